@@ -1,0 +1,1 @@
+//! Thin client library: ask for views, receive frames. Links no wgpu.

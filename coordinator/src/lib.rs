@@ -1,0 +1,1 @@
+//! The coordinator's service, the cluster's state and its pure schedule.

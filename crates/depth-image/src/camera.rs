@@ -1,0 +1,280 @@
+//! Camera models: a closed set. Whatever cannot be done for every pixel or point says so in its type.
+
+use glam::{Affine3A, Mat3A, Quat, UVec2, Vec2, Vec3, Vec3A, Vec4};
+use serde::{Deserialize, Serialize};
+
+/// The largest image side that any part of the system accepts.
+pub const MAX_IMAGE_SIDE_PX: u32 = 16_384;
+
+/// A half-line: `origin + t · direction`, `t >= 0`. The direction need not have unit length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin_in_world: Vec3,
+    /// Where it goes.
+    pub direction_in_world: Vec3,
+}
+
+impl Ray {
+    /// The point at parameter `t`.
+    #[must_use]
+    pub fn at(&self, t: f32) -> Vec3 {
+        self.origin_in_world + self.direction_in_world * t
+    }
+}
+
+/// A position in an image and the depth of what is there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PixelDepth {
+    /// Columns to the right, rows down; pixel centres at +0.5.
+    pub pixel: Vec2,
+    /// Along the camera's forward axis, metres, positive in front.
+    pub planar_depth_m: f32,
+}
+
+/// How an image maps to rays.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Camera {
+    /// Straight rays through one eye, with lens shift.
+    Pinhole(PinholeCamera),
+}
+
+impl Camera {
+    /// Where a point is seen; `None` behind the eye.
+    #[must_use]
+    pub fn project(&self, point_in_world: Vec3) -> Option<PixelDepth> {
+        match self {
+            Self::Pinhole(camera) => camera.project(point_in_world),
+        }
+    }
+
+    /// The point at a position and depth: the inverse of [`Camera::project`].
+    #[must_use]
+    pub fn unproject(&self, at: PixelDepth) -> Vec3 {
+        match self {
+            Self::Pinhole(camera) => camera.unproject(at),
+        }
+    }
+
+    /// The ray of a pixel, parametrised by planar depth; `None` where paths bend.
+    #[must_use]
+    pub fn straight_ray(&self, pixel: Vec2) -> Option<Ray> {
+        match self {
+            Self::Pinhole(camera) => Some(camera.ray(pixel)),
+        }
+    }
+}
+
+/// A pinhole camera; the principal point may lie anywhere (lens shift).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PinholeCamera {
+    /// The eye.
+    pub eye_in_world: Vec3,
+    /// Camera to world: looking down -Z, +Y up. Unit length.
+    pub world_from_camera: Quat,
+    /// Focal lengths in pixels, both positive.
+    pub focal_px: Vec2,
+    /// Where the forward axis meets the image, in pixels.
+    pub principal_px: Vec2,
+    /// Columns and rows.
+    pub size_px: UVec2,
+    /// What is closer is not seen, metres.
+    pub near_m: f32,
+}
+
+/// Why a camera cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CameraError {
+    /// NaN or infinite.
+    #[error("camera {field} is not finite")]
+    NotFinite {
+        /// Which.
+        field: &'static str,
+    },
+    /// Outside what the field allows.
+    #[error("camera {field} is {value}, must be {allowed}")]
+    OutOfRange {
+        /// Which.
+        field: &'static str,
+        /// What was given.
+        value: f64,
+        /// What would be right.
+        allowed: &'static str,
+    },
+}
+
+impl PinholeCamera {
+    /// A camera at `eye` that looks at `target`, with square pixels and a centred axis. `up` is used as
+    /// far as it is not parallel to the view.
+    #[must_use]
+    pub fn looking_at(eye: Vec3, target: Vec3, up: Vec3, fov_y_rad: f32, size_px: UVec2) -> Self {
+        let back = (eye - target).try_normalize().unwrap_or(Vec3::Z);
+        let right = up.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
+        let rotation = Mat3A::from_cols(right.into(), back.cross(right).into(), back.into());
+        let focal = size_px.y as f32 * 0.5 / (fov_y_rad * 0.5).tan();
+        Self {
+            eye_in_world: eye,
+            world_from_camera: Quat::from_mat3a(&rotation).normalize(),
+            focal_px: Vec2::splat(focal),
+            principal_px: size_px.as_vec2() * 0.5,
+            size_px,
+            near_m: 0.01,
+        }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the field that is not finite or out of range.
+    pub fn validate(&self) -> Result<(), CameraError> {
+        let finite = [
+            ("eye_in_world", self.eye_in_world.is_finite()),
+            ("world_from_camera", self.world_from_camera.is_finite()),
+            ("focal_px", self.focal_px.is_finite()),
+            ("principal_px", self.principal_px.is_finite()),
+            ("near_m", self.near_m.is_finite()),
+        ];
+        if let Some((field, _)) = finite.iter().find(|(_, ok)| !ok) {
+            return Err(CameraError::NotFinite { field });
+        }
+        let length = f64::from(self.world_from_camera.length());
+        let sides = self.size_px.min_element()..=self.size_px.max_element();
+        let focal = f64::from(self.focal_px.min_element());
+        let checks = [
+            ("world_from_camera", length, (length - 1.0).abs() < 1e-3, "of unit length"),
+            ("focal_px", focal, focal > 1e-3 && self.focal_px.max_element() < 1e7, "above 0.001 and below 1e7"),
+            ("principal_px", f64::from(self.principal_px.abs().max_element()), self.principal_px.abs().max_element() < 1e6, "within a million pixels"),
+            ("near_m", f64::from(self.near_m), self.near_m > 0.0, "above 0"),
+            ("size_px", f64::from(*sides.start()), *sides.start() >= 1, "at least 1"),
+            ("size_px", f64::from(*sides.end()), *sides.end() <= MAX_IMAGE_SIDE_PX, "at most 16384"),
+        ];
+        match checks.iter().find(|(_, _, ok, _)| !ok) {
+            Some(&(field, value, _, allowed)) => Err(CameraError::OutOfRange { field, value, allowed }),
+            None => Ok(()),
+        }
+    }
+
+    /// Pixels in the image.
+    #[must_use]
+    pub fn pixel_count(&self) -> usize {
+        self.size_px.x as usize * self.size_px.y as usize
+    }
+
+    /// Camera space to world space.
+    #[must_use]
+    pub fn world_from_camera_affine(&self) -> Affine3A {
+        Affine3A::from_rotation_translation(self.world_from_camera, self.eye_in_world)
+    }
+
+    /// Unit forward axis.
+    #[must_use]
+    pub fn forward_in_world(&self) -> Vec3 {
+        self.world_from_camera * Vec3::NEG_Z
+    }
+
+    /// Three rows that take `(point_in_world, 1)` to homogeneous pixels `(column · w, row · w, w)`, `w`
+    /// being the planar depth in metres.
+    #[must_use]
+    pub fn homogeneous_pixel_from_world(&self) -> [Vec4; 3] {
+        let right = self.world_from_camera * Vec3::X;
+        let down = self.world_from_camera * Vec3::NEG_Y;
+        let forward = self.forward_in_world();
+        let row = |axis: Vec3| axis.extend(-axis.dot(self.eye_in_world));
+        let depth = row(forward);
+        [
+            row(right) * self.focal_px.x + depth * self.principal_px.x,
+            row(down) * self.focal_px.y + depth * self.principal_px.y,
+            depth,
+        ]
+    }
+
+    /// Where a point is seen, inside the image or not; `None` at or behind the eye.
+    #[must_use]
+    pub fn project(&self, point_in_world: Vec3) -> Option<PixelDepth> {
+        let in_camera = self.world_from_camera.conjugate() * (point_in_world - self.eye_in_world);
+        let planar_depth_m = -in_camera.z;
+        (planar_depth_m > 0.0).then(|| PixelDepth {
+            pixel: self.principal_px + self.focal_px * Vec2::new(in_camera.x, -in_camera.y) / planar_depth_m,
+            planar_depth_m,
+        })
+    }
+
+    /// The point at a position and depth.
+    #[must_use]
+    pub fn unproject(&self, at: PixelDepth) -> Vec3 {
+        self.ray(at.pixel).at(at.planar_depth_m)
+    }
+
+    /// The ray of a pixel; its parameter is planar depth in metres.
+    #[must_use]
+    pub fn ray(&self, pixel: Vec2) -> Ray {
+        let slope = (pixel - self.principal_px) / self.focal_px;
+        let direction = self.world_from_camera * Vec3A::new(slope.x, -slope.y, -1.0);
+        Ray { origin_in_world: self.eye_in_world, direction_in_world: direction.into() }
+    }
+
+    /// Whether a position lies inside the image.
+    #[must_use]
+    pub fn contains(&self, pixel: Vec2) -> bool {
+        pixel.cmpge(Vec2::ZERO).all() && pixel.cmplt(self.size_px.as_vec2()).all()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shifted() -> PinholeCamera {
+        let mut camera = PinholeCamera::looking_at(Vec3::new(1.0, 2.0, 3.0), Vec3::new(-1.0, 0.5, -4.0), Vec3::Y, 0.8, UVec2::new(400, 300));
+        camera.principal_px += Vec2::new(37.5, -12.0);
+        camera
+    }
+
+    #[test]
+    fn unproject_inverts_project() {
+        let camera = shifted();
+        for i in 0..1000 {
+            let pixel = Vec2::new((i * 37 % 400) as f32 + 0.25, (i * 53 % 300) as f32 + 0.75);
+            let at = PixelDepth { pixel, planar_depth_m: 0.1 + i as f32 * 0.05 };
+            let back = camera.project(camera.unproject(at)).expect("in front");
+            assert!((back.pixel - at.pixel).length() < 2e-2, "{at:?} {back:?}");
+            assert!((back.planar_depth_m / at.planar_depth_m - 1.0).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn homogeneous_rows_agree_with_project() {
+        let camera = shifted();
+        let point = Vec3::new(-0.4, 0.2, -2.0);
+        let [u, v, w] = camera.homogeneous_pixel_from_world().map(|row| row.dot(point.extend(1.0)));
+        let at = camera.project(point).expect("in front");
+        assert!((Vec2::new(u, v) / w - at.pixel).length() < 1e-2);
+        assert!((w - at.planar_depth_m).abs() < 1e-5);
+    }
+
+    #[test]
+    fn behind_the_eye_is_nowhere() {
+        let camera = shifted();
+        assert_eq!(camera.project(camera.eye_in_world - camera.forward_in_world()), None);
+        assert_eq!(camera.project(camera.eye_in_world), None);
+    }
+
+    #[test]
+    fn bad_cameras_are_named() {
+        let good = shifted();
+        good.validate().expect("good");
+        let bad = [
+            (PinholeCamera { eye_in_world: Vec3::NAN, ..good }, "eye_in_world"),
+            (PinholeCamera { world_from_camera: Quat::from_xyzw(0.0, 0.0, 0.0, 0.0), ..good }, "world_from_camera"),
+            (PinholeCamera { focal_px: Vec2::new(0.0, 1.0), ..good }, "focal_px"),
+            (PinholeCamera { principal_px: Vec2::splat(f32::INFINITY), ..good }, "principal_px"),
+            (PinholeCamera { near_m: 0.0, ..good }, "near_m"),
+            (PinholeCamera { size_px: UVec2::new(0, 0), ..good }, "size_px"),
+            (PinholeCamera { size_px: UVec2::splat(65_535), ..good }, "size_px"),
+        ];
+        for (camera, field) in bad {
+            let error = camera.validate().expect_err(field);
+            assert!(error.to_string().contains(field), "{error}");
+        }
+    }
+}

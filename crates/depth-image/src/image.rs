@@ -1,0 +1,127 @@
+//! A depth image: what one sample camera saw. Holes are explicit.
+
+use glam::{UVec2, Vec3};
+
+use crate::{Camera, PixelDepth, linear_from_rgb9e5};
+
+/// Marks a texel that has *no sample*: it says nothing about what its ray meets.
+pub const HOLE_INVERSE_DEPTH: f32 = -1.0;
+/// Marks a texel whose ray was seen to meet nothing: free space all the way.
+pub const BACKGROUND_INVERSE_DEPTH: f32 = 0.0;
+
+/// Which surface a sample lies on: the redundancy key of Xie §3.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct SurfaceId {
+    /// Into the scene's instances.
+    pub instance: u32,
+    /// Triangle number within the instance's mesh.
+    pub primitive: u32,
+}
+
+/// What one texel holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Texel {
+    /// No sample: nothing is known.
+    Hole,
+    /// The ray meets no surface.
+    Background,
+    /// A surface.
+    Sample {
+        /// Along the forward axis.
+        planar_depth_m: f32,
+        /// Outgoing radiance, linear RGB.
+        color_linear: Vec3,
+    },
+}
+
+/// Planes of one size, rows top-down. Colour and inverse depth are always there; the others when a
+/// method asked for them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthImage {
+    /// What it was taken with; its size is the planes' size.
+    pub camera: Camera,
+    /// Per metre of planar depth; [`BACKGROUND_INVERSE_DEPTH`] or [`HOLE_INVERSE_DEPTH`] otherwise.
+    pub inverse_depth_per_m: Vec<f32>,
+    /// RGB9E5, linear.
+    pub color_rgb9e5: Vec<u32>,
+    /// Octahedral unit normals in world space, two signed 16-bit numbers.
+    pub normal_oct16: Option<Vec<u32>>,
+    /// Surface keys; meaningless where there is no sample.
+    pub surface_id: Option<Vec<SurfaceId>>,
+}
+
+/// Why planes do not make a depth image.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DepthImageError {
+    /// A plane's length is not width times height.
+    #[error("depth image plane {plane} has {len} texels, the camera {expected}")]
+    PlaneSize {
+        /// Which.
+        plane: &'static str,
+        /// Texels given.
+        len: usize,
+        /// Texels of the camera.
+        expected: usize,
+    },
+}
+
+impl DepthImage {
+    /// Checks that all planes have the camera's size.
+    ///
+    /// # Errors
+    /// Names the first plane that has not.
+    pub fn validate(&self) -> Result<(), DepthImageError> {
+        let expected = self.size_px().element_product() as usize;
+        let planes = [
+            ("inverse_depth", Some(self.inverse_depth_per_m.len())),
+            ("color", Some(self.color_rgb9e5.len())),
+            ("normal", self.normal_oct16.as_ref().map(Vec::len)),
+            ("surface_id", self.surface_id.as_ref().map(Vec::len)),
+        ];
+        match planes.into_iter().find_map(|(plane, len)| len.filter(|&len| len != expected).map(|len| (plane, len))) {
+            Some((plane, len)) => Err(DepthImageError::PlaneSize { plane, len, expected }),
+            None => Ok(()),
+        }
+    }
+
+    /// Columns and rows.
+    #[must_use]
+    pub fn size_px(&self) -> UVec2 {
+        match &self.camera {
+            Camera::Pinhole(camera) => camera.size_px,
+        }
+    }
+
+    /// What the texel at column `x`, row `y` holds.
+    #[must_use]
+    pub fn texel(&self, x: u32, y: u32) -> Texel {
+        let index = (y * self.size_px().x + x) as usize;
+        match self.inverse_depth_per_m[index] {
+            inverse if inverse > 0.0 => Texel::Sample {
+                planar_depth_m: inverse.recip(),
+                color_linear: linear_from_rgb9e5(self.color_rgb9e5[index]),
+            },
+            BACKGROUND_INVERSE_DEPTH => Texel::Background,
+            _ => Texel::Hole,
+        }
+    }
+
+    /// The point in the world that a texel's sample lies at.
+    #[must_use]
+    pub fn sample_in_world(&self, x: u32, y: u32) -> Option<Vec3> {
+        let Texel::Sample { planar_depth_m, .. } = self.texel(x, y) else { return None };
+        let pixel = UVec2::new(x, y).as_vec2() + 0.5;
+        Some(self.camera.unproject(PixelDepth { pixel, planar_depth_m }))
+    }
+
+    /// Finite, positive inverse depths: least and greatest; `None` where no texel has a sample.
+    #[must_use]
+    pub fn inverse_depth_range(&self) -> Option<(f32, f32)> {
+        let samples = self.inverse_depth_per_m.iter().copied().filter(|&d| d > 0.0);
+        samples.fold(None, |range, d| {
+            let (least, greatest) = range.unwrap_or((d, d));
+            Some((d.min(least), d.max(greatest)))
+        })
+    }
+}

@@ -1,0 +1,16 @@
+//! Camera models, depth images with explicit holes, and the scalar reference of project, unproject
+//! and intersect.
+//!
+//! Spaces: world is right-handed, metres, +Y up; a camera looks down its -Z. Pixels run top-down with
+//! centres at +0.5. *Planar depth* is the distance along the camera's forward axis; *inverse depth* its
+//! reciprocal, which is linear in screen space on planes and along projected rays.
+
+mod bounds;
+mod camera;
+mod color;
+mod image;
+
+pub use bounds::Aabb;
+pub use camera::{Camera, CameraError, PinholeCamera, PixelDepth, Ray, MAX_IMAGE_SIDE_PX};
+pub use color::{linear_from_rgb9e5, linear_from_srgb8, rgb9e5_from_linear, srgb8_from_linear};
+pub use image::{DepthImage, DepthImageError, SurfaceId, Texel, BACKGROUND_INVERSE_DEPTH, HOLE_INVERSE_DEPTH};

@@ -1,0 +1,1 @@
+//! The wgpu device, WGSL templates, frames of passes, read-back and timing.

@@ -1,0 +1,1 @@
+//! What every service shares: configuration, logging, health, measured costs, drain.

@@ -1,0 +1,1 @@
+//! Triangles on the GPU: what sampling and direct rendering share.

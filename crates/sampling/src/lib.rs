@@ -1,0 +1,1 @@
+//! Sampling methods (scene to depth images) and sample-camera rigs.

@@ -1,0 +1,188 @@
+//! The scene itself: plain data, the same on every node.
+
+use glam::{Affine3A, DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// Everything that can be rendered. All indices are valid once a scene has been made by this crate.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Scene {
+    /// What to call it in reports.
+    pub name: String,
+    /// Triangle meshes in their own space.
+    pub meshes: Vec<Mesh>,
+    /// Placements of meshes in the world.
+    pub instances: Vec<Instance>,
+    /// Surface descriptions; never empty.
+    pub materials: Vec<Material>,
+    /// Images that materials refer to.
+    pub textures: Vec<Texture>,
+    /// Light sources.
+    pub lights: Vec<Light>,
+    /// Light that reaches every surface from everywhere, linear RGB radiance.
+    pub ambient_linear: Vec3,
+    /// Colour where no surface is seen, linear RGB.
+    pub background_linear: Vec3,
+    /// Cameras that the source file listed.
+    pub cameras: Vec<SourceCamera>,
+    /// Motion as a function of scene time; `None` for a static scene.
+    pub wind: Option<Wind>,
+    /// The point of the source file's space that lies at the world's origin here.
+    pub origin_in_source: DVec3,
+}
+
+/// Indexed triangles, split into runs of one material.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Mesh {
+    /// Corner data.
+    pub vertices: Vec<Vertex>,
+    /// Three indices into `vertices` a triangle, counter-clockwise seen from the front.
+    pub indices: Vec<u32>,
+    /// Runs of `indices`; together they cover it in order.
+    pub parts: Vec<MeshPart>,
+}
+
+/// A run of triangles with one material.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MeshPart {
+    /// First of its entries in [`Mesh::indices`]; a multiple of three.
+    pub first_index: u32,
+    /// How many entries; a multiple of three.
+    pub index_count: u32,
+    /// Into [`Scene::materials`].
+    pub material: u32,
+}
+
+/// One corner. `#[repr(C)]`, 40 bytes: uploaded as it is.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Vertex {
+    /// In the mesh's space, metres.
+    pub position: [f32; 3],
+    /// Unit length, in the mesh's space.
+    pub normal: [f32; 3],
+    /// Texture coordinates, (0,0) at the image's top left corner.
+    pub uv: [f32; 2],
+    /// Vertex colour, sRGB-encoded RGB and linear alpha; white where the source has none.
+    pub color_srgba8: [u8; 4],
+    /// How far the wind moves this vertex, 0 (rooted) to 1.
+    pub sway: f32,
+}
+
+/// A mesh placed in the world.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Instance {
+    /// Into [`Scene::meshes`].
+    pub mesh: u32,
+    /// Finite and invertible.
+    pub world_from_mesh: Affine3A,
+}
+
+/// A surface: metallic-roughness as in glTF 2.0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Material {
+    /// The source's name, for messages.
+    pub name: String,
+    /// Multiplies texture and vertex colour; linear RGB and alpha.
+    pub base_color_linear: [f32; 4],
+    /// Into [`Scene::textures`]; sRGB.
+    pub base_color_texture: Option<u32>,
+    /// 0 dielectric, 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness, 0 to 1.
+    pub roughness: f32,
+    /// Linear RGB radiance given off.
+    pub emissive_linear: Vec3,
+    /// Blinn-Phong specular strength and exponent for `phong` lighting.
+    pub phong_specular: f32,
+    /// See `phong_specular`.
+    pub phong_exponent: f32,
+    /// Fragments with less alpha than this are not there; 0 for opaque surfaces.
+    pub alpha_cutoff: f32,
+    /// Whether the back is seen too (its normal then faces the viewer).
+    pub double_sided: bool,
+    /// Shown as it is, whatever the light (`KHR_materials_unlit`).
+    pub unlit: bool,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color_linear: [1.0; 4],
+            base_color_texture: None,
+            metallic: 0.0,
+            roughness: 1.0,
+            emissive_linear: Vec3::ZERO,
+            phong_specular: 0.0,
+            phong_exponent: 32.0,
+            alpha_cutoff: 0.0,
+            double_sided: false,
+            unlit: false,
+        }
+    }
+}
+
+/// An image, rows top-down.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Texture {
+    /// Columns, at least 1.
+    pub width_px: u32,
+    /// Rows, at least 1.
+    pub height_px: u32,
+    /// `width_px * height_px` texels, sRGB-encoded RGB and linear alpha.
+    pub srgba8: Vec<u8>,
+}
+
+/// A light source. Intensities are linear RGB and finite, never negative.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Light {
+    /// Parallel light, as from the sun.
+    Directional {
+        /// Unit vector from a surface towards the light.
+        towards_light_in_world: Vec3,
+        /// Reflected radiance of a white surface that faces the light.
+        irradiance_linear: Vec3,
+    },
+    /// A small lamp; falls off with the square of the distance.
+    Point {
+        /// Where it is.
+        position_in_world: Vec3,
+        /// As `irradiance_linear`, at a distance of one metre.
+        intensity_linear: Vec3,
+    },
+}
+
+/// A camera named by the source file, for use as a view.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SourceCamera {
+    /// The source's name, or its number.
+    pub name: String,
+    /// Camera to world: looking down -Z, +Y up.
+    pub world_from_camera: Affine3A,
+    /// Full vertical field of view, radians.
+    pub fov_y_rad: f32,
+}
+
+/// Sway of vegetation: a vertex moves by
+/// `direction · amplitude · sway · sin(2π (frequency · time + waves_per_m · position_in_world))`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Wind {
+    /// Unit vector.
+    pub direction_in_world: Vec3,
+    /// Largest displacement, metres.
+    pub amplitude_m: f32,
+    /// Swings a second.
+    pub frequency_hz: f32,
+    /// Spatial phase: a travelling wave's wave vector over 2π, per metre.
+    pub waves_per_m: Vec3,
+}
+
+impl Wind {
+    /// How far a vertex at rest at `position_in_world` is displaced at `scene_time_s`; the vertex
+    /// shader's twin.
+    #[must_use]
+    pub fn displacement_in_world(&self, position_in_world: Vec3, sway: f32, scene_time_s: f32) -> Vec3 {
+        let turns = self.frequency_hz * scene_time_s + self.waves_per_m.dot(position_in_world);
+        self.direction_in_world * (self.amplitude_m * sway * (std::f32::consts::TAU * turns.fract()).sin())
+    }
+}

@@ -1,0 +1,2 @@
+//! Myriorama: the one program.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Whole-project tests: architecture and clusters on real processes and ports.
