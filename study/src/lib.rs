@@ -1,1 +1,39 @@
-//! Speed against accuracy: reports, checks and charts.
+//! Reports: what `demo`, `bench` and `study` leave behind.
+//!
+//! A caller gathers numbers into a [`Report`]: tables, [`Check`]s against a bar, [`Chart`]s, pictures.
+//! [`Report::write`] makes files of them (`report.json`, a CSV a table, an SVG a chart, PNGs and an
+//! `index.html`), [`Report::finish`] also prints the checks. Nothing here measures, and nothing draws on a
+//! GPU: data in, files out. The format is described in `docs/report-format.md`.
+//!
+//! Charts share one look: a name has the same colour in all of them ([`Palette`]), axes carry units, and
+//! what was extrapolated is dashed.
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod chart;
+mod check;
+mod check_text;
+mod error;
+mod html;
+mod number;
+mod picture;
+mod report;
+mod slug;
+mod table;
+mod write;
+
+pub use chart::{
+    Axis, BarChart, Better, Chart, Limit, Mark, Palette, Point, Scale, Series, Stage, XyChart,
+    pareto_front,
+};
+pub use check::{Bar, Check, Outcome};
+pub use check_text::checks_text;
+pub use error::ReportError;
+pub use number::format_number;
+pub use picture::{
+    Picture, PictureRow, Provenance, comparison_row, contact_sheet, depth_false_color, error_map,
+    provenance_false_color, rgb_image,
+};
+pub use report::{Report, SCHEMA_VERSION};
+pub use slug::slug;
+pub use table::{Cell, Column, Table};

@@ -1,1 +1,16 @@
 //! The wgpu device, WGSL templates, frames of passes, read-back and timing.
+//!
+//! A pass records into a [`Frame`] and never submits or reads back; whoever owns the frame does, once
+//! for many passes. Shaders are [templates](Templates): numbers that are known when a pipeline is
+//! built (how many cameras, which planes) are written into the text, because indexing cameras
+//! dynamically costs several times as much as naming them.
+
+mod device;
+mod frame;
+mod pool;
+mod template;
+
+pub use device::{DevicePreference, Gpu, GpuError};
+pub use frame::{Frame, FrameResult, Readback, Submitted};
+pub use pool::{BufferPool, PooledBuffer};
+pub use template::{TemplateError, Templates};

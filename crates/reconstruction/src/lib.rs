@@ -1,1 +1,51 @@
 //! Reconstruction methods: depth images to views.
+//!
+//! [`Reconstructor::upload`] puts one complete sample set on the device with a min-max pyramid a camera;
+//! [`Reconstructor::reconstruct`] draws views from it, many in one submission. Each method is one enum
+//! variant, one `.rs` and `.wgsl` pair, and has a scalar twin.
+
+mod layout;
+mod method;
+mod pyramid;
+mod reconstructor;
+mod sample_set;
+mod shaders;
+
+pub use method::{ReconstructionMethod, UnknownMethod};
+pub use pyramid::{CodedDepth, Pyramid};
+pub use reconstructor::{Reconstructor, Statistics};
+pub use sample_set::{MAX_SAMPLE_CAMERAS, SampleSet};
+pub use shaders::{SHADERS, ShaderKey, shader_text};
+
+/// Why views cannot be reconstructed.
+#[derive(Debug, thiserror::Error)]
+pub enum ReconstructionError {
+    /// The device's fault or limit.
+    #[error(transparent)]
+    Gpu(#[from] gpu::GpuError),
+    /// A shader that cannot be written out.
+    #[error(transparent)]
+    Template(#[from] gpu::TemplateError),
+    /// A camera that cannot be used.
+    #[error("view camera {index}: {source}")]
+    Camera {
+        /// Its place in the request.
+        index: usize,
+        /// What is wrong with it.
+        source: depth_image::CameraError,
+    },
+    /// A sample image that cannot be used.
+    #[error("sample image {index}: {reason}")]
+    Sample {
+        /// Its place in the set.
+        index: usize,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// Too many or too few images.
+    #[error("a sample set holds 1 to {MAX_SAMPLE_CAMERAS} images, not {0}")]
+    SampleCount(usize),
+    /// No volume to search.
+    #[error("the volume of the sample set is empty or not finite")]
+    Volume,
+}

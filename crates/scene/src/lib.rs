@@ -3,7 +3,28 @@
 //!
 //! World space is right-handed, in metres, +Y up (glTF). Positions are `f32` around
 //! [`Scene::origin_in_source`], so that geometry in national-grid coordinates loses no precision.
+//!
+//! Every scene that comes from outside, from a file ([`load_file`]) or from a peer ([`unpack`]), has
+//! passed [`Scene::validate`]; sizes are checked against [`Limits`] before memory is taken for them,
+//! and what does not pass is a [`SceneError`] that names the file, the element and the reason.
 
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod error;
+mod import;
+mod light_rig;
+mod limits;
+mod measure;
 mod model;
+mod package;
+pub mod procedural;
+mod spec;
+mod validate;
 
+pub use error::{SceneError, SceneErrorKind};
+pub use import::load_file;
+pub use limits::Limits;
 pub use model::*;
+pub use package::{Package, PackageStore, SceneHash, SceneHashError, pack, unpack};
+pub use spec::{BUILT_IN_NAMES, SceneSpec};
+pub use validate::MAX_COORDINATE_M;

@@ -54,7 +54,9 @@ pub struct MeshPart {
 
 /// One corner. `#[repr(C)]`, 40 bytes: uploaded as it is.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Serialize, Deserialize, bytemuck::Pod, bytemuck::Zeroable,
+)]
 pub struct Vertex {
     /// In the mesh's space, metres.
     pub position: [f32; 3],
@@ -73,7 +75,8 @@ pub struct Vertex {
 pub struct Instance {
     /// Into [`Scene::meshes`].
     pub mesh: u32,
-    /// Finite and invertible.
+    /// Finite and invertible, and not a mirror: its determinant is positive, so that counter-clockwise
+    /// stays counter-clockwise.
     pub world_from_mesh: Affine3A,
 }
 
@@ -119,6 +122,24 @@ impl Default for Material {
             double_sided: false,
             unlit: false,
         }
+    }
+}
+
+impl Material {
+    /// Blinn-Phong strength and exponent whose highlight is about as bright and wide as that of a
+    /// metallic-roughness surface.
+    #[must_use]
+    pub fn phong_from_metallic_roughness(metallic: f32, roughness: f32) -> (f32, f32) {
+        // Blinn-Phong and GGX agree near the peak for exponent = 2 / alpha^2 - 2 (Karis 2013).
+        let alpha = (roughness * roughness).max(0.03);
+        let strength = (0.08 + 0.6 * metallic) * (1.0 - roughness);
+        (strength, (2.0 / (alpha * alpha) - 2.0).clamp(1.0, 1024.0))
+    }
+
+    /// The perceptual roughness that goes with a Blinn-Phong exponent.
+    #[must_use]
+    pub fn roughness_from_phong_exponent(exponent: f32) -> f32 {
+        (2.0 / (exponent.max(0.0) + 2.0)).powf(0.25).clamp(0.0, 1.0)
     }
 }
 
@@ -181,8 +202,14 @@ impl Wind {
     /// How far a vertex at rest at `position_in_world` is displaced at `scene_time_s`; the vertex
     /// shader's twin.
     #[must_use]
-    pub fn displacement_in_world(&self, position_in_world: Vec3, sway: f32, scene_time_s: f32) -> Vec3 {
+    pub fn displacement_in_world(
+        &self,
+        position_in_world: Vec3,
+        sway: f32,
+        scene_time_s: f32,
+    ) -> Vec3 {
         let turns = self.frequency_hz * scene_time_s + self.waves_per_m.dot(position_in_world);
-        self.direction_in_world * (self.amplitude_m * sway * (std::f32::consts::TAU * turns.fract()).sin())
+        self.direction_in_world
+            * (self.amplitude_m * sway * (std::f32::consts::TAU * turns.fract()).sin())
     }
 }

@@ -1,1 +1,36 @@
 //! The wire contract: generated messages, domain conversions, the depth codec and the frame codec.
+//!
+//! Only this crate names prost messages. Everything else sees domain types, made from messages with
+//! typed errors that name the field, and the services of [`rpc`] in terms of them.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod codec;
+mod error;
+mod frame;
+mod geometry;
+pub mod limits;
+mod membership;
+mod plan;
+mod proto;
+pub mod rpc;
+mod sample;
+mod scene;
+mod session;
+mod view;
+mod workload;
+
+#[cfg(test)]
+mod conventions_tests;
+#[cfg(test)]
+mod message_tests;
+
+pub use codec::*;
+pub use error::WireError;
+pub use frame::{FrameAssembly, FrameHeader, FramePart, RenderViews, RequestedView, StageTimes, WholeFrame};
+pub use membership::{ClusterStatus, JoinCluster, MeasureCosts, NodeStatus, Ready, Welcome};
+pub use plan::{Assignment, CompositorShare, Policy, SamplerShare, SetContent};
+pub use sample::FetchImages;
+pub use scene::{FetchScene, SceneAssembly, SceneHash, ScenePart, SceneRef};
+pub use session::{PolicyChoice, SessionEvent, SessionPlan, SessionRequest, SessionStage};
+pub use view::{EncodedView, ViewCodecError, decode_view, encode_view};
+pub use workload::{Costs, Timeline, Workload};

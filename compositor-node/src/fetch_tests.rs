@@ -1,0 +1,144 @@
+//! A sampler that sends what it should not, over a real port.
+
+use std::time::Duration;
+
+use depth_image::{Aabb, Camera, PinholeCamera};
+use glam::{UVec2, Vec3};
+use tokio::net::TcpListener;
+use tokio_stream::StreamExt as _;
+use tokio_util::sync::CancellationToken;
+use tonic::service::Routes;
+use tonic::{Code, async_trait};
+use wire::rpc::{Messages, Sampler, sampler_server};
+use wire::{
+    Chunk, ChunkBody, PlaneSet, Policy, SceneHash, SceneRef, Timeline, Workload, encode_depth_image, split_into_chunks,
+};
+
+use super::*;
+
+type Spoil = fn(&mut Vec<Chunk>);
+
+fn camera() -> Camera {
+    Camera::Pinhole(PinholeCamera::looking_at(
+        Vec3::Z,
+        Vec3::ZERO,
+        Vec3::Y,
+        1.0,
+        UVec2::splat(16),
+    ))
+}
+
+/// Chunks of two images of set 0 of plan 5, the right ones.
+fn right() -> Vec<Chunk> {
+    let image = DepthImage {
+        camera: camera(),
+        inverse_depth_per_m: vec![0.5; 256],
+        color_rgb9e5: (0..256).collect(),
+        normal_oct16: None,
+        surface_id: None,
+    };
+    let encoded = encode_depth_image(&image, PlaneSet::ALL).unwrap();
+    let id = SampleSetId {
+        plan_epoch: 5,
+        index: 0,
+    };
+    (0..2)
+        .flat_map(|index| split_into_chunks(id, index, encoded.clone()))
+        .collect()
+}
+
+/// Sends chunks as they are, and then says nothing more.
+struct Script {
+    chunks: Vec<Chunk>,
+    stays_open: bool,
+}
+
+#[async_trait]
+impl Sampler for Script {
+    async fn fetch_sample_images(&self, _request: FetchImages) -> Result<Messages<Chunk>, Status> {
+        let chunks = tokio_stream::iter(self.chunks.clone()).map(Ok);
+        Ok(if self.stays_open {
+            Box::pin(chunks.chain(tokio_stream::pending()))
+        } else {
+            Box::pin(chunks)
+        })
+    }
+}
+
+async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Status> {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = format!("http://{}", listener.local_addr().unwrap());
+    let shutdown = CancellationToken::new();
+    let routes = Routes::new(sampler_server(Script { chunks, stays_open }));
+    let _server = tokio::spawn(node::serve(listener, routes, false, shutdown.clone()));
+    let workload = Workload {
+        scene: SceneRef {
+            hash: SceneHash::of(b""),
+            package_bytes: 0,
+        },
+        sample_cameras: vec![camera(); 2],
+        sampling: "conventional".to_owned(),
+        lighting: "unlit".to_owned(),
+        method: "joint_carve".to_owned(),
+        codec: "lz4".to_owned(),
+        volume: Aabb {
+            min: Vec3::NEG_ONE,
+            max: Vec3::ONE,
+        },
+        background_linear: Vec3::ZERO,
+        timeline: Timeline::still(0.0),
+    };
+    let share = SamplerShare {
+        node_name: "n7".to_owned(),
+        address,
+        image_indices: vec![0, 1],
+    };
+    let plan = Arc::new(Assignment {
+        plan_epoch: 5,
+        policy: Policy::Pipeline,
+        workload,
+        samplers: vec![share],
+        compositors: Vec::new(),
+    });
+    let deadlines = Deadlines {
+        chunk: Duration::from_millis(200),
+        ..Deadlines::default()
+    };
+    let set = fetch_set(&plan, 0, &Arc::default(), deadlines).await;
+    shutdown.cancel();
+    set
+}
+
+#[tokio::test]
+async fn a_whole_set_arrives() {
+    assert_eq!(fetched(right(), false).await.unwrap().images.len(), 2);
+}
+
+#[tokio::test]
+async fn spoilt_chunks_are_refused_by_name() {
+    let spoilt: [(&str, Spoil); 8] = [
+        ("corrupt", |c| c[1].body = ChunkBody::Data(vec![0; 30].into())),
+        ("truncated", |c| drop(c.pop())),
+        ("reordered", |c| c.swap(0, 1)),
+        ("repeated", |c| c.insert(1, c[0].clone())),
+        ("repeated image", |c| c.extend_from_within(0..2)),
+        ("old plan", |c| {
+            c.iter_mut().for_each(|c| c.sample_set_id.plan_epoch = 4)
+        }),
+        ("another set", |c| c.iter_mut().for_each(|c| c.sample_set_id.index = 1)),
+        ("another image", |c| c.iter_mut().for_each(|c| c.image_index += 7)),
+    ];
+    for (what, spoil) in spoilt {
+        let mut chunks = right();
+        spoil(&mut chunks);
+        let refused = fetched(chunks, false).await.expect_err(what);
+        assert_eq!(refused.code(), Code::DataLoss, "{what}: {refused}");
+        assert!(refused.message().contains("sampler n7"), "{what}: {refused}");
+    }
+}
+
+#[tokio::test]
+async fn slow_chunks_have_a_deadline() {
+    let refused = fetched(right()[..3].to_vec(), true).await.expect_err("silent");
+    assert_eq!(refused.code(), Code::DeadlineExceeded, "{refused}");
+}

@@ -1,0 +1,103 @@
+//! Sample sets on the device: complete or not there at all.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use node::{Connections, Deadlines, Engine, UploadedSet, blocking};
+use tokio::sync::OnceCell;
+use tonic::Status;
+use wire::{Assignment, SetContent};
+
+use crate::fetch::fetch_set;
+
+/// The one that is shown, the next, and one that late views still need.
+const KEPT_SETS: usize = 3;
+
+/// A complete set, ready to be reconstructed from.
+pub(crate) type ReadySet = Arc<dyn UploadedSet>;
+
+type Cell = Arc<OnceCell<ReadySet>>;
+
+/// The last few sets.
+pub(crate) struct Sets {
+    engine: Arc<dyn Engine>,
+    connections: Arc<Connections>,
+    deadlines: Deadlines,
+    kept: Mutex<VecDeque<(SetContent, Cell)>>,
+}
+
+impl Sets {
+    pub(crate) fn new(engine: Arc<dyn Engine>, deadlines: Deadlines) -> Self {
+        Self {
+            engine,
+            connections: Arc::default(),
+            deadlines,
+            kept: Mutex::default(),
+        }
+    }
+
+    /// A set, once it is completely there; the one after it is then fetched ahead, so that samplers
+    /// work on it while this one is shown.
+    pub(crate) async fn get(self: &Arc<Self>, plan: &Arc<Assignment>, set_index: u32) -> Result<ReadySet, Status> {
+        let set = self.load(plan, set_index).await?;
+        let (sets, plan, next) = (self.clone(), plan.clone(), set_index + 1);
+        if next < plan.workload.timeline.set_count && plan.set_content(next) != plan.set_content(set_index) {
+            tokio::spawn(async move {
+                if let Err(status) = sets.load(&plan, next).await {
+                    tracing::debug!(set_index = next, reason = status.message(), "not fetched ahead");
+                }
+            });
+        }
+        Ok(set)
+    }
+
+    /// Loads once, however many wait; goes on when the first of them leaves.
+    async fn load(self: &Arc<Self>, plan: &Arc<Assignment>, set_index: u32) -> Result<ReadySet, Status> {
+        let content = plan
+            .set_content(set_index)
+            .ok_or_else(|| Status::invalid_argument(format!("set_index {set_index} is beyond the timeline")))?;
+        let cell = self.cell(content);
+        if let Some(set) = cell.get() {
+            return Ok(set.clone());
+        }
+        let (sets, plan) = (self.clone(), plan.clone());
+        let loading = tokio::spawn(async move {
+            cell.get_or_try_init(|| sets.fetch_and_upload(&plan, set_index))
+                .await
+                .cloned()
+        });
+        loading
+            .await
+            .map_err(|error| Status::internal(format!("loading a sample set failed: {error}")))?
+    }
+
+    async fn fetch_and_upload(&self, plan: &Arc<Assignment>, set_index: u32) -> Result<ReadySet, Status> {
+        let start = Instant::now();
+        let set = fetch_set(plan, set_index, &self.connections, self.deadlines).await?;
+        let fetched_s = start.elapsed().as_secs_f64();
+        let engine = self.engine.clone();
+        let ready = blocking(move || engine.upload(&set)).await?;
+        tracing::debug!(
+            set_index,
+            fetched_s,
+            total_s = start.elapsed().as_secs_f64(),
+            "sample set ready"
+        );
+        Ok(ready)
+    }
+
+    fn cell(&self, content: SetContent) -> Cell {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let at = kept.iter().position(|(other, _)| *other == content);
+        let entry = at
+            .and_then(|at| kept.remove(at))
+            .unwrap_or_else(|| (content, Cell::default()));
+        let cell = entry.1.clone();
+        kept.push_back(entry);
+        if kept.len() > KEPT_SETS {
+            kept.pop_front();
+        }
+        cell
+    }
+}

@@ -1,0 +1,67 @@
+//! What the coordinator is given.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use depth_image::{Aabb, Camera};
+use glam::Vec3;
+use wire::{SceneHash, SceneRef};
+
+/// The coordinator's configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CoordinatorConfig {
+    /// Allows another bind address than loopback, without TLS.
+    pub insecure_bind: bool,
+    /// How long one node may measure.
+    pub measure_deadline: Duration,
+    /// How long nodes may take to load a scene and get ready.
+    pub ready_deadline: Duration,
+}
+
+impl Default for CoordinatorConfig {
+    fn default() -> Self {
+        Self {
+            insecure_bind: false,
+            measure_deadline: Duration::from_secs(600),
+            ready_deadline: Duration::from_secs(300),
+        }
+    }
+}
+
+/// The scene that the cluster shows. Its contents are the nodes' business.
+#[derive(Debug, Clone)]
+pub struct SceneOffer {
+    /// Of the package.
+    pub hash: SceneHash,
+    /// The package.
+    pub package: Bytes,
+    /// Sample cameras for sessions that bring none.
+    pub rig: Vec<Camera>,
+    /// What reconstruction looks at, unless a session says otherwise.
+    pub volume: Aabb,
+    /// What rays meet that leave the scene.
+    pub background_linear: Vec3,
+}
+
+impl SceneOffer {
+    /// Computes the hash.
+    #[must_use]
+    pub fn new(package: Bytes, rig: Vec<Camera>, volume: Aabb, background_linear: Vec3) -> Self {
+        Self {
+            hash: SceneHash::of(&package),
+            package,
+            rig,
+            volume,
+            background_linear,
+        }
+    }
+
+    /// Its name and size.
+    #[must_use]
+    pub fn scene(&self) -> SceneRef {
+        SceneRef {
+            hash: self.hash.clone(),
+            package_bytes: self.package.len() as u64,
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Writes the pairs of `tests/agreement` as binary PPM files into a folder, and prints what this crate
+//! makes of them. `tests/agreement/reference_values.py` prints what others make of the files.
+//!
+//! With a second argument, compares two PPM files instead.
+
+#[path = "../tests/agreement/pairs.rs"]
+mod pairs;
+
+use std::path::Path;
+
+use metrics::{Rgb8Image, compare};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match arguments.as_slice() {
+        [folder] => write_pairs(Path::new(folder)),
+        [reference, test] => print_comparison(test, &read_ppm(reference)?, &read_ppm(test)?),
+        _ => Err("give a folder, or two PPM files".into()),
+    }
+}
+
+fn write_pairs(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    std::fs::create_dir_all(folder)?;
+    for pair in pairs::all() {
+        let write = |side: &str, pixels: &[u8]| {
+            let header = format!("P6\n{} {}\n255\n", pair.width, pair.height);
+            std::fs::write(
+                folder.join(format!("{}_{side}.ppm", pair.name)),
+                [header.as_bytes(), pixels].concat(),
+            )
+        };
+        write("reference", &pair.reference)?;
+        write("test", &pair.test)?;
+        let image = |pixels| Rgb8Image::new(pair.width as u32, pair.height as u32, pixels);
+        print_comparison(pair.name, &image(pair.reference)?, &image(pair.test)?)?;
+    }
+    Ok(())
+}
+
+fn print_comparison(
+    name: &str,
+    reference: &Rgb8Image,
+    test: &Rgb8Image,
+) -> Result<(), Box<dyn std::error::Error>> {
+    println!("{name} {:?}", compare(reference, test, None)?.overall);
+    Ok(())
+}
+
+/// The header must be as this program writes it: three lines, no comments.
+fn read_ppm(path: &str) -> Result<Rgb8Image<'static>, Box<dyn std::error::Error>> {
+    let bytes = std::fs::read(path)?;
+    let mut lines = bytes.splitn(4, |&byte| byte == b'\n');
+    let mut line = || lines.next().ok_or("short file");
+    let (_magic, size, _maximum, pixels) = (line()?, line()?, line()?, line()?);
+    let (width, height) = std::str::from_utf8(size)?
+        .split_once(' ')
+        .ok_or("no size")?;
+    Ok(Rgb8Image::new(
+        width.parse()?,
+        height.parse()?,
+        pixels.to_vec(),
+    )?)
+}

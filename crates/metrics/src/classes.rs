@@ -1,0 +1,298 @@
+//! Pixel classes: which part of an error is due to edges, to what no sample camera saw, and to neither.
+
+use depth_image::{DepthImage, PinholeCamera, PixelDepth};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::{MetricsError, error::expect_len, steps::step_pixels};
+
+/// What a pixel of the reference shows. Decided in this order: the first that holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PixelClass {
+    /// Within 2 px of a step in the reference's inverse depth ([`crate::step_pixels`]), on either side.
+    Silhouette,
+    /// A surface that matches no sample camera's depth.
+    Disoccluded,
+    /// Any other surface.
+    Covered,
+    /// No surface.
+    Background,
+}
+
+impl PixelClass {
+    /// All, in order.
+    pub const ALL: [Self; 4] = [
+        Self::Silhouette,
+        Self::Disoccluded,
+        Self::Covered,
+        Self::Background,
+    ];
+
+    /// As in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Silhouette => "silhouette",
+            Self::Disoccluded => "disoccluded",
+            Self::Covered => "covered",
+            Self::Background => "background",
+        }
+    }
+}
+
+/// How far a point may be from a sample's depth, in units of `z / f`, three texel footprints…
+const MATCH_FOOTPRINTS: f32 = 3.0;
+/// …or as a share of its depth, whichever is more.
+const MATCH_RELATIVE: f32 = 0.01;
+
+/// Classifies every pixel of a reference.
+///
+/// `reference_inverse_depth` is per metre of planar depth: above 0 a surface, anything else background. A
+/// point matches a sample camera if the texel that it projects into holds a depth within
+/// `max(3·z/f, 1 %)` of the point's own depth `z` there. A hole matches nothing: in a non-redundant set the
+/// point's sample is in another image.
+///
+/// # Errors
+/// Planes that do not fit their cameras.
+pub fn classify(
+    reference_camera: &PinholeCamera,
+    reference_inverse_depth: &[f32],
+    sample_images: &[DepthImage],
+) -> Result<Vec<PixelClass>, MetricsError> {
+    expect_len(
+        "reference depth",
+        reference_inverse_depth.len(),
+        reference_camera.pixel_count(),
+    )?;
+    for (index, image) in sample_images.iter().enumerate() {
+        image
+            .validate()
+            .map_err(|source| MetricsError::SampleImage { index, source })?;
+    }
+    let width_px = reference_camera.size_px.x;
+    let near_step = step_pixels(reference_inverse_depth, width_px);
+    let pixels = reference_inverse_depth
+        .par_iter()
+        .zip(&near_step)
+        .enumerate();
+    Ok(pixels
+        .map(
+            |(index, (&inverse_depth, &near_step))| match inverse_depth > 0.0 {
+                _ if near_step => PixelClass::Silhouette,
+                false => PixelClass::Background,
+                true => surface_class(
+                    surface_point(reference_camera, index, inverse_depth),
+                    sample_images,
+                ),
+            },
+        )
+        .collect())
+}
+
+/// The pixels of one class, as a mask.
+#[must_use]
+pub fn class_mask(classes: &[PixelClass], class: PixelClass) -> Vec<bool> {
+    classes.iter().map(|&one| one == class).collect()
+}
+
+/// Disoccluded pixels over all pixels whose reference shows a surface, those at silhouettes included;
+/// `None` where there is no surface.
+///
+/// # Errors
+/// Planes of different sizes.
+pub fn disocclusion_rate(
+    classes: &[PixelClass],
+    reference_inverse_depth: &[f32],
+) -> Result<Option<f64>, MetricsError> {
+    expect_len("classes", classes.len(), reference_inverse_depth.len())?;
+    let foreground = reference_inverse_depth
+        .iter()
+        .filter(|&&depth| depth > 0.0)
+        .count();
+    let disoccluded = ClassCounts::of(classes).disoccluded;
+    Ok((foreground > 0).then(|| disoccluded as f64 / foreground as f64))
+}
+
+/// Pixels of each class.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct ClassCounts {
+    /// [`PixelClass::Silhouette`].
+    pub silhouette: usize,
+    /// [`PixelClass::Disoccluded`].
+    pub disoccluded: usize,
+    /// [`PixelClass::Covered`].
+    pub covered: usize,
+    /// [`PixelClass::Background`].
+    pub background: usize,
+}
+
+impl ClassCounts {
+    /// Counts them.
+    #[must_use]
+    pub fn of(classes: &[PixelClass]) -> Self {
+        let count = |class| classes.iter().filter(|&&one| one == class).count();
+        Self {
+            silhouette: count(PixelClass::Silhouette),
+            disoccluded: count(PixelClass::Disoccluded),
+            covered: count(PixelClass::Covered),
+            background: count(PixelClass::Background),
+        }
+    }
+}
+
+fn surface_point(camera: &PinholeCamera, index: usize, inverse_depth: f32) -> Vec3 {
+    let width = camera.size_px.x as usize;
+    let pixel = Vec2::new((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
+    camera.unproject(PixelDepth {
+        pixel,
+        planar_depth_m: inverse_depth.recip(),
+    })
+}
+
+fn surface_class(point_in_world: Vec3, sample_images: &[DepthImage]) -> PixelClass {
+    match sample_images
+        .iter()
+        .any(|image| matches_sample(image, point_in_world))
+    {
+        true => PixelClass::Covered,
+        false => PixelClass::Disoccluded,
+    }
+}
+
+fn matches_sample(image: &DepthImage, point_in_world: Vec3) -> bool {
+    let depth_image::Camera::Pinhole(camera) = &image.camera;
+    let Some(at) = camera
+        .project(point_in_world)
+        .filter(|at| camera.contains(at.pixel))
+    else {
+        return false;
+    };
+    let texel = at.pixel.as_uvec2().min(camera.size_px - 1);
+    let sampled =
+        image.inverse_depth_per_m[texel.y as usize * camera.size_px.x as usize + texel.x as usize];
+    let tolerance =
+        (MATCH_FOOTPRINTS / camera.focal_px.min_element()).max(MATCH_RELATIVE) * at.planar_depth_m;
+    sampled > 0.0 && (sampled.recip() - at.planar_depth_m).abs() <= tolerance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use depth_image::Camera;
+    use glam::UVec2;
+
+    /// A card 2 m ahead that hides the middle of a wall 4 m ahead, seen from `(eye_x, 0, 0)`.
+    fn card_before_wall(eye_x: f32) -> (PinholeCamera, Vec<f32>) {
+        let eye = Vec3::new(eye_x, 0.0, 0.0);
+        let camera =
+            PinholeCamera::looking_at(eye, eye - Vec3::Z, Vec3::Y, 1.0, UVec2::new(160, 120));
+        let depth_at = |index: usize| {
+            let pixel = Vec2::new((index % 160) as f32 + 0.5, (index / 160) as f32 + 0.5);
+            let ray = camera.ray(pixel);
+            let (card, wall) = (ray.at(2.0), ray.at(4.0));
+            match (
+                card.x.abs() < 0.4 && card.y.abs() < 0.4,
+                wall.x.abs() < 2.0 && wall.y.abs() < 1.5,
+            ) {
+                (true, _) => 0.5,
+                (false, true) => 0.25,
+                (false, false) => 0.0,
+            }
+        };
+        let inverse_depth = (0..camera.pixel_count()).map(depth_at).collect();
+        (camera, inverse_depth)
+    }
+
+    fn sample(eye_x: f32) -> DepthImage {
+        let (camera, inverse_depth_per_m) = card_before_wall(eye_x);
+        let color_rgb9e5 = vec![0; inverse_depth_per_m.len()];
+        DepthImage {
+            camera: Camera::Pinhole(camera),
+            inverse_depth_per_m,
+            color_rgb9e5,
+            normal_oct16: None,
+            surface_id: None,
+        }
+    }
+
+    #[test]
+    fn classes_partition_all_pixels_and_all_occur() {
+        let (camera, depth) = card_before_wall(0.0);
+        let classes = classify(&camera, &depth, &[sample(0.4)]).unwrap();
+        let counts = ClassCounts::of(&classes);
+        assert_eq!(
+            counts.silhouette + counts.disoccluded + counts.covered + counts.background,
+            camera.pixel_count()
+        );
+        let masks = PixelClass::ALL.map(|class| class_mask(&classes, class));
+        assert!(
+            (0..classes.len()).all(|index| masks.iter().filter(|mask| mask[index]).count() == 1)
+        );
+        assert!(
+            [
+                counts.silhouette,
+                counts.disoccluded,
+                counts.covered,
+                counts.background
+            ]
+            .iter()
+            .all(|&count| count > 100)
+        );
+    }
+
+    #[test]
+    fn a_camera_covers_all_that_it_sees() {
+        let (camera, depth) = card_before_wall(0.0);
+        let classes = classify(&camera, &depth, &[sample(0.0)]).unwrap();
+        assert_eq!(disocclusion_rate(&classes, &depth).unwrap(), Some(0.0));
+    }
+
+    #[test]
+    fn what_the_card_hides_from_the_sample_is_disoccluded() {
+        let (camera, depth) = card_before_wall(0.0);
+        let classes = classify(&camera, &depth, &[sample(0.4)]).unwrap();
+        // The card's shadow on the wall moves by 0.4 m of 4 m: 0.4 · f / 4 columns of the view, less the silhouette.
+        let columns = 0.4 * camera.focal_px.x / 4.0;
+        let rows = 0.8 * camera.focal_px.y / 2.0;
+        let disoccluded = ClassCounts::of(&classes).disoccluded as f32;
+        assert!(
+            (disoccluded / ((columns - 2.0) * rows) - 1.0).abs() < 0.1,
+            "{disoccluded}"
+        );
+    }
+
+    #[test]
+    fn with_no_samples_everything_is_disoccluded() {
+        let (camera, depth) = card_before_wall(0.0);
+        assert_eq!(
+            ClassCounts::of(&classify(&camera, &depth, &[]).unwrap()).covered,
+            0
+        );
+    }
+
+    #[test]
+    fn an_empty_view_has_no_rate() {
+        assert_eq!(
+            disocclusion_rate(&[PixelClass::Background], &[0.0]).unwrap(),
+            None
+        );
+        assert!(disocclusion_rate(&[], &[0.0]).is_err());
+    }
+
+    #[test]
+    fn bad_planes_are_named() {
+        let (camera, depth) = card_before_wall(0.0);
+        assert!(matches!(
+            classify(&camera, &depth[1..], &[]),
+            Err(MetricsError::BufferSize { .. })
+        ));
+        let mut bad = sample(0.0);
+        bad.inverse_depth_per_m.pop();
+        assert!(matches!(
+            classify(&camera, &depth, &[sample(0.0), bad]),
+            Err(MetricsError::SampleImage { index: 1, .. })
+        ));
+    }
+}

@@ -1,0 +1,125 @@
+//! The one-dimensional kernels whose products are FLIP's filters.
+
+use std::f32::consts::PI;
+
+/// A contrast sensitivity of the eye, `a · sqrt(π/b) · exp(-π² x²/b)` over `x` degrees (§4.1.1, table 1).
+#[derive(Clone, Copy)]
+pub(super) struct Sensitivity {
+    pub(super) a: f32,
+    pub(super) b: f32,
+}
+
+/// Luminance.
+pub(super) const ACHROMATIC: Sensitivity = Sensitivity { a: 1.0, b: 0.0047 };
+/// Red against green.
+pub(super) const RED_GREEN: Sensitivity = Sensitivity { a: 1.0, b: 0.0053 };
+/// Blue against yellow is the sum of two.
+pub(super) const BLUE_YELLOW: [Sensitivity; 2] = [
+    Sensitivity { a: 34.1, b: 0.04 },
+    Sensitivity { a: 13.5, b: 0.025 },
+];
+
+/// Three standard deviations of the widest sensitivity: all share one support.
+pub(super) fn sensitivity_radius_px(pixels_per_degree: f32) -> i32 {
+    let widest = BLUE_YELLOW[0].b;
+    (3.0 * (widest / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as i32
+}
+
+impl Sensitivity {
+    /// Weights along one axis that sum to 1, and the share of the two-dimensional filter's volume that
+    /// this sensitivity had before.
+    pub(super) fn kernel(self, pixels_per_degree: f32) -> (Vec<f32>, f32) {
+        let radius = sensitivity_radius_px(pixels_per_degree);
+        let weight = |x: i32| (-PI * PI * (x as f32 / pixels_per_degree).powi(2) / self.b).exp();
+        let weights: Vec<f32> = (-radius..=radius).map(weight).collect();
+        let sum: f32 = weights.iter().sum();
+        let volume = self.a * (PI / self.b).sqrt() * sum * sum;
+        (scaled(&weights, sum.recip()), volume)
+    }
+}
+
+/// A Gaussian and its first two derivatives, of the width at which the eye finds edges (§4.2).
+pub(super) struct FeatureKernels {
+    /// Sums to 1.
+    pub(super) smooth: Vec<f32>,
+    /// Positive weights sum to 1, negative ones to -1.
+    pub(super) edge: Vec<f32>,
+    /// Positive weights sum to 1, negative ones to -1.
+    pub(super) point: Vec<f32>,
+}
+
+impl FeatureKernels {
+    pub(super) fn new(pixels_per_degree: f32) -> Self {
+        const WIDTH_DEGREES: f32 = 0.082;
+        let deviation_px = 0.5 * WIDTH_DEGREES * pixels_per_degree;
+        let radius = (3.0 * deviation_px).ceil() as i32;
+        let sampled = |weight: &dyn Fn(f32) -> f32| {
+            (-radius..=radius)
+                .map(|x| weight(x as f32))
+                .collect::<Vec<f32>>()
+        };
+        let gaussian = |x: f32| (-x * x / (2.0 * deviation_px * deviation_px)).exp();
+        Self {
+            smooth: balanced(&sampled(&gaussian)),
+            edge: balanced(&sampled(&|x| -x * gaussian(x))),
+            point: balanced(&sampled(&|x| {
+                ((x / deviation_px).powi(2) - 1.0) * gaussian(x)
+            })),
+        }
+    }
+}
+
+/// Positive weights scaled to sum to 1, negative ones to -1.
+fn balanced(weights: &[f32]) -> Vec<f32> {
+    let sum = |sign: f32| {
+        weights
+            .iter()
+            .map(|weight| (sign * weight).max(0.0))
+            .sum::<f32>()
+    };
+    let (positive, negative) = (sum(1.0), sum(-1.0));
+    weights
+        .iter()
+        .map(|&weight| {
+            if weight > 0.0 {
+                weight / positive
+            } else if weight < 0.0 {
+                weight / negative
+            } else {
+                0.0
+            }
+        })
+        .collect()
+}
+
+fn scaled(weights: &[f32], factor: f32) -> Vec<f32> {
+    weights.iter().map(|weight| weight * factor).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flip::FLIP_PIXELS_PER_DEGREE;
+
+    #[test]
+    fn kernels_keep_their_sums() {
+        let kernels = FeatureKernels::new(FLIP_PIXELS_PER_DEGREE);
+        assert!((kernels.smooth.iter().sum::<f32>() - 1.0).abs() < 1e-5);
+        assert!(kernels.edge.iter().sum::<f32>().abs() < 1e-5);
+        assert!(kernels.point.iter().sum::<f32>().abs() < 1e-5);
+        let (achromatic, _) = ACHROMATIC.kernel(FLIP_PIXELS_PER_DEGREE);
+        assert!((achromatic.iter().sum::<f32>() - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_tiny_viewer_has_finite_kernels() {
+        let kernels = FeatureKernels::new(0.01);
+        assert!(
+            kernels
+                .edge
+                .iter()
+                .chain(&kernels.point)
+                .all(|weight| weight.is_finite())
+        );
+    }
+}

@@ -1,0 +1,82 @@
+//! One score a pixel, and its mean over any part of the image.
+
+use crate::{MetricsError, error::expect_mask};
+
+/// A metric's value at every pixel. A metric that needs a window has none within `border_px` of the
+/// image's edge; those pixels hold 0 and are in no mean.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScoreMap {
+    pub(crate) width_px: u32,
+    pub(crate) height_px: u32,
+    pub(crate) border_px: u32,
+    pub(crate) values: Vec<f32>,
+}
+
+impl ScoreMap {
+    /// Columns and rows.
+    #[must_use]
+    pub fn size_px(&self) -> (u32, u32) {
+        (self.width_px, self.height_px)
+    }
+
+    /// Pixels at each edge without a value.
+    #[must_use]
+    pub fn border_px(&self) -> u32 {
+        self.border_px
+    }
+
+    /// One value a pixel, row by row.
+    #[must_use]
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// The mean over all pixels that have a value, or over those also in the mask; `None` where that
+    /// is none.
+    ///
+    /// # Errors
+    /// A mask of another size.
+    pub fn mean(&self, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
+        expect_mask(mask, self.values.len())?;
+        let selected = |index: &usize| mask.is_none_or(|mask| mask[*index]);
+        let values = self
+            .valued_pixels()
+            .filter(selected)
+            .map(|index| f64::from(self.values[index]));
+        let (sum, count) =
+            values.fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
+        Ok((count > 0).then(|| sum / count as f64))
+    }
+
+    /// Indices of the pixels that have a value.
+    fn valued_pixels(&self) -> impl Iterator<Item = usize> + '_ {
+        let columns = self.border_px..self.width_px.saturating_sub(self.border_px);
+        let rows = self.border_px..self.height_px.saturating_sub(self.border_px);
+        rows.flat_map(move |y| {
+            columns
+                .clone()
+                .map(move |x| (y * self.width_px + x) as usize)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_border_is_in_no_mean() {
+        let values = vec![9.0, 9.0, 9.0, 9.0, 0.5, 9.0, 9.0, 9.0, 9.0];
+        let map = ScoreMap {
+            width_px: 3,
+            height_px: 3,
+            border_px: 1,
+            values,
+        };
+        assert_eq!(map.mean(None).unwrap(), Some(0.5));
+        let mut corner = [false; 9];
+        corner[0] = true;
+        assert_eq!(map.mean(Some(&corner)).unwrap(), None);
+        assert!(map.mean(Some(&corner[1..])).is_err());
+    }
+}

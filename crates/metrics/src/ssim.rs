@@ -1,0 +1,157 @@
+//! Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004), with the choices that scikit-image's
+//! `structural_similarity(a, b, channel_axis=2)` makes for 8-bit images: a 7×7 uniform window, the
+//! sample covariance (divided by n-1), `K1 = 0.01`, `K2 = 0.03`, and the mean over the pixels whose whole
+//! window lies in the image.
+//!
+//! Window sums of 8-bit values are whole numbers, so they are exact here.
+
+use rayon::prelude::*;
+
+use crate::{MetricsError, Rgb8Image, ScoreMap};
+
+/// Side of the window.
+pub const SSIM_WINDOW_PX: u32 = 7;
+
+const RADIUS: usize = SSIM_WINDOW_PX as usize / 2;
+const SAMPLES: f64 = (SSIM_WINDOW_PX * SSIM_WINDOW_PX) as f64;
+const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
+const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
+
+/// Structural similarity, mean of the three channels, of the window around every pixel.
+///
+/// # Errors
+/// Images of different sizes, or smaller than the window.
+pub fn ssim_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, MetricsError> {
+    reference.expect_same_size(test)?;
+    let (width_px, height_px) = reference.size_px();
+    if width_px.min(height_px) < SSIM_WINDOW_PX {
+        return Err(MetricsError::SmallerThanWindow {
+            size_px: (width_px, height_px),
+            window_px: SSIM_WINDOW_PX,
+        });
+    }
+    let (width, height) = (width_px as usize, height_px as usize);
+    let mut values = vec![0.0; width * height];
+    let interior = values
+        .par_chunks_exact_mut(width)
+        .enumerate()
+        .take(height - RADIUS)
+        .skip(RADIUS);
+    interior.for_each(|(y, row)| fill_row(row, y, reference, test));
+    Ok(ScoreMap {
+        width_px,
+        height_px,
+        border_px: RADIUS as u32,
+        values,
+    })
+}
+
+/// The first and second moments of a window, times its samples.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    a: i64,
+    b: i64,
+    aa: i64,
+    bb: i64,
+    ab: i64,
+}
+
+impl Sums {
+    fn of(a: u8, b: u8) -> Self {
+        let (a, b) = (i64::from(a), i64::from(b));
+        Self {
+            a,
+            b,
+            aa: a * a,
+            bb: b * b,
+            ab: a * b,
+        }
+    }
+
+    fn plus(self, other: Self, sign: i64) -> Self {
+        Self {
+            a: self.a + sign * other.a,
+            b: self.b + sign * other.b,
+            aa: self.aa + sign * other.aa,
+            bb: self.bb + sign * other.bb,
+            ab: self.ab + sign * other.ab,
+        }
+    }
+
+    fn similarity(self) -> f64 {
+        let (mean_a, mean_b) = (self.a as f64 / SAMPLES, self.b as f64 / SAMPLES);
+        let covariance = |product: i64, x: i64, y: i64| {
+            (SAMPLES * product as f64 - x as f64 * y as f64) / (SAMPLES * (SAMPLES - 1.0))
+        };
+        let variances = covariance(self.aa, self.a, self.a) + covariance(self.bb, self.b, self.b);
+        let luminance = (2.0 * mean_a * mean_b + C1) / (mean_a * mean_a + mean_b * mean_b + C1);
+        luminance * (2.0 * covariance(self.ab, self.a, self.b) + C2) / (variances + C2)
+    }
+}
+
+/// One row of the map.
+fn fill_row(row: &mut [f32], y: usize, reference: &Rgb8Image, test: &Rgb8Image) {
+    let width = row.len();
+    for channel in 0..3 {
+        let columns: Vec<Sums> = (0..width)
+            .map(|x| column_sums(x, y, channel, reference, test))
+            .collect();
+        let mut window = columns[..2 * RADIUS]
+            .iter()
+            .fold(Sums::default(), |sum, &column| sum.plus(column, 1));
+        for x in RADIUS..width - RADIUS {
+            window = window.plus(columns[x + RADIUS], 1);
+            row[x] += (window.similarity() / 3.0) as f32;
+            window = window.plus(columns[x - RADIUS], -1);
+        }
+    }
+}
+
+/// The sums down the part of a column that the window around row `y` covers.
+fn column_sums(
+    x: usize,
+    y: usize,
+    channel: usize,
+    reference: &Rgb8Image,
+    test: &Rgb8Image,
+) -> Sums {
+    let width = reference.width_px() as usize;
+    (y - RADIUS..=y + RADIUS).fold(Sums::default(), |sum, row| {
+        let index = (row * width + x) * 3 + channel;
+        sum.plus(Sums::of(reference.srgb8()[index], test.srgb8()[index]), 1)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn identical_is_one() {
+        let bytes: Vec<u8> = (0..9 * 8 * 3).map(|i| (i * 37 % 251) as u8).collect();
+        let image = Rgb8Image::new(9, 8, bytes).unwrap();
+        let map = ssim_map(&image, &image).unwrap();
+        assert!((map.mean(None).unwrap().unwrap() - 1.0).abs() < 1e-7);
+    }
+
+    #[test]
+    fn flat_images_differ_by_luminance_alone() {
+        let flat = |value| Rgb8Image::new(7, 7, vec![value; 147]).unwrap();
+        let expected = (2.0 * 100.0 * 120.0 + C1) / (100.0_f64.powi(2) + 120.0_f64.powi(2) + C1);
+        let mean = ssim_map(&flat(100), &flat(120))
+            .unwrap()
+            .mean(None)
+            .unwrap()
+            .unwrap();
+        assert!((mean - expected).abs() < 1e-7);
+    }
+
+    #[test]
+    fn an_image_below_the_window_is_refused() {
+        let small = Rgb8Image::new(6, 9, vec![0; 162]).unwrap();
+        assert!(matches!(
+            ssim_map(&small, &small),
+            Err(MetricsError::SmallerThanWindow { window_px: 7, .. })
+        ));
+    }
+}

@@ -1,0 +1,133 @@
+//! The boundary to the device.
+
+use std::any::Any;
+use std::sync::Arc;
+
+use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use glam::Vec3;
+use tonic::Status;
+
+/// What a node can do on its device. Calls block; services run them on blocking threads. Methods,
+/// sampling and lighting are text, as on the command line, parsed here.
+pub trait Engine: Send + Sync + 'static {
+    /// As every reported time names it.
+    fn device_name(&self) -> String;
+    /// Whether the device is a CPU.
+    fn is_software(&self) -> bool;
+    /// Loads a scene package, whose bytes have been checked against the hash, and keeps it under it;
+    /// gives the seconds spent.
+    ///
+    /// # Errors
+    /// Where the package cannot be read or the device cannot hold it.
+    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<f64, EngineError>;
+    /// Whether [`Engine::load_scene`] has been here.
+    fn has_scene(&self, hash: &str) -> bool;
+    /// One image a camera, in one submission.
+    ///
+    /// # Errors
+    /// For settings it does not know, a scene it has not, or a device that fails.
+    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError>;
+    /// Makes a set ready to be reconstructed from.
+    ///
+    /// # Errors
+    /// For images it cannot take, or a device that fails.
+    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError>;
+    /// One view a camera, in one submission.
+    ///
+    /// # Errors
+    /// For settings it does not know, or a device that fails.
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError>;
+    /// One view a camera, from the scene itself.
+    ///
+    /// # Errors
+    /// For settings it does not know, a scene it has not, or a device that fails.
+    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError>;
+}
+
+/// A sample set on the device; the engine knows what it is.
+pub trait UploadedSet: Any + Send + Sync {}
+
+/// Images to sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SampleWork {
+    /// A loaded scene.
+    pub scene_hash: String,
+    /// One image each.
+    pub cameras: Vec<Camera>,
+    /// The sampling method.
+    pub sampling: String,
+    /// The lighting.
+    pub lighting: String,
+    /// Where animation stands.
+    pub scene_time_s: f32,
+}
+
+/// The images of one set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SampleSet {
+    /// One a sample camera, in their order.
+    pub images: Vec<DepthImage>,
+    /// What reconstruction looks at.
+    pub volume: Aabb,
+    /// What rays meet that leave the scene.
+    pub background_linear: Vec3,
+}
+
+/// Views to reconstruct.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewWork {
+    /// All of one size.
+    pub cameras: Vec<PinholeCamera>,
+    /// The reconstruction method.
+    pub method: String,
+    /// Beside colour.
+    pub planes: ViewPlanes,
+}
+
+/// Views to draw from the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DirectWork {
+    /// A loaded scene.
+    pub scene_hash: String,
+    /// All of one size.
+    pub cameras: Vec<PinholeCamera>,
+    /// The lighting.
+    pub lighting: String,
+    /// Where animation stands.
+    pub scene_time_s: f32,
+    /// Beside colour.
+    pub planes: ViewPlanes,
+}
+
+/// Why the device did not do it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum EngineError {
+    /// A setting that cannot be used.
+    #[error("{field}: {reason}")]
+    InvalidArgument {
+        /// Which.
+        field: &'static str,
+        /// Why.
+        reason: String,
+    },
+    /// A scene that was never loaded.
+    #[error("scene {hash} is not loaded")]
+    UnknownScene {
+        /// Which.
+        hash: String,
+    },
+    /// The device, or its memory.
+    #[error("device: {0}")]
+    Device(String),
+}
+
+impl From<EngineError> for Status {
+    fn from(error: EngineError) -> Self {
+        let text = error.to_string();
+        match error {
+            EngineError::InvalidArgument { .. } => Self::invalid_argument(text),
+            EngineError::UnknownScene { .. } => Self::failed_precondition(text),
+            EngineError::Device(_) => Self::internal(text),
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! The plan in force on this node. Epochs only rise.
+
+use std::sync::Arc;
+
+use tokio::sync::watch;
+use tonic::Status;
+use wire::Assignment;
+
+/// The node's name and what it was last told.
+#[derive(Debug, Clone)]
+pub struct CurrentPlan {
+    node_name: Arc<str>,
+    plan: watch::Sender<Option<Arc<Assignment>>>,
+}
+
+impl CurrentPlan {
+    /// No plan yet.
+    #[must_use]
+    pub fn new(node_name: &str) -> Self {
+        Self {
+            node_name: node_name.into(),
+            plan: watch::Sender::new(None),
+        }
+    }
+
+    /// This node.
+    #[must_use]
+    pub fn node_name(&self) -> &str {
+        &self.node_name
+    }
+
+    /// The highest epoch so far; 0 before the first plan.
+    #[must_use]
+    pub fn epoch(&self) -> u64 {
+        self.plan.borrow().as_ref().map_or(0, |plan| plan.plan_epoch)
+    }
+
+    /// Whether a plan may replace the one in force.
+    ///
+    /// # Errors
+    /// `FAILED_PRECONDITION` for a lower epoch, or for another plan with the same.
+    pub fn admits(&self, assignment: &Assignment) -> Result<(), Status> {
+        let current = self.plan.borrow();
+        let Some(current) = current.as_ref() else { return Ok(()) };
+        let (old, new) = (current.plan_epoch, assignment.plan_epoch);
+        if new > old || (new == old && **current == *assignment) {
+            return Ok(());
+        }
+        Err(Status::failed_precondition(format!(
+            "plan_epoch {new} does not replace {old}"
+        )))
+    }
+
+    /// Puts a plan in force.
+    ///
+    /// # Errors
+    /// As [`CurrentPlan::admits`].
+    pub fn apply(&self, assignment: Assignment) -> Result<(), Status> {
+        let mut verdict = Ok(());
+        // Judged under the lock: of two plans that were being prepared the higher one stays.
+        self.plan.send_if_modified(|current| {
+            let higher = current
+                .as_ref()
+                .is_none_or(|current| assignment.plan_epoch > current.plan_epoch);
+            let same = current.as_ref().is_some_and(|current| **current == assignment);
+            if higher {
+                *current = Some(Arc::new(assignment));
+            } else if !same {
+                verdict = Err(Status::failed_precondition(format!(
+                    "plan_epoch {} came too late",
+                    assignment.plan_epoch
+                )));
+            }
+            higher
+        });
+        verdict
+    }
+
+    /// The plan that a caller names.
+    ///
+    /// # Errors
+    /// `FAILED_PRECONDITION` where it is not the one in force.
+    pub fn require(&self, plan_epoch: u64) -> Result<Arc<Assignment>, Status> {
+        let current = self.plan.borrow().clone();
+        match current {
+            Some(plan) if plan.plan_epoch == plan_epoch => Ok(plan),
+            Some(plan) => Err(Status::failed_precondition(format!(
+                "plan_epoch {plan_epoch} is not in force on {}, {} is",
+                self.node_name, plan.plan_epoch
+            ))),
+            None => Err(Status::failed_precondition(format!(
+                "plan_epoch {plan_epoch} is not in force on {}, none is",
+                self.node_name
+            ))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use depth_image::Aabb;
+    use glam::Vec3;
+    use wire::{Policy, SceneHash, SceneRef, Timeline, Workload};
+
+    use super::*;
+
+    fn plan(plan_epoch: u64, lighting: &str) -> Assignment {
+        let workload = Workload {
+            scene: SceneRef {
+                hash: SceneHash::of(b""),
+                package_bytes: 0,
+            },
+            sample_cameras: Vec::new(),
+            sampling: "conventional".to_owned(),
+            lighting: lighting.to_owned(),
+            method: "joint_carve".to_owned(),
+            codec: "lz4".to_owned(),
+            volume: Aabb {
+                min: Vec3::NEG_ONE,
+                max: Vec3::ONE,
+            },
+            background_linear: Vec3::ZERO,
+            timeline: Timeline::still(0.0),
+        };
+        Assignment {
+            plan_epoch,
+            policy: Policy::Direct,
+            workload,
+            samplers: Vec::new(),
+            compositors: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn epochs_only_rise() {
+        let current = CurrentPlan::new("n");
+        assert!(current.require(0).is_err(), "no plan yet");
+        current.apply(plan(3, "unlit")).unwrap();
+        current.apply(plan(3, "unlit")).unwrap();
+        for refused in [plan(2, "unlit"), plan(3, "phong")] {
+            assert_eq!(
+                current.admits(&refused).unwrap_err().code(),
+                tonic::Code::FailedPrecondition
+            );
+            assert_eq!(
+                current.apply(refused).unwrap_err().code(),
+                tonic::Code::FailedPrecondition
+            );
+        }
+        current.apply(plan(4, "phong")).unwrap();
+        assert!(current.require(3).is_err() && current.require(5).is_err());
+        assert_eq!((current.require(4).unwrap().plan_epoch, current.epoch()), (4, 4));
+    }
+}

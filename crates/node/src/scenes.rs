@@ -1,0 +1,135 @@
+//! Scenes by hash: from the mounted folder, else from the coordinator.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use std::{fs, io};
+
+use tokio::sync::Mutex;
+use tonic::Status;
+use wire::rpc::{CoordinatorClient, connect};
+use wire::{FetchScene, SceneAssembly, SceneHash, SceneRef};
+
+use crate::{Engine, NodeConfig, blocking, next_within};
+
+/// Gets scenes onto the device.
+pub struct Scenes {
+    engine: Arc<dyn Engine>,
+    folder: Option<PathBuf>,
+    coordinator: String,
+    part_deadline: Duration,
+    /// One load at a time: two plans may want the same scene.
+    loading: Mutex<()>,
+}
+
+impl Scenes {
+    /// Of a node.
+    #[must_use]
+    pub fn new(engine: Arc<dyn Engine>, config: &NodeConfig) -> Self {
+        Self {
+            engine,
+            folder: config.scene_folder.clone(),
+            coordinator: config.coordinator.clone(),
+            part_deadline: config.deadlines.chunk,
+            loading: Mutex::new(()),
+        }
+    }
+
+    /// Makes sure that the device has a scene; gives the seconds that this took, 0 where it had it.
+    ///
+    /// # Errors
+    /// Where it is nowhere to be had, is not what its hash says, or cannot be loaded.
+    pub async fn ensure(&self, scene: &SceneRef) -> Result<f64, Status> {
+        let _one = self.loading.lock().await;
+        if self.engine.has_scene(scene.hash.as_str()) {
+            return Ok(0.0);
+        }
+        let start = Instant::now();
+        let package = match self.read_folder(&scene.hash).await? {
+            Some(package) => package,
+            None => self.fetch(scene).await?,
+        };
+        let (engine, hash) = (self.engine.clone(), scene.hash.clone());
+        blocking(move || engine.load_scene(hash.as_str(), &package)).await?;
+        let seconds = start.elapsed().as_secs_f64();
+        tracing::info!(scene = %scene.hash, seconds, "scene loaded");
+        Ok(seconds)
+    }
+
+    async fn read_folder(&self, hash: &SceneHash) -> Result<Option<Vec<u8>>, Status> {
+        let Some(folder) = self.folder.clone() else {
+            return Ok(None);
+        };
+        let hash = hash.clone();
+        blocking(move || read_verified(&folder, &hash)).await
+    }
+
+    async fn fetch(&self, scene: &SceneRef) -> Result<Vec<u8>, Status> {
+        // A channel of its own: bulk must not hold up membership.
+        let client = CoordinatorClient::new(connect(&self.coordinator).await?);
+        let mut parts = client
+            .fetch_scene(FetchScene {
+                hash: scene.hash.clone(),
+                offset_bytes: 0,
+            })
+            .await?;
+        let mut assembly = SceneAssembly::new(scene.clone());
+        while let Some(part) = next_within(&mut parts, self.part_deadline, "scene").await? {
+            assembly.push(&part)?;
+        }
+        let (folder, hash) = (self.folder.clone(), scene.hash.clone());
+        blocking(move || {
+            let package = assembly.finish()?;
+            keep(folder.as_deref(), &hash, &package);
+            Ok::<_, wire::WireError>(package)
+        })
+        .await
+    }
+}
+
+fn file_of(folder: &Path, hash: &SceneHash) -> PathBuf {
+    folder.join(format!("{hash}.scene"))
+}
+
+/// A file that is not what its name says counts as absent: it may be half written.
+fn read_verified(folder: &Path, hash: &SceneHash) -> Result<Option<Vec<u8>>, Status> {
+    let package = match fs::read(file_of(folder, hash)) {
+        Ok(package) => package,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(Status::internal(format!("scene {hash}: {error}"))),
+    };
+    let right = SceneHash::of(&package) == *hash;
+    if !right {
+        tracing::warn!(scene = %hash, "the file in the scene folder does not have its hash");
+    }
+    Ok(right.then_some(package))
+}
+
+/// Keeps a package for the next start; a folder that cannot be written to is no failure.
+fn keep(folder: Option<&Path>, hash: &SceneHash, package: &[u8]) {
+    let Some(folder) = folder else { return };
+    let partial = folder.join(format!("{hash}.{}.partial", std::process::id()));
+    let kept = fs::write(&partial, package).and_then(|()| fs::rename(&partial, file_of(folder, hash)));
+    if let Err(error) = kept {
+        tracing::debug!(scene = %hash, %error, "the scene folder is not writable");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_folder_gives_only_what_has_its_hash() {
+        let folder = tempfile::tempdir().unwrap();
+        let hash = SceneHash::of(b"scene");
+        assert_eq!(read_verified(folder.path(), &hash).unwrap(), None);
+        keep(Some(folder.path()), &hash, b"scene");
+        assert_eq!(
+            read_verified(folder.path(), &hash).unwrap().as_deref(),
+            Some(&b"scene"[..])
+        );
+        fs::write(file_of(folder.path(), &hash), b"scenery").unwrap();
+        assert_eq!(read_verified(folder.path(), &hash).unwrap(), None);
+    }
+}

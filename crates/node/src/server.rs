@@ -1,0 +1,86 @@
+//! One server with the settings that all services have, and a drain with a deadline.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+use tonic::service::Routes;
+use tonic::transport::Server;
+use tonic::transport::server::TcpIncoming;
+use tonic_health::ServingStatus;
+use tonic_health::pb::health_server::{Health, HealthServer};
+use wire::rpc::{KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT};
+
+/// How long connections may take to end after the streams were ended.
+pub const DRAIN: Duration = Duration::from_secs(10);
+/// Streams, and calls being answered, of one connection.
+pub const MAX_STREAMS: u32 = 64;
+
+/// Why a server did not serve.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// Others could reach it and nothing protects it.
+    #[error("{address} is not loopback: give --insecure-bind to serve there without TLS")]
+    NotLoopback {
+        /// Where it would have listened.
+        address: SocketAddr,
+    },
+    /// The socket.
+    #[error("listening: {0}")]
+    Listen(#[from] std::io::Error),
+    /// The transport.
+    #[error("serving: {0}")]
+    Transport(#[from] tonic::transport::Error),
+}
+
+/// Serves until `shutdown`, then waits for connections to end, at most [`DRAIN`].
+///
+/// # Errors
+/// Where the address is not allowed or the transport fails.
+pub async fn serve(
+    listener: TcpListener,
+    routes: Routes,
+    insecure_bind: bool,
+    shutdown: CancellationToken,
+) -> Result<(), ServeError> {
+    let address = listener.local_addr()?;
+    if !address.ip().is_loopback() && !insecure_bind {
+        return Err(ServeError::NotLoopback { address });
+    }
+    let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+    let serving = builder()
+        .add_routes(routes)
+        .serve_with_incoming_shutdown(incoming, shutdown.clone().cancelled_owned());
+    let overdue = async {
+        shutdown.cancelled().await;
+        tokio::time::sleep(DRAIN).await;
+    };
+    tokio::select! {
+        result = serving => Ok(result?),
+        () = overdue => {
+            tracing::warn!(%address, "connections were cut at the end of the drain");
+            Ok(())
+        }
+    }
+}
+
+fn builder() -> Server {
+    Server::builder()
+        .load_shed(true)
+        .concurrency_limit_per_connection(MAX_STREAMS as usize)
+        .max_concurrent_streams(MAX_STREAMS)
+        .http2_keepalive_interval(Some(KEEPALIVE_INTERVAL))
+        .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
+        .initial_stream_window_size(4 << 20)
+        .initial_connection_window_size(16 << 20)
+}
+
+/// The health service, with each role serving.
+pub async fn health(roles: &[&str]) -> HealthServer<impl Health> {
+    let (reporter, server) = tonic_health::server::health_reporter();
+    for role in roles {
+        reporter.set_service_status(*role, ServingStatus::Serving).await;
+    }
+    server
+}

@@ -1,0 +1,63 @@
+// Gives pixels that no camera knows the colour of the farther side of their gap: what is disoccluded lies
+// behind what occluded it. They stay marked as filled.
+{% include "color.wgsl" %}
+
+struct FillWork {
+    size_px: vec2u,
+    first_pixel: u32,
+    number: u32,
+}
+
+@group(0) @binding(0) var<uniform> work: FillWork;
+@group(0) @binding(1) var<storage, read_write> srgb8: array<u32>;
+@group(0) @binding(2) var<storage, read_write> inverse_depth: array<f32>;
+@group(0) @binding(3) var<storage, read> provenance: array<u32>;
+struct Later { workgroups: u32, y: u32, z: u32, count: u32 }
+@group(0) @binding(4) var<storage, read> unknown_pixels: array<u32>;
+@group(0) @binding(5) var<storage, read> unknown: array<Later>;
+
+const FILLED: u32 = 2u;
+const REACH_PX: i32 = 48;
+// Depths that differ by less are one side of the gap.
+const SAME_SIDE: f32 = 0.95;
+
+struct Neighbour { inverse_depth: f32, color_linear: vec3f, weight: f32 }
+
+// The first known pixel in one direction.
+fn known_towards(origin: vec2i, towards: vec2i, first: u32) -> Neighbour {
+    for (var i = 1; i <= REACH_PX; i++) {
+        let at = origin + towards * i;
+        if any(at < vec2i(0)) || any(at >= vec2i(work.size_px)) { break; }
+        let index = first + u32(at.y) * work.size_px.x + u32(at.x);
+        if (provenance[index] & 0xffu) != FILLED {
+            let color = linear_from_srgb(unpack4x8unorm(srgb8[index]).rgb);
+            return Neighbour(inverse_depth[index], color, 1.0 / (f32(i) * length(vec2f(towards))));
+        }
+    }
+    return Neighbour(0.0, vec3f(0.0), 0.0);
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= unknown[work.number].count { return; }
+    let first = work.first_pixel;
+    let index = unknown_pixels[first + id.x];
+    let origin = vec2i(vec2u((index - first) % work.size_px.x, (index - first) / work.size_px.x));
+    var farthest = 3.0e38;
+{% for d in directions %}
+    let n{{ loop.index0 }} = known_towards(origin, vec2i({{ d[0] }}, {{ d[1] }}), first);
+    farthest = select(farthest, min(farthest, n{{ loop.index0 }}.inverse_depth), n{{ loop.index0 }}.weight > 0.0);
+{% endfor %}
+    if farthest >= 3.0e38 { return; }
+    var sum = vec3f(0.0);
+    var weights = 0.0;
+    var depths = 0.0;
+{% for d in directions %}
+    let w{{ loop.index0 }} = select(0.0, n{{ loop.index0 }}.weight, n{{ loop.index0 }}.inverse_depth * SAME_SIDE <= farthest);
+    sum += n{{ loop.index0 }}.color_linear * w{{ loop.index0 }};
+    depths += n{{ loop.index0 }}.inverse_depth * w{{ loop.index0 }};
+    weights += w{{ loop.index0 }};
+{% endfor %}
+    srgb8[index] = pack4x8unorm(vec4f(srgb_from_linear(sum / weights), 1.0));
+    inverse_depth[index] = depths / weights;
+}

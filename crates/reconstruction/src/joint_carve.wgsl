@@ -1,0 +1,163 @@
+// One ray, a pyramid for each camera, one parameter t. A camera that shows everything in the ray's node to
+// be farther away proves the way to the node's edge empty, and t moves there. Where all cameras show
+// everything nearer, nothing is known, and t moves on. Else a finer level decides; at the finest the ray
+// meets the patches between samples.
+{% include "color.wgsl" %}
+{% include "sample_set.wgsl" %}
+{% include "surface.wgsl" %}
+
+// What the first pass could not decide; its own list, beside the one it leaves to the fill.
+struct Hard { workgroups: u32, y: u32, z: u32, count: u32 }
+@group(0) @binding({{ 9 + count_fetches|int }}) var<storage, read> hard_pixels: array<u32>;
+@group(0) @binding({{ 10 + count_fetches|int }}) var<storage, read> hard: array<Hard>;
+
+const MAX_MOVES: u32 = 128u;
+const START_LEVEL: u32 = {{ start_level }}u;
+// 0 unless the search is to be cut short.
+const STOP_LEVEL: u32 = {{ stop_level }}u;
+const THICKNESS_FOOTPRINTS: f32 = {{ thickness_footprints }};
+// Past a node's edge, in pixels.
+const NUDGE_PX: f32 = 1e-3;
+
+// What a camera knows of the ray from t on.
+struct Verdict {
+    // The way is free up to here (t where nothing is proven).
+    free_until: f32,
+    // Where the ray leaves the node; far away for a camera that does not see the point.
+    exit: f32,
+    // Positive inside the surface; in footprints, so that cameras compare. Far away where not inside
+    // or where only the back is met.
+    penetration: f32,
+    // Finer levels could say more.
+    undecided: bool,
+}
+
+const UNSEEN: Verdict = Verdict(-1.0, FAR_AWAY, FAR_AWAY, false);
+
+{% for k in range(cameras) %}
+fn exit_{{ k }}(a: vec3f, b: vec3f, p: vec3f, low: vec2f, high: vec2f) -> f32 {
+    let turn = b.xy * p.z - b.z * p.xy;
+    let edge = select(low - NUDGE_PX, high + NUDGE_PX, turn > vec2f(0.0)) + 0.5;
+    let slope = b.xy - edge * b.z;
+    let leave = (edge * a.z - a.xy) / select(slope, vec2f(1e-20), abs(slope) < vec2f(1e-20));
+    return min(select(FAR_AWAY, leave.x, abs(turn.x) > 1e-12), select(FAR_AWAY, leave.y, abs(turn.y) > 1e-12));
+}
+
+fn verdict_{{ k }}(a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Verdict {
+    let p = a + b * t;
+    let inverse_w = 1.0 / p.z;
+    let uv = p.xy * inverse_w - 0.5;
+    let cells = work.cameras[{{ k }}].cells;
+    if p.z <= 0.0 || any(uv < vec2f(0.0)) || any(uv >= cells) { return UNSEEN; }
+    let log2_sides = work.cameras[{{ k }}].log2_sides;
+    let node = vec2u(uv) >> vec2u(level);
+    let low = vec2f(node << vec2u(level));
+    let high = min(low + f32(1u << level), cells);
+    // A ray through the camera's own eye stays in one place and leaves no node.
+    var exit = clamp(exit_{{ k }}(a, b, p, low, high), t, far);
+    let scale = work.cameras[{{ k }}].code_scale;
+    let offset = work.cameras[{{ k }}].code_offset;
+    let code = scale * inverse_w + offset;
+    let exit_w = a.z + b.z * exit;
+    let exit_code = select(scale / exit_w + offset, 1e9, exit_w <= 0.0);
+    let word = work.cameras[{{ k }}].first_word;
+    if level > 0u {
+{% if count_fetches %}        fetches += 1u;
+{% endif %}
+        let range = pyramids[word + node_index(log2_sides, level, node)];
+        let nearest = f32(range & 0xffffu);
+        let farthest = f32(range >> 16u);
+        if min(code, exit_code) > nearest { return Verdict(exit, exit, FAR_AWAY, false); }
+        // Free up to the depth of the nearest thing in the node.
+        let surface_t = (scale / (nearest - offset) - a.z) * safe_reciprocal(b.z);
+        let partial = select(t, clamp(surface_t, t, exit), code > nearest && nearest > 1.0);
+        let slack = THICKNESS_FOOTPRINTS * (max(code, exit_code) - offset) / work.cameras[{{ k }}].focal_px;
+        let behind = max(code, exit_code) + slack < farthest;
+        // A search that stops here takes the nearest thing in the node for the surface.
+        let penetration = select(FAR_AWAY, 0.0, level == STOP_LEVEL && !behind);
+        return Verdict(partial, exit, penetration, !behind);
+    }
+    let row_words = 1u << log2_sides.x;
+    let codes = corner_codes(word + node.y * row_words + node.x, row_words);
+    if any(codes == vec4u(HOLE)) { return Verdict(t, exit, FAR_AWAY, false); }
+    let corners = vec4f(codes);
+    let nearest = max(max(corners.x, corners.y), max(corners.z, corners.w));
+    let farthest = min(min(corners.x, corners.y), min(corners.z, corners.w));
+    let footprint = (code - offset) / work.cameras[{{ k }}].focal_px;
+    let exit_uv = clamp((a.xy + b.xy * exit) / exit_w - 0.5 - low, vec2f(0.0), vec2f(1.0));
+    let connected = nearest - farthest < CONNECTED_FOOTPRINTS * footprint;
+    var here = 0.0;
+    var there = 0.0;
+    if connected {
+        here = HALF_CODE + code - bilinear(corners, uv - low);
+        there = HALF_CODE + exit_code - bilinear(corners, exit_uv);
+    } else {
+        // A silhouette runs through the cell: each sample stands for its own quarter.
+        let at = uv - low;
+        let quarter = select(vec2f(0.0), vec2f(0.5), at > vec2f(0.5));
+        exit = max(min(exit, exit_{{ k }}(a, b, p, low + quarter, low + quarter + 0.5)), t);
+        let quarter_w = a.z + b.z * exit;
+        let sample = nearest_corner(corners, at);
+        here = HALF_CODE + code - sample;
+        there = HALF_CODE + scale / quarter_w + offset - sample;
+    }
+    if here > 0.0 && there > 0.0 { return Verdict(exit, exit, FAR_AWAY, false); }
+    if here > 0.0 {
+        let crossing = t + (exit - t) * here / (here - there);
+        return Verdict(crossing, exit, 0.0, false);
+    }
+    // Inside and on the way out: the back of the surface, which no camera saw.
+    let leaving = there > here;
+    return Verdict(t, exit, select(-here / footprint, FAR_AWAY, leaving && connected), false);
+}
+{% endfor %}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= hard[work.view.number].count { return; }
+    let index = hard_pixels[work.view.first_pixel + id.x];
+    let place = index - work.view.first_pixel;
+    let pixel = pixel_of(vec2u(place % work.view.size_px.x, place / work.view.size_px.x));
+    let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
+{% for k in range(cameras) %}
+    let a{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
+    let b{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(pixel.direction, 0.0));
+{% endfor %}
+    // The pass before left how far it got.
+    var t = out_inverse_depth[index];
+    var level = START_LEVEL;
+    var hit = false;
+    var known = true;
+    for (var i = 0u; i < MAX_MOVES && t < span.far; i++) {
+        var free_until = t;
+        var exit = FAR_AWAY;
+        var penetration = FAR_AWAY;
+        var undecided = false;
+        var free = false;
+{% for k in range(cameras) %}
+        let v{{ k }} = verdict_{{ k }}(a{{ k }}, b{{ k }}, t, span.far, level);
+        free = free || (v{{ k }}.free_until == v{{ k }}.exit && v{{ k }}.free_until > t);
+        // A crossing farther on than the others' outweighs them: they are inside there.
+        penetration = select(min(penetration, v{{ k }}.penetration), v{{ k }}.penetration, v{{ k }}.free_until > free_until);
+        free_until = max(free_until, v{{ k }}.free_until);
+        exit = min(exit, v{{ k }}.exit);
+        undecided = undecided || v{{ k }}.undecided;
+{% endfor %}
+        let descend = !free && level > STOP_LEVEL && undecided;
+        hit = !free && !descend && penetration < THICKNESS_FOOTPRINTS;
+        let unknown = !free && !descend && !hit;
+        known = known && !unknown;
+        let beyond = max(select(exit, t + (span.far - span.near) * 0.01, exit >= FAR_AWAY), t * 1.00001);
+        t = select(free_until, beyond, unknown);
+        level = select(min(level + 1u, START_LEVEL), level - 1u, descend);
+        if hit { break; }
+    }
+    let point_in_world = work.view.eye_in_world + pixel.direction * t;
+    let blend = blended(point_in_world, pixel.direction, THICKNESS_FOOTPRINTS);
+    let empty = !hit && known && t >= span.far;
+    let found = hit && blend.camera_mask != 0u;
+    let provenance = select(select(PROVENANCE_FILLED, PROVENANCE_EMPTY, empty), PROVENANCE_HIT | (blend.camera_mask << 8u), found);
+    let color = select(work.background_srgb8, srgb8_from_linear(blend.color_linear), found);
+    write_pixel(index, color, select(0.0, 1.0 / t, found), provenance);
+    if provenance == PROVENANCE_FILLED { leave_for_later(index); }
+}

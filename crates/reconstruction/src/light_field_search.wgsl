@@ -1,0 +1,110 @@
+// Lages §4.2: a linear search along the view ray, entered only when inside for every camera that sees
+// the point, refined by bisection; the colour comes from the most conservative camera, the one whose
+// surface is closest.
+{% include "color.wgsl" %}
+{% include "sample_set.wgsl" %}
+{% include "surface.wgsl" %}
+
+const BISECTIONS: u32 = 8u;
+
+// Penetration in inverse metres, positive inside; far below 0 for a camera that does not see the point,
+// and whether it does.
+struct Depth { penetration: f32, seen: bool }
+
+{% for k in range(cameras) %}
+fn inside_{{ k }}(p: vec3f) -> Depth {
+    let inverse_w = 1.0 / p.z;
+    let uv = p.xy * inverse_w;
+    let cells = work.cameras[{{ k }}].cells;
+    let clamped = clamp(uv, vec2f(0.5), cells + 0.49);
+    let texel = vec2u(clamped);
+{% if count_fetches %}    fetches += 1u;
+{% endif %}
+    // A word holds a texel and its right neighbour; the texel itself is in the low half.
+    let code = pyramids[work.cameras[{{ k }}].first_word + (texel.y << work.cameras[{{ k }}].log2_sides.x) + texel.x] & 0xffffu;
+    let penetration = (f32(code) - work.cameras[{{ k }}].code_offset) / work.cameras[{{ k }}].code_scale - inverse_w;
+    return Depth(penetration, p.z > 0.0 && all(uv == clamped) && code != HOLE);
+}
+{% endfor %}
+
+// How the cameras that see a point judge it: inside for all of them, and whether there are any.
+struct Verdict { entered: bool, seen: bool }
+
+fn verdict({% for k in range(cameras) %}p{{ k }}: vec3f, {% endfor %}) -> Verdict {
+    var outside = false;
+    var seen = false;
+{% for k in range(cameras) %}
+    let d{{ k }} = inside_{{ k }}(p{{ k }});
+    seen = seen || d{{ k }}.seen;
+    outside = outside || (d{{ k }}.seen && d{{ k }}.penetration < 0.0);
+{% endfor %}
+    return Verdict(seen && !outside, seen);
+}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= work.view.size_px) { return; }
+    let pixel = pixel_of(id.xy);
+    let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
+    if span.near > span.far {
+        write_pixel(pixel.index, work.background_srgb8, 0.0, PROVENANCE_EMPTY);
+        return;
+    }
+{% for k in range(cameras) %}
+    let a{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
+    let b{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(pixel.direction, 0.0));
+{% endfor %}
+    let stride = (span.far - span.near) / f32(work.view.steps);
+    let proven = tile_start_m[pixel.tile];
+    // The last step that is proven free need not be taken.
+    var step = u32(clamp(floor((proven - span.near) / stride), 0.0, f32(work.view.steps)));
+    var entered = false;
+    var never_unseen = true;
+    var t = span.near;
+    for (; step <= work.view.steps && !entered; step++) {
+        t = span.near + stride * f32(step);
+        let v = verdict({% for k in range(cameras) %}a{{ k }} + b{{ k }} * t, {% endfor %});
+        entered = v.entered;
+        never_unseen = never_unseen && v.seen;
+    }
+    var low = max(t - stride, span.near);
+    var high = t;
+    for (var i = 0u; i < BISECTIONS; i++) {
+        let middle = 0.5 * (low + high);
+        let inside = verdict({% for k in range(cameras) %}a{{ k }} + b{{ k }} * middle, {% endfor %}).entered;
+        high = select(high, middle, inside);
+        low = select(middle, low, inside);
+    }
+    var closest = FAR_AWAY;
+    var mask = 0u;
+{% for k in range(cameras) %}
+    let p{{ k }} = a{{ k }} + b{{ k }} * high;
+    let d{{ k }} = inside_{{ k }}(p{{ k }});
+    let gap{{ k }} = select(FAR_AWAY, d{{ k }}.penetration, d{{ k }}.seen);
+    mask = select(mask, {{ 2 ** k }}u, gap{{ k }} < closest);
+    closest = min(closest, gap{{ k }});
+{% endfor %}
+    // One image is read, whichever it is.
+    var uv = vec2f(0.0);
+    var first_texel = 0u;
+    var width = 1u;
+    var camera_bit = 0u;
+{% for k in range(cameras) %}
+    let chosen{{ k }} = mask == {{ 2 ** k }}u;
+    uv = select(uv, clamp(p{{ k }}.xy / p{{ k }}.z - 0.5, vec2f(0.0), work.cameras[{{ k }}].cells - 0.01), chosen{{ k }});
+    first_texel = select(first_texel, work.cameras[{{ k }}].first_texel, chosen{{ k }});
+    width = select(width, work.cameras[{{ k }}].width_px, chosen{{ k }});
+    camera_bit = select(camera_bit, work.cameras[{{ k }}].mask, chosen{{ k }});
+{% endfor %}
+    let cell = vec2u(uv);
+    let at = uv - floor(uv);
+    let texel = first_texel + cell.y * width + cell.x;
+    let upper = mix(color_texel(texel), color_texel(texel + 1u), at.x);
+    let lower = mix(color_texel(texel + width), color_texel(texel + width + 1u), at.x);
+    let found = entered && mask != 0u;
+    let missed = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, never_unseen);
+    let provenance = select(missed, PROVENANCE_HIT | (camera_bit << 8u), found);
+    let color = select(work.background_srgb8, srgb8_from_linear(mix(upper, lower, at.y)), found);
+    write_pixel(pixel.index, color, select(0.0, 1.0 / high, found), provenance);
+    if provenance == PROVENANCE_FILLED { leave_for_later(pixel.index); }
+}

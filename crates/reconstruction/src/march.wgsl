@@ -1,0 +1,105 @@
+// The first pass of the joint carve: march in the image of the nearest sample camera alone, then ask all
+// cameras about the point found. Most pixels end here; the others are left to joint_carve.wgsl.
+//
+// In the camera's image the ray is a straight line along which columns, rows and the depth code are linear
+// in one parameter s, so that a step needs no division.
+{% include "color.wgsl" %}
+{% include "sample_set.wgsl" %}
+{% include "surface.wgsl" %}
+
+const MAX_COARSE: u32 = 64u;
+const MAX_FINE: u32 = 12u;
+const START_LEVEL: u32 = {{ start_level }}u;
+const THICKNESS_FOOTPRINTS: f32 = {{ thickness_footprints }};
+const NUDGE_PX: f32 = 1e-3;
+
+// How far the way is free, and whether it ends at a surface.
+struct March { t: f32, crossed: bool }
+
+fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
+    let scale = work.cameras[0].code_scale;
+    let offset = work.cameras[0].code_offset;
+    let cells = work.cameras[0].cells;
+    let log2_sides = work.cameras[0].log2_sides;
+    let first_word = work.cameras[0].first_word;
+    let row_words = 1u << log2_sides.x;
+    let p0 = a + b * near;
+    // The line ends before the plane through the camera's eye.
+    let end = select(far, min(far, (0.01 * p0.z - a.z) * safe_reciprocal(b.z)), b.z < 0.0);
+    let p1 = a + b * end;
+    let origin = vec3f(p0.xy / p0.z - 0.5, scale / p0.z + offset);
+    let to = vec3f(p1.xy / p1.z - 0.5, scale / p1.z + offset);
+    let line = to - origin;
+    let inverse = 1.0 / select(line.xy, vec2f(1e-9), abs(line.xy) < vec2f(1e-9));
+    let forwards = vec2f(inverse > vec2f(0.0));
+    let border = (select(vec2f(0.0), cells, inverse > vec2f(0.0)) - origin.xy) * inverse;
+    let s_end = min(min(border.x, border.y), 1.0);
+    let visible = p0.z > 0.0 && all(origin.xy >= vec2f(0.0)) && all(origin.xy < cells);
+    let nudge = (forwards * 2.0 - 1.0) * NUDGE_PX;
+    var s = select(s_end, 0.0, visible);
+    var level = START_LEVEL;
+    var crossed = false;
+    var blocked = false;
+    for (var i = 0u; i < MAX_COARSE && s < s_end && !blocked; i++) {
+        let at = origin + line * s;
+        let node = vec2u(clamp(at.xy, vec2f(0.0), cells)) >> vec2u(level);
+        let size = f32(1u << level);
+        let leave = ((vec2f(node) + forwards) * size + nudge - origin.xy) * inverse;
+        let exit = clamp(min(leave.x, leave.y), s, s_end);
+        let nearest = f32(pyramids[first_word + node_index(log2_sides, level, node)] & 0xffffu);
+{% if count_fetches %}        fetches += 1u;
+{% endif %}
+        let free = min(at.z, origin.z + line.z * exit) > nearest;
+        let surface = (nearest - origin.z) * safe_reciprocal(line.z);
+        let partial = select(s, clamp(surface, s, exit), at.z > nearest && line.z < 0.0);
+        blocked = !free && level == 1u;
+        s = select(partial, exit, free);
+        level = select(max(level, 2u) - 1u, min(level + 1u, START_LEVEL), free);
+    }
+    for (var i = 0u; i < MAX_FINE && blocked && s < s_end; i++) {
+        let at = origin + line * s;
+        let cell = floor(clamp(at.xy, vec2f(0.0), cells - 0.01));
+        let leave = (cell + forwards + nudge - origin.xy) * inverse;
+        let exit = clamp(min(leave.x, leave.y), s, s_end);
+        let beyond = origin + line * exit;
+        let node = vec2u(cell);
+        let corners = vec4f(corner_codes(first_word + node.y * row_words + node.x, row_words));
+        let nearest = max(max(corners.x, corners.y), max(corners.z, corners.w));
+        let farthest = min(min(corners.x, corners.y), min(corners.z, corners.w));
+        let connected = nearest - farthest < CONNECTED_FOOTPRINTS * (at.z - offset) / work.cameras[0].focal_px;
+        let inside = at.xy - cell;
+        let inside_beyond = clamp(beyond.xy - cell, vec2f(0.0), vec2f(1.0));
+        let here = HALF_CODE + at.z - select(nearest_corner(corners, inside), bilinear(corners, inside), connected);
+        let there = HALF_CODE + beyond.z - select(nearest_corner(corners, inside_beyond), bilinear(corners, inside_beyond), connected);
+        let hole = farthest < 0.5;
+        let through = here > 0.0 && there > 0.0 && !hole;
+        crossed = here > 0.0 && there <= 0.0 && !hole;
+        let crossing = s + (exit - s) * here / max(here - there, 1e-9);
+        s = select(select(s, crossing, crossed), exit, through);
+        blocked = through;
+    }
+    // Back to the ray's own parameter: 1/w is linear in s.
+    let share = s * p0.z / ((1.0 - s) * p1.z + s * p0.z);
+    return March(select(near, near + (end - near) * share, visible), crossed);
+}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= work.view.size_px) { return; }
+    let pixel = pixel_of(id.xy);
+    let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
+    let begin = max(span.near, tile_start_m[pixel.tile]);
+    let a = homogeneous(work.cameras[0].homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
+    let b = homogeneous(work.cameras[0].homogeneous_pixel_from_world, vec4f(pixel.direction, 0.0));
+    let found = march(a, b, begin, max(span.far, begin));
+    let point_in_world = work.view.eye_in_world + pixel.direction * found.t;
+    let blend = blended(point_in_world, pixel.direction, THICKNESS_FOOTPRINTS);
+    let hit = found.crossed && !blend.seen_past && blend.camera_mask != 0u;
+    let empty = begin >= span.far;
+    let color = select(work.background_srgb8, srgb8_from_linear(blend.color_linear), hit && !empty);
+    let provenance = select(PROVENANCE_HIT | (blend.camera_mask << 8u), PROVENANCE_EMPTY, empty);
+    // A pixel that is left for later keeps how far it got where its inverse depth will be.
+    let depth = select(select(found.t, 1.0 / found.t, hit), 0.0, empty);
+    write_pixel(pixel.index, color, depth, provenance);
+    if !hit && !empty { leave_for_later(pixel.index); }
+}

@@ -1,0 +1,193 @@
+//! Depth as 16-bit codes, and the min-max pyramid over it.
+
+use depth_image::DepthImage;
+
+/// Code of a texel without a sample.
+pub const HOLE_CODE: u16 = 0;
+/// Code of a texel whose ray meets nothing: farther than every sample.
+pub const BACKGROUND_CODE: u16 = 1;
+const FIRST_CODE: f32 = 2.0;
+const LAST_CODE: f32 = 65_535.0;
+
+/// A depth plane as codes linear in inverse depth: `code = scale / planar_depth_m + offset`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CodedDepth {
+    /// Columns and rows.
+    pub size_px: [u32; 2],
+    /// Row by row.
+    pub codes: Vec<u16>,
+    /// Codes per inverse metre.
+    pub scale: f32,
+    /// The code of infinity; negative or up to 2.
+    pub offset: f32,
+}
+
+impl CodedDepth {
+    /// Quantises a depth image over its own range.
+    #[must_use]
+    pub fn of(image: &DepthImage) -> Self {
+        let (least, greatest) = image.inverse_depth_range().unwrap_or((0.5, 1.0));
+        // One depth only still needs a scale.
+        let range = (greatest - least).max(greatest * 1e-4);
+        let scale = (LAST_CODE - FIRST_CODE) / range;
+        let offset = FIRST_CODE - least * scale;
+        let code = |&inverse: &f32| match inverse {
+            d if d > 0.0 => (d * scale + offset).round().clamp(FIRST_CODE, LAST_CODE) as u16,
+            0.0 => BACKGROUND_CODE,
+            _ => HOLE_CODE,
+        };
+        Self { size_px: image.size_px().to_array(), codes: image.inverse_depth_per_m.iter().map(code).collect(), scale, offset }
+    }
+
+    /// The code of a texel; positions beyond the border give the border's.
+    #[must_use]
+    pub fn at(&self, x: u32, y: u32) -> u16 {
+        let (x, y) = (x.min(self.size_px[0] - 1), y.min(self.size_px[1] - 1));
+        self.codes[(y * self.size_px[0] + x) as usize]
+    }
+}
+
+/// Levels of words over the cells between texel centres, sides padded to powers of two.
+///
+/// Level 0 holds a word a cell: the codes of its upper left (low half) and upper right corner (high
+/// half). A word of level `n` holds the nearest code (low) and the farthest (high) of the corners of
+/// 2ⁿ × 2ⁿ cells; a hole among them makes it say "anything": nearest 65535, farthest 0.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pyramid {
+    /// Of level 0.
+    pub log2_sides: [u32; 2],
+    /// Level after level.
+    pub words: Vec<u32>,
+}
+
+impl Pyramid {
+    /// Builds all levels.
+    #[must_use]
+    pub fn of(depth: &CodedDepth) -> Self {
+        let log2_sides = depth.size_px.map(|side| side.max(2).next_power_of_two().ilog2());
+        let (columns, rows) = (1u32 << log2_sides[0], 1u32 << log2_sides[1]);
+        let mut words = vec![0; Self::word_count(log2_sides)];
+        for y in 0..rows.min(depth.size_px[1]) {
+            let row = &mut words[(y * columns) as usize..][..columns as usize];
+            for (x, word) in (0..).zip(row.iter_mut()).take(depth.size_px[0] as usize) {
+                *word = u32::from(depth.at(x, y)) | u32::from(depth.at(x + 1, y)) << 16;
+            }
+        }
+        let mut pyramid = Self { log2_sides, words };
+        pyramid.build_first_level(depth);
+        (2..=log2_sides[0].min(log2_sides[1])).for_each(|level| pyramid.build_level(level));
+        pyramid
+    }
+
+    /// Words of all levels of padded sides.
+    #[must_use]
+    pub fn word_count(log2_sides: [u32; 2]) -> usize {
+        let [short, long] = [log2_sides[0].min(log2_sides[1]), log2_sides[0].max(log2_sides[1])];
+        Self::level_begin(log2_sides, short) + (1 << (long - short))
+    }
+
+    /// Where a level begins; the shaders' formula.
+    #[must_use]
+    pub fn level_begin(log2_sides: [u32; 2], level: u32) -> usize {
+        let whole = 1usize << (log2_sides[0] + log2_sides[1]);
+        (whole - (whole >> (2 * level))) / 3 * 4
+    }
+
+    /// Nearest codes of 2 × 2 nodes each, at the places of the nodes: what a disc's footprint needs, in one
+    /// load. Level 0 has none.
+    #[must_use]
+    pub fn wide_words(&self) -> Vec<u32> {
+        let mut wide = vec![0; self.words.len()];
+        for level in 1..=self.log2_sides[0].min(self.log2_sides[1]) {
+            let begin = Self::level_begin(self.log2_sides, level);
+            let columns = 1usize << (self.log2_sides[0] - level);
+            let rows = 1usize << (self.log2_sides[1] - level);
+            let nearest = |x: usize, y: usize| self.words[begin + y.min(rows - 1) * columns + x.min(columns - 1)] & 0xffff;
+            for (x, y) in (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y))) {
+                let four = [nearest(x, y), nearest(x + 1, y), nearest(x, y + 1), nearest(x + 1, y + 1)];
+                wide[begin + y * columns + x] = four.into_iter().fold(0, u32::max);
+            }
+        }
+        wide
+    }
+
+    fn build_first_level(&mut self, depth: &CodedDepth) {
+        let begin = Self::level_begin(self.log2_sides, 1);
+        let columns = 1u32 << (self.log2_sides[0] - 1);
+        let rows = 1u32 << (self.log2_sides[1] - 1);
+        for y in 0..rows {
+            for x in 0..columns {
+                let inside = 2 * x < depth.size_px[0] && 2 * y < depth.size_px[1];
+                self.words[begin + (y * columns + x) as usize] = if inside { corner_range(depth, 2 * x, 2 * y) } else { NOTHING };
+            }
+        }
+    }
+
+    fn build_level(&mut self, level: u32) {
+        let below = Self::level_begin(self.log2_sides, level - 1);
+        let begin = Self::level_begin(self.log2_sides, level);
+        let columns = 1usize << (self.log2_sides[0] - level);
+        let rows = 1usize << (self.log2_sides[1] - level);
+        let (finer, coarser) = self.words.split_at_mut(begin);
+        for y in 0..rows {
+            for x in 0..columns {
+                let child = |i: usize, j: usize| finer[below + (2 * y + j) * columns * 2 + 2 * x + i];
+                coarser[y * columns + x] = join(join(child(0, 0), child(1, 0)), join(child(0, 1), child(1, 1)));
+            }
+        }
+    }
+}
+
+/// The range of no corner at all.
+const NOTHING: u32 = 0xffff_0000;
+
+/// The range of the 3 × 3 corners of 2 × 2 cells.
+fn corner_range(depth: &CodedDepth, x: u32, y: u32) -> u32 {
+    let corners = (0..9).map(|i| depth.at(x + i % 3, y + i / 3));
+    corners.map(range_of).fold(NOTHING, join)
+}
+
+fn range_of(code: u16) -> u32 {
+    if code == HOLE_CODE { 0x0000_ffff } else { u32::from(code) << 16 | u32::from(code) }
+}
+
+fn join(a: u32, b: u32) -> u32 {
+    let nearest = (a & 0xffff).max(b & 0xffff);
+    let farthest = (a >> 16).min(b >> 16);
+    farthest << 16 | nearest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn coded(size_px: [u32; 2], code: impl Fn(u32, u32) -> u16) -> CodedDepth {
+        let codes = (0..size_px[1]).flat_map(|y| (0..size_px[0]).map(move |x| (x, y))).map(|(x, y)| code(x, y)).collect();
+        CodedDepth { size_px, codes, scale: 1.0, offset: 0.0 }
+    }
+
+    #[test]
+    fn every_node_bounds_its_corners() {
+        let depth = coded([37, 22], |x, y| 2 + ((x * 7919 + y * 104_729) % 60_000) as u16);
+        let pyramid = Pyramid::of(&depth);
+        for level in 1..=5 {
+            let begin = Pyramid::level_begin(pyramid.log2_sides, level);
+            let columns = 64usize >> level;
+            for (x, y) in (0..36).flat_map(|x| (0..21).map(move |y| (x, y))) {
+                let word = pyramid.words[begin + (y >> level) as usize * columns + (x >> level) as usize];
+                for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    let code = u32::from(depth.at(x + i, y + j));
+                    assert!(code <= word & 0xffff && code >= word >> 16, "level {level} cell {x} {y}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_hole_certifies_nothing() {
+        let depth = coded([8, 8], |x, y| if (x, y) == (5, 2) { HOLE_CODE } else { 100 });
+        let pyramid = Pyramid::of(&depth);
+        let top = pyramid.words[Pyramid::level_begin(pyramid.log2_sides, 3)];
+        assert_eq!(top, 0x0000_ffff);
+    }
+}

@@ -1,0 +1,57 @@
+//! The shaders' texts, written out for a number of cameras.
+
+use gpu::{TemplateError, Templates};
+use minijinja::context;
+
+/// All templates of this crate.
+pub const SHADERS: &[(&str, &str)] = &[
+    ("sample_set.wgsl", include_str!("sample_set.wgsl")),
+    ("surface.wgsl", include_str!("surface.wgsl")),
+    ("tile_start.wgsl", include_str!("tile_start.wgsl")),
+    ("march.wgsl", include_str!("march.wgsl")),
+    ("light_field_search.wgsl", include_str!("light_field_search.wgsl")),
+    ("joint_carve.wgsl", include_str!("joint_carve.wgsl")),
+    ("fill.wgsl", include_str!("fill.wgsl")),
+];
+
+/// The surface's thickness, in texel footprints: the best of a sweep (docs/methods/joint_carve.md).
+pub(crate) const THICKNESS_FOOTPRINTS: f32 = 3.0;
+/// Corners of a cell farther apart than this are not connected.
+pub(crate) const CONNECTED_FOOTPRINTS: f32 = 6.0;
+/// The coarsest level that a pixel's own search uses; its tile has done the rest.
+pub(crate) const START_LEVEL: u32 = 3;
+
+/// A shader and all that is written into it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ShaderKey {
+    /// Among [`SHADERS`].
+    pub name: &'static str,
+    /// How many sample cameras.
+    pub cameras: usize,
+    /// See [`crate::ReconstructionMethod::JointCarve`].
+    pub stop_level: u32,
+    /// Whether fetches are counted for each pixel.
+    pub count_fetches: bool,
+}
+
+/// The WGSL of a shader.
+///
+/// # Errors
+/// When a template is broken.
+pub fn shader_text(templates: &Templates, key: ShaderKey) -> Result<String, TemplateError> {
+    const DIRECTIONS: [[i32; 2]; 8] = [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]];
+    let decimal = |v: f32| format!("{v:?}");
+    templates.render(
+        key.name,
+        context! {
+            cameras => key.cameras,
+            stop_level => key.stop_level,
+            start_level => START_LEVEL.max(key.stop_level),
+            count_fetches => key.count_fetches,
+            thickness_footprints => decimal(THICKNESS_FOOTPRINTS),
+            connected_footprints => decimal(CONNECTED_FOOTPRINTS),
+            angle_floor => "1e-4",
+            directions => DIRECTIONS,
+        },
+    )
+}

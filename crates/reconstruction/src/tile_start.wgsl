@@ -1,0 +1,92 @@
+// For each tile of 8×8 pixels, how far all of its rays run through space that some camera has seen empty
+// or that none sees at all.
+//
+// A disc around the tile's middle ray bounds the points of all its rays at one parameter t. t moves on
+// while some camera shows everything in the footprint of the disc's way to be farther away, or no camera
+// that sees a part of it shows anything else.
+{% include "sample_set.wgsl" %}
+
+@group(0) @binding(2) var<storage, read_write> tile_start_m: array<f32>;
+
+const MAX_MOVES: u32 = 40u;
+const GREATEST_MOVE: f32 = 1.3;
+const LEAST_MOVE: f32 = 1.01;
+
+// Each ray's point is proven empty by this camera.
+const PROVEN: u32 = 1u;
+// No point that this camera sees may be occupied; it need not see them all.
+const UNOPPOSED: u32 = 2u;
+
+{% for k in range(cameras) %}
+// What camera {{ k }} knows of the disc's way from t to t_end.
+fn opinion_{{ k }}(a: vec3f, b: vec3f, t: f32, t_end: f32, slope: f32) -> u32 {
+    let p = a + b * t;
+    let q = a + b * t_end;
+    let radii_m = slope * vec2f(t, t_end);
+    let depths_m = vec2f(p.z, q.z);
+    let closest_m = depths_m - radii_m;
+    let behind = all(depths_m + radii_m <= vec2f(0.0));
+    let radii_px = work.cameras[{{ k }}].stretch * radii_m / max(closest_m, vec2f(1e-20));
+    let from_px = p.xy / p.z - 0.5;
+    let to_px = q.xy / q.z - 0.5;
+    let low = min(from_px - radii_px.x, to_px - radii_px.y);
+    let high = max(from_px + radii_px.x, to_px + radii_px.y);
+    let cells = work.cameras[{{ k }}].cells;
+    let unseen = behind || (all(closest_m > vec2f(0.0)) && (any(high < vec2f(0.0)) || any(low > cells)));
+    let whole = all(low >= vec2f(0.0)) && all(high <= cells);
+    let first = clamp(low, vec2f(0.0), cells);
+    let extent = clamp(high, vec2f(0.0), cells) - first;
+    let log2_sides = work.cameras[{{ k }}].log2_sides;
+    let wanted = u32(max(ceil(log2(max(extent.x, extent.y) + 1e-3)), 1.0));
+    let level = min(wanted, min(log2_sides.x, log2_sides.y));
+    let nearest = f32(pyramids[work.cameras[{{ k }}].first_wide_word + node_index(log2_sides, level, vec2u(first) >> vec2u(level))]);
+    let farthest_codes = work.cameras[{{ k }}].code_scale / max(depths_m + radii_m, vec2f(1e-20)) + work.cameras[{{ k }}].code_offset;
+    let empty = all(closest_m > vec2f(0.0)) && min(farthest_codes.x, farthest_codes.y) > nearest;
+    return select(select(0u, select(UNOPPOSED, PROVEN | UNOPPOSED, whole), empty), UNOPPOSED, unseen);
+}
+{% endfor %}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let tiles = (work.view.size_px + TILE_PX - 1u) / TILE_PX;
+    if id.x >= tiles.x || id.y >= tiles.y { return; }
+    let middle = (vec2f(id.xy) + 0.5) * f32(TILE_PX);
+    let direction = work.view.column_in_world * middle.x + work.view.row_in_world * middle.y + work.view.corner_in_world;
+    // Half a tile's diagonal at depth 1, and a little for rounding.
+    let slope = (0.7072 * f32(TILE_PX)) / work.view.focal_px;
+    // The middle ray may miss the volume where others of the tile enter it: start at the eye's near plane.
+    let far = length(max(abs(work.volume_min_in_world - work.view.eye_in_world), abs(work.volume_max_in_world - work.view.eye_in_world)));
+{% for k in range(cameras) %}
+    let a{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
+    let b{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(direction, 0.0));
+{% endfor %}
+    var t = entry(id.xy);
+    var stride = GREATEST_MOVE;
+    for (var i = 0u; i < MAX_MOVES && t < far && stride > LEAST_MOVE; i++) {
+        let t_end = t * stride;
+        var any_proof = 0u;
+        var all_agree = UNOPPOSED;
+{% for k in range(cameras) %}
+        let o{{ k }} = opinion_{{ k }}(a{{ k }}, b{{ k }}, t, t_end, slope);
+        any_proof |= o{{ k }};
+        all_agree &= o{{ k }};
+{% endfor %}
+        let free = (any_proof & PROVEN) != 0u || all_agree != 0u;
+        t = select(t, t_end, free);
+        stride = select(0.5 + 0.5 * stride, min(1.0 + (stride - 1.0) * 1.5, GREATEST_MOVE), free);
+    }
+    tile_start_m[work.view.first_tile + id.y * tiles.x + id.x] = t;
+}
+
+// The least parameter at which a corner ray of the tile enters the volume; its near plane where the
+// corners miss it although something between them may not.
+fn entry(tile: vec2u) -> f32 {
+    var least = FAR_AWAY;
+    for (var corner = 0u; corner < 4u; corner++) {
+        let pixel = vec2f((tile + vec2u(corner & 1u, corner >> 1u)) * TILE_PX);
+        let direction = work.view.column_in_world * pixel.x + work.view.row_in_world * pixel.y + work.view.corner_in_world;
+        let span = span_in_volume(work.view.eye_in_world, direction, work.view.near_m);
+        least = min(least, select(work.view.near_m, span.near, span.near <= span.far));
+    }
+    return least;
+}

@@ -1,0 +1,71 @@
+//! Textures with mip chains averaged in linear light.
+
+use depth_image::{linear_from_srgb8, srgb8_from_linear};
+use gpu::Gpu;
+use scene::Texture;
+
+/// One texel of white, for materials without a texture.
+pub(crate) fn white() -> Texture {
+    Texture { width_px: 1, height_px: 1, srgba8: vec![255; 4] }
+}
+
+/// Uploads a texture and all of its mip levels.
+pub(crate) fn upload(gpu: &Gpu, texture: &Texture) -> wgpu::TextureView {
+    let size = wgpu::Extent3d { width: texture.width_px, height: texture.height_px, depth_or_array_layers: 1 };
+    let levels = size.max_mips(wgpu::TextureDimension::D2);
+    let on_device = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("material texture"),
+        size,
+        mip_level_count: levels,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let mut level = texture.clone();
+    for mip in 0..levels {
+        write_level(gpu, &on_device, mip, &level);
+        level = halved(&level);
+    }
+    on_device.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+fn write_level(gpu: &Gpu, texture: &wgpu::Texture, mip_level: u32, level: &Texture) {
+    let destination = wgpu::TexelCopyTextureInfo { texture, mip_level, origin: wgpu::Origin3d::ZERO, aspect: wgpu::TextureAspect::All };
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(level.width_px * 4), rows_per_image: None };
+    let size = wgpu::Extent3d { width: level.width_px, height: level.height_px, depth_or_array_layers: 1 };
+    gpu.queue.write_texture(destination, &level.srgba8, layout, size);
+}
+
+/// Half the size, each texel the mean of up to four in linear light.
+fn halved(texture: &Texture) -> Texture {
+    let (width, height) = ((texture.width_px / 2).max(1), (texture.height_px / 2).max(1));
+    let decode: [f32; 256] = std::array::from_fn(|code| linear_from_srgb8(code as u8));
+    let texel = |x: u32, y: u32, channel: u32| {
+        let (x, y) = (x.min(texture.width_px - 1), y.min(texture.height_px - 1));
+        texture.srgba8[((y * texture.width_px + x) * 4 + channel) as usize]
+    };
+    let mean = |x: u32, y: u32, channel: u32| {
+        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| texel(2 * x + i, 2 * y + j, channel));
+        match channel {
+            3 => (four.iter().map(|&v| u32::from(v)).sum::<u32>() / 4) as u8,
+            _ => srgb8_from_linear(four.iter().map(|&v| decode[v as usize]).sum::<f32>() * 0.25),
+        }
+    };
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let srgba8 = pixels.flat_map(|(x, y)| (0..4).map(move |c| (x, y, c))).map(|(x, y, c)| mean(x, y, c)).collect();
+    Texture { width_px: width, height_px: height, srgba8 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halving_averages_light_not_codes() {
+        let mut texture = Texture { width_px: 2, height_px: 1, srgba8: vec![255; 8] };
+        texture.srgba8[..3].fill(0);
+        assert_eq!(halved(&texture).srgba8, [188, 188, 188, 255]);
+    }
+}

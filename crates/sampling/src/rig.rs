@@ -1,0 +1,164 @@
+//! Where sample cameras and the views between them stand.
+
+use depth_image::{Aabb, PinholeCamera};
+use glam::{UVec2, Vec2, Vec3};
+
+/// Four cameras at the corners of a rectangle, all looking at one point: the two-plane rig of Lages
+/// §4.1. The rectangle is the view cell; views are asked for within it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rig {
+    /// The rectangle's middle.
+    pub center_in_world: Vec3,
+    /// From the middle to the right and upper edges.
+    pub half_edges_in_world: [Vec3; 2],
+    /// What all cameras look at.
+    pub target_in_world: Vec3,
+    /// Full vertical field of view.
+    pub fov_y_rad: f32,
+    /// What is closer is not drawn.
+    pub near_m: f32,
+}
+
+/// Why a rig cannot be placed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RigError {
+    /// No volume to look at.
+    #[error("the volume to sample is empty or not finite")]
+    EmptyVolume,
+}
+
+/// 45 degrees, as in the paper.
+const FOV_Y_RAD: f32 = std::f32::consts::FRAC_PI_4;
+
+impl Rig {
+    /// The paper's: cameras above the corners of a block between two horizontal planes, looking at the
+    /// middle of the tile. `height` is in halves of the block's width (the paper leaves it open).
+    ///
+    /// # Errors
+    /// When the block is empty.
+    pub fn two_plane(block: &Aabb, height: f32) -> Result<Self, RigError> {
+        check(block)?;
+        let half = block.size() * 0.5;
+        let center = block.center();
+        let above = Vec3::new(center.x, block.min.y + height * half.x.max(half.z), center.z);
+        Ok(Self {
+            center_in_world: above,
+            half_edges_in_world: [Vec3::X * half.x, Vec3::NEG_Z * half.z],
+            target_in_world: Vec3::new(center.x, block.min.y, center.z),
+            fov_y_rad: FOV_Y_RAD,
+            near_m: half.max_element() * 0.05,
+        })
+    }
+
+    /// Before a model's front, at a distance from which all of it is seen, slightly raised. Neighbouring
+    /// cameras see its middle 2 · `spread_rad` apart.
+    ///
+    /// # Errors
+    /// When the volume is empty.
+    pub fn in_front_of(volume: &Aabb, spread_rad: f32) -> Result<Self, RigError> {
+        check(volume)?;
+        let radius_m = volume.size().length() * 0.5;
+        // The whole sphere fits at the corner cameras too, which are a little farther away.
+        let distance_m = radius_m / (FOV_Y_RAD * 0.5).sin();
+        let backwards = Vec3::new(0.35, 0.3, 1.0).normalize();
+        let right = Vec3::Y.cross(backwards).normalize();
+        let half = distance_m * spread_rad.tan();
+        Ok(Self {
+            center_in_world: volume.center() + backwards * distance_m,
+            half_edges_in_world: [right * half, backwards.cross(right) * half],
+            target_in_world: volume.center(),
+            fov_y_rad: FOV_Y_RAD,
+            near_m: (distance_m - radius_m) * 0.25,
+        })
+    }
+
+    /// The camera at a place of the rectangle, -1 to 1 each way.
+    #[must_use]
+    pub fn camera_at(&self, place: Vec2, size_px: UVec2) -> PinholeCamera {
+        let eye = self.center_in_world + self.half_edges_in_world[0] * place.x + self.half_edges_in_world[1] * place.y;
+        let up = self.half_edges_in_world[1];
+        PinholeCamera { near_m: self.near_m, ..PinholeCamera::looking_at(eye, self.target_in_world, up, self.fov_y_rad, size_px) }
+    }
+
+    /// The four sample cameras.
+    #[must_use]
+    pub fn samples(&self, size_px: UVec2) -> Vec<PinholeCamera> {
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+        corners.map(|(x, y)| self.camera_at(Vec2::new(x, y), size_px)).to_vec()
+    }
+
+    /// `count` views spread evenly over the rectangle, a low-discrepancy sequence (R2, Roberts 2018).
+    #[must_use]
+    pub fn views(&self, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
+        const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
+        let place = |i: usize| (Vec2::splat(0.5) + STEP * i as f32).fract() * 2.0 - 1.0;
+        (0..count).map(|i| self.camera_at(place(i), size_px)).collect()
+    }
+
+    /// `columns` × `rows` views over the whole rectangle, corners included, row by row from the bottom.
+    #[must_use]
+    pub fn grid(&self, columns: usize, rows: usize, size_px: UVec2) -> Vec<PinholeCamera> {
+        let step = |i: usize, n: usize| if n < 2 { 0.0 } else { 2.0 * i as f32 / (n - 1) as f32 - 1.0 };
+        let places = (0..rows).flat_map(|y| (0..columns).map(move |x| Vec2::new(step(x, columns), step(y, rows))));
+        places.map(|place| self.camera_at(place, size_px)).collect()
+    }
+
+    /// `count` views on an ellipse inside the rectangle.
+    #[must_use]
+    pub fn orbit(&self, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
+        let place = |i: usize| Vec2::from_angle(std::f32::consts::TAU * i as f32 / count as f32) * 0.8;
+        (0..count).map(|i| self.camera_at(place(i), size_px)).collect()
+    }
+}
+
+fn check(volume: &Aabb) -> Result<(), RigError> {
+    let usable = !volume.is_empty() && volume.size().is_finite() && volume.size().max_element() > 0.0;
+    usable.then_some(()).ok_or(RigError::EmptyVolume)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BLOCK: Aabb = Aabb { min: Vec3::new(-1.0, 0.0, -1.0), max: Vec3::new(1.0, 1.0, 1.0) };
+
+    #[test]
+    fn four_cameras_above_the_corners_see_the_middle_in_the_middle() {
+        let rig = Rig::two_plane(&BLOCK, 3.0).expect("a block");
+        let cameras = rig.samples(UVec2::new(400, 300));
+        assert_eq!(cameras.len(), 4);
+        for camera in cameras {
+            camera.validate().expect("valid");
+            assert!((camera.eye_in_world.abs() - Vec3::new(1.0, 3.0, 1.0)).length() < 1e-6);
+            let at = camera.project(Vec3::ZERO).expect("in front");
+            assert!((at.pixel - Vec2::new(200.0, 150.0)).length() < 1e-2);
+        }
+    }
+
+    #[test]
+    fn views_stay_in_the_cell() {
+        let rig = Rig::two_plane(&BLOCK, 3.0).expect("a block");
+        let views = [rig.views(290, UVec2::new(200, 150)), rig.grid(5, 4, UVec2::ONE), rig.orbit(24, UVec2::ONE)].concat();
+        assert_eq!(views.len(), 290 + 20 + 24);
+        assert!(views.iter().all(|v| v.eye_in_world.xz().abs().max_element() <= 1.0 + 1e-6));
+    }
+
+    #[test]
+    fn a_model_is_seen_whole() {
+        let rig = Rig::in_front_of(&BLOCK, 0.15).expect("a block");
+        for camera in rig.samples(UVec2::new(400, 300)) {
+            for corner in BLOCK.corners() {
+                let at = camera.project(corner).expect("in front");
+                assert!(camera.contains(at.pixel) && at.planar_depth_m > camera.near_m, "{at:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_to_look_at_is_an_error() {
+        assert_eq!(Rig::two_plane(&Aabb::EMPTY, 3.0), Err(RigError::EmptyVolume));
+        assert_eq!(Rig::in_front_of(&Aabb { min: Vec3::NAN, max: Vec3::NAN }, 0.1), Err(RigError::EmptyVolume));
+    }
+
+    use glam::Vec3Swizzles;
+}

@@ -1,0 +1,63 @@
+//! Prints what scenes hold and how long they take: `cargo run --release -p scene --example inspect --
+//! tree-terrain-500k model.glb`.
+
+use std::time::Instant;
+
+use scene::{Limits, SceneSpec, pack, unpack};
+
+fn main() {
+    for name in std::env::args().skip(1) {
+        let Ok(spec) = name.parse::<SceneSpec>();
+        inspect(&spec);
+    }
+}
+
+fn inspect(spec: &SceneSpec) {
+    let limits = Limits::default();
+    let start = Instant::now();
+    let scene = match spec.load(&limits) {
+        Ok(scene) => scene,
+        Err(error) => return println!("{spec}: refused after {:?}: {error}", start.elapsed()),
+    };
+    let load = start.elapsed();
+    let vertices: usize = scene.meshes.iter().map(|m| m.vertices.len()).sum();
+    println!(
+        "{spec}: {} triangles, {vertices} vertices, loaded in {load:.1?}",
+        scene.triangle_count()
+    );
+    let (meshes, instances, parts) = (
+        scene.meshes.len(),
+        scene.instances.len(),
+        scene.meshes.iter().map(|m| m.parts.len()).sum::<usize>(),
+    );
+    println!(
+        "  {meshes} meshes in {parts} parts, {instances} instances, {} materials",
+        scene.materials.len()
+    );
+    let sizes: Vec<_> = scene
+        .textures
+        .iter()
+        .map(|t| format!("{}x{}", t.width_px, t.height_px))
+        .collect();
+    println!(
+        "  textures {sizes:?}, {} lights, {} cameras",
+        scene.lights.len(),
+        scene.cameras.len()
+    );
+    let bounds = scene.bounds();
+    println!(
+        "  bounds {} to {}, origin in source {}",
+        bounds.min, bounds.max, scene.origin_in_source
+    );
+    let start = Instant::now();
+    let package = pack(&scene);
+    let packed = start.elapsed();
+    let start = Instant::now();
+    let is_same = unpack(&package.bytes, &limits).is_ok_and(|unpacked| unpacked == scene);
+    println!(
+        "  {} bytes packed in {packed:.1?}, unpacked in {:.1?}, same: {is_same}",
+        package.bytes.len(),
+        start.elapsed()
+    );
+    println!("  {}", package.hash);
+}

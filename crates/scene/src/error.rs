@@ -1,0 +1,135 @@
+//! What can be wrong with a scene: where, which element, and why.
+
+use std::fmt;
+use std::path::Path;
+
+/// A scene that cannot be used. Display reads `file: element: reason`.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}: {element}: {kind}")]
+pub struct SceneError {
+    /// The file, the package or the scene's name.
+    pub file: String,
+    /// The part at fault: an accessor, a line, a header.
+    pub element: String,
+    /// The reason.
+    #[source]
+    pub kind: SceneErrorKind,
+}
+
+/// Why a scene cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneErrorKind {
+    /// The operating system refused.
+    #[error("cannot be read or written: {0}")]
+    Io(#[from] std::io::Error),
+    /// The bytes are not what the format says.
+    #[error("{0}")]
+    Malformed(String),
+    /// Well-formed, but a feature that this program does not have.
+    #[error("not supported: {0}")]
+    Unsupported(String),
+    /// A reference to something outside the scene's folder.
+    #[error("refers to {reference:?}, which {reason}")]
+    Forbidden {
+        /// What the file asked for.
+        reference: String,
+        /// Why it does not get it.
+        reason: &'static str,
+    },
+    /// More than [`crate::Limits`] allows.
+    #[error("{actual} is over the limit of {limit}")]
+    TooLarge {
+        /// What the file asked for.
+        actual: u64,
+        /// What is allowed.
+        limit: u64,
+    },
+}
+
+/// A [`SceneError`] before the file's name is known.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    element: String,
+    kind: SceneErrorKind,
+}
+
+impl Fault {
+    pub(crate) fn new(element: impl fmt::Display, kind: SceneErrorKind) -> Self {
+        Self {
+            element: element.to_string(),
+            kind,
+        }
+    }
+
+    pub(crate) fn malformed(element: impl fmt::Display, reason: impl Into<String>) -> Self {
+        Self::new(element, SceneErrorKind::Malformed(shortened(reason.into())))
+    }
+
+    pub(crate) fn unsupported(element: impl fmt::Display, feature: impl Into<String>) -> Self {
+        Self::new(
+            element,
+            SceneErrorKind::Unsupported(shortened(feature.into())),
+        )
+    }
+
+    pub(crate) fn forbidden(
+        element: impl fmt::Display,
+        reference: &str,
+        reason: &'static str,
+    ) -> Self {
+        Self::new(
+            element,
+            SceneErrorKind::Forbidden {
+                reference: shortened(reference.to_owned()),
+                reason,
+            },
+        )
+    }
+
+    pub(crate) fn io(element: impl fmt::Display, error: std::io::Error) -> Self {
+        Self::new(element, SceneErrorKind::Io(error))
+    }
+
+    pub(crate) fn kind(&self) -> &SceneErrorKind {
+        &self.kind
+    }
+
+    pub(crate) fn in_file(self, file: impl Into<String>) -> SceneError {
+        SceneError {
+            file: file.into(),
+            element: shortened(self.element),
+            kind: self.kind,
+        }
+    }
+
+    pub(crate) fn in_path(self, path: &Path) -> SceneError {
+        self.in_file(path.display().to_string())
+    }
+}
+
+/// `Err` when `actual` is over `limit`.
+pub(crate) fn at_most(element: impl fmt::Display, actual: u64, limit: u64) -> Result<(), Fault> {
+    if actual > limit {
+        Err(Fault::new(
+            element,
+            SceneErrorKind::TooLarge { actual, limit },
+        ))
+    } else {
+        Ok(())
+    }
+}
+
+/// A message quotes the file, and the file may hold megabytes without a line break.
+fn shortened(mut text: String) -> String {
+    const MAX_BYTES: usize = 300;
+    if text.len() > MAX_BYTES {
+        text.truncate(
+            (0..=MAX_BYTES)
+                .rev()
+                .find(|&at| text.is_char_boundary(at))
+                .unwrap_or(0),
+        );
+        text.push('…');
+    }
+    text
+}

@@ -1,0 +1,81 @@
+//! glTF 2.0 and GLB.
+//!
+//! The JSON is parsed by the `gltf` crate; every index, range and type is then checked here, where it is
+//! used. The crate's own validation and readers are not called: both index without checking
+//! (`primitive_validate_hook`, `accessor::Iter`), which a malformed file turns into a panic.
+//!
+//! What is read: node transforms, meshes (one mesh a glTF mesh, however many nodes use it), triangles,
+//! strips and fans, base colour with texture and `KHR_texture_transform` (baked into the coordinates),
+//! `COLOR_0`, metallic and roughness (of a texture, its mean), alpha masks (blending becomes a mask at
+//! 0.5), `KHR_materials_unlit`, `KHR_materials_emissive_strength`, `KHR_lights_punctual` (a spot shines
+//! in all directions) and perspective cameras. Points and lines are skipped. Missing normals are flat,
+//! as the specification asks. Not read: normal and occlusion maps, skins (shown in bind pose), morph
+//! targets, animations, sampler wrap modes (all textures repeat), textures in other than PNG and JPEG.
+
+mod accessors;
+mod container;
+mod materials;
+mod nodes;
+mod primitives;
+
+use gltf::json::Root;
+
+use super::folder::Folder;
+use super::source_scene::{SourceMesh, SourceScene};
+use crate::Limits;
+use crate::error::{Fault, at_most};
+use accessors::Buffers;
+
+/// Extensions that a file may require.
+const SUPPORTED_EXTENSIONS: [&str; 4] = [
+    "KHR_materials_unlit",
+    "KHR_materials_emissive_strength",
+    "KHR_texture_transform",
+    "KHR_lights_punctual",
+];
+
+pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
+    let (root, binary_chunk) = container::parse(bytes, limits)?;
+    refuse_unknown_requirements(&root)?;
+    check_counts(&root, limits)?;
+    let buffers = Buffers::load(&root, binary_chunk, folder, limits)?;
+    let mut scene = SourceScene::default();
+    materials::read(&root, &buffers, folder, limits, &mut scene)?;
+    read_meshes(&root, &buffers, &mut scene)?;
+    nodes::read(&root, limits, &mut scene)?;
+    Ok(scene)
+}
+
+fn refuse_unknown_requirements(root: &Root) -> Result<(), Fault> {
+    let unknown = root
+        .extensions_required
+        .iter()
+        .find(|name| !SUPPORTED_EXTENSIONS.contains(&name.as_str()));
+    unknown.map_or(Ok(()), |name| {
+        Err(Fault::unsupported("extensionsRequired", name.as_str()))
+    })
+}
+
+fn check_counts(root: &Root, limits: &Limits) -> Result<(), Fault> {
+    at_most("nodes", root.nodes.len() as u64, limits.nodes)?;
+    at_most("meshes", root.meshes.len() as u64, limits.nodes)?;
+    at_most("materials", root.materials.len() as u64, limits.attributes)?;
+    at_most("images", root.images.len() as u64, limits.attributes)
+}
+
+/// Mesh `i` of the file becomes mesh `i` of the scene; one of lines only stays empty.
+fn read_meshes(root: &Root, buffers: &Buffers, scene: &mut SourceScene) -> Result<(), Fault> {
+    for (number, mesh) in root.meshes.iter().enumerate() {
+        let mut merged = SourceMesh::default();
+        for (part, primitive) in mesh.primitives.iter().enumerate() {
+            let element = format!("mesh {number}, primitive {part}");
+            let uv = materials::uv_source(root, primitive.material);
+            let material = materials::material_number(root, primitive.material, &element)?;
+            if let Some(geometry) = primitives::read(root, buffers, primitive, &uv, &element)? {
+                merged.append_part(geometry, material);
+            }
+        }
+        scene.meshes.push(merged);
+    }
+    Ok(())
+}

@@ -1,0 +1,202 @@
+//! The node tree: where meshes, lights and cameras are.
+
+use glam::{DAffine3, DMat4, DQuat, DVec3, Mat4, Quat, Vec3};
+use gltf::json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Type as LightType};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Node, Root, Scene as JsonScene};
+
+use super::super::source_scene::{PlacedCamera, SourceInstance, SourceLight, SourceScene};
+use crate::Limits;
+use crate::error::{Fault, at_most};
+
+/// Walks the default scene (else the first; else all nodes that are no other's child). A node reached
+/// twice is a cycle or has two parents; glTF allows neither.
+pub(super) fn read(root: &Root, limits: &Limits, scene: &mut SourceScene) -> Result<(), Fault> {
+    let mut is_visited = vec![false; root.nodes.len()];
+    let mut pending: Vec<_> = roots(root)?
+        .into_iter()
+        .map(|node| (node, DAffine3::IDENTITY, 0u32))
+        .collect();
+    while let Some((index, source_from_parent, depth)) = pending.pop() {
+        let element = format!("node {}", index.value());
+        let node = root
+            .get(index)
+            .ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
+        at_most(
+            format!("{element}, depth"),
+            u64::from(depth),
+            limits.node_depth.into(),
+        )?;
+        if std::mem::replace(&mut is_visited[index.value()], true) {
+            return Err(Fault::malformed(
+                element,
+                "it is reached twice: a cycle, or two parents",
+            ));
+        }
+        let source_from_node = source_from_parent * parent_from_node(node, &element)?;
+        place(root, node, source_from_node, &element, scene)?;
+        let children = node.children.iter().flatten();
+        pending.extend(children.map(|&child| (child, source_from_node, depth + 1)));
+    }
+    Ok(())
+}
+
+fn roots(root: &Root) -> Result<Vec<Index<Node>>, Fault> {
+    let chosen = root
+        .scene
+        .or((!root.scenes.is_empty()).then(|| Index::new(0)));
+    if let Some(index) = chosen {
+        let scene: Option<&JsonScene> = root.get(index);
+        return scene
+            .map(|s| s.nodes.clone())
+            .ok_or_else(|| Fault::malformed("default scene", "it does not exist"));
+    }
+    let mut is_child = vec![false; root.nodes.len()];
+    for child in root.nodes.iter().flat_map(|n| n.children.iter().flatten()) {
+        if let Some(flag) = is_child.get_mut(child.value()) {
+            *flag = true;
+        }
+    }
+    Ok((0..root.nodes.len())
+        .filter(|&i| !is_child[i])
+        .map(|i| Index::new(i as u32))
+        .collect())
+}
+
+fn place(
+    root: &Root,
+    node: &Node,
+    source_from_node: DAffine3,
+    element: &str,
+    scene: &mut SourceScene,
+) -> Result<(), Fault> {
+    if let Some(mesh) = node.mesh {
+        let mesh = mesh.value();
+        let triangles = scene.meshes.get(mesh).map(|m| m.indices.len());
+        let triangles = triangles
+            .ok_or_else(|| Fault::malformed(element, format!("mesh {mesh} does not exist")))?;
+        if triangles > 0 {
+            refuse_singular(&source_from_node, element)?;
+            scene.instances.push(SourceInstance {
+                mesh,
+                source_from_mesh: source_from_node,
+            });
+        }
+    }
+    if let Some(light) = node
+        .extensions
+        .as_ref()
+        .and_then(|e| e.khr_lights_punctual.as_ref())
+    {
+        let light: Option<&JsonLight> = root.get(light.light);
+        let light = light.ok_or_else(|| Fault::malformed(element, "its light does not exist"))?;
+        scene
+            .lights
+            .push(placed_light(light, &source_from_node, element)?);
+    }
+    if node.camera.is_some() {
+        scene
+            .cameras
+            .extend(placed_camera(root, node, &source_from_node, element)?);
+    }
+    Ok(())
+}
+
+fn refuse_singular(source_from_node: &DAffine3, element: &str) -> Result<(), Fault> {
+    if super::super::source_scene::is_invertible(source_from_node) {
+        Ok(())
+    } else {
+        Err(Fault::malformed(
+            element,
+            "its transform is singular or not finite",
+        ))
+    }
+}
+
+fn parent_from_node(node: &Node, element: &str) -> Result<DAffine3, Fault> {
+    let transform = match node.matrix {
+        Some(matrix) => affine_from(Mat4::from_cols_array(&matrix).as_dmat4()),
+        None => from_parts(node),
+    };
+    let transform = transform.filter(DAffine3::is_finite);
+    transform.ok_or_else(|| {
+        Fault::malformed(
+            element,
+            "its transform is not finite, not affine, or has no rotation",
+        )
+    })
+}
+
+fn affine_from(matrix: DMat4) -> Option<DAffine3> {
+    let is_affine = (matrix.row(3) - glam::DVec4::W).abs().max_element() < 1e-6;
+    is_affine.then(|| DAffine3::from_mat4(matrix))
+}
+
+fn from_parts(node: &Node) -> Option<DAffine3> {
+    let scale = node.scale.map_or(DVec3::ONE, |s| Vec3::from(s).as_dvec3());
+    let translation = node
+        .translation
+        .map_or(DVec3::ZERO, |t| Vec3::from(t).as_dvec3());
+    let rotation = node
+        .rotation
+        .map_or(DQuat::IDENTITY, |r| Quat::from_array(r.0).as_dquat());
+    let length = rotation.length();
+    let is_usable = length > 1e-6 && length.is_finite();
+    is_usable
+        .then(|| DAffine3::from_scale_rotation_translation(scale, rotation / length, translation))
+}
+
+/// glTF gives lux and candela, which a white surface reflects over a hemisphere: a factor of 1/π.
+fn placed_light(
+    light: &JsonLight,
+    source_from_node: &DAffine3,
+    element: &str,
+) -> Result<SourceLight, Fault> {
+    let colour = Vec3::from(light.color) * light.intensity * std::f32::consts::FRAC_1_PI;
+    match light.type_ {
+        Checked::Valid(LightType::Directional) => {
+            let towards = (source_from_node.matrix3 * DVec3::Z).try_normalize();
+            let towards_light_in_source =
+                towards.ok_or_else(|| Fault::malformed(element, "its light has no direction"))?;
+            Ok(SourceLight::Directional {
+                towards_light_in_source,
+                irradiance_linear: colour,
+            })
+        }
+        Checked::Valid(LightType::Point | LightType::Spot) => Ok(SourceLight::Point {
+            position_in_source: source_from_node.translation,
+            intensity_linear: colour,
+        }),
+        Checked::Invalid => Err(Fault::malformed(element, "its light has an unknown type")),
+    }
+}
+
+/// `None` for an orthographic camera. The pose is rigid: a node's scale says nothing about a view.
+fn placed_camera(
+    root: &Root,
+    node: &Node,
+    source_from_node: &DAffine3,
+    element: &str,
+) -> Result<Option<PlacedCamera>, Fault> {
+    let camera = node.camera.and_then(|index| root.get(index));
+    let camera = camera.ok_or_else(|| Fault::malformed(element, "its camera does not exist"))?;
+    let Some(perspective) = &camera.perspective else {
+        return Ok(None);
+    };
+    refuse_singular(source_from_node, element)?;
+    let backwards = (source_from_node.matrix3 * DVec3::Z).normalize_or(DVec3::Z);
+    let right = (source_from_node.matrix3 * DVec3::Y)
+        .cross(backwards)
+        .normalize_or(DVec3::X);
+    let rotation = glam::DMat3::from_cols(right, backwards.cross(right), backwards);
+    let fallback = || format!("camera {}", node.camera.map_or(0, |c| c.value()));
+    Ok(Some(PlacedCamera {
+        name: camera
+            .name
+            .clone()
+            .or_else(|| node.name.clone())
+            .unwrap_or_else(fallback),
+        source_from_camera: DAffine3::from_mat3_translation(rotation, source_from_node.translation),
+        fov_y_rad: perspective.yfov,
+    }))
+}

@@ -1,0 +1,59 @@
+//! Files to scenes. Each format fills a [`source_scene::SourceScene`] in double precision; what they
+//! share (re-centring, mirrored placements, limits, validation) happens once, in its `finish`.
+
+mod folder;
+mod gltf;
+mod normals;
+mod obj;
+mod picture;
+mod ply;
+mod source_scene;
+
+use std::path::Path;
+
+use crate::error::Fault;
+use crate::{Limits, Scene, SceneError};
+use folder::Folder;
+use source_scene::SourceScene;
+
+/// Reads a scene from a `.gltf`, `.glb`, `.obj` or `.ply` file. Files that it refers to are read only
+/// from its own folder and below. The scene has the lights that the file lists, which may be none: see
+/// [`Scene::with_default_lights`].
+///
+/// Axes and units are kept as in the file (only glTF defines them). Coordinates are kept too, unless the
+/// scene lies so far from the origin that `f32` would lose detail: then [`Scene::origin_in_source`] says
+/// by how much everything, lights and cameras included, has been moved. That is when the centre of its
+/// bounds is more than 10 km, or more than 1000 times the bounds' diagonal, from the origin.
+///
+/// # Errors
+/// Names the file, the element at fault, and the reason.
+pub fn load_file(path: &Path, limits: &Limits) -> Result<Scene, SceneError> {
+    let scene = read_source(path, limits).and_then(|source| source.finish(limits));
+    scene.map_err(|fault| fault.in_path(path))
+}
+
+fn read_source(path: &Path, limits: &Limits) -> Result<SourceScene, Fault> {
+    let extension = path
+        .extension()
+        .and_then(|e| e.to_str())
+        .unwrap_or_default()
+        .to_ascii_lowercase();
+    let read: fn(&[u8], &Folder, &Limits) -> Result<SourceScene, Fault> = match extension.as_str() {
+        "gltf" | "glb" => gltf::read,
+        "obj" => obj::read,
+        "ply" => ply::read,
+        _ => {
+            return Err(Fault::unsupported(
+                "file name",
+                format!("extension {extension:?}; known are gltf, glb, obj and ply"),
+            ));
+        }
+    };
+    let (folder, bytes) = Folder::opened_with(path, limits)?;
+    let mut source = read(&bytes, &folder, limits)?;
+    source.name = path
+        .file_stem()
+        .map(|stem| stem.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    Ok(source)
+}

@@ -1,0 +1,264 @@
+//! Normals for sources that have none: the angle-weighted mean of the faces around a corner, over those
+//! that bend away by less than a crease angle. Corners that disagree get vertices of their own.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::source_scene::SourceMesh;
+
+/// Smooth, with edges sharper than 60° kept: for formats that do not say how to shade.
+pub(crate) const CREASE_60_DEGREES: f64 = 0.5;
+/// Flat but for coplanar faces: what glTF 2.0 (3.7.2.1) asks for.
+pub(crate) const FLAT: f64 = 0.999_999;
+
+/// Around a hub of more corners than this, all are averaged: the pairwise comparison would be quadratic.
+const MAX_CORNERS_COMPARED: usize = 256;
+
+/// Sets every normal; may add vertices.
+pub(crate) fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
+    let faces = Faces::of(mesh);
+    let corners_at = CornersByPosition::of(mesh);
+    let original_count = mesh.vertices.len();
+    // For each vertex, the copies made of it so far: a chain through `next_copy`.
+    let mut next_copy: Vec<Option<u32>> = vec![None; original_count];
+    let mut is_set = vec![false; original_count];
+    for corner in 0..mesh.indices.len() {
+        let vertex = mesh.indices[corner];
+        let normal = faces
+            .smooth_normal(corner, corners_at.around(vertex), crease_cosine)
+            .as_vec3()
+            .to_array();
+        mesh.indices[corner] = if is_set[vertex as usize] {
+            copy_with_normal(mesh, &mut next_copy, vertex, normal)
+        } else {
+            is_set[vertex as usize] = true;
+            mesh.vertices[vertex as usize].normal = normal;
+            vertex
+        };
+    }
+    // Vertices of no triangle are never drawn, but must be valid.
+    let unused = is_set.iter().enumerate().filter(|(_, set)| !**set);
+    unused.for_each(|(i, _)| mesh.vertices[i].normal = [0.0, 1.0, 0.0]);
+}
+
+/// Normalises the normals that there are, and fills in those of no length with the mean of their faces.
+pub(crate) fn repair(mesh: &mut SourceMesh) {
+    let length = |n: [f32; 3]| DVec3::from(n.map(f64::from)).length();
+    if mesh.vertices.iter().any(|v| length(v.normal) < 1e-6) {
+        let (faces, corners_at) = (Faces::of(mesh), CornersByPosition::of(mesh));
+        for corner in 0..mesh.indices.len() {
+            let vertex = mesh.indices[corner];
+            if length(mesh.vertices[vertex as usize].normal) < 1e-6 {
+                let normal = faces.smooth_normal(corner, corners_at.around(vertex), -2.0);
+                mesh.vertices[vertex as usize].normal = normal.as_vec3().to_array();
+            }
+        }
+    }
+    for vertex in &mut mesh.vertices {
+        let normal = DVec3::from(vertex.normal.map(f64::from));
+        vertex.normal = normal
+            .try_normalize()
+            .unwrap_or(DVec3::Y)
+            .as_vec3()
+            .to_array();
+    }
+}
+
+fn copy_with_normal(
+    mesh: &mut SourceMesh,
+    next_copy: &mut Vec<Option<u32>>,
+    vertex: u32,
+    normal: [f32; 3],
+) -> u32 {
+    let mut at = vertex as usize;
+    loop {
+        if is_same_direction(mesh.vertices[at].normal, normal) {
+            return at as u32;
+        }
+        match next_copy[at] {
+            Some(next) => at = next as usize,
+            None => break,
+        }
+    }
+    let copy = mesh.vertices.len() as u32;
+    mesh.vertices.push(crate::Vertex {
+        normal,
+        ..mesh.vertices[vertex as usize]
+    });
+    mesh.positions_in_mesh
+        .push(mesh.positions_in_mesh[vertex as usize]);
+    next_copy[at] = Some(copy);
+    next_copy.push(None);
+    copy
+}
+
+fn is_same_direction(a: [f32; 3], b: [f32; 3]) -> bool {
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f32>() < 1e-8
+}
+
+/// Unit normal of each triangle, and the angle at each corner.
+struct Faces {
+    normals: Vec<DVec3>,
+    corner_angles_rad: Vec<f64>,
+}
+
+impl Faces {
+    fn of(mesh: &SourceMesh) -> Self {
+        let mut faces = Self {
+            normals: Vec::new(),
+            corner_angles_rad: Vec::new(),
+        };
+        for triangle in mesh.indices.chunks_exact(3) {
+            let p: [DVec3; 3] =
+                std::array::from_fn(|i| mesh.positions_in_mesh[triangle[i] as usize]);
+            faces.normals.push(
+                (p[1] - p[0])
+                    .cross(p[2] - p[0])
+                    .try_normalize()
+                    .unwrap_or(DVec3::ZERO),
+            );
+            faces
+                .corner_angles_rad
+                .extend((0..3).map(|i| corner_angle_rad(p[i], p[(i + 1) % 3], p[(i + 2) % 3])));
+        }
+        faces
+    }
+
+    fn smooth_normal(&self, corner: usize, around: &[u32], crease_cosine: f64) -> DVec3 {
+        let own = self.normals[corner / 3];
+        let compares = around.len() <= MAX_CORNERS_COMPARED;
+        let weighted = |&other: &u32| {
+            let normal = self.normals[other as usize / 3];
+            let joins = !compares || normal.dot(own) >= crease_cosine;
+            if joins {
+                normal * self.corner_angles_rad[other as usize]
+            } else {
+                DVec3::ZERO
+            }
+        };
+        // A hub's sum would be as long for each of its corners; a stride keeps the whole linear.
+        let stride = if compares {
+            1
+        } else {
+            around.len() / MAX_CORNERS_COMPARED
+        };
+        let sum: DVec3 = around.iter().step_by(stride).map(weighted).sum();
+        sum.try_normalize()
+            .or_else(|| own.try_normalize())
+            .unwrap_or(DVec3::Y)
+    }
+}
+
+fn corner_angle_rad(at: DVec3, next: DVec3, last: DVec3) -> f64 {
+    let (a, b) = (next - at, last - at);
+    let lengths = (a.length_squared() * b.length_squared()).sqrt();
+    if lengths > 0.0 {
+        (a.dot(b) / lengths).clamp(-1.0, 1.0).acos()
+    } else {
+        0.0
+    }
+}
+
+/// Which corners of triangles meet at a point, whatever vertex they name.
+struct CornersByPosition {
+    group_of_vertex: Vec<u32>,
+    first_of_group: Vec<u32>,
+    corners: Vec<u32>,
+}
+
+impl CornersByPosition {
+    fn of(mesh: &SourceMesh) -> Self {
+        let group_of_vertex = groups_by_position(&mesh.positions_in_mesh);
+        let group_count = group_of_vertex.iter().max().map_or(0, |&g| g as usize + 1);
+        let mut first_of_group = vec![0u32; group_count + 1];
+        for &vertex in &mesh.indices {
+            first_of_group[group_of_vertex[vertex as usize] as usize + 1] += 1;
+        }
+        for group in 1..first_of_group.len() {
+            first_of_group[group] += first_of_group[group - 1];
+        }
+        let mut corners = vec![0u32; mesh.indices.len()];
+        let mut next_free = first_of_group.clone();
+        for (corner, &vertex) in mesh.indices.iter().enumerate() {
+            let slot = &mut next_free[group_of_vertex[vertex as usize] as usize];
+            corners[*slot as usize] = corner as u32;
+            *slot += 1;
+        }
+        Self {
+            group_of_vertex,
+            first_of_group,
+            corners,
+        }
+    }
+
+    /// `vertex` may be a copy made later: copies are only asked for by their original's number.
+    fn around(&self, vertex: u32) -> &[u32] {
+        let group = self.group_of_vertex[vertex as usize] as usize;
+        &self.corners[self.first_of_group[group] as usize..self.first_of_group[group + 1] as usize]
+    }
+}
+
+fn groups_by_position(positions: &[DVec3]) -> Vec<u32> {
+    let mut group_of: HashMap<[u64; 3], u32> = HashMap::with_capacity(positions.len());
+    let key = |p: &DVec3| (*p + DVec3::ZERO).to_array().map(f64::to_bits);
+    let mut group = |p| {
+        let next = group_of.len() as u32;
+        *group_of.entry(key(p)).or_insert(next)
+    };
+    positions.iter().map(&mut group).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::source_scene::plain_vertex;
+    use super::*;
+
+    fn mesh(points: &[[f64; 3]], indices: &[u32]) -> SourceMesh {
+        SourceMesh {
+            positions_in_mesh: points.iter().map(|&p| p.into()).collect(),
+            vertices: vec![plain_vertex(); points.len()],
+            indices: indices.to_vec(),
+            parts: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_right_angle_stays_sharp_and_a_gentle_one_is_smoothed() {
+        let fold = |height: f64| {
+            let points = [[0., 0., 0.], [0., 0., 1.], [1., 0., 0.], [-1., height, 0.]];
+            let mut mesh = mesh(&points, &[0, 1, 2, 0, 3, 1]);
+            generate(&mut mesh, CREASE_60_DEGREES);
+            mesh
+        };
+        assert_eq!(fold(0.3).vertices.len(), 4);
+        let sharp = fold(50.0);
+        assert_eq!(sharp.vertices.len(), 6);
+        assert_eq!(sharp.vertices[0].normal, [0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn a_fan_around_one_hub_is_linear_in_time() {
+        let rim = 300_000u32;
+        let on_rim = |i: u32| [f64::from(i).cos(), 0.0, f64::from(i).sin()];
+        let points: Vec<_> = std::iter::once([0.0; 3])
+            .chain((0..=rim).map(on_rim))
+            .collect();
+        let indices: Vec<_> = (1..=rim).flat_map(|i| [0, i + 1, i]).collect();
+        let start = std::time::Instant::now();
+        generate(&mut mesh(&points, &indices), CREASE_60_DEGREES);
+        assert!(start.elapsed().as_secs() < 5);
+    }
+
+    #[test]
+    fn degenerate_triangles_get_some_unit_normal() {
+        let mut degenerate = mesh(&[[0.; 3], [0.; 3], [0.; 3]], &[0, 1, 2]);
+        generate(&mut degenerate, FLAT);
+        assert!(
+            degenerate
+                .vertices
+                .iter()
+                .all(|v| v.normal == [0.0, 1.0, 0.0])
+        );
+    }
+}

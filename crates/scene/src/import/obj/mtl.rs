@@ -1,0 +1,188 @@
+//! MTL material libraries.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+
+use super::super::folder::Folder;
+use super::super::picture::{EncodedPicture, decode_all};
+use super::super::source_scene::SourceScene;
+use super::text::{Line, floats, lines};
+use crate::error::{Fault, at_most};
+use crate::{Limits, Material, SceneErrorKind};
+
+/// Fills the scene's materials and textures, and numbers them for `names`. Libraries and textures that do
+/// not exist are left out; those outside the folder are refused.
+pub(super) fn read_materials(
+    libraries: &[String],
+    names: &[String],
+    folder: &Folder,
+    limits: &Limits,
+    scene: &mut SourceScene,
+) -> Result<Vec<u32>, Fault> {
+    at_most("materials", names.len() as u64, limits.attributes)?;
+    let mut known = HashMap::new();
+    for library in libraries {
+        let element = format!("mtllib {library}");
+        if let Some(bytes) = existing(folder.read_name(&element, library))? {
+            parse(
+                &String::from_utf8_lossy(&bytes),
+                &element,
+                limits,
+                &mut known,
+            )?;
+        }
+    }
+    let mut textures = Textures::default();
+    let mut numbers = Vec::new();
+    for name in names {
+        let Entry {
+            mut material,
+            picture,
+        } = known.get(name).cloned().unwrap_or_default();
+        material.name.clone_from(name);
+        material.base_color_texture = picture
+            .map(|file| textures.number_of(&file, folder))
+            .transpose()?
+            .flatten();
+        numbers.push(scene.materials.len() as u32);
+        scene.materials.push(material);
+    }
+    if scene.materials.is_empty() {
+        scene.materials.push(Material::default());
+    }
+    scene.textures = decode_all(&textures.encoded, limits)?;
+    Ok(numbers)
+}
+
+#[derive(Clone, Default)]
+struct Entry {
+    material: Material,
+    picture: Option<String>,
+}
+
+fn parse(
+    text: &str,
+    element: &str,
+    limits: &Limits,
+    known: &mut HashMap<String, Entry>,
+) -> Result<(), Fault> {
+    let (mut name, mut entry) = (None, Entry::default());
+    for line in lines(text) {
+        if line.keyword == "newmtl" {
+            known.extend(
+                name.replace(line.rest.to_owned())
+                    .map(|name| (name, std::mem::take(&mut entry))),
+            );
+            at_most(element, known.len() as u64, limits.attributes)?;
+        } else {
+            entry.take(&line)?;
+        }
+    }
+    known.extend(name.map(|name| (name, entry)));
+    Ok(())
+}
+
+impl Entry {
+    fn take(&mut self, line: &Line) -> Result<(), Fault> {
+        let material = &mut self.material;
+        match line.keyword {
+            "Kd" => {
+                let [r, g, b] = color(line)?.to_array();
+                material.base_color_linear = [r, g, b, material.base_color_linear[3]];
+            }
+            "Ks" => material.phong_specular = color(line)?.element_sum() / 3.0,
+            "Ke" => material.emissive_linear = color(line)?,
+            "Ns" => {
+                material.phong_exponent = non_negative(line)?;
+                material.roughness =
+                    Material::roughness_from_phong_exponent(material.phong_exponent);
+            }
+            "d" => material.set_opacity(non_negative(line)?),
+            "Tr" => material.set_opacity(1.0 - non_negative(line)?),
+            "map_Kd" => self.picture = Some(file_name(line.rest).to_owned()),
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+impl Material {
+    /// As glTF's blending: no surface is see-through, one of less than half is not there.
+    fn set_opacity(&mut self, opacity: f32) {
+        self.base_color_linear[3] = opacity.clamp(0.0, 1.0);
+        self.alpha_cutoff = if opacity < 1.0 { 0.5 } else { 0.0 };
+    }
+}
+
+/// One or three numbers; writers disagree on whether they are linear, and this takes them as linear, as
+/// the glTF converters do.
+fn color(line: &Line) -> Result<Vec3, Fault> {
+    if line.rest.starts_with("spectral") || line.rest.starts_with("xyz") {
+        return Err(Fault::unsupported(line, "colours other than RGB"));
+    }
+    let is_grey = line.rest.split_ascii_whitespace().count() == 1;
+    let [r, g, b] = floats::<3>(line, 1)?.map(|c| c as f32);
+    let color = if is_grey {
+        Vec3::splat(r)
+    } else {
+        Vec3::new(r, g, b)
+    };
+    let is_valid = color.is_finite() && color.min_element() >= 0.0;
+    if is_valid {
+        Ok(color)
+    } else {
+        Err(Fault::malformed(line, "a colour is negative or not finite"))
+    }
+}
+
+fn non_negative(line: &Line) -> Result<f32, Fault> {
+    let [value] = floats::<1>(line, 1)?;
+    let value = value as f32;
+    if value >= 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(Fault::malformed(line, "negative or not finite"))
+    }
+}
+
+/// The name comes after options such as `-s 1 1 1`; without options it may hold spaces.
+fn file_name(rest: &str) -> &str {
+    if rest.starts_with('-') {
+        rest.split_ascii_whitespace().next_back().unwrap_or(rest)
+    } else {
+        rest
+    }
+}
+
+#[derive(Default)]
+struct Textures {
+    number_of_file: HashMap<String, Option<u32>>,
+    encoded: Vec<EncodedPicture>,
+}
+
+impl Textures {
+    fn number_of(&mut self, file: &str, folder: &Folder) -> Result<Option<u32>, Fault> {
+        if let Some(&number) = self.number_of_file.get(file) {
+            return Ok(number);
+        }
+        let element = format!("map_Kd {file}");
+        let number = existing(folder.read_name(&element, file))?.map(|bytes| {
+            self.encoded.push(EncodedPicture { element, bytes });
+            self.encoded.len() as u32 - 1
+        });
+        self.number_of_file.insert(file.to_owned(), number);
+        Ok(number)
+    }
+}
+
+/// `None` for a file that does not exist.
+fn existing(read: Result<Vec<u8>, Fault>) -> Result<Option<Vec<u8>>, Fault> {
+    match read {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(fault) => match fault.kind() {
+            SceneErrorKind::Io(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            _ => Err(fault),
+        },
+    }
+}

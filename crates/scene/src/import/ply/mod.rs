@@ -1,0 +1,135 @@
+//! PLY, ASCII and binary, by `serde-ply` (which streams rows; sizes are checked against the file before).
+//!
+//! Read are `vertex` (x y z; nx ny nz; red green blue alpha, as sRGB bytes kept as they are, or as 0…1;
+//! s t, u v or texture_u texture_v) and `face` (vertex_indices or vertex_index; polygons become fans).
+//! Normals that are missing are made smooth up to creases of 60°. Axes are kept. Other elements are
+//! skipped.
+
+mod header;
+mod rows;
+
+use std::io::{BufRead, Read};
+
+use glam::DAffine3;
+use serde::de::MapAccess;
+use serde_ply::{PlyReader, RowVisitor};
+
+use super::folder::Folder;
+use super::normals;
+use super::source_scene::{SourceInstance, SourceMesh, SourceScene};
+use crate::error::{Fault, at_most};
+use crate::{Limits, Material, MeshPart};
+use rows::{FaceRow, SkippedRow, VertexRow};
+
+pub(super) fn read(bytes: &[u8], _folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
+    // The last number of an ASCII file may lack the white space that ends it.
+    let reader = PlyReader::from_reader(bytes.chain(&b"\n"[..]))
+        .map_err(|e| Fault::malformed("header", e.to_string()))?;
+    header::check(reader.header(), bytes.len() as u64, limits)?;
+    let (mut mesh, has_normals) = read_elements(reader, limits)?;
+    let index_count = mesh.indices.len() as u32;
+    mesh.parts.push(MeshPart {
+        first_index: 0,
+        index_count,
+        material: 0,
+    });
+    if has_normals {
+        normals::repair(&mut mesh)
+    } else {
+        normals::generate(&mut mesh, normals::CREASE_60_DEGREES)
+    }
+    Ok(SourceScene {
+        meshes: vec![mesh],
+        instances: vec![SourceInstance {
+            mesh: 0,
+            source_from_mesh: DAffine3::IDENTITY,
+        }],
+        materials: vec![Material {
+            name: "vertex colours".into(),
+            ..Material::default()
+        }],
+        ..SourceScene::default()
+    })
+}
+
+fn read_elements(
+    mut reader: PlyReader<impl BufRead>,
+    limits: &Limits,
+) -> Result<(SourceMesh, bool), Fault> {
+    let mut mesh = SourceMesh::default();
+    let mut has_normals = false;
+    while let Some(element) = reader.current_element() {
+        let name = element.name.clone();
+        match name.as_str() {
+            "vertex" => {
+                let color_scale = header::color_scale(element);
+                has_normals = element.has_property("nx");
+                read_vertices(&mut reader, color_scale, &mut mesh)?;
+            }
+            "face" => read_faces(&mut reader, &mut mesh, limits)?,
+            _ => each_row(&mut reader, |_: SkippedRow| Ok(()))
+                .map_err(|why| Fault::malformed(&name, why))?,
+        }
+    }
+    let vertex_count = mesh.vertices.len();
+    if let Some(bad) = mesh.indices.iter().find(|&&i| i as usize >= vertex_count) {
+        return Err(Fault::malformed(
+            "face",
+            format!("index {bad} is beyond its {vertex_count} vertices"),
+        ));
+    }
+    Ok((mesh, has_normals))
+}
+
+fn read_vertices(
+    reader: &mut PlyReader<impl BufRead>,
+    color_scale: f32,
+    mesh: &mut SourceMesh,
+) -> Result<(), Fault> {
+    each_row(reader, |row: VertexRow| {
+        let (position, vertex) = row.vertex(color_scale)?;
+        mesh.positions_in_mesh.push(position);
+        mesh.vertices.push(vertex);
+        Ok(())
+    })
+    .map_err(|why| Fault::malformed(format!("vertex {}", mesh.vertices.len()), why))
+}
+
+fn read_faces(
+    reader: &mut PlyReader<impl BufRead>,
+    mesh: &mut SourceMesh,
+    limits: &Limits,
+) -> Result<(), Fault> {
+    let mut face = 0u64;
+    let result = each_row(reader, |row: FaceRow| {
+        row.append_fan(&mut mesh.indices)?;
+        face += 1;
+        if mesh.indices.len() as u64 / 3 > limits.triangles {
+            Err(TOO_MANY.to_owned())
+        } else {
+            Ok(())
+        }
+    });
+    at_most("triangles", mesh.indices.len() as u64 / 3, limits.triangles)?;
+    result.map_err(|why| Fault::malformed(format!("face {face}"), why))
+}
+
+const TOO_MANY: &str = "too many triangles";
+
+/// Feeds the rows of the reader's next element to `take`, up to the first that it refuses.
+fn each_row<'de, R: BufRead, T: serde::Deserialize<'de>>(
+    mut reader: &mut PlyReader<R>,
+    mut take: impl FnMut(T) -> Result<(), String>,
+) -> Result<(), String> {
+    let mut refused = None;
+    let mut visitor = RowVisitor::new(|row| {
+        if refused.is_none() {
+            refused = take(row).err();
+        }
+    });
+    let read = reader.next_value_seed(&mut visitor);
+    match refused {
+        Some(why) => Err(why),
+        None => read.map_err(|e| e.0.to_string()),
+    }
+}

@@ -1,0 +1,329 @@
+//! A scene in the source's own coordinates, in double precision, and its way to a [`Scene`].
+
+use std::collections::HashMap;
+
+use glam::{Affine3A, DAffine3, DVec3, Vec3};
+
+use crate::error::{Fault, at_most};
+use crate::{
+    Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Vertex,
+};
+
+/// Further from the origin than this, a millimetre is lost in `f32`.
+const FAR_M: f64 = 1e4;
+/// Further than this many diagonals, a hundred-thousandth of the model is lost.
+const FAR_IN_DIAGONALS: f64 = 1e3;
+
+/// What an importer fills.
+#[derive(Default)]
+pub(crate) struct SourceScene {
+    pub name: String,
+    pub meshes: Vec<SourceMesh>,
+    pub instances: Vec<SourceInstance>,
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+    pub lights: Vec<SourceLight>,
+    pub cameras: Vec<PlacedCamera>,
+}
+
+/// A mesh; `vertices[i].position` is not set, `positions_in_mesh[i]` is.
+#[derive(Default, Clone)]
+pub(crate) struct SourceMesh {
+    pub positions_in_mesh: Vec<DVec3>,
+    pub vertices: Vec<Vertex>,
+    pub indices: Vec<u32>,
+    pub parts: Vec<MeshPart>,
+}
+
+#[derive(Clone, Copy)]
+pub(crate) struct SourceInstance {
+    pub mesh: usize,
+    pub source_from_mesh: DAffine3,
+}
+
+pub(crate) enum SourceLight {
+    Directional {
+        towards_light_in_source: DVec3,
+        irradiance_linear: Vec3,
+    },
+    Point {
+        position_in_source: DVec3,
+        intensity_linear: Vec3,
+    },
+}
+
+pub(crate) struct PlacedCamera {
+    pub name: String,
+    pub source_from_camera: DAffine3,
+    pub fov_y_rad: f32,
+}
+
+/// A vertex as it is where the source says nothing.
+pub(crate) fn plain_vertex() -> Vertex {
+    Vertex {
+        position: [0.0; 3],
+        normal: [0.0; 3],
+        uv: [0.0; 2],
+        color_srgba8: [255; 4],
+        sway: 0.0,
+    }
+}
+
+impl SourceScene {
+    /// Checks, re-centres, un-mirrors, converts to `f32`, and validates.
+    pub(crate) fn finish(mut self, limits: &Limits) -> Result<Scene, Fault> {
+        self.check_sizes(limits)?;
+        self.recentre_meshes()?;
+        let origin_in_source = self.origin_in_source()?;
+        self.unmirror();
+        let (meshes, materials, textures) = (self.meshes, self.materials, self.textures);
+        let scene = Scene {
+            name: self.name,
+            meshes: meshes.into_iter().map(SourceMesh::into_f32).collect(),
+            instances: self
+                .instances
+                .iter()
+                .map(|i| i.relative_to(origin_in_source))
+                .collect(),
+            materials,
+            textures,
+            lights: self
+                .lights
+                .iter()
+                .map(|l| l.relative_to(origin_in_source))
+                .collect(),
+            cameras: self
+                .cameras
+                .into_iter()
+                .map(|c| c.relative_to(origin_in_source))
+                .collect(),
+            origin_in_source,
+            ..Scene::default()
+        };
+        scene.check(limits)?;
+        Ok(scene)
+    }
+
+    fn check_sizes(&self, limits: &Limits) -> Result<(), Fault> {
+        at_most("instances", self.instances.len() as u64, limits.instances)?;
+        let of = |i: &SourceInstance| self.meshes[i.mesh].indices.len() as u64 / 3;
+        let triangles = self.instances.iter().map(of).fold(0, u64::saturating_add);
+        at_most("triangles of all instances", triangles, limits.triangles)?;
+        if triangles == 0 {
+            return Err(Fault::malformed("scene", "it has no triangles"));
+        }
+        let singular = self
+            .instances
+            .iter()
+            .position(|i| !is_invertible(&i.source_from_mesh));
+        singular.map_or(Ok(()), |i| {
+            Err(Fault::malformed(
+                format!("instance {i}"),
+                "its transform is singular or not finite",
+            ))
+        })
+    }
+
+    /// A mesh far from its own origin is brought there, and its instances take the distance over.
+    fn recentre_meshes(&mut self) -> Result<(), Fault> {
+        for (number, mesh) in self.meshes.iter_mut().enumerate() {
+            let bad = mesh.positions_in_mesh.iter().position(|p| !p.is_finite());
+            if let Some(vertex) = bad {
+                return Err(Fault::malformed(
+                    format!("mesh {number}, vertex {vertex}"),
+                    "its position is not finite",
+                ));
+            }
+            let offset = recentring_offset(Box3::around(mesh.positions_in_mesh.iter().copied()));
+            if offset != DVec3::ZERO {
+                mesh.positions_in_mesh.iter_mut().for_each(|p| *p -= offset);
+                let of_mesh = self.instances.iter_mut().filter(|i| i.mesh == number);
+                of_mesh.for_each(|i| i.source_from_mesh *= DAffine3::from_translation(offset));
+            }
+        }
+        Ok(())
+    }
+
+    fn origin_in_source(&self) -> Result<DVec3, Fault> {
+        let boxes: Vec<_> = self
+            .meshes
+            .iter()
+            .map(|m| Box3::around(m.positions_in_mesh.iter().copied()))
+            .collect();
+        let corners = self.instances.iter().flat_map(|instance| {
+            let box3 = boxes[instance.mesh];
+            let corners = (!box3.is_empty()).then(|| box3.corners());
+            corners
+                .into_iter()
+                .flatten()
+                .map(|c| instance.source_from_mesh.transform_point3(c))
+        });
+        let all = Box3::around(corners);
+        if !(all.min.is_finite() && all.max.is_finite()) {
+            return Err(Fault::malformed("scene", "its bounds are not finite"));
+        }
+        Ok(recentring_offset(all))
+    }
+
+    /// A placement that mirrors would turn triangles inside out; mirror the mesh once instead, and place
+    /// that without a mirror.
+    fn unmirror(&mut self) {
+        let mirror_x = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+        let mut mirrored_of = HashMap::new();
+        for instance in &mut self.instances {
+            if instance.source_from_mesh.matrix3.determinant() < 0.0 {
+                instance.mesh = *mirrored_of.entry(instance.mesh).or_insert_with(|| {
+                    self.meshes.push(self.meshes[instance.mesh].mirrored_in_x());
+                    self.meshes.len() - 1
+                });
+                instance.source_from_mesh *= mirror_x;
+            }
+        }
+    }
+}
+
+impl SourceMesh {
+    /// Appends `other` as one part of `material`.
+    pub(crate) fn append_part(&mut self, other: SourceMesh, material: u32) {
+        let first_vertex = self.vertices.len() as u32;
+        let first_index = self.indices.len() as u32;
+        let index_count = other.indices.len() as u32;
+        self.positions_in_mesh.extend(other.positions_in_mesh);
+        self.vertices.extend(other.vertices);
+        self.indices
+            .extend(other.indices.into_iter().map(|i| i + first_vertex));
+        self.parts.push(MeshPart {
+            first_index,
+            index_count,
+            material,
+        });
+    }
+
+    fn mirrored_in_x(&self) -> Self {
+        let mut mesh = self.clone();
+        mesh.positions_in_mesh.iter_mut().for_each(|p| p.x = -p.x);
+        mesh.vertices
+            .iter_mut()
+            .for_each(|v| v.normal[0] = -v.normal[0]);
+        mesh.indices
+            .chunks_exact_mut(3)
+            .for_each(|triangle| triangle.swap(1, 2));
+        mesh
+    }
+
+    fn into_f32(mut self) -> Mesh {
+        for (vertex, position) in self.vertices.iter_mut().zip(&self.positions_in_mesh) {
+            vertex.position = position.as_vec3().to_array();
+        }
+        Mesh {
+            vertices: self.vertices,
+            indices: self.indices,
+            parts: self.parts,
+        }
+    }
+}
+
+impl SourceInstance {
+    fn relative_to(&self, origin_in_source: DVec3) -> Instance {
+        Instance {
+            mesh: self.mesh as u32,
+            world_from_mesh: moved(&self.source_from_mesh, origin_in_source),
+        }
+    }
+}
+
+impl SourceLight {
+    fn relative_to(&self, origin_in_source: DVec3) -> Light {
+        match *self {
+            Self::Directional {
+                towards_light_in_source,
+                irradiance_linear,
+            } => Light::Directional {
+                towards_light_in_world: towards_light_in_source.as_vec3(),
+                irradiance_linear,
+            },
+            Self::Point {
+                position_in_source,
+                intensity_linear,
+            } => Light::Point {
+                position_in_world: (position_in_source - origin_in_source).as_vec3(),
+                intensity_linear,
+            },
+        }
+    }
+}
+
+impl PlacedCamera {
+    fn relative_to(self, origin_in_source: DVec3) -> SourceCamera {
+        let world_from_camera = moved(&self.source_from_camera, origin_in_source);
+        SourceCamera {
+            name: self.name,
+            world_from_camera,
+            fov_y_rad: self.fov_y_rad,
+        }
+    }
+}
+
+fn moved(source_from_x: &DAffine3, origin_in_source: DVec3) -> Affine3A {
+    let [x, y, z] = [0, 1, 2].map(|i| source_from_x.matrix3.col(i).as_vec3());
+    let translation = (source_from_x.translation - origin_in_source).as_vec3();
+    Affine3A::from_cols(x.into(), y.into(), z.into(), translation.into())
+}
+
+pub(crate) fn is_invertible(transform: &DAffine3) -> bool {
+    let largest = (0..3).fold(0f64, |most, i| most.max(transform.matrix3.col(i).length()));
+    transform.is_finite() && (transform.matrix3 * largest.recip()).determinant().abs() > 1e-12
+}
+
+/// By how much to move what fills `bounds` towards the origin: whole metres, unless it is too small.
+fn recentring_offset(bounds: Box3) -> DVec3 {
+    if bounds.is_empty() {
+        return DVec3::ZERO;
+    }
+    let (centre, diagonal) = (
+        (bounds.min + bounds.max) * 0.5,
+        (bounds.max - bounds.min).length(),
+    );
+    let distance = centre.length();
+    if distance <= FAR_M && distance <= FAR_IN_DIAGONALS * diagonal {
+        DVec3::ZERO
+    } else if diagonal > 10.0 {
+        centre.round()
+    } else {
+        centre
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Box3 {
+    min: DVec3,
+    max: DVec3,
+}
+
+impl Box3 {
+    fn around(points: impl Iterator<Item = DVec3>) -> Self {
+        let empty = Self {
+            min: DVec3::INFINITY,
+            max: DVec3::NEG_INFINITY,
+        };
+        points.fold(empty, |b, p| Self {
+            min: b.min.min(p),
+            max: b.max.max(p),
+        })
+    }
+
+    fn is_empty(&self) -> bool {
+        self.min.cmpgt(self.max).any()
+    }
+
+    fn corners(&self) -> [DVec3; 8] {
+        let pick = |i: usize, bit: usize| {
+            if i >> bit & 1 == 0 {
+                self.min[bit]
+            } else {
+                self.max[bit]
+            }
+        };
+        std::array::from_fn(|i| DVec3::new(pick(i, 0), pick(i, 1), pick(i, 2)))
+    }
+}

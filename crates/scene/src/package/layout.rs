@@ -1,0 +1,218 @@
+//! The bytes of a package, little-endian throughout:
+//!
+//! ```text
+//! magic "MYRSCENE" | version u32 | header length u32 | header (postcard)
+//! then for each mesh: vertices (40 bytes each), indices (4 bytes each); for each texture: texels
+//! ```
+//!
+//! The arrays are as they are in memory, so that packing and unpacking are copies; the header has their
+//! lengths, which are checked against what is left of the bytes before anything is allocated.
+
+use bytemuck::Pod;
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Fault, at_most};
+use crate::{
+    Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Wind,
+};
+
+#[cfg(target_endian = "big")]
+compile_error!("packages hold arrays as they are in memory, which must be little-endian");
+
+const MAGIC: &[u8; 8] = b"MYRSCENE";
+const VERSION: u32 = 1;
+
+/// A scene without its large arrays.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    name: String,
+    meshes: Vec<MeshHeader>,
+    instances: Vec<Instance>,
+    materials: Vec<Material>,
+    textures: Vec<TextureHeader>,
+    lights: Vec<Light>,
+    ambient_linear: Vec3,
+    background_linear: Vec3,
+    cameras: Vec<SourceCamera>,
+    wind: Option<Wind>,
+    origin_in_source: DVec3,
+}
+
+#[derive(Serialize, Deserialize)]
+struct MeshHeader {
+    vertex_count: u32,
+    index_count: u32,
+    parts: Vec<MeshPart>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct TextureHeader {
+    width_px: u32,
+    height_px: u32,
+}
+
+pub(super) fn bytes_from_scene(scene: &Scene) -> Vec<u8> {
+    // Writing to a growing vector cannot fail, and no field is of a kind that postcard refuses.
+    let header = postcard::to_stdvec(&header_of(scene)).unwrap_or_default();
+    let mut bytes = Vec::with_capacity(16 + header.len() + array_bytes(scene));
+    bytes.extend_from_slice(MAGIC);
+    bytes.extend_from_slice(&VERSION.to_le_bytes());
+    bytes.extend_from_slice(&(header.len() as u32).to_le_bytes());
+    bytes.extend_from_slice(&header);
+    for mesh in &scene.meshes {
+        bytes.extend_from_slice(bytemuck::cast_slice(&mesh.vertices));
+        bytes.extend_from_slice(bytemuck::cast_slice(&mesh.indices));
+    }
+    scene
+        .textures
+        .iter()
+        .for_each(|texture| bytes.extend_from_slice(&texture.srgba8));
+    bytes
+}
+
+pub(super) fn scene_from_bytes(bytes: &[u8], limits: &Limits) -> Result<Scene, Fault> {
+    at_most("size in bytes", bytes.len() as u64, limits.file_bytes)?;
+    let mut reader = Reader { rest: bytes };
+    if reader.array::<8>("magic")? != *MAGIC {
+        return Err(Fault::malformed(
+            "magic",
+            "these bytes are not a scene package",
+        ));
+    }
+    let version = u32::from_le_bytes(reader.array("version")?);
+    if version != VERSION {
+        return Err(Fault::unsupported(
+            "version",
+            format!("package version {version}"),
+        ));
+    }
+    let header_bytes = u32::from_le_bytes(reader.array("header length")?);
+    let header = read_header(reader.take("header", u64::from(header_bytes))?)?;
+    let scene = scene_from_header(header, &mut reader, limits)?;
+    if reader.rest.is_empty() {
+        Ok(scene)
+    } else {
+        Err(Fault::malformed("end", "bytes follow the last array"))
+    }
+}
+
+fn header_of(scene: &Scene) -> Header {
+    let mesh = |m: &Mesh| MeshHeader {
+        vertex_count: m.vertices.len() as u32,
+        index_count: m.indices.len() as u32,
+        parts: m.parts.clone(),
+    };
+    let texture = |t: &Texture| TextureHeader {
+        width_px: t.width_px,
+        height_px: t.height_px,
+    };
+    Header {
+        name: scene.name.clone(),
+        meshes: scene.meshes.iter().map(mesh).collect(),
+        instances: scene.instances.clone(),
+        materials: scene.materials.clone(),
+        textures: scene.textures.iter().map(texture).collect(),
+        lights: scene.lights.clone(),
+        ambient_linear: scene.ambient_linear,
+        background_linear: scene.background_linear,
+        cameras: scene.cameras.clone(),
+        wind: scene.wind,
+        origin_in_source: scene.origin_in_source,
+    }
+}
+
+fn array_bytes(scene: &Scene) -> usize {
+    let mesh = |m: &Mesh| size_of_val(m.vertices.as_slice()) + size_of_val(m.indices.as_slice());
+    scene.meshes.iter().map(mesh).sum::<usize>()
+        + scene.textures.iter().map(|t| t.srgba8.len()).sum::<usize>()
+}
+
+fn read_header(bytes: &[u8]) -> Result<Header, Fault> {
+    match postcard::take_from_bytes(bytes) {
+        Ok((header, [])) => Ok(header),
+        Ok(_) => Err(Fault::malformed("header", "it is longer than its contents")),
+        Err(e) => Err(Fault::malformed("header", e.to_string())),
+    }
+}
+
+fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Result<Scene, Fault> {
+    let mut meshes = Vec::new();
+    for (number, mesh) in header.meshes.into_iter().enumerate() {
+        let element = format!("mesh {number}");
+        at_most(
+            format!("{element}, vertices"),
+            mesh.vertex_count.into(),
+            limits.vertices,
+        )?;
+        let vertices = reader.pods(&element, mesh.vertex_count.into())?;
+        let indices = reader.pods(&element, mesh.index_count.into())?;
+        meshes.push(Mesh {
+            vertices,
+            indices,
+            parts: mesh.parts,
+        });
+    }
+    let mut textures = Vec::new();
+    for (
+        number,
+        TextureHeader {
+            width_px,
+            height_px,
+        },
+    ) in header.textures.into_iter().enumerate()
+    {
+        let bytes = u64::from(width_px) * u64::from(height_px) * 4;
+        let srgba8 = reader.take(format!("texture {number}"), bytes)?.to_vec();
+        textures.push(Texture {
+            width_px,
+            height_px,
+            srgba8,
+        });
+    }
+    Ok(Scene {
+        name: header.name,
+        meshes,
+        instances: header.instances,
+        materials: header.materials,
+        textures,
+        lights: header.lights,
+        ambient_linear: header.ambient_linear,
+        background_linear: header.background_linear,
+        cameras: header.cameras,
+        wind: header.wind,
+        origin_in_source: header.origin_in_source,
+    })
+}
+
+struct Reader<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, element: impl std::fmt::Display, length: u64) -> Result<&'a [u8], Fault> {
+        let split = usize::try_from(length)
+            .ok()
+            .and_then(|length| self.rest.split_at_checked(length));
+        let (taken, rest) = split.ok_or_else(|| {
+            Fault::malformed(
+                element,
+                format!("it needs {length} bytes where {} are left", self.rest.len()),
+            )
+        })?;
+        self.rest = rest;
+        Ok(taken)
+    }
+
+    fn array<const N: usize>(&mut self, element: &str) -> Result<[u8; N], Fault> {
+        let taken = self.take(element, N as u64)?;
+        taken
+            .try_into()
+            .map_err(|_| Fault::malformed(element, "it is cut off"))
+    }
+
+    fn pods<T: Pod>(&mut self, element: &str, count: u64) -> Result<Vec<T>, Fault> {
+        let length = count.saturating_mul(size_of::<T>() as u64);
+        Ok(bytemuck::pod_collect_to_vec(self.take(element, length)?))
+    }
+}

@@ -1,0 +1,35 @@
+//! Scenes made by arithmetic: the paper's tree over a terrain, and small ones in closed form for tests.
+//!
+//! The same arguments give the same scene, bit for bit, on the same build.
+
+mod courtyard;
+mod mesh_builder;
+mod noise;
+mod poles;
+mod rng;
+mod shapes;
+mod terrain;
+mod tree;
+mod tree_terrain;
+
+pub use courtyard::courtyard;
+pub use poles::poles;
+pub use shapes::{checker_sphere, quad, unit_cube, uv_sphere};
+pub use tree_terrain::tree_terrain;
+
+use glam::Vec3;
+
+use crate::Scene;
+
+/// The small scene of one of [`crate::BUILT_IN_NAMES`], with its usual arguments; the cube for any other
+/// name.
+pub(crate) fn by_name(name: &str) -> Scene {
+    match name {
+        "quad" => quad(Vec3::ZERO, 0.5, Vec3::Z, [200, 120, 60]),
+        "uv-sphere" => uv_sphere(1.0, 48),
+        "checker-sphere" => checker_sphere(),
+        "poles" => poles(0.02),
+        "courtyard" => courtyard(),
+        _ => unit_cube(),
+    }
+}

@@ -1,0 +1,73 @@
+//! Gradient noise (Perlin 2002) and sums of it.
+
+use glam::{Vec2, Vec2Swizzles, Vec3};
+
+use super::rng::mixed;
+
+/// Smooth noise, about -1 to 1, with features of size 1.
+#[derive(Clone, Copy)]
+pub(super) struct Noise {
+    seed: u64,
+}
+
+impl Noise {
+    pub(super) fn new(seed: u64) -> Self {
+        Self { seed: mixed(seed) }
+    }
+
+    pub(super) fn at(&self, point: Vec2) -> f32 {
+        let cell = point.floor();
+        let within = point - cell;
+        let corner = |dx: f32, dy: f32| {
+            let offset = Vec2::new(dx, dy);
+            self.gradient(cell + offset).dot(within - offset)
+        };
+        let ease = within * within * within * (within * (within * 6.0 - 15.0) + 10.0);
+        let low = lerp(corner(0.0, 0.0), corner(1.0, 0.0), ease.x);
+        let high = lerp(corner(0.0, 1.0), corner(1.0, 1.0), ease.x);
+        1.4 * lerp(low, high, ease.y)
+    }
+
+    /// Octaves of half the size and half the height each; about -1 to 1.
+    pub(super) fn fractal(&self, point: Vec2, octaves: u32) -> f32 {
+        let (mut sum, mut height, mut total) = (0.0, 1.0, 0.0);
+        for octave in 0..octaves {
+            // An offset a octave, so that the zeros at lattice points do not line up.
+            let shift = Vec2::splat(17.3 * octave as f32);
+            sum += height * self.at(point * 2f32.powi(octave as i32) + shift);
+            total += height;
+            height *= 0.5;
+        }
+        sum / total
+    }
+
+    /// Noise over space, by three planes: good enough for a tint.
+    pub(super) fn in_space(&self, point: Vec3) -> f32 {
+        (self.at(point.truncate())
+            + self.at(point.truncate().yx() + point.z)
+            + self.at(Vec2::new(point.z, point.y)))
+            / 2.0
+    }
+
+    fn gradient(&self, cell: Vec2) -> Vec2 {
+        let key = (cell.x as i32 as u32 as u64) << 32 | cell.y as i32 as u32 as u64;
+        let angle =
+            (mixed(self.seed ^ key) >> 40) as f32 * (std::f32::consts::TAU / (1u64 << 24) as f32);
+        Vec2::from_angle(angle)
+    }
+}
+
+pub(super) fn lerp(a: f32, b: f32, t: f32) -> f32 {
+    a + (b - a) * t
+}
+
+/// 0 below `low`, 1 above `high`, smooth between.
+pub(super) fn smoothstep(low: f32, high: f32, value: f32) -> f32 {
+    let t = ((value - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// Mixes colours by their sRGB codes.
+pub(super) fn mix(a: Vec3, b: Vec3, t: f32) -> Vec3 {
+    a + (b - a) * t.clamp(0.0, 1.0)
+}

@@ -1,0 +1,266 @@
+//! Branches by recursion, after Weber and Penn (1995): each bears shorter ones along its length, turned by
+//! the golden angle, and all bend with the light and their own weight.
+
+use glam::{Quat, Vec3};
+
+use super::super::noise::lerp;
+use super::super::rng::Rng;
+
+/// Trunk, limbs, branches, shoots, twigs.
+pub(super) const LEVELS: usize = 5;
+
+const GOLDEN_ANGLE_RAD: f32 = 2.399_963;
+
+/// How the branches of a level grow.
+struct Habit {
+    knots: u32,
+    children: u32,
+    /// Along the branch, where its first child is.
+    first_child: f32,
+    /// Change of direction a knot, at random.
+    wander: f32,
+    /// Change of direction a knot, upwards.
+    rise: f32,
+    /// Length, of the parent's.
+    length: f32,
+    /// Angle from the parent at its foot and at its tip.
+    angles_rad: [f32; 2],
+    /// How much more the wind moves its tip than its foot.
+    sway: f32,
+}
+
+const HABITS: [Habit; LEVELS] = [
+    Habit {
+        knots: 14,
+        children: 17,
+        first_child: 0.27,
+        wander: 0.07,
+        rise: 0.05,
+        length: 1.0,
+        angles_rad: [0.0; 2],
+        sway: 0.10,
+    },
+    Habit {
+        knots: 11,
+        children: 11,
+        first_child: 0.18,
+        wander: 0.13,
+        rise: 0.045,
+        length: 0.74,
+        angles_rad: [1.22, 0.55],
+        sway: 0.22,
+    },
+    Habit {
+        knots: 7,
+        children: 7,
+        first_child: 0.15,
+        wander: 0.16,
+        rise: 0.03,
+        length: 0.50,
+        angles_rad: [1.0, 0.6],
+        sway: 0.22,
+    },
+    Habit {
+        knots: 5,
+        children: 4,
+        first_child: 0.2,
+        wander: 0.2,
+        rise: 0.02,
+        length: 0.46,
+        angles_rad: [0.95, 0.6],
+        sway: 0.16,
+    },
+    Habit {
+        knots: 3,
+        children: 0,
+        first_child: 1.0,
+        wander: 0.2,
+        rise: -0.02,
+        length: 0.55,
+        angles_rad: [0.9, 0.5],
+        sway: 0.10,
+    },
+];
+
+/// A point on a branch's axis.
+#[derive(Clone, Copy)]
+pub(super) struct Knot {
+    pub position: Vec3,
+    pub radius_m: f32,
+    pub sway: f32,
+}
+
+pub(super) struct Branch {
+    pub level: usize,
+    pub knots: Vec<Knot>,
+}
+
+pub(super) struct Skeleton {
+    pub branches: Vec<Branch>,
+    /// Middle and half extents of the crown.
+    pub crown_centre: Vec3,
+    pub crown_radii: Vec3,
+}
+
+impl Skeleton {
+    /// About one unit high, its foot at the origin.
+    pub(super) fn grown(seed: u64) -> Self {
+        let mut rng = Rng::new(seed, 1);
+        let foot = Knot {
+            position: Vec3::ZERO,
+            radius_m: 0.034,
+            sway: 0.0,
+        };
+        let trunk = grow(0, foot, Vec3::Y, 0.78, &mut rng);
+        let mut branches = vec![trunk];
+        let mut next = 0;
+        while next < branches.len() {
+            let children = children_of(&branches[next], &mut rng);
+            branches.extend(children);
+            next += 1;
+        }
+        Self {
+            branches,
+            crown_centre: Vec3::ZERO,
+            crown_radii: Vec3::ONE,
+        }
+    }
+
+    /// Scaled to `height_m` and moved to `foot`; then the crown is measured.
+    pub(super) fn fitted(mut self, foot: Vec3, height_m: f32) -> Self {
+        /// Room for the leaves at the very top, and for the crown within the block.
+        const LEAF_MARGIN_M: f32 = 0.02;
+        const MAX_REACH_M: f32 = 0.62;
+        let knots = || self.branches.iter().flat_map(|b| &b.knots);
+        let top = knots().fold(1e-3f32, |top, k| top.max(k.position.y));
+        let reach = knots().fold(1e-3f32, |reach, k| {
+            reach.max(k.position.x.hypot(k.position.z))
+        });
+        let scale = ((height_m - LEAF_MARGIN_M) / top).min(MAX_REACH_M / reach);
+        for knot in self.branches.iter_mut().flat_map(|b| &mut b.knots) {
+            knot.position = foot + knot.position * scale;
+            knot.radius_m *= scale;
+        }
+        self.measure_crown();
+        self
+    }
+
+    fn measure_crown(&mut self) {
+        let twigs = self
+            .branches
+            .iter()
+            .filter(|b| b.level + 1 == LEVELS)
+            .flat_map(|b| &b.knots);
+        let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for knot in twigs {
+            (min, max) = (min.min(knot.position), max.max(knot.position));
+        }
+        if min.is_finite() {
+            self.crown_centre = (min + max) * 0.5;
+            self.crown_radii = ((max - min) * 0.5).max(Vec3::splat(1e-3));
+        }
+    }
+}
+
+impl Branch {
+    /// At `t` from 0 (foot) to 1 (tip): a Catmull-Rom curve through the knots.
+    pub(super) fn at(&self, t: f32) -> Knot {
+        let last = self.knots.len() - 1;
+        let along = t.clamp(0.0, 1.0) * last as f32;
+        let i = (along as usize).min(last - 1);
+        let f = along - i as f32;
+        let [a, b, c, d] =
+            [i.saturating_sub(1), i, i + 1, (i + 2).min(last)].map(|k| self.knots[k]);
+        let (p0, p1, p2, p3) = (a.position, b.position, c.position, d.position);
+        let curve = p1 * 2.0
+            + (p2 - p0) * f
+            + (p0 * 2.0 - p1 * 5.0 + p2 * 4.0 - p3) * (f * f)
+            + (p1 * 3.0 - p0 - p2 * 3.0 + p3) * (f * f * f);
+        Knot {
+            position: curve * 0.5,
+            radius_m: lerp(b.radius_m, c.radius_m, f),
+            sway: lerp(b.sway, c.sway, f),
+        }
+    }
+
+    pub(super) fn direction_at(&self, t: f32) -> Vec3 {
+        let (before, after) = (self.at(t - 0.05), self.at(t + 0.05));
+        (after.position - before.position).normalize_or(Vec3::Y)
+    }
+
+    pub(super) fn length_m(&self) -> f32 {
+        self.knots
+            .windows(2)
+            .map(|w| w[0].position.distance(w[1].position))
+            .sum()
+    }
+}
+
+fn grow(level: usize, foot: Knot, direction: Vec3, length: f32, rng: &mut Rng) -> Branch {
+    let habit = &HABITS[level];
+    let step = length / habit.knots as f32;
+    let mut knots = vec![foot];
+    let (mut position, mut direction) = (foot.position, direction);
+    for i in 1..=habit.knots {
+        let t = i as f32 / habit.knots as f32;
+        // Limbs sag in the middle under their weight and lift their ends to the light.
+        let lift = habit.rise * lerp(-0.6, 2.2, t);
+        direction =
+            (direction + rng.vector() * habit.wander + Vec3::Y * lift).normalize_or(Vec3::Y);
+        position += direction * step * rng.between(0.9, 1.1);
+        // Never below the ground that the tree stands on.
+        position.y = position.y.max(0.04);
+        let taper = if level == 0 {
+            lerp(1.0, 0.12, t.powf(0.9))
+        } else {
+            lerp(1.0, 0.22, t)
+        };
+        knots.push(Knot {
+            position,
+            radius_m: foot.radius_m * taper,
+            sway: foot.sway + habit.sway * t.powf(1.3),
+        });
+    }
+    Branch { level, knots }
+}
+
+fn children_of(parent: &Branch, rng: &mut Rng) -> Vec<Branch> {
+    let level = parent.level + 1;
+    let habit = &HABITS[parent.level];
+    if habit.children == 0 {
+        return Vec::new();
+    }
+    let parent_length = parent.length_m();
+    let first_turn = rng.between(0.0, std::f32::consts::TAU);
+    let child = |i: u32| {
+        let u = (i as f32 + rng.between(0.1, 0.9)) / habit.children as f32;
+        let t = lerp(habit.first_child, 0.98, u);
+        let turn = first_turn + GOLDEN_ANGLE_RAD * i as f32 + rng.between(-0.35, 0.35);
+        let knot = parent.at(t);
+        let angle = lerp(HABITS[level].angles_rad[0], HABITS[level].angles_rad[1], u)
+            + rng.between(-0.18, 0.18);
+        let direction = tilted(parent.direction_at(t), angle, turn);
+        let length =
+            parent_length * HABITS[level].length * envelope(level, u) * rng.between(0.8, 1.2);
+        let thickness = if level == 1 { 0.52 } else { 0.6 };
+        let radius_m = (knot.radius_m * thickness).min(0.05 * length).max(4e-4);
+        grow(level, Knot { radius_m, ..knot }, direction, length, rng)
+    };
+    (0..habit.children).map(child).collect()
+}
+
+/// Limbs are longest a third up the crown, which makes it a dome; others shorten towards the tip.
+fn envelope(level: usize, u: f32) -> f32 {
+    match level {
+        1 if u < 0.3 => lerp(0.82, 1.0, u / 0.3),
+        1 => 1.0 - 0.62 * ((u - 0.3) / 0.7).powi(2),
+        _ => lerp(1.0, 0.5, u),
+    }
+}
+
+/// `axis` turned away by `angle_rad`, towards the side that `turn_rad` names.
+fn tilted(axis: Vec3, angle_rad: f32, turn_rad: f32) -> Vec3 {
+    let side = axis.any_orthonormal_vector();
+    let side = Quat::from_axis_angle(axis, turn_rad) * side;
+    (Quat::from_axis_angle(side, angle_rad) * axis).normalize_or(axis)
+}

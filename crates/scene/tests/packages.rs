@@ -1,0 +1,228 @@
+//! Packages and scenes made by arithmetic.
+#![allow(clippy::unwrap_used)]
+
+mod samples;
+
+use glam::Vec3;
+use samples::signed_volume;
+use scene::procedural::{
+    checker_sphere, courtyard, poles, quad, tree_terrain, unit_cube, uv_sphere,
+};
+use scene::{Limits, PackageStore, Scene, SceneErrorKind, SceneHash, pack, unpack};
+
+#[test]
+fn packing_is_deterministic_and_loses_nothing() {
+    for make in [unit_cube, checker_sphere, courtyard, || {
+        tree_terrain(10_000, 1).with_wind()
+    }] {
+        let (package, again) = (pack(&make()), pack(&make()));
+        assert_eq!(package, again);
+        assert_eq!(unpack(&package.bytes, &Limits::default()).unwrap(), make());
+    }
+    assert_ne!(
+        pack(&tree_terrain(10_000, 1)).hash,
+        pack(&tree_terrain(10_000, 2)).hash
+    );
+}
+
+#[test]
+fn hashes_are_shown_and_parsed() {
+    let hash = pack(&unit_cube()).hash;
+    assert_eq!(hash.to_string().parse::<SceneHash>().unwrap(), hash);
+    assert_eq!(hash.to_string().len(), 64);
+    for bad in ["", "00", &"g".repeat(64), &"0".repeat(65)] {
+        assert!(bad.parse::<SceneHash>().is_err());
+    }
+}
+
+#[test]
+fn a_scene_that_breaks_a_promise_is_not_unpacked() {
+    let broken: [fn(&mut Scene); 11] = [
+        |s| s.meshes[0].indices[0] = 99,
+        |s| s.meshes[0].vertices[3].position[1] = f32::NAN,
+        |s| s.meshes[0].vertices[3].normal = [0.0; 3],
+        |s| s.meshes[0].vertices[3].sway = 1.5,
+        |s| s.meshes[0].parts[0].material = 1,
+        |s| s.meshes[0].parts[0].index_count = 33,
+        |s| s.instances[0].mesh = 1,
+        |s| s.instances[0].world_from_mesh.matrix3.x_axis.x = -1.0,
+        |s| s.instances[0].world_from_mesh.matrix3.x_axis.x = 0.0,
+        |s| s.materials[0].base_color_texture = Some(0),
+        |s| s.materials.clear(),
+    ];
+    for (number, break_it) in broken.iter().enumerate() {
+        let mut scene = unit_cube();
+        break_it(&mut scene);
+        assert!(scene.validate(&Limits::default()).is_err(), "{number}");
+        assert!(
+            unpack(&pack(&scene).bytes, &Limits::default()).is_err(),
+            "{number}"
+        );
+    }
+}
+
+#[test]
+fn the_limits_hold_for_packages() {
+    let bytes = pack(&checker_sphere()).bytes;
+    for limits in [
+        Limits {
+            file_bytes: 1000,
+            ..Limits::default()
+        },
+        Limits {
+            vertices: 100,
+            ..Limits::default()
+        },
+        Limits {
+            triangles: 100,
+            ..Limits::default()
+        },
+        Limits {
+            texture_bytes: 100,
+            ..Limits::default()
+        },
+    ] {
+        let error = unpack(&bytes, &limits).unwrap_err();
+        assert!(
+            matches!(error.kind, SceneErrorKind::TooLarge { .. }),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn the_store_gives_back_only_what_has_its_hash() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = PackageStore::open(dir.path().join("new/folder")).unwrap();
+    let package = pack(&unit_cube());
+    assert!(store.get(package.hash).is_none() && !store.contains(package.hash));
+    store.put(package.hash, &package.bytes).unwrap();
+    store.put(package.hash, &package.bytes).unwrap();
+    assert_eq!(store.get(package.hash).unwrap(), package.bytes);
+    assert!(store.put(package.hash, b"other").is_err());
+    let files: Vec<_> = std::fs::read_dir(dir.path().join("new/folder"))
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .collect();
+    assert_eq!(files.len(), 1, "no temporary file stays");
+    std::fs::write(&files[0], b"damaged").unwrap();
+    assert!(store.get(package.hash).is_none());
+}
+
+#[test]
+fn trees_have_the_triangles_asked_for_and_stay_in_their_block() {
+    for asked in [30_000u32, 125_000, 500_000] {
+        let scene = tree_terrain(asked, 2007);
+        scene.validate(&Limits::default()).unwrap();
+        let share = |n: u64| n as f32 / asked as f32;
+        assert!(
+            (share(scene.triangle_count()) - 1.0).abs() < 0.03,
+            "{}",
+            scene.triangle_count()
+        );
+        assert!((share(scene.meshes[0].triangle_count()) - 0.5).abs() < 0.02);
+        let bounds = scene.bounds();
+        assert!(
+            bounds.min.cmpge(Vec3::new(-1.0, 0.0, -1.0)).all() && bounds.max.cmple(Vec3::ONE).all(),
+            "{bounds:?}"
+        );
+        assert!(bounds.max.y > 0.8, "{bounds:?}");
+        assert!(!scene.is_animated());
+    }
+}
+
+#[test]
+fn other_seeds_grow_other_trees_that_fit_too() {
+    for seed in 0..12 {
+        let scene = tree_terrain(20_000, seed).with_wind();
+        scene.validate(&Limits::default()).unwrap();
+        let bounds = scene.bounds();
+        assert!(
+            bounds.min.y >= 0.0 && bounds.max.y <= 1.0,
+            "seed {seed}: {bounds:?}"
+        );
+    }
+}
+
+#[test]
+fn the_wind_moves_leaves_and_neither_ground_nor_roots() {
+    let scene = tree_terrain(30_000, 2007).with_wind();
+    assert!(scene.is_animated());
+    let wind = scene.wind.unwrap();
+    let [ground, tree] = [&scene.meshes[0], &scene.meshes[1]];
+    let moved = |v: &scene::Vertex, t: f32| {
+        wind.displacement_in_world(v.position.into(), v.sway, t)
+            .length()
+    };
+    assert!(ground.vertices.iter().all(|v| moved(v, 0.3) == 0.0));
+    let lowest = tree
+        .vertices
+        .iter()
+        .fold(f32::INFINITY, |y, v| y.min(v.position[1]));
+    assert!(
+        tree.vertices
+            .iter()
+            .filter(|v| v.position[1] < lowest + 1e-3)
+            .all(|v| moved(v, 0.3) < 1e-6)
+    );
+    let most = tree.vertices.iter().fold(0f32, |most, v| most.max(v.sway));
+    assert!((0.8..=1.0).contains(&most), "{most}");
+    let bounds = scene.bounds();
+    for step in 0..8 {
+        let at = |v: &scene::Vertex| {
+            Vec3::from(v.position)
+                + wind.displacement_in_world(v.position.into(), v.sway, step as f32 * 0.37)
+        };
+        assert!(
+            tree.vertices
+                .iter()
+                .map(at)
+                .all(|p| p.cmpge(bounds.min).all() && p.cmple(bounds.max).all())
+        );
+    }
+}
+
+#[test]
+fn small_scenes_are_what_they_say() {
+    assert_eq!(unit_cube().triangle_count(), 12);
+    assert!((signed_volume(&unit_cube()) - 1.0).abs() < 1e-6);
+    let sphere = uv_sphere(2.0, 64);
+    assert!(
+        sphere.meshes[0]
+            .vertices
+            .iter()
+            .all(|v| (Vec3::from(v.position).length() - 2.0).abs() < 1e-5)
+    );
+    assert!((signed_volume(&sphere) / (32.0 / 3.0 * std::f32::consts::PI) - 1.0).abs() < 0.01);
+    let pole = poles(0.05).bounds();
+    assert!((pole.max.z - -0.95).abs() < 1e-6 && pole.min.z == -3.0);
+    assert_eq!(courtyard().bounds().max.y, 2.0);
+    assert!(checker_sphere().materials[0].base_color_texture.is_some());
+}
+
+#[test]
+fn a_quad_faces_where_it_is_told() {
+    for normal in [
+        Vec3::X,
+        Vec3::NEG_X,
+        Vec3::Y,
+        Vec3::NEG_Y,
+        Vec3::Z,
+        Vec3::NEG_Z,
+        Vec3::new(1.0, 2.0, -3.0),
+    ] {
+        let scene = quad(Vec3::new(0.0, 0.0, -4.0), 2.0, normal, [1, 2, 3]);
+        scene.validate(&Limits::default()).unwrap();
+        for [a, b, c] in samples::world_triangles(&scene) {
+            assert!(
+                (b - a)
+                    .cross(c - a)
+                    .normalize()
+                    .distance(normal.normalize())
+                    < 1e-5
+            );
+            assert!((a - Vec3::new(0.0, 0.0, -4.0)).dot(normal).abs() < 1e-4);
+        }
+        assert_eq!(scene.meshes[0].vertices[0].color_srgba8, [1, 2, 3, 255]);
+    }
+}

@@ -1,0 +1,255 @@
+//! Round trips, and thousands of damaged headers and payloads.
+
+use depth_image::PinholeCamera;
+use glam::{UVec2, Vec3};
+
+use super::*;
+use crate::codec::{
+    InverseDepthRange, PlaneEncoding,
+    test_planes::{Random, tree_over_terrain},
+};
+
+fn camera(width: u32, height: u32) -> Camera {
+    Camera::Pinhole(PinholeCamera::looking_at(
+        Vec3::Y,
+        Vec3::ZERO,
+        Vec3::Y,
+        0.8,
+        UVec2::new(width, height),
+    ))
+}
+
+fn image(width: u32, height: u32) -> DepthImage {
+    let mut random = Random::new(8);
+    let mut inverse_depth_per_m = tree_over_terrain(width as usize, height as usize, 9);
+    inverse_depth_per_m
+        .iter_mut()
+        .skip(5)
+        .step_by(97)
+        .for_each(|texel| *texel = depth_image::HOLE_INVERSE_DEPTH);
+    // As decoded: nothing where there is no sample.
+    let mut word = |inverse: &f32, bits: u32| {
+        if *inverse > 0.0 {
+            random.next_u32() >> (32 - bits)
+        } else {
+            0
+        }
+    };
+    let color_rgb9e5 = inverse_depth_per_m
+        .iter()
+        .map(|inverse| word(inverse, 25))
+        .collect();
+    let normal_oct16 = Some(
+        inverse_depth_per_m
+            .iter()
+            .map(|inverse| word(inverse, 32))
+            .collect(),
+    );
+    let id = |inverse| SurfaceId {
+        instance: word(inverse, 2),
+        primitive: word(inverse, 17),
+    };
+    let surface_id = Some(inverse_depth_per_m.iter().map(id).collect());
+    DepthImage {
+        camera: camera(width, height),
+        inverse_depth_per_m,
+        color_rgb9e5,
+        normal_oct16,
+        surface_id,
+    }
+}
+
+fn decode(image: &EncodedDepthImage) -> Result<DepthImage, DecodeError> {
+    let limits = DecodeLimits {
+        max_texels: 1 << 16,
+        ..DecodeLimits::default()
+    };
+    decode_depth_image(
+        &image.header,
+        camera(image.header.width, image.header.height),
+        &image.payload,
+        &limits,
+    )
+}
+
+#[test]
+fn an_image_survives() {
+    for size in [(1, 1), (7, 3), (160, 120)] {
+        let image = image(size.0, size.1);
+        let encoded = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+        let back = decode(&encoded).expect("own encoding");
+        let half_step = encoded.header.inverse_depth_range.half_step_per_m() as f32 * 1.01;
+        for (&was, &is) in image
+            .inverse_depth_per_m
+            .iter()
+            .zip(&back.inverse_depth_per_m)
+        {
+            assert!((was - is).abs() <= half_step && (was > 0.0 || was == is));
+        }
+        let DepthImage {
+            inverse_depth_per_m,
+            ..
+        } = &back;
+        assert_eq!(
+            back,
+            DepthImage {
+                inverse_depth_per_m: inverse_depth_per_m.clone(),
+                ..image
+            }
+        );
+    }
+}
+
+#[test]
+fn planes_travel_only_when_asked_for() {
+    let encoded =
+        encode_depth_image(&image(20, 20), PlaneSet::DEPTH_COLOR).expect("consistent planes");
+    let back = decode(&encoded).expect("own encoding");
+    assert_eq!(
+        (
+            encoded.header.planes.len(),
+            back.normal_oct16,
+            back.surface_id
+        ),
+        (2, None, None)
+    );
+}
+
+#[test]
+fn inconsistent_planes_are_refused() {
+    let mut image = image(20, 20);
+    image.color_rgb9e5.pop();
+    assert!(encode_depth_image(&image, PlaneSet::ALL).is_err());
+}
+
+/// Damaged images may decode to something, but never to nonsense.
+fn assert_sound(result: Result<DepthImage, DecodeError>) {
+    let Ok(image) = result else { return };
+    assert_eq!(image.validate(), Ok(()));
+    let sound = |&inverse: &f32| {
+        inverse.is_finite() && (inverse >= 0.0 || inverse == depth_image::HOLE_INVERSE_DEPTH)
+    };
+    assert!(image.inverse_depth_per_m.iter().all(sound));
+}
+
+#[test]
+fn damaged_payloads_never_panic() {
+    let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
+    let mut random = Random::new(10);
+    for _ in 0..6000 {
+        let mut bad = good.clone();
+        let mut payload = good.payload.to_vec();
+        for _ in 0..1 + random.below(4) {
+            let at = random.below(payload.len());
+            payload[at] ^= 1 << random.below(8);
+        }
+        bad.payload = payload.into();
+        assert_sound(decode(&bad));
+    }
+}
+
+#[test]
+fn damaged_planes_behind_a_sound_lz4_never_panic() {
+    let good = image(48, 32);
+    let depth = encode_depth(&good.inverse_depth_per_m);
+    let mut random = Random::new(11);
+    for _ in 0..6000 {
+        let mut bytes = depth.bytes.clone();
+        let at = random.below(bytes.len());
+        bytes[at] = random.next_u32() as u8;
+        bytes.truncate(if random.below(4) == 0 {
+            random.below(bytes.len())
+        } else {
+            bytes.len()
+        });
+        if let Ok((_, plane)) = decode_depth(&bytes, 48 * 32, depth.range) {
+            assert!(
+                plane
+                    .iter()
+                    .all(|&inverse| inverse.is_finite() && inverse <= depth.range.greatest_per_m)
+            );
+        }
+    }
+}
+
+#[test]
+fn cut_and_random_payloads_are_refused() {
+    let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
+    for length in 0..good.payload.len() {
+        assert!(
+            decode(&EncodedDepthImage {
+                payload: good.payload.slice(..length),
+                ..good.clone()
+            })
+            .is_err()
+        );
+    }
+    let mut random = Random::new(12);
+    for _ in 0..2000 {
+        let payload: Vec<u8> = (0..good.payload.len())
+            .map(|_| random.next_u32() as u8)
+            .collect();
+        assert_sound(decode(&EncodedDepthImage {
+            payload: payload.into(),
+            ..good.clone()
+        }));
+    }
+}
+
+#[test]
+fn damaged_headers_are_named() {
+    let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
+    type Damage = fn(&mut ImageHeader);
+    let cases: [(&str, Damage); 12] = [
+        ("size", |h| h.width = 0),
+        ("width", |h| h.width = 65_535),
+        ("texels", |h| (h.width, h.height) = (16_384, 16_384)),
+        ("payload runs", |h| h.height += 1),
+        ("inverse_depth_range", |h| {
+            h.inverse_depth_range.least_per_m = f32::NAN
+        }),
+        ("payload runs", |h| {
+            h.inverse_depth_range = InverseDepthRange {
+                least_per_m: 0.0,
+                greatest_per_m: 0.0,
+            }
+        }),
+        ("planes.kind", |h| h.planes.clear()),
+        ("planes.kind", |h| h.planes[2].kind = PlaneKind::ColorRgb9e5),
+        ("planes.encoding", |h| {
+            h.planes[1].encoding = PlaneEncoding::SlopeTaggedLz4
+        }),
+        ("planes.raw_bytes", |h| h.planes[3].raw_bytes = u32::MAX),
+        ("payload_bytes", |h| h.planes[3].packed_bytes = u32::MAX),
+        ("LZ4 block is too short", |h| h.planes[0].raw_bytes += 1),
+    ];
+    for (name, damage) in cases {
+        let mut bad = good.clone();
+        damage(&mut bad.header);
+        let error = decode(&bad).expect_err(name).to_string();
+        assert!(error.contains(name), "{name}: {error}");
+    }
+}
+
+#[test]
+fn the_camera_must_have_the_images_size() {
+    let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
+    let result = decode_depth_image(
+        &good.header,
+        camera(32, 48),
+        &good.payload,
+        &DecodeLimits::default(),
+    );
+    assert!(matches!(result, Err(DecodeError::CameraSize { .. })));
+}
+
+#[test]
+fn a_small_payload_does_not_claim_a_large_buffer() {
+    let mut bad =
+        encode_depth_image(&image(200, 200), PlaneSet::DEPTH_COLOR).expect("consistent planes");
+    bad.header.planes[0].packed_bytes = 2;
+    bad.header.planes[1].packed_bytes = 2;
+    bad.payload = Bytes::from_static(&[0xff, 0xff, 0xff, 0xff]);
+    let error = decode(&bad).expect_err("four bytes");
+    assert!(error.to_string().contains("claims more"), "{error}");
+}

@@ -1,0 +1,198 @@
+//! What an encoded depth image says about itself, and the checks it must pass.
+
+use std::hash::Hasher;
+
+use super::{
+    DecodeError, DecodeLimits, InverseDepthRange, color_codec::max_colors_bytes,
+    depth_codec::max_unpacked_bytes, error::check_limit, words_codec::max_words_bytes,
+};
+
+/// What a plane holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum PlaneKind {
+    /// 16-bit codes of inverse depth, with background and holes. Always the first plane.
+    InverseDepth,
+    /// RGB9E5, linear. Always the second plane.
+    ColorRgb9e5,
+    /// Octahedral normals.
+    NormalOct16,
+    /// Instance and primitive.
+    SurfaceId,
+}
+
+/// How a plane is packed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum PlaneEncoding {
+    /// Runs, then codes predicted by value and slope, tagged by class, LZ4.
+    SlopeTaggedLz4,
+    /// Samples only, differences along the row, tagged by class, LZ4.
+    DifferenceTaggedLz4,
+}
+
+impl PlaneKind {
+    /// The one encoding of this kind.
+    #[must_use]
+    pub const fn encoding(self) -> PlaneEncoding {
+        match self {
+            Self::InverseDepth => PlaneEncoding::SlopeTaggedLz4,
+            Self::ColorRgb9e5 | Self::NormalOct16 | Self::SurfaceId => {
+                PlaneEncoding::DifferenceTaggedLz4
+            }
+        }
+    }
+
+    /// The kind's name in errors.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::InverseDepth => "inverse_depth",
+            Self::ColorRgb9e5 => "color_rgb9e5",
+            Self::NormalOct16 => "normal_oct16",
+            Self::SurfaceId => "surface_id",
+        }
+    }
+
+    /// Bytes of one texel before any packing.
+    #[must_use]
+    pub const fn texel_bytes(self) -> usize {
+        match self {
+            Self::InverseDepth => 2,
+            Self::ColorRgb9e5 | Self::NormalOct16 => 4,
+            Self::SurfaceId => 8,
+        }
+    }
+
+    /// Most bytes that a plane of `texels` has before LZ4.
+    const fn max_raw_bytes(self, texels: usize) -> usize {
+        match self {
+            Self::InverseDepth => max_unpacked_bytes(texels),
+            Self::ColorRgb9e5 => max_colors_bytes(texels),
+            Self::NormalOct16 => max_words_bytes(texels),
+            Self::SurfaceId => 2 * max_words_bytes(texels),
+        }
+    }
+}
+
+/// One plane of an image's payload.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct PlaneHeader {
+    /// What it holds.
+    pub kind: PlaneKind,
+    /// How.
+    pub encoding: PlaneEncoding,
+    /// Before LZ4. Bounded by the image's size.
+    pub raw_bytes: u32,
+    /// In the payload.
+    pub packed_bytes: u32,
+}
+
+/// The planes that travel besides inverse depth and colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct PlaneSet {
+    /// Octahedral normals, where the image has them.
+    pub normal: bool,
+    /// Surface keys, where the image has them.
+    pub surface_id: bool,
+}
+
+impl PlaneSet {
+    /// Inverse depth and colour only.
+    pub const DEPTH_COLOR: Self = Self {
+        normal: false,
+        surface_id: false,
+    };
+    /// Whatever the image has.
+    pub const ALL: Self = Self {
+        normal: true,
+        surface_id: true,
+    };
+}
+
+/// Size, planes and range of an encoded depth image. The camera travels beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageHeader {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// What the 16-bit codes span.
+    pub inverse_depth_range: InverseDepthRange,
+    /// In the order of the payload.
+    pub planes: Vec<PlaneHeader>,
+}
+
+impl ImageHeader {
+    /// Checks everything that can be checked without the payload; the number of texels.
+    ///
+    /// # Errors
+    /// Names the field that is wrong or over a limit.
+    pub fn validate(&self, limits: &DecodeLimits) -> Result<usize, DecodeError> {
+        let texels = limits.texels(self.width, self.height)?;
+        self.inverse_depth_range.validate()?;
+        self.validate_kinds()?;
+        for plane in &self.planes {
+            if plane.encoding != plane.kind.encoding() {
+                return Err(DecodeError::Header {
+                    field: "planes.encoding",
+                    reason: "not the encoding of this kind",
+                });
+            }
+            check_limit(
+                "planes.raw_bytes",
+                u64::from(plane.raw_bytes),
+                plane.kind.max_raw_bytes(texels) as u64,
+            )?;
+        }
+        check_limit(
+            "payload_bytes",
+            self.payload_bytes(),
+            limits.max_payload_bytes as u64,
+        )?;
+        Ok(texels)
+    }
+
+    fn validate_kinds(&self) -> Result<(), DecodeError> {
+        let kinds: Vec<_> = self.planes.iter().map(|plane| plane.kind).collect();
+        let required = [PlaneKind::InverseDepth, PlaneKind::ColorRgb9e5];
+        let reason = match kinds.strip_prefix(&required) {
+            None => "must begin with inverse depth and colour",
+            Some([] | [PlaneKind::NormalOct16 | PlaneKind::SurfaceId]) => return Ok(()),
+            Some([PlaneKind::NormalOct16, PlaneKind::SurfaceId]) => return Ok(()),
+            Some(_) => "repeated, unknown or out of order",
+        };
+        Err(DecodeError::Header {
+            field: "planes.kind",
+            reason,
+        })
+    }
+
+    /// Bytes of all planes in the payload.
+    #[must_use]
+    pub fn payload_bytes(&self) -> u64 {
+        self.planes
+            .iter()
+            .map(|plane| u64::from(plane.packed_bytes))
+            .sum()
+    }
+
+    /// CRC-32 of every field, for the chunk that carries the header.
+    #[must_use]
+    pub fn crc32(&self) -> u32 {
+        let mut hasher = crc32fast::Hasher::new();
+        let range = self.inverse_depth_range;
+        for word in [
+            self.width,
+            self.height,
+            range.least_per_m.to_bits(),
+            range.greatest_per_m.to_bits(),
+        ] {
+            hasher.update(&word.to_le_bytes());
+        }
+        for plane in &self.planes {
+            hasher.write(&[plane.kind as u8, plane.encoding as u8]);
+            hasher.update(&plane.raw_bytes.to_le_bytes());
+            hasher.update(&plane.packed_bytes.to_le_bytes());
+        }
+        hasher.finalize()
+    }
+}

@@ -1,0 +1,238 @@
+//! Joining, being measured and being told what to do.
+
+use depth_image::{PinholeCamera, ViewPlanes};
+
+use crate::error::{WireError, at_most, required};
+use crate::geometry::{pinhole_from, pinhole_to};
+use crate::limits::{MAX_BATCH, MAX_NODES, MAX_SCENES, nonempty, seconds, text};
+use crate::{Assignment, Costs, SceneRef, Workload, proto};
+
+/// A node that wants to be a member.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct JoinCluster {
+    /// The node, its address and its device.
+    pub node: NodeStatus,
+    /// The highest plan it has seen.
+    pub plan_epoch: u64,
+}
+
+/// A member.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NodeStatus {
+    /// Unique in the cluster; of two with one name the later counts.
+    pub node_name: String,
+    /// Where other processes reach it, as `http://host:port`.
+    pub address: String,
+    /// As every reported time names it.
+    pub device_name: String,
+    /// Whether the device is a CPU.
+    pub is_software: bool,
+}
+
+impl TryFrom<proto::JoinClusterRequest> for JoinCluster {
+    type Error = WireError;
+
+    fn try_from(r: proto::JoinClusterRequest) -> Result<Self, WireError> {
+        let node = NodeStatus {
+            node_name: nonempty(r.node_name, "node_name")?,
+            address: nonempty(r.node_address, "node_address")?,
+            device_name: text(r.device_name, "device_name")?,
+            is_software: r.is_software_device,
+        };
+        Ok(Self {
+            node,
+            plan_epoch: r.plan_epoch,
+        })
+    }
+}
+
+impl From<JoinCluster> for proto::JoinClusterRequest {
+    fn from(j: JoinCluster) -> Self {
+        Self {
+            node_name: j.node.node_name,
+            node_address: j.node.address,
+            device_name: j.node.device_name,
+            is_software_device: j.node.is_software,
+            plan_epoch: j.plan_epoch,
+        }
+    }
+}
+
+/// What a member is told on joining: scenes to load ahead.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Welcome {
+    /// On offer.
+    pub scenes: Vec<SceneRef>,
+}
+
+impl TryFrom<proto::JoinClusterResponse> for Welcome {
+    type Error = WireError;
+
+    fn try_from(r: proto::JoinClusterResponse) -> Result<Self, WireError> {
+        at_most(r.scenes.len(), MAX_SCENES, "scenes")?;
+        Ok(Self {
+            scenes: r.scenes.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+impl From<Welcome> for proto::JoinClusterResponse {
+    fn from(w: Welcome) -> Self {
+        Self {
+            scenes: w.scenes.into_iter().map(Into::into).collect(),
+        }
+    }
+}
+
+/// The cluster as the coordinator sees it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct ClusterStatus {
+    /// The highest plan so far.
+    pub plan_epoch: u64,
+    /// Members by name.
+    pub nodes: Vec<NodeStatus>,
+}
+
+impl TryFrom<proto::GetStatusResponse> for ClusterStatus {
+    type Error = WireError;
+
+    fn try_from(r: proto::GetStatusResponse) -> Result<Self, WireError> {
+        at_most(r.nodes.len(), MAX_NODES, "nodes")?;
+        let node = |n: proto::NodeStatus| NodeStatus {
+            node_name: n.node_name,
+            address: n.node_address,
+            device_name: n.device_name,
+            is_software: n.is_software_device,
+        };
+        Ok(Self {
+            plan_epoch: r.plan_epoch,
+            nodes: r.nodes.into_iter().map(node).collect(),
+        })
+    }
+}
+
+impl From<ClusterStatus> for proto::GetStatusResponse {
+    fn from(status: ClusterStatus) -> Self {
+        let node = |n: NodeStatus| proto::NodeStatus {
+            node_name: n.node_name,
+            node_address: n.address,
+            device_name: n.device_name,
+            is_software_device: n.is_software,
+        };
+        Self {
+            plan_epoch: status.plan_epoch,
+            nodes: status.nodes.into_iter().map(node).collect(),
+        }
+    }
+}
+
+/// Asks a node what operations cost it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasureCosts {
+    /// What is measured; of the timeline, set 0.
+    pub workload: Workload,
+    /// The view that is reconstructed and drawn.
+    pub typical_view: PinholeCamera,
+    /// Views of one call.
+    pub batch_count: u32,
+    /// Planes of the views.
+    pub planes: ViewPlanes,
+}
+
+impl TryFrom<proto::MeasureCostsRequest> for MeasureCosts {
+    type Error = WireError;
+
+    fn try_from(r: proto::MeasureCostsRequest) -> Result<Self, WireError> {
+        if !(1..=MAX_BATCH).contains(&r.batch_count) {
+            return Err(WireError::out_of_range("batch_count", r.batch_count, "from 1 to 64"));
+        }
+        let workload: Workload = required(r.workload, "workload")?.try_into()?;
+        if workload.sample_cameras.is_empty() {
+            return Err(WireError::Missing {
+                field: "sample_cameras",
+            });
+        }
+        Ok(Self {
+            workload,
+            typical_view: pinhole_from(r.typical_view, "typical_view")?,
+            batch_count: r.batch_count,
+            planes: ViewPlanes {
+                inverse_depth: r.with_inverse_depth,
+                provenance: r.with_provenance,
+            },
+        })
+    }
+}
+
+impl From<MeasureCosts> for proto::MeasureCostsRequest {
+    fn from(m: MeasureCosts) -> Self {
+        Self {
+            workload: Some(m.workload.into()),
+            typical_view: Some(pinhole_to(&m.typical_view)),
+            batch_count: m.batch_count,
+            with_inverse_depth: m.planes.inverse_depth,
+            with_provenance: m.planes.provenance,
+        }
+    }
+}
+
+impl TryFrom<proto::MeasureCostsResponse> for Costs {
+    type Error = WireError;
+
+    fn try_from(r: proto::MeasureCostsResponse) -> Result<Self, WireError> {
+        required(r.costs, "costs")?.try_into()
+    }
+}
+
+impl From<Costs> for proto::MeasureCostsResponse {
+    fn from(costs: Costs) -> Self {
+        Self {
+            costs: Some(costs.into()),
+        }
+    }
+}
+
+impl TryFrom<proto::ApplyAssignmentRequest> for Assignment {
+    type Error = WireError;
+
+    fn try_from(r: proto::ApplyAssignmentRequest) -> Result<Self, WireError> {
+        required(r.assignment, "assignment")?.try_into()
+    }
+}
+
+impl From<Assignment> for proto::ApplyAssignmentRequest {
+    fn from(assignment: Assignment) -> Self {
+        Self {
+            assignment: Some(assignment.into()),
+        }
+    }
+}
+
+/// A node is ready for a plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ready {
+    /// For which.
+    pub plan_epoch: u64,
+    /// What loading the scene took; 0 where it was there.
+    pub scene_load_s: f64,
+}
+
+impl TryFrom<proto::ApplyAssignmentResponse> for Ready {
+    type Error = WireError;
+
+    fn try_from(r: proto::ApplyAssignmentResponse) -> Result<Self, WireError> {
+        Ok(Self {
+            plan_epoch: r.plan_epoch,
+            scene_load_s: seconds(r.scene_load_s, "scene_load_s")?,
+        })
+    }
+}
+
+impl From<Ready> for proto::ApplyAssignmentResponse {
+    fn from(ready: Ready) -> Self {
+        Self {
+            plan_epoch: ready.plan_epoch,
+            scene_load_s: ready.scene_load_s,
+        }
+    }
+}

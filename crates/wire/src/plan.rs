@@ -1,0 +1,231 @@
+//! The plan: which node does what.
+
+use std::fmt;
+
+use crate::codec::SampleSetId;
+use crate::error::{WireError, at_most, required};
+use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS, nonempty};
+use crate::{Workload, proto};
+
+/// How views come about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Policy {
+    /// Samplers sample, compositors reconstruct.
+    Pipeline,
+    /// Every node draws its views from the scene.
+    Direct,
+}
+
+impl fmt::Display for Policy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Pipeline => "pipeline",
+            Self::Direct => "direct",
+        })
+    }
+}
+
+impl Policy {
+    pub(crate) fn from_wire(value: i32) -> Result<Self, WireError> {
+        match proto::Policy::try_from(value) {
+            Ok(proto::Policy::Pipeline) => Ok(Self::Pipeline),
+            Ok(proto::Policy::Direct) => Ok(Self::Direct),
+            _ => Err(WireError::UnknownEnum { field: "policy", value }),
+        }
+    }
+
+    pub(crate) fn to_wire(self) -> i32 {
+        match self {
+            Self::Pipeline => proto::Policy::Pipeline.into(),
+            Self::Direct => proto::Policy::Direct.into(),
+        }
+    }
+}
+
+/// The images that one node samples of every set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SamplerShare {
+    /// The node.
+    pub node_name: String,
+    /// Where it is reached.
+    pub address: String,
+    /// Into the workload's sample cameras.
+    pub image_indices: Vec<u32>,
+}
+
+/// A node that makes views.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CompositorShare {
+    /// The node.
+    pub node_name: String,
+    /// Where it is reached.
+    pub address: String,
+}
+
+/// What a sample set shows: equal for equal scene, time, cameras, sampling, lighting and volume, whatever
+/// the plan. What has not changed is known by it and not sampled again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct SetContent([u8; 32]);
+
+/// One plan for the whole cluster. Every node gets the same and finds its own roles in it: one, both
+/// or none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assignment {
+    /// Fences: a node refuses a lower one than it has.
+    pub plan_epoch: u64,
+    /// How views come about.
+    pub policy: Policy,
+    /// What is sampled.
+    pub workload: Workload,
+    /// None in the direct policy.
+    pub samplers: Vec<SamplerShare>,
+    /// At least one.
+    pub compositors: Vec<CompositorShare>,
+}
+
+impl Assignment {
+    /// The images that a node samples.
+    #[must_use]
+    pub fn images_of(&self, node_name: &str) -> &[u32] {
+        let share = self.samplers.iter().find(|share| share.node_name == node_name);
+        share.map_or(&[], |share| &share.image_indices)
+    }
+
+    /// Whether a node makes views.
+    #[must_use]
+    pub fn composites(&self, node_name: &str) -> bool {
+        self.compositors.iter().any(|share| share.node_name == node_name)
+    }
+
+    /// A set's name in this plan; `None` beyond the timeline.
+    #[must_use]
+    pub fn sample_set_id(&self, set_index: u32) -> Option<SampleSetId> {
+        (set_index < self.workload.timeline.set_count).then(|| SampleSetId {
+            plan_epoch: self.plan_epoch,
+            index: set_index.into(),
+        })
+    }
+
+    /// What a set shows; `None` beyond the timeline.
+    #[must_use]
+    pub fn set_content(&self, set_index: u32) -> Option<SetContent> {
+        let workload = &self.workload;
+        let time_s = workload.timeline.time_s(set_index)?;
+        let mut hash = blake3::Hasher::new();
+        hash.update(workload.scene.hash.as_str().as_bytes());
+        hash.update(&time_s.to_bits().to_le_bytes());
+        // Length-prefixed, so that no two settings run together into the same bytes.
+        for text in [&workload.sampling, &workload.lighting, &self.policy.to_string()] {
+            hash.update(&(text.len() as u64).to_le_bytes()).update(text.as_bytes());
+        }
+        for v in [workload.volume.min, workload.volume.max, workload.background_linear] {
+            hash.update(&v.to_array().map(f32::to_le_bytes).concat());
+        }
+        for camera in &workload.sample_cameras {
+            hash.update(&prost::Message::encode_to_vec(&crate::geometry::camera_to(camera)));
+        }
+        Some(SetContent(hash.finalize().into()))
+    }
+
+    fn check(self) -> Result<Self, WireError> {
+        let image_count = self.workload.sample_cameras.len();
+        let mut sampled = vec![0u32; image_count];
+        for &index in self.samplers.iter().flat_map(|share| &share.image_indices) {
+            *sampled
+                .get_mut(index as usize)
+                .ok_or_else(|| WireError::out_of_range("image_indices", index, "one of the sample cameras"))? += 1;
+        }
+        if self.policy == Policy::Pipeline && (image_count == 0 || sampled.iter().any(|&times| times != 1)) {
+            return Err(WireError::out_of_range(
+                "image_indices",
+                format!("{sampled:?} times"),
+                "each image once",
+            ));
+        }
+        if self.compositors.is_empty() {
+            Err(WireError::Missing { field: "compositors" })
+        } else {
+            Ok(self)
+        }
+    }
+}
+
+impl TryFrom<proto::Assignment> for Assignment {
+    type Error = WireError;
+
+    fn try_from(a: proto::Assignment) -> Result<Self, WireError> {
+        at_most(a.samplers.len(), MAX_NODES, "samplers")?;
+        at_most(a.compositors.len(), MAX_NODES, "compositors")?;
+        let assignment = Self {
+            plan_epoch: a.plan_epoch,
+            policy: Policy::from_wire(a.policy)?,
+            workload: required(a.workload, "assignment.workload")?.try_into()?,
+            samplers: a
+                .samplers
+                .into_iter()
+                .map(TryInto::try_into)
+                .collect::<Result<_, _>>()?,
+            compositors: a
+                .compositors
+                .into_iter()
+                .map(TryInto::try_into)
+                .collect::<Result<_, _>>()?,
+        };
+        assignment.check()
+    }
+}
+
+impl From<Assignment> for proto::Assignment {
+    fn from(a: Assignment) -> Self {
+        Self {
+            plan_epoch: a.plan_epoch,
+            policy: a.policy.to_wire(),
+            workload: Some(a.workload.into()),
+            samplers: a.samplers.into_iter().map(Into::into).collect(),
+            compositors: a.compositors.into_iter().map(Into::into).collect(),
+        }
+    }
+}
+
+impl TryFrom<proto::SamplerShare> for SamplerShare {
+    type Error = WireError;
+
+    fn try_from(s: proto::SamplerShare) -> Result<Self, WireError> {
+        at_most(s.image_indices.len(), MAX_SAMPLE_CAMERAS, "image_indices")?;
+        Ok(Self {
+            node_name: nonempty(s.node_name, "node_name")?,
+            address: nonempty(s.node_address, "node_address")?,
+            image_indices: s.image_indices,
+        })
+    }
+}
+
+impl From<SamplerShare> for proto::SamplerShare {
+    fn from(s: SamplerShare) -> Self {
+        Self {
+            node_name: s.node_name,
+            node_address: s.address,
+            image_indices: s.image_indices,
+        }
+    }
+}
+
+impl TryFrom<proto::CompositorShare> for CompositorShare {
+    type Error = WireError;
+
+    fn try_from(s: proto::CompositorShare) -> Result<Self, WireError> {
+        Ok(Self {
+            node_name: nonempty(s.node_name, "node_name")?,
+            address: nonempty(s.node_address, "node_address")?,
+        })
+    }
+}
+
+impl From<CompositorShare> for proto::CompositorShare {
+    fn from(s: CompositorShare) -> Self {
+        Self {
+            node_name: s.node_name,
+            node_address: s.address,
+        }
+    }
+}

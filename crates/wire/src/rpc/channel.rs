@@ -1,0 +1,35 @@
+//! How peers are reached.
+
+use std::time::Duration;
+
+use tonic::Status;
+use tonic::transport::{Channel, Endpoint};
+
+/// How often an idle connection is probed; with [`KEEPALIVE_TIMEOUT`], silent loss is noticed after 10 s.
+pub const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(5);
+/// How long a probe may stay unanswered.
+pub const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(5);
+/// How long connecting may take.
+pub const CALL_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// A connection to `http://host:port`.
+///
+/// # Errors
+/// `INVALID_ARGUMENT` for what is no address, `UNAVAILABLE` where nobody answers.
+pub async fn connect(address: &str) -> Result<Channel, Status> {
+    let endpoint = Endpoint::from_shared(address.to_owned())
+        .map_err(|error| Status::invalid_argument(format!("address {address}: {error}")))?;
+    let endpoint = endpoint
+        .connect_timeout(CALL_TIMEOUT)
+        .tcp_nodelay(true)
+        .http2_keep_alive_interval(KEEPALIVE_INTERVAL)
+        .keep_alive_timeout(KEEPALIVE_TIMEOUT)
+        .keep_alive_while_idle(true)
+        // Bulk: the default window of 64 KiB would stop a sender eight times a message.
+        .initial_stream_window_size(4 << 20)
+        .initial_connection_window_size(16 << 20);
+    endpoint
+        .connect()
+        .await
+        .map_err(|error| Status::unavailable(format!("{address}: {error}")))
+}

@@ -1,0 +1,60 @@
+//! The services in domain types: traits to serve, clients to call, and their settings.
+
+mod channel;
+mod compositor;
+mod coordinator;
+mod node;
+mod sampler;
+
+use std::pin::Pin;
+
+use tokio_stream::{Stream, StreamExt as _};
+use tonic::{Request, Response, Status, Streaming};
+
+pub use channel::{CALL_TIMEOUT, KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT, connect};
+pub use compositor::{Compositor, CompositorClient, compositor_server};
+pub use coordinator::{Coordinator, CoordinatorClient, coordinator_server};
+pub use node::{Node, NodeClient, node_server};
+pub use sampler::{Sampler, SamplerClient, sampler_server};
+
+use crate::WireError;
+
+/// A stream of messages, already checked.
+pub type Messages<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
+
+fn incoming<P, D>(stream: Streaming<P>) -> Messages<D>
+where
+    P: Send + 'static,
+    D: TryFrom<P, Error = WireError> + 'static,
+{
+    Box::pin(stream.map(|message| message.and_then(|message| D::try_from(message).map_err(Status::from))))
+}
+
+fn outgoing<D, P>(stream: Messages<D>) -> Messages<P>
+where
+    D: 'static,
+    P: From<D> + 'static,
+{
+    Box::pin(stream.map(|message| message.map(P::from)))
+}
+
+fn checked<P, D>(request: Request<P>) -> Result<D, Status>
+where
+    D: TryFrom<P, Error = WireError>,
+{
+    Ok(D::try_from(request.into_inner())?)
+}
+
+fn answer<D, P: From<D>>(value: D) -> Response<P> {
+    Response::new(value.into())
+}
+
+/// The type of a generated server around one of this module's adapters, with this crate's caps.
+macro_rules! capped {
+    ($server:expr) => {
+        $server
+            .max_decoding_message_size(crate::limits::MAX_MESSAGE_BYTES)
+            .max_encoding_message_size(crate::limits::MAX_MESSAGE_BYTES)
+    };
+}
+use capped;

@@ -1,0 +1,275 @@
+//! Opening a session: what a client asks for and what it is told.
+
+use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
+use glam::UVec2;
+
+use crate::error::{WireError, required};
+use crate::geometry::{bounds_from, bounds_to, camera_to, pinhole_from, pinhole_to, sample_cameras_from};
+use crate::limits::{MAX_VIEWS_PER_SET, nonempty, reason, seconds};
+use crate::{Assignment, Costs, SceneHash, Timeline, proto};
+
+/// What the client wants to happen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PolicyChoice {
+    /// Whatever is predicted to be faster.
+    #[default]
+    Auto,
+    /// Samplers and compositors.
+    Pipeline,
+    /// Every node draws from the scene.
+    Direct,
+}
+
+impl PolicyChoice {
+    fn from_wire(value: i32) -> Result<Self, WireError> {
+        match proto::PolicyChoice::try_from(value) {
+            Ok(proto::PolicyChoice::Auto) => Ok(Self::Auto),
+            Ok(proto::PolicyChoice::Pipeline) => Ok(Self::Pipeline),
+            Ok(proto::PolicyChoice::Direct) => Ok(Self::Direct),
+            _ => Err(WireError::UnknownEnum {
+                field: "policy_choice",
+                value,
+            }),
+        }
+    }
+
+    fn to_wire(self) -> i32 {
+        match self {
+            Self::Auto => proto::PolicyChoice::Auto.into(),
+            Self::Pipeline => proto::PolicyChoice::Pipeline.into(),
+            Self::Direct => proto::PolicyChoice::Direct.into(),
+        }
+    }
+}
+
+/// What a client asks for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionRequest {
+    /// `None`: the coordinator's own scene.
+    pub scene: Option<SceneHash>,
+    /// How views are reconstructed.
+    pub method: String,
+    /// How images are sampled.
+    pub sampling: String,
+    /// How samples are lit.
+    pub lighting: String,
+    /// How frames are encoded.
+    pub codec: String,
+    /// Empty: the rig that the coordinator was given with the scene.
+    pub sample_cameras: Vec<Camera>,
+    /// Gives the sample images another size, at the same field of view.
+    pub sample_size_px: Option<UVec2>,
+    /// `None`: the volume that the coordinator was given with the scene.
+    pub volume: Option<Aabb>,
+    /// A view as most will be: costs are measured on it.
+    pub typical_view: PinholeCamera,
+    /// V: views that are asked of each sample set.
+    pub views_per_set: u32,
+    /// Planes that views will have.
+    pub planes: ViewPlanes,
+    /// Scene times.
+    pub timeline: Timeline,
+    /// Who decides how.
+    pub policy: PolicyChoice,
+    /// K, instead of the balance formula's.
+    pub forced_sampler_count: Option<u32>,
+}
+
+impl TryFrom<proto::OpenSessionRequest> for SessionRequest {
+    type Error = WireError;
+
+    fn try_from(r: proto::OpenSessionRequest) -> Result<Self, WireError> {
+        if !(1..=MAX_VIEWS_PER_SET).contains(&r.views_per_set_count) {
+            return Err(WireError::out_of_range(
+                "views_per_set_count",
+                r.views_per_set_count,
+                "from 1 to 1048576",
+            ));
+        }
+        Ok(Self {
+            scene: if r.scene_hash.is_empty() {
+                None
+            } else {
+                Some(SceneHash::parse(&r.scene_hash)?)
+            },
+            method: nonempty(r.reconstruction_method, "reconstruction_method")?,
+            sampling: nonempty(r.sampling_method, "sampling_method")?,
+            lighting: nonempty(r.lighting, "lighting")?,
+            codec: nonempty(r.frame_codec, "frame_codec")?,
+            sample_cameras: sample_cameras_from(r.sample_cameras)?,
+            sample_size_px: r
+                .sample_image_size
+                .map(|size| UVec2::new(size.width_px, size.height_px)),
+            volume: r.volume.map(bounds_from).transpose()?,
+            typical_view: pinhole_from(r.typical_view, "typical_view")?,
+            views_per_set: r.views_per_set_count,
+            planes: ViewPlanes {
+                inverse_depth: r.with_inverse_depth,
+                provenance: r.with_provenance,
+            },
+            timeline: required(r.timeline, "timeline")?.try_into()?,
+            policy: PolicyChoice::from_wire(r.policy_choice)?,
+            forced_sampler_count: (r.forced_sampler_count > 0).then_some(r.forced_sampler_count),
+        })
+    }
+}
+
+impl From<SessionRequest> for proto::OpenSessionRequest {
+    fn from(r: SessionRequest) -> Self {
+        Self {
+            scene_hash: r.scene.map(|hash| hash.to_string()).unwrap_or_default(),
+            reconstruction_method: r.method,
+            sampling_method: r.sampling,
+            lighting: r.lighting,
+            frame_codec: r.codec,
+            sample_cameras: r.sample_cameras.iter().map(camera_to).collect(),
+            sample_image_size: r.sample_size_px.map(|size| proto::ImageSize {
+                width_px: size.x,
+                height_px: size.y,
+            }),
+            volume: r.volume.as_ref().map(bounds_to),
+            typical_view: Some(pinhole_to(&r.typical_view)),
+            views_per_set_count: r.views_per_set,
+            with_inverse_depth: r.planes.inverse_depth,
+            with_provenance: r.planes.provenance,
+            timeline: Some(r.timeline.into()),
+            policy_choice: r.policy.to_wire(),
+            forced_sampler_count: r.forced_sampler_count.unwrap_or(0),
+        }
+    }
+}
+
+/// What the coordinator is doing for a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SessionStage {
+    /// Nodes measure their costs.
+    Measuring,
+    /// K and the policy are chosen.
+    Planning,
+    /// Nodes load the scene and take their roles.
+    Preparing,
+}
+
+impl SessionStage {
+    fn from_wire(value: i32) -> Result<Self, WireError> {
+        match proto::SessionStage::try_from(value) {
+            Ok(proto::SessionStage::Measuring) => Ok(Self::Measuring),
+            Ok(proto::SessionStage::Planning) => Ok(Self::Planning),
+            Ok(proto::SessionStage::Preparing) => Ok(Self::Preparing),
+            _ => Err(WireError::UnknownEnum { field: "stage", value }),
+        }
+    }
+
+    fn to_wire(self) -> i32 {
+        match self {
+            Self::Measuring => proto::SessionStage::Measuring.into(),
+            Self::Planning => proto::SessionStage::Planning.into(),
+            Self::Preparing => proto::SessionStage::Preparing.into(),
+        }
+    }
+}
+
+/// The plan, and why it is so.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionPlan {
+    /// What every node was told.
+    pub assignment: Assignment,
+    /// As measured: the slowest node's.
+    pub costs: Costs,
+    /// In plain words, with the figures.
+    pub reason: String,
+    /// Seconds a sample set with samplers and compositors.
+    pub predicted_pipeline_s: f64,
+    /// Seconds a sample set's views when drawn from the scene.
+    pub predicted_direct_s: f64,
+    /// The slowest node's time to load the scene; 0 where all had it.
+    pub scene_load_s: f64,
+}
+
+impl SessionPlan {
+    /// K: nodes that sample.
+    #[must_use]
+    pub fn sampler_count(&self) -> usize {
+        self.assignment.samplers.len()
+    }
+}
+
+/// What a session's stream carries.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SessionEvent {
+    /// Before the plan.
+    Progress {
+        /// What is being done.
+        stage: SessionStage,
+        /// For a person.
+        detail: String,
+    },
+    /// Once.
+    Plan(Box<SessionPlan>),
+    /// The plan no longer holds.
+    Ended {
+        /// Why.
+        reason: String,
+    },
+}
+
+impl TryFrom<proto::SessionPlan> for SessionPlan {
+    type Error = WireError;
+
+    fn try_from(p: proto::SessionPlan) -> Result<Self, WireError> {
+        Ok(Self {
+            assignment: required(p.assignment, "plan.assignment")?.try_into()?,
+            costs: required(p.costs, "plan.costs")?.try_into()?,
+            reason: reason(p.reason, "plan.reason")?,
+            predicted_pipeline_s: seconds(p.predicted_pipeline_s, "predicted_pipeline_s")?,
+            predicted_direct_s: seconds(p.predicted_direct_s, "predicted_direct_s")?,
+            scene_load_s: seconds(p.scene_load_s, "scene_load_s")?,
+        })
+    }
+}
+
+impl From<SessionPlan> for proto::SessionPlan {
+    fn from(p: SessionPlan) -> Self {
+        Self {
+            assignment: Some(p.assignment.into()),
+            costs: Some(p.costs.into()),
+            reason: p.reason,
+            predicted_pipeline_s: p.predicted_pipeline_s,
+            predicted_direct_s: p.predicted_direct_s,
+            scene_load_s: p.scene_load_s,
+        }
+    }
+}
+
+impl TryFrom<proto::OpenSessionResponse> for SessionEvent {
+    type Error = WireError;
+
+    fn try_from(r: proto::OpenSessionResponse) -> Result<Self, WireError> {
+        use proto::open_session_response::Event;
+        Ok(match required(r.event, "event")? {
+            Event::Progress(p) => Self::Progress {
+                stage: SessionStage::from_wire(p.stage)?,
+                detail: reason(p.detail, "detail")?,
+            },
+            Event::Plan(plan) => Self::Plan(Box::new(plan.try_into()?)),
+            Event::Ended(ended) => Self::Ended {
+                reason: reason(ended.reason, "ended.reason")?,
+            },
+        })
+    }
+}
+
+impl From<SessionEvent> for proto::OpenSessionResponse {
+    fn from(event: SessionEvent) -> Self {
+        use proto::open_session_response::Event;
+        let event = match event {
+            SessionEvent::Progress { stage, detail } => Event::Progress(proto::SessionProgress {
+                stage: stage.to_wire(),
+                detail,
+            }),
+            SessionEvent::Plan(plan) => Event::Plan((*plan).into()),
+            SessionEvent::Ended { reason } => Event::Ended(proto::SessionEnded { reason }),
+        };
+        Self { event: Some(event) }
+    }
+}

@@ -1,0 +1,187 @@
+//! What a session samples, and what operations cost.
+
+use depth_image::{Aabb, Camera};
+use glam::Vec3;
+
+use crate::error::{WireError, required};
+use crate::geometry::{bounds_from, bounds_to, camera_to, sample_cameras_from, vec3_from, vec3_to};
+use crate::limits::{MAX_SETS, nonempty, seconds};
+use crate::{SceneRef, proto};
+
+/// Scene times of the sample sets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timeline {
+    /// Of set 0.
+    pub start_s: f64,
+    /// From set to set; 0 for a static scene.
+    pub step_s: f64,
+    /// How many sets.
+    pub set_count: u32,
+}
+
+impl Timeline {
+    /// One set.
+    #[must_use]
+    pub fn still(at_s: f64) -> Self {
+        Self {
+            start_s: at_s,
+            step_s: 0.0,
+            set_count: 1,
+        }
+    }
+
+    /// Scene time of a set; `None` beyond the last.
+    #[must_use]
+    pub fn time_s(&self, set_index: u32) -> Option<f32> {
+        (set_index < self.set_count).then(|| (self.start_s + f64::from(set_index) * self.step_s) as f32)
+    }
+}
+
+impl TryFrom<proto::Timeline> for Timeline {
+    type Error = WireError;
+
+    fn try_from(t: proto::Timeline) -> Result<Self, WireError> {
+        if !(1..=MAX_SETS).contains(&t.set_count) {
+            return Err(WireError::out_of_range(
+                "timeline.set_count",
+                t.set_count,
+                "from 1 to 1048576",
+            ));
+        }
+        let finite = |value: f64, field| {
+            if value.is_finite() {
+                Ok(value)
+            } else {
+                Err(WireError::out_of_range(field, value, "finite"))
+            }
+        };
+        Ok(Self {
+            start_s: finite(t.start_s, "timeline.start_s")?,
+            step_s: finite(t.step_s, "timeline.step_s")?,
+            set_count: t.set_count,
+        })
+    }
+}
+
+impl From<Timeline> for proto::Timeline {
+    fn from(t: Timeline) -> Self {
+        Self {
+            start_s: t.start_s,
+            step_s: t.step_s,
+            set_count: t.set_count,
+        }
+    }
+}
+
+/// What is sampled, when and how. Methods are text, as on the command line: nodes parse them, so that
+/// a new method changes nothing here.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Workload {
+    /// The scene.
+    pub scene: SceneRef,
+    /// One image of each set for each.
+    pub sample_cameras: Vec<Camera>,
+    /// How images are sampled.
+    pub sampling: String,
+    /// How samples are lit.
+    pub lighting: String,
+    /// How views are reconstructed, unless they ask for another method.
+    pub method: String,
+    /// How frames are encoded, unless views ask for another codec.
+    pub codec: String,
+    /// What reconstruction looks at.
+    pub volume: Aabb,
+    /// What rays meet that leave the scene.
+    pub background_linear: Vec3,
+    /// Scene times.
+    pub timeline: Timeline,
+}
+
+impl TryFrom<proto::Workload> for Workload {
+    type Error = WireError;
+
+    fn try_from(w: proto::Workload) -> Result<Self, WireError> {
+        Ok(Self {
+            scene: required(w.scene, "workload.scene")?.try_into()?,
+            sample_cameras: sample_cameras_from(w.sample_cameras)?,
+            sampling: nonempty(w.sampling_method, "sampling_method")?,
+            lighting: nonempty(w.lighting, "lighting")?,
+            method: nonempty(w.reconstruction_method, "reconstruction_method")?,
+            codec: nonempty(w.frame_codec, "frame_codec")?,
+            volume: bounds_from(required(w.volume, "workload.volume")?)?,
+            background_linear: vec3_from(w.background_linear_rgb, "background_linear_rgb")?,
+            timeline: required(w.timeline, "workload.timeline")?.try_into()?,
+        })
+    }
+}
+
+impl From<Workload> for proto::Workload {
+    fn from(w: Workload) -> Self {
+        Self {
+            scene: Some(w.scene.into()),
+            sample_cameras: w.sample_cameras.iter().map(camera_to).collect(),
+            sampling_method: w.sampling,
+            lighting: w.lighting,
+            reconstruction_method: w.method,
+            frame_codec: w.codec,
+            volume: Some(bounds_to(&w.volume)),
+            background_linear_rgb: vec3_to(w.background_linear),
+            timeline: Some(w.timeline.into()),
+        }
+    }
+}
+
+/// Seconds of one operation, each alone and warm.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Costs {
+    /// g_s: one finished sample image, its lighting included.
+    pub sample_image_s: f64,
+    /// g_v: one finished view drawn directly.
+    pub direct_view_s: f64,
+    /// c: one reconstructed view, to host pixels.
+    pub reconstruct_view_s: f64,
+    /// d: decode and upload of one sample set on one compositor.
+    pub load_set_s: f64,
+    /// e: encoding of one view.
+    pub encode_view_s: f64,
+}
+
+impl Costs {
+    /// The greater of each: what the slowest node needs.
+    #[must_use]
+    pub fn max(self, other: Self) -> Self {
+        Self {
+            sample_image_s: self.sample_image_s.max(other.sample_image_s),
+            direct_view_s: self.direct_view_s.max(other.direct_view_s),
+            reconstruct_view_s: self.reconstruct_view_s.max(other.reconstruct_view_s),
+            load_set_s: self.load_set_s.max(other.load_set_s),
+            encode_view_s: self.encode_view_s.max(other.encode_view_s),
+        }
+    }
+}
+
+impl TryFrom<proto::Costs> for Costs {
+    type Error = WireError;
+
+    fn try_from(c: proto::Costs) -> Result<Self, WireError> {
+        Ok(Self {
+            sample_image_s: seconds(c.sample_image_s, "sample_image_s")?,
+            direct_view_s: seconds(c.direct_view_s, "direct_view_s")?,
+            reconstruct_view_s: seconds(c.reconstruct_view_s, "reconstruct_view_s")?,
+            load_set_s: seconds(c.load_set_s, "load_set_s")?,
+            encode_view_s: seconds(c.encode_view_s, "encode_view_s")?,
+        })
+    }
+}
+
+impl From<Costs> for proto::Costs {
+    fn from(c: Costs) -> Self {
+        Self {
+            sample_image_s: c.sample_image_s,
+            direct_view_s: c.direct_view_s,
+            reconstruct_view_s: c.reconstruct_view_s,
+            load_set_s: c.load_set_s,
+            encode_view_s: c.encode_view_s,
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Answers compositors that ask for images.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use node::{CurrentPlan, Engine, NodeConfig, SampleWork, blocking, until_drained};
+use tokio_util::sync::CancellationToken;
+use tonic::{Status, async_trait};
+use wire::rpc::{Messages, Sampler};
+use wire::{Assignment, Chunk, FetchImages, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
+
+use crate::kept::{EncodedImages, Kept};
+
+/// The sampler's role.
+pub struct SamplerService {
+    engine: Arc<dyn Engine>,
+    plan: CurrentPlan,
+    kept: Arc<Kept>,
+    shutdown: CancellationToken,
+}
+
+impl SamplerService {
+    /// Of a node.
+    #[must_use]
+    pub fn new(engine: Arc<dyn Engine>, plan: CurrentPlan, config: &NodeConfig, shutdown: CancellationToken) -> Self {
+        Self {
+            engine,
+            plan,
+            kept: Arc::new(Kept::new(config.kept_sample_bytes)),
+            shutdown,
+        }
+    }
+
+    /// All of this node's images of a set: the first request makes them, in one submission.
+    async fn images(&self, plan: &Assignment, set_index: u32) -> Result<EncodedImages, Status> {
+        let beyond = || Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"));
+        let content = plan.set_content(set_index).ok_or_else(beyond)?;
+        let scene_time_s = plan.workload.timeline.time_s(set_index).ok_or_else(beyond)?;
+        let indices = plan.images_of(self.plan.node_name()).to_vec();
+        let work = sample_work(plan, &indices, scene_time_s)?;
+        let engine = self.engine.clone();
+        let key = (content, indices.clone());
+        self.kept
+            .get(key, move || blocking(move || sample(engine.as_ref(), &work, &indices)))
+            .await
+    }
+}
+
+#[async_trait]
+impl Sampler for SamplerService {
+    async fn fetch_sample_images(&self, request: FetchImages) -> Result<Messages<Chunk>, Status> {
+        let plan = self.plan.require(request.plan_epoch)?;
+        let own = plan.images_of(self.plan.node_name());
+        if let Some(index) = request.image_indices.iter().find(|index| !own.contains(index)) {
+            return Err(Status::invalid_argument(format!(
+                "image_indices: {index} is not sampled by {}",
+                self.plan.node_name()
+            )));
+        }
+        let images = self.images(&plan, request.set_index).await?;
+        let id = SampleSetId {
+            plan_epoch: plan.plan_epoch,
+            index: request.set_index.into(),
+        };
+        let wanted: Vec<_> = images
+            .iter()
+            .filter(|(index, _)| request.image_indices.contains(index))
+            .cloned()
+            .collect();
+        // The payload is shared: an iterator of chunks holds no copies.
+        let chunks = wanted
+            .into_iter()
+            .flat_map(move |(index, image)| split_into_chunks(id, index, image))
+            .map(Ok);
+        Ok(until_drained(
+            Box::pin(tokio_stream::iter(chunks)),
+            self.shutdown.clone(),
+        ))
+    }
+}
+
+fn sample_work(plan: &Assignment, indices: &[u32], scene_time_s: f32) -> Result<SampleWork, Status> {
+    let cameras = indices
+        .iter()
+        .map(|&index| plan.workload.sample_cameras.get(index as usize).copied());
+    Ok(SampleWork {
+        scene_hash: plan.workload.scene.hash.to_string(),
+        cameras: cameras
+            .collect::<Option<_>>()
+            .ok_or_else(|| Status::internal("image_indices beyond the sample cameras"))?,
+        sampling: plan.workload.sampling.clone(),
+        lighting: plan.workload.lighting.clone(),
+        scene_time_s,
+    })
+}
+
+fn sample(engine: &dyn Engine, work: &SampleWork, indices: &[u32]) -> Result<EncodedImages, Status> {
+    let start = Instant::now();
+    let images = engine.sample(work)?;
+    let sampled_s = start.elapsed().as_secs_f64();
+    if images.len() != indices.len() {
+        return Err(Status::internal(format!(
+            "{} images were sampled for {} cameras",
+            images.len(),
+            indices.len()
+        )));
+    }
+    let encode = |(index, image): (&u32, &_)| {
+        let encoded = encode_depth_image(image, PlaneSet::ALL).map_err(|error| Status::internal(error.to_string()))?;
+        Ok((*index, encoded))
+    };
+    let encoded = indices
+        .iter()
+        .zip(&images)
+        .map(encode)
+        .collect::<Result<Vec<_>, Status>>()?;
+    tracing::debug!(
+        images = images.len(),
+        scene_time_s = work.scene_time_s,
+        sampled_s,
+        total_s = start.elapsed().as_secs_f64(),
+        "sampled"
+    );
+    Ok(Arc::new(encoded))
+}

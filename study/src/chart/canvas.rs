@@ -1,0 +1,204 @@
+//! What all charts share: a title, a legend above the data, and ink that follows the page.
+
+use plotters::chart::MeshStyle;
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use plotters::element::DashedPathElement;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::marker::Marker;
+use crate::ReportError;
+
+/// Charts are drawn at this width and may be scaled.
+pub(super) const WIDTH_PX: u32 = 700;
+/// Of texts, as the chart library counts: 1.24 of a CSS pixel.
+const TEXT_SIZE: i32 = 16;
+/// A sans-serif letter at that size is about so wide.
+const LETTER_WIDTH_PX: f64 = 7.4;
+const TITLE_HEIGHT_PX: i32 = 30;
+const LEGEND_ROW_PX: i32 = 22;
+const MARGIN_PX: i32 = 14;
+/// From a legend's glyph to its text.
+const GLYPH_WIDTH_PX: i32 = 34;
+
+/// Stands for the page's text colour: replaced by `currentColor` when the drawing is done.
+pub(super) const INK: RGBColor = RGBColor(1, 2, 3);
+const INK_IN_SVG: &str = "#010203";
+
+/// Part of a drawing.
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// A finished chart.
+pub(crate) struct Drawing {
+    svg: String,
+}
+
+impl Drawing {
+    /// As part of a page: no paper, the page's ink.
+    pub(crate) fn inline(&self) -> String {
+        self.svg.clone()
+    }
+
+    /// As a file: black on white.
+    pub(crate) fn standalone(&self) -> String {
+        match self.svg.split_once('>') {
+            Some((tag, rest)) => format!(
+                "{tag} color=\"#1b1f24\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>{rest}"
+            ),
+            None => self.svg.clone(),
+        }
+    }
+}
+
+/// How a legend shows an entry.
+pub(super) enum Glyph {
+    /// A block of colour.
+    Swatch(RGBColor),
+    /// A point alone.
+    Point(Marker),
+    /// A line through a point.
+    Line(Marker),
+    /// A broken line through a point.
+    Dashes(Marker),
+}
+
+/// A line of a legend.
+pub(super) struct LegendEntry {
+    pub(super) text: String,
+    pub(super) glyph: Glyph,
+}
+
+/// Draws title and legend, and the rest by `plot` in an area `plot_height_px` high below them.
+pub(super) fn draw(
+    name: &str,
+    legend: &[LegendEntry],
+    plot_height_px: u32,
+    plot: impl FnOnce(&Area) -> Result<(), String>,
+) -> Result<Drawing, ReportError> {
+    let rows = legend_rows(legend);
+    let header_px = TITLE_HEIGHT_PX + LEGEND_ROW_PX * rows.len() as i32 + 4;
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, (WIDTH_PX, header_px as u32 + plot_height_px))
+            .into_drawing_area();
+        let (header, below) = area.split_vertically(header_px);
+        let drawn = draw_header(&header, name, &rows)
+            .and_then(|()| plot(&below))
+            .and_then(|()| area.present().map_err(message));
+        drawn.map_err(|message| ReportError::Draw {
+            chart: name.into(),
+            message,
+        })?;
+    }
+    let described = format!(
+        "<svg role=\"img\" aria-label=\"{}\" ",
+        minijinja::HtmlEscape(name)
+    );
+    Ok(Drawing {
+        svg: svg
+            .replace(INK_IN_SVG, "currentColor")
+            .replacen("<svg ", &described, 1),
+    })
+}
+
+/// The chart library's errors borrow the drawing: keep what they say.
+pub(super) fn message(error: impl std::error::Error) -> String {
+    error.to_string()
+}
+
+/// Text in the page's ink.
+pub(super) fn text_style(horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
+    TextStyle::from(("sans-serif", TEXT_SIZE).into_font())
+        .color(&INK)
+        .pos(Pos::new(horizontal, vertical))
+}
+
+/// Thin lines at the ticks, texts in the page's ink.
+pub(super) fn style_mesh<'b, X, Y>(mesh: &mut MeshStyle<'_, 'b, X, Y, SVGBackend<'_>>)
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    mesh.axis_style(INK.mix(0.6))
+        .bold_line_style(INK.mix(0.13))
+        .light_line_style(TRANSPARENT)
+        .label_style(("sans-serif", 15).into_font().color(&INK))
+        .axis_desc_style(("sans-serif", TEXT_SIZE).into_font().color(&INK));
+}
+
+/// About how wide a text is.
+pub(super) fn text_width_px(text: &str) -> i32 {
+    (text.chars().count() as f64 * LETTER_WIDTH_PX).ceil() as i32
+}
+
+/// Entries in rows, as many a row as fit.
+fn legend_rows(legend: &[LegendEntry]) -> Vec<Vec<(i32, &LegendEntry)>> {
+    let mut rows: Vec<Vec<(i32, &LegendEntry)>> = Vec::new();
+    let mut next_px = i32::MAX;
+    for entry in legend {
+        let width = GLYPH_WIDTH_PX + text_width_px(&entry.text) + 18;
+        if next_px.saturating_add(width) > WIDTH_PX as i32 - MARGIN_PX {
+            rows.push(Vec::new());
+            next_px = MARGIN_PX;
+        }
+        if let Some(row) = rows.last_mut() {
+            row.push((next_px, entry));
+        }
+        next_px += width;
+    }
+    rows
+}
+
+fn draw_header(area: &Area, name: &str, rows: &[Vec<(i32, &LegendEntry)>]) -> Result<(), String> {
+    let title = TextStyle::from(("sans-serif", 19).into_font().style(FontStyle::Bold)).color(&INK);
+    area.draw(&Text::new(name.to_owned(), (MARGIN_PX, 9), title))
+        .map_err(message)?;
+    for (row, entries) in rows.iter().enumerate() {
+        let y = TITLE_HEIGHT_PX + LEGEND_ROW_PX * row as i32 + LEGEND_ROW_PX / 2;
+        entries
+            .iter()
+            .try_for_each(|(x, entry)| draw_entry(area, (*x, y), entry))?;
+    }
+    Ok(())
+}
+
+fn draw_entry(area: &Area, (x, y): (i32, i32), entry: &LegendEntry) -> Result<(), String> {
+    let (line, middle) = (
+        [(x, y), (x + GLYPH_WIDTH_PX - 8, y)],
+        (x + GLYPH_WIDTH_PX / 2 - 4, y),
+    );
+    match &entry.glyph {
+        Glyph::Swatch(color) => area
+            .draw(&Rectangle::new(
+                [(x + 10, y - 6), (x + 24, y + 6)],
+                color.filled(),
+            ))
+            .map_err(message)?,
+        Glyph::Point(marker) => marker.draw(area, middle)?,
+        Glyph::Line(marker) => {
+            area.draw(&PathElement::new(
+                line.to_vec(),
+                marker.color.stroke_width(2),
+            ))
+            .map_err(message)?;
+            marker.draw(area, middle)?;
+        }
+        Glyph::Dashes(marker) => {
+            area.draw(&DashedPathElement::new(
+                line,
+                5,
+                4,
+                marker.color.stroke_width(2),
+            ))
+            .map_err(message)?;
+            marker.draw(area, middle)?;
+        }
+    }
+    let text = Text::new(
+        entry.text.clone(),
+        (x + GLYPH_WIDTH_PX, y),
+        text_style(HPos::Left, VPos::Center),
+    );
+    area.draw(&text).map_err(message)
+}

@@ -1,0 +1,319 @@
+//! Lines and points over two axes.
+
+use std::ops::Range;
+
+use plotters::element::DashedPathElement;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, VPos};
+use serde::{Deserialize, Serialize};
+
+use super::canvas::{
+    self, Area, Drawing, Glyph, INK, LegendEntry, WIDTH_PX, message, style_mesh, text_style,
+    text_width_px,
+};
+use super::marker::Marker;
+use super::ruler::Ruler;
+use super::{Axis, Better, Limit, Mark, Palette, Point, Series, pareto_front};
+use crate::ReportError;
+
+const PLOT_HEIGHT_PX: u32 = 390;
+
+/// Series over two axes, optionally with limits to reach and the front of the best points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct XyChart {
+    /// Its title, unique in the report.
+    pub name: String,
+    /// What to know when reading it; may be empty.
+    #[serde(default)]
+    pub note: String,
+    /// To the right.
+    pub x: Axis,
+    /// Upwards.
+    pub y: Axis,
+    /// In drawing order.
+    pub series: Vec<Series>,
+    /// Horizontal lines.
+    #[serde(default)]
+    pub limits: Vec<Limit>,
+    /// Which ends of x and y are better: draws the Pareto front of all measured points.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub front: Option<[Better; 2]>,
+}
+
+type Plot<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Ruler, Ruler>>;
+
+impl XyChart {
+    /// A chart without series.
+    #[must_use]
+    pub fn new(name: impl Into<String>, x: Axis, y: Axis) -> Self {
+        Self {
+            name: name.into(),
+            note: String::new(),
+            x,
+            y,
+            series: Vec::new(),
+            limits: Vec::new(),
+            front: None,
+        }
+    }
+
+    /// The same chart with one more series.
+    #[must_use]
+    pub fn with(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// The same chart with a horizontal line.
+    #[must_use]
+    pub fn with_limit(mut self, name: impl Into<String>, y: f64) -> Self {
+        self.limits.push(Limit {
+            name: name.into(),
+            y,
+        });
+        self
+    }
+
+    /// The same chart with the front of the best points.
+    #[must_use]
+    pub fn with_front(mut self, x: Better, y: Better) -> Self {
+        self.front = Some([x, y]);
+        self
+    }
+
+    pub(super) fn draw(&self, palette: &Palette) -> Result<Drawing, ReportError> {
+        canvas::draw(&self.name, &self.legend(palette), PLOT_HEIGHT_PX, |area| {
+            self.draw_plot(area, palette)
+        })
+    }
+
+    fn legend(&self, palette: &Palette) -> Vec<LegendEntry> {
+        self.series
+            .iter()
+            .flat_map(|series| legend_entries(series, palette))
+            .collect()
+    }
+
+    fn draw_plot(&self, area: &Area, palette: &Palette) -> Result<(), String> {
+        let (x_range, y_range) = self.ranges();
+        let mut plot = self.axes(area, x_range.clone(), y_range)?;
+        for limit in &self.limits {
+            self.draw_limit(&mut plot, limit, &x_range)?;
+        }
+        self.draw_front(&mut plot)?;
+        self.series
+            .iter()
+            .try_for_each(|series| self.draw_series(&mut plot, series, palette))?;
+        self.draw_labels(&mut plot, &x_range)
+    }
+
+    /// Both axes' ranges, in axis space.
+    fn ranges(&self) -> (Range<f64>, Range<f64>) {
+        let points = || {
+            self.series
+                .iter()
+                .flat_map(|series| &series.points)
+                .filter(|point| self.place(point).is_some())
+        };
+        let limits = self.limits.iter().map(|limit| limit.y);
+        (
+            self.x.range(points().map(|point| point.x)),
+            self.y.range(points().map(|point| point.y).chain(limits)),
+        )
+    }
+
+    /// A point in axis space; `None` where an axis cannot show it.
+    fn place(&self, point: &Point) -> Option<(f64, f64)> {
+        Some((self.x.place(point.x)?, self.y.place(point.y)?))
+    }
+
+    fn axes<'a>(&self, area: &Area<'a>, x: Range<f64>, y: Range<f64>) -> Result<Plot<'a>, String> {
+        let (x, y) = (Ruler::new(&self.x, x), Ruler::new(&self.y, y));
+        let (x_count, y_count) = (x.tick_count(), y.tick_count());
+        let mut plot = ChartBuilder::on(area)
+            .margin_right(18)
+            .margin_top(6)
+            .margin_left(8)
+            .margin_bottom(6)
+            .x_label_area_size(48)
+            .y_label_area_size(66)
+            .build_cartesian_2d(x, y)
+            .map_err(message)?;
+        let mut mesh = plot.configure_mesh();
+        mesh.x_desc(self.x.description())
+            .y_desc(self.y.description())
+            .x_labels(x_count)
+            .y_labels(y_count);
+        style_mesh(&mut mesh);
+        mesh.draw().map_err(message)?;
+        Ok(plot)
+    }
+
+    fn draw_limit(&self, plot: &mut Plot, limit: &Limit, x: &Range<f64>) -> Result<(), String> {
+        let Some(y) = self.y.place(limit.y) else {
+            return Ok(());
+        };
+        let style = INK.mix(0.55).stroke_width(1);
+        draw_path(plot, vec![(x.start, y), (x.end, y)], style, true)?;
+        let text = EmptyElement::at((x.end, y))
+            + Text::new(
+                limit.name.clone(),
+                (-4, -3),
+                text_style(HPos::Right, VPos::Bottom),
+            );
+        plot.draw_series([text]).map(drop).map_err(message)
+    }
+
+    fn draw_front(&self, plot: &mut Plot) -> Result<(), String> {
+        let Some(better) = self.front else {
+            return Ok(());
+        };
+        let all = self.series.iter().flat_map(|series| {
+            series
+                .points
+                .iter()
+                .enumerate()
+                .map(move |point| (series, point))
+        });
+        let measured = all
+            .filter(|(series, (index, _))| !series.is_extrapolated(*index))
+            .map(|(_, (_, point))| point);
+        let front = pareto_front(measured.filter(|point| self.place(point).is_some()), better);
+        let corners = staircase(
+            &front
+                .iter()
+                .filter_map(|point| self.place(point))
+                .collect::<Vec<_>>(),
+        );
+        draw_path(plot, corners, INK.mix(0.35).stroke_width(2), false)
+    }
+
+    fn draw_series(
+        &self,
+        plot: &mut Plot,
+        series: &Series,
+        palette: &Palette,
+    ) -> Result<(), String> {
+        let places: Vec<(usize, (f64, f64))> = series
+            .points
+            .iter()
+            .enumerate()
+            .filter_map(|(index, point)| Some((index, self.place(point)?)))
+            .collect();
+        let style = palette.color(&series.name).stroke_width(2);
+        if series.mark == Mark::Line {
+            let part = |keep: &dyn Fn(usize) -> bool| {
+                places
+                    .iter()
+                    .filter(|(index, _)| keep(*index))
+                    .map(|&(_, place)| place)
+                    .collect()
+            };
+            draw_path(
+                plot,
+                part(&|index| !series.is_extrapolated(index)),
+                style,
+                false,
+            )?;
+            // From the last measured point on, so that the line does not break.
+            draw_path(
+                plot,
+                part(&|index| series.is_extrapolated(index + 1)),
+                style,
+                true,
+            )?;
+        }
+        let pixels = plot.plotting_area().strip_coord_spec();
+        let (left_px, top_px) = pixels.get_base_pixel();
+        places.iter().try_for_each(|(index, place)| {
+            let (x, y) = plot.backend_coord(place);
+            marker(series, palette, !series.is_extrapolated(*index))
+                .draw(&pixels, (x - left_px, y - top_px))
+        })
+    }
+
+    /// Labels to the right of their points, or to the left near the right edge.
+    fn draw_labels(&self, plot: &mut Plot, x: &Range<f64>) -> Result<(), String> {
+        let labelled = self
+            .series
+            .iter()
+            .flat_map(|series| &series.points)
+            .filter(|point| !point.label.is_empty());
+        let texts = labelled.filter_map(|point| {
+            let place = self.place(point)?;
+            let right_of_px = (x.end - place.0) / (x.end - x.start) * f64::from(WIDTH_PX - 100);
+            let fits = f64::from(text_width_px(&point.label) + 12) < right_of_px;
+            let (offset, anchor) = if fits {
+                (9, HPos::Left)
+            } else {
+                (-9, HPos::Right)
+            };
+            Some(
+                EmptyElement::at(place)
+                    + Text::new(
+                        point.label.clone(),
+                        (offset, -8),
+                        text_style(anchor, VPos::Center),
+                    ),
+            )
+        });
+        plot.draw_series(texts.collect::<Vec<_>>())
+            .map(drop)
+            .map_err(message)
+    }
+}
+
+fn marker(series: &Series, palette: &Palette, filled: bool) -> Marker {
+    Marker {
+        shape: palette.slot(&series.name),
+        color: palette.color(&series.name),
+        filled,
+    }
+}
+
+/// One entry for what was measured, one for what was extrapolated.
+fn legend_entries(series: &Series, palette: &Palette) -> Vec<LegendEntry> {
+    let is_line = series.mark == Mark::Line;
+    let entry = |text: String, filled: bool| {
+        let marker = marker(series, palette, filled);
+        let glyph = match (is_line, filled) {
+            (false, _) => Glyph::Point(marker),
+            (true, true) => Glyph::Line(marker),
+            (true, false) => Glyph::Dashes(marker),
+        };
+        LegendEntry { text, glyph }
+    };
+    let measured = (series.extrapolated_from != Some(0)).then(|| entry(series.name.clone(), true));
+    let extrapolated = series
+        .extrapolated_from
+        .map(|_| entry(format!("{}, extrapolated", series.name), false));
+    measured.into_iter().chain(extrapolated).collect()
+}
+
+fn draw_path(
+    plot: &mut Plot,
+    points: Vec<(f64, f64)>,
+    style: ShapeStyle,
+    dashed: bool,
+) -> Result<(), String> {
+    if points.len() < 2 {
+        return Ok(());
+    }
+    let drawn = match dashed {
+        true => plot
+            .draw_series([DashedPathElement::new(points, 6, 5, style)])
+            .map(drop),
+        false => plot
+            .draw_series([PathElement::new(points, style)])
+            .map(drop),
+    };
+    drawn.map_err(message)
+}
+
+/// A front is a staircase: nothing between two of its points has been reached.
+fn staircase(front: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let steps = front
+        .windows(2)
+        .flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
+    steps.chain(front.last().copied()).collect()
+}

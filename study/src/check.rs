@@ -1,0 +1,231 @@
+//! Checks: a measured value against a bar.
+
+use serde::{Deserialize, Serialize};
+
+use crate::format_number;
+
+/// What a value must reach.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Bar {
+    /// This or more.
+    AtLeast(f64),
+    /// This or less.
+    AtMost(f64),
+    /// Exactly this: for counts.
+    Equal(f64),
+}
+
+impl Bar {
+    /// Whether a value reaches it. NaN never does.
+    #[must_use]
+    pub fn holds(self, value: f64) -> bool {
+        match self {
+            Self::AtLeast(bar) => value >= bar,
+            Self::AtMost(bar) => value <= bar,
+            Self::Equal(bar) => value == bar,
+        }
+    }
+}
+
+impl std::fmt::Display for Bar {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let (sign, bar) = match self {
+            Self::AtLeast(bar) => ("≥", bar),
+            Self::AtMost(bar) => ("≤", bar),
+            Self::Equal(bar) => ("=", bar),
+        };
+        write!(formatter, "{sign} {}", format_number(*bar))
+    }
+}
+
+/// How a check came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// The value reaches the bar.
+    Holds,
+    /// It does not.
+    FallsShort,
+    /// There is no value.
+    NotRun,
+}
+
+impl Outcome {
+    /// As printed.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Holds => "holds",
+            Self::FallsShort => "FALLS SHORT",
+            Self::NotRun => "not run",
+        }
+    }
+}
+
+/// One promise, and whether it was kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Check {
+    name: String,
+    /// `null` where not run, or not finite.
+    value: Option<f64>,
+    unit: String,
+    bar: Bar,
+    /// `null` where not run.
+    holds: Option<bool>,
+    /// Why not run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reason: Option<String>,
+}
+
+impl Check {
+    /// Holds the value against the bar. A value that is not finite is kept out of the file, but judged:
+    /// +∞ dB reaches any bar, NaN none.
+    #[must_use]
+    pub fn new(name: impl Into<String>, value: f64, unit: impl Into<String>, bar: Bar) -> Self {
+        Self {
+            name: name.into(),
+            value: Some(value).filter(|value| value.is_finite()),
+            unit: unit.into(),
+            bar,
+            holds: Some(bar.holds(value)),
+            reason: None,
+        }
+    }
+
+    /// A check that could not be made here.
+    #[must_use]
+    pub fn not_run(
+        name: impl Into<String>,
+        unit: impl Into<String>,
+        bar: Bar,
+        reason: impl Into<String>,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            value: None,
+            unit: unit.into(),
+            bar,
+            holds: None,
+            reason: Some(reason.into()),
+        }
+    }
+
+    /// Holds a value that may be missing against the bar: not run, for the reason, where it is.
+    #[must_use]
+    pub fn maybe(
+        name: impl Into<String>,
+        value: Option<f64>,
+        unit: impl Into<String>,
+        bar: Bar,
+        reason: impl Into<String>,
+    ) -> Self {
+        match value {
+            Some(value) => Self::new(name, value, unit, bar),
+            None => Self::not_run(name, unit, bar, reason),
+        }
+    }
+
+    /// What is promised.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What was measured, if it is finite.
+    #[must_use]
+    pub fn value(&self) -> Option<f64> {
+        self.value
+    }
+
+    /// Of value and bar; empty for none.
+    #[must_use]
+    pub fn unit(&self) -> &str {
+        &self.unit
+    }
+
+    /// What the value must reach.
+    #[must_use]
+    pub fn bar(&self) -> Bar {
+        self.bar
+    }
+
+    /// Why it was not run.
+    #[must_use]
+    pub fn reason(&self) -> Option<&str> {
+        self.reason.as_deref()
+    }
+
+    /// How it came out.
+    #[must_use]
+    pub fn outcome(&self) -> Outcome {
+        match self.holds {
+            Some(true) => Outcome::Holds,
+            Some(false) => Outcome::FallsShort,
+            None => Outcome::NotRun,
+        }
+    }
+
+    /// The value with its unit, or a dash.
+    pub(crate) fn value_text(&self) -> String {
+        match self.value {
+            Some(value) => with_unit(&format_number(value), &self.unit),
+            None if self.holds.is_some() => "not finite".into(),
+            None => "–".into(),
+        }
+    }
+
+    /// The bar with the unit.
+    pub(crate) fn bar_text(&self) -> String {
+        with_unit(&self.bar.to_string(), &self.unit)
+    }
+}
+
+fn with_unit(text: &str, unit: &str) -> String {
+    format!("{text} {unit}").trim_end().into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_include_themselves() {
+        for bar in [Bar::AtLeast(2.0), Bar::AtMost(2.0), Bar::Equal(2.0)] {
+            assert_eq!(
+                Check::new("x", 2.0, "", bar).outcome(),
+                Outcome::Holds,
+                "{bar}"
+            );
+            assert_eq!(
+                Check::new("x", f64::NAN, "", bar).outcome(),
+                Outcome::FallsShort,
+                "{bar}"
+            );
+        }
+        assert_eq!(
+            Check::new("x", 1.9, "", Bar::AtLeast(2.0)).outcome(),
+            Outcome::FallsShort
+        );
+        assert_eq!(
+            Check::new("x", 2.1, "", Bar::AtMost(2.0)).outcome(),
+            Outcome::FallsShort
+        );
+        assert_eq!(
+            Check::new("x", f64::INFINITY, "dB", Bar::AtLeast(40.0)).outcome(),
+            Outcome::Holds
+        );
+    }
+
+    #[test]
+    fn json_has_the_fields_that_the_format_names() {
+        let json = serde_json::to_value(Check::new("FLIP", 0.04, "", Bar::AtMost(0.05))).unwrap();
+        assert_eq!(
+            json,
+            serde_json::json!({"name": "FLIP", "value": 0.04, "unit": "", "bar": {"at_most": 0.05}, "holds": true})
+        );
+        let json =
+            serde_json::to_value(Check::not_run("GPU", "ms", Bar::AtMost(1.0), "no GPU")).unwrap();
+        assert!(json["holds"].is_null() && json["value"].is_null());
+        assert_eq!(json["reason"], "no GPU");
+    }
+}

@@ -1,0 +1,78 @@
+//! What can go wrong with a report.
+
+use std::path::PathBuf;
+
+/// Why a report, chart or picture could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// A file or folder could not be written.
+    #[error("cannot write {path}: {source}")]
+    Io {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Two parts would share a file.
+    #[error("two {kind} are named {name:?}, as a file name")]
+    DuplicateName {
+        /// Tables, charts or pictures.
+        kind: &'static str,
+        /// The file name without its ending.
+        name: String,
+    },
+    /// A row has not one cell a column.
+    #[error("row {row} of table {table:?} has {cells} cells, its columns are {columns}")]
+    RowLength {
+        /// The table's name.
+        table: String,
+        /// Counted from 0.
+        row: usize,
+        /// Cells in it.
+        cells: usize,
+        /// Columns of the table.
+        columns: usize,
+    },
+    /// A bar chart's stage has not one value a bar.
+    #[error("stage {stage:?} of chart {chart:?} has {values} values, its bars are {bars}")]
+    StageLength {
+        /// The chart's name.
+        chart: String,
+        /// The stage's name.
+        stage: String,
+        /// Values in it.
+        values: usize,
+        /// Bars of the chart.
+        bars: usize,
+    },
+    /// Pixels do not make a picture of the size stated.
+    #[error("{what} holds {len} values, {width_px} columns do not divide them")]
+    PictureSize {
+        /// Which picture.
+        what: &'static str,
+        /// Values given.
+        len: usize,
+        /// Columns stated.
+        width_px: u32,
+    },
+    /// The chart library failed.
+    #[error("cannot draw chart {chart:?}: {message}")]
+    Draw {
+        /// The chart's name.
+        chart: String,
+        /// What it said.
+        message: String,
+    },
+    /// JSON could not be written.
+    #[error("cannot write report.json: {0}")]
+    Json(#[from] serde_json::Error),
+    /// CSV could not be written.
+    #[error("cannot write a table: {0}")]
+    Csv(#[from] csv::Error),
+    /// A picture could not be encoded.
+    #[error("cannot write a picture: {0}")]
+    Image(#[from] image::ImageError),
+    /// The page could not be filled in.
+    #[error("cannot write index.html: {0}")]
+    Html(#[from] minijinja::Error),
+}

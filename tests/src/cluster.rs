@@ -1,0 +1,223 @@
+//! A cluster in one process over real loopback ports. Every node has a runtime of its own, so that one can
+//! be killed without a word.
+
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use client::{Client, ClientError, Session, ViewRequest};
+use coordinator::{CoordinatorConfig, SceneOffer};
+use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
+use glam::{UVec2, Vec3};
+use node::NodeConfig;
+use tokio::net::TcpListener;
+use tokio::runtime::{Builder, Runtime};
+use tokio_util::sync::CancellationToken;
+use wire::{PolicyChoice, SessionRequest, Timeline};
+
+use crate::scalar_engine::{SKY_LINEAR, ScalarEngine};
+
+/// A server with its own runtime.
+pub struct Server {
+    runtime: Option<Runtime>,
+    shutdown: CancellationToken,
+    stopped: tokio::sync::watch::Receiver<bool>,
+    /// Where it serves, as `http://host:port`.
+    pub address: String,
+}
+
+impl Server {
+    /// Runs `serve` on a listener at a port of the system's choice.
+    fn start<F>(serve: impl FnOnce(TcpListener, CancellationToken) -> F + Send + 'static) -> Self
+    where
+        F: Future<Output = Result<(), node::ServeError>> + Send + 'static,
+    {
+        let runtime = Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()
+            .expect("a runtime");
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+        listener.set_nonblocking(true).expect("a socket option");
+        let address = format!("http://{}", listener.local_addr().expect("an address"));
+        let shutdown = CancellationToken::new();
+        let (says, stopped) = tokio::sync::watch::channel(false);
+        let token = shutdown.clone();
+        runtime.spawn(async move {
+            let listener = TcpListener::from_std(listener).expect("a listener");
+            serve(listener, token).await.expect("served");
+            let _ = says.send(true);
+        });
+        Self {
+            runtime: Some(runtime),
+            shutdown,
+            stopped,
+            address,
+        }
+    }
+
+    /// Ends it at once; connections break.
+    pub fn kill(&mut self) {
+        if let Some(runtime) = self.runtime.take() {
+            runtime.shutdown_background();
+        }
+    }
+
+    /// Asks it to end; how long that took.
+    pub async fn drain(&mut self) -> Duration {
+        let start = Instant::now();
+        self.shutdown.cancel();
+        self.stopped.wait_for(|stopped| *stopped).await.expect("it says when");
+        start.elapsed()
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// A coordinator and its nodes.
+pub struct Cluster {
+    /// The coordinator.
+    pub coordinator: Server,
+    /// `n0`, `n1`…
+    pub nodes: Vec<Server>,
+    /// What all nodes count together.
+    pub engines: Vec<ScalarEngine>,
+    /// Connected.
+    pub client: Client,
+}
+
+/// The package is longer than a message, so that it travels in parts.
+#[must_use]
+pub fn package() -> Bytes {
+    let mut package = b"ball over floor".to_vec();
+    package.extend((0..1_500_000u32).map(|i| (i * 7 % 251) as u8));
+    package.into()
+}
+
+/// Three sample cameras on an arc in front of the ball.
+#[must_use]
+pub fn rig() -> Vec<Camera> {
+    [-0.6, 0.0, 0.6]
+        .map(|x| Camera::Pinhole(camera(x, UVec2::new(64, 48))))
+        .to_vec()
+}
+
+/// A camera in front of the ball.
+#[must_use]
+pub fn camera(x_m: f32, size_px: UVec2) -> PinholeCamera {
+    PinholeCamera::looking_at(
+        Vec3::new(x_m, 1.2, 3.0),
+        Vec3::new(0.0, 0.5, 0.0),
+        Vec3::Y,
+        0.9,
+        size_px,
+    )
+}
+
+/// A session of the scalar device.
+#[must_use]
+pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
+    SessionRequest {
+        scene: None,
+        method: "splat".to_owned(),
+        sampling: "conventional".to_owned(),
+        lighting: "unlit".to_owned(),
+        codec: "lz4".to_owned(),
+        sample_cameras: Vec::new(),
+        sample_size_px: None,
+        volume: None,
+        typical_view: camera(0.1, UVec2::new(48, 36)),
+        views_per_set: 12,
+        planes: ViewPlanes {
+            inverse_depth: true,
+            provenance: true,
+        },
+        timeline,
+        policy,
+        forced_sampler_count: None,
+    }
+}
+
+/// So many views of each set, from left to right.
+#[must_use]
+pub fn views(sets: u32, per_set: u32) -> Vec<ViewRequest> {
+    let view = |i: u32| ViewRequest {
+        frame: u64::from(i) + 100,
+        set_index: i / per_set,
+        camera: camera((i % per_set) as f32 * 0.08 - 0.4, UVec2::new(48, 36)),
+    };
+    (0..sets * per_set).map(view).collect()
+}
+
+impl Cluster {
+    /// A coordinator and `nodes` nodes that have joined.
+    pub async fn start(nodes: usize) -> Self {
+        Self::start_with(nodes, |config| config).await
+    }
+
+    /// As [`Cluster::start`], each node's configuration changed by `change`.
+    pub async fn start_with(nodes: usize, change: impl Fn(NodeConfig) -> NodeConfig) -> Self {
+        let offer = SceneOffer::new(
+            package(),
+            rig(),
+            Aabb {
+                min: Vec3::splat(-3.0),
+                max: Vec3::splat(3.0),
+            },
+            SKY_LINEAR,
+        );
+        let coordinator = Server::start(|listener, shutdown| {
+            coordinator::serve(listener, CoordinatorConfig::default(), offer, shutdown)
+        });
+        let engines: Vec<_> = (0..nodes).map(|_| ScalarEngine::default()).collect();
+        let start = |(i, engine): (usize, &ScalarEngine)| {
+            let config = change(NodeConfig::new(format!("n{i}"), &coordinator.address));
+            let engine = std::sync::Arc::new(engine.clone());
+            Server::start(|listener, shutdown| node_host::serve(listener, config, engine, shutdown))
+        };
+        let servers = engines.iter().enumerate().map(start).collect();
+        let client = connected(&coordinator.address).await;
+        client
+            .wait_for_nodes(nodes, Duration::from_secs(10))
+            .await
+            .expect("joined");
+        Self {
+            coordinator,
+            nodes: servers,
+            engines,
+            client,
+        }
+    }
+
+    /// An open session; what was sampled for measuring is forgotten.
+    ///
+    /// # Errors
+    /// The client's.
+    pub async fn session(&self, request: SessionRequest) -> Result<Session, ClientError> {
+        let session = self.client.open_session(request, |_| ()).await?;
+        self.take_counts();
+        Ok(session)
+    }
+
+    /// How often each image was sampled since the last call, on all nodes together.
+    pub fn take_counts(&self) -> Vec<usize> {
+        let mut all = std::collections::HashMap::new();
+        for (image, times) in self.engines.iter().flat_map(ScalarEngine::take_counts) {
+            *all.entry(image).or_insert(0) += times;
+        }
+        all.into_values().collect()
+    }
+}
+
+async fn connected(address: &str) -> Client {
+    for _ in 0..200 {
+        if let Ok(client) = Client::connect(address).await {
+            return client;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    panic!("no coordinator at {address}");
+}

@@ -1,0 +1,270 @@
+//! A device made of plain loops: rays against a ball over a floor, and samples splatted into views. Slow,
+//! but real: depth images hold true depths, and views are reconstructed from them.
+
+use std::any::Any;
+use std::collections::{HashMap, HashSet};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use depth_image::{
+    BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, PinholeCamera, Provenance, ProvenanceKind, Ray, Texel, View,
+    ViewPlanes, linear_from_rgb9e5, rgb9e5_from_linear, srgb8_from_linear,
+};
+use glam::{UVec2, Vec2, Vec3};
+use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
+
+/// The floor's colour.
+pub const FLOOR_LINEAR: Vec3 = Vec3::new(0.1, 0.6, 0.2);
+/// What rays meet that leave the scene.
+pub const SKY_LINEAR: Vec3 = Vec3::new(0.0, 0.0, 0.25);
+
+/// The ball's colour tells the scene's time, so that a view of two times shows two colours.
+#[must_use]
+pub fn ball_linear(scene_time_s: f32) -> Vec3 {
+    Vec3::new(0.2 + 0.08 * scene_time_s, 0.02, 0.01)
+}
+
+/// As it arrives in a view.
+#[must_use]
+pub fn srgb8(linear: Vec3) -> [u8; 3] {
+    linear_from_rgb9e5(rgb9e5_from_linear(linear))
+        .to_array()
+        .map(srgb8_from_linear)
+}
+
+/// Images sampled, by scene time and eye: how often.
+pub type SampleCounts = HashMap<([u32; 3], u32), usize>;
+
+/// Plain loops. Clones share what they count.
+#[derive(Debug, Clone, Default)]
+pub struct ScalarEngine {
+    counts: Arc<Mutex<SampleCounts>>,
+    scenes: Arc<Mutex<HashSet<String>>>,
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+struct Meets {
+    planar_depth_m: f32,
+    color_linear: Vec3,
+}
+
+fn ball(ray: &Ray, scene_time_s: f32) -> Option<Meets> {
+    let center = Vec3::new(scene_time_s * 0.4 - 0.4, 0.6, 0.0);
+    let (to_eye, d) = (ray.origin_in_world - center, ray.direction_in_world);
+    let (a, b, c) = (d.dot(d), to_eye.dot(d), to_eye.dot(to_eye) - 0.25);
+    let t = (-b - (b * b - a * c).sqrt()) / a;
+    (t > 0.0).then_some(Meets {
+        planar_depth_m: t,
+        color_linear: ball_linear(scene_time_s),
+    })
+}
+
+fn floor(ray: &Ray) -> Option<Meets> {
+    let t = -ray.origin_in_world.y / ray.direction_in_world.y;
+    (t > 0.0 && t < 50.0).then_some(Meets {
+        planar_depth_m: t,
+        color_linear: FLOOR_LINEAR,
+    })
+}
+
+fn first_met(ray: &Ray, scene_time_s: f32) -> Option<Meets> {
+    let both = [ball(ray, scene_time_s), floor(ray)];
+    both.into_iter()
+        .flatten()
+        .min_by(|a, b| a.planar_depth_m.total_cmp(&b.planar_depth_m))
+}
+
+fn pixels(size_px: UVec2) -> impl Iterator<Item = Vec2> {
+    (0..size_px.y).flat_map(move |y| (0..size_px.x).map(move |x| Vec2::new(x as f32 + 0.5, y as f32 + 0.5)))
+}
+
+fn depth_image(camera: &Camera, scene_time_s: f32) -> DepthImage {
+    let Camera::Pinhole(pinhole) = camera;
+    let met: Vec<_> = pixels(pinhole.size_px)
+        .map(|pixel| first_met(&pinhole.ray(pixel), scene_time_s))
+        .collect();
+    DepthImage {
+        camera: *camera,
+        inverse_depth_per_m: met
+            .iter()
+            .map(|met| {
+                met.as_ref()
+                    .map_or(BACKGROUND_INVERSE_DEPTH, |met| met.planar_depth_m.recip())
+            })
+            .collect(),
+        color_rgb9e5: met
+            .iter()
+            .map(|met| rgb9e5_from_linear(met.as_ref().map_or(SKY_LINEAR, |met| met.color_linear)))
+            .collect(),
+        normal_oct16: None,
+        surface_id: None,
+    }
+}
+
+/// A view under way: the nearest so far of each pixel.
+struct Canvas {
+    inverse_depth_per_m: Vec<f32>,
+    srgb8: Vec<[u8; 3]>,
+    provenance: Vec<Provenance>,
+    size_px: UVec2,
+}
+
+impl Canvas {
+    fn new(size_px: UVec2, background_linear: Vec3) -> Self {
+        let texels = size_px.element_product() as usize;
+        Self {
+            inverse_depth_per_m: vec![0.0; texels],
+            srgb8: vec![srgb8(background_linear); texels],
+            provenance: vec![Provenance::EMPTY; texels],
+            size_px,
+        }
+    }
+
+    fn put(&mut self, pixel: Vec2, planar_depth_m: f32, color_linear: Vec3, camera: usize) {
+        let at = (pixel.y as u32 * self.size_px.x + pixel.x as u32) as usize;
+        if planar_depth_m.recip() > self.inverse_depth_per_m[at] {
+            self.inverse_depth_per_m[at] = planar_depth_m.recip();
+            self.srgb8[at] = srgb8(color_linear);
+            self.provenance[at] = Provenance::new(ProvenanceKind::Hit, 1 << camera);
+        }
+    }
+
+    fn view(self, planes: ViewPlanes) -> View {
+        View {
+            size_px: self.size_px,
+            srgb8: self.srgb8.concat(),
+            inverse_depth_per_m: planes.inverse_depth.then_some(self.inverse_depth_per_m),
+            provenance: planes.provenance.then_some(self.provenance),
+        }
+    }
+}
+
+fn splat(set: &SampleSet, camera: &PinholeCamera, planes: ViewPlanes) -> View {
+    let mut canvas = Canvas::new(camera.size_px, set.background_linear);
+    for (index, image) in set.images.iter().enumerate() {
+        let size_px = image.size_px();
+        for (x, y) in (0..size_px.y).flat_map(|y| (0..size_px.x).map(move |x| (x, y))) {
+            let (Texel::Sample { color_linear, .. }, Some(point)) = (image.texel(x, y), image.sample_in_world(x, y))
+            else {
+                continue;
+            };
+            if let Some(at) = camera.project(point).filter(|at| camera.contains(at.pixel)) {
+                canvas.put(at.pixel, at.planar_depth_m, color_linear, index);
+            }
+        }
+    }
+    canvas.view(planes)
+}
+
+fn draw(camera: &PinholeCamera, scene_time_s: f32, planes: ViewPlanes) -> View {
+    let mut canvas = Canvas::new(camera.size_px, SKY_LINEAR);
+    for pixel in pixels(camera.size_px) {
+        if let Some(met) = first_met(&camera.ray(pixel), scene_time_s) {
+            canvas.put(pixel, met.planar_depth_m, met.color_linear, 0);
+        }
+    }
+    canvas.view(planes)
+}
+
+struct Uploaded(SampleSet);
+impl UploadedSet for Uploaded {}
+
+fn known(field: &'static str, value: &str, known: &str) -> Result<(), EngineError> {
+    if value == known {
+        Ok(())
+    } else {
+        Err(EngineError::InvalidArgument {
+            field,
+            reason: format!("{value} is unknown, {known} is known"),
+        })
+    }
+}
+
+impl ScalarEngine {
+    /// What was sampled since the last call.
+    #[must_use]
+    pub fn take_counts(&self) -> SampleCounts {
+        std::mem::take(&mut locked(&self.counts))
+    }
+
+    fn loaded(&self, hash: &str) -> Result<(), EngineError> {
+        if self.has_scene(hash) {
+            Ok(())
+        } else {
+            Err(EngineError::UnknownScene { hash: hash.to_owned() })
+        }
+    }
+}
+
+impl Engine for ScalarEngine {
+    fn device_name(&self) -> String {
+        "scalar loops".to_owned()
+    }
+
+    fn is_software(&self) -> bool {
+        true
+    }
+
+    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<f64, EngineError> {
+        if !package.starts_with(b"ball over floor") {
+            return Err(EngineError::InvalidArgument {
+                field: "package",
+                reason: "is no scene of mine".to_owned(),
+            });
+        }
+        locked(&self.scenes).insert(hash.to_owned());
+        Ok(0.0)
+    }
+
+    fn has_scene(&self, hash: &str) -> bool {
+        locked(&self.scenes).contains(hash)
+    }
+
+    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
+        self.loaded(&request.scene_hash)?;
+        known("sampling", &request.sampling, "conventional")?;
+        known("lighting", &request.lighting, "unlit")?;
+        for Camera::Pinhole(camera) in &request.cameras {
+            *locked(&self.counts)
+                .entry((
+                    camera.eye_in_world.to_array().map(f32::to_bits),
+                    request.scene_time_s.to_bits(),
+                ))
+                .or_default() += 1;
+        }
+        Ok(request
+            .cameras
+            .iter()
+            .map(|camera| depth_image(camera, request.scene_time_s))
+            .collect())
+    }
+
+    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        Ok(Arc::new(Uploaded(set.clone())))
+    }
+
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
+        known("method", &work.method, "splat")?;
+        let any: &dyn Any = set;
+        let Uploaded(set) = any
+            .downcast_ref()
+            .ok_or_else(|| EngineError::Device("a set of another device".to_owned()))?;
+        Ok(work
+            .cameras
+            .iter()
+            .map(|camera| splat(set, camera, work.planes))
+            .collect())
+    }
+
+    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
+        self.loaded(&work.scene_hash)?;
+        known("lighting", &work.lighting, "unlit")?;
+        Ok(work
+            .cameras
+            .iter()
+            .map(|camera| draw(camera, work.scene_time_s, work.planes))
+            .collect())
+    }
+}

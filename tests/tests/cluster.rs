@@ -1,0 +1,164 @@
+//! Clusters in one process over real ports: every view comes once, and from one set.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::HashSet;
+
+use client::Frame;
+use cluster_tests::cluster::{Cluster, package, request, views};
+use cluster_tests::scalar_engine::{FLOOR_LINEAR, SKY_LINEAR, ball_linear, srgb8};
+use depth_image::ProvenanceKind;
+use node::NodeConfig;
+use wire::{Policy, PolicyChoice, SceneHash, Timeline};
+
+const MOVING: Timeline = Timeline {
+    start_s: 0.0,
+    step_s: 1.0,
+    set_count: 3,
+};
+
+/// The ball shows its own time and no other; floor and sky are there; nothing else is.
+fn shows_only(frame: &Frame, scene_time_s: f32) {
+    let [ball, floor, sky] = [ball_linear(scene_time_s), FLOOR_LINEAR, SKY_LINEAR].map(srgb8);
+    let mut seen = HashSet::new();
+    for pixel in frame.view.srgb8.as_chunks::<3>().0 {
+        assert!(
+            [ball, floor, sky].contains(pixel),
+            "frame {}: {pixel:?} at {scene_time_s} s",
+            frame.request.frame
+        );
+        seen.insert(*pixel);
+    }
+    assert_eq!(seen.len(), 3, "frame {} shows ball, floor and sky", frame.request.frame);
+}
+
+/// All frames came once, each of its own set.
+fn all_came(frames: &[Frame], asked: usize) {
+    let numbers: HashSet<u64> = frames.iter().map(|frame| frame.request.frame).collect();
+    assert_eq!((frames.len(), numbers.len()), (asked, asked));
+    for frame in frames {
+        assert_eq!(frame.header.sample_set_id.index, u64::from(frame.request.set_index));
+        shows_only(frame, frame.request.set_index as f32);
+        let provenance = frame.view.provenance.as_ref().unwrap();
+        assert!(provenance.iter().any(|p| p.kind() == ProvenanceKind::Hit));
+        assert_eq!(frame.view.inverse_depth_per_m.as_ref().unwrap().len(), provenance.len());
+    }
+}
+
+async fn pipeline_of(nodes: usize) {
+    let cluster = Cluster::start(nodes).await;
+    let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    let plan = session.plan();
+    assert_eq!(plan.assignment.policy, Policy::Pipeline);
+    assert_eq!(
+        plan.assignment.compositors.len(),
+        nodes.max(2) - plan.sampler_count().min(nodes.max(2) - 1),
+        "{}",
+        plan.reason
+    );
+    let frames = session.render_views(views(3, 12)).unwrap().all().await.unwrap();
+    all_came(&frames, 36);
+    // Three sets of three images; the next set is fetched ahead, but none twice.
+    assert_eq!(cluster.take_counts(), [1; 9]);
+    let again = session.render_views(views(3, 12)).unwrap().all().await.unwrap();
+    all_came(&again, 36);
+    assert!(cluster.take_counts().is_empty(), "what was sampled is kept");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_node_does_both() {
+    pipeline_of(1).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn three_nodes_share_the_work() {
+    pipeline_of(3).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn five_nodes_share_the_work() {
+    pipeline_of(5).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_k_gives_the_same_pictures() {
+    let cluster = Cluster::start(4).await;
+    let mut pictures = Vec::new();
+    for k in 1..=3 {
+        let forced = wire::SessionRequest {
+            forced_sampler_count: Some(k),
+            ..request(PolicyChoice::Pipeline, MOVING)
+        };
+        let session = cluster.session(forced).await.unwrap();
+        assert_eq!(session.plan().sampler_count(), k as usize);
+        let mut frames = session.render_views(views(3, 4)).unwrap().all().await.unwrap();
+        frames.sort_by_key(|frame| frame.request.frame);
+        pictures.push(frames.into_iter().map(|frame| frame.view).collect::<Vec<_>>());
+    }
+    assert!(pictures[0] == pictures[1] && pictures[1] == pictures[2]);
+    let forced = wire::SessionRequest {
+        forced_sampler_count: Some(4),
+        ..request(PolicyChoice::Pipeline, MOVING)
+    };
+    let error = cluster.session(forced).await.unwrap_err().to_string();
+    assert!(error.contains("forced_sampler_count is 4, at most 3"), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn direct_draws_on_every_node_and_samples_nothing() {
+    let cluster = Cluster::start(3).await;
+    let session = cluster.session(request(PolicyChoice::Direct, MOVING)).await.unwrap();
+    assert_eq!(
+        (
+            session.plan().sampler_count(),
+            session.plan().assignment.compositors.len()
+        ),
+        (0, 3)
+    );
+    let frames = session.render_views(views(3, 12)).unwrap().all().await.unwrap();
+    all_came(&frames, 36);
+    assert!(cluster.take_counts().is_empty());
+    let (costs, reason) = (session.plan().costs, &session.plan().reason);
+    assert!(
+        costs.sample_image_s > 0.0
+            && costs.direct_view_s > 0.0
+            && costs.reconstruct_view_s > 0.0
+            && costs.load_set_s > 0.0
+            && costs.encode_view_s > 0.0
+    );
+    assert!(reason.starts_with("direct, asked for. Pipeline: "), "{reason}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_static_scene_is_sampled_once_for_all_sets_and_plans() {
+    let cluster = Cluster::start(2).await;
+    let still = request(PolicyChoice::Pipeline, Timeline { step_s: 0.0, ..MOVING });
+    let session = cluster.session(still.clone()).await.unwrap();
+    session.render_views(views(3, 4)).unwrap().all().await.unwrap();
+    assert_eq!(cluster.take_counts(), [1; 3]);
+    let session = cluster.session(still).await.unwrap();
+    session.render_views(views(3, 4)).unwrap().all().await.unwrap();
+    assert!(cluster.take_counts().is_empty());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_go_on_when_the_coordinator_is_gone() {
+    let mut cluster = Cluster::start(2).await;
+    let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    cluster.coordinator.kill();
+    let frames = session.render_views(views(3, 6)).unwrap().all().await.unwrap();
+    all_came(&frames, 18);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn scenes_come_by_hash_and_are_kept_in_the_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let with_folder = |config: NodeConfig| NodeConfig {
+        scene_folder: Some(folder.path().to_owned()),
+        ..config
+    };
+    let cluster = Cluster::start_with(1, with_folder).await;
+    let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    session.render_views(views(1, 1)).unwrap().all().await.unwrap();
+    let kept = folder.path().join(format!("{}.scene", SceneHash::of(&package())));
+    assert_eq!(std::fs::read(kept).unwrap(), package());
+}

@@ -1,0 +1,294 @@
+//! What goes wrong in a cluster is refused, named and survived.
+#![allow(clippy::unwrap_used)]
+
+use std::time::{Duration, Instant};
+
+use client::{ClientError, Session};
+use cluster_tests::cluster::{Cluster, request, rig, views};
+use depth_image::Camera;
+use node::{Deadlines, NodeConfig};
+use tokio_stream::StreamExt as _;
+use tonic::Code;
+use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
+use wire::{FetchImages, FrameCodec, PolicyChoice, RenderViews, RequestedView, SceneHash, Timeline};
+
+const MOVING: Timeline = Timeline {
+    start_s: 0.0,
+    step_s: 1.0,
+    set_count: 3,
+};
+
+/// One request on a stream of its own; how it ends.
+async fn ask(address: &str, request: RenderViews) -> Result<usize, tonic::Status> {
+    let client = CompositorClient::new(connect(address).await?);
+    let mut parts = client.render_views(tokio_stream::iter([request])).await?;
+    let mut count = 0;
+    while let Some(part) = parts.next().await {
+        part?;
+        count += 1;
+    }
+    Ok(count)
+}
+
+fn raw_request(session: &Session) -> RenderViews {
+    let Camera::Pinhole(camera) = rig()[0];
+    RenderViews {
+        plan_epoch: session.plan().assignment.plan_epoch,
+        set_index: 0,
+        method: "splat".to_owned(),
+        codec: FrameCodec::Lz4,
+        planes: depth_image::ViewPlanes::default(),
+        views: vec![RequestedView { frame: 1, camera }],
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn old_plans_are_refused_everywhere() {
+    let cluster = Cluster::start(2).await;
+    let old = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    let new = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    let (old_plan, new_plan) = (&old.plan().assignment, &new.plan().assignment);
+    assert!(new_plan.plan_epoch > old_plan.plan_epoch);
+    let compositor = &old_plan.compositors[0].address;
+    assert_eq!(ask(compositor, raw_request(&new)).await.unwrap(), 1);
+    let refused = ask(compositor, raw_request(&old)).await.unwrap_err();
+    assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
+    assert!(refused.message().contains("plan_epoch 1 is not in force"), "{refused}");
+    let node = NodeClient::new(connect(compositor).await.unwrap());
+    let refused = node.apply_assignment(old_plan.clone()).await.unwrap_err();
+    assert_eq!(refused.code(), Code::FailedPrecondition);
+    assert_eq!(
+        node.apply_assignment(new_plan.clone()).await.unwrap().plan_epoch,
+        new_plan.plan_epoch,
+        "the same again is no change"
+    );
+    let share = &old_plan.samplers[0];
+    let sampler = SamplerClient::new(connect(&share.address).await.unwrap());
+    let fetch = FetchImages {
+        plan_epoch: old_plan.plan_epoch,
+        set_index: 0,
+        image_indices: share.image_indices.clone(),
+    };
+    assert_eq!(
+        sampler.fetch_sample_images(fetch).await.err().unwrap().code(),
+        Code::FailedPrecondition
+    );
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    assert!(
+        matches!(old.render_views(views(1, 1)), Err(ClientError::Ended { reason }) if reason.contains("took its place"))
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn bad_requests_are_named() {
+    let cluster = Cluster::start(2).await;
+    let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    let compositor = session.plan().assignment.compositors[0].address.clone();
+    let good = raw_request(&session);
+    let bad = [
+        (
+            RenderViews {
+                method: "nonsense".to_owned(),
+                ..good.clone()
+            },
+            "nonsense is unknown",
+        ),
+        (
+            RenderViews {
+                set_index: 3,
+                ..good.clone()
+            },
+            "set_index 3",
+        ),
+        (
+            RenderViews {
+                views: vec![good.views[0]; 4097],
+                ..good.clone()
+            },
+            "views has 4097",
+        ),
+        (
+            RenderViews {
+                views: Vec::new(),
+                ..good.clone()
+            },
+            "views is missing",
+        ),
+        (
+            with_camera(&good, |camera| camera.eye_in_world.x = f32::NAN),
+            "eye_in_world",
+        ),
+        (
+            with_camera(&good, |camera| camera.size_px = glam::UVec2::splat(65_535)),
+            "size_px",
+        ),
+    ];
+    for (request, reason) in bad {
+        let refused = ask(&compositor, request).await.unwrap_err();
+        assert_eq!(refused.code(), Code::InvalidArgument, "{refused}");
+        assert!(refused.message().contains(reason), "{refused}");
+    }
+    let too_long = RenderViews {
+        views: vec![good.views[0]; 100_000],
+        ..good.clone()
+    };
+    assert!(
+        ask(&compositor, too_long).await.is_err(),
+        "more than a message may hold"
+    );
+    assert_eq!(ask(&compositor, good.clone()).await.unwrap(), 1, "the node goes on");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn bad_sessions_are_named() {
+    let cluster = Cluster::start(2).await;
+    let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    let share = &session.plan().assignment.samplers[0];
+    let sampler = SamplerClient::new(connect(&share.address).await.unwrap());
+    let fetch = FetchImages {
+        plan_epoch: session.plan().assignment.plan_epoch,
+        set_index: 0,
+        image_indices: vec![77],
+    };
+    assert!(
+        sampler
+            .fetch_sample_images(fetch)
+            .await
+            .err()
+            .unwrap()
+            .message()
+            .contains("image_indices: 77")
+    );
+    assert!(matches!(
+        session.render_views(views(4, 1)),
+        Err(ClientError::Invalid { field: "set_index", .. })
+    ));
+    let unknown = wire::SessionRequest {
+        lighting: "moonlight".to_owned(),
+        ..request(PolicyChoice::Auto, MOVING)
+    };
+    let error = cluster.session(unknown).await.unwrap_err().to_string();
+    assert!(error.contains("lighting: moonlight is unknown"), "{error}");
+    let elsewhere = wire::SessionRequest {
+        scene: Some(SceneHash::of(b"other")),
+        ..request(PolicyChoice::Auto, MOVING)
+    };
+    assert!(
+        cluster
+            .session(elsewhere)
+            .await
+            .unwrap_err()
+            .to_string()
+            .contains("scene_hash")
+    );
+}
+
+fn with_camera(good: &RenderViews, change: impl Fn(&mut depth_image::PinholeCamera)) -> RenderViews {
+    let mut request = good.clone();
+    change(&mut request.views[0].camera);
+    request
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_killed_node_is_named() {
+    let mut cluster = Cluster::start(3).await;
+    let forced = wire::SessionRequest {
+        forced_sampler_count: Some(1),
+        ..request(PolicyChoice::Pipeline, MOVING)
+    };
+    let session = cluster.session(forced).await.unwrap();
+    session.render_views(views(1, 6)).unwrap().all().await.unwrap();
+    cluster.nodes[2].kill();
+    let start = Instant::now();
+    let error = match session.render_views(views(1, 6)) {
+        Ok(frames) => frames.all().await.unwrap_err(),
+        Err(error) => error,
+    };
+    assert!(error.to_string().contains("n2"), "{error}");
+    assert!(start.elapsed() < Duration::from_secs(5));
+    let status = cluster.client.status().await.unwrap();
+    assert_eq!(status.nodes.len(), 2);
+    let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    assert_eq!(
+        session.render_views(views(3, 4)).unwrap().all().await.unwrap().len(),
+        12
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_killed_sampler_is_named() {
+    let mut cluster = Cluster::start(2).await;
+    let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    cluster.nodes[0].kill();
+    let error = match session.render_views(views(3, 2)) {
+        Ok(frames) => frames.all().await.unwrap_err(),
+        Err(error) => error,
+    };
+    assert!(error.to_string().contains("n0"), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn drain_ends_open_streams_in_time() {
+    let mut cluster = Cluster::start(2).await;
+    let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    let compositor = session.plan().assignment.compositors[0].address.clone();
+    let client = CompositorClient::new(connect(&compositor).await.unwrap());
+    let requests = tokio_stream::once(raw_request(&session)).chain(tokio_stream::pending());
+    let mut parts = client.render_views(requests).await.unwrap();
+    parts.next().await.unwrap().unwrap();
+    let mut node = cluster.nodes.pop().unwrap();
+    let (took, end) = tokio::join!(node.drain(), parts.next());
+    assert!(took < Duration::from_secs(10), "{took:?}");
+    assert_eq!(end.unwrap().unwrap_err().code(), Code::Unavailable);
+    let took = cluster.coordinator.drain().await;
+    assert!(took < Duration::from_secs(10), "{took:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_idle_stream_ends() {
+    let hasty = |config: NodeConfig| NodeConfig {
+        deadlines: Deadlines {
+            idle: Duration::from_millis(200),
+            ..config.deadlines
+        },
+        ..config
+    };
+    let cluster = Cluster::start_with(1, hasty).await;
+    let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    let client = CompositorClient::new(
+        connect(&session.plan().assignment.compositors[0].address)
+            .await
+            .unwrap(),
+    );
+    let mut parts = client
+        .render_views(tokio_stream::once(raw_request(&session)).chain(tokio_stream::pending()))
+        .await
+        .unwrap();
+    parts.next().await.unwrap().unwrap();
+    assert_eq!(parts.next().await.unwrap().unwrap_err().code(), Code::DeadlineExceeded);
+}
+
+#[tokio::test]
+async fn only_loopback_is_served_without_being_asked() {
+    let listener = tokio::net::TcpListener::bind("0.0.0.0:0").await.unwrap();
+    let engine = std::sync::Arc::new(cluster_tests::scalar_engine::ScalarEngine::default());
+    let refused = node_host::serve(
+        listener,
+        NodeConfig::new("n", "http://127.0.0.1:1"),
+        engine,
+        tokio_util::sync::CancellationToken::new(),
+    )
+    .await;
+    assert!(matches!(refused, Err(node::ServeError::NotLoopback { .. })));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_needs_nodes() {
+    let cluster = Cluster::start(0).await;
+    let error = cluster
+        .session(request(PolicyChoice::Auto, MOVING))
+        .await
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("no node has joined"), "{error}");
+}
