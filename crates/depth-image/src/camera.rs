@@ -143,7 +143,12 @@ impl PinholeCamera {
         let checks = [
             ("world_from_camera", length, (length - 1.0).abs() < 1e-3, "of unit length"),
             ("focal_px", focal, focal > 1e-3 && self.focal_px.max_element() < 1e7, "above 0.001 and below 1e7"),
-            ("principal_px", f64::from(self.principal_px.abs().max_element()), self.principal_px.abs().max_element() < 1e6, "within a million pixels"),
+            (
+                "principal_px",
+                f64::from(self.principal_px.abs().max_element()),
+                self.principal_px.abs().max_element() < 1e6,
+                "within a million pixels",
+            ),
             ("near_m", f64::from(self.near_m), self.near_m > 0.0, "above 0"),
             ("size_px", f64::from(*sides.start()), *sides.start() >= 1, "at least 1"),
             ("size_px", f64::from(*sides.end()), *sides.end() <= MAX_IMAGE_SIDE_PX, "at most 16384"),
@@ -225,7 +230,13 @@ mod tests {
     use super::*;
 
     fn shifted() -> PinholeCamera {
-        let mut camera = PinholeCamera::looking_at(Vec3::new(1.0, 2.0, 3.0), Vec3::new(-1.0, 0.5, -4.0), Vec3::Y, 0.8, UVec2::new(400, 300));
+        let mut camera = PinholeCamera::looking_at(
+            Vec3::new(1.0, 2.0, 3.0),
+            Vec3::new(-1.0, 0.5, -4.0),
+            Vec3::Y,
+            0.8,
+            UVec2::new(400, 300),
+        );
         camera.principal_px += Vec2::new(37.5, -12.0);
         camera
     }

@@ -95,7 +95,9 @@ impl Gpu {
             .await
             .map_err(|error| GpuError::NoDevice(error.to_string()))?;
         let info = adapter.get_info();
-        let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS | wgpu::Features::PRIMITIVE_INDEX;
+        let wanted = wgpu::Features::TIMESTAMP_QUERY
+            | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS
+            | wgpu::Features::PRIMITIVE_INDEX;
         let features = adapter.features() & wanted;
         let (device, queue) = adapter
             .request_device(&wgpu::DeviceDescriptor {
@@ -107,9 +109,11 @@ impl Gpu {
             })
             .await
             .map_err(|error| GpuError::Open { name: info.name.clone(), reason: error.to_string() })?;
-        let has_timestamps = features.contains(wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
+        let has_timestamps =
+            features.contains(wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
         // On a processor, wall clock around submit and wait is the truth; its time stamps are not.
-        let timestamp_period_ns = (has_timestamps && info.device_type != wgpu::DeviceType::Cpu).then(|| queue.get_timestamp_period());
+        let timestamp_period_ns =
+            (has_timestamps && info.device_type != wgpu::DeviceType::Cpu).then(|| queue.get_timestamp_period());
         tracing::info!(device = info.name, backend = %info.backend, "graphics device opened");
         Ok(Arc::new(Self { device, queue, info, timestamp_period_ns }))
     }
@@ -147,10 +151,19 @@ impl Gpu {
 
     /// A compute pipeline with entry point `main`, and an automatic layout where none is given for group 0.
     #[must_use]
-    pub fn compute_pipeline(&self, label: &str, wgsl: &str, layout: Option<&wgpu::BindGroupLayout>) -> wgpu::ComputePipeline {
+    pub fn compute_pipeline(
+        &self,
+        label: &str,
+        wgsl: &str,
+        layout: Option<&wgpu::BindGroupLayout>,
+    ) -> wgpu::ComputePipeline {
         let module = self.shader(label, wgsl);
         let layout = layout.map(|group| {
-            let descriptor = wgpu::PipelineLayoutDescriptor { label: Some(label), bind_group_layouts: &[Some(group)], immediate_size: 0 };
+            let descriptor = wgpu::PipelineLayoutDescriptor {
+                label: Some(label),
+                bind_group_layouts: &[Some(group)],
+                immediate_size: 0,
+            };
             self.device.create_pipeline_layout(&descriptor)
         });
         self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -158,7 +171,10 @@ impl Gpu {
             layout: layout.as_ref(),
             module: &module,
             entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions { zero_initialize_workgroup_memory: false, ..Default::default() },
+            compilation_options: wgpu::PipelineCompilationOptions {
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
             cache: None,
         })
     }
@@ -175,13 +191,25 @@ impl Gpu {
     /// Binds whole buffers to `pipeline`'s group 0, at bindings 0, 1, 2….
     #[must_use]
     pub fn bind(&self, pipeline: &wgpu::ComputePipeline, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
-        let entries: Vec<_> = (0..).zip(buffers).map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }).collect();
-        self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &pipeline.get_bind_group_layout(0), entries: &entries })
+        let entries: Vec<_> = (0..)
+            .zip(buffers)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        })
     }
 
     /// A buffer with contents.
     #[must_use]
-    pub fn buffer_with<T: bytemuck::NoUninit>(&self, label: &str, contents: &[T], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    pub fn buffer_with<T: bytemuck::NoUninit>(
+        &self,
+        label: &str,
+        contents: &[T],
+        usage: wgpu::BufferUsages,
+    ) -> wgpu::Buffer {
         let bytes: &[u8] = bytemuck::cast_slice(contents);
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),

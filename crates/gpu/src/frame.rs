@@ -54,16 +54,34 @@ impl<'g> Frame<'g> {
     }
 
     /// One compute dispatch.
-    pub fn compute(&mut self, label: &str, pipeline: &wgpu::ComputePipeline, bind_group: &wgpu::BindGroup, workgroups: [u32; 3]) {
-        let mut pass = self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
+    pub fn compute(
+        &mut self,
+        label: &str,
+        pipeline: &wgpu::ComputePipeline,
+        bind_group: &wgpu::BindGroup,
+        workgroups: [u32; 3],
+    ) {
+        let mut pass = self
+            .encoder
+            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, bind_group, &[]);
         pass.dispatch_workgroups(workgroups[0], workgroups[1], workgroups[2]);
     }
 
     /// `count` dispatches in one pass; the n-th sees its uniform at the dynamic offset `n · stride_bytes`.
-    pub fn compute_each(&mut self, label: &str, pipeline: &wgpu::ComputePipeline, bind_group: &wgpu::BindGroup, stride_bytes: u32, count: usize, workgroups: [u32; 3]) {
-        let mut pass = self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
+    pub fn compute_each(
+        &mut self,
+        label: &str,
+        pipeline: &wgpu::ComputePipeline,
+        bind_group: &wgpu::BindGroup,
+        stride_bytes: u32,
+        count: usize,
+        workgroups: [u32; 3],
+    ) {
+        let mut pass = self
+            .encoder
+            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
         pass.set_pipeline(pipeline);
         for number in 0..count as u32 {
             pass.set_bind_group(0, bind_group, &[number * stride_bytes]);
@@ -72,8 +90,18 @@ impl<'g> Frame<'g> {
     }
 
     /// As [`Frame::compute_each`], with the n-th dispatch's size in `arguments` at `16 · n`.
-    pub fn compute_each_indirect(&mut self, label: &str, pipeline: &wgpu::ComputePipeline, bind_group: &wgpu::BindGroup, stride_bytes: u32, count: usize, arguments: &wgpu::Buffer) {
-        let mut pass = self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
+    pub fn compute_each_indirect(
+        &mut self,
+        label: &str,
+        pipeline: &wgpu::ComputePipeline,
+        bind_group: &wgpu::BindGroup,
+        stride_bytes: u32,
+        count: usize,
+        arguments: &wgpu::Buffer,
+    ) {
+        let mut pass = self
+            .encoder
+            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
         pass.set_pipeline(pipeline);
         for number in 0..count as u32 {
             pass.set_bind_group(0, bind_group, &[number * stride_bytes]);
@@ -127,7 +155,8 @@ impl Submitted<'_> {
             let mapped = self.mapped.recv().map_err(|error| GpuError::Lost(error.to_string()))?;
             mapped.map_err(|error| GpuError::Lost(error.to_string()))?;
         }
-        let by_timestamp = self.timer.zip(self.gpu.timestamp_period_ns).and_then(|(timer, period_ns)| timer.seconds(period_ns));
+        let by_timestamp =
+            self.timer.zip(self.gpu.timestamp_period_ns).and_then(|(timer, period_ns)| timer.seconds(period_ns));
         Ok(FrameResult { device_s: by_timestamp.unwrap_or(wall_s), reads: self.reads })
     }
 }
@@ -137,7 +166,11 @@ impl FrameResult {
     ///
     /// # Errors
     /// When the device is lost.
-    pub fn with<T: bytemuck::AnyBitPattern, R>(&self, readback: Readback, look: impl FnOnce(&[T]) -> R) -> Result<R, GpuError> {
+    pub fn with<T: bytemuck::AnyBitPattern, R>(
+        &self,
+        readback: Readback,
+        look: impl FnOnce(&[T]) -> R,
+    ) -> Result<R, GpuError> {
         let view = self.reads[readback.0].get_mapped_range(..).map_err(|error| GpuError::Lost(error.to_string()))?;
         Ok(look(bytemuck::cast_slice(&view)))
     }
@@ -154,7 +187,8 @@ impl Drop for FrameResult {
 impl Timer {
     fn new(gpu: &Gpu) -> Self {
         let buffer = |usage| {
-            let descriptor = wgpu::BufferDescriptor { label: Some("timestamps"), size: 16, usage, mapped_at_creation: false };
+            let descriptor =
+                wgpu::BufferDescriptor { label: Some("timestamps"), size: 16, usage, mapped_at_creation: false };
             gpu.device.create_buffer(&descriptor)
         };
         let descriptor = wgpu::QuerySetDescriptor { label: Some("frame"), ty: wgpu::QueryType::Timestamp, count: 2 };

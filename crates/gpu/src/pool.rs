@@ -37,7 +37,12 @@ impl BufferPool {
         let key = (bytes.max(256).next_power_of_two().min(bytes.max(256).next_multiple_of(1 << 22)), usage);
         let kept = self.free.lock().unwrap_or_else(PoisonError::into_inner).get_mut(&key).and_then(Vec::pop);
         let buffer = kept.unwrap_or_else(|| {
-            self.gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size: key.0, usage, mapped_at_creation: false })
+            self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: key.0,
+                usage,
+                mapped_at_creation: false,
+            })
         });
         PooledBuffer { buffer: Some(buffer), key, home: Arc::downgrade(&self.free) }
     }
@@ -45,7 +50,11 @@ impl BufferPool {
     /// A device buffer that shaders write and copies read.
     #[must_use]
     pub fn lend_storage(&self, label: &str, bytes: u64) -> PooledBuffer {
-        self.lend(label, bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST)
+        self.lend(
+            label,
+            bytes,
+            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+        )
     }
 
     /// A host-visible buffer to read back into.

@@ -6,11 +6,6 @@
 {% include "sample_set.wgsl" %}
 {% include "surface.wgsl" %}
 
-// What the first pass could not decide; its own list, beside the one it leaves to the fill.
-struct Hard { workgroups: u32, y: u32, z: u32, count: u32 }
-@group(0) @binding({{ 9 + count_fetches|int }}) var<storage, read> hard_pixels: array<u32>;
-@group(0) @binding({{ 10 + count_fetches|int }}) var<storage, read> hard: array<Hard>;
-
 const MAX_MOVES: u32 = 128u;
 const START_LEVEL: u32 = {{ start_level }}u;
 // 0 unless the search is to be cut short.
@@ -30,9 +25,12 @@ struct Verdict {
     penetration: f32,
     // Finer levels could say more.
     undecided: bool,
+    // At the finest level: the share of the texels around the ray that lie on one surface with it, less the
+    // share that show what is beyond it.
+    vote: f32,
 }
 
-const UNSEEN: Verdict = Verdict(-1.0, FAR_AWAY, FAR_AWAY, false);
+const UNSEEN: Verdict = Verdict(-1.0, FAR_AWAY, FAR_AWAY, false, 0.0);
 
 {% for k in range(cameras) %}
 fn exit_{{ k }}(a: vec3f, b: vec3f, p: vec3f, low: vec2f, high: vec2f) -> f32 {
@@ -67,7 +65,7 @@ fn verdict_{{ k }}(a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Verdict 
         let range = pyramids[word + node_index(log2_sides, level, node)];
         let nearest = f32(range & 0xffffu);
         let farthest = f32(range >> 16u);
-        if min(code, exit_code) > nearest { return Verdict(exit, exit, FAR_AWAY, false); }
+        if min(code, exit_code) > nearest { return Verdict(exit, exit, FAR_AWAY, false, 0.0); }
         // Free up to the depth of the nearest thing in the node.
         let surface_t = (scale / (nearest - offset) - a.z) * safe_reciprocal(b.z);
         let partial = select(t, clamp(surface_t, t, exit), code > nearest && nearest > 1.0);
@@ -75,47 +73,43 @@ fn verdict_{{ k }}(a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Verdict 
         let behind = max(code, exit_code) + slack < farthest;
         // A search that stops here takes the nearest thing in the node for the surface.
         let penetration = select(FAR_AWAY, 0.0, level == STOP_LEVEL && !behind);
-        return Verdict(partial, exit, penetration, !behind);
+        return Verdict(partial, exit, penetration, !behind, 1.0);
     }
     let row_words = 1u << log2_sides.x;
-    let codes = corner_codes(word + node.y * row_words + node.x, row_words);
-    if any(codes == vec4u(HOLE)) { return Verdict(t, exit, FAR_AWAY, false); }
-    let corners = vec4f(codes);
-    let nearest = max(max(corners.x, corners.y), max(corners.z, corners.w));
-    let farthest = min(min(corners.x, corners.y), min(corners.z, corners.w));
+    let corners = corners_of(word + node.y * row_words + node.x, row_words);
+    let lowest = min(min(corners.codes.x, corners.codes.y), min(corners.codes.z, corners.codes.w));
+    if lowest < 0.5 { return Verdict(t, exit, FAR_AWAY, false, 0.0); }
     let footprint = (code - offset) / work.cameras[{{ k }}].focal_px;
-    let exit_uv = clamp((a.xy + b.xy * exit) / exit_w - 0.5 - low, vec2f(0.0), vec2f(1.0));
-    let connected = nearest - farthest < CONNECTED_FOOTPRINTS * footprint;
-    var here = 0.0;
-    var there = 0.0;
-    if connected {
-        here = HALF_CODE + code - bilinear(corners, uv - low);
-        there = HALF_CODE + exit_code - bilinear(corners, exit_uv);
-    } else {
-        // A silhouette runs through the cell: each sample stands for its own quarter.
-        let at = uv - low;
-        let quarter = select(vec2f(0.0), vec2f(0.5), at > vec2f(0.5));
-        exit = max(min(exit, exit_{{ k }}(a, b, p, low + quarter, low + quarter + 0.5)), t);
-        let quarter_w = a.z + b.z * exit;
-        let sample = nearest_corner(corners, at);
-        here = HALF_CODE + code - sample;
-        there = HALF_CODE + scale / quarter_w + offset - sample;
-    }
-    if here > 0.0 && there > 0.0 { return Verdict(exit, exit, FAR_AWAY, false); }
-    if here > 0.0 {
-        let crossing = t + (exit - t) * here / (here - there);
-        return Verdict(crossing, exit, 0.0, false);
-    }
-    // Inside and on the way out: the back of the surface, which no camera saw.
-    let leaving = there > here;
-    return Verdict(t, exit, select(-here / footprint, FAR_AWAY, leaving && connected), false);
+    let at = uv - low;
+    let exit_at = clamp((a.xy + b.xy * exit) / exit_w - 0.5 - low, vec2f(0.0), vec2f(1.0));
+    // A connected cell is its bilinear surface; else each sample is a surface of its own.
+    let samples = select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
+    let samples_at_exit = select(corners.codes, vec4f(bilinear(corners.codes, exit_at)), corners.connected);
+    let gaps = vec4f(HALF_CODE + code) - samples;
+    let gaps_at_exit = vec4f(HALF_CODE + exit_code) - samples_at_exit;
+    let ahead = gaps > vec4f(0.0);
+    // Of the surfaces still ahead the nearest is met first.
+    let next_gap = min(min(select(FAR_AWAY, gaps.x, ahead.x), select(FAR_AWAY, gaps.y, ahead.y)), min(select(FAR_AWAY, gaps.z, ahead.z), select(FAR_AWAY, gaps.w, ahead.w)));
+    let next_gap_at_exit = next_gap + min(min(select(FAR_AWAY, gaps_at_exit.x - gaps.x, ahead.x), select(FAR_AWAY, gaps_at_exit.y - gaps.y, ahead.y)), min(select(FAR_AWAY, gaps_at_exit.z - gaps.z, ahead.z), select(FAR_AWAY, gaps_at_exit.w - gaps.w, ahead.w)));
+    let meets = any(ahead) && next_gap_at_exit <= 0.0;
+    let crossing = select(exit, t + (exit - t) * next_gap / max(next_gap - next_gap_at_exit, 1e-9), meets);
+    if all(ahead) { return Verdict(crossing, select(exit, crossing + (exit - t) * 1e-6, meets), select(FAR_AWAY, 0.0, meets), false, 0.0); }
+    let share = vec4f((1.0 - at.x) * (1.0 - at.y), at.x * (1.0 - at.y), (1.0 - at.x) * at.y, at.x * at.y);
+    let reach = vec4f(THICKNESS_FOOTPRINTS * footprint);
+    let same = dot(share, select(vec4f(0.0), vec4f(1.0), (abs(gaps) < reach) & (corners.codes > vec4f(1.5))));
+    let beyond = dot(share, select(vec4f(0.0), vec4f(1.0), gaps > reach));
+    // Inside and on the way out of a connected cell: the back of the surface, which no camera saw.
+    let leaving = corners.connected && gaps_at_exit.x > gaps.x;
+    let depths = select(-gaps, vec4f(FAR_AWAY), ahead);
+    let shallowest = min(min(depths.x, depths.y), min(depths.z, depths.w));
+    return Verdict(t, crossing, select(shallowest / footprint, FAR_AWAY, leaving), false, same - beyond);
 }
 {% endfor %}
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= hard[work.view.number].count { return; }
-    let index = hard_pixels[work.view.first_pixel + id.x];
+    if id.x >= earlier[work.view.number].count { return; }
+    let index = earlier_pixels[work.view.first_pixel + id.x];
     let place = index - work.view.first_pixel;
     let pixel = pixel_of(vec2u(place % work.view.size_px.x, place / work.view.size_px.x));
     let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
@@ -134,6 +128,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         var penetration = FAR_AWAY;
         var undecided = false;
         var free = false;
+        var vote = 0.0;
 {% for k in range(cameras) %}
         let v{{ k }} = verdict_{{ k }}(a{{ k }}, b{{ k }}, t, span.far, level);
         free = free || (v{{ k }}.free_until == v{{ k }}.exit && v{{ k }}.free_until > t);
@@ -142,14 +137,20 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         free_until = max(free_until, v{{ k }}.free_until);
         exit = min(exit, v{{ k }}.exit);
         undecided = undecided || v{{ k }}.undecided;
+        vote += v{{ k }}.vote;
 {% endfor %}
         let descend = !free && level > STOP_LEVEL && undecided;
-        hit = !free && !descend && penetration < THICKNESS_FOOTPRINTS;
-        let unknown = !free && !descend && !hit;
+        let candidate = !free && !descend && penetration < THICKNESS_FOOTPRINTS;
+        // First go to the very place, then let the cameras vote there.
+        let arrived = free_until <= t || STOP_LEVEL > 0u;
+        hit = candidate && arrived && vote >= 0.0;
+        let rejected = candidate && arrived && !hit;
+        let unknown = !free && !descend && !candidate;
         known = known && !unknown;
         let beyond = max(select(exit, t + (span.far - span.near) * 0.01, exit >= FAR_AWAY), t * 1.00001);
-        t = select(free_until, beyond, unknown);
+        t = select(free_until, beyond, unknown || rejected);
         level = select(min(level + 1u, START_LEVEL), level - 1u, descend);
+        level = select(level, STOP_LEVEL, candidate);
         if hit { break; }
     }
     let point_in_world = work.view.eye_in_world + pixel.direction * t;

@@ -21,7 +21,7 @@ fn inside_{{ k }}(p: vec3f) -> Depth {
 {% if count_fetches %}    fetches += 1u;
 {% endif %}
     // A word holds a texel and its right neighbour; the texel itself is in the low half.
-    let code = pyramids[work.cameras[{{ k }}].first_word + (texel.y << work.cameras[{{ k }}].log2_sides.x) + texel.x] & 0xffffu;
+    let code = pyramids[work.cameras[{{ k }}].first_word + (texel.y << work.cameras[{{ k }}].log2_sides.x) + texel.x] & 0x7fffu;
     let penetration = (f32(code) - work.cameras[{{ k }}].code_offset) / work.cameras[{{ k }}].code_scale - inverse_w;
     return Depth(penetration, p.z > 0.0 && all(uv == clamped) && code != HOLE);
 }

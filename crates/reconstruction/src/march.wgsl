@@ -1,5 +1,6 @@
-// The first pass of the joint carve: march in the image of the nearest sample camera alone, then ask all
-// cameras about the point found. Most pixels end here; the others are left to joint_carve.wgsl.
+// The first passes of the joint carve: march in the image of one sample camera alone, then ask all cameras
+// about the point found. Most pixels end with the nearest camera and most others with the second nearest;
+// what is left goes to joint_carve.wgsl.
 //
 // In the camera's image the ray is a straight line along which columns, rows and the depth code are linear
 // in one parameter s, so that a step needs no division.
@@ -17,11 +18,11 @@ const NUDGE_PX: f32 = 1e-3;
 struct March { t: f32, crossed: bool }
 
 fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
-    let scale = work.cameras[0].code_scale;
-    let offset = work.cameras[0].code_offset;
-    let cells = work.cameras[0].cells;
-    let log2_sides = work.cameras[0].log2_sides;
-    let first_word = work.cameras[0].first_word;
+    let scale = work.cameras[{{ march_camera }}].code_scale;
+    let offset = work.cameras[{{ march_camera }}].code_offset;
+    let cells = work.cameras[{{ march_camera }}].cells;
+    let log2_sides = work.cameras[{{ march_camera }}].log2_sides;
+    let first_word = work.cameras[{{ march_camera }}].first_word;
     let row_words = 1u << log2_sides.x;
     let p0 = a + b * near;
     // The line ends before the plane through the camera's eye.
@@ -63,15 +64,12 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
         let exit = clamp(min(leave.x, leave.y), s, s_end);
         let beyond = origin + line * exit;
         let node = vec2u(cell);
-        let corners = vec4f(corner_codes(first_word + node.y * row_words + node.x, row_words));
-        let nearest = max(max(corners.x, corners.y), max(corners.z, corners.w));
-        let farthest = min(min(corners.x, corners.y), min(corners.z, corners.w));
-        let connected = nearest - farthest < CONNECTED_FOOTPRINTS * (at.z - offset) / work.cameras[0].focal_px;
+        let corners = corners_of(first_word + node.y * row_words + node.x, row_words);
+        let hole = min(min(corners.codes.x, corners.codes.y), min(corners.codes.z, corners.codes.w)) < 0.5;
         let inside = at.xy - cell;
         let inside_beyond = clamp(beyond.xy - cell, vec2f(0.0), vec2f(1.0));
-        let here = HALF_CODE + at.z - select(nearest_corner(corners, inside), bilinear(corners, inside), connected);
-        let there = HALF_CODE + beyond.z - select(nearest_corner(corners, inside_beyond), bilinear(corners, inside_beyond), connected);
-        let hole = farthest < 0.5;
+        let here = HALF_CODE + at.z - surface_code(corners, inside);
+        let there = HALF_CODE + beyond.z - surface_code(corners, inside_beyond);
         let through = here > 0.0 && there > 0.0 && !hole;
         crossed = here > 0.0 && there <= 0.0 && !hole;
         let crossing = s + (exit - s) * here / max(here - there, 1e-9);
@@ -83,22 +81,34 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
     return March(select(near, near + (end - near) * share, visible), crossed);
 }
 
+{% if march_camera == 0 %}
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= work.view.size_px) { return; }
     let pixel = pixel_of(id.xy);
     let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
     let begin = max(span.near, tile_start_m[pixel.tile]);
-    let a = homogeneous(work.cameras[0].homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
-    let b = homogeneous(work.cameras[0].homogeneous_pixel_from_world, vec4f(pixel.direction, 0.0));
+{% else %}
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= earlier[work.view.number].count { return; }
+    let place = earlier_pixels[work.view.first_pixel + id.x] - work.view.first_pixel;
+    let pixel = pixel_of(vec2u(place % work.view.size_px.x, place / work.view.size_px.x));
+    let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
+    // The pass before left how far it got.
+    let begin = out_inverse_depth[pixel.index];
+{% endif %}
+    let a = homogeneous(work.cameras[{{ march_camera }}].homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
+    let b = homogeneous(work.cameras[{{ march_camera }}].homogeneous_pixel_from_world, vec4f(pixel.direction, 0.0));
     let found = march(a, b, begin, max(span.far, begin));
     let point_in_world = work.view.eye_in_world + pixel.direction * found.t;
     let blend = blended(point_in_world, pixel.direction, THICKNESS_FOOTPRINTS);
-    let hit = found.crossed && !blend.seen_past && blend.camera_mask != 0u;
+    let hit = found.crossed && blend.occupied;
+    // Proven empty up to where the volume ends. A pixel that is left for later keeps how far it got where
+    // its inverse depth will be.
     let empty = begin >= span.far;
     let color = select(work.background_srgb8, srgb8_from_linear(blend.color_linear), hit && !empty);
     let provenance = select(PROVENANCE_HIT | (blend.camera_mask << 8u), PROVENANCE_EMPTY, empty);
-    // A pixel that is left for later keeps how far it got where its inverse depth will be.
     let depth = select(select(found.t, 1.0 / found.t, hit), 0.0, empty);
     write_pixel(pixel.index, color, depth, provenance);
     if !hit && !empty { leave_for_later(pixel.index); }

@@ -29,7 +29,9 @@ impl Default for ReconstructionMethod {
 
 /// Not the name of a method, or not a number it takes.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown reconstruction method {0:?}, expected joint_carve, joint_carve:LEVEL (0 to 8), light_field_search or light_field_search:STEPS (1 to 65536)")]
+#[error(
+    "unknown reconstruction method {0:?}, expected joint_carve, joint_carve:LEVEL (0 to 8), light_field_search or light_field_search:STEPS (1 to 65536)"
+)]
 pub struct UnknownMethod(String);
 
 impl FromStr for ReconstructionMethod {
@@ -41,9 +43,13 @@ impl FromStr for ReconstructionMethod {
             None => (text, None),
         };
         match (name, number) {
-            ("joint_carve", level) if level.unwrap_or(0) <= MAX_STOP_LEVEL => Ok(Self::JointCarve { stop_level: level.unwrap_or(0) }),
+            ("joint_carve", level) if level.unwrap_or(0) <= MAX_STOP_LEVEL => {
+                Ok(Self::JointCarve { stop_level: level.unwrap_or(0) })
+            }
             // The paper's 100 steps.
-            ("light_field_search", steps) if (1..=MAX_STEPS).contains(&steps.unwrap_or(100)) => Ok(Self::LightFieldSearch { steps: steps.unwrap_or(100) }),
+            ("light_field_search", steps) if (1..=MAX_STEPS).contains(&steps.unwrap_or(100)) => {
+                Ok(Self::LightFieldSearch { steps: steps.unwrap_or(100) })
+            }
             _ => Err(unknown()),
         }
     }
@@ -68,7 +74,14 @@ mod tests {
         for name in ["joint_carve", "joint_carve:3", "light_field_search:8"] {
             assert_eq!(name.parse::<ReconstructionMethod>().expect(name).to_string(), name);
         }
-        for name in ["", "carve", "joint_carve:9", "light_field_search:0", "light_field_search:-1", "light_field_search:99999999999"] {
+        for name in [
+            "",
+            "carve",
+            "joint_carve:9",
+            "light_field_search:0",
+            "light_field_search:-1",
+            "light_field_search:99999999999",
+        ] {
             assert!(name.parse::<ReconstructionMethod>().is_err(), "{name}");
         }
     }

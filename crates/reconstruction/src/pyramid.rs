@@ -1,13 +1,18 @@
-//! Depth as 16-bit codes, and the min-max pyramid over it.
+//! Depth as 15-bit codes, which neighbours are one surface, and the min-max pyramid over them.
 
-use depth_image::DepthImage;
+use depth_image::{Camera, DepthImage};
 
 /// Code of a texel without a sample.
 pub const HOLE_CODE: u16 = 0;
 /// Code of a texel whose ray meets nothing: farther than every sample.
 pub const BACKGROUND_CODE: u16 = 1;
 const FIRST_CODE: f32 = 2.0;
-const LAST_CODE: f32 = 65_535.0;
+const LAST_CODE: f32 = 32_767.0;
+
+/// Neighbours whose depths differ by less, in footprints, are one surface whatever is around them.
+const FLAT_FOOTPRINTS: f32 = 2.0;
+/// So much may a jump in depth leave the range of the jumps before and after it, in footprints.
+const SLOPE_FOOTPRINTS: f32 = 2.0;
 
 /// A depth plane as codes linear in inverse depth: `code = scale / planar_depth_m + offset`.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +25,8 @@ pub struct CodedDepth {
     pub scale: f32,
     /// The code of infinity; negative or up to 2.
     pub offset: f32,
+    /// For each cell between four texels, whether its corners are samples of one surface.
+    pub connected: Vec<bool>,
 }
 
 impl CodedDepth {
@@ -36,7 +43,14 @@ impl CodedDepth {
             0.0 => BACKGROUND_CODE,
             _ => HOLE_CODE,
         };
-        Self { size_px: image.size_px().to_array(), codes: image.inverse_depth_per_m.iter().map(code).collect(), scale, offset }
+        let Camera::Pinhole(camera) = &image.camera;
+        Self {
+            size_px: image.size_px().to_array(),
+            codes: image.inverse_depth_per_m.iter().map(code).collect(),
+            scale,
+            offset,
+            connected: connected_cells(image, camera.focal_px.min_element()),
+        }
     }
 
     /// The code of a texel; positions beyond the border give the border's.
@@ -47,10 +61,47 @@ impl CodedDepth {
     }
 }
 
+/// A cell is connected where all four of its edges are.
+fn connected_cells(image: &DepthImage, focal_px: f32) -> Vec<bool> {
+    let [columns, rows] = image.size_px().to_array().map(|side| side as usize);
+    let plane = &image.inverse_depth_per_m;
+    let across = |x: usize, y: usize| is_one_surface(plane, y * columns + x, 1, x, columns, focal_px);
+    let down = |x: usize, y: usize| is_one_surface(plane, y * columns + x, columns, y, rows, focal_px);
+    let mut connected = vec![false; columns * rows];
+    for y in 0..rows - 1 {
+        let mut left = down(0, y);
+        for x in 0..columns - 1 {
+            let right = down(x + 1, y);
+            connected[y * columns + x] = left && right && across(x, y) && across(x, y + 1);
+            left = right;
+        }
+    }
+    connected
+}
+
+/// Whether the samples at `index` and `index + stride` (the `place`-th and next of `count` in their row or
+/// column) lie on one surface: close in depth, or a slope that goes on before or after. Planes are
+/// linear in inverse depth, so that no plane is ever cut, however steep.
+fn is_one_surface(plane: &[f32], index: usize, stride: usize, place: usize, count: usize, focal_px: f32) -> bool {
+    let (a, b) = (plane[index], plane[index + stride]);
+    if a <= 0.0 || b <= 0.0 {
+        return false;
+    }
+    let footprint = a.max(b) / focal_px;
+    let jump = b - a;
+    if jump.abs() <= FLAT_FOOTPRINTS * footprint {
+        return true;
+    }
+    let before = (place > 0).then(|| plane[index - stride]).filter(|&d| d > 0.0).map(|d| a - d);
+    let after = (place + 2 < count).then(|| plane[index + 2 * stride]).filter(|&d| d > 0.0).map(|d| d - b);
+    let slack = SLOPE_FOOTPRINTS * footprint;
+    [before, after].into_iter().flatten().any(|slope| (slope - jump).abs() <= slack.max(0.2 * jump.abs()))
+}
+
 /// Levels of words over the cells between texel centres, sides padded to powers of two.
 ///
 /// Level 0 holds a word a cell: the codes of its upper left (low half) and upper right corner (high
-/// half). A word of level `n` holds the nearest code (low) and the farthest (high) of the corners of
+/// half), and in the highest bit whether the cell is connected. A word of level `n` holds the nearest code (low) and the farthest (high) of the corners of
 /// 2ⁿ × 2ⁿ cells; a hole among them makes it say "anything": nearest 65535, farthest 0.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pyramid {
@@ -70,7 +121,8 @@ impl Pyramid {
         for y in 0..rows.min(depth.size_px[1]) {
             let row = &mut words[(y * columns) as usize..][..columns as usize];
             for (x, word) in (0..).zip(row.iter_mut()).take(depth.size_px[0] as usize) {
-                *word = u32::from(depth.at(x, y)) | u32::from(depth.at(x + 1, y)) << 16;
+                let connected = u32::from(depth.connected[(y * depth.size_px[0] + x) as usize]);
+                *word = u32::from(depth.at(x, y)) | u32::from(depth.at(x + 1, y)) << 16 | connected << 31;
             }
         }
         let mut pyramid = Self { log2_sides, words };
@@ -102,7 +154,8 @@ impl Pyramid {
             let begin = Self::level_begin(self.log2_sides, level);
             let columns = 1usize << (self.log2_sides[0] - level);
             let rows = 1usize << (self.log2_sides[1] - level);
-            let nearest = |x: usize, y: usize| self.words[begin + y.min(rows - 1) * columns + x.min(columns - 1)] & 0xffff;
+            let nearest =
+                |x: usize, y: usize| self.words[begin + y.min(rows - 1) * columns + x.min(columns - 1)] & 0xffff;
             for (x, y) in (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y))) {
                 let four = [nearest(x, y), nearest(x + 1, y), nearest(x, y + 1), nearest(x + 1, y + 1)];
                 wide[begin + y * columns + x] = four.into_iter().fold(0, u32::max);
@@ -118,7 +171,8 @@ impl Pyramid {
         for y in 0..rows {
             for x in 0..columns {
                 let inside = 2 * x < depth.size_px[0] && 2 * y < depth.size_px[1];
-                self.words[begin + (y * columns + x) as usize] = if inside { corner_range(depth, 2 * x, 2 * y) } else { NOTHING };
+                self.words[begin + (y * columns + x) as usize] =
+                    if inside { corner_range(depth, 2 * x, 2 * y) } else { NOTHING };
             }
         }
     }
@@ -162,13 +216,15 @@ mod tests {
     use super::*;
 
     fn coded(size_px: [u32; 2], code: impl Fn(u32, u32) -> u16) -> CodedDepth {
-        let codes = (0..size_px[1]).flat_map(|y| (0..size_px[0]).map(move |x| (x, y))).map(|(x, y)| code(x, y)).collect();
-        CodedDepth { size_px, codes, scale: 1.0, offset: 0.0 }
+        let codes =
+            (0..size_px[1]).flat_map(|y| (0..size_px[0]).map(move |x| (x, y))).map(|(x, y)| code(x, y)).collect();
+        let connected = vec![true; (size_px[0] * size_px[1]) as usize];
+        CodedDepth { size_px, codes, scale: 1.0, offset: 0.0, connected }
     }
 
     #[test]
     fn every_node_bounds_its_corners() {
-        let depth = coded([37, 22], |x, y| 2 + ((x * 7919 + y * 104_729) % 60_000) as u16);
+        let depth = coded([37, 22], |x, y| 2 + ((x * 7919 + y * 104_729) % 30_000) as u16);
         let pyramid = Pyramid::of(&depth);
         for level in 1..=5 {
             let begin = Pyramid::level_begin(pyramid.log2_sides, level);

@@ -21,6 +21,8 @@ const TILE_PX: u32 = 8;
 const PIXELS_A_BATCH: usize = 1 << 21;
 const MAX_VIEWS_A_BATCH: usize = 256;
 /// Uniform offsets must be multiples of this on every device.
+/// Marches in the nearest two cameras, and the carve.
+const MAX_PASSES: usize = 3;
 const UNIFORM_ALIGNMENT: u32 = 256;
 const FILL_STRIDE: u32 = UNIFORM_ALIGNMENT;
 
@@ -74,14 +76,24 @@ impl Reconstructor {
     /// # Errors
     /// When a shader template is broken.
     pub fn new(gpu: &Arc<Gpu>) -> Result<Self, ReconstructionError> {
-        Ok(Self { gpu: gpu.clone(), pool: BufferPool::new(gpu), templates: Templates::new(SHADERS)?, pipelines: Mutex::default() })
+        Ok(Self {
+            gpu: gpu.clone(),
+            pool: BufferPool::new(gpu),
+            templates: Templates::new(SHADERS)?,
+            pipelines: Mutex::default(),
+        })
     }
 
     /// Puts a sample set on the device. `volume` holds all geometry of the scene.
     ///
     /// # Errors
     /// Images, cameras or a volume that cannot be used, or the device's limits.
-    pub fn upload(&self, images: &[DepthImage], volume: &Aabb, background_linear: Vec3) -> Result<SampleSet, ReconstructionError> {
+    pub fn upload(
+        &self,
+        images: &[DepthImage],
+        volume: &Aabb,
+        background_linear: Vec3,
+    ) -> Result<SampleSet, ReconstructionError> {
         SampleSet::upload(&self.gpu, images, volume, background_linear)
     }
 
@@ -89,7 +101,13 @@ impl Reconstructor {
     ///
     /// # Errors
     /// A camera that is not valid (all are checked first), or the device.
-    pub fn reconstruct(&self, set: &SampleSet, cameras: &[PinholeCamera], method: ReconstructionMethod, planes: ViewPlanes) -> Result<Vec<View>, ReconstructionError> {
+    pub fn reconstruct(
+        &self,
+        set: &SampleSet,
+        cameras: &[PinholeCamera],
+        method: ReconstructionMethod,
+        planes: ViewPlanes,
+    ) -> Result<Vec<View>, ReconstructionError> {
         self.reconstruct_measured(set, cameras, method, planes, false).map(|(views, _)| views)
     }
 
@@ -97,7 +115,14 @@ impl Reconstructor {
     ///
     /// # Errors
     /// As [`Reconstructor::reconstruct`].
-    pub fn reconstruct_measured(&self, set: &SampleSet, cameras: &[PinholeCamera], method: ReconstructionMethod, planes: ViewPlanes, count_fetches: bool) -> Result<(Vec<View>, Statistics), ReconstructionError> {
+    pub fn reconstruct_measured(
+        &self,
+        set: &SampleSet,
+        cameras: &[PinholeCamera],
+        method: ReconstructionMethod,
+        planes: ViewPlanes,
+        count_fetches: bool,
+    ) -> Result<(Vec<View>, Statistics), ReconstructionError> {
         for (index, camera) in cameras.iter().enumerate() {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
         }
@@ -118,54 +143,76 @@ impl Reconstructor {
         Ok((views, statistics))
     }
 
-    fn submit(&self, set: &SampleSet, cameras: &[PinholeCamera], method: ReconstructionMethod, planes: ViewPlanes, count_fetches: bool) -> Result<InFlight<'_>, ReconstructionError> {
+    fn submit(
+        &self,
+        set: &SampleSet,
+        cameras: &[PinholeCamera],
+        method: ReconstructionMethod,
+        planes: ViewPlanes,
+        count_fetches: bool,
+    ) -> Result<InFlight<'_>, ReconstructionError> {
         let size_px = cameras[0].size_px;
         let tiles = size_px.map(|side| side.div_ceil(TILE_PX));
         let count = cameras.len();
         let bytes = 4 * (cameras[0].pixel_count() * count) as u64;
         self.gpu.check_storage_bytes("a batch of views (bytes)", bytes)?;
-        let (steps, passes) = match method {
-            ReconstructionMethod::LightFieldSearch { steps } => (steps, &[("light_field_search.wgsl", 0)][..]),
-            ReconstructionMethod::JointCarve { stop_level } => (0, &[("march.wgsl", 0), ("joint_carve.wgsl", stop_level)][..]),
-        };
+        let (steps, passes) = passes(method, set.cameras.len(), count_fetches);
         let stride = view_stride(set);
         let works = self.gpu.buffer_with("views", &view_works(set, cameras, tiles, steps), BufferUsages::UNIFORM);
         let starts = self.pool.lend_storage("tile starts", 4 * u64::from(tiles.element_product()) * count as u64);
         let labels = ["srgb8", "inverse depth", "provenance", "fetches"];
-        let outputs: Vec<PooledBuffer> = labels.iter().take(3 + usize::from(count_fetches)).map(|label| self.pool.lend_storage(label, bytes)).collect();
-        let list_pixels = [(); 2].map(|()| self.pool.lend_storage("pixels left for later", bytes));
-        let lists = [(); 2].map(|()| self.gpu.buffer_with("lists", &vec![GpuList::EMPTY; count], BufferUsages::STORAGE | BufferUsages::INDIRECT));
+        let outputs: Vec<PooledBuffer> = labels
+            .iter()
+            .take(3 + usize::from(count_fetches))
+            .map(|label| self.pool.lend_storage(label, bytes))
+            .collect();
+        let list_pixels = [(); MAX_PASSES].map(|()| self.pool.lend_storage("pixels left for later", bytes));
+        let lists = [(); MAX_PASSES].map(|()| {
+            self.gpu.buffer_with("lists", &vec![GpuList::EMPTY; count], BufferUsages::STORAGE | BufferUsages::INDIRECT)
+        });
 
         let mut frame = Frame::begin(&self.gpu, "reconstruct");
         if count_fetches {
             frame.encoder.clear_buffer(&outputs[3], 0, None);
         }
-        let key = ShaderKey { name: "tile_start.wgsl", cameras: set.cameras.len(), stop_level: 0, count_fetches: false };
-        let tile_start = self.pipeline(key)?;
+        let tile_start =
+            self.pipeline(ShaderKey { name: "tile_start.wgsl", cameras: set.cameras.len(), ..ShaderKey::default() })?;
         let bound = self.bind(&tile_start, stride, &[&works, &set.pyramids, &starts]);
-        frame.compute_each("tile start", &tile_start, &bound, stride, count, [tiles.x.div_ceil(TILE_PX), tiles.y.div_ceil(TILE_PX), 1]);
-        for (number, &(name, stop_level)) in passes.iter().enumerate() {
-            let pipeline = self.pipeline(ShaderKey { name, stop_level, count_fetches, ..key })?;
+        frame.compute_each(
+            "tile start",
+            &tile_start,
+            &bound,
+            stride,
+            count,
+            [tiles.x.div_ceil(TILE_PX), tiles.y.div_ceil(TILE_PX), 1],
+        );
+        for (number, &key) in passes.iter().enumerate() {
+            let pipeline = self.pipeline(key)?;
             let mut buffers: Vec<&wgpu::Buffer> = vec![&works, &set.pyramids, &starts, &set.colors];
             buffers.extend(outputs[..3].iter().map(|buffer| &**buffer));
             buffers.extend([&*list_pixels[number], &lists[number]]);
             buffers.extend(outputs.get(3).map(|buffer| &**buffer));
             if number == 0 {
                 let bound = self.bind(&pipeline, stride, &buffers);
-                frame.compute_each(name, &pipeline, &bound, stride, count, [tiles.x, tiles.y, 1]);
+                frame.compute_each(key.name, &pipeline, &bound, stride, count, [tiles.x, tiles.y, 1]);
             } else {
                 buffers.extend([&*list_pixels[number - 1], &lists[number - 1]]);
                 let bound = self.bind(&pipeline, stride, &buffers);
-                frame.compute_each_indirect(name, &pipeline, &bound, stride, count, &lists[number - 1]);
+                frame.compute_each_indirect(key.name, &pipeline, &bound, stride, count, &lists[number - 1]);
             }
         }
         let last = passes.len() - 1;
-        let fill = self.pipeline(ShaderKey { name: "fill.wgsl", cameras: 0, stop_level: 0, count_fetches: false })?;
+        let fill = self.pipeline(ShaderKey { name: "fill.wgsl", ..ShaderKey::default() })?;
         let fill_works = self.gpu.buffer_with("fill", &fill_works(size_px, count), BufferUsages::UNIFORM);
-        let bound = self.bind(&fill, FILL_STRIDE, &[&fill_works, &outputs[0], &outputs[1], &outputs[2], &list_pixels[last], &lists[last]]);
+        let bound = self.bind(
+            &fill,
+            FILL_STRIDE,
+            &[&fill_works, &outputs[0], &outputs[1], &outputs[2], &list_pixels[last], &lists[last]],
+        );
         frame.compute_each_indirect("fill", &fill, &bound, FILL_STRIDE, count, &lists[last]);
 
-        let mut read = |index: usize| frame.read_back(&outputs[index], 0..bytes, self.pool.lend_host("view read-back", bytes));
+        let mut read =
+            |index: usize| frame.read_back(&outputs[index], 0..bytes, self.pool.lend_host("view read-back", bytes));
         let reads = Reads {
             srgb8: read(0),
             inverse_depth: planes.inverse_depth.then(|| read(1)),
@@ -181,19 +228,23 @@ impl Reconstructor {
         let read = match key.name {
             "tile_start.wgsl" => vec![1],
             "fill.wgsl" => vec![3, 4, 5],
-            "joint_carve.wgsl" => vec![1, 2, 3, 9 + u32::from(key.count_fetches), 10 + u32::from(key.count_fetches)],
+            _ if key.march_camera > 0 => {
+                vec![1, 2, 3, 9 + u32::from(key.count_fetches), 10 + u32::from(key.count_fetches)]
+            }
             _ => vec![1, 2, 3],
         };
         let bindings = match key.name {
             "tile_start.wgsl" => 3,
             "fill.wgsl" => 6,
-            "joint_carve.wgsl" => 11 + u32::from(key.count_fetches),
+            _ if key.march_camera > 0 => 11 + u32::from(key.count_fetches),
             _ => 9 + u32::from(key.count_fetches),
         };
         let storage = |binding| wgpu::BufferBindingType::Storage { read_only: read.contains(&binding) };
         let mut entries = vec![layout_entry(0, wgpu::BufferBindingType::Uniform, true)];
         entries.extend((1..bindings).map(|binding| layout_entry(binding, storage(binding), false)));
-        self.gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(key.name), entries: &entries })
+        self.gpu
+            .device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(key.name), entries: &entries })
     }
 
     fn bind(&self, pipeline: &wgpu::ComputePipeline, stride: u32, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
@@ -202,10 +253,17 @@ impl Reconstructor {
             .zip(buffers)
             .map(|(binding, &buffer)| {
                 let size = if binding == 0 { one_view } else { None };
-                wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size }) }
+                wgpu::BindGroupEntry {
+                    binding,
+                    resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size }),
+                }
             })
             .collect();
-        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &pipeline.get_bind_group_layout(0), entries: &entries })
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        })
     }
 
     fn pipeline(&self, key: ShaderKey) -> Result<Arc<wgpu::ComputePipeline>, ReconstructionError> {
@@ -214,9 +272,30 @@ impl Reconstructor {
             return Ok(pipeline.clone());
         }
         let layout = self.layout(key);
-        let pipeline = Arc::new(self.gpu.compute_pipeline(key.name, &shader_text(&self.templates, key)?, Some(&layout)));
+        let pipeline =
+            Arc::new(self.gpu.compute_pipeline(key.name, &shader_text(&self.templates, key)?, Some(&layout)));
         pipelines.insert(key, pipeline.clone());
         Ok(pipeline)
+    }
+}
+
+/// Steps for the shaders, and the passes over pixels: the first over all, each other over what the one before
+/// left.
+fn passes(method: ReconstructionMethod, cameras: usize, count_fetches: bool) -> (u32, Vec<ShaderKey>) {
+    let key = ShaderKey { cameras, count_fetches, ..ShaderKey::default() };
+    match method {
+        ReconstructionMethod::LightFieldSearch { steps } => {
+            (steps, vec![ShaderKey { name: "light_field_search.wgsl", ..key }])
+        }
+        ReconstructionMethod::JointCarve { stop_level } => {
+            let marches = (0..cameras.min(MAX_PASSES - 1)).map(|march_camera| ShaderKey {
+                name: "march.wgsl",
+                march_camera,
+                ..key
+            });
+            let carve = ShaderKey { name: "joint_carve.wgsl", march_camera: cameras, stop_level, ..key };
+            (0, marches.chain([carve]).collect())
+        }
     }
 }
 
@@ -258,12 +337,21 @@ impl InFlight<'_> {
         let result = self.submitted.wait()?;
         statistics.device_s += result.device_s;
         let pixels = self.size_px.element_product() as usize;
-        let planes = |readback: Readback| result.with(readback, |words: &[u32]| words.chunks(pixels).take(self.count).map(<[u32]>::to_vec).collect::<Vec<_>>());
-        let mut rgb = result.with(self.reads.srgb8, |words: &[u32]| words.chunks(pixels).take(self.count).map(rgb_bytes).collect::<Vec<_>>())?.into_iter();
+        let planes = |readback: Readback| {
+            result.with(readback, |words: &[u32]| {
+                words.chunks(pixels).take(self.count).map(<[u32]>::to_vec).collect::<Vec<_>>()
+            })
+        };
+        let mut rgb = result
+            .with(self.reads.srgb8, |words: &[u32]| {
+                words.chunks(pixels).take(self.count).map(rgb_bytes).collect::<Vec<_>>()
+            })?
+            .into_iter();
         let mut depths = self.reads.inverse_depth.map(planes).transpose()?.unwrap_or_default().into_iter();
         let mut provenances = self.reads.provenance.map(planes).transpose()?.unwrap_or_default().into_iter();
         if let Some(readback) = self.reads.fetches {
-            let sum: f64 = result.with(readback, |words: &[u32]| words[..pixels * self.count].iter().map(|&n| f64::from(n)).sum())?;
+            let sum: f64 = result
+                .with(readback, |words: &[u32]| words[..pixels * self.count].iter().map(|&n| f64::from(n)).sum())?;
             *statistics.fetches_per_ray.get_or_insert(0.0) += sum / pixels as f64;
         }
         views.extend((0..self.count).map(|_| View {
@@ -278,7 +366,10 @@ impl InFlight<'_> {
 
 fn rgb_bytes(rgba: &[u32]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(rgba.len() * 3);
-    bytes.extend(rgba.iter().flat_map(|word| { let [r, g, b, _] = word.to_le_bytes(); [r, g, b] }));
+    bytes.extend(rgba.iter().flat_map(|word| {
+        let [r, g, b, _] = word.to_le_bytes();
+        [r, g, b]
+    }));
     bytes
 }
 

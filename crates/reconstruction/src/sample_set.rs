@@ -26,7 +26,12 @@ impl SampleSet {
     ///
     /// # Errors
     /// Too many images, planes or cameras that do not fit, or a set beyond the device's limits.
-    pub(crate) fn upload(gpu: &Gpu, images: &[DepthImage], volume: &Aabb, background_linear: Vec3) -> Result<Self, ReconstructionError> {
+    pub(crate) fn upload(
+        gpu: &Gpu,
+        images: &[DepthImage],
+        volume: &Aabb,
+        background_linear: Vec3,
+    ) -> Result<Self, ReconstructionError> {
         check(gpu, images, volume)?;
         let mut cameras = Vec::with_capacity(images.len());
         let mut words: Vec<u32> = Vec::new();
@@ -71,12 +76,21 @@ fn check(gpu: &Gpu, images: &[DepthImage], volume: &Aabb) -> Result<(), Reconstr
             return Err(wrong("an image of one row or column has no surface between samples".to_owned()));
         }
     }
-    let words: usize = images.iter().map(|i| Pyramid::word_count(i.size_px().to_array().map(|side| side.next_power_of_two().ilog2()))).sum();
+    let words: usize = images
+        .iter()
+        .map(|i| Pyramid::word_count(i.size_px().to_array().map(|side| side.next_power_of_two().ilog2())))
+        .sum();
     gpu.check_storage_bytes("the sample set's pyramids (bytes)", words as u64 * 8)?;
     Ok(())
 }
 
-fn sample_camera(camera: &PinholeCamera, depth: &CodedDepth, pyramid: &Pyramid, first_word: u32, first_texel: u32) -> GpuSampleCamera {
+fn sample_camera(
+    camera: &PinholeCamera,
+    depth: &CodedDepth,
+    pyramid: &Pyramid,
+    first_word: u32,
+    first_texel: u32,
+) -> GpuSampleCamera {
     GpuSampleCamera {
         homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world().map(|row| row.to_array()),
         eye_in_world: camera.eye_in_world.to_array(),
@@ -97,7 +111,8 @@ fn sample_camera(camera: &PinholeCamera, depth: &CodedDepth, pyramid: &Pyramid, 
 /// `f √(1 + slope²)` at the corner farthest off the axis: a point that moves by r moves in the image by
 /// at most this times r / depth.
 fn stretch(camera: &PinholeCamera) -> f32 {
-    let corners = [Vec2::ZERO, camera.size_px.as_vec2()].map(|corner| ((corner - camera.principal_px) / camera.focal_px).abs());
+    let corners =
+        [Vec2::ZERO, camera.size_px.as_vec2()].map(|corner| ((corner - camera.principal_px) / camera.focal_px).abs());
     let slope = corners[0].max(corners[1]);
     camera.focal_px.max_element() * (1.0 + slope.length_squared()).sqrt()
 }
@@ -106,5 +121,10 @@ fn gpu_volume(volume: &Aabb, background_linear: Vec3) -> GpuVolume {
     // A surface on the very face of the volume must still be entered.
     let padded = volume.padded(volume.size().max_element() * 1e-3);
     let [r, g, b] = background_linear.to_array().map(srgb8_from_linear);
-    GpuVolume { min_in_world: padded.min.to_array(), background_srgb8: u32::from_le_bytes([r, g, b, 255]), max_in_world: padded.max.to_array(), padding: 0 }
+    GpuVolume {
+        min_in_world: padded.min.to_array(),
+        background_srgb8: u32::from_le_bytes([r, g, b, 255]),
+        max_in_world: padded.max.to_array(),
+        padding: 0,
+    }
 }

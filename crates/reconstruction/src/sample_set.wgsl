@@ -1,6 +1,6 @@
 // What every search along view rays needs: sample cameras, their depth pyramids and colours, and views.
 //
-// Depth is kept as 16-bit codes, linear in inverse depth: code = 2 + (1/z - least) / step, so that along
+// Depth is kept as 15-bit codes, linear in inverse depth: code = 2 + (1/z - least) / step, so that along
 // a projected ray it is linear in screen space like everything else. 1 is background, farther than any
 // sample; 0 is a hole, which certifies nothing and blocks nothing.
 
@@ -81,7 +81,7 @@ fn homogeneous(rows: array<vec4f, 3>, v: vec4f) -> vec3f {
 }
 
 // Where level `level` of a pyramid begins, in words, and its index of a node. Level 0 has one word a
-// cell: the codes of its two upper corners. Higher levels: nearest code low, farthest high.
+// cell: the codes of its two upper corners, and in the highest bit whether its corners are one surface. Higher levels: nearest code low, farthest high.
 fn node_index(log2_sides: vec2u, level: u32, node: vec2u) -> u32 {
     let whole = 1u << (log2_sides.x + log2_sides.y);
     let begin = (whole - (whole >> (2u * level))) / 3u * 4u;

@@ -15,14 +15,12 @@ pub const SHADERS: &[(&str, &str)] = &[
 ];
 
 /// The surface's thickness, in texel footprints: the best of a sweep (docs/methods/joint_carve.md).
-pub(crate) const THICKNESS_FOOTPRINTS: f32 = 3.0;
-/// Corners of a cell farther apart than this are not connected.
-pub(crate) const CONNECTED_FOOTPRINTS: f32 = 6.0;
+pub(crate) const THICKNESS_FOOTPRINTS: f32 = 2.0;
 /// The coarsest level that a pixel's own search uses; its tile has done the rest.
 pub(crate) const START_LEVEL: u32 = 3;
 
 /// A shader and all that is written into it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct ShaderKey {
     /// Among [`SHADERS`].
     pub name: &'static str,
@@ -30,6 +28,8 @@ pub struct ShaderKey {
     pub cameras: usize,
     /// See [`crate::ReconstructionMethod::JointCarve`].
     pub stop_level: u32,
+    /// Which of a view's cameras, nearest first, is marched in; above 0 for every pass over a list of pixels.
+    pub march_camera: usize,
     /// Whether fetches are counted for each pixel.
     pub count_fetches: bool,
 }
@@ -46,11 +46,11 @@ pub fn shader_text(templates: &Templates, key: ShaderKey) -> Result<String, Temp
         context! {
             cameras => key.cameras,
             stop_level => key.stop_level,
+            march_camera => key.march_camera,
             start_level => START_LEVEL.max(key.stop_level),
             count_fetches => key.count_fetches,
             thickness_footprints => decimal(THICKNESS_FOOTPRINTS),
-            connected_footprints => decimal(CONNECTED_FOOTPRINTS),
-            angle_floor => "1e-4",
+            angle_floor => "1e-2",
             directions => DIRECTIONS,
         },
     )

@@ -14,6 +14,13 @@ struct Later { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
 var<private> fetches: u32 = 0u;
 {% endif %}
 
+{% if march_camera > 0 %}
+// What the pass before could not decide.
+struct Earlier { workgroups: u32, y: u32, z: u32, count: u32 }
+@group(0) @binding({{ 9 + count_fetches|int }}) var<storage, read> earlier_pixels: array<u32>;
+@group(0) @binding({{ 10 + count_fetches|int }}) var<storage, read> earlier: array<Earlier>;
+{% endif %}
+
 const LIST_WORKGROUP: u32 = 64u;
 
 // Leaves a pixel to the next pass.
@@ -27,19 +34,20 @@ const PROVENANCE_EMPTY: u32 = 0u;
 const PROVENANCE_HIT: u32 = 1u;
 const PROVENANCE_FILLED: u32 = 2u;
 
-// Corners of a cell farther apart than this many footprints are not one surface.
-const CONNECTED_FOOTPRINTS: f32 = {{ connected_footprints }};
-
 // Depth is known to half a code; a ray that reached a plane's very depth is still before it.
 const HALF_CODE: f32 = 0.5;
 
-// The codes of a cell's corners: upper left, upper right, lower left, lower right.
-fn corner_codes(word_index: u32, row_words: u32) -> vec4u {
+// A cell's corners: codes (upper left, upper right, lower left, lower right), and whether they are one
+// surface.
+struct Corners { codes: vec4f, connected: bool }
+
+fn corners_of(word_index: u32, row_words: u32) -> Corners {
 {% if count_fetches %}    fetches += 2u;
 {% endif %}
     let upper = pyramids[word_index];
     let lower = pyramids[word_index + row_words];
-    return vec4u(upper & 0xffffu, upper >> 16u, lower & 0xffffu, lower >> 16u);
+    let codes = vec4u(upper & 0x7fffu, (upper >> 16u) & 0x7fffu, lower & 0x7fffu, (lower >> 16u) & 0x7fffu);
+    return Corners(vec4f(codes), (upper >> 31u) != 0u);
 }
 
 fn bilinear(corners: vec4f, at: vec2f) -> f32 {
@@ -48,10 +56,10 @@ fn bilinear(corners: vec4f, at: vec2f) -> f32 {
     return upper + (lower - upper) * at.y;
 }
 
-fn nearest_corner(corners: vec4f, at: vec2f) -> f32 {
-    let upper = select(corners.x, corners.y, at.x > 0.5);
-    let lower = select(corners.z, corners.w, at.x > 0.5);
-    return select(upper, lower, at.y > 0.5);
+// A silhouette runs through a cell that is not connected: what is nearer counts until the cameras vote.
+fn surface_code(corners: Corners, at: vec2f) -> f32 {
+    let nearest = max(max(corners.codes.x, corners.codes.y), max(corners.codes.z, corners.codes.w));
+    return select(nearest, bilinear(corners.codes, at), corners.connected);
 }
 
 struct Pixel { index: u32, tile: u32, direction: vec3f }
@@ -79,11 +87,13 @@ fn color_texel(index: u32) -> vec3f {
     return linear_from_rgb9e5(colors_rgb9e5[index]);
 }
 
-// What a camera makes of a point: how much it counts, its colour, and whether it sees past the point.
-struct Sight { weight: f32, color_linear: vec3f, sees_past: bool }
+// What a camera makes of a point: how much its colour counts and where it is found, and the share of the
+// texels around that lie on the point's own surface or show what is beyond it.
+struct Sight { weight: f32, texel: u32, width: u32, shares: vec4f, same: f32, beyond: f32 }
 
 {% for k in range(cameras) %}
-fn sight_{{ k }}(p: vec3f, point_in_world: vec3f, view_direction: vec3f, slack: f32) -> Sight {
+fn sight_{{ k }}(point_in_world: vec3f, view_direction: vec3f, slack: f32) -> Sight {
+    let p = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
     let cells = work.cameras[{{ k }}].cells;
     let inverse_w = 1.0 / p.z;
     let uv = p.xy * inverse_w - 0.5;
@@ -92,19 +102,16 @@ fn sight_{{ k }}(p: vec3f, point_in_world: vec3f, view_direction: vec3f, slack: 
     let cell = vec2u(clamped);
     let at = clamped - floor(clamped);
     let row_words = 1u << work.cameras[{{ k }}].log2_sides.x;
-    let corners = vec4f(corner_codes(work.cameras[{{ k }}].first_word + cell.y * row_words + cell.x, row_words));
+    let corners = corners_of(work.cameras[{{ k }}].first_word + cell.y * row_words + cell.x, row_words);
     let code_above = work.cameras[{{ k }}].code_scale * inverse_w;
     let code = code_above + work.cameras[{{ k }}].code_offset;
     let reach = slack * code_above / work.cameras[{{ k }}].focal_px;
-    let gaps = code - corners;
-    // Of the four texels around, those on the point's own surface.
+    // Of a connected cell, the surface itself counts; else each sample for itself.
+    let gaps = code - select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
     let share = vec4f((1.0 - at.x) * (1.0 - at.y), at.x * (1.0 - at.y), (1.0 - at.x) * at.y, at.x * at.y);
-    let same = select(vec4f(0.0), share, (abs(gaps) < vec4f(reach)) & (corners > vec4f(1.5)));
-    let total = dot(same, vec4f(1.0));
-    let width = work.cameras[{{ k }}].width_px;
-    let texel = work.cameras[{{ k }}].first_texel + cell.y * width + cell.x;
-    let color = same.x * color_texel(texel) + same.y * color_texel(texel + 1u)
-        + same.z * color_texel(texel + width) + same.w * color_texel(texel + width + 1u);
+    let shares = select(vec4f(0.0), share, (abs(gaps) < vec4f(reach)) & (corners.codes > vec4f(1.5)));
+    let same = dot(shares, vec4f(1.0));
+    let beyond = dot(select(vec4f(0.0), share, (gaps > vec4f(reach)) & (corners.codes > vec4f(0.5))), vec4f(1.0));
     // Angle between the two lines of sight, footprint and distance to the border.
     let sight = point_in_world - work.cameras[{{ k }}].eye_in_world;
     let inverse_distance = inverseSqrt(dot(sight, sight));
@@ -112,32 +119,61 @@ fn sight_{{ k }}(p: vec3f, point_in_world: vec3f, view_direction: vec3f, slack: 
     let border = min(min(min(uv.x, cells.x - uv.x), min(uv.y, cells.y - uv.y)) * 0.125, 1.0) + 1e-3;
     let footprint = work.cameras[{{ k }}].focal_px * inverse_distance;
     let weight = border * footprint * footprint / (dot(off, off) + {{ angle_floor }});
-    let seen = inside && total > 0.05;
-    // Only the same share of each colour was added: the weight carries the rest of the division.
-    let past = inside && all(gaps > vec4f(reach)) && all(corners > vec4f(0.5));
-    return Sight(select(0.0, weight, seen), color / max(total, 0.05), past);
+    let width = work.cameras[{{ k }}].width_px;
+    let texel = work.cameras[{{ k }}].first_texel + cell.y * width + cell.x;
+    return Sight(select(0.0, weight, inside && same > 0.05), texel, width, shares, select(0.0, same, inside), select(0.0, beyond, inside));
 }
 {% endfor %}
 
-struct Blend { color_linear: vec3f, camera_mask: u32, seen_past: bool }
+// `occupied`: whether the cameras together hold that there is a surface. A silhouette lies somewhere within
+// a texel; the mean of what all cameras show around a point tells better where than any one does.
+struct Blend { color_linear: vec3f, camera_mask: u32, occupied: bool }
 
-// The mean of all cameras that see the point, whatever their order.
+fn color_of(sight: Sight) -> vec3f {
+    let color = sight.shares.x * color_texel(sight.texel) + sight.shares.y * color_texel(sight.texel + 1u)
+        + sight.shares.z * color_texel(sight.texel + sight.width) + sight.shares.w * color_texel(sight.texel + sight.width + 1u);
+    return color / max(sight.same, 0.05);
+}
+
+// The two cameras that know a point best, each weighted by how far it surpasses the third, so that no seam
+// shows where cameras change places (Buehler et al. 2001, with k = 2). The order of cameras is no matter.
 fn blended(point_in_world: vec3f, direction: vec3f, slack: f32) -> Blend {
     let view_direction = normalize(direction);
-    let point = vec4f(point_in_world, 1.0);
-    var sum = vec3f(0.0);
-    var weights = 0.0;
-    var mask = 0u;
-    var past = false;
-{% for k in range(cameras) %}
-    let p{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, point);
-    let sight{{ k }} = sight_{{ k }}(p{{ k }}, point_in_world, view_direction, slack);
-    sum += sight{{ k }}.color_linear * sight{{ k }}.weight;
-    weights += sight{{ k }}.weight;
-    mask |= select(0u, work.cameras[{{ k }}].mask, sight{{ k }}.weight > 0.0);
-    past = past || sight{{ k }}.sees_past;
+    var first = sight_0(point_in_world, view_direction, slack);
+    var first_mask = work.cameras[0].mask;
+    var same = first.same;
+    var beyond = first.beyond;
+    var carved = first.beyond > 0.999;
+    var second = Sight(0.0, 0u, 0u, vec4f(0.0), 0.0, 0.0);
+    var second_mask = 0u;
+    var third_weight = 0.0;
+{% for k in range(1, cameras) %}
+    {
+        let sight = sight_{{ k }}(point_in_world, view_direction, slack);
+        let mask = work.cameras[{{ k }}].mask;
+        same += sight.same;
+        beyond += sight.beyond;
+        carved = carved || sight.beyond > 0.999;
+        let best = sight.weight > first.weight;
+        let better = sight.weight > second.weight;
+        third_weight = max(third_weight, min(sight.weight, second.weight));
+        second = pick_sight(pick_sight(second, sight, better), first, best);
+        second_mask = select(select(second_mask, mask, better), first_mask, best);
+        first = pick_sight(first, sight, best);
+        first_mask = select(first_mask, mask, best);
+    }
 {% endfor %}
-    return Blend(sum / max(weights, 1e-30), mask, past);
+    let weights = max(vec2f(first.weight, second.weight) - third_weight, vec2f(0.0)) + vec2f(1e-9, 0.0);
+    let color = (color_of(first) * weights.x + color_of(second) * weights.y) / (weights.x + weights.y);
+    let mask = select(0u, first_mask, first.weight > 0.0) | select(0u, second_mask, second.weight > third_weight);
+    return Blend(color, mask, same >= beyond && mask != 0u && !carved);
+}
+
+fn pick_sight(a: Sight, b: Sight, second: bool) -> Sight {
+    return Sight(
+        select(a.weight, b.weight, second), select(a.texel, b.texel, second), select(a.width, b.width, second),
+        select(a.shares, b.shares, second), select(a.same, b.same, second), 0.0,
+    );
 }
 
 fn srgb8_from_linear(linear: vec3f) -> u32 {

@@ -27,7 +27,12 @@ pub(crate) fn clustered(mesh: &Mesh) -> (Vec<u32>, Vec<Cluster>) {
             let first_triangle = (indices.len() / 3) as u32;
             indices.extend(chunk.iter().flatten());
             let corners = chunk.iter().flatten().map(|&i| mesh.vertices[i as usize].position.into());
-            clusters.push(Cluster { first_triangle, triangle_count: chunk.len() as u32, material: part.material, bounds_in_mesh: Aabb::around(corners) });
+            clusters.push(Cluster {
+                first_triangle,
+                triangle_count: chunk.len() as u32,
+                material: part.material,
+                bounds_in_mesh: Aabb::around(corners),
+            });
         }
     }
     (indices, clusters)

@@ -104,8 +104,16 @@ impl GpuScene {
             vertices: gpu.buffer_with("vertices", &geometry.vertices, BufferUsages::VERTEX),
             indices: gpu.buffer_with("indices", &geometry.indices, BufferUsages::INDEX),
             records: gpu.buffer_with("draw records", &geometry.records, storage),
-            instances: gpu.buffer_with("instances", &scene.instances.iter().map(|i| gpu_instance(&i.world_from_mesh)).collect::<Vec<_>>(), storage),
-            materials: gpu.buffer_with("materials", &scene.materials.iter().map(gpu_material).collect::<Vec<_>>(), storage),
+            instances: gpu.buffer_with(
+                "instances",
+                &scene.instances.iter().map(|i| gpu_instance(&i.world_from_mesh)).collect::<Vec<_>>(),
+                storage,
+            ),
+            materials: gpu.buffer_with(
+                "materials",
+                &scene.materials.iter().map(gpu_material).collect::<Vec<_>>(),
+                storage,
+            ),
             lights: gpu.buffer_with("lights", &scene.lights.iter().map(gpu_light).collect::<Vec<_>>(), storage),
             surroundings: gpu.buffer_with("surroundings", &[surroundings(scene)], BufferUsages::UNIFORM),
             textures: std::iter::once(&white).chain(&scene.textures).map(|t| texture::upload(gpu, t)).collect(),
@@ -143,11 +151,18 @@ fn check_sizes(gpu: &Gpu, scene: &Scene) -> Result<(), GpuError> {
     if needed > limit {
         return Err(GpuError::Limit { what: "the scene's vertices (bytes)".to_owned(), needed, limit });
     }
-    gpu.check_storage_bytes("the scene's instances (bytes)", (scene.instances.len() * size_of::<GpuInstance>()) as u64)?;
+    gpu.check_storage_bytes(
+        "the scene's instances (bytes)",
+        (scene.instances.len() * size_of::<GpuInstance>()) as u64,
+    )?;
     let side = u64::from(gpu.device.limits().max_texture_dimension_2d);
     let largest = scene.textures.iter().map(|t| u64::from(t.width_px.max(t.height_px))).max().unwrap_or(0);
     if largest > side {
-        return Err(GpuError::Limit { what: "the scene's largest texture (side in pixels)".to_owned(), needed: largest, limit: side });
+        return Err(GpuError::Limit {
+            what: "the scene's largest texture (side in pixels)".to_owned(),
+            needed: largest,
+            limit: side,
+        });
     }
     Ok(())
 }
@@ -167,7 +182,10 @@ impl Geometry {
             let (indices, clusters) = cluster::clustered(mesh);
             let placements = scene.instances.iter().enumerate().filter(|(_, i)| i.mesh as usize == mesh_number);
             for (number, instance) in placements {
-                let draws: Vec<Draw> = clusters.iter().map(|c| geometry.draw(scene, c, number as u32, &instance.world_from_mesh)).collect();
+                let draws: Vec<Draw> = clusters
+                    .iter()
+                    .map(|c| geometry.draw(scene, c, number as u32, &instance.world_from_mesh))
+                    .collect();
                 geometry.draws.extend(draws);
             }
             geometry.vertices.extend(&mesh.vertices);
@@ -198,12 +216,18 @@ impl Geometry {
 
 impl Draw {
     fn record(&self) -> DrawRecord {
-        DrawRecord { instance: self.mesh_instance, first_primitive: self.first_index / 3, material: self.material, padding: 0 }
+        DrawRecord {
+            instance: self.mesh_instance,
+            first_primitive: self.first_index / 3,
+            material: self.material,
+            padding: 0,
+        }
     }
 
     /// Whether `next` can be drawn in one call with this one.
     pub(crate) fn joins(&self, end_index: u32, next: &Self) -> bool {
-        (end_index, self.base_vertex, self.mesh_instance, self.material) == (next.first_index, next.base_vertex, next.mesh_instance, next.material)
+        (end_index, self.base_vertex, self.mesh_instance, self.material)
+            == (next.first_index, next.base_vertex, next.mesh_instance, next.material)
     }
 }
 
@@ -214,7 +238,10 @@ fn rows(matrix: Mat3, translation: Vec3) -> [[f32; 4]; 3] {
 fn gpu_instance(world_from_mesh: &Affine3A) -> GpuInstance {
     let linear = Mat3::from(world_from_mesh.matrix3);
     let normals = linear.inverse().transpose();
-    GpuInstance { world_from_mesh: rows(linear, world_from_mesh.translation.into()), normal_from_mesh: rows(normals, Vec3::ZERO) }
+    GpuInstance {
+        world_from_mesh: rows(linear, world_from_mesh.translation.into()),
+        normal_from_mesh: rows(normals, Vec3::ZERO),
+    }
 }
 
 fn gpu_material(material: &Material) -> GpuMaterial {
@@ -232,10 +259,15 @@ fn gpu_material(material: &Material) -> GpuMaterial {
 
 fn gpu_light(light: &Light) -> GpuLight {
     let (towards_or_position, intensity) = match *light {
-        Light::Directional { towards_light_in_world, irradiance_linear } => (towards_light_in_world.extend(0.0), irradiance_linear),
+        Light::Directional { towards_light_in_world, irradiance_linear } => {
+            (towards_light_in_world.extend(0.0), irradiance_linear)
+        }
         Light::Point { position_in_world, intensity_linear } => (position_in_world.extend(1.0), intensity_linear),
     };
-    GpuLight { towards_or_position: towards_or_position.to_array(), intensity_linear: Vec4::from((intensity, 0.0)).to_array() }
+    GpuLight {
+        towards_or_position: towards_or_position.to_array(),
+        intensity_linear: Vec4::from((intensity, 0.0)).to_array(),
+    }
 }
 
 fn surroundings(scene: &Scene) -> GpuSurroundings {

@@ -6,7 +6,9 @@ use std::{
 };
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Camera, DepthImage, PinholeCamera, Provenance, ProvenanceKind, SurfaceId, View, ViewPlanes, rgb9e5_from_linear};
+use depth_image::{
+    Camera, DepthImage, PinholeCamera, Provenance, ProvenanceKind, SurfaceId, View, ViewPlanes, rgb9e5_from_linear,
+};
 use glam::{Mat4, Vec4};
 use gpu::{BufferPool, Frame, FrameResult, Gpu, Templates};
 use minijinja::context;
@@ -106,7 +108,12 @@ impl Rasterizer {
     ///
     /// # Errors
     /// A camera that is not valid (all are checked first), or the device.
-    pub fn draw_views(&self, work: DrawWork<'_>, cameras: &[PinholeCamera], planes: ViewPlanes) -> Result<Vec<View>, RenderError> {
+    pub fn draw_views(
+        &self,
+        work: DrawWork<'_>,
+        cameras: &[PinholeCamera],
+        planes: ViewPlanes,
+    ) -> Result<Vec<View>, RenderError> {
         self.check(cameras.iter())?;
         let mut views = Vec::with_capacity(cameras.len());
         for batch in cameras.chunks(CAMERAS_A_SUBMISSION) {
@@ -124,7 +131,12 @@ impl Rasterizer {
     ///
     /// # Errors
     /// A camera that is not valid, or the device (surface ids need its primitive index).
-    pub fn draw_depth_images(&self, work: DrawWork<'_>, cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, RenderError> {
+    pub fn draw_depth_images(
+        &self,
+        work: DrawWork<'_>,
+        cameras: &[Camera],
+        planes: SamplePlanes,
+    ) -> Result<Vec<DepthImage>, RenderError> {
         let pinholes: Vec<PinholeCamera> = cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
         self.check(pinholes.iter())?;
         let mut formats = vec![TextureFormat::R32Uint];
@@ -154,7 +166,14 @@ impl Rasterizer {
 
     /// One submission: every camera into the same targets, one after another. Planes come in the order
     /// of `formats`, then depth.
-    fn draw(&self, work: DrawWork<'_>, cameras: &[PinholeCamera], output: Output, formats: &[TextureFormat], copy_depth: bool) -> Result<(FrameResult, Vec<Vec<HostPlane>>), RenderError> {
+    fn draw(
+        &self,
+        work: DrawWork<'_>,
+        cameras: &[PinholeCamera],
+        output: Output,
+        formats: &[TextureFormat],
+        copy_depth: bool,
+    ) -> Result<(FrameResult, Vec<Vec<HostPlane>>), RenderError> {
         let scene_group = self.bind_scene(work, cameras);
         let texture_groups: Vec<_> = work.scene.textures.iter().map(|view| self.bind_texture(view)).collect();
         let mut frame = Frame::begin(&self.gpu, "raster");
@@ -162,7 +181,11 @@ impl Rasterizer {
         let mut targets: Vec<Target> = Vec::new();
         for (index, camera) in cameras.iter().enumerate() {
             if index == 0 || cameras[index - 1].size_px != camera.size_px {
-                targets = formats.iter().chain([&DEPTH_FORMAT]).map(|&format| Target::new(&self.gpu, camera.size_px, format)).collect();
+                targets = formats
+                    .iter()
+                    .chain([&DEPTH_FORMAT])
+                    .map(|&format| Target::new(&self.gpu, camera.size_px, format))
+                    .collect();
             }
             self.record(&mut frame, work, camera, output, &targets, &scene_group, index as u32, &texture_groups)?;
             let copied = if copy_depth { &targets[..] } else { &targets[..formats.len()] };
@@ -172,12 +195,23 @@ impl Rasterizer {
     }
 
     #[expect(clippy::too_many_arguments, reason = "a pass takes its inputs one by one")]
-    fn record(&self, frame: &mut Frame<'_>, work: DrawWork<'_>, camera: &PinholeCamera, output: Output, targets: &[Target], scene_group: &wgpu::BindGroup, number: u32, textures: &[wgpu::BindGroup]) -> Result<(), RenderError> {
+    fn record(
+        &self,
+        frame: &mut Frame<'_>,
+        work: DrawWork<'_>,
+        camera: &PinholeCamera,
+        output: Output,
+        targets: &[Target],
+        scene_group: &wgpu::BindGroup,
+        number: u32,
+        textures: &[wgpu::BindGroup],
+    ) -> Result<(), RenderError> {
         let scene = work.scene;
         let pipelines = [self.pipeline(work, output, false)?, self.pipeline(work, output, true)?];
         let (depth, colors) = targets.split_last().expect("depth is always there");
         let clear = clear_colors(scene, output);
-        let attachments: Vec<_> = colors.iter().zip(clear).map(|(target, color)| Some(attachment(target, color))).collect();
+        let attachments: Vec<_> =
+            colors.iter().zip(clear).map(|(target, color)| Some(attachment(target, color))).collect();
         let mut pass = frame.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("raster"),
             color_attachments: &attachments,
@@ -212,11 +246,23 @@ impl Rasterizer {
         }
         let uniform = self.gpu.buffer_with("raster cameras", &bytes, wgpu::BufferUsages::UNIFORM);
         let scene = work.scene;
-        let camera = wgpu::BufferBinding { buffer: &uniform, offset: 0, size: std::num::NonZeroU64::new(size_of::<RasterCamera>() as u64) };
+        let camera = wgpu::BufferBinding {
+            buffer: &uniform,
+            offset: 0,
+            size: std::num::NonZeroU64::new(size_of::<RasterCamera>() as u64),
+        };
         let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(camera) }];
         let buffers = [&scene.surroundings, &scene.records, &scene.instances, &scene.materials, &scene.lights];
-        entries.extend((1..).zip(buffers).map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }));
-        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("scene"), layout: &self.scene_layout, entries: &entries })
+        entries.extend(
+            (1..)
+                .zip(buffers)
+                .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }),
+        );
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("scene"),
+            layout: &self.scene_layout,
+            entries: &entries,
+        })
     }
 
     fn bind_texture(&self, view: &wgpu::TextureView) -> wgpu::BindGroup {
@@ -224,10 +270,19 @@ impl Rasterizer {
             wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) },
             wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(&self.sampler) },
         ];
-        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("texture"), layout: &self.texture_layout, entries: &entries })
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("texture"),
+            layout: &self.texture_layout,
+            entries: &entries,
+        })
     }
 
-    fn pipeline(&self, work: DrawWork<'_>, output: Output, double_sided: bool) -> Result<Arc<wgpu::RenderPipeline>, RenderError> {
+    fn pipeline(
+        &self,
+        work: DrawWork<'_>,
+        output: Output,
+        double_sided: bool,
+    ) -> Result<Arc<wgpu::RenderPipeline>, RenderError> {
         let key = PipelineKey { output, lighting: work.lighting, wind: work.scene.is_animated(), double_sided };
         let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pipeline) = pipelines.get(&key) {
@@ -241,13 +296,25 @@ impl Rasterizer {
     fn build(&self, key: PipelineKey) -> Result<wgpu::RenderPipeline, RenderError> {
         let module = self.gpu.shader("raster", &self.templates.render("raster.wgsl", shader_context(key))?);
         let layouts = [Some(&self.scene_layout), Some(&self.texture_layout)];
-        let layout = self.gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label: Some("raster"), bind_group_layouts: &layouts, immediate_size: 0 });
+        let layout = self.gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("raster"),
+            bind_group_layouts: &layouts,
+            immediate_size: 0,
+        });
         let targets: Vec<_> = color_formats(key.output).into_iter().map(|format| Some(format.into())).collect();
         Ok(self.gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("raster"),
             layout: Some(&layout),
-            vertex: wgpu::VertexState { module: &module, entry_point: Some("vertex"), compilation_options: Default::default(), buffers: &[Some(vertex_layout())] },
-            primitive: wgpu::PrimitiveState { cull_mode: (!key.double_sided).then_some(wgpu::Face::Back), ..Default::default() },
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("vertex"),
+                compilation_options: Default::default(),
+                buffers: &[Some(vertex_layout())],
+            },
+            primitive: wgpu::PrimitiveState {
+                cull_mode: (!key.double_sided).then_some(wgpu::Face::Back),
+                ..Default::default()
+            },
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH_FORMAT,
                 depth_write_enabled: Some(true),
@@ -256,7 +323,12 @@ impl Rasterizer {
                 bias: Default::default(),
             }),
             multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState { module: &module, entry_point: Some("fragment"), compilation_options: Default::default(), targets: &targets }),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("fragment"),
+                compilation_options: Default::default(),
+                targets: &targets,
+            }),
             multiview_mask: None,
             cache: None,
         }))
@@ -275,8 +347,14 @@ fn visible_runs(scene: &GpuScene, frustum: &Frustum) -> Vec<Run> {
     let visible = scene.draws.iter().enumerate().filter(|(_, draw)| frustum.may_see(&draw.bounds_in_world));
     for (record, draw) in visible {
         match runs.last_mut() {
-            Some(run) if scene.draws[run.record as usize].joins(run.end_index, draw) => run.end_index += draw.index_count,
-            _ => runs.push(Run { record: record as u32, first_index: draw.first_index, end_index: draw.first_index + draw.index_count }),
+            Some(run) if scene.draws[run.record as usize].joins(run.end_index, draw) => {
+                run.end_index += draw.index_count
+            }
+            _ => runs.push(Run {
+                record: record as u32,
+                first_index: draw.first_index,
+                end_index: draw.first_index + draw.index_count,
+            }),
         }
     }
     runs
@@ -294,7 +372,8 @@ fn color_formats(output: Output) -> Vec<TextureFormat> {
     match output {
         Output::View => vec![TextureFormat::Rgba8UnormSrgb],
         Output::Samples(planes) => {
-            let optional = [planes.normal.then_some(TextureFormat::R32Uint), planes.surface_id.then_some(TextureFormat::Rg32Uint)];
+            let optional =
+                [planes.normal.then_some(TextureFormat::R32Uint), planes.surface_id.then_some(TextureFormat::Rg32Uint)];
             std::iter::once(TextureFormat::R32Uint).chain(optional.into_iter().flatten()).collect()
         }
     }
@@ -313,8 +392,13 @@ fn shader_context(key: PipelineKey) -> minijinja::Value {
 }
 
 fn vertex_layout() -> wgpu::VertexBufferLayout<'static> {
-    const ATTRIBUTES: [wgpu::VertexAttribute; 5] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2, 3 => Unorm8x4, 4 => Float32];
-    wgpu::VertexBufferLayout { array_stride: size_of::<scene::Vertex>() as u64, step_mode: wgpu::VertexStepMode::Vertex, attributes: &ATTRIBUTES }
+    const ATTRIBUTES: [wgpu::VertexAttribute; 5] =
+        wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2, 3 => Unorm8x4, 4 => Float32];
+    wgpu::VertexBufferLayout {
+        array_stride: size_of::<scene::Vertex>() as u64,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &ATTRIBUTES,
+    }
 }
 
 fn attachment(target: &Target, clear: wgpu::Color) -> wgpu::RenderPassColorAttachment<'_> {
@@ -332,7 +416,9 @@ fn clear_colors(scene: &GpuScene, output: Output) -> impl Iterator<Item = wgpu::
     let background = scene.background_linear.as_dvec3();
     let first = match output {
         Output::View => wgpu::Color { r: background.x, g: background.y, b: background.z, a: 1.0 },
-        Output::Samples(_) => wgpu::Color { r: f64::from(rgb9e5_from_linear(scene.background_linear)), ..wgpu::Color::TRANSPARENT },
+        Output::Samples(_) => {
+            wgpu::Color { r: f64::from(rgb9e5_from_linear(scene.background_linear)), ..wgpu::Color::TRANSPARENT }
+        }
     };
     std::iter::once(first).chain(std::iter::repeat(wgpu::Color::TRANSPARENT))
 }
@@ -345,19 +431,30 @@ fn scene_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
         count: None,
     };
     let storage = wgpu::BufferBindingType::Storage { read_only: true };
-    let mut entries = vec![buffer(0, wgpu::BufferBindingType::Uniform, true), buffer(1, wgpu::BufferBindingType::Uniform, false)];
+    let mut entries =
+        vec![buffer(0, wgpu::BufferBindingType::Uniform, true), buffer(1, wgpu::BufferBindingType::Uniform, false)];
     entries.extend((2..6).map(|binding| buffer(binding, storage, false)));
     gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("scene"), entries: &entries })
 }
 
 fn texture_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None };
-    let texture = wgpu::BindingType::Texture { sample_type: wgpu::TextureSampleType::Float { filterable: true }, view_dimension: wgpu::TextureViewDimension::D2, multisampled: false };
+    let entry =
+        |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None };
+    let texture = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
     let entries = [entry(0, texture), entry(1, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering))];
     gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("texture"), entries: &entries })
 }
 
-fn view(camera: &PinholeCamera, result: &FrameResult, host: &[HostPlane], planes: ViewPlanes) -> Result<View, RenderError> {
+fn view(
+    camera: &PinholeCamera,
+    result: &FrameResult,
+    host: &[HostPlane],
+    planes: ViewPlanes,
+) -> Result<View, RenderError> {
     let scale = camera.near_m.recip();
     let inverse_depth = match host.get(1) {
         Some(depth) => Some(depth.collect(result, |depth: f32| depth * scale)?),
@@ -372,7 +469,12 @@ fn view(camera: &PinholeCamera, result: &FrameResult, host: &[HostPlane], planes
     })
 }
 
-fn depth_image(camera: &PinholeCamera, result: &FrameResult, host: &[HostPlane], planes: SamplePlanes) -> Result<DepthImage, RenderError> {
+fn depth_image(
+    camera: &PinholeCamera,
+    result: &FrameResult,
+    host: &[HostPlane],
+    planes: SamplePlanes,
+) -> Result<DepthImage, RenderError> {
     let scale = camera.near_m.recip();
     let (depth, colors) = host.split_last().expect("depth is always copied");
     let id_plane = 1 + usize::from(planes.normal);

@@ -30,9 +30,15 @@ pub fn nearest(scene: &Scene, ray: &Ray, near: f32) -> Option<Nearest> {
                 let normals = glam::Mat3::from(instance.world_from_mesh.matrix3).inverse().transpose();
                 let normal = normals * blend(corners, barycentric, |v| v.normal.into());
                 let facing = if front { 1.0 } else { -1.0 };
-                let vertex_color = blend(corners, barycentric, |v| Vec3::from_array([0, 1, 2].map(|i| depth_image::linear_from_srgb8(v.color_srgba8[i]))));
+                let vertex_color = blend(corners, barycentric, |v| {
+                    Vec3::from_array([0, 1, 2].map(|i| depth_image::linear_from_srgb8(v.color_srgba8[i])))
+                });
                 let base = Vec3::from_slice(&material.base_color_linear[..3]) * vertex_color;
-                (t > near).then(|| Nearest { t, base_color_linear: base, normal_in_world: normal.normalize_or_zero() * facing })
+                (t > near).then(|| Nearest {
+                    t,
+                    base_color_linear: base,
+                    normal_in_world: normal.normalize_or_zero() * facing,
+                })
             })
         })
     });
@@ -62,6 +68,7 @@ fn intersect(ray: &Ray, [a, b, c]: [Vec3; 3], double_sided: bool) -> Option<(f32
 /// Inverse depths of a whole image, 0 where nothing is met.
 #[must_use]
 pub fn inverse_depth_per_m(scene: &Scene, camera: &PinholeCamera) -> Vec<f32> {
-    let pixels = (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| Vec2::new(x as f32, y as f32) + 0.5));
+    let pixels =
+        (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| Vec2::new(x as f32, y as f32) + 0.5));
     pixels.map(|pixel| nearest(scene, &camera.ray(pixel), camera.near_m).map_or(0.0, |hit| hit.t.recip())).collect()
 }

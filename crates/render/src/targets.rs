@@ -52,8 +52,15 @@ impl Target {
 
 impl HostPlane {
     /// The plane without row padding, each element made by `convert` from an element of the target.
-    pub fn collect<T: bytemuck::AnyBitPattern, U>(&self, result: &FrameResult, convert: impl Fn(T) -> U) -> Result<Vec<U>, GpuError> {
-        let (row, padded) = (self.size_px.x as usize, (padded_row_bytes(self.size_px.x, self.bytes_a_texel) / self.bytes_a_texel) as usize);
+    pub fn collect<T: bytemuck::AnyBitPattern, U>(
+        &self,
+        result: &FrameResult,
+        convert: impl Fn(T) -> U,
+    ) -> Result<Vec<U>, GpuError> {
+        let (row, padded) = (
+            self.size_px.x as usize,
+            (padded_row_bytes(self.size_px.x, self.bytes_a_texel) / self.bytes_a_texel) as usize,
+        );
         result.with(self.readback, |texels: &[T]| {
             let rows = texels.chunks(padded).take(self.size_px.y as usize);
             rows.flat_map(|texels| texels[..row].iter().copied().map(&convert)).collect()

@@ -32,8 +32,14 @@ pub(crate) fn upload(gpu: &Gpu, texture: &Texture) -> wgpu::TextureView {
 }
 
 fn write_level(gpu: &Gpu, texture: &wgpu::Texture, mip_level: u32, level: &Texture) {
-    let destination = wgpu::TexelCopyTextureInfo { texture, mip_level, origin: wgpu::Origin3d::ZERO, aspect: wgpu::TextureAspect::All };
-    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(level.width_px * 4), rows_per_image: None };
+    let destination = wgpu::TexelCopyTextureInfo {
+        texture,
+        mip_level,
+        origin: wgpu::Origin3d::ZERO,
+        aspect: wgpu::TextureAspect::All,
+    };
+    let layout =
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(level.width_px * 4), rows_per_image: None };
     let size = wgpu::Extent3d { width: level.width_px, height: level.height_px, depth_or_array_layers: 1 };
     gpu.queue.write_texture(destination, &level.srgba8, layout, size);
 }

@@ -60,8 +60,8 @@ impl Rig {
         let radius_m = volume.size().length() * 0.5;
         // The whole sphere fits at the corner cameras too, which are a little farther away.
         let distance_m = radius_m / (FOV_Y_RAD * 0.5).sin();
-        let backwards = Vec3::new(0.35, 0.3, 1.0).normalize();
-        let right = Vec3::Y.cross(backwards).normalize();
+        let backwards = Vec3::new(0.35, 0.3, 1.0).normalize_or(Vec3::Z);
+        let right = Vec3::Y.cross(backwards).normalize_or(Vec3::X);
         let half = distance_m * spread_rad.tan();
         Ok(Self {
             center_in_world: volume.center() + backwards * distance_m,
@@ -77,7 +77,10 @@ impl Rig {
     pub fn camera_at(&self, place: Vec2, size_px: UVec2) -> PinholeCamera {
         let eye = self.center_in_world + self.half_edges_in_world[0] * place.x + self.half_edges_in_world[1] * place.y;
         let up = self.half_edges_in_world[1];
-        PinholeCamera { near_m: self.near_m, ..PinholeCamera::looking_at(eye, self.target_in_world, up, self.fov_y_rad, size_px) }
+        PinholeCamera {
+            near_m: self.near_m,
+            ..PinholeCamera::looking_at(eye, self.target_in_world, up, self.fov_y_rad, size_px)
+        }
     }
 
     /// The four sample cameras.
@@ -138,7 +141,8 @@ mod tests {
     #[test]
     fn views_stay_in_the_cell() {
         let rig = Rig::two_plane(&BLOCK, 3.0).expect("a block");
-        let views = [rig.views(290, UVec2::new(200, 150)), rig.grid(5, 4, UVec2::ONE), rig.orbit(24, UVec2::ONE)].concat();
+        let views =
+            [rig.views(290, UVec2::new(200, 150)), rig.grid(5, 4, UVec2::ONE), rig.orbit(24, UVec2::ONE)].concat();
         assert_eq!(views.len(), 290 + 20 + 24);
         assert!(views.iter().all(|v| v.eye_in_world.xz().abs().max_element() <= 1.0 + 1e-6));
     }
