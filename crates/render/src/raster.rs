@@ -17,14 +17,13 @@ use wgpu::TextureFormat;
 use crate::{
     GpuScene, Lighting, RenderError,
     cluster::Frustum,
+    gpu_scene::{GpuObject, Traits, UNIFORM_STRIDE},
     targets::{HostPlane, Target},
 };
 
 /// Views or samples in one submission; bounds the memory for read-back.
 const CAMERAS_A_SUBMISSION: usize = 32;
 const DEPTH_FORMAT: TextureFormat = TextureFormat::Depth32Float;
-/// Uniform offsets must be multiples of this on every device.
-const CAMERA_STRIDE: u64 = 256;
 
 /// What to draw besides the cameras.
 #[derive(Clone, Copy)]
@@ -57,15 +56,23 @@ struct PipelineKey {
     output: Output,
     lighting: Lighting,
     wind: bool,
-    double_sided: bool,
+    lights: usize,
+    traits: Traits,
 }
 
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct RasterCamera {
-    clip_from_world: [[f32; 4]; 4],
-    eye_in_world: [f32; 3],
-    scene_time_s: f32,
+pub(crate) struct RasterCamera {
+    pub clip_from_world: [[f32; 4]; 4],
+    pub eye_in_world: [f32; 3],
+    pub scene_time_s: f32,
+}
+
+/// What all draws of a submission are bound to.
+struct Groups {
+    scene: wgpu::BindGroup,
+    object: wgpu::BindGroup,
+    textures: Vec<wgpu::BindGroup>,
 }
 
 /// Pipelines for every combination that has been asked for.
@@ -74,6 +81,7 @@ pub struct Rasterizer {
     pool: BufferPool,
     templates: Templates,
     scene_layout: wgpu::BindGroupLayout,
+    object_layout: wgpu::BindGroupLayout,
     texture_layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
     pipelines: Mutex<HashMap<PipelineKey, Arc<wgpu::RenderPipeline>>>,
@@ -89,7 +97,8 @@ impl Rasterizer {
             gpu: gpu.clone(),
             pool: BufferPool::new(gpu),
             templates: Templates::new(crate::SHADERS)?,
-            scene_layout: scene_layout(gpu),
+            scene_layout: uniform_layout(gpu, "scene", &[true, false]),
+            object_layout: uniform_layout(gpu, "object", &[true]),
             texture_layout: texture_layout(gpu),
             sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 address_mode_u: wgpu::AddressMode::Repeat,
@@ -174,8 +183,11 @@ impl Rasterizer {
         formats: &[TextureFormat],
         copy_depth: bool,
     ) -> Result<(FrameResult, Vec<Vec<HostPlane>>), RenderError> {
-        let scene_group = self.bind_scene(work, cameras);
-        let texture_groups: Vec<_> = work.scene.textures.iter().map(|view| self.bind_texture(view)).collect();
+        let groups = Groups {
+            scene: self.bind_scene(work, cameras),
+            object: self.bind_object(work),
+            textures: work.scene.textures.iter().map(|view| self.bind_texture(view)).collect(),
+        };
         let mut frame = Frame::begin(&self.gpu, "raster");
         let mut host_planes = Vec::with_capacity(cameras.len());
         let mut targets: Vec<Target> = Vec::new();
@@ -187,27 +199,23 @@ impl Rasterizer {
                     .map(|&format| Target::new(&self.gpu, camera.size_px, format))
                     .collect();
             }
-            self.record(&mut frame, work, camera, output, &targets, &scene_group, index as u32, &texture_groups)?;
+            self.record(&mut frame, work, (index, camera), output, &targets, &groups)?;
             let copied = if copy_depth { &targets[..] } else { &targets[..formats.len()] };
             host_planes.push(copied.iter().map(|target| target.copy_out(&mut frame, &self.pool)).collect());
         }
         Ok((frame.submit().wait()?, host_planes))
     }
 
-    #[expect(clippy::too_many_arguments, reason = "a pass takes its inputs one by one")]
     fn record(
         &self,
         frame: &mut Frame<'_>,
         work: DrawWork<'_>,
-        camera: &PinholeCamera,
+        (number, camera): (usize, &PinholeCamera),
         output: Output,
         targets: &[Target],
-        scene_group: &wgpu::BindGroup,
-        number: u32,
-        textures: &[wgpu::BindGroup],
+        groups: &Groups,
     ) -> Result<(), RenderError> {
         let scene = work.scene;
-        let pipelines = [self.pipeline(work, output, false)?, self.pipeline(work, output, true)?];
         let (depth, colors) = targets.split_last().expect("depth is always there");
         let clear = clear_colors(scene, output);
         let attachments: Vec<_> =
@@ -220,23 +228,36 @@ impl Rasterizer {
         });
         pass.set_vertex_buffer(0, scene.vertices.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.set_bind_group(0, scene_group, &[number * CAMERA_STRIDE as u32]);
-        let mut state = None;
+        pass.set_bind_group(0, &groups.scene, &[number as u32 * UNIFORM_STRIDE as u32]);
+        let (mut traits, mut texture, mut object) = (None, None, None);
         for run in visible_runs(scene, &Frustum::of(camera)) {
-            let draw = &scene.draws[run.record as usize];
-            if state != Some((draw.double_sided, draw.texture)) {
-                pass.set_pipeline(&pipelines[usize::from(draw.double_sided)]);
-                pass.set_bind_group(1, &textures[draw.texture as usize], &[]);
-                state = Some((draw.double_sided, draw.texture));
+            let draw = &scene.draws[run.draw];
+            if traits.replace(draw.traits) != Some(draw.traits) {
+                pass.set_pipeline(&*self.pipeline(work, output, draw.traits)?);
             }
-            pass.draw_indexed(run.first_index..run.end_index, draw.base_vertex, run.record..run.record + 1);
+            if object.replace(draw.object) != Some(draw.object) {
+                pass.set_bind_group(1, &groups.object, &[draw.object * UNIFORM_STRIDE as u32]);
+            }
+            if texture.replace(draw.texture) != Some(draw.texture) {
+                pass.set_bind_group(2, &groups.textures[draw.texture as usize], &[]);
+            }
+            let first_primitive = run.first_index / 3;
+            pass.draw_indexed(run.first_index..run.end_index, draw.base_vertex, first_primitive..first_primitive + 1);
         }
         Ok(())
     }
 
+    fn bind_object(&self, work: DrawWork<'_>) -> wgpu::BindGroup {
+        let size = std::num::NonZeroU64::new(size_of::<GpuObject>() as u64);
+        let object = wgpu::BufferBinding { buffer: &work.scene.objects, offset: 0, size };
+        let entries = [wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(object) }];
+        let layout = &self.object_layout;
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("object"), layout, entries: &entries })
+    }
+
     fn bind_scene(&self, work: DrawWork<'_>, cameras: &[PinholeCamera]) -> wgpu::BindGroup {
-        let mut bytes = vec![0; cameras.len() * CAMERA_STRIDE as usize];
-        for (slot, camera) in bytes.chunks_mut(CAMERA_STRIDE as usize).zip(cameras) {
+        let mut bytes = vec![0; cameras.len() * UNIFORM_STRIDE as usize];
+        for (slot, camera) in bytes.chunks_mut(UNIFORM_STRIDE as usize).zip(cameras) {
             let raster_camera = RasterCamera {
                 clip_from_world: clip_from_world(camera).to_cols_array_2d(),
                 eye_in_world: camera.eye_in_world.to_array(),
@@ -251,13 +272,10 @@ impl Rasterizer {
             offset: 0,
             size: std::num::NonZeroU64::new(size_of::<RasterCamera>() as u64),
         };
-        let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(camera) }];
-        let buffers = [&scene.surroundings, &scene.records, &scene.instances, &scene.materials, &scene.lights];
-        entries.extend(
-            (1..)
-                .zip(buffers)
-                .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }),
-        );
+        let entries = [
+            wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(camera) },
+            wgpu::BindGroupEntry { binding: 1, resource: scene.surroundings.as_entire_binding() },
+        ];
         self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("scene"),
             layout: &self.scene_layout,
@@ -281,9 +299,9 @@ impl Rasterizer {
         &self,
         work: DrawWork<'_>,
         output: Output,
-        double_sided: bool,
+        traits: Traits,
     ) -> Result<Arc<wgpu::RenderPipeline>, RenderError> {
-        let key = PipelineKey { output, lighting: work.lighting, wind: work.scene.is_animated(), double_sided };
+        let key = PipelineKey { output, lighting: work.lighting, wind: work.scene.is_animated(), lights: work.scene.light_count, traits };
         let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pipeline) = pipelines.get(&key) {
             return Ok(pipeline.clone());
@@ -295,7 +313,7 @@ impl Rasterizer {
 
     fn build(&self, key: PipelineKey) -> Result<wgpu::RenderPipeline, RenderError> {
         let module = self.gpu.shader("raster", &self.templates.render("raster.wgsl", shader_context(key))?);
-        let layouts = [Some(&self.scene_layout), Some(&self.texture_layout)];
+        let layouts = [Some(&self.scene_layout), Some(&self.object_layout), Some(&self.texture_layout)];
         let layout = self.gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("raster"),
             bind_group_layouts: &layouts,
@@ -312,7 +330,7 @@ impl Rasterizer {
                 buffers: &[Some(vertex_layout())],
             },
             primitive: wgpu::PrimitiveState {
-                cull_mode: (!key.double_sided).then_some(wgpu::Face::Back),
+                cull_mode: (!key.traits.double_sided).then_some(wgpu::Face::Back),
                 ..Default::default()
             },
             depth_stencil: Some(wgpu::DepthStencilState {
@@ -335,9 +353,9 @@ impl Rasterizer {
     }
 }
 
-/// Neighbouring clusters drawn in one call under the record of the first.
+/// Neighbouring clusters drawn in one call, and the first of them.
 struct Run {
-    record: u32,
+    draw: usize,
     first_index: u32,
     end_index: u32,
 }
@@ -345,13 +363,11 @@ struct Run {
 fn visible_runs(scene: &GpuScene, frustum: &Frustum) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     let visible = scene.draws.iter().enumerate().filter(|(_, draw)| frustum.may_see(&draw.bounds_in_world));
-    for (record, draw) in visible {
+    for (number, draw) in visible {
         match runs.last_mut() {
-            Some(run) if scene.draws[run.record as usize].joins(run.end_index, draw) => {
-                run.end_index += draw.index_count
-            }
+            Some(run) if scene.draws[run.draw].joins(run.end_index, draw) => run.end_index += draw.index_count,
             _ => runs.push(Run {
-                record: record as u32,
+                draw: number,
                 first_index: draw.first_index,
                 end_index: draw.first_index + draw.index_count,
             }),
@@ -385,8 +401,10 @@ fn shader_context(key: PipelineKey) -> minijinja::Value {
         Output::Samples(planes) => Some(planes),
     };
     let SamplePlanes { normal, surface_id } = planes.unwrap_or_default();
+    let Traits { double_sided, alpha_tested, textured, unlit, specular } = key.traits;
     context! {
-        wind => key.wind, lit => key.lighting != Lighting::Unlit, samples => planes.is_some(),
+        wind => key.wind, lights => key.lights, lit => key.lighting != Lighting::Unlit && !unlit, samples => planes.is_some(),
+        double_sided, alpha_tested, textured, specular,
         normal, surface_id, normal_location => 1, id_location => 1 + u32::from(normal),
     }
 }
@@ -423,18 +441,20 @@ fn clear_colors(scene: &GpuScene, output: Output) -> impl Iterator<Item = wgpu::
     std::iter::once(first).chain(std::iter::repeat(wgpu::Color::TRANSPARENT))
 }
 
-fn scene_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
-    let buffer = |binding, ty, has_dynamic_offset| wgpu::BindGroupLayoutEntry {
+/// Uniforms, each at a dynamic offset or not.
+fn uniform_layout(gpu: &Gpu, label: &str, dynamic: &[bool]) -> wgpu::BindGroupLayout {
+    let entry = |(binding, &has_dynamic_offset): (u32, &bool)| wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
-        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None },
+        ty: wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset,
+            min_binding_size: None,
+        },
         count: None,
     };
-    let storage = wgpu::BufferBindingType::Storage { read_only: true };
-    let mut entries =
-        vec![buffer(0, wgpu::BufferBindingType::Uniform, true), buffer(1, wgpu::BufferBindingType::Uniform, false)];
-    entries.extend((2..6).map(|binding| buffer(binding, storage, false)));
-    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("scene"), entries: &entries })
+    let entries: Vec<_> = (0..).zip(dynamic).map(entry).collect();
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
 }
 
 fn texture_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
