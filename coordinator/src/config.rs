@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use depth_image::{Aabb, Camera};
-use glam::Vec3;
-use wire::{SceneHash, SceneRef};
+use glam::{DVec3, Vec3};
+use wire::{OfferSettings, OfferStatus, SceneHash, SceneRef};
 
 /// The coordinator's configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +41,10 @@ pub struct SceneOffer {
     pub volume: Aabb,
     /// What rays meet that leave the scene.
     pub background_linear: Vec3,
+    /// The point of the source file's space that is the world's origin.
+    pub origin_in_source: DVec3,
+    /// For sessions that have no wish; empty where they may choose.
+    pub settings: OfferSettings,
 }
 
 impl SceneOffer {
@@ -53,6 +57,20 @@ impl SceneOffer {
             rig,
             volume,
             background_linear,
+            origin_in_source: DVec3::ZERO,
+            settings: OfferSettings::default(),
+        }
+    }
+
+    /// What clients are told.
+    #[must_use]
+    pub fn status(&self) -> OfferStatus {
+        OfferStatus {
+            scene: self.scene(),
+            sample_cameras: self.rig.clone(),
+            volume: self.volume,
+            origin_in_source: self.origin_in_source,
+            settings: self.settings.clone(),
         }
     }
 

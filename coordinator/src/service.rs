@@ -15,7 +15,7 @@ use tonic::{Status, async_trait};
 use wire::limits::PART_BYTES;
 use wire::rpc::{Coordinator, Messages, coordinator_server};
 use wire::{
-    ClusterStatus, Costs, FetchScene, JoinCluster, MeasureCosts, ScenePart, SessionEvent, SessionRequest, Welcome,
+    ClusterStatus, Costs, FetchScene, JoinCluster, MeasureCosts, ScenePart, SessionEvent, SessionRequest, Timeline, Welcome,
 };
 
 use crate::opening::{Events, open};
@@ -104,7 +104,7 @@ impl Inner {
     pub(crate) fn kept_costs(&self, device: &str, measure: &MeasureCosts) -> Option<Costs> {
         locked(&self.costs)
             .iter()
-            .find(|(kept, what, _)| kept == device && what == measure)
+            .find(|(kept, what, _)| kept == device && *what == timeless(measure))
             .map(|(_, _, costs)| *costs)
     }
 
@@ -113,12 +113,19 @@ impl Inner {
         if kept.len() >= most {
             kept.remove(0);
         }
-        kept.push((device, measure, costs));
+        kept.push((device, timeless(&measure), costs));
     }
 
     fn next_number(&self) -> u64 {
         self.counter.fetch_add(1, Ordering::Relaxed)
     }
+}
+
+/// Costs do not depend on the scene's time.
+fn timeless(measure: &MeasureCosts) -> MeasureCosts {
+    let mut measure = measure.clone();
+    measure.workload.timeline = Timeline::still(0.0);
+    measure
 }
 
 /// Says that something ended when its stream is dropped.
@@ -217,6 +224,9 @@ impl Coordinator for CoordinatorService {
     }
 
     async fn status(&self) -> Result<ClusterStatus, Status> {
-        Ok(self.inner.status())
+        Ok(ClusterStatus {
+            offer: Some(self.inner.offer.status()),
+            ..self.inner.status()
+        })
     }
 }

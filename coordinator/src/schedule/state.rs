@@ -121,6 +121,7 @@ impl ClusterState {
         ClusterStatus {
             plan_epoch: self.plan_epoch,
             nodes: self.members.values().map(|member| member.status.clone()).collect(),
+            offer: None,
         }
     }
 

@@ -5,6 +5,8 @@
 //! variant, one `.rs` and `.wgsl` pair, and has a scalar twin.
 
 mod layout;
+#[cfg(test)]
+mod layout_tests;
 mod method;
 mod pyramid;
 mod reconstructor;

@@ -6,7 +6,7 @@ use bytemuck::Zeroable as _;
 use gpu::Templates;
 use naga::TypeInner;
 
-use crate::gpu_scene::{DrawRecord, GpuInstance, GpuLight, GpuMaterial, GpuSurroundings};
+use crate::gpu_scene::{GpuLight, GpuObject, GpuSurroundings};
 use crate::raster::RasterCamera;
 
 /// Fields with their offsets, and the size of the whole.
@@ -25,7 +25,7 @@ macro_rules! host {
 }
 
 fn module() -> naga::Module {
-    let form = minijinja::context! { wind => true, lit => true, samples => true, normal => true, surface_id => false, normal_location => 1, id_location => 2 };
+    let form = minijinja::context! { wind => true, lit => true, lights => 1, samples => true, double_sided => true, alpha_tested => true, textured => true, specular => true, normal => true, surface_id => false, normal_location => 1, id_location => 2 };
     let text =
         Templates::new(crate::SHADERS).and_then(|templates| templates.render("raster.wgsl", form)).expect("a text");
     naga::front::wgsl::parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)))
@@ -46,36 +46,37 @@ fn everything_shared_agrees() {
     let module = module();
     let shared = [
         ("RasterCamera", host!(RasterCamera { clip_from_world, eye_in_world, scene_time_s })),
-        ("DrawRecord", host!(DrawRecord { instance, first_primitive, material, padding })),
-        ("Instance", host!(GpuInstance { world_from_mesh, normal_from_mesh })),
         (
-            "Material",
-            host!(GpuMaterial {
+            "Object",
+            host!(GpuObject {
+                world_from_mesh,
+                normal_from_mesh,
                 base_color_linear,
                 emissive_linear,
                 alpha_cutoff,
                 phong_specular,
                 phong_exponent,
-                unlit,
-                double_sided
+                instance,
+                padding
             }),
         ),
         ("Light", host!(GpuLight { towards_or_position, intensity_linear })),
-        (
-            "Surroundings",
-            host!(GpuSurroundings {
-                ambient_linear,
-                light_count,
-                wind_direction,
-                wind_amplitude_m,
-                wind_waves_per_m,
-                wind_frequency_hz
-            }),
-        ),
     ];
     for (name, host) in shared {
         assert_eq!(shader(&module, name), host, "{name}");
     }
+    // The lights follow what is fixed.
+    let fixed = host!(GpuSurroundings {
+        ambient_linear,
+        padding,
+        wind_direction,
+        wind_amplitude_m,
+        wind_waves_per_m,
+        wind_frequency_hz
+    });
+    let mut surroundings = shader(&module, "Surroundings");
+    assert_eq!(surroundings.fields.pop(), Some(("lights".to_owned(), fixed.bytes)));
+    assert_eq!(surroundings.fields, fixed.fields);
 }
 
 #[test]

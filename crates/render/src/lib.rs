@@ -6,6 +6,8 @@
 
 mod cluster;
 mod gpu_scene;
+#[cfg(test)]
+mod layout_tests;
 mod lighting;
 mod raster;
 pub mod scalar;

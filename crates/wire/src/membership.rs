@@ -5,7 +5,7 @@ use depth_image::{PinholeCamera, ViewPlanes};
 use crate::error::{WireError, at_most, required};
 use crate::geometry::{pinhole_from, pinhole_to};
 use crate::limits::{MAX_BATCH, MAX_NODES, MAX_SCENES, nonempty, seconds, text};
-use crate::{Assignment, Costs, SceneRef, Workload, proto};
+use crate::{Assignment, Costs, OfferStatus, SceneRef, Workload, proto};
 
 /// A node that wants to be a member.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -85,12 +85,14 @@ impl From<Welcome> for proto::JoinClusterResponse {
 }
 
 /// The cluster as the coordinator sees it.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ClusterStatus {
     /// The highest plan so far.
     pub plan_epoch: u64,
     /// Members by name.
     pub nodes: Vec<NodeStatus>,
+    /// The scene, and what it is shown with.
+    pub offer: Option<OfferStatus>,
 }
 
 impl TryFrom<proto::GetStatusResponse> for ClusterStatus {
@@ -107,6 +109,7 @@ impl TryFrom<proto::GetStatusResponse> for ClusterStatus {
         Ok(Self {
             plan_epoch: r.plan_epoch,
             nodes: r.nodes.into_iter().map(node).collect(),
+            offer: r.offer.map(TryInto::try_into).transpose()?,
         })
     }
 }
@@ -122,6 +125,7 @@ impl From<ClusterStatus> for proto::GetStatusResponse {
         Self {
             plan_epoch: status.plan_epoch,
             nodes: status.nodes.into_iter().map(node).collect(),
+            offer: status.offer.map(Into::into),
         }
     }
 }

@@ -1,0 +1,56 @@
+# Everything is built with the release profile: the software device and the scalar references need it, and
+# nothing is then compiled for a second profile.
+#
+# Needed: Rust (Cargo.toml says from which version), a linker (`cc`) and a Vulkan device. The targets install
+# the last two where they are missing and that is possible without asking; see scripts/.
+
+CARGO ?= cargo
+ARGS ?=
+export CARGO
+
+.DEFAULT_GOAL := help
+.PHONY: help build demo test fmt-check lint unit bench doc audit vulkan toolchain lint-toolchain clean
+
+help: ## what can be made
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@echo '  ARGS="…" is passed on, as in: make demo ARGS="--scene model.glb"'
+
+demo: build ## the paper's experiment on this machine; pictures and report in out/demo
+	$(CARGO) run --release --locked --package myriorama -- demo $(ARGS)
+
+test: fmt-check lint unit ## format, lints and all tests
+
+bench: build ## speed and accuracy against the bars; report in out/bench
+	$(CARGO) run --release --locked --package myriorama -- bench $(ARGS)
+
+doc: toolchain ## the crates' documentation, in target/doc
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --workspace --no-deps
+
+audit: toolchain ## licences, advisories, bans and sources of all dependencies
+	@$(CARGO) deny --version >/dev/null 2>&1 || { echo 'cargo-deny is missing: cargo install --locked cargo-deny' >&2; exit 1; }
+	$(CARGO) deny --locked check
+
+clean: ## removes all that was built and written
+	$(CARGO) clean
+	rm -rf out
+
+build: toolchain vulkan
+	$(CARGO) build --release --locked --package myriorama
+
+fmt-check: lint-toolchain
+	$(CARGO) fmt --all --check
+
+lint: lint-toolchain
+	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
+
+unit: toolchain vulkan
+	$(CARGO) test --release --locked --workspace
+
+vulkan:
+	@scripts/ensure-vulkan.sh
+
+toolchain:
+	@scripts/ensure-toolchain.sh
+
+lint-toolchain:
+	@scripts/ensure-toolchain.sh lint
