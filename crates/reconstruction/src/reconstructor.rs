@@ -18,7 +18,7 @@ use crate::{
 
 const TILE_PX: u32 = 8;
 /// Bounds the memory of a batch: 12 bytes a pixel on the device, up to as much again on the host.
-const PIXELS_A_BATCH: usize = 1 << 21;
+const PIXELS_A_BATCH: usize = 1 << 20;
 const MAX_VIEWS_A_BATCH: usize = 256;
 /// Uniform offsets must be multiples of this on every device.
 /// Marches in the nearest two cameras, and the carve.
