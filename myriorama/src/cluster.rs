@@ -1,0 +1,100 @@
+//! A whole cluster in one process: coordinator and nodes over loopback gRPC, one device among them.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use client::Client;
+use coordinator::{CoordinatorConfig, SceneOffer};
+use node::{Engine, NodeConfig, ServeError};
+use tokio::net::TcpListener;
+use tokio::task::JoinSet;
+use tokio_util::sync::CancellationToken;
+
+/// How long nodes of one process may take to join.
+const JOIN: Duration = Duration::from_secs(30);
+
+/// Servers that run until they are drained.
+pub struct Cluster {
+    /// The coordinator, as `http://host:port`.
+    pub address: String,
+    shutdown: CancellationToken,
+    servers: JoinSet<Result<(), ServeError>>,
+}
+
+impl Cluster {
+    /// Starts a coordinator on `listener` and `nodes` nodes, and waits until all have joined. The scene should
+    /// be on the engine already; otherwise each node fetches it.
+    ///
+    /// # Errors
+    /// When a port cannot be had or nodes do not join.
+    pub async fn start(
+        listener: TcpListener,
+        offer: SceneOffer,
+        engine: Arc<dyn Engine>,
+        nodes: usize,
+        insecure_bind: bool,
+    ) -> anyhow::Result<Self> {
+        let address = format!("http://{}", loopback_of(&listener)?);
+        let mut cluster = Self { address, shutdown: CancellationToken::new(), servers: JoinSet::new() };
+        let config = CoordinatorConfig { insecure_bind, ..CoordinatorConfig::default() };
+        cluster.servers.spawn(coordinator::serve(listener, config, offer, cluster.shutdown.clone()));
+        for number in 0..nodes {
+            cluster.add_node(number, engine.clone()).await?;
+        }
+        cluster.client().await?.wait_for_nodes(nodes, JOIN).await?;
+        Ok(cluster)
+    }
+
+    async fn add_node(&mut self, number: usize, engine: Arc<dyn Engine>) -> anyhow::Result<()> {
+        let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
+        // As many digits as sort well: members are listed by name.
+        let config = NodeConfig::new(format!("node-{number:03}"), &self.address);
+        self.servers.spawn(node_host::serve(listener, config, engine, self.shutdown.clone()));
+        Ok(())
+    }
+
+    /// A client of this cluster.
+    ///
+    /// # Errors
+    /// When the coordinator does not answer.
+    pub async fn client(&self) -> anyhow::Result<Client> {
+        Ok(Client::connect(&self.address).await?)
+    }
+
+    /// The first server that ends by itself, if one does: a cluster that serves never resolves.
+    ///
+    /// # Errors
+    /// Why it ended.
+    pub async fn failed(&mut self) -> anyhow::Result<()> {
+        match self.servers.join_next().await {
+            Some(ended) => Ok(ended.context("a server stopped")??),
+            None => Ok(()),
+        }
+    }
+
+    /// Ends streams and waits for the servers, 10 s at most.
+    ///
+    /// # Errors
+    /// When a server failed.
+    pub async fn drain(mut self) -> anyhow::Result<()> {
+        self.shutdown.cancel();
+        while let Some(ended) = self.servers.join_next().await {
+            ended.context("a server stopped")??;
+        }
+        Ok(())
+    }
+}
+
+/// Where this process reaches a listener that may be bound to all addresses.
+fn loopback_of(listener: &TcpListener) -> anyhow::Result<std::net::SocketAddr> {
+    let mut address = listener.local_addr()?;
+    if address.ip().is_unspecified() {
+        address.set_ip(if address.is_ipv4() {
+            std::net::Ipv4Addr::LOCALHOST.into()
+        } else {
+            std::net::Ipv6Addr::LOCALHOST.into()
+        });
+    }
+    Ok(address)
+}

@@ -1,0 +1,55 @@
+//! `myriorama coordinator`: plans for nodes that join it, and hands them the scene.
+
+use std::net::SocketAddr;
+
+use clap::Args;
+use coordinator::CoordinatorConfig;
+use tokio_util::sync::CancellationToken;
+
+use crate::exit::Outcome;
+use crate::process::{listen, runtime, stop_signal};
+use crate::setup::{SceneArgs, Setup};
+
+/// Draws nothing itself: it needs no device.
+#[derive(Debug, Args)]
+pub struct CoordinatorArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Where it listens
+    #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT")]
+    listen: SocketAddr,
+    /// Serve without TLS on an address that others can reach
+    #[arg(long)]
+    insecure_bind: bool,
+}
+
+/// Runs until a signal.
+///
+/// # Errors
+/// A scene that cannot be used, or a port that is taken.
+pub fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
+    let setup = args.scene.load()?;
+    runtime()?.block_on(serve(args, setup))
+}
+
+async fn serve(args: CoordinatorArgs, setup: Setup) -> anyhow::Result<Outcome> {
+    let listener = listen(args.listen, args.insecure_bind).await?;
+    println!(
+        "{}: {} triangles offered at http://{}",
+        setup.scene.name,
+        setup.scene.triangle_count(),
+        listener.local_addr()?
+    );
+    let Setup { offer, .. } = setup;
+    let shutdown = CancellationToken::new();
+    let config = CoordinatorConfig { insecure_bind: args.insecure_bind, ..CoordinatorConfig::default() };
+    let serving = coordinator::serve(listener, config, offer, shutdown.clone());
+    tokio::spawn(async move {
+        // Without signals there is still the caller's way to end the process.
+        if stop_signal().await.is_ok() {
+            shutdown.cancel();
+        }
+    });
+    serving.await?;
+    Ok(Outcome::Done)
+}

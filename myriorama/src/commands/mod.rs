@@ -1,0 +1,8 @@
+//! One module a subcommand: its arguments, and what it does.
+
+pub mod bench;
+pub mod coordinator;
+pub mod demo;
+pub mod node;
+pub mod up;
+pub mod view;

@@ -1,0 +1,70 @@
+//! `myriorama node`: samples and composites as the coordinator says.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::Args;
+use node::{Engine as _, NodeConfig};
+use tokio_util::sync::CancellationToken;
+
+use crate::cli::DeviceArgs;
+use crate::engine::GpuEngine;
+use crate::exit::Outcome;
+use crate::process::{listen, runtime, stop_signal};
+
+/// Stays a member, and joins again when the coordinator was away.
+#[derive(Debug, Args)]
+pub struct NodeArgs {
+    /// The coordinator
+    #[arg(long, value_name = "URL", env = "MYRIORAMA_COORDINATOR")]
+    coordinator: String,
+    /// Where it listens; port 0: any that is free
+    #[arg(long, default_value = "127.0.0.1:0", value_name = "HOST:PORT")]
+    listen: SocketAddr,
+    /// Unique in the cluster [default: node-PORT]
+    #[arg(long)]
+    name: Option<String>,
+    /// Where others reach it, if not at --listen
+    #[arg(long, value_name = "URL")]
+    advertise: Option<String>,
+    /// Keeps scenes here by hash, and looks here before fetching one
+    #[arg(long, value_name = "DIR")]
+    scene_folder: Option<PathBuf>,
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Serve without TLS on an address that others can reach
+    #[arg(long)]
+    insecure_bind: bool,
+}
+
+/// Runs until a signal.
+///
+/// # Errors
+/// No device, or a port that is taken.
+pub fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
+    runtime()?.block_on(serve(args))
+}
+
+async fn serve(args: NodeArgs) -> anyhow::Result<Outcome> {
+    let listener = listen(args.listen, args.insecure_bind).await?;
+    let address = listener.local_addr()?;
+    let engine = GpuEngine::shared(args.device.device)?;
+    let name = args.name.unwrap_or_else(|| format!("node-{}", address.port()));
+    println!("{name} on {}, at http://{address}", engine.device_name());
+    let config = NodeConfig {
+        scene_folder: args.scene_folder,
+        advertised_address: args.advertise,
+        insecure_bind: args.insecure_bind,
+        ..NodeConfig::new(name, args.coordinator)
+    };
+    let shutdown = CancellationToken::new();
+    let serving = node_host::serve(listener, config, engine, shutdown.clone());
+    tokio::spawn(async move {
+        // Without signals there is still the caller's way to end the process.
+        if stop_signal().await.is_ok() {
+            shutdown.cancel();
+        }
+    });
+    serving.await?;
+    Ok(Outcome::Done)
+}

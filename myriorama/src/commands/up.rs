@@ -1,0 +1,62 @@
+//! `myriorama up`: a whole cluster in one process.
+
+use std::net::SocketAddr;
+
+use clap::Args;
+use node::Engine as _;
+
+use crate::cli::DeviceArgs;
+use crate::cluster::Cluster;
+use crate::engine::GpuEngine;
+use crate::exit::Outcome;
+use crate::process::{listen, runtime, stop_signal};
+use crate::setup::{SceneArgs, Setup};
+
+/// Serves until ctrl-c or SIGTERM, then drains for at most 10 s.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example: myriorama up --scene helmet.gltf --nodes 5\nThen:    myriorama view --orbit 24 --out out/orbit"
+)]
+pub struct UpArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// P: nodes that share the device
+    #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
+    nodes: u16,
+    /// Where the coordinator listens
+    #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT")]
+    listen: SocketAddr,
+    /// Serve without TLS on an address that others can reach
+    #[arg(long)]
+    insecure_bind: bool,
+}
+
+/// Runs until a signal.
+///
+/// # Errors
+/// A scene that cannot be used, no device, or a port that is taken.
+pub fn run(args: UpArgs) -> anyhow::Result<Outcome> {
+    let setup = args.scene.load()?;
+    runtime()?.block_on(serve(args, setup))
+}
+
+async fn serve(args: UpArgs, setup: Setup) -> anyhow::Result<Outcome> {
+    let listener = listen(args.listen, args.insecure_bind).await?;
+    let engine = GpuEngine::shared(args.device.device)?;
+    engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
+    let (name, triangles) = (setup.scene.name.clone(), setup.scene.triangle_count());
+    // The device holds it now, and the package travels: the third copy can go.
+    drop(setup.scene);
+    let mut cluster =
+        Cluster::start(listener, setup.offer, engine.clone(), usize::from(args.nodes), args.insecure_bind).await?;
+    println!("{name}: {triangles} triangles on {}, {} nodes, at {}", engine.device_name(), args.nodes, cluster.address);
+    tokio::select! {
+        stopped = stop_signal() => stopped?,
+        failed = cluster.failed() => failed?,
+    }
+    println!("draining");
+    cluster.drain().await?;
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,210 @@
+//! `myriorama view`: a thin client that writes what it receives.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::Context as _;
+use clap::Args;
+use client::{Client, Frame};
+use depth_image::{Camera, PinholeCamera, ViewPlanes};
+use indicatif::ProgressBar;
+use reconstruction::ReconstructionMethod;
+use render::Lighting;
+use sampling::SamplingMethod;
+use serde_json::{Map, json};
+use wire::{FrameCodec, OfferStatus, PolicyChoice, Timeline};
+
+use crate::cameras::{self, NamedCamera, Placement};
+use crate::delivery::{Wishes, open, receive};
+use crate::exit::{BadInput, Outcome};
+use crate::pictures;
+use crate::process::runtime;
+use crate::rig::ViewCell;
+use crate::setup::NEAR_OF_DIAGONAL;
+use crate::sizes::{GridSize, SizePx};
+
+/// Files in --out: view_0000.png (colour); with --depth view_0000.depth.png (16-bit inverse planar depth:
+/// value / 65535 × inverse_depth_max_per_m of the frame in cameras.json, 0 for background); with --provenance
+/// view_0000.provenance.png (false colours: a colour for each sample camera, white blended, red filled); and
+/// cameras.json, in the transforms.json convention, in the scene file's own coordinates.
+#[derive(Debug, Args)]
+pub struct ViewArgs {
+    /// The coordinator
+    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR")]
+    coordinator: String,
+    #[command(flatten)]
+    which: Which,
+    /// Size of the views, unless --cameras says
+    #[arg(long, default_value = "200x150", value_name = "WxH")]
+    size: SizePx,
+    /// Where the pictures go
+    #[arg(long, default_value = "out/view", value_name = "DIR")]
+    out: PathBuf,
+    /// Depth of every view, too
+    #[arg(long)]
+    depth: bool,
+    /// Where every pixel comes from, too
+    #[arg(long)]
+    provenance: bool,
+    /// How views are reconstructed [default: the coordinator's]
+    #[arg(long, value_name = "NAME")]
+    method: Option<ReconstructionMethod>,
+    /// How surfaces are lit [default: the coordinator's]
+    #[arg(long, value_name = "NAME")]
+    lighting: Option<Lighting>,
+    /// How frames travel: lz4 (without loss) or jpeg:QUALITY
+    #[arg(long, default_value = "lz4", value_name = "NAME")]
+    codec: FrameCodec,
+    /// auto (whatever is predicted to be faster), pipeline or direct
+    #[arg(long, default_value = "auto", value_name = "NAME", value_parser = policy)]
+    policy: PolicyChoice,
+    /// Moments of an animated scene; every view is made of each
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: u32,
+    /// Seconds between moments
+    #[arg(long, default_value_t = 1.0 / 30.0, value_name = "S")]
+    frame_step: f64,
+}
+
+/// Which views: one of these; an orbit of 24 without any.
+#[derive(Debug, Args)]
+#[group(multiple = false)]
+struct Which {
+    /// N views on an ellipse between the sample cameras
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    orbit: Option<u32>,
+    /// Columns × rows of views over the rectangle of the sample cameras
+    #[arg(long, value_name = "CxR")]
+    grid: Option<GridSize>,
+    /// N views spread evenly over the rectangle of the sample cameras
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    views: Option<u32>,
+    /// One view: eye, target and full vertical field of view in degrees, in the scene file's coordinates
+    #[arg(long, value_name = "X,Y,Z:X,Y,Z[:FOV]", allow_hyphen_values = true)]
+    camera: Option<String>,
+    /// Views from a transforms.json, in the scene file's coordinates
+    #[arg(long, value_name = "FILE")]
+    cameras: Option<PathBuf>,
+}
+
+fn policy(name: &str) -> Result<PolicyChoice, String> {
+    match name {
+        "auto" => Ok(PolicyChoice::Auto),
+        "pipeline" => Ok(PolicyChoice::Pipeline),
+        "direct" => Ok(PolicyChoice::Direct),
+        other => Err(format!("unknown policy {other:?}, expected auto, pipeline or direct")),
+    }
+}
+
+impl Which {
+    fn cameras(&self, offer: &OfferStatus, size: SizePx) -> anyhow::Result<Vec<PinholeCamera>> {
+        let near_m = (offer.volume.size().length() * NEAR_OF_DIAGONAL).max(1e-6);
+        let placement = Placement { origin_in_source: offer.origin_in_source, near_m };
+        if let Some(path) = &self.cameras {
+            return Ok(cameras::read(path, placement)?);
+        }
+        if let Some(text) = &self.camera {
+            return Ok(vec![one_camera(text, placement, size)?]);
+        }
+        let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+        let cell = ViewCell::between(&samples).context("the coordinator has no sample cameras: give --cameras")?;
+        Ok(match (self.grid, self.views) {
+            (Some(grid), _) => cell.grid(grid.columns, grid.rows, size.0),
+            (_, Some(count)) => cell.spread(count as usize, size.0),
+            _ => cell.orbit(self.orbit.unwrap_or(24) as usize, size.0),
+        })
+    }
+}
+
+fn one_camera(text: &str, placement: Placement, size: SizePx) -> anyhow::Result<PinholeCamera> {
+    let bad =
+        || BadInput(format!("--camera {text:?}: expected EYE:TARGET or EYE:TARGET:DEGREES, as in 0,1,3:0,0.5,0:45"));
+    let numbers = |part: &str| {
+        part.split(',').map(|v| v.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect::<Option<Vec<_>>>()
+    };
+    let parts = text.split(':').map(numbers).collect::<Option<Vec<_>>>().ok_or_else(bad)?;
+    let triple = |part: &[f64]| <[f64; 3]>::try_from(part).ok();
+    let (eye, target, fov_deg) = match &parts[..] {
+        [eye, target] => (triple(eye), triple(target), 45.0),
+        [eye, target, fov] if fov.len() == 1 && (0.1..=170.0).contains(&fov[0]) => {
+            (triple(eye), triple(target), fov[0])
+        }
+        _ => (None, None, 0.0),
+    };
+    let (Some(eye), Some(target)) = (eye, target) else { return Err(bad().into()) };
+    let [eye, target] = [eye, target].map(|p| (glam::DVec3::from_array(p) - placement.origin_in_source).as_vec3());
+    let camera = PinholeCamera::looking_at(eye, target, glam::Vec3::Y, (fov_deg as f32).to_radians(), size.0);
+    Ok(PinholeCamera { near_m: placement.near_m, ..camera })
+}
+
+/// Asks, receives, writes.
+///
+/// # Errors
+/// Input that cannot be used, a cluster that cannot be reached, or a folder that cannot be written.
+pub fn run(args: ViewArgs) -> anyhow::Result<Outcome> {
+    runtime()?.block_on(view(args))
+}
+
+async fn view(args: ViewArgs) -> anyhow::Result<Outcome> {
+    let client =
+        Client::connect(&args.coordinator).await.with_context(|| format!("no coordinator at {}", args.coordinator))?;
+    let status = client.wait_for_nodes(1, Duration::from_secs(30)).await?;
+    let offer = status.offer.context("the coordinator does not say what it shows")?;
+    let cameras = args.which.cameras(&offer, args.size)?;
+    let folder = &args.out;
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
+    let session = open(&client, &wishes(&args, &offer), &cameras).await?;
+    let plan = session.plan();
+    println!("plan {}: {}", plan.assignment.plan_epoch, plan.reason);
+    let progress = ProgressBar::new(cameras.len() as u64 * u64::from(args.frames));
+    let delivered = receive(&session, &cameras, |_| progress.inc(1)).await?;
+    progress.finish_and_clear();
+    let named = delivered.frames.iter().map(|frame| write_frame(folder, frame)).collect::<anyhow::Result<Vec<_>>>()?;
+    let about = Map::from_iter([(
+        "depth".to_owned(),
+        json!("16-bit: value / 65535 * inverse_depth_max_per_m, per metre; 0 is background"),
+    )]);
+    cameras::write(&folder.join("cameras.json"), &named, offer.origin_in_source, about)?;
+    println!("{} views in {:.3} s, in {}", named.len(), delivered.seconds, folder.display());
+    Ok(Outcome::Done)
+}
+
+fn wishes(args: &ViewArgs, offer: &OfferStatus) -> Wishes {
+    let or = |wish: Option<String>, offered: &str, default: String| {
+        wish.unwrap_or_else(|| if offered.is_empty() { default } else { offered.to_owned() })
+    };
+    let OfferStatus { settings, .. } = offer;
+    Wishes {
+        method: or(args.method.map(|m| m.to_string()), &settings.method, ReconstructionMethod::default().to_string()),
+        sampling: or(None, &settings.sampling, SamplingMethod::default().to_string()),
+        lighting: or(args.lighting.map(|l| l.to_string()), &settings.lighting, Lighting::default().to_string()),
+        codec: args.codec.to_string(),
+        policy: args.policy,
+        planes: ViewPlanes { inverse_depth: args.depth, provenance: args.provenance },
+        timeline: Timeline { start_s: 0.0, step_s: args.frame_step, set_count: args.frames },
+    }
+}
+
+fn write_frame(folder: &Path, frame: &Frame) -> anyhow::Result<NamedCamera> {
+    let stem = format!("view_{:04}", frame.request.frame);
+    let file_path = format!("{stem}.png");
+    let save = |path: PathBuf, image: image::DynamicImage| {
+        image.save(&path).with_context(|| format!("cannot write {}", path.display()))
+    };
+    let color = pictures::rgb(&frame.view).context("a view is not of its size")?;
+    save(folder.join(&file_path), color.into())?;
+    let mut more = Map::from_iter([("set_index".to_owned(), json!(frame.request.set_index))]);
+    if let Some((image, greatest)) = pictures::inverse_depth_16(&frame.view) {
+        let name = format!("{stem}.depth.png");
+        save(folder.join(&name), image.into())?;
+        more.insert("depth_file_path".to_owned(), json!(name));
+        more.insert("inverse_depth_max_per_m".to_owned(), json!(greatest));
+    }
+    if let Some(provenance) = pictures::provenance(&frame.view) {
+        let name = format!("{stem}.provenance.png");
+        let image = study::provenance_false_color(&provenance, frame.view.size_px.x)?;
+        save(folder.join(&name), image.into())?;
+        more.insert("provenance_file_path".to_owned(), json!(name));
+    }
+    Ok(NamedCamera { file_path, camera: frame.request.camera, more })
+}

@@ -1,0 +1,91 @@
+//! Views asked of a cluster as any client asks, and the time until they are all here.
+
+use std::time::Instant;
+
+use client::{Client, Frame, Session, ViewRequest};
+use depth_image::{PinholeCamera, ViewPlanes};
+use wire::{PolicyChoice, SessionPlan, SessionRequest, Timeline};
+
+use crate::exit::BadInput;
+
+/// How views shall come about.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wishes {
+    /// Named as on the command line.
+    pub method: String,
+    /// Named as on the command line.
+    pub sampling: String,
+    /// Named as on the command line.
+    pub lighting: String,
+    /// Named as on the command line.
+    pub codec: String,
+    /// Who decides between pipeline and direct.
+    pub policy: PolicyChoice,
+    /// Planes beside colour.
+    pub planes: ViewPlanes,
+    /// Scene times; every set has the same views.
+    pub timeline: Timeline,
+}
+
+/// Views that came.
+#[derive(Debug)]
+pub struct Delivered {
+    /// What the coordinator decided, and the costs that it measured.
+    pub plan: SessionPlan,
+    /// From the request to the last frame, decoded and checksummed.
+    pub seconds: f64,
+    /// In the order of their numbers: set by set, in each the views in their order.
+    pub frames: Vec<Frame>,
+}
+
+/// Opens a session for `views` a set.
+///
+/// # Errors
+/// The coordinator's, or no views.
+pub async fn open(client: &Client, wishes: &Wishes, views: &[PinholeCamera]) -> anyhow::Result<Session> {
+    let typical_view = *views.first().ok_or_else(|| BadInput("no views are asked for".to_owned()))?;
+    let request = SessionRequest {
+        scene: None,
+        method: wishes.method.clone(),
+        sampling: wishes.sampling.clone(),
+        lighting: wishes.lighting.clone(),
+        codec: wishes.codec.clone(),
+        sample_cameras: Vec::new(),
+        sample_size_px: None,
+        volume: None,
+        typical_view,
+        views_per_set: u32::try_from(views.len())?,
+        planes: wishes.planes,
+        timeline: wishes.timeline,
+        policy: wishes.policy,
+        forced_sampler_count: None,
+    };
+    let told = |event: &_| tracing::info!(?event, "session");
+    Ok(client.open_session(request, told).await?)
+}
+
+/// Asks for all views of all sets and waits for them; `arrived` hears of each.
+///
+/// # Errors
+/// The cluster's, or frames that are missing.
+pub async fn receive(
+    session: &Session,
+    views: &[PinholeCamera],
+    mut arrived: impl FnMut(&Frame),
+) -> anyhow::Result<Delivered> {
+    let start = Instant::now();
+    let sets = session.plan().assignment.workload.timeline.set_count;
+    let request =
+        |(frame, (set_index, camera)): (u64, (u32, &PinholeCamera))| ViewRequest { frame, set_index, camera: *camera };
+    let all = (0..sets).flat_map(|set| views.iter().map(move |camera| (set, camera)));
+    let mut incoming = session.render_views((0..).zip(all).map(request).collect())?;
+    let mut frames = Vec::with_capacity(views.len() * sets as usize);
+    while let Some(frame) = incoming.next().await {
+        let frame = frame?;
+        arrived(&frame);
+        frames.push(frame);
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    frames.sort_by_key(|frame| frame.request.frame);
+    Ok(Delivered { plan: session.plan().clone(), seconds, frames })
+}

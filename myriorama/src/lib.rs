@@ -1,0 +1,24 @@
+//! The program `myriorama`: one binary that is a cluster, a part of one, its client, and its own judge.
+//!
+//! [`engine`] binds the device crates to the services' boundary; [`setup`] makes a scene on offer out of
+//! arguments; [`cluster`] runs coordinator and nodes in one process; [`rig`] places views, [`cameras`] reads
+//! and writes them; each of [`commands`] is one subcommand of [`cli`].
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod cameras;
+pub mod cli;
+pub mod cluster;
+pub mod commands;
+pub mod delivery;
+pub mod engine;
+pub mod evaluate;
+pub mod exit;
+pub mod experiment;
+pub mod pictures;
+pub mod process;
+pub mod progress;
+pub mod rig;
+pub mod setup;
+pub mod sizes;
+pub mod sweep;
+pub mod text_table;

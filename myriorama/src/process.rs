@@ -1,0 +1,52 @@
+//! What every command needs of the process: a runtime, a signal, its memory.
+
+use std::net::SocketAddr;
+
+use anyhow::Context as _;
+use tokio::net::TcpListener;
+use tokio::runtime::Runtime;
+use tokio::signal::unix::{SignalKind, signal};
+
+use crate::exit::BadInput;
+
+/// A runtime for services and clients.
+///
+/// # Errors
+/// When the system refuses threads.
+pub fn runtime() -> anyhow::Result<Runtime> {
+    tokio::runtime::Builder::new_multi_thread().enable_all().build().context("no runtime")
+}
+
+/// Resolves at ctrl-c or SIGTERM.
+///
+/// # Errors
+/// When signals cannot be listened to.
+pub async fn stop_signal() -> anyhow::Result<()> {
+    let mut terminate = signal(SignalKind::terminate())?;
+    tokio::select! {
+        ended = tokio::signal::ctrl_c() => ended?,
+        _ = terminate.recv() => (),
+    }
+    Ok(())
+}
+
+/// A port to serve on.
+///
+/// # Errors
+/// When it is taken or not ours; addresses that are not loopback need `insecure_bind`.
+pub async fn listen(address: SocketAddr, insecure_bind: bool) -> anyhow::Result<TcpListener> {
+    if !address.ip().is_loopback() && !insecure_bind {
+        let reason = format!("{address} is not loopback: give --insecure-bind to serve there without TLS");
+        return Err(BadInput(reason).into());
+    }
+    TcpListener::bind(address).await.with_context(|| format!("cannot listen on {address}"))
+}
+
+/// The most memory that this process has held, in MB; `None` where the system does not say.
+#[must_use]
+pub fn peak_memory_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kib: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024.0 / 1e6)
+}

@@ -1,0 +1,73 @@
+//! `WxH` on the command line.
+
+use std::fmt;
+use std::str::FromStr;
+
+use depth_image::MAX_IMAGE_SIDE_PX;
+use glam::UVec2;
+
+/// Columns and rows of an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SizePx(pub UVec2);
+
+/// Columns and rows of a grid of views.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GridSize {
+    /// Side by side.
+    pub columns: u32,
+    /// Above each other.
+    pub rows: u32,
+}
+
+/// Most columns or rows of a grid.
+const MAX_GRID_SIDE: u32 = 1000;
+
+/// Not two numbers, or too large ones.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{text:?} is no size: expected two whole numbers from 1 to {most} with an x between, as in 400x300")]
+pub struct SizeError {
+    text: String,
+    most: u32,
+}
+
+fn pair(text: &str, most: u32) -> Result<[u32; 2], SizeError> {
+    let sides = text.split_once(['x', 'X', '×']).and_then(|(a, b)| Some([a.parse().ok()?, b.parse().ok()?]));
+    sides
+        .filter(|sides| sides.iter().all(|side| (1..=most).contains(side)))
+        .ok_or_else(|| SizeError { text: text.to_owned(), most })
+}
+
+impl FromStr for SizePx {
+    type Err = SizeError;
+    fn from_str(text: &str) -> Result<Self, SizeError> {
+        pair(text, MAX_IMAGE_SIDE_PX).map(|sides| Self(sides.into()))
+    }
+}
+
+impl FromStr for GridSize {
+    type Err = SizeError;
+    fn from_str(text: &str) -> Result<Self, SizeError> {
+        pair(text, MAX_GRID_SIDE).map(|[columns, rows]| Self { columns, rows })
+    }
+}
+
+impl fmt::Display for SizePx {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{}", self.0.x, self.0.y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_two_numbers_in_range() {
+        assert_eq!("400x300".parse(), Ok(SizePx(UVec2::new(400, 300))));
+        assert_eq!("5x2".parse(), Ok(GridSize { columns: 5, rows: 2 }));
+        for bad in ["", "400", "0x3", "3x0", "65535x65535", "-1x4", "axb", "4x4x4"] {
+            assert!(bad.parse::<SizePx>().is_err(), "{bad}");
+        }
+        assert!("1001x1".parse::<GridSize>().is_err());
+    }
+}

@@ -1,0 +1,103 @@
+//! Time against error: every setting of every method on one scene.
+
+use reconstruction::ReconstructionMethod;
+use study::{Axis, Better, Cell, Point, ReportError, Series, Table, XyChart};
+
+use crate::evaluate::{Row, Truth};
+
+/// Steps of the search, as in the paper's Fig. 7 and beyond.
+const STEPS: [u32; 6] = [8, 16, 32, 64, 128, 256];
+/// Levels at which the carve stops.
+const STOP_LEVELS: [u32; 4] = [0, 1, 2, 3];
+
+/// All settings that are compared.
+#[must_use]
+pub fn settings(quick: bool) -> Vec<ReconstructionMethod> {
+    // A quick run leaves out every other setting.
+    let step = if quick { 2 } else { 1 };
+    let searches = STEPS.iter().step_by(step).map(|&steps| ReconstructionMethod::LightFieldSearch { steps });
+    let carves = STOP_LEVELS.iter().step_by(step).map(|&stop_level| ReconstructionMethod::JointCarve { stop_level });
+    searches.chain(carves).collect()
+}
+
+/// Evaluates all settings; `done` hears of each.
+///
+/// # Errors
+/// The device's.
+pub fn sweep(truth: &Truth, quick: bool, runs: usize, mut done: impl FnMut(&Row)) -> anyhow::Result<Vec<Row>> {
+    let row = |method| truth.evaluate(method, runs).inspect(|row| done(row));
+    settings(quick).into_iter().map(row).collect()
+}
+
+/// The rows as a table.
+///
+/// # Errors
+/// None that can happen: rows and columns are written together.
+pub fn table(name: &str, rows: &[Row]) -> Result<Table, ReportError> {
+    let columns = [
+        ("method", ""),
+        ("time a view", "ms"),
+        ("PSNR", "dB"),
+        ("PSNR of the worst view", "dB"),
+        ("SSIM", ""),
+        ("FLIP", ""),
+        ("wrong hits", "%"),
+        ("unknown", "%"),
+        ("disoccluded coloured wrong", "%"),
+        ("of these not marked", "%"),
+        ("disoccluded", "%"),
+        ("fetches a ray", ""),
+    ];
+    let mut table = Table::new(name, &columns);
+    for row in rows {
+        let shares = [row.wrong_hits, row.unknown, row.disoccluded_wrong, row.disoccluded_unmarked, row.disoccluded]
+            .map(|share| share * 100.0);
+        let numbers =
+            [&[row.ms_a_view, row.psnr_db, row.psnr_min_db, row.ssim, row.flip][..], &shares, &[row.fetches_a_ray]]
+                .concat();
+        table.push([Cell::from(row.method.to_string())].into_iter().chain(numbers.into_iter().map(Cell::from)))?;
+    }
+    Ok(table)
+}
+
+/// Time against FLIP, PSNR and wrong hits, each with the front of the best.
+#[must_use]
+pub fn charts(name: &str, rows: &[Row]) -> Vec<XyChart> {
+    let chart = |what: &str, unit: &str, better, value: fn(&Row) -> f64| {
+        let time = Axis::log("time a view", "ms");
+        series(rows, value)
+            .into_iter()
+            .fold(XyChart::new(format!("{what} against time, {name}"), time, Axis::linear(what, unit)), XyChart::with)
+            .with_front(Better::Low, better)
+    };
+    vec![
+        chart("FLIP", "", Better::Low, |row| row.flip),
+        chart("PSNR", "dB", Better::High, |row| row.psnr_db),
+        chart("Wrong hits", "%", Better::Low, |row| row.wrong_hits * 100.0),
+    ]
+}
+
+fn series(rows: &[Row], value: fn(&Row) -> f64) -> [Series; 2] {
+    let search = |row: &Row| match row.method {
+        ReconstructionMethod::LightFieldSearch { steps } => {
+            Some(Point::labelled(row.ms_a_view, value(row), steps.to_string()))
+        }
+        ReconstructionMethod::JointCarve { .. } => None,
+    };
+    let carve = |row: &Row| match row.method {
+        ReconstructionMethod::JointCarve { stop_level } => {
+            Some(Point::labelled(row.ms_a_view, value(row), format!("level {stop_level}")))
+        }
+        ReconstructionMethod::LightFieldSearch { .. } => None,
+    };
+    [
+        Series::line("light_field_search", rows.iter().filter_map(search)),
+        Series::line("joint_carve", rows.iter().filter_map(carve)),
+    ]
+}
+
+/// Rows of the search and of the carve.
+#[must_use]
+pub fn split(rows: &[Row]) -> (Vec<&Row>, Vec<&Row>) {
+    rows.iter().partition(|row| matches!(row.method, ReconstructionMethod::LightFieldSearch { .. }))
+}

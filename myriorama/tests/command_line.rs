@@ -1,0 +1,57 @@
+//! The program as a person meets it: help, exit status, messages.
+#![allow(clippy::unwrap_used)]
+
+use std::process::{Command, Output};
+
+fn myriorama(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_myriorama")).args(arguments).output().unwrap()
+}
+
+fn told(output: &Output) -> (Option<i32>, String) {
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn help_teaches_every_command() {
+    let help = myriorama(&["--help"]);
+    let text = String::from_utf8_lossy(&help.stdout).into_owned();
+    assert!(help.status.success());
+    for command in ["up", "coordinator", "node", "view", "demo", "bench"] {
+        assert!(text.contains(&format!("\n  {command} ")), "{command} in {text}");
+        assert!(myriorama(&[command, "--help"]).status.success(), "{command} --help");
+    }
+    assert!(text.contains("Examples:") && text.contains("Exit status:"));
+    assert!(String::from_utf8_lossy(&myriorama(&["--version"]).stdout).starts_with("myriorama "));
+}
+
+#[test]
+fn input_that_cannot_be_used_is_named_with_status_2() {
+    let folder = tempfile::tempdir().unwrap();
+    let broken = folder.path().join("broken.glb");
+    std::fs::write(&broken, b"no model").unwrap();
+    let cameras = folder.path().join("cameras.json");
+    std::fs::write(&cameras, b"{\"frames\": [{}]}").unwrap();
+    let (broken, cameras) = (broken.to_str().unwrap(), cameras.to_str().unwrap());
+    let cases: [(&[&str], &str); 8] = [
+        (&["demo", "--scene", "/nowhere/absent.glb"], "absent.glb"),
+        (&["up", "--scene", broken], "broken.glb"),
+        (&["coordinator", "--scene", broken], "broken.glb"),
+        (&["up", "--scene", "quad", "--samples", cameras], "cameras.json: frame 0, w"),
+        (&["up", "--scene", "quad", "--listen", "0.0.0.0:0"], "--insecure-bind"),
+        (&["up", "--scene", "quad", "--method", "guess"], "guess"),
+        (&["view", "--size", "0x0"], "0x0"),
+        (&["view", "--orbit", "3", "--grid", "2x2"], "--grid"),
+    ];
+    for (arguments, named) in cases {
+        let (status, message) = told(&myriorama(arguments));
+        assert_eq!(status, Some(2), "{arguments:?}: {message}");
+        assert!(message.contains(named), "{arguments:?}: {message}");
+    }
+}
+
+#[test]
+fn a_cluster_that_is_not_there_is_a_failure_at_run_time() {
+    let (status, message) = told(&myriorama(&["view", "--coordinator", "http://127.0.0.1:9", "--orbit", "2"]));
+    assert_eq!(status, Some(3), "{message}");
+    assert!(message.contains("127.0.0.1:9"), "{message}");
+}
