@@ -63,8 +63,6 @@ pub enum ClientError {
 
 impl ClientError {
     pub(crate) fn coordinator(status: Status) -> Self {
-        Self::Coordinator {
-            reason: status.message().to_owned(),
-        }
+        Self::Coordinator { reason: status.message().to_owned() }
     }
 }

@@ -32,17 +32,7 @@ impl Expected {
     ) -> Result<Self, ClientError> {
         let mut due = HashMap::new();
         for (request, sample_set_id) in requests {
-            if due
-                .insert(
-                    request.frame,
-                    Due {
-                        request,
-                        sample_set_id,
-                        came: false,
-                    },
-                )
-                .is_some()
-            {
+            if due.insert(request.frame, Due { request, sample_set_id, came: false }).is_some() {
                 return Err(ClientError::Invalid {
                     field: "frame",
                     reason: format!("{} is asked for twice", request.frame),
@@ -56,10 +46,7 @@ impl Expected {
     /// Notes a frame that came; gives what had been asked.
     pub(crate) fn accept(&mut self, frame: u64, header: &FrameHeader) -> Result<ViewRequest, ClientError> {
         let unexpected = |reason: String| ClientError::Unexpected { frame, reason };
-        let due = self
-            .due
-            .get_mut(&frame)
-            .ok_or_else(|| unexpected("was not asked for".to_owned()))?;
+        let due = self.due.get_mut(&frame).ok_or_else(|| unexpected("was not asked for".to_owned()))?;
         if due.came {
             return Err(unexpected("came twice".to_owned()));
         }
@@ -69,10 +56,8 @@ impl Expected {
                 header.sample_set_id, due.sample_set_id
             )));
         }
-        let planes = ViewPlanes {
-            inverse_depth: header.inverse_depth_bytes > 0,
-            provenance: header.provenance_bytes > 0,
-        };
+        let planes =
+            ViewPlanes { inverse_depth: header.inverse_depth_bytes > 0, provenance: header.provenance_bytes > 0 };
         if header.size_px != due.request.camera.size_px || planes != self.planes {
             return Err(unexpected("has another size or other planes than asked for".to_owned()));
         }
@@ -86,12 +71,7 @@ impl Expected {
         if self.left == 0 {
             return Ok(());
         }
-        let mut missing: Vec<u64> = self
-            .due
-            .iter()
-            .filter(|(_, due)| !due.came)
-            .map(|(frame, _)| *frame)
-            .collect();
+        let mut missing: Vec<u64> = self.due.iter().filter(|(_, due)| !due.came).map(|(frame, _)| *frame).collect();
         missing.sort_unstable();
         let count = missing.len();
         missing.truncate(8);
@@ -113,17 +93,7 @@ mod tests {
             1.0,
             [8, 8].into(),
         );
-        (
-            ViewRequest {
-                frame,
-                set_index: 0,
-                camera,
-            },
-            SampleSetId {
-                plan_epoch: 1,
-                index: 0,
-            },
-        )
+        (ViewRequest { frame, set_index: 0, camera }, SampleSetId { plan_epoch: 1, index: 0 })
     }
 
     fn header(index: u64) -> FrameHeader {
@@ -143,26 +113,12 @@ mod tests {
     fn frames_come_once_and_from_their_own_set() {
         let mut expected = Expected::new([request(4), request(7)], ViewPlanes::default()).unwrap();
         expected.accept(4, &header(0)).unwrap();
-        for (frame, header, reason) in [
-            (4, header(0), "twice"),
-            (5, header(0), "not asked"),
-            (7, header(1), "sample set"),
-        ] {
-            assert!(
-                expected
-                    .accept(frame, &header)
-                    .unwrap_err()
-                    .to_string()
-                    .contains(reason)
-            );
+        for (frame, header, reason) in
+            [(4, header(0), "twice"), (5, header(0), "not asked"), (7, header(1), "sample set")]
+        {
+            assert!(expected.accept(frame, &header).unwrap_err().to_string().contains(reason));
         }
-        assert!(
-            expected
-                .finish()
-                .unwrap_err()
-                .to_string()
-                .contains("1 frames are missing: [7]")
-        );
+        assert!(expected.finish().unwrap_err().to_string().contains("1 frames are missing: [7]"));
         expected.accept(7, &header(0)).unwrap();
         expected.finish().unwrap();
         assert!(Expected::new([request(4), request(4)], ViewPlanes::default()).is_err());

@@ -63,13 +63,7 @@ impl Frames {
                 calls.spawn(receive(peer.clone(), requests, decoders.clone(), send.clone()));
             }
         }
-        Self {
-            received,
-            expected,
-            ended,
-            failed: false,
-            _calls: calls,
-        }
+        Self { received, expected, ended, failed: false, _calls: calls }
     }
 
     /// The next frame; `None` when all have come.
@@ -82,10 +76,9 @@ impl Frames {
             return None;
         }
         let next = match self.received.recv().await {
-            Some(Ok((frame, header, view))) => self
-                .expected
-                .accept(frame, &header)
-                .map(|request| Some(Frame { request, view, header })),
+            Some(Ok((frame, header, view))) => {
+                self.expected.accept(frame, &header).map(|request| Some(Frame { request, view, header }))
+            }
             Some(Err(error)) => Err(self.reason(error).await),
             None => self.expected.finish().map(|()| None),
         };
@@ -108,9 +101,9 @@ impl Frames {
     /// A node that leaves breaks streams, and the coordinator says which: its word is the better one.
     async fn reason(&mut self, error: ClientError) -> ClientError {
         match tokio::time::timeout(WORD, self.ended.wait_for(Option::is_some)).await {
-            Ok(Ok(reason)) => ClientError::Ended {
-                reason: format!("{} ({error})", reason.as_deref().unwrap_or_default()),
-            },
+            Ok(Ok(reason)) => {
+                ClientError::Ended { reason: format!("{} ({error})", reason.as_deref().unwrap_or_default()) }
+            }
             _ => error,
         }
     }
@@ -123,18 +116,9 @@ fn spread(template: &RenderViews, requests: &[ViewRequest], peers: usize) -> Vec
         for (peer, of_peer) in spread.iter_mut().enumerate() {
             let share = &run[peer * run.len() / peers..(peer + 1) * run.len() / peers];
             for views in share.chunks(MAX_VIEWS_PER_REQUEST) {
-                let requested = views
-                    .iter()
-                    .map(|view| RequestedView {
-                        frame: view.frame,
-                        camera: view.camera,
-                    })
-                    .collect();
-                of_peer.push(RenderViews {
-                    set_index: views[0].set_index,
-                    views: requested,
-                    ..template.clone()
-                });
+                let requested =
+                    views.iter().map(|view| RequestedView { frame: view.frame, camera: view.camera }).collect();
+                of_peer.push(RenderViews { set_index: views[0].set_index, views: requested, ..template.clone() });
             }
         }
     }
@@ -155,11 +139,7 @@ async fn receive_all(
     send: &mpsc::Sender<Received>,
 ) -> Result<(), ClientError> {
     let status = |status: tonic::Status| peer.error(status.message());
-    let mut parts = peer
-        .client
-        .render_views(tokio_stream::iter(requests))
-        .await
-        .map_err(status)?;
+    let mut parts = peer.client.render_views(tokio_stream::iter(requests)).await.map_err(status)?;
     let mut assembly = FrameAssembly::default();
     let mut decoding = JoinSet::new();
     while let Some(frame) = next_frame(&mut parts, &mut assembly, peer).await? {

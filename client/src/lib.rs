@@ -31,9 +31,7 @@ impl Client {
     /// Where nobody answers.
     pub async fn connect(coordinator: &str) -> Result<Self, ClientError> {
         let channel = connect(coordinator).await.map_err(ClientError::coordinator)?;
-        Ok(Self {
-            coordinator: CoordinatorClient::new(channel),
-        })
+        Ok(Self { coordinator: CoordinatorClient::new(channel) })
     }
 
     /// The cluster's members.
@@ -56,10 +54,7 @@ impl Client {
                 return Ok(status);
             }
             if Instant::now() >= end {
-                return Err(ClientError::FewNodes {
-                    joined: status.nodes.len(),
-                    wanted,
-                });
+                return Err(ClientError::FewNodes { joined: status.nodes.len(), wanted });
             }
             tokio::time::sleep(Duration::from_millis(20)).await;
         }

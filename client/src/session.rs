@@ -63,14 +63,11 @@ impl Session {
         progress: impl FnMut(&SessionEvent),
     ) -> Result<Self, ClientError> {
         let planes = request.planes;
-        let codec: FrameCodec = request.codec.parse().map_err(|error| ClientError::Invalid {
-            field: "codec",
-            reason: format!("{error}"),
-        })?;
-        let mut events = coordinator
-            .open_session(request)
-            .await
-            .map_err(ClientError::coordinator)?;
+        let codec: FrameCodec = request
+            .codec
+            .parse()
+            .map_err(|error| ClientError::Invalid { field: "codec", reason: format!("{error}") })?;
+        let mut events = coordinator.open_session(request).await.map_err(ClientError::coordinator)?;
         let plan = plan_of(&mut events, progress).await?;
         let mut peers = Vec::with_capacity(plan.assignment.compositors.len());
         for share in &plan.assignment.compositors {
@@ -78,14 +75,7 @@ impl Session {
         }
         let (says, ended) = watch::channel(None);
         let watching = tokio::spawn(watch_end(events, says));
-        Ok(Self {
-            plan,
-            codec,
-            planes,
-            peers,
-            ended,
-            watching,
-        })
+        Ok(Self { plan, codec, planes, peers, ended, watching })
     }
 
     /// The plan, its costs and its reason.
@@ -117,10 +107,7 @@ impl Session {
         if let Some(reason) = self.ended() {
             return Err(ClientError::Ended { reason });
         }
-        let due = requests
-            .iter()
-            .map(|request| self.due(request))
-            .collect::<Result<Vec<_>, _>>()?;
+        let due = requests.iter().map(|request| self.due(request)).collect::<Result<Vec<_>, _>>()?;
         let expected = Expected::new(due, self.planes)?;
         let template = wire::RenderViews {
             plan_epoch: self.plan.assignment.plan_epoch,
@@ -130,13 +117,7 @@ impl Session {
             planes: self.planes,
             views: Vec::new(),
         };
-        Ok(Frames::start(
-            &self.peers,
-            &template,
-            requests,
-            expected,
-            self.ended.clone(),
-        ))
+        Ok(Frames::start(&self.peers, &template, requests, expected, self.ended.clone()))
     }
 
     fn due(&self, request: &ViewRequest) -> Result<(ViewRequest, wire::SampleSetId), ClientError> {
@@ -161,10 +142,7 @@ async fn peer(share: &CompositorShare) -> Result<Peer, ClientError> {
         reason: status.message().to_owned(),
     };
     let channel = connect(&share.address).await.map_err(error)?;
-    Ok(Peer {
-        share: share.clone(),
-        client: CompositorClient::new(channel),
-    })
+    Ok(Peer { share: share.clone(), client: CompositorClient::new(channel) })
 }
 
 async fn plan_of(
@@ -180,9 +158,7 @@ async fn plan_of(
             SessionEvent::Ended { reason } => return Err(ClientError::Ended { reason }),
         }
     }
-    Err(ClientError::Coordinator {
-        reason: "the session's stream ended before its plan".to_owned(),
-    })
+    Err(ClientError::Coordinator { reason: "the session's stream ended before its plan".to_owned() })
 }
 
 /// Only the coordinator's word ends a session: frames go on while it is away.

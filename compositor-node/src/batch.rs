@@ -32,11 +32,7 @@ pub(crate) enum Source {
     /// A complete sample set.
     Set(ReadySet),
     /// The scene itself.
-    Scene {
-        scene_hash: String,
-        lighting: String,
-        scene_time_s: f32,
-    },
+    Scene { scene_hash: String, lighting: String, scene_time_s: f32 },
 }
 
 /// A view that waits for the device, with the way back to its client.
@@ -61,11 +57,7 @@ pub(crate) fn take_batch<T>(waiting: &mut VecDeque<T>, key: impl Fn(&T) -> &Batc
     let mut batch = vec![first];
     let mut rest = VecDeque::with_capacity(waiting.len());
     for view in waiting.drain(..) {
-        if batch.len() < most && *key(&view) == wanted {
-            batch.push(view)
-        } else {
-            rest.push_back(view)
-        }
+        if batch.len() < most && *key(&view) == wanted { batch.push(view) } else { rest.push_back(view) }
     }
     *waiting = rest;
     batch

@@ -42,11 +42,7 @@ pub(crate) async fn fetch_set(
         .into_iter()
         .collect::<Option<_>>()
         .ok_or_else(|| Status::data_loss(format!("sample set {set_index} is not complete")))?;
-    Ok(SampleSet {
-        images: complete,
-        volume: plan.workload.volume,
-        background_linear: plan.workload.background_linear,
-    })
+    Ok(SampleSet { images: complete, volume: plan.workload.volume, background_linear: plan.workload.background_linear })
 }
 
 async fn fetch_share(
@@ -57,17 +53,10 @@ async fn fetch_share(
     deadlines: Deadlines,
 ) -> Result<Vec<(u32, DepthImage)>, Status> {
     let client = SamplerClient::new(connections.to(&share.address).await?);
-    let request = FetchImages {
-        plan_epoch: plan.plan_epoch,
-        set_index,
-        image_indices: share.image_indices.clone(),
-    };
+    let request = FetchImages { plan_epoch: plan.plan_epoch, set_index, image_indices: share.image_indices.clone() };
     let answer = tokio::time::timeout(deadlines.work, client.fetch_sample_images(request)).await;
     let mut chunks = answer.map_err(|_| Status::deadline_exceeded("no images in time"))??;
-    let id = SampleSetId {
-        plan_epoch: plan.plan_epoch,
-        index: set_index.into(),
-    };
+    let id = SampleSetId { plan_epoch: plan.plan_epoch, index: set_index.into() };
     let mut reassembler = Reassembler::new(DecodeLimits::default(), id);
     let mut images = Vec::new();
     while let Some(chunk) = next_within(&mut chunks, deadlines.chunk, "chunks").await? {
@@ -80,26 +69,17 @@ async fn fetch_share(
     if images.len() == share.image_indices.len() {
         Ok(images)
     } else {
-        Err(Status::data_loss(format!(
-            "{} images came of {}",
-            images.len(),
-            share.image_indices.len()
-        )))
+        Err(Status::data_loss(format!("{} images came of {}", images.len(), share.image_indices.len())))
     }
 }
 
 fn check(whole: &Reassembled, id: SampleSetId, share: &SamplerShare, have: &[(u32, DepthImage)]) -> Result<(), Status> {
     let index = whole.image_index;
     if whole.sample_set_id != id {
-        return Err(Status::data_loss(format!(
-            "an image of sample set {} came for {id}",
-            whole.sample_set_id
-        )));
+        return Err(Status::data_loss(format!("an image of sample set {} came for {id}", whole.sample_set_id)));
     }
     if !share.image_indices.contains(&index) || have.iter().any(|(other, _)| *other == index) {
-        return Err(Status::data_loss(format!(
-            "image {index} was not asked for, or came twice"
-        )));
+        return Err(Status::data_loss(format!("image {index} was not asked for, or came twice")));
     }
     Ok(())
 }
@@ -107,14 +87,8 @@ fn check(whole: &Reassembled, id: SampleSetId, share: &SamplerShare, have: &[(u3
 async fn decode(plan: &Arc<Assignment>, whole: Reassembled) -> Result<DepthImage, Status> {
     let camera = plan.workload.sample_cameras.get(whole.image_index as usize).copied();
     let camera = camera.ok_or_else(|| Status::data_loss(format!("image {} has no camera", whole.image_index)))?;
-    let decode = move || {
-        decode_depth_image(
-            &whole.image.header,
-            camera,
-            &whole.image.payload,
-            &DecodeLimits::default(),
-        )
-    };
+    let decode =
+        move || decode_depth_image(&whole.image.header, camera, &whole.image.payload, &DecodeLimits::default());
     blocking(move || decode().map_err(|error| Status::data_loss(error.to_string()))).await
 }
 

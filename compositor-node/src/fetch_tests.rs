@@ -19,13 +19,7 @@ use super::*;
 type Spoil = fn(&mut Vec<Chunk>);
 
 fn camera() -> Camera {
-    Camera::Pinhole(PinholeCamera::looking_at(
-        Vec3::Z,
-        Vec3::ZERO,
-        Vec3::Y,
-        1.0,
-        UVec2::splat(16),
-    ))
+    Camera::Pinhole(PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(16)))
 }
 
 /// Chunks of two images of set 0 of plan 5, the right ones.
@@ -38,13 +32,8 @@ fn right() -> Vec<Chunk> {
         surface_id: None,
     };
     let encoded = encode_depth_image(&image, PlaneSet::ALL).unwrap();
-    let id = SampleSetId {
-        plan_epoch: 5,
-        index: 0,
-    };
-    (0..2)
-        .flat_map(|index| split_into_chunks(id, index, encoded.clone()))
-        .collect()
+    let id = SampleSetId { plan_epoch: 5, index: 0 };
+    (0..2).flat_map(|index| split_into_chunks(id, index, encoded.clone())).collect()
 }
 
 /// Sends chunks as they are, and then says nothing more.
@@ -57,11 +46,7 @@ struct Script {
 impl Sampler for Script {
     async fn fetch_sample_images(&self, _request: FetchImages) -> Result<Messages<Chunk>, Status> {
         let chunks = tokio_stream::iter(self.chunks.clone()).map(Ok);
-        Ok(if self.stays_open {
-            Box::pin(chunks.chain(tokio_stream::pending()))
-        } else {
-            Box::pin(chunks)
-        })
+        Ok(if self.stays_open { Box::pin(chunks.chain(tokio_stream::pending())) } else { Box::pin(chunks) })
     }
 }
 
@@ -72,27 +57,17 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
     let routes = Routes::new(sampler_server(Script { chunks, stays_open }));
     let _server = tokio::spawn(node::serve(listener, routes, false, shutdown.clone()));
     let workload = Workload {
-        scene: SceneRef {
-            hash: SceneHash::of(b""),
-            package_bytes: 0,
-        },
+        scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![camera(); 2],
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
         method: "joint_carve".to_owned(),
         codec: "lz4".to_owned(),
-        volume: Aabb {
-            min: Vec3::NEG_ONE,
-            max: Vec3::ONE,
-        },
+        volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::ZERO,
         timeline: Timeline::still(0.0),
     };
-    let share = SamplerShare {
-        node_name: "n7".to_owned(),
-        address,
-        image_indices: vec![0, 1],
-    };
+    let share = SamplerShare { node_name: "n7".to_owned(), address, image_indices: vec![0, 1] };
     let plan = Arc::new(Assignment {
         plan_epoch: 5,
         policy: Policy::Pipeline,
@@ -100,10 +75,7 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
         samplers: vec![share],
         compositors: Vec::new(),
     });
-    let deadlines = Deadlines {
-        chunk: Duration::from_millis(200),
-        ..Deadlines::default()
-    };
+    let deadlines = Deadlines { chunk: Duration::from_millis(200), ..Deadlines::default() };
     let set = fetch_set(&plan, 0, &Arc::default(), deadlines).await;
     shutdown.cancel();
     set
@@ -122,9 +94,7 @@ async fn spoilt_chunks_are_refused_by_name() {
         ("reordered", |c| c.swap(0, 1)),
         ("repeated", |c| c.insert(1, c[0].clone())),
         ("repeated image", |c| c.extend_from_within(0..2)),
-        ("old plan", |c| {
-            c.iter_mut().for_each(|c| c.sample_set_id.plan_epoch = 4)
-        }),
+        ("old plan", |c| c.iter_mut().for_each(|c| c.sample_set_id.plan_epoch = 4)),
         ("another set", |c| c.iter_mut().for_each(|c| c.sample_set_id.index = 1)),
         ("another image", |c| c.iter_mut().for_each(|c| c.image_index += 7)),
     ];

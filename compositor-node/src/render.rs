@@ -67,34 +67,18 @@ async fn make(engine: &Arc<dyn Engine>, batch: &[Waiting]) -> Result<Vec<View>, 
     let cameras: Vec<_> = batch.iter().map(|waiting| waiting.view.camera).collect();
     let count = cameras.len();
     let views = blocking(move || match source {
-        Source::Set(set) => engine.reconstruct(
-            set.as_ref(),
-            &ViewWork {
-                cameras,
-                method: key.method,
-                planes: key.planes,
-            },
-        ),
-        Source::Scene {
-            scene_hash,
-            lighting,
-            scene_time_s,
-        } => engine.draw_direct(&DirectWork {
-            scene_hash,
-            cameras,
-            lighting,
-            scene_time_s,
-            planes: key.planes,
-        }),
+        Source::Set(set) => {
+            engine.reconstruct(set.as_ref(), &ViewWork { cameras, method: key.method, planes: key.planes })
+        }
+        Source::Scene { scene_hash, lighting, scene_time_s } => {
+            engine.draw_direct(&DirectWork { scene_hash, cameras, lighting, scene_time_s, planes: key.planes })
+        }
     })
     .await?;
     if views.len() == count {
         Ok(views)
     } else {
-        Err(Status::internal(format!(
-            "{} views were made for {count} cameras",
-            views.len()
-        )))
+        Err(Status::internal(format!("{} views were made for {count} cameras", views.len())))
     }
 }
 
@@ -113,13 +97,7 @@ async fn encode_all(
             return;
         };
         let queue_s = start.saturating_duration_since(waiting.since).as_secs_f64();
-        let times = StageTimes {
-            set_wait_s: waiting.set_wait_s,
-            queue_s,
-            reconstruct_s,
-            encode_s: 0.0,
-            batch_count,
-        };
+        let times = StageTimes { set_wait_s: waiting.set_wait_s, queue_s, reconstruct_s, encode_s: 0.0, batch_count };
         encodings.spawn(async move {
             encode_and_send(waiting, view, times).await;
             drop(encoder);
@@ -130,14 +108,7 @@ async fn encode_all(
 }
 
 async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes) {
-    let Waiting {
-        key,
-        view: requested,
-        codec,
-        reply,
-        credit,
-        ..
-    } = waiting;
+    let Waiting { key, view: requested, codec, reply, credit, .. } = waiting;
     let encoded = blocking(move || {
         let start = Instant::now();
         let encoded = encode_view(&view, codec).map_err(|error| Status::internal(format!("encoding: {error}")))?;
@@ -146,10 +117,7 @@ async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes) {
     let output = encoded.await.map(|(encoded, encode_s)| {
         times.encode_s = encode_s;
         let header = encoded.header(key.sample_set_id, times);
-        Output {
-            parts: Box::new(FramePart::cut(requested.frame, header, encoded.data)),
-            _credit: credit,
-        }
+        Output { parts: Box::new(FramePart::cut(requested.frame, header, encoded.data)), _credit: credit }
     });
     // The channel has room for every credit, so this waits for nobody; an error means a client that left.
     let _ = reply.send(output).await;

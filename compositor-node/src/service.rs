@@ -42,15 +42,7 @@ impl CompositorService {
         let (arrivals, arriving) = mpsc::channel(ARRIVALS);
         tokio::spawn(render_loop(engine.clone(), arriving));
         let sets = Arc::new(Sets::new(engine, config.deadlines));
-        Self {
-            shared: Arc::new(Shared {
-                plan,
-                sets,
-                arrivals,
-                deadlines: config.deadlines,
-            }),
-            shutdown,
-        }
+        Self { shared: Arc::new(Shared { plan, sets, arrivals, deadlines: config.deadlines }), shutdown }
     }
 }
 
@@ -182,11 +174,7 @@ impl ClientStream {
         if batch.is_empty() {
             return Ok(());
         }
-        self.shared
-            .arrivals
-            .send(batch)
-            .await
-            .map_err(|_| Status::internal("the device's loop has ended"))
+        self.shared.arrivals.send(batch).await.map_err(|_| Status::internal("the device's loop has ended"))
     }
 }
 

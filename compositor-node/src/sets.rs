@@ -29,12 +29,7 @@ pub(crate) struct Sets {
 
 impl Sets {
     pub(crate) fn new(engine: Arc<dyn Engine>, deadlines: Deadlines) -> Self {
-        Self {
-            engine,
-            connections: Arc::default(),
-            deadlines,
-            kept: Mutex::default(),
-        }
+        Self { engine, connections: Arc::default(), deadlines, kept: Mutex::default() }
     }
 
     /// A set, once it is completely there; the one after it is then fetched ahead, so that samplers
@@ -62,14 +57,11 @@ impl Sets {
             return Ok(set.clone());
         }
         let (sets, plan) = (self.clone(), plan.clone());
-        let loading = tokio::spawn(async move {
-            cell.get_or_try_init(|| sets.fetch_and_upload(&plan, set_index))
-                .await
-                .cloned()
-        });
-        loading
-            .await
-            .map_err(|error| Status::internal(format!("loading a sample set failed: {error}")))?
+        let loading =
+            tokio::spawn(
+                async move { cell.get_or_try_init(|| sets.fetch_and_upload(&plan, set_index)).await.cloned() },
+            );
+        loading.await.map_err(|error| Status::internal(format!("loading a sample set failed: {error}")))?
     }
 
     async fn fetch_and_upload(&self, plan: &Arc<Assignment>, set_index: u32) -> Result<ReadySet, Status> {
@@ -78,21 +70,14 @@ impl Sets {
         let fetched_s = start.elapsed().as_secs_f64();
         let engine = self.engine.clone();
         let ready = blocking(move || engine.upload(&set)).await?;
-        tracing::debug!(
-            set_index,
-            fetched_s,
-            total_s = start.elapsed().as_secs_f64(),
-            "sample set ready"
-        );
+        tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
         Ok(ready)
     }
 
     fn cell(&self, content: SetContent) -> Cell {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let at = kept.iter().position(|(other, _)| *other == content);
-        let entry = at
-            .and_then(|at| kept.remove(at))
-            .unwrap_or_else(|| (content, Cell::default()));
+        let entry = at.and_then(|at| kept.remove(at)).unwrap_or_else(|| (content, Cell::default()));
         let cell = entry.1.clone();
         kept.push_back(entry);
         if kept.len() > KEPT_SETS {

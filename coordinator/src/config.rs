@@ -77,9 +77,6 @@ impl SceneOffer {
     /// Its name and size.
     #[must_use]
     pub fn scene(&self) -> SceneRef {
-        SceneRef {
-            hash: self.hash.clone(),
-            package_bytes: self.package.len() as u64,
-        }
+        SceneRef { hash: self.hash.clone(), package_bytes: self.package.len() as u64 }
     }
 }

@@ -17,8 +17,9 @@ use crate::schedule::{Command, Event, Opening};
 use crate::service::Inner;
 use crate::workload::workload_of;
 
-/// Views of one measured call: a few, as in a batch, but not so many that a slow device takes minutes.
-const MEASURED_BATCH: u32 = 4;
+/// Views of one measured call: as in a batch of real work, for few views cost more apiece, but not so many that a
+/// slow device takes minutes.
+const MEASURED_BATCH: u32 = 32;
 /// Measured costs that are kept.
 const KEPT_COSTS: usize = 16;
 
@@ -34,13 +35,11 @@ pub(crate) async fn open(inner: Arc<Inner>, session: u64, request: SessionReques
             () = events.closed() => Err(Status::cancelled("the client went away")),
         }
     };
-    let event = opened
-        .map(|plan| SessionEvent::Plan(Box::new(plan)))
-        .inspect_err(|status| {
-            tracing::warn!(session, reason = status.message(), "session refused");
-            inner.step(Event::Closed { session });
-            inner.forget(session);
-        });
+    let event = opened.map(|plan| SessionEvent::Plan(Box::new(plan))).inspect_err(|status| {
+        tracing::warn!(session, reason = status.message(), "session refused");
+        inner.step(Event::Closed { session });
+        inner.forget(session);
+    });
     // An error means a client that left: its guard closes the session.
     let _ = events.send(event).await;
 }
@@ -59,12 +58,7 @@ async fn plan(
         planes: request.planes,
     };
     let costs = measured(inner, &measure, events).await?;
-    say(
-        events,
-        SessionStage::Planning,
-        "choosing between pipeline and direct".to_owned(),
-    )
-    .await;
+    say(events, SessionStage::Planning, "choosing between pipeline and direct".to_owned()).await;
     let opening = Opening {
         session,
         workload: measure.workload,
@@ -74,19 +68,10 @@ async fn plan(
         costs,
     };
     let (mut plan, addresses) = planned(inner, opening)?;
-    say(
-        events,
-        SessionStage::Preparing,
-        format!("{} nodes take plan {}", addresses.len(), plan.assignment.plan_epoch),
-    )
-    .await;
+    say(events, SessionStage::Preparing, format!("{} nodes take plan {}", addresses.len(), plan.assignment.plan_epoch))
+        .await;
     plan.scene_load_s = apply(inner, &plan.assignment, addresses).await?;
-    tracing::info!(
-        session,
-        plan_epoch = plan.assignment.plan_epoch,
-        reason = plan.reason,
-        "planned"
-    );
+    tracing::info!(session, plan_epoch = plan.assignment.plan_epoch, reason = plan.reason, "planned");
     Ok(plan)
 }
 
@@ -98,22 +83,15 @@ async fn say(events: &Events, stage: SessionStage, detail: String) {
 /// The slowest device's costs: one node of each device measures, one after the other.
 async fn measured(inner: &Arc<Inner>, measure: &MeasureCosts, events: &Events) -> Result<Costs, Status> {
     let nodes = inner.status().nodes;
-    let devices: BTreeMap<String, NodeStatus> = nodes
-        .into_iter()
-        .rev()
-        .map(|node| (node.device_name.clone(), node))
-        .collect();
+    let devices: BTreeMap<String, NodeStatus> =
+        nodes.into_iter().rev().map(|node| (node.device_name.clone(), node)).collect();
     let mut costs: Option<Costs> = None;
     for (device, node) in devices {
         let of_device = match inner.kept_costs(&device, measure) {
             Some(known) => known,
             None => {
-                say(
-                    events,
-                    SessionStage::Measuring,
-                    format!("{} measures its costs on {device}", node.node_name),
-                )
-                .await;
+                say(events, SessionStage::Measuring, format!("{} measures its costs on {device}", node.node_name))
+                    .await;
                 let fresh = measure_on(inner, &node, measure.clone()).await?;
                 inner.keep_costs(device, measure.clone(), fresh, KEPT_COSTS);
                 fresh
@@ -125,14 +103,8 @@ async fn measured(inner: &Arc<Inner>, measure: &MeasureCosts, events: &Events) -
 }
 
 async fn measure_on(inner: &Inner, node: &NodeStatus, measure: MeasureCosts) -> Result<Costs, Status> {
-    let call = async {
-        NodeClient::new(inner.connections.to(&node.address).await?)
-            .measure_costs(measure)
-            .await
-    };
-    within(inner.config.measure_deadline, "measuring", call)
-        .await
-        .map_err(|status| named(&node.node_name, &status))
+    let call = async { NodeClient::new(inner.connections.to(&node.address).await?).measure_costs(measure).await };
+    within(inner.config.measure_deadline, "measuring", call).await.map_err(|status| named(&node.node_name, &status))
 }
 
 fn planned(inner: &Arc<Inner>, opening: Opening) -> Result<(SessionPlan, Vec<String>), Status> {
@@ -153,14 +125,9 @@ async fn apply(inner: &Arc<Inner>, assignment: &Assignment, addresses: Vec<Strin
     for address in addresses {
         let (inner, assignment) = (inner.clone(), assignment.clone());
         calls.spawn(async move {
-            let call = async {
-                NodeClient::new(inner.connections.to(&address).await?)
-                    .apply_assignment(assignment)
-                    .await
-            };
-            within(inner.config.ready_deadline, "getting ready", call)
-                .await
-                .map_err(|status| named(&address, &status))
+            let call =
+                async { NodeClient::new(inner.connections.to(&address).await?).apply_assignment(assignment).await };
+            within(inner.config.ready_deadline, "getting ready", call).await.map_err(|status| named(&address, &status))
         });
     }
     let mut slowest_s = 0f64;

@@ -15,7 +15,8 @@ use tonic::{Status, async_trait};
 use wire::limits::PART_BYTES;
 use wire::rpc::{Coordinator, Messages, coordinator_server};
 use wire::{
-    ClusterStatus, Costs, FetchScene, JoinCluster, MeasureCosts, ScenePart, SessionEvent, SessionRequest, Timeline, Welcome,
+    ClusterStatus, Costs, FetchScene, JoinCluster, MeasureCosts, ScenePart, SessionEvent, SessionRequest, Timeline,
+    Welcome,
 };
 
 use crate::opening::{Events, open};
@@ -46,10 +47,7 @@ pub async fn serve(
         costs: Mutex::default(),
         counter: AtomicU64::new(1),
     });
-    let service = CoordinatorService {
-        inner,
-        shutdown: shutdown.clone(),
-    };
+    let service = CoordinatorService { inner, shutdown: shutdown.clone() };
     let routes = Routes::new(health(&["coordinator"]).await).add_service(coordinator_server(service));
     node::serve(listener, routes, config.insecure_bind, shutdown).await
 }
@@ -88,9 +86,7 @@ impl Inner {
             return;
         };
         // Full only where the client does not read; its calls then fail at the nodes.
-        let _ = events.try_send(Ok(SessionEvent::Ended {
-            reason: reason.to_owned(),
-        }));
+        let _ = events.try_send(Ok(SessionEvent::Ended { reason: reason.to_owned() }));
     }
 
     pub(crate) fn forget(&self, session: u64) {
@@ -152,33 +148,14 @@ struct CoordinatorService {
 #[async_trait]
 impl Coordinator for CoordinatorService {
     async fn join_cluster(&self, request: JoinCluster) -> Result<Messages<Welcome>, Status> {
-        let (inner, node_name, incarnation) = (
-            self.inner.clone(),
-            request.node.node_name.clone(),
-            self.inner.next_number(),
-        );
-        tracing::info!(
-            node = node_name,
-            address = request.node.address,
-            device = request.node.device_name,
-            "joined"
-        );
-        inner.step(Event::Joined {
-            incarnation,
-            join: request,
-        });
-        let welcome = Welcome {
-            scenes: vec![inner.offer.scene()],
-        };
+        let (inner, node_name, incarnation) =
+            (self.inner.clone(), request.node.node_name.clone(), self.inner.next_number());
+        tracing::info!(node = node_name, address = request.node.address, device = request.node.device_name, "joined");
+        inner.step(Event::Joined { incarnation, join: request });
+        let welcome = Welcome { scenes: vec![inner.offer.scene()] };
         let stream = tokio_stream::once(Ok(welcome)).chain(tokio_stream::pending());
-        let guard = Guard {
-            inner,
-            event: Some(Event::Left { incarnation, node_name }),
-        };
-        Ok(with_guard(
-            until_drained(Box::pin(stream), self.shutdown.clone()),
-            guard,
-        ))
+        let guard = Guard { inner, event: Some(Event::Left { incarnation, node_name }) };
+        Ok(with_guard(until_drained(Box::pin(stream), self.shutdown.clone()), guard))
     }
 
     async fn open_session(&self, request: SessionRequest) -> Result<Messages<SessionEvent>, Status> {
@@ -186,23 +163,14 @@ impl Coordinator for CoordinatorService {
         let (events, stream) = mpsc::channel(SESSION_EVENTS);
         locked(&self.inner.sessions).insert(session, events.clone());
         tokio::spawn(open(self.inner.clone(), session, request, events));
-        let guard = Guard {
-            inner: self.inner.clone(),
-            event: Some(Event::Closed { session }),
-        };
-        Ok(with_guard(
-            until_drained(Box::pin(ReceiverStream::new(stream)), self.shutdown.clone()),
-            guard,
-        ))
+        let guard = Guard { inner: self.inner.clone(), event: Some(Event::Closed { session }) };
+        Ok(with_guard(until_drained(Box::pin(ReceiverStream::new(stream)), self.shutdown.clone()), guard))
     }
 
     async fn fetch_scene(&self, request: FetchScene) -> Result<Messages<ScenePart>, Status> {
         let offer = &self.inner.offer;
         if request.hash != offer.hash {
-            return Err(Status::not_found(format!(
-                "scene_hash: the scene on offer is {}",
-                offer.hash
-            )));
+            return Err(Status::not_found(format!("scene_hash: the scene on offer is {}", offer.hash)));
         }
         let start = usize::try_from(request.offset_bytes).unwrap_or(usize::MAX);
         if start > offer.package.len() {
@@ -217,16 +185,10 @@ impl Coordinator for CoordinatorService {
             data: package.slice(start..package.len().min(start + PART_BYTES)),
         };
         let parts = (start..offer.package.len()).step_by(PART_BYTES).map(part).map(Ok);
-        Ok(until_drained(
-            Box::pin(tokio_stream::iter(parts)),
-            self.shutdown.clone(),
-        ))
+        Ok(until_drained(Box::pin(tokio_stream::iter(parts)), self.shutdown.clone()))
     }
 
     async fn status(&self) -> Result<ClusterStatus, Status> {
-        Ok(ClusterStatus {
-            offer: Some(self.inner.offer.status()),
-            ..self.inner.status()
-        })
+        Ok(ClusterStatus { offer: Some(self.inner.offer.status()), ..self.inner.status() })
     }
 }

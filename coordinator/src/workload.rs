@@ -13,26 +13,13 @@ use crate::SceneOffer;
 /// For another scene than the one on offer, and cameras that cannot be.
 pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Result<Workload, Status> {
     if request.scene.as_ref().is_some_and(|hash| *hash != offer.hash) {
-        return Err(Status::not_found(format!(
-            "scene_hash: the scene on offer is {}",
-            offer.hash
-        )));
+        return Err(Status::not_found(format!("scene_hash: the scene on offer is {}", offer.hash)));
     }
-    let cameras = if request.sample_cameras.is_empty() {
-        &offer.rig
-    } else {
-        &request.sample_cameras
-    };
-    let sized = |camera: &Camera| {
-        request
-            .sample_size_px
-            .map_or(Ok(*camera), |size_px| resized(camera, size_px))
-    };
+    let cameras = if request.sample_cameras.is_empty() { &offer.rig } else { &request.sample_cameras };
+    let sized = |camera: &Camera| request.sample_size_px.map_or(Ok(*camera), |size_px| resized(camera, size_px));
     let sample_cameras = cameras.iter().map(sized).collect::<Result<Vec<_>, _>>()?;
     if sample_cameras.is_empty() {
-        return Err(Status::invalid_argument(
-            "sample_cameras is missing, and the scene came without a rig",
-        ));
+        return Err(Status::invalid_argument("sample_cameras is missing, and the scene came without a rig"));
     }
     Ok(Workload {
         scene: offer.scene(),
@@ -57,8 +44,6 @@ fn resized(camera: &Camera, size_px: UVec2) -> Result<Camera, Status> {
         principal_px: camera.principal_px * scale,
         ..*camera
     };
-    camera
-        .validate()
-        .map_err(|error| Status::invalid_argument(format!("sample_image_size: {error}")))?;
+    camera.validate().map_err(|error| Status::invalid_argument(format!("sample_image_size: {error}")))?;
     Ok(Camera::Pinhole(camera))
 }

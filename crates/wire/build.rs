@@ -8,9 +8,8 @@ use prost::Message as _;
 fn main() -> Result<(), Box<dyn error::Error>> {
     let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?).join("../../proto");
     let package = root.join("myriorama/v1");
-    let mut files: Vec<PathBuf> = fs::read_dir(&package)?
-        .map(|entry| entry.map(|e| e.path()))
-        .collect::<Result<_, _>>()?;
+    let mut files: Vec<PathBuf> =
+        fs::read_dir(&package)?.map(|entry| entry.map(|e| e.path())).collect::<Result<_, _>>()?;
     files.sort();
     println!("cargo:rerun-if-changed={}", package.display());
     let descriptors = protox::compile(&files, [&root])?;

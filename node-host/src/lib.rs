@@ -33,13 +33,7 @@ pub async fn serve(
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))
         .add_service(compositor_server(compositor));
-    let membership = tokio::spawn(keep_membership(
-        status,
-        config.coordinator.clone(),
-        plan,
-        scenes,
-        shutdown.clone(),
-    ));
+    let membership = tokio::spawn(keep_membership(status, config.coordinator.clone(), plan, scenes, shutdown.clone()));
     let served = node::serve(listener, routes, config.insecure_bind, shutdown).await;
     // Where serving failed, nobody has cancelled it.
     membership.abort();
@@ -49,10 +43,7 @@ pub async fn serve(
 fn status_of(config: &NodeConfig, address: SocketAddr, engine: &dyn Engine) -> NodeStatus {
     NodeStatus {
         node_name: config.node_name.clone(),
-        address: config
-            .advertised_address
-            .clone()
-            .unwrap_or_else(|| format!("http://{address}")),
+        address: config.advertised_address.clone().unwrap_or_else(|| format!("http://{address}")),
         device_name: engine.device_name(),
         is_software: engine.is_software(),
     }

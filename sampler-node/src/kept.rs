@@ -25,10 +25,7 @@ pub(crate) struct Kept {
 
 impl Kept {
     pub(crate) fn new(max_bytes: usize) -> Self {
-        Self {
-            max_bytes,
-            sets: Mutex::default(),
-        }
+        Self { max_bytes, sets: Mutex::default() }
     }
 
     /// The images of a set, made by the first who asks. They go on being made when that one leaves.
@@ -46,17 +43,13 @@ impl Kept {
             kept.forget_oldest();
             Ok(images)
         });
-        making
-            .await
-            .map_err(|error| Status::internal(format!("sampling failed: {error}")))?
+        making.await.map_err(|error| Status::internal(format!("sampling failed: {error}")))?
     }
 
     fn cell(&self, key: Key) -> Cell {
         let mut sets = self.sets.lock().unwrap_or_else(PoisonError::into_inner);
         let at = sets.iter().position(|(other, _)| *other == key);
-        let entry = at
-            .and_then(|at| sets.remove(at))
-            .unwrap_or_else(|| (key, Cell::default()));
+        let entry = at.and_then(|at| sets.remove(at)).unwrap_or_else(|| (key, Cell::default()));
         let cell = entry.1.clone();
         sets.push_back(entry);
         cell
@@ -64,10 +57,8 @@ impl Kept {
 
     fn forget_oldest(&self) {
         let mut sets = self.sets.lock().unwrap_or_else(PoisonError::into_inner);
-        let bytes = |cell: &Cell| {
-            cell.get()
-                .map_or(0, |images| images.iter().map(|(_, image)| image.payload.len()).sum())
-        };
+        let bytes =
+            |cell: &Cell| cell.get().map_or(0, |images| images.iter().map(|(_, image)| image.payload.len()).sum());
         let mut total: usize = sets.iter().map(|(_, cell)| bytes(cell)).sum();
         while total > self.max_bytes && sets.len() > 1 {
             total -= sets.pop_front().map_or(0, |(_, cell)| bytes(&cell));
@@ -87,36 +78,20 @@ mod tests {
     use super::*;
 
     fn camera() -> Camera {
-        Camera::Pinhole(PinholeCamera::looking_at(
-            Vec3::Z,
-            Vec3::ZERO,
-            Vec3::Y,
-            1.0,
-            UVec2::splat(8),
-        ))
+        Camera::Pinhole(PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8)))
     }
 
     fn key(set_index: u32) -> Key {
         let workload = Workload {
-            scene: SceneRef {
-                hash: SceneHash::of(b""),
-                package_bytes: 0,
-            },
+            scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
             sample_cameras: vec![camera()],
             sampling: "conventional".to_owned(),
             lighting: "unlit".to_owned(),
             method: "joint_carve".to_owned(),
             codec: "lz4".to_owned(),
-            volume: Aabb {
-                min: Vec3::NEG_ONE,
-                max: Vec3::ONE,
-            },
+            volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
             background_linear: Vec3::ZERO,
-            timeline: Timeline {
-                start_s: 0.0,
-                step_s: 1.0,
-                set_count: 9,
-            },
+            timeline: Timeline { start_s: 0.0, step_s: 1.0, set_count: 9 },
         };
         let plan = Assignment {
             plan_epoch: 1,

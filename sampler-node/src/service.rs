@@ -23,12 +23,7 @@ impl SamplerService {
     /// Of a node.
     #[must_use]
     pub fn new(engine: Arc<dyn Engine>, plan: CurrentPlan, config: &NodeConfig, shutdown: CancellationToken) -> Self {
-        Self {
-            engine,
-            plan,
-            kept: Arc::new(Kept::new(config.kept_sample_bytes)),
-            shutdown,
-        }
+        Self { engine, plan, kept: Arc::new(Kept::new(config.kept_sample_bytes)), shutdown }
     }
 
     /// All of this node's images of a set: the first request makes them, in one submission.
@@ -40,9 +35,7 @@ impl SamplerService {
         let work = sample_work(plan, &indices, scene_time_s)?;
         let engine = self.engine.clone();
         let key = (content, indices.clone());
-        self.kept
-            .get(key, move || blocking(move || sample(engine.as_ref(), &work, &indices)))
-            .await
+        self.kept.get(key, move || blocking(move || sample(engine.as_ref(), &work, &indices))).await
     }
 }
 
@@ -58,31 +51,17 @@ impl Sampler for SamplerService {
             )));
         }
         let images = self.images(&plan, request.set_index).await?;
-        let id = SampleSetId {
-            plan_epoch: plan.plan_epoch,
-            index: request.set_index.into(),
-        };
-        let wanted: Vec<_> = images
-            .iter()
-            .filter(|(index, _)| request.image_indices.contains(index))
-            .cloned()
-            .collect();
+        let id = SampleSetId { plan_epoch: plan.plan_epoch, index: request.set_index.into() };
+        let wanted: Vec<_> =
+            images.iter().filter(|(index, _)| request.image_indices.contains(index)).cloned().collect();
         // The payload is shared: an iterator of chunks holds no copies.
-        let chunks = wanted
-            .into_iter()
-            .flat_map(move |(index, image)| split_into_chunks(id, index, image))
-            .map(Ok);
-        Ok(until_drained(
-            Box::pin(tokio_stream::iter(chunks)),
-            self.shutdown.clone(),
-        ))
+        let chunks = wanted.into_iter().flat_map(move |(index, image)| split_into_chunks(id, index, image)).map(Ok);
+        Ok(until_drained(Box::pin(tokio_stream::iter(chunks)), self.shutdown.clone()))
     }
 }
 
 fn sample_work(plan: &Assignment, indices: &[u32], scene_time_s: f32) -> Result<SampleWork, Status> {
-    let cameras = indices
-        .iter()
-        .map(|&index| plan.workload.sample_cameras.get(index as usize).copied());
+    let cameras = indices.iter().map(|&index| plan.workload.sample_cameras.get(index as usize).copied());
     Ok(SampleWork {
         scene_hash: plan.workload.scene.hash.to_string(),
         cameras: cameras
@@ -99,21 +78,13 @@ fn sample(engine: &dyn Engine, work: &SampleWork, indices: &[u32]) -> Result<Enc
     let images = engine.sample(work)?;
     let sampled_s = start.elapsed().as_secs_f64();
     if images.len() != indices.len() {
-        return Err(Status::internal(format!(
-            "{} images were sampled for {} cameras",
-            images.len(),
-            indices.len()
-        )));
+        return Err(Status::internal(format!("{} images were sampled for {} cameras", images.len(), indices.len())));
     }
     let encode = |(index, image): (&u32, &_)| {
         let encoded = encode_depth_image(image, PlaneSet::ALL).map_err(|error| Status::internal(error.to_string()))?;
         Ok((*index, encoded))
     };
-    let encoded = indices
-        .iter()
-        .zip(&images)
-        .map(encode)
-        .collect::<Result<Vec<_>, Status>>()?;
+    let encoded = indices.iter().zip(&images).map(encode).collect::<Result<Vec<_>, Status>>()?;
     tracing::debug!(
         images = images.len(),
         scene_time_s = work.scene_time_s,

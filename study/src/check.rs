@@ -94,20 +94,8 @@ impl Check {
 
     /// A check that could not be made here.
     #[must_use]
-    pub fn not_run(
-        name: impl Into<String>,
-        unit: impl Into<String>,
-        bar: Bar,
-        reason: impl Into<String>,
-    ) -> Self {
-        Self {
-            name: name.into(),
-            value: None,
-            unit: unit.into(),
-            bar,
-            holds: None,
-            reason: Some(reason.into()),
-        }
+    pub fn not_run(name: impl Into<String>, unit: impl Into<String>, bar: Bar, reason: impl Into<String>) -> Self {
+        Self { name: name.into(), value: None, unit: unit.into(), bar, holds: None, reason: Some(reason.into()) }
     }
 
     /// Holds a value that may be missing against the bar: not run, for the reason, where it is.
@@ -191,29 +179,12 @@ mod tests {
     #[test]
     fn bars_include_themselves() {
         for bar in [Bar::AtLeast(2.0), Bar::AtMost(2.0), Bar::Equal(2.0)] {
-            assert_eq!(
-                Check::new("x", 2.0, "", bar).outcome(),
-                Outcome::Holds,
-                "{bar}"
-            );
-            assert_eq!(
-                Check::new("x", f64::NAN, "", bar).outcome(),
-                Outcome::FallsShort,
-                "{bar}"
-            );
+            assert_eq!(Check::new("x", 2.0, "", bar).outcome(), Outcome::Holds, "{bar}");
+            assert_eq!(Check::new("x", f64::NAN, "", bar).outcome(), Outcome::FallsShort, "{bar}");
         }
-        assert_eq!(
-            Check::new("x", 1.9, "", Bar::AtLeast(2.0)).outcome(),
-            Outcome::FallsShort
-        );
-        assert_eq!(
-            Check::new("x", 2.1, "", Bar::AtMost(2.0)).outcome(),
-            Outcome::FallsShort
-        );
-        assert_eq!(
-            Check::new("x", f64::INFINITY, "dB", Bar::AtLeast(40.0)).outcome(),
-            Outcome::Holds
-        );
+        assert_eq!(Check::new("x", 1.9, "", Bar::AtLeast(2.0)).outcome(), Outcome::FallsShort);
+        assert_eq!(Check::new("x", 2.1, "", Bar::AtMost(2.0)).outcome(), Outcome::FallsShort);
+        assert_eq!(Check::new("x", f64::INFINITY, "dB", Bar::AtLeast(40.0)).outcome(), Outcome::Holds);
     }
 
     #[test]
@@ -223,8 +194,7 @@ mod tests {
             json,
             serde_json::json!({"name": "FLIP", "value": 0.04, "unit": "", "bar": {"at_most": 0.05}, "holds": true})
         );
-        let json =
-            serde_json::to_value(Check::not_run("GPU", "ms", Bar::AtMost(1.0), "no GPU")).unwrap();
+        let json = serde_json::to_value(Check::not_run("GPU", "ms", Bar::AtMost(1.0), "no GPU")).unwrap();
         assert!(json["holds"].is_null() && json["value"].is_null());
         assert_eq!(json["reason"], "no GPU");
     }

@@ -6,15 +6,9 @@ use crate::{Check, Outcome};
 #[must_use]
 pub fn checks_text(checks: &[Check]) -> String {
     let header = ["check", "value", "bar", "outcome"].map(String::from);
-    let rows: Vec<[String; 4]> = std::iter::once(header)
-        .chain(checks.iter().map(row))
-        .collect();
-    let widths: [usize; 4] = std::array::from_fn(|column| {
-        rows.iter()
-            .map(|row| width(&row[column]))
-            .max()
-            .unwrap_or(0)
-    });
+    let rows: Vec<[String; 4]> = std::iter::once(header).chain(checks.iter().map(row)).collect();
+    let widths: [usize; 4] =
+        std::array::from_fn(|column| rows.iter().map(|row| width(&row[column])).max().unwrap_or(0));
     let lines = rows.iter().map(|row| line(row, widths));
     lines.chain([totals(checks)]).collect::<Vec<_>>().join("\n")
 }
@@ -24,34 +18,18 @@ fn row(check: &Check) -> [String; 4] {
         Some(reason) => format!("{}: {reason}", check.outcome().words()),
         None => check.outcome().words().into(),
     };
-    [
-        check.name().into(),
-        check.value_text(),
-        check.bar_text(),
-        outcome,
-    ]
+    [check.name().into(), check.value_text(), check.bar_text(), outcome]
 }
 
 /// Names to the left, values to the right, the rest to the left.
 fn line([name, value, bar, outcome]: &[String; 4], widths: [usize; 4]) -> String {
-    format!(
-        "{name:<0$}  {value:>1$}  {bar:<2$}  {outcome}",
-        widths[0], widths[1], widths[2]
-    )
+    format!("{name:<0$}  {value:>1$}  {bar:<2$}  {outcome}", widths[0], widths[1], widths[2])
 }
 
 fn totals(checks: &[Check]) -> String {
-    let count = |outcome| {
-        checks
-            .iter()
-            .filter(|check| check.outcome() == outcome)
-            .count()
-    };
+    let count = |outcome| checks.iter().filter(|check| check.outcome() == outcome).count();
     let [holds, short, not_run] = [Outcome::Holds, Outcome::FallsShort, Outcome::NotRun].map(count);
-    format!(
-        "{} checks: {holds} hold, {short} fall short, {not_run} not run",
-        checks.len()
-    )
+    format!("{} checks: {holds} hold, {short} fall short, {not_run} not run", checks.len())
 }
 
 /// Characters, as `format!` pads them.

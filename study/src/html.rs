@@ -28,9 +28,7 @@ pub(crate) fn page(report: &Report, charts: Vec<String>) -> Result<String, Repor
 }
 
 fn named<'a>(entries: impl Iterator<Item = (&'a String, String)>) -> Vec<Value> {
-    entries
-        .map(|(name, value)| context! { name, value })
-        .collect()
+    entries.map(|(name, value)| context! { name, value }).collect()
 }
 
 fn check(check: &Check) -> Value {
@@ -51,9 +49,7 @@ fn check(check: &Check) -> Value {
 
 fn table(table: &Table) -> Value {
     let row = |row: &Vec<crate::Cell>| {
-        let cells = row
-            .iter()
-            .map(|cell| context! { text => cell.display(), numeric => cell.is_numeric() });
+        let cells = row.iter().map(|cell| context! { text => cell.display(), numeric => cell.is_numeric() });
         cells.collect::<Vec<_>>()
     };
     context! {
@@ -66,10 +62,8 @@ fn table(table: &Table) -> Value {
 
 fn pictures(row: &crate::PictureRow) -> Value {
     let picture = |picture: &crate::Picture| {
-        let legend = picture
-            .legend
-            .iter()
-            .map(|(name, [r, g, b])| context! { name, color => format!("rgb({r},{g},{b})") });
+        let legend =
+            picture.legend.iter().map(|(name, [r, g, b])| context! { name, color => format!("rgb({r},{g},{b})") });
         context! {
             file => picture_path(&picture.name),
             caption => picture.caption.as_str(),

@@ -23,8 +23,7 @@ mod table;
 mod write;
 
 pub use chart::{
-    Axis, BarChart, Better, Chart, Limit, Mark, Palette, Point, Scale, Series, Stage, XyChart,
-    pareto_front,
+    Axis, BarChart, Better, Chart, Limit, Mark, Palette, Point, Scale, Series, Stage, XyChart, pareto_front,
 };
 pub use check::{Bar, Check, Outcome};
 pub use check_text::checks_text;

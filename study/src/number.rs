@@ -20,10 +20,7 @@ pub fn format_number(value: f64) -> String {
     let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
     match exponent {
-        -4..=6 => without_trailing_zeros(&format!(
-            "{value:.*}",
-            usize::try_from(3 - exponent).unwrap_or(0)
-        )),
+        -4..=6 => without_trailing_zeros(&format!("{value:.*}", usize::try_from(3 - exponent).unwrap_or(0))),
         _ => format!("{}e{exponent}", without_trailing_zeros(mantissa)),
     }
 }

@@ -72,9 +72,7 @@ impl Report {
     /// not fall short; the printed table says that it was not run, and why.
     #[must_use]
     pub fn exit_ok(&self) -> bool {
-        self.checks
-            .iter()
-            .all(|check| check.outcome() != Outcome::FallsShort)
+        self.checks.iter().all(|check| check.outcome() != Outcome::FallsShort)
     }
 
     /// Writes the report to a folder, made if need be: `report.json`, `index.html`, a CSV file a table,

@@ -3,15 +3,9 @@
 /// Lower-case letters, digits and single hyphens; `unnamed` where nothing else is left.
 #[must_use]
 pub fn slug(name: &str) -> String {
-    let words = name
-        .split(|c: char| !c.is_ascii_alphanumeric())
-        .filter(|word| !word.is_empty());
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     let joined = words.collect::<Vec<_>>().join("-").to_ascii_lowercase();
-    if joined.is_empty() {
-        "unnamed".into()
-    } else {
-        joined
-    }
+    if joined.is_empty() { "unnamed".into() } else { joined }
 }
 
 #[cfg(test)]

@@ -53,11 +53,7 @@ impl Cell {
 
 impl From<f64> for Cell {
     fn from(number: f64) -> Self {
-        if number.is_finite() {
-            Self::Number(number)
-        } else {
-            Self::Missing
-        }
+        if number.is_finite() { Self::Number(number) } else { Self::Missing }
     }
 }
 
@@ -122,10 +118,7 @@ impl Column {
     /// A column with a unit, or with `""`.
     #[must_use]
     pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            unit: unit.into(),
-        }
+        Self { name: name.into(), unit: unit.into() }
     }
 
     /// `name (unit)`.
@@ -153,15 +146,8 @@ impl Table {
     /// An empty table of `(heading, unit)` columns.
     #[must_use]
     pub fn new(name: impl Into<String>, columns: &[(&str, &str)]) -> Self {
-        let columns = columns
-            .iter()
-            .map(|&(name, unit)| Column::new(name, unit))
-            .collect();
-        Self {
-            name: name.into(),
-            columns,
-            rows: Vec::new(),
-        }
+        let columns = columns.iter().map(|&(name, unit)| Column::new(name, unit)).collect();
+        Self { name: name.into(), columns, rows: Vec::new() }
     }
 
     /// Adds a row.
@@ -176,18 +162,10 @@ impl Table {
     /// Checks that every row has one cell a column.
     pub(crate) fn validate(&self) -> Result<(), ReportError> {
         let columns = self.columns.len();
-        match self
-            .rows
-            .iter()
-            .enumerate()
-            .find(|(_, row)| row.len() != columns)
-        {
-            Some((row, cells)) => Err(ReportError::RowLength {
-                table: self.name.clone(),
-                row,
-                cells: cells.len(),
-                columns,
-            }),
+        match self.rows.iter().enumerate().find(|(_, row)| row.len() != columns) {
+            Some((row, cells)) => {
+                Err(ReportError::RowLength { table: self.name.clone(), row, cells: cells.len(), columns })
+            }
             None => Ok(()),
         }
     }
@@ -199,9 +177,7 @@ impl Table {
         for row in &self.rows {
             writer.write_record(row.iter().map(Cell::full))?;
         }
-        writer
-            .into_inner()
-            .map_err(|error| error.into_error().into())
+        writer.into_inner().map_err(|error| error.into_error().into())
     }
 }
 
@@ -221,27 +197,12 @@ mod tests {
     #[test]
     fn a_short_row_is_refused() {
         let mut table = Table::new("costs", &[("what", ""), ("time", "ms")]);
-        assert!(matches!(
-            table.push([1_u32.into()]),
-            Err(ReportError::RowLength {
-                cells: 1,
-                columns: 2,
-                ..
-            })
-        ));
+        assert!(matches!(table.push([1_u32.into()]), Err(ReportError::RowLength { cells: 1, columns: 2, .. })));
     }
 
     #[test]
     fn cells_survive_json() {
-        let cells = [
-            Cell::Missing,
-            true.into(),
-            3_u32.into(),
-            0.5.into(),
-            2.0.into(),
-            "x".into(),
-            None::<f64>.into(),
-        ];
+        let cells = [Cell::Missing, true.into(), 3_u32.into(), 0.5.into(), 2.0.into(), "x".into(), None::<f64>.into()];
         let text = serde_json::to_string(&cells).unwrap();
         assert_eq!(text, r#"[null,true,3,0.5,2.0,"x",null]"#);
         assert_eq!(serde_json::from_str::<Vec<Cell>>(&text).unwrap(), cells);

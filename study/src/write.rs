@@ -10,27 +10,17 @@ use crate::{Chart, Palette, Report, ReportError, Table, html, slug};
 pub(crate) fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
     validate(report)?;
     let palette = Palette::for_names(report.charts.iter().flat_map(Chart::series_names));
-    let charts = report
-        .charts
-        .iter()
-        .map(|chart| chart.draw(&palette))
-        .collect::<Result<Vec<_>, _>>()?;
+    let charts = report.charts.iter().map(|chart| chart.draw(&palette)).collect::<Result<Vec<_>, _>>()?;
     let page = html::page(report, charts.iter().map(|chart| chart.inline()).collect())?;
     make_folders(report, folder)?;
     for (chart, drawing) in report.charts.iter().zip(&charts) {
-        write_file(
-            &folder.join(chart_path(chart)),
-            drawing.standalone().as_bytes(),
-        )?;
+        write_file(&folder.join(chart_path(chart)), drawing.standalone().as_bytes())?;
     }
     for table in &report.tables {
         write_file(&folder.join(table_path(table)), &table.to_csv()?)?;
     }
     write_pictures(report, folder)?;
-    write_file(
-        &folder.join("report.json"),
-        serde_json::to_string_pretty(report)?.as_bytes(),
-    )?;
+    write_file(&folder.join("report.json"), serde_json::to_string_pretty(report)?.as_bytes())?;
     write_file(&folder.join("index.html"), page.as_bytes())
 }
 
@@ -52,18 +42,12 @@ pub(crate) fn picture_path(name: &str) -> String {
 fn validate(report: &Report) -> Result<(), ReportError> {
     report.tables.iter().try_for_each(Table::validate)?;
     let pictures = report.pictures.iter().flat_map(|row| &row.pictures);
-    expect_distinct(
-        "tables",
-        report.tables.iter().map(|table| table.name.as_str()),
-    )?;
+    expect_distinct("tables", report.tables.iter().map(|table| table.name.as_str()))?;
     expect_distinct("charts", report.charts.iter().map(Chart::name))?;
     expect_distinct("pictures", pictures.map(|picture| picture.name.as_str()))
 }
 
-fn expect_distinct<'a>(
-    kind: &'static str,
-    names: impl Iterator<Item = &'a str>,
-) -> Result<(), ReportError> {
+fn expect_distinct<'a>(kind: &'static str, names: impl Iterator<Item = &'a str>) -> Result<(), ReportError> {
     let mut seen = HashSet::new();
     match names.map(slug).find(|name| !seen.insert(name.clone())) {
         Some(name) => Err(ReportError::DuplicateName { kind, name }),
@@ -72,14 +56,8 @@ fn expect_distinct<'a>(
 }
 
 fn make_folders(report: &Report, folder: &Path) -> Result<(), ReportError> {
-    let parts = [
-        ("charts", report.charts.is_empty()),
-        ("pictures", report.pictures.is_empty()),
-    ];
-    let used = parts
-        .iter()
-        .filter(|(_, empty)| !empty)
-        .map(|(part, _)| folder.join(part));
+    let parts = [("charts", report.charts.is_empty()), ("pictures", report.pictures.is_empty())];
+    let used = parts.iter().filter(|(_, empty)| !empty).map(|(part, _)| folder.join(part));
     for path in std::iter::once(folder.to_path_buf()).chain(used) {
         fs::create_dir_all(&path).map_err(|source| ReportError::Io { path, source })?;
     }
@@ -88,17 +66,11 @@ fn make_folders(report: &Report, folder: &Path) -> Result<(), ReportError> {
 
 fn write_pictures(report: &Report, folder: &Path) -> Result<(), ReportError> {
     for picture in report.pictures.iter().flat_map(|row| &row.pictures) {
-        picture.image.save_with_format(
-            folder.join(picture_path(&picture.name)),
-            image::ImageFormat::Png,
-        )?;
+        picture.image.save_with_format(folder.join(picture_path(&picture.name)), image::ImageFormat::Png)?;
     }
     Ok(())
 }
 
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
-    fs::write(path, bytes).map_err(|source| ReportError::Io {
-        path: path.into(),
-        source,
-    })
+    fs::write(path, bytes).map_err(|source| ReportError::Io { path: path.into(), source })
 }

@@ -7,25 +7,18 @@ use std::path::Path;
 
 use image::RgbImage;
 use study::{
-    Axis, Bar, BarChart, Better, Cell, Check, Outcome, Palette, Picture, PictureRow, Point, Report,
-    ReportError, Series, Table, XyChart,
+    Axis, Bar, BarChart, Better, Cell, Check, Outcome, Palette, Picture, PictureRow, Point, Report, ReportError,
+    Series, Table, XyChart,
 };
 
 const HOSTILE: &str = "a<script>&\"b\"";
 
 fn lines() -> XyChart {
-    XyChart::new(
-        "cost over views",
-        Axis::log("views", ""),
-        Axis::log("time", "ms"),
-    )
-    .with(Series::line("joint carve", [(1.0, 2.0), (10.0, 3.0)]).then_extrapolated([(100.0, 9.0)]))
-    .with(Series::points(
-        HOSTILE,
-        [Point::labelled(2.0, 2.5, "S = 4")],
-    ))
-    .with_limit("budget", 5.0)
-    .with_front(Better::Low, Better::Low)
+    XyChart::new("cost over views", Axis::log("views", ""), Axis::log("time", "ms"))
+        .with(Series::line("joint carve", [(1.0, 2.0), (10.0, 3.0)]).then_extrapolated([(100.0, 9.0)]))
+        .with(Series::points(HOSTILE, [Point::labelled(2.0, 2.5, "S = 4")]))
+        .with_limit("budget", 5.0)
+        .with_front(Better::Low, Better::Low)
 }
 
 fn bars() -> BarChart {
@@ -50,10 +43,7 @@ fn full_report() -> Report {
     ];
     report.charts = vec![lines().into(), bars().into()];
     let picture = Picture::new("one", HOSTILE, RgbImage::new(4, 3));
-    report.pictures = vec![PictureRow {
-        title: "views".into(),
-        pictures: vec![picture],
-    }];
+    report.pictures = vec![PictureRow { title: "views".into(), pictures: vec![picture] }];
     report
 }
 
@@ -75,26 +65,14 @@ fn report_json_reads_back_as_it_was() {
     let mut without_pixels = report;
     without_pixels.pictures[0].pictures[0].image = RgbImage::default();
     assert_eq!(back, without_pixels);
-    assert_eq!(
-        back.parameters.keys().collect::<Vec<_>>(),
-        ["views", "scene"]
-    );
+    assert_eq!(back.parameters.keys().collect::<Vec<_>>(), ["views", "scene"]);
 }
 
 #[test]
 fn report_json_has_the_fields_that_the_format_names() {
     let folder = written(&full_report());
-    let json: serde_json::Value =
-        serde_json::from_str(&read(folder.path(), "report.json")).unwrap();
-    for field in [
-        "schema",
-        "title",
-        "device",
-        "versions",
-        "parameters",
-        "rows",
-        "checks",
-    ] {
+    let json: serde_json::Value = serde_json::from_str(&read(folder.path(), "report.json")).unwrap();
+    for field in ["schema", "title", "device", "versions", "parameters", "rows", "checks"] {
         assert!(!json[field].is_null(), "{field}");
     }
     for field in ["name", "value", "unit", "bar", "holds"] {
@@ -119,21 +97,10 @@ fn strict_fails_only_what_falls_short() {
 #[test]
 fn every_part_has_its_file() {
     let folder = written(&full_report());
-    for file in [
-        "costs.csv",
-        "charts/cost-over-views.svg",
-        "charts/stages.svg",
-        "pictures/one.png",
-        "index.html",
-    ] {
+    for file in ["costs.csv", "charts/cost-over-views.svg", "charts/stages.svg", "pictures/one.png", "index.html"] {
         assert!(folder.path().join(file).is_file(), "{file}");
     }
-    assert_eq!(
-        image::open(folder.path().join("pictures/one.png"))
-            .unwrap()
-            .width(),
-        4
-    );
+    assert_eq!(image::open(folder.path().join("pictures/one.png")).unwrap().width(), 4);
     assert!(read(folder.path(), "costs.csv").ends_with("\nnone,\n"));
 }
 
@@ -143,20 +110,9 @@ fn charts_are_xml_that_names_their_series_axes_and_limits() {
     let expected: [(&str, &[&str]); 2] = [
         (
             "charts/cost-over-views.svg",
-            &[
-                "cost over views",
-                "joint carve",
-                "joint carve, extrapolated",
-                HOSTILE,
-                "budget",
-                "S = 4",
-                "time (ms)",
-            ],
+            &["cost over views", "joint carve", "joint carve, extrapolated", HOSTILE, "budget", "S = 4", "time (ms)"],
         ),
-        (
-            "charts/stages.svg",
-            &["render", "decode", "direct", "ours", "20", "3", "time (ms)"],
-        ),
+        ("charts/stages.svg", &["render", "decode", "direct", "ours", "20", "3", "time (ms)"]),
     ];
     for (file, words) in expected {
         let svg = read(folder.path(), file);
@@ -176,32 +132,14 @@ fn charts_are_xml_that_names_their_series_axes_and_limits() {
 #[test]
 fn odd_charts_are_drawn_too() {
     let empty = XyChart::new("empty", Axis::log("x", ""), Axis::linear("y", ""));
-    let unplaceable = empty.clone().with(Series::line(
-        "zero",
-        [(0.0, 1.0), (-1.0, f64::NAN), (f64::INFINITY, 2.0)],
-    ));
-    let single = empty
-        .clone()
-        .with(Series::line("one", [(5.0, 0.0)]))
-        .with_front(Better::Low, Better::High);
+    let unplaceable = empty.clone().with(Series::line("zero", [(0.0, 1.0), (-1.0, f64::NAN), (f64::INFINITY, 2.0)]));
+    let single = empty.clone().with(Series::line("one", [(5.0, 0.0)])).with_front(Better::Low, Better::High);
     let no_bars = BarChart::new("none", Axis::linear("time", "ms"), Vec::<String>::new());
     let nothing = BarChart::new("zeros", Axis::linear("time", "ms"), ["a"]).with("s", [f64::NAN]);
-    for chart in [
-        empty.into(),
-        unplaceable.into(),
-        single.into(),
-        no_bars.into(),
-        nothing.into(),
-    ] {
+    for chart in [empty.into(), unplaceable.into(), single.into(), no_bars.into(), nothing.into()] {
         let chart: study::Chart = chart;
-        let svg = chart
-            .to_svg(&Palette::for_names(chart.series_names()))
-            .unwrap();
-        assert!(
-            !svg.contains("NaN") && !svg.contains("inf"),
-            "{}",
-            chart.name()
-        );
+        let svg = chart.to_svg(&Palette::for_names(chart.series_names())).unwrap();
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{}", chart.name());
         roxmltree::Document::parse(&svg).unwrap();
     }
 }
@@ -212,9 +150,7 @@ fn the_page_escapes_what_it_is_given_and_needs_nothing_from_outside() {
     let page = read(folder.path(), "index.html");
     assert!(!page.contains("<script") && page.contains("a&lt;script&gt;&amp;"));
     assert!(page.contains("<svg ") && page.contains("pictures&#x2f;one.png"));
-    let outside = page
-        .match_indices("http")
-        .filter(|(at, _)| !page[*at..].starts_with("http://www.w3.org/"));
+    let outside = page.match_indices("http").filter(|(at, _)| !page[*at..].starts_with("http://www.w3.org/"));
     assert_eq!(outside.count(), 0);
 }
 
@@ -226,34 +162,13 @@ fn parts_that_do_not_fit_are_named() {
         change(&mut report);
         report.write(&folder.path().join("x")).unwrap_err()
     };
-    let duplicate = write(|report| {
-        report
-            .charts
-            .push(BarChart::new("Stages!", Axis::linear("t", ""), ["a"]).into())
-    });
-    assert!(matches!(
-        duplicate,
-        ReportError::DuplicateName { kind: "charts", .. }
-    ));
+    let duplicate = write(|report| report.charts.push(BarChart::new("Stages!", Axis::linear("t", ""), ["a"]).into()));
+    assert!(matches!(duplicate, ReportError::DuplicateName { kind: "charts", .. }));
     let ragged = write(|report| report.tables[0].rows[0].truncate(1));
     assert!(matches!(ragged, ReportError::RowLength { row: 0, .. }));
     let stage = write(|report| {
-        report.charts.push(
-            BarChart::new("b", Axis::linear("t", ""), ["a"])
-                .with("s", [1.0, 2.0])
-                .into(),
-        )
+        report.charts.push(BarChart::new("b", Axis::linear("t", ""), ["a"]).with("s", [1.0, 2.0]).into())
     });
-    assert!(matches!(
-        stage,
-        ReportError::StageLength {
-            values: 2,
-            bars: 1,
-            ..
-        }
-    ));
-    assert!(
-        !folder.path().join("x").exists(),
-        "nothing is written of a report that does not fit together"
-    );
+    assert!(matches!(stage, ReportError::StageLength { values: 2, bars: 1, .. }));
+    assert!(!folder.path().join("x").exists(), "nothing is written of a report that does not fit together");
 }

@@ -31,11 +31,7 @@ impl Server {
     where
         F: Future<Output = Result<(), node::ServeError>> + Send + 'static,
     {
-        let runtime = Builder::new_multi_thread()
-            .worker_threads(1)
-            .enable_all()
-            .build()
-            .expect("a runtime");
+        let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("a runtime");
         let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
         listener.set_nonblocking(true).expect("a socket option");
         let address = format!("http://{}", listener.local_addr().expect("an address"));
@@ -47,12 +43,7 @@ impl Server {
             serve(listener, token).await.expect("served");
             let _ = says.send(true);
         });
-        Self {
-            runtime: Some(runtime),
-            shutdown,
-            stopped,
-            address,
-        }
+        Self { runtime: Some(runtime), shutdown, stopped, address }
     }
 
     /// Ends it at once; connections break.
@@ -100,21 +91,13 @@ pub fn package() -> Bytes {
 /// Three sample cameras on an arc in front of the ball.
 #[must_use]
 pub fn rig() -> Vec<Camera> {
-    [-0.6, 0.0, 0.6]
-        .map(|x| Camera::Pinhole(camera(x, UVec2::new(64, 48))))
-        .to_vec()
+    [-0.6, 0.0, 0.6].map(|x| Camera::Pinhole(camera(x, UVec2::new(64, 48)))).to_vec()
 }
 
 /// A camera in front of the ball.
 #[must_use]
 pub fn camera(x_m: f32, size_px: UVec2) -> PinholeCamera {
-    PinholeCamera::looking_at(
-        Vec3::new(x_m, 1.2, 3.0),
-        Vec3::new(0.0, 0.5, 0.0),
-        Vec3::Y,
-        0.9,
-        size_px,
-    )
+    PinholeCamera::looking_at(Vec3::new(x_m, 1.2, 3.0), Vec3::new(0.0, 0.5, 0.0), Vec3::Y, 0.9, size_px)
 }
 
 /// A session of the scalar device.
@@ -131,10 +114,7 @@ pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
         volume: None,
         typical_view: camera(0.1, UVec2::new(48, 36)),
         views_per_set: 12,
-        planes: ViewPlanes {
-            inverse_depth: true,
-            provenance: true,
-        },
+        planes: ViewPlanes { inverse_depth: true, provenance: true },
         timeline,
         policy,
         forced_sampler_count: None,
@@ -160,15 +140,8 @@ impl Cluster {
 
     /// As [`Cluster::start`], each node's configuration changed by `change`.
     pub async fn start_with(nodes: usize, change: impl Fn(NodeConfig) -> NodeConfig) -> Self {
-        let offer = SceneOffer::new(
-            package(),
-            rig(),
-            Aabb {
-                min: Vec3::splat(-3.0),
-                max: Vec3::splat(3.0),
-            },
-            SKY_LINEAR,
-        );
+        let offer =
+            SceneOffer::new(package(), rig(), Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) }, SKY_LINEAR);
         let coordinator = Server::start(|listener, shutdown| {
             coordinator::serve(listener, CoordinatorConfig::default(), offer, shutdown)
         });
@@ -180,16 +153,8 @@ impl Cluster {
         };
         let servers = engines.iter().enumerate().map(start).collect();
         let client = connected(&coordinator.address).await;
-        client
-            .wait_for_nodes(nodes, Duration::from_secs(10))
-            .await
-            .expect("joined");
-        Self {
-            coordinator,
-            nodes: servers,
-            engines,
-            client,
-        }
+        client.wait_for_nodes(nodes, Duration::from_secs(10)).await.expect("joined");
+        Self { coordinator, nodes: servers, engines, client }
     }
 
     /// An open session; what was sampled for measuring is forgotten.

@@ -26,9 +26,7 @@ pub fn ball_linear(scene_time_s: f32) -> Vec3 {
 /// As it arrives in a view.
 #[must_use]
 pub fn srgb8(linear: Vec3) -> [u8; 3] {
-    linear_from_rgb9e5(rgb9e5_from_linear(linear))
-        .to_array()
-        .map(srgb8_from_linear)
+    linear_from_rgb9e5(rgb9e5_from_linear(linear)).to_array().map(srgb8_from_linear)
 }
 
 /// Images sampled, by scene time and eye: how often.
@@ -55,25 +53,17 @@ fn ball(ray: &Ray, scene_time_s: f32) -> Option<Meets> {
     let (to_eye, d) = (ray.origin_in_world - center, ray.direction_in_world);
     let (a, b, c) = (d.dot(d), to_eye.dot(d), to_eye.dot(to_eye) - 0.25);
     let t = (-b - (b * b - a * c).sqrt()) / a;
-    (t > 0.0).then_some(Meets {
-        planar_depth_m: t,
-        color_linear: ball_linear(scene_time_s),
-    })
+    (t > 0.0).then_some(Meets { planar_depth_m: t, color_linear: ball_linear(scene_time_s) })
 }
 
 fn floor(ray: &Ray) -> Option<Meets> {
     let t = -ray.origin_in_world.y / ray.direction_in_world.y;
-    (t > 0.0 && t < 50.0).then_some(Meets {
-        planar_depth_m: t,
-        color_linear: FLOOR_LINEAR,
-    })
+    (t > 0.0 && t < 50.0).then_some(Meets { planar_depth_m: t, color_linear: FLOOR_LINEAR })
 }
 
 fn first_met(ray: &Ray, scene_time_s: f32) -> Option<Meets> {
     let both = [ball(ray, scene_time_s), floor(ray)];
-    both.into_iter()
-        .flatten()
-        .min_by(|a, b| a.planar_depth_m.total_cmp(&b.planar_depth_m))
+    both.into_iter().flatten().min_by(|a, b| a.planar_depth_m.total_cmp(&b.planar_depth_m))
 }
 
 fn pixels(size_px: UVec2) -> impl Iterator<Item = Vec2> {
@@ -82,17 +72,12 @@ fn pixels(size_px: UVec2) -> impl Iterator<Item = Vec2> {
 
 fn depth_image(camera: &Camera, scene_time_s: f32) -> DepthImage {
     let Camera::Pinhole(pinhole) = camera;
-    let met: Vec<_> = pixels(pinhole.size_px)
-        .map(|pixel| first_met(&pinhole.ray(pixel), scene_time_s))
-        .collect();
+    let met: Vec<_> = pixels(pinhole.size_px).map(|pixel| first_met(&pinhole.ray(pixel), scene_time_s)).collect();
     DepthImage {
         camera: *camera,
         inverse_depth_per_m: met
             .iter()
-            .map(|met| {
-                met.as_ref()
-                    .map_or(BACKGROUND_INVERSE_DEPTH, |met| met.planar_depth_m.recip())
-            })
+            .map(|met| met.as_ref().map_or(BACKGROUND_INVERSE_DEPTH, |met| met.planar_depth_m.recip()))
             .collect(),
         color_rgb9e5: met
             .iter()
@@ -175,10 +160,7 @@ fn known(field: &'static str, value: &str, known: &str) -> Result<(), EngineErro
     if value == known {
         Ok(())
     } else {
-        Err(EngineError::InvalidArgument {
-            field,
-            reason: format!("{value} is unknown, {known} is known"),
-        })
+        Err(EngineError::InvalidArgument { field, reason: format!("{value} is unknown, {known} is known") })
     }
 }
 
@@ -190,11 +172,7 @@ impl ScalarEngine {
     }
 
     fn loaded(&self, hash: &str) -> Result<(), EngineError> {
-        if self.has_scene(hash) {
-            Ok(())
-        } else {
-            Err(EngineError::UnknownScene { hash: hash.to_owned() })
-        }
+        if self.has_scene(hash) { Ok(()) } else { Err(EngineError::UnknownScene { hash: hash.to_owned() }) }
     }
 }
 
@@ -209,10 +187,7 @@ impl Engine for ScalarEngine {
 
     fn load_scene(&self, hash: &str, package: &[u8]) -> Result<f64, EngineError> {
         if !package.starts_with(b"ball over floor") {
-            return Err(EngineError::InvalidArgument {
-                field: "package",
-                reason: "is no scene of mine".to_owned(),
-            });
+            return Err(EngineError::InvalidArgument { field: "package", reason: "is no scene of mine".to_owned() });
         }
         locked(&self.scenes).insert(hash.to_owned());
         Ok(0.0)
@@ -228,17 +203,10 @@ impl Engine for ScalarEngine {
         known("lighting", &request.lighting, "unlit")?;
         for Camera::Pinhole(camera) in &request.cameras {
             *locked(&self.counts)
-                .entry((
-                    camera.eye_in_world.to_array().map(f32::to_bits),
-                    request.scene_time_s.to_bits(),
-                ))
+                .entry((camera.eye_in_world.to_array().map(f32::to_bits), request.scene_time_s.to_bits()))
                 .or_default() += 1;
         }
-        Ok(request
-            .cameras
-            .iter()
-            .map(|camera| depth_image(camera, request.scene_time_s))
-            .collect())
+        Ok(request.cameras.iter().map(|camera| depth_image(camera, request.scene_time_s)).collect())
     }
 
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
@@ -248,23 +216,14 @@ impl Engine for ScalarEngine {
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
         known("method", &work.method, "splat")?;
         let any: &dyn Any = set;
-        let Uploaded(set) = any
-            .downcast_ref()
-            .ok_or_else(|| EngineError::Device("a set of another device".to_owned()))?;
-        Ok(work
-            .cameras
-            .iter()
-            .map(|camera| splat(set, camera, work.planes))
-            .collect())
+        let Uploaded(set) =
+            any.downcast_ref().ok_or_else(|| EngineError::Device("a set of another device".to_owned()))?;
+        Ok(work.cameras.iter().map(|camera| splat(set, camera, work.planes)).collect())
     }
 
     fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
         self.loaded(&work.scene_hash)?;
         known("lighting", &work.lighting, "unlit")?;
-        Ok(work
-            .cameras
-            .iter()
-            .map(|camera| draw(camera, work.scene_time_s, work.planes))
-            .collect())
+        Ok(work.cameras.iter().map(|camera| draw(camera, work.scene_time_s, work.planes)).collect())
     }
 }

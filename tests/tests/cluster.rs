@@ -10,22 +10,14 @@ use depth_image::ProvenanceKind;
 use node::NodeConfig;
 use wire::{Policy, PolicyChoice, SceneHash, Timeline};
 
-const MOVING: Timeline = Timeline {
-    start_s: 0.0,
-    step_s: 1.0,
-    set_count: 3,
-};
+const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 
 /// The ball shows its own time and no other; floor and sky are there; nothing else is.
 fn shows_only(frame: &Frame, scene_time_s: f32) {
     let [ball, floor, sky] = [ball_linear(scene_time_s), FLOOR_LINEAR, SKY_LINEAR].map(srgb8);
     let mut seen = HashSet::new();
     for pixel in frame.view.srgb8.as_chunks::<3>().0 {
-        assert!(
-            [ball, floor, sky].contains(pixel),
-            "frame {}: {pixel:?} at {scene_time_s} s",
-            frame.request.frame
-        );
+        assert!([ball, floor, sky].contains(pixel), "frame {}: {pixel:?} at {scene_time_s} s", frame.request.frame);
         seen.insert(*pixel);
     }
     assert_eq!(seen.len(), 3, "frame {} shows ball, floor and sky", frame.request.frame);
@@ -84,10 +76,7 @@ async fn every_k_gives_the_same_pictures() {
     let cluster = Cluster::start(4).await;
     let mut pictures = Vec::new();
     for k in 1..=3 {
-        let forced = wire::SessionRequest {
-            forced_sampler_count: Some(k),
-            ..request(PolicyChoice::Pipeline, MOVING)
-        };
+        let forced = wire::SessionRequest { forced_sampler_count: Some(k), ..request(PolicyChoice::Pipeline, MOVING) };
         let session = cluster.session(forced).await.unwrap();
         assert_eq!(session.plan().sampler_count(), k as usize);
         let mut frames = session.render_views(views(3, 4)).unwrap().all().await.unwrap();
@@ -95,10 +84,7 @@ async fn every_k_gives_the_same_pictures() {
         pictures.push(frames.into_iter().map(|frame| frame.view).collect::<Vec<_>>());
     }
     assert!(pictures[0] == pictures[1] && pictures[1] == pictures[2]);
-    let forced = wire::SessionRequest {
-        forced_sampler_count: Some(4),
-        ..request(PolicyChoice::Pipeline, MOVING)
-    };
+    let forced = wire::SessionRequest { forced_sampler_count: Some(4), ..request(PolicyChoice::Pipeline, MOVING) };
     let error = cluster.session(forced).await.unwrap_err().to_string();
     assert!(error.contains("forced_sampler_count is 4, at most 3"), "{error}");
 }
@@ -107,13 +93,7 @@ async fn every_k_gives_the_same_pictures() {
 async fn direct_draws_on_every_node_and_samples_nothing() {
     let cluster = Cluster::start(3).await;
     let session = cluster.session(request(PolicyChoice::Direct, MOVING)).await.unwrap();
-    assert_eq!(
-        (
-            session.plan().sampler_count(),
-            session.plan().assignment.compositors.len()
-        ),
-        (0, 3)
-    );
+    assert_eq!((session.plan().sampler_count(), session.plan().assignment.compositors.len()), (0, 3));
     let frames = session.render_views(views(3, 12)).unwrap().all().await.unwrap();
     all_came(&frames, 36);
     assert!(cluster.take_counts().is_empty());
@@ -152,10 +132,7 @@ async fn frames_go_on_when_the_coordinator_is_gone() {
 #[tokio::test(flavor = "multi_thread")]
 async fn scenes_come_by_hash_and_are_kept_in_the_folder() {
     let folder = tempfile::tempdir().unwrap();
-    let with_folder = |config: NodeConfig| NodeConfig {
-        scene_folder: Some(folder.path().to_owned()),
-        ..config
-    };
+    let with_folder = |config: NodeConfig| NodeConfig { scene_folder: Some(folder.path().to_owned()), ..config };
     let cluster = Cluster::start_with(1, with_folder).await;
     let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
     session.render_views(views(1, 1)).unwrap().all().await.unwrap();

@@ -12,11 +12,7 @@ use tonic::Code;
 use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
 use wire::{FetchImages, FrameCodec, PolicyChoice, RenderViews, RequestedView, SceneHash, Timeline};
 
-const MOVING: Timeline = Timeline {
-    start_s: 0.0,
-    step_s: 1.0,
-    set_count: 3,
-};
+const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 
 /// One request on a stream of its own; how it ends.
 async fn ask(address: &str, request: RenderViews) -> Result<usize, tonic::Status> {
@@ -64,15 +60,9 @@ async fn old_plans_are_refused_everywhere() {
     );
     let share = &old_plan.samplers[0];
     let sampler = SamplerClient::new(connect(&share.address).await.unwrap());
-    let fetch = FetchImages {
-        plan_epoch: old_plan.plan_epoch,
-        set_index: 0,
-        image_indices: share.image_indices.clone(),
-    };
-    assert_eq!(
-        sampler.fetch_sample_images(fetch).await.err().unwrap().code(),
-        Code::FailedPrecondition
-    );
+    let fetch =
+        FetchImages { plan_epoch: old_plan.plan_epoch, set_index: 0, image_indices: share.image_indices.clone() };
+    assert_eq!(sampler.fetch_sample_images(fetch).await.err().unwrap().code(), Code::FailedPrecondition);
     tokio::time::sleep(Duration::from_millis(50)).await;
     assert!(
         matches!(old.render_views(views(1, 1)), Err(ClientError::Ended { reason }) if reason.contains("took its place"))
@@ -86,56 +76,20 @@ async fn bad_requests_are_named() {
     let compositor = session.plan().assignment.compositors[0].address.clone();
     let good = raw_request(&session);
     let bad = [
-        (
-            RenderViews {
-                method: "nonsense".to_owned(),
-                ..good.clone()
-            },
-            "nonsense is unknown",
-        ),
-        (
-            RenderViews {
-                set_index: 3,
-                ..good.clone()
-            },
-            "set_index 3",
-        ),
-        (
-            RenderViews {
-                views: vec![good.views[0]; 4097],
-                ..good.clone()
-            },
-            "views has 4097",
-        ),
-        (
-            RenderViews {
-                views: Vec::new(),
-                ..good.clone()
-            },
-            "views is missing",
-        ),
-        (
-            with_camera(&good, |camera| camera.eye_in_world.x = f32::NAN),
-            "eye_in_world",
-        ),
-        (
-            with_camera(&good, |camera| camera.size_px = glam::UVec2::splat(65_535)),
-            "size_px",
-        ),
+        (RenderViews { method: "nonsense".to_owned(), ..good.clone() }, "nonsense is unknown"),
+        (RenderViews { set_index: 3, ..good.clone() }, "set_index 3"),
+        (RenderViews { views: vec![good.views[0]; 4097], ..good.clone() }, "views has 4097"),
+        (RenderViews { views: Vec::new(), ..good.clone() }, "views is missing"),
+        (with_camera(&good, |camera| camera.eye_in_world.x = f32::NAN), "eye_in_world"),
+        (with_camera(&good, |camera| camera.size_px = glam::UVec2::splat(65_535)), "size_px"),
     ];
     for (request, reason) in bad {
         let refused = ask(&compositor, request).await.unwrap_err();
         assert_eq!(refused.code(), Code::InvalidArgument, "{refused}");
         assert!(refused.message().contains(reason), "{refused}");
     }
-    let too_long = RenderViews {
-        views: vec![good.views[0]; 100_000],
-        ..good.clone()
-    };
-    assert!(
-        ask(&compositor, too_long).await.is_err(),
-        "more than a message may hold"
-    );
+    let too_long = RenderViews { views: vec![good.views[0]; 100_000], ..good.clone() };
+    assert!(ask(&compositor, too_long).await.is_err(), "more than a message may hold");
     assert_eq!(ask(&compositor, good.clone()).await.unwrap(), 1, "the node goes on");
 }
 
@@ -145,42 +99,15 @@ async fn bad_sessions_are_named() {
     let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
     let share = &session.plan().assignment.samplers[0];
     let sampler = SamplerClient::new(connect(&share.address).await.unwrap());
-    let fetch = FetchImages {
-        plan_epoch: session.plan().assignment.plan_epoch,
-        set_index: 0,
-        image_indices: vec![77],
-    };
-    assert!(
-        sampler
-            .fetch_sample_images(fetch)
-            .await
-            .err()
-            .unwrap()
-            .message()
-            .contains("image_indices: 77")
-    );
-    assert!(matches!(
-        session.render_views(views(4, 1)),
-        Err(ClientError::Invalid { field: "set_index", .. })
-    ));
-    let unknown = wire::SessionRequest {
-        lighting: "moonlight".to_owned(),
-        ..request(PolicyChoice::Auto, MOVING)
-    };
+    let fetch = FetchImages { plan_epoch: session.plan().assignment.plan_epoch, set_index: 0, image_indices: vec![77] };
+    assert!(sampler.fetch_sample_images(fetch).await.err().unwrap().message().contains("image_indices: 77"));
+    assert!(matches!(session.render_views(views(4, 1)), Err(ClientError::Invalid { field: "set_index", .. })));
+    let unknown = wire::SessionRequest { lighting: "moonlight".to_owned(), ..request(PolicyChoice::Auto, MOVING) };
     let error = cluster.session(unknown).await.unwrap_err().to_string();
     assert!(error.contains("lighting: moonlight is unknown"), "{error}");
-    let elsewhere = wire::SessionRequest {
-        scene: Some(SceneHash::of(b"other")),
-        ..request(PolicyChoice::Auto, MOVING)
-    };
-    assert!(
-        cluster
-            .session(elsewhere)
-            .await
-            .unwrap_err()
-            .to_string()
-            .contains("scene_hash")
-    );
+    let elsewhere =
+        wire::SessionRequest { scene: Some(SceneHash::of(b"other")), ..request(PolicyChoice::Auto, MOVING) };
+    assert!(cluster.session(elsewhere).await.unwrap_err().to_string().contains("scene_hash"));
 }
 
 fn with_camera(good: &RenderViews, change: impl Fn(&mut depth_image::PinholeCamera)) -> RenderViews {
@@ -192,10 +119,7 @@ fn with_camera(good: &RenderViews, change: impl Fn(&mut depth_image::PinholeCame
 #[tokio::test(flavor = "multi_thread")]
 async fn a_killed_node_is_named() {
     let mut cluster = Cluster::start(3).await;
-    let forced = wire::SessionRequest {
-        forced_sampler_count: Some(1),
-        ..request(PolicyChoice::Pipeline, MOVING)
-    };
+    let forced = wire::SessionRequest { forced_sampler_count: Some(1), ..request(PolicyChoice::Pipeline, MOVING) };
     let session = cluster.session(forced).await.unwrap();
     session.render_views(views(1, 6)).unwrap().all().await.unwrap();
     cluster.nodes[2].kill();
@@ -209,10 +133,7 @@ async fn a_killed_node_is_named() {
     let status = cluster.client.status().await.unwrap();
     assert_eq!(status.nodes.len(), 2);
     let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
-    assert_eq!(
-        session.render_views(views(3, 4)).unwrap().all().await.unwrap().len(),
-        12
-    );
+    assert_eq!(session.render_views(views(3, 4)).unwrap().all().await.unwrap().len(), 12);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -247,23 +168,14 @@ async fn drain_ends_open_streams_in_time() {
 #[tokio::test(flavor = "multi_thread")]
 async fn an_idle_stream_ends() {
     let hasty = |config: NodeConfig| NodeConfig {
-        deadlines: Deadlines {
-            idle: Duration::from_millis(200),
-            ..config.deadlines
-        },
+        deadlines: Deadlines { idle: Duration::from_millis(200), ..config.deadlines },
         ..config
     };
     let cluster = Cluster::start_with(1, hasty).await;
     let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
-    let client = CompositorClient::new(
-        connect(&session.plan().assignment.compositors[0].address)
-            .await
-            .unwrap(),
-    );
-    let mut parts = client
-        .render_views(tokio_stream::once(raw_request(&session)).chain(tokio_stream::pending()))
-        .await
-        .unwrap();
+    let client = CompositorClient::new(connect(&session.plan().assignment.compositors[0].address).await.unwrap());
+    let mut parts =
+        client.render_views(tokio_stream::once(raw_request(&session)).chain(tokio_stream::pending())).await.unwrap();
     parts.next().await.unwrap().unwrap();
     assert_eq!(parts.next().await.unwrap().unwrap_err().code(), Code::DeadlineExceeded);
 }
@@ -285,10 +197,6 @@ async fn only_loopback_is_served_without_being_asked() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_needs_nodes() {
     let cluster = Cluster::start(0).await;
-    let error = cluster
-        .session(request(PolicyChoice::Auto, MOVING))
-        .await
-        .unwrap_err()
-        .to_string();
+    let error = cluster.session(request(PolicyChoice::Auto, MOVING)).await.unwrap_err().to_string();
     assert!(error.contains("no node has joined"), "{error}");
 }

@@ -7,12 +7,7 @@ use std::ops::Range;
 #[must_use]
 pub fn share_images(image_count: usize, samplers: usize) -> Vec<Vec<u32>> {
     (0..samplers)
-        .map(|sampler| {
-            (sampler..image_count)
-                .step_by(samplers.max(1))
-                .map(|image| image as u32)
-                .collect()
-        })
+        .map(|sampler| (sampler..image_count).step_by(samplers.max(1)).map(|image| image as u32).collect())
         .collect()
 }
 
@@ -38,11 +33,7 @@ mod tests {
                 let views: Vec<usize> = ranges.iter().cloned().flatten().collect();
                 assert_eq!(views, (0..count).collect::<Vec<_>>());
                 assert!(ranges.iter().all(|range| range.len() <= count.div_ceil(nodes)));
-                assert!(
-                    share_images(count, nodes)
-                        .iter()
-                        .all(|share| share.len() <= count.div_ceil(nodes))
-                );
+                assert!(share_images(count, nodes).iter().all(|share| share.len() <= count.div_ceil(nodes)));
             }
         }
     }

@@ -72,13 +72,7 @@ pub fn choose(costs: &Costs, demand: &Demand) -> Result<Choice, ChoiceError> {
     };
     let reason = reason(costs, demand, policy, samplers);
     let samplers = if policy == Policy::Direct { 0 } else { samplers };
-    Ok(Choice {
-        policy,
-        samplers,
-        reason,
-        predicted_pipeline_s,
-        predicted_direct_s,
-    })
+    Ok(Choice { policy, samplers, reason, predicted_pipeline_s, predicted_direct_s })
 }
 
 /// Samplers that still leave a node for views; one node does both.
@@ -89,21 +83,11 @@ fn most_samplers(demand: &Demand) -> usize {
 fn sampler_count(costs: &Costs, demand: &Demand) -> Result<usize, ChoiceError> {
     let most = most_samplers(demand);
     match demand.forced_samplers {
-        Some(forced) if !(1..=most).contains(&forced) => Err(ChoiceError::ForcedSamplers {
-            forced,
-            most,
-            nodes: demand.nodes,
-            images: demand.images,
-        }),
+        Some(forced) if !(1..=most).contains(&forced) => {
+            Err(ChoiceError::ForcedSamplers { forced, most, nodes: demand.nodes, images: demand.images })
+        }
         Some(forced) => Ok(forced),
-        None => Ok(k_fd(
-            demand.images,
-            costs.sample_image_s,
-            demand.views,
-            view_s(costs),
-            demand.nodes,
-        )
-        .clamp(1, most)),
+        None => Ok(k_fd(demand.images, costs.sample_image_s, demand.views, view_s(costs), demand.nodes).clamp(1, most)),
     }
 }
 
@@ -119,11 +103,7 @@ pub fn predicted_pipeline_s(costs: &Costs, demand: &Demand, samplers: usize) -> 
     let compositors = demand.nodes.saturating_sub(samplers).max(1);
     let sample_s = demand.images.div_ceil(samplers.max(1)) as f64 * costs.sample_image_s;
     let view_s = costs.load_set_s + demand.views.div_ceil(compositors) as f64 * view_s(costs);
-    if demand.nodes == 1 {
-        sample_s + view_s
-    } else {
-        sample_s.max(view_s)
-    }
+    if demand.nodes == 1 { sample_s + view_s } else { sample_s.max(view_s) }
 }
 
 /// Seconds a set's views when every node draws its share from the scene.
@@ -135,16 +115,12 @@ pub fn predicted_direct_s(costs: &Costs, demand: &Demand) -> f64 {
 /// The K with the least predicted time when images and views are whole.
 fn enumerated_samplers(costs: &Costs, demand: &Demand) -> usize {
     let time = |k: &usize| predicted_pipeline_s(costs, demand, *k);
-    (1..=most_samplers(demand))
-        .min_by(|a, b| time(a).total_cmp(&time(b)))
-        .unwrap_or(1)
+    (1..=most_samplers(demand)).min_by(|a, b| time(a).total_cmp(&time(b))).unwrap_or(1)
 }
 
 fn reason(costs: &Costs, demand: &Demand, policy: Policy, samplers: usize) -> String {
     let ms = |seconds: f64| format!("{:.3} ms", seconds * 1e3);
-    let Demand {
-        images, views, nodes, ..
-    } = *demand;
+    let Demand { images, views, nodes, .. } = *demand;
     let who = match (demand.policy, demand.forced_samplers) {
         (PolicyChoice::Auto, None) => "predicted to be faster",
         (PolicyChoice::Auto, Some(_)) => "predicted to be faster, with K as asked for",
@@ -185,13 +161,7 @@ mod tests {
     };
 
     fn demand(views: usize, nodes: usize) -> Demand {
-        Demand {
-            images: 4,
-            views,
-            nodes,
-            policy: PolicyChoice::Auto,
-            forced_samplers: None,
-        }
+        Demand { images: 4, views, nodes, policy: PolicyChoice::Auto, forced_samplers: None }
     }
 
     #[test]
@@ -202,26 +172,13 @@ mod tests {
         assert!((many.predicted_direct_s - 20.2).abs() < 1e-9);
         let few = choose(&COSTS, &demand(3, 3)).unwrap();
         assert_eq!((few.policy, few.samplers), (Policy::Direct, 0));
-        assert!(
-            few.reason.starts_with("direct, predicted to be faster"),
-            "{}",
-            few.reason
-        );
+        assert!(few.reason.starts_with("direct, predicted to be faster"), "{}", few.reason);
         assert!(few.reason.contains("100.000 ms"), "{}", few.reason);
     }
 
     #[test]
     fn the_session_may_decide() {
-        let asked = |policy, forced_samplers| {
-            choose(
-                &COSTS,
-                &Demand {
-                    policy,
-                    forced_samplers,
-                    ..demand(5, 5)
-                },
-            )
-        };
+        let asked = |policy, forced_samplers| choose(&COSTS, &Demand { policy, forced_samplers, ..demand(5, 5) });
         assert_eq!(asked(PolicyChoice::Pipeline, None).unwrap().policy, Policy::Pipeline);
         assert_eq!(asked(PolicyChoice::Direct, None).unwrap().policy, Policy::Direct);
         assert_eq!(asked(PolicyChoice::Pipeline, Some(3)).unwrap().samplers, 3);
@@ -237,14 +194,8 @@ mod tests {
     fn whole_images_bound_the_samplers_and_views_keep_a_node() {
         for nodes in 1..30 {
             for views in [1, 10, 1000] {
-                let choice = choose(
-                    &COSTS,
-                    &Demand {
-                        policy: PolicyChoice::Pipeline,
-                        ..demand(views, nodes)
-                    },
-                )
-                .unwrap();
+                let choice =
+                    choose(&COSTS, &Demand { policy: PolicyChoice::Pipeline, ..demand(views, nodes) }).unwrap();
                 assert!(choice.samplers >= 1 && choice.samplers <= 4);
                 assert!(nodes == 1 || choice.samplers < nodes);
             }

@@ -130,13 +130,7 @@ impl ClusterState {
     fn joined(&mut self, incarnation: u64, join: JoinCluster) -> Vec<Command> {
         self.plan_epoch = self.plan_epoch.max(join.plan_epoch);
         let name = join.node.node_name.clone();
-        self.members.insert(
-            name.clone(),
-            Member {
-                incarnation,
-                status: join.node,
-            },
-        );
+        self.members.insert(name.clone(), Member { incarnation, status: join.node });
         self.end_where(
             |active| active.members.get(&name).is_some_and(|&planned| planned != incarnation),
             format!("node {name} was started again"),
@@ -144,29 +138,16 @@ impl ClusterState {
     }
 
     fn left(&mut self, incarnation: u64, name: &str) -> Vec<Command> {
-        if self
-            .members
-            .get(name)
-            .is_none_or(|member| member.incarnation != incarnation)
-        {
+        if self.members.get(name).is_none_or(|member| member.incarnation != incarnation) {
             return Vec::new();
         }
         self.members.remove(name);
-        self.end_where(
-            |active| active.members.contains_key(name),
-            format!("node {name} left the cluster"),
-        )
+        self.end_where(|active| active.members.contains_key(name), format!("node {name} left the cluster"))
     }
 
     fn end_where(&mut self, holds: impl FnOnce(&mut Active) -> bool, reason: String) -> Vec<Command> {
         let ended = self.active.take_if(holds);
-        ended
-            .map(|active| Command::End {
-                session: active.session,
-                reason,
-            })
-            .into_iter()
-            .collect()
+        ended.map(|active| Command::End { session: active.session, reason }).into_iter().collect()
     }
 
     fn opened(&mut self, opening: Opening) -> Vec<Command> {
@@ -194,22 +175,10 @@ impl ClusterState {
         };
         self.active = Some(Active {
             session,
-            members: self
-                .members
-                .iter()
-                .map(|(name, member)| (name.clone(), member.incarnation))
-                .collect(),
+            members: self.members.iter().map(|(name, member)| (name.clone(), member.incarnation)).collect(),
         });
-        let addresses = self
-            .members
-            .values()
-            .map(|member| member.status.address.clone())
-            .collect();
-        commands.push(Command::Apply {
-            session,
-            plan: Box::new(plan),
-            addresses,
-        });
+        let addresses = self.members.values().map(|member| member.status.address.clone()).collect();
+        commands.push(Command::Apply { session, plan: Box::new(plan), addresses });
         commands
     }
 
@@ -228,10 +197,8 @@ impl ClusterState {
             address: node.address.clone(),
             image_indices,
         };
-        let compositor = |node: &&NodeStatus| CompositorShare {
-            node_name: node.node_name.clone(),
-            address: node.address.clone(),
-        };
+        let compositor =
+            |node: &&NodeStatus| CompositorShare { node_name: node.node_name.clone(), address: node.address.clone() };
         Assignment {
             plan_epoch: self.plan_epoch,
             policy,

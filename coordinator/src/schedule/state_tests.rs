@@ -11,28 +11,19 @@ fn join(name: &str, incarnation: u64, plan_epoch: u64) -> Event {
         device_name: "cpu".to_owned(),
         is_software: true,
     };
-    Event::Joined {
-        incarnation,
-        join: JoinCluster { node, plan_epoch },
-    }
+    Event::Joined { incarnation, join: JoinCluster { node, plan_epoch } }
 }
 
 fn opening(session: u64, policy: PolicyChoice) -> Event {
     let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8));
     let workload = Workload {
-        scene: SceneRef {
-            hash: SceneHash::of(b""),
-            package_bytes: 0,
-        },
+        scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![Camera::Pinhole(camera); 4],
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
         method: "joint_carve".to_owned(),
         codec: "lz4".to_owned(),
-        volume: Aabb {
-            min: Vec3::NEG_ONE,
-            max: Vec3::ONE,
-        },
+        volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::ZERO,
         timeline: Timeline::still(0.0),
     };
@@ -43,14 +34,7 @@ fn opening(session: u64, policy: PolicyChoice) -> Event {
         load_set_s: 0.0,
         encode_view_s: 0.0,
     };
-    Event::Opened(Box::new(Opening {
-        session,
-        workload,
-        views_per_set: 40,
-        policy,
-        forced_samplers: None,
-        costs,
-    }))
+    Event::Opened(Box::new(Opening { session, workload, views_per_set: 40, policy, forced_samplers: None, costs }))
 }
 
 fn cluster(nodes: u64) -> ClusterState {
@@ -102,17 +86,8 @@ fn a_session_ends_when_a_member_leaves_or_another_opens() {
     state.step(opening(1, PolicyChoice::Auto));
     let commands = state.step(opening(2, PolicyChoice::Auto));
     assert!(matches!(&commands[0], Command::End { session: 1, .. }));
-    let ended = state.step(Event::Left {
-        incarnation: 1,
-        node_name: "n1".to_owned(),
-    });
-    assert_eq!(
-        ended,
-        [Command::End {
-            session: 2,
-            reason: "node n1 left the cluster".to_owned()
-        }]
-    );
+    let ended = state.step(Event::Left { incarnation: 1, node_name: "n1".to_owned() });
+    assert_eq!(ended, [Command::End { session: 2, reason: "node n1 left the cluster".to_owned() }]);
     assert_eq!(state.status().nodes.len(), 1);
 }
 
@@ -120,40 +95,18 @@ fn a_session_ends_when_a_member_leaves_or_another_opens() {
 fn of_two_processes_with_one_name_the_later_counts() {
     let mut state = cluster(1);
     state.step(opening(1, PolicyChoice::Auto));
-    assert!(matches!(
-        &state.step(join("n0", 7, 1))[..],
-        [Command::End { session: 1, .. }]
-    ));
+    assert!(matches!(&state.step(join("n0", 7, 1))[..], [Command::End { session: 1, .. }]));
     state.step(opening(2, PolicyChoice::Auto));
-    assert_eq!(
-        state.step(Event::Left {
-            incarnation: 0,
-            node_name: "n0".to_owned()
-        }),
-        [],
-        "the earlier one's end"
-    );
+    assert_eq!(state.step(Event::Left { incarnation: 0, node_name: "n0".to_owned() }), [], "the earlier one's end");
     assert_eq!(state.status().nodes.len(), 1);
 }
 
 #[test]
 fn without_nodes_a_session_is_refused_and_closed_ones_are_forgotten() {
     let refused = ClusterState::default().step(opening(1, PolicyChoice::Auto));
-    assert_eq!(
-        refused,
-        [Command::Refuse {
-            session: 1,
-            error: ChoiceError::NoNodes
-        }]
-    );
+    assert_eq!(refused, [Command::Refuse { session: 1, error: ChoiceError::NoNodes }]);
     let mut state = cluster(1);
     state.step(opening(1, PolicyChoice::Auto));
     state.step(Event::Closed { session: 1 });
-    assert_eq!(
-        state.step(Event::Left {
-            incarnation: 0,
-            node_name: "n0".to_owned()
-        }),
-        []
-    );
+    assert_eq!(state.step(Event::Left { incarnation: 0, node_name: "n0".to_owned() }), []);
 }

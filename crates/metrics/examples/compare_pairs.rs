@@ -24,10 +24,7 @@ fn write_pairs(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     for pair in pairs::all() {
         let write = |side: &str, pixels: &[u8]| {
             let header = format!("P6\n{} {}\n255\n", pair.width, pair.height);
-            std::fs::write(
-                folder.join(format!("{}_{side}.ppm", pair.name)),
-                [header.as_bytes(), pixels].concat(),
-            )
+            std::fs::write(folder.join(format!("{}_{side}.ppm", pair.name)), [header.as_bytes(), pixels].concat())
         };
         write("reference", &pair.reference)?;
         write("test", &pair.test)?;
@@ -37,11 +34,7 @@ fn write_pairs(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-fn print_comparison(
-    name: &str,
-    reference: &Rgb8Image,
-    test: &Rgb8Image,
-) -> Result<(), Box<dyn std::error::Error>> {
+fn print_comparison(name: &str, reference: &Rgb8Image, test: &Rgb8Image) -> Result<(), Box<dyn std::error::Error>> {
     println!("{name} {:?}", compare(reference, test, None)?.overall);
     Ok(())
 }
@@ -52,12 +45,6 @@ fn read_ppm(path: &str) -> Result<Rgb8Image<'static>, Box<dyn std::error::Error>
     let mut lines = bytes.splitn(4, |&byte| byte == b'\n');
     let mut line = || lines.next().ok_or("short file");
     let (_magic, size, _maximum, pixels) = (line()?, line()?, line()?, line()?);
-    let (width, height) = std::str::from_utf8(size)?
-        .split_once(' ')
-        .ok_or("no size")?;
-    Ok(Rgb8Image::new(
-        width.parse()?,
-        height.parse()?,
-        pixels.to_vec(),
-    )?)
+    let (width, height) = std::str::from_utf8(size)?.split_once(' ').ok_or("no size")?;
+    Ok(Rgb8Image::new(width.parse()?, height.parse()?, pixels.to_vec())?)
 }

@@ -23,12 +23,7 @@ pub enum PixelClass {
 
 impl PixelClass {
     /// All, in order.
-    pub const ALL: [Self; 4] = [
-        Self::Silhouette,
-        Self::Disoccluded,
-        Self::Covered,
-        Self::Background,
-    ];
+    pub const ALL: [Self; 4] = [Self::Silhouette, Self::Disoccluded, Self::Covered, Self::Background];
 
     /// As in reports.
     #[must_use]
@@ -61,33 +56,19 @@ pub fn classify(
     reference_inverse_depth: &[f32],
     sample_images: &[DepthImage],
 ) -> Result<Vec<PixelClass>, MetricsError> {
-    expect_len(
-        "reference depth",
-        reference_inverse_depth.len(),
-        reference_camera.pixel_count(),
-    )?;
+    expect_len("reference depth", reference_inverse_depth.len(), reference_camera.pixel_count())?;
     for (index, image) in sample_images.iter().enumerate() {
-        image
-            .validate()
-            .map_err(|source| MetricsError::SampleImage { index, source })?;
+        image.validate().map_err(|source| MetricsError::SampleImage { index, source })?;
     }
     let width_px = reference_camera.size_px.x;
     let near_step = step_pixels(reference_inverse_depth, width_px);
-    let pixels = reference_inverse_depth
-        .par_iter()
-        .zip(&near_step)
-        .enumerate();
+    let pixels = reference_inverse_depth.par_iter().zip(&near_step).enumerate();
     Ok(pixels
-        .map(
-            |(index, (&inverse_depth, &near_step))| match inverse_depth > 0.0 {
-                _ if near_step => PixelClass::Silhouette,
-                false => PixelClass::Background,
-                true => surface_class(
-                    surface_point(reference_camera, index, inverse_depth),
-                    sample_images,
-                ),
-            },
-        )
+        .map(|(index, (&inverse_depth, &near_step))| match inverse_depth > 0.0 {
+            _ if near_step => PixelClass::Silhouette,
+            false => PixelClass::Background,
+            true => surface_class(surface_point(reference_camera, index, inverse_depth), sample_images),
+        })
         .collect())
 }
 
@@ -102,15 +83,9 @@ pub fn class_mask(classes: &[PixelClass], class: PixelClass) -> Vec<bool> {
 ///
 /// # Errors
 /// Planes of different sizes.
-pub fn disocclusion_rate(
-    classes: &[PixelClass],
-    reference_inverse_depth: &[f32],
-) -> Result<Option<f64>, MetricsError> {
+pub fn disocclusion_rate(classes: &[PixelClass], reference_inverse_depth: &[f32]) -> Result<Option<f64>, MetricsError> {
     expect_len("classes", classes.len(), reference_inverse_depth.len())?;
-    let foreground = reference_inverse_depth
-        .iter()
-        .filter(|&&depth| depth > 0.0)
-        .count();
+    let foreground = reference_inverse_depth.iter().filter(|&&depth| depth > 0.0).count();
     let disoccluded = ClassCounts::of(classes).disoccluded;
     Ok((foreground > 0).then(|| disoccluded as f64 / foreground as f64))
 }
@@ -145,17 +120,11 @@ impl ClassCounts {
 fn surface_point(camera: &PinholeCamera, index: usize, inverse_depth: f32) -> Vec3 {
     let width = camera.size_px.x as usize;
     let pixel = Vec2::new((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
-    camera.unproject(PixelDepth {
-        pixel,
-        planar_depth_m: inverse_depth.recip(),
-    })
+    camera.unproject(PixelDepth { pixel, planar_depth_m: inverse_depth.recip() })
 }
 
 fn surface_class(point_in_world: Vec3, sample_images: &[DepthImage]) -> PixelClass {
-    match sample_images
-        .iter()
-        .any(|image| matches_sample(image, point_in_world))
-    {
+    match sample_images.iter().any(|image| matches_sample(image, point_in_world)) {
         true => PixelClass::Covered,
         false => PixelClass::Disoccluded,
     }
@@ -163,17 +132,12 @@ fn surface_class(point_in_world: Vec3, sample_images: &[DepthImage]) -> PixelCla
 
 fn matches_sample(image: &DepthImage, point_in_world: Vec3) -> bool {
     let depth_image::Camera::Pinhole(camera) = &image.camera;
-    let Some(at) = camera
-        .project(point_in_world)
-        .filter(|at| camera.contains(at.pixel))
-    else {
+    let Some(at) = camera.project(point_in_world).filter(|at| camera.contains(at.pixel)) else {
         return false;
     };
     let texel = at.pixel.as_uvec2().min(camera.size_px - 1);
-    let sampled =
-        image.inverse_depth_per_m[texel.y as usize * camera.size_px.x as usize + texel.x as usize];
-    let tolerance =
-        (MATCH_FOOTPRINTS / camera.focal_px.min_element()).max(MATCH_RELATIVE) * at.planar_depth_m;
+    let sampled = image.inverse_depth_per_m[texel.y as usize * camera.size_px.x as usize + texel.x as usize];
+    let tolerance = (MATCH_FOOTPRINTS / camera.focal_px.min_element()).max(MATCH_RELATIVE) * at.planar_depth_m;
     sampled > 0.0 && (sampled.recip() - at.planar_depth_m).abs() <= tolerance
 }
 
@@ -186,16 +150,12 @@ mod tests {
     /// A card 2 m ahead that hides the middle of a wall 4 m ahead, seen from `(eye_x, 0, 0)`.
     fn card_before_wall(eye_x: f32) -> (PinholeCamera, Vec<f32>) {
         let eye = Vec3::new(eye_x, 0.0, 0.0);
-        let camera =
-            PinholeCamera::looking_at(eye, eye - Vec3::Z, Vec3::Y, 1.0, UVec2::new(160, 120));
+        let camera = PinholeCamera::looking_at(eye, eye - Vec3::Z, Vec3::Y, 1.0, UVec2::new(160, 120));
         let depth_at = |index: usize| {
             let pixel = Vec2::new((index % 160) as f32 + 0.5, (index / 160) as f32 + 0.5);
             let ray = camera.ray(pixel);
             let (card, wall) = (ray.at(2.0), ray.at(4.0));
-            match (
-                card.x.abs() < 0.4 && card.y.abs() < 0.4,
-                wall.x.abs() < 2.0 && wall.y.abs() < 1.5,
-            ) {
+            match (card.x.abs() < 0.4 && card.y.abs() < 0.4, wall.x.abs() < 2.0 && wall.y.abs() < 1.5) {
                 (true, _) => 0.5,
                 (false, true) => 0.25,
                 (false, false) => 0.0,
@@ -222,23 +182,11 @@ mod tests {
         let (camera, depth) = card_before_wall(0.0);
         let classes = classify(&camera, &depth, &[sample(0.4)]).unwrap();
         let counts = ClassCounts::of(&classes);
-        assert_eq!(
-            counts.silhouette + counts.disoccluded + counts.covered + counts.background,
-            camera.pixel_count()
-        );
+        assert_eq!(counts.silhouette + counts.disoccluded + counts.covered + counts.background, camera.pixel_count());
         let masks = PixelClass::ALL.map(|class| class_mask(&classes, class));
+        assert!((0..classes.len()).all(|index| masks.iter().filter(|mask| mask[index]).count() == 1));
         assert!(
-            (0..classes.len()).all(|index| masks.iter().filter(|mask| mask[index]).count() == 1)
-        );
-        assert!(
-            [
-                counts.silhouette,
-                counts.disoccluded,
-                counts.covered,
-                counts.background
-            ]
-            .iter()
-            .all(|&count| count > 100)
+            [counts.silhouette, counts.disoccluded, counts.covered, counts.background].iter().all(|&count| count > 100)
         );
     }
 
@@ -257,37 +205,25 @@ mod tests {
         let columns = 0.4 * camera.focal_px.x / 4.0;
         let rows = 0.8 * camera.focal_px.y / 2.0;
         let disoccluded = ClassCounts::of(&classes).disoccluded as f32;
-        assert!(
-            (disoccluded / ((columns - 2.0) * rows) - 1.0).abs() < 0.1,
-            "{disoccluded}"
-        );
+        assert!((disoccluded / ((columns - 2.0) * rows) - 1.0).abs() < 0.1, "{disoccluded}");
     }
 
     #[test]
     fn with_no_samples_everything_is_disoccluded() {
         let (camera, depth) = card_before_wall(0.0);
-        assert_eq!(
-            ClassCounts::of(&classify(&camera, &depth, &[]).unwrap()).covered,
-            0
-        );
+        assert_eq!(ClassCounts::of(&classify(&camera, &depth, &[]).unwrap()).covered, 0);
     }
 
     #[test]
     fn an_empty_view_has_no_rate() {
-        assert_eq!(
-            disocclusion_rate(&[PixelClass::Background], &[0.0]).unwrap(),
-            None
-        );
+        assert_eq!(disocclusion_rate(&[PixelClass::Background], &[0.0]).unwrap(), None);
         assert!(disocclusion_rate(&[], &[0.0]).is_err());
     }
 
     #[test]
     fn bad_planes_are_named() {
         let (camera, depth) = card_before_wall(0.0);
-        assert!(matches!(
-            classify(&camera, &depth[1..], &[]),
-            Err(MetricsError::BufferSize { .. })
-        ));
+        assert!(matches!(classify(&camera, &depth[1..], &[]), Err(MetricsError::BufferSize { .. })));
         let mut bad = sample(0.0);
         bad.inverse_depth_per_m.pop();
         assert!(matches!(

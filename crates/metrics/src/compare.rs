@@ -4,8 +4,8 @@ use serde::{Serialize, Serializer};
 
 use crate::error::expect_len;
 use crate::{
-    MetricsError, PdiffMap, PdiffSettings, PixelClass, Rgb8Image, SSIM_WINDOW_PX, ScoreMap,
-    class_mask, flip_map, max_channel_difference, pdiff_map, psnr_db, ssim_map,
+    MetricsError, PdiffMap, PdiffSettings, PixelClass, Rgb8Image, SSIM_WINDOW_PX, ScoreMap, class_mask, flip_map,
+    max_channel_difference, pdiff_map, psnr_db, ssim_map,
 };
 
 /// PSNR is infinite for equal images, which JSON cannot say: in reports anything above this *is* this, and
@@ -67,11 +67,7 @@ pub fn compare(
 ) -> Result<Comparison, MetricsError> {
     let maps = Maps::new(reference, test)?;
     let by_class = classes.map(|classes| maps.by_class(classes)).transpose()?;
-    Ok(Comparison {
-        overall: maps.errors(None)?,
-        by_class,
-        flip_map: maps.flip,
-    })
+    Ok(Comparison { overall: maps.errors(None)?, by_class, flip_map: maps.flip })
 }
 
 /// The maps that the means are taken from.
@@ -87,18 +83,10 @@ struct Maps<'a> {
 impl<'a> Maps<'a> {
     fn new(reference: &'a Rgb8Image<'a>, test: &'a Rgb8Image<'a>) -> Result<Self, MetricsError> {
         let holds_window = reference.width_px().min(reference.height_px()) >= SSIM_WINDOW_PX;
-        let ssim = holds_window
-            .then(|| ssim_map(reference, test))
-            .transpose()?;
+        let ssim = holds_window.then(|| ssim_map(reference, test)).transpose()?;
         let flip = flip_map(reference, test)?;
         let pdiff = pdiff_map(reference, test, PdiffSettings::default())?;
-        Ok(Self {
-            reference,
-            test,
-            ssim,
-            flip,
-            pdiff,
-        })
+        Ok(Self { reference, test, ssim, flip, pdiff })
     }
 
     fn errors(&self, mask: Option<&[bool]>) -> Result<ImageErrors, MetricsError> {
@@ -137,11 +125,7 @@ mod tests {
     fn pattern(shift: usize) -> Rgb8Image<'static> {
         let bytes = (0..24 * 16).flat_map(|i| {
             let (x, y) = ((i % 24 + shift) / 4, i / 24 / 4);
-            [
-                ((x * 67 + y * 31) % 256) as u8,
-                ((x * 151 + y * 83) % 256) as u8,
-                ((x * 29 + y * 197) % 256) as u8,
-            ]
+            [((x * 67 + y * 31) % 256) as u8, ((x * 151 + y * 83) % 256) as u8, ((x * 29 + y * 197) % 256) as u8]
         });
         Rgb8Image::new(24, 16, bytes.collect::<Vec<u8>>()).unwrap()
     }
@@ -150,10 +134,7 @@ mod tests {
     fn identical_is_perfect_and_serialises_without_null() {
         let comparison = compare(&pattern(0), &pattern(0), None).unwrap();
         assert_eq!(comparison.overall.psnr_db, Some(f64::INFINITY));
-        assert_eq!(
-            (comparison.overall.flip, comparison.overall.pdiff_failing_px),
-            (Some(0.0), 0)
-        );
+        assert_eq!((comparison.overall.flip, comparison.overall.pdiff_failing_px), (Some(0.0), 0));
         let json = serde_json::to_value(&comparison).unwrap();
         assert_eq!(json["overall"]["psnr_db"], 99.99);
         assert!(json["by_class"].is_null() && json.get("flip_map").is_none());
@@ -174,28 +155,16 @@ mod tests {
         classes[..100].fill(PixelClass::Silhouette);
         let comparison = compare(&pattern(0), &pattern(1), Some(&classes)).unwrap();
         let by_class = comparison.by_class.unwrap();
-        assert_eq!(
-            (by_class.silhouette.pixels, by_class.covered.pixels),
-            (100, 284)
-        );
+        assert_eq!((by_class.silhouette.pixels, by_class.covered.pixels), (100, 284));
         let failing = by_class.silhouette.pdiff_failing_px + by_class.covered.pdiff_failing_px;
         assert_eq!(failing, comparison.overall.pdiff_failing_px);
-        let flip = (by_class.silhouette.flip.unwrap() * 100.0
-            + by_class.covered.flip.unwrap() * 284.0)
-            / 384.0;
+        let flip = (by_class.silhouette.flip.unwrap() * 100.0 + by_class.covered.flip.unwrap() * 284.0) / 384.0;
         assert!((flip - comparison.overall.flip.unwrap()).abs() < 1e-9);
         assert_eq!(
-            (
-                by_class.disoccluded.psnr_db,
-                by_class.disoccluded.ssim,
-                by_class.disoccluded.flip
-            ),
+            (by_class.disoccluded.psnr_db, by_class.disoccluded.ssim, by_class.disoccluded.flip),
             (None, None, None)
         );
-        assert!(
-            serde_json::to_value(&comparison).unwrap()["by_class"]["background"]["psnr_db"]
-                .is_null()
-        );
+        assert!(serde_json::to_value(&comparison).unwrap()["by_class"]["background"]["psnr_db"].is_null());
     }
 
     #[test]

@@ -35,48 +35,32 @@ impl Plane {
     /// Weighs the neighbours along the row by `row_kernel`, then those along the column by
     /// `column_kernel`. Kernels have odd lengths; their middle entry is the pixel's own weight.
     pub(crate) fn convolved(&self, row_kernel: &[f32], column_kernel: &[f32], edge: Edge) -> Self {
-        self.along_rows(row_kernel, edge)
-            .along_columns(column_kernel, edge)
+        self.along_rows(row_kernel, edge).along_columns(column_kernel, edge)
     }
 
     fn along_rows(&self, kernel: &[f32], edge: Edge) -> Self {
         let radius = kernel.len() / 2;
         let mut values = vec![0.0; self.values.len()];
-        let rows = values
-            .par_chunks_exact_mut(self.width)
-            .zip(self.values.par_chunks_exact(self.width));
+        let rows = values.par_chunks_exact_mut(self.width).zip(self.values.par_chunks_exact(self.width));
         rows.for_each(|(out, row)| {
             let padded = padded(row, radius, edge);
             for (x, value) in out.iter_mut().enumerate() {
-                *value = kernel
-                    .iter()
-                    .zip(&padded[x..])
-                    .map(|(weight, neighbour)| weight * neighbour)
-                    .sum();
+                *value = kernel.iter().zip(&padded[x..]).map(|(weight, neighbour)| weight * neighbour).sum();
             }
         });
-        Self {
-            width: self.width,
-            values,
-        }
+        Self { width: self.width, values }
     }
 
     fn along_columns(&self, kernel: &[f32], edge: Edge) -> Self {
         let (radius, height) = (kernel.len() as isize / 2, self.values.len() / self.width);
         let mut values = vec![0.0; self.values.len()];
-        values
-            .par_chunks_exact_mut(self.width)
-            .enumerate()
-            .for_each(|(y, out)| {
-                for (weight, offset) in kernel.iter().zip(-radius..) {
-                    let from = edge.index(y as isize + offset, height) * self.width;
-                    add_scaled(out, &self.values[from..from + self.width], *weight);
-                }
-            });
-        Self {
-            width: self.width,
-            values,
-        }
+        values.par_chunks_exact_mut(self.width).enumerate().for_each(|(y, out)| {
+            for (weight, offset) in kernel.iter().zip(-radius..) {
+                let from = edge.index(y as isize + offset, height) * self.width;
+                add_scaled(out, &self.values[from..from + self.width], *weight);
+            }
+        });
+        Self { width: self.width, values }
     }
 }
 
@@ -98,10 +82,7 @@ mod tests {
 
     #[test]
     fn an_impulse_becomes_the_kernel() {
-        let mut plane = Plane {
-            width: 5,
-            values: vec![0.0; 25],
-        };
+        let mut plane = Plane { width: 5, values: vec![0.0; 25] };
         plane.values[12] = 1.0;
         let out = plane.convolved(&[0.25, 0.5, 0.25], &[0.0, 0.0, 1.0], Edge::Repeat);
         assert_eq!(out.values[6..9], [0.25, 0.5, 0.25]);
@@ -111,14 +92,8 @@ mod tests {
     #[test]
     fn edges_follow_their_rule() {
         let row = [1.0, 2.0, 3.0];
-        assert_eq!(
-            padded(&row, 2, Edge::Repeat),
-            [1.0, 1.0, 1.0, 2.0, 3.0, 3.0, 3.0]
-        );
-        assert_eq!(
-            padded(&row, 2, Edge::Mirror),
-            [3.0, 2.0, 1.0, 2.0, 3.0, 2.0, 1.0]
-        );
+        assert_eq!(padded(&row, 2, Edge::Repeat), [1.0, 1.0, 1.0, 2.0, 3.0, 3.0, 3.0]);
+        assert_eq!(padded(&row, 2, Edge::Mirror), [3.0, 2.0, 1.0, 2.0, 3.0, 2.0, 1.0]);
         assert_eq!(padded(&[4.0], 2, Edge::Mirror), [4.0; 5]);
     }
 }

@@ -46,20 +46,12 @@ pub fn depth_errors(
     mask: Option<&[bool]>,
 ) -> Result<DepthErrors, MetricsError> {
     if reference.size_px() != test.size_px() {
-        return Err(MetricsError::SizesDiffer {
-            reference_px: reference.size_px(),
-            test_px: test.size_px(),
-        });
+        return Err(MetricsError::SizesDiffer { reference_px: reference.size_px(), test_px: test.size_px() });
     }
     expect_mask(mask, reference.inverse_depth_per_m().len())?;
-    let pairs = reference
-        .inverse_depth_per_m()
-        .iter()
-        .zip(test.inverse_depth_per_m())
-        .enumerate();
+    let pairs = reference.inverse_depth_per_m().iter().zip(test.inverse_depth_per_m()).enumerate();
     let mut tally = Tally::default();
-    for (_, (&reference, &test)) in pairs.filter(|(index, _)| mask.is_none_or(|mask| mask[*index]))
-    {
+    for (_, (&reference, &test)) in pairs.filter(|(index, _)| mask.is_none_or(|mask| mask[*index])) {
         tally.add(reference, test);
     }
     Ok(tally.finish())
@@ -90,10 +82,8 @@ impl Tally {
     fn add_hit(&mut self, surface: Option<f32>, test: f32) {
         self.counts.hit_px += 1;
         // |1/t - 1/r| / (1/r) = |r/t - 1|
-        let relative =
-            surface.map(|reference| (f64::from(reference) / f64::from(test) - 1.0).abs());
-        self.counts.wrong_hit_px +=
-            usize::from(relative.is_none_or(|relative| relative > WRONG_HIT_RELATIVE));
+        let relative = surface.map(|reference| (f64::from(reference) / f64::from(test) - 1.0).abs());
+        self.counts.wrong_hit_px += usize::from(relative.is_none_or(|relative| relative > WRONG_HIT_RELATIVE));
         self.relative.extend(relative);
     }
 
@@ -131,15 +121,9 @@ mod tests {
         let test = plane(&[0.5, 0.4, 0.0, -1.0, 0.3, 0.0, f32::NAN]);
         let errors = depth_errors(&reference, &test, None).unwrap();
         assert_eq!((errors.pixels, errors.foreground_px), (7, 4));
-        assert_eq!(
-            (errors.hit_px, errors.miss_px, errors.unknown_px),
-            (3, 2, 2)
-        );
+        assert_eq!((errors.hit_px, errors.miss_px, errors.unknown_px), (3, 2, 2));
         assert_eq!((errors.wrong_hit_px, errors.wrong_miss_px), (2, 1));
-        assert!(
-            (errors.relative_max.unwrap() - 0.25).abs() < 1e-6,
-            "2.5 m for 2 m"
-        );
+        assert!((errors.relative_max.unwrap() - 0.25).abs() < 1e-6, "2.5 m for 2 m");
     }
 
     #[test]
@@ -148,20 +132,14 @@ mod tests {
         let errors = depth_errors(&plane(&[1.0; 100]), &plane(&test), None).unwrap();
         assert!((errors.relative_p50.unwrap() - 0.050).abs() < 1e-6);
         assert!((errors.relative_p95.unwrap() - 0.095).abs() < 1e-6);
-        assert_eq!(
-            errors.wrong_hit_px, 90,
-            "those of more than 1 %, the tenth being on the bound or beside it"
-        );
+        assert_eq!(errors.wrong_hit_px, 90, "those of more than 1 %, the tenth being on the bound or beside it");
     }
 
     #[test]
     fn identical_has_no_error_and_an_empty_mask_no_rates() {
         let depth = plane(&[0.5, 0.0]);
         let errors = depth_errors(&depth, &depth, None).unwrap();
-        assert_eq!(
-            (errors.wrong_hit_rate, errors.relative_max),
-            (Some(0.0), Some(0.0))
-        );
+        assert_eq!((errors.wrong_hit_rate, errors.relative_max), (Some(0.0), Some(0.0)));
         let none = depth_errors(&depth, &depth, Some(&[false, false])).unwrap();
         assert_eq!(none, DepthErrors::default());
     }

@@ -52,18 +52,10 @@ pub enum MetricsError {
 }
 
 /// Fails unless `len` is what is expected.
-pub(crate) fn expect_len(
-    what: &'static str,
-    len: usize,
-    expected: usize,
-) -> Result<(), MetricsError> {
+pub(crate) fn expect_len(what: &'static str, len: usize, expected: usize) -> Result<(), MetricsError> {
     match len == expected {
         true => Ok(()),
-        false => Err(MetricsError::BufferSize {
-            what,
-            len,
-            expected,
-        }),
+        false => Err(MetricsError::BufferSize { what, len, expected }),
     }
 }
 

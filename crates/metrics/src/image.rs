@@ -17,45 +17,22 @@ impl<'a> Rgb8Image<'a> {
     ///
     /// # Errors
     /// A side of 0, or a length other than width × height × 3.
-    pub fn new(
-        width_px: u32,
-        height_px: u32,
-        srgb8: impl Into<Cow<'a, [u8]>>,
-    ) -> Result<Self, MetricsError> {
+    pub fn new(width_px: u32, height_px: u32, srgb8: impl Into<Cow<'a, [u8]>>) -> Result<Self, MetricsError> {
         let srgb8 = srgb8.into();
         if width_px == 0 || height_px == 0 {
             return Err(MetricsError::Empty { what: "image" });
         }
-        expect_len(
-            "image",
-            srgb8.len(),
-            width_px as usize * height_px as usize * 3,
-        )?;
-        Ok(Self {
-            width_px,
-            height_px,
-            srgb8,
-        })
+        expect_len("image", srgb8.len(), width_px as usize * height_px as usize * 3)?;
+        Ok(Self { width_px, height_px, srgb8 })
     }
 
     /// Drops the alpha of four bytes a pixel.
     ///
     /// # Errors
     /// A side of 0, or a length other than width × height × 4.
-    pub fn from_rgba8(
-        width_px: u32,
-        height_px: u32,
-        rgba8: &[u8],
-    ) -> Result<Rgb8Image<'static>, MetricsError> {
-        expect_len(
-            "image",
-            rgba8.len(),
-            width_px as usize * height_px as usize * 4,
-        )?;
-        let srgb8: Vec<u8> = rgba8
-            .chunks_exact(4)
-            .flat_map(|rgba| [rgba[0], rgba[1], rgba[2]])
-            .collect();
+    pub fn from_rgba8(width_px: u32, height_px: u32, rgba8: &[u8]) -> Result<Rgb8Image<'static>, MetricsError> {
+        expect_len("image", rgba8.len(), width_px as usize * height_px as usize * 4)?;
+        let srgb8: Vec<u8> = rgba8.chunks_exact(4).flat_map(|rgba| [rgba[0], rgba[1], rgba[2]]).collect();
         Rgb8Image::new(width_px, height_px, srgb8)
     }
 
@@ -91,19 +68,14 @@ impl<'a> Rgb8Image<'a> {
 
     /// The pixels, row by row.
     pub fn pixels(&self) -> impl ExactSizeIterator<Item = [u8; 3]> + '_ {
-        self.srgb8
-            .chunks_exact(3)
-            .map(|rgb| [rgb[0], rgb[1], rgb[2]])
+        self.srgb8.chunks_exact(3).map(|rgb| [rgb[0], rgb[1], rgb[2]])
     }
 
     /// Fails unless `test` has this image's size.
     pub(crate) fn expect_same_size(&self, test: &Rgb8Image) -> Result<(), MetricsError> {
         match self.size_px() == test.size_px() {
             true => Ok(()),
-            false => Err(MetricsError::SizesDiffer {
-                reference_px: self.size_px(),
-                test_px: test.size_px(),
-            }),
+            false => Err(MetricsError::SizesDiffer { reference_px: self.size_px(), test_px: test.size_px() }),
         }
     }
 }
@@ -129,20 +101,10 @@ impl<'a> DepthPlane<'a> {
     ) -> Result<Self, MetricsError> {
         let inverse_depth_per_m = inverse_depth_per_m.into();
         if width_px == 0 || height_px == 0 {
-            return Err(MetricsError::Empty {
-                what: "depth plane",
-            });
+            return Err(MetricsError::Empty { what: "depth plane" });
         }
-        expect_len(
-            "depth plane",
-            inverse_depth_per_m.len(),
-            width_px as usize * height_px as usize,
-        )?;
-        Ok(Self {
-            width_px,
-            height_px,
-            inverse_depth_per_m,
-        })
+        expect_len("depth plane", inverse_depth_per_m.len(), width_px as usize * height_px as usize)?;
+        Ok(Self { width_px, height_px, inverse_depth_per_m })
     }
 
     /// Columns and rows.
@@ -164,19 +126,9 @@ mod tests {
 
     #[test]
     fn wrong_sizes_are_refused() {
-        assert_eq!(
-            Rgb8Image::new(0, 3, vec![]).unwrap_err(),
-            MetricsError::Empty { what: "image" }
-        );
+        assert_eq!(Rgb8Image::new(0, 3, vec![]).unwrap_err(), MetricsError::Empty { what: "image" });
         let short = Rgb8Image::new(2, 2, vec![0; 11]).unwrap_err();
-        assert_eq!(
-            short,
-            MetricsError::BufferSize {
-                what: "image",
-                len: 11,
-                expected: 12
-            }
-        );
+        assert_eq!(short, MetricsError::BufferSize { what: "image", len: 11, expected: 12 });
         assert!(Rgb8Image::from_rgba8(2, 2, &[0; 15]).is_err());
         assert!(DepthPlane::new(2, 2, vec![0.0; 5]).is_err());
         assert!(DepthPlane::new(2, 0, vec![]).is_err());

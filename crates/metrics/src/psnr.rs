@@ -7,11 +7,7 @@ use crate::{MetricsError, Rgb8Image, error::expect_mask};
 ///
 /// # Errors
 /// Images or mask of different sizes.
-pub fn psnr_db(
-    reference: &Rgb8Image,
-    test: &Rgb8Image,
-    mask: Option<&[bool]>,
-) -> Result<Option<f64>, MetricsError> {
+pub fn psnr_db(reference: &Rgb8Image, test: &Rgb8Image, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
     Ok(mean_squared_error(reference, test, mask)?.map(db_from_mean_squared_error))
 }
 
@@ -25,9 +21,7 @@ pub fn mean_squared_error(
     mask: Option<&[bool]>,
 ) -> Result<Option<f64>, MetricsError> {
     let (sum, pixels) = differences(reference, test, mask)?
-        .fold((0_u64, 0_u64), |(sum, pixels), delta| {
-            (sum + u64::from(squared_length(delta)), pixels + 1)
-        });
+        .fold((0_u64, 0_u64), |(sum, pixels), delta| (sum + u64::from(squared_length(delta)), pixels + 1));
     Ok((pixels > 0).then(|| sum as f64 / (3 * pixels) as f64))
 }
 
@@ -81,22 +75,13 @@ mod tests {
         let expected = 20.0 * (255.0_f64 / 5.0).log10();
         let psnr = psnr_db(&flat(100), &flat(105), None).unwrap().unwrap();
         assert!((psnr - expected).abs() < 1e-12);
-        assert_eq!(
-            max_channel_difference(&flat(100), &flat(95), None).unwrap(),
-            Some(5)
-        );
+        assert_eq!(max_channel_difference(&flat(100), &flat(95), None).unwrap(), Some(5));
     }
 
     #[test]
     fn identical_is_infinite_and_an_empty_mask_is_none() {
-        assert_eq!(
-            psnr_db(&flat(7), &flat(7), None).unwrap(),
-            Some(f64::INFINITY)
-        );
-        assert_eq!(
-            psnr_db(&flat(7), &flat(9), Some(&[false; 12])).unwrap(),
-            None
-        );
+        assert_eq!(psnr_db(&flat(7), &flat(7), None).unwrap(), Some(f64::INFINITY));
+        assert_eq!(psnr_db(&flat(7), &flat(9), Some(&[false; 12])).unwrap(), None);
     }
 
     #[test]
@@ -106,22 +91,14 @@ mod tests {
         let test = Rgb8Image::new(4, 3, bytes).unwrap();
         let mut first = [false; 12];
         first[0] = true;
-        let error = mean_squared_error(&flat(50), &test, Some(&first))
-            .unwrap()
-            .unwrap();
+        let error = mean_squared_error(&flat(50), &test, Some(&first)).unwrap().unwrap();
         assert!((error - 100.0 / 3.0).abs() < 1e-12);
     }
 
     #[test]
     fn sizes_must_agree() {
         let other = Rgb8Image::new(3, 4, vec![0; 36]).unwrap();
-        assert!(matches!(
-            psnr_db(&flat(0), &other, None),
-            Err(MetricsError::SizesDiffer { .. })
-        ));
-        assert!(matches!(
-            psnr_db(&flat(0), &flat(0), Some(&[true])),
-            Err(MetricsError::BufferSize { .. })
-        ));
+        assert!(matches!(psnr_db(&flat(0), &other, None), Err(MetricsError::SizesDiffer { .. })));
+        assert!(matches!(psnr_db(&flat(0), &flat(0), Some(&[true])), Err(MetricsError::BufferSize { .. })));
     }
 }

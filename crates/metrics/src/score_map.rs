@@ -39,12 +39,8 @@ impl ScoreMap {
     pub fn mean(&self, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
         expect_mask(mask, self.values.len())?;
         let selected = |index: &usize| mask.is_none_or(|mask| mask[*index]);
-        let values = self
-            .valued_pixels()
-            .filter(selected)
-            .map(|index| f64::from(self.values[index]));
-        let (sum, count) =
-            values.fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
+        let values = self.valued_pixels().filter(selected).map(|index| f64::from(self.values[index]));
+        let (sum, count) = values.fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
         Ok((count > 0).then(|| sum / count as f64))
     }
 
@@ -52,11 +48,7 @@ impl ScoreMap {
     fn valued_pixels(&self) -> impl Iterator<Item = usize> + '_ {
         let columns = self.border_px..self.width_px.saturating_sub(self.border_px);
         let rows = self.border_px..self.height_px.saturating_sub(self.border_px);
-        rows.flat_map(move |y| {
-            columns
-                .clone()
-                .map(move |x| (y * self.width_px + x) as usize)
-        })
+        rows.flat_map(move |y| columns.clone().map(move |x| (y * self.width_px + x) as usize))
     }
 }
 
@@ -67,12 +59,7 @@ mod tests {
     #[test]
     fn the_border_is_in_no_mean() {
         let values = vec![9.0, 9.0, 9.0, 9.0, 0.5, 9.0, 9.0, 9.0, 9.0];
-        let map = ScoreMap {
-            width_px: 3,
-            height_px: 3,
-            border_px: 1,
-            values,
-        };
+        let map = ScoreMap { width_px: 3, height_px: 3, border_px: 1, values };
         assert_eq!(map.mean(None).unwrap(), Some(0.5));
         let mut corner = [false; 9];
         corner[0] = true;

@@ -25,25 +25,13 @@ pub fn ssim_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, Met
     reference.expect_same_size(test)?;
     let (width_px, height_px) = reference.size_px();
     if width_px.min(height_px) < SSIM_WINDOW_PX {
-        return Err(MetricsError::SmallerThanWindow {
-            size_px: (width_px, height_px),
-            window_px: SSIM_WINDOW_PX,
-        });
+        return Err(MetricsError::SmallerThanWindow { size_px: (width_px, height_px), window_px: SSIM_WINDOW_PX });
     }
     let (width, height) = (width_px as usize, height_px as usize);
     let mut values = vec![0.0; width * height];
-    let interior = values
-        .par_chunks_exact_mut(width)
-        .enumerate()
-        .take(height - RADIUS)
-        .skip(RADIUS);
+    let interior = values.par_chunks_exact_mut(width).enumerate().take(height - RADIUS).skip(RADIUS);
     interior.for_each(|(y, row)| fill_row(row, y, reference, test));
-    Ok(ScoreMap {
-        width_px,
-        height_px,
-        border_px: RADIUS as u32,
-        values,
-    })
+    Ok(ScoreMap { width_px, height_px, border_px: RADIUS as u32, values })
 }
 
 /// The first and second moments of a window, times its samples.
@@ -59,13 +47,7 @@ struct Sums {
 impl Sums {
     fn of(a: u8, b: u8) -> Self {
         let (a, b) = (i64::from(a), i64::from(b));
-        Self {
-            a,
-            b,
-            aa: a * a,
-            bb: b * b,
-            ab: a * b,
-        }
+        Self { a, b, aa: a * a, bb: b * b, ab: a * b }
     }
 
     fn plus(self, other: Self, sign: i64) -> Self {
@@ -93,12 +75,8 @@ impl Sums {
 fn fill_row(row: &mut [f32], y: usize, reference: &Rgb8Image, test: &Rgb8Image) {
     let width = row.len();
     for channel in 0..3 {
-        let columns: Vec<Sums> = (0..width)
-            .map(|x| column_sums(x, y, channel, reference, test))
-            .collect();
-        let mut window = columns[..2 * RADIUS]
-            .iter()
-            .fold(Sums::default(), |sum, &column| sum.plus(column, 1));
+        let columns: Vec<Sums> = (0..width).map(|x| column_sums(x, y, channel, reference, test)).collect();
+        let mut window = columns[..2 * RADIUS].iter().fold(Sums::default(), |sum, &column| sum.plus(column, 1));
         for x in RADIUS..width - RADIUS {
             window = window.plus(columns[x + RADIUS], 1);
             row[x] += (window.similarity() / 3.0) as f32;
@@ -108,13 +86,7 @@ fn fill_row(row: &mut [f32], y: usize, reference: &Rgb8Image, test: &Rgb8Image) 
 }
 
 /// The sums down the part of a column that the window around row `y` covers.
-fn column_sums(
-    x: usize,
-    y: usize,
-    channel: usize,
-    reference: &Rgb8Image,
-    test: &Rgb8Image,
-) -> Sums {
+fn column_sums(x: usize, y: usize, channel: usize, reference: &Rgb8Image, test: &Rgb8Image) -> Sums {
     let width = reference.width_px() as usize;
     (y - RADIUS..=y + RADIUS).fold(Sums::default(), |sum, row| {
         let index = (row * width + x) * 3 + channel;
@@ -138,20 +110,13 @@ mod tests {
     fn flat_images_differ_by_luminance_alone() {
         let flat = |value| Rgb8Image::new(7, 7, vec![value; 147]).unwrap();
         let expected = (2.0 * 100.0 * 120.0 + C1) / (100.0_f64.powi(2) + 120.0_f64.powi(2) + C1);
-        let mean = ssim_map(&flat(100), &flat(120))
-            .unwrap()
-            .mean(None)
-            .unwrap()
-            .unwrap();
+        let mean = ssim_map(&flat(100), &flat(120)).unwrap().mean(None).unwrap().unwrap();
         assert!((mean - expected).abs() < 1e-7);
     }
 
     #[test]
     fn an_image_below_the_window_is_refused() {
         let small = Rgb8Image::new(6, 9, vec![0; 162]).unwrap();
-        assert!(matches!(
-            ssim_map(&small, &small),
-            Err(MetricsError::SmallerThanWindow { window_px: 7, .. })
-        ));
+        assert!(matches!(ssim_map(&small, &small), Err(MetricsError::SmallerThanWindow { window_px: 7, .. })));
     }
 }

@@ -19,26 +19,10 @@ pub fn step_pixels(inverse_depth_per_m: &[f32], width_px: u32) -> Vec<bool> {
     let height = inverse_depth_per_m.len().checked_div(width).unwrap_or(0);
     let mut beside = vec![false; inverse_depth_per_m.len()];
     for y in 0..height {
-        mark_line(
-            &mut beside,
-            inverse_depth_per_m,
-            Line {
-                start: y * width,
-                stride: 1,
-                len: width,
-            },
-        );
+        mark_line(&mut beside, inverse_depth_per_m, Line { start: y * width, stride: 1, len: width });
     }
     for x in 0..width {
-        mark_line(
-            &mut beside,
-            inverse_depth_per_m,
-            Line {
-                start: x,
-                stride: width,
-                len: height,
-            },
-        );
+        mark_line(&mut beside, inverse_depth_per_m, Line { start: x, stride: width, len: height });
     }
     dilated(&beside, width, NEAR_PX - 1)
 }
@@ -60,15 +44,11 @@ impl Line {
 
     /// Whether there is a step between positions `at` and `at + 1`.
     fn steps_after(self, inverse_depth: &[f32], at: isize) -> bool {
-        let [before, a, b, after] =
-            [-1, 0, 1, 2].map(|offset| self.surface(inverse_depth, at + offset));
+        let [before, a, b, after] = [-1, 0, 1, 2].map(|offset| self.surface(inverse_depth, at + offset));
         match (a, b) {
-            (Some(a), Some(b)) => jump_is_step(
-                b - a,
-                before.map(|before| a - before),
-                after.map(|after| after - b),
-                a.max(b),
-            ),
+            (Some(a), Some(b)) => {
+                jump_is_step(b - a, before.map(|before| a - before), after.map(|after| after - b), a.max(b))
+            }
             (None, None) => false,
             _ => true,
         }
@@ -100,9 +80,7 @@ fn dilated(marked: &[bool], width: usize, radius: usize) -> Vec<bool> {
     for index in (0..marked.len()).filter(|&index| marked[index]) {
         let (x, y) = (index % width, index / width);
         for row in y.saturating_sub(radius)..(y + radius + 1).min(height) {
-            grown
-                [row * width + x.saturating_sub(radius)..row * width + (x + radius + 1).min(width)]
-                .fill(true);
+            grown[row * width + x.saturating_sub(radius)..row * width + (x + radius + 1).min(width)].fill(true);
         }
     }
     grown
@@ -117,9 +95,7 @@ mod tests {
     }
 
     fn expect_marked(inverse_depth: &[f32], marked: std::ops::Range<usize>) {
-        let expected: Vec<bool> = (0..inverse_depth.len())
-            .map(|x| marked.contains(&x))
-            .collect();
+        let expected: Vec<bool> = (0..inverse_depth.len()).map(|x| marked.contains(&x)).collect();
         assert_eq!(row_mask(inverse_depth), expected, "{inverse_depth:?}");
     }
 
@@ -131,9 +107,7 @@ mod tests {
 
     #[test]
     fn a_crease_is_no_step() {
-        let crease: Vec<f32> = (0..40_i16)
-            .map(|x| 2.0 - 0.04 * f32::from((x - 20).abs()))
-            .collect();
+        let crease: Vec<f32> = (0..40_i16).map(|x| 2.0 - 0.04 * f32::from((x - 20).abs())).collect();
         assert!(row_mask(&crease).iter().all(|&step| !step));
     }
 
@@ -157,10 +131,7 @@ mod tests {
     fn scale_does_not_matter() {
         let metres = [0.5, 0.5, 0.5, 0.4, 0.4, 0.4, 0.398, 0.396];
         for scale in [1e-4, 1.0, 1e4] {
-            assert_eq!(
-                row_mask(&metres.map(|depth| depth * scale)),
-                row_mask(&metres)
-            );
+            assert_eq!(row_mask(&metres.map(|depth| depth * scale)), row_mask(&metres));
         }
     }
 

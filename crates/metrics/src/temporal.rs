@@ -7,10 +7,7 @@ use crate::{MetricsError, Rgb8Image, psnr::db_from_mean_squared_error};
 ///
 /// # Errors
 /// Images of different sizes.
-pub fn temporal_psnr_db(
-    reference: [&Rgb8Image; 2],
-    test: [&Rgb8Image; 2],
-) -> Result<f64, MetricsError> {
+pub fn temporal_psnr_db(reference: [&Rgb8Image; 2], test: [&Rgb8Image; 2]) -> Result<f64, MetricsError> {
     for image in [reference[1], test[0], test[1]] {
         reference[0].expect_same_size(image)?;
     }
@@ -18,9 +15,7 @@ pub fn temporal_psnr_db(
         i64::from(frames[1].srgb8()[index]) - i64::from(frames[0].srgb8()[index])
     };
     let bytes = reference[0].srgb8().len();
-    let squares: i64 = (0..bytes)
-        .map(|index| (changes(test, index) - changes(reference, index)).pow(2))
-        .sum();
+    let squares: i64 = (0..bytes).map(|index| (changes(test, index) - changes(reference, index)).pow(2)).sum();
     Ok(db_from_mean_squared_error(squares as f64 / bytes as f64))
 }
 

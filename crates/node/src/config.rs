@@ -51,10 +51,6 @@ pub struct Deadlines {
 
 impl Default for Deadlines {
     fn default() -> Self {
-        Self {
-            idle: Duration::from_secs(60),
-            work: Duration::from_secs(300),
-            chunk: Duration::from_secs(10),
-        }
+        Self { idle: Duration::from_secs(60), work: Duration::from_secs(300), chunk: Duration::from_secs(10) }
     }
 }

@@ -47,11 +47,7 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
         .map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec))
         .collect::<Result<Vec<_>, _>>()?;
     let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?)?))?;
-    let work = ViewWork {
-        cameras: cameras.clone(),
-        method: workload.method.clone(),
-        planes: request.planes,
-    };
+    let work = ViewWork { cameras: cameras.clone(), method: workload.method.clone(), planes: request.planes };
     let (made, reconstruct_s) = timed(|| Ok(engine.reconstruct(set.as_ref(), &work)?))?;
     let direct = direct_work(workload, cameras, request);
     let ((), direct_s) = timed(|| Ok(engine.draw_direct(&direct).map(drop)?))?;
@@ -93,16 +89,8 @@ fn decoded(workload: &Workload, encoded: &[EncodedDepthImage]) -> Result<SampleS
     let decode = |(image, camera): (&EncodedDepthImage, &Camera)| {
         decode_depth_image(&image.header, *camera, &image.payload, &limits).map_err(codec)
     };
-    let images = encoded
-        .iter()
-        .zip(&workload.sample_cameras)
-        .map(decode)
-        .collect::<Result<_, _>>()?;
-    Ok(SampleSet {
-        images,
-        volume: workload.volume,
-        background_linear: workload.background_linear,
-    })
+    let images = encoded.iter().zip(&workload.sample_cameras).map(decode).collect::<Result<_, _>>()?;
+    Ok(SampleSet { images, volume: workload.volume, background_linear: workload.background_linear })
 }
 
 fn encode_s(made: &[View], codec_name: &str) -> Result<f64, MeasureError> {

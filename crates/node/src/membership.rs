@@ -25,19 +25,12 @@ pub async fn keep_membership(
     let mut retry = FIRST_RETRY;
     loop {
         let mut joined = false;
-        let request = JoinCluster {
-            node: node.clone(),
-            plan_epoch: plan.epoch(),
-        };
+        let request = JoinCluster { node: node.clone(), plan_epoch: plan.epoch() };
         let ended = tokio::select! {
             ended = member(request, &coordinator, &scenes, &mut joined) => ended,
             () = shutdown.cancelled() => return,
         };
-        retry = if joined {
-            FIRST_RETRY
-        } else {
-            (retry * 2).min(LAST_RETRY)
-        };
+        retry = if joined { FIRST_RETRY } else { (retry * 2).min(LAST_RETRY) };
         tracing::warn!(node = node.node_name, %coordinator, reason = ended.message(), "no longer a member");
         tokio::select! {
             () = tokio::time::sleep(retry) => (),
@@ -48,11 +41,7 @@ pub async fn keep_membership(
 
 /// One membership, until it ends; says why.
 async fn member(request: JoinCluster, coordinator: &str, scenes: &Arc<Scenes>, joined: &mut bool) -> Status {
-    let stream = async {
-        CoordinatorClient::new(connect(coordinator).await?)
-            .join_cluster(request)
-            .await
-    };
+    let stream = async { CoordinatorClient::new(connect(coordinator).await?).join_cluster(request).await };
     let mut stream = match stream.await {
         Ok(stream) => stream,
         Err(status) => return status,

@@ -17,10 +17,7 @@ impl CurrentPlan {
     /// No plan yet.
     #[must_use]
     pub fn new(node_name: &str) -> Self {
-        Self {
-            node_name: node_name.into(),
-            plan: watch::Sender::new(None),
-        }
+        Self { node_name: node_name.into(), plan: watch::Sender::new(None) }
     }
 
     /// This node.
@@ -46,9 +43,7 @@ impl CurrentPlan {
         if new > old || (new == old && **current == *assignment) {
             return Ok(());
         }
-        Err(Status::failed_precondition(format!(
-            "plan_epoch {new} does not replace {old}"
-        )))
+        Err(Status::failed_precondition(format!("plan_epoch {new} does not replace {old}")))
     }
 
     /// Puts a plan in force.
@@ -59,17 +54,13 @@ impl CurrentPlan {
         let mut verdict = Ok(());
         // Judged under the lock: of two plans that were being prepared the higher one stays.
         self.plan.send_if_modified(|current| {
-            let higher = current
-                .as_ref()
-                .is_none_or(|current| assignment.plan_epoch > current.plan_epoch);
+            let higher = current.as_ref().is_none_or(|current| assignment.plan_epoch > current.plan_epoch);
             let same = current.as_ref().is_some_and(|current| **current == assignment);
             if higher {
                 *current = Some(Arc::new(assignment));
             } else if !same {
-                verdict = Err(Status::failed_precondition(format!(
-                    "plan_epoch {} came too late",
-                    assignment.plan_epoch
-                )));
+                verdict =
+                    Err(Status::failed_precondition(format!("plan_epoch {} came too late", assignment.plan_epoch)));
             }
             higher
         });
@@ -106,29 +97,17 @@ mod tests {
 
     fn plan(plan_epoch: u64, lighting: &str) -> Assignment {
         let workload = Workload {
-            scene: SceneRef {
-                hash: SceneHash::of(b""),
-                package_bytes: 0,
-            },
+            scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
             sample_cameras: Vec::new(),
             sampling: "conventional".to_owned(),
             lighting: lighting.to_owned(),
             method: "joint_carve".to_owned(),
             codec: "lz4".to_owned(),
-            volume: Aabb {
-                min: Vec3::NEG_ONE,
-                max: Vec3::ONE,
-            },
+            volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
             background_linear: Vec3::ZERO,
             timeline: Timeline::still(0.0),
         };
-        Assignment {
-            plan_epoch,
-            policy: Policy::Direct,
-            workload,
-            samplers: Vec::new(),
-            compositors: Vec::new(),
-        }
+        Assignment { plan_epoch, policy: Policy::Direct, workload, samplers: Vec::new(), compositors: Vec::new() }
     }
 
     #[test]
@@ -138,14 +117,8 @@ mod tests {
         current.apply(plan(3, "unlit")).unwrap();
         current.apply(plan(3, "unlit")).unwrap();
         for refused in [plan(2, "unlit"), plan(3, "phong")] {
-            assert_eq!(
-                current.admits(&refused).unwrap_err().code(),
-                tonic::Code::FailedPrecondition
-            );
-            assert_eq!(
-                current.apply(refused).unwrap_err().code(),
-                tonic::Code::FailedPrecondition
-            );
+            assert_eq!(current.admits(&refused).unwrap_err().code(), tonic::Code::FailedPrecondition);
+            assert_eq!(current.apply(refused).unwrap_err().code(), tonic::Code::FailedPrecondition);
         }
         current.apply(plan(4, "phong")).unwrap();
         assert!(current.require(3).is_err() && current.require(5).is_err());

@@ -67,12 +67,7 @@ impl Scenes {
     async fn fetch(&self, scene: &SceneRef) -> Result<Vec<u8>, Status> {
         // A channel of its own: bulk must not hold up membership.
         let client = CoordinatorClient::new(connect(&self.coordinator).await?);
-        let mut parts = client
-            .fetch_scene(FetchScene {
-                hash: scene.hash.clone(),
-                offset_bytes: 0,
-            })
-            .await?;
+        let mut parts = client.fetch_scene(FetchScene { hash: scene.hash.clone(), offset_bytes: 0 }).await?;
         let mut assembly = SceneAssembly::new(scene.clone());
         while let Some(part) = next_within(&mut parts, self.part_deadline, "scene").await? {
             assembly.push(&part)?;
@@ -125,10 +120,7 @@ mod tests {
         let hash = SceneHash::of(b"scene");
         assert_eq!(read_verified(folder.path(), &hash).unwrap(), None);
         keep(Some(folder.path()), &hash, b"scene");
-        assert_eq!(
-            read_verified(folder.path(), &hash).unwrap().as_deref(),
-            Some(&b"scene"[..])
-        );
+        assert_eq!(read_verified(folder.path(), &hash).unwrap().as_deref(), Some(&b"scene"[..]));
         fs::write(file_of(folder.path(), &hash), b"scenery").unwrap();
         assert_eq!(read_verified(folder.path(), &hash).unwrap(), None);
     }

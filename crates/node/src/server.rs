@@ -49,9 +49,8 @@ pub async fn serve(
         return Err(ServeError::NotLoopback { address });
     }
     let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-    let serving = builder()
-        .add_routes(routes)
-        .serve_with_incoming_shutdown(incoming, shutdown.clone().cancelled_owned());
+    let serving =
+        builder().add_routes(routes).serve_with_incoming_shutdown(incoming, shutdown.clone().cancelled_owned());
     let overdue = async {
         shutdown.cancelled().await;
         tokio::time::sleep(DRAIN).await;

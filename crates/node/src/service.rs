@@ -36,9 +36,6 @@ impl rpc::Node for NodeService {
         let scene_load_s = self.scenes.ensure(&assignment.workload.scene).await?;
         self.plan.apply(assignment)?;
         tracing::info!(node = self.plan.node_name(), plan_epoch, "plan in force");
-        Ok(Ready {
-            plan_epoch,
-            scene_load_s,
-        })
+        Ok(Ready { plan_epoch, scene_load_s })
     }
 }

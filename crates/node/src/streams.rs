@@ -35,10 +35,7 @@ impl<T> Stream for UntilDrained<T> {
 
 /// Ends a stream with `UNAVAILABLE` once the process shuts down. What is ready still goes out.
 pub fn until_drained<T: Send + 'static>(stream: Messages<T>, shutdown: CancellationToken) -> Messages<T> {
-    Box::pin(UntilDrained {
-        inner: Some(stream),
-        shutdown: Box::pin(shutdown.cancelled_owned()),
-    })
+    Box::pin(UntilDrained { inner: Some(stream), shutdown: Box::pin(shutdown.cancelled_owned()) })
 }
 
 struct WithGuard<T, G> {
@@ -66,10 +63,7 @@ pub fn with_guard<T: Send + 'static, G: Unpin + Send + 'static>(inner: Messages<
 pub async fn next_within<T>(stream: &mut Messages<T>, deadline: Duration, what: &str) -> Result<Option<T>, Status> {
     match tokio::time::timeout(deadline, stream.next()).await {
         Ok(next) => next.transpose(),
-        Err(_) => Err(Status::deadline_exceeded(format!(
-            "{what}: nothing came for {:.1} s",
-            deadline.as_secs_f64()
-        ))),
+        Err(_) => Err(Status::deadline_exceeded(format!("{what}: nothing came for {:.1} s", deadline.as_secs_f64()))),
     }
 }
 
@@ -97,10 +91,7 @@ mod tests {
         let mut stream = until_drained(silent(), shutdown.clone());
         shutdown.cancel();
         assert_eq!(stream.next().await.unwrap().unwrap(), 1);
-        assert_eq!(
-            stream.next().await.unwrap().unwrap_err().code(),
-            tonic::Code::Unavailable
-        );
+        assert_eq!(stream.next().await.unwrap().unwrap_err().code(), tonic::Code::Unavailable);
         assert!(stream.next().await.is_none());
     }
 }

@@ -11,6 +11,7 @@ mod method;
 mod pyramid;
 mod reconstructor;
 mod sample_set;
+pub mod scalar;
 mod shaders;
 
 pub use method::{ReconstructionMethod, UnknownMethod};

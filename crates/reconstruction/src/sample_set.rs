@@ -10,6 +10,10 @@ use crate::{
     layout::{GpuSampleCamera, GpuVolume},
 };
 
+/// A surface on the very face of the volume must still be entered, by all cameras, whose samples of a slope are
+/// steps: in parts of the volume's longest edge.
+pub(crate) const VOLUME_MARGIN: f32 = 0.005;
+
 /// Shaders name each camera; more would make them too long.
 pub const MAX_SAMPLE_CAMERAS: usize = 16;
 
@@ -110,16 +114,15 @@ fn sample_camera(
 
 /// `f √(1 + slope²)` at the corner farthest off the axis: a point that moves by r moves in the image by
 /// at most this times r / depth.
-fn stretch(camera: &PinholeCamera) -> f32 {
+pub(crate) fn stretch(camera: &PinholeCamera) -> f32 {
     let corners =
         [Vec2::ZERO, camera.size_px.as_vec2()].map(|corner| ((corner - camera.principal_px) / camera.focal_px).abs());
     let slope = corners[0].max(corners[1]);
     camera.focal_px.max_element() * (1.0 + slope.length_squared()).sqrt()
 }
 
-fn gpu_volume(volume: &Aabb, background_linear: Vec3) -> GpuVolume {
-    // A surface on the very face of the volume must still be entered.
-    let padded = volume.padded(volume.size().max_element() * 1e-3);
+pub(crate) fn gpu_volume(volume: &Aabb, background_linear: Vec3) -> GpuVolume {
+    let padded = volume.padded(volume.size().max_element() * VOLUME_MARGIN);
     let [r, g, b] = background_linear.to_array().map(srgb8_from_linear);
     GpuVolume {
         min_in_world: padded.min.to_array(),

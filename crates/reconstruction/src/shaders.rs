@@ -19,6 +19,9 @@ pub(crate) const THICKNESS_FOOTPRINTS: f32 = 2.0;
 /// The coarsest level that a pixel's own search uses; its tile has done the rest.
 pub(crate) const START_LEVEL: u32 = 3;
 
+/// Added to the squared angle between two lines of sight, so that no camera counts without end.
+pub(crate) const ANGLE_FLOOR: f32 = 1e-2;
+
 /// A shader and all that is written into it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct ShaderKey {
@@ -50,7 +53,7 @@ pub fn shader_text(templates: &Templates, key: ShaderKey) -> Result<String, Temp
             start_level => START_LEVEL.max(key.stop_level),
             count_fetches => key.count_fetches,
             thickness_footprints => decimal(THICKNESS_FOOTPRINTS),
-            angle_floor => "1e-2",
+            angle_floor => decimal(ANGLE_FLOOR),
             directions => DIRECTIONS,
         },
     )

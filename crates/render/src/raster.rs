@@ -252,7 +252,11 @@ impl Rasterizer {
         let object = wgpu::BufferBinding { buffer: &work.scene.objects, offset: 0, size };
         let entries = [wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(object) }];
         let layout = &self.object_layout;
-        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("object"), layout, entries: &entries })
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("object"),
+            layout,
+            entries: &entries,
+        })
     }
 
     fn bind_scene(&self, work: DrawWork<'_>, cameras: &[PinholeCamera]) -> wgpu::BindGroup {
@@ -301,7 +305,13 @@ impl Rasterizer {
         output: Output,
         traits: Traits,
     ) -> Result<Arc<wgpu::RenderPipeline>, RenderError> {
-        let key = PipelineKey { output, lighting: work.lighting, wind: work.scene.is_animated(), lights: work.scene.light_count, traits };
+        let key = PipelineKey {
+            output,
+            lighting: work.lighting,
+            wind: work.scene.is_animated(),
+            lights: work.scene.light_count,
+            traits,
+        };
         let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pipeline) = pipelines.get(&key) {
             return Ok(pipeline.clone());

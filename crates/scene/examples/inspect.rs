@@ -21,34 +21,14 @@ fn inspect(spec: &SceneSpec) {
     };
     let load = start.elapsed();
     let vertices: usize = scene.meshes.iter().map(|m| m.vertices.len()).sum();
-    println!(
-        "{spec}: {} triangles, {vertices} vertices, loaded in {load:.1?}",
-        scene.triangle_count()
-    );
-    let (meshes, instances, parts) = (
-        scene.meshes.len(),
-        scene.instances.len(),
-        scene.meshes.iter().map(|m| m.parts.len()).sum::<usize>(),
-    );
-    println!(
-        "  {meshes} meshes in {parts} parts, {instances} instances, {} materials",
-        scene.materials.len()
-    );
-    let sizes: Vec<_> = scene
-        .textures
-        .iter()
-        .map(|t| format!("{}x{}", t.width_px, t.height_px))
-        .collect();
-    println!(
-        "  textures {sizes:?}, {} lights, {} cameras",
-        scene.lights.len(),
-        scene.cameras.len()
-    );
+    println!("{spec}: {} triangles, {vertices} vertices, loaded in {load:.1?}", scene.triangle_count());
+    let (meshes, instances, parts) =
+        (scene.meshes.len(), scene.instances.len(), scene.meshes.iter().map(|m| m.parts.len()).sum::<usize>());
+    println!("  {meshes} meshes in {parts} parts, {instances} instances, {} materials", scene.materials.len());
+    let sizes: Vec<_> = scene.textures.iter().map(|t| format!("{}x{}", t.width_px, t.height_px)).collect();
+    println!("  textures {sizes:?}, {} lights, {} cameras", scene.lights.len(), scene.cameras.len());
     let bounds = scene.bounds();
-    println!(
-        "  bounds {} to {}, origin in source {}",
-        bounds.min, bounds.max, scene.origin_in_source
-    );
+    println!("  bounds {} to {}, origin in source {}", bounds.min, bounds.max, scene.origin_in_source);
     let start = Instant::now();
     let package = pack(&scene);
     let packed = start.elapsed();

@@ -55,10 +55,7 @@ pub(crate) struct Fault {
 
 impl Fault {
     pub(crate) fn new(element: impl fmt::Display, kind: SceneErrorKind) -> Self {
-        Self {
-            element: element.to_string(),
-            kind,
-        }
+        Self { element: element.to_string(), kind }
     }
 
     pub(crate) fn malformed(element: impl fmt::Display, reason: impl Into<String>) -> Self {
@@ -66,24 +63,11 @@ impl Fault {
     }
 
     pub(crate) fn unsupported(element: impl fmt::Display, feature: impl Into<String>) -> Self {
-        Self::new(
-            element,
-            SceneErrorKind::Unsupported(shortened(feature.into())),
-        )
+        Self::new(element, SceneErrorKind::Unsupported(shortened(feature.into())))
     }
 
-    pub(crate) fn forbidden(
-        element: impl fmt::Display,
-        reference: &str,
-        reason: &'static str,
-    ) -> Self {
-        Self::new(
-            element,
-            SceneErrorKind::Forbidden {
-                reference: shortened(reference.to_owned()),
-                reason,
-            },
-        )
+    pub(crate) fn forbidden(element: impl fmt::Display, reference: &str, reason: &'static str) -> Self {
+        Self::new(element, SceneErrorKind::Forbidden { reference: shortened(reference.to_owned()), reason })
     }
 
     pub(crate) fn io(element: impl fmt::Display, error: std::io::Error) -> Self {
@@ -95,11 +79,7 @@ impl Fault {
     }
 
     pub(crate) fn in_file(self, file: impl Into<String>) -> SceneError {
-        SceneError {
-            file: file.into(),
-            element: shortened(self.element),
-            kind: self.kind,
-        }
+        SceneError { file: file.into(), element: shortened(self.element), kind: self.kind }
     }
 
     pub(crate) fn in_path(self, path: &Path) -> SceneError {
@@ -109,26 +89,14 @@ impl Fault {
 
 /// `Err` when `actual` is over `limit`.
 pub(crate) fn at_most(element: impl fmt::Display, actual: u64, limit: u64) -> Result<(), Fault> {
-    if actual > limit {
-        Err(Fault::new(
-            element,
-            SceneErrorKind::TooLarge { actual, limit },
-        ))
-    } else {
-        Ok(())
-    }
+    if actual > limit { Err(Fault::new(element, SceneErrorKind::TooLarge { actual, limit })) } else { Ok(()) }
 }
 
 /// A message quotes the file, and the file may hold megabytes without a line break.
 fn shortened(mut text: String) -> String {
     const MAX_BYTES: usize = 300;
     if text.len() > MAX_BYTES {
-        text.truncate(
-            (0..=MAX_BYTES)
-                .rev()
-                .find(|&at| text.is_char_boundary(at))
-                .unwrap_or(0),
-        );
+        text.truncate((0..=MAX_BYTES).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0));
         text.push('…');
     }
     text

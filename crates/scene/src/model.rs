@@ -54,9 +54,7 @@ pub struct MeshPart {
 
 /// One corner. `#[repr(C)]`, 40 bytes: uploaded as it is.
 #[repr(C)]
-#[derive(
-    Debug, Clone, Copy, PartialEq, Serialize, Deserialize, bytemuck::Pod, bytemuck::Zeroable,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Vertex {
     /// In the mesh's space, metres.
     pub position: [f32; 3],
@@ -202,14 +200,8 @@ impl Wind {
     /// How far a vertex at rest at `position_in_world` is displaced at `scene_time_s`; the vertex
     /// shader's twin.
     #[must_use]
-    pub fn displacement_in_world(
-        &self,
-        position_in_world: Vec3,
-        sway: f32,
-        scene_time_s: f32,
-    ) -> Vec3 {
+    pub fn displacement_in_world(&self, position_in_world: Vec3, sway: f32, scene_time_s: f32) -> Vec3 {
         let turns = self.frequency_hz * scene_time_s + self.waves_per_m.dot(position_in_world);
-        self.direction_in_world
-            * (self.amplitude_m * sway * (std::f32::consts::TAU * turns.fract()).sin())
+        self.direction_in_world * (self.amplitude_m * sway * (std::f32::consts::TAU * turns.fract()).sin())
     }
 }

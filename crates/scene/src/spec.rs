@@ -61,10 +61,7 @@ fn grown(triangles: u32, wind: bool) -> Scene {
 }
 
 fn named(spec: &SceneSpec, scene: Scene) -> Scene {
-    Scene {
-        name: spec.to_string(),
-        ..scene
-    }
+    Scene { name: spec.to_string(), ..scene }
 }
 
 impl FromStr for SceneSpec {
@@ -72,9 +69,7 @@ impl FromStr for SceneSpec {
 
     /// Never fails: what is no name is a file.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let (base, wind) = text
-            .strip_suffix("-wind")
-            .map_or((text, false), |base| (base, true));
+        let (base, wind) = text.strip_suffix("-wind").map_or((text, false), |base| (base, true));
         if let Some(triangles) = tree_triangles(base) {
             return Ok(Self::TreeTerrain { triangles, wind });
         }
@@ -123,29 +118,13 @@ mod tests {
             assert!(!matches!(parsed(name), SceneSpec::File(_)), "{name}");
             assert_eq!(parsed(name).to_string(), name);
         }
-        assert_eq!(
-            parsed("tree-terrain-2m-wind"),
-            SceneSpec::TreeTerrain {
-                triangles: 2_000_000,
-                wind: true
-            }
-        );
-        assert_eq!(
-            parsed("tree-terrain-2m-wind").to_string(),
-            "tree-terrain-2m-wind"
-        );
+        assert_eq!(parsed("tree-terrain-2m-wind"), SceneSpec::TreeTerrain { triangles: 2_000_000, wind: true });
+        assert_eq!(parsed("tree-terrain-2m-wind").to_string(), "tree-terrain-2m-wind");
     }
 
     #[test]
     fn all_else_is_a_file() {
-        for text in [
-            "quad.obj",
-            "./quad",
-            "quad-wind",
-            "tree-terrain-7k",
-            "models/a.glb",
-            "",
-        ] {
+        for text in ["quad.obj", "./quad", "quad-wind", "tree-terrain-7k", "models/a.glb", ""] {
             assert_eq!(parsed(text), SceneSpec::File(text.into()));
         }
     }
@@ -153,10 +132,7 @@ mod tests {
     #[test]
     fn the_small_ones_load_lit_and_valid() {
         let limits = Limits::default();
-        for name in BUILT_IN_NAMES
-            .iter()
-            .filter(|n| !n.starts_with("tree") || n.ends_with("30k"))
-        {
+        for name in BUILT_IN_NAMES.iter().filter(|n| !n.starts_with("tree") || n.ends_with("30k")) {
             let scene = parsed(name).load(&limits).unwrap();
             scene.validate(&limits).unwrap();
             assert_eq!(scene.name, *name);

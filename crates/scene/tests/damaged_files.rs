@@ -25,10 +25,7 @@ struct Random(u64);
 
 impl Random {
     fn below(&mut self, bound: usize) -> usize {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 33) as usize) % bound
     }
 }
@@ -58,22 +55,14 @@ const EXTREMES: [&str; 16] = [
 fn with_other_numbers(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     let mut copy = bytes.to_vec();
     for _ in 0..=random.below(3) {
-        let starts = |i: &usize| {
-            copy[*i].is_ascii_digit() && (*i == 0 || !copy[*i - 1].is_ascii_alphanumeric())
-        };
+        let starts = |i: &usize| copy[*i].is_ascii_digit() && (*i == 0 || !copy[*i - 1].is_ascii_alphanumeric());
         let numbers: Vec<usize> = (0..copy.len()).filter(starts).collect();
         if numbers.is_empty() {
             return copy;
         }
         let start = numbers[random.below(numbers.len())];
-        let length = copy[start..]
-            .iter()
-            .take_while(|b| b.is_ascii_digit() || **b == b'.')
-            .count();
-        copy.splice(
-            start..start + length,
-            EXTREMES[random.below(EXTREMES.len())].bytes(),
-        );
+        let length = copy[start..].iter().take_while(|b| b.is_ascii_digit() || **b == b'.').count();
+        copy.splice(start..start + length, EXTREMES[random.below(EXTREMES.len())].bytes());
     }
     copy
 }
@@ -81,9 +70,7 @@ fn with_other_numbers(bytes: &[u8], random: &mut Random) -> Vec<u8> {
 /// Calls `take` with every cut of `bytes`, `changed` copies with one to eight bytes changed, and noise.
 fn damaged(bytes: &[u8], changed: usize, mut take: impl FnMut(&[u8])) {
     let step = (bytes.len() / 600).max(1);
-    (0..bytes.len())
-        .step_by(step)
-        .for_each(|length| take(&bytes[..length]));
+    (0..bytes.len()).step_by(step).for_each(|length| take(&bytes[..length]));
     let mut random = Random(7);
     for _ in 0..changed {
         let mut copy = bytes.to_vec();
@@ -134,9 +121,7 @@ fn rewrite(path: &Path, bytes: &[u8]) {
 
 fn load(path: &Path) -> bool {
     let limits = limits();
-    load_file(path, &limits)
-        .map(|scene| scene.validate(&limits).unwrap())
-        .is_ok()
+    load_file(path, &limits).map(|scene| scene.validate(&limits).unwrap()).is_ok()
 }
 
 #[test]
@@ -151,19 +136,13 @@ fn glb_with_other_numbers_in_its_json() {
     let (mut loaded, mut slowest) = (0, Duration::ZERO);
     for _ in 0..6000 {
         let json = with_other_numbers(cube.json().as_bytes(), &mut random);
-        rewrite(
-            &path,
-            &samples::glb(std::str::from_utf8(&json).unwrap(), &cube.binary),
-        );
+        rewrite(&path, &samples::glb(std::str::from_utf8(&json).unwrap(), &cube.binary));
         let start = Instant::now();
         loaded += u32::from(load(&path));
         slowest = slowest.max(start.elapsed());
     }
     println!("{loaded} of 6000 loaded, slowest {slowest:?}");
-    assert!(
-        (600..5400).contains(&loaded),
-        "{loaded}: both outcomes must be common, or this tests little"
-    );
+    assert!((600..5400).contains(&loaded), "{loaded}: both outcomes must be common, or this tests little");
     assert!(slowest < Duration::from_secs(1), "{slowest:?}");
 }
 
@@ -171,10 +150,7 @@ fn glb_with_other_numbers_in_its_json() {
 fn gltf() {
     let mut cube = rich_gltf();
     let hex: String = cube.binary.iter().map(|b| format!("%{b:02x}")).collect();
-    cube.buffers = format!(
-        r#"{{"byteLength":{},"uri":"data:application/octet-stream,{hex}"}}"#,
-        cube.binary.len()
-    );
+    cube.buffers = format!(r#"{{"byteLength":{},"uri":"data:application/octet-stream,{hex}"}}"#, cube.binary.len());
     load_damaged("a.gltf", cube.json().as_bytes(), 4000);
 }
 
@@ -192,7 +168,8 @@ fn mtl() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.obj");
     std::fs::write(&path, format!("mtllib a.mtl\nusemtl a\n{}", cube_obj())).unwrap();
-    let library = "newmtl a\nKd 1 0 0\nKs 0.5 0.5 0.5\nNs 10\nd 0.5\nTr 0.2\nmap_Kd -s 1 1 1 a.png\nnewmtl b\nKe 1 1 1\n";
+    let library =
+        "newmtl a\nKd 1 0 0\nKs 0.5 0.5 0.5\nNs 10\nd 0.5\nTr 0.2\nmap_Kd -s 1 1 1 a.png\nnewmtl b\nKe 1 1 1\n";
     damaged(library.as_bytes(), 2000, |bytes| {
         rewrite(&dir.path().join("a.mtl"), bytes);
         load(&path);
@@ -213,11 +190,7 @@ fn ply_binary() {
 #[test]
 fn packages() {
     let mut textured = checker_sphere();
-    textured.textures[0] = scene::Texture {
-        width_px: 2,
-        height_px: 2,
-        srgba8: vec![9; 16],
-    };
+    textured.textures[0] = scene::Texture { width_px: 2, height_px: 2, srgba8: vec![9; 16] };
     for scene in [unit_cube().with_wind(), textured] {
         damaged(&pack(&scene).bytes, 4000, |bytes| {
             if let Ok(scene) = unpack(bytes, &limits()) {
@@ -230,16 +203,21 @@ fn packages() {
 /// A cube with lights, cameras, colours, normals, a sparse accessor, materials and a texture.
 fn rich_gltf() -> GltfCube {
     let mut cube = GltfCube::default();
-    cube.primitive = r#"{"attributes":{"POSITION":0,"NORMAL":0,"COLOR_0":2,"TEXCOORD_0":3},"indices":1,"material":0}"#.into();
-    cube.accessors = cube.accessors.replacen(r#""count":8"#,
-        r#""sparse":{"count":1,"indices":{"bufferView":2,"componentType":5121},"values":{"bufferView":0}},"count":8"#, 1);
+    cube.primitive =
+        r#"{"attributes":{"POSITION":0,"NORMAL":0,"COLOR_0":2,"TEXCOORD_0":3},"indices":1,"material":0}"#.into();
+    cube.accessors = cube.accessors.replacen(
+        r#""count":8"#,
+        r#""sparse":{"count":1,"indices":{"bufferView":2,"componentType":5121},"values":{"bufferView":0}},"count":8"#,
+        1,
+    );
     cube.accessors += r#",{"bufferView":2,"componentType":5121,"normalized":true,"count":8,"type":"VEC4"},
         {"bufferView":0,"componentType":5126,"count":8,"type":"VEC2"}"#;
     cube.views += r#",{"buffer":0,"byteOffset":168,"byteLength":32,"byteStride":4}"#;
     cube.buffers = r#"{"byteLength":200}"#.into();
     cube.binary.extend([6, 0, 255, 128].repeat(8));
     cube.nodes = r#"{"mesh":0,"children":[1,2],"rotation":[0,0,0,1]},{"mesh":0,"scale":[-1,1,1]},{"camera":0,
-        "extensions":{"KHR_lights_punctual":{"light":0}},"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}"#.into();
+        "extensions":{"KHR_lights_punctual":{"light":0}},"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}"#
+        .into();
     cube.more = r#""extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":3}]}},
         "cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1}}],"textures":[{"source":0}],
         "images":[{"uri":"data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC"}],
@@ -253,13 +231,5 @@ fn the_undamaged_sample_loads() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("a.glb"), rich_gltf().glb()).unwrap();
     let scene = load_file(&dir.path().join("a.glb"), &limits()).unwrap();
-    assert_eq!(
-        (
-            scene.triangle_count(),
-            scene.lights.len(),
-            scene.cameras.len(),
-            scene.textures.len()
-        ),
-        (24, 1, 1, 1)
-    );
+    assert_eq!((scene.triangle_count(), scene.lights.len(), scene.cameras.len(), scene.textures.len()), (24, 1, 1, 1));
 }

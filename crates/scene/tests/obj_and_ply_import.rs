@@ -4,17 +4,12 @@
 mod samples;
 
 use glam::{DVec3, Vec3};
-use samples::{
-    Sample, cube_obj, cube_ply_ascii, cube_ply_binary, load, ply_header, refusal, signed_volume,
-};
+use samples::{Sample, cube_obj, cube_ply_ascii, cube_ply_binary, load, ply_header, refusal, signed_volume};
 use scene::{Limits, Scene, SceneErrorKind, SceneSpec, load_file};
 
 fn assert_is_cube(scene: &Scene) {
     assert_eq!(scene.triangle_count(), 12);
-    assert_eq!(
-        (scene.bounds().min, scene.bounds().max),
-        (Vec3::splat(-0.5), Vec3::splat(0.5))
-    );
+    assert_eq!((scene.bounds().min, scene.bounds().max), (Vec3::splat(-0.5), Vec3::splat(0.5)));
     assert!((signed_volume(scene) - 1.0).abs() < 1e-6);
     // A cube's edges are sharper than the crease angle.
     assert_eq!(scene.meshes[0].vertices.len(), 24);
@@ -24,18 +19,10 @@ fn assert_is_cube(scene: &Scene) {
 #[test]
 fn cubes_of_all_forms_are_the_same_cube() {
     assert_is_cube(&load("cube.obj", cube_obj().as_bytes()).unwrap());
-    for bytes in [
-        cube_ply_ascii(),
-        cube_ply_binary(false),
-        cube_ply_binary(true),
-    ] {
+    for bytes in [cube_ply_ascii(), cube_ply_binary(false), cube_ply_binary(true)] {
         let scene = load("cube.ply", &bytes).unwrap();
         assert_is_cube(&scene);
-        assert_eq!(
-            scene.meshes[0].vertices[0].color_srgba8,
-            [10, 20, 30, 255],
-            "sRGB bytes are kept"
-        );
+        assert_eq!(scene.meshes[0].vertices[0].color_srgba8, [10, 20, 30, 255], "sRGB bytes are kept");
     }
 }
 
@@ -46,68 +33,32 @@ fn obj_corners_may_lack_parts_and_count_backwards() {
     let scene = load("odd.obj", text.as_bytes()).unwrap();
     assert_eq!(scene.triangle_count(), 2);
     let vertex = scene.meshes[0].vertices[0];
-    assert_eq!(
-        (vertex.uv, vertex.normal, vertex.color_srgba8),
-        ([0.25, 0.25], [0.0, 0.0, 1.0], [255, 128, 0, 255])
-    );
+    assert_eq!((vertex.uv, vertex.normal, vertex.color_srgba8), ([0.25, 0.25], [0.0, 0.0, 1.0], [255, 128, 0, 255]));
 }
 
 #[test]
 fn mtl_materials_and_their_textures_are_found() {
-    let text = cube_obj()
-        .replace("f 5 6", "usemtl red\nf 5 6")
-        .replace("f 1 2", "usemtl gone\nf 1 2");
-    let library =
-        "newmtl red\nKd 1 0 0\nKs 0.5 0.5 0.5\nNs 62\nd 1\nmap_Kd -s 1 1 1 no.png\nillum 2\n";
-    let sample = Sample::new("cube.obj", format!("mtllib my lib.mtl\n{text}").as_bytes())
-        .with("my lib.mtl", library.as_bytes());
+    let text = cube_obj().replace("f 5 6", "usemtl red\nf 5 6").replace("f 1 2", "usemtl gone\nf 1 2");
+    let library = "newmtl red\nKd 1 0 0\nKs 0.5 0.5 0.5\nNs 62\nd 1\nmap_Kd -s 1 1 1 no.png\nillum 2\n";
+    let sample =
+        Sample::new("cube.obj", format!("mtllib my lib.mtl\n{text}").as_bytes()).with("my lib.mtl", library.as_bytes());
     let scene = sample.load().unwrap();
     let red = scene.materials.iter().find(|m| m.name == "red").unwrap();
-    assert_eq!(
-        (
-            red.base_color_linear,
-            red.phong_specular,
-            red.phong_exponent
-        ),
-        ([1.0, 0.0, 0.0, 1.0], 0.5, 62.0)
-    );
+    assert_eq!((red.base_color_linear, red.phong_specular, red.phong_exponent), ([1.0, 0.0, 0.0, 1.0], 0.5, 62.0));
     assert!(red.base_color_texture.is_none() && (red.roughness - 0.42).abs() < 0.01);
-    assert_eq!(
-        (
-            scene.materials.len(),
-            scene.meshes[0].parts.len(),
-            scene.triangle_count()
-        ),
-        (3, 3, 12)
-    );
-    assert!(
-        load("lost.obj", format!("mtllib lost.mtl\n{text}").as_bytes()).is_ok(),
-        "a missing library is no error"
-    );
+    assert_eq!((scene.materials.len(), scene.meshes[0].parts.len(), scene.triangle_count()), (3, 3, 12));
+    assert!(load("lost.obj", format!("mtllib lost.mtl\n{text}").as_bytes()).is_ok(), "a missing library is no error");
 }
 
 #[test]
 fn obj_references_outside_the_folder_are_refused() {
-    for reference in [
-        "mtllib ../a.mtl",
-        "mtllib /etc/hostname",
-        "mtllib file:///a.mtl",
-    ] {
+    for reference in ["mtllib ../a.mtl", "mtllib /etc/hostname", "mtllib file:///a.mtl"] {
         let error = load("out.obj", format!("{reference}\n{}", cube_obj()).as_bytes()).unwrap_err();
-        assert!(
-            matches!(error.kind, SceneErrorKind::Forbidden { .. }),
-            "{reference}: {error}"
-        );
+        assert!(matches!(error.kind, SceneErrorKind::Forbidden { .. }), "{reference}: {error}");
     }
-    let sample = Sample::new(
-        "a.obj",
-        format!("mtllib a.mtl\nusemtl a\n{}", cube_obj()).as_bytes(),
-    )
-    .with("a.mtl", b"newmtl a\nmap_Kd ..\\secret.png\n");
-    assert!(matches!(
-        sample.load().unwrap_err().kind,
-        SceneErrorKind::Forbidden { .. }
-    ));
+    let sample = Sample::new("a.obj", format!("mtllib a.mtl\nusemtl a\n{}", cube_obj()).as_bytes())
+        .with("a.mtl", b"newmtl a\nmap_Kd ..\\secret.png\n");
+    assert!(matches!(sample.load().unwrap_err().kind, SceneErrorKind::Forbidden { .. }));
 }
 
 #[test]
@@ -141,50 +92,25 @@ fn bad_obj_lines_are_refused_by_number() {
     assert!(refusal("empty.obj", b"").contains("no triangles"));
     assert!(refusal("points.obj", points.as_bytes()).contains("no triangles"));
     let library = |text: &[u8]| {
-        Sample::new("a.obj", format!("mtllib a.mtl\n{points}f 1 2 3").as_bytes())
-            .with("a.mtl", text)
-            .load()
+        Sample::new("a.obj", format!("mtllib a.mtl\n{points}f 1 2 3").as_bytes()).with("a.mtl", text).load()
     };
-    for text in [
-        "newmtl a\nKd 1 x",
-        "newmtl a\nKd",
-        "newmtl a\nKd -1 0 0",
-        "newmtl a\nNs nan",
-        "newmtl a\nd",
-    ] {
-        assert!(
-            library(text.as_bytes())
-                .unwrap_err()
-                .to_string()
-                .contains("line 2"),
-            "{text}"
-        );
+    for text in ["newmtl a\nKd 1 x", "newmtl a\nKd", "newmtl a\nKd -1 0 0", "newmtl a\nNs nan", "newmtl a\nd"] {
+        assert!(library(text.as_bytes()).unwrap_err().to_string().contains("line 2"), "{text}");
     }
 }
 
 #[test]
 fn ply_rows_that_the_file_cannot_hold_are_refused_before_memory_is_taken() {
-    for (format, vertices, faces) in [
-        ("ascii", 1 << 31, 1),
-        ("binary_little_endian", 8, usize::MAX),
-        ("binary_big_endian", 1 << 40, 6),
-    ] {
-        assert!(
-            refusal("huge.ply", ply_header(format, vertices, faces).as_bytes())
-                .contains("do not fit")
-        );
+    for (format, vertices, faces) in
+        [("ascii", 1 << 31, 1), ("binary_little_endian", 8, usize::MAX), ("binary_big_endian", 1 << 40, 6)]
+    {
+        assert!(refusal("huge.ply", ply_header(format, vertices, faces).as_bytes()).contains("do not fit"));
     }
     let mut list = cube_ply_binary(false);
     let text = String::from_utf8_lossy(&list).into_owned();
     let end = text.find("end_header").unwrap();
-    list.splice(
-        ..end,
-        text[..end].replace("list uchar", "list uint").into_bytes(),
-    );
-    assert!(
-        refusal("list.ply", &list).contains("face"),
-        "a list of 2^31 corners"
-    );
+    list.splice(..end, text[..end].replace("list uchar", "list uint").into_bytes());
+    assert!(refusal("list.ply", &list).contains("face"), "a list of 2^31 corners");
 }
 
 #[test]
@@ -213,38 +139,20 @@ fn ply_normals_coordinates_floats_and_other_elements_are_read() {
         2 0.5 0.5 7\n0 8\n0 0 0 0 0 2 0.25 0.25 1 0.5 0\n1 0 0 0 0 1 1 1 0 0 0\n0 1 0 0 0 1 0 0 0 0 0\n3 0 1 2";
     let scene = load("rich.ply", text.replace('\n', "\r\n").as_bytes()).unwrap();
     let vertex = scene.meshes[0].vertices[0];
-    assert_eq!(
-        (vertex.normal, vertex.uv, vertex.color_srgba8),
-        ([0.0, 0.0, 1.0], [0.25, 0.75], [255, 128, 0, 255])
-    );
+    assert_eq!((vertex.normal, vertex.uv, vertex.color_srgba8), ([0.0, 0.0, 1.0], [0.25, 0.75], [255, 128, 0, 255]));
 }
 
 #[test]
 fn limits_hold_for_obj_and_ply() {
-    for (name, bytes) in [
-        ("a.obj", cube_obj().into_bytes()),
-        ("a.ply", cube_ply_binary(false)),
-    ] {
+    for (name, bytes) in [("a.obj", cube_obj().into_bytes()), ("a.ply", cube_ply_binary(false))] {
         let sample = Sample::new(name, &bytes);
         for limits in [
-            Limits {
-                triangles: 11,
-                ..Limits::default()
-            },
-            Limits {
-                vertices: 7,
-                ..Limits::default()
-            },
-            Limits {
-                file_bytes: 99,
-                ..Limits::default()
-            },
+            Limits { triangles: 11, ..Limits::default() },
+            Limits { vertices: 7, ..Limits::default() },
+            Limits { file_bytes: 99, ..Limits::default() },
         ] {
             let error = load_file(&sample.path, &limits).unwrap_err();
-            assert!(
-                matches!(error.kind, SceneErrorKind::TooLarge { .. }),
-                "{name}: {error}"
-            );
+            assert!(matches!(error.kind, SceneErrorKind::TooLarge { .. }), "{name}: {error}");
         }
     }
 }
@@ -260,34 +168,23 @@ fn a_centimetre_survives_at_two_thousand_kilometres() {
     );
     let scene = load("grid.obj", text.as_bytes()).unwrap();
     let x = |i: usize| {
-        f64::from(scene.meshes[0].vertices[i].position[0])
-            + f64::from(scene.instances[0].world_from_mesh.translation.x)
+        f64::from(scene.meshes[0].vertices[i].position[0]) + f64::from(scene.instances[0].world_from_mesh.translation.x)
     };
     assert!((x(1) - x(0) - 0.01).abs() < 1e-5, "{}", x(1) - x(0));
     let restored = x(0) + scene.origin_in_source.x;
     assert!((restored - 2_684_572.0).abs() < 1e-3, "{restored}");
     assert!(scene.bounds().center().length() < 1.0);
-    assert_eq!(
-        scene.origin_in_source,
-        scene.origin_in_source.round(),
-        "whole metres"
-    );
+    assert_eq!(scene.origin_in_source, scene.origin_in_source.round(), "whole metres");
 }
 
 #[test]
 fn models_near_the_origin_keep_their_coordinates() {
     let text = "v 9000 0 0\nv 9010 0 0\nv 9000 10 0\nf 1 2 3\n";
     let scene = load("near.obj", text.as_bytes()).unwrap();
-    assert_eq!(
-        (scene.origin_in_source, scene.bounds().min.x),
-        (DVec3::ZERO, 9000.0)
-    );
+    assert_eq!((scene.origin_in_source, scene.bounds().min.x), (DVec3::ZERO, 9000.0));
     let small = "v 10 0 0\nv 10.001 0 0\nv 10 0.001 0\nf 1 2 3\n";
     let scene = load("small.obj", small.as_bytes()).unwrap();
-    assert!(
-        (scene.origin_in_source.x - 10.0005).abs() < 1e-9
-            && scene.bounds().center().length() < 1e-6
-    );
+    assert!((scene.origin_in_source.x - 10.0005).abs() < 1e-9 && scene.bounds().center().length() < 1e-6);
 }
 
 #[test]
@@ -297,11 +194,7 @@ fn unlit_sources_get_the_default_lights_by_spec() {
     assert!(sample.load().unwrap().lights.is_empty());
     let lit = spec.load(&Limits::default()).unwrap();
     assert_eq!(lit.lights.len(), 1);
-    assert_eq!(
-        lit.clone().with_default_lights(),
-        lit,
-        "lights that are there are kept"
-    );
+    assert_eq!(lit.clone().with_default_lights(), lit, "lights that are there are kept");
 }
 
 #[test]

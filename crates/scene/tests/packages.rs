@@ -5,24 +5,17 @@ mod samples;
 
 use glam::Vec3;
 use samples::signed_volume;
-use scene::procedural::{
-    checker_sphere, courtyard, poles, quad, tree_terrain, unit_cube, uv_sphere,
-};
+use scene::procedural::{checker_sphere, courtyard, poles, quad, tree_terrain, unit_cube, uv_sphere};
 use scene::{Limits, PackageStore, Scene, SceneErrorKind, SceneHash, pack, unpack};
 
 #[test]
 fn packing_is_deterministic_and_loses_nothing() {
-    for make in [unit_cube, checker_sphere, courtyard, || {
-        tree_terrain(10_000, 1).with_wind()
-    }] {
+    for make in [unit_cube, checker_sphere, courtyard, || tree_terrain(10_000, 1).with_wind()] {
         let (package, again) = (pack(&make()), pack(&make()));
         assert_eq!(package, again);
         assert_eq!(unpack(&package.bytes, &Limits::default()).unwrap(), make());
     }
-    assert_ne!(
-        pack(&tree_terrain(10_000, 1)).hash,
-        pack(&tree_terrain(10_000, 2)).hash
-    );
+    assert_ne!(pack(&tree_terrain(10_000, 1)).hash, pack(&tree_terrain(10_000, 2)).hash);
 }
 
 #[test]
@@ -54,10 +47,7 @@ fn a_scene_that_breaks_a_promise_is_not_unpacked() {
         let mut scene = unit_cube();
         break_it(&mut scene);
         assert!(scene.validate(&Limits::default()).is_err(), "{number}");
-        assert!(
-            unpack(&pack(&scene).bytes, &Limits::default()).is_err(),
-            "{number}"
-        );
+        assert!(unpack(&pack(&scene).bytes, &Limits::default()).is_err(), "{number}");
     }
 }
 
@@ -65,28 +55,13 @@ fn a_scene_that_breaks_a_promise_is_not_unpacked() {
 fn the_limits_hold_for_packages() {
     let bytes = pack(&checker_sphere()).bytes;
     for limits in [
-        Limits {
-            file_bytes: 1000,
-            ..Limits::default()
-        },
-        Limits {
-            vertices: 100,
-            ..Limits::default()
-        },
-        Limits {
-            triangles: 100,
-            ..Limits::default()
-        },
-        Limits {
-            texture_bytes: 100,
-            ..Limits::default()
-        },
+        Limits { file_bytes: 1000, ..Limits::default() },
+        Limits { vertices: 100, ..Limits::default() },
+        Limits { triangles: 100, ..Limits::default() },
+        Limits { texture_bytes: 100, ..Limits::default() },
     ] {
         let error = unpack(&bytes, &limits).unwrap_err();
-        assert!(
-            matches!(error.kind, SceneErrorKind::TooLarge { .. }),
-            "{error}"
-        );
+        assert!(matches!(error.kind, SceneErrorKind::TooLarge { .. }), "{error}");
     }
 }
 
@@ -100,10 +75,7 @@ fn the_store_gives_back_only_what_has_its_hash() {
     store.put(package.hash, &package.bytes).unwrap();
     assert_eq!(store.get(package.hash).unwrap(), package.bytes);
     assert!(store.put(package.hash, b"other").is_err());
-    let files: Vec<_> = std::fs::read_dir(dir.path().join("new/folder"))
-        .unwrap()
-        .map(|e| e.unwrap().path())
-        .collect();
+    let files: Vec<_> = std::fs::read_dir(dir.path().join("new/folder")).unwrap().map(|e| e.unwrap().path()).collect();
     assert_eq!(files.len(), 1, "no temporary file stays");
     std::fs::write(&files[0], b"damaged").unwrap();
     assert!(store.get(package.hash).is_none());
@@ -115,17 +87,10 @@ fn trees_have_the_triangles_asked_for_and_stay_in_their_block() {
         let scene = tree_terrain(asked, 2007);
         scene.validate(&Limits::default()).unwrap();
         let share = |n: u64| n as f32 / asked as f32;
-        assert!(
-            (share(scene.triangle_count()) - 1.0).abs() < 0.03,
-            "{}",
-            scene.triangle_count()
-        );
+        assert!((share(scene.triangle_count()) - 1.0).abs() < 0.03, "{}", scene.triangle_count());
         assert!((share(scene.meshes[0].triangle_count()) - 0.5).abs() < 0.02);
         let bounds = scene.bounds();
-        assert!(
-            bounds.min.cmpge(Vec3::new(-1.0, 0.0, -1.0)).all() && bounds.max.cmple(Vec3::ONE).all(),
-            "{bounds:?}"
-        );
+        assert!(bounds.min.cmpge(Vec3::new(-1.0, 0.0, -1.0)).all() && bounds.max.cmple(Vec3::ONE).all(), "{bounds:?}");
         assert!(bounds.max.y > 0.8, "{bounds:?}");
         assert!(!scene.is_animated());
     }
@@ -137,10 +102,7 @@ fn other_seeds_grow_other_trees_that_fit_too() {
         let scene = tree_terrain(20_000, seed).with_wind();
         scene.validate(&Limits::default()).unwrap();
         let bounds = scene.bounds();
-        assert!(
-            bounds.min.y >= 0.0 && bounds.max.y <= 1.0,
-            "seed {seed}: {bounds:?}"
-        );
+        assert!(bounds.min.y >= 0.0 && bounds.max.y <= 1.0, "seed {seed}: {bounds:?}");
     }
 }
 
@@ -150,35 +112,18 @@ fn the_wind_moves_leaves_and_neither_ground_nor_roots() {
     assert!(scene.is_animated());
     let wind = scene.wind.unwrap();
     let [ground, tree] = [&scene.meshes[0], &scene.meshes[1]];
-    let moved = |v: &scene::Vertex, t: f32| {
-        wind.displacement_in_world(v.position.into(), v.sway, t)
-            .length()
-    };
+    let moved = |v: &scene::Vertex, t: f32| wind.displacement_in_world(v.position.into(), v.sway, t).length();
     assert!(ground.vertices.iter().all(|v| moved(v, 0.3) == 0.0));
-    let lowest = tree
-        .vertices
-        .iter()
-        .fold(f32::INFINITY, |y, v| y.min(v.position[1]));
-    assert!(
-        tree.vertices
-            .iter()
-            .filter(|v| v.position[1] < lowest + 1e-3)
-            .all(|v| moved(v, 0.3) < 1e-6)
-    );
+    let lowest = tree.vertices.iter().fold(f32::INFINITY, |y, v| y.min(v.position[1]));
+    assert!(tree.vertices.iter().filter(|v| v.position[1] < lowest + 1e-3).all(|v| moved(v, 0.3) < 1e-6));
     let most = tree.vertices.iter().fold(0f32, |most, v| most.max(v.sway));
     assert!((0.8..=1.0).contains(&most), "{most}");
     let bounds = scene.bounds();
     for step in 0..8 {
         let at = |v: &scene::Vertex| {
-            Vec3::from(v.position)
-                + wind.displacement_in_world(v.position.into(), v.sway, step as f32 * 0.37)
+            Vec3::from(v.position) + wind.displacement_in_world(v.position.into(), v.sway, step as f32 * 0.37)
         };
-        assert!(
-            tree.vertices
-                .iter()
-                .map(at)
-                .all(|p| p.cmpge(bounds.min).all() && p.cmple(bounds.max).all())
-        );
+        assert!(tree.vertices.iter().map(at).all(|p| p.cmpge(bounds.min).all() && p.cmple(bounds.max).all()));
     }
 }
 
@@ -187,12 +132,7 @@ fn small_scenes_are_what_they_say() {
     assert_eq!(unit_cube().triangle_count(), 12);
     assert!((signed_volume(&unit_cube()) - 1.0).abs() < 1e-6);
     let sphere = uv_sphere(2.0, 64);
-    assert!(
-        sphere.meshes[0]
-            .vertices
-            .iter()
-            .all(|v| (Vec3::from(v.position).length() - 2.0).abs() < 1e-5)
-    );
+    assert!(sphere.meshes[0].vertices.iter().all(|v| (Vec3::from(v.position).length() - 2.0).abs() < 1e-5));
     assert!((signed_volume(&sphere) / (32.0 / 3.0 * std::f32::consts::PI) - 1.0).abs() < 0.01);
     let pole = poles(0.05).bounds();
     assert!((pole.max.z - -0.95).abs() < 1e-6 && pole.min.z == -3.0);
@@ -202,25 +142,11 @@ fn small_scenes_are_what_they_say() {
 
 #[test]
 fn a_quad_faces_where_it_is_told() {
-    for normal in [
-        Vec3::X,
-        Vec3::NEG_X,
-        Vec3::Y,
-        Vec3::NEG_Y,
-        Vec3::Z,
-        Vec3::NEG_Z,
-        Vec3::new(1.0, 2.0, -3.0),
-    ] {
+    for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z, Vec3::new(1.0, 2.0, -3.0)] {
         let scene = quad(Vec3::new(0.0, 0.0, -4.0), 2.0, normal, [1, 2, 3]);
         scene.validate(&Limits::default()).unwrap();
         for [a, b, c] in samples::world_triangles(&scene) {
-            assert!(
-                (b - a)
-                    .cross(c - a)
-                    .normalize_or_zero()
-                    .distance(normal.normalize_or_zero())
-                    < 1e-5
-            );
+            assert!((b - a).cross(c - a).normalize_or_zero().distance(normal.normalize_or_zero()) < 1e-5);
             assert!((a - Vec3::new(0.0, 0.0, -4.0)).dot(normal).abs() < 1e-4);
         }
         assert_eq!(scene.meshes[0].vertices[0].color_srgba8, [1, 2, 3, 255]);

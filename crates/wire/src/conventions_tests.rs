@@ -24,14 +24,8 @@ fn messages() -> Vec<DescriptorProto> {
 }
 
 fn needs_unit(field: &FieldDescriptorProto) -> bool {
-    let tuple = TUPLES
-        .iter()
-        .any(|tuple| field.type_name() == format!(".myriorama.v1.{tuple}"));
-    tuple
-        || !matches!(
-            field.r#type(),
-            Type::Bool | Type::String | Type::Bytes | Type::Message | Type::Enum
-        )
+    let tuple = TUPLES.iter().any(|tuple| field.type_name() == format!(".myriorama.v1.{tuple}"));
+    tuple || !matches!(field.r#type(), Type::Bool | Type::String | Type::Bytes | Type::Message | Type::Enum)
 }
 
 #[test]
@@ -47,12 +41,7 @@ fn numbers_have_units() {
     let mut compared = 0;
     for message in messages().iter().filter(|message| !TUPLES.contains(&message.name())) {
         for field in message.field.iter().filter(|field| needs_unit(field)) {
-            assert!(
-                UNITS.iter().any(|unit| field.name().ends_with(unit)),
-                "{}.{}",
-                message.name(),
-                field.name()
-            );
+            assert!(UNITS.iter().any(|unit| field.name().ends_with(unit)), "{}.{}", message.name(), field.name());
             compared += 1;
         }
     }
@@ -64,19 +53,12 @@ fn times_and_lengths_are_not_integers_and_counts_are() {
     for message in messages() {
         for field in &message.field {
             let fractional = matches!(field.r#type(), Type::Float | Type::Double);
-            let whole = [
-                "_count", "_bytes", "_epoch", "_index", "_indices", "_id", "_number", "_crc32",
-            ]
-            .iter()
-            .any(|unit| field.name().ends_with(unit));
+            let whole = ["_count", "_bytes", "_epoch", "_index", "_indices", "_id", "_number", "_crc32"]
+                .iter()
+                .any(|unit| field.name().ends_with(unit));
             assert!(!(fractional && whole), "{}.{}", message.name(), field.name());
             let repeated_number = field.label() == Label::Repeated && needs_unit(field);
-            assert!(
-                !repeated_number || field.name().ends_with("_indices"),
-                "{}.{}",
-                message.name(),
-                field.name()
-            );
+            assert!(!repeated_number || field.name().ends_with("_indices"), "{}.{}", message.name(), field.name());
         }
     }
 }
@@ -102,13 +84,7 @@ fn enums_are_prefixed_and_begin_unspecified() {
         let words: String = kind
             .name()
             .chars()
-            .flat_map(|c| {
-                if c.is_uppercase() {
-                    vec!['_', c]
-                } else {
-                    vec![c.to_ascii_uppercase()]
-                }
-            })
+            .flat_map(|c| if c.is_uppercase() { vec!['_', c] } else { vec![c.to_ascii_uppercase()] })
             .collect();
         let prefix = &words[1..];
         assert_eq!(kind.value[0].name(), format!("{prefix}_UNSPECIFIED"));

@@ -63,18 +63,11 @@ pub enum WireError {
 
 impl WireError {
     pub(crate) fn out_of_range(field: &'static str, value: impl ToString, allowed: &'static str) -> Self {
-        Self::OutOfRange {
-            field,
-            value: value.to_string(),
-            allowed,
-        }
+        Self::OutOfRange { field, value: value.to_string(), allowed }
     }
 
     pub(crate) fn corrupt(field: &'static str, reason: impl ToString) -> Self {
-        Self::Corrupt {
-            field,
-            reason: reason.to_string(),
-        }
+        Self::Corrupt { field, reason: reason.to_string() }
     }
 }
 
@@ -106,13 +99,5 @@ pub(crate) fn required<T>(value: Option<T>, field: &'static str) -> Result<T, Wi
 
 /// Refuses more than `limit` before anything is allocated for them.
 pub(crate) fn at_most(count: usize, limit: usize, field: &'static str) -> Result<(), WireError> {
-    if count <= limit {
-        Ok(())
-    } else {
-        Err(WireError::TooMany {
-            field,
-            count: count as u64,
-            limit: limit as u64,
-        })
-    }
+    if count <= limit { Ok(()) } else { Err(WireError::TooMany { field, count: count as u64, limit: limit as u64 }) }
 }

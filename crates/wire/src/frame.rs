@@ -45,20 +45,14 @@ impl TryFrom<proto::RenderViewsRequest> for RenderViews {
             return Err(WireError::Missing { field: "views" });
         }
         let view = |v: proto::RequestedView| {
-            Ok(RequestedView {
-                frame: v.frame_number,
-                camera: pinhole_from(v.camera, "views.camera")?,
-            })
+            Ok(RequestedView { frame: v.frame_number, camera: pinhole_from(v.camera, "views.camera")? })
         };
         Ok(Self {
             plan_epoch: r.plan_epoch,
             set_index: r.set_index,
             method: nonempty(r.reconstruction_method, "reconstruction_method")?,
             codec: frame_codec(&r.frame_codec, "frame_codec")?,
-            planes: ViewPlanes {
-                inverse_depth: r.with_inverse_depth,
-                provenance: r.with_provenance,
-            },
+            planes: ViewPlanes { inverse_depth: r.with_inverse_depth, provenance: r.with_provenance },
             views: r.views.into_iter().map(view).collect::<Result<_, WireError>>()?,
         })
     }
@@ -66,10 +60,8 @@ impl TryFrom<proto::RenderViewsRequest> for RenderViews {
 
 impl From<RenderViews> for proto::RenderViewsRequest {
     fn from(r: RenderViews) -> Self {
-        let view = |v: &RequestedView| proto::RequestedView {
-            frame_number: v.frame,
-            camera: Some(pinhole_to(&v.camera)),
-        };
+        let view =
+            |v: &RequestedView| proto::RequestedView { frame_number: v.frame, camera: Some(pinhole_to(&v.camera)) };
         Self {
             plan_epoch: r.plan_epoch,
             set_index: r.set_index,
@@ -122,26 +114,14 @@ impl FrameHeader {
     /// Of all planes.
     #[must_use]
     pub fn total_bytes(&self) -> u64 {
-        self.color_bytes
-            .saturating_add(self.inverse_depth_bytes)
-            .saturating_add(self.provenance_bytes)
+        self.color_bytes.saturating_add(self.inverse_depth_bytes).saturating_add(self.provenance_bytes)
     }
 
     fn check(self) -> Result<Self, WireError> {
         let limits = DecodeLimits::default();
-        limits
-            .texels(self.size_px.x, self.size_px.y)
-            .map_err(|error| WireError::corrupt("header.size_px", error))?;
+        limits.texels(self.size_px.x, self.size_px.y).map_err(|error| WireError::corrupt("header.size_px", error))?;
         let (count, limit) = (self.total_bytes(), MAX_FRAME_BYTES);
-        if count > limit {
-            Err(WireError::TooMany {
-                field: "header.total_bytes",
-                count,
-                limit,
-            })
-        } else {
-            Ok(self)
-        }
+        if count > limit { Err(WireError::TooMany { field: "header.total_bytes", count, limit }) } else { Ok(self) }
     }
 }
 
@@ -150,10 +130,7 @@ impl TryFrom<proto::FrameHeader> for FrameHeader {
 
     fn try_from(h: proto::FrameHeader) -> Result<Self, WireError> {
         let header = Self {
-            sample_set_id: SampleSetId {
-                plan_epoch: h.plan_epoch,
-                index: h.set_index.into(),
-            },
+            sample_set_id: SampleSetId { plan_epoch: h.plan_epoch, index: h.set_index.into() },
             size_px: UVec2::new(h.width_px, h.height_px),
             codec: frame_codec(&h.frame_codec, "header.frame_codec")?,
             color_bytes: h.color_bytes,
@@ -186,8 +163,7 @@ impl From<FrameHeader> for proto::FrameHeader {
 /// A codec by its name in settings.
 fn frame_codec(text: &str, field: &'static str) -> Result<FrameCodec, WireError> {
     let short: String = text.chars().take(32).collect();
-    text.parse()
-        .map_err(|_| WireError::out_of_range(field, short, "lz4, jpeg or jpeg:QUALITY"))
+    text.parse().map_err(|_| WireError::out_of_range(field, short, "lz4, jpeg or jpeg:QUALITY"))
 }
 
 impl TryFrom<proto::StageTimes> for StageTimes {
@@ -236,12 +212,7 @@ impl FramePart {
         let starts = (0..encoded.len().max(1)).step_by(PART_BYTES);
         starts.map(move |start| {
             let data = encoded.slice(start..encoded.len().min(start + PART_BYTES));
-            Self {
-                frame,
-                header: header.take(),
-                offset_bytes: start as u64,
-                data,
-            }
+            Self { frame, header: header.take(), offset_bytes: start as u64, data }
         })
     }
 }
@@ -327,11 +298,7 @@ impl FrameAssembly {
         }
         let count = (data.len() + piece.len()) as u64;
         if count > header.total_bytes() {
-            return Err(WireError::TooMany {
-                field: "data",
-                count,
-                limit: header.total_bytes(),
-            });
+            return Err(WireError::TooMany { field: "data", count, limit: header.total_bytes() });
         }
         data.extend_from_slice(piece);
         if count == header.total_bytes() {
@@ -347,10 +314,7 @@ impl FrameAssembly {
     /// Names the frame that is cut off.
     pub fn finish(&self) -> Result<(), WireError> {
         match &self.open {
-            Some((frame, ..)) => Err(WireError::corrupt(
-                "data",
-                format!("the stream ends inside frame {frame}"),
-            )),
+            Some((frame, ..)) => Err(WireError::corrupt("data", format!("the stream ends inside frame {frame}"))),
             None => Ok(()),
         }
     }
@@ -360,10 +324,7 @@ fn whole(frame: u64, header: FrameHeader, data: Bytes) -> Result<WholeFrame, Wir
     if crc32fast::hash(&data) == header.crc32 {
         Ok(WholeFrame { frame, header, data })
     } else {
-        Err(WireError::corrupt(
-            "frame_crc32",
-            format!("frame {frame} has another checksum"),
-        ))
+        Err(WireError::corrupt("frame_crc32", format!("frame {frame} has another checksum")))
     }
 }
 

@@ -2,10 +2,7 @@ use super::*;
 
 fn header(data: &[u8]) -> FrameHeader {
     FrameHeader {
-        sample_set_id: SampleSetId {
-            plan_epoch: 1,
-            index: 0,
-        },
+        sample_set_id: SampleSetId { plan_epoch: 1, index: 0 },
         size_px: UVec2::splat(8),
         codec: FrameCodec::Lz4,
         color_bytes: data.len() as u64,

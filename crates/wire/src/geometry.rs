@@ -10,11 +10,7 @@ use crate::proto;
 pub(crate) fn vec3_from(v: Option<proto::Vec3>, field: &'static str) -> Result<Vec3, WireError> {
     let v = required(v, field)?;
     let v = Vec3::new(v.x, v.y, v.z);
-    if v.is_finite() {
-        Ok(v)
-    } else {
-        Err(WireError::out_of_range(field, v, "finite"))
-    }
+    if v.is_finite() { Ok(v) } else { Err(WireError::out_of_range(field, v, "finite")) }
 }
 
 pub(crate) fn vec3_to(v: Vec3) -> Option<proto::Vec3> {
@@ -45,9 +41,7 @@ pub(crate) fn pinhole_from(
         size_px: UVec2::new(camera.width_px, camera.height_px),
         near_m: camera.near_m,
     };
-    camera
-        .validate()
-        .map_err(|source| WireError::Camera { field, source })?;
+    camera.validate().map_err(|source| WireError::Camera { field, source })?;
     Ok(camera)
 }
 
@@ -55,12 +49,7 @@ pub(crate) fn pinhole_to(camera: &PinholeCamera) -> proto::PinholeCamera {
     let q = camera.world_from_camera;
     proto::PinholeCamera {
         eye_in_world_m: vec3_to(camera.eye_in_world),
-        world_from_camera_unit: Some(proto::Quaternion {
-            x: q.x,
-            y: q.y,
-            z: q.z,
-            w: q.w,
-        }),
+        world_from_camera_unit: Some(proto::Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }),
         focal_px: vec2_to(camera.focal_px),
         principal_px: vec2_to(camera.principal_px),
         width_px: camera.size_px.x,
@@ -101,8 +90,5 @@ pub(crate) fn bounds_from(bounds: proto::Bounds) -> Result<Aabb, WireError> {
 }
 
 pub(crate) fn bounds_to(bounds: &Aabb) -> proto::Bounds {
-    proto::Bounds {
-        min_in_world_m: vec3_to(bounds.min),
-        max_in_world_m: vec3_to(bounds.max),
-    }
+    proto::Bounds { min_in_world_m: vec3_to(bounds.min), max_in_world_m: vec3_to(bounds.max) }
 }

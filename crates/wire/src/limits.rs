@@ -37,11 +37,7 @@ pub(crate) fn text(value: String, field: &'static str) -> Result<String, WireErr
 
 /// A short text that says something.
 pub(crate) fn nonempty(value: String, field: &'static str) -> Result<String, WireError> {
-    if value.is_empty() {
-        Err(WireError::Missing { field })
-    } else {
-        text(value, field)
-    }
+    if value.is_empty() { Err(WireError::Missing { field }) } else { text(value, field) }
 }
 
 /// A text that a person reads.
@@ -53,9 +49,5 @@ pub(crate) fn reason(value: String, field: &'static str) -> Result<String, WireE
 /// A finite number, not negative.
 pub(crate) fn seconds(value: f64, field: &'static str) -> Result<f64, WireError> {
     let ok = value.is_finite() && value >= 0.0;
-    if ok {
-        Ok(value)
-    } else {
-        Err(WireError::out_of_range(field, value, "finite and not negative"))
-    }
+    if ok { Ok(value) } else { Err(WireError::out_of_range(field, value, "finite and not negative")) }
 }

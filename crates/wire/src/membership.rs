@@ -39,10 +39,7 @@ impl TryFrom<proto::JoinClusterRequest> for JoinCluster {
             device_name: text(r.device_name, "device_name")?,
             is_software: r.is_software_device,
         };
-        Ok(Self {
-            node,
-            plan_epoch: r.plan_epoch,
-        })
+        Ok(Self { node, plan_epoch: r.plan_epoch })
     }
 }
 
@@ -70,17 +67,13 @@ impl TryFrom<proto::JoinClusterResponse> for Welcome {
 
     fn try_from(r: proto::JoinClusterResponse) -> Result<Self, WireError> {
         at_most(r.scenes.len(), MAX_SCENES, "scenes")?;
-        Ok(Self {
-            scenes: r.scenes.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
-        })
+        Ok(Self { scenes: r.scenes.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()? })
     }
 }
 
 impl From<Welcome> for proto::JoinClusterResponse {
     fn from(w: Welcome) -> Self {
-        Self {
-            scenes: w.scenes.into_iter().map(Into::into).collect(),
-        }
+        Self { scenes: w.scenes.into_iter().map(Into::into).collect() }
     }
 }
 
@@ -152,18 +145,13 @@ impl TryFrom<proto::MeasureCostsRequest> for MeasureCosts {
         }
         let workload: Workload = required(r.workload, "workload")?.try_into()?;
         if workload.sample_cameras.is_empty() {
-            return Err(WireError::Missing {
-                field: "sample_cameras",
-            });
+            return Err(WireError::Missing { field: "sample_cameras" });
         }
         Ok(Self {
             workload,
             typical_view: pinhole_from(r.typical_view, "typical_view")?,
             batch_count: r.batch_count,
-            planes: ViewPlanes {
-                inverse_depth: r.with_inverse_depth,
-                provenance: r.with_provenance,
-            },
+            planes: ViewPlanes { inverse_depth: r.with_inverse_depth, provenance: r.with_provenance },
         })
     }
 }
@@ -190,9 +178,7 @@ impl TryFrom<proto::MeasureCostsResponse> for Costs {
 
 impl From<Costs> for proto::MeasureCostsResponse {
     fn from(costs: Costs) -> Self {
-        Self {
-            costs: Some(costs.into()),
-        }
+        Self { costs: Some(costs.into()) }
     }
 }
 
@@ -206,9 +192,7 @@ impl TryFrom<proto::ApplyAssignmentRequest> for Assignment {
 
 impl From<Assignment> for proto::ApplyAssignmentRequest {
     fn from(assignment: Assignment) -> Self {
-        Self {
-            assignment: Some(assignment.into()),
-        }
+        Self { assignment: Some(assignment.into()) }
     }
 }
 
@@ -225,18 +209,12 @@ impl TryFrom<proto::ApplyAssignmentResponse> for Ready {
     type Error = WireError;
 
     fn try_from(r: proto::ApplyAssignmentResponse) -> Result<Self, WireError> {
-        Ok(Self {
-            plan_epoch: r.plan_epoch,
-            scene_load_s: seconds(r.scene_load_s, "scene_load_s")?,
-        })
+        Ok(Self { plan_epoch: r.plan_epoch, scene_load_s: seconds(r.scene_load_s, "scene_load_s")? })
     }
 }
 
 impl From<Ready> for proto::ApplyAssignmentResponse {
     fn from(ready: Ready) -> Self {
-        Self {
-            plan_epoch: ready.plan_epoch,
-            scene_load_s: ready.scene_load_s,
-        }
+        Self { plan_epoch: ready.plan_epoch, scene_load_s: ready.scene_load_s }
     }
 }

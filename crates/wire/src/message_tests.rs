@@ -11,25 +11,15 @@ fn camera() -> PinholeCamera {
 
 fn workload() -> Workload {
     Workload {
-        scene: SceneRef {
-            hash: SceneHash::of(b"scene"),
-            package_bytes: 5,
-        },
+        scene: SceneRef { hash: SceneHash::of(b"scene"), package_bytes: 5 },
         sample_cameras: vec![Camera::Pinhole(camera()); 2],
         sampling: "conventional".to_owned(),
         lighting: "phong".to_owned(),
         method: "joint_carve".to_owned(),
         codec: "raw".to_owned(),
-        volume: Aabb {
-            min: Vec3::NEG_ONE,
-            max: Vec3::ONE,
-        },
+        volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::splat(0.2),
-        timeline: Timeline {
-            start_s: 1.0,
-            step_s: 0.5,
-            set_count: 3,
-        },
+        timeline: Timeline { start_s: 1.0, step_s: 0.5, set_count: 3 },
     }
 }
 
@@ -43,10 +33,7 @@ fn assignment() -> Assignment {
             address: "http://127.0.0.1:1".to_owned(),
             image_indices: vec![0, 1],
         }],
-        compositors: vec![CompositorShare {
-            node_name: "b".to_owned(),
-            address: "http://127.0.0.1:2".to_owned(),
-        }],
+        compositors: vec![CompositorShare { node_name: "b".to_owned(), address: "http://127.0.0.1:2".to_owned() }],
     }
 }
 
@@ -62,10 +49,7 @@ fn request() -> SessionRequest {
         volume: None,
         typical_view: camera(),
         views_per_set: 12,
-        planes: ViewPlanes {
-            inverse_depth: true,
-            provenance: false,
-        },
+        planes: ViewPlanes { inverse_depth: true, provenance: false },
         timeline: Timeline::still(0.0),
         policy: PolicyChoice::Auto,
         forced_sampler_count: None,
@@ -79,27 +63,15 @@ fn views() -> RenderViews {
         method: "joint_carve".to_owned(),
         codec: FrameCodec::Lz4,
         planes: ViewPlanes::default(),
-        views: vec![RequestedView {
-            frame: 9,
-            camera: camera(),
-        }],
+        views: vec![RequestedView { frame: 9, camera: camera() }],
     }
 }
 
 #[test]
 fn messages_come_back() {
-    assert_eq!(
-        Assignment::try_from(proto::Assignment::from(assignment())),
-        Ok(assignment())
-    );
-    assert_eq!(
-        SessionRequest::try_from(proto::OpenSessionRequest::from(request())),
-        Ok(request())
-    );
-    assert_eq!(
-        RenderViews::try_from(proto::RenderViewsRequest::from(views())),
-        Ok(views())
-    );
+    assert_eq!(Assignment::try_from(proto::Assignment::from(assignment())), Ok(assignment()));
+    assert_eq!(SessionRequest::try_from(proto::OpenSessionRequest::from(request())), Ok(request()));
+    assert_eq!(RenderViews::try_from(proto::RenderViewsRequest::from(views())), Ok(views()));
     let plan = SessionEvent::Plan(Box::new(SessionPlan {
         assignment: assignment(),
         costs: Costs {
@@ -114,10 +86,7 @@ fn messages_come_back() {
         predicted_direct_s: 0.2,
         scene_load_s: 0.0,
     }));
-    assert_eq!(
-        SessionEvent::try_from(proto::OpenSessionResponse::from(plan.clone())),
-        Ok(plan)
-    );
+    assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(plan.clone())), Ok(plan));
 }
 
 fn refusal<P, D: TryFrom<P, Error = WireError>>(message: P) -> String {
@@ -210,19 +179,10 @@ fn set_content_names_what_a_set_shows() {
     assert_ne!(id(&|a| a.workload.timeline.step_s = 0.6), same);
     assert_ne!(id(&|a| a.workload.lighting = "unlit".to_owned()), same);
     assert_ne!(id(&|a| a.workload.sample_cameras.truncate(1)), same);
-    assert_eq!(
-        (assignment().set_content(3), assignment().sample_set_id(3)),
-        (None, None)
-    );
+    assert_eq!((assignment().set_content(3), assignment().sample_set_id(3)), (None, None));
     let still = |index| {
         Assignment {
-            workload: Workload {
-                timeline: Timeline {
-                    step_s: 0.0,
-                    ..workload().timeline
-                },
-                ..workload()
-            },
+            workload: Workload { timeline: Timeline { step_s: 0.0, ..workload().timeline }, ..workload() },
             ..assignment()
         }
         .set_content(index)
@@ -233,12 +193,6 @@ fn set_content_names_what_a_set_shows() {
 #[test]
 fn errors_become_statuses() {
     let refused = tonic::Status::from(WireError::Missing { field: "views" });
-    assert_eq!(
-        (refused.code(), refused.message()),
-        (tonic::Code::InvalidArgument, "views is missing")
-    );
-    assert_eq!(
-        tonic::Status::from(WireError::corrupt("data", "x")).code(),
-        tonic::Code::DataLoss
-    );
+    assert_eq!((refused.code(), refused.message()), (tonic::Code::InvalidArgument, "views is missing"));
+    assert_eq!(tonic::Status::from(WireError::corrupt("data", "x")).code(), tonic::Code::DataLoss);
 }

@@ -100,10 +100,8 @@ impl Assignment {
     /// A set's name in this plan; `None` beyond the timeline.
     #[must_use]
     pub fn sample_set_id(&self, set_index: u32) -> Option<SampleSetId> {
-        (set_index < self.workload.timeline.set_count).then(|| SampleSetId {
-            plan_epoch: self.plan_epoch,
-            index: set_index.into(),
-        })
+        (set_index < self.workload.timeline.set_count)
+            .then(|| SampleSetId { plan_epoch: self.plan_epoch, index: set_index.into() })
     }
 
     /// What a set shows; `None` beyond the timeline.
@@ -136,17 +134,9 @@ impl Assignment {
                 .ok_or_else(|| WireError::out_of_range("image_indices", index, "one of the sample cameras"))? += 1;
         }
         if self.policy == Policy::Pipeline && (image_count == 0 || sampled.iter().any(|&times| times != 1)) {
-            return Err(WireError::out_of_range(
-                "image_indices",
-                format!("{sampled:?} times"),
-                "each image once",
-            ));
+            return Err(WireError::out_of_range("image_indices", format!("{sampled:?} times"), "each image once"));
         }
-        if self.compositors.is_empty() {
-            Err(WireError::Missing { field: "compositors" })
-        } else {
-            Ok(self)
-        }
+        if self.compositors.is_empty() { Err(WireError::Missing { field: "compositors" }) } else { Ok(self) }
     }
 }
 
@@ -160,16 +150,8 @@ impl TryFrom<proto::Assignment> for Assignment {
             plan_epoch: a.plan_epoch,
             policy: Policy::from_wire(a.policy)?,
             workload: required(a.workload, "assignment.workload")?.try_into()?,
-            samplers: a
-                .samplers
-                .into_iter()
-                .map(TryInto::try_into)
-                .collect::<Result<_, _>>()?,
-            compositors: a
-                .compositors
-                .into_iter()
-                .map(TryInto::try_into)
-                .collect::<Result<_, _>>()?,
+            samplers: a.samplers.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+            compositors: a.compositors.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
         };
         assignment.check()
     }
@@ -202,11 +184,7 @@ impl TryFrom<proto::SamplerShare> for SamplerShare {
 
 impl From<SamplerShare> for proto::SamplerShare {
     fn from(s: SamplerShare) -> Self {
-        Self {
-            node_name: s.node_name,
-            node_address: s.address,
-            image_indices: s.image_indices,
-        }
+        Self { node_name: s.node_name, node_address: s.address, image_indices: s.image_indices }
     }
 }
 
@@ -214,18 +192,12 @@ impl TryFrom<proto::CompositorShare> for CompositorShare {
     type Error = WireError;
 
     fn try_from(s: proto::CompositorShare) -> Result<Self, WireError> {
-        Ok(Self {
-            node_name: nonempty(s.node_name, "node_name")?,
-            address: nonempty(s.node_address, "node_address")?,
-        })
+        Ok(Self { node_name: nonempty(s.node_name, "node_name")?, address: nonempty(s.node_address, "node_address")? })
     }
 }
 
 impl From<CompositorShare> for proto::CompositorShare {
     fn from(s: CompositorShare) -> Self {
-        Self {
-            node_name: s.node_name,
-            node_address: s.address,
-        }
+        Self { node_name: s.node_name, node_address: s.address }
     }
 }

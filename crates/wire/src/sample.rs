@@ -30,21 +30,13 @@ impl TryFrom<proto::FetchSampleImagesRequest> for FetchImages {
         if r.image_indices.is_empty() {
             return Err(WireError::Missing { field: "image_indices" });
         }
-        Ok(Self {
-            plan_epoch: r.plan_epoch,
-            set_index: r.set_index,
-            image_indices: r.image_indices,
-        })
+        Ok(Self { plan_epoch: r.plan_epoch, set_index: r.set_index, image_indices: r.image_indices })
     }
 }
 
 impl From<FetchImages> for proto::FetchSampleImagesRequest {
     fn from(r: FetchImages) -> Self {
-        Self {
-            plan_epoch: r.plan_epoch,
-            set_index: r.set_index,
-            image_indices: r.image_indices,
-        }
+        Self { plan_epoch: r.plan_epoch, set_index: r.set_index, image_indices: r.image_indices }
     }
 }
 
@@ -61,10 +53,7 @@ impl TryFrom<proto::FetchSampleImagesResponse> for Chunk {
             }
         };
         Ok(Self {
-            sample_set_id: SampleSetId {
-                plan_epoch: c.plan_epoch,
-                index: c.set_index,
-            },
+            sample_set_id: SampleSetId { plan_epoch: c.plan_epoch, index: c.set_index },
             image_index: c.image_index,
             sequence: c.sequence_number,
             chunk_count: c.chunk_count,
@@ -103,12 +92,7 @@ impl TryFrom<proto::ImageHeader> for ImageHeader {
             greatest_per_m: h.greatest_inverse_depth_per_m,
         };
         let planes = h.planes.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?;
-        Ok(Self {
-            width: h.width_px,
-            height: h.height_px,
-            inverse_depth_range: range,
-            planes,
-        })
+        Ok(Self { width: h.width_px, height: h.height_px, inverse_depth_range: range, planes })
     }
 }
 
@@ -134,28 +118,17 @@ impl TryFrom<proto::PlaneHeader> for PlaneHeader {
             Ok(proto::PlaneKind::NormalOct16) => PlaneKind::NormalOct16,
             Ok(proto::PlaneKind::SurfaceId) => PlaneKind::SurfaceId,
             _ => {
-                return Err(WireError::UnknownEnum {
-                    field: "planes.kind",
-                    value: p.kind,
-                });
+                return Err(WireError::UnknownEnum { field: "planes.kind", value: p.kind });
             }
         };
         let encoding = match proto::PlaneEncoding::try_from(p.encoding) {
             Ok(proto::PlaneEncoding::SlopeTaggedLz4) => PlaneEncoding::SlopeTaggedLz4,
             Ok(proto::PlaneEncoding::DifferenceTaggedLz4) => PlaneEncoding::DifferenceTaggedLz4,
             _ => {
-                return Err(WireError::UnknownEnum {
-                    field: "planes.encoding",
-                    value: p.encoding,
-                });
+                return Err(WireError::UnknownEnum { field: "planes.encoding", value: p.encoding });
             }
         };
-        Ok(Self {
-            kind,
-            encoding,
-            raw_bytes: p.raw_bytes,
-            packed_bytes: p.packed_bytes,
-        })
+        Ok(Self { kind, encoding, raw_bytes: p.raw_bytes, packed_bytes: p.packed_bytes })
     }
 }
 
@@ -171,11 +144,6 @@ impl From<PlaneHeader> for proto::PlaneHeader {
             PlaneEncoding::SlopeTaggedLz4 => proto::PlaneEncoding::SlopeTaggedLz4,
             PlaneEncoding::DifferenceTaggedLz4 => proto::PlaneEncoding::DifferenceTaggedLz4,
         };
-        Self {
-            kind: kind.into(),
-            encoding: encoding.into(),
-            raw_bytes: p.raw_bytes,
-            packed_bytes: p.packed_bytes,
-        }
+        Self { kind: kind.into(), encoding: encoding.into(), raw_bytes: p.raw_bytes, packed_bytes: p.packed_bytes }
     }
 }

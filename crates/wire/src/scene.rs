@@ -69,19 +69,13 @@ impl TryFrom<proto::SceneRef> for SceneRef {
                 limit: MAX_SCENE_BYTES,
             });
         }
-        Ok(Self {
-            hash: SceneHash::parse(&scene.scene_hash)?,
-            package_bytes: scene.package_bytes,
-        })
+        Ok(Self { hash: SceneHash::parse(&scene.scene_hash)?, package_bytes: scene.package_bytes })
     }
 }
 
 impl From<SceneRef> for proto::SceneRef {
     fn from(scene: SceneRef) -> Self {
-        Self {
-            scene_hash: scene.hash.0,
-            package_bytes: scene.package_bytes,
-        }
+        Self { scene_hash: scene.hash.0, package_bytes: scene.package_bytes }
     }
 }
 
@@ -98,19 +92,13 @@ impl TryFrom<proto::FetchSceneRequest> for FetchScene {
     type Error = WireError;
 
     fn try_from(request: proto::FetchSceneRequest) -> Result<Self, WireError> {
-        Ok(Self {
-            hash: SceneHash::parse(&request.scene_hash)?,
-            offset_bytes: request.offset_bytes,
-        })
+        Ok(Self { hash: SceneHash::parse(&request.scene_hash)?, offset_bytes: request.offset_bytes })
     }
 }
 
 impl From<FetchScene> for proto::FetchSceneRequest {
     fn from(request: FetchScene) -> Self {
-        Self {
-            scene_hash: request.hash.0,
-            offset_bytes: request.offset_bytes,
-        }
+        Self { scene_hash: request.hash.0, offset_bytes: request.offset_bytes }
     }
 }
 
@@ -128,19 +116,13 @@ impl TryFrom<proto::FetchSceneResponse> for ScenePart {
 
     fn try_from(part: proto::FetchSceneResponse) -> Result<Self, WireError> {
         at_most(part.data.len(), MAX_MESSAGE_BYTES, "data")?;
-        Ok(Self {
-            offset_bytes: part.offset_bytes,
-            data: part.data,
-        })
+        Ok(Self { offset_bytes: part.offset_bytes, data: part.data })
     }
 }
 
 impl From<ScenePart> for proto::FetchSceneResponse {
     fn from(part: ScenePart) -> Self {
-        Self {
-            offset_bytes: part.offset_bytes,
-            data: part.data,
-        }
+        Self { offset_bytes: part.offset_bytes, data: part.data }
     }
 }
 
@@ -155,10 +137,7 @@ impl SceneAssembly {
     /// Nothing yet. No more is allocated than has come.
     #[must_use]
     pub fn new(scene: SceneRef) -> Self {
-        Self {
-            scene,
-            package: Vec::new(),
-        }
+        Self { scene, package: Vec::new() }
     }
 
     /// Adds the next part.
@@ -168,19 +147,11 @@ impl SceneAssembly {
     pub fn push(&mut self, part: &ScenePart) -> Result<(), WireError> {
         let have = self.package.len() as u64;
         if part.offset_bytes != have {
-            return Err(WireError::out_of_range(
-                "offset_bytes",
-                part.offset_bytes,
-                "where the part before ended",
-            ));
+            return Err(WireError::out_of_range("offset_bytes", part.offset_bytes, "where the part before ended"));
         }
         let count = have + part.data.len() as u64;
         if count > self.scene.package_bytes {
-            return Err(WireError::TooMany {
-                field: "data",
-                count,
-                limit: self.scene.package_bytes,
-            });
+            return Err(WireError::TooMany { field: "data", count, limit: self.scene.package_bytes });
         }
         self.package.extend_from_slice(&part.data);
         Ok(())
@@ -207,34 +178,23 @@ mod tests {
     use super::*;
 
     fn part(offset_bytes: u64, data: &'static [u8]) -> ScenePart {
-        ScenePart {
-            offset_bytes,
-            data: Bytes::from_static(data),
-        }
+        ScenePart { offset_bytes, data: Bytes::from_static(data) }
     }
 
     #[test]
     fn names_that_are_no_hash_are_refused() {
         let good = SceneHash::of(b"scene");
         assert_eq!(SceneHash::parse(good.as_str()), Ok(good.clone()));
-        for bad in [
-            "",
-            "../../etc/passwd",
-            &good.as_str().to_uppercase(),
-            &good.as_str()[1..],
-            &"%2e".repeat(22)[..64],
-            "\0",
-        ] {
+        for bad in
+            ["", "../../etc/passwd", &good.as_str().to_uppercase(), &good.as_str()[1..], &"%2e".repeat(22)[..64], "\0"]
+        {
             assert!(SceneHash::parse(bad).expect_err(bad).to_string().contains("scene_hash"));
         }
     }
 
     #[test]
     fn packages_are_whole_and_in_order() {
-        let scene = SceneRef {
-            hash: SceneHash::of(b"abcdef"),
-            package_bytes: 6,
-        };
+        let scene = SceneRef { hash: SceneHash::of(b"abcdef"), package_bytes: 6 };
         let mut whole = SceneAssembly::new(scene.clone());
         whole.push(&part(0, b"abc")).unwrap();
         assert!(whole.push(&part(0, b"abc")).is_err(), "twice");

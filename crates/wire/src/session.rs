@@ -26,10 +26,7 @@ impl PolicyChoice {
             Ok(proto::PolicyChoice::Auto) => Ok(Self::Auto),
             Ok(proto::PolicyChoice::Pipeline) => Ok(Self::Pipeline),
             Ok(proto::PolicyChoice::Direct) => Ok(Self::Direct),
-            _ => Err(WireError::UnknownEnum {
-                field: "policy_choice",
-                value,
-            }),
+            _ => Err(WireError::UnknownEnum { field: "policy_choice", value }),
         }
     }
 
@@ -80,33 +77,20 @@ impl TryFrom<proto::OpenSessionRequest> for SessionRequest {
 
     fn try_from(r: proto::OpenSessionRequest) -> Result<Self, WireError> {
         if !(1..=MAX_VIEWS_PER_SET).contains(&r.views_per_set_count) {
-            return Err(WireError::out_of_range(
-                "views_per_set_count",
-                r.views_per_set_count,
-                "from 1 to 1048576",
-            ));
+            return Err(WireError::out_of_range("views_per_set_count", r.views_per_set_count, "from 1 to 1048576"));
         }
         Ok(Self {
-            scene: if r.scene_hash.is_empty() {
-                None
-            } else {
-                Some(SceneHash::parse(&r.scene_hash)?)
-            },
+            scene: if r.scene_hash.is_empty() { None } else { Some(SceneHash::parse(&r.scene_hash)?) },
             method: nonempty(r.reconstruction_method, "reconstruction_method")?,
             sampling: nonempty(r.sampling_method, "sampling_method")?,
             lighting: nonempty(r.lighting, "lighting")?,
             codec: nonempty(r.frame_codec, "frame_codec")?,
             sample_cameras: sample_cameras_from(r.sample_cameras)?,
-            sample_size_px: r
-                .sample_image_size
-                .map(|size| UVec2::new(size.width_px, size.height_px)),
+            sample_size_px: r.sample_image_size.map(|size| UVec2::new(size.width_px, size.height_px)),
             volume: r.volume.map(bounds_from).transpose()?,
             typical_view: pinhole_from(r.typical_view, "typical_view")?,
             views_per_set: r.views_per_set_count,
-            planes: ViewPlanes {
-                inverse_depth: r.with_inverse_depth,
-                provenance: r.with_provenance,
-            },
+            planes: ViewPlanes { inverse_depth: r.with_inverse_depth, provenance: r.with_provenance },
             timeline: required(r.timeline, "timeline")?.try_into()?,
             policy: PolicyChoice::from_wire(r.policy_choice)?,
             forced_sampler_count: (r.forced_sampler_count > 0).then_some(r.forced_sampler_count),
@@ -123,10 +107,7 @@ impl From<SessionRequest> for proto::OpenSessionRequest {
             lighting: r.lighting,
             frame_codec: r.codec,
             sample_cameras: r.sample_cameras.iter().map(camera_to).collect(),
-            sample_image_size: r.sample_size_px.map(|size| proto::ImageSize {
-                width_px: size.x,
-                height_px: size.y,
-            }),
+            sample_image_size: r.sample_size_px.map(|size| proto::ImageSize { width_px: size.x, height_px: size.y }),
             volume: r.volume.as_ref().map(bounds_to),
             typical_view: Some(pinhole_to(&r.typical_view)),
             views_per_set_count: r.views_per_set,
@@ -247,14 +228,11 @@ impl TryFrom<proto::OpenSessionResponse> for SessionEvent {
     fn try_from(r: proto::OpenSessionResponse) -> Result<Self, WireError> {
         use proto::open_session_response::Event;
         Ok(match required(r.event, "event")? {
-            Event::Progress(p) => Self::Progress {
-                stage: SessionStage::from_wire(p.stage)?,
-                detail: reason(p.detail, "detail")?,
-            },
+            Event::Progress(p) => {
+                Self::Progress { stage: SessionStage::from_wire(p.stage)?, detail: reason(p.detail, "detail")? }
+            }
             Event::Plan(plan) => Self::Plan(Box::new(plan.try_into()?)),
-            Event::Ended(ended) => Self::Ended {
-                reason: reason(ended.reason, "ended.reason")?,
-            },
+            Event::Ended(ended) => Self::Ended { reason: reason(ended.reason, "ended.reason")? },
         })
     }
 }
@@ -263,10 +241,9 @@ impl From<SessionEvent> for proto::OpenSessionResponse {
     fn from(event: SessionEvent) -> Self {
         use proto::open_session_response::Event;
         let event = match event {
-            SessionEvent::Progress { stage, detail } => Event::Progress(proto::SessionProgress {
-                stage: stage.to_wire(),
-                detail,
-            }),
+            SessionEvent::Progress { stage, detail } => {
+                Event::Progress(proto::SessionProgress { stage: stage.to_wire(), detail })
+            }
             SessionEvent::Plan(plan) => Event::Plan((*plan).into()),
             SessionEvent::Ended { reason } => Event::Ended(proto::SessionEnded { reason }),
         };

@@ -48,11 +48,7 @@ impl EncodedView {
     /// The header of a frame with this view.
     #[must_use]
     pub fn header(&self, sample_set_id: SampleSetId, stage_times: StageTimes) -> FrameHeader {
-        FrameHeader {
-            sample_set_id,
-            stage_times,
-            ..self.header.clone()
-        }
+        FrameHeader { sample_set_id, stage_times, ..self.header.clone() }
     }
 }
 
@@ -63,30 +59,13 @@ impl EncodedView {
 pub fn encode_view(view: &View, codec: FrameCodec) -> Result<EncodedView, ViewCodecError> {
     let texels = view.size_px.element_product() as usize;
     let right = |plane, len| {
-        if len == texels {
-            Ok(())
-        } else {
-            Err(ViewCodecError::Length {
-                plane,
-                len,
-                expected: texels,
-            })
-        }
+        if len == texels { Ok(()) } else { Err(ViewCodecError::Length { plane, len, expected: texels }) }
     };
-    right(
-        "inverse_depth",
-        view.inverse_depth_per_m.as_ref().map_or(texels, Vec::len),
-    )?;
+    right("inverse_depth", view.inverse_depth_per_m.as_ref().map_or(texels, Vec::len))?;
     right("provenance", view.provenance.as_ref().map_or(texels, Vec::len))?;
     let color = encode_frame(codec, view.size_px.x, view.size_px.y, &view.srgb8)?.data;
-    let depth = view
-        .inverse_depth_per_m
-        .as_deref()
-        .map_or_else(Vec::new, pack_f32_plane);
-    let provenance = view
-        .provenance
-        .as_deref()
-        .map_or_else(Vec::new, |plane| pack_u32_plane(&words_of(plane)));
+    let depth = view.inverse_depth_per_m.as_deref().map_or_else(Vec::new, pack_f32_plane);
+    let provenance = view.provenance.as_deref().map_or_else(Vec::new, |plane| pack_u32_plane(&words_of(plane)));
     let lengths = [color.len(), depth.len(), provenance.len()].map(|len| len as u64);
     let data = if depth.is_empty() && provenance.is_empty() {
         color
@@ -119,13 +98,8 @@ pub fn decode_view(frame: &WholeFrame, limits: &DecodeLimits) -> Result<View, Vi
     let plane_error = |plane| move |source| ViewCodecError::Plane { plane, source };
     let texels = limits.texels(size_px.x, size_px.y).map_err(plane_error("size"))?;
     let [color, depth, provenance] = planes(frame)?;
-    let color = EncodedFrame {
-        codec,
-        width: size_px.x,
-        height: size_px.y,
-        crc32: crc32fast::hash(&color),
-        data: color,
-    };
+    let color =
+        EncodedFrame { codec, width: size_px.x, height: size_px.y, crc32: crc32fast::hash(&color), data: color };
     let some = |data: Bytes| (!data.is_empty()).then_some(data);
     let depth = some(depth).map(|data| unpack_f32_plane(&data, texels).map_err(plane_error("inverse_depth")));
     let provenance = some(provenance).map(|data| unpack_u32_plane(&data, texels).map_err(plane_error("provenance")));
@@ -133,9 +107,7 @@ pub fn decode_view(frame: &WholeFrame, limits: &DecodeLimits) -> Result<View, Vi
         size_px,
         srgb8: decode_frame(&color, limits)?,
         inverse_depth_per_m: depth.transpose()?,
-        provenance: provenance
-            .transpose()?
-            .map(|words| words.into_iter().map(Provenance).collect()),
+        provenance: provenance.transpose()?.map(|words| words.into_iter().map(Provenance).collect()),
     })
 }
 
@@ -170,18 +142,8 @@ mod tests {
 
     fn sent(view: &View) -> WholeFrame {
         let encoded = encode_view(view, FrameCodec::Lz4).unwrap();
-        let header = encoded.header(
-            SampleSetId {
-                plan_epoch: 3,
-                index: 2,
-            },
-            StageTimes::default(),
-        );
-        WholeFrame {
-            frame: 1,
-            header,
-            data: encoded.data,
-        }
+        let header = encoded.header(SampleSetId { plan_epoch: 3, index: 2 }, StageTimes::default());
+        WholeFrame { frame: 1, header, data: encoded.data }
     }
 
     #[test]
@@ -206,15 +168,6 @@ mod tests {
         assert!(spoilt(&|f| f.header.size_px.x = 21));
         assert!(spoilt(&|f| f.header.size_px = UVec2::splat(65_535)));
         assert!(spoilt(&|f| f.data.truncate(10)));
-        assert!(
-            encode_view(
-                &View {
-                    provenance: Some(Vec::new()),
-                    ..view(true)
-                },
-                FrameCodec::Lz4
-            )
-            .is_err()
-        );
+        assert!(encode_view(&View { provenance: Some(Vec::new()), ..view(true) }, FrameCodec::Lz4).is_err());
     }
 }

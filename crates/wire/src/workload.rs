@@ -23,11 +23,7 @@ impl Timeline {
     /// One set.
     #[must_use]
     pub fn still(at_s: f64) -> Self {
-        Self {
-            start_s: at_s,
-            step_s: 0.0,
-            set_count: 1,
-        }
+        Self { start_s: at_s, step_s: 0.0, set_count: 1 }
     }
 
     /// Scene time of a set; `None` beyond the last.
@@ -42,18 +38,10 @@ impl TryFrom<proto::Timeline> for Timeline {
 
     fn try_from(t: proto::Timeline) -> Result<Self, WireError> {
         if !(1..=MAX_SETS).contains(&t.set_count) {
-            return Err(WireError::out_of_range(
-                "timeline.set_count",
-                t.set_count,
-                "from 1 to 1048576",
-            ));
+            return Err(WireError::out_of_range("timeline.set_count", t.set_count, "from 1 to 1048576"));
         }
         let finite = |value: f64, field| {
-            if value.is_finite() {
-                Ok(value)
-            } else {
-                Err(WireError::out_of_range(field, value, "finite"))
-            }
+            if value.is_finite() { Ok(value) } else { Err(WireError::out_of_range(field, value, "finite")) }
         };
         Ok(Self {
             start_s: finite(t.start_s, "timeline.start_s")?,
@@ -65,11 +53,7 @@ impl TryFrom<proto::Timeline> for Timeline {
 
 impl From<Timeline> for proto::Timeline {
     fn from(t: Timeline) -> Self {
-        Self {
-            start_s: t.start_s,
-            step_s: t.step_s,
-            set_count: t.set_count,
-        }
+        Self { start_s: t.start_s, step_s: t.step_s, set_count: t.set_count }
     }
 }
 

@@ -39,20 +39,13 @@ impl Axis {
     /// An evenly spread axis.
     #[must_use]
     pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self {
-            label: label.into(),
-            unit: unit.into(),
-            scale: Scale::Linear,
-        }
+        Self { label: label.into(), unit: unit.into(), scale: Scale::Linear }
     }
 
     /// An axis spread by ratio.
     #[must_use]
     pub fn log(label: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self {
-            scale: Scale::Log,
-            ..Self::linear(label, unit)
-        }
+        Self { scale: Scale::Log, ..Self::linear(label, unit) }
     }
 
     /// `label (unit)`.
@@ -126,13 +119,8 @@ fn padded_log(least: f64, greatest: f64) -> Range<f64> {
 fn step(span: f64) -> f64 {
     let rough = span / TICKS;
     let power = 10_f64.powf(rough.log10().floor());
-    let multiples = [1.0, 2.0, 5.0, 10.0]
-        .into_iter()
-        .map(|multiple| multiple * power);
-    multiples
-        .into_iter()
-        .find(|&step| step >= rough * 0.999)
-        .unwrap_or(10.0 * power)
+    let multiples = [1.0, 2.0, 5.0, 10.0].into_iter().map(|multiple| multiple * power);
+    multiples.into_iter().find(|&step| step >= rough * 0.999).unwrap_or(10.0 * power)
 }
 
 fn linear_ticks(range: &Range<f64>) -> Vec<f64> {
@@ -153,9 +141,7 @@ fn log_ticks(range: &Range<f64>) -> Vec<f64> {
     let decades = range.start.floor() as i32..=range.end.ceil() as i32;
     let stride = (span / (TICKS + 2.0)).ceil() as usize;
     let multiples: &[f64] = if span < 2.6 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-    let ticks = decades
-        .step_by(stride)
-        .flat_map(|decade| multiples.iter().map(move |m| f64::from(decade) + m.log10()));
+    let ticks = decades.step_by(stride).flat_map(|decade| multiples.iter().map(move |m| f64::from(decade) + m.log10()));
     ticks.filter(inside).collect()
 }
 
@@ -172,10 +158,7 @@ mod tests {
     #[test]
     fn log_ticks_suit_their_span() {
         let values = |range: Range<f64>| {
-            log_ticks(&range)
-                .into_iter()
-                .map(|place| 10_f64.powf(place).round())
-                .collect::<Vec<_>>()
+            log_ticks(&range).into_iter().map(|place| 10_f64.powf(place).round()).collect::<Vec<_>>()
         };
         assert_eq!(values(-0.1..3.1), [1.0, 10.0, 100.0, 1000.0]);
         assert_eq!(values(-0.1..1.1), [1.0, 2.0, 5.0, 10.0]);
@@ -191,10 +174,7 @@ mod tests {
         for axis in [axis, Axis::linear("x", "")] {
             for values in [vec![], vec![5.0], vec![0.0], vec![-2.0, -2.0]] {
                 let range = axis.range(values.into_iter());
-                assert!(
-                    range.end > range.start && !axis.ticks(&range).is_empty(),
-                    "{range:?}"
-                );
+                assert!(range.end > range.start && !axis.ticks(&range).is_empty(), "{range:?}");
             }
         }
     }

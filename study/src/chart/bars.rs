@@ -5,9 +5,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
-use super::canvas::{
-    self, Area, Drawing, Glyph, LegendEntry, message, style_mesh, text_style, text_width_px,
-};
+use super::canvas::{self, Area, Drawing, Glyph, LegendEntry, message, style_mesh, text_style, text_width_px};
 use super::ruler::Ruler;
 use super::{Axis, Palette};
 use crate::{ReportError, format_number};
@@ -49,57 +47,32 @@ pub struct BarChart {
 impl BarChart {
     /// A chart of bars without parts.
     #[must_use]
-    pub fn new(
-        name: impl Into<String>,
-        value: Axis,
-        bars: impl IntoIterator<Item = impl Into<String>>,
-    ) -> Self {
+    pub fn new(name: impl Into<String>, value: Axis, bars: impl IntoIterator<Item = impl Into<String>>) -> Self {
         let bars = bars.into_iter().map(Into::into).collect();
-        Self {
-            name: name.into(),
-            note: String::new(),
-            value,
-            bars,
-            stages: Vec::new(),
-        }
+        Self { name: name.into(), note: String::new(), value, bars, stages: Vec::new() }
     }
 
     /// The same chart with one more part in every bar. What is not finite or below 0 counts as 0.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
         let drawable = |value: f64| {
-            if value.is_finite() {
-                value.max(0.0)
-            } else {
-                0.0
-            }
+            if value.is_finite() { value.max(0.0) } else { 0.0 }
         };
-        self.stages.push(Stage {
-            name: name.into(),
-            values: values.into_iter().map(drawable).collect(),
-        });
+        self.stages.push(Stage { name: name.into(), values: values.into_iter().map(drawable).collect() });
         self
     }
 
     pub(super) fn draw(&self, palette: &Palette) -> Result<Drawing, ReportError> {
         self.validate()?;
-        let entry = |stage: &Stage| LegendEntry {
-            text: stage.name.clone(),
-            glyph: Glyph::Swatch(palette.color(&stage.name)),
-        };
+        let entry =
+            |stage: &Stage| LegendEntry { text: stage.name.clone(), glyph: Glyph::Swatch(palette.color(&stage.name)) };
         let legend: Vec<LegendEntry> = self.stages.iter().map(entry).collect();
         let height_px = AXIS_HEIGHT_PX + BAR_PITCH_PX * self.bars.len().max(1) as u32;
-        canvas::draw(&self.name, &legend, height_px, |area| {
-            self.draw_plot(area, palette)
-        })
+        canvas::draw(&self.name, &legend, height_px, |area| self.draw_plot(area, palette))
     }
 
     fn validate(&self) -> Result<(), ReportError> {
-        match self
-            .stages
-            .iter()
-            .find(|stage| stage.values.len() != self.bars.len())
-        {
+        match self.stages.iter().find(|stage| stage.values.len() != self.bars.len()) {
             Some(stage) => Err(ReportError::StageLength {
                 chart: self.name.clone(),
                 stage: stage.name.clone(),
@@ -121,13 +94,7 @@ impl BarChart {
     }
 
     fn axes<'a>(&self, area: &Area<'a>) -> Result<Plot<'a>, String> {
-        let names_px = self
-            .bars
-            .iter()
-            .map(|name| text_width_px(name))
-            .max()
-            .unwrap_or(0)
-            .min(GREATEST_NAME_PX);
+        let names_px = self.bars.iter().map(|name| text_width_px(name)).max().unwrap_or(0).min(GREATEST_NAME_PX);
         let values = self.ruler();
         let tick_count = values.tick_count();
         let mut plot = ChartBuilder::on(area)
@@ -139,10 +106,7 @@ impl BarChart {
             .build_cartesian_2d(values, 0.0..self.bars.len().max(1) as f64)
             .map_err(message)?;
         let mut mesh = plot.configure_mesh();
-        mesh.x_desc(self.value.description())
-            .x_labels(tick_count)
-            .disable_y_mesh()
-            .y_labels(0);
+        mesh.x_desc(self.value.description()).x_labels(tick_count).disable_y_mesh().y_labels(0);
         style_mesh(&mut mesh);
         mesh.draw().map_err(message)?;
         Ok(plot)
@@ -150,9 +114,7 @@ impl BarChart {
 
     /// From 0 to beyond the longest bar, with room for its total.
     fn ruler(&self) -> Ruler {
-        let greatest = (0..self.bars.len())
-            .map(|bar| self.total(bar))
-            .fold(0.0, f64::max);
+        let greatest = (0..self.bars.len()).map(|bar| self.total(bar)).fold(0.0, f64::max);
         let end = if greatest > 0.0 { greatest * 1.13 } else { 1.0 };
         Ruler::new(&Axis::linear(&self.value.label, &self.value.unit), 0.0..end)
     }
@@ -167,19 +129,12 @@ impl BarChart {
         let mut parts = Vec::new();
         for stage in &self.stages {
             let style = palette.color(&stage.name).filled();
-            for (bar, (&value, end)) in stage
-                .values
-                .iter()
-                .zip(&mut ends)
-                .enumerate()
-                .filter(|(_, (value, _))| **value > 0.0)
+            for (bar, (&value, end)) in
+                stage.values.iter().zip(&mut ends).enumerate().filter(|(_, (value, _))| **value > 0.0)
             {
                 let (start, y) = (*end, self.middle(bar));
                 *end += value;
-                parts.push(Rectangle::new(
-                    [(start, y - HALF_BAR), (*end, y + HALF_BAR)],
-                    style,
-                ));
+                parts.push(Rectangle::new([(start, y - HALF_BAR), (*end, y + HALF_BAR)], style));
             }
         }
         parts
@@ -194,19 +149,9 @@ impl BarChart {
         };
         for (bar, name) in self.bars.iter().enumerate() {
             let total = self.total(bar);
-            let name = Text::new(
-                cut(name),
-                at(0.0, bar, -8),
-                text_style(HPos::Right, VPos::Center),
-            );
-            let total = Text::new(
-                format_number(total),
-                at(total, bar, 6),
-                text_style(HPos::Left, VPos::Center),
-            );
-            area.draw(&name)
-                .and_then(|()| area.draw(&total))
-                .map_err(message)?;
+            let name = Text::new(cut(name), at(0.0, bar, -8), text_style(HPos::Right, VPos::Center));
+            let total = Text::new(format_number(total), at(total, bar, 6), text_style(HPos::Left, VPos::Center));
+            area.draw(&name).and_then(|()| area.draw(&total)).map_err(message)?;
         }
         Ok(())
     }
@@ -219,9 +164,7 @@ fn cut(name: &str) -> String {
         return name.into();
     }
     let letters: Vec<char> = name.chars().collect();
-    let longest = (0..letters.len())
-        .rev()
-        .map(|count| letters[..count].iter().collect::<String>() + "…")
-        .find(|text| fits(text));
+    let longest =
+        (0..letters.len()).rev().map(|count| letters[..count].iter().collect::<String>() + "…").find(|text| fits(text));
     longest.unwrap_or_default()
 }

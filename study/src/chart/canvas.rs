@@ -43,9 +43,9 @@ impl Drawing {
     /// As a file: black on white.
     pub(crate) fn standalone(&self) -> String {
         match self.svg.split_once('>') {
-            Some((tag, rest)) => format!(
-                "{tag} color=\"#1b1f24\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>{rest}"
-            ),
+            Some((tag, rest)) => {
+                format!("{tag} color=\"#1b1f24\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>{rest}")
+            }
             None => self.svg.clone(),
         }
     }
@@ -80,26 +80,15 @@ pub(super) fn draw(
     let header_px = TITLE_HEIGHT_PX + LEGEND_ROW_PX * rows.len() as i32 + 4;
     let mut svg = String::new();
     {
-        let area = SVGBackend::with_string(&mut svg, (WIDTH_PX, header_px as u32 + plot_height_px))
-            .into_drawing_area();
+        let area = SVGBackend::with_string(&mut svg, (WIDTH_PX, header_px as u32 + plot_height_px)).into_drawing_area();
         let (header, below) = area.split_vertically(header_px);
         let drawn = draw_header(&header, name, &rows)
             .and_then(|()| plot(&below))
             .and_then(|()| area.present().map_err(message));
-        drawn.map_err(|message| ReportError::Draw {
-            chart: name.into(),
-            message,
-        })?;
+        drawn.map_err(|message| ReportError::Draw { chart: name.into(), message })?;
     }
-    let described = format!(
-        "<svg role=\"img\" aria-label=\"{}\" ",
-        minijinja::HtmlEscape(name)
-    );
-    Ok(Drawing {
-        svg: svg
-            .replace(INK_IN_SVG, "currentColor")
-            .replacen("<svg ", &described, 1),
-    })
+    let described = format!("<svg role=\"img\" aria-label=\"{}\" ", minijinja::HtmlEscape(name));
+    Ok(Drawing { svg: svg.replace(INK_IN_SVG, "currentColor").replacen("<svg ", &described, 1) })
 }
 
 /// The chart library's errors borrow the drawing: keep what they say.
@@ -109,9 +98,7 @@ pub(super) fn message(error: impl std::error::Error) -> String {
 
 /// Text in the page's ink.
 pub(super) fn text_style(horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
-    TextStyle::from(("sans-serif", TEXT_SIZE).into_font())
-        .color(&INK)
-        .pos(Pos::new(horizontal, vertical))
+    TextStyle::from(("sans-serif", TEXT_SIZE).into_font()).color(&INK).pos(Pos::new(horizontal, vertical))
 }
 
 /// Thin lines at the ticks, texts in the page's ink.
@@ -152,53 +139,30 @@ fn legend_rows(legend: &[LegendEntry]) -> Vec<Vec<(i32, &LegendEntry)>> {
 
 fn draw_header(area: &Area, name: &str, rows: &[Vec<(i32, &LegendEntry)>]) -> Result<(), String> {
     let title = TextStyle::from(("sans-serif", 19).into_font().style(FontStyle::Bold)).color(&INK);
-    area.draw(&Text::new(name.to_owned(), (MARGIN_PX, 9), title))
-        .map_err(message)?;
+    area.draw(&Text::new(name.to_owned(), (MARGIN_PX, 9), title)).map_err(message)?;
     for (row, entries) in rows.iter().enumerate() {
         let y = TITLE_HEIGHT_PX + LEGEND_ROW_PX * row as i32 + LEGEND_ROW_PX / 2;
-        entries
-            .iter()
-            .try_for_each(|(x, entry)| draw_entry(area, (*x, y), entry))?;
+        entries.iter().try_for_each(|(x, entry)| draw_entry(area, (*x, y), entry))?;
     }
     Ok(())
 }
 
 fn draw_entry(area: &Area, (x, y): (i32, i32), entry: &LegendEntry) -> Result<(), String> {
-    let (line, middle) = (
-        [(x, y), (x + GLYPH_WIDTH_PX - 8, y)],
-        (x + GLYPH_WIDTH_PX / 2 - 4, y),
-    );
+    let (line, middle) = ([(x, y), (x + GLYPH_WIDTH_PX - 8, y)], (x + GLYPH_WIDTH_PX / 2 - 4, y));
     match &entry.glyph {
-        Glyph::Swatch(color) => area
-            .draw(&Rectangle::new(
-                [(x + 10, y - 6), (x + 24, y + 6)],
-                color.filled(),
-            ))
-            .map_err(message)?,
+        Glyph::Swatch(color) => {
+            area.draw(&Rectangle::new([(x + 10, y - 6), (x + 24, y + 6)], color.filled())).map_err(message)?
+        }
         Glyph::Point(marker) => marker.draw(area, middle)?,
         Glyph::Line(marker) => {
-            area.draw(&PathElement::new(
-                line.to_vec(),
-                marker.color.stroke_width(2),
-            ))
-            .map_err(message)?;
+            area.draw(&PathElement::new(line.to_vec(), marker.color.stroke_width(2))).map_err(message)?;
             marker.draw(area, middle)?;
         }
         Glyph::Dashes(marker) => {
-            area.draw(&DashedPathElement::new(
-                line,
-                5,
-                4,
-                marker.color.stroke_width(2),
-            ))
-            .map_err(message)?;
+            area.draw(&DashedPathElement::new(line, 5, 4, marker.color.stroke_width(2))).map_err(message)?;
             marker.draw(area, middle)?;
         }
     }
-    let text = Text::new(
-        entry.text.clone(),
-        (x + GLYPH_WIDTH_PX, y),
-        text_style(HPos::Left, VPos::Center),
-    );
+    let text = Text::new(entry.text.clone(), (x + GLYPH_WIDTH_PX, y), text_style(HPos::Left, VPos::Center));
     area.draw(&text).map_err(message)
 }

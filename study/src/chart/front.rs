@@ -52,34 +52,18 @@ mod tests {
 
     fn front(points: &[(f64, f64)], better: [Better; 2]) -> Vec<(f64, f64)> {
         let points: Vec<Point> = points.iter().map(|&point| point.into()).collect();
-        pareto_front(&points, better)
-            .into_iter()
-            .map(|point| (point.x, point.y))
-            .collect()
+        pareto_front(&points, better).into_iter().map(|point| (point.x, point.y)).collect()
     }
 
     #[test]
     fn dominated_points_are_left_out() {
-        let points = [
-            (1.0, 5.0),
-            (2.0, 3.0),
-            (3.0, 4.0),
-            (4.0, 1.0),
-            (1.0, 6.0),
-            (2.0, 3.0),
-        ];
-        assert_eq!(
-            front(&points, [Better::Low, Better::Low]),
-            [(1.0, 5.0), (2.0, 3.0), (4.0, 1.0)]
-        );
+        let points = [(1.0, 5.0), (2.0, 3.0), (3.0, 4.0), (4.0, 1.0), (1.0, 6.0), (2.0, 3.0)];
+        assert_eq!(front(&points, [Better::Low, Better::Low]), [(1.0, 5.0), (2.0, 3.0), (4.0, 1.0)]);
     }
 
     #[test]
     fn more_can_be_better() {
         let points = [(1.0, 30.0), (2.0, 40.0), (3.0, 35.0)];
-        assert_eq!(
-            front(&points, [Better::Low, Better::High]),
-            [(1.0, 30.0), (2.0, 40.0)]
-        );
+        assert_eq!(front(&points, [Better::Low, Better::High]), [(1.0, 30.0), (2.0, 40.0)]);
     }
 }

@@ -20,19 +20,12 @@ pub(super) struct Marker {
 impl Marker {
     /// Draws it at a pixel of the area.
     pub(super) fn draw(self, area: &Area, (x, y): (i32, i32)) -> Result<(), String> {
-        let style = ShapeStyle {
-            color: self.color.to_rgba(),
-            filled: self.filled,
-            stroke_width: 2,
-        };
+        let style = ShapeStyle { color: self.color.to_rgba(), filled: self.filled, stroke_width: 2 };
         let corners = self.corners().map(|(dx, dy)| (x + dx, y + dy));
         match (self.shape % 4, self.filled) {
             (0, _) => area.draw(&Circle::new((x, y), RADIUS_PX, style)),
             (_, true) => area.draw(&Polygon::new(corners.to_vec(), style)),
-            (_, false) => area.draw(&PathElement::new(
-                [corners.as_slice(), &corners[..1]].concat(),
-                style,
-            )),
+            (_, false) => area.draw(&PathElement::new([corners.as_slice(), &corners[..1]].concat(), style)),
         }
         .map_err(message)
     }
@@ -41,19 +34,9 @@ impl Marker {
     fn corners(self) -> [(i32, i32); 4] {
         let (small, large) = (RADIUS_PX - 1, RADIUS_PX + 1);
         match self.shape % 4 {
-            1 => [
-                (-small, -small),
-                (small, -small),
-                (small, small),
-                (-small, small),
-            ],
+            1 => [(-small, -small), (small, -small), (small, small), (-small, small)],
             2 => [(0, -large), (large, 0), (0, large), (-large, 0)],
-            _ => [
-                (0, -large),
-                (0, -large),
-                (RADIUS_PX, small),
-                (-RADIUS_PX, small),
-            ],
+            _ => [(0, -large), (0, -large), (RADIUS_PX, small), (-RADIUS_PX, small)],
         }
     }
 }

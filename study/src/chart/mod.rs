@@ -54,16 +54,8 @@ impl Chart {
     #[must_use]
     pub fn series_names(&self) -> Vec<&str> {
         match self {
-            Self::Xy(chart) => chart
-                .series
-                .iter()
-                .map(|series| series.name.as_str())
-                .collect(),
-            Self::Bars(chart) => chart
-                .stages
-                .iter()
-                .map(|stage| stage.name.as_str())
-                .collect(),
+            Self::Xy(chart) => chart.series.iter().map(|series| series.name.as_str()).collect(),
+            Self::Bars(chart) => chart.stages.iter().map(|stage| stage.name.as_str()).collect(),
         }
     }
 

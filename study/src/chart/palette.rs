@@ -48,9 +48,7 @@ impl Palette {
         }
         let preferred = preferred_slot(name);
         let probes = (0..COLORS.len()).map(|step| (preferred + step) % COLORS.len());
-        let free = probes
-            .into_iter()
-            .find(|slot| !self.slots.values().any(|taken| taken == slot));
+        let free = probes.into_iter().find(|slot| !self.slots.values().any(|taken| taken == slot));
         self.slots.insert(name.into(), free.unwrap_or(preferred));
     }
 
@@ -64,18 +62,15 @@ impl Palette {
 
     /// A number that picks the marker's shape.
     pub(super) fn slot(&self, name: &str) -> usize {
-        self.slots
-            .get(name)
-            .copied()
-            .unwrap_or_else(|| preferred_slot(name))
+        self.slots.get(name).copied().unwrap_or_else(|| preferred_slot(name))
     }
 }
 
 /// FNV-1a: the same on every machine and in every release, unlike the standard hasher.
 fn preferred_slot(name: &str) -> usize {
-    let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    });
+    let hash = name
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
     (hash % COLORS.len() as u64) as usize
 }
 

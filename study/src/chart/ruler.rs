@@ -17,11 +17,7 @@ pub(super) struct Ruler {
 
 impl Ruler {
     pub(super) fn new(axis: &Axis, range: Range<f64>) -> Self {
-        Self {
-            ticks: axis.ticks(&range),
-            axis: axis.clone(),
-            range,
-        }
+        Self { ticks: axis.ticks(&range), axis: axis.clone(), range }
     }
 
     pub(super) fn tick_count(&self) -> usize {

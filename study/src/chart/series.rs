@@ -28,11 +28,7 @@ impl Point {
     /// A point with a label.
     #[must_use]
     pub fn labelled(x: f64, y: f64, label: impl Into<String>) -> Self {
-        Self {
-            x,
-            y,
-            label: label.into(),
-        }
+        Self { x, y, label: label.into() }
     }
 }
 
@@ -60,40 +56,21 @@ pub struct Series {
 impl Series {
     /// A line through measured points.
     #[must_use]
-    pub fn line<P: Into<Point>>(
-        name: impl Into<String>,
-        points: impl IntoIterator<Item = P>,
-    ) -> Self {
-        let points = points
-            .into_iter()
-            .map(Into::into)
-            .filter(|point: &Point| point.x.is_finite() && point.y.is_finite());
-        Self {
-            name: name.into(),
-            points: points.collect(),
-            mark: Mark::Line,
-            extrapolated_from: None,
-        }
+    pub fn line<P: Into<Point>>(name: impl Into<String>, points: impl IntoIterator<Item = P>) -> Self {
+        let points =
+            points.into_iter().map(Into::into).filter(|point: &Point| point.x.is_finite() && point.y.is_finite());
+        Self { name: name.into(), points: points.collect(), mark: Mark::Line, extrapolated_from: None }
     }
 
     /// Measured points without a line.
     #[must_use]
-    pub fn points<P: Into<Point>>(
-        name: impl Into<String>,
-        points: impl IntoIterator<Item = P>,
-    ) -> Self {
-        Self {
-            mark: Mark::Points,
-            ..Self::line(name, points)
-        }
+    pub fn points<P: Into<Point>>(name: impl Into<String>, points: impl IntoIterator<Item = P>) -> Self {
+        Self { mark: Mark::Points, ..Self::line(name, points) }
     }
 
     /// The same series with extrapolated points after the measured ones.
     #[must_use]
-    pub fn then_extrapolated<P: Into<Point>>(
-        mut self,
-        points: impl IntoIterator<Item = P>,
-    ) -> Self {
+    pub fn then_extrapolated<P: Into<Point>>(mut self, points: impl IntoIterator<Item = P>) -> Self {
         let more = Self::line("", points).points;
         if !more.is_empty() {
             self.extrapolated_from.get_or_insert(self.points.len());

@@ -8,8 +8,7 @@ use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
 use super::canvas::{
-    self, Area, Drawing, Glyph, INK, LegendEntry, WIDTH_PX, message, style_mesh, text_style,
-    text_width_px,
+    self, Area, Drawing, Glyph, INK, LegendEntry, WIDTH_PX, message, style_mesh, text_style, text_width_px,
 };
 use super::marker::Marker;
 use super::ruler::Ruler;
@@ -46,15 +45,7 @@ impl XyChart {
     /// A chart without series.
     #[must_use]
     pub fn new(name: impl Into<String>, x: Axis, y: Axis) -> Self {
-        Self {
-            name: name.into(),
-            note: String::new(),
-            x,
-            y,
-            series: Vec::new(),
-            limits: Vec::new(),
-            front: None,
-        }
+        Self { name: name.into(), note: String::new(), x, y, series: Vec::new(), limits: Vec::new(), front: None }
     }
 
     /// The same chart with one more series.
@@ -67,10 +58,7 @@ impl XyChart {
     /// The same chart with a horizontal line.
     #[must_use]
     pub fn with_limit(mut self, name: impl Into<String>, y: f64) -> Self {
-        self.limits.push(Limit {
-            name: name.into(),
-            y,
-        });
+        self.limits.push(Limit { name: name.into(), y });
         self
     }
 
@@ -82,16 +70,11 @@ impl XyChart {
     }
 
     pub(super) fn draw(&self, palette: &Palette) -> Result<Drawing, ReportError> {
-        canvas::draw(&self.name, &self.legend(palette), PLOT_HEIGHT_PX, |area| {
-            self.draw_plot(area, palette)
-        })
+        canvas::draw(&self.name, &self.legend(palette), PLOT_HEIGHT_PX, |area| self.draw_plot(area, palette))
     }
 
     fn legend(&self, palette: &Palette) -> Vec<LegendEntry> {
-        self.series
-            .iter()
-            .flat_map(|series| legend_entries(series, palette))
-            .collect()
+        self.series.iter().flat_map(|series| legend_entries(series, palette)).collect()
     }
 
     fn draw_plot(&self, area: &Area, palette: &Palette) -> Result<(), String> {
@@ -101,25 +84,16 @@ impl XyChart {
             self.draw_limit(&mut plot, limit, &x_range)?;
         }
         self.draw_front(&mut plot)?;
-        self.series
-            .iter()
-            .try_for_each(|series| self.draw_series(&mut plot, series, palette))?;
+        self.series.iter().try_for_each(|series| self.draw_series(&mut plot, series, palette))?;
         self.draw_labels(&mut plot, &x_range)
     }
 
     /// Both axes' ranges, in axis space.
     fn ranges(&self) -> (Range<f64>, Range<f64>) {
-        let points = || {
-            self.series
-                .iter()
-                .flat_map(|series| &series.points)
-                .filter(|point| self.place(point).is_some())
-        };
+        let points =
+            || self.series.iter().flat_map(|series| &series.points).filter(|point| self.place(point).is_some());
         let limits = self.limits.iter().map(|limit| limit.y);
-        (
-            self.x.range(points().map(|point| point.x)),
-            self.y.range(points().map(|point| point.y).chain(limits)),
-        )
+        (self.x.range(points().map(|point| point.x)), self.y.range(points().map(|point| point.y).chain(limits)))
     }
 
     /// A point in axis space; `None` where an axis cannot show it.
@@ -140,10 +114,7 @@ impl XyChart {
             .build_cartesian_2d(x, y)
             .map_err(message)?;
         let mut mesh = plot.configure_mesh();
-        mesh.x_desc(self.x.description())
-            .y_desc(self.y.description())
-            .x_labels(x_count)
-            .y_labels(y_count);
+        mesh.x_desc(self.x.description()).y_desc(self.y.description()).x_labels(x_count).y_labels(y_count);
         style_mesh(&mut mesh);
         mesh.draw().map_err(message)?;
         Ok(plot)
@@ -156,11 +127,7 @@ impl XyChart {
         let style = INK.mix(0.55).stroke_width(1);
         draw_path(plot, vec![(x.start, y), (x.end, y)], style, true)?;
         let text = EmptyElement::at((x.end, y))
-            + Text::new(
-                limit.name.clone(),
-                (-4, -3),
-                text_style(HPos::Right, VPos::Bottom),
-            );
+            + Text::new(limit.name.clone(), (-4, -3), text_style(HPos::Right, VPos::Bottom));
         plot.draw_series([text]).map(drop).map_err(message)
     }
 
@@ -168,107 +135,53 @@ impl XyChart {
         let Some(better) = self.front else {
             return Ok(());
         };
-        let all = self.series.iter().flat_map(|series| {
-            series
-                .points
-                .iter()
-                .enumerate()
-                .map(move |point| (series, point))
-        });
-        let measured = all
-            .filter(|(series, (index, _))| !series.is_extrapolated(*index))
-            .map(|(_, (_, point))| point);
+        let all =
+            self.series.iter().flat_map(|series| series.points.iter().enumerate().map(move |point| (series, point)));
+        let measured = all.filter(|(series, (index, _))| !series.is_extrapolated(*index)).map(|(_, (_, point))| point);
         let front = pareto_front(measured.filter(|point| self.place(point).is_some()), better);
-        let corners = staircase(
-            &front
-                .iter()
-                .filter_map(|point| self.place(point))
-                .collect::<Vec<_>>(),
-        );
+        let corners = staircase(&front.iter().filter_map(|point| self.place(point)).collect::<Vec<_>>());
         draw_path(plot, corners, INK.mix(0.35).stroke_width(2), false)
     }
 
-    fn draw_series(
-        &self,
-        plot: &mut Plot,
-        series: &Series,
-        palette: &Palette,
-    ) -> Result<(), String> {
-        let places: Vec<(usize, (f64, f64))> = series
-            .points
-            .iter()
-            .enumerate()
-            .filter_map(|(index, point)| Some((index, self.place(point)?)))
-            .collect();
+    fn draw_series(&self, plot: &mut Plot, series: &Series, palette: &Palette) -> Result<(), String> {
+        let places: Vec<(usize, (f64, f64))> =
+            series.points.iter().enumerate().filter_map(|(index, point)| Some((index, self.place(point)?))).collect();
         let style = palette.color(&series.name).stroke_width(2);
         if series.mark == Mark::Line {
             let part = |keep: &dyn Fn(usize) -> bool| {
-                places
-                    .iter()
-                    .filter(|(index, _)| keep(*index))
-                    .map(|&(_, place)| place)
-                    .collect()
+                places.iter().filter(|(index, _)| keep(*index)).map(|&(_, place)| place).collect()
             };
-            draw_path(
-                plot,
-                part(&|index| !series.is_extrapolated(index)),
-                style,
-                false,
-            )?;
+            draw_path(plot, part(&|index| !series.is_extrapolated(index)), style, false)?;
             // From the last measured point on, so that the line does not break.
-            draw_path(
-                plot,
-                part(&|index| series.is_extrapolated(index + 1)),
-                style,
-                true,
-            )?;
+            draw_path(plot, part(&|index| series.is_extrapolated(index + 1)), style, true)?;
         }
         let pixels = plot.plotting_area().strip_coord_spec();
         let (left_px, top_px) = pixels.get_base_pixel();
         places.iter().try_for_each(|(index, place)| {
             let (x, y) = plot.backend_coord(place);
-            marker(series, palette, !series.is_extrapolated(*index))
-                .draw(&pixels, (x - left_px, y - top_px))
+            marker(series, palette, !series.is_extrapolated(*index)).draw(&pixels, (x - left_px, y - top_px))
         })
     }
 
     /// Labels to the right of their points, or to the left near the right edge.
     fn draw_labels(&self, plot: &mut Plot, x: &Range<f64>) -> Result<(), String> {
-        let labelled = self
-            .series
-            .iter()
-            .flat_map(|series| &series.points)
-            .filter(|point| !point.label.is_empty());
+        let labelled = self.series.iter().flat_map(|series| &series.points).filter(|point| !point.label.is_empty());
         let texts = labelled.filter_map(|point| {
             let place = self.place(point)?;
             let right_of_px = (x.end - place.0) / (x.end - x.start) * f64::from(WIDTH_PX - 100);
             let fits = f64::from(text_width_px(&point.label) + 12) < right_of_px;
-            let (offset, anchor) = if fits {
-                (9, HPos::Left)
-            } else {
-                (-9, HPos::Right)
-            };
+            let (offset, anchor) = if fits { (9, HPos::Left) } else { (-9, HPos::Right) };
             Some(
                 EmptyElement::at(place)
-                    + Text::new(
-                        point.label.clone(),
-                        (offset, -8),
-                        text_style(anchor, VPos::Center),
-                    ),
+                    + Text::new(point.label.clone(), (offset, -8), text_style(anchor, VPos::Center)),
             )
         });
-        plot.draw_series(texts.collect::<Vec<_>>())
-            .map(drop)
-            .map_err(message)
+        plot.draw_series(texts.collect::<Vec<_>>()).map(drop).map_err(message)
     }
 }
 
 fn marker(series: &Series, palette: &Palette, filled: bool) -> Marker {
-    Marker {
-        shape: palette.slot(&series.name),
-        color: palette.color(&series.name),
-        filled,
-    }
+    Marker { shape: palette.slot(&series.name), color: palette.color(&series.name), filled }
 }
 
 /// One entry for what was measured, one for what was extrapolated.
@@ -284,36 +197,23 @@ fn legend_entries(series: &Series, palette: &Palette) -> Vec<LegendEntry> {
         LegendEntry { text, glyph }
     };
     let measured = (series.extrapolated_from != Some(0)).then(|| entry(series.name.clone(), true));
-    let extrapolated = series
-        .extrapolated_from
-        .map(|_| entry(format!("{}, extrapolated", series.name), false));
+    let extrapolated = series.extrapolated_from.map(|_| entry(format!("{}, extrapolated", series.name), false));
     measured.into_iter().chain(extrapolated).collect()
 }
 
-fn draw_path(
-    plot: &mut Plot,
-    points: Vec<(f64, f64)>,
-    style: ShapeStyle,
-    dashed: bool,
-) -> Result<(), String> {
+fn draw_path(plot: &mut Plot, points: Vec<(f64, f64)>, style: ShapeStyle, dashed: bool) -> Result<(), String> {
     if points.len() < 2 {
         return Ok(());
     }
     let drawn = match dashed {
-        true => plot
-            .draw_series([DashedPathElement::new(points, 6, 5, style)])
-            .map(drop),
-        false => plot
-            .draw_series([PathElement::new(points, style)])
-            .map(drop),
+        true => plot.draw_series([DashedPathElement::new(points, 6, 5, style)]).map(drop),
+        false => plot.draw_series([PathElement::new(points, style)]).map(drop),
     };
     drawn.map_err(message)
 }
 
 /// A front is a staircase: nothing between two of its points has been reached.
 fn staircase(front: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let steps = front
-        .windows(2)
-        .flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
+    let steps = front.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
     steps.chain(front.last().copied()).collect()
 }

@@ -15,17 +15,9 @@ pub fn contact_sheet(images: &[RgbImage], columns: u32, gap_px: u32) -> RgbImage
     let cell_width = images.iter().map(RgbImage::width).max().unwrap_or(0);
     let cell_height = images.iter().map(RgbImage::height).max().unwrap_or(0);
     let side = |cells: u32, cell: u32| {
-        if count == 0 {
-            0
-        } else {
-            gap_px + cells * (cell + gap_px)
-        }
+        if count == 0 { 0 } else { gap_px + cells * (cell + gap_px) }
     };
-    let mut sheet = RgbImage::from_pixel(
-        side(columns, cell_width),
-        side(rows, cell_height),
-        GAP_COLOR,
-    );
+    let mut sheet = RgbImage::from_pixel(side(columns, cell_width), side(rows, cell_height), GAP_COLOR);
     for (index, image) in (0..count).zip(images) {
         let x = gap_px + index % columns * (cell_width + gap_px);
         let y = gap_px + index / columns * (cell_height + gap_px);
@@ -49,10 +41,7 @@ mod tests {
         assert_eq!(sheet.get_pixel(1, 1).0, [100; 3]);
         assert_eq!(sheet.get_pixel(6, 1).0, [150; 3]);
         assert_eq!(sheet.get_pixel(1, 5).0, [200; 3]);
-        assert_eq!(
-            [sheet[(0, 0)], sheet[(5, 1)], sheet[(3, 5)], sheet[(6, 5)]],
-            [GAP_COLOR; 4]
-        );
+        assert_eq!([sheet[(0, 0)], sheet[(5, 1)], sheet[(3, 5)], sheet[(6, 5)]], [GAP_COLOR; 4]);
     }
 
     #[test]

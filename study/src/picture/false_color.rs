@@ -25,9 +25,7 @@ const CAMERAS: [[u8; 3]; 8] = [
 pub fn error_map(map: &ScoreMap) -> RgbImage {
     let (width_px, height_px) = map.size_px();
     let color = |value: f32| gradient(colorous::MAGMA, value);
-    RgbImage::from_fn(width_px, height_px, |x, y| {
-        color(map.values()[(y * width_px + x) as usize])
-    })
+    RgbImage::from_fn(width_px, height_px, |x, y| color(map.values()[(y * width_px + x) as usize]))
 }
 
 /// Inverse depth in viridis, nearest yellow, farthest violet, over the range found. Background is dark grey,
@@ -35,20 +33,9 @@ pub fn error_map(map: &ScoreMap) -> RgbImage {
 ///
 /// # Errors
 /// Rows that are not whole.
-pub fn depth_false_color(
-    inverse_depth_per_m: &[f32],
-    width_px: u32,
-) -> Result<RgbImage, ReportError> {
-    let surfaces = || {
-        inverse_depth_per_m
-            .iter()
-            .copied()
-            .filter(|&depth| depth > 0.0 && depth.is_finite())
-    };
-    let (least, greatest) = (
-        surfaces().fold(f32::MAX, f32::min),
-        surfaces().fold(0.0, f32::max),
-    );
+pub fn depth_false_color(inverse_depth_per_m: &[f32], width_px: u32) -> Result<RgbImage, ReportError> {
+    let surfaces = || inverse_depth_per_m.iter().copied().filter(|&depth| depth > 0.0 && depth.is_finite());
+    let (least, greatest) = (surfaces().fold(f32::MAX, f32::min), surfaces().fold(0.0, f32::max));
     let span = (greatest - least).max(f32::MIN_POSITIVE);
     let color = |depth: &f32| match *depth {
         depth if depth > 0.0 => gradient(colorous::VIRIDIS, (depth - least) / span),
@@ -106,10 +93,7 @@ impl Provenance {
     #[must_use]
     pub fn legend(pixels: &[Self]) -> Vec<(String, [u8; 3])> {
         let found: std::collections::BTreeSet<Self> = pixels.iter().copied().collect();
-        found
-            .into_iter()
-            .map(|one| (one.name(), one.color()))
-            .collect()
+        found.into_iter().map(|one| (one.name(), one.color())).collect()
     }
 }
 
@@ -117,23 +101,12 @@ impl Provenance {
 ///
 /// # Errors
 /// Rows that are not whole.
-pub fn provenance_false_color(
-    provenance: &[Provenance],
-    width_px: u32,
-) -> Result<RgbImage, ReportError> {
-    picture(
-        "provenance",
-        provenance.iter().map(|one| Rgb(one.color())),
-        width_px,
-    )
+pub fn provenance_false_color(provenance: &[Provenance], width_px: u32) -> Result<RgbImage, ReportError> {
+    picture("provenance", provenance.iter().map(|one| Rgb(one.color())), width_px)
 }
 
 fn gradient(gradient: colorous::Gradient, value: f32) -> Rgb<u8> {
-    let share = if value.is_nan() {
-        0.0
-    } else {
-        f64::from(value.clamp(0.0, 1.0))
-    };
+    let share = if value.is_nan() { 0.0 } else { f64::from(value.clamp(0.0, 1.0)) };
     Rgb(gradient.eval_continuous(share).as_array())
 }
 
@@ -143,11 +116,7 @@ fn picture(
     width_px: u32,
 ) -> Result<RgbImage, ReportError> {
     let len = pixels.len();
-    let wrong = || ReportError::PictureSize {
-        what,
-        len,
-        width_px,
-    };
+    let wrong = || ReportError::PictureSize { what, len, width_px };
     let height_px = (len as u32).checked_div(width_px).ok_or_else(wrong)?;
     if (width_px as usize) * (height_px as usize) != len {
         return Err(wrong());
@@ -167,11 +136,7 @@ mod tests {
         let none = error_map(&flip_map(&flat([9; 3]), &flat([9; 3])).unwrap());
         assert_eq!(none[(0, 0)].0, [0, 0, 4]);
         let all = error_map(&flip_map(&flat([0, 255, 0]), &flat([0, 0, 255])).unwrap());
-        assert!(
-            all[(1, 1)].0.iter().all(|&channel| channel > 180),
-            "{:?}",
-            all[(1, 1)]
-        );
+        assert!(all[(1, 1)].0.iter().all(|&channel| channel > 180), "{:?}", all[(1, 1)]);
     }
 
     #[test]
@@ -191,8 +156,7 @@ mod tests {
 
     #[test]
     fn the_legend_names_what_occurs_once() {
-        let legend =
-            Provenance::legend(&[Provenance::Fill, Provenance::Sample(1), Provenance::Fill]);
+        let legend = Provenance::legend(&[Provenance::Fill, Provenance::Sample(1), Provenance::Fill]);
         let names: Vec<&str> = legend.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["sample 1", "fill"]);
     }

@@ -29,12 +29,7 @@ impl Picture {
     /// A picture without a legend.
     #[must_use]
     pub fn new(name: impl Into<String>, caption: impl Into<String>, image: RgbImage) -> Self {
-        Self {
-            name: name.into(),
-            caption: caption.into(),
-            legend: Vec::new(),
-            image,
-        }
+        Self { name: name.into(), caption: caption.into(), legend: Vec::new(), image }
     }
 }
 
@@ -65,15 +60,9 @@ pub fn comparison_row(
     ];
     pictures.extend(provenance.and_then(|provenance| {
         let image = provenance_false_color(provenance, width_px).ok()?;
-        Some(Picture {
-            legend: Provenance::legend(provenance),
-            ..picture("provenance", image)
-        })
+        Some(Picture { legend: Provenance::legend(provenance), ..picture("provenance", image) })
     }));
-    PictureRow {
-        title: title.into(),
-        pictures,
-    }
+    PictureRow { title: title.into(), pictures }
 }
 
 /// A copy in the image library's type.
@@ -81,7 +70,5 @@ pub fn comparison_row(
 pub fn rgb_image(image: &Rgb8Image) -> RgbImage {
     let (width_px, height_px) = image.size_px();
     let pixels: Vec<[u8; 3]> = image.pixels().collect();
-    RgbImage::from_fn(width_px, height_px, |x, y| {
-        image::Rgb(pixels[(y * width_px + x) as usize])
-    })
+    RgbImage::from_fn(width_px, height_px, |x, y| image::Rgb(pixels[(y * width_px + x) as usize]))
 }

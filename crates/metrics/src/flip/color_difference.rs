@@ -14,65 +14,32 @@ const KNEE: f32 = 0.4;
 const KNEE_OUTPUT: f32 = 0.95;
 
 /// The colour difference of every pixel, 0 to 1.
-pub(super) fn map(
-    reference_ycxcz: &[Vec3],
-    test_ycxcz: &[Vec3],
-    width: usize,
-    pixels_per_degree: f32,
-) -> Vec<f32> {
+pub(super) fn map(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize, pixels_per_degree: f32) -> Vec<f32> {
     let space = WhiteRelative::new(REC_709);
-    let [reference, test] = [reference_ycxcz, test_ycxcz]
-        .map(|image| perceived(image, width, pixels_per_degree, &space));
+    let [reference, test] =
+        [reference_ycxcz, test_ycxcz].map(|image| perceived(image, width, pixels_per_degree, &space));
     let greatest = greatest_difference(&space);
-    reference
-        .par_iter()
-        .zip(&test)
-        .map(|(a, b)| remapped(hyab(*a, *b).powf(POWER), greatest))
-        .collect()
+    reference.par_iter().zip(&test).map(|(a, b)| remapped(hyab(*a, *b).powf(POWER), greatest)).collect()
 }
 
 /// Hunt-adjusted L*a*b* of what the eye resolves.
-fn perceived(
-    ycxcz: &[Vec3],
-    width: usize,
-    pixels_per_degree: f32,
-    space: &WhiteRelative,
-) -> Vec<Vec3> {
-    let channel = |of: fn(&Vec3) -> f32| Plane {
-        width,
-        values: ycxcz.iter().map(of).collect(),
-    };
+fn perceived(ycxcz: &[Vec3], width: usize, pixels_per_degree: f32, space: &WhiteRelative) -> Vec<Vec3> {
+    let channel = |of: fn(&Vec3) -> f32| Plane { width, values: ycxcz.iter().map(of).collect() };
     let y = filtered(&channel(|c| c.x), &[ACHROMATIC], pixels_per_degree);
     let cx = filtered(&channel(|c| c.y), &[RED_GREEN], pixels_per_degree);
     let cz = filtered(&channel(|c| c.z), &BLUE_YELLOW, pixels_per_degree);
-    let pixels = y
-        .par_iter()
-        .zip(&cx)
-        .zip(&cz)
-        .map(|((&y, &cx), &cz)| Vec3::new(y, cx, cz));
-    pixels
-        .map(|ycxcz| {
-            hunt_adjusted(
-                space,
-                space.linear_from_ycxcz(ycxcz).clamp(Vec3::ZERO, Vec3::ONE),
-            )
-        })
-        .collect()
+    let pixels = y.par_iter().zip(&cx).zip(&cz).map(|((&y, &cx), &cz)| Vec3::new(y, cx, cz));
+    pixels.map(|ycxcz| hunt_adjusted(space, space.linear_from_ycxcz(ycxcz).clamp(Vec3::ZERO, Vec3::ONE))).collect()
 }
 
 /// The plane convolved with a sum of sensitivities that together weigh 1.
 fn filtered(plane: &Plane, sensitivities: &[Sensitivity], pixels_per_degree: f32) -> Vec<f32> {
-    let kernels: Vec<_> = sensitivities
-        .iter()
-        .map(|one| one.kernel(pixels_per_degree))
-        .collect();
+    let kernels: Vec<_> = sensitivities.iter().map(|one| one.kernel(pixels_per_degree)).collect();
     let total: f32 = kernels.iter().map(|(_, volume)| volume).sum();
     let mut sum = vec![0.0; plane.values.len()];
     for (kernel, volume) in &kernels {
         let part = plane.convolved(kernel, kernel, Edge::Repeat);
-        sum.par_iter_mut()
-            .zip(&part.values)
-            .for_each(|(sum, value)| *sum += value * volume / total);
+        sum.par_iter_mut().zip(&part.values).for_each(|(sum, value)| *sum += value * volume / total);
     }
     sum
 }

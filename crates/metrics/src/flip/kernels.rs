@@ -14,10 +14,7 @@ pub(super) const ACHROMATIC: Sensitivity = Sensitivity { a: 1.0, b: 0.0047 };
 /// Red against green.
 pub(super) const RED_GREEN: Sensitivity = Sensitivity { a: 1.0, b: 0.0053 };
 /// Blue against yellow is the sum of two.
-pub(super) const BLUE_YELLOW: [Sensitivity; 2] = [
-    Sensitivity { a: 34.1, b: 0.04 },
-    Sensitivity { a: 13.5, b: 0.025 },
-];
+pub(super) const BLUE_YELLOW: [Sensitivity; 2] = [Sensitivity { a: 34.1, b: 0.04 }, Sensitivity { a: 13.5, b: 0.025 }];
 
 /// Three standard deviations of the widest sensitivity: all share one support.
 pub(super) fn sensitivity_radius_px(pixels_per_degree: f32) -> i32 {
@@ -53,30 +50,19 @@ impl FeatureKernels {
         const WIDTH_DEGREES: f32 = 0.082;
         let deviation_px = 0.5 * WIDTH_DEGREES * pixels_per_degree;
         let radius = (3.0 * deviation_px).ceil() as i32;
-        let sampled = |weight: &dyn Fn(f32) -> f32| {
-            (-radius..=radius)
-                .map(|x| weight(x as f32))
-                .collect::<Vec<f32>>()
-        };
+        let sampled = |weight: &dyn Fn(f32) -> f32| (-radius..=radius).map(|x| weight(x as f32)).collect::<Vec<f32>>();
         let gaussian = |x: f32| (-x * x / (2.0 * deviation_px * deviation_px)).exp();
         Self {
             smooth: balanced(&sampled(&gaussian)),
             edge: balanced(&sampled(&|x| -x * gaussian(x))),
-            point: balanced(&sampled(&|x| {
-                ((x / deviation_px).powi(2) - 1.0) * gaussian(x)
-            })),
+            point: balanced(&sampled(&|x| ((x / deviation_px).powi(2) - 1.0) * gaussian(x))),
         }
     }
 }
 
 /// Positive weights scaled to sum to 1, negative ones to -1.
 fn balanced(weights: &[f32]) -> Vec<f32> {
-    let sum = |sign: f32| {
-        weights
-            .iter()
-            .map(|weight| (sign * weight).max(0.0))
-            .sum::<f32>()
-    };
+    let sum = |sign: f32| weights.iter().map(|weight| (sign * weight).max(0.0)).sum::<f32>();
     let (positive, negative) = (sum(1.0), sum(-1.0));
     weights
         .iter()
@@ -114,12 +100,6 @@ mod tests {
     #[test]
     fn a_tiny_viewer_has_finite_kernels() {
         let kernels = FeatureKernels::new(0.01);
-        assert!(
-            kernels
-                .edge
-                .iter()
-                .chain(&kernels.point)
-                .all(|weight| weight.is_finite())
-        );
+        assert!(kernels.edge.iter().chain(&kernels.point).all(|weight| weight.is_finite()));
     }
 }

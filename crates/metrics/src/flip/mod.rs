@@ -10,10 +10,7 @@ mod kernels;
 
 use rayon::prelude::*;
 
-use crate::{
-    MetricsError, Rgb8Image, ScoreMap, color::REC_709, color::WhiteRelative,
-    color::convert_srgb_pixels,
-};
+use crate::{MetricsError, Rgb8Image, ScoreMap, color::REC_709, color::WhiteRelative, color::convert_srgb_pixels};
 
 /// The paper's viewer: 0.7 m from a display 0.7 m wide with 3840 columns, 0.7 · 3840 / 0.7 · π / 180.
 pub const FLIP_PIXELS_PER_DEGREE: f32 = 67.020_64;
@@ -30,35 +27,20 @@ pub fn flip_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, Met
 ///
 /// # Errors
 /// Images of different sizes, or no such viewer.
-pub fn flip_map_at(
-    reference: &Rgb8Image,
-    test: &Rgb8Image,
-    pixels_per_degree: f32,
-) -> Result<ScoreMap, MetricsError> {
+pub fn flip_map_at(reference: &Rgb8Image, test: &Rgb8Image, pixels_per_degree: f32) -> Result<ScoreMap, MetricsError> {
     reference.expect_same_size(test)?;
     if !(pixels_per_degree.is_finite() && pixels_per_degree > 0.0) {
-        return Err(MetricsError::Setting {
-            what: "pixels per degree",
-        });
+        return Err(MetricsError::Setting { what: "pixels per degree" });
     }
     let space = WhiteRelative::new(REC_709);
-    let [reference_ycxcz, test_ycxcz] = [reference, test]
-        .map(|image| convert_srgb_pixels(image, |linear| space.ycxcz_from_linear(linear)));
+    let [reference_ycxcz, test_ycxcz] =
+        [reference, test].map(|image| convert_srgb_pixels(image, |linear| space.ycxcz_from_linear(linear)));
     let width = reference.width_px() as usize;
     let color = color_difference::map(&reference_ycxcz, &test_ycxcz, width, pixels_per_degree);
     let feature = feature_difference::map(&reference_ycxcz, &test_ycxcz, width, pixels_per_degree);
-    let values = color
-        .par_iter()
-        .zip(&feature)
-        .map(|(color, feature)| color.powf(1.0 - feature))
-        .collect();
+    let values = color.par_iter().zip(&feature).map(|(color, feature)| color.powf(1.0 - feature)).collect();
     let (width_px, height_px) = reference.size_px();
-    Ok(ScoreMap {
-        width_px,
-        height_px,
-        border_px: 0,
-        values,
-    })
+    Ok(ScoreMap { width_px, height_px, border_px: 0, values })
 }
 
 #[cfg(test)]
@@ -77,11 +59,7 @@ mod tests {
 
     #[test]
     fn blue_for_green_is_the_greatest_error() {
-        let mean = flip_map(&flat([0, 255, 0]), &flat([0, 0, 255]))
-            .unwrap()
-            .mean(None)
-            .unwrap()
-            .unwrap();
+        let mean = flip_map(&flat([0, 255, 0]), &flat([0, 0, 255])).unwrap().mean(None).unwrap().unwrap();
         assert!((mean - 1.0).abs() < 1e-4, "{mean}");
     }
 

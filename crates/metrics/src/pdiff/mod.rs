@@ -53,12 +53,7 @@ pub struct PdiffSettings {
 
 impl Default for PdiffSettings {
     fn default() -> Self {
-        Self {
-            field_of_view_deg: 45.0,
-            gamma: 2.2,
-            white_cd_m2: 100.0,
-            primaries: PdiffPrimaries::AdobeRgb,
-        }
+        Self { field_of_view_deg: 45.0, gamma: 2.2, white_cd_m2: 100.0, primaries: PdiffPrimaries::AdobeRgb }
     }
 }
 
@@ -66,10 +61,7 @@ impl PdiffSettings {
     fn validate(&self) -> Result<(), MetricsError> {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         let checks = [
-            (
-                "field of view",
-                positive(self.field_of_view_deg) && self.field_of_view_deg < 180.0,
-            ),
+            ("field of view", positive(self.field_of_view_deg) && self.field_of_view_deg < 180.0),
             ("gamma", positive(self.gamma)),
             ("white luminance", positive(self.white_cd_m2)),
         ];
@@ -100,12 +92,7 @@ impl PdiffMap {
     pub fn failing_px(&self, mask: Option<&[bool]>) -> Result<usize, MetricsError> {
         expect_mask(mask, self.failing.len())?;
         let selected = |index: usize| mask.is_none_or(|mask| mask[index]);
-        Ok(self
-            .failing
-            .iter()
-            .enumerate()
-            .filter(|&(index, &fails)| fails && selected(index))
-            .count())
+        Ok(self.failing.iter().enumerate().filter(|&(index, &fails)| fails && selected(index)).count())
     }
 }
 
@@ -113,19 +100,13 @@ impl PdiffMap {
 ///
 /// # Errors
 /// Images of different sizes, or settings that describe no viewer.
-pub fn pdiff_map(
-    reference: &Rgb8Image,
-    test: &Rgb8Image,
-    settings: PdiffSettings,
-) -> Result<PdiffMap, MetricsError> {
+pub fn pdiff_map(reference: &Rgb8Image, test: &Rgb8Image, settings: PdiffSettings) -> Result<PdiffMap, MetricsError> {
     reference.expect_same_size(test)?;
     settings.validate()?;
     let bands = FrequencyBands::new(reference.width_px(), settings.field_of_view_deg);
     let [reference, test] = [reference, test].map(|image| Seen::new(image, &settings));
     let pixels = (0..reference.ab.len()).into_par_iter();
-    let failing = pixels
-        .map(|index| fails(&reference, &test, &bands, index))
-        .collect();
+    let failing = pixels.map(|index| fails(&reference, &test, &bands, index)).collect();
     Ok(PdiffMap { failing })
 }
 
@@ -148,10 +129,7 @@ impl Seen {
         let luminance = xyz.iter().map(|xyz| xyz.y * settings.white_cd_m2).collect();
         let lab = xyz.iter().map(|&xyz| lab_from_relative_xyz(xyz));
         Self {
-            pyramid: pyramid(Plane {
-                width: image.width_px() as usize,
-                values: luminance,
-            }),
+            pyramid: pyramid(Plane { width: image.width_px() as usize, values: luminance }),
             ab: lab.map(|lab| [lab.y, lab.z]).collect(),
         }
     }
@@ -164,9 +142,7 @@ impl Seen {
 /// The pyramid at full size: each level is the one before, smoothed once more.
 fn pyramid(luminance: Plane) -> Vec<Plane> {
     let smoother = |finer: &Plane| Some(finer.convolved(&BINOMIAL, &BINOMIAL, Edge::Mirror));
-    std::iter::successors(Some(luminance), smoother)
-        .take(LEVELS)
-        .collect()
+    std::iter::successors(Some(luminance), smoother).take(LEVELS).collect()
 }
 
 /// Whether a viewer sees a pixel differ.
@@ -174,15 +150,11 @@ fn fails(reference: &Seen, test: &Seen, bands: &FrequencyBands, index: usize) ->
     let level = bands.adaptation_level();
     let mean = (reference.luminance(level, index) + test.luminance(level, index)) / 2.0;
     let adaptation_cd_m2 = mean.max(DARKEST_CD_M2);
-    let contrast = std::array::from_fn(|band| {
-        contrast(reference, index, band).max_of(contrast(test, index, band))
-    });
+    let contrast = std::array::from_fn(|band| contrast(reference, index, band).max_of(contrast(test, index, band)));
     let elevation = bands.threshold_elevation(&contrast, adaptation_cd_m2);
     let delta_cd_m2 = (reference.luminance(0, index) - test.luminance(0, index)).abs();
     delta_cd_m2 > elevation * threshold_vs_intensity(adaptation_cd_m2)
-        || chroma_difference_squared(reference.ab[index], test.ab[index])
-            * color_scale(adaptation_cd_m2)
-            > elevation
+        || chroma_difference_squared(reference.ab[index], test.ab[index]) * color_scale(adaptation_cd_m2) > elevation
 }
 
 /// A band's amplitude and what it stands out from.
@@ -194,10 +166,7 @@ struct BandContrast {
 impl BandContrast {
     /// The contrast of the stronger amplitude against the brighter background of two images.
     fn max_of(self, other: Self) -> f32 {
-        let background = self
-            .background_cd_m2
-            .max(other.background_cd_m2)
-            .max(DARKEST_CD_M2);
+        let background = self.background_cd_m2.max(other.background_cd_m2).max(DARKEST_CD_M2);
         self.amplitude_cd_m2.max(other.amplitude_cd_m2) / background
     }
 }
@@ -227,10 +196,7 @@ mod tests {
     }
 
     fn failing(a: [u8; 3], b: [u8; 3]) -> usize {
-        pdiff_map(&flat(a), &flat(b), PdiffSettings::default())
-            .unwrap()
-            .failing_px(None)
-            .unwrap()
+        pdiff_map(&flat(a), &flat(b), PdiffSettings::default()).unwrap().failing_px(None).unwrap()
     }
 
     #[test]
@@ -242,35 +208,19 @@ mod tests {
     #[test]
     fn what_the_eye_tells_fails() {
         assert_eq!(failing([120; 3], [160; 3]), 64 * 48);
-        assert_eq!(
-            failing([200, 100, 100], [100, 145, 100]),
-            64 * 48,
-            "equal luminance, other colour"
-        );
+        assert_eq!(failing([200, 100, 100], [100, 145, 100]), 64 * 48, "equal luminance, other colour");
     }
 
     #[test]
     fn impossible_viewers_are_refused() {
         let good = PdiffSettings::default();
         let bad = [
-            PdiffSettings {
-                field_of_view_deg: 180.0,
-                ..good
-            },
-            PdiffSettings {
-                gamma: f32::NAN,
-                ..good
-            },
-            PdiffSettings {
-                white_cd_m2: 0.0,
-                ..good
-            },
+            PdiffSettings { field_of_view_deg: 180.0, ..good },
+            PdiffSettings { gamma: f32::NAN, ..good },
+            PdiffSettings { white_cd_m2: 0.0, ..good },
         ];
         for settings in bad {
-            assert!(matches!(
-                pdiff_map(&flat([0; 3]), &flat([0; 3]), settings),
-                Err(MetricsError::Setting { .. })
-            ));
+            assert!(matches!(pdiff_map(&flat([0; 3]), &flat([0; 3]), settings), Err(MetricsError::Setting { .. })));
         }
     }
 }

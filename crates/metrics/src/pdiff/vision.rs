@@ -19,8 +19,7 @@ impl FrequencyBands {
     pub(super) fn new(width_px: u32, field_of_view_deg: f32) -> Self {
         let image_deg = 2.0 * (field_of_view_deg.to_radians() / 2.0).tan().to_degrees();
         let pixels_per_degree = width_px as f32 / image_deg;
-        let cycles_per_degree =
-            std::array::from_fn(|band| 0.5 * pixels_per_degree / (1 << band) as f32);
+        let cycles_per_degree = std::array::from_fn(|band| 0.5 * pixels_per_degree / (1 << band) as f32);
         let peak = contrast_sensitivity(PEAK_CYCLES_PER_DEGREE, 100.0);
         let inverse = |cycles: f32| peak / contrast_sensitivity(cycles, 100.0);
         Self {
@@ -36,19 +35,10 @@ impl FrequencyBands {
     }
 
     /// `F`: by how much the threshold rises, 1 to 10.
-    pub(super) fn threshold_elevation(
-        &self,
-        contrast: &[f32; BANDS],
-        adaptation_cd_m2: f32,
-    ) -> f32 {
-        let weighted = contrast
-            .iter()
-            .zip(self.cycles_per_degree)
-            .zip(self.inverse_relative_sensitivity);
+    pub(super) fn threshold_elevation(&self, contrast: &[f32; BANDS], adaptation_cd_m2: f32) -> f32 {
+        let weighted = contrast.iter().zip(self.cycles_per_degree).zip(self.inverse_relative_sensitivity);
         let elevations = weighted.map(|((&contrast, cycles), inverse_sensitivity)| {
-            contrast
-                * inverse_sensitivity
-                * masking(contrast * contrast_sensitivity(cycles, adaptation_cd_m2))
+            contrast * inverse_sensitivity * masking(contrast * contrast_sensitivity(cycles, adaptation_cd_m2))
         });
         let sum = contrast.iter().sum::<f32>().max(1e-5);
         (elevations.sum::<f32>() / sum).clamp(1.0, GREATEST_ELEVATION)
@@ -57,9 +47,7 @@ impl FrequencyBands {
 
 /// The first level whose doubling support is wider than the image is in degrees.
 fn adaptation_level(image_deg: f32) -> usize {
-    (0..LEVELS - 1)
-        .find(|&level| (1_u32 << level) as f32 > image_deg)
-        .unwrap_or(LEVELS - 1)
+    (0..LEVELS - 1).find(|&level| (1_u32 << level) as f32 > image_deg).unwrap_or(LEVELS - 1)
 }
 
 /// Barten's contrast sensitivity.
@@ -107,10 +95,8 @@ mod tests {
     #[test]
     fn the_threshold_has_no_great_jump_where_its_pieces_meet() {
         for log in [-3.94_f32, -1.44, -0.0184, 1.9] {
-            let (below, above) = (
-                threshold_vs_intensity(10_f32.powf(log - 1e-3)),
-                threshold_vs_intensity(10_f32.powf(log + 1e-3)),
-            );
+            let (below, above) =
+                (threshold_vs_intensity(10_f32.powf(log - 1e-3)), threshold_vs_intensity(10_f32.powf(log + 1e-3)));
             assert!((below / above - 1.0).abs() < 0.05, "{log}: {below} {above}");
         }
     }
@@ -120,10 +106,7 @@ mod tests {
         let bands = FrequencyBands::new(4096, 45.0);
         for contrast in [[0.0; BANDS], [1e-6; BANDS], [1.0; BANDS], [1e5; BANDS]] {
             let elevation = bands.threshold_elevation(&contrast, 30.0);
-            assert!(
-                (1.0..=10.0).contains(&elevation),
-                "{contrast:?} {elevation}"
-            );
+            assert!((1.0..=10.0).contains(&elevation), "{contrast:?} {elevation}");
         }
     }
 }

@@ -42,11 +42,7 @@ fn for_each_pair(check: impl Fn(&Expected, [Rgb8Image; 2])) {
 }
 
 fn expect_near(what: &str, expected: &Expected, found: f64, value: f64, tolerance: f64) {
-    assert!(
-        (found - value).abs() <= tolerance,
-        "{what} of {}: {found}, elsewhere {value}",
-        expected.name
-    );
+    assert!((found - value).abs() <= tolerance, "{what} of {}: {found}, elsewhere {value}", expected.name);
 }
 
 #[test]
@@ -60,11 +56,7 @@ fn psnr_agrees() {
 #[test]
 fn ssim_agrees() {
     for_each_pair(|expected, [reference, test]| {
-        let found = ssim_map(&reference, &test)
-            .unwrap()
-            .mean(None)
-            .unwrap()
-            .unwrap();
+        let found = ssim_map(&reference, &test).unwrap().mean(None).unwrap().unwrap();
         expect_near("SSIM", expected, found, expected.ssim, 1e-7);
     });
 }
@@ -73,20 +65,8 @@ fn ssim_agrees() {
 fn flip_agrees() {
     for_each_pair(|expected, [reference, test]| {
         let map = flip_map(&reference, &test).unwrap();
-        expect_near(
-            "FLIP",
-            expected,
-            map.mean(None).unwrap().unwrap(),
-            expected.flip,
-            2e-5,
-        );
+        expect_near("FLIP", expected, map.mean(None).unwrap().unwrap(), expected.flip, 2e-5);
         let at = reference.pixel_count() / 2 + reference.width_px() as usize / 3;
-        expect_near(
-            "FLIP at a pixel",
-            expected,
-            f64::from(map.values()[at]),
-            f64::from(expected.flip_at_third),
-            1e-4,
-        );
+        expect_near("FLIP at a pixel", expected, f64::from(map.values()[at]), f64::from(expected.flip_at_third), 1e-4);
     });
 }

@@ -14,46 +14,27 @@ pub fn all() -> Vec<Pair> {
     let small = |name, test: fn(usize, usize) -> [u8; 3]| pair(name, 96, 64, test);
     let large = |name, test: fn(usize, usize) -> [u8; 3]| pair(name, 200, 150, test);
     vec![
-        small("noise", |x, y| {
-            base(x, y).map_with(noise(x, y), |value, noise| value + noise)
-        }),
+        small("noise", |x, y| base(x, y).map_with(noise(x, y), |value, noise| value + noise)),
         large("blur", blurred),
         large("shift", |x, y| base(x + 1, y)),
-        small("block", |x, y| {
-            if (24..56).contains(&x) && (16..40).contains(&y) {
-                base(x + 40, y + 11)
-            } else {
-                base(x, y)
-            }
-        }),
+        small(
+            "block",
+            |x, y| {
+                if (24..56).contains(&x) && (16..40).contains(&y) { base(x + 40, y + 11) } else { base(x, y) }
+            },
+        ),
         small("colour", |x, y| {
             let [r, g, b] = base(x, y);
             [g, r, b]
         }),
-        large("step", |x, y| {
-            base(x, y).map(|value| value.saturating_add(1))
-        }),
+        large("step", |x, y| base(x, y).map(|value| value.saturating_add(1))),
     ]
 }
 
-fn pair(
-    name: &'static str,
-    width: usize,
-    height: usize,
-    test: fn(usize, usize) -> [u8; 3],
-) -> Pair {
-    let filled = |pixel: fn(usize, usize) -> [u8; 3]| {
-        (0..width * height)
-            .flat_map(|i| pixel(i % width, i / width))
-            .collect()
-    };
-    Pair {
-        name,
-        width,
-        height,
-        reference: filled(base),
-        test: filled(test),
-    }
+fn pair(name: &'static str, width: usize, height: usize, test: fn(usize, usize) -> [u8; 3]) -> Pair {
+    let filled =
+        |pixel: fn(usize, usize) -> [u8; 3]| (0..width * height).flat_map(|i| pixel(i % width, i / width)).collect();
+    Pair { name, width, height, reference: filled(base), test: filled(test) }
 }
 
 /// Gradients, a disc, stripes one to four pixels wide and a dark corner.
@@ -99,8 +80,6 @@ trait MapWith {
 
 impl MapWith for [u8; 3] {
     fn map_with(self, other: [i32; 3], combine: fn(i32, i32) -> i32) -> [u8; 3] {
-        std::array::from_fn(|channel| {
-            combine(i32::from(self[channel]), other[channel]).clamp(0, 255) as u8
-        })
+        std::array::from_fn(|channel| combine(i32::from(self[channel]), other[channel]).clamp(0, 255) as u8)
     }
 }

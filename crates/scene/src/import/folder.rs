@@ -19,15 +19,9 @@ pub(crate) struct Folder {
 impl Folder {
     /// The folder of the scene file `path`, and that file's bytes.
     pub(crate) fn opened_with(path: &Path, limits: &Limits) -> Result<(Self, Vec<u8>), Fault> {
-        let parent = path
-            .parent()
-            .filter(|p| !p.as_os_str().is_empty())
-            .unwrap_or(Path::new("."));
+        let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let canonical_root = parent.canonicalize().map_err(|e| Fault::io("folder", e))?;
-        let folder = Self {
-            canonical_root,
-            bytes_left: Cell::new(limits.file_bytes),
-        };
+        let folder = Self { canonical_root, bytes_left: Cell::new(limits.file_bytes) };
         let bytes = folder.read_path("file", path)?;
         Ok((folder, bytes))
     }
@@ -35,8 +29,7 @@ impl Folder {
     /// Reads a file named by a URI reference, as in glTF: percent-encoding is undone first.
     pub(crate) fn read_uri(&self, element: &str, uri: &str) -> Result<Vec<u8>, Fault> {
         let decoded = percent_decode_str(uri).decode_utf8();
-        let name =
-            decoded.map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
+        let name = decoded.map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
         self.read_name(element, &name)
     }
 
@@ -47,17 +40,9 @@ impl Folder {
         if let Some(reason) = reason_to_refuse(&relative) {
             return Err(Fault::forbidden(element, name, reason));
         }
-        let path = self
-            .canonical_root
-            .join(&relative)
-            .canonicalize()
-            .map_err(|e| Fault::io(element, e))?;
+        let path = self.canonical_root.join(&relative).canonicalize().map_err(|e| Fault::io(element, e))?;
         if !path.starts_with(&self.canonical_root) {
-            return Err(Fault::forbidden(
-                element,
-                name,
-                "is a link that leaves the scene's folder",
-            ));
+            return Err(Fault::forbidden(element, name, "is a link that leaves the scene's folder"));
         }
         self.read_path(element, &path)
     }
@@ -66,23 +51,13 @@ impl Folder {
         let metadata = path.metadata().map_err(|e| Fault::io(element, e))?;
         if !metadata.is_file() {
             // A pipe or a device would block or never end.
-            return Err(Fault::malformed(
-                element,
-                format!("{} is not a regular file", path.display()),
-            ));
+            return Err(Fault::malformed(element, format!("{} is not a regular file", path.display())));
         }
-        at_most(
-            format!("{element}, in bytes"),
-            metadata.len(),
-            self.bytes_left.get(),
-        )?;
+        at_most(format!("{element}, in bytes"), metadata.len(), self.bytes_left.get())?;
         let mut bytes = Vec::with_capacity(metadata.len() as usize);
         let file = File::open(path).map_err(|e| Fault::io(element, e))?;
-        file.take(metadata.len())
-            .read_to_end(&mut bytes)
-            .map_err(|e| Fault::io(element, e))?;
-        self.bytes_left
-            .set(self.bytes_left.get() - bytes.len() as u64);
+        file.take(metadata.len()).read_to_end(&mut bytes).map_err(|e| Fault::io(element, e))?;
+        self.bytes_left.set(self.bytes_left.get() - bytes.len() as u64);
         Ok(bytes)
     }
 }
@@ -91,18 +66,11 @@ fn reason_to_refuse(relative: &str) -> Option<&'static str> {
     let path = Path::new(relative);
     if relative.contains('\0') {
         Some("contains a NUL")
-    } else if relative
-        .split('/')
-        .next()
-        .is_some_and(|first| first.contains(':'))
-    {
+    } else if relative.split('/').next().is_some_and(|first| first.contains(':')) {
         Some("names a scheme or a drive")
     } else if relative.is_empty() || relative.starts_with('/') || path.is_absolute() {
         Some("is not a relative file name")
-    } else if path
-        .components()
-        .any(|c| !matches!(c, Component::Normal(_) | Component::CurDir))
-    {
+    } else if path.components().any(|c| !matches!(c, Component::Normal(_) | Component::CurDir)) {
         Some("climbs out of the scene's folder")
     } else {
         None
@@ -120,8 +88,7 @@ mod tests {
         std::fs::write(dir.path().join("secret.bin"), b"secret").unwrap();
         std::fs::write(dir.path().join("scene/a.gltf"), b"{}").unwrap();
         std::fs::write(dir.path().join("scene/a b.bin"), b"inside").unwrap();
-        let (folder, bytes) =
-            Folder::opened_with(&dir.path().join("scene/a.gltf"), &Limits::default()).unwrap();
+        let (folder, bytes) = Folder::opened_with(&dir.path().join("scene/a.gltf"), &Limits::default()).unwrap();
         assert_eq!(bytes, b"{}");
         (dir, folder)
     }
@@ -157,14 +124,8 @@ mod tests {
             &absolute,
         ];
         for name in names {
-            let fault = folder
-                .read_uri("buffer 0", name)
-                .unwrap_err()
-                .in_file("a.gltf");
-            assert!(
-                matches!(fault.kind, SceneErrorKind::Forbidden { .. }),
-                "{name:?}: {fault}"
-            );
+            let fault = folder.read_uri("buffer 0", name).unwrap_err().in_file("a.gltf");
+            assert!(matches!(fault.kind, SceneErrorKind::Forbidden { .. }), "{name:?}: {fault}");
         }
     }
 
@@ -172,43 +133,18 @@ mod tests {
     #[test]
     fn refuses_links_that_leave() {
         let (dir, folder) = folder_with_file();
-        std::os::unix::fs::symlink(
-            dir.path().join("secret.bin"),
-            dir.path().join("scene/link.bin"),
-        )
-        .unwrap();
-        let fault = folder
-            .read_name("buffer 0", "link.bin")
-            .unwrap_err()
-            .in_file("a.gltf");
-        assert!(
-            matches!(fault.kind, SceneErrorKind::Forbidden { .. }),
-            "{fault}"
-        );
+        std::os::unix::fs::symlink(dir.path().join("secret.bin"), dir.path().join("scene/link.bin")).unwrap();
+        let fault = folder.read_name("buffer 0", "link.bin").unwrap_err().in_file("a.gltf");
+        assert!(matches!(fault.kind, SceneErrorKind::Forbidden { .. }), "{fault}");
     }
 
     #[test]
     fn bytes_are_limited_over_all_files() {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("a.gltf"), [0; 60]).unwrap();
-        let limits = Limits {
-            file_bytes: 100,
-            ..Limits::default()
-        };
+        let limits = Limits { file_bytes: 100, ..Limits::default() };
         let (folder, _) = Folder::opened_with(&dir.path().join("a.gltf"), &limits).unwrap();
-        let fault = folder
-            .read_name("buffer 0", "a.gltf")
-            .unwrap_err()
-            .in_file("a.gltf");
-        assert!(
-            matches!(
-                fault.kind,
-                SceneErrorKind::TooLarge {
-                    actual: 60,
-                    limit: 40
-                }
-            ),
-            "{fault}"
-        );
+        let fault = folder.read_name("buffer 0", "a.gltf").unwrap_err().in_file("a.gltf");
+        assert!(matches!(fault.kind, SceneErrorKind::TooLarge { actual: 60, limit: 40 }), "{fault}");
     }
 }

@@ -33,11 +33,7 @@ pub fn load_file(path: &Path, limits: &Limits) -> Result<Scene, SceneError> {
 }
 
 fn read_source(path: &Path, limits: &Limits) -> Result<SourceScene, Fault> {
-    let extension = path
-        .extension()
-        .and_then(|e| e.to_str())
-        .unwrap_or_default()
-        .to_ascii_lowercase();
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let read: fn(&[u8], &Folder, &Limits) -> Result<SourceScene, Fault> = match extension.as_str() {
         "gltf" | "glb" => gltf::read,
         "obj" => obj::read,
@@ -51,9 +47,6 @@ fn read_source(path: &Path, limits: &Limits) -> Result<SourceScene, Fault> {
     };
     let (folder, bytes) = Folder::opened_with(path, limits)?;
     let mut source = read(&bytes, &folder, limits)?;
-    source.name = path
-        .file_stem()
-        .map(|stem| stem.to_string_lossy().into_owned())
-        .unwrap_or_default();
+    source.name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     Ok(source)
 }

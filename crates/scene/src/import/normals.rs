@@ -25,10 +25,7 @@ pub(crate) fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
     let mut is_set = vec![false; original_count];
     for corner in 0..mesh.indices.len() {
         let vertex = mesh.indices[corner];
-        let normal = faces
-            .smooth_normal(corner, corners_at.around(vertex), crease_cosine)
-            .as_vec3()
-            .to_array();
+        let normal = faces.smooth_normal(corner, corners_at.around(vertex), crease_cosine).as_vec3().to_array();
         mesh.indices[corner] = if is_set[vertex as usize] {
             copy_with_normal(mesh, &mut next_copy, vertex, normal)
         } else {
@@ -57,20 +54,11 @@ pub(crate) fn repair(mesh: &mut SourceMesh) {
     }
     for vertex in &mut mesh.vertices {
         let normal = DVec3::from(vertex.normal.map(f64::from));
-        vertex.normal = normal
-            .try_normalize()
-            .unwrap_or(DVec3::Y)
-            .as_vec3()
-            .to_array();
+        vertex.normal = normal.try_normalize().unwrap_or(DVec3::Y).as_vec3().to_array();
     }
 }
 
-fn copy_with_normal(
-    mesh: &mut SourceMesh,
-    next_copy: &mut Vec<Option<u32>>,
-    vertex: u32,
-    normal: [f32; 3],
-) -> u32 {
+fn copy_with_normal(mesh: &mut SourceMesh, next_copy: &mut Vec<Option<u32>>, vertex: u32, normal: [f32; 3]) -> u32 {
     let mut at = vertex as usize;
     loop {
         if is_same_direction(mesh.vertices[at].normal, normal) {
@@ -82,12 +70,8 @@ fn copy_with_normal(
         }
     }
     let copy = mesh.vertices.len() as u32;
-    mesh.vertices.push(crate::Vertex {
-        normal,
-        ..mesh.vertices[vertex as usize]
-    });
-    mesh.positions_in_mesh
-        .push(mesh.positions_in_mesh[vertex as usize]);
+    mesh.vertices.push(crate::Vertex { normal, ..mesh.vertices[vertex as usize] });
+    mesh.positions_in_mesh.push(mesh.positions_in_mesh[vertex as usize]);
     next_copy[at] = Some(copy);
     next_copy.push(None);
     copy
@@ -105,22 +89,11 @@ struct Faces {
 
 impl Faces {
     fn of(mesh: &SourceMesh) -> Self {
-        let mut faces = Self {
-            normals: Vec::new(),
-            corner_angles_rad: Vec::new(),
-        };
+        let mut faces = Self { normals: Vec::new(), corner_angles_rad: Vec::new() };
         for triangle in mesh.indices.chunks_exact(3) {
-            let p: [DVec3; 3] =
-                std::array::from_fn(|i| mesh.positions_in_mesh[triangle[i] as usize]);
-            faces.normals.push(
-                (p[1] - p[0])
-                    .cross(p[2] - p[0])
-                    .try_normalize()
-                    .unwrap_or(DVec3::ZERO),
-            );
-            faces
-                .corner_angles_rad
-                .extend((0..3).map(|i| corner_angle_rad(p[i], p[(i + 1) % 3], p[(i + 2) % 3])));
+            let p: [DVec3; 3] = std::array::from_fn(|i| mesh.positions_in_mesh[triangle[i] as usize]);
+            faces.normals.push((p[1] - p[0]).cross(p[2] - p[0]).try_normalize().unwrap_or(DVec3::ZERO));
+            faces.corner_angles_rad.extend((0..3).map(|i| corner_angle_rad(p[i], p[(i + 1) % 3], p[(i + 2) % 3])));
         }
         faces
     }
@@ -131,33 +104,19 @@ impl Faces {
         let weighted = |&other: &u32| {
             let normal = self.normals[other as usize / 3];
             let joins = !compares || normal.dot(own) >= crease_cosine;
-            if joins {
-                normal * self.corner_angles_rad[other as usize]
-            } else {
-                DVec3::ZERO
-            }
+            if joins { normal * self.corner_angles_rad[other as usize] } else { DVec3::ZERO }
         };
         // A hub's sum would be as long for each of its corners; a stride keeps the whole linear.
-        let stride = if compares {
-            1
-        } else {
-            around.len() / MAX_CORNERS_COMPARED
-        };
+        let stride = if compares { 1 } else { around.len() / MAX_CORNERS_COMPARED };
         let sum: DVec3 = around.iter().step_by(stride).map(weighted).sum();
-        sum.try_normalize()
-            .or_else(|| own.try_normalize())
-            .unwrap_or(DVec3::Y)
+        sum.try_normalize().or_else(|| own.try_normalize()).unwrap_or(DVec3::Y)
     }
 }
 
 fn corner_angle_rad(at: DVec3, next: DVec3, last: DVec3) -> f64 {
     let (a, b) = (next - at, last - at);
     let lengths = (a.length_squared() * b.length_squared()).sqrt();
-    if lengths > 0.0 {
-        (a.dot(b) / lengths).clamp(-1.0, 1.0).acos()
-    } else {
-        0.0
-    }
+    if lengths > 0.0 { (a.dot(b) / lengths).clamp(-1.0, 1.0).acos() } else { 0.0 }
 }
 
 /// Which corners of triangles meet at a point, whatever vertex they name.
@@ -185,11 +144,7 @@ impl CornersByPosition {
             corners[*slot as usize] = corner as u32;
             *slot += 1;
         }
-        Self {
-            group_of_vertex,
-            first_of_group,
-            corners,
-        }
+        Self { group_of_vertex, first_of_group, corners }
     }
 
     /// `vertex` may be a copy made later: copies are only asked for by their original's number.
@@ -241,9 +196,7 @@ mod tests {
     fn a_fan_around_one_hub_is_linear_in_time() {
         let rim = 300_000u32;
         let on_rim = |i: u32| [f64::from(i).cos(), 0.0, f64::from(i).sin()];
-        let points: Vec<_> = std::iter::once([0.0; 3])
-            .chain((0..=rim).map(on_rim))
-            .collect();
+        let points: Vec<_> = std::iter::once([0.0; 3]).chain((0..=rim).map(on_rim)).collect();
         let indices: Vec<_> = (1..=rim).flat_map(|i| [0, i + 1, i]).collect();
         let start = std::time::Instant::now();
         generate(&mut mesh(&points, &indices), CREASE_60_DEGREES);
@@ -254,11 +207,6 @@ mod tests {
     fn degenerate_triangles_get_some_unit_normal() {
         let mut degenerate = mesh(&[[0.; 3], [0.; 3], [0.; 3]], &[0, 1, 2]);
         generate(&mut degenerate, FLAT);
-        assert!(
-            degenerate
-                .vertices
-                .iter()
-                .all(|v| v.normal == [0.0, 1.0, 0.0])
-        );
+        assert!(degenerate.vertices.iter().all(|v| v.normal == [0.0, 1.0, 0.0]));
     }
 }

@@ -15,10 +15,7 @@ pub(crate) struct EncodedPicture {
 }
 
 /// Decodes all, in parallel, once their headers show that they fit the limits together.
-pub(crate) fn decode_all(
-    pictures: &[EncodedPicture],
-    limits: &Limits,
-) -> Result<Vec<Texture>, Fault> {
+pub(crate) fn decode_all(pictures: &[EncodedPicture], limits: &Limits) -> Result<Vec<Texture>, Fault> {
     let mut decoded_bytes = 0u64;
     for picture in pictures {
         let (width_px, height_px) = size_px(picture)?;
@@ -28,16 +25,9 @@ pub(crate) fn decode_all(
             limits.texture_side_px.into(),
         )?;
         decoded_bytes += u64::from(width_px) * u64::from(height_px) * 4;
-        at_most(
-            format!("{}, decoded textures in bytes", picture.element),
-            decoded_bytes,
-            limits.texture_bytes,
-        )?;
+        at_most(format!("{}, decoded textures in bytes", picture.element), decoded_bytes, limits.texture_bytes)?;
     }
-    pictures
-        .par_iter()
-        .map(|picture| decode(picture, limits))
-        .collect()
+    pictures.par_iter().map(|picture| decode(picture, limits)).collect()
 }
 
 fn reader(picture: &EncodedPicture) -> Result<ImageReader<Cursor<&[u8]>>, Fault> {
@@ -46,9 +36,7 @@ fn reader(picture: &EncodedPicture) -> Result<ImageReader<Cursor<&[u8]>>, Fault>
 }
 
 fn size_px(picture: &EncodedPicture) -> Result<(u32, u32), Fault> {
-    reader(picture)?
-        .into_dimensions()
-        .map_err(|e| Fault::malformed(&picture.element, e.to_string()))
+    reader(picture)?.into_dimensions().map_err(|e| Fault::malformed(&picture.element, e.to_string()))
 }
 
 fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
@@ -59,18 +47,12 @@ fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
     // 16-bit channels and a decoder's working copy take a few times the 8-bit texels.
     image_limits.max_alloc = Some(limits.texture_bytes.saturating_mul(4));
     reader.limits(image_limits);
-    let pixels = reader
-        .decode()
-        .map_err(|e| Fault::malformed(&picture.element, e.to_string()))?;
+    let pixels = reader.decode().map_err(|e| Fault::malformed(&picture.element, e.to_string()))?;
     Ok(texture_from(pixels.into_rgba8()))
 }
 
 fn texture_from(pixels: RgbaImage) -> Texture {
-    Texture {
-        width_px: pixels.width(),
-        height_px: pixels.height(),
-        srgba8: pixels.into_raw(),
-    }
+    Texture { width_px: pixels.width(), height_px: pixels.height(), srgba8: pixels.into_raw() }
 }
 
 #[cfg(test)]
@@ -80,16 +62,9 @@ mod tests {
 
     fn png(width: u32, height: u32) -> EncodedPicture {
         let mut bytes = Vec::new();
-        let pixels = RgbaImage::from_fn(width, height, |x, y| {
-            image::Rgba([x as u8, y as u8, 7, 255])
-        });
-        pixels
-            .write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png)
-            .unwrap();
-        EncodedPicture {
-            element: "image 0".into(),
-            bytes,
-        }
+        let pixels = RgbaImage::from_fn(width, height, |x, y| image::Rgba([x as u8, y as u8, 7, 255]));
+        pixels.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png).unwrap();
+        EncodedPicture { element: "image 0".into(), bytes }
     }
 
     #[test]
@@ -109,22 +84,11 @@ mod tests {
 
     #[test]
     fn sides_and_total_are_limited() {
-        let sides = Limits {
-            texture_side_px: 2,
-            ..Limits::default()
-        };
-        let total = Limits {
-            texture_bytes: 40,
-            ..Limits::default()
-        };
+        let sides = Limits { texture_side_px: 2, ..Limits::default() };
+        let total = Limits { texture_bytes: 40, ..Limits::default() };
         for limits in [sides, total] {
-            let fault = decode_all(&[png(3, 2), png(3, 2)], &limits)
-                .unwrap_err()
-                .in_file("a");
-            assert!(
-                matches!(fault.kind, SceneErrorKind::TooLarge { .. }),
-                "{fault}"
-            );
+            let fault = decode_all(&[png(3, 2), png(3, 2)], &limits).unwrap_err().in_file("a");
+            assert!(matches!(fault.kind, SceneErrorKind::TooLarge { .. }), "{fault}");
         }
     }
 }

@@ -5,9 +5,7 @@ use std::collections::HashMap;
 use glam::{Affine3A, DAffine3, DVec3, Vec3};
 
 use crate::error::{Fault, at_most};
-use crate::{
-    Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Vertex,
-};
+use crate::{Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Vertex};
 
 /// Further from the origin than this, a millimetre is lost in `f32`.
 const FAR_M: f64 = 1e4;
@@ -42,14 +40,8 @@ pub(crate) struct SourceInstance {
 }
 
 pub(crate) enum SourceLight {
-    Directional {
-        towards_light_in_source: DVec3,
-        irradiance_linear: Vec3,
-    },
-    Point {
-        position_in_source: DVec3,
-        intensity_linear: Vec3,
-    },
+    Directional { towards_light_in_source: DVec3, irradiance_linear: Vec3 },
+    Point { position_in_source: DVec3, intensity_linear: Vec3 },
 }
 
 pub(crate) struct PlacedCamera {
@@ -60,13 +52,7 @@ pub(crate) struct PlacedCamera {
 
 /// A vertex as it is where the source says nothing.
 pub(crate) fn plain_vertex() -> Vertex {
-    Vertex {
-        position: [0.0; 3],
-        normal: [0.0; 3],
-        uv: [0.0; 2],
-        color_srgba8: [255; 4],
-        sway: 0.0,
-    }
+    Vertex { position: [0.0; 3], normal: [0.0; 3], uv: [0.0; 2], color_srgba8: [255; 4], sway: 0.0 }
 }
 
 impl SourceScene {
@@ -80,23 +66,11 @@ impl SourceScene {
         let scene = Scene {
             name: self.name,
             meshes: meshes.into_iter().map(SourceMesh::into_f32).collect(),
-            instances: self
-                .instances
-                .iter()
-                .map(|i| i.relative_to(origin_in_source))
-                .collect(),
+            instances: self.instances.iter().map(|i| i.relative_to(origin_in_source)).collect(),
             materials,
             textures,
-            lights: self
-                .lights
-                .iter()
-                .map(|l| l.relative_to(origin_in_source))
-                .collect(),
-            cameras: self
-                .cameras
-                .into_iter()
-                .map(|c| c.relative_to(origin_in_source))
-                .collect(),
+            lights: self.lights.iter().map(|l| l.relative_to(origin_in_source)).collect(),
+            cameras: self.cameras.into_iter().map(|c| c.relative_to(origin_in_source)).collect(),
             origin_in_source,
             ..Scene::default()
         };
@@ -112,15 +86,9 @@ impl SourceScene {
         if triangles == 0 {
             return Err(Fault::malformed("scene", "it has no triangles"));
         }
-        let singular = self
-            .instances
-            .iter()
-            .position(|i| !is_invertible(&i.source_from_mesh));
+        let singular = self.instances.iter().position(|i| !is_invertible(&i.source_from_mesh));
         singular.map_or(Ok(()), |i| {
-            Err(Fault::malformed(
-                format!("instance {i}"),
-                "its transform is singular or not finite",
-            ))
+            Err(Fault::malformed(format!("instance {i}"), "its transform is singular or not finite"))
         })
     }
 
@@ -129,10 +97,7 @@ impl SourceScene {
         for (number, mesh) in self.meshes.iter_mut().enumerate() {
             let bad = mesh.positions_in_mesh.iter().position(|p| !p.is_finite());
             if let Some(vertex) = bad {
-                return Err(Fault::malformed(
-                    format!("mesh {number}, vertex {vertex}"),
-                    "its position is not finite",
-                ));
+                return Err(Fault::malformed(format!("mesh {number}, vertex {vertex}"), "its position is not finite"));
             }
             let offset = recentring_offset(Box3::around(mesh.positions_in_mesh.iter().copied()));
             if offset != DVec3::ZERO {
@@ -145,18 +110,11 @@ impl SourceScene {
     }
 
     fn origin_in_source(&self) -> Result<DVec3, Fault> {
-        let boxes: Vec<_> = self
-            .meshes
-            .iter()
-            .map(|m| Box3::around(m.positions_in_mesh.iter().copied()))
-            .collect();
+        let boxes: Vec<_> = self.meshes.iter().map(|m| Box3::around(m.positions_in_mesh.iter().copied())).collect();
         let corners = self.instances.iter().flat_map(|instance| {
             let box3 = boxes[instance.mesh];
             let corners = (!box3.is_empty()).then(|| box3.corners());
-            corners
-                .into_iter()
-                .flatten()
-                .map(|c| instance.source_from_mesh.transform_point3(c))
+            corners.into_iter().flatten().map(|c| instance.source_from_mesh.transform_point3(c))
         });
         let all = Box3::around(corners);
         if !(all.min.is_finite() && all.max.is_finite()) {
@@ -190,24 +148,15 @@ impl SourceMesh {
         let index_count = other.indices.len() as u32;
         self.positions_in_mesh.extend(other.positions_in_mesh);
         self.vertices.extend(other.vertices);
-        self.indices
-            .extend(other.indices.into_iter().map(|i| i + first_vertex));
-        self.parts.push(MeshPart {
-            first_index,
-            index_count,
-            material,
-        });
+        self.indices.extend(other.indices.into_iter().map(|i| i + first_vertex));
+        self.parts.push(MeshPart { first_index, index_count, material });
     }
 
     fn mirrored_in_x(&self) -> Self {
         let mut mesh = self.clone();
         mesh.positions_in_mesh.iter_mut().for_each(|p| p.x = -p.x);
-        mesh.vertices
-            .iter_mut()
-            .for_each(|v| v.normal[0] = -v.normal[0]);
-        mesh.indices
-            .chunks_exact_mut(3)
-            .for_each(|triangle| triangle.swap(1, 2));
+        mesh.vertices.iter_mut().for_each(|v| v.normal[0] = -v.normal[0]);
+        mesh.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
         mesh
     }
 
@@ -215,40 +164,25 @@ impl SourceMesh {
         for (vertex, position) in self.vertices.iter_mut().zip(&self.positions_in_mesh) {
             vertex.position = position.as_vec3().to_array();
         }
-        Mesh {
-            vertices: self.vertices,
-            indices: self.indices,
-            parts: self.parts,
-        }
+        Mesh { vertices: self.vertices, indices: self.indices, parts: self.parts }
     }
 }
 
 impl SourceInstance {
     fn relative_to(&self, origin_in_source: DVec3) -> Instance {
-        Instance {
-            mesh: self.mesh as u32,
-            world_from_mesh: moved(&self.source_from_mesh, origin_in_source),
-        }
+        Instance { mesh: self.mesh as u32, world_from_mesh: moved(&self.source_from_mesh, origin_in_source) }
     }
 }
 
 impl SourceLight {
     fn relative_to(&self, origin_in_source: DVec3) -> Light {
         match *self {
-            Self::Directional {
-                towards_light_in_source,
-                irradiance_linear,
-            } => Light::Directional {
-                towards_light_in_world: towards_light_in_source.as_vec3(),
-                irradiance_linear,
-            },
-            Self::Point {
-                position_in_source,
-                intensity_linear,
-            } => Light::Point {
-                position_in_world: (position_in_source - origin_in_source).as_vec3(),
-                intensity_linear,
-            },
+            Self::Directional { towards_light_in_source, irradiance_linear } => {
+                Light::Directional { towards_light_in_world: towards_light_in_source.as_vec3(), irradiance_linear }
+            }
+            Self::Point { position_in_source, intensity_linear } => {
+                Light::Point { position_in_world: (position_in_source - origin_in_source).as_vec3(), intensity_linear }
+            }
         }
     }
 }
@@ -256,11 +190,7 @@ impl SourceLight {
 impl PlacedCamera {
     fn relative_to(self, origin_in_source: DVec3) -> SourceCamera {
         let world_from_camera = moved(&self.source_from_camera, origin_in_source);
-        SourceCamera {
-            name: self.name,
-            world_from_camera,
-            fov_y_rad: self.fov_y_rad,
-        }
+        SourceCamera { name: self.name, world_from_camera, fov_y_rad: self.fov_y_rad }
     }
 }
 
@@ -280,10 +210,7 @@ fn recentring_offset(bounds: Box3) -> DVec3 {
     if bounds.is_empty() {
         return DVec3::ZERO;
     }
-    let (centre, diagonal) = (
-        (bounds.min + bounds.max) * 0.5,
-        (bounds.max - bounds.min).length(),
-    );
+    let (centre, diagonal) = ((bounds.min + bounds.max) * 0.5, (bounds.max - bounds.min).length());
     let distance = centre.length();
     if distance <= FAR_M && distance <= FAR_IN_DIAGONALS * diagonal {
         DVec3::ZERO
@@ -302,14 +229,8 @@ struct Box3 {
 
 impl Box3 {
     fn around(points: impl Iterator<Item = DVec3>) -> Self {
-        let empty = Self {
-            min: DVec3::INFINITY,
-            max: DVec3::NEG_INFINITY,
-        };
-        points.fold(empty, |b, p| Self {
-            min: b.min.min(p),
-            max: b.max.max(p),
-        })
+        let empty = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+        points.fold(empty, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
     }
 
     fn is_empty(&self) -> bool {
@@ -318,11 +239,7 @@ impl Box3 {
 
     fn corners(&self) -> [DVec3; 8] {
         let pick = |i: usize, bit: usize| {
-            if i >> bit & 1 == 0 {
-                self.min[bit]
-            } else {
-                self.max[bit]
-            }
+            if i >> bit & 1 == 0 { self.min[bit] } else { self.max[bit] }
         };
         std::array::from_fn(|i| DVec3::new(pick(i, 0), pick(i, 1), pick(i, 2)))
     }

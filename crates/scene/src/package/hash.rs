@@ -38,8 +38,6 @@ impl FromStr for SceneHash {
     type Err = SceneHashError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        blake3::Hash::from_hex(text)
-            .map(|hash| Self(*hash.as_bytes()))
-            .map_err(|_| SceneHashError)
+        blake3::Hash::from_hex(text).map(|hash| Self(*hash.as_bytes())).map_err(|_| SceneHashError)
     }
 }

@@ -13,9 +13,7 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Fault, at_most};
-use crate::{
-    Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Wind,
-};
+use crate::{Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Wind};
 
 #[cfg(target_endian = "big")]
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");
@@ -64,10 +62,7 @@ pub(super) fn bytes_from_scene(scene: &Scene) -> Vec<u8> {
         bytes.extend_from_slice(bytemuck::cast_slice(&mesh.vertices));
         bytes.extend_from_slice(bytemuck::cast_slice(&mesh.indices));
     }
-    scene
-        .textures
-        .iter()
-        .for_each(|texture| bytes.extend_from_slice(&texture.srgba8));
+    scene.textures.iter().for_each(|texture| bytes.extend_from_slice(&texture.srgba8));
     bytes
 }
 
@@ -75,26 +70,16 @@ pub(super) fn scene_from_bytes(bytes: &[u8], limits: &Limits) -> Result<Scene, F
     at_most("size in bytes", bytes.len() as u64, limits.file_bytes)?;
     let mut reader = Reader { rest: bytes };
     if reader.array::<8>("magic")? != *MAGIC {
-        return Err(Fault::malformed(
-            "magic",
-            "these bytes are not a scene package",
-        ));
+        return Err(Fault::malformed("magic", "these bytes are not a scene package"));
     }
     let version = u32::from_le_bytes(reader.array("version")?);
     if version != VERSION {
-        return Err(Fault::unsupported(
-            "version",
-            format!("package version {version}"),
-        ));
+        return Err(Fault::unsupported("version", format!("package version {version}")));
     }
     let header_bytes = u32::from_le_bytes(reader.array("header length")?);
     let header = read_header(reader.take("header", u64::from(header_bytes))?)?;
     let scene = scene_from_header(header, &mut reader, limits)?;
-    if reader.rest.is_empty() {
-        Ok(scene)
-    } else {
-        Err(Fault::malformed("end", "bytes follow the last array"))
-    }
+    if reader.rest.is_empty() { Ok(scene) } else { Err(Fault::malformed("end", "bytes follow the last array")) }
 }
 
 fn header_of(scene: &Scene) -> Header {
@@ -103,10 +88,7 @@ fn header_of(scene: &Scene) -> Header {
         index_count: m.indices.len() as u32,
         parts: m.parts.clone(),
     };
-    let texture = |t: &Texture| TextureHeader {
-        width_px: t.width_px,
-        height_px: t.height_px,
-    };
+    let texture = |t: &Texture| TextureHeader { width_px: t.width_px, height_px: t.height_px };
     Header {
         name: scene.name.clone(),
         meshes: scene.meshes.iter().map(mesh).collect(),
@@ -124,8 +106,7 @@ fn header_of(scene: &Scene) -> Header {
 
 fn array_bytes(scene: &Scene) -> usize {
     let mesh = |m: &Mesh| size_of_val(m.vertices.as_slice()) + size_of_val(m.indices.as_slice());
-    scene.meshes.iter().map(mesh).sum::<usize>()
-        + scene.textures.iter().map(|t| t.srgba8.len()).sum::<usize>()
+    scene.meshes.iter().map(mesh).sum::<usize>() + scene.textures.iter().map(|t| t.srgba8.len()).sum::<usize>()
 }
 
 fn read_header(bytes: &[u8]) -> Result<Header, Fault> {
@@ -140,35 +121,16 @@ fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Re
     let mut meshes = Vec::new();
     for (number, mesh) in header.meshes.into_iter().enumerate() {
         let element = format!("mesh {number}");
-        at_most(
-            format!("{element}, vertices"),
-            mesh.vertex_count.into(),
-            limits.vertices,
-        )?;
+        at_most(format!("{element}, vertices"), mesh.vertex_count.into(), limits.vertices)?;
         let vertices = reader.pods(&element, mesh.vertex_count.into())?;
         let indices = reader.pods(&element, mesh.index_count.into())?;
-        meshes.push(Mesh {
-            vertices,
-            indices,
-            parts: mesh.parts,
-        });
+        meshes.push(Mesh { vertices, indices, parts: mesh.parts });
     }
     let mut textures = Vec::new();
-    for (
-        number,
-        TextureHeader {
-            width_px,
-            height_px,
-        },
-    ) in header.textures.into_iter().enumerate()
-    {
+    for (number, TextureHeader { width_px, height_px }) in header.textures.into_iter().enumerate() {
         let bytes = u64::from(width_px) * u64::from(height_px) * 4;
         let srgba8 = reader.take(format!("texture {number}"), bytes)?.to_vec();
-        textures.push(Texture {
-            width_px,
-            height_px,
-            srgba8,
-        });
+        textures.push(Texture { width_px, height_px, srgba8 });
     }
     Ok(Scene {
         name: header.name,
@@ -191,14 +153,9 @@ struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     fn take(&mut self, element: impl std::fmt::Display, length: u64) -> Result<&'a [u8], Fault> {
-        let split = usize::try_from(length)
-            .ok()
-            .and_then(|length| self.rest.split_at_checked(length));
+        let split = usize::try_from(length).ok().and_then(|length| self.rest.split_at_checked(length));
         let (taken, rest) = split.ok_or_else(|| {
-            Fault::malformed(
-                element,
-                format!("it needs {length} bytes where {} are left", self.rest.len()),
-            )
+            Fault::malformed(element, format!("it needs {length} bytes where {} are left", self.rest.len()))
         })?;
         self.rest = rest;
         Ok(taken)
@@ -206,9 +163,7 @@ impl<'a> Reader<'a> {
 
     fn array<const N: usize>(&mut self, element: &str) -> Result<[u8; N], Fault> {
         let taken = self.take(element, N as u64)?;
-        taken
-            .try_into()
-            .map_err(|_| Fault::malformed(element, "it is cut off"))
+        taken.try_into().map_err(|_| Fault::malformed(element, "it is cut off"))
     }
 
     fn pods<T: Pod>(&mut self, element: &str, count: u64) -> Result<Vec<T>, Fault> {

@@ -22,10 +22,7 @@ pub struct Package {
 #[must_use]
 pub fn pack(scene: &Scene) -> Package {
     let bytes = layout::bytes_from_scene(scene);
-    Package {
-        hash: SceneHash::of(&bytes),
-        bytes,
-    }
+    Package { hash: SceneHash::of(&bytes), bytes }
 }
 
 /// Unpacks a scene and validates it: the bytes may come from anyone. Does not check their hash.

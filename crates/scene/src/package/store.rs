@@ -22,8 +22,7 @@ impl PackageStore {
     /// When it can be neither found nor made.
     pub fn open(folder: impl Into<PathBuf>) -> Result<Self, SceneError> {
         let folder = folder.into();
-        std::fs::create_dir_all(&folder)
-            .map_err(|e| Fault::io("package folder", e).in_path(&folder))?;
+        std::fs::create_dir_all(&folder).map_err(|e| Fault::io("package folder", e).in_path(&folder))?;
         Ok(Self { folder })
     }
 
@@ -50,8 +49,7 @@ impl PackageStore {
         if actual != hash {
             return Err(Fault::malformed("package", format!("its hash is {actual}")).in_path(&path));
         }
-        self.write(&path, bytes)
-            .map_err(|e| Fault::io("package", e).in_path(&path))
+        self.write(&path, bytes).map_err(|e| Fault::io("package", e).in_path(&path))
     }
 
     fn write(&self, path: &Path, bytes: &[u8]) -> std::io::Result<()> {

@@ -13,16 +13,8 @@ pub(super) struct MeshBuilder {
 
 /// A vertex without texture coordinates or sway; `color_srgb` in codes of 0 to 255.
 pub(super) fn vertex(position: Vec3, normal: Vec3, color_srgb: Vec3) -> Vertex {
-    let [r, g, b] = color_srgb
-        .to_array()
-        .map(|c| (c.clamp(0.0, 255.0) + 0.5) as u8);
-    Vertex {
-        position: position.into(),
-        normal: normal.into(),
-        uv: [0.0; 2],
-        color_srgba8: [r, g, b, 255],
-        sway: 0.0,
-    }
+    let [r, g, b] = color_srgb.to_array().map(|c| (c.clamp(0.0, 255.0) + 0.5) as u8);
+    Vertex { position: position.into(), normal: normal.into(), uv: [0.0; 2], color_srgba8: [r, g, b, 255], sway: 0.0 }
 }
 
 impl MeshBuilder {
@@ -40,14 +32,10 @@ impl MeshBuilder {
     /// A parallelogram facing `right × up`, its corners at `centre ± right ± up`.
     pub(super) fn rectangle(&mut self, centre: Vec3, right: Vec3, up: Vec3, color_srgb: Vec3) {
         let normal = right.cross(up).normalize_or(Vec3::Y);
-        let corners =
-            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(r, u): (f32, f32)| {
-                let uv = Vec2::new(0.5 + 0.5 * r, 0.5 - 0.5 * u).to_array();
-                self.push(Vertex {
-                    uv,
-                    ..vertex(centre + right * r + up * u, normal, color_srgb)
-                })
-            });
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(r, u): (f32, f32)| {
+            let uv = Vec2::new(0.5 + 0.5 * r, 0.5 - 0.5 * u).to_array();
+            self.push(Vertex { uv, ..vertex(centre + right * r + up * u, normal, color_srgb) })
+        });
         self.quad(corners);
     }
 
@@ -64,24 +52,13 @@ impl MeshBuilder {
 
     /// Ends a part: all indices since the last one.
     pub(super) fn finish_part(&mut self, material: u32) {
-        let first_index = self
-            .parts
-            .last()
-            .map_or(0, |p| p.first_index + p.index_count);
+        let first_index = self.parts.last().map_or(0, |p| p.first_index + p.index_count);
         let index_count = self.indices.len() as u32 - first_index;
-        self.parts.push(MeshPart {
-            first_index,
-            index_count,
-            material,
-        });
+        self.parts.push(MeshPart { first_index, index_count, material });
     }
 
     pub(super) fn into_mesh(self) -> Mesh {
-        Mesh {
-            vertices: self.vertices,
-            indices: self.indices,
-            parts: self.parts,
-        }
+        Mesh { vertices: self.vertices, indices: self.indices, parts: self.parts }
     }
 
     /// A scene of this mesh alone, in one material, lit.
@@ -90,10 +67,7 @@ impl MeshBuilder {
         Scene {
             name: name.into(),
             meshes: vec![self.into_mesh()],
-            instances: vec![Instance {
-                mesh: 0,
-                world_from_mesh: Affine3A::IDENTITY,
-            }],
+            instances: vec![Instance { mesh: 0, world_from_mesh: Affine3A::IDENTITY }],
             materials: vec![material],
             ..Scene::default()
         }

@@ -43,16 +43,13 @@ impl Noise {
 
     /// Noise over space, by three planes: good enough for a tint.
     pub(super) fn in_space(&self, point: Vec3) -> f32 {
-        (self.at(point.truncate())
-            + self.at(point.truncate().yx() + point.z)
-            + self.at(Vec2::new(point.z, point.y)))
+        (self.at(point.truncate()) + self.at(point.truncate().yx() + point.z) + self.at(Vec2::new(point.z, point.y)))
             / 2.0
     }
 
     fn gradient(&self, cell: Vec2) -> Vec2 {
         let key = (cell.x as i32 as u32 as u64) << 32 | cell.y as i32 as u32 as u64;
-        let angle =
-            (mixed(self.seed ^ key) >> 40) as f32 * (std::f32::consts::TAU / (1u64 << 24) as f32);
+        let angle = (mixed(self.seed ^ key) >> 40) as f32 * (std::f32::consts::TAU / (1u64 << 24) as f32);
         Vec2::from_angle(angle)
     }
 }

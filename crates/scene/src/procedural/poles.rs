@@ -28,11 +28,7 @@ fn add_wall(builder: &mut MeshBuilder) {
     for row in 0..12 {
         for column in 0..20 {
             let centre = Vec3::new(-4.75 + 0.5 * column as f32, -2.75 + 0.5 * row as f32, -3.0);
-            let tint = Vec3::new(
-                (column * 37 % 5) as f32,
-                (row * 53 % 7) as f32,
-                ((row + column) % 3) as f32,
-            );
+            let tint = Vec3::new((column * 37 % 5) as f32, (row * 53 % 7) as f32, ((row + column) % 3) as f32);
             let color = Vec3::new(90.0, 100.0, 110.0) + tint * Vec3::new(30.0, 18.0, 40.0);
             builder.rectangle(centre, Vec3::X * 0.25, Vec3::Y * 0.25, color);
         }

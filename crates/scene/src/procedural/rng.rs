@@ -10,9 +10,7 @@ pub(super) struct Rng {
 impl Rng {
     /// Streams of different `purpose` are unrelated, so that one may draw more without moving the others.
     pub(super) fn new(seed: u64, purpose: u64) -> Self {
-        Self {
-            state: mixed(seed ^ mixed(purpose)),
-        }
+        Self { state: mixed(seed ^ mixed(purpose)) }
     }
 
     /// 0 up to but not 1.
@@ -27,11 +25,7 @@ impl Rng {
 
     /// In the cube from -1 to 1.
     pub(super) fn vector(&mut self) -> Vec3 {
-        Vec3::new(
-            self.between(-1.0, 1.0),
-            self.between(-1.0, 1.0),
-            self.between(-1.0, 1.0),
-        )
+        Vec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
     }
 }
 

@@ -15,28 +15,12 @@ const WHITE: Vec3 = Vec3::splat(255.0);
 pub fn quad(center: Vec3, half_size_m: f32, normal: Vec3, color_srgb8: [u8; 3]) -> Scene {
     let normal = normal.normalize_or(Vec3::Y);
     // Sides along the axes where the normal is along one.
-    let reference = if normal.y.abs() > 0.9 {
-        Vec3::NEG_Z
-    } else {
-        Vec3::Y
-    };
+    let reference = if normal.y.abs() > 0.9 { Vec3::NEG_Z } else { Vec3::Y };
     let right = reference.cross(normal).normalize_or(Vec3::X);
     let up = normal.cross(right);
     let mut builder = MeshBuilder::default();
-    builder.rectangle(
-        center,
-        right * half_size_m,
-        up * half_size_m,
-        Vec3::from(color_srgb8.map(f32::from)),
-    );
-    builder.into_scene(
-        "quad",
-        Material {
-            name: "unlit".into(),
-            unlit: true,
-            ..Material::default()
-        },
-    )
+    builder.rectangle(center, right * half_size_m, up * half_size_m, Vec3::from(color_srgb8.map(f32::from)));
+    builder.into_scene("quad", Material { name: "unlit".into(), unlit: true, ..Material::default() })
 }
 
 /// The cube from -0.5 to 0.5 on each axis: 12 triangles, a normal and a colour a face.
@@ -46,9 +30,7 @@ pub fn unit_cube() -> Scene {
     builder.cuboid(Vec3::splat(-0.5), Vec3::splat(0.5), WHITE);
     for (face, corners) in builder.vertices.chunks_exact_mut(4).enumerate() {
         let code = |bit: usize| if (face + 1) >> bit & 1 == 1 { 220 } else { 90 };
-        corners
-            .iter_mut()
-            .for_each(|v| v.color_srgba8 = [code(0), code(1), code(2), 255]);
+        corners.iter_mut().for_each(|v| v.color_srgba8 = [code(0), code(1), code(2), 255]);
     }
     builder.into_scene("unit-cube", Material::default())
 }
@@ -63,31 +45,17 @@ pub fn uv_sphere(radius_m: f32, segments: u32) -> Scene {
 /// A sphere of radius 1 with a texture of 16 × 8 black and white checks.
 #[must_use]
 pub fn checker_sphere() -> Scene {
-    let material = Material {
-        base_color_texture: Some(0),
-        ..Material::default()
-    };
+    let material = Material { base_color_texture: Some(0), ..Material::default() };
     let scene = sphere(1.0, 96).into_scene("checker-sphere", material);
-    Scene {
-        textures: vec![checks(256, 128, 16)],
-        ..scene
-    }
+    Scene { textures: vec![checks(256, 128, 16)], ..scene }
 }
 
 fn checks(width_px: u32, height_px: u32, check_px: u32) -> Texture {
     let texel = |i: u32| {
         let (x, y) = (i % width_px / check_px, i / width_px / check_px);
-        if (x + y).is_multiple_of(2) {
-            [235, 235, 230, 255]
-        } else {
-            [25, 30, 40, 255]
-        }
+        if (x + y).is_multiple_of(2) { [235, 235, 230, 255] } else { [25, 30, 40, 255] }
     };
-    Texture {
-        width_px,
-        height_px,
-        srgba8: (0..width_px * height_px).flat_map(texel).collect(),
-    }
+    Texture { width_px, height_px, srgba8: (0..width_px * height_px).flat_map(texel).collect() }
 }
 
 fn sphere(radius_m: f32, segments: u32) -> MeshBuilder {
@@ -98,28 +66,14 @@ fn sphere(radius_m: f32, segments: u32) -> MeshBuilder {
             let uv = [column as f32 / columns as f32, row as f32 / rows as f32];
             // The seam's two ends, and each pole, must be the same point to the last bit.
             let azimuth = TAU * (column % columns) as f32 / columns as f32;
-            let ring = if row % rows == 0 {
-                0.0
-            } else {
-                (PI * uv[1]).sin()
-            };
-            let normal = Vec3::new(
-                ring * azimuth.sin(),
-                (PI * uv[1]).cos(),
-                ring * azimuth.cos(),
-            );
-            builder.push(Vertex {
-                uv,
-                ..vertex(normal * radius_m, normal, WHITE)
-            });
+            let ring = if row % rows == 0 { 0.0 } else { (PI * uv[1]).sin() };
+            let normal = Vec3::new(ring * azimuth.sin(), (PI * uv[1]).cos(), ring * azimuth.cos());
+            builder.push(Vertex { uv, ..vertex(normal * radius_m, normal, WHITE) });
         }
     }
     for row in 0..rows {
         for column in 0..columns {
-            let (above, below) = (
-                row * (columns + 1) + column,
-                (row + 1) * (columns + 1) + column,
-            );
+            let (above, below) = (row * (columns + 1) + column, (row + 1) * (columns + 1) + column);
             if row > 0 {
                 builder.indices.extend([above, below, above + 1]);
             }

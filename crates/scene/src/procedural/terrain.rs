@@ -16,11 +16,7 @@ pub(super) struct Terrain {
 
 impl Terrain {
     pub(super) fn new(seed: u64, tree_foot: Vec2) -> Self {
-        Self {
-            noise: Noise::new(seed ^ 0x7e44),
-            tree_foot,
-            seed,
-        }
+        Self { noise: Noise::new(seed ^ 0x7e44), tree_foot, seed }
     }
 
     /// Hills, a knoll under the tree, rocks towards the rim, and tussocks.
@@ -28,9 +24,7 @@ impl Terrain {
         let hills = 0.5 + 0.5 * self.noise.fractal(at * 1.1 + 5.0, 4);
         let knoll = (-at.distance_squared(self.tree_foot) / 0.12).exp();
         let ridges = 1.0 - self.noise.fractal(at * 3.0 + 40.0, 4).abs();
-        let rocks = ridges.powi(6)
-            * smoothstep(0.55, 1.0, at.distance(self.tree_foot))
-            * self.rockiness(at);
+        let rocks = ridges.powi(6) * smoothstep(0.55, 1.0, at.distance(self.tree_foot)) * self.rockiness(at);
         let tussocks = self.noise.fractal(at * 28.0, 2);
         (0.02 + 0.15 * hills + 0.05 * knoll + 0.07 * rocks + 0.0035 * tussocks).clamp(0.0, 0.3)
     }
@@ -38,9 +32,8 @@ impl Terrain {
     /// `cells`² squares of two triangles, in one part of material 0.
     pub(super) fn mesh(&self, cells: u32) -> Mesh {
         let side = cells + 1;
-        let heights: Vec<f32> = (0..side * side)
-            .map(|i| self.height_m(grid_point(i % side, i / side, cells)))
-            .collect();
+        let heights: Vec<f32> =
+            (0..side * side).map(|i| self.height_m(grid_point(i % side, i / side, cells))).collect();
         let mut rng = Rng::new(self.seed, 11);
         let mut builder = MeshBuilder::default();
         for row in 0..side {
@@ -68,55 +61,19 @@ impl Terrain {
     fn color_srgb(&self, at: Vec2, height_m: f32, normal: Vec3, random: f32) -> Vec3 {
         let patches = 0.5 + 0.5 * self.noise.fractal(at * 3.7 + 11.0, 3);
         let blades = 0.5 + 0.5 * self.noise.fractal(at * 55.0, 2);
-        let lush = mix(
-            Vec3::new(66.0, 98.0, 34.0),
-            Vec3::new(108.0, 132.0, 52.0),
-            blades,
-        );
-        let dry = mix(
-            Vec3::new(132.0, 128.0, 66.0),
-            Vec3::new(166.0, 154.0, 92.0),
-            blades,
-        );
-        let grass = mix(
-            lush,
-            dry,
-            smoothstep(0.45, 0.8, patches + 1.2 * (height_m - 0.12)),
-        );
-        let earth = mix(
-            Vec3::new(92.0, 70.0, 46.0),
-            Vec3::new(124.0, 98.0, 68.0),
-            blades,
-        );
-        let rock = mix(
-            Vec3::new(104.0, 100.0, 94.0),
-            Vec3::new(150.0, 145.0, 136.0),
-            patches + 0.4 * (blades - 0.5),
-        );
+        let lush = mix(Vec3::new(66.0, 98.0, 34.0), Vec3::new(108.0, 132.0, 52.0), blades);
+        let dry = mix(Vec3::new(132.0, 128.0, 66.0), Vec3::new(166.0, 154.0, 92.0), blades);
+        let grass = mix(lush, dry, smoothstep(0.45, 0.8, patches + 1.2 * (height_m - 0.12)));
+        let earth = mix(Vec3::new(92.0, 70.0, 46.0), Vec3::new(124.0, 98.0, 68.0), blades);
+        let rock = mix(Vec3::new(104.0, 100.0, 94.0), Vec3::new(150.0, 145.0, 136.0), patches + 0.4 * (blades - 0.5));
         let steepness = 1.0 - normal.y + 0.05 * (blades - 0.5);
-        let trodden = smoothstep(
-            0.13,
-            0.04,
-            at.distance(self.tree_foot) + 0.05 * (patches - 0.5),
-        );
-        let ground = mix(
-            grass,
-            earth,
-            smoothstep(0.07, 0.15, steepness).max(0.75 * trodden),
-        );
+        let trodden = smoothstep(0.13, 0.04, at.distance(self.tree_foot) + 0.05 * (patches - 0.5));
+        let ground = mix(grass, earth, smoothstep(0.07, 0.15, steepness).max(0.75 * trodden));
         let ground = mix(ground, rock, smoothstep(0.14, 0.26, steepness));
         let in_flower = random < 0.004 && steepness < 0.06 && patches > 0.4 && trodden < 0.1;
         let flower = lerp(0.0, 1.0, (random * 250.0).fract());
-        let flower = if flower < 0.6 {
-            Vec3::new(226.0, 204.0, 86.0)
-        } else {
-            Vec3::new(232.0, 228.0, 220.0)
-        };
-        if in_flower {
-            flower
-        } else {
-            ground * lerp(0.93, 1.05, random)
-        }
+        let flower = if flower < 0.6 { Vec3::new(226.0, 204.0, 86.0) } else { Vec3::new(232.0, 228.0, 220.0) };
+        if in_flower { flower } else { ground * lerp(0.93, 1.05, random) }
     }
 }
 

@@ -36,12 +36,7 @@ pub fn tree_terrain(triangles: u32, seed: u64) -> Scene {
     let meshes = vec![terrain.mesh(cells), tree_mesh(&plan, seed)];
     Scene {
         name: format!("tree-terrain-{triangles}"),
-        instances: (0..2)
-            .map(|mesh| Instance {
-                mesh,
-                world_from_mesh: Affine3A::IDENTITY,
-            })
-            .collect(),
+        instances: (0..2).map(|mesh| Instance { mesh, world_from_mesh: Affine3A::IDENTITY }).collect(),
         meshes,
         materials: materials(),
         lights: lights(),
@@ -74,15 +69,8 @@ fn materials() -> Vec<Material> {
         phong_exponent,
         ..Material::default()
     };
-    let leaves = Material {
-        double_sided: true,
-        ..phong("leaves", 0.10, 20.0)
-    };
-    vec![
-        phong("ground", 0.02, 8.0),
-        phong("bark", 0.05, 12.0),
-        leaves,
-    ]
+    let leaves = Material { double_sided: true, ..phong("leaves", 0.10, 20.0) };
+    vec![phong("ground", 0.02, 8.0), phong("bark", 0.05, 12.0), leaves]
 }
 
 /// A late sun, and a weak lamp on the shaded side.
@@ -92,9 +80,6 @@ fn lights() -> Vec<Light> {
             towards_light_in_world: Vec3::new(0.48, 0.64, 0.6),
             irradiance_linear: Vec3::new(0.98, 0.90, 0.74),
         },
-        Light::Point {
-            position_in_world: Vec3::new(-0.9, 0.95, -0.6),
-            intensity_linear: Vec3::new(0.08, 0.10, 0.14),
-        },
+        Light::Point { position_in_world: Vec3::new(-0.9, 0.95, -0.6), intensity_linear: Vec3::new(0.08, 0.10, 0.14) },
     ]
 }

@@ -17,20 +17,11 @@ pub const CUBE_CORNERS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.5],
     [-0.5, 0.5, 0.5],
 ];
-pub const CUBE_QUADS: [[u32; 4]; 6] = [
-    [0, 3, 2, 1],
-    [4, 5, 6, 7],
-    [0, 1, 5, 4],
-    [3, 7, 6, 2],
-    [0, 4, 7, 3],
-    [1, 2, 6, 5],
-];
+pub const CUBE_QUADS: [[u32; 4]; 6] =
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [3, 7, 6, 2], [0, 4, 7, 3], [1, 2, 6, 5]];
 
 pub fn cube_triangles() -> Vec<u32> {
-    CUBE_QUADS
-        .iter()
-        .flat_map(|[a, b, c, d]| [*a, *b, *c, *a, *c, *d])
-        .collect()
+    CUBE_QUADS.iter().flat_map(|[a, b, c, d]| [*a, *b, *c, *a, *c, *d]).collect()
 }
 
 /// A folder with one scene file in it.
@@ -64,14 +55,8 @@ pub fn load(name: &str, bytes: &[u8]) -> Result<Scene, SceneError> {
 /// The message of the error that loading must give; a second is the time for it.
 pub fn refusal(name: &str, bytes: &[u8]) -> String {
     let start = std::time::Instant::now();
-    let message = load(name, bytes)
-        .expect_err("it must be refused")
-        .to_string();
-    assert!(
-        start.elapsed().as_secs_f32() < 1.0,
-        "took {:?}: {message}",
-        start.elapsed()
-    );
+    let message = load(name, bytes).expect_err("it must be refused").to_string();
+    assert!(start.elapsed().as_secs_f32() < 1.0, "took {:?}: {message}", start.elapsed());
     assert!(message.contains(name), "the file is not named: {message}");
     message
 }
@@ -81,26 +66,15 @@ pub fn world_triangles(scene: &Scene) -> Vec<[glam::Vec3; 3]> {
     let mut triangles = Vec::new();
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh as usize];
-        let point = |i: u32| {
-            instance
-                .world_from_mesh
-                .transform_point3(mesh.vertices[i as usize].position.into())
-        };
-        triangles.extend(
-            mesh.indices
-                .chunks_exact(3)
-                .map(|t| [point(t[0]), point(t[1]), point(t[2])]),
-        );
+        let point = |i: u32| instance.world_from_mesh.transform_point3(mesh.vertices[i as usize].position.into());
+        triangles.extend(mesh.indices.chunks_exact(3).map(|t| [point(t[0]), point(t[1]), point(t[2])]));
     }
     triangles
 }
 
 /// Volume enclosed: positive where triangles face out.
 pub fn signed_volume(scene: &Scene) -> f32 {
-    world_triangles(scene)
-        .iter()
-        .map(|[a, b, c]| a.dot(b.cross(*c)) / 6.0)
-        .sum()
+    world_triangles(scene).iter().map(|[a, b, c]| a.dot(b.cross(*c)) / 6.0).sum()
 }
 
 pub fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
@@ -110,11 +84,7 @@ pub fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
     binary.resize(binary.len().next_multiple_of(4), 0);
     let total = 12 + 8 + json.len() + 8 + binary.len();
     let mut bytes = b"glTF".to_vec();
-    bytes.extend(
-        [2, total as u32, json.len() as u32]
-            .iter()
-            .flat_map(|n| n.to_le_bytes()),
-    );
+    bytes.extend([2, total as u32, json.len() as u32].iter().flat_map(|n| n.to_le_bytes()));
     bytes.extend(b"JSON");
     bytes.extend(&json);
     bytes.extend((binary.len() as u32).to_le_bytes());
@@ -125,16 +95,8 @@ pub fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
 
 /// The cube's positions (96 bytes) and then its indices (72 bytes).
 pub fn cube_buffer() -> Vec<u8> {
-    let mut buffer: Vec<u8> = CUBE_CORNERS
-        .iter()
-        .flatten()
-        .flat_map(|c| c.to_le_bytes())
-        .collect();
-    buffer.extend(
-        cube_triangles()
-            .iter()
-            .flat_map(|i| (*i as u16).to_le_bytes()),
-    );
+    let mut buffer: Vec<u8> = CUBE_CORNERS.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+    buffer.extend(cube_triangles().iter().flat_map(|i| (*i as u16).to_le_bytes()));
     buffer
 }
 
@@ -163,8 +125,7 @@ impl Default for GltfCube {
                 r#"{"bufferView":1,"componentType":5123,"count":36,"type":"SCALAR"}"#
             )
             .into(),
-            views: r#"{"buffer":0,"byteLength":96},{"buffer":0,"byteOffset":96,"byteLength":72}"#
-                .into(),
+            views: r#"{"buffer":0,"byteLength":96},{"buffer":0,"byteOffset":96,"byteLength":72}"#.into(),
             buffers: r#"{"byteLength":168}"#.into(),
             more: String::new(),
             binary: cube_buffer(),
@@ -174,16 +135,7 @@ impl Default for GltfCube {
 
 impl GltfCube {
     pub fn json(&self) -> String {
-        let Self {
-            nodes,
-            roots,
-            primitive,
-            accessors,
-            views,
-            buffers,
-            more,
-            ..
-        } = self;
+        let Self { nodes, roots, primitive, accessors, views, buffers, more, .. } = self;
         format!(
             r#"{{"asset":{{"version":"2.0"}},{more}"scene":0,"scenes":[{{"nodes":[{roots}]}}],"nodes":[{nodes}],
             "meshes":[{{"primitives":[{primitive}]}}],"accessors":[{accessors}],"bufferViews":[{views}],"buffers":[{buffers}]}}"#
@@ -196,12 +148,8 @@ impl GltfCube {
 }
 
 pub fn cube_obj() -> String {
-    let vertices = CUBE_CORNERS
-        .iter()
-        .map(|[x, y, z]| format!("v {x} {y} {z}\n"));
-    let faces = CUBE_QUADS
-        .iter()
-        .map(|q| format!("f {} {} {} {}\n", q[0] + 1, q[1] + 1, q[2] + 1, q[3] + 1));
+    let vertices = CUBE_CORNERS.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n"));
+    let faces = CUBE_QUADS.iter().map(|q| format!("f {} {} {} {}\n", q[0] + 1, q[1] + 1, q[2] + 1, q[3] + 1));
     vertices.chain(faces).collect()
 }
 
@@ -215,43 +163,24 @@ pub fn ply_header(format: &str, vertices: usize, faces: usize) -> String {
 
 pub fn cube_ply_ascii() -> Vec<u8> {
     let mut text = ply_header("ascii", 8, 6);
-    CUBE_CORNERS
-        .iter()
-        .for_each(|[x, y, z]| text += &format!("{x} {y} {z} 10 20 30\n"));
-    CUBE_QUADS
-        .iter()
-        .for_each(|[a, b, c, d]| text += &format!("4 {a} {b} {c} {d}\n"));
+    CUBE_CORNERS.iter().for_each(|[x, y, z]| text += &format!("{x} {y} {z} 10 20 30\n"));
+    CUBE_QUADS.iter().for_each(|[a, b, c, d]| text += &format!("4 {a} {b} {c} {d}\n"));
     text.trim_end().to_owned().into_bytes()
 }
 
 pub fn cube_ply_binary(is_big_endian: bool) -> Vec<u8> {
     let order = |bytes: [u8; 4]| {
-        if is_big_endian {
-            [bytes[3], bytes[2], bytes[1], bytes[0]]
-        } else {
-            bytes
-        }
+        if is_big_endian { [bytes[3], bytes[2], bytes[1], bytes[0]] } else { bytes }
     };
-    let mut bytes = ply_header(
-        if is_big_endian {
-            "binary_big_endian"
-        } else {
-            "binary_little_endian"
-        },
-        8,
-        6,
-    )
-    .into_bytes();
+    let mut bytes =
+        ply_header(if is_big_endian { "binary_big_endian" } else { "binary_little_endian" }, 8, 6).into_bytes();
     for corner in CUBE_CORNERS {
-        corner
-            .iter()
-            .for_each(|c| bytes.extend(order(c.to_le_bytes())));
+        corner.iter().for_each(|c| bytes.extend(order(c.to_le_bytes())));
         bytes.extend([10, 20, 30]);
     }
     for quad in CUBE_QUADS {
         bytes.push(4);
-        quad.iter()
-            .for_each(|i| bytes.extend(order(i.to_le_bytes())));
+        quad.iter().for_each(|i| bytes.extend(order(i.to_le_bytes())));
     }
     bytes
 }

@@ -25,19 +25,14 @@ pub(super) const fn max_colors_bytes(count: usize) -> usize {
 pub(super) fn pack_colors(colors_rgb9e5: &[u32], out: &mut Vec<u8>) {
     let green = |color: u32, last: u32| change(color >> 9, last >> 9, MANTISSA);
     let red = |color, last| change(color, last, MANTISSA).wrapping_sub(green(color, last));
-    let blue =
-        |color, last| change(color >> 18, last >> 18, MANTISSA).wrapping_sub(green(color, last));
+    let blue = |color, last| change(color >> 18, last >> 18, MANTISSA).wrapping_sub(green(color, last));
     let mut packer = Packer::new(colors_rgb9e5.len());
     for block in colors_rgb9e5.chunks(BLOCK) {
-        packer.pack(block.len(), out, |out| {
-            for_neighbours(block, out, |color, last| fold(green(color, last), MANTISSA))
-        });
-        packer.pack(block.len(), out, |out| {
-            for_neighbours(block, out, |color, last| fold(red(color, last), MANTISSA))
-        });
-        packer.pack(block.len(), out, |out| {
-            for_neighbours(block, out, |color, last| fold(blue(color, last), MANTISSA))
-        });
+        packer
+            .pack(block.len(), out, |out| for_neighbours(block, out, |color, last| fold(green(color, last), MANTISSA)));
+        packer.pack(block.len(), out, |out| for_neighbours(block, out, |color, last| fold(red(color, last), MANTISSA)));
+        packer
+            .pack(block.len(), out, |out| for_neighbours(block, out, |color, last| fold(blue(color, last), MANTISSA)));
         let exponent = |color, last| fold(change(color >> 27, last >> 27, EXPONENT), EXPONENT);
         packer.pack(block.len(), out, |out| for_neighbours(block, out, exponent));
     }
@@ -54,13 +49,11 @@ pub(super) fn unpack_colors(input: &mut &[u8], count: usize) -> Result<Vec<u32>,
         }
         let [green, red, blue, exponent] = channels.each_ref().map(|channel| &channel[..block]);
         let mut color = [0u32; 4];
-        colors.extend(green.iter().zip(red).zip(blue).zip(exponent).map(
-            |(((&green, &red), &blue), &exponent)| {
-                color = apply(color, [green, red, blue, exponent]);
-                let [r, g, b, e] = color;
-                (r & MANTISSA) | (g & MANTISSA) << 9 | (b & MANTISSA) << 18 | e << 27
-            },
-        ));
+        colors.extend(green.iter().zip(red).zip(blue).zip(exponent).map(|(((&green, &red), &blue), &exponent)| {
+            color = apply(color, [green, red, blue, exponent]);
+            let [r, g, b, e] = color;
+            (r & MANTISSA) | (g & MANTISSA) << 9 | (b & MANTISSA) << 18 | e << 27
+        }));
     }
     Ok(colors)
 }
@@ -110,16 +103,10 @@ mod tests {
     #[test]
     fn noisy_colors_beat_plain_lz4() {
         let mut random = Random::new(7);
-        let color = |x: u32, noise: u32| {
-            (200 + x / 16 + noise) | (180 + x / 20 + noise) << 9 | (90 + noise) << 18 | 15 << 27
-        };
-        let colors: Vec<u32> = (0..4000)
-            .map(|x| color(x % 400, random.next_u32() & 7))
-            .collect();
-        let raw: Vec<u8> = colors
-            .iter()
-            .flat_map(|color| color.to_le_bytes())
-            .collect();
+        let color =
+            |x: u32, noise: u32| (200 + x / 16 + noise) | (180 + x / 20 + noise) << 9 | (90 + noise) << 18 | 15 << 27;
+        let colors: Vec<u32> = (0..4000).map(|x| color(x % 400, random.next_u32() & 7)).collect();
+        let raw: Vec<u8> = colors.iter().flat_map(|color| color.to_le_bytes()).collect();
         let mut bytes = Vec::new();
         pack_colors(&colors, &mut bytes);
         assert!(lz4_flex::block::compress(&bytes).len() < lz4_flex::block::compress(&raw).len());

@@ -65,9 +65,7 @@ pub(super) fn encode_depth(inverse_depth_per_m: &[f32]) -> UnpackedDepth {
         }
     }
     if !samples.is_empty() {
-        packer.pack(samples.len(), &mut packed, |residuals| {
-            predict(&samples, residuals)
-        });
+        packer.pack(samples.len(), &mut packed, |residuals| predict(&samples, residuals));
     }
     let mut bytes = Vec::with_capacity(packed.len() + runs.written_bytes());
     runs.write(&mut bytes);
@@ -84,10 +82,7 @@ pub(super) fn decode_depth(
     let mut input = bytes;
     let runs = Runs::read(&mut input, texels)?;
     if range.is_empty() && runs.sample_count() > 0 {
-        return Err(DecodeError::Corrupt {
-            field: "runs",
-            reason: "samples in an image without a range",
-        });
+        return Err(DecodeError::Corrupt { field: "runs", reason: "samples in an image without a range" });
     }
     let mut codes = vec![0; runs.sample_count()];
     for block in codes.chunks_mut(BLOCK) {
@@ -95,10 +90,7 @@ pub(super) fn decode_depth(
         restore(block);
     }
     if !input.is_empty() {
-        return Err(DecodeError::Corrupt {
-            field: "inverse_depth",
-            reason: "bytes left over",
-        });
+        return Err(DecodeError::Corrupt { field: "inverse_depth", reason: "bytes left over" });
     }
     let mut plane = vec![0.0; texels];
     runs.scatter_with(
@@ -112,15 +104,11 @@ pub(super) fn decode_depth(
 
 /// What prediction leaves of each code of a block.
 fn predict(codes: &[u16], residuals: &mut [u16]) {
-    let before =
-        |index: usize, back: usize| index.checked_sub(back).map_or(0, |index| codes[index]);
+    let before = |index: usize, back: usize| index.checked_sub(back).map_or(0, |index| codes[index]);
     for index in 0..codes.len().min(2) {
         residuals[index] = residual(codes[index], before(index, 1), before(index, 2));
     }
-    let shifted = codes
-        .iter()
-        .zip(codes.iter().skip(1))
-        .zip(codes.iter().skip(2));
+    let shifted = codes.iter().zip(codes.iter().skip(1)).zip(codes.iter().skip(2));
     for (out, ((&second_last, &last), &code)) in residuals.iter_mut().skip(2).zip(shifted) {
         *out = residual(code, last, second_last);
     }
@@ -161,9 +149,7 @@ mod tests {
         let mut random = Random::new(3);
         for length in (0..20).chain([1000]) {
             let mask = if length % 2 == 0 { 0xffff } else { 0x1ff };
-            let codes: Vec<_> = (0..length)
-                .map(|_| random.next_u32() as u16 & mask)
-                .collect();
+            let codes: Vec<_> = (0..length).map(|_| random.next_u32() as u16 & mask).collect();
             let mut back = vec![0; codes.len()];
             predict(&codes, &mut back);
             restore(&mut back);
@@ -187,12 +173,8 @@ mod tests {
         let codes = inverse_depth_codes(&plane);
         let raw: Vec<u8> = codes.iter().flat_map(|code| code.to_le_bytes()).collect();
         let raw_packed = lz4_flex::block::compress(&raw).len();
-        assert!(
-            packed * 2 <= raw_packed,
-            "{packed} bytes against {raw_packed}"
-        );
-        let (runs, back) =
-            decode_depth(&encoded.bytes, plane.len(), encoded.range).expect("own stream");
+        assert!(packed * 2 <= raw_packed, "{packed} bytes against {raw_packed}");
+        let (runs, back) = decode_depth(&encoded.bytes, plane.len(), encoded.range).expect("own stream");
         assert_eq!(runs.sample_count(), encoded.runs.sample_count());
         assert_eq!(inverse_depth_codes(&back), codes);
     }

@@ -22,11 +22,7 @@ pub struct EncodedDepthPlane {
 #[must_use]
 pub fn inverse_depth_codes(inverse_depth_per_m: &[f32]) -> Vec<u16> {
     let mut codes = vec![0; inverse_depth_per_m.len()];
-    quantise(
-        inverse_depth_per_m,
-        InverseDepthRange::of_plane(inverse_depth_per_m),
-        &mut codes,
-    );
+    quantise(inverse_depth_per_m, InverseDepthRange::of_plane(inverse_depth_per_m), &mut codes);
     codes
 }
 
@@ -35,11 +31,7 @@ pub fn inverse_depth_codes(inverse_depth_per_m: &[f32]) -> Vec<u16> {
 pub fn encode_depth_plane(inverse_depth_per_m: &[f32]) -> EncodedDepthPlane {
     let depth = encode_depth(inverse_depth_per_m);
     let packed = lz4_flex::block::compress(&depth.bytes);
-    EncodedDepthPlane {
-        range: depth.range,
-        raw_bytes: depth.bytes.len() as u32,
-        packed,
-    }
+    EncodedDepthPlane { range: depth.range, raw_bytes: depth.bytes.len() as u32, packed }
 }
 
 /// Unpacks a plane.
@@ -54,11 +46,7 @@ pub fn decode_depth_plane(
 ) -> Result<Vec<f32>, DecodeError> {
     let texels = limits.texels(width, height)?;
     plane.range.validate()?;
-    check_limit(
-        "raw_bytes",
-        u64::from(plane.raw_bytes),
-        max_unpacked_bytes(texels) as u64,
-    )?;
+    check_limit("raw_bytes", u64::from(plane.raw_bytes), max_unpacked_bytes(texels) as u64)?;
     let bytes = expand_lz4(&plane.packed, plane.raw_bytes as usize, "inverse_depth")?;
     decode_depth(&bytes, texels, plane.range).map(|(_, plane)| plane)
 }

@@ -59,11 +59,7 @@ pub struct DecodeLimits {
 impl Default for DecodeLimits {
     /// 16 million texels, 256 MiB: some fifty times what the largest planned sample image needs.
     fn default() -> Self {
-        Self {
-            max_side_px: MAX_IMAGE_SIDE_PX,
-            max_texels: 1 << 24,
-            max_payload_bytes: 256 << 20,
-        }
+        Self { max_side_px: MAX_IMAGE_SIDE_PX, max_texels: 1 << 24, max_payload_bytes: 256 << 20 }
     }
 }
 
@@ -74,10 +70,7 @@ impl DecodeLimits {
     /// Names the side or the product that is zero or too large.
     pub fn texels(&self, width: u32, height: u32) -> Result<usize, DecodeError> {
         if width == 0 || height == 0 {
-            return Err(DecodeError::Header {
-                field: "size",
-                reason: "zero",
-            });
+            return Err(DecodeError::Header { field: "size", reason: "zero" });
         }
         for (field, side) in [("width", width), ("height", height)] {
             check_limit(field, u64::from(side), u64::from(self.max_side_px))?;
@@ -89,41 +82,20 @@ impl DecodeLimits {
 }
 
 pub(super) fn check_limit(field: &'static str, value: u64, limit: u64) -> Result<(), DecodeError> {
-    if value > limit {
-        Err(DecodeError::Limit {
-            field,
-            value,
-            limit,
-        })
-    } else {
-        Ok(())
-    }
+    if value > limit { Err(DecodeError::Limit { field, value, limit }) } else { Ok(()) }
 }
 
 /// Expands an LZ4 block that must give exactly `unpacked_bytes`, a size that the caller has checked.
-pub(super) fn expand_lz4(
-    packed: &[u8],
-    unpacked_bytes: usize,
-    field: &'static str,
-) -> Result<Vec<u8>, DecodeError> {
+pub(super) fn expand_lz4(packed: &[u8], unpacked_bytes: usize, field: &'static str) -> Result<Vec<u8>, DecodeError> {
     // LZ4 cannot do better than 255 to 1: a few bytes do not get to claim a large buffer.
     if unpacked_bytes / 255 > packed.len() {
-        return Err(DecodeError::Corrupt {
-            field,
-            reason: "claims more than LZ4 can hold",
-        });
+        return Err(DecodeError::Corrupt { field, reason: "claims more than LZ4 can hold" });
     }
     let mut unpacked = vec![0; unpacked_bytes];
     match lz4_flex::block::decompress_into(packed, &mut unpacked) {
         Ok(written) if written == unpacked_bytes => Ok(unpacked),
-        Ok(_) => Err(DecodeError::Corrupt {
-            field,
-            reason: "LZ4 block is too short",
-        }),
-        Err(_) => Err(DecodeError::Corrupt {
-            field,
-            reason: "LZ4 block is invalid",
-        }),
+        Ok(_) => Err(DecodeError::Corrupt { field, reason: "LZ4 block is too short" }),
+        Err(_) => Err(DecodeError::Corrupt { field, reason: "LZ4 block is invalid" }),
     }
 }
 
@@ -134,12 +106,8 @@ pub(super) fn expand_lz4_up_to(
     field: &'static str,
 ) -> Result<Vec<u8>, DecodeError> {
     let mut unpacked = vec![0; max_unpacked_bytes.min(packed.len().saturating_mul(255))];
-    let written = lz4_flex::block::decompress_into(packed, &mut unpacked).map_err(|_| {
-        DecodeError::Corrupt {
-            field,
-            reason: "LZ4 block is invalid",
-        }
-    })?;
+    let written = lz4_flex::block::decompress_into(packed, &mut unpacked)
+        .map_err(|_| DecodeError::Corrupt { field, reason: "LZ4 block is invalid" })?;
     unpacked.truncate(written);
     Ok(unpacked)
 }

@@ -80,15 +80,10 @@ impl FromStr for FrameCodec {
         let quality = match text.split_once(':') {
             None if text == "lz4" => return Ok(Self::Lz4),
             None if text == "jpeg" => Some(DEFAULT_JPEG_QUALITY),
-            Some(("jpeg", quality)) => quality
-                .parse()
-                .ok()
-                .filter(|quality| (1..=100).contains(quality)),
+            Some(("jpeg", quality)) => quality.parse().ok().filter(|quality| (1..=100).contains(quality)),
             _ => None,
         };
-        quality
-            .map(|quality| Self::Jpeg { quality })
-            .ok_or_else(|| ParseFrameCodecError(text.to_owned()))
+        quality.map(|quality| Self::Jpeg { quality }).ok_or_else(|| ParseFrameCodecError(text.to_owned()))
     }
 }
 
@@ -105,32 +100,16 @@ impl fmt::Display for FrameCodec {
 ///
 /// # Errors
 /// A slice that is not of the frame's size; a size or quality that JPEG cannot have.
-pub fn encode_frame(
-    codec: FrameCodec,
-    width: u32,
-    height: u32,
-    rgb: &[u8],
-) -> Result<EncodedFrame, FrameError> {
+pub fn encode_frame(codec: FrameCodec, width: u32, height: u32, rgb: &[u8]) -> Result<EncodedFrame, FrameError> {
     let (pixels, rest) = rgb.as_chunks::<3>();
-    if !rest.is_empty() || width == 0 || pixels.len() as u64 != u64::from(width) * u64::from(height)
-    {
-        return Err(FrameError::Size {
-            width,
-            height,
-            rgb_bytes: rgb.len(),
-        });
+    if !rest.is_empty() || width == 0 || pixels.len() as u64 != u64::from(width) * u64::from(height) {
+        return Err(FrameError::Size { width, height, rgb_bytes: rgb.len() });
     }
     let data: Bytes = match codec {
         FrameCodec::Lz4 => lz4_flex::block::compress(&filter(pixels)).into(),
         FrameCodec::Jpeg { quality } => jpeg::encode(width, height, rgb, quality)?.into(),
     };
-    Ok(EncodedFrame {
-        codec,
-        width,
-        height,
-        crc32: crc32fast::hash(&data),
-        data,
-    })
+    Ok(EncodedFrame { codec, width, height, crc32: crc32fast::hash(&data), data })
 }
 
 /// Unpacks a frame to three bytes a pixel.
@@ -139,11 +118,7 @@ pub fn encode_frame(
 /// A size or data over the limits; a wrong checksum; data that does not decode to that size.
 pub fn decode_frame(frame: &EncodedFrame, limits: &DecodeLimits) -> Result<Vec<u8>, FrameError> {
     let pixels = limits.texels(frame.width, frame.height)?;
-    check_limit(
-        "frame data",
-        frame.data.len() as u64,
-        limits.max_payload_bytes as u64,
-    )?;
+    check_limit("frame data", frame.data.len() as u64, limits.max_payload_bytes as u64)?;
     if crc32fast::hash(&frame.data) != frame.crc32 {
         return Err(FrameError::Checksum);
     }
@@ -171,50 +146,35 @@ mod tests {
     }
 
     fn limits() -> DecodeLimits {
-        DecodeLimits {
-            max_texels: 1 << 16,
-            ..DecodeLimits::default()
-        }
+        DecodeLimits { max_texels: 1 << 16, ..DecodeLimits::default() }
     }
 
     #[test]
     fn lossless_is_lossless() {
         for (width, height) in [(1, 1), (3, 2), (200, 150)] {
             let rgb = picture(width, height);
-            let frame = encode_frame(FrameCodec::Lz4, width as u32, height as u32, &rgb)
-                .expect("right size");
+            let frame = encode_frame(FrameCodec::Lz4, width as u32, height as u32, &rgb).expect("right size");
             assert_eq!(decode_frame(&frame, &limits()).as_ref(), Ok(&rgb));
         }
     }
 
     #[test]
     fn gradients_pack_better_than_by_lz4_alone() {
-        let rgb: Vec<u8> = (0..200 * 150)
-            .flat_map(|i| [i % 200, i / 200, i % 200 / 2 + i / 400].map(|c| c as u8))
-            .collect();
+        let rgb: Vec<u8> =
+            (0..200 * 150).flat_map(|i| [i % 200, i / 200, i % 200 / 2 + i / 400].map(|c| c as u8)).collect();
         let frame = encode_frame(FrameCodec::Lz4, 200, 150, &rgb).expect("right size");
         assert!(frame.data.len() < lz4_flex::block::compress(&rgb).len());
     }
 
     #[test]
     fn jpeg_is_close() {
-        let rgb: Vec<u8> = (0..64 * 48)
-            .flat_map(|i| [(i % 64) as u8 * 2, (i / 64) as u8 * 3, 90])
-            .collect();
-        let frame =
-            encode_frame(FrameCodec::Jpeg { quality: 95 }, 64, 48, &rgb).expect("right size");
+        let rgb: Vec<u8> = (0..64 * 48).flat_map(|i| [(i % 64) as u8 * 2, (i / 64) as u8 * 3, 90]).collect();
+        let frame = encode_frame(FrameCodec::Jpeg { quality: 95 }, 64, 48, &rgb).expect("right size");
         let back = decode_frame(&frame, &limits()).expect("own encoding");
         assert_eq!(back.len(), rgb.len());
         assert!(rgb.iter().zip(&back).all(|(a, b)| a.abs_diff(*b) <= 12));
-        let wrong = EncodedFrame {
-            width: 48,
-            height: 64,
-            ..frame
-        };
-        assert!(matches!(
-            decode_frame(&wrong, &limits()),
-            Err(FrameError::Jpeg(_))
-        ));
+        let wrong = EncodedFrame { width: 48, height: 64, ..frame };
+        assert!(matches!(decode_frame(&wrong, &limits()), Err(FrameError::Jpeg(_))));
     }
 
     #[test]
@@ -228,15 +188,9 @@ mod tests {
                 let at = random.below(data.len());
                 data[at] ^= 1 << random.below(8);
                 data.truncate(if case % 3 == 0 { at } else { data.len() });
-                let bad = EncodedFrame {
-                    data: data.into(),
-                    ..good.clone()
-                };
+                let bad = EncodedFrame { data: data.into(), ..good.clone() };
                 assert_eq!(decode_frame(&bad, &limits()), Err(FrameError::Checksum));
-                let sealed = EncodedFrame {
-                    crc32: crc32fast::hash(&bad.data),
-                    ..bad
-                };
+                let sealed = EncodedFrame { crc32: crc32fast::hash(&bad.data), ..bad };
                 if let Ok(rgb) = decode_frame(&sealed, &limits()) {
                     assert_eq!(rgb.len(), 40 * 30 * 3);
                 }
@@ -246,30 +200,11 @@ mod tests {
 
     #[test]
     fn sizes_are_checked_first() {
-        assert!(matches!(
-            encode_frame(FrameCodec::Lz4, 2, 2, &[0; 11]),
-            Err(FrameError::Size { .. })
-        ));
+        assert!(matches!(encode_frame(FrameCodec::Lz4, 2, 2, &[0; 11]), Err(FrameError::Size { .. })));
         assert!(encode_frame(FrameCodec::Jpeg { quality: 0 }, 1, 1, &[0; 3]).is_err());
         let frame = encode_frame(FrameCodec::Lz4, 1, 1, &[1, 2, 3]).expect("right size");
-        for (width, height) in [
-            (0, 1),
-            (65_535, 65_535),
-            (16_384, 16_384),
-            (300, 300),
-            (9, 9),
-        ] {
-            assert!(
-                decode_frame(
-                    &EncodedFrame {
-                        width,
-                        height,
-                        ..frame.clone()
-                    },
-                    &limits()
-                )
-                .is_err()
-            );
+        for (width, height) in [(0, 1), (65_535, 65_535), (16_384, 16_384), (300, 300), (9, 9)] {
+            assert!(decode_frame(&EncodedFrame { width, height, ..frame.clone() }, &limits()).is_err());
         }
     }
 

@@ -25,30 +25,16 @@ pub fn unpack_u32_plane(data: &[u8], texels: usize) -> Result<Vec<u32>, DecodeEr
     let packed = expand_lz4_up_to(data, max_words_bytes(texels), "plane")?;
     let mut input = &packed[..];
     let words = unpack_words(&mut input, texels, WordLayout::Whole)?;
-    if input.is_empty() {
-        Ok(words)
-    } else {
-        Err(DecodeError::Corrupt {
-            field: "plane",
-            reason: "bytes left over",
-        })
-    }
+    if input.is_empty() { Ok(words) } else { Err(DecodeError::Corrupt { field: "plane", reason: "bytes left over" }) }
 }
 
 /// Packs a plane of inverse depths to the bit; what is not finite becomes a hole.
 #[must_use]
 pub fn pack_f32_plane(inverse_depth_per_m: &[f32]) -> Vec<u8> {
     let finite = |&value: &f32| {
-        if value.is_finite() {
-            value
-        } else {
-            HOLE_INVERSE_DEPTH
-        }
+        if value.is_finite() { value } else { HOLE_INVERSE_DEPTH }
     };
-    let words: Vec<u32> = inverse_depth_per_m
-        .iter()
-        .map(|value| finite(value).to_bits())
-        .collect();
+    let words: Vec<u32> = inverse_depth_per_m.iter().map(|value| finite(value).to_bits()).collect();
     pack_u32_plane(&words)
 }
 
@@ -57,17 +43,11 @@ pub fn pack_f32_plane(inverse_depth_per_m: &[f32]) -> Vec<u8> {
 /// # Errors
 /// Data that does not decode to exactly so many, or to anything that is not finite.
 pub fn unpack_f32_plane(data: &[u8], texels: usize) -> Result<Vec<f32>, DecodeError> {
-    let plane: Vec<f32> = unpack_u32_plane(data, texels)?
-        .into_iter()
-        .map(f32::from_bits)
-        .collect();
+    let plane: Vec<f32> = unpack_u32_plane(data, texels)?.into_iter().map(f32::from_bits).collect();
     if plane.iter().all(|value| value.is_finite()) {
         return Ok(plane);
     }
-    Err(DecodeError::Corrupt {
-        field: "plane",
-        reason: "not finite",
-    })
+    Err(DecodeError::Corrupt { field: "plane", reason: "not finite" })
 }
 
 #[cfg(test)]
@@ -83,19 +63,13 @@ mod tests {
         assert!(packed.len() < lz4_flex::block::compress(&raw).len());
         assert_eq!(unpack_f32_plane(&packed, plane.len()), Ok(plane));
         let words: Vec<u32> = (0..30_000).map(|i| i / 700 * 0x0101).collect();
-        assert_eq!(
-            unpack_u32_plane(&pack_u32_plane(&words), words.len()),
-            Ok(words)
-        );
+        assert_eq!(unpack_u32_plane(&pack_u32_plane(&words), words.len()), Ok(words));
     }
 
     #[test]
     fn nothing_that_is_not_finite_comes_out() {
         let packed = pack_f32_plane(&[0.5, f32::NAN, f32::INFINITY, -0.0]);
-        assert_eq!(
-            unpack_f32_plane(&packed, 4),
-            Ok(vec![0.5, HOLE_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, 0.0])
-        );
+        assert_eq!(unpack_f32_plane(&packed, 4), Ok(vec![0.5, HOLE_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, 0.0]));
         assert!(unpack_f32_plane(&pack_u32_plane(&[f32::NAN.to_bits()]), 1).is_err());
     }
 

@@ -35,21 +35,12 @@ pub fn encode_depth_image(
     let runs = &depth.runs;
     let mut packer = Packer::default();
     packer.push(PlaneKind::InverseDepth, &depth.bytes);
-    packer.push(
-        PlaneKind::ColorRgb9e5,
-        &raw(|out| pack_colors(&runs.gather(&image.color_rgb9e5), out)),
-    );
+    packer.push(PlaneKind::ColorRgb9e5, &raw(|out| pack_colors(&runs.gather(&image.color_rgb9e5), out)));
     if let Some(normals) = image.normal_oct16.as_ref().filter(|_| planes.normal) {
-        packer.push(
-            PlaneKind::NormalOct16,
-            &raw(|out| pack_words(&runs.gather(normals), WordLayout::Halves, out)),
-        );
+        packer.push(PlaneKind::NormalOct16, &raw(|out| pack_words(&runs.gather(normals), WordLayout::Halves, out)));
     }
     if let Some(ids) = image.surface_id.as_ref().filter(|_| planes.surface_id) {
-        packer.push(
-            PlaneKind::SurfaceId,
-            &raw(|out| pack_surface_ids(&runs.gather(ids), out)),
-        );
+        packer.push(PlaneKind::SurfaceId, &raw(|out| pack_surface_ids(&runs.gather(ids), out)));
     }
     let size_px = image.size_px();
     Ok(EncodedDepthImage {
@@ -77,19 +68,11 @@ pub fn decode_depth_image(
     let texels = header.validate(limits)?;
     check_camera(header, &camera)?;
     if payload.len() as u64 != header.payload_bytes() {
-        return Err(DecodeError::Corrupt {
-            field: "payload",
-            reason: "not as long as the header says",
-        });
+        return Err(DecodeError::Corrupt { field: "payload", reason: "not as long as the header says" });
     }
     let (runs, inverse_depth_per_m, others) = decode_depth_plane(header, payload, texels)?;
-    let mut image = DepthImage {
-        camera,
-        inverse_depth_per_m,
-        color_rgb9e5: Vec::new(),
-        normal_oct16: None,
-        surface_id: None,
-    };
+    let mut image =
+        DepthImage { camera, inverse_depth_per_m, color_rgb9e5: Vec::new(), normal_oct16: None, surface_id: None };
     let mut packed = others;
     for plane in header.planes.iter().skip(1) {
         decode_plane(plane, &mut packed, &runs, &mut image)?;
@@ -129,12 +112,7 @@ fn check_camera(header: &ImageHeader, camera: &Camera) -> Result<(), DecodeError
     if (width, height) == (camera_width, camera_height) {
         return Ok(());
     }
-    Err(DecodeError::CameraSize {
-        width,
-        height,
-        camera_width,
-        camera_height,
-    })
+    Err(DecodeError::CameraSize { width, height, camera_width, camera_height })
 }
 
 /// The runs, the plane, and the bytes of the other planes.
@@ -144,10 +122,7 @@ fn decode_depth_plane<'a>(
     texels: usize,
 ) -> Result<(Runs, Vec<f32>, &'a [u8]), DecodeError> {
     let mut packed = payload;
-    let plane = header.planes.first().ok_or(DecodeError::Header {
-        field: "planes",
-        reason: "none",
-    })?;
+    let plane = header.planes.first().ok_or(DecodeError::Header { field: "planes", reason: "none" })?;
     let raw = expand_plane(plane, &mut packed)?;
     let (runs, inverse_depth_per_m) = decode_depth(&raw, texels, header.inverse_depth_range)?;
     Ok((runs, inverse_depth_per_m, packed))
@@ -155,13 +130,9 @@ fn decode_depth_plane<'a>(
 
 fn expand_plane(plane: &PlaneHeader, packed: &mut &[u8]) -> Result<Vec<u8>, DecodeError> {
     let field = plane.kind.name();
-    let (own, rest) =
-        packed
-            .split_at_checked(plane.packed_bytes as usize)
-            .ok_or(DecodeError::Corrupt {
-                field,
-                reason: "ends too early",
-            })?;
+    let (own, rest) = packed
+        .split_at_checked(plane.packed_bytes as usize)
+        .ok_or(DecodeError::Corrupt { field, reason: "ends too early" })?;
     *packed = rest;
     expand_lz4(own, plane.raw_bytes as usize, field)
 }
@@ -177,34 +148,24 @@ fn decode_plane(
     let samples = runs.sample_count();
     match plane.kind {
         PlaneKind::InverseDepth => {}
-        PlaneKind::ColorRgb9e5 => {
-            image.color_rgb9e5 = runs.scatter(&unpack_colors(&mut input, samples)?, 0)
-        }
+        PlaneKind::ColorRgb9e5 => image.color_rgb9e5 = runs.scatter(&unpack_colors(&mut input, samples)?, 0),
         PlaneKind::NormalOct16 => {
             let normals = unpack_words(&mut input, samples, WordLayout::Halves)?;
             image.normal_oct16 = Some(runs.scatter(&normals, 0));
         }
         PlaneKind::SurfaceId => {
-            let nothing = SurfaceId {
-                instance: 0,
-                primitive: 0,
-            };
-            image.surface_id =
-                Some(runs.scatter(&unpack_surface_ids(&mut input, samples)?, nothing));
+            let nothing = SurfaceId { instance: 0, primitive: 0 };
+            image.surface_id = Some(runs.scatter(&unpack_surface_ids(&mut input, samples)?, nothing));
         }
     }
     if input.is_empty() {
         return Ok(());
     }
-    Err(DecodeError::Corrupt {
-        field: plane.kind.name(),
-        reason: "bytes left over",
-    })
+    Err(DecodeError::Corrupt { field: plane.kind.name(), reason: "bytes left over" })
 }
 
 fn pack_surface_ids(ids: &[SurfaceId], out: &mut Vec<u8>) {
-    let (instances, primitives): (Vec<_>, Vec<_>) =
-        ids.iter().map(|id| (id.instance, id.primitive)).unzip();
+    let (instances, primitives): (Vec<_>, Vec<_>) = ids.iter().map(|id| (id.instance, id.primitive)).unzip();
     pack_words(&instances, WordLayout::Whole, out);
     pack_words(&primitives, WordLayout::Whole, out);
 }
@@ -213,12 +174,7 @@ fn unpack_surface_ids(input: &mut &[u8], count: usize) -> Result<Vec<SurfaceId>,
     let instances = unpack_words(input, count, WordLayout::Whole)?;
     let primitives = unpack_words(input, count, WordLayout::Whole)?;
     let pairs = instances.into_iter().zip(primitives);
-    Ok(pairs
-        .map(|(instance, primitive)| SurfaceId {
-            instance,
-            primitive,
-        })
-        .collect())
+    Ok(pairs.map(|(instance, primitive)| SurfaceId { instance, primitive }).collect())
 }
 
 #[cfg(test)]

@@ -10,66 +10,27 @@ use crate::codec::{
 };
 
 fn camera(width: u32, height: u32) -> Camera {
-    Camera::Pinhole(PinholeCamera::looking_at(
-        Vec3::Y,
-        Vec3::ZERO,
-        Vec3::Y,
-        0.8,
-        UVec2::new(width, height),
-    ))
+    Camera::Pinhole(PinholeCamera::looking_at(Vec3::Y, Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(width, height)))
 }
 
 fn image(width: u32, height: u32) -> DepthImage {
     let mut random = Random::new(8);
     let mut inverse_depth_per_m = tree_over_terrain(width as usize, height as usize, 9);
-    inverse_depth_per_m
-        .iter_mut()
-        .skip(5)
-        .step_by(97)
-        .for_each(|texel| *texel = depth_image::HOLE_INVERSE_DEPTH);
+    inverse_depth_per_m.iter_mut().skip(5).step_by(97).for_each(|texel| *texel = depth_image::HOLE_INVERSE_DEPTH);
     // As decoded: nothing where there is no sample.
     let mut word = |inverse: &f32, bits: u32| {
-        if *inverse > 0.0 {
-            random.next_u32() >> (32 - bits)
-        } else {
-            0
-        }
+        if *inverse > 0.0 { random.next_u32() >> (32 - bits) } else { 0 }
     };
-    let color_rgb9e5 = inverse_depth_per_m
-        .iter()
-        .map(|inverse| word(inverse, 25))
-        .collect();
-    let normal_oct16 = Some(
-        inverse_depth_per_m
-            .iter()
-            .map(|inverse| word(inverse, 32))
-            .collect(),
-    );
-    let id = |inverse| SurfaceId {
-        instance: word(inverse, 2),
-        primitive: word(inverse, 17),
-    };
+    let color_rgb9e5 = inverse_depth_per_m.iter().map(|inverse| word(inverse, 25)).collect();
+    let normal_oct16 = Some(inverse_depth_per_m.iter().map(|inverse| word(inverse, 32)).collect());
+    let id = |inverse| SurfaceId { instance: word(inverse, 2), primitive: word(inverse, 17) };
     let surface_id = Some(inverse_depth_per_m.iter().map(id).collect());
-    DepthImage {
-        camera: camera(width, height),
-        inverse_depth_per_m,
-        color_rgb9e5,
-        normal_oct16,
-        surface_id,
-    }
+    DepthImage { camera: camera(width, height), inverse_depth_per_m, color_rgb9e5, normal_oct16, surface_id }
 }
 
 fn decode(image: &EncodedDepthImage) -> Result<DepthImage, DecodeError> {
-    let limits = DecodeLimits {
-        max_texels: 1 << 16,
-        ..DecodeLimits::default()
-    };
-    decode_depth_image(
-        &image.header,
-        camera(image.header.width, image.header.height),
-        &image.payload,
-        &limits,
-    )
+    let limits = DecodeLimits { max_texels: 1 << 16, ..DecodeLimits::default() };
+    decode_depth_image(&image.header, camera(image.header.width, image.header.height), &image.payload, &limits)
 }
 
 #[test]
@@ -79,40 +40,19 @@ fn an_image_survives() {
         let encoded = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
         let back = decode(&encoded).expect("own encoding");
         let half_step = encoded.header.inverse_depth_range.half_step_per_m() as f32 * 1.01;
-        for (&was, &is) in image
-            .inverse_depth_per_m
-            .iter()
-            .zip(&back.inverse_depth_per_m)
-        {
+        for (&was, &is) in image.inverse_depth_per_m.iter().zip(&back.inverse_depth_per_m) {
             assert!((was - is).abs() <= half_step && (was > 0.0 || was == is));
         }
-        let DepthImage {
-            inverse_depth_per_m,
-            ..
-        } = &back;
-        assert_eq!(
-            back,
-            DepthImage {
-                inverse_depth_per_m: inverse_depth_per_m.clone(),
-                ..image
-            }
-        );
+        let DepthImage { inverse_depth_per_m, .. } = &back;
+        assert_eq!(back, DepthImage { inverse_depth_per_m: inverse_depth_per_m.clone(), ..image });
     }
 }
 
 #[test]
 fn planes_travel_only_when_asked_for() {
-    let encoded =
-        encode_depth_image(&image(20, 20), PlaneSet::DEPTH_COLOR).expect("consistent planes");
+    let encoded = encode_depth_image(&image(20, 20), PlaneSet::DEPTH_COLOR).expect("consistent planes");
     let back = decode(&encoded).expect("own encoding");
-    assert_eq!(
-        (
-            encoded.header.planes.len(),
-            back.normal_oct16,
-            back.surface_id
-        ),
-        (2, None, None)
-    );
+    assert_eq!((encoded.header.planes.len(), back.normal_oct16, back.surface_id), (2, None, None));
 }
 
 #[test]
@@ -126,9 +66,7 @@ fn inconsistent_planes_are_refused() {
 fn assert_sound(result: Result<DepthImage, DecodeError>) {
     let Ok(image) = result else { return };
     assert_eq!(image.validate(), Ok(()));
-    let sound = |&inverse: &f32| {
-        inverse.is_finite() && (inverse >= 0.0 || inverse == depth_image::HOLE_INVERSE_DEPTH)
-    };
+    let sound = |&inverse: &f32| inverse.is_finite() && (inverse >= 0.0 || inverse == depth_image::HOLE_INVERSE_DEPTH);
     assert!(image.inverse_depth_per_m.iter().all(sound));
 }
 
@@ -157,17 +95,9 @@ fn damaged_planes_behind_a_sound_lz4_never_panic() {
         let mut bytes = depth.bytes.clone();
         let at = random.below(bytes.len());
         bytes[at] = random.next_u32() as u8;
-        bytes.truncate(if random.below(4) == 0 {
-            random.below(bytes.len())
-        } else {
-            bytes.len()
-        });
+        bytes.truncate(if random.below(4) == 0 { random.below(bytes.len()) } else { bytes.len() });
         if let Ok((_, plane)) = decode_depth(&bytes, 48 * 32, depth.range) {
-            assert!(
-                plane
-                    .iter()
-                    .all(|&inverse| inverse.is_finite() && inverse <= depth.range.greatest_per_m)
-            );
+            assert!(plane.iter().all(|&inverse| inverse.is_finite() && inverse <= depth.range.greatest_per_m));
         }
     }
 }
@@ -176,23 +106,12 @@ fn damaged_planes_behind_a_sound_lz4_never_panic() {
 fn cut_and_random_payloads_are_refused() {
     let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
     for length in 0..good.payload.len() {
-        assert!(
-            decode(&EncodedDepthImage {
-                payload: good.payload.slice(..length),
-                ..good.clone()
-            })
-            .is_err()
-        );
+        assert!(decode(&EncodedDepthImage { payload: good.payload.slice(..length), ..good.clone() }).is_err());
     }
     let mut random = Random::new(12);
     for _ in 0..2000 {
-        let payload: Vec<u8> = (0..good.payload.len())
-            .map(|_| random.next_u32() as u8)
-            .collect();
-        assert_sound(decode(&EncodedDepthImage {
-            payload: payload.into(),
-            ..good.clone()
-        }));
+        let payload: Vec<u8> = (0..good.payload.len()).map(|_| random.next_u32() as u8).collect();
+        assert_sound(decode(&EncodedDepthImage { payload: payload.into(), ..good.clone() }));
     }
 }
 
@@ -205,20 +124,11 @@ fn damaged_headers_are_named() {
         ("width", |h| h.width = 65_535),
         ("texels", |h| (h.width, h.height) = (16_384, 16_384)),
         ("payload runs", |h| h.height += 1),
-        ("inverse_depth_range", |h| {
-            h.inverse_depth_range.least_per_m = f32::NAN
-        }),
-        ("payload runs", |h| {
-            h.inverse_depth_range = InverseDepthRange {
-                least_per_m: 0.0,
-                greatest_per_m: 0.0,
-            }
-        }),
+        ("inverse_depth_range", |h| h.inverse_depth_range.least_per_m = f32::NAN),
+        ("payload runs", |h| h.inverse_depth_range = InverseDepthRange { least_per_m: 0.0, greatest_per_m: 0.0 }),
         ("planes.kind", |h| h.planes.clear()),
         ("planes.kind", |h| h.planes[2].kind = PlaneKind::ColorRgb9e5),
-        ("planes.encoding", |h| {
-            h.planes[1].encoding = PlaneEncoding::SlopeTaggedLz4
-        }),
+        ("planes.encoding", |h| h.planes[1].encoding = PlaneEncoding::SlopeTaggedLz4),
         ("planes.raw_bytes", |h| h.planes[3].raw_bytes = u32::MAX),
         ("payload_bytes", |h| h.planes[3].packed_bytes = u32::MAX),
         ("LZ4 block is too short", |h| h.planes[0].raw_bytes += 1),
@@ -234,19 +144,13 @@ fn damaged_headers_are_named() {
 #[test]
 fn the_camera_must_have_the_images_size() {
     let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
-    let result = decode_depth_image(
-        &good.header,
-        camera(32, 48),
-        &good.payload,
-        &DecodeLimits::default(),
-    );
+    let result = decode_depth_image(&good.header, camera(32, 48), &good.payload, &DecodeLimits::default());
     assert!(matches!(result, Err(DecodeError::CameraSize { .. })));
 }
 
 #[test]
 fn a_small_payload_does_not_claim_a_large_buffer() {
-    let mut bad =
-        encode_depth_image(&image(200, 200), PlaneSet::DEPTH_COLOR).expect("consistent planes");
+    let mut bad = encode_depth_image(&image(200, 200), PlaneSet::DEPTH_COLOR).expect("consistent planes");
     bad.header.planes[0].packed_bytes = 2;
     bad.header.planes[1].packed_bytes = 2;
     bad.payload = Bytes::from_static(&[0xff, 0xff, 0xff, 0xff]);

@@ -3,8 +3,8 @@
 use std::hash::Hasher;
 
 use super::{
-    DecodeError, DecodeLimits, InverseDepthRange, color_codec::max_colors_bytes,
-    depth_codec::max_unpacked_bytes, error::check_limit, words_codec::max_words_bytes,
+    DecodeError, DecodeLimits, InverseDepthRange, color_codec::max_colors_bytes, depth_codec::max_unpacked_bytes,
+    error::check_limit, words_codec::max_words_bytes,
 };
 
 /// What a plane holds.
@@ -35,9 +35,7 @@ impl PlaneKind {
     pub const fn encoding(self) -> PlaneEncoding {
         match self {
             Self::InverseDepth => PlaneEncoding::SlopeTaggedLz4,
-            Self::ColorRgb9e5 | Self::NormalOct16 | Self::SurfaceId => {
-                PlaneEncoding::DifferenceTaggedLz4
-            }
+            Self::ColorRgb9e5 | Self::NormalOct16 | Self::SurfaceId => PlaneEncoding::DifferenceTaggedLz4,
         }
     }
 
@@ -97,15 +95,9 @@ pub struct PlaneSet {
 
 impl PlaneSet {
     /// Inverse depth and colour only.
-    pub const DEPTH_COLOR: Self = Self {
-        normal: false,
-        surface_id: false,
-    };
+    pub const DEPTH_COLOR: Self = Self { normal: false, surface_id: false };
     /// Whatever the image has.
-    pub const ALL: Self = Self {
-        normal: true,
-        surface_id: true,
-    };
+    pub const ALL: Self = Self { normal: true, surface_id: true };
 }
 
 /// Size, planes and range of an encoded depth image. The camera travels beside it.
@@ -132,22 +124,11 @@ impl ImageHeader {
         self.validate_kinds()?;
         for plane in &self.planes {
             if plane.encoding != plane.kind.encoding() {
-                return Err(DecodeError::Header {
-                    field: "planes.encoding",
-                    reason: "not the encoding of this kind",
-                });
+                return Err(DecodeError::Header { field: "planes.encoding", reason: "not the encoding of this kind" });
             }
-            check_limit(
-                "planes.raw_bytes",
-                u64::from(plane.raw_bytes),
-                plane.kind.max_raw_bytes(texels) as u64,
-            )?;
+            check_limit("planes.raw_bytes", u64::from(plane.raw_bytes), plane.kind.max_raw_bytes(texels) as u64)?;
         }
-        check_limit(
-            "payload_bytes",
-            self.payload_bytes(),
-            limits.max_payload_bytes as u64,
-        )?;
+        check_limit("payload_bytes", self.payload_bytes(), limits.max_payload_bytes as u64)?;
         Ok(texels)
     }
 
@@ -160,19 +141,13 @@ impl ImageHeader {
             Some([PlaneKind::NormalOct16, PlaneKind::SurfaceId]) => return Ok(()),
             Some(_) => "repeated, unknown or out of order",
         };
-        Err(DecodeError::Header {
-            field: "planes.kind",
-            reason,
-        })
+        Err(DecodeError::Header { field: "planes.kind", reason })
     }
 
     /// Bytes of all planes in the payload.
     #[must_use]
     pub fn payload_bytes(&self) -> u64 {
-        self.planes
-            .iter()
-            .map(|plane| u64::from(plane.packed_bytes))
-            .sum()
+        self.planes.iter().map(|plane| u64::from(plane.packed_bytes)).sum()
     }
 
     /// CRC-32 of every field, for the chunk that carries the header.
@@ -180,12 +155,7 @@ impl ImageHeader {
     pub fn crc32(&self) -> u32 {
         let mut hasher = crc32fast::Hasher::new();
         let range = self.inverse_depth_range;
-        for word in [
-            self.width,
-            self.height,
-            range.least_per_m.to_bits(),
-            range.greatest_per_m.to_bits(),
-        ] {
+        for word in [self.width, self.height, range.least_per_m.to_bits(), range.greatest_per_m.to_bits()] {
             hasher.update(&word.to_le_bytes());
         }
         for plane in &self.planes {

@@ -8,30 +8,14 @@ use jpeg_encoder::Encoder;
 use super::FrameError;
 
 /// Packs three bytes a pixel.
-pub(super) fn encode(
-    width: u32,
-    height: u32,
-    rgb: &[u8],
-    quality: u8,
-) -> Result<Vec<u8>, FrameError> {
+pub(super) fn encode(width: u32, height: u32, rgb: &[u8], quality: u8) -> Result<Vec<u8>, FrameError> {
     if !(1..=100).contains(&quality) {
         return Err(FrameError::Quality(quality));
     }
-    let side = |side: u32| {
-        u16::try_from(side).map_err(|_| FrameError::Size {
-            width,
-            height,
-            rgb_bytes: rgb.len(),
-        })
-    };
+    let side = |side: u32| u16::try_from(side).map_err(|_| FrameError::Size { width, height, rgb_bytes: rgb.len() });
     let mut data = Vec::new();
     Encoder::new(&mut data, quality)
-        .encode(
-            rgb,
-            side(width)?,
-            side(height)?,
-            jpeg_encoder::ColorType::Rgb,
-        )
+        .encode(rgb, side(width)?, side(height)?, jpeg_encoder::ColorType::Rgb)
         .map_err(|error| FrameError::Jpeg(error.to_string()))?;
     Ok(data)
 }
@@ -41,9 +25,7 @@ pub(super) fn decode(width: u32, height: u32, data: &[u8]) -> Result<Vec<u8>, Fr
     let jpeg_error = |error: image::ImageError| FrameError::Jpeg(error.to_string());
     let mut decoder = JpegDecoder::new(Cursor::new(data)).map_err(jpeg_error)?;
     if decoder.dimensions() != (width, height) || decoder.color_type() != ColorType::Rgb8 {
-        return Err(FrameError::Jpeg(format!(
-            "not an RGB picture of {width}×{height}"
-        )));
+        return Err(FrameError::Jpeg(format!("not an RGB picture of {width}×{height}")));
     }
     let mut limits = Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(width), Some(height));

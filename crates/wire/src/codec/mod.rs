@@ -27,13 +27,9 @@ mod test_planes;
 mod words_codec;
 
 pub use chunk::{Chunk, ChunkBody, MAX_CHUNK_BYTES, SampleSetId, split_into_chunks};
-pub use depth_plane::{
-    EncodedDepthPlane, decode_depth_plane, encode_depth_plane, inverse_depth_codes,
-};
+pub use depth_plane::{EncodedDepthPlane, decode_depth_plane, encode_depth_plane, inverse_depth_codes};
 pub use error::{DecodeError, DecodeLimits};
-pub use frame_codec::{
-    EncodedFrame, FrameCodec, FrameError, ParseFrameCodecError, decode_frame, encode_frame,
-};
+pub use frame_codec::{EncodedFrame, FrameCodec, FrameError, ParseFrameCodecError, decode_frame, encode_frame};
 pub use frame_planes::{pack_f32_plane, pack_u32_plane, unpack_f32_plane, unpack_u32_plane};
 pub use image_codec::{EncodedDepthImage, decode_depth_image, encode_depth_image};
 pub use image_header::{ImageHeader, PlaneEncoding, PlaneHeader, PlaneKind, PlaneSet};

@@ -40,11 +40,7 @@ impl InverseDepthRange {
                 let finite = if value <= f32::MAX { value } else { 0.0 };
                 let positive = if finite > 0.0 { finite } else { f32::INFINITY };
                 *least = if positive < *least { positive } else { *least };
-                *greatest = if finite > *greatest {
-                    finite
-                } else {
-                    *greatest
-                };
+                *greatest = if finite > *greatest { finite } else { *greatest };
             }
         };
         let (blocks, rest) = inverse_depth_per_m.as_chunks::<LANES>();
@@ -54,10 +50,7 @@ impl InverseDepthRange {
         widen(&last);
         let greatest_per_m = greatest.into_iter().fold(0.0, f32::max);
         let least_per_m = least.into_iter().fold(greatest_per_m, f32::min);
-        Self {
-            least_per_m,
-            greatest_per_m,
-        }
+        Self { least_per_m, greatest_per_m }
     }
 
     /// Half the distance between neighbouring codes: the bound on the error of a round trip.
@@ -68,20 +61,12 @@ impl InverseDepthRange {
 
     /// Refuses ranges that would decode to anything but positive, finite inverse depths.
     pub(super) fn validate(self) -> Result<(), DecodeError> {
-        let Self {
-            least_per_m,
-            greatest_per_m,
-        } = self;
+        let Self { least_per_m, greatest_per_m } = self;
         let empty = least_per_m == 0.0 && greatest_per_m == 0.0;
-        if empty
-            || (least_per_m > 0.0 && least_per_m <= greatest_per_m && greatest_per_m <= f32::MAX)
-        {
+        if empty || (least_per_m > 0.0 && least_per_m <= greatest_per_m && greatest_per_m <= f32::MAX) {
             return Ok(());
         }
-        Err(DecodeError::Header {
-            field: "inverse_depth_range",
-            reason: "not 0 < least <= greatest < infinity",
-        })
+        Err(DecodeError::Header { field: "inverse_depth_range", reason: "not 0 < least <= greatest < infinity" })
     }
 
     pub(super) fn is_empty(self) -> bool {
@@ -108,11 +93,7 @@ pub(super) fn quantise(inverse_depth_per_m: &[f32], range: InverseDepthRange, co
 }
 
 /// Inverse depths of sample codes. Whatever the codes, the results lie within the range.
-pub(super) fn dequantise(
-    sample_codes: &[u16],
-    range: InverseDepthRange,
-    inverse_depth_per_m: &mut [f32],
-) {
+pub(super) fn dequantise(sample_codes: &[u16], range: InverseDepthRange, inverse_depth_per_m: &mut [f32]) {
     let least = f64::from(range.least_per_m);
     let step = range.step_per_m();
     for (out, code) in inverse_depth_per_m.iter_mut().zip(sample_codes) {
@@ -123,11 +104,7 @@ pub(super) fn dequantise(
 
 /// What stands in the plane for a code without a sample.
 pub(super) fn empty_inverse_depth(code: u16) -> f32 {
-    if code == BACKGROUND_CODE {
-        BACKGROUND_INVERSE_DEPTH
-    } else {
-        HOLE_INVERSE_DEPTH
-    }
+    if code == BACKGROUND_CODE { BACKGROUND_INVERSE_DEPTH } else { HOLE_INVERSE_DEPTH }
 }
 
 #[cfg(test)]
@@ -141,11 +118,7 @@ mod tests {
         quantise(plane, range, &mut codes);
         let mut back = vec![0.0; plane.len()];
         dequantise(&codes, range, &mut back);
-        for (out, &code) in back
-            .iter_mut()
-            .zip(&codes)
-            .filter(|(_, code)| **code < FIRST_SAMPLE_CODE)
-        {
+        for (out, &code) in back.iter_mut().zip(&codes).filter(|(_, code)| **code < FIRST_SAMPLE_CODE) {
             *out = empty_inverse_depth(code);
         }
         (range, back)
@@ -158,18 +131,12 @@ mod tests {
             let scale = 10f32.powi(case % 60 - 30);
             let offset = if case % 3 == 0 { scale * 1000.0 } else { 0.0 };
             let length = 1 + random.below(60);
-            let plane: Vec<f32> = (0..length)
-                .map(|_| offset + scale * (random.unit() + 1e-6))
-                .collect();
+            let plane: Vec<f32> = (0..length).map(|_| offset + scale * (random.unit() + 1e-6)).collect();
             let (range, back) = round_trip(&plane);
             for (&was, &is) in plane.iter().zip(&back) {
-                let rounding =
-                    f64::from(is) * f64::from(f32::EPSILON) * 0.5 + f64::from(f32::from_bits(1));
+                let rounding = f64::from(is) * f64::from(f32::EPSILON) * 0.5 + f64::from(f32::from_bits(1));
                 let error = (f64::from(was) - f64::from(is)).abs();
-                assert!(
-                    error <= range.half_step_per_m() * (1.0 + 1e-3) + rounding,
-                    "{was} {is} {range:?}"
-                );
+                assert!(error <= range.half_step_per_m() * (1.0 + 1e-3) + rounding, "{was} {is} {range:?}");
             }
         }
     }
@@ -193,43 +160,17 @@ mod tests {
     #[test]
     fn what_is_not_finite_becomes_a_hole() {
         let hole = HOLE_INVERSE_DEPTH;
-        let (range, back) = round_trip(&[
-            f32::NAN,
-            f32::INFINITY,
-            f32::NEG_INFINITY,
-            -0.5,
-            -0.0,
-            0.5,
-            0.25,
-        ]);
+        let (range, back) = round_trip(&[f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.5, -0.0, 0.5, 0.25]);
         assert_eq!(back, [hole, hole, hole, hole, 0.0, 0.5, 0.25]);
-        assert_eq!(
-            range,
-            InverseDepthRange {
-                least_per_m: 0.25,
-                greatest_per_m: 0.5
-            }
-        );
+        assert_eq!(range, InverseDepthRange { least_per_m: 0.25, greatest_per_m: 0.5 });
     }
 
     #[test]
     fn ranges_that_could_yield_nonsense_are_refused() {
-        for (least_per_m, greatest_per_m) in [
-            (f32::NAN, 1.0),
-            (0.5, f32::NAN),
-            (0.5, f32::INFINITY),
-            (-1.0, 1.0),
-            (0.0, 1.0),
-            (2.0, 1.0),
-        ] {
-            assert!(
-                InverseDepthRange {
-                    least_per_m,
-                    greatest_per_m
-                }
-                .validate()
-                .is_err()
-            );
+        for (least_per_m, greatest_per_m) in
+            [(f32::NAN, 1.0), (0.5, f32::NAN), (0.5, f32::INFINITY), (-1.0, 1.0), (0.0, 1.0), (2.0, 1.0)]
+        {
+            assert!(InverseDepthRange { least_per_m, greatest_per_m }.validate().is_err());
         }
     }
 }

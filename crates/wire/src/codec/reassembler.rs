@@ -3,8 +3,8 @@
 use bytes::{Bytes, BytesMut};
 
 use super::{
-    Chunk, ChunkBody, DecodeError, DecodeLimits, EncodedDepthImage, ImageHeader, MAX_CHUNK_BYTES,
-    SampleSetId, chunk::chunk_count,
+    Chunk, ChunkBody, DecodeError, DecodeLimits, EncodedDepthImage, ImageHeader, MAX_CHUNK_BYTES, SampleSetId,
+    chunk::chunk_count,
 };
 
 /// An image whose chunks have all come.
@@ -38,9 +38,7 @@ pub enum ChunkError {
         expected: u32,
     },
     /// Chunks were lost or overtaken.
-    #[error(
-        "chunk {got} of image {image_index} in sample set {sample_set_id}, but chunk {expected} is missing"
-    )]
+    #[error("chunk {got} of image {image_index} in sample set {sample_set_id}, but chunk {expected} is missing")]
     Missing {
         /// The set under way.
         sample_set_id: SampleSetId,
@@ -108,12 +106,7 @@ impl Reassembler {
     /// Nothing before `oldest` is accepted, nor any image over `limits`.
     #[must_use]
     pub fn new(limits: DecodeLimits, oldest: SampleSetId) -> Self {
-        Self {
-            limits,
-            oldest,
-            under_way: None,
-            abandoned: 0,
-        }
+        Self { limits, oldest, under_way: None, abandoned: 0 }
     }
 
     /// Refuses sets before `oldest` from now on; an unfinished image of one is dropped.
@@ -135,10 +128,7 @@ impl Reassembler {
     /// See [`ChunkError`].
     pub fn push(&mut self, chunk: Chunk) -> Result<Option<Reassembled>, ChunkError> {
         if chunk.sample_set_id < self.oldest {
-            return Err(ChunkError::StaleSet {
-                got: chunk.sample_set_id,
-                oldest: self.oldest,
-            });
+            return Err(ChunkError::StaleSet { got: chunk.sample_set_id, oldest: self.oldest });
         }
         self.check_sequence(&chunk)?;
         let result = self.accept(chunk);
@@ -154,27 +144,15 @@ impl Reassembler {
         let Some(image) = &self.under_way else {
             return Ok(());
         };
-        let (sample_set_id, image_index, expected) =
-            (image.sample_set_id, image.image_index, image.next_sequence);
-        if (chunk.sample_set_id, chunk.image_index) == (sample_set_id, image_index)
-            && got <= expected
-        {
-            return if got == expected {
-                Ok(())
-            } else {
-                Err(ChunkError::Duplicate { got, expected })
-            };
+        let (sample_set_id, image_index, expected) = (image.sample_set_id, image.image_index, image.next_sequence);
+        if (chunk.sample_set_id, chunk.image_index) == (sample_set_id, image_index) && got <= expected {
+            return if got == expected { Ok(()) } else { Err(ChunkError::Duplicate { got, expected }) };
         }
         self.abandon();
         if got == 0 && chunk.sample_set_id > sample_set_id {
             return Ok(());
         }
-        Err(ChunkError::Missing {
-            sample_set_id,
-            image_index,
-            got,
-            expected,
-        })
+        Err(ChunkError::Missing { sample_set_id, image_index, got, expected })
     }
 
     fn abandon(&mut self) {
@@ -182,41 +160,25 @@ impl Reassembler {
     }
 
     fn accept(&mut self, chunk: Chunk) -> Result<Option<Reassembled>, ChunkError> {
-        let Chunk {
-            sequence,
-            image_index,
-            ..
-        } = chunk;
+        let Chunk { sequence, image_index, .. } = chunk;
         if chunk.body.crc32() != chunk.crc32 {
             return Err(ChunkError::Checksum { sequence });
         }
         match (sequence, chunk.body, &mut self.under_way) {
             (0, ChunkBody::Header(header), under_way) => {
                 check_header(&header, chunk.chunk_count, &self.limits)?;
-                let image =
-                    UnderWay::new(chunk.sample_set_id, image_index, chunk.chunk_count, header);
+                let image = UnderWay::new(chunk.sample_set_id, image_index, chunk.chunk_count, header);
                 *under_way = Some(image);
             }
-            (1.., ChunkBody::Data(data), Some(image)) => {
-                image.append(sequence, chunk.chunk_count, data)?
-            }
+            (1.., ChunkBody::Data(data), Some(image)) => image.append(sequence, chunk.chunk_count, data)?,
             (1.., ChunkBody::Data(_), None) => {
-                return Err(ChunkError::NoHeader {
-                    image_index,
-                    got: sequence,
-                });
+                return Err(ChunkError::NoHeader { image_index, got: sequence });
             }
             _ => {
-                return Err(ChunkError::Malformed {
-                    sequence,
-                    field: "body",
-                });
+                return Err(ChunkError::Malformed { sequence, field: "body" });
             }
         }
-        Ok(self
-            .under_way
-            .take_if(|image| image.next_sequence == image.chunk_count)
-            .map(UnderWay::finish))
+        Ok(self.under_way.take_if(|image| image.next_sequence == image.chunk_count).map(UnderWay::finish))
     }
 }
 
@@ -226,31 +188,16 @@ fn check_header(header: &ImageHeader, count: u32, limits: &DecodeLimits) -> Resu
     if u64::from(count) == chunk_count(header.payload_bytes()) {
         return Ok(());
     }
-    Err(ChunkError::Malformed {
-        sequence: 0,
-        field: "chunk_count",
-    })
+    Err(ChunkError::Malformed { sequence: 0, field: "chunk_count" })
 }
 
 impl UnderWay {
-    fn new(
-        sample_set_id: SampleSetId,
-        image_index: u32,
-        chunk_count: u32,
-        header: ImageHeader,
-    ) -> Self {
+    fn new(sample_set_id: SampleSetId, image_index: u32, chunk_count: u32, header: ImageHeader) -> Self {
         let payload = match chunk_count {
             0..=2 => Payload::Whole(Bytes::new()),
             _ => Payload::Joined(BytesMut::with_capacity(header.payload_bytes() as usize)),
         };
-        Self {
-            sample_set_id,
-            image_index,
-            next_sequence: 1,
-            chunk_count,
-            header,
-            payload,
-        }
+        Self { sample_set_id, image_index, next_sequence: 1, chunk_count, header, payload }
     }
 
     fn append(&mut self, sequence: u32, chunk_count: u32, data: Bytes) -> Result<(), ChunkError> {
@@ -276,15 +223,8 @@ impl UnderWay {
             Payload::Whole(whole) => whole,
             Payload::Joined(joined) => joined.freeze(),
         };
-        let image = EncodedDepthImage {
-            header: self.header,
-            payload,
-        };
-        Reassembled {
-            sample_set_id: self.sample_set_id,
-            image_index: self.image_index,
-            image,
-        }
+        let image = EncodedDepthImage { header: self.header, payload };
+        Reassembled { sample_set_id: self.sample_set_id, image_index: self.image_index, image }
     }
 }
 

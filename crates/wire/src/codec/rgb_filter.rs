@@ -10,8 +10,7 @@ pub(super) fn filter(rgb: &[[u8; 3]]) -> Vec<u8> {
     let mut filtered = vec![0; rgb.len() * 3];
     let mut last = [0u8; 3];
     for (out, &pixel) in filtered.as_chunks_mut::<3>().0.iter_mut().zip(rgb) {
-        let [red, green, blue] =
-            [0, 1, 2].map(|channel| pixel[channel].wrapping_sub(last[channel]));
+        let [red, green, blue] = [0, 1, 2].map(|channel| pixel[channel].wrapping_sub(last[channel]));
         *out = [red.wrapping_sub(green), green, blue.wrapping_sub(green)];
         last = pixel;
     }
@@ -37,9 +36,7 @@ mod tests {
     #[test]
     fn filtering_inverts() {
         let mut random = Random::new(20);
-        let rgb: Vec<[u8; 3]> = (0..1000)
-            .map(|_| [0; 3].map(|_: u8| random.next_u32() as u8))
-            .collect();
+        let rgb: Vec<[u8; 3]> = (0..1000).map(|_| [0; 3].map(|_: u8| random.next_u32() as u8)).collect();
         let mut filtered = filter(&rgb);
         unfilter(&mut filtered);
         assert_eq!(filtered, rgb.into_flattened());
@@ -48,12 +45,6 @@ mod tests {
     #[test]
     fn gradients_repeat() {
         let rgb: Vec<[u8; 3]> = (0..200).map(|x| [x, x, x]).collect();
-        assert!(
-            filter(&rgb)[3..]
-                .as_chunks::<3>()
-                .0
-                .iter()
-                .all(|pixel| *pixel == [0, 1, 0])
-        );
+        assert!(filter(&rgb)[3..].as_chunks::<3>().0.iter().all(|pixel| *pixel == [0, 1, 0]));
     }
 }

@@ -70,35 +70,20 @@ impl Runs {
 
     /// Bytes that [`Runs::write`] appends.
     pub fn written_bytes(&self) -> usize {
-        4 + 2 * self
-            .runs
-            .iter()
-            .map(|run| run.texels.div_ceil(LONGEST))
-            .sum::<usize>()
+        4 + 2 * self.runs.iter().map(|run| run.texels.div_ceil(LONGEST)).sum::<usize>()
     }
 
     /// Reads the runs of a plane of `texels` from the front of `input`.
     pub fn read(input: &mut &[u8], texels: usize) -> Result<Self, DecodeError> {
-        let corrupt = |reason| DecodeError::Corrupt {
-            field: "runs",
-            reason,
-        };
-        let length = take(input, 4)?
-            .first_chunk()
-            .map_or(0, |&bytes| u32::from_le_bytes(bytes));
+        let corrupt = |reason| DecodeError::Corrupt { field: "runs", reason };
+        let length = take(input, 4)?.first_chunk().map_or(0, |&bytes| u32::from_le_bytes(bytes));
         // `take` refuses a length beyond the input before anything of that size is allocated.
         let (words, odd) = take(input, length as usize)?.as_chunks::<2>();
         if !odd.is_empty() {
             return Err(corrupt("odd number of bytes"));
         }
-        let runs: Vec<Run> = words
-            .iter()
-            .map(|&word| parse(u16::from_le_bytes(word)))
-            .collect();
-        if runs
-            .iter()
-            .any(|run| run.texels == 0 || run.kind > FIRST_SAMPLE_CODE)
-        {
+        let runs: Vec<Run> = words.iter().map(|&word| parse(u16::from_le_bytes(word))).collect();
+        if runs.iter().any(|run| run.texels == 0 || run.kind > FIRST_SAMPLE_CODE) {
             return Err(corrupt("empty run or unknown kind"));
         }
         if runs.iter().map(|run| run.texels).sum::<usize>() != texels {
@@ -136,12 +121,7 @@ impl Runs {
     pub fn scatter<T: Copy>(&self, samples: &[T], empty: T) -> Vec<T> {
         let texels = self.runs.iter().map(|run| run.texels).sum();
         let mut plane = vec![empty; texels];
-        self.scatter_with(
-            &mut plane,
-            samples,
-            |samples, out| out.copy_from_slice(samples),
-            |_, _| (),
-        );
+        self.scatter_with(&mut plane, samples, |samples, out| out.copy_from_slice(samples), |_, _| ());
         plane
     }
 
@@ -175,10 +155,7 @@ fn sample_runs(runs: &[Run]) -> impl Iterator<Item = &Run> {
 }
 
 fn parse(word: u16) -> Run {
-    Run {
-        kind: word & 3,
-        texels: usize::from(word >> 2),
-    }
+    Run { kind: word & 3, texels: usize::from(word >> 2) }
 }
 
 /// How many codes at the front hold a property. Whole blocks are tested at once.
@@ -187,11 +164,7 @@ fn leading(codes: &[u16], holds: impl Fn(u16) -> bool) -> usize {
     let (blocks, _) = codes.as_chunks::<BLOCK>();
     let all = |block: &[u16; BLOCK]| block.iter().fold(true, |all, &code| all & holds(code));
     let whole = blocks.iter().take_while(|block| all(block)).count() * BLOCK;
-    whole
-        + codes[whole..]
-            .iter()
-            .take_while(|&&code| holds(code))
-            .count()
+    whole + codes[whole..].iter().take_while(|&&code| holds(code)).count()
 }
 
 const _: () = assert!(HOLE_CODE < BACKGROUND_CODE && BACKGROUND_CODE < FIRST_SAMPLE_CODE);
@@ -206,9 +179,7 @@ mod tests {
         codes.extend(std::iter::repeat_n(1, LONGEST * 2 + 5));
         codes.extend(std::iter::repeat_n(500, 1000));
         let (mut runs, mut found) = (Runs::default(), Vec::new());
-        codes
-            .chunks(1001)
-            .for_each(|codes| runs.extend(codes, &mut found));
+        codes.chunks(1001).for_each(|codes| runs.extend(codes, &mut found));
         assert_eq!(runs.sample_count(), 1004);
         let mut bytes = Vec::new();
         runs.write(&mut bytes);
@@ -217,12 +188,7 @@ mod tests {
         assert_eq!(found, samples);
         assert_eq!(samples[..5], [7, 8, 9, 3, 500]);
         let spread = back.scatter(&samples, 0);
-        assert!(
-            spread
-                .iter()
-                .zip(&codes)
-                .all(|(&a, &b)| a == if b >= 2 { b } else { 0 })
-        );
+        assert!(spread.iter().zip(&codes).all(|(&a, &b)| a == if b >= 2 { b } else { 0 }));
     }
 
     #[test]

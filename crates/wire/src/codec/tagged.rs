@@ -49,11 +49,7 @@ pub(super) struct Packer {
 impl Packer {
     pub(super) fn new(count: usize) -> Self {
         let numbers = count.min(BLOCK).next_multiple_of(4);
-        Self {
-            numbers: vec![0; numbers],
-            tags: vec![0; numbers],
-            fields: vec![0; numbers * 2 + SLACK_BYTES],
-        }
+        Self { numbers: vec![0; numbers], tags: vec![0; numbers], fields: vec![0; numbers * 2 + SLACK_BYTES] }
     }
 
     /// Appends one block to `out`: `count` numbers, at most [`BLOCK`] and what [`Packer::new`] was told,
@@ -70,18 +66,13 @@ impl Packer {
         let widths = choose_widths(numbers);
         let limits = [widths[0], widths[1], widths[2]].map(|width| 1u16 << width);
         for (tag, &number) in self.tags.iter_mut().zip(numbers) {
-            *tag = u16::from(number >= limits[0])
-                + u16::from(number >= limits[1])
-                + u16::from(number >= limits[2]);
+            *tag = u16::from(number >= limits[0]) + u16::from(number >= limits[1]) + u16::from(number >= limits[2]);
         }
         out.extend_from_slice(&widths[..WIDTHS_BYTES]);
         let tags_start = out.len();
         out.resize(tags_start + padded / 4, 0);
         let tag_bytes = &mut out[tags_start..];
-        tag_bytes
-            .iter_mut()
-            .zip(self.tags.as_chunks::<4>().0)
-            .for_each(|(byte, tags)| *byte = tag_byte(tags));
+        tag_bytes.iter_mut().zip(self.tags.as_chunks::<4>().0).for_each(|(byte, tags)| *byte = tag_byte(tags));
         let fields_bytes = pack_fields(numbers, tag_bytes, &quad_table(widths), &mut self.fields);
         out.extend_from_slice(&self.fields[..fields_bytes]);
     }
@@ -95,12 +86,7 @@ fn tag_byte(tags: &[u16; 4]) -> u8 {
 }
 
 fn pack_fields(numbers: &[u16], tags: &[u8], quads: &[Quad; 256], fields: &mut [u8]) -> usize {
-    let mut writer = BitWriter {
-        fields,
-        next_byte: 0,
-        pending: 0,
-        pending_bits: 0,
-    };
+    let mut writer = BitWriter { fields, next_byte: 0, pending: 0, pending_bits: 0 };
     for (numbers, &tag) in numbers.as_chunks::<4>().0.iter().zip(tags) {
         let quad = &quads[usize::from(tag)];
         let [a, b, c, d] = numbers.map(u64::from);
@@ -128,8 +114,7 @@ impl BitWriter<'_> {
     fn push(&mut self, word: u64, bits: u8) {
         self.pending |= word << self.pending_bits;
         self.pending_bits += u32::from(bits);
-        self.fields[self.next_byte..self.next_byte + SLACK_BYTES]
-            .copy_from_slice(&self.pending.to_le_bytes());
+        self.fields[self.next_byte..self.next_byte + SLACK_BYTES].copy_from_slice(&self.pending.to_le_bytes());
         self.next_byte += (self.pending_bits / 8) as usize;
         self.pending >>= self.pending_bits & !7;
         self.pending_bits &= 7;
@@ -151,14 +136,11 @@ fn choose_widths(numbers: &[u16]) -> [u8; 4] {
         let saved = |narrow: u8, wide: u8| up_to[usize::from(narrow)] * u32::from(wide - narrow);
         saved(a, b) + saved(b, c) + saved(c, WIDEST_BITS)
     };
-    candidate_widths()
-        .max_by_key(saved_bits)
-        .unwrap_or([0, 5, 10, WIDEST_BITS])
+    candidate_widths().max_by_key(saved_bits).unwrap_or([0, 5, 10, WIDEST_BITS])
 }
 
 fn candidate_widths() -> impl Iterator<Item = [u8; 4]> {
-    let ordered =
-        |a| (a + 1..15).flat_map(move |b| (b + 1..16).map(move |c| [a, b, c, WIDEST_BITS]));
+    let ordered = |a| (a + 1..15).flat_map(move |b| (b + 1..16).map(move |c| [a, b, c, WIDEST_BITS]));
     (0..14).flat_map(ordered)
 }
 
@@ -176,13 +158,7 @@ fn quad_table(widths: [u8; 4]) -> [Quad; 256] {
     std::array::from_fn(|tags| {
         let [a, b, c, d] = [0, 2, 4, 6].map(|shift| widths[tags >> shift & 3]);
         let masks = [a, b, c, d].map(|width| ((1u32 << width) - 1) as u16);
-        Quad {
-            masks,
-            first_bits: a,
-            pair_bits: a + b,
-            third_bits: c,
-            bits: a + b + c + d,
-        }
+        Quad { masks, first_bits: a, pair_bits: a + b, third_bits: c, bits: a + b + c + d }
     })
 }
 
@@ -191,17 +167,11 @@ pub(super) fn unpack(input: &mut &[u8], numbers: &mut [u16]) -> Result<(), Decod
     let widths = take(input, WIDTHS_BYTES)?;
     let widths = [widths[0], widths[1], widths[2], WIDEST_BITS];
     if !widths.is_sorted() {
-        return Err(DecodeError::Corrupt {
-            field: "tagged.widths",
-            reason: "not ascending up to 16",
-        });
+        return Err(DecodeError::Corrupt { field: "tagged.widths", reason: "not ascending up to 16" });
     }
     let quads = quad_table(widths);
     let tags = take(input, numbers.len().div_ceil(4))?;
-    let bits: usize = tags
-        .iter()
-        .map(|&tag| usize::from(quads[usize::from(tag)].bits))
-        .sum();
+    let bits: usize = tags.iter().map(|&tag| usize::from(quads[usize::from(tag)].bits)).sum();
     let fields = take(input, bits.div_ceil(8))?;
     let mut bit = 0;
     let mut unpacked = tags.iter().map(|&tag| {
@@ -211,10 +181,7 @@ pub(super) fn unpack(input: &mut &[u8], numbers: &mut [u16]) -> Result<(), Decod
         unpack_quad(fields, at, quad)
     });
     let (whole, rest) = numbers.as_chunks_mut::<4>();
-    whole
-        .iter_mut()
-        .zip(&mut unpacked)
-        .for_each(|(out, quad)| *out = quad);
+    whole.iter_mut().zip(&mut unpacked).for_each(|(out, quad)| *out = quad);
     if let Some(last) = unpacked.next() {
         rest.copy_from_slice(&last[..rest.len()]);
     }
@@ -225,12 +192,7 @@ pub(super) fn unpack(input: &mut &[u8], numbers: &mut [u16]) -> Result<(), Decod
 fn unpack_quad(fields: &[u8], bit: usize, quad: &Quad) -> [u16; 4] {
     let first = load_u64(fields, bit);
     let second = load_u64(fields, bit + usize::from(quad.pair_bits));
-    let numbers = [
-        first,
-        first >> quad.first_bits,
-        second,
-        second >> quad.third_bits,
-    ];
+    let numbers = [first, first >> quad.first_bits, second, second >> quad.third_bits];
     std::array::from_fn(|i| numbers[i] as u16 & quad.masks[i])
 }
 
@@ -238,10 +200,7 @@ fn unpack_quad(fields: &[u8], bit: usize, quad: &Quad) -> [u16; 4] {
 #[inline]
 fn load_u64(fields: &[u8], bit: usize) -> u64 {
     let from = fields.get(bit / 8..).unwrap_or_default();
-    let bytes = from
-        .first_chunk::<8>()
-        .copied()
-        .unwrap_or_else(|| last_bytes(from));
+    let bytes = from.first_chunk::<8>().copied().unwrap_or_else(|| last_bytes(from));
     u64::from_le_bytes(bytes) >> (bit % 8)
 }
 
@@ -254,10 +213,8 @@ fn last_bytes(from: &[u8]) -> [u8; 8] {
 
 /// Splits `count` bytes off the front.
 pub(super) fn take<'a>(input: &mut &'a [u8], count: usize) -> Result<&'a [u8], DecodeError> {
-    let (taken, rest) = input.split_at_checked(count).ok_or(DecodeError::Corrupt {
-        field: "payload",
-        reason: "ends too early",
-    })?;
+    let (taken, rest) =
+        input.split_at_checked(count).ok_or(DecodeError::Corrupt { field: "payload", reason: "ends too early" })?;
     *input = rest;
     Ok(taken)
 }
@@ -269,9 +226,7 @@ mod tests {
 
     fn round_trip(numbers: &[u16]) -> usize {
         let mut packed = vec![7];
-        Packer::new(numbers.len()).pack(numbers.len(), &mut packed, |out| {
-            out.copy_from_slice(numbers)
-        });
+        Packer::new(numbers.len()).pack(numbers.len(), &mut packed, |out| out.copy_from_slice(numbers));
         assert!(packed.len() - 1 <= max_packed_bytes(numbers.len()));
         packed.push(9);
         let mut input = &packed[1..];
@@ -287,9 +242,7 @@ mod tests {
         let mut random = Random::new(1);
         for length in 1..70 {
             for width in 0..=16 {
-                let numbers: Vec<_> = (0..length)
-                    .map(|_| (random.next_u32() & ((1 << width) - 1)) as u16)
-                    .collect();
+                let numbers: Vec<_> = (0..length).map(|_| (random.next_u32() & ((1 << width) - 1)) as u16).collect();
                 round_trip(&numbers);
             }
         }
@@ -309,9 +262,7 @@ mod tests {
     #[test]
     fn cut_streams_are_refused() {
         let mut packed = Vec::new();
-        Packer::new(5).pack(5, &mut packed, |out| {
-            out.copy_from_slice(&[1, 2, 60_000, 4, 5])
-        });
+        Packer::new(5).pack(5, &mut packed, |out| out.copy_from_slice(&[1, 2, 60_000, 4, 5]));
         for length in 0..packed.len() {
             assert!(unpack(&mut &packed[..length], &mut [0; 5]).is_err());
         }

@@ -51,8 +51,8 @@ fn terrain(width: usize, height: usize) -> Vec<f32> {
         }
         let depth_m = focal_px * 3.0 / down;
         let across_m = right / focal_px * depth_m;
-        let hill_m = 0.4 * (across_m * 0.3).sin() * (depth_m * 0.21).cos()
-            + 0.05 * (across_m * 1.9 + depth_m * 1.3).sin();
+        let hill_m =
+            0.4 * (across_m * 0.3).sin() * (depth_m * 0.21).cos() + 0.05 * (across_m * 1.9 + depth_m * 1.3).sin();
         down / (focal_px * (3.0 - hill_m))
     };
     (0..width * height).map(texel).collect()
@@ -60,10 +60,7 @@ fn terrain(width: usize, height: usize) -> Vec<f32> {
 
 /// A tilted quad within the crown, nearest wins.
 fn draw_leaf(plane: &mut [f32], width: usize, height: usize, random: &mut Random) {
-    let (angle, radius) = (
-        random.unit() * std::f32::consts::TAU,
-        random.unit().sqrt() * 0.3,
-    );
+    let (angle, radius) = (random.unit() * std::f32::consts::TAU, random.unit().sqrt() * 0.3);
     let center = [
         (0.5 + radius * angle.cos() * height as f32 / width as f32) * width as f32,
         (0.4 + radius * angle.sin()) * height as f32,
@@ -71,20 +68,13 @@ fn draw_leaf(plane: &mut [f32], width: usize, height: usize, random: &mut Random
     let depth_m = 9.0 + 5.0 * (random.unit() - 0.5);
     let half_px = 0.12 * height as f32 / depth_m * (0.6 + random.unit());
     let turn = random.unit() * std::f32::consts::TAU;
-    let slope = [(random.unit() - 0.5) * 0.4, (random.unit() - 0.5) * 0.4]
-        .map(|s| s / (height as f32 * depth_m));
+    let slope = [(random.unit() - 0.5) * 0.4, (random.unit() - 0.5) * 0.4].map(|s| s / (height as f32 * depth_m));
     let reach = half_px * 1.5;
-    let rows = (center[1] - reach).max(0.0) as usize
-        ..((center[1] + reach).max(0.0) as usize + 1).min(height);
+    let rows = (center[1] - reach).max(0.0) as usize..((center[1] + reach).max(0.0) as usize + 1).min(height);
     for y in rows {
-        for x in (center[0] - reach).max(0.0) as usize
-            ..((center[0] + reach).max(0.0) as usize + 1).min(width)
-        {
+        for x in (center[0] - reach).max(0.0) as usize..((center[0] + reach).max(0.0) as usize + 1).min(width) {
             let (dx, dy) = (x as f32 + 0.5 - center[0], y as f32 + 0.5 - center[1]);
-            let (u, v) = (
-                dx * turn.cos() + dy * turn.sin(),
-                dy * turn.cos() - dx * turn.sin(),
-            );
+            let (u, v) = (dx * turn.cos() + dy * turn.sin(), dy * turn.cos() - dx * turn.sin());
             let inverse = depth_m.recip() + slope[0] * dx + slope[1] * dy;
             let texel = &mut plane[y * width + x];
             if u.abs() <= half_px && v.abs() <= half_px * 0.6 && inverse > *texel {

@@ -26,29 +26,16 @@ pub(super) const fn max_words_bytes(count: usize) -> usize {
 pub(super) fn pack_words(words: &[u32], layout: WordLayout, out: &mut Vec<u8>) {
     let mut packer = Packer::new(words.len());
     for block in words.chunks(BLOCK) {
-        packer.pack(block.len(), out, |low| {
-            differences(block, layout, low, |(low, _)| low)
-        });
-        packer.pack(block.len(), out, |high| {
-            differences(block, layout, high, |(_, high)| high)
-        });
+        packer.pack(block.len(), out, |low| differences(block, layout, low, |(low, _)| low));
+        packer.pack(block.len(), out, |high| differences(block, layout, high, |(_, high)| high));
     }
 }
 
 #[inline]
-fn differences(
-    words: &[u32],
-    layout: WordLayout,
-    out: &mut [u16],
-    half: impl Fn((u16, u16)) -> u16,
-) {
+fn differences(words: &[u32], layout: WordLayout, out: &mut [u16], half: impl Fn((u16, u16)) -> u16) {
     match layout {
-        WordLayout::Whole => {
-            for_neighbours(words, out, |word, last| half(whole_difference(word, last)))
-        }
-        WordLayout::Halves => {
-            for_neighbours(words, out, |word, last| half(halves_difference(word, last)))
-        }
+        WordLayout::Whole => for_neighbours(words, out, |word, last| half(whole_difference(word, last))),
+        WordLayout::Halves => for_neighbours(words, out, |word, last| half(halves_difference(word, last))),
     }
 }
 
@@ -65,11 +52,7 @@ pub(super) fn for_neighbours(words: &[u32], out: &mut [u16], number: impl Fn(u32
 }
 
 /// Reads `count` words from the front of `input`.
-pub(super) fn unpack_words(
-    input: &mut &[u8],
-    count: usize,
-    layout: WordLayout,
-) -> Result<Vec<u32>, DecodeError> {
+pub(super) fn unpack_words(input: &mut &[u8], count: usize, layout: WordLayout) -> Result<Vec<u32>, DecodeError> {
     let mut words = Vec::with_capacity(count);
     let mut halves = vec![0; 2 * count.min(BLOCK)];
     while words.len() < count {
@@ -125,16 +108,11 @@ mod tests {
         let mut random = Random::new(5);
         for count in [0, 1, 2, 7, 1000, BLOCK + 3] {
             for layout in [WordLayout::Whole, WordLayout::Halves] {
-                let words: Vec<u32> = (0..count)
-                    .map(|_| random.next_u32() >> random.below(32))
-                    .collect();
+                let words: Vec<u32> = (0..count).map(|_| random.next_u32() >> random.below(32)).collect();
                 let mut bytes = Vec::new();
                 pack_words(&words, layout, &mut bytes);
                 assert!(bytes.len() <= max_words_bytes(words.len()));
-                assert_eq!(
-                    unpack_words(&mut &bytes[..], words.len(), layout),
-                    Ok(words)
-                );
+                assert_eq!(unpack_words(&mut &bytes[..], words.len(), layout), Ok(words));
             }
         }
     }

@@ -28,8 +28,5 @@ pub async fn connect(address: &str) -> Result<Channel, Status> {
         // Bulk: the default window of 64 KiB would stop a sender eight times a message.
         .initial_stream_window_size(4 << 20)
         .initial_connection_window_size(16 << 20);
-    endpoint
-        .connect()
-        .await
-        .map_err(|error| Status::unavailable(format!("{address}: {error}")))
+    endpoint.connect().await.map_err(|error| Status::unavailable(format!("{address}: {error}")))
 }

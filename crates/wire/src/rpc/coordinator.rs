@@ -108,12 +108,6 @@ impl CoordinatorClient {
     /// # Errors
     /// The coordinator's.
     pub async fn status(&self) -> Result<ClusterStatus, Status> {
-        Ok(self
-            .0
-            .clone()
-            .get_status(proto::GetStatusRequest {})
-            .await?
-            .into_inner()
-            .try_into()?)
+        Ok(self.0.clone().get_status(proto::GetStatusRequest {}).await?.into_inner().try_into()?)
     }
 }

@@ -69,12 +69,6 @@ impl NodeClient {
     /// The node's; `FAILED_PRECONDITION` for an epoch below the one it has.
     pub async fn apply_assignment(&self, assignment: Assignment) -> Result<Ready, Status> {
         let request: proto::ApplyAssignmentRequest = assignment.into();
-        Ok(self
-            .0
-            .clone()
-            .apply_assignment(request)
-            .await?
-            .into_inner()
-            .try_into()?)
+        Ok(self.0.clone().apply_assignment(request).await?.into_inner().try_into()?)
     }
 }

@@ -55,8 +55,6 @@ impl SamplerClient {
     /// The sampler's.
     pub async fn fetch_sample_images(&self, request: FetchImages) -> Result<Messages<Chunk>, Status> {
         let request: proto::FetchSampleImagesRequest = request.into();
-        Ok(incoming(
-            self.0.clone().fetch_sample_images(request).await?.into_inner(),
-        ))
+        Ok(incoming(self.0.clone().fetch_sample_images(request).await?.into_inner()))
     }
 }

@@ -69,6 +69,28 @@ fn checks(name: &str, rows: &[Row], default: ReconstructionMethod) -> Vec<Check>
     ]
 }
 
+/// A scene whose gaps are wide enough to count: in foliage, every pixel that no camera sees is a silhouette's.
+const GAPS: &str = "poles";
+
+/// Sweeps a scene with disocclusions.
+pub fn gaps(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
+    sweep_scene(GAPS, GAPS.parse().unwrap_or_else(|never| match never {}), args, engine, report)
+}
+
+fn sweep_scene(
+    name: &str,
+    spec: SceneSpec,
+    args: &BenchArgs,
+    engine: &Arc<GpuEngine>,
+    report: &mut Report,
+) -> anyhow::Result<()> {
+    let scene = SceneArgs { lighting: args.scene.lighting, ..SceneArgs::of(spec) };
+    let setup = scene.load()?;
+    let cell = ViewCell::between(&setup.samples).context("no sample cameras")?;
+    let truth = Truth::take(engine, &setup, &scene, cell.spread(args.compared_views(), VIEW_SIZE_PX))?;
+    compare(name, &truth, args, report)
+}
+
 /// Sweeps the models of the folder, if one is given.
 pub fn models(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let Some(folder) = &args.models else {
@@ -80,11 +102,7 @@ pub fn models(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) ->
     };
     for path in models_of(folder, if args.quick { 2 } else { MODELS })? {
         let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        let scene = SceneArgs { lighting: args.scene.lighting, ..SceneArgs::of(SceneSpec::File(path)) };
-        let setup = scene.load()?;
-        let cell = ViewCell::between(&setup.samples).context("no sample cameras")?;
-        let truth = Truth::take(engine, &setup, &scene, cell.spread(args.compared_views(), VIEW_SIZE_PX))?;
-        compare(&name, &truth, args, report)?;
+        sweep_scene(&name, SceneSpec::File(path), args, engine, report)?;
     }
     Ok(())
 }

@@ -77,6 +77,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     drop(truth);
     let engine = experiment.engine.clone();
     experiment.stop()?;
+    fronts::gaps(args, &engine, &mut report)?;
     fronts::models(args, &engine, &mut report)?;
     peer::measure(args, &engine, &mut report)?;
     let memory = peak_memory_mb().filter(|_| engine.is_software());

@@ -9,39 +9,23 @@ use crate::error::{Fault, at_most};
 const GLB_MAGIC: &[u8] = b"glTF";
 const GLB_HEADER_BYTES: u32 = 12;
 
-pub(super) fn parse<'a>(
-    bytes: &'a [u8],
-    limits: &Limits,
-) -> Result<(Root, Option<&'a [u8]>), Fault> {
-    let (json, binary_chunk) = if bytes.starts_with(GLB_MAGIC) {
-        split(bytes)?
-    } else {
-        (bytes, None)
-    };
+pub(super) fn parse<'a>(bytes: &'a [u8], limits: &Limits) -> Result<(Root, Option<&'a [u8]>), Fault> {
+    let (json, binary_chunk) = if bytes.starts_with(GLB_MAGIC) { split(bytes)? } else { (bytes, None) };
     // Each object of the JSON becomes a struct of some hundred bytes, be it only `{}`.
     let objects = json.iter().filter(|&&b| b == b'{').count();
     at_most("JSON objects", objects as u64, limits.json_objects)?;
     let root = Root::from_slice(json).map_err(|e| Fault::malformed("JSON", e.to_string()))?;
     if !root.asset.version.starts_with("2.") {
-        return Err(Fault::unsupported(
-            "asset",
-            format!("glTF version {}", root.asset.version),
-        ));
+        return Err(Fault::unsupported("asset", format!("glTF version {}", root.asset.version)));
     }
     Ok((root, binary_chunk))
 }
 
 fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
-    let length = bytes
-        .get(8..12)
-        .and_then(|b| b.try_into().ok())
-        .map_or(0, u32::from_le_bytes);
+    let length = bytes.get(8..12).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes);
     if length < GLB_HEADER_BYTES {
         // The crate subtracts the header's size unchecked.
-        return Err(Fault::malformed(
-            "GLB header",
-            "the length is smaller than the header",
-        ));
+        return Err(Fault::malformed("GLB header", "the length is smaller than the header"));
     }
     let glb = Glb::from_slice(bytes).map_err(|e| Fault::malformed("GLB header", e.to_string()))?;
     // Only its borrowed form is ever made from a slice; an owned one would not outlive this function.

@@ -29,42 +29,24 @@ pub(super) fn read(
     scene: &mut SourceScene,
 ) -> Result<(), Fault> {
     let mut pictures = Pictures::default();
-    let uses = root
-        .materials
-        .iter()
-        .enumerate()
-        .map(|(i, m)| Uses::of(root, m, &mut pictures, &format!("material {i}")));
+    let uses =
+        root.materials.iter().enumerate().map(|(i, m)| Uses::of(root, m, &mut pictures, &format!("material {i}")));
     let uses: Vec<_> = uses.collect::<Result<_, _>>()?;
-    let encoded = pictures
-        .images
-        .iter()
-        .map(|&image| encoded_picture(root, buffers, folder, image));
+    let encoded = pictures.images.iter().map(|&image| encoded_picture(root, buffers, folder, image));
     let textures = decode_all(&encoded.collect::<Result<Vec<_>, _>>()?, limits)?;
     for (number, (material, uses)) in root.materials.iter().zip(&uses).enumerate() {
-        scene
-            .materials
-            .push(converted(material, uses, &textures, number)?);
+        scene.materials.push(converted(material, uses, &textures, number)?);
     }
-    scene.materials.push(Material {
-        name: "default".into(),
-        ..Material::default()
-    });
+    scene.materials.push(Material { name: "default".into(), ..Material::default() });
     scene.textures = keep_base_colours(textures, &mut scene.materials);
     Ok(())
 }
 
 /// The scene's number of a primitive's material.
-pub(super) fn material_number(
-    root: &Root,
-    material: Option<Index<JsonMaterial>>,
-    element: &str,
-) -> Result<u32, Fault> {
+pub(super) fn material_number(root: &Root, material: Option<Index<JsonMaterial>>, element: &str) -> Result<u32, Fault> {
     let number = material.map_or(root.materials.len(), |m| m.value());
     if number > root.materials.len() || (material.is_some() && number == root.materials.len()) {
-        return Err(Fault::malformed(
-            element,
-            format!("material {number} does not exist"),
-        ));
+        return Err(Fault::malformed(element, format!("material {number} does not exist")));
     }
     Ok(number as u32)
 }
@@ -78,22 +60,11 @@ pub(super) struct UvSource {
 }
 
 pub(super) fn uv_source(root: &Root, material: Option<Index<JsonMaterial>>) -> UvSource {
-    let mut source = UvSource {
-        set: 0,
-        offset: [0.0; 2],
-        scale: [1.0; 2],
-        rotation_rad: 0.0,
-    };
-    let info = material
-        .and_then(|m| root.get(m))
-        .and_then(|m| m.pbr_metallic_roughness.base_color_texture.as_ref());
+    let mut source = UvSource { set: 0, offset: [0.0; 2], scale: [1.0; 2], rotation_rad: 0.0 };
+    let info = material.and_then(|m| root.get(m)).and_then(|m| m.pbr_metallic_roughness.base_color_texture.as_ref());
     let Some(info) = info else { return source };
     source.set = info.tex_coord;
-    if let Some(transform) = info
-        .extensions
-        .as_ref()
-        .and_then(|e| e.texture_transform.as_ref())
-    {
+    if let Some(transform) = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref()) {
         source.set = transform.tex_coord.unwrap_or(source.set);
         source.offset = transform.offset.0;
         source.scale = transform.scale.0;
@@ -107,10 +78,7 @@ impl UvSource {
     pub(super) fn apply(&self, [u, v]: [f32; 2]) -> [f32; 2] {
         let (sin, cos) = self.rotation_rad.sin_cos();
         let (u, v) = (u * self.scale[0], v * self.scale[1]);
-        [
-            cos * u + sin * v + self.offset[0],
-            cos * v - sin * u + self.offset[1],
-        ]
+        [cos * u + sin * v + self.offset[0], cos * v - sin * u + self.offset[1]]
     }
 }
 
@@ -123,12 +91,8 @@ struct Pictures {
 
 impl Pictures {
     fn place(&mut self, root: &Root, info: &Info, element: &str) -> Result<usize, Fault> {
-        let missing = || {
-            Fault::malformed(
-                element,
-                format!("texture {} or its image does not exist", info.index.value()),
-            )
-        };
+        let missing =
+            || Fault::malformed(element, format!("texture {} or its image does not exist", info.index.value()));
         let image = root.get(info.index).ok_or_else(missing)?.source;
         root.get(image).ok_or_else(missing)?;
         let next = self.images.len();
@@ -148,17 +112,8 @@ struct Uses {
 }
 
 impl Uses {
-    fn of(
-        root: &Root,
-        material: &JsonMaterial,
-        pictures: &mut Pictures,
-        element: &str,
-    ) -> Result<Self, Fault> {
-        let mut place = |info: &Option<Info>| {
-            info.as_ref()
-                .map(|i| pictures.place(root, i, element))
-                .transpose()
-        };
+    fn of(root: &Root, material: &JsonMaterial, pictures: &mut Pictures, element: &str) -> Result<Self, Fault> {
+        let mut place = |info: &Option<Info>| info.as_ref().map(|i| pictures.place(root, i, element)).transpose();
         let pbr = &material.pbr_metallic_roughness;
         Ok(Self {
             base_color: place(&pbr.base_color_texture)?,
@@ -175,47 +130,31 @@ fn encoded_picture(
     index: Index<Image>,
 ) -> Result<EncodedPicture, Fault> {
     let element = format!("image {}", index.value());
-    let image = root
-        .get(index)
-        .ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
+    let image = root.get(index).ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
     let bytes = match (&image.uri, image.buffer_view) {
         (Some(uri), _) => read_uri(&element, uri, folder)?,
         (None, Some(view)) => buffers.view(root, view, &element)?.bytes.to_vec(),
         (None, None) => {
-            return Err(Fault::malformed(
-                element,
-                "it has neither a uri nor a buffer view",
-            ));
+            return Err(Fault::malformed(element, "it has neither a uri nor a buffer view"));
         }
     };
     Ok(EncodedPicture { element, bytes })
 }
 
-fn converted(
-    material: &JsonMaterial,
-    uses: &Uses,
-    textures: &[Texture],
-    number: usize,
-) -> Result<Material, Fault> {
+fn converted(material: &JsonMaterial, uses: &Uses, textures: &[Texture], number: usize) -> Result<Material, Fault> {
     let element = format!("material {number}");
     let Checked::Valid(alpha_mode) = material.alpha_mode else {
         return Err(Fault::malformed(element, "unknown alphaMode"));
     };
     let pbr = &material.pbr_metallic_roughness;
-    let metal_rough = uses.metallic_roughness.map_or(Vec3::ONE, |place| {
-        mean(&textures[place], |byte| f32::from(byte) / 255.0)
-    });
-    let glow = uses
-        .emissive
-        .map_or(Vec3::ONE, |place| mean(&textures[place], linear_from_srgb8));
+    let metal_rough =
+        uses.metallic_roughness.map_or(Vec3::ONE, |place| mean(&textures[place], |byte| f32::from(byte) / 255.0));
+    let glow = uses.emissive.map_or(Vec3::ONE, |place| mean(&textures[place], linear_from_srgb8));
     let metallic = (pbr.metallic_factor.0 * metal_rough.z).clamp(0.0, 1.0);
     let roughness = (pbr.roughness_factor.0 * metal_rough.y).clamp(0.0, 1.0);
     let extensions = material.extensions.as_ref();
-    let strength = extensions
-        .and_then(|e| e.emissive_strength.as_ref())
-        .map_or(1.0, |s| s.emissive_strength.0);
-    let (phong_specular, phong_exponent) =
-        Material::phong_from_metallic_roughness(metallic, roughness);
+    let strength = extensions.and_then(|e| e.emissive_strength.as_ref()).map_or(1.0, |s| s.emissive_strength.0);
+    let (phong_specular, phong_exponent) = Material::phong_from_metallic_roughness(metallic, roughness);
     Ok(Material {
         name: material.name.clone().unwrap_or(element),
         base_color_linear: pbr.base_color_factor.0,
@@ -248,22 +187,11 @@ fn mean(texture: &Texture, decode: impl Fn(u8) -> f32) -> Vec3 {
 
 /// Drops the textures of which only the mean was needed, and renumbers the others.
 fn keep_base_colours(textures: Vec<Texture>, materials: &mut [Material]) -> Vec<Texture> {
-    let is_kept = |place: usize| {
-        materials
-            .iter()
-            .any(|m| m.base_color_texture == Some(place as u32))
-    };
+    let is_kept = |place: usize| materials.iter().any(|m| m.base_color_texture == Some(place as u32));
     let kept: Vec<bool> = (0..textures.len()).map(is_kept).collect();
     let number_of = |place: u32| kept[..place as usize].iter().filter(|&&k| k).count() as u32;
-    materials
-        .iter_mut()
-        .for_each(|m| m.base_color_texture = m.base_color_texture.map(number_of));
-    textures
-        .into_iter()
-        .zip(&kept)
-        .filter(|(_, kept)| **kept)
-        .map(|(texture, _)| texture)
-        .collect()
+    materials.iter_mut().for_each(|m| m.base_color_texture = m.base_color_texture.map(number_of));
+    textures.into_iter().zip(&kept).filter(|(_, kept)| **kept).map(|(texture, _)| texture).collect()
 }
 
 #[cfg(test)]
@@ -272,12 +200,8 @@ mod tests {
 
     #[test]
     fn a_quarter_turn_takes_u_to_minus_v() {
-        let turn = UvSource {
-            set: 0,
-            offset: [1.0, 2.0],
-            scale: [2.0, 1.0],
-            rotation_rad: std::f32::consts::FRAC_PI_2,
-        };
+        let turn =
+            UvSource { set: 0, offset: [1.0, 2.0], scale: [2.0, 1.0], rotation_rad: std::f32::consts::FRAC_PI_2 };
         let [u, v] = turn.apply([0.5, 0.0]);
         assert!((u - 1.0).abs() < 1e-6 && (v - 1.0).abs() < 1e-6, "{u} {v}");
     }

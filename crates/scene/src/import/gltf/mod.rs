@@ -27,12 +27,8 @@ use crate::error::{Fault, at_most};
 use accessors::Buffers;
 
 /// Extensions that a file may require.
-const SUPPORTED_EXTENSIONS: [&str; 4] = [
-    "KHR_materials_unlit",
-    "KHR_materials_emissive_strength",
-    "KHR_texture_transform",
-    "KHR_lights_punctual",
-];
+const SUPPORTED_EXTENSIONS: [&str; 4] =
+    ["KHR_materials_unlit", "KHR_materials_emissive_strength", "KHR_texture_transform", "KHR_lights_punctual"];
 
 pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
     let (root, binary_chunk) = container::parse(bytes, limits)?;
@@ -47,13 +43,8 @@ pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<Sou
 }
 
 fn refuse_unknown_requirements(root: &Root) -> Result<(), Fault> {
-    let unknown = root
-        .extensions_required
-        .iter()
-        .find(|name| !SUPPORTED_EXTENSIONS.contains(&name.as_str()));
-    unknown.map_or(Ok(()), |name| {
-        Err(Fault::unsupported("extensionsRequired", name.as_str()))
-    })
+    let unknown = root.extensions_required.iter().find(|name| !SUPPORTED_EXTENSIONS.contains(&name.as_str()));
+    unknown.map_or(Ok(()), |name| Err(Fault::unsupported("extensionsRequired", name.as_str())))
 }
 
 fn check_counts(root: &Root, limits: &Limits) -> Result<(), Fault> {

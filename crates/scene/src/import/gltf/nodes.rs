@@ -13,25 +13,13 @@ use crate::error::{Fault, at_most};
 /// twice is a cycle or has two parents; glTF allows neither.
 pub(super) fn read(root: &Root, limits: &Limits, scene: &mut SourceScene) -> Result<(), Fault> {
     let mut is_visited = vec![false; root.nodes.len()];
-    let mut pending: Vec<_> = roots(root)?
-        .into_iter()
-        .map(|node| (node, DAffine3::IDENTITY, 0u32))
-        .collect();
+    let mut pending: Vec<_> = roots(root)?.into_iter().map(|node| (node, DAffine3::IDENTITY, 0u32)).collect();
     while let Some((index, source_from_parent, depth)) = pending.pop() {
         let element = format!("node {}", index.value());
-        let node = root
-            .get(index)
-            .ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
-        at_most(
-            format!("{element}, depth"),
-            u64::from(depth),
-            limits.node_depth.into(),
-        )?;
+        let node = root.get(index).ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
+        at_most(format!("{element}, depth"), u64::from(depth), limits.node_depth.into())?;
         if std::mem::replace(&mut is_visited[index.value()], true) {
-            return Err(Fault::malformed(
-                element,
-                "it is reached twice: a cycle, or two parents",
-            ));
+            return Err(Fault::malformed(element, "it is reached twice: a cycle, or two parents"));
         }
         let source_from_node = source_from_parent * parent_from_node(node, &element)?;
         place(root, node, source_from_node, &element, scene)?;
@@ -42,14 +30,10 @@ pub(super) fn read(root: &Root, limits: &Limits, scene: &mut SourceScene) -> Res
 }
 
 fn roots(root: &Root) -> Result<Vec<Index<Node>>, Fault> {
-    let chosen = root
-        .scene
-        .or((!root.scenes.is_empty()).then(|| Index::new(0)));
+    let chosen = root.scene.or((!root.scenes.is_empty()).then(|| Index::new(0)));
     if let Some(index) = chosen {
         let scene: Option<&JsonScene> = root.get(index);
-        return scene
-            .map(|s| s.nodes.clone())
-            .ok_or_else(|| Fault::malformed("default scene", "it does not exist"));
+        return scene.map(|s| s.nodes.clone()).ok_or_else(|| Fault::malformed("default scene", "it does not exist"));
     }
     let mut is_child = vec![false; root.nodes.len()];
     for child in root.nodes.iter().flat_map(|n| n.children.iter().flatten()) {
@@ -57,10 +41,7 @@ fn roots(root: &Root) -> Result<Vec<Index<Node>>, Fault> {
             *flag = true;
         }
     }
-    Ok((0..root.nodes.len())
-        .filter(|&i| !is_child[i])
-        .map(|i| Index::new(i as u32))
-        .collect())
+    Ok((0..root.nodes.len()).filter(|&i| !is_child[i]).map(|i| Index::new(i as u32)).collect())
 }
 
 fn place(
@@ -73,31 +54,19 @@ fn place(
     if let Some(mesh) = node.mesh {
         let mesh = mesh.value();
         let triangles = scene.meshes.get(mesh).map(|m| m.indices.len());
-        let triangles = triangles
-            .ok_or_else(|| Fault::malformed(element, format!("mesh {mesh} does not exist")))?;
+        let triangles = triangles.ok_or_else(|| Fault::malformed(element, format!("mesh {mesh} does not exist")))?;
         if triangles > 0 {
             refuse_singular(&source_from_node, element)?;
-            scene.instances.push(SourceInstance {
-                mesh,
-                source_from_mesh: source_from_node,
-            });
+            scene.instances.push(SourceInstance { mesh, source_from_mesh: source_from_node });
         }
     }
-    if let Some(light) = node
-        .extensions
-        .as_ref()
-        .and_then(|e| e.khr_lights_punctual.as_ref())
-    {
+    if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
         let light: Option<&JsonLight> = root.get(light.light);
         let light = light.ok_or_else(|| Fault::malformed(element, "its light does not exist"))?;
-        scene
-            .lights
-            .push(placed_light(light, &source_from_node, element)?);
+        scene.lights.push(placed_light(light, &source_from_node, element)?);
     }
     if node.camera.is_some() {
-        scene
-            .cameras
-            .extend(placed_camera(root, node, &source_from_node, element)?);
+        scene.cameras.extend(placed_camera(root, node, &source_from_node, element)?);
     }
     Ok(())
 }
@@ -106,10 +75,7 @@ fn refuse_singular(source_from_node: &DAffine3, element: &str) -> Result<(), Fau
     if super::super::source_scene::is_invertible(source_from_node) {
         Ok(())
     } else {
-        Err(Fault::malformed(
-            element,
-            "its transform is singular or not finite",
-        ))
+        Err(Fault::malformed(element, "its transform is singular or not finite"))
     }
 }
 
@@ -119,12 +85,7 @@ fn parent_from_node(node: &Node, element: &str) -> Result<DAffine3, Fault> {
         None => from_parts(node),
     };
     let transform = transform.filter(DAffine3::is_finite);
-    transform.ok_or_else(|| {
-        Fault::malformed(
-            element,
-            "its transform is not finite, not affine, or has no rotation",
-        )
-    })
+    transform.ok_or_else(|| Fault::malformed(element, "its transform is not finite, not affine, or has no rotation"))
 }
 
 fn affine_from(matrix: DMat4) -> Option<DAffine3> {
@@ -134,39 +95,26 @@ fn affine_from(matrix: DMat4) -> Option<DAffine3> {
 
 fn from_parts(node: &Node) -> Option<DAffine3> {
     let scale = node.scale.map_or(DVec3::ONE, |s| Vec3::from(s).as_dvec3());
-    let translation = node
-        .translation
-        .map_or(DVec3::ZERO, |t| Vec3::from(t).as_dvec3());
-    let rotation = node
-        .rotation
-        .map_or(DQuat::IDENTITY, |r| Quat::from_array(r.0).as_dquat());
+    let translation = node.translation.map_or(DVec3::ZERO, |t| Vec3::from(t).as_dvec3());
+    let rotation = node.rotation.map_or(DQuat::IDENTITY, |r| Quat::from_array(r.0).as_dquat());
     let length = rotation.length();
     let is_usable = length > 1e-6 && length.is_finite();
-    is_usable
-        .then(|| DAffine3::from_scale_rotation_translation(scale, rotation / length, translation))
+    is_usable.then(|| DAffine3::from_scale_rotation_translation(scale, rotation / length, translation))
 }
 
 /// glTF gives lux and candela, which a white surface reflects over a hemisphere: a factor of 1/π.
-fn placed_light(
-    light: &JsonLight,
-    source_from_node: &DAffine3,
-    element: &str,
-) -> Result<SourceLight, Fault> {
+fn placed_light(light: &JsonLight, source_from_node: &DAffine3, element: &str) -> Result<SourceLight, Fault> {
     let colour = Vec3::from(light.color) * light.intensity * std::f32::consts::FRAC_1_PI;
     match light.type_ {
         Checked::Valid(LightType::Directional) => {
             let towards = (source_from_node.matrix3 * DVec3::Z).try_normalize();
             let towards_light_in_source =
                 towards.ok_or_else(|| Fault::malformed(element, "its light has no direction"))?;
-            Ok(SourceLight::Directional {
-                towards_light_in_source,
-                irradiance_linear: colour,
-            })
+            Ok(SourceLight::Directional { towards_light_in_source, irradiance_linear: colour })
         }
-        Checked::Valid(LightType::Point | LightType::Spot) => Ok(SourceLight::Point {
-            position_in_source: source_from_node.translation,
-            intensity_linear: colour,
-        }),
+        Checked::Valid(LightType::Point | LightType::Spot) => {
+            Ok(SourceLight::Point { position_in_source: source_from_node.translation, intensity_linear: colour })
+        }
         Checked::Invalid => Err(Fault::malformed(element, "its light has an unknown type")),
     }
 }
@@ -185,17 +133,11 @@ fn placed_camera(
     };
     refuse_singular(source_from_node, element)?;
     let backwards = (source_from_node.matrix3 * DVec3::Z).normalize_or(DVec3::Z);
-    let right = (source_from_node.matrix3 * DVec3::Y)
-        .cross(backwards)
-        .normalize_or(DVec3::X);
+    let right = (source_from_node.matrix3 * DVec3::Y).cross(backwards).normalize_or(DVec3::X);
     let rotation = glam::DMat3::from_cols(right, backwards.cross(right), backwards);
     let fallback = || format!("camera {}", node.camera.map_or(0, |c| c.value()));
     Ok(Some(PlacedCamera {
-        name: camera
-            .name
-            .clone()
-            .or_else(|| node.name.clone())
-            .unwrap_or_else(fallback),
+        name: camera.name.clone().or_else(|| node.name.clone()).unwrap_or_else(fallback),
         source_from_camera: DAffine3::from_mat3_translation(rotation, source_from_node.translation),
         fov_y_rad: perspective.yfov,
     }))

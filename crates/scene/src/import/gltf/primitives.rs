@@ -24,30 +24,16 @@ pub(super) fn read(
     let Checked::Valid(mode) = primitive.mode else {
         return Err(Fault::malformed(element, "unknown mode"));
     };
-    if !matches!(
-        mode,
-        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
-    ) {
+    if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
         return Ok(None);
     }
     let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
-    let position = attribute(Semantic::Positions)
-        .ok_or_else(|| Fault::malformed(element, "it has no POSITION"))?;
+    let position = attribute(Semantic::Positions).ok_or_else(|| Fault::malformed(element, "it has no POSITION"))?;
     let positions = buffers.floats::<3>(root, position, element)?;
     let mut mesh = SourceMesh {
         vertices: vec![plain_vertex(); positions.len()],
-        positions_in_mesh: positions
-            .iter()
-            .map(|p| Vec3::from(*p).as_dvec3())
-            .collect(),
-        indices: triangles(
-            root,
-            buffers,
-            primitive.indices,
-            mode,
-            positions.len(),
-            element,
-        )?,
+        positions_in_mesh: positions.iter().map(|p| Vec3::from(*p).as_dvec3()).collect(),
+        indices: triangles(root, buffers, primitive.indices, mode, positions.len(), element)?,
         parts: Vec::new(),
     };
     if let Some(index) = attribute(Semantic::TexCoords(uv.set)) {
@@ -56,9 +42,7 @@ pub(super) fn read(
     if let Some(index) = attribute(Semantic::Colors(0)) {
         read_colors(root, buffers, index, &mut mesh, element)?;
     }
-    drop_unused(&mut mesh, |mesh| {
-        read_normals(root, buffers, attribute(Semantic::Normals), mesh, element)
-    })?;
+    drop_unused(&mut mesh, |mesh| read_normals(root, buffers, attribute(Semantic::Normals), mesh, element))?;
     Ok(Some(mesh))
 }
 
@@ -70,19 +54,11 @@ fn read_normals(
     element: &str,
 ) -> Result<bool, Fault> {
     let Some(index) = index else { return Ok(false) };
-    let normals = same_count(
-        buffers.floats::<3>(root, index, element)?,
-        mesh,
-        "NORMAL",
-        element,
-    )?;
+    let normals = same_count(buffers.floats::<3>(root, index, element)?, mesh, "NORMAL", element)?;
     if normals.iter().any(|n| !Vec3::from(*n).is_finite()) {
         return Err(Fault::malformed(element, "a normal is not finite"));
     }
-    mesh.vertices
-        .iter_mut()
-        .zip(normals)
-        .for_each(|(v, normal)| v.normal = normal);
+    mesh.vertices.iter_mut().zip(normals).for_each(|(v, normal)| v.normal = normal);
     Ok(true)
 }
 
@@ -93,9 +69,7 @@ fn drop_unused(
 ) -> Result<(), Fault> {
     let has_normals = read_normals(mesh)?;
     let mut is_used = vec![false; mesh.vertices.len()];
-    mesh.indices
-        .iter()
-        .for_each(|&i| is_used[i as usize] = true);
+    mesh.indices.iter().for_each(|&i| is_used[i as usize] = true);
     let mut new_number = vec![0u32; is_used.len()];
     let mut kept = 0u32;
     for (number, &used) in new_number.iter_mut().zip(&is_used) {
@@ -103,20 +77,12 @@ fn drop_unused(
         kept += u32::from(used);
     }
     let mut at = is_used.iter();
-    mesh.vertices
-        .retain(|_| at.next().is_some_and(|&used| used));
+    mesh.vertices.retain(|_| at.next().is_some_and(|&used| used));
     let mut at = is_used.iter();
-    mesh.positions_in_mesh
-        .retain(|_| at.next().is_some_and(|&used| used));
-    mesh.indices
-        .iter_mut()
-        .for_each(|i| *i = new_number[*i as usize]);
+    mesh.positions_in_mesh.retain(|_| at.next().is_some_and(|&used| used));
+    mesh.indices.iter_mut().for_each(|i| *i = new_number[*i as usize]);
     if mesh.positions_in_mesh.iter().all(|p: &DVec3| p.is_finite()) {
-        if has_normals {
-            normals::repair(mesh)
-        } else {
-            normals::generate(mesh, normals::FLAT)
-        }
+        if has_normals { normals::repair(mesh) } else { normals::generate(mesh, normals::FLAT) }
     }
     Ok(())
 }
@@ -129,16 +95,8 @@ fn read_uvs(
     mesh: &mut SourceMesh,
     element: &str,
 ) -> Result<(), Fault> {
-    let uvs = same_count(
-        buffers.floats::<2>(root, index, element)?,
-        mesh,
-        "TEXCOORD",
-        element,
-    )?;
-    mesh.vertices
-        .iter_mut()
-        .zip(uvs)
-        .for_each(|(v, at)| v.uv = uv.apply(at));
+    let uvs = same_count(buffers.floats::<2>(root, index, element)?, mesh, "TEXCOORD", element)?;
+    mesh.vertices.iter_mut().zip(uvs).for_each(|(v, at)| v.uv = uv.apply(at));
     Ok(())
 }
 
@@ -156,10 +114,7 @@ fn read_colors(
         buffers.floats::<4>(root, index, element)?
     };
     let colors = same_count(colors, mesh, "COLOR_0", element)?;
-    mesh.vertices
-        .iter_mut()
-        .zip(colors)
-        .for_each(|(v, linear)| v.color_srgba8 = srgba8_from_linear(linear));
+    mesh.vertices.iter_mut().zip(colors).for_each(|(v, linear)| v.color_srgba8 = srgba8_from_linear(linear));
     Ok(())
 }
 
@@ -168,20 +123,12 @@ fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {
     [r, g, b, (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
 }
 
-fn same_count<T>(
-    items: Vec<T>,
-    mesh: &SourceMesh,
-    what: &str,
-    element: &str,
-) -> Result<Vec<T>, Fault> {
+fn same_count<T>(items: Vec<T>, mesh: &SourceMesh, what: &str, element: &str) -> Result<Vec<T>, Fault> {
     let (has, needs) = (items.len(), mesh.vertices.len());
     if has == needs {
         Ok(items)
     } else {
-        Err(Fault::malformed(
-            element,
-            format!("{what} has {has} elements, POSITION {needs}"),
-        ))
+        Err(Fault::malformed(element, format!("{what} has {has} elements, POSITION {needs}")))
     }
 }
 
@@ -198,43 +145,26 @@ fn triangles(
         None => (0..vertex_count as u32).collect(),
     };
     if let Some(bad) = indices.iter().find(|&&i| i as usize >= vertex_count) {
-        return Err(Fault::malformed(
-            element,
-            format!("index {bad} is beyond its {vertex_count} vertices"),
-        ));
+        return Err(Fault::malformed(element, format!("index {bad} is beyond its {vertex_count} vertices")));
     }
     match mode {
         Mode::TriangleStrip => Ok(from_strip(&indices)),
         Mode::TriangleFan => Ok(from_fan(&indices)),
         _ if indices.len().is_multiple_of(3) => Ok(indices),
-        _ => Err(Fault::malformed(
-            element,
-            format!("{} indices are not whole triangles", indices.len()),
-        )),
+        _ => Err(Fault::malformed(element, format!("{} indices are not whole triangles", indices.len()))),
     }
 }
 
 /// Every other triangle of a strip runs the other way; those that repeat a vertex only steer the strip.
 fn from_strip(indices: &[u32]) -> Vec<u32> {
     let windows = indices.windows(3).enumerate();
-    let turned = windows.map(|(i, w)| {
-        if i % 2 == 0 {
-            [w[0], w[1], w[2]]
-        } else {
-            [w[1], w[0], w[2]]
-        }
-    });
-    turned
-        .filter(|[a, b, c]| a != b && b != c && a != c)
-        .flatten()
-        .collect()
+    let turned = windows.map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] });
+    turned.filter(|[a, b, c]| a != b && b != c && a != c).flatten().collect()
 }
 
 fn from_fan(indices: &[u32]) -> Vec<u32> {
     let rim = indices.get(1..).unwrap_or_default();
-    rim.windows(2)
-        .flat_map(|edge| [indices[0], edge[0], edge[1]])
-        .collect()
+    rim.windows(2).flat_map(|edge| [indices[0], edge[0], edge[1]]).collect()
 }
 
 #[cfg(test)]

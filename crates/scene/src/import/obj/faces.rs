@@ -28,10 +28,7 @@ pub(super) struct Faces {
 impl Faces {
     pub(super) fn use_material(&mut self, name: &str) {
         let next = self.material_names.len();
-        let number = *self
-            .number_of_material
-            .entry(name.to_owned())
-            .or_insert(next);
+        let number = *self.number_of_material.entry(name.to_owned()).or_insert(next);
         if number == next {
             self.material_names.push(name.to_owned());
             self.indices_of_material.push(Vec::new());
@@ -39,23 +36,13 @@ impl Faces {
         self.current_material = Some(number);
     }
 
-    pub(super) fn take(
-        &mut self,
-        line: &Line,
-        attributes: &Attributes,
-        limits: &Limits,
-    ) -> Result<(), Fault> {
+    pub(super) fn take(&mut self, line: &Line, attributes: &Attributes, limits: &Limits) -> Result<(), Fault> {
         if self.current_material.is_none() {
             self.use_material("");
         }
         let material = self.current_material.unwrap_or(0);
         let mut words = line.rest.split_ascii_whitespace();
-        let mut next = |faces: &mut Self| {
-            words
-                .next()
-                .map(|word| faces.vertex(word, line, attributes))
-                .transpose()
-        };
+        let mut next = |faces: &mut Self| words.next().map(|word| faces.vertex(word, line, attributes)).transpose();
         let (Some(hub), Some(mut last)) = (next(self)?, next(self)?) else {
             return Err(Fault::malformed(line, "a face of fewer than three corners"));
         };
@@ -83,17 +70,14 @@ impl Faces {
     }
 
     fn vertex(&mut self, word: &str, line: &Line, attributes: &Attributes) -> Result<u32, Fault> {
-        let corner = corner(word, attributes)
-            .map_err(|why| Fault::malformed(line, format!("{word:?} {why}")))?;
+        let corner = corner(word, attributes).map_err(|why| Fault::malformed(line, format!("{word:?} {why}")))?;
         if let Some(&vertex) = self.vertex_of_corner.get(&corner) {
             return Ok(vertex);
         }
         let vertex = self.mesh.vertices.len() as u32;
         self.vertex_of_corner.insert(corner, vertex);
         self.has_normals |= corner[2] != NONE;
-        self.mesh
-            .positions_in_mesh
-            .push(attributes.positions_in_source[corner[0] as usize]);
+        self.mesh.positions_in_mesh.push(attributes.positions_in_source[corner[0] as usize]);
         self.mesh.vertices.push(attributes.vertex(corner));
         Ok(vertex)
     }
@@ -103,17 +87,9 @@ impl Attributes {
     fn vertex(&self, [position, uv, normal]: Corner) -> Vertex {
         let plain = plain_vertex();
         Vertex {
-            color_srgba8: self
-                .colors_srgba8
-                .get(position as usize)
-                .copied()
-                .unwrap_or(plain.color_srgba8),
+            color_srgba8: self.colors_srgba8.get(position as usize).copied().unwrap_or(plain.color_srgba8),
             uv: self.uvs.get(uv as usize).copied().unwrap_or(plain.uv),
-            normal: self
-                .normals
-                .get(normal as usize)
-                .copied()
-                .unwrap_or(plain.normal),
+            normal: self.normals.get(normal as usize).copied().unwrap_or(plain.normal),
             ..plain
         }
     }
@@ -121,11 +97,7 @@ impl Attributes {
 
 /// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
 fn corner(word: &str, attributes: &Attributes) -> Result<Corner, &'static str> {
-    let counts = [
-        attributes.positions_in_source.len(),
-        attributes.uvs.len(),
-        attributes.normals.len(),
-    ];
+    let counts = [attributes.positions_in_source.len(), attributes.uvs.len(), attributes.normals.len()];
     let mut corner = [NONE; 3];
     let mut fields = word.split('/');
     for (number, count) in corner.iter_mut().zip(counts) {
@@ -134,23 +106,13 @@ fn corner(word: &str, attributes: &Attributes) -> Result<Corner, &'static str> {
         }
     }
     let is_complete = corner[0] != NONE && fields.next().is_none();
-    if is_complete {
-        Ok(corner)
-    } else {
-        Err("is not a corner")
-    }
+    if is_complete { Ok(corner) } else { Err("is not a corner") }
 }
 
 /// From 1, or backwards from the last one so far.
 fn resolved(field: &str, count: usize) -> Result<u32, &'static str> {
     let number: i64 = field.parse().map_err(|_| "is not a corner")?;
-    let from_zero = if number < 0 {
-        number.checked_add(count as i64)
-    } else {
-        number.checked_sub(1)
-    };
+    let from_zero = if number < 0 { number.checked_add(count as i64) } else { number.checked_sub(1) };
     let in_range = from_zero.filter(|n| (0..count.min(NONE as usize) as i64).contains(n));
-    in_range
-        .map(|n| n as u32)
-        .ok_or("refers to something that is not there")
+    in_range.map(|n| n as u32).ok_or("refers to something that is not there")
 }

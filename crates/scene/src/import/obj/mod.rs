@@ -29,18 +29,9 @@ pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<Sou
         file.take(&line, limits)?;
     }
     let mut scene = SourceScene::default();
-    let numbers = mtl::read_materials(
-        &file.libraries,
-        &file.faces.material_names,
-        folder,
-        limits,
-        &mut scene,
-    )?;
+    let numbers = mtl::read_materials(&file.libraries, &file.faces.material_names, folder, limits, &mut scene)?;
     scene.meshes.push(file.faces.into_mesh(&numbers)?);
-    scene.instances.push(SourceInstance {
-        mesh: 0,
-        source_from_mesh: DAffine3::IDENTITY,
-    });
+    scene.instances.push(SourceInstance { mesh: 0, source_from_mesh: DAffine3::IDENTITY });
     Ok(scene)
 }
 
@@ -65,11 +56,7 @@ impl ObjFile {
     fn take(&mut self, line: &Line, limits: &Limits) -> Result<(), Fault> {
         match line.keyword {
             "v" => {
-                at_most(
-                    line,
-                    self.attributes.positions_in_source.len() as u64 + 1,
-                    limits.vertices,
-                )?;
+                at_most(line, self.attributes.positions_in_source.len() as u64 + 1, limits.vertices)?;
                 self.attributes.take_position(line)?;
             }
             "vt" => {
@@ -77,10 +64,7 @@ impl ObjFile {
                 // OBJ's v runs upwards.
                 self.attributes.uvs.push([u as f32, 1.0 - v as f32]);
             }
-            "vn" => self
-                .attributes
-                .normals
-                .push(floats::<3>(line, 3)?.map(|n| n as f32)),
+            "vn" => self.attributes.normals.push(floats::<3>(line, 3)?.map(|n| n as f32)),
             "f" => self.faces.take(line, &self.attributes, limits)?,
             "usemtl" => self.faces.use_material(line.rest),
             "mtllib" => self.libraries.push(line.rest.to_owned()),
@@ -97,14 +81,12 @@ impl Attributes {
         let position = DVec3::new(x, y, z);
         let count = line.rest.split_ascii_whitespace().count();
         if count >= 6 {
-            self.colors_srgba8
-                .resize(self.positions_in_source.len(), [255; 4]);
+            self.colors_srgba8.resize(self.positions_in_source.len(), [255; 4]);
             let [r, g, b] = [a, g, b].map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
             self.colors_srgba8.push([r, g, b, 255]);
         }
         let is_weighted = count == 4 && a != 0.0;
-        self.positions_in_source
-            .push(if is_weighted { position / a } else { position });
+        self.positions_in_source.push(if is_weighted { position / a } else { position });
         Ok(())
     }
 }
@@ -115,11 +97,7 @@ fn parts_of(indices_of_material: Vec<Vec<u32>>, numbers: &[u32]) -> (Vec<u32>, V
     for (own, &material) in indices_of_material.into_iter().zip(numbers) {
         if !own.is_empty() {
             let (first_index, index_count) = (indices.len() as u32, own.len() as u32);
-            parts.push(MeshPart {
-                first_index,
-                index_count,
-                material,
-            });
+            parts.push(MeshPart { first_index, index_count, material });
             indices.extend(own);
         }
     }

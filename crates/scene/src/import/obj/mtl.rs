@@ -25,26 +25,15 @@ pub(super) fn read_materials(
     for library in libraries {
         let element = format!("mtllib {library}");
         if let Some(bytes) = existing(folder.read_name(&element, library))? {
-            parse(
-                &String::from_utf8_lossy(&bytes),
-                &element,
-                limits,
-                &mut known,
-            )?;
+            parse(&String::from_utf8_lossy(&bytes), &element, limits, &mut known)?;
         }
     }
     let mut textures = Textures::default();
     let mut numbers = Vec::new();
     for name in names {
-        let Entry {
-            mut material,
-            picture,
-        } = known.get(name).cloned().unwrap_or_default();
+        let Entry { mut material, picture } = known.get(name).cloned().unwrap_or_default();
         material.name.clone_from(name);
-        material.base_color_texture = picture
-            .map(|file| textures.number_of(&file, folder))
-            .transpose()?
-            .flatten();
+        material.base_color_texture = picture.map(|file| textures.number_of(&file, folder)).transpose()?.flatten();
         numbers.push(scene.materials.len() as u32);
         scene.materials.push(material);
     }
@@ -61,19 +50,11 @@ struct Entry {
     picture: Option<String>,
 }
 
-fn parse(
-    text: &str,
-    element: &str,
-    limits: &Limits,
-    known: &mut HashMap<String, Entry>,
-) -> Result<(), Fault> {
+fn parse(text: &str, element: &str, limits: &Limits, known: &mut HashMap<String, Entry>) -> Result<(), Fault> {
     let (mut name, mut entry) = (None, Entry::default());
     for line in lines(text) {
         if line.keyword == "newmtl" {
-            known.extend(
-                name.replace(line.rest.to_owned())
-                    .map(|name| (name, std::mem::take(&mut entry))),
-            );
+            known.extend(name.replace(line.rest.to_owned()).map(|name| (name, std::mem::take(&mut entry))));
             at_most(element, known.len() as u64, limits.attributes)?;
         } else {
             entry.take(&line)?;
@@ -95,8 +76,7 @@ impl Entry {
             "Ke" => material.emissive_linear = color(line)?,
             "Ns" => {
                 material.phong_exponent = non_negative(line)?;
-                material.roughness =
-                    Material::roughness_from_phong_exponent(material.phong_exponent);
+                material.roughness = Material::roughness_from_phong_exponent(material.phong_exponent);
             }
             "d" => material.set_opacity(non_negative(line)?),
             "Tr" => material.set_opacity(1.0 - non_negative(line)?),
@@ -123,36 +103,20 @@ fn color(line: &Line) -> Result<Vec3, Fault> {
     }
     let is_grey = line.rest.split_ascii_whitespace().count() == 1;
     let [r, g, b] = floats::<3>(line, 1)?.map(|c| c as f32);
-    let color = if is_grey {
-        Vec3::splat(r)
-    } else {
-        Vec3::new(r, g, b)
-    };
+    let color = if is_grey { Vec3::splat(r) } else { Vec3::new(r, g, b) };
     let is_valid = color.is_finite() && color.min_element() >= 0.0;
-    if is_valid {
-        Ok(color)
-    } else {
-        Err(Fault::malformed(line, "a colour is negative or not finite"))
-    }
+    if is_valid { Ok(color) } else { Err(Fault::malformed(line, "a colour is negative or not finite")) }
 }
 
 fn non_negative(line: &Line) -> Result<f32, Fault> {
     let [value] = floats::<1>(line, 1)?;
     let value = value as f32;
-    if value >= 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(Fault::malformed(line, "negative or not finite"))
-    }
+    if value >= 0.0 && value.is_finite() { Ok(value) } else { Err(Fault::malformed(line, "negative or not finite")) }
 }
 
 /// The name comes after options such as `-s 1 1 1`; without options it may hold spaces.
 fn file_name(rest: &str) -> &str {
-    if rest.starts_with('-') {
-        rest.split_ascii_whitespace().next_back().unwrap_or(rest)
-    } else {
-        rest
-    }
+    if rest.starts_with('-') { rest.split_ascii_whitespace().next_back().unwrap_or(rest) } else { rest }
 }
 
 #[derive(Default)]

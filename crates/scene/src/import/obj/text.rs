@@ -20,22 +20,11 @@ impl fmt::Display for Line<'_> {
 /// All lines but empty ones and comments. Lines continued by a backslash are not joined: the backslash
 /// is then refused as no number and no corner.
 pub(super) fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
-    let numbered = text
-        .lines()
-        .enumerate()
-        .map(|(i, line)| (i + 1, line.trim()));
-    numbered
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
-        .map(|(number, line)| {
-            let (keyword, rest) = line
-                .split_once(|c: char| c.is_ascii_whitespace())
-                .unwrap_or((line, ""));
-            Line {
-                number,
-                keyword,
-                rest: rest.trim_start(),
-            }
-        })
+    let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
+    numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).map(|(number, line)| {
+        let (keyword, rest) = line.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((line, ""));
+        Line { number, keyword, rest: rest.trim_start() }
+    })
 }
 
 /// Up to `N` finite numbers, at least `required`; what is missing is 0.
@@ -46,15 +35,10 @@ pub(super) fn floats<const N: usize>(line: &Line, required: usize) -> Result<[f6
         match words.next() {
             Some(word) => {
                 let number = word.parse().ok().filter(|n: &f64| n.is_finite());
-                *value = number.ok_or_else(|| {
-                    Fault::malformed(line, format!("{word:?} is not a finite number"))
-                })?;
+                *value = number.ok_or_else(|| Fault::malformed(line, format!("{word:?} is not a finite number")))?;
             }
             None if i < required => {
-                return Err(Fault::malformed(
-                    line,
-                    format!("{i} numbers where {required} are needed"),
-                ));
+                return Err(Fault::malformed(line, format!("{i} numbers where {required} are needed")));
             }
             None => break,
         }

@@ -12,41 +12,24 @@ pub(super) fn check(header: &PlyHeader, file_bytes: u64, limits: &Limits) -> Res
     for element in &header.elem_defs {
         let name = format!("header, element {}", element.name);
         let count = element.count as u64;
-        let row = element
-            .properties
-            .iter()
-            .map(|p| least_property_bytes(&p.property_type, header.format))
-            .sum::<u64>();
+        let row = element.properties.iter().map(|p| least_property_bytes(&p.property_type, header.format)).sum::<u64>();
         if row == 0 && count > 0 {
             return Err(Fault::malformed(name, "it has rows but no properties"));
         }
         least_bytes = least_bytes.saturating_add(count.saturating_mul(row));
         // One byte more: the last number of an ASCII file needs no white space after it.
         if least_bytes > file_bytes + 1 {
-            return Err(Fault::malformed(
-                name,
-                format!("{count} rows do not fit a file of {file_bytes} bytes"),
-            ));
+            return Err(Fault::malformed(name, format!("{count} rows do not fit a file of {file_bytes} bytes")));
         }
     }
-    let vertex = header
-        .get_element("vertex")
-        .ok_or_else(|| Fault::malformed("header", "there is no element vertex"))?;
-    at_most(
-        "header, element vertex",
-        vertex.count as u64,
-        limits.vertices,
-    )?;
+    let vertex =
+        header.get_element("vertex").ok_or_else(|| Fault::malformed("header", "there is no element vertex"))?;
+    at_most("header, element vertex", vertex.count as u64, limits.vertices)?;
     let has_position = ["x", "y", "z"].iter().all(|name| vertex.has_property(name));
-    let face = header
-        .get_element("face")
-        .ok_or_else(|| Fault::malformed("header", "there is no element face"))?;
+    let face = header.get_element("face").ok_or_else(|| Fault::malformed("header", "there is no element face"))?;
     let has_corners = face.has_property("vertex_indices") || face.has_property("vertex_index");
     if !has_position || !has_corners {
-        return Err(Fault::malformed(
-            "header",
-            "vertex needs x, y, z, and face needs vertex_indices",
-        ));
+        return Err(Fault::malformed("header", "vertex needs x, y, z, and face needs vertex_indices"));
     }
     Ok(())
 }

@@ -23,16 +23,12 @@ use rows::{FaceRow, SkippedRow, VertexRow};
 
 pub(super) fn read(bytes: &[u8], _folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
     // The last number of an ASCII file may lack the white space that ends it.
-    let reader = PlyReader::from_reader(bytes.chain(&b"\n"[..]))
-        .map_err(|e| Fault::malformed("header", e.to_string()))?;
+    let reader =
+        PlyReader::from_reader(bytes.chain(&b"\n"[..])).map_err(|e| Fault::malformed("header", e.to_string()))?;
     header::check(reader.header(), bytes.len() as u64, limits)?;
     let (mut mesh, has_normals) = read_elements(reader, limits)?;
     let index_count = mesh.indices.len() as u32;
-    mesh.parts.push(MeshPart {
-        first_index: 0,
-        index_count,
-        material: 0,
-    });
+    mesh.parts.push(MeshPart { first_index: 0, index_count, material: 0 });
     if has_normals {
         normals::repair(&mut mesh)
     } else {
@@ -40,22 +36,13 @@ pub(super) fn read(bytes: &[u8], _folder: &Folder, limits: &Limits) -> Result<So
     }
     Ok(SourceScene {
         meshes: vec![mesh],
-        instances: vec![SourceInstance {
-            mesh: 0,
-            source_from_mesh: DAffine3::IDENTITY,
-        }],
-        materials: vec![Material {
-            name: "vertex colours".into(),
-            ..Material::default()
-        }],
+        instances: vec![SourceInstance { mesh: 0, source_from_mesh: DAffine3::IDENTITY }],
+        materials: vec![Material { name: "vertex colours".into(), ..Material::default() }],
         ..SourceScene::default()
     })
 }
 
-fn read_elements(
-    mut reader: PlyReader<impl BufRead>,
-    limits: &Limits,
-) -> Result<(SourceMesh, bool), Fault> {
+fn read_elements(mut reader: PlyReader<impl BufRead>, limits: &Limits) -> Result<(SourceMesh, bool), Fault> {
     let mut mesh = SourceMesh::default();
     let mut has_normals = false;
     while let Some(element) = reader.current_element() {
@@ -67,25 +54,17 @@ fn read_elements(
                 read_vertices(&mut reader, color_scale, &mut mesh)?;
             }
             "face" => read_faces(&mut reader, &mut mesh, limits)?,
-            _ => each_row(&mut reader, |_: SkippedRow| Ok(()))
-                .map_err(|why| Fault::malformed(&name, why))?,
+            _ => each_row(&mut reader, |_: SkippedRow| Ok(())).map_err(|why| Fault::malformed(&name, why))?,
         }
     }
     let vertex_count = mesh.vertices.len();
     if let Some(bad) = mesh.indices.iter().find(|&&i| i as usize >= vertex_count) {
-        return Err(Fault::malformed(
-            "face",
-            format!("index {bad} is beyond its {vertex_count} vertices"),
-        ));
+        return Err(Fault::malformed("face", format!("index {bad} is beyond its {vertex_count} vertices")));
     }
     Ok((mesh, has_normals))
 }
 
-fn read_vertices(
-    reader: &mut PlyReader<impl BufRead>,
-    color_scale: f32,
-    mesh: &mut SourceMesh,
-) -> Result<(), Fault> {
+fn read_vertices(reader: &mut PlyReader<impl BufRead>, color_scale: f32, mesh: &mut SourceMesh) -> Result<(), Fault> {
     each_row(reader, |row: VertexRow| {
         let (position, vertex) = row.vertex(color_scale)?;
         mesh.positions_in_mesh.push(position);
@@ -95,20 +74,12 @@ fn read_vertices(
     .map_err(|why| Fault::malformed(format!("vertex {}", mesh.vertices.len()), why))
 }
 
-fn read_faces(
-    reader: &mut PlyReader<impl BufRead>,
-    mesh: &mut SourceMesh,
-    limits: &Limits,
-) -> Result<(), Fault> {
+fn read_faces(reader: &mut PlyReader<impl BufRead>, mesh: &mut SourceMesh, limits: &Limits) -> Result<(), Fault> {
     let mut face = 0u64;
     let result = each_row(reader, |row: FaceRow| {
         row.append_fan(&mut mesh.indices)?;
         face += 1;
-        if mesh.indices.len() as u64 / 3 > limits.triangles {
-            Err(TOO_MANY.to_owned())
-        } else {
-            Ok(())
-        }
+        if mesh.indices.len() as u64 / 3 > limits.triangles { Err(TOO_MANY.to_owned()) } else { Ok(()) }
     });
     at_most("triangles", mesh.indices.len() as u64 / 3, limits.triangles)?;
     result.map_err(|why| Fault::malformed(format!("face {face}"), why))

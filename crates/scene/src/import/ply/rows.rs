@@ -62,22 +62,9 @@ impl VertexRow {
             return Err("a position, normal or texture coordinate is not finite".into());
         }
         let byte = |channel: Option<f32>| channel.map_or(255, |c| (c * color_scale + 0.5) as u8);
-        let color_srgba8 = [
-            byte(self.red),
-            byte(self.green),
-            byte(self.blue),
-            byte(self.alpha),
-        ];
+        let color_srgba8 = [byte(self.red), byte(self.green), byte(self.blue), byte(self.alpha)];
         // PLY's v runs upwards.
-        Ok((
-            position,
-            Vertex {
-                normal,
-                uv: [u, 1.0 - v],
-                color_srgba8,
-                ..plain_vertex()
-            },
-        ))
+        Ok((position, Vertex { normal, uv: [u, 1.0 - v], color_srgba8, ..plain_vertex() }))
     }
 }
 

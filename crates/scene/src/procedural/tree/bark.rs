@@ -33,13 +33,7 @@ pub(super) fn add(builder: &mut MeshBuilder, skeleton: &Skeleton, budget: u32, s
         let before = (*number as f32 * detail.share[branch.level]) as u32;
         *number += 1;
         if (*number as f32 * detail.share[branch.level]) as u32 > before {
-            add_tube(
-                builder,
-                branch,
-                detail.rings[branch.level],
-                detail.sides[branch.level],
-                &noise,
-            );
+            add_tube(builder, branch, detail.rings[branch.level], detail.sides[branch.level], &noise);
         }
     }
 }
@@ -47,25 +41,15 @@ pub(super) fn add(builder: &mut MeshBuilder, skeleton: &Skeleton, budget: u32, s
 impl Detail {
     fn at(scale: f32) -> Self {
         let count = |at_one: f32, least: f32| (at_one * scale).round().max(least) as u32;
-        Self {
-            rings: RINGS.map(|r| count(r, 1.0)),
-            sides: SIDES.map(|s| count(s, 3.0)),
-            share: [1.0; LEVELS],
-        }
+        Self { rings: RINGS.map(|r| count(r, 1.0)), sides: SIDES.map(|s| count(s, 3.0)), share: [1.0; LEVELS] }
     }
 
     fn within(budget: u32, skeleton: &Skeleton) -> Self {
         let mut branches = [0u32; LEVELS];
-        skeleton
-            .branches
-            .iter()
-            .for_each(|b| branches[b.level] += 1);
+        skeleton.branches.iter().for_each(|b| branches[b.level] += 1);
         let scales = (0..40).map(|step| 4.0 * 0.92f32.powi(step));
         let fits = |detail: &Self| detail.triangles(&branches) <= budget as f32;
-        scales
-            .map(Self::at)
-            .find(fits)
-            .unwrap_or_else(|| Self::at(0.2).thinned_to(budget as f32, &branches))
+        scales.map(Self::at).find(fits).unwrap_or_else(|| Self::at(0.2).thinned_to(budget as f32, &branches))
     }
 
     /// Drops twigs first, then shoots, and so on.
@@ -81,9 +65,7 @@ impl Detail {
     }
 
     fn triangles(&self, branches: &[u32; LEVELS]) -> f32 {
-        (0..LEVELS)
-            .map(|level| self.triangles_of(level, branches))
-            .sum()
+        (0..LEVELS).map(|level| self.triangles_of(level, branches)).sum()
     }
 
     fn triangles_of(&self, level: usize, branches: &[u32; LEVELS]) -> f32 {
@@ -127,19 +109,8 @@ fn bark_vertex(branch: &Branch, t: f32, outwards: Vec3, angle_rad: f32, noise: &
         radius_m *= 1.0 + 0.09 * grain;
     }
     let thin = branch.level as f32 / LEVELS as f32;
-    let dark = mix(
-        Vec3::new(58.0, 46.0, 36.0),
-        Vec3::new(84.0, 70.0, 50.0),
-        thin,
-    );
-    let light = mix(
-        Vec3::new(122.0, 104.0, 84.0),
-        Vec3::new(112.0, 98.0, 68.0),
-        thin,
-    );
+    let dark = mix(Vec3::new(58.0, 46.0, 36.0), Vec3::new(84.0, 70.0, 50.0), thin);
+    let light = mix(Vec3::new(122.0, 104.0, 84.0), Vec3::new(112.0, 98.0, 68.0), thin);
     let color = mix(dark, light, 0.45 + 0.55 * grain);
-    Vertex {
-        sway: knot.sway,
-        ..vertex(knot.position + outwards * radius_m, outwards, color)
-    }
+    Vertex { sway: knot.sway, ..vertex(knot.position + outwards * radius_m, outwards, color) }
 }

@@ -26,16 +26,9 @@ pub(super) struct TreePlan {
 pub(super) fn tree_mesh(plan: &TreePlan, seed: u64) -> Mesh {
     let skeleton = Skeleton::grown(seed).fitted(plan.foot_in_world, plan.height_m);
     let mut builder = MeshBuilder::default();
-    bark::add(
-        &mut builder,
-        &skeleton,
-        (plan.triangles as f32 * BARK_SHARE) as u32,
-        seed,
-    );
+    bark::add(&mut builder, &skeleton, (plan.triangles as f32 * BARK_SHARE) as u32, seed);
     builder.finish_part(plan.bark_material);
-    let left = plan
-        .triangles
-        .saturating_sub(builder.indices.len() as u32 / 3);
+    let left = plan.triangles.saturating_sub(builder.indices.len() as u32 / 3);
     leaves::add(&mut builder, &skeleton, left, seed);
     builder.finish_part(plan.leaf_material);
     builder.into_mesh()

@@ -106,11 +106,7 @@ impl Skeleton {
     /// About one unit high, its foot at the origin.
     pub(super) fn grown(seed: u64) -> Self {
         let mut rng = Rng::new(seed, 1);
-        let foot = Knot {
-            position: Vec3::ZERO,
-            radius_m: 0.034,
-            sway: 0.0,
-        };
+        let foot = Knot { position: Vec3::ZERO, radius_m: 0.034, sway: 0.0 };
         let trunk = grow(0, foot, Vec3::Y, 0.78, &mut rng);
         let mut branches = vec![trunk];
         let mut next = 0;
@@ -119,11 +115,7 @@ impl Skeleton {
             branches.extend(children);
             next += 1;
         }
-        Self {
-            branches,
-            crown_centre: Vec3::ZERO,
-            crown_radii: Vec3::ONE,
-        }
+        Self { branches, crown_centre: Vec3::ZERO, crown_radii: Vec3::ONE }
     }
 
     /// Scaled to `height_m` and moved to `foot`; then the crown is measured.
@@ -133,9 +125,7 @@ impl Skeleton {
         const MAX_REACH_M: f32 = 0.62;
         let knots = || self.branches.iter().flat_map(|b| &b.knots);
         let top = knots().fold(1e-3f32, |top, k| top.max(k.position.y));
-        let reach = knots().fold(1e-3f32, |reach, k| {
-            reach.max(k.position.x.hypot(k.position.z))
-        });
+        let reach = knots().fold(1e-3f32, |reach, k| reach.max(k.position.x.hypot(k.position.z)));
         let scale = ((height_m - LEAF_MARGIN_M) / top).min(MAX_REACH_M / reach);
         for knot in self.branches.iter_mut().flat_map(|b| &mut b.knots) {
             knot.position = foot + knot.position * scale;
@@ -146,11 +136,7 @@ impl Skeleton {
     }
 
     fn measure_crown(&mut self) {
-        let twigs = self
-            .branches
-            .iter()
-            .filter(|b| b.level + 1 == LEVELS)
-            .flat_map(|b| &b.knots);
+        let twigs = self.branches.iter().filter(|b| b.level + 1 == LEVELS).flat_map(|b| &b.knots);
         let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for knot in twigs {
             (min, max) = (min.min(knot.position), max.max(knot.position));
@@ -169,18 +155,13 @@ impl Branch {
         let along = t.clamp(0.0, 1.0) * last as f32;
         let i = (along as usize).min(last - 1);
         let f = along - i as f32;
-        let [a, b, c, d] =
-            [i.saturating_sub(1), i, i + 1, (i + 2).min(last)].map(|k| self.knots[k]);
+        let [a, b, c, d] = [i.saturating_sub(1), i, i + 1, (i + 2).min(last)].map(|k| self.knots[k]);
         let (p0, p1, p2, p3) = (a.position, b.position, c.position, d.position);
         let curve = p1 * 2.0
             + (p2 - p0) * f
             + (p0 * 2.0 - p1 * 5.0 + p2 * 4.0 - p3) * (f * f)
             + (p1 * 3.0 - p0 - p2 * 3.0 + p3) * (f * f * f);
-        Knot {
-            position: curve * 0.5,
-            radius_m: lerp(b.radius_m, c.radius_m, f),
-            sway: lerp(b.sway, c.sway, f),
-        }
+        Knot { position: curve * 0.5, radius_m: lerp(b.radius_m, c.radius_m, f), sway: lerp(b.sway, c.sway, f) }
     }
 
     pub(super) fn direction_at(&self, t: f32) -> Vec3 {
@@ -189,10 +170,7 @@ impl Branch {
     }
 
     pub(super) fn length_m(&self) -> f32 {
-        self.knots
-            .windows(2)
-            .map(|w| w[0].position.distance(w[1].position))
-            .sum()
+        self.knots.windows(2).map(|w| w[0].position.distance(w[1].position)).sum()
     }
 }
 
@@ -205,21 +183,12 @@ fn grow(level: usize, foot: Knot, direction: Vec3, length: f32, rng: &mut Rng) -
         let t = i as f32 / habit.knots as f32;
         // Limbs sag in the middle under their weight and lift their ends to the light.
         let lift = habit.rise * lerp(-0.6, 2.2, t);
-        direction =
-            (direction + rng.vector() * habit.wander + Vec3::Y * lift).normalize_or(Vec3::Y);
+        direction = (direction + rng.vector() * habit.wander + Vec3::Y * lift).normalize_or(Vec3::Y);
         position += direction * step * rng.between(0.9, 1.1);
         // Never below the ground that the tree stands on.
         position.y = position.y.max(0.04);
-        let taper = if level == 0 {
-            lerp(1.0, 0.12, t.powf(0.9))
-        } else {
-            lerp(1.0, 0.22, t)
-        };
-        knots.push(Knot {
-            position,
-            radius_m: foot.radius_m * taper,
-            sway: foot.sway + habit.sway * t.powf(1.3),
-        });
+        let taper = if level == 0 { lerp(1.0, 0.12, t.powf(0.9)) } else { lerp(1.0, 0.22, t) };
+        knots.push(Knot { position, radius_m: foot.radius_m * taper, sway: foot.sway + habit.sway * t.powf(1.3) });
     }
     Branch { level, knots }
 }
@@ -237,11 +206,9 @@ fn children_of(parent: &Branch, rng: &mut Rng) -> Vec<Branch> {
         let t = lerp(habit.first_child, 0.98, u);
         let turn = first_turn + GOLDEN_ANGLE_RAD * i as f32 + rng.between(-0.35, 0.35);
         let knot = parent.at(t);
-        let angle = lerp(HABITS[level].angles_rad[0], HABITS[level].angles_rad[1], u)
-            + rng.between(-0.18, 0.18);
+        let angle = lerp(HABITS[level].angles_rad[0], HABITS[level].angles_rad[1], u) + rng.between(-0.18, 0.18);
         let direction = tilted(parent.direction_at(t), angle, turn);
-        let length =
-            parent_length * HABITS[level].length * envelope(level, u) * rng.between(0.8, 1.2);
+        let length = parent_length * HABITS[level].length * envelope(level, u) * rng.between(0.8, 1.2);
         let thickness = if level == 1 { 0.52 } else { 0.6 };
         let radius_m = (knot.radius_m * thickness).min(0.05 * length).max(4e-4);
         grow(level, Knot { radius_m, ..knot }, direction, length, rng)

@@ -1,0 +1,66 @@
+//! Twin of `fill.wgsl`: what no camera knows gets the colour of the farther side of its gap.
+
+use depth_image::{ProvenanceKind, linear_from_srgb8, srgb8_from_linear};
+use glam::{IVec2, UVec2, Vec3};
+
+use super::Pixel;
+
+const REACH_PX: i32 = 48;
+/// Depths that differ by less are one side of the gap.
+const SAME_SIDE: f32 = 0.95;
+const DIRECTIONS: [IVec2; 8] = [
+    IVec2::new(1, 0),
+    IVec2::new(-1, 0),
+    IVec2::new(0, 1),
+    IVec2::new(0, -1),
+    IVec2::new(1, 1),
+    IVec2::new(-1, 1),
+    IVec2::new(1, -1),
+    IVec2::new(-1, -1),
+];
+
+/// The first known pixel in one direction, and what it counts.
+#[derive(Clone, Copy)]
+struct Neighbour {
+    pixel: Pixel,
+    weight: f32,
+}
+
+pub(super) fn fill(pixels: &mut [Pixel], size_px: UVec2) {
+    let known = pixels.to_vec();
+    for (index, pixel) in pixels.iter_mut().enumerate() {
+        if pixel.provenance.kind() == ProvenanceKind::Filled {
+            let place = UVec2::new(index as u32 % size_px.x, index as u32 / size_px.x).as_ivec2();
+            let neighbours: Vec<_> =
+                DIRECTIONS.into_iter().filter_map(|towards| known_towards(&known, size_px, place, towards)).collect();
+            fill_pixel(pixel, &neighbours);
+        }
+    }
+}
+
+fn fill_pixel(pixel: &mut Pixel, neighbours: &[Neighbour]) {
+    let farthest = neighbours.iter().fold(f32::INFINITY, |least, n| least.min(n.pixel.inverse_depth_per_m));
+    let far_side = || neighbours.iter().filter(|n| n.pixel.inverse_depth_per_m * SAME_SIDE <= farthest);
+    let weights: f32 = far_side().map(|n| n.weight).sum();
+    // Nothing is known within reach: the background stays.
+    if weights > 0.0 {
+        let color: Vec3 = far_side().map(|n| Vec3::from(n.pixel.srgb8.map(linear_from_srgb8)) * n.weight).sum();
+        let depth: f32 = far_side().map(|n| n.pixel.inverse_depth_per_m * n.weight).sum();
+        pixel.srgb8 = (color / weights).to_array().map(srgb8_from_linear);
+        pixel.inverse_depth_per_m = depth / weights;
+    }
+}
+
+fn known_towards(known: &[Pixel], size_px: UVec2, origin: IVec2, towards: IVec2) -> Option<Neighbour> {
+    for i in 1..=REACH_PX {
+        let at = origin + towards * i;
+        if at.cmplt(IVec2::ZERO).any() || at.cmpge(size_px.as_ivec2()).any() {
+            return None;
+        }
+        let pixel = known[(at.y * size_px.x as i32 + at.x) as usize];
+        if pixel.provenance.kind() != ProvenanceKind::Filled {
+            return Some(Neighbour { pixel, weight: (i as f32 * towards.as_vec2().length()).recip() });
+        }
+    }
+    None
+}

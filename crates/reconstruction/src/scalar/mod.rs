@@ -1,0 +1,153 @@
+//! The scalar twin of every method: the same data, one pixel after another, in plain `f32`.
+//!
+//! An oracle for tests, written to be read beside the shaders; it is slow and takes only what
+//! [`crate::Reconstructor::upload`] accepts.
+
+mod carve;
+mod fill;
+mod march;
+mod sample_camera;
+mod search;
+mod surface;
+mod tile_start;
+mod view_ray;
+
+use depth_image::{Aabb, DepthImage, PinholeCamera, Provenance, ProvenanceKind, View, srgb8_from_linear};
+use glam::{UVec2, Vec3};
+
+use crate::ReconstructionMethod;
+use sample_camera::SampleCamera;
+use view_ray::{ViewRay, ViewRays};
+
+/// Greater than every parameter and gap.
+const FAR_AWAY: f32 = 3.0e38;
+/// Sides of the squares of pixels that start together.
+const TILE_PX: u32 = 8;
+/// Depth is known to half a code; a ray that reached a plane's very depth is still before it.
+const HALF_CODE: f32 = 0.5;
+/// The carve marches in so many of the nearest cameras first.
+const MARCHES: usize = 2;
+
+/// What is written for a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Pixel {
+    srgb8: [u8; 3],
+    inverse_depth_per_m: f32,
+    provenance: Provenance,
+}
+
+impl Pixel {
+    fn without_surface(kind: ProvenanceKind, background_srgb8: [u8; 3]) -> Self {
+        Self { srgb8: background_srgb8, inverse_depth_per_m: 0.0, provenance: Provenance::new(kind, 0) }
+    }
+
+    fn hit(color_linear: Vec3, t: f32, camera_mask: u32) -> Self {
+        Self {
+            srgb8: color_linear.to_array().map(srgb8_from_linear),
+            inverse_depth_per_m: t.recip(),
+            provenance: Provenance::new(ProvenanceKind::Hit, camera_mask),
+        }
+    }
+}
+
+/// One view with depth and provenance.
+#[must_use]
+pub fn reconstruct(
+    images: &[DepthImage],
+    volume: &Aabb,
+    background_linear: Vec3,
+    camera: &PinholeCamera,
+    method: ReconstructionMethod,
+) -> View {
+    let cameras = nearest_first(images, camera);
+    let rays = ViewRays::of(camera, volume);
+    let starts = tile_start::tile_starts(&cameras, &rays);
+    reconstruct_from(&cameras, &rays, &starts, background_linear, method)
+}
+
+/// As [`reconstruct`], but each ray is followed from where it enters the volume: what tile starts must not
+/// change, but for the space that no camera sees.
+#[must_use]
+pub fn reconstruct_from_entry(
+    images: &[DepthImage],
+    volume: &Aabb,
+    background_linear: Vec3,
+    camera: &PinholeCamera,
+    method: ReconstructionMethod,
+) -> View {
+    let cameras = nearest_first(images, camera);
+    let rays = ViewRays::of(camera, volume);
+    let starts = vec![0.0; rays.tiles().element_product() as usize];
+    reconstruct_from(&cameras, &rays, &starts, background_linear, method)
+}
+
+/// For each tile of 8 × 8 pixels, row by row, the planar depth in metres up to which its rays need not be
+/// searched.
+#[must_use]
+pub fn tile_starts_m(images: &[DepthImage], volume: &Aabb, camera: &PinholeCamera) -> Vec<f32> {
+    tile_start::tile_starts(&nearest_first(images, camera), &ViewRays::of(camera, volume))
+}
+
+/// Camera 0 is the nearest to the view's eye and so knows most; each keeps its bit.
+fn nearest_first(images: &[DepthImage], camera: &PinholeCamera) -> Vec<SampleCamera> {
+    let mut cameras: Vec<_> = (0..).zip(images).map(|(bit, image)| SampleCamera::of(image, 1 << bit)).collect();
+    let distance = |c: &SampleCamera| c.eye_in_world.distance_squared(camera.eye_in_world);
+    cameras.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    cameras
+}
+
+fn reconstruct_from(
+    cameras: &[SampleCamera],
+    rays: &ViewRays,
+    starts: &[f32],
+    background_linear: Vec3,
+    method: ReconstructionMethod,
+) -> View {
+    let background_srgb8 = background_linear.to_array().map(srgb8_from_linear);
+    let size_px = rays.size_px();
+    let places = (0..size_px.y).flat_map(|y| (0..size_px.x).map(move |x| UVec2::new(x, y)));
+    let mut pixels: Vec<Pixel> = places
+        .map(|place| {
+            let ray = rays.ray(place);
+            let start = starts[rays.tile_index(place)];
+            match method {
+                ReconstructionMethod::LightFieldSearch { steps } => {
+                    search::light_field_search(cameras, &ray, start, steps, background_srgb8)
+                }
+                ReconstructionMethod::JointCarve { stop_level } => {
+                    joint_carve(cameras, &ray, start, stop_level, background_srgb8)
+                }
+            }
+        })
+        .collect();
+    fill::fill(&mut pixels, size_px);
+    View {
+        size_px,
+        srgb8: pixels.iter().flat_map(|p| p.srgb8).collect(),
+        inverse_depth_per_m: Some(pixels.iter().map(|p| p.inverse_depth_per_m).collect()),
+        provenance: Some(pixels.iter().map(|p| p.provenance).collect()),
+    }
+}
+
+/// Marches in the nearest cameras, one after another; what they leave is carved by all together.
+fn joint_carve(
+    cameras: &[SampleCamera],
+    ray: &ViewRay,
+    start: f32,
+    stop_level: u32,
+    background_srgb8: [u8; 3],
+) -> Pixel {
+    let mut t = ray.near.max(start);
+    for marched in cameras.iter().take(MARCHES) {
+        if t >= ray.far {
+            return Pixel::without_surface(ProvenanceKind::Empty, background_srgb8);
+        }
+        let found = march::march(marched, ray, t, stop_level);
+        t = found.t;
+        let blend = surface::blended(cameras, ray, t);
+        if found.crossed && blend.occupied {
+            return Pixel::hit(blend.color_linear, t, blend.camera_mask);
+        }
+    }
+    carve::carve(cameras, ray, t, stop_level, background_srgb8)
+}

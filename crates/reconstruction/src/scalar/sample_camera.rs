@@ -1,0 +1,111 @@
+//! A sample image as the searches read it.
+
+use depth_image::{Camera, DepthImage, linear_from_rgb9e5};
+use glam::{UVec2, Vec2, Vec3, Vec4};
+
+use crate::{CodedDepth, Pyramid, sample_set::stretch};
+
+/// One sample image, its depth as codes and their pyramid.
+pub(super) struct SampleCamera {
+    homogeneous_pixel_from_world: [Vec4; 3],
+    pub eye_in_world: Vec3,
+    /// Columns and rows less one: cells lie between texel centres.
+    pub cells: Vec2,
+    pub focal_px: f32,
+    /// See `sample_set::stretch`.
+    pub stretch: f32,
+    /// This camera's bit in provenance.
+    pub mask: u32,
+    depth: CodedDepth,
+    pyramid: Pyramid,
+    wide_words: Vec<u32>,
+    colors_linear: Vec<Vec3>,
+}
+
+/// A cell's corners: codes of the upper left, upper right, lower left and lower right sample, and whether
+/// they are one surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Corners {
+    pub codes: [f32; 4],
+    pub connected: bool,
+}
+
+impl SampleCamera {
+    pub fn of(image: &DepthImage, mask: u32) -> Self {
+        let Camera::Pinhole(camera) = &image.camera;
+        let depth = CodedDepth::of(image);
+        let pyramid = Pyramid::of(&depth);
+        Self {
+            homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world(),
+            eye_in_world: camera.eye_in_world,
+            cells: camera.size_px.as_vec2() - 1.0,
+            focal_px: camera.focal_px.min_element(),
+            stretch: stretch(camera),
+            mask,
+            wide_words: pyramid.wide_words(),
+            pyramid,
+            depth,
+            colors_linear: image.color_rgb9e5.iter().map(|&packed| linear_from_rgb9e5(packed)).collect(),
+        }
+    }
+
+    /// (column · w, row · w, w), w the planar depth, of a point (1) or a direction (0).
+    pub fn homogeneous(&self, v: Vec4) -> Vec3 {
+        Vec3::from_array(self.homogeneous_pixel_from_world.map(|row| row.dot(v)))
+    }
+
+    /// Codes from infinity to a reciprocal depth.
+    pub fn code_above(&self, inverse_depth_per_m: f32) -> f32 {
+        self.depth.scale * inverse_depth_per_m
+    }
+
+    pub fn code(&self, inverse_depth_per_m: f32) -> f32 {
+        self.code_above(inverse_depth_per_m) + self.depth.offset
+    }
+
+    pub fn inverse_depth_per_m(&self, code: f32) -> f32 {
+        (code - self.depth.offset) / self.depth.scale
+    }
+
+    pub fn code_offset(&self) -> f32 {
+        self.depth.offset
+    }
+
+    pub fn code_at(&self, texel: UVec2) -> u16 {
+        self.depth.at(texel.x, texel.y)
+    }
+
+    pub fn color_linear(&self, texel: UVec2) -> Vec3 {
+        self.colors_linear[(texel.y * self.depth.size_px[0] + texel.x) as usize]
+    }
+
+    pub fn corners(&self, cell: UVec2) -> Corners {
+        let at = |x, y| f32::from(self.depth.at(cell.x + x, cell.y + y));
+        Corners {
+            codes: [at(0, 0), at(1, 0), at(0, 1), at(1, 1)],
+            connected: self.depth.connected[(cell.y * self.depth.size_px[0] + cell.x) as usize],
+        }
+    }
+
+    /// The coarsest level.
+    pub fn top_level(&self) -> u32 {
+        let [columns, rows] = self.pyramid.log2_sides;
+        columns.min(rows)
+    }
+
+    /// Nearest and farthest code of a node of level 1 or coarser.
+    pub fn range(&self, level: u32, node: UVec2) -> (f32, f32) {
+        let word = self.pyramid.words[self.node_index(level, node)];
+        ((word & 0xffff) as f32, (word >> 16) as f32)
+    }
+
+    /// Nearest code of 2 × 2 nodes.
+    pub fn wide_nearest(&self, level: u32, node: UVec2) -> f32 {
+        self.wide_words[self.node_index(level, node)] as f32
+    }
+
+    fn node_index(&self, level: u32, node: UVec2) -> usize {
+        let columns = self.pyramid.log2_sides[0] - level;
+        Pyramid::level_begin(self.pyramid.log2_sides, level) + ((node.y << columns) + node.x) as usize
+    }
+}

@@ -1,0 +1,92 @@
+//! The rays of a view, and where they are inside the volume.
+
+use depth_image::{Aabb, PinholeCamera};
+use glam::{UVec2, Vec2, Vec3};
+
+use super::{TILE_PX, sample_camera::SampleCamera};
+use crate::{layout::GpuViewCamera, sample_set::gpu_volume};
+
+/// All rays of a view.
+pub(super) struct ViewRays {
+    view: GpuViewCamera,
+    /// Padded as on the device.
+    pub volume: Aabb,
+}
+
+/// A ray; its parameter is planar depth in metres. It is inside the volume from `near` to `far`, nowhere
+/// where `near > far`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ViewRay {
+    pub eye: Vec3,
+    pub direction: Vec3,
+    pub near: f32,
+    pub far: f32,
+}
+
+impl ViewRay {
+    pub fn at(&self, t: f32) -> Vec3 {
+        self.eye + self.direction * t
+    }
+
+    /// The ray in a camera's homogeneous pixels: `a + b · t`.
+    pub fn in_image_of(&self, camera: &SampleCamera) -> [Vec3; 2] {
+        [camera.homogeneous(self.eye.extend(1.0)), camera.homogeneous(self.direction.extend(0.0))]
+    }
+}
+
+impl ViewRays {
+    pub fn of(camera: &PinholeCamera, volume: &Aabb) -> Self {
+        let padded = gpu_volume(volume, Vec3::ZERO);
+        Self {
+            view: GpuViewCamera::of(camera, 0, UVec2::ONE, 0),
+            volume: Aabb { min: padded.min_in_world.into(), max: padded.max_in_world.into() },
+        }
+    }
+
+    pub fn size_px(&self) -> UVec2 {
+        self.view.size_px.into()
+    }
+
+    /// The smaller focal length, in pixels.
+    pub fn focal_px(&self) -> f32 {
+        self.view.focal_px
+    }
+
+    pub fn eye(&self) -> Vec3 {
+        self.view.eye_in_world.into()
+    }
+
+    pub fn near_m(&self) -> f32 {
+        self.view.near_m
+    }
+
+    pub fn tiles(&self) -> UVec2 {
+        self.size_px().map(|side| side.div_ceil(TILE_PX))
+    }
+
+    pub fn tile_index(&self, pixel: UVec2) -> usize {
+        let tile = pixel / TILE_PX;
+        (tile.y * self.tiles().x + tile.x) as usize
+    }
+
+    /// Through the middle of a pixel.
+    pub fn ray(&self, pixel: UVec2) -> ViewRay {
+        self.ray_at(pixel.as_vec2() + 0.5)
+    }
+
+    /// Through a position in the image.
+    pub fn ray_at(&self, position_px: Vec2) -> ViewRay {
+        let [column, row, corner] =
+            [self.view.column_in_world, self.view.row_in_world, self.view.corner_in_world].map(Vec3::from);
+        let direction = column * position_px.x + row * position_px.y + corner;
+        // No component may be 0: 0 · inf is NaN.
+        let d = direction.map(|c| if c.abs() < 1e-20 { 1e-20 } else { c });
+        let (a, b) = ((self.volume.min - self.eye()) / d, (self.volume.max - self.eye()) / d);
+        ViewRay {
+            eye: self.eye(),
+            direction,
+            near: a.min(b).max_element().max(self.near_m()),
+            far: a.max(b).min_element(),
+        }
+    }
+}

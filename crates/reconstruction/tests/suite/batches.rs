@@ -1,0 +1,87 @@
+//! Many views in one call, and requests that are refused.
+
+use depth_image::{Aabb, CameraError, PinholeCamera};
+use glam::{UVec2, Vec3};
+use reconstruction::ReconstructionError;
+use scene::procedural::uv_sphere;
+
+use crate::stage::{ALL_PLANES, CARVE, Corners, SEARCH, Stage, reconstructor};
+
+fn corners() -> Corners {
+    Corners { eye: Vec3::new(0.4, 0.9, 3.6), target: Vec3::ZERO, half_m: 0.6 }
+}
+
+fn stage() -> Stage {
+    Stage::new(uv_sphere(1.0, 24), &corners().samples(2))
+}
+
+#[test]
+fn seventy_views_are_seventy_single_views() {
+    let set = stage().upload();
+    let cameras: Vec<_> = (0..70)
+        .map(|i| corners().camera(i as f32 / 35.0 - 1.0, (i % 7) as f32 / 3.5 - 1.0, UVec2::new(33, 21)))
+        .collect();
+    for method in [CARVE, SEARCH] {
+        let all = reconstructor().reconstruct(&set, &cameras, method, ALL_PLANES).expect("views");
+        assert_eq!(all.len(), 70);
+        for (index, (camera, view)) in cameras.iter().zip(&all).enumerate() {
+            let single = reconstructor().reconstruct(&set, &[*camera], method, ALL_PLANES).expect("a view");
+            assert!(single[0] == *view, "{method}: view {index} differs");
+        }
+    }
+}
+
+#[test]
+fn sizes_may_change_from_view_to_view() {
+    let set = stage().upload();
+    let sizes = [[64, 48], [64, 48], [31, 17], [1, 1], [64, 48], [8, 100]].map(UVec2::from);
+    let cameras = sizes.map(|size_px| corners().camera(0.1, 0.2, size_px));
+    let views = reconstructor().reconstruct(&set, &cameras, CARVE, ALL_PLANES).expect("views");
+    assert_eq!(views.iter().map(|view| view.size_px).collect::<Vec<_>>(), sizes);
+    assert!(views[0] == views[1] && views[0] == views[4], "the same camera, the same view");
+    for (camera, view) in cameras.iter().zip(&views) {
+        assert!(reconstructor().reconstruct(&set, &[*camera], CARVE, ALL_PLANES).expect("a view")[0] == *view);
+    }
+}
+
+#[test]
+fn no_views_are_no_views() {
+    let set = stage().upload();
+    assert!(reconstructor().reconstruct(&set, &[], CARVE, ALL_PLANES).expect("nothing").is_empty());
+}
+
+/// The error of an upload that must fail.
+fn refused(stage: &Stage) -> ReconstructionError {
+    let done = reconstructor().upload(&stage.images, &stage.volume, Vec3::ZERO);
+    done.err().expect("an error")
+}
+
+#[test]
+fn sets_that_cannot_be_used_are_refused() {
+    let good = stage();
+    let of = |count: usize| Stage { images: vec![good.images[0].clone(); count], ..good.clone() };
+    assert!(reconstructor().upload(&of(16).images, &good.volume, Vec3::ZERO).is_ok());
+    assert!(matches!(refused(&of(17)), ReconstructionError::SampleCount(17)));
+    assert!(matches!(refused(&of(0)), ReconstructionError::SampleCount(0)));
+    let mut short = good.clone();
+    short.images[1].inverse_depth_per_m.pop();
+    assert!(matches!(refused(&short), ReconstructionError::Sample { index: 1, .. }));
+    let mut nowhere = good.clone();
+    let depth_image::Camera::Pinhole(camera) = &mut nowhere.images[0].camera;
+    camera.eye_in_world.x = f32::NAN;
+    assert!(matches!(refused(&nowhere), ReconstructionError::Sample { index: 0, .. }));
+    for volume in [Aabb::EMPTY, Aabb { min: Vec3::NAN, max: Vec3::NAN }, Aabb { min: Vec3::ZERO, max: Vec3::INFINITY }]
+    {
+        assert!(matches!(refused(&Stage { volume, ..good.clone() }), ReconstructionError::Volume), "{volume:?}");
+    }
+}
+
+#[test]
+fn a_bad_view_camera_is_named() {
+    let set = stage().upload();
+    let good = corners().view();
+    let bad = PinholeCamera { eye_in_world: Vec3::NAN, ..good };
+    let error = reconstructor().reconstruct(&set, &[good, bad], CARVE, ALL_PLANES).expect_err("NaN");
+    let named = matches!(error, ReconstructionError::Camera { index: 1, source: CameraError::NotFinite { .. } });
+    assert!(named, "{error}");
+}

@@ -1,0 +1,8 @@
+//! The methods on the software device: against their scalar twins, closed forms and their own limits.
+
+mod batches;
+mod closed_form;
+mod failures;
+mod holes_and_limits;
+mod stage;
+mod twins;

@@ -1,0 +1,89 @@
+//! Sampling on the software device: the planes that were asked for, and batches.
+
+use std::sync::{Arc, OnceLock};
+
+use depth_image::{Camera, CameraError, DepthImage};
+use glam::{UVec2, Vec3};
+use gpu::{DevicePreference, Gpu};
+use render::{GpuScene, Lighting, RenderError, SamplePlanes};
+use sampling::{Rig, SampleWork, Sampler, SamplingError, SamplingMethod};
+use scene::procedural::courtyard;
+
+struct Device {
+    sampler: Sampler,
+    scene: GpuScene,
+    rig: Rig,
+}
+
+/// The software device of this program; a test without one fails.
+fn device() -> &'static Device {
+    static DEVICE: OnceLock<Device> = OnceLock::new();
+    DEVICE.get_or_init(|| {
+        let gpu: Arc<Gpu> = Gpu::open(DevicePreference::Software).expect("a software device");
+        let yard = courtyard();
+        Device {
+            sampler: Sampler::new(&gpu).expect("a sampler"),
+            scene: GpuScene::upload(&gpu, &yard).expect("a scene"),
+            rig: Rig::two_plane(&yard.bounds(), 2.5).expect("a rig"),
+        }
+    })
+}
+
+fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, SamplingError> {
+    let work = SampleWork {
+        scene: &device().scene,
+        cameras,
+        method: SamplingMethod::Conventional,
+        lighting: Lighting::Phong,
+        scene_time_s: 0.0,
+        planes,
+    };
+    device().sampler.sample(&work)
+}
+
+/// More than one submission holds, of two sizes.
+fn cameras() -> Vec<Camera> {
+    let sizes = [UVec2::new(40, 30), UVec2::new(33, 17)];
+    sizes.into_iter().flat_map(|size_px| device().rig.views(20, size_px)).map(Camera::Pinhole).collect()
+}
+
+#[test]
+fn planes_come_as_asked() {
+    let cameras: Vec<Camera> = device().rig.samples(UVec2::new(40, 30)).into_iter().map(Camera::Pinhole).collect();
+    let mut depth = None;
+    for (normal, surface_id) in [(false, false), (true, false), (false, true), (true, true)] {
+        let images = sample(&cameras, SamplePlanes { normal, surface_id }).expect("images");
+        assert_eq!(images.len(), 4);
+        for image in &images {
+            image.validate().expect("planes of one size");
+            assert_eq!((image.normal_oct16.is_some(), image.surface_id.is_some()), (normal, surface_id));
+            assert!(image.inverse_depth_per_m.iter().filter(|&&d| d > 0.0).count() > 100);
+        }
+        // Depth and colour do not depend on what else is asked for.
+        let base: Vec<_> = images.into_iter().map(|i| (i.inverse_depth_per_m, i.color_rgb9e5)).collect();
+        assert!(*depth.get_or_insert_with(|| base.clone()) == base, "{normal} {surface_id}");
+    }
+}
+
+#[test]
+fn a_batch_is_its_singles() {
+    let planes = SamplePlanes { normal: true, surface_id: true };
+    let all = sample(&cameras(), planes).expect("images");
+    assert_eq!(all.len(), 40);
+    for (index, (camera, image)) in cameras().into_iter().zip(&all).enumerate() {
+        assert_eq!(image.camera, camera);
+        assert!(sample(&[camera], planes).expect("an image")[0] == *image, "image {index} differs");
+    }
+    assert!(sample(&[], planes).expect("nothing").is_empty());
+}
+
+#[test]
+fn a_bad_camera_is_named() {
+    let mut cameras = cameras();
+    let Camera::Pinhole(camera) = &mut cameras[3];
+    camera.eye_in_world = Vec3::NAN;
+    let error = sample(&cameras, SamplePlanes::default()).expect_err("NaN");
+    let SamplingError::Render(RenderError::Camera { index: 3, source: CameraError::NotFinite { .. } }) = error else {
+        panic!("{error}");
+    };
+}
