@@ -15,7 +15,7 @@ pub const BACKGROUND_INVERSE_DEPTH: f32 = 0.0;
 pub struct SurfaceId {
     /// Into the scene's instances.
     pub instance: u32,
-    /// Triangle number within the instance's mesh.
+    /// Triangle number, the same on every node: unique in the scene, shared by all instances of a mesh.
     pub primitive: u32,
 }
 

@@ -33,9 +33,7 @@ impl CodedDepth {
     /// Quantises a depth image over its own range.
     #[must_use]
     pub fn of(image: &DepthImage) -> Self {
-        let (least, greatest) = image.inverse_depth_range().unwrap_or((0.5, 1.0));
-        // One depth only still needs a scale.
-        let range = (greatest - least).max(greatest * 1e-4);
+        let [least, range] = least_and_range(image);
         let scale = (LAST_CODE - FIRST_CODE) / range;
         let offset = FIRST_CODE - least * scale;
         let code = |&inverse: &f32| match inverse {
@@ -53,12 +51,25 @@ impl CodedDepth {
         }
     }
 
+    /// How far the farthest sample may lie from where its code puts it, and half as much again for rounding.
+    pub(crate) fn greatest_error_m(image: &DepthImage) -> f32 {
+        let [least, range] = least_and_range(image);
+        0.75 * range / (LAST_CODE - FIRST_CODE) / (least * least)
+    }
+
     /// The code of a texel; positions beyond the border give the border's.
     #[must_use]
     pub fn at(&self, x: u32, y: u32) -> u16 {
         let (x, y) = (x.min(self.size_px[0] - 1), y.min(self.size_px[1] - 1));
         self.codes[(y * self.size_px[0] + x) as usize]
     }
+}
+
+/// The least inverse depth of an image's samples, and how far its codes reach from there.
+fn least_and_range(image: &DepthImage) -> [f32; 2] {
+    let (least, greatest) = image.inverse_depth_range().unwrap_or((0.5, 1.0));
+    // One depth only still needs a scale.
+    [least, (greatest - least).max(greatest * 1e-4)]
 }
 
 /// A cell is connected where all four of its edges are.

@@ -57,7 +57,7 @@ impl SampleSet {
         }
         Ok(Self {
             cameras,
-            volume: gpu_volume(volume, background_linear),
+            volume: gpu_volume(&searched_volume(volume, images), background_linear),
             pyramids: gpu.buffer_with("depth pyramids", &words, BufferUsages::STORAGE),
             colors: gpu.buffer_with("sample colours", &colors, BufferUsages::STORAGE),
         })
@@ -121,13 +121,19 @@ pub(crate) fn stretch(camera: &PinholeCamera) -> f32 {
     camera.focal_px.max_element() * (1.0 + slope.length_squared()).sqrt()
 }
 
-pub(crate) fn gpu_volume(volume: &Aabb, background_linear: Vec3) -> GpuVolume {
-    let padded = volume.padded(volume.size().max_element() * VOLUME_MARGIN);
+/// The volume with room for what samples do not know: a search must still be inside where it meets a surface
+/// on the volume's very face.
+pub(crate) fn searched_volume(volume: &Aabb, images: &[DepthImage]) -> Aabb {
+    let depth_error_m = images.iter().map(CodedDepth::greatest_error_m).fold(0.0, f32::max);
+    volume.padded(volume.size().max_element() * VOLUME_MARGIN + depth_error_m)
+}
+
+fn gpu_volume(searched: &Aabb, background_linear: Vec3) -> GpuVolume {
     let [r, g, b] = background_linear.to_array().map(srgb8_from_linear);
     GpuVolume {
-        min_in_world: padded.min.to_array(),
+        min_in_world: searched.min.to_array(),
         background_srgb8: u32::from_le_bytes([r, g, b, 255]),
-        max_in_world: padded.max.to_array(),
+        max_in_world: searched.max.to_array(),
         padding: 0,
     }
 }

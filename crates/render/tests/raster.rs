@@ -305,7 +305,7 @@ fn triangles_at(scene: &Scene, point: Vec3) -> Vec<(u32, usize)> {
             let position = mesh.vertices[mesh.indices[triangle * 3 + k] as usize].position;
             scene.instances[instance as usize].world_from_mesh.transform_point3(position.into())
         });
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
         let inside = |k: usize| (corners[(k + 1) % 3] - corners[k]).cross(point - corners[k]).dot(normal) > -1e-2;
         (point - corners[0]).dot(normal).abs() < 1e-3 && (0..3).all(inside)
     })

@@ -60,7 +60,7 @@ pub fn reconstruct(
     method: ReconstructionMethod,
 ) -> View {
     let cameras = nearest_first(images, camera);
-    let rays = ViewRays::of(camera, volume);
+    let rays = ViewRays::of(camera, volume, images);
     let starts = tile_start::tile_starts(&cameras, &rays);
     reconstruct_from(&cameras, &rays, &starts, background_linear, method)
 }
@@ -76,7 +76,7 @@ pub fn reconstruct_from_entry(
     method: ReconstructionMethod,
 ) -> View {
     let cameras = nearest_first(images, camera);
-    let rays = ViewRays::of(camera, volume);
+    let rays = ViewRays::of(camera, volume, images);
     let starts = vec![0.0; rays.tiles().element_product() as usize];
     reconstruct_from(&cameras, &rays, &starts, background_linear, method)
 }
@@ -85,7 +85,7 @@ pub fn reconstruct_from_entry(
 /// searched.
 #[must_use]
 pub fn tile_starts_m(images: &[DepthImage], volume: &Aabb, camera: &PinholeCamera) -> Vec<f32> {
-    tile_start::tile_starts(&nearest_first(images, camera), &ViewRays::of(camera, volume))
+    tile_start::tile_starts(&nearest_first(images, camera), &ViewRays::of(camera, volume, images))
 }
 
 /// Camera 0 is the nearest to the view's eye and so knows most; each keeps its bit.

@@ -41,7 +41,7 @@ struct Sight {
 /// 2001, with k = 2).
 pub(super) fn blended(cameras: &[SampleCamera], ray: &ViewRay, t: f32) -> Blend {
     let point = ray.at(t);
-    let view_direction = ray.direction.normalize();
+    let view_direction = ray.direction.normalize_or(Vec3::NEG_Z);
     let sights: Vec<Sight> = cameras.iter().map(|camera| sight(camera, point, view_direction)).collect();
     let mut best_first = sights.clone();
     best_first.sort_by(|a, b| b.weight.total_cmp(&a.weight));

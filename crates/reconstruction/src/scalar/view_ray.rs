@@ -1,10 +1,10 @@
 //! The rays of a view, and where they are inside the volume.
 
-use depth_image::{Aabb, PinholeCamera};
+use depth_image::{Aabb, DepthImage, PinholeCamera};
 use glam::{UVec2, Vec2, Vec3};
 
 use super::{TILE_PX, sample_camera::SampleCamera};
-use crate::{layout::GpuViewCamera, sample_set::gpu_volume};
+use crate::{layout::GpuViewCamera, sample_set::searched_volume};
 
 /// All rays of a view.
 pub(super) struct ViewRays {
@@ -35,12 +35,8 @@ impl ViewRay {
 }
 
 impl ViewRays {
-    pub fn of(camera: &PinholeCamera, volume: &Aabb) -> Self {
-        let padded = gpu_volume(volume, Vec3::ZERO);
-        Self {
-            view: GpuViewCamera::of(camera, 0, UVec2::ONE, 0),
-            volume: Aabb { min: padded.min_in_world.into(), max: padded.max_in_world.into() },
-        }
+    pub fn of(camera: &PinholeCamera, volume: &Aabb, images: &[DepthImage]) -> Self {
+        Self { view: GpuViewCamera::of(camera, 0, UVec2::ONE, 0), volume: searched_volume(volume, images) }
     }
 
     pub fn size_px(&self) -> UVec2 {

@@ -84,7 +84,7 @@ fn depth_images(scene: &Scene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
 }
 
 pub fn looking(eye: Vec3, target: Vec3, fov_y_deg: f32, size_px: UVec2) -> PinholeCamera {
-    let up = if (target - eye).normalize().y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };
+    let up = if (target - eye).normalize_or_zero().y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };
     PinholeCamera::looking_at(eye, target, up, fov_y_deg.to_radians(), size_px)
 }
 
@@ -97,8 +97,8 @@ pub struct Corners {
 
 impl Corners {
     pub fn camera(&self, x: f32, y: f32, size_px: UVec2) -> PinholeCamera {
-        let forward = (self.target - self.eye).normalize();
-        let right = forward.cross(if forward.y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y }).normalize();
+        let forward = (self.target - self.eye).normalize_or_zero();
+        let right = forward.cross(if forward.y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y }).normalize_or_zero();
         let eye = self.eye + (right * x + right.cross(forward) * y) * self.half_m;
         looking(eye, self.target, 45.0, size_px)
     }
