@@ -11,8 +11,7 @@ pub struct SceneError {
     pub file: String,
     /// The part at fault: an accessor, a line, a header.
     pub element: String,
-    /// The reason.
-    #[source]
+    /// The reason; Display includes it, so it is no source.
     pub kind: SceneErrorKind,
 }
 
