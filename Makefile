@@ -7,6 +7,10 @@
 CARGO ?= cargo
 ARGS ?=
 export CARGO
+# Mesa's device selection asks for a Wayland display, and complains where there is none.
+ifndef XDG_RUNTIME_DIR
+export NODEVICE_SELECT = 1
+endif
 
 .DEFAULT_GOAL := help
 .PHONY: help build demo test fmt-check lint unit bench doc audit vulkan toolchain lint-toolchain clean

@@ -123,17 +123,22 @@ fn compare(args: &DemoArgs, experiment: &Experiment, report: &mut Report) -> any
     pictures::comparisons(&truth, &views, report)
 }
 
+/// Lages et al.: a highly tessellated tree over a terrain, about 500,000 triangles.
+const PAPER_SCENE: &str = "tree-terrain-500k";
+
 fn checks(times: &timing::Times, start: Instant, args: &DemoArgs) -> Vec<Check> {
     let speed = format!("{} views delivered: pipeline over direct, throughput", times.headline_views);
+    // What sharing wins grows with the scene; other models get their figure, not a bar.
+    let promised = !args.quick && args.scene.scene.to_string() == PAPER_SCENE;
     let k_off = times.headline_k_off_formula();
     let memory = peak_memory_mb().filter(|_| times.is_software);
     vec![
         Check::maybe(
             speed,
-            (!args.quick).then(|| times.headline_ratio()),
+            promised.then(|| times.headline_ratio()),
             "×",
             Bar::AtLeast(6.0),
-            "a quick run has fewer views",
+            "it is promised of all views of the paper's scene",
         ),
         Check::new("chosen K off the formula's", k_off, "", Bar::Equal(0.0)),
         Check::new("time of the whole demo", start.elapsed().as_secs_f64(), "s", Bar::AtMost(TIME_LIMIT_S)),
