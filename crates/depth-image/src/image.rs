@@ -49,6 +49,28 @@ pub struct DepthImage {
     pub normal_oct16: Option<Vec<u32>>,
     /// Surface keys; meaningless where there is no sample.
     pub surface_id: Option<Vec<SurfaceId>>,
+    /// What highlights need, where a surface has any: needs `normal_oct16`.
+    pub specular: Option<SpecularPlanes>,
+}
+
+/// What a compositor needs to add light that depends on the viewer.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct SpecularPlanes {
+    /// Reflectance at normal incidence (three bytes, sRGB-encoded) and perceptual roughness (the high byte);
+    /// 0 where a surface has no highlight.
+    pub reflectance_srgb8_roughness8: Vec<u32>,
+    /// What share of each light arrives, 255 for all of it; the environment's is the first, then one byte a
+    /// light in their order. Each plane has four bytes a texel, the first in the low byte. Empty where nothing
+    /// casts shadows.
+    pub visibility8: Vec<Vec<u32>>,
+}
+
+impl SpecularPlanes {
+    /// Planes of [`SpecularPlanes::visibility8`] for so many lights.
+    #[must_use]
+    pub const fn visibility_planes(light_count: usize) -> usize {
+        (light_count + 1).div_ceil(4)
+    }
 }
 
 /// Why planes do not make a depth image.
@@ -78,8 +100,10 @@ impl DepthImage {
             ("color", Some(self.color_rgb9e5.len())),
             ("normal", self.normal_oct16.as_ref().map(Vec::len)),
             ("surface_id", self.surface_id.as_ref().map(Vec::len)),
+            ("reflectance", self.specular.as_ref().map(|s| s.reflectance_srgb8_roughness8.len())),
         ];
-        match planes.into_iter().find_map(|(plane, len)| len.filter(|&len| len != expected).map(|len| (plane, len))) {
+        let visibilities = self.specular.iter().flat_map(|s| &s.visibility8).map(|p| ("visibility", Some(p.len())));
+        match planes.into_iter().chain(visibilities).find_map(|(plane, len)| len.filter(|&len| len != expected).map(|len| (plane, len))) {
             Some((plane, len)) => Err(DepthImageError::PlaneSize { plane, len, expected }),
             None => Ok(()),
         }

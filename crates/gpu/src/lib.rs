@@ -7,10 +7,14 @@
 
 mod device;
 mod frame;
+mod illumination;
+#[cfg(test)]
+mod illumination_tests;
 mod pool;
 mod template;
 
 pub use device::{DevicePreference, Gpu, GpuError};
 pub use frame::{Frame, FrameResult, Readback, Submitted};
+pub use illumination::{GpuLight, illumination_bytes, light_slots};
 pub use pool::{BufferPool, PooledBuffer};
 pub use template::{TemplateError, Templates};

@@ -25,8 +25,12 @@ impl Templates {
     /// # Errors
     /// When a text is not a template.
     pub fn new(own: &[(&'static str, &'static str)]) -> Result<Self, TemplateError> {
-        let shared =
-            [("color.wgsl", include_str!("wgsl/color.wgsl")), ("normal.wgsl", include_str!("wgsl/normal.wgsl"))];
+        let shared = [
+            ("color.wgsl", include_str!("wgsl/color.wgsl")),
+            ("normal.wgsl", include_str!("wgsl/normal.wgsl")),
+            ("light.wgsl", include_str!("wgsl/light.wgsl")),
+            ("highlight.wgsl", include_str!("wgsl/highlight.wgsl")),
+        ];
         let mut environment = Environment::new();
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
         for &(name, text) in shared.iter().chain(own) {

@@ -1,0 +1,120 @@
+//! Light sources as `light.wgsl` reads them.
+
+use bytemuck::{Pod, Zeroable};
+use depth_image::{Illumination, Light};
+use glam::Vec3;
+
+/// `Light` of `light.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct GpuLight {
+    /// Its middle; of parallel light, the unit vector towards it.
+    pub middle_in_world: [f32; 3],
+    /// Parallel, round or a rectangle.
+    pub kind: u32,
+    /// Intensity, of a rectangle radiance, of parallel light irradiance.
+    pub color_linear: [f32; 3],
+    /// Radius in metres; of parallel light the tangent of the angular radius.
+    pub extent: f32,
+    /// Of a spot its cone's axis, away from the light; of a rectangle half an edge.
+    pub axis_in_world: [f32; 3],
+    /// Where a spot's light ends; −1 for what is no spot.
+    pub outer_cosine: f32,
+    /// Of a rectangle, half of the next edge.
+    pub next_edge_in_world: [f32; 3],
+    /// From cosines beyond the outer one to a spot's share.
+    pub cone_scale: f32,
+}
+
+/// `Illumination` of `light.wgsl`, up to its lights.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuIllumination {
+    pub zenith_linear: [f32; 3],
+    pub light_count: u32,
+    pub nadir_linear: [f32; 3],
+    pub padding: u32,
+}
+
+const PARALLEL: u32 = 0;
+const ROUND: u32 = 1;
+const RECTANGLE: u32 = 2;
+
+/// Shines in no colour, from nowhere, and into all directions alike.
+const NOTHING: GpuLight = GpuLight {
+    middle_in_world: [0.0; 3],
+    kind: ROUND,
+    color_linear: [0.0; 3],
+    extent: 0.0,
+    axis_in_world: [0.0; 3],
+    outer_cosine: -1.0,
+    next_edge_in_world: [0.0; 3],
+    cone_scale: 1.0,
+};
+
+impl From<&Light> for GpuLight {
+    fn from(light: &Light) -> Self {
+        match *light {
+            Light::Directional { towards_light_in_world, irradiance_linear, angular_radius_rad } => Self {
+                middle_in_world: towards_light_in_world.to_array(),
+                kind: PARALLEL,
+                color_linear: irradiance_linear.to_array(),
+                extent: angular_radius_rad.tan(),
+                ..NOTHING
+            },
+            Light::Point { position_in_world, intensity_linear, radius_m } => {
+                round(position_in_world, intensity_linear, radius_m)
+            }
+            Light::Spot {
+                position_in_world,
+                forward_in_world,
+                intensity_linear,
+                inner_cone_rad,
+                outer_cone_rad,
+                radius_m,
+            } => Self {
+                axis_in_world: forward_in_world.to_array(),
+                outer_cosine: outer_cone_rad.cos(),
+                cone_scale: (inner_cone_rad.cos() - outer_cone_rad.cos()).max(1e-4).recip(),
+                ..round(position_in_world, intensity_linear, radius_m)
+            },
+            Light::Rectangle { center_in_world, half_edges_in_world: [u, v], radiance_linear } => Self {
+                middle_in_world: center_in_world.to_array(),
+                kind: RECTANGLE,
+                color_linear: radiance_linear.to_array(),
+                axis_in_world: u.to_array(),
+                next_edge_in_world: v.to_array(),
+                ..NOTHING
+            },
+        }
+    }
+}
+
+fn round(position_in_world: Vec3, intensity_linear: Vec3, radius_m: f32) -> GpuLight {
+    GpuLight {
+        middle_in_world: position_in_world.to_array(),
+        color_linear: intensity_linear.to_array(),
+        extent: radius_m,
+        ..NOTHING
+    }
+}
+
+/// `light_slots` of `light.wgsl`: an array in a uniform may not be empty.
+#[must_use]
+pub const fn light_slots(light_count: usize) -> usize {
+    if light_count == 0 { 1 } else { light_count }
+}
+
+/// The bytes of an `Illumination` uniform of [`light_slots`] lights.
+#[must_use]
+pub fn illumination_bytes(illumination: &Illumination) -> Vec<u8> {
+    let head = GpuIllumination {
+        zenith_linear: illumination.environment.zenith_linear.to_array(),
+        light_count: illumination.lights.len() as u32,
+        nadir_linear: illumination.environment.nadir_linear.to_array(),
+        padding: 0,
+    };
+    let mut lights: Vec<GpuLight> = illumination.lights.iter().map(GpuLight::from).collect();
+    lights.resize(light_slots(lights.len()), NOTHING);
+    [bytemuck::bytes_of(&head), bytemuck::cast_slice(&lights)].concat()
+}

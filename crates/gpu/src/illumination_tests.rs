@@ -1,0 +1,303 @@
+//! light.wgsl and highlight.wgsl have the layout of their structs here, and say what their scalar twins say.
+
+use std::{
+    f32::consts::PI,
+    mem::offset_of,
+    sync::{Arc, OnceLock},
+};
+
+use bytemuck::Zeroable as _;
+use depth_image::{
+    Environment, Highlight, Illumination, Light, Reflector, disc_from_square, highlight_linear, tangents_of,
+};
+use glam::{Vec2, Vec3};
+use minijinja::context;
+use wgpu::BufferUsages;
+
+use crate::{
+    BufferPool, DevicePreference, Frame, Gpu, GpuLight, Templates, illumination::GpuIllumination, illumination_bytes,
+    light_slots,
+};
+
+/// One question to the device.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Question {
+    point_in_world: [f32; 3],
+    light: u32,
+    normal: [f32; 3],
+    reflector: u32,
+    towards_eye: [f32; 3],
+    padding: u32,
+    place: [f32; 2],
+    visibility: [u32; 2],
+}
+
+const SHADER: &str = "
+{% include 'color.wgsl' %}
+{% include 'light.wgsl' %}
+{% include 'highlight.wgsl' %}
+struct Question {
+    point_in_world: vec3f, light: u32, normal: vec3f, reflector: u32, towards_eye: vec3f, padding: u32,
+    place: vec2f, visibility: vec2u,
+}
+@group(0) @binding(0) var<uniform> illumination: Illumination;
+@group(0) @binding(1) var<storage, read> questions: array<Question>;
+@group(0) @binding(2) var<storage, read_write> answers: array<vec4f>;
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= arrayLength(&questions) { return; }
+    let q = questions[id.x];
+    let incident = incident_from(illumination.lights[q.light], q.point_in_world, q.place);
+    var words = VisibilityWords();
+    words[0] = q.visibility.x;
+{% if visibility_words > 1 %}    words[1] = q.visibility.y;
+{% endif %}
+    let tangents = tangents_of(q.normal);
+    let first = id.x * 8u;
+    answers[first] = vec4f(incident.towards, incident.distance_m);
+    answers[first + 1u] = vec4f(incident.irradiance_linear, 0.0);
+    answers[first + 2u] = vec4f(environment_radiance(q.normal), 0.0);
+    answers[first + 3u] = vec4f(environment_diffuse(q.normal), 0.0);
+    answers[first + 4u] = vec4f(tangents.tangent, 0.0);
+    answers[first + 5u] = vec4f(tangents.bitangent, 0.0);
+    answers[first + 6u] = vec4f(disc_from_square(q.place), 0.0, 0.0);
+    answers[first + 7u] = vec4f(highlight(q.point_in_world, q.normal, q.towards_eye, q.reflector, words), 0.0);
+}
+";
+
+type Answer = [[f32; 4]; 8];
+
+fn text(kind: Highlight, lights: usize, visibility_words: usize) -> String {
+    let highlight = match kind {
+        Highlight::BlinnPhong => "blinn_phong",
+        Highlight::Ggx => "ggx",
+    };
+    let form = context! { highlight, light_slots => light_slots(lights), visibility_words };
+    let templates = Templates::new(&[("test.wgsl", SHADER)]).expect("templates");
+    templates.render("test.wgsl", form).expect("a text")
+}
+
+fn gpu() -> Arc<Gpu> {
+    static GPU: OnceLock<Arc<Gpu>> = OnceLock::new();
+    GPU.get_or_init(|| Gpu::open(DevicePreference::Software).expect("a software device")).clone()
+}
+
+fn answers(kind: Highlight, illumination: &Illumination, words: usize, questions: &[Question]) -> Vec<Answer> {
+    let gpu = gpu();
+    let pipeline = gpu.compute_pipeline("test", &text(kind, illumination.lights.len(), words), None);
+    let uniform = gpu.buffer_with("illumination", &illumination_bytes(illumination), BufferUsages::UNIFORM);
+    let asked = gpu.buffer_with("questions", questions, BufferUsages::STORAGE);
+    let pool = BufferPool::new(&gpu);
+    let bytes = size_of_val(questions) as u64 / size_of::<Question>() as u64 * size_of::<Answer>() as u64;
+    let out = pool.lend_storage("answers", bytes);
+    let bound = gpu.bind(&pipeline, &[&uniform, &asked, &out]);
+    let mut frame = Frame::begin(&gpu, "test");
+    frame.compute("test", &pipeline, &bound, [questions.len().div_ceil(64) as u32, 1, 1]);
+    let read = frame.read_back(&out, 0..bytes, pool.lend_host("answers", bytes));
+    let result = frame.submit().wait().expect("a result");
+    result.with(read, |answers: &[Answer]| answers[..questions.len()].to_vec()).expect("answers")
+}
+
+fn illumination() -> Illumination {
+    let lights = vec![
+        Light::Directional {
+            towards_light_in_world: Vec3::new(0.36, 0.8, 0.48),
+            irradiance_linear: Vec3::new(1.0, 0.9, 0.8),
+            angular_radius_rad: 0.05,
+        },
+        Light::Point {
+            position_in_world: Vec3::new(1.0, 2.0, 0.5),
+            intensity_linear: Vec3::new(3.0, 2.0, 1.0),
+            radius_m: 0.2,
+        },
+        Light::Spot {
+            position_in_world: Vec3::new(-1.0, 2.0, 0.0),
+            forward_in_world: Vec3::new(0.6, -0.8, 0.0),
+            intensity_linear: Vec3::splat(4.0),
+            inner_cone_rad: 0.3,
+            outer_cone_rad: 0.7,
+            radius_m: 0.05,
+        },
+        Light::Rectangle {
+            center_in_world: Vec3::new(0.0, 3.0, 0.0),
+            half_edges_in_world: [Vec3::X * 0.5, Vec3::Z * 0.8],
+            radiance_linear: Vec3::new(1.0, 2.0, 3.0),
+        },
+    ];
+    let environment = Environment { zenith_linear: Vec3::new(0.3, 0.5, 0.9), nadir_linear: Vec3::splat(0.1) };
+    Illumination { lights, environment }
+}
+
+/// Spread over what may be asked; the same every time.
+fn questions() -> Vec<Question> {
+    let random = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
+    let direction = |i: u32| {
+        let (z, turn) = (2.0 * random(i) - 1.0, 2.0 * PI * random(i + 7));
+        (Vec2::from_angle(turn) * (1.0 - z * z).sqrt()).extend(z)
+    };
+    (0..4000u32)
+        .map(|i| Question {
+            point_in_world: (Vec3::new(random(5 * i), random(5 * i + 1), random(5 * i + 2)) * 3.0 - 1.5).to_array(),
+            light: i % 4,
+            normal: direction(3 * i + 1).to_array(),
+            reflector: i.wrapping_mul(747_796_405) | 0x2000_0000,
+            towards_eye: direction(11 * i + 5).to_array(),
+            padding: 0,
+            place: [random(13 * i), random(17 * i + 3)],
+            visibility: [i.wrapping_mul(2_891_336_453), i.wrapping_mul(22_695_477)],
+        })
+        .collect()
+}
+
+fn share(words: usize, visibility: [u32; 2], place: usize) -> f32 {
+    if words == 0 { 1.0 } else { (visibility[place / 4] >> (8 * (place % 4)) & 0xff) as f32 / 255.0 }
+}
+
+fn close(found: [f32; 4], expected: Vec3, slack: f32) -> bool {
+    let found = Vec3::from_slice(&found[..3]);
+    (found - expected).abs().max_element() <= slack * (1.0 + expected.abs().max_element())
+}
+
+#[test]
+fn light_arrives_as_in_the_twin() {
+    let (illumination, questions) = (illumination(), questions());
+    for (q, answer) in questions.iter().zip(answers(Highlight::Ggx, &illumination, 0, &questions)) {
+        let place = Vec2::from(q.place);
+        let incident = illumination.lights[q.light as usize].from_sample(q.point_in_world.into(), place);
+        assert!(close(answer[0], incident.towards_light_in_world, 1e-4), "{q:?} {answer:?} {incident:?}");
+        let distance_m = incident.distance_m.min(1e30);
+        assert!((answer[0][3] / distance_m - 1.0).abs() < 1e-4, "{q:?} {answer:?} {incident:?}");
+        assert!(close(answer[1], incident.irradiance_linear, 2e-3), "{q:?} {answer:?} {incident:?}");
+        let normal = Vec3::from(q.normal);
+        assert!(close(answer[2], illumination.environment.radiance_linear(normal), 1e-5));
+        assert!(close(answer[3], illumination.environment.diffuse_linear(normal), 1e-5));
+        let [tangent, bitangent] = tangents_of(normal);
+        assert!(close(answer[4], tangent, 1e-4) && close(answer[5], bitangent, 1e-4), "{q:?} {answer:?}");
+        assert!(close(answer[6], disc_from_square(place).extend(0.0), 1e-4), "{q:?} {answer:?}");
+    }
+}
+
+#[test]
+fn highlights_are_the_twins() {
+    let questions = questions();
+    for kind in [Highlight::BlinnPhong, Highlight::Ggx] {
+        for words in 0..=2 {
+            let mut illumination = illumination();
+            // Two words have room for 7 lights, one for 3.
+            illumination.lights.truncate(if words == 1 { 3 } else { 4 });
+            let asked: Vec<Question> = questions.iter().map(|q| Question { light: 0, ..*q }).collect();
+            let mut bright = 0;
+            for (q, answer) in asked.iter().zip(answers(kind, &illumination, words, &asked)) {
+                let reflector = Reflector::unpack(q.reflector).expect("a reflector");
+                let expected = highlight_linear(
+                    kind,
+                    &illumination,
+                    &|place| share(words, q.visibility, place),
+                    q.point_in_world.into(),
+                    q.normal.into(),
+                    q.towards_eye.into(),
+                    &reflector,
+                );
+                bright += usize::from(expected.max_element() > 0.01);
+                assert!(close(answer[7], expected, 3e-3), "{kind:?}, {words} words: {q:?} {answer:?} {expected}");
+            }
+            assert!(bright > 500, "{kind:?}, {words} words: {bright} highlights");
+        }
+    }
+}
+
+#[test]
+fn a_visibility_out_of_place_is_seen() {
+    let (illumination, questions) = (illumination(), questions());
+    let found = answers(Highlight::BlinnPhong, &illumination, 2, &questions);
+    let differ = questions.iter().zip(found).filter(|(q, answer)| {
+        let reflector = Reflector::unpack(q.reflector).expect("a reflector");
+        let [point, normal, eye] = [q.point_in_world, q.normal, q.towards_eye].map(Vec3::from);
+        let shifted = |place: usize| share(2, q.visibility, place - 1);
+        let other = highlight_linear(Highlight::BlinnPhong, &illumination, &shifted, point, normal, eye, &reflector);
+        !close(answer[7], other, 3e-3)
+    });
+    assert!(differ.count() > 500);
+}
+
+#[test]
+fn nothing_on_the_device_is_nan() {
+    let mut illumination = illumination();
+    illumination.lights[1] = Light::Point { position_in_world: Vec3::ZERO, intensity_linear: Vec3::ONE, radius_m: 0.1 };
+    let directions = [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0; 3]];
+    let points = [[0.0; 3], [0.0, 3.0, 0.0], [-1.0, 2.0, 0.0], [1e6; 3]];
+    let ways = directions.into_iter().flat_map(|n| directions.map(|e| (n, e)));
+    let asked: Vec<Question> = (0..)
+        .zip(ways.flat_map(|way| points.map(|point| (way, point))))
+        .map(|(i, ((normal, towards_eye), point_in_world))| Question {
+            point_in_world,
+            light: i % 4,
+            normal,
+            reflector: 0x00ff_ffff,
+            towards_eye,
+            place: [0.5; 2],
+            visibility: [!0; 2],
+            ..Question::zeroed()
+        })
+        .collect();
+    for kind in [Highlight::BlinnPhong, Highlight::Ggx] {
+        for (q, answer) in asked.iter().zip(answers(kind, &illumination, 2, &asked)) {
+            assert!(answer.as_flattened().iter().all(|v| v.is_finite()), "{kind:?}: {q:?} {answer:?}");
+        }
+    }
+}
+
+#[test]
+fn no_reflector_and_no_light_add_nothing() {
+    let asked: Vec<Question> = questions().iter().map(|q| Question { light: 0, reflector: 0, ..*q }).collect();
+    let dark = Illumination::default();
+    assert_eq!(illumination_bytes(&dark).len(), size_of::<GpuIllumination>() + size_of::<GpuLight>());
+    for (lit, asked) in [(illumination(), asked), (dark, questions())] {
+        let asked: Vec<Question> = asked.iter().map(|q| Question { light: 0, ..*q }).collect();
+        assert!(answers(Highlight::Ggx, &lit, 0, &asked).iter().all(|answer| answer[7] == [0.0; 4]));
+    }
+}
+
+/// Fields with their offsets, and the size of the whole.
+type Layout = (Vec<(String, usize)>, usize);
+
+/// A WGSL struct's.
+fn shader(module: &naga::Module, name: &str) -> Layout {
+    let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
+    let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
+        panic!("no struct {name}")
+    };
+    let field = |member: &naga::StructMember| (member.name.clone().unwrap_or_default(), member.offset as usize);
+    (members.iter().map(field).collect(), *span as usize)
+}
+
+/// A Rust struct's. A field that is not listed does not compile.
+macro_rules! host {
+    ($host:ident { $($field:ident),+ }) => {{
+        let $host { $($field: _),+ } = $host::zeroed();
+        (vec![$((stringify!($field).to_owned(), offset_of!($host, $field))),+], size_of::<$host>())
+    }};
+}
+
+#[test]
+fn structs_have_the_shaders_layout() {
+    for (lights, slots) in [(0, 1), (3, 3)] {
+        let text = text(Highlight::Ggx, lights, 1);
+        let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
+        let light: Layout = host!(GpuLight {
+            middle_in_world,
+            kind,
+            color_linear,
+            extent,
+            axis_in_world,
+            outer_cosine,
+            next_edge_in_world,
+            cone_scale
+        });
+        assert_eq!(shader(&module, "Light"), light);
+        let (mut fields, bytes) = host!(GpuIllumination { zenith_linear, light_count, nadir_linear, padding });
+        fields.push(("lights".to_owned(), bytes));
+        assert_eq!(shader(&module, "Illumination"), (fields, bytes + slots * light.1));
+    }
+}
