@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use scene::{Limits, SceneSpec, pack, unpack};
+use scene::{EnvironmentSpec, LightSpec, Limits, SceneSpec, pack, unpack};
 
 fn main() {
     for name in std::env::args().skip(1) {
@@ -26,7 +26,15 @@ fn inspect(spec: &SceneSpec) {
         (scene.meshes.len(), scene.instances.len(), scene.meshes.iter().map(|m| m.parts.len()).sum::<usize>());
     println!("  {meshes} meshes in {parts} parts, {instances} instances, {} materials", scene.materials.len());
     let sizes: Vec<_> = scene.textures.iter().map(|t| format!("{}x{}", t.width_px, t.height_px)).collect();
-    println!("  textures {sizes:?}, {} lights, {} cameras", scene.lights.len(), scene.cameras.len());
+    let (lights, environment) = (&scene.illumination.lights, scene.illumination.environment);
+    println!("  textures {sizes:?}, {} specular materials", scene.materials.iter().filter(|m| m.is_specular()).count());
+    println!(
+        "  {} lights, environment {}, {} cameras",
+        lights.len(),
+        EnvironmentSpec(environment),
+        scene.cameras.len()
+    );
+    lights.iter().for_each(|&light| println!("  {}", LightSpec(light)));
     let bounds = scene.bounds();
     println!("  bounds {} to {}, origin in source {}", bounds.min, bounds.max, scene.origin_in_source);
     let start = Instant::now();

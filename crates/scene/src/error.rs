@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::Path;
 
+use depth_image::LightError;
+
 /// A scene that cannot be used. Display reads `file: element: reason`.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {element}: {kind}")]
@@ -59,6 +61,10 @@ impl Fault {
 
     pub(crate) fn malformed(element: impl fmt::Display, reason: impl Into<String>) -> Self {
         Self::new(element, SceneErrorKind::Malformed(shortened(reason.into())))
+    }
+
+    pub(crate) fn light(element: impl fmt::Display, error: &LightError) -> Self {
+        Self::malformed(format_args!("{element}: {}", error.field), error.reason)
     }
 
     pub(crate) fn unsupported(element: impl fmt::Display, feature: impl Into<String>) -> Self {

@@ -12,7 +12,9 @@
 
 mod error;
 mod import;
+mod light_parts;
 mod light_rig;
+mod light_spec;
 mod limits;
 mod measure;
 mod model;
@@ -21,8 +23,10 @@ pub mod procedural;
 mod spec;
 mod validate;
 
+pub use depth_image::{Environment, Illumination, Light, LightError};
 pub use error::{SceneError, SceneErrorKind};
 pub use import::load_file;
+pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorKind};
 pub use limits::Limits;
 pub use model::*;
 pub use package::{Package, PackageStore, SceneHash, SceneHashError, pack, unpack};

@@ -22,8 +22,10 @@ pub struct Limits {
     pub instances: u64,
     /// JSON objects of a glTF file: the parsed form is some hundred times larger than `{}`.
     pub json_objects: u64,
-    /// Materials, lights and cameras, each.
+    /// Materials and cameras, each.
     pub attributes: u64,
+    /// Light sources. What is seen of each from a sample is named by a byte.
+    pub lights: u64,
 }
 
 impl Default for Limits {
@@ -39,6 +41,7 @@ impl Default for Limits {
             instances: 200_000,
             json_objects: 2_000_000,
             attributes: 65_536,
+            lights: 255,
         }
     }
 }

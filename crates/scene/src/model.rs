@@ -1,5 +1,6 @@
 //! The scene itself: plain data, the same on every node.
 
+use depth_image::Illumination;
 use glam::{Affine3A, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -16,10 +17,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Images that materials refer to.
     pub textures: Vec<Texture>,
-    /// Light sources.
-    pub lights: Vec<Light>,
-    /// Light that reaches every surface from everywhere, linear RGB radiance.
-    pub ambient_linear: Vec3,
+    /// Light sources, and the light from all around. Nothing at all leaves the scene black, and valid.
+    pub illumination: Illumination,
     /// Colour where no surface is seen, linear RGB.
     pub background_linear: Vec3,
     /// Cameras that the source file listed.
@@ -87,13 +86,15 @@ pub struct Material {
     pub base_color_linear: [f32; 4],
     /// Into [`Scene::textures`]; sRGB.
     pub base_color_texture: Option<u32>,
-    /// 0 dielectric, 1 metal.
+    /// 0 dielectric, 1 metal; multiplied with the texture's where there is one.
     pub metallic: f32,
-    /// Perceptual roughness, 0 to 1.
+    /// Perceptual roughness, 0 to 1; multiplied with the texture's where there is one.
     pub roughness: f32,
+    /// Into [`Scene::textures`]; green is roughness and blue is metallic, linear: `is_srgb` is false.
+    pub metallic_roughness_texture: Option<u32>,
     /// Linear RGB radiance given off.
     pub emissive_linear: Vec3,
-    /// Blinn-Phong specular strength and exponent for `phong` lighting.
+    /// Blinn-Phong specular strength and exponent for `phong` lighting; of a texture, for its mean.
     pub phong_specular: f32,
     /// See `phong_specular`.
     pub phong_exponent: f32,
@@ -113,6 +114,7 @@ impl Default for Material {
             base_color_texture: None,
             metallic: 0.0,
             roughness: 1.0,
+            metallic_roughness_texture: None,
             emissive_linear: Vec3::ZERO,
             phong_specular: 0.0,
             phong_exponent: 32.0,
@@ -123,6 +125,9 @@ impl Default for Material {
     }
 }
 
+/// See [`Material::is_specular`].
+const LEAST_MATT_ROUGHNESS: f32 = 0.95;
+
 impl Material {
     /// Blinn-Phong strength and exponent whose highlight is about as bright and wide as that of a
     /// metallic-roughness surface.
@@ -132,6 +137,17 @@ impl Material {
         let alpha = (roughness * roughness).max(0.03);
         let strength = (0.08 + 0.6 * metallic) * (1.0 - roughness);
         (strength, (2.0 / (alpha * alpha) - 2.0).clamp(1.0, 1024.0))
+    }
+
+    /// Whether light that depends on the viewer matters for it under GGX. Samples keep such light apart from
+    /// what looks the same from everywhere, at a cost, and a scene should pay for no more than it needs. A
+    /// dielectric (reflectance 0.04 head on) of roughness 0.95 or more has a highlight of about a hundredth
+    /// of what a white surface reflects: that is left out. What a texture says of it is not looked at: it
+    /// may vary, and then it matters.
+    #[must_use]
+    pub fn is_specular(&self) -> bool {
+        let is_smooth_or_metal = self.metallic > 0.0 || self.roughness < LEAST_MATT_ROUGHNESS;
+        !self.unlit && (is_smooth_or_metal || self.metallic_roughness_texture.is_some())
     }
 
     /// The perceptual roughness that goes with a Blinn-Phong exponent.
@@ -148,27 +164,10 @@ pub struct Texture {
     pub width_px: u32,
     /// Rows, at least 1.
     pub height_px: u32,
-    /// `width_px * height_px` texels, sRGB-encoded RGB and linear alpha.
+    /// Whether RGB is sRGB-encoded, as colours are; else it is linear, as other data is.
+    pub is_srgb: bool,
+    /// `width_px * height_px` texels, RGB as `is_srgb` says and linear alpha.
     pub srgba8: Vec<u8>,
-}
-
-/// A light source. Intensities are linear RGB and finite, never negative.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Light {
-    /// Parallel light, as from the sun.
-    Directional {
-        /// Unit vector from a surface towards the light.
-        towards_light_in_world: Vec3,
-        /// Reflected radiance of a white surface that faces the light.
-        irradiance_linear: Vec3,
-    },
-    /// A small lamp; falls off with the square of the distance.
-    Point {
-        /// Where it is.
-        position_in_world: Vec3,
-        /// As `irradiance_linear`, at a distance of one metre.
-        intensity_linear: Vec3,
-    },
 }
 
 /// A camera named by the source file, for use as a view.

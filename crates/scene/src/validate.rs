@@ -1,5 +1,6 @@
 //! What every scene must satisfy, wherever it comes from.
 
+use depth_image::LightError;
 use glam::{Affine3A, Vec3};
 
 use crate::error::{Fault, at_most};
@@ -26,12 +27,11 @@ impl Scene {
         self.check_sizes(limits)?;
         each("mesh", &self.meshes, |mesh| check_mesh(mesh, self.materials.len()))?;
         each("instance", &self.instances, |instance| self.check_instance(instance))?;
-        each("material", &self.materials, |material| check_material(material, self.textures.len()))?;
+        each("material", &self.materials, |material| check_material(material, &self.textures))?;
         each("texture", &self.textures, |texture| check_texture(texture, limits))?;
-        each("light", &self.lights, check_light)?;
+        self.check_illumination()?;
         each("camera", &self.cameras, check_camera)?;
-        check_colour("ambient light", self.ambient_linear)?;
-        check_colour("background", self.background_linear)?;
+        require(is_radiance(self.background_linear), "background", "negative or not finite")?;
         self.wind.as_ref().map_or(Ok(()), check_wind)?;
         require(self.origin_in_source.is_finite(), "origin", "not finite")
     }
@@ -44,13 +44,20 @@ impl Scene {
         at_most("vertices", vertices, limits.vertices)?;
         at_most("textures, in bytes", texture_bytes, limits.texture_bytes)?;
         at_most("materials", self.materials.len() as u64, limits.attributes)?;
-        at_most("lights", self.lights.len() as u64, limits.attributes)?;
+        at_most("lights", self.illumination.lights.len() as u64, limits.lights)?;
         at_most("cameras", self.cameras.len() as u64, limits.attributes)?;
         at_most("triangles of all instances", self.triangle_count(), limits.triangles)?;
         let stored = self.meshes.iter().map(Mesh::triangle_count).sum();
         at_most("triangles of all meshes", stored, limits.triangles)?;
         require(!self.materials.is_empty(), "materials", "there are none")?;
         require(self.triangle_count() > 0, "scene", "it has no triangles")
+    }
+
+    fn check_illumination(&self) -> Result<(), Fault> {
+        for (number, light) in self.illumination.lights.iter().enumerate() {
+            check_light(light).map_err(|e| Fault::light(format_args!("light {number}"), &e))?;
+        }
+        self.illumination.environment.validate().map_err(|e| Fault::light("environment", &e))
     }
 
     fn check_instance(&self, instance: &Instance) -> Result<(), String> {
@@ -120,15 +127,23 @@ fn check_transform(world_from_mesh: &Affine3A) -> Result<(), String> {
     })
 }
 
-fn check_material(material: &Material, texture_count: usize) -> Result<(), String> {
-    let texture = material.base_color_texture;
-    ensure(texture.is_none_or(|t| (t as usize) < texture_count), || format!("texture {texture:?} does not exist"))?;
+fn check_material(material: &Material, textures: &[Texture]) -> Result<(), String> {
+    check_texture_use("base colour", material.base_color_texture, textures)?;
+    check_texture_use("metallic-roughness", material.metallic_roughness_texture, textures)?;
+    let data = material.metallic_roughness_texture.and_then(|t| textures.get(t as usize));
+    ensure(data.is_none_or(|t| !t.is_srgb), || "its metallic-roughness texture holds colours".into())?;
     let unit = |v: f32| (0.0..=1.0).contains(&v);
     ensure(material.base_color_linear.iter().all(|c| c.is_finite() && *c >= 0.0), || "bad base colour".into())?;
     ensure(is_radiance(material.emissive_linear), || "bad emissive colour".into())?;
-    ensure(unit(material.metallic) && unit(material.roughness), || "metallic or roughness out of range".into())?;
+    ensure(unit(material.metallic), || "metallic is not from 0 to 1".into())?;
+    ensure(unit(material.roughness), || "roughness is not from 0 to 1".into())?;
     let phong = [material.phong_specular, material.phong_exponent, material.alpha_cutoff];
     ensure(phong.iter().all(|v| v.is_finite() && *v >= 0.0), || "bad Phong terms or alpha cutoff".into())
+}
+
+fn check_texture_use(what: &str, texture: Option<u32>, textures: &[Texture]) -> Result<(), String> {
+    let is_there = texture.is_none_or(|t| (t as usize) < textures.len());
+    ensure(is_there, || format!("its {what} texture {} does not exist", texture.unwrap_or(0)))
 }
 
 fn check_texture(texture: &Texture, limits: &Limits) -> Result<(), String> {
@@ -141,17 +156,25 @@ fn check_texture(texture: &Texture, limits: &Limits) -> Result<(), String> {
     })
 }
 
-fn check_light(light: &Light) -> Result<(), String> {
-    let (place, colour, is_place_valid) = match *light {
-        Light::Directional { towards_light_in_world: d, irradiance_linear } => {
-            (d, irradiance_linear, (d.length_squared() - 1.0).abs() < 1e-2)
+fn check_light(light: &Light) -> Result<(), LightError> {
+    light.validate()?;
+    match *light {
+        Light::Directional { .. } => Ok(()),
+        Light::Point { position_in_world, radius_m, .. } | Light::Spot { position_in_world, radius_m, .. } => {
+            within_reach("position", position_in_world)?;
+            within_reach("radius", Vec3::splat(radius_m))
         }
-        Light::Point { position_in_world: p, intensity_linear } => {
-            (p, intensity_linear, p.abs().max_element() <= MAX_COORDINATE_M)
+        Light::Rectangle { center_in_world, half_edges_in_world: [u, v], .. } => {
+            within_reach("center", center_in_world)?;
+            within_reach("half_edges", u)?;
+            within_reach("half_edges", v)
         }
-    };
-    ensure(place.is_finite() && is_place_valid, || "bad position or direction".into())?;
-    ensure(is_radiance(colour), || "bad intensity".into())
+    }
+}
+
+fn within_reach(field: &'static str, v: Vec3) -> Result<(), LightError> {
+    let holds = v.abs().max_element() <= MAX_COORDINATE_M;
+    if holds { Ok(()) } else { Err(LightError { field, reason: "over 1e9 m" }) }
 }
 
 fn check_camera(camera: &SourceCamera) -> Result<(), String> {
@@ -166,10 +189,6 @@ fn check_wind(wind: &Wind) -> Result<(), Fault> {
         && wind.frequency_hz.is_finite()
         && wind.waves_per_m.is_finite();
     require(is_direction_valid && are_numbers_valid, "wind", "not finite or out of range")
-}
-
-fn check_colour(element: &str, colour: Vec3) -> Result<(), Fault> {
-    require(is_radiance(colour), element, "negative or not finite")
 }
 
 fn is_radiance(colour: Vec3) -> bool {

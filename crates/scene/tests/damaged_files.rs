@@ -190,7 +190,7 @@ fn ply_binary() {
 #[test]
 fn packages() {
     let mut textured = checker_sphere();
-    textured.textures[0] = scene::Texture { width_px: 2, height_px: 2, srgba8: vec![9; 16] };
+    textured.textures[0] = scene::Texture { width_px: 2, height_px: 2, is_srgb: true, srgba8: vec![9; 16] };
     for scene in [unit_cube().with_wind(), textured] {
         damaged(&pack(&scene).bytes, 4000, |bytes| {
             if let Ok(scene) = unpack(bytes, &limits()) {
@@ -215,10 +215,11 @@ fn rich_gltf() -> GltfCube {
     cube.views += r#",{"buffer":0,"byteOffset":168,"byteLength":32,"byteStride":4}"#;
     cube.buffers = r#"{"byteLength":200}"#.into();
     cube.binary.extend([6, 0, 255, 128].repeat(8));
-    cube.nodes = r#"{"mesh":0,"children":[1,2],"rotation":[0,0,0,1]},{"mesh":0,"scale":[-1,1,1]},{"camera":0,
-        "extensions":{"KHR_lights_punctual":{"light":0}},"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}"#
+    cube.nodes = r#"{"mesh":0,"children":[1,2],"rotation":[0,0,0,1]},{"mesh":0,"scale":[-1,1,1],"extensions":{"KHR_lights_punctual":{"light":0}}},{"camera":0,
+        "extensions":{"KHR_lights_punctual":{"light":1}},"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}"#
         .into();
-    cube.more = r#""extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":3}]}},
+    cube.more = r#""extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":3},
+        {"type":"spot","intensity":900,"color":[1,0.5,0.25],"spot":{"innerConeAngle":0.25,"outerConeAngle":0.5}}]}},
         "cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1}}],"textures":[{"source":0}],
         "images":[{"uri":"data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC"}],
         "materials":[{"emissiveTexture":{"index":0},"pbrMetallicRoughness":{"baseColorTexture":{"index":0},
@@ -231,5 +232,8 @@ fn the_undamaged_sample_loads() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("a.glb"), rich_gltf().glb()).unwrap();
     let scene = load_file(&dir.path().join("a.glb"), &limits()).unwrap();
-    assert_eq!((scene.triangle_count(), scene.lights.len(), scene.cameras.len(), scene.textures.len()), (24, 1, 1, 1));
+    assert_eq!(
+        (scene.triangle_count(), scene.illumination.lights.len(), scene.cameras.len(), scene.textures.len()),
+        (24, 2, 1, 2)
+    );
 }

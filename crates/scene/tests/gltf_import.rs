@@ -3,9 +3,11 @@
 
 mod samples;
 
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
+
 use glam::Vec3;
 use samples::{GltfCube, Sample, cube_buffer, load, refusal, signed_volume, world_triangles};
-use scene::{Light, Limits, SceneErrorKind, load_file};
+use scene::{Light, LightSpec, Limits, Scene, SceneErrorKind, load_file};
 
 fn cube(change: impl FnOnce(&mut GltfCube)) -> GltfCube {
     let mut cube = GltfCube::default();
@@ -143,30 +145,283 @@ fn png_data_uri() -> &'static str {
 
 #[test]
 fn lights_and_cameras_are_placed() {
-    let scene = load("l.glb", &cube(|c| {
-        c.more = r#""extensions":{"KHR_lights_punctual":{"lights":[{"type":"directional","intensity":3.1415927},
-            {"type":"spot","color":[1,0,0],"spot":{}}]}},"cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1}},
-            {"type":"orthographic","orthographic":{"xmag":1,"ymag":1,"zfar":2,"znear":1}}],"#.into();
-        c.nodes += r#",{"extensions":{"KHR_lights_punctual":{"light":0}},"rotation":[-0.70710678,0,0,0.70710678]},
-            {"extensions":{"KHR_lights_punctual":{"light":1}},"translation":[1,2,3]},
-            {"camera":0,"name":"eye","translation":[0,0,5],"scale":[3,3,3]},{"camera":1}"#;
-        c.roots = "0,1,2,3,4".into();
-    }).glb()).unwrap();
-    let (mut sun, mut lamp) = (None, None);
-    for light in &scene.lights {
-        match *light {
-            Light::Directional { towards_light_in_world, irradiance_linear } => {
-                sun = Some((towards_light_in_world, irradiance_linear))
-            }
-            Light::Point { position_in_world, intensity_linear } => lamp = Some((position_in_world, intensity_linear)),
-        }
-    }
-    let (towards, irradiance) = sun.unwrap();
-    assert!(towards.distance(Vec3::Y) < 1e-5 && irradiance.distance(Vec3::ONE) < 1e-5, "{towards} {irradiance}");
-    assert_eq!((lamp.unwrap().0, lamp.unwrap().1.y), (Vec3::new(1.0, 2.0, 3.0), 0.0));
+    let scene = load(
+        "l.glb",
+        &cube(|c| {
+            c.more = r#""extensions":{"KHR_lights_punctual":{"lights":[{"type":"directional","intensity":3.1415927},
+            {"type":"spot","color":[1,0,0],"range":2,"spot":{"innerConeAngle":0.25,"outerConeAngle":0.5}},
+            {"type":"point"},{"type":"spot"}]}},"cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1}},
+            {"type":"orthographic","orthographic":{"xmag":1,"ymag":1,"zfar":2,"znear":1}}],"#
+                .into();
+            c.nodes += r#",{"extensions":{"KHR_lights_punctual":{"light":0}},"rotation":[-0.70710678,0,0,0.70710678]},
+            {"extensions":{"KHR_lights_punctual":{"light":1}},"translation":[1,2,3],"scale":[2,2,2]},
+            {"camera":0,"name":"eye","translation":[0,0,5],"scale":[3,3,3]},{"camera":1},
+            {"extensions":{"KHR_lights_punctual":{"light":2}},"translation":[0,4,0]},
+            {"extensions":{"KHR_lights_punctual":{"light":3}},"translation":[0,-4,0]}"#;
+            c.roots = "0,1,2,3,4,5,6".into();
+        })
+        .glb(),
+    )
+    .unwrap();
+    let lights = &scene.illumination.lights;
+    let find = |is_it: fn(&Light) -> bool| *lights.iter().find(|l| is_it(l)).unwrap();
+    let Light::Directional { towards_light_in_world: towards, irradiance_linear, angular_radius_rad } =
+        find(|l| matches!(l, Light::Directional { .. }))
+    else {
+        unreachable!()
+    };
+    assert!(towards.distance(Vec3::Y) < 1e-5 && irradiance_linear.distance(Vec3::ONE) < 1e-5, "{towards}");
+    assert_eq!(angular_radius_rad, 0.0, "a file's lights have no extent");
+    let spot = Light::Spot {
+        position_in_world: Vec3::new(1.0, 2.0, 3.0),
+        forward_in_world: Vec3::NEG_Z,
+        intensity_linear: Vec3::X * FRAC_1_PI,
+        inner_cone_rad: 0.25,
+        outer_cone_rad: 0.5,
+        radius_m: 0.0,
+    };
+    assert!(lights.contains(&spot), "{lights:?}");
+    let point =
+        Light::Point { position_in_world: Vec3::Y * 4.0, intensity_linear: Vec3::splat(FRAC_1_PI), radius_m: 0.0 };
+    assert!(lights.contains(&point), "{lights:?}");
+    let wide = |l: &Light| matches!(l, Light::Spot { outer_cone_rad, .. } if *outer_cone_rad == FRAC_PI_4);
+    assert!(lights.iter().any(wide), "the extension's cones where the file gives none");
     assert_eq!((scene.cameras.len(), scene.cameras[0].name.as_str(), scene.cameras[0].fov_y_rad), (1, "eye", 1.0));
     let pose = scene.cameras[0].world_from_camera;
     assert_eq!((pose.translation.z, pose.matrix3.determinant()), (5.0, 1.0));
+}
+
+/// A cube lit by a sun and, three metres from its middle, a lamp.
+fn sun_and_lamp(sun: &str, lamp: &str) -> GltfCube {
+    cube(|c| {
+        c.more = format!(r#""extensions":{{"KHR_lights_punctual":{{"lights":[{{{sun}}},{{{lamp}}}]}}}},"#);
+        c.nodes += r#",{"extensions":{"KHR_lights_punctual":{"light":0}}},
+            {"extensions":{"KHR_lights_punctual":{"light":1}},"translation":[0,3,0]}"#;
+        c.roots = "0,1,2".into();
+    })
+}
+
+/// Irradiance of the sun and intensity of the lamp.
+fn colors(scene: &Scene) -> [Vec3; 2] {
+    let mut colors = [Vec3::NAN; 2];
+    for light in &scene.illumination.lights {
+        match *light {
+            Light::Directional { irradiance_linear, .. } => colors[0] = irradiance_linear,
+            Light::Point { intensity_linear, .. } => colors[1] = intensity_linear,
+            _ => panic!("{light:?}"),
+        }
+    }
+    colors
+}
+
+#[test]
+fn lights_of_any_unit_are_exposed_and_keep_their_ratios() {
+    let read = |sun_lux: f64, lamp_candela: f64| {
+        let sun = format!(r#""type":"directional","intensity":{sun_lux}"#);
+        let lamp = format!(r#""type":"point","color":[1,0.5,0.25],"intensity":{lamp_candela}"#);
+        colors(&load("lit.glb", &sun_and_lamp(&sun, &lamp).glb()).unwrap())
+    };
+    for (sun_lux, lamp_candela) in
+        [(100_000.0, 2_718.0), (1e-3, 5e-3), (0.0, 54_351.4), (1e38, 1e30), (1e-38, 0.0), (3.0, 4_000.0)]
+    {
+        let [sun, lamp] = read(sun_lux, lamp_candela);
+        let arriving = sun.x + lamp.x / 9.0;
+        assert!((arriving - 1.0).abs() < 1e-4, "{sun_lux} {lamp_candela}: {arriving}");
+        let cross = f64::from(sun.x) * lamp_candela - f64::from(lamp.x) * sun_lux;
+        assert!(cross.abs() <= 1e-5 * sun_lux.max(lamp_candela), "{sun_lux} {lamp_candela}: {sun} {lamp}");
+        assert!(lamp.x == 0.0 || lamp.distance(lamp.x * Vec3::new(1.0, 0.5, 0.25)) < 1e-5 * lamp.x);
+    }
+    // Meant to be looked at as it is, bright or dim; and nothing cannot be made brighter.
+    for (sun_lux, lamp_candela) in [(3.0, 1.0), (9.0, 9.0), (1.0, 0.0), (0.0, 0.0)] {
+        let [sun, lamp] = read(sun_lux, lamp_candela);
+        assert_eq!((sun.x, lamp.x), (sun_lux as f32 * FRAC_1_PI, lamp_candela as f32 * FRAC_1_PI));
+    }
+}
+
+#[test]
+fn a_lamp_in_the_middle_does_not_darken_the_rest() {
+    let inside = cube(|c| {
+        c.more = r#""extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":1}]}},"#.into();
+        c.nodes += r#",{"extensions":{"KHR_lights_punctual":{"light":0}}}"#;
+        c.roots = "0,1".into();
+    });
+    let scene = load("inside.glb", &inside.glb()).unwrap();
+    let Light::Point { intensity_linear, .. } = scene.illumination.lights[0] else { panic!() };
+    assert_eq!(intensity_linear, Vec3::splat(FRAC_1_PI));
+}
+
+#[test]
+fn lights_move_with_the_origin() {
+    let far = cube(|c| {
+        c.more = r#""extensions":{"KHR_lights_punctual":{"lights":[{"type":"spot"}]}},"#.into();
+        c.nodes = r#"{"translation":[2684572,0,0],"children":[1,2]},{"mesh":0},
+            {"extensions":{"KHR_lights_punctual":{"light":0}},"translation":[0,1.125,0]}"#
+            .into();
+    });
+    let scene = load("far.glb", &far.glb()).unwrap();
+    assert_eq!(scene.origin_in_source.x, 2_684_572.0);
+    let place = |light: &Light| match *light {
+        Light::Spot { position_in_world, .. } | Light::Point { position_in_world, .. } => position_in_world,
+        _ => panic!("{light:?}"),
+    };
+    assert_eq!(place(&scene.illumination.lights[0]), Vec3::Y * 1.125);
+    let spec: LightSpec = "point at=2684572,2.5,0".parse().unwrap();
+    let relit = scene.lit_by(Some(vec![spec.0]), None);
+    assert_eq!(place(&relit.illumination.lights[0]), Vec3::Y * 2.5);
+}
+
+#[test]
+fn lights_that_cannot_be_are_refused_by_file_light_and_field() {
+    let sun = r#""type":"directional""#;
+    let cases = [
+        (r#""type":"point","intensity":-1"#, "light 1: intensity"),
+        (r#""type":"point","intensity":1e39"#, "light 1: intensity"),
+        (r#""type":"point","color":[1,-0.5,0]"#, "light 1: color"),
+        (r#""type":"point","color":[1,1e39,0]"#, "light 1: color"),
+        (r#""type":"point","color":[1e30,1,1],"intensity":1e30"#, "light 1: intensity"),
+        (r#""type":"spot","spot":{"outerConeAngle":1e39}"#, "light 1: spot.outerConeAngle"),
+        (r#""type":"spot","spot":{"outerConeAngle":1.7}"#, "light 1: spot.outerConeAngle"),
+        (r#""type":"spot","spot":{"outerConeAngle":-0.1}"#, "light 1: spot.outerConeAngle"),
+        (r#""type":"spot","spot":{"innerConeAngle":0.6,"outerConeAngle":0.5}"#, "light 1: spot.innerConeAngle"),
+        (r#""type":"spot","spot":{"innerConeAngle":-1}"#, "light 1: spot.innerConeAngle"),
+        (r#""type":"area""#, "light 1"),
+        (r#""type":"point","intensity":NaN"#, "JSON"),
+        (r#""intensity":1"#, "JSON"),
+    ];
+    for (lamp, element) in cases {
+        let error = load("bad.glb", &sun_and_lamp(sun, lamp).glb()).unwrap_err();
+        assert_eq!(error.element, element, "{lamp}: {error}");
+        assert!(error.to_string().contains("bad.glb"), "{error}");
+    }
+    assert!(
+        refused(|c| c.nodes = r#"{"mesh":0,"extensions":{"KHR_lights_punctual":{"light":3}}}"#.into())
+            .contains("node 0")
+    );
+    // Ninety degrees, rounded up by its writer.
+    assert!(load("wide.glb", &sun_and_lamp(sun, r#""type":"spot","spot":{"outerConeAngle":1.5708}"#).glb()).is_ok());
+}
+
+#[test]
+fn more_lights_than_the_limit_are_refused() {
+    let sample = Sample::new("lit.glb", &sun_and_lamp(r#""type":"directional""#, r#""type":"point""#).glb());
+    assert_eq!(sample.load().unwrap().illumination.lights.len(), 2);
+    let error = load_file(&sample.path, &Limits { lights: 1, ..Limits::default() }).unwrap_err();
+    assert!(matches!(error.kind, SceneErrorKind::TooLarge { actual: 2, limit: 1 }), "{error}");
+}
+
+/// An image of `texels`, as a data URI.
+fn png_of(texels: &[[u8; 4]]) -> String {
+    let image = image::RgbaImage::from_raw(texels.len() as u32, 1, texels.concat()).unwrap();
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    let hex: String = bytes.get_ref().iter().map(|b| format!("%{b:02x}")).collect();
+    format!("data:image/png,{hex}")
+}
+
+/// A cube with one material, `pbr` its `pbrMetallicRoughness`, and the textures 0 and 1 of two images.
+fn textured_cube(pbr: &str) -> Vec<u8> {
+    let (image, other) = (png_of(&[[10, 200, 255, 255], [20, 100, 0, 255]]), png_of(&[[255; 4]]));
+    cube(|c| {
+        c.primitive = r#"{"attributes":{"POSITION":0,"TEXCOORD_0":2},"indices":1,"material":0}"#.into();
+        c.accessors += r#",{"bufferView":0,"componentType":5126,"count":8,"type":"VEC2"}"#;
+        c.more = format!(
+            r#""textures":[{{"source":0}},{{"source":1}}],"images":[{{"uri":"{image}"}},{{"uri":"{other}"}}],
+            "materials":[{{"pbrMetallicRoughness":{{{pbr}}}}}],"#
+        );
+    })
+    .glb()
+}
+
+#[test]
+fn metallic_and_roughness_keep_their_texture() {
+    let pbr = r#""metallicRoughnessTexture":{"index":0},"metallicFactor":0.5,"roughnessFactor":0.8"#;
+    let scene = load("mr.glb", &textured_cube(pbr)).unwrap();
+    let m = &scene.materials[0];
+    assert_eq!((m.metallic, m.roughness, m.base_color_texture), (0.5, 0.8, None));
+    let texture = &scene.textures[m.metallic_roughness_texture.unwrap() as usize];
+    assert_eq!((texture.is_srgb, texture.width_px, scene.textures.len()), (false, 2, 1));
+    assert_eq!(texture.srgba8[..3], [10, 200, 255], "as it is in the file");
+    // Blinn-Phong has the mean: metallic 0.5 · 0.5 and roughness 0.8 · 150/255.
+    let (specular, exponent) = scene::Material::phong_from_metallic_roughness(0.25, 0.8 * 150.0 / 255.0);
+    assert!((m.phong_specular - specular).abs() < 1e-5 && (m.phong_exponent / exponent - 1.0).abs() < 1e-4);
+}
+
+#[test]
+fn an_image_of_colours_and_data_is_two_textures() {
+    let both = r#""baseColorTexture":{"index":0},"metallicRoughnessTexture":{"index":0}"#;
+    let scene = load("both.glb", &textured_cube(both)).unwrap();
+    let of = |texture: Option<u32>| &scene.textures[texture.unwrap() as usize];
+    let m = &scene.materials[0];
+    assert!(of(m.base_color_texture).is_srgb && !of(m.metallic_roughness_texture).is_srgb);
+    assert_eq!((scene.textures.len(), &scene.textures[0].srgba8), (2, &scene.textures[1].srgba8));
+}
+
+#[test]
+fn a_texture_with_coordinates_of_its_own_is_reduced_to_its_mean() {
+    let transform = r#""extensions":{"KHR_texture_transform":{"scale":[2,2]}}"#;
+    let pbr = format!(r#""baseColorTexture":{{"index":1}},"metallicRoughnessTexture":{{"index":0,{transform}}}"#);
+    let scene = load("own.glb", &textured_cube(&pbr)).unwrap();
+    let m = &scene.materials[0];
+    assert_eq!((m.metallic_roughness_texture, scene.textures.len()), (None, 1));
+    assert!((m.metallic - 0.5).abs() < 1e-5 && (m.roughness - 150.0 / 255.0).abs() < 1e-5);
+    // Alone, its coordinates are the vertex's.
+    let alone = format!(r#""metallicRoughnessTexture":{{"index":0,{transform}}}"#);
+    let scene = load("alone.glb", &textured_cube(&alone)).unwrap();
+    assert!(scene.materials[0].metallic_roughness_texture.is_some());
+    assert_eq!(scene.meshes[0].vertices[0].uv, [-1.0, -1.0]);
+}
+
+#[test]
+fn factors_out_of_range_are_brought_into_it_and_infinite_ones_refused() {
+    let material = |members: &str| {
+        let material = format!(r#""materials":[{{"alphaMode":"MASK",{members}}}],"#);
+        load("m.glb", &cube(|c| c.more = material).glb())
+    };
+    let pbr = r#""metallicFactor":2,"roughnessFactor":-1,"baseColorFactor":[-0.5,0.5,1.5,2]"#;
+    let scene =
+        material(&format!(r#""pbrMetallicRoughness":{{{pbr}}},"emissiveFactor":[-1,0.5,3],"alphaCutoff":-0.25"#));
+    let m = &scene.unwrap().materials[0];
+    assert_eq!((m.metallic, m.roughness, m.base_color_linear), (1.0, 0.0, [0.0, 0.5, 1.0, 1.0]));
+    assert_eq!((m.emissive_linear, m.alpha_cutoff), (Vec3::new(0.0, 0.5, 3.0), 0.0));
+    for (members, element) in [
+        (r#""pbrMetallicRoughness":{"metallicFactor":1e39}"#, "material 0: metallic"),
+        (r#""pbrMetallicRoughness":{"roughnessFactor":-1e39}"#, "material 0: roughness"),
+        (r#""pbrMetallicRoughness":{"baseColorFactor":[0,0,1e39,1]}"#, "material 0: base colour"),
+        (r#""emissiveFactor":[1e39,0,0]"#, "material 0: emissive colour"),
+        (r#""alphaCutoff":1e39"#, "material 0: alpha cutoff"),
+        (r#""pbrMetallicRoughness":{"metallicFactor":NaN}"#, "JSON"),
+    ] {
+        let error = material(members).unwrap_err();
+        assert_eq!(error.element, element, "{error}");
+    }
+}
+
+#[test]
+fn triangles_without_area_are_kept_with_unit_normals() {
+    // Corner 0 thrice, an edge there and back, and the cube's own after them.
+    let flat: Vec<u16> =
+        [0, 0, 0, 1, 2, 1].into_iter().chain(samples::cube_triangles().into_iter().map(|i| i as u16)).collect();
+    let with = |attributes: &str| {
+        cube(|c| {
+            c.primitive = format!(r#"{{"attributes":{{"POSITION":0{attributes}}},"indices":1}}"#);
+            c.accessors = c.accessors.replace(r#""count":36"#, r#""count":42"#)
+                + r#",{"bufferView":2,"componentType":5126,"count":8,"type":"VEC3"}"#;
+            c.views = r#"{"buffer":0,"byteLength":96},{"buffer":0,"byteOffset":96,"byteLength":84},
+                {"buffer":0,"byteOffset":180,"byteLength":96}"#
+                .into();
+            c.buffers = r#"{"byteLength":276}"#.into();
+            c.binary.truncate(96);
+            c.binary.extend(flat.iter().flat_map(|i| i.to_le_bytes()));
+            c.binary.resize(276, 0);
+        })
+    };
+    // Without normals, and with normals that are all zero.
+    for attributes in ["", r#","NORMAL":2"#] {
+        let scene = load("flat.glb", &with(attributes).glb()).unwrap();
+        assert_eq!(scene.triangle_count(), 14);
+        let unit = |v: &scene::Vertex| (Vec3::from(v.normal).length() - 1.0).abs() < 1e-5;
+        assert!(scene.meshes[0].vertices.iter().all(unit));
+    }
 }
 
 #[test]

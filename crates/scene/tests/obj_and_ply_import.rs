@@ -51,6 +51,42 @@ fn mtl_materials_and_their_textures_are_found() {
 }
 
 #[test]
+fn mtl_numbers_out_of_range_are_brought_into_it() {
+    let library = b"newmtl a\nKd -1 0.5 2\nKs -0.1 0 0\nNs -3\nd 1.5\nnewmtl b\nKs 0.4\nNs 200\nnewmtl c\nNs 200\n";
+    let faces = cube_obj().replace("f 5 6", "usemtl b\nf 5 6").replace("f 1 2", "usemtl c\nf 1 2");
+    let scene = Sample::new("a.obj", format!("mtllib a.mtl\nusemtl a\n{faces}").as_bytes())
+        .with("a.mtl", library)
+        .load()
+        .unwrap();
+    let of = |name: &str| scene.materials.iter().find(|m| m.name == name).unwrap();
+    assert_eq!((of("a").base_color_linear, of("a").phong_specular), ([0.0, 0.5, 2.0, 1.0], 0.0));
+    assert!(of("b").is_specular(), "a highlight of exponent 200");
+    assert!(!of("a").is_specular() && !of("c").is_specular(), "no highlight without a specular colour");
+}
+
+#[test]
+fn triangles_without_area_are_kept_with_unit_normals() {
+    let points = "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\n";
+    let faces = "f 1 2 4\nf 1 1 2\nf 3 3 3\nf 1 2 3\n";
+    let zero_normals = faces.replace(' ', "//1 ").replace('\n', "//1\n").replace("f//1", "f");
+    for obj in [format!("{points}{faces}"), format!("{points}vn 0 0 0\n{zero_normals}")] {
+        assert_keeps_flat_ones(&load("flat.obj", obj.as_bytes()).unwrap(), 4);
+    }
+    let rows = "0 0 0 1 2 3\n1 0 0 1 2 3\n2 0 0 1 2 3\n0 1 0 1 2 3\n3 0 1 3\n3 0 0 1\n3 2 2 2\n3 0 1 2\n";
+    let ply = ply_header("ascii", 4, 4) + rows;
+    assert_keeps_flat_ones(&load("flat.ply", ply.as_bytes()).unwrap(), 4);
+    // Nothing has area, and all of it is in one point.
+    assert_keeps_flat_ones(&load("point.obj", b"v 7 7 7\nf 1 1 1\n").unwrap(), 1);
+}
+
+fn assert_keeps_flat_ones(scene: &Scene, triangles: u64) {
+    assert_eq!(scene.triangle_count(), triangles);
+    scene.validate(&Limits::default()).unwrap();
+    let unit = |v: &scene::Vertex| (Vec3::from(v.normal).length() - 1.0).abs() < 1e-5;
+    assert!(scene.meshes.iter().flat_map(|m| &m.vertices).all(unit));
+}
+
+#[test]
 fn obj_references_outside_the_folder_are_refused() {
     for reference in ["mtllib ../a.mtl", "mtllib /etc/hostname", "mtllib file:///a.mtl"] {
         let error = load("out.obj", format!("{reference}\n{}", cube_obj()).as_bytes()).unwrap_err();
@@ -94,7 +130,7 @@ fn bad_obj_lines_are_refused_by_number() {
     let library = |text: &[u8]| {
         Sample::new("a.obj", format!("mtllib a.mtl\n{points}f 1 2 3").as_bytes()).with("a.mtl", text).load()
     };
-    for text in ["newmtl a\nKd 1 x", "newmtl a\nKd", "newmtl a\nKd -1 0 0", "newmtl a\nNs nan", "newmtl a\nd"] {
+    for text in ["newmtl a\nKd 1 x", "newmtl a\nKd", "newmtl a\nKd 1e39 0 0", "newmtl a\nNs nan", "newmtl a\nd"] {
         assert!(library(text.as_bytes()).unwrap_err().to_string().contains("line 2"), "{text}");
     }
 }
@@ -191,9 +227,9 @@ fn models_near_the_origin_keep_their_coordinates() {
 fn unlit_sources_get_the_default_lights_by_spec() {
     let sample = Sample::new("cube.obj", cube_obj().as_bytes());
     let spec: SceneSpec = sample.path.to_str().unwrap().parse().unwrap();
-    assert!(sample.load().unwrap().lights.is_empty());
+    assert!(!sample.load().unwrap().has_light());
     let lit = spec.load(&Limits::default()).unwrap();
-    assert_eq!(lit.lights.len(), 1);
+    assert_eq!(lit.illumination.lights.len(), 1);
     assert_eq!(lit.clone().with_default_lights(), lit, "lights that are there are kept");
 }
 

@@ -6,7 +6,9 @@ mod samples;
 use glam::Vec3;
 use samples::signed_volume;
 use scene::procedural::{checker_sphere, courtyard, poles, quad, tree_terrain, unit_cube, uv_sphere};
-use scene::{Limits, PackageStore, Scene, SceneErrorKind, SceneHash, pack, unpack};
+use scene::{
+    Illumination, Light, LightSpec, Limits, PackageStore, Scene, SceneErrorKind, SceneHash, Texture, pack, unpack,
+};
 
 #[test]
 fn packing_is_deterministic_and_loses_nothing() {
@@ -30,7 +32,7 @@ fn hashes_are_shown_and_parsed() {
 
 #[test]
 fn a_scene_that_breaks_a_promise_is_not_unpacked() {
-    let broken: [fn(&mut Scene); 11] = [
+    let broken: [fn(&mut Scene); 16] = [
         |s| s.meshes[0].indices[0] = 99,
         |s| s.meshes[0].vertices[3].position[1] = f32::NAN,
         |s| s.meshes[0].vertices[3].normal = [0.0; 3],
@@ -41,6 +43,11 @@ fn a_scene_that_breaks_a_promise_is_not_unpacked() {
         |s| s.instances[0].world_from_mesh.matrix3.x_axis.x = -1.0,
         |s| s.instances[0].world_from_mesh.matrix3.x_axis.x = 0.0,
         |s| s.materials[0].base_color_texture = Some(0),
+        |s| s.materials[0].metallic_roughness_texture = Some(0),
+        |s| s.materials[0].metallic = 2.0,
+        |s| s.materials[0].roughness = f32::NAN,
+        |s| s.illumination.environment.zenith_linear.x = -1.0,
+        |s| s.illumination.lights = vec![s.illumination.lights[0]; 256],
         |s| s.materials.clear(),
     ];
     for (number, break_it) in broken.iter().enumerate() {
@@ -49,6 +56,59 @@ fn a_scene_that_breaks_a_promise_is_not_unpacked() {
         assert!(scene.validate(&Limits::default()).is_err(), "{number}");
         assert!(unpack(&pack(&scene).bytes, &Limits::default()).is_err(), "{number}");
     }
+}
+
+#[test]
+fn a_light_that_cannot_be_is_named_with_its_field() {
+    let lit_by = |lights| Scene { illumination: Illumination { lights, ..Illumination::default() }, ..unit_cube() };
+    let with = |light| lit_by(vec![sun(), light]);
+    let far = Vec3::X * 2e9;
+    let rectangle = |center_in_world, u| Light::Rectangle {
+        center_in_world,
+        half_edges_in_world: [u, Vec3::Y],
+        radiance_linear: Vec3::ONE,
+    };
+    let point =
+        |position_in_world, intensity_linear, radius_m| Light::Point { position_in_world, intensity_linear, radius_m };
+    for (light, field) in [
+        (point(Vec3::ZERO, Vec3::NAN, 0.0), "intensity"),
+        (point(Vec3::ZERO, -Vec3::ONE, 0.0), "intensity"),
+        (point(far, Vec3::ONE, 0.0), "position"),
+        (point(Vec3::ZERO, Vec3::ONE, 2e9), "radius"),
+        (rectangle(far, Vec3::X), "center"),
+        (rectangle(Vec3::ZERO, far), "half_edges"),
+        (rectangle(Vec3::ZERO, Vec3::Y), "half_edges"),
+    ] {
+        let error = with(light).validate(&Limits::default()).unwrap_err();
+        assert_eq!(error.element, format!("light 1: {field}"), "{error}");
+        assert!(unpack(&pack(&with(light)).bytes, &Limits::default()).is_err());
+    }
+    let many = lit_by(vec![sun(); 255]);
+    many.validate(&Limits::default()).unwrap();
+    let error = many.validate(&Limits { lights: 254, ..Limits::default() }).unwrap_err();
+    assert!(matches!(error.kind, SceneErrorKind::TooLarge { actual: 255, limit: 254 }), "{error}");
+}
+
+#[test]
+fn lights_of_all_kinds_and_both_kinds_of_texture_travel() {
+    let lights = [
+        "sun towards=1,2,3 irradiance=0.5 angle=2",
+        "point at=1,2,3 radius=0.1",
+        "spot at=1,2,3 towards=0,-1,0 inner=10 outer=20",
+        "rectangle at=0,2,0 u=1,0,0 v=0,0,1 radiance=3,2,1",
+    ];
+    let lights = lights.map(|text| text.parse::<LightSpec>().unwrap().0).to_vec();
+    let mut scene = checker_sphere().lit_by(Some(lights), None);
+    scene.textures.push(Texture { is_srgb: false, ..scene.textures[0].clone() });
+    scene.materials[0].metallic_roughness_texture = Some(1);
+    assert_eq!(unpack(&pack(&scene).bytes, &Limits::default()).unwrap(), scene);
+    scene.materials[0].metallic_roughness_texture = Some(0);
+    let error = unpack(&pack(&scene).bytes, &Limits::default()).unwrap_err();
+    assert!(error.to_string().contains("holds colours"), "{error}");
+}
+
+fn sun() -> Light {
+    unit_cube().illumination.lights[0]
 }
 
 #[test]
@@ -94,6 +154,15 @@ fn trees_have_the_triangles_asked_for_and_stay_in_their_block() {
         assert!(bounds.max.y > 0.8, "{bounds:?}");
         assert!(!scene.is_animated());
     }
+}
+
+#[test]
+fn the_papers_scene_is_matt_and_softly_lit() {
+    let scene = tree_terrain(10_000, 2007);
+    assert!(scene.materials.iter().all(|m| !m.is_specular() && m.phong_specular > 0.0));
+    assert!(scene.illumination.lights.iter().all(Light::has_extent));
+    let on_level_ground = scene.illumination.environment.diffuse_linear(Vec3::Y);
+    assert!(on_level_ground.distance(Vec3::new(0.20, 0.23, 0.27)) < 1e-3, "{on_level_ground}");
 }
 
 #[test]

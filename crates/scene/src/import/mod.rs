@@ -1,6 +1,7 @@
 //! Files to scenes. Each format fills a [`source_scene::SourceScene`] in double precision; what they
 //! share (re-centring, mirrored placements, limits, validation) happens once, in its `finish`.
 
+mod clamped;
 mod folder;
 mod gltf;
 mod normals;

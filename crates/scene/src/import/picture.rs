@@ -12,6 +12,8 @@ use crate::{Limits, Texture};
 pub(crate) struct EncodedPicture {
     pub element: String,
     pub bytes: Vec<u8>,
+    /// See [`Texture::is_srgb`].
+    pub is_srgb: bool,
 }
 
 /// Decodes all, in parallel, once their headers show that they fit the limits together.
@@ -48,11 +50,11 @@ fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
     image_limits.max_alloc = Some(limits.texture_bytes.saturating_mul(4));
     reader.limits(image_limits);
     let pixels = reader.decode().map_err(|e| Fault::malformed(&picture.element, e.to_string()))?;
-    Ok(texture_from(pixels.into_rgba8()))
+    Ok(texture_from(pixels.into_rgba8(), picture.is_srgb))
 }
 
-fn texture_from(pixels: RgbaImage) -> Texture {
-    Texture { width_px: pixels.width(), height_px: pixels.height(), srgba8: pixels.into_raw() }
+fn texture_from(pixels: RgbaImage, is_srgb: bool) -> Texture {
+    Texture { width_px: pixels.width(), height_px: pixels.height(), is_srgb, srgba8: pixels.into_raw() }
 }
 
 #[cfg(test)]
@@ -64,7 +66,7 @@ mod tests {
         let mut bytes = Vec::new();
         let pixels = RgbaImage::from_fn(width, height, |x, y| image::Rgba([x as u8, y as u8, 7, 255]));
         pixels.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png).unwrap();
-        EncodedPicture { element: "image 0".into(), bytes }
+        EncodedPicture { element: "image 0".into(), bytes, is_srgb: true }
     }
 
     #[test]

@@ -2,10 +2,11 @@
 
 use std::collections::HashMap;
 
-use glam::{Affine3A, DAffine3, DVec3, Vec3};
+use glam::{Affine3A, DAffine3, DVec3};
 
 use crate::error::{Fault, at_most};
-use crate::{Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Vertex};
+use crate::light_parts::{color, color_mut, position_mut};
+use crate::{Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Vertex};
 
 /// Further from the origin than this, a millimetre is lost in `f32`.
 const FAR_M: f64 = 1e4;
@@ -39,9 +40,10 @@ pub(crate) struct SourceInstance {
     pub source_from_mesh: DAffine3,
 }
 
-pub(crate) enum SourceLight {
-    Directional { towards_light_in_source: DVec3, irradiance_linear: Vec3 },
-    Point { position_in_source: DVec3, intensity_linear: Vec3 },
+/// A light, all but its position, which is not set in `light`.
+pub(crate) struct SourceLight {
+    pub light: Light,
+    pub position_in_source: DVec3,
 }
 
 pub(crate) struct PlacedCamera {
@@ -62,6 +64,7 @@ impl SourceScene {
         self.recentre_meshes()?;
         let origin_in_source = self.origin_in_source()?;
         self.unmirror();
+        let lights = self.lights.iter().map(|l| l.relative_to(origin_in_source)).collect();
         let (meshes, materials, textures) = (self.meshes, self.materials, self.textures);
         let scene = Scene {
             name: self.name,
@@ -69,7 +72,7 @@ impl SourceScene {
             instances: self.instances.iter().map(|i| i.relative_to(origin_in_source)).collect(),
             materials,
             textures,
-            lights: self.lights.iter().map(|l| l.relative_to(origin_in_source)).collect(),
+            illumination: Illumination { lights, ..Illumination::default() },
             cameras: self.cameras.into_iter().map(|c| c.relative_to(origin_in_source)).collect(),
             origin_in_source,
             ..Scene::default()
@@ -110,17 +113,22 @@ impl SourceScene {
     }
 
     fn origin_in_source(&self) -> Result<DVec3, Fault> {
+        let all = self.bounds_in_source();
+        if !(all.min.is_finite() && all.max.is_finite()) {
+            return Err(Fault::malformed("scene", "its bounds are not finite"));
+        }
+        Ok(recentring_offset(all))
+    }
+
+    /// Around all instances; not finite where there are none, or where a position is not.
+    pub(crate) fn bounds_in_source(&self) -> Box3 {
         let boxes: Vec<_> = self.meshes.iter().map(|m| Box3::around(m.positions_in_mesh.iter().copied())).collect();
         let corners = self.instances.iter().flat_map(|instance| {
             let box3 = boxes[instance.mesh];
             let corners = (!box3.is_empty()).then(|| box3.corners());
             corners.into_iter().flatten().map(|c| instance.source_from_mesh.transform_point3(c))
         });
-        let all = Box3::around(corners);
-        if !(all.min.is_finite() && all.max.is_finite()) {
-            return Err(Fault::malformed("scene", "its bounds are not finite"));
-        }
-        Ok(recentring_offset(all))
+        Box3::around(corners)
     }
 
     /// A placement that mirrors would turn triangles inside out; mirror the mesh once instead, and place
@@ -175,15 +183,26 @@ impl SourceInstance {
 }
 
 impl SourceLight {
+    /// Irradiance at a point, with nothing in between and a spot turned there; no distance counts as less
+    /// than `least_m`.
+    pub(crate) fn arriving_at(&self, point_in_source: DVec3, least_m: f64) -> DVec3 {
+        let color = color(&self.light).as_dvec3();
+        let distance_m = self.position_in_source.distance(point_in_source).max(least_m);
+        if matches!(self.light, Light::Directional { .. }) { color } else { color / (distance_m * distance_m) }
+    }
+
+    /// In double precision: a factor may be too small for `f32` where what comes out is not.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        let color = color_mut(&mut self.light);
+        *color = (color.as_dvec3() * factor).as_vec3();
+    }
+
     fn relative_to(&self, origin_in_source: DVec3) -> Light {
-        match *self {
-            Self::Directional { towards_light_in_source, irradiance_linear } => {
-                Light::Directional { towards_light_in_world: towards_light_in_source.as_vec3(), irradiance_linear }
-            }
-            Self::Point { position_in_source, intensity_linear } => {
-                Light::Point { position_in_world: (position_in_source - origin_in_source).as_vec3(), intensity_linear }
-            }
+        let mut light = self.light;
+        if let Some(position) = position_mut(&mut light) {
+            *position = (self.position_in_source - origin_in_source).as_vec3();
         }
+        light
     }
 }
 
@@ -210,7 +229,7 @@ fn recentring_offset(bounds: Box3) -> DVec3 {
     if bounds.is_empty() {
         return DVec3::ZERO;
     }
-    let (centre, diagonal) = ((bounds.min + bounds.max) * 0.5, (bounds.max - bounds.min).length());
+    let (centre, diagonal) = (bounds.center(), bounds.diagonal());
     let distance = centre.length();
     if distance <= FAR_M && distance <= FAR_IN_DIAGONALS * diagonal {
         DVec3::ZERO
@@ -222,7 +241,7 @@ fn recentring_offset(bounds: Box3) -> DVec3 {
 }
 
 #[derive(Clone, Copy)]
-struct Box3 {
+pub(crate) struct Box3 {
     min: DVec3,
     max: DVec3,
 }
@@ -231,6 +250,14 @@ impl Box3 {
     fn around(points: impl Iterator<Item = DVec3>) -> Self {
         let empty = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
         points.fold(empty, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
+    }
+
+    pub(crate) fn center(&self) -> DVec3 {
+        (self.min + self.max) * 0.5
+    }
+
+    pub(crate) fn diagonal(&self) -> f64 {
+        (self.max - self.min).length()
     }
 
     fn is_empty(&self) -> bool {

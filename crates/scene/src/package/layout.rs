@@ -9,17 +9,18 @@
 //! lengths, which are checked against what is left of the bytes before anything is allocated.
 
 use bytemuck::Pod;
+use depth_image::Illumination;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Fault, at_most};
-use crate::{Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Wind};
+use crate::{Instance, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Wind};
 
 #[cfg(target_endian = "big")]
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");
 
 const MAGIC: &[u8; 8] = b"MYRSCENE";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// A scene without its large arrays.
 #[derive(Serialize, Deserialize)]
@@ -29,8 +30,7 @@ struct Header {
     instances: Vec<Instance>,
     materials: Vec<Material>,
     textures: Vec<TextureHeader>,
-    lights: Vec<Light>,
-    ambient_linear: Vec3,
+    illumination: Illumination,
     background_linear: Vec3,
     cameras: Vec<SourceCamera>,
     wind: Option<Wind>,
@@ -48,6 +48,7 @@ struct MeshHeader {
 struct TextureHeader {
     width_px: u32,
     height_px: u32,
+    is_srgb: bool,
 }
 
 pub(super) fn bytes_from_scene(scene: &Scene) -> Vec<u8> {
@@ -88,15 +89,14 @@ fn header_of(scene: &Scene) -> Header {
         index_count: m.indices.len() as u32,
         parts: m.parts.clone(),
     };
-    let texture = |t: &Texture| TextureHeader { width_px: t.width_px, height_px: t.height_px };
+    let texture = |t: &Texture| TextureHeader { width_px: t.width_px, height_px: t.height_px, is_srgb: t.is_srgb };
     Header {
         name: scene.name.clone(),
         meshes: scene.meshes.iter().map(mesh).collect(),
         instances: scene.instances.clone(),
         materials: scene.materials.clone(),
         textures: scene.textures.iter().map(texture).collect(),
-        lights: scene.lights.clone(),
-        ambient_linear: scene.ambient_linear,
+        illumination: scene.illumination.clone(),
         background_linear: scene.background_linear,
         cameras: scene.cameras.clone(),
         wind: scene.wind,
@@ -127,10 +127,10 @@ fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Re
         meshes.push(Mesh { vertices, indices, parts: mesh.parts });
     }
     let mut textures = Vec::new();
-    for (number, TextureHeader { width_px, height_px }) in header.textures.into_iter().enumerate() {
+    for (number, TextureHeader { width_px, height_px, is_srgb }) in header.textures.into_iter().enumerate() {
         let bytes = u64::from(width_px) * u64::from(height_px) * 4;
         let srgba8 = reader.take(format!("texture {number}"), bytes)?.to_vec();
-        textures.push(Texture { width_px, height_px, srgba8 });
+        textures.push(Texture { width_px, height_px, is_srgb, srgba8 });
     }
     Ok(Scene {
         name: header.name,
@@ -138,8 +138,7 @@ fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Re
         instances: header.instances,
         materials: header.materials,
         textures,
-        lights: header.lights,
-        ambient_linear: header.ambient_linear,
+        illumination: header.illumination,
         background_linear: header.background_linear,
         cameras: header.cameras,
         wind: header.wind,

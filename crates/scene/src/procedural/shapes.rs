@@ -55,7 +55,7 @@ fn checks(width_px: u32, height_px: u32, check_px: u32) -> Texture {
         let (x, y) = (i % width_px / check_px, i / width_px / check_px);
         if (x + y).is_multiple_of(2) { [235, 235, 230, 255] } else { [25, 30, 40, 255] }
     };
-    Texture { width_px, height_px, srgba8: (0..width_px * height_px).flat_map(texel).collect() }
+    Texture { width_px, height_px, is_srgb: true, srgba8: (0..width_px * height_px).flat_map(texel).collect() }
 }
 
 fn sphere(radius_m: f32, segments: u32) -> MeshBuilder {

@@ -5,13 +5,18 @@ use glam::{Affine3A, Vec2, Vec3};
 
 use super::terrain::Terrain;
 use super::tree::{TreePlan, tree_mesh};
-use crate::{Instance, Light, Material, Scene, Wind};
+use crate::light_rig::SOFT_SUN_RAD;
+use crate::{Environment, Illumination, Instance, Light, Material, Scene, Wind};
 
 /// Where the tree stands, x and z.
 const TREE_FOOT: Vec2 = Vec2::new(-0.05, 0.04);
 /// Top of the block.
 const CEILING_M: f32 = 0.98;
 const TREE_HEIGHT_M: f32 = 0.8;
+
+/// A blue sky over a meadow that gives some of it back: `(0.20, 0.23, 0.27)` on level ground.
+const ENVIRONMENT: Environment =
+    Environment { zenith_linear: Vec3::new(0.220, 0.258, 0.312), nadir_linear: Vec3::new(0.10, 0.09, 0.06) };
 
 // The ground has material 0.
 const BARK_MATERIAL: u32 = 1;
@@ -39,8 +44,7 @@ pub fn tree_terrain(triangles: u32, seed: u64) -> Scene {
         instances: (0..2).map(|mesh| Instance { mesh, world_from_mesh: Affine3A::IDENTITY }).collect(),
         meshes,
         materials: materials(),
-        lights: lights(),
-        ambient_linear: Vec3::new(0.20, 0.23, 0.27),
+        illumination: Illumination { lights: lights(), environment: ENVIRONMENT },
         background_linear: Vec3::new(0.40, 0.56, 0.80),
         ..Scene::default()
     }
@@ -61,25 +65,34 @@ impl Scene {
     }
 }
 
+/// All matt under GGX, leaves too: the paper's scene then has no light that depends on the viewer, and its
+/// samples need no planes for it. The paper's own shading has its highlights, which go with `phong` lighting.
 fn materials() -> Vec<Material> {
-    let phong = |name: &str, phong_specular: f32, phong_exponent: f32| Material {
+    let matt = |name: &str, phong_specular: f32, phong_exponent: f32| Material {
         name: name.into(),
-        roughness: Material::roughness_from_phong_exponent(phong_exponent),
+        metallic: 0.0,
+        roughness: 1.0,
         phong_specular,
         phong_exponent,
         ..Material::default()
     };
-    let leaves = Material { double_sided: true, ..phong("leaves", 0.10, 20.0) };
-    vec![phong("ground", 0.02, 8.0), phong("bark", 0.05, 12.0), leaves]
+    let leaves = Material { double_sided: true, ..matt("leaves", 0.10, 20.0) };
+    vec![matt("ground", 0.02, 8.0), matt("bark", 0.05, 12.0), leaves]
 }
 
-/// A late sun, and a weak lamp on the shaded side.
+/// A late sun, and a weak lamp on the shaded side. The lamp is broad: seen from the tree it is twice as wide
+/// as the sun, as what fills shadows should have none to speak of.
 fn lights() -> Vec<Light> {
     vec![
         Light::Directional {
             towards_light_in_world: Vec3::new(0.48, 0.64, 0.6),
             irradiance_linear: Vec3::new(0.98, 0.90, 0.74),
+            angular_radius_rad: SOFT_SUN_RAD,
         },
-        Light::Point { position_in_world: Vec3::new(-0.9, 0.95, -0.6), intensity_linear: Vec3::new(0.08, 0.10, 0.14) },
+        Light::Point {
+            position_in_world: Vec3::new(-0.9, 0.95, -0.6),
+            intensity_linear: Vec3::new(0.08, 0.10, 0.14),
+            radius_m: 0.1,
+        },
     ]
 }

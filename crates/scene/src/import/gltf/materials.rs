@@ -1,5 +1,6 @@
 //! Materials, and the textures that they use.
 
+use std::cell::OnceCell;
 use std::collections::HashMap;
 
 use depth_image::linear_from_srgb8;
@@ -10,6 +11,7 @@ use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
+use super::super::clamped::{all_clamped, clamped};
 use super::super::folder::Folder;
 use super::super::picture::{EncodedPicture, decode_all};
 use super::super::source_scene::SourceScene;
@@ -32,13 +34,14 @@ pub(super) fn read(
     let uses =
         root.materials.iter().enumerate().map(|(i, m)| Uses::of(root, m, &mut pictures, &format!("material {i}")));
     let uses: Vec<_> = uses.collect::<Result<_, _>>()?;
-    let encoded = pictures.images.iter().map(|&image| encoded_picture(root, buffers, folder, image));
+    let encoded = pictures.uses.iter().map(|&(image, is_srgb)| encoded_picture(root, buffers, folder, image, is_srgb));
     let textures = decode_all(&encoded.collect::<Result<Vec<_>, _>>()?, limits)?;
+    let means = Means::of(&textures);
     for (number, (material, uses)) in root.materials.iter().zip(&uses).enumerate() {
-        scene.materials.push(converted(material, uses, &textures, number)?);
+        scene.materials.push(converted(material, uses, &means, number)?);
     }
     scene.materials.push(Material { name: "default".into(), ..Material::default() });
-    scene.textures = keep_base_colours(textures, &mut scene.materials);
+    scene.textures = keep_referred_to(textures, &mut scene.materials);
     Ok(())
 }
 
@@ -51,7 +54,8 @@ pub(super) fn material_number(root: &Root, material: Option<Index<JsonMaterial>>
     Ok(number as u32)
 }
 
-/// Which texture coordinates a material's base colour takes, and `KHR_texture_transform`.
+/// Which texture coordinates a texture takes, and `KHR_texture_transform`.
+#[derive(PartialEq)]
 pub(super) struct UvSource {
     pub set: u32,
     offset: [f32; 2],
@@ -59,9 +63,14 @@ pub(super) struct UvSource {
     rotation_rad: f32,
 }
 
+/// A vertex has one pair of coordinates: those of the base colour, else those of metallic and roughness.
 pub(super) fn uv_source(root: &Root, material: Option<Index<JsonMaterial>>) -> UvSource {
+    let pbr = material.and_then(|m| root.get(m)).map(|m| &m.pbr_metallic_roughness);
+    uv_of(pbr.and_then(|p| p.base_color_texture.as_ref().or(p.metallic_roughness_texture.as_ref())))
+}
+
+fn uv_of(info: Option<&Info>) -> UvSource {
     let mut source = UvSource { set: 0, offset: [0.0; 2], scale: [1.0; 2], rotation_rad: 0.0 };
-    let info = material.and_then(|m| root.get(m)).and_then(|m| m.pbr_metallic_roughness.base_color_texture.as_ref());
     let Some(info) = info else { return source };
     source.set = info.tex_coord;
     if let Some(transform) = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref()) {
@@ -82,23 +91,24 @@ impl UvSource {
     }
 }
 
-/// The images that materials use, each once.
+/// The images that materials use, and whether as colours: each once, or twice where one holds colours here
+/// and data there.
 #[derive(Default)]
 struct Pictures {
-    images: Vec<Index<Image>>,
-    place_of: HashMap<usize, usize>,
+    uses: Vec<(Index<Image>, bool)>,
+    place_of: HashMap<(usize, bool), usize>,
 }
 
 impl Pictures {
-    fn place(&mut self, root: &Root, info: &Info, element: &str) -> Result<usize, Fault> {
+    fn place(&mut self, root: &Root, info: &Info, is_srgb: bool, element: &str) -> Result<usize, Fault> {
         let missing =
             || Fault::malformed(element, format!("texture {} or its image does not exist", info.index.value()));
         let image = root.get(info.index).ok_or_else(missing)?.source;
         root.get(image).ok_or_else(missing)?;
-        let next = self.images.len();
-        let place = *self.place_of.entry(image.value()).or_insert(next);
+        let next = self.uses.len();
+        let place = *self.place_of.entry((image.value(), is_srgb)).or_insert(next);
         if place == next {
-            self.images.push(image);
+            self.uses.push((image, is_srgb));
         }
         Ok(place)
     }
@@ -113,12 +123,13 @@ struct Uses {
 
 impl Uses {
     fn of(root: &Root, material: &JsonMaterial, pictures: &mut Pictures, element: &str) -> Result<Self, Fault> {
-        let mut place = |info: &Option<Info>| info.as_ref().map(|i| pictures.place(root, i, element)).transpose();
+        let mut place =
+            |info: &Option<Info>, is_srgb| info.as_ref().map(|i| pictures.place(root, i, is_srgb, element)).transpose();
         let pbr = &material.pbr_metallic_roughness;
         Ok(Self {
-            base_color: place(&pbr.base_color_texture)?,
-            metallic_roughness: place(&pbr.metallic_roughness_texture)?,
-            emissive: place(&material.emissive_texture)?,
+            base_color: place(&pbr.base_color_texture, true)?,
+            metallic_roughness: place(&pbr.metallic_roughness_texture, false)?,
+            emissive: place(&material.emissive_texture, true)?,
         })
     }
 }
@@ -128,6 +139,7 @@ fn encoded_picture(
     buffers: &Buffers,
     folder: &Folder,
     index: Index<Image>,
+    is_srgb: bool,
 ) -> Result<EncodedPicture, Fault> {
     let element = format!("image {}", index.value());
     let image = root.get(index).ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
@@ -138,44 +150,97 @@ fn encoded_picture(
             return Err(Fault::malformed(element, "it has neither a uri nor a buffer view"));
         }
     };
-    Ok(EncodedPicture { element, bytes })
+    Ok(EncodedPicture { element, bytes, is_srgb })
 }
 
-fn converted(material: &JsonMaterial, uses: &Uses, textures: &[Texture], number: usize) -> Result<Material, Fault> {
+fn converted(material: &JsonMaterial, uses: &Uses, means: &Means, number: usize) -> Result<Material, Fault> {
     let element = format!("material {number}");
     let Checked::Valid(alpha_mode) = material.alpha_mode else {
         return Err(Fault::malformed(element, "unknown alphaMode"));
     };
     let pbr = &material.pbr_metallic_roughness;
-    let metal_rough =
-        uses.metallic_roughness.map_or(Vec3::ONE, |place| mean(&textures[place], |byte| f32::from(byte) / 255.0));
-    let glow = uses.emissive.map_or(Vec3::ONE, |place| mean(&textures[place], linear_from_srgb8));
-    let metallic = (pbr.metallic_factor.0 * metal_rough.z).clamp(0.0, 1.0);
-    let roughness = (pbr.roughness_factor.0 * metal_rough.y).clamp(0.0, 1.0);
-    let extensions = material.extensions.as_ref();
-    let strength = extensions.and_then(|e| e.emissive_strength.as_ref()).map_or(1.0, |s| s.emissive_strength.0);
+    let base_color = all_clamped(format_args!("{element}: base colour"), pbr.base_color_factor.0, 0.0..=1.0)?;
+    let surface = MetallicRoughness::of(material, uses, means, &element)?;
+    let [metallic, roughness] = surface.mean;
     let (phong_specular, phong_exponent) = Material::phong_from_metallic_roughness(metallic, roughness);
     Ok(Material {
-        name: material.name.clone().unwrap_or(element),
-        base_color_linear: pbr.base_color_factor.0,
+        base_color_linear: base_color,
         base_color_texture: uses.base_color.map(|place| place as u32),
-        metallic,
-        roughness,
-        emissive_linear: Vec3::from(material.emissive_factor.0) * glow * strength,
+        metallic: surface.factors[0],
+        roughness: surface.factors[1],
+        metallic_roughness_texture: surface.texture,
+        emissive_linear: emissive(material, uses, means, &element)?,
         phong_specular,
         phong_exponent,
         alpha_cutoff: match alpha_mode {
             AlphaMode::Opaque => 0.0,
-            AlphaMode::Mask => material.alpha_cutoff.map_or(0.5, |c| c.0),
+            AlphaMode::Mask => {
+                let cutoff = material.alpha_cutoff.map_or(0.5, |c| c.0);
+                clamped(format_args!("{element}: alpha cutoff"), cutoff, 0.0..=f32::MAX)?
+            }
             AlphaMode::Blend => BLEND_CUTOFF,
         },
         double_sided: material.double_sided,
-        unlit: extensions.is_some_and(|e| e.unlit.is_some()),
+        unlit: material.extensions.as_ref().is_some_and(|e| e.unlit.is_some()),
+        name: material.name.clone().unwrap_or(element),
     })
 }
 
-/// Mean of the colour channels of a texture whose texels the model has no place for.
-fn mean(texture: &Texture, decode: impl Fn(u8) -> f32) -> Vec3 {
+/// Each pair is metallic, then roughness.
+struct MetallicRoughness {
+    factors: [f32; 2],
+    texture: Option<u32>,
+    /// Factors times the texture's mean.
+    mean: [f32; 2],
+}
+
+impl MetallicRoughness {
+    fn of(material: &JsonMaterial, uses: &Uses, means: &Means, element: &str) -> Result<Self, Fault> {
+        let pbr = &material.pbr_metallic_roughness;
+        let metallic = clamped(format_args!("{element}: metallic"), pbr.metallic_factor.0, 0.0..=1.0)?;
+        let roughness = clamped(format_args!("{element}: roughness"), pbr.roughness_factor.0, 0.0..=1.0)?;
+        let factors = [metallic, roughness];
+        let Some(place) = uses.metallic_roughness else {
+            return Ok(Self { factors, texture: None, mean: factors });
+        };
+        let of_texture = means.linear(place);
+        let mean = [metallic * of_texture.z, roughness * of_texture.y];
+        let base = pbr.base_color_texture.as_ref();
+        let has_own_coordinates = base.is_some() && uv_of(base) != uv_of(pbr.metallic_roughness_texture.as_ref());
+        Ok(if has_own_coordinates {
+            Self { factors: mean, texture: None, mean }
+        } else {
+            Self { factors, texture: Some(place as u32), mean }
+        })
+    }
+}
+
+fn emissive(material: &JsonMaterial, uses: &Uses, means: &Means, element: &str) -> Result<Vec3, Fault> {
+    let element = format!("{element}: emissive colour");
+    let extensions = material.extensions.as_ref();
+    let strength = extensions.and_then(|e| e.emissive_strength.as_ref()).map_or(1.0, |s| s.emissive_strength.0);
+    let glow = uses.emissive.map_or(Vec3::ONE, |place| means.linear(place));
+    let color = (Vec3::from(material.emissive_factor.0) * glow * strength).to_array();
+    all_clamped(element, color, 0.0..=f32::MAX).map(Vec3::from)
+}
+
+/// Means of textures. Each is made once, when it is first asked for: many materials may share a large one.
+struct Means<'a>(Vec<(&'a Texture, OnceCell<Vec3>)>);
+
+impl<'a> Means<'a> {
+    fn of(textures: &'a [Texture]) -> Self {
+        Self(textures.iter().map(|texture| (texture, OnceCell::new())).collect())
+    }
+
+    /// Of the texture's colour channels, linear.
+    fn linear(&self, place: usize) -> Vec3 {
+        let (texture, mean) = &self.0[place];
+        *mean.get_or_init(|| mean_linear(texture))
+    }
+}
+
+fn mean_linear(texture: &Texture) -> Vec3 {
+    let decode = |code: u8| if texture.is_srgb { linear_from_srgb8(code) } else { f32::from(code) / 255.0 };
     let values: Vec<f32> = (0..=255).map(decode).collect();
     let mut sum = [0f64; 3];
     for texel in texture.srgba8.chunks_exact(4) {
@@ -186,11 +251,15 @@ fn mean(texture: &Texture, decode: impl Fn(u8) -> f32) -> Vec3 {
 }
 
 /// Drops the textures of which only the mean was needed, and renumbers the others.
-fn keep_base_colours(textures: Vec<Texture>, materials: &mut [Material]) -> Vec<Texture> {
-    let is_kept = |place: usize| materials.iter().any(|m| m.base_color_texture == Some(place as u32));
-    let kept: Vec<bool> = (0..textures.len()).map(is_kept).collect();
+fn keep_referred_to(textures: Vec<Texture>, materials: &mut [Material]) -> Vec<Texture> {
+    let mut kept = vec![false; textures.len()];
+    let used = materials.iter().flat_map(|m| [m.base_color_texture, m.metallic_roughness_texture]).flatten();
+    used.for_each(|place| kept[place as usize] = true);
     let number_of = |place: u32| kept[..place as usize].iter().filter(|&&k| k).count() as u32;
-    materials.iter_mut().for_each(|m| m.base_color_texture = m.base_color_texture.map(number_of));
+    for material in materials {
+        material.base_color_texture = material.base_color_texture.map(number_of);
+        material.metallic_roughness_texture = material.metallic_roughness_texture.map(number_of);
+    }
     textures.into_iter().zip(&kept).filter(|(_, kept)| **kept).map(|(texture, _)| texture).collect()
 }
 

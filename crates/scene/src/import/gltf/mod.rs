@@ -6,14 +6,27 @@
 //!
 //! What is read: node transforms, meshes (one mesh a glTF mesh, however many nodes use it), triangles,
 //! strips and fans, base colour with texture and `KHR_texture_transform` (baked into the coordinates),
-//! `COLOR_0`, metallic and roughness (of a texture, its mean), alpha masks (blending becomes a mask at
-//! 0.5), `KHR_materials_unlit`, `KHR_materials_emissive_strength`, `KHR_lights_punctual` (a spot shines
-//! in all directions) and perspective cameras. Points and lines are skipped. Missing normals are flat,
-//! as the specification asks. Not read: normal and occlusion maps, skins (shown in bind pose), morph
-//! targets, animations, sampler wrap modes (all textures repeat), textures in other than PNG and JPEG.
+//! `COLOR_0`, metallic and roughness with their texture (its mean where its coordinates are not the base
+//! colour's: a vertex has one pair), alpha masks (blending becomes a mask at 0.5), the mean of an emissive
+//! texture, `KHR_materials_unlit`, `KHR_materials_emissive_strength`, `KHR_lights_punctual` and perspective
+//! cameras. Points and lines are skipped. Missing normals are flat, as the specification asks. Not read:
+//! normal and occlusion maps, skins (shown in bind pose), morph targets, animations, sampler wrap modes (all
+//! textures repeat), textures in other than PNG and JPEG.
+//!
+//! Factors of materials that leave their range are brought back into it; one that is not finite is refused.
+//! So is a light with a number that cannot be a light's.
+//!
+//! Lights have no extent, as in the file; their `range`, a hint for culling, is not read. Their intensities
+//! are lux and candela, and how bright a picture becomes is then up to a camera's exposure, which a file does
+//! not have: sunlight of 100,000 lux and a sun of strength 3 are both meant to be seen. Where the light that
+//! arrives at the middle of the bounds from all lights together, with nothing in between and each spot turned
+//! there, is within two stops of what makes a white surface white, it stays as it is. Else all lights are
+//! multiplied by the one number that makes it so: ratios between them stay. Emissive surfaces are not
+//! exposed: in files they are relative to white already.
 
 mod accessors;
 mod container;
+mod lights;
 mod materials;
 mod nodes;
 mod primitives;
@@ -39,6 +52,7 @@ pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<Sou
     materials::read(&root, &buffers, folder, limits, &mut scene)?;
     read_meshes(&root, &buffers, &mut scene)?;
     nodes::read(&root, limits, &mut scene)?;
+    lights::expose(&mut scene);
     Ok(scene)
 }
 

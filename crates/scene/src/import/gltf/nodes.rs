@@ -1,11 +1,10 @@
 //! The node tree: where meshes, lights and cameras are.
 
 use glam::{DAffine3, DMat4, DQuat, DVec3, Mat4, Quat, Vec3};
-use gltf::json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Type as LightType};
-use gltf::json::validation::Checked;
 use gltf::json::{Index, Node, Root, Scene as JsonScene};
 
-use super::super::source_scene::{PlacedCamera, SourceInstance, SourceLight, SourceScene};
+use super::super::source_scene::{PlacedCamera, SourceInstance, SourceScene};
+use super::lights;
 use crate::Limits;
 use crate::error::{Fault, at_most};
 
@@ -61,9 +60,7 @@ fn place(
         }
     }
     if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
-        let light: Option<&JsonLight> = root.get(light.light);
-        let light = light.ok_or_else(|| Fault::malformed(element, "its light does not exist"))?;
-        scene.lights.push(placed_light(light, &source_from_node, element)?);
+        scene.lights.push(lights::placed(root, light.light, &source_from_node, element)?);
     }
     if node.camera.is_some() {
         scene.cameras.extend(placed_camera(root, node, &source_from_node, element)?);
@@ -100,23 +97,6 @@ fn from_parts(node: &Node) -> Option<DAffine3> {
     let length = rotation.length();
     let is_usable = length > 1e-6 && length.is_finite();
     is_usable.then(|| DAffine3::from_scale_rotation_translation(scale, rotation / length, translation))
-}
-
-/// glTF gives lux and candela, which a white surface reflects over a hemisphere: a factor of 1/π.
-fn placed_light(light: &JsonLight, source_from_node: &DAffine3, element: &str) -> Result<SourceLight, Fault> {
-    let colour = Vec3::from(light.color) * light.intensity * std::f32::consts::FRAC_1_PI;
-    match light.type_ {
-        Checked::Valid(LightType::Directional) => {
-            let towards = (source_from_node.matrix3 * DVec3::Z).try_normalize();
-            let towards_light_in_source =
-                towards.ok_or_else(|| Fault::malformed(element, "its light has no direction"))?;
-            Ok(SourceLight::Directional { towards_light_in_source, irradiance_linear: colour })
-        }
-        Checked::Valid(LightType::Point | LightType::Spot) => {
-            Ok(SourceLight::Point { position_in_source: source_from_node.translation, intensity_linear: colour })
-        }
-        Checked::Invalid => Err(Fault::malformed(element, "its light has an unknown type")),
-    }
 }
 
 /// `None` for an orthographic camera. The pose is rigid: a node's scale says nothing about a view.

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
+use super::super::clamped::{all_clamped, clamped};
 use super::super::folder::Folder;
 use super::super::picture::{EncodedPicture, decode_all};
 use super::super::source_scene::SourceScene;
@@ -33,6 +34,10 @@ pub(super) fn read_materials(
     for name in names {
         let Entry { mut material, picture } = known.get(name).cloned().unwrap_or_default();
         material.name.clone_from(name);
+        if material.phong_specular == 0.0 {
+            // No highlight, whatever its exponent, which many programs write all the same.
+            material.roughness = 1.0;
+        }
         material.base_color_texture = picture.map(|file| textures.number_of(&file, folder)).transpose()?.flatten();
         numbers.push(scene.materials.len() as u32);
         scene.materials.push(material);
@@ -96,22 +101,20 @@ impl Material {
 }
 
 /// One or three numbers; writers disagree on whether they are linear, and this takes them as linear, as
-/// the glTF converters do.
+/// the glTF converters do. Negative ones are black.
 fn color(line: &Line) -> Result<Vec3, Fault> {
     if line.rest.starts_with("spectral") || line.rest.starts_with("xyz") {
         return Err(Fault::unsupported(line, "colours other than RGB"));
     }
     let is_grey = line.rest.split_ascii_whitespace().count() == 1;
     let [r, g, b] = floats::<3>(line, 1)?.map(|c| c as f32);
-    let color = if is_grey { Vec3::splat(r) } else { Vec3::new(r, g, b) };
-    let is_valid = color.is_finite() && color.min_element() >= 0.0;
-    if is_valid { Ok(color) } else { Err(Fault::malformed(line, "a colour is negative or not finite")) }
+    let color = if is_grey { [r; 3] } else { [r, g, b] };
+    all_clamped(line, color, 0.0..=f32::MAX).map(Vec3::from)
 }
 
 fn non_negative(line: &Line) -> Result<f32, Fault> {
     let [value] = floats::<1>(line, 1)?;
-    let value = value as f32;
-    if value >= 0.0 && value.is_finite() { Ok(value) } else { Err(Fault::malformed(line, "negative or not finite")) }
+    clamped(line, value as f32, 0.0..=f32::MAX)
 }
 
 /// The name comes after options such as `-s 1 1 1`; without options it may hold spaces.
@@ -132,7 +135,7 @@ impl Textures {
         }
         let element = format!("map_Kd {file}");
         let number = existing(folder.read_name(&element, file))?.map(|bytes| {
-            self.encoded.push(EncodedPicture { element, bytes });
+            self.encoded.push(EncodedPicture { element, bytes, is_srgb: true });
             self.encoded.len() as u32 - 1
         });
         self.number_of_file.insert(file.to_owned(), number);

@@ -1,0 +1,28 @@
+//! Numbers that a file gets slightly wrong.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+
+use crate::error::Fault;
+
+/// `value` in `range`: a colour of −0.01 or a roughness of 1.5 is rounding or a habit of the exporter, and no
+/// reason to refuse a model. What is no number is one.
+pub(crate) fn clamped(element: impl fmt::Display, value: f32, range: RangeInclusive<f32>) -> Result<f32, Fault> {
+    if value.is_finite() {
+        Ok(value.clamp(*range.start(), *range.end()))
+    } else {
+        Err(Fault::malformed(element, "not finite"))
+    }
+}
+
+/// Each of `values`; see [`clamped`].
+pub(crate) fn all_clamped<const N: usize>(
+    element: impl fmt::Display,
+    mut values: [f32; N],
+    range: RangeInclusive<f32>,
+) -> Result<[f32; N], Fault> {
+    for value in &mut values {
+        *value = clamped(&element, *value, range.clone())?;
+    }
+    Ok(values)
+}

@@ -1,0 +1,96 @@
+//! `KHR_lights_punctual`.
+
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
+use std::ops::RangeInclusive;
+
+use depth_image::LightError;
+use glam::{DAffine3, DVec3, Vec3};
+use gltf::json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Spot, Type};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Root};
+
+use super::super::source_scene::{SourceLight, SourceScene};
+use crate::Light;
+use crate::error::Fault;
+
+/// Largest channel of what arrives at the middle of a scene that is taken as it is: two stops to either side
+/// of what makes white white.
+const UNEXPOSED: RangeInclusive<f64> = 0.25..=4.0;
+
+/// No light counts as nearer to the middle than this share of the bounds' diagonal: a lamp in the middle of a
+/// room lights its walls, and nothing is where it is.
+const LEAST_DISTANCE_IN_DIAGONALS: f64 = 0.25;
+/// And than this, in metres, where all of a scene is in one point.
+const LEAST_DISTANCE_M: f64 = 1e-3;
+
+/// Angles over 90° by less than this, radians, are 90°.
+const ANGLE_ROUNDING_RAD: f32 = 1e-3;
+
+/// The light of a node; `element` names the node.
+pub(super) fn placed(
+    root: &Root,
+    index: Index<JsonLight>,
+    source_from_node: &DAffine3,
+    element: &str,
+) -> Result<SourceLight, Fault> {
+    let json = root.get(index).ok_or_else(|| Fault::malformed(element, "its light does not exist"))?;
+    let element = format!("light {}", index.value());
+    let Checked::Valid(kind) = json.type_ else {
+        return Err(Fault::malformed(element, "unknown type"));
+    };
+    let wrong = |e| Fault::light(&element, &e);
+    let color = color(json).map_err(wrong)?;
+    let backwards = (source_from_node.matrix3 * DVec3::Z).try_normalize().map(|v| v.as_vec3());
+    let no_direction = LightError { field: "direction", reason: "its node's transform leaves none" };
+    let backwards = backwards.ok_or(no_direction);
+    let light = match kind {
+        Type::Directional => directional(color, backwards.map_err(wrong)?),
+        Type::Point => Light::Point { position_in_world: Vec3::ZERO, intensity_linear: color, radius_m: 0.0 },
+        Type::Spot => spot(json, color, -backwards.map_err(wrong)?).map_err(wrong)?,
+    };
+    light.validate().map_err(wrong)?;
+    Ok(SourceLight { light, position_in_source: source_from_node.translation })
+}
+
+/// Lux and candela, of which a white surface reflects 1/π into each direction.
+fn color(light: &JsonLight) -> Result<Vec3, LightError> {
+    let color = Vec3::from(light.color);
+    require(color.min_element() >= 0.0 && color.is_finite(), "color", "negative or not finite")?;
+    require(light.intensity >= 0.0 && light.intensity.is_finite(), "intensity", "negative or not finite")?;
+    Ok(color * light.intensity * FRAC_1_PI)
+}
+
+fn directional(irradiance_linear: Vec3, towards_light_in_world: Vec3) -> Light {
+    Light::Directional { towards_light_in_world, irradiance_linear, angular_radius_rad: 0.0 }
+}
+
+fn spot(light: &JsonLight, intensity_linear: Vec3, forward_in_world: Vec3) -> Result<Light, LightError> {
+    let default = Spot { inner_cone_angle: 0.0, outer_cone_angle: std::f32::consts::FRAC_PI_4 };
+    let Spot { inner_cone_angle: inner, outer_cone_angle: outer } = *light.spot.as_ref().unwrap_or(&default);
+    let is_outer_valid = (0.0..FRAC_PI_2 + ANGLE_ROUNDING_RAD).contains(&outer);
+    require(is_outer_valid, "spot.outerConeAngle", "not from 0 to 90 degrees")?;
+    require((0.0..=outer).contains(&inner), "spot.innerConeAngle", "not from 0 to the outer cone's")?;
+    Ok(Light::Spot {
+        position_in_world: Vec3::ZERO,
+        forward_in_world,
+        intensity_linear,
+        inner_cone_rad: inner.min(FRAC_PI_2),
+        outer_cone_rad: outer.min(FRAC_PI_2),
+        radius_m: 0.0,
+    })
+}
+
+fn require(holds: bool, field: &'static str, reason: &'static str) -> Result<(), LightError> {
+    if holds { Ok(()) } else { Err(LightError { field, reason }) }
+}
+
+/// Takes the place of the exposure that a file does not have; see [`super`].
+pub(super) fn expose(scene: &mut SourceScene) {
+    let bounds = scene.bounds_in_source();
+    let least_m = (bounds.diagonal() * LEAST_DISTANCE_IN_DIAGONALS).max(LEAST_DISTANCE_M);
+    let arriving: DVec3 = scene.lights.iter().map(|light| light.arriving_at(bounds.center(), least_m)).sum();
+    let most = arriving.max_element();
+    if most > 0.0 && most.is_finite() && !UNEXPOSED.contains(&most) {
+        scene.lights.iter_mut().for_each(|light| light.scale(most.recip()));
+    }
+}

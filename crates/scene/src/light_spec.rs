@@ -1,0 +1,318 @@
+//! Lights and environments as text, for the command line.
+
+use std::fmt;
+use std::str::FromStr;
+
+use depth_image::{Environment, Light, LightError, linear_from_srgb8};
+use glam::{DVec3, Vec3};
+
+/// A light as text: a kind, then fields in any order, with spaces between.
+///
+/// ```text
+/// sun towards=X,Y,Z [irradiance=V] [angle=DEG]
+/// point at=X,Y,Z [intensity=V] [radius=M]
+/// spot at=X,Y,Z towards=X,Y,Z [intensity=V] [inner=DEG] [outer=DEG] [radius=M]
+/// rectangle at=X,Y,Z u=X,Y,Z v=X,Y,Z [radiance=V]
+/// ```
+///
+/// A colour V is a grey, `R,G,B` in linear RGB, or `#rrggbb` in sRGB. Where it is left out it is 1; a sun is
+/// then as wide as the real one, a spot has glTF's cones (0° and 45°), and lamps are points. A sun's `towards`
+/// is where it stands, a spot's where it shines. `angle` and `radius` are half of what is seen; `u` and `v`
+/// lead from a rectangle's middle to those of two edges, and it shines to the side of `u × v`. Positions are in
+/// metres, in the coordinates of the scene's source: [`Scene::lit_by`](crate::Scene::lit_by) takes them so.
+///
+/// Displayed so that it is parsed as the same light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightSpec(pub Light);
+
+/// An environment as text: one colour as in [`LightSpec`], or two, `ZENITH/NADIR`. Displayed so that it is
+/// parsed as the same.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EnvironmentSpec(pub Environment);
+
+/// Why a text is no light, or no environment. Display reads `field: reason`.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{field}: {kind}")]
+pub struct LightSpecError {
+    /// The field's name as it is written.
+    pub field: String,
+    /// The reason; Display includes it, so it is no source.
+    pub kind: LightSpecErrorKind,
+}
+
+/// What is wrong with a field.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LightSpecErrorKind {
+    /// It is not one of those that there are.
+    #[error("unknown; known are {}", .0.join(", "))]
+    Unknown(&'static [&'static str]),
+    /// It is there twice.
+    #[error("given twice")]
+    Repeated,
+    /// It is needed and not there.
+    #[error("missing")]
+    Missing,
+    /// Its text does not say what it should.
+    #[error("{text:?} is not {expected}")]
+    Malformed {
+        /// What is there.
+        text: String,
+        /// What should be.
+        expected: &'static str,
+    },
+    /// No light can have this value.
+    #[error("{0}")]
+    Invalid(&'static str),
+}
+
+const KINDS: &[&str] = &["sun", "point", "spot", "rectangle"];
+/// Of the sun as seen from here.
+const SUN_RADIUS_DEG: f64 = 0.27;
+/// `KHR_lights_punctual`'s.
+const SPOT_CONES_DEG: [f64; 2] = [0.0, 45.0];
+/// Squared lengths this near to 1 are left as they are: what was normalised once stays the same to the bit.
+const UNIT_TOLERANCE: f64 = 1e-6;
+
+/// The fields of one kind of light to that light.
+type Read = fn(&Fields) -> Result<Light, LightSpecError>;
+
+impl FromStr for LightSpec {
+    type Err = LightSpecError;
+
+    fn from_str(text: &str) -> Result<Self, LightSpecError> {
+        let mut words = text.split_ascii_whitespace();
+        let kind = words.next().ok_or_else(|| wrong("light", LightSpecErrorKind::Missing))?;
+        let (read, known): (Read, &[&str]) = match kind {
+            "sun" => (sun, &["towards", "irradiance", "angle"]),
+            "point" => (point, &["at", "intensity", "radius"]),
+            "spot" => (spot, &["at", "towards", "intensity", "inner", "outer", "radius"]),
+            "rectangle" => (rectangle, &["at", "u", "v", "radiance"]),
+            other => return Err(wrong(other, LightSpecErrorKind::Unknown(KINDS))),
+        };
+        let light = read(&Fields::read(words, known)?)?;
+        light.validate().map_err(|e| invalid(&e))?;
+        Ok(Self(light))
+    }
+}
+
+fn sun(fields: &Fields) -> Result<Light, LightSpecError> {
+    Ok(Light::Directional {
+        towards_light_in_world: fields.direction("towards")?,
+        irradiance_linear: fields.color("irradiance")?,
+        angular_radius_rad: fields.angle_rad("angle", SUN_RADIUS_DEG)?,
+    })
+}
+
+fn point(fields: &Fields) -> Result<Light, LightSpecError> {
+    Ok(Light::Point {
+        position_in_world: fields.vector("at")?.as_vec3(),
+        intensity_linear: fields.color("intensity")?,
+        radius_m: fields.radius_m()?,
+    })
+}
+
+fn spot(fields: &Fields) -> Result<Light, LightSpecError> {
+    Ok(Light::Spot {
+        position_in_world: fields.vector("at")?.as_vec3(),
+        forward_in_world: fields.direction("towards")?,
+        intensity_linear: fields.color("intensity")?,
+        inner_cone_rad: fields.angle_rad("inner", SPOT_CONES_DEG[0])?,
+        outer_cone_rad: fields.angle_rad("outer", SPOT_CONES_DEG[1])?,
+        radius_m: fields.radius_m()?,
+    })
+}
+
+fn rectangle(fields: &Fields) -> Result<Light, LightSpecError> {
+    Ok(Light::Rectangle {
+        center_in_world: fields.vector("at")?.as_vec3(),
+        half_edges_in_world: [fields.vector("u")?.as_vec3(), fields.vector("v")?.as_vec3()],
+        radiance_linear: fields.color("radiance")?,
+    })
+}
+
+impl FromStr for EnvironmentSpec {
+    type Err = LightSpecError;
+
+    fn from_str(text: &str) -> Result<Self, LightSpecError> {
+        let text = text.trim();
+        let environment = match text.split_once('/') {
+            Some((zenith, nadir)) => {
+                Environment { zenith_linear: color_from("zenith", zenith)?, nadir_linear: color_from("nadir", nadir)? }
+            }
+            None => Environment::uniform(color_from("environment", text)?),
+        };
+        Ok(Self(environment))
+    }
+}
+
+/// `name=value` pairs, each known and there once.
+struct Fields<'a>(Vec<(&'a str, &'a str)>);
+
+impl<'a> Fields<'a> {
+    fn read(words: impl Iterator<Item = &'a str>, known: &'static [&'static str]) -> Result<Self, LightSpecError> {
+        let mut fields: Vec<(&str, &str)> = Vec::new();
+        for word in words {
+            let (name, value) = word.split_once('=').unwrap_or((word, ""));
+            if !known.contains(&name) {
+                return Err(wrong(name, LightSpecErrorKind::Unknown(known)));
+            }
+            if fields.iter().any(|(other, _)| *other == name) {
+                return Err(wrong(name, LightSpecErrorKind::Repeated));
+            }
+            fields.push((name, value));
+        }
+        Ok(Self(fields))
+    }
+
+    fn get(&self, name: &str) -> Option<&'a str> {
+        self.0.iter().find(|(other, _)| *other == name).map(|(_, value)| *value)
+    }
+
+    fn vector(&self, name: &str) -> Result<DVec3, LightSpecError> {
+        let text = self.get(name).ok_or_else(|| wrong(name, LightSpecErrorKind::Missing))?;
+        numbers(text).map(DVec3::from).ok_or_else(|| malformed(name, text, "three finite numbers X,Y,Z"))
+    }
+
+    fn direction(&self, name: &str) -> Result<Vec3, LightSpecError> {
+        let vector = self.vector(name)?;
+        if (vector.length_squared() - 1.0).abs() < UNIT_TOLERANCE {
+            return Ok(vector.as_vec3());
+        }
+        let unit =
+            vector.try_normalize().ok_or_else(|| wrong(name, LightSpecErrorKind::Invalid("it has no length")))?;
+        Ok(unit.as_vec3())
+    }
+
+    fn color(&self, name: &str) -> Result<Vec3, LightSpecError> {
+        self.get(name).map_or(Ok(Vec3::ONE), |text| color_from(name, text))
+    }
+
+    fn angle_rad(&self, name: &str, default_deg: f64) -> Result<f32, LightSpecError> {
+        Ok(self.number(name, default_deg)?.to_radians() as f32)
+    }
+
+    fn radius_m(&self) -> Result<f32, LightSpecError> {
+        Ok(self.number("radius", 0.0)? as f32)
+    }
+
+    fn number(&self, name: &str, default: f64) -> Result<f64, LightSpecError> {
+        let Some(text) = self.get(name) else { return Ok(default) };
+        let [number] = numbers(text).ok_or_else(|| malformed(name, text, "a finite number"))?;
+        Ok(number)
+    }
+}
+
+/// `N` numbers between commas, finite in `f32` too.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.parse().ok()).collect();
+    let numbers: [f64; N] = numbers?.try_into().ok()?;
+    numbers.iter().all(|&n| (n as f32).is_finite()).then_some(numbers)
+}
+
+fn color_from(field: &str, text: &str) -> Result<Vec3, LightSpecError> {
+    let grey = || numbers(text).map(|[v]| DVec3::splat(v));
+    let color = srgb_color(text).or_else(|| grey().or_else(|| numbers(text).map(DVec3::from)).map(|c| c.as_vec3()));
+    let color = color.ok_or_else(|| malformed(field, text, "a number, three numbers R,G,B or #rrggbb"))?;
+    let is_light = color.min_element() >= 0.0;
+    if is_light { Ok(color) } else { Err(wrong(field, LightSpecErrorKind::Invalid("negative"))) }
+}
+
+fn srgb_color(text: &str) -> Option<Vec3> {
+    let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
+    let [_, r, g, b] = u32::from_str_radix(digits, 16).ok()?.to_be_bytes();
+    Some(Vec3::from([r, g, b].map(linear_from_srgb8)))
+}
+
+fn wrong(field: &str, kind: LightSpecErrorKind) -> LightSpecError {
+    LightSpecError { field: field.to_owned(), kind }
+}
+
+fn malformed(field: &str, text: &str, expected: &'static str) -> LightSpecError {
+    wrong(field, LightSpecErrorKind::Malformed { text: text.to_owned(), expected })
+}
+
+/// The model's name of a field to the one that is written.
+fn invalid(error: &LightError) -> LightSpecError {
+    let field = match error.field {
+        "towards_light" | "forward" => "towards",
+        "position" | "center" => "at",
+        "angular_radius" => "angle",
+        "inner_cone" => "inner",
+        "outer_cone" => "outer",
+        "half_edges" => "u, v",
+        same => same,
+    };
+    wrong(field, LightSpecErrorKind::Invalid(error.reason))
+}
+
+impl fmt::Display for LightSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Light::Directional { towards_light_in_world: towards, irradiance_linear, angular_radius_rad } => {
+                let angle = Degrees(angular_radius_rad);
+                write!(f, "sun towards={} irradiance={} angle={angle}", Triple(towards), Color(irradiance_linear))
+            }
+            Light::Point { position_in_world, intensity_linear, radius_m } => {
+                let (at, intensity) = (Triple(position_in_world), Color(intensity_linear));
+                write!(f, "point at={at} intensity={intensity} radius={radius_m}")
+            }
+            Light::Spot {
+                position_in_world,
+                forward_in_world,
+                intensity_linear,
+                inner_cone_rad,
+                outer_cone_rad,
+                radius_m,
+            } => {
+                let (at, towards) = (Triple(position_in_world), Triple(forward_in_world));
+                write!(f, "spot at={at} towards={towards} intensity={} ", Color(intensity_linear))?;
+                write!(f, "inner={} outer={} radius={radius_m}", Degrees(inner_cone_rad), Degrees(outer_cone_rad))
+            }
+            Light::Rectangle { center_in_world, half_edges_in_world: [u, v], radiance_linear } => {
+                let (at, u, v) = (Triple(center_in_world), Triple(u), Triple(v));
+                write!(f, "rectangle at={at} u={u} v={v} radiance={}", Color(radiance_linear))
+            }
+        }
+    }
+}
+
+impl fmt::Display for EnvironmentSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Environment { zenith_linear, nadir_linear } = self.0;
+        if zenith_linear == nadir_linear {
+            return Color(zenith_linear).fmt(f);
+        }
+        write!(f, "{}/{}", Color(zenith_linear), Color(nadir_linear))
+    }
+}
+
+struct Triple(Vec3);
+
+impl fmt::Display for Triple {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.0.to_array();
+        write!(f, "{x},{y},{z}")
+    }
+}
+
+/// One number where it is a grey.
+struct Color(Vec3);
+
+impl fmt::Display for Color {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(color) = *self;
+        if color == Vec3::splat(color.x) { write!(f, "{}", color.x) } else { Triple(color).fmt(f) }
+    }
+}
+
+/// Radians, shown with as few decimals as give the same radians again.
+struct Degrees(f32);
+
+impl fmt::Display for Degrees {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let degrees = f64::from(self.0).to_degrees();
+        let rounded = |decimals: i32| (degrees * 10f64.powi(decimals)).round() / 10f64.powi(decimals);
+        let shortest = (0..12).map(rounded).find(|d| d.to_radians() as f32 == self.0);
+        write!(f, "{}", shortest.unwrap_or(degrees))
+    }
+}
