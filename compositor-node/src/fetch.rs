@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use depth_image::DepthImage;
+use depth_image::{DepthImage, SpecularPlanes};
 use node::{Connections, Deadlines, SampleSet, blocking, next_within};
 use tokio::task::JoinSet;
 use tonic::Status;
@@ -42,7 +42,13 @@ pub(crate) async fn fetch_set(
         .into_iter()
         .collect::<Option<_>>()
         .ok_or_else(|| Status::data_loss(format!("sample set {set_index} is not complete")))?;
-    Ok(SampleSet { images: complete, volume: plan.workload.volume, background_linear: plan.workload.background_linear })
+    Ok(SampleSet {
+        images: complete,
+        volume: plan.workload.volume,
+        background_linear: plan.workload.background_linear,
+        illumination: plan.workload.illumination.clone(),
+        lighting: plan.workload.lighting.clone(),
+    })
 }
 
 async fn fetch_share(
@@ -64,7 +70,10 @@ async fn fetch_share(
             continue;
         };
         check(&whole, id, share, &images)?;
-        images.push((whole.image_index, decode(plan, whole).await?));
+        let index = whole.image_index;
+        let image = decode(plan, whole).await?;
+        check_visibility(plan, index, &image)?;
+        images.push((index, image));
     }
     if images.len() == share.image_indices.len() {
         Ok(images)
@@ -82,6 +91,16 @@ fn check(whole: &Reassembled, id: SampleSetId, share: &SamplerShare, have: &[(u3
         return Err(Status::data_loss(format!("image {index} was not asked for, or came twice")));
     }
     Ok(())
+}
+
+/// Highlights find a light's visibility by its place: there is a byte for every light, or none at all.
+fn check_visibility(plan: &Assignment, index: u32, image: &DepthImage) -> Result<(), Status> {
+    let lights = plan.workload.illumination.lights.len();
+    let planes = image.specular.as_ref().map_or(0, |specular| specular.visibility8.len());
+    if planes == 0 || planes == SpecularPlanes::visibility_planes(lights) {
+        return Ok(());
+    }
+    Err(Status::data_loss(format!("image {index} has {planes} planes of visibility for {lights} lights")))
 }
 
 async fn decode(plan: &Arc<Assignment>, whole: Reassembled) -> Result<DepthImage, Status> {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use depth_image::{Aabb, Camera, PinholeCamera};
+use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera};
 use glam::{UVec2, Vec3};
 use tokio::net::TcpListener;
 use tokio_stream::StreamExt as _;
@@ -22,18 +22,42 @@ fn camera() -> Camera {
     Camera::Pinhole(PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(16)))
 }
 
-/// Chunks of two images of set 0 of plan 5, the right ones.
-fn right() -> Vec<Chunk> {
-    let image = DepthImage {
+/// Four lights: with the environment they take two planes of visibility.
+fn illumination() -> Illumination {
+    let lamp = Light::Point { position_in_world: Vec3::Y, intensity_linear: Vec3::ONE, radius_m: 0.1 };
+    Illumination { lights: vec![lamp; 4], environment: Environment::uniform(Vec3::ONE) }
+}
+
+fn dull() -> DepthImage {
+    DepthImage {
         camera: camera(),
         inverse_depth_per_m: vec![0.5; 256],
         color_rgb9e5: (0..256).collect(),
         normal_oct16: None,
         surface_id: None,
+        specular: None,
+    }
+}
+
+/// With so many planes of visibility.
+fn shiny(visibilities: usize) -> DepthImage {
+    let specular = SpecularPlanes {
+        reflectance_srgb8_roughness8: (0..256).rev().collect(),
+        visibility8: vec![vec![u32::MAX; 256]; visibilities],
     };
-    let encoded = encode_depth_image(&image, PlaneSet::ALL).unwrap();
+    DepthImage { normal_oct16: Some(vec![7; 256]), specular: Some(specular), ..dull() }
+}
+
+/// Chunks of two images of set 0 of plan 5.
+fn chunks_of(image: &DepthImage) -> Vec<Chunk> {
+    let encoded = encode_depth_image(image, PlaneSet::ALL).unwrap();
     let id = SampleSetId { plan_epoch: 5, index: 0 };
     (0..2).flat_map(|index| split_into_chunks(id, index, encoded.clone())).collect()
+}
+
+/// The right ones.
+fn right() -> Vec<Chunk> {
+    chunks_of(&dull())
 }
 
 /// Sends chunks as they are, and then says nothing more.
@@ -66,6 +90,8 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::ZERO,
         timeline: Timeline::still(0.0),
+        illumination: illumination(),
+        refinement_steps: 1,
     };
     let share = SamplerShare { node_name: "n7".to_owned(), address, image_indices: vec![0, 1] };
     let plan = Arc::new(Assignment {
@@ -84,6 +110,24 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
 #[tokio::test]
 async fn a_whole_set_arrives() {
     assert_eq!(fetched(right(), false).await.unwrap().images.len(), 2);
+}
+
+#[tokio::test]
+async fn what_highlights_need_arrives() {
+    for visibilities in [0, 2] {
+        let set = fetched(chunks_of(&shiny(visibilities)), false).await.unwrap();
+        assert_eq!(set.illumination, illumination());
+        assert_eq!(set.images, [shiny(visibilities), shiny(visibilities)]);
+    }
+}
+
+#[tokio::test]
+async fn visibility_of_other_lights_is_refused() {
+    for visibilities in [1, 3] {
+        let refused = fetched(chunks_of(&shiny(visibilities)), false).await.expect_err("for other lights");
+        assert_eq!(refused.code(), Code::DataLoss, "{refused}");
+        assert!(refused.message().contains("planes of visibility for 4 lights"), "{refused}");
+    }
 }
 
 #[tokio::test]

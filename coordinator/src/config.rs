@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use depth_image::{Aabb, Camera};
+use depth_image::{Aabb, Camera, Illumination};
 use glam::{DVec3, Vec3};
 use wire::{OfferSettings, OfferStatus, SceneHash, SceneRef};
 
@@ -41,6 +41,8 @@ pub struct SceneOffer {
     pub volume: Aabb,
     /// What rays meet that leave the scene.
     pub background_linear: Vec3,
+    /// What lights the scene: compositors add what of it depends on the viewer.
+    pub illumination: Illumination,
     /// The point of the source file's space that is the world's origin.
     pub origin_in_source: DVec3,
     /// For sessions that have no wish; empty where they may choose.
@@ -57,6 +59,7 @@ impl SceneOffer {
             rig,
             volume,
             background_linear,
+            illumination: Illumination::default(),
             origin_in_source: DVec3::ZERO,
             settings: OfferSettings::default(),
         }

@@ -117,10 +117,11 @@ impl Inner {
     }
 }
 
-/// Costs do not depend on the scene's time.
+/// Costs do not depend on the scene's time, and are those of finished pictures.
 fn timeless(measure: &MeasureCosts) -> MeasureCosts {
     let mut measure = measure.clone();
     measure.workload.timeline = Timeline::still(0.0);
+    measure.workload.refinement_steps = 1;
     measure
 }
 

@@ -31,6 +31,8 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
         volume: request.volume.unwrap_or(offer.volume),
         background_linear: offer.background_linear,
         timeline: request.timeline,
+        illumination: offer.illumination.clone(),
+        refinement_steps: request.refinement_steps,
     })
 }
 

@@ -71,7 +71,7 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::time::Duration;
 
-    use depth_image::{Aabb, Camera, DepthImage, PinholeCamera};
+    use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera};
     use glam::{UVec2, Vec3};
     use wire::{Assignment, PlaneSet, Policy, SceneHash, SceneRef, Timeline, Workload, encode_depth_image};
 
@@ -92,6 +92,8 @@ mod tests {
             volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
             background_linear: Vec3::ZERO,
             timeline: Timeline { start_s: 0.0, step_s: 1.0, set_count: 9 },
+            illumination: Illumination::default(),
+            refinement_steps: 1,
         };
         let plan = Assignment {
             plan_epoch: 1,
@@ -110,6 +112,7 @@ mod tests {
             color_rgb9e5: (0..64).collect(),
             normal_oct16: None,
             surface_id: None,
+            specular: None,
         };
         Arc::new(vec![(0, encode_depth_image(&image, PlaneSet::ALL).unwrap())])
     }

@@ -7,7 +7,7 @@ use node::{CurrentPlan, Engine, NodeConfig, SampleWork, blocking, until_drained}
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Messages, Sampler};
-use wire::{Assignment, Chunk, FetchImages, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
+use wire::{Assignment, Chunk, FetchImages, PlaneSet, Refinement, SampleSetId, encode_depth_image, split_into_chunks};
 
 use crate::kept::{EncodedImages, Kept};
 
@@ -32,7 +32,7 @@ impl SamplerService {
         let content = plan.set_content(set_index).ok_or_else(beyond)?;
         let scene_time_s = plan.workload.timeline.time_s(set_index).ok_or_else(beyond)?;
         let indices = plan.images_of(self.plan.node_name()).to_vec();
-        let work = sample_work(plan, &indices, scene_time_s)?;
+        let work = sample_work(plan, &indices, scene_time_s, plan.workload.refinement(set_index))?;
         let engine = self.engine.clone();
         let key = (content, indices.clone());
         self.kept.get(key, move || blocking(move || sample(engine.as_ref(), &work, &indices))).await
@@ -60,7 +60,12 @@ impl Sampler for SamplerService {
     }
 }
 
-fn sample_work(plan: &Assignment, indices: &[u32], scene_time_s: f32) -> Result<SampleWork, Status> {
+fn sample_work(
+    plan: &Assignment,
+    indices: &[u32],
+    scene_time_s: f32,
+    refinement: Refinement,
+) -> Result<SampleWork, Status> {
     let cameras = indices.iter().map(|&index| plan.workload.sample_cameras.get(index as usize).copied());
     Ok(SampleWork {
         scene_hash: plan.workload.scene.hash.to_string(),
@@ -70,6 +75,7 @@ fn sample_work(plan: &Assignment, indices: &[u32], scene_time_s: f32) -> Result<
         sampling: plan.workload.sampling.clone(),
         lighting: plan.workload.lighting.clone(),
         scene_time_s,
+        refinement,
     })
 }
 
@@ -88,6 +94,7 @@ fn sample(engine: &dyn Engine, work: &SampleWork, indices: &[u32]) -> Result<Enc
     tracing::debug!(
         images = images.len(),
         scene_time_s = work.scene_time_s,
+        refinement_step = work.refinement.step,
         sampled_s,
         total_s = start.elapsed().as_secs_f64(),
         "sampled"

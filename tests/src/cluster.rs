@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use client::{Client, ClientError, Session, ViewRequest};
 use coordinator::{CoordinatorConfig, SceneOffer};
-use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
+use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
 use node::NodeConfig;
 use tokio::net::TcpListener;
@@ -94,6 +94,13 @@ pub fn rig() -> Vec<Camera> {
     [-0.6, 0.0, 0.6].map(|x| Camera::Pinhole(camera(x, UVec2::new(64, 48)))).to_vec()
 }
 
+/// A lamp above the ball, and a sky; the scalar device checks that they arrive and shades with neither.
+#[must_use]
+pub fn illumination() -> Illumination {
+    let lamp = Light::Point { position_in_world: Vec3::Y * 4.0, intensity_linear: Vec3::splat(9.0), radius_m: 0.2 };
+    Illumination { lights: vec![lamp], environment: Environment::uniform(SKY_LINEAR) }
+}
+
 /// A camera in front of the ball.
 #[must_use]
 pub fn camera(x_m: f32, size_px: UVec2) -> PinholeCamera {
@@ -118,6 +125,7 @@ pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
         timeline,
         policy,
         forced_sampler_count: None,
+        refinement_steps: 1,
     }
 }
 
@@ -140,8 +148,9 @@ impl Cluster {
 
     /// As [`Cluster::start`], each node's configuration changed by `change`.
     pub async fn start_with(nodes: usize, change: impl Fn(NodeConfig) -> NodeConfig) -> Self {
-        let offer =
-            SceneOffer::new(package(), rig(), Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) }, SKY_LINEAR);
+        let volume = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) };
+        let mut offer = SceneOffer::new(package(), rig(), volume, SKY_LINEAR);
+        offer.illumination = illumination();
         let coordinator = Server::start(|listener, shutdown| {
             coordinator::serve(listener, CoordinatorConfig::default(), offer, shutdown)
         });

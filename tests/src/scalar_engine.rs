@@ -11,16 +11,21 @@ use depth_image::{
 };
 use glam::{UVec2, Vec2, Vec3};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
+use wire::Refinement;
+
+use crate::cluster::illumination;
 
 /// The floor's colour.
 pub const FLOOR_LINEAR: Vec3 = Vec3::new(0.1, 0.6, 0.2);
 /// What rays meet that leave the scene.
 pub const SKY_LINEAR: Vec3 = Vec3::new(0.0, 0.0, 0.25);
 
-/// The ball's colour tells the scene's time, so that a view of two times shows two colours.
+/// The ball's colour tells the scene's time, and how many steps its light lacks, so that a view of two sets shows two
+/// colours.
 #[must_use]
-pub fn ball_linear(scene_time_s: f32) -> Vec3 {
-    Vec3::new(0.2 + 0.08 * scene_time_s, 0.02, 0.01)
+pub fn ball_linear(scene_time_s: f32, refinement: Refinement) -> Vec3 {
+    let lacks = refinement.steps - 1 - refinement.step;
+    Vec3::new(0.2 + 0.08 * scene_time_s, 0.02, 0.01 + 0.08 * lacks as f32)
 }
 
 /// As it arrives in a view.
@@ -29,8 +34,8 @@ pub fn srgb8(linear: Vec3) -> [u8; 3] {
     linear_from_rgb9e5(rgb9e5_from_linear(linear)).to_array().map(srgb8_from_linear)
 }
 
-/// Images sampled, by scene time and eye: how often.
-pub type SampleCounts = HashMap<([u32; 3], u32), usize>;
+/// Images sampled, by eye, scene time and step: how often.
+pub type SampleCounts = HashMap<([u32; 3], u32, Refinement), usize>;
 
 /// Plain loops. Clones share what they count.
 #[derive(Debug, Clone, Default)]
@@ -48,12 +53,12 @@ struct Meets {
     color_linear: Vec3,
 }
 
-fn ball(ray: &Ray, scene_time_s: f32) -> Option<Meets> {
+fn ball(ray: &Ray, scene_time_s: f32, refinement: Refinement) -> Option<Meets> {
     let center = Vec3::new(scene_time_s * 0.4 - 0.4, 0.6, 0.0);
     let (to_eye, d) = (ray.origin_in_world - center, ray.direction_in_world);
     let (a, b, c) = (d.dot(d), to_eye.dot(d), to_eye.dot(to_eye) - 0.25);
     let t = (-b - (b * b - a * c).sqrt()) / a;
-    (t > 0.0).then_some(Meets { planar_depth_m: t, color_linear: ball_linear(scene_time_s) })
+    (t > 0.0).then_some(Meets { planar_depth_m: t, color_linear: ball_linear(scene_time_s, refinement) })
 }
 
 fn floor(ray: &Ray) -> Option<Meets> {
@@ -61,8 +66,8 @@ fn floor(ray: &Ray) -> Option<Meets> {
     (t > 0.0 && t < 50.0).then_some(Meets { planar_depth_m: t, color_linear: FLOOR_LINEAR })
 }
 
-fn first_met(ray: &Ray, scene_time_s: f32) -> Option<Meets> {
-    let both = [ball(ray, scene_time_s), floor(ray)];
+fn first_met(ray: &Ray, scene_time_s: f32, refinement: Refinement) -> Option<Meets> {
+    let both = [ball(ray, scene_time_s, refinement), floor(ray)];
     both.into_iter().flatten().min_by(|a, b| a.planar_depth_m.total_cmp(&b.planar_depth_m))
 }
 
@@ -70,9 +75,10 @@ fn pixels(size_px: UVec2) -> impl Iterator<Item = Vec2> {
     (0..size_px.y).flat_map(move |y| (0..size_px.x).map(move |x| Vec2::new(x as f32 + 0.5, y as f32 + 0.5)))
 }
 
-fn depth_image(camera: &Camera, scene_time_s: f32) -> DepthImage {
+fn depth_image(camera: &Camera, scene_time_s: f32, refinement: Refinement) -> DepthImage {
     let Camera::Pinhole(pinhole) = camera;
-    let met: Vec<_> = pixels(pinhole.size_px).map(|pixel| first_met(&pinhole.ray(pixel), scene_time_s)).collect();
+    let meets = |pixel| first_met(&pinhole.ray(pixel), scene_time_s, refinement);
+    let met: Vec<_> = pixels(pinhole.size_px).map(meets).collect();
     DepthImage {
         camera: *camera,
         inverse_depth_per_m: met
@@ -85,6 +91,7 @@ fn depth_image(camera: &Camera, scene_time_s: f32) -> DepthImage {
             .collect(),
         normal_oct16: None,
         surface_id: None,
+        specular: None,
     }
 }
 
@@ -146,7 +153,7 @@ fn splat(set: &SampleSet, camera: &PinholeCamera, planes: ViewPlanes) -> View {
 fn draw(camera: &PinholeCamera, scene_time_s: f32, planes: ViewPlanes) -> View {
     let mut canvas = Canvas::new(camera.size_px, SKY_LINEAR);
     for pixel in pixels(camera.size_px) {
-        if let Some(met) = first_met(&camera.ray(pixel), scene_time_s) {
+        if let Some(met) = first_met(&camera.ray(pixel), scene_time_s, Refinement::default()) {
             canvas.put(pixel, met.planar_depth_m, met.color_linear, 0);
         }
     }
@@ -202,14 +209,21 @@ impl Engine for ScalarEngine {
         known("sampling", &request.sampling, "conventional")?;
         known("lighting", &request.lighting, "unlit")?;
         for Camera::Pinhole(camera) in &request.cameras {
-            *locked(&self.counts)
-                .entry((camera.eye_in_world.to_array().map(f32::to_bits), request.scene_time_s.to_bits()))
-                .or_default() += 1;
+            let eye = camera.eye_in_world.to_array().map(f32::to_bits);
+            let image = (eye, request.scene_time_s.to_bits(), request.refinement);
+            *locked(&self.counts).entry(image).or_default() += 1;
         }
-        Ok(request.cameras.iter().map(|camera| depth_image(camera, request.scene_time_s)).collect())
+        let image = |camera| depth_image(camera, request.scene_time_s, request.refinement);
+        Ok(request.cameras.iter().map(image).collect())
     }
 
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        if set.illumination != illumination() {
+            return Err(EngineError::InvalidArgument {
+                field: "illumination",
+                reason: "is not the scene's".to_owned(),
+            });
+        }
         Ok(Arc::new(Uploaded(set.clone())))
     }
 

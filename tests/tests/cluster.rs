@@ -8,13 +8,13 @@ use cluster_tests::cluster::{Cluster, package, request, views};
 use cluster_tests::scalar_engine::{FLOOR_LINEAR, SKY_LINEAR, ball_linear, srgb8};
 use depth_image::ProvenanceKind;
 use node::NodeConfig;
-use wire::{Policy, PolicyChoice, SceneHash, Timeline};
+use wire::{Policy, PolicyChoice, Refinement, SceneHash, SessionRequest, Timeline};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 
-/// The ball shows its own time and no other; floor and sky are there; nothing else is.
-fn shows_only(frame: &Frame, scene_time_s: f32) {
-    let [ball, floor, sky] = [ball_linear(scene_time_s), FLOOR_LINEAR, SKY_LINEAR].map(srgb8);
+/// The ball shows its own time and step and no other; floor and sky are there; nothing else is.
+fn shows_only(frame: &Frame, scene_time_s: f32, refinement: Refinement) {
+    let [ball, floor, sky] = [ball_linear(scene_time_s, refinement), FLOOR_LINEAR, SKY_LINEAR].map(srgb8);
     let mut seen = HashSet::new();
     for pixel in frame.view.srgb8.as_chunks::<3>().0 {
         assert!([ball, floor, sky].contains(pixel), "frame {}: {pixel:?} at {scene_time_s} s", frame.request.frame);
@@ -29,7 +29,7 @@ fn all_came(frames: &[Frame], asked: usize) {
     assert_eq!((frames.len(), numbers.len()), (asked, asked));
     for frame in frames {
         assert_eq!(frame.header.sample_set_id.index, u64::from(frame.request.set_index));
-        shows_only(frame, frame.request.set_index as f32);
+        shows_only(frame, frame.request.set_index as f32, Refinement::default());
         let provenance = frame.view.provenance.as_ref().unwrap();
         assert!(provenance.iter().any(|p| p.kind() == ProvenanceKind::Hit));
         assert_eq!(frame.view.inverse_depth_per_m.as_ref().unwrap().len(), provenance.len());
@@ -118,6 +118,39 @@ async fn a_static_scene_is_sampled_once_for_all_sets_and_plans() {
     let session = cluster.session(still).await.unwrap();
     session.render_views(views(3, 4)).unwrap().all().await.unwrap();
     assert!(cluster.take_counts().is_empty());
+}
+
+/// Four steps over eight sets, by one node and by samplers apart from compositors.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_still_picture_is_refined_step_by_step_and_each_step_sampled_once() {
+    for nodes in [1, 3] {
+        let cluster = Cluster::start(nodes).await;
+        let timeline = Timeline { start_s: 0.0, step_s: 0.0, set_count: 8 };
+        let refined = SessionRequest { refinement_steps: 4, ..request(PolicyChoice::Pipeline, timeline) };
+        let session = cluster.session(refined.clone()).await.unwrap();
+        let plan = &session.plan().assignment;
+        assert!((3..8).all(|set_index| plan.set_content(set_index) == plan.set_content(3)));
+        let frames = session.render_views(views(8, 4)).unwrap().all().await.unwrap();
+        assert_eq!(frames.len(), 32);
+        for frame in &frames {
+            shows_only(frame, 0.0, Refinement { step: frame.request.set_index.min(3), steps: 4 });
+        }
+        assert_eq!(cluster.take_counts(), [1; 12], "four sets of three images, none twice, none ahead of the last");
+        let again = cluster.session(refined).await.unwrap();
+        let last: Vec<_> = views(8, 1).into_iter().filter(|view| view.set_index == 7).collect();
+        let frames = again.render_views(last).unwrap().all().await.unwrap();
+        shows_only(&frames[0], 0.0, Refinement::default());
+        assert!(cluster.take_counts().is_empty(), "a new plan shows what is there");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_moving_picture_is_finished_in_every_set() {
+    let cluster = Cluster::start(2).await;
+    let refined = SessionRequest { refinement_steps: 4, ..request(PolicyChoice::Pipeline, MOVING) };
+    let session = cluster.session(refined).await.unwrap();
+    all_came(&session.render_views(views(3, 4)).unwrap().all().await.unwrap(), 12);
+    assert_eq!(cluster.take_counts(), [1; 9]);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -105,6 +105,9 @@ async fn bad_sessions_are_named() {
     let unknown = wire::SessionRequest { lighting: "moonlight".to_owned(), ..request(PolicyChoice::Auto, MOVING) };
     let error = cluster.session(unknown).await.unwrap_err().to_string();
     assert!(error.contains("lighting: moonlight is unknown"), "{error}");
+    let patient = wire::SessionRequest { refinement_steps: 65, ..request(PolicyChoice::Auto, MOVING) };
+    let error = cluster.session(patient).await.unwrap_err().to_string();
+    assert!(error.contains("refinement_step_count is 65"), "{error}");
     let elsewhere =
         wire::SessionRequest { scene: Some(SceneHash::of(b"other")), ..request(PolicyChoice::Auto, MOVING) };
     assert!(cluster.session(elsewhere).await.unwrap_err().to_string().contains("scene_hash"));

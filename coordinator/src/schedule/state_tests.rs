@@ -1,4 +1,4 @@
-use depth_image::{Aabb, Camera, PinholeCamera};
+use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 use wire::{SceneHash, SceneRef, Timeline};
 
@@ -26,6 +26,8 @@ fn opening(session: u64, policy: PolicyChoice) -> Event {
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::ZERO,
         timeline: Timeline::still(0.0),
+        illumination: Illumination::default(),
+        refinement_steps: 1,
     };
     let costs = Costs {
         sample_image_s: 0.1,

@@ -3,9 +3,10 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, View, ViewPlanes};
 use glam::Vec3;
 use tonic::Status;
+use wire::Refinement;
 
 /// What a node can do on its device. Calls block; services run them on blocking threads. Methods,
 /// sampling and lighting are text, as on the command line, parsed here.
@@ -60,6 +61,8 @@ pub struct SampleWork {
     pub lighting: String,
     /// Where animation stands.
     pub scene_time_s: f32,
+    /// How far its light has come. Any step may be asked for first, or alone.
+    pub refinement: Refinement,
 }
 
 /// The images of one set.
@@ -71,6 +74,10 @@ pub struct SampleSet {
     pub volume: Aabb,
     /// What rays meet that leave the scene.
     pub background_linear: Vec3,
+    /// Of the scene: what highlights are made of, in the order of the images' visibility.
+    pub illumination: Illumination,
+    /// The lighting that the images were sampled with: whose formula highlights follow.
+    pub lighting: String,
 }
 
 /// Views to reconstruct.

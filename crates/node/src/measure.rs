@@ -1,16 +1,22 @@
-//! What operations cost on this node, each alone and warm.
+//! What operations cost on this node, each alone and warm: pictures as they are when finished, by the session's
+//! lighting, so that g_s and g_v hold all the light that samplers compute and c what compositors add.
 
 use std::time::Instant;
 
-use depth_image::{Camera, PinholeCamera, View};
+use depth_image::{Camera, View};
 use tonic::Status;
 use wire::codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet, decode_depth_image, encode_depth_image};
-use wire::{Costs, MeasureCosts, Workload, encode_view};
+use wire::{Costs, MeasureCosts, Refinement, Workload, encode_view};
 
 use crate::{DirectWork, Engine, EngineError, SampleSet, SampleWork, ViewWork};
 
-/// Runs of one operation, after one that does not count.
+/// Runs of one operation, after one that does not count: shaders are built in it.
 const RUNS: usize = 3;
+/// A run that takes longer stays the only one that counts: under heavy light it may take seconds, of which little is
+/// chance.
+const LONG_RUN_S: f64 = 0.5;
+/// Views drawn in one call take about so long at most, unless one alone takes longer.
+const DIRECT_CALL_S: f64 = 1.0;
 
 /// Why costs could not be measured.
 #[derive(Debug, thiserror::Error)]
@@ -38,8 +44,6 @@ impl From<MeasureError> for Status {
 /// Where one of the operations fails.
 pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Costs, MeasureError> {
     let workload = &request.workload;
-    let cameras = vec![request.typical_view; request.batch_count as usize];
-    let views = f64::from(request.batch_count);
     let sample = sample_work(workload);
     let (images, sample_s) = timed(|| Ok(engine.sample(&sample)?))?;
     let encoded = images
@@ -47,14 +51,13 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
         .map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec))
         .collect::<Result<Vec<_>, _>>()?;
     let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?)?))?;
-    let work = ViewWork { cameras: cameras.clone(), method: workload.method.clone(), planes: request.planes };
+    let cameras = vec![request.typical_view; request.batch_count as usize];
+    let work = ViewWork { cameras, method: workload.method.clone(), planes: request.planes };
     let (made, reconstruct_s) = timed(|| Ok(engine.reconstruct(set.as_ref(), &work)?))?;
-    let direct = direct_work(workload, cameras, request);
-    let ((), direct_s) = timed(|| Ok(engine.draw_direct(&direct).map(drop)?))?;
     Ok(Costs {
         sample_image_s: sample_s / images.len().max(1) as f64,
-        direct_view_s: direct_s / views,
-        reconstruct_view_s: reconstruct_s / views,
+        direct_view_s: direct_view_s(engine, request)?,
+        reconstruct_view_s: reconstruct_s / f64::from(request.batch_count),
         load_set_s,
         encode_view_s: encode_s(&made, &workload.codec)?,
     })
@@ -71,13 +74,34 @@ fn sample_work(workload: &Workload) -> SampleWork {
         sampling: workload.sampling.clone(),
         lighting: workload.lighting.clone(),
         scene_time_s: workload.timeline.start_s as f32,
+        refinement: Refinement::default(),
     }
 }
 
-fn direct_work(workload: &Workload, cameras: Vec<PinholeCamera>, request: &MeasureCosts) -> DirectWork {
+/// Measured on as many views as there is time for: fixed costs are shared as in real batches where a view is cheap,
+/// and hardly matter where it is not.
+fn direct_view_s(engine: &dyn Engine, request: &MeasureCosts) -> Result<f64, MeasureError> {
+    let draw = |views: u32| Ok(engine.draw_direct(&direct_work(request, views)).map(drop)?);
+    let ((), alone_s) = timed(|| draw(1))?;
+    let views = direct_views(alone_s, request.batch_count);
+    if views == 1 {
+        return Ok(alone_s);
+    }
+    let ((), direct_s) = timed(|| draw(views))?;
+    Ok(direct_s / f64::from(views))
+}
+
+/// How many views to draw in one call, where one alone takes so long.
+fn direct_views(alone_s: f64, most: u32) -> u32 {
+    // A cast saturates: views that take no time are as many as may be.
+    ((DIRECT_CALL_S / alone_s) as u32).clamp(1, most.max(1))
+}
+
+fn direct_work(request: &MeasureCosts, views: u32) -> DirectWork {
+    let workload = &request.workload;
     DirectWork {
         scene_hash: workload.scene.hash.to_string(),
-        cameras,
+        cameras: vec![request.typical_view; views as usize],
         lighting: workload.lighting.clone(),
         scene_time_s: workload.timeline.start_s as f32,
         planes: request.planes,
@@ -90,7 +114,13 @@ fn decoded(workload: &Workload, encoded: &[EncodedDepthImage]) -> Result<SampleS
         decode_depth_image(&image.header, *camera, &image.payload, &limits).map_err(codec)
     };
     let images = encoded.iter().zip(&workload.sample_cameras).map(decode).collect::<Result<_, _>>()?;
-    Ok(SampleSet { images, volume: workload.volume, background_linear: workload.background_linear })
+    Ok(SampleSet {
+        images,
+        volume: workload.volume,
+        background_linear: workload.background_linear,
+        illumination: workload.illumination.clone(),
+        lighting: workload.lighting.clone(),
+    })
 }
 
 fn encode_s(made: &[View], codec_name: &str) -> Result<f64, MeasureError> {
@@ -100,15 +130,25 @@ fn encode_s(made: &[View], codec_name: &str) -> Result<f64, MeasureError> {
     Ok(seconds)
 }
 
-/// The result of one run that does not count, and the median time of those that do.
+/// The result of one run that does not count, and the median time of those that do: one long run, or [`RUNS`].
+/// How many is judged by the first that counts, for the one before may have spent its time on shaders.
 fn timed<T>(mut run: impl FnMut() -> Result<T, MeasureError>) -> Result<(T, f64), MeasureError> {
     let result = run()?;
     let mut seconds = Vec::with_capacity(RUNS);
-    for _ in 0..RUNS {
+    while seconds.len() < runs_after(seconds.first().copied()) {
         let start = Instant::now();
         run()?;
         seconds.push(start.elapsed().as_secs_f64());
     }
     seconds.sort_by(f64::total_cmp);
-    Ok((result, seconds[RUNS / 2]))
+    Ok((result, seconds[seconds.len() / 2]))
 }
+
+/// Runs that count, where the first took so long.
+fn runs_after(first_s: Option<f64>) -> usize {
+    if first_s.is_some_and(|first_s| first_s > LONG_RUN_S) { 1 } else { RUNS }
+}
+
+#[cfg(test)]
+#[path = "measure_tests.rs"]
+mod tests;

@@ -89,7 +89,7 @@ impl CurrentPlan {
 
 #[cfg(test)]
 mod tests {
-    use depth_image::Aabb;
+    use depth_image::{Aabb, Illumination};
     use glam::Vec3;
     use wire::{Policy, SceneHash, SceneRef, Timeline, Workload};
 
@@ -106,6 +106,8 @@ mod tests {
             volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
             background_linear: Vec3::ZERO,
             timeline: Timeline::still(0.0),
+            illumination: Illumination::default(),
+            refinement_steps: 1,
         };
         Assignment { plan_epoch, policy: Policy::Direct, workload, samplers: Vec::new(), compositors: Vec::new() }
     }

@@ -4,11 +4,11 @@
 //!
 //! Without arguments it takes a made-up tree over terrain; a file holds inverse depths per metre as
 //! little-endian `f32`, rows top-down, 0 for background, negative for holes. Speeds are of the 16-bit
-//! plane's bytes (colour: 32-bit; frames: 24-bit), quantising and LZ4 included, medians.
+//! plane's bytes (colour and what highlights need: 32-bit; frames: 24-bit), quantising and LZ4 included, medians.
 
 use std::{error::Error, hint::black_box, time::Instant};
 
-use depth_image::{Camera, DepthImage, PinholeCamera, rgb9e5_from_linear};
+use depth_image::{Camera, DepthImage, PinholeCamera, SpecularPlanes, rgb9e5_from_linear};
 use glam::{UVec2, Vec3};
 use wire::{
     DecodeLimits, FrameCodec, PlaneSet, decode_depth_image, decode_depth_plane, decode_frame, encode_depth_image,
@@ -48,6 +48,14 @@ fn report(name: &str, plane: &[f32], width: u32, height: u32) -> Result<(), Box<
     };
     let colors: Vec<Vec3> = plane.iter().map(shade).collect();
     report_color(&format!("{name} {width}×{height} colour"), plane, &colors, width, height)?;
+    for (what, words) in [
+        ("reflectance", reflectance(plane, &mut random)),
+        ("visibility, 16 rays", visibility(plane, width as usize, 16, &mut random)),
+        ("visibility, 256 rays", visibility(plane, width as usize, 256, &mut random)),
+        ("visibility, hard", visibility(plane, width as usize, 1, &mut random)),
+    ] {
+        report_words(&format!("{name} {width}×{height} {what}"), plane, words, width, height)?;
+    }
     report_frame(&format!("{name} {width}×{height} frame"), &colors, width, height)
 }
 
@@ -64,14 +72,8 @@ fn report_depth(name: &str, plane: &[f32], width: u32, height: u32) -> Result<()
 
 /// The colour plane's share of a whole image: what it adds to an image without colours.
 fn report_color(name: &str, plane: &[f32], colors: &[Vec3], width: u32, height: u32) -> Result<(), Box<dyn Error>> {
-    let size_px = UVec2::new(width, height);
-    let image = DepthImage {
-        camera: Camera::Pinhole(PinholeCamera::looking_at(Vec3::Y, Vec3::ZERO, Vec3::Y, 0.8, size_px)),
-        inverse_depth_per_m: plane.to_vec(),
-        color_rgb9e5: colors.iter().map(|&color| rgb9e5_from_linear(color)).collect(),
-        normal_oct16: None,
-        surface_id: None,
-    };
+    let color_rgb9e5 = colors.iter().map(|&color| rgb9e5_from_linear(color)).collect();
+    let image = DepthImage { color_rgb9e5, ..black(plane, width, height) };
     let limits = DecodeLimits::default();
     let encoded = encode_depth_image(&image, PlaneSet::ALL)?;
     let decode = || decode_depth_image(&encoded.header, image.camera, &encoded.payload, &limits);
@@ -84,6 +86,62 @@ fn report_color(name: &str, plane: &[f32], colors: &[Vec3], width: u32, height: 
     let raw: Vec<u8> = image.color_rgb9e5.iter().flat_map(|color| color.to_le_bytes()).collect();
     print_row(name, &raw, encoded.payload.len() - depth.packed.len(), encode_s, decode_s);
     Ok(())
+}
+
+fn black(plane: &[f32], width: u32, height: u32) -> DepthImage {
+    let size_px = UVec2::new(width, height);
+    DepthImage {
+        camera: Camera::Pinhole(PinholeCamera::looking_at(Vec3::Y, Vec3::ZERO, Vec3::Y, 0.8, size_px)),
+        inverse_depth_per_m: plane.to_vec(),
+        color_rgb9e5: vec![0; plane.len()],
+        normal_oct16: None,
+        surface_id: None,
+        specular: None,
+    }
+}
+
+/// Two materials by depth, one of them of uneven roughness; nothing where there is no sample.
+fn reflectance(plane: &[f32], random: &mut test_planes::Random) -> Vec<u32> {
+    let mut word = |&inverse: &f32| match inverse {
+        inverse if inverse <= 0.0 => 0,
+        inverse if inverse * 40.0 % 2.0 < 1.0 => 0x6038_3838,
+        inverse => ((150.0 + 20.0 * (inverse * 90.0).sin() + 6.0 * random.unit()) as u32) << 24 | 0x0038_3838,
+    };
+    plane.iter().map(&mut word).collect()
+}
+
+/// Shares of four lights by so many rays; one ray from the light's middle casts a hard shadow.
+fn visibility(plane: &[f32], width: usize, rays: u32, random: &mut test_planes::Random) -> Vec<u32> {
+    let mut share = |at: usize, light: usize| {
+        let (x, y) = ((at % width) as f32 / width as f32, (at / width) as f32 / width as f32);
+        let lit = ((x * 9.0 + light as f32).sin() + (y * 13.0 + plane[at]).cos()) * 2.0 + 0.5;
+        let seen = (0..rays).filter(|_| if rays == 1 { lit > 0.5 } else { random.unit() < lit }).count();
+        seen as u32 * 255 / rays
+    };
+    let mut word = |at| (0..4).fold(0, |word, light| word | share(at, light) << (8 * light));
+    (0..plane.len()).map(|at| if plane[at] > 0.0 { word(at) } else { 0 }).collect()
+}
+
+/// A plane of four bytes a texel: what it adds to an image without highlights. Raw are its samples alone.
+fn report_words(name: &str, plane: &[f32], words: Vec<u32>, width: u32, height: u32) -> Result<(), Box<dyn Error>> {
+    let samples = plane.iter().zip(&words).filter(|(inverse, _)| **inverse > 0.0);
+    let raw: Vec<u8> = samples.flat_map(|(_, word)| word.to_le_bytes()).collect();
+    let dull = DepthImage { normal_oct16: Some(vec![0; plane.len()]), ..black(plane, width, height) };
+    let specular = SpecularPlanes { reflectance_srgb8_roughness8: words, visibility8: Vec::new() };
+    let shiny = DepthImage { specular: Some(specular), ..dull.clone() };
+    let (without, with) = (image_costs(&dull)?, image_costs(&shiny)?);
+    print_row(name, &raw, with.0 - without.0, with.1 - without.1, with.2 - without.2);
+    Ok(())
+}
+
+/// Bytes, and seconds to encode and decode.
+fn image_costs(image: &DepthImage) -> Result<(usize, f64, f64), Box<dyn Error>> {
+    let limits = DecodeLimits::default();
+    let encoded = encode_depth_image(image, PlaneSet::ALL)?;
+    let decode = || decode_depth_image(&encoded.header, image.camera, &encoded.payload, &limits);
+    decode()?;
+    let encode_s = median_secs(|| drop(black_box(encode_depth_image(image, PlaneSet::ALL))));
+    Ok((encoded.payload.len(), encode_s, median_secs(|| drop(black_box(decode())))))
 }
 
 fn report_frame(name: &str, colors: &[Vec3], width: u32, height: u32) -> Result<(), Box<dyn Error>> {

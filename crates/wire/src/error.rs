@@ -1,6 +1,6 @@
 //! Why a message is refused. Every kind names the field.
 
-use depth_image::CameraError;
+use depth_image::{CameraError, LightError};
 use tonic::Status;
 
 use crate::codec::ChunkError;
@@ -22,6 +22,14 @@ pub enum WireError {
         field: &'static str,
         /// Why.
         source: CameraError,
+    },
+    /// A light that cannot be.
+    #[error("{field}: {source}")]
+    Light {
+        /// Which.
+        field: &'static str,
+        /// Why.
+        source: LightError,
     },
     /// More entries or bytes than any peer needs.
     #[error("{field} has {count}, at most {limit} are allowed")]

@@ -1,9 +1,17 @@
 //! What any peer may ask for. Checked before anything is allocated.
 
+use depth_image::SpecularPlanes;
+
 use crate::error::{WireError, at_most};
 
 /// Sample cameras of one set; provenance has room for 24.
 pub const MAX_SAMPLE_CAMERAS: usize = 16;
+/// Lights of one scene.
+pub const MAX_LIGHTS: usize = 255;
+/// Planes of visibility of one sample image: one byte for the environment and each light.
+pub const MAX_VISIBILITY_PLANES: usize = SpecularPlanes::visibility_planes(MAX_LIGHTS);
+/// Steps in which a still picture's light is refined.
+pub const MAX_REFINEMENT_STEPS: u32 = 64;
 /// Views of one request.
 pub const MAX_VIEWS_PER_REQUEST: usize = 4096;
 /// Views of one sample set in a session.

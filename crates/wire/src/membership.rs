@@ -130,7 +130,7 @@ pub struct MeasureCosts {
     pub workload: Workload,
     /// The view that is reconstructed and drawn.
     pub typical_view: PinholeCamera,
-    /// Views of one call.
+    /// Most views of one call: fewer are drawn directly where they take long.
     pub batch_count: u32,
     /// Planes of the views.
     pub planes: ViewPlanes,

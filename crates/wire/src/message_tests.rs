@@ -1,12 +1,38 @@
 //! Bad messages are refused with the field's name; good ones come back as they were.
 
-use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
+use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
 
 use crate::*;
 
 fn camera() -> PinholeCamera {
     PinholeCamera::looking_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(40, 30))
+}
+
+fn illumination() -> Illumination {
+    let (position_in_world, intensity_linear) = (Vec3::new(0.0, 4.0, 1.0), Vec3::new(3.0, 2.0, 1.0));
+    let lights = vec![
+        Light::Directional {
+            towards_light_in_world: Vec3::Y,
+            irradiance_linear: Vec3::splat(0.5),
+            angular_radius_rad: 0.01,
+        },
+        Light::Point { position_in_world, intensity_linear, radius_m: 0.0 },
+        Light::Spot {
+            position_in_world,
+            forward_in_world: Vec3::NEG_Y,
+            intensity_linear,
+            inner_cone_rad: 0.1,
+            outer_cone_rad: 0.2,
+            radius_m: 0.3,
+        },
+        Light::Rectangle {
+            center_in_world: position_in_world,
+            half_edges_in_world: [Vec3::X, Vec3::Z * 2.0],
+            radiance_linear: Vec3::ONE,
+        },
+    ];
+    Illumination { lights, environment: Environment { zenith_linear: Vec3::ONE, nadir_linear: Vec3::splat(0.1) } }
 }
 
 fn workload() -> Workload {
@@ -20,6 +46,8 @@ fn workload() -> Workload {
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::splat(0.2),
         timeline: Timeline { start_s: 1.0, step_s: 0.5, set_count: 3 },
+        illumination: illumination(),
+        refinement_steps: 1,
     }
 }
 
@@ -53,6 +81,7 @@ fn request() -> SessionRequest {
         timeline: Timeline::still(0.0),
         policy: PolicyChoice::Auto,
         forced_sampler_count: None,
+        refinement_steps: 4,
     }
 }
 
@@ -134,6 +163,82 @@ fn bad_counts_are_refused() {
     assert!(spoilt(&|m| m.timeline.as_mut().unwrap().step_s = f64::NAN).contains("step_s"));
     assert!(spoilt(&|m| m.timeline = None).contains("timeline"));
     assert!(spoilt(&|m| m.scene_hash = "../scene".to_owned()).contains("scene_hash"));
+    assert!(spoilt(&|m| m.refinement_step_count = 65).contains("refinement_step_count is 65"));
+}
+
+#[test]
+fn without_a_wish_every_set_is_finished() {
+    let message = proto::OpenSessionRequest { refinement_step_count: 0, ..request().into() };
+    assert_eq!(SessionRequest::try_from(message).map(|request| request.refinement_steps), Ok(1));
+}
+
+fn spoilt_workload(spoil: impl FnOnce(&mut proto::Workload)) -> String {
+    let mut message = proto::Workload::from(workload());
+    spoil(&mut message);
+    refusal::<_, Workload>(message)
+}
+
+fn spoilt_light(place: usize, spoil: impl FnOnce(&mut proto::light::Kind)) -> String {
+    spoilt_workload(|w| spoil(w.illumination.as_mut().unwrap().lights[place].kind.as_mut().unwrap()))
+}
+
+#[test]
+fn bad_lights_are_refused() {
+    use proto::light::Kind;
+
+    assert!(spoilt_workload(|w| w.illumination = None).contains("workload.illumination is missing"));
+    assert!(spoilt_workload(|w| w.refinement_step_count = 0).contains("refinement_step_count is 0"));
+    let spoilt = |spoil: fn(&mut proto::Illumination)| spoilt_workload(|w| spoil(w.illumination.as_mut().unwrap()));
+    assert!(spoilt(|i| i.environment = None).contains("illumination.environment is missing"));
+    assert!(spoilt(|i| i.lights = vec![i.lights[0]; 256]).contains("illumination.lights has 256"));
+    assert!(spoilt(|i| i.lights[2].kind = None).contains("light.kind is missing"));
+    let zenith = |x| {
+        spoilt_workload(|w| {
+            let environment = w.illumination.as_mut().unwrap().environment.as_mut().unwrap();
+            environment.zenith_linear_rgb.as_mut().unwrap().x = x;
+        })
+    };
+    assert!(zenith(f32::NAN).contains("zenith_linear_rgb"));
+    assert!(zenith(-1.0).contains("illumination.environment: zenith: negative"));
+    let directional = |spoil: fn(&mut proto::DirectionalLight)| {
+        spoilt_light(0, |kind| match kind {
+            Kind::Directional(light) => spoil(light),
+            other => panic!("{other:?}"),
+        })
+    };
+    assert!(directional(|l| l.irradiance_linear_rgb = None).contains("irradiance_linear_rgb is missing"));
+    assert!(directional(|l| l.angular_radius_rad = 2.0).contains("light.directional: angular_radius"));
+    assert!(
+        directional(|l| l.towards_light_in_world_unit.as_mut().unwrap().x = 1.0)
+            .contains("light.directional: towards_light: not a unit vector")
+    );
+    let spot = spoilt_light(2, |kind| match kind {
+        Kind::Spot(light) => light.inner_cone_rad = f32::NAN,
+        other => panic!("{other:?}"),
+    });
+    assert!(spot.contains("light.spot: inner_cone"), "{spot}");
+}
+
+#[test]
+fn as_many_lights_as_have_a_plane_come_back() {
+    let light = illumination().lights[1];
+    let most = Illumination { lights: vec![light; limits::MAX_LIGHTS], ..illumination() };
+    assert_eq!(limits::MAX_VISIBILITY_PLANES, 64);
+    assert_eq!(Illumination::try_from(proto::Illumination::from(most.clone())), Ok(most));
+}
+
+#[test]
+fn a_still_picture_is_refined_set_by_set_and_a_moving_one_is_finished() {
+    let steps = |refinement_steps, step_s| {
+        let timeline = Timeline { start_s: 0.0, step_s, set_count: 8 };
+        let workload = Workload { refinement_steps, timeline, ..workload() };
+        (0..8).map(|set_index| workload.refinement(set_index)).collect::<Vec<_>>()
+    };
+    let of_4 = |step| Refinement { step, steps: 4 };
+    assert_eq!(steps(4, 0.0), [0, 1, 2, 3, 3, 3, 3, 3].map(of_4));
+    assert_eq!(steps(4, 0.1), [of_4(3); 8]);
+    assert_eq!(steps(1, 0.0), [Refinement::default(); 8]);
+    assert!(of_4(3).is_last() && !of_4(2).is_last() && Refinement::default().is_last());
 }
 
 #[test]
@@ -179,6 +284,9 @@ fn set_content_names_what_a_set_shows() {
     assert_ne!(id(&|a| a.workload.timeline.step_s = 0.6), same);
     assert_ne!(id(&|a| a.workload.lighting = "unlit".to_owned()), same);
     assert_ne!(id(&|a| a.workload.sample_cameras.truncate(1)), same);
+    assert_ne!(id(&|a| a.workload.refinement_steps = 2), same);
+    assert_ne!(id(&|a| a.workload.illumination.lights.truncate(3)), same);
+    assert_ne!(id(&|a| a.workload.illumination.environment = Environment::default()), same);
     assert_eq!((assignment().set_content(3), assignment().sample_set_id(3)), (None, None));
     let still = |index| {
         Assignment {
@@ -188,6 +296,11 @@ fn set_content_names_what_a_set_shows() {
         .set_content(index)
     };
     assert_eq!(still(0), still(2), "a static scene has one set");
+    let timeline = Timeline { step_s: 0.0, set_count: 8, ..workload().timeline };
+    let refined = Assignment { workload: Workload { timeline, refinement_steps: 4, ..workload() }, ..assignment() };
+    let contents: Vec<_> = (0..8).map(|set_index| refined.set_content(set_index).unwrap()).collect();
+    assert!((0..3).all(|i| !contents[i + 1..].contains(&contents[i])), "each step is another");
+    assert!(contents[3..].iter().all(|content| *content == contents[3]), "the last stays");
 }
 
 #[test]

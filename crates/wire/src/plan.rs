@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use prost::Message as _;
+
 use crate::codec::SampleSetId;
 use crate::error::{WireError, at_most, required};
 use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS, nonempty};
@@ -62,8 +64,8 @@ pub struct CompositorShare {
     pub address: String,
 }
 
-/// What a sample set shows: equal for equal scene, time, cameras, sampling, lighting and volume, whatever
-/// the plan. What has not changed is known by it and not sampled again.
+/// What a sample set shows: equal for equal scene, time, cameras, sampling, lighting, step of refinement, lights
+/// and volume, whatever the plan. What has not changed is known by it and not sampled again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SetContent([u8; 32]);
 
@@ -119,8 +121,12 @@ impl Assignment {
         for v in [workload.volume.min, workload.volume.max, workload.background_linear] {
             hash.update(&v.to_array().map(f32::to_le_bytes).concat());
         }
+        let refinement = workload.refinement(set_index);
+        hash.update(&refinement.step.to_le_bytes()).update(&refinement.steps.to_le_bytes());
+        let illumination: proto::Illumination = workload.illumination.clone().into();
+        hash.update(&illumination.encode_length_delimited_to_vec());
         for camera in &workload.sample_cameras {
-            hash.update(&prost::Message::encode_to_vec(&crate::geometry::camera_to(camera)));
+            hash.update(&crate::geometry::camera_to(camera).encode_to_vec());
         }
         Some(SetContent(hash.finalize().into()))
     }

@@ -5,11 +5,11 @@ use crate::codec::{
     SampleSetId,
 };
 use crate::error::{WireError, at_most, required};
-use crate::limits::MAX_SAMPLE_CAMERAS;
+use crate::limits::{MAX_SAMPLE_CAMERAS, MAX_VISIBILITY_PLANES};
 use crate::proto;
 
-/// One of each kind.
-const MAX_PLANES: usize = 4;
+/// One of each kind, but for visibility.
+const MAX_PLANES: usize = 5 + MAX_VISIBILITY_PLANES;
 
 /// Asks for encoded images of one set.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -117,6 +117,8 @@ impl TryFrom<proto::PlaneHeader> for PlaneHeader {
             Ok(proto::PlaneKind::ColorRgb9e5) => PlaneKind::ColorRgb9e5,
             Ok(proto::PlaneKind::NormalOct16) => PlaneKind::NormalOct16,
             Ok(proto::PlaneKind::SurfaceId) => PlaneKind::SurfaceId,
+            Ok(proto::PlaneKind::ReflectanceRoughness8) => PlaneKind::ReflectanceRoughness8,
+            Ok(proto::PlaneKind::Visibility8) => PlaneKind::Visibility8,
             _ => {
                 return Err(WireError::UnknownEnum { field: "planes.kind", value: p.kind });
             }
@@ -139,6 +141,8 @@ impl From<PlaneHeader> for proto::PlaneHeader {
             PlaneKind::ColorRgb9e5 => proto::PlaneKind::ColorRgb9e5,
             PlaneKind::NormalOct16 => proto::PlaneKind::NormalOct16,
             PlaneKind::SurfaceId => proto::PlaneKind::SurfaceId,
+            PlaneKind::ReflectanceRoughness8 => proto::PlaneKind::ReflectanceRoughness8,
+            PlaneKind::Visibility8 => proto::PlaneKind::Visibility8,
         };
         let encoding = match p.encoding {
             PlaneEncoding::SlopeTaggedLz4 => proto::PlaneEncoding::SlopeTaggedLz4,

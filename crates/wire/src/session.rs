@@ -6,6 +6,7 @@ use glam::UVec2;
 use crate::error::{WireError, required};
 use crate::geometry::{bounds_from, bounds_to, camera_to, pinhole_from, pinhole_to, sample_cameras_from};
 use crate::limits::{MAX_VIEWS_PER_SET, nonempty, reason, seconds};
+use crate::workload::refinement_steps_from;
 use crate::{Assignment, Costs, SceneHash, Timeline, proto};
 
 /// What the client wants to happen.
@@ -70,6 +71,9 @@ pub struct SessionRequest {
     pub policy: PolicyChoice,
     /// K, instead of the balance formula's.
     pub forced_sampler_count: Option<u32>,
+    /// Steps in which a still picture is refined, one a set; see [`Workload::refinement`](crate::Workload::refinement).
+    /// From 1, where every set is finished, to [`MAX_REFINEMENT_STEPS`](crate::limits::MAX_REFINEMENT_STEPS).
+    pub refinement_steps: u32,
 }
 
 impl TryFrom<proto::OpenSessionRequest> for SessionRequest {
@@ -94,6 +98,7 @@ impl TryFrom<proto::OpenSessionRequest> for SessionRequest {
             timeline: required(r.timeline, "timeline")?.try_into()?,
             policy: PolicyChoice::from_wire(r.policy_choice)?,
             forced_sampler_count: (r.forced_sampler_count > 0).then_some(r.forced_sampler_count),
+            refinement_steps: refinement_steps_from(r.refinement_step_count.max(1))?,
         })
     }
 }
@@ -116,6 +121,7 @@ impl From<SessionRequest> for proto::OpenSessionRequest {
             timeline: Some(r.timeline.into()),
             policy_choice: r.policy.to_wire(),
             forced_sampler_count: r.forced_sampler_count.unwrap_or(0),
+            refinement_step_count: r.refinement_steps,
         }
     }
 }

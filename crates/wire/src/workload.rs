@@ -1,11 +1,11 @@
 //! What a session samples, and what operations cost.
 
-use depth_image::{Aabb, Camera};
+use depth_image::{Aabb, Camera, Illumination};
 use glam::Vec3;
 
 use crate::error::{WireError, required};
 use crate::geometry::{bounds_from, bounds_to, camera_to, sample_cameras_from, vec3_from, vec3_to};
-use crate::limits::{MAX_SETS, nonempty, seconds};
+use crate::limits::{MAX_REFINEMENT_STEPS, MAX_SETS, nonempty, seconds};
 use crate::{SceneRef, proto};
 
 /// Scene times of the sample sets.
@@ -24,6 +24,12 @@ impl Timeline {
     #[must_use]
     pub fn still(at_s: f64) -> Self {
         Self { start_s: at_s, step_s: 0.0, set_count: 1 }
+    }
+
+    /// Whether sets differ in scene time.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.step_s != 0.0
     }
 
     /// Scene time of a set; `None` beyond the last.
@@ -57,6 +63,37 @@ impl From<Timeline> for proto::Timeline {
     }
 }
 
+/// How far the light of a set has come: with every step it is sampled with more rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Refinement {
+    /// From 0 to `steps - 1`, which is full quality.
+    pub step: u32,
+    /// At least 1.
+    pub steps: u32,
+}
+
+impl Default for Refinement {
+    /// Full quality at once.
+    fn default() -> Self {
+        Self { step: 0, steps: 1 }
+    }
+}
+
+impl Refinement {
+    /// The last of so many steps; 0 counts as 1.
+    #[must_use]
+    pub const fn last_of(steps: u32) -> Self {
+        let step = steps.saturating_sub(1);
+        Self { step, steps: step + 1 }
+    }
+
+    /// Whether this is full quality.
+    #[must_use]
+    pub const fn is_last(&self) -> bool {
+        self.step + 1 >= self.steps
+    }
+}
+
 /// What is sampled, when and how. Methods are text, as on the command line: nodes parse them, so that
 /// a new method changes nothing here.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +116,30 @@ pub struct Workload {
     pub background_linear: Vec3,
     /// Scene times.
     pub timeline: Timeline,
+    /// The scene's: compositors add what depends on the viewer.
+    pub illumination: Illumination,
+    /// Steps in which a still picture is refined: from 1, finished at once, to [`MAX_REFINEMENT_STEPS`].
+    pub refinement_steps: u32,
+}
+
+impl Workload {
+    /// What step a set shows. Where nothing moves, one step more from set to set up to the last, at which it
+    /// stays; sets beyond it are equal and are not sampled again. A timeline that ends before shows no finished
+    /// set. A scene that moves has no time for steps: each set shows the last. So do views drawn directly.
+    #[must_use]
+    pub fn refinement(&self, set_index: u32) -> Refinement {
+        let last = Refinement::last_of(self.refinement_steps);
+        if self.timeline.moves() { last } else { Refinement { step: set_index.min(last.step), ..last } }
+    }
+}
+
+/// From 1 to the limit.
+pub(crate) fn refinement_steps_from(count: u32) -> Result<u32, WireError> {
+    if (1..=MAX_REFINEMENT_STEPS).contains(&count) {
+        Ok(count)
+    } else {
+        Err(WireError::out_of_range("refinement_step_count", count, "from 1 to 64"))
+    }
 }
 
 impl TryFrom<proto::Workload> for Workload {
@@ -95,6 +156,8 @@ impl TryFrom<proto::Workload> for Workload {
             volume: bounds_from(required(w.volume, "workload.volume")?)?,
             background_linear: vec3_from(w.background_linear_rgb, "background_linear_rgb")?,
             timeline: required(w.timeline, "workload.timeline")?.try_into()?,
+            illumination: required(w.illumination, "workload.illumination")?.try_into()?,
+            refinement_steps: refinement_steps_from(w.refinement_step_count)?,
         })
     }
 }
@@ -111,6 +174,8 @@ impl From<Workload> for proto::Workload {
             volume: Some(bounds_to(&w.volume)),
             background_linear_rgb: vec3_to(w.background_linear),
             timeline: Some(w.timeline.into()),
+            illumination: Some(w.illumination.into()),
+            refinement_step_count: w.refinement_steps,
         }
     }
 }

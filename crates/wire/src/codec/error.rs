@@ -54,12 +54,20 @@ pub struct DecodeLimits {
     pub max_texels: usize,
     /// Packed bytes of one image, all planes.
     pub max_payload_bytes: usize,
+    /// Bytes of one image before any packing, all planes: what packs best would take the most memory.
+    pub max_image_bytes: usize,
 }
 
 impl Default for DecodeLimits {
-    /// 16 million texels, 256 MiB: some fifty times what the largest planned sample image needs.
+    /// 16 million texels, 256 MiB packed: some fifty times what the largest planned sample image needs. 1 GiB
+    /// unpacked: all lights' visibility at 1920×1080 takes half of that.
     fn default() -> Self {
-        Self { max_side_px: MAX_IMAGE_SIDE_PX, max_texels: 1 << 24, max_payload_bytes: 256 << 20 }
+        Self {
+            max_side_px: MAX_IMAGE_SIDE_PX,
+            max_texels: 1 << 24,
+            max_payload_bytes: 256 << 20,
+            max_image_bytes: 1 << 30,
+        }
     }
 }
 

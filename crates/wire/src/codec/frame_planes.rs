@@ -22,7 +22,7 @@ pub fn pack_u32_plane(words: &[u32]) -> Vec<u8> {
 /// # Errors
 /// Data that does not decode to exactly so many.
 pub fn unpack_u32_plane(data: &[u8], texels: usize) -> Result<Vec<u32>, DecodeError> {
-    let packed = expand_lz4_up_to(data, max_words_bytes(texels), "plane")?;
+    let packed = expand_lz4_up_to(data, max_words_bytes(texels, WordLayout::Whole), "plane")?;
     let mut input = &packed[..];
     let words = unpack_words(&mut input, texels, WordLayout::Whole)?;
     if input.is_empty() { Ok(words) } else { Err(DecodeError::Corrupt { field: "plane", reason: "bytes left over" }) }

@@ -1,7 +1,7 @@
 //! A depth image to header and payload, and back.
 
 use bytes::Bytes;
-use depth_image::{Camera, DepthImage, SurfaceId};
+use depth_image::{Camera, DepthImage, DepthImageError, SpecularPlanes, SurfaceId};
 
 use super::{
     DecodeError, DecodeLimits, ImageHeader, PlaneHeader, PlaneKind, PlaneSet,
@@ -25,22 +25,26 @@ pub struct EncodedDepthImage {
 /// bit at samples, and not at all elsewhere: texels without a sample decode to zeros in other planes.
 ///
 /// # Errors
-/// Planes that are not of the camera's size.
-pub fn encode_depth_image(
-    image: &DepthImage,
-    planes: PlaneSet,
-) -> Result<EncodedDepthImage, depth_image::DepthImageError> {
+/// Planes that are not of the camera's size; what highlights need without normals.
+pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<EncodedDepthImage, DepthImageError> {
     image.validate()?;
+    let specular = image.specular.as_ref().filter(|_| planes.specular);
+    if specular.is_some() && image.normal_oct16.is_none() {
+        return Err(DepthImageError::PlaneSize { plane: "normal", len: 0, expected: image.inverse_depth_per_m.len() });
+    }
     let depth = encode_depth(&image.inverse_depth_per_m);
     let runs = &depth.runs;
     let mut packer = Packer::default();
     packer.push(PlaneKind::InverseDepth, &depth.bytes);
     packer.push(PlaneKind::ColorRgb9e5, &raw(|out| pack_colors(&runs.gather(&image.color_rgb9e5), out)));
-    if let Some(normals) = image.normal_oct16.as_ref().filter(|_| planes.normal) {
+    if let Some(normals) = image.normal_oct16.as_ref().filter(|_| planes.normal || specular.is_some()) {
         packer.push(PlaneKind::NormalOct16, &raw(|out| pack_words(&runs.gather(normals), WordLayout::Halves, out)));
     }
     if let Some(ids) = image.surface_id.as_ref().filter(|_| planes.surface_id) {
         packer.push(PlaneKind::SurfaceId, &raw(|out| pack_surface_ids(&runs.gather(ids), out)));
+    }
+    if let Some(specular) = specular {
+        push_specular(&mut packer, specular, runs);
     }
     let size_px = image.size_px();
     Ok(EncodedDepthImage {
@@ -71,13 +75,27 @@ pub fn decode_depth_image(
         return Err(DecodeError::Corrupt { field: "payload", reason: "not as long as the header says" });
     }
     let (runs, inverse_depth_per_m, others) = decode_depth_plane(header, payload, texels)?;
-    let mut image =
-        DepthImage { camera, inverse_depth_per_m, color_rgb9e5: Vec::new(), normal_oct16: None, surface_id: None };
+    let mut image = DepthImage {
+        camera,
+        inverse_depth_per_m,
+        color_rgb9e5: Vec::new(),
+        normal_oct16: None,
+        surface_id: None,
+        specular: None,
+    };
     let mut packed = others;
     for plane in header.planes.iter().skip(1) {
         decode_plane(plane, &mut packed, &runs, &mut image)?;
     }
     Ok(image)
+}
+
+fn push_specular(packer: &mut Packer, specular: &SpecularPlanes, runs: &Runs) {
+    let packed = |plane| raw(|out| pack_words(&runs.gather(plane), WordLayout::Bytes, out));
+    packer.push(PlaneKind::ReflectanceRoughness8, &packed(&specular.reflectance_srgb8_roughness8));
+    for visibility in &specular.visibility8 {
+        packer.push(PlaneKind::Visibility8, &packed(visibility));
+    }
 }
 
 #[derive(Default)]
@@ -156,6 +174,14 @@ fn decode_plane(
         PlaneKind::SurfaceId => {
             let nothing = SurfaceId { instance: 0, primitive: 0 };
             image.surface_id = Some(runs.scatter(&unpack_surface_ids(&mut input, samples)?, nothing));
+        }
+        PlaneKind::ReflectanceRoughness8 => {
+            let reflectances = unpack_words(&mut input, samples, WordLayout::Bytes)?;
+            image.specular.get_or_insert_default().reflectance_srgb8_roughness8 = runs.scatter(&reflectances, 0);
+        }
+        PlaneKind::Visibility8 => {
+            let visibilities = unpack_words(&mut input, samples, WordLayout::Bytes)?;
+            image.specular.get_or_insert_default().visibility8.push(runs.scatter(&visibilities, 0));
         }
     }
     if input.is_empty() {

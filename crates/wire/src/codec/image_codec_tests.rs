@@ -25,7 +25,27 @@ fn image(width: u32, height: u32) -> DepthImage {
     let normal_oct16 = Some(inverse_depth_per_m.iter().map(|inverse| word(inverse, 32)).collect());
     let id = |inverse| SurfaceId { instance: word(inverse, 2), primitive: word(inverse, 17) };
     let surface_id = Some(inverse_depth_per_m.iter().map(id).collect());
-    DepthImage { camera: camera(width, height), inverse_depth_per_m, color_rgb9e5, normal_oct16, surface_id }
+    DepthImage {
+        camera: camera(width, height),
+        inverse_depth_per_m,
+        color_rgb9e5,
+        normal_oct16,
+        surface_id,
+        specular: None,
+    }
+}
+
+/// With so many planes of visibility.
+fn shiny(width: u32, height: u32, visibilities: usize) -> DepthImage {
+    let mut random = Random::new(20);
+    let image = image(width, height);
+    let mut plane = || {
+        let word = |&inverse: &f32| if inverse > 0.0 { random.next_u32() } else { 0 };
+        image.inverse_depth_per_m.iter().map(word).collect::<Vec<_>>()
+    };
+    let reflectance_srgb8_roughness8 = plane();
+    let visibility8 = (0..visibilities).map(|_| plane()).collect();
+    DepthImage { specular: Some(SpecularPlanes { reflectance_srgb8_roughness8, visibility8 }), ..image }
 }
 
 fn decode(image: &EncodedDepthImage) -> Result<DepthImage, DecodeError> {
@@ -56,10 +76,51 @@ fn planes_travel_only_when_asked_for() {
 }
 
 #[test]
+fn what_highlights_need_survives_and_brings_normals() {
+    let specular_only = PlaneSet { specular: true, ..PlaneSet::DEPTH_COLOR };
+    for visibilities in [0, 1, 2, 64] {
+        let image = shiny(20, 20, visibilities);
+        let encoded = encode_depth_image(&image, specular_only).expect("consistent planes");
+        let back = decode(&encoded).expect("own encoding");
+        assert_eq!((back.normal_oct16, back.surface_id), (image.normal_oct16.clone(), None));
+        assert_eq!(back.specular, image.specular);
+        assert_eq!(decode(&encode_depth_image(&image, PlaneSet::ALL).unwrap()).unwrap().specular, image.specular);
+        let unwanted = PlaneSet { specular: false, ..PlaneSet::ALL };
+        let plain = encode_depth_image(&image, unwanted).unwrap();
+        assert_eq!((plain.header.planes.len(), decode(&plain).unwrap().specular), (4, None));
+    }
+    let dull = encode_depth_image(&image(20, 20), PlaneSet::ALL).expect("consistent planes");
+    assert_eq!((dull.header.planes.len(), decode(&dull).expect("own encoding").specular), (4, None));
+    let dull = encode_depth_image(&image(20, 20), specular_only).expect("consistent planes");
+    assert_eq!(dull.header.planes.len(), 2);
+}
+
+#[test]
+fn nothing_but_samples_travels() {
+    let mut image = shiny(20, 20, 1);
+    let good = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+    let empty: Vec<_> = (0..400).filter(|&i| image.inverse_depth_per_m[i] <= 0.0).collect();
+    assert!(empty.len() > 10);
+    let specular = image.specular.as_mut().expect("made so");
+    for at in empty {
+        specular.reflectance_srgb8_roughness8[at] = u32::MAX;
+        specular.visibility8[0][at] = u32::MAX;
+    }
+    assert_eq!(encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes"), good);
+}
+
+#[test]
 fn inconsistent_planes_are_refused() {
-    let mut image = image(20, 20);
-    image.color_rgb9e5.pop();
-    assert!(encode_depth_image(&image, PlaneSet::ALL).is_err());
+    let mut bad = image(20, 20);
+    bad.color_rgb9e5.pop();
+    assert!(encode_depth_image(&bad, PlaneSet::ALL).is_err());
+    let mut bad = shiny(20, 20, 2);
+    bad.specular.as_mut().expect("made so").visibility8[1].pop();
+    assert!(encode_depth_image(&bad, PlaneSet::ALL).is_err());
+    let bad = DepthImage { normal_oct16: None, ..shiny(20, 20, 2) };
+    let error = encode_depth_image(&bad, PlaneSet::ALL).expect_err("no normals").to_string();
+    assert!(error.contains("plane normal has 0"), "{error}");
+    assert!(encode_depth_image(&bad, PlaneSet::DEPTH_COLOR).is_ok(), "then nothing needs them");
 }
 
 /// Damaged images may decode to something, but never to nonsense.
@@ -72,7 +133,7 @@ fn assert_sound(result: Result<DepthImage, DecodeError>) {
 
 #[test]
 fn damaged_payloads_never_panic() {
-    let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
+    let good = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
     let mut random = Random::new(10);
     for _ in 0..6000 {
         let mut bad = good.clone();
@@ -103,8 +164,26 @@ fn damaged_planes_behind_a_sound_lz4_never_panic() {
 }
 
 #[test]
+fn damaged_words_behind_a_sound_lz4_never_panic() {
+    let mut random = Random::new(14);
+    let words: Vec<u32> = (0..500).map(|_| random.next_u32() >> random.below(32)).collect();
+    for layout in [WordLayout::Whole, WordLayout::Halves, WordLayout::Bytes] {
+        let mut good = Vec::new();
+        pack_words(&words, layout, &mut good);
+        for _ in 0..2000 {
+            let mut bytes = good.clone();
+            let at = random.below(bytes.len());
+            bytes[at] = random.next_u32() as u8;
+            bytes.truncate(if random.below(4) == 0 { random.below(bytes.len()) } else { bytes.len() });
+            let back = unpack_words(&mut &bytes[..], words.len(), layout);
+            assert!(back.is_err() || back.is_ok_and(|back| back.len() == words.len()));
+        }
+    }
+}
+
+#[test]
 fn cut_and_random_payloads_are_refused() {
-    let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
+    let good = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
     for length in 0..good.payload.len() {
         assert!(decode(&EncodedDepthImage { payload: good.payload.slice(..length), ..good.clone() }).is_err());
     }
@@ -139,6 +218,48 @@ fn damaged_headers_are_named() {
         let error = decode(&bad).expect_err(name).to_string();
         assert!(error.contains(name), "{name}: {error}");
     }
+}
+
+#[test]
+fn planes_of_highlights_must_come_in_their_order() {
+    let good = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
+    let kinds = |header: &ImageHeader| header.planes.iter().map(|plane| plane.kind).collect::<Vec<_>>();
+    assert_eq!(
+        kinds(&good.header)[2..],
+        [
+            PlaneKind::NormalOct16,
+            PlaneKind::SurfaceId,
+            PlaneKind::ReflectanceRoughness8,
+            PlaneKind::Visibility8,
+            PlaneKind::Visibility8
+        ]
+    );
+    type Damage = fn(&mut Vec<PlaneHeader>);
+    let cases: [(&str, Damage); 9] = [
+        ("reflectance without normals", |p| drop(p.drain(2..3))),
+        ("reflectance without normals", |p| drop(p.drain(2..4))),
+        ("visibility without reflectance", |p| drop(p.drain(4..5))),
+        ("out of order", |p| p.swap(4, 5)),
+        ("out of order", |p| p.swap(3, 4)),
+        ("out of order", |p| p.swap(2, 6)),
+        ("repeated", |p| p.insert(4, p[4])),
+        ("planes.visibility8 is 65", |p| p.extend([p[6]; 63])),
+        ("planes.raw_bytes", |p| p[6].raw_bytes = u32::MAX),
+    ];
+    for (name, damage) in cases {
+        let mut bad = good.clone();
+        damage(&mut bad.header.planes);
+        let error = decode(&bad).expect_err(name).to_string();
+        assert!(error.contains(name), "{name}: {error}");
+    }
+}
+
+#[test]
+fn what_packs_well_does_not_claim_all_memory() {
+    let mut bad = encode_depth_image(&shiny(48, 32, 64), PlaneSet::ALL).expect("consistent planes");
+    (bad.header.width, bad.header.height) = (4096, 4096);
+    let result = decode_depth_image(&bad.header, camera(4096, 4096), &bad.payload, &DecodeLimits::default());
+    assert!(matches!(result, Err(DecodeError::Limit { field: "image_bytes", .. })), "{result:?}");
 }
 
 #[test]

@@ -3,9 +3,13 @@
 use std::hash::Hasher;
 
 use super::{
-    DecodeError, DecodeLimits, InverseDepthRange, color_codec::max_colors_bytes, depth_codec::max_unpacked_bytes,
-    error::check_limit, words_codec::max_words_bytes,
+    DecodeError, DecodeLimits, InverseDepthRange,
+    color_codec::max_colors_bytes,
+    depth_codec::max_unpacked_bytes,
+    error::check_limit,
+    words_codec::{WordLayout, max_words_bytes},
 };
+use crate::limits::MAX_VISIBILITY_PLANES;
 
 /// What a plane holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -18,6 +22,10 @@ pub enum PlaneKind {
     NormalOct16,
     /// Instance and primitive.
     SurfaceId,
+    /// Reflectance and roughness, 8 bits each. Needs normals.
+    ReflectanceRoughness8,
+    /// What share of four lights arrives. Needs reflectance; the one kind of which an image may have several.
+    Visibility8,
 }
 
 /// How a plane is packed.
@@ -35,7 +43,11 @@ impl PlaneKind {
     pub const fn encoding(self) -> PlaneEncoding {
         match self {
             Self::InverseDepth => PlaneEncoding::SlopeTaggedLz4,
-            Self::ColorRgb9e5 | Self::NormalOct16 | Self::SurfaceId => PlaneEncoding::DifferenceTaggedLz4,
+            Self::ColorRgb9e5
+            | Self::NormalOct16
+            | Self::SurfaceId
+            | Self::ReflectanceRoughness8
+            | Self::Visibility8 => PlaneEncoding::DifferenceTaggedLz4,
         }
     }
 
@@ -47,6 +59,8 @@ impl PlaneKind {
             Self::ColorRgb9e5 => "color_rgb9e5",
             Self::NormalOct16 => "normal_oct16",
             Self::SurfaceId => "surface_id",
+            Self::ReflectanceRoughness8 => "reflectance_roughness8",
+            Self::Visibility8 => "visibility8",
         }
     }
 
@@ -55,7 +69,7 @@ impl PlaneKind {
     pub const fn texel_bytes(self) -> usize {
         match self {
             Self::InverseDepth => 2,
-            Self::ColorRgb9e5 | Self::NormalOct16 => 4,
+            Self::ColorRgb9e5 | Self::NormalOct16 | Self::ReflectanceRoughness8 | Self::Visibility8 => 4,
             Self::SurfaceId => 8,
         }
     }
@@ -65,8 +79,9 @@ impl PlaneKind {
         match self {
             Self::InverseDepth => max_unpacked_bytes(texels),
             Self::ColorRgb9e5 => max_colors_bytes(texels),
-            Self::NormalOct16 => max_words_bytes(texels),
-            Self::SurfaceId => 2 * max_words_bytes(texels),
+            Self::NormalOct16 => max_words_bytes(texels, WordLayout::Halves),
+            Self::SurfaceId => 2 * max_words_bytes(texels, WordLayout::Whole),
+            Self::ReflectanceRoughness8 | Self::Visibility8 => max_words_bytes(texels, WordLayout::Bytes),
         }
     }
 }
@@ -91,13 +106,15 @@ pub struct PlaneSet {
     pub normal: bool,
     /// Surface keys, where the image has them.
     pub surface_id: bool,
+    /// What highlights need, where the image has it. Normals then travel too, wanted or not.
+    pub specular: bool,
 }
 
 impl PlaneSet {
     /// Inverse depth and colour only.
-    pub const DEPTH_COLOR: Self = Self { normal: false, surface_id: false };
+    pub const DEPTH_COLOR: Self = Self { normal: false, surface_id: false, specular: false };
     /// Whatever the image has.
-    pub const ALL: Self = Self { normal: true, surface_id: true };
+    pub const ALL: Self = Self { normal: true, surface_id: true, specular: true };
 }
 
 /// Size, planes and range of an encoded depth image. The camera travels beside it.
@@ -128,20 +145,30 @@ impl ImageHeader {
             }
             check_limit("planes.raw_bytes", u64::from(plane.raw_bytes), plane.kind.max_raw_bytes(texels) as u64)?;
         }
+        let texel_bytes: usize = self.planes.iter().map(|plane| plane.kind.texel_bytes()).sum();
+        check_limit("image_bytes", texels as u64 * texel_bytes as u64, limits.max_image_bytes as u64)?;
         check_limit("payload_bytes", self.payload_bytes(), limits.max_payload_bytes as u64)?;
         Ok(texels)
     }
 
+    /// Depth, colour, \[normal\], \[surface id\], \[reflectance, visibility*\]; reflectance only with normals.
     fn validate_kinds(&self) -> Result<(), DecodeError> {
+        let error = |reason| Err(DecodeError::Header { field: "planes.kind", reason });
         let kinds: Vec<_> = self.planes.iter().map(|plane| plane.kind).collect();
-        let required = [PlaneKind::InverseDepth, PlaneKind::ColorRgb9e5];
-        let reason = match kinds.strip_prefix(&required) {
-            None => "must begin with inverse depth and colour",
-            Some([] | [PlaneKind::NormalOct16 | PlaneKind::SurfaceId]) => return Ok(()),
-            Some([PlaneKind::NormalOct16, PlaneKind::SurfaceId]) => return Ok(()),
-            Some(_) => "repeated, unknown or out of order",
+        let Some(rest) = kinds.strip_prefix(&[PlaneKind::InverseDepth, PlaneKind::ColorRgb9e5]) else {
+            return error("must begin with inverse depth and colour");
         };
-        Err(DecodeError::Header { field: "planes.kind", reason })
+        let (normals, rest) = leading(rest, PlaneKind::NormalOct16);
+        let (surface_ids, rest) = leading(rest, PlaneKind::SurfaceId);
+        let (reflectances, rest) = leading(rest, PlaneKind::ReflectanceRoughness8);
+        let (visibilities, rest) = leading(rest, PlaneKind::Visibility8);
+        if !rest.is_empty() || normals.max(surface_ids).max(reflectances) > 1 {
+            return error("repeated or out of order");
+        }
+        if reflectances > normals || (visibilities > 0 && reflectances == 0) {
+            return error("reflectance without normals, or visibility without reflectance");
+        }
+        check_limit("planes.visibility8", visibilities as u64, MAX_VISIBILITY_PLANES as u64)
     }
 
     /// Bytes of all planes in the payload.
@@ -165,4 +192,10 @@ impl ImageHeader {
         }
         hasher.finalize()
     }
+}
+
+/// How many of a kind come first, and what follows.
+fn leading(kinds: &[PlaneKind], kind: PlaneKind) -> (usize, &[PlaneKind]) {
+    let count = kinds.iter().take_while(|&&other| other == kind).count();
+    (count, &kinds[count..])
 }

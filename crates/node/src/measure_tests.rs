@@ -1,0 +1,149 @@
+//! How often operations run, on a device that takes as long as it is told.
+
+use std::any::Any;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, SpecularPlanes, ViewPlanes};
+use glam::{UVec2, Vec3};
+use wire::{SceneHash, SceneRef, Timeline};
+
+use super::*;
+use crate::UploadedSet;
+
+/// Sleeps, and notes what it was asked.
+#[derive(Default)]
+struct Sleeper {
+    sample_s: f64,
+    direct_view_s: f64,
+    build_s: f64,
+    asked: Mutex<Asked>,
+}
+
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Asked {
+    refinements: Vec<Refinement>,
+    drawn_views: Vec<usize>,
+    uploads: Vec<(Illumination, bool)>,
+}
+
+struct Nothing;
+impl UploadedSet for Nothing {}
+
+fn camera() -> PinholeCamera {
+    PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(4))
+}
+
+fn image(camera: &Camera) -> DepthImage {
+    DepthImage {
+        camera: *camera,
+        inverse_depth_per_m: vec![0.5; 16],
+        color_rgb9e5: vec![0; 16],
+        normal_oct16: Some(vec![0; 16]),
+        surface_id: None,
+        specular: Some(SpecularPlanes { reflectance_srgb8_roughness8: vec![9; 16], ..SpecularPlanes::default() }),
+    }
+}
+
+fn views(cameras: &[PinholeCamera]) -> Vec<View> {
+    let view = |camera: &PinholeCamera| View {
+        size_px: camera.size_px,
+        srgb8: vec![0; 48],
+        inverse_depth_per_m: None,
+        provenance: None,
+    };
+    cameras.iter().map(view).collect()
+}
+
+impl Engine for Sleeper {
+    fn device_name(&self) -> String {
+        "sleeper".to_owned()
+    }
+
+    fn is_software(&self) -> bool {
+        true
+    }
+
+    fn load_scene(&self, _hash: &str, _package: &[u8]) -> Result<f64, EngineError> {
+        Ok(0.0)
+    }
+
+    fn has_scene(&self, _hash: &str) -> bool {
+        true
+    }
+
+    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
+        self.asked.lock().unwrap().refinements.push(request.refinement);
+        std::thread::sleep(Duration::from_secs_f64(self.sample_s));
+        Ok(request.cameras.iter().map(image).collect())
+    }
+
+    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        let shiny = set.images.iter().all(|image| image.specular.is_some());
+        self.asked.lock().unwrap().uploads.push((set.illumination.clone(), shiny));
+        Ok(Arc::new(Nothing))
+    }
+
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
+        let any: &dyn Any = set;
+        assert!(any.is::<Nothing>());
+        Ok(views(&work.cameras))
+    }
+
+    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
+        let mut asked = self.asked.lock().unwrap();
+        let build_s = if asked.drawn_views.is_empty() { self.build_s } else { 0.0 };
+        asked.drawn_views.push(work.cameras.len());
+        std::thread::sleep(Duration::from_secs_f64(build_s + self.direct_view_s * work.cameras.len() as f64));
+        Ok(views(&work.cameras))
+    }
+}
+
+fn request(batch_count: u32) -> MeasureCosts {
+    let lamp = depth_image::Light::Point { position_in_world: Vec3::Y, intensity_linear: Vec3::ONE, radius_m: 0.1 };
+    let workload = Workload {
+        scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
+        sample_cameras: vec![Camera::Pinhole(camera()); 2],
+        sampling: "conventional".to_owned(),
+        lighting: "traced".to_owned(),
+        method: "joint_carve".to_owned(),
+        codec: "lz4".to_owned(),
+        volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
+        background_linear: Vec3::ZERO,
+        timeline: Timeline { start_s: 0.0, step_s: 0.0, set_count: 8 },
+        illumination: Illumination { lights: vec![lamp], ..Illumination::default() },
+        refinement_steps: 4,
+    };
+    MeasureCosts { workload, typical_view: camera(), batch_count, planes: ViewPlanes::default() }
+}
+
+fn measured(engine: Sleeper, batch_count: u32) -> (Costs, Asked) {
+    let costs = measure_costs(&engine, &request(batch_count)).unwrap();
+    (costs, engine.asked.into_inner().unwrap())
+}
+
+#[test]
+fn quick_operations_run_three_times_after_one_that_does_not_count() {
+    // The first draw builds shaders for longer than a view may take.
+    let engine = Sleeper { direct_view_s: 1e-3, build_s: 0.6, ..Sleeper::default() };
+    let (costs, asked) = measured(engine, 32);
+    assert_eq!(asked.refinements, [Refinement::default(); 4], "finished, whatever the session's steps");
+    assert_eq!(asked.drawn_views, [1, 1, 1, 1, 32, 32, 32, 32]);
+    assert!((1e-3..0.01).contains(&costs.direct_view_s), "{costs:?}");
+    assert_eq!(asked.uploads, vec![(request(1).workload.illumination, true); 4], "with what highlights need");
+}
+
+#[test]
+fn slow_operations_run_once_after_one_that_does_not_count() {
+    let (costs, asked) = measured(Sleeper { sample_s: 0.51, direct_view_s: 0.51, ..Sleeper::default() }, 32);
+    assert_eq!((asked.refinements.len(), asked.drawn_views), (2, vec![1, 1]));
+    assert!((0.51..2.0).contains(&costs.direct_view_s), "{costs:?}");
+    assert!((0.255..1.0).contains(&costs.sample_image_s), "two images a run: {costs:?}");
+}
+
+#[test]
+fn as_many_views_are_drawn_as_there_is_time_for() {
+    let views = [1e-9, 0.01, 0.09, 0.3, 0.6, 40.0].map(|alone_s| direct_views(alone_s, 32));
+    assert_eq!(views, [32, 32, 11, 3, 1, 1]);
+    assert_eq!((direct_views(0.0, 32), direct_views(f64::NAN, 32), direct_views(0.1, 1)), (32, 1, 1));
+}
