@@ -1,15 +1,23 @@
 //! A scene on the device.
 
-use std::sync::Arc;
+use std::sync::{
+    Arc,
+    atomic::{AtomicU64, Ordering},
+};
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::Aabb;
-use glam::{Affine3A, Mat3, Vec3, Vec4};
+use depth_image::{Aabb, Highlight, Illumination, Reflector};
+use glam::{Affine3A, Mat3, Vec3};
 use gpu::{Gpu, GpuError};
-use scene::{Light, Material, Scene, Wind};
+use indexmap::IndexSet;
+use scene::{Material, Scene, Wind};
 use wgpu::BufferUsages;
 
-use crate::{RenderError, cluster, texture};
+use crate::{
+    RenderError, cluster,
+    rays::{AccelerationReport, OrderedMesh, RayScene},
+    scalar, texture,
+};
 
 /// What is the same for a whole draw: a mesh part where an instance places it. `Object` in the shader, which
 /// finds it at a dynamic offset: a load from a uniform costs nothing a vertex or fragment.
@@ -21,32 +29,22 @@ pub(crate) struct GpuObject {
     pub base_color_linear: [f32; 4],
     pub emissive_linear: [f32; 3],
     pub alpha_cutoff: f32,
-    pub phong_specular: f32,
-    pub phong_exponent: f32,
+    pub metallic: f32,
+    pub roughness: f32,
+    pub phong_reflector: u32,
     pub instance: u32,
-    pub padding: u32,
 }
 
 /// Uniform offsets must be multiples of this on every device.
 pub(crate) const UNIFORM_STRIDE: u64 = 256;
 
 /// Lights travel in a uniform.
-const MAX_LIGHTS: usize = 256;
-
-/// Directional where `towards_or_position.w` is 0, else a point light.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(crate) struct GpuLight {
-    pub towards_or_position: [f32; 4],
-    pub intensity_linear: [f32; 4],
-}
+const MAX_LIGHTS: usize = 255;
 
 /// The part of the scene that is the same for every vertex and fragment.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(crate) struct GpuSurroundings {
-    pub ambient_linear: [f32; 3],
-    pub padding: u32,
     pub wind_direction: [f32; 3],
     pub wind_amplitude_m: f32,
     pub wind_waves_per_m: [f32; 3],
@@ -60,6 +58,8 @@ pub(crate) struct Traits {
     /// Without a test for alpha, hidden fragments are never shaded.
     pub alpha_tested: bool,
     pub textured: bool,
+    /// Whether metallic and roughness come from a texture.
+    pub coat_textured: bool,
     pub unlit: bool,
     pub specular: bool,
 }
@@ -69,6 +69,7 @@ pub(crate) struct Draw {
     pub first_index: u32,
     pub index_count: u32,
     pub base_vertex: i32,
+    /// Into the pairs of textures.
     pub texture: u32,
     pub traits: Traits,
     /// Into the objects.
@@ -76,16 +77,23 @@ pub(crate) struct Draw {
     pub bounds_in_world: Aabb,
 }
 
+static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(0);
+
 /// A scene uploaded to one device.
 pub struct GpuScene {
     pub(crate) draws: Vec<Draw>,
     pub(crate) vertices: wgpu::Buffer,
     pub(crate) indices: wgpu::Buffer,
     pub(crate) objects: wgpu::Buffer,
-    pub(crate) light_count: usize,
     pub(crate) surroundings: wgpu::Buffer,
-    pub(crate) textures: Vec<wgpu::TextureView>,
+    /// Base colour, and metallic and roughness; white where a material has none.
+    pub(crate) textures: Vec<[wgpu::TextureView; 2]>,
     pub(crate) background_linear: Vec3,
+    pub(crate) illumination: wgpu::Buffer,
+    pub(crate) light_count: usize,
+    pub(crate) rays: RayScene,
+    highlights: [bool; 2],
+    identity: u64,
     animated: bool,
     bounds_in_world: Aabb,
     triangle_count: u64,
@@ -98,21 +106,67 @@ impl GpuScene {
     /// When a buffer would exceed the device's limits: names it.
     pub fn upload(gpu: &Arc<Gpu>, scene: &Scene) -> Result<Self, RenderError> {
         check_sizes(gpu, scene)?;
-        let geometry = Geometry::gather(scene);
-        let white = texture::white();
+        let ordered = OrderedMesh::all(scene);
+        let geometry = Geometry::gather(scene, &ordered);
+        let white = texture::upload(gpu, &texture::white());
+        let uploaded: Vec<_> = scene.textures.iter().map(|t| texture::upload(gpu, t)).collect();
+        let view = |t: &Option<u32>| t.map_or(&white, |t| &uploaded[t as usize]).clone();
+        let illumination = gpu::illumination_bytes(&scene.illumination);
         Ok(Self {
             vertices: gpu.buffer_with("vertices", &geometry.vertices, BufferUsages::VERTEX),
             indices: gpu.buffer_with("indices", &geometry.indices, BufferUsages::INDEX),
             objects: gpu.buffer_with("objects", &strided(&geometry.objects), BufferUsages::UNIFORM),
-            light_count: scene.lights.len(),
-            surroundings: gpu.buffer_with("surroundings", &surroundings(scene), BufferUsages::UNIFORM),
-            textures: std::iter::once(&white).chain(&scene.textures).map(|t| texture::upload(gpu, t)).collect(),
+            surroundings: gpu.buffer_with("surroundings", &[surroundings(scene)], BufferUsages::UNIFORM),
+            textures: geometry.textures.iter().map(|pair| pair.each_ref().map(view)).collect(),
             background_linear: scene.background_linear,
+            illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
+            light_count: scene.illumination.lights.len(),
+            rays: RayScene::of(gpu, scene, &ordered),
+            highlights: [
+                scene.materials.iter().any(|m| m.phong_specular > 0.0 && !m.unlit),
+                scene.materials.iter().any(Material::is_specular),
+            ],
+            identity: NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed),
             animated: scene.wind.is_some(),
             bounds_in_world: scene.bounds(),
             triangle_count: scene.triangle_count(),
             draws: geometry.draws,
         })
+    }
+
+    /// Whether some surface has highlights.
+    #[must_use]
+    pub fn has_highlights(&self, highlight: Highlight) -> bool {
+        self.highlights[usize::from(highlight == Highlight::Ggx)]
+    }
+
+    /// What tells it from every other scene of this process.
+    pub(crate) fn identity(&self) -> u64 {
+        self.identity
+    }
+
+    /// The tree that rays go through at a scene time: made now if there is none.
+    ///
+    /// # Errors
+    /// When the device's textures are too small for the scene.
+    pub fn acceleration(&self, scene_time_s: f32) -> Result<AccelerationReport, RenderError> {
+        Ok(self.rays.at(scene_time_s)?.report)
+    }
+
+    /// As [`GpuScene::acceleration`], with a new tree whatever there was: for measuring what refitting one saves.
+    ///
+    /// # Errors
+    /// As [`GpuScene::acceleration`].
+    pub fn rebuilt_acceleration(&self, scene_time_s: f32) -> Result<AccelerationReport, RenderError> {
+        Ok(self.rays.rebuilt_at(scene_time_s)?.report)
+    }
+
+    /// What the device traces rays against at a scene time, for the scalar twin.
+    ///
+    /// # Errors
+    /// When the device's textures are too small for the scene.
+    pub fn scalar_rays(&self, scene_time_s: f32) -> Result<scalar::rays::Scene, RenderError> {
+        Ok(self.rays.scalar(scene_time_s)?)
     }
 
     /// Whether pictures depend on scene time.
@@ -141,8 +195,9 @@ fn check_sizes(gpu: &Gpu, scene: &Scene) -> Result<(), GpuError> {
     if needed > limit {
         return Err(GpuError::Limit { what: "the scene's vertices (bytes)".to_owned(), needed, limit });
     }
-    if scene.lights.len() > MAX_LIGHTS {
-        let (needed, limit) = (scene.lights.len() as u64, MAX_LIGHTS as u64);
+    let Illumination { lights, .. } = &scene.illumination;
+    if lights.len() > MAX_LIGHTS {
+        let (needed, limit) = (lights.len() as u64, MAX_LIGHTS as u64);
         return Err(GpuError::Limit { what: "the scene's lights".to_owned(), needed, limit });
     }
     let side = u64::from(gpu.device.limits().max_texture_dimension_2d);
@@ -163,13 +218,13 @@ struct Geometry {
     indices: Vec<u32>,
     objects: Vec<GpuObject>,
     draws: Vec<Draw>,
+    textures: IndexSet<[Option<u32>; 2]>,
 }
 
 impl Geometry {
-    fn gather(scene: &Scene) -> Self {
+    fn gather(scene: &Scene, ordered: &[OrderedMesh<'_>]) -> Self {
         let mut geometry = Self::default();
-        for (mesh_number, mesh) in scene.meshes.iter().enumerate() {
-            let (indices, clusters) = cluster::clustered(mesh);
+        for (mesh_number, OrderedMesh { mesh, indices, clusters, .. }) in ordered.iter().enumerate() {
             let placements = scene.instances.iter().enumerate().filter(|(_, i)| i.mesh as usize == mesh_number);
             for (number, instance) in placements {
                 for of_one_material in clusters.chunk_by(|a, b| a.material == b.material) {
@@ -190,6 +245,8 @@ impl Geometry {
         let reach_m = scene.wind.map_or(0.0, |wind: Wind| wind.amplitude_m.abs());
         let (first_index, base_vertex) = (self.indices.len() as u32, self.vertices.len() as i32);
         let object = self.objects.len() as u32;
+        let pair = [material.base_color_texture, material.metallic_roughness_texture];
+        let (texture, _) = self.textures.insert_full(pair);
         self.objects.push(gpu_object(world_from_mesh, material, instance));
         self.draws.extend(clusters.iter().map(|cluster| {
             let corners = cluster.bounds_in_mesh.corners().map(|corner| world_from_mesh.transform_point3(corner));
@@ -197,7 +254,7 @@ impl Geometry {
                 first_index: first_index + cluster.first_triangle * 3,
                 index_count: cluster.triangle_count * 3,
                 base_vertex,
-                texture: material.base_color_texture.map_or(0, |t| t + 1),
+                texture: texture as u32,
                 traits: Traits::of(material),
                 object,
                 bounds_in_world: Aabb::around(corners).padded(reach_m),
@@ -219,8 +276,9 @@ impl Traits {
             double_sided: material.double_sided,
             alpha_tested: material.alpha_cutoff > 0.0,
             textured: material.base_color_texture.is_some(),
+            coat_textured: material.metallic_roughness_texture.is_some(),
             unlit: material.unlit,
-            specular: material.phong_specular > 0.0,
+            specular: material.is_specular(),
         }
     }
 }
@@ -247,40 +305,29 @@ fn gpu_object(world_from_mesh: &Affine3A, material: &Material, instance: u32) ->
         base_color_linear: material.base_color_linear,
         emissive_linear: material.emissive_linear.to_array(),
         alpha_cutoff: material.alpha_cutoff,
-        phong_specular: material.phong_specular,
-        phong_exponent: material.phong_exponent,
+        metallic: material.metallic,
+        roughness: material.roughness,
+        phong_reflector: phong_reflector(material),
         instance,
-        padding: 0,
     }
 }
 
-fn gpu_light(light: &Light) -> GpuLight {
-    let (towards_or_position, intensity) = match *light {
-        Light::Directional { towards_light_in_world, irradiance_linear } => {
-            (towards_light_in_world.extend(0.0), irradiance_linear)
-        }
-        Light::Point { position_in_world, intensity_linear } => (position_in_world.extend(1.0), intensity_linear),
-    };
-    GpuLight {
-        towards_or_position: towards_or_position.to_array(),
-        intensity_linear: Vec4::from((intensity, 0.0)).to_array(),
+/// The word of a surface's highlight under Blinn-Phong.
+pub(crate) fn phong_reflector(material: &Material) -> u32 {
+    if material.phong_specular <= 0.0 {
+        return 0;
     }
+    let roughness = Reflector::roughness_of_exponent(material.phong_exponent);
+    Reflector { reflectance_linear: Vec3::splat(material.phong_specular), roughness }.pack()
 }
 
-/// The fixed part, then the lights.
-fn surroundings(scene: &Scene) -> Vec<u8> {
+fn surroundings(scene: &Scene) -> GpuSurroundings {
     let still = Wind { direction_in_world: Vec3::X, amplitude_m: 0.0, frequency_hz: 0.0, waves_per_m: Vec3::ZERO };
     let wind = scene.wind.unwrap_or(still);
-    let fixed = GpuSurroundings {
-        ambient_linear: scene.ambient_linear.to_array(),
-        padding: 0,
+    GpuSurroundings {
         wind_direction: wind.direction_in_world.to_array(),
         wind_amplitude_m: wind.amplitude_m,
         wind_waves_per_m: wind.waves_per_m.to_array(),
         wind_frequency_hz: wind.frequency_hz,
-    };
-    let lights: Vec<GpuLight> = scene.lights.iter().map(gpu_light).collect();
-    let mut bytes = bytemuck::bytes_of(&fixed).to_vec();
-    bytes.extend_from_slice(bytemuck::cast_slice(&lights));
-    bytes
+    }
 }

@@ -6,7 +6,8 @@ use bytemuck::Zeroable as _;
 use gpu::Templates;
 use naga::TypeInner;
 
-use crate::gpu_scene::{GpuLight, GpuObject, GpuSurroundings};
+use crate::gpu_scene::{GpuObject, GpuSurroundings};
+use crate::pixel_camera::PixelCamera;
 use crate::raster::RasterCamera;
 
 /// Fields with their offsets, and the size of the whole.
@@ -24,10 +25,8 @@ macro_rules! host {
     }};
 }
 
-fn module() -> naga::Module {
-    let form = minijinja::context! { wind => true, lit => true, lights => 1, samples => true, double_sided => true, alpha_tested => true, textured => true, specular => true, normal => true, surface_id => false, normal_location => 1, id_location => 2 };
-    let text =
-        Templates::new(crate::SHADERS).and_then(|templates| templates.render("raster.wgsl", form)).expect("a text");
+fn parsed(name: &str, form: minijinja::Value) -> naga::Module {
+    let text = Templates::new(crate::SHADERS).and_then(|templates| templates.render(name, form)).expect("a text");
     naga::front::wgsl::parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)))
 }
 
@@ -43,10 +42,16 @@ fn shader(module: &naga::Module, name: &str) -> Layout {
 
 #[test]
 fn everything_shared_agrees() {
-    let module = module();
+    let form = minijinja::context! {
+        wind => true, shading => "ggx", surface_id => false, double_sided => true, alpha_tested => true,
+        textured => true, coat_textured => true, unlit => false, specular => true,
+    };
+    let raster = parsed("raster.wgsl", form);
+    let camera = parsed("camera.wgsl", minijinja::context! {});
     let shared = [
-        ("RasterCamera", host!(RasterCamera { clip_from_world, eye_in_world, scene_time_s })),
+        (&raster, "RasterCamera", host!(RasterCamera { clip_from_world, eye_in_world, scene_time_s })),
         (
+            &raster,
             "Object",
             host!(GpuObject {
                 world_from_mesh,
@@ -54,34 +59,56 @@ fn everything_shared_agrees() {
                 base_color_linear,
                 emissive_linear,
                 alpha_cutoff,
-                phong_specular,
-                phong_exponent,
-                instance,
-                padding
+                metallic,
+                roughness,
+                phong_reflector,
+                instance
             }),
         ),
-        ("Light", host!(GpuLight { towards_or_position, intensity_linear })),
+        (
+            &raster,
+            "Surroundings",
+            host!(GpuSurroundings { wind_direction, wind_amplitude_m, wind_waves_per_m, wind_frequency_hz }),
+        ),
+        (
+            &camera,
+            "PixelCamera",
+            host!(PixelCamera {
+                eye_in_world,
+                near_m,
+                column_in_world,
+                footprint,
+                row_in_world,
+                first_word,
+                corner_in_world,
+                first_sum,
+                size_px,
+                pixel_count,
+                seed,
+                first_shadow_ray,
+                shadow_rays,
+                first_occlusion_ray,
+                occlusion_rays,
+                shadow_rays_in_sum,
+                occlusion_rays_in_sum,
+                occlusion_radius_m,
+                tolerance
+            }),
+        ),
     ];
-    for (name, host) in shared {
-        assert_eq!(shader(&module, name), host, "{name}");
+    for (module, name, host) in shared {
+        assert_eq!(shader(module, name), host, "{name}");
     }
-    // The lights follow what is fixed.
-    let fixed = host!(GpuSurroundings {
-        ambient_linear,
-        padding,
-        wind_direction,
-        wind_amplitude_m,
-        wind_waves_per_m,
-        wind_frequency_hz
-    });
-    let mut surroundings = shader(&module, "Surroundings");
-    assert_eq!(surroundings.fields.pop(), Some(("lights".to_owned(), fixed.bytes)));
-    assert_eq!(surroundings.fields, fixed.fields);
 }
 
 #[test]
 fn a_field_out_of_place_is_seen() {
-    let other = naga::front::wgsl::parse_str("struct Light { intensity_linear: vec4f, towards_or_position: vec4f }")
-        .expect("a struct");
-    assert_ne!(shader(&other, "Light"), host!(GpuLight { towards_or_position, intensity_linear }));
+    let other = naga::front::wgsl::parse_str("struct Other { b: vec4f, a: vec4f }").expect("a struct");
+    #[derive(bytemuck::Zeroable, Clone, Copy)]
+    #[repr(C)]
+    struct Other {
+        a: [f32; 4],
+        b: [f32; 4],
+    }
+    assert_ne!(shader(&other, "Other"), host!(Other { a, b }));
 }

@@ -1,38 +1,248 @@
-//! How surfaces are lit.
+//! How surfaces are lit: the quality of a finished picture, the same for samples and for direct rendering.
 
-use std::{fmt, str::FromStr};
+use std::{fmt, num::NonZeroU32, str::FromStr};
 
-/// The same for samples and for direct rendering, so that their pictures agree.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Lighting {
-    /// Base colours as they are.
-    Unlit,
-    /// Ambient, Lambert and Blinn-Phong terms of every light, without shadows.
-    #[default]
-    Phong,
+use depth_image::Highlight;
+
+/// Most rays a light, or of occlusion, a pixel.
+pub const MAX_RAYS: u32 = 4096;
+
+/// Written as terms with commas between them: `soft 16, occlusion 16`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Lighting {
+    /// Light of lamps.
+    pub direct: Direct,
+    /// Whether light from all around is kept off by what is near; without it all of it arrives.
+    pub occlusion: Option<Occlusion>,
+    /// Where rays are spent.
+    pub rate: Rate,
 }
 
-/// Not the name of a lighting.
+/// Light of lamps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Direct {
+    /// Colours as they are: no light at all.
+    Unlit,
+    /// From the middle of every lamp whatever is in between, with Blinn-Phong highlights.
+    #[default]
+    Phong,
+    /// One ray to the middle of every lamp; highlights by GGX, as for all that follow.
+    Shadows,
+    /// So many rays to places spread over every lamp.
+    Soft(NonZeroU32),
+}
+
+/// Cosine-weighted ambient occlusion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Occlusion {
+    /// A pixel.
+    pub rays: NonZeroU32,
+    /// What is farther away keeps no light off; a share of the scene's diagonal where not given.
+    pub radius_m: Option<f32>,
+}
+
+/// Which pixels get rays of their own.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Rate {
+    /// All.
+    #[default]
+    Full,
+    /// A grid of pixels, and those between whose neighbours on it disagree by more than this, relatively.
+    Adaptive {
+        /// Of the light that arrives.
+        tolerance: f32,
+    },
+}
+
+/// Of adaptive shading, where none is given: below a step of 8-bit sRGB in the middle greys.
+const DEFAULT_TOLERANCE: f32 = 0.04;
+
+/// Not a lighting.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown lighting {0:?}, expected unlit or phong")]
-pub struct UnknownLighting(String);
+pub enum UnknownLighting {
+    /// A term with an unknown name.
+    #[error(
+        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, adaptive, adaptive TOLERANCE with commas between them"
+    )]
+    Term(String),
+    /// A number of rays that cannot be.
+    #[error("lighting {0:?}: rays must be from 1 to {MAX_RAYS}")]
+    Rays(String),
+    /// A radius or tolerance that cannot be.
+    #[error("lighting {0:?}: {1} must be a positive number")]
+    Number(String, &'static str),
+    /// Two terms that say different things.
+    #[error("lighting {0:?}: {1}")]
+    Conflict(String, &'static str),
+}
+
+impl Lighting {
+    /// Base colours as they are.
+    pub const UNLIT: Self = Self { direct: Direct::Unlit, occlusion: None, rate: Rate::Full };
+    /// Lamps without shadows.
+    pub const PHONG: Self = Self { direct: Direct::Phong, occlusion: None, rate: Rate::Full };
+
+    /// Whether anything arrives at surfaces.
+    #[must_use]
+    pub fn is_lit(&self) -> bool {
+        self.direct != Direct::Unlit
+    }
+
+    /// Whether rays are traced.
+    #[must_use]
+    pub fn is_traced(&self) -> bool {
+        self.shadow_rays() > 0 || self.occlusion.is_some()
+    }
+
+    /// Rays a light and pixel.
+    #[must_use]
+    pub fn shadow_rays(&self) -> u32 {
+        match self.direct {
+            Direct::Unlit | Direct::Phong => 0,
+            Direct::Shadows => 1,
+            Direct::Soft(rays) => rays.get(),
+        }
+    }
+
+    /// Rays of occlusion a pixel.
+    #[must_use]
+    pub fn occlusion_rays(&self) -> u32 {
+        self.occlusion.map_or(0, |occlusion| occlusion.rays.get())
+    }
+
+    /// Whose formula highlights follow.
+    #[must_use]
+    pub fn highlight(&self) -> Option<Highlight> {
+        match self.direct {
+            Direct::Unlit => None,
+            Direct::Phong => Some(Highlight::BlinnPhong),
+            Direct::Shadows | Direct::Soft(_) => Some(Highlight::Ggx),
+        }
+    }
+
+    /// Steps in which a static scene's light grows from one ray to all: each doubles what was there.
+    #[must_use]
+    pub fn refinement_steps(&self) -> u32 {
+        let most = match self.direct {
+            Direct::Soft(rays) => rays.get().max(self.occlusion_rays()),
+            _ => self.occlusion_rays(),
+        };
+        most.max(1).next_power_of_two().ilog2() + 1
+    }
+}
 
 impl FromStr for Lighting {
     type Err = UnknownLighting;
     fn from_str(text: &str) -> Result<Self, UnknownLighting> {
-        match text {
-            "unlit" => Ok(Self::Unlit),
-            "phong" => Ok(Self::Phong),
-            other => Err(UnknownLighting(other.to_owned())),
+        let (mut direct, mut occlusion, mut rate) = (None, None, None);
+        for term in text.split(',').map(str::trim) {
+            let words: Vec<&str> = term.split_whitespace().collect();
+            let again = match words[..] {
+                ["unlit"] => direct.replace(Direct::Unlit).is_some(),
+                ["phong"] => direct.replace(Direct::Phong).is_some(),
+                ["shadows"] => direct.replace(Direct::Shadows).is_some(),
+                ["soft", n] => direct.replace(Direct::Soft(rays(text, n)?)).is_some(),
+                ["occlusion", n] => occlusion.replace(Occlusion { rays: rays(text, n)?, radius_m: None }).is_some(),
+                ["occlusion", n, radius] => {
+                    let radius_m = Some(positive(text, radius.strip_suffix('m').unwrap_or(radius), "the radius")?);
+                    occlusion.replace(Occlusion { rays: rays(text, n)?, radius_m }).is_some()
+                }
+                ["adaptive"] => rate.replace(Rate::Adaptive { tolerance: DEFAULT_TOLERANCE }).is_some(),
+                ["adaptive", n] => {
+                    rate.replace(Rate::Adaptive { tolerance: positive(text, n, "the tolerance")? }).is_some()
+                }
+                _ => return Err(UnknownLighting::Term(term.to_owned())),
+            };
+            if again {
+                return Err(UnknownLighting::Conflict(text.to_owned(), "says one thing twice"));
+            }
         }
+        let lighting =
+            Self { direct: direct.unwrap_or_default(), occlusion, rate: rate.unwrap_or_default() };
+        if !lighting.is_lit() && occlusion.is_some() {
+            return Err(UnknownLighting::Conflict(text.to_owned(), "unlit surfaces have no occlusion"));
+        }
+        if !lighting.is_traced() && rate.is_some() {
+            return Err(UnknownLighting::Conflict(text.to_owned(), "there are no rays to be adaptive with"));
+        }
+        Ok(lighting)
     }
+}
+
+fn rays(text: &str, number: &str) -> Result<NonZeroU32, UnknownLighting> {
+    let rays = number.parse().ok().filter(|rays: &NonZeroU32| rays.get() <= MAX_RAYS);
+    rays.ok_or_else(|| UnknownLighting::Rays(text.to_owned()))
+}
+
+fn positive(text: &str, number: &str, what: &'static str) -> Result<f32, UnknownLighting> {
+    let value = number.parse().ok().filter(|v: &f32| v.is_finite() && *v > 0.0);
+    value.ok_or_else(|| UnknownLighting::Number(text.to_owned(), what))
 }
 
 impl fmt::Display for Lighting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Unlit => "unlit",
-            Self::Phong => "phong",
-        })
+        match self.direct {
+            Direct::Unlit => write!(f, "unlit")?,
+            Direct::Phong => write!(f, "phong")?,
+            Direct::Shadows => write!(f, "shadows")?,
+            Direct::Soft(rays) => write!(f, "soft {rays}")?,
+        }
+        match self.occlusion {
+            Some(Occlusion { rays, radius_m: Some(radius_m) }) => write!(f, ", occlusion {rays} {radius_m}m")?,
+            Some(Occlusion { rays, radius_m: None }) => write!(f, ", occlusion {rays}")?,
+            None => {}
+        }
+        match self.rate {
+            Rate::Full => Ok(()),
+            Rate::Adaptive { tolerance } if tolerance == DEFAULT_TOLERANCE => write!(f, ", adaptive"),
+            Rate::Adaptive { tolerance } => write!(f, ", adaptive {tolerance}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_round_trip() {
+        for name in [
+            "unlit",
+            "phong",
+            "shadows",
+            "soft 16",
+            "soft 16, occlusion 16",
+            "phong, occlusion 4 0.5m",
+            "shadows, occlusion 8, adaptive",
+            "soft 4, adaptive 0.1",
+        ] {
+            assert_eq!(name.parse::<Lighting>().expect(name).to_string(), name);
+        }
+        assert_eq!("occlusion 4".parse::<Lighting>().expect("alone").to_string(), "phong, occlusion 4");
+    }
+
+    #[test]
+    fn nonsense_is_refused_by_name() {
+        use UnknownLighting::{Conflict, Number, Rays, Term};
+        let parsed = |text: &str| text.parse::<Lighting>().expect_err(text);
+        for text in ["soft 0", "soft -1", "soft 4097", "soft many", "occlusion 0", "soft 99999999999"] {
+            assert!(matches!(parsed(text), Rays(_)), "{text}");
+        }
+        for text in ["", "soft", "bright", "unlit;phong", "occlusion", "occlusion 1 2 3"] {
+            assert!(matches!(parsed(text), Term(_)), "{text}");
+        }
+        for text in ["occlusion 4 -1m", "occlusion 4 NaN", "soft 4, adaptive inf", "soft 4, adaptive 0"] {
+            assert!(matches!(parsed(text), Number(..)), "{text}");
+        }
+        for text in ["unlit, phong", "unlit, occlusion 4", "phong, adaptive", "occlusion 4, occlusion 8"] {
+            assert!(matches!(parsed(text), Conflict(..)), "{text}");
+        }
+    }
+
+    #[test]
+    fn light_grows_by_doubling() {
+        let steps = |text: &str| text.parse::<Lighting>().expect(text).refinement_steps();
+        assert_eq!([steps("phong"), steps("shadows"), steps("soft 1"), steps("soft 16"), steps("soft 17")], [1, 1, 1, 5, 6]);
+        assert_eq!(steps("soft 4, occlusion 16"), 5);
     }
 }

@@ -6,57 +6,25 @@ use std::{
 };
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{
-    Camera, DepthImage, PinholeCamera, Provenance, ProvenanceKind, SurfaceId, View, ViewPlanes, rgb9e5_from_linear,
-};
+use depth_image::PinholeCamera;
 use glam::{Mat4, Vec4};
-use gpu::{BufferPool, Frame, FrameResult, Gpu, Templates};
+use gpu::{Frame, Gpu, Templates};
 use minijinja::context;
 use wgpu::TextureFormat;
 
 use crate::{
-    GpuScene, Lighting, RenderError,
+    GpuScene, RenderError,
     cluster::Frustum,
+    form::Shading,
     gpu_scene::{GpuObject, Traits, UNIFORM_STRIDE},
-    targets::{HostPlane, Target},
+    surfaces::Surfaces,
 };
-
-/// Views or samples in one submission; bounds the memory for read-back.
-const CAMERAS_A_SUBMISSION: usize = 32;
-const DEPTH_FORMAT: TextureFormat = TextureFormat::Depth32Float;
-
-/// What to draw besides the cameras.
-#[derive(Clone, Copy)]
-pub struct DrawWork<'a> {
-    /// From where.
-    pub scene: &'a GpuScene,
-    /// How it is lit.
-    pub lighting: Lighting,
-    /// Which moment of an animated scene.
-    pub scene_time_s: f32,
-}
-
-/// Optional planes of depth images.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct SamplePlanes {
-    /// [`DepthImage::normal_oct16`].
-    pub normal: bool,
-    /// [`DepthImage::surface_id`].
-    pub surface_id: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Output {
-    View,
-    Samples(SamplePlanes),
-}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct PipelineKey {
-    output: Output,
-    lighting: Lighting,
+    shading: Shading,
+    surface_id: bool,
     wind: bool,
-    lights: usize,
     traits: Traits,
 }
 
@@ -68,6 +36,15 @@ pub(crate) struct RasterCamera {
     pub scene_time_s: f32,
 }
 
+/// What to draw, besides from where.
+#[derive(Clone, Copy)]
+pub(crate) struct RasterWork<'a> {
+    pub scene: &'a GpuScene,
+    pub shading: Shading,
+    pub scene_time_s: f32,
+    pub surface_id: bool,
+}
+
 /// What all draws of a submission are bound to.
 struct Groups {
     scene: wgpu::BindGroup,
@@ -76,10 +53,9 @@ struct Groups {
 }
 
 /// Pipelines for every combination that has been asked for.
-pub struct Rasterizer {
+pub(crate) struct Rasterizer {
     gpu: Arc<Gpu>,
-    pool: BufferPool,
-    templates: Templates,
+    templates: Arc<Templates>,
     scene_layout: wgpu::BindGroupLayout,
     object_layout: wgpu::BindGroupLayout,
     texture_layout: wgpu::BindGroupLayout,
@@ -88,15 +64,10 @@ pub struct Rasterizer {
 }
 
 impl Rasterizer {
-    /// Pipelines are built when first used.
-    ///
-    /// # Errors
-    /// When a shader template is broken.
-    pub fn new(gpu: &Arc<Gpu>) -> Result<Self, RenderError> {
-        Ok(Self {
+    pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
+        Self {
             gpu: gpu.clone(),
-            pool: BufferPool::new(gpu),
-            templates: Templates::new(crate::SHADERS)?,
+            templates: templates.clone(),
             scene_layout: uniform_layout(gpu, "scene", &[true, false]),
             object_layout: uniform_layout(gpu, "object", &[true]),
             texture_layout: texture_layout(gpu),
@@ -110,120 +81,42 @@ impl Rasterizer {
                 ..Default::default()
             }),
             pipelines: Mutex::default(),
-        })
+        }
     }
 
-    /// Finished views: the method `direct`. Provenance of a surface is a hit without cameras.
-    ///
-    /// # Errors
-    /// A camera that is not valid (all are checked first), or the device.
-    pub fn draw_views(
+    /// Records one pass a camera.
+    pub fn record(
         &self,
-        work: DrawWork<'_>,
+        frame: &mut Frame<'_>,
+        work: RasterWork<'_>,
         cameras: &[PinholeCamera],
-        planes: ViewPlanes,
-    ) -> Result<Vec<View>, RenderError> {
-        self.check(cameras.iter())?;
-        let mut views = Vec::with_capacity(cameras.len());
-        for batch in cameras.chunks(CAMERAS_A_SUBMISSION) {
-            let formats = [TextureFormat::Rgba8UnormSrgb];
-            let with_depth = planes.inverse_depth || planes.provenance;
-            let (result, drawn) = self.draw(work, batch, Output::View, &formats, with_depth)?;
-            for (camera, planes_drawn) in batch.iter().zip(drawn) {
-                views.push(view(camera, &result, &planes_drawn, planes)?);
-            }
-        }
-        Ok(views)
-    }
-
-    /// Conventional depth images, in as few submissions as memory allows.
-    ///
-    /// # Errors
-    /// A camera that is not valid, or the device (surface ids need its primitive index).
-    pub fn draw_depth_images(
-        &self,
-        work: DrawWork<'_>,
-        cameras: &[Camera],
-        planes: SamplePlanes,
-    ) -> Result<Vec<DepthImage>, RenderError> {
-        let pinholes: Vec<PinholeCamera> = cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
-        self.check(pinholes.iter())?;
-        let mut formats = vec![TextureFormat::R32Uint];
-        formats.extend(planes.normal.then_some(TextureFormat::R32Uint));
-        formats.extend(planes.surface_id.then_some(TextureFormat::Rg32Uint));
-        let mut images = Vec::with_capacity(cameras.len());
-        for batch in pinholes.chunks(CAMERAS_A_SUBMISSION) {
-            let (result, drawn) = self.draw(work, batch, Output::Samples(planes), &formats, true)?;
-            for (camera, host) in batch.iter().zip(drawn) {
-                images.push(depth_image(camera, &result, &host, planes)?);
-            }
-        }
-        Ok(images)
-    }
-
-    fn check<'c>(&self, cameras: impl Iterator<Item = &'c PinholeCamera>) -> Result<(), RenderError> {
-        let limit = u64::from(self.gpu.device.limits().max_texture_dimension_2d);
-        for (index, camera) in cameras.enumerate() {
-            camera.validate().map_err(|source| RenderError::Camera { index, source })?;
-            let needed = u64::from(camera.size_px.max_element());
-            if needed > limit {
-                return Err(gpu::GpuError::Limit { what: format!("camera {index}'s image side"), needed, limit }.into());
-            }
+        surfaces: &[Surfaces],
+    ) -> Result<(), RenderError> {
+        let groups = Groups {
+            scene: self.bind_scene(work, cameras),
+            object: self.bind_object(work),
+            textures: work.scene.textures.iter().map(|views| self.bind_textures(views)).collect(),
+        };
+        for (number, (camera, target)) in cameras.iter().zip(surfaces).enumerate() {
+            self.record_one(frame, work, (number, camera), target, &groups)?;
         }
         Ok(())
     }
 
-    /// One submission: every camera into the same targets, one after another. Planes come in the order
-    /// of `formats`, then depth.
-    fn draw(
-        &self,
-        work: DrawWork<'_>,
-        cameras: &[PinholeCamera],
-        output: Output,
-        formats: &[TextureFormat],
-        copy_depth: bool,
-    ) -> Result<(FrameResult, Vec<Vec<HostPlane>>), RenderError> {
-        let groups = Groups {
-            scene: self.bind_scene(work, cameras),
-            object: self.bind_object(work),
-            textures: work.scene.textures.iter().map(|view| self.bind_texture(view)).collect(),
-        };
-        let mut frame = Frame::begin(&self.gpu, "raster");
-        let mut host_planes = Vec::with_capacity(cameras.len());
-        let mut targets: Vec<Target> = Vec::new();
-        for (index, camera) in cameras.iter().enumerate() {
-            if index == 0 || cameras[index - 1].size_px != camera.size_px {
-                targets = formats
-                    .iter()
-                    .chain([&DEPTH_FORMAT])
-                    .map(|&format| Target::new(&self.gpu, camera.size_px, format))
-                    .collect();
-            }
-            self.record(&mut frame, work, (index, camera), output, &targets, &groups)?;
-            let copied = if copy_depth { &targets[..] } else { &targets[..formats.len()] };
-            host_planes.push(copied.iter().map(|target| target.copy_out(&mut frame, &self.pool)).collect());
-        }
-        Ok((frame.submit().wait()?, host_planes))
-    }
-
-    fn record(
+    fn record_one(
         &self,
         frame: &mut Frame<'_>,
-        work: DrawWork<'_>,
+        work: RasterWork<'_>,
         (number, camera): (usize, &PinholeCamera),
-        output: Output,
-        targets: &[Target],
+        target: &Surfaces,
         groups: &Groups,
     ) -> Result<(), RenderError> {
         let scene = work.scene;
-        let (depth, colors) = targets.split_last().expect("depth is always there");
-        let clear = clear_colors(scene, output);
-        let attachments: Vec<_> =
-            colors.iter().zip(clear).map(|(target, color)| Some(attachment(target, color))).collect();
+        let colors = [Some(attachment(&target.surface)), target.ids.as_ref().map(attachment)];
         let mut pass = frame.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("raster"),
-            color_attachments: &attachments,
-            depth_stencil_attachment: Some(depth_attachment(depth)),
+            color_attachments: &colors[..1 + usize::from(work.surface_id)],
+            depth_stencil_attachment: Some(depth_attachment(&target.depth)),
             ..Default::default()
         });
         pass.set_vertex_buffer(0, scene.vertices.slice(..));
@@ -233,7 +126,7 @@ impl Rasterizer {
         for run in visible_runs(scene, &Frustum::of(camera)) {
             let draw = &scene.draws[run.draw];
             if traits.replace(draw.traits) != Some(draw.traits) {
-                pass.set_pipeline(&*self.pipeline(work, output, draw.traits)?);
+                pass.set_pipeline(&*self.pipeline(work, draw.traits)?);
             }
             if object.replace(draw.object) != Some(draw.object) {
                 pass.set_bind_group(1, &groups.object, &[draw.object * UNIFORM_STRIDE as u32]);
@@ -247,7 +140,7 @@ impl Rasterizer {
         Ok(())
     }
 
-    fn bind_object(&self, work: DrawWork<'_>) -> wgpu::BindGroup {
+    fn bind_object(&self, work: RasterWork<'_>) -> wgpu::BindGroup {
         let size = std::num::NonZeroU64::new(size_of::<GpuObject>() as u64);
         let object = wgpu::BufferBinding { buffer: &work.scene.objects, offset: 0, size };
         let entries = [wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(object) }];
@@ -259,7 +152,7 @@ impl Rasterizer {
         })
     }
 
-    fn bind_scene(&self, work: DrawWork<'_>, cameras: &[PinholeCamera]) -> wgpu::BindGroup {
+    fn bind_scene(&self, work: RasterWork<'_>, cameras: &[PinholeCamera]) -> wgpu::BindGroup {
         let mut bytes = vec![0; cameras.len() * UNIFORM_STRIDE as usize];
         for (slot, camera) in bytes.chunks_mut(UNIFORM_STRIDE as usize).zip(cameras) {
             let raster_camera = RasterCamera {
@@ -287,31 +180,22 @@ impl Rasterizer {
         })
     }
 
-    fn bind_texture(&self, view: &wgpu::TextureView) -> wgpu::BindGroup {
+    fn bind_textures(&self, [base_color, metallic_roughness]: &[wgpu::TextureView; 2]) -> wgpu::BindGroup {
         let entries = [
-            wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) },
-            wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(&self.sampler) },
+            wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(base_color) },
+            wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::TextureView(metallic_roughness) },
+            wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::Sampler(&self.sampler) },
         ];
         self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("texture"),
+            label: Some("textures"),
             layout: &self.texture_layout,
             entries: &entries,
         })
     }
 
-    fn pipeline(
-        &self,
-        work: DrawWork<'_>,
-        output: Output,
-        traits: Traits,
-    ) -> Result<Arc<wgpu::RenderPipeline>, RenderError> {
-        let key = PipelineKey {
-            output,
-            lighting: work.lighting,
-            wind: work.scene.is_animated(),
-            lights: work.scene.light_count,
-            traits,
-        };
+    fn pipeline(&self, work: RasterWork<'_>, traits: Traits) -> Result<Arc<wgpu::RenderPipeline>, RenderError> {
+        let RasterWork { shading, surface_id, .. } = work;
+        let key = PipelineKey { shading, surface_id, wind: work.scene.is_animated(), traits };
         let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pipeline) = pipelines.get(&key) {
             return Ok(pipeline.clone());
@@ -329,7 +213,7 @@ impl Rasterizer {
             bind_group_layouts: &layouts,
             immediate_size: 0,
         });
-        let targets: Vec<_> = color_formats(key.output).into_iter().map(|format| Some(format.into())).collect();
+        let formats = [Some(TextureFormat::Rgba32Uint.into()), Some(TextureFormat::Rg32Uint.into())];
         Ok(self.gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("raster"),
             layout: Some(&layout),
@@ -344,7 +228,7 @@ impl Rasterizer {
                 ..Default::default()
             },
             depth_stencil: Some(wgpu::DepthStencilState {
-                format: DEPTH_FORMAT,
+                format: TextureFormat::Depth32Float,
                 depth_write_enabled: Some(true),
                 depth_compare: Some(wgpu::CompareFunction::Greater),
                 stencil: Default::default(),
@@ -355,7 +239,7 @@ impl Rasterizer {
                 module: &module,
                 entry_point: Some("fragment"),
                 compilation_options: Default::default(),
-                targets: &targets,
+                targets: &formats[..1 + usize::from(key.surface_id)],
             }),
             multiview_mask: None,
             cache: None,
@@ -394,28 +278,12 @@ fn clip_from_world(camera: &PinholeCamera) -> Mat4 {
     Mat4::from_cols_array_2d(&rows.map(|row| row.to_array())).transpose()
 }
 
-fn color_formats(output: Output) -> Vec<TextureFormat> {
-    match output {
-        Output::View => vec![TextureFormat::Rgba8UnormSrgb],
-        Output::Samples(planes) => {
-            let optional =
-                [planes.normal.then_some(TextureFormat::R32Uint), planes.surface_id.then_some(TextureFormat::Rg32Uint)];
-            std::iter::once(TextureFormat::R32Uint).chain(optional.into_iter().flatten()).collect()
-        }
-    }
-}
-
 fn shader_context(key: PipelineKey) -> minijinja::Value {
-    let planes = match key.output {
-        Output::View => None,
-        Output::Samples(planes) => Some(planes),
-    };
-    let SamplePlanes { normal, surface_id } = planes.unwrap_or_default();
-    let Traits { double_sided, alpha_tested, textured, unlit, specular } = key.traits;
+    let Traits { double_sided, alpha_tested, textured, coat_textured, unlit, specular } = key.traits;
     context! {
-        wind => key.wind, lights => key.lights, lit => key.lighting != Lighting::Unlit && !unlit, samples => planes.is_some(),
-        double_sided, alpha_tested, textured, specular,
-        normal, surface_id, normal_location => 1, id_location => 1 + u32::from(normal),
+        wind => key.wind, shading => key.shading.name(), surface_id => key.surface_id,
+        double_sided, alpha_tested, textured, unlit, specular,
+        coat_textured => coat_textured && key.shading == Shading::Ggx,
     }
 }
 
@@ -429,26 +297,14 @@ fn vertex_layout() -> wgpu::VertexBufferLayout<'static> {
     }
 }
 
-fn attachment(target: &Target, clear: wgpu::Color) -> wgpu::RenderPassColorAttachment<'_> {
-    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(clear), store: wgpu::StoreOp::Store };
-    wgpu::RenderPassColorAttachment { view: &target.view, depth_slice: None, resolve_target: None, ops }
+fn attachment(view: &wgpu::TextureView) -> wgpu::RenderPassColorAttachment<'_> {
+    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
+    wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops }
 }
 
-fn depth_attachment(target: &Target) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+fn depth_attachment(view: &wgpu::TextureView) -> wgpu::RenderPassDepthStencilAttachment<'_> {
     let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store };
-    wgpu::RenderPassDepthStencilAttachment { view: &target.view, depth_ops: Some(ops), stencil_ops: None }
-}
-
-/// Background colour first; the other planes mean nothing there.
-fn clear_colors(scene: &GpuScene, output: Output) -> impl Iterator<Item = wgpu::Color> {
-    let background = scene.background_linear.as_dvec3();
-    let first = match output {
-        Output::View => wgpu::Color { r: background.x, g: background.y, b: background.z, a: 1.0 },
-        Output::Samples(_) => {
-            wgpu::Color { r: f64::from(rgb9e5_from_linear(scene.background_linear)), ..wgpu::Color::TRANSPARENT }
-        }
-    };
-    std::iter::once(first).chain(std::iter::repeat(wgpu::Color::TRANSPARENT))
+    wgpu::RenderPassDepthStencilAttachment { view, depth_ops: Some(ops), stencil_ops: None }
 }
 
 /// Uniforms, each at a dynamic offset or not.
@@ -475,44 +331,7 @@ fn texture_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
         view_dimension: wgpu::TextureViewDimension::D2,
         multisampled: false,
     };
-    let entries = [entry(0, texture), entry(1, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering))];
-    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("texture"), entries: &entries })
-}
-
-fn view(
-    camera: &PinholeCamera,
-    result: &FrameResult,
-    host: &[HostPlane],
-    planes: ViewPlanes,
-) -> Result<View, RenderError> {
-    let scale = camera.near_m.recip();
-    let inverse_depth = match host.get(1) {
-        Some(depth) => Some(depth.collect(result, |depth: f32| depth * scale)?),
-        None => None,
-    };
-    let hit = |&inverse: &f32| if inverse > 0.0 { Provenance::new(ProvenanceKind::Hit, 0) } else { Provenance::EMPTY };
-    Ok(View {
-        size_px: camera.size_px,
-        srgb8: host[0].collect_rgb(result)?,
-        provenance: inverse_depth.as_ref().filter(|_| planes.provenance).map(|plane| plane.iter().map(hit).collect()),
-        inverse_depth_per_m: inverse_depth.filter(|_| planes.inverse_depth),
-    })
-}
-
-fn depth_image(
-    camera: &PinholeCamera,
-    result: &FrameResult,
-    host: &[HostPlane],
-    planes: SamplePlanes,
-) -> Result<DepthImage, RenderError> {
-    let scale = camera.near_m.recip();
-    let (depth, colors) = host.split_last().expect("depth is always copied");
-    let id_plane = 1 + usize::from(planes.normal);
-    Ok(DepthImage {
-        camera: Camera::Pinhole(*camera),
-        inverse_depth_per_m: depth.collect(result, |depth: f32| depth * scale)?,
-        color_rgb9e5: colors[0].collect(result, |color: u32| color)?,
-        normal_oct16: planes.normal.then(|| colors[1].collect(result, |n: u32| n)).transpose()?,
-        surface_id: planes.surface_id.then(|| colors[id_plane].collect(result, |id: SurfaceId| id)).transpose()?,
-    })
+    let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+    let entries = [entry(0, texture), entry(1, texture), entry(2, sampler)];
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("textures"), entries: &entries })
 }

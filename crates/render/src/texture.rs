@@ -6,7 +6,7 @@ use scene::Texture;
 
 /// One texel of white, for materials without a texture.
 pub(crate) fn white() -> Texture {
-    Texture { width_px: 1, height_px: 1, srgba8: vec![255; 4] }
+    Texture { width_px: 1, height_px: 1, is_srgb: true, srgba8: vec![255; 4] }
 }
 
 /// Uploads a texture and all of its mip levels.
@@ -19,16 +19,20 @@ pub(crate) fn upload(gpu: &Gpu, texture: &Texture) -> wgpu::TextureView {
         mip_level_count: levels,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        format: if texture.is_srgb { wgpu::TextureFormat::Rgba8UnormSrgb } else { wgpu::TextureFormat::Rgba8Unorm },
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
-    let mut level = texture.clone();
-    for mip in 0..levels {
+    for (mip, level) in (0..levels).zip(mips(texture)) {
         write_level(gpu, &on_device, mip, &level);
-        level = halved(&level);
     }
     on_device.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+/// The texture and its halves, down to one texel.
+pub(crate) fn mips(texture: &Texture) -> impl Iterator<Item = Texture> {
+    let next = |level: &Texture| (level.width_px.max(level.height_px) > 1).then(|| halved(level));
+    std::iter::successors(Some(texture.clone()), next)
 }
 
 fn write_level(gpu: &Gpu, texture: &wgpu::Texture, mip_level: u32, level: &Texture) {
@@ -44,7 +48,7 @@ fn write_level(gpu: &Gpu, texture: &wgpu::Texture, mip_level: u32, level: &Textu
     gpu.queue.write_texture(destination, &level.srgba8, layout, size);
 }
 
-/// Half the size, each texel the mean of up to four in linear light.
+/// Half the size, each texel the mean of up to four; of colours in linear light.
 fn halved(texture: &Texture) -> Texture {
     let (width, height) = ((texture.width_px / 2).max(1), (texture.height_px / 2).max(1));
     let decode: [f32; 256] = std::array::from_fn(|code| linear_from_srgb8(code as u8));
@@ -55,13 +59,13 @@ fn halved(texture: &Texture) -> Texture {
     let mean = |x: u32, y: u32, channel: u32| {
         let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| texel(2 * x + i, 2 * y + j, channel));
         match channel {
-            3 => (four.iter().map(|&v| u32::from(v)).sum::<u32>() / 4) as u8,
-            _ => srgb8_from_linear(four.iter().map(|&v| decode[v as usize]).sum::<f32>() * 0.25),
+            0..3 if texture.is_srgb => srgb8_from_linear(four.iter().map(|&v| decode[v as usize]).sum::<f32>() * 0.25),
+            _ => (four.iter().map(|&v| u32::from(v)).sum::<u32>() / 4) as u8,
         }
     };
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
     let srgba8 = pixels.flat_map(|(x, y)| (0..4).map(move |c| (x, y, c))).map(|(x, y, c)| mean(x, y, c)).collect();
-    Texture { width_px: width, height_px: height, srgba8 }
+    Texture { width_px: width, height_px: height, is_srgb: texture.is_srgb, srgba8 }
 }
 
 #[cfg(test)]
@@ -70,7 +74,7 @@ mod tests {
 
     #[test]
     fn halving_averages_light_not_codes() {
-        let mut texture = Texture { width_px: 2, height_px: 1, srgba8: vec![255; 8] };
+        let mut texture = Texture { width_px: 2, height_px: 1, is_srgb: true, srgba8: vec![255; 8] };
         texture.srgba8[..3].fill(0);
         assert_eq!(halved(&texture).srgba8, [188, 188, 188, 255]);
     }

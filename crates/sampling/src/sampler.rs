@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use depth_image::{Camera, DepthImage};
 use gpu::Gpu;
-use render::{DrawWork, GpuScene, Lighting, Rasterizer, RenderError, SamplePlanes};
+use render::{DrawWork, RenderError, Renderer, SamplePlanes};
 
 use crate::SamplingMethod;
 
@@ -17,39 +17,36 @@ pub enum SamplingError {
 }
 
 /// What to sample.
+#[derive(Clone, Copy)]
 pub struct SampleWork<'a> {
-    /// From where.
-    pub scene: &'a GpuScene,
+    /// Of what, lit how.
+    pub draw: DrawWork<'a>,
     /// One image each.
     pub cameras: &'a [Camera],
     /// Which samples are taken.
     pub method: SamplingMethod,
-    /// How surfaces are lit.
-    pub lighting: Lighting,
-    /// Which moment of an animated scene.
-    pub scene_time_s: f32,
     /// Planes beside colour and depth.
     pub planes: SamplePlanes,
 }
 
 /// Takes samples; shares its pipelines with direct rendering.
 pub struct Sampler {
-    rasterizer: Arc<Rasterizer>,
+    renderer: Arc<Renderer>,
 }
 
 impl Sampler {
-    /// Makes a rasteriser of its own.
+    /// Makes a renderer of its own.
     ///
     /// # Errors
     /// When a shader is broken.
     pub fn new(gpu: &Arc<Gpu>) -> Result<Self, SamplingError> {
-        Ok(Self::sharing(Arc::new(Rasterizer::new(gpu)?)))
+        Ok(Self::sharing(Arc::new(Renderer::new(gpu)?)))
     }
 
-    /// Uses `rasterizer`.
+    /// Uses `renderer`.
     #[must_use]
-    pub fn sharing(rasterizer: Arc<Rasterizer>) -> Self {
-        Self { rasterizer }
+    pub fn sharing(renderer: Arc<Renderer>) -> Self {
+        Self { renderer }
     }
 
     /// One depth image a camera, in their order.
@@ -57,9 +54,10 @@ impl Sampler {
     /// # Errors
     /// A camera that is not valid, or the device.
     pub fn sample(&self, work: &SampleWork<'_>) -> Result<Vec<DepthImage>, SamplingError> {
-        let draw = DrawWork { scene: work.scene, lighting: work.lighting, scene_time_s: work.scene_time_s };
         match work.method {
-            SamplingMethod::Conventional => Ok(self.rasterizer.draw_depth_images(draw, work.cameras, work.planes)?),
+            SamplingMethod::Conventional => {
+                Ok(self.renderer.draw_depth_images(work.draw, work.cameras, work.planes)?)
+            }
         }
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use depth_image::{Camera, CameraError, DepthImage};
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
-use render::{GpuScene, Lighting, RenderError, SamplePlanes};
+use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, SamplePlanes, Visibility};
 use sampling::{Rig, SampleWork, Sampler, SamplingError, SamplingMethod};
 use scene::procedural::courtyard;
 
@@ -30,15 +30,14 @@ fn device() -> &'static Device {
 }
 
 fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, SamplingError> {
-    let work = SampleWork {
+    let draw = DrawWork {
         scene: &device().scene,
-        cameras,
-        method: SamplingMethod::Conventional,
-        lighting: Lighting::Phong,
+        lighting: Lighting::PHONG,
         scene_time_s: 0.0,
-        planes,
+        visibility: Visibility::Triangles,
+        refinement: Refinement::default(),
     };
-    device().sampler.sample(&work)
+    device().sampler.sample(&SampleWork { draw, cameras, method: SamplingMethod::Conventional, planes })
 }
 
 /// More than one submission holds, of two sizes.
@@ -52,7 +51,7 @@ fn planes_come_as_asked() {
     let cameras: Vec<Camera> = device().rig.samples(UVec2::new(40, 30)).into_iter().map(Camera::Pinhole).collect();
     let mut depth = None;
     for (normal, surface_id) in [(false, false), (true, false), (false, true), (true, true)] {
-        let images = sample(&cameras, SamplePlanes { normal, surface_id }).expect("images");
+        let images = sample(&cameras, SamplePlanes { normal, surface_id, specular: false }).expect("images");
         assert_eq!(images.len(), 4);
         for image in &images {
             image.validate().expect("planes of one size");
@@ -67,7 +66,7 @@ fn planes_come_as_asked() {
 
 #[test]
 fn a_batch_is_its_singles() {
-    let planes = SamplePlanes { normal: true, surface_id: true };
+    let planes = SamplePlanes { normal: true, surface_id: true, specular: false };
     let all = sample(&cameras(), planes).expect("images");
     assert_eq!(all.len(), 40);
     for (index, (camera, image)) in cameras().into_iter().zip(&all).enumerate() {

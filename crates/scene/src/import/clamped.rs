@@ -9,7 +9,11 @@ use crate::error::Fault;
 /// reason to refuse a model. What is no number is one.
 pub(crate) fn clamped(element: impl fmt::Display, value: f32, range: RangeInclusive<f32>) -> Result<f32, Fault> {
     if value.is_finite() {
-        Ok(value.clamp(*range.start(), *range.end()))
+        let within = value.clamp(*range.start(), *range.end());
+        if within != value {
+            tracing::warn!("{element}: {value} is out of range, {within} is taken");
+        }
+        Ok(within)
     } else {
         Err(Fault::malformed(element, "not finite"))
     }

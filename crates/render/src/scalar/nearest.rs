@@ -1,4 +1,4 @@
-//! The scalar reference of drawing: every ray against every triangle. For tests on small scenes.
+//! Every ray against every triangle: for small scenes.
 
 use depth_image::{PinholeCamera, Ray};
 use glam::{Vec2, Vec3};

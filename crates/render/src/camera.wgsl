@@ -1,0 +1,33 @@
+// One camera of a batch: its pixels' rays, and where its planes begin in what is shared by the batch.
+
+struct PixelCamera {
+    eye_in_world: vec3f,
+    near_m: f32,
+    // world direction of a pixel = column · x + row · y + corner; its parameter is planar depth in metres.
+    column_in_world: vec3f,
+    // A pixel's side on a surface that faces the camera, in metres at a depth of one metre.
+    footprint: f32,
+    row_in_world: vec3f,
+    first_word: u32,
+    corner_in_world: vec3f,
+    first_sum: u32,
+    size_px: vec2u,
+    pixel_count: u32,
+    seed: u32,
+    // Numbers of the rays that are traced now, and of all that the sums hold afterwards.
+    first_shadow_ray: u32,
+    shadow_rays: u32,
+    first_occlusion_ray: u32,
+    occlusion_rays: u32,
+    shadow_rays_in_sum: u32,
+    occlusion_rays_in_sum: u32,
+    occlusion_radius_m: f32,
+    tolerance: f32,
+}
+
+@group(0) @binding(0) var<uniform> camera: PixelCamera;
+
+fn direction_of(pixel: vec2u) -> vec3f {
+    let center = vec2f(pixel) + 0.5;
+    return camera.column_in_world * center.x + camera.row_in_world * center.y + camera.corner_in_world;
+}

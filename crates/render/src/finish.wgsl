@@ -1,0 +1,90 @@
+// Surface and light to finished planes: a view's colour and depth, or those of a depth image.
+{% include "camera.wgsl" %}
+{% include "color.wgsl" %}
+{% include "normal.wgsl" %}
+{% include "albedo.wgsl" %}
+{% if highlight %}
+{% include "light.wgsl" %}
+{% include "highlight.wgsl" %}
+{% endif %}
+
+@group(0) @binding(1) var surfaces: texture_2d<u32>;
+@group(0) @binding(2) var reversed_depth: {{ "texture_2d<f32>" if by_rays else "texture_depth_2d" }};
+// Of each camera, plane by plane.
+@group(0) @binding(3) var<storage, read_write> words: array<u32>;
+@group(0) @binding(4) var<storage, read> sums: array<f32>;
+@group(0) @binding(5) var<uniform> finish: Finish;
+{% if highlight %}
+@group(0) @binding(6) var<uniform> illumination: Illumination;
+{% endif %}
+{% if surface_id %}
+@group(0) @binding(7) var surface_ids: texture_2d<u32>;
+{% endif %}
+{% include "sums.wgsl" %}
+
+struct Finish { background_linear: vec3f, padding: u32 }
+
+fn put(plane: u32, place: u32, word: u32) { words[camera.first_word + plane * camera.pixel_count + place] = word; }
+fn sum_at(plane: u32, place: u32) -> f32 { return sums[camera.first_sum + plane * camera.pixel_count + place]; }
+
+fn light_at(place: u32) -> vec3f {
+    let lamps = vec3f(sum_at(LAMPS, place), sum_at(LAMPS + 1u, place), sum_at(LAMPS + 2u, place));
+    let environment = vec3f(sum_at(ENVIRONMENT, place), sum_at(ENVIRONMENT + 1u, place), sum_at(ENVIRONMENT + 2u, place));
+    return lamps / f32(camera.shadow_rays_in_sum) + environment / f32(camera.occlusion_rays_in_sum);
+}
+{% if visibility %}
+
+// Bytes of visibility: the environment's, then the lamps'.
+fn visibility_word(word: u32, place: u32) -> u32 {
+    var shares = vec4f(0.0);
+    for (var i = 0u; i < 4u; i++) {
+        let plane = word * 4u + i;
+        if plane >= {{ light_count + 1 }}u { break; }
+        let rays = select(camera.shadow_rays_in_sum, camera.occlusion_rays_in_sum, plane == 0u);
+        shares[i] = sum_at(OPEN_TO_ENVIRONMENT + plane, place) / f32(rays);
+    }
+    return pack4x8unorm(shares);
+}
+{% endif %}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= camera.size_px) { return; }
+    let place = id.y * camera.size_px.x + id.x;
+    let depth = textureLoad(reversed_depth, id.xy, 0){{ ".x" if by_rays else "" }};
+    let surface = textureLoad(surfaces, id.xy, 0);
+    let met = depth > 0.0;
+    var light = vec3f(1.0);
+{% if lit %}
+    light = select(light_at(place), light, (surface.x & SHOWN_AS_IT_IS) != 0u);
+{% endif %}
+    var linear = albedo_linear(surface.x) * light + linear_from_rgb9e5(surface.y);
+{% if highlight %}
+    for (var glossy = met && surface.w != 0u; glossy; glossy = false) {
+        let direction = direction_of(id.xy);
+        let point = camera.eye_in_world + direction * (camera.near_m / depth);
+        var visibility: VisibilityWords;
+{% for word in range(visibility_words) %}        visibility[{{ word }}] = visibility_word({{ word }}u, place);
+{% endfor %}
+        linear += highlight(point, unit_from_oct16(surface.z), -normalize(direction), surface.w, visibility);
+    }
+{% endif %}
+    let color = select(finish.background_linear, linear, met);
+{% if samples %}
+    put(0u, place, rgb9e5_from_linear(color));
+{% else %}
+    put(0u, place, pack4x8unorm(vec4f(srgb_from_linear(color), 1.0)));
+{% endif %}
+    put(1u, place, bitcast<u32>(depth / camera.near_m));
+{% if normal_plane > 0 %}    put({{ normal_plane }}u, place, surface.z);
+{% endif %}
+{% if reflector_plane > 0 %}    put({{ reflector_plane }}u, place, select(0u, surface.w, met));
+{% for word in range(visibility_words) %}    put({{ reflector_plane + 1 + word }}u, place, visibility_word({{ word }}u, place));
+{% endfor %}
+{% endif %}
+{% if surface_id %}
+    let ids = textureLoad(surface_ids, id.xy, 0);
+    put({{ id_plane }}u, place, ids.x);
+    put({{ id_plane + 1 }}u, place, ids.y);
+{% endif %}
+}

@@ -1,0 +1,147 @@
+// What arrives at each pixel's surface: of every lamp and of the environment, with rays where they are asked for.
+// Adds to sums that later rays can be added to.
+{% include "camera.wgsl" %}
+{% include "color.wgsl" %}
+{% include "normal.wgsl" %}
+{% include "light.wgsl" %}
+{% include "sequence.wgsl" %}
+{% if traced %}
+{% include "rays/traverse.wgsl" %}
+{% endif %}
+
+@group(0) @binding(1) var<uniform> illumination: Illumination;
+@group(0) @binding(2) var surfaces: texture_2d<u32>;
+@group(0) @binding(3) var reversed_depth: {{ "texture_2d<f32>" if by_rays else "texture_depth_2d" }};
+// Of each camera, plane by plane (sums.wgsl).
+@group(0) @binding(4) var<storage, read_write> sums: array<f32>;
+{% include "sums.wgsl" %}
+{% if domain == "list" %}
+struct List { workgroups: u32, y: u32, z: u32, count: u32 }
+@group(0) @binding(5) var<storage, read> listed_pixels: array<u32>;
+@group(0) @binding(6) var<storage, read> list: List;
+{% endif %}
+
+// Rays begin above the surface by this share of the pixel's footprint on it: less than can be seen, more than
+// what rounding makes of the point.
+const BIAS_FOOTPRINTS: f32 = {{ bias_footprints }};
+// And by so many roundings of its coordinates.
+const BIAS_ROUNDINGS: f32 = 4e-7;
+
+struct Spot { point: vec3f, normal: vec3f, origin: vec3f, bias_m: f32, seed: u32 }
+
+fn spot_of(pixel: vec2u, depth: f32, surface: vec4u) -> Spot {
+    let planar_depth_m = camera.near_m / depth;
+    let offset = direction_of(pixel) * planar_depth_m;
+    let point = camera.eye_in_world + offset;
+    let normal = unit_from_oct16(surface.z);
+    let size = abs(camera.eye_in_world) + abs(offset);
+    let bias_m = BIAS_FOOTPRINTS * planar_depth_m * camera.footprint + BIAS_ROUNDINGS * max(max(size.x, size.y), size.z);
+    return Spot(point, normal, point + normal * bias_m, bias_m, hashed(camera.seed ^ hashed(pixel.x | (pixel.y << 16u))));
+}
+
+struct Arrival { linear: vec3f, open: f32 }
+
+// Of one lamp: the sum over its rays.
+fn from_lamp(number: u32, spot: Spot) -> Arrival {
+    let lamp = illumination.lights[number];
+{% if shadow_rays == "none" %}
+    let incident = incident_from(lamp, spot.point, vec2f(0.5));
+    return Arrival(incident.irradiance_linear * max(dot(spot.normal, incident.towards), 0.0), 1.0);
+{% else %}
+    var arrival = Arrival(vec3f(0.0), 0.0);
+    for (var i = 0u; i < camera.shadow_rays; i++) {
+{% if shadow_rays == "one" %}
+        let place = vec2f(0.5);
+{% else %}
+        let place = point_of(camera.first_shadow_ray + i, hashed(spot.seed + number));
+{% endif %}
+        let incident = incident_from(lamp, spot.point, place);
+        let cosine = dot(spot.normal, incident.towards);
+        var open = 0.0;
+        // A loop, for what no lane needs is left out only of loops.
+        for (var lit = cosine > 0.0 && any(incident.irradiance_linear > vec3f(0.0)); lit; lit = false) {
+            let blocked = is_blocked(ray_from(spot.origin, incident.towards), incident.distance_m - spot.bias_m);
+            open = select(1.0, 0.0, blocked);
+        }
+        arrival.linear += incident.irradiance_linear * (max(cosine, 0.0) * open);
+        arrival.open += open;
+    }
+    return arrival;
+{% endif %}
+}
+
+fn from_environment(spot: Spot) -> Arrival {
+{% if occluded %}
+    let around = tangents_of(spot.normal);
+    var arrival = Arrival(vec3f(0.0), 0.0);
+    for (var i = 0u; i < camera.occlusion_rays; i++) {
+        let disc = disc_from_square(point_of(camera.first_occlusion_ray + i, hashed(spot.seed + 0x5bd1e995u)));
+        let up = sqrt(max(1.0 - dot(disc, disc), 0.0));
+        let towards = around.tangent * disc.x + around.bitangent * disc.y + spot.normal * up;
+        let open = select(1.0, 0.0, is_blocked(ray_from(spot.origin, towards), camera.occlusion_radius_m));
+        arrival.linear += environment_radiance(towards) * open;
+        arrival.open += open;
+    }
+    return arrival;
+{% else %}
+    return Arrival(environment_diffuse(spot.normal), 1.0);
+{% endif %}
+}
+
+fn add(plane: u32, place: u32, value: f32) {
+    let index = camera.first_sum + plane * camera.pixel_count + place;
+{% if continued %}
+    sums[index] += value;
+{% else %}
+    sums[index] = value;
+{% endif %}
+}
+
+fn add_color(plane: u32, place: u32, linear: vec3f) {
+    add(plane, place, linear.r);
+    add(plane + 1u, place, linear.g);
+    add(plane + 2u, place, linear.b);
+}
+
+fn light_pixel(pixel: vec2u) {
+    let place = pixel.y * camera.size_px.x + pixel.x;
+    let depth = textureLoad(reversed_depth, pixel, 0){{ ".x" if by_rays else "" }};
+    var lamps_linear = vec3f(0.0);
+    var environment = Arrival(vec3f(0.0), 0.0);
+    for (var found = depth > 0.0; found; found = false) {
+        let spot = spot_of(pixel, depth, textureLoad(surfaces, pixel, 0));
+        environment = from_environment(spot);
+        for (var number = 0u; number < illumination.light_count; number++) {
+            let lamp = from_lamp(number, spot);
+            lamps_linear += lamp.linear;
+{% if visibility %}            add(OPEN_TO_LAMPS + number, place, lamp.open);
+{% endif %}
+        }
+    }
+    add_color(LAMPS, place, lamps_linear);
+    add_color(ENVIRONMENT, place, environment.linear);
+{% if visibility %}    add(OPEN_TO_ENVIRONMENT, place, environment.open);
+{% endif %}
+}
+
+{% if domain == "list" %}
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= list.count { return; }
+    let place = listed_pixels[id.x];
+    light_pixel(vec2u(place % camera.size_px.x, place / camera.size_px.x));
+}
+{% elif domain == "grid" %}
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let pixel = id.xy * {{ grid_px }}u;
+    if any(pixel >= camera.size_px) { return; }
+    light_pixel(pixel);
+}
+{% else %}
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= camera.size_px) { return; }
+    light_pixel(id.xy);
+}
+{% endif %}

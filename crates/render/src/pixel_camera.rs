@@ -1,0 +1,79 @@
+//! `PixelCamera` of `camera.wgsl`.
+
+use bytemuck::{Pod, Zeroable};
+use depth_image::PinholeCamera;
+use glam::{UVec2, Vec3};
+use wgpu::BufferUsages;
+
+/// One camera of a batch.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct PixelCamera {
+    pub eye_in_world: [f32; 3],
+    pub near_m: f32,
+    pub column_in_world: [f32; 3],
+    pub footprint: f32,
+    pub row_in_world: [f32; 3],
+    pub first_word: u32,
+    pub corner_in_world: [f32; 3],
+    pub first_sum: u32,
+    pub size_px: [u32; 2],
+    pub pixel_count: u32,
+    pub seed: u32,
+    pub first_shadow_ray: u32,
+    pub shadow_rays: u32,
+    pub first_occlusion_ray: u32,
+    pub occlusion_rays: u32,
+    pub shadow_rays_in_sum: u32,
+    pub occlusion_rays_in_sum: u32,
+    pub occlusion_radius_m: f32,
+    pub tolerance: f32,
+}
+
+/// What a shader sees at an offset.
+pub(crate) const PIXEL_CAMERA_BYTES: usize = size_of::<PixelCamera>();
+/// From one camera of a batch to the next: uniform offsets must be multiples of this on every device.
+pub(crate) const PIXEL_CAMERA_STRIDE: u32 = 256;
+
+impl PixelCamera {
+    /// Rays' seeds are the camera's place alone: noise does not swim while nothing moves, and images that are
+    /// blended do not share it.
+    pub fn of(camera: &PinholeCamera) -> Self {
+        let column = camera.world_from_camera * Vec3::X / camera.focal_px.x;
+        let row = camera.world_from_camera * Vec3::NEG_Y / camera.focal_px.y;
+        let corner = camera.forward_in_world() - column * camera.principal_px.x - row * camera.principal_px.y;
+        let seed = camera.eye_in_world.to_array().iter().fold(0u32, |seed, c| {
+            (seed ^ c.to_bits()).wrapping_mul(0x9e37_79b1).rotate_left(13)
+        });
+        Self {
+            eye_in_world: camera.eye_in_world.to_array(),
+            near_m: camera.near_m,
+            column_in_world: column.to_array(),
+            footprint: camera.focal_px.min_element().recip(),
+            row_in_world: row.to_array(),
+            corner_in_world: corner.to_array(),
+            size_px: camera.size_px.to_array(),
+            pixel_count: camera.pixel_count() as u32,
+            seed,
+            shadow_rays_in_sum: 1,
+            occlusion_rays_in_sum: 1,
+            ..Self::zeroed()
+        }
+    }
+
+    /// `direction_of` of the shader.
+    pub fn direction_of(&self, pixel: UVec2) -> Vec3 {
+        let center = pixel.as_vec2() + 0.5;
+        let [column, row, corner] = [self.column_in_world, self.row_in_world, self.corner_in_world].map(Vec3::from);
+        column * center.x + row * center.y + corner
+    }
+}
+
+/// A uniform of them all, each at its offset.
+pub(crate) fn uniform(gpu: &gpu::Gpu, cameras: &[PixelCamera]) -> wgpu::Buffer {
+    let mut bytes = vec![0; cameras.len() * PIXEL_CAMERA_STRIDE as usize];
+    for (slot, camera) in bytes.chunks_mut(PIXEL_CAMERA_STRIDE as usize).zip(cameras) {
+        slot[..PIXEL_CAMERA_BYTES].copy_from_slice(bytemuck::bytes_of(camera));
+    }
+    gpu.buffer_with("pixel cameras", &bytes, BufferUsages::UNIFORM)
+}

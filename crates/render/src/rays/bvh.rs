@@ -1,0 +1,156 @@
+//! The bounding volume hierarchy: eight children a node, boxes in eight bits (Ylitie et al. 2017). `obvhs` builds
+//! it; moving triangles are refitted here, for the crate refits only its two-child form.
+
+use std::time::{Duration, Instant};
+
+use glam::{Vec3, Vec3A};
+use obvhs::{
+    BvhBuildParams,
+    cwbvh::{CwBvh, builder::build_cwbvh_from_tris, node::CwBvhNode},
+    triangle::Triangle,
+};
+
+/// Most levels that the device's traversal has room for.
+pub const MAX_DEPTH: u32 = 48;
+
+/// A refitted tree whose rays meet this many times the boxes of a new one is built anew.
+pub const WORST_REFIT: f32 = 1.3;
+
+/// Triangles of a scene at one time, and the tree over them.
+pub struct Bvh {
+    pub tree: CwBvh,
+    /// Levels of nodes.
+    pub depth: u32,
+    /// Expected node visits and triangle tests of a random ray through the scene's box (the surface area
+    /// heuristic).
+    pub cost: f32,
+    /// Of the tree when it was built.
+    pub cost_when_built: f32,
+    /// How long the last build or refit took.
+    pub took: Duration,
+}
+
+impl Bvh {
+    /// Builds a tree over triangles, given by three points each.
+    pub fn build(corners_in_world: &[[Vec3; 3]]) -> Self {
+        let start = Instant::now();
+        let triangles: Vec<Triangle> = corners_in_world
+            .iter()
+            .map(|[a, b, c]| Triangle { v0: (*a).into(), v1: (*b).into(), v2: (*c).into() })
+            .collect();
+        let tree = build_cwbvh_from_tris(&triangles, BvhBuildParams::medium_build(), &mut Duration::default());
+        let mut bvh = Self { tree, depth: 0, cost: 0.0, cost_when_built: 0.0, took: Duration::ZERO };
+        bvh.refit(corners_in_world);
+        bvh.cost_when_built = bvh.cost;
+        bvh.depth = bvh.measured_depth();
+        bvh.took = start.elapsed();
+        bvh
+    }
+
+    /// Fits the boxes to where the triangles are now. Children come after their parents, so that one pass from
+    /// the last node to the first sees every box complete.
+    pub fn refit(&mut self, corners_in_world: &[[Vec3; 3]]) {
+        let start = Instant::now();
+        let mut bounds = vec![Bounds::EMPTY; self.tree.nodes.len()];
+        let mut area_sum = 0.0;
+        for index in (0..self.tree.nodes.len()).rev() {
+            let children = self.child_bounds(index, &bounds, corners_in_world);
+            let node = &mut self.tree.nodes[index];
+            bounds[index] = children.iter().flatten().fold(Bounds::EMPTY, |all, child| all.with(child));
+            area_sum += bounds[index].half_area() + leaf_area(node, &children);
+            quantise(node, &bounds[index], &children);
+        }
+        self.cost = bounds.first().map_or(0.0, |root| area_sum / root.half_area().max(f32::MIN_POSITIVE));
+        self.took = start.elapsed();
+    }
+
+    /// Whether boxes have grown so that a new tree would be worth its time.
+    pub fn is_worn(&self) -> bool {
+        self.cost > self.cost_when_built * WORST_REFIT
+    }
+
+    fn child_bounds(&self, index: usize, nodes: &[Bounds], corners_in_world: &[[Vec3; 3]]) -> [Option<Bounds>; 8] {
+        let node = &self.tree.nodes[index];
+        std::array::from_fn(|child| {
+            if node.is_child_empty(child) {
+                return None;
+            }
+            if !node.is_leaf(child) {
+                return Some(nodes[node.child_node_index(child) as usize]);
+            }
+            let (first, count) = node.child_primitives(child);
+            let slots = &self.tree.primitive_indices[first as usize..(first + count) as usize];
+            Some(slots.iter().fold(Bounds::EMPTY, |all, &triangle| all.around(&corners_in_world[triangle as usize])))
+        })
+    }
+
+    fn measured_depth(&self) -> u32 {
+        let mut depths = vec![1u32; self.tree.nodes.len()];
+        for (index, node) in self.tree.nodes.iter().enumerate() {
+            for child in (0..8).filter(|&child| !node.is_child_empty(child) && !node.is_leaf(child)) {
+                depths[node.child_node_index(child) as usize] = depths[index] + 1;
+            }
+        }
+        depths.into_iter().max().unwrap_or(0)
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Bounds {
+    min: Vec3A,
+    max: Vec3A,
+}
+
+impl Bounds {
+    const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
+
+    fn with(self, other: &Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    fn around(self, corners: &[Vec3; 3]) -> Self {
+        corners.iter().fold(self, |all, &corner| {
+            let corner = Vec3A::from(corner);
+            Self { min: all.min.min(corner), max: all.max.max(corner) }
+        })
+    }
+
+    fn half_area(&self) -> f32 {
+        let size = (self.max - self.min).max(Vec3A::ZERO);
+        size.x * size.y + size.y * size.z + size.z * size.x
+    }
+}
+
+/// Area of leaves, each as often as it has triangles.
+fn leaf_area(node: &CwBvhNode, children: &[Option<Bounds>; 8]) -> f32 {
+    let leaves = (0..8).filter(|&child| node.is_leaf(child));
+    leaves.filter_map(|c| children[c].map(|b| b.half_area() * node.child_primitives(c).1 as f32)).sum()
+}
+
+/// Of a step of the eight-bit boxes: more than what rounding takes off a difference.
+const ROUNDING: f32 = 1e-3;
+
+/// Writes a node's box and its children's, rounded outwards.
+fn quantise(node: &mut CwBvhNode, bounds: &Bounds, children: &[Option<Bounds>; 8]) {
+    let size = (bounds.max - bounds.min).to_array();
+    node.p = bounds.min.into();
+    node.e = size.map(exponent);
+    let scale = node.e.map(|e| f32::from_bits(u32::from(e) << 23));
+    for (child, bounds_of_child) in children.iter().enumerate() {
+        let Some(b) = bounds_of_child else { continue };
+        let steps = |v: Vec3A, axis: usize| (v[axis] - bounds.min[axis]) / scale[axis];
+        let low: [u8; 3] = std::array::from_fn(|axis| (steps(b.min, axis) - ROUNDING).floor() as u8);
+        let high: [u8; 3] = std::array::from_fn(|axis| (steps(b.max, axis) + ROUNDING).ceil() as u8);
+        (node.child_min_x[child], node.child_min_y[child], node.child_min_z[child]) = low.into();
+        (node.child_max_x[child], node.child_max_y[child], node.child_max_z[child]) = high.into();
+    }
+}
+
+/// The biased exponent of the least power of two of which 255 span `size`.
+fn exponent(size: f32) -> u8 {
+    // 254 leaves room for rounding; the least exponent keeps flat boxes from dividing by zero.
+    let step = (size / 254.0).max(1e-30);
+    let bits = step.to_bits();
+    let up = u32::from(bits & 0x7f_ffff != 0);
+    ((bits >> 23) + up).min(254) as u8
+}

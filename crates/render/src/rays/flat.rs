@@ -1,0 +1,141 @@
+//! A scene's triangles in the world, instances written out: what rays are traced against.
+
+use depth_image::oct16_from_unit;
+use glam::{Mat3, Vec3};
+use rayon::prelude::*;
+use scene::{Material, Mesh, Scene, Wind};
+
+use crate::cluster::{self, Cluster};
+
+/// Flag of a triangle whose texture decides where it is.
+pub const ALPHA_TESTED: u32 = 1 << 31;
+/// Flag of a triangle whose back is seen too.
+pub const DOUBLE_SIDED: u32 = 1 << 30;
+/// Flag of a triangle that is shown as it is, whatever the light.
+pub const UNLIT: u32 = 1 << 29;
+/// Flag of a triangle that has highlights.
+pub const SPECULAR: u32 = 1 << 28;
+/// Those that a ray must know before it knows what it met.
+pub const CORNER_FLAGS: u32 = ALPHA_TESTED | DOUBLE_SIDED;
+/// Vertex numbers share a word with the flags.
+pub const MAX_VERTICES: u64 = 1 << 30;
+
+/// One corner besides its position: one texel on the device.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct FlatVertex {
+    /// In the world.
+    pub normal_oct16: u32,
+    /// As in [`scene::Vertex`].
+    pub uv: [f32; 2],
+    /// As in [`scene::Vertex`].
+    pub color_srgba8: [u8; 4],
+}
+
+/// One triangle besides its corners: one texel on the device.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct FlatTriangle {
+    /// Into [`Scene::instances`].
+    pub instance: u32,
+    /// As in [`depth_image::SurfaceId`].
+    pub primitive: u32,
+    /// Into [`Scene::materials`].
+    pub material: u32,
+    /// [`ALPHA_TESTED`], [`DOUBLE_SIDED`], [`UNLIT`] and [`SPECULAR`].
+    pub flags: u32,
+}
+
+/// All triangles of all instances.
+#[derive(Debug, Default)]
+pub struct FlatScene {
+    rest_in_world: Vec<Vec3>,
+    sway: Vec<f32>,
+    wind: Option<Wind>,
+    pub vertices: Vec<FlatVertex>,
+    pub corners: Vec<[u32; 3]>,
+    pub triangles: Vec<FlatTriangle>,
+}
+
+impl FlatScene {
+    /// Writes out the instances.
+    pub fn of(scene: &Scene, ordered: &[OrderedMesh<'_>]) -> Self {
+        let mut flat = Self { wind: scene.wind, ..Self::default() };
+        for (number, instance) in (0..).zip(&scene.instances) {
+            flat.add(scene, number, &ordered[instance.mesh as usize]);
+        }
+        flat
+    }
+
+    fn add(&mut self, scene: &Scene, number: u32, mesh: &OrderedMesh<'_>) {
+        let placed = &scene.instances[number as usize].world_from_mesh;
+        let normals = Mat3::from(placed.matrix3).inverse().transpose();
+        let first_vertex = self.rest_in_world.len() as u32;
+        let vertices = &mesh.mesh.vertices;
+        self.rest_in_world.extend(vertices.iter().map(|v| placed.transform_point3(v.position.into())));
+        self.sway.extend(vertices.iter().map(|v| v.sway));
+        self.vertices.extend(vertices.iter().map(|v| FlatVertex {
+            normal_oct16: oct16_from_unit((normals * Vec3::from(v.normal)).normalize_or(Vec3::Y)),
+            uv: v.uv,
+            color_srgba8: v.color_srgba8,
+        }));
+        let flags: Vec<u32> = scene.materials.iter().map(flags_of).collect();
+        for (primitive, (triangle, material)) in (mesh.first_primitive..).zip(mesh.triangles()) {
+            self.corners.push(triangle.map(|v| v + first_vertex));
+            let flags = flags[material as usize];
+            self.triangles.push(FlatTriangle { instance: number, primitive, material, flags });
+        }
+    }
+
+    /// Whether positions depend on scene time.
+    pub fn is_animated(&self) -> bool {
+        self.wind.is_some()
+    }
+
+    /// Where the corners of all triangles are at a scene time.
+    pub fn positions_in_world(&self, scene_time_s: f32) -> Vec<Vec3> {
+        let Some(wind) = self.wind else { return self.rest_in_world.clone() };
+        let moved = |(&rest, &sway): (&Vec3, &f32)| rest + wind.displacement_in_world(rest, sway, scene_time_s);
+        self.rest_in_world.par_iter().zip(&self.sway).map(moved).collect()
+    }
+}
+
+fn flags_of(material: &Material) -> u32 {
+    let flag = |is: bool, bit: u32| if is { bit } else { 0 };
+    flag(material.alpha_cutoff > 0.0, ALPHA_TESTED)
+        | flag(material.double_sided, DOUBLE_SIDED)
+        | flag(material.unlit, UNLIT)
+        | flag(material.is_specular(), SPECULAR)
+}
+
+/// A mesh with its triangles in the order that gives them their numbers.
+pub(crate) struct OrderedMesh<'s> {
+    pub mesh: &'s Mesh,
+    /// Number of its first triangle in the scene.
+    pub first_primitive: u32,
+    /// Three corners a triangle.
+    pub indices: Vec<u32>,
+    /// They cover the triangles in order.
+    pub clusters: Vec<Cluster>,
+}
+
+impl<'s> OrderedMesh<'s> {
+    /// All meshes of a scene.
+    pub fn all(scene: &'s Scene) -> Vec<Self> {
+        let mut first_primitive = 0;
+        let mut ordered = Vec::with_capacity(scene.meshes.len());
+        for mesh in &scene.meshes {
+            let (indices, clusters) = cluster::clustered(mesh);
+            ordered.push(Self { mesh, first_primitive, indices, clusters });
+            first_primitive += mesh.triangle_count() as u32;
+        }
+        ordered
+    }
+
+    /// Corners and material of each triangle.
+    fn triangles(&self) -> impl Iterator<Item = ([u32; 3], u32)> {
+        let corners = self.indices.as_chunks::<3>().0.iter().copied();
+        let materials = self.clusters.iter().flat_map(|c| std::iter::repeat_n(c.material, c.triangle_count as usize));
+        corners.zip(materials)
+    }
+}

@@ -1,0 +1,45 @@
+// Which surface each pixel shows, by one ray each: what raster.wgsl draws, found the other way round.
+{% include "camera.wgsl" %}
+{% include "surface.wgsl" %}
+{% include "rays/traverse.wgsl" %}
+
+@group(0) @binding(1) var surfaces: texture_storage_2d<rgba32uint, write>;
+// Near plane over planar depth, as a depth buffer has it; 0 where nothing is met.
+@group(0) @binding(2) var reversed_depth: texture_storage_2d<r32float, write>;
+{% if surface_id %}
+@group(0) @binding(3) var surface_ids: texture_storage_2d<rg32uint, write>;
+{% endif %}
+{% if count_visits %}
+@group(0) @binding({{ 3 + surface_id|int }}) var<storage, read_write> visit_counts: array<u32>;
+{% endif %}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= camera.size_px) { return; }
+    let direction = direction_of(id.xy);
+    let hit = closest(ray_from(camera.eye_in_world, direction), camera.near_m);
+    let met = hit.slot != NOTHING;
+    var surface = vec4u(0u);
+    var ids = vec2u(0u);
+    for (var found = met; found; found = false) {
+        let triangle = textureLoad(flat_triangles, texel_at(hit.slot), 0);
+        let at = attributes_at(hit.crossing);
+        let footprint = uv_footprint(hit.crossing, hit.slot, hit.t * camera.footprint);
+        let facing = select(-1.0, 1.0, hit.crossing.front);
+        let normal = normalize(at.normal + vec3f(0.0, 1e-20, 0.0)) * facing;
+        let emissive = bitcast<vec3f>(material_texel(triangle.z, 1u).xyz);
+        surface = packed_surface(
+            base_color(triangle.z, at, footprint).rgb, emissive, normal, coat(triangle.z, triangle.w, at, footprint),
+        );
+        ids = triangle.xy;
+    }
+    textureStore(surfaces, id.xy, surface);
+    textureStore(reversed_depth, id.xy, vec4f(select(0.0, camera.near_m / hit.t, met)));
+{% if surface_id %}    textureStore(surface_ids, id.xy, vec4u(ids, 0u, 0u));
+{% endif %}
+{% if count_visits %}
+    let place = (id.y * camera.size_px.x + id.x) * 2u;
+    visit_counts[place] = node_visits;
+    visit_counts[place + 1u] = triangle_tests;
+{% endif %}
+}

@@ -1,0 +1,267 @@
+//! A scene's triangles on the device, as rays need them: made when rays are first traced, moved when scene time is.
+
+use std::{
+    sync::{Arc, Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+
+use glam::{Vec3, Vec4};
+use gpu::{Gpu, GpuError};
+use rayon::prelude::*;
+use scene::{Material, Scene};
+use wgpu::TextureFormat;
+
+use super::{
+    bvh::{Bvh, MAX_DEPTH},
+    flat::{CORNER_FLAGS, FlatScene, MAX_VERTICES, OrderedMesh},
+};
+use crate::{data_texture::DataTexture, gpu_scene::phong_reflector, scalar, texture};
+
+/// How the tree over a scene's triangles came about.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct AccelerationReport {
+    /// Whether boxes were moved, not made anew.
+    pub refitted: bool,
+    /// On the host.
+    pub build_s: f64,
+    /// To the device.
+    pub upload_s: f64,
+    /// Expected visits and tests of a random ray through the scene's box.
+    pub cost: f32,
+    /// Nodes of up to eight children.
+    pub nodes: usize,
+    /// Instances counted each.
+    pub triangles: usize,
+    /// Nodes from the root to the deepest.
+    pub depth: u32,
+}
+
+/// The part of a scene that rays are traced against. Trees stand for one scene time, the last that was asked for.
+pub struct RayScene {
+    gpu: Arc<Gpu>,
+    flat: FlatScene,
+    tables: Tables,
+    state: Mutex<Option<Built>>,
+}
+
+/// What does not depend on the tree.
+struct Tables {
+    materials: Vec<[u32; 4]>,
+    texels: Vec<[u8; 4]>,
+    alpha_tested: bool,
+}
+
+struct Built {
+    bvh: Bvh,
+    scene_time_s: f32,
+    traced: Arc<Traced>,
+    last_refit: Option<Duration>,
+    last_build: Duration,
+}
+
+/// Bound to shaders that trace rays.
+pub struct Traced {
+    nodes: DataTexture,
+    corners: DataTexture,
+    fixed: Arc<Fixed>,
+    pub(crate) depth: u32,
+    pub(crate) alpha_tested: bool,
+    /// How it came about.
+    pub report: AccelerationReport,
+}
+
+/// What stays while triangles move, but for their order, which a new tree changes.
+struct Fixed {
+    vertices: DataTexture,
+    triangles: DataTexture,
+    materials: DataTexture,
+    texels: DataTexture,
+}
+
+impl RayScene {
+    /// Keeps what trees are made of; nothing is built or uploaded before it is needed.
+    pub(crate) fn of(gpu: &Arc<Gpu>, scene: &Scene, ordered: &[OrderedMesh<'_>]) -> Self {
+        Self { gpu: gpu.clone(), flat: FlatScene::of(scene, ordered), tables: Tables::of(scene), state: Mutex::default() }
+    }
+
+    /// Triangles and the tree over them at a scene time. A tree of another time is refitted where that costs less
+    /// than a new one and its boxes have not grown too far.
+    ///
+    /// # Errors
+    /// When the device's textures are too small for the scene.
+    pub fn at(&self, scene_time_s: f32) -> Result<Arc<Traced>, GpuError> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(built) = &*state
+            && (!self.flat.is_animated() || built.scene_time_s == scene_time_s)
+        {
+            return Ok(built.traced.clone());
+        }
+        let next = match state.take() {
+            Some(built) if built.prefers_refit() => self.refitted(built, scene_time_s)?,
+            _ => self.built(scene_time_s)?,
+        };
+        let traced = next.traced.clone();
+        *state = Some(next);
+        Ok(traced)
+    }
+
+    /// As [`RayScene::at`], by a new tree whatever there was.
+    ///
+    /// # Errors
+    /// As [`RayScene::at`].
+    pub fn rebuilt_at(&self, scene_time_s: f32) -> Result<Arc<Traced>, GpuError> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).take();
+        self.at(scene_time_s)
+    }
+
+    fn corners_in_world(&self, scene_time_s: f32) -> Vec<[Vec3; 3]> {
+        let positions = self.flat.positions_in_world(scene_time_s);
+        self.flat.corners.par_iter().map(|corners| corners.map(|i| positions[i as usize])).collect()
+    }
+
+    fn built(&self, scene_time_s: f32) -> Result<Built, GpuError> {
+        at_most("the vertices of all instances", self.flat.vertices.len() as u64, MAX_VERTICES)?;
+        let start = Instant::now();
+        let corners = self.corners_in_world(scene_time_s);
+        let bvh = Bvh::build(&corners);
+        at_most("levels of the tree over the scene", u64::from(bvh.depth), u64::from(MAX_DEPTH))?;
+        let took = start.elapsed();
+        let fixed = Arc::new(self.fixed(&bvh)?);
+        let traced = self.traced(&bvh, &corners, fixed, took, false)?;
+        Ok(Built { bvh, scene_time_s, traced, last_refit: None, last_build: took })
+    }
+
+    fn refitted(&self, mut built: Built, scene_time_s: f32) -> Result<Built, GpuError> {
+        let start = Instant::now();
+        let corners = self.corners_in_world(scene_time_s);
+        built.bvh.refit(&corners);
+        if built.bvh.is_worn() {
+            return self.built(scene_time_s);
+        }
+        let took = start.elapsed();
+        let traced = self.traced(&built.bvh, &corners, built.traced.fixed.clone(), took, true)?;
+        Ok(Built { scene_time_s, traced, last_refit: Some(took), ..built })
+    }
+
+    /// Attributes and textures; triangles in the order of the tree's leaves.
+    fn fixed(&self, bvh: &Bvh) -> Result<Fixed, GpuError> {
+        let triangles: Vec<_> =
+            bvh.tree.primitive_indices.iter().map(|&triangle| self.flat.triangles[triangle as usize]).collect();
+        let words = TextureFormat::Rgba32Uint;
+        let table = |what, elements: &[[u32; 4]]| DataTexture::with(&self.gpu, what, words, elements);
+        Ok(Fixed {
+            vertices: DataTexture::with(&self.gpu, "vertex attributes", words, &self.flat.vertices)?,
+            triangles: DataTexture::with(&self.gpu, "triangle attributes", words, &triangles)?,
+            materials: table("materials", &self.tables.materials)?,
+            texels: DataTexture::with(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?,
+        })
+    }
+
+    fn traced(
+        &self,
+        bvh: &Bvh,
+        corners_in_world: &[[Vec3; 3]],
+        fixed: Arc<Fixed>,
+        took: Duration,
+        refitted: bool,
+    ) -> Result<Arc<Traced>, GpuError> {
+        let start = Instant::now();
+        let words = TextureFormat::Rgba32Uint;
+        let nodes = DataTexture::with(&self.gpu, "nodes", words, &bvh.tree.nodes)?;
+        let corners = DataTexture::with(&self.gpu, "triangles", words, &self.corner_texels(bvh, corners_in_world))?;
+        let report = AccelerationReport {
+            refitted,
+            build_s: took.as_secs_f64(),
+            upload_s: start.elapsed().as_secs_f64(),
+            cost: bvh.cost,
+            nodes: bvh.tree.nodes.len(),
+            triangles: corners_in_world.len(),
+            depth: bvh.depth,
+        };
+        tracing::debug!(?report, "rays are ready");
+        let alpha_tested = self.tables.alpha_tested;
+        Ok(Arc::new(Traced { nodes, corners, fixed, depth: bvh.depth, alpha_tested, report }))
+    }
+
+    /// Three texels a triangle in the order of the tree's leaves: a corner's position, and its number with the
+    /// triangle's flags.
+    fn corner_texels(&self, bvh: &Bvh, corners_in_world: &[[Vec3; 3]]) -> Vec<[[u32; 4]; 3]> {
+        let texels = |&triangle: &u32| {
+            let triangle = triangle as usize;
+            let (points, numbers) = (corners_in_world[triangle], self.flat.corners[triangle]);
+            let flags = self.flat.triangles[triangle].flags & CORNER_FLAGS;
+            std::array::from_fn(|i| {
+                let [x, y, z] = points[i].to_array().map(f32::to_bits);
+                [x, y, z, numbers[i] | flags]
+            })
+        };
+        bvh.tree.primitive_indices.par_iter().map(texels).collect()
+    }
+
+    /// What the device has at a scene time, for the scalar twin.
+    ///
+    /// # Errors
+    /// When the device's textures are too small for the scene.
+    pub(crate) fn scalar(&self, scene_time_s: f32) -> Result<scalar::rays::Scene, GpuError> {
+        self.at(scene_time_s)?;
+        let corners_in_world = self.corners_in_world(scene_time_s);
+        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let bvh = state.as_ref().map(|built| &built.bvh);
+        let order = bvh.map_or(&[][..], |bvh| &bvh.tree.primitive_indices);
+        Ok(scalar::rays::Scene {
+            nodes: bvh.map_or_else(Vec::new, |bvh| bvh.tree.nodes.clone()),
+            corners: bvh.map_or_else(Vec::new, |bvh| self.corner_texels(bvh, &corners_in_world)),
+            triangles: order.iter().map(|&triangle| self.flat.triangles[triangle as usize]).collect(),
+            vertices: self.flat.vertices.clone(),
+            materials: self.tables.materials.clone(),
+            texels: self.tables.texels.clone(),
+        })
+    }
+}
+
+impl Built {
+    fn prefers_refit(&self) -> bool {
+        self.last_refit.is_none_or(|refit| refit < self.last_build)
+    }
+}
+
+impl Traced {
+    /// In the order of group 1 of `traverse.wgsl`.
+    pub(crate) fn views(&self) -> [&wgpu::TextureView; 6] {
+        let Fixed { vertices, triangles, materials, texels } = &*self.fixed;
+        [&self.nodes, &self.corners, vertices, triangles, materials, texels].map(|table| &table.view)
+    }
+}
+
+impl Tables {
+    fn of(scene: &Scene) -> Self {
+        let mut texels: Vec<[u8; 4]> = Vec::new();
+        let mut place = |texture: &scene::Texture| {
+            let first = texels.len() as u32;
+            texture::mips(texture).for_each(|level| texels.extend(level.srgba8.as_chunks::<4>().0));
+            [first, texture.width_px | texture.height_px << 16]
+        };
+        let places: Vec<[u32; 2]> = scene.textures.iter().map(&mut place).collect();
+        let place_of = |texture: Option<u32>| texture.map_or([0, 0], |t| places[t as usize]);
+        let materials = scene.materials.iter().flat_map(|material| material_texels(material, place_of)).collect();
+        let alpha_tested = scene.materials.iter().any(|m| m.alpha_cutoff > 0.0);
+        Self { materials, texels, alpha_tested }
+    }
+}
+
+/// Four texels: base colour; emission and alpha cutoff; metallic, roughness and reflector; places of textures.
+fn material_texels(material: &Material, place_of: impl Fn(Option<u32>) -> [u32; 2]) -> [[u32; 4]; 4] {
+    let emission = Vec4::from((material.emissive_linear, material.alpha_cutoff));
+    let [base_first, base_size] = place_of(material.base_color_texture);
+    let [coat_first, coat_size] = place_of(material.metallic_roughness_texture);
+    [
+        material.base_color_linear.map(f32::to_bits),
+        emission.to_array().map(f32::to_bits),
+        [material.metallic.to_bits(), material.roughness.to_bits(), phong_reflector(material), 0],
+        [base_first, base_size, coat_first, coat_size],
+    ]
+}
+
+fn at_most(what: &str, needed: u64, limit: u64) -> Result<(), GpuError> {
+    if needed <= limit { Ok(()) } else { Err(GpuError::Limit { what: what.to_owned(), needed, limit }) }
+}

@@ -1,0 +1,282 @@
+//! The twin of `rays/traverse.wgsl`: the same tree and triangles, the same operations on `f32` in the same order.
+//! What may differ on a device is what WGSL leaves open: the last bits of quotients, and whether a product and a
+//! sum are rounded once or twice.
+
+use depth_image::{PinholeCamera, Ray, SurfaceId};
+use glam::{UVec2, Vec2, Vec3};
+use obvhs::cwbvh::node::CwBvhNode;
+
+use crate::{
+    pixel_camera::PixelCamera,
+    rays::flat::{ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatTriangle, FlatVertex},
+};
+
+/// The tables that a device has of a scene at one time.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    pub(crate) nodes: Vec<CwBvhNode>,
+    /// In the order of the tree's leaves: corners, and their numbers with the triangle's flags.
+    pub(crate) corners: Vec<[[u32; 4]; 3]>,
+    pub(crate) triangles: Vec<FlatTriangle>,
+    pub(crate) vertices: Vec<FlatVertex>,
+    pub(crate) materials: Vec<[u32; 4]>,
+    pub(crate) texels: Vec<[u8; 4]>,
+}
+
+/// Where a ray meets a triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// The ray's parameter.
+    pub t: f32,
+    /// Place of the triangle in the order of the tree's leaves.
+    pub slot: u32,
+    /// Barycentric coordinates of the second and third corner.
+    pub barycentric: [f32; 2],
+    /// Whether the front was met.
+    pub front: bool,
+}
+
+/// What a search looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Visits {
+    /// Nodes of the tree.
+    pub nodes: u32,
+    /// Triangles.
+    pub triangles: u32,
+}
+
+/// The ray through the middle of a pixel, as on a device; its parameter is planar depth.
+#[must_use]
+pub fn pixel_ray(camera: &PinholeCamera, pixel: UVec2) -> Ray {
+    let direction_in_world = PixelCamera::of(camera).direction_of(pixel);
+    Ray { origin_in_world: camera.eye_in_world, direction_in_world }
+}
+
+/// Greater than any parameter of a hit.
+const FAR_AWAY: f32 = 3.0e38;
+/// As in the shader.
+const BOX_SLACK: f32 = 1.000_001;
+
+struct Traveller {
+    origin: Vec3,
+    direction: Vec3,
+    inverse: Vec3,
+    octant4: u32,
+}
+
+impl Traveller {
+    fn of(ray: &Ray) -> Self {
+        let direction = ray.direction_in_world;
+        let steep = |d: f32| if d.abs() < 1e-20 { 1e-20 } else { d };
+        let bit = |d: f32, bit: u32| if d < 0.0 { 0 } else { bit };
+        let octant = bit(direction.x, 4) | bit(direction.y, 2) | bit(direction.z, 1);
+        Self {
+            origin: ray.origin_in_world,
+            direction,
+            inverse: direction.map(|d| 1.0 / steep(d)),
+            octant4: octant * 0x0101_0101,
+        }
+    }
+}
+
+/// Children of one node that are to be visited: inner ones in bits 24 to 31, by their distance.
+#[derive(Clone, Copy)]
+struct Todo {
+    first_child: u32,
+    hits: u32,
+}
+
+impl Todo {
+    const ROOT: Self = Self { first_child: 0, hits: 0x8000_0000 };
+
+    fn is_done(self) -> bool {
+        self.hits <= 0x00ff_ffff
+    }
+
+    fn nearest_child(self, ray: &Traveller) -> u32 {
+        let slot = (self.hits.ilog2() - 24) ^ (ray.octant4 & 255);
+        self.first_child + (self.hits & !(u32::MAX << slot)).count_ones()
+    }
+
+    fn without_nearest(self) -> Self {
+        Self { hits: self.hits & !(1 << self.hits.ilog2()), ..self }
+    }
+}
+
+impl Scene {
+    /// The nearest triangle beyond `near`; backs of single-sided ones are not there.
+    #[must_use]
+    pub fn closest(&self, ray: &Ray, near: f32) -> (Option<Hit>, Visits) {
+        let mut hit = None;
+        let visits = self.search(ray, FAR_AWAY, |scene, ray, slot, t_max| {
+            let crossing = scene.crossing(slot, ray, t_max)?;
+            let seen = crossing.front || scene.has(slot, DOUBLE_SIDED);
+            if seen && crossing.t > near && scene.is_there(&crossing) {
+                hit = Some(crossing);
+            }
+            hit.map(|hit| hit.t)
+        });
+        (hit, visits)
+    }
+
+    /// Whether anything lies before `t_max`, whichever way it faces.
+    #[must_use]
+    pub fn is_blocked(&self, ray: &Ray, t_max: f32) -> (bool, Visits) {
+        let mut blocked = false;
+        let visits = self.search(ray, t_max, |scene, ray, slot, t_max| {
+            blocked = scene.crossing(slot, ray, t_max).is_some_and(|crossing| scene.is_there(&crossing));
+            blocked.then_some(f32::NEG_INFINITY)
+        });
+        (blocked, visits)
+    }
+
+    /// Which surface a hit lies on.
+    #[must_use]
+    pub fn surface_id(&self, hit: &Hit) -> SurfaceId {
+        let FlatTriangle { instance, primitive, .. } = self.triangles[hit.slot as usize];
+        SurfaceId { instance, primitive }
+    }
+
+    /// Corners of all triangles.
+    pub fn triangles_in_world(&self) -> impl Iterator<Item = [Vec3; 3]> {
+        (0..self.corners.len() as u32).map(|slot| self.corners_of(slot))
+    }
+
+    /// Levels of nodes.
+    #[must_use]
+    pub fn depth(&self) -> u32 {
+        let mut depths = vec![1; self.nodes.len()];
+        for (index, node) in self.nodes.iter().enumerate() {
+            for child in (0..8).filter(|&child| !node.is_child_empty(child) && !node.is_leaf(child)) {
+                depths[node.child_node_index(child) as usize] = depths[index] + 1;
+            }
+        }
+        depths.into_iter().max().unwrap_or(0)
+    }
+
+    /// Walks the tree front to back. `test` is asked about triangles with the greatest parameter that matters, and
+    /// gives a lesser one once it is known; below zero the search is over.
+    fn search(
+        &self,
+        ray: &Ray,
+        mut t_max: f32,
+        mut test: impl FnMut(&Self, &Traveller, u32, f32) -> Option<f32>,
+    ) -> Visits {
+        let ray = &Traveller::of(ray);
+        let mut visits = Visits::default();
+        let (mut stack, mut todo) = (Vec::new(), Todo::ROOT);
+        while !todo.is_done() && t_max >= 0.0 {
+            let child = todo.nearest_child(ray);
+            let rest = todo.without_nearest();
+            if !rest.is_done() {
+                stack.push(rest);
+            }
+            let node = &self.nodes[child as usize];
+            let hits = met_children(node, ray, t_max);
+            visits.nodes += 1;
+            todo = Todo { first_child: node.child_base_idx, hits: hits & 0xff00_0000 | u32::from(node.imask) };
+            let mut triangles = hits & 0x00ff_ffff;
+            while triangles != 0 && t_max >= 0.0 {
+                visits.triangles += 1;
+                let slot = node.primitive_base_idx + triangles.trailing_zeros();
+                t_max = test(self, ray, slot, t_max).unwrap_or(t_max);
+                triangles &= triangles - 1;
+            }
+            if todo.is_done() {
+                todo = stack.pop().unwrap_or(todo);
+            }
+        }
+        visits
+    }
+
+    fn corners_of(&self, slot: u32) -> [Vec3; 3] {
+        self.corners[slot as usize].map(|[x, y, z, _]| Vec3::from([x, y, z].map(f32::from_bits)))
+    }
+
+    fn has(&self, slot: u32, flag: u32) -> bool {
+        self.corners[slot as usize][0][3] & flag != 0
+    }
+
+    fn crossing(&self, slot: u32, ray: &Traveller, t_max: f32) -> Option<Hit> {
+        let [a, b, c] = self.corners_of(slot).map(|corner| corner - ray.origin);
+        let from_b = dot((c - a).cross(c + a), ray.direction);
+        let from_c = dot((a - b).cross(a + b), ray.direction);
+        let from_a = dot((b - c).cross(b + c), ray.direction);
+        let least = from_a.min(from_b).min(from_c);
+        let greatest = from_a.max(from_b).max(from_c);
+        let normal = (a - b).cross(c - a);
+        let along = dot(normal, ray.direction);
+        let t = dot(a, normal) / if along == 0.0 { 1e-30 } else { along };
+        let sum = from_a + from_b + from_c;
+        let share = 1.0 / if sum == 0.0 { 1e-30 } else { sum };
+        let met = (least >= 0.0 || greatest <= 0.0) && along != 0.0 && t > 0.0 && t < t_max;
+        met.then_some(Hit { t, slot, barycentric: [from_b * share, from_c * share], front: along > 0.0 })
+    }
+
+    /// Whether a texture leaves the triangle where it is met.
+    fn is_there(&self, hit: &Hit) -> bool {
+        if !self.has(hit.slot, ALPHA_TESTED) {
+            return true;
+        }
+        let material = self.triangles[hit.slot as usize].material as usize * 4;
+        let cutoff = f32::from_bits(self.materials[material + 1][3]);
+        self.alpha(material, hit) >= cutoff
+    }
+
+    fn alpha(&self, material: usize, hit: &Hit) -> f32 {
+        let [second, third] = hit.barycentric;
+        let shares = [1.0 - second - third, second, third];
+        let vertices = self.corners[hit.slot as usize].map(|c| self.vertices[(c[3] & !CORNER_FLAGS) as usize]);
+        let uv: Vec2 = (0..3).map(|i| Vec2::from(vertices[i].uv) * shares[i]).sum();
+        let vertex_alpha: f32 = (0..3).map(|i| f32::from(vertices[i].color_srgba8[3]) / 255.0 * shares[i]).sum();
+        let [first, packed_size, ..] = self.materials[material + 3];
+        f32::from_bits(self.materials[material][3]) * vertex_alpha * self.texture_alpha(first, packed_size, uv)
+    }
+
+    /// Bilinear, of the finest level; 1 where there is no texture.
+    fn texture_alpha(&self, first: u32, packed_size: u32, uv: Vec2) -> f32 {
+        if packed_size == 0 {
+            return 1.0;
+        }
+        let size = UVec2::new(packed_size & 0xffff, packed_size >> 16);
+        let at = (uv - uv.floor()) * size.as_vec2() - 0.5;
+        let (low, share) = (at.floor(), at - at.floor());
+        let texel = |x: i32, y: i32| {
+            let place = (low.as_ivec2() + glam::IVec2::new(x, y)).rem_euclid(size.as_ivec2()).as_uvec2();
+            f32::from(self.texels[(first + place.y * size.x + place.x) as usize][3]) / 255.0
+        };
+        let mix = |a: f32, b: f32, share: f32| a * (1.0 - share) + b * share;
+        mix(mix(texel(0, 0), texel(1, 0), share.x), mix(texel(0, 1), texel(1, 1), share.x), share.y)
+    }
+}
+
+/// The sum from the last to the first product, as the software device has it.
+fn dot(a: Vec3, b: Vec3) -> f32 {
+    a.z * b.z + a.y * b.y + a.x * b.x
+}
+
+/// Inner children that the ray meets as bits 24 to 31 in the order of their distance, triangles below.
+fn met_children(node: &CwBvhNode, ray: &Traveller, t_max: f32) -> u32 {
+    let slope = Vec3::from(node.e.map(|e| f32::from_bits(u32::from(e) << 23))) * ray.inverse;
+    let start = (node.p - ray.origin) * ray.inverse;
+    let planes = [
+        (&node.child_min_x, &node.child_max_x),
+        (&node.child_min_y, &node.child_max_y),
+        (&node.child_min_z, &node.child_max_z),
+    ];
+    let places = |child: usize, axis: usize| {
+        let (min, max) = planes[axis];
+        let at = |byte: u8| f32::from(byte) * slope[axis] + start[axis];
+        let [near, far] = if ray.direction[axis] < 0.0 { [max, min] } else { [min, max] };
+        [at(near[child]), at(far[child])]
+    };
+    (0..8).fold(0, |hits, child| {
+        let [x, y, z] = [0, 1, 2].map(|axis| places(child, axis));
+        let enter = x[0].max(y[0]).max(z[0].max(0.0));
+        let leave = x[1].min(y[1]).min(z[1].min(t_max));
+        let meta = u32::from(node.child_meta[child]);
+        let is_inner = meta & (meta << 1) & 0x10 != 0;
+        let place = (meta ^ if is_inner { ray.octant4 & 255 } else { 0 }) & 31;
+        if enter <= leave * BOX_SLACK { hits | (meta >> 5) << place } else { hits }
+    })
+}

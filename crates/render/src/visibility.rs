@@ -1,0 +1,101 @@
+//! How surfaces are found: by drawing triangles, or by one ray a pixel. What is faster depends on the scene, the
+//! size of its pictures and the device, so it is measured.
+
+use std::{
+    fmt,
+    str::FromStr,
+    sync::{Mutex, PoisonError},
+};
+
+use glam::UVec2;
+
+use crate::{GpuScene, RenderError};
+
+/// A closed set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Visibility {
+    /// Whichever was faster when both were tried.
+    #[default]
+    Measured,
+    /// Every triangle is drawn.
+    Triangles,
+    /// Every pixel sends a ray.
+    Rays,
+}
+
+/// Not a way to find surfaces.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("unknown visibility {0:?}, expected measured, triangles or rays")]
+pub struct UnknownVisibility(String);
+
+/// What both ways cost for pictures of one size of a scene, unlit, to host pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Choice {
+    /// Seconds a view.
+    pub triangles_s: f64,
+    /// Seconds a view, the tree not counted.
+    pub rays_s: f64,
+}
+
+impl Choice {
+    /// Which is taken.
+    #[must_use]
+    pub fn rays_are_faster(&self) -> bool {
+        self.rays_s < self.triangles_s
+    }
+}
+
+impl fmt::Display for Choice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let chosen = if self.rays_are_faster() { Visibility::Rays } else { Visibility::Triangles };
+        let ms = |s: f64| s * 1e3;
+        write!(f, "{chosen} (triangles {:.2} ms, rays {:.2} ms a view)", ms(self.triangles_s), ms(self.rays_s))
+    }
+}
+
+impl FromStr for Visibility {
+    type Err = UnknownVisibility;
+    fn from_str(text: &str) -> Result<Self, UnknownVisibility> {
+        match text {
+            "measured" => Ok(Self::Measured),
+            "triangles" => Ok(Self::Triangles),
+            "rays" => Ok(Self::Rays),
+            other => Err(UnknownVisibility(other.to_owned())),
+        }
+    }
+}
+
+impl fmt::Display for Visibility {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Measured => "measured",
+            Self::Triangles => "triangles",
+            Self::Rays => "rays",
+        })
+    }
+}
+
+/// What has been measured.
+#[derive(Default)]
+pub(crate) struct Choices(Mutex<Vec<((u64, UVec2), Choice)>>);
+
+impl Choices {
+    /// Of one scene and size; `seconds` is asked for both ways the first time.
+    pub fn get_or_measure(
+        &self,
+        scene: &GpuScene,
+        size_px: UVec2,
+        seconds: impl Fn(Visibility) -> Result<f64, RenderError>,
+    ) -> Result<Choice, RenderError> {
+        let mut measured = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = (scene.identity(), size_px);
+        if let Some((_, choice)) = measured.iter().find(|(other, _)| *other == key) {
+            return Ok(*choice);
+        }
+        let choice =
+            Choice { triangles_s: seconds(Visibility::Triangles)?, rays_s: seconds(Visibility::Rays)? };
+        tracing::info!(%size_px, %choice, "surfaces are found by");
+        measured.push((key, choice));
+        Ok(choice)
+    }
+}
