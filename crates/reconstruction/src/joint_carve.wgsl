@@ -4,6 +4,7 @@
 // meets the patches between samples.
 {% include "color.wgsl" %}
 {% include "sample_set.wgsl" %}
+{% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 
 // A ray that is not done by then wanders behind what every camera sees, and whatever it still met would
@@ -50,9 +51,11 @@ fn verdict_{{ k }}(a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Verdict 
     let cells = work.cameras[{{ k }}].cells;
     if p.z <= 0.0 || any(uv < vec2f(0.0)) || any(uv >= cells) { return UNSEEN; }
     let log2_sides = work.cameras[{{ k }}].log2_sides;
-    let node = vec2u(uv) >> vec2u(level);
-    let low = vec2f(node << vec2u(level));
-    let high = min(low + f32(1u << level), cells);
+    // A small image has fewer levels.
+    let pyramid_level = min(level, top_level(log2_sides));
+    let node = vec2u(uv) >> vec2u(pyramid_level);
+    let low = vec2f(node << vec2u(pyramid_level));
+    let high = min(low + f32(1u << pyramid_level), cells);
     // A ray through the camera's own eye stays in one place and leaves no node.
     var exit = clamp(exit_{{ k }}(a, b, p, low, high), t, far);
     let scale = work.cameras[{{ k }}].code_scale;
@@ -60,11 +63,11 @@ fn verdict_{{ k }}(a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Verdict 
     let code = scale * inverse_w + offset;
     let exit_w = a.z + b.z * exit;
     let exit_code = select(scale / exit_w + offset, 1e9, exit_w <= 0.0);
-    let word = work.cameras[{{ k }}].first_word;
     if level > 0u {
 {% if count_fetches %}        fetches += 1u;
 {% endif %}
-        let range = pyramids[word + node_index(log2_sides, level, node)];
+        let index = work.cameras[{{ k }}].first_node + node_index(log2_sides, pyramid_level, node);
+        let range = textureLoad(nodes, texel_of(index), 0).x;
         let nearest = f32(range & 0xffffu);
         let farthest = f32(range >> 16u);
         if min(code, exit_code) > nearest { return Verdict(exit, exit, FAR_AWAY, false, 0.0); }
@@ -77,8 +80,7 @@ fn verdict_{{ k }}(a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Verdict 
         let penetration = select(FAR_AWAY, 0.0, level == STOP_LEVEL && !behind);
         return Verdict(partial, exit, penetration, !behind, 1.0);
     }
-    let row_words = 1u << log2_sides.x;
-    let corners = corners_of(word + node.y * row_words + node.x, row_words);
+    let corners = corners_of(work.cameras[{{ k }}].first_cell + node.y * work.cameras[{{ k }}].width_px + node.x);
     let lowest = min(min(corners.codes.x, corners.codes.y), min(corners.codes.z, corners.codes.w));
     if lowest < 0.5 { return Verdict(t, exit, FAR_AWAY, false, 0.0); }
     let footprint = (code - offset) / work.cameras[{{ k }}].focal_px;
@@ -96,7 +98,7 @@ fn verdict_{{ k }}(a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Verdict 
     let meets = any(ahead) && next_gap_at_exit <= 0.0;
     let crossing = select(exit, t + (exit - t) * next_gap / max(next_gap - next_gap_at_exit, 1e-9), meets);
     if all(ahead) { return Verdict(crossing, select(exit, crossing + (exit - t) * 1e-6, meets), select(FAR_AWAY, 0.0, meets), false, 0.0); }
-    let share = vec4f((1.0 - at.x) * (1.0 - at.y), at.x * (1.0 - at.y), (1.0 - at.x) * at.y, at.x * at.y);
+    let share = bilinear_shares(at);
     let reach = vec4f(THICKNESS_FOOTPRINTS * footprint);
     let same = dot(share, select(vec4f(0.0), vec4f(1.0), (abs(gaps) < reach) & (corners.codes > vec4f(1.5))));
     let beyond = dot(share, select(vec4f(0.0), vec4f(1.0), gaps > reach));

@@ -15,12 +15,12 @@ pub(crate) struct GpuSampleCamera {
     pub code_offset: f32,
     pub focal_px: f32,
     pub log2_sides: [u32; 2],
-    pub first_word: u32,
-    pub first_texel: u32,
+    pub first_node: u32,
+    pub first_cell: u32,
     pub width_px: u32,
     pub stretch: f32,
     pub mask: u32,
-    pub first_wide_word: u32,
+    pub padding: u32,
 }
 
 /// `ViewCamera` of `sample_set.wgsl`.

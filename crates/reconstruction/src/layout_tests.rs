@@ -78,12 +78,12 @@ fn sample_camera() -> Layout {
         code_offset,
         focal_px,
         log2_sides,
-        first_word,
-        first_texel,
+        first_node,
+        first_cell,
         width_px,
         stretch,
         mask,
-        first_wide_word
+        padding
     })
 }
 
@@ -113,7 +113,7 @@ fn list() -> Layout {
 
 #[test]
 fn views_and_sample_cameras_agree_in_every_search() {
-    for name in ["tile_start.wgsl", "march.wgsl", "joint_carve.wgsl", "light_field_search.wgsl"] {
+    for name in ["tile_start.wgsl", "march.wgsl", "joint_carve.wgsl", "light_field_search.wgsl", "specular.wgsl"] {
         let module = module(name);
         assert_eq!(shader(&module, "ViewCamera"), view_camera(), "{name}");
         assert_eq!(shader(&module, "SampleCamera"), sample_camera(), "{name}");

@@ -10,14 +10,16 @@ mod layout_tests;
 mod method;
 mod pyramid;
 mod reconstructor;
+mod reflectors;
 mod sample_set;
 pub mod scalar;
 mod shaders;
+mod word_texture;
 
 pub use method::{ReconstructionMethod, UnknownMethod};
 pub use pyramid::{CodedDepth, Pyramid};
 pub use reconstructor::{Reconstructor, Statistics};
-pub use sample_set::{MAX_SAMPLE_CAMERAS, SampleSet};
+pub use sample_set::{MAX_SAMPLE_CAMERAS, SampleSet, SetDescription};
 pub use shaders::{SHADERS, ShaderKey, shader_text};
 
 /// Why views cannot be reconstructed.

@@ -3,6 +3,7 @@
 // surface is closest.
 {% include "color.wgsl" %}
 {% include "sample_set.wgsl" %}
+{% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 
 const BISECTIONS: u32 = 8u;
@@ -20,8 +21,9 @@ fn inside_{{ k }}(p: vec3f) -> Depth {
     let texel = vec2u(clamped);
 {% if count_fetches %}    fetches += 1u;
 {% endif %}
-    // A word holds a texel and its right neighbour; the texel itself is in the low half.
-    let code = pyramids[work.cameras[{{ k }}].first_word + (texel.y << work.cameras[{{ k }}].log2_sides.x) + texel.x] & 0x7fffu;
+    // The first of the corners of the cell to its lower right.
+    let cell_index = work.cameras[{{ k }}].first_cell + texel.y * work.cameras[{{ k }}].width_px + texel.x;
+    let code = textureLoad(cell_codes, texel_of(cell_index), 0).x & 0x7fffu;
     let penetration = (f32(code) - work.cameras[{{ k }}].code_offset) / work.cameras[{{ k }}].code_scale - inverse_w;
     return Depth(penetration, p.z > 0.0 && all(uv == clamped) && code != HOLE);
 }
@@ -86,21 +88,21 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% endfor %}
     // One image is read, whichever it is.
     var uv = vec2f(0.0);
-    var first_texel = 0u;
+    var first_cell = 0u;
     var width = 1u;
     var camera_bit = 0u;
 {% for k in range(cameras) %}
     let chosen{{ k }} = mask == {{ 2 ** k }}u;
     uv = select(uv, clamp(p{{ k }}.xy / p{{ k }}.z - 0.5, vec2f(0.0), work.cameras[{{ k }}].cells - 0.01), chosen{{ k }});
-    first_texel = select(first_texel, work.cameras[{{ k }}].first_texel, chosen{{ k }});
+    first_cell = select(first_cell, work.cameras[{{ k }}].first_cell, chosen{{ k }});
     width = select(width, work.cameras[{{ k }}].width_px, chosen{{ k }});
     camera_bit = select(camera_bit, work.cameras[{{ k }}].mask, chosen{{ k }});
 {% endfor %}
     let cell = vec2u(uv);
     let at = uv - floor(uv);
-    let texel = first_texel + cell.y * width + cell.x;
-    let upper = mix(color_texel(texel), color_texel(texel + 1u), at.x);
-    let lower = mix(color_texel(texel + width), color_texel(texel + width + 1u), at.x);
+    let colors = colors_of(first_cell + cell.y * width + cell.x).corners;
+    let upper = mix(colors[0], colors[1], at.x);
+    let lower = mix(colors[2], colors[3], at.x);
     let found = entered && mask != 0u;
     let missed = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, never_unseen);
     let provenance = select(missed, PROVENANCE_HIT | (camera_bit << 8u), found);

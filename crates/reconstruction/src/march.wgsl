@@ -6,6 +6,7 @@
 // in one parameter s, so that a step needs no division.
 {% include "color.wgsl" %}
 {% include "sample_set.wgsl" %}
+{% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 
 const MAX_COARSE: u32 = 64u;
@@ -22,8 +23,11 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
     let offset = work.cameras[{{ march_camera }}].code_offset;
     let cells = work.cameras[{{ march_camera }}].cells;
     let log2_sides = work.cameras[{{ march_camera }}].log2_sides;
-    let first_word = work.cameras[{{ march_camera }}].first_word;
-    let row_words = 1u << log2_sides.x;
+    let first_node = work.cameras[{{ march_camera }}].first_node;
+    let first_cell = work.cameras[{{ march_camera }}].first_cell;
+    let width_px = work.cameras[{{ march_camera }}].width_px;
+    // A small image has fewer levels.
+    let start_level = min(START_LEVEL, top_level(log2_sides));
     let p0 = a + b * near;
     // The line ends before the plane through the camera's eye.
     let end = select(far, min(far, (0.01 * p0.z - a.z) * safe_reciprocal(b.z)), b.z < 0.0);
@@ -38,7 +42,7 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
     let visible = p0.z > 0.0 && all(origin.xy >= vec2f(0.0)) && all(origin.xy < cells);
     let nudge = (forwards * 2.0 - 1.0) * NUDGE_PX;
     var s = select(s_end, 0.0, visible);
-    var level = START_LEVEL;
+    var level = start_level;
     var crossed = false;
     var blocked = false;
     for (var i = 0u; i < MAX_COARSE && s < s_end && !blocked; i++) {
@@ -47,7 +51,7 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
         let size = f32(1u << level);
         let leave = ((vec2f(node) + forwards) * size + nudge - origin.xy) * inverse;
         let exit = clamp(min(leave.x, leave.y), s, s_end);
-        let nearest = f32(pyramids[first_word + node_index(log2_sides, level, node)] & 0xffffu);
+        let nearest = f32(textureLoad(nodes, texel_of(first_node + node_index(log2_sides, level, node)), 0).x & 0xffffu);
 {% if count_fetches %}        fetches += 1u;
 {% endif %}
         let free = min(at.z, origin.z + line.z * exit) > nearest;
@@ -55,7 +59,7 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
         let partial = select(s, clamp(surface, s, exit), at.z > nearest && line.z < 0.0);
         blocked = !free && level == 1u;
         s = select(partial, exit, free);
-        level = select(max(level, 2u) - 1u, min(level + 1u, START_LEVEL), free);
+        level = select(max(level, 2u) - 1u, min(level + 1u, start_level), free);
     }
     for (var i = 0u; i < MAX_FINE && blocked && s < s_end; i++) {
         let at = origin + line * s;
@@ -64,7 +68,7 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
         let exit = clamp(min(leave.x, leave.y), s, s_end);
         let beyond = origin + line * exit;
         let node = vec2u(cell);
-        let corners = corners_of(first_word + node.y * row_words + node.x, row_words);
+        let corners = corners_of(first_cell + node.y * width_px + node.x);
         let hole = min(min(corners.codes.x, corners.codes.y), min(corners.codes.z, corners.codes.w)) < 0.5;
         let inside = at.xy - cell;
         let inside_beyond = clamp(beyond.xy - cell, vec2f(0.0), vec2f(1.0));

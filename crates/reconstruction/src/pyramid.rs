@@ -57,12 +57,39 @@ impl CodedDepth {
         0.75 * range / (LAST_CODE - FIRST_CODE) / (least * least)
     }
 
+    /// Two words for each texel and the cell to its lower right, row by row: the codes of the cell's upper left (low
+    /// half) and upper right corner (high half), and in the highest bit whether it is connected; those of its lower
+    /// corners.
+    #[must_use]
+    pub fn cell_words(&self) -> Vec<[u32; 2]> {
+        let pair = |left: u16, right: u16| u32::from(left) | u32::from(right) << 16;
+        let [columns, rows] = self.size_px.map(|side| side as usize);
+        let mut words = Vec::with_capacity(columns * rows);
+        for y in 0..rows {
+            words.extend(cell_row(&self.codes, columns, y).map(|[a, b, c, d]| [pair(a, b), pair(c, d)]));
+        }
+        for (word, &connected) in words.iter_mut().zip(&self.connected) {
+            word[0] |= u32::from(connected) << 31;
+        }
+        words
+    }
+
     /// The code of a texel; positions beyond the border give the border's.
     #[must_use]
     pub fn at(&self, x: u32, y: u32) -> u16 {
         let (x, y) = (x.min(self.size_px[0] - 1), y.min(self.size_px[1] - 1));
         self.codes[(y * self.size_px[0] + x) as usize]
     }
+}
+
+/// A row of cells, one to the lower right of each texel: what a plane has at their upper left, upper right, lower left
+/// and lower right corners. Beyond the border lies the border's.
+pub(crate) fn cell_row<T: Copy>(plane: &[T], columns: usize, y: usize) -> impl Iterator<Item = [T; 4]> {
+    let row = |y: usize| &plane[y * columns..][..columns];
+    let (upper, lower) = (row(y), row((y + 1).min(plane.len() / columns - 1)));
+    let last = columns - 1;
+    let inside = upper.windows(2).zip(lower.windows(2)).map(|(u, l)| [u[0], u[1], l[0], l[1]]);
+    inside.chain(std::iter::once([upper[last], upper[last], lower[last], lower[last]]))
 }
 
 /// The least inverse depth of an image's samples, and how far its codes reach from there.
@@ -109,16 +136,16 @@ fn is_one_surface(plane: &[f32], index: usize, stride: usize, place: usize, coun
     [before, after].into_iter().flatten().any(|slope| (slope - jump).abs() <= slack.max(0.2 * jump.abs()))
 }
 
-/// Levels of words over the cells between texel centres, sides padded to powers of two.
+/// Levels of words over the cells between texel centres, sides padded to powers of two. Level 0 is the cells and has
+/// no words.
 ///
-/// Level 0 holds a word a cell: the codes of its upper left (low half) and upper right corner (high
-/// half), and in the highest bit whether the cell is connected. A word of level `n` holds the nearest code (low) and the farthest (high) of the corners of
-/// 2ⁿ × 2ⁿ cells; a hole among them makes it say "anything": nearest 65535, farthest 0.
+/// A word of level `n` holds the nearest code (low) and the farthest (high) of the corners of 2ⁿ × 2ⁿ cells; a hole
+/// among them makes it say "anything": nearest 65535, farthest 0.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pyramid {
     /// Of level 0.
     pub log2_sides: [u32; 2],
-    /// Level after level.
+    /// Level after level, from level 1.
     pub words: Vec<u32>,
 }
 
@@ -127,16 +154,7 @@ impl Pyramid {
     #[must_use]
     pub fn of(depth: &CodedDepth) -> Self {
         let log2_sides = depth.size_px.map(|side| side.max(2).next_power_of_two().ilog2());
-        let (columns, rows) = (1u32 << log2_sides[0], 1u32 << log2_sides[1]);
-        let mut words = vec![0; Self::word_count(log2_sides)];
-        for y in 0..rows.min(depth.size_px[1]) {
-            let row = &mut words[(y * columns) as usize..][..columns as usize];
-            for (x, word) in (0..).zip(row.iter_mut()).take(depth.size_px[0] as usize) {
-                let connected = u32::from(depth.connected[(y * depth.size_px[0] + x) as usize]);
-                *word = u32::from(depth.at(x, y)) | u32::from(depth.at(x + 1, y)) << 16 | connected << 31;
-            }
-        }
-        let mut pyramid = Self { log2_sides, words };
+        let mut pyramid = Self { log2_sides, words: vec![0; Self::word_count(log2_sides)] };
         pyramid.build_first_level(depth);
         (2..=log2_sides[0].min(log2_sides[1])).for_each(|level| pyramid.build_level(level));
         pyramid
@@ -149,15 +167,15 @@ impl Pyramid {
         Self::level_begin(log2_sides, short) + (1 << (long - short))
     }
 
-    /// Where a level begins; the shaders' formula.
+    /// Where a level from 1 on begins; the shaders' formula.
     #[must_use]
     pub fn level_begin(log2_sides: [u32; 2], level: u32) -> usize {
-        let whole = 1usize << (log2_sides[0] + log2_sides[1]);
-        (whole - (whole >> (2 * level))) / 3 * 4
+        let finest = 1usize << (log2_sides[0] + log2_sides[1] - 2);
+        (finest - (finest >> (2 * (level - 1)))) / 3 * 4
     }
 
     /// Nearest codes of 2 × 2 nodes each, at the places of the nodes: what a disc's footprint needs, in one
-    /// load. Level 0 has none.
+    /// load.
     #[must_use]
     pub fn wide_words(&self) -> Vec<u32> {
         let mut wide = vec![0; self.words.len()];

@@ -5,13 +5,13 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-use depth_image::{Aabb, DepthImage, PinholeCamera, Provenance, View, ViewPlanes};
+use depth_image::{DepthImage, PinholeCamera, Provenance, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use gpu::{BufferPool, Frame, Gpu, PooledBuffer, Readback, Submitted, Templates};
-use wgpu::BufferUsages;
+use wgpu::{BindingResource, BufferUsages};
 
 use crate::{
-    ReconstructionError, ReconstructionMethod, SHADERS, SampleSet, ShaderKey,
+    ReconstructionError, ReconstructionMethod, SHADERS, SampleSet, SetDescription, ShaderKey,
     layout::{GpuFillWork, GpuList, GpuSampleCamera, GpuViewCamera, GpuViewWork},
     shader_text,
 };
@@ -20,9 +20,9 @@ const TILE_PX: u32 = 8;
 /// Bounds the memory of a batch: 12 bytes a pixel on the device, up to as much again on the host.
 const PIXELS_A_BATCH: usize = 1 << 20;
 const MAX_VIEWS_A_BATCH: usize = 256;
-/// Uniform offsets must be multiples of this on every device.
 /// Marches in the nearest two cameras, and the carve.
 const MAX_PASSES: usize = 3;
+/// Uniform offsets must be multiples of this on every device.
 const UNIFORM_ALIGNMENT: u32 = 256;
 const FILL_STRIDE: u32 = UNIFORM_ALIGNMENT;
 
@@ -43,12 +43,86 @@ pub struct Reconstructor {
     pipelines: Mutex<HashMap<ShaderKey, Arc<wgpu::ComputePipeline>>>,
 }
 
-fn layout_entry(binding: u32, ty: wgpu::BufferBindingType, has_dynamic_offset: bool) -> wgpu::BindGroupLayoutEntry {
-    wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None },
-        count: None,
+/// What a shader finds at a binding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Slot {
+    /// The view's uniform, at a dynamic offset.
+    View,
+    Uniform,
+    Read,
+    Write,
+    /// See `word_texture`.
+    Words,
+}
+
+impl Slot {
+    fn ty(self) -> wgpu::BindingType {
+        let buffer =
+            |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: self == Self::View, min_binding_size: None };
+        match self {
+            Self::View | Self::Uniform => buffer(wgpu::BufferBindingType::Uniform),
+            Self::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
+            Self::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
+            Self::Words => wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Uint,
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
+        }
+    }
+
+    fn entry(self, binding: u32) -> wgpu::BindGroupLayoutEntry {
+        let visibility = wgpu::ShaderStages::COMPUTE;
+        wgpu::BindGroupLayoutEntry { binding, visibility, ty: self.ty(), count: None }
+    }
+}
+
+/// A shader's bindings, in their order.
+fn slots(key: ShaderKey) -> Vec<Slot> {
+    use Slot::{Read, Uniform, View, Words, Write};
+    match key.name {
+        "tile_start.wgsl" => vec![View, Words, Words, Write],
+        "fill.wgsl" => vec![View, Write, Write, Read, Read, Read],
+        "specular.wgsl" => vec![View, Words, Words, Write, Read, Read, Uniform, Words],
+        _ => {
+            let mut slots = vec![View, Words, Words, Read, Write, Write, Write, Write, Write, Words];
+            slots.extend(key.count_fetches.then_some(Write));
+            slots.extend([Read, Read].into_iter().filter(|_| key.march_camera > 0));
+            slots
+        }
+    }
+}
+
+/// Views of one size that are made together, and what that takes on the device.
+struct Batch {
+    size_px: UVec2,
+    tiles: UVec2,
+    count: usize,
+    /// Of one plane of all views.
+    bytes: u64,
+    /// Between the views' uniforms.
+    stride: u32,
+    works: wgpu::Buffer,
+    starts: PooledBuffer,
+    /// sRGB, inverse depth, provenance and, where counted, fetches.
+    outputs: Vec<PooledBuffer>,
+    /// What each pass leaves to the next.
+    list_pixels: [PooledBuffer; MAX_PASSES],
+    lists: [wgpu::Buffer; MAX_PASSES],
+}
+
+/// In [`Batch::outputs`], after the planes.
+const FETCHES: usize = 3;
+
+impl Batch {
+    /// What all passes over sample cameras begin with.
+    fn over<'b>(&'b self, set: &'b SampleSet) -> Vec<BindingResource<'b>> {
+        let textures = [&set.nodes, &set.cell_codes].map(BindingResource::TextureView);
+        [self.works.as_entire_binding()].into_iter().chain(textures).collect()
+    }
+
+    fn list(&self, pass: usize) -> [BindingResource<'_>; 2] {
+        [self.list_pixels[pass].as_entire_binding(), self.lists[pass].as_entire_binding()]
     }
 }
 
@@ -58,8 +132,8 @@ struct InFlight<'g> {
     reads: Reads,
     size_px: UVec2,
     count: usize,
-    /// Lent until the device is done with them.
-    _buffers: Vec<PooledBuffer>,
+    /// Lent until the device is done with it.
+    _batch: Batch,
 }
 
 #[derive(Clone, Copy)]
@@ -84,17 +158,12 @@ impl Reconstructor {
         })
     }
 
-    /// Puts a sample set on the device. `volume` holds all geometry of the scene.
+    /// Puts a sample set on the device.
     ///
     /// # Errors
     /// Images, cameras or a volume that cannot be used, or the device's limits.
-    pub fn upload(
-        &self,
-        images: &[DepthImage],
-        volume: &Aabb,
-        background_linear: Vec3,
-    ) -> Result<SampleSet, ReconstructionError> {
-        SampleSet::upload(&self.gpu, images, volume, background_linear)
+    pub fn upload(&self, images: &[DepthImage], set: &SetDescription<'_>) -> Result<SampleSet, ReconstructionError> {
+        SampleSet::upload(&self.gpu, images, set)
     }
 
     /// One view a camera, in their order.
@@ -151,114 +220,167 @@ impl Reconstructor {
         planes: ViewPlanes,
         count_fetches: bool,
     ) -> Result<InFlight<'_>, ReconstructionError> {
-        let size_px = cameras[0].size_px;
-        let tiles = size_px.map(|side| side.div_ceil(TILE_PX));
-        let count = cameras.len();
-        let bytes = 4 * (cameras[0].pixel_count() * count) as u64;
-        self.gpu.check_storage_bytes("a batch of views (bytes)", bytes)?;
         let (steps, passes) = passes(method, set.cameras.len(), count_fetches);
-        let stride = view_stride(set);
-        let works = self.gpu.buffer_with("views", &view_works(set, cameras, tiles, steps), BufferUsages::UNIFORM);
-        let starts = self.pool.lend_storage("tile starts", 4 * u64::from(tiles.element_product()) * count as u64);
-        let labels = ["srgb8", "inverse depth", "provenance", "fetches"];
-        let outputs: Vec<PooledBuffer> = labels
-            .iter()
-            .take(3 + usize::from(count_fetches))
-            .map(|label| self.pool.lend_storage(label, bytes))
-            .collect();
-        let list_pixels = [(); MAX_PASSES].map(|()| self.pool.lend_storage("pixels left for later", bytes));
-        let lists = [(); MAX_PASSES].map(|()| {
-            self.gpu.buffer_with("lists", &vec![GpuList::EMPTY; count], BufferUsages::STORAGE | BufferUsages::INDIRECT)
-        });
-
+        let batch = self.batch(set, cameras, steps, count_fetches)?;
         let mut frame = Frame::begin(&self.gpu, "reconstruct");
         if count_fetches {
-            frame.encoder.clear_buffer(&outputs[3], 0, None);
+            frame.encoder.clear_buffer(&batch.outputs[FETCHES], 0, None);
         }
-        let tile_start =
-            self.pipeline(ShaderKey { name: "tile_start.wgsl", cameras: set.cameras.len(), ..ShaderKey::default() })?;
-        let bound = self.bind(&tile_start, stride, &[&works, &set.pyramids, &starts]);
-        frame.compute_each(
-            "tile start",
-            &tile_start,
-            &bound,
-            stride,
-            count,
-            [tiles.x.div_ceil(TILE_PX), tiles.y.div_ceil(TILE_PX), 1],
-        );
+        self.find_tile_starts(&mut frame, set, &batch)?;
         for (number, &key) in passes.iter().enumerate() {
-            let pipeline = self.pipeline(key)?;
-            let mut buffers: Vec<&wgpu::Buffer> = vec![&works, &set.pyramids, &starts, &set.colors];
-            buffers.extend(outputs[..3].iter().map(|buffer| &**buffer));
-            buffers.extend([&*list_pixels[number], &lists[number]]);
-            buffers.extend(outputs.get(3).map(|buffer| &**buffer));
-            if number == 0 {
-                let bound = self.bind(&pipeline, stride, &buffers);
-                frame.compute_each(key.name, &pipeline, &bound, stride, count, [tiles.x, tiles.y, 1]);
-            } else {
-                buffers.extend([&*list_pixels[number - 1], &lists[number - 1]]);
-                let bound = self.bind(&pipeline, stride, &buffers);
-                frame.compute_each_indirect(key.name, &pipeline, &bound, stride, count, &lists[number - 1]);
+            self.find_surfaces(&mut frame, set, &batch, number, key)?;
+        }
+        self.fill(&mut frame, &batch, passes.len() - 1)?;
+        self.add_highlights(&mut frame, set, &batch)?;
+        let reads = self.read(&mut frame, &batch, planes, count_fetches);
+        let (size_px, count) = (batch.size_px, batch.count);
+        Ok(InFlight { submitted: frame.submit(), reads, size_px, count, _batch: batch })
+    }
+
+    fn batch(
+        &self,
+        set: &SampleSet,
+        cameras: &[PinholeCamera],
+        steps: u32,
+        count_fetches: bool,
+    ) -> Result<Batch, ReconstructionError> {
+        let (size_px, count) = (cameras[0].size_px, cameras.len());
+        let tiles = size_px.map(|side| side.div_ceil(TILE_PX));
+        let bytes = 4 * (cameras[0].pixel_count() * count) as u64;
+        self.gpu.check_storage_bytes("a batch of views (bytes)", bytes)?;
+        let outputs = ["srgb8", "inverse depth", "provenance", "fetches"];
+        let list = || {
+            let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT;
+            self.gpu.buffer_with("lists", &vec![GpuList::EMPTY; count], usage)
+        };
+        Ok(Batch {
+            size_px,
+            tiles,
+            count,
+            bytes,
+            stride: view_stride(set),
+            works: self.gpu.buffer_with("views", &view_works(set, cameras, tiles, steps), BufferUsages::UNIFORM),
+            starts: self.pool.lend_storage("tile starts", 4 * u64::from(tiles.element_product()) * count as u64),
+            outputs: outputs[..3 + usize::from(count_fetches)]
+                .iter()
+                .map(|label| self.pool.lend_storage(label, bytes))
+                .collect(),
+            list_pixels: [(); MAX_PASSES].map(|()| self.pool.lend_storage("pixels left for later", bytes)),
+            lists: [(); MAX_PASSES].map(|()| list()),
+        })
+    }
+
+    fn find_tile_starts(
+        &self,
+        frame: &mut Frame<'_>,
+        set: &SampleSet,
+        batch: &Batch,
+    ) -> Result<(), ReconstructionError> {
+        let name = "tile_start.wgsl";
+        let pipeline = self.pipeline(ShaderKey { name, cameras: set.cameras.len(), ..ShaderKey::default() })?;
+        let mut resources = batch.over(set);
+        resources.push(batch.starts.as_entire_binding());
+        let bound = self.bind(&pipeline, batch.stride, resources);
+        let [across, down] = batch.tiles.to_array().map(|tiles| tiles.div_ceil(TILE_PX));
+        frame.compute_each(name, &pipeline, &bound, batch.stride, batch.count, [across, down, 1]);
+        Ok(())
+    }
+
+    /// One pass of the method: the first over all pixels, each other over those that the one before left.
+    fn find_surfaces(
+        &self,
+        frame: &mut Frame<'_>,
+        set: &SampleSet,
+        batch: &Batch,
+        number: usize,
+        key: ShaderKey,
+    ) -> Result<(), ReconstructionError> {
+        let pipeline = self.pipeline(key)?;
+        let mut resources = batch.over(set);
+        resources.push(batch.starts.as_entire_binding());
+        resources.extend(batch.outputs[..FETCHES].iter().map(|buffer| buffer.as_entire_binding()));
+        resources.extend(batch.list(number));
+        resources.push(BindingResource::TextureView(&set.cell_colors));
+        resources.extend(batch.outputs.get(FETCHES).map(|buffer| buffer.as_entire_binding()));
+        resources.extend(number.checked_sub(1).into_iter().flat_map(|earlier| batch.list(earlier)));
+        let bound = self.bind(&pipeline, batch.stride, resources);
+        match number.checked_sub(1) {
+            None => {
+                let groups = [batch.tiles.x, batch.tiles.y, 1];
+                frame.compute_each(key.name, &pipeline, &bound, batch.stride, batch.count, groups);
+            }
+            Some(earlier) => {
+                let left = &batch.lists[earlier];
+                frame.compute_each_indirect(key.name, &pipeline, &bound, batch.stride, batch.count, left);
             }
         }
-        let last = passes.len() - 1;
-        let fill = self.pipeline(ShaderKey { name: "fill.wgsl", ..ShaderKey::default() })?;
-        let fill_works = self.gpu.buffer_with("fill", &fill_works(size_px, count), BufferUsages::UNIFORM);
-        let bound = self.bind(
-            &fill,
-            FILL_STRIDE,
-            &[&fill_works, &outputs[0], &outputs[1], &outputs[2], &list_pixels[last], &lists[last]],
-        );
-        frame.compute_each_indirect("fill", &fill, &bound, FILL_STRIDE, count, &lists[last]);
+        Ok(())
+    }
 
-        let mut read =
-            |index: usize| frame.read_back(&outputs[index], 0..bytes, self.pool.lend_host("view read-back", bytes));
-        let reads = Reads {
+    /// Over what the last pass left.
+    fn fill(&self, frame: &mut Frame<'_>, batch: &Batch, last: usize) -> Result<(), ReconstructionError> {
+        let pipeline = self.pipeline(ShaderKey { name: "fill.wgsl", ..ShaderKey::default() })?;
+        let works = fill_works(batch.size_px, batch.count);
+        let works = self.gpu.buffer_with("fill", &works, BufferUsages::UNIFORM);
+        let mut resources = vec![works.as_entire_binding()];
+        resources.extend(batch.outputs[..FETCHES].iter().map(|buffer| buffer.as_entire_binding()));
+        resources.extend(batch.list(last));
+        let bound = self.bind(&pipeline, FILL_STRIDE, resources);
+        frame.compute_each_indirect("fill", &pipeline, &bound, FILL_STRIDE, batch.count, &batch.lists[last]);
+        Ok(())
+    }
+
+    /// After the fill, which shall not spread them.
+    fn add_highlights(&self, frame: &mut Frame<'_>, set: &SampleSet, batch: &Batch) -> Result<(), ReconstructionError> {
+        let Some(reflectors) = &set.reflectors else { return Ok(()) };
+        let pipeline = self.pipeline(ShaderKey {
+            name: "specular.wgsl",
+            cameras: set.cameras.len(),
+            highlight: reflectors.highlight,
+            lights: reflectors.lights,
+            visibility_words: reflectors.visibility_words,
+            ..ShaderKey::default()
+        })?;
+        let mut resources = batch.over(set);
+        resources.extend(batch.outputs[..FETCHES].iter().map(|buffer| buffer.as_entire_binding()));
+        resources.push(reflectors.illumination.as_entire_binding());
+        resources.push(BindingResource::TextureView(&reflectors.samples));
+        let bound = self.bind(&pipeline, batch.stride, resources);
+        let groups = [batch.tiles.x, batch.tiles.y, 1];
+        frame.compute_each("specular", &pipeline, &bound, batch.stride, batch.count, groups);
+        Ok(())
+    }
+
+    fn read(&self, frame: &mut Frame<'_>, batch: &Batch, planes: ViewPlanes, count_fetches: bool) -> Reads {
+        let host = || self.pool.lend_host("view read-back", batch.bytes);
+        let mut read = |index: usize| frame.read_back(&batch.outputs[index], 0..batch.bytes, host());
+        Reads {
             srgb8: read(0),
             inverse_depth: planes.inverse_depth.then(|| read(1)),
             provenance: planes.provenance.then(|| read(2)),
-            fetches: count_fetches.then(|| read(3)),
-        };
-        let kept = outputs.into_iter().chain([starts]).chain(list_pixels).collect();
-        Ok(InFlight { submitted: frame.submit(), reads, size_px, count, _buffers: kept })
+            fetches: count_fetches.then(|| read(FETCHES)),
+        }
     }
 
-    /// One uniform at a dynamic offset, then what is read, then what is written.
     fn layout(&self, key: ShaderKey) -> wgpu::BindGroupLayout {
-        let read = match key.name {
-            "tile_start.wgsl" => vec![1],
-            "fill.wgsl" => vec![3, 4, 5],
-            _ if key.march_camera > 0 => {
-                vec![1, 2, 3, 9 + u32::from(key.count_fetches), 10 + u32::from(key.count_fetches)]
-            }
-            _ => vec![1, 2, 3],
-        };
-        let bindings = match key.name {
-            "tile_start.wgsl" => 3,
-            "fill.wgsl" => 6,
-            _ if key.march_camera > 0 => 11 + u32::from(key.count_fetches),
-            _ => 9 + u32::from(key.count_fetches),
-        };
-        let storage = |binding| wgpu::BufferBindingType::Storage { read_only: read.contains(&binding) };
-        let mut entries = vec![layout_entry(0, wgpu::BufferBindingType::Uniform, true)];
-        entries.extend((1..bindings).map(|binding| layout_entry(binding, storage(binding), false)));
+        let entries: Vec<_> = (0..).zip(slots(key)).map(|(binding, slot)| slot.entry(binding)).collect();
         self.gpu
             .device
             .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(key.name), entries: &entries })
     }
 
-    fn bind(&self, pipeline: &wgpu::ComputePipeline, stride: u32, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
-        let one_view = std::num::NonZeroU64::new(u64::from(stride));
-        let entries: Vec<_> = (0..)
-            .zip(buffers)
-            .map(|(binding, &buffer)| {
-                let size = if binding == 0 { one_view } else { None };
-                wgpu::BindGroupEntry {
-                    binding,
-                    resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size }),
-                }
-            })
-            .collect();
+    /// The first resource is the views' uniforms, of which a shader sees one.
+    fn bind(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        stride: u32,
+        mut resources: Vec<BindingResource<'_>>,
+    ) -> wgpu::BindGroup {
+        if let Some(BindingResource::Buffer(views)) = resources.first_mut() {
+            views.size = std::num::NonZeroU64::new(u64::from(stride));
+        }
+        let entries: Vec<_> =
+            (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
         self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &pipeline.get_bind_group_layout(0),

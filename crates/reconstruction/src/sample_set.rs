@@ -1,13 +1,15 @@
 //! A sample set on the device.
 
-use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, srgb8_from_linear};
+use depth_image::{Aabb, Camera, DepthImage, Highlight, Illumination, PinholeCamera, srgb8_from_linear};
 use glam::{Vec2, Vec3};
 use gpu::Gpu;
-use wgpu::BufferUsages;
 
 use crate::{
     CodedDepth, Pyramid, ReconstructionError,
     layout::{GpuSampleCamera, GpuVolume},
+    pyramid::cell_row,
+    reflectors::Reflectors,
+    word_texture,
 };
 
 /// A surface on the very face of the volume must still be entered, by all cameras, whose samples of a slope are
@@ -17,49 +19,66 @@ pub(crate) const VOLUME_MARGIN: f32 = 0.005;
 /// Shaders name each camera; more would make them too long.
 pub const MAX_SAMPLE_CAMERAS: usize = 16;
 
+/// What the images of a set have in common.
+#[derive(Debug, Clone, Copy)]
+pub struct SetDescription<'a> {
+    /// Holds all geometry of the scene.
+    pub volume: Aabb,
+    /// Of pixels that show nothing.
+    pub background_linear: Vec3,
+    /// What lights the scene; seen in highlights only, the rest is in the samples' colours.
+    pub illumination: &'a Illumination,
+    /// How surfaces reflect towards the viewer; `None` leaves highlights out, whatever planes images have.
+    pub highlight: Option<Highlight>,
+}
+
 /// One complete sample set: what views are reconstructed from.
 pub struct SampleSet {
     pub(crate) cameras: Vec<GpuSampleCamera>,
     pub(crate) volume: GpuVolume,
-    pub(crate) pyramids: wgpu::Buffer,
-    pub(crate) colors: wgpu::Buffer,
+    /// Of pyramids.
+    pub(crate) nodes: wgpu::TextureView,
+    pub(crate) cell_codes: wgpu::TextureView,
+    pub(crate) cell_colors: wgpu::TextureView,
+    pub(crate) reflectors: Option<Reflectors>,
 }
 
 impl SampleSet {
-    /// Builds pyramids and uploads everything. `volume` holds all geometry.
+    /// Builds pyramids and uploads everything.
     ///
     /// # Errors
     /// Too many images, planes or cameras that do not fit, or a set beyond the device's limits.
     pub(crate) fn upload(
         gpu: &Gpu,
         images: &[DepthImage],
-        volume: &Aabb,
-        background_linear: Vec3,
+        set: &SetDescription<'_>,
     ) -> Result<Self, ReconstructionError> {
-        check(gpu, images, volume)?;
+        check(gpu, images, &set.volume)?;
         let mut cameras = Vec::with_capacity(images.len());
-        let mut words: Vec<u32> = Vec::new();
-        let mut colors: Vec<u32> = Vec::new();
+        let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(word_texture::room);
+        let mut colors = word_texture::room(cell_count(images));
         for image in images {
             let depth = CodedDepth::of(image);
             let pyramid = Pyramid::of(&depth);
             let Camera::Pinhole(camera) = &image.camera;
-            let wide = pyramid.wide_words();
-            let first_word = words.len() as u32;
             cameras.push(GpuSampleCamera {
-                first_wide_word: first_word + pyramid.words.len() as u32,
                 mask: 1 << cameras.len(),
-                ..sample_camera(camera, &depth, &pyramid, first_word, colors.len() as u32)
+                first_node: nodes.len() as u32,
+                first_cell: codes.len() as u32,
+                ..sample_camera(camera, &depth, &pyramid)
             });
-            words.extend(pyramid.words);
-            words.extend(wide);
-            colors.extend(&image.color_rgb9e5);
+            nodes.extend(pyramid.words.iter().zip(pyramid.wide_words()).map(|(&range, wide)| [range, wide]));
+            codes.extend(depth.cell_words());
+            let [columns, rows] = image.size_px().to_array().map(|side| side as usize);
+            (0..rows).for_each(|y| colors.extend(cell_row(&image.color_rgb9e5, columns, y)));
         }
         Ok(Self {
             cameras,
-            volume: gpu_volume(&searched_volume(volume, images), background_linear),
-            pyramids: gpu.buffer_with("depth pyramids", &words, BufferUsages::STORAGE),
-            colors: gpu.buffer_with("sample colours", &colors, BufferUsages::STORAGE),
+            volume: gpu_volume(&searched_volume(&set.volume, images), set.background_linear),
+            nodes: word_texture::upload(gpu, "depth pyramids", nodes)?,
+            cell_codes: word_texture::upload(gpu, "cells", codes)?,
+            cell_colors: word_texture::upload(gpu, "sample colours", colors)?,
+            reflectors: Reflectors::upload(gpu, images, set)?,
         })
     }
 }
@@ -80,21 +99,23 @@ fn check(gpu: &Gpu, images: &[DepthImage], volume: &Aabb) -> Result<(), Reconstr
             return Err(wrong("an image of one row or column has no surface between samples".to_owned()));
         }
     }
-    let words: usize = images
-        .iter()
-        .map(|i| Pyramid::word_count(i.size_px().to_array().map(|side| side.next_power_of_two().ilog2())))
-        .sum();
-    gpu.check_storage_bytes("the sample set's pyramids (bytes)", words as u64 * 8)?;
+    word_texture::check(gpu, "depth pyramids", node_count(images))?;
+    word_texture::check(gpu, "cells", cell_count(images))?;
     Ok(())
 }
 
-fn sample_camera(
-    camera: &PinholeCamera,
-    depth: &CodedDepth,
-    pyramid: &Pyramid,
-    first_word: u32,
-    first_texel: u32,
-) -> GpuSampleCamera {
+fn node_count(images: &[DepthImage]) -> usize {
+    let log2_sides = |image: &DepthImage| image.size_px().to_array().map(|side| side.next_power_of_two().ilog2());
+    images.iter().map(|image| Pyramid::word_count(log2_sides(image))).sum()
+}
+
+/// One a texel.
+fn cell_count(images: &[DepthImage]) -> usize {
+    images.iter().map(|image| image.color_rgb9e5.len()).sum()
+}
+
+/// But for its place in the set.
+fn sample_camera(camera: &PinholeCamera, depth: &CodedDepth, pyramid: &Pyramid) -> GpuSampleCamera {
     GpuSampleCamera {
         homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world().map(|row| row.to_array()),
         eye_in_world: camera.eye_in_world.to_array(),
@@ -103,12 +124,12 @@ fn sample_camera(
         code_offset: depth.offset,
         focal_px: camera.focal_px.min_element(),
         log2_sides: pyramid.log2_sides,
-        first_word,
-        first_texel,
+        first_node: 0,
+        first_cell: 0,
         width_px: camera.size_px.x,
         stretch: stretch(camera),
         mask: 0,
-        first_wide_word: 0,
+        padding: 0,
     }
 }
 

@@ -16,17 +16,17 @@ struct SampleCamera {
     cells: vec2f,
     code_offset: f32,
     focal_px: f32,
-    // log2 of the padded sides of level 0, and where this camera's words begin.
+    // log2 of the padded sides of level 0, and where this camera's nodes and its samples, each with the cell to its
+    // lower right, begin.
     log2_sides: vec2u,
-    first_word: u32,
-    first_texel: u32,
+    first_node: u32,
+    first_cell: u32,
     width_px: u32,
     // Greatest factor by which a point's sideways motion moves it in the image, over f / w.
     stretch: f32,
     // This camera's bit in provenance.
     mask: u32,
-    // Where words for tiles begin: like the pyramid's, but each with the nearest code of 2 × 2 nodes.
-    first_wide_word: u32,
+    padding: u32,
 }
 
 struct ViewCamera {
@@ -58,7 +58,9 @@ struct ViewWork {
 }
 
 @group(0) @binding(0) var<uniform> work: ViewWork;
-@group(0) @binding(1) var<storage, read> pyramids: array<u32>;
+// Words that are read by place lie in textures: a load there brings up to four, for less than one of a buffer.
+// Nodes of the pyramids: a range (nearest code low, farthest high), and the nearest code of 2 × 2 nodes.
+@group(0) @binding(1) var nodes: texture_2d<u32>;
 
 const TILE_PX: u32 = 8u;
 const FAR_AWAY: f32 = 3.0e38;
@@ -80,11 +82,20 @@ fn homogeneous(rows: array<vec4f, 3>, v: vec4f) -> vec3f {
     return vec3f(dot(rows[0], v), dot(rows[1], v), dot(rows[2], v));
 }
 
-// Where level `level` of a pyramid begins, in words, and its index of a node. Level 0 has one word a
-// cell: the codes of its two upper corners, and in the highest bit whether its corners are one surface. Higher levels: nearest code low, farthest high.
+// Where the n-th texel of such a texture lies.
+fn texel_of(index: u32) -> vec2u {
+    return vec2u(index % {{ texture_width }}u, index / {{ texture_width }}u);
+}
+
+// The coarsest level of a pyramid.
+fn top_level(log2_sides: vec2u) -> u32 {
+    return min(log2_sides.x, log2_sides.y);
+}
+
+// Of a node of level 1 or coarser, which are all there are: what is below are cells.
 fn node_index(log2_sides: vec2u, level: u32, node: vec2u) -> u32 {
-    let whole = 1u << (log2_sides.x + log2_sides.y);
-    let begin = (whole - (whole >> (2u * level))) / 3u * 4u;
+    let finest = 1u << (log2_sides.x + log2_sides.y - 2u);
+    let begin = (finest - (finest >> (2u * (level - 1u)))) / 3u * 4u;
     return begin + (node.y << (log2_sides.x - level)) + node.x;
 }
 

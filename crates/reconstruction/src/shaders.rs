@@ -1,17 +1,22 @@
 //! The shaders' texts, written out for a number of cameras.
 
-use gpu::{TemplateError, Templates};
+use depth_image::Highlight;
+use gpu::{TemplateError, Templates, light_slots};
 use minijinja::context;
+
+use crate::{reflectors::sample_texels, word_texture};
 
 /// All templates of this crate.
 pub const SHADERS: &[(&str, &str)] = &[
     ("sample_set.wgsl", include_str!("sample_set.wgsl")),
+    ("cell.wgsl", include_str!("cell.wgsl")),
     ("surface.wgsl", include_str!("surface.wgsl")),
     ("tile_start.wgsl", include_str!("tile_start.wgsl")),
     ("march.wgsl", include_str!("march.wgsl")),
     ("light_field_search.wgsl", include_str!("light_field_search.wgsl")),
     ("joint_carve.wgsl", include_str!("joint_carve.wgsl")),
     ("fill.wgsl", include_str!("fill.wgsl")),
+    ("specular.wgsl", include_str!("specular.wgsl")),
 ];
 
 /// The surface's thickness, in texel footprints: the best of a sweep (docs/methods/joint_carve.md).
@@ -35,6 +40,12 @@ pub struct ShaderKey {
     pub march_camera: usize,
     /// Whether fetches are counted for each pixel.
     pub count_fetches: bool,
+    /// How surfaces reflect; of `specular.wgsl`, as what follows.
+    pub highlight: Highlight,
+    /// How many lights.
+    pub lights: usize,
+    /// How many words say which lights a sample sees; 0 where all do.
+    pub visibility_words: usize,
 }
 
 /// The WGSL of a shader.
@@ -44,6 +55,10 @@ pub struct ShaderKey {
 pub fn shader_text(templates: &Templates, key: ShaderKey) -> Result<String, TemplateError> {
     const DIRECTIONS: [[i32; 2]; 8] = [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]];
     let decimal = |v: f32| format!("{v:?}");
+    let highlight = match key.highlight {
+        Highlight::BlinnPhong => "blinn_phong",
+        Highlight::Ggx => "ggx",
+    };
     templates.render(
         key.name,
         context! {
@@ -55,6 +70,11 @@ pub fn shader_text(templates: &Templates, key: ShaderKey) -> Result<String, Temp
             thickness_footprints => decimal(THICKNESS_FOOTPRINTS),
             angle_floor => decimal(ANGLE_FLOOR),
             directions => DIRECTIONS,
+            highlight,
+            light_slots => light_slots(key.lights),
+            visibility_words => key.visibility_words,
+            sample_texels => sample_texels(key.visibility_words),
+            texture_width => word_texture::WIDTH,
         },
     )
 }

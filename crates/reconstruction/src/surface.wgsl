@@ -1,7 +1,8 @@
 // The surface that one camera's samples describe around a position, and what it says of a point there.
 
-@group(0) @binding(2) var<storage, read> tile_start_m: array<f32>;
-@group(0) @binding(3) var<storage, read> colors_rgb9e5: array<u32>;
+@group(0) @binding(3) var<storage, read> tile_start_m: array<f32>;
+// RGB9E5 of each cell's corners, in their order.
+@group(0) @binding(9) var cell_colors: texture_2d<u32>;
 @group(0) @binding(4) var<storage, read_write> out_srgb8: array<u32>;
 @group(0) @binding(5) var<storage, read_write> out_inverse_depth: array<f32>;
 @group(0) @binding(6) var<storage, read_write> out_provenance: array<u32>;
@@ -10,15 +11,15 @@
 struct Later { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
 @group(0) @binding(8) var<storage, read_write> later: array<Later>;
 {% if count_fetches %}
-@group(0) @binding(9) var<storage, read_write> out_fetches: array<u32>;
+@group(0) @binding(10) var<storage, read_write> out_fetches: array<u32>;
 var<private> fetches: u32 = 0u;
 {% endif %}
 
 {% if march_camera > 0 %}
 // What the pass before could not decide.
 struct Earlier { workgroups: u32, y: u32, z: u32, count: u32 }
-@group(0) @binding({{ 9 + count_fetches|int }}) var<storage, read> earlier_pixels: array<u32>;
-@group(0) @binding({{ 10 + count_fetches|int }}) var<storage, read> earlier: array<Earlier>;
+@group(0) @binding({{ 10 + count_fetches|int }}) var<storage, read> earlier_pixels: array<u32>;
+@group(0) @binding({{ 11 + count_fetches|int }}) var<storage, read> earlier: array<Earlier>;
 {% endif %}
 
 const LIST_WORKGROUP: u32 = 64u;
@@ -36,25 +37,6 @@ const PROVENANCE_FILLED: u32 = 2u;
 
 // Depth is known to half a code; a ray that reached a plane's very depth is still before it.
 const HALF_CODE: f32 = 0.5;
-
-// A cell's corners: codes (upper left, upper right, lower left, lower right), and whether they are one
-// surface.
-struct Corners { codes: vec4f, connected: bool }
-
-fn corners_of(word_index: u32, row_words: u32) -> Corners {
-{% if count_fetches %}    fetches += 2u;
-{% endif %}
-    let upper = pyramids[word_index];
-    let lower = pyramids[word_index + row_words];
-    let codes = vec4u(upper & 0x7fffu, (upper >> 16u) & 0x7fffu, lower & 0x7fffu, (lower >> 16u) & 0x7fffu);
-    return Corners(vec4f(codes), (upper >> 31u) != 0u);
-}
-
-fn bilinear(corners: vec4f, at: vec2f) -> f32 {
-    let upper = corners.x + (corners.y - corners.x) * at.x;
-    let lower = corners.z + (corners.w - corners.z) * at.x;
-    return upper + (lower - upper) * at.y;
-}
 
 // A silhouette runs through a cell that is not connected: what is nearer counts until the cameras vote.
 fn surface_code(corners: Corners, at: vec2f) -> f32 {
@@ -81,15 +63,21 @@ fn write_pixel(index: u32, color_srgb8: u32, inverse_depth_per_m: f32, provenanc
 {% endif %}
 }
 
-fn color_texel(index: u32) -> vec3f {
+// Of a cell's corners, in their order.
+struct Colors { corners: array<vec3f, 4> }
+
+fn colors_of(cell_index: u32) -> Colors {
 {% if count_fetches %}    fetches += 1u;
 {% endif %}
-    return linear_from_rgb9e5(colors_rgb9e5[index]);
+    let words = textureLoad(cell_colors, texel_of(cell_index), 0);
+    return Colors(array(
+        linear_from_rgb9e5(words.x), linear_from_rgb9e5(words.y), linear_from_rgb9e5(words.z), linear_from_rgb9e5(words.w),
+    ));
 }
 
 // What a camera makes of a point: how much its colour counts and where it is found, and the share of the
 // texels around that lie on the point's own surface or show what is beyond it.
-struct Sight { weight: f32, texel: u32, width: u32, shares: vec4f, same: f32, beyond: f32 }
+struct Sight { weight: f32, cell: u32, shares: vec4f, same: f32, beyond: f32 }
 
 {% for k in range(cameras) %}
 fn sight_{{ k }}(point_in_world: vec3f, view_direction: vec3f, slack: f32) -> Sight {
@@ -101,14 +89,14 @@ fn sight_{{ k }}(point_in_world: vec3f, view_direction: vec3f, slack: f32) -> Si
     let clamped = clamp(uv, vec2f(0.0), cells - 0.01);
     let cell = vec2u(clamped);
     let at = clamped - floor(clamped);
-    let row_words = 1u << work.cameras[{{ k }}].log2_sides.x;
-    let corners = corners_of(work.cameras[{{ k }}].first_word + cell.y * row_words + cell.x, row_words);
+    let cell_index = work.cameras[{{ k }}].first_cell + cell.y * work.cameras[{{ k }}].width_px + cell.x;
+    let corners = corners_of(cell_index);
     let code_above = work.cameras[{{ k }}].code_scale * inverse_w;
     let code = code_above + work.cameras[{{ k }}].code_offset;
     let reach = slack * code_above / work.cameras[{{ k }}].focal_px;
     // Of a connected cell, the surface itself counts; else each sample for itself.
     let gaps = code - select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
-    let share = vec4f((1.0 - at.x) * (1.0 - at.y), at.x * (1.0 - at.y), (1.0 - at.x) * at.y, at.x * at.y);
+    let share = bilinear_shares(at);
     let shares = select(vec4f(0.0), share, (abs(gaps) < vec4f(reach)) & (corners.codes > vec4f(1.5)));
     let same = dot(shares, vec4f(1.0));
     let beyond = dot(select(vec4f(0.0), share, (gaps > vec4f(reach)) & (corners.codes > vec4f(0.5))), vec4f(1.0));
@@ -119,9 +107,7 @@ fn sight_{{ k }}(point_in_world: vec3f, view_direction: vec3f, slack: f32) -> Si
     let border = min(min(min(uv.x, cells.x - uv.x), min(uv.y, cells.y - uv.y)) * 0.125, 1.0) + 1e-3;
     let footprint = work.cameras[{{ k }}].focal_px * inverse_distance;
     let weight = border * footprint * footprint / (dot(off, off) + {{ angle_floor }});
-    let width = work.cameras[{{ k }}].width_px;
-    let texel = work.cameras[{{ k }}].first_texel + cell.y * width + cell.x;
-    return Sight(select(0.0, weight, inside && same > 0.05), texel, width, shares, select(0.0, same, inside), select(0.0, beyond, inside));
+    return Sight(select(0.0, weight, inside && same > 0.05), cell_index, shares, select(0.0, same, inside), select(0.0, beyond, inside));
 }
 {% endfor %}
 
@@ -130,8 +116,8 @@ fn sight_{{ k }}(point_in_world: vec3f, view_direction: vec3f, slack: f32) -> Si
 struct Blend { color_linear: vec3f, camera_mask: u32, occupied: bool }
 
 fn color_of(sight: Sight) -> vec3f {
-    let color = sight.shares.x * color_texel(sight.texel) + sight.shares.y * color_texel(sight.texel + 1u)
-        + sight.shares.z * color_texel(sight.texel + sight.width) + sight.shares.w * color_texel(sight.texel + sight.width + 1u);
+    let colors = colors_of(sight.cell).corners;
+    let color = sight.shares.x * colors[0] + sight.shares.y * colors[1] + sight.shares.z * colors[2] + sight.shares.w * colors[3];
     return color / max(sight.same, 0.05);
 }
 
@@ -144,7 +130,7 @@ fn blended(point_in_world: vec3f, direction: vec3f, slack: f32) -> Blend {
     var same = first.same;
     var beyond = first.beyond;
     var carved = first.beyond > 0.999;
-    var second = Sight(0.0, 0u, 0u, vec4f(0.0), 0.0, 0.0);
+    var second = Sight(0.0, 0u, vec4f(0.0), 0.0, 0.0);
     var second_mask = 0u;
     var third_weight = 0.0;
 {% for k in range(1, cameras) %}
@@ -171,8 +157,8 @@ fn blended(point_in_world: vec3f, direction: vec3f, slack: f32) -> Blend {
 
 fn pick_sight(a: Sight, b: Sight, second: bool) -> Sight {
     return Sight(
-        select(a.weight, b.weight, second), select(a.texel, b.texel, second), select(a.width, b.width, second),
-        select(a.shares, b.shares, second), select(a.same, b.same, second), 0.0,
+        select(a.weight, b.weight, second), select(a.cell, b.cell, second), select(a.shares, b.shares, second),
+        select(a.same, b.same, second), 0.0,
     );
 }
 

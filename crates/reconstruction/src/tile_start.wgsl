@@ -6,7 +6,7 @@
 // that sees a part of it shows anything else.
 {% include "sample_set.wgsl" %}
 
-@group(0) @binding(2) var<storage, read_write> tile_start_m: array<f32>;
+@group(0) @binding(3) var<storage, read_write> tile_start_m: array<f32>;
 
 const MAX_MOVES: u32 = 40u;
 const GREATEST_MOVE: f32 = 1.3;
@@ -38,8 +38,9 @@ fn opinion_{{ k }}(a: vec3f, b: vec3f, t: f32, t_end: f32, slope: f32) -> u32 {
     let extent = clamp(high, vec2f(0.0), cells) - first;
     let log2_sides = work.cameras[{{ k }}].log2_sides;
     let wanted = u32(max(ceil(log2(max(extent.x, extent.y) + 1e-3)), 1.0));
-    let level = min(wanted, min(log2_sides.x, log2_sides.y));
-    let nearest = f32(pyramids[work.cameras[{{ k }}].first_wide_word + node_index(log2_sides, level, vec2u(first) >> vec2u(level))]);
+    let level = min(wanted, top_level(log2_sides));
+    let node = work.cameras[{{ k }}].first_node + node_index(log2_sides, level, vec2u(first) >> vec2u(level));
+    let nearest = f32(textureLoad(nodes, texel_of(node), 0).y);
     let farthest_codes = work.cameras[{{ k }}].code_scale / max(depths_m + radii_m, vec2f(1e-20)) + work.cameras[{{ k }}].code_offset;
     let empty = all(closest_m > vec2f(0.0)) && min(farthest_codes.x, farthest_codes.y) > nearest;
     return select(select(0u, select(UNOPPOSED, PROVEN | UNOPPOSED, whole), empty), UNOPPOSED, unseen);

@@ -8,14 +8,15 @@ mod fill;
 mod march;
 mod sample_camera;
 mod search;
+mod specular;
 mod surface;
 mod tile_start;
 mod view_ray;
 
 use depth_image::{Aabb, DepthImage, PinholeCamera, Provenance, ProvenanceKind, View, srgb8_from_linear};
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 
-use crate::ReconstructionMethod;
+use crate::{ReconstructionMethod, SetDescription};
 use sample_camera::SampleCamera;
 use view_ray::{ViewRay, ViewRays};
 
@@ -54,15 +55,15 @@ impl Pixel {
 #[must_use]
 pub fn reconstruct(
     images: &[DepthImage],
-    volume: &Aabb,
-    background_linear: Vec3,
+    set: &SetDescription<'_>,
     camera: &PinholeCamera,
     method: ReconstructionMethod,
 ) -> View {
     let cameras = nearest_first(images, camera);
-    let rays = ViewRays::of(camera, volume, images);
+    let rays = ViewRays::of(camera, &set.volume, images);
     let starts = tile_start::tile_starts(&cameras, &rays);
-    reconstruct_from(&cameras, &rays, &starts, background_linear, method)
+    let pixels = pixels_from(&cameras, &rays, &starts, set.background_linear, method);
+    finished(pixels, images, set, &cameras, &rays)
 }
 
 /// As [`reconstruct`], but each ray is followed from where it enters the volume: what tile starts must not
@@ -70,15 +71,15 @@ pub fn reconstruct(
 #[must_use]
 pub fn reconstruct_from_entry(
     images: &[DepthImage],
-    volume: &Aabb,
-    background_linear: Vec3,
+    set: &SetDescription<'_>,
     camera: &PinholeCamera,
     method: ReconstructionMethod,
 ) -> View {
     let cameras = nearest_first(images, camera);
-    let rays = ViewRays::of(camera, volume, images);
+    let rays = ViewRays::of(camera, &set.volume, images);
     let starts = vec![0.0; rays.tiles().element_product() as usize];
-    reconstruct_from(&cameras, &rays, &starts, background_linear, method)
+    let pixels = pixels_from(&cameras, &rays, &starts, set.background_linear, method);
+    finished(pixels, images, set, &cameras, &rays)
 }
 
 /// For each tile of 8 × 8 pixels, row by row, the planar depth in metres up to which its rays need not be
@@ -96,17 +97,16 @@ fn nearest_first(images: &[DepthImage], camera: &PinholeCamera) -> Vec<SampleCam
     cameras
 }
 
-fn reconstruct_from(
+/// What the method finds, row by row.
+fn pixels_from(
     cameras: &[SampleCamera],
     rays: &ViewRays,
     starts: &[f32],
     background_linear: Vec3,
     method: ReconstructionMethod,
-) -> View {
+) -> Vec<Pixel> {
     let background_srgb8 = background_linear.to_array().map(srgb8_from_linear);
-    let size_px = rays.size_px();
-    let places = (0..size_px.y).flat_map(|y| (0..size_px.x).map(move |x| UVec2::new(x, y)));
-    let mut pixels: Vec<Pixel> = places
+    rays.places()
         .map(|place| {
             let ray = rays.ray(place);
             let start = starts[rays.tile_index(place)];
@@ -119,10 +119,21 @@ fn reconstruct_from(
                 }
             }
         })
-        .collect();
-    fill::fill(&mut pixels, size_px);
+        .collect()
+}
+
+/// Fills what is unknown, then adds highlights, which are not to be spread.
+fn finished(
+    mut pixels: Vec<Pixel>,
+    images: &[DepthImage],
+    set: &SetDescription<'_>,
+    cameras: &[SampleCamera],
+    rays: &ViewRays,
+) -> View {
+    fill::fill(&mut pixels, rays.size_px());
+    specular::add_highlights(&mut pixels, images, set, cameras, rays);
     View {
-        size_px,
+        size_px: rays.size_px(),
         srgb8: pixels.iter().flat_map(|p| p.srgb8).collect(),
         inverse_depth_per_m: Some(pixels.iter().map(|p| p.inverse_depth_per_m).collect()),
         provenance: Some(pixels.iter().map(|p| p.provenance).collect()),

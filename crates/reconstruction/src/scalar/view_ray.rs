@@ -43,6 +43,12 @@ impl ViewRays {
         self.view.size_px.into()
     }
 
+    /// All pixels, row by row.
+    pub fn places(&self) -> impl Iterator<Item = UVec2> + use<> {
+        let size_px = self.size_px();
+        (0..size_px.y).flat_map(move |y| (0..size_px.x).map(move |x| UVec2::new(x, y)))
+    }
+
     /// The smaller focal length, in pixels.
     pub fn focal_px(&self) -> f32 {
         self.view.focal_px

@@ -52,7 +52,7 @@ fn no_views_are_no_views() {
 
 /// The error of an upload that must fail.
 fn refused(stage: &Stage) -> ReconstructionError {
-    let done = reconstructor().upload(&stage.images, &stage.volume, Vec3::ZERO);
+    let done = reconstructor().upload(&stage.images, &stage.description());
     done.err().expect("an error")
 }
 
@@ -60,7 +60,7 @@ fn refused(stage: &Stage) -> ReconstructionError {
 fn sets_that_cannot_be_used_are_refused() {
     let good = stage();
     let of = |count: usize| Stage { images: vec![good.images[0].clone(); count], ..good.clone() };
-    assert!(reconstructor().upload(&of(16).images, &good.volume, Vec3::ZERO).is_ok());
+    assert!(reconstructor().upload(&of(16).images, &good.description()).is_ok());
     assert!(matches!(refused(&of(17)), ReconstructionError::SampleCount(17)));
     assert!(matches!(refused(&of(0)), ReconstructionError::SampleCount(0)));
     let mut short = good.clone();

@@ -4,5 +4,6 @@ mod batches;
 mod closed_form;
 mod failures;
 mod holes_and_limits;
+mod specular;
 mod stage;
 mod twins;

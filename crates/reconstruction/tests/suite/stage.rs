@@ -2,11 +2,13 @@
 
 use std::sync::{Arc, OnceLock};
 
-use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use depth_image::{
+    Aabb, Camera, DepthImage, Environment, Illumination, PinholeCamera, ProvenanceKind, View, ViewPlanes,
+};
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use metrics::Rgb8Image;
-use reconstruction::{ReconstructionMethod, Reconstructor, SampleSet};
+use reconstruction::{ReconstructionMethod, Reconstructor, SampleSet, SetDescription};
 use render::{DrawWork, GpuScene, Lighting, Rasterizer, SamplePlanes};
 use scene::Scene;
 
@@ -37,6 +39,13 @@ pub fn reconstructor() -> &'static Reconstructor {
     &device().reconstructor
 }
 
+static DARK: Illumination = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
+
+/// Of a set in which nothing depends on the viewer.
+pub fn matt(volume: Aabb, background_linear: Vec3) -> SetDescription<'static> {
+    SetDescription { volume, background_linear, illumination: &DARK, highlight: None }
+}
+
 /// A scene and depth images of it.
 #[derive(Clone)]
 pub struct Stage {
@@ -53,7 +62,11 @@ impl Stage {
     }
 
     pub fn upload(&self) -> SampleSet {
-        reconstructor().upload(&self.images, &self.volume, self.scene.background_linear).expect("a sample set")
+        reconstructor().upload(&self.images, &self.description()).expect("a sample set")
+    }
+
+    pub fn description(&self) -> SetDescription<'static> {
+        matt(self.volume, self.scene.background_linear)
     }
 
     pub fn views(&self, cameras: &[PinholeCamera], method: ReconstructionMethod) -> Vec<View> {
@@ -65,7 +78,7 @@ impl Stage {
     }
 
     pub fn twin(&self, camera: &PinholeCamera, method: ReconstructionMethod) -> View {
-        reconstruction::scalar::reconstruct(&self.images, &self.volume, self.scene.background_linear, camera, method)
+        reconstruction::scalar::reconstruct(&self.images, &self.description(), camera, method)
     }
 
     /// From the triangles.

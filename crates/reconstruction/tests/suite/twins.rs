@@ -89,8 +89,7 @@ fn starting_at_the_volume_finds_the_same_surfaces() {
         let stage = Stage::new(scene, &corners.samples(4));
         for method in [CARVE, SEARCH] {
             let camera = corners.view();
-            let background = stage.scene.background_linear;
-            let from_entry = scalar::reconstruct_from_entry(&stage.images, &stage.volume, background, &camera, method);
+            let from_entry = scalar::reconstruct_from_entry(&stage.images, &stage.description(), &camera, method);
             let tiled = stage.twin(&camera, method);
             let hit = |view: &View| kinds(view).into_iter().map(|k| k == ProvenanceKind::Hit).collect::<Vec<_>>();
             let differ = hit(&tiled).into_iter().zip(hit(&from_entry)).filter(|(a, b)| a != b).count();

@@ -1,0 +1,28 @@
+// A cell of a sample image: the four samples at its corners.
+
+// A cell's corners: codes (upper left, upper right, lower left, lower right), and whether they are one
+// surface.
+struct Corners { codes: vec4f, connected: bool }
+
+// Of each cell two words: its upper corners' codes, and in the highest bit whether its corners are one surface; its
+// lower corners' codes.
+@group(0) @binding(2) var cell_codes: texture_2d<u32>;
+
+fn corners_of(cell_index: u32) -> Corners {
+{% if count_fetches %}    fetches += 1u;
+{% endif %}
+    let words = textureLoad(cell_codes, texel_of(cell_index), 0).xy;
+    let codes = vec4u(words.x & 0x7fffu, (words.x >> 16u) & 0x7fffu, words.y & 0x7fffu, (words.y >> 16u) & 0x7fffu);
+    return Corners(vec4f(codes), (words.x >> 31u) != 0u);
+}
+
+fn bilinear(corners: vec4f, at: vec2f) -> f32 {
+    let upper = corners.x + (corners.y - corners.x) * at.x;
+    let lower = corners.z + (corners.w - corners.z) * at.x;
+    return upper + (lower - upper) * at.y;
+}
+
+// Of each corner at a place inside the cell, in their order.
+fn bilinear_shares(at: vec2f) -> vec4f {
+    return vec4f((1.0 - at.x) * (1.0 - at.y), at.x * (1.0 - at.y), (1.0 - at.x) * at.y, at.x * at.y);
+}

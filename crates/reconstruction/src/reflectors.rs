@@ -1,0 +1,104 @@
+//! What the samples of a set reflect towards a viewer, on the device.
+
+use depth_image::{DepthImage, Highlight, Illumination, SpecularPlanes};
+use gpu::{Gpu, GpuError, illumination_bytes};
+use wgpu::BufferUsages;
+
+use crate::{ReconstructionError, SetDescription, word_texture};
+
+/// A normal and a reflector before the words of visibility.
+const WORDS_BEFORE_VISIBILITY: usize = 2;
+const ALL_VISIBLE: u32 = u32::MAX;
+
+/// Of a set in which anything has a highlight.
+pub(crate) struct Reflectors {
+    pub highlight: Highlight,
+    pub lights: usize,
+    pub visibility_words: usize,
+    pub samples: wgpu::TextureView,
+    pub illumination: wgpu::Buffer,
+}
+
+impl Reflectors {
+    /// `None` where no highlights are asked for or nothing reflects.
+    pub fn upload(
+        gpu: &Gpu,
+        images: &[DepthImage],
+        set: &SetDescription<'_>,
+    ) -> Result<Option<Self>, ReconstructionError> {
+        check(images, set.illumination)?;
+        let Some(highlight) = set.highlight.filter(|_| images.iter().any(reflects)) else { return Ok(None) };
+        let bytes = illumination_bytes(set.illumination);
+        check_uniform(gpu, bytes.len())?;
+        let visibility_words = visibility_words(images);
+        Ok(Some(Self {
+            highlight,
+            lights: set.illumination.lights.len(),
+            visibility_words,
+            samples: word_texture::upload(gpu, "reflectors", sample_words(images, visibility_words))?,
+            illumination: gpu.buffer_with("illumination", &bytes, BufferUsages::UNIFORM),
+        }))
+    }
+}
+
+/// Texels that a sample's words take.
+pub(crate) const fn sample_texels(visibility_words: usize) -> usize {
+    (WORDS_BEFORE_VISIBILITY + visibility_words).div_ceil(4)
+}
+
+fn reflects(image: &DepthImage) -> bool {
+    image.specular.as_ref().is_some_and(|planes| planes.reflectance_srgb8_roughness8.iter().any(|&word| word != 0))
+}
+
+fn check(images: &[DepthImage], illumination: &Illumination) -> Result<(), ReconstructionError> {
+    let expected = SpecularPlanes::visibility_planes(illumination.lights.len());
+    for (index, image) in images.iter().enumerate() {
+        let wrong = |reason: String| Err(ReconstructionError::Sample { index, reason });
+        let Some(planes) = &image.specular else { continue };
+        if image.normal_oct16.is_none() {
+            return wrong("a highlight needs normals".to_owned());
+        }
+        let found = planes.visibility8.len();
+        if found != 0 && found != expected {
+            return wrong(format!("{found} planes of visibility, the lights need {expected} or none"));
+        }
+    }
+    Ok(())
+}
+
+fn check_uniform(gpu: &Gpu, bytes: usize) -> Result<(), GpuError> {
+    let (needed, limit) = (bytes as u64, gpu.device.limits().max_uniform_buffer_binding_size);
+    if needed > limit {
+        return Err(GpuError::Limit { what: "the scene's lights (bytes)".to_owned(), needed, limit });
+    }
+    Ok(())
+}
+
+fn visibility_words(images: &[DepthImage]) -> usize {
+    images.iter().filter_map(|image| image.specular.as_ref()).map(|planes| planes.visibility8.len()).max().unwrap_or(0)
+}
+
+/// Sample after sample, image after image; those of images without highlights reflect nothing.
+fn sample_words(images: &[DepthImage], visibility_words: usize) -> Vec<[u32; 4]> {
+    let stride = sample_texels(visibility_words);
+    let samples: usize = images.iter().map(|image| image.color_rgb9e5.len()).sum();
+    let mut texels = vec![[0; 4]; samples * stride];
+    let mut rest = texels.as_mut_slice();
+    for image in images {
+        let (own, others) = rest.split_at_mut(image.color_rgb9e5.len() * stride);
+        write_image(own.as_flattened_mut(), 4 * stride, image, visibility_words);
+        rest = others;
+    }
+    texels
+}
+
+fn write_image(words: &mut [u32], stride: usize, image: &DepthImage, visibility_words: usize) {
+    let (Some(planes), Some(normals)) = (&image.specular, &image.normal_oct16) else { return };
+    for (index, sample) in words.chunks_mut(stride).enumerate() {
+        sample[0] = normals[index];
+        sample[1] = planes.reflectance_srgb8_roughness8[index];
+        for (word, visible) in sample[WORDS_BEFORE_VISIBILITY..][..visibility_words].iter_mut().enumerate() {
+            *visible = planes.visibility8.get(word).map_or(ALL_VISIBLE, |plane| plane[index]);
+        }
+    }
+}

@@ -1,0 +1,117 @@
+// Adds the light that depends on the viewer to pixels that show a surface: their colour so far is what the
+// surface sends to all sides alike. Works on the finished view, whatever method found it.
+//
+// What a surface reflects is told by the samples around the point, of the contributing camera that is nearest
+// to the view. What is filled shows no surface that a camera saw, and gets no highlight.
+{% include "color.wgsl" %}
+{% include "normal.wgsl" %}
+{% include "light.wgsl" %}
+{% include "highlight.wgsl" %}
+{% include "sample_set.wgsl" %}
+{% include "cell.wgsl" %}
+
+@group(0) @binding(3) var<storage, read_write> out_srgb8: array<u32>;
+@group(0) @binding(4) var<storage, read> inverse_depth: array<f32>;
+@group(0) @binding(5) var<storage, read> provenance: array<u32>;
+@group(0) @binding(6) var<uniform> illumination: Illumination;
+// Of each sample its normal, its reflector and the words of its visibility, rounded up to whole texels: a load
+// brings four words.
+@group(0) @binding(7) var samples: texture_2d<u32>;
+
+const PROVENANCE_HIT: u32 = 1u;
+const THICKNESS_FOOTPRINTS: f32 = {{ thickness_footprints }};
+const SAMPLE_TEXELS: u32 = {{ sample_texels }}u;
+
+// What the samples around a point say together, packed as one sample's, and the share of them that reflects.
+struct Gathered { normal: vec3f, reflector: u32, visibility: VisibilityWords, reflecting: f32 }
+
+fn sample_texel(sample: u32, texel: u32) -> vec4u {
+    return textureLoad(samples, texel_of(sample * SAMPLE_TEXELS + texel), 0);
+}
+
+// On the octahedron, not the sphere: neighbours are near to each other, and their mean is brought to unit length
+// once.
+fn octahedral_from_oct16(packed: u32) -> vec3f {
+    let flat = unpack2x16snorm(packed);
+    let z = 1.0 - abs(flat.x) - abs(flat.y);
+    return vec3f(select(flat, oct_wrapped(flat), z < 0.0), z);
+}
+
+// The samples at a cell's corners, by their shares; `sample` is the upper left one's number. Means of encoded
+// numbers are encoded means: nothing but the mean is decoded.
+fn gathered(sample: u32, width_px: u32, shares: vec4f) -> Gathered {
+    var normal = vec3f(0.0);
+    var reflector = vec4f(0.0);
+    var reflecting = 0.0;
+{% for word in range(visibility_words) %}
+    var visible{{ word }} = vec4f(0.0);
+{% endfor %}
+{% for corner in range(4) %}
+    {
+        let place = sample + {{ corner % 2 }}u + {{ corner // 2 }}u * width_px;
+{% for texel in range(sample_texels) %}
+        let words{{ texel }} = sample_texel(place, {{ texel }}u);
+{% endfor %}
+        let share = select(shares[{{ corner }}], 0.0, words0.y == 0u);
+        normal += octahedral_from_oct16(words0.x) * share;
+        reflector += unpack4x8unorm(words0.y) * share;
+        reflecting += share;
+{% for word in range(visibility_words) %}
+        visible{{ word }} += unpack4x8unorm(words{{ (word + 2) // 4 }}[{{ (word + 2) % 4 }}]) * share;
+{% endfor %}
+    }
+{% endfor %}
+    let inverse = 1.0 / max(reflecting, 1e-6);
+    var visibility: VisibilityWords;
+{% for word in range(visibility_words) %}
+    visibility[{{ word }}] = pack4x8unorm(visible{{ word }} * inverse);
+{% endfor %}
+    let all = max(dot(shares, vec4f(1.0)), 1e-6);
+    return Gathered(unit_or_zero(normal), pack4x8unorm(reflector * inverse), visibility, reflecting / all);
+}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= work.view.size_px) { return; }
+    let index = work.view.first_pixel + id.y * work.view.size_px.x + id.x;
+    let origin = provenance[index];
+    if (origin & 0xffu) != PROVENANCE_HIT { return; }
+    let center = vec2f(id.xy) + 0.5;
+    let direction = work.view.column_in_world * center.x + work.view.row_in_world * center.y + work.view.corner_in_world;
+    let point_in_world = work.view.eye_in_world + direction / inverse_depth[index];
+    // Cameras are sorted: of those that contributed, the last to be chosen is the nearest.
+    var p = vec3f(0.0, 0.0, 1.0);
+    var cells = vec2f(1.0);
+    var scale = 1.0;
+    var offset = 0.0;
+    var focal_px = 1.0;
+    var first_cell = 0u;
+    var width_px = 1u;
+{% for k in range(cameras) | reverse %}
+    let chosen{{ k }} = (work.cameras[{{ k }}].mask & (origin >> 8u)) != 0u;
+    p = select(p, homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(point_in_world, 1.0)), chosen{{ k }});
+    cells = select(cells, work.cameras[{{ k }}].cells, chosen{{ k }});
+    scale = select(scale, work.cameras[{{ k }}].code_scale, chosen{{ k }});
+    offset = select(offset, work.cameras[{{ k }}].code_offset, chosen{{ k }});
+    focal_px = select(focal_px, work.cameras[{{ k }}].focal_px, chosen{{ k }});
+    first_cell = select(first_cell, work.cameras[{{ k }}].first_cell, chosen{{ k }});
+    width_px = select(width_px, work.cameras[{{ k }}].width_px, chosen{{ k }});
+{% endfor %}
+    let inverse_w = safe_reciprocal(p.z);
+    let uv = clamp(p.xy * inverse_w - 0.5, vec2f(0.0), cells - 0.01);
+    let cell = vec2u(uv);
+    let at = uv - floor(uv);
+    let cell_index = first_cell + cell.y * width_px + cell.x;
+    let corners = corners_of(cell_index);
+    // As in surface.wgsl: of a connected cell the surface itself counts, else each sample for itself.
+    let code_above = scale * inverse_w;
+    let gaps = code_above + offset - select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
+    let reach = vec4f(THICKNESS_FOOTPRINTS * code_above / focal_px);
+    let shares = select(vec4f(0.0), bilinear_shares(at), (abs(gaps) < reach) & (corners.codes > vec4f(1.5)));
+    let around = gathered(cell_index, width_px, shares);
+    if around.reflecting <= 0.0 { return; }
+    let towards_eye = unit_or_zero(-direction);
+    let added = highlight(point_in_world, around.normal, towards_eye, around.reflector, around.visibility);
+    let color = linear_from_srgb(unpack4x8unorm(out_srgb8[index]).rgb) + added * around.reflecting;
+    out_srgb8[index] = pack4x8unorm(vec4f(srgb_from_linear(color), 1.0));
+}
