@@ -23,6 +23,8 @@ pub struct Wishes {
     pub policy: PolicyChoice,
     /// Planes beside colour.
     pub planes: ViewPlanes,
+    /// Steps in which the light of a static scene grows; 1 for all of it at once.
+    pub refinement_steps: u32,
     /// Scene times; every set has the same views.
     pub timeline: Timeline,
 }
@@ -59,6 +61,7 @@ pub async fn open(client: &Client, wishes: &Wishes, views: &[PinholeCamera]) -> 
         timeline: wishes.timeline,
         policy: wishes.policy,
         forced_sampler_count: None,
+        refinement_steps: wishes.refinement_steps,
     };
     let told = |event: &_| tracing::info!(?event, "session");
     Ok(client.open_session(request, told).await?)

@@ -6,11 +6,14 @@ use std::str::FromStr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Instant;
 
-use depth_image::{DepthImage, View};
+use depth_image::{DepthImage, PinholeCamera, View};
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
-use reconstruction::{ReconstructionError, ReconstructionMethod, Reconstructor};
-use render::{DrawWork, GpuScene, Rasterizer, RenderError, SamplePlanes};
+use reconstruction::{ReconstructionError, ReconstructionMethod, Reconstructor, SetDescription};
+use render::{
+    AccelerationReport, Choice, DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, SamplePlanes,
+    Visibility,
+};
 use sampling::{Sampler, SamplingError};
 use scene::{Limits, Scene};
 
@@ -20,7 +23,7 @@ const KEPT_SCENES: usize = 8;
 /// One device, its pipelines, and the scenes on it.
 pub struct GpuEngine {
     gpu: Arc<Gpu>,
-    rasterizer: Arc<Rasterizer>,
+    renderer: Arc<Renderer>,
     sampler: Sampler,
     reconstructor: Reconstructor,
     scenes: Mutex<Vec<(String, Arc<GpuScene>)>>,
@@ -72,11 +75,11 @@ impl GpuEngine {
     /// When there is no device or a shader is broken.
     pub fn open(preference: DevicePreference) -> Result<Self, EngineError> {
         let gpu = Gpu::open(preference).map_err(|error: GpuError| device(error))?;
-        let rasterizer = Arc::new(Rasterizer::new(&gpu).map_err(render_error)?);
+        let renderer = Arc::new(Renderer::new(&gpu).map_err(render_error)?);
         Ok(Self {
-            sampler: Sampler::sharing(rasterizer.clone()),
+            sampler: Sampler::sharing(renderer.clone()),
             reconstructor: Reconstructor::new(&gpu).map_err(reconstruction_error)?,
-            rasterizer,
+            renderer,
             gpu,
             scenes: Mutex::default(),
             loading: Mutex::default(),
@@ -124,10 +127,41 @@ impl GpuEngine {
         &self.reconstructor
     }
 
-    fn scene(&self, hash: &str) -> Result<Arc<GpuScene>, EngineError> {
+    /// What draws, for measuring without a service in between.
+    #[must_use]
+    pub fn renderer(&self) -> &Renderer {
+        &self.renderer
+    }
+
+    /// How surfaces of a scene are found in pictures of a camera's size, by what both ways cost.
+    ///
+    /// # Errors
+    /// For a scene it has not, or a device that fails.
+    pub fn visibility_choice(&self, hash: &str, camera: &PinholeCamera) -> Result<Choice, EngineError> {
+        self.renderer.choice(&*self.scene(hash)?, camera, 0.0).map_err(render_error)
+    }
+
+    /// The tree that rays go through.
+    ///
+    /// # Errors
+    /// For a scene it has not, or one that does not fit the device.
+    pub fn acceleration(&self, hash: &str, scene_time_s: f32) -> Result<AccelerationReport, EngineError> {
+        self.scene(hash)?.acceleration(scene_time_s).map_err(render_error)
+    }
+
+    /// A scene on the device.
+    ///
+    /// # Errors
+    /// Where it was never loaded.
+    pub fn scene(&self, hash: &str) -> Result<Arc<GpuScene>, EngineError> {
         let found = locked(&self.scenes).iter().find(|(kept, _)| kept == hash).map(|(_, scene)| scene.clone());
         found.ok_or_else(|| EngineError::UnknownScene { hash: hash.to_owned() })
     }
+}
+
+fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {
+    let (visibility, refinement) = (Visibility::Measured, Refinement::default());
+    DrawWork { scene, lighting, scene_time_s, visibility, refinement }
 }
 
 impl Engine for GpuEngine {
@@ -152,19 +186,29 @@ impl Engine for GpuEngine {
 
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
         let scene = self.scene(&request.scene_hash)?;
+        let wire::Refinement { step, steps } = request.refinement;
+        let draw = DrawWork {
+            refinement: Refinement { step, steps },
+            ..draw_work(&scene, parsed("lighting", &request.lighting)?, request.scene_time_s)
+        };
         let work = sampling::SampleWork {
-            scene: &scene,
+            draw,
             cameras: &request.cameras,
             method: parsed("sampling_method", &request.sampling)?,
-            lighting: parsed("lighting", &request.lighting)?,
-            scene_time_s: request.scene_time_s,
-            planes: SamplePlanes::default(),
+            planes: SamplePlanes { specular: true, ..SamplePlanes::default() },
         };
         self.sampler.sample(&work).map_err(|SamplingError::Render(error)| render_error(error))
     }
 
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
-        let uploaded = self.reconstructor.upload(&set.images, &set.volume, set.background_linear);
+        let lighting: Lighting = parsed("lighting", &set.lighting)?;
+        let description = SetDescription {
+            volume: set.volume,
+            background_linear: set.background_linear,
+            illumination: &set.illumination,
+            highlight: lighting.highlight(),
+        };
+        let uploaded = self.reconstructor.upload(&set.images, &description);
         Ok(Arc::new(Uploaded(uploaded.map_err(reconstruction_error)?)))
     }
 
@@ -176,8 +220,7 @@ impl Engine for GpuEngine {
 
     fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
         let scene = self.scene(&work.scene_hash)?;
-        let draw =
-            DrawWork { scene: &scene, lighting: parsed("lighting", &work.lighting)?, scene_time_s: work.scene_time_s };
-        self.rasterizer.draw_views(draw, &work.cameras, work.planes).map_err(render_error)
+        let draw = draw_work(&scene, parsed("lighting", &work.lighting)?, work.scene_time_s);
+        self.renderer.draw_views(draw, &work.cameras, work.planes).map_err(render_error)
     }
 }

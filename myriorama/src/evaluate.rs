@@ -8,7 +8,8 @@ use depth_image::{Camera, DepthImage, PinholeCamera, ProvenanceKind, View, ViewP
 use metrics::{DepthPlane, PixelClass, Rgb8Image, ScoreMap, classify, depth_errors, flip_map, psnr_db, ssim_map};
 use node::{DirectWork, Engine as _, SampleWork};
 use rayon::prelude::*;
-use reconstruction::{ReconstructionMethod, SampleSet};
+use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
+use render::Lighting;
 use wire::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
 
 use crate::engine::GpuEngine;
@@ -83,9 +84,16 @@ impl Truth {
             sampling: args.sampling.to_string(),
             lighting: lighting.clone(),
             scene_time_s: 0.0,
+            refinement: wire::Refinement::default(),
         };
         let images = engine.sample(&work)?.iter().map(travelled).collect::<anyhow::Result<Vec<_>>>()?;
-        let set = engine.reconstructor().upload(&images, &setup.offer.volume, setup.offer.background_linear)?;
+        let description = SetDescription {
+            volume: setup.offer.volume,
+            background_linear: setup.offer.background_linear,
+            illumination: &setup.offer.illumination,
+            highlight: args.lighting.highlight(),
+        };
+        let set = engine.reconstructor().upload(&images, &description)?;
         let direct =
             DirectWork { scene_hash: hash, cameras: cameras.clone(), lighting, scene_time_s: 0.0, planes: ALL_PLANES };
         let views = engine.draw_direct(&direct)?;
@@ -95,6 +103,21 @@ impl Truth {
         };
         let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;
         Ok(Self { engine: engine.clone(), cameras, views, images, set, classes })
+    }
+
+    /// The same views drawn from the scene in another light.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn drawn(&self, setup: &Setup, lighting: Lighting) -> anyhow::Result<Vec<View>> {
+        let direct = DirectWork {
+            scene_hash: setup.offer.hash.to_string(),
+            cameras: self.cameras.clone(),
+            lighting: lighting.to_string(),
+            scene_time_s: 0.0,
+            planes: COLOR_ONLY,
+        };
+        Ok(self.engine.draw_direct(&direct)?)
     }
 
     /// Reconstructs all views.
@@ -214,6 +237,16 @@ fn row(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, errors:
     }
 }
 
+/// Mean FLIP over views.
+///
+/// # Errors
+/// When views are not of one size.
+pub fn mean_flip(references: &[View], tests: &[View]) -> anyhow::Result<f64> {
+    let flip = |(reference, test): (&View, &View)| mean(&flip_map(&image_of(reference)?, &image_of(test)?)?);
+    let flips = references.iter().zip(tests).map(flip).collect::<anyhow::Result<Vec<_>>>()?;
+    Ok(flips.iter().sum::<f64>() / flips.len() as f64)
+}
+
 /// A view's colour, for the metrics.
 ///
 /// # Errors
@@ -233,7 +266,7 @@ fn known_depth(view: &View) -> anyhow::Result<DepthPlane<'static>> {
     Ok(DepthPlane::new(view.size_px.x, view.size_px.y, plane)?)
 }
 
-fn mean(map: &ScoreMap) -> anyhow::Result<f64> {
+pub(crate) fn mean(map: &ScoreMap) -> anyhow::Result<f64> {
     Ok(map.mean(None)?.unwrap_or(f64::NAN))
 }
 

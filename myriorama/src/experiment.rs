@@ -9,6 +9,7 @@ use depth_image::{PinholeCamera, ViewPlanes};
 use glam::UVec2;
 use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
+use render::{Choice, Lighting};
 use tokio::runtime::Runtime;
 use wire::{PolicyChoice, Timeline};
 
@@ -25,6 +26,21 @@ pub const PAPER_VIEWS: usize = 290;
 pub const VIEW_SIZE_PX: UVec2 = UVec2::new(200, 150);
 /// Scene time between runs: far less than any motion, but another sample set, which no node has kept.
 const RUN_STEP_S: f64 = 1e-4;
+
+/// What is asked of the cluster.
+#[derive(Debug, Clone, Copy)]
+pub struct Wish {
+    /// How surfaces are lit.
+    pub lighting: Lighting,
+    /// Who makes the views.
+    pub policy: PolicyChoice,
+    /// How they are reconstructed.
+    pub method: ReconstructionMethod,
+    /// V.
+    pub views: usize,
+    /// Sample sets of one moment, each with all views.
+    pub sets: u32,
+}
 
 /// Runs until it is stopped.
 pub struct Experiment {
@@ -78,33 +94,42 @@ impl Experiment {
         Ok(cell.spread(count, VIEW_SIZE_PX))
     }
 
-    /// Delivers `count` views of a sample set that nobody has yet. What the coordinator measures before is not
-    /// in the time.
+    /// `views` of one set, everything else as the scene's arguments say.
+    #[must_use]
+    pub fn wish(&self, policy: PolicyChoice, views: usize) -> Wish {
+        Wish { lighting: self.args.lighting, policy, method: self.args.method, views, sets: 1 }
+    }
+
+    /// Delivers views of a sample set that nobody has yet. What the coordinator measures before is not in the time.
     ///
     /// # Errors
     /// The cluster's.
-    pub fn deliver(
-        &self,
-        policy: PolicyChoice,
-        method: ReconstructionMethod,
-        count: usize,
-        arrived: impl FnMut(&Frame),
-    ) -> anyhow::Result<Delivered> {
+    pub fn deliver(&self, wish: Wish, arrived: impl FnMut(&Frame)) -> anyhow::Result<Delivered> {
         let run = self.runs.replace(self.runs.get() + 1);
         let wishes = Wishes {
-            method: method.to_string(),
+            method: wish.method.to_string(),
             sampling: self.args.sampling.to_string(),
-            lighting: self.args.lighting.to_string(),
+            lighting: wish.lighting.to_string(),
             codec: "lz4".to_owned(),
-            policy,
+            policy: wish.policy,
             planes: ViewPlanes::default(),
-            timeline: Timeline::still(f64::from(run) * RUN_STEP_S),
+            refinement_steps: 1,
+            timeline: Timeline { set_count: wish.sets, ..Timeline::still(f64::from(run) * RUN_STEP_S) },
         };
-        let views = self.views(count)?;
+        let views = self.views(wish.views)?;
         self.runtime.block_on(async {
             let session = open(&self.client, &wishes, &views).await?;
             receive(&session, &views, arrived).await
         })
+    }
+
+    /// How direct rendering finds surfaces in views of this size.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn visibility(&self) -> anyhow::Result<Choice> {
+        let view = self.views(1)?;
+        Ok(self.engine.visibility_choice(self.setup.offer.hash.as_str(), &view[0])?)
     }
 
     /// Drains the cluster.

@@ -10,7 +10,7 @@ use glam::UVec2;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::{Rig, SamplingMethod};
-use scene::{Limits, Scene, SceneSpec};
+use scene::{EnvironmentSpec, LightSpec, Limits, Scene, SceneSpec};
 use wire::OfferSettings;
 
 use crate::cameras::{self, Placement};
@@ -32,9 +32,19 @@ pub struct SceneArgs {
     /// file (.gltf, .glb, .obj, .ply)
     #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
     pub scene: SceneSpec,
-    /// How surfaces are lit: unlit (colours as they are) or phong
-    #[arg(long, default_value_t, value_name = "NAME")]
+    /// How surfaces are lit, in terms with commas between them: unlit, phong, shadows or soft N (rays a light);
+    /// occlusion N [RADIUSm] (rays of ambient occlusion); adaptive [TOLERANCE] (rays only where light changes)
+    #[arg(long, default_value_t, value_name = "TERMS")]
     pub lighting: Lighting,
+    /// A lamp in place of the scene's, as often as wanted, in the scene file's own coordinates: "sun towards=X,Y,Z
+    /// [irradiance=V] [angle=DEG]", "point at=X,Y,Z [intensity=V] [radius=M]", "spot at=… towards=… [intensity=V]
+    /// [inner=DEG] [outer=DEG] [radius=M]" or "rectangle at=… u=X,Y,Z v=X,Y,Z [radiance=V]"; V is a grey, R,G,B or
+    /// #rrggbb
+    #[arg(long = "light", value_name = "LAMP")]
+    pub lights: Vec<LightSpec>,
+    /// Light from all around in place of the scene's: V, or ZENITH/NADIR
+    #[arg(long, value_name = "V[/V]")]
+    pub environment: Option<EnvironmentSpec>,
     /// How views are reconstructed: joint_carve, joint_carve:LEVEL, light_field_search or light_field_search:STEPS
     #[arg(long, default_value_t, value_name = "NAME")]
     pub method: ReconstructionMethod,
@@ -67,6 +77,8 @@ impl SceneArgs {
         Self {
             scene,
             lighting: Lighting::default(),
+            lights: Vec::new(),
+            environment: None,
             method: ReconstructionMethod::default(),
             sampling: SamplingMethod::default(),
             sample_size: None,
@@ -79,18 +91,39 @@ impl SceneArgs {
     /// # Errors
     /// For a scene or a camera file that cannot be used.
     pub fn load(&self) -> anyhow::Result<Setup> {
-        let scene = self.scene.load(&Limits::default()).context("the scene cannot be used")?;
+        self.load_changed(|_| ())
+    }
+
+    /// As [`SceneArgs::load`], with the scene changed before anything is made of it.
+    ///
+    /// # Errors
+    /// As [`SceneArgs::load`].
+    pub fn load_changed(&self, change: impl FnOnce(&mut Scene)) -> anyhow::Result<Setup> {
+        let mut scene = self.load_scene()?;
+        change(&mut scene);
         let samples = self.sample_cameras(&scene)?;
         let rig = samples.iter().copied().map(Camera::Pinhole).collect();
         let package = scene::pack(&scene).bytes.into();
         let mut offer = SceneOffer::new(package, rig, scene.bounds(), scene.background_linear);
         offer.origin_in_source = scene.origin_in_source;
+        offer.illumination = scene.illumination.clone();
         offer.settings = OfferSettings {
             method: self.method.to_string(),
             sampling: self.sampling.to_string(),
             lighting: self.lighting.to_string(),
         };
         Ok(Setup { scene, samples, offer })
+    }
+
+    fn load_scene(&self) -> anyhow::Result<Scene> {
+        let scene = self.scene.load(&Limits::default()).context("the scene cannot be used")?;
+        let lights = (!self.lights.is_empty()).then(|| self.lights.iter().map(|spec| spec.0).collect());
+        let lit = scene.lit_by(lights, self.environment.map(|spec| spec.0));
+        lit.validate(&Limits::default()).context("the scene cannot be used")?;
+        if self.lighting.is_lit() && !lit.has_light() {
+            tracing::warn!("nothing lights the scene: all that gives off no light itself will be black");
+        }
+        Ok(lit)
     }
 
     fn sample_cameras(&self, scene: &Scene) -> anyhow::Result<Vec<PinholeCamera>> {

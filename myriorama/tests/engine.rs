@@ -62,7 +62,7 @@ fn is_invalid(error: &EngineError, named: &str) -> bool {
 
 #[test]
 fn what_it_does_not_know_is_named() {
-    let (engine, _, setup, truth) = truth("uv-sphere", 1);
+    let (engine, args, setup, truth) = truth("uv-sphere", 1);
     let hash = setup.offer.hash.to_string();
     let samples: Vec<_> = setup.samples.iter().copied().map(Camera::Pinhole).collect();
     let sample = |scene_hash: &str, sampling: &str, lighting: &str| {
@@ -73,6 +73,7 @@ fn what_it_does_not_know_is_named() {
                 sampling: sampling.to_owned(),
                 lighting: lighting.to_owned(),
                 scene_time_s: 0.0,
+                refinement: wire::Refinement::default(),
             })
             .unwrap_err()
     };
@@ -83,6 +84,8 @@ fn what_it_does_not_know_is_named() {
         images: truth.images.clone(),
         volume: setup.offer.volume,
         background_linear: glam::Vec3::ZERO,
+        illumination: setup.offer.illumination.clone(),
+        lighting: args.lighting.to_string(),
     };
     let uploaded = engine.upload(&set).unwrap();
     let work = |method: &str, near_m: f32| ViewWork {
@@ -131,6 +134,7 @@ fn a_cluster_gives_what_one_engine_gives() {
             policy: PolicyChoice::Pipeline,
             planes: ALL_PLANES,
             timeline: Timeline::still(0.0),
+            refinement_steps: 1,
         };
         let session = open(&client, &wishes, &truth.cameras).await.unwrap();
         let delivered = receive(&session, &truth.cameras, |_| ()).await.unwrap();

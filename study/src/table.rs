@@ -171,13 +171,16 @@ impl Table {
     }
 
     /// The table with a heading line, quoted as RFC 4180 wants it.
-    pub(crate) fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+    ///
+    /// # Errors
+    /// When a row has more or fewer cells than there are columns.
+    pub fn to_csv(&self) -> Result<Vec<u8>, ReportError> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(self.columns.iter().map(Column::heading))?;
         for row in &self.rows {
             writer.write_record(row.iter().map(Cell::full))?;
         }
-        writer.into_inner().map_err(|error| error.into_error().into())
+        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()).into())
     }
 }
 

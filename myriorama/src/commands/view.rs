@@ -15,6 +15,7 @@ use serde_json::{Map, json};
 use wire::{FrameCodec, OfferStatus, PolicyChoice, Timeline};
 
 use crate::cameras::{self, NamedCamera, Placement};
+use crate::comparison;
 use crate::delivery::{Wishes, open, receive};
 use crate::exit::{BadInput, Outcome};
 use crate::pictures;
@@ -22,6 +23,7 @@ use crate::process::runtime;
 use crate::rig::ViewCell;
 use crate::setup::NEAR_OF_DIAGONAL;
 use crate::sizes::{GridSize, SizePx};
+use crate::text_table;
 
 /// Files in --out: view_0000.png (colour); with --depth view_0000.depth.png (16-bit inverse planar depth:
 /// value / 65535 × inverse_depth_max_per_m of the frame in cameras.json, 0 for background); with --provenance
@@ -49,9 +51,17 @@ pub struct ViewArgs {
     /// How views are reconstructed [default: the coordinator's]
     #[arg(long, value_name = "NAME")]
     method: Option<ReconstructionMethod>,
-    /// How surfaces are lit [default: the coordinator's]
-    #[arg(long, value_name = "NAME")]
+    /// How surfaces are lit, as in "soft 16, occlusion 16" (see `myriorama up --help`) [default: the coordinator's]
+    #[arg(long, value_name = "TERMS")]
     lighting: Option<Lighting>,
+    /// Draw every view directly, too, and say how far those in --out are from it: PSNR, SSIM and FLIP, also in
+    /// comparison.csv
+    #[arg(long)]
+    compare: bool,
+    /// With --frames: begin with one ray a light and pixel and double them from frame to frame, so that the first
+    /// picture is there at once
+    #[arg(long)]
+    refine: bool,
     /// How frames travel: lz4 (without loss) or jpeg:QUALITY
     #[arg(long, default_value = "lz4", value_name = "NAME")]
     codec: FrameCodec,
@@ -166,6 +176,16 @@ async fn view(args: ViewArgs) -> anyhow::Result<Outcome> {
     )]);
     cameras::write(&folder.join("cameras.json"), &named, offer.origin_in_source, about)?;
     println!("{} views in {:.3} s, in {}", named.len(), delivered.seconds, folder.display());
+    if args.compare {
+        drop(session);
+        let direct = Wishes { policy: PolicyChoice::Direct, ..wishes(&args, &offer) };
+        let session = open(&client, &direct, &cameras).await?;
+        let truth = receive(&session, &cameras, |_| ()).await?;
+        let table = comparison::table(&truth.frames, &delivered.frames)?;
+        println!("\n{}", text_table::text(&table));
+        let path = folder.join("comparison.csv");
+        std::fs::write(&path, table.to_csv()?).with_context(|| format!("cannot write {}", path.display()))?;
+    }
     Ok(Outcome::Done)
 }
 
@@ -174,15 +194,22 @@ fn wishes(args: &ViewArgs, offer: &OfferStatus) -> Wishes {
         wish.unwrap_or_else(|| if offered.is_empty() { default } else { offered.to_owned() })
     };
     let OfferStatus { settings, .. } = offer;
+    let lighting = or(args.lighting.map(|l| l.to_string()), &settings.lighting, Lighting::default().to_string());
     Wishes {
         method: or(args.method.map(|m| m.to_string()), &settings.method, ReconstructionMethod::default().to_string()),
         sampling: or(None, &settings.sampling, SamplingMethod::default().to_string()),
-        lighting: or(args.lighting.map(|l| l.to_string()), &settings.lighting, Lighting::default().to_string()),
+        refinement_steps: if args.refine { refinement_steps(&lighting) } else { 1 },
+        lighting,
         codec: args.codec.to_string(),
         policy: args.policy,
         planes: ViewPlanes { inverse_depth: args.depth, provenance: args.provenance },
         timeline: Timeline { start_s: 0.0, step_s: args.frame_step, set_count: args.frames },
     }
+}
+
+/// Of a lighting that a newer coordinator may have named: one step where it is not known here.
+fn refinement_steps(lighting: &str) -> u32 {
+    lighting.parse().map_or(1, |lighting: Lighting| lighting.refinement_steps())
 }
 
 fn write_frame(folder: &Path, frame: &Frame) -> anyhow::Result<NamedCamera> {

@@ -2,6 +2,7 @@
 
 mod codec;
 mod fronts;
+mod light;
 mod peer;
 mod throughput;
 
@@ -75,8 +76,11 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     codec::measure(&truth.images, &mut report)?;
     fronts::compare(&args.scene.scene.to_string(), &truth, args, &mut report)?;
     drop(truth);
+    light::qualities(args, &experiment, &mut report)?;
+    light::truth(args, &experiment, &mut report)?;
     let engine = experiment.engine.clone();
     experiment.stop()?;
+    light::glossy(args, &engine, &mut report)?;
     fronts::gaps(args, &engine, &mut report)?;
     fronts::models(args, &engine, &mut report)?;
     peer::measure(args, &engine, &mut report)?;

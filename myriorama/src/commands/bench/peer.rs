@@ -36,7 +36,7 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
         return Ok(());
     };
     let scene = SceneArgs {
-        lighting: Lighting::Unlit,
+        lighting: Lighting::UNLIT,
         samples: Some(folder.join("samples.json")),
         ..SceneArgs::of(SceneSpec::File(folder.join("bench.ply")))
     };

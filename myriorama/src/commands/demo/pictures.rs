@@ -1,12 +1,13 @@
 //! What the views look like.
 
 use anyhow::Context as _;
+use client::Frame;
 use depth_image::View;
 use image::imageops;
 use metrics::flip_map;
+use render::Lighting;
 use study::{Picture, PictureRow, Report, comparison_row};
 
-use super::timing::Times;
 use crate::evaluate::{Truth, image_of};
 use crate::pictures;
 
@@ -14,15 +15,19 @@ use crate::pictures;
 const SIDE_BY_SIDE: usize = 6;
 const SHEET_COLUMNS: u32 = 20;
 
-/// All views of the headline, at half their size.
-pub fn contact_sheet(times: &Times, report: &mut Report) {
+/// All views that were delivered, at half their size.
+pub fn contact_sheet(frames: &[Frame], lighting: &Lighting, report: &mut Report) {
     let small = |view: &View| {
         pictures::rgb(view)
             .map(|image| imageops::thumbnail(&image, (image.width() / 2).max(1), (image.height() / 2).max(1)))
     };
-    let images: Vec<_> = times.frames.iter().filter_map(|frame| small(&frame.view)).collect();
+    let images: Vec<_> = frames.iter().filter_map(|frame| small(&frame.view)).collect();
     let sheet = study::contact_sheet(&images, SHEET_COLUMNS, 2);
-    let picture = Picture::new("contact sheet", format!("{} delivered views, at half their size", images.len()), sheet);
+    let picture = Picture::new(
+        "contact sheet",
+        format!("{} delivered views, {lighting}, at half their size", images.len()),
+        sheet,
+    );
     report.pictures.insert(0, PictureRow { title: "All views".to_owned(), pictures: vec![picture] });
 }
 

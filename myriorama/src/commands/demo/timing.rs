@@ -1,6 +1,5 @@
 //! Views delivered against the number of views, by each method.
 
-use client::Frame;
 use coordinator::schedule::{brute_force_k, k_fd, k_fd_printed};
 use node::Engine as _;
 use reconstruction::ReconstructionMethod;
@@ -8,7 +7,7 @@ use study::{Report, Table};
 use wire::{Costs, PolicyChoice, SessionPlan};
 
 use crate::delivery::Delivered;
-use crate::experiment::{Experiment, PAPER_VIEWS};
+use crate::experiment::{Experiment, PAPER_VIEWS, Wish};
 use crate::progress::bar;
 
 /// The paper's 100 steps.
@@ -30,7 +29,7 @@ pub struct Run {
 
 /// All deliveries.
 pub struct Times {
-    /// V of the headline, pictures and stages.
+    /// V of the headline and of the stages.
     pub headline_views: usize,
     /// S.
     pub images: usize,
@@ -42,8 +41,6 @@ pub struct Times {
     pub pipelines: Vec<(String, Vec<Run>)>,
     /// Few views, drawn from the scene.
     pub direct: Vec<Run>,
-    /// Of the default method's headline run.
-    pub frames: Vec<Frame>,
 }
 
 /// V along the chart's axis.
@@ -67,22 +64,17 @@ pub fn measure(experiment: &Experiment, quick: bool) -> anyhow::Result<Times> {
         is_software: experiment.engine.is_software(),
         pipelines: Vec::new(),
         direct: Vec::new(),
-        frames: Vec::new(),
     };
     for method in compared(experiment.args.method) {
         let mut runs = Vec::new();
         for &count in &counts {
             let delivered = deliver(experiment, PolicyChoice::Pipeline, method, count)?;
-            let (run, frames) = run_of(count, delivered);
-            if count == times.headline_views && times.pipelines.is_empty() {
-                times.frames = frames;
-            }
-            runs.push(run);
+            runs.push(run_of(count, &delivered));
         }
         times.pipelines.push((method.to_string(), runs));
     }
     for count in DIRECT_VIEWS {
-        times.direct.push(run_of(count, deliver(experiment, PolicyChoice::Direct, experiment.args.method, count)?).0);
+        times.direct.push(run_of(count, &deliver(experiment, PolicyChoice::Direct, experiment.args.method, count)?));
     }
     let assignment = times.direct.first().map(|run| &run.plan.assignment);
     times.nodes = assignment.map_or(0, |assignment| assignment.compositors.len());
@@ -97,14 +89,14 @@ fn deliver(
 ) -> anyhow::Result<Delivered> {
     let name = if policy == PolicyChoice::Direct { "direct".to_owned() } else { method.to_string() };
     let progress = bar(format!("{count} views by {name}"), count);
-    let delivered = experiment.deliver(policy, method, count, |_| progress.inc(1));
+    let delivered = experiment.deliver(Wish { method, ..experiment.wish(policy, count) }, |_| progress.inc(1));
     progress.finish_and_clear();
     delivered
 }
 
-fn run_of(views: usize, delivered: Delivered) -> (Run, Vec<Frame>) {
+fn run_of(views: usize, delivered: &Delivered) -> Run {
     let set_wait_s = delivered.frames.iter().map(|frame| frame.header.stage_times.set_wait_s).fold(0.0, f64::max);
-    (Run { views, seconds: delivered.seconds, set_wait_s, plan: delivered.plan }, delivered.frames)
+    Run { views, seconds: delivered.seconds, set_wait_s, plan: delivered.plan.clone() }
 }
 
 impl Times {

@@ -1,0 +1,95 @@
+//! Light sampled once and shared: gains, what a highlight costs, still scenes, and truth beside converged light.
+
+use std::sync::Arc;
+
+use render::Lighting;
+use study::{Bar, Check, Report, Table};
+use wire::PolicyChoice;
+
+use super::BenchArgs;
+use crate::engine::GpuEngine;
+use crate::evaluate::{Truth, mean_flip};
+use crate::experiment::{Experiment, PAPER_VIEWS, VIEW_SIZE_PX, Wish};
+use crate::lighting_study::{self, Extent, FINE};
+use crate::progress::bar;
+use crate::rig::ViewCell;
+use crate::setup::{SceneArgs, Setup};
+
+/// Rays that stand for all light.
+const CONVERGED: &str = "soft 256, occlusion 256";
+/// Views that are compared with converged light.
+const CONVERGED_VIEWS: usize = 4;
+/// Perceptual roughness of the scene made glossy.
+const GLOSSY: f32 = 0.3;
+
+/// Every quality of light on the scene.
+pub fn qualities(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
+    let rows = lighting_study::measure(experiment, Extent::bench(args.quick), drop)?;
+    lighting_study::report(&rows, experiment.setup.scene.illumination.lights.len(), report)?;
+    report.checks.extend(lighting_study::checks(&rows));
+    still(args, experiment, report)
+}
+
+/// A second set that shows what the first does: only c and e are spent on it.
+fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
+    let views = if args.quick { 64 } else { PAPER_VIEWS };
+    let wish = Wish { lighting: FINE.parse()?, sets: 2, ..experiment.wish(PolicyChoice::Pipeline, views) };
+    let delivered = experiment.deliver(wish, |_| ())?;
+    let second = delivered.frames.iter().filter(|frame| frame.request.set_index == 1);
+    let waited_s = second.map(|frame| frame.header.stage_times.set_wait_s).fold(0.0, f64::max);
+    let set_s = experiment.setup.samples.len() as f64 * delivered.plan.costs.sample_image_s;
+    let name = "still scene: longest wait of a second frame for its samples, over sampling them";
+    report.checks.push(Check::new(name, waited_s / set_s, "", Bar::AtMost(0.01)));
+    Ok(())
+}
+
+/// FLIP of views against light of many rays: shared, and drawn with as many rays.
+pub fn truth(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
+    let views = experiment.views(if args.quick { 1 } else { CONVERGED_VIEWS })?;
+    let progress = bar("converged light", 3);
+    let take = |lighting: Lighting| {
+        let lit = SceneArgs { lighting, ..experiment.args.clone() };
+        let truth = Truth::take(&experiment.engine, &experiment.setup, &lit, views.clone());
+        progress.inc(1);
+        truth
+    };
+    let (unlit, fine) = (take(Lighting::UNLIT)?, take(FINE.parse()?)?);
+    let converged = fine.drawn(&experiment.setup, CONVERGED.parse()?)?;
+    progress.finish_and_clear();
+    let reconstructed = |truth: &Truth| truth.reconstruct(args.scene.method, Default::default());
+    let shared = mean_flip(&converged, &reconstructed(&fine)?)?;
+    let drawn = mean_flip(&converged, &fine.views)?;
+    let geometry = mean_flip(&unlit.views, &reconstructed(&unlit)?)?;
+    let mut table = Table::new("Light beside converged light", &[("views", ""), ("FLIP", "")]);
+    table.push([format!("pipeline, {FINE}").into(), shared.into()])?;
+    table.push([format!("direct, {FINE}").into(), drawn.into()])?;
+    table.push(["pipeline beside direct, unlit".into(), geometry.into()])?;
+    report.tables.push(table);
+    let name = "FLIP to converged light: the pipeline's over direct's plus the unlit pipeline's";
+    report.checks.push(Check::new(name, shared / (drawn + geometry), "×", Bar::AtMost(1.0)));
+    Ok(())
+}
+
+/// c where every surface has a highlight.
+pub fn glossy(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
+    let scene = glossy_scene(args)?;
+    engine.put_scene(scene.offer.hash.as_str(), &scene.scene)?;
+    let cell = ViewCell::between(&scene.samples).ok_or_else(|| anyhow::anyhow!("no sample cameras"))?;
+    let c = |lighting: Lighting| {
+        let lit = SceneArgs { lighting, ..args.scene.clone() };
+        let truth = Truth::take(engine, &scene, &lit, cell.spread(args.compared_views(), VIEW_SIZE_PX))?;
+        truth.ms_a_view(args.scene.method, PAPER_VIEWS, args.runs())
+    };
+    let (unlit, lit) = (c(Lighting::UNLIT)?, c("shadows".parse()?)?);
+    let mut table = Table::new("Highlights everywhere", &[("lighting", ""), ("c a view", "ms")]);
+    table.push(["unlit".into(), unlit.into()])?;
+    table.push(["shadows, with highlights".into(), lit.into()])?;
+    report.tables.push(table);
+    let name = format!("{} made glossy: c with highlights over c unlit", args.scene.scene);
+    report.checks.push(Check::new(name, lit / unlit, "×", Bar::AtMost(1.25)));
+    Ok(())
+}
+
+fn glossy_scene(args: &BenchArgs) -> anyhow::Result<Setup> {
+    args.scene.load_changed(|scene| scene.materials.iter_mut().for_each(|material| material.roughness = GLOSSY))
+}

@@ -1,0 +1,44 @@
+//! Delivered views beside the same views drawn directly.
+
+use client::Frame;
+use metrics::{flip_map, psnr_db, ssim_map};
+use study::Table;
+
+use crate::evaluate::{image_of, mean};
+
+/// Errors of one view.
+struct Errors {
+    psnr_db: f64,
+    ssim: f64,
+    flip: f64,
+}
+
+/// A row a view, then their mean and the worst of each column.
+///
+/// # Errors
+/// When views are not of one size.
+pub fn table(truth: &[Frame], delivered: &[Frame]) -> anyhow::Result<Table> {
+    let columns = [("view", ""), ("PSNR", "dB"), ("SSIM", ""), ("FLIP", "")];
+    let mut table = Table::new("Against views drawn directly", &columns);
+    let errors = truth.iter().zip(delivered).map(errors).collect::<anyhow::Result<Vec<_>>>()?;
+    for (number, Errors { psnr_db, ssim, flip }) in errors.iter().enumerate() {
+        table.push([number.into(), (*psnr_db).into(), (*ssim).into(), (*flip).into()])?;
+    }
+    let mean = |value: fn(&Errors) -> f64| errors.iter().map(value).sum::<f64>() / errors.len() as f64;
+    let least = |value: fn(&Errors) -> f64| errors.iter().map(value).fold(f64::INFINITY, f64::min);
+    let means = [mean(|e| e.psnr_db), mean(|e| e.ssim), mean(|e| e.flip)];
+    let worst = [least(|e| e.psnr_db), least(|e| e.ssim), -least(|e| -e.flip)];
+    for (name, numbers) in [("mean", means), ("worst", worst)] {
+        table.push([name.into()].into_iter().chain(numbers.map(Into::into)))?;
+    }
+    Ok(table)
+}
+
+fn errors((truth, delivered): (&Frame, &Frame)) -> anyhow::Result<Errors> {
+    let (reference, test) = (image_of(&truth.view)?, image_of(&delivered.view)?);
+    Ok(Errors {
+        psnr_db: psnr_db(&reference, &test, None)?.unwrap_or(f64::NAN).min(metrics::PSNR_CAP_DB),
+        ssim: mean(&ssim_map(&reference, &test)?)?,
+        flip: mean(&flip_map(&reference, &test)?)?,
+    })
+}
