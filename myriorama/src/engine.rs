@@ -27,6 +27,8 @@ pub struct GpuEngine {
     sampler: Sampler,
     reconstructor: Reconstructor,
     scenes: Mutex<Vec<(String, Arc<GpuScene>)>>,
+    /// One batch at a time: the device makes no more of several, and memory holds one.
+    reconstructing: Mutex<()>,
     /// One load at a time: nodes of one process want the same scene at the same moment.
     loading: Mutex<()>,
 }
@@ -82,6 +84,7 @@ impl GpuEngine {
             renderer,
             gpu,
             scenes: Mutex::default(),
+            reconstructing: Mutex::default(),
             loading: Mutex::default(),
         })
     }
@@ -215,6 +218,7 @@ impl Engine for GpuEngine {
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
         let Uploaded(set) = (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))?;
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
+        let _one = locked(&self.reconstructing);
         self.reconstructor.reconstruct(set, &work.cameras, method, work.planes).map_err(reconstruction_error)
     }
 

@@ -76,7 +76,7 @@ async fn every_k_gives_the_same_pictures() {
     let cluster = Cluster::start(4).await;
     let mut pictures = Vec::new();
     for k in 1..=3 {
-        let forced = wire::SessionRequest { forced_sampler_count: Some(k), ..request(PolicyChoice::Pipeline, MOVING) };
+        let forced = SessionRequest { forced_sampler_count: Some(k), ..request(PolicyChoice::Pipeline, MOVING) };
         let session = cluster.session(forced).await.unwrap();
         assert_eq!(session.plan().sampler_count(), k as usize);
         let mut frames = session.render_views(views(3, 4)).unwrap().all().await.unwrap();
@@ -84,7 +84,7 @@ async fn every_k_gives_the_same_pictures() {
         pictures.push(frames.into_iter().map(|frame| frame.view).collect::<Vec<_>>());
     }
     assert!(pictures[0] == pictures[1] && pictures[1] == pictures[2]);
-    let forced = wire::SessionRequest { forced_sampler_count: Some(4), ..request(PolicyChoice::Pipeline, MOVING) };
+    let forced = SessionRequest { forced_sampler_count: Some(4), ..request(PolicyChoice::Pipeline, MOVING) };
     let error = cluster.session(forced).await.unwrap_err().to_string();
     assert!(error.contains("forced_sampler_count is 4, at most 3"), "{error}");
 }

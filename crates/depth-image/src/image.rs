@@ -103,7 +103,11 @@ impl DepthImage {
             ("reflectance", self.specular.as_ref().map(|s| s.reflectance_srgb8_roughness8.len())),
         ];
         let visibilities = self.specular.iter().flat_map(|s| &s.visibility8).map(|p| ("visibility", Some(p.len())));
-        match planes.into_iter().chain(visibilities).find_map(|(plane, len)| len.filter(|&len| len != expected).map(|len| (plane, len))) {
+        match planes
+            .into_iter()
+            .chain(visibilities)
+            .find_map(|(plane, len)| len.filter(|&len| len != expected).map(|len| (plane, len)))
+        {
             Some((plane, len)) => Err(DepthImageError::PlaneSize { plane, len, expected }),
             None => Ok(()),
         }

@@ -18,7 +18,9 @@ pub use bounds::Aabb;
 pub use camera::{Camera, CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera, PixelDepth, Ray};
 pub use color::{linear_from_rgb9e5, linear_from_srgb8, rgb9e5_from_linear, srgb8_from_linear};
 pub use highlight::{Highlight, Reflector, highlight_linear};
-pub use image::{BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId, Texel};
+pub use image::{
+    BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId, Texel,
+};
 pub use light::{Environment, Illumination, Incident, Light, LightError, disc_from_square, tangents_of};
 pub use normal::{oct16_from_unit, unit_from_oct16};
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};

@@ -248,11 +248,8 @@ pub fn disc_from_square(place: Vec2) -> Vec2 {
     if p == Vec2::ZERO {
         return Vec2::ZERO;
     }
-    let (radius, angle) = if p.x.abs() > p.y.abs() {
-        (p.x, FRAC_PI_4 * p.y / p.x)
-    } else {
-        (p.y, FRAC_PI_2 - FRAC_PI_4 * p.x / p.y)
-    };
+    let (radius, angle) =
+        if p.x.abs() > p.y.abs() { (p.x, FRAC_PI_4 * p.y / p.x) } else { (p.y, FRAC_PI_2 - FRAC_PI_4 * p.x / p.y) };
     Vec2::from_angle(angle) * radius
 }
 
@@ -310,8 +307,7 @@ mod tests {
 
     fn mean_irradiance(light: &Light, point: Vec3, normal: Vec3) -> f32 {
         const SIDE: usize = 64;
-        let places = (0..SIDE * SIDE)
-            .map(|i| (Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) + 0.5) / SIDE as f32);
+        let places = (0..SIDE * SIDE).map(|i| (Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) + 0.5) / SIDE as f32);
         let sum: f32 = places
             .map(|place| {
                 let incident = light.from_sample(point, place);
@@ -382,7 +378,8 @@ mod tests {
 
     #[test]
     fn what_cannot_be_a_light_is_named() {
-        let point = |intensity_linear, radius_m| Light::Point { position_in_world: Vec3::ZERO, intensity_linear, radius_m };
+        let point =
+            |intensity_linear, radius_m| Light::Point { position_in_world: Vec3::ZERO, intensity_linear, radius_m };
         assert_eq!(point(Vec3::ONE, 0.1).validate(), Ok(()));
         for bad in [Vec3::NAN, Vec3::NEG_X, Vec3::INFINITY] {
             assert_eq!(point(bad, 0.1).validate().map_err(|e| e.field), Err("intensity"));

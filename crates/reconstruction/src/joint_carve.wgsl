@@ -35,8 +35,7 @@ struct Verdict {
 
 const UNSEEN: Verdict = Verdict(-1.0, FAR_AWAY, FAR_AWAY, false, 0.0);
 
-{% for k in range(cameras) %}
-fn exit_{{ k }}(a: vec3f, b: vec3f, p: vec3f, low: vec2f, high: vec2f) -> f32 {
+fn exit_of(a: vec3f, b: vec3f, p: vec3f, low: vec2f, high: vec2f) -> f32 {
     let turn = b.xy * p.z - b.z * p.xy;
     let edge = select(low - NUDGE_PX, high + NUDGE_PX, turn > vec2f(0.0)) + 0.5;
     let slope = b.xy - edge * b.z;
@@ -44,29 +43,29 @@ fn exit_{{ k }}(a: vec3f, b: vec3f, p: vec3f, low: vec2f, high: vec2f) -> f32 {
     return min(select(FAR_AWAY, leave.x, abs(turn.x) > 1e-12), select(FAR_AWAY, leave.y, abs(turn.y) > 1e-12));
 }
 
-fn verdict_{{ k }}(a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Verdict {
+fn verdict(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Verdict {
     let p = a + b * t;
     let inverse_w = 1.0 / p.z;
     let uv = p.xy * inverse_w - 0.5;
-    let cells = work.cameras[{{ k }}].cells;
+    let cells = camera.cells;
     if p.z <= 0.0 || any(uv < vec2f(0.0)) || any(uv >= cells) { return UNSEEN; }
-    let log2_sides = work.cameras[{{ k }}].log2_sides;
+    let log2_sides = camera.log2_sides;
     // A small image has fewer levels.
     let pyramid_level = min(level, top_level(log2_sides));
     let node = vec2u(uv) >> vec2u(pyramid_level);
     let low = vec2f(node << vec2u(pyramid_level));
     let high = min(low + f32(1u << pyramid_level), cells);
     // A ray through the camera's own eye stays in one place and leaves no node.
-    var exit = clamp(exit_{{ k }}(a, b, p, low, high), t, far);
-    let scale = work.cameras[{{ k }}].code_scale;
-    let offset = work.cameras[{{ k }}].code_offset;
+    var exit = clamp(exit_of(a, b, p, low, high), t, far);
+    let scale = camera.code_scale;
+    let offset = camera.code_offset;
     let code = scale * inverse_w + offset;
     let exit_w = a.z + b.z * exit;
     let exit_code = select(scale / exit_w + offset, 1e9, exit_w <= 0.0);
     if level > 0u {
 {% if count_fetches %}        fetches += 1u;
 {% endif %}
-        let index = work.cameras[{{ k }}].first_node + node_index(log2_sides, pyramid_level, node);
+        let index = camera.first_node + node_index(log2_sides, pyramid_level, node);
         let range = textureLoad(nodes, texel_of(index), 0).x;
         let nearest = f32(range & 0xffffu);
         let farthest = f32(range >> 16u);
@@ -74,16 +73,16 @@ fn verdict_{{ k }}(a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Verdict 
         // Free up to the depth of the nearest thing in the node.
         let surface_t = (scale / (nearest - offset) - a.z) * safe_reciprocal(b.z);
         let partial = select(t, clamp(surface_t, t, exit), code > nearest && nearest > 1.0);
-        let slack = THICKNESS_FOOTPRINTS * (max(code, exit_code) - offset) / work.cameras[{{ k }}].focal_px;
+        let slack = THICKNESS_FOOTPRINTS * (max(code, exit_code) - offset) / camera.focal_px;
         let behind = max(code, exit_code) + slack < farthest;
         // A search that stops here takes the nearest thing in the node for the surface.
         let penetration = select(FAR_AWAY, 0.0, level == STOP_LEVEL && !behind);
         return Verdict(partial, exit, penetration, !behind, 1.0);
     }
-    let corners = corners_of(work.cameras[{{ k }}].first_cell + node.y * work.cameras[{{ k }}].width_px + node.x);
+    let corners = corners_of(camera.first_cell + node.y * camera.width_px + node.x);
     let lowest = min(min(corners.codes.x, corners.codes.y), min(corners.codes.z, corners.codes.w));
     if lowest < 0.5 { return Verdict(t, exit, FAR_AWAY, false, 0.0); }
-    let footprint = (code - offset) / work.cameras[{{ k }}].focal_px;
+    let footprint = (code - offset) / camera.focal_px;
     let at = uv - low;
     let exit_at = clamp((a.xy + b.xy * exit) / exit_w - 0.5 - low, vec2f(0.0), vec2f(1.0));
     // A connected cell is its bilinear surface; else each sample is a surface of its own.
@@ -108,7 +107,6 @@ fn verdict_{{ k }}(a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Verdict 
     let shallowest = min(min(depths.x, depths.y), min(depths.z, depths.w));
     return Verdict(t, crossing, select(shallowest / footprint, FAR_AWAY, leaving), false, same - beyond);
 }
-{% endfor %}
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -118,8 +116,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let pixel = pixel_of(vec2u(place % work.view.size_px.x, place / work.view.size_px.x));
     let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
 {% for k in range(cameras) %}
-    let a{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
-    let b{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(pixel.direction, 0.0));
+    // Loaded once: to the software device a word of a uniform is a load for each thread.
+    let camera{{ k }} = work.cameras[{{ k }}];
+    let a{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
+    let b{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f(pixel.direction, 0.0));
 {% endfor %}
     // The pass before left how far it got.
     var t = out_inverse_depth[index];
@@ -134,7 +134,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         var free = false;
         var vote = 0.0;
 {% for k in range(cameras) %}
-        let v{{ k }} = verdict_{{ k }}(a{{ k }}, b{{ k }}, t, span.far, level);
+        let v{{ k }} = verdict(camera{{ k }}, a{{ k }}, b{{ k }}, t, span.far, level);
         free = free || (v{{ k }}.free_until == v{{ k }}.exit && v{{ k }}.free_until > t);
         // A crossing farther on than the others' outweighs them: they are inside there.
         penetration = select(min(penetration, v{{ k }}.penetration), v{{ k }}.penetration, v{{ k }}.free_until > free_until);

@@ -12,31 +12,29 @@ const BISECTIONS: u32 = 8u;
 // and whether it does.
 struct Depth { penetration: f32, seen: bool }
 
-{% for k in range(cameras) %}
-fn inside_{{ k }}(p: vec3f) -> Depth {
+fn inside(camera: SampleCamera, p: vec3f) -> Depth {
     let inverse_w = 1.0 / p.z;
     let uv = p.xy * inverse_w;
-    let cells = work.cameras[{{ k }}].cells;
+    let cells = camera.cells;
     let clamped = clamp(uv, vec2f(0.5), cells + 0.49);
     let texel = vec2u(clamped);
 {% if count_fetches %}    fetches += 1u;
 {% endif %}
     // The first of the corners of the cell to its lower right.
-    let cell_index = work.cameras[{{ k }}].first_cell + texel.y * work.cameras[{{ k }}].width_px + texel.x;
+    let cell_index = camera.first_cell + texel.y * camera.width_px + texel.x;
     let code = textureLoad(cell_codes, texel_of(cell_index), 0).x & 0x7fffu;
-    let penetration = (f32(code) - work.cameras[{{ k }}].code_offset) / work.cameras[{{ k }}].code_scale - inverse_w;
+    let penetration = (f32(code) - camera.code_offset) / camera.code_scale - inverse_w;
     return Depth(penetration, p.z > 0.0 && all(uv == clamped) && code != HOLE);
 }
-{% endfor %}
 
 // How the cameras that see a point judge it: inside for all of them, and whether there are any.
 struct Verdict { entered: bool, seen: bool }
 
-fn verdict({% for k in range(cameras) %}p{{ k }}: vec3f, {% endfor %}) -> Verdict {
+fn verdict({% for k in range(cameras) %}camera{{ k }}: SampleCamera, p{{ k }}: vec3f, {% endfor %}) -> Verdict {
     var outside = false;
     var seen = false;
 {% for k in range(cameras) %}
-    let d{{ k }} = inside_{{ k }}(p{{ k }});
+    let d{{ k }} = inside(camera{{ k }}, p{{ k }});
     seen = seen || d{{ k }}.seen;
     outside = outside || (d{{ k }}.seen && d{{ k }}.penetration < 0.0);
 {% endfor %}
@@ -53,8 +51,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
 {% for k in range(cameras) %}
-    let a{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
-    let b{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(pixel.direction, 0.0));
+    // Loaded once: to the software device a word of a uniform is a load for each thread.
+    let camera{{ k }} = work.cameras[{{ k }}];
+    let a{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
+    let b{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f(pixel.direction, 0.0));
 {% endfor %}
     let stride = (span.far - span.near) / f32(work.view.steps);
     let proven = tile_start_m[pixel.tile];
@@ -65,7 +65,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var t = span.near;
     for (; step <= work.view.steps && !entered; step++) {
         t = span.near + stride * f32(step);
-        let v = verdict({% for k in range(cameras) %}a{{ k }} + b{{ k }} * t, {% endfor %});
+        let v = verdict({% for k in range(cameras) %}camera{{ k }}, a{{ k }} + b{{ k }} * t, {% endfor %});
         entered = v.entered;
         never_unseen = never_unseen && v.seen;
     }
@@ -73,15 +73,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var high = t;
     for (var i = 0u; i < BISECTIONS; i++) {
         let middle = 0.5 * (low + high);
-        let inside = verdict({% for k in range(cameras) %}a{{ k }} + b{{ k }} * middle, {% endfor %}).entered;
-        high = select(high, middle, inside);
-        low = select(middle, low, inside);
+        let entered_there = verdict({% for k in range(cameras) %}camera{{ k }}, a{{ k }} + b{{ k }} * middle, {% endfor %}).entered;
+        high = select(high, middle, entered_there);
+        low = select(middle, low, entered_there);
     }
     var closest = FAR_AWAY;
     var mask = 0u;
 {% for k in range(cameras) %}
     let p{{ k }} = a{{ k }} + b{{ k }} * high;
-    let d{{ k }} = inside_{{ k }}(p{{ k }});
+    let d{{ k }} = inside(camera{{ k }}, p{{ k }});
     let gap{{ k }} = select(FAR_AWAY, d{{ k }}.penetration, d{{ k }}.seen);
     mask = select(mask, {{ 2 ** k }}u, gap{{ k }} < closest);
     closest = min(closest, gap{{ k }});
@@ -93,10 +93,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var camera_bit = 0u;
 {% for k in range(cameras) %}
     let chosen{{ k }} = mask == {{ 2 ** k }}u;
-    uv = select(uv, clamp(p{{ k }}.xy / p{{ k }}.z - 0.5, vec2f(0.0), work.cameras[{{ k }}].cells - 0.01), chosen{{ k }});
-    first_cell = select(first_cell, work.cameras[{{ k }}].first_cell, chosen{{ k }});
-    width = select(width, work.cameras[{{ k }}].width_px, chosen{{ k }});
-    camera_bit = select(camera_bit, work.cameras[{{ k }}].mask, chosen{{ k }});
+    uv = select(uv, clamp(p{{ k }}.xy / p{{ k }}.z - 0.5, vec2f(0.0), camera{{ k }}.cells - 0.01), chosen{{ k }});
+    first_cell = select(first_cell, camera{{ k }}.first_cell, chosen{{ k }});
+    width = select(width, camera{{ k }}.width_px, chosen{{ k }});
+    camera_bit = select(camera_bit, camera{{ k }}.mask, chosen{{ k }});
 {% endfor %}
     let cell = vec2u(uv);
     let at = uv - floor(uv);

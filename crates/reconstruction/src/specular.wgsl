@@ -79,36 +79,26 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let center = vec2f(id.xy) + 0.5;
     let direction = work.view.column_in_world * center.x + work.view.row_in_world * center.y + work.view.corner_in_world;
     let point_in_world = work.view.eye_in_world + direction / inverse_depth[index];
-    // Cameras are sorted: of those that contributed, the last to be chosen is the nearest.
-    var p = vec3f(0.0, 0.0, 1.0);
-    var cells = vec2f(1.0);
-    var scale = 1.0;
-    var offset = 0.0;
-    var focal_px = 1.0;
-    var first_cell = 0u;
-    var width_px = 1u;
+    // Cameras are sorted: of those that contributed, the last to be chosen is the nearest. On the software device one
+    // camera by a variable index is cheaper than a choice among all.
+    var nearest = 0u;
 {% for k in range(cameras) | reverse %}
-    let chosen{{ k }} = (work.cameras[{{ k }}].mask & (origin >> 8u)) != 0u;
-    p = select(p, homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(point_in_world, 1.0)), chosen{{ k }});
-    cells = select(cells, work.cameras[{{ k }}].cells, chosen{{ k }});
-    scale = select(scale, work.cameras[{{ k }}].code_scale, chosen{{ k }});
-    offset = select(offset, work.cameras[{{ k }}].code_offset, chosen{{ k }});
-    focal_px = select(focal_px, work.cameras[{{ k }}].focal_px, chosen{{ k }});
-    first_cell = select(first_cell, work.cameras[{{ k }}].first_cell, chosen{{ k }});
-    width_px = select(width_px, work.cameras[{{ k }}].width_px, chosen{{ k }});
+    nearest = select(nearest, {{ k }}u, (work.cameras[{{ k }}].mask & (origin >> 8u)) != 0u);
 {% endfor %}
+    let camera = work.cameras[nearest];
+    let p = homogeneous(camera.homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
     let inverse_w = safe_reciprocal(p.z);
-    let uv = clamp(p.xy * inverse_w - 0.5, vec2f(0.0), cells - 0.01);
+    let uv = clamp(p.xy * inverse_w - 0.5, vec2f(0.0), camera.cells - 0.01);
     let cell = vec2u(uv);
     let at = uv - floor(uv);
-    let cell_index = first_cell + cell.y * width_px + cell.x;
+    let cell_index = camera.first_cell + cell.y * camera.width_px + cell.x;
     let corners = corners_of(cell_index);
     // As in surface.wgsl: of a connected cell the surface itself counts, else each sample for itself.
-    let code_above = scale * inverse_w;
-    let gaps = code_above + offset - select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
-    let reach = vec4f(THICKNESS_FOOTPRINTS * code_above / focal_px);
+    let code_above = camera.code_scale * inverse_w;
+    let gaps = code_above + camera.code_offset - select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
+    let reach = vec4f(THICKNESS_FOOTPRINTS * code_above / camera.focal_px);
     let shares = select(vec4f(0.0), bilinear_shares(at), (abs(gaps) < reach) & (corners.codes > vec4f(1.5)));
-    let around = gathered(cell_index, width_px, shares);
+    let around = gathered(cell_index, camera.width_px, shares);
     if around.reflecting <= 0.0 { return; }
     let towards_eye = unit_or_zero(-direction);
     let added = highlight(point_in_world, around.normal, towards_eye, around.reflector, around.visibility);

@@ -79,21 +79,20 @@ fn colors_of(cell_index: u32) -> Colors {
 // texels around that lie on the point's own surface or show what is beyond it.
 struct Sight { weight: f32, cell: u32, shares: vec4f, same: f32, beyond: f32 }
 
-{% for k in range(cameras) %}
-fn sight_{{ k }}(point_in_world: vec3f, view_direction: vec3f, slack: f32) -> Sight {
-    let p = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
-    let cells = work.cameras[{{ k }}].cells;
+fn sight_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f, slack: f32) -> Sight {
+    let p = homogeneous(camera.homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
+    let cells = camera.cells;
     let inverse_w = 1.0 / p.z;
     let uv = p.xy * inverse_w - 0.5;
     let inside = p.z > 0.0 && all(uv >= vec2f(0.0)) && all(uv < cells);
     let clamped = clamp(uv, vec2f(0.0), cells - 0.01);
     let cell = vec2u(clamped);
     let at = clamped - floor(clamped);
-    let cell_index = work.cameras[{{ k }}].first_cell + cell.y * work.cameras[{{ k }}].width_px + cell.x;
+    let cell_index = camera.first_cell + cell.y * camera.width_px + cell.x;
     let corners = corners_of(cell_index);
-    let code_above = work.cameras[{{ k }}].code_scale * inverse_w;
-    let code = code_above + work.cameras[{{ k }}].code_offset;
-    let reach = slack * code_above / work.cameras[{{ k }}].focal_px;
+    let code_above = camera.code_scale * inverse_w;
+    let code = code_above + camera.code_offset;
+    let reach = slack * code_above / camera.focal_px;
     // Of a connected cell, the surface itself counts; else each sample for itself.
     let gaps = code - select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
     let share = bilinear_shares(at);
@@ -101,15 +100,14 @@ fn sight_{{ k }}(point_in_world: vec3f, view_direction: vec3f, slack: f32) -> Si
     let same = dot(shares, vec4f(1.0));
     let beyond = dot(select(vec4f(0.0), share, (gaps > vec4f(reach)) & (corners.codes > vec4f(0.5))), vec4f(1.0));
     // Angle between the two lines of sight, footprint and distance to the border.
-    let sight = point_in_world - work.cameras[{{ k }}].eye_in_world;
+    let sight = point_in_world - camera.eye_in_world;
     let inverse_distance = inverseSqrt(dot(sight, sight));
     let off = sight * inverse_distance - view_direction;
     let border = min(min(min(uv.x, cells.x - uv.x), min(uv.y, cells.y - uv.y)) * 0.125, 1.0) + 1e-3;
-    let footprint = work.cameras[{{ k }}].focal_px * inverse_distance;
+    let footprint = camera.focal_px * inverse_distance;
     let weight = border * footprint * footprint / (dot(off, off) + {{ angle_floor }});
     return Sight(select(0.0, weight, inside && same > 0.05), cell_index, shares, select(0.0, same, inside), select(0.0, beyond, inside));
 }
-{% endfor %}
 
 // `occupied`: whether the cameras together hold that there is a surface. A silhouette lies somewhere within
 // a texel; the mean of what all cameras show around a point tells better where than any one does.
@@ -125,7 +123,7 @@ fn color_of(sight: Sight) -> vec3f {
 // shows where cameras change places (Buehler et al. 2001, with k = 2). The order of cameras is no matter.
 fn blended(point_in_world: vec3f, direction: vec3f, slack: f32) -> Blend {
     let view_direction = normalize(direction);
-    var first = sight_0(point_in_world, view_direction, slack);
+    var first = sight_of(work.cameras[0], point_in_world, view_direction, slack);
     var first_mask = work.cameras[0].mask;
     var same = first.same;
     var beyond = first.beyond;
@@ -135,7 +133,7 @@ fn blended(point_in_world: vec3f, direction: vec3f, slack: f32) -> Blend {
     var third_weight = 0.0;
 {% for k in range(1, cameras) %}
     {
-        let sight = sight_{{ k }}(point_in_world, view_direction, slack);
+        let sight = sight_of(work.cameras[{{ k }}], point_in_world, view_direction, slack);
         let mask = work.cameras[{{ k }}].mask;
         same += sight.same;
         beyond += sight.beyond;

@@ -17,35 +17,33 @@ const PROVEN: u32 = 1u;
 // No point that this camera sees may be occupied; it need not see them all.
 const UNOPPOSED: u32 = 2u;
 
-{% for k in range(cameras) %}
-// What camera {{ k }} knows of the disc's way from t to t_end.
-fn opinion_{{ k }}(a: vec3f, b: vec3f, t: f32, t_end: f32, slope: f32) -> u32 {
+// What a camera knows of the disc's way from t to t_end.
+fn opinion(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, t_end: f32, slope: f32) -> u32 {
     let p = a + b * t;
     let q = a + b * t_end;
     let radii_m = slope * vec2f(t, t_end);
     let depths_m = vec2f(p.z, q.z);
     let closest_m = depths_m - radii_m;
     let behind = all(depths_m + radii_m <= vec2f(0.0));
-    let radii_px = work.cameras[{{ k }}].stretch * radii_m / max(closest_m, vec2f(1e-20));
+    let radii_px = camera.stretch * radii_m / max(closest_m, vec2f(1e-20));
     let from_px = p.xy / p.z - 0.5;
     let to_px = q.xy / q.z - 0.5;
     let low = min(from_px - radii_px.x, to_px - radii_px.y);
     let high = max(from_px + radii_px.x, to_px + radii_px.y);
-    let cells = work.cameras[{{ k }}].cells;
+    let cells = camera.cells;
     let unseen = behind || (all(closest_m > vec2f(0.0)) && (any(high < vec2f(0.0)) || any(low > cells)));
     let whole = all(low >= vec2f(0.0)) && all(high <= cells);
     let first = clamp(low, vec2f(0.0), cells);
     let extent = clamp(high, vec2f(0.0), cells) - first;
-    let log2_sides = work.cameras[{{ k }}].log2_sides;
+    let log2_sides = camera.log2_sides;
     let wanted = u32(max(ceil(log2(max(extent.x, extent.y) + 1e-3)), 1.0));
     let level = min(wanted, top_level(log2_sides));
-    let node = work.cameras[{{ k }}].first_node + node_index(log2_sides, level, vec2u(first) >> vec2u(level));
+    let node = camera.first_node + node_index(log2_sides, level, vec2u(first) >> vec2u(level));
     let nearest = f32(textureLoad(nodes, texel_of(node), 0).y);
-    let farthest_codes = work.cameras[{{ k }}].code_scale / max(depths_m + radii_m, vec2f(1e-20)) + work.cameras[{{ k }}].code_offset;
+    let farthest_codes = camera.code_scale / max(depths_m + radii_m, vec2f(1e-20)) + camera.code_offset;
     let empty = all(closest_m > vec2f(0.0)) && min(farthest_codes.x, farthest_codes.y) > nearest;
     return select(select(0u, select(UNOPPOSED, PROVEN | UNOPPOSED, whole), empty), UNOPPOSED, unseen);
 }
-{% endfor %}
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -58,8 +56,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     // The middle ray may miss the volume where others of the tile enter it: start at the eye's near plane.
     let far = length(max(abs(work.volume_min_in_world - work.view.eye_in_world), abs(work.volume_max_in_world - work.view.eye_in_world)));
 {% for k in range(cameras) %}
-    let a{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
-    let b{{ k }} = homogeneous(work.cameras[{{ k }}].homogeneous_pixel_from_world, vec4f(direction, 0.0));
+    let camera{{ k }} = work.cameras[{{ k }}];
+    let a{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
+    let b{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f(direction, 0.0));
 {% endfor %}
     var t = entry(id.xy);
     var stride = GREATEST_MOVE;
@@ -68,7 +67,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         var any_proof = 0u;
         var all_agree = UNOPPOSED;
 {% for k in range(cameras) %}
-        let o{{ k }} = opinion_{{ k }}(a{{ k }}, b{{ k }}, t, t_end, slope);
+        let o{{ k }} = opinion(camera{{ k }}, a{{ k }}, b{{ k }}, t, t_end, slope);
         any_proof |= o{{ k }};
         all_agree &= o{{ k }};
 {% endfor %}

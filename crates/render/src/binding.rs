@@ -21,8 +21,7 @@ pub(crate) enum Slot {
 
 impl Slot {
     fn binding_type(self) -> BindingType {
-        let buffer =
-            |ty, has_dynamic_offset| BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None };
+        let buffer = |ty, has_dynamic_offset| BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None };
         let texture = |sample_type| BindingType::Texture {
             sample_type,
             view_dimension: wgpu::TextureViewDimension::D2,

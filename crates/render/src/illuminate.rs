@@ -76,9 +76,9 @@ impl Illuminator<'_> {
         list: Option<(u32, &List)>,
     ) -> Result<(), RenderError> {
         let pipeline = self.pipelines.get(Form { domain, ..work.form })?;
-        let rays = work.traced.map(|traced| {
-            bind_group(self.gpu, &pipeline.get_bind_group_layout(1), traced.views().map(texture))
-        });
+        let rays = work
+            .traced
+            .map(|traced| bind_group(self.gpu, &pipeline.get_bind_group_layout(1), traced.views().map(texture)));
         let first = list.map_or(0, |(number, _)| number);
         for (number, target) in (first..).zip(surfaces) {
             let mut resources = self.resources(work, target);

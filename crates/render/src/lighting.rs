@@ -157,8 +157,7 @@ impl FromStr for Lighting {
                 return Err(UnknownLighting::Conflict(text.to_owned(), "says one thing twice"));
             }
         }
-        let lighting =
-            Self { direct: direct.unwrap_or_default(), occlusion, rate: rate.unwrap_or_default() };
+        let lighting = Self { direct: direct.unwrap_or_default(), occlusion, rate: rate.unwrap_or_default() };
         if !lighting.is_lit() && occlusion.is_some() {
             return Err(UnknownLighting::Conflict(text.to_owned(), "unlit surfaces have no occlusion"));
         }
@@ -242,7 +241,10 @@ mod tests {
     #[test]
     fn light_grows_by_doubling() {
         let steps = |text: &str| text.parse::<Lighting>().expect(text).refinement_steps();
-        assert_eq!([steps("phong"), steps("shadows"), steps("soft 1"), steps("soft 16"), steps("soft 17")], [1, 1, 1, 5, 6]);
+        assert_eq!(
+            [steps("phong"), steps("shadows"), steps("soft 1"), steps("soft 16"), steps("soft 17")],
+            [1, 1, 1, 5, 6]
+        );
         assert_eq!(steps("soft 4, occlusion 16"), 5);
     }
 }

@@ -19,17 +19,12 @@ fn split<'a>(
     })
 }
 
-pub(crate) fn views(
-    words: &[u32],
-    form: Form,
-    cameras: &[PinholeCamera],
-    planes: ViewPlanes,
-    views: &mut Vec<View>,
-) {
+pub(crate) fn views(words: &[u32], form: Form, cameras: &[PinholeCamera], planes: ViewPlanes, views: &mut Vec<View>) {
     let [.., count] = form.planes();
     for (camera, own) in split(words, count, cameras) {
         let inverse_depth: &[f32] = bytemuck::cast_slice(own[1]);
-        let hit = |&inverse: &f32| if inverse > 0.0 { Provenance::new(ProvenanceKind::Hit, 0) } else { Provenance::EMPTY };
+        let hit =
+            |&inverse: &f32| if inverse > 0.0 { Provenance::new(ProvenanceKind::Hit, 0) } else { Provenance::EMPTY };
         let rgb = |word: &u32| word.to_le_bytes().into_iter().take(3);
         views.push(View {
             size_px: camera.size_px,

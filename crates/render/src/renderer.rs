@@ -264,11 +264,7 @@ impl Renderer {
     }
 
     /// One submission: surfaces, light, planes.
-    fn draw(
-        &self,
-        batch: &Batch<'_>,
-        counts: Option<&wgpu::Buffer>,
-    ) -> Result<(FrameResult, Readback), RenderError> {
+    fn draw(&self, batch: &Batch<'_>, counts: Option<&wgpu::Buffer>) -> Result<(FrameResult, Readback), RenderError> {
         let _one = self.drawing.lock().unwrap_or_else(PoisonError::into_inner);
         let [.., planes] = batch.finish.planes();
         let pixels: u64 = batch.cameras.iter().map(|camera| camera.pixel_count() as u64).sum();
@@ -279,7 +275,8 @@ impl Renderer {
         self.gpu.check_storage_bytes("the planes of a batch (bytes)", words_bytes)?;
         let sums = self.sums(batch, sums_bytes);
         let cameras = uniform(&self.gpu, &pixel_cameras(batch, &sums, planes));
-        let surfaces: Vec<Surfaces> = batch.cameras.iter().map(|camera| self.surfaces.lend(batch.kind(camera))).collect();
+        let surfaces: Vec<Surfaces> =
+            batch.cameras.iter().map(|camera| self.surfaces.lend(batch.kind(camera))).collect();
         let mut frame = Frame::begin(&self.gpu, "draw");
         self.record_surfaces(&mut frame, batch, &cameras, &surfaces, counts)?;
         let mut lent = Vec::new();

@@ -92,8 +92,7 @@ impl Choices {
         if let Some((_, choice)) = measured.iter().find(|(other, _)| *other == key) {
             return Ok(*choice);
         }
-        let choice =
-            Choice { triangles_s: seconds(Visibility::Triangles)?, rays_s: seconds(Visibility::Rays)? };
+        let choice = Choice { triangles_s: seconds(Visibility::Triangles)?, rays_s: seconds(Visibility::Rays)? };
         tracing::info!(%size_px, %choice, "surfaces are found by");
         measured.push((key, choice));
         Ok(choice)

@@ -30,13 +30,7 @@ fn upload(scene: &Scene) -> GpuScene {
 }
 
 fn work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {
-    DrawWork {
-        scene,
-        lighting,
-        scene_time_s,
-        visibility: Visibility::Triangles,
-        refinement: Refinement::default(),
-    }
+    DrawWork { scene, lighting, scene_time_s, visibility: Visibility::Triangles, refinement: Refinement::default() }
 }
 
 fn sample_at(scene: &Scene, camera: &PinholeCamera, planes: SamplePlanes, scene_time_s: f32) -> DepthImage {

@@ -9,7 +9,7 @@ use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use metrics::Rgb8Image;
 use reconstruction::{ReconstructionMethod, Reconstructor, SampleSet, SetDescription};
-use render::{DrawWork, GpuScene, Lighting, Rasterizer, SamplePlanes};
+use render::{DrawWork, GpuScene, Lighting, Refinement, Renderer, SamplePlanes, Visibility};
 use scene::Scene;
 
 pub const SAMPLE_PX: UVec2 = UVec2::new(96, 72);
@@ -20,7 +20,7 @@ pub const ALL_PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance:
 
 struct Device {
     gpu: Arc<Gpu>,
-    rasterizer: Rasterizer,
+    renderer: Renderer,
     reconstructor: Reconstructor,
 }
 
@@ -29,9 +29,9 @@ fn device() -> &'static Device {
     static DEVICE: OnceLock<Device> = OnceLock::new();
     DEVICE.get_or_init(|| {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let rasterizer = Rasterizer::new(&gpu).expect("a rasterizer");
+        let renderer = Renderer::new(&gpu).expect("a renderer");
         let reconstructor = Reconstructor::new(&gpu).expect("a reconstructor");
-        Device { gpu, rasterizer, reconstructor }
+        Device { gpu, renderer, reconstructor }
     })
 }
 
@@ -84,16 +84,16 @@ impl Stage {
     /// From the triangles.
     pub fn truth(&self, camera: &PinholeCamera) -> View {
         let scene = GpuScene::upload(&device().gpu, &self.scene).expect("a scene");
-        let work = DrawWork { scene: &scene, lighting: Lighting::Phong, scene_time_s: 0.0 };
-        device().rasterizer.draw_views(work, &[*camera], ALL_PLANES).expect("a view").remove(0)
+        let work = plainly_lit(&scene);
+        device().renderer.draw_views(work, &[*camera], ALL_PLANES).expect("a view").remove(0)
     }
 }
 
 fn depth_images(scene: &Scene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
     let scene = GpuScene::upload(&device().gpu, scene).expect("a scene");
-    let work = DrawWork { scene: &scene, lighting: Lighting::Phong, scene_time_s: 0.0 };
+    let work = plainly_lit(&scene);
     let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
-    device().rasterizer.draw_depth_images(work, &cameras, SamplePlanes::default()).expect("depth images")
+    device().renderer.draw_depth_images(work, &cameras, SamplePlanes::default()).expect("depth images")
 }
 
 pub fn looking(eye: Vec3, target: Vec3, fov_y_deg: f32, size_px: UVec2) -> PinholeCamera {
@@ -199,4 +199,14 @@ pub fn psnr_db(reference: &View, test: &View, mask: &[bool]) -> f64 {
 pub fn assert_sane(view: &View, what: &str) {
     assert_eq!(view.srgb8.len(), view.size_px.element_product() as usize * 3, "{what}");
     assert!(depths(view).iter().all(|d| d.is_finite() && *d >= 0.0), "{what}: a depth is not one");
+}
+
+fn plainly_lit(scene: &GpuScene) -> DrawWork<'_> {
+    DrawWork {
+        scene,
+        lighting: Lighting::PHONG,
+        scene_time_s: 0.0,
+        visibility: Visibility::Triangles,
+        refinement: Refinement::default(),
+    }
 }

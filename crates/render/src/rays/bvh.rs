@@ -6,8 +6,10 @@ use std::time::{Duration, Instant};
 use glam::{Vec3, Vec3A};
 use obvhs::{
     BvhBuildParams,
-    cwbvh::{CwBvh, builder::build_cwbvh_from_tris, node::CwBvhNode},
-    triangle::Triangle,
+    aabb::Aabb,
+    bvh2::{Bvh2, node::Bvh2Node, reinsertion::ReinsertionOptimizer},
+    cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode},
+    ploc::PlocBuilder,
 };
 
 /// Most levels that the device's traversal has room for.
@@ -34,11 +36,7 @@ impl Bvh {
     /// Builds a tree over triangles, given by three points each.
     pub fn build(corners_in_world: &[[Vec3; 3]]) -> Self {
         let start = Instant::now();
-        let triangles: Vec<Triangle> = corners_in_world
-            .iter()
-            .map(|[a, b, c]| Triangle { v0: (*a).into(), v1: (*b).into(), v2: (*c).into() })
-            .collect();
-        let tree = build_cwbvh_from_tris(&triangles, BvhBuildParams::medium_build(), &mut Duration::default());
+        let tree = bvh2_to_cwbvh(&two_children(corners_in_world), MOST_TRIANGLES_A_LEAF, true, false);
         let mut bvh = Self { tree, depth: 0, cost: 0.0, cost_when_built: 0.0, took: Duration::ZERO };
         bvh.refit(corners_in_world);
         bvh.cost_when_built = bvh.cost;
@@ -93,6 +91,73 @@ impl Bvh {
         }
         depths.into_iter().max().unwrap_or(0)
     }
+}
+
+/// The format's.
+const MOST_TRIANGLES_A_LEAF: u32 = 3;
+/// Deeper trees of two children are not worth their steps, and conversion, which calls itself, has no room for them.
+const DEEPEST: usize = 160;
+
+/// A tree with two children a node: by cost, or by halves where triangles lie on one another in heaps, of which cost
+/// makes chains.
+fn two_children(corners_in_world: &[[Vec3; 3]]) -> Bvh2 {
+    let around = |[a, b, c]: &[Vec3; 3]| Aabb::new(a.min(*b).min(*c).into(), a.max(*b).max(*c).into());
+    let boxes: Vec<Aabb> = corners_in_world.iter().map(around).collect();
+    let BvhBuildParams {
+        ploc_search_distance, sort_precision, search_depth_threshold, reinsertion_batch_ratio, ..
+    } = BvhBuildParams::medium_build();
+    let all = (0..boxes.len() as u32).collect();
+    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
+        ploc_search_distance,
+        &boxes,
+        all,
+        sort_precision,
+        search_depth_threshold,
+    );
+    ReinsertionOptimizer::default().run(&mut tree, reinsertion_batch_ratio, None);
+    if levels(&tree) > DEEPEST { halved(&boxes) } else { tree }
+}
+
+fn levels(tree: &Bvh2) -> usize {
+    let (mut deepest, mut pending) = (0, vec![(0usize, 1usize)]);
+    while let Some((node, level)) = pending.pop() {
+        deepest = deepest.max(level);
+        let Bvh2Node { prim_count, first_index, .. } = tree.nodes[node];
+        if prim_count == 0 {
+            pending.extend([0, 1].map(|child| (first_index as usize + child, level + 1)));
+        }
+    }
+    deepest
+}
+
+/// Halves of equal number along the widest axis, down to single triangles, of which conversion makes leaves.
+fn halved(boxes: &[Aabb]) -> Bvh2 {
+    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+    let mut nodes = vec![Bvh2Node::default()];
+    let mut pending = vec![(0usize, 0..boxes.len())];
+    while let Some((node, range)) = pending.pop() {
+        let own = &mut order[range.clone()];
+        let bounds = own.iter().fold(Aabb::empty(), |all, &i| all.union(&boxes[i as usize]));
+        if range.len() == 1 {
+            nodes[node] = Bvh2Node::new(bounds, 1, range.start as u32);
+            continue;
+        }
+        let size = bounds.max - bounds.min;
+        let axis = if size.x >= size.y && size.x >= size.z {
+            0
+        } else if size.y >= size.z {
+            1
+        } else {
+            2
+        };
+        let middle = |i: u32| boxes[i as usize].min[axis] + boxes[i as usize].max[axis];
+        own.select_nth_unstable_by(range.len() / 2, |&a, &b| middle(a).total_cmp(&middle(b)));
+        let (first, split) = (nodes.len(), range.start + range.len() / 2);
+        nodes.extend([Bvh2Node::default(); 2]);
+        nodes[node] = Bvh2Node::new(bounds, 0, first as u32);
+        pending.extend([(first, range.start..split), (first + 1, split..range.end)]);
+    }
+    Bvh2 { nodes, primitive_indices: order, ..Bvh2::default() }
 }
 
 #[derive(Debug, Clone, Copy)]

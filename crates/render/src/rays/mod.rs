@@ -5,6 +5,5 @@ pub(crate) mod flat;
 pub(crate) mod primary;
 mod ray_scene;
 
-
 pub(crate) use flat::OrderedMesh;
 pub use ray_scene::{AccelerationReport, RayScene, Traced};

@@ -13,7 +13,7 @@ use wgpu::TextureFormat;
 
 use super::{
     bvh::{Bvh, MAX_DEPTH},
-    flat::{CORNER_FLAGS, FlatScene, MAX_VERTICES, OrderedMesh},
+    flat::{CORNER_FLAGS, FlatScene, FlatTriangle, MAX_VERTICES, OrderedMesh},
 };
 use crate::{data_texture::DataTexture, gpu_scene::phong_reflector, scalar, texture};
 
@@ -81,7 +81,12 @@ struct Fixed {
 impl RayScene {
     /// Keeps what trees are made of; nothing is built or uploaded before it is needed.
     pub(crate) fn of(gpu: &Arc<Gpu>, scene: &Scene, ordered: &[OrderedMesh<'_>]) -> Self {
-        Self { gpu: gpu.clone(), flat: FlatScene::of(scene, ordered), tables: Tables::of(scene), state: Mutex::default() }
+        Self {
+            gpu: gpu.clone(),
+            flat: FlatScene::of(scene, ordered),
+            tables: Tables::of(scene),
+            state: Mutex::default(),
+        }
     }
 
     /// Triangles and the tree over them at a scene time. A tree of another time is refitted where that costs less
@@ -91,18 +96,7 @@ impl RayScene {
     /// When the device's textures are too small for the scene.
     pub fn at(&self, scene_time_s: f32) -> Result<Arc<Traced>, GpuError> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(built) = &*state
-            && (!self.flat.is_animated() || built.scene_time_s == scene_time_s)
-        {
-            return Ok(built.traced.clone());
-        }
-        let next = match state.take() {
-            Some(built) if built.prefers_refit() => self.refitted(built, scene_time_s)?,
-            _ => self.built(scene_time_s)?,
-        };
-        let traced = next.traced.clone();
-        *state = Some(next);
-        Ok(traced)
+        Ok(self.moved_to(scene_time_s, &mut state)?.traced.clone())
     }
 
     /// As [`RayScene::at`], by a new tree whatever there was.
@@ -112,6 +106,15 @@ impl RayScene {
     pub fn rebuilt_at(&self, scene_time_s: f32) -> Result<Arc<Traced>, GpuError> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).take();
         self.at(scene_time_s)
+    }
+
+    fn moved_to<'s>(&self, scene_time_s: f32, state: &'s mut Option<Built>) -> Result<&'s Built, GpuError> {
+        let next = match state.take() {
+            Some(built) if !self.flat.is_animated() || built.scene_time_s == scene_time_s => built,
+            Some(built) if built.prefers_refit() => self.refitted(built, scene_time_s)?,
+            _ => self.built(scene_time_s)?,
+        };
+        Ok(state.insert(next))
     }
 
     fn corners_in_world(&self, scene_time_s: f32) -> Vec<[Vec3; 3]> {
@@ -145,13 +148,11 @@ impl RayScene {
 
     /// Attributes and textures; triangles in the order of the tree's leaves.
     fn fixed(&self, bvh: &Bvh) -> Result<Fixed, GpuError> {
-        let triangles: Vec<_> =
-            bvh.tree.primitive_indices.iter().map(|&triangle| self.flat.triangles[triangle as usize]).collect();
         let words = TextureFormat::Rgba32Uint;
         let table = |what, elements: &[[u32; 4]]| DataTexture::with(&self.gpu, what, words, elements);
         Ok(Fixed {
             vertices: DataTexture::with(&self.gpu, "vertex attributes", words, &self.flat.vertices)?,
-            triangles: DataTexture::with(&self.gpu, "triangle attributes", words, &triangles)?,
+            triangles: DataTexture::with(&self.gpu, "triangle attributes", words, &self.triangles_of_leaves(bvh))?,
             materials: table("materials", &self.tables.materials)?,
             texels: DataTexture::with(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?,
         })
@@ -203,19 +204,20 @@ impl RayScene {
     /// # Errors
     /// When the device's textures are too small for the scene.
     pub(crate) fn scalar(&self, scene_time_s: f32) -> Result<scalar::rays::Scene, GpuError> {
-        self.at(scene_time_s)?;
-        let corners_in_world = self.corners_in_world(scene_time_s);
-        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let bvh = state.as_ref().map(|built| &built.bvh);
-        let order = bvh.map_or(&[][..], |bvh| &bvh.tree.primitive_indices);
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let Built { bvh, .. } = self.moved_to(scene_time_s, &mut state)?;
         Ok(scalar::rays::Scene {
-            nodes: bvh.map_or_else(Vec::new, |bvh| bvh.tree.nodes.clone()),
-            corners: bvh.map_or_else(Vec::new, |bvh| self.corner_texels(bvh, &corners_in_world)),
-            triangles: order.iter().map(|&triangle| self.flat.triangles[triangle as usize]).collect(),
+            nodes: bvh.tree.nodes.clone(),
+            corners: self.corner_texels(bvh, &self.corners_in_world(scene_time_s)),
+            triangles: self.triangles_of_leaves(bvh),
             vertices: self.flat.vertices.clone(),
             materials: self.tables.materials.clone(),
             texels: self.tables.texels.clone(),
         })
+    }
+
+    fn triangles_of_leaves(&self, bvh: &Bvh) -> Vec<FlatTriangle> {
+        bvh.tree.primitive_indices.iter().map(|&triangle| self.flat.triangles[triangle as usize]).collect()
     }
 }
 

@@ -84,8 +84,14 @@ fn visit(index: u32, ray: Ray, t_max: f32) -> Node {
 // Nearer than `t` at barycentric coordinates of the second and third corner.
 struct Crossing { t: f32, second: f32, third: f32, met: bool, front: bool, corners: vec3u }
 
+// Of the products that a volume is a sum of, a few roundings: what is nearer to an edge may be on either side.
+const EDGE_ROUNDINGS: f32 = 4e-7;
+
+fn taxicab(v: vec3f) -> f32 { return abs(v.x) + abs(v.y) + abs(v.z); }
+
 // By the signs of three volumes, each of one edge and the ray: neighbours that share an edge compute the same
-// number with the other sign, so that no ray passes between them.
+// number with the other sign, so that no ray passes between two of them; and with room for rounding, so that none
+// passes where many meet.
 fn cross_triangle(slot: u32, ray: Ray, t_max: f32) -> Crossing {
     let c0 = corner_texel(slot * 3u);
     let c1 = corner_texel(slot * 3u + 1u);
@@ -106,7 +112,10 @@ fn cross_triangle(slot: u32, ray: Ray, t_max: f32) -> Crossing {
     let t = dot(a, normal) / select(along, 1e-30, along == 0.0);
     let sum = from_a + from_b + from_c;
     let share = 1.0 / select(sum, 1e-30, sum == 0.0);
-    let met = (least >= 0.0 || greatest <= 0.0) && along != 0.0 && t > 0.0 && t < t_max;
+    let reach = max(max(taxicab(a), taxicab(b)), taxicab(c));
+    let slack = EDGE_ROUNDINGS * reach * max(taxicab(c - a), taxicab(a - b)) * taxicab(ray.direction);
+    // A triangle seen edge-on is no more than rounding.
+    let met = (least >= -slack || greatest <= slack) && abs(sum) > 2.0 * slack && along != 0.0 && t > 0.0 && t < t_max;
     return Crossing(t, from_b * share, from_c * share, met, along > 0.0, vec3u(c0.w, c1.w, c2.w));
 }
 

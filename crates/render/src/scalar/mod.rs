@@ -1,7 +1,6 @@
 //! The scalar reference of this crate, for tests: every ray against every triangle, and twins of the shaders that
 //! trace rays and gather light, which do the same on the same data, one ray after another.
 
-pub mod light;
 mod nearest;
 pub mod rays;
 pub mod sequence;

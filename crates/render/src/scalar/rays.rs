@@ -55,6 +55,8 @@ pub fn pixel_ray(camera: &PinholeCamera, pixel: UVec2) -> Ray {
 /// Greater than any parameter of a hit.
 const FAR_AWAY: f32 = 3.0e38;
 /// As in the shader.
+const EDGE_ROUNDINGS: f32 = 4e-7;
+/// As in the shader.
 const BOX_SLACK: f32 = 1.000_001;
 
 struct Traveller {
@@ -209,7 +211,10 @@ impl Scene {
         let t = dot(a, normal) / if along == 0.0 { 1e-30 } else { along };
         let sum = from_a + from_b + from_c;
         let share = 1.0 / if sum == 0.0 { 1e-30 } else { sum };
-        let met = (least >= 0.0 || greatest <= 0.0) && along != 0.0 && t > 0.0 && t < t_max;
+        let reach = taxicab(a).max(taxicab(b)).max(taxicab(c));
+        let slack = EDGE_ROUNDINGS * reach * taxicab(c - a).max(taxicab(a - b)) * taxicab(ray.direction);
+        let beside = least >= -slack || greatest <= slack;
+        let met = beside && sum.abs() > 2.0 * slack && along != 0.0 && t > 0.0 && t < t_max;
         met.then_some(Hit { t, slot, barycentric: [from_b * share, from_c * share], front: along > 0.0 })
     }
 
@@ -248,6 +253,10 @@ impl Scene {
         let mix = |a: f32, b: f32, share: f32| a * (1.0 - share) + b * share;
         mix(mix(texel(0, 0), texel(1, 0), share.x), mix(texel(0, 1), texel(1, 1), share.x), share.y)
     }
+}
+
+fn taxicab(v: Vec3) -> f32 {
+    v.x.abs() + v.y.abs() + v.z.abs()
 }
 
 /// The sum from the last to the first product, as the software device has it.

@@ -76,7 +76,10 @@ mod tests {
     #[test]
     fn points_lie_in_the_square_and_differ_between_seeds() {
         let mean = |number: u32| {
-            (0..20_000).map(|i| point_of(number, hashed(i))).inspect(|p| assert!(p.min_element() >= 0.0 && p.max_element() < 1.0)).sum::<Vec2>()
+            (0..20_000)
+                .map(|i| point_of(number, hashed(i)))
+                .inspect(|p| assert!(p.min_element() >= 0.0 && p.max_element() < 1.0))
+                .sum::<Vec2>()
                 / 20_000.0
         };
         // One point of many sequences is spread evenly: 4 of its standard deviations.

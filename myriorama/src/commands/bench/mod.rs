@@ -1,10 +1,15 @@
 //! `myriorama bench`: what is promised, as ratios of one run.
 
+mod adaptive;
+mod animation;
 mod codec;
+mod convergence;
 mod fronts;
 mod light;
 mod peer;
+mod rays;
 mod throughput;
+mod timing;
 
 use std::path::PathBuf;
 
@@ -79,7 +84,11 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     light::qualities(args, &experiment, &mut report)?;
     light::truth(args, &experiment, &mut report)?;
     let engine = experiment.engine.clone();
+    rays::measure(args, &engine, &experiment.setup, &mut report)?;
+    convergence::measure(args, &engine, &experiment.setup, &mut report)?;
+    adaptive::compare(args, &engine, &experiment.setup, &mut report)?;
     experiment.stop()?;
+    animation::measure(args, &engine, &mut report)?;
     light::glossy(args, &engine, &mut report)?;
     fronts::gaps(args, &engine, &mut report)?;
     fronts::models(args, &engine, &mut report)?;

@@ -16,7 +16,7 @@ use crate::engine::GpuEngine;
 use crate::evaluate::median;
 use crate::setup::Setup;
 
-/// One that more than one disturbed run in three would have to change.
+/// Of every time; the median counts.
 const RUNS: usize = 3;
 /// Rays a pixel and lamp, and of occlusion a pixel, as in the lightings below.
 const MANY: usize = 16;
@@ -104,7 +104,14 @@ fn tree(subject: &Subject<'_>) -> anyhow::Result<Table> {
     let mut table = Table::new("Tree over the triangles", &columns);
     let built = subject.scene.acceleration(0.0)?;
     let (build_s, upload_s) = (built.build_s.into(), built.upload_s.into());
-    table.push([built.triangles.into(), build_s, upload_s, built.nodes.into(), built.depth.into(), built.cost.into()])?;
+    table.push([
+        built.triangles.into(),
+        build_s,
+        upload_s,
+        built.nodes.into(),
+        built.depth.into(),
+        built.cost.into(),
+    ])?;
     Ok(table)
 }
 
@@ -141,7 +148,7 @@ fn speeds(subject: &Subject<'_>, lamps: &[Light], report: &mut Report) -> anyhow
 fn speeds_name(subject: &Subject<'_>) -> String {
     let size = subject.cameras.first().map_or(UVec2::ZERO, |camera| camera.size_px);
     let images = subject.cameras.len();
-    format!("Rays, {images} depth images of {}x{}; primary with all that is written and read back", size.x, size.y)
+    format!("Rays, depth images of {}x{}: {images} (primary with all that is written and read back)", size.x, size.y)
 }
 
 impl Kind {
@@ -158,7 +165,8 @@ impl Counts {
             counts.pixels += size.element_product() as usize;
             for (x, y) in (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y))) {
                 let Some(point) = image.sample_in_world(x, y) else { continue };
-                let normal = image.normal_oct16.as_ref().map_or(Vec3::ZERO, |n| unit_from_oct16(n[(y * size.x + x) as usize]));
+                let normal =
+                    image.normal_oct16.as_ref().map_or(Vec3::ZERO, |n| unit_from_oct16(n[(y * size.x + x) as usize]));
                 counts.surfaces += 1;
                 counts.lamps_faced += lamps.iter().filter(|lamp| faces(lamp, point, normal)).count();
             }

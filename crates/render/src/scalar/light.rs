@@ -1,1 +1,0 @@
-//! The scalar reference of light.
