@@ -30,7 +30,8 @@ struct Question {
     towards_eye: [f32; 3],
     padding: u32,
     place: [f32; 2],
-    visibility: [u32; 2],
+    more_padding: [u32; 2],
+    visibility: [u32; 4],
 }
 
 const SHADER: &str = "
@@ -39,7 +40,7 @@ const SHADER: &str = "
 {% include 'highlight.wgsl' %}
 struct Question {
     point_in_world: vec3f, light: u32, normal: vec3f, reflector: u32, towards_eye: vec3f, padding: u32,
-    place: vec2f, visibility: vec2u,
+    place: vec2f, more_padding: vec2u, visibility: vec4u,
 }
 @group(0) @binding(0) var<uniform> illumination: Illumination;
 @group(0) @binding(1) var<storage, read> questions: array<Question>;
@@ -50,9 +51,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let q = questions[id.x];
     let incident = incident_from(illumination.lights[q.light], q.point_in_world, q.place);
     var words = VisibilityWords();
-    words[0] = q.visibility.x;
-{% if visibility_words > 1 %}    words[1] = q.visibility.y;
-{% endif %}
+{% for word in range(visibility_words) %}    words[{{ word }}] = q.visibility[{{ word }}];
+{% endfor %}
     let tangents = tangents_of(q.normal);
     let first = id.x * 8u;
     answers[first] = vec4f(incident.towards, incident.distance_m);
@@ -145,12 +145,13 @@ fn questions() -> Vec<Question> {
             towards_eye: direction(11 * i + 5).to_array(),
             padding: 0,
             place: [random(13 * i), random(17 * i + 3)],
-            visibility: [i.wrapping_mul(2_891_336_453), i.wrapping_mul(22_695_477)],
+            more_padding: [0; 2],
+            visibility: [2_891_336_453, 22_695_477, 747_796_405, 1].map(|factor| i.wrapping_mul(factor)),
         })
         .collect()
 }
 
-fn share(words: usize, visibility: [u32; 2], place: usize) -> f32 {
+fn share(words: usize, visibility: [u32; 4], place: usize) -> f32 {
     if words == 0 { 1.0 } else { (visibility[place / 4] >> (8 * (place % 4)) & 0xff) as f32 / 255.0 }
 }
 
@@ -182,10 +183,11 @@ fn light_arrives_as_in_the_twin() {
 fn highlights_are_the_twins() {
     let questions = questions();
     for kind in [Highlight::BlinnPhong, Highlight::Ggx] {
-        for words in 0..=2 {
-            let mut illumination = illumination();
-            // Two words have room for 7 lights, one for 3.
-            illumination.lights.truncate(if words == 1 { 3 } else { 4 });
+        // Written out, and as loops.
+        for (lights, words) in [(4, 0), (3, 1), (4, 2), (11, 0), (11, 3)] {
+            let four = illumination();
+            let lights = four.lights.iter().copied().cycle().take(lights).collect();
+            let illumination = Illumination { lights, ..four };
             let asked: Vec<Question> = questions.iter().map(|q| Question { light: 0, ..*q }).collect();
             let mut bright = 0;
             for (q, answer) in asked.iter().zip(answers(kind, &illumination, words, &asked)) {
@@ -237,7 +239,7 @@ fn nothing_on_the_device_is_nan() {
             reflector: 0x00ff_ffff,
             towards_eye,
             place: [0.5; 2],
-            visibility: [!0; 2],
+            visibility: [!0; 4],
             ..Question::zeroed()
         })
         .collect();

@@ -174,6 +174,7 @@ mod tests {
             color_rgb9e5,
             normal_oct16: None,
             surface_id: None,
+            specular: None,
         }
     }
 

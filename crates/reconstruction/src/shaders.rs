@@ -78,3 +78,32 @@ pub fn shader_text(templates: &Templates, key: ShaderKey) -> Result<String, Temp
         },
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    use super::*;
+
+    /// What is wrong with a text.
+    fn fault(text: &str) -> Option<String> {
+        let module = naga::front::wgsl::parse_str(text).map_err(|error| error.emit_to_string(text));
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+        let valid = |module| validator.validate(&module).map_err(|error| error.emit_to_string(text));
+        module.and_then(valid).err()
+    }
+
+    #[test]
+    fn specular_is_valid_for_any_light() {
+        let templates = Templates::new(SHADERS).expect("templates");
+        for (lights, words) in [(0, 0), (0, 1), (1, 0), (2, 1), (3, 1), (4, 2), (8, 3), (9, 0), (9, 3), (255, 64)] {
+            for (highlight, cameras) in [(Highlight::BlinnPhong, 1), (Highlight::Ggx, 4), (Highlight::Ggx, 16)] {
+                let key = ShaderKey { name: "specular.wgsl", cameras, highlight, lights, ..ShaderKey::default() };
+                let key = ShaderKey { visibility_words: words, ..key };
+                let text = shader_text(&templates, key).expect("a text");
+                assert_eq!(fault(&text), None, "{key:?}");
+            }
+        }
+        assert!(fault("fn f() -> f32 { return g; }").is_some());
+    }
+}
