@@ -1,7 +1,7 @@
 //! What light costs, and what sharing it gains: parts measured alone, and views delivered.
 
 use coordinator::schedule::k_fd;
-use render::{Direct, Lighting};
+use render::Lighting;
 use study::{Axis, Bar, Check, Point, Report, Series, Table, XyChart};
 use wire::{Costs, PolicyChoice};
 
@@ -259,8 +259,5 @@ pub fn checks(rows: &[Row]) -> Vec<Check> {
             Check::new(name, share, "", Bar::AtLeast(SHARE_OF_PARTS))
         })
     });
-    let unlit = rows.iter().find(|row| row.lighting.direct == Direct::Unlit);
-    let growth = fine.zip(unlit).map(|(fine, unlit)| fine.costs.reconstruct_view_s / unlit.costs.reconstruct_view_s);
-    let name = format!("c with {FINE} over c unlit");
-    of_parts.chain([Check::maybe(name, growth, "×", Bar::AtMost(1.25), "not both were measured")]).collect()
+    of_parts.collect()
 }

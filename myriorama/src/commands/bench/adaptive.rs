@@ -38,23 +38,26 @@ struct Row {
     flip_to_converged: f64,
 }
 
+const COLUMNS: [(&str, &str); 8] = [
+    ("scene", ""),
+    ("rate", ""),
+    ("time a view", "ms"),
+    ("over full rate", "×"),
+    ("FLIP to full rate", ""),
+    ("PSNR to full rate", "dB"),
+    ("FLIP to converged", ""),
+    ("over full rate's", "×"),
+];
+
 /// Adds a table, charts and checks.
 pub fn compare(args: &BenchArgs, engine: &Arc<GpuEngine>, setup: &Setup, report: &mut Report) -> anyhow::Result<()> {
     let spec: SceneSpec = SMOOTH.parse().unwrap_or_else(|never| match never {});
     let smooth = SceneArgs { sample_size: args.scene.sample_size, ..SceneArgs::of(spec) }.load()?;
     engine.put_scene(smooth.offer.hash.as_str(), &smooth.scene)?;
-    let columns = [
-        ("scene", ""),
-        ("rate", ""),
-        ("time a view", "ms"),
-        ("over full rate", "×"),
-        ("FLIP to full rate", ""),
-        ("PSNR to full rate", "dB"),
-        ("FLIP to converged", ""),
-        ("over full rate's", "×"),
-    ];
-    let mut table = Table::new(format!("Adaptive rate, {FINE}"), &columns);
-    for (name, setup) in [(args.scene.scene.to_string(), setup), (SMOOTH.to_owned(), &smooth)] {
+    let mut table = Table::new(format!("Adaptive rate, {FINE}"), &COLUMNS);
+    let own = args.scene.scene.to_string();
+    let also = (own != SMOOTH).then(|| (SMOOTH.to_owned(), &smooth));
+    for (name, setup) in [(own, setup)].into_iter().chain(also) {
         let rows = rows(args, engine, setup)?;
         push(&mut table, &name, &rows)?;
         report.charts.push(chart(&name, &rows).into());

@@ -103,18 +103,19 @@ impl Moment {
     }
 }
 
+const COLUMNS: [(&str, &str); 8] = [
+    ("scene time", "s"),
+    ("way", ""),
+    ("boxes", "ms"),
+    ("upload", "ms"),
+    ("ready after", "ms"),
+    ("sample set", "ms"),
+    ("expected visits and tests of a random ray", ""),
+    ("over built anew", "×"),
+];
+
 fn table(scene: &str, moments: &[Moment]) -> anyhow::Result<Table> {
-    let columns = [
-        ("scene time", "s"),
-        ("way", ""),
-        ("boxes", "ms"),
-        ("upload", "ms"),
-        ("ready after", "ms"),
-        ("sample set", "ms"),
-        ("expected visits and tests of a random ray", ""),
-        ("over built anew", "×"),
-    ];
-    let mut table = Table::new(format!("Trees that move, {scene}, samples with {LIGHTING}"), &columns);
+    let mut table = Table::new(format!("Trees that move, {scene}, samples with {LIGHTING}"), &COLUMNS);
     for moment in moments {
         let ways = [(&moment.chosen, Some(moment.cost_ratio())), (&moment.rebuilt, None)];
         for (tree, ratio) in ways {

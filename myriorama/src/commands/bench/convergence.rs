@@ -104,12 +104,13 @@ fn bias(differences: &[Vec3]) -> f64 {
     mean.abs() / (DEVIATIONS_99 * (variance / n).sqrt())
 }
 
-/// Root mean square of what rounding to the steps of RGB9E5 adds to the difference of two pictures.
+/// Root mean square of what rounding to the steps of RGB9E5 adds to the difference of two pictures, were it
+/// independent in both; the background is the same in both.
 fn rounding_of(image: &DepthImage) -> f64 {
-    let step = |word: &u32| 2f64.powi((word >> 27) as i32 - 24);
-    let mean =
-        image.color_rgb9e5.iter().map(|word| step(word).powi(2) / 12.0).sum::<f64>() / image.color_rgb9e5.len() as f64;
-    (2.0 * mean).sqrt()
+    let step = |word: u32| 2f64.powi((word >> 27) as i32 - 24);
+    let surfaces = image.color_rgb9e5.iter().zip(&image.inverse_depth_per_m).filter(|(_, inverse)| **inverse > 0.0);
+    let sum: f64 = surfaces.map(|(&word, _)| step(word).powi(2) / 12.0).sum();
+    (2.0 * sum / image.color_rgb9e5.len() as f64).sqrt()
 }
 
 /// The error of independent random rays, but for a factor. The reference's first rays are those that are compared
@@ -131,17 +132,18 @@ fn slope_of(errors: &[Error]) -> f64 {
     slope(errors.iter().map(|error| (f64::from(error.rays), error.rms)))
 }
 
+const COLUMNS: [(&str, &str); 7] = [
+    ("light", ""),
+    ("rays a pixel", ""),
+    ("RMSE of linear light", ""),
+    ("over that of one ray", ""),
+    ("1/√N", ""),
+    ("mean difference over its 99 % interval", ""),
+    ("rounding of two RGB9E5", ""),
+];
+
 fn table(of_kinds: &[Vec<Error>], rounding: f64) -> anyhow::Result<Table> {
-    let columns = [
-        ("light", ""),
-        ("rays a pixel", ""),
-        ("RMSE of linear light", ""),
-        ("over that of one ray", ""),
-        ("1/√N", ""),
-        ("mean difference over its 99 % interval", ""),
-        ("rounding of two RGB9E5", ""),
-    ];
-    let mut table = Table::new(format!("Error against rays, beside {REFERENCE} rays"), &columns);
+    let mut table = Table::new(format!("Error against rays, beside {REFERENCE} rays"), &COLUMNS);
     for (kind, errors) in KINDS.iter().zip(of_kinds) {
         let first = errors.first().map_or(f64::NAN, |error| error.rms);
         for error in errors {

@@ -8,7 +8,7 @@ use wire::PolicyChoice;
 
 use super::BenchArgs;
 use crate::engine::GpuEngine;
-use crate::evaluate::{Truth, mean_flip};
+use crate::evaluate::{Truth, mean_flip, median};
 use crate::experiment::{Experiment, PAPER_VIEWS, VIEW_SIZE_PX, Wish};
 use crate::lighting_study::{self, Extent, FINE};
 use crate::progress::bar;
@@ -65,6 +65,14 @@ pub fn truth(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> 
     table.push([format!("direct, {FINE}").into(), drawn.into()])?;
     table.push(["pipeline beside direct, unlit".into(), geometry.into()])?;
     report.tables.push(table);
+    let (mut plain, mut lit) = (Vec::new(), Vec::new());
+    // In turn, so that neither has the quieter machine.
+    for _ in 0..args.runs() {
+        plain.push(unlit.ms_a_view(args.scene.method, PAPER_VIEWS, 1)?);
+        lit.push(fine.ms_a_view(args.scene.method, PAPER_VIEWS, 1)?);
+    }
+    let name = format!("c with {FINE} over c unlit");
+    report.checks.push(Check::new(name, median(lit) / median(plain), "×", Bar::AtMost(1.25)));
     let name = "FLIP to converged light: the pipeline's over direct's plus the unlit pipeline's";
     report.checks.push(Check::new(name, shared / (drawn + geometry), "×", Bar::AtMost(1.0)));
     Ok(())

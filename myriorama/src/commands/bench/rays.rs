@@ -7,8 +7,8 @@ use anyhow::Context as _;
 use depth_image::{Camera, DepthImage, Light, PinholeCamera, ViewPlanes, unit_from_oct16};
 use glam::{UVec2, Vec3};
 use node::Engine as _;
-use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
-use study::{Bar, Check, Report, Table};
+use render::{Choice, DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
+use study::{Bar, Cell, Check, Report, Table};
 
 use super::BenchArgs;
 use super::timing::in_turn;
@@ -92,16 +92,17 @@ impl Subject<'_> {
     }
 }
 
+const TREE: [(&str, &str); 6] = [
+    ("triangles", ""),
+    ("built in", "s"),
+    ("uploaded in", "s"),
+    ("nodes", ""),
+    ("levels", ""),
+    ("expected visits and tests of a random ray", ""),
+];
+
 fn tree(subject: &Subject<'_>) -> anyhow::Result<Table> {
-    let columns = [
-        ("triangles", ""),
-        ("built in", "s"),
-        ("uploaded in", "s"),
-        ("nodes", ""),
-        ("levels", ""),
-        ("expected visits and tests of a random ray", ""),
-    ];
-    let mut table = Table::new("Tree over the triangles", &columns);
+    let mut table = Table::new("Tree over the triangles", &TREE);
     let built = subject.scene.acceleration(0.0)?;
     let (build_s, upload_s) = (built.build_s.into(), built.upload_s.into());
     table.push([
@@ -115,6 +116,16 @@ fn tree(subject: &Subject<'_>) -> anyhow::Result<Table> {
     Ok(table)
 }
 
+const SPEEDS: [(&str, &str); 7] = [
+    ("rays", ""),
+    ("lighting", ""),
+    ("less the time of", ""),
+    ("traced", "million"),
+    ("time", "ms"),
+    ("speed of", ""),
+    ("speed", "million rays/s"),
+];
+
 /// Adds the table; gives primary rays a second on the whole device.
 fn speeds(subject: &Subject<'_>, lamps: &[Light], report: &mut Report) -> anyhow::Result<f64> {
     let lightings = LIGHTINGS.map(str::parse::<Lighting>).into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -122,24 +133,9 @@ fn speeds(subject: &Subject<'_>, lamps: &[Light], report: &mut Report) -> anyhow
     let seconds = in_turn(&lightings, RUNS, draw)?;
     let normals = SamplePlanes { normal: true, ..SamplePlanes::default() };
     let counts = Counts::of(&subject.draw(Lighting::UNLIT, normals)?, lamps);
-    let (of, workers) = subject.workers();
-    let columns = [
-        ("rays", ""),
-        ("lighting", ""),
-        ("less the time of", ""),
-        ("traced", "million"),
-        ("time", "ms"),
-        ("speed of", ""),
-        ("speed", "million rays/s"),
-    ];
-    let mut table = Table::new(speeds_name(subject), &columns);
+    let mut table = Table::new(speeds_name(subject), &SPEEDS);
     for kind in &KINDS {
-        let (rays, seconds_of) = ((kind.count)(&counts) as f64, kind.seconds(&seconds));
-        let speed = rays / seconds_of / workers;
-        let without: Option<&str> = kind.without.map(|place| LIGHTINGS[place]);
-        let names = [kind.name.into(), LIGHTINGS[kind.with].into(), without.into()];
-        let numbers = [(rays * 1e-6).into(), (seconds_of * 1e3).into(), of.into(), (speed * 1e-6).into()];
-        table.push(names.into_iter().chain(numbers))?;
+        table.push(kind.row(&counts, &seconds, subject.workers()))?;
     }
     report.tables.push(table);
     Ok(counts.pixels as f64 / KINDS[0].seconds(&seconds))
@@ -154,6 +150,19 @@ fn speeds_name(subject: &Subject<'_>) -> String {
 impl Kind {
     fn seconds(&self, of_lightings: &[f64]) -> f64 {
         of_lightings[self.with] - self.without.map_or(0.0, |place| of_lightings[place])
+    }
+
+    fn row(&self, counts: &Counts, of_lightings: &[f64], (of, workers): (&str, f64)) -> [Cell; 7] {
+        let (rays, seconds) = ((self.count)(counts) as f64, self.seconds(of_lightings));
+        [
+            self.name.into(),
+            LIGHTINGS[self.with].into(),
+            self.without.map(|place| LIGHTINGS[place]).into(),
+            (rays * 1e-6).into(),
+            (seconds * 1e3).into(),
+            of.into(),
+            (rays / seconds / workers * 1e-6).into(),
+        ]
     }
 }
 
@@ -180,30 +189,28 @@ fn faces(lamp: &Light, point_in_world: Vec3, normal_in_world: Vec3) -> bool {
     normal_in_world.dot(incident.towards_light_in_world) > 0.0 && incident.irradiance_linear.max_element() > 0.0
 }
 
+const BESIDE_MEMORY: [(&str, &str); 7] = [
+    ("node visits a ray", ""),
+    ("triangle tests a ray", ""),
+    ("a ray reads", "bytes"),
+    ("rays read", "GB/s"),
+    ("tree and triangles", "MB"),
+    ("read once", "GB/s"),
+    ("share of it", "%"),
+];
+
 /// What primary rays read, beside a pass that reads all there is once.
 fn beside_memory(subject: &Subject<'_>, rays_a_second: f64, report: &mut Report) -> anyhow::Result<()> {
+    let renderer = subject.engine.renderer();
     let work = subject.work(Lighting::UNLIT, Visibility::Rays);
-    let visits = subject.engine.renderer().count_visits(work, subject.camera()?)?.of_pixel;
+    let visits = renderer.count_visits(work, subject.camera()?)?.of_pixel;
     let mean = |of: usize| visits.iter().map(|pair| f64::from(pair[of])).sum::<f64>() / visits.len() as f64;
     let (nodes, tests) = (mean(0), mean(1));
     let bytes_a_ray = nodes * NODE_BYTES + tests * TRIANGLE_BYTES;
-    let passes = (0..RUNS)
-        .map(|_| subject.engine.renderer().read_acceleration(subject.scene, 0.0))
-        .collect::<Result<Vec<_>, _>>()?;
-    let limit = median(passes.iter().map(|pass| pass.bytes as f64 / pass.device_s).collect());
-    let columns = [
-        ("node visits a ray", ""),
-        ("triangle tests a ray", ""),
-        ("a ray reads", "bytes"),
-        ("rays read", "GB/s"),
-        ("tree and triangles", "MB"),
-        ("read once", "GB/s"),
-        ("share of it", "%"),
-    ];
-    let mut table = Table::new("Primary rays beside plain reading of nodes and triangles", &columns);
-    let table_mb = passes.first().map(|pass| pass.bytes as f64 * 1e-6);
     let by_rays = bytes_a_ray * rays_a_second;
-    let read = [by_rays * 1e-9, table_mb.unwrap_or(f64::NAN), limit * 1e-9, by_rays / limit * 100.0];
+    let (bytes, bytes_a_second) = plain_reading(subject)?;
+    let mut table = Table::new("Primary rays beside plain reading of nodes and triangles", &BESIDE_MEMORY);
+    let read = [by_rays * 1e-9, bytes * 1e-6, bytes_a_second * 1e-9, by_rays / bytes_a_second * 100.0];
     table.push([nodes, tests, bytes_a_ray].into_iter().chain(read).map(Into::into))?;
     report.tables.push(table);
     let least = visits.iter().map(|pair| pair[0]).min().map_or(f64::NAN, f64::from);
@@ -211,32 +218,34 @@ fn beside_memory(subject: &Subject<'_>, rays_a_second: f64, report: &mut Report)
     Ok(())
 }
 
+/// Bytes of tree and triangles, and how many of them a second.
+fn plain_reading(subject: &Subject<'_>) -> anyhow::Result<(f64, f64)> {
+    let pass = |_| subject.engine.renderer().read_acceleration(subject.scene, 0.0);
+    let passes = (0..RUNS).map(pass).collect::<Result<Vec<_>, _>>()?;
+    let bytes = passes.first().map_or(f64::NAN, |pass| pass.bytes as f64);
+    Ok((bytes, bytes / median(passes.iter().map(|pass| pass.device_s).collect())))
+}
+
+const CHOICES: [(&str, &str); 7] = [
+    ("picture", ""),
+    ("by triangles", "ms"),
+    ("by rays", "ms"),
+    ("chosen", ""),
+    ("again by triangles", "ms"),
+    ("again by rays", "ms"),
+    ("chosen over other", "×"),
+];
+
 /// How surfaces are found in pictures of some sizes, and what both ways take when they are timed again.
 fn choices(subject: &Subject<'_>, hash: &str, report: &mut Report) -> anyhow::Result<()> {
-    let columns = [
-        ("picture", ""),
-        ("by triangles", "ms"),
-        ("by rays", "ms"),
-        ("chosen", ""),
-        ("again by triangles", "ms"),
-        ("again by rays", "ms"),
-        ("chosen over other", "×"),
-    ];
-    let mut table = Table::new("How surfaces are found, one view unlit", &columns);
+    let mut table = Table::new("How surfaces are found, one view unlit", &CHOICES);
     let mut worst = 0f64;
     for size_px in SIZES_PX {
         let camera = resized(subject.camera()?, size_px);
         let choice = subject.engine.visibility_choice(hash, &camera)?;
-        let [triangles_s, rays_s] = again(subject, &camera)?;
-        let by_rays = choice.rays_are_faster();
-        let ratio = if by_rays { rays_s / triangles_s } else { triangles_s / rays_s };
-        worst = worst.max(ratio);
-        let chosen = if by_rays { Visibility::Rays } else { Visibility::Triangles };
-        let ms = |s: f64| (s * 1e3).into();
-        let [first, second] = [[choice.triangles_s, choice.rays_s], [triangles_s, rays_s]].map(|pair| pair.map(ms));
-        let size = [format!("{}x{}", size_px.x, size_px.y).into()];
-        let cells = size.into_iter().chain(first).chain([chosen.to_string().into()]).chain(second);
-        table.push(cells.chain([ratio.into()]))?;
+        let again = again(subject, &camera)?;
+        worst = worst.max(chosen_over_other(&choice, &again));
+        table.push(choice_row(size_px, &choice, &again))?;
     }
     report.tables.push(table);
     let name = "surfaces: time of the chosen way over the other, worst size";
@@ -244,15 +253,34 @@ fn choices(subject: &Subject<'_>, hash: &str, report: &mut Report) -> anyhow::Re
     Ok(())
 }
 
-/// By triangles and by rays, in turn.
-fn again(subject: &Subject<'_>, camera: &PinholeCamera) -> anyhow::Result<[f64; 2]> {
+fn choice_row(size_px: UVec2, choice: &Choice, again: &Choice) -> [Cell; 7] {
+    let chosen = if choice.rays_are_faster() { Visibility::Rays } else { Visibility::Triangles };
+    let ms = |s: f64| Cell::from(s * 1e3);
+    [
+        format!("{}x{}", size_px.x, size_px.y).into(),
+        ms(choice.triangles_s),
+        ms(choice.rays_s),
+        chosen.to_string().into(),
+        ms(again.triangles_s),
+        ms(again.rays_s),
+        chosen_over_other(choice, again).into(),
+    ]
+}
+
+fn chosen_over_other(choice: &Choice, again: &Choice) -> f64 {
+    let rays_over_triangles = again.rays_s / again.triangles_s;
+    if choice.rays_are_faster() { rays_over_triangles } else { rays_over_triangles.recip() }
+}
+
+/// Both ways in turn.
+fn again(subject: &Subject<'_>, camera: &PinholeCamera) -> anyhow::Result<Choice> {
     let draw = |visibility| {
         let work = subject.work(Lighting::UNLIT, visibility);
         subject.engine.renderer().draw_views(work, &[*camera], ViewPlanes::default())?;
         Ok(())
     };
     let seconds = in_turn(&[Visibility::Triangles, Visibility::Rays], RUNS, draw)?;
-    Ok([seconds[0], seconds[1]])
+    Ok(Choice { triangles_s: seconds[0], rays_s: seconds[1] })
 }
 
 /// The same field of view in another size.
