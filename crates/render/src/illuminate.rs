@@ -22,7 +22,8 @@ pub(crate) struct IlluminateWork<'a> {
     /// Needed where the form traces rays.
     pub traced: Option<&'a Traced>,
     pub illumination: &'a wgpu::Buffer,
-    pub cameras: &'a wgpu::Buffer,
+    /// One uniform of all cameras for each part of the rays.
+    pub cameras: &'a [wgpu::Buffer],
     pub sums: &'a wgpu::Buffer,
     /// Whether pixels that lie between others may take their light.
     pub adaptive: bool,
@@ -66,7 +67,7 @@ impl Illuminator<'_> {
         Ok(lent)
     }
 
-    /// One dispatch a camera; or, with a list, of the one camera that it is of.
+    /// One dispatch a camera and part of the rays; or, with a list, of the one camera that it is of.
     fn light(
         &self,
         frame: &mut Frame<'_>,
@@ -75,13 +76,29 @@ impl Illuminator<'_> {
         surfaces: &[Surfaces],
         list: Option<(u32, &List)>,
     ) -> Result<(), RenderError> {
-        let pipeline = self.pipelines.get(Form { domain, ..work.form })?;
+        for (part, cameras) in work.cameras.iter().enumerate() {
+            let form = Form { domain, continued: work.form.continued || part > 0, ..work.form };
+            self.light_part(frame, IlluminateWork { form, ..work }, cameras, surfaces, list)?;
+        }
+        Ok(())
+    }
+
+    fn light_part(
+        &self,
+        frame: &mut Frame<'_>,
+        work: IlluminateWork<'_>,
+        cameras: &wgpu::Buffer,
+        surfaces: &[Surfaces],
+        list: Option<(u32, &List)>,
+    ) -> Result<(), RenderError> {
+        let domain = work.form.domain;
+        let pipeline = self.pipelines.get(work.form)?;
         let rays = work
             .traced
             .map(|traced| bind_group(self.gpu, &pipeline.get_bind_group_layout(1), traced.views().map(texture)));
         let first = list.map_or(0, |(number, _)| number);
         for (number, target) in (first..).zip(surfaces) {
-            let mut resources = self.resources(work, target);
+            let mut resources = self.resources(work, cameras, target);
             resources.insert(1, work.illumination.as_entire_binding());
             resources.extend(list.iter().flat_map(|(_, list)| list.resources()));
             let own = bind_group(self.gpu, &pipeline.get_bind_group_layout(0), resources);
@@ -115,7 +132,8 @@ impl Illuminator<'_> {
         let form = Form { pass: Pass::Interpolate, by_rays, visibility, light_count, step_px, ..Form::default() };
         let pipeline = self.pipelines.get(form)?;
         let list = self.list(target);
-        let mut resources = self.resources(work, target);
+        // How many rays the sums hold is the same for all parts.
+        let mut resources = self.resources(work, &work.cameras[0], target);
         resources.extend(list.resources());
         let own = bind_group(self.gpu, &pipeline.get_bind_group_layout(0), resources);
         let groups = target.size_px().map(|side| side.div_ceil(step_px).div_ceil(8));
@@ -127,9 +145,14 @@ impl Illuminator<'_> {
         Ok(list)
     }
 
-    fn resources<'r>(&self, work: IlluminateWork<'r>, target: &'r Surfaces) -> Vec<BindingResource<'r>> {
+    fn resources<'r>(
+        &self,
+        work: IlluminateWork<'r>,
+        cameras: &'r wgpu::Buffer,
+        target: &'r Surfaces,
+    ) -> Vec<BindingResource<'r>> {
         vec![
-            window(work.cameras, PIXEL_CAMERA_BYTES),
+            window(cameras, PIXEL_CAMERA_BYTES),
             texture(&target.surface),
             texture(&target.depth),
             work.sums.as_entire_binding(),

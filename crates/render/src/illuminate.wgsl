@@ -44,7 +44,10 @@ struct Arrival { linear: vec3f, open: f32 }
 // Of one lamp: the sum over its rays.
 fn from_lamp(number: u32, spot: Spot) -> Arrival {
     let lamp = illumination.lights[number];
-{% if shadow_rays == "none" %}
+{% if shadow_rays == "none" and continued %}
+    // Known at once, and in the sums already.
+    return Arrival(vec3f(0.0), 0.0);
+{% elif shadow_rays == "none" %}
     let incident = incident_from(lamp, spot.point, vec2f(0.5));
     return Arrival(incident.irradiance_linear * max(dot(spot.normal, incident.towards), 0.0), 1.0);
 {% else %}
@@ -83,6 +86,8 @@ fn from_environment(spot: Spot) -> Arrival {
         arrival.open += open;
     }
     return arrival;
+{% elif continued %}
+    return Arrival(vec3f(0.0), 0.0);
 {% else %}
     return Arrival(environment_diffuse(spot.normal), 1.0);
 {% endif %}

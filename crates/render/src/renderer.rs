@@ -1,6 +1,7 @@
 //! Finished pictures: surfaces by triangles or by rays, then their light, then planes on the host.
 
 use std::{
+    ops::Range,
     sync::{Arc, Mutex, PoisonError},
     time::Instant,
 };
@@ -274,14 +275,14 @@ impl Renderer {
         self.gpu.check_storage_bytes("the light of a batch (bytes)", sums_bytes)?;
         self.gpu.check_storage_bytes("the planes of a batch (bytes)", words_bytes)?;
         let sums = self.sums(batch, sums_bytes);
-        let cameras = uniform(&self.gpu, &pixel_cameras(batch, &sums, planes));
+        let cameras = uniform(&self.gpu, &pixel_cameras(batch, &sums, sums.ranges(), planes));
         let surfaces: Vec<Surfaces> =
             batch.cameras.iter().map(|camera| self.surfaces.lend(batch.kind(camera))).collect();
         let mut frame = Frame::begin(&self.gpu, "draw");
         self.record_surfaces(&mut frame, batch, &cameras, &surfaces, counts)?;
         let mut lent = Vec::new();
         if batch.work.lighting.is_lit() {
-            lent = self.record_light(&mut frame, batch, &cameras, &surfaces, &sums)?;
+            lent = self.record_light(&mut frame, batch, &surfaces, &sums, planes)?;
         }
         let words = self.pool.lend_storage("planes", words_bytes.max(4));
         self.record_finish(&mut frame, batch, &cameras, &surfaces, (&sums.buffer, &words))?;
@@ -319,10 +320,13 @@ impl Renderer {
         &self,
         frame: &mut Frame<'_>,
         batch: &Batch<'_>,
-        cameras: &wgpu::Buffer,
         surfaces: &[Surfaces],
         sums: &Sums,
+        planes: usize,
     ) -> Result<Vec<PooledBuffer>, RenderError> {
+        let parts = parts_of(sums.ranges());
+        let cameras: Vec<_> =
+            parts.into_iter().map(|part| uniform(&self.gpu, &pixel_cameras(batch, sums, part, planes))).collect();
         let lighting = batch.work.lighting;
         let stack = batch.traced.as_deref().map(Form::traced).unwrap_or_default();
         let form = Form {
@@ -344,7 +348,7 @@ impl Renderer {
             form,
             traced: batch.traced.as_deref().filter(|_| lighting.is_traced()),
             illumination: &batch.work.scene.illumination,
-            cameras,
+            cameras: &cameras,
             sums: &sums.buffer,
             adaptive: lighting.rate != Rate::Full,
         };
@@ -416,9 +420,28 @@ impl Batch<'_> {
     }
 }
 
+/// Rays of each kind that one dispatch traces for a pixel: the software device ends all loops of an invocation after
+/// 65,535 turns together, and a GPU may take a long dispatch for a hung one.
+const RAYS_A_DISPATCH: u32 = 32;
+
+/// Ranges of rays, cut into parts of that many.
+fn parts_of(ranges: [Range<u32>; 2]) -> Vec<[Range<u32>; 2]> {
+    let most = ranges.iter().map(|range| range.len().div_ceil(RAYS_A_DISPATCH as usize)).max().unwrap_or(0).max(1);
+    let part = |range: &Range<u32>, number: u32| {
+        let at = |number: u32| (range.start + number * RAYS_A_DISPATCH).min(range.end);
+        at(number)..at(number + 1)
+    };
+    (0..most as u32).map(|number| ranges.each_ref().map(|range| part(range, number))).collect()
+}
+
 /// The cameras as shaders see them, with their places in the batch's planes and the rays to be traced.
-fn pixel_cameras(batch: &Batch<'_>, sums: &Sums, planes: usize) -> Vec<PixelCamera> {
-    let [shadow, occlusion] = sums.ranges();
+fn pixel_cameras(
+    batch: &Batch<'_>,
+    sums: &Sums,
+    [shadow, occlusion]: [Range<u32>; 2],
+    planes: usize,
+) -> Vec<PixelCamera> {
+    let [all_shadow, all_occlusion] = sums.ranges();
     let tolerance = match batch.work.lighting.rate {
         Rate::Full => 0.0,
         Rate::Adaptive { tolerance } => tolerance,
@@ -433,8 +456,8 @@ fn pixel_cameras(batch: &Batch<'_>, sums: &Sums, planes: usize) -> Vec<PixelCame
             first_occlusion_ray: occlusion.start,
             occlusion_rays: occlusion.end - occlusion.start,
             // Without rays, what arrives is known at once.
-            shadow_rays_in_sum: shadow.end.max(1),
-            occlusion_rays_in_sum: occlusion.end.max(1),
+            shadow_rays_in_sum: all_shadow.end.max(1),
+            occlusion_rays_in_sum: all_occlusion.end.max(1),
             occlusion_radius_m: batch.occlusion_radius_m(),
             tolerance,
             ..PixelCamera::of(camera)
@@ -484,6 +507,12 @@ fn batches(cameras: &[PinholeCamera], most_pixels: usize) -> impl Iterator<Item 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rays_are_traced_in_parts_that_leave_none_out() {
+        assert_eq!(parts_of([0..0, 0..0]), [[0..0, 0..0]]);
+        assert_eq!(parts_of([3..70, 0..16]), [[3..35, 0..16], [35..67, 16..16], [67..70, 16..16]]);
+    }
 
     #[test]
     fn each_step_doubles_the_rays_and_the_last_has_all() {

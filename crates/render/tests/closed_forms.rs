@@ -322,6 +322,35 @@ fn what_stands_still_does_not_flicker_and_steps_add_up() {
 }
 
 #[test]
+fn each_kind_of_light_alone_refines_to_the_whole() {
+    let scene = courtyard();
+    let (on_device, camera) = (upload(&scene), before(&scene));
+    for lighting in ["soft 8", "phong, occlusion 8", "shadows, occlusion 4", "soft 100"] {
+        let lit = work(&on_device, lighting);
+        let steps = lit.lighting.refinement_steps();
+        let refined = (0..steps).map(|step| image(DrawWork { refinement: Refinement { step, steps }, ..lit }, &camera));
+        let (last, whole) = (refined.last().expect("steps"), image(lit, &camera));
+        let far = |(&a, &b): (&u32, &u32)| (linear_from_rgb9e5(a) - linear_from_rgb9e5(b)).length() > 5e-3;
+        let differ = last.color_rgb9e5.iter().zip(&whole.color_rgb9e5).filter(|pair| far(*pair)).count();
+        assert_eq!(differ, 0, "{lighting}");
+    }
+}
+
+/// The software device ends an invocation's loops after 65,535 turns: no ray may be lost to that.
+#[test]
+fn many_rays_through_foliage_are_all_traced() {
+    let scene = tree_terrain(30_000, 1);
+    let on_device = upload(&scene);
+    let camera = PinholeCamera { size_px: UVec2::new(24, 18), ..before(&scene) };
+    let mean_light = |lighting: &str| {
+        let image = image(work(&on_device, lighting), &camera);
+        mean(image.color_rgb9e5.iter().map(|&c| linear_from_rgb9e5(c).y))
+    };
+    let (few, many) = (mean_light("soft 64, occlusion 64"), mean_light("soft 2048, occlusion 2048"));
+    assert!((few - many).abs() < 2e-3 * few, "{few} {many}");
+}
+
+#[test]
 fn more_rays_are_not_brighter_or_darker() {
     let scene = courtyard();
     let (on_device, camera) = (upload(&scene), before(&scene));
