@@ -328,8 +328,9 @@ fn each_kind_of_light_alone_refines_to_the_whole() {
     for lighting in ["soft 8", "phong, occlusion 8", "shadows, occlusion 4", "soft 100"] {
         let lit = work(&on_device, lighting);
         let steps = lit.lighting.refinement_steps();
-        let refined = (0..steps).map(|step| image(DrawWork { refinement: Refinement { step, steps }, ..lit }, &camera));
-        let (last, whole) = (refined.last().expect("steps"), image(lit, &camera));
+        let refined = |step| image(DrawWork { refinement: Refinement { step, steps }, ..lit }, &camera);
+        let steps: Vec<DepthImage> = (0..steps).map(refined).collect();
+        let (last, whole) = (steps.last().expect("steps"), image(lit, &camera));
         let far = |(&a, &b): (&u32, &u32)| (linear_from_rgb9e5(a) - linear_from_rgb9e5(b)).length() > 5e-3;
         let differ = last.color_rgb9e5.iter().zip(&whole.color_rgb9e5).filter(|pair| far(*pair)).count();
         assert_eq!(differ, 0, "{lighting}");
