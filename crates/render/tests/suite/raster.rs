@@ -1,33 +1,17 @@
 //! Drawing on the software device, against the scalar reference and closed forms.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    sync::{Arc, OnceLock},
-};
+use std::collections::{BTreeMap, BTreeSet};
 
 use depth_image::{Camera, CameraError, DepthImage, PinholeCamera, View, ViewPlanes, linear_from_rgb9e5};
 use glam::{Affine3A, UVec2, Vec2, Vec3};
-use gpu::{DevicePreference, Gpu};
-use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, SamplePlanes, Visibility, scalar};
+use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, SamplePlanes, Visibility, scalar};
 use scene::procedural::{courtyard, poles, quad, unit_cube, uv_sphere};
 use scene::{Instance, Material, Scene, Texture, Wind};
 
+use crate::stage::{device, upload};
+
 const SIZE_PX: UVec2 = UVec2::new(64, 48);
 const COLOR: [u8; 3] = [200, 120, 60];
-
-/// The software device of this program; a test without one fails.
-fn device() -> &'static (Arc<Gpu>, Renderer) {
-    static DEVICE: OnceLock<(Arc<Gpu>, Renderer)> = OnceLock::new();
-    DEVICE.get_or_init(|| {
-        let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let rasterizer = Renderer::new(&gpu).expect("a renderer");
-        (gpu, rasterizer)
-    })
-}
-
-fn upload(scene: &Scene) -> GpuScene {
-    GpuScene::upload(&device().0, scene).expect("a scene")
-}
 
 fn work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {
     DrawWork { scene, lighting, scene_time_s, visibility: Visibility::Triangles, refinement: Refinement::default() }

@@ -1,52 +1,21 @@
 //! Rays and light on the software device against closed forms and the scalar reference.
 
-use std::sync::{Arc, OnceLock};
-
 use depth_image::{
-    Camera, DepthImage, Environment, Highlight, Illumination, Light, PinholeCamera, Ray, Reflector, View, ViewPlanes,
+    DepthImage, Environment, Highlight, Illumination, Light, PinholeCamera, Ray, Reflector, View, ViewPlanes,
     highlight_linear, linear_from_rgb9e5, linear_from_srgb8, unit_from_oct16,
 };
 use glam::{Affine3A, UVec2, Vec3};
-use gpu::{DevicePreference, Gpu};
 use rayon::prelude::*;
-use render::{DrawWork, GpuScene, Refinement, Renderer, SamplePlanes, Visibility, scalar};
-use scene::procedural::{checker_sphere, courtyard, poles, quad, tree_terrain, unit_cube, uv_sphere};
+use render::{DrawWork, Refinement, Visibility, scalar};
+use scene::procedural::{checker_sphere, courtyard, poles, tree_terrain, unit_cube, uv_sphere};
 use scene::{Instance, Scene};
 
-const SIZE_PX: UVec2 = UVec2::new(96, 72);
+use crate::stage::{SIZE_PX, device, down_from, floor_light, floor_under, image, lamps, mean, upload, work};
+
 const DEPTH: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: false };
-const ALL: SamplePlanes = SamplePlanes { normal: true, surface_id: true, specular: true };
-
-/// The software device of this program; a test without one fails.
-fn device() -> &'static (Arc<Gpu>, Renderer) {
-    static DEVICE: OnceLock<(Arc<Gpu>, Renderer)> = OnceLock::new();
-    DEVICE.get_or_init(|| {
-        let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let renderer = Renderer::new(&gpu).expect("a renderer");
-        (gpu, renderer)
-    })
-}
-
-fn upload(scene: &Scene) -> GpuScene {
-    GpuScene::upload(&device().0, scene).expect("a scene")
-}
-
-fn work<'a>(scene: &'a GpuScene, lighting: &str) -> DrawWork<'a> {
-    DrawWork {
-        scene,
-        lighting: lighting.parse().expect(lighting),
-        scene_time_s: 0.0,
-        visibility: Visibility::Triangles,
-        refinement: Refinement::default(),
-    }
-}
 
 fn view(work: DrawWork<'_>, camera: &PinholeCamera) -> View {
     device().1.draw_views(work, &[*camera], DEPTH).expect("a view").remove(0)
-}
-
-fn image(work: DrawWork<'_>, camera: &PinholeCamera) -> DepthImage {
-    device().1.draw_depth_images(work, &[Camera::Pinhole(*camera)], ALL).expect("an image").remove(0)
 }
 
 /// From above a scene's front.
@@ -56,45 +25,8 @@ fn before(scene: &Scene) -> PinholeCamera {
     PinholeCamera::looking_at(eye, bounds.center(), Vec3::Y, 0.8, SIZE_PX)
 }
 
-fn down_from(height_m: f32) -> PinholeCamera {
-    PinholeCamera::looking_at(Vec3::Y * height_m, Vec3::ZERO, Vec3::NEG_Z, 0.9, SIZE_PX)
-}
-
-/// A white floor of two metres at the origin, lit as said, and further quads (centre, half size, normal) over it.
-fn floor_under(quads: &[(Vec3, f32, Vec3)], illumination: Illumination) -> Scene {
-    let mut scene = quad(Vec3::ZERO, 1.0, Vec3::Y, [255; 3]);
-    scene.materials[0].unlit = false;
-    scene.illumination = illumination;
-    for &(center, half_m, normal) in quads {
-        let mesh = scene.meshes.len() as u32;
-        scene.meshes.push(quad(center, half_m, normal, [255; 3]).meshes.remove(0));
-        scene.instances.push(Instance { mesh, world_from_mesh: Affine3A::IDENTITY });
-    }
-    scene
-}
-
-fn lamps(lights: Vec<Light>) -> Illumination {
-    Illumination { lights, environment: Environment::default() }
-}
-
 fn sky(radiance: f32) -> Illumination {
     Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::splat(radiance)) }
-}
-
-/// Points of the floor that an image shows, with what is reflected there.
-fn floor_light(image: &DepthImage) -> Vec<(Vec3, f32)> {
-    let places = (0..SIZE_PX.y).flat_map(|y| (0..SIZE_PX.x).map(move |x| (x, y)));
-    let lit = places.filter_map(|(x, y)| {
-        let point = image.sample_in_world(x, y)?;
-        let color = linear_from_rgb9e5(image.color_rgb9e5[(y * SIZE_PX.x + x) as usize]);
-        (point.y.abs() < 1e-3).then_some((point, color.y))
-    });
-    lit.collect()
-}
-
-fn mean(values: impl IntoIterator<Item = f32>) -> f32 {
-    let (sum, count) = values.into_iter().fold((0.0, 0), |(sum, count), v| (sum + v, count + 1));
-    sum / count as f32
 }
 
 #[test]
