@@ -36,6 +36,8 @@ fn dull() -> DepthImage {
         normal_oct16: None,
         surface_id: None,
         specular: None,
+        passed: None,
+        corner_inverse_depth_per_m: None,
     }
 }
 

@@ -113,6 +113,8 @@ mod tests {
             normal_oct16: None,
             surface_id: None,
             specular: None,
+            passed: None,
+            corner_inverse_depth_per_m: None,
         };
         Arc::new(vec![(0, encode_depth_image(&image, PlaneSet::ALL).unwrap())])
     }

@@ -92,6 +92,8 @@ fn depth_image(camera: &Camera, scene_time_s: f32, refinement: Refinement) -> De
         normal_oct16: None,
         surface_id: None,
         specular: None,
+        passed: None,
+        corner_inverse_depth_per_m: None,
     }
 }
 

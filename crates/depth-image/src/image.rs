@@ -2,7 +2,7 @@
 
 use glam::{UVec2, Vec3};
 
-use crate::{Camera, PixelDepth, linear_from_rgb9e5};
+use crate::{Camera, PinholeCamera, PixelDepth, linear_from_rgb9e5};
 
 /// Marks a texel that has *no sample*: it says nothing about what its ray meets.
 pub const HOLE_INVERSE_DEPTH: f32 = -1.0;
@@ -51,6 +51,12 @@ pub struct DepthImage {
     pub surface_id: Option<Vec<SurfaceId>>,
     /// What highlights need, where a surface has any: needs `normal_oct16`.
     pub specular: Option<SpecularPlanes>,
+    /// Whether a texel's ray went through surfaces that were left out, because an earlier image holds them, before
+    /// it reached what the texel shows. Nothing before such a sample is proven free. `None` where no ray did.
+    pub passed: Option<Vec<bool>>,
+    /// Inverse depths at the corners of texels, one column and one row more than the other planes: the image H of
+    /// Xie's Algorithm 4, taken half a pixel up and to the left.
+    pub corner_inverse_depth_per_m: Option<Vec<f32>>,
 }
 
 /// What a compositor needs to add light that depends on the viewer.
@@ -101,6 +107,7 @@ impl DepthImage {
             ("normal", self.normal_oct16.as_ref().map(Vec::len)),
             ("surface_id", self.surface_id.as_ref().map(Vec::len)),
             ("reflectance", self.specular.as_ref().map(|s| s.reflectance_srgb8_roughness8.len())),
+            ("passed", self.passed.as_ref().map(Vec::len)),
         ];
         let visibilities = self.specular.iter().flat_map(|s| &s.visibility8).map(|p| ("visibility", Some(p.len())));
         match planes
@@ -109,8 +116,27 @@ impl DepthImage {
             .find_map(|(plane, len)| len.filter(|&len| len != expected).map(|len| (plane, len)))
         {
             Some((plane, len)) => Err(DepthImageError::PlaneSize { plane, len, expected }),
-            None => Ok(()),
+            None => self.validate_corners(),
         }
+    }
+
+    fn validate_corners(&self) -> Result<(), DepthImageError> {
+        let expected = (self.size_px() + 1).element_product() as usize;
+        let len = self.corner_inverse_depth_per_m.as_ref().map_or(expected, Vec::len);
+        let wrong = DepthImageError::PlaneSize { plane: "corner_inverse_depth", len, expected };
+        if len == expected { Ok(()) } else { Err(wrong) }
+    }
+
+    /// Whether the texel's ray passed a surface that other images hold: see [`DepthImage::passed`].
+    #[must_use]
+    pub fn has_passed(&self, index: usize) -> bool {
+        self.passed.as_ref().is_some_and(|passed| passed[index])
+    }
+
+    /// The camera of [`DepthImage::corner_inverse_depth_per_m`]: its texel centres are this one's corners.
+    #[must_use]
+    pub fn corner_camera(camera: &PinholeCamera) -> PinholeCamera {
+        PinholeCamera { size_px: camera.size_px + 1, principal_px: camera.principal_px + 0.5, ..*camera }
     }
 
     /// Columns and rows.

@@ -175,6 +175,8 @@ mod tests {
             normal_oct16: None,
             surface_id: None,
             specular: None,
+            passed: None,
+            corner_inverse_depth_per_m: None,
         }
     }
 

@@ -51,6 +51,8 @@ pub(crate) fn depth_images(words: &[u32], form: Form, cameras: &[PinholeCamera],
             normal_oct16: form.normal.then(|| own[normal].to_vec()),
             surface_id: form.surface_id.then(|| own[ids].iter().zip(own[ids + 1]).map(id).collect()),
             specular,
+            passed: None,
+            corner_inverse_depth_per_m: None,
         });
     }
 }

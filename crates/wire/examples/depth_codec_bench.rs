@@ -97,6 +97,8 @@ fn black(plane: &[f32], width: u32, height: u32) -> DepthImage {
         normal_oct16: None,
         surface_id: None,
         specular: None,
+        passed: None,
+        corner_inverse_depth_per_m: None,
     }
 }
 

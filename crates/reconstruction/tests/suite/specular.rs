@@ -90,6 +90,8 @@ impl Room {
                 reflectance_srgb8_roughness8: met.iter().map(|m| m.reflector.pack()).collect(),
                 visibility8: if self.lit.is_some() { visibility8.collect() } else { Vec::new() },
             }),
+            passed: None,
+            corner_inverse_depth_per_m: None,
         }
     }
 

@@ -82,6 +82,8 @@ pub fn decode_depth_image(
         normal_oct16: None,
         surface_id: None,
         specular: None,
+        passed: None,
+        corner_inverse_depth_per_m: None,
     };
     let mut packed = others;
     for plane in header.planes.iter().skip(1) {

@@ -32,6 +32,8 @@ fn image(width: u32, height: u32) -> DepthImage {
         normal_oct16,
         surface_id,
         specular: None,
+        passed: None,
+        corner_inverse_depth_per_m: None,
     }
 }
 
