@@ -42,6 +42,8 @@ fn image(camera: &Camera) -> DepthImage {
         normal_oct16: Some(vec![0; 16]),
         surface_id: None,
         specular: Some(SpecularPlanes { reflectance_srgb8_roughness8: vec![9; 16], ..SpecularPlanes::default() }),
+        passed: None,
+        corner_inverse_depth_per_m: None,
     }
 }
 
