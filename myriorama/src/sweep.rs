@@ -82,13 +82,17 @@ fn series(rows: &[Row], value: fn(&Row) -> f64) -> [Series; 2] {
         ReconstructionMethod::LightFieldSearch { steps } => {
             Some(Point::labelled(row.ms_a_view, value(row), steps.to_string()))
         }
-        ReconstructionMethod::JointCarve { .. } => None,
+        ReconstructionMethod::JointCarve { .. }
+        | ReconstructionMethod::Mesh
+        | ReconstructionMethod::HybridMesh { .. } => None,
     };
     let carve = |row: &Row| match row.method {
         ReconstructionMethod::JointCarve { stop_level } => {
             Some(Point::labelled(row.ms_a_view, value(row), format!("level {stop_level}")))
         }
-        ReconstructionMethod::LightFieldSearch { .. } => None,
+        ReconstructionMethod::LightFieldSearch { .. }
+        | ReconstructionMethod::Mesh
+        | ReconstructionMethod::HybridMesh { .. } => None,
     };
     [
         Series::line("light_field_search", rows.iter().filter_map(search)),

@@ -75,6 +75,38 @@ pub(crate) struct GpuList {
     pub count: u32,
 }
 
+/// `CutWork` of `cut.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuCutWork {
+    pub column_in_world: [f32; 3],
+    pub focal_px: f32,
+    pub row_in_world: [f32; 3],
+    pub code_scale: f32,
+    pub corner_in_world: [f32; 3],
+    pub code_offset: f32,
+    pub size_px: [u32; 2],
+    pub first_sample: u32,
+    pub first_corner: u32,
+    pub side: u32,
+    pub bound_px: f32,
+    pub chunks: u32,
+    pub padding: u32,
+}
+
+/// `QuadWork` of `quads.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuQuadWork {
+    pub clip_from_inverse_depth: [f32; 4],
+    pub clip_from_column: [f32; 4],
+    pub clip_from_row: [f32; 4],
+    pub clip_from_corner: [f32; 4],
+    pub width_px: u32,
+    pub first_sample: u32,
+    pub padding: [u32; 2],
+}
+
 impl GpuList {
     pub const EMPTY: Self = Self { workgroups: [0, 1, 1], count: 0 };
 }

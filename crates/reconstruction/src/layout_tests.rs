@@ -8,7 +8,7 @@ use naga::TypeInner;
 
 use crate::{
     SHADERS, ShaderKey,
-    layout::{GpuFillWork, GpuList, GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume},
+    layout::{GpuCutWork, GpuFillWork, GpuList, GpuQuadWork, GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume},
     shader_text,
 };
 
@@ -113,7 +113,14 @@ fn list() -> Layout {
 
 #[test]
 fn views_and_sample_cameras_agree_in_every_search() {
-    for name in ["tile_start.wgsl", "march.wgsl", "joint_carve.wgsl", "light_field_search.wgsl", "specular.wgsl"] {
+    for name in [
+        "tile_start.wgsl",
+        "march.wgsl",
+        "joint_carve.wgsl",
+        "light_field_search.wgsl",
+        "specular.wgsl",
+        "resolve.wgsl",
+    ] {
         let module = module(name);
         assert_eq!(shader(&module, "ViewCamera"), view_camera(), "{name}");
         assert_eq!(shader(&module, "SampleCamera"), sample_camera(), "{name}");
@@ -138,6 +145,40 @@ fn lists_and_the_fill_agree() {
     }
     let fill = host!(GpuFillWork { size_px, first_pixel, number });
     assert_eq!(shader(&module("fill.wgsl"), "FillWork"), fill);
+}
+
+#[test]
+fn cutting_and_drawing_quads_agree() {
+    let cut = host!(GpuCutWork {
+        column_in_world,
+        focal_px,
+        row_in_world,
+        code_scale,
+        corner_in_world,
+        code_offset,
+        size_px,
+        first_sample,
+        first_corner,
+        side,
+        bound_px,
+        chunks,
+        padding
+    });
+    let passes =
+        ["mesh.wgsl", "hybrid_mesh.wgsl", "merge.wgsl", "quad_count.wgsl", "quad_scan.wgsl", "quad_indices.wgsl"];
+    for name in passes {
+        assert_eq!(shader(&module(name), "CutWork"), cut, "{name}");
+    }
+    let quads = host!(GpuQuadWork {
+        clip_from_inverse_depth,
+        clip_from_column,
+        clip_from_row,
+        clip_from_corner,
+        width_px,
+        first_sample,
+        padding
+    });
+    assert_eq!(shader(&module("quads.wgsl"), "QuadWork"), quads);
 }
 
 #[test]

@@ -4,11 +4,15 @@
 //! [`Reconstructor::reconstruct`] draws views from it, many in one submission. Each method is one enum
 //! variant, one `.rs` and `.wgsl` pair, and has a scalar twin.
 
+mod hybrid_mesh;
 mod layout;
 #[cfg(test)]
 mod layout_tests;
+mod mesh;
 mod method;
 mod pyramid;
+mod quad_drawing;
+mod quads;
 mod reconstructor;
 mod reflectors;
 mod sample_set;
@@ -16,8 +20,9 @@ pub mod scalar;
 mod shaders;
 mod word_texture;
 
-pub use method::{ReconstructionMethod, UnknownMethod};
+pub use method::{ErrorBound, ReconstructionMethod, UnknownMethod};
 pub use pyramid::{CodedDepth, Pyramid};
+pub use quads::{MeshStatistics, Quad};
 pub use reconstructor::{Reconstructor, Statistics};
 pub use sample_set::{MAX_SAMPLE_CAMERAS, SampleSet, SetDescription};
 pub use shaders::{SHADERS, ShaderKey, shader_text};
@@ -46,6 +51,14 @@ pub enum ReconstructionError {
         index: usize,
         /// What is wrong with it.
         reason: String,
+    },
+    /// A sample image without a plane that the method needs.
+    #[error("sample image {index} has no plane {plane}, which hybrid_mesh needs")]
+    MissingPlane {
+        /// Its place in the set.
+        index: usize,
+        /// As [`depth_image::DepthImageError`] calls it.
+        plane: &'static str,
     },
     /// Too many or too few images.
     #[error("a sample set holds 1 to {MAX_SAMPLE_CAMERAS} images, not {0}")]

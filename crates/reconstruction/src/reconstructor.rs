@@ -13,6 +13,7 @@ use wgpu::{BindingResource, BufferUsages};
 use crate::{
     ReconstructionError, ReconstructionMethod, SHADERS, SampleSet, SetDescription, ShaderKey,
     layout::{GpuFillWork, GpuList, GpuSampleCamera, GpuViewCamera, GpuViewWork},
+    quad_drawing::{QuadDrawing, Targets},
     shader_text,
 };
 
@@ -37,10 +38,11 @@ pub struct Statistics {
 
 /// Pipelines for every method and number of cameras that has been asked for.
 pub struct Reconstructor {
-    gpu: Arc<Gpu>,
-    pool: BufferPool,
-    templates: Templates,
+    pub(crate) gpu: Arc<Gpu>,
+    pub(crate) pool: BufferPool,
+    pub(crate) templates: Templates,
     pipelines: Mutex<HashMap<ShaderKey, Arc<wgpu::ComputePipeline>>>,
+    pub(crate) drawing: QuadDrawing,
 }
 
 /// What a shader finds at a binding.
@@ -53,21 +55,27 @@ enum Slot {
     Write,
     /// See `word_texture`.
     Words,
+    /// A layer for each view of a batch: what of its depth was drawn, and of which samples.
+    DrawnDepth,
+    DrawnSamples,
 }
 
 impl Slot {
     fn ty(self) -> wgpu::BindingType {
         let buffer =
             |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: self == Self::View, min_binding_size: None };
+        let texture = |sample_type, view_dimension| wgpu::BindingType::Texture {
+            sample_type,
+            view_dimension,
+            multisampled: false,
+        };
         match self {
             Self::View | Self::Uniform => buffer(wgpu::BufferBindingType::Uniform),
             Self::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
             Self::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
-            Self::Words => wgpu::BindingType::Texture {
-                sample_type: wgpu::TextureSampleType::Uint,
-                view_dimension: wgpu::TextureViewDimension::D2,
-                multisampled: false,
-            },
+            Self::Words => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
+            Self::DrawnDepth => texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2Array),
+            Self::DrawnSamples => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2Array),
         }
     }
 
@@ -79,15 +87,20 @@ impl Slot {
 
 /// A shader's bindings, in their order.
 fn slots(key: ShaderKey) -> Vec<Slot> {
-    use Slot::{Read, Uniform, View, Words, Write};
+    use Slot::{DrawnDepth, DrawnSamples, Read, Uniform, View, Words, Write};
     match key.name {
         "tile_start.wgsl" => vec![View, Words, Words, Write],
         "fill.wgsl" => vec![View, Write, Write, Read, Read, Read],
         "specular.wgsl" => vec![View, Words, Words, Write, Read, Read, Uniform, Words],
+        "mesh.wgsl" | "hybrid_mesh.wgsl" => vec![Uniform, Words, Write, Write],
+        "merge.wgsl" | "quad_count.wgsl" => vec![Uniform, Read, Write, Write],
+        "quad_scan.wgsl" => vec![Uniform, Write, Write],
+        "quad_indices.wgsl" => vec![Uniform, Read, Read, Write],
         _ => {
             let mut slots = vec![View, Words, Words, Read, Write, Write, Write, Write, Write, Words];
             slots.extend(key.count_fetches.then_some(Write));
             slots.extend([Read, Read].into_iter().filter(|_| key.march_camera > 0));
+            slots.extend([DrawnDepth, DrawnSamples].into_iter().filter(|_| key.name == "resolve.wgsl"));
             slots
         }
     }
@@ -155,6 +168,7 @@ impl Reconstructor {
             pool: BufferPool::new(gpu),
             templates: Templates::new(SHADERS)?,
             pipelines: Mutex::default(),
+            drawing: QuadDrawing::default(),
         })
     }
 
@@ -226,9 +240,12 @@ impl Reconstructor {
         if count_fetches {
             frame.encoder.clear_buffer(&batch.outputs[FETCHES], 0, None);
         }
-        self.find_tile_starts(&mut frame, set, &batch)?;
+        let drawn = self.draw_mesh(&mut frame, set, cameras, method)?;
+        if drawn.is_none() {
+            self.find_tile_starts(&mut frame, set, &batch)?;
+        }
         for (number, &key) in passes.iter().enumerate() {
-            self.find_surfaces(&mut frame, set, &batch, number, key)?;
+            self.find_surfaces(&mut frame, set, &batch, (number, key), drawn.as_deref())?;
         }
         self.fill(&mut frame, &batch, passes.len() - 1)?;
         self.add_highlights(&mut frame, set, &batch)?;
@@ -286,14 +303,15 @@ impl Reconstructor {
         Ok(())
     }
 
-    /// One pass of the method: the first over all pixels, each other over those that the one before left.
+    /// One pass of the method: the first over all pixels, each other over those that the one before left. `drawn`: what
+    /// quads were drawn into, of methods that draw.
     fn find_surfaces(
         &self,
         frame: &mut Frame<'_>,
         set: &SampleSet,
         batch: &Batch,
-        number: usize,
-        key: ShaderKey,
+        (number, key): (usize, ShaderKey),
+        drawn: Option<&Targets>,
     ) -> Result<(), ReconstructionError> {
         let pipeline = self.pipeline(key)?;
         let mut resources = batch.over(set);
@@ -303,6 +321,7 @@ impl Reconstructor {
         resources.push(BindingResource::TextureView(&set.cell_colors));
         resources.extend(batch.outputs.get(FETCHES).map(|buffer| buffer.as_entire_binding()));
         resources.extend(number.checked_sub(1).into_iter().flat_map(|earlier| batch.list(earlier)));
+        resources.extend(drawn.into_iter().flat_map(Targets::drawn));
         let bound = self.bind(&pipeline, batch.stride, resources);
         match number.checked_sub(1) {
             None => {
@@ -388,7 +407,7 @@ impl Reconstructor {
         })
     }
 
-    fn pipeline(&self, key: ShaderKey) -> Result<Arc<wgpu::ComputePipeline>, ReconstructionError> {
+    pub(crate) fn pipeline(&self, key: ShaderKey) -> Result<Arc<wgpu::ComputePipeline>, ReconstructionError> {
         let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pipeline) = pipelines.get(&key) {
             return Ok(pipeline.clone());
@@ -417,6 +436,9 @@ fn passes(method: ReconstructionMethod, cameras: usize, count_fetches: bool) -> 
             });
             let carve = ShaderKey { name: "joint_carve.wgsl", march_camera: cameras, stop_level, ..key };
             (0, marches.chain([carve]).collect())
+        }
+        ReconstructionMethod::Mesh | ReconstructionMethod::HybridMesh { .. } => {
+            (0, vec![ShaderKey { name: "resolve.wgsl", ..key }])
         }
     }
 }

@@ -8,6 +8,7 @@ use crate::{
     CodedDepth, Pyramid, ReconstructionError,
     layout::{GpuSampleCamera, GpuVolume},
     pyramid::cell_row,
+    quads::SetMeshes,
     reflectors::Reflectors,
     word_texture,
 };
@@ -41,6 +42,7 @@ pub struct SampleSet {
     pub(crate) cell_codes: wgpu::TextureView,
     pub(crate) cell_colors: wgpu::TextureView,
     pub(crate) reflectors: Option<Reflectors>,
+    pub(crate) meshes: SetMeshes,
 }
 
 impl SampleSet {
@@ -79,6 +81,7 @@ impl SampleSet {
             cell_codes: word_texture::upload(gpu, "cells", codes)?,
             cell_colors: word_texture::upload(gpu, "sample colours", colors)?,
             reflectors: Reflectors::upload(gpu, images, set)?,
+            meshes: SetMeshes::upload(gpu, images)?,
         })
     }
 }

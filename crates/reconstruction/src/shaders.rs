@@ -17,6 +17,15 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("joint_carve.wgsl", include_str!("joint_carve.wgsl")),
     ("fill.wgsl", include_str!("fill.wgsl")),
     ("specular.wgsl", include_str!("specular.wgsl")),
+    ("cut.wgsl", include_str!("cut.wgsl")),
+    ("mesh.wgsl", include_str!("mesh.wgsl")),
+    ("hybrid_mesh.wgsl", include_str!("hybrid_mesh.wgsl")),
+    ("merge.wgsl", include_str!("merge.wgsl")),
+    ("quad_count.wgsl", include_str!("quad_count.wgsl")),
+    ("quad_scan.wgsl", include_str!("quad_scan.wgsl")),
+    ("quad_indices.wgsl", include_str!("quad_indices.wgsl")),
+    ("quads.wgsl", include_str!("quads.wgsl")),
+    ("resolve.wgsl", include_str!("resolve.wgsl")),
 ];
 
 /// The surface's thickness, in texel footprints: the best of a sweep (docs/methods/joint_carve.md).
@@ -26,6 +35,10 @@ pub(crate) const START_LEVEL: u32 = 3;
 
 /// Added to the squared angle between two lines of sight, so that no camera counts without end.
 pub(crate) const ANGLE_FLOOR: f32 = 1e-2;
+
+/// Of a surface against a line of sight, as a guessed corner has it: the tangent of 87.5°. Beyond, the corner runs to
+/// infinity.
+pub(crate) const GREATEST_SLOPE: f32 = 22.903_765;
 
 /// A shader and all that is written into it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -46,6 +59,8 @@ pub struct ShaderKey {
     pub lights: usize,
     /// How many words say which lights a sample sees; 0 where all do.
     pub visibility_words: usize,
+    /// Whether each sample has a quad of its own; else quads lie between samples.
+    pub hybrid: bool,
 }
 
 /// The WGSL of a shader.
@@ -74,6 +89,8 @@ pub fn shader_text(templates: &Templates, key: ShaderKey) -> Result<String, Temp
             light_slots => light_slots(key.lights),
             visibility_words => key.visibility_words,
             sample_texels => sample_texels(key.visibility_words),
+            hybrid => key.hybrid,
+            greatest_slope => decimal(GREATEST_SLOPE),
             texture_width => word_texture::WIDTH,
         },
     )

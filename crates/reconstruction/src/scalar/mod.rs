@@ -4,8 +4,11 @@
 //! [`crate::Reconstructor::upload`] accepts.
 
 mod carve;
+mod draw;
 mod fill;
+mod hybrid_mesh;
 mod march;
+mod mesh;
 mod sample_camera;
 mod search;
 mod specular;
@@ -16,7 +19,7 @@ mod view_ray;
 use depth_image::{Aabb, DepthImage, PinholeCamera, Provenance, ProvenanceKind, View, srgb8_from_linear};
 use glam::Vec3;
 
-use crate::{ReconstructionMethod, SetDescription};
+use crate::{Quad, ReconstructionMethod, SetDescription};
 use sample_camera::SampleCamera;
 use view_ray::{ViewRay, ViewRays};
 
@@ -61,6 +64,10 @@ pub fn reconstruct(
 ) -> View {
     let cameras = nearest_first(images, camera);
     let rays = ViewRays::of(camera, &set.volume, images);
+    if let Some(quads) = quads(images, method) {
+        let pixels = draw::drawn(&quads, images, &cameras, camera, &rays, set.background_linear);
+        return finished(pixels, images, set, &cameras, &rays);
+    }
     let starts = tile_start::tile_starts(&cameras, &rays);
     let pixels = pixels_from(&cameras, &rays, &starts, set.background_linear, method);
     finished(pixels, images, set, &cameras, &rays)
@@ -87,6 +94,20 @@ pub fn reconstruct_from_entry(
 #[must_use]
 pub fn tile_starts_m(images: &[DepthImage], volume: &Aabb, camera: &PinholeCamera) -> Vec<f32> {
     tile_start::tile_starts(&nearest_first(images, camera), &ViewRays::of(camera, volume, images))
+}
+
+/// The quads that a method draws, image after image in the order of their samples; `None` of methods that draw none.
+/// Of images without the planes that the method needs there are none either.
+#[must_use]
+pub fn quads(images: &[DepthImage], method: ReconstructionMethod) -> Option<Vec<Quad>> {
+    let images = || images.iter().enumerate();
+    match method {
+        ReconstructionMethod::Mesh => Some(images().flat_map(|(n, image)| mesh::quads(n, image)).collect()),
+        ReconstructionMethod::HybridMesh { merged } => {
+            Some(images().flat_map(|(n, image)| hybrid_mesh::quads(n, image, merged)).collect())
+        }
+        ReconstructionMethod::LightFieldSearch { .. } | ReconstructionMethod::JointCarve { .. } => None,
+    }
 }
 
 /// Camera 0 is the nearest to the view's eye and so knows most; each keeps its bit.
@@ -116,6 +137,9 @@ fn pixels_from(
                 }
                 ReconstructionMethod::JointCarve { stop_level } => {
                     joint_carve(cameras, &ray, start, stop_level, background_srgb8)
+                }
+                ReconstructionMethod::Mesh | ReconstructionMethod::HybridMesh { .. } => {
+                    unreachable!("meshes are drawn, not searched")
                 }
             }
         })

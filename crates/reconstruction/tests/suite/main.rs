@@ -4,6 +4,8 @@ mod batches;
 mod closed_form;
 mod failures;
 mod holes_and_limits;
+mod mesh_limits;
+mod meshes;
 mod specular;
 mod stage;
 mod twins;

@@ -61,6 +61,13 @@ impl Stage {
         Self { scene, images, volume }
     }
 
+    /// Whose images have normals and texel corners.
+    pub fn with_corners(scene: Scene, cameras: &[PinholeCamera]) -> Self {
+        let images = depth_images_with_corners(&scene, cameras);
+        let volume = scene.bounds();
+        Self { scene, images, volume }
+    }
+
     pub fn upload(&self) -> SampleSet {
         reconstructor().upload(&self.images, &self.description()).expect("a sample set")
     }
@@ -90,10 +97,23 @@ impl Stage {
 }
 
 fn depth_images(scene: &Scene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
+    draw_depth_images(scene, cameras, SamplePlanes::default())
+}
+
+fn draw_depth_images(scene: &Scene, cameras: &[PinholeCamera], planes: SamplePlanes) -> Vec<DepthImage> {
     let scene = GpuScene::upload(&device().gpu, scene).expect("a scene");
     let work = plainly_lit(&scene);
     let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
-    device().renderer.draw_depth_images(work, &cameras, SamplePlanes::default()).expect("depth images")
+    device().renderer.draw_depth_images(work, &cameras, planes).expect("depth images")
+}
+
+fn depth_images_with_corners(scene: &Scene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
+    let corner_cameras: Vec<_> = cameras.iter().map(DepthImage::corner_camera).collect();
+    let planes = SamplePlanes { normal: true, ..SamplePlanes::default() };
+    let images = draw_depth_images(scene, cameras, planes);
+    let corners = depth_images(scene, &corner_cameras).into_iter().map(|image| Some(image.inverse_depth_per_m));
+    let with = |(image, corner_inverse_depth_per_m)| DepthImage { corner_inverse_depth_per_m, ..image };
+    images.into_iter().zip(corners).map(with).collect()
 }
 
 pub fn looking(eye: Vec3, target: Vec3, fov_y_deg: f32, size_px: UVec2) -> PinholeCamera {

@@ -1,0 +1,36 @@
+// What cutting a sample image into quads needs to know of it. Corners of quads lie on fixed rays of the image: their
+// inverse depths say all of where they are.
+
+struct CutWork {
+    // world direction of a pixel = column · x + row · y + corner; its parameter is planar depth in metres.
+    column_in_world: vec3f,
+    focal_px: f32,
+    row_in_world: vec3f,
+    // code = code_scale / planar_depth_m + code_offset
+    code_scale: f32,
+    corner_in_world: vec3f,
+    code_offset: f32,
+    size_px: vec2u,
+    // Where this image's samples begin among those of the set, and its corners in `planes`.
+    first_sample: u32,
+    first_corner: u32,
+    // Of merging: the side of a block in texels, and the greatest error.
+    side: u32,
+    bound_px: f32,
+    // Of CHUNK samples each.
+    chunks: u32,
+    padding: u32,
+}
+
+@group(0) @binding(0) var<uniform> work: CutWork;
+
+// Samples that one thread counts and lists.
+const CHUNK: u32 = 64u;
+
+fn texel_of(index: u32) -> vec2u {
+    return vec2u(index % {{ texture_width }}u, index / {{ texture_width }}u);
+}
+
+fn ray_at(position_px: vec2f) -> vec3f {
+    return work.column_in_world * position_px.x + work.row_in_world * position_px.y + work.corner_in_world;
+}

@@ -1,0 +1,100 @@
+//! Xie's hybrid reconstruction: each sample a quad of its texel, corners shared with its neighbours, and blocks of
+//! them merged where a surface is flat.
+
+use depth_image::{DepthImage, HOLE_INVERSE_DEPTH};
+use gpu::{Frame, Gpu};
+use wgpu::BindingResource;
+
+use crate::{
+    ErrorBound, ReconstructionError, Reconstructor, ShaderKey,
+    layout::GpuCutWork,
+    quads::{ImageCut, buffers},
+    word_texture,
+};
+
+const WORKGROUP_PX: u32 = 8;
+/// In texels; one thread looks at all samples of a block.
+pub(crate) const GREATEST_SIDE: u32 = 64;
+
+/// What corners of quads are made from, on the device: see `planes` in `hybrid_mesh.wgsl`.
+pub(crate) struct CornerPlanes {
+    texels: wgpu::TextureView,
+    /// Of each image its first texel.
+    pub first_corners: Vec<u32>,
+}
+
+/// The first image that lacks a plane, and which.
+pub(crate) fn missing_plane(images: &[DepthImage]) -> Option<(usize, &'static str)> {
+    let missing = |image: &DepthImage| match image {
+        DepthImage { normal_oct16: None, .. } => Some("normal"),
+        DepthImage { corner_inverse_depth_per_m: None, .. } => Some("corner_inverse_depth"),
+        _ => None,
+    };
+    images.iter().enumerate().find_map(|(index, image)| Some((index, missing(image)?)))
+}
+
+impl CornerPlanes {
+    /// Of images that have all planes.
+    pub fn upload(gpu: &Gpu, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
+        let count = images.iter().map(|image| (image.size_px() + 1).element_product() as usize).sum();
+        word_texture::check(gpu, "corners", count)?;
+        let mut texels = word_texture::room(count);
+        let mut first_corners = Vec::with_capacity(images.len());
+        for image in images {
+            first_corners.push(texels.len() as u32);
+            texels.extend(corner_texels(image));
+        }
+        Ok(Self { texels: word_texture::upload(gpu, "corners", texels)?, first_corners })
+    }
+}
+
+/// Of each corner, row by row, the sample to its lower right and its own depth.
+fn corner_texels(image: &DepthImage) -> impl Iterator<Item = [u32; 4]> {
+    let size_px = image.size_px();
+    let normals = image.normal_oct16.as_deref().unwrap_or_default();
+    let corners = image.corner_inverse_depth_per_m.as_deref().unwrap_or_default();
+    let places = (0..=size_px.y).flat_map(move |y| (0..=size_px.x).map(move |x| (x, y)));
+    places.zip(corners).map(move |((x, y), corner)| {
+        let sample = (x < size_px.x && y < size_px.y).then_some((y * size_px.x + x) as usize);
+        let inverse_depth = sample.map_or(HOLE_INVERSE_DEPTH, |sample| image.inverse_depth_per_m[sample]);
+        let normal = sample.and_then(|sample| normals.get(sample)).copied().unwrap_or_default();
+        [inverse_depth.to_bits(), normal, corner.to_bits(), 0]
+    })
+}
+
+/// Cuts an image, and merges what is flat within the bound.
+pub(crate) fn record(
+    reconstructor: &Reconstructor,
+    frame: &mut Frame<'_>,
+    image: &ImageCut<'_>,
+    merged: Option<ErrorBound>,
+) -> Result<(), ReconstructionError> {
+    let planes = image.set.meshes.planes.as_ref();
+    let planes = planes.map_err(|&(index, plane)| ReconstructionError::MissingPlane { index, plane })?;
+    let key = ShaderKey { name: "hybrid_mesh.wgsl", hybrid: true, ..ShaderKey::default() };
+    let texels = BindingResource::TextureView(&planes.texels);
+    let [depths, sides] = buffers([&image.quads.inverse_depths, &image.sides]);
+    let groups = image.size_px.to_array().map(|side| side.div_ceil(WORKGROUP_PX));
+    let work = image.work();
+    reconstructor.cut_pass(frame, key, &work, &[texels, depths, sides], [groups[0], groups[1], 1])?;
+    merged.map_or(Ok(()), |bound| merge(reconstructor, frame, image, bound))
+}
+
+/// Blocks of 2 × 2, of those blocks of 2 × 2, and so on.
+fn merge(
+    reconstructor: &Reconstructor,
+    frame: &mut Frame<'_>,
+    image: &ImageCut<'_>,
+    bound: ErrorBound,
+) -> Result<(), ReconstructionError> {
+    let key = ShaderKey { name: "merge.wgsl", hybrid: true, ..ShaderKey::default() };
+    let greatest = GREATEST_SIDE.min(image.size_px.min_element());
+    for side in (1..).map(|level| 1 << level).take_while(|&side| side <= greatest) {
+        let work = GpuCutWork { side, bound_px: bound.px(), ..image.work() };
+        let used = buffers([&image.quads.inverse_depths, &image.sides, &image.report]);
+        let blocks = image.size_px / side;
+        let groups = [blocks.x.div_ceil(WORKGROUP_PX), blocks.y.div_ceil(WORKGROUP_PX), 1];
+        reconstructor.cut_pass(frame, key, &work, &used, groups)?;
+    }
+    Ok(())
+}

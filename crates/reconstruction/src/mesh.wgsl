@@ -1,0 +1,20 @@
+// Cuts an image into quads between samples: a cell whose four corners are one surface is a quad, any other is none.
+{% include "cut.wgsl" %}
+
+// As in cell.wgsl.
+@group(0) @binding(1) var cell_codes: texture_2d<u32>;
+// Of each sample.
+@group(0) @binding(2) var<storage, read_write> inverse_depths: array<f32>;
+// Sides in texels of the quads that begin at each sample; 0 where none does.
+@group(0) @binding(3) var<storage, read_write> sides: array<u32>;
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= work.size_px) { return; }
+    let index = id.y * work.size_px.x + id.x;
+    let word = textureLoad(cell_codes, texel_of(work.first_sample + index), 0).x;
+    let code = f32(word & 0x7fffu);
+    inverse_depths[index] = select(0.0, (code - work.code_offset) / work.code_scale, code > 1.5);
+    let whole = all(id.xy + 1u < work.size_px);
+    sides[index] = select(0u, 1u, whole && (word >> 31u) != 0u);
+}

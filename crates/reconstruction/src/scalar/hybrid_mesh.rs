@@ -1,0 +1,166 @@
+//! Twin of `hybrid_mesh.wgsl` and `merge.wgsl`: each sample a quad of its texel, and flat blocks of them merged.
+
+use depth_image::{Camera, DepthImage, PinholeCamera, unit_from_oct16};
+use glam::{UVec2, Vec2, Vec3};
+
+use crate::{ErrorBound, Quad, hybrid_mesh::GREATEST_SIDE, shaders::GREATEST_SLOPE};
+
+/// As in `pyramid.rs`.
+const FLAT_FOOTPRINTS: f32 = 2.0;
+const SLOPE_SHARE: f32 = 0.2;
+/// Of a quad: upper left, upper right, lower left, lower right.
+const CORNERS: [UVec2; 4] = [UVec2::ZERO, UVec2::X, UVec2::Y, UVec2::ONE];
+
+/// An image, cut.
+struct Cut<'i> {
+    camera: &'i PinholeCamera,
+    /// Of each sample.
+    inverse_depths: Vec<[f32; 4]>,
+    /// In texels, of the quad that begins at each sample; 0 where none does.
+    sides: Vec<u32>,
+}
+
+/// In the order of their upper left samples; none where a plane is missing.
+pub(super) fn quads(number: usize, image: &DepthImage, merged: Option<ErrorBound>) -> Vec<Quad> {
+    let Some(mut cut) = Cut::of(image) else { return Vec::new() };
+    if let Some(bound) = merged {
+        cut.merge_all(bound.px());
+    }
+    (0..cut.sides.len()).filter(|&sample| cut.sides[sample] > 0).map(|sample| cut.quad(number, sample)).collect()
+}
+
+/// A sample and its plane.
+struct Sample {
+    inverse_depth: f32,
+    ray: Vec3,
+    normal: Vec3,
+}
+
+impl Sample {
+    /// Where a plane through the sample meets another ray.
+    fn on_plane(&self, normal: Vec3, ray: Vec3) -> f32 {
+        let along = normal.dot(self.ray);
+        self.inverse_depth * normal.dot(ray) / if along.abs() < 1e-12 { 1e-12 } else { along }
+    }
+
+    /// Whether no discontinuity lies between the sample and what its corner's ray meets.
+    fn shares(&self, held: f32, ray: Vec3, focal_px: f32) -> bool {
+        let slack = FLAT_FOOTPRINTS * held.max(self.inverse_depth) / focal_px;
+        let expected = self.on_plane(self.normal, ray);
+        let sloped = (held - expected).abs() <= slack.max(SLOPE_SHARE * (expected - self.inverse_depth).abs());
+        held > 0.0 && ((held - self.inverse_depth).abs() <= slack || sloped)
+    }
+
+    /// On the sample's own plane, as far as that is not too steep.
+    fn guess(&self, ray: Vec3, focal_px: f32) -> f32 {
+        let reach = self.inverse_depth * (Vec2::splat(0.5).length() * GREATEST_SLOPE / focal_px).min(0.5);
+        let guess = self.on_plane(tamed(self.normal, self.ray), ray);
+        guess.clamp(self.inverse_depth - reach, self.inverse_depth + reach)
+    }
+}
+
+/// Faces the eye, by at least as much as a surface of the greatest slope.
+fn tamed(normal: Vec3, ray: Vec3) -> Vec3 {
+    let sight = ray.normalize_or(Vec3::NEG_Z);
+    let facing = if normal.dot(sight) > 0.0 { -normal } else { normal };
+    let cosine = -facing.dot(sight);
+    let least_cosine = (1.0 + GREATEST_SLOPE * GREATEST_SLOPE).sqrt().recip();
+    if cosine >= least_cosine {
+        return facing;
+    }
+    let sideways = facing + sight * cosine;
+    (sideways * (GREATEST_SLOPE / sideways.length().max(1e-6)) - sight) * least_cosine
+}
+
+impl<'i> Cut<'i> {
+    fn of(image: &'i DepthImage) -> Option<Self> {
+        let (normals, corners) = (image.normal_oct16.as_ref()?, image.corner_inverse_depth_per_m.as_ref()?);
+        let Camera::Pinhole(camera) = &image.camera;
+        let (width, focal_px) = (camera.size_px.x, camera.focal_px.min_element());
+        let texels = (0..camera.size_px.y).flat_map(|y| (0..width).map(move |x| UVec2::new(x, y)));
+        let quad = |(index, texel): (usize, UVec2)| {
+            let inverse_depth = image.inverse_depth_per_m[index];
+            let ray = camera.ray(texel.as_vec2() + 0.5).direction_in_world;
+            let sample = Sample { inverse_depth, ray, normal: unit_from_oct16(normals[index]) };
+            CORNERS.map(|offset| {
+                let at = texel + offset;
+                let held = corners[(at.y * (width + 1) + at.x) as usize];
+                let ray = camera.ray(at.as_vec2()).direction_in_world;
+                if sample.shares(held, ray, focal_px) { held } else { sample.guess(ray, focal_px) }
+            })
+        };
+        Some(Self {
+            camera,
+            inverse_depths: texels.enumerate().map(quad).collect(),
+            sides: image.inverse_depth_per_m.iter().map(|&d| u32::from(d > 0.0)).collect(),
+        })
+    }
+
+    fn index(&self, texel: UVec2) -> usize {
+        (texel.y * self.camera.size_px.x + texel.x) as usize
+    }
+
+    fn texel(&self, sample: usize) -> UVec2 {
+        let width = self.camera.size_px.x;
+        UVec2::new(sample as u32 % width, sample as u32 / width)
+    }
+
+    /// The corners of a block.
+    fn merged(&self, origin: UVec2, side: u32) -> [f32; 4] {
+        [0, 1, 2, 3].map(|i| self.inverse_depths[self.index(origin + CORNERS[i] * (side - 1))][i])
+    }
+
+    fn quad(&self, number: usize, sample: usize) -> Quad {
+        let (origin, side) = (self.texel(sample), self.sides[sample]);
+        let depths = self.merged(origin, side);
+        let point = |i: usize| self.camera.ray((origin + CORNERS[i] * side).as_vec2()).at(depths[i].recip());
+        let last = self.index(origin + side - 1);
+        Quad { image: number, corners_in_world: [0, 1, 2, 3].map(point), samples: [sample as u32, last as u32] }
+    }
+
+    fn merge_all(&mut self, bound_px: f32) {
+        let size_px = self.camera.size_px;
+        let greatest = GREATEST_SIDE.min(size_px.min_element());
+        for side in (1..).map(|level| 1u32 << level).take_while(|&side| side <= greatest) {
+            let blocks = size_px / side;
+            for block in (0..blocks.y).flat_map(|y| (0..blocks.x).map(move |x| UVec2::new(x, y))) {
+                self.merge(block * side, side, bound_px);
+            }
+        }
+    }
+
+    fn merge(&mut self, origin: UVec2, side: u32, bound_px: f32) {
+        let children = CORNERS.map(|offset| self.index(origin + offset * (side / 2)));
+        if children.iter().any(|&child| self.sides[child] != side / 2) {
+            return;
+        }
+        if self.error_px(origin, side) <= bound_px {
+            children.iter().for_each(|&child| self.sides[child] = 0);
+            self.sides[children[0]] = side;
+        }
+    }
+
+    /// How far the merged quad is off the corners of all samples in the block.
+    fn error_px(&self, origin: UVec2, side: u32) -> f32 {
+        let merged = self.merged(origin, side);
+        let places = (0..side).flat_map(|y| (0..side).map(move |x| UVec2::new(x, y)));
+        let corners = places.flat_map(|place| (0..4).map(move |i| (place, i)));
+        let errors = corners.map(|(place, i)| {
+            let depth = self.inverse_depths[self.index(origin + place)][i];
+            let at = place + CORNERS[i];
+            let surface = on_triangles(merged, at.as_vec2() / side as f32);
+            let ray = self.camera.ray((origin + at).as_vec2()).direction_in_world;
+            self.camera.focal_px.min_element() * ray.length() * (surface - depth).abs() / surface
+        });
+        errors.fold(0.0, f32::max)
+    }
+}
+
+/// Of the two triangles that are drawn; linear in the image, as planes are.
+fn on_triangles([a, b, c, d]: [f32; 4], at: Vec2) -> f32 {
+    if at.element_sum() <= 1.0 {
+        a + (b - a) * at.x + (c - a) * at.y
+    } else {
+        d + (c - d) * (1.0 - at.x) + (b - d) * (1.0 - at.y)
+    }
+}

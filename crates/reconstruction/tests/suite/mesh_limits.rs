@@ -1,0 +1,99 @@
+//! What meshes refuse, what they make of nothing, and that they are cut once.
+
+use depth_image::{BACKGROUND_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, ProvenanceKind};
+use glam::{UVec2, Vec3};
+use reconstruction::{MeshStatistics, ReconstructionError};
+use scene::procedural::uv_sphere;
+
+use crate::{
+    meshes::{HYBRID, MESH, all_meshes, merged},
+    stage::{ALL_PLANES, CARVE, Corners, Stage, VIEW_PX, assert_sane, count, reconstructor},
+};
+
+fn corners() -> Corners {
+    Corners { eye: Vec3::new(0.4, 0.9, 3.6), target: Vec3::ZERO, half_m: 0.6 }
+}
+
+fn stage(cameras: usize) -> Stage {
+    Stage::with_corners(uv_sphere(1.0, 24), &corners().samples(cameras))
+}
+
+#[test]
+fn a_missing_plane_is_named() {
+    let mut without_normals = stage(2);
+    without_normals.images[1].normal_oct16 = None;
+    let mut without_corners = stage(2);
+    without_corners.images[0].corner_inverse_depth_per_m = None;
+    for (stage, expected) in [(without_normals, (1, "normal")), (without_corners, (0, "corner_inverse_depth"))] {
+        let set = stage.upload();
+        for method in [HYBRID, merged(1.0)] {
+            let error =
+                reconstructor().reconstruct(&set, &[corners().view()], method, ALL_PLANES).expect_err("a plane");
+            let ReconstructionError::MissingPlane { index, plane } = error else { panic!("{error}") };
+            assert_eq!((index, plane), expected, "{method}");
+        }
+        // Others need none of them.
+        for method in [MESH, CARVE] {
+            assert!(reconstructor().reconstruct(&set, &[corners().view()], method, ALL_PLANES).is_ok(), "{method}");
+        }
+    }
+}
+
+#[test]
+fn nothing_seen_is_nothing_shown() {
+    for (depth, kind) in
+        [(HOLE_INVERSE_DEPTH, ProvenanceKind::Filled), (BACKGROUND_INVERSE_DEPTH, ProvenanceKind::Empty)]
+    {
+        let mut stage = stage(2);
+        for image in &mut stage.images {
+            image.inverse_depth_per_m.fill(depth);
+            image.corner_inverse_depth_per_m.as_mut().expect("corners").fill(depth);
+        }
+        for method in all_meshes() {
+            let found = reconstructor().mesh_statistics(&stage.upload(), method).expect("statistics").expect("a mesh");
+            assert_eq!(MeshStatistics { device_s: 0.0, ..found }, MeshStatistics::default(), "{method}");
+            let view = stage.view(&corners().view(), method);
+            assert_sane(&view, &method.to_string());
+            // A view looks past the volume, too.
+            let [hit, of_kind] = [ProvenanceKind::Hit, kind].map(|kind| count(&view, kind));
+            println!("{depth} {method}: {hit} hits, {of_kind} {kind:?}");
+            assert!(hit == 0 && of_kind * 2 > view.size_px.element_product() as usize, "{depth} {method}");
+        }
+    }
+}
+
+#[test]
+fn searches_have_no_mesh() {
+    let set = stage(1).upload();
+    assert!(reconstructor().mesh_statistics(&set, CARVE).expect("no error").is_none());
+    assert!(reconstructor().read_quads(&set, CARVE).expect("no error").is_empty());
+}
+
+#[test]
+fn the_same_set_gives_the_same_quads_and_views() {
+    let stage = stage(4);
+    for method in all_meshes() {
+        let [a, b] = [stage.upload(), stage.upload()];
+        let quads = |set| reconstructor().read_quads(set, method).expect("quads");
+        assert!(quads(&a) == quads(&b), "{method}");
+        let view = |set| reconstructor().reconstruct(set, &[corners().view()], method, ALL_PLANES).expect("a view");
+        assert!(view(&a) == view(&a) && view(&a) == view(&b), "{method}");
+    }
+}
+
+#[test]
+fn many_views_of_many_sizes_are_single_views() {
+    let set = stage(3).upload();
+    let sizes = [VIEW_PX, VIEW_PX, UVec2::new(31, 17), UVec2::ONE, VIEW_PX, UVec2::new(8, 100)];
+    let cameras: Vec<_> =
+        sizes.iter().enumerate().map(|(i, &size_px)| corners().camera(i as f32 / 6.0, -0.3, size_px)).collect();
+    for method in all_meshes() {
+        let views = reconstructor().reconstruct(&set, &cameras, method, ALL_PLANES).expect("views");
+        for (camera, view) in cameras.iter().zip(&views) {
+            let single = reconstructor().reconstruct(&set, &[*camera], method, ALL_PLANES).expect("a view");
+            assert!(single[0] == *view, "{method} {:?}", camera.size_px);
+        }
+        let counted = reconstructor().reconstruct_measured(&set, &cameras, method, ALL_PLANES, true).expect("views");
+        assert!(counted.0 == views && counted.1.fetches_per_ray.is_some_and(|fetches| fetches >= 1.0), "{method}");
+    }
+}

@@ -1,0 +1,297 @@
+//! Quads cut from sample images: their twins, closed forms, and what merging gives up.
+
+use depth_image::{BACKGROUND_INVERSE_DEPTH, Camera, HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, View};
+use glam::{UVec2, Vec3};
+use reconstruction::{ErrorBound, Quad, ReconstructionMethod, scalar};
+use scene::procedural::{quad, uv_sphere};
+
+use crate::stage::{
+    ALL_PLANES, Agreement, Corners, SAMPLE_PX, Stage, VIEW_PX, assert_sane, corpus, count, depths, kinds, looking,
+    reconstructor,
+};
+
+pub const MESH: ReconstructionMethod = ReconstructionMethod::Mesh;
+pub const HYBRID: ReconstructionMethod = ReconstructionMethod::HybridMesh { merged: None };
+
+pub fn merged(px: f64) -> ReconstructionMethod {
+    ReconstructionMethod::HybridMesh { merged: Some(ErrorBound::from_px(px).expect("a bound")) }
+}
+
+pub fn all_meshes() -> [ReconstructionMethod; 3] {
+    [MESH, HYBRID, merged(0.5)]
+}
+
+fn device_quads(stage: &Stage, method: ReconstructionMethod) -> Vec<Quad> {
+    reconstructor().read_quads(&stage.upload(), method).expect("quads")
+}
+
+fn camera_of(stage: &Stage, image: usize) -> PinholeCamera {
+    let Camera::Pinhole(camera) = stage.images[image].camera;
+    camera
+}
+
+/// The greatest distance of corners, in parts of the distance from their eye.
+fn corners_differ_by(stage: &Stage, a: &[Quad], b: &[Quad]) -> f32 {
+    let differ = |(a, b): (&Quad, &Quad)| {
+        let eye = camera_of(stage, a.image).eye_in_world;
+        let corners = a.corners_in_world.into_iter().zip(b.corners_in_world);
+        corners.map(|(p, q)| p.distance(q) / p.distance(eye)).fold(0.0, f32::max)
+    };
+    a.iter().zip(b).map(differ).fold(0.0, f32::max)
+}
+
+#[test]
+fn the_devices_quads_are_the_twins() {
+    for (name, scene, corners) in corpus() {
+        let mut stage = Stage::with_corners(scene, &corners.samples(2));
+        punch_holes(&mut stage, 0.1);
+        for method in all_meshes() {
+            let device = device_quads(&stage, method);
+            let twin = scalar::quads(&stage.images, method).expect("quads");
+            let names = |quads: &[Quad]| quads.iter().map(|q| (q.image, q.samples)).collect::<Vec<_>>();
+            let differ = corners_differ_by(&stage, &device, &twin);
+            println!("{name:<18} {method:<16} {:>6} quads, corners off by {differ:.1e}", device.len());
+            assert!(!device.is_empty() && names(&device) == names(&twin), "{name} {method}: {}", twin.len());
+            assert!(differ < 1e-4, "{name} {method}: {differ}");
+        }
+    }
+}
+
+#[test]
+fn views_are_the_twins() {
+    let mut bad = Vec::new();
+    for (name, scene, corners) in corpus() {
+        let whole = Stage::with_corners(scene, &corners.samples(4));
+        for (cameras, method) in [1, 2, 4].into_iter().flat_map(|n| all_meshes().map(|method| (n, method))) {
+            let stage = Stage { images: whole.images[..cameras].to_vec(), ..whole.clone() };
+            let agreement = Agreement::of(&stage.view(&corners.view(), method), &stage.twin(&corners.view(), method));
+            let Agreement { kind, hits, close } = agreement;
+            println!("{name:<18} {method:<16} {cameras} cameras: {kind:.5} same kind, {hits} hits, {close:.5} close");
+            bad.extend((!agreement.is_good()).then(|| format!("{name}, {method}, {cameras} cameras: {agreement:?}")));
+        }
+    }
+    assert!(bad.is_empty(), "{bad:#?}");
+}
+
+/// Pixels of the inside of the truth's surfaces, and of those the ones that are no hit.
+fn inside_and_lost(truth: &View, view: &View) -> (usize, usize) {
+    let (width, height) = (truth.size_px.x as usize, truth.size_px.y as usize);
+    let known = kinds(truth);
+    let is_inside = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let within = x > 0 && y > 0 && x + 1 < width && y + 1 < height;
+        within && (0..9).all(|k| known[i + (k / 3) * width + k % 3 - width - 1] == ProvenanceKind::Hit)
+    };
+    let inside: Vec<usize> = (0..width * height).filter(|&i| is_inside(i)).collect();
+    let found = kinds(view);
+    (inside.len(), inside.into_iter().filter(|&i| found[i] != ProvenanceKind::Hit).count())
+}
+
+fn plane_at(degrees: f32) -> (Stage, PinholeCamera) {
+    let elevation = (90.0 - degrees).to_radians();
+    let camera = |azimuth: f32, fov_deg, size_px| {
+        let at = Vec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos());
+        looking(at * 4.0, Vec3::ZERO, fov_deg, size_px)
+    };
+    let samples = [camera(-0.1, 60.0, SAMPLE_PX), camera(0.1, 60.0, SAMPLE_PX)];
+    (Stage::with_corners(quad(Vec3::ZERO, 2.0, Vec3::Y, [200, 120, 60]), &samples), camera(0.03, 40.0, VIEW_PX))
+}
+
+#[test]
+fn a_plane_is_whole_and_exact_however_steep() {
+    for degrees in [0.0, 45.0, 80.0, 85.0] {
+        let (stage, camera) = plane_at(degrees);
+        let truth = stage.truth(&camera);
+        for method in all_meshes() {
+            let view = stage.view(&camera, method);
+            let (inside, lost) = inside_and_lost(&truth, &view);
+            let both =
+                (0..kinds(&truth).len()).filter(|&i| [kinds(&truth)[i], kinds(&view)[i]] == [ProvenanceKind::Hit; 2]);
+            let worst = both.map(|i| (depths(&view)[i] / depths(&truth)[i] - 1.0).abs()).fold(0.0, f32::max);
+            println!("{degrees}° {method:<16} {lost} of {inside} pixels lost, depth off by at most {worst:.1e}");
+            assert!(inside > 30 && lost == 0, "{degrees}° {method}: {lost} of {inside}");
+            assert!(worst < if method == merged(0.5) { 2e-2 } else { 2e-4 }, "{degrees}° {method}: {worst}");
+        }
+    }
+}
+
+#[test]
+fn a_sphere_is_near_the_truth() {
+    let corners = Corners { eye: Vec3::new(0.4, 0.9, 3.6), target: Vec3::ZERO, half_m: 0.3 };
+    let stage = Stage::with_corners(uv_sphere(1.0, 64), &corners.samples(4));
+    let truth = stage.truth(&corners.view());
+    for method in all_meshes() {
+        let view = stage.view(&corners.view(), method);
+        let both =
+            (0..kinds(&truth).len()).filter(|&i| [kinds(&truth)[i], kinds(&view)[i]] == [ProvenanceKind::Hit; 2]);
+        let errors: Vec<f32> = both.map(|i| (depths(&view)[i] / depths(&truth)[i] - 1.0).abs()).collect();
+        let mean = errors.iter().sum::<f32>() / errors.len() as f32;
+        let worst = errors.iter().copied().fold(0.0, f32::max);
+        let (inside, lost) = inside_and_lost(&truth, &view);
+        println!("{method:<16} depth off by {mean:.1e}, at most {worst:.1e}; {lost} of {inside} pixels lost");
+        assert!(mean < 2e-3 && worst < 0.1 && lost * 100 <= inside, "{method}");
+    }
+}
+
+/// Takes samples away, the same ones each time.
+pub fn punch_holes(stage: &mut Stage, share: f64) {
+    let mut state = 1u32;
+    for image in &mut stage.images {
+        for depth in &mut image.inverse_depth_per_m {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            if f64::from(state >> 8) < share * f64::from(1 << 24) {
+                *depth = HOLE_INVERSE_DEPTH;
+            }
+        }
+    }
+}
+
+/// Every fourth sample of a wall alone, the rest background, and no corner known.
+fn isolated() -> Stage {
+    let camera = looking(Vec3::Z * 3.0, Vec3::ZERO, 45.0, SAMPLE_PX);
+    let mut stage = Stage::with_corners(quad(Vec3::ZERO, 1.0, Vec3::Z, [200, 120, 60]), &[camera]);
+    let image = &mut stage.images[0];
+    for (i, depth) in image.inverse_depth_per_m.iter_mut().enumerate() {
+        let (x, y) = (i as u32 % SAMPLE_PX.x, i as u32 / SAMPLE_PX.x);
+        *depth = if x % 4 == 1 && y % 4 == 1 { *depth } else { BACKGROUND_INVERSE_DEPTH };
+    }
+    image.corner_inverse_depth_per_m.as_mut().expect("corners").fill(BACKGROUND_INVERSE_DEPTH);
+    stage
+}
+
+#[test]
+fn only_the_hybrid_keeps_isolated_samples() {
+    let stage = isolated();
+    let samples: Vec<usize> = (0..stage.images[0].inverse_depth_per_m.len())
+        .filter(|&i| stage.images[0].inverse_depth_per_m[i] > 0.0)
+        .collect();
+    let camera = camera_of(&stage, 0);
+    for (method, expected) in [(MESH, 0), (HYBRID, samples.len()), (merged(2.0), samples.len())] {
+        assert_eq!(device_quads(&stage, method).len(), expected, "{method}");
+        let view = stage.view(&camera, method);
+        let shown = samples.iter().filter(|&&i| kinds(&view)[i] == ProvenanceKind::Hit).count();
+        println!(
+            "{method:<16} {shown} of {} isolated samples, {} hits",
+            samples.len(),
+            count(&view, ProvenanceKind::Hit)
+        );
+        assert_eq!((shown, count(&view, ProvenanceKind::Hit)), (expected, expected), "{method}");
+    }
+}
+
+/// Of the samples that the mesh has in no quad, how many the view from their own camera shows.
+#[test]
+fn silhouettes_are_kept_by_the_hybrid() {
+    for (name, scene, corners) in corpus() {
+        let stage = Stage::with_corners(scene, &corners.samples(1));
+        let image = &stage.images[0];
+        let width = SAMPLE_PX.x;
+        let mut in_quad = vec![false; image.inverse_depth_per_m.len()];
+        for quad in device_quads(&stage, MESH) {
+            let [first, last] = quad.samples;
+            [first, first + 1, last - 1, last].into_iter().for_each(|sample| in_quad[sample as usize] = true);
+        }
+        let lost: Vec<usize> =
+            (0..in_quad.len()).filter(|&i| image.inverse_depth_per_m[i] > 0.0 && !in_quad[i]).collect();
+        let shows = |method| {
+            let view = stage.view(&camera_of(&stage, 0), method);
+            let is_shown = |&&i: &&usize| (depths(&view)[i] / image.inverse_depth_per_m[i] - 1.0).abs() < 0.01;
+            let shown = lost.iter().filter(|i| kinds(&view)[**i] == ProvenanceKind::Hit).filter(is_shown);
+            shown.count() as f64 / lost.len().max(1) as f64
+        };
+        let [mesh, hybrid] = [MESH, HYBRID].map(shows);
+        println!(
+            "{name:<18} {:>5} samples in no quad of the mesh ({width} across); shown: mesh {mesh:.3}, hybrid {hybrid:.3}",
+            lost.len()
+        );
+        assert!(lost.is_empty() || (hybrid >= 0.95 && hybrid > mesh), "{name}: {hybrid}");
+    }
+}
+
+#[test]
+fn merging_a_plane_leaves_few_quads() {
+    let (stage, _) = plane_at(30.0);
+    let set = stage.upload();
+    let before = reconstructor().mesh_statistics(&set, HYBRID).expect("statistics").expect("a mesh");
+    assert_eq!((before.quads, before.greatest_error_px), (before.quads_before, 0.0));
+    for px in [0.1, 0.5, 2.0] {
+        let after = reconstructor().mesh_statistics(&set, merged(px)).expect("statistics").expect("a mesh");
+        println!(
+            "plane, {px} px: {} of {} quads, off by {:.4} px",
+            after.quads, after.quads_before, after.greatest_error_px
+        );
+        assert_eq!(after.quads_before, before.quads);
+        assert!(after.quads * 4 <= after.quads_before && f64::from(after.greatest_error_px) <= px, "{px}: {after:?}");
+    }
+}
+
+/// Looser bounds leave fewer quads, and none is exceeded.
+#[test]
+fn merging_keeps_its_bound() {
+    for (name, scene, corners) in corpus() {
+        let stage = Stage::with_corners(scene, &corners.samples(4));
+        let set = stage.upload();
+        let truth = stage.truth(&corners.view());
+        let mut last = usize::MAX as u64;
+        for px in [0.1, 0.5, 2.0] {
+            let found = reconstructor().mesh_statistics(&set, merged(px)).expect("statistics").expect("a mesh");
+            let view = reconstructor().reconstruct(&set, &[corners.view()], merged(px), ALL_PLANES).expect("a view");
+            let (inside, lost) = inside_and_lost(&truth, &view[0]);
+            println!(
+                "{name:<18} {px} px: {:>6} of {:>6} quads, off by {:.3} px; {lost} of {inside} pixels lost",
+                found.quads, found.quads_before, found.greatest_error_px
+            );
+            assert!(f64::from(found.greatest_error_px) <= px && found.quads <= last, "{name} {px}: {found:?}");
+            last = found.quads;
+        }
+    }
+}
+
+/// By how much the corner of a texel runs away as the normal turns from the eye: the ratio of the quad's longer
+/// diagonal to that of the texel at the sample's depth, where no corner is held.
+#[test]
+fn corners_stay_near_however_grazing_the_normal() {
+    let camera = looking(Vec3::Z * 3.0, Vec3::ZERO, 45.0, UVec2::new(3, 3) * 24);
+    let scene = quad(Vec3::ZERO, 4.0, Vec3::Z, [200, 120, 60]);
+    let mut stage = Stage::with_corners(scene, &[camera]);
+    let image = &mut stage.images[0];
+    image.corner_inverse_depth_per_m.as_mut().expect("corners").fill(HOLE_INVERSE_DEPTH);
+    println!("degrees  greatest stretch of depth, clamped / of the plane itself");
+    let mut last = 0.0;
+    for degrees in [0.0f32, 45.0, 80.0, 85.0, 87.5, 89.0, 89.9, 89.99, 90.0] {
+        let normal = Vec3::new(degrees.to_radians().sin(), 0.0, degrees.to_radians().cos());
+        let packed = depth_image::oct16_from_unit(normal);
+        stage.images[0].normal_oct16.as_mut().expect("normals").fill(packed);
+        let quads = device_quads(&stage, HYBRID);
+        assert_eq!(quads.len(), camera.pixel_count());
+        let depth_m = |point: Vec3| (point - camera.eye_in_world).dot(camera.forward_in_world());
+        let corners = || quads.iter().flat_map(|quad| quad.corners_in_world);
+        assert!(corners().all(Vec3::is_finite), "{degrees}°");
+        // In the middle of the image: there the normal's angle is the angle to the ray.
+        let middle = &quads[quads.len() / 2];
+        let stretch = |point: Vec3| (depth_m(point) / 3.0).max(3.0 / depth_m(point));
+        let found = middle.corners_in_world.into_iter().map(stretch).fold(0.0, f32::max);
+        let everywhere = corners().map(stretch).fold(0.0, f32::max);
+        let along = |corner: glam::Vec2| normal.dot(camera.ray(corner).direction_in_world);
+        let center = glam::Vec2::new(36.5, 36.5);
+        let bare = along(center) / along(center - 0.5).abs().min(along(center + 0.5).abs());
+        println!("{degrees:<8} {found:.3} (anywhere {everywhere:.3}) / {:.3}", bare.abs());
+        assert!(everywhere <= 2.0 + 1e-3 && found >= last - 1e-3, "{degrees}°: {everywhere} {found} {last}");
+        last = found;
+    }
+}
+
+#[test]
+fn views_with_random_holes_are_pictures() {
+    for (name, scene, corners) in corpus() {
+        let mut stage = Stage::with_corners(scene, &corners.samples(3));
+        punch_holes(&mut stage, 0.3);
+        let hits = all_meshes().map(|method| {
+            let view = stage.view(&corners.view(), method);
+            assert_sane(&view, &format!("{name} {method}"));
+            count(&view, ProvenanceKind::Hit)
+        });
+        println!("{name:<18} 30 % holes: hits of mesh {}, hybrid {}, merged {}", hits[0], hits[1], hits[2]);
+        assert!(hits[1] > hits[0] && hits[2] > hits[0], "{name}: {hits:?}");
+    }
+}
