@@ -286,7 +286,9 @@ fn next_reconstruction(method: Option<ReconstructionMethod>) -> Option<Reconstru
     match method {
         None => Some(ReconstructionMethod::LightFieldSearch { steps: 100 }),
         Some(ReconstructionMethod::LightFieldSearch { .. }) => Some(ReconstructionMethod::JointCarve { stop_level: 0 }),
-        Some(ReconstructionMethod::JointCarve { .. }) => None,
+        Some(ReconstructionMethod::JointCarve { .. }) => Some(ReconstructionMethod::Mesh),
+        Some(ReconstructionMethod::Mesh) => Some(ReconstructionMethod::HybridMesh { merged: None }),
+        Some(ReconstructionMethod::HybridMesh { .. }) => None,
     }
 }
 
@@ -311,7 +313,7 @@ fn methods() -> Vec<String> {
 fn every_method_has_its_page() {
     const PARTS: [&str; 4] = ["## Source", "## Equations", "## Cost", "## Known failures"];
     let folder = root().join("docs/methods");
-    assert_eq!(methods().len(), 4);
+    assert_eq!(methods().len(), 6);
     for name in methods() {
         let page = folder.join(format!("{name}.md"));
         let text = fs::read_to_string(&page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));

@@ -43,9 +43,9 @@ fn reconstruction_keys() -> Vec<ShaderKey> {
     keys.flat_map(forms).flat_map(counting).collect()
 }
 
-/// Only what searches along rays counts what it fetches.
+/// Only what finds surfaces counts what it fetches.
 fn counting(key: ShaderKey) -> Vec<ShaderKey> {
-    let searches = ["march.wgsl", "joint_carve.wgsl", "light_field_search.wgsl"].contains(&key.name);
+    let searches = ["march.wgsl", "joint_carve.wgsl", "light_field_search.wgsl", "resolve.wgsl"].contains(&key.name);
     let counted = if searches { vec![false, true] } else { vec![false] };
     counted.into_iter().map(|count_fetches| ShaderKey { count_fetches, ..key }).collect()
 }
@@ -61,6 +61,7 @@ fn forms(key: ShaderKey) -> Vec<ShaderKey> {
             .flat_map(|highlight| [(0, 0), (3, 0), (3, 1), (9, 3)].map(|(lights, words)| (highlight, lights, words)))
             .map(|(highlight, lights, visibility_words)| ShaderKey { highlight, lights, visibility_words, ..key })
             .collect(),
+        "quads.wgsl" | "quad_indices.wgsl" => [false, true].map(|hybrid| ShaderKey { hybrid, ..key }).to_vec(),
         _ => vec![key],
     }
 }
@@ -71,7 +72,8 @@ fn reconstruction_shaders_are_valid_for_every_number_of_cameras() {
     let keys = reconstruction_keys();
     for key in &keys {
         let text = shader_text(&templates, *key).unwrap_or_else(|error| panic!("{key:?}: {error}"));
-        assert_eq!(entries(&format!("{key:?}"), &text), ["main"], "{key:?}");
+        let expected: &[&str] = if key.name == "quads.wgsl" { &["vertex", "fragment"] } else { &["main"] };
+        assert_eq!(entries(&format!("{key:?}"), &text), expected, "{key:?}");
     }
     let shaders = keys.iter().map(|key| key.name).collect::<std::collections::BTreeSet<_>>();
     assert!(shaders.len() >= 5 && keys.len() >= shaders.len() * CAMERAS.len(), "{} texts", keys.len());

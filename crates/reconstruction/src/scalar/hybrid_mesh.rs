@@ -55,7 +55,7 @@ impl Sample {
     fn guess(&self, ray: Vec3, focal_px: f32) -> f32 {
         let reach = self.inverse_depth * (Vec2::splat(0.5).length() * GREATEST_SLOPE / focal_px).min(0.5);
         let guess = self.on_plane(tamed(self.normal, self.ray), ray);
-        guess.clamp(self.inverse_depth - reach, self.inverse_depth + reach)
+        guess.max(self.inverse_depth - reach).min(self.inverse_depth + reach)
     }
 }
 

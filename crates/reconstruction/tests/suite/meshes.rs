@@ -6,8 +6,8 @@ use reconstruction::{ErrorBound, Quad, ReconstructionMethod, scalar};
 use scene::procedural::{quad, uv_sphere};
 
 use crate::stage::{
-    ALL_PLANES, Agreement, Corners, SAMPLE_PX, Stage, VIEW_PX, assert_sane, corpus, count, depths, kinds, looking,
-    reconstructor,
+    ALL_PLANES, Agreement, CARVE, Corners, SAMPLE_PX, Stage, VIEW_PX, assert_sane, corpus, count, depths, kinds,
+    looking, psnr_db, reconstructor,
 };
 
 pub const MESH: ReconstructionMethod = ReconstructionMethod::Mesh;
@@ -179,7 +179,8 @@ fn only_the_hybrid_keeps_isolated_samples() {
     }
 }
 
-/// Of the samples that the mesh has in no quad, how many the view from their own camera shows.
+/// Of the samples that the mesh has in no quad, how many the view from their own camera shows, at their depth to within
+/// four footprints.
 #[test]
 fn silhouettes_are_kept_by_the_hybrid() {
     for (name, scene, corners) in corpus() {
@@ -195,7 +196,7 @@ fn silhouettes_are_kept_by_the_hybrid() {
             (0..in_quad.len()).filter(|&i| image.inverse_depth_per_m[i] > 0.0 && !in_quad[i]).collect();
         let shows = |method| {
             let view = stage.view(&camera_of(&stage, 0), method);
-            let is_shown = |&&i: &&usize| (depths(&view)[i] / image.inverse_depth_per_m[i] - 1.0).abs() < 0.01;
+            let is_shown = |&&i: &&usize| (depths(&view)[i] / image.inverse_depth_per_m[i] - 1.0).abs() < 0.05;
             let shown = lost.iter().filter(|i| kinds(&view)[**i] == ProvenanceKind::Hit).filter(is_shown);
             shown.count() as f64 / lost.len().max(1) as f64
         };
@@ -233,6 +234,9 @@ fn merging_keeps_its_bound() {
         let set = stage.upload();
         let truth = stage.truth(&corners.view());
         let mut last = usize::MAX as u64;
+        let view = reconstructor().reconstruct(&set, &[corners.view()], HYBRID, ALL_PLANES).expect("a view");
+        let (inside, lost_before) = inside_and_lost(&truth, &view[0]);
+        println!("{name:<18} not merged: {lost_before} of {inside} pixels lost");
         for px in [0.1, 0.5, 2.0] {
             let found = reconstructor().mesh_statistics(&set, merged(px)).expect("statistics").expect("a mesh");
             let view = reconstructor().reconstruct(&set, &[corners.view()], merged(px), ALL_PLANES).expect("a view");
@@ -242,8 +246,35 @@ fn merging_keeps_its_bound() {
                 found.quads, found.quads_before, found.greatest_error_px
             );
             assert!(f64::from(found.greatest_error_px) <= px && found.quads <= last, "{name} {px}: {found:?}");
+            assert!(lost <= lost_before + inside / 200, "{name} {px}: cracks, {lost} pixels lost");
             last = found.quads;
         }
+    }
+}
+
+/// What the methods come to beside the carve; times are of the software device and small views.
+#[test]
+fn hybrids_cover_more_than_meshes() {
+    for (name, scene, corners) in corpus() {
+        let stage = Stage::with_corners(scene, &corners.samples(4));
+        let (set, truth) = (stage.upload(), stage.truth(&corners.view()));
+        let cameras = [corners.view(); 16];
+        let everywhere = vec![true; kinds(&truth).len()];
+        let shown = |method| {
+            let reconstruct = || reconstructor().reconstruct_measured(&set, &cameras, method, ALL_PLANES, false);
+            reconstruct().expect("pipelines and quads");
+            let (views, statistics) = reconstruct().expect("views");
+            let both = kinds(&truth).into_iter().zip(kinds(&views[0])).filter(|(t, _)| *t == ProvenanceKind::Hit);
+            let (covered, found) =
+                both.fold((0, 0), |(c, f), (_, v)| (c + 1u32, f + u32::from(v == ProvenanceKind::Hit)));
+            let psnr = psnr_db(&truth, &views[0], &everywhere);
+            let share = f64::from(found) / f64::from(covered.max(1));
+            let ms = statistics.device_s * 1e3 / cameras.len() as f64;
+            println!("{name:<18} {method:<16} {psnr:.2} dB, {share:.4} of the surface shown, {ms:.2} ms a view");
+            share
+        };
+        let [mesh, hybrid, _, _] = [MESH, HYBRID, merged(0.5), CARVE].map(shown);
+        assert!(hybrid > mesh && hybrid > 0.95, "{name}: {hybrid} {mesh}");
     }
 }
 
@@ -268,7 +299,7 @@ fn corners_stay_near_however_grazing_the_normal() {
         let corners = || quads.iter().flat_map(|quad| quad.corners_in_world);
         assert!(corners().all(Vec3::is_finite), "{degrees}°");
         // In the middle of the image: there the normal's angle is the angle to the ray.
-        let middle = &quads[quads.len() / 2];
+        let middle = &quads[36 * 72 + 36];
         let stretch = |point: Vec3| (depth_m(point) / 3.0).max(3.0 / depth_m(point));
         let found = middle.corners_in_world.into_iter().map(stretch).fold(0.0, f32::max);
         let everywhere = corners().map(stretch).fold(0.0, f32::max);
