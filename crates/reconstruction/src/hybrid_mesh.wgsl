@@ -48,14 +48,21 @@ fn is_shared(sample: Sample, held: f32, ray: vec3f) -> bool {
     return held > 0.0 && (close || sloped);
 }
 
+// On the sample's own plane, but no farther off than half a texel's diagonal on the greatest slope, nor than the half or
+// double depth. Where the corner's ray is known to go past the surface, its silhouette lies before the corner: a steep
+// plane would stand out there like a flap.
+fn guessed(sample: Sample, held: f32, ray: vec3f) -> f32 {
+    let guess = on_plane(sample, sample.tame_normal, ray);
+    let is_silhouette = held >= 0.0 && held < guess;
+    let footprints = select(HALF_DIAGONAL_PX * GREATEST_SLOPE, FLAT_FOOTPRINTS, is_silhouette);
+    let reach = sample.inverse_depth * min(footprints / work.focal_px, 0.5);
+    return clamp(guess, sample.inverse_depth - reach, sample.inverse_depth + reach);
+}
+
 fn corner(sample: Sample, at: vec2u) -> f32 {
     let held = bitcast<f32>(plane_texel(at).z);
     let ray = ray_at(vec2f(at));
-    let guess = on_plane(sample, sample.tame_normal, ray);
-    // No farther off than half a texel's diagonal on the greatest slope, nor than the half or double depth.
-    let reach = sample.inverse_depth * min(HALF_DIAGONAL_PX * GREATEST_SLOPE / work.focal_px, 0.5);
-    let bounded = clamp(guess, sample.inverse_depth - reach, sample.inverse_depth + reach);
-    return select(bounded, held, is_shared(sample, held, ray));
+    return select(guessed(sample, held, ray), held, is_shared(sample, held, ray));
 }
 
 @compute @workgroup_size(8, 8)

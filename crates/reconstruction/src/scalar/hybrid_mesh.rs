@@ -51,10 +51,12 @@ impl Sample {
         held > 0.0 && ((held - self.inverse_depth).abs() <= slack || sloped)
     }
 
-    /// On the sample's own plane, as far as that is not too steep.
-    fn guess(&self, ray: Vec3, focal_px: f32) -> f32 {
-        let reach = self.inverse_depth * (Vec2::splat(0.5).length() * GREATEST_SLOPE / focal_px).min(0.5);
+    /// On the sample's own plane as far as that is not too steep; nearer where the ray is known to go past the surface.
+    fn guess(&self, held: f32, ray: Vec3, focal_px: f32) -> f32 {
         let guess = self.on_plane(tamed(self.normal, self.ray), ray);
+        let steepest = Vec2::splat(0.5).length() * GREATEST_SLOPE;
+        let footprints = if held >= 0.0 && held < guess { FLAT_FOOTPRINTS } else { steepest };
+        let reach = self.inverse_depth * (footprints / focal_px).min(0.5);
         guess.max(self.inverse_depth - reach).min(self.inverse_depth + reach)
     }
 }
@@ -86,7 +88,7 @@ impl<'i> Cut<'i> {
                 let at = texel + offset;
                 let held = corners[(at.y * (width + 1) + at.x) as usize];
                 let ray = camera.ray(at.as_vec2()).direction_in_world;
-                if sample.shares(held, ray, focal_px) { held } else { sample.guess(ray, focal_px) }
+                if sample.shares(held, ray, focal_px) { held } else { sample.guess(held, ray, focal_px) }
             })
         };
         Some(Self {
