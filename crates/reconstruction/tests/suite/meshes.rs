@@ -73,21 +73,22 @@ fn views_are_the_twins() {
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
-/// Pixels of the inside of the truth's surfaces: they and all around them are hits.
-fn inside(truth: &View) -> Vec<usize> {
+/// Pixels of the inside of the truth's surfaces: they and all around them, so far, are hits.
+fn inside(truth: &View, reach_px: usize) -> Vec<usize> {
     let (width, height) = (truth.size_px.x as usize, truth.size_px.y as usize);
     let known = kinds(truth);
     let is_inside = |i: &usize| {
         let (x, y) = (i % width, i / width);
-        let within = x > 0 && y > 0 && x + 1 < width && y + 1 < height;
-        within && (0..9).all(|k| known[i + (k / 3) * width + k % 3 - width - 1] == ProvenanceKind::Hit)
+        let within = x.min(y) >= reach_px && x + reach_px < width && y + reach_px < height;
+        let row = |y: usize| &known[y * width + x - reach_px..=y * width + x + reach_px];
+        within && (y - reach_px..=y + reach_px).all(|y| row(y).iter().all(|&k| k == ProvenanceKind::Hit))
     };
     (0..width * height).filter(is_inside).collect()
 }
 
 /// How many those are, and how many of them are no hit.
 fn inside_and_lost(truth: &View, view: &View) -> (usize, usize) {
-    let (inside, found) = (inside(truth), kinds(view));
+    let (inside, found) = (inside(truth, 1), kinds(view));
     (inside.len(), inside.into_iter().filter(|&i| found[i] != ProvenanceKind::Hit).count())
 }
 
@@ -110,7 +111,8 @@ fn a_plane_is_whole_and_exact_however_steep() {
             let view = stage.view(&camera, method);
             let (inside, lost) = inside_and_lost(&truth, &view);
             let off = |i: usize| (depths(&view)[i] / depths(&truth)[i] - 1.0).abs();
-            let worst = self::inside(&truth).into_iter().map(off).fold(0.0, f32::max);
+            // Quads at the rim end in silhouettes, and are a texel wide.
+            let worst = self::inside(&truth, 2).into_iter().map(off).fold(0.0, f32::max);
             println!("{degrees}° {method:<16} {lost} of {inside} pixels lost, depth off by at most {worst:.1e}");
             assert!(inside > 30 && lost == 0, "{degrees}° {method}: {lost} of {inside}");
             assert!(worst < 1e-4, "{degrees}° {method}: {worst}");
