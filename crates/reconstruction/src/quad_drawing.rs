@@ -7,7 +7,7 @@ use std::{
 
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3, Vec4};
-use gpu::Frame;
+use gpu::{Frame, GpuError};
 use wgpu::{BindingResource, BufferUsages, TextureFormat, TextureView, TextureViewDimension};
 
 use crate::{
@@ -96,7 +96,7 @@ impl Reconstructor {
     ) -> Result<Option<Arc<Targets>>, ReconstructionError> {
         let Some(mesh) = self.mesh(set, method)? else { return Ok(None) };
         let pipeline = self.quad_pipeline(mesh.cut.is_hybrid())?;
-        let targets = self.targets(cameras[0].size_px, cameras.len());
+        let targets = self.targets(cameras[0].size_px, cameras.len())?;
         let bound = self.bind_works(&pipeline, set, cameras);
         for number in 0..cameras.len() {
             let first_work = number * mesh.images.len();
@@ -105,10 +105,13 @@ impl Reconstructor {
         Ok(Some(targets))
     }
 
-    fn targets(&self, size_px: UVec2, count: usize) -> Arc<Targets> {
+    fn targets(&self, size_px: UVec2, count: usize) -> Result<Arc<Targets>, GpuError> {
+        let limits = self.gpu.device.limits();
+        check_limit("a drawn view's side (px)", size_px.max_element(), limits.max_texture_dimension_2d)?;
+        check_limit("views drawn together", count as u32, limits.max_texture_array_layers)?;
         let mut kept = self.drawing.targets.lock().unwrap_or_else(PoisonError::into_inner);
         let reused = kept.take().filter(|targets| targets.holds(size_px, count));
-        kept.insert(reused.unwrap_or_else(|| Arc::new(Targets::new(&self.gpu.device, size_px, count)))).clone()
+        Ok(kept.insert(reused.unwrap_or_else(|| Arc::new(Targets::new(&self.gpu.device, size_px, count)))).clone())
     }
 
     /// A uniform for each view and image.
@@ -146,6 +149,13 @@ impl Reconstructor {
         pipelines.insert(hybrid, pipeline.clone());
         Ok(pipeline)
     }
+}
+
+fn check_limit(what: &str, needed: u32, limit: u32) -> Result<(), GpuError> {
+    if needed > limit {
+        return Err(GpuError::Limit { what: what.to_owned(), needed: needed.into(), limit: limit.into() });
+    }
+    Ok(())
 }
 
 fn draw_view(

@@ -3,10 +3,7 @@
 //! What a quad stands for is the method's (`mesh.rs`, `hybrid_mesh.rs`); here quads are counted and listed in the order
 //! of their samples, so that the same set gives the same list.
 
-use std::{
-    collections::HashMap,
-    sync::{Arc, Mutex, PoisonError},
-};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use glam::{UVec2, Vec2, Vec3};
@@ -26,9 +23,11 @@ pub(crate) const INDICES_A_QUAD: u32 = 6;
 const BYTES_OF_DRAW: u64 = 20;
 /// Bits of the greatest error, and quads before merging.
 const BYTES_OF_REPORT: u64 = 8;
+/// Kept with a set, the last ones asked for: bounds are free to choose, memory is not.
+const MAX_CUTS: usize = 3;
 
 /// How images are cut.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Cut {
     /// Between samples.
     Mesh,
@@ -84,7 +83,8 @@ pub(crate) struct SetMeshes {
     pub cameras: Vec<PinholeCamera>,
     /// Or which plane is missing where.
     pub planes: Result<CornerPlanes, (usize, &'static str)>,
-    cut: Mutex<HashMap<Cut, Arc<Mesh>>>,
+    /// The one first asked for is the first.
+    cut: Mutex<Vec<Arc<Mesh>>>,
 }
 
 impl SetMeshes {
@@ -210,7 +210,7 @@ impl Reconstructor {
         })?)
     }
 
-    /// Cut when first asked for, kept with the set.
+    /// Cut when first asked for, and kept with the set.
     pub(crate) fn mesh(
         &self,
         set: &SampleSet,
@@ -219,11 +219,14 @@ impl Reconstructor {
         let Some(cut) = Cut::of(method) else { return Ok(None) };
         // Held while it is cut: who asks meanwhile wants the same.
         let mut meshes = set.meshes.cut.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(mesh) = meshes.get(&cut) {
+        if let Some(mesh) = meshes.iter().find(|mesh| mesh.cut == cut) {
             return Ok(Some(mesh.clone()));
         }
         let mesh = Arc::new(self.cut(set, cut)?);
-        meshes.insert(cut, mesh.clone());
+        if meshes.len() >= MAX_CUTS {
+            meshes.remove(0);
+        }
+        meshes.push(mesh.clone());
         Ok(Some(mesh))
     }
 

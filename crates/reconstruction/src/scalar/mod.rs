@@ -74,7 +74,7 @@ pub fn reconstruct(
 }
 
 /// As [`reconstruct`], but each ray is followed from where it enters the volume: what tile starts must not
-/// change, but for the space that no camera sees.
+/// change, but for the space that no camera sees. Of searches; what is drawn starts nowhere.
 #[must_use]
 pub fn reconstruct_from_entry(
     images: &[DepthImage],

@@ -62,6 +62,17 @@ fn nothing_seen_is_nothing_shown() {
     }
 }
 
+/// Bounds are free to choose: old cuts make room, and come back the same.
+#[test]
+fn many_bounds_take_turns() {
+    let set = stage(2).upload();
+    let counts = |px| reconstructor().mesh_statistics(&set, merged(px)).expect("statistics").map(|found| found.quads);
+    let bounds = [0.1, 0.2, 0.4, 0.8, 1.6, 3.2];
+    let first = bounds.map(counts);
+    assert!(first.is_sorted_by(|a, b| a >= b) && first[0] > first[5], "{first:?}");
+    assert_eq!(bounds.map(counts), first);
+}
+
 #[test]
 fn searches_have_no_mesh() {
     let set = stage(1).upload();
