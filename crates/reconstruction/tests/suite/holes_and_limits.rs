@@ -8,7 +8,7 @@ use crate::stage::{
     ALL_PLANES, CARVE, Corners, SAMPLE_PX, SEARCH, Stage, VIEW_PX, assert_sane, count, looking, reconstructor,
 };
 
-fn odd_cameras() -> Vec<(&'static str, PinholeCamera)> {
+pub fn odd_cameras() -> Vec<(&'static str, PinholeCamera)> {
     let size = UVec2::new(40, 30);
     let look = |eye: [f32; 3], target: [f32; 3]| looking(eye.into(), target.into(), 60.0, size);
     vec![

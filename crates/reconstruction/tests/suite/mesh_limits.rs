@@ -3,11 +3,12 @@
 use depth_image::{BACKGROUND_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, ProvenanceKind};
 use glam::{UVec2, Vec3};
 use reconstruction::{MeshStatistics, ReconstructionError};
-use scene::procedural::uv_sphere;
+use scene::procedural::{tree_terrain, uv_sphere};
 
 use crate::{
+    holes_and_limits::odd_cameras,
     meshes::{HYBRID, MESH, all_meshes, merged},
-    stage::{ALL_PLANES, CARVE, Corners, Stage, VIEW_PX, assert_sane, count, reconstructor},
+    stage::{ALL_PLANES, Agreement, CARVE, Corners, Stage, VIEW_PX, assert_sane, count, reconstructor},
 };
 
 fn corners() -> Corners {
@@ -71,6 +72,22 @@ fn many_bounds_take_turns() {
     let first = bounds.map(counts);
     assert!(first.is_sorted_by(|a, b| a >= b) && first[0] > first[5], "{first:?}");
     assert_eq!(bounds.map(counts), first);
+}
+
+/// From below, from within, from afar: quads before and behind the eye.
+#[test]
+fn drawn_views_from_anywhere_are_pictures() {
+    let corners = Corners { eye: Vec3::new(0.3, 2.2, 2.2), target: Vec3::Y * 0.3, half_m: 0.4 };
+    let stage = Stage::with_corners(tree_terrain(10_000, 1), &corners.samples(4));
+    let (names, cameras): (Vec<_>, Vec<_>) = odd_cameras().into_iter().unzip();
+    for method in all_meshes() {
+        for ((view, camera), name) in stage.views(&cameras, method).iter().zip(&cameras).zip(&names) {
+            assert_sane(view, &format!("{method}: {name}"));
+            let Agreement { kind, hits, close } = Agreement::of(view, &stage.twin(camera, method));
+            println!("{method:<16} {name:<28} {kind:.4} same kind, {hits} hits, {close:.4} close");
+            assert!(kind >= 0.99 && (hits == 0 || close >= 0.97), "{method} {name}: {kind} {close}");
+        }
+    }
 }
 
 #[test]
