@@ -77,7 +77,7 @@ impl GpuEngine {
     /// When there is no device or a shader is broken.
     pub fn open(preference: DevicePreference) -> Result<Self, EngineError> {
         let gpu = Gpu::open(preference).map_err(|error: GpuError| device(error))?;
-        let renderer = Arc::new(Renderer::new(&gpu).map_err(render_error)?);
+        let renderer = Arc::new(sampling::renderer(&gpu).map_err(render_error)?);
         Ok(Self {
             sampler: Sampler::sharing(renderer.clone()),
             reconstructor: Reconstructor::new(&gpu).map_err(reconstruction_error)?,
