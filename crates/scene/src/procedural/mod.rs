@@ -2,16 +2,19 @@
 //!
 //! The same arguments give the same scene, bit for bit, on the same build.
 
+mod blocks;
 mod courtyard;
 mod mesh_builder;
 mod noise;
 mod poles;
 mod rng;
 mod shapes;
+mod solids;
 mod terrain;
 mod tree;
 mod tree_terrain;
 
+pub use blocks::{BlocksViewpoints, blocks, blocks_viewpoints};
 pub use courtyard::courtyard;
 pub use poles::poles;
 pub use shapes::{checker_sphere, quad, unit_cube, uv_sphere};
@@ -21,7 +24,7 @@ use glam::Vec3;
 
 use crate::Scene;
 
-/// The small scene of one of [`crate::BUILT_IN_NAMES`], with its usual arguments; the cube for any other
+/// The scene of one of [`crate::BUILT_IN_NAMES`], with its usual arguments; the cube for any other
 /// name.
 pub(crate) fn by_name(name: &str) -> Scene {
     match name {
