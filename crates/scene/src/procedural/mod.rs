@@ -2,6 +2,7 @@
 //!
 //! The same arguments give the same scene, bit for bit, on the same build.
 
+mod bird_nest;
 mod blocks;
 mod courtyard;
 mod mesh_builder;
@@ -14,6 +15,7 @@ mod terrain;
 mod tree;
 mod tree_terrain;
 
+pub use bird_nest::bird_nest;
 pub use blocks::{BlocksViewpoints, blocks, blocks_viewpoints};
 pub use courtyard::courtyard;
 pub use poles::poles;
