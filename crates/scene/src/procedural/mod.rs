@@ -14,6 +14,7 @@ mod solids;
 mod terrain;
 mod tree;
 mod tree_terrain;
+mod urban;
 
 pub use bird_nest::bird_nest;
 pub use blocks::{BlocksViewpoints, blocks, blocks_viewpoints};
@@ -21,6 +22,7 @@ pub use courtyard::courtyard;
 pub use poles::poles;
 pub use shapes::{checker_sphere, quad, unit_cube, uv_sphere};
 pub use tree_terrain::tree_terrain;
+pub use urban::urban;
 
 use glam::Vec3;
 
