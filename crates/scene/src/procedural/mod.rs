@@ -5,6 +5,7 @@
 mod bird_nest;
 mod blocks;
 mod courtyard;
+mod grass;
 mod lone_tree;
 mod mesh_builder;
 mod noise;
@@ -20,6 +21,7 @@ mod urban;
 pub use bird_nest::bird_nest;
 pub use blocks::{BlocksViewpoints, blocks, blocks_viewpoints};
 pub use courtyard::courtyard;
+pub use grass::{GrassDensity, grass};
 pub use lone_tree::lone_tree;
 pub use poles::poles;
 pub use shapes::{checker_sphere, quad, unit_cube, uv_sphere};
