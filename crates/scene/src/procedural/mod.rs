@@ -41,6 +41,10 @@ pub(crate) fn by_name(name: &str) -> Scene {
         "checker-sphere" => checker_sphere(),
         "poles" => poles(0.02),
         "courtyard" => courtyard(),
+        "blocks" => blocks(),
+        "bird-nest" => bird_nest(),
+        "urban" => urban(),
+        "tree" => lone_tree(),
         _ => unit_cube(),
     }
 }
