@@ -28,8 +28,8 @@ pub const NEAR_OF_DIAGONAL: f32 = 1e-3;
 /// Which scene, sampled and shown how.
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
-    /// A scene by name (tree-terrain-30k, -125k, -500k, -2m, each also with -wind; courtyard, uv-sphere…) or a
-    /// file (.gltf, .glb, .obj, .ply)
+    /// A scene by name (tree-terrain-30k, -125k, -500k, -2m, each also with -wind; bird-nest, urban, tree, grass or
+    /// grass:DENSITY, blocks, courtyard, uv-sphere…) or a file (.gltf, .glb, .obj, .ply)
     #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
     pub scene: SceneSpec,
     /// How surfaces are lit, in terms with commas between them: unlit, phong, shadows or soft N (rays a light);

@@ -74,7 +74,7 @@ const GAPS: &str = "poles";
 
 /// Sweeps a scene with disocclusions.
 pub fn gaps(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
-    sweep_scene(GAPS, GAPS.parse().unwrap_or_else(|never| match never {}), args, engine, report)
+    sweep_scene(GAPS, GAPS.parse()?, args, engine, report)
 }
 
 fn sweep_scene(
