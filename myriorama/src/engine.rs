@@ -200,7 +200,10 @@ impl Engine for GpuEngine {
             method: parsed("sampling_method", &request.sampling)?,
             planes: SamplePlanes { specular: true, ..SamplePlanes::default() },
         };
-        self.sampler.sample(&work).map_err(|SamplingError::Render(error)| render_error(error))
+        self.sampler.sample(&work).map_err(|error| match error {
+            SamplingError::Render(error) => render_error(error),
+            SamplingError::Layer { .. } => invalid("sample_cameras", error),
+        })
     }
 
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {

@@ -5,6 +5,7 @@ mod method;
 mod non_redundant;
 mod rig;
 mod sampler;
+pub mod scalar;
 
 pub use method::{Redundancy, SamplingMethod, UnknownSampling};
 pub use rig::{Rig, RigError};
