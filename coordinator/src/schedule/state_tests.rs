@@ -35,6 +35,7 @@ fn opening(session: u64, policy: PolicyChoice) -> Event {
         reconstruct_view_s: 0.01,
         load_set_s: 0.0,
         encode_view_s: 0.0,
+        in_order: false,
     };
     Event::Opened(Box::new(Opening { session, workload, views_per_set: 40, policy, forced_samplers: None, costs }))
 }

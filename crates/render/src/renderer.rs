@@ -119,7 +119,8 @@ struct Batch<'a> {
 struct Chain<'a> {
     leave_out: LeaveOut,
     known: &'a Known,
-    /// The place in the set of the batch's first camera.
+    /// Places in the set of the images to be drawn, and which of them is the batch's first.
+    wanted: &'a [u32],
     first: usize,
     /// Whether what the images hold is kept for those after them.
     keep: bool,
@@ -192,7 +193,7 @@ impl Renderer {
         Ok(images)
     }
 
-    /// As [`Renderer::draw_depth_images`], but each image leaves out what a test says that the images before it
+    /// As [`Renderer::draw_depth_images`] for the `wanted` of `cameras`, but each image leaves out what a test says that the images before it
     /// hold, and shows what lies behind. What its rays went through is in [`DepthImage::passed`]; a texel behind
     /// whose left-out surfaces lies nothing is a hole.
     ///
@@ -202,13 +203,15 @@ impl Renderer {
         &self,
         work: DrawWork<'_>,
         cameras: &[Camera],
+        wanted: &[u32],
         planes: SamplePlanes,
         leave_out: LeaveOut,
     ) -> Result<Vec<DepthImage>, RenderError> {
-        let pinholes = pinholes(cameras);
-        self.check(&pinholes)?;
-        let known = Known::of(&self.gpu, &pinholes, leave_out)?;
-        let chain = Chain { leave_out, known: &known, first: 0, keep: !leave_out.traces_rays };
+        let all = pinholes(cameras);
+        self.check(&all)?;
+        let known = Known::of(&self.gpu, &all, leave_out)?;
+        let chain = Chain { leave_out, known: &known, wanted, first: 0, keep: !leave_out.traces_rays };
+        let pinholes: Vec<PinholeCamera> = wanted.iter().map(|&number| all[number as usize]).collect();
         let mut images = self.images(work, &pinholes, planes, Some(chain))?;
         if planes.corners {
             // Where pixels are compared with the same pixel, corners are compared with corners.
@@ -420,7 +423,7 @@ impl Renderer {
         let shading = batch.finish.shading;
         let surface_id = !chain.leave_out.traces_rays || batch.finish.surface_id;
         for (place, (camera, target)) in batch.cameras.iter().zip(surfaces).enumerate() {
-            let earlier = chain.first + place;
+            let earlier = chain.wanted[chain.first + place] as usize;
             let leave_out = (earlier > 0).then_some((chain.leave_out, chain.known, &*left_out[place]));
             let target = std::slice::from_ref(target);
             match &batch.traced {

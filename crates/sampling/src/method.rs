@@ -3,6 +3,7 @@
 use std::{fmt, str::FromStr};
 
 use depth_image::PinholeCamera;
+use render::LeaveOut;
 
 use crate::{depth_peeling, non_redundant};
 
@@ -66,17 +67,17 @@ impl SamplingMethod {
     /// Whether an image can only be taken after those before it: then a set's images are taken on one node.
     #[must_use]
     pub fn is_chained(self) -> bool {
-        match self {
-            Self::Conventional => false,
-            Self::NonRedundant(redundancy) => !non_redundant::test(redundancy).traces_rays,
-            Self::DepthPeeling { .. } => true,
-        }
+        self.leave_out().is_some_and(|test| !test.traces_rays)
     }
 
-    /// Whether an image depends on the cameras before its own, be it on their places alone.
+    /// By which test an image leaves out what others hold.
     #[must_use]
-    pub fn needs_earlier_cameras(self) -> bool {
-        self != Self::Conventional
+    pub fn leave_out(self) -> Option<LeaveOut> {
+        match self {
+            Self::Conventional => None,
+            Self::NonRedundant(redundancy) => Some(non_redundant::test(redundancy)),
+            Self::DepthPeeling { .. } => Some(depth_peeling::TEST),
+        }
     }
 }
 

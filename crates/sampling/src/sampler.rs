@@ -6,7 +6,7 @@ use depth_image::{Camera, DepthImage};
 use gpu::Gpu;
 use render::{DrawWork, RenderError, Renderer, SamplePlanes};
 
-use crate::{SamplingMethod, depth_peeling, non_redundant};
+use crate::{SamplingMethod, depth_peeling};
 
 /// Why samples could not be taken.
 #[derive(Debug, thiserror::Error)]
@@ -20,6 +20,16 @@ pub enum SamplingError {
         /// Its place in the request.
         index: usize,
     },
+    /// A camera that is not there, or a part of a chain.
+    #[error("image {index} is not among the {cameras} of the set, or not wanted with all others by {method}")]
+    Wanted {
+        /// The first such.
+        index: u32,
+        /// Of the set.
+        cameras: usize,
+        /// Which takes its images in order.
+        method: SamplingMethod,
+    },
 }
 
 /// What to sample.
@@ -27,8 +37,10 @@ pub enum SamplingError {
 pub struct SampleWork<'a> {
     /// Of what, lit how.
     pub draw: DrawWork<'a>,
-    /// One image each. What a later one leaves out depends on those before it.
+    /// Of the whole set: what a later image leaves out depends on those before it.
     pub cameras: &'a [Camera],
+    /// Which images are taken. Images in a chain are taken all together.
+    pub wanted: &'a [u32],
     /// Which samples are taken.
     pub method: SamplingMethod,
     /// Planes beside colour and depth.
@@ -55,22 +67,32 @@ impl Sampler {
         Self { renderer }
     }
 
-    /// One depth image a camera, in their order.
+    /// The wanted depth images, in their order.
     ///
     /// # Errors
     /// A camera that is not valid or does not go with the method, or the device.
     pub fn sample(&self, work: &SampleWork<'_>) -> Result<Vec<DepthImage>, SamplingError> {
-        let leave_out = match work.method {
-            SamplingMethod::Conventional => {
-                return Ok(self.renderer.draw_depth_images(work.draw, work.cameras, work.planes)?);
-            }
-            SamplingMethod::NonRedundant(redundancy) => non_redundant::test(redundancy),
-            SamplingMethod::DepthPeeling { .. } => {
-                depth_peeling::check(work.cameras)?;
-                depth_peeling::TEST
-            }
+        check_wanted(work)?;
+        if let SamplingMethod::DepthPeeling { .. } = work.method {
+            depth_peeling::check(work.cameras)?;
+        }
+        let Some(leave_out) = work.method.leave_out() else {
+            let cameras: Vec<Camera> = work.wanted.iter().map(|&index| work.cameras[index as usize]).collect();
+            return Ok(self.renderer.draw_depth_images(work.draw, &cameras, work.planes)?);
         };
-        Ok(self.renderer.draw_depth_images_apart(work.draw, work.cameras, work.planes, leave_out)?)
+        Ok(self.renderer.draw_depth_images_apart(work.draw, work.cameras, work.wanted, work.planes, leave_out)?)
+    }
+}
+
+/// Of a chain all are wanted, in their order.
+fn check_wanted(work: &SampleWork<'_>) -> Result<(), SamplingError> {
+    let cameras = work.cameras.len();
+    let all = || (0..cameras as u32).eq(work.wanted.iter().copied());
+    let missing = work.wanted.iter().copied().find(|&index| index as usize >= cameras);
+    let broken = (work.method.is_chained() && !all()).then(|| work.wanted.first().copied().unwrap_or(0));
+    match missing.or(broken) {
+        Some(index) => Err(SamplingError::Wanted { index, cameras, method: work.method }),
+        None => Ok(()),
     }
 }
 

@@ -39,8 +39,9 @@ fn taken(
 ) -> Result<Vec<DepthImage>, SamplingError> {
     let draw =
         DrawWork { scene, lighting: Lighting::PHONG, scene_time_s: 0.0, visibility, refinement: Refinement::default() };
+    let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
-    device().1.sample(&SampleWork { draw, cameras: &cameras, method, planes: ALL })
+    device().1.sample(&SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes: ALL })
 }
 
 fn sample(scene: &GpuScene, cameras: &[PinholeCamera], method: SamplingMethod) -> Vec<DepthImage> {
@@ -208,4 +209,32 @@ fn who_sees_nothing_has_nothing() {
             assert!(images.iter().flat_map(|image| &image.inverse_depth_per_m).all(|d| d.is_finite()), "{method}");
         }
     }
+}
+
+/// By visibility each image can be taken alone; a chain cannot be taken in parts.
+#[test]
+fn what_needs_no_earlier_image_can_be_taken_apart() {
+    let scene = poles(0.02);
+    let on_device = upload(&scene);
+    let cameras = two_plane(&scene);
+    let method = SamplingMethod::NonRedundant(Redundancy::Visibility);
+    let whole = sample(&on_device, &cameras, method);
+    let draw = DrawWork {
+        scene: &on_device,
+        lighting: Lighting::PHONG,
+        scene_time_s: 0.0,
+        visibility: Visibility::Measured,
+        refinement: Refinement::default(),
+    };
+    let cameras: Vec<Camera> = cameras.into_iter().map(Camera::Pinhole).collect();
+    let part = |wanted: &[u32], method| {
+        device().1.sample(&SampleWork { draw, cameras: &cameras, wanted, method, planes: ALL })
+    };
+    assert_eq!(part(&[3, 1], method).expect("two images"), [whole[3].clone(), whole[1].clone()]);
+    for (wanted, method) in [(&[0, 1][..], SamplingMethod::default()), (&[4], method)] {
+        let allowed = wanted.iter().all(|&index| index < 4);
+        assert_eq!(part(wanted, method).is_ok(), allowed);
+    }
+    let chained = SamplingMethod::NonRedundant(Redundancy::Pixel);
+    assert!(matches!(part(&[1, 2], chained), Err(SamplingError::Wanted { index: 1, cameras: 4, .. })));
 }

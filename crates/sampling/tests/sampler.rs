@@ -37,7 +37,9 @@ fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, S
         visibility: Visibility::Triangles,
         refinement: Refinement::default(),
     };
-    device().sampler.sample(&SampleWork { draw, cameras, method: SamplingMethod::Conventional, planes })
+    let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
+    let method = SamplingMethod::Conventional;
+    device().sampler.sample(&SampleWork { draw, cameras, wanted: &wanted, method, planes })
 }
 
 /// More than one submission holds, of two sizes.

@@ -73,7 +73,7 @@ fn an_image_survives() {
 /// As an image that leaves out what others hold has them.
 fn apart(width: u32, height: u32) -> DepthImage {
     let image = image(width, height);
-    let passed = Some(image.inverse_depth_per_m.iter().map(|&d| d < 0.0 || d > 0.3).collect());
+    let passed = Some(image.inverse_depth_per_m.iter().map(|d| !(0.0..=0.3).contains(d)).collect());
     let corner_inverse_depth_per_m = Some(tree_over_terrain(width as usize + 1, height as usize + 1, 4));
     DepthImage { passed, corner_inverse_depth_per_m, ..image }
 }

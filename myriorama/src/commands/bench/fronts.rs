@@ -86,7 +86,7 @@ fn sweep_scene(
 ) -> anyhow::Result<()> {
     let scene = SceneArgs { lighting: args.scene.lighting, ..SceneArgs::of(spec) };
     let setup = scene.load()?;
-    let cell = ViewCell::between(&setup.samples).context("no sample cameras")?;
+    let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
     let truth = Truth::take(engine, &setup, &scene, cell.spread(args.compared_views(), VIEW_SIZE_PX))?;
     compare(name, &truth, args, report)
 }
