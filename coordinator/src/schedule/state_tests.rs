@@ -72,7 +72,7 @@ fn every_member_has_a_role() {
 fn one_node_has_both_roles() {
     let commands = cluster(1).step(opening(1, PolicyChoice::Pipeline));
     let plan = applied(&commands);
-    assert_eq!((plan.images_of("n0").len(), plan.composites("n0")), (4, true));
+    assert_eq!((plan.images_of("n0", 0).len(), plan.composites("n0")), (4, true));
 }
 
 #[test]
