@@ -4,6 +4,7 @@ mod batches;
 mod closed_form;
 mod failures;
 mod holes_and_limits;
+mod non_redundant;
 mod specular;
 mod stage;
 mod twins;

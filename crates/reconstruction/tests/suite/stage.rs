@@ -9,7 +9,7 @@ use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use metrics::Rgb8Image;
 use reconstruction::{ReconstructionMethod, Reconstructor, SampleSet, SetDescription};
-use render::{DrawWork, GpuScene, Lighting, Refinement, Renderer, SamplePlanes, Visibility};
+use render::{DrawWork, GpuScene, LeaveOut, Lighting, Refinement, Renderer, SamplePlanes, Visibility};
 use scene::Scene;
 
 pub const SAMPLE_PX: UVec2 = UVec2::new(96, 72);
@@ -17,6 +17,9 @@ pub const VIEW_PX: UVec2 = UVec2::new(64, 48);
 pub const CARVE: ReconstructionMethod = ReconstructionMethod::JointCarve { stop_level: 0 };
 pub const SEARCH: ReconstructionMethod = ReconstructionMethod::LightFieldSearch { steps: 64 };
 pub const ALL_PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: true };
+
+/// By which images leave out what those before them hold: the test of sampling `non_redundant:pixel`.
+const APART: (&str, &str) = ("apart.wgsl", include_str!("../../../sampling/src/non_redundant_pixel.wgsl"));
 
 struct Device {
     gpu: Arc<Gpu>,
@@ -29,7 +32,7 @@ fn device() -> &'static Device {
     static DEVICE: OnceLock<Device> = OnceLock::new();
     DEVICE.get_or_init(|| {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let renderer = Renderer::new(&gpu).expect("a renderer");
+        let renderer = Renderer::with_tests(&gpu, &[APART]).expect("a renderer");
         let reconstructor = Reconstructor::new(&gpu).expect("a reconstructor");
         Device { gpu, renderer, reconstructor }
     })
@@ -59,6 +62,18 @@ impl Stage {
         let images = depth_images(&scene, cameras);
         let volume = scene.bounds();
         Self { scene, images, volume }
+    }
+
+    /// Of images that leave out what those before them hold.
+    pub fn apart(scene: Scene, cameras: &[PinholeCamera]) -> Self {
+        let on_device = GpuScene::upload(&device().gpu, &scene).expect("a scene");
+        let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
+        let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
+        let leave_out = LeaveOut { shader: APART.0, traces_rays: false, from_one_place: false };
+        let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
+        let work = plainly_lit(&on_device);
+        let images = device().renderer.draw_depth_images_apart(work, &cameras, &wanted, planes, leave_out);
+        Self { images: images.expect("depth images"), volume: scene.bounds(), scene }
     }
 
     pub fn upload(&self) -> SampleSet {
