@@ -20,7 +20,7 @@ pub(crate) async fn fetch_set(
     deadlines: Deadlines,
 ) -> Result<SampleSet, Status> {
     let mut fetches = JoinSet::new();
-    for share in plan.samplers.iter().cloned() {
+    for share in plan.samplers_of(set_index).iter().cloned() {
         let (plan, connections) = (plan.clone(), connections.clone());
         fetches.spawn(async move {
             let images = fetch_share(&plan, set_index, &share, &connections, deadlines).await;

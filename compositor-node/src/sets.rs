@@ -11,8 +11,8 @@ use wire::{Assignment, SetContent};
 
 use crate::fetch::fetch_set;
 
-/// The one that is shown, the next, and one that late views still need.
-const KEPT_SETS: usize = 3;
+/// The one that is shown and one that late views still need; besides those that are fetched ahead.
+const KEPT_SETS: usize = 2;
 
 /// A complete set, ready to be reconstructed from.
 pub(crate) type ReadySet = Arc<dyn UploadedSet>;
@@ -32,19 +32,34 @@ impl Sets {
         Self { engine, connections: Arc::default(), deadlines, kept: Mutex::default() }
     }
 
-    /// A set, once it is completely there; the one after it is then fetched ahead, so that samplers
-    /// work on it while this one is shown.
+    /// A set, once it is completely there; those after it are then fetched ahead, so that samplers
+    /// work on them while this one is shown: as many as are sampled at once.
     pub(crate) async fn get(self: &Arc<Self>, plan: &Arc<Assignment>, set_index: u32) -> Result<ReadySet, Status> {
+        let in_turn = plan.sets_at_once() > 1;
+        if in_turn {
+            self.fetch_ahead(plan, set_index);
+        }
         let set = self.load(plan, set_index).await?;
-        let (sets, plan, next) = (self.clone(), plan.clone(), set_index + 1);
-        if next < plan.workload.timeline.set_count && plan.set_content(next) != plan.set_content(set_index) {
+        if !in_turn {
+            self.fetch_ahead(plan, set_index);
+        }
+        Ok(set)
+    }
+
+    /// Where sets are sampled in turn, the others' samplers need not wait for this one's.
+    fn fetch_ahead(self: &Arc<Self>, plan: &Arc<Assignment>, set_index: u32) {
+        let last = plan.workload.timeline.set_count.saturating_sub(1);
+        for next in set_index.saturating_add(1)..=last.min(set_index.saturating_add(plan.sets_at_once())) {
+            if plan.set_content(next) == plan.set_content(set_index) {
+                continue;
+            }
+            let (sets, plan) = (self.clone(), plan.clone());
             tokio::spawn(async move {
                 if let Err(status) = sets.load(&plan, next).await {
                     tracing::debug!(set_index = next, reason = status.message(), "not fetched ahead");
                 }
             });
         }
-        Ok(set)
     }
 
     /// Loads once, however many wait; goes on when the first of them leaves.
@@ -52,7 +67,7 @@ impl Sets {
         let content = plan
             .set_content(set_index)
             .ok_or_else(|| Status::invalid_argument(format!("set_index {set_index} is beyond the timeline")))?;
-        let cell = self.cell(content);
+        let cell = self.cell(content, KEPT_SETS + plan.sets_at_once() as usize);
         if let Some(set) = cell.get() {
             return Ok(set.clone());
         }
@@ -74,13 +89,13 @@ impl Sets {
         Ok(ready)
     }
 
-    fn cell(&self, content: SetContent) -> Cell {
+    fn cell(&self, content: SetContent, most: usize) -> Cell {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let at = kept.iter().position(|(other, _)| *other == content);
         let entry = at.and_then(|at| kept.remove(at)).unwrap_or_else(|| (content, Cell::default()));
         let cell = entry.1.clone();
         kept.push_back(entry);
-        if kept.len() > KEPT_SETS {
+        while kept.len() > most {
             kept.pop_front();
         }
         cell

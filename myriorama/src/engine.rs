@@ -14,7 +14,7 @@ use render::{
     AccelerationReport, Choice, DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, SamplePlanes,
     Visibility,
 };
-use sampling::{Sampler, SamplingError};
+use sampling::{Sampler, SamplingError, SamplingMethod};
 use scene::{Limits, Scene};
 
 /// Scenes that stay on the device; the one that was loaded first goes first.
@@ -77,7 +77,7 @@ impl GpuEngine {
     /// When there is no device or a shader is broken.
     pub fn open(preference: DevicePreference) -> Result<Self, EngineError> {
         let gpu = Gpu::open(preference).map_err(|error: GpuError| device(error))?;
-        let renderer = Arc::new(Renderer::new(&gpu).map_err(render_error)?);
+        let renderer = Arc::new(sampling::renderer(&gpu).map_err(render_error)?);
         Ok(Self {
             sampler: Sampler::sharing(renderer.clone()),
             reconstructor: Reconstructor::new(&gpu).map_err(reconstruction_error)?,
@@ -162,6 +162,11 @@ impl GpuEngine {
     }
 }
 
+/// What images must have for views to be reconstructed from them.
+fn planes_for(_method: ReconstructionMethod) -> SamplePlanes {
+    SamplePlanes { specular: true, ..SamplePlanes::default() }
+}
+
 fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {
     let (visibility, refinement) = (Visibility::Measured, Refinement::default());
     DrawWork { scene, lighting, scene_time_s, visibility, refinement }
@@ -187,6 +192,10 @@ impl Engine for GpuEngine {
         locked(&self.scenes).iter().any(|(kept, _)| kept == hash)
     }
 
+    fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError> {
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.is_chained())
+    }
+
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
         let scene = self.scene(&request.scene_hash)?;
         let wire::Refinement { step, steps } = request.refinement;
@@ -194,13 +203,19 @@ impl Engine for GpuEngine {
             refinement: Refinement { step, steps },
             ..draw_work(&scene, parsed("lighting", &request.lighting)?, request.scene_time_s)
         };
+        let method: ReconstructionMethod = parsed("reconstruction_method", &request.method)?;
         let work = sampling::SampleWork {
             draw,
             cameras: &request.cameras,
+            wanted: &request.wanted,
             method: parsed("sampling_method", &request.sampling)?,
-            planes: SamplePlanes { specular: true, ..SamplePlanes::default() },
+            planes: planes_for(method),
         };
-        self.sampler.sample(&work).map_err(|SamplingError::Render(error)| render_error(error))
+        self.sampler.sample(&work).map_err(|error| match error {
+            SamplingError::Render(error) => render_error(error),
+            SamplingError::Layer { .. } => invalid("sample_cameras", error),
+            SamplingError::Wanted { .. } => invalid("image_indices", error),
+        })
     }
 
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {

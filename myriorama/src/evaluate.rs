@@ -80,8 +80,10 @@ impl Truth {
         let samples = setup.samples.iter().copied().map(Camera::Pinhole).collect();
         let work = SampleWork {
             scene_hash: hash.clone(),
+            wanted: (0..setup.samples.len() as u32).collect(),
             cameras: samples,
             sampling: args.sampling.to_string(),
+            method: args.method.to_string(),
             lighting: lighting.clone(),
             scene_time_s: 0.0,
             refinement: wire::Refinement::default(),

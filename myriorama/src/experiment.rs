@@ -90,7 +90,7 @@ impl Experiment {
         if !self.given_views.is_empty() {
             return Ok(self.given_views.iter().copied().cycle().take(count).collect());
         }
-        let cell = ViewCell::between(&self.setup.samples).context("no sample cameras")?;
+        let cell = ViewCell::between(&self.setup.around).context("no sample cameras")?;
         Ok(cell.spread(count, VIEW_SIZE_PX))
     }
 

@@ -28,8 +28,8 @@ pub const NEAR_OF_DIAGONAL: f32 = 1e-3;
 /// Which scene, sampled and shown how.
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
-    /// A scene by name (tree-terrain-30k, -125k, -500k, -2m, each also with -wind; courtyard, uv-sphere…) or a
-    /// file (.gltf, .glb, .obj, .ply)
+    /// A scene by name (tree-terrain-30k, -125k, -500k, -2m, each also with -wind; bird-nest, urban, tree, grass or
+    /// grass:DENSITY, blocks, courtyard, uv-sphere…) or a file (.gltf, .glb, .obj, .ply)
     #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
     pub scene: SceneSpec,
     /// How surfaces are lit, in terms with commas between them: unlit, phong, shadows or soft N (rays a light);
@@ -46,9 +46,11 @@ pub struct SceneArgs {
     #[arg(long, value_name = "V[/V]")]
     pub environment: Option<EnvironmentSpec>,
     /// How views are reconstructed: joint_carve, joint_carve:LEVEL, light_field_search or light_field_search:STEPS
-    #[arg(long, default_value_t, value_name = "NAME")]
+    #[arg(long, visible_alias = "reconstruction", default_value_t, value_name = "NAME")]
     pub method: ReconstructionMethod,
-    /// Which samples are taken
+    /// Which samples are taken: conventional (all that is seen); non_redundant:pixel, :visibility or :tolerance
+    /// (what no image before holds; non_redundant is :tolerance); or depth_peeling:LAYERS (layer behind layer, from
+    /// the middle)
     #[arg(long, default_value_t, value_name = "NAME")]
     pub sampling: SamplingMethod,
     /// Size of the sample images [default: 400x300, or as in --samples]
@@ -64,7 +66,9 @@ pub struct SceneArgs {
 pub struct Setup {
     /// The scene.
     pub scene: Scene,
-    /// Where it is sampled from.
+    /// The cameras that views stand between.
+    pub around: Vec<PinholeCamera>,
+    /// Where it is sampled from: there too, unless the sampling method has another place.
     pub samples: Vec<PinholeCamera>,
     /// What a coordinator is given.
     pub offer: SceneOffer,
@@ -101,7 +105,8 @@ impl SceneArgs {
     pub fn load_changed(&self, change: impl FnOnce(&mut Scene)) -> anyhow::Result<Setup> {
         let mut scene = self.load_scene()?;
         change(&mut scene);
-        let samples = self.sample_cameras(&scene)?;
+        let around = self.sample_cameras(&scene)?;
+        let samples = self.sampling.cameras(around.clone());
         let rig = samples.iter().copied().map(Camera::Pinhole).collect();
         let package = scene::pack(&scene).bytes.into();
         let mut offer = SceneOffer::new(package, rig, scene.bounds(), scene.background_linear);
@@ -112,7 +117,7 @@ impl SceneArgs {
             sampling: self.sampling.to_string(),
             lighting: self.lighting.to_string(),
         };
-        Ok(Setup { scene, samples, offer })
+        Ok(Setup { scene, around, samples, offer })
     }
 
     fn load_scene(&self) -> anyhow::Result<Scene> {

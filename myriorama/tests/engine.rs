@@ -70,7 +70,9 @@ fn what_it_does_not_know_is_named() {
             .sample(&SampleWork {
                 scene_hash: scene_hash.to_owned(),
                 cameras: samples.clone(),
+                wanted: vec![0, 1],
                 sampling: sampling.to_owned(),
+                method: "joint_carve".to_owned(),
                 lighting: lighting.to_owned(),
                 scene_time_s: 0.0,
                 refinement: wire::Refinement::default(),

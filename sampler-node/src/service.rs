@@ -31,7 +31,7 @@ impl SamplerService {
         let beyond = || Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"));
         let content = plan.set_content(set_index).ok_or_else(beyond)?;
         let scene_time_s = plan.workload.timeline.time_s(set_index).ok_or_else(beyond)?;
-        let indices = plan.images_of(self.plan.node_name()).to_vec();
+        let indices = plan.images_of(self.plan.node_name(), set_index).to_vec();
         let work = sample_work(plan, &indices, scene_time_s, plan.workload.refinement(set_index))?;
         let engine = self.engine.clone();
         let key = (content, indices.clone());
@@ -43,7 +43,7 @@ impl SamplerService {
 impl Sampler for SamplerService {
     async fn fetch_sample_images(&self, request: FetchImages) -> Result<Messages<Chunk>, Status> {
         let plan = self.plan.require(request.plan_epoch)?;
-        let own = plan.images_of(self.plan.node_name());
+        let own = plan.images_of(self.plan.node_name(), request.set_index);
         if let Some(index) = request.image_indices.iter().find(|index| !own.contains(index)) {
             return Err(Status::invalid_argument(format!(
                 "image_indices: {index} is not sampled by {}",
@@ -66,13 +66,15 @@ fn sample_work(
     scene_time_s: f32,
     refinement: Refinement,
 ) -> Result<SampleWork, Status> {
-    let cameras = indices.iter().map(|&index| plan.workload.sample_cameras.get(index as usize).copied());
+    if indices.iter().any(|&index| index as usize >= plan.workload.sample_cameras.len()) {
+        return Err(Status::internal("image_indices beyond the sample cameras"));
+    }
     Ok(SampleWork {
         scene_hash: plan.workload.scene.hash.to_string(),
-        cameras: cameras
-            .collect::<Option<_>>()
-            .ok_or_else(|| Status::internal("image_indices beyond the sample cameras"))?,
+        cameras: plan.workload.sample_cameras.clone(),
+        wanted: indices.to_vec(),
         sampling: plan.workload.sampling.clone(),
+        method: plan.workload.method.clone(),
         lighting: plan.workload.lighting.clone(),
         scene_time_s,
         refinement,

@@ -206,17 +206,25 @@ impl Engine for ScalarEngine {
         locked(&self.scenes).contains(hash)
     }
 
+    fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError> {
+        match sampling {
+            "in_order" => Ok(true),
+            _ => known("sampling", sampling, "conventional").map(|()| false),
+        }
+    }
+
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
         self.loaded(&request.scene_hash)?;
-        known("sampling", &request.sampling, "conventional")?;
+        self.samples_in_order(&request.sampling)?;
         known("lighting", &request.lighting, "unlit")?;
-        for Camera::Pinhole(camera) in &request.cameras {
+        let cameras: Vec<&Camera> = request.wanted.iter().map(|&index| &request.cameras[index as usize]).collect();
+        for Camera::Pinhole(camera) in &cameras {
             let eye = camera.eye_in_world.to_array().map(f32::to_bits);
             let image = (eye, request.scene_time_s.to_bits(), request.refinement);
             *locked(&self.counts).entry(image).or_default() += 1;
         }
         let image = |camera| depth_image(camera, request.scene_time_s, request.refinement);
-        Ok(request.cameras.iter().map(image).collect())
+        Ok(cameras.into_iter().map(image).collect())
     }
 
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {

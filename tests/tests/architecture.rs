@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 use reconstruction::ReconstructionMethod;
-use sampling::SamplingMethod;
+use sampling::{Redundancy, SamplingMethod};
 
 /// Which crates of the workspace each one may use, in programs and build scripts. What is not here is not
 /// allowed.
@@ -295,7 +295,9 @@ fn next_reconstruction(method: Option<ReconstructionMethod>) -> Option<Reconstru
 fn next_sampling(method: Option<SamplingMethod>) -> Option<SamplingMethod> {
     match method {
         None => Some(SamplingMethod::Conventional),
-        Some(SamplingMethod::Conventional) => None,
+        Some(SamplingMethod::Conventional) => Some(SamplingMethod::NonRedundant(Redundancy::default())),
+        Some(SamplingMethod::NonRedundant(_)) => Some(SamplingMethod::DepthPeeling { layers: 4 }),
+        Some(SamplingMethod::DepthPeeling { .. }) => None,
     }
 }
 
@@ -313,7 +315,7 @@ fn methods() -> Vec<String> {
 fn every_method_has_its_page() {
     const PARTS: [&str; 4] = ["## Source", "## Equations", "## Cost", "## Known failures"];
     let folder = root().join("docs/methods");
-    assert_eq!(methods().len(), 6);
+    assert_eq!(methods().len(), 8);
     for name in methods() {
         let page = folder.join(format!("{name}.md"));
         let text = fs::read_to_string(&page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));

@@ -89,6 +89,36 @@ async fn every_k_gives_the_same_pictures() {
     assert!(error.contains("forced_sampler_count is 4, at most 3"), "{error}");
 }
 
+/// Whole sets in turn: each image once, whatever K, and the same pictures.
+#[tokio::test(flavor = "multi_thread")]
+async fn sets_that_are_sampled_in_order_stay_on_one_node() {
+    let cluster = Cluster::start(4).await;
+    let mut pictures = Vec::new();
+    for k in 1..=3 {
+        let in_order = SessionRequest {
+            sampling: "in_order".to_owned(),
+            forced_sampler_count: Some(k),
+            ..request(PolicyChoice::Pipeline, MOVING)
+        };
+        let session = cluster.session(in_order).await.unwrap();
+        let samplers = session.plan().assignment.samplers.clone();
+        assert_eq!(samplers.len(), k as usize);
+        assert!(samplers.iter().all(|share| share.image_indices == [0, 1, 2]), "{samplers:?}");
+        let mut frames = session.render_views(views(3, 4)).unwrap().all().await.unwrap();
+        frames.sort_by_key(|frame| frame.request.frame);
+        assert!(cluster.take_counts().iter().all(|&times| times == 1), "no image twice in a session");
+        pictures.push(frames.into_iter().map(|frame| frame.view).collect::<Vec<_>>());
+    }
+    assert!(pictures[0] == pictures[1] && pictures[1] == pictures[2]);
+    let still = SessionRequest {
+        sampling: "in_order".to_owned(),
+        forced_sampler_count: Some(2),
+        ..request(PolicyChoice::Pipeline, Timeline::still(0.0))
+    };
+    let error = cluster.session(still).await.unwrap_err().to_string();
+    assert!(error.contains("at most 1"), "one still set is sampled by one node: {error}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn direct_draws_on_every_node_and_samples_nothing() {
     let cluster = Cluster::start(3).await;

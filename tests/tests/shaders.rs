@@ -8,7 +8,8 @@ use minijinja::context;
 use naga::front::wgsl::{Frontend, Options};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use reconstruction::{MAX_SAMPLE_CAMERAS, ShaderKey, shader_text};
-use render::{Domain, Form, Pass, Shading, ShadowRays};
+use render::{Domain, Form, LeaveOut, Pass, Shading, ShadowRays};
+use sampling::SamplingMethod;
 
 const CAMERAS: [usize; 4] = [1, 2, 4, MAX_SAMPLE_CAMERAS];
 /// The command line's: `joint_carve:0` to `joint_carve:8`.
@@ -62,6 +63,7 @@ fn forms(key: ShaderKey) -> Vec<ShaderKey> {
             .map(|(highlight, lights, visibility_words)| ShaderKey { highlight, lights, visibility_words, ..key })
             .collect(),
         "quads.wgsl" | "quad_indices.wgsl" => [false, true].map(|hybrid| ShaderKey { hybrid, ..key }).to_vec(),
+        "resolve.wgsl" => [false, true].map(|holes| ShaderKey { holes, ..key }).to_vec(),
         _ => vec![key],
     }
 }
@@ -81,18 +83,39 @@ fn reconstruction_shaders_are_valid_for_every_number_of_cameras() {
 
 #[test]
 fn raster_shader_is_valid_in_every_form() {
-    let templates = Templates::new(render::SHADERS).expect("templates");
+    let templates = drawing_templates();
     for bits in 0..256u32 {
         let bit = |place: u32| bits >> place & 1 == 1;
         for shading in ["unlit", "blinn_phong", "ggx"] {
             let form = context! {
                 shading, surface_id => bit(0), wind => bit(1), double_sided => bit(2), alpha_tested => bit(3),
                 textured => bit(4), coat_textured => bit(5), unlit => bit(6), specular => bit(7),
+                leave_out => (), test_traces_rays => false, earlier => 0, known_group => 3,
             };
             let text = templates.render("raster.wgsl", form).unwrap_or_else(|error| panic!("{bits:#b}: {error}"));
             assert_eq!(entries("raster.wgsl", &text), ["vertex", "fragment"], "{bits:#b}");
         }
     }
+}
+
+#[test]
+fn raster_shader_is_valid_with_every_test_of_what_is_left_out() {
+    let templates = drawing_templates();
+    for test in leave_outs().into_iter().filter(|test| !test.traces_rays) {
+        for (earlier, wind) in [(1, false), (3, true), (15, false)] {
+            let form = context! {
+                shading => "ggx", surface_id => true, wind, double_sided => true, alpha_tested => true,
+                textured => true, coat_textured => true, unlit => false, specular => true,
+                leave_out => test.shader, test_traces_rays => false, earlier, known_group => 3,
+            };
+            let text = templates.render("raster.wgsl", form).unwrap_or_else(|error| panic!("{test:?}: {error}"));
+            assert_eq!(entries(test.shader, &text), ["vertex", "fragment"], "{test:?}");
+        }
+    }
+}
+
+fn leave_outs() -> Vec<LeaveOut> {
+    SamplingMethod::ALL.into_iter().filter_map(SamplingMethod::leave_out).collect()
 }
 
 /// What pipelines of [`render::Renderer`] may ask for: every switch of a pass, with none, one and many lamps.
@@ -105,6 +128,8 @@ fn render_forms() -> Vec<Form> {
         for shading in SHADING {
             let primary = Form { pass: Pass::Primary, shading, surface_id: bit(2), count_visits: bit(3), ..traced };
             forms.push(primary);
+            let apart = leave_outs().into_iter().map(Some);
+            forms.extend(apart.map(|leave_out| Form { surface_id: true, leave_out, earlier: 3, ..primary }));
         }
         for light_count in [0, 1, 9] {
             let lit = Form { light_count, visibility: bit(2), ..traced };
@@ -114,21 +139,28 @@ fn render_forms() -> Vec<Form> {
                     forms.push(Form { pass: Pass::Illuminate, shadow_rays, domain, occluded, continued, ..lit });
                 }
             }
+            forms.push(Form { pass: Pass::Keep, ..traced });
             forms.push(Form { pass: Pass::Interpolate, step_px: 1 + bits % 2, ..lit });
             for shading in SHADING {
                 let finish = Form { pass: Pass::Finish, shading, ..lit };
                 let highlight = bit(3) && shading != Shading::Unlit;
                 forms.push(Form { highlight, ..finish });
                 forms.push(Form { samples: true, normal: true, reflector: bit(3), surface_id: bit(4), ..finish });
+                forms.push(Form { samples: true, surface_id: bit(3), leave_out: leave_outs().pop(), ..finish });
             }
         }
     }
     forms
 }
 
+/// With the tests of what images leave out.
+fn drawing_templates() -> Templates {
+    Templates::new(&[render::SHADERS, &sampling::shaders()].concat()).expect("templates")
+}
+
 #[test]
 fn compute_shaders_of_drawing_are_valid_in_every_form() {
-    let templates = Templates::new(render::SHADERS).expect("templates");
+    let templates = drawing_templates();
     let forms: BTreeMap<String, Form> = render_forms().into_iter().map(|form| (format!("{form:?}"), form)).collect();
     for (name, form) in forms {
         let text = render::shader_text(&templates, form).unwrap_or_else(|error| panic!("{name}: {error}"));

@@ -11,6 +11,12 @@ pub fn share_images(image_count: usize, samplers: usize) -> Vec<Vec<u32>> {
         .collect()
 }
 
+/// All images to each of `samplers` nodes, which then sample sets in turn.
+#[must_use]
+pub fn share_sets(image_count: usize, samplers: usize) -> Vec<Vec<u32>> {
+    vec![(0..image_count as u32).collect(); samplers]
+}
+
 /// Contiguous views of each of `compositors` nodes; no two differ by more than one view.
 #[must_use]
 pub fn share_views(view_count: usize, compositors: usize) -> Vec<Range<usize>> {

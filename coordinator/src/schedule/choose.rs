@@ -9,6 +9,8 @@ use super::k_fd;
 pub struct Demand {
     /// S: images of a sample set. They are whole: no more nodes can sample.
     pub images: usize,
+    /// Sample sets that differ, of the whole session.
+    pub sets: usize,
     /// V: views of a sample set.
     pub views: usize,
     /// P.
@@ -40,8 +42,8 @@ pub enum ChoiceError {
     /// Nobody is there.
     #[error("no node has joined the cluster")]
     NoNodes,
-    /// More samplers than images, or none left for views.
-    #[error("forced_sampler_count is {forced}, at most {most} of {nodes} nodes can sample {images} whole images")]
+    /// More samplers than images (or sets, where images are sampled in order), or none left for views.
+    #[error("forced_sampler_count is {forced}, at most {most} of {nodes} nodes can sample {images} whole images a set")]
     ForcedSamplers {
         /// Asked for.
         forced: usize,
@@ -75,13 +77,15 @@ pub fn choose(costs: &Costs, demand: &Demand) -> Result<Choice, ChoiceError> {
     Ok(Choice { policy, samplers, reason, predicted_pipeline_s, predicted_direct_s })
 }
 
-/// Samplers that still leave a node for views; one node does both.
-fn most_samplers(demand: &Demand) -> usize {
-    demand.images.min(demand.nodes.saturating_sub(1).max(1)).max(1)
+/// Samplers that still leave a node for views; one node does both. Images that are sampled in order keep a set on
+/// one node, so that no more nodes can sample than there are sets.
+fn most_samplers(costs: &Costs, demand: &Demand) -> usize {
+    let parts = if costs.in_order { demand.sets } else { demand.images };
+    parts.min(demand.nodes.saturating_sub(1).max(1)).max(1)
 }
 
 fn sampler_count(costs: &Costs, demand: &Demand) -> Result<usize, ChoiceError> {
-    let most = most_samplers(demand);
+    let most = most_samplers(costs, demand);
     match demand.forced_samplers {
         Some(forced) if !(1..=most).contains(&forced) => {
             Err(ChoiceError::ForcedSamplers { forced, most, nodes: demand.nodes, images: demand.images })
@@ -101,9 +105,17 @@ fn view_s(costs: &Costs) -> f64 {
 #[must_use]
 pub fn predicted_pipeline_s(costs: &Costs, demand: &Demand, samplers: usize) -> f64 {
     let compositors = demand.nodes.saturating_sub(samplers).max(1);
-    let sample_s = demand.images.div_ceil(samplers.max(1)) as f64 * costs.sample_image_s;
+    let sample_s = images_in_turn(costs, demand, samplers.max(1)) * costs.sample_image_s;
     let view_s = costs.load_set_s + demand.views.div_ceil(compositors) as f64 * view_s(costs);
     if demand.nodes == 1 { sample_s + view_s } else { sample_s.max(view_s) }
+}
+
+/// Images that one sampler makes one after the other, a set: of each set its share, or whole sets in turn.
+fn images_in_turn(costs: &Costs, demand: &Demand, samplers: usize) -> f64 {
+    match costs.in_order {
+        true => demand.images as f64 * demand.sets.max(1).div_ceil(samplers) as f64 / demand.sets.max(1) as f64,
+        false => demand.images.div_ceil(samplers) as f64,
+    }
 }
 
 /// Seconds a set's views when every node draws its share from the scene.
@@ -115,7 +127,7 @@ pub fn predicted_direct_s(costs: &Costs, demand: &Demand) -> f64 {
 /// The K with the least predicted time when images and views are whole.
 fn enumerated_samplers(costs: &Costs, demand: &Demand) -> usize {
     let time = |k: &usize| predicted_pipeline_s(costs, demand, *k);
-    (1..=most_samplers(demand)).min_by(|a, b| time(a).total_cmp(&time(b))).unwrap_or(1)
+    (1..=most_samplers(costs, demand)).min_by(|a, b| time(a).total_cmp(&time(b))).unwrap_or(1)
 }
 
 fn reason(costs: &Costs, demand: &Demand, policy: Policy, samplers: usize) -> String {
@@ -131,7 +143,8 @@ fn reason(costs: &Costs, demand: &Demand, policy: Policy, samplers: usize) -> St
     let roles = if nodes == 1 {
         "1 node in turn".to_owned()
     } else {
-        format!("K = {samplers} of {nodes} nodes, the others reconstruct")
+        let how = if costs.in_order { "whole sets in turn, " } else { "" };
+        format!("K = {samplers} of {nodes} nodes, {how}the others reconstruct")
     };
     format!(
         "{policy}, {who}. Pipeline: {} a set: {images} images of {} sampled by {roles} {views} views of {} + {} to encode, after {} to load the set (trying every K gives K = {best}, {}). \
@@ -158,10 +171,11 @@ mod tests {
         reconstruct_view_s: 0.009,
         load_set_s: 0.005,
         encode_view_s: 0.001,
+        in_order: false,
     };
 
     fn demand(views: usize, nodes: usize) -> Demand {
-        Demand { images: 4, views, nodes, policy: PolicyChoice::Auto, forced_samplers: None }
+        Demand { images: 4, sets: 1, views, nodes, policy: PolicyChoice::Auto, forced_samplers: None }
     }
 
     #[test]
@@ -201,6 +215,20 @@ mod tests {
             }
         }
         assert_eq!(choose(&COSTS, &demand(1, 0)), Err(ChoiceError::NoNodes));
+    }
+
+    #[test]
+    fn sets_whose_images_are_sampled_in_order_stay_whole() {
+        let costs = Costs { in_order: true, ..COSTS };
+        let still = Demand { policy: PolicyChoice::Pipeline, ..demand(20, 5) };
+        assert_eq!(choose(&costs, &still).unwrap().samplers, 1, "one set, one node");
+        assert!((predicted_pipeline_s(&costs, &still, 1) - 0.4).abs() < 1e-9);
+        let moving = Demand { sets: 30, ..still };
+        let choice = choose(&costs, &moving).unwrap();
+        assert!(choice.samplers > 1 && choice.reason.contains("whole sets in turn"), "{choice:?}");
+        // 30 sets by 4 nodes: 8 rounds of 0.4 s.
+        let few_views = Demand { views: 2, ..moving };
+        assert!((predicted_pipeline_s(&costs, &few_views, 4) - 8.0 * 0.4 / 30.0).abs() < 1e-9);
     }
 
     #[test]

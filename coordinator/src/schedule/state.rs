@@ -7,7 +7,7 @@ use wire::{
     SessionPlan, Workload,
 };
 
-use super::{ChoiceError, Demand, choose, share_images};
+use super::{ChoiceError, Demand, choose, share_images, share_sets};
 
 /// What happened.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,6 +154,8 @@ impl ClusterState {
         let session = opening.session;
         let demand = Demand {
             images: opening.workload.sample_cameras.len(),
+            // A still picture is one set, though it be refined: its sums are kept where it is sampled.
+            sets: if opening.workload.timeline.moves() { opening.workload.timeline.set_count as usize } else { 1 },
             views: opening.views_per_set,
             nodes: self.members.len(),
             policy: opening.policy,
@@ -166,7 +168,7 @@ impl ClusterState {
         self.plan_epoch += 1;
         let mut commands = self.end_where(|_| true, format!("plan {} took its place", self.plan_epoch));
         let plan = SessionPlan {
-            assignment: self.assignment(opening.workload, choice.policy, choice.samplers),
+            assignment: self.assignment(opening.workload, choice.policy, choice.samplers, opening.costs.in_order),
             costs: opening.costs,
             reason: choice.reason,
             predicted_pipeline_s: choice.predicted_pipeline_s,
@@ -184,14 +186,15 @@ impl ClusterState {
 
     /// The first K members sample and the others composite; in the direct policy all make views, and a
     /// single node does both.
-    fn assignment(&self, workload: Workload, policy: Policy, sampler_count: usize) -> Assignment {
+    fn assignment(&self, workload: Workload, policy: Policy, sampler_count: usize, in_order: bool) -> Assignment {
         let nodes: Vec<&NodeStatus> = self.members.values().map(|member| &member.status).collect();
         let (sampling, making) = match policy {
             Policy::Direct => (&[][..], &nodes[..]),
             Policy::Pipeline if nodes.len() == 1 => (&nodes[..], &nodes[..]),
             Policy::Pipeline => nodes.split_at(sampler_count),
         };
-        let shares = share_images(workload.sample_cameras.len(), sampling.len());
+        let share = if in_order { share_sets } else { share_images };
+        let shares = share(workload.sample_cameras.len(), sampling.len());
         let sampler = |(node, image_indices): (&&NodeStatus, Vec<u32>)| SamplerShare {
             node_name: node.node_name.clone(),
             address: node.address.clone(),

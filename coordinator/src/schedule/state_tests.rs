@@ -35,6 +35,7 @@ fn opening(session: u64, policy: PolicyChoice) -> Event {
         reconstruct_view_s: 0.01,
         load_set_s: 0.0,
         encode_view_s: 0.0,
+        in_order: false,
     };
     Event::Opened(Box::new(Opening { session, workload, views_per_set: 40, policy, forced_samplers: None, costs }))
 }
@@ -71,7 +72,7 @@ fn every_member_has_a_role() {
 fn one_node_has_both_roles() {
     let commands = cluster(1).step(opening(1, PolicyChoice::Pipeline));
     let plan = applied(&commands);
-    assert_eq!((plan.images_of("n0").len(), plan.composites("n0")), (4, true));
+    assert_eq!((plan.images_of("n0", 0).len(), plan.composites("n0")), (4, true));
 }
 
 #[test]

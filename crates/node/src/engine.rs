@@ -23,7 +23,12 @@ pub trait Engine: Send + Sync + 'static {
     fn load_scene(&self, hash: &str, package: &[u8]) -> Result<f64, EngineError>;
     /// Whether [`Engine::load_scene`] has been here.
     fn has_scene(&self, hash: &str) -> bool;
-    /// One image a camera, in one submission.
+    /// Whether a sampling method takes an image only after those before it, so that a set stays on one node.
+    ///
+    /// # Errors
+    /// For a method it does not know.
+    fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError>;
+    /// The wanted images of a set, in their order.
     ///
     /// # Errors
     /// For settings it does not know, a scene it has not, or a device that fails.
@@ -53,10 +58,14 @@ pub trait UploadedSet: Any + Send + Sync {}
 pub struct SampleWork {
     /// A loaded scene.
     pub scene_hash: String,
-    /// One image each.
+    /// Of the whole set, in its order: what an image shows may depend on the cameras before its own.
     pub cameras: Vec<Camera>,
+    /// Which of them are to be sampled.
+    pub wanted: Vec<u32>,
     /// The sampling method.
     pub sampling: String,
+    /// The reconstruction method, which says what planes images need.
+    pub method: String,
     /// The lighting.
     pub lighting: String,
     /// Where animation stands.

@@ -60,6 +60,7 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
         reconstruct_view_s: reconstruct_s / f64::from(request.batch_count),
         load_set_s,
         encode_view_s: encode_s(&made, &workload.codec)?,
+        in_order: engine.samples_in_order(&workload.sampling)?,
     })
 }
 
@@ -71,7 +72,9 @@ fn sample_work(workload: &Workload) -> SampleWork {
     SampleWork {
         scene_hash: workload.scene.hash.to_string(),
         cameras: workload.sample_cameras.clone(),
+        wanted: (0..workload.sample_cameras.len() as u32).collect(),
         sampling: workload.sampling.clone(),
+        method: workload.method.clone(),
         lighting: workload.lighting.clone(),
         scene_time_s: workload.timeline.start_s as f32,
         refinement: Refinement::default(),

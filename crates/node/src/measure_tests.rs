@@ -74,6 +74,10 @@ impl Engine for Sleeper {
         true
     }
 
+    fn samples_in_order(&self, _: &str) -> Result<bool, EngineError> {
+        Ok(false)
+    }
+
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
         self.asked.lock().unwrap().refinements.push(request.refinement);
         std::thread::sleep(Duration::from_secs_f64(self.sample_s));

@@ -2,10 +2,16 @@
 
 // A cell's corners: codes (upper left, upper right, lower left, lower right), and whether they are one
 // surface.
+{% if holes %}
+// `certain`: whether the ways to all four are proven free.
+struct Corners { codes: vec4f, connected: bool, certain: bool }
+{% else %}
 struct Corners { codes: vec4f, connected: bool }
+{% endif %}
 
 // Of each cell two words: its upper corners' codes, and in the highest bit whether its corners are one surface; its
-// lower corners' codes.
+// lower corners' codes, and in the highest bit whether any way to them is not proven free. Bit 15 of the first says so
+// of the upper left corner.
 @group(0) @binding(2) var cell_codes: texture_2d<u32>;
 
 fn corners_of(cell_index: u32) -> Corners {
@@ -13,7 +19,7 @@ fn corners_of(cell_index: u32) -> Corners {
 {% endif %}
     let words = textureLoad(cell_codes, texel_of(cell_index), 0).xy;
     let codes = vec4u(words.x & 0x7fffu, (words.x >> 16u) & 0x7fffu, words.y & 0x7fffu, (words.y >> 16u) & 0x7fffu);
-    return Corners(vec4f(codes), (words.x >> 31u) != 0u);
+    return Corners(vec4f(codes), (words.x >> 31u) != 0u{% if holes %}, (words.y >> 31u) == 0u{% endif %});
 }
 
 fn bilinear(corners: vec4f, at: vec2f) -> f32 {

@@ -9,7 +9,12 @@
 
 // A ray that is not done by then wanders behind what every camera sees, and whatever it still met would
 // more likely be wrong than right (docs/methods/joint_carve.md): it stays unknown.
+{% if holes %}
+// Texels that prove nothing are crossed one by one.
+const MAX_MOVES: u32 = {{ holes_moves }}u;
+{% else %}
 const MAX_MOVES: u32 = 24u;
+{% endif %}
 const START_LEVEL: u32 = {{ start_level }}u;
 // 0 unless the search is to be cut short.
 const STOP_LEVEL: u32 = {{ stop_level }}u;
@@ -67,7 +72,7 @@ fn verdict(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, far: f32, level: u3
 {% endif %}
         let index = camera.first_node + node_index(log2_sides, pyramid_level, node);
         let range = textureLoad(nodes, texel_of(index), 0).x;
-        let nearest = f32(range & 0xffffu);
+        let nearest = nearest_code(range);
         let farthest = f32(range >> 16u);
         if min(code, exit_code) > nearest { return Verdict(exit, exit, FAR_AWAY, false, 0.0); }
         // Free up to the depth of the nearest thing in the node.
@@ -80,27 +85,49 @@ fn verdict(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, far: f32, level: u3
         return Verdict(partial, exit, penetration, !behind, 1.0);
     }
     let corners = corners_of(camera.first_cell + node.y * camera.width_px + node.x);
+{% if holes %}
+    // Between unconnected samples of which some are uncertain each stands for its own quarter of the cell.
+    let patches = !corners.certain && !corners.connected;
+    let quarter = floor((uv - low) * 2.0);
+    let right = quarter.x > 0.5;
+    let lower = quarter.y > 0.5;
+    let own_code = select(select(corners.codes.x, corners.codes.y, right), select(corners.codes.z, corners.codes.w, right), lower);
+    let codes = select(corners.codes, vec4f(own_code), patches);
+    let quarter_exit = exit_of(a, b, p, low + 0.5 * quarter, min(low + 0.5 * quarter + 0.5, cells));
+    exit = select(exit, clamp(quarter_exit, t, far), patches);
+    let w_at_exit = a.z + b.z * exit;
+    let code_at_exit = select(scale / w_at_exit + offset, 1e9, w_at_exit <= 0.0);
+    if own_code < 0.5 && patches { return Verdict(t, exit, FAR_AWAY, false, 0.0); }
+{% else %}
+    let codes = corners.codes;
+    let w_at_exit = exit_w;
+    let code_at_exit = exit_code;
     let lowest = min(min(corners.codes.x, corners.codes.y), min(corners.codes.z, corners.codes.w));
     if lowest < 0.5 { return Verdict(t, exit, FAR_AWAY, false, 0.0); }
+{% endif %}
     let footprint = (code - offset) / camera.focal_px;
     let at = uv - low;
-    let exit_at = clamp((a.xy + b.xy * exit) / exit_w - 0.5 - low, vec2f(0.0), vec2f(1.0));
+    let exit_at = clamp((a.xy + b.xy * exit) / w_at_exit - 0.5 - low, vec2f(0.0), vec2f(1.0));
     // A connected cell is its bilinear surface; else each sample is a surface of its own.
-    let samples = select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
-    let samples_at_exit = select(corners.codes, vec4f(bilinear(corners.codes, exit_at)), corners.connected);
+    let samples = select(codes, vec4f(bilinear(corners.codes, at)), corners.connected);
+    let samples_at_exit = select(codes, vec4f(bilinear(corners.codes, exit_at)), corners.connected);
     let gaps = vec4f(HALF_CODE + code) - samples;
-    let gaps_at_exit = vec4f(HALF_CODE + exit_code) - samples_at_exit;
+    let gaps_at_exit = vec4f(HALF_CODE + code_at_exit) - samples_at_exit;
     let ahead = gaps > vec4f(0.0);
     // Of the surfaces still ahead the nearest is met first.
     let next_gap = min(min(select(FAR_AWAY, gaps.x, ahead.x), select(FAR_AWAY, gaps.y, ahead.y)), min(select(FAR_AWAY, gaps.z, ahead.z), select(FAR_AWAY, gaps.w, ahead.w)));
     let next_gap_at_exit = next_gap + min(min(select(FAR_AWAY, gaps_at_exit.x - gaps.x, ahead.x), select(FAR_AWAY, gaps_at_exit.y - gaps.y, ahead.y)), min(select(FAR_AWAY, gaps_at_exit.z - gaps.z, ahead.z), select(FAR_AWAY, gaps_at_exit.w - gaps.w, ahead.w)));
     let meets = any(ahead) && next_gap_at_exit <= 0.0;
     let crossing = select(exit, t + (exit - t) * next_gap / max(next_gap - next_gap_at_exit, 1e-9), meets);
+{% if holes %}
+    // Nothing is proven up to the sample, but the ray may meet it.
+    if all(ahead) && !corners.certain { return Verdict(t, crossing, FAR_AWAY, false, 0.0); }
+{% endif %}
     if all(ahead) { return Verdict(crossing, select(exit, crossing + (exit - t) * 1e-6, meets), select(FAR_AWAY, 0.0, meets), false, 0.0); }
     let share = bilinear_shares(at);
     let reach = vec4f(THICKNESS_FOOTPRINTS * footprint);
-    let same = dot(share, select(vec4f(0.0), vec4f(1.0), (abs(gaps) < reach) & (corners.codes > vec4f(1.5))));
-    let beyond = dot(share, select(vec4f(0.0), vec4f(1.0), gaps > reach));
+    let same = dot(share, select(vec4f(0.0), vec4f(1.0), (abs(gaps) < reach) & (codes > vec4f(1.5))));
+    let beyond = {% if holes %}select(0.0, 1.0, corners.certain) * {% endif %}dot(share, select(vec4f(0.0), vec4f(1.0), gaps > reach));
     // Inside and on the way out of a connected cell: the back of the surface, which no camera saw.
     let leaving = corners.connected && gaps_at_exit.x > gaps.x;
     let depths = select(-gaps, vec4f(FAR_AWAY), ahead);

@@ -22,9 +22,16 @@ fn inside(camera: SampleCamera, p: vec3f) -> Depth {
 {% endif %}
     // The first of the corners of the cell to its lower right.
     let cell_index = camera.first_cell + texel.y * camera.width_px + texel.x;
-    let code = textureLoad(cell_codes, texel_of(cell_index), 0).x & 0x7fffu;
+    let word = textureLoad(cell_codes, texel_of(cell_index), 0).x;
+    let code = word & 0x7fffu;
     let penetration = (f32(code) - camera.code_offset) / camera.code_scale - inverse_w;
-    return Depth(penetration, p.z > 0.0 && all(uv == clamped) && code != HOLE);
+{% if holes %}
+    // What lies before a sample whose ray passed other surfaces is not seen.
+    let known = (word & 0x8000u) == 0u || penetration >= 0.0;
+{% else %}
+    let known = true;
+{% endif %}
+    return Depth(penetration, p.z > 0.0 && all(uv == clamped) && code != HOLE && known);
 }
 
 // How the cameras that see a point judge it: inside for all of them, and whether there are any.
@@ -101,12 +108,21 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let cell = vec2u(uv);
     let at = uv - floor(uv);
     let colors = colors_of(first_cell + cell.y * width + cell.x).corners;
+{% if holes %}
+    // Holes have no colour.
+    let held = corners_of(first_cell + cell.y * width + cell.x).codes > vec4f(0.5);
+    let shares = select(vec4f(0.0), bilinear_shares(at), held);
+    let sum = colors[0] * shares.x + colors[1] * shares.y + colors[2] * shares.z + colors[3] * shares.w;
+    let color_linear = sum / max(dot(shares, vec4f(1.0)), 1e-6);
+{% else %}
     let upper = mix(colors[0], colors[1], at.x);
     let lower = mix(colors[2], colors[3], at.x);
+    let color_linear = mix(upper, lower, at.y);
+{% endif %}
     let found = entered && mask != 0u;
     let missed = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, never_unseen);
     let provenance = select(missed, PROVENANCE_HIT | (camera_bit << 8u), found);
-    let color = select(work.background_srgb8, srgb8_from_linear(mix(upper, lower, at.y)), found);
+    let color = select(work.background_srgb8, srgb8_from_linear(color_linear), found);
     write_pixel(pixel.index, color, select(0.0, 1.0 / high, found), provenance);
     if provenance == PROVENANCE_FILLED { leave_for_later(pixel.index); }
 }

@@ -51,7 +51,7 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
         let size = f32(1u << level);
         let leave = ((vec2f(node) + forwards) * size + nudge - origin.xy) * inverse;
         let exit = clamp(min(leave.x, leave.y), s, s_end);
-        let nearest = f32(textureLoad(nodes, texel_of(first_node + node_index(log2_sides, level, node)), 0).x & 0xffffu);
+        let nearest = nearest_code(textureLoad(nodes, texel_of(first_node + node_index(log2_sides, level, node)), 0).x);
 {% if count_fetches %}        fetches += 1u;
 {% endif %}
         let free = min(at.z, origin.z + line.z * exit) > nearest;
@@ -69,7 +69,7 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
         let beyond = origin + line * exit;
         let node = vec2u(cell);
         let corners = corners_of(first_cell + node.y * width_px + node.x);
-        let hole = min(min(corners.codes.x, corners.codes.y), min(corners.codes.z, corners.codes.w)) < 0.5;
+        let hole = {% if holes %}!corners.certain{% else %}min(min(corners.codes.x, corners.codes.y), min(corners.codes.z, corners.codes.w)) < 0.5{% endif %};
         let inside = at.xy - cell;
         let inside_beyond = clamp(beyond.xy - cell, vec2f(0.0), vec2f(1.0));
         let here = HALF_CODE + at.z - surface_code(corners, inside);

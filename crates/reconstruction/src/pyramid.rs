@@ -27,6 +27,9 @@ pub struct CodedDepth {
     pub offset: f32,
     /// For each cell between four texels, whether its corners are samples of one surface.
     pub connected: Vec<bool>,
+    /// Whether the way to a texel's sample is not proven free: its ray passed what other images hold, or it is a hole.
+    /// Empty where that is so of none.
+    pub uncertain: Vec<bool>,
 }
 
 impl CodedDepth {
@@ -48,7 +51,14 @@ impl CodedDepth {
             scale,
             offset,
             connected: connected_cells(image, camera.focal_px.min_element()),
+            uncertain: uncertain_texels(image),
         }
+    }
+
+    /// See [`CodedDepth::uncertain`].
+    pub(crate) fn is_uncertain(&self, x: u32, y: u32) -> bool {
+        let (x, y) = (x.min(self.size_px[0] - 1), y.min(self.size_px[1] - 1));
+        !self.uncertain.is_empty() && self.uncertain[(y * self.size_px[0] + x) as usize]
     }
 
     /// How far the farthest sample may lie from where its code puts it, and half as much again for rounding.
@@ -59,7 +69,7 @@ impl CodedDepth {
 
     /// Two words for each texel and the cell to its lower right, row by row: the codes of the cell's upper left (low
     /// half) and upper right corner (high half), and in the highest bit whether it is connected; those of its lower
-    /// corners.
+    /// corners. Bit 15 of the first says that the texel is uncertain, the highest of the second that any corner is.
     #[must_use]
     pub fn cell_words(&self) -> Vec<[u32; 2]> {
         let pair = |left: u16, right: u16| u32::from(left) | u32::from(right) << 16;
@@ -71,6 +81,12 @@ impl CodedDepth {
         for (word, &connected) in words.iter_mut().zip(&self.connected) {
             word[0] |= u32::from(connected) << 31;
         }
+        for (y, row) in words.chunks_mut(columns).enumerate().filter(|_| !self.uncertain.is_empty()) {
+            for (word, corners) in row.iter_mut().zip(cell_row(&self.uncertain, columns, y)) {
+                word[0] |= u32::from(corners[0]) << 15;
+                word[1] |= u32::from(corners.contains(&true)) << 31;
+            }
+        }
         words
     }
 
@@ -80,6 +96,12 @@ impl CodedDepth {
         let (x, y) = (x.min(self.size_px[0] - 1), y.min(self.size_px[1] - 1));
         self.codes[(y * self.size_px[0] + x) as usize]
     }
+}
+
+fn uncertain_texels(image: &DepthImage) -> Vec<bool> {
+    let uncertain = |(index, &inverse): (usize, &f32)| inverse < 0.0 || image.has_passed(index);
+    let texels: Vec<bool> = image.inverse_depth_per_m.iter().enumerate().map(uncertain).collect();
+    if texels.contains(&true) { texels } else { Vec::new() }
 }
 
 /// A row of cells, one to the lower right of each texel: what a plane has at their upper left, upper right, lower left
@@ -226,12 +248,13 @@ const NOTHING: u32 = 0xffff_0000;
 
 /// The range of the 3 × 3 corners of 2 × 2 cells.
 fn corner_range(depth: &CodedDepth, x: u32, y: u32) -> u32 {
-    let corners = (0..9).map(|i| depth.at(x + i % 3, y + i / 3));
-    corners.map(range_of).fold(NOTHING, join)
+    let corners = (0..9).map(|i| (x + i % 3, y + i / 3));
+    corners.map(|(x, y)| range_of(depth.at(x, y), depth.is_uncertain(x, y))).fold(NOTHING, join)
 }
 
-fn range_of(code: u16) -> u32 {
-    if code == HOLE_CODE { 0x0000_ffff } else { u32::from(code) << 16 | u32::from(code) }
+/// Of an uncertain texel: anything.
+fn range_of(code: u16, uncertain: bool) -> u32 {
+    if uncertain || code == HOLE_CODE { 0x0000_ffff } else { u32::from(code) << 16 | u32::from(code) }
 }
 
 fn join(a: u32, b: u32) -> u32 {
@@ -248,7 +271,7 @@ mod tests {
         let codes =
             (0..size_px[1]).flat_map(|y| (0..size_px[0]).map(move |x| (x, y))).map(|(x, y)| code(x, y)).collect();
         let connected = vec![true; (size_px[0] * size_px[1]) as usize];
-        CodedDepth { size_px, codes, scale: 1.0, offset: 0.0, connected }
+        CodedDepth { size_px, codes, scale: 1.0, offset: 0.0, connected, uncertain: Vec::new() }
     }
 
     #[test]

@@ -234,7 +234,7 @@ impl Reconstructor {
         planes: ViewPlanes,
         count_fetches: bool,
     ) -> Result<InFlight<'_>, ReconstructionError> {
-        let (steps, passes) = passes(method, set.cameras.len(), count_fetches);
+        let (steps, passes) = passes(method, set, count_fetches);
         let batch = self.batch(set, cameras, steps, count_fetches)?;
         let mut frame = Frame::begin(&self.gpu, "reconstruct");
         if count_fetches {
@@ -355,6 +355,7 @@ impl Reconstructor {
         let pipeline = self.pipeline(ShaderKey {
             name: "specular.wgsl",
             cameras: set.cameras.len(),
+            holes: set.has_holes(),
             highlight: reflectors.highlight,
             lights: reflectors.lights,
             visibility_words: reflectors.visibility_words,
@@ -422,8 +423,9 @@ impl Reconstructor {
 
 /// Steps for the shaders, and the passes over pixels: the first over all, each other over what the one before
 /// left.
-fn passes(method: ReconstructionMethod, cameras: usize, count_fetches: bool) -> (u32, Vec<ShaderKey>) {
-    let key = ShaderKey { cameras, count_fetches, ..ShaderKey::default() };
+fn passes(method: ReconstructionMethod, set: &SampleSet, count_fetches: bool) -> (u32, Vec<ShaderKey>) {
+    let cameras = set.cameras.len();
+    let key = ShaderKey { cameras, count_fetches, holes: set.has_holes(), ..ShaderKey::default() };
     match method {
         ReconstructionMethod::LightFieldSearch { steps } => {
             (steps, vec![ShaderKey { name: "light_field_search.wgsl", ..key }])
@@ -457,7 +459,9 @@ fn view_works(set: &SampleSet, cameras: &[PinholeCamera], tiles: UVec2, steps: u
         let mut nearest_first = set.cameras.clone();
         nearest_first.sort_by(|a, b| {
             let distance = |c: &GpuSampleCamera| Vec3::from(c.eye_in_world).distance_squared(camera.eye_in_world);
-            distance(a).total_cmp(&distance(b))
+            // Images that prove nothing everywhere are no use to march in.
+            let uncertain = |c: &GpuSampleCamera| set.uncertain[c.mask.trailing_zeros() as usize];
+            uncertain(a).cmp(&uncertain(b)).then(distance(a).total_cmp(&distance(b)))
         });
         let (head, tail) = slot.split_at_mut(size_of::<GpuViewWork>());
         head.copy_from_slice(bytemuck::bytes_of(&work));

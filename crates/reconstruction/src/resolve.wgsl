@@ -20,7 +20,8 @@ fn shows_background(camera: SampleCamera, point_in_world: vec3f) -> bool {
 {% if count_fetches %}    fetches += 1u;
 {% endif %}
     let words = textureLoad(cell_codes, texel_of(camera.first_cell + texel.y * camera.width_px + texel.x), 0);
-    return inside && (words.x & 0x7fffu) == BACKGROUND;
+    // Not where the ray passed what other images hold: bit 15 says so.
+    return inside && (words.x & 0xffffu) == BACKGROUND;
 }
 
 // The bit of the camera that a sample is of.

@@ -36,6 +36,8 @@ pub struct SetDescription<'a> {
 /// One complete sample set: what views are reconstructed from.
 pub struct SampleSet {
     pub(crate) cameras: Vec<GpuSampleCamera>,
+    /// Of each image, by its bit in provenance: whether some of its texels prove nothing.
+    pub(crate) uncertain: Vec<bool>,
     pub(crate) volume: GpuVolume,
     /// Of pyramids.
     pub(crate) nodes: wgpu::TextureView,
@@ -46,6 +48,11 @@ pub struct SampleSet {
 }
 
 impl SampleSet {
+    /// Whether any image has texels that prove nothing.
+    pub(crate) fn has_holes(&self) -> bool {
+        self.uncertain.contains(&true)
+    }
+
     /// Builds pyramids and uploads everything.
     ///
     /// # Errors
@@ -57,11 +64,13 @@ impl SampleSet {
     ) -> Result<Self, ReconstructionError> {
         check(gpu, images, &set.volume)?;
         let mut cameras = Vec::with_capacity(images.len());
+        let mut uncertain = Vec::with_capacity(images.len());
         let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(word_texture::room);
         let mut colors = word_texture::room(cell_count(images));
         for image in images {
             let depth = CodedDepth::of(image);
             let pyramid = Pyramid::of(&depth);
+            uncertain.push(!depth.uncertain.is_empty());
             let Camera::Pinhole(camera) = &image.camera;
             cameras.push(GpuSampleCamera {
                 mask: 1 << cameras.len(),
@@ -76,6 +85,7 @@ impl SampleSet {
         }
         Ok(Self {
             cameras,
+            uncertain,
             volume: gpu_volume(&searched_volume(&set.volume, images), set.background_linear),
             nodes: word_texture::upload(gpu, "depth pyramids", nodes)?,
             cell_codes: word_texture::upload(gpu, "cells", codes)?,

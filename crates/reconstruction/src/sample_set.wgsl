@@ -99,6 +99,12 @@ fn node_index(log2_sides: vec2u, level: u32, node: vec2u) -> u32 {
     return begin + (node.y << (log2_sides.x - level)) + node.x;
 }
 
+// The nearest code of a node, in the lower half of its word; a hole may be as near as anything, nearer than any code.
+fn nearest_code(word: u32) -> f32 {
+    let code = word & 0xffffu;
+    return select(f32(code), FAR_AWAY, code == 0xffffu);
+}
+
 fn safe_reciprocal(v: f32) -> f32 {
     return 1.0 / select(v, 1e-20, abs(v) < 1e-20);
 }

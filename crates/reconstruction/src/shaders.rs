@@ -30,6 +30,8 @@ pub const SHADERS: &[(&str, &str)] = &[
 
 /// The surface's thickness, in texel footprints: the best of a sweep (docs/methods/joint_carve.md).
 pub(crate) const THICKNESS_FOOTPRINTS: f32 = 2.0;
+/// Moves of a carve in a set with holes.
+pub(crate) const MOVES_AMONG_HOLES: u32 = 96;
 /// The coarsest level that a pixel's own search uses; its tile has done the rest.
 pub(crate) const START_LEVEL: u32 = 3;
 
@@ -53,6 +55,8 @@ pub struct ShaderKey {
     pub march_camera: usize,
     /// Whether fetches are counted for each pixel.
     pub count_fetches: bool,
+    /// Whether some texels prove nothing of what lies before them.
+    pub holes: bool,
     /// How surfaces reflect; of `specular.wgsl`, as what follows.
     pub highlight: Highlight,
     /// How many lights.
@@ -82,6 +86,8 @@ pub fn shader_text(templates: &Templates, key: ShaderKey) -> Result<String, Temp
             march_camera => key.march_camera,
             start_level => START_LEVEL.max(key.stop_level),
             count_fetches => key.count_fetches,
+            holes => key.holes,
+            holes_moves => MOVES_AMONG_HOLES,
             thickness_footprints => decimal(THICKNESS_FOOTPRINTS),
             angle_floor => decimal(ANGLE_FLOOR),
             directions => DIRECTIONS,

@@ -98,7 +98,13 @@ fn sight_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f, 
     let share = bilinear_shares(at);
     let shares = select(vec4f(0.0), share, (abs(gaps) < vec4f(reach)) & (corners.codes > vec4f(1.5)));
     let same = dot(shares, vec4f(1.0));
-    let beyond = dot(select(vec4f(0.0), share, (gaps > vec4f(reach)) & (corners.codes > vec4f(0.5))), vec4f(1.0));
+{% if holes %}
+    // What is not proven free says nothing of what lies before it.
+    let proven = share * select(0.0, 1.0, corners.certain);
+{% else %}
+    let proven = share;
+{% endif %}
+    let beyond = dot(select(vec4f(0.0), proven, (gaps > vec4f(reach)) & (corners.codes > vec4f(0.5))), vec4f(1.0));
     // Angle between the two lines of sight, footprint and distance to the border.
     let sight = point_in_world - camera.eye_in_world;
     let inverse_distance = inverseSqrt(dot(sight, sight));
@@ -106,7 +112,13 @@ fn sight_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f, 
     let border = min(min(min(uv.x, cells.x - uv.x), min(uv.y, cells.y - uv.y)) * 0.125, 1.0) + 1e-3;
     let footprint = camera.focal_px * inverse_distance;
     let weight = border * footprint * footprint / (dot(off, off) + {{ angle_floor }});
-    return Sight(select(0.0, weight, inside && same > 0.05), cell_index, shares, select(0.0, same, inside), select(0.0, beyond, inside));
+{% if holes %}
+    // Weight fades towards texels that were left out: it goes over to the image that holds them, without a seam.
+    let kept = clamp((same - 0.05) / 0.95, 0.0, 1.0);
+{% else %}
+    let kept = 1.0;
+{% endif %}
+    return Sight(select(0.0, weight * kept, inside && same > 0.05), cell_index, shares, select(0.0, same, inside), select(0.0, beyond, inside));
 }
 
 // `occupied`: whether the cameras together hold that there is a surface. A silhouette lies somewhere within

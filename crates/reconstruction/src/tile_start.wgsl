@@ -39,7 +39,7 @@ fn opinion(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, t_end: f32, slope: 
     let wanted = u32(max(ceil(log2(max(extent.x, extent.y) + 1e-3)), 1.0));
     let level = min(wanted, top_level(log2_sides));
     let node = camera.first_node + node_index(log2_sides, level, vec2u(first) >> vec2u(level));
-    let nearest = f32(textureLoad(nodes, texel_of(node), 0).y);
+    let nearest = nearest_code(textureLoad(nodes, texel_of(node), 0).y);
     let farthest_codes = camera.code_scale / max(depths_m + radii_m, vec2f(1e-20)) + camera.code_offset;
     let empty = all(closest_m > vec2f(0.0)) && min(farthest_codes.x, farthest_codes.y) > nearest;
     return select(select(0u, select(UNOPPOSED, PROVEN | UNOPPOSED, whole), empty), UNOPPOSED, unseen);

@@ -14,6 +14,7 @@ pub(crate) enum Slot {
     Read,
     Written,
     WordTexture,
+    WordTextureArray,
     FloatTexture,
     DepthTexture,
     WrittenTexture(TextureFormat),
@@ -22,17 +23,16 @@ pub(crate) enum Slot {
 impl Slot {
     fn binding_type(self) -> BindingType {
         let buffer = |ty, has_dynamic_offset| BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None };
-        let texture = |sample_type| BindingType::Texture {
-            sample_type,
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        };
+        let texture_of =
+            |sample_type, view_dimension| BindingType::Texture { sample_type, view_dimension, multisampled: false };
+        let texture = |sample_type| texture_of(sample_type, wgpu::TextureViewDimension::D2);
         match self {
             Self::DynamicUniform => buffer(BufferBindingType::Uniform, true),
             Self::Uniform => buffer(BufferBindingType::Uniform, false),
             Self::Read => buffer(BufferBindingType::Storage { read_only: true }, false),
             Self::Written => buffer(BufferBindingType::Storage { read_only: false }, false),
             Self::WordTexture => texture(TextureSampleType::Uint),
+            Self::WordTextureArray => texture_of(TextureSampleType::Uint, wgpu::TextureViewDimension::D2Array),
             Self::FloatTexture => texture(TextureSampleType::Float { filterable: false }),
             Self::DepthTexture => texture(TextureSampleType::Depth),
             Self::WrittenTexture(format) => BindingType::StorageTexture {
@@ -45,14 +45,18 @@ impl Slot {
 }
 
 pub(crate) fn group_layout(gpu: &Gpu, label: &str, slots: &[Slot]) -> wgpu::BindGroupLayout {
+    layout_seen_by(gpu, label, slots, wgpu::ShaderStages::COMPUTE)
+}
+
+pub(crate) fn layout_seen_by(
+    gpu: &Gpu,
+    label: &str,
+    slots: &[Slot],
+    visibility: wgpu::ShaderStages,
+) -> wgpu::BindGroupLayout {
     let entries: Vec<_> = (0..)
         .zip(slots)
-        .map(|(binding, slot)| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: slot.binding_type(),
-            count: None,
-        })
+        .map(|(binding, slot)| wgpu::BindGroupLayoutEntry { binding, visibility, ty: slot.binding_type(), count: None })
         .collect();
     gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
 }

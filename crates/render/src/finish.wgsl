@@ -20,6 +20,10 @@
 {% if surface_id %}
 @group(0) @binding(7) var surface_ids: texture_2d<u32>;
 {% endif %}
+{% if leave_out %}
+// Of each pixel the reversed depth of the nearest surface that was left out.
+@group(0) @binding({{ 8 if surface_id else 7 }}) var<storage, read> left_out: array<u32>;
+{% endif %}
 {% include "sums.wgsl" %}
 
 struct Finish { background_linear: vec3f, padding: u32 }
@@ -75,7 +79,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% else %}
     put(0u, place, pack4x8unorm(vec4f(srgb_from_linear(color), 1.0)));
 {% endif %}
+{% if leave_out %}
+    let left = bitcast<f32>(left_out[place]);
+    // Behind what is left out and not behind something else lies a hole, of which nothing is known.
+    put(1u, place, bitcast<u32>(select(depth / camera.near_m, -1.0, !met && left > 0.0)));
+    put({{ passed_plane }}u, place, select(0u, 1u, left > depth));
+{% else %}
     put(1u, place, bitcast<u32>(depth / camera.near_m));
+{% endif %}
 {% if normal_plane > 0 %}    put({{ normal_plane }}u, place, surface.z);
 {% endif %}
 {% if reflector_plane > 0 %}    put({{ reflector_plane }}u, place, select(0u, surface.w, met));

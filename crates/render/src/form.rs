@@ -12,6 +12,7 @@ use minijinja::{Value, context};
 use crate::{
     RenderError,
     binding::{Slot, group_layout},
+    known::{KNOWN_SLOTS, LeaveOut},
     rays::Traced,
 };
 
@@ -82,6 +83,8 @@ pub enum Pass {
     Illuminate,
     /// Light between pixels that have it.
     Interpolate,
+    /// What an image holds, for those after it.
+    Keep,
     /// Surface and light to planes.
     Finish,
 }
@@ -125,6 +128,10 @@ pub struct Form {
     pub reflector: bool,
     /// Planes of depth images.
     pub surface_id: bool,
+    /// What is not shown, because cameras before this one hold it.
+    pub leave_out: Option<LeaveOut>,
+    /// How many cameras those are.
+    pub earlier: usize,
 }
 
 impl Form {
@@ -147,15 +154,22 @@ impl Form {
         6 + if self.visibility { self.light_count + 1 } else { 0 }
     }
 
-    /// First plane of normals, reflectors and surface ids among the finished planes, 0 where there is none;
-    /// and the number of all planes.
-    pub(crate) fn planes(&self) -> [usize; 4] {
+    /// First plane of normals, reflectors, surface ids and of what rays passed among the finished planes, 0 where
+    /// there is none; and the number of all planes.
+    pub(crate) fn planes(&self) -> [usize; 5] {
         let normal = 2;
         let reflector = normal + usize::from(self.normal);
         let ids = reflector + if self.reflector { 1 + self.visibility_words() } else { 0 };
-        let end = ids + if self.surface_id { 2 } else { 0 };
+        let passed = ids + if self.surface_id { 2 } else { 0 };
+        let end = passed + usize::from(self.leave_out.is_some());
         let present = |is: bool, plane: usize| if is { plane } else { 0 };
-        [present(self.normal, normal), present(self.reflector, reflector), present(self.surface_id, ids), end]
+        [
+            present(self.normal, normal),
+            present(self.reflector, reflector),
+            present(self.surface_id, ids),
+            present(self.leave_out.is_some(), passed),
+            end,
+        ]
     }
 
     fn template(&self) -> &'static str {
@@ -163,12 +177,13 @@ impl Form {
             Pass::Primary => "rays/primary.wgsl",
             Pass::Illuminate => "illuminate.wgsl",
             Pass::Interpolate => "interpolate.wgsl",
+            Pass::Keep => "keep.wgsl",
             Pass::Finish => "finish.wgsl",
         }
     }
 
     fn context(&self) -> Value {
-        let [normal_plane, reflector_plane, id_plane, _] = self.planes();
+        let [normal_plane, reflector_plane, id_plane, passed_plane, _] = self.planes();
         let highlight = if self.highlight { Value::from(self.shading.name()) } else { Value::from(false) };
         context! {
             primary => self.pass == Pass::Primary,
@@ -196,7 +211,11 @@ impl Form {
             count_visits => self.count_visits,
             highlight,
             samples => self.samples,
-            normal_plane, reflector_plane, id_plane,
+            normal_plane, reflector_plane, id_plane, passed_plane,
+            leave_out => self.leave_out.map(|test| test.shader),
+            test_traces_rays => self.leave_out.is_some_and(|test| test.traces_rays),
+            earlier => self.earlier,
+            known_group => 2,
             surface_id => self.surface_id,
             bias_footprints => format!("{:?}", crate::BIAS_FOOTPRINTS),
         }
@@ -212,6 +231,9 @@ impl Form {
             ],
             Pass::Illuminate => vec![Slot::Uniform, Slot::WordTexture, depth, Slot::Written],
             Pass::Interpolate => vec![Slot::WordTexture, depth, Slot::Written, Slot::Written, Slot::Written],
+            Pass::Keep => {
+                vec![Slot::WordTexture, depth, Slot::WordTexture, Slot::WrittenTexture(wgpu::TextureFormat::Rgba32Uint)]
+            }
             Pass::Finish => vec![Slot::WordTexture, depth, Slot::Written, Slot::Read, Slot::Uniform, Slot::Uniform],
         });
         if self.pass == Pass::Illuminate && self.domain == Domain::List {
@@ -225,6 +247,9 @@ impl Form {
         }
         if self.count_visits {
             slots.push(Slot::Written);
+        }
+        if self.pass == Pass::Finish && self.leave_out.is_some() {
+            slots.push(Slot::Read);
         }
         slots
     }
@@ -266,10 +291,12 @@ impl ComputePipelines {
         let module = self.gpu.shader(label, &shader_text(&self.templates, form)?);
         let own = group_layout(&self.gpu, label, &form.slots());
         let rays = group_layout(&self.gpu, "triangles", &RAY_SLOTS);
-        let groups = [Some(&own), Some(&rays)];
+        let known = group_layout(&self.gpu, "known samples", &KNOWN_SLOTS);
+        let groups = [Some(&own), Some(&rays), Some(&known)];
+        let leaves_out = form.pass == Pass::Primary && form.leave_out.is_some();
         let layout = self.gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(label),
-            bind_group_layouts: &groups[..1 + usize::from(form.is_traced())],
+            bind_group_layouts: &groups[..1 + usize::from(form.is_traced()) + usize::from(leaves_out)],
             immediate_size: 0,
         });
         Ok(self.gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {

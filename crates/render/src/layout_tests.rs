@@ -7,6 +7,7 @@ use gpu::Templates;
 use naga::TypeInner;
 
 use crate::gpu_scene::{GpuObject, GpuSurroundings};
+use crate::known::KnownCamera;
 use crate::pixel_camera::PixelCamera;
 use crate::raster::RasterCamera;
 
@@ -26,7 +27,11 @@ macro_rules! host {
 }
 
 fn parsed(name: &str, form: minijinja::Value) -> naga::Module {
-    let text = Templates::new(crate::SHADERS).and_then(|templates| templates.render(name, form)).expect("a text");
+    let test =
+        ("known_test.wgsl", "fn is_known(c: Candidate, number: u32, camera: KnownCamera) -> bool { return false; }");
+    let text = Templates::new(&[crate::SHADERS, &[test]].concat())
+        .and_then(|templates| templates.render(name, form))
+        .expect("a text");
     naga::front::wgsl::parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)))
 }
 
@@ -44,12 +49,21 @@ fn shader(module: &naga::Module, name: &str) -> Layout {
 fn everything_shared_agrees() {
     let form = minijinja::context! {
         wind => true, shading => "ggx", surface_id => false, double_sided => true, alpha_tested => true,
-        textured => true, coat_textured => true, unlit => false, specular => true,
+        textured => true, coat_textured => true, unlit => false, specular => true, leave_out => (),
+        test_traces_rays => false, earlier => 0, known_group => 3,
     };
     let raster = parsed("raster.wgsl", form);
     let camera = parsed("camera.wgsl", minijinja::context! {});
+    let test = minijinja::context! {
+        leave_out => "known_test.wgsl", test_traces_rays => false, earlier => 2, known_group => 3,
+    };
+    let known = parsed("known.wgsl", test);
     let shared = [
-        (&raster, "RasterCamera", host!(RasterCamera { clip_from_world, eye_in_world, scene_time_s })),
+        (
+            &raster,
+            "RasterCamera",
+            host!(RasterCamera { clip_from_world, eye_in_world, scene_time_s, near_m, footprint, columns, padding }),
+        ),
         (
             &raster,
             "Object",
@@ -63,6 +77,23 @@ fn everything_shared_agrees() {
                 roughness,
                 phong_reflector,
                 instance
+            }),
+        ),
+        (
+            &known,
+            "KnownCamera",
+            host!(KnownCamera {
+                homogeneous_pixel_from_world,
+                eye_in_world,
+                footprint,
+                column_in_world,
+                columns,
+                row_in_world,
+                rows,
+                near_m,
+                padding_0,
+                padding_1,
+                padding_2
             }),
         ),
         (

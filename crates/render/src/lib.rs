@@ -12,6 +12,7 @@ mod data_texture;
 mod form;
 mod gpu_scene;
 mod illuminate;
+mod known;
 #[cfg(test)]
 mod layout_tests;
 mod lighting;
@@ -28,6 +29,7 @@ mod visibility;
 
 pub use form::{Domain, Form, Pass, Shading, ShadowRays, shader_text};
 pub use gpu_scene::GpuScene;
+pub use known::LeaveOut;
 pub use lighting::{Direct, Lighting, MAX_RAYS, Occlusion, Rate, UnknownLighting};
 pub use memory_pass::MemoryPass;
 pub use rays::AccelerationReport;
@@ -48,6 +50,8 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("illuminate.wgsl", include_str!("illuminate.wgsl")),
     ("interpolate.wgsl", include_str!("interpolate.wgsl")),
     ("finish.wgsl", include_str!("finish.wgsl")),
+    ("known.wgsl", include_str!("known.wgsl")),
+    ("keep.wgsl", include_str!("keep.wgsl")),
     ("rays/traverse.wgsl", include_str!("rays/traverse.wgsl")),
     ("rays/material.wgsl", include_str!("rays/material.wgsl")),
     ("rays/primary.wgsl", include_str!("rays/primary.wgsl")),

@@ -36,7 +36,7 @@ pub(crate) fn views(words: &[u32], form: Form, cameras: &[PinholeCamera], planes
 }
 
 pub(crate) fn depth_images(words: &[u32], form: Form, cameras: &[PinholeCamera], images: &mut Vec<DepthImage>) {
-    let [normal, reflector, ids, count] = form.planes();
+    let [normal, reflector, ids, passed, count] = form.planes();
     for (camera, own) in split(words, count, cameras) {
         let visibility = reflector + 1..reflector + 1 + form.visibility_words();
         let specular = form.reflector.then(|| SpecularPlanes {
@@ -51,8 +51,13 @@ pub(crate) fn depth_images(words: &[u32], form: Form, cameras: &[PinholeCamera],
             normal_oct16: form.normal.then(|| own[normal].to_vec()),
             surface_id: form.surface_id.then(|| own[ids].iter().zip(own[ids + 1]).map(id).collect()),
             specular,
-            passed: None,
+            passed: form.leave_out.and_then(|_| passed_plane(own[passed])),
             corner_inverse_depth_per_m: None,
         });
     }
+}
+
+/// `None` where no ray passed anything.
+fn passed_plane(words: &[u32]) -> Option<Vec<bool>> {
+    words.iter().any(|&word| word != 0).then(|| words.iter().map(|&word| word != 0).collect())
 }

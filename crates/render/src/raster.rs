@@ -14,9 +14,11 @@ use wgpu::TextureFormat;
 
 use crate::{
     GpuScene, RenderError,
+    binding::{bind_group, layout_seen_by},
     cluster::Frustum,
     form::Shading,
     gpu_scene::{GpuObject, Traits, UNIFORM_STRIDE},
+    known::{KNOWN_SLOTS, Known, LeaveOut},
     surfaces::Surfaces,
 };
 
@@ -26,6 +28,8 @@ struct PipelineKey {
     surface_id: bool,
     wind: bool,
     traits: Traits,
+    leave_out: Option<LeaveOut>,
+    earlier: usize,
 }
 
 #[repr(C)]
@@ -34,6 +38,10 @@ pub(crate) struct RasterCamera {
     pub clip_from_world: [[f32; 4]; 4],
     pub eye_in_world: [f32; 3],
     pub scene_time_s: f32,
+    pub near_m: f32,
+    pub footprint: f32,
+    pub columns: u32,
+    pub padding: u32,
 }
 
 /// What to draw, besides from where.
@@ -43,6 +51,10 @@ pub(crate) struct RasterWork<'a> {
     pub shading: Shading,
     pub scene_time_s: f32,
     pub surface_id: bool,
+    /// What is not drawn, and where it is noted; of a single camera.
+    pub leave_out: Option<(LeaveOut, &'a Known, &'a wgpu::Buffer)>,
+    /// The first camera's place among the known ones.
+    pub earlier: usize,
 }
 
 /// What all draws of a submission are bound to.
@@ -50,6 +62,7 @@ struct Groups {
     scene: wgpu::BindGroup,
     object: wgpu::BindGroup,
     textures: Vec<wgpu::BindGroup>,
+    known: Option<wgpu::BindGroup>,
 }
 
 /// Pipelines for every combination that has been asked for.
@@ -59,6 +72,7 @@ pub(crate) struct Rasterizer {
     scene_layout: wgpu::BindGroupLayout,
     object_layout: wgpu::BindGroupLayout,
     texture_layout: wgpu::BindGroupLayout,
+    known_layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
     pipelines: Mutex<HashMap<PipelineKey, Arc<wgpu::RenderPipeline>>>,
 }
@@ -71,6 +85,7 @@ impl Rasterizer {
             scene_layout: uniform_layout(gpu, "scene", &[true, false]),
             object_layout: uniform_layout(gpu, "object", &[true]),
             texture_layout: texture_layout(gpu),
+            known_layout: layout_seen_by(gpu, "known samples", &KNOWN_SLOTS, wgpu::ShaderStages::FRAGMENT),
             sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 address_mode_u: wgpu::AddressMode::Repeat,
                 address_mode_v: wgpu::AddressMode::Repeat,
@@ -96,6 +111,9 @@ impl Rasterizer {
             scene: self.bind_scene(work, cameras),
             object: self.bind_object(work),
             textures: work.scene.textures.iter().map(|views| self.bind_textures(views)).collect(),
+            known: work.leave_out.map(|(_, known, left_out)| {
+                bind_group(&self.gpu, &self.known_layout, known.resources(work.earlier, left_out))
+            }),
         };
         for (number, (camera, target)) in cameras.iter().zip(surfaces).enumerate() {
             self.record_one(frame, work, (number, camera), target, &groups)?;
@@ -122,6 +140,9 @@ impl Rasterizer {
         pass.set_vertex_buffer(0, scene.vertices.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.set_bind_group(0, &groups.scene, &[number as u32 * UNIFORM_STRIDE as u32]);
+        if let Some(known) = &groups.known {
+            pass.set_bind_group(3, known, &[]);
+        }
         let (mut traits, mut texture, mut object) = (None, None, None);
         for run in visible_runs(scene, &Frustum::of(camera)) {
             let draw = &scene.draws[run.draw];
@@ -159,6 +180,10 @@ impl Rasterizer {
                 clip_from_world: clip_from_world(camera).to_cols_array_2d(),
                 eye_in_world: camera.eye_in_world.to_array(),
                 scene_time_s: work.scene_time_s,
+                near_m: camera.near_m,
+                footprint: camera.focal_px.min_element().recip(),
+                columns: camera.size_px.x,
+                padding: 0,
             };
             slot[..size_of::<RasterCamera>()].copy_from_slice(bytemuck::bytes_of(&raster_camera));
         }
@@ -195,7 +220,9 @@ impl Rasterizer {
 
     fn pipeline(&self, work: RasterWork<'_>, traits: Traits) -> Result<Arc<wgpu::RenderPipeline>, RenderError> {
         let RasterWork { shading, surface_id, .. } = work;
-        let key = PipelineKey { shading, surface_id, wind: work.scene.is_animated(), traits };
+        let leave_out = work.leave_out.map(|(test, ..)| test);
+        let earlier = work.leave_out.map_or(0, |_| work.earlier);
+        let key = PipelineKey { shading, surface_id, wind: work.scene.is_animated(), traits, leave_out, earlier };
         let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pipeline) = pipelines.get(&key) {
             return Ok(pipeline.clone());
@@ -207,10 +234,10 @@ impl Rasterizer {
 
     fn build(&self, key: PipelineKey) -> Result<wgpu::RenderPipeline, RenderError> {
         let module = self.gpu.shader("raster", &self.templates.render("raster.wgsl", shader_context(key))?);
-        let layouts = [Some(&self.scene_layout), Some(&self.object_layout), Some(&self.texture_layout)];
+        let layouts = [&self.scene_layout, &self.object_layout, &self.texture_layout, &self.known_layout].map(Some);
         let layout = self.gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("raster"),
-            bind_group_layouts: &layouts,
+            bind_group_layouts: &layouts[..3 + usize::from(key.leave_out.is_some())],
             immediate_size: 0,
         });
         let formats = [Some(TextureFormat::Rgba32Uint.into()), Some(TextureFormat::Rg32Uint.into())];
@@ -284,6 +311,10 @@ fn shader_context(key: PipelineKey) -> minijinja::Value {
         wind => key.wind, shading => key.shading.name(), surface_id => key.surface_id,
         double_sided, alpha_tested, textured, unlit, specular,
         coat_textured => coat_textured && key.shading == Shading::Ggx,
+        leave_out => key.leave_out.map(|test| test.shader),
+        test_traces_rays => false,
+        earlier => key.earlier,
+        known_group => 3,
     }
 }
 

@@ -20,7 +20,16 @@ struct Surroundings {
     wind_waves_per_m: vec3f,
     wind_frequency_hz: f32,
 }
-struct RasterCamera { clip_from_world: mat4x4f, eye_in_world: vec3f, scene_time_s: f32 }
+struct RasterCamera {
+    clip_from_world: mat4x4f,
+    eye_in_world: vec3f,
+    scene_time_s: f32,
+    near_m: f32,
+    // A pixel's side at a depth of one metre.
+    footprint: f32,
+    columns: u32,
+    padding: u32,
+}
 
 @group(0) @binding(0) var<uniform> camera: RasterCamera;
 @group(0) @binding(1) var<uniform> surroundings: Surroundings;
@@ -35,6 +44,8 @@ struct Varyings {
     @location(1) uv: vec2f,
     @location(2) color_linear: vec4f,
     @location(3) @interpolate(flat) first_primitive: u32,
+{% if leave_out %}    @location(4) position_in_world: vec3f,
+{% endif %}
 }
 
 fn rows_times(rows: array<vec4f, 3>, v: vec4f) -> vec3f {
@@ -63,8 +74,23 @@ fn vertex(
     out.uv = uv;
     out.color_linear = vec4f(linear_from_srgb(color_srgb.rgb), color_srgb.a);
     out.first_primitive = first_primitive;
+{% if leave_out %}    out.position_in_world = position_in_world;
+{% endif %}
     return out;
 }
+
+{% if leave_out %}
+{% include "known.wgsl" %}
+
+fn candidate_at(in: Varyings, normal: vec3f, primitive: u32) -> Candidate {
+    let depth_m = camera.near_m / in.clip.z;
+    let sight = in.position_in_world - camera.eye_in_world;
+    return Candidate(
+        in.position_in_world, in.clip.z, normal, stretched_footprint(depth_m, camera.footprint, normal, sight),
+        vec2u(object.instance, in.first_primitive + primitive), vec2u(in.clip.xy),
+    );
+}
+{% endif %}
 
 struct Planes {
     @location(0) surface: vec4u,
@@ -88,6 +114,10 @@ fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface
     coat.roughness *= metallic_roughness.g;
 {% endif %}
     let normal = normalize(in.normal_in_world){% if double_sided %} * select(-1.0, 1.0, front_facing){% endif %};
+{% if leave_out %}
+    let place = u32(in.clip.y) * camera.columns + u32(in.clip.x);
+    if is_left_out(candidate_at(in, normal, primitive), place) { discard; }
+{% endif %}
     var out: Planes;
     out.surface = packed_surface(base.rgb, object.emissive_linear, normal, coat);
 {% if surface_id %}    out.surface_id = vec2u(object.instance, in.first_primitive + primitive);

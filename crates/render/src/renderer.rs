@@ -16,6 +16,7 @@ use crate::{
     binding::{bind_group, texture, window},
     form::{ComputePipelines, Form, Pass, Shading, ShadowRays},
     illuminate::{IlluminateWork, Illuminator},
+    known::{Known, LeaveOut},
     memory_pass::{self, MemoryPass},
     pixel_camera::{PIXEL_CAMERA_BYTES, PIXEL_CAMERA_STRIDE, PixelCamera, uniform},
     planes,
@@ -78,6 +79,8 @@ pub struct SamplePlanes {
     pub surface_id: bool,
     /// [`DepthImage::specular`], with normals, where the scene has highlights under the lighting.
     pub specular: bool,
+    /// [`DepthImage::corner_inverse_depth_per_m`]: a second picture.
+    pub corners: bool,
 }
 
 /// Node visits and triangle tests of rays.
@@ -108,6 +111,19 @@ struct Batch<'a> {
     by_rays: bool,
     /// Of the last pass.
     finish: Form,
+    chain: Option<Chain<'a>>,
+}
+
+/// Images that leave out what those before them hold.
+#[derive(Clone, Copy)]
+struct Chain<'a> {
+    leave_out: LeaveOut,
+    known: &'a Known,
+    /// Places in the set of the images to be drawn, and which of them is the batch's first.
+    wanted: &'a [u32],
+    first: usize,
+    /// Whether what the images hold is kept for those after them.
+    keep: bool,
 }
 
 impl Renderer {
@@ -116,7 +132,15 @@ impl Renderer {
     /// # Errors
     /// When a shader template is broken.
     pub fn new(gpu: &Arc<Gpu>) -> Result<Self, RenderError> {
-        let templates = Arc::new(Templates::new(crate::SHADERS)?);
+        Self::with_tests(gpu, &[])
+    }
+
+    /// With templates of tests for [`Renderer::draw_depth_images_apart`], each with its name.
+    ///
+    /// # Errors
+    /// When a shader template is broken.
+    pub fn with_tests(gpu: &Arc<Gpu>, tests: &[(&'static str, &'static str)]) -> Result<Self, RenderError> {
+        let templates = Arc::new(Templates::new(&[crate::SHADERS, tests].concat())?);
         Ok(Self {
             gpu: gpu.clone(),
             pool: BufferPool::new(gpu),
@@ -160,16 +184,79 @@ impl Renderer {
         cameras: &[Camera],
         planes: SamplePlanes,
     ) -> Result<Vec<DepthImage>, RenderError> {
-        let pinholes: Vec<PinholeCamera> = cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+        let pinholes = pinholes(cameras);
         self.check(&pinholes)?;
-        let mut images = Vec::with_capacity(cameras.len());
-        let form = form_of(work, planes, true);
-        for cameras in batches(&pinholes, self.most_pixels(form)) {
-            let batch = self.batch(work, cameras, form)?;
-            let result = self.draw(&batch, None)?;
-            result.0.with(result.1, |words: &[u32]| planes::depth_images(words, batch.finish, cameras, &mut images))?;
+        let mut images = self.images(work, &pinholes, planes, None)?;
+        if planes.corners {
+            self.add_corners(work, &mut images, &pinholes, None)?;
         }
         Ok(images)
+    }
+
+    /// As [`Renderer::draw_depth_images`] for the `wanted` of `cameras`, but each image leaves out what a test says that the images before it
+    /// hold, and shows what lies behind. What its rays went through is in [`DepthImage::passed`]; a texel behind
+    /// whose left-out surfaces lies nothing is a hole.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw_depth_images`]; more images than the device's layers.
+    pub fn draw_depth_images_apart(
+        &self,
+        work: DrawWork<'_>,
+        cameras: &[Camera],
+        wanted: &[u32],
+        planes: SamplePlanes,
+        leave_out: LeaveOut,
+    ) -> Result<Vec<DepthImage>, RenderError> {
+        let all = pinholes(cameras);
+        self.check(&all)?;
+        let known = Known::of(&self.gpu, &all, leave_out)?;
+        let chain = Chain { leave_out, known: &known, wanted, first: 0, keep: !leave_out.traces_rays };
+        let pinholes: Vec<PinholeCamera> = wanted.iter().map(|&number| all[number as usize]).collect();
+        let mut images = self.images(work, &pinholes, planes, Some(chain))?;
+        if planes.corners {
+            // Where pixels are compared with the same pixel, corners are compared with corners.
+            let own = leave_out.from_one_place;
+            let corners = own.then(|| Known::of(&self.gpu, &corner_cameras(&pinholes), leave_out)).transpose()?;
+            let chain = Chain { keep: own, known: corners.as_ref().unwrap_or(&known), ..chain };
+            self.add_corners(work, &mut images, &pinholes, Some(chain))?;
+        }
+        Ok(images)
+    }
+
+    fn images(
+        &self,
+        work: DrawWork<'_>,
+        cameras: &[PinholeCamera],
+        planes: SamplePlanes,
+        chain: Option<Chain<'_>>,
+    ) -> Result<Vec<DepthImage>, RenderError> {
+        let mut images = Vec::with_capacity(cameras.len());
+        let form = Form { leave_out: chain.map(|chain| chain.leave_out), ..form_of(work, planes, true) };
+        for cameras in batches(cameras, self.most_pixels(form)) {
+            let chain = chain.map(|chain| Chain { first: images.len(), ..chain });
+            let batch = Batch { chain, ..self.batch(work, cameras, form)? };
+            let (result, words) = self.draw(&batch, None)?;
+            result.with(words, |words: &[u32]| planes::depth_images(words, batch.finish, cameras, &mut images))?;
+        }
+        Ok(images)
+    }
+
+    /// Depths at texels' corners: pictures of their own, without light.
+    fn add_corners(
+        &self,
+        work: DrawWork<'_>,
+        images: &mut [DepthImage],
+        cameras: &[PinholeCamera],
+        chain: Option<Chain<'_>>,
+    ) -> Result<(), RenderError> {
+        let work = DrawWork { lighting: Lighting::UNLIT, refinement: Refinement::default(), ..work };
+        let cameras = corner_cameras(cameras);
+        self.check(&cameras)?;
+        let corners = self.images(work, &cameras, SamplePlanes::default(), chain)?;
+        for (image, corners) in images.iter_mut().zip(corners) {
+            image.corner_inverse_depth_per_m = Some(corners.inverse_depth_per_m);
+        }
+        Ok(())
     }
 
     /// How surfaces of `camera`'s kind are found where that is left to the device: measured the first time.
@@ -247,13 +334,14 @@ impl Renderer {
         let by_rays = match work.visibility {
             Visibility::Triangles => false,
             Visibility::Rays => true,
+            Visibility::Measured if form.leave_out.is_some_and(|test| test.traces_rays) => true,
             // Each moment of a moving scene would need a tree that nothing else needs.
             Visibility::Measured if work.scene.is_animated() && !work.lighting.is_traced() => false,
             Visibility::Measured => self.choice(work.scene, &cameras[0], work.scene_time_s)?.rays_are_faster(),
         };
         let needs_tree = by_rays || work.lighting.is_traced();
         let traced = needs_tree.then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
-        Ok(Batch { work, cameras, traced, by_rays, finish: Form { by_rays, ..form } })
+        Ok(Batch { work, cameras, traced, by_rays, finish: Form { by_rays, ..form }, chain: None })
     }
 
     /// So many that no buffer of a batch is larger than the device binds.
@@ -278,18 +366,23 @@ impl Renderer {
         let cameras = uniform(&self.gpu, &pixel_cameras(batch, &sums, sums.ranges(), planes));
         let surfaces: Vec<Surfaces> =
             batch.cameras.iter().map(|camera| self.surfaces.lend(batch.kind(camera))).collect();
+        let left_out = self.left_out(batch);
         let mut frame = Frame::begin(&self.gpu, "draw");
-        self.record_surfaces(&mut frame, batch, &cameras, &surfaces, counts)?;
+        left_out.iter().for_each(|buffer| frame.encoder.clear_buffer(buffer, 0, None));
+        match batch.chain {
+            Some(chain) => self.record_chain(&mut frame, batch, chain, &cameras, &surfaces, &left_out)?,
+            None => self.record_surfaces(&mut frame, batch, &cameras, &surfaces, counts)?,
+        }
         let mut lent = Vec::new();
         if batch.work.lighting.is_lit() {
             lent = self.record_light(&mut frame, batch, &surfaces, &sums, planes)?;
         }
         let words = self.pool.lend_storage("planes", words_bytes.max(4));
-        self.record_finish(&mut frame, batch, &cameras, &surfaces, (&sums.buffer, &words))?;
+        self.record_finish(&mut frame, batch, &cameras, &surfaces, (&sums.buffer, &words, &left_out))?;
         let host = self.pool.lend_host("planes read-back", words_bytes.max(4));
         let read = frame.read_back(&words, 0..words_bytes, host);
         let result = frame.submit().wait()?;
-        drop((surfaces, lent, words));
+        drop((surfaces, lent, words, left_out));
         self.keep(batch, sums);
         Ok((result, read))
     }
@@ -305,15 +398,59 @@ impl Renderer {
         let (shading, surface_id) = (batch.finish.shading, batch.finish.surface_id);
         match &batch.traced {
             Some(traced) if batch.by_rays => {
-                let work = primary::PrimaryWork { traced, shading, surface_id, counts };
+                let work =
+                    primary::PrimaryWork { traced, shading, surface_id, counts, first: 0, leave_out: None, earlier: 0 };
                 primary::record(&self.gpu, &self.pipelines, frame, work, cameras, surfaces)
             }
             _ => {
                 let DrawWork { scene, scene_time_s, .. } = batch.work;
-                let work = RasterWork { scene, shading, scene_time_s, surface_id };
+                let work = RasterWork { scene, shading, scene_time_s, surface_id, leave_out: None, earlier: 0 };
                 self.rasterizer.record(frame, work, batch.cameras, surfaces)
             }
         }
+    }
+
+    /// Image after image: each needs to know what those before it hold.
+    fn record_chain(
+        &self,
+        frame: &mut Frame<'_>,
+        batch: &Batch<'_>,
+        chain: Chain<'_>,
+        cameras: &wgpu::Buffer,
+        surfaces: &[Surfaces],
+        left_out: &[PooledBuffer],
+    ) -> Result<(), RenderError> {
+        let shading = batch.finish.shading;
+        let surface_id = !chain.leave_out.traces_rays || batch.finish.surface_id;
+        for (place, (camera, target)) in batch.cameras.iter().zip(surfaces).enumerate() {
+            let earlier = chain.wanted[chain.first + place] as usize;
+            let leave_out = (earlier > 0).then_some((chain.leave_out, chain.known, &*left_out[place]));
+            let target = std::slice::from_ref(target);
+            match &batch.traced {
+                Some(traced) if batch.by_rays => {
+                    let first = place as u32;
+                    let work =
+                        primary::PrimaryWork { traced, shading, surface_id, counts: None, first, leave_out, earlier };
+                    primary::record(&self.gpu, &self.pipelines, frame, work, cameras, target)?;
+                }
+                _ => {
+                    let DrawWork { scene, scene_time_s, .. } = batch.work;
+                    let work = RasterWork { scene, shading, scene_time_s, surface_id, leave_out, earlier };
+                    self.rasterizer.record(frame, work, std::slice::from_ref(camera), target)?;
+                }
+            }
+            if chain.keep {
+                let image = (&target[0], batch.by_rays);
+                chain.known.keep(&self.gpu, &self.pipelines, frame, (earlier, place as u32), image, cameras)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A buffer for each image that leaves something out.
+    fn left_out(&self, batch: &Batch<'_>) -> Vec<PooledBuffer> {
+        let cameras = batch.chain.map_or(&[][..], |_| batch.cameras);
+        cameras.iter().map(|camera| self.pool.lend_storage("left out", 4 * camera.pixel_count() as u64)).collect()
     }
 
     fn record_light(
@@ -361,7 +498,7 @@ impl Renderer {
         batch: &Batch<'_>,
         cameras: &wgpu::Buffer,
         surfaces: &[Surfaces],
-        (sums, words): (&wgpu::Buffer, &wgpu::Buffer),
+        (sums, words, left_out): (&wgpu::Buffer, &wgpu::Buffer, &[PooledBuffer]),
     ) -> Result<(), RenderError> {
         let pipeline = self.pipelines.get(batch.finish)?;
         let [r, g, b] = batch.work.scene.background_linear.to_array();
@@ -377,6 +514,7 @@ impl Renderer {
                 batch.work.scene.illumination.as_entire_binding(),
             ];
             resources.extend(target.ids.as_ref().filter(|_| batch.finish.surface_id).map(texture));
+            resources.extend(left_out.get(number as usize).map(|buffer| buffer.as_entire_binding()));
             let own = bind_group(&self.gpu, &pipeline.get_bind_group_layout(0), resources);
             let groups = target.size_px().map(|side| side.div_ceil(8));
             let mut pass = frame.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -405,7 +543,8 @@ impl Renderer {
 
 impl Batch<'_> {
     fn kind(&self, camera: &PinholeCamera) -> SurfaceKind {
-        SurfaceKind { size_px: camera.size_px, by_rays: self.by_rays, surface_id: self.finish.surface_id }
+        let compared = self.chain.is_some_and(|chain| !chain.leave_out.traces_rays);
+        SurfaceKind { size_px: camera.size_px, by_rays: self.by_rays, surface_id: self.finish.surface_id || compared }
     }
 
     fn key(&self) -> Key {
@@ -467,6 +606,14 @@ fn pixel_cameras(
         placed
     };
     batch.cameras.iter().map(place).collect()
+}
+
+fn pinholes(cameras: &[Camera]) -> Vec<PinholeCamera> {
+    cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect()
+}
+
+fn corner_cameras(cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {
+    cameras.iter().map(DepthImage::corner_camera).collect()
 }
 
 /// The last pass, but for how surfaces are found.

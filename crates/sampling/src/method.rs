@@ -2,33 +2,132 @@
 
 use std::{fmt, str::FromStr};
 
+use depth_image::PinholeCamera;
+use render::LeaveOut;
+
+use crate::{depth_peeling, non_redundant};
+
 /// A closed set: each variant is one file pair, one docs page and one row in the study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum SamplingMethod {
     /// Every visible surface, whether another image holds it too or not (Lages §4.1).
     #[default]
     Conventional,
+    /// Only what no image before holds; behind it rays go on (Xie §3).
+    NonRedundant(Redundancy),
+    /// Layer behind layer from one place: the middle of the sample cameras.
+    DepthPeeling {
+        /// Images, each of what lies behind the one before.
+        layers: u32,
+    },
 }
+
+/// When a sample is redundant with an image before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Redundancy {
+    /// It has a sample of the same triangle at the same pixel (Xie, Algorithm 3).
+    Pixel,
+    /// It is seen from that image's viewpoint (Xie, Algorithm 2).
+    Visibility,
+    /// It has a sample nearby of the same surface, facing the same way and not much coarser.
+    #[default]
+    Tolerance,
+}
+
+/// The most images of a set, as reconstruction takes them.
+const MAX_LAYERS: u32 = 16;
+const DEFAULT_LAYERS: u32 = 4;
 
 /// Not the name of a sampling method.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown sampling method {0:?}, expected conventional")]
+#[error(
+    "unknown sampling method {0:?}, expected conventional, non_redundant, non_redundant:pixel, non_redundant:visibility, non_redundant:tolerance, depth_peeling or depth_peeling:LAYERS (1 to 16)"
+)]
 pub struct UnknownSampling(String);
+
+impl SamplingMethod {
+    /// All of them, with the paper's numbers.
+    pub const ALL: [Self; 5] = [
+        Self::Conventional,
+        Self::NonRedundant(Redundancy::Pixel),
+        Self::NonRedundant(Redundancy::Visibility),
+        Self::NonRedundant(Redundancy::Tolerance),
+        Self::DepthPeeling { layers: DEFAULT_LAYERS },
+    ];
+
+    /// Where its images are taken from, where a rig has these cameras.
+    #[must_use]
+    pub fn cameras(self, rig: Vec<PinholeCamera>) -> Vec<PinholeCamera> {
+        match self {
+            Self::DepthPeeling { layers } => depth_peeling::cameras(&rig, layers as usize),
+            Self::Conventional | Self::NonRedundant(_) => rig,
+        }
+    }
+
+    /// Whether an image can only be taken after those before it: then a set's images are taken on one node.
+    #[must_use]
+    pub fn is_chained(self) -> bool {
+        self.leave_out().is_some_and(|test| !test.traces_rays)
+    }
+
+    /// By which test an image leaves out what others hold.
+    #[must_use]
+    pub fn leave_out(self) -> Option<LeaveOut> {
+        match self {
+            Self::Conventional => None,
+            Self::NonRedundant(redundancy) => Some(non_redundant::test(redundancy)),
+            Self::DepthPeeling { .. } => Some(depth_peeling::TEST),
+        }
+    }
+}
 
 impl FromStr for SamplingMethod {
     type Err = UnknownSampling;
     fn from_str(text: &str) -> Result<Self, UnknownSampling> {
-        match text {
-            "conventional" => Ok(Self::Conventional),
-            other => Err(UnknownSampling(other.to_owned())),
+        let unknown = || UnknownSampling(text.to_owned());
+        let name = text.replace('-', "_");
+        let (name, detail) = name.split_once(':').map_or((name.as_str(), None), |(name, detail)| (name, Some(detail)));
+        match (name, detail) {
+            ("conventional", None) => Ok(Self::Conventional),
+            ("non_redundant", None | Some("tolerance")) => Ok(Self::NonRedundant(Redundancy::Tolerance)),
+            ("non_redundant", Some("pixel")) => Ok(Self::NonRedundant(Redundancy::Pixel)),
+            ("non_redundant", Some("visibility")) => Ok(Self::NonRedundant(Redundancy::Visibility)),
+            ("depth_peeling", layers) => {
+                let layers = layers.map_or(Ok(DEFAULT_LAYERS), |layers| layers.parse().map_err(|_| unknown()))?;
+                let allowed = (1..=MAX_LAYERS).contains(&layers);
+                allowed.then_some(Self::DepthPeeling { layers }).ok_or_else(unknown)
+            }
+            _ => Err(unknown()),
         }
     }
 }
 
 impl fmt::Display for SamplingMethod {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Conventional => "conventional",
-        })
+        match self {
+            Self::Conventional => f.write_str("conventional"),
+            Self::NonRedundant(Redundancy::Pixel) => f.write_str("non_redundant:pixel"),
+            Self::NonRedundant(Redundancy::Visibility) => f.write_str("non_redundant:visibility"),
+            Self::NonRedundant(Redundancy::Tolerance) => f.write_str("non_redundant:tolerance"),
+            Self::DepthPeeling { layers } => write!(f, "depth_peeling:{layers}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_round_trip_and_nonsense_is_refused() {
+        for method in SamplingMethod::ALL {
+            assert_eq!(method.to_string().parse(), Ok(method));
+        }
+        assert_eq!("non-redundant".parse(), Ok(SamplingMethod::NonRedundant(Redundancy::Tolerance)));
+        for name in
+            ["", "non_redundant:", "non_redundant:id", "depth_peeling:0", "depth_peeling:17", "depth_peeling:-1"]
+        {
+            assert!(name.parse::<SamplingMethod>().is_err(), "{name}");
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Sampling as a service of a device: all cameras of a request in one submission.
+//! Sampling as a service of a device: all cameras of a request in as few submissions as memory allows.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use depth_image::{Camera, DepthImage};
 use gpu::Gpu;
 use render::{DrawWork, RenderError, Renderer, SamplePlanes};
 
-use crate::SamplingMethod;
+use crate::{SamplingMethod, depth_peeling};
 
 /// Why samples could not be taken.
 #[derive(Debug, thiserror::Error)]
@@ -14,6 +14,22 @@ pub enum SamplingError {
     /// A camera, the device, or a shader.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// Layers are peeled from one place.
+    #[error("camera {index}: the layers of depth_peeling are taken by one camera, this is another")]
+    Layer {
+        /// Its place in the request.
+        index: usize,
+    },
+    /// A camera that is not there, or a part of a chain.
+    #[error("image {index} is not among the {cameras} of the set, or not wanted with all others by {method}")]
+    Wanted {
+        /// The first such.
+        index: u32,
+        /// Of the set.
+        cameras: usize,
+        /// Which takes its images in order.
+        method: SamplingMethod,
+    },
 }
 
 /// What to sample.
@@ -21,8 +37,10 @@ pub enum SamplingError {
 pub struct SampleWork<'a> {
     /// Of what, lit how.
     pub draw: DrawWork<'a>,
-    /// One image each.
+    /// Of the whole set: what a later image leaves out depends on those before it.
     pub cameras: &'a [Camera],
+    /// Which images are taken. Images in a chain are taken all together.
+    pub wanted: &'a [u32],
     /// Which samples are taken.
     pub method: SamplingMethod,
     /// Planes beside colour and depth.
@@ -40,24 +58,48 @@ impl Sampler {
     /// # Errors
     /// When a shader is broken.
     pub fn new(gpu: &Arc<Gpu>) -> Result<Self, SamplingError> {
-        Ok(Self::sharing(Arc::new(Renderer::new(gpu)?)))
+        Ok(Self { renderer: Arc::new(renderer(gpu)?) })
     }
 
-    /// Uses `renderer`.
+    /// Uses what [`renderer`] made.
     #[must_use]
     pub fn sharing(renderer: Arc<Renderer>) -> Self {
         Self { renderer }
     }
 
-    /// One depth image a camera, in their order.
+    /// The wanted depth images, in their order.
     ///
     /// # Errors
-    /// A camera that is not valid, or the device.
+    /// A camera that is not valid or does not go with the method, or the device.
     pub fn sample(&self, work: &SampleWork<'_>) -> Result<Vec<DepthImage>, SamplingError> {
-        match work.method {
-            SamplingMethod::Conventional => {
-                Ok(self.renderer.draw_depth_images(work.draw, work.cameras, work.planes)?)
-            }
+        check_wanted(work)?;
+        if let SamplingMethod::DepthPeeling { .. } = work.method {
+            depth_peeling::check(work.cameras)?;
         }
+        let Some(leave_out) = work.method.leave_out() else {
+            let cameras: Vec<Camera> = work.wanted.iter().map(|&index| work.cameras[index as usize]).collect();
+            return Ok(self.renderer.draw_depth_images(work.draw, &cameras, work.planes)?);
+        };
+        Ok(self.renderer.draw_depth_images_apart(work.draw, work.cameras, work.wanted, work.planes, leave_out)?)
     }
+}
+
+/// Of a chain all are wanted, in their order.
+fn check_wanted(work: &SampleWork<'_>) -> Result<(), SamplingError> {
+    let cameras = work.cameras.len();
+    let all = || (0..cameras as u32).eq(work.wanted.iter().copied());
+    let missing = work.wanted.iter().copied().find(|&index| index as usize >= cameras);
+    let broken = (work.method.is_chained() && !all()).then(|| work.wanted.first().copied().unwrap_or(0));
+    match missing.or(broken) {
+        Some(index) => Err(SamplingError::Wanted { index, cameras, method: work.method }),
+        None => Ok(()),
+    }
+}
+
+/// A renderer that knows this crate's tests of what images leave out.
+///
+/// # Errors
+/// When a shader is broken.
+pub fn renderer(gpu: &Arc<Gpu>) -> Result<Renderer, RenderError> {
+    Renderer::with_tests(gpu, &crate::shaders())
 }

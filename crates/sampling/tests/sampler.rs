@@ -37,7 +37,9 @@ fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, S
         visibility: Visibility::Triangles,
         refinement: Refinement::default(),
     };
-    device().sampler.sample(&SampleWork { draw, cameras, method: SamplingMethod::Conventional, planes })
+    let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
+    let method = SamplingMethod::Conventional;
+    device().sampler.sample(&SampleWork { draw, cameras, wanted: &wanted, method, planes })
 }
 
 /// More than one submission holds, of two sizes.
@@ -51,7 +53,7 @@ fn planes_come_as_asked() {
     let cameras: Vec<Camera> = device().rig.samples(UVec2::new(40, 30)).into_iter().map(Camera::Pinhole).collect();
     let mut depth = None;
     for (normal, surface_id) in [(false, false), (true, false), (false, true), (true, true)] {
-        let images = sample(&cameras, SamplePlanes { normal, surface_id, specular: false }).expect("images");
+        let images = sample(&cameras, SamplePlanes { normal, surface_id, ..SamplePlanes::default() }).expect("images");
         assert_eq!(images.len(), 4);
         for image in &images {
             image.validate().expect("planes of one size");
@@ -66,7 +68,7 @@ fn planes_come_as_asked() {
 
 #[test]
 fn a_batch_is_its_singles() {
-    let planes = SamplePlanes { normal: true, surface_id: true, specular: false };
+    let planes = SamplePlanes { normal: true, surface_id: true, ..SamplePlanes::default() };
     let all = sample(&cameras(), planes).expect("images");
     assert_eq!(all.len(), 40);
     for (index, (camera, image)) in cameras().into_iter().zip(&all).enumerate() {

@@ -7,8 +7,10 @@ use scene::{EnvironmentSpec, LightSpec, Limits, SceneSpec, pack, unpack};
 
 fn main() {
     for name in std::env::args().skip(1) {
-        let Ok(spec) = name.parse::<SceneSpec>();
-        inspect(&spec);
+        match name.parse::<SceneSpec>() {
+            Ok(spec) => inspect(&spec),
+            Err(error) => println!("{name}: {error}"),
+        }
     }
 }
 

@@ -30,5 +30,5 @@ pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorK
 pub use limits::Limits;
 pub use model::*;
 pub use package::{Package, PackageStore, SceneHash, SceneHashError, pack, unpack};
-pub use spec::{BUILT_IN_NAMES, SceneSpec};
+pub use spec::{BUILT_IN_NAMES, SceneSpec, SceneSpecError};
 pub use validate::MAX_COORDINATE_M;

@@ -4,12 +4,13 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use crate::procedural::{self, tree_terrain};
+use crate::error::at_most;
+use crate::procedural::{self, GrassDensity, grass, tree_terrain};
 use crate::{Limits, Scene, SceneError, load_file};
 
-/// The names that are not files. Each `tree-terrain-…` may be followed by `-wind`. A file of such a name
-/// is reached as `./name`.
-pub const BUILT_IN_NAMES: [&str; 10] = [
+/// The names that are not files. Each `tree-terrain-…` may be followed by `-wind`, and `grass` by `:` and a
+/// [density](GrassDensity). A file of such a name is reached as `./name`.
+pub const BUILT_IN_NAMES: [&str; 15] = [
     "tree-terrain-30k",
     "tree-terrain-125k",
     "tree-terrain-500k",
@@ -20,7 +21,15 @@ pub const BUILT_IN_NAMES: [&str; 10] = [
     "checker-sphere",
     "poles",
     "courtyard",
+    "blocks",
+    "bird-nest",
+    "grass",
+    "urban",
+    "tree",
 ];
+
+/// Before the density of a meadow.
+const GRASS: &str = "grass";
 
 /// The seed of the named trees, so that all nodes and all runs grow the same one.
 const TREE_SEED: u64 = 2007;
@@ -35,23 +44,52 @@ pub enum SceneSpec {
         /// Whether the tree sways.
         wind: bool,
     },
+    /// The meadow.
+    Grass {
+        /// How fine it is.
+        density: GrassDensity,
+    },
     /// One of the other [`BUILT_IN_NAMES`].
     BuiltIn(&'static str),
     /// A file to import.
     File(PathBuf),
 }
 
+/// Why a text names no scene.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SceneSpecError {
+    /// What follows `grass:` is no number.
+    #[error("grass: the density {0:?} is not a number")]
+    DensityMalformed(String),
+    /// It is a number, and no meadow is made of it.
+    #[error(
+        "grass: the density {0:?} is not between {min} and {max}",
+        min = GrassDensity::MIN,
+        max = GrassDensity::MAX
+    )]
+    DensityOutOfRange(String),
+}
+
 impl SceneSpec {
     /// Makes or reads the scene, and lights it where its source does not.
     ///
     /// # Errors
-    /// Those of [`load_file`].
+    /// Those of [`load_file`]; a meadow that is over the limits.
     pub fn load(&self, limits: &Limits) -> Result<Scene, SceneError> {
         match self {
             Self::File(path) => Ok(load_file(path, limits)?.with_default_lights()),
             Self::TreeTerrain { triangles, wind } => Ok(named(self, grown(*triangles, *wind))),
+            Self::Grass { density } => Ok(named(self, self.sown(*density, limits)?)),
             Self::BuiltIn(name) => Ok(named(self, procedural::by_name(name))),
         }
+    }
+
+    /// Sizes are known, and checked, before memory is taken.
+    fn sown(&self, density: GrassDensity, limits: &Limits) -> Result<Scene, SceneError> {
+        at_most("triangles", density.triangles(), limits.triangles)
+            .and_then(|()| at_most("vertices", density.vertices(), limits.vertices))
+            .map_err(|fault| fault.in_file(self.to_string()))?;
+        Ok(grass(density))
     }
 }
 
@@ -65,17 +103,32 @@ fn named(spec: &SceneSpec, scene: Scene) -> Scene {
 }
 
 impl FromStr for SceneSpec {
-    type Err = std::convert::Infallible;
+    type Err = SceneSpecError;
 
-    /// Never fails: what is no name is a file.
+    /// What is no name is a file. Fails on a density that cannot be.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let (base, wind) = text.strip_suffix("-wind").map_or((text, false), |base| (base, true));
         if let Some(triangles) = tree_triangles(base) {
             return Ok(Self::TreeTerrain { triangles, wind });
         }
+        if let Some(density) = grass_density(text)? {
+            return Ok(Self::Grass { density });
+        }
         let built_in = BUILT_IN_NAMES.into_iter().find(|name| *name == text);
         Ok(built_in.map_or_else(|| Self::File(text.into()), Self::BuiltIn))
     }
+}
+
+/// `None` of what is no meadow.
+fn grass_density(text: &str) -> Result<Option<GrassDensity>, SceneSpecError> {
+    let density = match text.strip_prefix(GRASS) {
+        Some("") => return Ok(Some(GrassDensity::ONE)),
+        Some(rest) => rest.strip_prefix(':'),
+        None => None,
+    };
+    let Some(density) = density else { return Ok(None) };
+    let number = density.parse().map_err(|_| SceneSpecError::DensityMalformed(density.into()))?;
+    GrassDensity::new(number).map(Some).ok_or_else(|| SceneSpecError::DensityOutOfRange(density.into()))
 }
 
 fn tree_triangles(base: &str) -> Option<u32> {
@@ -98,6 +151,8 @@ impl fmt::Display for SceneSpec {
                 };
                 write!(f, "tree-terrain-{size}{}", if *wind { "-wind" } else { "" })
             }
+            Self::Grass { density } if *density == GrassDensity::ONE => f.write_str(GRASS),
+            Self::Grass { density } => write!(f, "{GRASS}:{density}"),
             Self::BuiltIn(name) => f.write_str(name),
             Self::File(path) => write!(f, "{}", path.display()),
         }
@@ -124,15 +179,59 @@ mod tests {
 
     #[test]
     fn all_else_is_a_file() {
-        for text in ["quad.obj", "./quad", "quad-wind", "tree-terrain-7k", "models/a.glb", ""] {
+        for text in [
+            "quad.obj",
+            "./quad",
+            "quad-wind",
+            "tree-terrain-7k",
+            "models/a.glb",
+            "",
+            "grassy",
+            "./grass:2",
+            "grass.obj",
+        ] {
             assert_eq!(parsed(text), SceneSpec::File(text.into()));
+        }
+    }
+
+    #[test]
+    fn a_meadow_has_a_density() {
+        for (text, density, shown) in
+            [("grass", 1.0, "grass"), ("grass:1.0", 1.0, "grass"), ("grass:16", 16.0, "grass:16")]
+        {
+            let density = GrassDensity::new(density).unwrap();
+            assert_eq!(parsed(text), SceneSpec::Grass { density });
+            assert_eq!(parsed(text).to_string(), shown);
+        }
+        assert_eq!(parsed(&parsed("grass:0.37").to_string()), parsed("grass:0.37"));
+    }
+
+    #[test]
+    fn densities_that_cannot_be_are_refused() {
+        for text in ["", "x", "1,5", " 2", "2x", "16:1"] {
+            let expected = SceneSpecError::DensityMalformed(text.into());
+            assert_eq!(format!("grass:{text}").parse::<SceneSpec>(), Err(expected));
+        }
+        for text in ["0", "-1", "nan", "inf", "-inf", "1e-9", "1001", "1e40"] {
+            let expected = SceneSpecError::DensityOutOfRange(text.into());
+            assert_eq!(format!("grass:{text}").parse::<SceneSpec>(), Err(expected));
+        }
+    }
+
+    /// Made first, the larger one would take gigabytes.
+    #[test]
+    fn a_meadow_over_the_limits_is_refused_before_it_is_made() {
+        let limits = Limits { triangles: 55_000, ..Limits::default() };
+        for (text, limits) in [("grass:1000", &Limits::default()), ("grass", &limits)] {
+            let error = parsed(text).load(limits).unwrap_err();
+            assert!(matches!(error.kind, crate::SceneErrorKind::TooLarge { .. }), "{error}");
         }
     }
 
     #[test]
     fn the_small_ones_load_lit_and_valid() {
         let limits = Limits::default();
-        for name in BUILT_IN_NAMES.iter().filter(|n| !n.starts_with("tree") || n.ends_with("30k")) {
+        for name in BUILT_IN_NAMES.iter().filter(|n| !n.starts_with("tree-terrain") || n.ends_with("30k")) {
             let scene = parsed(name).load(&limits).unwrap();
             scene.validate(&limits).unwrap();
             assert_eq!(scene.name, *name);

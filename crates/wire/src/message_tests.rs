@@ -109,6 +109,7 @@ fn messages_come_back() {
             reconstruct_view_s: 0.01,
             load_set_s: 0.02,
             encode_view_s: 0.001,
+            in_order: true,
         },
         reason: "because".to_owned(),
         predicted_pipeline_s: 0.1,

@@ -44,7 +44,8 @@ impl Policy {
     }
 }
 
-/// The images that one node samples of every set.
+/// The images that one node samples: of every set, or, where every sampler has all of them, of every set whose turn
+/// it is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SamplerShare {
     /// The node.
@@ -86,10 +87,30 @@ pub struct Assignment {
 }
 
 impl Assignment {
-    /// The images that a node samples.
+    /// Who samples a set: all samplers its images, or in turn one sampler the whole set.
     #[must_use]
-    pub fn images_of(&self, node_name: &str) -> &[u32] {
-        let share = self.samplers.iter().find(|share| share.node_name == node_name);
+    pub fn samplers_of(&self, set_index: u32) -> &[SamplerShare] {
+        match self.sets_in_turn() {
+            true => std::slice::from_ref(&self.samplers[set_index as usize % self.samplers.len()]),
+            false => &self.samplers,
+        }
+    }
+
+    /// Sets that are sampled at the same time, if sets are wanted fast enough.
+    #[must_use]
+    pub fn sets_at_once(&self) -> u32 {
+        if self.sets_in_turn() { self.samplers.len() as u32 } else { 1 }
+    }
+
+    fn sets_in_turn(&self) -> bool {
+        let all = self.workload.sample_cameras.len();
+        self.samplers.len() > 1 && self.samplers.iter().all(|share| share.image_indices.len() == all)
+    }
+
+    /// The images that a node samples of a set.
+    #[must_use]
+    pub fn images_of(&self, node_name: &str, set_index: u32) -> &[u32] {
+        let share = self.samplers_of(set_index).iter().find(|share| share.node_name == node_name);
         share.map_or(&[], |share| &share.image_indices)
     }
 
@@ -115,7 +136,8 @@ impl Assignment {
         hash.update(workload.scene.hash.as_str().as_bytes());
         hash.update(&time_s.to_bits().to_le_bytes());
         // Length-prefixed, so that no two settings run together into the same bytes.
-        for text in [&workload.sampling, &workload.lighting, &self.policy.to_string()] {
+        // The method says which planes images have.
+        for text in [&workload.sampling, &workload.lighting, &workload.method, &self.policy.to_string()] {
             hash.update(&(text.len() as u64).to_le_bytes()).update(text.as_bytes());
         }
         for v in [workload.volume.min, workload.volume.max, workload.background_linear] {
@@ -139,8 +161,13 @@ impl Assignment {
                 .get_mut(index as usize)
                 .ok_or_else(|| WireError::out_of_range("image_indices", index, "one of the sample cameras"))? += 1;
         }
-        if self.policy == Policy::Pipeline && (image_count == 0 || sampled.iter().any(|&times| times != 1)) {
-            return Err(WireError::out_of_range("image_indices", format!("{sampled:?} times"), "each image once"));
+        let each = self.sets_at_once();
+        if self.policy == Policy::Pipeline && (image_count == 0 || sampled.iter().any(|&times| times != each)) {
+            return Err(WireError::out_of_range(
+                "image_indices",
+                format!("{sampled:?} times"),
+                "each image once a set",
+            ));
         }
         if self.compositors.is_empty() { Err(WireError::Missing { field: "compositors" }) } else { Ok(self) }
     }

@@ -119,6 +119,8 @@ impl TryFrom<proto::PlaneHeader> for PlaneHeader {
             Ok(proto::PlaneKind::SurfaceId) => PlaneKind::SurfaceId,
             Ok(proto::PlaneKind::ReflectanceRoughness8) => PlaneKind::ReflectanceRoughness8,
             Ok(proto::PlaneKind::Visibility8) => PlaneKind::Visibility8,
+            Ok(proto::PlaneKind::Passed1) => PlaneKind::Passed1,
+            Ok(proto::PlaneKind::CornerInverseDepth) => PlaneKind::CornerInverseDepth,
             _ => {
                 return Err(WireError::UnknownEnum { field: "planes.kind", value: p.kind });
             }
@@ -126,6 +128,7 @@ impl TryFrom<proto::PlaneHeader> for PlaneHeader {
         let encoding = match proto::PlaneEncoding::try_from(p.encoding) {
             Ok(proto::PlaneEncoding::SlopeTaggedLz4) => PlaneEncoding::SlopeTaggedLz4,
             Ok(proto::PlaneEncoding::DifferenceTaggedLz4) => PlaneEncoding::DifferenceTaggedLz4,
+            Ok(proto::PlaneEncoding::BitsLz4) => PlaneEncoding::BitsLz4,
             _ => {
                 return Err(WireError::UnknownEnum { field: "planes.encoding", value: p.encoding });
             }
@@ -143,10 +146,13 @@ impl From<PlaneHeader> for proto::PlaneHeader {
             PlaneKind::SurfaceId => proto::PlaneKind::SurfaceId,
             PlaneKind::ReflectanceRoughness8 => proto::PlaneKind::ReflectanceRoughness8,
             PlaneKind::Visibility8 => proto::PlaneKind::Visibility8,
+            PlaneKind::Passed1 => proto::PlaneKind::Passed1,
+            PlaneKind::CornerInverseDepth => proto::PlaneKind::CornerInverseDepth,
         };
         let encoding = match p.encoding {
             PlaneEncoding::SlopeTaggedLz4 => proto::PlaneEncoding::SlopeTaggedLz4,
             PlaneEncoding::DifferenceTaggedLz4 => proto::PlaneEncoding::DifferenceTaggedLz4,
+            PlaneEncoding::BitsLz4 => proto::PlaneEncoding::BitsLz4,
         };
         Self { kind: kind.into(), encoding: encoding.into(), raw_bytes: p.raw_bytes, packed_bytes: p.packed_bytes }
     }

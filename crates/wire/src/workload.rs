@@ -193,6 +193,9 @@ pub struct Costs {
     pub load_set_s: f64,
     /// e: encoding of one view.
     pub encode_view_s: f64,
+    /// Whether an image of a set can only be sampled after those before it: then one node samples the whole set,
+    /// and several nodes sample sets in turn.
+    pub in_order: bool,
 }
 
 impl Costs {
@@ -205,6 +208,7 @@ impl Costs {
             reconstruct_view_s: self.reconstruct_view_s.max(other.reconstruct_view_s),
             load_set_s: self.load_set_s.max(other.load_set_s),
             encode_view_s: self.encode_view_s.max(other.encode_view_s),
+            in_order: self.in_order || other.in_order,
         }
     }
 }
@@ -219,6 +223,7 @@ impl TryFrom<proto::Costs> for Costs {
             reconstruct_view_s: seconds(c.reconstruct_view_s, "reconstruct_view_s")?,
             load_set_s: seconds(c.load_set_s, "load_set_s")?,
             encode_view_s: seconds(c.encode_view_s, "encode_view_s")?,
+            in_order: c.is_sampled_in_order,
         })
     }
 }
@@ -231,6 +236,7 @@ impl From<Costs> for proto::Costs {
             reconstruct_view_s: c.reconstruct_view_s,
             load_set_s: c.load_set_s,
             encode_view_s: c.encode_view_s,
+            is_sampled_in_order: c.in_order,
         }
     }
 }

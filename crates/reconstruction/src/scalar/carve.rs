@@ -10,7 +10,7 @@ use super::{
     surface::{bilinear, bilinear_shares, blended},
     view_ray::ViewRay,
 };
-use crate::shaders::{START_LEVEL, THICKNESS_FOOTPRINTS};
+use crate::shaders::{MOVES_AMONG_HOLES, START_LEVEL, THICKNESS_FOOTPRINTS};
 
 /// See the shader; a ray that is not done by then stays unknown.
 const MAX_MOVES: u32 = 24;
@@ -55,7 +55,8 @@ pub(super) fn carve(
 ) -> Pixel {
     let start_level = START_LEVEL.max(stop_level);
     let (mut t, mut level, mut hit, mut known) = (begin, start_level, false, true);
-    for _ in 0..MAX_MOVES {
+    let among_holes = cameras.iter().any(|camera| camera.among_holes);
+    for _ in 0..if among_holes { MOVES_AMONG_HOLES } else { MAX_MOVES } {
         if t >= ray.far {
             break;
         }
@@ -128,8 +129,32 @@ fn verdict(camera: &SampleCamera, ray: &ViewRay, t: f32, level: u32, stop_level:
         let penetration_inside = if level == stop_level { 0.0 } else { FAR_AWAY };
         node_verdict(camera, &within, [a, b], (pyramid_level, node), penetration_inside)
     } else {
-        cell_verdict(camera, &within, camera.corners(node))
+        let corners = camera.corners(node);
+        if corners.certain || corners.connected {
+            return cell_verdict(camera, &within, corners);
+        }
+        quarter_verdict(camera, ray, within, low, corners)
     }
+}
+
+/// Between unconnected samples of which some are uncertain each stands for its own quarter of the cell.
+fn quarter_verdict(camera: &SampleCamera, ray: &ViewRay, cell: InNode, low: Vec2, corners: Corners) -> Verdict {
+    let [a, b] = ray.in_image_of(camera);
+    let quarter = (cell.at * 2.0).floor();
+    let edges = [low + 0.5 * quarter, (low + 0.5 * quarter + 0.5).min(camera.cells)];
+    let exit = exit(a, b, a + b * cell.t, edges).max(cell.t).min(ray.far);
+    let exit_p = a + b * exit;
+    let own = corners.codes[usize::from(quarter.x > 0.5) + 2 * usize::from(quarter.y > 0.5)];
+    if own < 0.5 {
+        return Verdict { free_until: cell.t, exit, penetration: FAR_AWAY, undecided: false, vote: 0.0 };
+    }
+    let within = InNode {
+        exit,
+        exit_code: if exit_p.z <= 0.0 { 1e9 } else { camera.code(exit_p.z.recip()) },
+        exit_at: (exit_p.xy() / exit_p.z - 0.5 - low).max(Vec2::ZERO).min(Vec2::ONE),
+        ..cell
+    };
+    cell_verdict(camera, &within, Corners { codes: [own; 4], ..corners })
 }
 
 /// Where the ray leaves the rectangle. One through the camera's own eye stays in one place and leaves none.
@@ -167,9 +192,6 @@ fn node_verdict(
 fn cell_verdict(camera: &SampleCamera, within: &InNode, corners: Corners) -> Verdict {
     let &InNode { t, exit, code, exit_code, at, exit_at } = within;
     let nothing = Verdict { free_until: t, exit, penetration: FAR_AWAY, undecided: false, vote: 0.0 };
-    if corners.codes.iter().any(|&c| c < 0.5) {
-        return nothing;
-    }
     // A connected cell is its bilinear surface; else each sample is a surface of its own.
     let samples = |at| if corners.connected { [bilinear(corners.codes, at); 4] } else { corners.codes };
     let gaps = samples(at).map(|sample| HALF_CODE + code - sample);
@@ -181,6 +203,10 @@ fn cell_verdict(camera: &SampleCamera, within: &InNode, corners: Corners) -> Ver
     let next_gap_at_exit = next_gap + least(&|i| gaps_at_exit[i] - gaps[i]);
     let meets = !ahead.is_empty() && next_gap_at_exit <= 0.0;
     let crossing = if meets { t + (exit - t) * next_gap / (next_gap - next_gap_at_exit).max(1e-9) } else { exit };
+    if ahead.len() == 4 && !corners.certain {
+        // Nothing is proven up to the sample, but the ray may meet it.
+        return Verdict { exit: crossing, ..nothing };
+    }
     if ahead.len() == 4 {
         let (exit, penetration) = if meets { (crossing + (exit - t) * 1e-6, 0.0) } else { (exit, FAR_AWAY) };
         return Verdict { free_until: crossing, exit, penetration, ..nothing };
@@ -188,7 +214,7 @@ fn cell_verdict(camera: &SampleCamera, within: &InNode, corners: Corners) -> Ver
     let footprint = (code - camera.code_offset()) / camera.focal_px;
     let reach = THICKNESS_FOOTPRINTS * footprint;
     let vote = |(i, share): (usize, f32)| match gaps[i] {
-        gap if gap > reach => -share,
+        gap if gap > reach && corners.certain => -share,
         gap if gap.abs() < reach && corners.codes[i] > 1.5 => share,
         _ => 0.0,
     };

@@ -109,5 +109,7 @@ fn shows_background(camera: &SampleCamera, point_in_world: Vec3) -> bool {
     let p = camera.homogeneous(point_in_world.extend(1.0));
     let uv = p.xy() / p.z;
     let inside = p.z > 0.0 && uv.cmpge(Vec2::ZERO).all() && uv.cmplt(camera.cells + 1.0).all();
-    inside && camera.code_at(uv.min(camera.cells).as_uvec2()) == BACKGROUND_CODE
+    let texel = uv.min(camera.cells).as_uvec2();
+    // Not where the ray passed what other images hold.
+    inside && camera.code_at(texel) == BACKGROUND_CODE && !camera.is_uncertain(texel)
 }

@@ -115,7 +115,7 @@ fn fine(camera: &SampleCamera, line: &Line, mut s: f32) -> (f32, bool) {
         let exit = line.exit(s, cell, 1.0);
         let beyond = line.at(exit);
         let corners = camera.corners(cell.as_uvec2());
-        if corners.codes.iter().any(|&code| code < 0.5) {
+        if !corners.certain {
             break;
         }
         let here = HALF_CODE + at.z - surface_code(corners, at.xy() - cell);

@@ -110,11 +110,14 @@ pub fn quads(images: &[DepthImage], method: ReconstructionMethod) -> Option<Vec<
     }
 }
 
-/// Camera 0 is the nearest to the view's eye and so knows most; each keeps its bit.
+/// Camera 0 is the nearest to the view's eye and so knows most; each keeps its bit. Images that do not prove all ways
+/// free come after those that do.
 fn nearest_first(images: &[DepthImage], camera: &PinholeCamera) -> Vec<SampleCamera> {
     let mut cameras: Vec<_> = (0..).zip(images).map(|(bit, image)| SampleCamera::of(image, 1 << bit)).collect();
     let distance = |c: &SampleCamera| c.eye_in_world.distance_squared(camera.eye_in_world);
-    cameras.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    cameras.sort_by(|a, b| a.has_uncertain().cmp(&b.has_uncertain()).then(distance(a).total_cmp(&distance(b))));
+    let among_holes = cameras.iter().any(SampleCamera::has_uncertain);
+    cameras.iter_mut().for_each(|camera| camera.among_holes = among_holes);
     cameras
 }
 

@@ -16,6 +16,8 @@ pub(super) struct SampleCamera {
     pub stretch: f32,
     /// This camera's bit in provenance.
     pub mask: u32,
+    /// Whether some texels of some image of the set prove nothing of what lies before them.
+    pub among_holes: bool,
     depth: CodedDepth,
     pyramid: Pyramid,
     wide_words: Vec<u32>,
@@ -28,6 +30,13 @@ pub(super) struct SampleCamera {
 pub(super) struct Corners {
     pub codes: [f32; 4],
     pub connected: bool,
+    /// Whether the ways to all four are proven free.
+    pub certain: bool,
+}
+
+/// Of a node's word; a hole may be as near as anything, nearer than any code.
+fn nearest_code(word: u32) -> f32 {
+    if word & 0xffff == 0xffff { super::FAR_AWAY } else { (word & 0xffff) as f32 }
 }
 
 impl SampleCamera {
@@ -42,6 +51,7 @@ impl SampleCamera {
             focal_px: camera.focal_px.min_element(),
             stretch: stretch(camera),
             mask,
+            among_holes: false,
             wide_words: pyramid.wide_words(),
             pyramid,
             depth,
@@ -75,6 +85,16 @@ impl SampleCamera {
         self.depth.at(texel.x, texel.y)
     }
 
+    /// Whether nothing before a texel's sample is proven free.
+    pub fn is_uncertain(&self, texel: UVec2) -> bool {
+        self.depth.is_uncertain(texel.x, texel.y)
+    }
+
+    /// Of the image.
+    pub fn has_uncertain(&self) -> bool {
+        !self.depth.uncertain.is_empty()
+    }
+
     pub fn color_linear(&self, texel: UVec2) -> Vec3 {
         self.colors_linear[(texel.y * self.depth.size_px[0] + texel.x) as usize]
     }
@@ -84,6 +104,9 @@ impl SampleCamera {
         Corners {
             codes: [at(0, 0), at(1, 0), at(0, 1), at(1, 1)],
             connected: self.depth.connected[(cell.y * self.depth.size_px[0] + cell.x) as usize],
+            certain: ![(0, 0), (1, 0), (0, 1), (1, 1)]
+                .iter()
+                .any(|(x, y)| self.is_uncertain(cell + UVec2::new(*x, *y))),
         }
     }
 
@@ -96,12 +119,12 @@ impl SampleCamera {
     /// Nearest and farthest code of a node of level 1 or coarser.
     pub fn range(&self, level: u32, node: UVec2) -> (f32, f32) {
         let word = self.pyramid.words[self.node_index(level, node)];
-        ((word & 0xffff) as f32, (word >> 16) as f32)
+        (nearest_code(word), (word >> 16) as f32)
     }
 
     /// Nearest code of 2 × 2 nodes.
     pub fn wide_nearest(&self, level: u32, node: UVec2) -> f32 {
-        self.wide_words[self.node_index(level, node)] as f32
+        nearest_code(self.wide_words[self.node_index(level, node)])
     }
 
     fn node_index(&self, level: u32, node: UVec2) -> usize {

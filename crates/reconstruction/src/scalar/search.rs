@@ -3,7 +3,7 @@
 use depth_image::ProvenanceKind;
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
-use super::{FAR_AWAY, Pixel, sample_camera::SampleCamera, view_ray::ViewRay};
+use super::{FAR_AWAY, Pixel, sample_camera::SampleCamera, surface::bilinear_shares, view_ray::ViewRay};
 use crate::pyramid::HOLE_CODE;
 
 const BISECTIONS: u32 = 8;
@@ -60,7 +60,9 @@ fn penetration(camera: &SampleCamera, ray: &ViewRay, t: f32) -> Option<f32> {
     let uv = p.xy() / p.z;
     let seen = p.z > 0.0 && uv.cmpge(Vec2::splat(0.5)).all() && uv.cmple(camera.cells + 0.49).all();
     let code = seen.then(|| camera.code_at(uv.as_uvec2())).filter(|&code| code != HOLE_CODE)?;
-    Some(camera.inverse_depth_per_m(f32::from(code)) - p.z.recip())
+    let penetration = camera.inverse_depth_per_m(f32::from(code)) - p.z.recip();
+    // What lies before a sample whose ray passed other surfaces is not seen.
+    (penetration >= 0.0 || !camera.is_uncertain(uv.as_uvec2())).then_some(penetration)
 }
 
 fn in_image(camera: &SampleCamera, ray: &ViewRay, t: f32) -> Vec3 {
@@ -91,8 +93,11 @@ fn color(camera: &SampleCamera, ray: &ViewRay, t: f32) -> Vec3 {
     let p = in_image(camera, ray, t);
     let uv = (p.xy() / p.z - 0.5).max(Vec2::ZERO).min(camera.cells - 0.01);
     let (cell, at) = (uv.as_uvec2(), uv - uv.floor());
-    let texel = |x, y| camera.color_linear(cell + UVec2::new(x, y));
-    let upper = texel(0, 0).lerp(texel(1, 0), at.x);
-    let lower = texel(0, 1).lerp(texel(1, 1), at.x);
-    upper.lerp(lower, at.y)
+    // Holes have no colour.
+    let corners = (0..4u32).map(|i| cell + UVec2::new(i & 1, i >> 1)).zip(bilinear_shares(at));
+    let held = corners.filter(|(texel, _)| camera.code_at(*texel) != HOLE_CODE);
+    let (sum, shares) = held.fold((Vec3::ZERO, 0.0), |(sum, shares), (texel, share)| {
+        (sum + camera.color_linear(texel) * share, shares + share)
+    });
+    sum / shares.max(1e-6)
 }

@@ -80,11 +80,12 @@ fn sight(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> S
             same += share;
             color += camera.color_linear(cell + UVec2::new(i as u32 & 1, i as u32 >> 1)) * share;
         }
-        if gap > reach && corners.codes[i] > 0.5 {
+        if gap > reach && corners.codes[i] > 0.5 && corners.certain {
             beyond += share;
         }
     }
-    let weight = if same > 0.05 { weight(camera, uv, point_in_world, view_direction) } else { 0.0 };
+    let kept = if camera.among_holes { ((same - 0.05) / 0.95).clamp(0.0, 1.0) } else { 1.0 };
+    let weight = if same > 0.05 { weight(camera, uv, point_in_world, view_direction) * kept } else { 0.0 };
     Sight { weight, color_linear: color / same.max(0.05), mask: camera.mask, same, beyond }
 }
 

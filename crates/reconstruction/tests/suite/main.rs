@@ -6,6 +6,7 @@ mod failures;
 mod holes_and_limits;
 mod mesh_limits;
 mod meshes;
+mod non_redundant;
 mod specular;
 mod stage;
 mod twins;

@@ -273,6 +273,24 @@ fn merging_keeps_its_bound() {
     }
 }
 
+/// Images that leave out what those before them hold are all borders: the mesh loses far more of them.
+#[test]
+fn hybrids_hold_images_without_redundance_together() {
+    for (name, scene, corners) in corpus() {
+        let stage = Stage::apart(scene, &corners.samples(4));
+        let truth = stage.truth(&corners.view());
+        let shares = all_meshes().map(|method| {
+            let view = stage.view(&corners.view(), method);
+            let agreement = Agreement::of(&view, &stage.twin(&corners.view(), method));
+            assert!(agreement.is_good(), "{name} {method}: {agreement:?}");
+            let (inside, lost) = inside_and_lost(&truth, &view);
+            1.0 - lost as f64 / inside as f64
+        });
+        println!("{name:<18} of the inside mesh {:.4}, hybrid {:.4}, merged {:.4}", shares[0], shares[1], shares[2]);
+        assert!(shares[1] >= shares[0] && shares[1] > 0.97 && shares[2] > shares[1] - 0.01, "{name}: {shares:?}");
+    }
+}
+
 /// What the methods come to beside the carve; times are of the software device and small views.
 #[test]
 fn hybrids_cover_more_than_meshes() {

@@ -9,7 +9,7 @@ use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use metrics::Rgb8Image;
 use reconstruction::{ReconstructionMethod, Reconstructor, SampleSet, SetDescription};
-use render::{DrawWork, GpuScene, Lighting, Refinement, Renderer, SamplePlanes, Visibility};
+use render::{DrawWork, GpuScene, LeaveOut, Lighting, Refinement, Renderer, SamplePlanes, Visibility};
 use scene::Scene;
 
 pub const SAMPLE_PX: UVec2 = UVec2::new(96, 72);
@@ -17,6 +17,9 @@ pub const VIEW_PX: UVec2 = UVec2::new(64, 48);
 pub const CARVE: ReconstructionMethod = ReconstructionMethod::JointCarve { stop_level: 0 };
 pub const SEARCH: ReconstructionMethod = ReconstructionMethod::LightFieldSearch { steps: 64 };
 pub const ALL_PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: true };
+
+/// By which images leave out what those before them hold: the test of sampling `non_redundant:pixel`.
+const APART: (&str, &str) = ("apart.wgsl", include_str!("../../../sampling/src/non_redundant_pixel.wgsl"));
 
 struct Device {
     gpu: Arc<Gpu>,
@@ -29,7 +32,7 @@ fn device() -> &'static Device {
     static DEVICE: OnceLock<Device> = OnceLock::new();
     DEVICE.get_or_init(|| {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let renderer = Renderer::new(&gpu).expect("a renderer");
+        let renderer = Renderer::with_tests(&gpu, &[APART]).expect("a renderer");
         let reconstructor = Reconstructor::new(&gpu).expect("a reconstructor");
         Device { gpu, renderer, reconstructor }
     })
@@ -56,16 +59,29 @@ pub struct Stage {
 
 impl Stage {
     pub fn new(scene: Scene, cameras: &[PinholeCamera]) -> Self {
-        let images = depth_images(&scene, cameras);
+        let images = depth_images(&scene, cameras, SamplePlanes::default());
         let volume = scene.bounds();
         Self { scene, images, volume }
     }
 
     /// Whose images have normals and texel corners.
     pub fn with_corners(scene: Scene, cameras: &[PinholeCamera]) -> Self {
-        let images = depth_images_with_corners(&scene, cameras);
+        let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
+        let images = depth_images(&scene, cameras, planes);
         let volume = scene.bounds();
         Self { scene, images, volume }
+    }
+
+    /// Of images that leave out what those before them hold.
+    pub fn apart(scene: Scene, cameras: &[PinholeCamera]) -> Self {
+        let on_device = GpuScene::upload(&device().gpu, &scene).expect("a scene");
+        let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
+        let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
+        let leave_out = LeaveOut { shader: APART.0, traces_rays: false, from_one_place: false };
+        let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
+        let work = plainly_lit(&on_device);
+        let images = device().renderer.draw_depth_images_apart(work, &cameras, &wanted, planes, leave_out);
+        Self { images: images.expect("depth images"), volume: scene.bounds(), scene }
     }
 
     pub fn upload(&self) -> SampleSet {
@@ -96,24 +112,11 @@ impl Stage {
     }
 }
 
-fn depth_images(scene: &Scene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
-    draw_depth_images(scene, cameras, SamplePlanes::default())
-}
-
-fn draw_depth_images(scene: &Scene, cameras: &[PinholeCamera], planes: SamplePlanes) -> Vec<DepthImage> {
+fn depth_images(scene: &Scene, cameras: &[PinholeCamera], planes: SamplePlanes) -> Vec<DepthImage> {
     let scene = GpuScene::upload(&device().gpu, scene).expect("a scene");
     let work = plainly_lit(&scene);
     let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
     device().renderer.draw_depth_images(work, &cameras, planes).expect("depth images")
-}
-
-fn depth_images_with_corners(scene: &Scene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
-    let corner_cameras: Vec<_> = cameras.iter().map(DepthImage::corner_camera).collect();
-    let planes = SamplePlanes { normal: true, ..SamplePlanes::default() };
-    let images = draw_depth_images(scene, cameras, planes);
-    let corners = depth_images(scene, &corner_cameras).into_iter().map(|image| Some(image.inverse_depth_per_m));
-    let with = |(image, corner_inverse_depth_per_m)| DepthImage { corner_inverse_depth_per_m, ..image };
-    images.into_iter().zip(corners).map(with).collect()
 }
 
 pub fn looking(eye: Vec3, target: Vec3, fov_y_deg: f32, size_px: UVec2) -> PinholeCamera {

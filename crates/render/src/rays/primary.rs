@@ -9,6 +9,7 @@ use crate::{
     RenderError,
     binding::{bind_group, texture, window},
     form::{ComputePipelines, Form, Pass, Shading},
+    known::{Known, LeaveOut},
     pixel_camera::{PIXEL_CAMERA_BYTES, PIXEL_CAMERA_STRIDE},
     surfaces::Surfaces,
 };
@@ -19,8 +20,14 @@ pub(crate) struct PrimaryWork<'a> {
     pub traced: &'a Traced,
     pub shading: Shading,
     pub surface_id: bool,
+    /// The place of the first of the surfaces' cameras.
+    pub first: u32,
     /// Receives node visits and triangle tests of each pixel, of a single camera.
     pub counts: Option<&'a wgpu::Buffer>,
+    /// What is not shown, and where it is noted; of a single camera.
+    pub leave_out: Option<(LeaveOut, &'a Known, &'a wgpu::Buffer)>,
+    /// The first camera's place among the known ones.
+    pub earlier: usize,
 }
 
 /// Records one dispatch a camera into its own textures.
@@ -37,11 +44,16 @@ pub(crate) fn record(
         shading: work.shading,
         surface_id: work.surface_id,
         count_visits: work.counts.is_some(),
+        leave_out: work.leave_out.map(|(test, ..)| test),
+        earlier: work.leave_out.map_or(0, |_| work.earlier),
         ..Form::traced(work.traced)
     };
     let pipeline = pipelines.get(form)?;
     let rays = bind_group(gpu, &pipeline.get_bind_group_layout(1), work.traced.views().map(texture));
-    for (number, target) in (0..).zip(surfaces) {
+    let known = work.leave_out.map(|(_, known, left_out)| {
+        bind_group(gpu, &pipeline.get_bind_group_layout(2), known.resources(work.earlier, left_out))
+    });
+    for (number, target) in (work.first..).zip(surfaces) {
         let mut resources = vec![window(cameras, PIXEL_CAMERA_BYTES), texture(&target.surface), texture(&target.depth)];
         resources.extend(target.ids.as_ref().filter(|_| work.surface_id).map(texture));
         resources.extend(work.counts.map(wgpu::Buffer::as_entire_binding));
@@ -51,6 +63,9 @@ pub(crate) fn record(
         pass.set_pipeline(&pipeline);
         pass.set_bind_group(0, &own, &[number * PIXEL_CAMERA_STRIDE]);
         pass.set_bind_group(1, &rays, &[]);
+        if let Some(known) = &known {
+            pass.set_bind_group(2, known, &[]);
+        }
         pass.dispatch_workgroups(size.x.div_ceil(8), size.y.div_ceil(8), 1);
     }
     Ok(())

@@ -13,11 +13,46 @@
 @group(0) @binding({{ 3 + surface_id|int }}) var<storage, read_write> visit_counts: array<u32>;
 {% endif %}
 
+const FARTHEST: f32 = 3.0e38;
+{% if leave_out %}
+{% include "known.wgsl" %}
+
+// Surfaces that one ray leaves out before it is given up: the software device ends long loops.
+const MOST_LAYERS: u32 = 64u;
+
+fn candidate_at(hit: Hit, pixel: vec2u, direction: vec3f) -> Candidate {
+    let facing = select(-1.0, 1.0, hit.crossing.front);
+    let normal = normalize(attributes_at(hit.crossing).normal + vec3f(0.0, 1e-20, 0.0)) * facing;
+    let offset = direction * hit.t;
+    return Candidate(
+        camera.eye_in_world + offset, camera.near_m / hit.t, normal,
+        stretched_footprint(hit.t, camera.footprint, normal, offset),
+        textureLoad(flat_triangles, texel_at(hit.slot), 0).xy, pixel,
+    );
+}
+{% endif %}
+
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= camera.size_px) { return; }
     let direction = direction_of(id.xy);
-    let hit = closest(ray_from(camera.eye_in_world, direction), camera.near_m);
+    let ray = ray_from(camera.eye_in_world, direction);
+{% if leave_out %}
+    var hit = Hit(FARTHEST, NOTHING, Crossing(0.0, 0.0, 0.0, false, false, vec3u(0u)));
+    var near = camera.near_m;
+    var searching = true;
+    for (var layer = 0u; searching && layer < MOST_LAYERS; layer++) {
+        hit = closest(ray, near, FARTHEST);
+        near = hit.t;
+        searching = false;
+        for (var met = hit.slot != NOTHING; met; met = false) {
+            searching = is_left_out(candidate_at(hit, id.xy, direction), id.y * camera.size_px.x + id.x);
+        }
+    }
+    hit.slot = select(hit.slot, NOTHING, searching);
+{% else %}
+    let hit = closest(ray, camera.near_m, FARTHEST);
+{% endif %}
     let met = hit.slot != NOTHING;
     var surface = vec4u(0u);
     var ids = vec2u(0u);

@@ -182,12 +182,12 @@ fn is_blocked(ray: Ray, t_max: f32) -> bool {
 
 struct Hit { t: f32, slot: u32, crossing: Crossing }
 
-// The nearest triangle; backs of single-sided ones are not there.
-fn closest(ray: Ray, near: f32) -> Hit {
+// The nearest triangle between two places; backs of single-sided ones are not there.
+fn closest(ray: Ray, near: f32, far: f32) -> Hit {
     var stack: array<Todo, STACK>;
     var height = 0u;
     var todo = ROOT;
-    var hit = Hit(3.0e38, NOTHING, Crossing(0.0, 0.0, 0.0, false, false, vec3u(0u)));
+    var hit = Hit(far, NOTHING, Crossing(0.0, 0.0, 0.0, false, false, vec3u(0u)));
     for (; !is_done(todo);) {
         let child = nearest_child(todo, ray);
         let rest = without_nearest(todo);

@@ -2,7 +2,7 @@
 //! What may differ on a device is what WGSL leaves open: the last bits of quotients, and whether a product and a
 //! sum are rounded once or twice.
 
-use depth_image::{PinholeCamera, Ray, SurfaceId};
+use depth_image::{PinholeCamera, Ray, SurfaceId, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 use obvhs::cwbvh::node::CwBvhNode;
 
@@ -109,8 +109,14 @@ impl Scene {
     /// The nearest triangle beyond `near`; backs of single-sided ones are not there.
     #[must_use]
     pub fn closest(&self, ray: &Ray, near: f32) -> (Option<Hit>, Visits) {
+        self.closest_between(ray, near, FAR_AWAY)
+    }
+
+    /// As [`Scene::closest`], of those before `far`.
+    #[must_use]
+    pub fn closest_between(&self, ray: &Ray, near: f32, far: f32) -> (Option<Hit>, Visits) {
         let mut hit = None;
-        let visits = self.search(ray, FAR_AWAY, |scene, ray, slot, t_max| {
+        let visits = self.search(ray, far, |scene, ray, slot, t_max| {
             let crossing = scene.crossing(slot, ray, t_max)?;
             let seen = crossing.front || scene.has(slot, DOUBLE_SIDED);
             if seen && crossing.t > near && scene.is_there(&crossing) {
@@ -137,6 +143,16 @@ impl Scene {
     pub fn surface_id(&self, hit: &Hit) -> SurfaceId {
         let FlatTriangle { instance, primitive, .. } = self.triangles[hit.slot as usize];
         SurfaceId { instance, primitive }
+    }
+
+    /// Between the corners', towards the side that was met; unit length.
+    #[must_use]
+    pub fn normal_in_world(&self, hit: &Hit) -> Vec3 {
+        let [b, c] = hit.barycentric;
+        let corners = self.corners[hit.slot as usize].map(|corner| corner[3] & !CORNER_FLAGS);
+        let normals = corners.map(|number| unit_from_oct16(self.vertices[number as usize].normal_oct16));
+        let normal = normals[0] * (1.0 - b - c) + normals[1] * b + normals[2] * c;
+        normal.normalize_or_zero() * if hit.front { 1.0 } else { -1.0 }
     }
 
     /// Corners of all triangles.

@@ -454,7 +454,7 @@ fn thin_walls_hold_and_contact_shadows_begin_at_the_bias() {
 fn a_refitted_tree_finds_what_a_new_one_finds() {
     let scene: Scene = "tree-terrain-30k-wind"
         .parse::<scene::SceneSpec>()
-        .unwrap_or_else(|never| match never {})
+        .expect("a name")
         .load(&scene::Limits::default())
         .expect("a scene");
     let camera = before(&scene);

@@ -198,7 +198,7 @@ fn backs_are_seen_of_double_sided_surfaces_only() {
     let behind = looking(Vec3::NEG_Z * 8.0, Vec3::ZERO);
     assert!(sample(&scene, &behind).inverse_depth_per_m.iter().all(|&d| d == 0.0));
     scene.materials[0].double_sided = true;
-    let planes = SamplePlanes { normal: true, surface_id: false, specular: false };
+    let planes = SamplePlanes { normal: true, surface_id: false, ..SamplePlanes::default() };
     let image = sample_at(&scene, &behind, planes, 0.0);
     let covered: Vec<usize> =
         (0..image.inverse_depth_per_m.len()).filter(|&i| image.inverse_depth_per_m[i] > 0.0).collect();
@@ -222,7 +222,8 @@ fn instances_stand_where_they_are_placed() {
         Vec3::new(0.3, -0.2, -3.0),
     );
     let scene = moved(&unit_cube(), placement);
-    let image = sample_at(&scene, &ahead(), SamplePlanes { normal: true, surface_id: false, specular: false }, 0.0);
+    let image =
+        sample_at(&scene, &ahead(), SamplePlanes { normal: true, surface_id: false, ..SamplePlanes::default() }, 0.0);
     let reference = scalar::inverse_depth_per_m(&scene, &ahead());
     let (error, surfaces, _) = depth_error(&reference, &image.inverse_depth_per_m);
     assert!(surfaces > 100 && error < 1e-4, "{surfaces} {error}");
@@ -263,7 +264,8 @@ fn surface_ids_name_one_triangle_of_one_instance() {
     let at = |x: f32| Affine3A::from_translation(Vec3::new(x, 0.0, -4.0)) * Affine3A::from_rotation_y(0.5);
     scene.instances =
         vec![Instance { mesh: 0, world_from_mesh: at(-1.0) }, Instance { mesh: 0, world_from_mesh: at(1.0) }];
-    let image = sample_at(&scene, &ahead(), SamplePlanes { normal: false, surface_id: true, specular: false }, 0.0);
+    let image =
+        sample_at(&scene, &ahead(), SamplePlanes { normal: false, surface_id: true, ..SamplePlanes::default() }, 0.0);
     let ids = image.surface_id.as_ref().expect("ids");
     let mut triangle_of_id = BTreeMap::new();
     for (x, y) in (0..SIZE_PX.y).flat_map(|y| (0..SIZE_PX.x).map(move |x| (x, y))) {

@@ -50,6 +50,18 @@ impl MeshBuilder {
         }
     }
 
+    /// A flat quadrilateral, its corners counter-clockwise seen from the front.
+    pub(super) fn facet(&mut self, corners: [Vec3; 4], color_srgb: Vec3) {
+        let [a, b, c, d] = corners;
+        let normal = (c - a).cross(d - b).normalize_or(Vec3::Y);
+        let corners = corners.map(|corner| self.push(vertex(corner, normal, color_srgb)));
+        self.quad(corners);
+    }
+
+    pub(super) fn triangle_count(&self) -> u32 {
+        self.indices.len() as u32 / 3
+    }
+
     /// Ends a part: all indices since the last one.
     pub(super) fn finish_part(&mut self, material: u32) {
         let first_index = self.parts.last().map_or(0, |p| p.first_index + p.index_count);
@@ -64,11 +76,16 @@ impl MeshBuilder {
     /// A scene of this mesh alone, in one material, lit.
     pub(super) fn into_scene(mut self, name: &str, material: Material) -> Scene {
         self.finish_part(0);
+        self.into_scene_of(name, vec![material])
+    }
+
+    /// A scene of this mesh alone, whose parts have been finished, lit.
+    pub(super) fn into_scene_of(self, name: &str, materials: Vec<Material>) -> Scene {
         Scene {
             name: name.into(),
             meshes: vec![self.into_mesh()],
             instances: vec![Instance { mesh: 0, world_from_mesh: Affine3A::IDENTITY }],
-            materials: vec![material],
+            materials,
             ..Scene::default()
         }
         .with_default_lights()

@@ -2,26 +2,37 @@
 //!
 //! The same arguments give the same scene, bit for bit, on the same build.
 
+mod bird_nest;
+mod blocks;
 mod courtyard;
+mod grass;
+mod lone_tree;
 mod mesh_builder;
 mod noise;
 mod poles;
 mod rng;
 mod shapes;
+mod solids;
 mod terrain;
 mod tree;
 mod tree_terrain;
+mod urban;
 
+pub use bird_nest::bird_nest;
+pub use blocks::{BlocksViewpoints, blocks, blocks_viewpoints};
 pub use courtyard::courtyard;
+pub use grass::{GrassDensity, grass};
+pub use lone_tree::lone_tree;
 pub use poles::poles;
 pub use shapes::{checker_sphere, quad, unit_cube, uv_sphere};
 pub use tree_terrain::tree_terrain;
+pub use urban::urban;
 
 use glam::Vec3;
 
 use crate::Scene;
 
-/// The small scene of one of [`crate::BUILT_IN_NAMES`], with its usual arguments; the cube for any other
+/// The scene of one of [`crate::BUILT_IN_NAMES`], with its usual arguments; the cube for any other
 /// name.
 pub(crate) fn by_name(name: &str) -> Scene {
     match name {
@@ -30,6 +41,10 @@ pub(crate) fn by_name(name: &str) -> Scene {
         "checker-sphere" => checker_sphere(),
         "poles" => poles(0.02),
         "courtyard" => courtyard(),
+        "blocks" => blocks(),
+        "bird-nest" => bird_nest(),
+        "urban" => urban(),
+        "tree" => lone_tree(),
         _ => unit_cube(),
     }
 }

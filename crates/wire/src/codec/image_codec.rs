@@ -4,11 +4,13 @@ use bytes::Bytes;
 use depth_image::{Camera, DepthImage, DepthImageError, SpecularPlanes, SurfaceId};
 
 use super::{
-    DecodeError, DecodeLimits, ImageHeader, PlaneHeader, PlaneKind, PlaneSet,
+    DecodeError, DecodeLimits, ImageHeader, InverseDepthRange, PlaneHeader, PlaneKind, PlaneSet,
     color_codec::{pack_colors, unpack_colors},
     depth_codec::{decode_depth, encode_depth},
     error::expand_lz4,
+    image_header::CORNER_RANGE_BYTES,
     runs::Runs,
+    tagged::take,
     words_codec::{WordLayout, pack_words, unpack_words},
 };
 
@@ -45,6 +47,12 @@ pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<Encode
     }
     if let Some(specular) = specular {
         push_specular(&mut packer, specular, runs);
+    }
+    if let Some(passed) = &image.passed {
+        packer.push(PlaneKind::Passed1, &pack_bits(passed));
+    }
+    if let Some(corners) = image.corner_inverse_depth_per_m.as_ref().filter(|_| planes.corners) {
+        packer.push(PlaneKind::CornerInverseDepth, &pack_corners(corners));
     }
     let size_px = image.size_px();
     Ok(EncodedDepthImage {
@@ -87,7 +95,7 @@ pub fn decode_depth_image(
     };
     let mut packed = others;
     for plane in header.planes.iter().skip(1) {
-        decode_plane(plane, &mut packed, &runs, &mut image)?;
+        decode_plane(plane, &mut packed, &runs, header.corners(), &mut image)?;
     }
     Ok(image)
 }
@@ -161,6 +169,7 @@ fn decode_plane(
     plane: &PlaneHeader,
     packed: &mut &[u8],
     runs: &Runs,
+    corners: usize,
     image: &mut DepthImage,
 ) -> Result<(), DecodeError> {
     let raw = expand_plane(plane, packed)?;
@@ -185,11 +194,39 @@ fn decode_plane(
             let visibilities = unpack_words(&mut input, samples, WordLayout::Bytes)?;
             image.specular.get_or_insert_default().visibility8.push(runs.scatter(&visibilities, 0));
         }
+        PlaneKind::Passed1 => {
+            image.passed = Some(unpack_bits(take(&mut input, image.inverse_depth_per_m.len().div_ceil(8))?, image));
+        }
+        PlaneKind::CornerInverseDepth => {
+            image.corner_inverse_depth_per_m = Some(unpack_corners(std::mem::take(&mut input), corners)?);
+        }
     }
     if input.is_empty() {
         return Ok(());
     }
     Err(DecodeError::Corrupt { field: plane.kind.name(), reason: "bytes left over" })
+}
+
+fn pack_bits(bits: &[bool]) -> Vec<u8> {
+    bits.chunks(8).map(|eight| (0..).zip(eight).map(|(place, &bit)| u8::from(bit) << place).sum()).collect()
+}
+
+fn unpack_bits(bytes: &[u8], image: &DepthImage) -> Vec<bool> {
+    (0..image.inverse_depth_per_m.len()).map(|index| bytes[index / 8] >> (index % 8) & 1 != 0).collect()
+}
+
+fn pack_corners(corners: &[f32]) -> Vec<u8> {
+    let depth = encode_depth(corners);
+    let range = [depth.range.least_per_m, depth.range.greatest_per_m].map(f32::to_le_bytes);
+    [range.as_flattened(), &depth.bytes].concat()
+}
+
+fn unpack_corners(mut input: &[u8], corners: usize) -> Result<Vec<f32>, DecodeError> {
+    let range = take(&mut input, CORNER_RANGE_BYTES)?;
+    let at = |place: usize| range[place..].first_chunk().map_or(0.0, |&bytes| f32::from_le_bytes(bytes));
+    let range = InverseDepthRange { least_per_m: at(0), greatest_per_m: at(4) };
+    range.validate()?;
+    Ok(decode_depth(input, corners, range)?.1)
 }
 
 fn pack_surface_ids(ids: &[SurfaceId], out: &mut Vec<u8>) {

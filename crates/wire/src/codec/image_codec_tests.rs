@@ -70,6 +70,60 @@ fn an_image_survives() {
     }
 }
 
+/// As an image that leaves out what others hold has them.
+fn apart(width: u32, height: u32) -> DepthImage {
+    let image = image(width, height);
+    let passed = Some(image.inverse_depth_per_m.iter().map(|d| !(0.0..=0.3).contains(d)).collect());
+    let corner_inverse_depth_per_m = Some(tree_over_terrain(width as usize + 1, height as usize + 1, 4));
+    DepthImage { passed, corner_inverse_depth_per_m, ..image }
+}
+
+#[test]
+fn what_was_passed_and_corners_survive() {
+    for (width, height) in [(1, 1), (7, 3), (160, 120)] {
+        let image = apart(width, height);
+        let encoded = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+        let back = decode(&encoded).expect("own encoding");
+        assert_eq!(back.passed, image.passed);
+        let corners = |image: &DepthImage| image.corner_inverse_depth_per_m.clone().expect("corners");
+        let (was, is) = (corners(&image), corners(&back));
+        assert_eq!(was.len(), is.len());
+        assert!(was.iter().zip(&is).all(|(was, is)| (was - is).abs() < 1e-4 && (*was > 0.0 || was == is)));
+        let without = encode_depth_image(&image, PlaneSet::DEPTH_COLOR).expect("consistent planes");
+        let back = decode(&without).expect("own encoding");
+        assert!(back.corner_inverse_depth_per_m.is_none() && back.passed == image.passed);
+    }
+}
+
+#[test]
+fn damaged_planes_of_images_apart_are_refused() {
+    let good = encode_depth_image(&apart(48, 32), PlaneSet::ALL).expect("consistent planes");
+    type Damage = fn(&mut Vec<PlaneHeader>);
+    let cases: [(&str, Damage); 5] = [
+        ("repeated or out of order", |p| p.swap(4, 5)),
+        ("repeated or out of order", |p| p.push(p[5])),
+        ("repeated or out of order", |p| p.swap(3, 4)),
+        ("planes.raw_bytes", |p| p[4].raw_bytes = u32::MAX),
+        ("planes.raw_bytes", |p| p[5].raw_bytes = u32::MAX),
+    ];
+    for (name, damage) in cases {
+        let mut bad = good.clone();
+        damage(&mut bad.header.planes);
+        let error = decode(&bad).expect_err(name).to_string();
+        assert!(error.contains(name), "{name}: {error}");
+    }
+    let mut random = Random::new(3);
+    for _ in 0..3000 {
+        let mut payload = good.payload.to_vec();
+        let place = random.next_u32() as usize % payload.len();
+        payload[place] ^= 1 << (random.next_u32() % 8);
+        // Whatever comes out is of the right size, or an error.
+        if let Ok(image) = decode(&EncodedDepthImage { payload: payload.into(), ..good.clone() }) {
+            image.validate().expect("planes of one size");
+        }
+    }
+}
+
 #[test]
 fn planes_travel_only_when_asked_for() {
     let encoded = encode_depth_image(&image(20, 20), PlaneSet::DEPTH_COLOR).expect("consistent planes");

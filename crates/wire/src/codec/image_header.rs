@@ -26,6 +26,10 @@ pub enum PlaneKind {
     ReflectanceRoughness8,
     /// What share of four lights arrives. Needs reflectance; the one kind of which an image may have several.
     Visibility8,
+    /// Which rays passed surfaces that other images hold.
+    Passed1,
+    /// Inverse depth at texels' corners, with a range of its own.
+    CornerInverseDepth,
 }
 
 /// How a plane is packed.
@@ -35,6 +39,8 @@ pub enum PlaneEncoding {
     SlopeTaggedLz4,
     /// Samples only, differences along the row, tagged by class, LZ4.
     DifferenceTaggedLz4,
+    /// One bit a texel, LZ4.
+    BitsLz4,
 }
 
 impl PlaneKind {
@@ -42,7 +48,8 @@ impl PlaneKind {
     #[must_use]
     pub const fn encoding(self) -> PlaneEncoding {
         match self {
-            Self::InverseDepth => PlaneEncoding::SlopeTaggedLz4,
+            Self::InverseDepth | Self::CornerInverseDepth => PlaneEncoding::SlopeTaggedLz4,
+            Self::Passed1 => PlaneEncoding::BitsLz4,
             Self::ColorRgb9e5
             | Self::NormalOct16
             | Self::SurfaceId
@@ -61,6 +68,8 @@ impl PlaneKind {
             Self::SurfaceId => "surface_id",
             Self::ReflectanceRoughness8 => "reflectance_roughness8",
             Self::Visibility8 => "visibility8",
+            Self::Passed1 => "passed1",
+            Self::CornerInverseDepth => "corner_inverse_depth",
         }
     }
 
@@ -68,20 +77,23 @@ impl PlaneKind {
     #[must_use]
     pub const fn texel_bytes(self) -> usize {
         match self {
-            Self::InverseDepth => 2,
+            Self::InverseDepth | Self::CornerInverseDepth => 2,
+            Self::Passed1 => 1,
             Self::ColorRgb9e5 | Self::NormalOct16 | Self::ReflectanceRoughness8 | Self::Visibility8 => 4,
             Self::SurfaceId => 8,
         }
     }
 
-    /// Most bytes that a plane of `texels` has before LZ4.
-    const fn max_raw_bytes(self, texels: usize) -> usize {
+    /// Most bytes that a plane of `texels` with so many `corners` has before LZ4.
+    const fn max_raw_bytes(self, texels: usize, corners: usize) -> usize {
         match self {
             Self::InverseDepth => max_unpacked_bytes(texels),
             Self::ColorRgb9e5 => max_colors_bytes(texels),
             Self::NormalOct16 => max_words_bytes(texels, WordLayout::Halves),
             Self::SurfaceId => 2 * max_words_bytes(texels, WordLayout::Whole),
             Self::ReflectanceRoughness8 | Self::Visibility8 => max_words_bytes(texels, WordLayout::Bytes),
+            Self::Passed1 => texels.div_ceil(8),
+            Self::CornerInverseDepth => CORNER_RANGE_BYTES + max_unpacked_bytes(corners),
         }
     }
 }
@@ -108,13 +120,18 @@ pub struct PlaneSet {
     pub surface_id: bool,
     /// What highlights need, where the image has it. Normals then travel too, wanted or not.
     pub specular: bool,
+    /// Depths at texels' corners, where the image has them.
+    pub corners: bool,
 }
 
+/// Of a plane of corners, before its codes.
+pub(super) const CORNER_RANGE_BYTES: usize = 8;
+
 impl PlaneSet {
-    /// Inverse depth and colour only.
-    pub const DEPTH_COLOR: Self = Self { normal: false, surface_id: false, specular: false };
+    /// Inverse depth and colour only, and which rays passed something, without which depths would be misread.
+    pub const DEPTH_COLOR: Self = Self { normal: false, surface_id: false, specular: false, corners: false };
     /// Whatever the image has.
-    pub const ALL: Self = Self { normal: true, surface_id: true, specular: true };
+    pub const ALL: Self = Self { normal: true, surface_id: true, specular: true, corners: true };
 }
 
 /// Size, planes and range of an encoded depth image. The camera travels beside it.
@@ -143,7 +160,11 @@ impl ImageHeader {
             if plane.encoding != plane.kind.encoding() {
                 return Err(DecodeError::Header { field: "planes.encoding", reason: "not the encoding of this kind" });
             }
-            check_limit("planes.raw_bytes", u64::from(plane.raw_bytes), plane.kind.max_raw_bytes(texels) as u64)?;
+            check_limit(
+                "planes.raw_bytes",
+                u64::from(plane.raw_bytes),
+                plane.kind.max_raw_bytes(texels, self.corners()) as u64,
+            )?;
         }
         let texel_bytes: usize = self.planes.iter().map(|plane| plane.kind.texel_bytes()).sum();
         check_limit("image_bytes", texels as u64 * texel_bytes as u64, limits.max_image_bytes as u64)?;
@@ -151,7 +172,8 @@ impl ImageHeader {
         Ok(texels)
     }
 
-    /// Depth, colour, \[normal\], \[surface id\], \[reflectance, visibility*\]; reflectance only with normals.
+    /// Depth, colour, \[normal\], \[surface id\], \[reflectance, visibility*\], \[passed\], \[corners\]; reflectance
+    /// only with normals.
     fn validate_kinds(&self) -> Result<(), DecodeError> {
         let error = |reason| Err(DecodeError::Header { field: "planes.kind", reason });
         let kinds: Vec<_> = self.planes.iter().map(|plane| plane.kind).collect();
@@ -162,13 +184,20 @@ impl ImageHeader {
         let (surface_ids, rest) = leading(rest, PlaneKind::SurfaceId);
         let (reflectances, rest) = leading(rest, PlaneKind::ReflectanceRoughness8);
         let (visibilities, rest) = leading(rest, PlaneKind::Visibility8);
-        if !rest.is_empty() || normals.max(surface_ids).max(reflectances) > 1 {
+        let (passed, rest) = leading(rest, PlaneKind::Passed1);
+        let (corners, rest) = leading(rest, PlaneKind::CornerInverseDepth);
+        if !rest.is_empty() || [normals, surface_ids, reflectances, passed, corners].iter().any(|&count| count > 1) {
             return error("repeated or out of order");
         }
         if reflectances > normals || (visibilities > 0 && reflectances == 0) {
             return error("reflectance without normals, or visibility without reflectance");
         }
         check_limit("planes.visibility8", visibilities as u64, MAX_VISIBILITY_PLANES as u64)
+    }
+
+    /// Corners of texels. Sides have been checked.
+    pub(super) fn corners(&self) -> usize {
+        (self.width as usize + 1) * (self.height as usize + 1)
     }
 
     /// Bytes of all planes in the payload.

@@ -51,7 +51,7 @@ const COLUMNS: [(&str, &str); 8] = [
 
 /// Adds a table, charts and checks.
 pub fn compare(args: &BenchArgs, engine: &Arc<GpuEngine>, setup: &Setup, report: &mut Report) -> anyhow::Result<()> {
-    let spec: SceneSpec = SMOOTH.parse().unwrap_or_else(|never| match never {});
+    let spec: SceneSpec = SMOOTH.parse()?;
     let smooth = SceneArgs { sample_size: args.scene.sample_size, ..SceneArgs::of(spec) }.load()?;
     engine.put_scene(smooth.offer.hash.as_str(), &smooth.scene)?;
     let mut table = Table::new(format!("Adaptive rate, {FINE}"), &COLUMNS);

@@ -45,7 +45,7 @@ struct Moment {
 /// Adds a table, a chart and checks.
 pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let name = if args.quick { SCENE_QUICK } else { SCENE };
-    let spec: SceneSpec = name.parse().unwrap_or_else(|never| match never {});
+    let spec: SceneSpec = name.parse()?;
     let setup = SceneArgs::of(spec).load()?;
     engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
     let scene = engine.scene(setup.offer.hash.as_str())?;

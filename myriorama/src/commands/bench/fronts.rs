@@ -74,7 +74,7 @@ const GAPS: &str = "poles";
 
 /// Sweeps a scene with disocclusions.
 pub fn gaps(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
-    sweep_scene(GAPS, GAPS.parse().unwrap_or_else(|never| match never {}), args, engine, report)
+    sweep_scene(GAPS, GAPS.parse()?, args, engine, report)
 }
 
 fn sweep_scene(
@@ -86,7 +86,7 @@ fn sweep_scene(
 ) -> anyhow::Result<()> {
     let scene = SceneArgs { lighting: args.scene.lighting, ..SceneArgs::of(spec) };
     let setup = scene.load()?;
-    let cell = ViewCell::between(&setup.samples).context("no sample cameras")?;
+    let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
     let truth = Truth::take(engine, &setup, &scene, cell.spread(args.compared_views(), VIEW_SIZE_PX))?;
     compare(name, &truth, args, report)
 }

@@ -90,7 +90,7 @@ fn ms_in_turn(args: &BenchArgs, both: [&Truth; 2]) -> anyhow::Result<[f64; 2]> {
 pub fn glossy(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let scene = glossy_scene(args)?;
     engine.put_scene(scene.offer.hash.as_str(), &scene.scene)?;
-    let cell = ViewCell::between(&scene.samples).ok_or_else(|| anyhow::anyhow!("no sample cameras"))?;
+    let cell = ViewCell::between(&scene.around).ok_or_else(|| anyhow::anyhow!("no sample cameras"))?;
     let take = |lighting: Lighting| {
         let lit = SceneArgs { lighting, ..args.scene.clone() };
         Truth::take(engine, &scene, &lit, cell.spread(args.compared_views(), VIEW_SIZE_PX))

@@ -1,0 +1,201 @@
+//! Images that leave out what others hold: holes, and samples to which no way is proven free.
+
+use depth_image::{
+    DepthImage, HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, View, linear_from_rgb9e5, rgb9e5_from_linear,
+};
+use glam::{UVec2, Vec3};
+use metrics::{PixelClass, classify};
+use reconstruction::ReconstructionMethod;
+use scene::procedural::{poles, quad};
+
+use crate::stage::{
+    Agreement, CARVE, Corners, SAMPLE_PX, SEARCH, Stage, VIEW_PX, assert_sane, colors_differ_by, corpus, count, depths,
+    kinds, looking,
+};
+
+const METHODS: [ReconstructionMethod; 2] = [CARVE, SEARCH];
+
+/// Of the foreground, what was found nowhere, and what was found too far from where it is.
+struct Faults {
+    missing: f64,
+    wrong: f64,
+    disoccluded: f64,
+}
+
+fn faults(stage: &Stage, camera: &PinholeCamera, method: ReconstructionMethod) -> Faults {
+    let (view, truth) = (stage.view(camera, method), stage.truth(camera));
+    assert_sane(&view, &method.to_string());
+    let classes = classify(camera, depths(&truth), &stage.images).expect("planes of one size");
+    let (mut missing, mut wrong, mut covered, mut disoccluded, mut foreground) = (0, 0, 0, 0, 0);
+    for (i, class) in classes.iter().enumerate() {
+        let surface = depths(&truth)[i] > 0.0;
+        foreground += usize::from(surface);
+        disoccluded += usize::from(*class == PixelClass::Disoccluded);
+        if *class != PixelClass::Covered {
+            continue;
+        }
+        covered += 1;
+        let hit = kinds(&view)[i] == ProvenanceKind::Hit;
+        missing += usize::from(!hit);
+        wrong += usize::from(hit && (depths(&view)[i] / depths(&truth)[i] - 1.0).abs() > 0.01);
+    }
+    let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
+    Faults {
+        missing: share(missing, covered),
+        wrong: share(wrong, covered),
+        disoccluded: share(disoccluded, foreground),
+    }
+}
+
+#[test]
+fn more_is_seen_and_what_is_seen_is_as_right() {
+    println!("covered pixels missing and wrong, and disocclusion: conventional, then apart");
+    for (name, scene, corners) in corpus() {
+        let (cameras, view) = (corners.samples(4), corners.camera(0.1, -0.2, VIEW_PX));
+        let (whole, apart) = (Stage::new(scene.clone(), &cameras), Stage::apart(scene, &cameras));
+        for method in METHODS {
+            let [before, after] = [&whole, &apart].map(|stage| faults(stage, &view, method));
+            let percent = |f: &Faults| [f.missing, f.wrong, f.disoccluded].map(|share| 100.0 * share);
+            println!("{name:<18} {method:<22} {:5.2?} {:5.2?}", percent(&before), percent(&after));
+            assert!(after.disoccluded <= before.disoccluded + 0.005, "{name} {method}: more disoccluded");
+            if method == CARVE {
+                assert!(after.missing <= before.missing + 0.03, "{name}: {} missing", after.missing);
+                assert!(after.wrong <= before.wrong + 0.03, "{name}: {} wrong", after.wrong);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_device_is_its_twin_among_holes() {
+    for (name, scene, corners) in corpus() {
+        let stage = Stage::apart(scene, &corners.samples(3));
+        for method in METHODS {
+            let agreement = Agreement::of(&stage.view(&corners.view(), method), &stage.twin(&corners.view(), method));
+            println!("{name:<18} {method:<22} {agreement:?}");
+            assert!(agreement.is_good(), "{name} {method}: {agreement:?}");
+        }
+    }
+}
+
+/// Two images of a wall, each with every other texel a hole, side by side they have all.
+#[test]
+fn halves_make_a_closed_wall() {
+    let corners = Corners { eye: Vec3::Z * 4.0, target: Vec3::ZERO, half_m: 0.0 };
+    let mut stage = Stage::new(quad(Vec3::ZERO, 3.0, Vec3::Z, [120, 160, 90]), &corners.samples(2));
+    for (number, image) in stage.images.iter_mut().enumerate() {
+        punch(image, |x, y| (x + y) as usize % 2 == number);
+    }
+    let view = stage.view(&corners.camera(0.0, 0.0, VIEW_PX), CARVE);
+    assert_eq!(count(&view, ProvenanceKind::Hit), VIEW_PX.element_product() as usize);
+    // A hole certifies nothing and blocks nothing: beside a whole image an empty one changes nothing.
+    let whole = Stage::new(quad(Vec3::ZERO, 3.0, Vec3::Z, [120, 160, 90]), &corners.samples(1));
+    let mut beside = whole.clone();
+    let mut empty = whole.images[0].clone();
+    punch(&mut empty, |_, _| true);
+    beside.images.push(empty);
+    let camera = corners.camera(0.1, 0.1, VIEW_PX);
+    for method in METHODS {
+        let (alone, beside) = (whole.view(&camera, method), beside.view(&camera, method));
+        let far = (0..kinds(&alone).len()).filter(|&i| colors_differ_by(&alone, &beside, i) > 1).count();
+        assert!(far == 0 && kinds(&alone) == kinds(&beside), "{method}: {far} pixels differ");
+    }
+}
+
+fn punch(image: &mut DepthImage, is_hole: impl Fn(u32, u32) -> bool) {
+    let width = image.size_px().x;
+    for (place, depth) in (0..).zip(&mut image.inverse_depth_per_m) {
+        if is_hole(place % width, place / width) {
+            *depth = HOLE_INVERSE_DEPTH;
+        }
+    }
+}
+
+#[test]
+fn nothing_but_holes_is_an_honest_nothing() {
+    let corners = Corners { eye: Vec3::Z * 4.0, target: Vec3::ZERO, half_m: 0.3 };
+    let mut stage = Stage::new(quad(Vec3::ZERO, 1.0, Vec3::Z, [9, 9, 9]), &corners.samples(2));
+    stage.images.iter_mut().for_each(|image| punch(image, |_, _| true));
+    for method in METHODS {
+        let view = stage.view(&corners.view(), method);
+        assert_sane(&view, "holes");
+        assert_eq!(count(&view, ProvenanceKind::Hit), 0, "{method}");
+    }
+}
+
+/// What the second image shows behind a pole that it left out proves nothing of the way there.
+#[test]
+fn what_is_left_out_is_not_carved_away() {
+    let camera = looking(Vec3::Z * 4.0, Vec3::Z * -2.0, 60.0, SAMPLE_PX);
+    // The same camera twice: the second image is what lies behind the first.
+    let stage = Stage::apart(poles(0.08), &[camera, camera]);
+    assert!(stage.images[1].passed.is_some());
+    let mut naive = stage.clone();
+    naive.images[1].passed = None;
+    let aside = looking(Vec3::new(0.3, 0.0, 4.0), Vec3::Z * -2.0, 40.0, VIEW_PX);
+    let kept = |stage: &Stage| {
+        let (view, truth) = (stage.view(&aside, CARVE), stage.truth(&aside));
+        // The wall is the farthest.
+        let wall = depths(&truth).iter().copied().filter(|&d| d > 0.0).fold(f32::MAX, f32::min);
+        let poles: Vec<usize> = (0..depths(&truth).len()).filter(|&i| depths(&truth)[i] > 1.3 * wall).collect();
+        let kept = poles.iter().filter(|&&i| (depths(&view)[i] / depths(&truth)[i] - 1.0).abs() < 0.02).count();
+        kept as f64 / poles.len().max(1) as f64
+    };
+    let (right, wrong) = (kept(&stage), kept(&naive));
+    println!("poles kept: {right:.3}, {wrong:.3} if left-out surfaces counted as free space");
+    assert!(right > 0.8 && wrong < 0.6, "{right} {wrong}");
+}
+
+/// A slanting wall of smooth colour, whose left half one image has and whose right half the other.
+#[test]
+fn no_seam_shows_where_one_image_hands_over_to_the_other() {
+    let corners = Corners { eye: Vec3::new(0.5, 0.3, 4.0), target: Vec3::ZERO, half_m: 0.4 };
+    let mut whole = Stage::new(quad(Vec3::ZERO, 3.0, Vec3::new(0.3, 0.1, 1.0), [120, 160, 90]), &corners.samples(2));
+    for (number, image) in whole.images.iter_mut().enumerate() {
+        paint(image, 1.0 + 0.02 * number as f32);
+    }
+    let mut split = whole.clone();
+    punch(&mut split.images[0], |x, _| x > SAMPLE_PX.x / 2);
+    punch(&mut split.images[1], |x, _| x + 24 < SAMPLE_PX.x / 2);
+    // Narrower than the samples, that all of it is seen by both.
+    let camera = looking(corners.eye, corners.target, 32.0, UVec2::new(128, 96));
+    let (smooth, seamed) = (whole.view(&camera, CARVE), split.view(&camera, CARVE));
+    assert_eq!(count(&seamed, ProvenanceKind::Hit), count(&smooth, ProvenanceKind::Hit));
+    let (before, after) = (greatest_step(&smooth), greatest_step(&seamed));
+    println!("greatest step between neighbours: {before} codes whole, {after} split");
+    assert!(after <= before + 2, "{before} {after}");
+}
+
+/// A gradient over the world; two cameras may disagree by a factor, as highlights make them.
+fn paint(image: &mut DepthImage, factor: f32) {
+    let size = image.size_px();
+    for (x, y) in (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y))) {
+        if let Some(point) = image.sample_in_world(x, y) {
+            let grey = factor * (0.35 + 0.05 * point.x + 0.03 * point.y);
+            image.color_rgb9e5[(y * size.x + x) as usize] = rgb9e5_from_linear(Vec3::splat(grey));
+        }
+    }
+    assert!(linear_from_rgb9e5(image.color_rgb9e5[0]).is_finite());
+}
+
+fn greatest_step(view: &View) -> u8 {
+    let width = view.size_px.x as usize;
+    let step = |i: usize| (0..3).map(|c| view.srgb8[3 * i + c].abs_diff(view.srgb8[3 * i + 3 + c])).max().unwrap_or(0);
+    (0..kinds(view).len() - 1).filter(|i| i % width != width - 1).map(step).max().unwrap_or(0)
+}
+
+#[test]
+fn a_wall_that_only_passing_rays_reach_is_met() {
+    let scene = poles(0.25);
+    let eye = Vec3::Z * 4.0;
+    let camera = looking(eye, Vec3::Z * -2.0, 60.0, SAMPLE_PX);
+    // The same camera twice: the second image is what lies behind the first.
+    let stage = Stage::apart(scene, &[camera, camera]);
+    let behind = stage.images[1].inverse_depth_per_m.iter().filter(|&&d| d > 0.0).count();
+    assert!(behind > 300, "{behind} samples behind the poles");
+    let aside = looking(eye + Vec3::X * 0.4, Vec3::Z * -2.0, 40.0, VIEW_PX);
+    let first = Stage { images: stage.images[..1].to_vec(), ..stage.clone() };
+    let [alone, both] = [&first, &stage].map(|stage| count(&stage.view(&aside, CARVE), ProvenanceKind::Filled));
+    println!("pixels filled: {alone} with one layer, {both} with two");
+    assert!(both * 4 < alone, "{alone} {both}");
+}

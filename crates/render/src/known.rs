@@ -1,0 +1,157 @@
+//! What the images of a set hold, for tests of what later ones may leave out.
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+use depth_image::PinholeCamera;
+use gpu::{Frame, Gpu, GpuError};
+use wgpu::{BindingResource, BufferUsages, TextureFormat, TextureUsages};
+
+use crate::{
+    RenderError,
+    binding::{Slot, bind_group, texture, window},
+    form::{ComputePipelines, Form, Pass},
+    pixel_camera::{PIXEL_CAMERA_BYTES, PIXEL_CAMERA_STRIDE},
+    surfaces::Surfaces,
+};
+
+/// A test of one candidate sample against one camera before the image's own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct LeaveOut {
+    /// The template that holds `fn is_known(candidate: Candidate, number: u32, camera: KnownCamera) -> bool`.
+    pub shader: &'static str,
+    /// Whether it asks the scene by rays; else it asks what the images before hold.
+    pub traces_rays: bool,
+    /// Whether all images have one camera, so that pixels are compared with the same pixel.
+    pub from_one_place: bool,
+}
+
+/// `KnownCamera` of `known.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct KnownCamera {
+    pub homogeneous_pixel_from_world: [[f32; 4]; 3],
+    pub eye_in_world: [f32; 3],
+    pub footprint: f32,
+    pub column_in_world: [f32; 3],
+    pub columns: f32,
+    pub row_in_world: [f32; 3],
+    pub rows: f32,
+    pub near_m: f32,
+    pub padding_0: f32,
+    pub padding_1: f32,
+    pub padding_2: f32,
+}
+
+/// The cameras of a set and, where a test asks for it, what their images hold.
+pub(crate) struct Known {
+    cameras: Vec<PinholeCamera>,
+    uniform: wgpu::Buffer,
+    /// All layers, to be read.
+    held: wgpu::TextureView,
+    /// Each layer, to be written.
+    layers: Vec<wgpu::TextureView>,
+}
+
+/// What is bound to a test.
+pub(crate) const KNOWN_SLOTS: [Slot; 3] = [Slot::WordTextureArray, Slot::Uniform, Slot::Written];
+
+impl Known {
+    /// Nothing is held yet.
+    pub fn of(gpu: &Gpu, cameras: &[PinholeCamera], test: LeaveOut) -> Result<Self, GpuError> {
+        let limits = &gpu.device.limits();
+        at_most("images of a set", cameras.len(), limits.max_texture_array_layers)?;
+        let gpu_cameras: Vec<KnownCamera> = cameras.iter().map(KnownCamera::of).collect();
+        let bytes: &[u8] = bytemuck::cast_slice(&gpu_cameras);
+        at_most("the cameras of a set (bytes)", bytes.len(), limits.max_uniform_buffer_binding_size as u32)?;
+        let size = |side: fn(&PinholeCamera) -> u32| {
+            if test.traces_rays { 1 } else { cameras.iter().map(side).max().unwrap_or(1) }
+        };
+        let held = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("held samples"),
+            size: wgpu::Extent3d {
+                width: size(|camera| camera.size_px.x),
+                height: size(|camera| camera.size_px.y),
+                depth_or_array_layers: cameras.len() as u32,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: TextureFormat::Rgba32Uint,
+            usage: TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        let layer = |base_array_layer| {
+            held.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2),
+                base_array_layer,
+                array_layer_count: Some(1),
+                ..Default::default()
+            })
+        };
+        Ok(Self {
+            cameras: cameras.to_vec(),
+            uniform: gpu.buffer_with("known cameras", bytes, BufferUsages::UNIFORM),
+            layers: (0..cameras.len() as u32).map(layer).collect(),
+            held: held.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2Array),
+                ..Default::default()
+            }),
+        })
+    }
+
+    /// In the order of [`KNOWN_SLOTS`], for an image after `earlier` others.
+    pub fn resources<'r>(&'r self, earlier: usize, left_out: &'r wgpu::Buffer) -> [BindingResource<'r>; 3] {
+        debug_assert!(earlier <= self.cameras.len());
+        let cameras = window(&self.uniform, earlier.max(1) * size_of::<KnownCamera>());
+        [texture(&self.held), cameras, left_out.as_entire_binding()]
+    }
+
+    /// Records what the `number`-th camera's image holds, which is the `place`-th of its submission.
+    pub fn keep(
+        &self,
+        gpu: &Arc<Gpu>,
+        pipelines: &ComputePipelines,
+        frame: &mut Frame<'_>,
+        (number, place): (usize, u32),
+        (surfaces, by_rays): (&Surfaces, bool),
+        cameras: &wgpu::Buffer,
+    ) -> Result<(), RenderError> {
+        let pipeline = pipelines.get(Form { pass: Pass::Keep, by_rays, ..Form::default() })?;
+        let mut resources =
+            vec![window(cameras, PIXEL_CAMERA_BYTES), texture(&surfaces.surface), texture(&surfaces.depth)];
+        resources.extend(surfaces.ids.as_ref().map(texture));
+        resources.push(texture(&self.layers[number]));
+        let bound = bind_group(gpu, &pipeline.get_bind_group_layout(0), resources);
+        let groups = surfaces.size_px().map(|side| side.div_ceil(8));
+        let mut pass = frame.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &bound, &[place * PIXEL_CAMERA_STRIDE]);
+        pass.dispatch_workgroups(groups.x, groups.y, 1);
+        Ok(())
+    }
+}
+
+impl KnownCamera {
+    fn of(camera: &PinholeCamera) -> Self {
+        let column = camera.world_from_camera * glam::Vec3::X / camera.focal_px.x;
+        let row = camera.world_from_camera * glam::Vec3::NEG_Y / camera.focal_px.y;
+        let size = camera.size_px.as_vec2();
+        Self {
+            homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world().map(|row| row.to_array()),
+            eye_in_world: camera.eye_in_world.to_array(),
+            footprint: camera.focal_px.min_element().recip(),
+            column_in_world: column.to_array(),
+            columns: size.x,
+            row_in_world: row.to_array(),
+            rows: size.y,
+            near_m: camera.near_m,
+            ..Self::zeroed()
+        }
+    }
+}
+
+fn at_most(what: &str, needed: usize, limit: u32) -> Result<(), GpuError> {
+    let (needed, limit) = (needed as u64, u64::from(limit));
+    if needed <= limit { Ok(()) } else { Err(GpuError::Limit { what: what.to_owned(), needed, limit }) }
+}

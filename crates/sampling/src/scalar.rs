@@ -1,0 +1,181 @@
+//! The scalar reference of this crate: one ray a pixel, one after the other, which goes on behind what is left out.
+
+use depth_image::{
+    BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, HOLE_INVERSE_DEPTH, PinholeCamera, Ray, SurfaceId, oct16_from_unit,
+    unit_from_oct16,
+};
+use glam::{UVec2, Vec2, Vec3};
+use render::scalar::rays::{Hit, Scene, pixel_ray};
+
+use crate::{Redundancy, SamplingMethod};
+
+/// A sample that an image would show.
+#[derive(Debug, Clone, Copy)]
+pub struct Candidate {
+    /// Where it lies.
+    pub point_in_world: Vec3,
+    /// Unit length, towards the camera.
+    pub normal: Vec3,
+    /// Of which triangle.
+    pub id: SurfaceId,
+    /// A pixel's length on the surface.
+    pub footprint_m: f32,
+    planar_depth_m: f32,
+    pixel: UVec2,
+}
+
+/// As in the shaders.
+const LEAST_FACING: f32 = 0.01;
+const SAME_DEPTH: f32 = 2e-5;
+const SAME_FOOTPRINTS: f32 = 0.0625;
+const DEPTH_FOOTPRINTS: f32 = 2.0;
+const SLOPE_PX: f32 = 1.0;
+const SAME_FACING: f32 = 0.906_307_8;
+const COARSER: f32 = 1.5;
+const MOST_LAYERS: usize = 64;
+
+/// Depth, normals and surface ids of a set; colours are left black.
+#[must_use]
+pub fn sample(scene: &Scene, cameras: &[PinholeCamera], method: SamplingMethod) -> Vec<DepthImage> {
+    let mut images: Vec<DepthImage> = Vec::with_capacity(cameras.len());
+    for camera in cameras {
+        let pixels = (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| UVec2::new(x, y)));
+        let texels: Vec<Texel> = pixels.map(|pixel| texel(scene, camera, pixel, &images, method)).collect();
+        images.push(image(camera, &texels));
+    }
+    images
+}
+
+struct Texel {
+    inverse_depth_per_m: f32,
+    normal_oct16: u32,
+    id: SurfaceId,
+    passed: bool,
+}
+
+fn texel(scene: &Scene, camera: &PinholeCamera, pixel: UVec2, earlier: &[DepthImage], method: SamplingMethod) -> Texel {
+    let ray = pixel_ray(camera, pixel);
+    let (mut near, mut passed) = (camera.near_m, false);
+    for _ in 0..MOST_LAYERS {
+        let Some(hit) = scene.closest(&ray, near).0 else { break };
+        let candidate = candidate(scene, camera, pixel, &ray, &hit);
+        if !earlier.iter().any(|image| is_known(scene, &candidate, image, method)) {
+            let (id, normal_oct16) = (candidate.id, oct16_from_unit(candidate.normal));
+            return Texel { inverse_depth_per_m: hit.t.recip(), normal_oct16, id, passed };
+        }
+        (near, passed) = (hit.t, true);
+    }
+    let inverse_depth_per_m = if passed { HOLE_INVERSE_DEPTH } else { BACKGROUND_INVERSE_DEPTH };
+    Texel { inverse_depth_per_m, normal_oct16: 0, id: SurfaceId { instance: 0, primitive: 0 }, passed }
+}
+
+fn candidate(scene: &Scene, camera: &PinholeCamera, pixel: UVec2, ray: &Ray, hit: &Hit) -> Candidate {
+    let sight = ray.direction_in_world * hit.t;
+    let normal = scene.normal_in_world(hit);
+    Candidate {
+        point_in_world: ray.origin_in_world + sight,
+        normal,
+        id: scene.surface_id(hit),
+        footprint_m: stretched_footprint(hit.t, camera, normal, sight),
+        planar_depth_m: hit.t,
+        pixel,
+    }
+}
+
+fn stretched_footprint(planar_depth_m: f32, camera: &PinholeCamera, normal: Vec3, sight: Vec3) -> f32 {
+    let facing = normal.dot(sight).abs() / sight.length().max(1e-15);
+    planar_depth_m / camera.focal_px.min_element() / facing.max(LEAST_FACING)
+}
+
+fn image(camera: &PinholeCamera, texels: &[Texel]) -> DepthImage {
+    DepthImage {
+        camera: Camera::Pinhole(*camera),
+        inverse_depth_per_m: texels.iter().map(|texel| texel.inverse_depth_per_m).collect(),
+        color_rgb9e5: vec![0; texels.len()],
+        normal_oct16: Some(texels.iter().map(|texel| texel.normal_oct16).collect()),
+        surface_id: Some(texels.iter().map(|texel| texel.id).collect()),
+        specular: None,
+        passed: texels.iter().any(|texel| texel.passed).then(|| texels.iter().map(|texel| texel.passed).collect()),
+        corner_inverse_depth_per_m: None,
+    }
+}
+
+fn is_known(scene: &Scene, candidate: &Candidate, image: &DepthImage, method: SamplingMethod) -> bool {
+    match method {
+        SamplingMethod::Conventional => false,
+        SamplingMethod::NonRedundant(Redundancy::Pixel) => is_pixel_redundant(candidate, image),
+        SamplingMethod::NonRedundant(Redundancy::Visibility) => {
+            let Camera::Pinhole(camera) = &image.camera;
+            is_visibility_redundant(scene, candidate.point_in_world, candidate.footprint_m, camera)
+        }
+        SamplingMethod::NonRedundant(Redundancy::Tolerance) => is_tolerance_redundant(candidate, image),
+        SamplingMethod::DepthPeeling { .. } => is_in_layer(candidate, image),
+    }
+}
+
+/// Where a point is seen by a camera, if it is: its pixel and planar depth.
+fn place(camera: &PinholeCamera, point_in_world: Vec3) -> Option<(Vec2, f32)> {
+    let seen = camera.project(point_in_world)?;
+    let inside = seen.pixel.cmpge(Vec2::ZERO).all() && seen.pixel.cmplt(camera.size_px.as_vec2()).all();
+    (inside && seen.planar_depth_m > camera.near_m).then_some((seen.pixel, seen.planar_depth_m))
+}
+
+/// Xie, Algorithm 3. False for an image without surface ids.
+#[must_use]
+pub fn is_pixel_redundant(candidate: &Candidate, image: &DepthImage) -> bool {
+    holds(image, candidate.point_in_world, candidate.id)
+}
+
+/// Whether an image has a sample of a triangle at the pixel that a point is seen at.
+#[must_use]
+pub fn holds(image: &DepthImage, point_in_world: Vec3, id: SurfaceId) -> bool {
+    let Camera::Pinhole(camera) = &image.camera;
+    let (Some((pixel, _)), Some(ids)) = (place(camera, point_in_world), &image.surface_id) else { return false };
+    let index = index_of(camera, pixel.as_uvec2());
+    image.inverse_depth_per_m[index] > 0.0 && ids[index] == id
+}
+
+/// Xie, Algorithm 2: whether the first thing on the way from a camera to a point is the point itself.
+#[must_use]
+pub fn is_visibility_redundant(scene: &Scene, point_in_world: Vec3, footprint_m: f32, camera: &PinholeCamera) -> bool {
+    let Some((_, depth_m)) = place(camera, point_in_world) else { return false };
+    let room_m = SAME_DEPTH * depth_m + SAME_FOOTPRINTS * footprint_m;
+    let direction_in_world = (point_in_world - camera.eye_in_world) / depth_m;
+    let ray = Ray { origin_in_world: camera.eye_in_world, direction_in_world };
+    let met = scene.closest_between(&ray, camera.near_m, depth_m + room_m).0;
+    met.is_some_and(|hit| hit.t >= depth_m - room_m)
+}
+
+fn is_tolerance_redundant(candidate: &Candidate, image: &DepthImage) -> bool {
+    let Camera::Pinhole(camera) = &image.camera;
+    let (Some((pixel, depth_m)), Some(normals)) = (place(camera, candidate.point_in_world), &image.normal_oct16) else {
+        return false;
+    };
+    let sight = candidate.point_in_world - camera.eye_in_world;
+    let steps = [Vec3::X / camera.focal_px.x, Vec3::NEG_Y / camera.focal_px.y].map(|s| camera.world_from_camera * s);
+    let across: f32 = steps.iter().map(|step| candidate.normal.dot(*step).abs()).sum();
+    let slope = depth_m * across / (candidate.normal.dot(sight).abs() / depth_m).max(1e-6);
+    let room_m = (DEPTH_FOOTPRINTS * depth_m / camera.focal_px.min_element()).max(SLOPE_PX * slope);
+    let first = (pixel - 0.5).floor().as_ivec2();
+    let last = camera.size_px.as_ivec2() - 1;
+    [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().any(|(x, y)| {
+        let texel = (first + glam::IVec2::new(x, y)).clamp(glam::IVec2::ZERO, last).as_uvec2();
+        let index = index_of(camera, texel);
+        let inverse_depth = image.inverse_depth_per_m[index];
+        let normal = unit_from_oct16(normals[index]);
+        inverse_depth > 0.0
+            && (inverse_depth.recip() - depth_m).abs() < room_m
+            && normal.dot(candidate.normal) > SAME_FACING
+            && stretched_footprint(inverse_depth.recip(), camera, normal, sight) <= COARSER * candidate.footprint_m
+    })
+}
+
+fn is_in_layer(candidate: &Candidate, image: &DepthImage) -> bool {
+    let Camera::Pinhole(camera) = &image.camera;
+    let inverse_depth = image.inverse_depth_per_m[index_of(camera, candidate.pixel)];
+    inverse_depth <= 0.0 || candidate.planar_depth_m * inverse_depth <= 1.0 + 1e-6
+}
+
+fn index_of(camera: &PinholeCamera, pixel: UVec2) -> usize {
+    (pixel.y * camera.size_px.x + pixel.x) as usize
+}

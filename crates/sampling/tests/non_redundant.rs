@@ -1,0 +1,240 @@
+//! Images that leave out what others hold: against the scalar reference, and what must hold of them.
+
+use std::sync::{Arc, OnceLock};
+
+use depth_image::{Camera, DepthImage, PinholeCamera};
+use glam::{UVec2, Vec3};
+use gpu::{DevicePreference, Gpu};
+use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
+use sampling::{Redundancy, Rig, SampleWork, Sampler, SamplingError, SamplingMethod, scalar};
+use scene::Scene;
+use scene::procedural::{blocks, blocks_viewpoints, courtyard, poles};
+
+const SIZE_PX: UVec2 = UVec2::new(80, 60);
+const ALL: SamplePlanes = SamplePlanes { normal: true, surface_id: true, specular: false, corners: true };
+const APART: [SamplingMethod; 3] = [
+    SamplingMethod::NonRedundant(Redundancy::Pixel),
+    SamplingMethod::NonRedundant(Redundancy::Visibility),
+    SamplingMethod::NonRedundant(Redundancy::Tolerance),
+];
+
+fn device() -> &'static (Arc<Gpu>, Sampler) {
+    static DEVICE: OnceLock<(Arc<Gpu>, Sampler)> = OnceLock::new();
+    DEVICE.get_or_init(|| {
+        let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
+        let sampler = Sampler::new(&gpu).expect("a sampler");
+        (gpu, sampler)
+    })
+}
+
+fn upload(scene: &Scene) -> GpuScene {
+    GpuScene::upload(&device().0, scene).expect("a scene")
+}
+
+fn taken(
+    scene: &GpuScene,
+    cameras: &[PinholeCamera],
+    method: SamplingMethod,
+    visibility: Visibility,
+) -> Result<Vec<DepthImage>, SamplingError> {
+    let draw =
+        DrawWork { scene, lighting: Lighting::PHONG, scene_time_s: 0.0, visibility, refinement: Refinement::default() };
+    let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
+    let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
+    device().1.sample(&SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes: ALL })
+}
+
+fn sample(scene: &GpuScene, cameras: &[PinholeCamera], method: SamplingMethod) -> Vec<DepthImage> {
+    taken(scene, cameras, method, Visibility::Measured).expect("images")
+}
+
+fn two_plane(scene: &Scene) -> Vec<PinholeCamera> {
+    Rig::two_plane(&scene.bounds(), 2.5).expect("a rig").samples(SIZE_PX)
+}
+
+/// The two viewpoints of Xie's Fig. 3.
+fn fig_3() -> Vec<PinholeCamera> {
+    let viewpoints = blocks_viewpoints();
+    let camera = |eye| PinholeCamera::looking_at(eye, viewpoints.target_in_world, Vec3::Y, 0.9, SIZE_PX);
+    viewpoints.eyes_in_world.map(camera).to_vec()
+}
+
+/// Of all texels, those that hold something else: another kind of texel, another depth, or another way there.
+fn differing(a: &DepthImage, b: &DepthImage) -> f64 {
+    let differs = |(i, (&a_depth, &b_depth)): (usize, (&f32, &f32))| {
+        let far = (a_depth - b_depth).abs() > 1e-3 * a_depth.abs();
+        far || a.has_passed(i) != b.has_passed(i)
+    };
+    let depths = a.inverse_depth_per_m.iter().zip(&b.inverse_depth_per_m);
+    depths.enumerate().filter(|&texel| differs(texel)).count() as f64 / a.inverse_depth_per_m.len() as f64
+}
+
+#[test]
+fn the_device_leaves_out_what_the_reference_leaves_out() {
+    for (name, scene, cameras) in [
+        ("blocks", blocks(), fig_3()),
+        ("poles", poles(0.02), two_plane(&poles(0.02))),
+        ("courtyard", courtyard(), two_plane(&courtyard())),
+    ] {
+        let on_device = upload(&scene);
+        let rays = on_device.scalar_rays(0.0).expect("a tree");
+        let peeling = SamplingMethod::DepthPeeling { layers: 3 };
+        for method in APART.into_iter().chain([peeling]) {
+            let cameras = method.cameras(cameras.clone());
+            let reference = scalar::sample(&rays, &cameras, method);
+            for visibility in [Visibility::Rays, Visibility::Triangles] {
+                if visibility == Visibility::Triangles && !method.is_chained() {
+                    continue;
+                }
+                let images = taken(&on_device, &cameras, method, visibility).expect("images");
+                for (number, (image, reference)) in images.iter().zip(&reference).enumerate() {
+                    let off = differing(image, reference);
+                    println!("{name}, {method} by {visibility}, image {number}: {:.3} % differ", 100.0 * off);
+                    let bar = if visibility == Visibility::Rays { 0.01 } else { 0.02 };
+                    assert!(off < bar, "{name} {method} {visibility} {number}: {off}");
+                }
+            }
+        }
+    }
+}
+
+/// Every sample of a conventional image is in the non-redundant one, or redundant with an earlier image.
+#[test]
+fn nothing_is_lost() {
+    let scene = courtyard();
+    let on_device = upload(&scene);
+    let cameras = two_plane(&scene);
+    let conventional = sample(&on_device, &cameras, SamplingMethod::Conventional);
+    let apart = sample(&on_device, &cameras, SamplingMethod::NonRedundant(Redundancy::Pixel));
+    for (number, (whole, part)) in conventional.iter().zip(&apart).enumerate() {
+        let ids = whole.surface_id.as_ref().expect("ids");
+        let (mut lost, mut samples) = (0, 0);
+        for (x, y) in (0..SIZE_PX.y).flat_map(|y| (0..SIZE_PX.x).map(move |x| (x, y))) {
+            let index = (y * SIZE_PX.x + x) as usize;
+            let Some(point) = whole.sample_in_world(x, y) else { continue };
+            let kept = part.inverse_depth_per_m[index] == whole.inverse_depth_per_m[index];
+            let redundant = apart[..number].iter().any(|earlier| scalar::holds(earlier, point, ids[index]));
+            samples += 1;
+            lost += usize::from(!kept && !redundant);
+        }
+        println!("image {number}: {lost} of {samples} samples lost");
+        // A point that projects to the border between two pixels is rounded to either.
+        assert!(lost * 1000 <= samples, "{number}: {lost} of {samples}");
+    }
+}
+
+/// Texels that show block C, the yellow one.
+fn shows_block_c(images: &[DepthImage], scene: &Scene) -> usize {
+    let vertices = scene.meshes.iter().flat_map(|mesh| &mesh.vertices);
+    let yellow =
+        vertices.filter(|v| v.color_srgba8[0] > 200 && v.color_srgba8[1] > 150).map(|v| Vec3::from(v.position));
+    let (low, high) = yellow.fold((Vec3::MAX, Vec3::MIN), |(low, high), p| (low.min(p), high.max(p)));
+    assert!(low.cmplt(high).all(), "block C is yellow");
+    let inside = |p: Vec3| p.cmpge(low - 1e-3).all() && p.cmple(high + 1e-3).all();
+    let texels = |image: &DepthImage| {
+        let size = image.size_px();
+        let places = (0..size.y).flat_map(move |y| (0..size.x).map(move |x| (x, y)));
+        places.filter(|&(x, y)| image.sample_in_world(x, y).is_some_and(inside)).count()
+    };
+    images.iter().map(texels).sum()
+}
+
+#[test]
+fn only_images_without_redundance_find_block_c() {
+    let scene = blocks();
+    let on_device = upload(&scene);
+    let found = |method: SamplingMethod| {
+        let cameras = method.cameras(fig_3());
+        shows_block_c(&sample(&on_device, &cameras, method), &scene)
+    };
+    assert_eq!(found(SamplingMethod::Conventional), 0);
+    for method in APART {
+        let texels = found(method);
+        println!("{method}: {texels} texels show block C");
+        assert!(texels > 10, "{method}: {texels}");
+    }
+    // Two layers from the first viewpoint end at B (Fig. 3, right).
+    let first = vec![fig_3()[0]; 2];
+    let layers = sample(&on_device, &first, SamplingMethod::DepthPeeling { layers: 2 });
+    assert_eq!(shows_block_c(&layers, &scene), 0);
+}
+
+#[test]
+fn the_same_viewpoint_twice_peels() {
+    let scene = courtyard();
+    let on_device = upload(&scene);
+    let cameras = vec![two_plane(&scene)[0]; 2];
+    let peeled = sample(&on_device, &cameras, SamplingMethod::DepthPeeling { layers: 2 });
+    for method in APART {
+        let images = sample(&on_device, &cameras, method);
+        assert!(images[0].passed.is_none(), "{method}: the first image is conventional");
+        let again = images[1].inverse_depth_per_m.iter().zip(&images[0].inverse_depth_per_m);
+        let nearer = again.filter(|(second, first)| **second > 0.0 && **second >= **first).count();
+        println!("{method}: {nearer} texels again, {:.4} unlike peeling", differing(&images[1], &peeled[1]));
+        assert!(nearer * 200 < images[1].inverse_depth_per_m.len(), "{method}: {nearer}");
+    }
+}
+
+#[test]
+fn layers_lie_behind_each_other_and_corners_go_with_them() {
+    let scene = poles(0.02);
+    let on_device = upload(&scene);
+    let method = SamplingMethod::DepthPeeling { layers: 4 };
+    let images = sample(&on_device, &method.cameras(two_plane(&scene)), method);
+    assert_eq!(images.len(), 4);
+    for pair in images.windows(2) {
+        for (front, back) in pair[0].inverse_depth_per_m.iter().zip(&pair[1].inverse_depth_per_m) {
+            assert!(*back <= 0.0 || back < front, "{back} is not behind {front}");
+        }
+        pair[1].validate().expect("all planes");
+        assert_eq!(pair[1].corner_inverse_depth_per_m.as_ref().map(Vec::len), Some(81 * 61));
+    }
+    let refused = taken(&on_device, &two_plane(&scene), method, Visibility::Measured);
+    assert!(matches!(refused, Err(SamplingError::Layer { index: 1 })), "{refused:?}");
+}
+
+#[test]
+fn who_sees_nothing_has_nothing() {
+    let scene = courtyard();
+    let on_device = upload(&scene);
+    let up = PinholeCamera::looking_at(Vec3::Y * 50.0, Vec3::Y * 100.0, Vec3::X, 0.5, SIZE_PX);
+    let inside = PinholeCamera::looking_at(scene.bounds().center(), scene.bounds().max, Vec3::Y, 0.5, SIZE_PX);
+    for method in SamplingMethod::ALL {
+        let cameras = method.cameras(vec![up, up]);
+        for image in sample(&on_device, &cameras, method) {
+            assert!(image.inverse_depth_per_m.iter().all(|&d| d == 0.0), "{method}");
+        }
+        if method.cameras(vec![up, inside]) == [up, inside] {
+            let images = sample(&on_device, &[up, inside], method);
+            assert!(images.iter().flat_map(|image| &image.inverse_depth_per_m).all(|d| d.is_finite()), "{method}");
+        }
+    }
+}
+
+/// By visibility each image can be taken alone; a chain cannot be taken in parts.
+#[test]
+fn what_needs_no_earlier_image_can_be_taken_apart() {
+    let scene = poles(0.02);
+    let on_device = upload(&scene);
+    let cameras = two_plane(&scene);
+    let method = SamplingMethod::NonRedundant(Redundancy::Visibility);
+    let whole = sample(&on_device, &cameras, method);
+    let draw = DrawWork {
+        scene: &on_device,
+        lighting: Lighting::PHONG,
+        scene_time_s: 0.0,
+        visibility: Visibility::Measured,
+        refinement: Refinement::default(),
+    };
+    let cameras: Vec<Camera> = cameras.into_iter().map(Camera::Pinhole).collect();
+    let part = |wanted: &[u32], method| {
+        device().1.sample(&SampleWork { draw, cameras: &cameras, wanted, method, planes: ALL })
+    };
+    assert_eq!(part(&[3, 1], method).expect("two images"), [whole[3].clone(), whole[1].clone()]);
+    for (wanted, method) in [(&[0, 1][..], SamplingMethod::default()), (&[4], method)] {
+        let allowed = wanted.iter().all(|&index| index < 4);
+        assert_eq!(part(wanted, method).is_ok(), allowed);
+    }
+    let chained = SamplingMethod::NonRedundant(Redundancy::Pixel);
+    assert!(matches!(part(&[1, 2], chained), Err(SamplingError::Wanted { index: 1, cameras: 4, .. })));
+}
