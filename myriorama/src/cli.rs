@@ -3,7 +3,7 @@
 use clap::{Args, Parser, Subcommand};
 use gpu::DevicePreference;
 
-use crate::commands::{bench, coordinator, demo, node, up, view};
+use crate::commands::{bench, coordinator, demo, node, study, up, view};
 use crate::exit::Outcome;
 
 /// Many views of one scene from a few depth images.
@@ -49,6 +49,9 @@ pub enum Command {
     Demo(demo::DemoArgs),
     /// Measure speed and accuracy against what is promised, and write a report
     Bench(bench::BenchArgs),
+    /// Repeat a paper's experiments, its figures beside ours, and write a report
+    #[command(subcommand)]
+    Study(study::StudyCommand),
 }
 
 /// Which device.
@@ -72,6 +75,7 @@ impl Command {
             Self::View(args) => view::run(args),
             Self::Demo(args) => demo::run(&args),
             Self::Bench(args) => bench::run(&args),
+            Self::Study(command) => command.run(),
         }
     }
 }

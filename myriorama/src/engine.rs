@@ -136,6 +136,12 @@ impl GpuEngine {
         &self.renderer
     }
 
+    /// As [`GpuEngine::renderer`], to be shared with another sampler.
+    #[must_use]
+    pub fn shared_renderer(&self) -> Arc<Renderer> {
+        self.renderer.clone()
+    }
+
     /// How surfaces of a scene are found in pictures of a camera's size, by what both ways cost.
     ///
     /// # Errors
@@ -163,8 +169,10 @@ impl GpuEngine {
 }
 
 /// What images must have for views to be reconstructed from them.
-fn planes_for(_method: ReconstructionMethod) -> SamplePlanes {
-    SamplePlanes { specular: true, ..SamplePlanes::default() }
+#[must_use]
+pub fn planes_for(method: ReconstructionMethod) -> SamplePlanes {
+    let hybrid = matches!(method, ReconstructionMethod::HybridMesh { .. });
+    SamplePlanes { specular: true, normal: hybrid, corners: hybrid, ..SamplePlanes::default() }
 }
 
 fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {

@@ -5,7 +5,9 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use depth_image::{Camera, DepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
-use metrics::{DepthPlane, PixelClass, Rgb8Image, ScoreMap, classify, depth_errors, flip_map, psnr_db, ssim_map};
+use metrics::{
+    DepthPlane, PixelClass, Rgb8Image, ScoreMap, class_mask, classify, depth_errors, flip_map, psnr_db, ssim_map,
+};
 use node::{DirectWork, Engine as _, SampleWork};
 use rayon::prelude::*;
 use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
@@ -49,6 +51,8 @@ pub struct Row {
     pub ssim: f64,
     /// Mean over views.
     pub flip: f64,
+    /// Of covered pixels, mean over views that have any.
+    pub flip_covered: f64,
     /// Hits off by more than 1 % in depth, of all hits.
     pub wrong_hits: f64,
     /// Pixels that no sample camera knows, of all.
@@ -153,7 +157,15 @@ impl Truth {
     /// # Errors
     /// The device's.
     pub fn evaluate(&self, method: ReconstructionMethod, runs: usize) -> anyhow::Result<Row> {
-        let ms_a_view = self.ms_a_view(method, 64, runs)?;
+        self.evaluate_timed_on(method, 64, runs)
+    }
+
+    /// As [`Truth::evaluate`], timed on a batch of so many views or more.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn evaluate_timed_on(&self, method: ReconstructionMethod, views: usize, runs: usize) -> anyhow::Result<Row> {
+        let ms_a_view = self.ms_a_view(method, views, runs)?;
         let (views, statistics) =
             self.engine.reconstructor().reconstruct_measured(&self.set, &self.cameras, method, ALL_PLANES, true)?;
         let pairs: Vec<_> = self.views.iter().zip(&views).zip(&self.classes).collect();
@@ -176,6 +188,7 @@ struct Errors {
     psnr_db: f64,
     ssim: f64,
     flip: f64,
+    flip_covered: Option<f64>,
     pixels: usize,
     hits: usize,
     wrong_hits: usize,
@@ -188,6 +201,7 @@ struct Errors {
 impl Errors {
     fn of(truth: &View, view: &View, classes: &[PixelClass]) -> anyhow::Result<Self> {
         let (reference, test) = (image_of(truth)?, image_of(view)?);
+        let flip = flip_map(&reference, &test)?;
         let depth = depth_errors(&known_depth(truth)?, &known_depth(view)?, None)?;
         let provenance = view.provenance.as_ref().context("a view without provenance")?;
         let wrong = truth
@@ -202,7 +216,8 @@ impl Errors {
         let mut errors = Self {
             psnr_db: psnr_db(&reference, &test, None)?.unwrap_or(f64::NAN).min(metrics::PSNR_CAP_DB),
             ssim: mean(&ssim_map(&reference, &test)?)?,
-            flip: mean(&flip_map(&reference, &test)?)?,
+            flip: mean(&flip)?,
+            flip_covered: flip.mean(Some(&class_mask(classes, PixelClass::Covered)))?,
             pixels: depth.pixels,
             hits: depth.hit_px,
             wrong_hits: depth.wrong_hit_px,
@@ -223,6 +238,7 @@ impl Errors {
 fn row(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, errors: &[Errors]) -> Row {
     let mean = |value: fn(&Errors) -> f64| errors.iter().map(value).sum::<f64>() / errors.len() as f64;
     let sum = |value: fn(&Errors) -> usize| errors.iter().map(value).sum::<usize>() as f64;
+    let covered: Vec<f64> = errors.iter().filter_map(|e| e.flip_covered).collect();
     Row {
         method,
         ms_a_view,
@@ -230,6 +246,7 @@ fn row(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, errors:
         psnr_min_db: errors.iter().map(|e| e.psnr_db).fold(f64::INFINITY, f64::min),
         ssim: mean(|e| e.ssim),
         flip: mean(|e| e.flip),
+        flip_covered: covered.iter().sum::<f64>() / covered.len() as f64,
         wrong_hits: sum(|e| e.wrong_hits) / sum(|e| e.hits),
         unknown: sum(|e| e.unknown) / sum(|e| e.pixels),
         disoccluded_wrong: sum(|e| e.disoccluded_wrong) / sum(|e| e.disoccluded),

@@ -20,6 +20,7 @@ pub mod pictures;
 pub mod process;
 pub mod progress;
 pub mod rig;
+pub mod sampling_study;
 pub mod setup;
 pub mod sizes;
 pub mod sweep;

@@ -146,6 +146,39 @@ pub fn is_visibility_redundant(scene: &Scene, point_in_world: Vec3, footprint_m:
     met.is_some_and(|hit| hit.t >= depth_m - room_m)
 }
 
+/// How many rays sampling by visibility sends for the images after the first: those through pixels, and those from
+/// earlier viewpoints.
+#[must_use]
+pub fn rays_of_visibility(scene: &Scene, cameras: &[PinholeCamera]) -> usize {
+    let of_image = |(number, camera): (usize, &PinholeCamera)| -> usize {
+        let pixels = (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| UVec2::new(x, y)));
+        pixels.map(|pixel| rays_of_pixel(scene, camera, pixel, &cameras[..number])).sum()
+    };
+    cameras.iter().enumerate().skip(1).map(of_image).sum()
+}
+
+fn rays_of_pixel(scene: &Scene, camera: &PinholeCamera, pixel: UVec2, earlier: &[PinholeCamera]) -> usize {
+    let ray = pixel_ray(camera, pixel);
+    let (mut near, mut rays) = (camera.near_m, 0);
+    for _ in 0..MOST_LAYERS {
+        rays += 1;
+        let Some(hit) = scene.closest(&ray, near).0 else { break };
+        let candidate = candidate(scene, camera, pixel, &ray, &hit);
+        let asked: Vec<_> = earlier.iter().filter(|other| place(other, candidate.point_in_world).is_some()).collect();
+        let seen = |other: &PinholeCamera| {
+            is_visibility_redundant(scene, candidate.point_in_world, candidate.footprint_m, other)
+        };
+        // Asked one after the other, until one sees it.
+        let Some(place) = asked.iter().position(|other| seen(other)) else {
+            rays += asked.len();
+            break;
+        };
+        rays += place + 1;
+        near = hit.t;
+    }
+    rays
+}
+
 fn is_tolerance_redundant(candidate: &Candidate, image: &DepthImage) -> bool {
     let Camera::Pinhole(camera) = &image.camera;
     let (Some((pixel, depth_m)), Some(normals)) = (place(camera, candidate.point_in_world), &image.normal_oct16) else {

@@ -4,5 +4,6 @@ pub mod bench;
 pub mod coordinator;
 pub mod demo;
 pub mod node;
+pub mod study;
 pub mod up;
 pub mod view;

@@ -1,0 +1,103 @@
+//! Which surfaces an image holds: the pixel redundancy that sampling is judged by (Xie §6.1.2).
+
+use depth_image::{Camera, DepthImage, SurfaceId};
+use glam::{Vec3, Vec4};
+
+/// An image's surface ids, to be asked for many points.
+#[derive(Debug, Clone, Copy)]
+pub struct Held<'a> {
+    homogeneous_pixel_from_world: [Vec4; 3],
+    columns: f32,
+    rows: f32,
+    near_m: f32,
+    inverse_depth_per_m: &'a [f32],
+    ids: &'a [SurfaceId],
+}
+
+/// A sample's place in its image, in the world, and its surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeldSample {
+    /// Row by row.
+    pub index: usize,
+    /// Where it lies.
+    pub point_in_world: Vec3,
+    /// Of which triangle.
+    pub id: SurfaceId,
+}
+
+impl<'a> Held<'a> {
+    /// `None` for an image without surface ids.
+    #[must_use]
+    pub fn of(image: &'a DepthImage) -> Option<Self> {
+        let Camera::Pinhole(camera) = &image.camera;
+        let size = camera.size_px.as_vec2();
+        Some(Self {
+            homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world(),
+            columns: size.x,
+            rows: size.y,
+            near_m: camera.near_m,
+            inverse_depth_per_m: &image.inverse_depth_per_m,
+            ids: image.surface_id.as_deref()?,
+        })
+    }
+
+    /// Whether the image has a sample of the same triangle at the pixel that the point is seen at (Xie,
+    /// Algorithm 3).
+    #[must_use]
+    pub fn has(&self, sample: &HeldSample) -> bool {
+        let p = sample.point_in_world.extend(1.0);
+        let [u, v, w] = self.homogeneous_pixel_from_world.map(|row| row.dot(p));
+        let (x, y) = (u / w, v / w);
+        if !(w > self.near_m && x >= 0.0 && y >= 0.0 && x < self.columns && y < self.rows) {
+            return false;
+        }
+        let index = y as usize * self.columns as usize + x as usize;
+        self.inverse_depth_per_m[index] > 0.0 && self.ids[index] == sample.id
+    }
+}
+
+/// All samples of an image with surface ids, row by row.
+#[must_use]
+pub fn held_samples(image: &DepthImage) -> Vec<HeldSample> {
+    let Some(ids) = &image.surface_id else { return Vec::new() };
+    let width = image.size_px().x;
+    let sample = |(index, id): (usize, &SurfaceId)| {
+        let point_in_world = image.sample_in_world(index as u32 % width, index as u32 / width)?;
+        Some(HeldSample { index, point_in_world, id: *id })
+    };
+    ids.iter().enumerate().filter_map(sample).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use depth_image::{HOLE_INVERSE_DEPTH, PinholeCamera};
+    use glam::UVec2;
+
+    use super::*;
+
+    #[test]
+    fn an_image_holds_its_own_samples_and_no_holes() {
+        let camera = PinholeCamera::looking_at(Vec3::Z * 4.0, Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(16, 12));
+        let id = |i: u32| SurfaceId { instance: 0, primitive: i };
+        let mut image = DepthImage {
+            camera: Camera::Pinhole(camera),
+            inverse_depth_per_m: vec![0.25; 192],
+            color_rgb9e5: vec![0; 192],
+            normal_oct16: None,
+            surface_id: Some((0..192).map(id).collect()),
+            specular: None,
+            passed: None,
+            corner_inverse_depth_per_m: None,
+        };
+        let samples = held_samples(&image);
+        assert_eq!(samples.len(), 192);
+        let held = Held::of(&image).unwrap();
+        assert!(samples.iter().all(|sample| held.has(sample)));
+        let other = HeldSample { id: id(999), ..samples[5] };
+        let beside = HeldSample { point_in_world: Vec3::X * 9.0, ..samples[5] };
+        assert!(!held.has(&other) && !held.has(&beside));
+        image.inverse_depth_per_m[5] = HOLE_INVERSE_DEPTH;
+        assert!(!Held::of(&image).unwrap().has(&samples[5]));
+        assert_eq!(held_samples(&image).len(), 191);
+    }
+}

@@ -1,0 +1,44 @@
+//! By pixel: of each output frame, the samples that a set holds.
+
+use depth_image::DepthImage;
+use metrics::{Held, held_samples};
+use rayon::prelude::*;
+
+/// Over many frames.
+#[derive(Debug, Clone, Copy)]
+pub struct Availability {
+    sum: f64,
+    least: f64,
+    frames: usize,
+}
+
+impl Default for Availability {
+    fn default() -> Self {
+        Self { sum: 0.0, least: 1.0, frames: 0 }
+    }
+}
+
+impl Availability {
+    /// Adds one frame.
+    pub fn add(&mut self, frame: &DepthImage, set: &[Held<'_>]) {
+        let samples = held_samples(frame);
+        if samples.is_empty() {
+            return;
+        }
+        let available = samples.par_iter().filter(|sample| set.iter().any(|image| image.has(sample))).count();
+        let share = available as f64 / samples.len() as f64;
+        self.sum += share;
+        self.least = self.least.min(share);
+        self.frames += 1;
+    }
+
+    /// Per cent, over frames.
+    pub fn mean(&self) -> f64 {
+        100.0 * self.sum / self.frames.max(1) as f64
+    }
+
+    /// Per cent, of the worst frame.
+    pub fn least(&self) -> f64 {
+        100.0 * self.least
+    }
+}

@@ -1,0 +1,62 @@
+//! By pixel: redundant, disoccluded and useful samples.
+
+use depth_image::DepthImage;
+use metrics::{Held, HeldSample, held_samples};
+use rayon::prelude::*;
+use sampling::SamplingMethod;
+
+use super::METHODS;
+
+/// Of one image of one method; counted before anything is dilated or steadied.
+#[derive(Debug, Clone, Default)]
+pub struct ImageCount {
+    /// All of them.
+    pub samples: usize,
+    /// Those that an image before it holds.
+    pub redundant: usize,
+    /// Those that no conventional image holds: of the same camera, or, peeled from the middle, of any.
+    pub disoccluded: Vec<HeldSample>,
+    /// Of those, whether some view between the viewpoints needs it.
+    pub useful: Vec<bool>,
+}
+
+impl ImageCount {
+    pub fn useful_count(&self) -> usize {
+        self.useful.iter().filter(|&&useful| useful).count()
+    }
+}
+
+/// The sets of all methods, in their order: conventional first.
+pub fn image_counts(sets: &[Vec<DepthImage>]) -> Vec<Vec<ImageCount>> {
+    let conventional: Vec<Held<'_>> = sets[0].iter().filter_map(Held::of).collect();
+    METHODS.iter().zip(sets).map(|(&method, set)| counts_of(method, set, &conventional)).collect()
+}
+
+fn counts_of(method: SamplingMethod, set: &[DepthImage], conventional: &[Held<'_>]) -> Vec<ImageCount> {
+    let held: Vec<Held<'_>> = set.iter().filter_map(Held::of).collect();
+    let count = |(number, image): (usize, &DepthImage)| {
+        let samples = held_samples(image);
+        let before = |sample: &&HeldSample| held[..number].iter().any(|other| other.has(sample));
+        let beside = match method {
+            SamplingMethod::DepthPeeling { .. } => conventional,
+            _ => &conventional[number..=number],
+        };
+        let disoccluded: Vec<HeldSample> =
+            samples.par_iter().filter(|sample| !beside.iter().any(|other| other.has(sample))).copied().collect();
+        ImageCount {
+            samples: samples.len(),
+            redundant: samples.par_iter().filter(before).count(),
+            useful: vec![false; disoccluded.len()],
+            disoccluded,
+        }
+    };
+    set.iter().enumerate().map(count).collect()
+}
+
+/// Marks what a frame needs: samples of a surface that it shows at the same pixel.
+pub fn mark_useful(counts: &mut [Vec<ImageCount>], frame: &Held<'_>) {
+    for count in counts.iter_mut().flatten() {
+        let samples = count.disoccluded.par_iter().zip(count.useful.par_iter_mut());
+        samples.filter(|(_, useful)| !**useful).for_each(|(sample, useful)| *useful = frame.has(sample));
+    }
+}

@@ -1,0 +1,105 @@
+//! Fig. 7: redundancy by pixel comes to redundancy by visibility as images grow.
+
+use glam::UVec2;
+use sampling::{Redundancy, SamplingMethod};
+use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
+
+use super::counts::image_counts;
+use super::subject::WITH_IDS;
+use super::visibility::seen;
+use super::{Extent, METHODS, Subject};
+use crate::progress::bar;
+
+const SIDES_PX: [u32; 4] = [256, 512, 1024, 2048];
+/// As in the paper.
+const SCENES: [&str; 2] = ["bird-nest", "urban"];
+
+/// Of one size, means over images 1 and 2, in per cent: redundant of conventional images, and disoccluded of
+/// non-redundant ones, by pixel and by visibility.
+pub struct SizeRow {
+    side_px: u32,
+    redundant: [f64; 2],
+    disoccluded: [f64; 2],
+}
+
+/// Its name, and its values by pixel and by visibility.
+type Metric = (&'static str, fn(&SizeRow) -> [f64; 2]);
+
+/// Measures a scene if the paper shows it.
+///
+/// # Errors
+/// The device's.
+pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<Vec<SizeRow>> {
+    if !SCENES.contains(&subject.name.as_str()) {
+        return Ok(Vec::new());
+    }
+    let sides = if quick { &SIDES_PX[..2] } else { &SIDES_PX[..] };
+    let rays = subject.scene.scalar_rays(0.0)?;
+    let progress = bar(format!("{}: sizes of images", subject.name), sides.len());
+    let mut rows = Vec::with_capacity(sides.len());
+    for &side_px in sides {
+        let size_px = UVec2::splat(side_px);
+        let viewpoints = subject.cameras(SamplingMethod::Conventional, size_px);
+        let methods = [METHODS[0], METHODS[1], SamplingMethod::NonRedundant(Redundancy::Visibility)];
+        let take = |method| subject.sample(method, size_px, WITH_IDS);
+        let [whole, apart, by_rays] = [take(methods[0])?, take(methods[1])?, take(methods[2])?];
+        let by_visibility = |method, set: &[_]| seen(&rays, method, set, &viewpoints, &[], extent.seeds);
+        let redundant = by_visibility(methods[0], &whole);
+        let disoccluded = by_visibility(methods[2], &by_rays);
+        let counts = image_counts(&[whole, apart]);
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / (super::IMAGES - 1) as f64;
+        let share = |part: usize, whole: usize| 100.0 * part as f64 / whole as f64;
+        rows.push(SizeRow {
+            side_px,
+            redundant: [
+                mean(&mut counts[0][1..].iter().map(|c| share(c.redundant, c.samples))),
+                mean(&mut redundant[1..].iter().map(|seen| 100.0 * seen.redundant.share)),
+            ],
+            disoccluded: [
+                mean(&mut counts[1][1..].iter().map(|c| share(c.disoccluded.len(), c.samples))),
+                mean(&mut disoccluded[1..].iter().map(|seen| 100.0 * seen.disoccluded.share)),
+            ],
+        });
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    Ok(rows)
+}
+
+/// Table, charts and checks of one scene.
+///
+/// # Errors
+/// A row that does not fit, which is a fault here.
+pub fn sizes_report(scene: &str, rows: &[SizeRow], report: &mut Report) -> anyhow::Result<()> {
+    let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
+    let columns = [
+        ("side", "px"),
+        ("redundant by pixel", "%"),
+        ("redundant by visibility", "%"),
+        ("disoccluded by pixel", "%"),
+        ("disoccluded by visibility", "%"),
+    ];
+    let mut table = Table::new(format!("Fig. 7, {scene}"), &columns);
+    for row in rows {
+        let cells = row.redundant.into_iter().chain(row.disoccluded).map(Cell::from);
+        table.push([row.side_px.into()].into_iter().chain(cells))?;
+    }
+    report.tables.push(table);
+    let redundant: Metric = ("redundant", |row| row.redundant);
+    let disoccluded: Metric = ("disoccluded", |row| row.disoccluded);
+    for (what, of) in [redundant, disoccluded] {
+        let axes = (Axis::log("side of images", "px"), Axis::linear(what, "%"));
+        let line = |name: &str, place: usize| {
+            Series::line(name, rows.iter().map(move |row| (f64::from(row.side_px), of(row)[place])))
+        };
+        let chart = XyChart::new(format!("Fig. 7, {scene}: {what} samples"), axes.0, axes.1);
+        report.charts.push(chart.with(line("by pixel", 0)).with(line("by visibility", 1)).into());
+        let gap = |row: &SizeRow| (of(row)[0] - of(row)[1]).abs();
+        let name = format!(
+            "{scene}: {what} by pixel and by visibility, gap at {} px over that at {} px",
+            last.side_px, first.side_px
+        );
+        report.checks.push(Check::new(name, gap(last) / gap(first), "×", Bar::AtMost(0.75)));
+    }
+    Ok(())
+}

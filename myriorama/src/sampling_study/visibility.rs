@@ -1,0 +1,94 @@
+//! By visibility: the same metrics whatever the resolution, of seeded samples, by rays on the host.
+
+use depth_image::{Camera, DepthImage, PinholeCamera};
+use metrics::{HeldSample, held_samples};
+use rayon::prelude::*;
+use render::scalar::rays::Scene;
+use sampling::{SamplingMethod, scalar::is_visibility_redundant};
+
+/// A share of seeded samples.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Estimate {
+    /// Of 1; NaN of no samples.
+    pub share: f64,
+    /// Half of the interval that it lies in with 95 %.
+    pub half_width: f64,
+}
+
+/// Of one image.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Seen {
+    /// Of its samples.
+    pub redundant: Estimate,
+    /// Of its samples.
+    pub disoccluded: Estimate,
+    /// Of the disoccluded ones.
+    pub useful: Estimate,
+}
+
+impl Estimate {
+    fn of(count: usize, n: usize) -> Self {
+        let share = count as f64 / n as f64;
+        Self { share, half_width: 1.96 * (share * (1.0 - share) / n as f64).sqrt() }
+    }
+}
+
+/// All images of a set. `viewpoints` are those of conventional sampling, `views` lie between them.
+pub fn seen(
+    scene: &Scene,
+    method: SamplingMethod,
+    set: &[DepthImage],
+    viewpoints: &[PinholeCamera],
+    views: &[PinholeCamera],
+    seeds: usize,
+) -> Vec<Seen> {
+    let own: Vec<PinholeCamera> = set.iter().map(pinhole).collect();
+    let image = |(number, image): (usize, &DepthImage)| {
+        let samples = seeded(held_samples(image), seeds);
+        let footprint_m = |sample: &HeldSample| {
+            let depth = (sample.point_in_world - own[number].eye_in_world).dot(own[number].forward_in_world());
+            depth / own[number].focal_px.min_element()
+        };
+        let by = |sample: &HeldSample, cameras: &[PinholeCamera]| {
+            let seen = |camera| is_visibility_redundant(scene, sample.point_in_world, footprint_m(sample), camera);
+            cameras.iter().any(seen)
+        };
+        // Peeled layers share one viewpoint: what it sees is in the first.
+        let earlier = match method {
+            SamplingMethod::DepthPeeling { .. } => &own[..number.min(1)],
+            _ => &own[..number],
+        };
+        let beside = match method {
+            SamplingMethod::DepthPeeling { .. } => viewpoints,
+            _ => &viewpoints[number..=number],
+        };
+        let redundant = samples.par_iter().filter(|sample| by(sample, earlier)).count();
+        let disoccluded: Vec<&HeldSample> = samples.par_iter().filter(|sample| !by(sample, beside)).collect();
+        let useful = disoccluded.par_iter().filter(|sample| by(sample, views)).count();
+        Seen {
+            redundant: Estimate::of(redundant, samples.len()),
+            disoccluded: Estimate::of(disoccluded.len(), samples.len()),
+            useful: Estimate::of(useful, disoccluded.len()),
+        }
+    };
+    set.iter().enumerate().map(image).collect()
+}
+
+fn pinhole(image: &DepthImage) -> PinholeCamera {
+    let Camera::Pinhole(camera) = &image.camera;
+    *camera
+}
+
+/// So many of them, the same every time.
+fn seeded(mut samples: Vec<HeldSample>, count: usize) -> Vec<HeldSample> {
+    samples.sort_by_key(|sample| scrambled(sample.index as u32));
+    samples.truncate(count);
+    samples
+}
+
+/// A permutation of the numbers without a pattern that images could share (the finish of `MurmurHash3`).
+fn scrambled(mut n: u32) -> u32 {
+    n = (n ^ (n >> 16)).wrapping_mul(0x85eb_ca6b);
+    n = (n ^ (n >> 13)).wrapping_mul(0xc2b2_ae35);
+    n ^ (n >> 16)
+}
