@@ -1,6 +1,6 @@
 //! What the images of a set hold, for tests of what later ones may leave out.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
@@ -45,35 +45,42 @@ pub(crate) struct KnownCamera {
 
 /// The cameras of a set and, where a test asks for it, what their images hold.
 pub(crate) struct Known {
-    cameras: Vec<PinholeCamera>,
     uniform: wgpu::Buffer,
+    layers: Arc<Layers>,
+}
+
+/// A texel for each sample, a layer for each image.
+pub(crate) struct Layers {
+    size: wgpu::Extent3d,
     /// All layers, to be read.
     held: wgpu::TextureView,
     /// Each layer, to be written.
-    layers: Vec<wgpu::TextureView>,
+    each: Vec<wgpu::TextureView>,
 }
+
+/// The last layers that were made: making and clearing them costs as much as drawing a picture.
+#[derive(Default)]
+pub(crate) struct KeptLayers(Mutex<Option<Arc<Layers>>>);
 
 /// What is bound to a test.
 pub(crate) const KNOWN_SLOTS: [Slot; 3] = [Slot::WordTextureArray, Slot::Uniform, Slot::Written];
 
-impl Known {
-    /// Nothing is held yet.
-    pub fn of(gpu: &Gpu, cameras: &[PinholeCamera], test: LeaveOut) -> Result<Self, GpuError> {
-        let limits = &gpu.device.limits();
-        at_most("images of a set", cameras.len(), limits.max_texture_array_layers)?;
-        let gpu_cameras: Vec<KnownCamera> = cameras.iter().map(KnownCamera::of).collect();
-        let bytes: &[u8] = bytemuck::cast_slice(&gpu_cameras);
-        at_most("the cameras of a set (bytes)", bytes.len(), limits.max_uniform_buffer_binding_size as u32)?;
-        let size = |side: fn(&PinholeCamera) -> u32| {
-            if test.traces_rays { 1 } else { cameras.iter().map(side).max().unwrap_or(1) }
-        };
+impl KeptLayers {
+    /// Nobody else uses them; what they hold is left over.
+    fn of(&self, gpu: &Gpu, size: wgpu::Extent3d) -> Arc<Layers> {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match kept.as_ref().filter(|layers| layers.size == size && Arc::strong_count(layers) == 1) {
+            Some(layers) => layers.clone(),
+            None => kept.insert(Arc::new(Layers::new(gpu, size))).clone(),
+        }
+    }
+}
+
+impl Layers {
+    fn new(gpu: &Gpu, size: wgpu::Extent3d) -> Self {
         let held = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("held samples"),
-            size: wgpu::Extent3d {
-                width: size(|camera| camera.size_px.x),
-                height: size(|camera| camera.size_px.y),
-                depth_or_array_layers: cameras.len() as u32,
-            },
+            size,
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
@@ -89,22 +96,45 @@ impl Known {
                 ..Default::default()
             })
         };
-        Ok(Self {
-            cameras: cameras.to_vec(),
-            uniform: gpu.buffer_with("known cameras", bytes, BufferUsages::UNIFORM),
-            layers: (0..cameras.len() as u32).map(layer).collect(),
+        Self {
+            size,
+            each: (0..size.depth_or_array_layers).map(layer).collect(),
             held: held.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(wgpu::TextureViewDimension::D2Array),
                 ..Default::default()
             }),
-        })
+        }
+    }
+}
+
+impl Known {
+    /// Nothing is held yet.
+    pub fn of(gpu: &Gpu, kept: &KeptLayers, cameras: &[PinholeCamera], test: LeaveOut) -> Result<Self, GpuError> {
+        let limits = &gpu.device.limits();
+        at_most("images of a set", cameras.len(), limits.max_texture_array_layers)?;
+        let gpu_cameras: Vec<KnownCamera> = cameras.iter().map(KnownCamera::of).collect();
+        let bytes: &[u8] = bytemuck::cast_slice(&gpu_cameras);
+        at_most("the cameras of a set (bytes)", bytes.len(), limits.max_uniform_buffer_binding_size as u32)?;
+        let side = |side: fn(&PinholeCamera) -> u32| {
+            if test.traces_rays { 1 } else { cameras.iter().map(side).max().unwrap_or(1) }
+        };
+        let size = wgpu::Extent3d {
+            width: side(|camera| camera.size_px.x),
+            height: side(|camera| camera.size_px.y),
+            depth_or_array_layers: cameras.len().max(1) as u32,
+        };
+        Ok(Self { uniform: gpu.buffer_with("known cameras", bytes, BufferUsages::UNIFORM), layers: kept.of(gpu, size) })
+    }
+
+    /// Whether images after the `number`-th will ask what it holds.
+    pub fn is_asked_for(&self, number: usize) -> bool {
+        number + 1 < self.layers.each.len()
     }
 
     /// In the order of [`KNOWN_SLOTS`], for an image after `earlier` others.
     pub fn resources<'r>(&'r self, earlier: usize, left_out: &'r wgpu::Buffer) -> [BindingResource<'r>; 3] {
-        debug_assert!(earlier <= self.cameras.len());
         let cameras = window(&self.uniform, earlier.max(1) * size_of::<KnownCamera>());
-        [texture(&self.held), cameras, left_out.as_entire_binding()]
+        [texture(&self.layers.held), cameras, left_out.as_entire_binding()]
     }
 
     /// Records what the `number`-th camera's image holds, which is the `place`-th of its submission.
@@ -121,7 +151,7 @@ impl Known {
         let mut resources =
             vec![window(cameras, PIXEL_CAMERA_BYTES), texture(&surfaces.surface), texture(&surfaces.depth)];
         resources.extend(surfaces.ids.as_ref().map(texture));
-        resources.push(texture(&self.layers[number]));
+        resources.push(texture(&self.layers.each[number]));
         let bound = bind_group(gpu, &pipeline.get_bind_group_layout(0), resources);
         let groups = surfaces.size_px().map(|side| side.div_ceil(8));
         let mut pass = frame.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());

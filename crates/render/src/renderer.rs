@@ -16,7 +16,7 @@ use crate::{
     binding::{bind_group, texture, window},
     form::{ComputePipelines, Form, Pass, Shading, ShadowRays},
     illuminate::{IlluminateWork, Illuminator},
-    known::{Known, LeaveOut},
+    known::{KeptLayers, Known, LeaveOut},
     memory_pass::{self, MemoryPass},
     pixel_camera::{PIXEL_CAMERA_BYTES, PIXEL_CAMERA_STRIDE, PixelCamera, uniform},
     planes,
@@ -98,6 +98,7 @@ pub struct Renderer {
     rasterizer: Rasterizer,
     pipelines: ComputePipelines,
     accumulations: Accumulations,
+    kept_layers: KeptLayers,
     choices: Choices,
     /// One batch at a time: the device makes no more of two, and memory holds one.
     drawing: Mutex<()>,
@@ -148,6 +149,7 @@ impl Renderer {
             rasterizer: Rasterizer::new(gpu, &templates),
             pipelines: ComputePipelines::new(gpu, &templates),
             accumulations: Accumulations::default(),
+            kept_layers: KeptLayers::default(),
             choices: Choices::default(),
             drawing: Mutex::default(),
         })
@@ -209,14 +211,16 @@ impl Renderer {
     ) -> Result<Vec<DepthImage>, RenderError> {
         let all = pinholes(cameras);
         self.check(&all)?;
-        let known = Known::of(&self.gpu, &all, leave_out)?;
+        let known = Known::of(&self.gpu, &self.kept_layers, &all, leave_out)?;
         let chain = Chain { leave_out, known: &known, wanted, first: 0, keep: !leave_out.traces_rays };
         let pinholes: Vec<PinholeCamera> = wanted.iter().map(|&number| all[number as usize]).collect();
         let mut images = self.images(work, &pinholes, planes, Some(chain))?;
         if planes.corners {
             // Where pixels are compared with the same pixel, corners are compared with corners.
             let own = leave_out.from_one_place;
-            let corners = own.then(|| Known::of(&self.gpu, &corner_cameras(&pinholes), leave_out)).transpose()?;
+            let corners = own
+                .then(|| Known::of(&self.gpu, &self.kept_layers, &corner_cameras(&pinholes), leave_out))
+                .transpose()?;
             let chain = Chain { keep: own, known: corners.as_ref().unwrap_or(&known), ..chain };
             self.add_corners(work, &mut images, &pinholes, Some(chain))?;
         }
@@ -439,7 +443,7 @@ impl Renderer {
                     self.rasterizer.record(frame, work, std::slice::from_ref(camera), target)?;
                 }
             }
-            if chain.keep {
+            if chain.keep && chain.known.is_asked_for(earlier) {
                 let image = (&target[0], batch.by_rays);
                 chain.known.keep(&self.gpu, &self.pipelines, frame, (earlier, place as u32), image, cameras)?;
             }
