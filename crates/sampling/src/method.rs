@@ -26,11 +26,11 @@ pub enum SamplingMethod {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Redundancy {
     /// It has a sample of the same triangle at the same pixel (Xie, Algorithm 3).
+    #[default]
     Pixel,
     /// It is seen from that image's viewpoint (Xie, Algorithm 2).
     Visibility,
     /// It has a sample nearby of the same surface, facing the same way and not much coarser.
-    #[default]
     Tolerance,
 }
 
@@ -89,8 +89,8 @@ impl FromStr for SamplingMethod {
         let (name, detail) = name.split_once(':').map_or((name.as_str(), None), |(name, detail)| (name, Some(detail)));
         match (name, detail) {
             ("conventional", None) => Ok(Self::Conventional),
-            ("non_redundant", None | Some("tolerance")) => Ok(Self::NonRedundant(Redundancy::Tolerance)),
-            ("non_redundant", Some("pixel")) => Ok(Self::NonRedundant(Redundancy::Pixel)),
+            ("non_redundant", None | Some("pixel")) => Ok(Self::NonRedundant(Redundancy::Pixel)),
+            ("non_redundant", Some("tolerance")) => Ok(Self::NonRedundant(Redundancy::Tolerance)),
             ("non_redundant", Some("visibility")) => Ok(Self::NonRedundant(Redundancy::Visibility)),
             ("depth_peeling", layers) => {
                 let layers = layers.map_or(Ok(DEFAULT_LAYERS), |layers| layers.parse().map_err(|_| unknown()))?;
@@ -123,7 +123,7 @@ mod tests {
         for method in SamplingMethod::ALL {
             assert_eq!(method.to_string().parse(), Ok(method));
         }
-        assert_eq!("non-redundant".parse(), Ok(SamplingMethod::NonRedundant(Redundancy::Tolerance)));
+        assert_eq!("non-redundant".parse(), Ok(SamplingMethod::NonRedundant(Redundancy::Pixel)));
         for name in
             ["", "non_redundant:", "non_redundant:id", "depth_peeling:0", "depth_peeling:17", "depth_peeling:-1"]
         {

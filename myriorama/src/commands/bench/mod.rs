@@ -8,6 +8,7 @@ mod fronts;
 mod light;
 mod peer;
 mod rays;
+mod sampling;
 mod throughput;
 mod timing;
 
@@ -90,6 +91,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     experiment.stop()?;
     animation::measure(args, &engine, &mut report)?;
     light::glossy(args, &engine, &mut report)?;
+    sampling::measure(args, &engine, &mut report)?;
     fronts::gaps(args, &engine, &mut report)?;
     fronts::models(args, &engine, &mut report)?;
     peer::measure(args, &engine, &mut report)?;
