@@ -170,7 +170,7 @@ fn no_seam_shows_where_one_image_hands_over_to_the_other() {
     }
 }
 
-/// Two cameras disagree by a fifth, some twenty codes. A texel of theirs is twenty pixels, over which one fades.
+/// Two cameras disagree by a fifth, some fourteen codes. A texel of theirs is twenty pixels, over which one fades.
 #[test]
 fn weight_fades_over_a_cell() {
     let (whole, corners) = painted_wall(1.2);
