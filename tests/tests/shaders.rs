@@ -41,7 +41,21 @@ fn reconstruction_keys() -> Vec<ShaderKey> {
     let entry_points = reconstruction::SHADERS.iter().filter(|(_, text)| has_entry(text));
     let keys =
         entry_points.flat_map(|&(name, _)| CAMERAS.map(|cameras| ShaderKey { name, cameras, ..ShaderKey::default() }));
-    keys.flat_map(forms).flat_map(counting).collect()
+    keys.flat_map(forms).flat_map(among_holes).flat_map(counting).collect()
+}
+
+/// What reads pyramids or cells is written out for sets with holes, too: see `has_holes` in `sample_set.rs`.
+fn among_holes(key: ShaderKey) -> Vec<ShaderKey> {
+    let reads = [
+        "tile_start.wgsl",
+        "march.wgsl",
+        "joint_carve.wgsl",
+        "light_field_search.wgsl",
+        "specular.wgsl",
+        "resolve.wgsl",
+    ];
+    let switches = if reads.contains(&key.name) { vec![false, true] } else { vec![false] };
+    switches.into_iter().map(|holes| ShaderKey { holes, ..key }).collect()
 }
 
 /// Only what finds surfaces counts what it fetches.
@@ -63,7 +77,6 @@ fn forms(key: ShaderKey) -> Vec<ShaderKey> {
             .map(|(highlight, lights, visibility_words)| ShaderKey { highlight, lights, visibility_words, ..key })
             .collect(),
         "quads.wgsl" | "quad_indices.wgsl" => [false, true].map(|hybrid| ShaderKey { hybrid, ..key }).to_vec(),
-        "resolve.wgsl" => [false, true].map(|holes| ShaderKey { holes, ..key }).to_vec(),
         _ => vec![key],
     }
 }

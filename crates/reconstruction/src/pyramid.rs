@@ -45,13 +45,14 @@ impl CodedDepth {
             _ => HOLE_CODE,
         };
         let Camera::Pinhole(camera) = &image.camera;
+        let codes: Vec<u16> = image.inverse_depth_per_m.iter().map(code).collect();
         Self {
             size_px: image.size_px().to_array(),
-            codes: image.inverse_depth_per_m.iter().map(code).collect(),
+            uncertain: uncertain_texels(image, &codes),
+            codes,
             scale,
             offset,
             connected: connected_cells(image, camera.focal_px.min_element()),
-            uncertain: uncertain_texels(image),
         }
     }
 
@@ -98,9 +99,10 @@ impl CodedDepth {
     }
 }
 
-fn uncertain_texels(image: &DepthImage) -> Vec<bool> {
-    let uncertain = |(index, &inverse): (usize, &f32)| inverse < 0.0 || image.has_passed(index);
-    let texels: Vec<bool> = image.inverse_depth_per_m.iter().enumerate().map(uncertain).collect();
+/// By codes: all that is coded as a hole is one, a depth that is no number as well.
+fn uncertain_texels(image: &DepthImage, codes: &[u16]) -> Vec<bool> {
+    let uncertain = |(index, &code): (usize, &u16)| code == HOLE_CODE || image.has_passed(index);
+    let texels: Vec<bool> = codes.iter().enumerate().map(uncertain).collect();
     if texels.contains(&true) { texels } else { Vec::new() }
 }
 

@@ -294,7 +294,8 @@ impl Reconstructor {
         batch: &Batch,
     ) -> Result<(), ReconstructionError> {
         let name = "tile_start.wgsl";
-        let pipeline = self.pipeline(ShaderKey { name, cameras: set.cameras.len(), ..ShaderKey::default() })?;
+        let key = ShaderKey { name, cameras: set.cameras.len(), holes: set.has_holes(), ..ShaderKey::default() };
+        let pipeline = self.pipeline(key)?;
         let mut resources = batch.over(set);
         resources.push(batch.starts.as_entire_binding());
         let bound = self.bind(&pipeline, batch.stride, resources);

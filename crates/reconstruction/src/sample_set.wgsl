@@ -101,8 +101,12 @@ fn node_index(log2_sides: vec2u, level: u32, node: vec2u) -> u32 {
 
 // The nearest code of a node, in the lower half of its word; a hole may be as near as anything, nearer than any code.
 fn nearest_code(word: u32) -> f32 {
+{% if holes %}
     let code = word & 0xffffu;
     return select(f32(code), FAR_AWAY, code == 0xffffu);
+{% else %}
+    return f32(word & 0xffffu);
+{% endif %}
 }
 
 fn safe_reciprocal(v: f32) -> f32 {
