@@ -68,7 +68,7 @@ fn a_grazing_floor_counts_as_sampled_by_pixel_but_not_by_tolerance() {
         });
         println!("{degrees:5}: {left_out:.3?}");
         assert!(left_out[1] > 0.95, "all of it is seen");
-        if (45.0..89.5).contains(&degrees) {
+        if degrees <= 85.0 {
             assert!(left_out[0] > 0.8, "one triangle is one triangle: {left_out:?}");
         }
         if degrees >= 80.0 {

@@ -1,5 +1,6 @@
 //! `myriorama demo`: the paper's experiment on this machine.
 
+mod beside;
 mod charts;
 mod light;
 mod pictures;
@@ -80,6 +81,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     timing::tables(&times, &mut report)?;
     report.charts.extend([charts::total_time(&times).into(), charts::stages(&times).into()]);
     compare(args, &experiment, &mut report)?;
+    beside::conventional(&experiment, &mut report)?;
     let light = light::show(args, &experiment, &mut report)?;
     let choice = experiment.visibility()?;
     report.parameter("direct finds surfaces by", choice.to_string());
