@@ -1,28 +1,18 @@
 //! Where sampling without redundance goes wrong, or must not: as curves, which docs/methods/non_redundant.md repeats.
 
-use std::sync::{Arc, OnceLock};
-
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use glam::{Affine3A, UVec2, Vec3};
-use gpu::{DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
-use sampling::{Redundancy, SampleWork, Sampler, SamplingMethod, scalar};
+use sampling::{Redundancy, SampleWork, SamplingMethod, scalar};
+use scene::Instance;
 use scene::procedural::{GrassDensity, grass, poles, quad};
-use scene::{Instance, Scene};
+
+use crate::stage::{device, upload};
 
 const SIZE_PX: UVec2 = UVec2::new(80, 60);
 const PIXEL: SamplingMethod = SamplingMethod::NonRedundant(Redundancy::Pixel);
 const VISIBILITY: SamplingMethod = SamplingMethod::NonRedundant(Redundancy::Visibility);
 const TOLERANCE: SamplingMethod = SamplingMethod::NonRedundant(Redundancy::Tolerance);
-
-fn device() -> &'static (Arc<Gpu>, Sampler) {
-    static DEVICE: OnceLock<(Arc<Gpu>, Sampler)> = OnceLock::new();
-    DEVICE.get_or_init(|| {
-        let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let sampler = Sampler::new(&gpu).expect("a sampler");
-        (gpu, sampler)
-    })
-}
 
 fn sample(scene: &GpuScene, cameras: &[PinholeCamera], method: SamplingMethod) -> Vec<DepthImage> {
     let draw = DrawWork {
@@ -36,10 +26,6 @@ fn sample(scene: &GpuScene, cameras: &[PinholeCamera], method: SamplingMethod) -
     let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
     let planes = SamplePlanes { normal: true, surface_id: true, ..SamplePlanes::default() };
     device().1.sample(&SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes }).expect("images")
-}
-
-fn upload(scene: &Scene) -> GpuScene {
-    GpuScene::upload(&device().0, scene).expect("a scene")
 }
 
 fn samples(image: &DepthImage) -> usize {

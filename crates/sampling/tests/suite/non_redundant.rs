@@ -1,14 +1,13 @@
 //! Images that leave out what others hold: against the scalar reference, and what must hold of them.
 
-use std::sync::{Arc, OnceLock};
-
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use glam::{UVec2, Vec3};
-use gpu::{DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
-use sampling::{Redundancy, Rig, SampleWork, Sampler, SamplingError, SamplingMethod, scalar};
+use sampling::{Redundancy, Rig, SampleWork, SamplingError, SamplingMethod, scalar};
 use scene::Scene;
 use scene::procedural::{blocks, blocks_viewpoints, courtyard, poles};
+
+use crate::stage::{device, upload};
 
 const SIZE_PX: UVec2 = UVec2::new(80, 60);
 const ALL: SamplePlanes = SamplePlanes { normal: true, surface_id: true, specular: false, corners: true };
@@ -17,19 +16,6 @@ const APART: [SamplingMethod; 3] = [
     SamplingMethod::NonRedundant(Redundancy::Visibility),
     SamplingMethod::NonRedundant(Redundancy::Tolerance),
 ];
-
-fn device() -> &'static (Arc<Gpu>, Sampler) {
-    static DEVICE: OnceLock<(Arc<Gpu>, Sampler)> = OnceLock::new();
-    DEVICE.get_or_init(|| {
-        let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let sampler = Sampler::new(&gpu).expect("a sampler");
-        (gpu, sampler)
-    })
-}
-
-fn upload(scene: &Scene) -> GpuScene {
-    GpuScene::upload(&device().0, scene).expect("a scene")
-}
 
 fn taken(
     scene: &GpuScene,

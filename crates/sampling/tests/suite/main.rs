@@ -1,0 +1,5 @@
+//! Sampling without redundance on the software device.
+
+mod failures;
+mod non_redundant;
+mod stage;
