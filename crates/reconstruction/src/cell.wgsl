@@ -3,8 +3,8 @@
 // A cell's corners: codes (upper left, upper right, lower left, lower right), and whether they are one
 // surface.
 {% if holes %}
-// `certain`: whether the ways to all four are proven free.
-struct Corners { codes: vec4f, connected: bool, certain: bool }
+// `certain`: whether the ways to all four are proven free; `proven`: 1 where a corner's own way is, else 0.
+struct Corners { codes: vec4f, connected: bool, certain: bool, proven: vec4f }
 {% else %}
 struct Corners { codes: vec4f, connected: bool }
 {% endif %}
@@ -19,7 +19,15 @@ fn corners_of(cell_index: u32) -> Corners {
 {% endif %}
     let words = textureLoad(cell_codes, texel_of(cell_index), 0).xy;
     let codes = vec4u(words.x & 0x7fffu, (words.x >> 16u) & 0x7fffu, words.y & 0x7fffu, (words.y >> 16u) & 0x7fffu);
-    return Corners(vec4f(codes), (words.x >> 31u) != 0u{% if holes %}, (words.y >> 31u) == 0u{% endif %});
+{% if holes %}
+    // A sample's lowest bit says that its way is not proven free.
+    let is_sample = codes > vec4u(1u);
+    let proven = select(vec4f(1.0), vec4f(0.0), is_sample & ((codes & vec4u(1u)) == vec4u(1u)));
+    let plain = select(codes, codes & vec4u(0x7ffeu), is_sample);
+    return Corners(vec4f(plain), (words.x >> 31u) != 0u, (words.y >> 31u) == 0u, proven);
+{% else %}
+    return Corners(vec4f(codes), (words.x >> 31u) != 0u);
+{% endif %}
 }
 
 fn bilinear(corners: vec4f, at: vec2f) -> f32 {

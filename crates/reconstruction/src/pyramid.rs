@@ -56,6 +56,21 @@ impl CodedDepth {
         }
     }
 
+    /// Of one image among others. In a set with holes each sample's lowest bit says whether its own way is not proven
+    /// free, in images without uncertain texels too.
+    pub(crate) fn in_set(image: &DepthImage, among_holes: bool) -> Self {
+        let mut depth = Self::of(image);
+        if among_holes {
+            let uncertain = std::mem::take(&mut depth.uncertain);
+            let marks = uncertain.iter().copied().chain(std::iter::repeat(false));
+            for (code, mark) in depth.codes.iter_mut().zip(marks).filter(|(code, _)| **code > BACKGROUND_CODE) {
+                *code = (*code & !1) | u16::from(mark);
+            }
+            depth.uncertain = uncertain;
+        }
+        depth
+    }
+
     /// See [`CodedDepth::uncertain`].
     pub(crate) fn is_uncertain(&self, x: u32, y: u32) -> bool {
         let (x, y) = (x.min(self.size_px[0] - 1), y.min(self.size_px[1] - 1));
@@ -63,9 +78,11 @@ impl CodedDepth {
     }
 
     /// How far the farthest sample may lie from where its code puts it, and half as much again for rounding.
-    pub(crate) fn greatest_error_m(image: &DepthImage) -> f32 {
+    pub(crate) fn greatest_error_m(image: &DepthImage, among_holes: bool) -> f32 {
         let [least, range] = least_and_range(image);
-        0.75 * range / (LAST_CODE - FIRST_CODE) / (least * least)
+        // A mark takes the place of the lowest bit.
+        let codes = if among_holes { 1.75 } else { 0.75 };
+        codes * range / (LAST_CODE - FIRST_CODE) / (least * least)
     }
 
     /// Two words for each texel and the cell to its lower right, row by row: the codes of the cell's upper left (low
@@ -100,6 +117,13 @@ impl CodedDepth {
 }
 
 /// By codes: all that is coded as a hole is one, a depth that is no number as well.
+/// Whether any texel of a set is uncertain.
+pub(crate) fn is_among_holes(images: &[DepthImage]) -> bool {
+    let is_hole = |&inverse: &f32| inverse.is_nan() || inverse < 0.0;
+    let passes = |image: &DepthImage| image.passed.as_ref().is_some_and(|passed| passed.contains(&true));
+    images.iter().any(|image| passes(image) || image.inverse_depth_per_m.iter().any(is_hole))
+}
+
 fn uncertain_texels(image: &DepthImage, codes: &[u16]) -> Vec<bool> {
     let uncertain = |(index, &code): (usize, &u16)| code == HOLE_CODE || image.has_passed(index);
     let texels: Vec<bool> = codes.iter().enumerate().map(uncertain).collect();

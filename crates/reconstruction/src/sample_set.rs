@@ -7,7 +7,7 @@ use gpu::Gpu;
 use crate::{
     CodedDepth, Pyramid, ReconstructionError,
     layout::{GpuSampleCamera, GpuVolume},
-    pyramid::cell_row,
+    pyramid::{cell_row, is_among_holes},
     quads::SetMeshes,
     reflectors::Reflectors,
     word_texture,
@@ -63,12 +63,13 @@ impl SampleSet {
         set: &SetDescription<'_>,
     ) -> Result<Self, ReconstructionError> {
         check(gpu, images, &set.volume)?;
+        let among_holes = is_among_holes(images);
         let mut cameras = Vec::with_capacity(images.len());
         let mut uncertain = Vec::with_capacity(images.len());
         let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(word_texture::room);
         let mut colors = word_texture::room(cell_count(images));
         for image in images {
-            let depth = CodedDepth::of(image);
+            let depth = CodedDepth::in_set(image, among_holes);
             let pyramid = Pyramid::of(&depth);
             uncertain.push(!depth.uncertain.is_empty());
             let Camera::Pinhole(camera) = &image.camera;
@@ -158,7 +159,8 @@ pub(crate) fn stretch(camera: &PinholeCamera) -> f32 {
 /// The volume with room for what samples do not know: a search must still be inside where it meets a surface
 /// on the volume's very face.
 pub(crate) fn searched_volume(volume: &Aabb, images: &[DepthImage]) -> Aabb {
-    let depth_error_m = images.iter().map(CodedDepth::greatest_error_m).fold(0.0, f32::max);
+    let among_holes = is_among_holes(images);
+    let depth_error_m = images.iter().map(|image| CodedDepth::greatest_error_m(image, among_holes)).fold(0.0, f32::max);
     volume.padded(volume.size().max_element() * VOLUME_MARGIN + depth_error_m)
 }
 

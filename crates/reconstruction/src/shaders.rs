@@ -30,6 +30,8 @@ pub const SHADERS: &[(&str, &str)] = &[
 
 /// The surface's thickness, in texel footprints: the best of a sweep (docs/methods/joint_carve.md).
 pub(crate) const THICKNESS_FOOTPRINTS: f32 = 2.0;
+/// How much a sample counts behind a surface that was left out.
+pub(crate) const HIDDEN_WEIGHT: f32 = 0.02;
 /// Moves of a carve in a set with holes.
 pub(crate) const MOVES_AMONG_HOLES: u32 = 96;
 /// The coarsest level that a pixel's own search uses; its tile has done the rest.
@@ -88,6 +90,7 @@ pub fn shader_text(templates: &Templates, key: ShaderKey) -> Result<String, Temp
             count_fetches => key.count_fetches,
             holes => key.holes,
             holes_moves => MOVES_AMONG_HOLES,
+            hidden_weight => decimal(HIDDEN_WEIGHT),
             thickness_footprints => decimal(THICKNESS_FOOTPRINTS),
             angle_floor => decimal(ANGLE_FLOOR),
             directions => DIRECTIONS,

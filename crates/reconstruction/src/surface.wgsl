@@ -75,6 +75,13 @@ fn colors_of(cell_index: u32) -> Colors {
     ));
 }
 
+{% if holes %}
+// How much a sample counts behind a surface that was left out, beside one that nothing was left out before.
+const HIDDEN_WEIGHT: f32 = {{ hidden_weight }};
+
+fn faded(share: f32) -> f32 { return clamp((share - 0.05) / 0.95, 0.0, 1.0); }
+{% endif %}
+
 // What a camera makes of a point: how much its colour counts and where it is found, and the share of the
 // texels around that lie on the point's own surface or show what is beyond it.
 struct Sight { weight: f32, cell: u32, shares: vec4f, same: f32, beyond: f32 }
@@ -113,12 +120,14 @@ fn sight_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f, 
     let footprint = camera.focal_px * inverse_distance;
     let weight = border * footprint * footprint / (dot(off, off) + {{ angle_floor }});
 {% if holes %}
-    // Weight fades towards texels that were left out: it goes over to the image that holds them, without a seam.
-    let kept = clamp((same - 0.05) / 0.95, 0.0, 1.0);
+    // Weight fades towards texels that were left out: it goes over to the image that holds them, without a seam. What
+    // lies close behind a surface that was left out is not that surface: it counts where nothing else does.
+    let own = shares * mix(vec4f(HIDDEN_WEIGHT), vec4f(1.0), corners.proven);
+    let kept = faded(dot(shares, corners.proven)) + HIDDEN_WEIGHT * faded(same);
 {% else %}
     let kept = 1.0;
 {% endif %}
-    return Sight(select(0.0, weight * kept, inside && same > 0.05), cell_index, shares, select(0.0, same, inside), select(0.0, beyond, inside));
+    return Sight(select(0.0, weight * kept, inside && same > 0.05), cell_index, {{ "own" if holes else "shares" }}, select(0.0, same, inside), select(0.0, beyond, inside));
 }
 
 // `occupied`: whether the cameras together hold that there is a surface. A silhouette lies somewhere within
@@ -128,7 +137,11 @@ struct Blend { color_linear: vec3f, camera_mask: u32, occupied: bool }
 fn color_of(sight: Sight) -> vec3f {
     let colors = colors_of(sight.cell).corners;
     let color = sight.shares.x * colors[0] + sight.shares.y * colors[1] + sight.shares.z * colors[2] + sight.shares.w * colors[3];
+{% if holes %}
+    return color / max(dot(sight.shares, vec4f(1.0)), 1e-6);
+{% else %}
     return color / max(sight.same, 0.05);
+{% endif %}
 }
 
 // The two cameras that know a point best, each weighted by how far it surpasses the third, so that no seam

@@ -19,6 +19,7 @@ mod view_ray;
 use depth_image::{Aabb, DepthImage, PinholeCamera, Provenance, ProvenanceKind, View, srgb8_from_linear};
 use glam::Vec3;
 
+use crate::pyramid::is_among_holes;
 use crate::{Quad, ReconstructionMethod, SetDescription};
 use sample_camera::SampleCamera;
 use view_ray::{ViewRay, ViewRays};
@@ -113,11 +114,11 @@ pub fn quads(images: &[DepthImage], method: ReconstructionMethod) -> Option<Vec<
 /// Camera 0 is the nearest to the view's eye and so knows most; each keeps its bit. Images that do not prove all ways
 /// free come after those that do.
 fn nearest_first(images: &[DepthImage], camera: &PinholeCamera) -> Vec<SampleCamera> {
-    let mut cameras: Vec<_> = (0..).zip(images).map(|(bit, image)| SampleCamera::of(image, 1 << bit)).collect();
+    let among_holes = is_among_holes(images);
+    let camera_of = |(bit, image): (u32, &DepthImage)| SampleCamera::of(image, 1 << bit, among_holes);
+    let mut cameras: Vec<_> = (0..).zip(images).map(camera_of).collect();
     let distance = |c: &SampleCamera| c.eye_in_world.distance_squared(camera.eye_in_world);
     cameras.sort_by(|a, b| a.has_uncertain().cmp(&b.has_uncertain()).then(distance(a).total_cmp(&distance(b))));
-    let among_holes = cameras.iter().any(SampleCamera::has_uncertain);
-    cameras.iter_mut().for_each(|camera| camera.among_holes = among_holes);
     cameras
 }
 

@@ -3,7 +3,7 @@
 use depth_image::{Camera, DepthImage, linear_from_rgb9e5};
 use glam::{UVec2, Vec2, Vec3, Vec4};
 
-use crate::{CodedDepth, Pyramid, sample_set::stretch};
+use crate::{CodedDepth, Pyramid, pyramid::BACKGROUND_CODE, sample_set::stretch};
 
 /// One sample image, its depth as codes and their pyramid.
 pub(super) struct SampleCamera {
@@ -32,6 +32,8 @@ pub(super) struct Corners {
     pub connected: bool,
     /// Whether the ways to all four are proven free.
     pub certain: bool,
+    /// 1 for each corner whose own way is, else 0.
+    pub proven: [f32; 4],
 }
 
 /// Of a node's word; a hole may be as near as anything, nearer than any code.
@@ -40,9 +42,9 @@ fn nearest_code(word: u32) -> f32 {
 }
 
 impl SampleCamera {
-    pub fn of(image: &DepthImage, mask: u32) -> Self {
+    pub fn of(image: &DepthImage, mask: u32, among_holes: bool) -> Self {
         let Camera::Pinhole(camera) = &image.camera;
-        let depth = CodedDepth::of(image);
+        let depth = CodedDepth::in_set(image, among_holes);
         let pyramid = Pyramid::of(&depth);
         Self {
             homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world(),
@@ -51,7 +53,7 @@ impl SampleCamera {
             focal_px: camera.focal_px.min_element(),
             stretch: stretch(camera),
             mask,
-            among_holes: false,
+            among_holes,
             wide_words: pyramid.wide_words(),
             pyramid,
             depth,
@@ -100,9 +102,11 @@ impl SampleCamera {
     }
 
     pub fn corners(&self, cell: UVec2) -> Corners {
-        let at = |x, y| f32::from(self.depth.at(cell.x + x, cell.y + y));
+        let raw = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| self.depth.at(cell.x + x, cell.y + y));
+        let is_marked = |code: u16| self.among_holes && code > BACKGROUND_CODE && code & 1 == 1;
         Corners {
-            codes: [at(0, 0), at(1, 0), at(0, 1), at(1, 1)],
+            codes: raw.map(|code| f32::from(if is_marked(code) { code & !1 } else { code })),
+            proven: raw.map(|code| if is_marked(code) { 0.0 } else { 1.0 }),
             connected: self.depth.connected[(cell.y * self.depth.size_px[0] + cell.x) as usize],
             certain: ![(0, 0), (1, 0), (0, 1), (1, 1)]
                 .iter()

@@ -3,7 +3,7 @@
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{sample_camera::SampleCamera, view_ray::ViewRay};
-use crate::shaders::{ANGLE_FLOOR, THICKNESS_FOOTPRINTS};
+use crate::shaders::{ANGLE_FLOOR, HIDDEN_WEIGHT, THICKNESS_FOOTPRINTS};
 
 /// Of four corners, in their order.
 pub(super) fn bilinear(corners: [f32; 4], at: Vec2) -> f32 {
@@ -74,19 +74,26 @@ fn sight(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> S
     // Of a connected cell, the surface itself counts; else each sample for itself.
     let surfaces = if corners.connected { [bilinear(corners.codes, at); 4] } else { corners.codes };
     let (mut same, mut beyond, mut color) = (0.0, 0.0, Vec3::ZERO);
+    // Of the same surface, those that count, and those whose ways are proven free.
+    let (mut own, mut proven) = (0.0, 0.0);
     for (i, share) in bilinear_shares(at).into_iter().enumerate() {
         let gap = camera.code(inverse_w) - surfaces[i];
         if gap.abs() < reach && corners.codes[i] > 1.5 {
             same += share;
-            color += camera.color_linear(cell + UVec2::new(i as u32 & 1, i as u32 >> 1)) * share;
+            proven += share * corners.proven[i];
+            let counted = share * if corners.proven[i] > 0.0 { 1.0 } else { HIDDEN_WEIGHT };
+            own += counted;
+            color += camera.color_linear(cell + UVec2::new(i as u32 & 1, i as u32 >> 1)) * counted;
         }
         if gap > reach && corners.codes[i] > 0.5 && corners.certain {
             beyond += share;
         }
     }
-    let kept = if camera.among_holes { ((same - 0.05) / 0.95).clamp(0.0, 1.0) } else { 1.0 };
+    let faded = |share: f32| ((share - 0.05) / 0.95).clamp(0.0, 1.0);
+    let kept = if camera.among_holes { faded(proven) + HIDDEN_WEIGHT * faded(same) } else { 1.0 };
+    let of: f32 = if camera.among_holes { own.max(1e-6) } else { same.max(0.05) };
     let weight = if same > 0.05 { weight(camera, uv, point_in_world, view_direction) * kept } else { 0.0 };
-    Sight { weight, color_linear: color / same.max(0.05), mask: camera.mask, same, beyond }
+    Sight { weight, color_linear: color / of, mask: camera.mask, same, beyond }
 }
 
 /// By the angle between the two lines of sight, the footprint and the distance to the border.

@@ -259,3 +259,21 @@ fn a_wall_that_only_passing_rays_reach_is_met() {
     println!("pixels filled: {alone} with one layer, {both} with two");
     assert!(both * 4 < alone, "{alone} {both}");
 }
+
+/// Ground half a footprint under a road: images that leave the road out show the ground, so close that it could be
+/// taken for the road.
+#[test]
+fn what_lies_close_behind_does_not_shine_through() {
+    let mut scene = quad(Vec3::ZERO, 1.5, Vec3::Z, [230; 3]);
+    scene.meshes.extend(quad(Vec3::Z * -0.02, 1.5, Vec3::Z, [20; 3]).meshes);
+    scene.instances.push(scene::Instance { mesh: 1, ..scene.instances[0] });
+    let corners = Corners { eye: Vec3::Z * 4.0, target: Vec3::ZERO, half_m: 0.4 };
+    let stage = Stage::apart(scene, &corners.samples(3));
+    let hidden = stage.images[1].passed.as_ref().expect("the second image shows the ground");
+    assert!(hidden.iter().filter(|&&passed| passed).count() > 1000);
+    let camera = looking(corners.eye, corners.target, 25.0, VIEW_PX);
+    let view = stage.view(&camera, CARVE);
+    let darkest = view.srgb8.iter().min().copied().unwrap_or(0);
+    println!("darkest of the road: {darkest} of 230 codes");
+    assert!(count(&view, ProvenanceKind::Hit) == VIEW_PX.element_product() as usize && darkest > 215, "{darkest}");
+}
