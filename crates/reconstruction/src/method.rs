@@ -74,15 +74,14 @@ impl FromStr for ReconstructionMethod {
     type Err = UnknownMethod;
     fn from_str(text: &str) -> Result<Self, UnknownMethod> {
         let unknown = || UnknownMethod(text.to_owned());
-        if let Some(("hybrid_mesh", px)) = text.split_once(':') {
+        let (name, number) = text.split_once(':').map_or((text, None), |(name, number)| (name, Some(number)));
+        let name = name.replace('-', "_");
+        if let ("hybrid_mesh", Some(px)) = (name.as_str(), number) {
             let bound = px.parse().ok().and_then(ErrorBound::from_px).ok_or_else(unknown)?;
             return Ok(Self::HybridMesh { merged: Some(bound) });
         }
-        let (name, number) = match text.split_once(':') {
-            Some((name, number)) => (name, Some(number.parse::<u32>().map_err(|_| unknown())?)),
-            None => (text, None),
-        };
-        match (name, number) {
+        let number = number.map(|number| number.parse::<u32>().map_err(|_| unknown())).transpose()?;
+        match (name.as_str(), number) {
             ("joint_carve", level) if level.unwrap_or(0) <= MAX_STOP_LEVEL => {
                 Ok(Self::JointCarve { stop_level: level.unwrap_or(0) })
             }
@@ -119,6 +118,7 @@ mod tests {
         let meshes = ["mesh", "hybrid_mesh", "hybrid_mesh:0.01", "hybrid_mesh:0.5", "hybrid_mesh:2", "hybrid_mesh:100"];
         for name in ["joint_carve", "joint_carve:3", "light_field_search:8"].into_iter().chain(meshes) {
             assert_eq!(name.parse::<ReconstructionMethod>().expect(name).to_string(), name);
+            assert_eq!(name.replace('_', "-").parse::<ReconstructionMethod>().expect(name).to_string(), name);
         }
         for name in [
             "",
