@@ -296,7 +296,8 @@ fn next_sampling(method: Option<SamplingMethod>) -> Option<SamplingMethod> {
     match method {
         None => Some(SamplingMethod::Conventional),
         Some(SamplingMethod::Conventional) => Some(SamplingMethod::NonRedundant(Redundancy::default())),
-        Some(SamplingMethod::NonRedundant(_)) => Some(SamplingMethod::DepthPeeling { layers: 4 }),
+        Some(SamplingMethod::NonRedundant(_)) => Some(SamplingMethod::Useful(Redundancy::default())),
+        Some(SamplingMethod::Useful(_)) => Some(SamplingMethod::DepthPeeling { layers: 4 }),
         Some(SamplingMethod::DepthPeeling { .. }) => None,
     }
 }
@@ -315,7 +316,7 @@ fn methods() -> Vec<String> {
 fn every_method_has_its_page() {
     const PARTS: [&str; 4] = ["## Source", "## Equations", "## Cost", "## Known failures"];
     let folder = root().join("docs/methods");
-    assert_eq!(methods().len(), 8);
+    assert_eq!(methods().len(), 9);
     for name in methods() {
         let page = folder.join(format!("{name}.md"));
         let text = fs::read_to_string(&page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));

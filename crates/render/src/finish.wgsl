@@ -26,7 +26,10 @@
 {% endif %}
 {% include "sums.wgsl" %}
 
-struct Finish { background_linear: vec3f, padding: u32 }
+struct Finish { background_linear: vec3f, view_cell_m: f32 }
+{% if only_useful %}
+{% include "useful.wgsl" %}
+{% endif %}
 
 fn put(plane: u32, place: u32, word: u32) { words[camera.first_word + plane * camera.pixel_count + place] = word; }
 fn sum_at(plane: u32, place: u32) -> f32 { return sums[camera.first_sum + plane * camera.pixel_count + place]; }
@@ -57,7 +60,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let place = id.y * camera.size_px.x + id.x;
     let depth = textureLoad(reversed_depth, id.xy, 0){{ ".x" if by_rays else "" }};
     let surface = textureLoad(surfaces, id.xy, 0);
+{% if only_useful %}
+    let passed_depth = bitcast<f32>(left_out[place]);
+    var met = depth > 0.0;
+    for (var hidden = met && passed_depth > depth; hidden; hidden = false) {
+        met = is_useful(id.xy, depth, passed_depth);
+    }
+{% else %}
     let met = depth > 0.0;
+{% endif %}
     var light = vec3f(1.0);
 {% if lit %}
     light = select(light_at(place), light, (surface.x & SHOWN_AS_IT_IS) != 0u);

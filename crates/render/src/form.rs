@@ -215,6 +215,7 @@ impl Form {
             leave_out => self.leave_out.map(|test| test.shader),
             test_traces_rays => self.leave_out.is_some_and(|test| test.traces_rays),
             earlier => self.earlier,
+            only_useful => self.leave_out.is_some_and(|test| test.only_useful),
             known_group => 2,
             surface_id => self.surface_id,
             bias_footprints => format!("{:?}", crate::BIAS_FOOTPRINTS),

@@ -24,6 +24,8 @@ pub struct LeaveOut {
     pub traces_rays: bool,
     /// Whether all images have one camera, so that pixels are compared with the same pixel.
     pub from_one_place: bool,
+    /// Whether what no viewpoint near the cameras can see past its blockers is left out, too (`useful.wgsl`).
+    pub only_useful: bool,
 }
 
 /// `KnownCamera` of `known.wgsl`.
@@ -45,6 +47,8 @@ pub(crate) struct KnownCamera {
 
 /// The cameras of a set and, where a test asks for it, what their images hold.
 pub(crate) struct Known {
+    /// The greatest distance between two of the viewpoints.
+    pub extent_m: f32,
     uniform: wgpu::Buffer,
     layers: Arc<Layers>,
 }
@@ -123,7 +127,12 @@ impl Known {
             height: side(|camera| camera.size_px.y),
             depth_or_array_layers: cameras.len().max(1) as u32,
         };
-        Ok(Self { uniform: gpu.buffer_with("known cameras", bytes, BufferUsages::UNIFORM), layers: kept.of(gpu, size) })
+        let extent_m = extent_m(cameras);
+        Ok(Self {
+            extent_m,
+            uniform: gpu.buffer_with("known cameras", bytes, BufferUsages::UNIFORM),
+            layers: kept.of(gpu, size),
+        })
     }
 
     /// Whether images after the `number`-th will ask what it holds.
@@ -179,6 +188,13 @@ impl KnownCamera {
             ..Self::zeroed()
         }
     }
+}
+
+/// The greatest distance between two of the viewpoints: the size of the cell that views are asked for in.
+#[must_use]
+pub fn extent_m(cameras: &[PinholeCamera]) -> f32 {
+    let pairs = cameras.iter().flat_map(|a| cameras.iter().map(|b| a.eye_in_world.distance(b.eye_in_world)));
+    pairs.fold(0.0, f32::max)
 }
 
 fn at_most(what: &str, needed: usize, limit: u32) -> Result<(), GpuError> {

@@ -506,7 +506,8 @@ impl Renderer {
     ) -> Result<(), RenderError> {
         let pipeline = self.pipelines.get(batch.finish)?;
         let [r, g, b] = batch.work.scene.background_linear.to_array();
-        let finish = self.gpu.buffer_with("finish", &[r, g, b, 0.0], BufferUsages::UNIFORM);
+        let view_cell_m = batch.chain.map_or(0.0, |chain| chain.known.extent_m);
+        let finish = self.gpu.buffer_with("finish", &[r, g, b, view_cell_m], BufferUsages::UNIFORM);
         for (number, target) in (0..).zip(surfaces) {
             let mut resources = vec![
                 window(cameras, PIXEL_CAMERA_BYTES),

@@ -15,6 +15,8 @@ pub enum SamplingMethod {
     Conventional,
     /// Only what no image before holds; behind it rays go on (Xie §3).
     NonRedundant(Redundancy),
+    /// The same, less what no viewpoint between the sample cameras can see past its blockers.
+    Useful(Redundancy),
     /// Layer behind layer from one place: the middle of the sample cameras.
     DepthPeeling {
         /// Images, each of what lies behind the one before.
@@ -34,6 +36,26 @@ pub enum Redundancy {
     Tolerance,
 }
 
+impl Redundancy {
+    const ALL: [Self; 3] = [Self::Pixel, Self::Visibility, Self::Tolerance];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Pixel => "pixel",
+            Self::Visibility => "visibility",
+            Self::Tolerance => "tolerance",
+        }
+    }
+
+    /// The default without a name.
+    fn named(name: Option<&str>) -> Option<Self> {
+        match name {
+            None => Some(Self::default()),
+            Some(name) => Self::ALL.into_iter().find(|test| test.name() == name),
+        }
+    }
+}
+
 /// The most images of a set, as reconstruction takes them.
 const MAX_LAYERS: u32 = 16;
 const DEFAULT_LAYERS: u32 = 4;
@@ -41,17 +63,18 @@ const DEFAULT_LAYERS: u32 = 4;
 /// Not the name of a sampling method.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "unknown sampling method {0:?}, expected conventional, non_redundant, non_redundant:pixel, non_redundant:visibility, non_redundant:tolerance, depth_peeling or depth_peeling:LAYERS (1 to 16)"
+    "unknown sampling method {0:?}, expected conventional, non_redundant or useful, each also with :pixel, :visibility or :tolerance, depth_peeling or depth_peeling:LAYERS (1 to 16)"
 )]
 pub struct UnknownSampling(String);
 
 impl SamplingMethod {
     /// All of them, with the paper's numbers.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Conventional,
         Self::NonRedundant(Redundancy::Pixel),
         Self::NonRedundant(Redundancy::Visibility),
         Self::NonRedundant(Redundancy::Tolerance),
+        Self::Useful(Redundancy::Pixel),
         Self::DepthPeeling { layers: DEFAULT_LAYERS },
     ];
 
@@ -60,7 +83,7 @@ impl SamplingMethod {
     pub fn cameras(self, rig: Vec<PinholeCamera>) -> Vec<PinholeCamera> {
         match self {
             Self::DepthPeeling { layers } => depth_peeling::cameras(&rig, layers as usize),
-            Self::Conventional | Self::NonRedundant(_) => rig,
+            Self::Conventional | Self::NonRedundant(_) | Self::Useful(_) => rig,
         }
     }
 
@@ -76,6 +99,7 @@ impl SamplingMethod {
         match self {
             Self::Conventional => None,
             Self::NonRedundant(redundancy) => Some(non_redundant::test(redundancy)),
+            Self::Useful(redundancy) => Some(LeaveOut { only_useful: true, ..non_redundant::test(redundancy) }),
             Self::DepthPeeling { .. } => Some(depth_peeling::TEST),
         }
     }
@@ -89,9 +113,8 @@ impl FromStr for SamplingMethod {
         let (name, detail) = name.split_once(':').map_or((name.as_str(), None), |(name, detail)| (name, Some(detail)));
         match (name, detail) {
             ("conventional", None) => Ok(Self::Conventional),
-            ("non_redundant", None | Some("pixel")) => Ok(Self::NonRedundant(Redundancy::Pixel)),
-            ("non_redundant", Some("tolerance")) => Ok(Self::NonRedundant(Redundancy::Tolerance)),
-            ("non_redundant", Some("visibility")) => Ok(Self::NonRedundant(Redundancy::Visibility)),
+            ("non_redundant", test) => Redundancy::named(test).map(Self::NonRedundant).ok_or_else(unknown),
+            ("useful", test) => Redundancy::named(test).map(Self::Useful).ok_or_else(unknown),
             ("depth_peeling", layers) => {
                 let layers = layers.map_or(Ok(DEFAULT_LAYERS), |layers| layers.parse().map_err(|_| unknown()))?;
                 let allowed = (1..=MAX_LAYERS).contains(&layers);
@@ -106,9 +129,8 @@ impl fmt::Display for SamplingMethod {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Conventional => f.write_str("conventional"),
-            Self::NonRedundant(Redundancy::Pixel) => f.write_str("non_redundant:pixel"),
-            Self::NonRedundant(Redundancy::Visibility) => f.write_str("non_redundant:visibility"),
-            Self::NonRedundant(Redundancy::Tolerance) => f.write_str("non_redundant:tolerance"),
+            Self::NonRedundant(redundancy) => write!(f, "non_redundant:{}", redundancy.name()),
+            Self::Useful(redundancy) => write!(f, "useful:{}", redundancy.name()),
             Self::DepthPeeling { layers } => write!(f, "depth_peeling:{layers}"),
         }
     }

@@ -20,5 +20,5 @@ pub(crate) const fn test(redundancy: Redundancy) -> LeaveOut {
         Redundancy::Visibility => (VISIBILITY, true),
         Redundancy::Tolerance => (TOLERANCE, false),
     };
-    LeaveOut { shader, traces_rays, from_one_place: false }
+    LeaveOut { shader, traces_rays, from_one_place: false, only_useful: false }
 }

@@ -5,7 +5,10 @@ use depth_image::{
     unit_from_oct16,
 };
 use glam::{UVec2, Vec2, Vec3};
-use render::scalar::rays::{Hit, Scene, pixel_ray};
+use render::{
+    extent_m,
+    scalar::rays::{Hit, Scene, pixel_ray},
+};
 
 use crate::{Redundancy, SamplingMethod};
 
@@ -33,6 +36,8 @@ const SLOPE_PX: f32 = 1.0;
 const SAME_FACING: f32 = 0.906_307_8;
 const COARSER: f32 = 1.5;
 const MOST_LAYERS: usize = 64;
+const RING: u32 = 16;
+const BLOCKER_FOOTPRINTS: f32 = 4.0;
 
 /// Depth, normals and surface ids of a set; colours are left black.
 #[must_use]
@@ -40,7 +45,10 @@ pub fn sample(scene: &Scene, cameras: &[PinholeCamera], method: SamplingMethod) 
     let mut images: Vec<DepthImage> = Vec::with_capacity(cameras.len());
     for camera in cameras {
         let pixels = (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| UVec2::new(x, y)));
-        let texels: Vec<Texel> = pixels.map(|pixel| texel(scene, camera, pixel, &images, method)).collect();
+        let mut texels: Vec<Texel> = pixels.map(|pixel| texel(scene, camera, pixel, &images, method)).collect();
+        if let SamplingMethod::Useful(_) = method {
+            leave_out_useless(&mut texels, camera, extent_m(cameras));
+        }
         images.push(image(camera, &texels));
     }
     images
@@ -50,23 +58,48 @@ struct Texel {
     inverse_depth_per_m: f32,
     normal_oct16: u32,
     id: SurfaceId,
-    passed: bool,
+    /// Planar depth of the nearest surface that was left out before it, if any was.
+    passed_m: Option<f32>,
 }
 
 fn texel(scene: &Scene, camera: &PinholeCamera, pixel: UVec2, earlier: &[DepthImage], method: SamplingMethod) -> Texel {
     let ray = pixel_ray(camera, pixel);
-    let (mut near, mut passed) = (camera.near_m, false);
+    let (mut near, mut passed_m) = (camera.near_m, None);
     for _ in 0..MOST_LAYERS {
         let Some(hit) = scene.closest(&ray, near).0 else { break };
         let candidate = candidate(scene, camera, pixel, &ray, &hit);
         if !earlier.iter().any(|image| is_known(scene, &candidate, image, method)) {
             let (id, normal_oct16) = (candidate.id, oct16_from_unit(candidate.normal));
-            return Texel { inverse_depth_per_m: hit.t.recip(), normal_oct16, id, passed };
+            return Texel { inverse_depth_per_m: hit.t.recip(), normal_oct16, id, passed_m };
         }
-        (near, passed) = (hit.t, true);
+        (near, passed_m) = (hit.t, passed_m.or(Some(hit.t)));
     }
-    let inverse_depth_per_m = if passed { HOLE_INVERSE_DEPTH } else { BACKGROUND_INVERSE_DEPTH };
-    Texel { inverse_depth_per_m, normal_oct16: 0, id: SurfaceId { instance: 0, primitive: 0 }, passed }
+    let inverse_depth_per_m = if passed_m.is_some() { HOLE_INVERSE_DEPTH } else { BACKGROUND_INVERSE_DEPTH };
+    Texel { inverse_depth_per_m, normal_oct16: 0, id: SurfaceId { instance: 0, primitive: 0 }, passed_m }
+}
+
+/// As in `useful.wgsl`: what lies behind a blocker that fills the whole ring around it is not seen from the cell.
+fn leave_out_useless(texels: &mut [Texel], camera: &PinholeCamera, view_cell_m: f32) {
+    let front = |texel: &Texel| texel.passed_m.map_or(texel.inverse_depth_per_m.max(0.0), |m: f32| m.recip());
+    let fronts: Vec<f32> = texels.iter().map(front).collect();
+    let width = camera.size_px.x;
+    for (place, texel) in (0..).zip(texels).filter(|(_, texel)| texel.inverse_depth_per_m > 0.0) {
+        let Some(blocker_m) = texel.passed_m else { continue };
+        let sample_m = texel.inverse_depth_per_m.recip();
+        let footprint_m = blocker_m / camera.focal_px.min_element();
+        let radius_px = (view_cell_m * (sample_m - blocker_m) / sample_m / footprint_m).max(1.0);
+        let center = Vec2::new((place % width) as f32, (place / width) as f32) + 0.5;
+        let is_seen_past = |step: u32| {
+            let offset = Vec2::from_angle(step as f32 * std::f32::consts::TAU / RING as f32) * radius_px;
+            let at = (center + offset).floor();
+            let inside = at.cmpge(Vec2::ZERO).all() && at.cmplt(camera.size_px.as_vec2()).all();
+            let front = if inside { fronts[index_of(camera, at.as_uvec2())] } else { 0.0 };
+            front <= 0.0 || (front.recip() - blocker_m).abs() > BLOCKER_FOOTPRINTS * footprint_m
+        };
+        if !(0..RING).any(is_seen_past) {
+            texel.inverse_depth_per_m = HOLE_INVERSE_DEPTH;
+        }
+    }
 }
 
 fn candidate(scene: &Scene, camera: &PinholeCamera, pixel: UVec2, ray: &Ray, hit: &Hit) -> Candidate {
@@ -95,7 +128,10 @@ fn image(camera: &PinholeCamera, texels: &[Texel]) -> DepthImage {
         normal_oct16: Some(texels.iter().map(|texel| texel.normal_oct16).collect()),
         surface_id: Some(texels.iter().map(|texel| texel.id).collect()),
         specular: None,
-        passed: texels.iter().any(|texel| texel.passed).then(|| texels.iter().map(|texel| texel.passed).collect()),
+        passed: texels
+            .iter()
+            .any(|texel| texel.passed_m.is_some())
+            .then(|| texels.iter().map(|texel| texel.passed_m.is_some()).collect()),
         corner_inverse_depth_per_m: None,
     }
 }
@@ -103,12 +139,16 @@ fn image(camera: &PinholeCamera, texels: &[Texel]) -> DepthImage {
 fn is_known(scene: &Scene, candidate: &Candidate, image: &DepthImage, method: SamplingMethod) -> bool {
     match method {
         SamplingMethod::Conventional => false,
-        SamplingMethod::NonRedundant(Redundancy::Pixel) => is_pixel_redundant(candidate, image),
-        SamplingMethod::NonRedundant(Redundancy::Visibility) => {
+        SamplingMethod::NonRedundant(Redundancy::Pixel) | SamplingMethod::Useful(Redundancy::Pixel) => {
+            is_pixel_redundant(candidate, image)
+        }
+        SamplingMethod::NonRedundant(Redundancy::Visibility) | SamplingMethod::Useful(Redundancy::Visibility) => {
             let Camera::Pinhole(camera) = &image.camera;
             is_visibility_redundant(scene, candidate.point_in_world, candidate.footprint_m, camera)
         }
-        SamplingMethod::NonRedundant(Redundancy::Tolerance) => is_tolerance_redundant(candidate, image),
+        SamplingMethod::NonRedundant(Redundancy::Tolerance) | SamplingMethod::Useful(Redundancy::Tolerance) => {
+            is_tolerance_redundant(candidate, image)
+        }
         SamplingMethod::DepthPeeling { .. } => is_in_layer(candidate, image),
     }
 }

@@ -131,7 +131,8 @@ fn chart(scene: &str, all: &[Reconstructed]) -> XyChart {
 
 fn checks(scenes: &[(String, Vec<Reconstructed>)]) -> Vec<Check> {
     let apart = |all: &[Reconstructed], of: fn(&Reconstructed) -> f64| {
-        let non_redundant = all.iter().filter(|r| matches!(r.sampling, SamplingMethod::NonRedundant(_)));
+        let non_redundant =
+            all.iter().filter(|r| matches!(r.sampling, SamplingMethod::NonRedundant(_) | SamplingMethod::Useful(_)));
         non_redundant.map(of).fold(f64::INFINITY, f64::min)
     };
     let mut checks = Vec::new();

@@ -141,7 +141,9 @@ fn paper(scene: &str, method: SamplingMethod, image: usize) -> [Cell; 3] {
     let pair = |pair: Option<&[f64; 2]>| pair.map_or([f64::NAN; 2], |pair| *pair);
     let [disoccluded, useful] = match method {
         SamplingMethod::Conventional => [0.0, f64::NAN],
-        SamplingMethod::NonRedundant(_) => pair(image.checked_sub(1).and_then(|i| apart.get(i))),
+        SamplingMethod::NonRedundant(_) | SamplingMethod::Useful(_) => {
+            pair(image.checked_sub(1).and_then(|i| apart.get(i)))
+        }
         SamplingMethod::DepthPeeling { .. } => pair(peeled.get(image)),
     };
     let redundant = match (method, image) {
@@ -234,7 +236,7 @@ fn availabilities(rows: &[SceneRow]) -> anyhow::Result<Table> {
         for (method, available) in METHODS.iter().zip(&row.available) {
             let kind = match method {
                 SamplingMethod::Conventional => 0,
-                SamplingMethod::NonRedundant(_) => 1,
+                SamplingMethod::NonRedundant(_) | SamplingMethod::Useful(_) => 1,
                 SamplingMethod::DepthPeeling { .. } => 2,
             };
             let figures = paper.map_or([f64::NAN; 2], |figures| figures[kind]);

@@ -133,7 +133,7 @@ pub fn times_report(rows: &[(String, Vec<Times>)], extent: Extent, report: &mut 
         report.checks.push(Check::new(name, ratios.sum::<f64>() / rows.len() as f64, "×", Bar::AtMost(most)));
     }
     for (scene, times) in rows {
-        for place in [1, 3] {
+        for place in [1, 3, 5] {
             let method = METHODS[place];
             let more = times[place].bits_a_sample() - times[0].bits_a_sample();
             report.checks.push(Check::new(

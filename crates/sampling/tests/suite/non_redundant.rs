@@ -4,8 +4,8 @@ use depth_image::{Camera, DepthImage, PinholeCamera};
 use glam::{UVec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use sampling::{Redundancy, Rig, SampleWork, SamplingError, SamplingMethod, scalar};
-use scene::Scene;
-use scene::procedural::{blocks, blocks_viewpoints, courtyard, poles};
+use scene::procedural::{blocks, blocks_viewpoints, courtyard, poles, quad};
+use scene::{Instance, Scene};
 
 use crate::stage::{device, upload};
 
@@ -65,7 +65,8 @@ fn the_device_leaves_out_what_the_reference_leaves_out() {
         let on_device = upload(&scene);
         let rays = on_device.scalar_rays(0.0).expect("a tree");
         let peeling = SamplingMethod::DepthPeeling { layers: 3 };
-        for method in APART.into_iter().chain([peeling]) {
+        let useful = [Redundancy::Pixel, Redundancy::Visibility].map(SamplingMethod::Useful);
+        for method in APART.into_iter().chain(useful).chain([peeling]) {
             let cameras = method.cameras(cameras.clone());
             let reference = scalar::sample(&rays, &cameras, method);
             for visibility in [Visibility::Rays, Visibility::Triangles] {
@@ -223,4 +224,30 @@ fn what_needs_no_earlier_image_can_be_taken_apart() {
     }
     let chained = SamplingMethod::NonRedundant(Redundancy::Pixel);
     assert!(matches!(part(&[1, 2], chained), Err(SamplingError::Wanted { index: 1, cameras: 4, .. })));
+}
+
+/// Of two walls behind each other the hidden one is useless in its middle and useful at its rim, the more so the larger
+/// the cell.
+#[test]
+fn what_no_view_can_see_is_left_out() {
+    let mut scene = quad(Vec3::ZERO, 1.5, Vec3::Z, [200; 3]);
+    scene.meshes.extend(quad(Vec3::Z * -1.5, 1.5, Vec3::Z, [90; 3]).meshes);
+    scene.instances.push(Instance { mesh: 1, ..scene.instances[0] });
+    let on_device = upload(&scene);
+    let camera = |x: f32| PinholeCamera::looking_at(Vec3::new(x, 0.0, 5.0), Vec3::ZERO, Vec3::Y, 0.9, SIZE_PX);
+    println!("cell (m): samples of the hidden wall by non_redundant, and useful of them");
+    let mut before = 0;
+    for cell_m in [0.1, 0.4, 0.8, 1.6] {
+        let cameras = [camera(0.0), camera(cell_m)];
+        let hidden = |method| {
+            let image = &sample(&on_device, &cameras, method)[1];
+            let ids = image.surface_id.as_ref().expect("ids");
+            image.inverse_depth_per_m.iter().zip(ids).filter(|(d, id)| **d > 0.0 && id.instance == 1).count()
+        };
+        let all = hidden(SamplingMethod::NonRedundant(Redundancy::Pixel));
+        let useful = hidden(SamplingMethod::Useful(Redundancy::Pixel));
+        println!("{cell_m:4}: {all:5} {useful:5}");
+        assert!(useful < all && useful >= before, "{cell_m}: {useful} of {all} after {before}");
+        before = useful;
+    }
 }
