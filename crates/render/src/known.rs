@@ -48,7 +48,8 @@ pub(crate) struct KnownCamera {
 /// The cameras of a set and, where a test asks for it, what their images hold.
 pub(crate) struct Known {
     /// The greatest distance between two of the viewpoints.
-    pub extent_m: f32,
+    pub view_cell_m: f32,
+    pub cameras: Vec<PinholeCamera>,
     uniform: wgpu::Buffer,
     layers: Arc<Layers>,
 }
@@ -127,9 +128,10 @@ impl Known {
             height: side(|camera| camera.size_px.y),
             depth_or_array_layers: cameras.len().max(1) as u32,
         };
-        let extent_m = extent_m(cameras);
+        let view_cell_m = view_cell_m(cameras);
         Ok(Self {
-            extent_m,
+            view_cell_m,
+            cameras: cameras.to_vec(),
             uniform: gpu.buffer_with("known cameras", bytes, BufferUsages::UNIFORM),
             layers: kept.of(gpu, size),
         })
@@ -192,7 +194,7 @@ impl KnownCamera {
 
 /// The greatest distance between two of the viewpoints: the size of the cell that views are asked for in.
 #[must_use]
-pub fn extent_m(cameras: &[PinholeCamera]) -> f32 {
+pub fn view_cell_m(cameras: &[PinholeCamera]) -> f32 {
     let pairs = cameras.iter().flat_map(|a| cameras.iter().map(|b| a.eye_in_world.distance(b.eye_in_world)));
     pairs.fold(0.0, f32::max)
 }

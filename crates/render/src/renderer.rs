@@ -506,7 +506,7 @@ impl Renderer {
     ) -> Result<(), RenderError> {
         let pipeline = self.pipelines.get(batch.finish)?;
         let [r, g, b] = batch.work.scene.background_linear.to_array();
-        let view_cell_m = batch.chain.map_or(0.0, |chain| chain.known.extent_m);
+        let view_cell_m = batch.chain.map_or(0.0, |chain| chain.known.view_cell_m);
         let finish = self.gpu.buffer_with("finish", &[r, g, b, view_cell_m], BufferUsages::UNIFORM);
         for (number, target) in (0..).zip(surfaces) {
             let mut resources = vec![
@@ -554,7 +554,10 @@ impl Batch<'_> {
 
     fn key(&self) -> Key {
         let DrawWork { scene, lighting, scene_time_s, .. } = self.work;
-        Key::of(scene, lighting, scene_time_s, self.cameras, self.finish)
+        // What a chain's image shows depends on all cameras of its set, and on its place among them.
+        let (of_set, earlier) = self.chain.map_or((&[][..], 0), |chain| (&chain.known.cameras[..], chain.first));
+        let cameras = [of_set, self.cameras].concat();
+        Key::of(scene, lighting, scene_time_s, &cameras, Form { earlier, ..self.finish })
     }
 
     fn occlusion_radius_m(&self) -> f32 {

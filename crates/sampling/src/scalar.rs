@@ -6,8 +6,8 @@ use depth_image::{
 };
 use glam::{UVec2, Vec2, Vec3};
 use render::{
-    extent_m,
     scalar::rays::{Hit, Scene, pixel_ray},
+    view_cell_m,
 };
 
 use crate::{Redundancy, SamplingMethod};
@@ -47,7 +47,7 @@ pub fn sample(scene: &Scene, cameras: &[PinholeCamera], method: SamplingMethod) 
         let pixels = (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| UVec2::new(x, y)));
         let mut texels: Vec<Texel> = pixels.map(|pixel| texel(scene, camera, pixel, &images, method)).collect();
         if let SamplingMethod::Useful(_) = method {
-            leave_out_useless(&mut texels, camera, extent_m(cameras));
+            leave_out_useless(&mut texels, camera, view_cell_m(cameras));
         }
         images.push(image(camera, &texels));
     }
