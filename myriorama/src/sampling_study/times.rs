@@ -47,8 +47,8 @@ fn of_method(subject: &Subject, method: SamplingMethod, size_px: UVec2) -> anyho
     let hybrid = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
     let mut ms = [Vec::new(), Vec::new()];
     for (ms, planes) in ms.iter_mut().zip([SamplePlanes::default(), hybrid]) {
-        // Pipelines are built at any size.
-        subject.sample(method, UVec2::splat(COUNTED_PX), planes)?;
+        // The first builds pipelines, and finds out how surfaces of this size are found.
+        subject.sample(method, size_px, planes)?;
         while ms.len() < RUNS && ms.iter().sum::<f64>() < ENOUGH_MS {
             let start = Instant::now();
             subject.sample(method, size_px, planes)?;
