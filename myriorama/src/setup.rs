@@ -33,7 +33,8 @@ pub struct SceneArgs {
     #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
     pub scene: SceneSpec,
     /// How surfaces are lit, in terms with commas between them: unlit, phong, shadows or soft N (rays a light);
-    /// occlusion N [RADIUSm] (rays of ambient occlusion); adaptive [TOLERANCE] (rays only where light changes)
+    /// occlusion N or occlusion N RADIUSm (rays of ambient occlusion); adaptive or adaptive TOLERANCE (rays only where
+    /// light changes)
     #[arg(long, default_value_t, value_name = "TERMS")]
     pub lighting: Lighting,
     /// A lamp in place of the scene's, as often as wanted, in the scene file's own coordinates: "sun towards=X,Y,Z
