@@ -103,7 +103,7 @@ fn raster_shader_is_valid_in_every_form() {
             let form = context! {
                 shading, surface_id => bit(0), wind => bit(1), double_sided => bit(2), alpha_tested => bit(3),
                 textured => bit(4), coat_textured => bit(5), unlit => bit(6), specular => bit(7),
-                leave_out => (), test_traces_rays => false, earlier => 0, known_group => 3,
+                leave_out => (), depth_only => false, test_traces_rays => false, earlier => 0, known_group => 3,
             };
             let text = templates.render("raster.wgsl", form).unwrap_or_else(|error| panic!("{bits:#b}: {error}"));
             assert_eq!(entries("raster.wgsl", &text), ["vertex", "fragment"], "{bits:#b}");
@@ -112,14 +112,30 @@ fn raster_shader_is_valid_in_every_form() {
 }
 
 #[test]
+fn raster_shader_is_valid_for_depth_alone() {
+    let templates = drawing_templates();
+    for bits in 0..8u32 {
+        let bit = |place: u32| bits >> place & 1 == 1;
+        let form = context! {
+            shading => "ggx", surface_id => true, wind => bit(0), double_sided => true, alpha_tested => bit(1),
+            textured => bit(2), coat_textured => true, unlit => false, specular => true,
+            leave_out => (), depth_only => true, test_traces_rays => false, earlier => 0, known_group => 3,
+        };
+        let text = templates.render("raster.wgsl", form).unwrap_or_else(|error| panic!("{bits:#b}: {error}"));
+        let expected: &[&str] = if bit(1) { &["vertex", "fragment"] } else { &["vertex"] };
+        assert_eq!(entries("raster.wgsl", &text), expected, "{bits:#b}");
+    }
+}
+
+#[test]
 fn raster_shader_is_valid_with_every_test_of_what_is_left_out() {
     let templates = drawing_templates();
-    for test in leave_outs().into_iter().filter(|test| !test.traces_rays) {
+    for test in leave_outs().into_iter().filter(|test| !test.traces_rays()) {
         for (earlier, wind) in [(1, false), (3, true), (15, false)] {
             let form = context! {
                 shading => "ggx", surface_id => true, wind, double_sided => true, alpha_tested => true,
                 textured => true, coat_textured => true, unlit => false, specular => true,
-                leave_out => test.shader, test_traces_rays => false, earlier, known_group => 3,
+                leave_out => test.shader, depth_only => false, test_traces_rays => false, earlier, known_group => 3,
             };
             let text = templates.render("raster.wgsl", form).unwrap_or_else(|error| panic!("{test:?}: {error}"));
             assert_eq!(entries(test.shader, &text), ["vertex", "fragment"], "{test:?}");

@@ -21,12 +21,16 @@
 @group(0) @binding(7) var surface_ids: texture_2d<u32>;
 {% endif %}
 {% if leave_out %}
-// Of each pixel the reversed depth of the nearest surface that was left out.
-@group(0) @binding({{ 8 if surface_id else 7 }}) var<storage, read> left_out: array<u32>;
+// Of the nearest surface on each pixel's ray, shown or left out.
+@group(0) @binding({{ 8 if surface_id else 7 }}) var front_depth: {{ "texture_2d<f32>" if by_rays else "texture_depth_2d" }};
 {% endif %}
 {% include "sums.wgsl" %}
 
 struct Finish { background_linear: vec3f, view_cell_m: f32 }
+{% if leave_out %}
+
+fn front_at(texel: vec2u) -> f32 { return textureLoad(front_depth, texel, 0){{ ".x" if by_rays else "" }}; }
+{% endif %}
 {% if only_useful %}
 {% include "useful.wgsl" %}
 {% endif %}
@@ -60,14 +64,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let place = id.y * camera.size_px.x + id.x;
     let depth = textureLoad(reversed_depth, id.xy, 0){{ ".x" if by_rays else "" }};
     let surface = textureLoad(surfaces, id.xy, 0);
-{% if only_useful %}
-    let passed_depth = bitcast<f32>(left_out[place]);
     var met = depth > 0.0;
-    for (var hidden = met && passed_depth > depth; hidden; hidden = false) {
-        met = is_useful(id.xy, depth, passed_depth);
-    }
-{% else %}
-    let met = depth > 0.0;
+{% if leave_out %}
+    let front = front_at(id.xy);
+{% if only_useful %}
+    for (var hidden = met && front > depth; hidden; hidden = false) { met = is_useful(id.xy, depth, front); }
+{% endif %}
 {% endif %}
     var light = vec3f(1.0);
 {% if lit %}
@@ -91,10 +93,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     put(0u, place, pack4x8unorm(vec4f(srgb_from_linear(color), 1.0)));
 {% endif %}
 {% if leave_out %}
-    let left = bitcast<f32>(left_out[place]);
     // Behind what is left out and not behind something else lies a hole, of which nothing is known.
-    put(1u, place, bitcast<u32>(select(depth / camera.near_m, -1.0, !met && left > 0.0)));
-    put({{ passed_plane }}u, place, select(0u, 1u, left > depth));
+    put(1u, place, bitcast<u32>(select(depth / camera.near_m, -1.0, !met && front > 0.0)));
+    put({{ passed_plane }}u, place, select(0u, 1u, front > depth));
 {% else %}
     put(1u, place, bitcast<u32>(depth / camera.near_m));
 {% endif %}
@@ -105,7 +106,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% endfor %}
 {% endif %}
 {% if surface_id %}
-    let ids = textureLoad(surface_ids, id.xy, 0);
+    let ids = select(vec2u(0u), textureLoad(surface_ids, id.xy, 0).xy, met);
     put({{ id_plane }}u, place, ids.x);
     put({{ id_plane + 1 }}u, place, ids.y);
 {% endif %}

@@ -213,10 +213,11 @@ impl Form {
             samples => self.samples,
             normal_plane, reflector_plane, id_plane, passed_plane,
             leave_out => self.leave_out.map(|test| test.shader),
-            test_traces_rays => self.leave_out.is_some_and(|test| test.traces_rays),
+            test_traces_rays => self.leave_out.is_some_and(|test| test.traces_rays()),
             earlier => self.earlier,
             only_useful => self.leave_out.is_some_and(|test| test.only_useful),
             known_group => 2,
+            nothing => u32::MAX,
             surface_id => self.surface_id,
             bias_footprints => format!("{:?}", crate::BIAS_FOOTPRINTS),
         }
@@ -233,7 +234,7 @@ impl Form {
             Pass::Illuminate => vec![Slot::Uniform, Slot::WordTexture, depth, Slot::Written],
             Pass::Interpolate => vec![Slot::WordTexture, depth, Slot::Written, Slot::Written, Slot::Written],
             Pass::Keep => {
-                vec![Slot::WordTexture, depth, Slot::WordTexture, Slot::WrittenTexture(wgpu::TextureFormat::Rgba32Uint)]
+                vec![Slot::WordTexture, depth, Slot::WrittenTexture(wgpu::TextureFormat::Rgba32Uint)]
             }
             Pass::Finish => vec![Slot::WordTexture, depth, Slot::Written, Slot::Read, Slot::Uniform, Slot::Uniform],
         });
@@ -246,11 +247,14 @@ impl Form {
                 _ => Slot::WordTexture,
             });
         }
+        if self.leave_out.is_some() {
+            slots.push(match self.pass {
+                Pass::Primary => Slot::WrittenTexture(wgpu::TextureFormat::R32Float),
+                _ => depth,
+            });
+        }
         if self.count_visits {
             slots.push(Slot::Written);
-        }
-        if self.pass == Pass::Finish && self.leave_out.is_some() {
-            slots.push(Slot::Read);
         }
         slots
     }

@@ -4,8 +4,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
+use glam::{DMat4, DVec4, UVec2};
 use gpu::{Frame, Gpu, GpuError};
-use wgpu::{BindingResource, BufferUsages, TextureFormat, TextureUsages};
+use wgpu::{BufferUsages, TextureFormat, TextureUsages};
 
 use crate::{
     RenderError,
@@ -20,19 +21,38 @@ use crate::{
 pub struct LeaveOut {
     /// The template that holds `fn is_known(candidate: Candidate, number: u32, camera: KnownCamera) -> bool`.
     pub shader: &'static str,
-    /// Whether it asks the scene by rays; else it asks what the images before hold.
-    pub traces_rays: bool,
+    /// Whom it asks.
+    pub asks: Asks,
     /// Whether all images have one camera, so that pixels are compared with the same pixel.
     pub from_one_place: bool,
     /// Whether what no viewpoint near the cameras can see past its blockers is left out, too (`useful.wgsl`).
     pub only_useful: bool,
 }
 
+/// What a test asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Asks {
+    /// The scene, by rays.
+    Scene,
+    /// Which triangle each texel of the images before shows: instance and primitive, all bits set where it shows none.
+    SurfaceIds,
+    /// How far each sample of the images before lies, where it faces and how coarse it is (`keep.wgsl`).
+    Samples,
+}
+
+impl LeaveOut {
+    /// Whether it asks the scene by rays; else it asks what the images before hold.
+    #[must_use]
+    pub fn traces_rays(self) -> bool {
+        self.asks == Asks::Scene
+    }
+}
+
 /// `KnownCamera` of `known.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct KnownCamera {
-    pub homogeneous_pixel_from_world: [[f32; 4]; 3],
+    pub homogeneous_pixel_from_own: [[f32; 4]; 3],
     pub eye_in_world: [f32; 3],
     pub footprint: f32,
     pub column_in_world: [f32; 3],
@@ -50,15 +70,13 @@ pub(crate) struct Known {
     /// The greatest distance between two of the viewpoints.
     pub view_cell_m: f32,
     pub cameras: Vec<PinholeCamera>,
-    uniform: wgpu::Buffer,
+    asks: Asks,
     layers: Arc<Layers>,
 }
 
 /// A texel for each sample, a layer for each image.
-pub(crate) struct Layers {
-    size: wgpu::Extent3d,
-    /// All layers, to be read.
-    held: wgpu::TextureView,
+struct Layers {
+    held: wgpu::Texture,
     /// Each layer, to be written.
     each: Vec<wgpu::TextureView>,
 }
@@ -68,29 +86,30 @@ pub(crate) struct Layers {
 pub(crate) struct KeptLayers(Mutex<Option<Arc<Layers>>>);
 
 /// What is bound to a test.
-pub(crate) const KNOWN_SLOTS: [Slot; 3] = [Slot::WordTextureArray, Slot::Uniform, Slot::Written];
+pub(crate) const KNOWN_SLOTS: [Slot; 2] = [Slot::WordTextureArray, Slot::Uniform];
 
 impl KeptLayers {
     /// Nobody else uses them; what they hold is left over.
-    fn of(&self, gpu: &Gpu, size: wgpu::Extent3d) -> Arc<Layers> {
+    fn of(&self, gpu: &Gpu, size: wgpu::Extent3d, format: TextureFormat) -> Arc<Layers> {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        match kept.as_ref().filter(|layers| layers.size == size && Arc::strong_count(layers) == 1) {
+        let fits = |layers: &&Arc<Layers>| layers.held.size() == size && layers.held.format() == format;
+        match kept.as_ref().filter(fits).filter(|layers| Arc::strong_count(layers) == 1) {
             Some(layers) => layers.clone(),
-            None => kept.insert(Arc::new(Layers::new(gpu, size))).clone(),
+            None => kept.insert(Arc::new(Layers::new(gpu, size, format))).clone(),
         }
     }
 }
 
 impl Layers {
-    fn new(gpu: &Gpu, size: wgpu::Extent3d) -> Self {
+    fn new(gpu: &Gpu, size: wgpu::Extent3d, format: TextureFormat) -> Self {
         let held = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("held samples"),
             size,
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: TextureFormat::Rgba32Uint,
-            usage: TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING,
+            format,
+            usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING,
             view_formats: &[],
         });
         let layer = |base_array_layer| {
@@ -101,14 +120,16 @@ impl Layers {
                 ..Default::default()
             })
         };
-        Self {
-            size,
-            each: (0..size.depth_or_array_layers).map(layer).collect(),
-            held: held.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2Array),
-                ..Default::default()
-            }),
-        }
+        Self { each: (0..size.depth_or_array_layers).map(layer).collect(), held }
+    }
+
+    /// The first `count`, to be read, while others are written.
+    fn first(&self, count: usize) -> wgpu::TextureView {
+        self.held.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            array_layer_count: Some(count as u32),
+            ..Default::default()
+        })
     }
 }
 
@@ -117,38 +138,55 @@ impl Known {
     pub fn of(gpu: &Gpu, kept: &KeptLayers, cameras: &[PinholeCamera], test: LeaveOut) -> Result<Self, GpuError> {
         let limits = &gpu.device.limits();
         at_most("images of a set", cameras.len(), limits.max_texture_array_layers)?;
-        let gpu_cameras: Vec<KnownCamera> = cameras.iter().map(KnownCamera::of).collect();
-        let bytes: &[u8] = bytemuck::cast_slice(&gpu_cameras);
-        at_most("the cameras of a set (bytes)", bytes.len(), limits.max_uniform_buffer_binding_size as u32)?;
+        let bytes = size_of::<KnownCamera>() * cameras.len();
+        at_most("the cameras of a set (bytes)", bytes, limits.max_uniform_buffer_binding_size as u32)?;
         let side = |side: fn(&PinholeCamera) -> u32| {
-            if test.traces_rays { 1 } else { cameras.iter().map(side).max().unwrap_or(1) }
+            if test.traces_rays() { 1 } else { cameras.iter().map(side).max().unwrap_or(1) }
         };
         let size = wgpu::Extent3d {
             width: side(|camera| camera.size_px.x),
             height: side(|camera| camera.size_px.y),
             depth_or_array_layers: cameras.len().max(1) as u32,
         };
-        let view_cell_m = view_cell_m(cameras);
+        let format = if test.asks == Asks::SurfaceIds { TextureFormat::Rg32Uint } else { TextureFormat::Rgba32Uint };
         Ok(Self {
-            view_cell_m,
+            view_cell_m: view_cell_m(cameras),
             cameras: cameras.to_vec(),
-            uniform: gpu.buffer_with("known cameras", bytes, BufferUsages::UNIFORM),
-            layers: kept.of(gpu, size),
+            asks: test.asks,
+            layers: kept.of(gpu, size, format),
         })
     }
 
-    /// Whether images after the `number`-th will ask what it holds.
-    pub fn is_asked_for(&self, number: usize) -> bool {
+    /// What tests for an image of the camera `own`, after `earlier` others, are bound to.
+    pub fn bind(
+        &self,
+        gpu: &Gpu,
+        layout: &wgpu::BindGroupLayout,
+        own: &PinholeCamera,
+        earlier: usize,
+    ) -> wgpu::BindGroup {
+        let cameras: Vec<KnownCamera> =
+            self.cameras[..earlier].iter().map(|camera| KnownCamera::of(camera, own)).collect();
+        let cameras = gpu.buffer_with("known cameras", &cameras, BufferUsages::UNIFORM);
+        bind_group(gpu, layout, [texture(&self.layers.first(earlier)), cameras.as_entire_binding()])
+    }
+
+    /// Where the `number`-th image's surface ids are to be drawn, if they are asked for as they are.
+    pub fn surface_ids(&self, number: usize) -> Option<&wgpu::TextureView> {
+        (self.asks == Asks::SurfaceIds && self.is_asked_for(number)).then(|| &self.layers.each[number])
+    }
+
+    fn is_asked_for(&self, number: usize) -> bool {
         number + 1 < self.layers.each.len()
     }
 
-    /// In the order of [`KNOWN_SLOTS`], for an image after `earlier` others.
-    pub fn resources<'r>(&'r self, earlier: usize, left_out: &'r wgpu::Buffer) -> [BindingResource<'r>; 3] {
-        let cameras = window(&self.uniform, earlier.max(1) * size_of::<KnownCamera>());
-        [texture(&self.layers.held), cameras, left_out.as_entire_binding()]
+    /// The largest image's.
+    pub fn size_px(&self) -> UVec2 {
+        let size = self.layers.held.size();
+        UVec2::new(size.width, size.height)
     }
 
-    /// Records what the `number`-th camera's image holds, which is the `place`-th of its submission.
+    /// Records what later images ask of the `number`-th camera's image, which is the `place`-th of its submission.
     pub fn keep(
         &self,
         gpu: &Arc<Gpu>,
@@ -158,11 +196,16 @@ impl Known {
         (surfaces, by_rays): (&Surfaces, bool),
         cameras: &wgpu::Buffer,
     ) -> Result<(), RenderError> {
+        if self.asks != Asks::Samples || !self.is_asked_for(number) {
+            return Ok(());
+        }
         let pipeline = pipelines.get(Form { pass: Pass::Keep, by_rays, ..Form::default() })?;
-        let mut resources =
-            vec![window(cameras, PIXEL_CAMERA_BYTES), texture(&surfaces.surface), texture(&surfaces.depth)];
-        resources.extend(surfaces.ids.as_ref().map(texture));
-        resources.push(texture(&self.layers.each[number]));
+        let resources = [
+            window(cameras, PIXEL_CAMERA_BYTES),
+            texture(&surfaces.surface),
+            texture(&surfaces.depth),
+            texture(&self.layers.each[number]),
+        ];
         let bound = bind_group(gpu, &pipeline.get_bind_group_layout(0), resources);
         let groups = surfaces.size_px().map(|side| side.div_ceil(8));
         let mut pass = frame.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -174,12 +217,13 @@ impl Known {
 }
 
 impl KnownCamera {
-    fn of(camera: &PinholeCamera) -> Self {
+    /// `own` is the camera whose image asks.
+    fn of(camera: &PinholeCamera, own: &PinholeCamera) -> Self {
         let column = camera.world_from_camera * glam::Vec3::X / camera.focal_px.x;
         let row = camera.world_from_camera * glam::Vec3::NEG_Y / camera.focal_px.y;
         let size = camera.size_px.as_vec2();
         Self {
-            homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world().map(|row| row.to_array()),
+            homogeneous_pixel_from_own: homogeneous_pixel_from_own(camera, own),
             eye_in_world: camera.eye_in_world.to_array(),
             footprint: camera.focal_px.min_element().recip(),
             column_in_world: column.to_array(),
@@ -190,6 +234,17 @@ impl KnownCamera {
             ..Self::zeroed()
         }
     }
+}
+
+/// Rows that take (column · w, row · w, w, 1) of `own` to the same, without the 1, of `camera`; w is planar depth. In
+/// double precision: both cameras may be far from the origin.
+fn homogeneous_pixel_from_own(camera: &PinholeCamera, own: &PinholeCamera) -> [[f32; 4]; 3] {
+    let from_world = |camera: &PinholeCamera| {
+        let [column, row, depth] = camera.homogeneous_pixel_from_world().map(|row| row.as_dvec4());
+        DMat4::from_cols(column, row, depth, DVec4::W).transpose()
+    };
+    let rows = (from_world(camera) * from_world(own).inverse()).transpose();
+    [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.as_vec4().to_array())
 }
 
 /// The greatest distance between two of the viewpoints: the size of the cell that views are asked for in.

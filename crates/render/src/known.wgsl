@@ -2,8 +2,9 @@
 // test is another template: `is_known(candidate, number, camera)`, of one candidate and one of those cameras.
 
 struct KnownCamera {
-    // Rows that take (point_in_world, 1) to (column · w, row · w, w), w the planar depth in metres.
-    homogeneous_pixel_from_world: array<vec4f, 3>,
+    // Rows that take (column · w, row · w, w, 1) of the image that asks to (column · w, row · w, w) of this one; w is
+    // the planar depth in metres.
+    homogeneous_pixel_from_own: array<vec4f, 3>,
     eye_in_world: vec3f,
     // A pixel's side at a depth of one metre.
     footprint: f32,
@@ -20,6 +21,8 @@ struct KnownCamera {
 
 // A sample that the image would show.
 struct Candidate {
+    // Column · w, row · w, w, 1.
+    homogeneous_pixel: vec4f,
     point_in_world: vec3f,
     reversed_depth: f32,
     normal: vec3f,
@@ -29,18 +32,15 @@ struct Candidate {
     pixel: vec2u,
 }
 
-// A layer a camera; a texel's inverse planar depth (0 without a sample), normal, instance and primitive.
+// A layer a camera; what a texel holds is for the test to know.
 @group({{ known_group }}) @binding(0) var known_samples: texture_2d_array<u32>;
 @group({{ known_group }}) @binding(1) var<uniform> known_cameras: array<KnownCamera, {{ [earlier, 1] | max }}>;
-// Of each pixel the reversed depth of the nearest candidate that was left out.
-@group({{ known_group }}) @binding(2) var<storage, read_write> left_out: array<atomic<u32>>;
 
-// Cosine of the most grazing angle at which a footprint still grows.
-const LEAST_FACING: f32 = 0.01;
+{% include "footprint.wgsl" %}
 
-fn homogeneous_in(camera: KnownCamera, point_in_world: vec3f) -> vec3f {
-    let rows = camera.homogeneous_pixel_from_world;
-    let p = vec4f(point_in_world, 1.0);
+fn homogeneous_in(camera: KnownCamera, candidate: Candidate) -> vec3f {
+    let rows = camera.homogeneous_pixel_from_own;
+    let p = candidate.homogeneous_pixel;
     return vec3f(dot(rows[0], p), dot(rows[1], p), dot(rows[2], p));
 }
 
@@ -50,15 +50,15 @@ fn is_in_view(camera: KnownCamera, homogeneous: vec3f) -> bool {
     return homogeneous.z > camera.near_m && all(homogeneous.xy >= vec2f(0.0)) && all(homogeneous.xy < size);
 }
 
-// A pixel's length on a surface at this depth that is met at this angle.
-fn stretched_footprint(planar_depth_m: f32, footprint: f32, normal: vec3f, sight: vec3f) -> f32 {
-    let facing = abs(dot(normal, sight)) * inverseSqrt(max(dot(sight, sight), 1e-30));
-    return planar_depth_m * footprint / max(facing, LEAST_FACING);
+// The texel that it projects to, or one at the image's rim.
+fn nearest_texel(camera: KnownCamera, homogeneous: vec3f) -> vec2u {
+    let at = homogeneous.xy / max(homogeneous.z, 1e-30);
+    return vec2u(clamp(at, vec2f(0.0), vec2f(camera.columns, camera.rows) - 1.0));
 }
 
 {% include leave_out %}
 
-fn is_left_out(candidate: Candidate, place: u32) -> bool {
+fn is_left_out(candidate: Candidate) -> bool {
     var known = false;
 {% if test_traces_rays %}
     for (var number = 0u; number < {{ earlier }}u && !known; number++) {
@@ -66,13 +66,8 @@ fn is_left_out(candidate: Candidate, place: u32) -> bool {
     }
 {% else %}
 {% for number in range(earlier) %}
-    for (var open = !known; open; open = false) {
-        known = is_known(candidate, {{ number }}u, known_cameras[{{ number }}]);
-    }
+    known = is_known(candidate, {{ number }}u, known_cameras[{{ number }}]) || known;
 {% endfor %}
 {% endif %}
-    for (var left = known; left; left = false) {
-        atomicMax(&left_out[place], bitcast<u32>(candidate.reversed_depth));
-    }
     return known;
 }

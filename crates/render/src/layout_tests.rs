@@ -49,20 +49,28 @@ fn shader(module: &naga::Module, name: &str) -> Layout {
 fn everything_shared_agrees() {
     let form = minijinja::context! {
         wind => true, shading => "ggx", surface_id => false, double_sided => true, alpha_tested => true,
-        textured => true, coat_textured => true, unlit => false, specular => true, leave_out => (),
+        textured => true, coat_textured => true, unlit => false, specular => true, leave_out => (), depth_only => false,
         test_traces_rays => false, earlier => 0, known_group => 3,
     };
     let raster = parsed("raster.wgsl", form);
     let camera = parsed("camera.wgsl", minijinja::context! {});
     let test = minijinja::context! {
-        leave_out => "known_test.wgsl", test_traces_rays => false, earlier => 2, known_group => 3,
+        leave_out => "known_test.wgsl", depth_only => false, test_traces_rays => false, earlier => 2, known_group => 3,
     };
     let known = parsed("known.wgsl", test);
     let shared = [
         (
             &raster,
             "RasterCamera",
-            host!(RasterCamera { clip_from_world, eye_in_world, scene_time_s, near_m, footprint, columns, padding }),
+            host!(RasterCamera {
+                clip_from_world,
+                eye_in_world,
+                scene_time_s,
+                near_m,
+                footprint,
+                padding_0,
+                padding_1
+            }),
         ),
         (
             &raster,
@@ -83,7 +91,7 @@ fn everything_shared_agrees() {
             &known,
             "KnownCamera",
             host!(KnownCamera {
-                homogeneous_pixel_from_world,
+                homogeneous_pixel_from_own,
                 eye_in_world,
                 footprint,
                 column_in_world,

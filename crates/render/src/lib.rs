@@ -29,7 +29,7 @@ mod visibility;
 
 pub use form::{Domain, Form, Pass, Shading, ShadowRays, shader_text};
 pub use gpu_scene::GpuScene;
-pub use known::{LeaveOut, view_cell_m};
+pub use known::{Asks, LeaveOut, view_cell_m};
 pub use lighting::{Direct, Lighting, MAX_RAYS, Occlusion, Rate, UnknownLighting};
 pub use memory_pass::MemoryPass;
 pub use rays::AccelerationReport;
@@ -52,6 +52,7 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("finish.wgsl", include_str!("finish.wgsl")),
     ("known.wgsl", include_str!("known.wgsl")),
     ("keep.wgsl", include_str!("keep.wgsl")),
+    ("footprint.wgsl", include_str!("footprint.wgsl")),
     ("useful.wgsl", include_str!("useful.wgsl")),
     ("rays/traverse.wgsl", include_str!("rays/traverse.wgsl")),
     ("rays/material.wgsl", include_str!("rays/material.wgsl")),

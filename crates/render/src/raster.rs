@@ -14,7 +14,7 @@ use wgpu::TextureFormat;
 
 use crate::{
     GpuScene, RenderError,
-    binding::{bind_group, layout_seen_by},
+    binding::layout_seen_by,
     cluster::Frustum,
     form::Shading,
     gpu_scene::{GpuObject, Traits, UNIFORM_STRIDE},
@@ -26,6 +26,7 @@ use crate::{
 struct PipelineKey {
     shading: Shading,
     surface_id: bool,
+    depth_only: bool,
     wind: bool,
     traits: Traits,
     leave_out: Option<LeaveOut>,
@@ -40,8 +41,8 @@ pub(crate) struct RasterCamera {
     pub scene_time_s: f32,
     pub near_m: f32,
     pub footprint: f32,
-    pub columns: u32,
-    pub padding: u32,
+    pub padding_0: u32,
+    pub padding_1: u32,
 }
 
 /// What to draw, besides from where.
@@ -51,8 +52,8 @@ pub(crate) struct RasterWork<'a> {
     pub shading: Shading,
     pub scene_time_s: f32,
     pub surface_id: bool,
-    /// What is not drawn, and where it is noted; of a single camera.
-    pub leave_out: Option<(LeaveOut, &'a Known, &'a wgpu::Buffer)>,
+    /// What is not drawn; of a single camera.
+    pub leave_out: Option<(LeaveOut, &'a Known)>,
     /// The first camera's place among the known ones.
     pub earlier: usize,
 }
@@ -99,7 +100,8 @@ impl Rasterizer {
         }
     }
 
-    /// Records one pass a camera.
+    /// Records one pass a camera, and one before it for what is in front where something is left out: a test that
+    /// noted what it leaves out would write memory, and no fragment could be spared it by its depth.
     pub fn record(
         &self,
         frame: &mut Frame<'_>,
@@ -111,12 +113,21 @@ impl Rasterizer {
             scene: self.bind_scene(work, cameras),
             object: self.bind_object(work),
             textures: work.scene.textures.iter().map(|views| self.bind_textures(views)).collect(),
-            known: work.leave_out.map(|(_, known, left_out)| {
-                bind_group(&self.gpu, &self.known_layout, known.resources(work.earlier, left_out))
-            }),
+            known: work
+                .leave_out
+                .map(|(_, known)| known.bind(&self.gpu, &self.known_layout, &cameras[0], work.earlier)),
         };
         for (number, (camera, target)) in cameras.iter().zip(surfaces).enumerate() {
-            self.record_one(frame, work, (number, camera), target, &groups)?;
+            if work.leave_out.is_some() {
+                self.record_one(
+                    frame,
+                    RasterWork { leave_out: None, ..work },
+                    (number, camera),
+                    (target, true),
+                    &groups,
+                )?;
+            }
+            self.record_one(frame, work, (number, camera), (target, false), &groups)?;
         }
         Ok(())
     }
@@ -126,28 +137,32 @@ impl Rasterizer {
         frame: &mut Frame<'_>,
         work: RasterWork<'_>,
         (number, camera): (usize, &PinholeCamera),
-        target: &Surfaces,
+        (target, depth_only): (&Surfaces, bool),
         groups: &Groups,
     ) -> Result<(), RenderError> {
         let scene = work.scene;
-        let colors = [Some(attachment(&target.surface)), target.ids.as_ref().map(attachment)];
+        let colors = [Some(attachment(&target.surface)), target.ids().map(attachment)];
+        let color_count = if depth_only { 0 } else { 1 + usize::from(work.surface_id) };
         let mut pass = frame.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("raster"),
-            color_attachments: &colors[..1 + usize::from(work.surface_id)],
-            depth_stencil_attachment: Some(depth_attachment(&target.depth)),
+            color_attachments: &colors[..color_count],
+            depth_stencil_attachment: Some(depth_attachment(if depth_only { target.front() } else { &target.depth })),
             ..Default::default()
         });
+        // Layers of a set are as large as its largest image.
+        let size = camera.size_px.as_vec2();
+        pass.set_viewport(0.0, 0.0, size.x, size.y, 0.0, 1.0);
         pass.set_vertex_buffer(0, scene.vertices.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.set_bind_group(0, &groups.scene, &[number as u32 * UNIFORM_STRIDE as u32]);
-        if let Some(known) = &groups.known {
+        if let Some(known) = groups.known.as_ref().filter(|_| work.leave_out.is_some()) {
             pass.set_bind_group(3, known, &[]);
         }
         let (mut traits, mut texture, mut object) = (None, None, None);
         for run in visible_runs(scene, &Frustum::of(camera)) {
             let draw = &scene.draws[run.draw];
             if traits.replace(draw.traits) != Some(draw.traits) {
-                pass.set_pipeline(&*self.pipeline(work, draw.traits)?);
+                pass.set_pipeline(&*self.pipeline(work, draw.traits, depth_only)?);
             }
             if object.replace(draw.object) != Some(draw.object) {
                 pass.set_bind_group(1, &groups.object, &[draw.object * UNIFORM_STRIDE as u32]);
@@ -182,8 +197,8 @@ impl Rasterizer {
                 scene_time_s: work.scene_time_s,
                 near_m: camera.near_m,
                 footprint: camera.focal_px.min_element().recip(),
-                columns: camera.size_px.x,
-                padding: 0,
+                padding_0: 0,
+                padding_1: 0,
             };
             slot[..size_of::<RasterCamera>()].copy_from_slice(bytemuck::bytes_of(&raster_camera));
         }
@@ -218,11 +233,17 @@ impl Rasterizer {
         })
     }
 
-    fn pipeline(&self, work: RasterWork<'_>, traits: Traits) -> Result<Arc<wgpu::RenderPipeline>, RenderError> {
+    fn pipeline(
+        &self,
+        work: RasterWork<'_>,
+        traits: Traits,
+        depth_only: bool,
+    ) -> Result<Arc<wgpu::RenderPipeline>, RenderError> {
         let RasterWork { shading, surface_id, .. } = work;
-        let leave_out = work.leave_out.map(|(test, ..)| test);
+        let leave_out = work.leave_out.map(|(test, _)| test);
         let earlier = work.leave_out.map_or(0, |_| work.earlier);
-        let key = PipelineKey { shading, surface_id, wind: work.scene.is_animated(), traits, leave_out, earlier };
+        let key =
+            PipelineKey { shading, surface_id, depth_only, wind: work.scene.is_animated(), traits, leave_out, earlier };
         let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pipeline) = pipelines.get(&key) {
             return Ok(pipeline.clone());
@@ -240,6 +261,7 @@ impl Rasterizer {
             bind_group_layouts: &layouts[..3 + usize::from(key.leave_out.is_some())],
             immediate_size: 0,
         });
+        let color_count = if key.depth_only { 0 } else { 1 + usize::from(key.surface_id) };
         let formats = [Some(TextureFormat::Rgba32Uint.into()), Some(TextureFormat::Rg32Uint.into())];
         Ok(self.gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("raster"),
@@ -262,11 +284,11 @@ impl Rasterizer {
                 bias: Default::default(),
             }),
             multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
+            fragment: (!key.depth_only || key.traits.alpha_tested).then(|| wgpu::FragmentState {
                 module: &module,
                 entry_point: Some("fragment"),
                 compilation_options: Default::default(),
-                targets: &formats[..1 + usize::from(key.surface_id)],
+                targets: &formats[..color_count],
             }),
             multiview_mask: None,
             cache: None,
@@ -309,6 +331,7 @@ fn shader_context(key: PipelineKey) -> minijinja::Value {
     let Traits { double_sided, alpha_tested, textured, coat_textured, unlit, specular } = key.traits;
     context! {
         wind => key.wind, shading => key.shading.name(), surface_id => key.surface_id,
+        depth_only => key.depth_only,
         double_sided, alpha_tested, textured, unlit, specular,
         coat_textured => coat_textured && key.shading == Shading::Ggx,
         leave_out => key.leave_out.map(|test| test.shader),
@@ -328,8 +351,14 @@ fn vertex_layout() -> wgpu::VertexBufferLayout<'static> {
     }
 }
 
+/// All bits of a word: no instance has this number.
+const NOTHING: wgpu::Color = {
+    let word = u32::MAX as f64;
+    wgpu::Color { r: word, g: word, b: word, a: word }
+};
+
 fn attachment(view: &wgpu::TextureView) -> wgpu::RenderPassColorAttachment<'_> {
-    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
+    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(NOTHING), store: wgpu::StoreOp::Store };
     wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops }
 }
 

@@ -1,4 +1,4 @@
-{% if surface_id %}enable primitive_index;
+{% if surface_id or leave_out %}enable primitive_index;
 {% endif %}
 // Draws triangles: which surface each pixel shows. Light comes later.
 {% include "surface.wgsl" %}
@@ -27,8 +27,8 @@ struct RasterCamera {
     near_m: f32,
     // A pixel's side at a depth of one metre.
     footprint: f32,
-    columns: u32,
-    padding: u32,
+    padding_0: u32,
+    padding_1: u32,
 }
 
 @group(0) @binding(0) var<uniform> camera: RasterCamera;
@@ -39,7 +39,8 @@ struct RasterCamera {
 @group(2) @binding(2) var material_sampler: sampler;
 
 struct Varyings {
-    @builtin(position) clip: vec4f,
+    // The same for all pipelines: depths of one pass are compared with those of another.
+    @builtin(position) @invariant clip: vec4f,
     @location(0) normal_in_world: vec3f,
     @location(1) uv: vec2f,
     @location(2) color_linear: vec4f,
@@ -86,12 +87,24 @@ fn candidate_at(in: Varyings, normal: vec3f, primitive: u32) -> Candidate {
     let depth_m = camera.near_m / in.clip.z;
     let sight = in.position_in_world - camera.eye_in_world;
     return Candidate(
-        in.position_in_world, in.clip.z, normal, stretched_footprint(depth_m, camera.footprint, normal, sight),
+        vec4f(in.clip.xy * depth_m, depth_m, 1.0), in.position_in_world, in.clip.z, normal, stretched_footprint(depth_m, camera.footprint, normal, sight),
         vec2u(object.instance, in.first_primitive + primitive), vec2u(in.clip.xy),
     );
 }
 {% endif %}
 
+{% if depth_only %}
+{% if alpha_tested %}
+@fragment
+fn fragment(in: Varyings) {
+    var alpha = object.base_color_linear.a * in.color_linear.a;
+{% if textured %}
+    alpha *= textureSample(base_color_texture, material_sampler, in.uv).a;
+{% endif %}
+    if alpha < object.alpha_cutoff { discard; }
+}
+{% endif %}
+{% else %}
 struct Planes {
     @location(0) surface: vec4u,
 {% if surface_id %}    @location(1) surface_id: vec2u,
@@ -99,7 +112,7 @@ struct Planes {
 }
 
 @fragment
-fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface_id %}, @builtin(primitive_index) primitive: u32{% endif %}) -> Planes {
+fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface_id or leave_out %}, @builtin(primitive_index) primitive: u32{% endif %}) -> Planes {
     var base = object.base_color_linear * in.color_linear;
 {% if textured %}
     base *= textureSample(base_color_texture, material_sampler, in.uv);
@@ -115,8 +128,7 @@ fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface
 {% endif %}
     let normal = normalize(in.normal_in_world){% if double_sided %} * select(-1.0, 1.0, front_facing){% endif %};
 {% if leave_out %}
-    let place = u32(in.clip.y) * camera.columns + u32(in.clip.x);
-    if is_left_out(candidate_at(in, normal, primitive), place) { discard; }
+    if is_left_out(candidate_at(in, normal, primitive)) { discard; }
 {% endif %}
     var out: Planes;
     out.surface = packed_surface(base.rgb, object.emissive_linear, normal, coat);
@@ -124,3 +136,4 @@ fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface
 {% endif %}
     return out;
 }
+{% endif %}

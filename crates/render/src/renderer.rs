@@ -7,6 +7,7 @@ use std::{
 };
 
 use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use glam::UVec2;
 use gpu::{BufferPool, Frame, FrameResult, Gpu, PooledBuffer, Readback, Templates};
 use wgpu::BufferUsages;
 
@@ -212,7 +213,7 @@ impl Renderer {
         let all = pinholes(cameras);
         self.check(&all)?;
         let known = Known::of(&self.gpu, &self.kept_layers, &all, leave_out)?;
-        let chain = Chain { leave_out, known: &known, wanted, first: 0, keep: !leave_out.traces_rays };
+        let chain = Chain { leave_out, known: &known, wanted, first: 0, keep: !leave_out.traces_rays() };
         let pinholes: Vec<PinholeCamera> = wanted.iter().map(|&number| all[number as usize]).collect();
         let mut images = self.images(work, &pinholes, planes, Some(chain))?;
         if planes.corners {
@@ -338,7 +339,7 @@ impl Renderer {
         let by_rays = match work.visibility {
             Visibility::Triangles => false,
             Visibility::Rays => true,
-            Visibility::Measured if form.leave_out.is_some_and(|test| test.traces_rays) => true,
+            Visibility::Measured if form.leave_out.is_some_and(LeaveOut::traces_rays) => true,
             // Each moment of a moving scene would need a tree that nothing else needs.
             Visibility::Measured if work.scene.is_animated() && !work.lighting.is_traced() => false,
             Visibility::Measured => self.choice(work.scene, &cameras[0], work.scene_time_s)?.rays_are_faster(),
@@ -369,12 +370,10 @@ impl Renderer {
         let sums = self.sums(batch, sums_bytes);
         let cameras = uniform(&self.gpu, &pixel_cameras(batch, &sums, sums.ranges(), planes));
         let surfaces: Vec<Surfaces> =
-            batch.cameras.iter().map(|camera| self.surfaces.lend(batch.kind(camera))).collect();
-        let left_out = self.left_out(batch);
+            (0..).zip(batch.cameras).map(|(place, camera)| self.lend(batch, place, camera)).collect();
         let mut frame = Frame::begin(&self.gpu, "draw");
-        left_out.iter().for_each(|buffer| frame.encoder.clear_buffer(buffer, 0, None));
         match batch.chain {
-            Some(chain) => self.record_chain(&mut frame, batch, chain, &cameras, &surfaces, &left_out)?,
+            Some(chain) => self.record_chain(&mut frame, batch, chain, &cameras, &surfaces)?,
             None => self.record_surfaces(&mut frame, batch, &cameras, &surfaces, counts)?,
         }
         let mut lent = Vec::new();
@@ -382,13 +381,28 @@ impl Renderer {
             lent = self.record_light(&mut frame, batch, &surfaces, &sums, planes)?;
         }
         let words = self.pool.lend_storage("planes", words_bytes.max(4));
-        self.record_finish(&mut frame, batch, &cameras, &surfaces, (&sums.buffer, &words, &left_out))?;
+        self.record_finish(&mut frame, batch, &cameras, &surfaces, (&sums.buffer, &words))?;
         let host = self.pool.lend_host("planes read-back", words_bytes.max(4));
         let read = frame.read_back(&words, 0..words_bytes, host);
         let result = frame.submit().wait()?;
-        drop((surfaces, lent, words, left_out));
+        drop((surfaces, lent, words));
         self.keep(batch, sums);
         Ok((result, read))
+    }
+
+    fn lend(&self, batch: &Batch<'_>, place: usize, camera: &PinholeCamera) -> Surfaces {
+        let kind = SurfaceKind {
+            size_px: camera.size_px,
+            by_rays: batch.by_rays,
+            surface_id: batch.finish.surface_id,
+            front: batch.chain.is_some_and(|chain| chain.number(place) > 0),
+        };
+        match batch.chain.and_then(|chain| chain.surface_ids(place)) {
+            Some((ids, size_px)) => {
+                self.surfaces.lend(SurfaceKind { size_px, surface_id: false, ..kind }).with_ids(ids)
+            }
+            None => self.surfaces.lend(kind),
+        }
     }
 
     fn record_surfaces(
@@ -422,39 +436,34 @@ impl Renderer {
         chain: Chain<'_>,
         cameras: &wgpu::Buffer,
         surfaces: &[Surfaces],
-        left_out: &[PooledBuffer],
     ) -> Result<(), RenderError> {
         let shading = batch.finish.shading;
-        let surface_id = !chain.leave_out.traces_rays || batch.finish.surface_id;
         for (place, (camera, target)) in batch.cameras.iter().zip(surfaces).enumerate() {
-            let earlier = chain.wanted[chain.first + place] as usize;
-            let leave_out = (earlier > 0).then_some((chain.leave_out, chain.known, &*left_out[place]));
+            let earlier = chain.number(place);
+            let surface_id = target.ids().is_some();
             let target = std::slice::from_ref(target);
+            let leaves_out = earlier > 0;
             match &batch.traced {
                 Some(traced) if batch.by_rays => {
                     let first = place as u32;
+                    let leave_out = leaves_out.then_some((chain.leave_out, chain.known, camera));
                     let work =
                         primary::PrimaryWork { traced, shading, surface_id, counts: None, first, leave_out, earlier };
                     primary::record(&self.gpu, &self.pipelines, frame, work, cameras, target)?;
                 }
                 _ => {
                     let DrawWork { scene, scene_time_s, .. } = batch.work;
+                    let leave_out = leaves_out.then_some((chain.leave_out, chain.known));
                     let work = RasterWork { scene, shading, scene_time_s, surface_id, leave_out, earlier };
                     self.rasterizer.record(frame, work, std::slice::from_ref(camera), target)?;
                 }
             }
-            if chain.keep && chain.known.is_asked_for(earlier) {
+            if chain.keep {
                 let image = (&target[0], batch.by_rays);
                 chain.known.keep(&self.gpu, &self.pipelines, frame, (earlier, place as u32), image, cameras)?;
             }
         }
         Ok(())
-    }
-
-    /// A buffer for each image that leaves something out.
-    fn left_out(&self, batch: &Batch<'_>) -> Vec<PooledBuffer> {
-        let cameras = batch.chain.map_or(&[][..], |_| batch.cameras);
-        cameras.iter().map(|camera| self.pool.lend_storage("left out", 4 * camera.pixel_count() as u64)).collect()
     }
 
     fn record_light(
@@ -502,7 +511,7 @@ impl Renderer {
         batch: &Batch<'_>,
         cameras: &wgpu::Buffer,
         surfaces: &[Surfaces],
-        (sums, words, left_out): (&wgpu::Buffer, &wgpu::Buffer, &[PooledBuffer]),
+        (sums, words): (&wgpu::Buffer, &wgpu::Buffer),
     ) -> Result<(), RenderError> {
         let pipeline = self.pipelines.get(batch.finish)?;
         let [r, g, b] = batch.work.scene.background_linear.to_array();
@@ -518,8 +527,8 @@ impl Renderer {
                 finish.as_entire_binding(),
                 batch.work.scene.illumination.as_entire_binding(),
             ];
-            resources.extend(target.ids.as_ref().filter(|_| batch.finish.surface_id).map(texture));
-            resources.extend(left_out.get(number as usize).map(|buffer| buffer.as_entire_binding()));
+            resources.extend(target.ids().filter(|_| batch.finish.surface_id).map(texture));
+            resources.extend(batch.finish.leave_out.map(|_| texture(target.front())));
             let own = bind_group(&self.gpu, &pipeline.get_bind_group_layout(0), resources);
             let groups = target.size_px().map(|side| side.div_ceil(8));
             let mut pass = frame.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -546,12 +555,20 @@ impl Renderer {
     }
 }
 
-impl Batch<'_> {
-    fn kind(&self, camera: &PinholeCamera) -> SurfaceKind {
-        let compared = self.chain.is_some_and(|chain| !chain.leave_out.traces_rays);
-        SurfaceKind { size_px: camera.size_px, by_rays: self.by_rays, surface_id: self.finish.surface_id || compared }
+impl Chain<'_> {
+    /// In its set, of the image at this place of the batch: how many others it may leave out what they hold of.
+    fn number(&self, place: usize) -> usize {
+        self.wanted[self.first + place] as usize
     }
 
+    /// Where its surface ids are drawn, for images after it to ask; and what is drawn with them is as large.
+    fn surface_ids(&self, place: usize) -> Option<(wgpu::TextureView, UVec2)> {
+        let ids = self.keep.then(|| self.known.surface_ids(self.number(place))).flatten();
+        ids.map(|ids| (ids.clone(), self.known.size_px()))
+    }
+}
+
+impl Batch<'_> {
     fn key(&self) -> Key {
         let DrawWork { scene, lighting, scene_time_s, .. } = self.work;
         // What a chain's image shows depends on all cameras of its set, and on its place among them.

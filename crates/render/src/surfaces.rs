@@ -15,13 +15,16 @@ pub(crate) struct SurfaceKind {
     pub size_px: UVec2,
     pub by_rays: bool,
     pub surface_id: bool,
+    /// Whether what is nearest is wanted besides what is shown.
+    pub front: bool,
 }
 
 /// Words of `surface.wgsl`, reversed depth, and surface ids where they are asked for.
 pub(crate) struct SurfaceViews {
     pub surface: wgpu::TextureView,
     pub depth: wgpu::TextureView,
-    pub ids: Option<wgpu::TextureView>,
+    ids: Option<wgpu::TextureView>,
+    front: Option<wgpu::TextureView>,
 }
 
 type Free = Mutex<HashMap<SurfaceKind, Vec<SurfaceViews>>>;
@@ -35,6 +38,8 @@ pub(crate) struct SurfacePool {
 /// On loan; contents are whatever the last borrower left.
 pub(crate) struct Surfaces {
     views: Option<SurfaceViews>,
+    /// Not lent: where surface ids are drawn instead.
+    own_ids: Option<wgpu::TextureView>,
     kind: SurfaceKind,
     home: Weak<Free>,
 }
@@ -47,7 +52,7 @@ impl SurfacePool {
     pub fn lend(&self, kind: SurfaceKind) -> Surfaces {
         let kept = self.free.lock().unwrap_or_else(PoisonError::into_inner).get_mut(&kind).and_then(Vec::pop);
         let views = kept.unwrap_or_else(|| self.make(kind));
-        Surfaces { views: Some(views), kind, home: Arc::downgrade(&self.free) }
+        Surfaces { views: Some(views), own_ids: None, kind, home: Arc::downgrade(&self.free) }
     }
 
     fn make(&self, kind: SurfaceKind) -> SurfaceViews {
@@ -65,15 +70,34 @@ impl SurfacePool {
             });
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
+        let depth = if kind.by_rays { TextureFormat::R32Float } else { TextureFormat::Depth32Float };
         SurfaceViews {
             surface: view(TextureFormat::Rgba32Uint),
-            depth: view(if kind.by_rays { TextureFormat::R32Float } else { TextureFormat::Depth32Float }),
+            depth: view(depth),
+            front: kind.front.then(|| view(depth)),
             ids: kind.surface_id.then(|| view(TextureFormat::Rg32Uint)),
         }
     }
 }
 
+impl SurfaceViews {
+    /// Reversed depth of the nearest surface on each pixel's ray, shown or left out.
+    pub fn front(&self) -> &wgpu::TextureView {
+        self.front.as_ref().unwrap_or(&self.depth)
+    }
+}
+
 impl Surfaces {
+    pub fn with_ids(mut self, ids: wgpu::TextureView) -> Self {
+        self.own_ids = Some(ids);
+        self
+    }
+
+    /// Where surface ids are asked for.
+    pub fn ids(&self) -> Option<&wgpu::TextureView> {
+        self.own_ids.as_ref().or(self.views.as_ref().and_then(|views| views.ids.as_ref()))
+    }
+
     pub fn size_px(&self) -> UVec2 {
         self.kind.size_px
     }

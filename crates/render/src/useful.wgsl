@@ -6,26 +6,24 @@ const RING: u32 = 16u;
 // The blocker itself, in footprints.
 const SAME_FOOTPRINTS: f32 = 4.0;
 
-// Reversed depth of the first surface on a pixel's ray, left out or not; 0 beyond the image, where nothing is known.
-fn front_at(pixel: vec2i) -> f32 {
+// 0 beyond the image, where nothing is known.
+fn front_around(pixel: vec2i) -> f32 {
     let inside = all(pixel >= vec2i(0)) && all(pixel < vec2i(camera.size_px));
     let texel = vec2u(clamp(pixel, vec2i(0), vec2i(camera.size_px) - 1));
-    let own = textureLoad(reversed_depth, texel, 0){{ ".x" if by_rays else "" }};
-    let left = bitcast<f32>(left_out[texel.y * camera.size_px.x + texel.x]);
-    return select(0.0, max(own, left), inside);
+    return select(0.0, front_at(texel), inside);
 }
 
-// Of a pixel whose sample lies at `depth` behind a blocker at `left`, both reversed.
-fn is_useful(pixel: vec2u, depth: f32, left: f32) -> bool {
+// Of a pixel whose sample lies at `depth` behind a blocker at `blocker`, both reversed.
+fn is_useful(pixel: vec2u, depth: f32, blocker: f32) -> bool {
     let sample_m = camera.near_m / depth;
-    let blocker_m = camera.near_m / left;
+    let blocker_m = camera.near_m / blocker;
     let aside_m = finish.view_cell_m * (sample_m - blocker_m) / sample_m;
     let footprint_m = blocker_m * camera.footprint;
     let radius_px = max(aside_m / footprint_m, 1.0);
     var useful = false;
     for (var step = 0u; step < RING && !useful; step++) {
         let angle = f32(step) * (6.2831853 / f32(RING));
-        let front = front_at(vec2i(floor(vec2f(pixel) + 0.5 + vec2f(cos(angle), sin(angle)) * radius_px)));
+        let front = front_around(vec2i(floor(vec2f(pixel) + 0.5 + vec2f(cos(angle), sin(angle)) * radius_px)));
         useful = front <= 0.0 || abs(camera.near_m / max(front, 1e-30) - blocker_m) > SAME_FOOTPRINTS * footprint_m;
     }
     return useful;

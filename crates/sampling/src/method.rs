@@ -90,7 +90,7 @@ impl SamplingMethod {
     /// Whether an image can only be taken after those before it: then a set's images are taken on one node.
     #[must_use]
     pub fn is_chained(self) -> bool {
-        self.leave_out().is_some_and(|test| !test.traces_rays)
+        self.leave_out().is_some_and(|test| !test.traces_rays())
     }
 
     /// By which test an image leaves out what others hold.

@@ -1,6 +1,6 @@
 //! Images that leave out what those before them hold (Xie §3, Algorithm 1): by which test.
 
-use render::LeaveOut;
+use render::{Asks, LeaveOut};
 
 use crate::Redundancy;
 
@@ -15,10 +15,10 @@ pub(crate) const SHADERS: [(&str, &str); 3] = [
 ];
 
 pub(crate) const fn test(redundancy: Redundancy) -> LeaveOut {
-    let (shader, traces_rays) = match redundancy {
-        Redundancy::Pixel => (PIXEL, false),
-        Redundancy::Visibility => (VISIBILITY, true),
-        Redundancy::Tolerance => (TOLERANCE, false),
+    let (shader, asks) = match redundancy {
+        Redundancy::Pixel => (PIXEL, Asks::SurfaceIds),
+        Redundancy::Visibility => (VISIBILITY, Asks::Scene),
+        Redundancy::Tolerance => (TOLERANCE, Asks::Samples),
     };
-    LeaveOut { shader, traces_rays, from_one_place: false, only_useful: false }
+    LeaveOut { shader, asks, from_one_place: false, only_useful: false }
 }

@@ -9,29 +9,24 @@ const SAME_FACING: f32 = 0.906307787;
 const COARSER: f32 = 1.5;
 
 fn is_known(candidate: Candidate, number: u32, camera: KnownCamera) -> bool {
-    let p = homogeneous_in(camera, candidate.point_in_world);
+    let p = homogeneous_in(camera, candidate);
+    let along = abs(dot(candidate.normal, candidate.point_in_world - camera.eye_in_world)) / p.z;
+    // Of planar depth, from one pixel to the next on the candidate's own plane.
+    let across = abs(dot(candidate.normal, camera.column_in_world)) + abs(dot(candidate.normal, camera.row_in_world));
+    let slope = p.z * across / max(along, 1e-6);
+    let room = max(DEPTH_FOOTPRINTS * p.z * camera.footprint, SLOPE_PX * slope);
     var known = false;
-    for (var look = is_in_view(camera, p); look; look = false) {
-        let sight = candidate.point_in_world - camera.eye_in_world;
-        let along = abs(dot(candidate.normal, sight)) / p.z;
-        // Of planar depth, from one pixel to the next on the candidate's own plane.
-        let across = abs(dot(candidate.normal, camera.column_in_world)) + abs(dot(candidate.normal, camera.row_in_world));
-        let slope = p.z * across / max(along, 1e-6);
-        let room = max(DEPTH_FOOTPRINTS * p.z * camera.footprint, SLOPE_PX * slope);
-        let first = vec2i(floor(p.xy / p.z - 0.5));
-        let last = vec2i(vec2f(camera.columns, camera.rows)) - 1;
 {% for corner in range(4) %}
-        {
-            let texel = clamp(first + vec2i({{ corner % 2 }}, {{ corner // 2 }}), vec2i(0), last);
-            let held = textureLoad(known_samples, texel, number, 0);
-            let depth_m = 1.0 / max(bitcast<f32>(held.x), 1e-30);
-            let normal = unit_from_oct16(held.y);
-            let near = held.x != 0u && abs(depth_m - p.z) < room;
-            let facing = dot(normal, candidate.normal) > SAME_FACING;
-            let fine = stretched_footprint(depth_m, camera.footprint, normal, sight) <= COARSER * candidate.footprint_m;
-            known = known || (near && facing && fine);
-        }
-{% endfor %}
+    {
+        let corner = vec2f({{ corner % 2 }}.0, {{ corner // 2 }}.0) - 0.5;
+        // Loads cost less than a branch around them.
+        let held = textureLoad(known_samples, nearest_texel(camera, p + vec3f(corner * p.z, 0.0)), number, 0);
+        let depth_m = 1.0 / max(bitcast<f32>(held.x), 1e-30);
+        let normal = vec3f(unpack2x16snorm(held.z), bitcast<f32>(held.w));
+        let near = held.x != 0u && abs(depth_m - p.z) < room;
+        let facing = dot(normal, candidate.normal) > SAME_FACING;
+        known = known || (near && facing && bitcast<f32>(held.y) <= COARSER * candidate.footprint_m);
     }
-    return known;
+{% endfor %}
+    return known && is_in_view(camera, p);
 }

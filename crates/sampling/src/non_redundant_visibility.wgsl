@@ -6,7 +6,7 @@ const SAME_DEPTH: f32 = 2e-5;
 const SAME_FOOTPRINTS: f32 = 0.0625;
 
 fn is_known(candidate: Candidate, number: u32, camera: KnownCamera) -> bool {
-    let p = homogeneous_in(camera, candidate.point_in_world);
+    let p = homogeneous_in(camera, candidate);
     var first = false;
     for (var look = is_in_view(camera, p); look; look = false) {
         let room = SAME_DEPTH * p.z + SAME_FOOTPRINTS * candidate.footprint_m;

@@ -239,8 +239,14 @@ fn is_tolerance_redundant(candidate: &Candidate, image: &DepthImage) -> bool {
         inverse_depth > 0.0
             && (inverse_depth.recip() - depth_m).abs() < room_m
             && normal.dot(candidate.normal) > SAME_FACING
-            && stretched_footprint(inverse_depth.recip(), camera, normal, sight) <= COARSER * candidate.footprint_m
+            && footprint_m(camera, texel, inverse_depth, normal) <= COARSER * candidate.footprint_m
     })
+}
+
+/// Of a held sample.
+fn footprint_m(camera: &PinholeCamera, texel: UVec2, inverse_depth_per_m: f32, normal: Vec3) -> f32 {
+    let sight = pixel_ray(camera, texel).direction_in_world;
+    stretched_footprint(inverse_depth_per_m.recip(), camera, normal, sight)
 }
 
 fn is_in_layer(candidate: &Candidate, image: &DepthImage) -> bool {

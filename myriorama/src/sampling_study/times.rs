@@ -74,7 +74,7 @@ fn of_method(subject: &Subject, method: SamplingMethod, size_px: UVec2) -> anyho
 }
 
 fn rays_a_pixel(subject: &Subject, method: SamplingMethod) -> anyhow::Result<f64> {
-    if method.leave_out().is_none_or(|test| !test.traces_rays) {
+    if method.leave_out().is_none_or(|test| !test.traces_rays()) {
         return Ok(f64::NAN);
     }
     let cameras = subject.cameras(method, UVec2::splat(COUNTED_PX));

@@ -9,7 +9,7 @@ use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use metrics::Rgb8Image;
 use reconstruction::{ReconstructionMethod, Reconstructor, SampleSet, SetDescription};
-use render::{DrawWork, GpuScene, LeaveOut, Lighting, Refinement, Renderer, SamplePlanes, Visibility};
+use render::{Asks, DrawWork, GpuScene, LeaveOut, Lighting, Refinement, Renderer, SamplePlanes, Visibility};
 use scene::Scene;
 
 pub const SAMPLE_PX: UVec2 = UVec2::new(96, 72);
@@ -77,7 +77,7 @@ impl Stage {
         let on_device = GpuScene::upload(&device().gpu, &scene).expect("a scene");
         let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-        let leave_out = LeaveOut { shader: APART.0, traces_rays: false, from_one_place: false, only_useful: false };
+        let leave_out = LeaveOut { shader: APART.0, asks: Asks::SurfaceIds, from_one_place: false, only_useful: false };
         let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
         let work = plainly_lit(&on_device);
         let images = device().renderer.draw_depth_images_apart(work, &cameras, &wanted, planes, leave_out);

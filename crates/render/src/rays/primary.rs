@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use depth_image::PinholeCamera;
 use gpu::{Frame, Gpu};
 
 use super::Traced;
@@ -24,8 +25,8 @@ pub(crate) struct PrimaryWork<'a> {
     pub first: u32,
     /// Receives node visits and triangle tests of each pixel, of a single camera.
     pub counts: Option<&'a wgpu::Buffer>,
-    /// What is not shown, and where it is noted; of a single camera.
-    pub leave_out: Option<(LeaveOut, &'a Known, &'a wgpu::Buffer)>,
+    /// What is not shown; of a single camera.
+    pub leave_out: Option<(LeaveOut, &'a Known, &'a PinholeCamera)>,
     /// The first camera's place among the known ones.
     pub earlier: usize,
 }
@@ -50,12 +51,13 @@ pub(crate) fn record(
     };
     let pipeline = pipelines.get(form)?;
     let rays = bind_group(gpu, &pipeline.get_bind_group_layout(1), work.traced.views().map(texture));
-    let known = work.leave_out.map(|(_, known, left_out)| {
-        bind_group(gpu, &pipeline.get_bind_group_layout(2), known.resources(work.earlier, left_out))
-    });
+    let known = work
+        .leave_out
+        .map(|(_, known, camera)| known.bind(gpu, &pipeline.get_bind_group_layout(2), camera, work.earlier));
     for (number, target) in (work.first..).zip(surfaces) {
         let mut resources = vec![window(cameras, PIXEL_CAMERA_BYTES), texture(&target.surface), texture(&target.depth)];
-        resources.extend(target.ids.as_ref().filter(|_| work.surface_id).map(texture));
+        resources.extend(target.ids().filter(|_| work.surface_id).map(texture));
+        resources.extend(known.as_ref().map(|_| texture(target.front())));
         resources.extend(work.counts.map(wgpu::Buffer::as_entire_binding));
         let own = bind_group(gpu, &pipeline.get_bind_group_layout(0), resources);
         let size = target.size_px();

@@ -9,8 +9,12 @@
 {% if surface_id %}
 @group(0) @binding(3) var surface_ids: texture_storage_2d<rg32uint, write>;
 {% endif %}
+{% if leave_out %}
+// Of the nearest surface, shown or left out.
+@group(0) @binding({{ 3 + surface_id|int }}) var front_depth: texture_storage_2d<r32float, write>;
+{% endif %}
 {% if count_visits %}
-@group(0) @binding({{ 3 + surface_id|int }}) var<storage, read_write> visit_counts: array<u32>;
+@group(0) @binding({{ 3 + surface_id|int + (1 if leave_out else 0) }}) var<storage, read_write> visit_counts: array<u32>;
 {% endif %}
 
 const FARTHEST: f32 = 3.0e38;
@@ -24,8 +28,9 @@ fn candidate_at(hit: Hit, pixel: vec2u, direction: vec3f) -> Candidate {
     let facing = select(-1.0, 1.0, hit.crossing.front);
     let normal = normalize(attributes_at(hit.crossing).normal + vec3f(0.0, 1e-20, 0.0)) * facing;
     let offset = direction * hit.t;
+    let pixel_center = (vec2f(pixel) + 0.5) * hit.t;
     return Candidate(
-        camera.eye_in_world + offset, camera.near_m / hit.t, normal,
+        vec4f(pixel_center, hit.t, 1.0), camera.eye_in_world + offset, camera.near_m / hit.t, normal,
         stretched_footprint(hit.t, camera.footprint, normal, offset),
         textureLoad(flat_triangles, texel_at(hit.slot), 0).xy, pixel,
     );
@@ -41,21 +46,24 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var hit = Hit(FARTHEST, NOTHING, Crossing(0.0, 0.0, 0.0, false, false, vec3u(0u)));
     var near = camera.near_m;
     var searching = true;
+    var front = 0.0;
     for (var layer = 0u; searching && layer < MOST_LAYERS; layer++) {
         hit = closest(ray, near, FARTHEST);
         near = hit.t;
         searching = false;
         for (var met = hit.slot != NOTHING; met; met = false) {
-            searching = is_left_out(candidate_at(hit, id.xy, direction), id.y * camera.size_px.x + id.x);
+            front = max(front, camera.near_m / hit.t);
+            searching = is_left_out(candidate_at(hit, id.xy, direction));
         }
     }
     hit.slot = select(hit.slot, NOTHING, searching);
+    textureStore(front_depth, id.xy, vec4f(front));
 {% else %}
     let hit = closest(ray, camera.near_m, FARTHEST);
 {% endif %}
     let met = hit.slot != NOTHING;
     var surface = vec4u(0u);
-    var ids = vec2u(0u);
+    var ids = vec2u({{ nothing }}u);
     for (var found = met; found; found = false) {
         let triangle = textureLoad(flat_triangles, texel_at(hit.slot), 0);
         let at = attributes_at(hit.crossing);
