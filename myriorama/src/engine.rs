@@ -218,6 +218,7 @@ impl Engine for GpuEngine {
             wanted: &request.wanted,
             method: parsed("sampling_method", &request.sampling)?,
             planes: planes_for(method),
+            settled_at_s: request.settled_at_s,
         };
         self.sampler.sample(&work).map_err(|error| match error {
             SamplingError::Render(error) => render_error(error),

@@ -90,6 +90,7 @@ impl Truth {
             method: args.method.to_string(),
             lighting: lighting.clone(),
             scene_time_s: 0.0,
+            settled_at_s: None,
             refinement: wire::Refinement::default(),
         };
         let images = engine.sample(&work)?.iter().map(travelled).collect::<anyhow::Result<Vec<_>>>()?;

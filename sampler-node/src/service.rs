@@ -7,7 +7,7 @@ use node::{CurrentPlan, Engine, NodeConfig, SampleWork, blocking, until_drained}
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Messages, Sampler};
-use wire::{Assignment, Chunk, FetchImages, PlaneSet, Refinement, SampleSetId, encode_depth_image, split_into_chunks};
+use wire::{Assignment, Chunk, FetchImages, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
 
 use crate::kept::{EncodedImages, Kept};
 
@@ -30,9 +30,8 @@ impl SamplerService {
     async fn images(&self, plan: &Assignment, set_index: u32) -> Result<EncodedImages, Status> {
         let beyond = || Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"));
         let content = plan.set_content(set_index).ok_or_else(beyond)?;
-        let scene_time_s = plan.workload.timeline.time_s(set_index).ok_or_else(beyond)?;
         let indices = plan.images_of(self.plan.node_name(), set_index).to_vec();
-        let work = sample_work(plan, &indices, scene_time_s, plan.workload.refinement(set_index))?;
+        let work = sample_work(plan, &indices, set_index)?.ok_or_else(beyond)?;
         let engine = self.engine.clone();
         let key = (content, indices.clone());
         self.kept.get(key, move || blocking(move || sample(engine.as_ref(), &work, &indices))).await
@@ -60,25 +59,24 @@ impl Sampler for SamplerService {
     }
 }
 
-fn sample_work(
-    plan: &Assignment,
-    indices: &[u32],
-    scene_time_s: f32,
-    refinement: Refinement,
-) -> Result<SampleWork, Status> {
-    if indices.iter().any(|&index| index as usize >= plan.workload.sample_cameras.len()) {
+/// `None` beyond the timeline.
+fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Option<SampleWork>, Status> {
+    let workload = &plan.workload;
+    if indices.iter().any(|&index| index as usize >= workload.sample_cameras.len()) {
         return Err(Status::internal("image_indices beyond the sample cameras"));
     }
-    Ok(SampleWork {
-        scene_hash: plan.workload.scene.hash.to_string(),
-        cameras: plan.workload.sample_cameras.clone(),
+    let work = |scene_time_s| SampleWork {
+        scene_hash: workload.scene.hash.to_string(),
+        cameras: workload.sample_cameras.clone(),
         wanted: indices.to_vec(),
-        sampling: plan.workload.sampling.clone(),
-        method: plan.workload.method.clone(),
-        lighting: plan.workload.lighting.clone(),
+        sampling: workload.sampling.clone(),
+        method: workload.method.clone(),
+        lighting: workload.lighting.clone(),
         scene_time_s,
-        refinement,
-    })
+        settled_at_s: workload.timeline.settled_at_s(set_index),
+        refinement: workload.refinement(set_index),
+    };
+    Ok(workload.timeline.time_s(set_index).map(work))
 }
 
 fn sample(engine: &dyn Engine, work: &SampleWork, indices: &[u32]) -> Result<EncodedImages, Status> {

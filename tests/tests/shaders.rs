@@ -8,7 +8,7 @@ use minijinja::context;
 use naga::front::wgsl::{Frontend, Options};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use reconstruction::{MAX_SAMPLE_CAMERAS, ShaderKey, shader_text};
-use render::{Domain, Form, LeaveOut, Pass, Shading, ShadowRays};
+use render::{Asks, Domain, Form, LeaveOut, Pass, Shading, ShadowRays};
 use sampling::SamplingMethod;
 
 const CAMERAS: [usize; 4] = [1, 2, 4, MAX_SAMPLE_CAMERAS];
@@ -103,7 +103,7 @@ fn raster_shader_is_valid_in_every_form() {
             let form = context! {
                 shading, surface_id => bit(0), wind => bit(1), double_sided => bit(2), alpha_tested => bit(3),
                 textured => bit(4), coat_textured => bit(5), unlit => bit(6), specular => bit(7),
-                leave_out => (), depth_only => false, test_traces_rays => false, earlier => 0, known_group => 3,
+                leave_out => (), depth_only => false, test_traces_rays => false, settled => false, earlier => 0, known_group => 3,
             };
             let text = templates.render("raster.wgsl", form).unwrap_or_else(|error| panic!("{bits:#b}: {error}"));
             assert_eq!(entries("raster.wgsl", &text), ["vertex", "fragment"], "{bits:#b}");
@@ -119,7 +119,7 @@ fn raster_shader_is_valid_for_depth_alone() {
         let form = context! {
             shading => "ggx", surface_id => true, wind => bit(0), double_sided => true, alpha_tested => bit(1),
             textured => bit(2), coat_textured => true, unlit => false, specular => true,
-            leave_out => (), depth_only => true, test_traces_rays => false, earlier => 0, known_group => 3,
+            leave_out => (), depth_only => true, test_traces_rays => false, settled => false, earlier => 0, known_group => 3,
         };
         let text = templates.render("raster.wgsl", form).unwrap_or_else(|error| panic!("{bits:#b}: {error}"));
         let expected: &[&str] = if bit(1) { &["vertex", "fragment"] } else { &["vertex"] };
@@ -135,7 +135,8 @@ fn raster_shader_is_valid_with_every_test_of_what_is_left_out() {
             let form = context! {
                 shading => "ggx", surface_id => true, wind, double_sided => true, alpha_tested => true,
                 textured => true, coat_textured => true, unlit => false, specular => true,
-                leave_out => test.shader, depth_only => false, test_traces_rays => false, earlier, known_group => 3,
+                leave_out => test.shader, depth_only => false, test_traces_rays => false, settled => test.settled, earlier,
+                known_group => 3,
             };
             let text = templates.render("raster.wgsl", form).unwrap_or_else(|error| panic!("{test:?}: {error}"));
             assert_eq!(entries(test.shader, &text), ["vertex", "fragment"], "{test:?}");
@@ -144,7 +145,9 @@ fn raster_shader_is_valid_with_every_test_of_what_is_left_out() {
 }
 
 fn leave_outs() -> Vec<LeaveOut> {
-    SamplingMethod::ALL.into_iter().filter_map(SamplingMethod::leave_out).collect()
+    let tests = SamplingMethod::ALL.into_iter().filter_map(SamplingMethod::leave_out);
+    let both = |test: LeaveOut| [test, LeaveOut { settled: test.asks == Asks::Samples, ..test }];
+    tests.flat_map(both).collect()
 }
 
 /// What pipelines of [`render::Renderer`] may ask for: every switch of a pass, with none, one and many lamps.

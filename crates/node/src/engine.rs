@@ -70,6 +70,8 @@ pub struct SampleWork {
     pub lighting: String,
     /// Where animation stands.
     pub scene_time_s: f32,
+    /// Where it stood in the set that this one keeps on to the samples of, where the sampling method settles.
+    pub settled_at_s: Option<f32>,
     /// How far its light has come. Any step may be asked for first, or alone.
     pub refinement: Refinement,
 }

@@ -77,6 +77,7 @@ fn sample_work(workload: &Workload) -> SampleWork {
         method: workload.method.clone(),
         lighting: workload.lighting.clone(),
         scene_time_s: workload.timeline.start_s as f32,
+        settled_at_s: None,
         refinement: Refinement::default(),
     }
 }

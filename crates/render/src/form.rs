@@ -214,6 +214,7 @@ impl Form {
             normal_plane, reflector_plane, id_plane, passed_plane,
             leave_out => self.leave_out.map(|test| test.shader),
             test_traces_rays => self.leave_out.is_some_and(|test| test.traces_rays()),
+            settled => self.leave_out.is_some_and(|test| test.settled),
             earlier => self.earlier,
             only_useful => self.leave_out.is_some_and(|test| test.only_useful),
             known_group => 2,

@@ -141,7 +141,8 @@ impl GpuScene {
     }
 
     /// What tells it from every other scene of this process.
-    pub(crate) fn identity(&self) -> u64 {
+    #[must_use]
+    pub fn identity(&self) -> u64 {
         self.identity
     }
 

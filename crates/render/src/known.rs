@@ -25,6 +25,8 @@ pub struct LeaveOut {
     pub asks: Asks,
     /// Whether all images have one camera, so that pixels are compared with the same pixel.
     pub from_one_place: bool,
+    /// Whether samples that were kept at another moment are kept on unless they are redundant by a margin: `known.wgsl`.
+    pub settled: bool,
     /// Whether what no viewpoint near the cameras can see past its blockers is left out, too (`useful.wgsl`).
     pub only_useful: bool,
 }
@@ -72,6 +74,15 @@ pub(crate) struct Known {
     pub cameras: Vec<PinholeCamera>,
     asks: Asks,
     layers: Arc<Layers>,
+    before: Option<Settled>,
+    keeps_last: bool,
+}
+
+/// What all images of a set held at one moment, for the same images at another.
+#[derive(Clone)]
+pub struct Settled {
+    cameras: Vec<PinholeCamera>,
+    layers: Arc<Layers>,
 }
 
 /// A texel for each sample, a layer for each image.
@@ -86,7 +97,8 @@ struct Layers {
 pub(crate) struct KeptLayers(Mutex<Option<Arc<Layers>>>);
 
 /// What is bound to a test.
-pub(crate) const KNOWN_SLOTS: [Slot; 2] = [Slot::WordTextureArray, Slot::Uniform];
+pub(crate) const KNOWN_SLOTS: [Slot; 4] =
+    [Slot::WordTextureArray, Slot::Uniform, Slot::WordTextureArray, Slot::Uniform];
 
 impl KeptLayers {
     /// Nobody else uses them; what they hold is left over.
@@ -154,7 +166,24 @@ impl Known {
             cameras: cameras.to_vec(),
             asks: test.asks,
             layers: kept.of(gpu, size, format),
+            before: None,
+            keeps_last: false,
         })
+    }
+
+    /// After another moment of the same set.
+    pub fn after(self, before: Option<&Settled>) -> Self {
+        Self { before: before.cloned(), ..self }
+    }
+
+    /// To be [`Known::settle`]d: the last image's samples are kept, too.
+    pub fn keeping_all(self) -> Self {
+        Self { keeps_last: true, ..self }
+    }
+
+    /// Once all images are drawn.
+    pub fn settle(self) -> Settled {
+        Settled { cameras: self.cameras, layers: self.layers }
     }
 
     /// What tests for an image of the camera `own`, after `earlier` others, are bound to.
@@ -168,7 +197,15 @@ impl Known {
         let cameras: Vec<KnownCamera> =
             self.cameras[..earlier].iter().map(|camera| KnownCamera::of(camera, own)).collect();
         let cameras = gpu.buffer_with("known cameras", &cameras, BufferUsages::UNIFORM);
-        bind_group(gpu, layout, [texture(&self.layers.first(earlier)), cameras.as_entire_binding()])
+        let held = self.layers.first(earlier);
+        // Bound in any case, and read only by tests that settle.
+        let (before, camera) = match &self.before {
+            Some(before) => (before.layers.first(before.cameras.len()), before.cameras[earlier]),
+            None => (held.clone(), *own),
+        };
+        let camera = gpu.buffer_with("settled camera", &[KnownCamera::of(&camera, own)], BufferUsages::UNIFORM);
+        let resources = [texture(&held), cameras.as_entire_binding(), texture(&before), camera.as_entire_binding()];
+        bind_group(gpu, layout, resources)
     }
 
     /// Where the `number`-th image's surface ids are to be drawn, if they are asked for as they are.
@@ -177,7 +214,7 @@ impl Known {
     }
 
     fn is_asked_for(&self, number: usize) -> bool {
-        number + 1 < self.layers.each.len()
+        self.keeps_last || number + 1 < self.layers.each.len()
     }
 
     /// The largest image's.

@@ -30,6 +30,8 @@ struct Candidate {
     footprint_m: f32,
     id: vec2u,
     pixel: vec2u,
+    // Whether this image kept it at the moment that it settled at: then it stays unless it is clearly redundant.
+    was_kept: bool,
 }
 
 // A layer a camera; what a texel holds is for the test to know.
@@ -56,9 +58,28 @@ fn nearest_texel(camera: KnownCamera, homogeneous: vec3f) -> vec2u {
     return vec2u(clamp(at, vec2f(0.0), vec2f(camera.columns, camera.rows) - 1.0));
 }
 
+{% if settled %}
+// What this set held when it settled, and this image's camera then.
+@group({{ known_group }}) @binding(2) var settled_samples: texture_2d_array<u32>;
+@group({{ known_group }}) @binding(3) var<uniform> settled_camera: KnownCamera;
+
+const SETTLED_FOOTPRINTS: f32 = 4.0;
+
+fn was_kept(candidate: Candidate) -> bool {
+    let p = homogeneous_in(settled_camera, candidate);
+    let held = textureLoad(settled_samples, nearest_texel(settled_camera, p), {{ earlier }}, 0);
+    let depth_m = 1.0 / max(bitcast<f32>(held.x), 1e-30);
+    // Stretched footprints: a steep surface may change its depth more from texel to texel.
+    let room = SETTLED_FOOTPRINTS * max(bitcast<f32>(held.y), candidate.footprint_m);
+    return is_in_view(settled_camera, p) && held.x != 0u && abs(depth_m - p.z) < room;
+}
+{% endif %}
 {% include leave_out %}
 
-fn is_left_out(candidate: Candidate) -> bool {
+fn is_left_out(found: Candidate) -> bool {
+    var candidate = found;
+{% if settled %}    candidate.was_kept = was_kept(found);
+{% endif %}
     var known = false;
 {% if test_traces_rays %}
     for (var number = 0u; number < {{ earlier }}u && !known; number++) {

@@ -50,12 +50,12 @@ fn everything_shared_agrees() {
     let form = minijinja::context! {
         wind => true, shading => "ggx", surface_id => false, double_sided => true, alpha_tested => true,
         textured => true, coat_textured => true, unlit => false, specular => true, leave_out => (), depth_only => false,
-        test_traces_rays => false, earlier => 0, known_group => 3,
+        test_traces_rays => false, settled => true, earlier => 0, known_group => 3,
     };
     let raster = parsed("raster.wgsl", form);
     let camera = parsed("camera.wgsl", minijinja::context! {});
     let test = minijinja::context! {
-        leave_out => "known_test.wgsl", depth_only => false, test_traces_rays => false, earlier => 2, known_group => 3,
+        leave_out => "known_test.wgsl", depth_only => false, test_traces_rays => false, settled => true, earlier => 2, known_group => 3,
     };
     let known = parsed("known.wgsl", test);
     let shared = [

@@ -29,7 +29,7 @@ mod visibility;
 
 pub use form::{Domain, Form, Pass, Shading, ShadowRays, shader_text};
 pub use gpu_scene::GpuScene;
-pub use known::{Asks, LeaveOut, view_cell_m};
+pub use known::{Asks, LeaveOut, Settled, view_cell_m};
 pub use lighting::{Direct, Lighting, MAX_RAYS, Occlusion, Rate, UnknownLighting};
 pub use memory_pass::MemoryPass;
 pub use rays::AccelerationReport;

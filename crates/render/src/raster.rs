@@ -336,6 +336,7 @@ fn shader_context(key: PipelineKey) -> minijinja::Value {
         coat_textured => coat_textured && key.shading == Shading::Ggx,
         leave_out => key.leave_out.map(|test| test.shader),
         test_traces_rays => false,
+        settled => key.leave_out.is_some_and(|test| test.settled),
         earlier => key.earlier,
         known_group => 3,
     }

@@ -17,7 +17,7 @@ use crate::{
     binding::{bind_group, texture, window},
     form::{ComputePipelines, Form, Pass, Shading, ShadowRays},
     illuminate::{IlluminateWork, Illuminator},
-    known::{KeptLayers, Known, LeaveOut},
+    known::{KeptLayers, Known, LeaveOut, Settled},
     memory_pass::{self, MemoryPass},
     pixel_camera::{PIXEL_CAMERA_BYTES, PIXEL_CAMERA_STRIDE, PixelCamera, uniform},
     planes,
@@ -200,6 +200,8 @@ impl Renderer {
     /// hold, and shows what lies behind. What its rays went through is in [`DepthImage::passed`]; a texel behind
     /// whose left-out surfaces lies nothing is a hole.
     ///
+    /// With what the set held at another moment, a test that settles keeps on to it.
+    ///
     /// # Errors
     /// As [`Renderer::draw_depth_images`]; more images than the device's layers.
     pub fn draw_depth_images_apart(
@@ -209,10 +211,12 @@ impl Renderer {
         wanted: &[u32],
         planes: SamplePlanes,
         leave_out: LeaveOut,
+        before: Option<&Settled>,
     ) -> Result<Vec<DepthImage>, RenderError> {
+        let leave_out = LeaveOut { settled: before.is_some(), ..leave_out };
         let all = pinholes(cameras);
         self.check(&all)?;
-        let known = Known::of(&self.gpu, &self.kept_layers, &all, leave_out)?;
+        let known = Known::of(&self.gpu, &self.kept_layers, &all, leave_out)?.after(before);
         let chain = Chain { leave_out, known: &known, wanted, first: 0, keep: !leave_out.traces_rays() };
         let pinholes: Vec<PinholeCamera> = wanted.iter().map(|&number| all[number as usize]).collect();
         let mut images = self.images(work, &pinholes, planes, Some(chain))?;
@@ -226,6 +230,21 @@ impl Renderer {
             self.add_corners(work, &mut images, &pinholes, Some(chain))?;
         }
         Ok(images)
+    }
+
+    /// What all images of a set hold: samples, for a test that asks for them.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw_depth_images_apart`].
+    pub fn settle(&self, work: DrawWork<'_>, cameras: &[Camera], leave_out: LeaveOut) -> Result<Settled, RenderError> {
+        let cameras = pinholes(cameras);
+        self.check(&cameras)?;
+        let known = Known::of(&self.gpu, &self.kept_layers, &cameras, leave_out)?.keeping_all();
+        let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
+        let chain = Chain { leave_out, known: &known, wanted: &wanted, first: 0, keep: true };
+        let work = DrawWork { lighting: Lighting::UNLIT, refinement: Refinement::default(), ..work };
+        self.images(work, &cameras, SamplePlanes::default(), Some(chain))?;
+        Ok(known.settle())
     }
 
     fn images(

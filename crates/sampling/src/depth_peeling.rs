@@ -11,7 +11,7 @@ const SHADER: &str = "depth_peeling.wgsl";
 pub(crate) const SHADERS: [(&str, &str); 1] = [(SHADER, include_str!("depth_peeling.wgsl"))];
 
 pub(crate) const TEST: LeaveOut =
-    LeaveOut { shader: SHADER, asks: Asks::Samples, from_one_place: true, only_useful: false };
+    LeaveOut { shader: SHADER, asks: Asks::Samples, from_one_place: true, settled: false, only_useful: false };
 
 /// One camera in the middle of a rig, for each layer; it looks as the rig's cameras do together.
 pub(crate) fn cameras(rig: &[PinholeCamera], layers: usize) -> Vec<PinholeCamera> {

@@ -6,6 +6,7 @@ mod non_redundant;
 mod rig;
 mod sampler;
 pub mod scalar;
+mod settling;
 
 pub use method::{Redundancy, SamplingMethod, UnknownSampling};
 pub use rig::{Rig, RigError};

@@ -93,6 +93,12 @@ impl SamplingMethod {
         self.leave_out().is_some_and(|test| !test.traces_rays())
     }
 
+    /// Whether what it keeps settles between the moments of a moving scene.
+    #[must_use]
+    pub fn settles(self) -> bool {
+        matches!(self, Self::NonRedundant(Redundancy::Tolerance) | Self::Useful(Redundancy::Tolerance))
+    }
+
     /// By which test an image leaves out what others hold.
     #[must_use]
     pub fn leave_out(self) -> Option<LeaveOut> {

@@ -20,5 +20,5 @@ pub(crate) const fn test(redundancy: Redundancy) -> LeaveOut {
         Redundancy::Visibility => (VISIBILITY, Asks::Scene),
         Redundancy::Tolerance => (TOLERANCE, Asks::Samples),
     };
-    LeaveOut { shader, asks, from_one_place: false, only_useful: false }
+    LeaveOut { shader, asks, from_one_place: false, settled: false, only_useful: false }
 }

@@ -1,5 +1,5 @@
 // Tolerance redundancy: one of the four samples around the place in the image before lies on the same surface, faces
-// the same way, and is not much coarser.
+// the same way, and is not much coarser. What was kept before stays until all four do, by a margin.
 
 const DEPTH_FOOTPRINTS: f32 = 2.0;
 // How far, in pixels, a surface may go on changing its depth at its own slope.
@@ -7,6 +7,9 @@ const SLOPE_PX: f32 = 1.0;
 // 25 degrees.
 const SAME_FACING: f32 = 0.906307787;
 const COARSER: f32 = 1.5;
+// Of what the others allow, for what was kept before; and 20 degrees.
+const CLEARLY: f32 = 0.8;
+const CLEARLY_SAME_FACING: f32 = 0.939692621;
 
 fn is_known(candidate: Candidate, number: u32, camera: KnownCamera) -> bool {
     let p = homogeneous_in(camera, candidate);
@@ -14,8 +17,11 @@ fn is_known(candidate: Candidate, number: u32, camera: KnownCamera) -> bool {
     // Of planar depth, from one pixel to the next on the candidate's own plane.
     let across = abs(dot(candidate.normal, camera.column_in_world)) + abs(dot(candidate.normal, camera.row_in_world));
     let slope = p.z * across / max(along, 1e-6);
-    let room = max(DEPTH_FOOTPRINTS * p.z * camera.footprint, SLOPE_PX * slope);
-    var known = false;
+    let allowed = select(1.0, CLEARLY, candidate.was_kept);
+    let least_facing = select(SAME_FACING, CLEARLY_SAME_FACING, candidate.was_kept);
+    let room = allowed * max(DEPTH_FOOTPRINTS * p.z * camera.footprint, SLOPE_PX * slope);
+    var some = false;
+    var all_four = true;
 {% for corner in range(4) %}
     {
         let corner = vec2f({{ corner % 2 }}.0, {{ corner // 2 }}.0) - 0.5;
@@ -24,9 +30,11 @@ fn is_known(candidate: Candidate, number: u32, camera: KnownCamera) -> bool {
         let depth_m = 1.0 / max(bitcast<f32>(held.x), 1e-30);
         let normal = vec3f(unpack2x16snorm(held.z), bitcast<f32>(held.w));
         let near = held.x != 0u && abs(depth_m - p.z) < room;
-        let facing = dot(normal, candidate.normal) > SAME_FACING;
-        known = known || (near && facing && bitcast<f32>(held.y) <= COARSER * candidate.footprint_m);
+        let facing = dot(normal, candidate.normal) > least_facing;
+        let fine = bitcast<f32>(held.y) <= allowed * COARSER * candidate.footprint_m;
+        some = some || (near && facing && fine);
+        all_four = all_four && near && facing && fine;
     }
 {% endfor %}
-    return known && is_in_view(camera, p);
+    return select(some, all_four, candidate.was_kept) && is_in_view(camera, p);
 }

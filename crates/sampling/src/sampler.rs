@@ -6,7 +6,7 @@ use depth_image::{Camera, DepthImage};
 use gpu::Gpu;
 use render::{DrawWork, RenderError, Renderer, SamplePlanes};
 
-use crate::{SamplingMethod, depth_peeling};
+use crate::{SamplingMethod, depth_peeling, settling::Settling};
 
 /// Why samples could not be taken.
 #[derive(Debug, thiserror::Error)]
@@ -45,11 +45,14 @@ pub struct SampleWork<'a> {
     pub method: SamplingMethod,
     /// Planes beside colour and depth.
     pub planes: SamplePlanes,
+    /// A moment of a moving scene, what is kept at which is kept on to, where the method settles.
+    pub settled_at_s: Option<f32>,
 }
 
 /// Takes samples; shares its pipelines with direct rendering.
 pub struct Sampler {
     renderer: Arc<Renderer>,
+    settling: Settling,
 }
 
 impl Sampler {
@@ -58,13 +61,13 @@ impl Sampler {
     /// # Errors
     /// When a shader is broken.
     pub fn new(gpu: &Arc<Gpu>) -> Result<Self, SamplingError> {
-        Ok(Self { renderer: Arc::new(renderer(gpu)?) })
+        Ok(Self::sharing(Arc::new(renderer(gpu)?)))
     }
 
     /// Uses what [`renderer`] made.
     #[must_use]
     pub fn sharing(renderer: Arc<Renderer>) -> Self {
-        Self { renderer }
+        Self { renderer, settling: Settling::default() }
     }
 
     /// The wanted depth images, in their order.
@@ -80,7 +83,9 @@ impl Sampler {
             let cameras: Vec<Camera> = work.wanted.iter().map(|&index| work.cameras[index as usize]).collect();
             return Ok(self.renderer.draw_depth_images(work.draw, &cameras, work.planes)?);
         };
-        Ok(self.renderer.draw_depth_images_apart(work.draw, work.cameras, work.wanted, work.planes, leave_out)?)
+        let before = self.settling.before(&self.renderer, work, leave_out)?;
+        let SampleWork { draw, cameras, wanted, planes, .. } = *work;
+        Ok(self.renderer.draw_depth_images_apart(draw, cameras, wanted, planes, leave_out, before.as_ref())?)
     }
 }
 

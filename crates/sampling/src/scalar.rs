@@ -35,6 +35,9 @@ const DEPTH_FOOTPRINTS: f32 = 2.0;
 const SLOPE_PX: f32 = 1.0;
 const SAME_FACING: f32 = 0.906_307_8;
 const COARSER: f32 = 1.5;
+const CLEARLY: f32 = 0.8;
+const CLEARLY_SAME_FACING: f32 = 0.939_692_6;
+const SETTLED_FOOTPRINTS: f32 = 4.0;
 const MOST_LAYERS: usize = 64;
 const RING: u32 = 16;
 const BLOCKER_FOOTPRINTS: f32 = 4.0;
@@ -42,10 +45,22 @@ const BLOCKER_FOOTPRINTS: f32 = 4.0;
 /// Depth, normals and surface ids of a set; colours are left black.
 #[must_use]
 pub fn sample(scene: &Scene, cameras: &[PinholeCamera], method: SamplingMethod) -> Vec<DepthImage> {
+    sample_after(scene, cameras, method, None)
+}
+
+/// As [`sample`], keeping on to what the same images of another moment hold, where the method settles.
+#[must_use]
+pub fn sample_after(
+    scene: &Scene,
+    cameras: &[PinholeCamera],
+    method: SamplingMethod,
+    before: Option<&[DepthImage]>,
+) -> Vec<DepthImage> {
     let mut images: Vec<DepthImage> = Vec::with_capacity(cameras.len());
-    for camera in cameras {
+    for (number, camera) in cameras.iter().enumerate() {
+        let asked = Asked { scene, images: &images, method, before: before.map(|before| &before[number]) };
         let pixels = (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| UVec2::new(x, y)));
-        let mut texels: Vec<Texel> = pixels.map(|pixel| texel(scene, camera, pixel, &images, method)).collect();
+        let mut texels: Vec<Texel> = pixels.map(|pixel| texel(&asked, camera, pixel)).collect();
         if let SamplingMethod::Useful(_) = method {
             leave_out_useless(&mut texels, camera, view_cell_m(cameras));
         }
@@ -62,13 +77,25 @@ struct Texel {
     passed_m: Option<f32>,
 }
 
-fn texel(scene: &Scene, camera: &PinholeCamera, pixel: UVec2, earlier: &[DepthImage], method: SamplingMethod) -> Texel {
+/// What is asked whether it holds a candidate.
+struct Asked<'a> {
+    scene: &'a Scene,
+    /// Before the candidate's own.
+    images: &'a [DepthImage],
+    method: SamplingMethod,
+    /// The candidate's own, at the moment that the set settled at.
+    before: Option<&'a DepthImage>,
+}
+
+fn texel(asked: &Asked<'_>, camera: &PinholeCamera, pixel: UVec2) -> Texel {
+    let scene = asked.scene;
     let ray = pixel_ray(camera, pixel);
     let (mut near, mut passed_m) = (camera.near_m, None);
     for _ in 0..MOST_LAYERS {
         let Some(hit) = scene.closest(&ray, near).0 else { break };
         let candidate = candidate(scene, camera, pixel, &ray, &hit);
-        if !earlier.iter().any(|image| is_known(scene, &candidate, image, method)) {
+        let was_kept = asked.before.is_some_and(|before| was_kept(&candidate, before));
+        if !asked.images.iter().any(|image| is_known(asked, &candidate, was_kept, image)) {
             let (id, normal_oct16) = (candidate.id, oct16_from_unit(candidate.normal));
             return Texel { inverse_depth_per_m: hit.t.recip(), normal_oct16, id, passed_m };
         }
@@ -136,18 +163,18 @@ fn image(camera: &PinholeCamera, texels: &[Texel]) -> DepthImage {
     }
 }
 
-fn is_known(scene: &Scene, candidate: &Candidate, image: &DepthImage, method: SamplingMethod) -> bool {
-    match method {
+fn is_known(asked: &Asked<'_>, candidate: &Candidate, was_kept: bool, image: &DepthImage) -> bool {
+    match asked.method {
         SamplingMethod::Conventional => false,
         SamplingMethod::NonRedundant(Redundancy::Pixel) | SamplingMethod::Useful(Redundancy::Pixel) => {
             is_pixel_redundant(candidate, image)
         }
         SamplingMethod::NonRedundant(Redundancy::Visibility) | SamplingMethod::Useful(Redundancy::Visibility) => {
             let Camera::Pinhole(camera) = &image.camera;
-            is_visibility_redundant(scene, candidate.point_in_world, candidate.footprint_m, camera)
+            is_visibility_redundant(asked.scene, candidate.point_in_world, candidate.footprint_m, camera)
         }
         SamplingMethod::NonRedundant(Redundancy::Tolerance) | SamplingMethod::Useful(Redundancy::Tolerance) => {
-            is_tolerance_redundant(candidate, image)
+            is_tolerance_redundant(candidate, was_kept, image)
         }
         SamplingMethod::DepthPeeling { .. } => is_in_layer(candidate, image),
     }
@@ -219,7 +246,22 @@ fn rays_of_pixel(scene: &Scene, camera: &PinholeCamera, pixel: UVec2, earlier: &
     rays
 }
 
-fn is_tolerance_redundant(candidate: &Candidate, image: &DepthImage) -> bool {
+/// As in `known.wgsl`: whether an image has a sample where a candidate is.
+fn was_kept(candidate: &Candidate, before: &DepthImage) -> bool {
+    let Camera::Pinhole(camera) = &before.camera;
+    let (Some((pixel, depth_m)), Some(normals)) = (place(camera, candidate.point_in_world), &before.normal_oct16)
+    else {
+        return false;
+    };
+    let texel = pixel.as_uvec2();
+    let index = index_of(camera, texel);
+    let inverse_depth = before.inverse_depth_per_m[index];
+    let held_m = footprint_m(camera, texel, inverse_depth, unit_from_oct16(normals[index]));
+    let room_m = SETTLED_FOOTPRINTS * held_m.max(candidate.footprint_m);
+    inverse_depth > 0.0 && (inverse_depth.recip() - depth_m).abs() < room_m
+}
+
+fn is_tolerance_redundant(candidate: &Candidate, was_kept: bool, image: &DepthImage) -> bool {
     let Camera::Pinhole(camera) = &image.camera;
     let (Some((pixel, depth_m)), Some(normals)) = (place(camera, candidate.point_in_world), &image.normal_oct16) else {
         return false;
@@ -228,19 +270,22 @@ fn is_tolerance_redundant(candidate: &Candidate, image: &DepthImage) -> bool {
     let steps = [Vec3::X / camera.focal_px.x, Vec3::NEG_Y / camera.focal_px.y].map(|s| camera.world_from_camera * s);
     let across: f32 = steps.iter().map(|step| candidate.normal.dot(*step).abs()).sum();
     let slope = depth_m * across / (candidate.normal.dot(sight).abs() / depth_m).max(1e-6);
-    let room_m = (DEPTH_FOOTPRINTS * depth_m / camera.focal_px.min_element()).max(SLOPE_PX * slope);
+    let (allowed, least_facing) = if was_kept { (CLEARLY, CLEARLY_SAME_FACING) } else { (1.0, SAME_FACING) };
+    let room_m = allowed * (DEPTH_FOOTPRINTS * depth_m / camera.focal_px.min_element()).max(SLOPE_PX * slope);
     let first = (pixel - 0.5).floor().as_ivec2();
     let last = camera.size_px.as_ivec2() - 1;
-    [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().any(|(x, y)| {
+    let stands_for_it = |(x, y): (i32, i32)| {
         let texel = (first + glam::IVec2::new(x, y)).clamp(glam::IVec2::ZERO, last).as_uvec2();
         let index = index_of(camera, texel);
         let inverse_depth = image.inverse_depth_per_m[index];
         let normal = unit_from_oct16(normals[index]);
         inverse_depth > 0.0
             && (inverse_depth.recip() - depth_m).abs() < room_m
-            && normal.dot(candidate.normal) > SAME_FACING
-            && footprint_m(camera, texel, inverse_depth, normal) <= COARSER * candidate.footprint_m
-    })
+            && normal.dot(candidate.normal) > least_facing
+            && footprint_m(camera, texel, inverse_depth, normal) <= allowed * COARSER * candidate.footprint_m
+    };
+    let four = [(0, 0), (1, 0), (0, 1), (1, 1)];
+    if was_kept { four.into_iter().all(stands_for_it) } else { four.into_iter().any(stands_for_it) }
 }
 
 /// Of a held sample.

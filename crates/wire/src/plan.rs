@@ -135,6 +135,8 @@ impl Assignment {
         let mut hash = blake3::Hasher::new();
         hash.update(workload.scene.hash.as_str().as_bytes());
         hash.update(&time_s.to_bits().to_le_bytes());
+        let settled_at_s = workload.timeline.settled_at_s(set_index).unwrap_or(time_s);
+        hash.update(&settled_at_s.to_bits().to_le_bytes());
         // Length-prefixed, so that no two settings run together into the same bytes.
         // The method says which planes images have.
         for text in [&workload.sampling, &workload.lighting, &workload.method, &self.policy.to_string()] {

@@ -8,6 +8,9 @@ use crate::geometry::{bounds_from, bounds_to, camera_to, sample_cameras_from, ve
 use crate::limits::{MAX_REFINEMENT_STEPS, MAX_SETS, nonempty, seconds};
 use crate::{SceneRef, proto};
 
+/// Sets that keep on to what the first of them holds: the node that samples one of them samples that first one, too.
+const SETTLED_SETS: u32 = 16;
+
 /// Scene times of the sample sets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timeline {
@@ -30,6 +33,14 @@ impl Timeline {
     #[must_use]
     pub fn moves(&self) -> bool {
         self.step_s != 0.0
+    }
+
+    /// Scene time of the set whose kept samples this one keeps on to, so that they do not flicker: the first of its run.
+    /// `None` for that one itself, and where nothing moves.
+    #[must_use]
+    pub fn settled_at_s(&self, set_index: u32) -> Option<f32> {
+        let first = set_index - set_index % SETTLED_SETS;
+        (self.moves() && first != set_index).then(|| self.time_s(first)).flatten()
     }
 
     /// Scene time of a set; `None` beyond the last.

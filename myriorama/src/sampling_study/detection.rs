@@ -49,7 +49,14 @@ pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detecti
         for (found, test) in found.iter_mut().zip(TESTS) {
             let method = SamplingMethod::NonRedundant(test);
             let planes = SamplePlanes::default();
-            let images = sampler.sample(&SampleWork { draw, cameras: &cameras(), wanted: &[0, 1], method, planes })?;
+            let images = sampler.sample(&SampleWork {
+                draw,
+                cameras: &cameras(),
+                wanted: &[0, 1],
+                method,
+                planes,
+                settled_at_s: None,
+            })?;
             *found = left_out(&images[1]);
         }
         rows.push((leg_px, found));

@@ -77,10 +77,16 @@ impl Stage {
         let on_device = GpuScene::upload(&device().gpu, &scene).expect("a scene");
         let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-        let leave_out = LeaveOut { shader: APART.0, asks: Asks::SurfaceIds, from_one_place: false, only_useful: false };
+        let leave_out = LeaveOut {
+            shader: APART.0,
+            asks: Asks::SurfaceIds,
+            from_one_place: false,
+            settled: false,
+            only_useful: false,
+        };
         let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
         let work = plainly_lit(&on_device);
-        let images = device().renderer.draw_depth_images_apart(work, &cameras, &wanted, planes, leave_out);
+        let images = device().renderer.draw_depth_images_apart(work, &cameras, &wanted, planes, leave_out, None);
         Self { images: images.expect("depth images"), volume: scene.bounds(), scene }
     }
 

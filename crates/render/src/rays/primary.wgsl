@@ -32,7 +32,7 @@ fn candidate_at(hit: Hit, pixel: vec2u, direction: vec3f) -> Candidate {
     return Candidate(
         vec4f(pixel_center, hit.t, 1.0), camera.eye_in_world + offset, camera.near_m / hit.t, normal,
         stretched_footprint(hit.t, camera.footprint, normal, offset),
-        textureLoad(flat_triangles, texel_at(hit.slot), 0).xy, pixel,
+        textureLoad(flat_triangles, texel_at(hit.slot), 0).xy, pixel, false,
     );
 }
 {% endif %}

@@ -1,13 +1,13 @@
 //! Where sampling without redundance goes wrong, or must not: as curves, which docs/methods/non_redundant.md repeats.
 
-use depth_image::{Camera, DepthImage, PinholeCamera};
+use depth_image::{DepthImage, PinholeCamera};
 use glam::{Affine3A, UVec2, Vec3};
-use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
+use render::{DrawWork, GpuScene, SamplePlanes};
 use sampling::{Redundancy, SampleWork, SamplingMethod, scalar};
 use scene::Instance;
 use scene::procedural::{GrassDensity, grass, poles, quad};
 
-use crate::stage::{device, upload};
+use crate::stage::{after, device, pinholes, settle, unlit, upload};
 
 const SIZE_PX: UVec2 = UVec2::new(80, 60);
 const PIXEL: SamplingMethod = SamplingMethod::NonRedundant(Redundancy::Pixel);
@@ -15,17 +15,12 @@ const VISIBILITY: SamplingMethod = SamplingMethod::NonRedundant(Redundancy::Visi
 const TOLERANCE: SamplingMethod = SamplingMethod::NonRedundant(Redundancy::Tolerance);
 
 fn sample(scene: &GpuScene, cameras: &[PinholeCamera], method: SamplingMethod) -> Vec<DepthImage> {
-    let draw = DrawWork {
-        scene,
-        lighting: Lighting::UNLIT,
-        scene_time_s: 0.0,
-        visibility: Visibility::Measured,
-        refinement: Refinement::default(),
-    };
+    let draw = unlit(scene);
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-    let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
+    let cameras = pinholes(cameras);
     let planes = SamplePlanes { normal: true, surface_id: true, ..SamplePlanes::default() };
-    device().1.sample(&SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes }).expect("images")
+    let work = SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes, settled_at_s: None };
+    device().sampler.sample(&work).expect("images")
 }
 
 fn samples(image: &DepthImage) -> usize {
@@ -160,4 +155,50 @@ fn masks_flicker_little_under_jitter() {
         assert!(flips.iter().all(|&flips| flips <= 0.1), "{jitter_px}: {flips:?}");
         assert!(jitter_px > 0.0 || flips == [0.0; 3], "what stands still does not flicker: {flips:?}");
     }
+}
+
+/// The same, compared with what was kept before the second camera moved.
+#[test]
+fn what_has_settled_flickers_less() {
+    let scene = poles(0.05);
+    let on_device = upload(&scene);
+    let rays = on_device.scalar_rays(0.0).expect("a tree");
+    let camera = |x: f32| PinholeCamera::looking_at(Vec3::new(x, 0.0, 4.0), Vec3::NEG_Z * 2.0, Vec3::Y, 0.8, SIZE_PX);
+    let pixel_m = 6.0 / camera(0.0).focal_px.x;
+    let still = [camera(-0.4), camera(0.4)];
+    let before = scalar::sample(&rays, &still, TOLERANCE);
+    let settled = settle(&on_device, &still);
+    let mask = |image: &DepthImage| -> Vec<bool> { image.inverse_depth_per_m.iter().map(|&d| d > 0.0).collect() };
+    let flips = |image: &DepthImage| {
+        let pairs = mask(&before[1]).into_iter().zip(mask(image));
+        share(pairs.filter(|(a, b)| a != b).count(), before[1].inverse_depth_per_m.len())
+    };
+    println!("jitter (px): texels that change sides, without and with hysteresis, and by the reference");
+    for jitter_px in [0.05, 0.1, 0.25, 0.5] {
+        let cameras = [still[0], camera(0.4 + jitter_px * pixel_m)];
+        let [free, kept] = [None, Some(&settled)].map(|before| flips(&after(&on_device, &cameras, before)[1]));
+        let twin = flips(&scalar::sample_after(&rays, &cameras, TOLERANCE, Some(&before))[1]);
+        println!("{jitter_px:5}: {free:.4} {kept:.4} {twin:.4}");
+        assert!(kept <= 0.6 * free, "{jitter_px}: {kept} of {free}");
+        assert!((kept - twin).abs() < 2e-3, "{jitter_px}: {kept}, {twin} by the reference");
+    }
+}
+
+/// A meadow in wind: what a set holds follows from its time and the one it settled at, whatever was sampled before.
+#[test]
+fn settled_sets_do_not_depend_on_their_order() {
+    let scene = upload(&grass(GrassDensity::new(0.2).expect("a density")));
+    let eye = |x: f32| PinholeCamera::looking_at(Vec3::new(x, 1.2, 3.0), Vec3::ZERO, Vec3::Y, 0.7, SIZE_PX);
+    let cameras = pinholes(&[eye(-0.2), eye(0.2)]);
+    let at = |scene_time_s: f32, settled_at_s: Option<f32>| {
+        let draw = DrawWork { scene_time_s, ..unlit(&scene) };
+        let planes = SamplePlanes::default();
+        let work = SampleWork { draw, cameras: &cameras, wanted: &[0, 1], method: TOLERANCE, planes, settled_at_s };
+        device().sampler.sample(&work).expect("images")
+    };
+    let later = at(0.4, Some(0.0));
+    assert_eq!(at(0.2, Some(0.0)).len(), 2);
+    assert!(at(0.9, Some(0.5)) != at(0.9, None), "hysteresis has an effect");
+    assert!(at(0.4, Some(0.0)) == later, "whatever came between");
+    assert!(at(0.4, Some(0.4)) == at(0.4, None), "the first of its run settles at itself");
 }

@@ -27,7 +27,14 @@ fn taken(
         DrawWork { scene, lighting: Lighting::PHONG, scene_time_s: 0.0, visibility, refinement: Refinement::default() };
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
-    device().1.sample(&SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes: ALL })
+    device().sampler.sample(&SampleWork {
+        draw,
+        cameras: &cameras,
+        wanted: &wanted,
+        method,
+        planes: ALL,
+        settled_at_s: None,
+    })
 }
 
 fn sample(scene: &GpuScene, cameras: &[PinholeCamera], method: SamplingMethod) -> Vec<DepthImage> {
@@ -215,7 +222,14 @@ fn what_needs_no_earlier_image_can_be_taken_apart() {
     };
     let cameras: Vec<Camera> = cameras.into_iter().map(Camera::Pinhole).collect();
     let part = |wanted: &[u32], method| {
-        device().1.sample(&SampleWork { draw, cameras: &cameras, wanted, method, planes: ALL })
+        device().sampler.sample(&SampleWork {
+            draw,
+            cameras: &cameras,
+            wanted,
+            method,
+            planes: ALL,
+            settled_at_s: None,
+        })
     };
     assert_eq!(part(&[3, 1], method).expect("two images"), [whole[3].clone(), whole[1].clone()]);
     for (wanted, method) in [(&[0, 1][..], SamplingMethod::default()), (&[4], method)] {

@@ -2,21 +2,59 @@
 
 use std::sync::{Arc, OnceLock};
 
+use depth_image::{Camera, DepthImage, PinholeCamera};
 use gpu::{DevicePreference, Gpu};
-use render::GpuScene;
-use sampling::Sampler;
+use render::{DrawWork, GpuScene, LeaveOut, Lighting, Refinement, Renderer, SamplePlanes, Settled, Visibility};
+use sampling::{Redundancy, Sampler, SamplingMethod};
 use scene::Scene;
 
+pub struct Device {
+    gpu: Arc<Gpu>,
+    renderer: Arc<Renderer>,
+    pub sampler: Sampler,
+}
+
 /// The software device of this program; a test without one fails.
-pub fn device() -> &'static (Arc<Gpu>, Sampler) {
-    static DEVICE: OnceLock<(Arc<Gpu>, Sampler)> = OnceLock::new();
+pub fn device() -> &'static Device {
+    static DEVICE: OnceLock<Device> = OnceLock::new();
     DEVICE.get_or_init(|| {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let sampler = Sampler::new(&gpu).expect("a sampler");
-        (gpu, sampler)
+        let renderer = Arc::new(sampling::renderer(&gpu).expect("a renderer"));
+        Device { gpu, sampler: Sampler::sharing(renderer.clone()), renderer }
     })
 }
 
 pub fn upload(scene: &Scene) -> GpuScene {
-    GpuScene::upload(&device().0, scene).expect("a scene")
+    GpuScene::upload(&device().gpu, scene).expect("a scene")
+}
+
+pub fn unlit(scene: &GpuScene) -> DrawWork<'_> {
+    DrawWork {
+        scene,
+        lighting: Lighting::UNLIT,
+        scene_time_s: 0.0,
+        visibility: Visibility::Measured,
+        refinement: Refinement::default(),
+    }
+}
+
+pub fn pinholes(cameras: &[PinholeCamera]) -> Vec<Camera> {
+    cameras.iter().copied().map(Camera::Pinhole).collect()
+}
+
+fn tolerance() -> LeaveOut {
+    SamplingMethod::NonRedundant(Redundancy::Tolerance).leave_out().expect("a test")
+}
+
+/// What a set by tolerance holds.
+pub fn settle(scene: &GpuScene, cameras: &[PinholeCamera]) -> Settled {
+    device().renderer.settle(unlit(scene), &pinholes(cameras), tolerance()).expect("a set")
+}
+
+/// A set by tolerance, which keeps on to another's samples.
+pub fn after(scene: &GpuScene, cameras: &[PinholeCamera], before: Option<&Settled>) -> Vec<DepthImage> {
+    let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
+    let (work, cameras, planes) = (unlit(scene), pinholes(cameras), SamplePlanes::default());
+    let images = device().renderer.draw_depth_images_apart(work, &cameras, &wanted, planes, tolerance(), before);
+    images.expect("images")
 }
