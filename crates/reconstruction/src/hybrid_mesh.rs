@@ -1,5 +1,5 @@
-//! Xie's hybrid reconstruction: each sample a quad of its texel, corners shared with its neighbours, and blocks of
-//! them merged where a surface is flat.
+//! Xie's hybrid reconstruction: each sample a quad of its texel, corners shared with its neighbours, and rectangles
+//! of them merged where a surface is flat.
 
 use depth_image::{DepthImage, HOLE_INVERSE_DEPTH};
 use gpu::{Frame, Gpu};
@@ -13,8 +13,7 @@ use crate::{
 };
 
 const WORKGROUP_PX: u32 = 8;
-/// In texels; one thread looks at all samples of a block.
-pub(crate) const GREATEST_SIDE: u32 = 64;
+const WORKGROUP_LINES: u32 = 64;
 
 /// What corners of quads are made from, on the device: see `planes` in `hybrid_mesh.wgsl`.
 pub(crate) struct CornerPlanes {
@@ -73,14 +72,14 @@ pub(crate) fn record(
     let planes = planes.map_err(|&(index, plane)| ReconstructionError::MissingPlane { index, plane })?;
     let key = ShaderKey { name: "hybrid_mesh.wgsl", hybrid: true, ..ShaderKey::default() };
     let texels = BindingResource::TextureView(&planes.texels);
-    let [depths, sides] = buffers([&image.quads.inverse_depths, &image.sides]);
+    let [depths, extents] = buffers([&image.quads.inverse_depths, &image.extents]);
     let groups = image.size_px.to_array().map(|side| side.div_ceil(WORKGROUP_PX));
     let work = image.work();
-    reconstructor.cut_pass(frame, key, &work, &[texels, depths, sides], [groups[0], groups[1], 1])?;
+    reconstructor.cut_pass(frame, key, &work, &[texels, depths, extents], [groups[0], groups[1], 1])?;
     merged.map_or(Ok(()), |bound| merge(reconstructor, frame, image, bound))
 }
 
-/// Blocks of 2 × 2, of those blocks of 2 × 2, and so on.
+/// Rows into runs, then columns of equal runs into rectangles.
 fn merge(
     reconstructor: &Reconstructor,
     frame: &mut Frame<'_>,
@@ -88,13 +87,10 @@ fn merge(
     bound: ErrorBound,
 ) -> Result<(), ReconstructionError> {
     let key = ShaderKey { name: "merge.wgsl", hybrid: true, ..ShaderKey::default() };
-    let greatest = GREATEST_SIDE.min(image.size_px.min_element());
-    for side in (1..).map(|level| 1 << level).take_while(|&side| side <= greatest) {
-        let work = GpuCutWork { side, bound_px: bound.px(), ..image.work() };
-        let used = buffers([&image.quads.inverse_depths, &image.sides, &image.report]);
-        let blocks = image.size_px / side;
-        let groups = [blocks.x.div_ceil(WORKGROUP_PX), blocks.y.div_ceil(WORKGROUP_PX), 1];
-        reconstructor.cut_pass(frame, key, &work, &used, groups)?;
+    for (axis, lines) in [(0, image.size_px.y), (1, image.size_px.x)] {
+        let work = GpuCutWork { axis, bound_px: bound.px(), ..image.work() };
+        let used = buffers([&image.quads.inverse_depths, &image.extents, &image.report]);
+        reconstructor.cut_pass(frame, key, &work, &used, [lines.div_ceil(WORKGROUP_LINES), 1, 1])?;
     }
     Ok(())
 }

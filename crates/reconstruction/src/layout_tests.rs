@@ -159,7 +159,7 @@ fn cutting_and_drawing_quads_agree() {
         size_px,
         first_sample,
         first_corner,
-        side,
+        axis,
         bound_px,
         chunks,
         padding
