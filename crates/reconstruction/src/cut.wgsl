@@ -14,12 +14,13 @@ struct CutWork {
     // Where this image's samples begin among those of the set, and its corners in `planes`.
     first_sample: u32,
     first_corner: u32,
-    // Of merging: 0 across, 1 down, and the greatest error.
+    // Of merging: 0 across, 1 down, and the greatest error in pixels.
     axis: u32,
     bound_px: f32,
     // Of CHUNK samples each.
     chunks: u32,
-    padding: u32,
+    // Of merging: into how long pieces lines are cut, in texels.
+    segment: u32,
 }
 
 @group(0) @binding(0) var<uniform> work: CutWork;

@@ -2,6 +2,7 @@
 //! of them merged where a surface is flat.
 
 use depth_image::{DepthImage, HOLE_INVERSE_DEPTH};
+use glam::UVec2;
 use gpu::{Frame, Gpu};
 use wgpu::BindingResource;
 
@@ -14,6 +15,9 @@ use crate::{
 
 const WORKGROUP_PX: u32 = 8;
 const WORKGROUP_LINES: u32 = 64;
+/// The greatest merged quad, across and down in texels: lines are merged in pieces so long. Powers of two; more would be
+/// too much for one thread of the software device, which ends loops after 65,535 turns.
+pub(crate) const GREATEST_EXTENT: UVec2 = UVec2::new(64, 16);
 
 /// What corners of quads are made from, on the device: see `planes` in `hybrid_mesh.wgsl`.
 pub(crate) struct CornerPlanes {
@@ -87,10 +91,17 @@ fn merge(
     bound: ErrorBound,
 ) -> Result<(), ReconstructionError> {
     let key = ShaderKey { name: "merge.wgsl", hybrid: true, ..ShaderKey::default() };
-    for (axis, lines) in [(0, image.size_px.y), (1, image.size_px.x)] {
-        let work = GpuCutWork { axis, bound_px: bound.px(), ..image.work() };
+    for (axis, segment) in (0..).zip(GREATEST_EXTENT.to_array()) {
+        let [length, lines] = [axis, 1 - axis].map(|axis| image.size_px[axis]);
+        let work = GpuCutWork { axis: axis as u32, segment, bound_px: bound.px(), ..image.work() };
         let used = buffers([&image.quads.inverse_depths, &image.extents, &image.report]);
-        reconstructor.cut_pass(frame, key, &work, &used, [lines.div_ceil(WORKGROUP_LINES), 1, 1])?;
+        reconstructor.cut_pass(
+            frame,
+            key,
+            &work,
+            &used,
+            [lines.div_ceil(WORKGROUP_LINES), length.div_ceil(segment), 1],
+        )?;
     }
     Ok(())
 }

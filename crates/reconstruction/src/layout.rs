@@ -91,7 +91,7 @@ pub(crate) struct GpuCutWork {
     pub axis: u32,
     pub bound_px: f32,
     pub chunks: u32,
-    pub padding: u32,
+    pub segment: u32,
 }
 
 /// `QuadWork` of `quads.wgsl`.

@@ -162,7 +162,7 @@ fn cutting_and_drawing_quads_agree() {
         axis,
         bound_px,
         chunks,
-        padding
+        segment
     });
     let passes =
         ["mesh.wgsl", "hybrid_mesh.wgsl", "merge.wgsl", "quad_count.wgsl", "quad_scan.wgsl", "quad_indices.wgsl"];

@@ -1,6 +1,6 @@
 // Merges quads of one extent that follow one another along a line, where no corner of all the samples' own quads lies
 // farther from the merged quad than the bound: rows into runs, then columns of equal runs into rectangles. One thread a
-// line, one dispatch an axis.
+// segment of a line, one dispatch an axis.
 {% include "cut.wgsl" %}
 
 @group(0) @binding(1) var<storage, read> inverse_depths: array<vec4f>;
@@ -8,9 +8,6 @@
 // Bits of a number that is not negative: they have its order.
 struct Report { greatest_error_px: atomic<u32>, quads_before: atomic<u32> }
 @group(0) @binding(3) var<storage, read_write> report: Report;
-
-// Steps are halved from here: at most twice as many quads are merged along a line.
-const GREATEST_STEP: u32 = 32u;
 
 struct Block { origin: vec2u, size: vec2u }
 // Quads along a line that become one.
@@ -67,7 +64,7 @@ fn block_of(origin: vec2u, extent: vec2u, count: u32) -> Block {
 // Not quad by quad: a run may end badly at one sample and well at a later one.
 fn longest_run(origin: vec2u, extent: vec2u, alike: u32) -> Run {
     var run = Run(1u, 0.0);
-    for (var step = GREATEST_STEP; step > 0u; step /= 2u) {
+    for (var step = work.segment / 2u; step > 0u; step /= 2u) {
         let count = run.count + step;
         for (var look = count <= alike; look; look = false) {
             let error = error_of_block(block_of(origin, extent, count));
@@ -78,9 +75,9 @@ fn longest_run(origin: vec2u, extent: vec2u, alike: u32) -> Run {
 }
 
 // Where quads along the line are no longer like the one at a place.
-fn end_of_alike(line: u32, place: u32, word: u32) -> u32 {
+fn end_of_alike(line: u32, place: u32, end_of_segment: u32, word: u32) -> u32 {
     var end = place + 1u;
-    for (; end < work.size_px[work.axis] && extents[index_of(texel_at(line, end))] == word; end++) {}
+    for (; end < end_of_segment && extents[index_of(texel_at(line, end))] == word; end++) {}
     return end;
 }
 
@@ -94,11 +91,13 @@ fn merge(line: u32, place: u32, extent: vec2u, run: Run) {
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= work.size_px[1u - work.axis] { return; }
-    var alike_until = 0u;
-    for (var place = 0u; place < work.size_px[work.axis];) {
+    let begin = id.y * work.segment;
+    let end = min(begin + work.segment, work.size_px[work.axis]);
+    var alike_until = begin;
+    for (var place = begin; place < end;) {
         let origin = texel_at(id.x, place);
         let word = extents[index_of(origin)];
-        if place == alike_until { alike_until = end_of_alike(id.x, place, word); }
+        if place == alike_until { alike_until = end_of_alike(id.x, place, end, word); }
         var run = Run(alike_until - place, 0.0);
         for (var look = word != 0u; look; look = false) {
             run = longest_run(origin, extent_of(word), run.count);

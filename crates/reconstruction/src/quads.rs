@@ -151,7 +151,7 @@ impl ImageCut<'_> {
             axis: 0,
             bound_px: 0.0,
             chunks: self.samples().div_ceil(CHUNK),
-            padding: 0,
+            segment: 0,
         }
     }
 }

@@ -3,13 +3,11 @@
 use depth_image::{Camera, DepthImage, PinholeCamera, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 
-use crate::{ErrorBound, Quad, shaders::GREATEST_SLOPE};
+use crate::{ErrorBound, Quad, hybrid_mesh::GREATEST_EXTENT, shaders::GREATEST_SLOPE};
 
 /// As in `pyramid.rs`.
 const FLAT_FOOTPRINTS: f32 = 2.0;
 const SLOPE_SHARE: f32 = 0.2;
-/// As in `merge.wgsl`.
-const GREATEST_STEP: u32 = 32;
 /// Of a quad: upper left, upper right, lower left, lower right.
 const CORNERS: [UVec2; 4] = [UVec2::ZERO, UVec2::X, UVec2::Y, UVec2::ONE];
 
@@ -126,14 +124,17 @@ impl<'i> Cut<'i> {
     fn merge_all(&mut self, bound_px: f32) {
         for along in [UVec2::X, UVec2::Y] {
             let across = UVec2::ONE - along;
+            let segments = self.camera.size_px.dot(along).div_ceil(GREATEST_EXTENT.dot(along));
             for line in 0..self.camera.size_px.dot(across) {
-                self.merge_line(across * line, along, bound_px);
+                for segment in 0..segments {
+                    self.merge_segment(across * line + along * GREATEST_EXTENT * segment, along, bound_px);
+                }
             }
         }
     }
 
-    fn merge_line(&mut self, first: UVec2, along: UVec2, bound_px: f32) {
-        let length = self.camera.size_px.dot(along);
+    fn merge_segment(&mut self, first: UVec2, along: UVec2, bound_px: f32) {
+        let length = (self.camera.size_px - first).min(GREATEST_EXTENT).dot(along);
         let mut place = 0;
         while place < length {
             let origin = first + along * place;
@@ -155,7 +156,8 @@ impl<'i> Cut<'i> {
     /// How many of the quads that are alike become one.
     fn longest_run(&self, origin: UVec2, extent: UVec2, along: UVec2, alike: u32, bound_px: f32) -> u32 {
         let fits = |count| count <= alike && self.error_px(origin, times(extent, along, count)) <= bound_px;
-        let steps = std::iter::successors(Some(GREATEST_STEP), |step| Some(step / 2)).take_while(|&step| step > 0);
+        let greatest = GREATEST_EXTENT.dot(along) / 2;
+        let steps = std::iter::successors(Some(greatest), |step| Some(step / 2)).take_while(|&step| step > 0);
         steps.fold(1, |count, step| if fits(count + step) { count + step } else { count })
     }
 
