@@ -14,12 +14,13 @@ struct CutWork {
     // Where this image's samples begin among those of the set, and its corners in `planes`.
     first_sample: u32,
     first_corner: u32,
-    // Of merging: the side of a block in texels, and the greatest error.
-    side: u32,
+    // Of merging: 0 across, 1 down, and the greatest error in pixels.
+    axis: u32,
     bound_px: f32,
     // Of CHUNK samples each.
     chunks: u32,
-    padding: u32,
+    // Of merging: into how long pieces lines are cut, in texels.
+    segment: u32,
 }
 
 @group(0) @binding(0) var<uniform> work: CutWork;
@@ -30,6 +31,10 @@ const CHUNK: u32 = 64u;
 fn texel_of(index: u32) -> vec2u {
     return vec2u(index % {{ texture_width }}u, index / {{ texture_width }}u);
 }
+
+// Of a quad, columns and rows in texels: its word among the extents of an image's quads, 0 where none begins.
+fn extent_of(word: u32) -> vec2u { return vec2u(word & 0xffffu, word >> 16u); }
+fn word_of(extent: vec2u) -> u32 { return extent.x | (extent.y << 16u); }
 
 fn ray_at(position_px: vec2f) -> vec3f {
     return work.column_in_world * position_px.x + work.row_in_world * position_px.y + work.corner_in_world;

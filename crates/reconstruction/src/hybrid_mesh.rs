@@ -1,7 +1,8 @@
-//! Xie's hybrid reconstruction: each sample a quad of its texel, corners shared with its neighbours, and blocks of
-//! them merged where a surface is flat.
+//! Xie's hybrid reconstruction: each sample a quad of its texel, corners shared with its neighbours, and rectangles
+//! of them merged where a surface is flat.
 
 use depth_image::{DepthImage, HOLE_INVERSE_DEPTH};
+use glam::UVec2;
 use gpu::{Frame, Gpu};
 use wgpu::BindingResource;
 
@@ -13,8 +14,10 @@ use crate::{
 };
 
 const WORKGROUP_PX: u32 = 8;
-/// In texels; one thread looks at all samples of a block.
-pub(crate) const GREATEST_SIDE: u32 = 64;
+const WORKGROUP_LINES: u32 = 64;
+/// The greatest merged quad, across and down in texels: lines are merged in pieces so long. Powers of two; more would be
+/// too much for one thread of the software device, which ends loops after 65,535 turns.
+pub(crate) const GREATEST_EXTENT: UVec2 = UVec2::new(64, 16);
 
 /// What corners of quads are made from, on the device: see `planes` in `hybrid_mesh.wgsl`.
 pub(crate) struct CornerPlanes {
@@ -73,14 +76,14 @@ pub(crate) fn record(
     let planes = planes.map_err(|&(index, plane)| ReconstructionError::MissingPlane { index, plane })?;
     let key = ShaderKey { name: "hybrid_mesh.wgsl", hybrid: true, ..ShaderKey::default() };
     let texels = BindingResource::TextureView(&planes.texels);
-    let [depths, sides] = buffers([&image.quads.inverse_depths, &image.sides]);
+    let [depths, extents] = buffers([&image.quads.inverse_depths, &image.extents]);
     let groups = image.size_px.to_array().map(|side| side.div_ceil(WORKGROUP_PX));
     let work = image.work();
-    reconstructor.cut_pass(frame, key, &work, &[texels, depths, sides], [groups[0], groups[1], 1])?;
+    reconstructor.cut_pass(frame, key, &work, &[texels, depths, extents], [groups[0], groups[1], 1])?;
     merged.map_or(Ok(()), |bound| merge(reconstructor, frame, image, bound))
 }
 
-/// Blocks of 2 × 2, of those blocks of 2 × 2, and so on.
+/// Rows into runs, then columns of equal runs into rectangles.
 fn merge(
     reconstructor: &Reconstructor,
     frame: &mut Frame<'_>,
@@ -88,13 +91,17 @@ fn merge(
     bound: ErrorBound,
 ) -> Result<(), ReconstructionError> {
     let key = ShaderKey { name: "merge.wgsl", hybrid: true, ..ShaderKey::default() };
-    let greatest = GREATEST_SIDE.min(image.size_px.min_element());
-    for side in (1..).map(|level| 1 << level).take_while(|&side| side <= greatest) {
-        let work = GpuCutWork { side, bound_px: bound.px(), ..image.work() };
-        let used = buffers([&image.quads.inverse_depths, &image.sides, &image.report]);
-        let blocks = image.size_px / side;
-        let groups = [blocks.x.div_ceil(WORKGROUP_PX), blocks.y.div_ceil(WORKGROUP_PX), 1];
-        reconstructor.cut_pass(frame, key, &work, &used, groups)?;
+    for (axis, segment) in (0..).zip(GREATEST_EXTENT.to_array()) {
+        let [length, lines] = [axis, 1 - axis].map(|axis| image.size_px[axis]);
+        let work = GpuCutWork { axis: axis as u32, segment, bound_px: bound.px(), ..image.work() };
+        let used = buffers([&image.quads.inverse_depths, &image.extents, &image.report]);
+        reconstructor.cut_pass(
+            frame,
+            key,
+            &work,
+            &used,
+            [lines.div_ceil(WORKGROUP_LINES), length.div_ceil(segment), 1],
+        )?;
     }
     Ok(())
 }

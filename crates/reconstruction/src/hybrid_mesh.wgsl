@@ -8,8 +8,7 @@
 @group(0) @binding(1) var planes: texture_2d<u32>;
 // Of each sample's corners: upper left, upper right, lower left, lower right.
 @group(0) @binding(2) var<storage, read_write> inverse_depths: array<vec4f>;
-// Sides in texels of the quads that begin at each sample; 0 where none does.
-@group(0) @binding(3) var<storage, read_write> sides: array<u32>;
+@group(0) @binding(3) var<storage, read_write> extents: array<u32>;
 
 // As in pyramid.rs.
 const FLAT_FOOTPRINTS: f32 = 2.0;
@@ -78,5 +77,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         corner(sample, id.xy), corner(sample, id.xy + vec2u(1u, 0u)),
         corner(sample, id.xy + vec2u(0u, 1u)), corner(sample, id.xy + 1u),
     );
-    sides[index] = select(0u, 1u, inverse_depth > 0.0);
+    extents[index] = select(0u, word_of(vec2u(1u)), inverse_depth > 0.0);
 }

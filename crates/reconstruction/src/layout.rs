@@ -88,10 +88,10 @@ pub(crate) struct GpuCutWork {
     pub size_px: [u32; 2],
     pub first_sample: u32,
     pub first_corner: u32,
-    pub side: u32,
+    pub axis: u32,
     pub bound_px: f32,
     pub chunks: u32,
-    pub padding: u32,
+    pub segment: u32,
 }
 
 /// `QuadWork` of `quads.wgsl`.

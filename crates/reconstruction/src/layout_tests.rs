@@ -159,10 +159,10 @@ fn cutting_and_drawing_quads_agree() {
         size_px,
         first_sample,
         first_corner,
-        side,
+        axis,
         bound_px,
         chunks,
-        padding
+        segment
     });
     let passes =
         ["mesh.wgsl", "hybrid_mesh.wgsl", "merge.wgsl", "quad_count.wgsl", "quad_scan.wgsl", "quad_indices.wgsl"];

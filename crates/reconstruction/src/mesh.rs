@@ -18,7 +18,7 @@ pub(crate) fn record(
 ) -> Result<(), ReconstructionError> {
     let key = ShaderKey { name: "mesh.wgsl", ..ShaderKey::default() };
     let codes = BindingResource::TextureView(&image.set.cell_codes);
-    let [depths, sides] = buffers([&image.quads.inverse_depths, &image.sides]);
+    let [depths, extents] = buffers([&image.quads.inverse_depths, &image.extents]);
     let [across, down] = image.size_px.to_array().map(|side| side.div_ceil(WORKGROUP_PX));
-    reconstructor.cut_pass(frame, key, &image.work(), &[codes, depths, sides], [across, down, 1])
+    reconstructor.cut_pass(frame, key, &image.work(), &[codes, depths, extents], [across, down, 1])
 }

@@ -5,8 +5,7 @@
 @group(0) @binding(1) var cell_codes: texture_2d<u32>;
 // Of each sample.
 @group(0) @binding(2) var<storage, read_write> inverse_depths: array<f32>;
-// Sides in texels of the quads that begin at each sample; 0 where none does.
-@group(0) @binding(3) var<storage, read_write> sides: array<u32>;
+@group(0) @binding(3) var<storage, read_write> extents: array<u32>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -16,5 +15,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let code = f32(word & 0x7fffu);
     inverse_depths[index] = select(0.0, (code - work.code_offset) / work.code_scale, code > 1.5);
     let whole = all(id.xy + 1u < work.size_px);
-    sides[index] = select(0u, 1u, whole && (word >> 31u) != 0u);
+    extents[index] = select(0u, word_of(vec2u(1u)), whole && (word >> 31u) != 0u);
 }

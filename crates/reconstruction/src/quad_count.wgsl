@@ -1,7 +1,7 @@
 // Counts the quads of each chunk of samples, so that they can be listed in their order.
 {% include "cut.wgsl" %}
 
-@group(0) @binding(1) var<storage, read> sides: array<u32>;
+@group(0) @binding(1) var<storage, read> extents: array<u32>;
 @group(0) @binding(2) var<storage, read_write> counts: array<u32>;
 struct Report { greatest_error_px: u32, quads_before: atomic<u32> }
 @group(0) @binding(3) var<storage, read_write> report: Report;
@@ -13,9 +13,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var count = 0u;
     var before = 0u;
     for (var i = id.x * CHUNK; i < end; i++) {
-        let side = sides[i];
-        count += min(side, 1u);
-        before += side * side;
+        let extent = extent_of(extents[i]);
+        count += min(extent.x, 1u);
+        before += extent.x * extent.y;
     }
     counts[id.x] = count;
     atomicAdd(&report.quads_before, before);

@@ -124,8 +124,8 @@ pub(crate) struct ImageCut<'s> {
     pub number: usize,
     pub size_px: UVec2,
     pub quads: ImageQuads,
-    /// See `sides` in the shaders.
-    pub sides: PooledBuffer,
+    /// See `extent_of` in the shaders.
+    pub extents: PooledBuffer,
     pub report: wgpu::Buffer,
 }
 
@@ -148,10 +148,10 @@ impl ImageCut<'_> {
             size_px: self.size_px.to_array(),
             first_sample: camera.first_cell,
             first_corner: planes.map_or(0, |planes| planes.first_corners[self.number]),
-            side: 0,
+            axis: 0,
             bound_px: 0.0,
             chunks: self.samples().div_ceil(CHUNK),
-            padding: 0,
+            segment: 0,
         }
     }
 }
@@ -276,8 +276,8 @@ impl Reconstructor {
         };
         // New buffers are zero, as the report's sums need.
         let report = storage("mesh report", BYTES_OF_REPORT, BufferUsages::empty())?;
-        let sides = self.pool.lend_storage("sides of quads", 4 * samples);
-        Ok(ImageCut { set, number, size_px, quads, sides, report })
+        let extents = self.pool.lend_storage("extents of quads", 4 * samples);
+        Ok(ImageCut { set, number, size_px, quads, extents, report })
     }
 
     fn list_quads(&self, frame: &mut Frame<'_>, image: &ImageCut<'_>, cut: Cut) -> Result<(), ReconstructionError> {
@@ -285,10 +285,10 @@ impl Reconstructor {
         let counts = self.pool.lend_storage("quads of chunks", 4 * u64::from(chunks));
         let key = |name| ShaderKey { name, hybrid: cut.is_hybrid(), ..ShaderKey::default() };
         let groups = [chunks.div_ceil(CHUNK), 1, 1];
-        let (work, sides, places) = (image.work(), &*image.sides, &*counts);
-        self.cut_pass(frame, key("quad_count.wgsl"), &work, &buffers([sides, places, &image.report]), groups)?;
+        let (work, extents, places) = (image.work(), &*image.extents, &*counts);
+        self.cut_pass(frame, key("quad_count.wgsl"), &work, &buffers([extents, places, &image.report]), groups)?;
         self.cut_pass(frame, key("quad_scan.wgsl"), &work, &buffers([places, &image.quads.draw]), [1, 1, 1])?;
-        let lists = buffers([sides, places, &image.quads.indices]);
+        let lists = buffers([extents, places, &image.quads.indices]);
         self.cut_pass(frame, key("quad_indices.wgsl"), &work, &lists, groups)
     }
 

@@ -1,9 +1,9 @@
-//! Twin of `hybrid_mesh.wgsl` and `merge.wgsl`: each sample a quad of its texel, and flat blocks of them merged.
+//! Twin of `hybrid_mesh.wgsl` and `merge.wgsl`: each sample a quad of its texel, and flat rectangles of them merged.
 
 use depth_image::{Camera, DepthImage, PinholeCamera, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 
-use crate::{ErrorBound, Quad, hybrid_mesh::GREATEST_SIDE, shaders::GREATEST_SLOPE};
+use crate::{ErrorBound, Quad, hybrid_mesh::GREATEST_EXTENT, shaders::GREATEST_SLOPE};
 
 /// As in `pyramid.rs`.
 const FLAT_FOOTPRINTS: f32 = 2.0;
@@ -16,8 +16,8 @@ struct Cut<'i> {
     camera: &'i PinholeCamera,
     /// Of each sample.
     inverse_depths: Vec<[f32; 4]>,
-    /// In texels, of the quad that begins at each sample; 0 where none does.
-    sides: Vec<u32>,
+    /// Columns and rows in texels, of the quad that begins at each sample; 0 where none does.
+    extents: Vec<UVec2>,
 }
 
 /// In the order of their upper left samples; none where a plane is missing.
@@ -26,7 +26,7 @@ pub(super) fn quads(number: usize, image: &DepthImage, merged: Option<ErrorBound
     if let Some(bound) = merged {
         cut.merge_all(bound.px());
     }
-    (0..cut.sides.len()).filter(|&sample| cut.sides[sample] > 0).map(|sample| cut.quad(number, sample)).collect()
+    (0..cut.extents.len()).filter(|&sample| cut.extents[sample].x > 0).map(|sample| cut.quad(number, sample)).collect()
 }
 
 /// A sample and its plane.
@@ -94,7 +94,7 @@ impl<'i> Cut<'i> {
         Some(Self {
             camera,
             inverse_depths: texels.enumerate().map(quad).collect(),
-            sides: image.inverse_depth_per_m.iter().map(|&d| u32::from(d > 0.0)).collect(),
+            extents: image.inverse_depth_per_m.iter().map(|&d| UVec2::splat(u32::from(d > 0.0))).collect(),
         })
     }
 
@@ -108,54 +108,78 @@ impl<'i> Cut<'i> {
     }
 
     /// The corners of a block.
-    fn merged(&self, origin: UVec2, side: u32) -> [f32; 4] {
-        [0, 1, 2, 3].map(|i| self.inverse_depths[self.index(origin + CORNERS[i] * (side - 1))][i])
+    fn merged(&self, origin: UVec2, size: UVec2) -> [f32; 4] {
+        [0, 1, 2, 3].map(|i| self.inverse_depths[self.index(origin + CORNERS[i] * (size - 1))][i])
     }
 
     fn quad(&self, number: usize, sample: usize) -> Quad {
-        let (origin, side) = (self.texel(sample), self.sides[sample]);
-        let depths = self.merged(origin, side);
-        let point = |i: usize| self.camera.ray((origin + CORNERS[i] * side).as_vec2()).at(depths[i].recip());
-        let last = self.index(origin + side - 1);
+        let (origin, extent) = (self.texel(sample), self.extents[sample]);
+        let depths = self.merged(origin, extent);
+        let point = |i: usize| self.camera.ray((origin + CORNERS[i] * extent).as_vec2()).at(depths[i].recip());
+        let last = self.index(origin + extent - 1);
         Quad { image: number, corners_in_world: [0, 1, 2, 3].map(point), samples: [sample as u32, last as u32] }
     }
 
+    /// Rows into runs, then columns of equal runs into rectangles.
     fn merge_all(&mut self, bound_px: f32) {
-        let size_px = self.camera.size_px;
-        let greatest = GREATEST_SIDE.min(size_px.min_element());
-        for side in (1..).map(|level| 1u32 << level).take_while(|&side| side <= greatest) {
-            let blocks = size_px / side;
-            for block in (0..blocks.y).flat_map(|y| (0..blocks.x).map(move |x| UVec2::new(x, y))) {
-                self.merge(block * side, side, bound_px);
+        for along in [UVec2::X, UVec2::Y] {
+            let across = UVec2::ONE - along;
+            let segments = self.camera.size_px.dot(along).div_ceil(GREATEST_EXTENT.dot(along));
+            for line in 0..self.camera.size_px.dot(across) {
+                for segment in 0..segments {
+                    self.merge_segment(across * line + along * GREATEST_EXTENT * segment, along, bound_px);
+                }
             }
         }
     }
 
-    fn merge(&mut self, origin: UVec2, side: u32, bound_px: f32) {
-        let children = CORNERS.map(|offset| self.index(origin + offset * (side / 2)));
-        if children.iter().any(|&child| self.sides[child] != side / 2) {
-            return;
-        }
-        if self.error_px(origin, side) <= bound_px {
-            children.iter().for_each(|&child| self.sides[child] = 0);
-            self.sides[children[0]] = side;
+    fn merge_segment(&mut self, first: UVec2, along: UVec2, bound_px: f32) {
+        let length = (self.camera.size_px - first).min(GREATEST_EXTENT).dot(along);
+        let mut place = 0;
+        while place < length {
+            let origin = first + along * place;
+            let extent = self.extents[self.index(origin)];
+            let is_alike = |&i: &u32| self.extents[self.index(origin + along * i)] == extent;
+            let alike = (0..length - place).take_while(is_alike).count() as u32;
+            let count = if extent.x > 0 { self.longest_run(origin, extent, along, alike, bound_px) } else { alike };
+            (0..count).for_each(|i| self.set_extent(origin + along * i, UVec2::ZERO));
+            self.set_extent(origin, times(extent, along, count));
+            place += count;
         }
     }
 
+    fn set_extent(&mut self, texel: UVec2, extent: UVec2) {
+        let index = self.index(texel);
+        self.extents[index] = extent;
+    }
+
+    /// How many of the quads that are alike become one.
+    fn longest_run(&self, origin: UVec2, extent: UVec2, along: UVec2, alike: u32, bound_px: f32) -> u32 {
+        let fits = |count| count <= alike && self.error_px(origin, times(extent, along, count)) <= bound_px;
+        let greatest = GREATEST_EXTENT.dot(along) / 2;
+        let steps = std::iter::successors(Some(greatest), |step| Some(step / 2)).take_while(|&step| step > 0);
+        steps.fold(1, |count, step| if fits(count + step) { count + step } else { count })
+    }
+
     /// How far the merged quad is off the corners of all samples in the block.
-    fn error_px(&self, origin: UVec2, side: u32) -> f32 {
-        let merged = self.merged(origin, side);
-        let places = (0..side).flat_map(|y| (0..side).map(move |x| UVec2::new(x, y)));
+    fn error_px(&self, origin: UVec2, size: UVec2) -> f32 {
+        let merged = self.merged(origin, size);
+        let places = (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y)));
         let corners = places.flat_map(|place| (0..4).map(move |i| (place, i)));
         let errors = corners.map(|(place, i)| {
             let depth = self.inverse_depths[self.index(origin + place)][i];
             let at = place + CORNERS[i];
-            let surface = on_triangles(merged, at.as_vec2() / side as f32);
+            let surface = on_triangles(merged, at.as_vec2() / size.as_vec2());
             let ray = self.camera.ray((origin + at).as_vec2()).direction_in_world;
             self.camera.focal_px.min_element() * ray.length() * (surface - depth).abs() / surface
         });
         errors.fold(0.0, f32::max)
     }
+}
+
+/// Of so many quads along an axis.
+fn times(extent: UVec2, along: UVec2, count: u32) -> UVec2 {
+    extent * (UVec2::ONE + along * (count - 1))
 }
 
 /// Of the two triangles that are drawn; linear in the image, as planes are.

@@ -4,6 +4,7 @@ mod batches;
 mod closed_form;
 mod failures;
 mod holes_and_limits;
+mod merging;
 mod mesh_limits;
 mod meshes;
 mod non_redundant;

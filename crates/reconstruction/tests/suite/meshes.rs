@@ -135,7 +135,10 @@ fn a_plane_is_whole_and_exact_however_steep() {
             let worst = self::inside(&truth, 2).into_iter().map(off).fold(0.0, f32::max);
             println!("{degrees}° {method:<16} {lost} of {inside} pixels lost, depth off by at most {worst:.1e}");
             assert!(inside > 30 && lost == 0, "{degrees}° {method}: {lost} of {inside}");
-            assert!(worst < 1e-4, "{degrees}° {method}: {worst}");
+            // The rim's corners may be off the plane, and so by its bound what is merged with them.
+            let bound_px = if method == merged(0.5) { 0.5 } else { 0.0 };
+            let allowed = 1e-4 + bound_px / camera_of(&stage, 0).focal_px.min_element();
+            assert!(worst < allowed, "{degrees}° {method}: {worst}");
         }
     }
 }
