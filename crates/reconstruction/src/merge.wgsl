@@ -28,11 +28,13 @@ fn merged_at(corners: vec4f, at: vec2f) -> f32 {
     return select(lower, upper, at.x + at.y <= 1.0);
 }
 
-// How far the merged quad is off a corner, along the corner's ray, as seen from the side at the corner's distance.
+// How far the merged quad is off a corner, along the corner's ray, as seen from the side at the corner's distance. On the
+// outline it counts twice: there a crack opens to both sides.
 fn error_px(corners: vec4f, block: Block, place: vec2u, inverse_depth: f32) -> f32 {
     let merged = merged_at(corners, vec2f(place) / vec2f(block.size));
     let ray = ray_at(vec2f(block.origin + place));
-    return work.focal_px * length(ray) * abs(merged - inverse_depth) / merged;
+    let sides = select(1.0, 2.0, any(place == vec2u(0u)) || any(place == block.size));
+    return sides * work.focal_px * length(ray) * abs(merged - inverse_depth) / merged;
 }
 
 fn error_of_quad(corners: vec4f, block: Block, place: vec2u) -> f32 {

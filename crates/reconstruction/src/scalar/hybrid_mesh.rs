@@ -161,7 +161,8 @@ impl<'i> Cut<'i> {
         steps.fold(1, |count, step| if fits(count + step) { count + step } else { count })
     }
 
-    /// How far the merged quad is off the corners of all samples in the block.
+    /// How far the merged quad is off the corners of all samples in the block. On the outline it counts twice: there a
+    /// crack opens to both sides.
     fn error_px(&self, origin: UVec2, size: UVec2) -> f32 {
         let merged = self.merged(origin, size);
         let places = (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y)));
@@ -171,7 +172,9 @@ impl<'i> Cut<'i> {
             let at = place + CORNERS[i];
             let surface = on_triangles(merged, at.as_vec2() / size.as_vec2());
             let ray = self.camera.ray((origin + at).as_vec2()).direction_in_world;
-            self.camera.focal_px.min_element() * ray.length() * (surface - depth).abs() / surface
+            let on_outline = at.cmpeq(UVec2::ZERO).any() || at.cmpeq(size).any();
+            let sides = if on_outline { 2.0 } else { 1.0 };
+            sides * self.camera.focal_px.min_element() * ray.length() * (surface - depth).abs() / surface
         });
         errors.fold(0.0, f32::max)
     }
