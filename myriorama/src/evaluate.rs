@@ -7,6 +7,7 @@ use anyhow::Context as _;
 use depth_image::{Camera, DepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use metrics::{
     DepthPlane, PixelClass, Rgb8Image, ScoreMap, class_mask, classify, depth_errors, flip_map, psnr_db, ssim_map,
+    unheld_rate,
 };
 use node::{DirectWork, Engine as _, SampleWork};
 use rayon::prelude::*;
@@ -110,6 +111,19 @@ impl Truth {
         };
         let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;
         Ok(Self { engine: engine.clone(), cameras, views, images, set, classes })
+    }
+
+    /// Of the views' pixels that show a surface, those whose surface no sample image holds.
+    ///
+    /// # Errors
+    /// Views without depth.
+    pub fn unheld(&self) -> anyhow::Result<f64> {
+        let rate = |(camera, view): (&PinholeCamera, &View)| {
+            let depth = view.inverse_depth_per_m.as_ref().context("a view without depth")?;
+            Ok(unheld_rate(camera, depth, &self.images)?.unwrap_or(0.0))
+        };
+        let rates = self.cameras.iter().zip(&self.views).map(rate).collect::<anyhow::Result<Vec<_>>>()?;
+        Ok(rates.iter().sum::<f64>() / rates.len() as f64)
     }
 
     /// The same views drawn from the scene in another light.

@@ -72,6 +72,27 @@ pub fn classify(
         .collect())
 }
 
+/// Pixels whose surface no sample image holds, over all whose reference shows a surface, silhouettes or not; `None` where
+/// there is no surface. Of a scene that is all edges nothing else is left to count.
+///
+/// # Errors
+/// As [`classify`].
+pub fn unheld_rate(
+    reference_camera: &PinholeCamera,
+    reference_inverse_depth: &[f32],
+    sample_images: &[DepthImage],
+) -> Result<Option<f64>, MetricsError> {
+    expect_len("reference depth", reference_inverse_depth.len(), reference_camera.pixel_count())?;
+    let surfaces: Vec<(usize, f32)> =
+        reference_inverse_depth.iter().copied().enumerate().filter(|&(_, inverse_depth)| inverse_depth > 0.0).collect();
+    let is_unheld = |&&(index, inverse_depth): &&(usize, f32)| {
+        let point = surface_point(reference_camera, index, inverse_depth);
+        surface_class(point, sample_images) == PixelClass::Disoccluded
+    };
+    let unheld = surfaces.par_iter().filter(is_unheld).count();
+    Ok((!surfaces.is_empty()).then(|| unheld as f64 / surfaces.len() as f64))
+}
+
 /// The pixels of one class, as a mask.
 #[must_use]
 pub fn class_mask(classes: &[PixelClass], class: PixelClass) -> Vec<bool> {
@@ -209,6 +230,9 @@ mod tests {
         let rows = 0.8 * camera.focal_px.y / 2.0;
         let disoccluded = ClassCounts::of(&classes).disoccluded as f32;
         assert!((disoccluded / ((columns - 2.0) * rows) - 1.0).abs() < 0.1, "{disoccluded}");
+        let surfaces = depth.iter().filter(|&&depth| depth > 0.0).count() as f64;
+        let unheld = unheld_rate(&camera, &depth, &[sample(0.4)]).unwrap().unwrap() * surfaces;
+        assert!((unheld / f64::from(columns * rows) - 1.0).abs() < 0.1, "{unheld}: with what lies beside steps");
     }
 
     #[test]

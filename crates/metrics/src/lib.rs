@@ -32,7 +32,7 @@ mod ssim;
 mod steps;
 mod temporal;
 
-pub use classes::{ClassCounts, PixelClass, class_mask, classify, disocclusion_rate};
+pub use classes::{ClassCounts, PixelClass, class_mask, classify, disocclusion_rate, unheld_rate};
 pub use compare::{ClassErrors, Comparison, ImageErrors, PSNR_CAP_DB, compare};
 pub use depth_error::{DepthErrors, WRONG_HIT_RELATIVE, depth_errors};
 pub use error::MetricsError;

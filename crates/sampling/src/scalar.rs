@@ -45,20 +45,36 @@ const BLOCKER_FOOTPRINTS: f32 = 4.0;
 /// Depth, normals and surface ids of a set; colours are left black.
 #[must_use]
 pub fn sample(scene: &Scene, cameras: &[PinholeCamera], method: SamplingMethod) -> Vec<DepthImage> {
-    sample_after(scene, cameras, method, None)
+    sample_with(scene, cameras, method, Settings::default())
 }
 
-/// As [`sample`], keeping on to what the same images of another moment hold, where the method settles.
+/// What the test by tolerance may be varied by.
+#[derive(Debug, Clone, Copy)]
+pub struct Settings<'a> {
+    /// The same images at another moment, what they hold of which is kept on to.
+    pub before: Option<&'a [DepthImage]>,
+    /// Depths and footprints may differ by so many times what the method allows.
+    pub allowed: f32,
+}
+
+impl Default for Settings<'_> {
+    fn default() -> Self {
+        Self { before: None, allowed: 1.0 }
+    }
+}
+
+/// As [`sample`], with the test by tolerance varied.
 #[must_use]
-pub fn sample_after(
+pub fn sample_with(
     scene: &Scene,
     cameras: &[PinholeCamera],
     method: SamplingMethod,
-    before: Option<&[DepthImage]>,
+    settings: Settings<'_>,
 ) -> Vec<DepthImage> {
     let mut images: Vec<DepthImage> = Vec::with_capacity(cameras.len());
     for (number, camera) in cameras.iter().enumerate() {
-        let asked = Asked { scene, images: &images, method, before: before.map(|before| &before[number]) };
+        let before = settings.before.map(|before| &before[number]);
+        let asked = Asked { scene, images: &images, method, before, allowed: settings.allowed };
         let pixels = (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| UVec2::new(x, y)));
         let mut texels: Vec<Texel> = pixels.map(|pixel| texel(&asked, camera, pixel)).collect();
         if let SamplingMethod::Useful(_) = method {
@@ -85,6 +101,7 @@ struct Asked<'a> {
     method: SamplingMethod,
     /// The candidate's own, at the moment that the set settled at.
     before: Option<&'a DepthImage>,
+    allowed: f32,
 }
 
 fn texel(asked: &Asked<'_>, camera: &PinholeCamera, pixel: UVec2) -> Texel {
@@ -174,7 +191,7 @@ fn is_known(asked: &Asked<'_>, candidate: &Candidate, was_kept: bool, image: &De
             is_visibility_redundant(asked.scene, candidate.point_in_world, candidate.footprint_m, camera)
         }
         SamplingMethod::NonRedundant(Redundancy::Tolerance) | SamplingMethod::Useful(Redundancy::Tolerance) => {
-            is_tolerance_redundant(candidate, was_kept, image)
+            is_tolerance_redundant(candidate, was_kept, asked.allowed, image)
         }
         SamplingMethod::DepthPeeling { .. } => is_in_layer(candidate, image),
     }
@@ -261,7 +278,7 @@ fn was_kept(candidate: &Candidate, before: &DepthImage) -> bool {
     inverse_depth > 0.0 && (inverse_depth.recip() - depth_m).abs() < room_m
 }
 
-fn is_tolerance_redundant(candidate: &Candidate, was_kept: bool, image: &DepthImage) -> bool {
+fn is_tolerance_redundant(candidate: &Candidate, was_kept: bool, allowed: f32, image: &DepthImage) -> bool {
     let Camera::Pinhole(camera) = &image.camera;
     let (Some((pixel, depth_m)), Some(normals)) = (place(camera, candidate.point_in_world), &image.normal_oct16) else {
         return false;
@@ -270,7 +287,8 @@ fn is_tolerance_redundant(candidate: &Candidate, was_kept: bool, image: &DepthIm
     let steps = [Vec3::X / camera.focal_px.x, Vec3::NEG_Y / camera.focal_px.y].map(|s| camera.world_from_camera * s);
     let across: f32 = steps.iter().map(|step| candidate.normal.dot(*step).abs()).sum();
     let slope = depth_m * across / (candidate.normal.dot(sight).abs() / depth_m).max(1e-6);
-    let (allowed, least_facing) = if was_kept { (CLEARLY, CLEARLY_SAME_FACING) } else { (1.0, SAME_FACING) };
+    let (share, least_facing) = if was_kept { (CLEARLY, CLEARLY_SAME_FACING) } else { (1.0, SAME_FACING) };
+    let allowed = share * allowed;
     let room_m = allowed * (DEPTH_FOOTPRINTS * depth_m / camera.focal_px.min_element()).max(SLOPE_PX * slope);
     let first = (pixel - 0.5).floor().as_ivec2();
     let last = camera.size_px.as_ivec2() - 1;

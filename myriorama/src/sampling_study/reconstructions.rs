@@ -20,24 +20,31 @@ pub struct Reconstructed {
     sampling: SamplingMethod,
     size_px: UVec2,
     samples: usize,
+    /// Of the views' pixels that show a surface, the share whose surface is in no image.
+    unheld: f64,
     rows: Vec<Row>,
 }
 
-/// Measures all pairs on a scene; conventional sampling once more with as few samples as the least of the others.
+/// Measures all pairs on a scene, then once more with about as few samples as the least of them.
 ///
 /// # Errors
 /// The device's.
 pub fn reconstructions(subject: &Subject, quick: bool) -> anyhow::Result<Vec<Reconstructed>> {
-    let progress = bar(format!("{}: views", subject.name), METHODS.len() + 1);
-    let mut all = Vec::with_capacity(METHODS.len() + 1);
+    let progress = bar(format!("{}: views", subject.name), 2 * METHODS.len() - 1);
+    let mut all = Vec::with_capacity(2 * METHODS.len() - 1);
     for method in METHODS {
         all.push(of_method(subject, method, SAMPLE_PX, quick)?);
         progress.inc(1);
     }
-    let fewest = all.iter().skip(1).map(|r| r.samples).min().unwrap_or(0);
-    let scale = (fewest as f32 / all[0].samples as f32).sqrt();
-    let smaller = (SAMPLE_PX.as_vec2() * scale).round().as_uvec2();
-    all.push(of_method(subject, SamplingMethod::Conventional, smaller, quick)?);
+    let fewest = all.iter().map(|r: &Reconstructed| r.samples).min().unwrap_or(0);
+    for place in 0..METHODS.len() {
+        let scale = (fewest as f32 / all[place].samples as f32).sqrt();
+        let smaller = (SAMPLE_PX.as_vec2() * scale).round().as_uvec2();
+        if smaller != SAMPLE_PX {
+            all.push(of_method(subject, METHODS[place], smaller, quick)?);
+            progress.inc(1);
+        }
+    }
     progress.finish_and_clear();
     Ok(all)
 }
@@ -64,7 +71,7 @@ fn of_method(
         .iter()
         .map(|name| truth.evaluate_timed_on(name.parse()?, VIEWS, 1))
         .collect::<anyhow::Result<_>>()?;
-    Ok(Reconstructed { sampling, size_px, samples, rows })
+    Ok(Reconstructed { sampling, size_px, samples, unheld: truth.unheld()?, rows })
 }
 
 impl Reconstructed {
@@ -100,13 +107,14 @@ pub fn reconstructions_report(scenes: &[(String, Vec<Reconstructed>)], report: &
         ("FLIP of covered pixels", ""),
         ("wrong hits", "%"),
         ("unknown", "%"),
+        ("not held by any image", "%"),
     ];
     let mut table = Table::new("Sampling and reconstruction", &columns);
     for (scene, all) in scenes {
         for of_sampling in all {
             for row in &of_sampling.rows {
                 let head = [scene.clone().into(), of_sampling.name().into(), row.method.to_string().into()];
-                let shares = [row.wrong_hits, row.unknown].map(|share| 100.0 * share);
+                let shares = [row.wrong_hits, row.unknown, of_sampling.unheld].map(|share| 100.0 * share);
                 let numbers = [of_sampling.samples as f64, row.ms_a_view, row.psnr_db, row.flip, row.flip_covered];
                 table.push(head.into_iter().chain(numbers.into_iter().chain(shares).map(Cell::from)))?;
             }
@@ -131,12 +139,27 @@ fn chart(scene: &str, all: &[Reconstructed]) -> XyChart {
 
 fn checks(scenes: &[(String, Vec<Reconstructed>)]) -> Vec<Check> {
     let apart = |all: &[Reconstructed], of: fn(&Reconstructed) -> f64| {
-        let non_redundant =
-            all.iter().filter(|r| matches!(r.sampling, SamplingMethod::NonRedundant(_) | SamplingMethod::Useful(_)));
+        let non_redundant = all[..METHODS.len()]
+            .iter()
+            .filter(|r| !matches!(r.sampling, SamplingMethod::Conventional | SamplingMethod::DepthPeeling { .. }));
         non_redundant.map(of).fold(f64::INFINITY, f64::min)
     };
     let mut checks = Vec::new();
+    let unheld = |all: &[Reconstructed]| apart(all, |r| r.unheld) / all[0].unheld;
+    let mean = scenes.iter().map(|(_, all)| unheld(all)).sum::<f64>() / scenes.len() as f64;
+    checks.push(Check::new(
+        "pixels of views that no image holds, non_redundant over conventional, mean of the scenes",
+        mean,
+        "×",
+        Bar::AtMost(0.75),
+    ));
     for (scene, all) in scenes {
+        checks.push(Check::new(
+            format!("{scene}: pixels of views that no image holds, non_redundant over conventional"),
+            unheld(all),
+            "×",
+            Bar::AtMost(1.0),
+        ));
         let ratio = apart(all, Reconstructed::covered_flip) / all[0].covered_flip();
         checks.push(Check::new(
             format!("{scene}: FLIP of covered pixels, non_redundant over conventional"),

@@ -1,10 +1,11 @@
 //! Fig. 7: redundancy by pixel comes to redundancy by visibility as images grow.
 
 use glam::UVec2;
+use metrics::Held;
 use sampling::{Redundancy, SamplingMethod};
 use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
-use super::counts::image_counts;
+use super::counts::{ImageCount, image_counts, mark_useful};
 use super::subject::WITH_IDS;
 use super::visibility::seen;
 use super::{Extent, METHODS, Subject};
@@ -14,12 +15,16 @@ const SIDES_PX: [u32; 4] = [256, 512, 1024, 2048];
 /// As in the paper.
 const SCENES: [&str; 2] = ["bird-nest", "urban"];
 
-/// Of one size, means over images 1 and 2, in per cent: redundant of conventional images, and disoccluded of
-/// non-redundant ones, by pixel and by visibility.
+/// Views between the viewpoints, of the images' size, that say what is useful.
+const VIEWS: usize = 24;
+
+/// Of one size, means over images 1 and 2, in per cent, by pixel and by visibility: redundant of conventional images,
+/// disoccluded of non-redundant ones, and useful of these.
 pub struct SizeRow {
     side_px: u32,
     redundant: [f64; 2],
     disoccluded: [f64; 2],
+    useful: [f64; 2],
 }
 
 /// Its name, and its values by pixel and by visibility.
@@ -43,10 +48,14 @@ pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<V
         let methods = [METHODS[0], METHODS[1], SamplingMethod::NonRedundant(Redundancy::Visibility)];
         let take = |method| subject.sample(method, size_px, WITH_IDS);
         let [whole, apart, by_rays] = [take(methods[0])?, take(methods[1])?, take(methods[2])?];
-        let by_visibility = |method, set: &[_]| seen(&rays, method, set, &viewpoints, &[], extent.seeds);
-        let redundant = by_visibility(methods[0], &whole);
-        let disoccluded = by_visibility(methods[2], &by_rays);
-        let counts = image_counts(&[whole, apart]);
+        let views = subject.between(VIEWS, size_px);
+        let redundant = seen(&rays, methods[0], &whole, &viewpoints, &[], extent.seeds);
+        let disoccluded = seen(&rays, methods[2], &by_rays, &viewpoints, &views, extent.seeds);
+        let mut counts = image_counts(&[whole, apart]);
+        subject.each_frame(&views, |frames| {
+            frames.iter().filter_map(Held::of).for_each(|frame| mark_useful(&mut counts, &frame));
+            Ok(())
+        })?;
         let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / (super::IMAGES - 1) as f64;
         let share = |part: usize, whole: usize| 100.0 * part as f64 / whole as f64;
         rows.push(SizeRow {
@@ -58,6 +67,10 @@ pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<V
             disoccluded: [
                 mean(&mut counts[1][1..].iter().map(|c| share(c.disoccluded.len(), c.samples))),
                 mean(&mut disoccluded[1..].iter().map(|seen| 100.0 * seen.disoccluded.share)),
+            ],
+            useful: [
+                mean(&mut counts[1][1..].iter().map(|c: &ImageCount| share(c.useful_count(), c.disoccluded.len()))),
+                mean(&mut disoccluded[1..].iter().map(|seen| 100.0 * seen.useful.share)),
             ],
         });
         progress.inc(1);
@@ -78,16 +91,19 @@ pub fn sizes_report(scene: &str, rows: &[SizeRow], report: &mut Report) -> anyho
         ("redundant by visibility", "%"),
         ("disoccluded by pixel", "%"),
         ("disoccluded by visibility", "%"),
+        ("useful, of these, by pixel", "%"),
+        ("by visibility", "%"),
     ];
     let mut table = Table::new(format!("Fig. 7, {scene}"), &columns);
     for row in rows {
-        let cells = row.redundant.into_iter().chain(row.disoccluded).map(Cell::from);
+        let cells = row.redundant.into_iter().chain(row.disoccluded).chain(row.useful).map(Cell::from);
         table.push([row.side_px.into()].into_iter().chain(cells))?;
     }
     report.tables.push(table);
     let redundant: Metric = ("redundant", |row| row.redundant);
     let disoccluded: Metric = ("disoccluded", |row| row.disoccluded);
-    for (what, of) in [redundant, disoccluded] {
+    let useful: Metric = ("useful", |row| row.useful);
+    for (what, of) in [redundant, disoccluded, useful] {
         let axes = (Axis::log("side of images", "px"), Axis::linear(what, "%"));
         let line = |name: &str, place: usize| {
             Series::line(name, rows.iter().map(move |row| (f64::from(row.side_px), of(row)[place])))
