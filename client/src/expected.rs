@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use depth_image::ViewPlanes;
-use wire::{FrameHeader, SampleSetId};
+use wire::FrameHeader;
 
 use crate::{ClientError, ViewRequest};
 
@@ -11,7 +11,6 @@ use crate::{ClientError, ViewRequest};
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Due {
     request: ViewRequest,
-    sample_set_id: SampleSetId,
     came: bool,
 }
 
@@ -27,12 +26,12 @@ impl Expected {
     /// # Errors
     /// For a frame number that is given twice.
     pub(crate) fn new(
-        requests: impl IntoIterator<Item = (ViewRequest, SampleSetId)>,
+        requests: impl IntoIterator<Item = ViewRequest>,
         planes: ViewPlanes,
     ) -> Result<Self, ClientError> {
         let mut due = HashMap::new();
-        for (request, sample_set_id) in requests {
-            if due.insert(request.frame, Due { request, sample_set_id, came: false }).is_some() {
+        for request in requests {
+            if due.insert(request.frame, Due { request, came: false }).is_some() {
                 return Err(ClientError::Invalid {
                     field: "frame",
                     reason: format!("{} is asked for twice", request.frame),
@@ -50,10 +49,11 @@ impl Expected {
         if due.came {
             return Err(unexpected("came twice".to_owned()));
         }
-        if header.sample_set_id != due.sample_set_id {
+        // Of whichever plan: the call that it came by has checked that.
+        if header.sample_set_id.index != u64::from(due.request.set_index) {
             return Err(unexpected(format!(
                 "shows sample set {} in place of {}",
-                header.sample_set_id, due.sample_set_id
+                header.sample_set_id, due.request.set_index
             )));
         }
         let planes =
@@ -83,9 +83,9 @@ impl Expected {
 mod tests {
     use super::*;
     use depth_image::PinholeCamera;
-    use wire::{FrameCodec, StageTimes};
+    use wire::{FrameCodec, SampleSetId, StageTimes};
 
-    fn request(frame: u64) -> (ViewRequest, SampleSetId) {
+    fn request(frame: u64) -> ViewRequest {
         let camera = PinholeCamera::looking_at(
             [0.0, 0.0, 1.0].into(),
             [0.0; 3].into(),
@@ -93,7 +93,7 @@ mod tests {
             1.0,
             [8, 8].into(),
         );
-        (ViewRequest { frame, set_index: 0, camera }, SampleSetId { plan_epoch: 1, index: 0 })
+        ViewRequest { frame, set_index: 0, camera }
     }
 
     fn header(index: u64) -> FrameHeader {

@@ -6,6 +6,7 @@
 mod error;
 mod expected;
 mod frames;
+mod live;
 mod session;
 
 use std::time::Duration;
