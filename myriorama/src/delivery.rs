@@ -90,5 +90,5 @@ pub async fn receive(
     }
     let seconds = start.elapsed().as_secs_f64();
     frames.sort_by_key(|frame| frame.request.frame);
-    Ok(Delivered { plan: session.plan().clone(), seconds, frames })
+    Ok(Delivered { plan: session.plan(), seconds, frames })
 }

@@ -16,6 +16,7 @@ pub mod evaluate;
 pub mod exit;
 pub mod experiment;
 pub mod lighting_study;
+pub mod live;
 pub mod pictures;
 pub mod process;
 pub mod progress;

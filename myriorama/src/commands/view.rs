@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use clap::Args;
-use client::{Client, Frame};
+use client::{Client, Frame, Session};
 use depth_image::{Camera, PinholeCamera, ViewPlanes};
 use indicatif::ProgressBar;
 use reconstruction::ReconstructionMethod;
@@ -18,6 +18,7 @@ use crate::cameras::{self, NamedCamera, Placement};
 use crate::comparison;
 use crate::delivery::{Wishes, open, receive};
 use crate::exit::{BadInput, Outcome};
+use crate::live::{self, Drive};
 use crate::pictures;
 use crate::process::runtime;
 use crate::rig::ViewCell;
@@ -74,6 +75,24 @@ pub struct ViewArgs {
     /// Seconds between moments
     #[arg(long, default_value_t = 1.0 / 30.0, value_name = "S")]
     frame_step: f64,
+    /// Move along the views as a viewer does, at --rate for --seconds, and print where frames' time went; every frame
+    /// is in live.csv in --out, none is a picture
+    #[arg(long, conflicts_with_all = ["compare", "depth", "provenance"])]
+    live: bool,
+    /// With --live: poses a second
+    #[arg(long, default_value_t = 10.0, value_name = "HZ", value_parser = rate)]
+    rate: f64,
+    /// With --live: for how long
+    #[arg(long, default_value_t = 10.0, value_name = "S", value_parser = duration)]
+    seconds: f64,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|hz| (0.01..=1000.0).contains(hz)).ok_or_else(|| "expected 0.01 to 1000".to_owned())
+}
+
+fn duration(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|s| (0.1..=86_400.0).contains(s)).ok_or_else(|| "expected 0.1 to 86400".to_owned())
 }
 
 /// Which views: one of these; an orbit of 24 without any.
@@ -163,9 +182,13 @@ async fn view(args: ViewArgs) -> anyhow::Result<Outcome> {
     let cameras = args.which.cameras(&offer, args.size)?;
     let folder = &args.out;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
-    let session = open(&client, &wishes(&args, &offer), &cameras).await?;
+    let views = if args.live { &cameras[..1] } else { &cameras[..] };
+    let session = open(&client, &wishes(&args, &offer), views).await?;
     let plan = session.plan();
     println!("plan {}: {}", plan.assignment.plan_epoch, plan.reason);
+    if args.live {
+        return live(&args, &session, cameras).await;
+    }
     let progress = ProgressBar::new(cameras.len() as u64 * u64::from(args.frames));
     let delivered = receive(&session, &cameras, |_| progress.inc(1)).await?;
     progress.finish_and_clear();
@@ -186,6 +209,21 @@ async fn view(args: ViewArgs) -> anyhow::Result<Outcome> {
         let path = folder.join("comparison.csv");
         std::fs::write(&path, table.to_csv()?).with_context(|| format!("cannot write {}", path.display()))?;
     }
+    Ok(Outcome::Done)
+}
+
+async fn live(args: &ViewArgs, session: &Session, path: Vec<PinholeCamera>) -> anyhow::Result<Outcome> {
+    let drive = Drive {
+        path,
+        rate_hz: args.rate,
+        lasting: Duration::from_secs_f64(args.seconds),
+        set_step_s: args.frame_step,
+        set_count: args.frames,
+    };
+    let record = live::drive(session, &drive).await?;
+    let file = args.out.join("live.csv");
+    std::fs::write(&file, record.frames()?.to_csv()?).with_context(|| format!("cannot write {}", file.display()))?;
+    println!("{}\n\n{}", text_table::text(&record.latencies()?), record.summary());
     Ok(Outcome::Done)
 }
 
