@@ -6,7 +6,7 @@ use std::thread::available_parallelism;
 use std::time::Instant;
 
 use depth_image::View;
-use node::{DirectWork, Engine, ViewWork, blocking};
+use node::{DirectWork, Engine, NodeMetrics, ViewWork, blocking};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tonic::Status;
 use wire::{FramePart, StageTimes, encode_view};
@@ -18,7 +18,11 @@ use crate::output::Output;
 const BATCHES_BEHIND: usize = 2;
 
 /// Runs until every sender is gone.
-pub(crate) async fn render_loop(engine: Arc<dyn Engine>, mut arrivals: mpsc::Receiver<Vec<Waiting>>) {
+pub(crate) async fn render_loop(
+    engine: Arc<dyn Engine>,
+    mut arrivals: mpsc::Receiver<Vec<Waiting>>,
+    metrics: NodeMetrics,
+) {
     let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
     let behind = Arc::new(Semaphore::new(BATCHES_BEHIND));
     let mut waiting = VecDeque::new();
@@ -31,7 +35,7 @@ pub(crate) async fn render_loop(engine: Arc<dyn Engine>, mut arrivals: mpsc::Rec
         while let Ok(views) = arrivals.try_recv() {
             waiting.extend(views);
         }
-        waiting.retain(|view| !view.reply.is_closed());
+        waiting.retain(|view| still_wanted(view, &metrics));
         let batch = take_batch(&mut waiting, |view: &Waiting| &view.key);
         if batch.is_empty() {
             continue;
@@ -39,19 +43,39 @@ pub(crate) async fn render_loop(engine: Arc<dyn Engine>, mut arrivals: mpsc::Rec
         let Ok(place) = behind.clone().acquire_owned().await else {
             return;
         };
-        render(&engine, batch, encoders.clone(), place).await;
+        render(&engine, batch, encoders.clone(), place, &metrics).await;
     }
 }
 
-async fn render(engine: &Arc<dyn Engine>, batch: Vec<Waiting>, encoders: Arc<Semaphore>, place: OwnedSemaphorePermit) {
+fn still_wanted(view: &Waiting, metrics: &NodeMetrics) -> bool {
+    let wanted = !view.reply.is_closed();
+    if !wanted {
+        metrics.drop_view("client gone");
+    }
+    wanted
+}
+
+async fn render(
+    engine: &Arc<dyn Engine>,
+    batch: Vec<Waiting>,
+    encoders: Arc<Semaphore>,
+    place: OwnedSemaphorePermit,
+    metrics: &NodeMetrics,
+) {
     let start = Instant::now();
     match make(engine, &batch).await {
         Ok(views) => {
             let reconstruct_s = start.elapsed().as_secs_f64() / batch.len() as f64;
+            metrics.views.inc_by(batch.len() as u64);
+            for view in &batch {
+                metrics.view_s.observe(reconstruct_s);
+                metrics.queue_s.observe(start.saturating_duration_since(view.since).as_secs_f64());
+            }
             tokio::spawn(encode_all(batch, views, start, reconstruct_s, encoders, place));
         }
         Err(status) => {
             for view in batch {
+                metrics.drop_view("device failed");
                 // Full or gone: then the stream has ended already.
                 let _ = view.reply.try_send(Err(status.clone()));
             }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use node::{CurrentPlan, Deadlines, Engine, NodeConfig, next_within, until_drained};
+use node::{CurrentPlan, Deadlines, Engine, NodeConfig, NodeMetrics, next_within, until_drained};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
@@ -33,16 +33,24 @@ struct Shared {
     sets: Arc<Sets>,
     arrivals: mpsc::Sender<Vec<Waiting>>,
     deadlines: Deadlines,
+    metrics: NodeMetrics,
 }
 
 impl CompositorService {
     /// Of a node. Starts the device's loop, which ends with the service.
     #[must_use]
-    pub fn new(engine: Arc<dyn Engine>, plan: CurrentPlan, config: &NodeConfig, shutdown: CancellationToken) -> Self {
+    pub fn new(
+        engine: Arc<dyn Engine>,
+        plan: CurrentPlan,
+        config: &NodeConfig,
+        metrics: NodeMetrics,
+        shutdown: CancellationToken,
+    ) -> Self {
         let (arrivals, arriving) = mpsc::channel(ARRIVALS);
-        tokio::spawn(render_loop(engine.clone(), arriving));
-        let sets = Arc::new(Sets::new(engine, config.deadlines));
-        Self { shared: Arc::new(Shared { plan, sets, arrivals, deadlines: config.deadlines }), shutdown }
+        tokio::spawn(render_loop(engine.clone(), arriving, metrics.clone()));
+        let sets = Arc::new(Sets::new(engine, config.deadlines, metrics.clone()));
+        let shared = Shared { plan, sets, arrivals, deadlines: config.deadlines, metrics };
+        Self { shared: Arc::new(shared), shutdown }
     }
 }
 
@@ -69,10 +77,12 @@ struct ClientStream {
 
 impl ClientStream {
     async fn run(self, mut requests: Messages<RenderViews>) {
+        self.shared.metrics.streams.inc();
         let ended = tokio::select! {
             ended = self.answer(&mut requests) => ended,
             () = self.reply.closed() => Ok(()),
         };
+        self.shared.metrics.streams.dec();
         if let Err(status) = ended {
             tracing::debug!(reason = status.message(), "a client's stream ends");
             // Full or gone: the client then sees the end without a reason.

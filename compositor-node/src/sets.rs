@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use node::{Connections, Deadlines, Engine, UploadedSet, blocking};
+use node::{Connections, Deadlines, Engine, NodeMetrics, UploadedSet, blocking};
 use tokio::sync::OnceCell;
 use tonic::Status;
 use wire::{Assignment, SetContent};
@@ -24,12 +24,13 @@ pub(crate) struct Sets {
     engine: Arc<dyn Engine>,
     connections: Arc<Connections>,
     deadlines: Deadlines,
+    metrics: NodeMetrics,
     kept: Mutex<VecDeque<(SetContent, Cell)>>,
 }
 
 impl Sets {
-    pub(crate) fn new(engine: Arc<dyn Engine>, deadlines: Deadlines) -> Self {
-        Self { engine, connections: Arc::default(), deadlines, kept: Mutex::default() }
+    pub(crate) fn new(engine: Arc<dyn Engine>, deadlines: Deadlines, metrics: NodeMetrics) -> Self {
+        Self { engine, connections: Arc::default(), deadlines, metrics, kept: Mutex::default() }
     }
 
     /// A set, once it is completely there; those after it are then fetched ahead, so that samplers
@@ -85,6 +86,8 @@ impl Sets {
         let fetched_s = start.elapsed().as_secs_f64();
         let engine = self.engine.clone();
         let ready = blocking(move || engine.upload(&set)).await?;
+        self.metrics.sets_loaded.inc();
+        self.metrics.set_s.observe(start.elapsed().as_secs_f64());
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
         Ok(ready)
     }

@@ -3,6 +3,7 @@
 //! [`schedule`] decides and does nothing else: no clock, no await. `service` asks it and does the rest.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod carrying_out;
 mod config;
 mod opening;
 pub mod schedule;

@@ -1,4 +1,4 @@
-//! From a request to a plan that all nodes are ready for.
+//! From a request to a session whose costs are known.
 
 use std::collections::BTreeMap;
 use std::future::Future;
@@ -6,14 +6,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::mpsc;
-use tokio::task::JoinSet;
 use tonic::Status;
 use wire::rpc::NodeClient;
-use wire::{
-    Assignment, Costs, MeasureCosts, NodeStatus, Ready, SessionEvent, SessionPlan, SessionRequest, SessionStage,
-};
+use wire::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage};
 
-use crate::schedule::{Command, Event, Opening};
+use crate::schedule::{Event, Opening};
 use crate::service::Inner;
 use crate::workload::workload_of;
 
@@ -25,31 +22,27 @@ const KEPT_COSTS: usize = 16;
 
 pub(crate) type Events = mpsc::Sender<Result<SessionEvent, Status>>;
 
-/// Opens a session; what it says comes through `events`.
+/// Measures what a session costs, and hands it to the schedule; its plans come through `events`, as do refusals.
 pub(crate) async fn open(inner: Arc<Inner>, session: u64, request: SessionRequest, events: Events) {
-    // One at a time: costs are measured with nothing else running.
-    let opened = {
-        let _one = inner.opening.lock().await;
-        tokio::select! {
-            opened = plan(&inner, session, request, &events) => opened,
-            () = events.closed() => Err(Status::cancelled("the client went away")),
-        }
+    let opened = tokio::select! {
+        opened = measured_opening(&inner, session, request, &events) => opened,
+        () = events.closed() => return,
     };
-    let event = opened.map(|plan| SessionEvent::Plan(Box::new(plan))).inspect_err(|status| {
-        tracing::warn!(session, reason = status.message(), "session refused");
-        inner.step(Event::Closed { session });
-        inner.forget(session);
-    });
-    // An error means a client that left: its guard closes the session.
-    let _ = events.send(event).await;
+    match opened {
+        Ok(opening) => {
+            say(&events, SessionStage::Planning, "choosing who samples and who reconstructs".to_owned()).await;
+            inner.step(Event::Opened(Box::new(opening)));
+        }
+        Err(status) => inner.refuse(session, status),
+    }
 }
 
-async fn plan(
+async fn measured_opening(
     inner: &Arc<Inner>,
     session: u64,
     request: SessionRequest,
     events: &Events,
-) -> Result<SessionPlan, Status> {
+) -> Result<Opening, Status> {
     let workload = workload_of(&request, &inner.offer)?;
     let measure = MeasureCosts {
         workload,
@@ -57,22 +50,19 @@ async fn plan(
         batch_count: request.views_per_set.min(MEASURED_BATCH),
         planes: request.planes,
     };
-    let costs = measured(inner, &measure, events).await?;
-    say(events, SessionStage::Planning, "choosing between pipeline and direct".to_owned()).await;
-    let opening = Opening {
+    // One at a time: costs are measured with nothing else being measured.
+    let costs = {
+        let _one = inner.measuring.lock().await;
+        measured(inner, &measure, events).await?
+    };
+    Ok(Opening {
         session,
         workload: measure.workload,
         views_per_set: request.views_per_set as usize,
         policy: request.policy,
         forced_samplers: request.forced_sampler_count.map(|count| count as usize),
         costs,
-    };
-    let (mut plan, addresses) = planned(inner, opening)?;
-    say(events, SessionStage::Preparing, format!("{} nodes take plan {}", addresses.len(), plan.assignment.plan_epoch))
-        .await;
-    plan.scene_load_s = apply(inner, &plan.assignment, addresses).await?;
-    tracing::info!(session, plan_epoch = plan.assignment.plan_epoch, reason = plan.reason, "planned");
-    Ok(plan)
+    })
 }
 
 async fn say(events: &Events, stage: SessionStage, detail: String) {
@@ -107,42 +97,11 @@ async fn measure_on(inner: &Inner, node: &NodeStatus, measure: MeasureCosts) -> 
     within(inner.config.measure_deadline, "measuring", call).await.map_err(|status| named(&node.node_name, &status))
 }
 
-fn planned(inner: &Arc<Inner>, opening: Opening) -> Result<(SessionPlan, Vec<String>), Status> {
-    let mut planned = Err(Status::internal("the schedule said nothing"));
-    for command in inner.step(Event::Opened(Box::new(opening))) {
-        match command {
-            Command::Apply { plan, addresses, .. } => planned = Ok((*plan, addresses)),
-            Command::Refuse { error, .. } => planned = Err(Status::failed_precondition(error.to_string())),
-            Command::End { .. } => (),
-        }
-    }
-    planned
-}
-
-/// Tells every node; the time of the one that took longest to load the scene.
-async fn apply(inner: &Arc<Inner>, assignment: &Assignment, addresses: Vec<String>) -> Result<f64, Status> {
-    let mut calls = JoinSet::new();
-    for address in addresses {
-        let (inner, assignment) = (inner.clone(), assignment.clone());
-        calls.spawn(async move {
-            let call =
-                async { NodeClient::new(inner.connections.to(&address).await?).apply_assignment(assignment).await };
-            within(inner.config.ready_deadline, "getting ready", call).await.map_err(|status| named(&address, &status))
-        });
-    }
-    let mut slowest_s = 0f64;
-    while let Some(ready) = calls.join_next().await {
-        let Ready { scene_load_s, .. } = ready.map_err(|error| Status::internal(error.to_string()))??;
-        slowest_s = slowest_s.max(scene_load_s);
-    }
-    Ok(slowest_s)
-}
-
-async fn within<T>(deadline: Duration, what: &str, call: impl Future<Output = Result<T, Status>>) -> Result<T, Status> {
+pub(crate) async fn within<T>(deadline: Duration, what: &str, call: impl Future<Output = Result<T, Status>>) -> Result<T, Status> {
     let late = |_| Status::deadline_exceeded(format!("{what} took longer than {} s", deadline.as_secs()));
     tokio::time::timeout(deadline, call).await.map_err(late)?
 }
 
-fn named(node: &str, status: &Status) -> Status {
+pub(crate) fn named(node: &str, status: &Status) -> Status {
     Status::new(status.code(), format!("node {node}: {}", status.message()))
 }

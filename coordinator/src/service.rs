@@ -3,10 +3,12 @@
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use node::{Connections, ServeError, health, until_drained, with_guard};
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
+use tokio::task::JoinSet;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
@@ -19,12 +21,15 @@ use wire::{
     Welcome,
 };
 
+use crate::carrying_out::carry_out;
 use crate::opening::{Events, open};
-use crate::schedule::{ClusterState, Command, Event};
+use crate::schedule::{Command, Event, Scheduler};
 use crate::{CoordinatorConfig, SceneOffer};
 
 /// Events that a session's client has not read yet.
-const SESSION_EVENTS: usize = 16;
+const SESSION_EVENTS: usize = 64;
+/// How often the schedule looks again though nothing has happened.
+const TICK: Duration = Duration::from_millis(250);
 
 /// Serves until `shutdown`; then ends its streams and returns when connections have ended, after 10 s at
 /// most.
@@ -37,19 +42,33 @@ pub async fn serve(
     offer: SceneOffer,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
+    let (commands, to_do) = mpsc::unbounded_channel();
     let inner = Arc::new(Inner {
         config,
         offer,
         connections: Connections::default(),
-        opening: tokio::sync::Mutex::default(),
-        state: Mutex::default(),
+        measuring: tokio::sync::Mutex::default(),
+        started: Instant::now(),
+        scheduler: Mutex::default(),
+        commands,
         sessions: Mutex::default(),
         costs: Mutex::default(),
         counter: AtomicU64::new(1),
     });
+    let mut running = JoinSet::new();
+    running.spawn(carry_out(inner.clone(), to_do));
+    running.spawn(tick(inner.clone()));
     let service = CoordinatorService { inner, shutdown: shutdown.clone() };
     let routes = Routes::new(health(&["coordinator"]).await).add_service(coordinator_server(service));
     node::serve(listener, routes, config.insecure_bind, shutdown).await
+}
+
+async fn tick(inner: Arc<Inner>) {
+    let mut ticks = tokio::time::interval(TICK);
+    loop {
+        ticks.tick().await;
+        inner.step(Event::Tick);
+    }
 }
 
 /// What all calls share.
@@ -57,9 +76,12 @@ pub(crate) struct Inner {
     pub(crate) config: CoordinatorConfig,
     pub(crate) offer: SceneOffer,
     pub(crate) connections: Connections,
-    pub(crate) opening: tokio::sync::Mutex<()>,
-    state: Mutex<ClusterState>,
+    pub(crate) measuring: tokio::sync::Mutex<()>,
+    started: Instant,
+    scheduler: Mutex<Scheduler>,
+    commands: mpsc::UnboundedSender<Command>,
     sessions: Mutex<HashMap<u64, Events>>,
+    /// Of each device and what was measured, the oldest first.
     costs: Mutex<Vec<(String, MeasureCosts, Costs)>>,
     counter: AtomicU64,
 }
@@ -69,32 +91,45 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Inner {
-    /// Tells the schedule, and the sessions that end by it; the other commands are the caller's.
-    pub(crate) fn step(&self, event: Event) -> Vec<Command> {
-        let commands = locked(&self.state).step(event);
-        for command in &commands {
-            if let Command::End { session, reason } = command {
-                self.end(*session, reason);
-            }
+    /// Tells the schedule; what follows is carried out in its order.
+    pub(crate) fn step(&self, event: Event) {
+        let mut scheduler = locked(&self.scheduler);
+        for command in scheduler.step(self.started.elapsed(), event) {
+            // Nobody listens any more only at the end.
+            let _ = self.commands.send(command);
         }
-        commands
     }
 
-    fn end(&self, session: u64, reason: &str) {
+    /// Ends a session that cannot be.
+    pub(crate) fn refuse(&self, session: u64, status: Status) {
+        tracing::warn!(session, reason = status.message(), "session refused");
+        if let Some(events) = locked(&self.sessions).remove(&session) {
+            let _ = events.try_send(Err(status));
+        }
+        self.step(Event::Closed { session });
+    }
+
+    pub(crate) fn end(&self, session: u64, reason: &str) {
         tracing::warn!(session, reason, "session ended");
-        let Some(events) = locked(&self.sessions).remove(&session) else {
-            return;
-        };
-        // Full only where the client does not read; its calls then fail at the nodes.
-        let _ = events.try_send(Ok(SessionEvent::Ended { reason: reason.to_owned() }));
+        self.say(session, SessionEvent::Ended { reason: reason.to_owned() });
+        self.forget(session);
+    }
+
+    /// To a client that does not read what it is told nothing more is said: its session ends.
+    pub(crate) fn say(&self, session: u64, event: SessionEvent) {
+        let full = locked(&self.sessions).get(&session).is_some_and(|events| events.try_send(Ok(event)).is_err());
+        if full {
+            self.forget(session);
+        }
     }
 
     pub(crate) fn forget(&self, session: u64) {
         locked(&self.sessions).remove(&session);
     }
 
+    /// The cluster as it is.
     pub(crate) fn status(&self) -> ClusterStatus {
-        locked(&self.state).status()
+        locked(&self.scheduler).status()
     }
 
     pub(crate) fn kept_costs(&self, device: &str, measure: &MeasureCosts) -> Option<Costs> {

@@ -3,7 +3,7 @@
 use clap::{Args, Parser, Subcommand};
 use gpu::DevicePreference;
 
-use crate::commands::{bench, coordinator, demo, node, study, up, view};
+use crate::commands::{bench, coordinator, demo, health, node, status, study, up, view};
 use crate::exit::Outcome;
 
 /// Many views of one scene from a few depth images.
@@ -31,7 +31,7 @@ The same on several machines or terminals:
   myriorama node --coordinator http://127.0.0.1:7420  one on each
   myriorama view --coordinator http://127.0.0.1:7420 --orbit 24 --out out/orbit
 
-Exit status: 0 done; 1 a check fell short under --strict; 2 arguments or input that cannot be used; 3 a failure
+Exit status: 0 done; 1 a check that was asked for fell short; 2 arguments or input that cannot be used; 3 a failure
 at run time. RUST_LOG=info (or debug) says what is going on.";
 
 /// What the program does.
@@ -45,6 +45,10 @@ pub enum Command {
     Node(node::NodeArgs),
     /// Ask a cluster for views and write them as pictures
     View(view::ViewArgs),
+    /// Show a cluster's nodes, their roles, and why they have them
+    Status(status::StatusArgs),
+    /// Ask a coordinator or a node whether it serves
+    Health(health::HealthArgs),
     /// Run the paper's experiment on this machine and write a report
     Demo(demo::DemoArgs),
     /// Measure speed and accuracy against what is promised, and write a report
@@ -73,6 +77,8 @@ impl Command {
             Self::Coordinator(args) => coordinator::run(args),
             Self::Node(args) => node::run(args),
             Self::View(args) => view::run(args),
+            Self::Status(args) => status::run(&args),
+            Self::Health(args) => health::run(&args),
             Self::Demo(args) => demo::run(&args),
             Self::Bench(args) => bench::run(&args),
             Self::Study(command) => command.run(),

@@ -50,7 +50,13 @@ impl Cluster {
         let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
         // As many digits as sort well: members are listed by name.
         let config = NodeConfig::new(format!("node-{number:03}"), &self.address);
-        self.servers.spawn(node_host::serve(listener, config, engine, self.shutdown.clone()));
+        self.servers.spawn(node_host::serve(
+            listener,
+            config,
+            engine,
+            NodeMetrics::default(),
+            self.shutdown.clone(),
+        ));
         Ok(())
     }
 

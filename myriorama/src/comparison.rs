@@ -13,11 +13,11 @@ struct Errors {
     flip: f64,
 }
 
-/// A row a view, then their mean and the worst of each column.
+/// A row a view, then their mean and the worst of each column; and the worst PSNR.
 ///
 /// # Errors
 /// When views are not of one size.
-pub fn table(truth: &[Frame], delivered: &[Frame]) -> anyhow::Result<Table> {
+pub fn table(truth: &[Frame], delivered: &[Frame]) -> anyhow::Result<(Table, f64)> {
     let columns = [("view", ""), ("PSNR", "dB"), ("SSIM", ""), ("FLIP", "")];
     let mut table = Table::new("Against views drawn directly", &columns);
     let errors = truth.iter().zip(delivered).map(errors).collect::<anyhow::Result<Vec<_>>>()?;
@@ -31,7 +31,7 @@ pub fn table(truth: &[Frame], delivered: &[Frame]) -> anyhow::Result<Table> {
     for (name, numbers) in [("mean", means), ("worst", worst)] {
         table.push([name.into()].into_iter().chain(numbers.map(Into::into)))?;
     }
-    Ok(table)
+    Ok((table, worst[0]))
 }
 
 fn errors((truth, delivered): (&Frame, &Frame)) -> anyhow::Result<Errors> {

@@ -9,7 +9,7 @@ use crate::cameras::CameraFileError;
 pub enum Outcome {
     /// Everything was done.
     Done,
-    /// Done, but a check fell short and `--strict` was given.
+    /// Done, but a check that was asked for fell short: by `--strict`, `--least-psnr` or `--longest-gap`.
     FellShort,
 }
 
@@ -18,7 +18,7 @@ pub enum Outcome {
 #[error("{0}")]
 pub struct BadInput(pub String);
 
-/// 0 done, 1 a check fell short under `--strict`, 2 input that cannot be used, 3 a failure at run time.
+/// 0 done, 1 a check that was asked for fell short, 2 input that cannot be used, 3 a failure at run time.
 #[must_use]
 pub fn code_of(result: &anyhow::Result<Outcome>) -> u8 {
     match result {

@@ -3,9 +3,11 @@
 use std::net::SocketAddr;
 
 use anyhow::Context as _;
+use node::Telemetry;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{SignalKind, signal};
+use tokio_util::sync::CancellationToken;
 
 use crate::exit::BadInput;
 
@@ -40,6 +42,24 @@ pub async fn listen(address: SocketAddr, insecure_bind: bool) -> anyhow::Result<
         return Err(BadInput(reason).into());
     }
     TcpListener::bind(address).await.with_context(|| format!("cannot listen on {address}"))
+}
+
+/// Serves a process's metrics until `shutdown`, where an address is given.
+///
+/// # Errors
+/// As [`listen`].
+pub async fn serve_metrics(
+    address: Option<SocketAddr>,
+    insecure_bind: bool,
+    telemetry: Telemetry,
+    shutdown: CancellationToken,
+) -> anyhow::Result<()> {
+    if let Some(address) = address {
+        let listener = listen(address, insecure_bind).await?;
+        println!("metrics at http://{}/metrics", listener.local_addr()?);
+        tokio::spawn(telemetry.serve(listener, shutdown));
+    }
+    Ok(())
 }
 
 /// The most memory that this process has held, in MB; `None` where the system does not say.

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 use compositor_node::CompositorService;
-use node::{CurrentPlan, Engine, NodeConfig, NodeService, Scenes, ServeError, health, keep_membership};
+use node::{CurrentPlan, Engine, NodeConfig, NodeMetrics, NodeService, Scenes, ServeError, health, keep_membership};
 use sampler_node::SamplerService;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
@@ -21,14 +21,15 @@ pub async fn serve(
     listener: TcpListener,
     config: NodeConfig,
     engine: Arc<dyn Engine>,
+    metrics: NodeMetrics,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
     let plan = CurrentPlan::new(&config.node_name);
     let scenes = Arc::new(Scenes::new(engine.clone(), &config));
     let status = status_of(&config, listener.local_addr()?, engine.as_ref());
-    let sampler = SamplerService::new(engine.clone(), plan.clone(), &config, shutdown.clone());
-    let compositor = CompositorService::new(engine.clone(), plan.clone(), &config, shutdown.clone());
-    let service = NodeService::new(engine, plan.clone(), scenes.clone());
+    let sampler = SamplerService::new(engine.clone(), plan.clone(), &config, metrics.clone(), shutdown.clone());
+    let compositor = CompositorService::new(engine.clone(), plan.clone(), &config, metrics.clone(), shutdown.clone());
+    let service = NodeService::new(engine, plan.clone(), scenes.clone(), metrics);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))

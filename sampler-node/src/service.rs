@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use node::{CurrentPlan, Engine, NodeConfig, SampleWork, blocking, until_drained};
+use node::{CurrentPlan, Engine, NodeConfig, NodeMetrics, SampleWork, blocking, until_drained};
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Messages, Sampler};
@@ -16,14 +16,21 @@ pub struct SamplerService {
     engine: Arc<dyn Engine>,
     plan: CurrentPlan,
     kept: Arc<Kept>,
+    metrics: NodeMetrics,
     shutdown: CancellationToken,
 }
 
 impl SamplerService {
     /// Of a node.
     #[must_use]
-    pub fn new(engine: Arc<dyn Engine>, plan: CurrentPlan, config: &NodeConfig, shutdown: CancellationToken) -> Self {
-        Self { engine, plan, kept: Arc::new(Kept::new(config.kept_sample_bytes)), shutdown }
+    pub fn new(
+        engine: Arc<dyn Engine>,
+        plan: CurrentPlan,
+        config: &NodeConfig,
+        metrics: NodeMetrics,
+        shutdown: CancellationToken,
+    ) -> Self {
+        Self { engine, plan, kept: Arc::new(Kept::new(config.kept_sample_bytes)), metrics, shutdown }
     }
 
     /// All of this node's images of a set: the first request makes them, in one submission.
@@ -32,9 +39,9 @@ impl SamplerService {
         let content = plan.set_content(set_index).ok_or_else(beyond)?;
         let indices = plan.images_of(self.plan.node_name(), set_index).to_vec();
         let work = sample_work(plan, &indices, set_index)?.ok_or_else(beyond)?;
-        let engine = self.engine.clone();
+        let (engine, metrics) = (self.engine.clone(), self.metrics.clone());
         let key = (content, indices.clone());
-        self.kept.get(key, move || blocking(move || sample(engine.as_ref(), &work, &indices))).await
+        self.kept.get(key, move || blocking(move || sample(engine.as_ref(), &work, &indices, &metrics))).await
     }
 }
 
@@ -79,7 +86,7 @@ fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Opt
     Ok(workload.timeline.time_s(set_index).map(work))
 }
 
-fn sample(engine: &dyn Engine, work: &SampleWork, indices: &[u32]) -> Result<EncodedImages, Status> {
+fn sample(engine: &dyn Engine, work: &SampleWork, indices: &[u32], metrics: &NodeMetrics) -> Result<EncodedImages, Status> {
     let start = Instant::now();
     let images = engine.sample(work)?;
     let sampled_s = start.elapsed().as_secs_f64();
@@ -90,6 +97,9 @@ fn sample(engine: &dyn Engine, work: &SampleWork, indices: &[u32]) -> Result<Enc
         let encoded = encode_depth_image(image, PlaneSet::ALL).map_err(|error| Status::internal(error.to_string()))?;
         Ok((*index, encoded))
     };
+    let image_s = sampled_s / images.len().max(1) as f64;
+    images.iter().for_each(|_| metrics.image_s.observe(image_s));
+    metrics.images_sampled.inc_by(images.len() as u64);
     let encoded = indices.iter().zip(&images).map(encode).collect::<Result<Vec<_>, Status>>()?;
     tracing::debug!(
         images = images.len(),

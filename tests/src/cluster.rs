@@ -8,7 +8,7 @@ use client::{Client, ClientError, Session, ViewRequest};
 use coordinator::{CoordinatorConfig, SceneOffer};
 use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
-use node::NodeConfig;
+use node::{NodeConfig, NodeMetrics};
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
 use tokio_util::sync::CancellationToken;
@@ -31,8 +31,16 @@ impl Server {
     where
         F: Future<Output = Result<(), node::ServeError>> + Send + 'static,
     {
+        Self::start_at("127.0.0.1:0", serve)
+    }
+
+    /// As [`Server::start`], where another may have been.
+    fn start_at<F>(address: &str, serve: impl FnOnce(TcpListener, CancellationToken) -> F + Send + 'static) -> Self
+    where
+        F: Future<Output = Result<(), node::ServeError>> + Send + 'static,
+    {
         let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("a runtime");
-        let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+        let listener = bind(address);
         listener.set_nonblocking(true).expect("a socket option");
         let address = format!("http://{}", listener.local_addr().expect("an address"));
         let shutdown = CancellationToken::new();
@@ -66,6 +74,17 @@ impl Drop for Server {
     fn drop(&mut self) {
         self.kill();
     }
+}
+
+/// Whoever was there before may take a moment to go.
+fn bind(address: &str) -> std::net::TcpListener {
+    for _ in 0..500 {
+        if let Ok(listener) = std::net::TcpListener::bind(address) {
+            return listener;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("no port at {address}");
 }
 
 /// A coordinator and its nodes.
@@ -148,22 +167,35 @@ impl Cluster {
 
     /// As [`Cluster::start`], each node's configuration changed by `change`.
     pub async fn start_with(nodes: usize, change: impl Fn(NodeConfig) -> NodeConfig) -> Self {
-        let volume = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) };
-        let mut offer = SceneOffer::new(package(), rig(), volume, SKY_LINEAR);
-        offer.illumination = illumination();
-        let coordinator = Server::start(|listener, shutdown| {
-            coordinator::serve(listener, CoordinatorConfig::default(), offer, shutdown)
-        });
-        let engines: Vec<_> = (0..nodes).map(|_| ScalarEngine::default()).collect();
-        let start = |(i, engine): (usize, &ScalarEngine)| {
-            let config = change(NodeConfig::new(format!("n{i}"), &coordinator.address));
-            let engine = std::sync::Arc::new(engine.clone());
-            Server::start(|listener, shutdown| node_host::serve(listener, config, engine, shutdown))
-        };
-        let servers = engines.iter().enumerate().map(start).collect();
+        let coordinator = Server::start(coordinate);
         let client = connected(&coordinator.address).await;
-        client.wait_for_nodes(nodes, Duration::from_secs(10)).await.expect("joined");
-        Self { coordinator, nodes: servers, engines, client }
+        let mut cluster = Self { coordinator, nodes: Vec::new(), engines: Vec::new(), client };
+        for _ in 0..nodes {
+            cluster.add_node(&change);
+        }
+        cluster.client.wait_for_nodes(nodes, Duration::from_secs(10)).await.expect("joined");
+        cluster
+    }
+
+    /// One more node, which joins soon.
+    pub fn add_node(&mut self, change: impl Fn(NodeConfig) -> NodeConfig) {
+        let engine = ScalarEngine::default();
+        let config = change(NodeConfig::new(format!("n{}", self.nodes.len()), &self.coordinator.address));
+        self.engines.push(engine.clone());
+        self.nodes.push(Server::start(|listener, shutdown| {
+            node_host::serve(listener, config, std::sync::Arc::new(engine), NodeMetrics::default(), shutdown)
+        }));
+    }
+
+    /// Ends the coordinator without a word.
+    pub fn kill_coordinator(&mut self) {
+        self.coordinator.kill();
+    }
+
+    /// Starts one where the other was.
+    pub fn restart_coordinator(&mut self) {
+        let address = self.coordinator.address.trim_start_matches("http://").to_owned();
+        self.coordinator = Server::start_at(&address, coordinate);
     }
 
     /// An open session; what was sampled for measuring is forgotten.
@@ -184,6 +216,13 @@ impl Cluster {
         }
         all.into_values().collect()
     }
+}
+
+async fn coordinate(listener: TcpListener, shutdown: CancellationToken) -> Result<(), node::ServeError> {
+    let volume = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) };
+    let mut offer = SceneOffer::new(package(), rig(), volume, SKY_LINEAR);
+    offer.illumination = illumination();
+    coordinator::serve(listener, CoordinatorConfig::default(), offer, shutdown).await
 }
 
 async fn connected(address: &str) -> Client {

@@ -191,6 +191,7 @@ async fn only_loopback_is_served_without_being_asked() {
         listener,
         NodeConfig::new("n", "http://127.0.0.1:1"),
         engine,
+        node::NodeMetrics::default(),
         tokio_util::sync::CancellationToken::new(),
     )
     .await;

@@ -14,10 +14,12 @@ mod scenes;
 mod server;
 mod service;
 mod streams;
+mod telemetry;
 
 pub use blocking::blocking;
 pub use config::{Deadlines, NodeConfig};
 pub use connections::Connections;
+pub use telemetry::{NodeMetrics, Telemetry};
 pub use engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 pub use logging::init_logging;
 pub use measure::{MeasureError, measure_costs};

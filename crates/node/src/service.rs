@@ -1,33 +1,58 @@
 //! What every node answers: its costs, and that it is ready for a plan.
 
-use std::sync::Arc;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use tonic::{Status, async_trait};
 use wire::{Assignment, Costs, MeasureCosts, Ready, rpc};
 
-use crate::{CurrentPlan, Engine, Scenes, blocking, measure_costs};
+use crate::{CurrentPlan, Engine, NodeMetrics, Scenes, blocking, measure_costs};
+
+/// Measured costs that are kept.
+const KEPT: usize = 16;
 
 /// The node's own service.
 pub struct NodeService {
     engine: Arc<dyn Engine>,
     plan: CurrentPlan,
     scenes: Arc<Scenes>,
+    metrics: NodeMetrics,
+    /// What was measured, the oldest first: a coordinator that was restarted need not wait for it again.
+    measured: Mutex<VecDeque<(MeasureCosts, Costs)>>,
 }
 
 impl NodeService {
     /// Of a node.
     #[must_use]
-    pub fn new(engine: Arc<dyn Engine>, plan: CurrentPlan, scenes: Arc<Scenes>) -> Self {
-        Self { engine, plan, scenes }
+    pub fn new(engine: Arc<dyn Engine>, plan: CurrentPlan, scenes: Arc<Scenes>, metrics: NodeMetrics) -> Self {
+        Self { engine, plan, scenes, metrics, measured: Mutex::default() }
+    }
+
+    fn known(&self, request: &MeasureCosts) -> Option<Costs> {
+        let measured = self.measured.lock().unwrap_or_else(PoisonError::into_inner);
+        measured.iter().find(|(known, _)| known == request).map(|(_, costs)| *costs)
+    }
+
+    fn keep(&self, request: MeasureCosts, costs: Costs) {
+        let mut measured = self.measured.lock().unwrap_or_else(PoisonError::into_inner);
+        measured.push_back((request, costs));
+        while measured.len() > KEPT {
+            measured.pop_front();
+        }
     }
 }
 
 #[async_trait]
 impl rpc::Node for NodeService {
     async fn measure_costs(&self, request: MeasureCosts) -> Result<Costs, Status> {
+        if let Some(costs) = self.known(&request) {
+            return Ok(costs);
+        }
         self.scenes.ensure(&request.workload.scene).await?;
-        let engine = self.engine.clone();
-        blocking(move || measure_costs(engine.as_ref(), &request)).await
+        let (engine, measured) = (self.engine.clone(), request.clone());
+        let costs = blocking(move || measure_costs(engine.as_ref(), &measured)).await?;
+        self.keep(request, costs);
+        Ok(costs)
     }
 
     async fn apply_assignment(&self, assignment: Assignment) -> Result<Ready, Status> {
@@ -35,6 +60,7 @@ impl rpc::Node for NodeService {
         let plan_epoch = assignment.plan_epoch;
         let scene_load_s = self.scenes.ensure(&assignment.workload.scene).await?;
         self.plan.apply(assignment)?;
+        self.metrics.plan_epoch.set(i64::try_from(plan_epoch).unwrap_or(i64::MAX));
         tracing::info!(node = self.plan.node_name(), plan_epoch, "plan in force");
         Ok(Ready { plan_epoch, scene_load_s })
     }

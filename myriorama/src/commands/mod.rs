@@ -3,7 +3,9 @@
 pub mod bench;
 pub mod coordinator;
 pub mod demo;
+pub mod health;
 pub mod node;
+pub mod status;
 pub mod study;
 pub mod up;
 pub mod view;

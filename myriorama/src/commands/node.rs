@@ -4,13 +4,13 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args;
-use node::{Engine as _, NodeConfig};
+use node::{Engine as _, NodeConfig, NodeMetrics, Telemetry};
 use tokio_util::sync::CancellationToken;
 
 use crate::cli::DeviceArgs;
 use crate::engine::GpuEngine;
 use crate::exit::Outcome;
-use crate::process::{listen, runtime, stop_signal};
+use crate::process::{listen, runtime, serve_metrics, stop_signal};
 
 /// Stays a member, and joins again when the coordinator was away.
 #[derive(Debug, Args)]
@@ -32,6 +32,9 @@ pub struct NodeArgs {
     scene_folder: Option<PathBuf>,
     #[command(flatten)]
     device: DeviceArgs,
+    /// Where Prometheus reads what it counts, at /metrics
+    #[arg(long, value_name = "HOST:PORT")]
+    metrics: Option<SocketAddr>,
     /// Serve without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
@@ -58,7 +61,10 @@ async fn serve(args: NodeArgs) -> anyhow::Result<Outcome> {
         ..NodeConfig::new(name, args.coordinator)
     };
     let shutdown = CancellationToken::new();
-    let serving = node_host::serve(listener, config, engine, shutdown.clone());
+    let telemetry = Telemetry::default();
+    let metrics = NodeMetrics::new(&telemetry);
+    serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
+    let serving = node_host::serve(listener, config, engine, metrics, shutdown.clone());
     tokio::spawn(async move {
         // Without signals there is still the caller's way to end the process.
         if stop_signal().await.is_ok() {

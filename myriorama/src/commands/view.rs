@@ -59,6 +59,9 @@ pub struct ViewArgs {
     /// comparison.csv
     #[arg(long)]
     compare: bool,
+    /// With --compare: exit status 1 where a view's PSNR is below
+    #[arg(long, value_name = "DB", requires = "compare")]
+    least_psnr: Option<f64>,
     /// With --frames: begin with one ray a light and pixel and double them from frame to frame, so that the first
     /// picture is there at once
     #[arg(long)]
@@ -85,6 +88,9 @@ pub struct ViewArgs {
     /// With --live: for how long
     #[arg(long, default_value_t = 10.0, value_name = "S", value_parser = duration)]
     seconds: f64,
+    /// With --live: exit status 1 where no new frame came for longer
+    #[arg(long, value_name = "S", requires = "live")]
+    longest_gap: Option<f64>,
 }
 
 fn rate(text: &str) -> Result<f64, String> {
@@ -204,10 +210,11 @@ async fn view(args: ViewArgs) -> anyhow::Result<Outcome> {
         let direct = Wishes { policy: PolicyChoice::Direct, ..wishes(&args, &offer) };
         let session = open(&client, &direct, &cameras).await?;
         let truth = receive(&session, &cameras, |_| ()).await?;
-        let table = comparison::table(&truth.frames, &delivered.frames)?;
+        let (table, worst_psnr_db) = comparison::table(&truth.frames, &delivered.frames)?;
         println!("\n{}", text_table::text(&table));
         let path = folder.join("comparison.csv");
         std::fs::write(&path, table.to_csv()?).with_context(|| format!("cannot write {}", path.display()))?;
+        return Ok(met(args.least_psnr.is_none_or(|least| worst_psnr_db >= least)));
     }
     Ok(Outcome::Done)
 }
@@ -224,7 +231,12 @@ async fn live(args: &ViewArgs, session: &Session, path: Vec<PinholeCamera>) -> a
     let file = args.out.join("live.csv");
     std::fs::write(&file, record.frames()?.to_csv()?).with_context(|| format!("cannot write {}", file.display()))?;
     println!("{}\n\n{}", text_table::text(&record.latencies()?), record.summary());
-    Ok(Outcome::Done)
+    let gap_s = record.longest_gap_s().map_or(f64::INFINITY, |(gap_s, _)| gap_s);
+    Ok(met(args.longest_gap.is_none_or(|longest| gap_s <= longest)))
+}
+
+fn met(holds: bool) -> Outcome {
+    if holds { Outcome::Done } else { Outcome::FellShort }
 }
 
 fn wishes(args: &ViewArgs, offer: &OfferStatus) -> Wishes {

@@ -3,6 +3,7 @@
 mod channel;
 mod compositor;
 mod coordinator;
+mod health;
 mod node;
 mod sampler;
 
@@ -14,6 +15,7 @@ use tonic::{Request, Response, Status, Streaming};
 pub use channel::{CALL_TIMEOUT, KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT, connect};
 pub use compositor::{Compositor, CompositorClient, compositor_server};
 pub use coordinator::{Coordinator, CoordinatorClient, coordinator_server};
+pub use health::is_serving;
 pub use node::{Node, NodeClient, node_server};
 pub use sampler::{Sampler, SamplerClient, sampler_server};
 

@@ -1,0 +1,172 @@
+//! What a process counts, and the page at which Prometheus reads it. Base units; labels are few and bounded.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use axum::{Router, http::header, routing::get};
+use prometheus_client::encoding::{EncodeLabelSet, text::encode};
+use prometheus_client::metrics::{
+    counter::Counter,
+    family::Family,
+    gauge::Gauge,
+    histogram::{Histogram, exponential_buckets},
+};
+use prometheus_client::registry::{Registry, Unit};
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+
+const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+/// A process's metrics, by name.
+#[derive(Debug, Clone)]
+pub struct Telemetry(Arc<Mutex<Registry>>);
+
+impl Default for Telemetry {
+    fn default() -> Self {
+        Self(Arc::new(Mutex::new(Registry::with_prefix("myriorama"))))
+    }
+}
+
+impl Telemetry {
+    /// To register metrics in.
+    pub fn registry(&self) -> MutexGuard<'_, Registry> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The page, in the OpenMetrics text format.
+    #[must_use]
+    pub fn page(&self) -> String {
+        let mut page = String::new();
+        // Writing to a string does not fail.
+        let _ = encode(&mut page, &self.registry());
+        page
+    }
+
+    /// Serves the page at `/metrics` until `shutdown`.
+    ///
+    /// # Errors
+    /// The listener's.
+    pub async fn serve(self, listener: TcpListener, shutdown: CancellationToken) -> std::io::Result<()> {
+        let page = move || async move { ([(header::CONTENT_TYPE, CONTENT_TYPE)], self.page()) };
+        let router = Router::new().route("/metrics", get(page));
+        axum::serve(listener, router).with_graceful_shutdown(shutdown.cancelled_owned()).await
+    }
+}
+
+/// Why something that was made or asked for did not go out.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub struct Reason {
+    /// One of few.
+    pub reason: &'static str,
+}
+
+/// What a node counts.
+#[derive(Debug, Clone)]
+pub struct NodeMetrics {
+    /// Images sampled and encoded.
+    pub images_sampled: Counter,
+    /// Seconds an image, its light included.
+    pub image_s: Histogram,
+    /// Sample sets fetched, decoded and uploaded.
+    pub sets_loaded: Counter,
+    /// Seconds a set, fetching included.
+    pub set_s: Histogram,
+    /// Views made.
+    pub views: Counter,
+    /// Seconds of the device a view.
+    pub view_s: Histogram,
+    /// Seconds between a view's request and the device.
+    pub queue_s: Histogram,
+    /// Bytes of encoded frames.
+    pub frame_bytes: Counter,
+    /// Views that were not made, or not sent.
+    pub dropped: Family<Reason, Counter>,
+    /// Clients' streams that are open.
+    pub streams: Gauge,
+    /// The plan in force.
+    pub plan_epoch: Gauge,
+}
+
+fn seconds() -> Histogram {
+    Histogram::new(exponential_buckets(0.0005, 2.0, 16))
+}
+
+impl NodeMetrics {
+    /// Registered, all at zero.
+    #[must_use]
+    pub fn new(telemetry: &Telemetry) -> Self {
+        let metrics = Self {
+            images_sampled: Counter::default(),
+            image_s: seconds(),
+            sets_loaded: Counter::default(),
+            set_s: seconds(),
+            views: Counter::default(),
+            view_s: seconds(),
+            queue_s: seconds(),
+            frame_bytes: Counter::default(),
+            dropped: Family::default(),
+            streams: Gauge::default(),
+            plan_epoch: Gauge::default(),
+        };
+        metrics.register(&mut telemetry.registry());
+        metrics
+    }
+
+    fn register(&self, registry: &mut Registry) {
+        registry.register("images_sampled", "Images sampled and encoded", self.images_sampled.clone());
+        registry.register_with_unit("image", "Sampling of one image", Unit::Seconds, self.image_s.clone());
+        registry.register("sets_loaded", "Sample sets fetched and uploaded", self.sets_loaded.clone());
+        registry.register_with_unit("set_load", "Loading of one sample set", Unit::Seconds, self.set_s.clone());
+        registry.register("views", "Views made", self.views.clone());
+        registry.register_with_unit("view", "The device's time for one view", Unit::Seconds, self.view_s.clone());
+        registry.register_with_unit("queue", "A view's wait for the device", Unit::Seconds, self.queue_s.clone());
+        registry.register_with_unit("frames", "Encoded frames", Unit::Bytes, self.frame_bytes.clone());
+        registry.register("dropped_views", "Views not made or not sent", self.dropped.clone());
+        registry.register("streams", "Clients' streams that are open", self.streams.clone());
+        registry.register("plan_epoch", "The plan in force", self.plan_epoch.clone());
+    }
+
+    /// Counts a view that was not made or not sent.
+    pub fn drop_view(&self, reason: &'static str) {
+        self.dropped.get_or_create(&Reason { reason }).inc();
+    }
+}
+
+impl Default for NodeMetrics {
+    fn default() -> Self {
+        Self::new(&Telemetry::default())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+
+    use super::*;
+
+    #[tokio::test]
+    async fn the_page_has_what_was_counted() {
+        let telemetry = Telemetry::default();
+        let metrics = NodeMetrics::new(&telemetry);
+        metrics.images_sampled.inc_by(3);
+        metrics.view_s.observe(0.004);
+        metrics.drop_view("client gone");
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let shutdown = CancellationToken::new();
+        let serving = tokio::spawn(telemetry.serve(listener, shutdown.clone()));
+        let mut socket = tokio::net::TcpStream::connect(address).await.unwrap();
+        socket.write_all(b"GET /metrics HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n").await.unwrap();
+        let mut page = String::new();
+        socket.read_to_string(&mut page).await.unwrap();
+        for line in [
+            "myriorama_images_sampled_total 3",
+            "myriorama_view_seconds_count 1",
+            "myriorama_dropped_views_total{reason=\"client gone\"} 1",
+            "# EOF",
+        ] {
+            assert!(page.contains(line), "{line} in {page}");
+        }
+        shutdown.cancel();
+        serving.await.unwrap().unwrap();
+    }
+}

@@ -1,0 +1,36 @@
+//! `myriorama health`: whether a process serves, for those who restart it where it does not.
+
+use std::time::Duration;
+
+use anyhow::{Context as _, bail};
+use clap::Args;
+
+use crate::exit::Outcome;
+use crate::process::runtime;
+
+const DEADLINE: Duration = Duration::from_secs(4);
+
+/// Prints what the process says of itself; exit status 3 where it does not serve or does not answer.
+#[derive(Debug, Args)]
+pub struct HealthArgs {
+    /// A coordinator or a node
+    #[arg(value_name = "URL")]
+    address: String,
+    /// coordinator, node, sampler or compositor; the whole process without one
+    #[arg(long, default_value = "", value_name = "NAME")]
+    role: String,
+}
+
+/// Asks once.
+///
+/// # Errors
+/// Where it does not serve, or does not answer within seconds.
+pub fn run(args: &HealthArgs) -> anyhow::Result<Outcome> {
+    let asked = async { tokio::time::timeout(DEADLINE, wire::rpc::is_serving(&args.address, &args.role)).await };
+    let serves = runtime()?.block_on(asked).with_context(|| format!("{} does not answer", args.address))?;
+    if !serves.with_context(|| format!("{} does not answer", args.address))? {
+        bail!("{} does not serve", args.address);
+    }
+    println!("{} serves", args.address);
+    Ok(Outcome::Done)
+}

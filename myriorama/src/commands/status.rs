@@ -1,0 +1,44 @@
+//! `myriorama status`: who is there, what the plan is, and why.
+
+use std::time::Duration;
+
+use anyhow::Context as _;
+use clap::Args;
+use client::Client;
+
+use crate::exit::Outcome;
+use crate::process::runtime;
+
+/// Prints the cluster's nodes with their roles, the plan and its reason; with --watch again and again.
+#[derive(Debug, Args)]
+pub struct StatusArgs {
+    /// The coordinator
+    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR")]
+    coordinator: String,
+    /// Every so many seconds, until ctrl-c
+    #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "1")]
+    watch: Option<f64>,
+}
+
+/// Asks and prints.
+///
+/// # Errors
+/// A coordinator that does not answer.
+pub fn run(args: &StatusArgs) -> anyhow::Result<Outcome> {
+    runtime()?.block_on(show(args))
+}
+
+async fn show(args: &StatusArgs) -> anyhow::Result<Outcome> {
+    let client =
+        Client::connect(&args.coordinator).await.with_context(|| format!("no coordinator at {}", args.coordinator))?;
+    loop {
+        let text = crate::status_text::text(&client.status().await?)?;
+        let Some(seconds) = args.watch else {
+            println!("{text}");
+            return Ok(Outcome::Done);
+        };
+        // Clears the terminal, so that the table stays where it is.
+        print!("\x1b[2J\x1b[H{text}\n");
+        tokio::time::sleep(Duration::from_secs_f64(seconds.clamp(0.1, 3600.0))).await;
+    }
+}

@@ -1,0 +1,164 @@
+//! What clients see while nodes come and go: whole pictures, each of one set, and all that they asked for.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::{BTreeSet, HashMap};
+use std::time::{Duration, Instant};
+
+use client::{Frame, Session, ViewRequest};
+use cluster_tests::cluster::{Cluster, camera, request, views};
+use glam::UVec2;
+use wire::{PolicyChoice, SessionRequest, Timeline};
+
+const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
+const STILL: Timeline = Timeline { start_s: 0.0, step_s: 0.0, set_count: 1 };
+/// Complete frames come again after so long.
+const HEALED: Duration = Duration::from_secs(5);
+
+fn pipeline(timeline: Timeline) -> SessionRequest {
+    request(PolicyChoice::Pipeline, timeline)
+}
+
+/// The invariants of a history: each frame once, and of plans that only rise.
+fn check(frames: &[Frame], asked: usize) {
+    let numbers: BTreeSet<u64> = frames.iter().map(|frame| frame.request.frame).collect();
+    assert_eq!((numbers.len(), frames.len()), (asked, asked));
+    assert!(frames.iter().all(|frame| frame.header.sample_set_id.index == u64::from(frame.request.set_index)));
+    let epochs: Vec<u64> = frames.iter().map(|frame| frame.header.sample_set_id.plan_epoch).collect();
+    assert!(epochs.is_sorted(), "{epochs:?}");
+}
+
+async fn wait_for(what: &str, holds: impl AsyncFn() -> bool) {
+    let start = Instant::now();
+    while !holds().await {
+        assert!(start.elapsed() < HEALED, "{what} takes longer than {HEALED:?}");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+/// The same view, again and again, until it comes of a plan above `plan_epoch`; how long that took.
+async fn until_replanned(session: &Session, plan_epoch: u64) -> Duration {
+    let start = Instant::now();
+    for frame in 0.. {
+        let view = ViewRequest { frame, set_index: 0, camera: camera(0.1, UVec2::new(48, 36)) };
+        let frames = session.render_views(vec![view]).unwrap().all().await.unwrap();
+        check(&frames, 1);
+        if frames[0].header.sample_set_id.plan_epoch > plan_epoch {
+            break;
+        }
+        assert!(start.elapsed() < HEALED);
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    start.elapsed()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_of_a_killed_compositor_come_from_others() {
+    let mut cluster = Cluster::start(4).await;
+    let session = cluster.session(pipeline(MOVING)).await.unwrap();
+    let plan = session.plan();
+    let victim = plan.assignment.compositors.last().unwrap().node_name[1..].parse::<usize>().unwrap();
+    let mut frames = session.render_views(views(3, 40)).unwrap();
+    let mut came = vec![frames.next().await.unwrap().unwrap()];
+    cluster.nodes[victim].kill();
+    let start = Instant::now();
+    came.extend(frames.all().await.unwrap());
+    println!("healed after {:?}", start.elapsed());
+    assert!(start.elapsed() < HEALED);
+    check(&came, 120);
+    assert!(session.plan().assignment.plan_epoch > plan.assignment.plan_epoch);
+    assert!(!session.plan().assignment.composites(&format!("n{victim}")));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sets_of_a_killed_sampler_come_from_others() {
+    let mut cluster = Cluster::start(3).await;
+    let session = cluster.session(pipeline(MOVING)).await.unwrap();
+    let plan = session.plan();
+    let victim = plan.assignment.samplers[0].node_name[1..].parse::<usize>().unwrap();
+    cluster.nodes[victim].kill();
+    let start = Instant::now();
+    let frames = session.render_views(views(3, 4)).unwrap().all().await.unwrap();
+    println!("healed after {:?}", start.elapsed());
+    assert!(start.elapsed() < HEALED);
+    check(&frames, 12);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_last_node_s_work_waits_for_the_next() {
+    let mut cluster = Cluster::start(1).await;
+    let session = cluster.session(pipeline(MOVING)).await.unwrap();
+    cluster.nodes[0].kill();
+    let waiting = session.render_views(views(1, 3)).unwrap();
+    cluster.add_node(|config| config);
+    check(&waiting.all().await.unwrap(), 3);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_new_node_takes_part_without_a_lost_frame() {
+    let mut cluster = Cluster::start(1).await;
+    let session = cluster.session(pipeline(STILL)).await.unwrap();
+    let epoch = session.plan().assignment.plan_epoch;
+    cluster.add_node(|config| config);
+    cluster.client.wait_for_nodes(2, HEALED).await.unwrap();
+    let mut all = Vec::new();
+    let start = Instant::now();
+    while session.plan().assignment.plan_epoch == epoch {
+        let first = all.len() as u64;
+        let asked = (0..6).map(|i| ViewRequest { frame: first + i, ..views(1, 6)[i as usize] }).collect();
+        all.extend(session.render_views(asked).unwrap().all().await.unwrap());
+        assert!(start.elapsed() < 3 * HEALED, "one node goes on doing both");
+    }
+    println!("{} frames before the second node takes part, after {:?}", all.len(), start.elapsed());
+    check(&all, all.len());
+    check(&session.render_views(views(1, 6)).unwrap().all().await.unwrap(), 6);
+    assert_eq!(session.plan().assignment.nodes().len(), 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_go_on_without_a_coordinator_and_a_plan_follows_its_return() {
+    let mut cluster = Cluster::start(3).await;
+    let session = cluster.session(pipeline(MOVING)).await.unwrap();
+    let epoch = session.plan().assignment.plan_epoch;
+    cluster.kill_coordinator();
+    check(&session.render_views(views(3, 4)).unwrap().all().await.unwrap(), 12);
+    cluster.restart_coordinator();
+    let took = until_replanned(&session, epoch).await;
+    println!("a new plan {took:?} after the coordinator's return");
+    check(&session.render_views(views(3, 4)).unwrap().all().await.unwrap(), 12);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sessions_of_one_workload_share_a_plan() {
+    let mut cluster = Cluster::start(3).await;
+    let mut sessions = Vec::new();
+    for _ in 0..4 {
+        sessions.push(cluster.session(pipeline(MOVING)).await.unwrap());
+    }
+    let newest = sessions[3].plan().assignment.plan_epoch;
+    wait_for("one plan for all", async || {
+        sessions.iter().all(|session| session.plan().assignment.plan_epoch == newest)
+    })
+    .await;
+    cluster.take_counts();
+    let mut images = HashMap::new();
+    for session in &sessions {
+        for frame in session.render_views(views(3, 4)).unwrap().all().await.unwrap() {
+            let first = images.entry(frame.request.frame).or_insert_with(|| frame.view.clone());
+            assert_eq!(*first, frame.view, "the same picture for all");
+        }
+    }
+    assert!(cluster.take_counts().iter().all(|&times| times == 1), "sampled once for all");
+    drop(sessions.remove(0));
+    cluster.nodes[2].kill();
+    check(&sessions[0].render_views(views(3, 4)).unwrap().all().await.unwrap(), 12);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn another_workload_takes_the_cluster_over() {
+    let cluster = Cluster::start(2).await;
+    let old = cluster.session(pipeline(MOVING)).await.unwrap();
+    let new = cluster.session(pipeline(STILL)).await.unwrap();
+    wait_for("the end of the old session", async || old.ended().is_some()).await;
+    assert!(old.render_views(views(1, 1)).is_err());
+    check(&new.render_views(views(1, 6)).unwrap().all().await.unwrap(), 6);
+}
