@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use node::{Connections, ServeError, health, until_drained, with_guard};
 use tokio::net::TcpListener;
@@ -20,7 +21,7 @@ use wire::{
 };
 
 use crate::opening::{Events, open};
-use crate::schedule::{ClusterState, Command, Event};
+use crate::schedule::{Command, Event, Scheduler};
 use crate::{CoordinatorConfig, SceneOffer};
 
 /// Events that a session's client has not read yet.
@@ -42,6 +43,7 @@ pub async fn serve(
         offer,
         connections: Connections::default(),
         opening: tokio::sync::Mutex::default(),
+        started: Instant::now(),
         state: Mutex::default(),
         sessions: Mutex::default(),
         costs: Mutex::default(),
@@ -58,7 +60,8 @@ pub(crate) struct Inner {
     pub(crate) offer: SceneOffer,
     pub(crate) connections: Connections,
     pub(crate) opening: tokio::sync::Mutex<()>,
-    state: Mutex<ClusterState>,
+    started: Instant,
+    state: Mutex<Scheduler>,
     sessions: Mutex<HashMap<u64, Events>>,
     costs: Mutex<Vec<(String, MeasureCosts, Costs)>>,
     counter: AtomicU64,
@@ -69,12 +72,19 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Inner {
-    /// Tells the schedule, and the sessions that end by it; the other commands are the caller's.
+    /// Tells the schedule, and the sessions that end by it; the other commands are the caller's. A session that was
+    /// told its plan does not follow to the next one yet: it ends.
     pub(crate) fn step(&self, event: Event) -> Vec<Command> {
-        let commands = locked(&self.state).step(event);
+        let opening = if let Event::Opened(opening) = &event { Some(opening.session) } else { None };
+        let commands = locked(&self.state).step(self.started.elapsed(), event);
         for command in &commands {
-            if let Command::End { session, reason } = command {
-                self.end(*session, reason);
+            match command {
+                Command::End { session, reason } => self.end(*session, reason),
+                Command::Apply { sessions, plan, .. } => {
+                    let left_behind = sessions.iter().filter(|session| Some(**session) != opening);
+                    left_behind.for_each(|session| self.end(*session, &plan.reason));
+                }
+                Command::Refuse { .. } => (),
             }
         }
         commands
