@@ -161,7 +161,7 @@ impl ClientStream {
         let beyond = || Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"));
         let id = plan.sample_set_id(set_index).ok_or_else(beyond)?;
         let source = match plan.policy {
-            Policy::Pipeline => Source::Set(self.shared.sets.get(plan, set_index).await?),
+            Policy::Pipeline | Policy::TimeShare => Source::Set(self.shared.sets.get(plan, set_index).await?),
             Policy::Direct => Source::Scene {
                 scene_hash: plan.workload.scene.hash.to_string(),
                 lighting: plan.workload.lighting.clone(),

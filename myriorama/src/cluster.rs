@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use client::Client;
 use coordinator::{CoordinatorConfig, SceneOffer};
-use node::{Engine, NodeConfig, ServeError};
+use node::{Engine, NodeConfig, NodeMetrics, ServeError};
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;

@@ -42,7 +42,9 @@ fn raw_request(session: &Session) -> RenderViews {
 async fn old_plans_are_refused_everywhere() {
     let cluster = Cluster::start(2).await;
     let old = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
-    let new = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    // Of another workload: sessions of one share a plan.
+    let other = wire::SessionRequest { refinement_steps: 2, ..request(PolicyChoice::Pipeline, MOVING) };
+    let new = cluster.session(other).await.unwrap();
     let (old_plan, new_plan) = (&old.plan().assignment, &new.plan().assignment);
     assert!(new_plan.plan_epoch > old_plan.plan_epoch);
     let compositor = &old_plan.compositors[0].address;

@@ -2,19 +2,68 @@
 
 use std::ops::Range;
 
-/// Images of each of `samplers` nodes, dealt in turn. Where there are more nodes than images, the last
-/// ones have none.
-#[must_use]
-pub fn share_images(image_count: usize, samplers: usize) -> Vec<Vec<u32>> {
-    (0..samplers)
-        .map(|sampler| (sampler..image_count).step_by(samplers.max(1)).map(|image| image as u32).collect())
-        .collect()
+use wire::{Assignment, CompositorShare, NodeStatus, Policy, SamplerShare, Workload};
+
+use super::{Choice, Load, NodeCosts};
+
+/// A node and what it costs.
+pub(super) type Candidate<'a> = (&'a NodeStatus, NodeCosts);
+
+/// The plan of a choice. In the direct policy all make views; a single node, and in time-share every node, samples too,
+/// as far as there are images.
+pub(super) fn assignment(
+    plan_epoch: u64,
+    workload: Workload,
+    load: &Load,
+    choice: &Choice,
+    nodes: &[Candidate<'_>],
+) -> Assignment {
+    let samples = |i: usize| nodes.len() == 1 || choice.division.samples[i];
+    let who = |role: &dyn Fn(usize) -> bool| -> Vec<Candidate<'_>> {
+        (0..nodes.len()).filter(|&i| role(i)).map(|i| nodes[i]).collect()
+    };
+    let (sampling, making) = match choice.policy {
+        Policy::Direct => (Vec::new(), nodes.to_vec()),
+        Policy::TimeShare => (nodes.to_vec(), nodes.to_vec()),
+        Policy::Pipeline if nodes.len() == 1 => (nodes.to_vec(), nodes.to_vec()),
+        Policy::Pipeline => (who(&samples), who(&|i| !samples(i))),
+    };
+    let compositors = making.iter().map(|(node, _)| compositor(node)).collect();
+    Assignment { plan_epoch, policy: choice.policy, workload, samplers: sampler_shares(load, &sampling), compositors }
 }
 
-/// All images to each of `samplers` nodes, which then sample sets in turn.
+fn compositor(node: &NodeStatus) -> CompositorShare {
+    CompositorShare { node_name: node.node_name.clone(), address: node.address.clone() }
+}
+
+/// Nodes without an image are left out: nobody would ask them.
+fn sampler_shares(load: &Load, sampling: &[Candidate<'_>]) -> Vec<SamplerShare> {
+    let costs: Vec<NodeCosts> = sampling.iter().map(|(_, costs)| *costs).collect();
+    let counts = load.image_counts(&costs);
+    let images = if load.in_order { share_sets(load.images, &counts) } else { share_images(&counts) };
+    let share = |((node, _), image_indices): (&Candidate<'_>, Vec<u32>)| SamplerShare {
+        node_name: node.node_name.clone(),
+        address: node.address.clone(),
+        image_indices,
+    };
+    sampling.iter().zip(images).map(share).filter(|share| !share.image_indices.is_empty()).collect()
+}
+
+/// So many images to each node, dealt in turn.
 #[must_use]
-pub fn share_sets(image_count: usize, samplers: usize) -> Vec<Vec<u32>> {
-    vec![(0..image_count as u32).collect(); samplers]
+pub fn share_images(counts: &[usize]) -> Vec<Vec<u32>> {
+    let mut shares = vec![Vec::new(); counts.len()];
+    let rounds = 0..counts.iter().copied().max().unwrap_or(0);
+    let turns = rounds.flat_map(|round| (0..counts.len()).filter(move |&node| counts[node] > round));
+    for (image, node) in turns.enumerate() {
+        shares[node].push(image as u32);
+    }
+    shares
+}
+
+/// All images to each node that has any; they then sample sets in turn.
+fn share_sets(images: usize, counts: &[usize]) -> Vec<Vec<u32>> {
+    counts.iter().map(|&count| (0..images.min(count) as u32).collect()).collect()
 }
 
 /// Contiguous views of each of `compositors` nodes; no two differ by more than one view.
@@ -32,14 +81,15 @@ mod tests {
     fn every_image_and_view_is_dealt_once_and_evenly() {
         for nodes in 1..12 {
             for count in 0..40 {
-                let mut images: Vec<u32> = share_images(count, nodes).concat();
+                let counts: Vec<usize> = (0..nodes).map(|i| (count + i) / nodes).collect();
+                let mut images: Vec<u32> = share_images(&counts).concat();
                 images.sort_unstable();
                 assert_eq!(images, (0..count as u32).collect::<Vec<_>>());
                 let ranges = share_views(count, nodes);
                 let views: Vec<usize> = ranges.iter().cloned().flatten().collect();
                 assert_eq!(views, (0..count).collect::<Vec<_>>());
                 assert!(ranges.iter().all(|range| range.len() <= count.div_ceil(nodes)));
-                assert!(share_images(count, nodes).iter().all(|share| share.len() <= count.div_ceil(nodes)));
+                assert!(share_images(&counts).iter().zip(&counts).all(|(share, &count)| share.len() == count));
             }
         }
     }

@@ -1,24 +1,74 @@
-//! Pipeline or direct, and K: with the figures, in plain words.
+//! Which of the policies, and who samples: by predicted time, unless the session decides.
 
-use wire::{Costs, Policy, PolicyChoice};
+use wire::{Policy, PolicyChoice};
 
-use super::k_fd;
+use super::reason::reason;
+use super::search::{Division, enumerate, first, improve, order, towards};
+use super::{Load, NodeCosts, direct_s, k_fd, time_share_s};
 
-/// What a session asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Demand {
-    /// S: images of a sample set. They are whole: no more nodes can sample.
-    pub images: usize,
-    /// Sample sets that differ, of the whole session.
-    pub sets: usize,
-    /// V: views of a sample set.
-    pub views: usize,
-    /// P.
-    pub nodes: usize,
-    /// Who decides.
+/// What predicts less than so many times another's time is no reason to change anything.
+pub(super) const WORTH: f64 = 1.1;
+
+/// Who decides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Wish {
+    /// How views come about.
     pub policy: PolicyChoice,
     /// K, instead of the formula's.
     pub forced_samplers: Option<usize>,
+}
+
+/// What nodes do now; those without a role count as compositors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Present {
+    /// How views come about.
+    pub policy: Policy,
+    /// Whether each node samples.
+    pub samples: Vec<bool>,
+}
+
+/// What is asked, and of whom.
+#[derive(Debug, Clone, Copy)]
+pub struct Demand<'a> {
+    /// The work.
+    pub load: Load,
+    /// The nodes, by name.
+    pub nodes: &'a [NodeCosts],
+    /// Who decides.
+    pub wish: Wish,
+    /// What is kept where nothing else is clearly better.
+    pub present: Option<&'a Present>,
+}
+
+/// Predicted seconds of a sample set.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Predicted {
+    /// With samplers and compositors, as divided.
+    pub pipeline_s: f64,
+    /// From the scene.
+    pub direct_s: f64,
+    /// With every node doing both.
+    pub time_share_s: f64,
+    /// K by the balance formula, on the mean of the nodes' costs.
+    pub k_fd: usize,
+    /// With that K.
+    pub k_fd_s: f64,
+    /// K of the best division that trying finds.
+    pub enumerated: usize,
+    /// With that division.
+    pub enumerated_s: f64,
+}
+
+impl Predicted {
+    /// By one of them.
+    #[must_use]
+    pub fn of(&self, policy: Policy) -> f64 {
+        match policy {
+            Policy::Pipeline => self.pipeline_s,
+            Policy::Direct => self.direct_s,
+            Policy::TimeShare => self.time_share_s,
+        }
+    }
 }
 
 /// What was chosen.
@@ -26,14 +76,20 @@ pub struct Demand {
 pub struct Choice {
     /// How views come about.
     pub policy: Policy,
-    /// K; 0 in the direct policy.
-    pub samplers: usize,
+    /// Who samples in the pipeline, whether or not it was chosen.
+    pub division: Division,
     /// In plain words, with the figures.
     pub reason: String,
-    /// With samplers and compositors, seconds a set.
-    pub predicted_pipeline_s: f64,
-    /// From the scene, seconds a set.
-    pub predicted_direct_s: f64,
+    /// Of every policy.
+    pub predicted: Predicted,
+}
+
+impl Choice {
+    /// Seconds a sample set.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.predicted.of(self.policy)
+    }
 }
 
 /// Why nothing could be chosen.
@@ -60,181 +116,101 @@ pub enum ChoiceError {
 ///
 /// # Errors
 /// Without nodes, or with a K that cannot be.
-pub fn choose(costs: &Costs, demand: &Demand) -> Result<Choice, ChoiceError> {
-    if demand.nodes == 0 {
+pub fn choose(demand: &Demand<'_>) -> Result<Choice, ChoiceError> {
+    check(demand)?;
+    let Demand { load, nodes, .. } = demand;
+    let sampled = demand.present.map_or(&[][..], |present| &present.samples);
+    let order = order(nodes, sampled);
+    let k_fd = first(load, nodes, &order, k_fd_of(load, nodes));
+    let enumerated = enumerate(load, nodes, &order);
+    let division = divide(demand, &order, &k_fd, &enumerated);
+    Ok(conclude(demand, division, &k_fd, &enumerated))
+}
+
+/// Whether a demand can be met at all.
+pub(super) fn check(demand: &Demand<'_>) -> Result<(), ChoiceError> {
+    let nodes = demand.nodes.len();
+    if nodes == 0 {
         return Err(ChoiceError::NoNodes);
     }
-    let samplers = sampler_count(costs, demand)?;
-    let predicted_pipeline_s = predicted_pipeline_s(costs, demand, samplers);
-    let predicted_direct_s = predicted_direct_s(costs, demand);
-    let policy = match demand.policy {
-        PolicyChoice::Auto if predicted_direct_s < predicted_pipeline_s => Policy::Direct,
-        PolicyChoice::Direct => Policy::Direct,
-        PolicyChoice::Auto | PolicyChoice::Pipeline => Policy::Pipeline,
-    };
-    let reason = reason(costs, demand, policy, samplers);
-    let samplers = if policy == Policy::Direct { 0 } else { samplers };
-    Ok(Choice { policy, samplers, reason, predicted_pipeline_s, predicted_direct_s })
-}
-
-/// Samplers that still leave a node for views; one node does both. Images that are sampled in order keep a set on
-/// one node, so that no more nodes can sample than there are sets.
-fn most_samplers(costs: &Costs, demand: &Demand) -> usize {
-    let parts = if costs.in_order { demand.sets } else { demand.images };
-    parts.min(demand.nodes.saturating_sub(1).max(1)).max(1)
-}
-
-fn sampler_count(costs: &Costs, demand: &Demand) -> Result<usize, ChoiceError> {
-    let most = most_samplers(costs, demand);
-    match demand.forced_samplers {
+    let most = demand.load.most_samplers(nodes);
+    match demand.wish.forced_samplers {
         Some(forced) if !(1..=most).contains(&forced) => {
-            Err(ChoiceError::ForcedSamplers { forced, most, nodes: demand.nodes, images: demand.images })
+            Err(ChoiceError::ForcedSamplers { forced, most, nodes, images: demand.load.images })
         }
-        Some(forced) => Ok(forced),
-        None => Ok(k_fd(demand.images, costs.sample_image_s, demand.views, view_s(costs), demand.nodes).clamp(1, most)),
+        _ => Ok(()),
     }
 }
 
-/// c + e.
-fn view_s(costs: &Costs) -> f64 {
-    costs.reconstruct_view_s + costs.encode_view_s
+fn conclude(demand: &Demand<'_>, division: Division, k_fd: &Division, enumerated: &Division) -> Choice {
+    let predicted = Predicted {
+        pipeline_s: division.time_s,
+        direct_s: direct_s(&demand.load, demand.nodes),
+        time_share_s: time_share_s(&demand.load, demand.nodes),
+        k_fd: k_fd.sampler_count(),
+        k_fd_s: k_fd.time_s,
+        enumerated: enumerated.sampler_count(),
+        enumerated_s: enumerated.time_s,
+    };
+    let policy = policy(demand, &predicted);
+    let reason = reason(demand, policy, division.sampler_count(), &predicted);
+    Choice { policy, division, reason, predicted }
 }
 
-/// Seconds a set with K samplers: whole images, whole views, and the set's decode and upload on every
-/// compositor. One node does all in turn.
-#[must_use]
-pub fn predicted_pipeline_s(costs: &Costs, demand: &Demand, samplers: usize) -> f64 {
-    let compositors = demand.nodes.saturating_sub(samplers).max(1);
-    let sample_s = images_in_turn(costs, demand, samplers.max(1)) * costs.sample_image_s;
-    let view_s = costs.load_set_s + demand.views.div_ceil(compositors) as f64 * view_s(costs);
-    if demand.nodes == 1 { sample_s + view_s } else { sample_s.max(view_s) }
-}
-
-/// Images that one sampler makes one after the other, a set: of each set its share, or whole sets in turn.
-fn images_in_turn(costs: &Costs, demand: &Demand, samplers: usize) -> f64 {
-    match costs.in_order {
-        true => demand.images as f64 * demand.sets.max(1).div_ceil(samplers) as f64 / demand.sets.max(1) as f64,
-        false => demand.images.div_ceil(samplers) as f64,
+/// As much of a choice as `changes` changes of role allow; from policy to policy all nodes change.
+pub(super) fn step_from(demand: &Demand<'_>, mut choice: Choice, has_role: &[bool], changes: usize) -> Choice {
+    let Some(present) = demand.present.filter(|present| present.policy == Policy::Pipeline) else { return choice };
+    if choice.policy == Policy::Pipeline {
+        let Demand { load, nodes, .. } = demand;
+        choice.division = towards(load, nodes, &present.samples, &choice.division, has_role, changes);
+        choice.predicted.pipeline_s = choice.division.time_s;
+        choice.reason = reason(demand, choice.policy, choice.division.sampler_count(), &choice.predicted);
     }
+    choice
 }
 
-/// Seconds a set's views when every node draws its share from the scene.
-#[must_use]
-pub fn predicted_direct_s(costs: &Costs, demand: &Demand) -> f64 {
-    demand.views.div_ceil(demand.nodes.max(1)) as f64 * (costs.direct_view_s + costs.encode_view_s)
+/// The formula's K, as far as whole images allow.
+fn k_fd_of(load: &Load, nodes: &[NodeCosts]) -> usize {
+    let mean = NodeCosts::mean(nodes);
+    let k = k_fd(load.images, mean.costs.sample_image_s, load.views, mean.view_s(), nodes.len());
+    k.clamp(1, load.most_samplers(nodes.len()))
 }
 
-/// The K with the least predicted time when images and views are whole.
-fn enumerated_samplers(costs: &Costs, demand: &Demand) -> usize {
-    let time = |k: &usize| predicted_pipeline_s(costs, demand, *k);
-    (1..=most_samplers(costs, demand)).min_by(|a, b| time(a).total_cmp(&time(b))).unwrap_or(1)
-}
-
-fn reason(costs: &Costs, demand: &Demand, policy: Policy, samplers: usize) -> String {
-    let ms = |seconds: f64| format!("{:.3} ms", seconds * 1e3);
-    let Demand { images, views, nodes, .. } = *demand;
-    let who = match (demand.policy, demand.forced_samplers) {
-        (PolicyChoice::Auto, None) => "predicted to be faster",
-        (PolicyChoice::Auto, Some(_)) => "predicted to be faster, with K as asked for",
-        (_, None) => "asked for",
-        (_, Some(_)) => "asked for, and K too",
+/// The formula's K for equal nodes, unless whole images make it clearly the worse; else what trying finds. What is now
+/// stays where neither is clearly better.
+fn divide(demand: &Demand<'_>, order: &[usize], k_fd: &Division, enumerated: &Division) -> Division {
+    let Demand { load, nodes, wish, present } = demand;
+    let best = match wish.forced_samplers {
+        Some(forced) if NodeCosts::are_equal(nodes) => first(load, nodes, order, forced),
+        Some(forced) => improve(load, nodes, first(load, nodes, order, forced), false),
+        None if NodeCosts::are_equal(nodes) && k_fd.time_s <= enumerated.time_s * WORTH => k_fd.clone(),
+        None => enumerated.clone(),
     };
-    let best = enumerated_samplers(costs, demand);
-    let roles = if nodes == 1 {
-        "1 node in turn".to_owned()
-    } else {
-        let how = if costs.in_order { "whole sets in turn, " } else { "" };
-        format!("K = {samplers} of {nodes} nodes, {how}the others reconstruct")
+    let pipeline = present.filter(|present| present.policy == Policy::Pipeline);
+    let now = pipeline.map(|present| Division::new(load, nodes, present.samples.clone()));
+    let possible = |now: &Division| match wish.forced_samplers {
+        Some(forced) => now.sampler_count() == forced,
+        None => (1..=load.most_samplers(nodes.len())).contains(&now.sampler_count()),
     };
-    format!(
-        "{policy}, {who}. Pipeline: {} a set: {images} images of {} sampled by {roles} {views} views of {} + {} to encode, after {} to load the set (trying every K gives K = {best}, {}). \
-         Direct: {} a set: {views} views of {} + {} to encode on {nodes} nodes.",
-        ms(predicted_pipeline_s(costs, demand, samplers)),
-        ms(costs.sample_image_s),
-        ms(costs.reconstruct_view_s),
-        ms(costs.encode_view_s),
-        ms(costs.load_set_s),
-        ms(predicted_pipeline_s(costs, demand, best)),
-        ms(predicted_direct_s(costs, demand)),
-        ms(costs.direct_view_s),
-        ms(costs.encode_view_s),
-    )
+    now.filter(|now| possible(now) && now.time_s <= best.time_s * WORTH).unwrap_or(best)
+}
+
+fn policy(demand: &Demand<'_>, predicted: &Predicted) -> Policy {
+    let shared = demand.wish.forced_samplers.is_none().then_some(Policy::TimeShare);
+    let all = [Policy::Pipeline, Policy::Direct].into_iter().chain(shared);
+    match demand.wish.policy {
+        PolicyChoice::Pipeline => Policy::Pipeline,
+        PolicyChoice::Direct => Policy::Direct,
+        PolicyChoice::TimeShare => Policy::TimeShare,
+        PolicyChoice::Auto => {
+            let time_s = |policy: &Policy| predicted.of(*policy);
+            let best = all.min_by(|a, b| time_s(a).total_cmp(&time_s(b))).unwrap_or(Policy::Direct);
+            let now = demand.present.map(|present| present.policy);
+            now.filter(|now| time_s(now) <= time_s(&best) * WORTH).unwrap_or(best)
+        }
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const COSTS: Costs = Costs {
-        sample_image_s: 0.1,
-        direct_view_s: 0.1,
-        reconstruct_view_s: 0.009,
-        load_set_s: 0.005,
-        encode_view_s: 0.001,
-        in_order: false,
-    };
-
-    fn demand(views: usize, nodes: usize) -> Demand {
-        Demand { images: 4, sets: 1, views, nodes, policy: PolicyChoice::Auto, forced_samplers: None }
-    }
-
-    #[test]
-    fn many_views_are_reconstructed_and_few_are_drawn() {
-        let many = choose(&COSTS, &demand(1000, 5)).unwrap();
-        assert_eq!((many.policy, many.samplers), (Policy::Pipeline, 1));
-        assert!((many.predicted_pipeline_s - 2.505).abs() < 1e-9);
-        assert!((many.predicted_direct_s - 20.2).abs() < 1e-9);
-        let few = choose(&COSTS, &demand(3, 3)).unwrap();
-        assert_eq!((few.policy, few.samplers), (Policy::Direct, 0));
-        assert!(few.reason.starts_with("direct, predicted to be faster"), "{}", few.reason);
-        assert!(few.reason.contains("100.000 ms"), "{}", few.reason);
-    }
-
-    #[test]
-    fn the_session_may_decide() {
-        let asked = |policy, forced_samplers| choose(&COSTS, &Demand { policy, forced_samplers, ..demand(5, 5) });
-        assert_eq!(asked(PolicyChoice::Pipeline, None).unwrap().policy, Policy::Pipeline);
-        assert_eq!(asked(PolicyChoice::Direct, None).unwrap().policy, Policy::Direct);
-        assert_eq!(asked(PolicyChoice::Pipeline, Some(3)).unwrap().samplers, 3);
-        for forced in [0, 5, 9] {
-            assert!(matches!(
-                asked(PolicyChoice::Pipeline, Some(forced)),
-                Err(ChoiceError::ForcedSamplers { most: 4, .. })
-            ));
-        }
-    }
-
-    #[test]
-    fn whole_images_bound_the_samplers_and_views_keep_a_node() {
-        for nodes in 1..30 {
-            for views in [1, 10, 1000] {
-                let choice =
-                    choose(&COSTS, &Demand { policy: PolicyChoice::Pipeline, ..demand(views, nodes) }).unwrap();
-                assert!(choice.samplers >= 1 && choice.samplers <= 4);
-                assert!(nodes == 1 || choice.samplers < nodes);
-            }
-        }
-        assert_eq!(choose(&COSTS, &demand(1, 0)), Err(ChoiceError::NoNodes));
-    }
-
-    #[test]
-    fn sets_whose_images_are_sampled_in_order_stay_whole() {
-        let costs = Costs { in_order: true, ..COSTS };
-        let still = Demand { policy: PolicyChoice::Pipeline, ..demand(20, 5) };
-        assert_eq!(choose(&costs, &still).unwrap().samplers, 1, "one set, one node");
-        assert!((predicted_pipeline_s(&costs, &still, 1) - 0.4).abs() < 1e-9);
-        let moving = Demand { sets: 30, ..still };
-        let choice = choose(&costs, &moving).unwrap();
-        assert!(choice.samplers > 1 && choice.reason.contains("whole sets in turn"), "{choice:?}");
-        // 30 sets by 4 nodes: 8 rounds of 0.4 s.
-        let few_views = Demand { views: 2, ..moving };
-        assert!((predicted_pipeline_s(&costs, &few_views, 4) - 8.0 * 0.4 / 30.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn one_node_does_all_in_turn() {
-        let choice = choose(&COSTS, &demand(100, 1)).unwrap();
-        assert!((choice.predicted_pipeline_s - (0.4 + 0.005 + 1.0)).abs() < 1e-9);
-        assert_eq!(choice.samplers, 1);
-    }
-}
+#[path = "choose_tests.rs"]
+mod tests;

@@ -1,11 +1,33 @@
 //! Who does what. Pure: no clock, no await; the same events give the same commands.
+//!
+//! [`Scheduler`] takes events and says what is to be done. It divides nodes by what work is predicted to take
+//! ([`choose`]), from costs that nodes time themselves ([`MeasuredCosts`]), and changes a plan that works only where
+//! that pays. See `docs/scheduling.md`.
 
 mod assign;
 mod balance;
 mod choose;
-mod state;
+mod costs;
+mod deal;
+mod event;
+mod patience;
+mod predict;
+mod reason;
+mod scheduler;
+mod search;
+mod work;
 
-pub use assign::{share_images, share_sets, share_views};
+#[cfg(test)]
+mod simulation;
+#[cfg(test)]
+mod test_support;
+
+pub use assign::{share_images, share_views};
 pub use balance::{brute_force_k, k_fd, k_fd_printed, pipeline_time};
-pub use choose::{Choice, ChoiceError, Demand, choose, predicted_direct_s, predicted_pipeline_s};
-pub use state::{ClusterState, Command, Event, Opening};
+pub use choose::{Choice, ChoiceError, Demand, Predicted, Present, Wish, choose};
+pub use costs::{MeasuredCosts, NodeCosts};
+pub use deal::{Worker, deal, finish_s};
+pub use event::{Command, Event, Opening};
+pub use predict::{Load, direct_s, pipeline_s, time_share_s};
+pub use scheduler::Scheduler;
+pub use search::{Division, enumerate};

@@ -5,7 +5,7 @@ use depth_image::{PinholeCamera, ViewPlanes};
 use crate::error::{WireError, at_most, required};
 use crate::geometry::{pinhole_from, pinhole_to};
 use crate::limits::{MAX_BATCH, MAX_NODES, MAX_SCENES, nonempty, seconds, text};
-use crate::{Assignment, Costs, OfferStatus, SceneRef, Workload, proto};
+use crate::{Assignment, Costs, OfferStatus, SceneRef, SessionPlan, Workload, proto};
 
 /// A node that wants to be a member.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -86,6 +86,43 @@ pub struct ClusterStatus {
     pub nodes: Vec<NodeStatus>,
     /// The scene, and what it is shown with.
     pub offer: Option<OfferStatus>,
+    /// In force; `None` while nothing is asked for, or nobody is there to do it.
+    pub plan: Option<Box<SessionPlan>>,
+    /// Sessions that share the plan, or wait for one.
+    pub session_count: u32,
+    /// V: views that all of them ask of each sample set.
+    pub views_per_set: u64,
+    /// Of every member, while anything is asked for.
+    pub conditions: Vec<NodeCondition>,
+}
+
+/// How a member stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodeCondition {
+    /// Who.
+    pub node_name: String,
+    /// For the plan in force.
+    pub is_ready: bool,
+    /// As estimated now, from the node's own timings.
+    pub costs: Costs,
+}
+
+impl TryFrom<proto::NodeCondition> for NodeCondition {
+    type Error = WireError;
+
+    fn try_from(c: proto::NodeCondition) -> Result<Self, WireError> {
+        Ok(Self {
+            node_name: nonempty(c.node_name, "node_name")?,
+            is_ready: c.is_ready,
+            costs: required(c.costs, "costs")?.try_into()?,
+        })
+    }
+}
+
+impl From<NodeCondition> for proto::NodeCondition {
+    fn from(c: NodeCondition) -> Self {
+        Self { node_name: c.node_name, is_ready: c.is_ready, costs: Some(c.costs.into()) }
+    }
 }
 
 impl TryFrom<proto::GetStatusResponse> for ClusterStatus {
@@ -93,6 +130,7 @@ impl TryFrom<proto::GetStatusResponse> for ClusterStatus {
 
     fn try_from(r: proto::GetStatusResponse) -> Result<Self, WireError> {
         at_most(r.nodes.len(), MAX_NODES, "nodes")?;
+        at_most(r.conditions.len(), MAX_NODES, "conditions")?;
         let node = |n: proto::NodeStatus| NodeStatus {
             node_name: n.node_name,
             address: n.node_address,
@@ -103,6 +141,10 @@ impl TryFrom<proto::GetStatusResponse> for ClusterStatus {
             plan_epoch: r.plan_epoch,
             nodes: r.nodes.into_iter().map(node).collect(),
             offer: r.offer.map(TryInto::try_into).transpose()?,
+            plan: r.plan.map(|plan| plan.try_into().map(Box::new)).transpose()?,
+            session_count: r.session_count,
+            views_per_set: r.views_per_set_count,
+            conditions: r.conditions.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
         })
     }
 }
@@ -119,6 +161,10 @@ impl From<ClusterStatus> for proto::GetStatusResponse {
             plan_epoch: status.plan_epoch,
             nodes: status.nodes.into_iter().map(node).collect(),
             offer: status.offer.map(Into::into),
+            plan: status.plan.map(|plan| (*plan).into()),
+            session_count: status.session_count,
+            views_per_set_count: status.views_per_set,
+            conditions: status.conditions.into_iter().map(Into::into).collect(),
         }
     }
 }

@@ -114,9 +114,26 @@ fn messages_come_back() {
         reason: "because".to_owned(),
         predicted_pipeline_s: 0.1,
         predicted_direct_s: 0.2,
+        predicted_time_share_s: 0.3,
+        k_fd_sampler_count: 1,
+        predicted_k_fd_s: 0.4,
+        enumerated_sampler_count: 2,
+        predicted_enumerated_s: 0.5,
         scene_load_s: 0.0,
     }));
     assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(plan.clone())), Ok(plan));
+    assert_eq!(Workload::from_bytes(&workload().to_bytes()), Ok(workload()));
+}
+
+#[test]
+fn policies_have_names() {
+    for choice in [PolicyChoice::Auto, PolicyChoice::Pipeline, PolicyChoice::Direct, PolicyChoice::TimeShare] {
+        assert_eq!(choice.to_string().parse(), Ok(choice));
+        let asked = SessionRequest { policy: choice, ..request() };
+        assert_eq!(SessionRequest::try_from(proto::OpenSessionRequest::from(asked.clone())), Ok(asked));
+    }
+    let unknown = "best".parse::<PolicyChoice>().unwrap_err().to_string();
+    assert!(unknown.contains("\"best\"") && unknown.contains("time-share"), "{unknown}");
 }
 
 fn refusal<P, D: TryFrom<P, Error = WireError>>(message: P) -> String {

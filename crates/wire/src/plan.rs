@@ -16,6 +16,8 @@ pub enum Policy {
     Pipeline,
     /// Every node draws its views from the scene.
     Direct,
+    /// Every node samples its share of the images and reconstructs its share of the views.
+    TimeShare,
 }
 
 impl fmt::Display for Policy {
@@ -23,6 +25,7 @@ impl fmt::Display for Policy {
         f.write_str(match self {
             Self::Pipeline => "pipeline",
             Self::Direct => "direct",
+            Self::TimeShare => "time-share",
         })
     }
 }
@@ -32,6 +35,7 @@ impl Policy {
         match proto::Policy::try_from(value) {
             Ok(proto::Policy::Pipeline) => Ok(Self::Pipeline),
             Ok(proto::Policy::Direct) => Ok(Self::Direct),
+            Ok(proto::Policy::TimeShare) => Ok(Self::TimeShare),
             _ => Err(WireError::UnknownEnum { field: "policy", value }),
         }
     }
@@ -40,6 +44,7 @@ impl Policy {
         match self {
             Self::Pipeline => proto::Policy::Pipeline.into(),
             Self::Direct => proto::Policy::Direct.into(),
+            Self::TimeShare => proto::Policy::TimeShare.into(),
         }
     }
 }
@@ -139,7 +144,7 @@ impl Assignment {
         hash.update(&settled_at_s.to_bits().to_le_bytes());
         // Length-prefixed, so that no two settings run together into the same bytes.
         // The method says which planes images have.
-        for text in [&workload.sampling, &workload.lighting, &workload.method, &self.policy.to_string()] {
+        for text in [&workload.sampling, &workload.lighting, &workload.method] {
             hash.update(&(text.len() as u64).to_le_bytes()).update(text.as_bytes());
         }
         for v in [workload.volume.min, workload.volume.max, workload.background_linear] {
@@ -164,7 +169,7 @@ impl Assignment {
                 .ok_or_else(|| WireError::out_of_range("image_indices", index, "one of the sample cameras"))? += 1;
         }
         let each = self.sets_at_once();
-        if self.policy == Policy::Pipeline && (image_count == 0 || sampled.iter().any(|&times| times != each)) {
+        if self.policy != Policy::Direct && (image_count == 0 || sampled.iter().any(|&times| times != each)) {
             return Err(WireError::out_of_range(
                 "image_indices",
                 format!("{sampled:?} times"),

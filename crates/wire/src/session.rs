@@ -1,5 +1,8 @@
 //! Opening a session: what a client asks for and what it is told.
 
+use std::fmt;
+use std::str::FromStr;
+
 use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
 use glam::UVec2;
 
@@ -7,7 +10,7 @@ use crate::error::{WireError, required};
 use crate::geometry::{bounds_from, bounds_to, camera_to, pinhole_from, pinhole_to, sample_cameras_from};
 use crate::limits::{MAX_VIEWS_PER_SET, nonempty, reason, seconds};
 use crate::workload::refinement_steps_from;
-use crate::{Assignment, Costs, SceneHash, Timeline, proto};
+use crate::{Assignment, Costs, Policy, SceneHash, Timeline, proto};
 
 /// What the client wants to happen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -19,6 +22,33 @@ pub enum PolicyChoice {
     Pipeline,
     /// Every node draws from the scene.
     Direct,
+    /// Every node samples and reconstructs.
+    TimeShare,
+}
+
+/// A policy that is not there.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("unknown policy {0:?}, expected auto, pipeline, direct or time-share")]
+pub struct UnknownPolicy(String);
+
+impl fmt::Display for PolicyChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Auto => "auto",
+            Self::Pipeline => "pipeline",
+            Self::Direct => "direct",
+            Self::TimeShare => "time-share",
+        })
+    }
+}
+
+impl FromStr for PolicyChoice {
+    type Err = UnknownPolicy;
+
+    fn from_str(name: &str) -> Result<Self, UnknownPolicy> {
+        let all = [Self::Auto, Self::Pipeline, Self::Direct, Self::TimeShare];
+        all.into_iter().find(|choice| choice.to_string() == name).ok_or_else(|| UnknownPolicy(name.to_owned()))
+    }
 }
 
 impl PolicyChoice {
@@ -27,6 +57,7 @@ impl PolicyChoice {
             Ok(proto::PolicyChoice::Auto) => Ok(Self::Auto),
             Ok(proto::PolicyChoice::Pipeline) => Ok(Self::Pipeline),
             Ok(proto::PolicyChoice::Direct) => Ok(Self::Direct),
+            Ok(proto::PolicyChoice::TimeShare) => Ok(Self::TimeShare),
             _ => Err(WireError::UnknownEnum { field: "policy_choice", value }),
         }
     }
@@ -36,6 +67,7 @@ impl PolicyChoice {
             Self::Auto => proto::PolicyChoice::Auto.into(),
             Self::Pipeline => proto::PolicyChoice::Pipeline.into(),
             Self::Direct => proto::PolicyChoice::Direct.into(),
+            Self::TimeShare => proto::PolicyChoice::TimeShare.into(),
         }
     }
 }
@@ -169,6 +201,16 @@ pub struct SessionPlan {
     pub predicted_pipeline_s: f64,
     /// Seconds a sample set's views when drawn from the scene.
     pub predicted_direct_s: f64,
+    /// Seconds a sample set where every node both samples and makes views.
+    pub predicted_time_share_s: f64,
+    /// K by the balance formula, on the mean of the nodes' costs.
+    pub k_fd_sampler_count: u32,
+    /// Seconds a sample set with that K.
+    pub predicted_k_fd_s: f64,
+    /// K of the best assignment that trying finds.
+    pub enumerated_sampler_count: u32,
+    /// Seconds a sample set with that assignment.
+    pub predicted_enumerated_s: f64,
     /// The slowest node's time to load the scene; 0 where all had it.
     pub scene_load_s: f64,
 }
@@ -178,6 +220,16 @@ impl SessionPlan {
     #[must_use]
     pub fn sampler_count(&self) -> usize {
         self.assignment.samplers.len()
+    }
+
+    /// Seconds a sample set by the policy that was chosen.
+    #[must_use]
+    pub fn predicted_s(&self) -> f64 {
+        match self.assignment.policy {
+            Policy::Pipeline => self.predicted_pipeline_s,
+            Policy::Direct => self.predicted_direct_s,
+            Policy::TimeShare => self.predicted_time_share_s,
+        }
     }
 }
 
@@ -210,6 +262,11 @@ impl TryFrom<proto::SessionPlan> for SessionPlan {
             reason: reason(p.reason, "plan.reason")?,
             predicted_pipeline_s: seconds(p.predicted_pipeline_s, "predicted_pipeline_s")?,
             predicted_direct_s: seconds(p.predicted_direct_s, "predicted_direct_s")?,
+            predicted_time_share_s: seconds(p.predicted_time_share_s, "predicted_time_share_s")?,
+            k_fd_sampler_count: p.k_fd_sampler_count,
+            predicted_k_fd_s: seconds(p.predicted_k_fd_s, "predicted_k_fd_s")?,
+            enumerated_sampler_count: p.enumerated_sampler_count,
+            predicted_enumerated_s: seconds(p.predicted_enumerated_s, "predicted_enumerated_s")?,
             scene_load_s: seconds(p.scene_load_s, "scene_load_s")?,
         })
     }
@@ -223,6 +280,11 @@ impl From<SessionPlan> for proto::SessionPlan {
             reason: p.reason,
             predicted_pipeline_s: p.predicted_pipeline_s,
             predicted_direct_s: p.predicted_direct_s,
+            predicted_time_share_s: p.predicted_time_share_s,
+            k_fd_sampler_count: p.k_fd_sampler_count,
+            predicted_k_fd_s: p.predicted_k_fd_s,
+            enumerated_sampler_count: p.enumerated_sampler_count,
+            predicted_enumerated_s: p.predicted_enumerated_s,
             scene_load_s: p.scene_load_s,
         }
     }

@@ -2,6 +2,7 @@
 
 use depth_image::{Aabb, Camera, Illumination};
 use glam::Vec3;
+use prost::Message as _;
 
 use crate::error::{WireError, required};
 use crate::geometry::{bounds_from, bounds_to, camera_to, sample_cameras_from, vec3_from, vec3_to};
@@ -150,6 +151,23 @@ pub(crate) fn refinement_steps_from(count: u32) -> Result<u32, WireError> {
         Ok(count)
     } else {
         Err(WireError::out_of_range("refinement_step_count", count, "from 1 to 64"))
+    }
+}
+
+impl Workload {
+    /// As a message, for whoever keeps it.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        proto::Workload::from(self.clone()).encode_to_vec()
+    }
+
+    /// What [`Workload::to_bytes`] made.
+    ///
+    /// # Errors
+    /// For bytes that are no such message, and for a message that any peer would be refused for.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, WireError> {
+        let message = proto::Workload::decode(bytes).map_err(|error| WireError::corrupt("workload", error))?;
+        message.try_into()
     }
 }
 

@@ -69,8 +69,8 @@ pub struct ViewArgs {
     /// How frames travel: lz4 (without loss) or jpeg:QUALITY
     #[arg(long, default_value = "lz4", value_name = "NAME")]
     codec: FrameCodec,
-    /// auto (whatever is predicted to be faster), pipeline or direct
-    #[arg(long, default_value = "auto", value_name = "NAME", value_parser = policy)]
+    /// auto (whatever is predicted to be fastest), pipeline, direct or time-share
+    #[arg(long, default_value = "auto", value_name = "NAME")]
     policy: PolicyChoice,
     /// Moments of an animated scene; every view is made of each
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -120,15 +120,6 @@ struct Which {
     /// Views from a transforms.json, in the scene file's coordinates
     #[arg(long, value_name = "FILE")]
     cameras: Option<PathBuf>,
-}
-
-fn policy(name: &str) -> Result<PolicyChoice, String> {
-    match name {
-        "auto" => Ok(PolicyChoice::Auto),
-        "pipeline" => Ok(PolicyChoice::Pipeline),
-        "direct" => Ok(PolicyChoice::Direct),
-        other => Err(format!("unknown policy {other:?}, expected auto, pipeline or direct")),
-    }
 }
 
 impl Which {

@@ -1,0 +1,115 @@
+use wire::Costs;
+
+use super::*;
+use crate::schedule::test_support::{COSTS, nodes};
+
+fn load(views: usize) -> Load {
+    Load { images: 4, sets: 1, views, in_order: false }
+}
+
+fn asked(
+    costs: Costs,
+    load: Load,
+    count: usize,
+    policy: PolicyChoice,
+    forced: Option<usize>,
+) -> Result<Choice, ChoiceError> {
+    let wish = Wish { policy, forced_samplers: forced };
+    choose(&Demand { load, nodes: &nodes(count, costs), wish, present: None })
+}
+
+fn auto(views: usize, count: usize) -> Choice {
+    asked(COSTS, load(views), count, PolicyChoice::Auto, None).unwrap()
+}
+
+fn pipeline(costs: Costs, load: Load, count: usize) -> Choice {
+    asked(costs, load, count, PolicyChoice::Pipeline, None).unwrap()
+}
+
+#[test]
+fn many_views_are_reconstructed_and_few_are_drawn() {
+    let many = auto(1000, 5);
+    assert_eq!((many.policy, many.predicted.k_fd, many.division.sampler_count()), (Policy::TimeShare, 1, 1));
+    assert!((many.predicted.pipeline_s - 2.505).abs() < 1e-9);
+    assert!((many.predicted.direct_s - 20.2).abs() < 1e-9);
+    assert!(many.time_s() < many.predicted.pipeline_s);
+    let few = auto(3, 3);
+    assert_eq!(few.policy, Policy::Direct);
+    assert!(few.reason.starts_with("direct, predicted to be faster"), "{}", few.reason);
+    for part in ["100.000 ms", "Pipeline: ", "Time-share: ", "Direct: ", "K_fd = 2"] {
+        assert!(few.reason.contains(part), "{}", few.reason);
+    }
+}
+
+#[test]
+fn the_session_may_decide() {
+    let policies = [PolicyChoice::Pipeline, PolicyChoice::Direct, PolicyChoice::TimeShare];
+    for (choice, policy) in policies.into_iter().zip([Policy::Pipeline, Policy::Direct, Policy::TimeShare]) {
+        assert_eq!(asked(COSTS, load(5), 5, choice, None).unwrap().policy, policy);
+    }
+    assert_eq!(asked(COSTS, load(5), 5, PolicyChoice::Pipeline, Some(3)).unwrap().division.sampler_count(), 3);
+    for forced in [0, 5, 9] {
+        let refused = asked(COSTS, load(5), 5, PolicyChoice::Pipeline, Some(forced));
+        assert!(matches!(refused, Err(ChoiceError::ForcedSamplers { most: 4, .. })));
+    }
+    assert_eq!(asked(COSTS, load(1), 0, PolicyChoice::Auto, None), Err(ChoiceError::NoNodes));
+}
+
+#[test]
+fn whole_images_bound_the_samplers_and_views_keep_a_node() {
+    for count in 1..30 {
+        for views in [1, 10, 1000] {
+            let samplers = pipeline(COSTS, load(views), count).division.sampler_count();
+            assert!((1..=4).contains(&samplers) && (count == 1 || samplers < count));
+        }
+    }
+}
+
+#[test]
+fn where_whole_images_make_the_formula_clearly_worse_trying_decides() {
+    // 4 images by 3 nodes take as long as by 2, which leave one more for views.
+    let choice = pipeline(Costs { reconstruct_view_s: 0.049, ..COSTS }, load(5), 5);
+    assert_eq!((choice.predicted.k_fd, choice.predicted.enumerated), (3, 2));
+    assert!(choice.predicted.k_fd_s <= choice.predicted.enumerated_s * WORTH);
+    assert_eq!(choice.division.sampler_count(), 3, "no clear difference: the formula's");
+    let choice = pipeline(Costs { reconstruct_view_s: 0.119, ..COSTS }, load(4), 6);
+    assert!(choice.time_s() <= choice.predicted.enumerated_s * WORTH, "{}", choice.reason);
+}
+
+#[test]
+fn sets_whose_images_are_sampled_in_order_stay_whole() {
+    let in_order = |sets, views| Load { sets, in_order: true, ..load(views) };
+    assert_eq!(pipeline(COSTS, in_order(1, 20), 5).division.sampler_count(), 1, "one set, one node");
+    let choice = pipeline(COSTS, in_order(30, 20), 5);
+    assert!(choice.division.sampler_count() > 1 && choice.reason.contains("whole sets in turn"), "{choice:?}");
+}
+
+#[test]
+fn unequal_nodes_do_what_they_do_best() {
+    let mut nodes = nodes(4, COSTS);
+    // A slow sampler that reconstructs as fast as any, behind the others in name.
+    nodes[0].costs.sample_image_s = 1.0;
+    let wish = Wish { policy: PolicyChoice::Pipeline, forced_samplers: None };
+    for views in [1, 10, 100, 1000] {
+        let choice = choose(&Demand { load: load(views), nodes: &nodes, wish, present: None }).unwrap();
+        assert!(!choice.division.samples[0] && choice.reason.contains("unequal"), "{choice:?}");
+        assert!(choice.predicted.pipeline_s <= choice.predicted.k_fd_s);
+    }
+}
+
+#[test]
+fn roles_stay_where_nothing_is_clearly_better() {
+    let nodes = nodes(5, COSTS);
+    let samples = vec![false, false, false, true, false];
+    let present = Present { policy: Policy::Pipeline, samples: samples.clone() };
+    let wish = Wish { policy: PolicyChoice::Pipeline, forced_samplers: None };
+    let demand = Demand { load: load(1000), nodes: &nodes, wish, present: Some(&present) };
+    assert_eq!(choose(&demand).unwrap().division.samples, samples);
+    let few = choose(&Demand { load: load(5), ..demand }).unwrap();
+    assert!(few.division.samples[3] && few.division.sampler_count() > 1, "{few:?}");
+    let any = Wish::default();
+    let near = Present { policy: Policy::Direct, samples };
+    let views = 4;
+    let kept = choose(&Demand { load: load(views), wish: any, present: Some(&near), ..demand }).unwrap();
+    assert_eq!(kept.policy, Policy::Direct);
+}

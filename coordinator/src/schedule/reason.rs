@@ -1,0 +1,67 @@
+//! Why a policy and a K were chosen, in plain words.
+
+use wire::{Policy, PolicyChoice};
+
+use super::choose::{Demand, Predicted};
+use super::{Load, NodeCosts};
+
+/// Every figure that the choice rests on.
+pub(super) fn reason(demand: &Demand<'_>, policy: Policy, samplers: usize, predicted: &Predicted) -> String {
+    let parts = [pipeline(demand, samplers, predicted), time_share(demand, predicted), direct(demand, predicted)];
+    let unequal = if NodeCosts::are_equal(demand.nodes) { "" } else { " Nodes are unequal: costs are their mean." };
+    format!("{policy}, {}. {}{unequal}", who(demand), parts.join(" "))
+}
+
+fn who(demand: &Demand<'_>) -> &'static str {
+    match (demand.wish.policy, demand.wish.forced_samplers) {
+        (PolicyChoice::Auto, None) => "predicted to be faster",
+        (PolicyChoice::Auto, Some(_)) => "predicted to be faster, with K as asked for",
+        (_, None) => "asked for",
+        (_, Some(_)) => "asked for, and K too",
+    }
+}
+
+fn ms(seconds: f64) -> String {
+    format!("{:.3} ms", seconds * 1e3)
+}
+
+fn pipeline(demand: &Demand<'_>, samplers: usize, predicted: &Predicted) -> String {
+    let Load { images, views, in_order, .. } = demand.load;
+    let (nodes, mean) = (demand.nodes.len(), NodeCosts::mean(demand.nodes).costs);
+    let in_turn = if in_order { "whole sets in turn, " } else { "" };
+    let roles = match nodes {
+        1 => "1 node in turn".to_owned(),
+        _ => format!("K = {samplers} of {nodes} nodes, {in_turn}the others reconstruct"),
+    };
+    format!(
+        "Pipeline: {} a set: {images} images of {} sampled by {roles} {views} views of {} + {} to encode, after {} to \
+         load the set (K_fd = {}, {}; trying every K gives K = {}, {}).",
+        ms(predicted.pipeline_s),
+        ms(mean.sample_image_s),
+        ms(mean.reconstruct_view_s),
+        ms(mean.encode_view_s),
+        ms(mean.load_set_s),
+        predicted.k_fd,
+        ms(predicted.k_fd_s),
+        predicted.enumerated,
+        ms(predicted.enumerated_s),
+    )
+}
+
+fn time_share(demand: &Demand<'_>, predicted: &Predicted) -> String {
+    let nodes = demand.nodes.len();
+    format!(
+        "Time-share: {} a set: each of {nodes} nodes samples and reconstructs its part.",
+        ms(predicted.time_share_s)
+    )
+}
+
+fn direct(demand: &Demand<'_>, predicted: &Predicted) -> String {
+    let (nodes, views, mean) = (demand.nodes.len(), demand.load.views, NodeCosts::mean(demand.nodes).costs);
+    format!(
+        "Direct: {} a set: {views} views of {} + {} to encode on {nodes} nodes.",
+        ms(predicted.direct_s),
+        ms(mean.direct_view_s),
+        ms(mean.encode_view_s),
+    )
+}

@@ -1,0 +1,272 @@
+use wire::{Assignment, Policy, PolicyChoice};
+
+use super::*;
+use crate::schedule::test_support::{COSTS, join, opened, opening, workload};
+
+const PIPELINE: PolicyChoice = PolicyChoice::Pipeline;
+
+/// A scheduler and its clock.
+struct Cluster {
+    scheduler: Scheduler,
+    now: Duration,
+}
+
+impl Cluster {
+    fn of(nodes: u64) -> Self {
+        let mut cluster = Self { scheduler: Scheduler::default(), now: Duration::ZERO };
+        for i in 0..nodes {
+            assert_eq!(cluster.step(join(&format!("n{i}"), i, 0)), []);
+        }
+        cluster
+    }
+
+    fn step(&mut self, event: Event) -> Vec<Command> {
+        self.scheduler.step(self.now, event)
+    }
+
+    fn left(&mut self, incarnation: u64, name: &str) -> Vec<Command> {
+        self.step(Event::Left { incarnation, node_name: name.to_owned() })
+    }
+
+    /// All nodes of the plan in force are ready, and time passes, up to the next command.
+    fn wait(&mut self, seconds: u64) -> Vec<Command> {
+        let plan = self.plan();
+        for node_name in self.scheduler.members.keys().cloned().collect::<Vec<_>>() {
+            self.step(Event::Ready { plan_epoch: plan.plan_epoch, node_name });
+        }
+        for _ in 0..seconds * 2 {
+            self.now += Duration::from_millis(500);
+            let commands = self.step(Event::Tick);
+            if !commands.is_empty() {
+                return commands;
+            }
+        }
+        Vec::new()
+    }
+
+    fn plan(&self) -> Assignment {
+        self.scheduler.in_force().expect("a plan").plan.assignment.clone()
+    }
+}
+
+fn applied(commands: &[Command]) -> (&[u64], &SessionPlan) {
+    match commands.last() {
+        Some(Command::Apply { sessions, plan, .. }) => (sessions, plan),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn assignment_of(commands: &[Command]) -> &Assignment {
+    &applied(commands).1.assignment
+}
+
+fn roles(plan: &Assignment) -> BTreeMap<&str, (bool, bool)> {
+    let mut roles: BTreeMap<&str, (bool, bool)> = BTreeMap::new();
+    plan.samplers.iter().for_each(|share| roles.entry(&share.node_name).or_default().0 = true);
+    plan.compositors.iter().for_each(|share| roles.entry(&share.node_name).or_default().1 = true);
+    roles
+}
+
+fn changes(from: &Assignment, to: &Assignment) -> usize {
+    let (from, to) = (roles(from), roles(to));
+    from.iter().filter(|(name, role)| to.get(*name).is_some_and(|new| new != *role)).count()
+}
+
+#[test]
+fn every_member_has_a_role() {
+    let mut cluster = Cluster::of(5);
+    let commands = cluster.step(opened(1, PIPELINE, 40));
+    let plan = assignment_of(&commands);
+    assert_eq!(plan.samplers.len() + plan.compositors.len(), 5);
+    let images: usize = plan.samplers.iter().map(|share| share.image_indices.len()).sum();
+    assert_eq!(images, 4);
+    let commands = cluster.step(opened(2, PolicyChoice::Direct, 40));
+    let plan = assignment_of(&commands);
+    assert_eq!((plan.samplers.len(), plan.compositors.len()), (0, 5), "the last session decides");
+    let commands = cluster.step(opened(3, PolicyChoice::TimeShare, 40));
+    let plan = assignment_of(&commands);
+    assert_eq!((plan.samplers.len(), plan.compositors.len()), (4, 5), "four images");
+    let commands = cluster.step(Event::Closed { session: 3 });
+    assert_eq!((applied(&commands).0, assignment_of(&commands).policy), (&[1, 2][..], Policy::Direct));
+}
+
+#[test]
+fn one_node_has_both_roles() {
+    let commands = Cluster::of(1).step(opened(1, PIPELINE, 40));
+    let plan = assignment_of(&commands);
+    assert_eq!((plan.images_of("n0", 0).len(), plan.composites("n0")), (4, true));
+}
+
+#[test]
+fn epochs_rise_above_what_any_node_has_seen() {
+    let mut cluster = Cluster::of(2);
+    assert_eq!(assignment_of(&cluster.step(opened(1, PIPELINE, 40))).plan_epoch, 1);
+    assert_eq!(cluster.step(join("late", 9, 41)), []);
+    assert_eq!(assignment_of(&cluster.left(1, "n1")).plan_epoch, 42);
+}
+
+#[test]
+fn sessions_of_one_workload_share_a_plan_and_another_workload_takes_over() {
+    let mut cluster = Cluster::of(3);
+    cluster.step(opened(1, PIPELINE, 40));
+    let commands = cluster.step(opened(2, PIPELINE, 2));
+    assert_eq!((commands.len(), applied(&commands).0, assignment_of(&commands).plan_epoch), (1, &[2][..], 1));
+    assert_eq!((cluster.scheduler.status().session_count, cluster.scheduler.status().views_per_set), (2, 42));
+    let other = Opening { workload: workload(3), ..opening(3, PIPELINE, 5) };
+    let commands = cluster.step(Event::Opened(Box::new(other)));
+    let ended = |session| Command::End { session, reason: "plan 2 took its place".to_owned() };
+    assert_eq!(commands[..2], [ended(1), ended(2)]);
+    assert_eq!((applied(&commands).0, assignment_of(&commands).plan_epoch), (&[3][..], 2));
+}
+
+#[test]
+fn a_lost_node_is_planned_around_at_once() {
+    let mut cluster = Cluster::of(4);
+    cluster.step(opened(1, PIPELINE, 40));
+    let before = cluster.plan();
+    let commands = cluster.left(3, "n3");
+    let (sessions, plan) = applied(&commands);
+    assert_eq!((sessions, plan.assignment.plan_epoch), (&[1][..], 2));
+    assert!(plan.reason.ends_with("Planned anew: node n3 left the cluster."), "{}", plan.reason);
+    assert!(!roles(&plan.assignment).contains_key("n3"));
+    assert_eq!(changes(&before, &plan.assignment), 0, "the others keep their roles");
+    assert_eq!(cluster.left(3, "n3"), [], "it was gone");
+}
+
+#[test]
+fn without_nodes_sessions_wait_for_the_next_one() {
+    let mut cluster = Cluster::of(1);
+    cluster.step(opened(1, PIPELINE, 40));
+    assert_eq!(cluster.left(0, "n0"), []);
+    assert!(cluster.scheduler.status().plan.is_none());
+    let refused = cluster.step(opened(2, PIPELINE, 40));
+    assert_eq!(refused, [Command::Refuse { session: 2, error: ChoiceError::NoNodes }]);
+    let commands = cluster.step(join("n9", 9, 0));
+    assert_eq!((applied(&commands).0, assignment_of(&commands).plan_epoch), (&[1][..], 2));
+}
+
+#[test]
+fn of_two_processes_with_one_name_the_later_counts() {
+    let mut cluster = Cluster::of(2);
+    cluster.step(opened(1, PIPELINE, 40));
+    let commands = cluster.step(join("n0", 7, 1));
+    assert!(applied(&commands).1.reason.contains("n0 was started again"));
+    assert_eq!(cluster.left(0, "n0"), [], "the earlier one's end");
+    assert_eq!(cluster.scheduler.status().nodes.len(), 2);
+}
+
+#[test]
+fn a_new_node_waits_for_the_dwell_and_then_gets_a_role() {
+    let mut cluster = Cluster::of(2);
+    cluster.step(opened(1, PIPELINE, 400));
+    assert_eq!(cluster.step(join("n9", 9, 0)), []);
+    let commands = cluster.wait(20);
+    assert!((Duration::from_secs(5)..Duration::from_secs(7)).contains(&cluster.now), "{:?}", cluster.now);
+    assert!(assignment_of(&commands).composites("n9"));
+    assert_eq!(cluster.wait(60), [], "and then it rests");
+}
+
+#[test]
+fn k_follows_the_views_two_roles_at_a_time() {
+    let mut cluster = Cluster::of(11);
+    cluster.step(opened(1, PIPELINE, 1));
+    let mut k = vec![cluster.plan().samplers.len()];
+    cluster.step(Event::Demanded { session: 1, views_per_set: 500 });
+    loop {
+        let before = cluster.plan();
+        if cluster.wait(60).is_empty() {
+            break;
+        }
+        assert!(changes(&before, &cluster.plan()) <= 2);
+        k.push(cluster.plan().samplers.len());
+    }
+    assert!(k.len() > 1 && k.is_sorted_by(|a, b| a > b), "{k:?}");
+    let plan = cluster.scheduler.status().plan.unwrap();
+    assert!(plan.predicted_pipeline_s <= plan.predicted_k_fd_s * 1.1, "{}", plan.reason);
+}
+
+#[test]
+fn costs_that_nodes_report_move_roles() {
+    let mut cluster = Cluster::of(4);
+    cluster.step(opened(1, PIPELINE, 30));
+    let sampler = cluster.plan().samplers[0].node_name.clone();
+    let costs = MeasuredCosts { sample_image_s: Some(10.0 * COSTS.sample_image_s), ..MeasuredCosts::default() };
+    for _ in 0..20 {
+        cluster.step(Event::Measured { node_name: sampler.clone(), costs });
+    }
+    let commands = cluster.wait(60);
+    assert!(!assignment_of(&commands).samplers.iter().any(|share| share.node_name == sampler));
+    let conditions = cluster.scheduler.status().conditions;
+    assert!(conditions.iter().any(|c| c.node_name == sampler && c.costs.sample_image_s > 0.9));
+}
+
+#[test]
+fn a_node_that_cannot_take_a_plan_is_left_out_until_it_joins_again() {
+    let mut cluster = Cluster::of(3);
+    cluster.step(opened(1, PIPELINE, 400));
+    let unready = |plan_epoch| Event::Unready { plan_epoch, node_name: "n1".to_owned(), reason: "no disk".to_owned() };
+    assert_eq!(cluster.step(unready(7)), [], "of another plan");
+    let commands = cluster.step(unready(1));
+    let plan = applied(&commands).1;
+    assert!(!roles(&plan.assignment).contains_key("n1") && plan.reason.contains("no disk"), "{}", plan.reason);
+    assert_eq!(cluster.step(unready(1)), [], "that plan is no more");
+    assert_eq!(cluster.wait(60), []);
+    cluster.step(join("n1", 9, 1));
+    assert!(roles(assignment_of(&cluster.wait(60))).contains_key("n1"));
+}
+
+#[test]
+fn old_readiness_and_unknown_names_are_nothing() {
+    let mut cluster = Cluster::of(2);
+    cluster.step(opened(1, PIPELINE, 40));
+    let ready = |plan_epoch, name: &str| Event::Ready { plan_epoch, node_name: name.to_owned() };
+    for event in [
+        ready(0, "n0"),
+        ready(1, "nobody"),
+        Event::Measured { node_name: "nobody".to_owned(), costs: MeasuredCosts::default() },
+        Event::Demanded { session: 77, views_per_set: 1 },
+        Event::Closed { session: 77 },
+    ] {
+        assert_eq!(cluster.step(event), []);
+    }
+    let is_ready = |cluster: &Cluster| cluster.scheduler.status().conditions.iter().filter(|c| c.is_ready).count();
+    assert_eq!(is_ready(&cluster), 0);
+    cluster.step(ready(1, "n0"));
+    assert_eq!(is_ready(&cluster), 1);
+}
+
+#[test]
+fn a_forced_k_that_cannot_be_is_refused_and_later_made_do_with() {
+    let mut cluster = Cluster::of(4);
+    let forced = |k| Opening { forced_samplers: Some(k), ..opening(1, PIPELINE, 40) };
+    assert!(matches!(
+        cluster.step(Event::Opened(Box::new(forced(4))))[..],
+        [Command::Refuse { error: ChoiceError::ForcedSamplers { forced: 4, most: 3, .. }, .. }]
+    ));
+    cluster.step(Event::Opened(Box::new(forced(3))));
+    assert_eq!(cluster.plan().samplers.len(), 3);
+    assert_eq!(assignment_of(&cluster.left(0, "n0")).samplers.len(), 2);
+}
+
+#[test]
+fn closed_sessions_are_forgotten_and_a_refused_one_ends_nobody() {
+    let mut cluster = Cluster::of(2);
+    cluster.step(opened(1, PIPELINE, 40));
+    let other = Opening { workload: workload(2), forced_samplers: Some(9), ..opening(2, PIPELINE, 40) };
+    assert!(matches!(cluster.step(Event::Opened(Box::new(other)))[..], [Command::Refuse { session: 2, .. }]));
+    cluster.step(Event::Closed { session: 1 });
+    assert!(cluster.scheduler.status().plan.is_none());
+    assert_eq!(cluster.left(0, "n0"), []);
+}
+
+#[test]
+fn commands_are_said_in_words() {
+    let mut cluster = Cluster::of(2);
+    let text = cluster.step(opened(1, PIPELINE, 40))[0].to_string();
+    assert!(
+        text.starts_with("apply plan 1 to sessions [1]: pipeline, samplers n0[0,1,2,3], compositors n1, "),
+        "{text}"
+    );
+    let refused = Command::Refuse { session: 3, error: ChoiceError::NoNodes };
+    assert_eq!(refused.to_string(), "refuse session 3: no node has joined the cluster");
+}

@@ -1,0 +1,130 @@
+//! Who samples, by trying: every K over the nodes in order, then single moves and swaps.
+
+use std::cmp::Ordering;
+
+use super::predict::pipeline_s;
+use super::{Load, NodeCosts};
+
+/// Most nodes of which moves and swaps are tried: beyond, every look would take longer than it saves.
+const MOST_NODES_TO_MOVE: usize = 32;
+/// A move that gains less is none: rounding would move nodes back and forth.
+const LEAST_GAIN: f64 = 1e-9;
+
+/// A division of the nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Division {
+    /// Whether each node samples; the others composite.
+    pub samples: Vec<bool>,
+    /// T of it.
+    pub time_s: f64,
+}
+
+impl Division {
+    /// With its predicted time.
+    #[must_use]
+    pub fn new(load: &Load, nodes: &[NodeCosts], samples: Vec<bool>) -> Self {
+        let time_s = pipeline_s(load, nodes, &samples);
+        Self { samples, time_s }
+    }
+
+    /// K.
+    #[must_use]
+    pub fn sampler_count(&self) -> usize {
+        self.samples.iter().filter(|samples| **samples).count()
+    }
+
+    fn flipped(&self, load: &Load, nodes: &[NodeCosts], flips: &[usize]) -> Self {
+        let mut samples = self.samples.clone();
+        for &i in flips {
+            samples[i] = !samples[i];
+        }
+        Self::new(load, nodes, samples)
+    }
+}
+
+/// Nodes by what they should do, best samplers first. Equal ones by what they do now (`sampled`), so that K ± 1 is one
+/// change of role; unequal ones by s/q, how much faster they sample than they composite.
+#[must_use]
+pub fn order(nodes: &[NodeCosts], sampled: &[bool]) -> Vec<usize> {
+    let equal = NodeCosts::are_equal(nodes);
+    let ratio = |i: usize| nodes[i].view_s() / nodes[i].costs.sample_image_s.max(f64::MIN_POSITIVE);
+    let by_speed = |a: usize, b: usize| if equal { Ordering::Equal } else { ratio(b).total_cmp(&ratio(a)) };
+    let does = |i: usize| sampled.get(i).copied().unwrap_or(false);
+    let mut order: Vec<usize> = (0..nodes.len()).collect();
+    order.sort_by(|&a, &b| by_speed(a, b).then(does(b).cmp(&does(a))));
+    order
+}
+
+/// The first K in `order` sample.
+#[must_use]
+pub fn first(load: &Load, nodes: &[NodeCosts], order: &[usize], k: usize) -> Division {
+    let mut samples = vec![false; nodes.len()];
+    for &i in order.iter().take(k) {
+        samples[i] = true;
+    }
+    Division::new(load, nodes, samples)
+}
+
+/// The best of every K; of unequal nodes each K improved by moves. Of equal times the least K.
+#[must_use]
+pub fn enumerate(load: &Load, nodes: &[NodeCosts], order: &[usize]) -> Division {
+    let moves = !NodeCosts::are_equal(nodes) && nodes.len() <= MOST_NODES_TO_MOVE;
+    let every_k = (1..=load.most_samplers(nodes.len())).map(|k| first(load, nodes, order, k));
+    let improved = every_k.map(|division| if moves { improve(load, nodes, division, true) } else { division });
+    improved.min_by(by_time).unwrap_or_else(|| first(load, nodes, order, 1))
+}
+
+fn by_time(a: &Division, b: &Division) -> Ordering {
+    a.time_s.total_cmp(&b.time_s)
+}
+
+/// Single moves (where K may change) and swaps, the best one first, until none gains.
+#[must_use]
+pub fn improve(load: &Load, nodes: &[NodeCosts], mut best: Division, k_may_change: bool) -> Division {
+    while let Some(better) = neighbours(load, nodes, &best, k_may_change).min_by(by_time) {
+        if better.time_s >= best.time_s * (1.0 - LEAST_GAIN) {
+            break;
+        }
+        best = better;
+    }
+    best
+}
+
+fn neighbours<'a>(
+    load: &'a Load,
+    nodes: &'a [NodeCosts],
+    from: &'a Division,
+    k_may_change: bool,
+) -> impl Iterator<Item = Division> + 'a {
+    let count = nodes.len();
+    let singles = (0..if k_may_change { count } else { 0 }).map(|i| vec![i]);
+    let differ = |i: usize, j: usize| from.samples[i] != from.samples[j];
+    let swaps = (0..count).flat_map(move |i| (0..i).filter(move |&j| differ(i, j)).map(move |j| vec![i, j]));
+    let possible = |division: &Division| (1..=load.most_samplers(nodes.len())).contains(&division.sampler_count());
+    singles.chain(swaps).map(|flips| from.flipped(load, nodes, &flips)).filter(possible)
+}
+
+/// From a division towards another with at most `changes` changes of role, the best first. `has_role` says whose
+/// change counts: a node that does nothing yet takes its role at once.
+#[must_use]
+pub fn towards(
+    load: &Load,
+    nodes: &[NodeCosts],
+    present: &[bool],
+    target: &Division,
+    has_role: &[bool],
+    changes: usize,
+) -> Division {
+    let start = |i: usize| if has_role[i] { present[i] } else { target.samples[i] };
+    let mut division = Division::new(load, nodes, (0..nodes.len()).map(start).collect());
+    for _ in 0..changes {
+        let open = (0..nodes.len()).filter(|&i| division.samples[i] != target.samples[i]);
+        let Some(next) = open.map(|i| division.flipped(load, nodes, &[i])).min_by(by_time) else { break };
+        division = next;
+    }
+    division
+}
+
+#[cfg(test)]
+#[path = "search_tests.rs"]
+mod tests;

@@ -1,0 +1,83 @@
+//! What tests of several files share: numbers from a seed, costs, and events.
+
+use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
+use glam::{UVec2, Vec3};
+use wire::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, Timeline, Workload};
+
+use super::{Event, NodeCosts, Opening};
+
+/// Numbers from a seed (SplitMix64).
+pub(super) struct Random(pub(super) u64);
+
+impl Random {
+    pub(super) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    pub(super) fn below(&mut self, bound: u64) -> u64 {
+        self.next() % bound
+    }
+
+    /// From 0 to 1.
+    pub(super) fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Evenly spread over the logarithm.
+    pub(super) fn between(&mut self, least: f64, most: f64) -> f64 {
+        least * (most / least).powf(self.unit())
+    }
+}
+
+pub(super) const COSTS: Costs = Costs {
+    sample_image_s: 0.1,
+    direct_view_s: 0.1,
+    reconstruct_view_s: 0.009,
+    load_set_s: 0.005,
+    encode_view_s: 0.001,
+    in_order: false,
+};
+
+/// So many nodes that need `costs`.
+pub(super) fn nodes(count: usize, costs: Costs) -> Vec<NodeCosts> {
+    vec![NodeCosts { costs, transfer_image_s: 0.0 }; count]
+}
+
+pub(super) fn join(name: &str, incarnation: u64, plan_epoch: u64) -> Event {
+    let node = NodeStatus {
+        node_name: name.to_owned(),
+        address: format!("http://{name}:{incarnation}"),
+        device_name: "cpu".to_owned(),
+        is_software: true,
+    };
+    Event::Joined { incarnation, join: JoinCluster { node, plan_epoch } }
+}
+
+pub(super) fn workload(images: usize) -> Workload {
+    let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8));
+    Workload {
+        scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
+        sample_cameras: vec![Camera::Pinhole(camera); images],
+        sampling: "conventional".to_owned(),
+        lighting: "unlit".to_owned(),
+        method: "joint_carve".to_owned(),
+        codec: "lz4".to_owned(),
+        volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
+        background_linear: Vec3::ZERO,
+        timeline: Timeline::still(0.0),
+        illumination: Illumination::default(),
+        refinement_steps: 1,
+    }
+}
+
+pub(super) fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) -> Opening {
+    Opening { session, workload: workload(4), views_per_set, policy, forced_samplers: None, costs: COSTS }
+}
+
+pub(super) fn opened(session: u64, policy: PolicyChoice, views_per_set: usize) -> Event {
+    Event::Opened(Box::new(opening(session, policy, views_per_set)))
+}
