@@ -13,16 +13,22 @@ export NODEVICE_SELECT = 1
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo test fmt-check lint unit bench doc audit vulkan toolchain lint-toolchain clean
+.PHONY: help build demo cluster cluster-test test fmt-check lint unit bench doc audit vulkan toolchain lint-toolchain clean
 
 help: ## what can be made
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 	@echo '  ARGS="…" is passed on, as in: make demo ARGS="--scene model.glb"'
 
 demo: build ## the paper's experiment on this machine; pictures and report in out/demo
 	$(CARGO) run --release --locked --package myriorama -- demo $(ARGS)
 
 test: fmt-check lint unit ## format, lints and all tests
+
+cluster: build ## a coordinator and four nodes in containers; leaves them running
+	deploy/cluster.sh
+
+cluster-test: build ## the same, with nodes that are killed; stops it all
+	deploy/cluster.sh --test
 
 bench: build ## speed and accuracy against the bars; report in out/bench
 	$(CARGO) run --release --locked --package myriorama -- bench $(ARGS)

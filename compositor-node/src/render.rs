@@ -71,7 +71,7 @@ async fn render(
                 metrics.view_s.observe(reconstruct_s);
                 metrics.queue_s.observe(start.saturating_duration_since(view.since).as_secs_f64());
             }
-            tokio::spawn(encode_all(batch, views, start, reconstruct_s, encoders, place));
+            tokio::spawn(encode_all(batch, views, (start, reconstruct_s), encoders, place, metrics.clone()));
         }
         Err(status) => {
             for view in batch {
@@ -109,10 +109,10 @@ async fn make(engine: &Arc<dyn Engine>, batch: &[Waiting]) -> Result<Vec<View>, 
 async fn encode_all(
     batch: Vec<Waiting>,
     views: Vec<View>,
-    start: Instant,
-    reconstruct_s: f64,
+    (start, reconstruct_s): (Instant, f64),
     encoders: Arc<Semaphore>,
     place: OwnedSemaphorePermit,
+    metrics: NodeMetrics,
 ) {
     let batch_count = batch.len() as u32;
     let mut encodings = tokio::task::JoinSet::new();
@@ -122,8 +122,9 @@ async fn encode_all(
         };
         let queue_s = start.saturating_duration_since(waiting.since).as_secs_f64();
         let times = StageTimes { set_wait_s: waiting.set_wait_s, queue_s, reconstruct_s, encode_s: 0.0, batch_count };
+        let metrics = metrics.clone();
         encodings.spawn(async move {
-            encode_and_send(waiting, view, times).await;
+            encode_and_send(waiting, view, times, &metrics).await;
             drop(encoder);
         });
     }
@@ -131,7 +132,7 @@ async fn encode_all(
     drop(place);
 }
 
-async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes) {
+async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes, metrics: &NodeMetrics) {
     let Waiting { key, view: requested, codec, reply, credit, .. } = waiting;
     let encoded = blocking(move || {
         let start = Instant::now();
@@ -140,6 +141,7 @@ async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes) {
     });
     let output = encoded.await.map(|(encoded, encode_s)| {
         times.encode_s = encode_s;
+        metrics.frame_bytes.inc_by(encoded.data.len() as u64);
         let header = encoded.header(key.sample_set_id, times);
         Output { parts: Box::new(FramePart::cut(requested.frame, header, encoded.data)), _credit: credit }
     });

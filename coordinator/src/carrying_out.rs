@@ -29,6 +29,7 @@ pub(crate) async fn carry_out(inner: Arc<Inner>, mut commands: mpsc::UnboundedRe
 
 async fn apply(inner: Arc<Inner>, sessions: Vec<u64>, mut plan: SessionPlan, addresses: Vec<String>) {
     let plan_epoch = plan.assignment.plan_epoch;
+    inner.metrics.planned();
     tracing::info!(plan_epoch, reason = plan.reason, "planned");
     for &session in &sessions {
         let detail = format!("{} nodes take plan {plan_epoch}", addresses.len());

@@ -5,10 +5,12 @@
 
 mod carrying_out;
 mod config;
+mod metrics;
 mod opening;
 pub mod schedule;
 mod service;
 mod workload;
 
 pub use config::{CoordinatorConfig, SceneOffer};
+pub use metrics::CoordinatorMetrics;
 pub use service::serve;

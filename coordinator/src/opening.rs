@@ -97,7 +97,11 @@ async fn measure_on(inner: &Inner, node: &NodeStatus, measure: MeasureCosts) -> 
     within(inner.config.measure_deadline, "measuring", call).await.map_err(|status| named(&node.node_name, &status))
 }
 
-pub(crate) async fn within<T>(deadline: Duration, what: &str, call: impl Future<Output = Result<T, Status>>) -> Result<T, Status> {
+pub(crate) async fn within<T>(
+    deadline: Duration,
+    what: &str,
+    call: impl Future<Output = Result<T, Status>>,
+) -> Result<T, Status> {
     let late = |_| Status::deadline_exceeded(format!("{what} took longer than {} s", deadline.as_secs()));
     tokio::time::timeout(deadline, call).await.map_err(late)?
 }

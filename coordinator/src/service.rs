@@ -24,7 +24,7 @@ use wire::{
 use crate::carrying_out::carry_out;
 use crate::opening::{Events, open};
 use crate::schedule::{Command, Event, Scheduler};
-use crate::{CoordinatorConfig, SceneOffer};
+use crate::{CoordinatorConfig, CoordinatorMetrics, SceneOffer};
 
 /// Events that a session's client has not read yet.
 const SESSION_EVENTS: usize = 64;
@@ -40,6 +40,7 @@ pub async fn serve(
     listener: TcpListener,
     config: CoordinatorConfig,
     offer: SceneOffer,
+    metrics: CoordinatorMetrics,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
     let (commands, to_do) = mpsc::unbounded_channel();
@@ -51,6 +52,7 @@ pub async fn serve(
         started: Instant::now(),
         scheduler: Mutex::default(),
         commands,
+        metrics,
         sessions: Mutex::default(),
         costs: Mutex::default(),
         counter: AtomicU64::new(1),
@@ -80,6 +82,7 @@ pub(crate) struct Inner {
     started: Instant,
     scheduler: Mutex<Scheduler>,
     commands: mpsc::UnboundedSender<Command>,
+    pub(crate) metrics: CoordinatorMetrics,
     sessions: Mutex<HashMap<u64, Events>>,
     /// Of each device and what was measured, the oldest first.
     costs: Mutex<Vec<(String, MeasureCosts, Costs)>>,
@@ -94,7 +97,9 @@ impl Inner {
     /// Tells the schedule; what follows is carried out in its order.
     pub(crate) fn step(&self, event: Event) {
         let mut scheduler = locked(&self.scheduler);
-        for command in scheduler.step(self.started.elapsed(), event) {
+        let commands = scheduler.step(self.started.elapsed(), event);
+        self.metrics.show(&scheduler.status());
+        for command in commands {
             // Nobody listens any more only at the end.
             let _ = self.commands.send(command);
         }

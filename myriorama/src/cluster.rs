@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use client::Client;
-use coordinator::{CoordinatorConfig, SceneOffer};
+use coordinator::{CoordinatorConfig, CoordinatorMetrics, SceneOffer};
 use node::{Engine, NodeConfig, NodeMetrics, ServeError};
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
@@ -38,7 +38,13 @@ impl Cluster {
         let address = format!("http://{}", loopback_of(&listener)?);
         let mut cluster = Self { address, shutdown: CancellationToken::new(), servers: JoinSet::new() };
         let config = CoordinatorConfig { insecure_bind, ..CoordinatorConfig::default() };
-        cluster.servers.spawn(coordinator::serve(listener, config, offer, cluster.shutdown.clone()));
+        cluster.servers.spawn(coordinator::serve(
+            listener,
+            config,
+            offer,
+            CoordinatorMetrics::default(),
+            cluster.shutdown.clone(),
+        ));
         for number in 0..nodes {
             cluster.add_node(number, engine.clone()).await?;
         }
@@ -50,13 +56,7 @@ impl Cluster {
         let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
         // As many digits as sort well: members are listed by name.
         let config = NodeConfig::new(format!("node-{number:03}"), &self.address);
-        self.servers.spawn(node_host::serve(
-            listener,
-            config,
-            engine,
-            NodeMetrics::default(),
-            self.shutdown.clone(),
-        ));
+        self.servers.spawn(node_host::serve(listener, config, engine, NodeMetrics::default(), self.shutdown.clone()));
         Ok(())
     }
 

@@ -24,5 +24,6 @@ pub mod rig;
 pub mod sampling_study;
 pub mod setup;
 pub mod sizes;
+pub mod status_text;
 pub mod sweep;
 pub mod text_table;

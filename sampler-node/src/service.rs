@@ -86,7 +86,12 @@ fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Opt
     Ok(workload.timeline.time_s(set_index).map(work))
 }
 
-fn sample(engine: &dyn Engine, work: &SampleWork, indices: &[u32], metrics: &NodeMetrics) -> Result<EncodedImages, Status> {
+fn sample(
+    engine: &dyn Engine,
+    work: &SampleWork,
+    indices: &[u32],
+    metrics: &NodeMetrics,
+) -> Result<EncodedImages, Status> {
     let start = Instant::now();
     let images = engine.sample(work)?;
     let sampled_s = start.elapsed().as_secs_f64();

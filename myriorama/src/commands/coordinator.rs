@@ -3,11 +3,12 @@
 use std::net::SocketAddr;
 
 use clap::Args;
-use coordinator::CoordinatorConfig;
+use coordinator::{CoordinatorConfig, CoordinatorMetrics};
+use node::Telemetry;
 use tokio_util::sync::CancellationToken;
 
 use crate::exit::Outcome;
-use crate::process::{listen, runtime, stop_signal};
+use crate::process::{listen, runtime, serve_metrics, stop_signal};
 use crate::setup::{SceneArgs, Setup};
 
 /// Draws nothing itself: it needs no device.
@@ -18,6 +19,9 @@ pub struct CoordinatorArgs {
     /// Where it listens
     #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT")]
     listen: SocketAddr,
+    /// Where Prometheus reads what it counts, at /metrics
+    #[arg(long, value_name = "HOST:PORT")]
+    metrics: Option<SocketAddr>,
     /// Serve without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
@@ -43,7 +47,10 @@ async fn serve(args: CoordinatorArgs, setup: Setup) -> anyhow::Result<Outcome> {
     let Setup { offer, .. } = setup;
     let shutdown = CancellationToken::new();
     let config = CoordinatorConfig { insecure_bind: args.insecure_bind, ..CoordinatorConfig::default() };
-    let serving = coordinator::serve(listener, config, offer, shutdown.clone());
+    let telemetry = Telemetry::default();
+    let metrics = CoordinatorMetrics::new(&telemetry);
+    serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
+    let serving = coordinator::serve(listener, config, offer, metrics, shutdown.clone());
     tokio::spawn(async move {
         // Without signals there is still the caller's way to end the process.
         if stop_signal().await.is_ok() {

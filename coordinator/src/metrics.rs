@@ -1,0 +1,59 @@
+//! What the coordinator counts.
+
+use node::Telemetry;
+use prometheus_client::metrics::{counter::Counter, gauge::Gauge};
+use wire::ClusterStatus;
+
+/// Registered gauges of the cluster's state, and a counter of its plans.
+#[derive(Debug, Clone)]
+pub struct CoordinatorMetrics {
+    nodes: Gauge,
+    samplers: Gauge,
+    sessions: Gauge,
+    views_per_set: Gauge,
+    plan_epoch: Gauge,
+    plans: Counter,
+}
+
+impl CoordinatorMetrics {
+    /// Registered, all at zero.
+    #[must_use]
+    pub fn new(telemetry: &Telemetry) -> Self {
+        let metrics = Self {
+            nodes: Gauge::default(),
+            samplers: Gauge::default(),
+            sessions: Gauge::default(),
+            views_per_set: Gauge::default(),
+            plan_epoch: Gauge::default(),
+            plans: Counter::default(),
+        };
+        let mut registry = telemetry.registry();
+        registry.register("cluster_nodes", "P: nodes that have joined", metrics.nodes.clone());
+        registry.register("cluster_samplers", "K: nodes that sample", metrics.samplers.clone());
+        registry.register("cluster_sessions", "Sessions of the plan", metrics.sessions.clone());
+        registry.register("cluster_views_per_set", "V: views of a sample set", metrics.views_per_set.clone());
+        registry.register("cluster_plan_epoch", "The plan in force", metrics.plan_epoch.clone());
+        registry.register("cluster_plans", "Plans that were made", metrics.plans.clone());
+        drop(registry);
+        metrics
+    }
+
+    pub(crate) fn planned(&self) {
+        self.plans.inc();
+    }
+
+    pub(crate) fn show(&self, status: &ClusterStatus) {
+        let number = |count: u64| i64::try_from(count).unwrap_or(i64::MAX);
+        self.nodes.set(number(status.nodes.len() as u64));
+        self.samplers.set(number(status.plan.as_ref().map_or(0, |plan| plan.assignment.samplers.len() as u64)));
+        self.sessions.set(number(status.session_count.into()));
+        self.views_per_set.set(number(status.views_per_set));
+        self.plan_epoch.set(number(status.plan_epoch));
+    }
+}
+
+impl Default for CoordinatorMetrics {
+    fn default() -> Self {
+        Self::new(&Telemetry::default())
+    }
+}

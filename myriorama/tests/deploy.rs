@@ -1,0 +1,60 @@
+//! What is deployed fits the program: metrics on the dashboard exist, and commands in the compose file are understood.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use clap::Parser as _;
+use coordinator::CoordinatorMetrics;
+use node::{NodeMetrics, Telemetry};
+
+fn deployed(file: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy").join(file);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn names_in(text: &str) -> BTreeSet<String> {
+    let is_part = |c: char| c.is_ascii_lowercase() || c == '_' || c.is_ascii_digit();
+    let starts = text.match_indices("myriorama_").map(|(at, _)| &text[at..]);
+    starts.map(|rest| rest.chars().take_while(|&c| is_part(c)).collect()).collect()
+}
+
+#[test]
+fn every_metric_of_the_dashboard_is_exported() {
+    let telemetry = Telemetry::default();
+    let (node, _coordinator) = (NodeMetrics::new(&telemetry), CoordinatorMetrics::new(&telemetry));
+    node.drop_view("client gone");
+    let exported = names_in(&telemetry.page());
+    let shown = names_in(&deployed("grafana/dashboard.json"));
+    assert!(shown.len() > 10, "{shown:?}");
+    let unknown: Vec<_> = shown.difference(&exported).collect();
+    assert!(unknown.is_empty(), "{unknown:?} are not among {exported:?}");
+}
+
+/// The `- --flag=value` lists of a service, as the shell would pass them.
+fn commands_in(compose: &str) -> Vec<Vec<String>> {
+    let mut commands: Vec<Vec<String>> = Vec::new();
+    let mut inside = false;
+    for line in compose.lines().map(str::trim) {
+        if line == "command:" {
+            commands.push(vec!["myriorama".to_owned()]);
+            inside = true;
+        } else if let Some(word) = line.strip_prefix("- ").filter(|_| inside) {
+            commands.last_mut().unwrap().push(word.replace("${MYRIORAMA_SCENE:-courtyard}", "courtyard"));
+        } else {
+            inside = false;
+        }
+    }
+    commands
+}
+
+#[test]
+fn every_command_of_the_compose_file_is_understood() {
+    let commands = commands_in(&deployed("compose.yaml"));
+    assert_eq!(commands.len(), 2, "{commands:?}");
+    for command in commands {
+        if let Err(error) = myriorama::cli::Cli::try_parse_from(&command) {
+            panic!("{command:?}: {error}");
+        }
+    }
+}
