@@ -96,7 +96,7 @@ impl Scheduler {
         self.members.iter().map(condition).collect()
     }
 
-    fn in_force(&self) -> Option<&InForce> {
+    pub(super) fn in_force(&self) -> Option<&InForce> {
         self.work.as_ref()?.in_force.as_ref()
     }
 
