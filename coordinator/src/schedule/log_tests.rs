@@ -1,4 +1,7 @@
+use wire::PolicyChoice;
+
 use super::*;
+use crate::schedule::MeasuredCosts;
 use crate::schedule::test_support::{Random, join, opened};
 
 fn incident() -> Vec<(Duration, Event)> {

@@ -17,6 +17,7 @@ mod reason;
 mod scheduler;
 mod search;
 mod work;
+mod written;
 
 #[cfg(test)]
 mod simulation;

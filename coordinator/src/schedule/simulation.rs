@@ -345,15 +345,15 @@ fn changes(from: &Assignment, to: &Assignment) -> usize {
     from.iter().filter(|(name, role)| to.get(*name).is_some_and(|new| new != *role)).count()
 }
 
-/// Runs every seed and names the ones that fail.
-fn for_every_seed(run: impl Fn(u64) + std::panic::RefUnwindSafe) {
-    let failed: Vec<u64> = (0..SEEDS).filter(|&seed| std::panic::catch_unwind(|| run(seed)).is_err()).collect();
+/// Runs the seeds and names the ones that fail.
+fn for_seeds(seeds: std::ops::Range<u64>, run: impl Fn(u64) + std::panic::RefUnwindSafe) {
+    let failed: Vec<u64> = seeds.filter(|&seed| std::panic::catch_unwind(|| run(seed)).is_err()).collect();
     assert!(failed.is_empty(), "seeds {failed:?}");
 }
 
 #[test]
 fn faults_of_all_kinds() {
-    for_every_seed(|seed| {
+    for_seeds(0..SEEDS, |seed| {
         let mut world = World::new(seed);
         for _ in 0..STEPS {
             world.pass(700);
@@ -366,7 +366,7 @@ fn faults_of_all_kinds() {
 /// Equal nodes, and views that swing: K follows and stays, changing two roles a plan.
 #[test]
 fn k_follows_views_up_and_down_without_flapping() {
-    for_every_seed(|seed| {
+    for_seeds(0..SEEDS, |seed| {
         let mut world = World::new(seed);
         let nodes = 2 + world.random.below(14);
         (0..nodes).for_each(|i| world.tell(join(&format!("n{i:02}"), i, 0)));
@@ -389,11 +389,11 @@ fn k_follows_views_up_and_down_without_flapping() {
     });
 }
 
-/// K of every plan while two minutes pass.
+/// K of every plan while a minute and a half passes.
 fn settle(world: &mut World) -> Vec<usize> {
     let k = |world: &World| world.last.as_ref().map_or(0, SessionPlan::sampler_count);
     let mut seen = vec![k(world)];
-    for _ in 0..480 {
+    for _ in 0..360 {
         world.pass(500);
         world.tell(Event::Tick);
         if k(world) != seen[seen.len() - 1] {
@@ -417,7 +417,7 @@ fn near_k_fd(world: &World, costs: &Costs, images: usize, views: usize) -> bool 
 /// Timings that vary by a fifth move nothing.
 #[test]
 fn noise_moves_no_roles() {
-    for_every_seed(|seed| {
+    for_seeds(0..50, |seed| {
         let mut world = World::new(seed);
         (0..8).for_each(|i| world.tell(join(&format!("n{i:02}"), i, 0)));
         world.sessions.insert(1, 4);
@@ -427,6 +427,6 @@ fn noise_moves_no_roles() {
             world.tell(Event::Measured { node_name: name, costs: timings(noise) });
             world.pass(300);
         }
-        assert!(world.plans <= 2, "{} plans", world.plans);
+        assert!(world.plans == 1, "{} plans", world.plans);
     });
 }
