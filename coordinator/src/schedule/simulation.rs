@@ -33,6 +33,8 @@ struct World {
     sessions: BTreeMap<u64, usize>,
     /// Events on their way.
     coming: Vec<(Duration, Event)>,
+    /// The highest epoch that any node had seen when it joined.
+    seen: u64,
     last: Option<SessionPlan>,
     last_at: Duration,
     /// Since the last plan a node of it was lost, or came again, or another session came to decide.
@@ -53,6 +55,7 @@ impl World {
             out: BTreeSet::new(),
             sessions: BTreeMap::new(),
             coming: Vec::new(),
+            seen: 0,
             last: None,
             last_at: Duration::ZERO,
             may_replan: true,
@@ -222,6 +225,7 @@ impl World {
                 let name = &join.node.node_name;
                 self.may_replan |= self.knows(name);
                 self.out.remove(name);
+                self.seen = self.seen.max(join.plan_epoch);
                 self.members.insert(name.clone(), *incarnation);
             }
             Event::Left { incarnation, node_name } if self.members.get(node_name) == Some(incarnation) => {
@@ -270,6 +274,7 @@ impl World {
 
     fn in_force(&mut self, plan: SessionPlan) {
         let epoch = plan.assignment.plan_epoch;
+        assert!(epoch > self.seen, "above what nodes have seen");
         for name in self.alive.keys().cloned().collect::<Vec<_>>() {
             // Some answers are lost.
             if self.random.below(10) > 0 {
