@@ -29,13 +29,16 @@ pub(crate) async fn carry_out(inner: Arc<Inner>, mut commands: mpsc::UnboundedRe
 
 async fn apply(inner: Arc<Inner>, sessions: Vec<u64>, mut plan: SessionPlan, addresses: Vec<String>) {
     let plan_epoch = plan.assignment.plan_epoch;
-    inner.metrics.planned();
     tracing::info!(plan_epoch, reason = plan.reason, "planned");
     for &session in &sessions {
         let detail = format!("{} nodes take plan {plan_epoch}", addresses.len());
         inner.say(session, SessionEvent::Progress { stage: SessionStage::Preparing, detail });
     }
     match tell_all(&inner, &plan.assignment, addresses).await {
+        // What no node can do is the sessions' fault, not the nodes'.
+        Err(status) if status.code() == Code::InvalidArgument => {
+            sessions.into_iter().for_each(|session| inner.refuse(session, status.clone()));
+        }
         Ok(scene_load_s) => {
             plan.scene_load_s = scene_load_s;
             for session in sessions {
@@ -68,8 +71,8 @@ async fn tell(inner: Arc<Inner>, assignment: Assignment, address: String) -> Res
     let ready = within(inner.config.ready_deadline, "getting ready", call).await;
     match &ready {
         Ok(_) => inner.step(Event::Ready { plan_epoch, node_name }),
-        // A later plan came first.
-        Err(status) if status.code() == Code::FailedPrecondition => (),
+        // A later plan came first, or the plan asks for what cannot be.
+        Err(status) if [Code::FailedPrecondition, Code::InvalidArgument].contains(&status.code()) => (),
         Err(status) => {
             inner.step(Event::Unready { plan_epoch, node_name, reason: status.message().to_owned() });
         }

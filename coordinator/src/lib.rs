@@ -6,6 +6,7 @@
 mod carrying_out;
 mod config;
 mod metrics;
+mod observers;
 mod opening;
 pub mod schedule;
 mod service;
@@ -13,4 +14,5 @@ mod workload;
 
 pub use config::{CoordinatorConfig, SceneOffer};
 pub use metrics::CoordinatorMetrics;
+pub use observers::{EventLog, Observers};
 pub use service::serve;

@@ -4,6 +4,8 @@ use node::Telemetry;
 use prometheus_client::metrics::{counter::Counter, gauge::Gauge};
 use wire::ClusterStatus;
 
+use crate::schedule::Command;
+
 /// Registered gauges of the cluster's state, and a counter of its plans.
 #[derive(Debug, Clone)]
 pub struct CoordinatorMetrics {
@@ -38,11 +40,9 @@ impl CoordinatorMetrics {
         metrics
     }
 
-    pub(crate) fn planned(&self) {
-        self.plans.inc();
-    }
-
-    pub(crate) fn show(&self, status: &ClusterStatus) {
+    pub(crate) fn show(&self, status: &ClusterStatus, commands: &[Command]) {
+        let plans = commands.iter().filter(|command| matches!(command, Command::Apply { .. })).count();
+        self.plans.inc_by(plans as u64);
         let number = |count: u64| i64::try_from(count).unwrap_or(i64::MAX);
         self.nodes.set(number(status.nodes.len() as u64));
         self.samplers.set(number(status.plan.as_ref().map_or(0, |plan| plan.assignment.samplers.len() as u64)));

@@ -24,7 +24,7 @@ use wire::{
 use crate::carrying_out::carry_out;
 use crate::opening::{Events, open};
 use crate::schedule::{Command, Event, Scheduler};
-use crate::{CoordinatorConfig, CoordinatorMetrics, SceneOffer};
+use crate::{CoordinatorConfig, Observers, SceneOffer};
 
 /// Events that a session's client has not read yet.
 const SESSION_EVENTS: usize = 64;
@@ -40,7 +40,7 @@ pub async fn serve(
     listener: TcpListener,
     config: CoordinatorConfig,
     offer: SceneOffer,
-    metrics: CoordinatorMetrics,
+    observers: Observers,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
     let (commands, to_do) = mpsc::unbounded_channel();
@@ -50,9 +50,8 @@ pub async fn serve(
         connections: Connections::default(),
         measuring: tokio::sync::Mutex::default(),
         started: Instant::now(),
-        scheduler: Mutex::default(),
+        schedule: Mutex::new((Scheduler::default(), observers)),
         commands,
-        metrics,
         sessions: Mutex::default(),
         costs: Mutex::default(),
         counter: AtomicU64::new(1),
@@ -80,9 +79,8 @@ pub(crate) struct Inner {
     pub(crate) connections: Connections,
     pub(crate) measuring: tokio::sync::Mutex<()>,
     started: Instant,
-    scheduler: Mutex<Scheduler>,
+    schedule: Mutex<(Scheduler, Observers)>,
     commands: mpsc::UnboundedSender<Command>,
-    pub(crate) metrics: CoordinatorMetrics,
     sessions: Mutex<HashMap<u64, Events>>,
     /// Of each device and what was measured, the oldest first.
     costs: Mutex<Vec<(String, MeasureCosts, Costs)>>,
@@ -96,9 +94,12 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl Inner {
     /// Tells the schedule; what follows is carried out in its order.
     pub(crate) fn step(&self, event: Event) {
-        let mut scheduler = locked(&self.scheduler);
-        let commands = scheduler.step(self.started.elapsed(), event);
-        self.metrics.show(&scheduler.status());
+        let mut schedule = locked(&self.schedule);
+        let (scheduler, observers) = &mut *schedule;
+        let now = self.started.elapsed();
+        observers.note(now, &event);
+        let commands = scheduler.step(now, event);
+        observers.metrics.show(&scheduler.status(), &commands);
         for command in commands {
             // Nobody listens any more only at the end.
             let _ = self.commands.send(command);
@@ -134,7 +135,7 @@ impl Inner {
 
     /// The cluster as it is.
     pub(crate) fn status(&self) -> ClusterStatus {
-        locked(&self.scheduler).status()
+        locked(&self.schedule).0.status()
     }
 
     pub(crate) fn kept_costs(&self, device: &str, measure: &MeasureCosts) -> Option<Costs> {

@@ -3,7 +3,7 @@
 use clap::{Args, Parser, Subcommand};
 use gpu::DevicePreference;
 
-use crate::commands::{bench, coordinator, demo, health, node, status, study, up, view};
+use crate::commands::{bench, coordinator, demo, health, node, replay, status, study, up, view};
 use crate::exit::Outcome;
 
 /// Many views of one scene from a few depth images.
@@ -47,6 +47,8 @@ pub enum Command {
     View(view::ViewArgs),
     /// Show a cluster's nodes, their roles, and why they have them
     Status(status::StatusArgs),
+    /// Run a coordinator's recorded events through the schedule once more
+    Replay(replay::ReplayArgs),
     /// Ask a coordinator or a node whether it serves
     Health(health::HealthArgs),
     /// Run the paper's experiment on this machine and write a report
@@ -78,6 +80,7 @@ impl Command {
             Self::Node(args) => node::run(args),
             Self::View(args) => view::run(args),
             Self::Status(args) => status::run(&args),
+            Self::Replay(args) => replay::run(&args),
             Self::Health(args) => health::run(&args),
             Self::Demo(args) => demo::run(&args),
             Self::Bench(args) => bench::run(&args),

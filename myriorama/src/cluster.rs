@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use client::Client;
-use coordinator::{CoordinatorConfig, CoordinatorMetrics, SceneOffer};
+use coordinator::{CoordinatorConfig, Observers, SceneOffer};
 use node::{Engine, NodeConfig, NodeMetrics, ServeError};
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
@@ -42,7 +42,7 @@ impl Cluster {
             listener,
             config,
             offer,
-            CoordinatorMetrics::default(),
+            Observers::default(),
             cluster.shutdown.clone(),
         ));
         for number in 0..nodes {

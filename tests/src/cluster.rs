@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use client::{Client, ClientError, Session, ViewRequest};
-use coordinator::{CoordinatorConfig, CoordinatorMetrics, SceneOffer};
+use coordinator::{CoordinatorConfig, Observers, SceneOffer};
 use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
@@ -222,7 +222,7 @@ async fn coordinate(listener: TcpListener, shutdown: CancellationToken) -> Resul
     let volume = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) };
     let mut offer = SceneOffer::new(package(), rig(), volume, SKY_LINEAR);
     offer.illumination = illumination();
-    coordinator::serve(listener, CoordinatorConfig::default(), offer, CoordinatorMetrics::default(), shutdown).await
+    coordinator::serve(listener, CoordinatorConfig::default(), offer, Observers::default(), shutdown).await
 }
 
 async fn connected(address: &str) -> Client {

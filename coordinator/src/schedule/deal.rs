@@ -13,7 +13,7 @@ pub struct Worker {
 }
 
 /// Less than any job; free jobs would never fill a worker.
-const LEAST_JOB_S: f64 = 1e-15;
+const LEAST_JOB_S: f64 = 1e-12;
 
 impl Worker {
     fn job_s(&self) -> f64 {

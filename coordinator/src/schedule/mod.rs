@@ -10,12 +10,14 @@ mod choose;
 mod costs;
 mod deal;
 mod event;
+mod log;
 mod patience;
 mod predict;
 mod reason;
 mod scheduler;
 mod search;
 mod work;
+mod written;
 
 #[cfg(test)]
 mod simulation;
@@ -28,6 +30,7 @@ pub use choose::{Choice, ChoiceError, Demand, Predicted, Present, Wish, choose};
 pub use costs::{MeasuredCosts, NodeCosts};
 pub use deal::{Worker, deal, finish_s};
 pub use event::{Command, Event, Opening};
+pub use log::{LogError, Recorder, replay};
 pub use predict::{Load, direct_s, pipeline_s, time_share_s};
 pub use scheduler::Scheduler;
 pub use search::{Division, enumerate};

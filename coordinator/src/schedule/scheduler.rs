@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use wire::{ClusterStatus, Costs, JoinCluster, NodeCondition, NodeStatus, SessionPlan};
+use wire::{Assignment, ClusterStatus, Costs, JoinCluster, NodeCondition, NodeStatus, Policy, SessionPlan};
 
 use super::assign::assignment;
 use super::choose::{Demand, Present, WORTH, check, step_from};
@@ -96,7 +96,7 @@ impl Scheduler {
         self.members.iter().map(condition).collect()
     }
 
-    fn in_force(&self) -> Option<&InForce> {
+    pub(super) fn in_force(&self) -> Option<&InForce> {
         self.work.as_ref()?.in_force.as_ref()
     }
 
@@ -152,8 +152,8 @@ impl Scheduler {
 
     fn check(&self, opening: &Opening) -> Result<(), ChoiceError> {
         let load = load_of(&opening.workload, opening.costs.in_order, opening.views_per_set);
-        let nodes =
-            vec![NodeCosts::default(); self.members.values().filter(|member| self.counts(member, opening)).count()];
+        let count = self.members.values().filter(|member| self.counts(member, opening)).count();
+        let nodes = vec![NodeCosts::default(); count];
         let wish = Wish { policy: opening.policy, forced_samplers: opening.forced_samplers };
         check(&Demand { load, nodes: &nodes, wish, present: None })
     }
@@ -278,26 +278,20 @@ impl Scheduler {
     /// A plan that changes nothing is not made: epochs rise only where nodes have something new to do.
     fn put_in_force(&mut self, choice: &Choice, why: &str) -> Vec<Command> {
         let Some(work) = &self.work else { return Vec::new() };
-        let candidates: Vec<_> = self.usable().map(|(_, member)| (&member.status, member.estimate.now())).collect();
+        let crew: Vec<_> = self.usable().map(|(_, member)| (&member.status, member.estimate.now())).collect();
         let members = self.usable().map(|(name, member)| (name.clone(), member.incarnation)).collect();
-        let epoch = self.plan_epoch + 1;
-        let mut assignment = assignment(epoch, work.workload.clone(), &work.load(), choice, &candidates);
-        if let Some(old) = work.in_force.as_ref().filter(|old| old.members == members) {
-            assignment.plan_epoch = old.plan.assignment.plan_epoch;
-            if assignment == old.plan.assignment {
-                return Vec::new();
-            }
-            assignment.plan_epoch = epoch;
+        let assignment = assignment(self.plan_epoch + 1, work.workload.clone(), &work.load(), choice, &crew);
+        if work.in_force.as_ref().is_some_and(|old| old.members == members && old.assigns(&assignment)) {
+            return Vec::new();
         }
-        let slowest = candidates.iter().fold(Costs::default(), |slowest, (_, node)| slowest.max(node.costs));
+        let slowest = crew.iter().fold(Costs::default(), |slowest, (_, node)| slowest.max(node.costs));
         let anew = if work.in_force.is_some() { format!(" Planned anew: {why}.") } else { String::new() };
-        let reason = format!("{}{anew}", choice.reason);
-        let plan = session_plan(assignment, slowest, choice, reason);
-        self.plan_epoch = epoch;
+        let plan = session_plan(assignment, slowest, choice, format!("{}{anew}", choice.reason));
         self.enforce(InForce::new(plan, members, self.now))
     }
 
     fn enforce(&mut self, in_force: InForce) -> Vec<Command> {
+        self.plan_epoch = in_force.plan.assignment.plan_epoch;
         let sessions = self.work.as_ref().map(Work::sessions).unwrap_or_default();
         let command = self.tell(&in_force, sessions);
         self.work.iter_mut().for_each(|work| work.in_force = Some(in_force.clone()));
@@ -317,14 +311,14 @@ fn present_s(crew: &Crew<'_>, has_role: &[bool]) -> Option<f64> {
     let at_work = crew.nodes.iter().zip(&present.samples).zip(has_role).filter(|(_, has_role)| **has_role);
     let (nodes, samples): (Vec<NodeCosts>, Vec<bool>) = at_work.map(|((node, samples), _)| (*node, *samples)).unzip();
     let time_s = match present.policy {
-        wire::Policy::Pipeline => pipeline_s(&crew.load, &nodes, &samples),
-        wire::Policy::Direct => direct_s(&crew.load, &nodes),
-        wire::Policy::TimeShare => time_share_s(&crew.load, &nodes),
+        Policy::Pipeline => pipeline_s(&crew.load, &nodes, &samples),
+        Policy::Direct => direct_s(&crew.load, &nodes),
+        Policy::TimeShare => time_share_s(&crew.load, &nodes),
     };
     (!nodes.is_empty()).then_some(time_s)
 }
 
-fn session_plan(assignment: wire::Assignment, costs: Costs, choice: &Choice, reason: String) -> SessionPlan {
+fn session_plan(assignment: Assignment, costs: Costs, choice: &Choice, reason: String) -> SessionPlan {
     let predicted = &choice.predicted;
     SessionPlan {
         assignment,

@@ -1,4 +1,4 @@
-use wire::{Assignment, Policy, PolicyChoice};
+use wire::PolicyChoice;
 
 use super::*;
 use crate::schedule::test_support::{COSTS, join, opened, opening, workload};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use wire::{Costs, Policy, SessionPlan, Workload};
+use wire::{Assignment, Costs, Policy, SessionPlan, Workload};
 
 use super::patience::Patience;
 use super::{Load, Opening, Wish};
@@ -85,6 +85,13 @@ impl Work {
 impl InForce {
     pub(super) fn new(plan: SessionPlan, members: BTreeMap<String, u64>, now: Duration) -> Self {
         Self { plan, members, patience: Patience::from(now) }
+    }
+
+    /// Whether another plan would say the same to every node.
+    pub(super) fn assigns(&self, other: &Assignment) -> bool {
+        let own = &self.plan.assignment;
+        let roles = |plan: &Assignment| (plan.policy, plan.samplers.clone(), plan.compositors.clone());
+        own.workload == other.workload && roles(own) == roles(other)
     }
 
     pub(super) fn policy(&self) -> Policy {

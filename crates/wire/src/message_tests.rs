@@ -121,7 +121,18 @@ fn messages_come_back() {
         predicted_enumerated_s: 0.5,
         scene_load_s: 0.0,
     }));
-    assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(plan.clone())), Ok(plan));
+    assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(plan.clone())), Ok(plan.clone()));
+    let SessionEvent::Plan(plan) = plan else { panic!("{plan:?}") };
+    let condition = NodeCondition { node_name: "a".to_owned(), is_ready: true, costs: plan.costs };
+    let status = ClusterStatus {
+        plan_epoch: 4,
+        plan: Some(plan),
+        session_count: 2,
+        views_per_set: 70,
+        conditions: vec![condition],
+        ..ClusterStatus::default()
+    };
+    assert_eq!(ClusterStatus::try_from(proto::GetStatusResponse::from(status.clone())), Ok(status));
     assert_eq!(Workload::from_bytes(&workload().to_bytes()), Ok(workload()));
 }
 

@@ -1,9 +1,13 @@
 //! `myriorama coordinator`: plans for nodes that join it, and hands them the scene.
 
+use std::fs::File;
 use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
 
+use anyhow::Context as _;
 use clap::Args;
-use coordinator::{CoordinatorConfig, CoordinatorMetrics};
+use coordinator::schedule::Recorder;
+use coordinator::{CoordinatorConfig, CoordinatorMetrics, EventLog, Observers};
 use node::Telemetry;
 use tokio_util::sync::CancellationToken;
 
@@ -22,6 +26,9 @@ pub struct CoordinatorArgs {
     /// Where Prometheus reads what it counts, at /metrics
     #[arg(long, value_name = "HOST:PORT")]
     metrics: Option<SocketAddr>,
+    /// Writes all that happens to the schedule here, for `myriorama replay`
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
     /// Serve without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
@@ -47,10 +54,11 @@ async fn serve(args: CoordinatorArgs, setup: Setup) -> anyhow::Result<Outcome> {
     let Setup { offer, .. } = setup;
     let shutdown = CancellationToken::new();
     let config = CoordinatorConfig { insecure_bind: args.insecure_bind, ..CoordinatorConfig::default() };
+    let log = args.record.as_deref().map(event_log).transpose()?;
     let telemetry = Telemetry::default();
     let metrics = CoordinatorMetrics::new(&telemetry);
     serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
-    let serving = coordinator::serve(listener, config, offer, metrics, shutdown.clone());
+    let serving = coordinator::serve(listener, config, offer, Observers { metrics, log }, shutdown.clone());
     tokio::spawn(async move {
         // Without signals there is still the caller's way to end the process.
         if stop_signal().await.is_ok() {
@@ -59,4 +67,9 @@ async fn serve(args: CoordinatorArgs, setup: Setup) -> anyhow::Result<Outcome> {
     });
     serving.await?;
     Ok(Outcome::Done)
+}
+
+fn event_log(path: &Path) -> anyhow::Result<EventLog> {
+    let begin = || Recorder::new(Box::new(File::create(path)?) as Box<dyn std::io::Write + Send>);
+    begin().with_context(|| format!("cannot write {}", path.display()))
 }

@@ -5,6 +5,7 @@ pub mod coordinator;
 pub mod demo;
 pub mod health;
 pub mod node;
+pub mod replay;
 pub mod status;
 pub mod study;
 pub mod up;

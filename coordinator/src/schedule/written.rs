@@ -1,0 +1,250 @@
+//! Events as a log has them, and back; values that no event has are named.
+
+use serde::{Deserialize, Serialize};
+use wire::limits::{MAX_TEXT_BYTES, MAX_VIEWS_PER_SET};
+use wire::{Costs, JoinCluster, NodeStatus, PolicyChoice, UnknownPolicy, WireError, Workload};
+
+use super::{Event, MeasuredCosts, Opening};
+
+/// A field that is wrong, before its line is known.
+pub(super) struct Wrong {
+    pub(super) field: &'static str,
+    pub(super) reason: String,
+}
+
+impl From<WireError> for Wrong {
+    fn from(error: WireError) -> Self {
+        Self { field: "workload", reason: error.to_string() }
+    }
+}
+
+impl From<UnknownPolicy> for Wrong {
+    fn from(error: UnknownPolicy) -> Self {
+        Self { field: "policy", reason: error.to_string() }
+    }
+}
+
+/// An event as it is written.
+#[derive(Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub(super) enum Written {
+    Joined {
+        incarnation: u64,
+        node_name: String,
+        address: String,
+        device_name: String,
+        is_software: bool,
+        plan_epoch: u64,
+    },
+    Left {
+        incarnation: u64,
+        node_name: String,
+    },
+    Opened {
+        session: u64,
+        views_per_set: usize,
+        policy: String,
+        forced_samplers: Option<usize>,
+        costs: WrittenCosts,
+        /// The message that nodes get, in hexadecimal.
+        workload: String,
+    },
+    Demanded {
+        session: u64,
+        views_per_set: usize,
+    },
+    Measured {
+        node_name: String,
+        #[serde(flatten)]
+        costs: WrittenTimings,
+    },
+    Ready {
+        plan_epoch: u64,
+        node_name: String,
+    },
+    Unready {
+        plan_epoch: u64,
+        node_name: String,
+        reason: String,
+    },
+    Closed {
+        session: u64,
+    },
+    Tick,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct WrittenCosts {
+    sample_image_s: f64,
+    direct_view_s: f64,
+    reconstruct_view_s: f64,
+    load_set_s: f64,
+    encode_view_s: f64,
+    in_order: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct WrittenTimings {
+    sample_image_s: Option<f64>,
+    direct_view_s: Option<f64>,
+    reconstruct_view_s: Option<f64>,
+    load_set_s: Option<f64>,
+    encode_view_s: Option<f64>,
+    transfer_bytes_per_s: Option<f64>,
+    image_bytes: Option<f64>,
+}
+
+impl From<&Event> for Written {
+    fn from(event: &Event) -> Self {
+        match event.clone() {
+            Event::Joined { incarnation, join } => Self::joined(incarnation, join),
+            Event::Left { incarnation, node_name } => Self::Left { incarnation, node_name },
+            Event::Opened(opening) => Self::opened(*opening),
+            Event::Demanded { session, views_per_set } => Self::Demanded { session, views_per_set },
+            Event::Measured { node_name, costs } => Self::Measured { node_name, costs: costs.into() },
+            Event::Ready { plan_epoch, node_name } => Self::Ready { plan_epoch, node_name },
+            Event::Unready { plan_epoch, node_name, reason } => Self::Unready { plan_epoch, node_name, reason },
+            Event::Closed { session } => Self::Closed { session },
+            Event::Tick => Self::Tick,
+        }
+    }
+}
+
+impl Written {
+    fn joined(incarnation: u64, join: JoinCluster) -> Self {
+        let NodeStatus { node_name, address, device_name, is_software } = join.node;
+        Self::Joined { incarnation, node_name, address, device_name, is_software, plan_epoch: join.plan_epoch }
+    }
+
+    fn opened(opening: Opening) -> Self {
+        Self::Opened {
+            session: opening.session,
+            views_per_set: opening.views_per_set,
+            policy: opening.policy.to_string(),
+            forced_samplers: opening.forced_samplers,
+            costs: opening.costs.into(),
+            workload: hex(&opening.workload.to_bytes()),
+        }
+    }
+
+    pub(super) fn read(self) -> Result<Event, Wrong> {
+        Ok(match self {
+            Self::Joined { incarnation, node_name, address, device_name, is_software, plan_epoch } => {
+                let node = NodeStatus { node_name: name(node_name)?, address, device_name, is_software };
+                Event::Joined { incarnation, join: JoinCluster { node, plan_epoch } }
+            }
+            Self::Left { incarnation, node_name } => Event::Left { incarnation, node_name: name(node_name)? },
+            Self::Opened { session, views_per_set, policy, forced_samplers, costs, workload } => {
+                Event::Opened(Box::new(Opening {
+                    session,
+                    workload: Workload::from_bytes(&bytes(&workload)?)?,
+                    views_per_set: views(views_per_set)?,
+                    policy: policy.parse::<PolicyChoice>()?,
+                    forced_samplers,
+                    costs: costs.read()?,
+                }))
+            }
+            Self::Demanded { session, views_per_set } => {
+                Event::Demanded { session, views_per_set: views(views_per_set)? }
+            }
+            Self::Measured { node_name, costs } => Event::Measured { node_name: name(node_name)?, costs: costs.into() },
+            Self::Ready { plan_epoch, node_name } => Event::Ready { plan_epoch, node_name: name(node_name)? },
+            Self::Unready { plan_epoch, node_name, reason } => {
+                Event::Unready { plan_epoch, node_name: name(node_name)?, reason }
+            }
+            Self::Closed { session } => Event::Closed { session },
+            Self::Tick => Event::Tick,
+        })
+    }
+}
+
+fn name(node_name: String) -> Result<String, Wrong> {
+    if (1..=MAX_TEXT_BYTES).contains(&node_name.len()) {
+        return Ok(node_name);
+    }
+    Err(Wrong { field: "node_name", reason: format!("has {} bytes, must have 1 to {MAX_TEXT_BYTES}", node_name.len()) })
+}
+
+fn views(views_per_set: usize) -> Result<usize, Wrong> {
+    if views_per_set <= MAX_VIEWS_PER_SET as usize {
+        return Ok(views_per_set);
+    }
+    let reason = format!("is {views_per_set}, at most {MAX_VIEWS_PER_SET} are allowed");
+    Err(Wrong { field: "views_per_set", reason })
+}
+
+fn seconds(value: f64, field: &'static str) -> Result<f64, Wrong> {
+    if value.is_finite() && value >= 0.0 {
+        return Ok(value);
+    }
+    Err(Wrong { field, reason: format!("is {value}, must be finite and not negative") })
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn bytes(hex: &str) -> Result<Vec<u8>, Wrong> {
+    let digit = |digit: &u8| char::from(*digit).to_digit(16).map(|digit| digit as u8);
+    let pair = |pair: &[u8]| match pair {
+        [high, low] => Some(digit(high)? << 4 | digit(low)?),
+        _ => None,
+    };
+    let read: Option<Vec<u8>> = hex.as_bytes().chunks(2).map(pair).collect();
+    read.ok_or_else(|| Wrong { field: "workload", reason: "is not hexadecimal".to_owned() })
+}
+
+impl From<Costs> for WrittenCosts {
+    fn from(c: Costs) -> Self {
+        Self {
+            sample_image_s: c.sample_image_s,
+            direct_view_s: c.direct_view_s,
+            reconstruct_view_s: c.reconstruct_view_s,
+            load_set_s: c.load_set_s,
+            encode_view_s: c.encode_view_s,
+            in_order: c.in_order,
+        }
+    }
+}
+
+impl WrittenCosts {
+    fn read(self) -> Result<Costs, Wrong> {
+        Ok(Costs {
+            sample_image_s: seconds(self.sample_image_s, "sample_image_s")?,
+            direct_view_s: seconds(self.direct_view_s, "direct_view_s")?,
+            reconstruct_view_s: seconds(self.reconstruct_view_s, "reconstruct_view_s")?,
+            load_set_s: seconds(self.load_set_s, "load_set_s")?,
+            encode_view_s: seconds(self.encode_view_s, "encode_view_s")?,
+            in_order: self.in_order,
+        })
+    }
+}
+
+impl From<MeasuredCosts> for WrittenTimings {
+    fn from(c: MeasuredCosts) -> Self {
+        Self {
+            sample_image_s: c.sample_image_s,
+            direct_view_s: c.direct_view_s,
+            reconstruct_view_s: c.reconstruct_view_s,
+            load_set_s: c.load_set_s,
+            encode_view_s: c.encode_view_s,
+            transfer_bytes_per_s: c.transfer_bytes_per_s,
+            image_bytes: c.image_bytes,
+        }
+    }
+}
+
+/// A timing that cannot be says nothing, here as where it was recorded.
+impl From<WrittenTimings> for MeasuredCosts {
+    fn from(c: WrittenTimings) -> Self {
+        Self {
+            sample_image_s: c.sample_image_s,
+            direct_view_s: c.direct_view_s,
+            reconstruct_view_s: c.reconstruct_view_s,
+            load_set_s: c.load_set_s,
+            encode_view_s: c.encode_view_s,
+            transfer_bytes_per_s: c.transfer_bytes_per_s,
+            image_bytes: c.image_bytes,
+        }
+    }
+}

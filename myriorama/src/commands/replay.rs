@@ -1,0 +1,45 @@
+//! `myriorama replay`: what the schedule makes of a recorded incident.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::Args;
+use coordinator::schedule::{LogError, replay};
+
+use crate::exit::{BadInput, Outcome};
+
+/// Runs the events that `myriorama coordinator --record` wrote through the schedule once more and prints its commands,
+/// each with the time since the coordinator's start. The same events give the same commands.
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// As `--record` wrote it
+    #[arg(value_name = "LOG")]
+    log: PathBuf,
+}
+
+/// Replays.
+///
+/// # Errors
+/// A log that cannot be read; the text names the line and the field.
+pub fn run(args: &ReplayArgs) -> anyhow::Result<Outcome> {
+    let file = File::open(&args.log).with_context(|| format!("cannot read {}", args.log.display()))?;
+    let steps = replay(BufReader::new(file)).map_err(|error| wrong(args, error))?;
+    let events = steps.len();
+    for (now, _, commands) in steps {
+        for command in commands {
+            println!("{:>10.3} s  {command}", now.as_secs_f64());
+        }
+    }
+    eprintln!("{events} events");
+    Ok(Outcome::Done)
+}
+
+fn wrong(args: &ReplayArgs, error: LogError) -> anyhow::Error {
+    let text = format!("{}: {error}", args.log.display());
+    match error {
+        LogError::Read { .. } => anyhow::anyhow!(text),
+        _ => BadInput(text).into(),
+    }
+}
