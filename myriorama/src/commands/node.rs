@@ -1,6 +1,6 @@
 //! `myriorama node`: samples and composites as the coordinator says.
 
-use std::net::SocketAddr;
+use std::net::{SocketAddr, UdpSocket};
 use std::path::PathBuf;
 
 use clap::Args;
@@ -21,10 +21,10 @@ pub struct NodeArgs {
     /// Where it listens; port 0: any that is free
     #[arg(long, default_value = "127.0.0.1:0", value_name = "HOST:PORT")]
     listen: SocketAddr,
-    /// Unique in the cluster [default: node-PORT]
+    /// Unique in the cluster [default: node-PORT, or the host's name where it listens on all addresses]
     #[arg(long)]
     name: Option<String>,
-    /// Where others reach it, if not at --listen
+    /// Where others reach it, if not at --listen [default, where that is all addresses: the one towards the coordinator]
     #[arg(long, value_name = "URL")]
     advertise: Option<String>,
     /// Keeps scenes here by hash, and looks here before fetching one
@@ -52,11 +52,12 @@ async fn serve(args: NodeArgs) -> anyhow::Result<Outcome> {
     let listener = listen(args.listen, args.insecure_bind).await?;
     let address = listener.local_addr()?;
     let engine = GpuEngine::shared(args.device.device)?;
-    let name = args.name.unwrap_or_else(|| format!("node-{}", address.port()));
+    let name = args.name.unwrap_or_else(|| name_of(address));
+    let advertise = args.advertise.or_else(|| own_address(&args.coordinator, address));
     println!("{name} on {}, at http://{address}", engine.device_name());
     let config = NodeConfig {
         scene_folder: args.scene_folder,
-        advertised_address: args.advertise,
+        advertised_address: advertise,
         insecure_bind: args.insecure_bind,
         ..NodeConfig::new(name, args.coordinator)
     };
@@ -73,4 +74,19 @@ async fn serve(args: NodeArgs) -> anyhow::Result<Outcome> {
     });
     serving.await?;
     Ok(Outcome::Done)
+}
+
+fn name_of(address: SocketAddr) -> String {
+    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").ok().filter(|_| address.ip().is_unspecified());
+    host.map_or_else(|| format!("node-{}", address.port()), |host| host.trim().to_owned())
+}
+
+/// Of a node that listens on all addresses: the one that the way to the coordinator goes out by.
+fn own_address(coordinator: &str, address: SocketAddr) -> Option<String> {
+    let authority = coordinator.split("://").last()?.split('/').next()?;
+    let unspecified = SocketAddr::new(address.ip(), 0);
+    // No packet is sent: the system only chooses the way.
+    let socket = UdpSocket::bind(unspecified).ok().filter(|_| address.ip().is_unspecified())?;
+    socket.connect(authority).ok()?;
+    Some(format!("http://{}", SocketAddr::new(socket.local_addr().ok()?.ip(), address.port())))
 }
