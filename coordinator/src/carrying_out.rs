@@ -1,8 +1,9 @@
 //! Does what the schedule says: plans to nodes, then, when all are ready, to the sessions that they serve.
 
-use std::sync::Arc;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use tokio::sync::mpsc;
+use tokio::sync::Notify;
 use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
@@ -12,10 +13,34 @@ use crate::opening::{named, within};
 use crate::schedule::{Command, Event};
 use crate::service::Inner;
 
-/// Runs until the schedule's end. Plans do not wait for one another: nodes refuse what a later one has replaced.
-pub(crate) async fn carry_out(inner: Arc<Inner>, mut commands: mpsc::UnboundedReceiver<Command>) {
-    while let Some(command) = commands.recv().await {
-        match command {
+/// What is still to be done, in its order. None may be lost, and none is added but by an event that was let in.
+#[derive(Default)]
+pub(crate) struct Commands {
+    waiting: Mutex<VecDeque<Command>>,
+    added: Notify,
+}
+
+impl Commands {
+    pub(crate) fn add(&self, commands: Vec<Command>) {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).extend(commands);
+        self.added.notify_one();
+    }
+
+    async fn next(&self) -> Command {
+        loop {
+            let next = self.waiting.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+            match next {
+                Some(command) => return command,
+                None => self.added.notified().await,
+            }
+        }
+    }
+}
+
+/// Runs until it is aborted. Plans do not wait for one another: nodes refuse what a later one has replaced.
+pub(crate) async fn carry_out(inner: Arc<Inner>) {
+    loop {
+        match inner.commands.next().await {
             Command::Apply { sessions, plan, addresses } => {
                 tokio::spawn(apply(inner.clone(), sessions, *plan, addresses));
             }

@@ -21,9 +21,9 @@ use wire::{
     Welcome,
 };
 
-use crate::carrying_out::carry_out;
+use crate::carrying_out::{Commands, carry_out};
 use crate::opening::{Events, open};
-use crate::schedule::{Command, Event, Scheduler};
+use crate::schedule::{Event, Scheduler};
 use crate::{CoordinatorConfig, Observers, SceneOffer};
 
 /// Events that a session's client has not read yet.
@@ -43,7 +43,6 @@ pub async fn serve(
     observers: Observers,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
-    let (commands, to_do) = mpsc::unbounded_channel();
     let inner = Arc::new(Inner {
         config,
         offer,
@@ -51,13 +50,13 @@ pub async fn serve(
         measuring: tokio::sync::Mutex::default(),
         started: Instant::now(),
         schedule: Mutex::new((Scheduler::default(), observers)),
-        commands,
+        commands: Commands::default(),
         sessions: Mutex::default(),
         costs: Mutex::default(),
         counter: AtomicU64::new(1),
     });
     let mut running = JoinSet::new();
-    running.spawn(carry_out(inner.clone(), to_do));
+    running.spawn(carry_out(inner.clone()));
     running.spawn(tick(inner.clone()));
     let service = CoordinatorService { inner, shutdown: shutdown.clone() };
     let routes = Routes::new(health(&["coordinator"]).await).add_service(coordinator_server(service));
@@ -80,7 +79,7 @@ pub(crate) struct Inner {
     pub(crate) measuring: tokio::sync::Mutex<()>,
     started: Instant,
     schedule: Mutex<(Scheduler, Observers)>,
-    commands: mpsc::UnboundedSender<Command>,
+    pub(crate) commands: Commands,
     sessions: Mutex<HashMap<u64, Events>>,
     /// Of each device and what was measured, the oldest first.
     costs: Mutex<Vec<(String, MeasureCosts, Costs)>>,
@@ -100,10 +99,7 @@ impl Inner {
         observers.note(now, &event);
         let commands = scheduler.step(now, event);
         observers.metrics.show(&scheduler.status(), &commands);
-        for command in commands {
-            // Nobody listens any more only at the end.
-            let _ = self.commands.send(command);
-        }
+        self.commands.add(commands);
     }
 
     /// Ends a session that cannot be.

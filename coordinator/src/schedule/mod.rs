@@ -10,6 +10,7 @@ mod choose;
 mod costs;
 mod deal;
 mod event;
+mod exact;
 mod log;
 mod patience;
 mod predict;

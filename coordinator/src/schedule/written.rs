@@ -75,22 +75,34 @@ pub(super) enum Written {
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct WrittenCosts {
+    #[serde(with = "super::exact")]
     sample_image_s: f64,
+    #[serde(with = "super::exact")]
     direct_view_s: f64,
+    #[serde(with = "super::exact")]
     reconstruct_view_s: f64,
+    #[serde(with = "super::exact")]
     load_set_s: f64,
+    #[serde(with = "super::exact")]
     encode_view_s: f64,
     in_order: bool,
 }
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct WrittenTimings {
+    #[serde(with = "super::exact::option", default)]
     sample_image_s: Option<f64>,
+    #[serde(with = "super::exact::option", default)]
     direct_view_s: Option<f64>,
+    #[serde(with = "super::exact::option", default)]
     reconstruct_view_s: Option<f64>,
+    #[serde(with = "super::exact::option", default)]
     load_set_s: Option<f64>,
+    #[serde(with = "super::exact::option", default)]
     encode_view_s: Option<f64>,
+    #[serde(with = "super::exact::option", default)]
     transfer_bytes_per_s: Option<f64>,
+    #[serde(with = "super::exact::option", default)]
     image_bytes: Option<f64>,
 }
 

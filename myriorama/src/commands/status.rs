@@ -38,7 +38,7 @@ async fn show(args: &StatusArgs) -> anyhow::Result<Outcome> {
             return Ok(Outcome::Done);
         };
         // Clears the terminal, so that the table stays where it is.
-        print!("\x1b[2J\x1b[H{text}\n");
+        println!("\x1b[2J\x1b[H{text}");
         tokio::time::sleep(Duration::from_secs_f64(seconds.clamp(0.1, 3600.0))).await;
     }
 }
