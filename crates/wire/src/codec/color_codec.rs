@@ -7,8 +7,6 @@
 //!
 //! `docs/methods/depth_codec.md` has what the bits save.
 
-use std::hint::select_unpredictable;
-
 use super::{
     DecodeError,
     tagged::{BLOCK, Packer, max_packed_bytes, take, unpack, unzigzag, zigzag},
@@ -25,89 +23,99 @@ pub(super) const fn max_colors_bytes(count: usize) -> usize {
 
 /// Appends `colors_rgb9e5` to `out`.
 pub(super) fn pack_colors(colors_rgb9e5: &[u32], out: &mut Vec<u8>) {
-    let changed = pack_changes(colors_rgb9e5, out);
-    pack_differences(&changed, out);
+    let mut packer = Packer::new(colors_rgb9e5.len());
+    let mut changed = vec![0; colors_rgb9e5.len().min(BLOCK)];
+    for block in colors_rgb9e5.chunks(BLOCK) {
+        let count = pack_changes(block, &mut changed, out);
+        pack_differences(&changed[..count], &mut packer, out);
+    }
 }
 
 /// Appends a bit for each colour, the first in the lowest: whether it differs from the one before, 0 before the first.
-/// Those that do: of these, too, each is a change from the one before.
-fn pack_changes(colors_rgb9e5: &[u32], out: &mut Vec<u8>) -> Vec<u32> {
-    let mut changed = vec![0; colors_rgb9e5.len()];
+/// Puts those that do first in `changed`, and says how many; of these, too, each differs from the one before.
+fn pack_changes(colors_rgb9e5: &[u32], changed: &mut [u32], out: &mut Vec<u8>) -> usize {
     let (mut count, mut last) = (0, 0);
     out.extend(colors_rgb9e5.chunks(8).map(|eight| {
         (0..).zip(eight).fold(0, |bits, (place, &color)| {
             let is_change = color != last;
-            // Written at all events and kept if it counts: no branch depends on the colour.
+            // Overwritten unless it counts: no branch depends on the colour.
             changed[count] = color;
             count += usize::from(is_change);
             last = color;
             bits | u8::from(is_change) << place
         })
     }));
-    changed.truncate(count);
-    changed
+    count
 }
 
-fn pack_differences(colors_rgb9e5: &[u32], out: &mut Vec<u8>) {
+fn pack_differences(colors_rgb9e5: &[u32], packer: &mut Packer, out: &mut Vec<u8>) {
     let green = |color: u32, last: u32| change(color >> 9, last >> 9, MANTISSA);
     let red = |color, last| change(color, last, MANTISSA).wrapping_sub(green(color, last));
     let blue = |color, last| change(color >> 18, last >> 18, MANTISSA).wrapping_sub(green(color, last));
-    let mut packer = Packer::new(colors_rgb9e5.len());
-    for block in colors_rgb9e5.chunks(BLOCK) {
-        packer
-            .pack(block.len(), out, |out| for_neighbours(block, out, |color, last| fold(green(color, last), MANTISSA)));
-        packer.pack(block.len(), out, |out| for_neighbours(block, out, |color, last| fold(red(color, last), MANTISSA)));
-        packer
-            .pack(block.len(), out, |out| for_neighbours(block, out, |color, last| fold(blue(color, last), MANTISSA)));
-        let exponent = |color, last| fold(change(color >> 27, last >> 27, EXPONENT), EXPONENT);
-        packer.pack(block.len(), out, |out| for_neighbours(block, out, exponent));
-    }
+    let exponent = |color: u32, last: u32| change(color >> 27, last >> 27, EXPONENT);
+    let colors = colors_rgb9e5;
+    let count = colors.len();
+    packer.pack(count, out, |out| for_neighbours(colors, out, |color, last| fold(green(color, last), MANTISSA)));
+    packer.pack(count, out, |out| for_neighbours(colors, out, |color, last| fold(red(color, last), MANTISSA)));
+    packer.pack(count, out, |out| for_neighbours(colors, out, |color, last| fold(blue(color, last), MANTISSA)));
+    packer.pack(count, out, |out| for_neighbours(colors, out, |color, last| fold(exponent(color, last), EXPONENT)));
 }
 
 /// Reads `count` colours from the front of `input`.
 pub(super) fn unpack_colors(input: &mut &[u8], count: usize) -> Result<Vec<u32>, DecodeError> {
+    let mut colors = Vec::with_capacity(count);
+    let mut channels = [(); 4].map(|()| vec![0; count.min(BLOCK)]);
+    // Behind the 0 before the first.
+    let mut changed = vec![0; count.min(BLOCK) + 1];
+    while colors.len() < count {
+        let block = (count - colors.len()).min(BLOCK);
+        let (changes, change_count) = take_changes(input, block)?;
+        unpack_differences(input, &mut channels, &mut changed[1..=change_count])?;
+        extend_by_repeats(&mut colors, &changed[..=change_count], changes, block);
+    }
+    Ok(colors)
+}
+
+/// A bit for each of `count` colours, and how many change.
+fn take_changes<'a>(input: &mut &'a [u8], count: usize) -> Result<(&'a [u8], usize), DecodeError> {
     let changes = take(input, count.div_ceil(8))?;
     let spare_bits = 8 * changes.len() - count;
     if changes.last().is_some_and(|last| (last.leading_zeros() as usize) < spare_bits) {
         return Err(DecodeError::Corrupt { field: "color_rgb9e5", reason: "changes beyond the last sample" });
     }
-    let changed = changes.iter().map(|bits| bits.count_ones() as usize).sum();
-    Ok(repeat_unchanged(&unpack_differences(input, changed)?, changes, count))
+    Ok((changes, changes.iter().map(|bits| bits.count_ones() as usize).sum()))
 }
 
-/// As many colours as asked for; `changed` has one for each bit in `changes`.
-fn repeat_unchanged(changed: &[u32], changes: &[u8], count: usize) -> Vec<u32> {
-    let mut colors = vec![0; count];
-    let (mut next, mut last) = (0, 0);
-    for (eight, &bits) in colors.chunks_mut(8).zip(changes) {
-        for (place, color) in eight.iter_mut().enumerate() {
-            let is_change = bits >> place & 1 != 0;
-            // Nothing is next behind the last change.
-            last = select_unpredictable(is_change, changed.get(next).copied().unwrap_or_default(), last);
-            next += usize::from(is_change);
-            *color = last;
-        }
+fn unpack_differences(
+    input: &mut &[u8],
+    channels: &mut [Vec<u16>; 4],
+    colors_rgb9e5: &mut [u32],
+) -> Result<(), DecodeError> {
+    for channel in &mut *channels {
+        unpack(input, &mut channel[..colors_rgb9e5.len()])?;
     }
-    colors
+    let [green, red, blue, exponent] = channels.each_ref();
+    let mut color = [0u32; 4];
+    let numbers = green.iter().zip(red).zip(blue).zip(exponent);
+    for (out, (((&green, &red), &blue), &exponent)) in colors_rgb9e5.iter_mut().zip(numbers) {
+        color = apply(color, [green, red, blue, exponent]);
+        let [r, g, b, e] = color;
+        *out = (r & MANTISSA) | (g & MANTISSA) << 9 | (b & MANTISSA) << 18 | e << 27;
+    }
+    Ok(())
 }
 
-fn unpack_differences(input: &mut &[u8], count: usize) -> Result<Vec<u32>, DecodeError> {
-    let mut colors = Vec::with_capacity(count);
-    let mut channels = [(); 4].map(|()| vec![0; count.min(BLOCK)]);
-    while colors.len() < count {
-        let block = (count - colors.len()).min(BLOCK);
-        for channel in &mut channels {
-            unpack(input, &mut channel[..block])?;
+/// Appends `count` colours; `changed` has what is before the first, then one for each bit in `changes`.
+fn extend_by_repeats(colors_rgb9e5: &mut Vec<u32>, changed: &[u32], changes: &[u8], count: usize) {
+    let start = colors_rgb9e5.len();
+    colors_rgb9e5.resize(start + count, 0);
+    let mut place = 0;
+    for (eight, &bits) in colors_rgb9e5[start..].chunks_mut(8).zip(changes) {
+        for (shift, color) in eight.iter_mut().enumerate() {
+            place += usize::from(bits >> shift & 1);
+            *color = changed[place];
         }
-        let [green, red, blue, exponent] = channels.each_ref().map(|channel| &channel[..block]);
-        let mut color = [0u32; 4];
-        colors.extend(green.iter().zip(red).zip(blue).zip(exponent).map(|(((&green, &red), &blue), &exponent)| {
-            color = apply(color, [green, red, blue, exponent]);
-            let [r, g, b, e] = color;
-            (r & MANTISSA) | (g & MANTISSA) << 9 | (b & MANTISSA) << 18 | e << 27
-        }));
     }
-    Ok(colors)
 }
 
 /// Red, green, blue and exponent, in bits beyond their fields too, where they do not matter.
@@ -163,7 +171,8 @@ mod tests {
     fn colors_that_stay_take_a_bit_each() {
         let mut bytes = Vec::new();
         pack_colors(&[0; 1001], &mut bytes);
-        assert_eq!(bytes, [0; 126]);
+        assert_eq!(bytes[..126], [0; 126]);
+        assert_eq!(bytes.len(), 126 + 4 * 3);
     }
 
     #[test]
