@@ -1,4 +1,4 @@
-//! RGB9E5 colours, without loss: which differ from the one before in the row, and by how much.
+//! RGB9E5 colours, without loss: which differ from that of the sample before, and by how much.
 //!
 //! One bit a sample says whether the colour changes: unlit surfaces seldom do, and LZ4 shortens the bits where they are
 //! all alike. Of the colours that are left, each mantissa and the exponent follow as differences. Green goes first and
