@@ -128,6 +128,7 @@ impl TryFrom<proto::PlaneHeader> for PlaneHeader {
         let encoding = match proto::PlaneEncoding::try_from(p.encoding) {
             Ok(proto::PlaneEncoding::SlopeTaggedLz4) => PlaneEncoding::SlopeTaggedLz4,
             Ok(proto::PlaneEncoding::DifferenceTaggedLz4) => PlaneEncoding::DifferenceTaggedLz4,
+            Ok(proto::PlaneEncoding::ChangeTaggedLz4) => PlaneEncoding::ChangeTaggedLz4,
             Ok(proto::PlaneEncoding::BitsLz4) => PlaneEncoding::BitsLz4,
             _ => {
                 return Err(WireError::UnknownEnum { field: "planes.encoding", value: p.encoding });
@@ -152,6 +153,7 @@ impl From<PlaneHeader> for proto::PlaneHeader {
         let encoding = match p.encoding {
             PlaneEncoding::SlopeTaggedLz4 => proto::PlaneEncoding::SlopeTaggedLz4,
             PlaneEncoding::DifferenceTaggedLz4 => proto::PlaneEncoding::DifferenceTaggedLz4,
+            PlaneEncoding::ChangeTaggedLz4 => proto::PlaneEncoding::ChangeTaggedLz4,
             PlaneEncoding::BitsLz4 => proto::PlaneEncoding::BitsLz4,
         };
         Self { kind: kind.into(), encoding: encoding.into(), raw_bytes: p.raw_bytes, packed_bytes: p.packed_bytes }

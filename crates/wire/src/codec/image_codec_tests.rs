@@ -254,7 +254,7 @@ fn cut_and_random_payloads_are_refused() {
 fn damaged_headers_are_named() {
     let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
     type Damage = fn(&mut ImageHeader);
-    let cases: [(&str, Damage); 12] = [
+    let cases: [(&str, Damage); 13] = [
         ("size", |h| h.width = 0),
         ("width", |h| h.width = 65_535),
         ("texels", |h| (h.width, h.height) = (16_384, 16_384)),
@@ -264,6 +264,7 @@ fn damaged_headers_are_named() {
         ("planes.kind", |h| h.planes.clear()),
         ("planes.kind", |h| h.planes[2].kind = PlaneKind::ColorRgb9e5),
         ("planes.encoding", |h| h.planes[1].encoding = PlaneEncoding::SlopeTaggedLz4),
+        ("planes.encoding", |h| h.planes[1].encoding = PlaneEncoding::DifferenceTaggedLz4),
         ("planes.raw_bytes", |h| h.planes[3].raw_bytes = u32::MAX),
         ("payload_bytes", |h| h.planes[3].packed_bytes = u32::MAX),
         ("LZ4 block is too short", |h| h.planes[0].raw_bytes += 1),

@@ -41,6 +41,8 @@ pub enum PlaneEncoding {
     DifferenceTaggedLz4,
     /// One bit a texel, LZ4.
     BitsLz4,
+    /// Samples only, a bit for each that differs from the one before, differences of those, tagged by class, LZ4.
+    ChangeTaggedLz4,
 }
 
 impl PlaneKind {
@@ -50,11 +52,10 @@ impl PlaneKind {
         match self {
             Self::InverseDepth | Self::CornerInverseDepth => PlaneEncoding::SlopeTaggedLz4,
             Self::Passed1 => PlaneEncoding::BitsLz4,
-            Self::ColorRgb9e5
-            | Self::NormalOct16
-            | Self::SurfaceId
-            | Self::ReflectanceRoughness8
-            | Self::Visibility8 => PlaneEncoding::DifferenceTaggedLz4,
+            Self::ColorRgb9e5 => PlaneEncoding::ChangeTaggedLz4,
+            Self::NormalOct16 | Self::SurfaceId | Self::ReflectanceRoughness8 | Self::Visibility8 => {
+                PlaneEncoding::DifferenceTaggedLz4
+            }
         }
     }
 
