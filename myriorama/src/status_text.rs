@@ -26,10 +26,10 @@ pub fn text(status: &ClusterStatus) -> anyhow::Result<String> {
     for node in &status.nodes {
         table.push(row(status, node))?;
     }
-    let why = status.plan.as_ref().map_or_else(
-        || "No plan: nobody has asked for views.".to_owned(),
-        |plan| format!("{}: {}", plan.assignment.policy, plan.reason),
-    );
+    let why = status
+        .plan
+        .as_ref()
+        .map_or_else(|| "No plan: nobody has asked for views.".to_owned(), |plan| plan.reason.clone());
     Ok(format!("{}\n\n{why}", text_table::text(&table)))
 }
 

@@ -78,7 +78,7 @@ fn what_is_wrong_is_named_with_its_line() {
         ("\"pipeline\"", "\"best\"", "line 4: policy unknown policy"),
         ("\"workload\":\"", "\"workload\":\"xy", "line 4: workload is not hexadecimal"),
         ("\"workload\":\"", "\"workload\":\"00", "line 4: workload workload is corrupt"),
-        ("\"load_set_s\":0.005", "\"load_set_s\":-1", "line 4: load_set_s is -1"),
+        ("\"load_set_s\":\"0.005\"", "\"load_set_s\":\"-1\"", "line 4: load_set_s is -1"),
         ("\"version\":1", "\"version\":2", "version is 2, must be 1"),
     ] {
         let text = refusal(whole.replacen(from, to, 1).as_bytes());
