@@ -159,6 +159,13 @@ impl PinholeCamera {
         }
     }
 
+    /// The same field of view in another size.
+    #[must_use]
+    pub fn resized(&self, size_px: UVec2) -> Self {
+        let scale = size_px.as_vec2() / self.size_px.as_vec2();
+        Self { size_px, focal_px: self.focal_px * scale, principal_px: self.principal_px * scale, ..*self }
+    }
+
     /// Pixels in the image.
     #[must_use]
     pub fn pixel_count(&self) -> usize {

@@ -12,6 +12,7 @@ mod highlight;
 mod image;
 mod light;
 mod normal;
+mod tiles;
 mod view;
 
 pub use bounds::Aabb;
@@ -23,4 +24,5 @@ pub use image::{
 };
 pub use light::{Environment, Illumination, Incident, Light, LightError, disc_from_square, tangents_of};
 pub use normal::{oct16_from_unit, unit_from_oct16};
+pub use tiles::TileError;
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};

@@ -1,0 +1,147 @@
+//! A sample image in tiles, one above the other: each is taken by a camera of its own, and together they are the image.
+
+use glam::{UVec2, Vec2};
+
+use crate::{Camera, DepthImage, DepthImageError, PinholeCamera, SpecularPlanes};
+
+/// Why tiles do not make an image.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TileError {
+    /// Rows or columns that are not the image's.
+    #[error("tile {tile} has {given} pixels, the image's has {expected}")]
+    Size {
+        /// Which, from the top.
+        tile: usize,
+        /// Its size.
+        given: UVec2,
+        /// What the camera says.
+        expected: UVec2,
+    },
+    /// Its planes.
+    #[error("tile {tile}: {source}")]
+    Planes {
+        /// Which, from the top.
+        tile: usize,
+        /// Which plane.
+        source: DepthImageError,
+    },
+    /// A plane that only some tiles have, though nothing can be said for the others.
+    #[error("some tiles have the plane {plane}, and some have not")]
+    Mixed {
+        /// Which.
+        plane: &'static str,
+    },
+}
+
+impl Camera {
+    /// The camera of one of `count` tiles, from the top; where there are fewer rows than tiles, some have none.
+    #[must_use]
+    pub fn tile(&self, tile: u32, count: u32) -> Self {
+        let Self::Pinhole(camera) = self;
+        let row = |i: u32| (u64::from(i) * u64::from(camera.size_px.y) / u64::from(count.max(1))) as u32;
+        let (first, end) = (row(tile), row(tile + 1));
+        Self::Pinhole(PinholeCamera {
+            size_px: UVec2::new(camera.size_px.x, end - first),
+            principal_px: camera.principal_px - Vec2::new(0.0, first as f32),
+            ..*camera
+        })
+    }
+}
+
+impl DepthImage {
+    /// The image whose tiles these are, from the top.
+    ///
+    /// # Errors
+    /// For tiles of other sizes, and planes that only some of them have.
+    pub fn from_tiles(camera: Camera, tiles: Vec<Self>) -> Result<Self, TileError> {
+        let count = tiles.len() as u32;
+        for (number, tile) in tiles.iter().enumerate() {
+            let Camera::Pinhole(expected) = camera.tile(number as u32, count);
+            check(number, tile, expected.size_px)?;
+        }
+        let corners = joined(&tiles, "corner_inverse_depth", |tile| tile.corner_inverse_depth_per_m.as_deref())?;
+        Ok(Self {
+            camera,
+            inverse_depth_per_m: concat(&tiles, |tile| &tile.inverse_depth_per_m),
+            color_rgb9e5: concat(&tiles, |tile| &tile.color_rgb9e5),
+            surface_id: joined(&tiles, "surface_id", |tile| tile.surface_id.as_deref())?,
+            normal_oct16: filled(&tiles, |tile| tile.normal_oct16.as_deref()),
+            passed: filled(&tiles, |tile| tile.passed.as_deref()),
+            specular: specular(&tiles)?,
+            corner_inverse_depth_per_m: corners.map(|_| shared_corners(&tiles)),
+        })
+    }
+}
+
+fn check(number: usize, tile: &DepthImage, expected: UVec2) -> Result<(), TileError> {
+    if tile.size_px() != expected {
+        return Err(TileError::Size { tile: number, given: tile.size_px(), expected });
+    }
+    tile.validate().map_err(|source| TileError::Planes { tile: number, source })
+}
+
+fn concat<T: Copy>(tiles: &[DepthImage], plane: impl Fn(&DepthImage) -> &Vec<T>) -> Vec<T> {
+    tiles.iter().flat_map(|tile| plane(tile).iter().copied()).collect()
+}
+
+/// A plane that all tiles have, or none.
+fn joined<T: Copy>(
+    tiles: &[DepthImage],
+    name: &'static str,
+    plane: impl Fn(&DepthImage) -> Option<&[T]>,
+) -> Result<Option<Vec<T>>, TileError> {
+    let have = tiles.iter().filter(|tile| plane(tile).is_some()).count();
+    match have {
+        0 => Ok(None),
+        _ if have == tiles.len() => Ok(Some(tiles.iter().filter_map(&plane).flatten().copied().collect())),
+        _ => Err(TileError::Mixed { plane: name }),
+    }
+}
+
+/// A plane that a tile is without where all of it would be zero.
+fn filled<T: Copy + Default>(tiles: &[DepthImage], plane: impl Fn(&DepthImage) -> Option<&[T]>) -> Option<Vec<T>> {
+    tiles.iter().any(|tile| plane(tile).is_some()).then(|| {
+        let of = |tile: &DepthImage| plane(tile).map_or_else(|| vec![T::default(); texels(tile)], <[T]>::to_vec);
+        tiles.iter().flat_map(of).collect()
+    })
+}
+
+fn texels(tile: &DepthImage) -> usize {
+    tile.size_px().element_product() as usize
+}
+
+/// What has no highlight needs no visibility.
+fn specular(tiles: &[DepthImage]) -> Result<Option<SpecularPlanes>, TileError> {
+    if tiles.iter().all(|tile| tile.specular.is_none()) {
+        return Ok(None);
+    }
+    let planes = tiles.iter().filter_map(|tile| tile.specular.as_ref()).map(|s| s.visibility8.len());
+    let (least, most) = planes.fold((usize::MAX, 0), |(least, most), len| (least.min(len), most.max(len)));
+    if least != most {
+        return Err(TileError::Mixed { plane: "visibility" });
+    }
+    let visibility =
+        |number: usize| filled(tiles, |tile| tile.specular.as_ref().map(|s| s.visibility8[number].as_slice()));
+    Ok(Some(SpecularPlanes {
+        reflectance_srgb8_roughness8: filled(tiles, |tile| {
+            tile.specular.as_ref().map(|s| s.reflectance_srgb8_roughness8.as_slice())
+        })
+        .unwrap_or_default(),
+        visibility8: (0..most).filter_map(visibility).collect(),
+    }))
+}
+
+/// Corners between two tiles are in both: the lower one's are taken.
+fn shared_corners(tiles: &[DepthImage]) -> Vec<f32> {
+    let mut corners = Vec::new();
+    for (number, tile) in tiles.iter().enumerate() {
+        let rows = tile.size_px().y as usize + usize::from(number + 1 == tiles.len());
+        let plane = tile.corner_inverse_depth_per_m.as_deref().unwrap_or_default();
+        corners.extend_from_slice(&plane[..rows * (tile.size_px().x as usize + 1)]);
+    }
+    corners
+}
+
+#[cfg(test)]
+#[path = "tiles_tests.rs"]
+mod tests;

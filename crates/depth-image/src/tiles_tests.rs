@@ -1,0 +1,69 @@
+use glam::Vec3;
+
+use super::*;
+
+fn camera() -> Camera {
+    Camera::Pinhole(PinholeCamera::looking_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Y, 0.9, UVec2::new(7, 11)))
+}
+
+/// Every texel tells its ray, so that a row in the wrong place is seen.
+fn image(camera: Camera) -> DepthImage {
+    let Camera::Pinhole(pinhole) = camera;
+    let texels = |size: UVec2| (0..size.y).flat_map(move |y| (0..size.x).map(move |x| UVec2::new(x, y)));
+    let tells = |texel: UVec2| {
+        let direction = pinhole.ray(texel.as_vec2() + 0.5).direction_in_world;
+        (direction.dot(Vec3::new(3.0, 5.0, 7.0)) * 1000.0).round()
+    };
+    let corner =
+        |texel: UVec2| (pinhole.ray(texel.as_vec2()).direction_in_world.dot(Vec3::new(3.0, 5.0, 7.0)) * 1000.0).round();
+    let plane: Vec<f32> = texels(pinhole.size_px).map(tells).collect();
+    DepthImage {
+        camera,
+        inverse_depth_per_m: plane.clone(),
+        color_rgb9e5: plane.iter().map(|v| v.to_bits()).collect(),
+        normal_oct16: Some(plane.iter().map(|v| v.to_bits() ^ 1).collect()),
+        surface_id: None,
+        specular: Some(SpecularPlanes {
+            reflectance_srgb8_roughness8: plane.iter().map(|v| v.to_bits() ^ 2).collect(),
+            visibility8: vec![plane.iter().map(|v| v.to_bits() ^ 3).collect(); 2],
+        }),
+        passed: Some(plane.iter().map(|v| v.to_bits() & 1 == 1).collect()),
+        corner_inverse_depth_per_m: Some(texels(pinhole.size_px + 1).map(corner).collect()),
+    }
+}
+
+#[test]
+fn tiles_make_the_image_they_were_cut_from() {
+    let whole = image(camera());
+    for count in 1..=11 {
+        let tiles: Vec<_> = (0..count).map(|tile| image(camera().tile(tile, count))).collect();
+        assert!(tiles.iter().all(|tile| tile.size_px().y >= 11 / count));
+        assert_eq!(DepthImage::from_tiles(camera(), tiles).expect("they fit"), whole, "{count} tiles");
+    }
+}
+
+#[test]
+fn a_tile_without_highlights_has_none_in_the_image() {
+    let mut tiles: Vec<_> = (0..2).map(|tile| image(camera().tile(tile, 2))).collect();
+    (tiles[0].specular, tiles[0].passed) = (None, None);
+    let joined = DepthImage::from_tiles(camera(), tiles).expect("they fit");
+    let specular = joined.specular.expect("one tile has it");
+    assert!(specular.reflectance_srgb8_roughness8[..35].iter().all(|&r| r == 0));
+    assert!(specular.reflectance_srgb8_roughness8[35..].iter().all(|&r| r != 0));
+    assert!(specular.visibility8.iter().all(|plane| plane.len() == 77));
+    assert_eq!(joined.passed.expect("one tile has it").len(), 77);
+}
+
+#[test]
+fn tiles_that_do_not_fit_are_named() {
+    let tiles = || (0..3).map(|tile| image(camera().tile(tile, 3))).collect::<Vec<_>>();
+    let mut swapped = tiles();
+    swapped.swap(0, 2);
+    assert!(matches!(DepthImage::from_tiles(camera(), swapped), Err(TileError::Size { tile: 0, .. })));
+    let mut broken = tiles();
+    broken[1].color_rgb9e5.pop();
+    assert!(matches!(DepthImage::from_tiles(camera(), broken), Err(TileError::Planes { tile: 1, .. })));
+    let mut mixed = tiles();
+    mixed[2].corner_inverse_depth_per_m = None;
+    assert!(matches!(DepthImage::from_tiles(camera(), mixed), Err(TileError::Mixed { .. })));
+}
