@@ -6,9 +6,9 @@ use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 
 /// What a number's name must end in; counts and names of things are units too.
-const UNITS: [&str; 16] = [
-    "_m", "_per_m", "_s", "_px", "_bytes", "_count", "_epoch", "_index", "_indices", "_id", "_number", "_crc32",
-    "_unit", "_rgb", "_hz", "_rad",
+const UNITS: [&str; 18] = [
+    "_m", "_per_m", "_s", "_px", "_bytes", "_count", "_epoch", "_index", "_indices", "_id", "_number", "_version",
+    "_crc32", "_unit", "_rgb", "_hz", "_rad", "_ratio",
 ];
 /// Their fields are components: the unit is in the name of the field that holds one.
 const TUPLES: [&str; 3] = ["Vec2", "Vec3", "Quaternion"];
@@ -74,7 +74,7 @@ fn calls_have_their_own_messages() {
             calls += 1;
         }
     }
-    assert_eq!(calls, 8);
+    assert_eq!(calls, 11);
 }
 
 #[test]

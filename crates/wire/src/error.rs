@@ -59,6 +59,16 @@ pub enum WireError {
         /// As it came.
         value: i32,
     },
+    /// A program whose messages mean something else.
+    #[error("{field} is {found}, must be {expected}: this program is of another version")]
+    Version {
+        /// Which.
+        field: &'static str,
+        /// The sender's; 0 where it says none.
+        found: u32,
+        /// Ours.
+        expected: u32,
+    },
     /// Data that contradicts its header: corrupt, truncated, reordered or repeated.
     #[error("{field} is corrupt: {reason}")]
     Corrupt {
@@ -83,6 +93,7 @@ impl From<WireError> for Status {
     fn from(error: WireError) -> Self {
         match error {
             WireError::Corrupt { .. } => Self::data_loss(error.to_string()),
+            WireError::Version { .. } => Self::failed_precondition(error.to_string()),
             _ => Self::invalid_argument(error.to_string()),
         }
     }

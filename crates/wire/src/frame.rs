@@ -7,8 +7,10 @@ use glam::UVec2;
 use crate::codec::{DecodeLimits, FrameCodec, SampleSetId};
 use crate::error::{WireError, at_most, required};
 use crate::geometry::{pinhole_from, pinhole_to};
-use crate::limits::{MAX_FRAME_BYTES, MAX_MESSAGE_BYTES, MAX_VIEWS_PER_REQUEST, PART_BYTES, nonempty, seconds};
+use crate::limits::{MAX_FRAME_BYTES, MAX_MESSAGE_BYTES, MAX_VIEWS_PER_REQUEST, PART_BYTES, nonempty};
+use crate::live::{LiveRequest, view_counts};
 use crate::proto;
+use crate::stage_times::StageTimes;
 
 /// Views of one sample set, all made alike.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,8 +25,10 @@ pub struct RenderViews {
     pub codec: FrameCodec,
     /// Planes beside colour.
     pub planes: ViewPlanes,
-    /// Frame numbers and cameras.
+    /// Frame numbers and cameras; of a live stream one at most.
     pub views: Vec<RequestedView>,
+    /// Whether the stream is live.
+    pub live: Option<LiveRequest>,
 }
 
 /// One view.
@@ -41,9 +45,7 @@ impl TryFrom<proto::RenderViewsRequest> for RenderViews {
 
     fn try_from(r: proto::RenderViewsRequest) -> Result<Self, WireError> {
         at_most(r.views.len(), MAX_VIEWS_PER_REQUEST, "views")?;
-        if r.views.is_empty() {
-            return Err(WireError::Missing { field: "views" });
-        }
+        view_counts(r.views.len(), r.live.is_some())?;
         let view = |v: proto::RequestedView| {
             Ok(RequestedView { frame: v.frame_number, camera: pinhole_from(v.camera, "views.camera")? })
         };
@@ -54,6 +56,7 @@ impl TryFrom<proto::RenderViewsRequest> for RenderViews {
             codec: frame_codec(&r.frame_codec, "frame_codec")?,
             planes: ViewPlanes { inverse_depth: r.with_inverse_depth, provenance: r.with_provenance },
             views: r.views.into_iter().map(view).collect::<Result<_, WireError>>()?,
+            live: r.live.map(Into::into),
         })
     }
 }
@@ -70,23 +73,9 @@ impl From<RenderViews> for proto::RenderViewsRequest {
             with_inverse_depth: r.planes.inverse_depth,
             with_provenance: r.planes.provenance,
             views: r.views.iter().map(view).collect(),
+            live: r.live.map(Into::into),
         }
     }
-}
-
-/// Where a frame's time went.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct StageTimes {
-    /// Until the sample set was there.
-    pub set_wait_s: f64,
-    /// In the queue for the device.
-    pub queue_s: f64,
-    /// The batch's device time divided by its views.
-    pub reconstruct_s: f64,
-    /// Encoding.
-    pub encode_s: f64,
-    /// Views of the batch.
-    pub batch_count: u32,
 }
 
 /// What a frame is. The planes' bytes follow one another.
@@ -94,6 +83,8 @@ pub struct StageTimes {
 pub struct FrameHeader {
     /// What it shows: one set, never a mixture.
     pub sample_set_id: SampleSetId,
+    /// From where it was seen, as asked for.
+    pub camera: PinholeCamera,
     /// Columns and rows.
     pub size_px: UVec2,
     /// How its colour is encoded.
@@ -120,6 +111,9 @@ impl FrameHeader {
     fn check(self) -> Result<Self, WireError> {
         let limits = DecodeLimits::default();
         limits.texels(self.size_px.x, self.size_px.y).map_err(|error| WireError::corrupt("header.size_px", error))?;
+        if self.camera.size_px != self.size_px {
+            return Err(WireError::out_of_range("header.camera.size_px", self.camera.size_px, "the frame's"));
+        }
         let (count, limit) = (self.total_bytes(), MAX_FRAME_BYTES);
         if count > limit { Err(WireError::TooMany { field: "header.total_bytes", count, limit }) } else { Ok(self) }
     }
@@ -131,6 +125,7 @@ impl TryFrom<proto::FrameHeader> for FrameHeader {
     fn try_from(h: proto::FrameHeader) -> Result<Self, WireError> {
         let header = Self {
             sample_set_id: SampleSetId { plan_epoch: h.plan_epoch, index: h.set_index.into() },
+            camera: pinhole_from(h.camera, "header.camera")?,
             size_px: UVec2::new(h.width_px, h.height_px),
             codec: frame_codec(&h.frame_codec, "header.frame_codec")?,
             color_bytes: h.color_bytes,
@@ -156,6 +151,7 @@ impl From<FrameHeader> for proto::FrameHeader {
             provenance_bytes: h.provenance_bytes,
             frame_crc32: h.crc32,
             stage_times: Some(h.stage_times.into()),
+            camera: Some(pinhole_to(&h.camera)),
         }
     }
 }
@@ -164,32 +160,6 @@ impl From<FrameHeader> for proto::FrameHeader {
 fn frame_codec(text: &str, field: &'static str) -> Result<FrameCodec, WireError> {
     let short: String = text.chars().take(32).collect();
     text.parse().map_err(|_| WireError::out_of_range(field, short, "lz4, jpeg or jpeg:QUALITY"))
-}
-
-impl TryFrom<proto::StageTimes> for StageTimes {
-    type Error = WireError;
-
-    fn try_from(t: proto::StageTimes) -> Result<Self, WireError> {
-        Ok(Self {
-            set_wait_s: seconds(t.set_wait_s, "set_wait_s")?,
-            queue_s: seconds(t.queue_s, "queue_s")?,
-            reconstruct_s: seconds(t.reconstruct_s, "reconstruct_s")?,
-            encode_s: seconds(t.encode_s, "encode_s")?,
-            batch_count: t.batch_count,
-        })
-    }
-}
-
-impl From<StageTimes> for proto::StageTimes {
-    fn from(t: StageTimes) -> Self {
-        Self {
-            set_wait_s: t.set_wait_s,
-            queue_s: t.queue_s,
-            reconstruct_s: t.reconstruct_s,
-            encode_s: t.encode_s,
-            batch_count: t.batch_count,
-        }
-    }
 }
 
 /// A piece of an encoded frame.

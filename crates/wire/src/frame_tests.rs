@@ -1,8 +1,11 @@
+use glam::Vec3;
+
 use super::*;
 
 fn header(data: &[u8]) -> FrameHeader {
     FrameHeader {
         sample_set_id: SampleSetId { plan_epoch: 1, index: 0 },
+        camera: PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8)),
         size_px: UVec2::splat(8),
         codec: FrameCodec::Lz4,
         color_bytes: data.len() as u64,
@@ -56,6 +59,12 @@ fn spoilt_streams_are_named() {
 }
 
 #[test]
+fn headers_come_back_with_their_pose() {
+    let header = header(b"data");
+    assert_eq!(FrameHeader::try_from(proto::FrameHeader::from(header.clone())), Ok(header));
+}
+
+#[test]
 fn headers_that_claim_too_much_are_refused() {
     let spoil = |change: &dyn Fn(&mut proto::FrameHeader)| {
         let mut message = proto::FrameHeader::from(header(b"data"));
@@ -67,4 +76,7 @@ fn headers_that_claim_too_much_are_refused() {
     assert!(spoil(&|h| h.width_px = 0).contains("size_px"));
     assert!(spoil(&|h| h.frame_codec = "zip".to_owned()).contains("frame_codec"));
     assert!(spoil(&|h| h.stage_times = None).contains("stage_times"));
+    assert!(spoil(&|h| h.camera = None).contains("header.camera is missing"));
+    assert!(spoil(&|h| h.camera.as_mut().unwrap().near_m = -1.0).contains("header.camera"));
+    assert!(spoil(&|h| h.camera.as_mut().unwrap().width_px = 9).contains("header.camera.size_px"));
 }

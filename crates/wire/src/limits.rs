@@ -6,6 +6,10 @@ use crate::error::{WireError, at_most};
 
 /// Sample cameras of one set; provenance has room for 24.
 pub const MAX_SAMPLE_CAMERAS: usize = 16;
+/// Tiles of one sample image.
+pub const MAX_TILES: u32 = 16;
+/// Fallbacks of one session.
+pub const MAX_FALLBACKS: usize = 16;
 /// Lights of one scene.
 pub const MAX_LIGHTS: usize = 255;
 /// Planes of visibility of one sample image: one byte for the environment and each light.
@@ -14,8 +18,12 @@ pub const MAX_VISIBILITY_PLANES: usize = SpecularPlanes::visibility_planes(MAX_L
 pub const MAX_REFINEMENT_STEPS: u32 = 64;
 /// Views of one request.
 pub const MAX_VIEWS_PER_REQUEST: usize = 4096;
+/// Views of one request of a live stream.
+pub const MAX_LIVE_VIEWS_PER_REQUEST: usize = 1;
 /// Views of one sample set in a session.
-pub const MAX_VIEWS_PER_SET: u32 = 1 << 20;
+pub const MAX_VIEWS_PER_SET: u32 = 1 << 16;
+/// Pictures a second of one session.
+pub const MAX_FRAMES_PER_S: f64 = 1000.0;
 /// Sample sets of one timeline.
 pub const MAX_SETS: u32 = 1 << 20;
 /// Nodes of one plan.

@@ -5,7 +5,11 @@ use depth_image::{PinholeCamera, ViewPlanes};
 use crate::error::{WireError, at_most, required};
 use crate::geometry::{pinhole_from, pinhole_to};
 use crate::limits::{MAX_BATCH, MAX_NODES, MAX_SCENES, nonempty, seconds, text};
-use crate::{Assignment, Costs, OfferStatus, SceneRef, SessionPlan, Workload, proto};
+use crate::protocol::{PROTOCOL_VERSION, same_version};
+use crate::{Assignment, Costs, OfferStatus, Policy, SceneRef, SessionPlan, Workload, proto};
+
+/// More policies than there will be.
+const MAX_POLICIES: usize = 16;
 
 /// A node that wants to be a member.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,6 +37,7 @@ impl TryFrom<proto::JoinClusterRequest> for JoinCluster {
     type Error = WireError;
 
     fn try_from(r: proto::JoinClusterRequest) -> Result<Self, WireError> {
+        same_version(r.protocol_version)?;
         let node = NodeStatus {
             node_name: nonempty(r.node_name, "node_name")?,
             address: nonempty(r.node_address, "node_address")?,
@@ -51,6 +56,7 @@ impl From<JoinCluster> for proto::JoinClusterRequest {
             device_name: j.node.device_name,
             is_software_device: j.node.is_software,
             plan_epoch: j.plan_epoch,
+            protocol_version: PROTOCOL_VERSION,
         }
     }
 }
@@ -94,6 +100,33 @@ pub struct ClusterStatus {
     pub views_per_set: u64,
     /// Of every member, while anything is asked for.
     pub conditions: Vec<NodeCondition>,
+    /// Of each policy that has been in force for what is asked for.
+    pub achieved: Vec<AchievedTime>,
+    /// What share of the plan's nodes' time all sessions' pictures a second take; 0 where none states a rate.
+    pub utilisation: f64,
+}
+
+/// What a policy took, as nodes timed themselves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AchievedTime {
+    /// Which.
+    pub policy: Policy,
+    /// Of the busiest node, for all views of a set.
+    pub busy_s: f64,
+}
+
+impl TryFrom<proto::AchievedTime> for AchievedTime {
+    type Error = WireError;
+
+    fn try_from(a: proto::AchievedTime) -> Result<Self, WireError> {
+        Ok(Self { policy: Policy::from_wire(a.policy)?, busy_s: seconds(a.busy_s, "busy_s")? })
+    }
+}
+
+impl From<AchievedTime> for proto::AchievedTime {
+    fn from(a: AchievedTime) -> Self {
+        Self { policy: a.policy.to_wire(), busy_s: a.busy_s }
+    }
 }
 
 /// How a member stands.
@@ -105,6 +138,12 @@ pub struct NodeCondition {
     pub is_ready: bool,
     /// As estimated now, from the node's own timings.
     pub costs: Costs,
+    /// Views made since it joined.
+    pub views: u64,
+    /// Views not made, or not sent, since it joined.
+    pub dropped_views: u64,
+    /// Of its last report, what share of the time it worked; two operations at a time count twice.
+    pub busy_ratio: f64,
 }
 
 impl TryFrom<proto::NodeCondition> for NodeCondition {
@@ -115,13 +154,23 @@ impl TryFrom<proto::NodeCondition> for NodeCondition {
             node_name: nonempty(c.node_name, "node_name")?,
             is_ready: c.is_ready,
             costs: required(c.costs, "costs")?.try_into()?,
+            views: c.view_count,
+            dropped_views: c.dropped_view_count,
+            busy_ratio: seconds(c.busy_ratio, "busy_ratio")?,
         })
     }
 }
 
 impl From<NodeCondition> for proto::NodeCondition {
     fn from(c: NodeCondition) -> Self {
-        Self { node_name: c.node_name, is_ready: c.is_ready, costs: Some(c.costs.into()) }
+        Self {
+            node_name: c.node_name,
+            is_ready: c.is_ready,
+            costs: Some(c.costs.into()),
+            view_count: c.views,
+            dropped_view_count: c.dropped_views,
+            busy_ratio: c.busy_ratio,
+        }
     }
 }
 
@@ -131,6 +180,7 @@ impl TryFrom<proto::GetStatusResponse> for ClusterStatus {
     fn try_from(r: proto::GetStatusResponse) -> Result<Self, WireError> {
         at_most(r.nodes.len(), MAX_NODES, "nodes")?;
         at_most(r.conditions.len(), MAX_NODES, "conditions")?;
+        at_most(r.achieved_times.len(), MAX_POLICIES, "achieved_times")?;
         let node = |n: proto::NodeStatus| NodeStatus {
             node_name: n.node_name,
             address: n.node_address,
@@ -145,6 +195,8 @@ impl TryFrom<proto::GetStatusResponse> for ClusterStatus {
             session_count: r.session_count,
             views_per_set: r.views_per_set_count,
             conditions: r.conditions.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+            achieved: r.achieved_times.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+            utilisation: seconds(r.utilisation_ratio, "utilisation_ratio")?,
         })
     }
 }
@@ -165,6 +217,8 @@ impl From<ClusterStatus> for proto::GetStatusResponse {
             session_count: status.session_count,
             views_per_set_count: status.views_per_set,
             conditions: status.conditions.into_iter().map(Into::into).collect(),
+            achieved_times: status.achieved.into_iter().map(Into::into).collect(),
+            utilisation_ratio: status.utilisation,
         }
     }
 }

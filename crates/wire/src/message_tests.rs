@@ -1,5 +1,7 @@
 //! Bad messages are refused with the field's name; good ones come back as they were.
 
+use std::num::NonZeroU32;
+
 use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
 
@@ -61,7 +63,13 @@ fn assignment() -> Assignment {
             address: "http://127.0.0.1:1".to_owned(),
             image_indices: vec![0, 1],
         }],
-        compositors: vec![CompositorShare { node_name: "b".to_owned(), address: "http://127.0.0.1:2".to_owned() }],
+        compositors: vec![CompositorShare {
+            node_name: "b".to_owned(),
+            address: "http://127.0.0.1:2".to_owned(),
+            view_weight: 7,
+        }],
+        tile_count: 1,
+        relay_fanout: None,
     }
 }
 
@@ -82,6 +90,14 @@ fn request() -> SessionRequest {
         policy: PolicyChoice::Auto,
         forced_sampler_count: None,
         refinement_steps: 4,
+        frames_per_s: 25.0,
+        fallbacks: vec![Quality {
+            lighting: "unlit".to_owned(),
+            method: "joint_carve:1".to_owned(),
+            sample_side_ratio: 0.5,
+            frame_rate_ratio: 1.0,
+        }],
+        forced_tile_count: Some(2),
     }
 }
 
@@ -93,6 +109,7 @@ fn views() -> RenderViews {
         codec: FrameCodec::Lz4,
         planes: ViewPlanes::default(),
         views: vec![RequestedView { frame: 9, camera: camera() }],
+        live: None,
     }
 }
 
@@ -101,6 +118,9 @@ fn messages_come_back() {
     assert_eq!(Assignment::try_from(proto::Assignment::from(assignment())), Ok(assignment()));
     assert_eq!(SessionRequest::try_from(proto::OpenSessionRequest::from(request())), Ok(request()));
     assert_eq!(RenderViews::try_from(proto::RenderViewsRequest::from(views())), Ok(views()));
+    let live =
+        RenderViews { live: Some(LiveRequest { acknowledged_frame: 8, client_id: 5 }), views: Vec::new(), ..views() };
+    assert_eq!(RenderViews::try_from(proto::RenderViewsRequest::from(live.clone())), Ok(live));
     let plan = SessionEvent::Plan(Box::new(SessionPlan {
         assignment: assignment(),
         costs: Costs {
@@ -110,6 +130,7 @@ fn messages_come_back() {
             load_set_s: 0.02,
             encode_view_s: 0.001,
             in_order: true,
+            sample_overhead_s: 0.03,
         },
         reason: "because".to_owned(),
         predicted_pipeline_s: 0.1,
@@ -120,20 +141,114 @@ fn messages_come_back() {
         enumerated_sampler_count: 2,
         predicted_enumerated_s: 0.5,
         scene_load_s: 0.0,
+        fallback_number: 1,
+        frame_rate_ratio: 0.5,
     }));
     assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(plan.clone())), Ok(plan.clone()));
     let SessionEvent::Plan(plan) = plan else { panic!("{plan:?}") };
-    let condition = NodeCondition { node_name: "a".to_owned(), is_ready: true, costs: plan.costs };
+    let condition = NodeCondition {
+        node_name: "a".to_owned(),
+        is_ready: true,
+        costs: plan.costs,
+        views: 3,
+        dropped_views: 1,
+        busy_ratio: 0.7,
+    };
     let status = ClusterStatus {
         plan_epoch: 4,
         plan: Some(plan),
         session_count: 2,
         views_per_set: 70,
         conditions: vec![condition],
+        achieved: vec![AchievedTime { policy: Policy::TimeShare, busy_s: 0.3 }],
+        utilisation: 0.6,
         ..ClusterStatus::default()
     };
     assert_eq!(ClusterStatus::try_from(proto::GetStatusResponse::from(status.clone())), Ok(status));
+    let report = SamplerReport {
+        plan_epoch: 4,
+        compositor: "b".to_owned(),
+        sampler: "a".to_owned(),
+        reason: "corrupt".to_owned(),
+    };
+    assert_eq!(SamplerReport::try_from(proto::ReportSamplerRequest::from(report.clone())), Ok(report));
     assert_eq!(Workload::from_bytes(&workload().to_bytes()), Ok(workload()));
+    let opened = SessionEvent::Opened { session: 7 };
+    assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(opened.clone())), Ok(opened));
+    let change = ChangeSession { session: 7, views_per_set: 0, frames_per_s: 12.5 };
+    assert_eq!(ChangeSession::try_from(proto::ChangeSessionRequest::from(change)), Ok(change));
+    assert_eq!(WorkReport::try_from(proto::ReportWorkRequest::from(work_report())), Ok(work_report()));
+}
+
+fn work_report() -> WorkReport {
+    let costs = MeasuredCosts { sample_image_s: Some(0.1), image_bytes: Some(1e5), ..MeasuredCosts::default() };
+    WorkReport { node_name: "a".to_owned(), plan_epoch: 4, costs, busy_s: 0.9, views: 3, dropped_views: 1 }
+}
+
+#[test]
+fn bad_reports_and_demands_are_refused() {
+    let spoilt = |spoil: &dyn Fn(&mut proto::ReportWorkRequest)| {
+        let mut message = proto::ReportWorkRequest::from(work_report());
+        spoil(&mut message);
+        refusal::<_, WorkReport>(message)
+    };
+    assert!(spoilt(&|m| m.node_name.clear()).contains("node_name is missing"));
+    assert!(spoilt(&|m| m.busy_s = f64::NAN).contains("busy_s is NaN"));
+    assert!(spoilt(&|m| m.load_set_s = Some(-1.0)).contains("load_set_s is -1"));
+    let change =
+        proto::ChangeSessionRequest { session_number: 1, views_per_set_count: 1_000_000_000, frames_per_s: 1.0 };
+    assert!(refusal::<_, ChangeSession>(change).contains("views_per_set_count is 1000000000"));
+}
+
+#[test]
+fn tiles_are_images_of_their_own_to_samplers() {
+    let mut cut = Assignment { tile_count: 2, ..assignment() };
+    cut.samplers[0].image_indices = vec![0, 3];
+    let other = SamplerShare { node_name: "c".to_owned(), image_indices: vec![1, 2], ..cut.samplers[0].clone() };
+    cut.samplers.push(other);
+    assert_eq!(Assignment::try_from(proto::Assignment::from(cut.clone())), Ok(cut.clone()));
+    let heights: Vec<u32> = cut.sampled_cameras().iter().map(|Camera::Pinhole(c)| c.size_px.y).collect();
+    assert_eq!((heights.len(), heights[0] + heights[1]), (4, camera().size_px.y));
+    assert_eq!(cut.sets_at_once(), 1);
+    assert_eq!(cut.set_content(0), assignment().set_content(0), "a set shows the same however it is cut");
+    let lost = Assignment { tile_count: 4, ..cut.clone() };
+    assert!(refusal::<_, Assignment>(proto::Assignment::from(lost)).contains("image_indices"));
+    assert!(refusal::<_, Assignment>(proto::Assignment { tile_count: 17, ..cut.into() }).contains("tile_count is 17"));
+}
+
+#[test]
+fn a_refusal_names_the_plan_in_force() {
+    let refusal = assignment().refusal("plan_epoch 3 is not in force".to_owned());
+    assert_eq!((refusal.code(), Assignment::told_by(&refusal)), (tonic::Code::FailedPrecondition, Some(assignment())));
+    let mut large = assignment();
+    large.workload.sample_cameras = vec![Camera::Pinhole(camera()); 16];
+    large.workload.illumination.lights = vec![illumination().lights[1]; 255];
+    let refusal = large.refusal(String::new());
+    assert!(Assignment::told_by(&refusal).is_none_or(|told| told == large), "whole or not at all");
+    assert_eq!(Assignment::told_by(&tonic::Status::failed_precondition("of something else")), None);
+}
+
+#[test]
+fn relays_reach_every_compositor() {
+    for fanout in [None, NonZeroU32::new(1), NonZeroU32::new(2), NonZeroU32::new(3)] {
+        let compositor = |i: u32| CompositorShare { node_name: format!("c{i}"), ..assignment().compositors[0].clone() };
+        let plan = Assignment { compositors: (0..10).map(compositor).collect(), relay_fanout: fanout, ..assignment() };
+        assert_eq!(Assignment::try_from(proto::Assignment::from(plan.clone())), Ok(plan.clone()));
+        let mut asked = std::collections::HashMap::new();
+        for i in 0..10 {
+            let (mut steps, mut at) = (0, format!("c{i}"));
+            while let Some(relay) = plan.relay_of(&at) {
+                (steps, at) = (steps + 1, relay.node_name.clone());
+            }
+            assert!(steps < 10, "the way ends at the samplers");
+            if let Some(relay) = plan.relay_of(&format!("c{i}")) {
+                assert!(plan.relays(&relay.node_name));
+                *asked.entry(relay.node_name.clone()).or_insert(0) += 1;
+            }
+        }
+        assert!(asked.values().all(|&count| count <= fanout.map_or(0, NonZeroU32::get)));
+        assert_eq!(asked.values().sum::<u32>(), 10 - fanout.map_or(10, NonZeroU32::get));
+    }
 }
 
 #[test]
@@ -188,11 +303,30 @@ fn bad_counts_are_refused() {
     };
     assert!(spoilt(&|m| m.sample_cameras = vec![proto::Camera::default(); 17]).contains("sample_cameras has 17"));
     assert!(spoilt(&|m| m.views_per_set_count = 0).contains("views_per_set_count"));
+    assert!(spoilt(&|m| m.views_per_set_count = 1_000_000).contains("views_per_set_count is 1000000"));
     assert!(spoilt(&|m| m.timeline.as_mut().unwrap().set_count = 0).contains("set_count"));
     assert!(spoilt(&|m| m.timeline.as_mut().unwrap().step_s = f64::NAN).contains("step_s"));
     assert!(spoilt(&|m| m.timeline = None).contains("timeline"));
     assert!(spoilt(&|m| m.scene_hash = "../scene".to_owned()).contains("scene_hash"));
+    assert!(spoilt(&|m| m.frames_per_s = f64::NAN).contains("frames_per_s is NaN"));
+    assert!(spoilt(&|m| m.frames_per_s = 1e9).contains("frames_per_s is 1000000000"));
+    assert!(spoilt(&|m| m.forced_tile_count = 17).contains("tile_count is 17"));
+    assert!(spoilt(&|m| m.fallbacks = vec![m.fallbacks[0].clone(); 17]).contains("fallbacks has 17"));
+    assert!(spoilt(&|m| m.fallbacks[0].sample_side_ratio = 1.5).contains("fallbacks.sample_side_ratio is 1.5"));
+    assert!(spoilt(&|m| m.fallbacks[0].frame_rate_ratio = 0.0).contains("fallbacks.frame_rate_ratio is 0"));
     assert!(spoilt(&|m| m.refinement_step_count = 65).contains("refinement_step_count is 65"));
+}
+
+#[test]
+fn other_versions_are_refused_before_anything_else() {
+    for version in [0, PROTOCOL_VERSION + 1] {
+        let message = proto::OpenSessionRequest { protocol_version: version, ..proto::OpenSessionRequest::default() };
+        assert!(refusal::<_, SessionRequest>(message).contains(&format!("protocol_version is {version}, must be 1")));
+        let message = proto::JoinClusterRequest { protocol_version: version, ..proto::JoinClusterRequest::default() };
+        assert!(refusal::<_, JoinCluster>(message).contains(&format!("protocol_version is {version}, must be 1")));
+    }
+    let error = JoinCluster::try_from(proto::JoinClusterRequest::default()).unwrap_err();
+    assert_eq!(tonic::Status::from(error).code(), tonic::Code::FailedPrecondition);
 }
 
 #[test]

@@ -1,13 +1,22 @@
 //! The plan: which node does what.
 
 use std::fmt;
+use std::num::NonZeroU32;
 
+use depth_image::Camera;
 use prost::Message as _;
+use tonic::metadata::{MetadataMap, MetadataValue};
+use tonic::{Code, Status};
 
 use crate::codec::SampleSetId;
 use crate::error::{WireError, at_most, required};
-use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS, nonempty};
+use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_TILES, nonempty};
 use crate::{Workload, proto};
+
+/// Of a refusal: the plan in force.
+const PLAN_KEY: &str = "myriorama-plan-bin";
+/// In base64 it must fit the 16 KiB of headers that peers take.
+const MAX_PLAN_IN_METADATA_BYTES: usize = 8 << 10;
 
 /// How views come about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,7 +58,7 @@ impl Policy {
     }
 }
 
-/// The images that one node samples: of every set, or, where every sampler has all of them, of every set whose turn
+/// The images, or tiles of images, that one node samples: of every set, or, where every sampler has all of them, of every set whose turn
 /// it is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SamplerShare {
@@ -57,7 +66,7 @@ pub struct SamplerShare {
     pub node_name: String,
     /// Where it is reached.
     pub address: String,
-    /// Into the workload's sample cameras.
+    /// Into [`Assignment::sampled_cameras`].
     pub image_indices: Vec<u32>,
 }
 
@@ -68,6 +77,8 @@ pub struct CompositorShare {
     pub node_name: String,
     /// Where it is reached.
     pub address: String,
+    /// Views are dealt in proportion to it.
+    pub view_weight: u32,
 }
 
 /// What a sample set shows: equal for equal scene, time, cameras, sampling, lighting, step of refinement, lights
@@ -89,9 +100,37 @@ pub struct Assignment {
     pub samplers: Vec<SamplerShare>,
     /// At least one.
     pub compositors: Vec<CompositorShare>,
+    /// Each sample image is cut into so many tiles, one above the other, and every tile is an image of its own to
+    /// samplers: of image i they are i · T to (i + 1) · T - 1, top to bottom. At least 1.
+    pub tile_count: u32,
+    /// So many compositors, the first, ask samplers for images; each passes them on to so many others, those to as
+    /// many again. `None`: all ask samplers.
+    pub relay_fanout: Option<NonZeroU32>,
 }
 
 impl Assignment {
+    /// The cameras of all that is sampled: of the set's images, or of their tiles.
+    #[must_use]
+    pub fn sampled_cameras(&self) -> Vec<Camera> {
+        let tiles = |camera: &Camera| (0..self.tile_count).map(|tile| camera.tile(tile, self.tile_count)).collect();
+        self.workload.sample_cameras.iter().flat_map(|camera| -> Vec<Camera> { tiles(camera) }).collect()
+    }
+
+    /// Whom a compositor asks for images: another compositor, or `None` for the samplers.
+    #[must_use]
+    pub fn relay_of(&self, node_name: &str) -> Option<&CompositorShare> {
+        let fanout = self.relay_fanout?.get() as usize;
+        let place = self.compositors.iter().position(|share| share.node_name == node_name)?;
+        (place / fanout).checked_sub(1).map(|relay| &self.compositors[relay])
+    }
+
+    /// Whether other compositors ask this node for images.
+    #[must_use]
+    pub fn relays(&self, node_name: &str) -> bool {
+        let asks = |share: &CompositorShare| self.relay_of(&share.node_name).is_some_and(|r| r.node_name == node_name);
+        self.compositors.iter().any(asks)
+    }
+
     /// Who samples a set: all samplers its images, or in turn one sampler the whole set.
     #[must_use]
     pub fn samplers_of(&self, set_index: u32) -> &[SamplerShare] {
@@ -107,8 +146,14 @@ impl Assignment {
         if self.sets_in_turn() { self.samplers.len() as u32 } else { 1 }
     }
 
+    /// Images, or tiles of images, of a set.
+    #[must_use]
+    pub fn image_count(&self) -> usize {
+        self.workload.sample_cameras.len() * self.tile_count as usize
+    }
+
     fn sets_in_turn(&self) -> bool {
-        let all = self.workload.sample_cameras.len();
+        let all = self.image_count();
         self.samplers.len() > 1 && self.samplers.iter().all(|share| share.image_indices.len() == all)
     }
 
@@ -160,13 +205,32 @@ impl Assignment {
         Some(SetContent(hash.finalize().into()))
     }
 
+    /// Refuses what is asked under another plan, and says which is in force: whoever asks may not hear the coordinator.
+    #[must_use]
+    pub fn refusal(&self, message: String) -> Status {
+        let bytes = proto::Assignment::from(self.clone()).encode_to_vec();
+        let mut metadata = MetadataMap::new();
+        // What is larger than a peer takes as metadata is left to the coordinator to say.
+        if bytes.len() <= MAX_PLAN_IN_METADATA_BYTES {
+            metadata.insert_bin(PLAN_KEY, MetadataValue::from_bytes(&bytes));
+        }
+        Status::with_metadata(Code::FailedPrecondition, message, metadata)
+    }
+
+    /// The plan in force, of a refusal that says so.
+    #[must_use]
+    pub fn told_by(refusal: &Status) -> Option<Self> {
+        let bytes = refusal.metadata().get_bin(PLAN_KEY)?.to_bytes().ok()?;
+        proto::Assignment::decode(bytes).ok()?.try_into().ok()
+    }
+
     fn check(self) -> Result<Self, WireError> {
-        let image_count = self.workload.sample_cameras.len();
+        let image_count = self.image_count();
         let mut sampled = vec![0u32; image_count];
         for &index in self.samplers.iter().flat_map(|share| &share.image_indices) {
             *sampled
                 .get_mut(index as usize)
-                .ok_or_else(|| WireError::out_of_range("image_indices", index, "one of the sample cameras"))? += 1;
+                .ok_or_else(|| WireError::out_of_range("image_indices", index, "of an image or a tile"))? += 1;
         }
         let each = self.sets_at_once();
         if self.policy != Policy::Direct && (image_count == 0 || sampled.iter().any(|&times| times != each)) {
@@ -192,6 +256,8 @@ impl TryFrom<proto::Assignment> for Assignment {
             workload: required(a.workload, "assignment.workload")?.try_into()?,
             samplers: a.samplers.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
             compositors: a.compositors.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+            tile_count: tile_count_from(a.tile_count)?,
+            relay_fanout: NonZeroU32::new(a.relay_fanout_count),
         };
         assignment.check()
     }
@@ -205,15 +271,22 @@ impl From<Assignment> for proto::Assignment {
             workload: Some(a.workload.into()),
             samplers: a.samplers.into_iter().map(Into::into).collect(),
             compositors: a.compositors.into_iter().map(Into::into).collect(),
+            tile_count: a.tile_count,
+            relay_fanout_count: a.relay_fanout.map_or(0, NonZeroU32::get),
         }
     }
+}
+
+/// From 1 to the limit; 0 counts as 1.
+pub(crate) fn tile_count_from(count: u32) -> Result<u32, WireError> {
+    if count <= MAX_TILES { Ok(count.max(1)) } else { Err(WireError::out_of_range("tile_count", count, "at most 16")) }
 }
 
 impl TryFrom<proto::SamplerShare> for SamplerShare {
     type Error = WireError;
 
     fn try_from(s: proto::SamplerShare) -> Result<Self, WireError> {
-        at_most(s.image_indices.len(), MAX_SAMPLE_CAMERAS, "image_indices")?;
+        at_most(s.image_indices.len(), MAX_SAMPLE_CAMERAS * MAX_TILES as usize, "image_indices")?;
         Ok(Self {
             node_name: nonempty(s.node_name, "node_name")?,
             address: nonempty(s.node_address, "node_address")?,
@@ -232,12 +305,13 @@ impl TryFrom<proto::CompositorShare> for CompositorShare {
     type Error = WireError;
 
     fn try_from(s: proto::CompositorShare) -> Result<Self, WireError> {
-        Ok(Self { node_name: nonempty(s.node_name, "node_name")?, address: nonempty(s.node_address, "node_address")? })
+        let (node_name, address) = (nonempty(s.node_name, "node_name")?, nonempty(s.node_address, "node_address")?);
+        Ok(Self { node_name, address, view_weight: s.dealt_view_count })
     }
 }
 
 impl From<CompositorShare> for proto::CompositorShare {
     fn from(s: CompositorShare) -> Self {
-        Self { node_name: s.node_name, node_address: s.address }
+        Self { node_name: s.node_name, node_address: s.address, dealt_view_count: s.view_weight }
     }
 }

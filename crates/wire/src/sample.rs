@@ -5,7 +5,7 @@ use crate::codec::{
     SampleSetId,
 };
 use crate::error::{WireError, at_most, required};
-use crate::limits::{MAX_SAMPLE_CAMERAS, MAX_VISIBILITY_PLANES};
+use crate::limits::{MAX_SAMPLE_CAMERAS, MAX_TILES, MAX_VISIBILITY_PLANES};
 use crate::proto;
 
 /// One of each kind, but for visibility.
@@ -18,7 +18,8 @@ pub struct FetchImages {
     pub plan_epoch: u64,
     /// Into the timeline.
     pub set_index: u32,
-    /// Into the sample cameras; all of them the sampler's own.
+    /// Into [`Assignment::sampled_cameras`](crate::Assignment::sampled_cameras); all of them the sampler's own, or what
+    /// a relay passes on.
     pub image_indices: Vec<u32>,
 }
 
@@ -26,7 +27,7 @@ impl TryFrom<proto::FetchSampleImagesRequest> for FetchImages {
     type Error = WireError;
 
     fn try_from(r: proto::FetchSampleImagesRequest) -> Result<Self, WireError> {
-        at_most(r.image_indices.len(), MAX_SAMPLE_CAMERAS, "image_indices")?;
+        at_most(r.image_indices.len(), MAX_SAMPLE_CAMERAS * MAX_TILES as usize, "image_indices")?;
         if r.image_indices.is_empty() {
             return Err(WireError::Missing { field: "image_indices" });
         }

@@ -6,11 +6,14 @@ use std::str::FromStr;
 use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
 use glam::UVec2;
 
+use crate::demand::{fallbacks_from, rate_from, ratio_from};
 use crate::error::{WireError, required};
 use crate::geometry::{bounds_from, bounds_to, camera_to, pinhole_from, pinhole_to, sample_cameras_from};
 use crate::limits::{MAX_VIEWS_PER_SET, nonempty, reason, seconds};
+use crate::plan::tile_count_from;
+use crate::protocol::{PROTOCOL_VERSION, same_version};
 use crate::workload::refinement_steps_from;
-use crate::{Assignment, Costs, Policy, SceneHash, Timeline, proto};
+use crate::{Assignment, Costs, Policy, Quality, SceneHash, Timeline, proto};
 
 /// What the client wants to happen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -106,14 +109,21 @@ pub struct SessionRequest {
     /// Steps in which a still picture is refined, one a set; see [`Workload::refinement`](crate::Workload::refinement).
     /// From 1, where every set is finished, to [`MAX_REFINEMENT_STEPS`](crate::limits::MAX_REFINEMENT_STEPS).
     pub refinement_steps: u32,
+    /// Pictures a second, of `views_per_set` views each; 0: as fast as they come, as of a batch.
+    pub frames_per_s: f64,
+    /// What it makes do with under overload, in this order.
+    pub fallbacks: Vec<Quality>,
+    /// Tiles of a sample image, instead of as many as are predicted to be fastest.
+    pub forced_tile_count: Option<u32>,
 }
 
 impl TryFrom<proto::OpenSessionRequest> for SessionRequest {
     type Error = WireError;
 
     fn try_from(r: proto::OpenSessionRequest) -> Result<Self, WireError> {
+        same_version(r.protocol_version)?;
         if !(1..=MAX_VIEWS_PER_SET).contains(&r.views_per_set_count) {
-            return Err(WireError::out_of_range("views_per_set_count", r.views_per_set_count, "from 1 to 1048576"));
+            return Err(WireError::out_of_range("views_per_set_count", r.views_per_set_count, "from 1 to 65536"));
         }
         Ok(Self {
             scene: if r.scene_hash.is_empty() { None } else { Some(SceneHash::parse(&r.scene_hash)?) },
@@ -131,6 +141,12 @@ impl TryFrom<proto::OpenSessionRequest> for SessionRequest {
             policy: PolicyChoice::from_wire(r.policy_choice)?,
             forced_sampler_count: (r.forced_sampler_count > 0).then_some(r.forced_sampler_count),
             refinement_steps: refinement_steps_from(r.refinement_step_count.max(1))?,
+            frames_per_s: rate_from(r.frames_per_s)?,
+            fallbacks: fallbacks_from(r.fallbacks)?,
+            forced_tile_count: match r.forced_tile_count {
+                0 => None,
+                count => Some(tile_count_from(count)?),
+            },
         })
     }
 }
@@ -154,6 +170,10 @@ impl From<SessionRequest> for proto::OpenSessionRequest {
             policy_choice: r.policy.to_wire(),
             forced_sampler_count: r.forced_sampler_count.unwrap_or(0),
             refinement_step_count: r.refinement_steps,
+            frames_per_s: r.frames_per_s,
+            fallbacks: r.fallbacks.into_iter().map(Into::into).collect(),
+            forced_tile_count: r.forced_tile_count.unwrap_or(0),
+            protocol_version: PROTOCOL_VERSION,
         }
     }
 }
@@ -213,6 +233,10 @@ pub struct SessionPlan {
     pub predicted_enumerated_s: f64,
     /// The slowest node's time to load the scene; 0 where all had it.
     pub scene_load_s: f64,
+    /// Which of the session's fallbacks, from 1; 0: all that was asked for.
+    pub fallback_number: u32,
+    /// Pictures a second, of those asked for.
+    pub frame_rate_ratio: f64,
 }
 
 impl SessionPlan {
@@ -236,6 +260,11 @@ impl SessionPlan {
 /// What a session's stream carries.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SessionEvent {
+    /// First.
+    Opened {
+        /// To change what the session asks for.
+        session: u64,
+    },
     /// Before the plan.
     Progress {
         /// What is being done.
@@ -268,6 +297,8 @@ impl TryFrom<proto::SessionPlan> for SessionPlan {
             enumerated_sampler_count: p.enumerated_sampler_count,
             predicted_enumerated_s: seconds(p.predicted_enumerated_s, "predicted_enumerated_s")?,
             scene_load_s: seconds(p.scene_load_s, "scene_load_s")?,
+            fallback_number: p.fallback_number,
+            frame_rate_ratio: ratio_from(p.frame_rate_ratio, "frame_rate_ratio")?,
         })
     }
 }
@@ -286,6 +317,8 @@ impl From<SessionPlan> for proto::SessionPlan {
             enumerated_sampler_count: p.enumerated_sampler_count,
             predicted_enumerated_s: p.predicted_enumerated_s,
             scene_load_s: p.scene_load_s,
+            fallback_number: p.fallback_number,
+            frame_rate_ratio: p.frame_rate_ratio,
         }
     }
 }
@@ -301,6 +334,7 @@ impl TryFrom<proto::OpenSessionResponse> for SessionEvent {
             }
             Event::Plan(plan) => Self::Plan(Box::new(plan.try_into()?)),
             Event::Ended(ended) => Self::Ended { reason: reason(ended.reason, "ended.reason")? },
+            Event::Opened(opened) => Self::Opened { session: opened.session_number },
         })
     }
 }
@@ -314,6 +348,7 @@ impl From<SessionEvent> for proto::OpenSessionResponse {
             }
             SessionEvent::Plan(plan) => Event::Plan((*plan).into()),
             SessionEvent::Ended { reason } => Event::Ended(proto::SessionEnded { reason }),
+            SessionEvent::Opened { session } => Event::Opened(proto::SessionOpened { session_number: session }),
         };
         Self { event: Some(event) }
     }

@@ -1,7 +1,8 @@
 //! Views to bytes and back: colour by the frame codec, other planes without loss.
 
 use bytes::Bytes;
-use depth_image::{Provenance, View};
+use depth_image::{PinholeCamera, Provenance, View};
+use glam::UVec2;
 
 use crate::codec::{
     DecodeError, DecodeLimits, EncodedFrame, FrameCodec, FrameError, decode_frame, encode_frame, pack_f32_plane,
@@ -38,17 +39,31 @@ pub enum ViewCodecError {
 /// A view's bytes, planes one after the other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EncodedView {
-    /// All but set and times.
-    header: FrameHeader,
-    /// What the header describes.
+    size_px: UVec2,
+    codec: FrameCodec,
+    /// Of colour, inverse depth and provenance.
+    lengths: [u64; 3],
+    crc32: u32,
+    /// All planes.
     pub data: Bytes,
 }
 
 impl EncodedView {
     /// The header of a frame with this view.
     #[must_use]
-    pub fn header(&self, sample_set_id: SampleSetId, stage_times: StageTimes) -> FrameHeader {
-        FrameHeader { sample_set_id, stage_times, ..self.header.clone() }
+    pub fn header(&self, sample_set_id: SampleSetId, camera: PinholeCamera, stage_times: StageTimes) -> FrameHeader {
+        let [color_bytes, inverse_depth_bytes, provenance_bytes] = self.lengths;
+        FrameHeader {
+            sample_set_id,
+            camera,
+            size_px: self.size_px,
+            codec: self.codec,
+            color_bytes,
+            inverse_depth_bytes,
+            provenance_bytes,
+            crc32: self.crc32,
+            stage_times,
+        }
     }
 }
 
@@ -72,17 +87,7 @@ pub fn encode_view(view: &View, codec: FrameCodec) -> Result<EncodedView, ViewCo
     } else {
         [&color[..], &depth, &provenance].concat().into()
     };
-    let header = FrameHeader {
-        sample_set_id: SampleSetId::default(),
-        size_px: view.size_px,
-        codec,
-        color_bytes: lengths[0],
-        inverse_depth_bytes: lengths[1],
-        provenance_bytes: lengths[2],
-        crc32: crc32fast::hash(&data),
-        stage_times: StageTimes::default(),
-    };
-    Ok(EncodedView { header, data })
+    Ok(EncodedView { size_px: view.size_px, codec, lengths, crc32: crc32fast::hash(&data), data })
 }
 
 fn words_of(plane: &[Provenance]) -> Vec<u32> {
@@ -128,8 +133,9 @@ fn planes(frame: &WholeFrame) -> Result<[Bytes; 3], ViewCodecError> {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
-    use glam::UVec2;
 
     fn view(planes: bool) -> View {
         View {
@@ -142,7 +148,8 @@ mod tests {
 
     fn sent(view: &View) -> WholeFrame {
         let encoded = encode_view(view, FrameCodec::Lz4).unwrap();
-        let header = encoded.header(SampleSetId { plan_epoch: 3, index: 2 }, StageTimes::default());
+        let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, view.size_px);
+        let header = encoded.header(SampleSetId { plan_epoch: 3, index: 2 }, camera, StageTimes::default());
         WholeFrame { frame: 1, header, data: encoded.data }
     }
 

@@ -30,10 +30,10 @@ impl Timeline {
         Self { start_s: at_s, step_s: 0.0, set_count: 1 }
     }
 
-    /// Whether sets differ in scene time.
+    /// Whether sets differ in scene time: one set never does.
     #[must_use]
     pub fn moves(&self) -> bool {
-        self.step_s != 0.0
+        self.step_s != 0.0 && self.set_count > 1
     }
 
     /// Scene time of the set whose kept samples this one keeps on to, so that they do not flicker: the first of its run.
@@ -225,9 +225,18 @@ pub struct Costs {
     /// Whether an image of a set can only be sampled after those before it: then one node samples the whole set,
     /// and several nodes sample sets in turn.
     pub in_order: bool,
+    /// Of g_s, what every tile of an image costs anew: work that does not shrink with its rows.
+    pub sample_overhead_s: f64,
 }
 
 impl Costs {
+    /// One of so many tiles of a sample image.
+    #[must_use]
+    pub fn sample_tile_s(&self, tile_count: usize) -> f64 {
+        let overhead_s = self.sample_overhead_s.min(self.sample_image_s);
+        overhead_s + (self.sample_image_s - overhead_s) / tile_count.max(1) as f64
+    }
+
     /// The greater of each: what the slowest node needs.
     #[must_use]
     pub fn max(self, other: Self) -> Self {
@@ -238,6 +247,7 @@ impl Costs {
             load_set_s: self.load_set_s.max(other.load_set_s),
             encode_view_s: self.encode_view_s.max(other.encode_view_s),
             in_order: self.in_order || other.in_order,
+            sample_overhead_s: self.sample_overhead_s.max(other.sample_overhead_s),
         }
     }
 }
@@ -253,6 +263,7 @@ impl TryFrom<proto::Costs> for Costs {
             load_set_s: seconds(c.load_set_s, "load_set_s")?,
             encode_view_s: seconds(c.encode_view_s, "encode_view_s")?,
             in_order: c.is_sampled_in_order,
+            sample_overhead_s: seconds(c.sample_overhead_s, "sample_overhead_s")?,
         })
     }
 }
@@ -266,6 +277,7 @@ impl From<Costs> for proto::Costs {
             load_set_s: c.load_set_s,
             encode_view_s: c.encode_view_s,
             is_sampled_in_order: c.in_order,
+            sample_overhead_s: c.sample_overhead_s,
         }
     }
 }

@@ -50,6 +50,17 @@ pub struct Chunk {
     pub body: ChunkBody,
 }
 
+impl Chunk {
+    /// Bytes of data; a header has none.
+    #[must_use]
+    pub fn data_len(&self) -> usize {
+        match &self.body {
+            ChunkBody::Header(_) => 0,
+            ChunkBody::Data(data) => data.len(),
+        }
+    }
+}
+
 impl ChunkBody {
     /// The checksum that a chunk with this body carries.
     #[must_use]

@@ -17,9 +17,22 @@ pub const CALL_TIMEOUT: Duration = Duration::from_secs(5);
 /// # Errors
 /// `INVALID_ARGUMENT` for what is no address, `UNAVAILABLE` where nobody answers.
 pub async fn connect(address: &str) -> Result<Channel, Status> {
+    let connected = endpoint(address)?.connect().await;
+    connected.map_err(|error| Status::unavailable(format!("{address}: {error}")))
+}
+
+/// As [`connect`], but only when it is first used.
+///
+/// # Errors
+/// `INVALID_ARGUMENT` for what is no address.
+pub fn connect_later(address: &str) -> Result<Channel, Status> {
+    Ok(endpoint(address)?.connect_lazy())
+}
+
+fn endpoint(address: &str) -> Result<Endpoint, Status> {
     let endpoint = Endpoint::from_shared(address.to_owned())
         .map_err(|error| Status::invalid_argument(format!("address {address}: {error}")))?;
-    let endpoint = endpoint
+    Ok(endpoint
         .connect_timeout(CALL_TIMEOUT)
         .tcp_nodelay(true)
         .http2_keep_alive_interval(KEEPALIVE_INTERVAL)
@@ -27,6 +40,5 @@ pub async fn connect(address: &str) -> Result<Channel, Status> {
         .keep_alive_while_idle(true)
         // Bulk: the default window of 64 KiB would stop a sender eight times a message.
         .initial_stream_window_size(4 << 20)
-        .initial_connection_window_size(16 << 20);
-    endpoint.connect().await.map_err(|error| Status::unavailable(format!("{address}: {error}")))
+        .initial_connection_window_size(16 << 20))
 }

@@ -4,7 +4,7 @@ use tokio_stream::StreamExt as _;
 use tonic::transport::Channel;
 use tonic::{Request, Response, Status, Streaming, async_trait};
 
-use super::{Messages, answer, capped, incoming, outgoing};
+use super::{Messages, answer, answers, capped, incoming, outgoing};
 use crate::proto::compositor_service_client::CompositorServiceClient;
 use crate::proto::compositor_service_server::{CompositorService, CompositorServiceServer};
 use crate::{FramePart, RenderViews, proto};
@@ -58,6 +58,6 @@ impl CompositorClient {
         requests: impl tokio_stream::Stream<Item = RenderViews> + Send + 'static,
     ) -> Result<Messages<FramePart>, Status> {
         let requests = requests.map(proto::RenderViewsRequest::from);
-        Ok(incoming(self.0.clone().render_views(requests).await?.into_inner()))
+        Ok(answers(self.0.clone().render_views(requests).await?.into_inner()))
     }
 }

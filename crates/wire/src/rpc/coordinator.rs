@@ -3,10 +3,13 @@
 use tonic::transport::Channel;
 use tonic::{Request, Response, Status, async_trait};
 
-use super::{Messages, answer, capped, checked, incoming, outgoing};
+use super::{Messages, answer, answered, answers, capped, checked, outgoing};
 use crate::proto::coordinator_service_client::CoordinatorServiceClient;
 use crate::proto::coordinator_service_server::{CoordinatorService, CoordinatorServiceServer};
-use crate::{ClusterStatus, FetchScene, JoinCluster, ScenePart, SessionEvent, SessionRequest, Welcome, proto};
+use crate::{
+    ChangeSession, ClusterStatus, FetchScene, JoinCluster, SamplerReport, ScenePart, SessionEvent, SessionRequest,
+    Welcome, WorkReport, proto,
+};
 
 /// Knows the members, plans sessions and hands out scenes.
 #[async_trait]
@@ -15,10 +18,16 @@ pub trait Coordinator: Send + Sync + 'static {
     async fn join_cluster(&self, request: JoinCluster) -> Result<Messages<Welcome>, Status>;
     /// Progress, one plan, and word when it no longer holds.
     async fn open_session(&self, request: SessionRequest) -> Result<Messages<SessionEvent>, Status>;
+    /// A session asks for more, or less.
+    async fn change_session(&self, request: ChangeSession) -> Result<(), Status>;
+    /// A member says what it did.
+    async fn report_work(&self, request: WorkReport) -> Result<(), Status>;
     /// A scene's package from an offset on.
     async fn fetch_scene(&self, request: FetchScene) -> Result<Messages<ScenePart>, Status>;
     /// The members.
     async fn status(&self) -> Result<ClusterStatus, Status>;
+    /// A sampler that a compositor cannot get images of.
+    async fn report_sampler(&self, report: SamplerReport) -> Result<(), Status>;
 }
 
 /// Adapts a [`Coordinator`] to its messages.
@@ -45,6 +54,22 @@ impl<C: Coordinator> CoordinatorService for CoordinatorAdapter<C> {
         Ok(answer(outgoing(self.0.open_session(checked(request)?).await?)))
     }
 
+    async fn change_session(
+        &self,
+        request: Request<proto::ChangeSessionRequest>,
+    ) -> Result<Response<proto::ChangeSessionResponse>, Status> {
+        self.0.change_session(checked(request)?).await?;
+        Ok(Response::new(proto::ChangeSessionResponse {}))
+    }
+
+    async fn report_work(
+        &self,
+        request: Request<proto::ReportWorkRequest>,
+    ) -> Result<Response<proto::ReportWorkResponse>, Status> {
+        self.0.report_work(checked(request)?).await?;
+        Ok(Response::new(proto::ReportWorkResponse {}))
+    }
+
     async fn fetch_scene(
         &self,
         request: Request<proto::FetchSceneRequest>,
@@ -57,6 +82,14 @@ impl<C: Coordinator> CoordinatorService for CoordinatorAdapter<C> {
         _request: Request<proto::GetStatusRequest>,
     ) -> Result<Response<proto::GetStatusResponse>, Status> {
         Ok(answer(self.0.status().await?))
+    }
+
+    async fn report_sampler(
+        &self,
+        request: Request<proto::ReportSamplerRequest>,
+    ) -> Result<Response<proto::ReportSamplerResponse>, Status> {
+        self.0.report_sampler(checked(request)?).await?;
+        Ok(answer(proto::ReportSamplerResponse {}))
     }
 }
 
@@ -82,7 +115,7 @@ impl CoordinatorClient {
     /// The coordinator's.
     pub async fn join_cluster(&self, request: JoinCluster) -> Result<Messages<Welcome>, Status> {
         let request: proto::JoinClusterRequest = request.into();
-        Ok(incoming(self.0.clone().join_cluster(request).await?.into_inner()))
+        Ok(answers(self.0.clone().join_cluster(request).await?.into_inner()))
     }
 
     /// See [`Coordinator::open_session`].
@@ -91,7 +124,25 @@ impl CoordinatorClient {
     /// The coordinator's.
     pub async fn open_session(&self, request: SessionRequest) -> Result<Messages<SessionEvent>, Status> {
         let request: proto::OpenSessionRequest = request.into();
-        Ok(incoming(self.0.clone().open_session(request).await?.into_inner()))
+        Ok(answers(self.0.clone().open_session(request).await?.into_inner()))
+    }
+
+    /// See [`Coordinator::change_session`].
+    ///
+    /// # Errors
+    /// The coordinator's.
+    pub async fn change_session(&self, request: ChangeSession) -> Result<(), Status> {
+        let request: proto::ChangeSessionRequest = request.into();
+        self.0.clone().change_session(request).await.map(drop)
+    }
+
+    /// See [`Coordinator::report_work`].
+    ///
+    /// # Errors
+    /// The coordinator's.
+    pub async fn report_work(&self, request: WorkReport) -> Result<(), Status> {
+        let request: proto::ReportWorkRequest = request.into();
+        self.0.clone().report_work(request).await.map(drop)
     }
 
     /// See [`Coordinator::fetch_scene`].
@@ -100,7 +151,7 @@ impl CoordinatorClient {
     /// The coordinator's.
     pub async fn fetch_scene(&self, request: FetchScene) -> Result<Messages<ScenePart>, Status> {
         let request: proto::FetchSceneRequest = request.into();
-        Ok(incoming(self.0.clone().fetch_scene(request).await?.into_inner()))
+        Ok(answers(self.0.clone().fetch_scene(request).await?.into_inner()))
     }
 
     /// See [`Coordinator::status`].
@@ -108,6 +159,15 @@ impl CoordinatorClient {
     /// # Errors
     /// The coordinator's.
     pub async fn status(&self) -> Result<ClusterStatus, Status> {
-        Ok(self.0.clone().get_status(proto::GetStatusRequest {}).await?.into_inner().try_into()?)
+        answered(self.0.clone().get_status(proto::GetStatusRequest {}).await?.into_inner())
+    }
+
+    /// See [`Coordinator::report_sampler`].
+    ///
+    /// # Errors
+    /// The coordinator's; `FAILED_PRECONDITION` where the plan is not in force.
+    pub async fn report_sampler(&self, report: SamplerReport) -> Result<(), Status> {
+        let request: proto::ReportSamplerRequest = report.into();
+        self.0.clone().report_sampler(request).await.map(drop)
     }
 }

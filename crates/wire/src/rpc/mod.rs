@@ -5,6 +5,7 @@ mod compositor;
 mod coordinator;
 mod health;
 mod node;
+mod reflection;
 mod sampler;
 
 use std::pin::Pin;
@@ -12,11 +13,12 @@ use std::pin::Pin;
 use tokio_stream::{Stream, StreamExt as _};
 use tonic::{Request, Response, Status, Streaming};
 
-pub use channel::{CALL_TIMEOUT, KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT, connect};
+pub use channel::{CALL_TIMEOUT, KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT, connect, connect_later};
 pub use compositor::{Compositor, CompositorClient, compositor_server};
 pub use coordinator::{Coordinator, CoordinatorClient, coordinator_server};
 pub use health::is_serving;
 pub use node::{Node, NodeClient, node_server};
+pub use reflection::reflection_server;
 pub use sampler::{Sampler, SamplerClient, sampler_server};
 
 use crate::WireError;
@@ -30,6 +32,22 @@ where
     D: TryFrom<P, Error = WireError> + 'static,
 {
     Box::pin(stream.map(|message| message.and_then(|message| D::try_from(message).map_err(Status::from))))
+}
+
+/// As [`incoming`], of what a server answers: what is wrong with that is no fault of the request.
+fn answers<P, D>(stream: Streaming<P>) -> Messages<D>
+where
+    P: Send + 'static,
+    D: TryFrom<P, Error = WireError> + 'static,
+{
+    Box::pin(stream.map(|message| message.and_then(answered)))
+}
+
+fn answered<P, D>(message: P) -> Result<D, Status>
+where
+    D: TryFrom<P, Error = WireError>,
+{
+    D::try_from(message).map_err(|error| Status::data_loss(error.to_string()))
 }
 
 fn outgoing<D, P>(stream: Messages<D>) -> Messages<P>

@@ -3,7 +3,7 @@
 use tonic::transport::Channel;
 use tonic::{Request, Response, Status, async_trait};
 
-use super::{answer, capped, checked};
+use super::{answer, answered, capped, checked};
 use crate::proto::node_service_client::NodeServiceClient;
 use crate::proto::node_service_server::{NodeService, NodeServiceServer};
 use crate::{Assignment, Costs, MeasureCosts, Ready, proto};
@@ -60,7 +60,7 @@ impl NodeClient {
     /// The node's.
     pub async fn measure_costs(&self, request: MeasureCosts) -> Result<Costs, Status> {
         let request: proto::MeasureCostsRequest = request.into();
-        Ok(self.0.clone().measure_costs(request).await?.into_inner().try_into()?)
+        answered(self.0.clone().measure_costs(request).await?.into_inner())
     }
 
     /// See [`Node::apply_assignment`].
@@ -69,6 +69,6 @@ impl NodeClient {
     /// The node's; `FAILED_PRECONDITION` for an epoch below the one it has.
     pub async fn apply_assignment(&self, assignment: Assignment) -> Result<Ready, Status> {
         let request: proto::ApplyAssignmentRequest = assignment.into();
-        Ok(self.0.clone().apply_assignment(request).await?.into_inner().try_into()?)
+        answered(self.0.clone().apply_assignment(request).await?.into_inner())
     }
 }

@@ -3,7 +3,7 @@
 use tonic::transport::Channel;
 use tonic::{Request, Response, Status, async_trait};
 
-use super::{Messages, answer, capped, checked, incoming, outgoing};
+use super::{Messages, answer, answers, capped, checked, outgoing};
 use crate::codec::Chunk;
 use crate::proto::sampler_service_client::SamplerServiceClient;
 use crate::proto::sampler_service_server::{SamplerService, SamplerServiceServer};
@@ -55,6 +55,6 @@ impl SamplerClient {
     /// The sampler's.
     pub async fn fetch_sample_images(&self, request: FetchImages) -> Result<Messages<Chunk>, Status> {
         let request: proto::FetchSampleImagesRequest = request.into();
-        Ok(incoming(self.0.clone().fetch_sample_images(request).await?.into_inner()))
+        Ok(answers(self.0.clone().fetch_sample_images(request).await?.into_inner()))
     }
 }
