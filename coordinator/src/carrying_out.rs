@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use tokio::sync::Notify;
 use tokio::task::JoinSet;
@@ -10,8 +11,12 @@ use wire::rpc::NodeClient;
 use wire::{Assignment, Ready, SessionEvent, SessionPlan, SessionStage};
 
 use crate::opening::{named, within};
-use crate::schedule::{Command, Event};
+use crate::schedule::{ChoiceError, Command, Event};
 use crate::service::Inner;
+
+/// A call that breaks sooner than this is tried again, after a pause.
+const SOON: Duration = Duration::from_secs(1);
+const PAUSE: Duration = Duration::from_millis(100);
 
 /// What is still to be done, in its order. None may be lost, and none is added but by an event that was let in.
 #[derive(Default)]
@@ -45,10 +50,18 @@ pub(crate) async fn carry_out(inner: Arc<Inner>) {
                 tokio::spawn(apply(inner.clone(), sessions, *plan, addresses));
             }
             Command::Refuse { session, error } => {
-                inner.refuse(session, Status::failed_precondition(error.to_string()));
+                inner.refuse(session, refusal(&error));
             }
             Command::End { session, reason } => inner.end(session, &reason),
         }
+    }
+}
+
+pub(crate) fn refusal(error: &ChoiceError) -> Status {
+    match error {
+        ChoiceError::Overload { .. } => Status::resource_exhausted(error.to_string()),
+        ChoiceError::ForcedTiles { .. } => Status::invalid_argument(error.to_string()),
+        ChoiceError::NoNodes | ChoiceError::ForcedSamplers { .. } => Status::failed_precondition(error.to_string()),
     }
 }
 
@@ -59,50 +72,89 @@ async fn apply(inner: Arc<Inner>, sessions: Vec<u64>, mut plan: SessionPlan, add
         let detail = format!("{} nodes take plan {plan_epoch}", addresses.len());
         inner.say(session, SessionEvent::Progress { stage: SessionStage::Preparing, detail });
     }
-    match tell_all(&inner, &plan.assignment, addresses).await {
-        // What no node can do is the sessions' fault, not the nodes'.
-        Err(status) if status.code() == Code::InvalidArgument => {
-            sessions.into_iter().for_each(|session| inner.refuse(session, status.clone()));
-        }
-        Ok(scene_load_s) => {
-            plan.scene_load_s = scene_load_s;
-            for session in sessions {
-                inner.say(session, SessionEvent::Plan(Box::new(plan.clone())));
-            }
-        }
+    let Told { scene_load_s, ready, failed } = tell_all(&inner, &plan.assignment, addresses).await;
+    // What no node can do is the sessions' fault, not the nodes'.
+    if let Some(status) = failed.as_ref().filter(|status| status.code() == Code::InvalidArgument) {
+        sessions.into_iter().for_each(|session| inner.refuse(session, status.clone()));
+        return;
+    }
+    if let Some(status) = &failed {
         // The schedule knows: another plan follows.
-        Err(status) => tracing::warn!(plan_epoch, reason = status.message(), "not in force"),
+        tracing::warn!(plan_epoch, reason = status.message(), "not in force everywhere");
+    }
+    // Nodes that have taken it refuse what is asked under the plan before.
+    if ready > 0 {
+        plan.scene_load_s = scene_load_s;
+        for session in sessions {
+            inner.say(session, SessionEvent::Plan(Box::new(plan.clone())));
+        }
     }
 }
 
-/// The time of the node that took longest to load the scene; the schedule hears of each.
-async fn tell_all(inner: &Arc<Inner>, assignment: &Assignment, addresses: Vec<String>) -> Result<f64, Status> {
+/// What nodes said to a plan.
+#[derive(Default)]
+struct Told {
+    /// The time of the node that took longest to load the scene.
+    scene_load_s: f64,
+    /// Nodes that have taken it.
+    ready: usize,
+    /// Why one of the others has not.
+    failed: Option<Status>,
+}
+
+/// The schedule hears of each.
+async fn tell_all(inner: &Arc<Inner>, assignment: &Assignment, addresses: Vec<String>) -> Told {
     let mut calls = JoinSet::new();
     for address in addresses {
         calls.spawn(tell(inner.clone(), assignment.clone(), address));
     }
-    let mut slowest_s = Ok(0f64);
-    while let Some(ready) = calls.join_next().await {
-        let ready = ready.unwrap_or_else(|error| Err(Status::internal(error.to_string())));
-        slowest_s = slowest_s.and_then(|slowest_s| Ok(slowest_s.max(ready?.scene_load_s)));
+    let mut told = Told::default();
+    while let Some(answer) = calls.join_next().await {
+        match answer.unwrap_or_else(|error| Err(Status::internal(error.to_string()))) {
+            Ok(ready) => {
+                told.ready += 1;
+                told.scene_load_s = told.scene_load_s.max(ready.scene_load_s);
+            }
+            Err(status) if told.failed.as_ref().is_none_or(|failed| failed.code() != Code::InvalidArgument) => {
+                told.failed = Some(status);
+            }
+            Err(_) => (),
+        }
     }
-    slowest_s
+    told
 }
 
 async fn tell(inner: Arc<Inner>, assignment: Assignment, address: String) -> Result<Ready, Status> {
     let plan_epoch = assignment.plan_epoch;
     let node_name = node_at(&assignment, &address);
-    let call = async { NodeClient::new(inner.connections.to(&address).await?).apply_assignment(assignment).await };
-    let ready = within(inner.config.ready_deadline, "getting ready", call).await;
+    let ready = within(inner.config.ready_deadline, "getting ready", ask(&inner, &assignment, &address)).await;
     match &ready {
         Ok(_) => inner.step(Event::Ready { plan_epoch, node_name }),
         // A later plan came first, or the plan asks for what cannot be.
         Err(status) if [Code::FailedPrecondition, Code::InvalidArgument].contains(&status.code()) => (),
         Err(status) => {
-            inner.step(Event::Unready { plan_epoch, node_name, reason: status.message().to_owned() });
+            inner.leave_out(plan_epoch, node_name, status.message().to_owned());
         }
     }
     ready.map_err(|status| named(&address, &status))
+}
+
+/// Asks once more where a connection broke: the node may not have heard.
+async fn ask(inner: &Inner, assignment: &Assignment, address: &str) -> Result<Ready, Status> {
+    let apply =
+        async || NodeClient::new(inner.connections.to(address).await?).apply_assignment(assignment.clone()).await;
+    let start = Instant::now();
+    match apply().await {
+        Err(status) if is_of_connection(&status) && start.elapsed() < SOON => {
+            tokio::time::sleep(PAUSE).await;
+            apply().await
+        }
+        done => done,
+    }
+}
+
+fn is_of_connection(status: &Status) -> bool {
+    [Code::Unavailable, Code::Unknown, Code::Internal, Code::Cancelled, Code::DataLoss].contains(&status.code())
 }
 
 fn node_at(assignment: &Assignment, address: &str) -> String {

@@ -12,18 +12,24 @@ use wire::{OfferSettings, OfferStatus, SceneHash, SceneRef};
 pub struct CoordinatorConfig {
     /// Allows another bind address than loopback, without TLS.
     pub insecure_bind: bool,
+    /// Says by reflection what services and messages there are.
+    pub reflection: bool,
     /// How long one node may measure.
     pub measure_deadline: Duration,
     /// How long nodes may take to load a scene and get ready.
     pub ready_deadline: Duration,
+    /// Sessions that may be open; more are refused with `RESOURCE_EXHAUSTED`.
+    pub max_sessions: usize,
 }
 
 impl Default for CoordinatorConfig {
     fn default() -> Self {
         Self {
             insecure_bind: false,
+            reflection: false,
             measure_deadline: Duration::from_secs(600),
             ready_deadline: Duration::from_secs(300),
+            max_sessions: 1024,
         }
     }
 }

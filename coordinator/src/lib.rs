@@ -5,10 +5,13 @@
 
 mod carrying_out;
 mod config;
+mod leaving_out;
 mod metrics;
 mod observers;
 mod opening;
+mod reports;
 pub mod schedule;
+mod seats;
 mod service;
 mod workload;
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::mpsc;
-use tonic::Status;
+use tonic::{Code, Status};
 use wire::rpc::NodeClient;
 use wire::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage};
 
@@ -17,6 +17,9 @@ use crate::workload::workload_of;
 /// Views of one measured call: as in a batch of real work, for few views cost more apiece, but not so many that a
 /// slow device takes minutes.
 const MEASURED_BATCH: u32 = 32;
+/// How often costs are measured again where a node was lost, and how long it may take to leave.
+const MEASURED_AGAIN: usize = 10;
+const UNTIL_IT_HAS_LEFT: Duration = Duration::from_millis(200);
 /// Measured costs that are kept.
 const KEPT_COSTS: usize = 16;
 
@@ -53,16 +56,33 @@ async fn measured_opening(
     // One at a time: costs are measured with nothing else being measured.
     let costs = {
         let _one = inner.measuring.lock().await;
-        measured(inner, &measure, events).await?
+        measured_in_spite(inner, &measure, events).await?
     };
     Ok(Opening {
         session,
         workload: measure.workload,
         views_per_set: request.views_per_set as usize,
+        frames_per_s: request.frames_per_s,
         policy: request.policy,
         forced_samplers: request.forced_sampler_count.map(|count| count as usize),
+        forced_tiles: request.forced_tile_count.map(|count| count as usize),
+        fallbacks: request.fallbacks,
         costs,
     })
+}
+
+/// A node may be lost while it measures: others of its kind are asked once it has left.
+async fn measured_in_spite(inner: &Arc<Inner>, measure: &MeasureCosts, events: &Events) -> Result<Costs, Status> {
+    for _ in 0..MEASURED_AGAIN {
+        match measured(inner, measure, events).await {
+            Err(status) if [Code::Unavailable, Code::Unknown].contains(&status.code()) => {
+                say(events, SessionStage::Measuring, format!("measuring again: {}", status.message())).await;
+                tokio::time::sleep(UNTIL_IT_HAS_LEFT).await;
+            }
+            done => return done,
+        }
+    }
+    measured(inner, measure, events).await
 }
 
 async fn say(events: &Events, stage: SessionStage, detail: String) {

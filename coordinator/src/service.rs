@@ -5,11 +5,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use node::{Connections, ServeError, health, until_drained, with_guard};
+use glam::{Quat, Vec3};
+use node::{Connections, ServeError, health, until_drained, with_guard, with_reflection};
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
-use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
@@ -17,17 +17,22 @@ use tonic::{Status, async_trait};
 use wire::limits::PART_BYTES;
 use wire::rpc::{Coordinator, Messages, coordinator_server};
 use wire::{
-    ClusterStatus, Costs, FetchScene, JoinCluster, MeasureCosts, ScenePart, SessionEvent, SessionRequest, Timeline,
-    Welcome,
+    ChangeSession, ClusterStatus, Costs, FetchScene, JoinCluster, MeasureCosts, SamplerReport, ScenePart, SessionEvent,
+    SessionRequest, Timeline, Welcome, WorkReport,
 };
 
-use crate::carrying_out::{Commands, carry_out};
+use crate::carrying_out::{Commands, carry_out, refusal};
+use crate::leaving_out::probe;
 use crate::opening::{Events, open};
+use crate::reports::Reports;
 use crate::schedule::{Event, Scheduler};
+use crate::seats::Seats;
 use crate::{CoordinatorConfig, Observers, SceneOffer};
 
 /// Events that a session's client has not read yet.
 const SESSION_EVENTS: usize = 64;
+type SessionEvents = mpsc::Receiver<Result<SessionEvent, Status>>;
+
 /// How often the schedule looks again though nothing has happened.
 const TICK: Duration = Duration::from_millis(250);
 
@@ -51,6 +56,9 @@ pub async fn serve(
         started: Instant::now(),
         schedule: Mutex::new((Scheduler::default(), observers)),
         commands: Commands::default(),
+        seats: Seats::default(),
+        joining: Mutex::default(),
+        reports: Reports::default(),
         sessions: Mutex::default(),
         costs: Mutex::default(),
         counter: AtomicU64::new(1),
@@ -58,9 +66,10 @@ pub async fn serve(
     let mut running = JoinSet::new();
     running.spawn(carry_out(inner.clone()));
     running.spawn(tick(inner.clone()));
+    running.spawn(probe(inner.clone()));
     let service = CoordinatorService { inner, shutdown: shutdown.clone() };
     let routes = Routes::new(health(&["coordinator"]).await).add_service(coordinator_server(service));
-    node::serve(listener, routes, config.insecure_bind, shutdown).await
+    node::serve(listener, with_reflection(routes, config.reflection)?, config.insecure_bind, shutdown).await
 }
 
 async fn tick(inner: Arc<Inner>) {
@@ -80,6 +89,10 @@ pub(crate) struct Inner {
     started: Instant,
     schedule: Mutex<(Scheduler, Observers)>,
     pub(crate) commands: Commands,
+    pub(crate) seats: Seats,
+    /// One at a time: the schedule hears of nodes in the order in which they are seated.
+    joining: Mutex<()>,
+    pub(crate) reports: Reports,
     sessions: Mutex<HashMap<u64, Events>>,
     /// Of each device and what was measured, the oldest first.
     costs: Mutex<Vec<(String, MeasureCosts, Costs)>>,
@@ -97,9 +110,26 @@ impl Inner {
         let (scheduler, observers) = &mut *schedule;
         let now = self.started.elapsed();
         observers.note(now, &event);
+        let is_tick = matches!(event, Event::Tick);
         let commands = scheduler.step(now, event);
-        observers.metrics.show(&scheduler.status(), &commands);
+        // Nodes report often, and gauges are read seldom.
+        if is_tick || !commands.is_empty() {
+            observers.metrics.show(&scheduler.status(), &commands);
+        }
         self.commands.add(commands);
+    }
+
+    /// Room for one more session, before anything is done for it.
+    fn admit(&self) -> Result<(u64, Events, SessionEvents), Status> {
+        let (mut sessions, most) = (locked(&self.sessions), self.config.max_sessions);
+        if sessions.len() >= most {
+            return Err(Status::resource_exhausted(format!("quota max_sessions: {most} sessions are open")));
+        }
+        let (session, (events, stream)) = (self.next_number(), mpsc::channel(SESSION_EVENTS));
+        // There is room: it is the first.
+        let _ = events.try_send(Ok(SessionEvent::Opened { session }));
+        sessions.insert(session, events.clone());
+        Ok((session, events, stream))
     }
 
     /// Ends a session that cannot be.
@@ -137,7 +167,7 @@ impl Inner {
     pub(crate) fn kept_costs(&self, device: &str, measure: &MeasureCosts) -> Option<Costs> {
         locked(&self.costs)
             .iter()
-            .find(|(kept, what, _)| kept == device && *what == timeless(measure))
+            .find(|(kept, what, _)| kept == device && *what == kind_of(measure))
             .map(|(_, _, costs)| *costs)
     }
 
@@ -146,7 +176,7 @@ impl Inner {
         if kept.len() >= most {
             kept.remove(0);
         }
-        kept.push((device, timeless(&measure), costs));
+        kept.push((device, kind_of(&measure), costs));
     }
 
     fn next_number(&self) -> u64 {
@@ -154,11 +184,13 @@ impl Inner {
     }
 }
 
-/// Costs do not depend on the scene's time, and are those of finished pictures.
-fn timeless(measure: &MeasureCosts) -> MeasureCosts {
+/// What costs are kept for: they do not depend on the scene's time nor, as far as sessions are concerned, on where a view
+/// stands, and are those of finished pictures.
+fn kind_of(measure: &MeasureCosts) -> MeasureCosts {
     let mut measure = measure.clone();
     measure.workload.timeline = Timeline::still(0.0);
     measure.workload.refinement_steps = 1;
+    (measure.typical_view.eye_in_world, measure.typical_view.world_from_camera) = (Vec3::ZERO, Quat::IDENTITY);
     measure
 }
 
@@ -171,8 +203,10 @@ struct Guard {
 impl Drop for Guard {
     fn drop(&mut self) {
         let Some(event) = self.event.take() else { return };
-        if let Event::Closed { session } = event {
-            self.inner.forget(session);
+        match &event {
+            Event::Closed { session } => self.inner.forget(*session),
+            Event::Left { incarnation, node_name } => self.inner.seats.leave(node_name, *incarnation),
+            _ => (),
         }
         self.inner.step(event);
     }
@@ -188,21 +222,38 @@ impl Coordinator for CoordinatorService {
     async fn join_cluster(&self, request: JoinCluster) -> Result<Messages<Welcome>, Status> {
         let (inner, node_name, incarnation) =
             (self.inner.clone(), request.node.node_name.clone(), self.inner.next_number());
+        let welcome = Welcome { scenes: vec![inner.offer.scene()] };
+        let _one = locked(&self.inner.joining);
+        let told = inner.seats.take(&request.node, incarnation, welcome)?;
         tracing::info!(node = node_name, address = request.node.address, device = request.node.device_name, "joined");
         inner.step(Event::Joined { incarnation, join: request });
-        let welcome = Welcome { scenes: vec![inner.offer.scene()] };
-        let stream = tokio_stream::once(Ok(welcome)).chain(tokio_stream::pending());
         let guard = Guard { inner, event: Some(Event::Left { incarnation, node_name }) };
-        Ok(with_guard(until_drained(Box::pin(stream), self.shutdown.clone()), guard))
+        Ok(with_guard(until_drained(Box::pin(ReceiverStream::new(told)), self.shutdown.clone()), guard))
     }
 
     async fn open_session(&self, request: SessionRequest) -> Result<Messages<SessionEvent>, Status> {
-        let session = self.inner.next_number();
-        let (events, stream) = mpsc::channel(SESSION_EVENTS);
-        locked(&self.inner.sessions).insert(session, events.clone());
+        let (session, events, stream) = self.inner.admit()?;
         tokio::spawn(open(self.inner.clone(), session, request, events));
         let guard = Guard { inner: self.inner.clone(), event: Some(Event::Closed { session }) };
         Ok(with_guard(until_drained(Box::pin(ReceiverStream::new(stream)), self.shutdown.clone()), guard))
+    }
+
+    async fn change_session(&self, request: ChangeSession) -> Result<(), Status> {
+        let ChangeSession { session, views_per_set, frames_per_s } = request;
+        let views_per_set = views_per_set as usize;
+        if !locked(&self.inner.sessions).contains_key(&session) {
+            return Err(Status::not_found(format!("session_number: no session {session} is open")));
+        }
+        let admitted = locked(&self.inner.schedule).0.admits(session, views_per_set, frames_per_s);
+        admitted.map_err(|error| refusal(&error))?;
+        self.inner.step(Event::Demanded { session, views_per_set, frames_per_s });
+        Ok(())
+    }
+
+    async fn report_work(&self, request: WorkReport) -> Result<(), Status> {
+        let WorkReport { node_name, plan_epoch, costs, busy_s, views, dropped_views } = request;
+        self.inner.step(Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views });
+        Ok(())
     }
 
     async fn fetch_scene(&self, request: FetchScene) -> Result<Messages<ScenePart>, Status> {
@@ -228,5 +279,9 @@ impl Coordinator for CoordinatorService {
 
     async fn status(&self) -> Result<ClusterStatus, Status> {
         Ok(ClusterStatus { offer: Some(self.inner.offer.status()), ..self.inner.status() })
+    }
+
+    async fn report_sampler(&self, report: SamplerReport) -> Result<(), Status> {
+        self.inner.hear(&report)
     }
 }

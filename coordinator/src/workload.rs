@@ -1,6 +1,6 @@
 //! What a session samples: its own wishes, else what came with the scene.
 
-use depth_image::{Camera, PinholeCamera};
+use depth_image::Camera;
 use glam::UVec2;
 use tonic::Status;
 use wire::{SessionRequest, Workload};
@@ -39,13 +39,7 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
 /// The same field of view in another size.
 fn resized(camera: &Camera, size_px: UVec2) -> Result<Camera, Status> {
     let Camera::Pinhole(camera) = camera;
-    let scale = size_px.as_vec2() / camera.size_px.as_vec2();
-    let camera = PinholeCamera {
-        size_px,
-        focal_px: camera.focal_px * scale,
-        principal_px: camera.principal_px * scale,
-        ..*camera
-    };
+    let camera = camera.resized(size_px);
     camera.validate().map_err(|error| Status::invalid_argument(format!("sample_image_size: {error}")))?;
     Ok(Camera::Pinhole(camera))
 }

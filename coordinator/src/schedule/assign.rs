@@ -4,20 +4,18 @@ use std::ops::Range;
 
 use wire::{Assignment, CompositorShare, NodeStatus, Policy, SamplerShare, Workload};
 
-use super::{Choice, Load, NodeCosts};
+use super::deal::deal;
+use super::{Choice, Load, NodeCosts, relay_fanout};
+
+/// So many views at least are dealt to see who should make how many: of few, some nodes would get none.
+const LEAST_VIEWS: usize = 1000;
 
 /// A node and what it costs.
 pub(super) type Candidate<'a> = (&'a NodeStatus, NodeCosts);
 
 /// The plan of a choice. In the direct policy all make views; a single node, and in time-share every node, samples too,
 /// as far as there are images.
-pub(super) fn assignment(
-    plan_epoch: u64,
-    workload: Workload,
-    load: &Load,
-    choice: &Choice,
-    nodes: &[Candidate<'_>],
-) -> Assignment {
+pub(super) fn assignment(plan_epoch: u64, workload: Workload, choice: &Choice, nodes: &[Candidate<'_>]) -> Assignment {
     let samples = |i: usize| nodes.len() == 1 || choice.division.samples[i];
     let who = |role: &dyn Fn(usize) -> bool| -> Vec<Candidate<'_>> {
         (0..nodes.len()).filter(|&i| role(i)).map(|i| nodes[i]).collect()
@@ -28,12 +26,30 @@ pub(super) fn assignment(
         Policy::Pipeline if nodes.len() == 1 => (nodes.to_vec(), nodes.to_vec()),
         Policy::Pipeline => (who(&samples), who(&|i| !samples(i))),
     };
-    let compositors = making.iter().map(|(node, _)| compositor(node)).collect();
-    Assignment { plan_epoch, policy: choice.policy, workload, samplers: sampler_shares(load, &sampling), compositors }
+    let costs: Vec<NodeCosts> = nodes.iter().map(|(_, costs)| *costs).collect();
+    let relays = choice.policy == Policy::Pipeline && nodes.len() > 1;
+    Assignment {
+        plan_epoch,
+        policy: choice.policy,
+        workload,
+        samplers: sampler_shares(&choice.load, &sampling),
+        compositors: compositor_shares(choice, &making),
+        tile_count: choice.load.tiles as u32,
+        relay_fanout: if relays { relay_fanout(&choice.load, &costs, &choice.division.samples) } else { None },
+    }
 }
 
-fn compositor(node: &NodeStatus) -> CompositorShare {
-    CompositorShare { node_name: node.node_name.clone(), address: node.address.clone() }
+/// Views by speed; where nodes also sample, by what time that leaves.
+fn compositor_shares(choice: &Choice, making: &[Candidate<'_>]) -> Vec<CompositorShare> {
+    let costs: Vec<NodeCosts> = making.iter().map(|(_, costs)| *costs).collect();
+    let workers = choice.load.view_workers(choice.policy, &costs);
+    let weights = deal(choice.load.views.max(LEAST_VIEWS), &workers);
+    let share = |((node, _), weight): (&Candidate<'_>, usize)| CompositorShare {
+        node_name: node.node_name.clone(),
+        address: node.address.clone(),
+        view_weight: u32::try_from(weight).unwrap_or(u32::MAX),
+    };
+    making.iter().zip(weights).map(share).collect()
 }
 
 /// Nodes without an image are left out: nobody would ask them.

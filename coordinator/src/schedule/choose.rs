@@ -1,10 +1,15 @@
 //! Which of the policies, and who samples: by predicted time, unless the session decides.
 
+use std::num::NonZeroU32;
+
 use wire::{Policy, PolicyChoice};
 
 use super::reason::reason;
 use super::search::{Division, enumerate, first, improve, order, towards};
 use super::{Load, NodeCosts, direct_s, k_fd, time_share_s};
+
+/// Into so many tiles images may be cut.
+const TILES: [usize; 5] = [1, 2, 4, 8, 16];
 
 /// What predicts less than so many times another's time is no reason to change anything.
 pub(super) const WORTH: f64 = 1.1;
@@ -16,6 +21,8 @@ pub struct Wish {
     pub policy: PolicyChoice,
     /// K, instead of the formula's.
     pub forced_samplers: Option<usize>,
+    /// Tiles of an image, instead of as many as are predicted to be fastest.
+    pub forced_tiles: Option<usize>,
 }
 
 /// What nodes do now; those without a role count as compositors.
@@ -25,6 +32,10 @@ pub struct Present {
     pub policy: Policy,
     /// Whether each node samples.
     pub samples: Vec<bool>,
+    /// Tiles of an image.
+    pub tiles: usize,
+    /// How images reach compositors.
+    pub relay_fanout: Option<NonZeroU32>,
 }
 
 /// What is asked, and of whom.
@@ -76,6 +87,8 @@ impl Predicted {
 pub struct Choice {
     /// How views come about.
     pub policy: Policy,
+    /// The work, with images cut as it is best.
+    pub load: Load,
     /// Who samples in the pipeline, whether or not it was chosen.
     pub division: Division,
     /// In plain words, with the figures.
@@ -93,11 +106,23 @@ impl Choice {
 }
 
 /// Why nothing could be chosen.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ChoiceError {
     /// Nobody is there.
     #[error("no node has joined the cluster")]
     NoNodes,
+    /// Images that are sampled one after the other, or by what others hold, are whole.
+    #[error("forced_tile_count is {forced}, but images of this sampling method are not cut")]
+    ForcedTiles {
+        /// Asked for.
+        forced: usize,
+    },
+    /// Sessions that state a rate ask for more than all nodes can do.
+    #[error("frames_per_s: all sessions together would take {needed:.2} times what the nodes can do")]
+    Overload {
+        /// Of the nodes' time.
+        needed: f64,
+    },
     /// More samplers than images (or sets, where images are sampled in order), or none left for views.
     #[error("forced_sampler_count is {forced}, at most {most} of {nodes} nodes can sample {images} whole images a set")]
     ForcedSamplers {
@@ -118,13 +143,51 @@ pub enum ChoiceError {
 /// Without nodes, or with a K that cannot be.
 pub fn choose(demand: &Demand<'_>) -> Result<Choice, ChoiceError> {
     check(demand)?;
+    let cut = |tiles: usize| Demand { load: demand.load.cut(tiles), ..*demand };
+    let counts = tile_counts(demand);
+    let tiles = match counts[..] {
+        [only] => only,
+        // Moves of single nodes decide nothing here, and cost most.
+        _ => best_tiles(demand, counts.into_iter().map(|tiles| choose_cut(&cut(tiles), false)).collect()),
+    };
+    Ok(choose_cut(&cut(tiles), true))
+}
+
+/// As many as now, or else as few as can be, where that is not clearly slower than the best.
+fn best_tiles(demand: &Demand<'_>, choices: Vec<Choice>) -> usize {
+    let best_s = choices.iter().map(Choice::time_s).fold(f64::INFINITY, f64::min);
+    let good = choices.iter().filter(|choice| choice.time_s() <= best_s * WORTH).map(|choice| choice.load.tiles);
+    let now = demand.present.map(|present| present.tiles);
+    good.clone().find(|&tiles| Some(tiles) == now).or_else(|| good.min()).unwrap_or(1)
+}
+
+/// None are cut where a tile takes as long as the image.
+fn tile_counts(demand: &Demand<'_>) -> Vec<usize> {
+    match demand.wish.forced_tiles {
+        Some(forced) => vec![forced],
+        None if demand.load.still || !is_cut(demand) => vec![1],
+        // More than two for every node would only cost more.
+        None => {
+            let useful = |tiles: &usize| *tiles == 1 || demand.load.images * tiles < 4 * demand.nodes.len();
+            TILES.into_iter().filter(useful).collect()
+        }
+    }
+}
+
+fn is_cut(demand: &Demand<'_>) -> bool {
+    let mean = NodeCosts::mean(demand.nodes).costs;
+    !demand.load.in_order && mean.sample_overhead_s < mean.sample_image_s
+}
+
+/// With images cut as the load says.
+fn choose_cut(demand: &Demand<'_>, moves: bool) -> Choice {
     let Demand { load, nodes, .. } = demand;
     let sampled = demand.present.map_or(&[][..], |present| &present.samples);
     let order = order(nodes, sampled);
     let k_fd = first(load, nodes, &order, k_fd_of(load, nodes));
-    let enumerated = enumerate(load, nodes, &order);
+    let enumerated = enumerate(load, nodes, &order, moves);
     let division = divide(demand, &order, &k_fd, &enumerated);
-    Ok(conclude(demand, division, &k_fd, &enumerated))
+    conclude(demand, division, &k_fd, &enumerated)
 }
 
 /// Whether a demand can be met at all.
@@ -133,7 +196,10 @@ pub(super) fn check(demand: &Demand<'_>) -> Result<(), ChoiceError> {
     if nodes == 0 {
         return Err(ChoiceError::NoNodes);
     }
-    let most = demand.load.most_samplers(nodes);
+    if let Some(forced) = demand.wish.forced_tiles.filter(|&forced| forced > 1 && !is_cut(demand)) {
+        return Err(ChoiceError::ForcedTiles { forced });
+    }
+    let most = demand.load.cut(tile_counts(demand).into_iter().max().unwrap_or(1)).most_samplers(nodes);
     match demand.wish.forced_samplers {
         Some(forced) if !(1..=most).contains(&forced) => {
             Err(ChoiceError::ForcedSamplers { forced, most, nodes, images: demand.load.images })
@@ -154,13 +220,14 @@ fn conclude(demand: &Demand<'_>, division: Division, k_fd: &Division, enumerated
     };
     let policy = policy(demand, &predicted);
     let reason = reason(demand, policy, division.sampler_count(), &predicted);
-    Choice { policy, division, reason, predicted }
+    Choice { policy, load: demand.load, division, reason, predicted }
 }
 
 /// As much of a choice as `changes` changes of role allow; from policy to policy all nodes change.
 pub(super) fn step_from(demand: &Demand<'_>, mut choice: Choice, has_role: &[bool], changes: usize) -> Choice {
     let Some(present) = demand.present.filter(|present| present.policy == Policy::Pipeline) else { return choice };
     if choice.policy == Policy::Pipeline {
+        let demand = &Demand { load: choice.load, ..*demand };
         let Demand { load, nodes, .. } = demand;
         choice.division = towards(load, nodes, &present.samples, &choice.division, has_role, changes);
         choice.predicted.pipeline_s = choice.division.time_s;
@@ -172,7 +239,7 @@ pub(super) fn step_from(demand: &Demand<'_>, mut choice: Choice, has_role: &[boo
 /// The formula's K, as far as whole images allow.
 fn k_fd_of(load: &Load, nodes: &[NodeCosts]) -> usize {
     let mean = NodeCosts::mean(nodes);
-    let k = k_fd(load.images, mean.costs.sample_image_s, load.views, mean.view_s(), nodes.len());
+    let k = k_fd(load.parts(), load.part_s(&mean), load.views, mean.view_s(), nodes.len());
     k.clamp(1, load.most_samplers(nodes.len()))
 }
 

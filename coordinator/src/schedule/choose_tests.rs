@@ -4,7 +4,7 @@ use super::*;
 use crate::schedule::test_support::{COSTS, nodes};
 
 fn load(views: usize) -> Load {
-    Load { images: 4, sets: 1, views, in_order: false }
+    Load { images: 4, views, ..Load::default() }
 }
 
 fn asked(
@@ -14,7 +14,7 @@ fn asked(
     policy: PolicyChoice,
     forced: Option<usize>,
 ) -> Result<Choice, ChoiceError> {
-    let wish = Wish { policy, forced_samplers: forced };
+    let wish = Wish { policy, forced_samplers: forced, forced_tiles: None };
     choose(&Demand { load, nodes: &nodes(count, costs), wish, present: None })
 }
 
@@ -89,7 +89,7 @@ fn unequal_nodes_do_what_they_do_best() {
     let mut nodes = nodes(4, COSTS);
     // A slow sampler that reconstructs as fast as any, behind the others in name.
     nodes[0].costs.sample_image_s = 1.0;
-    let wish = Wish { policy: PolicyChoice::Pipeline, forced_samplers: None };
+    let wish = Wish { policy: PolicyChoice::Pipeline, forced_samplers: None, forced_tiles: None };
     for views in [1, 10, 100, 1000] {
         let choice = choose(&Demand { load: load(views), nodes: &nodes, wish, present: None }).unwrap();
         assert!(!choice.division.samples[0] && choice.reason.contains("unequal"), "{choice:?}");
@@ -101,14 +101,14 @@ fn unequal_nodes_do_what_they_do_best() {
 fn roles_stay_where_nothing_is_clearly_better() {
     let nodes = nodes(5, COSTS);
     let samples = vec![false, false, false, true, false];
-    let present = Present { policy: Policy::Pipeline, samples: samples.clone() };
-    let wish = Wish { policy: PolicyChoice::Pipeline, forced_samplers: None };
+    let present = Present { policy: Policy::Pipeline, samples: samples.clone(), tiles: 1, relay_fanout: None };
+    let wish = Wish { policy: PolicyChoice::Pipeline, forced_samplers: None, forced_tiles: None };
     let demand = Demand { load: load(1000), nodes: &nodes, wish, present: Some(&present) };
     assert_eq!(choose(&demand).unwrap().division.samples, samples);
     let few = choose(&Demand { load: load(5), ..demand }).unwrap();
     assert!(few.division.samples[3] && few.division.sampler_count() > 1, "{few:?}");
     let any = Wish::default();
-    let near = Present { policy: Policy::Direct, samples };
+    let near = Present { policy: Policy::Direct, samples, tiles: 1, relay_fanout: None };
     let views = 4;
     let kept = choose(&Demand { load: load(views), wish: any, present: Some(&near), ..demand }).unwrap();
     assert_eq!(kept.policy, Policy::Direct);

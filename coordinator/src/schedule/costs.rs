@@ -2,33 +2,16 @@
 
 use std::collections::VecDeque;
 
-use wire::Costs;
+use wire::{Costs, MeasuredCosts};
 
+/// Reports without a timing after which it no longer counts: what the node does meanwhile says how slow it is.
+const RECENT: u32 = 30;
 /// Timings of which the median counts.
 const MEDIAN_OF: usize = 5;
 /// What the moving average takes of a new median.
 const ALPHA: f64 = 0.2;
 /// Nodes are equal when none needs so many times what another does.
 const EQUAL_WITHIN: f64 = 1.1;
-
-/// A node's own timings of one report; what it did not do is `None`.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct MeasuredCosts {
-    /// g_s: one finished sample image.
-    pub sample_image_s: Option<f64>,
-    /// g_v: one view drawn directly.
-    pub direct_view_s: Option<f64>,
-    /// c: one view reconstructed.
-    pub reconstruct_view_s: Option<f64>,
-    /// d: one sample set decoded and uploaded.
-    pub load_set_s: Option<f64>,
-    /// e: one view encoded.
-    pub encode_view_s: Option<f64>,
-    /// Depth images to and from this node.
-    pub transfer_bytes_per_s: Option<f64>,
-    /// B: one encoded sample image.
-    pub image_bytes: Option<f64>,
-}
 
 /// What is known of one node.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -58,6 +41,7 @@ impl NodeCosts {
                 load_set_s: mean(|n| n.costs.load_set_s),
                 encode_view_s: mean(|n| n.costs.encode_view_s),
                 in_order: nodes.iter().any(|n| n.costs.in_order),
+                sample_overhead_s: mean(|n| n.costs.sample_overhead_s),
             },
             transfer_image_s: mean(|n| n.transfer_image_s),
         }
@@ -95,6 +79,11 @@ impl Smoothed {
         self.value = Some(self.value.map_or(median, |value| value + ALPHA * (median - value)));
     }
 
+    /// The next timing counts at once.
+    fn begin_anew(&mut self) {
+        (self.last, self.value) = (VecDeque::new(), None);
+    }
+
     fn or_zero(&self) -> f64 {
         self.value.unwrap_or(0.0)
     }
@@ -107,16 +96,54 @@ fn median(timings: &VecDeque<f64>) -> f64 {
     sorted[sorted.len() / 2]
 }
 
+/// One operation: as measured alone, and as timed since.
+#[derive(Debug, Clone, Default)]
+struct Operation {
+    alone_s: f64,
+    timed: Smoothed,
+    reports_without: u32,
+}
+
+impl Operation {
+    fn starting_at(alone_s: f64) -> Self {
+        Self { alone_s, timed: Smoothed::starting_at(alone_s), reports_without: 0 }
+    }
+
+    /// How many times longer than alone, if anything can be said.
+    fn add(&mut self, timing_s: Option<f64>, slowness: f64) -> Option<f64> {
+        if self.timed.last.is_empty() {
+            // Until now it was taken to be as slow as the rest.
+            self.timed.value = self.timed.value.map(|_| self.alone_s * slowness);
+        }
+        let timing_s = timing_s.filter(|timing_s| timing_s.is_finite() && *timing_s >= 0.0);
+        self.reports_without = if timing_s.is_some() { 0 } else { self.reports_without.saturating_add(1) };
+        self.timed.add(timing_s);
+        timing_s.map(|timing_s| timing_s / self.alone_s).filter(|ratio| ratio.is_finite() && *ratio > 0.0)
+    }
+
+    /// What has not been timed for long is as much slower than alone as the rest is.
+    fn now_s(&self, slowness: f64) -> f64 {
+        if self.timed.last.is_empty() || self.reports_without > RECENT {
+            self.alone_s * slowness
+        } else {
+            self.timed.or_zero()
+        }
+    }
+}
+
 /// One node's costs as its timings come in.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Estimate {
-    sample_image_s: Smoothed,
-    direct_view_s: Smoothed,
-    reconstruct_view_s: Smoothed,
-    load_set_s: Smoothed,
-    encode_view_s: Smoothed,
+    sample_image: Operation,
+    direct_view: Operation,
+    reconstruct_view: Operation,
+    load_set: Operation,
+    encode_view: Operation,
+    /// How many times longer than alone what it does takes now.
+    slowness: Smoothed,
     transfer_bytes_per_s: Smoothed,
     image_bytes: Smoothed,
+    sample_overhead_s: f64,
     in_order: bool,
 }
 
@@ -124,40 +151,71 @@ impl Estimate {
     /// As measured when the session was opened.
     pub(super) fn starting_at(costs: &Costs) -> Self {
         Self {
-            sample_image_s: Smoothed::starting_at(costs.sample_image_s),
-            direct_view_s: Smoothed::starting_at(costs.direct_view_s),
-            reconstruct_view_s: Smoothed::starting_at(costs.reconstruct_view_s),
-            load_set_s: Smoothed::starting_at(costs.load_set_s),
-            encode_view_s: Smoothed::starting_at(costs.encode_view_s),
+            sample_image: Operation::starting_at(costs.sample_image_s),
+            direct_view: Operation::starting_at(costs.direct_view_s),
+            reconstruct_view: Operation::starting_at(costs.reconstruct_view_s),
+            load_set: Operation::starting_at(costs.load_set_s),
+            encode_view: Operation::starting_at(costs.encode_view_s),
+            sample_overhead_s: costs.sample_overhead_s,
             in_order: costs.in_order,
             ..Self::default()
         }
     }
 
     pub(super) fn add(&mut self, measured: &MeasuredCosts) {
-        self.sample_image_s.add(measured.sample_image_s);
-        self.direct_view_s.add(measured.direct_view_s);
-        self.reconstruct_view_s.add(measured.reconstruct_view_s);
-        self.load_set_s.add(measured.load_set_s);
-        self.encode_view_s.add(measured.encode_view_s);
+        let slowness = self.slowness.value.unwrap_or(1.0);
+        let ratios = [
+            self.sample_image.add(measured.sample_image_s, slowness),
+            self.direct_view.add(measured.direct_view_s, slowness),
+            self.reconstruct_view.add(measured.reconstruct_view_s, slowness),
+            self.load_set.add(measured.load_set_s, slowness),
+            self.encode_view.add(measured.encode_view_s, slowness),
+        ];
+        self.slowness.add(geometric_mean(ratios.into_iter().flatten()));
         // Nothing moves at 0 bytes/s: that is no rate.
         self.transfer_bytes_per_s.add(measured.transfer_bytes_per_s.filter(|rate| *rate > 0.0));
         self.image_bytes.add(measured.image_bytes);
     }
 
-    pub(super) fn now(&self) -> NodeCosts {
-        NodeCosts {
-            costs: Costs {
-                sample_image_s: self.sample_image_s.or_zero(),
-                direct_view_s: self.direct_view_s.or_zero(),
-                reconstruct_view_s: self.reconstruct_view_s.or_zero(),
-                load_set_s: self.load_set_s.or_zero(),
-                encode_view_s: self.encode_view_s.or_zero(),
-                in_order: self.in_order,
-            },
-            transfer_image_s: self.transfer_bytes_per_s.value.map_or(0.0, |rate| self.image_bytes.or_zero() / rate),
+    /// Other work is done from here on: the next timings count at once.
+    pub(super) fn begin_anew(&mut self) {
+        for operation in [
+            &mut self.sample_image,
+            &mut self.direct_view,
+            &mut self.reconstruct_view,
+            &mut self.load_set,
+            &mut self.encode_view,
+        ] {
+            operation.timed.begin_anew();
         }
     }
+
+    pub(super) fn now(&self) -> NodeCosts {
+        let slowness = self.slowness.value.unwrap_or(1.0);
+        let costs = Costs {
+            sample_image_s: self.sample_image.now_s(slowness),
+            direct_view_s: self.direct_view.now_s(slowness),
+            reconstruct_view_s: self.reconstruct_view.now_s(slowness),
+            load_set_s: self.load_set.now_s(slowness),
+            encode_view_s: self.encode_view.now_s(slowness),
+            in_order: self.in_order,
+            sample_overhead_s: self.overhead_s(slowness),
+        };
+        let image_bytes = self.image_bytes.or_zero();
+        let transfer_image_s = self.transfer_bytes_per_s.value.map_or(0.0, |rate| image_bytes / rate);
+        NodeCosts { costs, transfer_image_s }
+    }
+
+    /// Grows with the cost of an image.
+    fn overhead_s(&self, slowness: f64) -> f64 {
+        let ratio = self.sample_image.now_s(slowness) / self.sample_image.alone_s;
+        self.sample_overhead_s * if ratio.is_finite() { ratio } else { 1.0 }
+    }
+}
+
+fn geometric_mean(ratios: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = ratios.fold((0.0, 0.0), |(sum, count), ratio| (sum + ratio.ln(), count + 1.0));
+    (count > 0.0).then(|| (sum / count).exp())
 }
 
 #[cfg(test)]
@@ -196,6 +254,38 @@ mod tests {
         assert_eq!(estimate.now().transfer_image_s, 0.0);
         estimate.add(&MeasuredCosts { transfer_bytes_per_s: Some(1e8), ..MeasuredCosts::default() });
         assert!((estimate.now().transfer_image_s - 0.01).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_not_timed_is_as_slow_as_what_is() {
+        let alone = Costs { sample_image_s: 1.0, direct_view_s: 2.0, reconstruct_view_s: 0.1, ..Costs::default() };
+        let mut estimate = Estimate::starting_at(&alone);
+        let views = MeasuredCosts { reconstruct_view_s: Some(0.3), ..MeasuredCosts::default() };
+        for _ in 0..40 {
+            estimate.add(&views);
+        }
+        let costs = estimate.now().costs;
+        let times = [costs.sample_image_s / 1.0, costs.direct_view_s / 2.0, costs.reconstruct_view_s / 0.1];
+        assert!(times.iter().all(|times| (times - 3.0).abs() < 0.01), "{times:?}");
+        let first_s = sampled(&mut estimate, 5.0);
+        assert!((first_s - 3.4).abs() < 0.01, "a fifth of the way: {first_s}");
+        assert!((0..30).map(|_| sampled(&mut estimate, 5.0)).last().unwrap() > 4.9, "it is timed by now");
+        for _ in 0..=RECENT {
+            estimate.add(&views);
+        }
+        let (now_s, slowness) = (estimate.now().costs.sample_image_s, estimate.slowness.value.unwrap());
+        assert!((now_s - slowness).abs() < 1e-9 && slowness < 4.0, "no longer, after a while: {now_s}");
+    }
+
+    #[test]
+    fn other_work_counts_at_once() {
+        let mut estimate = Estimate::starting_at(&Costs { sample_image_s: 1.0, ..Costs::default() });
+        for _ in 0..9 {
+            sampled(&mut estimate, 1.0);
+        }
+        estimate.begin_anew();
+        assert_eq!(estimate.now().costs.sample_image_s, 1.0);
+        assert_eq!(sampled(&mut estimate, 0.2), 0.2);
     }
 
     #[test]

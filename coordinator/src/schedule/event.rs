@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use wire::{Costs, JoinCluster, PolicyChoice, SessionPlan, Workload};
+use wire::{Costs, JoinCluster, MeasuredCosts, PolicyChoice, Quality, SessionPlan, Workload};
 
-use super::{ChoiceError, MeasuredCosts};
+use super::ChoiceError;
 
 /// What happened.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,13 +31,23 @@ pub enum Event {
         session: u64,
         /// V.
         views_per_set: usize,
+        /// Pictures a second; 0: as fast as they come.
+        frames_per_s: f64,
     },
     /// A node timed its own work.
     Measured {
         /// Who.
         node_name: String,
+        /// Under which plan.
+        plan_epoch: u64,
         /// What it did.
         costs: MeasuredCosts,
+        /// Seconds of all of it.
+        busy_s: f64,
+        /// Views made.
+        views: u64,
+        /// Views not made, or not sent.
+        dropped_views: u64,
     },
     /// A node has taken a plan.
     Ready {
@@ -73,10 +83,16 @@ pub struct Opening {
     pub workload: Workload,
     /// V.
     pub views_per_set: usize,
+    /// Pictures a second, of so many views each; 0: as fast as they come.
+    pub frames_per_s: f64,
     /// Who decides.
     pub policy: PolicyChoice,
     /// K, instead of the formula's.
     pub forced_samplers: Option<usize>,
+    /// Tiles of an image, instead of as many as are predicted to be fastest.
+    pub forced_tiles: Option<usize>,
+    /// What it makes do with under overload, in this order.
+    pub fallbacks: Vec<Quality>,
     /// As measured: every node's until it reports its own.
     pub costs: Costs,
 }

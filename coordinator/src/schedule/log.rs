@@ -10,7 +10,7 @@ use super::written::{Written, Wrong};
 use super::{Command, Event, Scheduler};
 
 /// What the first line says.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// A line that is longer is no event.
 const MAX_LINE_BYTES: u64 = 1 << 20;
 

@@ -13,8 +13,15 @@ fn incident() -> Vec<(Duration, Event)> {
         join("n1", 2, 0),
         opened(7, PolicyChoice::Pipeline, 40),
         Event::Ready { plan_epoch: 4, node_name: named.clone() },
-        Event::Demanded { session: 7, views_per_set: 500 },
-        Event::Measured { node_name: named.clone(), costs: measured },
+        Event::Demanded { session: 7, views_per_set: 500, frames_per_s: 0.1 },
+        Event::Measured {
+            node_name: named.clone(),
+            plan_epoch: 4,
+            costs: measured,
+            busy_s: 0.3,
+            views: 2,
+            dropped_views: 1,
+        },
         Event::Unready { plan_epoch: 4, node_name: named.clone(), reason: "no \"disk\"\nleft".to_owned() },
         Event::Left { incarnation: 1, node_name: named },
         opened(8, PolicyChoice::TimeShare, 1),
@@ -54,15 +61,21 @@ fn one_line_an_event_after_the_version() {
     let text = String::from_utf8(recorded()).unwrap();
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines.len(), incident().len() + 1);
-    assert_eq!(lines[0], r#"{"version":1}"#);
-    assert_eq!(lines[5], r#"{"now_ns":4123456789,"event":"demanded","session":7,"views_per_set":500}"#);
+    assert_eq!(lines[0], r#"{"version":2}"#);
+    assert_eq!(
+        lines[5],
+        r#"{"now_ns":4123456789,"event":"demanded","session":7,"views_per_set":500,"frames_per_s":"0.1"}"#
+    );
 }
 
 #[test]
 fn what_is_wrong_is_named_with_its_line() {
-    let after_header = |line: &str| refusal(format!("{{\"version\":1}}\n{line}\n").as_bytes());
+    let after_header = |line: &str| refusal(format!("{{\"version\":2}}\n{line}\n").as_bytes());
     let cases = [
-        (r#"{"now_ns":0,"event":"demanded","session":1,"views_per_set":9999999}"#, "line 2: views_per_set is 9999999"),
+        (
+            r#"{"now_ns":0,"event":"demanded","session":1,"views_per_set":9999999,"frames_per_s":"0"}"#,
+            "line 2: views_per_set is 9999999",
+        ),
         (r#"{"now_ns":0,"event":"left","incarnation":1,"node_name":""}"#, "line 2: node_name has 0 bytes"),
         (r#"{"now_ns":0,"event":"closed"}"#, "missing field `session`"),
         (r#"{"now_ns":0,"event":"exploded"}"#, "unknown variant `exploded`"),
@@ -79,7 +92,7 @@ fn what_is_wrong_is_named_with_its_line() {
         ("\"workload\":\"", "\"workload\":\"xy", "line 4: workload is not hexadecimal"),
         ("\"workload\":\"", "\"workload\":\"00", "line 4: workload workload is corrupt"),
         ("\"load_set_s\":\"0.005\"", "\"load_set_s\":\"-1\"", "line 4: load_set_s is -1"),
-        ("\"version\":1", "\"version\":2", "version is 2, must be 1"),
+        ("\"version\":2", "\"version\":1", "version is 1, must be 2"),
     ] {
         let text = refusal(whole.replacen(from, to, 1).as_bytes());
         assert!(text.contains(part), "{text}");

@@ -3,20 +3,25 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use wire::{Assignment, ClusterStatus, Costs, JoinCluster, NodeCondition, NodeStatus, Policy, SessionPlan};
+use wire::{
+    Assignment, ClusterStatus, Costs, JoinCluster, MeasuredCosts, NodeCondition, NodeStatus, Policy, SessionPlan,
+};
 
 use super::assign::assignment;
 use super::choose::{Demand, Present, WORTH, check, step_from};
 use super::costs::Estimate;
+use super::overload::Look;
 use super::patience::Gain;
-use super::work::{InForce, Work, load_of};
+use super::work::{InForce, Work};
 use super::{
-    Choice, ChoiceError, Command, Event, Load, MeasuredCosts, NodeCosts, Opening, Wish, choose, direct_s, pipeline_s,
-    time_share_s,
+    Choice, ChoiceError, Command, Event, Load, NodeCosts, Opening, Wish, choose, direct_s, pipeline_by_s, time_share_s,
 };
 
 /// A node that has nothing to do is given a role for less than roles are changed for.
 const WORTH_OF_IDLE: f64 = 1.02;
+/// Of the nodes' time, at the least that sessions make do with: what is measured alone and in even batches takes longer among
+/// many viewers.
+const MOST_ADMITTED: f64 = 0.9;
 /// Changes of role of one plan, unless a node was lost.
 const MOST_CHANGES: usize = 2;
 
@@ -27,6 +32,16 @@ struct Member {
     estimate: Estimate,
     /// It could not take a plan of this workload.
     is_out: bool,
+    reported: Reported,
+}
+
+/// What a node says it has done since it joined.
+#[derive(Debug, Clone, Copy, Default)]
+struct Reported {
+    at: Duration,
+    views: u64,
+    dropped_views: u64,
+    busy_ratio: f64,
 }
 
 /// Members by name, the last epoch, and what sessions ask for.
@@ -62,8 +77,13 @@ impl Scheduler {
             Event::Joined { incarnation, join } => self.joined(incarnation, join),
             Event::Left { incarnation, node_name } => self.left(incarnation, &node_name),
             Event::Opened(opening) => self.opened(&opening),
-            Event::Demanded { session, views_per_set } => self.demanded(session, views_per_set),
-            Event::Measured { node_name, costs } => self.measured(&node_name, &costs),
+            Event::Demanded { session, views_per_set, frames_per_s } => {
+                self.demanded(session, views_per_set, frames_per_s)
+            }
+            Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views } => {
+                self.worked(&node_name, plan_epoch, busy_s, (views, dropped_views));
+                self.measured(&node_name, &costs)
+            }
             Event::Ready { plan_epoch, node_name } => self.ready(plan_epoch, node_name),
             Event::Unready { plan_epoch, node_name, reason } => self.unready(plan_epoch, &node_name, &reason),
             Event::Closed { session } => self.closed(session),
@@ -83,7 +103,21 @@ impl Scheduler {
             session_count: work.map_or(0, |work| work.sessions().len() as u32),
             views_per_set: work.map_or(0, |work| work.views() as u64),
             conditions: work.map_or_else(Vec::new, |_| self.conditions()),
+            achieved: work.map_or_else(Vec::new, |work| work.achieved.clone()),
+            utilisation: self.utilisation().unwrap_or(0.0),
         }
+    }
+
+    /// What share of their time the plan's nodes need for what is asked; `None` without a plan.
+    fn utilisation(&self) -> Option<f64> {
+        let (work, crew) = (self.work.as_ref()?, self.crew()?);
+        Some(work.utilisation(present_s(&crew, &self.has_role(&crew)?)?))
+    }
+
+    /// Of each of the crew, whether the plan in force gives it anything to do.
+    fn has_role(&self, crew: &Crew<'_>) -> Option<Vec<bool>> {
+        let in_force = self.in_force()?;
+        Some(crew.names.iter().map(|name| in_force.has_role(name)).collect())
     }
 
     fn conditions(&self) -> Vec<NodeCondition> {
@@ -92,6 +126,9 @@ impl Scheduler {
             node_name: name.clone(),
             is_ready: is_ready(name),
             costs: member.estimate.now().costs,
+            views: member.reported.views,
+            dropped_views: member.reported.dropped_views,
+            busy_ratio: member.reported.busy_ratio,
         };
         self.members.iter().map(condition).collect()
     }
@@ -113,7 +150,9 @@ impl Scheduler {
         self.plan_epoch = self.plan_epoch.max(join.plan_epoch);
         let name = join.node.node_name.clone();
         let estimate = self.work.as_ref().map(|work| Estimate::starting_at(&work.costs)).unwrap_or_default();
-        self.members.insert(name.clone(), Member { incarnation, status: join.node, estimate, is_out: false });
+        let reported = Reported { at: self.now, ..Reported::default() };
+        let member = Member { incarnation, status: join.node, estimate, is_out: false, reported };
+        self.members.insert(name.clone(), member);
         let planned = self.in_force().and_then(|in_force| in_force.members.get(&name));
         if planned.is_some_and(|&planned| planned != incarnation) {
             return self.replan(&format!("node {name} was started again"));
@@ -141,7 +180,7 @@ impl Scheduler {
             return vec![Command::Refuse { session, error }];
         }
         let mut commands = self.take_over(opening);
-        let work = self.work.get_or_insert_with(|| Work::new(opening.workload.clone(), opening.costs));
+        let work = self.work.get_or_insert_with(|| Work::new(opening));
         let wish = work.wish();
         work.add(opening);
         commands.extend(if work.wish() == wish { self.look() } else { self.replan("another session decides") });
@@ -151,21 +190,38 @@ impl Scheduler {
     }
 
     fn check(&self, opening: &Opening) -> Result<(), ChoiceError> {
-        let load = load_of(&opening.workload, opening.costs.in_order, opening.views_per_set);
-        let count = self.members.values().filter(|member| self.counts(member, opening)).count();
-        let nodes = vec![NodeCosts::default(); count];
-        let wish = Wish { policy: opening.policy, forced_samplers: opening.forced_samplers };
-        check(&Demand { load, nodes: &nodes, wish, present: None })
+        let shared = self.work.as_ref().filter(|work| work.asked == opening.workload);
+        let mut work = shared.cloned().unwrap_or_else(|| Work::new(opening));
+        work.add(opening);
+        let counting = self.members.values().filter(|member| self.counts(member, opening));
+        let alone = NodeCosts { costs: opening.costs, ..NodeCosts::default() };
+        let costs = |member: &Member| if shared.is_some() { member.estimate.now() } else { alone };
+        let nodes: Vec<NodeCosts> = counting.map(costs).collect();
+        admit(&work, &nodes)
+    }
+
+    /// Whether a session may ask for so much from now on. Less than before it always may.
+    ///
+    /// # Errors
+    /// As for one that is opened.
+    pub fn admits(&self, session: u64, views_per_set: usize, frames_per_s: f64) -> Result<(), ChoiceError> {
+        let Some(before) = &self.work else { return Ok(()) };
+        let mut work = before.clone();
+        work.demand(session, views_per_set, frames_per_s);
+        if work.views_per_s() <= before.views_per_s() {
+            return Ok(());
+        }
+        admit(&work, &self.usable().map(|(_, member)| member.estimate.now()).collect::<Vec<_>>())
     }
 
     /// A node that could not take plans of one workload may take those of another.
     fn counts(&self, member: &Member, opening: &Opening) -> bool {
-        !member.is_out || self.work.as_ref().is_none_or(|work| work.workload != opening.workload)
+        !member.is_out || self.work.as_ref().is_none_or(|work| work.asked != opening.workload)
     }
 
     /// Ends sessions of another workload; costs are those of the new one from here on.
     fn take_over(&mut self, opening: &Opening) -> Vec<Command> {
-        if self.work.as_ref().is_some_and(|work| work.workload == opening.workload) {
+        if self.work.as_ref().is_some_and(|work| work.asked == opening.workload) {
             return Vec::new();
         }
         for member in self.members.values_mut() {
@@ -176,11 +232,37 @@ impl Scheduler {
         ended.into_iter().map(|session| Command::End { session, reason: reason.clone() }).collect()
     }
 
-    fn demanded(&mut self, session: u64, views_per_set: usize) -> Vec<Command> {
+    fn demanded(&mut self, session: u64, views_per_set: usize, frames_per_s: f64) -> Vec<Command> {
         if let Some(work) = &mut self.work {
-            work.demand(session, views_per_set);
+            work.demand(session, views_per_set, frames_per_s);
         }
         self.look()
+    }
+
+    /// Counts what a node did; for the plan in force it says how long a set takes.
+    fn worked(&mut self, name: &str, plan_epoch: u64, busy_s: f64, (views, dropped_views): (u64, u64)) {
+        let now = self.now;
+        if let Some(Member { reported, .. }) = self.members.get_mut(name) {
+            let since_s = now.saturating_sub(reported.at).as_secs_f64();
+            *reported = Reported {
+                at: now,
+                views: reported.views.saturating_add(views),
+                dropped_views: reported.dropped_views.saturating_add(dropped_views),
+                busy_ratio: if since_s > 0.0 { busy_s / since_s } else { 0.0 },
+            };
+        }
+        if let Some(in_force) = self.in_force_on(plan_epoch, name) {
+            in_force.worked(name, busy_s, views);
+        }
+        self.note_achieved();
+    }
+
+    fn note_achieved(&mut self) {
+        let Some(work) = &mut self.work else { return };
+        let views = work.load().views;
+        let Some(achieved) = work.in_force.as_ref().and_then(|in_force| in_force.achieved(views)) else { return };
+        work.achieved.retain(|other| other.policy != achieved.policy);
+        work.achieved.push(achieved);
     }
 
     fn measured(&mut self, name: &str, costs: &MeasuredCosts) -> Vec<Command> {
@@ -222,10 +304,16 @@ impl Scheduler {
         let work = self.work.as_ref()?;
         let (names, nodes): (Vec<_>, Vec<_>) = self.usable().map(|(name, m)| (name.as_str(), m.estimate.now())).unzip();
         let samples = |in_force: &InForce| names.iter().map(|name| in_force.samples(name)).collect();
-        let present = work.in_force.as_ref().map(|plan| Present { policy: plan.policy(), samples: samples(plan) });
+        let present = work.in_force.as_ref().map(|plan| Present {
+            policy: plan.policy(),
+            samples: samples(plan),
+            tiles: plan.plan.assignment.tile_count as usize,
+            relay_fanout: plan.plan.assignment.relay_fanout,
+        });
         let (load, mut wish) = (work.load(), work.wish());
         // What could be when it was asked for may be too much when nodes are lost.
-        wish.forced_samplers = wish.forced_samplers.map(|forced| forced.min(load.most_samplers(names.len())));
+        let most = load.cut(wish.forced_tiles.unwrap_or(1)).most_samplers(names.len());
+        wish.forced_samplers = wish.forced_samplers.map(|forced| forced.min(most));
         Some(Crew { names, nodes, present, load, wish })
     }
 
@@ -247,9 +335,15 @@ impl Scheduler {
 
     /// Whether another plan is worth it by now.
     fn look(&mut self) -> Vec<Command> {
-        let Some(in_force) = self.in_force() else { return self.replan("") };
-        if !in_force.patience.is_due(self.now) {
+        if self.in_force().is_none() {
+            return self.replan("");
+        }
+        if !self.in_force().is_some_and(|in_force| in_force.patience.is_due(self.now)) {
             return Vec::new();
+        }
+        if let Some(why) = self.step_of_overload() {
+            self.members.values_mut().for_each(|member| member.estimate.begin_anew());
+            return self.replan(&why);
         }
         let Some((choice, gain)) = self.better() else { return Vec::new() };
         let now = self.now;
@@ -258,6 +352,21 @@ impl Scheduler {
             true => self.put_in_force(&choice, "demand, costs or nodes have changed"),
             false => Vec::new(),
         }
+    }
+
+    /// Less where nodes have no time left, more again where they have: why, if that changes anything.
+    fn step_of_overload(&mut self) -> Option<String> {
+        let (utilisation, now) = (self.utilisation()?, self.now);
+        let work = self.work.as_mut()?;
+        let frame_rate_ratios: Vec<f64> = work.fallbacks().iter().map(|quality| quality.frame_rate_ratio).collect();
+        let look = Look { utilisation, views_per_s: work.views_per_s(), frame_rate_ratios: &frame_rate_ratios };
+        let before = work.overload.step;
+        if !work.overload.judge(now, look) {
+            return None;
+        }
+        let step = work.overload.step;
+        let share = format!("what is asked for takes {:.0} % of the nodes' time", utilisation * 100.0);
+        Some(if step > before { format!("{share}: fallback {step}") } else { format!("{share}: back to {step}") })
     }
 
     /// The next plan towards the best one, and what the best one would bring.
@@ -280,13 +389,14 @@ impl Scheduler {
         let Some(work) = &self.work else { return Vec::new() };
         let crew: Vec<_> = self.usable().map(|(_, member)| (&member.status, member.estimate.now())).collect();
         let members = self.usable().map(|(name, member)| (name.clone(), member.incarnation)).collect();
-        let assignment = assignment(self.plan_epoch + 1, work.workload.clone(), &work.load(), choice, &crew);
+        let assignment = assignment(self.plan_epoch + 1, work.workload(), choice, &crew);
         if work.in_force.as_ref().is_some_and(|old| old.members == members && old.assigns(&assignment)) {
             return Vec::new();
         }
         let slowest = crew.iter().fold(Costs::default(), |slowest, (_, node)| slowest.max(node.costs));
         let anew = if work.in_force.is_some() { format!(" Planned anew: {why}.") } else { String::new() };
-        let plan = session_plan(assignment, slowest, choice, format!("{}{anew}", choice.reason));
+        let mut plan = session_plan(assignment, slowest, choice, format!("{}{anew}", choice.reason));
+        (plan.fallback_number, plan.frame_rate_ratio) = (work.overload.step as u32, work.frame_rate_ratio());
         self.enforce(InForce::new(plan, members, self.now))
     }
 
@@ -310,12 +420,22 @@ fn present_s(crew: &Crew<'_>, has_role: &[bool]) -> Option<f64> {
     let present = crew.present.as_ref()?;
     let at_work = crew.nodes.iter().zip(&present.samples).zip(has_role).filter(|(_, has_role)| **has_role);
     let (nodes, samples): (Vec<NodeCosts>, Vec<bool>) = at_work.map(|((node, samples), _)| (*node, *samples)).unzip();
+    let load = crew.load.cut(present.tiles);
     let time_s = match present.policy {
-        Policy::Pipeline => pipeline_s(&crew.load, &nodes, &samples),
-        Policy::Direct => direct_s(&crew.load, &nodes),
-        Policy::TimeShare => time_share_s(&crew.load, &nodes),
+        Policy::Pipeline => pipeline_by_s(&load, &nodes, &samples, present.relay_fanout),
+        Policy::Direct => direct_s(&load, &nodes),
+        Policy::TimeShare => time_share_s(&load, &nodes),
     };
     (!nodes.is_empty()).then_some(time_s)
+}
+
+/// Whether a demand can be met at all; of sessions with a rate, at the least that they make do with.
+fn admit(work: &Work, nodes: &[NodeCosts]) -> Result<(), ChoiceError> {
+    let demand = Demand { load: work.load(), nodes, wish: work.wish(), present: None };
+    check(&demand)?;
+    let least_ratio = work.fallbacks().last().map_or(1.0, |quality| quality.frame_rate_ratio);
+    let needed = work.utilisation(choose(&demand)?.time_s()) * least_ratio / work.frame_rate_ratio();
+    if needed > MOST_ADMITTED { Err(ChoiceError::Overload { needed }) } else { Ok(()) }
 }
 
 fn session_plan(assignment: Assignment, costs: Costs, choice: &Choice, reason: String) -> SessionPlan {
@@ -332,6 +452,8 @@ fn session_plan(assignment: Assignment, costs: Costs, choice: &Choice, reason: S
         enumerated_sampler_count: predicted.enumerated as u32,
         predicted_enumerated_s: predicted.enumerated_s,
         scene_load_s: 0.0,
+        fallback_number: 0,
+        frame_rate_ratio: 1.0,
     }
 }
 

@@ -1,4 +1,4 @@
-use wire::PolicyChoice;
+use wire::{PolicyChoice, Quality};
 
 use super::*;
 use crate::schedule::test_support::{COSTS, join, opened, opening, workload};
@@ -47,6 +47,10 @@ impl Cluster {
     fn plan(&self) -> Assignment {
         self.scheduler.in_force().expect("a plan").plan.assignment.clone()
     }
+}
+
+fn timed(node_name: &str, costs: MeasuredCosts) -> Event {
+    Event::Measured { node_name: node_name.to_owned(), plan_epoch: 1, costs, busy_s: 0.1, views: 1, dropped_views: 0 }
 }
 
 fn applied(commands: &[Command]) -> (&[u64], &SessionPlan) {
@@ -171,7 +175,7 @@ fn k_follows_the_views_two_roles_at_a_time() {
     let mut cluster = Cluster::of(11);
     cluster.step(opened(1, PIPELINE, 1));
     let mut k = vec![cluster.plan().samplers.len()];
-    cluster.step(Event::Demanded { session: 1, views_per_set: 500 });
+    cluster.step(Event::Demanded { session: 1, views_per_set: 500, frames_per_s: 0.0 });
     loop {
         let before = cluster.plan();
         if cluster.wait(60).is_empty() {
@@ -192,7 +196,7 @@ fn costs_that_nodes_report_move_roles() {
     let sampler = cluster.plan().samplers[0].node_name.clone();
     let costs = MeasuredCosts { sample_image_s: Some(10.0 * COSTS.sample_image_s), ..MeasuredCosts::default() };
     for _ in 0..20 {
-        cluster.step(Event::Measured { node_name: sampler.clone(), costs });
+        cluster.step(timed(&sampler, costs));
     }
     let commands = cluster.wait(60);
     assert!(!assignment_of(&commands).samplers.iter().any(|share| share.node_name == sampler));
@@ -223,8 +227,8 @@ fn old_readiness_and_unknown_names_are_nothing() {
     for event in [
         ready(0, "n0"),
         ready(1, "nobody"),
-        Event::Measured { node_name: "nobody".to_owned(), costs: MeasuredCosts::default() },
-        Event::Demanded { session: 77, views_per_set: 1 },
+        timed("nobody", MeasuredCosts::default()),
+        Event::Demanded { session: 77, views_per_set: 1, frames_per_s: 0.0 },
         Event::Closed { session: 77 },
     ] {
         assert_eq!(cluster.step(event), []);
@@ -269,4 +273,140 @@ fn commands_are_said_in_words() {
     );
     let refused = Command::Refuse { session: 3, error: ChoiceError::NoNodes };
     assert_eq!(refused.to_string(), "refuse session 3: no node has joined the cluster");
+}
+
+fn rated(session: u64, frames_per_s: f64, fallbacks: Vec<Quality>) -> Event {
+    let asked = opening(session, PolicyChoice::Auto, 1);
+    Event::Opened(Box::new(Opening { frames_per_s, fallbacks, ..asked }))
+}
+
+fn quality(method: &str, frame_rate_ratio: f64) -> Quality {
+    Quality { lighting: "unlit".to_owned(), method: method.to_owned(), sample_side_ratio: 0.5, frame_rate_ratio }
+}
+
+#[test]
+fn a_still_scene_that_is_looked_at_is_sampled_once_and_all_make_views() {
+    let mut cluster = Cluster::of(5);
+    let commands = cluster.step(rated(1, 100.0, Vec::new()));
+    let plan = assignment_of(&commands);
+    assert_eq!((plan.policy, plan.compositors.len()), (Policy::TimeShare, 5), "{}", applied(&commands).1.reason);
+    let utilisation = cluster.scheduler.status().utilisation;
+    assert!((utilisation - 0.2).abs() < 1e-9, "100 views of 10 ms by 5 nodes: {utilisation}");
+}
+
+#[test]
+fn sessions_that_nodes_have_no_time_for_are_refused_by_name() {
+    let mut cluster = Cluster::of(2);
+    cluster.step(rated(1, 150.0, Vec::new()));
+    let refused = cluster.step(rated(2, 100.0, Vec::new()));
+    let [Command::Refuse { session: 2, error }] = &refused[..] else { panic!("{refused:?}") };
+    assert_eq!(error.to_string(), "frames_per_s: all sessions together would take 1.25 times what the nodes can do");
+    assert_eq!(cluster.scheduler.status().session_count, 1);
+    let admitted = cluster.step(rated(3, 70.0, vec![quality("joint_carve:1", 0.8)]));
+    assert!(matches!(admitted[..], [Command::Apply { .. }]), "220 are too many, 176 are not: {admitted:?}");
+    let scheduler = &cluster.scheduler;
+    assert!(matches!(scheduler.admits(3, 1, 140.0), Err(ChoiceError::Overload { .. })), "nor may one ask for it later");
+    assert_eq!([scheduler.admits(3, 1, 60.0), scheduler.admits(1, 1, 1.0)], [Ok(()), Ok(())], "less, always");
+    let batch = cluster.step(opened(4, PolicyChoice::Auto, 1000));
+    assert!(!batch.iter().any(|command| matches!(command, Command::Refuse { .. })), "a batch waits for its turn");
+}
+
+#[test]
+fn overload_goes_down_the_fallbacks_and_every_plan_says_so() {
+    let mut cluster = Cluster::of(2);
+    cluster.step(rated(1, 180.0, vec![quality("joint_carve:1", 1.0), quality("joint_carve:2", 0.8)]));
+    // Views take a quarter longer than they did alone.
+    let slow =
+        MeasuredCosts { reconstruct_view_s: Some(0.0115), encode_view_s: Some(0.001), ..MeasuredCosts::default() };
+    let mut seen = Vec::new();
+    for _ in 0..240 {
+        for name in ["n0", "n1"] {
+            let (node_name, plan_epoch) = (name.to_owned(), cluster.plan().plan_epoch);
+            cluster.step(Event::Ready { plan_epoch, node_name: node_name.clone() });
+            cluster.step(Event::Measured {
+                node_name,
+                plan_epoch,
+                costs: slow,
+                busy_s: 0.5,
+                views: 40,
+                dropped_views: 0,
+            });
+        }
+        cluster.now += Duration::from_millis(500);
+        let commands = cluster.step(Event::Tick);
+        seen.extend(commands.iter().filter_map(|command| match command {
+            Command::Apply { plan, .. } => Some(plan.fallback_number),
+            _ => None,
+        }));
+    }
+    assert_eq!(seen, [1, 2], "1.125 of their time at 180, 0.9 at 144");
+    let plan = cluster.plan();
+    assert_eq!(plan.workload.method, "joint_carve:2");
+    let depth_image::Camera::Pinhole(camera) = plan.workload.sample_cameras[0];
+    assert_eq!(camera.size_px.x, 4, "half of 8");
+    cluster.step(Event::Demanded { session: 1, views_per_set: 1, frames_per_s: 20.0 });
+    let plans: Vec<u32> = (0..2).map(|_| applied(&cluster.wait(60)).1.fallback_number).collect();
+    assert_eq!(plans, [1, 0], "with less to do they get all again");
+    assert_eq!(cluster.plan().workload.method, "joint_carve");
+}
+
+#[test]
+fn what_a_set_took_is_the_time_of_the_busiest_node() {
+    let mut cluster = Cluster::of(2);
+    cluster.step(opened(1, PIPELINE, 40));
+    let report = |plan_epoch: u64, name: &str, busy_s: f64, views: u64| Event::Measured {
+        node_name: name.to_owned(),
+        plan_epoch,
+        costs: MeasuredCosts::default(),
+        busy_s,
+        views,
+        dropped_views: 2,
+    };
+    cluster.step(report(1, "n0", 0.5, 0));
+    assert!(cluster.scheduler.status().achieved.is_empty(), "no set is complete");
+    cluster.step(report(1, "n1", 0.8, 80));
+    cluster.step(report(7, "n1", 100.0, 80));
+    let status = cluster.scheduler.status();
+    let [achieved] = status.achieved[..] else { panic!("{:?}", status.achieved) };
+    assert_eq!((achieved.policy, achieved.busy_s), (Policy::Pipeline, 0.4), "0.8 s for two sets");
+    assert_eq!((status.conditions[1].views, status.conditions[1].dropped_views), (160, 4));
+}
+
+#[test]
+fn heavy_images_are_cut_so_that_more_nodes_sample_them() {
+    let mut cluster = Cluster::of(11);
+    let costs = Costs { sample_image_s: 10.0, sample_overhead_s: 0.05, ..COSTS };
+    let commands = cluster.step(Event::Opened(Box::new(Opening { costs, ..opening(1, PIPELINE, 1000) })));
+    let (plan, session) = (assignment_of(&commands), applied(&commands).1);
+    assert!(plan.tile_count > 1 && plan.samplers.len() > 4, "{}", session.reason);
+    let whole_s = 10.0f64.max(1000.0 * 0.01 / 7.0);
+    let ideal_s = (4.0 * 10.0 + 1000.0 * 0.01) / 11.0;
+    assert!(session.predicted_s() < 0.6 * whole_s && session.predicted_s() < 1.2 * ideal_s, "{}", session.reason);
+    let mut parts: Vec<u32> = plan.samplers.iter().flat_map(|share| share.image_indices.clone()).collect();
+    parts.sort_unstable();
+    assert_eq!(parts, (0..4 * plan.tile_count).collect::<Vec<_>>());
+    let forced = Opening { forced_tiles: Some(3), workload: workload(3), ..opening(2, PIPELINE, 10) };
+    let refused = cluster.step(Event::Opened(Box::new(forced)));
+    assert!(matches!(&refused[..], [Command::Refuse { error: ChoiceError::ForcedTiles { forced: 3 }, .. }]));
+}
+
+#[test]
+fn slow_links_are_relayed() {
+    let mut cluster = Cluster::of(8);
+    cluster.step(opened(1, PIPELINE, 1000));
+    assert_eq!(cluster.plan().relay_fanout, None);
+    let costs = MeasuredCosts { transfer_bytes_per_s: Some(1e6), image_bytes: Some(1e5), ..MeasuredCosts::default() };
+    for name in (0..8).map(|i| format!("n{i}")) {
+        cluster.step(Event::Measured {
+            node_name: name,
+            plan_epoch: 1,
+            costs,
+            busy_s: 0.0,
+            views: 0,
+            dropped_views: 0,
+        });
+    }
+    // 4 images of 0.1 s to each of 7 compositors: 2.8 s from one sampler, more than their views take.
+    let commands = cluster.wait(30);
+    assert_eq!(assignment_of(&commands).relay_fanout.map(std::num::NonZeroU32::get), Some(2));
 }

@@ -7,6 +7,8 @@ use super::{Load, NodeCosts};
 
 /// Most nodes of which moves and swaps are tried: beyond, every look would take longer than it saves.
 const MOST_NODES_TO_MOVE: usize = 32;
+/// Divisions that are improved by moves.
+const STARTS: usize = 4;
 /// A move that gains less is none: rounding would move nodes back and forth.
 const LEAST_GAIN: f64 = 1e-9;
 
@@ -65,13 +67,16 @@ pub fn first(load: &Load, nodes: &[NodeCosts], order: &[usize], k: usize) -> Div
     Division::new(load, nodes, samples)
 }
 
-/// The best of every K; of unequal nodes each K improved by moves. Of equal times the least K.
+/// The best of every K; with `moves`, and unequal nodes, the best few of them improved. Of equal times the least K.
 #[must_use]
-pub fn enumerate(load: &Load, nodes: &[NodeCosts], order: &[usize]) -> Division {
-    let moves = !NodeCosts::are_equal(nodes) && nodes.len() <= MOST_NODES_TO_MOVE;
-    let every_k = (1..=load.most_samplers(nodes.len())).map(|k| first(load, nodes, order, k));
-    let improved = every_k.map(|division| if moves { improve(load, nodes, division, true) } else { division });
-    improved.min_by(by_time).unwrap_or_else(|| first(load, nodes, order, 1))
+pub fn enumerate(load: &Load, nodes: &[NodeCosts], order: &[usize], moves: bool) -> Division {
+    let mut all: Vec<Division> = (1..=load.most_samplers(nodes.len())).map(|k| first(load, nodes, order, k)).collect();
+    all.sort_by(by_time);
+    if moves && !NodeCosts::are_equal(nodes) && nodes.len() <= MOST_NODES_TO_MOVE {
+        all.truncate(STARTS);
+        all = all.into_iter().map(|division| improve(load, nodes, division, true)).collect();
+    }
+    all.into_iter().min_by(by_time).unwrap_or_else(|| first(load, nodes, order, 1))
 }
 
 fn by_time(a: &Division, b: &Division) -> Ordering {

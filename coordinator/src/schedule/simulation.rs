@@ -165,7 +165,7 @@ impl World {
     fn swing(&mut self) {
         if let Some(session) = self.random_session() {
             let views_per_set = [1, 500, 30][self.random.below(3) as usize];
-            self.tell(Event::Demanded { session, views_per_set });
+            self.tell(Event::Demanded { session, views_per_set, frames_per_s: 0.0 });
         }
     }
 
@@ -186,7 +186,7 @@ impl World {
         let name = self.random_name();
         if let Some(&(_, speed)) = self.alive.get(&name) {
             let noise = self.random.between(0.8, 1.25);
-            self.tell(Event::Measured { node_name: name, costs: timings(speed * noise) });
+            self.tell(measured(name, timings(speed * noise)));
         }
     }
 
@@ -297,7 +297,7 @@ impl World {
         assert!(!plan.compositors.is_empty());
         let mut images: Vec<u32> = plan.samplers.iter().flat_map(|s| s.image_indices.clone()).collect();
         images.sort_unstable();
-        let all = 0..plan.workload.sample_cameras.len() as u32;
+        let all = 0..plan.image_count() as u32;
         assert_eq!(images, if plan.policy == wire::Policy::Direct { vec![] } else { all.collect::<Vec<_>>() });
     }
 
@@ -326,6 +326,10 @@ impl World {
         }
         assert_eq!(self.plans, plans, "it rests");
     }
+}
+
+fn measured(node_name: String, costs: MeasuredCosts) -> Event {
+    Event::Measured { node_name, plan_epoch: 1, costs, busy_s: 0.1, views: 3, dropped_views: 0 }
 }
 
 fn timings(times: f64) -> MeasuredCosts {
@@ -386,7 +390,7 @@ fn k_follows_views_up_and_down_without_flapping() {
         let asked = Opening { workload: workload(images), costs, ..opening(1, PolicyChoice::Pipeline, 1) };
         world.tell(Event::Opened(Box::new(asked)));
         for views in [500, 1, 30, 500, 30, 1] {
-            world.tell(Event::Demanded { session: 1, views_per_set: views });
+            world.tell(Event::Demanded { session: 1, views_per_set: views, frames_per_s: 0.0 });
             let k = settle(&mut world);
             assert!(k.is_sorted() || k.is_sorted_by(|a, b| a >= b), "K turned back: {k:?}");
             assert!(near_k_fd(&world, &costs, images, views), "{views} views, K {k:?}");
@@ -411,7 +415,7 @@ fn settle(world: &mut World) -> Vec<usize> {
 fn near_k_fd(world: &World, costs: &Costs, images: usize, views: usize) -> bool {
     let plan = &world.last.as_ref().expect("a plan").assignment;
     let nodes = vec![NodeCosts { costs: *costs, transfer_image_s: 0.0 }; world.members.len()];
-    let load = Load { images, sets: 1, views, in_order: false };
+    let load = Load { images, views, ..Load::default() };
     let samples =
         world.members.keys().map(|name| plan.samplers.iter().any(|s| s.node_name == *name)).collect::<Vec<_>>();
     let k = k_fd(images, costs.sample_image_s, views, nodes[0].view_s(), nodes.len());
@@ -429,7 +433,7 @@ fn noise_moves_no_roles() {
         world.tell(opened(1, PolicyChoice::Pipeline, 200));
         for _ in 0..1000 {
             let (name, noise) = (format!("n{:02}", world.random.below(8)), world.random.between(0.8, 1.25));
-            world.tell(Event::Measured { node_name: name, costs: timings(noise) });
+            world.tell(measured(name, timings(noise)));
             world.pass(300);
         }
         assert!(world.plans == 1, "{} plans", world.plans);

@@ -40,6 +40,8 @@ pub(super) const COSTS: Costs = Costs {
     load_set_s: 0.005,
     encode_view_s: 0.001,
     in_order: false,
+    // A tile costs as much as the image: none is cut.
+    sample_overhead_s: 1e3,
 };
 
 /// So many nodes that need `costs`.
@@ -75,7 +77,17 @@ pub(super) fn workload(images: usize) -> Workload {
 }
 
 pub(super) fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) -> Opening {
-    Opening { session, workload: workload(4), views_per_set, policy, forced_samplers: None, costs: COSTS }
+    Opening {
+        session,
+        workload: workload(4),
+        views_per_set,
+        frames_per_s: 0.0,
+        policy,
+        forced_samplers: None,
+        forced_tiles: None,
+        fallbacks: Vec::new(),
+        costs: COSTS,
+    }
 }
 
 pub(super) fn opened(session: u64, policy: PolicyChoice, views_per_set: usize) -> Event {

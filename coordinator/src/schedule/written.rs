@@ -1,10 +1,10 @@
 //! Events as a log has them, and back; values that no event has are named.
 
 use serde::{Deserialize, Serialize};
-use wire::limits::{MAX_TEXT_BYTES, MAX_VIEWS_PER_SET};
-use wire::{Costs, JoinCluster, NodeStatus, PolicyChoice, UnknownPolicy, WireError, Workload};
+use wire::limits::{MAX_FRAMES_PER_S, MAX_TEXT_BYTES, MAX_TILES, MAX_VIEWS_PER_SET};
+use wire::{Costs, JoinCluster, MeasuredCosts, NodeStatus, PolicyChoice, Quality, UnknownPolicy, WireError, Workload};
 
-use super::{Event, MeasuredCosts, Opening};
+use super::{Event, Opening};
 
 /// A field that is wrong, before its line is known.
 pub(super) struct Wrong {
@@ -43,8 +43,12 @@ pub(super) enum Written {
     Opened {
         session: u64,
         views_per_set: usize,
+        #[serde(with = "super::exact")]
+        frames_per_s: f64,
         policy: String,
         forced_samplers: Option<usize>,
+        forced_tiles: Option<usize>,
+        fallbacks: Vec<WrittenQuality>,
         costs: WrittenCosts,
         /// The message that nodes get, in hexadecimal.
         workload: String,
@@ -52,9 +56,16 @@ pub(super) enum Written {
     Demanded {
         session: u64,
         views_per_set: usize,
+        #[serde(with = "super::exact")]
+        frames_per_s: f64,
     },
     Measured {
         node_name: String,
+        plan_epoch: u64,
+        #[serde(with = "super::exact")]
+        busy_s: f64,
+        views: u64,
+        dropped_views: u64,
         #[serde(flatten)]
         costs: WrittenTimings,
     },
@@ -86,6 +97,18 @@ pub(super) struct WrittenCosts {
     #[serde(with = "super::exact")]
     encode_view_s: f64,
     in_order: bool,
+    #[serde(with = "super::exact")]
+    sample_overhead_s: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct WrittenQuality {
+    lighting: String,
+    method: String,
+    #[serde(with = "super::exact")]
+    sample_side_ratio: f64,
+    #[serde(with = "super::exact")]
+    frame_rate_ratio: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -112,8 +135,12 @@ impl From<&Event> for Written {
             Event::Joined { incarnation, join } => Self::joined(incarnation, join),
             Event::Left { incarnation, node_name } => Self::Left { incarnation, node_name },
             Event::Opened(opening) => Self::opened(*opening),
-            Event::Demanded { session, views_per_set } => Self::Demanded { session, views_per_set },
-            Event::Measured { node_name, costs } => Self::Measured { node_name, costs: costs.into() },
+            Event::Demanded { session, views_per_set, frames_per_s } => {
+                Self::Demanded { session, views_per_set, frames_per_s }
+            }
+            Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views } => {
+                Self::Measured { node_name, plan_epoch, busy_s, views, dropped_views, costs: costs.into() }
+            }
             Event::Ready { plan_epoch, node_name } => Self::Ready { plan_epoch, node_name },
             Event::Unready { plan_epoch, node_name, reason } => Self::Unready { plan_epoch, node_name, reason },
             Event::Closed { session } => Self::Closed { session },
@@ -132,8 +159,11 @@ impl Written {
         Self::Opened {
             session: opening.session,
             views_per_set: opening.views_per_set,
+            frames_per_s: opening.frames_per_s,
             policy: opening.policy.to_string(),
             forced_samplers: opening.forced_samplers,
+            forced_tiles: opening.forced_tiles,
+            fallbacks: opening.fallbacks.into_iter().map(Into::into).collect(),
             costs: opening.costs.into(),
             workload: hex(&opening.workload.to_bytes()),
         }
@@ -146,20 +176,38 @@ impl Written {
                 Event::Joined { incarnation, join: JoinCluster { node, plan_epoch } }
             }
             Self::Left { incarnation, node_name } => Event::Left { incarnation, node_name: name(node_name)? },
-            Self::Opened { session, views_per_set, policy, forced_samplers, costs, workload } => {
-                Event::Opened(Box::new(Opening {
-                    session,
-                    workload: Workload::from_bytes(&bytes(&workload)?)?,
-                    views_per_set: views(views_per_set)?,
-                    policy: policy.parse::<PolicyChoice>()?,
-                    forced_samplers,
-                    costs: costs.read()?,
-                }))
+            Self::Opened {
+                session,
+                views_per_set,
+                frames_per_s,
+                policy,
+                forced_samplers,
+                forced_tiles,
+                fallbacks,
+                costs,
+                workload,
+            } => Event::Opened(Box::new(Opening {
+                session,
+                workload: Workload::from_bytes(&bytes(&workload)?)?,
+                views_per_set: views(views_per_set)?,
+                frames_per_s: rate(frames_per_s)?,
+                policy: policy.parse::<PolicyChoice>()?,
+                forced_samplers,
+                forced_tiles: tiles(forced_tiles)?,
+                fallbacks: fallbacks.into_iter().map(WrittenQuality::read).collect::<Result<_, _>>()?,
+                costs: costs.read()?,
+            })),
+            Self::Demanded { session, views_per_set, frames_per_s } => {
+                Event::Demanded { session, views_per_set: views(views_per_set)?, frames_per_s: rate(frames_per_s)? }
             }
-            Self::Demanded { session, views_per_set } => {
-                Event::Demanded { session, views_per_set: views(views_per_set)? }
-            }
-            Self::Measured { node_name, costs } => Event::Measured { node_name: name(node_name)?, costs: costs.into() },
+            Self::Measured { node_name, plan_epoch, busy_s, views, dropped_views, costs } => Event::Measured {
+                node_name: name(node_name)?,
+                plan_epoch,
+                busy_s: seconds(busy_s, "busy_s")?,
+                views,
+                dropped_views,
+                costs: costs.into(),
+            },
             Self::Ready { plan_epoch, node_name } => Event::Ready { plan_epoch, node_name: name(node_name)? },
             Self::Unready { plan_epoch, node_name, reason } => {
                 Event::Unready { plan_epoch, node_name: name(node_name)?, reason }
@@ -183,6 +231,43 @@ fn views(views_per_set: usize) -> Result<usize, Wrong> {
     }
     let reason = format!("is {views_per_set}, at most {MAX_VIEWS_PER_SET} are allowed");
     Err(Wrong { field: "views_per_set", reason })
+}
+
+fn rate(frames_per_s: f64) -> Result<f64, Wrong> {
+    if (0.0..=MAX_FRAMES_PER_S).contains(&frames_per_s) {
+        return Ok(frames_per_s);
+    }
+    Err(Wrong { field: "frames_per_s", reason: format!("is {frames_per_s}, must be from 0 to {MAX_FRAMES_PER_S}") })
+}
+
+fn tiles(forced: Option<usize>) -> Result<Option<usize>, Wrong> {
+    if forced.is_none_or(|forced| (1..=MAX_TILES as usize).contains(&forced)) {
+        return Ok(forced);
+    }
+    Err(Wrong { field: "forced_tiles", reason: format!("is {forced:?}, must be from 1 to {MAX_TILES}") })
+}
+
+impl From<Quality> for WrittenQuality {
+    fn from(q: Quality) -> Self {
+        let Quality { lighting, method, sample_side_ratio, frame_rate_ratio } = q;
+        Self { lighting, method, sample_side_ratio, frame_rate_ratio }
+    }
+}
+
+impl WrittenQuality {
+    fn read(self) -> Result<Quality, Wrong> {
+        let Self { lighting, method, sample_side_ratio, frame_rate_ratio } = self;
+        let ratio = |value: f64, field| {
+            let wrong = Wrong { field, reason: format!("is {value}, must be above 0 and at most 1") };
+            if value > 0.0 && value <= 1.0 { Ok(value) } else { Err(wrong) }
+        };
+        Ok(Quality {
+            lighting,
+            method,
+            sample_side_ratio: ratio(sample_side_ratio, "sample_side_ratio")?,
+            frame_rate_ratio: ratio(frame_rate_ratio, "frame_rate_ratio")?,
+        })
+    }
 }
 
 fn seconds(value: f64, field: &'static str) -> Result<f64, Wrong> {
@@ -215,6 +300,7 @@ impl From<Costs> for WrittenCosts {
             load_set_s: c.load_set_s,
             encode_view_s: c.encode_view_s,
             in_order: c.in_order,
+            sample_overhead_s: c.sample_overhead_s,
         }
     }
 }
@@ -228,6 +314,7 @@ impl WrittenCosts {
             load_set_s: seconds(self.load_set_s, "load_set_s")?,
             encode_view_s: seconds(self.encode_view_s, "encode_view_s")?,
             in_order: self.in_order,
+            sample_overhead_s: seconds(self.sample_overhead_s, "sample_overhead_s")?,
         })
     }
 }

@@ -28,6 +28,11 @@ pub trait Engine: Send + Sync + 'static {
     /// # Errors
     /// For a method it does not know.
     fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError>;
+    /// Whether an image depends on its own camera alone, so that it can be cut into tiles.
+    ///
+    /// # Errors
+    /// For a method it does not know.
+    fn samples_alone(&self, sampling: &str) -> Result<bool, EngineError>;
     /// The wanted images of a set, in their order.
     ///
     /// # Errors
@@ -134,9 +139,12 @@ pub enum EngineError {
         /// Which.
         hash: String,
     },
-    /// The device, or its memory.
+    /// The device, or its memory, could not do this one thing.
     #[error("device: {0}")]
     Device(String),
+    /// The device does nothing any more.
+    #[error("device lost: {0}")]
+    Lost(String),
 }
 
 impl From<EngineError> for Status {
@@ -146,6 +154,8 @@ impl From<EngineError> for Status {
             EngineError::InvalidArgument { .. } => Self::invalid_argument(text),
             EngineError::UnknownScene { .. } => Self::failed_precondition(text),
             EngineError::Device(_) => Self::internal(text),
+            // Another node's device can do it.
+            EngineError::Lost(_) => Self::unavailable(text),
         }
     }
 }

@@ -15,6 +15,8 @@ const RUNS: usize = 3;
 /// A run that takes longer stays the only one that counts: under heavy light it may take seconds, of which little is
 /// chance.
 const LONG_RUN_S: f64 = 0.5;
+/// Into so many tiles an image is cut to see what a tile costs.
+const MEASURED_TILES: u32 = 4;
 /// Views drawn in one call take about so long at most, unless one alone takes longer.
 const DIRECT_CALL_S: f64 = 1.0;
 
@@ -54,14 +56,33 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
     let cameras = vec![request.typical_view; request.batch_count as usize];
     let work = ViewWork { cameras, method: workload.method.clone(), planes: request.planes };
     let (made, reconstruct_s) = timed(|| Ok(engine.reconstruct(set.as_ref(), &work)?))?;
+    let in_order = engine.samples_in_order(&workload.sampling)?;
+    let sample_image_s = sample_s / images.len().max(1) as f64;
     Ok(Costs {
-        sample_image_s: sample_s / images.len().max(1) as f64,
+        sample_image_s,
+        sample_overhead_s: if engine.samples_alone(&workload.sampling)? {
+            overhead_s(engine, &sample, sample_image_s)?
+        } else {
+            sample_image_s
+        },
         direct_view_s: direct_view_s(engine, request)?,
         reconstruct_view_s: reconstruct_s / f64::from(request.batch_count),
         load_set_s,
         encode_view_s: encode_s(&made, &workload.codec)?,
-        in_order: engine.samples_in_order(&workload.sampling)?,
+        in_order,
     })
+}
+
+/// What a tile of an image costs beyond its rows: of g = o + rows and g_tile = o + rows / T the o.
+fn overhead_s(engine: &dyn Engine, whole: &SampleWork, sample_image_s: f64) -> Result<f64, MeasureError> {
+    let tile = |camera: &Camera| (0..MEASURED_TILES).map(|tile| camera.tile(tile, MEASURED_TILES)).nth(1);
+    let Some(camera) = whole.cameras.first().and_then(tile).filter(|Camera::Pinhole(tile)| tile.size_px.y > 0) else {
+        return Ok(sample_image_s);
+    };
+    let work = SampleWork { cameras: vec![camera], wanted: vec![0], ..whole.clone() };
+    let (_, tile_s) = timed(|| Ok(engine.sample(&work)?))?;
+    let tiles = f64::from(MEASURED_TILES);
+    Ok(((tiles * tile_s - sample_image_s) / (tiles - 1.0)).clamp(0.0, sample_image_s))
 }
 
 fn codec(error: impl ToString) -> MeasureError {
@@ -127,11 +148,12 @@ fn decoded(workload: &Workload, encoded: &[EncodedDepthImage]) -> Result<SampleS
     })
 }
 
+/// Of all views of the batch: one alone ends within a time slice, in which a node with a quota is as fast as any.
 fn encode_s(made: &[View], codec_name: &str) -> Result<f64, MeasureError> {
     let frame_codec: FrameCodec = codec_name.parse().map_err(codec)?;
-    let Some(view) = made.first() else { return Ok(0.0) };
-    let (_, seconds) = timed(|| encode_view(view, frame_codec).map_err(codec))?;
-    Ok(seconds)
+    let ((), seconds) =
+        timed(|| made.iter().try_for_each(|view| encode_view(view, frame_codec).map(drop).map_err(codec)))?;
+    Ok(seconds / made.len().max(1) as f64)
 }
 
 /// The result of one run that does not count, and the median time of those that do: one long run, or [`RUNS`].

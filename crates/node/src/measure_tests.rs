@@ -74,6 +74,10 @@ impl Engine for Sleeper {
         true
     }
 
+    fn samples_alone(&self, _: &str) -> Result<bool, EngineError> {
+        Ok(false)
+    }
+
     fn samples_in_order(&self, _: &str) -> Result<bool, EngineError> {
         Ok(false)
     }

@@ -32,6 +32,12 @@ impl CurrentPlan {
         self.plan.borrow().as_ref().map_or(0, |plan| plan.plan_epoch)
     }
 
+    /// The plan in force.
+    #[must_use]
+    pub fn in_force(&self) -> Option<Arc<Assignment>> {
+        self.plan.borrow().clone()
+    }
+
     /// Whether a plan may replace the one in force.
     ///
     /// # Errors
@@ -67,15 +73,21 @@ impl CurrentPlan {
         verdict
     }
 
+    /// Resolves when a later plan than this is in force.
+    pub async fn replaced(&self, plan_epoch: u64) {
+        let later = |plan: &Option<Arc<Assignment>>| plan.as_ref().is_some_and(|plan| plan.plan_epoch > plan_epoch);
+        // The sender is ours: it lasts as long as this.
+        let _ = self.plan.subscribe().wait_for(later).await;
+    }
+
     /// The plan that a caller names.
     ///
     /// # Errors
-    /// `FAILED_PRECONDITION` where it is not the one in force.
+    /// `FAILED_PRECONDITION` where it is not the one in force, which the refusal names.
     pub fn require(&self, plan_epoch: u64) -> Result<Arc<Assignment>, Status> {
-        let current = self.plan.borrow().clone();
-        match current {
+        match self.in_force() {
             Some(plan) if plan.plan_epoch == plan_epoch => Ok(plan),
-            Some(plan) => Err(Status::failed_precondition(format!(
+            Some(plan) => Err(plan.refusal(format!(
                 "plan_epoch {plan_epoch} is not in force on {}, {} is",
                 self.node_name, plan.plan_epoch
             ))),
@@ -109,7 +121,28 @@ mod tests {
             illumination: Illumination::default(),
             refinement_steps: 1,
         };
-        Assignment { plan_epoch, policy: Policy::Direct, workload, samplers: Vec::new(), compositors: Vec::new() }
+        Assignment {
+            plan_epoch,
+            policy: Policy::Direct,
+            workload,
+            samplers: Vec::new(),
+            compositors: Vec::new(),
+            tile_count: 1,
+            relay_fanout: None,
+        }
+    }
+
+    #[tokio::test]
+    async fn a_plan_is_replaced_by_a_later_one() {
+        let current = CurrentPlan::new("n");
+        current.apply(plan(3, "unlit")).unwrap();
+        let waits = std::time::Duration::from_millis(20);
+        assert!(tokio::time::timeout(waits, current.replaced(3)).await.is_err());
+        current.replaced(2).await;
+        let (waiting, later) = (current.clone(), current);
+        let replaced = tokio::spawn(async move { waiting.replaced(3).await });
+        later.apply(plan(4, "unlit")).unwrap();
+        replaced.await.unwrap();
     }
 
     #[test]

@@ -7,10 +7,11 @@ use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 use tonic::transport::Server;
-use tonic::transport::server::TcpIncoming;
 use tonic_health::ServingStatus;
 use tonic_health::pb::health_server::{Health, HealthServer};
-use wire::rpc::{KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT};
+use wire::rpc::{KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT, reflection_server};
+
+use crate::incoming::greeted;
 
 /// How long connections may take to end after the streams were ended.
 pub const DRAIN: Duration = Duration::from_secs(10);
@@ -29,6 +30,15 @@ pub enum ServeError {
     /// The socket.
     #[error("listening: {0}")]
     Listen(#[from] std::io::Error),
+    /// What services there are could not be described.
+    #[error("reflection: {0}")]
+    Reflection(String),
+    /// Nothing can be made here any more; whatever started the process may start it again.
+    #[error("device lost: {reason}")]
+    DeviceLost {
+        /// How.
+        reason: String,
+    },
     /// The transport.
     #[error("serving: {0}")]
     Transport(#[from] tonic::transport::Error),
@@ -48,9 +58,9 @@ pub async fn serve(
     if !address.ip().is_loopback() && !insecure_bind {
         return Err(ServeError::NotLoopback { address });
     }
-    let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-    let serving =
-        builder().add_routes(routes).serve_with_incoming_shutdown(incoming, shutdown.clone().cancelled_owned());
+    let serving = builder()
+        .add_routes(routes)
+        .serve_with_incoming_shutdown(greeted(listener), shutdown.clone().cancelled_owned());
     let overdue = async {
         shutdown.cancelled().await;
         tokio::time::sleep(DRAIN).await;
@@ -73,6 +83,15 @@ fn builder() -> Server {
         .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
         .initial_stream_window_size(4 << 20)
         .initial_connection_window_size(16 << 20)
+}
+
+/// The routes, with reflection where it is wanted.
+///
+/// # Errors
+/// Where the descriptors cannot be read.
+pub fn with_reflection(routes: Routes, wanted: bool) -> Result<Routes, ServeError> {
+    let described = || reflection_server().map_err(|error| ServeError::Reflection(error.to_string()));
+    if wanted { Ok(routes.add_service(described()?)) } else { Ok(routes) }
 }
 
 /// The health service, with each role serving.

@@ -14,6 +14,8 @@ use prometheus_client::registry::{Registry, Unit};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
+use crate::WorkDone;
+
 const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
 /// A process's metrics, by name.
@@ -84,6 +86,8 @@ pub struct NodeMetrics {
     pub streams: Gauge,
     /// The plan in force.
     pub plan_epoch: Gauge,
+    /// For the coordinator.
+    pub done: WorkDone,
 }
 
 fn seconds() -> Histogram {
@@ -106,6 +110,7 @@ impl NodeMetrics {
             dropped: Family::default(),
             streams: Gauge::default(),
             plan_epoch: Gauge::default(),
+            done: WorkDone::default(),
         };
         metrics.register(&mut telemetry.registry());
         metrics
@@ -128,6 +133,7 @@ impl NodeMetrics {
     /// Counts a view that was not made or not sent.
     pub fn drop_view(&self, reason: &'static str) {
         self.dropped.get_or_create(&Reason { reason }).inc();
+        self.done.dropped();
     }
 }
 

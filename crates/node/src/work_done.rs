@@ -1,0 +1,136 @@
+//! What this node has done since it last said so, and what that took.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use wire::MeasuredCosts;
+
+/// What takes time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Operation {
+    /// g_s: one sample image, whole. A tile counts as its part of one.
+    SampleImage,
+    /// g_v: one view drawn directly.
+    DirectView,
+    /// c: one view reconstructed.
+    ReconstructView,
+    /// d: one set decoded and uploaded.
+    LoadSet,
+    /// e: one view encoded.
+    EncodeView,
+}
+
+/// Counts and seconds. Clones share them.
+#[derive(Debug, Clone, Default)]
+pub struct WorkDone(Arc<Mutex<Sums>>);
+
+/// Of all that was done since the last report.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sums {
+    /// By [`Operation`]: how many, and seconds of all.
+    operations: [(f64, f64); 5],
+    /// Bytes of images that came, and seconds of their coming.
+    transferred: (f64, f64),
+    /// Encoded images, and their bytes.
+    encoded: (f64, f64),
+    /// Seconds of all operations.
+    pub busy_s: f64,
+    /// Made.
+    pub views: u64,
+    /// Not made, or not sent.
+    pub dropped_views: u64,
+}
+
+impl WorkDone {
+    fn change(&self, change: impl FnOnce(&mut Sums)) {
+        change(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    /// So many operations that took so long together; a part of one counts as that.
+    pub fn add(&self, operation: Operation, count: f64, seconds: f64) {
+        self.change(|sums| {
+            let sum = &mut sums.operations[operation as usize];
+            *sum = (sum.0 + count, sum.1 + seconds);
+            sums.busy_s += seconds;
+            if matches!(operation, Operation::DirectView | Operation::ReconstructView) {
+                sums.views += count as u64;
+            }
+        });
+    }
+
+    /// Bytes that came in so many seconds.
+    pub fn transferred(&self, bytes: usize, seconds: f64) {
+        self.change(|sums| sums.transferred = (sums.transferred.0 + bytes as f64, sums.transferred.1 + seconds));
+    }
+
+    /// Whole images of so many bytes together.
+    pub fn encoded(&self, images: f64, bytes: usize) {
+        self.change(|sums| sums.encoded = (sums.encoded.0 + images, sums.encoded.1 + bytes as f64));
+    }
+
+    /// A view that was not made or not sent.
+    pub fn dropped(&self) {
+        self.change(|sums| sums.dropped_views += 1);
+    }
+
+    /// All since the last call.
+    #[must_use]
+    pub fn take(&self) -> Sums {
+        std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Sums {
+    /// Whether there is nothing to say.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The mean of each operation; what was not done is `None`.
+    #[must_use]
+    pub fn costs(&self) -> MeasuredCosts {
+        let mean = |operation: Operation| quotient(self.operations[operation as usize]);
+        let (images, bytes) = self.encoded;
+        let (received, seconds) = self.transferred;
+        MeasuredCosts {
+            sample_image_s: mean(Operation::SampleImage),
+            direct_view_s: mean(Operation::DirectView),
+            reconstruct_view_s: mean(Operation::ReconstructView),
+            load_set_s: mean(Operation::LoadSet),
+            encode_view_s: mean(Operation::EncodeView),
+            transfer_bytes_per_s: quotient((seconds, received)),
+            image_bytes: quotient((images, bytes)),
+        }
+    }
+}
+
+/// The second by the first.
+fn quotient((count, sum): (f64, f64)) -> Option<f64> {
+    (count > 0.0).then(|| sum / count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_are_of_what_was_done_since() {
+        let done = WorkDone::default();
+        assert!(done.take().is_empty());
+        done.add(Operation::ReconstructView, 32.0, 0.32);
+        done.clone().add(Operation::ReconstructView, 8.0, 0.48);
+        done.add(Operation::SampleImage, 0.25, 0.1);
+        done.transferred(1 << 20, 0.5);
+        done.encoded(0.5, 1000);
+        done.dropped();
+        let sums = done.take();
+        let costs = sums.costs();
+        assert_eq!(costs.reconstruct_view_s, Some(0.02));
+        assert_eq!(costs.sample_image_s, Some(0.4), "a quarter of an image in 0.1 s");
+        assert_eq!(costs.transfer_bytes_per_s, Some(2.0 * 1024.0 * 1024.0));
+        assert_eq!((costs.image_bytes, costs.direct_view_s, costs.load_set_s), (Some(2000.0), None, None));
+        assert_eq!((sums.views, sums.dropped_views), (40, 1));
+        assert!((sums.busy_s - 0.9).abs() < 1e-12);
+        assert!(done.take().is_empty());
+    }
+}
