@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera};
+use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, SpecularPlanes};
 use glam::{UVec2, Vec3};
 use tokio::net::TcpListener;
 use tokio_stream::StreamExt as _;
@@ -102,11 +102,17 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
         workload,
         samplers: vec![share],
         compositors: Vec::new(),
+        tile_count: 1,
+        relay_fanout: None,
     });
     let deadlines = Deadlines { chunk: Duration::from_millis(200), ..Deadlines::default() };
-    let set = fetch_set(&plan, 0, &Arc::default(), deadlines).await;
+    let fetched = Arc::new(Fetcher::new("n0", deadlines)).fetch(&plan, 0, None).await;
     shutdown.cancel();
-    set
+    let set = fetched.map(|fetched| fetched.set);
+    set.map_err(|failed| {
+        assert_eq!(failed.sampler.as_deref(), Some("n7"));
+        failed.status
+    })
 }
 
 #[tokio::test]

@@ -1,39 +1,42 @@
 //! Answers clients that ask for views.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use node::{CurrentPlan, Deadlines, Engine, NodeConfig, NodeMetrics, next_within, until_drained};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
+use node::{CurrentPlan, Deadlines, Engine, NodeConfig, NodeMetrics, Relay, next_within, until_drained};
+use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Compositor, Messages};
-use wire::{Assignment, FramePart, Policy, RenderViews, RequestedView, SampleSetId};
+use wire::{Assignment, FramePart, Policy, RenderViews, SampleSetId};
 
-use crate::batch::{BatchKey, MAX_BATCH, Source, Waiting};
-use crate::output::{Outgoing, Output};
+use crate::arrivals::Arrivals;
+use crate::batch::Source;
+use crate::batch_stream::BatchStream;
+use crate::live_stream::LiveStream;
+use crate::outbox::{Outbox, Outgoing, Reply};
+use crate::quota::NodeQuota;
 use crate::render::render_loop;
-use crate::sets::Sets;
-
-/// Pixels of one stream's views that wait or are not sent yet.
-const STREAM_PIXELS: u32 = 128 << 20;
-/// Views of one stream that wait or are not sent yet.
-const STREAM_VIEWS: u32 = 256;
-/// Batches that may arrive before the device's loop looks.
-const ARRIVALS: usize = 64;
+use crate::sets::{SetRelay, Sets};
 
 /// The compositor's role.
 pub struct CompositorService {
     shared: Arc<Shared>,
     shutdown: CancellationToken,
+    /// Ends with the service.
+    _rendering: JoinSet<()>,
 }
 
-struct Shared {
-    plan: CurrentPlan,
-    sets: Arc<Sets>,
-    arrivals: mpsc::Sender<Vec<Waiting>>,
-    deadlines: Deadlines,
-    metrics: NodeMetrics,
+/// What all streams share.
+pub(crate) struct Shared {
+    pub(crate) plan: CurrentPlan,
+    pub(crate) sets: Arc<Sets>,
+    pub(crate) arrivals: Arc<Arrivals>,
+    pub(crate) quota: NodeQuota,
+    pub(crate) deadlines: Deadlines,
+    pub(crate) metrics: NodeMetrics,
+    streams: AtomicU64,
 }
 
 impl CompositorService {
@@ -46,151 +49,123 @@ impl CompositorService {
         metrics: NodeMetrics,
         shutdown: CancellationToken,
     ) -> Self {
-        let (arrivals, arriving) = mpsc::channel(ARRIVALS);
-        tokio::spawn(render_loop(engine.clone(), arriving, metrics.clone()));
-        let sets = Arc::new(Sets::new(engine, config.deadlines, metrics.clone()));
-        let shared = Shared { plan, sets, arrivals, deadlines: config.deadlines, metrics };
-        Self { shared: Arc::new(shared), shutdown }
+        let arrivals = Arc::<Arrivals>::default();
+        let mut rendering = JoinSet::new();
+        rendering.spawn(render_loop(engine.clone(), arrivals.clone(), metrics.clone()));
+        let sets = Arc::new(Sets::new(engine, plan.clone(), config, metrics.clone()));
+        let quota = NodeQuota::new(config.quotas);
+        let shared =
+            Shared { plan, sets, arrivals, quota, deadlines: config.deadlines, metrics, streams: AtomicU64::new(1) };
+        Self { shared: Arc::new(shared), shutdown, _rendering: rendering }
+    }
+
+    /// What passes on to other compositors the images that come to this one.
+    #[must_use]
+    pub fn relay(&self) -> Arc<dyn Relay> {
+        Arc::new(SetRelay(self.shared.sets.clone()))
     }
 }
 
 #[async_trait]
 impl Compositor for CompositorService {
     async fn render_views(&self, requests: Messages<RenderViews>) -> Result<Messages<FramePart>, Status> {
-        let (reply, frames) = mpsc::channel(STREAM_VIEWS as usize + 1);
-        let stream = ClientStream {
-            shared: self.shared.clone(),
-            reply,
-            credits: Arc::new(Semaphore::new(STREAM_PIXELS as usize)),
-        };
+        let place = self.shared.quota.stream()?;
+        let stream = self.shared.streams.fetch_add(1, Ordering::Relaxed);
+        let outbox = Outbox::new(stream, self.shared.metrics.clone());
+        let client = ClientStream { shared: self.shared.clone(), stream, outbox: outbox.clone() };
         let requests = until_drained(requests, self.shutdown.clone());
-        tokio::spawn(stream.run(requests));
-        Ok(until_drained(Box::pin(Outgoing::new(frames)), self.shutdown.clone()))
+        tokio::spawn(async move {
+            client.run(requests).await;
+            drop(place);
+        });
+        Ok(until_drained(Box::pin(Outgoing::new(outbox)), self.shutdown.clone()))
     }
 }
 
-struct ClientStream {
-    shared: Arc<Shared>,
-    reply: mpsc::Sender<Result<Output, Status>>,
-    credits: Arc<Semaphore>,
+/// One client's call.
+pub(crate) struct ClientStream {
+    pub(crate) shared: Arc<Shared>,
+    /// Its number, for the queue and in logs.
+    pub(crate) stream: u64,
+    pub(crate) outbox: Arc<Outbox>,
 }
 
 impl ClientStream {
-    async fn run(self, mut requests: Messages<RenderViews>) {
+    /// Until it ends from either side; a client that takes nothing of what is ready is cut off.
+    async fn run(self, requests: Messages<RenderViews>) {
         self.shared.metrics.streams.inc();
-        let ended = tokio::select! {
-            ended = self.answer(&mut requests) => ended,
-            () = self.reply.closed() => Ok(()),
-        };
+        let stall = self.shared.deadlines.stall;
+        tokio::select! {
+            () = self.answer_and_send(requests) => (),
+            () = self.outbox.gone() => (),
+            () = self.outbox.stalled(stall) => self.cut_off(),
+        }
+        for view in self.shared.arrivals.withdraw(self.stream) {
+            self.shared.metrics.drop_view("client gone");
+            drop(view);
+        }
         self.shared.metrics.streams.dec();
-        if let Err(status) = ended {
-            tracing::debug!(reason = status.message(), "a client's stream ends");
-            // Full or gone: the client then sees the end without a reason.
-            let _ = self.reply.try_send(Err(status));
+    }
+
+    /// The frames that are under way are sent before it ends.
+    async fn answer_and_send(&self, requests: Messages<RenderViews>) {
+        // Until the end, so that no other way out of here ends the stream without a reason.
+        let reply = Reply::new(self.outbox.clone());
+        if let Err(status) = self.answer(requests, reply.clone()).await {
+            tracing::debug!(stream = self.stream, reason = status.message(), "a client's stream ends");
+            reply.send(Err(status));
+        }
+        drop(reply);
+        self.outbox.gone().await;
+    }
+
+    async fn answer(&self, mut requests: Messages<RenderViews>, reply: Reply) -> Result<(), Status> {
+        let idle = self.shared.deadlines.idle;
+        match next_within(&mut requests, idle, "views").await? {
+            None => Ok(()),
+            Some(first) if first.live.is_some() => LiveStream::new(self, reply).answer(first, requests).await,
+            Some(first) => BatchStream::new(self, reply).answer(first, requests).await,
         }
     }
 
-    async fn answer(&self, requests: &mut Messages<RenderViews>) -> Result<(), Status> {
-        while let Some(request) = self.next(requests).await? {
-            self.enqueue(request).await?;
+    fn cut_off(&self) {
+        let seconds = self.shared.deadlines.stall.as_secs_f64();
+        tracing::warn!(stream = self.stream, seconds, "a client takes no frames: cut off");
+        let reason = format!("frames: nothing was taken for {seconds:.1} s");
+        self.outbox.cut(Status::deadline_exceeded(reason));
+    }
+}
+
+impl Shared {
+    /// A plan, if this node makes views in it.
+    pub(crate) fn of_compositor(&self, plan: Arc<Assignment>) -> Result<Arc<Assignment>, Status> {
+        if plan.composites(self.plan.node_name()) {
+            return Ok(plan);
         }
-        Ok(())
+        Err(Status::failed_precondition(format!(
+            "{} makes no views in plan_epoch {}",
+            self.plan.node_name(),
+            plan.plan_epoch
+        )))
     }
 
-    /// A client that waits for frames is not idle.
-    async fn next(&self, requests: &mut Messages<RenderViews>) -> Result<Option<RenderViews>, Status> {
-        loop {
-            match next_within(requests, self.shared.deadlines.idle, "views").await {
-                Err(status) if status.code() == tonic::Code::DeadlineExceeded && self.frames_are_due() => (),
-                next => return next,
-            }
-        }
-    }
-
-    fn frames_are_due(&self) -> bool {
-        self.credits.available_permits() < STREAM_PIXELS as usize
-    }
-
-    /// Hands over a request's views in pieces of one batch, as far as there is credit.
-    async fn enqueue(&self, request: RenderViews) -> Result<(), Status> {
-        let plan = self.shared.plan.require(request.plan_epoch)?;
-        if !plan.composites(self.shared.plan.node_name()) {
-            return Err(Status::failed_precondition(format!(
-                "{} makes no views in plan_epoch {}",
-                self.shared.plan.node_name(),
-                plan.plan_epoch
-            )));
-        }
+    /// What views of a set are made from, as soon as it is there, and the seconds until then.
+    pub(crate) async fn source(
+        &self,
+        plan: &Arc<Assignment>,
+        set_index: u32,
+    ) -> Result<(Source, SampleSetId, f64), Status> {
         let start = Instant::now();
-        let (source, sample_set_id) = self.source(&plan, request.set_index).await?;
-        let set_wait_s = start.elapsed().as_secs_f64();
-        for views in request.views.chunks(MAX_BATCH) {
-            let mut batch = Vec::with_capacity(views.len());
-            for &view in views {
-                // What holds no credit yet must not keep back what does: at the bound, hand over first.
-                let credit = match self.try_credit(&view) {
-                    Some(credit) => credit,
-                    None => {
-                        self.hand_over(std::mem::take(&mut batch)).await?;
-                        self.credit(&view).await?
-                    }
-                };
-                let key = BatchKey {
-                    sample_set_id,
-                    method: request.method.clone(),
-                    planes: request.planes,
-                    size_px: view.camera.size_px,
-                };
-                batch.push(Waiting {
-                    key,
-                    source: source.clone(),
-                    view,
-                    codec: request.codec,
-                    set_wait_s,
-                    since: Instant::now(),
-                    reply: self.reply.clone(),
-                    credit,
-                });
-            }
-            self.hand_over(batch).await?;
-        }
-        Ok(())
-    }
-
-    async fn source(&self, plan: &Arc<Assignment>, set_index: u32) -> Result<(Source, SampleSetId), Status> {
         let beyond = || Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"));
         let id = plan.sample_set_id(set_index).ok_or_else(beyond)?;
         let source = match plan.policy {
-            Policy::Pipeline | Policy::TimeShare => Source::Set(self.shared.sets.get(plan, set_index).await?),
+            Policy::Pipeline | Policy::TimeShare => Source::Set(self.sets.get(plan, set_index).await?),
             Policy::Direct => Source::Scene {
                 scene_hash: plan.workload.scene.hash.to_string(),
                 lighting: plan.workload.lighting.clone(),
                 scene_time_s: plan.workload.timeline.time_s(set_index).ok_or_else(beyond)?,
             },
         };
-        Ok((source, id))
+        Ok((source, id, start.elapsed().as_secs_f64()))
     }
-
-    fn try_credit(&self, view: &RequestedView) -> Option<OwnedSemaphorePermit> {
-        self.credits.clone().try_acquire_many_owned(price(view)).ok()
-    }
-
-    async fn credit(&self, view: &RequestedView) -> Result<OwnedSemaphorePermit, Status> {
-        let credit = self.credits.clone().acquire_many_owned(price(view)).await;
-        credit.map_err(|_| Status::internal("the stream's credits are closed"))
-    }
-
-    async fn hand_over(&self, batch: Vec<Waiting>) -> Result<(), Status> {
-        if batch.is_empty() {
-            return Ok(());
-        }
-        self.shared.arrivals.send(batch).await.map_err(|_| Status::internal("the device's loop has ended"))
-    }
-}
-
-/// What a view takes of its stream's pixels: at least so much that the views are bounded too, at most
-/// all, so that one view larger than the bound still passes, alone.
-fn price(view: &RequestedView) -> u32 {
-    let pixels = u32::try_from(view.camera.pixel_count()).unwrap_or(STREAM_PIXELS);
-    pixels.clamp(STREAM_PIXELS / STREAM_VIEWS, STREAM_PIXELS)
 }

@@ -4,7 +4,10 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 use compositor_node::CompositorService;
-use node::{CurrentPlan, Engine, NodeConfig, NodeMetrics, NodeService, Scenes, ServeError, health, keep_membership};
+use node::{
+    CurrentPlan, Engine, NodeConfig, NodeMetrics, NodeService, Scenes, ServeError, Watched, health, keep_membership,
+    with_reflection,
+};
 use sampler_node::SamplerService;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
@@ -13,10 +16,11 @@ use wire::NodeStatus;
 use wire::rpc::{compositor_server, node_server, sampler_server};
 
 /// Serves both roles on one port and stays a member of the coordinator's cluster until `shutdown`; then
-/// ends its streams and returns when connections have ended, after 10 s at most.
+/// ends its streams and returns when connections have ended, after 10 s at most. A node whose device is lost leaves at
+/// once: others take its place.
 ///
 /// # Errors
-/// Where the address is not allowed or the transport fails.
+/// Where the address is not allowed, the transport fails or the device is lost.
 pub async fn serve(
     listener: TcpListener,
     config: NodeConfig,
@@ -24,19 +28,27 @@ pub async fn serve(
     metrics: NodeMetrics,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
+    let watched = Watched::new(engine);
+    let engine: Arc<dyn Engine> = Arc::new(watched.clone());
     let plan = CurrentPlan::new(&config.node_name);
     let scenes = Arc::new(Scenes::new(engine.clone(), &config));
     let status = status_of(&config, listener.local_addr()?, engine.as_ref());
-    let sampler = SamplerService::new(engine.clone(), plan.clone(), &config, metrics.clone(), shutdown.clone());
     let compositor = CompositorService::new(engine.clone(), plan.clone(), &config, metrics.clone(), shutdown.clone());
+    let (relay, done) = (compositor.relay(), metrics.done.clone());
+    let sampler = SamplerService::new(engine.clone(), plan.clone(), &config, relay, metrics.clone(), shutdown.clone());
     let service = NodeService::new(engine, plan.clone(), scenes.clone(), metrics);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))
         .add_service(compositor_server(compositor));
-    let membership = tokio::spawn(keep_membership(status, config.coordinator.clone(), plan, scenes, shutdown.clone()));
-    let served = node::serve(listener, routes, config.insecure_bind, shutdown).await;
-    // Where serving failed, nobody has cancelled it.
+    let routes = with_reflection(routes, config.reflection)?;
+    let member = keep_membership(status, config.coordinator.clone(), plan, scenes, done, shutdown.clone());
+    let membership = tokio::spawn(member);
+    let served = tokio::select! {
+        served = node::serve(listener, routes, config.insecure_bind, shutdown) => served,
+        reason = watched.lost() => Err(ServeError::DeviceLost { reason }),
+    };
+    // Where serving ended by itself, nobody has cancelled it.
     membership.abort();
     served
 }

@@ -8,8 +8,9 @@ use tokio::sync::OnceCell;
 use tonic::Status;
 use wire::{EncodedDepthImage, SetContent};
 
-/// What is sampled: a set, and which of its images. Not the plan: a static scene stays sampled.
-pub(crate) type Key = (SetContent, Vec<u32>);
+/// What is sampled: a set, into how many tiles its images are cut, and which of them. Not the plan: a static scene stays
+/// sampled.
+pub(crate) type Key = (SetContent, u32, Vec<u32>);
 
 /// Encoded images with their indices.
 pub(crate) type EncodedImages = Arc<Vec<(u32, EncodedDepthImage)>>;
@@ -101,8 +102,10 @@ mod tests {
             workload,
             samplers: Vec::new(),
             compositors: Vec::new(),
+            tile_count: 1,
+            relay_fanout: None,
         };
-        (plan.set_content(set_index).unwrap(), vec![0])
+        (plan.set_content(set_index).unwrap(), 1, vec![0])
     }
 
     fn images() -> EncodedImages {

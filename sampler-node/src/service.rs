@@ -3,34 +3,47 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use node::{CurrentPlan, Engine, NodeConfig, NodeMetrics, SampleWork, blocking, until_drained};
+use node::{CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, SampleWork, blocking, until_drained};
+use tokio::sync::mpsc;
+use tokio_stream::StreamExt as _;
+use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Messages, Sampler};
-use wire::{Assignment, Chunk, FetchImages, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
+use wire::{
+    Assignment, Chunk, EncodedDepthImage, FetchImages, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks,
+};
 
 use crate::kept::{EncodedImages, Kept};
+
+/// Chunks of images that are passed on and not sent yet.
+const CHUNKS_AHEAD: usize = 4;
 
 /// The sampler's role.
 pub struct SamplerService {
     engine: Arc<dyn Engine>,
     plan: CurrentPlan,
     kept: Arc<Kept>,
+    /// Sets are sampled in the order in which they are asked for: the next one is waited for first.
+    sampling: Arc<tokio::sync::Mutex<()>>,
+    relay: Arc<dyn Relay>,
     metrics: NodeMetrics,
     shutdown: CancellationToken,
 }
 
 impl SamplerService {
-    /// Of a node.
+    /// Of a node, which passes on what `relay` has.
     #[must_use]
     pub fn new(
         engine: Arc<dyn Engine>,
         plan: CurrentPlan,
         config: &NodeConfig,
+        relay: Arc<dyn Relay>,
         metrics: NodeMetrics,
         shutdown: CancellationToken,
     ) -> Self {
-        Self { engine, plan, kept: Arc::new(Kept::new(config.kept_sample_bytes)), metrics, shutdown }
+        let kept = Arc::new(Kept::new(config.kept_sample_bytes));
+        Self { engine, plan, kept, sampling: Arc::default(), relay, metrics, shutdown }
     }
 
     /// All of this node's images of a set: the first request makes them, in one submission.
@@ -40,8 +53,23 @@ impl SamplerService {
         let indices = plan.images_of(self.plan.node_name(), set_index).to_vec();
         let work = sample_work(plan, &indices, set_index)?.ok_or_else(beyond)?;
         let (engine, metrics) = (self.engine.clone(), self.metrics.clone());
-        let key = (content, indices.clone());
-        self.kept.get(key, move || blocking(move || sample(engine.as_ref(), &work, &indices, &metrics))).await
+        let key = (content, plan.tile_count, indices.clone());
+        let tiles = f64::from(plan.tile_count);
+        let sampling = self.sampling.clone();
+        let make = move || async move {
+            let _one = sampling.lock().await;
+            blocking(move || sample(engine.as_ref(), &work, (&indices, tiles), &metrics)).await
+        };
+        self.kept.get(key, make).await
+    }
+
+    /// Images of others, as they come.
+    async fn passed_on(&self, plan: &Arc<Assignment>, request: FetchImages) -> Result<Messages<Chunk>, Status> {
+        let id = SampleSetId { plan_epoch: plan.plan_epoch, index: request.set_index.into() };
+        let images = self.relay.images(plan, request.set_index).await?;
+        let (send, chunks) = mpsc::channel(CHUNKS_AHEAD);
+        tokio::spawn(pass_on(images, id, request.image_indices, send));
+        Ok(until_drained(Box::pin(ReceiverStream::new(chunks)), self.shutdown.clone()))
     }
 }
 
@@ -51,6 +79,9 @@ impl Sampler for SamplerService {
         let plan = self.plan.require(request.plan_epoch)?;
         let own = plan.images_of(self.plan.node_name(), request.set_index);
         if let Some(index) = request.image_indices.iter().find(|index| !own.contains(index)) {
+            if plan.relays(self.plan.node_name()) {
+                return self.passed_on(&plan, request).await;
+            }
             return Err(Status::invalid_argument(format!(
                 "image_indices: {index} is not sampled by {}",
                 self.plan.node_name()
@@ -66,15 +97,39 @@ impl Sampler for SamplerService {
     }
 }
 
+/// Until all have gone out, one fails, or nobody listens any more.
+async fn pass_on(
+    mut images: Messages<(u32, EncodedDepthImage)>,
+    id: SampleSetId,
+    wanted: Vec<u32>,
+    send: mpsc::Sender<Result<Chunk, Status>>,
+) {
+    while let Some(image) = images.next().await {
+        let chunks = match image {
+            Ok((index, _)) if !wanted.contains(&index) => continue,
+            Ok((index, image)) => split_into_chunks(id, index, image),
+            Err(status) => {
+                let _ = send.send(Err(status)).await;
+                return;
+            }
+        };
+        for chunk in chunks {
+            if send.send(Ok(chunk)).await.is_err() {
+                return;
+            }
+        }
+    }
+}
+
 /// `None` beyond the timeline.
 fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Option<SampleWork>, Status> {
-    let workload = &plan.workload;
-    if indices.iter().any(|&index| index as usize >= workload.sample_cameras.len()) {
+    let (workload, cameras) = (&plan.workload, plan.sampled_cameras());
+    if indices.iter().any(|&index| index as usize >= cameras.len()) {
         return Err(Status::internal("image_indices beyond the sample cameras"));
     }
     let work = |scene_time_s| SampleWork {
         scene_hash: workload.scene.hash.to_string(),
-        cameras: workload.sample_cameras.clone(),
+        cameras: cameras.clone(),
         wanted: indices.to_vec(),
         sampling: workload.sampling.clone(),
         method: workload.method.clone(),
@@ -89,7 +144,7 @@ fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Opt
 fn sample(
     engine: &dyn Engine,
     work: &SampleWork,
-    indices: &[u32],
+    (indices, tiles): (&[u32], f64),
     metrics: &NodeMetrics,
 ) -> Result<EncodedImages, Status> {
     let start = Instant::now();
@@ -106,6 +161,9 @@ fn sample(
     images.iter().for_each(|_| metrics.image_s.observe(image_s));
     metrics.images_sampled.inc_by(images.len() as u64);
     let encoded = indices.iter().zip(&images).map(encode).collect::<Result<Vec<_>, Status>>()?;
+    let whole_images = images.len() as f64 / tiles;
+    metrics.done.add(Operation::SampleImage, whole_images, start.elapsed().as_secs_f64());
+    metrics.done.encoded(whole_images, encoded.iter().map(|(_, image)| image.payload.len()).sum());
     tracing::debug!(
         images = images.len(),
         scene_time_s = work.scene_time_s,

@@ -63,6 +63,20 @@ impl Default for ReconstructionMethod {
     }
 }
 
+impl ReconstructionMethod {
+    /// With half the steps, or one level less deep; `None` where there are no fewer.
+    #[must_use]
+    pub fn with_fewer_steps(self) -> Option<Self> {
+        match self {
+            Self::LightFieldSearch { steps } => (steps > 1).then_some(Self::LightFieldSearch { steps: steps / 2 }),
+            Self::JointCarve { stop_level } => {
+                (stop_level < MAX_STOP_LEVEL).then_some(Self::JointCarve { stop_level: stop_level + 1 })
+            }
+            Self::Mesh | Self::HybridMesh { .. } => None,
+        }
+    }
+}
+
 /// Not the name of a method, or not a number it takes.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
@@ -139,6 +153,15 @@ mod tests {
         ] {
             assert!(name.parse::<ReconstructionMethod>().is_err(), "{name}");
         }
+    }
+
+    #[test]
+    fn fewer_steps_end_somewhere() {
+        let steps = |name: &str| {
+            let next = |method: &ReconstructionMethod| method.with_fewer_steps();
+            std::iter::successors(Some(name.parse::<ReconstructionMethod>().expect(name)), next).count()
+        };
+        assert_eq!((steps("light_field_search:100"), steps("joint_carve"), steps("mesh")), (7, 9, 1));
     }
 
     #[test]

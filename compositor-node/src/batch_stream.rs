@@ -1,0 +1,138 @@
+//! A stream whose every view is made.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use node::next_within;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tonic::{Code, Status};
+use wire::rpc::Messages;
+use wire::{RenderViews, RequestedView, SampleSetId};
+
+use crate::batch::{BatchKey, MAX_BATCH, Source, Waiting, Waits};
+use crate::outbox::Reply;
+use crate::quota::{Credit, closed};
+use crate::service::ClientStream;
+
+/// Pixels of one stream's views that wait or are not sent yet.
+const STREAM_PIXELS: u32 = 128 << 20;
+/// Views of one stream that wait or are not sent yet.
+const STREAM_VIEWS: u32 = 256;
+
+pub(crate) struct BatchStream<'a> {
+    client: &'a ClientStream,
+    reply: Reply,
+    credits: Arc<Semaphore>,
+}
+
+impl<'a> BatchStream<'a> {
+    pub(crate) fn new(client: &'a ClientStream, reply: Reply) -> Self {
+        Self { client, reply, credits: Arc::new(Semaphore::new(STREAM_PIXELS as usize)) }
+    }
+
+    pub(crate) async fn answer(self, first: RenderViews, mut requests: Messages<RenderViews>) -> Result<(), Status> {
+        let mut next = Some(first);
+        while let Some(request) = next {
+            if request.live.is_some() {
+                return Err(Status::invalid_argument("live: the stream's first request was not"));
+            }
+            self.enqueue(request).await?;
+            next = self.next(&mut requests).await?;
+        }
+        Ok(())
+    }
+
+    /// A client that waits for frames is not idle.
+    async fn next(&self, requests: &mut Messages<RenderViews>) -> Result<Option<RenderViews>, Status> {
+        loop {
+            match next_within(requests, self.client.shared.deadlines.idle, "views").await {
+                Err(status) if status.code() == Code::DeadlineExceeded && self.is_busy() => (),
+                next => return next,
+            }
+        }
+    }
+
+    /// Whether views are under way.
+    fn is_busy(&self) -> bool {
+        self.credits.available_permits() < STREAM_PIXELS as usize
+    }
+
+    /// Hands over a request's views in pieces of one batch, as far as there is credit.
+    async fn enqueue(&self, request: RenderViews) -> Result<(), Status> {
+        let (arrived, shared) = (Instant::now(), &self.client.shared);
+        let plan = shared.of_compositor(shared.plan.require(request.plan_epoch)?)?;
+        let (source, id, set_wait_s) = shared.source(&plan, request.set_index).await?;
+        for views in request.views.chunks(MAX_BATCH) {
+            let mut batch = Vec::with_capacity(views.len());
+            for view in views {
+                // What holds no credit yet must not keep back what does: at the bound, hand over first.
+                let credit = match self.try_credit(view, batch.is_empty())? {
+                    Some(credit) => credit,
+                    None => {
+                        self.hand_over(std::mem::take(&mut batch));
+                        self.credit(view).await?
+                    }
+                };
+                batch.push(self.waiting(&request, *view, (&source, id), (arrived, set_wait_s), credit));
+            }
+            self.hand_over(batch);
+        }
+        Ok(())
+    }
+
+    fn waiting(
+        &self,
+        request: &RenderViews,
+        view: RequestedView,
+        (source, sample_set_id): (&Source, SampleSetId),
+        (arrived, set_wait_s): (Instant, f64),
+        credit: Credit,
+    ) -> Waiting {
+        let key = BatchKey {
+            sample_set_id,
+            method: request.method.clone(),
+            planes: request.planes,
+            size_px: view.camera.size_px,
+        };
+        let waits = Waits::until_now(arrived, set_wait_s);
+        let (source, reply) = (source.clone(), self.reply.clone());
+        Waiting { key, source, view, codec: request.codec, waits, reply, credit }
+    }
+
+    /// None where it must wait for the stream's own views; an error where others have taken the node's room, and nothing
+    /// of this stream will make any.
+    fn try_credit(&self, view: &RequestedView, is_first: bool) -> Result<Option<Credit>, Status> {
+        let has_none = is_first && !self.is_busy();
+        let Ok(stream) = self.credits.clone().try_acquire_many_owned(price(view)) else {
+            return Ok(None);
+        };
+        match self.client.shared.quota.try_view(&view.camera) {
+            Ok(node) => Ok(Some(Credit { stream, _node: node })),
+            Err(refused) if has_none => {
+                self.client.shared.metrics.drop_view("node full");
+                Err(refused)
+            }
+            Err(_) => Ok(None),
+        }
+    }
+
+    async fn credit(&self, view: &RequestedView) -> Result<Credit, Status> {
+        let stream: OwnedSemaphorePermit =
+            self.credits.clone().acquire_many_owned(price(view)).await.map_err(closed)?;
+        Ok(Credit { stream, _node: self.client.shared.quota.view(&view.camera).await? })
+    }
+
+    fn hand_over(&self, batch: Vec<Waiting>) {
+        for Waiting { key, view, .. } in &batch {
+            tracing::debug!(stream = self.client.stream, frame = view.frame, set = %key.sample_set_id, "queued");
+        }
+        self.client.shared.arrivals.push(self.client.stream, batch);
+    }
+}
+
+/// What a view takes of its stream's pixels: at least so much that the views are bounded too, at most
+/// all, so that one view larger than the bound still passes, alone.
+fn price(view: &RequestedView) -> u32 {
+    let pixels = u32::try_from(view.camera.pixel_count()).unwrap_or(STREAM_PIXELS);
+    pixels.clamp(STREAM_PIXELS / STREAM_VIEWS, STREAM_PIXELS)
+}

@@ -1,0 +1,263 @@
+//! A stream that shows what a camera sees as it moves: the newest pose counts.
+//!
+//! A pose waits in three places: until its set is there, until its client has taken a frame, and for the device. In each
+//! there is one of a stream at most, and a newer one takes its place. A set that is being fetched is never given up for a
+//! newer one: where sets come slower than poses, every set that comes is shown, with the newest pose of it.
+
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::Instant;
+
+use node::next_within;
+use tokio::sync::Semaphore;
+use tonic::Status;
+use wire::rpc::Messages;
+use wire::{Assignment, LiveRequest, RenderViews, RequestedView, SampleSetId};
+
+use crate::arrivals::Viewer;
+use crate::batch::{BatchKey, Source, Waiting, Waits};
+use crate::outbox::Reply;
+use crate::quota::{Credit, closed};
+use crate::service::ClientStream;
+
+/// Frames that may be under way at once, until the client says that they have come: a third would only be older then.
+const CREDITS: usize = 2;
+
+/// What views of a set are made from, its name, and the seconds until it was there.
+type Loaded = (Source, SampleSetId, f64);
+type Work<T> = Pin<Box<dyn Future<Output = Result<T, Status>> + Send>>;
+
+/// A view that was asked for.
+struct Pose {
+    request: RenderViews,
+    view: RequestedView,
+    plan: Arc<Assignment>,
+    arrived: Instant,
+}
+
+impl Pose {
+    fn shows_set_of(&self, other: &Self) -> bool {
+        (self.plan.plan_epoch, self.request.set_index) == (other.plan.plan_epoch, other.request.set_index)
+    }
+}
+
+/// A pose whose set is there.
+struct Ready {
+    pose: Pose,
+    source: Source,
+    id: SampleSetId,
+    set_wait_s: f64,
+    /// Until there is room for it.
+    credit: Work<Credit>,
+}
+
+pub(crate) struct LiveStream<'a> {
+    client: &'a ClientStream,
+    reply: Reply,
+    credits: Arc<Semaphore>,
+    /// The newest pose, of a set that is not asked for yet.
+    newest: Option<Pose>,
+    /// A pose whose set is on its way.
+    loading: Option<(Pose, Work<Loaded>)>,
+    ready: Option<Ready>,
+    /// That it was opened for, or that has followed.
+    plan: Option<Arc<Assignment>>,
+    last_frame: Option<u64>,
+    _viewer: Viewer,
+}
+
+/// What comes next.
+enum Step {
+    Asked(Option<RenderViews>),
+    Loaded(Loaded),
+    Credited(Credit),
+}
+
+impl<'a> LiveStream<'a> {
+    pub(crate) fn new(client: &'a ClientStream, reply: Reply) -> Self {
+        client.outbox.set_live();
+        Self {
+            client,
+            reply,
+            credits: Arc::new(Semaphore::new(CREDITS)),
+            newest: None,
+            loading: None,
+            ready: None,
+            plan: None,
+            last_frame: None,
+            _viewer: client.shared.arrivals.viewer(),
+        }
+    }
+
+    pub(crate) async fn answer(
+        mut self,
+        first: RenderViews,
+        mut requests: Messages<RenderViews>,
+    ) -> Result<(), Status> {
+        let mut is_open = true;
+        self.take(first)?;
+        while is_open || self.newest.is_some() || self.loading.is_some() || self.ready.is_some() {
+            match self.step(&mut requests, is_open).await? {
+                Step::Asked(Some(request)) => self.take(request)?,
+                Step::Asked(None) => is_open = false,
+                Step::Loaded(set) => self.loaded(set),
+                Step::Credited(credit) => self.credited(credit),
+            }
+            self.go_on();
+        }
+        Ok(())
+    }
+
+    async fn step(&mut self, requests: &mut Messages<RenderViews>, is_open: bool) -> Result<Step, Status> {
+        let idle = self.client.shared.deadlines.idle;
+        let ready = self.ready.as_mut().map(|ready| &mut ready.credit);
+        let loading = self.loading.as_mut().map(|(_, work)| work);
+        tokio::select! {
+            biased;
+            asked = next_within(requests, idle, "poses"), if is_open => asked.map(Step::Asked),
+            set = of(loading) => set.map(Step::Loaded),
+            credit = of(ready) => credit.map(Step::Credited),
+        }
+    }
+
+    /// A request: what it acknowledges, and its pose, which takes the place of an older one of its set.
+    fn take(&mut self, request: RenderViews) -> Result<(), Status> {
+        let live = request.live.ok_or_else(|| Status::invalid_argument("live: the stream's first request was"))?;
+        self.client.outbox.acknowledge(live.acknowledged_frame);
+        let plan = self.plan_of(request.plan_epoch)?;
+        let Some(&view) = request.views.first() else {
+            return Ok(());
+        };
+        self.check_number(view.frame)?;
+        let pose = Pose { request, view, plan, arrived: Instant::now() };
+        self.note(&pose, &live);
+        let older = self.put(pose);
+        self.replaced(older);
+        self.go_on();
+        Ok(())
+    }
+
+    /// Where a pose of the same set waits, or else for its set to be asked for; gives the one whose place it takes.
+    fn put(&mut self, pose: Pose) -> Option<Pose> {
+        if self.ready.as_ref().is_some_and(|ready| ready.pose.shows_set_of(&pose)) {
+            let credit = self.credit(&pose.view);
+            let ready = self.ready.as_mut()?;
+            if ready.pose.view.camera.size_px != pose.view.camera.size_px {
+                ready.credit = credit;
+            }
+            return Some(std::mem::replace(&mut ready.pose, pose));
+        }
+        match &mut self.loading {
+            Some((loading, _)) if loading.shows_set_of(&pose) => Some(std::mem::replace(loading, pose)),
+            _ => self.newest.replace(pose),
+        }
+    }
+
+    fn note(&self, pose: &Pose, live: &LiveRequest) {
+        tracing::debug!(
+            stream = self.client.stream,
+            client = live.client_id,
+            frame = pose.view.frame,
+            plan_epoch = pose.plan.plan_epoch,
+            set_index = pose.request.set_index,
+            "asked"
+        );
+    }
+
+    fn check_number(&mut self, frame: u64) -> Result<(), Status> {
+        match self.last_frame.replace(frame) {
+            Some(last) if frame <= last => {
+                Err(Status::invalid_argument(format!("views.frame_number: {frame} comes after {last}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Nodes take a plan before clients hear of it. Until they do, they are served by the new one, where it shows the
+    /// same.
+    fn plan_of(&mut self, plan_epoch: u64) -> Result<Arc<Assignment>, Status> {
+        let shared = &self.client.shared;
+        let follows = |plan: &Arc<Assignment>| {
+            plan.plan_epoch > plan_epoch && self.plan.as_ref().is_some_and(|known| known.workload == plan.workload)
+        };
+        let plan = match shared.plan.in_force().filter(follows) {
+            Some(plan) => plan,
+            None => shared.plan.require(plan_epoch)?,
+        };
+        let plan = shared.of_compositor(plan)?;
+        self.plan = Some(plan.clone());
+        Ok(plan)
+    }
+
+    fn replaced(&self, older: Option<Pose>) {
+        if let Some(older) = older {
+            tracing::debug!(stream = self.client.stream, frame = older.view.frame, "replaced by a newer pose");
+            self.client.shared.metrics.drop_view("newer pose");
+        }
+    }
+
+    /// Asks for the newest pose's set, if no other is being asked for.
+    fn go_on(&mut self) {
+        if self.loading.is_some() {
+            return;
+        }
+        let Some(pose) = self.newest.take() else { return };
+        let (shared, plan, set_index) = (self.client.shared.clone(), pose.plan.clone(), pose.request.set_index);
+        let work = Box::pin(async move { shared.source(&plan, set_index).await });
+        self.loading = Some((pose, work));
+    }
+
+    fn loaded(&mut self, (source, id, set_wait_s): Loaded) {
+        let Some((pose, _)) = self.loading.take() else { return };
+        // It may have come after the set was asked for.
+        let set_wait_s = set_wait_s.min(pose.arrived.elapsed().as_secs_f64());
+        let ready = Ready { credit: self.credit(&pose.view), pose, source, id, set_wait_s };
+        let older = self.ready.replace(ready);
+        self.replaced(older.map(|ready| ready.pose));
+        self.take_place_of_waiting();
+    }
+
+    /// A view of this stream that still waits for the device gives up its place, and its credit.
+    fn take_place_of_waiting(&mut self) {
+        let same_price = |ready: &Ready, waiting: &Waiting| ready.pose.view.camera.size_px == waiting.key.size_px;
+        let waiting = self.client.shared.arrivals.withdraw(self.client.stream).pop_front();
+        let Some((waiting, ready)) = waiting.zip(self.ready.as_ref()) else { return };
+        tracing::debug!(stream = self.client.stream, frame = waiting.view.frame, "replaced by a newer pose");
+        self.client.shared.metrics.drop_view("newer pose");
+        if same_price(ready, &waiting) {
+            self.credited(waiting.credit);
+        }
+    }
+
+    fn credited(&mut self, credit: Credit) {
+        let Some(Ready { pose, source, id, set_wait_s, .. }) = self.ready.take() else { return };
+        let Pose { request, view, arrived, .. } = pose;
+        let key = BatchKey {
+            sample_set_id: id,
+            method: request.method,
+            planes: request.planes,
+            size_px: view.camera.size_px,
+        };
+        let waits = Waits::until_now(arrived, set_wait_s);
+        tracing::debug!(stream = self.client.stream, frame = view.frame, set = %id, "queued");
+        let waiting = Waiting { key, source, view, codec: request.codec, waits, reply: self.reply.clone(), credit };
+        self.client.shared.arrivals.push(self.client.stream, [waiting]);
+    }
+
+    fn credit(&self, view: &RequestedView) -> Work<Credit> {
+        let (credits, shared) = (self.credits.clone(), self.client.shared.clone());
+        let pixels = view.camera.pixel_count() as u64;
+        Box::pin(async move {
+            let stream = credits.acquire_owned().await.map_err(closed)?;
+            Ok(Credit { stream, _node: shared.quota.live_view(pixels).await? })
+        })
+    }
+}
+
+/// What is there to be waited for; else nothing, for ever.
+async fn of<T>(work: Option<&mut Work<T>>) -> Result<T, Status> {
+    match work {
+        Some(work) => work.await,
+        None => std::future::pending().await,
+    }
+}

@@ -1,0 +1,267 @@
+//! Finished frames of one stream on their way out.
+//!
+//! Frames lie here, not in the transport, until the client takes them: what a client does not take holds up nobody but
+//! itself, and can be taken away from it.
+
+use std::collections::VecDeque;
+use std::iter::Peekable;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use node::NodeMetrics;
+use tokio::sync::OwnedSemaphorePermit;
+use tokio_stream::Stream;
+use tokio_util::sync::CancellationToken;
+use tonic::Status;
+use wire::{FrameHeader, FramePart};
+
+use crate::quota::Credit;
+
+/// An encoded frame.
+pub(crate) struct Output {
+    pub(crate) frame: u64,
+    pub(crate) header: FrameHeader,
+    pub(crate) data: Bytes,
+    /// When its request came.
+    pub(crate) arrived: Instant,
+    pub(crate) credit: Credit,
+}
+
+/// The frame that is being sent.
+struct Current {
+    frame: u64,
+    parts: Peekable<Box<dyn Iterator<Item = FramePart> + Send>>,
+    credit: Credit,
+}
+
+#[derive(Default)]
+struct State {
+    ready: VecDeque<Output>,
+    current: Option<Current>,
+    /// Sent, but not acknowledged; of live streams only.
+    unacknowledged: VecDeque<(u64, OwnedSemaphorePermit)>,
+    /// Numbers must rise, and frames be acknowledged.
+    is_live: bool,
+    /// The last frame that was begun.
+    last: u64,
+    /// Since when the client could have taken something.
+    untaken_since: Option<Instant>,
+    /// How it ends once all has been sent.
+    end: Option<Result<(), Status>>,
+    waker: Option<Waker>,
+}
+
+/// Shared by whoever makes frames and the response that sends them.
+pub(crate) struct Outbox {
+    stream: u64,
+    metrics: NodeMetrics,
+    state: Mutex<State>,
+    gone: CancellationToken,
+}
+
+impl Outbox {
+    pub(crate) fn new(stream: u64, metrics: NodeMetrics) -> Arc<Self> {
+        Arc::new(Self { stream, metrics, state: Mutex::default(), gone: CancellationToken::new() })
+    }
+
+    fn locked(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// From here on numbers must rise, and frames be acknowledged.
+    pub(crate) fn set_live(&self) {
+        self.locked().is_live = true;
+    }
+
+    /// Whether the client has left.
+    pub(crate) fn is_gone(&self) -> bool {
+        self.gone.is_cancelled()
+    }
+
+    /// Resolves when the client leaves.
+    pub(crate) async fn gone(&self) {
+        self.gone.cancelled().await;
+    }
+
+    /// Resolves when the client has taken nothing for so long of what was ready.
+    pub(crate) async fn stalled(&self, deadline: Duration) {
+        loop {
+            let since = self.locked().untaken_since;
+            let left = deadline.saturating_sub(since.map_or(Duration::ZERO, |since| since.elapsed()));
+            if left.is_zero() {
+                return;
+            }
+            tokio::time::sleep(left).await;
+        }
+    }
+
+    /// Gives back the credit of all frames up to this one.
+    pub(crate) fn acknowledge(&self, frame: u64) {
+        let unacknowledged = &mut self.locked().unacknowledged;
+        while unacknowledged.front().is_some_and(|(sent, _)| *sent <= frame) {
+            unacknowledged.pop_front();
+        }
+    }
+
+    /// Ends the stream, after the frames that are ready.
+    pub(crate) fn end(&self, end: Result<(), Status>) {
+        let mut state = self.locked();
+        state.end.get_or_insert(end);
+        state.wake();
+    }
+
+    /// Ends the stream at once, whatever is ready.
+    pub(crate) fn cut(&self, status: Status) {
+        let mut state = self.locked();
+        self.drop_ready(&mut state, "client stalled");
+        (state.current, state.end) = (None, Some(Err(status)));
+        state.wake();
+    }
+
+    fn put(&self, output: Output) {
+        let mut state = self.locked();
+        if self.is_gone() || state.end.as_ref().is_some_and(Result::is_err) {
+            return self.metrics.drop_view("client gone");
+        }
+        state.untaken_since.get_or_insert_with(Instant::now);
+        state.ready.push_back(output);
+        state.wake();
+    }
+
+    fn drop_ready(&self, state: &mut State, reason: &'static str) {
+        state.ready.drain(..).for_each(|_| self.metrics.drop_view(reason));
+    }
+
+    fn next_part(&self, state: &mut State) -> Option<FramePart> {
+        while state.current.is_none() {
+            let output = state.ready.pop_front()?;
+            if state.is_live && output.frame <= state.last {
+                self.metrics.drop_view("overtaken");
+                continue;
+            }
+            state.last = output.frame;
+            state.current = Some(self.begin(output));
+        }
+        let current = state.current.as_mut()?;
+        let part = current.parts.next();
+        if current.parts.peek().is_none() {
+            let sent = state.current.take()?;
+            if state.is_live {
+                state.unacknowledged.push_back((sent.frame, sent.credit.stream));
+            }
+        }
+        part
+    }
+
+    /// From here on the frame is the transport's.
+    fn begin(&self, output: Output) -> Current {
+        let Output { frame, mut header, data, arrived, credit } = output;
+        header.stage_times = header.stage_times.leaving_after(arrived.elapsed().as_secs_f64());
+        tracing::debug!(
+            stream = self.stream,
+            frame,
+            set = %header.sample_set_id,
+            compositor_s = header.stage_times.compositor_s,
+            "sent"
+        );
+        let parts: Box<dyn Iterator<Item = FramePart> + Send> = Box::new(FramePart::cut(frame, header, data));
+        Current { frame, parts: parts.peekable(), credit }
+    }
+
+    fn poll(&self, cx: &Context<'_>) -> Poll<Option<Result<FramePart, Status>>> {
+        let mut state = self.locked();
+        let part = self.next_part(&mut state);
+        let is_left = state.current.is_some() || !state.ready.is_empty();
+        state.untaken_since = is_left.then(Instant::now);
+        if let Some(part) = part {
+            return Poll::Ready(Some(Ok(part)));
+        }
+        match &mut state.end {
+            None => {
+                state.waker = Some(cx.waker().clone());
+                Poll::Pending
+            }
+            Some(end) => Poll::Ready(std::mem::replace(end, Ok(())).err().map(Err)),
+        }
+    }
+
+    fn leave(&self) {
+        self.gone.cancel();
+        let mut state = self.locked();
+        self.drop_ready(&mut state, "client gone");
+        (state.current, state.unacknowledged) = (None, VecDeque::new());
+    }
+}
+
+impl State {
+    fn wake(&mut self) {
+        if let Some(waker) = self.waker.take() {
+            waker.wake();
+        }
+    }
+}
+
+/// The way to an outbox. With the last of its clones the stream ends.
+#[derive(Clone)]
+pub(crate) struct Reply(Arc<Closing>);
+
+struct Closing(Arc<Outbox>);
+
+impl Drop for Closing {
+    fn drop(&mut self) {
+        self.0.end(Ok(()));
+    }
+}
+
+impl Reply {
+    pub(crate) fn new(outbox: Arc<Outbox>) -> Self {
+        Self(Arc::new(Closing(outbox)))
+    }
+
+    pub(crate) fn outbox(&self) -> &Outbox {
+        &self.0.0
+    }
+
+    /// Which stream, in logs.
+    pub(crate) fn stream(&self) -> u64 {
+        self.outbox().stream
+    }
+
+    /// Waits for nobody: every frame has a credit.
+    pub(crate) fn send(&self, output: Result<Output, Status>) {
+        match output {
+            Ok(output) => self.outbox().put(output),
+            Err(status) => self.outbox().end(Err(status)),
+        }
+    }
+}
+
+/// A client's frames as messages.
+pub(crate) struct Outgoing(Arc<Outbox>);
+
+impl Outgoing {
+    pub(crate) fn new(outbox: Arc<Outbox>) -> Self {
+        Self(outbox)
+    }
+}
+
+impl Stream for Outgoing {
+    type Item = Result<FramePart, Status>;
+
+    fn poll_next(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Self::Item>> {
+        self.0.poll(cx)
+    }
+}
+
+impl Drop for Outgoing {
+    fn drop(&mut self) {
+        self.0.leave();
+    }
+}
+
+#[cfg(test)]
+#[path = "outbox_tests.rs"]
+mod tests;
