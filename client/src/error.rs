@@ -1,6 +1,6 @@
 //! What can go wrong for a client.
 
-use tonic::Status;
+use tonic::{Code, Status};
 
 /// Why views did not come.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -9,6 +9,12 @@ pub enum ClientError {
     #[error("coordinator: {reason}")]
     Coordinator {
         /// What it says.
+        reason: String,
+    },
+    /// There is no room: a quota, or all nodes' time. Others are not affected, and may be done later.
+    #[error("no room: {reason}")]
+    Exhausted {
+        /// Which quota, and whose.
         reason: String,
     },
     /// Nodes did not join in time.
@@ -63,6 +69,10 @@ pub enum ClientError {
 
 impl ClientError {
     pub(crate) fn coordinator(status: Status) -> Self {
-        Self::Coordinator { reason: status.message().to_owned() }
+        let reason = status.message().to_owned();
+        match status.code() {
+            Code::ResourceExhausted => Self::Exhausted { reason: format!("coordinator: {reason}") },
+            _ => Self::Coordinator { reason },
+        }
     }
 }

@@ -49,18 +49,7 @@ impl Expected {
         if due.came {
             return Err(unexpected("came twice".to_owned()));
         }
-        // Of whichever plan: the call that it came by has checked that.
-        if header.sample_set_id.index != u64::from(due.request.set_index) {
-            return Err(unexpected(format!(
-                "shows sample set {} in place of {}",
-                header.sample_set_id, due.request.set_index
-            )));
-        }
-        let planes =
-            ViewPlanes { inverse_depth: header.inverse_depth_bytes > 0, provenance: header.provenance_bytes > 0 };
-        if header.size_px != due.request.camera.size_px || planes != self.planes {
-            return Err(unexpected("has another size or other planes than asked for".to_owned()));
-        }
+        agrees(&due.request, self.planes, header).map_err(unexpected)?;
         due.came = true;
         self.left -= 1;
         Ok(due.request)
@@ -77,6 +66,21 @@ impl Expected {
         missing.truncate(8);
         Err(ClientError::Missing { count, first: missing })
     }
+}
+
+/// Whether a frame shows what was asked for, of whichever plan. Else says what is wrong with it.
+pub(crate) fn agrees(request: &ViewRequest, planes: ViewPlanes, header: &FrameHeader) -> Result<(), String> {
+    if header.sample_set_id.index != u64::from(request.set_index) {
+        return Err(format!("shows sample set {} in place of {}", header.sample_set_id, request.set_index));
+    }
+    let has = ViewPlanes { inverse_depth: header.inverse_depth_bytes > 0, provenance: header.provenance_bytes > 0 };
+    if header.size_px != request.camera.size_px || has != planes {
+        return Err("has another size or other planes than asked for".to_owned());
+    }
+    if header.camera != request.camera {
+        return Err("shows another pose than asked for".to_owned());
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -99,6 +103,7 @@ mod tests {
     fn header(index: u64) -> FrameHeader {
         FrameHeader {
             sample_set_id: SampleSetId { plan_epoch: 1, index },
+            camera: request(0).camera,
             size_px: [8, 8].into(),
             codec: FrameCodec::Lz4,
             color_bytes: 1,
@@ -113,9 +118,14 @@ mod tests {
     fn frames_come_once_and_from_their_own_set() {
         let mut expected = Expected::new([request(4), request(7)], ViewPlanes::default()).unwrap();
         expected.accept(4, &header(0)).unwrap();
-        for (frame, header, reason) in
-            [(4, header(0), "twice"), (5, header(0), "not asked"), (7, header(1), "sample set")]
-        {
+        let mut elsewhere = header(0);
+        elsewhere.camera.eye_in_world.x += 0.1;
+        for (frame, header, reason) in [
+            (4, header(0), "twice"),
+            (5, header(0), "not asked"),
+            (7, header(1), "sample set"),
+            (7, elsewhere, "another pose"),
+        ] {
             assert!(expected.accept(frame, &header).unwrap_err().to_string().contains(reason));
         }
         assert!(expected.finish().unwrap_err().to_string().contains("1 frames are missing: [7]"));

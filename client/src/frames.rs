@@ -17,13 +17,12 @@ use wire::{DecodeLimits, FrameAssembly, FrameHeader, FramePart, RenderViews, Req
 use crate::ClientError;
 use crate::expected::Expected;
 use crate::live::{Peer, State};
+use crate::plan_change::{lost_peer, successor};
 use crate::session::ViewRequest;
+use crate::trouble::Trouble;
 
 /// Decoded frames that the caller has not taken yet.
 const FRAMES_AHEAD: usize = 32;
-/// How long a plan whose compositor failed may take to be replaced: a host that is lost without a word is missed after
-/// 15 s.
-const PATIENCE: Duration = Duration::from_secs(20);
 /// How long a compositor may be silent while frames are due: samplers on slow devices take minutes.
 const SILENCE: Duration = Duration::from_secs(600);
 
@@ -112,6 +111,10 @@ struct Line {
 }
 
 impl Line {
+    fn is_due(&self, frame: u64) -> bool {
+        self.outstanding.lock().unwrap_or_else(PoisonError::into_inner).contains(&frame)
+    }
+
     fn still_due(&self, requests: &[ViewRequest]) -> Vec<ViewRequest> {
         let outstanding = self.outstanding.lock().unwrap_or_else(PoisonError::into_inner);
         requests.iter().filter(|request| outstanding.contains(&request.frame)).copied().collect()
@@ -129,59 +132,69 @@ impl Line {
 
 /// Why a call ended before its frames had come.
 #[derive(Debug)]
-enum Failure {
+pub(crate) enum Failure {
     /// The plan may be on its way out: its successor is asked for what is missing.
     OfPlan(ClientError),
     /// Another plan would fail as well.
     OfRequest(ClientError),
+    /// This compositor has no room.
+    Exhausted(ClientError),
 }
 
 impl Failure {
-    fn of(peer: &Peer, status: &tonic::Status) -> Self {
+    /// Others are asked first from now on.
+    pub(crate) fn of_peer(peer: &Peer, error: ClientError) -> Self {
+        peer.suspicion.raise();
+        Self::OfPlan(error)
+    }
+
+    pub(crate) fn of(peer: &Peer, status: &tonic::Status) -> Self {
         let error = peer.error(status.message());
         match status.code() {
-            Code::InvalidArgument
-            | Code::OutOfRange
-            | Code::NotFound
-            | Code::Unimplemented
-            | Code::ResourceExhausted => Self::OfRequest(error),
-            _ => Self::OfPlan(error),
+            Code::InvalidArgument | Code::NotFound | Code::Unimplemented => Self::OfRequest(error),
+            Code::ResourceExhausted => Self::Exhausted(ClientError::Exhausted { reason: error.to_string() }),
+            // Of which plan is in force it knows better; anything else may be its own fault.
+            Code::FailedPrecondition => {
+                peer.learn(status);
+                Self::OfPlan(error)
+            }
+            _ => Self::of_peer(peer, error),
         }
     }
 }
 
 /// Asks for all frames, and after a fault for those that are missing, of whatever plan is in force by then.
 async fn deliver(mut state: watch::Receiver<State>, template: RenderViews, requests: Vec<ViewRequest>, line: Line) {
+    let mut trouble = Trouble::new(requests.len());
     loop {
         let live = state.borrow_and_update().live.clone();
         let due = line.still_due(&requests);
         if due.is_empty() {
             return;
         }
-        let plan_epoch = live.plan.assignment.plan_epoch;
-        let template = RenderViews { plan_epoch, ..template.clone() };
-        let error = match call_all(&live.peers, &template, &due, &line).await {
+        let plan_epoch = live.plan_epoch();
+        let mut template = RenderViews { plan_epoch, ..template.clone() };
+        if template.method.is_empty() {
+            template.method.clone_from(&live.plan.assignment.workload.method);
+        }
+        let peers = live.trusted();
+        let ended = tokio::select! {
+            ended = call_all(&peers, &template, &due, &line) => ended,
+            lost = lost_peer(state.clone(), plan_epoch, &peers) => Err(Failure::OfPlan(lost)),
+        };
+        let error = match ended {
             // What has not come then is missing.
             Ok(()) => return,
-            Err(Failure::OfRequest(error)) => error,
-            Err(Failure::OfPlan(error)) => match successor(&mut state, plan_epoch, error).await {
-                None => continue,
-                Some(error) => error,
+            Err(Failure::OfRequest(error) | Failure::Exhausted(error)) => error,
+            Err(Failure::OfPlan(error)) => match trouble.pause(line.still_due(&requests).len()) {
+                None => error,
+                Some(pause) => match successor(&mut state, plan_epoch, pause, error).await {
+                    None => continue,
+                    Some(error) => error,
+                },
             },
         };
         return line.pass(Err(error)).await;
-    }
-}
-
-/// Waits for a later plan; else says why there is none.
-async fn successor(state: &mut watch::Receiver<State>, plan_epoch: u64, error: ClientError) -> Option<ClientError> {
-    let later = |state: &State| state.ended.is_some() || state.live.plan.assignment.plan_epoch > plan_epoch;
-    match tokio::time::timeout(PATIENCE, state.wait_for(later)).await {
-        Ok(Ok(state)) => {
-            let reason = state.ended.as_ref()?;
-            Some(ClientError::Ended { reason: format!("{reason} ({error})") })
-        }
-        _ => Some(error),
     }
 }
 
@@ -193,7 +206,7 @@ async fn call_all(
     line: &Line,
 ) -> Result<(), Failure> {
     let mut calls = JoinSet::new();
-    for (peer, requests) in peers.iter().zip(spread(template, requests, peers.len())) {
+    for (peer, requests) in peers.iter().zip(spread(template, requests, &weights(peers))) {
         if !requests.is_empty() {
             calls.spawn(receive_all(peer.clone(), requests, line.clone()));
         }
@@ -205,12 +218,20 @@ async fn call_all(
     Ok(())
 }
 
-/// The requests of each compositor: of every run of one set an even, contiguous share.
-fn spread(template: &RenderViews, requests: &[ViewRequest], peers: usize) -> Vec<Vec<RenderViews>> {
-    let mut spread = vec![Vec::new(); peers];
+/// How many views each compositor should make of many; all alike where the plan does not say.
+fn weights(peers: &[Peer]) -> Vec<u64> {
+    let weights: Vec<u64> = peers.iter().map(|peer| peer.share.view_weight.into()).collect();
+    if weights.iter().all(|&weight| weight == 0) { vec![1; peers.len()] } else { weights }
+}
+
+/// The requests of each compositor: of every run of one set a contiguous share in proportion to its weight.
+fn spread(template: &RenderViews, requests: &[ViewRequest], weights: &[u64]) -> Vec<Vec<RenderViews>> {
+    let mut spread = vec![Vec::new(); weights.len()];
     for run in requests.chunk_by(|a, b| a.set_index == b.set_index) {
-        for (peer, of_peer) in spread.iter_mut().enumerate() {
-            let share = &run[peer * run.len() / peers..(peer + 1) * run.len() / peers];
+        let mut before = 0;
+        for (of_peer, weight) in spread.iter_mut().zip(weights) {
+            let share = &run[part_of(run.len(), before, weights)..part_of(run.len(), before + weight, weights)];
+            before += weight;
             for views in share.chunks(MAX_VIEWS_PER_REQUEST) {
                 let requested =
                     views.iter().map(|view| RequestedView { frame: view.frame, camera: view.camera }).collect();
@@ -221,6 +242,13 @@ fn spread(template: &RenderViews, requests: &[ViewRequest], peers: usize) -> Vec
     spread
 }
 
+/// Where a share begins, or ends, that so much weight comes before.
+fn part_of(count: usize, before: u64, weights: &[u64]) -> usize {
+    let all: u64 = weights.iter().sum();
+    // Rounded to the nearest: of few views the faster nodes get more.
+    ((count as u64 * before + all / 2) / all.max(1)) as usize
+}
+
 async fn receive_all(peer: Peer, requests: Vec<RenderViews>, line: Line) -> Result<(), Failure> {
     let plan_epoch = requests.first().map(|request| request.plan_epoch);
     let mut parts =
@@ -229,7 +257,12 @@ async fn receive_all(peer: Peer, requests: Vec<RenderViews>, line: Line) -> Resu
     let mut decoding = JoinSet::new();
     while let Some(frame) = next_frame(&mut parts, &mut assembly, &peer).await? {
         if Some(frame.header.sample_set_id.plan_epoch) != plan_epoch {
-            return Err(Failure::OfPlan(peer.error(format!("sent a frame of set {}", frame.header.sample_set_id))));
+            let sent = format!("sent a frame of set {}", frame.header.sample_set_id);
+            return Err(Failure::of_peer(&peer, peer.error(sent)));
+        }
+        if !line.is_due(frame.frame) {
+            let sent = format!("sent frame {}, which was not asked for or has come", frame.frame);
+            return Err(Failure::of_peer(&peer, peer.error(sent)));
         }
         let Ok(decoder) = line.decoders.clone().acquire_owned().await else {
             break;
@@ -247,12 +280,12 @@ async fn receive_all(peer: Peer, requests: Vec<RenderViews>, line: Line) -> Resu
 }
 
 /// The next whole frame; `None` at the stream's end.
-async fn next_frame(
+pub(crate) async fn next_frame(
     parts: &mut Messages<FramePart>,
     assembly: &mut FrameAssembly,
     peer: &Peer,
 ) -> Result<Option<WholeFrame>, Failure> {
-    let corrupt = |error: wire::WireError| Failure::OfPlan(peer.error(error));
+    let corrupt = |error: wire::WireError| Failure::of_peer(peer, peer.error(error));
     while let Some(part) = next_part(parts, peer).await? {
         if let Some(frame) = assembly.push(part).map_err(corrupt)? {
             return Ok(Some(frame));
@@ -265,7 +298,7 @@ async fn next_frame(
 async fn next_part(parts: &mut Messages<FramePart>, peer: &Peer) -> Result<Option<FramePart>, Failure> {
     match tokio::time::timeout(SILENCE, parts.next()).await {
         Ok(part) => part.transpose().map_err(|status| Failure::of(peer, &status)),
-        Err(_) => Err(Failure::OfPlan(peer.error(format!("no frame came for {} s", SILENCE.as_secs())))),
+        Err(_) => Err(Failure::of_peer(peer, peer.error(format!("no frame came for {} s", SILENCE.as_secs())))),
     }
 }
 

@@ -7,7 +7,13 @@ mod error;
 mod expected;
 mod frames;
 mod live;
+mod live_stream;
+mod live_view;
+mod places;
+mod plan_change;
+mod poses;
 mod session;
+mod trouble;
 
 use std::time::Duration;
 
@@ -17,6 +23,7 @@ use wire::{ClusterStatus, SessionEvent, SessionRequest};
 
 pub use error::ClientError;
 pub use frames::{Frame, Frames};
+pub use live_view::{LiveFrame, LiveTimes, LiveView};
 pub use session::{Session, ViewRequest};
 
 /// A connection to a coordinator.

@@ -1,18 +1,22 @@
 //! A session: a plan, and views asked of its compositors.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use depth_image::{PinholeCamera, ViewPlanes};
-use tokio::sync::watch;
-use tokio::task::JoinHandle;
+use tokio::sync::{mpsc, watch};
+use tokio::task::JoinSet;
 use tokio_stream::StreamExt as _;
 use wire::rpc::{CoordinatorClient, Messages};
-use wire::{FrameCodec, SessionEvent, SessionPlan, SessionRequest};
+use wire::{ChangeSession, FrameCodec, SessionEvent, SessionPlan, SessionRequest};
 
 use crate::ClientError;
 use crate::expected::Expected;
 use crate::frames::Frames;
-use crate::live::{Live, State, follow};
+use crate::live::{Live, State, follow, learn};
+use crate::live_view::LiveView;
+
+/// Plans that compositors have named and nobody has looked at.
+const PLANS_LEARNED: usize = 4;
 
 /// One view.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,13 +35,10 @@ pub struct Session {
     codec: FrameCodec,
     planes: ViewPlanes,
     state: watch::Receiver<State>,
-    following: JoinHandle<()>,
-}
-
-impl Drop for Session {
-    fn drop(&mut self) {
-        self.following.abort();
-    }
+    /// Dropped with the session.
+    _following: JoinSet<()>,
+    coordinator: CoordinatorClient,
+    request: Arc<Mutex<SessionRequest>>,
 }
 
 impl Session {
@@ -52,10 +53,30 @@ impl Session {
             .parse()
             .map_err(|error| ClientError::Invalid { field: "codec", reason: format!("{error}") })?;
         let mut events = coordinator.open_session(request.clone()).await.map_err(ClientError::coordinator)?;
-        let live = Arc::new(Live::reach(plan_of(&mut events, progress).await?).await?);
-        let (says, state) = watch::channel(State { live, ended: None });
-        let following = tokio::spawn(follow(coordinator.clone(), request, events, says));
-        Ok(Self { codec, planes, state, following })
+        let (session, plan) = plan_of(&mut events, progress).await?;
+        let (learned, learning) = mpsc::channel(PLANS_LEARNED);
+        let live = Arc::new(Live::reach(plan, &learned).await?);
+        let (says, state) = watch::channel(State { session, live, ended: None });
+        let request = Arc::new(Mutex::new(request));
+        let mut following = JoinSet::new();
+        following.spawn(learn(learning, says.clone()));
+        following.spawn(follow(coordinator.clone(), request.clone(), events, says));
+        Ok(Self { codec, planes, state, _following: following, coordinator: coordinator.clone(), request })
+    }
+
+    /// Asks for another number of views a set, or another rate, from now on; plans follow.
+    ///
+    /// # Errors
+    /// The coordinator's; a session that has ended.
+    pub async fn change(&self, views_per_set: u32, frames_per_s: f64) -> Result<(), ClientError> {
+        let session = self.state.borrow().session;
+        let change = ChangeSession { session, views_per_set, frames_per_s };
+        {
+            // What is asked for when the coordinator comes back, too.
+            let mut request = self.request.lock().unwrap_or_else(PoisonError::into_inner);
+            (request.views_per_set, request.frames_per_s) = (views_per_set.max(1), frames_per_s);
+        }
+        self.coordinator.change_session(change).await.map_err(ClientError::coordinator)
     }
 
     /// The plan in force, its costs and its reason. It changes as nodes come and go.
@@ -76,8 +97,7 @@ impl Session {
     /// # Errors
     /// For frame numbers given twice, sets beyond the timeline, bad cameras, and a session that has ended.
     pub fn render_views(&self, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
-        let method = self.state.borrow().live.plan.assignment.workload.method.clone();
-        self.render_views_by(&method, requests)
+        self.ask(None, requests)
     }
 
     /// As [`Session::render_views`], by another method.
@@ -85,6 +105,11 @@ impl Session {
     /// # Errors
     /// As there.
     pub fn render_views_by(&self, method: &str, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
+        self.ask(Some(method), requests)
+    }
+
+    /// By the method of whatever plan is in force, unless one is given.
+    fn ask(&self, method: Option<&str>, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
         let live = self.state.borrow().live.clone();
         if let Some(reason) = self.ended() {
             return Err(ClientError::Ended { reason });
@@ -94,16 +119,24 @@ impl Session {
         let template = wire::RenderViews {
             plan_epoch: live.plan.assignment.plan_epoch,
             set_index: 0,
-            method: method.to_owned(),
+            method: method.unwrap_or_default().to_owned(),
             codec: self.codec,
             planes: self.planes,
             views: Vec::new(),
+            live: None,
         };
         Ok(Frames::start(self.state.clone(), template, requests, expected))
     }
+
+    /// Frames of a camera that moves, by the session's own method: one long stream to one compositor, of which the newest
+    /// pose counts.
+    #[must_use]
+    pub fn live(&self) -> LiveView {
+        LiveView::start(self.state.clone(), self.codec, self.planes)
+    }
 }
 
-fn check(request: &ViewRequest, live: &Live) -> Result<(), ClientError> {
+pub(crate) fn check(request: &ViewRequest, live: &Live) -> Result<(), ClientError> {
     let camera_error = |error: depth_image::CameraError| ClientError::Invalid {
         field: "camera",
         reason: format!("frame {}: {error}", request.frame),
@@ -117,13 +150,15 @@ fn check(request: &ViewRequest, live: &Live) -> Result<(), ClientError> {
 async fn plan_of(
     events: &mut Messages<SessionEvent>,
     mut progress: impl FnMut(&SessionEvent),
-) -> Result<SessionPlan, ClientError> {
+) -> Result<(u64, SessionPlan), ClientError> {
+    let mut number = 0;
     while let Some(event) = events.next().await {
         let event = event.map_err(ClientError::coordinator)?;
         progress(&event);
         match event {
+            SessionEvent::Opened { session } => number = session,
             SessionEvent::Progress { .. } => (),
-            SessionEvent::Plan(plan) => return Ok(*plan),
+            SessionEvent::Plan(plan) => return Ok((number, *plan)),
             SessionEvent::Ended { reason } => return Err(ClientError::Ended { reason }),
         }
     }
