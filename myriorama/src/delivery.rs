@@ -4,9 +4,13 @@ use std::time::Instant;
 
 use client::{Client, Frame, Session, ViewRequest};
 use depth_image::{PinholeCamera, ViewPlanes};
-use wire::{PolicyChoice, SessionPlan, SessionRequest, Timeline};
+use reconstruction::ReconstructionMethod;
+use render::Lighting;
+use sampling::SamplingMethod;
+use wire::{OfferSettings, OfferStatus, PolicyChoice, Quality, SessionPlan, SessionRequest, Timeline};
 
 use crate::exit::BadInput;
+use crate::fallbacks;
 
 /// How views shall come about.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,10 +27,54 @@ pub struct Wishes {
     pub policy: PolicyChoice,
     /// Planes beside colour.
     pub planes: ViewPlanes,
+    /// Tiles of a sample image; `None`: as many as are predicted to be fastest.
+    pub tiles: Option<u32>,
     /// Steps in which the light of a static scene grows; 1 for all of it at once.
     pub refinement_steps: u32,
+    /// Pictures a second; 0: as fast as they come.
+    pub frames_per_s: f64,
+    /// What the session makes do with under overload.
+    pub fallbacks: Vec<Quality>,
     /// Scene times; every set has the same views.
     pub timeline: Timeline,
+}
+
+impl Wishes {
+    /// Finished pictures of a still scene, without other planes, by whatever is predicted to be fastest.
+    #[must_use]
+    pub fn new(method: String, sampling: String, lighting: String) -> Self {
+        Self {
+            method,
+            sampling,
+            lighting,
+            codec: "lz4".to_owned(),
+            policy: PolicyChoice::Auto,
+            planes: ViewPlanes::default(),
+            tiles: None,
+            refinement_steps: 1,
+            frames_per_s: 0.0,
+            fallbacks: Vec::new(),
+            timeline: Timeline::still(0.0),
+        }
+    }
+
+    /// The same, as the coordinator offers its scene.
+    #[must_use]
+    pub fn offered(offer: &OfferStatus) -> Self {
+        let or = |offered: &str, default: String| if offered.is_empty() { default } else { offered.to_owned() };
+        let OfferSettings { method, sampling, lighting } = &offer.settings;
+        Self::new(
+            or(method, ReconstructionMethod::default().to_string()),
+            or(sampling, SamplingMethod::default().to_string()),
+            or(lighting, Lighting::default().to_string()),
+        )
+    }
+
+    /// So many pictures a second, or fewer under overload, after all else that can be given up.
+    #[must_use]
+    pub fn at_rate(self, frames_per_s: f64) -> Self {
+        Self { frames_per_s, fallbacks: fallbacks::ladder(&self.lighting, &self.method), ..self }
+    }
 }
 
 /// Views that came.
@@ -62,6 +110,9 @@ pub async fn open(client: &Client, wishes: &Wishes, views: &[PinholeCamera]) -> 
         policy: wishes.policy,
         forced_sampler_count: None,
         refinement_steps: wishes.refinement_steps,
+        frames_per_s: wishes.frames_per_s,
+        fallbacks: wishes.fallbacks.clone(),
+        forced_tile_count: wishes.tiles,
     };
     let told = |event: &_| tracing::info!(?event, "session");
     Ok(client.open_session(request, told).await?)

@@ -52,6 +52,7 @@ fn invalid(field: &'static str, reason: impl ToString) -> EngineError {
 fn render_error(error: RenderError) -> EngineError {
     match error {
         RenderError::Camera { .. } => invalid("camera", error),
+        RenderError::Gpu(GpuError::Lost(reason)) => EngineError::Lost(reason),
         _ => device(error),
     }
 }
@@ -61,6 +62,7 @@ fn reconstruction_error(error: ReconstructionError) -> EngineError {
         ReconstructionError::Camera { .. } => invalid("camera", error),
         ReconstructionError::Sample { .. } | ReconstructionError::SampleCount(_) => invalid("sample_images", error),
         ReconstructionError::Volume => invalid("volume", error),
+        ReconstructionError::Gpu(GpuError::Lost(reason)) => EngineError::Lost(reason),
         _ => device(error),
     }
 }
@@ -202,6 +204,10 @@ impl Engine for GpuEngine {
 
     fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError> {
         Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.is_chained())
+    }
+
+    fn samples_alone(&self, sampling: &str) -> Result<bool, EngineError> {
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.leave_out().is_none())
     }
 
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use client::{Client, Frame};
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::PinholeCamera;
 use glam::UVec2;
 use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
@@ -106,15 +106,11 @@ impl Experiment {
     /// The cluster's.
     pub fn deliver(&self, wish: Wish, arrived: impl FnMut(&Frame)) -> anyhow::Result<Delivered> {
         let run = self.runs.replace(self.runs.get() + 1);
+        let (method, sampling) = (wish.method.to_string(), self.args.sampling.to_string());
         let wishes = Wishes {
-            method: wish.method.to_string(),
-            sampling: self.args.sampling.to_string(),
-            lighting: wish.lighting.to_string(),
-            codec: "lz4".to_owned(),
             policy: wish.policy,
-            planes: ViewPlanes::default(),
-            refinement_steps: 1,
             timeline: Timeline { set_count: wish.sets, ..Timeline::still(f64::from(run) * RUN_STEP_S) },
+            ..Wishes::new(method, sampling, wish.lighting.to_string())
         };
         let views = self.views(wish.views)?;
         self.runtime.block_on(async {

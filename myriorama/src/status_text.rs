@@ -1,11 +1,11 @@
 //! A cluster's state as a table: nodes, roles, costs, and why.
 
 use study::{Cell, Table};
-use wire::{ClusterStatus, NodeStatus};
+use wire::{ClusterStatus, Costs, NodeStatus};
 
 use crate::text_table;
 
-const COLUMNS: [(&str, &str); 9] = [
+const COLUMNS: [(&str, &str); 12] = [
     ("node", ""),
     ("roles", ""),
     ("plan", ""),
@@ -14,6 +14,9 @@ const COLUMNS: [(&str, &str); 9] = [
     ("c", "ms"),
     ("d", "ms"),
     ("e", "ms"),
+    ("busy", "%"),
+    ("views", ""),
+    ("dropped", ""),
     ("device", ""),
 ];
 
@@ -30,7 +33,19 @@ pub fn text(status: &ClusterStatus) -> anyhow::Result<String> {
         .plan
         .as_ref()
         .map_or_else(|| "No plan: nobody has asked for views.".to_owned(), |plan| plan.reason.clone());
-    Ok(format!("{}\n\n{why}", text_table::text(&table)))
+    Ok(format!("{}\n\n{why}\n{}", text_table::text(&table), achieved(status)))
+}
+
+/// What each policy took that has been in force, and whether nodes have time left.
+fn achieved(status: &ClusterStatus) -> String {
+    let mut lines: Vec<String> =
+        status.achieved.iter().map(|a| format!("Achieved by {}: {:.3} ms a set.", a.policy, a.busy_s * 1e3)).collect();
+    if status.utilisation > 0.0 {
+        let fallback = status.plan.as_ref().map_or(0, |plan| plan.fallback_number);
+        let quality = if fallback > 0 { format!("fallback {fallback}") } else { "all that was asked for".to_owned() };
+        lines.push(format!("Sessions take {:.0} % of the nodes' time and get {quality}.", status.utilisation * 100.0));
+    }
+    lines.join("\n")
 }
 
 fn headline(status: &ClusterStatus) -> String {
@@ -45,20 +60,16 @@ fn headline(status: &ClusterStatus) -> String {
 fn row(status: &ClusterStatus, node: &NodeStatus) -> Vec<Cell> {
     let condition = status.conditions.iter().find(|condition| condition.node_name == node.node_name);
     let plan = condition.map_or("-", |condition| if condition.is_ready { "ready" } else { "not yet" });
-    let costs = condition.map(|condition| {
-        let costs = condition.costs;
-        let seconds = [
-            costs.sample_image_s,
-            costs.direct_view_s,
-            costs.reconstruct_view_s,
-            costs.load_set_s,
-            costs.encode_view_s,
-        ];
-        seconds.map(|s| Cell::from(s * 1e3))
+    let figures = condition.map(|condition| {
+        let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, .. } =
+            condition.costs;
+        let times_ms = [sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s].map(|s| s * 1e3);
+        let counts = [condition.busy_ratio * 100.0, condition.views as f64, condition.dropped_views as f64];
+        times_ms.into_iter().chain(counts).map(Cell::from).collect()
     });
     let head = [node.node_name.clone().into(), roles(status, &node.node_name).into(), plan.into()];
-    let costs = costs.map_or_else(|| vec![Cell::Missing; 5], Vec::from);
-    head.into_iter().chain(costs).chain([node.device_name.clone().into()]).collect()
+    let figures = figures.unwrap_or_else(|| vec![Cell::Missing; 8]);
+    head.into_iter().chain(figures).chain([node.device_name.clone().into()]).collect()
 }
 
 fn roles(status: &ClusterStatus, name: &str) -> String {

@@ -21,6 +21,7 @@ fn help_teaches_every_command() {
         assert!(myriorama(&[command, "--help"]).status.success(), "{command} --help");
     }
     assert!(text.contains("Examples:") && text.contains("Exit status:"));
+    assert!(myriorama(&["bench", "scaling", "--help"]).status.success(), "bench scaling --help");
     assert!(String::from_utf8_lossy(&myriorama(&["--version"]).stdout).starts_with("myriorama "));
 }
 
@@ -32,7 +33,8 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
     let cameras = folder.path().join("cameras.json");
     std::fs::write(&cameras, b"{\"frames\": [{}]}").unwrap();
     let (broken, cameras) = (broken.to_str().unwrap(), cameras.to_str().unwrap());
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 9] = [
+        (&["bench", "scaling", "--quota", "0"], "0.01 to 64"),
         (&["demo", "--scene", "/nowhere/absent.glb"], "absent.glb"),
         (&["up", "--scene", broken], "broken.glb"),
         (&["coordinator", "--scene", broken], "broken.glb"),

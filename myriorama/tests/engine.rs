@@ -16,7 +16,7 @@ use myriorama::setup::{SceneArgs, Setup};
 use myriorama::sizes::SizePx;
 use node::{DirectWork, Engine as _, EngineError, SampleWork, ViewWork};
 use reconstruction::ReconstructionMethod;
-use wire::{PolicyChoice, Timeline};
+use wire::PolicyChoice;
 
 const VIEW_SIZE: UVec2 = UVec2::new(64, 48);
 
@@ -129,15 +129,11 @@ fn a_cluster_gives_what_one_engine_gives() {
         let client = cluster.client().await.unwrap();
         let offer = client.status().await.unwrap().offer.unwrap();
         assert_eq!((offer.sample_cameras, offer.settings), (setup.offer.rig.clone(), setup.offer.settings.clone()));
+        let (method, sampling) = (args.method.to_string(), args.sampling.to_string());
         let wishes = Wishes {
-            method: args.method.to_string(),
-            sampling: args.sampling.to_string(),
-            lighting: args.lighting.to_string(),
-            codec: "lz4".to_owned(),
             policy: PolicyChoice::Pipeline,
             planes: ALL_PLANES,
-            timeline: Timeline::still(0.0),
-            refinement_steps: 1,
+            ..Wishes::new(method, sampling, args.lighting.to_string())
         };
         let session = open(&client, &wishes, &truth.cameras).await.unwrap();
         let delivered = receive(&session, &truth.cameras, |_| ()).await.unwrap();

@@ -182,6 +182,16 @@ impl Table {
         }
         writer.into_inner().map_err(|error| csv::Error::from(error.into_error()).into())
     }
+
+    /// As it stands in a Markdown page, rounded as on paper.
+    #[must_use]
+    pub fn to_markdown(&self) -> String {
+        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let heads = line(self.columns.iter().map(Column::heading).collect());
+        let rule = format!("|{}\n", "---|".repeat(self.columns.len()));
+        let rows: String = self.rows.iter().map(|row| line(row.iter().map(Cell::display).collect())).collect();
+        format!("**{}**\n\n{heads}{rule}{rows}", self.name)
+    }
 }
 
 #[cfg(test)]
@@ -195,6 +205,13 @@ mod tests {
         table.push(["none".into(), f64::NAN.into()]).unwrap();
         let text = String::from_utf8(table.to_csv().unwrap()).unwrap();
         assert_eq!(text, "what,time (ms)\n\"a, \"\"b\"\"\",1.2345678\nnone,\n");
+    }
+
+    #[test]
+    fn tables_read_as_markdown() {
+        let mut table = Table::new("Times", &[("P", ""), ("T", "s")]);
+        table.push([2_u32.into(), 1.5.into()]).unwrap();
+        assert_eq!(table.to_markdown(), "**Times**\n\n| P | T (s) |\n|---|---|\n| 2 | 1.5 |\n");
     }
 
     #[test]

@@ -29,6 +29,12 @@ pub struct CoordinatorArgs {
     /// Writes all that happens to the schedule here, for `myriorama replay`
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Say by gRPC reflection what services and messages there are, as grpcurl asks
+    #[arg(long)]
+    reflection: bool,
+    /// Sessions that may be open at once; more are refused
+    #[arg(long, value_name = "N", default_value_t = CoordinatorConfig::default().max_sessions)]
+    max_sessions: usize,
     /// Serve without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
@@ -53,7 +59,12 @@ async fn serve(args: CoordinatorArgs, setup: Setup) -> anyhow::Result<Outcome> {
     );
     let Setup { offer, .. } = setup;
     let shutdown = CancellationToken::new();
-    let config = CoordinatorConfig { insecure_bind: args.insecure_bind, ..CoordinatorConfig::default() };
+    let config = CoordinatorConfig {
+        insecure_bind: args.insecure_bind,
+        reflection: args.reflection,
+        max_sessions: args.max_sessions,
+        ..CoordinatorConfig::default()
+    };
     let log = args.record.as_deref().map(event_log).transpose()?;
     let telemetry = Telemetry::default();
     let metrics = CoordinatorMetrics::new(&telemetry);

@@ -4,7 +4,7 @@ use std::net::{SocketAddr, UdpSocket};
 use std::path::PathBuf;
 
 use clap::Args;
-use node::{Engine as _, NodeConfig, NodeMetrics, Telemetry};
+use node::{Engine as _, NodeConfig, NodeMetrics, Quotas, Telemetry};
 use tokio_util::sync::CancellationToken;
 
 use crate::cli::DeviceArgs;
@@ -35,9 +35,34 @@ pub struct NodeArgs {
     /// Where Prometheus reads what it counts, at /metrics
     #[arg(long, value_name = "HOST:PORT")]
     metrics: Option<SocketAddr>,
+    /// Say by gRPC reflection what services and messages there are, as grpcurl asks
+    #[arg(long)]
+    reflection: bool,
+    #[command(flatten)]
+    quotas: QuotaArgs,
     /// Serve without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
+}
+
+/// What it takes on for all its clients together; what is beyond is refused.
+#[derive(Debug, Clone, Copy, Args)]
+struct QuotaArgs {
+    /// Clients' streams that may be open
+    #[arg(long, value_name = "N", default_value_t = Quotas::default().streams)]
+    max_streams: usize,
+    /// Views of batches that may wait, or be not sent yet
+    #[arg(long, value_name = "N", default_value_t = Quotas::default().views)]
+    max_views: usize,
+    /// Pixels of them; and as many of live views
+    #[arg(long, value_name = "N", default_value_t = Quotas::default().pixels)]
+    max_pixels: usize,
+}
+
+impl From<QuotaArgs> for Quotas {
+    fn from(args: QuotaArgs) -> Self {
+        Self { streams: args.max_streams, views: args.max_views, pixels: args.max_pixels }
+    }
 }
 
 /// Runs until a signal.
@@ -59,6 +84,8 @@ async fn serve(args: NodeArgs) -> anyhow::Result<Outcome> {
         scene_folder: args.scene_folder,
         advertised_address: advertise,
         insecure_bind: args.insecure_bind,
+        reflection: args.reflection,
+        quotas: args.quotas.into(),
         ..NodeConfig::new(name, args.coordinator)
     };
     let shutdown = CancellationToken::new();

@@ -1,5 +1,6 @@
 //! `myriorama status`: who is there, what the plan is, and why.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -8,6 +9,7 @@ use client::Client;
 
 use crate::exit::Outcome;
 use crate::process::runtime;
+use crate::terminal_picture;
 
 /// Prints the cluster's nodes with their roles, the plan and its reason; with --watch again and again.
 #[derive(Debug, Args)]
@@ -18,6 +20,9 @@ pub struct StatusArgs {
     /// Every so many seconds, until ctrl-c
     #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "1")]
     watch: Option<f64>,
+    /// Writes it as a picture, too (SVG)
+    #[arg(long, value_name = "FILE", conflicts_with = "watch")]
+    picture: Option<PathBuf>,
 }
 
 /// Asks and prints.
@@ -34,6 +39,10 @@ async fn show(args: &StatusArgs) -> anyhow::Result<Outcome> {
     loop {
         let text = crate::status_text::text(&client.status().await?)?;
         let Some(seconds) = args.watch else {
+            if let Some(file) = &args.picture {
+                let written = std::fs::write(file, terminal_picture::svg(&text));
+                written.with_context(|| format!("cannot write {}", file.display()))?;
+            }
             println!("{text}");
             return Ok(Outcome::Done);
         };

@@ -10,7 +10,6 @@ use depth_image::{Camera, PinholeCamera, ViewPlanes};
 use indicatif::ProgressBar;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
-use sampling::SamplingMethod;
 use serde_json::{Map, json};
 use wire::{FrameCodec, OfferStatus, PolicyChoice, Timeline};
 
@@ -72,6 +71,9 @@ pub struct ViewArgs {
     /// auto (whatever is predicted to be fastest), pipeline, direct or time-share
     #[arg(long, default_value = "auto", value_name = "NAME")]
     policy: PolicyChoice,
+    /// Cut every sample image into so many tiles, to share them among samplers [default: as predicted to be fastest]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
+    tiles: Option<u32>,
     /// Moments of an animated scene; every view is made of each
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
@@ -221,7 +223,11 @@ async fn live(args: &ViewArgs, session: &Session, path: Vec<PinholeCamera>) -> a
     let record = live::drive(session, &drive).await?;
     let file = args.out.join("live.csv");
     std::fs::write(&file, record.frames()?.to_csv()?).with_context(|| format!("cannot write {}", file.display()))?;
-    println!("{}\n\n{}", text_table::text(&record.latencies()?), record.summary());
+    let latencies = live::latencies("From pose to picture", record.shown.iter())?;
+    println!("{}\n\n{}", text_table::text(&latencies), record.summary());
+    if let Some(error) = record.error {
+        return Err(error.into());
+    }
     let gap_s = record.longest_gap_s().map_or(f64::INFINITY, |(gap_s, _)| gap_s);
     Ok(met(args.longest_gap.is_none_or(|longest| gap_s <= longest)))
 }
@@ -231,21 +237,24 @@ fn met(holds: bool) -> Outcome {
 }
 
 fn wishes(args: &ViewArgs, offer: &OfferStatus) -> Wishes {
-    let or = |wish: Option<String>, offered: &str, default: String| {
-        wish.unwrap_or_else(|| if offered.is_empty() { default } else { offered.to_owned() })
-    };
-    let OfferStatus { settings, .. } = offer;
-    let lighting = or(args.lighting.map(|l| l.to_string()), &settings.lighting, Lighting::default().to_string());
+    let mut wishes = Wishes::offered(offer);
+    wishes.method = args.method.map_or(wishes.method, |method| method.to_string());
+    wishes.lighting = args.lighting.map_or(wishes.lighting, |lighting| lighting.to_string());
+    let wishes = if args.live { wishes.at_rate(args.rate) } else { wishes };
     Wishes {
-        method: or(args.method.map(|m| m.to_string()), &settings.method, ReconstructionMethod::default().to_string()),
-        sampling: or(None, &settings.sampling, SamplingMethod::default().to_string()),
-        refinement_steps: if args.refine { refinement_steps(&lighting) } else { 1 },
-        lighting,
+        tiles: args.tiles,
+        refinement_steps: if args.refine { refinement_steps(&wishes.lighting) } else { 1 },
         codec: args.codec.to_string(),
         policy: args.policy,
         planes: ViewPlanes { inverse_depth: args.depth, provenance: args.provenance },
-        timeline: Timeline { start_s: 0.0, step_s: args.frame_step, set_count: args.frames },
+        timeline: timeline(args.frames, args.frame_step, args.refine),
+        ..wishes
     }
+}
+
+/// A picture that is refined stands still: what moved meanwhile would have to begin anew.
+fn timeline(set_count: u32, step_s: f64, refine: bool) -> Timeline {
+    Timeline { start_s: 0.0, step_s: if refine { 0.0 } else { step_s }, set_count }
 }
 
 /// Of a lighting that a newer coordinator may have named: one step where it is not known here.
@@ -275,4 +284,16 @@ fn write_frame(folder: &Path, frame: &Frame) -> anyhow::Result<NamedCamera> {
         more.insert("provenance_file_path".to_owned(), json!(name));
     }
     Ok(NamedCamera { file_path, camera: frame.request.camera, more })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_refined_stands_still() {
+        assert!(timeline(4, 0.1, false).moves());
+        assert!(!timeline(4, 0.1, true).moves() && timeline(4, 0.1, true).set_count == 4);
+        assert!(!timeline(1, 0.1, false).moves(), "one set");
+    }
 }

@@ -6,15 +6,17 @@ mod codec;
 mod convergence;
 mod fronts;
 mod light;
+mod load;
 mod peer;
 mod rays;
 mod sampling;
+mod scaling;
 mod throughput;
 mod timing;
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use node::Engine as _;
 use study::{Bar, Check, Report};
 
@@ -29,8 +31,13 @@ use crate::text_table;
 /// Every bullet is a check: a value, a bar, holds or falls short. Checks whose input was not given are not run
 /// and do not fall short.
 #[derive(Debug, Args)]
-#[command(after_help = "Example: myriorama bench --models models/ --peer peer-bench/ --strict")]
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "Example: myriorama bench --models models/ --peer peer-bench/ --strict"
+)]
 pub struct BenchArgs {
+    #[command(subcommand)]
+    part: Option<Part>,
     #[command(flatten)]
     scene: SceneArgs,
     #[command(flatten)]
@@ -55,6 +62,15 @@ pub struct BenchArgs {
     strict: bool,
 }
 
+/// What is measured by itself.
+#[derive(Debug, Subcommand)]
+enum Part {
+    /// How many clients a cluster of processes serves, and what becomes of those that are too many
+    Load(load::LoadArgs),
+    /// How the cluster scales with nodes and views, on processes of equal CPU share and in simulation
+    Scaling(scaling::ScalingArgs),
+}
+
 impl BenchArgs {
     /// Times that a measurement is repeated; the median counts.
     fn runs(&self) -> usize {
@@ -72,6 +88,11 @@ impl BenchArgs {
 /// # Errors
 /// Input that cannot be used, or a failure of the device or the cluster.
 pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
+    match &args.part {
+        Some(Part::Load(args)) => return load::run(args),
+        Some(Part::Scaling(args)) => return scaling::run(args),
+        None => (),
+    }
     let experiment = Experiment::start(args.scene.clone(), Vec::new(), args.device.device, usize::from(args.nodes))?;
     let mut report = new_report(args, &experiment);
     println!("{} on {}", args.scene.scene, experiment.engine.device_name());

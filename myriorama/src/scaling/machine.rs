@@ -1,0 +1,77 @@
+//! How busy the machine was: whether what was measured had it for itself.
+
+use std::fs;
+
+/// Ticks of the kernel's counters in a second: fixed for programs since Linux 2.6, whatever the kernel's own rate.
+const TICKS_PER_S: f64 = 100.0;
+
+/// Processor time so far, in seconds of one core.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MachineTime {
+    /// Of all processes.
+    pub busy_s: f64,
+    /// Taken by other guests of the same host.
+    pub stolen_s: f64,
+    /// Of this process: the client.
+    pub client_s: f64,
+}
+
+impl MachineTime {
+    /// Now; zeros where the system does not say.
+    #[must_use]
+    pub fn now() -> Self {
+        let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
+        let own = fs::read_to_string("/proc/self/stat").unwrap_or_default();
+        let (busy_s, stolen_s) = all(&stat).unwrap_or_default();
+        Self { busy_s, stolen_s, client_s: of_process(&own).unwrap_or_default() }
+    }
+
+    /// Between two readings.
+    #[must_use]
+    pub fn since(&self, before: &Self) -> Self {
+        Self {
+            busy_s: self.busy_s - before.busy_s,
+            stolen_s: self.stolen_s - before.stolen_s,
+            client_s: self.client_s - before.client_s,
+        }
+    }
+}
+
+/// user, nice, system, idle, iowait, irq, softirq, steal.
+fn all(stat: &str) -> Option<(f64, f64)> {
+    let line = stat.lines().find_map(|line| line.strip_prefix("cpu "))?;
+    let ticks: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    let sum = |which: &[usize]| which.iter().filter_map(|&i| ticks.get(i)).sum::<f64>() / TICKS_PER_S;
+    Some((sum(&[0, 1, 2, 5, 6]), sum(&[7])))
+}
+
+/// utime and stime, the 14th and 15th field; the 2nd is a name that may hold blanks.
+fn of_process(stat: &str) -> Option<f64> {
+    let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+    let ticks = |field: usize| fields.get(field - 3)?.parse::<f64>().ok();
+    Some((ticks(14)? + ticks(15)?) / TICKS_PER_S)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counters_are_read_by_their_place() {
+        let stat = "cpu  100 10 50 900 5 4 6 30 0 0\ncpu0 1 1 1 1\n";
+        assert_eq!(all(stat), Some((1.7, 0.3)));
+        let own = "42 (a ) name) S 1 2 3 4 5 6 7 8 9 10 250 50 0 0 20 0 1 0";
+        assert_eq!(of_process(own), Some(3.0));
+        assert_eq!(of_process("nothing"), None);
+    }
+
+    #[test]
+    fn work_is_seen() {
+        let before = MachineTime::now();
+        let mut sum = 0u64;
+        while MachineTime::now().since(&before).client_s < 0.02 {
+            sum = std::hint::black_box(sum.wrapping_add(1));
+        }
+        assert!(MachineTime::now().since(&before).busy_s > 0.0, "{sum}");
+    }
+}

@@ -1,0 +1,198 @@
+//! The real schedule, told what a coordinator would tell it.
+
+use std::time::Duration;
+
+use coordinator::schedule::{ChoiceError, Command, Event, MeasuredCosts, Opening, Scheduler};
+use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
+use glam::{UVec2, Vec3};
+use wire::{
+    Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, SessionPlan, Timeline, Workload,
+};
+
+use crate::cluster::{Cluster, Machine};
+
+/// Between two ticks, as the coordinator's.
+const TICK: Duration = Duration::from_millis(250);
+/// A plan that has not changed for so long, longer than any dwell, is settled.
+const SETTLED_TICKS: usize = 40;
+/// After so many it is taken as it is: ten simulated minutes.
+const MOST_TICKS: usize = 2400;
+/// Timings of each kind that a node reports: the schedule's moving average is then within a thousandth of them.
+const REPORTS: usize = 32;
+
+/// What one session asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Demand {
+    /// V.
+    pub views: usize,
+    /// Sample sets, all different.
+    pub sets: u32,
+    /// Who decides.
+    pub policy: PolicyChoice,
+    /// Whether nodes report their own costs and bytes; otherwise all count as the slowest, and links as free, which is
+    /// all that a coordinator knows when a session is opened.
+    pub nodes_report: bool,
+}
+
+/// Why there is no plan.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// The schedule says so.
+    #[error(transparent)]
+    Refused(#[from] ChoiceError),
+    /// It said nothing at all.
+    #[error("the schedule made no plan")]
+    None,
+}
+
+/// A schedule and what it last said.
+#[derive(Default)]
+struct Coordinator {
+    scheduler: Scheduler,
+    now: Duration,
+    plan: Option<SessionPlan>,
+    refused: Option<ChoiceError>,
+}
+
+/// The plan that the schedule comes to rest at.
+///
+/// # Errors
+/// Where the schedule refuses.
+pub fn plan(cluster: &Cluster, demand: &Demand) -> Result<SessionPlan, PlanError> {
+    let mut coordinator = Coordinator::default();
+    for (number, _) in cluster.machines.iter().enumerate() {
+        coordinator.tell(join(number));
+    }
+    coordinator.tell(open(cluster, demand));
+    if demand.nodes_report {
+        (0..REPORTS).for_each(|_| coordinator.hear_costs(cluster));
+    }
+    coordinator.settle();
+    match (coordinator.plan, coordinator.refused) {
+        (_, Some(error)) => Err(error.into()),
+        (Some(plan), None) => Ok(plan),
+        (None, None) => Err(PlanError::None),
+    }
+}
+
+impl Coordinator {
+    fn tell(&mut self, event: Event) {
+        for command in self.scheduler.step(self.now, event) {
+            match command {
+                Command::Apply { plan, .. } => self.apply(*plan),
+                Command::Refuse { error, .. } => self.refused = Some(error),
+                Command::End { .. } => self.plan = None,
+            }
+        }
+    }
+
+    /// Nodes are ready at once.
+    fn apply(&mut self, plan: SessionPlan) {
+        let ready = |node_name| Event::Ready { plan_epoch: plan.assignment.plan_epoch, node_name };
+        let names = node_names(&plan.assignment);
+        self.plan = Some(plan.clone());
+        names.into_iter().for_each(|name| self.tell(ready(name)));
+    }
+
+    fn hear_costs(&mut self, cluster: &Cluster) {
+        for (number, machine) in cluster.machines.iter().enumerate() {
+            self.tell(Event::Measured {
+                node_name: name(number),
+                plan_epoch: self.epoch().unwrap_or(0),
+                costs: timings(machine, cluster.image_bytes),
+                busy_s: 0.0,
+                views: 0,
+                dropped_views: 0,
+            });
+        }
+    }
+
+    fn settle(&mut self) {
+        let mut settled = 0;
+        for _ in 0..MOST_TICKS {
+            self.now += TICK;
+            let before = self.epoch();
+            self.tell(Event::Tick);
+            settled = if self.epoch() == before { settled + 1 } else { 0 };
+            if settled >= SETTLED_TICKS {
+                return;
+            }
+        }
+    }
+
+    fn epoch(&self) -> Option<u64> {
+        self.plan.as_ref().map(|plan| plan.assignment.plan_epoch)
+    }
+}
+
+/// As many digits as sort well: the schedule lists nodes by name.
+fn name(number: usize) -> String {
+    format!("node-{number:04}")
+}
+
+/// The node of a name in a plan of ours.
+pub(crate) fn number_of(name: &str) -> Option<usize> {
+    name.strip_prefix("node-")?.parse().ok()
+}
+
+fn node_names(assignment: &Assignment) -> Vec<String> {
+    let samplers = assignment.samplers.iter().map(|share| share.node_name.clone());
+    let mut names: Vec<String> =
+        samplers.chain(assignment.compositors.iter().map(|share| share.node_name.clone())).collect();
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
+fn join(number: usize) -> Event {
+    let node_name = name(number);
+    let address = format!("http://{node_name}");
+    let node = NodeStatus { node_name, address, device_name: "simulated".to_owned(), is_software: true };
+    Event::Joined { incarnation: number as u64 + 1, join: JoinCluster { node, plan_epoch: 0 } }
+}
+
+fn open(cluster: &Cluster, demand: &Demand) -> Event {
+    let slowest = cluster.machines.iter().fold(Costs::default(), |slowest, machine| slowest.max(machine.costs));
+    Event::Opened(Box::new(Opening {
+        session: 1,
+        workload: workload(cluster.images, demand.sets),
+        views_per_set: demand.views,
+        policy: demand.policy,
+        frames_per_s: 0.0,
+        forced_samplers: None,
+        forced_tiles: None,
+        fallbacks: Vec::new(),
+        costs: slowest,
+    }))
+}
+
+fn timings(machine: &Machine, image_bytes: f64) -> MeasuredCosts {
+    let costs = machine.costs;
+    MeasuredCosts {
+        sample_image_s: Some(costs.sample_image_s),
+        direct_view_s: Some(costs.direct_view_s),
+        reconstruct_view_s: Some(costs.reconstruct_view_s),
+        load_set_s: Some(costs.load_set_s),
+        encode_view_s: Some(costs.encode_view_s),
+        transfer_bytes_per_s: Some(machine.bytes_per_s).filter(|rate| rate.is_finite()),
+        image_bytes: Some(image_bytes),
+    }
+}
+
+/// Of a workload the schedule looks at the number of images and sets alone.
+fn workload(images: usize, sets: u32) -> Workload {
+    let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8));
+    Workload {
+        scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
+        sample_cameras: vec![Camera::Pinhole(camera); images],
+        sampling: String::new(),
+        lighting: String::new(),
+        method: String::new(),
+        codec: String::new(),
+        volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
+        background_linear: Vec3::ZERO,
+        timeline: Timeline { start_s: 0.0, step_s: 1.0, set_count: sets },
+        illumination: Illumination::default(),
+        refinement_steps: 1,
+    }
+}

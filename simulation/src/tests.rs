@@ -1,0 +1,211 @@
+//! Closed forms.
+
+use coordinator::schedule::{Load, NodeCosts, k_fd, pipeline_s, pipeline_time};
+use wire::{Costs, Policy, PolicyChoice};
+
+use crate::{Calls, Cluster, Dealing, Demand, Habits, Limit, Machine, Run, Transfer, plan, run, spread_speeds};
+
+const COSTS: Costs = Costs {
+    sample_image_s: 0.1,
+    direct_view_s: 0.1,
+    reconstruct_view_s: 0.009,
+    load_set_s: 0.005,
+    encode_view_s: 0.001,
+    in_order: false,
+    sample_overhead_s: 1e3,
+};
+
+const FREE: Machine =
+    Machine { costs: COSTS, calls: Calls { reconstruct_s: 0.0, direct_s: 0.0 }, bytes_per_s: f64::INFINITY };
+
+fn demand(policy: PolicyChoice, views: usize, sets: u32) -> Demand {
+    Demand { views, sets, policy, nodes_report: false }
+}
+
+fn ran(cluster: &Cluster, demand: &Demand, habits: Habits) -> Run {
+    run(cluster, &plan(cluster, demand).unwrap(), demand.views, demand.sets, habits)
+}
+
+fn equal(nodes: usize, machine: Machine) -> Cluster {
+    Cluster::equal(nodes, machine, 4, 1e6, 1e5)
+}
+
+fn close(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-9 * b.abs().max(1.0)
+}
+
+#[test]
+fn one_sampler_one_compositor_one_set() {
+    let run = ran(&equal(2, FREE), &demand(PolicyChoice::Pipeline, 100, 1), Habits::default());
+    assert!(close(run.complete_s[0], 0.4 + 0.005 + 100.0 * 0.01), "{run:?}");
+    assert!(close(run.busy[0].sample_s, 0.4) && close(run.busy[1].views_s, 1.0));
+}
+
+#[test]
+fn every_batch_costs_a_call() {
+    let machine = Machine { calls: Calls { reconstruct_s: 0.02, direct_s: 0.03 }, ..FREE };
+    let run = ran(&equal(2, machine), &demand(PolicyChoice::Pipeline, 100, 1), Habits::default());
+    assert!(close(run.complete_s[0], 0.4 + 0.005 + 2.0 * 0.02 + 100.0 * 0.01), "64 views and 36");
+    let run = ran(&equal(2, machine), &demand(PolicyChoice::Direct, 100, 1), Habits::default());
+    assert!(close(run.complete_s[0], 0.03 + 50.0 * 0.101));
+}
+
+#[test]
+fn a_link_delays_by_what_it_carries() {
+    // 4 MB of images at 10 MB/s, then 64 and 36 frames of 0.1 MB: the last leave while nothing else does.
+    let slow = Machine { bytes_per_s: 1e7, ..FREE };
+    let run = ran(&equal(2, slow), &demand(PolicyChoice::Pipeline, 100, 1), Habits::default());
+    let made_s = 0.4 + 0.4 + 0.005 + 0.64;
+    assert!(close(run.complete_s[0], made_s + 0.64 + 0.36), "{:?}", run.complete_s);
+}
+
+#[test]
+fn the_steady_state_is_the_formulas() {
+    for (nodes, views) in [(2, 100), (5, 1000), (11, 1000), (11, 290)] {
+        let demand = demand(PolicyChoice::Pipeline, views, 16);
+        let run = ran(&equal(nodes, FREE), &demand, Habits::default());
+        let k = k_fd(4, 0.1, views, 0.01, nodes).clamp(1, 4);
+        let most = views.div_ceil(nodes - k) as f64 * 0.01 + 0.005;
+        let formula_s = pipeline_time(4, 0.1, views, 0.01, nodes, k).max(most);
+        let ratio = run.steady_period_s() / formula_s;
+        assert!((0.99..1.02).contains(&ratio), "{nodes} {views} {ratio}");
+    }
+    let direct = ran(&equal(4, FREE), &demand(PolicyChoice::Direct, 100, 12), Habits::default());
+    assert!(close(direct.steady_period_s(), 25.0 * 0.101));
+}
+
+/// With one set asked for ahead a sampler rests while what it made travels and is loaded; with two it does not.
+#[test]
+fn a_sampler_that_is_asked_late_rests_meanwhile() {
+    let machine = Machine { bytes_per_s: 1e8, ..FREE };
+    let demand = demand(PolicyChoice::Pipeline, 2, 24);
+    let one = ran(&equal(2, machine), &demand, Habits { sets_ahead: 1, ..Habits::default() });
+    assert!(close(one.steady_period_s(), 0.4 + 0.04 + 0.005), "{}", one.steady_period_s());
+    let two = ran(&equal(2, machine), &demand, Habits::default());
+    assert!(close(two.steady_period_s(), 0.4), "{}", two.steady_period_s());
+    assert_eq!(two.limit(), Limit::Sampling);
+}
+
+#[test]
+fn a_sampler_that_sends_to_all_is_bound_by_its_link_and_a_tree_is_not() {
+    // 40 compositors × 4 MB at 100 MB/s: 1.6 s a set, against 0.4 s of sampling and 0.26 s of views.
+    let machine = Machine { bytes_per_s: 1e8, ..FREE };
+    let demand = demand(PolicyChoice::Pipeline, 1000, 12);
+    let cluster = equal(41, machine);
+    let planned = plan(&cluster, &demand).unwrap();
+    let k = planned.sampler_count();
+    let sent_mb = (4 / k * (41 - k)) as f64;
+    let unicast = run(&cluster, &planned, 1000, 12, Habits::default());
+    assert!(unicast.steady_period_s() >= sent_mb / 100.0 * (1.0 - 1e-9), "{}", unicast.steady_period_s());
+    assert_eq!(unicast.limit(), Limit::ImagesOut);
+    let ahead = Habits { transfer: Transfer::Relay(2), sets_ahead: 3, ..Habits::default() };
+    let tree = run(&cluster, &planned, 1000, 12, ahead);
+    assert!(tree.steady_period_s() < 0.5 * unicast.steady_period_s(), "{}", tree.steady_period_s());
+    assert!(tree.complete_s.iter().all(|at_s| at_s.is_finite()));
+}
+
+#[test]
+fn a_relay_brings_every_image_to_every_node_once() {
+    for (policy, transfer) in [
+        (PolicyChoice::Pipeline, Transfer::Relay(1)),
+        (PolicyChoice::Pipeline, Transfer::Relay(3)),
+        (PolicyChoice::TimeShare, Transfer::Relay(1)),
+        (PolicyChoice::TimeShare, Transfer::Relay(2)),
+        (PolicyChoice::TimeShare, Transfer::Unicast),
+    ] {
+        let machine = Machine { bytes_per_s: 1e8, ..FREE };
+        let cluster = equal(7, machine);
+        let demand = demand(policy, 70, 5);
+        let planned = plan(&cluster, &demand).unwrap();
+        let habits = Habits { transfer, ..Habits::default() };
+        let run = run(&cluster, &planned, 70, 5, habits);
+        assert!(run.complete_s.is_sorted() && run.complete_s.iter().all(|s| s.is_finite()), "{policy:?} {transfer:?}");
+        let own = |node: usize| {
+            let name = format!("node-{node:04}");
+            planned.assignment.samplers.iter().find(|s| s.node_name == name).map_or(0, |s| s.image_indices.len())
+        };
+        for share in &planned.assignment.compositors {
+            let node: usize = share.node_name["node-".len()..].parse().unwrap();
+            let received_mb = run.busy[node].in_s * 100.0;
+            assert!(close(received_mb, (5 * (4 - own(node))) as f64), "{policy:?} {transfer:?} {node}: {received_mb}");
+        }
+    }
+}
+
+#[test]
+fn time_share_and_few_views() {
+    let one = ran(&equal(1, FREE), &demand(PolicyChoice::Auto, 100, 12), Habits::default());
+    assert!(close(one.steady_period_s(), 0.4 + 0.005 + 1.0), "{}", one.steady_period_s());
+    // A set that is sampled ahead may fall before or behind the end of the time that counts.
+    let shared = ran(&equal(4, FREE), &demand(PolicyChoice::TimeShare, 400, 64), Habits::default());
+    assert!((0.99..1.01).contains(&(shared.steady_period_s() / 1.105)), "{}", shared.steady_period_s());
+    let few = ran(&equal(11, FREE), &demand(PolicyChoice::Pipeline, 3, 6), Habits::default());
+    assert_eq!(few.busy.iter().filter(|busy| busy.load_s > 0.0).count(), 3, "who has no view loads nothing");
+}
+
+#[test]
+fn images_in_order_are_sampled_by_nodes_in_turn() {
+    let costs = Costs { in_order: true, ..COSTS };
+    let cluster = equal(5, Machine { costs, ..FREE });
+    let run = ran(&cluster, &demand(PolicyChoice::Pipeline, 10, 40), Habits::default());
+    let samplers = run.busy.iter().filter(|busy| busy.sample_s > 0.0).count();
+    assert!(samplers > 1);
+    let ratio = run.steady_period_s() / (0.4 / samplers as f64);
+    assert!((0.9..1.2).contains(&ratio), "{samplers} {ratio}");
+}
+
+#[test]
+fn unequal_nodes_are_planned_by_their_own_costs() {
+    let speeds = spread_speeds(11, 4.0, 7);
+    assert!(speeds.iter().all(|speed| (0.5..=2.0).contains(speed)));
+    assert_eq!(speeds, spread_speeds(11, 4.0, 7));
+    let machines = speeds.iter().map(|&speed| FREE.faster(speed)).collect();
+    let cluster = Cluster { machines, images: 4, image_bytes: 1e6, frame_bytes: 1e5 };
+    let known = Demand { nodes_report: true, ..demand(PolicyChoice::Pipeline, 1000, 16) };
+    let even = ran(&cluster, &known, Habits::default());
+    let by_speed = ran(&cluster, &known, Habits { dealing: Dealing::BySpeed, ..Habits::default() });
+    assert!(by_speed.steady_period_s() < 0.8 * even.steady_period_s());
+    assert_eq!((even.limit(), by_speed.limit()), (Limit::Uneven, Limit::Views));
+    let nodes: Vec<_> =
+        cluster.machines.iter().map(|machine| NodeCosts { costs: machine.costs, transfer_image_s: 0.0 }).collect();
+    let samplers = plan(&cluster, &known).unwrap().assignment.samplers;
+    let samples: Vec<bool> =
+        (0..11).map(|node| samplers.iter().any(|share| share.node_name == format!("node-{node:04}"))).collect();
+    let load = Load { images: 4, sets: 16, views: 1000, ..Load::default() };
+    let ratio = by_speed.steady_period_s() / pipeline_s(&load, &nodes, &samples);
+    assert!((0.98..1.02).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn a_device_is_held_up_by_what_is_not_views() {
+    // Whoever samples an image makes as many views as the others.
+    let few = ran(&equal(50, FREE), &demand(PolicyChoice::TimeShare, 500, 16), Habits::default());
+    assert_eq!(few.limit(), Limit::Sampling);
+    let loads = Machine { costs: Costs { load_set_s: 0.2, sample_image_s: 0.01, ..COSTS }, ..FREE };
+    let loading = ran(&equal(50, loads), &demand(PolicyChoice::TimeShare, 500, 16), Habits::default());
+    assert_eq!(loading.limit(), Limit::Loading);
+}
+
+#[test]
+fn parts_of_images_cost_what_images_cost() {
+    let cut = equal(11, FREE).cut(16);
+    assert_eq!(cut.images, 64);
+    assert!(close(cut.machines[0].costs.sample_image_s * 64.0, 0.4) && close(cut.image_bytes * 64.0, 4e6));
+    let dear = Machine { costs: Costs { sample_image_s: 2.0, ..COSTS }, ..FREE };
+    let demand = demand(PolicyChoice::Pipeline, 1000, 16);
+    let whole = ran(&equal(11, dear), &demand, Habits::default()).steady_period_s();
+    let cut = ran(&equal(11, dear).cut(16), &demand, Habits::default()).steady_period_s();
+    assert!(cut < 0.9 * whole, "{cut} {whole}");
+}
+
+#[test]
+fn a_thousand_nodes_take_a_moment_and_the_same_every_time() {
+    let machine = Machine { bytes_per_s: 1.25e9, ..FREE };
+    let demand = demand(PolicyChoice::Auto, 100_000, 12);
+    let cluster = equal(1000, machine);
+    let planned = plan(&cluster, &demand).unwrap();
+    let first = run(&cluster, &planned, 100_000, 12, Habits::default());
+    assert_eq!(first, run(&cluster, &planned, 100_000, 12, Habits::default()));
+    assert!(first.complete_s.is_sorted());
+    assert!(planned.assignment.policy != Policy::Direct);
+}

@@ -1,0 +1,305 @@
+//! The event loop: a plan carried out.
+//!
+//! Requests take no time. An image share that is sent occupies the sender's link for as long as it takes, and the
+//! receiver's from the moment it arrives there; what is in the way is waited for. Frames leave over the compositor's
+//! link; clients are many, and their links are their own.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use wire::{Assignment, Policy, SessionPlan};
+
+use crate::cluster::{Cluster, Habits, Machine, Transfer};
+use crate::dealing::{compositors_of, receivers, shares};
+use crate::node::{Job, Node, Parcel, Sampled};
+use crate::planning::number_of;
+use crate::run::Run;
+
+/// What happens next; of several at the same time what was foreseen first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Happens {
+    /// A device has ended its job.
+    Done { node: usize },
+    /// A link has sent its parcel.
+    Sent { node: usize },
+    /// A sampler's images are there: their place in its list of receivers.
+    Arrived { sampler: usize, set: u32, place: usize, node: usize },
+}
+
+struct World<'a> {
+    cluster: &'a Cluster,
+    plan: &'a Assignment,
+    habits: Habits,
+    sets: u32,
+    nodes: Vec<Node>,
+    /// Nodes that make views, in the plan's order.
+    compositors: Vec<usize>,
+    /// Of each node, to whom its images go under a relay; of those that sample nothing nobody.
+    receivers: Vec<Vec<usize>>,
+    now_s: f64,
+    foreseen: BinaryHeap<Reverse<(u64, u64, Happens)>>,
+    events: u64,
+    /// Views of each set that are still to be delivered, and when the last was.
+    due: Vec<(usize, f64)>,
+}
+
+/// Carries a plan out for `sets` sets of `views` views.
+#[must_use]
+pub fn run(cluster: &Cluster, plan: &SessionPlan, views: usize, sets: u32, habits: Habits) -> Run {
+    let plan = &plan.assignment;
+    let mut world = World::new(cluster, plan, views, sets, habits);
+    for node in world.compositors.clone() {
+        world.advance(node);
+    }
+    while let Some(Reverse((at, _, what))) = world.foreseen.pop() {
+        world.now_s = f64::from_bits(at);
+        world.happens(what);
+    }
+    Run {
+        complete_s: world.due.iter().map(|(due, last_s)| if *due == 0 { *last_s } else { f64::NAN }).collect(),
+        busy: world.nodes.iter().map(|node| node.busy).collect(),
+    }
+}
+
+impl<'a> World<'a> {
+    fn new(cluster: &'a Cluster, plan: &'a Assignment, views: usize, sets: u32, habits: Habits) -> Self {
+        let all = compositors_of(plan);
+        let shares = shares(cluster, plan, &all, views, habits.dealing);
+        let relayed = plan.relay_fanout.map(|fanout| Transfer::Relay(fanout.get() as usize));
+        let habits = Habits { transfer: relayed.unwrap_or(habits.transfer), ..habits };
+        let node = |machine| Node::new(machine, sets, 0, habits.credit_views);
+        let mut nodes: Vec<Node> = cluster.machines.iter().copied().map(node).collect();
+        for (&at, &share) in all.iter().zip(&shares) {
+            (nodes[at].share, nodes[at].to_hand_over) = (share, share);
+        }
+        // Who has no view of a set is not asked, and loads nothing.
+        let compositors: Vec<usize> = all.into_iter().filter(|&at| nodes[at].share > 0).collect();
+        let receivers = receivers(plan, &compositors, nodes.len());
+        let (now_s, foreseen, events) = (0.0, BinaryHeap::new(), 0);
+        let due = vec![(views, 0.0); sets as usize];
+        Self { cluster, plan, habits, sets, nodes, compositors, receivers, now_s, foreseen, events, due }
+    }
+
+    /// Of an image, or of one of the tiles that the plan cuts it into.
+    fn part_bytes(&self) -> f64 {
+        self.cluster.image_bytes / f64::from(self.plan.tile_count)
+    }
+
+    fn foresee(&mut self, at_s: f64, what: Happens) {
+        // Times are not negative, so that their bits are in their order.
+        self.foreseen.push(Reverse((at_s.to_bits(), self.events, what)));
+        self.events += 1;
+    }
+
+    fn happens(&mut self, what: Happens) {
+        match what {
+            Happens::Done { node } => self.done(node),
+            Happens::Sent { node } => self.sent(node),
+            Happens::Arrived { sampler, set, place, node } => self.arrived(sampler, set, place, node),
+        }
+    }
+
+    /// As far as a compositor's stream of requests gets: a set is waited for, the next one asked for, its views handed
+    /// over as far as there is credit.
+    fn advance(&mut self, node: usize) {
+        while self.nodes[node].next_set < self.sets {
+            let set = self.nodes[node].next_set;
+            if self.plan.policy != Policy::Direct && !self.prepare(node, set) {
+                break;
+            }
+            if !self.nodes[node].hand_over() {
+                break;
+            }
+        }
+        self.start_device(node);
+    }
+
+    /// Whether a set is there; asks for it and those after it otherwise. Where sets are sampled in turn, the others'
+    /// samplers need not wait for this one.
+    fn prepare(&mut self, node: usize, set: u32) -> bool {
+        let at_once = self.plan.sets_at_once();
+        let ahead = at_once.max(self.habits.sets_ahead);
+        self.ask(node, set);
+        let loaded = self.nodes[node].loading[set as usize].loaded;
+        if loaded || at_once > 1 {
+            let last = self.sets.saturating_sub(1).min(set.saturating_add(ahead));
+            (set + 1..=last).for_each(|next| self.ask(node, next));
+        }
+        loaded
+    }
+
+    /// Asks all samplers of a set for their images, once.
+    fn ask(&mut self, node: usize, set: u32) {
+        let plan = self.plan;
+        let samplers: Vec<(usize, usize)> = plan
+            .samplers_of(set)
+            .iter()
+            .filter_map(|share| Some((number_of(&share.node_name)?, share.image_indices.len())))
+            .collect();
+        let loading = &mut self.nodes[node].loading[set as usize];
+        if std::mem::replace(&mut loading.asked, true) {
+            return;
+        }
+        for (sampler, images) in samplers {
+            self.asked(sampler, set, images, node);
+        }
+        // Under a relay all may have come unasked.
+        self.load_if_complete(node, set);
+    }
+
+    fn asked(&mut self, sampler: usize, set: u32, images: usize, by: usize) {
+        match &mut self.nodes[sampler].sampled[set as usize] {
+            Sampled::Soon(askers) => askers.push(by),
+            Sampled::Done => self.give(sampler, set, by),
+            state @ Sampled::Not => {
+                *state = Sampled::Soon(vec![by]);
+                self.nodes[sampler].urgent.push_back(Job::Sample { set, images });
+                self.start_device(sampler);
+            }
+        }
+    }
+
+    /// To one that asked. Its own images need no link, and under a relay others pass them on.
+    fn give(&mut self, sampler: usize, set: u32, to: usize) {
+        if to == sampler {
+            self.came(to, set);
+        } else if self.habits.transfer == Transfer::Unicast {
+            self.send_images(sampler, sampler, set, to);
+        }
+    }
+
+    /// `place` is the receiver itself in unicast, and its place in the sampler's list under a relay.
+    fn send_images(&mut self, from: usize, sampler: usize, set: u32, place: usize) {
+        let share = self.plan.samplers_of(set).iter().find(|share| number_of(&share.node_name) == Some(sampler));
+        let images = share.map_or(0, |share| share.image_indices.len());
+        self.nodes[from].outgoing.push_back(Parcel::Images { set, sampler, images, place });
+        self.start_link(from);
+    }
+
+    /// Passes on what came, in a tree over the sampler's receivers.
+    fn relay(&mut self, from: usize, sampler: usize, set: u32, place: Option<usize>) {
+        let Transfer::Relay(children) = self.habits.transfer else { return };
+        let receivers = self.receivers[sampler].len();
+        let children = children.max(1);
+        let first = place.map_or(0, |place| children * place + 1);
+        let count = if place.is_some() { children } else { 1 };
+        for place in (first..first + count).filter(|&place| place < receivers) {
+            self.send_images(from, sampler, set, place);
+        }
+    }
+
+    fn receiver(&self, sampler: usize, place: usize) -> usize {
+        match self.habits.transfer {
+            Transfer::Unicast => place,
+            Transfer::Relay(_) => self.receivers[sampler][place],
+        }
+    }
+
+    fn arrived(&mut self, sampler: usize, set: u32, place: usize, node: usize) {
+        self.relay(node, sampler, set, Some(place));
+        self.came(node, set);
+    }
+
+    fn came(&mut self, node: usize, set: u32) {
+        self.nodes[node].loading[set as usize].came += 1;
+        self.load_if_complete(node, set);
+    }
+
+    fn load_if_complete(&mut self, node: usize, set: u32) {
+        let shares = self.plan.samplers_of(set).len();
+        let loading = &mut self.nodes[node].loading[set as usize];
+        if loading.asked && loading.came == shares && !std::mem::replace(&mut loading.queued, true) {
+            self.nodes[node].urgent.push_back(Job::Load { set });
+            self.start_device(node);
+        }
+    }
+
+    fn start_device(&mut self, node: usize) {
+        let (policy, tiles) = (self.plan.policy, self.plan.tile_count as usize);
+        let this = &mut self.nodes[node];
+        if this.running.is_some() {
+            return;
+        }
+        let Some(job) = this.next_job(self.habits.batch_views) else { return };
+        let Machine { costs, calls, .. } = this.machine;
+        let (call_s, view_s) = match policy {
+            Policy::Direct => (calls.direct_s, costs.direct_view_s),
+            _ => (calls.reconstruct_s, costs.reconstruct_view_s),
+        };
+        let (seconds, busy) = match job {
+            Job::Sample { images, .. } => (images as f64 * costs.sample_tile_s(tiles), &mut this.busy.sample_s),
+            Job::Load { .. } => (costs.load_set_s, &mut this.busy.load_s),
+            Job::Views { views, .. } => {
+                (call_s + views as f64 * (view_s + costs.encode_view_s), &mut this.busy.views_s)
+            }
+        };
+        *busy += seconds;
+        this.running = Some(job);
+        self.foresee(self.now_s + seconds, Happens::Done { node });
+    }
+
+    fn done(&mut self, node: usize) {
+        match self.nodes[node].running.take() {
+            Some(Job::Sample { set, .. }) => {
+                let state = std::mem::replace(&mut self.nodes[node].sampled[set as usize], Sampled::Done);
+                let askers = if let Sampled::Soon(askers) = state { askers } else { Vec::new() };
+                askers.into_iter().for_each(|to| self.give(node, set, to));
+                self.relay(node, node, set, None);
+            }
+            Some(Job::Load { set }) => {
+                self.nodes[node].loading[set as usize].loaded = true;
+                self.advance(node);
+            }
+            Some(Job::Views { set, views }) => {
+                self.nodes[node].outgoing.push_back(Parcel::Frames { set, views });
+                self.start_link(node);
+            }
+            None => (),
+        }
+        self.start_device(node);
+    }
+
+    fn start_link(&mut self, node: usize) {
+        if self.nodes[node].sending.is_some() {
+            return;
+        }
+        let Some(parcel) = self.nodes[node].outgoing.pop_front() else { return };
+        self.nodes[node].sending = Some(parcel);
+        let seconds = match parcel {
+            Parcel::Images { set, sampler, images, place } => {
+                let seconds = images as f64 * self.part_bytes() / self.nodes[node].machine.bytes_per_s;
+                self.nodes[node].busy.images_out_s += seconds;
+                self.receive(sampler, set, images, place, seconds);
+                seconds
+            }
+            Parcel::Frames { views, .. } => {
+                let seconds = views as f64 * self.cluster.frame_bytes / self.nodes[node].machine.bytes_per_s;
+                self.nodes[node].busy.frames_out_s += seconds;
+                seconds
+            }
+        };
+        self.foresee(self.now_s + seconds, Happens::Sent { node });
+    }
+
+    /// Occupies the receiver's link behind what is coming in already.
+    fn receive(&mut self, sampler: usize, set: u32, images: usize, place: usize, sending_s: f64) {
+        let (node, part_bytes) = (self.receiver(sampler, place), self.part_bytes());
+        let this = &mut self.nodes[node];
+        let seconds = images as f64 * part_bytes / this.machine.bytes_per_s;
+        let end_s = (this.in_free_s.max(self.now_s) + seconds).max(self.now_s + sending_s);
+        this.in_free_s = end_s;
+        this.busy.in_s += seconds;
+        self.foresee(end_s, Happens::Arrived { sampler, set, place, node });
+    }
+
+    fn sent(&mut self, node: usize) {
+        if let Some(Parcel::Frames { set, views }) = self.nodes[node].sending.take() {
+            let (due, last_s) = &mut self.due[set as usize];
+            *due -= views;
+            *last_s = self.now_s;
+            self.nodes[node].credit += views;
+            self.advance(node);
+        }
+        self.start_link(node);
+    }
+}
