@@ -113,6 +113,13 @@ pub fn rig() -> Vec<Camera> {
     [-0.6, 0.0, 0.6].map(|x| Camera::Pinhole(camera(x, UVec2::new(64, 48)))).to_vec()
 }
 
+/// What a coordinator of the scalar device shows.
+#[must_use]
+pub fn offer() -> SceneOffer {
+    let volume = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) };
+    SceneOffer { illumination: illumination(), ..SceneOffer::new(package(), rig(), volume, SKY_LINEAR) }
+}
+
 /// A lamp above the ball, and a sky; the scalar device checks that they arrive and shades with neither.
 #[must_use]
 pub fn illumination() -> Illumination {
@@ -145,6 +152,9 @@ pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
         policy,
         forced_sampler_count: None,
         refinement_steps: 1,
+        frames_per_s: 0.0,
+        fallbacks: Vec::new(),
+        forced_tile_count: None,
     }
 }
 
@@ -167,7 +177,16 @@ impl Cluster {
 
     /// As [`Cluster::start`], each node's configuration changed by `change`.
     pub async fn start_with(nodes: usize, change: impl Fn(NodeConfig) -> NodeConfig) -> Self {
-        let coordinator = Server::start(coordinate);
+        Self::start_limited(CoordinatorConfig::default(), nodes, change).await
+    }
+
+    /// As [`Cluster::start_with`], with a coordinator's configuration.
+    pub async fn start_limited(
+        config: CoordinatorConfig,
+        nodes: usize,
+        change: impl Fn(NodeConfig) -> NodeConfig,
+    ) -> Self {
+        let coordinator = Server::start(move |listener, shutdown| coordinate(config, listener, shutdown));
         let client = connected(&coordinator.address).await;
         let mut cluster = Self { coordinator, nodes: Vec::new(), engines: Vec::new(), client };
         for _ in 0..nodes {
@@ -195,7 +214,8 @@ impl Cluster {
     /// Starts one where the other was.
     pub fn restart_coordinator(&mut self) {
         let address = self.coordinator.address.trim_start_matches("http://").to_owned();
-        self.coordinator = Server::start_at(&address, coordinate);
+        let config = CoordinatorConfig::default();
+        self.coordinator = Server::start_at(&address, move |listener, shutdown| coordinate(config, listener, shutdown));
     }
 
     /// An open session; what was sampled for measuring is forgotten.
@@ -218,14 +238,19 @@ impl Cluster {
     }
 }
 
-async fn coordinate(listener: TcpListener, shutdown: CancellationToken) -> Result<(), node::ServeError> {
-    let volume = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) };
-    let mut offer = SceneOffer::new(package(), rig(), volume, SKY_LINEAR);
-    offer.illumination = illumination();
-    coordinator::serve(listener, CoordinatorConfig::default(), offer, Observers::default(), shutdown).await
+async fn coordinate(
+    config: CoordinatorConfig,
+    listener: TcpListener,
+    shutdown: CancellationToken,
+) -> Result<(), node::ServeError> {
+    coordinator::serve(listener, config, offer(), Observers::default(), shutdown).await
 }
 
-async fn connected(address: &str) -> Client {
+/// A client of a coordinator that is there soon.
+///
+/// # Panics
+/// Where it is not.
+pub async fn connected(address: &str) -> Client {
     for _ in 0..200 {
         if let Ok(client) = Client::connect(address).await {
             return client;

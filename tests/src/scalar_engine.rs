@@ -3,6 +3,7 @@
 
 use std::any::Any;
 use std::collections::{HashMap, HashSet};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use depth_image::{
@@ -34,14 +35,15 @@ pub fn srgb8(linear: Vec3) -> [u8; 3] {
     linear_from_rgb9e5(rgb9e5_from_linear(linear)).to_array().map(srgb8_from_linear)
 }
 
-/// Images sampled, by eye, scene time and step: how often.
-pub type SampleCounts = HashMap<([u32; 3], u32, Refinement), usize>;
+/// Images sampled, by eye and first row, scene time and step: how often.
+pub type SampleCounts = HashMap<([u32; 4], u32, Refinement), usize>;
 
 /// Plain loops. Clones share what they count.
 #[derive(Debug, Clone, Default)]
 pub struct ScalarEngine {
     counts: Arc<Mutex<SampleCounts>>,
     scenes: Arc<Mutex<HashSet<String>>>,
+    is_lost: Arc<AtomicBool>,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -180,7 +182,18 @@ impl ScalarEngine {
         std::mem::take(&mut locked(&self.counts))
     }
 
+    /// From now on the device does nothing any more.
+    pub fn lose(&self) {
+        self.is_lost.store(true, Ordering::Relaxed);
+    }
+
+    fn works(&self) -> Result<(), EngineError> {
+        let is_lost = self.is_lost.load(Ordering::Relaxed);
+        if is_lost { Err(EngineError::Lost("as a test wanted".to_owned())) } else { Ok(()) }
+    }
+
     fn loaded(&self, hash: &str) -> Result<(), EngineError> {
+        self.works()?;
         if self.has_scene(hash) { Ok(()) } else { Err(EngineError::UnknownScene { hash: hash.to_owned() }) }
     }
 }
@@ -213,13 +226,17 @@ impl Engine for ScalarEngine {
         }
     }
 
+    fn samples_alone(&self, sampling: &str) -> Result<bool, EngineError> {
+        Ok(sampling == "conventional")
+    }
+
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
         self.loaded(&request.scene_hash)?;
         self.samples_in_order(&request.sampling)?;
         known("lighting", &request.lighting, "unlit")?;
         let cameras: Vec<&Camera> = request.wanted.iter().map(|&index| &request.cameras[index as usize]).collect();
         for Camera::Pinhole(camera) in &cameras {
-            let eye = camera.eye_in_world.to_array().map(f32::to_bits);
+            let eye = camera.eye_in_world.extend(camera.principal_px.y).to_array().map(f32::to_bits);
             let image = (eye, request.scene_time_s.to_bits(), request.refinement);
             *locked(&self.counts).entry(image).or_default() += 1;
         }
@@ -228,6 +245,7 @@ impl Engine for ScalarEngine {
     }
 
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        self.works()?;
         if set.illumination != illumination() {
             return Err(EngineError::InvalidArgument {
                 field: "illumination",
@@ -238,6 +256,7 @@ impl Engine for ScalarEngine {
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
+        self.works()?;
         known("method", &work.method, "splat")?;
         let any: &dyn Any = set;
         let Uploaded(set) =

@@ -30,6 +30,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("node-host", &["sampler-node", "compositor-node", "node", "wire"]),
     ("coordinator", &["node", "wire", "depth-image"]),
     ("client", &["wire", "depth-image"]),
+    ("simulation", &["coordinator", "wire", "depth-image"]),
     ("study", &["metrics", "depth-image"]),
     (
         "myriorama",
@@ -45,6 +46,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "render",
             "sampling",
             "scene",
+            "simulation",
             "study",
             "wire",
         ],
@@ -249,12 +251,36 @@ fn services_see_the_device_through_the_engine_only() {
 
 #[test]
 fn the_schedule_neither_waits_nor_reads_a_clock() {
-    let files = sources(&root().join("coordinator/src/schedule"), "rs");
-    assert!(files.iter().any(|(path, _)| path.ends_with("balance.rs")), "the schedule was read");
+    let mut files = sources(&root().join("coordinator/src/schedule"), "rs");
+    files.extend(sources(&root().join("simulation/src"), "rs"));
+    for read in ["balance.rs", "world.rs"] {
+        assert!(files.iter().any(|(path, _)| path.ends_with(read)), "{read} was read");
+    }
     for (path, text) in &files {
         assert_eq!(lines_with(text, &IMPURE), Vec::<String>::new(), "{}", path.display());
     }
     assert_eq!(lines_with("// .await\n let t = Instant::now();", &IMPURE), ["let t = Instant::now();"]);
+}
+
+/// A clock that is set, by a person or over the network, moves no deadline.
+#[test]
+fn services_read_monotonic_time_only() {
+    const SERVICES: [&str; 8] = [
+        "client",
+        "compositor-node",
+        "coordinator",
+        "crates/node",
+        "crates/wire",
+        "node-host",
+        "sampler-node",
+        "tests/src",
+    ];
+    let files: Vec<_> = SERVICES.into_iter().flat_map(|folder| sources(&root().join(folder), "rs")).collect();
+    assert!(files.len() > 50, "{}", files.len());
+    assert!(files.iter().any(|(_, text)| !lines_with(text, &["Instant::now()"]).is_empty()));
+    for (path, text) in &files {
+        assert_eq!(lines_with(text, &["SystemTime", "UNIX_EPOCH"]), [""; 0], "{}", path.display());
+    }
 }
 
 #[test]

@@ -35,6 +35,7 @@ fn raw_request(session: &Session) -> RenderViews {
         codec: FrameCodec::Lz4,
         planes: depth_image::ViewPlanes::default(),
         views: vec![RequestedView { frame: 1, camera }],
+        live: None,
     }
 }
 

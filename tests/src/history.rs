@@ -1,0 +1,215 @@
+//! What happened, as a client saw it and as coordinators wrote it down; and the invariants that no fault may break.
+
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::io::Cursor;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use coordinator::schedule::{Command, replay};
+use wire::{Assignment, Policy};
+
+/// A frame that came.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    /// The client's number.
+    pub frame: u64,
+    /// Of the plan that made it.
+    pub plan_epoch: u64,
+    /// What it shows.
+    pub set_index: u64,
+    /// What is wrong with its picture.
+    pub fault: Option<String>,
+}
+
+/// Views that were asked for together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Call {
+    /// When.
+    pub asked: Instant,
+    /// When all had come, or none was waited for any more.
+    pub ended: Instant,
+    /// The numbers asked for.
+    pub wanted: std::ops::Range<u64>,
+    /// Of which sample set.
+    pub set_index: u64,
+    /// What came.
+    pub frames: Vec<Seen>,
+    /// Why not all came.
+    pub error: Option<String>,
+}
+
+/// All that is known of one cluster.
+#[derive(Debug, Clone, Default)]
+pub struct History {
+    /// Of one client, in their order.
+    pub calls: Vec<Call>,
+    /// The plans that the client was given.
+    pub plans: Vec<Assignment>,
+    /// What coordinators recorded, the first one's log first.
+    pub logs: Vec<Vec<u8>>,
+}
+
+impl History {
+    /// Adds a coordinator's log.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    pub fn add_log(&mut self, path: &Path) -> std::io::Result<()> {
+        self.logs.push(std::fs::read(path)?);
+        Ok(())
+    }
+
+    /// Frames that came whole.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.calls.iter().map(|call| call.frames.len()).sum()
+    }
+
+    /// The longest time after `since` in which no call was answered in full.
+    #[must_use]
+    pub fn longest_wait(&self, since: Instant) -> Duration {
+        let answered = self.calls.iter().filter(|call| call.error.is_none() && call.ended > since);
+        let (mut last, mut longest) = (since, Duration::ZERO);
+        for call in answered {
+            longest = longest.max(call.ended - last);
+            last = call.ended;
+        }
+        longest
+    }
+
+    /// Every invariant that does not hold, in words. Nothing seen is one too.
+    #[must_use]
+    pub fn violations(&self) -> Vec<String> {
+        let mut wrong = Vec::new();
+        if self.frames() == 0 {
+            wrong.push("no frame came".to_owned());
+        }
+        wrong.extend(self.lost());
+        wrong.extend(self.numbers());
+        wrong.extend(self.pictures());
+        wrong.extend(self.epochs_of_frames());
+        let commanded = self.commanded().unwrap_or_else(|why| {
+            wrong.push(why);
+            Vec::new()
+        });
+        wrong.extend(commanded.iter().flat_map(roles));
+        wrong.extend(rising(&commanded));
+        wrong.extend(self.leaders(&commanded));
+        wrong
+    }
+
+    /// All that was asked for came.
+    fn lost(&self) -> Vec<String> {
+        let lost =
+            self.calls.iter().filter(|call| call.error.is_some() || call.frames.len() != call.wanted.clone().count());
+        lost.map(|call| format!("of frames {:?} {} came: {:?}", call.wanted, call.frames.len(), call.error)).collect()
+    }
+
+    /// Each number once, none after those of a later call, and none that was not asked for.
+    fn numbers(&self) -> Vec<String> {
+        let (mut wrong, mut seen) = (Vec::new(), HashSet::new());
+        let mut highest = None;
+        for call in &self.calls {
+            for Seen { frame, .. } in &call.frames {
+                if !seen.insert(*frame)
+                    || !call.wanted.contains(frame)
+                    || highest.is_some_and(|highest| *frame <= highest)
+                {
+                    wrong.push(format!("frame {frame} came twice, too late or without being asked for"));
+                }
+            }
+            highest = call.frames.iter().map(|seen| seen.frame).max().max(highest);
+        }
+        wrong
+    }
+
+    /// One sample set a picture: the one that was asked for.
+    fn pictures(&self) -> Vec<String> {
+        let frames = self.calls.iter().flat_map(|call| call.frames.iter().map(move |seen| (call, seen)));
+        let wrong = |(call, seen): (&Call, &Seen)| {
+            let other = (seen.set_index != call.set_index)
+                .then(|| format!("frame {} shows set {} for {}", seen.frame, seen.set_index, call.set_index));
+            other.or_else(|| seen.fault.clone())
+        };
+        frames.filter_map(wrong).collect()
+    }
+
+    /// Plans of frames rise from call to call: nothing comes of a plan that was replaced.
+    fn epochs_of_frames(&self) -> Vec<String> {
+        let epochs = |call: &Call| call.frames.iter().map(|seen| seen.plan_epoch).collect::<BTreeSet<_>>();
+        let (mut wrong, mut highest) = (Vec::new(), 0);
+        for call in &self.calls {
+            let epochs = epochs(call);
+            if epochs.first().is_some_and(|&least| least < highest) {
+                wrong.push(format!("frames {:?} are of plans {epochs:?}, after plan {highest}", call.wanted));
+            }
+            highest = epochs.last().copied().unwrap_or(0).max(highest);
+        }
+        wrong
+    }
+
+    /// The plans of all logs, in their order. A log gives the same commands whenever it is replayed.
+    fn commanded(&self) -> Result<Vec<Assignment>, String> {
+        let mut plans = Vec::new();
+        for log in &self.logs {
+            let [once, again] = [(); 2].map(|()| replay(Cursor::new(log)).map_err(|error| error.to_string()));
+            let (once, again) = (once?, again?);
+            if once != again {
+                return Err("a log is not replayed twice alike".to_owned());
+            }
+            plans.extend(once.into_iter().flat_map(|(_, _, commands)| commands).filter_map(plan_of));
+        }
+        Ok(plans)
+    }
+
+    /// One leader an epoch: whoever has a plan of an epoch has the same, and it is the one that was recorded.
+    fn leaders(&self, commanded: &[Assignment]) -> Vec<String> {
+        let mut first: BTreeMap<u64, &Assignment> = BTreeMap::new();
+        let mut wrong = Vec::new();
+        for plan in commanded.iter().chain(&self.plans) {
+            if first.entry(plan.plan_epoch).or_insert(plan) != &plan {
+                wrong.push(format!("there are two plans {}", plan.plan_epoch));
+            }
+        }
+        let unknown = |plan: &&Assignment| commanded.iter().all(|other| other.plan_epoch != plan.plan_epoch);
+        if !self.logs.is_empty() {
+            wrong.extend(self.plans.iter().filter(unknown).map(|plan| format!("no log has plan {}", plan.plan_epoch)));
+        }
+        wrong
+    }
+}
+
+fn plan_of(command: Command) -> Option<Assignment> {
+    match command {
+        Command::Apply { plan, .. } => Some(plan.assignment),
+        _ => None,
+    }
+}
+
+/// A view has one compositor, an image, or its tile, one sampler.
+fn roles(plan: &Assignment) -> Vec<String> {
+    let names: Vec<_> = plan.compositors.iter().map(|share| &share.node_name).collect();
+    let addresses: HashSet<_> = plan.compositors.iter().map(|share| &share.address).collect();
+    let mut wrong = Vec::new();
+    if addresses.len() < names.len() || names.iter().collect::<HashSet<_>>().len() < names.len() {
+        wrong.push(format!("plan {} has a compositor twice: {names:?}", plan.plan_epoch));
+    }
+    let images: Vec<u32> = plan.samplers.iter().flat_map(|share| share.image_indices.iter().copied()).collect();
+    let once = images.iter().collect::<HashSet<_>>().len() == images.len();
+    let all = plan.policy == Policy::Direct || images.len() == plan.image_count();
+    if !(once && all) {
+        wrong.push(format!("plan {} samples images {images:?}", plan.plan_epoch));
+    }
+    wrong
+}
+
+fn rising(commanded: &[Assignment]) -> Vec<String> {
+    // A plan is told again to sessions that come later.
+    let again = |pair: &&[Assignment]| pair[0].plan_epoch > pair[1].plan_epoch;
+    let falls = commanded.windows(2).filter(again);
+    falls.map(|pair| format!("plan {} after plan {}", pair[1].plan_epoch, pair[0].plan_epoch)).collect()
+}
+
+#[cfg(test)]
+#[path = "history_tests.rs"]
+mod tests;

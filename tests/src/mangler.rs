@@ -1,0 +1,134 @@
+//! A sampler that sends what it should not: it stands before a node, asks it, and spoils what it passes on.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use node::{ServeError, serve};
+use tokio::net::TcpListener;
+use tokio::sync::mpsc;
+use tokio_stream::StreamExt as _;
+use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::{CancellationToken, DropGuard};
+use tonic::service::Routes;
+use tonic::{Status, async_trait};
+use wire::rpc::{
+    Compositor, CompositorClient, Messages, Node, NodeClient, Sampler, SamplerClient, compositor_server, connect,
+    node_server, sampler_server,
+};
+use wire::{Assignment, Chunk, Costs, FetchImages, FramePart, MeasureCosts, Ready, RenderViews};
+
+/// What becomes of the chunks of one answer.
+pub type Spoil = fn(&mut Vec<Chunk>);
+
+#[derive(Default)]
+struct Orders {
+    spoil: Option<Spoil>,
+    /// Answers left to be spoilt.
+    times: usize,
+}
+
+/// Serves until it is dropped.
+pub struct Mangler {
+    /// What the node is to advertise.
+    pub address: String,
+    node: Arc<Mutex<String>>,
+    orders: Arc<Mutex<Orders>>,
+    _ends: DropGuard,
+}
+
+impl Mangler {
+    /// Before a node that is named later.
+    ///
+    /// # Panics
+    /// Where there is no port.
+    pub async fn start() -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let address = format!("http://{}", listener.local_addr().expect("an address"));
+        let (node, orders) = (Arc::<Mutex<String>>::default(), Arc::<Mutex<Orders>>::default());
+        let front = Front { node: node.clone(), orders: orders.clone() };
+        let shutdown = CancellationToken::new();
+        tokio::spawn(serve_front(listener, front, shutdown.clone()));
+        Self { address, node, orders, _ends: shutdown.drop_guard() }
+    }
+
+    /// Which node is asked.
+    pub fn stand_before(&self, address: &str) {
+        *self.node.lock().unwrap_or_else(PoisonError::into_inner) = address.to_owned();
+    }
+
+    /// Spoils the next answers.
+    pub fn spoil(&self, times: usize, spoil: Spoil) {
+        *self.orders.lock().unwrap_or_else(PoisonError::into_inner) = Orders { spoil: Some(spoil), times };
+    }
+
+    /// Answers that are still to be spoilt.
+    #[must_use]
+    pub fn left(&self) -> usize {
+        self.orders.lock().unwrap_or_else(PoisonError::into_inner).times
+    }
+}
+
+async fn serve_front(listener: TcpListener, front: Front, shutdown: CancellationToken) -> Result<(), ServeError> {
+    let routes = Routes::new(sampler_server(front.clone()))
+        .add_service(node_server(front.clone()))
+        .add_service(compositor_server(front));
+    serve(listener, routes, false, shutdown).await
+}
+
+#[derive(Clone)]
+struct Front {
+    node: Arc<Mutex<String>>,
+    orders: Arc<Mutex<Orders>>,
+}
+
+impl Front {
+    fn node(&self) -> String {
+        self.node.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn spoilt(&self, chunks: &mut Vec<Chunk>) {
+        let mut orders = self.orders.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(spoil) = orders.spoil.filter(|_| orders.times > 0) {
+            orders.times -= 1;
+            spoil(chunks);
+        }
+    }
+}
+
+#[async_trait]
+impl Sampler for Front {
+    async fn fetch_sample_images(&self, request: FetchImages) -> Result<Messages<Chunk>, Status> {
+        let mut coming = SamplerClient::new(connect(&self.node()).await?).fetch_sample_images(request).await?;
+        let mut chunks = Vec::new();
+        while let Some(chunk) = coming.next().await {
+            chunks.push(chunk?);
+        }
+        self.spoilt(&mut chunks);
+        Ok(Box::pin(tokio_stream::iter(chunks).map(Ok)))
+    }
+}
+
+#[async_trait]
+impl Node for Front {
+    async fn measure_costs(&self, request: MeasureCosts) -> Result<Costs, Status> {
+        NodeClient::new(connect(&self.node()).await?).measure_costs(request).await
+    }
+
+    async fn apply_assignment(&self, assignment: Assignment) -> Result<Ready, Status> {
+        NodeClient::new(connect(&self.node()).await?).apply_assignment(assignment).await
+    }
+}
+
+#[async_trait]
+impl Compositor for Front {
+    async fn render_views(&self, mut requests: Messages<RenderViews>) -> Result<Messages<FramePart>, Status> {
+        let (send, passed) = mpsc::channel(4);
+        tokio::spawn(async move {
+            while let Some(Ok(request)) = requests.next().await {
+                if send.send(request).await.is_err() {
+                    break;
+                }
+            }
+        });
+        CompositorClient::new(connect(&self.node()).await?).render_views(ReceiverStream::new(passed)).await
+    }
+}

@@ -1,0 +1,152 @@
+//! A client that asks for views all the time, and remembers what came of it.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use client::{Client, Session, ViewRequest};
+use glam::UVec2;
+use tokio::task::JoinHandle;
+use wire::{PolicyChoice, Refinement, SessionRequest, Timeline};
+
+use crate::cluster::{camera, request};
+use crate::history::{Call, History, Seen};
+use crate::picture::fault_of;
+
+/// Views of one call: enough for every compositor of a small cluster.
+const VIEWS: u64 = 4;
+/// Between two calls, so that others get on.
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// Sets of which each shows another time, over and over. They are more than a compositor keeps, so that samplers are
+/// needed all the time.
+pub const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 0.05, set_count: 40 };
+
+/// The session that is watched.
+#[must_use]
+pub fn watched() -> SessionRequest {
+    request(PolicyChoice::Pipeline, MOVING)
+}
+
+/// Asks until it is told to stop.
+#[derive(Debug)]
+pub struct Watcher {
+    /// What it asks by.
+    pub session: Arc<Session>,
+    history: Arc<Mutex<History>>,
+    asking: JoinHandle<()>,
+}
+
+impl Drop for Watcher {
+    fn drop(&mut self) {
+        self.asking.abort();
+    }
+}
+
+impl Watcher {
+    /// Opens a session and begins.
+    ///
+    /// # Panics
+    /// Where there is none to be had, or its first frames do not come.
+    pub async fn start(client: &Client) -> Self {
+        let session = Arc::new(client.open_session(watched(), |_| ()).await.expect("a session"));
+        let history = Arc::<Mutex<History>>::default();
+        let asking = tokio::spawn(ask(session.clone(), history.clone()));
+        let watcher = Self { session, history, asking };
+        watcher.calls_after(Instant::now(), 2, Duration::from_secs(10)).await;
+        watcher
+    }
+
+    /// Up to now.
+    #[must_use]
+    pub fn history(&self) -> History {
+        self.locked().clone()
+    }
+
+    fn locked(&self) -> MutexGuard<'_, History> {
+        self.history.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The plan that holds for the client.
+    #[must_use]
+    pub fn epoch(&self) -> u64 {
+        self.session.plan().assignment.plan_epoch
+    }
+
+    /// Waits for so many calls that began after `since` and were answered in full.
+    ///
+    /// # Panics
+    /// Where they take longer than `deadline`.
+    pub async fn calls_after(&self, since: Instant, count: usize, deadline: Duration) {
+        let answered = |call: &&Call| call.error.is_none() && call.asked >= since;
+        let what = format!("{count} calls in full");
+        eventually(&what, deadline, || self.locked().calls.iter().filter(answered).count() >= count).await;
+    }
+
+    /// Waits for a plan that `holds` and frames of it; gives the longest time without frames since then.
+    ///
+    /// # Panics
+    /// Where that takes longer than `deadline`.
+    pub async fn healed(&self, since: Instant, deadline: Duration, holds: impl Fn(&Session) -> bool) -> Duration {
+        eventually("another plan", deadline, || holds(&self.session)).await;
+        self.calls_after(Instant::now(), 2, deadline).await;
+        let wait = self.locked().longest_wait(since);
+        assert!(wait < deadline, "no frames for {wait:?}, at most {deadline:?}");
+        wait
+    }
+}
+
+/// Waits for what is soon.
+///
+/// # Panics
+/// Where it takes longer than `deadline`.
+pub async fn eventually(what: &str, deadline: Duration, mut holds: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !holds() {
+        assert!(start.elapsed() < deadline, "{what}: not within {deadline:?}");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+async fn ask(session: Arc<Session>, history: Arc<Mutex<History>>) {
+    for number in 0.. {
+        let plan = session.plan().assignment;
+        let call = ask_once(&session, number).await;
+        {
+            let mut history = history.lock().unwrap_or_else(PoisonError::into_inner);
+            if history.plans.last() != Some(&plan) {
+                history.plans.push(plan);
+            }
+            history.calls.push(call);
+        }
+        tokio::time::sleep(PAUSE).await;
+    }
+}
+
+async fn ask_once(session: &Session, number: u64) -> Call {
+    let wanted = number * VIEWS..(number + 1) * VIEWS;
+    let set_index = (number % u64::from(MOVING.set_count)) as u32;
+    let scene_time_s = MOVING.time_s(set_index).expect("one of its sets");
+    let view = |frame: u64| ViewRequest {
+        frame,
+        set_index,
+        camera: camera((frame % VIEWS) as f32 * 0.2 - 0.3, UVec2::new(40, 30)),
+    };
+    let (asked, mut frames, mut error) = (Instant::now(), Vec::new(), None);
+    match session.render_views(wanted.clone().map(view).collect()) {
+        Err(refused) => error = Some(refused.to_string()),
+        Ok(mut coming) => {
+            while let Some(next) = coming.next().await {
+                match next {
+                    Ok(frame) => frames.push(Seen {
+                        frame: frame.request.frame,
+                        plan_epoch: frame.header.sample_set_id.plan_epoch,
+                        set_index: frame.header.sample_set_id.index,
+                        fault: fault_of(&frame, scene_time_s, Refinement::default()),
+                    }),
+                    Err(failed) => error = Some(failed.to_string()),
+                }
+            }
+        }
+    }
+    Call { asked, ended: Instant::now(), wanted, set_index: u64::from(set_index), frames, error }
+}

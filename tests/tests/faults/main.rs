@@ -1,0 +1,43 @@
+//! Faults, injected into real processes, real sockets and what is sent between them. Each test holds what a client saw
+//! and what the coordinator recorded against the invariants, and prints how long clients went without frames.
+//! `docs/faults.md` has the table.
+#![allow(clippy::unwrap_used)]
+
+mod bad_input;
+mod chunks;
+mod network;
+mod processes;
+
+use std::time::Duration;
+
+use client::Session;
+use cluster_tests::processes::Processes;
+use cluster_tests::watcher::Watcher;
+
+/// The program that is killed.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_scalar_cluster");
+/// Complete frames come again after a closed connection.
+const CLOSED: Duration = Duration::from_secs(5);
+/// And after a silent loss.
+const SILENT: Duration = Duration::from_secs(15);
+
+/// Prints the time to heal. Nothing may have been violated, by what the coordinators wrote down either.
+fn finish(what: &str, wait: Duration, cluster: &Processes, watcher: &Watcher) {
+    let mut history = watcher.history();
+    cluster.logs().iter().for_each(|log| history.add_log(log).unwrap());
+    println!("{what}: {} frames, longest without {:.2} s", history.frames(), wait.as_secs_f64());
+    assert_eq!(history.violations(), [""; 0], "{what}");
+}
+
+fn has_role(session: &Session, name: &str) -> bool {
+    let plan = session.plan().assignment;
+    plan.composites(name) || plan.samplers.iter().any(|share| share.node_name == name)
+}
+
+fn sampler_of(session: &Session) -> String {
+    session.plan().assignment.samplers[0].node_name.clone()
+}
+
+fn compositor_of(session: &Session) -> String {
+    session.plan().assignment.compositors[0].node_name.clone()
+}

@@ -1,0 +1,136 @@
+//! Processes that are killed, stopped, started again and asked to end.
+
+use std::time::{Duration, Instant};
+
+use client::Session;
+use cluster_tests::cluster::connected;
+use cluster_tests::processes::{Processes, number_of};
+use cluster_tests::watcher::Watcher;
+use rustix::process::Signal;
+
+use crate::{CLOSED, PROGRAM, SILENT, compositor_of, finish, has_role, sampler_of};
+
+async fn killed(what: &str, victim: fn(&Session) -> String) {
+    let mut cluster = Processes::start(PROGRAM, 3).await;
+    let watcher = Watcher::start(&cluster.client).await;
+    let name = victim(&watcher.session);
+    let since = Instant::now();
+    cluster.nodes[number_of(&name)].kill();
+    let wait = watcher.healed(since, CLOSED, |session| !has_role(session, &name)).await;
+    finish(what, wait, &cluster, &watcher);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_killed_sampler_is_replaced() {
+    killed("sampler killed", sampler_of).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_killed_compositor_is_replaced() {
+    killed("compositor killed", compositor_of).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_go_on_without_a_coordinator_and_a_plan_follows_its_return() {
+    let mut cluster = Processes::start(PROGRAM, 3).await;
+    let watcher = Watcher::start(&cluster.client).await;
+    let (epoch, since) = (watcher.epoch(), Instant::now());
+    cluster.coordinator.kill();
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    watcher.calls_after(Instant::now(), 5, Duration::from_secs(1)).await;
+    let returned = Instant::now();
+    cluster.restart_coordinator();
+    let wait = watcher.healed(since, CLOSED, |session| session.plan().assignment.plan_epoch > epoch).await;
+    let took = returned.elapsed();
+    assert!(took < CLOSED, "{took:?}");
+    finish(
+        &format!("coordinator killed, a plan {:.2} s after its return", took.as_secs_f64()),
+        wait,
+        &cluster,
+        &watcher,
+    );
+}
+
+/// What is lost without a word: sockets stay open, and nothing answers. Afterwards the process goes on as if nothing
+/// had been.
+async fn stopped(what: &str, victim: fn(&Session) -> String) {
+    let cluster = Processes::start(PROGRAM, 3).await;
+    let watcher = Watcher::start(&cluster.client).await;
+    let (name, epoch) = (victim(&watcher.session), watcher.epoch());
+    let since = Instant::now();
+    let zombie = &cluster.nodes[number_of(&name)];
+    zombie.signal(Signal::STOP);
+    let wait = watcher.healed(since, SILENT, |session| !has_role(session, &name)).await;
+    zombie.signal(Signal::CONT);
+    cluster.client.wait_for_nodes(3, CLOSED).await.unwrap();
+    watcher.calls_after(Instant::now(), 10, CLOSED).await;
+    assert!(watcher.epoch() > epoch);
+    finish(what, wait, &cluster, &watcher);
+}
+
+/// Keepalive takes up to 10 s to notice: all at the same time.
+#[tokio::test(flavor = "multi_thread")]
+async fn stopped_processes_are_replaced_and_fenced_when_they_go_on() {
+    tokio::join!(
+        stopped("sampler stopped", sampler_of),
+        stopped("compositor stopped", compositor_of),
+        stopped_coordinator(),
+    );
+}
+
+async fn stopped_coordinator() {
+    let cluster = Processes::start(PROGRAM, 3).await;
+    let watcher = Watcher::start(&cluster.client).await;
+    let since = Instant::now();
+    cluster.coordinator.signal(Signal::STOP);
+    tokio::time::sleep(Duration::from_secs(12)).await;
+    cluster.coordinator.signal(Signal::CONT);
+    let client = connected(&cluster.coordinator.address).await;
+    client.wait_for_nodes(3, CLOSED).await.unwrap();
+    let wait = watcher.healed(since, CLOSED, |_| true).await;
+    finish("coordinator stopped for 12 s", wait, &cluster, &watcher);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_that_is_asked_to_end_does_so_under_load_and_no_frame_is_lost() {
+    let mut cluster = Processes::start(PROGRAM, 3).await;
+    let watcher = Watcher::start(&cluster.client).await;
+    for victim in [compositor_of, sampler_of] {
+        let (name, since) = (victim(&watcher.session), Instant::now());
+        let node = &mut cluster.nodes[number_of(&name)];
+        node.signal(Signal::TERM);
+        let (status, took) = node.ended(Duration::from_secs(10)).await;
+        assert!(status.success(), "{status}");
+        let wait = watcher.healed(since, CLOSED, |session| !has_role(session, &name)).await;
+        finish(&format!("SIGTERM, ended after {:.2} s", took.as_secs_f64()), wait, &cluster, &watcher);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_whose_device_is_lost_ends_and_others_take_its_place() {
+    let mut cluster = Processes::start(PROGRAM, 3).await;
+    let watcher = Watcher::start(&cluster.client).await;
+    let (name, since) = (compositor_of(&watcher.session), Instant::now());
+    let node = &mut cluster.nodes[number_of(&name)];
+    node.signal(Signal::USR1);
+    let (status, _) = node.ended(CLOSED).await;
+    assert!(!status.success(), "whoever started it may start it again");
+    let wait = watcher.healed(since, CLOSED, |session| !has_role(session, &name)).await;
+    finish("device of a compositor lost", wait, &cluster, &watcher);
+}
+
+/// What was sampled is kept: the sampler's device is needed again for another workload only, and to measure its costs.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_opens_though_a_device_is_lost_meanwhile() {
+    let mut cluster = Processes::start(PROGRAM, 3).await;
+    for node in &mut cluster.nodes[..2] {
+        node.signal(Signal::USR1);
+    }
+    let since = Instant::now();
+    let watcher = Watcher::start(&cluster.client).await;
+    for node in &mut cluster.nodes[..2] {
+        assert!(!node.ended(CLOSED).await.0.success());
+    }
+    let wait = watcher.healed(since, CLOSED, |session| has_role(session, "n2") && !has_role(session, "n1")).await;
+    finish("devices of two of three nodes lost", wait, &cluster, &watcher);
+}

@@ -1,0 +1,172 @@
+//! What plans say beside who does what: tiles, relays, demand that changes, and what nodes report of their work.
+#![allow(clippy::unwrap_used)]
+
+use std::num::NonZeroU32;
+use std::time::{Duration, Instant};
+
+use client::{ClientError, Frame};
+use cluster_tests::cluster::{Cluster, camera, request, views};
+use glam::UVec2;
+use tokio_stream::StreamExt as _;
+use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
+use wire::{
+    Assignment, FetchImages, FrameAssembly, FrameCodec, Policy, PolicyChoice, RenderViews, RequestedView,
+    SessionRequest, Timeline, WholeFrame,
+};
+
+const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
+
+fn pipeline() -> SessionRequest {
+    request(PolicyChoice::Pipeline, MOVING)
+}
+
+/// What share of all pixels' bytes two deliveries have in common.
+fn alike(a: &[Frame], b: &[Frame]) -> f64 {
+    let (mut same, mut all) = (0, 0);
+    for frame in a {
+        let other = b.iter().find(|other| other.request.frame == frame.request.frame).unwrap();
+        same += frame.view.srgb8.iter().zip(&other.view.srgb8).filter(|(a, b)| a == b).count();
+        all += frame.view.srgb8.len();
+    }
+    f64::from(u32::try_from(same).unwrap()) / f64::from(u32::try_from(all).unwrap())
+}
+
+async fn delivered(cluster: &Cluster, request: SessionRequest) -> (Assignment, Vec<Frame>) {
+    let session = cluster.session(request).await.unwrap();
+    let frames = session.render_views(views(3, 6)).unwrap().all().await.unwrap();
+    (session.plan().assignment, frames)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn views_from_tiles_are_those_from_whole_images() {
+    let cluster = Cluster::start(4).await;
+    let forced = |tiles| SessionRequest { forced_tile_count: Some(tiles), ..pipeline() };
+    let (plan, whole) = delivered(&cluster, forced(1)).await;
+    assert_eq!(plan.tile_count, 1);
+    drop(cluster);
+    let cluster = Cluster::start(4).await;
+    let (plan, tiled) = delivered(&cluster, forced(5)).await;
+    assert_eq!((plan.tile_count, plan.image_count()), (5, 15));
+    assert_eq!(whole.len(), 18);
+    assert!(cluster.take_counts().iter().all(|&times| times == 1), "every tile once");
+    // Depth is quantised over each tile's own range, so that samples may fall into the neighbouring pixel.
+    let alike = alike(&whole, &tiled);
+    assert!(alike > 0.98, "{alike}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn tiles_need_images_that_stand_alone() {
+    let cluster = Cluster::start(2).await;
+    let cut = SessionRequest { sampling: "in_order".to_owned(), forced_tile_count: Some(2), ..pipeline() };
+    let error = cluster.session(cut).await.unwrap_err().to_string();
+    assert!(error.contains("forced_tile_count is 2"), "{error}");
+}
+
+/// A chain: one sampler, and compositors that pass images on.
+async fn chained(cluster: &Cluster) -> Assignment {
+    let forced = SessionRequest { forced_sampler_count: Some(1), ..pipeline() };
+    let session = cluster.session(forced).await.unwrap();
+    let plan = session.plan().assignment;
+    drop(session);
+    let chain = Assignment { plan_epoch: 100, relay_fanout: NonZeroU32::new(1), ..plan };
+    for address in chain.compositors.iter().map(|c| &c.address).chain(chain.samplers.iter().map(|s| &s.address)) {
+        NodeClient::new(connect(address).await.unwrap()).apply_assignment(chain.clone()).await.unwrap();
+    }
+    chain
+}
+
+/// One view of a set, of one compositor.
+async fn ask(address: &str, plan: &Assignment, set_index: u32) -> WholeFrame {
+    let request = RenderViews {
+        plan_epoch: plan.plan_epoch,
+        set_index,
+        method: "splat".to_owned(),
+        codec: FrameCodec::Lz4,
+        planes: depth_image::ViewPlanes::default(),
+        views: vec![RequestedView { frame: 1, camera: camera(0.1, UVec2::new(48, 36)) }],
+        live: None,
+    };
+    let client = CompositorClient::new(connect(address).await.unwrap());
+    let mut parts = client.render_views(tokio_stream::iter([request])).await.unwrap();
+    let mut assembly = FrameAssembly::default();
+    while let Some(part) = parts.next().await {
+        if let Some(frame) = assembly.push(part.unwrap()).unwrap() {
+            return frame;
+        }
+    }
+    panic!("no frame of {address}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn compositors_pass_images_on_in_a_chain() {
+    let cluster = Cluster::start(4).await;
+    let plan = chained(&cluster).await;
+    let [first, second, last] = &plan.compositors[..] else { panic!("{:?}", plan.compositors) };
+    assert_eq!((plan.relay_of(&first.node_name), plan.relay_of(&last.node_name)), (None, Some(second)));
+    cluster.take_counts();
+    // The last one first: its asking goes all the way up.
+    let far = ask(&last.address, &plan, 1).await;
+    let near = ask(&first.address, &plan, 1).await;
+    assert_eq!(far.data, near.data);
+    assert!(cluster.take_counts().iter().all(|&times| times == 1), "sampled once");
+    let passed_on = |address: String, plan_epoch| async move {
+        let sampler = SamplerClient::new(connect(&address).await.unwrap());
+        let fetch = FetchImages { plan_epoch, set_index: 1, image_indices: vec![0, 1, 2] };
+        sampler.fetch_sample_images(fetch).await.map(|chunks| chunks.collect::<Vec<_>>())
+    };
+    let chunks = passed_on(second.address.clone(), 100).await.unwrap().await;
+    assert!(chunks.len() >= 6 && chunks.iter().all(Result::is_ok), "header and data of each of three images");
+    let refused = passed_on(last.address.clone(), 100).await.err().unwrap();
+    assert!(refused.message().contains("is not sampled by"), "nobody asks the last one: {refused}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_relay_that_is_gone_is_passed_over() {
+    let mut cluster = Cluster::start(4).await;
+    let plan = chained(&cluster).await;
+    let relay = plan.compositors[1].node_name[1..].parse::<usize>().unwrap();
+    cluster.nodes[relay].kill();
+    let start = Instant::now();
+    ask(&plan.compositors[2].address, &plan, 0).await;
+    println!("samplers asked in place of a relay after {:?}", start.elapsed());
+    assert!(start.elapsed() < Duration::from_secs(5));
+    let start = Instant::now();
+    ask(&plan.compositors[2].address, &plan, 1).await;
+    assert!(start.elapsed() < Duration::from_secs(2), "the next set is not asked of it any more");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sessions_ask_for_more_and_less_and_nodes_say_what_they_did() {
+    let cluster = Cluster::start(3).await;
+    let session = cluster.session(pipeline()).await.unwrap();
+    session.change(500, 0.0).await.unwrap();
+    let status = cluster.client.status().await.unwrap();
+    assert_eq!(status.views_per_set, 500);
+    session.change(12, 0.0).await.unwrap();
+    let (start, mut made) = (Instant::now(), 0);
+    loop {
+        made += session.render_views(views(3, 12)).unwrap().all().await.unwrap().len() as u64;
+        let status = cluster.client.status().await.unwrap();
+        let reported: u64 = status.conditions.iter().map(|condition| condition.views).sum();
+        assert!(reported <= made, "{reported} of {made}");
+        if let Some(achieved) = status.achieved.first().filter(|_| reported > 0) {
+            assert_eq!(achieved.policy, Policy::Pipeline);
+            assert!(achieved.busy_s > 0.0 && achieved.busy_s < 10.0, "{achieved:?}");
+            assert!(status.conditions.iter().any(|condition| condition.busy_ratio > 0.0));
+            break;
+        }
+        assert!(start.elapsed() < Duration::from_secs(10), "{status:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_nodes_cannot_do_is_refused_and_others_go_on() {
+    let cluster = Cluster::start(2).await;
+    let session = cluster.session(pipeline()).await.unwrap();
+    let still = Timeline::still(0.0);
+    let greedy = SessionRequest { frames_per_s: 1000.0, views_per_set: 1 << 16, ..request(PolicyChoice::Auto, still) };
+    let refused = cluster.session(greedy).await.unwrap_err();
+    let ClientError::Exhausted { reason } = &refused else { panic!("{refused:?}") };
+    assert!(reason.contains("frames_per_s: all sessions together would take"), "{reason}");
+    assert_eq!(session.render_views(views(3, 2)).unwrap().all().await.unwrap().len(), 6);
+}

@@ -1,0 +1,154 @@
+//! Nobody holds up another, and what is too much is refused by its name.
+
+use std::time::{Duration, Instant};
+
+use client::{Client, ClientError};
+use cluster_tests::cluster::Cluster;
+use coordinator::CoordinatorConfig;
+use node::{Deadlines, NodeConfig, Quotas};
+use tokio::time::timeout;
+use tokio_stream::StreamExt as _;
+use tonic::Code;
+use wire::SessionRequest;
+use wire::rpc::{CompositorClient, connect};
+
+use crate::raw::{HEALED, Raw, STILL, compositor_of, greedy, narrow, pipeline, seen};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_takes_nothing_holds_up_nobody_and_is_cut_off() {
+    let hasty = |config: NodeConfig| NodeConfig {
+        deadlines: Deadlines { stall: Duration::from_millis(700), ..config.deadlines },
+        ..config
+    };
+    let cluster = Cluster::start_with(1, hasty).await;
+    let session = cluster.session(pipeline(STILL)).await.unwrap();
+    let (address, _) = compositor_of(&session);
+    let slow = narrow(&address).await;
+    let request = greedy(&session, 512, 80);
+    let mut unread = slow.render_views(tokio_stream::once(request).chain(tokio_stream::pending())).await.unwrap();
+    let mut live = session.live();
+    for i in 0..20 {
+        seen(&mut live, i as f32 * 0.01, 0).await;
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    let ended = loop {
+        match timeout(HEALED, unread.next()).await.expect("it was cut off").unwrap() {
+            Ok(_) => (),
+            Err(status) => break status,
+        }
+    };
+    assert_eq!(ended.code(), Code::DeadlineExceeded);
+    assert!(ended.message().contains("nothing was taken"), "{ended}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_asks_for_thousands_does_not_starve_others() {
+    let cluster = Cluster::start(1).await;
+    let session = cluster.session(pipeline(STILL)).await.unwrap();
+    let (address, _) = compositor_of(&session);
+    let other = CompositorClient::new(connect(&address).await.unwrap());
+    let request = greedy(&session, 96, 4000);
+    let mut many = other.render_views(tokio_stream::once(request)).await.unwrap();
+    let bulk = tokio::spawn(async move {
+        let mut count = 0;
+        while let Some(part) = many.next().await {
+            part.unwrap();
+            count += 1;
+        }
+        count
+    });
+    let mut live = session.live();
+    let mut waited = Vec::new();
+    for i in 0..20 {
+        let came = seen(&mut live, i as f32 * 0.01, 0).await;
+        waited.push(came.times.decoded - came.times.looked);
+    }
+    assert!(!bulk.is_finished(), "nothing was shared: {waited:?}");
+    assert_eq!(bulk.await.unwrap(), 4000);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_beyond_a_node_s_quota_is_refused_by_name() {
+    let small =
+        |config: NodeConfig| NodeConfig { quotas: Quotas { streams: 3, pixels: 4 << 20, ..config.quotas }, ..config };
+    let cluster = Cluster::start_with(1, small).await;
+    let session = cluster.session(pipeline(STILL)).await.unwrap();
+    let (address, _) = compositor_of(&session);
+    let mut live = session.live();
+    seen(&mut live, 0.0, 0).await;
+    let ask = async |count: u64| {
+        let request = greedy(&session, 1024, count);
+        narrow(&address).await.render_views(tokio_stream::once(request).chain(tokio_stream::pending())).await
+    };
+    // Takes nothing, and keeps the node's pixels.
+    let _first = ask(64).await.unwrap();
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    let mut second = ask(1).await.unwrap();
+    let refused = timeout(HEALED, second.next()).await.unwrap().unwrap().unwrap_err();
+    assert_eq!(refused.code(), Code::ResourceExhausted);
+    assert!(refused.message().contains("quota pixels: 4194304"), "{refused}");
+    seen(&mut live, 0.1, 0).await;
+    drop(second);
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    let third = Raw::open(&address, session.plan().assignment.plan_epoch).await.unwrap();
+    third.say(None, 0).await;
+    let refused = ask(1).await.err().expect("streams are used up");
+    assert_eq!(refused.code(), Code::ResourceExhausted);
+    assert!(refused.message().contains("quota streams: 3"), "{refused}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_full_node_sends_a_live_view_to_another_and_says_where_none_has_room() {
+    let one = |config: NodeConfig| NodeConfig { quotas: Quotas { streams: 1, ..config.quotas }, ..config };
+    let cluster = Cluster::start_with(3, one).await;
+    let session = cluster.session(SessionRequest { forced_sampler_count: Some(1), ..pipeline(STILL) }).await.unwrap();
+    assert_eq!(session.plan().assignment.compositors.len(), 2);
+    let mut lives = vec![session.live(), session.live()];
+    for live in &mut lives {
+        seen(live, 0.0, 0).await;
+    }
+    let mut third = session.live();
+    let refused = timeout(HEALED, third.next()).await.unwrap().unwrap_err();
+    assert!(matches!(&refused, ClientError::Exhausted { reason } if reason.contains("quota streams")), "{refused}");
+    for live in &mut lives {
+        seen(live, 0.1, 0).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sessions_beyond_the_most_are_refused() {
+    let config = CoordinatorConfig { max_sessions: 2, ..CoordinatorConfig::default() };
+    let cluster = Cluster::start_limited(config, 1, |config| config).await;
+    let first = cluster.session(pipeline(STILL)).await.unwrap();
+    let second = cluster.session(pipeline(STILL)).await.unwrap();
+    let refused = cluster.session(pipeline(STILL)).await.unwrap_err();
+    assert!(matches!(&refused, ClientError::Exhausted { reason } if reason.contains("max_sessions: 2")), "{refused}");
+    drop(first);
+    let start = Instant::now();
+    while cluster.session(pipeline(STILL)).await.is_err() {
+        assert!(start.elapsed() < HEALED, "a closed session leaves its place");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    seen(&mut second.live(), 0.0, 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn two_hundred_idle_streams_are_no_burden() {
+    let cluster = Cluster::start(2).await;
+    let first = cluster.session(pipeline(STILL)).await.unwrap();
+    let mut idle = Vec::new();
+    for _ in 0..200 {
+        let client = Client::connect(&cluster.coordinator.address).await.unwrap();
+        let session = client.open_session(pipeline(STILL), |_| ()).await.unwrap();
+        let live = session.live();
+        idle.push((session, live));
+    }
+    let mut live = first.live();
+    for i in 0..10 {
+        seen(&mut live, i as f32 * 0.01, 0).await;
+    }
+    // None was let go.
+    for (_, live) in &mut idle {
+        seen(live, 0.3, 0).await;
+    }
+}
