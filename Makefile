@@ -13,7 +13,7 @@ export NODEVICE_SELECT = 1
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo cluster cluster-test test fmt-check lint unit bench doc audit vulkan toolchain lint-toolchain clean
+.PHONY: help build demo cluster cluster-test test fmt-check lint unit bench doc audit vulkan toolchain lint-toolchain clean bench-scaling
 
 help: ## what can be made
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -32,6 +32,9 @@ cluster-test: build ## the same, with nodes that are killed; stops it all
 
 bench: build ## speed and accuracy against the bars; report in out/bench
 	$(CARGO) run --release --locked --package myriorama -- bench $(ARGS)
+
+bench-scaling: build ## how it scales, to eleven nodes and simulated to 1,000 (root; an hour and a half, ARGS=--quick a quarter of one)
+	$(CARGO) run --release --locked --package myriorama -- bench scaling $(ARGS)
 
 doc: toolchain ## the crates' documentation, in target/doc
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --workspace --no-deps

@@ -110,6 +110,19 @@ impl Lighting {
         self.occlusion.map_or(0, |occlusion| occlusion.rays.get())
     }
 
+    /// A quarter of the rays, at least one each; `None` where there are no fewer.
+    #[must_use]
+    pub fn with_fewer_rays(&self) -> Option<Self> {
+        let fewer = |rays: NonZeroU32| NonZeroU32::new(rays.get() / 4).unwrap_or(NonZeroU32::MIN);
+        let direct = match self.direct {
+            Direct::Soft(rays) => Direct::Soft(fewer(rays)),
+            other => other,
+        };
+        let occlusion = self.occlusion.map(|occlusion| Occlusion { rays: fewer(occlusion.rays), ..occlusion });
+        let lighting = Self { direct, occlusion, ..*self };
+        (lighting != *self).then_some(lighting)
+    }
+
     /// Whose formula highlights follow.
     #[must_use]
     pub fn highlight(&self) -> Option<Highlight> {
