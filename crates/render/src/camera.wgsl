@@ -23,6 +23,8 @@ struct PixelCamera {
     occlusion_rays_in_sum: u32,
     occlusion_radius_m: f32,
     tolerance: f32,
+    first_from_axis: vec2u,
+    padding: vec2u,
 }
 
 @group(0) @binding(0) var<uniform> camera: PixelCamera;

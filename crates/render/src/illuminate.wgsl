@@ -36,7 +36,9 @@ fn spot_of(pixel: vec2u, depth: f32, surface: vec4u) -> Spot {
     let normal = unit_from_oct16(surface.z);
     let size = abs(camera.eye_in_world) + abs(offset);
     let bias_m = BIAS_FOOTPRINTS * planar_depth_m * camera.footprint + BIAS_ROUNDINGS * max(max(size.x, size.y), size.z);
-    return Spot(point, normal, point + normal * bias_m, bias_m, hashed(camera.seed ^ hashed(pixel.x | (pixel.y << 16u))));
+    let from_axis = pixel + camera.first_from_axis;
+    let seed = hashed(camera.seed ^ hashed((from_axis.x & 0xffffu) | (from_axis.y << 16u)));
+    return Spot(point, normal, point + normal * bias_m, bias_m, seed);
 }
 
 struct Arrival { linear: vec3f, open: f32 }

@@ -131,7 +131,9 @@ fn everything_shared_agrees() {
                 shadow_rays_in_sum,
                 occlusion_rays_in_sum,
                 occlusion_radius_m,
-                tolerance
+                tolerance,
+                first_from_axis,
+                padding
             }),
         ),
     ];

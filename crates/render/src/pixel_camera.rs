@@ -28,6 +28,9 @@ pub(crate) struct PixelCamera {
     pub occlusion_rays_in_sum: u32,
     pub occlusion_radius_m: f32,
     pub tolerance: f32,
+    /// Of the first pixel from where the forward axis meets the image; wraps.
+    pub first_from_axis: [u32; 2],
+    pub padding: [u32; 2],
 }
 
 /// What a shader sees at an offset.
@@ -36,8 +39,8 @@ pub(crate) const PIXEL_CAMERA_BYTES: usize = size_of::<PixelCamera>();
 pub(crate) const PIXEL_CAMERA_STRIDE: u32 = 256;
 
 impl PixelCamera {
-    /// Rays' seeds are the camera's place alone: noise does not swim while nothing moves, and images that are
-    /// blended do not share it.
+    /// Rays' seeds are the camera's place, and the pixel's from the forward axis: noise does not swim while nothing moves,
+    /// images that are blended do not share it, and a tile of an image has the image's.
     pub fn of(camera: &PinholeCamera) -> Self {
         let column = camera.world_from_camera * Vec3::X / camera.focal_px.x;
         let row = camera.world_from_camera * Vec3::NEG_Y / camera.focal_px.y;
@@ -57,6 +60,7 @@ impl PixelCamera {
             size_px: camera.size_px.to_array(),
             pixel_count: camera.pixel_count() as u32,
             seed,
+            first_from_axis: (-camera.principal_px).floor().as_ivec2().as_uvec2().to_array(),
             shadow_rays_in_sum: 1,
             occlusion_rays_in_sum: 1,
             ..Self::zeroed()

@@ -1,7 +1,7 @@
 //! Rays and light on the software device against closed forms and the scalar reference.
 
 use depth_image::{
-    DepthImage, Environment, Highlight, Illumination, Light, PinholeCamera, Ray, Reflector, View, ViewPlanes,
+    Camera, DepthImage, Environment, Highlight, Illumination, Light, PinholeCamera, Ray, Reflector, View, ViewPlanes,
     highlight_linear, linear_from_rgb9e5, linear_from_srgb8, unit_from_oct16,
 };
 use glam::{Affine3A, UVec2, Vec3};
@@ -484,4 +484,22 @@ fn surfaces_in_one_place_are_seen_alike_every_time() {
     assert!(first == seen());
     // Neither keeps light off the other: rays begin above both.
     assert!(floor_light(&first).iter().all(|(_, l)| (l - 0.5).abs() < 2e-3));
+}
+
+/// One ray a lamp, so that the noise is all there is: a tile's is its image's, not that of another tile.
+#[test]
+fn tiles_have_the_noise_of_their_image() {
+    let scene = upload(&courtyard());
+    let camera = before(&courtyard());
+    let lit = || work(&scene, "soft 1, occlusion 1");
+    let whole = image(lit(), &camera);
+    let tiles = (0..3).map(|tile| {
+        let Camera::Pinhole(tile) = Camera::Pinhole(camera).tile(tile, 3);
+        image(lit(), &tile)
+    });
+    let tiled = DepthImage::from_tiles(Camera::Pinhole(camera), tiles.collect()).expect("an image");
+    let same = whole.color_rgb9e5.iter().zip(&tiled.color_rgb9e5).filter(|(a, b)| a == b).count();
+    let share = same as f64 / whole.color_rgb9e5.len() as f64;
+    println!("{share:.4} of all texels are lit alike");
+    assert!(share > 0.95, "{share}");
 }
