@@ -1,10 +1,10 @@
-//! What operations cost one node, with its share of the machine and nothing else running.
+//! What operations cost one node, with its share of the machine, while the others do the same.
 
 use render::Lighting;
 use wire::Costs;
 
 use super::fleet::Fleet;
-use super::subject::{MEASURED_BATCH, Subject};
+use super::subject::Subject;
 
 /// The mean of several measurements; zeros without any.
 #[must_use]
@@ -21,24 +21,15 @@ pub fn mean(all: &[Costs]) -> Costs {
     }
 }
 
-/// Costs by so many of the views, one after the other, on the first node. A view's cost depends on where it stands:
-/// the first ones of the sequence lie far apart.
+/// Costs of all nodes at the same time: alone on the machine a node has its caches and its memory to itself, which is not
+/// what it has at work. A view's cost depends on where it stands: each node has another of the sequence, whose first
+/// ones lie far apart.
 ///
 /// # Errors
-/// The node's.
-pub async fn measure(
-    fleet: &Fleet,
-    subject: &Subject,
-    lighting: Lighting,
-    views: usize,
-    done: impl Fn(),
-) -> anyhow::Result<Vec<Costs>> {
-    let mut all = Vec::new();
-    for view in subject.views(views)? {
-        all.push(fleet.measure(0, subject.measurement(lighting, view, MEASURED_BATCH)).await?);
-        done();
-    }
-    Ok(all)
+/// A node's.
+pub async fn measure(fleet: &Fleet, subject: &Subject, lighting: Lighting, batch: u32) -> anyhow::Result<Vec<Costs>> {
+    let views = subject.views(fleet.nodes())?;
+    fleet.measure(views.into_iter().map(|view| subject.measurement(lighting, view, batch))).await
 }
 
 /// (S·g_s + V·(c+e)) / (P·T): what the work would take one node, over what P nodes took.

@@ -98,14 +98,34 @@ impl Fleet {
         format!("node-{number:03}")
     }
 
-    /// Has one node time its work; the others have nothing to do meanwhile.
+    /// Has nodes time their work at the same time: the first node the first request, and so on.
     ///
     /// # Errors
-    /// The node's.
-    pub async fn measure(&self, node: usize, request: MeasureCosts) -> anyhow::Result<Costs> {
-        let member = self.members.get(node).context("no such node")?;
-        let client = NodeClient::new(connect(&member.address).await?);
-        client.measure_costs(request).await.with_context(|| format!("node {node} could not measure its costs"))
+    /// The first node's that fails.
+    pub async fn measure(&self, requests: impl IntoIterator<Item = MeasureCosts>) -> anyhow::Result<Vec<Costs>> {
+        let measuring = self.members.iter().zip(requests).map(|(member, request)| {
+            let address = member.address.clone();
+            tokio::spawn(async move { NodeClient::new(connect(&address).await?).measure_costs(request).await })
+        });
+        let mut all = Vec::new();
+        for (node, measuring) in measuring.collect::<Vec<_>>().into_iter().enumerate() {
+            all.push(measuring.await?.with_context(|| format!("node {node} could not measure its costs"))?);
+        }
+        Ok(all)
+    }
+
+    /// The same, one node after the other.
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn measure_in_turn(&self, request: &MeasureCosts, mut done: impl FnMut()) -> anyhow::Result<Vec<Costs>> {
+        let mut all = Vec::new();
+        for member in &self.members {
+            let client = NodeClient::new(connect(&member.address).await?);
+            all.push(client.measure_costs(request.clone()).await?);
+            done();
+        }
+        Ok(all)
     }
 
     /// Ends the last nodes, so that so many are left, and waits until they are missed.

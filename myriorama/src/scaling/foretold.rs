@@ -4,7 +4,7 @@ use coordinator::schedule::pipeline_time;
 use simulation::{Cluster, Demand, Habits, Machine, plan, run};
 use wire::{Costs, Policy};
 
-use super::measured::Lit;
+use super::measured::{Lit, Timed};
 use super::point::Point;
 
 /// Sets of the simulation beyond those that count: the first, and what is sampled ahead at the end.
@@ -55,15 +55,16 @@ impl Traffic {
     }
 }
 
-/// Of one point, from the lighting's mean costs.
+/// Of one point, from what as many nodes timed before and after.
 #[must_use]
 pub fn foretell(lit: &Lit, images: usize, point: &Point) -> Foretold {
     let traffic = Traffic::of(&lit.points);
     let bytes_per_s = if traffic.bytes_per_s > 0.0 { traffic.bytes_per_s } else { f64::INFINITY };
-    let (costs, calls) = lit.by_view_and_call();
+    let timed = lit.timed.iter().find(|timed| timed.nodes == point.nodes);
+    let (costs, calls) = timed.map_or_else(Default::default, Timed::by_view_and_call);
     let simulated = simulate(Machine { costs, calls, bytes_per_s }, &traffic, images, point);
     Foretold {
-        equation_s: equation_s(&lit.mean(), images, point),
+        equation_s: equation_s(&lit.mean(point.nodes), images, point),
         schedule_s: point.plan.predicted_s(),
         simulated_s: simulated.map_or(f64::NAN, |(period_s, _)| period_s),
         same_plan: simulated.is_some_and(|(_, same)| same),

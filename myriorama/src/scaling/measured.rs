@@ -37,15 +37,24 @@ pub struct Request {
     pub dear_lighting: Option<Lighting>,
 }
 
+/// What P nodes timed at the same time, each with its quota, before the points, and in the full form after them, too.
+#[derive(Debug, Clone, Default)]
+pub struct Timed {
+    /// P.
+    pub nodes: usize,
+    /// Of every node, as often as it was asked.
+    pub costs: Vec<Costs>,
+    /// The same with one view a call.
+    pub alone: Vec<Costs>,
+}
+
 /// One lighting's costs and points.
 #[derive(Debug, Clone)]
 pub struct Lit {
     /// Which.
     pub lighting: Lighting,
-    /// One node's, with its quota, as often as they were measured.
-    pub costs: Vec<Costs>,
-    /// The same with one view a call.
-    pub alone: Costs,
+    /// By P, falling.
+    pub timed: Vec<Timed>,
     /// In the order they were measured.
     pub points: Vec<Point>,
 }
@@ -70,7 +79,15 @@ pub struct Measured {
 }
 
 impl Lit {
-    /// The mean of all measurements.
+    /// The mean of what so many nodes timed; zeros where they did not.
+    #[must_use]
+    pub fn mean(&self, nodes: usize) -> Costs {
+        self.timed.iter().find(|timed| timed.nodes == nodes).map_or_else(Costs::default, Timed::mean)
+    }
+}
+
+impl Timed {
+    /// Of all nodes and times.
     #[must_use]
     pub fn mean(&self) -> Costs {
         costs::mean(&self.costs)
@@ -79,14 +96,14 @@ impl Lit {
     /// What a call to the device takes, and each view of it: both follow from calls of one view and of many.
     #[must_use]
     pub fn by_view_and_call(&self) -> (Costs, Calls) {
-        let costs = self.mean();
+        let (costs, alone) = (self.mean(), costs::mean(&self.alone));
         let split = |alone_s: f64, of_many_s: f64| {
             let many = f64::from(MEASURED_BATCH);
             let view_s = ((many * of_many_s - alone_s) / (many - 1.0)).clamp(0.0, of_many_s);
             (view_s, ((of_many_s - view_s) * many).max(0.0))
         };
-        let (reconstruct_view_s, reconstruct_s) = split(self.alone.reconstruct_view_s, costs.reconstruct_view_s);
-        let (direct_view_s, direct_s) = split(self.alone.direct_view_s, costs.direct_view_s);
+        let (reconstruct_view_s, reconstruct_s) = split(alone.reconstruct_view_s, costs.reconstruct_view_s);
+        let (direct_view_s, direct_s) = split(alone.direct_view_s, costs.direct_view_s);
         (Costs { reconstruct_view_s, direct_view_s, ..costs }, Calls { reconstruct_s, direct_s })
     }
 }
@@ -124,18 +141,9 @@ async fn take_undisturbed(request: &Request, subject: &Subject) -> anyhow::Resul
     println!("all are ready after {:.0} s", start.elapsed().as_secs_f64());
     fleet.limit(Some(quota_cores))?;
     fleet.rest().await?;
-    let [before, after] = request.extent.cost_views();
-    let mut lit = Vec::new();
-    for lighting in [request.lighting].into_iter().chain(request.dear_lighting) {
-        let costs = timed(&fleet, subject, lighting, before).await?;
-        let alone = fleet.measure(0, subject.measurement(lighting, subject.views(1)?[0], 1)).await?;
-        lit.push(Lit { lighting, costs, alone, points: Vec::new() });
-    }
-    println!("costs are known after {:.0} s", start.elapsed().as_secs_f64());
+    let lightings = [request.lighting].into_iter().chain(request.dear_lighting);
+    let mut lit: Vec<Lit> = lightings.map(|lighting| Lit { lighting, timed: Vec::new(), points: Vec::new() }).collect();
     points(&mut fleet, subject, request.extent, &mut lit).await?;
-    for lit in &mut lit {
-        lit.costs.extend(timed(&fleet, subject, lit.lighting, after).await?);
-    }
     let cores = std::thread::available_parallelism().map_or(1, usize::from) as f64;
     let (images, seconds) = (subject.images(), start.elapsed().as_secs_f64());
     Ok(Measured { device, cores, quota_cores, images, unlimited, lit, seconds })
@@ -145,24 +153,29 @@ async fn take_undisturbed(request: &Request, subject: &Subject) -> anyhow::Resul
 /// whether rays or triangles are faster is found out undisturbed.
 async fn warm(fleet: &Fleet, subject: &Subject, lighting: Lighting) -> anyhow::Result<Vec<Costs>> {
     let progress = bar("nodes load the scene and build shaders", fleet.nodes());
-    let view = subject.views(1)?[0];
-    let mut unlimited = Vec::new();
-    for node in 0..fleet.nodes() {
-        unlimited.push(fleet.measure(node, subject.measurement(lighting, view, MEASURED_BATCH)).await?);
-        progress.inc(1);
-    }
+    let request = subject.measurement(lighting, subject.views(1)?[0], MEASURED_BATCH);
+    let unlimited = fleet.measure_in_turn(&request, || progress.inc(1)).await;
     progress.finish_and_clear();
-    Ok(unlimited)
+    unlimited
 }
 
-async fn timed(fleet: &Fleet, subject: &Subject, lighting: Lighting, views: usize) -> anyhow::Result<Vec<Costs>> {
-    let progress = bar(format!("costs of one node, {lighting}"), views);
-    let costs = costs::measure(fleet, subject, lighting, views, || progress.inc(1)).await;
-    progress.finish_and_clear();
-    costs
+/// All lightings' costs, at as many nodes as there are.
+async fn time(fleet: &Fleet, subject: &Subject, lit: &mut [Lit]) -> anyhow::Result<()> {
+    let (nodes, start) = (fleet.nodes(), Instant::now());
+    for lit in lit {
+        if lit.timed.last().is_none_or(|timed| timed.nodes != nodes) {
+            let alone = costs::measure(fleet, subject, lit.lighting, 1).await?;
+            lit.timed.push(Timed { nodes, alone, ..Timed::default() });
+        }
+        let costs = costs::measure(fleet, subject, lit.lighting, MEASURED_BATCH).await?;
+        lit.timed.iter_mut().last().into_iter().for_each(|timed| timed.costs.extend(&costs));
+    }
+    println!("{nodes} nodes have timed their work in {:.0} s", start.elapsed().as_secs_f64());
+    fleet.rest().await
 }
 
 async fn points(fleet: &mut Fleet, subject: &Subject, extent: Extent, lit: &mut [Lit]) -> anyhow::Result<()> {
+    time(fleet, subject, lit).await?;
     let all = all_points(subject, extent, lit);
     let about_s: f64 = all.iter().map(|(_, point)| point.about_s).sum();
     println!("{} points, about {:.0} minutes", all.len(), (about_s / 60.0).ceil());
@@ -170,7 +183,9 @@ async fn points(fleet: &mut Fleet, subject: &Subject, extent: Extent, lit: &mut 
     let mut done_s = 0.0;
     for (which, Planned { ask, nodes, about_s }) in all {
         if nodes < fleet.nodes() {
+            time_again(fleet, subject, extent, lit).await?;
             fleet.shrink_to(nodes).await?;
+            time(fleet, subject, lit).await?;
         }
         progress.set_message(format!("P = {nodes}, V = {}, {}", ask.views, ask.policy));
         let point = point(fleet, subject, ask, done_s, about_s, &progress).await?;
@@ -181,7 +196,12 @@ async fn points(fleet: &mut Fleet, subject: &Subject, extent: Extent, lit: &mut 
         fleet.rest().await?;
     }
     progress.finish_and_clear();
-    Ok(())
+    time_again(fleet, subject, extent, lit).await
+}
+
+/// After the points of so many nodes; the quick form has no time for it.
+async fn time_again(fleet: &Fleet, subject: &Subject, extent: Extent, lit: &mut [Lit]) -> anyhow::Result<()> {
+    if extent.quick { Ok(()) } else { time(fleet, subject, lit).await }
 }
 
 fn in_words(point: &Point) -> String {
@@ -199,7 +219,7 @@ fn all_points(subject: &Subject, extent: Extent, lit: &[Lit]) -> Vec<(usize, Pla
     let of = |nodes: usize| {
         lit.iter().enumerate().flat_map(move |(which, lit)| {
             let points = if which == 0 { extent.points(nodes) } else { extent.dear_points(nodes) };
-            let (costs, images) = (lit.mean(), subject.images());
+            let (costs, images) = (lit.timed.first().map_or_else(Costs::default, Timed::mean), subject.images());
             points.into_iter().map(move |point| (which, planned(extent, &costs, images, nodes, lit.lighting, point)))
         })
     };
@@ -239,8 +259,8 @@ mod tests {
         let many = f64::from(MEASURED_BATCH);
         let of_many = Costs { reconstruct_view_s: 0.01 / many + 0.002, direct_view_s: 0.005, ..Costs::default() };
         let alone = Costs { reconstruct_view_s: 0.012, direct_view_s: 0.005, ..Costs::default() };
-        let lit = Lit { lighting: Lighting::default(), costs: vec![of_many], alone, points: Vec::new() };
-        let (costs, calls) = lit.by_view_and_call();
+        let timed = Timed { nodes: 1, costs: vec![of_many], alone: vec![alone] };
+        let (costs, calls) = timed.by_view_and_call();
         assert!((costs.reconstruct_view_s - 0.002).abs() < 1e-12 && (calls.reconstruct_s - 0.01).abs() < 1e-12);
         assert!((costs.direct_view_s - 0.005).abs() < 1e-12 && calls.direct_s.abs() < 1e-12);
     }

@@ -37,7 +37,7 @@ pub fn report(measured: &Measured, extent: Extent, scene: &str, most_simulated: 
 
 fn told_of<'a>(measured: &Measured, lit: &'a super::measured::Lit) -> Told<'a> {
     let foretold = lit.points.iter().map(|point| foretell(lit, measured.images, point)).collect();
-    Told { lit, foretold, costs: lit.mean(), images: measured.images }
+    Told { lit, foretold, images: measured.images }
 }
 
 fn new_report(measured: &Measured, extent: Extent, scene: &str) -> Report {
@@ -62,8 +62,9 @@ fn new_report(measured: &Measured, extent: Extent, scene: &str) -> Report {
 fn simulate(measured: &Measured, main: &Told<'_>, most_nodes: usize, report: &mut Report) -> anyhow::Result<()> {
     let plain = costs::mean(&measured.unlimited);
     // Dear light was timed with a quota alone: as many times faster without as plain light is.
-    let speed = main.costs.sample_image_s / plain.sample_image_s;
-    let dear = measured.lit.get(1).map(|lit| lit.mean());
+    let nodes = main.node_counts().into_iter().max().unwrap_or(PAPER_NODES);
+    let speed = main.lit.mean(nodes).sample_image_s / plain.sample_image_s;
+    let dear = measured.lit.get(1).map(|lit| lit.mean(nodes));
     let unlimited = |costs: wire::Costs| simulation::Machine::of(costs).faster(speed).costs;
     let traffic = Traffic::of(&main.lit.points);
     let basis = Basis { plain, dear: dear.map(unlimited), images: measured.images, traffic };

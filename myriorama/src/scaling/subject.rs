@@ -3,13 +3,12 @@
 use std::cell::Cell;
 
 use anyhow::Context as _;
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
 use render::Lighting;
 use wire::{MeasureCosts, PolicyChoice, Timeline, Workload};
 
 use crate::delivery::Wishes;
 use crate::experiment::VIEW_SIZE_PX;
-use crate::rig::ViewCell;
 use crate::setup::{SceneArgs, Setup};
 
 /// Scene time between sets: far less than any motion, but another set, which is sampled anew as the paper's are.
@@ -75,6 +74,7 @@ impl Subject {
         let workload = Workload {
             scene: offer.scene(),
             sample_cameras: offer.rig.clone(),
+            cell_first_indices: Vec::new(),
             sampling: self.args.sampling.to_string(),
             lighting: lighting.to_string(),
             method: self.args.method.to_string(),

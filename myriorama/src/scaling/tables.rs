@@ -16,8 +16,6 @@ pub struct Told<'a> {
     pub lit: &'a Lit,
     /// In the order of its points.
     pub foretold: Vec<Foretold>,
-    /// Means.
-    pub costs: Costs,
     /// S.
     pub images: usize,
 }
@@ -26,7 +24,7 @@ impl Told<'_> {
     /// (S·g_s + V·(c+e)) / (P·T) of a measured point.
     #[must_use]
     pub fn efficiency(&self, point: &Point) -> f64 {
-        efficiency(&self.costs, self.images, point.ask.views, point.nodes, point.period_s)
+        efficiency(&self.lit.mean(point.nodes), self.images, point.ask.views, point.nodes, point.period_s)
     }
 
     /// What was asked for and measured.
@@ -97,7 +95,7 @@ pub fn naive<'a>(told: &Told<'a>, nodes: usize) -> Option<(f64, &'a Point)> {
         told.lit.points.iter().filter(|point| point.ask.policy == PolicyChoice::Direct && point.nodes == nodes);
     let point = directs.max_by_key(|point| point.ask.views)?;
     let period_s = point.period_s * PAPER_VIEWS as f64 / point.ask.views as f64;
-    Some((efficiency(&told.costs, told.images, PAPER_VIEWS, nodes, period_s), point))
+    Some((efficiency(&told.lit.mean(nodes), told.images, PAPER_VIEWS, nodes, period_s), point))
 }
 
 /// Every point, with what was foretold of it.
@@ -146,6 +144,7 @@ pub fn points_table(told: &Told<'_>) -> anyhow::Result<Table> {
 pub fn costs_table(measured: &Measured, told: &[Told<'_>]) -> anyhow::Result<Table> {
     let columns = [
         ("lighting", ""),
+        ("nodes at the same time", ""),
         ("cores", ""),
         ("timings", ""),
         ("g_s", "ms"),
@@ -156,8 +155,8 @@ pub fn costs_table(measured: &Measured, told: &[Told<'_>]) -> anyhow::Result<Tab
         ("(c + e) / g_s", ""),
         ("least and most c", "ms"),
     ];
-    let mut table = Table::new(COSTS_TABLE, &columns);
-    let mut push = |lighting: &str, cores: f64, all: &[Costs]| {
+    let mut table = Table::new("Costs of one operation on one node", &columns);
+    let mut push = |lighting: &str, nodes: usize, cores: f64, all: &[Costs]| {
         let mean = super::costs::mean(all);
         let ms =
             [mean.sample_image_s, mean.direct_view_s, mean.load_set_s, mean.reconstruct_view_s, mean.encode_view_s]
@@ -165,18 +164,17 @@ pub fn costs_table(measured: &Measured, told: &[Told<'_>]) -> anyhow::Result<Tab
         let ratio = (mean.reconstruct_view_s + mean.encode_view_s) / mean.sample_image_s;
         let c_ms = all.iter().map(|costs| costs.reconstruct_view_s * 1e3);
         let spread = format!("{:.1}–{:.1}", c_ms.clone().fold(f64::INFINITY, f64::min), c_ms.fold(0.0, f64::max));
-        let head = [lighting.into(), cores.into(), all.len().into()];
+        let head = [lighting.into(), nodes.into(), cores.into(), all.len().into()];
         table.push(head.into_iter().chain(ms).chain([ratio.into(), spread.into()]))
     };
     for told in told {
-        push(&told.lit.lighting.to_string(), measured.quota_cores, &told.lit.costs)?;
+        for timed in &told.lit.timed {
+            push(&told.lit.lighting.to_string(), timed.nodes, measured.quota_cores, &timed.costs)?;
+        }
     }
-    push(&measured.lit[0].lighting.to_string(), measured.cores, &measured.unlimited)?;
+    push(&measured.lit[0].lighting.to_string(), 1, measured.cores, &measured.unlimited)?;
     Ok(table)
 }
-
-/// Its name: an earlier report is read by it.
-pub const COSTS_TABLE: &str = "Costs of one operation on one node alone";
 
 /// What became of the nodes' processor time at the most views.
 pub fn shares_table(told: &Told<'_>) -> anyhow::Result<Table> {
@@ -193,13 +191,13 @@ pub fn shares_table(told: &Told<'_>) -> anyhow::Result<Table> {
     ];
     let mut table = Table::new("Where the nodes' processor time goes", &columns);
     for point in told.lit.points.iter().filter(|point| point.ask.views >= PAPER_VIEWS) {
-        let of_time = 1.0 / (point.nodes as f64 * point.period_s);
+        let (of_time, costs) = (1.0 / (point.nodes as f64 * point.period_s), told.lit.mean(point.nodes));
         let counts = match point.policy() {
-            Policy::Direct => point.ask.views as f64 * (told.costs.direct_view_s + told.costs.encode_view_s) * of_time,
+            Policy::Direct => point.ask.views as f64 * (costs.direct_view_s + costs.encode_view_s) * of_time,
             _ => told.efficiency(point),
         };
         let loads = if point.policy() == Policy::Direct { 0 } else { point.compositors() };
-        let loading = loads as f64 * told.costs.load_set_s * of_time;
+        let loading = loads as f64 * costs.load_set_s * of_time;
         let used = point.window.used_share();
         table.push([
             point.nodes.into(),
@@ -235,7 +233,7 @@ pub fn steps(told: &Told<'_>, nodes: usize) -> Vec<(usize, [f64; 6])> {
         let image_s = point.fetched.map_or(0.0, |image| image.image_s);
         let transfer_s = told.images as f64 * image_s * receivers;
         let Point { steps, .. } = point;
-        let load_s = receivers * told.costs.load_set_s;
+        let load_s = receivers * told.lit.mean(point.nodes).load_set_s;
         let all = [steps.sample_s, transfer_s, load_s, steps.reconstruct_s, steps.encode_s, steps.client_s];
         (point.ask.views, all)
     };

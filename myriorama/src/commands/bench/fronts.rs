@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use depth_image::ViewCell;
 use reconstruction::ReconstructionMethod;
 use scene::SceneSpec;
 use study::{Bar, Check, Report};
@@ -13,7 +14,6 @@ use crate::engine::GpuEngine;
 use crate::evaluate::{Row, Truth};
 use crate::experiment::VIEW_SIZE_PX;
 use crate::progress::bar;
-use crate::rig::ViewCell;
 use crate::setup::SceneArgs;
 use crate::sweep;
 

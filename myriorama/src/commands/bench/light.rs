@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use depth_image::ViewCell;
 use render::Lighting;
 use study::{Bar, Check, Report, Table};
 use wire::PolicyChoice;
@@ -12,7 +13,6 @@ use crate::evaluate::{Truth, mean_flip, median};
 use crate::experiment::{Experiment, PAPER_VIEWS, VIEW_SIZE_PX, Wish};
 use crate::lighting_study::{self, Extent, FINE};
 use crate::progress::bar;
-use crate::rig::ViewCell;
 use crate::setup::{SceneArgs, Setup};
 
 /// Rays that stand for all light.

@@ -50,7 +50,7 @@ pub struct ScalingArgs {
     /// Where the report goes
     #[arg(long, default_value = "out/bench-scaling", value_name = "DIR")]
     out: PathBuf,
-    /// A subset in a quarter of an hour: P = 11, 5 and 2
+    /// A subset in under ten minutes: P = 11 and 5
     #[arg(long)]
     quick: bool,
     /// Exit status 1 when a check falls short
