@@ -5,6 +5,8 @@
 //! centres at +0.5. *Planar depth* is the distance along the camera's forward axis; *inverse depth* its
 //! reciprocal, which is linear in screen space on planes and along projected rays.
 
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
 mod bounds;
 mod camera;
 mod color;
@@ -14,6 +16,8 @@ mod light;
 mod normal;
 mod tiles;
 mod view;
+mod view_cell;
+mod view_group;
 
 pub use bounds::Aabb;
 pub use camera::{Camera, CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera, PixelDepth, Ray};
@@ -26,3 +30,5 @@ pub use light::{Environment, Illumination, Incident, Light, LightError, disc_fro
 pub use normal::{oct16_from_unit, unit_from_oct16};
 pub use tiles::TileError;
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};
+pub use view_cell::ViewCell;
+pub use view_group::{ViewGroup, nearest_set};

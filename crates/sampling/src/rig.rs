@@ -121,6 +121,8 @@ fn check(volume: &Aabb) -> Result<(), RigError> {
 
 #[cfg(test)]
 mod tests {
+    use depth_image::ViewCell;
+
     use super::*;
 
     const BLOCK: Aabb = Aabb { min: Vec3::new(-1.0, 0.0, -1.0), max: Vec3::new(1.0, 1.0, 1.0) };
@@ -135,6 +137,22 @@ mod tests {
             assert!((camera.eye_in_world.abs() - Vec3::new(1.0, 3.0, 1.0)).length() < 1e-6);
             let at = camera.project(Vec3::ZERO).expect("in front");
             assert!((at.pixel - Vec2::new(200.0, 150.0)).length() < 1e-2);
+        }
+    }
+
+    #[test]
+    fn a_rig_is_found_again_from_its_cameras() {
+        let (block, size_px) =
+            (Aabb { min: Vec3::new(-1.0, 0.0, -2.0), max: Vec3::new(1.0, 1.0, 2.0) }, UVec2::new(40, 30));
+        for rig in [Rig::two_plane(&block, 3.0), Rig::in_front_of(&block, 0.12)] {
+            let rig = rig.expect("a block");
+            let cell = ViewCell::between(&rig.samples(UVec2::new(400, 300))).expect("four cameras");
+            let pairs = rig.views(20, size_px).into_iter().zip(cell.spread(20, size_px));
+            for (expected, found) in pairs {
+                assert!((expected.eye_in_world - found.eye_in_world).length() < 1e-4);
+                assert!(expected.forward_in_world().dot(found.forward_in_world()) > 1.0 - 1e-5);
+                assert!((expected.focal_px - found.focal_px).length() < 1e-2);
+            }
         }
     }
 

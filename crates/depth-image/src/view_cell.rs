@@ -1,0 +1,224 @@
+//! A box of viewpoints that one sample set serves.
+
+use glam::{Mat3, Quat, UVec2, Vec2, Vec3};
+
+use crate::PinholeCamera;
+
+/// The farthest that cameras may be from looking at one point, as a share of its distance.
+const CONVERGENCE: f32 = 0.02;
+/// Half an image's side at unit distance, at most: 150 degrees.
+const STEEPEST: f32 = 3.7;
+/// Cameras that are turned by less, in radians, do not say what is up for them all.
+const LEAST_TURN: f32 = 1e-2;
+/// By how much equal fields of view may differ.
+const ROUNDING: f32 = 1e-3;
+
+/// A box of viewpoints and what all of them look at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewCell {
+    center_in_world: Vec3,
+    /// From the middle to the right, upper and rear faces.
+    half_edges_in_world: [Vec3; 3],
+    aim: Aim,
+    up_in_world: Vec3,
+    /// Of the first camera: focal length in image heights.
+    focal_heights: f32,
+    /// Half the sides, at unit distance, of an image in which all is that the cameras see.
+    half_sides: Vec2,
+    near_m: f32,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Aim {
+    /// All look at one point.
+    Target(Vec3),
+    /// All look the same way.
+    Parallel(Quat),
+}
+
+impl ViewCell {
+    /// The cell that cameras span, be they sample cameras or views; `None` without any. For a rig of four corners it is
+    /// their rectangle.
+    #[must_use]
+    pub fn between(cameras: &[PinholeCamera]) -> Option<Self> {
+        let first = cameras.first()?;
+        let turn = mean_turn(cameras);
+        let (center_in_world, half_edges_in_world) = corners(cameras).unwrap_or_else(|| extent(cameras, turn));
+        let cell = Self {
+            center_in_world,
+            half_edges_in_world,
+            aim: common_target(cameras).map_or(Aim::Parallel(turn), Aim::Target),
+            up_in_world: common_up(cameras, turn),
+            focal_heights: first.focal_px.y / first.size_px.y as f32,
+            half_sides: Vec2::ZERO,
+            near_m: cameras.iter().map(|camera| camera.near_m).fold(f32::INFINITY, f32::min),
+        };
+        let half_sides = cameras.iter().map(|camera| cell.half_sides_of(camera)).fold(Vec2::ZERO, Vec2::max);
+        Some(Self { half_sides, ..cell })
+    }
+
+    /// Cameras that between them see what views of the cell see: one at each corner of the box. An edge that is not longer
+    /// than `shortest_edge_m` is none; so they are 1, 2 at the ends of a line, 4 or 8.
+    #[must_use]
+    pub fn sample_cameras(&self, shortest_edge_m: f32, size_px: UVec2) -> Vec<PinholeCamera> {
+        let focal_px = (size_px.as_vec2() * 0.5 / self.half_sides).min_element();
+        let [x, y, z] = self.half_edges_in_world.map(|half| -> &[f32] {
+            if 2.0 * half.length() > shortest_edge_m { &[-1.0, 1.0] } else { &[0.0] }
+        });
+        let row = |y: f32, z: f32| x.iter().map(move |&x| Vec3::new(x, y, z));
+        let places = z.iter().flat_map(|&z| y.iter().flat_map(move |&y| row(y, z)));
+        places.map(|place| self.camera(place, focal_px, size_px)).collect()
+    }
+
+    /// Whether all that a camera within the cell sees is in its sample images.
+    pub(crate) fn sees_all_of(&self, camera: &PinholeCamera) -> bool {
+        self.half_sides_of(camera).cmple(self.half_sides * (1.0 + ROUNDING)).all()
+    }
+
+    /// The camera at a place of the rectangle halfway between front and rear, -1 to 1 each way.
+    #[must_use]
+    pub fn camera_at(&self, place: Vec2, size_px: UVec2) -> PinholeCamera {
+        self.camera(place.extend(0.0), self.focal_heights * size_px.y as f32, size_px)
+    }
+
+    /// `count` views spread evenly, by a low-discrepancy sequence (R2, Roberts 2018).
+    #[must_use]
+    pub fn spread(&self, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
+        const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
+        let place = |i: usize| (Vec2::splat(0.5) + STEP * i as f32).fract() * 2.0 - 1.0;
+        (0..count).map(|i| self.camera_at(place(i), size_px)).collect()
+    }
+
+    /// `columns` × `rows` views over the whole rectangle, row by row from the bottom.
+    #[must_use]
+    pub fn grid(&self, columns: u32, rows: u32, size_px: UVec2) -> Vec<PinholeCamera> {
+        let step = |i: u32, n: u32| if n < 2 { 0.0 } else { 2.0 * i as f32 / (n - 1) as f32 - 1.0 };
+        let places = (0..rows).flat_map(|y| (0..columns).map(move |x| Vec2::new(step(x, columns), step(y, rows))));
+        places.map(|place| self.camera_at(place, size_px)).collect()
+    }
+
+    /// `count` views on an ellipse inside the rectangle.
+    #[must_use]
+    pub fn orbit(&self, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
+        let place = |i: usize| Vec2::from_angle(std::f32::consts::TAU * i as f32 / count as f32) * 0.8;
+        (0..count).map(|i| self.camera_at(place(i), size_px)).collect()
+    }
+
+    /// `count` views on a full circle around an upright axis, of the cell's height and field of view, all turned as the
+    /// one in its middle.
+    #[must_use]
+    pub fn around(&self, axis_in_world: Vec3, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
+        let middle = self.camera_at(Vec2::ZERO, size_px);
+        let turned = |i: usize| {
+            let turn = Quat::from_rotation_y(std::f32::consts::TAU * i as f32 / count as f32);
+            PinholeCamera {
+                eye_in_world: axis_in_world + turn * (middle.eye_in_world - axis_in_world),
+                world_from_camera: (turn * middle.world_from_camera).normalize(),
+                ..middle
+            }
+        };
+        (0..count).map(turned).collect()
+    }
+
+    fn camera(&self, place: Vec3, focal_px: f32, size_px: UVec2) -> PinholeCamera {
+        let offsets = self.half_edges_in_world.iter().zip(place.to_array()).map(|(half, at)| *half * at);
+        let eye = self.center_in_world + offsets.sum::<Vec3>();
+        PinholeCamera {
+            eye_in_world: eye,
+            world_from_camera: self.turn_at(eye),
+            focal_px: Vec2::splat(focal_px),
+            principal_px: size_px.as_vec2() * 0.5,
+            size_px,
+            near_m: self.near_m,
+        }
+    }
+
+    fn turn_at(&self, eye: Vec3) -> Quat {
+        match self.aim {
+            Aim::Parallel(turn) => turn,
+            Aim::Target(target) => {
+                PinholeCamera::looking_at(eye, target, self.up_in_world, 1.0, UVec2::ONE).world_from_camera
+            }
+        }
+    }
+
+    /// Of an image from the same eye in which all is that a camera sees.
+    fn half_sides_of(&self, camera: &PinholeCamera) -> Vec2 {
+        let cell_from_camera = self.turn_at(camera.eye_in_world).conjugate() * camera.world_from_camera;
+        let near = -camera.principal_px / camera.focal_px;
+        let far = (camera.size_px.as_vec2() - camera.principal_px) / camera.focal_px;
+        let slope = |corner: Vec2| {
+            let direction = cell_from_camera * Vec3::new(corner.x, -corner.y, -1.0);
+            direction.truncate().abs() / (-direction.z).max(1e-6)
+        };
+        let corners = [near, far, Vec2::new(near.x, far.y), Vec2::new(far.x, near.y)];
+        corners.into_iter().map(slope).fold(Vec2::ZERO, Vec2::max).min(Vec2::splat(STEEPEST))
+    }
+}
+
+/// Middle and half edges of the box that is turned as the cameras are.
+fn extent(cameras: &[PinholeCamera], turn: Quat) -> (Vec3, [Vec3; 3]) {
+    // From one of them: far from the world's origin nothing is lost.
+    let from = cameras.first().map_or(Vec3::ZERO, |camera| camera.eye_in_world);
+    let eyes = cameras.iter().map(|camera| turn.conjugate() * (camera.eye_in_world - from));
+    let (least, most) = eyes.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), eye| (a.min(eye), b.max(eye)));
+    let half = (most - least) * 0.5;
+    (from + turn * (least + half), [turn * Vec3::X * half.x, turn * Vec3::Y * half.y, turn * Vec3::Z * half.z])
+}
+
+/// Of four cameras in rows from the bottom left, as rigs list them.
+fn corners(cameras: &[PinholeCamera]) -> Option<(Vec3, [Vec3; 3])> {
+    let [a, b, c, d] =
+        <[&PinholeCamera; 4]>::try_from(cameras.iter().collect::<Vec<_>>()).ok()?.map(|camera| camera.eye_in_world);
+    let (right, up) = ((b - a) * 0.5, (c - a) * 0.5);
+    let is_parallelogram = (a + d - b - c).length() <= 1e-3 * (right.length() + up.length());
+    let is_area = right.cross(up).length() > 1e-3 * right.length() * up.length();
+    (is_parallelogram && is_area).then_some(((a + b + c + d) / 4.0, [right, up, Vec3::ZERO]))
+}
+
+fn mean_turn(cameras: &[PinholeCamera]) -> Quat {
+    let first = cameras[0].world_from_camera;
+    let sum = cameras.iter().fold(Quat::from_xyzw(0.0, 0.0, 0.0, 0.0), |sum, camera| {
+        let turn = camera.world_from_camera;
+        sum + if turn.dot(first) < 0.0 { -turn } else { turn }
+    });
+    if sum.length() > 1e-3 { sum.normalize() } else { first }
+}
+
+/// What is up for all cameras: at a right angle to the right of those that differ most from the first; else as they are
+/// turned in the mean.
+fn common_up(cameras: &[PinholeCamera], turn: Quat) -> Vec3 {
+    let rights = cameras.iter().map(|camera| camera.world_from_camera * Vec3::X);
+    let first = cameras.first().map_or(Vec3::X, |camera| camera.world_from_camera * Vec3::X);
+    let across = rights.map(|right| first.cross(right));
+    let up = across.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared())).unwrap_or(Vec3::ZERO);
+    let mean = turn * Vec3::Y;
+    match up.try_normalize().map(|up| up * up.dot(mean).signum()) {
+        Some(up_in_world) if up.length() > LEAST_TURN && up_in_world.dot(mean) > 0.5 => up_in_world,
+        _ => mean,
+    }
+}
+
+/// The point nearest to all forward axes, by least squares; `None` where they run in parallel, part, or miss it.
+fn common_target(cameras: &[PinholeCamera]) -> Option<Vec3> {
+    let mut matrix = Mat3::ZERO;
+    let mut right_side = Vec3::ZERO;
+    for camera in cameras {
+        let forward = camera.forward_in_world();
+        let across = Mat3::IDENTITY - Mat3::from_cols(forward * forward.x, forward * forward.y, forward * forward.z);
+        matrix += across;
+        right_side += across * camera.eye_in_world;
+    }
+    let is_parallel = matrix.determinant() < 1e-4 * (cameras.len() as f32).powi(3);
+    let target = (!is_parallel).then(|| matrix.inverse() * right_side)?;
+    let looks_at_it = |camera: &PinholeCamera| {
+        let to_target = target - camera.eye_in_world;
+        let off = to_target.cross(camera.forward_in_world()).length();
+        to_target.dot(camera.forward_in_world()) > 0.0 && off <= CONVERGENCE * to_target.length()
+    };
+    cameras.iter().all(looks_at_it).then_some(target)
+}
+
+#[cfg(test)]
+#[path = "view_cell_tests.rs"]
+mod tests;

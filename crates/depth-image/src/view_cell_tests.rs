@@ -1,0 +1,114 @@
+//! Closed forms.
+
+use super::*;
+
+const SIZE: UVec2 = UVec2::new(40, 30);
+
+fn at(eye: Vec3) -> PinholeCamera {
+    PinholeCamera::looking_at(eye, eye - Vec3::Z, Vec3::Y, 0.8, SIZE)
+}
+
+fn towards_middle(eye: Vec3) -> PinholeCamera {
+    PinholeCamera::looking_at(eye, Vec3::ZERO, Vec3::Y, 0.8, SIZE)
+}
+
+fn line() -> Vec<PinholeCamera> {
+    (0..7).map(|i| at(Vec3::new(0.1 * i as f32 - 0.2, 1.0, 3.0))).collect()
+}
+
+fn block(corners: [Vec3; 2]) -> Vec<PinholeCamera> {
+    let pick = |i: usize, axis: usize| corners[(i >> axis) & 1][axis];
+    (0..8).map(|i| at(Vec3::new(pick(i, 0), pick(i, 1), pick(i, 2)))).collect()
+}
+
+#[test]
+fn parallel_cameras_stay_parallel() {
+    let camera = |x: f32, y: f32| at(Vec3::new(x, y, 2.2));
+    let cell = ViewCell::between(&[camera(-0.1, 0.1), camera(0.1, 0.1), camera(-0.1, 0.4), camera(0.1, 0.4)]).unwrap();
+    for view in cell.grid(3, 3, SIZE) {
+        assert!(view.forward_in_world().dot(Vec3::NEG_Z) > 1.0 - 1e-6);
+    }
+    assert!((cell.grid(3, 3, SIZE)[0].eye_in_world - Vec3::new(-0.1, 0.1, 2.2)).length() < 1e-6);
+}
+
+#[test]
+fn one_camera_is_a_cell_of_one_point_and_none_is_none() {
+    let one = towards_middle(Vec3::ONE);
+    let cell = ViewCell::between(&[one]).unwrap();
+    assert_eq!(cell.orbit(5, SIZE)[3].eye_in_world, Vec3::ONE);
+    let [sample] = cell.sample_cameras(0.0, SIZE)[..] else { panic!("one") };
+    assert!((sample.focal_px - one.focal_px).length() < 1e-3 && sample.world_from_camera == one.world_from_camera);
+    assert_eq!(ViewCell::between(&[]), None);
+}
+
+#[test]
+fn samples_stand_at_ends_and_corners() {
+    let ends = ViewCell::between(&line()).unwrap().sample_cameras(0.01, SIZE);
+    let eyes: Vec<Vec3> = ends.iter().map(|camera| camera.eye_in_world).collect();
+    let expected = [Vec3::new(-0.2, 1.0, 3.0), Vec3::new(0.4, 1.0, 3.0)];
+    assert!(eyes.len() == 2 && eyes.iter().zip(expected).all(|(a, b)| (*a - b).length() < 1e-6), "{eyes:?}");
+
+    let corners = [Vec3::new(-1.0, 0.0, 2.0), Vec3::new(1.0, 0.5, 4.0)];
+    let cell = ViewCell::between(&block(corners)).unwrap();
+    let samples = cell.sample_cameras(0.1, SIZE);
+    let is_corner = |eye: Vec3| (eye.cmpeq(corners[0]) | eye.cmpeq(corners[1])).all();
+    assert!(samples.len() == 8 && samples.iter().all(|camera| is_corner(camera.eye_in_world)), "{samples:?}");
+    let flat = cell.sample_cameras(0.6, SIZE);
+    assert!(flat.len() == 4 && flat.iter().all(|camera| camera.eye_in_world.y == 0.25), "a short edge is none");
+}
+
+/// What any view of a cell sees far away, every sample camera sees.
+#[test]
+fn samples_see_what_views_see() {
+    let mut views = line();
+    // One is turned and rolled, one has another shape, one another lens shift.
+    views[1].world_from_camera *= Quat::from_rotation_y(0.2) * Quat::from_rotation_z(0.3);
+    views[2] = views[2].resized(UVec2::new(90, 30));
+    views[2].focal_px.x = views[2].focal_px.y;
+    views[3].principal_px.y += 12.0;
+    let samples = ViewCell::between(&views).unwrap().sample_cameras(0.01, UVec2::new(400, 300));
+    for view in &views {
+        let size = view.size_px.as_vec2();
+        for corner in [Vec2::ZERO, size, Vec2::new(size.x, 0.0), Vec2::new(0.0, size.y)] {
+            let far = view.ray(corner).at(1e5);
+            for sample in &samples {
+                let pixel = sample.project(far).unwrap().pixel;
+                let inside = pixel.clamp(Vec2::ZERO, sample.size_px.as_vec2());
+                assert!((pixel - inside).length() < 0.05, "{view:?}: {pixel}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_converges_keeps_its_field_of_view() {
+    let views: Vec<_> =
+        [-0.3f32, -0.1, 0.1, 0.3].map(|x| towards_middle(Vec3::new(3.0 * x.sin(), 1.0, 3.0 * x.cos()))).to_vec();
+    let samples = ViewCell::between(&views).unwrap().sample_cameras(0.2, SIZE);
+    assert_eq!(samples.len(), 2);
+    for sample in samples {
+        assert!((sample.focal_px / views[0].focal_px - 1.0).abs().max_element() < 0.02, "{sample:?}");
+        assert!(sample.project(Vec3::ZERO).is_some_and(|at| (at.pixel - Vec2::new(20.0, 15.0)).length() < 0.1));
+    }
+}
+
+#[test]
+fn a_circle_comes_round() {
+    let cell = ViewCell::between(&[towards_middle(Vec3::new(0.0, 1.0, 3.0))]).unwrap();
+    let views = cell.around(Vec3::ZERO, 8, SIZE);
+    for view in &views {
+        assert!((view.eye_in_world.length() - 10f32.sqrt()).abs() < 1e-5, "{view:?}");
+        assert!(view.forward_in_world().dot(-view.eye_in_world) > (1.0 - 1e-5) * view.eye_in_world.length());
+    }
+    assert!((views[4].eye_in_world - Vec3::new(0.0, 1.0, -3.0)).length() < 1e-5);
+}
+
+/// What looks every which way still gives cameras that can be used.
+#[test]
+fn views_that_part_give_finite_cameras() {
+    let apart = [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::Y]
+        .map(|aim| PinholeCamera::looking_at(Vec3::ZERO, aim, Vec3::Y, 1.0, SIZE));
+    for sample in ViewCell::between(&apart).unwrap().sample_cameras(0.0, SIZE) {
+        sample.validate().unwrap();
+    }
+}

@@ -1,0 +1,151 @@
+//! Views that are near enough to each other for one sample set, and the set that a view is nearest to.
+//!
+//! How far two views are apart is measured by what it does to a picture: by how much the middle of the scene is seen from
+//! another side, and by the angle between the ways they look. Both are coordinates of one space, in which a group is no
+//! longer than 1 along any axis.
+
+use glam::UVec2;
+
+use crate::{Aabb, PinholeCamera, ViewCell};
+
+/// The longest edge of a group's eyes, as a share of their distance from the scene's middle.
+const LONGEST_EDGE: f32 = 0.25;
+/// The greatest difference between the ways in which they look: along an axis of the unit sphere.
+const WIDEST_LOOK: f32 = 0.5;
+/// Eyes that are nearer to each other than this, as a share of the distance, are as good as at one place.
+const SHORTEST_EDGE: f32 = 0.02;
+/// Within the scene its middle may be nearer than what is seen: distances are at least this share of its radius.
+const NEAREST: f32 = 0.5;
+/// A view that is so little outside is inside: of the longest group's length.
+const TOLERANCE: f32 = 0.01;
+/// Of two sets that are as near, the one whose middle is nearer: of how far that is, so much counts.
+const OF_MIDDLE: f32 = 1e-3;
+
+/// Where a view is and which way it looks.
+type Place = [f32; 6];
+
+/// Least and greatest of each coordinate.
+type Bounds = [(f32, f32); 6];
+
+/// Views that one sample set serves. It only grows: what has been sampled for it then stays good.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewGroup {
+    /// At least one.
+    views: Vec<PinholeCamera>,
+}
+
+impl ViewGroup {
+    /// Adds views to the groups that they are in, else to those that they do not make too long, else as new groups: as few
+    /// as halving finds. Groups that need not change do not.
+    pub fn add(groups: &mut Vec<Self>, views: &[PinholeCamera], scene: &Aabb) {
+        let mut apart = Vec::new();
+        for view in views {
+            if groups.iter().any(|group| group.serves(view, scene)) {
+                continue;
+            }
+            let lengths = groups.iter_mut().map(|group| (group.length_with(view, scene), group));
+            match lengths.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((length, group)) if length <= 1.0 => group.views.push(*view),
+                _ => apart.push(*view),
+            }
+        }
+        groups.extend(halved(apart, scene));
+    }
+
+    /// Whether a view lies between the group's views and sees no more than they do.
+    #[must_use]
+    pub fn serves(&self, view: &PinholeCamera, scene: &Aabb) -> bool {
+        let sees_less = || ViewCell::between(&self.views).is_some_and(|cell| cell.sees_all_of(view));
+        outside(view, &bounds(&self.views), scene) <= TOLERANCE && sees_less()
+    }
+
+    /// Where to sample for it, in images of this size.
+    #[must_use]
+    pub fn sample_cameras(&self, scene: &Aabb, size_px: UVec2) -> Vec<PinholeCamera> {
+        let shortest_edge_m = SHORTEST_EDGE * least_distance_m(&self.views, scene);
+        ViewCell::between(&self.views).map_or_else(Vec::new, |cell| cell.sample_cameras(shortest_edge_m, size_px))
+    }
+
+    fn length_with(&self, view: &PinholeCamera, scene: &Aabb) -> f32 {
+        let views = [&self.views[..], &[*view]].concat();
+        longest(&views, scene).1
+    }
+}
+
+/// Which of several sample sets a view is nearest to, each given by its cameras; `None` without any.
+#[must_use]
+pub fn nearest_set(
+    view: &PinholeCamera,
+    sets: impl IntoIterator<Item = Vec<PinholeCamera>>,
+    scene: &Aabb,
+) -> Option<usize> {
+    let far = |cameras: Vec<PinholeCamera>| {
+        let bounds = bounds(&cameras);
+        let middle = bounds.map(|(least, most)| ((least + most) * 0.5, (least + most) * 0.5));
+        outside(view, &bounds, scene) + OF_MIDDLE * outside(view, &middle, scene)
+    };
+    let far = sets.into_iter().map(far).enumerate();
+    far.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(set, _)| set)
+}
+
+/// What is too long is halved along its longest axis.
+fn halved(views: Vec<PinholeCamera>, scene: &Aabb) -> Vec<ViewGroup> {
+    if views.is_empty() {
+        return Vec::new();
+    }
+    let (axis, length) = longest(&views, scene);
+    let (least, most) = bounds(&views)[axis];
+    let (low, high): (Vec<_>, Vec<_>) = views.iter().partition(|view| place_of(view)[axis] < (least + most) * 0.5);
+    if length <= 1.0 || low.is_empty() || high.is_empty() {
+        return vec![ViewGroup { views }];
+    }
+    [halved(low, scene), halved(high, scene)].concat()
+}
+
+/// The axis along which views spread most, and by how much.
+fn longest(views: &[PinholeCamera], scene: &Aabb) -> (usize, f32) {
+    let distance_m = least_distance_m(views, scene);
+    let lengths = bounds(views).into_iter().enumerate();
+    let lengths = lengths.map(|(axis, (least, most))| (axis, (most - least) / unit(axis, distance_m)));
+    lengths.fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a })
+}
+
+/// How far a view lies outside of bounds.
+fn outside(view: &PinholeCamera, bounds: &Bounds, scene: &Aabb) -> f32 {
+    let (place, distance_m) = (place_of(view), distance_m(view, scene));
+    let off = |axis: usize| {
+        let (least, most) = bounds[axis];
+        (place[axis] - place[axis].max(least).min(most)) / unit(axis, distance_m)
+    };
+    (0..6).map(|axis| off(axis).powi(2)).sum::<f32>().sqrt()
+}
+
+fn place_of(view: &PinholeCamera) -> Place {
+    let (eye, forward) = (view.eye_in_world, view.forward_in_world());
+    [eye.x, eye.y, eye.z, forward.x, forward.y, forward.z]
+}
+
+fn bounds(views: &[PinholeCamera]) -> Bounds {
+    views.iter().map(place_of).fold([(f32::INFINITY, f32::NEG_INFINITY); 6], |bounds, place| {
+        std::array::from_fn(|axis| (bounds[axis].0.min(place[axis]), bounds[axis].1.max(place[axis])))
+    })
+}
+
+/// What a coordinate is divided by.
+fn unit(axis: usize, distance_m: f32) -> f32 {
+    if axis < 3 { LONGEST_EDGE * distance_m } else { WIDEST_LOOK }
+}
+
+fn distance_m(view: &PinholeCamera, scene: &Aabb) -> f32 {
+    let radius_m = scene.size().length() * 0.5;
+    (view.eye_in_world - scene.center()).length().max(radius_m * NEAREST).max(f32::MIN_POSITIVE)
+}
+
+/// The nearest view's: there a step changes most.
+fn least_distance_m(views: &[PinholeCamera], scene: &Aabb) -> f32 {
+    views.iter().map(|view| distance_m(view, scene)).fold(f32::INFINITY, f32::min)
+}
+
+#[cfg(test)]
+#[path = "view_group_tests.rs"]
+mod tests;
