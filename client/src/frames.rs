@@ -1,21 +1,24 @@
 //! Frames as they come from several compositors at once.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-use depth_image::View;
+use depth_image::{View, ViewPlanes};
 use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::task::JoinSet;
 use tokio_stream::StreamExt as _;
 use tonic::Code;
 use wire::limits::MAX_VIEWS_PER_REQUEST;
 use wire::rpc::Messages;
-use wire::{DecodeLimits, FrameAssembly, FrameHeader, FramePart, RenderViews, RequestedView, WholeFrame, decode_view};
+use wire::{
+    Assignment, DecodeLimits, FrameAssembly, FrameHeader, FramePart, RenderViews, RequestedView, WholeFrame,
+    decode_view,
+};
 
 use crate::ClientError;
-use crate::expected::Expected;
+use crate::expected::{Expected, agrees};
 use crate::live::{Peer, State};
 use crate::plan_change::{lost_peer, successor};
 use crate::session::ViewRequest;
@@ -57,9 +60,10 @@ impl Frames {
         expected: Expected,
     ) -> Self {
         let (send, received) = mpsc::channel(FRAMES_AHEAD);
-        let outstanding = requests.iter().map(|request| request.frame).collect();
+        let outstanding = requests.iter().map(|request| (request.frame, *request)).collect();
         let line = Line {
             send,
+            planes: template.planes,
             outstanding: Arc::new(Mutex::new(outstanding)),
             decoders: Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from))),
         };
@@ -105,19 +109,30 @@ impl Frames {
 #[derive(Clone)]
 struct Line {
     send: mpsc::Sender<Received>,
+    planes: ViewPlanes,
     /// Frames that have not come.
-    outstanding: Arc<Mutex<HashSet<u64>>>,
+    outstanding: Arc<Mutex<HashMap<u64, ViewRequest>>>,
     decoders: Arc<Semaphore>,
 }
 
 impl Line {
-    fn is_due(&self, frame: u64) -> bool {
-        self.outstanding.lock().unwrap_or_else(PoisonError::into_inner).contains(&frame)
+    /// What is wrong with a frame: whoever sent it, or what it came through, has spoilt it.
+    fn wrong_with(&self, frame: &WholeFrame, plan_epoch: Option<u64>) -> Option<String> {
+        let due = self.outstanding.lock().unwrap_or_else(PoisonError::into_inner).get(&frame.frame).copied();
+        let (number, set) = (frame.frame, frame.header.sample_set_id);
+        match due {
+            _ if Some(set.plan_epoch) != plan_epoch => Some(format!("sent a frame of set {set}")),
+            None => Some(format!("sent frame {number}, which was not asked for or has come")),
+            Some(request) => {
+                let wrong = agrees(&request, self.planes, &frame.header).err();
+                wrong.map(|wrong| format!("sent frame {number}, which {wrong}"))
+            }
+        }
     }
 
     fn still_due(&self, requests: &[ViewRequest]) -> Vec<ViewRequest> {
         let outstanding = self.outstanding.lock().unwrap_or_else(PoisonError::into_inner);
-        requests.iter().filter(|request| outstanding.contains(&request.frame)).copied().collect()
+        requests.iter().filter(|request| outstanding.contains_key(&request.frame)).copied().collect()
     }
 
     /// Holds the decoder until there is room: a caller that is slow holds up the decoding. An error means that the
@@ -177,6 +192,7 @@ async fn deliver(mut state: watch::Receiver<State>, template: RenderViews, reque
         if template.method.is_empty() {
             template.method.clone_from(&live.plan.assignment.workload.method);
         }
+        let due = cell_by_cell(&live.plan.assignment, due);
         let peers = live.trusted();
         let ended = tokio::select! {
             ended = call_all(&peers, &template, &due, &line) => ended,
@@ -196,6 +212,15 @@ async fn deliver(mut state: watch::Receiver<State>, template: RenderViews, reque
         };
         return line.pass(Err(error)).await;
     }
+}
+
+/// Of every set, views of one view cell next to each other: a compositor then needs the images of few.
+fn cell_by_cell(plan: &Assignment, mut requests: Vec<ViewRequest>) -> Vec<ViewRequest> {
+    if plan.workload.cell_count() > 1 {
+        let sets = requests.chunk_by_mut(|a, b| a.set_index == b.set_index);
+        sets.for_each(|views| views.sort_by_cached_key(|view| plan.cell_of(&view.camera)));
+    }
+    requests
 }
 
 /// All calls of a plan, until they end or one fails.
@@ -256,26 +281,26 @@ async fn receive_all(peer: Peer, requests: Vec<RenderViews>, line: Line) -> Resu
     let mut assembly = FrameAssembly::default();
     let mut decoding = JoinSet::new();
     while let Some(frame) = next_frame(&mut parts, &mut assembly, &peer).await? {
-        if Some(frame.header.sample_set_id.plan_epoch) != plan_epoch {
-            let sent = format!("sent a frame of set {}", frame.header.sample_set_id);
-            return Err(Failure::of_peer(&peer, peer.error(sent)));
-        }
-        if !line.is_due(frame.frame) {
-            let sent = format!("sent frame {}, which was not asked for or has come", frame.frame);
-            return Err(Failure::of_peer(&peer, peer.error(sent)));
+        if let Some(wrong) = line.wrong_with(&frame, plan_epoch) {
+            return Err(Failure::of_peer(&peer, peer.error(wrong)));
         }
         let Ok(decoder) = line.decoders.clone().acquire_owned().await else {
             break;
         };
         let (peer, line) = (peer.clone(), line.clone());
         decoding.spawn(async move {
-            let frame = decode(frame, &peer).await;
-            line.pass(frame).await;
+            let frame = decode(frame, &peer).await.map_err(|error| Failure::of_peer(&peer, error))?;
+            line.pass(Ok(frame)).await;
             drop(decoder);
+            Ok(())
         });
-        while decoding.try_join_next().is_some() {}
+        while let Some(decoded) = decoding.try_join_next() {
+            decoded.unwrap_or(Ok(()))?;
+        }
     }
-    while decoding.join_next().await.is_some() {}
+    while let Some(decoded) = decoding.join_next().await {
+        decoded.unwrap_or(Ok(()))?;
+    }
     Ok(())
 }
 

@@ -204,7 +204,8 @@ impl LiveStream {
 
     fn accept(&mut self, whole: WholeFrame, peer: &Peer) -> Result<(), Failure> {
         let unexpected = |reason: &str| {
-            Failure::OfRequest(ClientError::Unexpected { frame: whole.frame, reason: reason.to_owned() })
+            let error = ClientError::Unexpected { frame: whole.frame, reason: reason.to_owned() };
+            Failure::of_peer(peer, error)
         };
         let sent = self.poses.answer(whole.frame).ok_or_else(|| unexpected("was not asked for, or comes late"))?;
         agrees(&sent.pose.request, self.planes, &whole.header).map_err(|reason| unexpected(&reason))?;

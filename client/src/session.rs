@@ -69,13 +69,28 @@ impl Session {
     /// # Errors
     /// The coordinator's; a session that has ended.
     pub async fn change(&self, views_per_set: u32, frames_per_s: f64) -> Result<(), ClientError> {
+        self.say(|request| (request.views_per_set, request.frames_per_s) = (views_per_set, frames_per_s)).await
+    }
+
+    /// Looks from elsewhere from now on: plans follow, with view cells around these viewpoints. Only of a session that was
+    /// opened with viewpoints.
+    ///
+    /// # Errors
+    /// The coordinator's; a session that has ended.
+    pub async fn look_from(&self, viewpoints: Vec<PinholeCamera>) -> Result<(), ClientError> {
+        self.say(|request| request.viewpoints = viewpoints).await
+    }
+
+    async fn say(&self, change: impl FnOnce(&mut SessionRequest)) -> Result<(), ClientError> {
         let session = self.state.borrow().session;
-        let change = ChangeSession { session, views_per_set, frames_per_s };
-        {
+        let change = {
             // What is asked for when the coordinator comes back, too.
             let mut request = self.request.lock().unwrap_or_else(PoisonError::into_inner);
-            (request.views_per_set, request.frames_per_s) = (views_per_set.max(1), frames_per_s);
-        }
+            change(&mut request);
+            let SessionRequest { views_per_set, frames_per_s, .. } = *request;
+            request.views_per_set = views_per_set.max(1);
+            ChangeSession { session, views_per_set, frames_per_s, viewpoints: request.viewpoints.clone() }
+        };
         self.coordinator.change_session(change).await.map_err(ClientError::coordinator)
     }
 

@@ -19,6 +19,8 @@ const MAX_BATCH_PIXELS: usize = 64 << 20;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct BatchKey {
     pub(crate) sample_set_id: SampleSetId,
+    /// Whose images of the set it is made from.
+    pub(crate) cell: u32,
     pub(crate) method: String,
     pub(crate) planes: ViewPlanes,
     pub(crate) size_px: UVec2,

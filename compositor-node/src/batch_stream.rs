@@ -1,5 +1,6 @@
 //! A stream whose every view is made.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -7,7 +8,7 @@ use node::next_within;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::{Code, Status};
 use wire::rpc::Messages;
-use wire::{RenderViews, RequestedView, SampleSetId};
+use wire::{Assignment, RenderViews, RequestedView, SampleSetId};
 
 use crate::batch::{BatchKey, MAX_BATCH, Source, Waiting, Waits};
 use crate::outbox::Reply;
@@ -57,12 +58,30 @@ impl<'a> BatchStream<'a> {
         self.credits.available_permits() < STREAM_PIXELS as usize
     }
 
-    /// Hands over a request's views in pieces of one batch, as far as there is credit.
+    /// Of every view cell the views that are in it; all cells' images are asked for at once.
     async fn enqueue(&self, request: RenderViews) -> Result<(), Status> {
         let (arrived, shared) = (Instant::now(), &self.client.shared);
         let plan = shared.of_compositor(shared.plan.require(request.plan_epoch)?)?;
-        let (source, id, set_wait_s) = shared.source(&plan, request.set_index).await?;
-        for views in request.views.chunks(MAX_BATCH) {
+        let asked = by_cell(&plan, &request.views).into_iter().map(|(cell, views)| {
+            let (shared, plan, set_index) = (shared.clone(), plan.clone(), request.set_index);
+            (cell, views, tokio::spawn(async move { shared.source(&plan, (set_index, cell)).await }))
+        });
+        for (cell, views, source) in asked.collect::<Vec<_>>() {
+            let (source, id, set_wait_s) = source.await.map_err(|error| Status::internal(error.to_string()))??;
+            self.enqueue_of_cell(&request, (cell, &views), (&source, id), (arrived, set_wait_s)).await?;
+        }
+        Ok(())
+    }
+
+    /// Hands over views in pieces of one batch, as far as there is credit.
+    async fn enqueue_of_cell(
+        &self,
+        request: &RenderViews,
+        (cell, views): (u32, &[RequestedView]),
+        (source, id): (&Source, SampleSetId),
+        waited: (Instant, f64),
+    ) -> Result<(), Status> {
+        for views in views.chunks(MAX_BATCH) {
             let mut batch = Vec::with_capacity(views.len());
             for view in views {
                 // What holds no credit yet must not keep back what does: at the bound, hand over first.
@@ -73,7 +92,7 @@ impl<'a> BatchStream<'a> {
                         self.credit(view).await?
                     }
                 };
-                batch.push(self.waiting(&request, *view, (&source, id), (arrived, set_wait_s), credit));
+                batch.push(self.waiting(request, (cell, *view), (source, id), waited, credit));
             }
             self.hand_over(batch);
         }
@@ -83,13 +102,14 @@ impl<'a> BatchStream<'a> {
     fn waiting(
         &self,
         request: &RenderViews,
-        view: RequestedView,
+        (cell, view): (u32, RequestedView),
         (source, sample_set_id): (&Source, SampleSetId),
         (arrived, set_wait_s): (Instant, f64),
         credit: Credit,
     ) -> Waiting {
         let key = BatchKey {
             sample_set_id,
+            cell,
             method: request.method.clone(),
             planes: request.planes,
             size_px: view.camera.size_px,
@@ -128,6 +148,15 @@ impl<'a> BatchStream<'a> {
         }
         self.client.shared.arrivals.push(self.client.stream, batch);
     }
+}
+
+/// Views by their view cell, in their order.
+fn by_cell(plan: &Assignment, views: &[RequestedView]) -> BTreeMap<u32, Vec<RequestedView>> {
+    let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
+    for view in views {
+        cells.entry(plan.cell_of(&view.camera)).or_default().push(*view);
+    }
+    cells
 }
 
 /// What a view takes of its stream's pixels: at least so much that the views are bounded too, at most

@@ -5,11 +5,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use depth_image::DepthImage;
-use node::{Connections, Deadlines, SampleSet};
+use node::{CellPlan, Connections, Deadlines, SampleSet};
 use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::{Messages, SamplerClient};
-use wire::{Assignment, Chunk, DecodeLimits, FetchImages, Reassembler, SampleSetId, SamplerShare, WireError};
+use wire::{Chunk, DecodeLimits, FetchImages, Reassembler, SampleSetId, SamplerShare, WireError};
 
 use crate::incoming::{Incoming, check, check_visibility, decode, whole};
 use crate::passing::Passing;
@@ -79,7 +79,7 @@ impl Fetcher {
     /// Every image of a set, whole and decoded. They are passed on as they come.
     pub(crate) async fn fetch(
         self: &Arc<Self>,
-        plan: &Arc<Assignment>,
+        plan: &CellPlan,
         set_index: u32,
         passing: Option<&Passing>,
     ) -> Result<Fetched, NotFetched> {
@@ -102,7 +102,7 @@ impl Fetcher {
     /// All that is sampled of a set, in its order.
     async fn fetch_images(
         self: &Arc<Self>,
-        plan: &Arc<Assignment>,
+        plan: &CellPlan,
         set_index: u32,
         passing: Option<&Passing>,
     ) -> Result<(Vec<DepthImage>, Took), NotFetched> {
@@ -128,7 +128,7 @@ impl Fetcher {
         Ok((complete, took))
     }
 
-    fn relay(&self, plan: &Assignment) -> Option<Ask> {
+    fn relay(&self, plan: &CellPlan) -> Option<Ask> {
         let has_failed = self.failed_relay_epoch.load(Ordering::Relaxed) == plan.plan_epoch;
         let relay = plan.relay_of(&self.node_name).filter(|_| !has_failed)?;
         let image_indices = (0..plan.image_count() as u32).collect();
@@ -136,7 +136,7 @@ impl Fetcher {
         Some(Ask { share, answer_within: RELAY_PATIENCE, first_within: RELAY_PATIENCE })
     }
 
-    fn asks(&self, plan: &Assignment, set_index: u32, have: &[Option<DepthImage>]) -> Vec<Ask> {
+    fn asks(&self, plan: &CellPlan, set_index: u32, have: &[Option<DepthImage>]) -> Vec<Ask> {
         let ask = |share: &SamplerShare| {
             let is_missing = |index: &u32| have.get(*index as usize).is_some_and(Option::is_none);
             let image_indices = share.image_indices.iter().copied().filter(is_missing).collect();
@@ -150,7 +150,7 @@ impl Fetcher {
 
     async fn fetch_all(
         self: &Arc<Self>,
-        plan: &Arc<Assignment>,
+        plan: &CellPlan,
         set_index: u32,
         asks: Vec<Ask>,
         passing: Option<&Passing>,
@@ -173,7 +173,7 @@ impl Fetcher {
     /// A share, asked for again where a fault may have been the network's.
     async fn fetch_again(
         &self,
-        plan: &Arc<Assignment>,
+        plan: &CellPlan,
         set_index: u32,
         ask: &Ask,
         passing: Option<&Passing>,
@@ -190,14 +190,14 @@ impl Fetcher {
 
     async fn fetch_share(
         &self,
-        plan: &Arc<Assignment>,
+        plan: &CellPlan,
         set_index: u32,
         ask: &Ask,
         passing: Option<&Passing>,
     ) -> Result<(Images, Took), Status> {
         let share = &ask.share;
         let id = SampleSetId { plan_epoch: plan.plan_epoch, index: set_index.into() };
-        let mut incoming = Incoming::new(self.call(id, ask).await?, ask.first_within, self.deadlines.chunk);
+        let mut incoming = Incoming::new(self.call(plan, id, ask).await?, ask.first_within, self.deadlines.chunk);
         let mut reassembler = Reassembler::new(DecodeLimits::default(), id);
         let cameras = plan.sampled_cameras();
         let (mut images, mut decode_s) = (Vec::new(), 0.0);
@@ -221,10 +221,11 @@ impl Fetcher {
         Ok((images, Took { decode_s, transfer_s: incoming.transfer_s, bytes: incoming.bytes }))
     }
 
-    async fn call(&self, id: SampleSetId, ask: &Ask) -> Result<Messages<Chunk>, Status> {
+    async fn call(&self, plan: &CellPlan, id: SampleSetId, ask: &Ask) -> Result<Messages<Chunk>, Status> {
         let client = SamplerClient::new(self.connections.to(&ask.share.address).await?);
         let image_indices = ask.share.image_indices.clone();
-        let request = FetchImages { plan_epoch: id.plan_epoch, set_index: id.index as u32, image_indices };
+        let SampleSetId { plan_epoch, index } = id;
+        let request = FetchImages { plan_epoch, set_index: index as u32, cell: plan.cell(), image_indices };
         let answer = tokio::time::timeout(ask.answer_within, client.fetch_sample_images(request)).await;
         answer.map_err(|_| Status::deadline_exceeded("no images in time"))?
     }

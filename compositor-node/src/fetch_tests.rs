@@ -85,6 +85,7 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
     let workload = Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![camera(); 2],
+        cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
         method: "joint_carve".to_owned(),
@@ -96,7 +97,7 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
         refinement_steps: 1,
     };
     let share = SamplerShare { node_name: "n7".to_owned(), address, image_indices: vec![0, 1] };
-    let plan = Arc::new(Assignment {
+    let plan = Arc::new(wire::Assignment {
         plan_epoch: 5,
         policy: Policy::Pipeline,
         workload,
@@ -106,7 +107,7 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
         relay_fanout: None,
     });
     let deadlines = Deadlines { chunk: Duration::from_millis(200), ..Deadlines::default() };
-    let fetched = Arc::new(Fetcher::new("n0", deadlines)).fetch(&plan, 0, None).await;
+    let fetched = Arc::new(Fetcher::new("n0", deadlines)).fetch(&CellPlan::of(&plan, 0).unwrap(), 0, None).await;
     shutdown.cancel();
     let set = fetched.map(|fetched| fetched.set);
     set.map_err(|failed| {

@@ -1,10 +1,9 @@
 //! What comes of a sampler: chunks, and images that are checked and decoded.
 
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use depth_image::{Camera, DepthImage, SpecularPlanes};
-use node::{blocking, next_within};
+use node::{CellPlan, blocking, next_within};
 use tonic::Status;
 use wire::rpc::Messages;
 use wire::{Assignment, Chunk, DecodeLimits, Reassembled, SampleSetId, SamplerShare, decode_depth_image};
@@ -70,7 +69,7 @@ pub(crate) async fn decode(cameras: &[Camera], whole: Reassembled) -> Result<Dep
 }
 
 /// The set's images out of what was sampled: the same, or their tiles.
-pub(crate) async fn whole(plan: &Arc<Assignment>, sampled: Vec<DepthImage>) -> Result<Vec<DepthImage>, Status> {
+pub(crate) async fn whole(plan: &CellPlan, sampled: Vec<DepthImage>) -> Result<Vec<DepthImage>, Status> {
     if plan.tile_count == 1 {
         return Ok(sampled);
     }

@@ -32,12 +32,14 @@ struct Pose {
     request: RenderViews,
     view: RequestedView,
     plan: Arc<Assignment>,
+    cell: u32,
     arrived: Instant,
 }
 
 impl Pose {
     fn shows_set_of(&self, other: &Self) -> bool {
-        (self.plan.plan_epoch, self.request.set_index) == (other.plan.plan_epoch, other.request.set_index)
+        let set = |pose: &Self| (pose.plan.plan_epoch, pose.request.set_index, pose.cell);
+        set(self) == set(other)
     }
 }
 
@@ -129,7 +131,8 @@ impl<'a> LiveStream<'a> {
             return Ok(());
         };
         self.check_number(view.frame)?;
-        let pose = Pose { request, view, plan, arrived: Instant::now() };
+        let cell = plan.cell_of(&view.camera);
+        let pose = Pose { request, view, plan, cell, arrived: Instant::now() };
         self.note(&pose, &live);
         let older = self.put(pose);
         self.replaced(older);
@@ -202,8 +205,8 @@ impl<'a> LiveStream<'a> {
             return;
         }
         let Some(pose) = self.newest.take() else { return };
-        let (shared, plan, set_index) = (self.client.shared.clone(), pose.plan.clone(), pose.request.set_index);
-        let work = Box::pin(async move { shared.source(&plan, set_index).await });
+        let (shared, plan, set) = (self.client.shared.clone(), pose.plan.clone(), (pose.request.set_index, pose.cell));
+        let work = Box::pin(async move { shared.source(&plan, set).await });
         self.loading = Some((pose, work));
     }
 
@@ -231,9 +234,10 @@ impl<'a> LiveStream<'a> {
 
     fn credited(&mut self, credit: Credit) {
         let Some(Ready { pose, source, id, set_wait_s, .. }) = self.ready.take() else { return };
-        let Pose { request, view, arrived, .. } = pose;
+        let Pose { request, view, cell, arrived, .. } = pose;
         let key = BatchKey {
             sample_set_id: id,
+            cell,
             method: request.method,
             planes: request.planes,
             size_px: view.camera.size_px,

@@ -139,6 +139,7 @@ mod tests {
     fn view(stream: u64, number: u32, index: u64, side_px: u32) -> View {
         let key = BatchKey {
             sample_set_id: SampleSetId { plan_epoch: 1, index },
+            cell: 0,
             method: String::new(),
             planes: ViewPlanes::default(),
             size_px: UVec2::splat(side_px),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use node::{CurrentPlan, Deadlines, Engine, NodeConfig, NodeMetrics, Relay, next_within, until_drained};
+use node::{CellPlan, CurrentPlan, Deadlines, Engine, NodeConfig, NodeMetrics, Relay, next_within, until_drained};
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
@@ -149,17 +149,19 @@ impl Shared {
         )))
     }
 
-    /// What views of a set are made from, as soon as it is there, and the seconds until then.
+    /// What views of a cell's set are made from, as soon as it is there, and the seconds until then.
     pub(crate) async fn source(
         &self,
         plan: &Arc<Assignment>,
-        set_index: u32,
+        (set_index, cell): (u32, u32),
     ) -> Result<(Source, SampleSetId, f64), Status> {
         let start = Instant::now();
         let beyond = || Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"));
         let id = plan.sample_set_id(set_index).ok_or_else(beyond)?;
         let source = match plan.policy {
-            Policy::Pipeline | Policy::TimeShare => Source::Set(self.sets.get(plan, set_index).await?),
+            Policy::Pipeline | Policy::TimeShare => {
+                Source::Set(self.sets.get(&CellPlan::of(plan, cell)?, set_index).await?)
+            }
             Policy::Direct => Source::Scene {
                 scene_hash: plan.workload.scene.hash.to_string(),
                 lighting: plan.workload.lighting.clone(),

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use node::{CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, UploadedSet, blocking};
+use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, UploadedSet, blocking};
 use tokio::sync::OnceCell;
 use tonic::{Status, async_trait};
 use wire::rpc::Messages;
@@ -25,6 +25,11 @@ fn sets_ahead(plan: &Assignment) -> u32 {
     plan.sets_at_once().max(SETS_AHEAD)
 }
 
+/// Of every view cell as many: views of all of them come in turn.
+fn most_kept(plan: &CellPlan) -> usize {
+    (KEPT_SETS + sets_ahead(plan) as usize) * plan.cell_count()
+}
+
 /// A complete set, ready to be reconstructed from.
 #[derive(Clone)]
 pub(crate) struct ReadySet {
@@ -35,7 +40,7 @@ pub(crate) struct ReadySet {
 
 /// A set on the device, and what of it is passed on.
 #[derive(Clone, Default)]
-struct Cell {
+struct Slot {
     ready: Arc<OnceCell<ReadySet>>,
     passing: Passing,
 }
@@ -48,7 +53,7 @@ pub(crate) struct Sets {
     metrics: NodeMetrics,
     current: CurrentPlan,
     reports: Reports,
-    kept: Mutex<VecDeque<(SetContent, Cell)>>,
+    kept: Mutex<VecDeque<(SetContent, Slot)>>,
 }
 
 /// Passes on what the sets of this node are loaded from.
@@ -56,11 +61,7 @@ pub(crate) struct SetRelay(pub(crate) Arc<Sets>);
 
 #[async_trait]
 impl Relay for SetRelay {
-    async fn images(
-        &self,
-        plan: &Arc<Assignment>,
-        set_index: u32,
-    ) -> Result<Messages<(u32, EncodedDepthImage)>, Status> {
+    async fn images(&self, plan: &CellPlan, set_index: u32) -> Result<Messages<(u32, EncodedDepthImage)>, Status> {
         let images = self.0.passed_on(plan, set_index)?;
         let (sets, plan) = (self.0.clone(), plan.clone());
         // Whoever asks first begins the loading; it tells those who listen how it ends.
@@ -88,19 +89,19 @@ impl Sets {
     }
 
     /// What was loaded before others asked is not kept for them: they ask the samplers.
-    fn passed_on(&self, plan: &Arc<Assignment>, set_index: u32) -> Result<Messages<(u32, EncodedDepthImage)>, Status> {
+    fn passed_on(&self, plan: &CellPlan, set_index: u32) -> Result<Messages<(u32, EncodedDepthImage)>, Status> {
         let beyond = || Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"));
         let content = plan.set_content(set_index).ok_or_else(beyond)?;
-        let cell = self.cell(content, KEPT_SETS + sets_ahead(plan) as usize);
-        if (cell.ready.initialized() && cell.passing.is_empty()) || cell.passing.has_failed() {
+        let slot = self.slot(content, most_kept(plan));
+        if (slot.ready.initialized() && slot.passing.is_empty()) || slot.passing.has_failed() {
             return Err(Status::failed_precondition(format!("sample set {set_index} is not passed on")));
         }
-        Ok(cell.passing.images())
+        Ok(slot.passing.images())
     }
 
     /// A set, once it is completely there; those after it are then fetched ahead, so that samplers
     /// work on them while this one is shown.
-    pub(crate) async fn get(self: &Arc<Self>, plan: &Arc<Assignment>, set_index: u32) -> Result<ReadySet, Status> {
+    pub(crate) async fn get(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<ReadySet, Status> {
         let in_turn = plan.sets_at_once() > 1;
         if in_turn {
             self.fetch_ahead(plan, set_index);
@@ -113,7 +114,7 @@ impl Sets {
     }
 
     /// Where sets are sampled in turn, the others' samplers need not wait for this one's.
-    fn fetch_ahead(self: &Arc<Self>, plan: &Arc<Assignment>, set_index: u32) {
+    fn fetch_ahead(self: &Arc<Self>, plan: &CellPlan, set_index: u32) {
         let last = plan.workload.timeline.set_count.saturating_sub(1);
         for next in set_index.saturating_add(1)..=last.min(set_index.saturating_add(sets_ahead(plan))) {
             if plan.set_content(next) == plan.set_content(set_index) {
@@ -129,18 +130,18 @@ impl Sets {
     }
 
     /// Loads once, however many wait; goes on when the first of them leaves.
-    async fn load(self: &Arc<Self>, plan: &Arc<Assignment>, set_index: u32) -> Result<ReadySet, Status> {
+    async fn load(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<ReadySet, Status> {
         let content = plan
             .set_content(set_index)
             .ok_or_else(|| Status::invalid_argument(format!("set_index {set_index} is beyond the timeline")))?;
-        let cell = self.cell(content, KEPT_SETS + sets_ahead(plan) as usize);
-        if let Some(set) = cell.ready.get() {
+        let slot = self.slot(content, most_kept(plan));
+        if let Some(set) = slot.ready.get() {
             return Ok(set.clone());
         }
         let (sets, plan) = (self.clone(), plan.clone());
         let loading = tokio::spawn(async move {
-            let load = || sets.fetch_and_upload(&plan, set_index, &cell.passing);
-            let loaded = cell.ready.get_or_try_init(load).await.cloned();
+            let load = || sets.fetch_and_upload(&plan, set_index, &slot.passing);
+            let loaded = slot.ready.get_or_try_init(load).await.cloned();
             if loaded.is_err() {
                 sets.forget(&content);
             }
@@ -149,12 +150,7 @@ impl Sets {
         loading.await.map_err(|error| Status::internal(format!("loading a sample set failed: {error}")))?
     }
 
-    async fn fetch_and_upload(
-        &self,
-        plan: &Arc<Assignment>,
-        set_index: u32,
-        passing: &Passing,
-    ) -> Result<ReadySet, Status> {
+    async fn fetch_and_upload(&self, plan: &CellPlan, set_index: u32, passing: &Passing) -> Result<ReadySet, Status> {
         let start = Instant::now();
         let passing = plan.relays(&self.node_name).then_some(passing).filter(|passing| !passing.has_failed());
         let fetched = self.fetch(plan, set_index, passing).await?;
@@ -172,16 +168,11 @@ impl Sets {
     /// A set that failed is begun anew by the next who asks.
     fn forget(&self, content: &SetContent) {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.retain(|(other, cell)| other != content || cell.ready.initialized());
+        kept.retain(|(other, slot)| other != content || slot.ready.initialized());
     }
 
     /// Stops when a later plan is in force: a sampler that is not of it may be gone without a word.
-    async fn fetch(
-        &self,
-        plan: &Arc<Assignment>,
-        set_index: u32,
-        passing: Option<&Passing>,
-    ) -> Result<Fetched, Status> {
+    async fn fetch(&self, plan: &CellPlan, set_index: u32, passing: Option<&Passing>) -> Result<Fetched, Status> {
         let fetched = tokio::select! {
             fetched = self.fetcher.fetch(plan, set_index, passing) => fetched,
             () = self.current.replaced(plan.plan_epoch) => {
@@ -194,15 +185,15 @@ impl Sets {
         })
     }
 
-    fn cell(&self, content: SetContent, most: usize) -> Cell {
+    fn slot(&self, content: SetContent, most: usize) -> Slot {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let at = kept.iter().position(|(other, _)| *other == content);
-        let entry = at.and_then(|at| kept.remove(at)).unwrap_or_else(|| (content, Cell::default()));
-        let cell = entry.1.clone();
+        let entry = at.and_then(|at| kept.remove(at)).unwrap_or_else(|| (content, Slot::default()));
+        let slot = entry.1.clone();
         kept.push_back(entry);
         while kept.len() > most {
             kept.pop_front();
         }
-        cell
+        slot
     }
 }

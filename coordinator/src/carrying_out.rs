@@ -60,7 +60,9 @@ pub(crate) async fn carry_out(inner: Arc<Inner>) {
 pub(crate) fn refusal(error: &ChoiceError) -> Status {
     match error {
         ChoiceError::Overload { .. } => Status::resource_exhausted(error.to_string()),
-        ChoiceError::ForcedTiles { .. } => Status::invalid_argument(error.to_string()),
+        ChoiceError::ForcedTiles { .. } | ChoiceError::Cells { .. } | ChoiceError::NoCells { .. } => {
+            Status::invalid_argument(error.to_string())
+        }
         ChoiceError::NoNodes | ChoiceError::ForcedSamplers { .. } => Status::failed_precondition(error.to_string()),
     }
 }

@@ -239,14 +239,23 @@ impl Coordinator for CoordinatorService {
     }
 
     async fn change_session(&self, request: ChangeSession) -> Result<(), Status> {
-        let ChangeSession { session, views_per_set, frames_per_s } = request;
+        let ChangeSession { session, views_per_set, frames_per_s, viewpoints } = request;
         let views_per_set = views_per_set as usize;
         if !locked(&self.inner.sessions).contains_key(&session) {
             return Err(Status::not_found(format!("session_number: no session {session} is open")));
         }
-        let admitted = locked(&self.inner.schedule).0.admits(session, views_per_set, frames_per_s);
-        admitted.map_err(|error| refusal(&error))?;
+        {
+            let scheduler = &locked(&self.inner.schedule).0;
+            let admitted = scheduler.admits(session, views_per_set, frames_per_s);
+            admitted.map_err(|error| refusal(&error))?;
+            if !viewpoints.is_empty() {
+                scheduler.admits_views(session, &viewpoints).map_err(|error| refusal(&error))?;
+            }
+        }
         self.inner.step(Event::Demanded { session, views_per_set, frames_per_s });
+        if !viewpoints.is_empty() {
+            self.inner.step(Event::Looked { session, viewpoints });
+        }
         Ok(())
     }
 

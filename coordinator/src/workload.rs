@@ -1,11 +1,14 @@
 //! What a session samples: its own wishes, else what came with the scene.
 
-use depth_image::Camera;
+use depth_image::{Aabb, Camera, PinholeCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
+use wire::limits::MAX_CELLS;
 use wire::{SessionRequest, Workload};
 
 use crate::SceneOffer;
+use crate::carrying_out::refusal;
+use crate::schedule::{ChoiceError, firsts};
 
 /// Completes a request with the scene's defaults.
 ///
@@ -15,7 +18,15 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
     if request.scene.as_ref().is_some_and(|hash| *hash != offer.hash) {
         return Err(Status::not_found(format!("scene_hash: the scene on offer is {}", offer.hash)));
     }
-    let cameras = if request.sample_cameras.is_empty() { &offer.rig } else { &request.sample_cameras };
+    let volume = request.volume.unwrap_or(offer.volume);
+    let cells = cells_of(request, offer, &volume)?;
+    let cell_first_indices = firsts(&cells);
+    let cameras = match (cells.is_empty(), request.sample_cameras.is_empty()) {
+        (false, false) => return Err(Status::invalid_argument("viewpoints: sample_cameras are given, too")),
+        (false, true) => cells.concat(),
+        (true, false) => request.sample_cameras.clone(),
+        (true, true) => offer.rig.clone(),
+    };
     let sized = |camera: &Camera| request.sample_size_px.map_or(Ok(*camera), |size_px| resized(camera, size_px));
     let sample_cameras = cameras.iter().map(sized).collect::<Result<Vec<_>, _>>()?;
     if sample_cameras.is_empty() {
@@ -24,16 +35,35 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
     Ok(Workload {
         scene: offer.scene(),
         sample_cameras,
+        cell_first_indices,
         sampling: request.sampling.clone(),
         lighting: request.lighting.clone(),
         method: request.method.clone(),
         codec: request.codec.clone(),
-        volume: request.volume.unwrap_or(offer.volume),
+        volume,
         background_linear: offer.background_linear,
         timeline: request.timeline,
         illumination: offer.illumination.clone(),
         refinement_steps: request.refinement_steps,
     })
+}
+
+/// Of a session that says from where it looks: the sample cameras of each of its view cells, as if it were alone, in the
+/// size of the offered ones.
+fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Result<Vec<Vec<Camera>>, Status> {
+    let offered = offer.rig.first().map(|Camera::Pinhole(camera)| camera.size_px);
+    let size_px = request.sample_size_px.or(offered).unwrap_or(request.typical_view.size_px);
+    let mut groups = Vec::new();
+    ViewGroup::add(&mut groups, &request.viewpoints, volume);
+    if groups.len() > MAX_CELLS {
+        return Err(refusal(&ChoiceError::Cells { cells: groups.len() }));
+    }
+    let checked = |camera: PinholeCamera| {
+        let usable = camera.validate().map(|()| Camera::Pinhole(camera));
+        usable.map_err(|error| Status::invalid_argument(format!("viewpoints: {error}")))
+    };
+    let cameras = |group: &ViewGroup| group.sample_cameras(volume, size_px).into_iter().map(checked).collect();
+    groups.iter().map(cameras).collect()
 }
 
 /// The same field of view in another size.

@@ -7,6 +7,7 @@ use depth_image::{PinholeCamera, ViewPlanes};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::SamplingMethod;
+use wire::limits::MAX_VIEWPOINTS;
 use wire::{OfferSettings, OfferStatus, PolicyChoice, Quality, SessionPlan, SessionRequest, Timeline};
 
 use crate::exit::BadInput;
@@ -37,6 +38,8 @@ pub struct Wishes {
     pub fallbacks: Vec<Quality>,
     /// Scene times; every set has the same views.
     pub timeline: Timeline,
+    /// Whether sample cameras shall stand around the views, in place of those that the scene came with.
+    pub around_views: bool,
 }
 
 impl Wishes {
@@ -55,6 +58,7 @@ impl Wishes {
             frames_per_s: 0.0,
             fallbacks: Vec::new(),
             timeline: Timeline::still(0.0),
+            around_views: false,
         }
     }
 
@@ -113,9 +117,15 @@ pub async fn open(client: &Client, wishes: &Wishes, views: &[PinholeCamera]) -> 
         frames_per_s: wishes.frames_per_s,
         fallbacks: wishes.fallbacks.clone(),
         forced_tile_count: wishes.tiles,
+        viewpoints: if wishes.around_views { viewpoints(views) } else { Vec::new() },
     };
     let told = |event: &_| tracing::info!(?event, "session");
     Ok(client.open_session(request, told).await?)
+}
+
+/// As many of the views as a session may name, evenly.
+fn viewpoints(views: &[PinholeCamera]) -> Vec<PinholeCamera> {
+    views.iter().step_by(views.len().div_ceil(MAX_VIEWPOINTS).max(1)).copied().collect()
 }
 
 /// Asks for all views of all sets and waits for them; `arrived` hears of each.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use client::{Client, Frame};
-use depth_image::PinholeCamera;
+use depth_image::{PinholeCamera, ViewCell};
 use glam::UVec2;
 use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
@@ -17,7 +17,6 @@ use crate::cluster::Cluster;
 use crate::delivery::{Delivered, Wishes, open, receive};
 use crate::engine::GpuEngine;
 use crate::process::{listen, runtime};
-use crate::rig::ViewCell;
 use crate::setup::{SceneArgs, Setup};
 
 /// V of the paper's headline: 290 views of 200×150.

@@ -23,7 +23,6 @@ pub mod pictures;
 pub mod process;
 pub mod processes;
 pub mod progress;
-pub mod rig;
 pub mod sampling_study;
 pub mod scaling;
 pub mod setup;

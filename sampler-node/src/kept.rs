@@ -86,6 +86,7 @@ mod tests {
         let workload = Workload {
             scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
             sample_cameras: vec![camera()],
+            cell_first_indices: Vec::new(),
             sampling: "conventional".to_owned(),
             lighting: "unlit".to_owned(),
             method: "joint_carve".to_owned(),

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use node::{CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, SampleWork, blocking, until_drained};
+use node::{
+    CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, SampleWork, blocking, until_drained,
+};
 use tokio::sync::mpsc;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
@@ -64,7 +66,7 @@ impl SamplerService {
     }
 
     /// Images of others, as they come.
-    async fn passed_on(&self, plan: &Arc<Assignment>, request: FetchImages) -> Result<Messages<Chunk>, Status> {
+    async fn passed_on(&self, plan: &CellPlan, request: FetchImages) -> Result<Messages<Chunk>, Status> {
         let id = SampleSetId { plan_epoch: plan.plan_epoch, index: request.set_index.into() };
         let images = self.relay.images(plan, request.set_index).await?;
         let (send, chunks) = mpsc::channel(CHUNKS_AHEAD);
@@ -76,7 +78,7 @@ impl SamplerService {
 #[async_trait]
 impl Sampler for SamplerService {
     async fn fetch_sample_images(&self, request: FetchImages) -> Result<Messages<Chunk>, Status> {
-        let plan = self.plan.require(request.plan_epoch)?;
+        let plan = CellPlan::of(&self.plan.require(request.plan_epoch)?, request.cell)?;
         let own = plan.images_of(self.plan.node_name(), request.set_index);
         if let Some(index) = request.image_indices.iter().find(|index| !own.contains(index)) {
             if plan.relays(self.plan.node_name()) {

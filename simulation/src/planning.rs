@@ -162,6 +162,7 @@ fn open(cluster: &Cluster, demand: &Demand) -> Event {
         forced_samplers: None,
         forced_tiles: None,
         fallbacks: Vec::new(),
+        viewpoints: Vec::new(),
         costs: slowest,
     }))
 }
@@ -185,6 +186,7 @@ fn workload(images: usize, sets: u32) -> Workload {
     Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![Camera::Pinhole(camera); images],
+        cell_first_indices: Vec::new(),
         sampling: String::new(),
         lighting: String::new(),
         method: String::new(),

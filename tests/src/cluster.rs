@@ -154,6 +154,7 @@ pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
         refinement_steps: 1,
         frames_per_s: 0.0,
         fallbacks: Vec::new(),
+        viewpoints: Vec::new(),
         forced_tile_count: None,
     }
 }

@@ -21,6 +21,7 @@ fn workload() -> Workload {
     Workload {
         scene: SceneRef { hash: offer.hash, package_bytes: 1 },
         sample_cameras: rig(),
+        cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
         method: "splat".to_owned(),
@@ -61,6 +62,7 @@ fn log(plan_epoch: u64) -> Vec<u8> {
         frames_per_s: 0.0,
         forced_tiles: None,
         fallbacks: Vec::new(),
+        viewpoints: Vec::new(),
         policy: PolicyChoice::Pipeline,
         forced_samplers: None,
         costs,

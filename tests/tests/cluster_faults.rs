@@ -63,8 +63,12 @@ async fn old_plans_are_refused_everywhere() {
     );
     let share = &old_plan.samplers[0];
     let sampler = SamplerClient::new(connect(&share.address).await.unwrap());
-    let fetch =
-        FetchImages { plan_epoch: old_plan.plan_epoch, set_index: 0, image_indices: share.image_indices.clone() };
+    let fetch = FetchImages {
+        plan_epoch: old_plan.plan_epoch,
+        set_index: 0,
+        cell: 0,
+        image_indices: share.image_indices.clone(),
+    };
     assert_eq!(sampler.fetch_sample_images(fetch).await.err().unwrap().code(), Code::FailedPrecondition);
     tokio::time::sleep(Duration::from_millis(50)).await;
     assert!(
@@ -102,7 +106,12 @@ async fn bad_sessions_are_named() {
     let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
     let share = &session.plan().assignment.samplers[0];
     let sampler = SamplerClient::new(connect(&share.address).await.unwrap());
-    let fetch = FetchImages { plan_epoch: session.plan().assignment.plan_epoch, set_index: 0, image_indices: vec![77] };
+    let fetch = FetchImages {
+        plan_epoch: session.plan().assignment.plan_epoch,
+        set_index: 0,
+        cell: 0,
+        image_indices: vec![77],
+    };
     assert!(sampler.fetch_sample_images(fetch).await.err().unwrap().message().contains("image_indices: 77"));
     assert!(matches!(session.render_views(views(4, 1)), Err(ClientError::Invalid { field: "set_index", .. })));
     let unknown = wire::SessionRequest { lighting: "moonlight".to_owned(), ..request(PolicyChoice::Auto, MOVING) };

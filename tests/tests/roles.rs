@@ -111,7 +111,7 @@ async fn compositors_pass_images_on_in_a_chain() {
     assert!(cluster.take_counts().iter().all(|&times| times == 1), "sampled once");
     let passed_on = |address: String, plan_epoch| async move {
         let sampler = SamplerClient::new(connect(&address).await.unwrap());
-        let fetch = FetchImages { plan_epoch, set_index: 1, image_indices: vec![0, 1, 2] };
+        let fetch = FetchImages { plan_epoch, set_index: 1, cell: 0, image_indices: vec![0, 1, 2] };
         sampler.fetch_sample_images(fetch).await.map(|chunks| chunks.collect::<Vec<_>>())
     };
     let chunks = passed_on(second.address.clone(), 100).await.unwrap().await;

@@ -123,6 +123,18 @@ pub enum ChoiceError {
         /// Of the nodes' time.
         needed: f64,
     },
+    /// More cells than a plan may have.
+    #[error("viewpoints: they are spread over {cells} view cells, at most 64")]
+    Cells {
+        /// How many.
+        cells: usize,
+    },
+    /// Where sample cameras stand is not for the schedule to say.
+    #[error("viewpoints: session {session} was opened with sample cameras")]
+    NoCells {
+        /// Which.
+        session: u64,
+    },
     /// More samplers than images (or sets, where images are sampled in order), or none left for views.
     #[error("forced_sampler_count is {forced}, at most {most} of {nodes} nodes can sample {images} whole images a set")]
     ForcedSamplers {

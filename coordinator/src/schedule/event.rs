@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use depth_image::PinholeCamera;
 use wire::{Costs, JoinCluster, MeasuredCosts, PolicyChoice, Quality, SessionPlan, Workload};
 
 use super::ChoiceError;
@@ -33,6 +34,13 @@ pub enum Event {
         views_per_set: usize,
         /// Pictures a second; 0: as fast as they come.
         frames_per_s: f64,
+    },
+    /// A session looks from elsewhere.
+    Looked {
+        /// Which.
+        session: u64,
+        /// From where, in place of what it said before.
+        viewpoints: Vec<PinholeCamera>,
     },
     /// A node timed its own work.
     Measured {
@@ -95,6 +103,9 @@ pub struct Opening {
     pub fallbacks: Vec<Quality>,
     /// As measured: every node's until it reports its own.
     pub costs: Costs,
+    /// From where it looks; the workload's sample cameras are then its own cells', as if it were alone. Empty: it has
+    /// sample cameras of its own.
+    pub viewpoints: Vec<PinholeCamera>,
 }
 
 /// What is to be done.

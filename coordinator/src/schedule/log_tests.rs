@@ -2,7 +2,8 @@ use wire::PolicyChoice;
 
 use super::*;
 use crate::schedule::MeasuredCosts;
-use crate::schedule::test_support::{Random, join, opened};
+use crate::schedule::Opening;
+use crate::schedule::test_support::{Random, join, opened, opening, view};
 
 fn incident() -> Vec<(Duration, Event)> {
     let measured =
@@ -14,6 +15,7 @@ fn incident() -> Vec<(Duration, Event)> {
         opened(7, PolicyChoice::Pipeline, 40),
         Event::Ready { plan_epoch: 4, node_name: named.clone() },
         Event::Demanded { session: 7, views_per_set: 500, frames_per_s: 0.1 },
+        Event::Looked { session: 7, viewpoints: vec![view(0.1), view(1.0 / 3.0)] },
         Event::Measured {
             node_name: named.clone(),
             plan_epoch: 4,
@@ -25,6 +27,7 @@ fn incident() -> Vec<(Duration, Event)> {
         Event::Unready { plan_epoch: 4, node_name: named.clone(), reason: "no \"disk\"\nleft".to_owned() },
         Event::Left { incarnation: 1, node_name: named },
         opened(8, PolicyChoice::TimeShare, 1),
+        Event::Opened(Box::new(Opening { viewpoints: vec![view(0.7)], ..opening(9, PolicyChoice::Pipeline, 3) })),
         Event::Tick,
         Event::Closed { session: 7 },
     ];

@@ -6,6 +6,7 @@
 
 mod assign;
 mod balance;
+mod cells;
 mod choose;
 mod costs;
 mod deal;
@@ -23,12 +24,15 @@ mod work;
 mod written;
 
 #[cfg(test)]
+mod cells_tests;
+#[cfg(test)]
 mod simulation;
 #[cfg(test)]
 mod test_support;
 
 pub use assign::{share_images, share_views};
 pub use balance::{brute_force_k, k_fd, k_fd_printed, pipeline_time};
+pub(crate) use cells::firsts;
 pub use choose::{Choice, ChoiceError, Demand, Predicted, Present, Wish, choose};
 pub use costs::NodeCosts;
 pub use deal::{Worker, deal, finish_s};

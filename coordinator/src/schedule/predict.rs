@@ -17,6 +17,8 @@ pub struct Load {
     pub images: usize,
     /// Into how many tiles each image is cut, to be shared among samplers: at least 1.
     pub tiles: usize,
+    /// View cells that the images belong to: at least 1.
+    pub cells: usize,
     /// Sample sets that differ, of the whole session.
     pub sets: usize,
     /// V: views of a sample set.
@@ -29,7 +31,7 @@ pub struct Load {
 
 impl Default for Load {
     fn default() -> Self {
-        Self { images: 0, tiles: 1, sets: 1, views: 0, in_order: false, still: false }
+        Self { images: 0, tiles: 1, cells: 1, sets: 1, views: 0, in_order: false, still: false }
     }
 }
 
@@ -56,29 +58,36 @@ impl Load {
     #[must_use]
     pub fn view_workers(&self, policy: Policy, nodes: &[NodeCosts]) -> Vec<Worker> {
         match policy {
-            Policy::Pipeline if nodes.len() > 1 => nodes.iter().map(|node| self.compositor(node)).collect(),
+            Policy::Pipeline if nodes.len() > 1 => {
+                nodes.iter().map(|node| self.compositor(node, nodes.len())).collect()
+            }
             Policy::Pipeline | Policy::TimeShare => self.sharers(nodes),
             Policy::Direct => nodes.iter().map(drawer).collect(),
         }
     }
 
-    fn compositor(&self, node: &NodeCosts) -> Worker {
-        Worker { start_s: self.load_set_s(node), job_s: node.view_s() }
+    fn compositor(&self, node: &NodeCosts, of: usize) -> Worker {
+        Worker { start_s: self.load_set_s(node, of), job_s: node.view_s() }
     }
 
     /// Each samples its part and gets the rest before it makes views.
     fn sharers(&self, nodes: &[NodeCosts]) -> Vec<Worker> {
         let others = nodes.len().saturating_sub(1);
         let worker = |(node, own): (&NodeCosts, f64)| Worker {
-            start_s: own * self.part_s(node) + exchange_s(self, node, own, others) + self.load_set_s(node),
+            start_s: own * self.part_s(node) + exchange_s(self, node, own, others) + self.load_set_s(node, nodes.len()),
             job_s: node.view_s(),
         };
         nodes.iter().zip(self.mean_image_counts(nodes)).map(worker).collect()
     }
 
-    /// d, where sets are loaded at all.
-    fn load_set_s(&self, node: &NodeCosts) -> f64 {
-        if self.still { 0.0 } else { node.costs.load_set_s }
+    /// d, where sets are loaded at all, of each cell that a node has views of: it is one of so many that make them.
+    fn load_set_s(&self, node: &NodeCosts, of: usize) -> f64 {
+        if self.still { 0.0 } else { self.cells_each(of) as f64 * node.costs.load_set_s }
+    }
+
+    /// Views are dealt cell by cell: a node has an even share of the cells, and part of another.
+    fn cells_each(&self, of: usize) -> usize {
+        (self.cells.div_ceil(of.max(1)) + 1).min(self.cells)
     }
 
     /// Nodes that can sample at the same time.
@@ -188,7 +197,7 @@ fn drawer(node: &NodeCosts) -> Worker {
 }
 
 fn views_s(load: &Load, compositors: &[NodeCosts]) -> f64 {
-    finish_s(load.views, &compositors.iter().map(|node| load.compositor(node)).collect::<Vec<_>>())
+    finish_s(load.views, &compositors.iter().map(|node| load.compositor(node, compositors.len())).collect::<Vec<_>>())
 }
 
 #[cfg(test)]
@@ -198,7 +207,7 @@ mod tests {
     use super::*;
     use crate::schedule::test_support::{COSTS, nodes};
 
-    const LOAD: Load = Load { images: 4, tiles: 1, sets: 1, views: 1000, in_order: false, still: false };
+    const LOAD: Load = Load { images: 4, tiles: 1, cells: 1, sets: 1, views: 1000, in_order: false, still: false };
 
     fn first(count: usize, of: usize) -> Vec<bool> {
         (0..of).map(|i| i < count).collect()

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use depth_image::{Camera, PinholeCamera};
+use wire::limits::MAX_CELLS;
 use wire::{
     Assignment, ClusterStatus, Costs, JoinCluster, MeasuredCosts, NodeCondition, NodeStatus, Policy, SessionPlan,
 };
@@ -53,6 +55,19 @@ pub struct Scheduler {
     work: Option<Work>,
 }
 
+/// What a plan follows at once.
+#[derive(PartialEq)]
+struct Wanted {
+    wish: Wish,
+    sample_cameras: Vec<Camera>,
+}
+
+impl Wanted {
+    fn of(work: &Work) -> Self {
+        Self { wish: work.wish(), sample_cameras: work.asked.sample_cameras.clone() }
+    }
+}
+
 /// The members that can be planned with, in the order of their names.
 struct Crew<'a> {
     names: Vec<&'a str>,
@@ -80,6 +95,7 @@ impl Scheduler {
             Event::Demanded { session, views_per_set, frames_per_s } => {
                 self.demanded(session, views_per_set, frames_per_s)
             }
+            Event::Looked { session, viewpoints } => self.looked(session, &viewpoints),
             Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views } => {
                 self.worked(&node_name, plan_epoch, busy_s, (views, dropped_views));
                 self.measured(&node_name, &costs)
@@ -181,16 +197,16 @@ impl Scheduler {
         }
         let mut commands = self.take_over(opening);
         let work = self.work.get_or_insert_with(|| Work::new(opening));
-        let wish = work.wish();
+        let before = Wanted::of(work);
         work.add(opening);
-        commands.extend(if work.wish() == wish { self.look() } else { self.replan("another session decides") });
+        commands.extend(self.follow(before));
         let is_told = commands.iter().any(|command| matches!(command, Command::Apply { .. }));
         commands.extend(self.in_force().filter(|_| !is_told).map(|in_force| self.tell(in_force, vec![session])));
         commands
     }
 
     fn check(&self, opening: &Opening) -> Result<(), ChoiceError> {
-        let shared = self.work.as_ref().filter(|work| work.asked == opening.workload);
+        let shared = self.work.as_ref().filter(|work| work.suits(opening));
         let mut work = shared.cloned().unwrap_or_else(|| Work::new(opening));
         work.add(opening);
         let counting = self.members.values().filter(|member| self.counts(member, opening));
@@ -214,14 +230,29 @@ impl Scheduler {
         admit(&work, &self.usable().map(|(_, member)| member.estimate.now()).collect::<Vec<_>>())
     }
 
+    /// Whether a session may look from elsewhere from now on.
+    ///
+    /// # Errors
+    /// As for one that is opened, and for one that has sample cameras of its own.
+    pub fn admits_views(&self, session: u64, viewpoints: &[PinholeCamera]) -> Result<(), ChoiceError> {
+        let Some(before) = &self.work else { return Ok(()) };
+        let mut work = before.clone();
+        work.look(session, viewpoints);
+        match work.cell_count() {
+            None => Err(ChoiceError::NoCells { session }),
+            Some(cells) if cells > MAX_CELLS && Some(cells) > before.cell_count() => Err(ChoiceError::Cells { cells }),
+            Some(_) => Ok(()),
+        }
+    }
+
     /// A node that could not take plans of one workload may take those of another.
     fn counts(&self, member: &Member, opening: &Opening) -> bool {
-        !member.is_out || self.work.as_ref().is_none_or(|work| work.asked != opening.workload)
+        !member.is_out || self.work.as_ref().is_none_or(|work| !work.suits(opening))
     }
 
     /// Ends sessions of another workload; costs are those of the new one from here on.
     fn take_over(&mut self, opening: &Opening) -> Vec<Command> {
-        if self.work.as_ref().is_some_and(|work| work.asked == opening.workload) {
+        if self.work.as_ref().is_some_and(|work| work.suits(opening)) {
             return Vec::new();
         }
         for member in self.members.values_mut() {
@@ -291,13 +322,32 @@ impl Scheduler {
 
     fn closed(&mut self, session: u64) -> Vec<Command> {
         let Some(work) = &mut self.work else { return Vec::new() };
-        let wish = work.wish();
+        let before = Wanted::of(work);
         work.remove(session);
         if work.sessions().is_empty() {
             self.work = None;
             return Vec::new();
         }
-        if work.wish() == wish { self.look() } else { self.replan("another session decides") }
+        self.follow(before)
+    }
+
+    fn looked(&mut self, session: u64, viewpoints: &[PinholeCamera]) -> Vec<Command> {
+        let Some(work) = &mut self.work else { return Vec::new() };
+        let before = Wanted::of(work);
+        work.look(session, viewpoints);
+        self.follow(before)
+    }
+
+    /// At once, where another session decides or other images are sampled; else when it is worth it.
+    fn follow(&mut self, before: Wanted) -> Vec<Command> {
+        let Some(now) = self.work.as_ref().map(Wanted::of) else { return Vec::new() };
+        if now.wish != before.wish {
+            self.replan("another session decides")
+        } else if now.sample_cameras != before.sample_cameras {
+            self.replan("sessions look from elsewhere")
+        } else {
+            self.look()
+        }
     }
 
     fn crew(&self) -> Option<Crew<'_>> {
@@ -433,6 +483,9 @@ fn present_s(crew: &Crew<'_>, has_role: &[bool]) -> Option<f64> {
 fn admit(work: &Work, nodes: &[NodeCosts]) -> Result<(), ChoiceError> {
     let demand = Demand { load: work.load(), nodes, wish: work.wish(), present: None };
     check(&demand)?;
+    if let Some(cells) = work.cell_count().filter(|&cells| cells > MAX_CELLS) {
+        return Err(ChoiceError::Cells { cells });
+    }
     let least_ratio = work.fallbacks().last().map_or(1.0, |quality| quality.frame_rate_ratio);
     let needed = work.utilisation(choose(&demand)?.time_s()) * least_ratio / work.frame_rate_ratio();
     if needed > MOST_ADMITTED { Err(ChoiceError::Overload { needed }) } else { Ok(()) }

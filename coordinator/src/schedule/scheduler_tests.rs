@@ -342,7 +342,7 @@ fn overload_goes_down_the_fallbacks_and_every_plan_says_so() {
     assert_eq!(seen, [1, 2], "1.125 of their time at 180, 0.9 at 144");
     let plan = cluster.plan();
     assert_eq!(plan.workload.method, "joint_carve:2");
-    let depth_image::Camera::Pinhole(camera) = plan.workload.sample_cameras[0];
+    let Camera::Pinhole(camera) = plan.workload.sample_cameras[0];
     assert_eq!(camera.size_px.x, 4, "half of 8");
     cluster.step(Event::Demanded { session: 1, views_per_set: 1, frames_per_s: 20.0 });
     let plans: Vec<u32> = (0..2).map(|_| applied(&cluster.wait(60)).1.fallback_number).collect();

@@ -64,6 +64,7 @@ pub(super) fn workload(images: usize) -> Workload {
     Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![Camera::Pinhole(camera); images],
+        cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
         method: "joint_carve".to_owned(),
@@ -76,6 +77,12 @@ pub(super) fn workload(images: usize) -> Workload {
     }
 }
 
+/// From a circle around the scene.
+pub(super) fn view(azimuth_rad: f32) -> PinholeCamera {
+    let eye = Vec3::new(azimuth_rad.sin(), 0.3, azimuth_rad.cos()) * 4.0;
+    PinholeCamera::looking_at(eye, Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(40, 30))
+}
+
 pub(super) fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) -> Opening {
     Opening {
         session,
@@ -86,6 +93,7 @@ pub(super) fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) 
         forced_samplers: None,
         forced_tiles: None,
         fallbacks: Vec::new(),
+        viewpoints: Vec::new(),
         costs: COSTS,
     }
 }

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use depth_image::Camera;
+use depth_image::{Camera, PinholeCamera};
 use glam::UVec2;
 use wire::{AchievedTime, Assignment, Costs, Policy, Quality, SessionPlan, Workload};
 
+use super::cells::Cells;
 use super::overload::Overload;
 use super::patience::Patience;
 use super::{Load, Opening, Wish};
@@ -19,13 +20,16 @@ struct Session {
     frames_per_s: f64,
     wish: Wish,
     fallbacks: Vec<Quality>,
+    viewpoints: Vec<PinholeCamera>,
 }
 
 /// Sessions of one workload.
 #[derive(Debug, Clone)]
 pub(super) struct Work {
-    /// As it was asked for.
+    /// As it was asked for, with the cells' sample cameras where there are cells.
     pub(super) asked: Workload,
+    /// Of sessions that say from where they look.
+    cells: Option<Cells>,
     /// As measured when it was first opened.
     pub(super) costs: Costs,
     /// In the order they were opened.
@@ -55,6 +59,7 @@ impl Work {
     pub(super) fn new(opening: &Opening) -> Self {
         Self {
             asked: opening.workload.clone(),
+            cells: (!opening.viewpoints.is_empty()).then(|| Cells::of(&opening.workload)),
             costs: opening.costs,
             sessions: Vec::new(),
             overload: Overload::default(),
@@ -72,11 +77,41 @@ impl Work {
             frames_per_s: opening.frames_per_s,
             wish: Wish { policy, forced_samplers, forced_tiles },
             fallbacks: opening.fallbacks.clone(),
+            viewpoints: opening.viewpoints.clone(),
         });
+        self.follow_views();
+    }
+
+    /// Whether a session can be one of this work's.
+    pub(super) fn suits(&self, opening: &Opening) -> bool {
+        match &self.cells {
+            Some(cells) => !opening.viewpoints.is_empty() && cells.suit(&self.asked, &opening.workload),
+            None => opening.viewpoints.is_empty() && self.asked == opening.workload,
+        }
     }
 
     pub(super) fn remove(&mut self, number: u64) {
         self.sessions.retain(|session| session.number != number);
+        self.follow_views();
+    }
+
+    pub(super) fn look(&mut self, number: u64, viewpoints: &[PinholeCamera]) {
+        for session in self.sessions.iter_mut().filter(|session| session.number == number) {
+            session.viewpoints = viewpoints.to_vec();
+        }
+        self.follow_views();
+    }
+
+    fn follow_views(&mut self) {
+        let Some(cells) = &mut self.cells else { return };
+        let viewpoints: Vec<_> = self.sessions.iter().flat_map(|session| session.viewpoints.iter().copied()).collect();
+        cells.follow(&viewpoints, &self.asked.volume);
+        cells.put_into(&mut self.asked);
+    }
+
+    /// View cells, where sessions say from where they look.
+    pub(super) fn cell_count(&self) -> Option<usize> {
+        self.cells.as_ref().map(Cells::len)
     }
 
     pub(super) fn demand(&mut self, number: u64, views: usize, frames_per_s: f64) {
@@ -114,6 +149,7 @@ impl Work {
         Load {
             images: self.asked.sample_cameras.len(),
             tiles: 1,
+            cells: self.asked.cell_count(),
             // A still picture is one set, though it be refined: its sums are kept where it is sampled.
             sets: if timeline.moves() { timeline.set_count as usize } else { 1 },
             views: at_once.saturating_add(rated),

@@ -1,7 +1,8 @@
 //! Events as a log has them, and back; values that no event has are named.
 
+use depth_image::PinholeCamera;
 use serde::{Deserialize, Serialize};
-use wire::limits::{MAX_FRAMES_PER_S, MAX_TEXT_BYTES, MAX_TILES, MAX_VIEWS_PER_SET};
+use wire::limits::{MAX_FRAMES_PER_S, MAX_TEXT_BYTES, MAX_TILES, MAX_VIEWPOINTS, MAX_VIEWS_PER_SET};
 use wire::{Costs, JoinCluster, MeasuredCosts, NodeStatus, PolicyChoice, Quality, UnknownPolicy, WireError, Workload};
 
 use super::{Event, Opening};
@@ -52,12 +53,18 @@ pub(super) enum Written {
         costs: WrittenCosts,
         /// The message that nodes get, in hexadecimal.
         workload: String,
+        #[serde(default)]
+        viewpoints: Vec<PinholeCamera>,
     },
     Demanded {
         session: u64,
         views_per_set: usize,
         #[serde(with = "super::exact")]
         frames_per_s: f64,
+    },
+    Looked {
+        session: u64,
+        viewpoints: Vec<PinholeCamera>,
     },
     Measured {
         node_name: String,
@@ -138,6 +145,7 @@ impl From<&Event> for Written {
             Event::Demanded { session, views_per_set, frames_per_s } => {
                 Self::Demanded { session, views_per_set, frames_per_s }
             }
+            Event::Looked { session, viewpoints } => Self::Looked { session, viewpoints },
             Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views } => {
                 Self::Measured { node_name, plan_epoch, busy_s, views, dropped_views, costs: costs.into() }
             }
@@ -166,6 +174,7 @@ impl Written {
             fallbacks: opening.fallbacks.into_iter().map(Into::into).collect(),
             costs: opening.costs.into(),
             workload: hex(&opening.workload.to_bytes()),
+            viewpoints: opening.viewpoints,
         }
     }
 
@@ -186,6 +195,7 @@ impl Written {
                 fallbacks,
                 costs,
                 workload,
+                viewpoints,
             } => Event::Opened(Box::new(Opening {
                 session,
                 workload: Workload::from_bytes(&bytes(&workload)?)?,
@@ -196,10 +206,12 @@ impl Written {
                 forced_tiles: tiles(forced_tiles)?,
                 fallbacks: fallbacks.into_iter().map(WrittenQuality::read).collect::<Result<_, _>>()?,
                 costs: costs.read()?,
+                viewpoints: looks(viewpoints)?,
             })),
             Self::Demanded { session, views_per_set, frames_per_s } => {
                 Event::Demanded { session, views_per_set: views(views_per_set)?, frames_per_s: rate(frames_per_s)? }
             }
+            Self::Looked { session, viewpoints } => Event::Looked { session, viewpoints: looks(viewpoints)? },
             Self::Measured { node_name, plan_epoch, busy_s, views, dropped_views, costs } => Event::Measured {
                 node_name: name(node_name)?,
                 plan_epoch,
@@ -223,6 +235,15 @@ fn name(node_name: String) -> Result<String, Wrong> {
         return Ok(node_name);
     }
     Err(Wrong { field: "node_name", reason: format!("has {} bytes, must have 1 to {MAX_TEXT_BYTES}", node_name.len()) })
+}
+
+fn looks(viewpoints: Vec<PinholeCamera>) -> Result<Vec<PinholeCamera>, Wrong> {
+    let wrong = |reason: String| Wrong { field: "viewpoints", reason };
+    if viewpoints.len() > MAX_VIEWPOINTS {
+        return Err(wrong(format!("{} are more than {MAX_VIEWPOINTS}", viewpoints.len())));
+    }
+    viewpoints.iter().try_for_each(|view| view.validate().map_err(|error| wrong(error.to_string())))?;
+    Ok(viewpoints)
 }
 
 fn views(views_per_set: usize) -> Result<usize, Wrong> {

@@ -3,6 +3,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod blocking;
+mod cell_plan;
 mod config;
 mod connections;
 mod engine;
@@ -21,6 +22,7 @@ mod watched;
 mod work_done;
 
 pub use blocking::blocking;
+pub use cell_plan::CellPlan;
 pub use config::{Deadlines, NodeConfig, Quotas};
 pub use connections::Connections;
 pub use engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};

@@ -114,6 +114,7 @@ fn request(batch_count: u32) -> MeasureCosts {
     let workload = Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![Camera::Pinhole(camera()); 2],
+        cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "traced".to_owned(),
         method: "joint_carve".to_owned(),

@@ -111,6 +111,7 @@ mod tests {
         let workload = Workload {
             scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
             sample_cameras: Vec::new(),
+            cell_first_indices: Vec::new(),
             sampling: "conventional".to_owned(),
             lighting: lighting.to_owned(),
             method: "joint_carve".to_owned(),

@@ -1,6 +1,9 @@
 //! How much a session asks for, and what it makes do with.
 
+use depth_image::PinholeCamera;
+
 use crate::error::{WireError, at_most};
+use crate::geometry::{pinhole_to, viewpoints_from};
 use crate::limits::{MAX_FALLBACKS, MAX_FRAMES_PER_S, MAX_VIEWS_PER_SET, nonempty};
 use crate::proto;
 
@@ -57,7 +60,7 @@ pub(crate) fn rate_from(frames_per_s: f64) -> Result<f64, WireError> {
 }
 
 /// A session wants more, or less.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ChangeSession {
     /// Which.
     pub session: u64,
@@ -65,6 +68,8 @@ pub struct ChangeSession {
     pub views_per_set: u32,
     /// Pictures a second; 0: as fast as they come.
     pub frames_per_s: f64,
+    /// From where it looks from now on; empty: as before.
+    pub viewpoints: Vec<PinholeCamera>,
 }
 
 impl TryFrom<proto::ChangeSessionRequest> for ChangeSession {
@@ -74,13 +79,22 @@ impl TryFrom<proto::ChangeSessionRequest> for ChangeSession {
         if c.views_per_set_count > MAX_VIEWS_PER_SET {
             return Err(WireError::out_of_range("views_per_set_count", c.views_per_set_count, "from 0 to 65536"));
         }
-        let frames_per_s = rate_from(c.frames_per_s)?;
-        Ok(Self { session: c.session_number, views_per_set: c.views_per_set_count, frames_per_s })
+        Ok(Self {
+            session: c.session_number,
+            views_per_set: c.views_per_set_count,
+            frames_per_s: rate_from(c.frames_per_s)?,
+            viewpoints: viewpoints_from(c.viewpoints)?,
+        })
     }
 }
 
 impl From<ChangeSession> for proto::ChangeSessionRequest {
     fn from(c: ChangeSession) -> Self {
-        Self { session_number: c.session, views_per_set_count: c.views_per_set, frames_per_s: c.frames_per_s }
+        Self {
+            session_number: c.session,
+            views_per_set_count: c.views_per_set,
+            frames_per_s: c.frames_per_s,
+            viewpoints: c.viewpoints.iter().map(pinhole_to).collect(),
+        }
     }
 }

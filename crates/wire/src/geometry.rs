@@ -4,7 +4,7 @@ use depth_image::{Aabb, Camera, PinholeCamera};
 use glam::{Quat, UVec2, Vec2, Vec3};
 
 use crate::error::{WireError, at_most, required};
-use crate::limits::MAX_SAMPLE_CAMERAS;
+use crate::limits::{MAX_SAMPLE_CAMERAS, MAX_VIEWPOINTS};
 use crate::proto;
 
 pub(crate) fn vec3_from(v: Option<proto::Vec3>, field: &'static str) -> Result<Vec3, WireError> {
@@ -71,10 +71,16 @@ pub(crate) fn camera_to(camera: &Camera) -> proto::Camera {
     proto::Camera { model: Some(model) }
 }
 
-/// The cameras of one sample set; none is allowed here.
-pub(crate) fn sample_cameras_from(cameras: Vec<proto::Camera>) -> Result<Vec<Camera>, WireError> {
-    at_most(cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras")?;
+/// The cameras of so many view cells at most; none is allowed here.
+pub(crate) fn sample_cameras_from(cameras: Vec<proto::Camera>, cells: usize) -> Result<Vec<Camera>, WireError> {
+    at_most(cameras.len(), MAX_SAMPLE_CAMERAS * cells, "sample_cameras")?;
     cameras.into_iter().map(camera_from).collect()
+}
+
+/// From where a session looks.
+pub(crate) fn viewpoints_from(viewpoints: Vec<proto::PinholeCamera>) -> Result<Vec<PinholeCamera>, WireError> {
+    at_most(viewpoints.len(), MAX_VIEWPOINTS, "viewpoints")?;
+    viewpoints.into_iter().map(|viewpoint| pinhole_from(Some(viewpoint), "viewpoints")).collect()
 }
 
 pub(crate) fn bounds_from(bounds: proto::Bounds) -> Result<Aabb, WireError> {

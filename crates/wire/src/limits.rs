@@ -4,8 +4,12 @@ use depth_image::SpecularPlanes;
 
 use crate::error::{WireError, at_most};
 
-/// Sample cameras of one set; provenance has room for 24.
+/// Sample cameras of one view cell; provenance has room for 24.
 pub const MAX_SAMPLE_CAMERAS: usize = 16;
+/// View cells of one workload.
+pub const MAX_CELLS: usize = 64;
+/// Viewpoints of one session.
+pub const MAX_VIEWPOINTS: usize = 256;
 /// Tiles of one sample image.
 pub const MAX_TILES: u32 = 16;
 /// Fallbacks of one session.

@@ -5,6 +5,7 @@ use std::num::NonZeroU32;
 use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
 
+use crate::geometry::pinhole_to;
 use crate::*;
 
 fn camera() -> PinholeCamera {
@@ -41,6 +42,7 @@ fn workload() -> Workload {
     Workload {
         scene: SceneRef { hash: SceneHash::of(b"scene"), package_bytes: 5 },
         sample_cameras: vec![Camera::Pinhole(camera()); 2],
+        cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "phong".to_owned(),
         method: "joint_carve".to_owned(),
@@ -98,6 +100,7 @@ fn request() -> SessionRequest {
             frame_rate_ratio: 1.0,
         }],
         forced_tile_count: Some(2),
+        viewpoints: vec![camera(); 2],
     }
 }
 
@@ -175,8 +178,8 @@ fn messages_come_back() {
     assert_eq!(Workload::from_bytes(&workload().to_bytes()), Ok(workload()));
     let opened = SessionEvent::Opened { session: 7 };
     assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(opened.clone())), Ok(opened));
-    let change = ChangeSession { session: 7, views_per_set: 0, frames_per_s: 12.5 };
-    assert_eq!(ChangeSession::try_from(proto::ChangeSessionRequest::from(change)), Ok(change));
+    let change = ChangeSession { session: 7, views_per_set: 0, frames_per_s: 12.5, viewpoints: vec![camera()] };
+    assert_eq!(ChangeSession::try_from(proto::ChangeSessionRequest::from(change.clone())), Ok(change));
     assert_eq!(WorkReport::try_from(proto::ReportWorkRequest::from(work_report())), Ok(work_report()));
 }
 
@@ -195,9 +198,15 @@ fn bad_reports_and_demands_are_refused() {
     assert!(spoilt(&|m| m.node_name.clear()).contains("node_name is missing"));
     assert!(spoilt(&|m| m.busy_s = f64::NAN).contains("busy_s is NaN"));
     assert!(spoilt(&|m| m.load_set_s = Some(-1.0)).contains("load_set_s is -1"));
-    let change =
-        proto::ChangeSessionRequest { session_number: 1, views_per_set_count: 1_000_000_000, frames_per_s: 1.0 };
-    assert!(refusal::<_, ChangeSession>(change).contains("views_per_set_count is 1000000000"));
+    let change = proto::ChangeSessionRequest { session_number: 1, frames_per_s: 1.0, ..Default::default() };
+    let many = proto::ChangeSessionRequest { views_per_set_count: 1_000_000_000, ..change.clone() };
+    assert!(refusal::<_, ChangeSession>(many).contains("views_per_set_count is 1000000000"));
+    let viewpoint = pinhole_to(&camera());
+    let crowd = proto::ChangeSessionRequest { viewpoints: vec![viewpoint; 257], ..change.clone() };
+    assert!(refusal::<_, ChangeSession>(crowd).contains("viewpoints has 257"));
+    let nowhere = proto::PinholeCamera { near_m: f32::NAN, ..viewpoint };
+    let lost = proto::ChangeSessionRequest { viewpoints: vec![nowhere], ..change };
+    assert!(refusal::<_, ChangeSession>(lost).contains("viewpoints: camera near_m"));
 }
 
 #[test]
@@ -471,4 +480,72 @@ fn errors_become_statuses() {
     let refused = tonic::Status::from(WireError::Missing { field: "views" });
     assert_eq!((refused.code(), refused.message()), (tonic::Code::InvalidArgument, "views is missing"));
     assert_eq!(tonic::Status::from(WireError::corrupt("data", "x")).code(), tonic::Code::DataLoss);
+}
+
+/// Three cells of 1, 2 and 1 cameras in four tiles' plan of two samplers.
+fn of_cells() -> Assignment {
+    let looking = |x: f32| {
+        let eye = Vec3::new(x, 0.0, 9.0);
+        Camera::Pinhole(PinholeCamera { eye_in_world: eye, ..camera() })
+    };
+    let workload = Workload {
+        sample_cameras: [0.0, 10.0, 11.0, 30.0].map(looking).to_vec(),
+        cell_first_indices: vec![0, 1, 3],
+        ..workload()
+    };
+    let share = |name: &str, image_indices: Vec<u32>| SamplerShare {
+        node_name: name.to_owned(),
+        address: "http://127.0.0.1:1".to_owned(),
+        image_indices,
+    };
+    let samplers = vec![share("a", vec![0, 1, 2]), share("c", vec![3, 4, 5, 6, 7])];
+    Assignment { workload, samplers, tile_count: 2, ..assignment() }
+}
+
+#[test]
+fn a_cells_plan_has_its_images_and_no_others() {
+    let plan = of_cells();
+    assert_eq!(Assignment::try_from(proto::Assignment::from(plan.clone())), Ok(plan.clone()));
+    let of = |cell: u32| {
+        let of_cell = plan.of_cell(cell).unwrap();
+        let shares: Vec<_> = of_cell.samplers.iter().map(|s| (s.node_name.clone(), s.image_indices.clone())).collect();
+        assert_eq!(Assignment::try_from(proto::Assignment::from(of_cell.clone())), Ok(of_cell.clone()));
+        (of_cell.workload.sample_cameras.len(), shares)
+    };
+    let share = |name: &str, images: &[u32]| (name.to_owned(), images.to_vec());
+    assert_eq!(of(0), (1, vec![share("a", &[0, 1])]));
+    assert_eq!(of(1), (2, vec![share("a", &[0]), share("c", &[1, 2, 3])]));
+    assert_eq!(of(2), (1, vec![share("c", &[0, 1])]));
+    assert_eq!(plan.of_cell(3), None);
+    let one = assignment();
+    assert_eq!((one.of_cell(0), one.of_cell(1)), (Some(one.clone()), None));
+}
+
+#[test]
+fn a_view_is_of_the_nearest_cell_and_what_a_cell_shows_is_its_own() {
+    let plan = of_cells();
+    let view = |x: f32| PinholeCamera { eye_in_world: Vec3::new(x, 0.0, 9.0), ..camera() };
+    assert_eq!([-3.0, 4.0, 6.0, 10.5, 17.0, 40.0].map(|x| plan.cell_of(&view(x))), [0, 0, 1, 1, 1, 2]);
+    assert_eq!(Assignment { policy: Policy::Direct, ..plan.clone() }.cell_of(&view(40.0)), 0);
+    let content = |plan: &Assignment, cell: u32| plan.of_cell(cell).unwrap().set_content(0);
+    let mut fewer = plan.clone();
+    fewer.workload.sample_cameras.pop();
+    fewer.workload.cell_first_indices.pop();
+    fewer.plan_epoch += 1;
+    assert_eq!([0, 1].map(|cell| content(&fewer, cell)), [0, 1].map(|cell| content(&plan, cell)));
+    assert_ne!(content(&plan, 0), content(&plan, 1));
+}
+
+#[test]
+fn cells_that_cannot_be_are_refused() {
+    let spoilt = |firsts: Vec<u32>| {
+        let mut message = proto::Assignment::from(of_cells());
+        message.workload.as_mut().unwrap().cell_first_indices = firsts;
+        refusal::<_, Assignment>(message)
+    };
+    for firsts in [vec![1, 2], vec![0, 0, 3], vec![0, 3, 1], vec![0, 4], vec![0, u32::MAX]] {
+        let text = spoilt(firsts);
+        assert!(text.contains("cell_first_indices is ") && text.contains("of 4 sample_cameras"), "{text}");
+    }
+    assert!(spoilt(vec![0; 65]).contains("cell_first_indices has 65"));
 }

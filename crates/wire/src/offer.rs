@@ -44,7 +44,7 @@ impl TryFrom<proto::SceneOffer> for OfferStatus {
         }
         Ok(Self {
             scene: required(o.scene, "offer.scene")?.try_into()?,
-            sample_cameras: sample_cameras_from(o.sample_cameras)?,
+            sample_cameras: sample_cameras_from(o.sample_cameras, 1)?,
             volume: bounds_from(required(o.volume, "offer.volume")?)?,
             origin_in_source: origin,
             settings: OfferSettings {

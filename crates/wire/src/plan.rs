@@ -3,14 +3,14 @@
 use std::fmt;
 use std::num::NonZeroU32;
 
-use depth_image::Camera;
+use depth_image::{Camera, PinholeCamera};
 use prost::Message as _;
 use tonic::metadata::{MetadataMap, MetadataValue};
 use tonic::{Code, Status};
 
 use crate::codec::SampleSetId;
 use crate::error::{WireError, at_most, required};
-use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_TILES, nonempty};
+use crate::limits::{MAX_CELLS, MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_TILES, nonempty};
 use crate::{Workload, proto};
 
 /// Of a refusal: the plan in force.
@@ -81,7 +81,7 @@ pub struct CompositorShare {
     pub view_weight: u32,
 }
 
-/// What a sample set shows: equal for equal scene, time, cameras, sampling, lighting, step of refinement, lights
+/// What a sample set shows, of one view cell: equal for equal scene, time, cameras, sampling, lighting, step of refinement, lights
 /// and volume, whatever the plan. What has not changed is known by it and not sampled again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SetContent([u8; 32]);
@@ -146,6 +146,28 @@ impl Assignment {
         if self.sets_in_turn() { self.samplers.len() as u32 } else { 1 }
     }
 
+    /// The view cell from whose images a view is made; views that are drawn directly need none.
+    #[must_use]
+    pub fn cell_of(&self, view: &PinholeCamera) -> u32 {
+        if self.policy == Policy::Direct { 0 } else { self.workload.cell_of(view) }
+    }
+
+    /// The same plan for one view cell alone: its cameras, and of their images who samples them; `None` beyond the last
+    /// cell.
+    #[must_use]
+    pub fn of_cell(&self, cell: u32) -> Option<Self> {
+        let cameras = self.workload.cameras_of_cell(cell as usize)?;
+        let images = [cameras.start, cameras.end].map(|camera| camera as u32 * self.tile_count);
+        let own = |share: &SamplerShare| {
+            let of_cell = share.image_indices.iter().filter(|image| (images[0]..images[1]).contains(image));
+            SamplerShare { image_indices: of_cell.map(|image| image - images[0]).collect(), ..share.clone() }
+        };
+        let samplers = self.samplers.iter().map(own).filter(|share| !share.image_indices.is_empty()).collect();
+        let sample_cameras = self.workload.sample_cameras[cameras].to_vec();
+        let workload = Workload { sample_cameras, cell_first_indices: Vec::new(), ..self.workload.clone() };
+        Some(Self { workload, samplers, ..self.clone() })
+    }
+
     /// Images, or tiles of images, of a set.
     #[must_use]
     pub fn image_count(&self) -> usize {
@@ -177,7 +199,7 @@ impl Assignment {
             .then(|| SampleSetId { plan_epoch: self.plan_epoch, index: set_index.into() })
     }
 
-    /// What a set shows; `None` beyond the timeline.
+    /// What a set shows, of a plan [of one cell](Self::of_cell); `None` beyond the timeline.
     #[must_use]
     pub fn set_content(&self, set_index: u32) -> Option<SetContent> {
         let workload = &self.workload;
@@ -286,7 +308,7 @@ impl TryFrom<proto::SamplerShare> for SamplerShare {
     type Error = WireError;
 
     fn try_from(s: proto::SamplerShare) -> Result<Self, WireError> {
-        at_most(s.image_indices.len(), MAX_SAMPLE_CAMERAS * MAX_TILES as usize, "image_indices")?;
+        at_most(s.image_indices.len(), MAX_CELLS * MAX_SAMPLE_CAMERAS * MAX_TILES as usize, "image_indices")?;
         Ok(Self {
             node_name: nonempty(s.node_name, "node_name")?,
             address: nonempty(s.node_address, "node_address")?,

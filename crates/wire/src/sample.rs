@@ -18,8 +18,10 @@ pub struct FetchImages {
     pub plan_epoch: u64,
     /// Into the timeline.
     pub set_index: u32,
-    /// Into [`Assignment::sampled_cameras`](crate::Assignment::sampled_cameras); all of them the sampler's own, or what
-    /// a relay passes on.
+    /// Into the workload's view cells.
+    pub cell: u32,
+    /// Into [`Assignment::sampled_cameras`](crate::Assignment::sampled_cameras) of the cell; all of them the sampler's
+    /// own, or what a relay passes on.
     pub image_indices: Vec<u32>,
 }
 
@@ -31,13 +33,18 @@ impl TryFrom<proto::FetchSampleImagesRequest> for FetchImages {
         if r.image_indices.is_empty() {
             return Err(WireError::Missing { field: "image_indices" });
         }
-        Ok(Self { plan_epoch: r.plan_epoch, set_index: r.set_index, image_indices: r.image_indices })
+        Ok(Self {
+            plan_epoch: r.plan_epoch,
+            set_index: r.set_index,
+            cell: r.cell_index,
+            image_indices: r.image_indices,
+        })
     }
 }
 
 impl From<FetchImages> for proto::FetchSampleImagesRequest {
     fn from(r: FetchImages) -> Self {
-        Self { plan_epoch: r.plan_epoch, set_index: r.set_index, image_indices: r.image_indices }
+        Self { plan_epoch: r.plan_epoch, set_index: r.set_index, cell_index: r.cell, image_indices: r.image_indices }
     }
 }
 

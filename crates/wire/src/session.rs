@@ -8,7 +8,9 @@ use glam::UVec2;
 
 use crate::demand::{fallbacks_from, rate_from, ratio_from};
 use crate::error::{WireError, required};
-use crate::geometry::{bounds_from, bounds_to, camera_to, pinhole_from, pinhole_to, sample_cameras_from};
+use crate::geometry::{
+    bounds_from, bounds_to, camera_to, pinhole_from, pinhole_to, sample_cameras_from, viewpoints_from,
+};
 use crate::limits::{MAX_VIEWS_PER_SET, nonempty, reason, seconds};
 use crate::plan::tile_count_from;
 use crate::protocol::{PROTOCOL_VERSION, same_version};
@@ -115,6 +117,9 @@ pub struct SessionRequest {
     pub fallbacks: Vec<Quality>,
     /// Tiles of a sample image, instead of as many as are predicted to be fastest.
     pub forced_tile_count: Option<u32>,
+    /// From where the session looks, in place of `sample_cameras`: sample cameras are placed around them, in view cells
+    /// where they are far apart.
+    pub viewpoints: Vec<PinholeCamera>,
 }
 
 impl TryFrom<proto::OpenSessionRequest> for SessionRequest {
@@ -131,7 +136,7 @@ impl TryFrom<proto::OpenSessionRequest> for SessionRequest {
             sampling: nonempty(r.sampling_method, "sampling_method")?,
             lighting: nonempty(r.lighting, "lighting")?,
             codec: nonempty(r.frame_codec, "frame_codec")?,
-            sample_cameras: sample_cameras_from(r.sample_cameras)?,
+            sample_cameras: sample_cameras_from(r.sample_cameras, 1)?,
             sample_size_px: r.sample_image_size.map(|size| UVec2::new(size.width_px, size.height_px)),
             volume: r.volume.map(bounds_from).transpose()?,
             typical_view: pinhole_from(r.typical_view, "typical_view")?,
@@ -147,6 +152,7 @@ impl TryFrom<proto::OpenSessionRequest> for SessionRequest {
                 0 => None,
                 count => Some(tile_count_from(count)?),
             },
+            viewpoints: viewpoints_from(r.viewpoints)?,
         })
     }
 }
@@ -173,6 +179,7 @@ impl From<SessionRequest> for proto::OpenSessionRequest {
             frames_per_s: r.frames_per_s,
             fallbacks: r.fallbacks.into_iter().map(Into::into).collect(),
             forced_tile_count: r.forced_tile_count.unwrap_or(0),
+            viewpoints: r.viewpoints.iter().map(pinhole_to).collect(),
             protocol_version: PROTOCOL_VERSION,
         }
     }

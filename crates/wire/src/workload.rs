@@ -1,12 +1,14 @@
 //! What a session samples, and what operations cost.
 
-use depth_image::{Aabb, Camera, Illumination};
+use std::ops::Range;
+
+use depth_image::{Aabb, Camera, Illumination, PinholeCamera, nearest_set};
 use glam::Vec3;
 use prost::Message as _;
 
-use crate::error::{WireError, required};
+use crate::error::{WireError, at_most, required};
 use crate::geometry::{bounds_from, bounds_to, camera_to, sample_cameras_from, vec3_from, vec3_to};
-use crate::limits::{MAX_REFINEMENT_STEPS, MAX_SETS, nonempty, seconds};
+use crate::limits::{MAX_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS, MAX_SETS, nonempty, seconds};
 use crate::{SceneRef, proto};
 
 /// Sets that keep on to what the first of them holds: the node that samples one of them samples that first one, too.
@@ -112,8 +114,10 @@ impl Refinement {
 pub struct Workload {
     /// The scene.
     pub scene: SceneRef,
-    /// One image of each set for each.
+    /// One image of each set for each; those of a view cell next to each other.
     pub sample_cameras: Vec<Camera>,
+    /// Where each view cell's cameras begin, the first's at 0; empty: one cell has all.
+    pub cell_first_indices: Vec<u32>,
     /// How images are sampled.
     pub sampling: String,
     /// How samples are lit.
@@ -155,6 +159,45 @@ pub(crate) fn refinement_steps_from(count: u32) -> Result<u32, WireError> {
 }
 
 impl Workload {
+    /// View cells: each view is made from the images of one.
+    #[must_use]
+    pub fn cell_count(&self) -> usize {
+        self.cell_first_indices.len().max(1)
+    }
+
+    /// Which of the sample cameras a view cell has; `None` beyond the last cell.
+    #[must_use]
+    pub fn cameras_of_cell(&self, cell: usize) -> Option<Range<usize>> {
+        let firsts = if self.cell_first_indices.is_empty() { &[0][..] } else { &self.cell_first_indices };
+        let first = |cell: usize| firsts.get(cell).map(|&first| first as usize);
+        Some(first(cell)?..first(cell + 1).unwrap_or(self.sample_cameras.len()))
+    }
+
+    /// The view cell that a view is in, or else nearest to.
+    #[must_use]
+    pub fn cell_of(&self, view: &PinholeCamera) -> u32 {
+        if self.cell_count() == 1 {
+            return 0;
+        }
+        let cameras = |cell: usize| {
+            let range = self.cameras_of_cell(cell).unwrap_or_default();
+            self.sample_cameras[range].iter().map(|Camera::Pinhole(camera)| *camera).collect()
+        };
+        nearest_set(view, (0..self.cell_count()).map(cameras), &self.volume).unwrap_or(0) as u32
+    }
+
+    fn check(self) -> Result<Self, WireError> {
+        let firsts = &self.cell_first_indices;
+        at_most(firsts.len(), MAX_CELLS, "cell_first_indices")?;
+        let ends = firsts.iter().skip(1).copied().chain([self.sample_cameras.len() as u32]);
+        let is_cell = |(&first, end): (&u32, u32)| first < end && end - first <= MAX_SAMPLE_CAMERAS as u32;
+        if firsts.first().is_some_and(|&first| first > 0) || !firsts.iter().zip(ends).all(is_cell) {
+            let given = format!("{firsts:?} of {} sample_cameras", self.sample_cameras.len());
+            return Err(WireError::out_of_range("cell_first_indices", given, "rising from 0, by 1 to 16 cameras each"));
+        }
+        Ok(self)
+    }
+
     /// As a message, for whoever keeps it.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
@@ -175,9 +218,10 @@ impl TryFrom<proto::Workload> for Workload {
     type Error = WireError;
 
     fn try_from(w: proto::Workload) -> Result<Self, WireError> {
-        Ok(Self {
+        let workload = Self {
             scene: required(w.scene, "workload.scene")?.try_into()?,
-            sample_cameras: sample_cameras_from(w.sample_cameras)?,
+            sample_cameras: sample_cameras_from(w.sample_cameras, w.cell_first_indices.len().clamp(1, MAX_CELLS))?,
+            cell_first_indices: w.cell_first_indices,
             sampling: nonempty(w.sampling_method, "sampling_method")?,
             lighting: nonempty(w.lighting, "lighting")?,
             method: nonempty(w.reconstruction_method, "reconstruction_method")?,
@@ -187,7 +231,8 @@ impl TryFrom<proto::Workload> for Workload {
             timeline: required(w.timeline, "workload.timeline")?.try_into()?,
             illumination: required(w.illumination, "workload.illumination")?.try_into()?,
             refinement_steps: refinement_steps_from(w.refinement_step_count)?,
-        })
+        };
+        workload.check()
     }
 }
 
@@ -196,6 +241,7 @@ impl From<Workload> for proto::Workload {
         Self {
             scene: Some(w.scene.into()),
             sample_cameras: w.sample_cameras.iter().map(camera_to).collect(),
+            cell_first_indices: w.cell_first_indices,
             sampling_method: w.sampling,
             lighting: w.lighting,
             reconstruction_method: w.method,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use clap::Args;
 use client::{Client, Frame, Session};
-use depth_image::{Camera, PinholeCamera, ViewPlanes};
+use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use indicatif::ProgressBar;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -20,7 +20,6 @@ use crate::exit::{BadInput, Outcome};
 use crate::live::{self, Drive};
 use crate::pictures;
 use crate::process::runtime;
-use crate::rig::ViewCell;
 use crate::setup::NEAR_OF_DIAGONAL;
 use crate::sizes::{GridSize, SizePx};
 use crate::text_table;
@@ -116,10 +115,14 @@ struct Which {
     /// N views spread evenly over the rectangle of the sample cameras
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     views: Option<u32>,
-    /// One view: eye, target and full vertical field of view in degrees, in the scene file's coordinates
+    /// N views on a circle around the scene, at the height of the sample cameras' middle: sampled in view cells, each
+    /// near its views
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    around: Option<u32>,
+    /// One view, sampled where it is: eye, target and full vertical field of view in degrees, in the scene file's coordinates
     #[arg(long, value_name = "X,Y,Z:X,Y,Z[:FOV]", allow_hyphen_values = true)]
     camera: Option<String>,
-    /// Views from a transforms.json, in the scene file's coordinates
+    /// Views from a transforms.json, in the scene file's coordinates; sampled in view cells around them
     #[arg(long, value_name = "FILE")]
     cameras: Option<PathBuf>,
 }
@@ -136,11 +139,17 @@ impl Which {
         }
         let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
         let cell = ViewCell::between(&samples).context("the coordinator has no sample cameras: give --cameras")?;
-        Ok(match (self.grid, self.views) {
-            (Some(grid), _) => cell.grid(grid.columns, grid.rows, size.0),
-            (_, Some(count)) => cell.spread(count as usize, size.0),
+        Ok(match (self.grid, self.views, self.around) {
+            (Some(grid), ..) => cell.grid(grid.columns, grid.rows, size.0),
+            (_, Some(count), _) => cell.spread(count as usize, size.0),
+            (.., Some(count)) => cell.around(offer.volume.center(), count as usize, size.0),
             _ => cell.orbit(self.orbit.unwrap_or(24) as usize, size.0),
         })
+    }
+
+    /// Whether the views may be anywhere: then the sample cameras that came with the scene are no use.
+    fn are_anywhere(&self) -> bool {
+        self.around.is_some() || self.camera.is_some() || self.cameras.is_some()
     }
 }
 
@@ -248,6 +257,7 @@ fn wishes(args: &ViewArgs, offer: &OfferStatus) -> Wishes {
         policy: args.policy,
         planes: ViewPlanes { inverse_depth: args.depth, provenance: args.provenance },
         timeline: timeline(args.frames, args.frame_step, args.refine),
+        around_views: args.which.are_anywhere(),
         ..wishes
     }
 }

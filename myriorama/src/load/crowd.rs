@@ -4,14 +4,13 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use client::{Client, ClientError, LiveView, Session};
-use depth_image::{Camera, PinholeCamera};
+use depth_image::{Camera, PinholeCamera, ViewCell};
 use glam::UVec2;
 use tokio::task::JoinSet;
 use wire::PolicyChoice;
 
 use crate::delivery::{Wishes, open};
 use crate::live::{Drive, Record, drive};
-use crate::rig::ViewCell;
 
 /// Poses of a way around; at 10 a second it takes 24 s.
 const WAY: usize = 240;

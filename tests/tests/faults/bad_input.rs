@@ -79,6 +79,16 @@ async fn other_versions_and_what_is_no_message_are_refused() {
     beside.finish("other versions and noise").await;
 }
 
+/// In a hundred places, each half as far again as the one before.
+fn everywhere(camera: PinholeCamera) -> Vec<PinholeCamera> {
+    (0..100).map(|i| PinholeCamera { eye_in_world: camera.eye_in_world * 1.5f32.powi(i), ..camera }).collect()
+}
+
+/// So far apart that no number says how far.
+fn beyond(camera: PinholeCamera) -> Vec<PinholeCamera> {
+    [-3e38, 3e38].map(|x| PinholeCamera { eye_in_world: Vec3::X * x, ..camera }).to_vec()
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn absurd_requests_name_their_field() {
     let beside = Beside::start(2).await;
@@ -100,6 +110,14 @@ async fn absurd_requests_name_their_field() {
         ),
         (SessionRequest { sample_size_px: Some(UVec2::ZERO), ..watched() }, "sample_image_size"),
         (SessionRequest { method: String::new(), ..watched() }, "reconstruction_method"),
+        (SessionRequest { viewpoints: vec![camera; 257], ..watched() }, "viewpoints has 257"),
+        (SessionRequest { viewpoints: vec![huge], ..watched() }, "viewpoints: camera size_px"),
+        (
+            SessionRequest { viewpoints: vec![camera], sample_cameras: vec![Camera::Pinhole(camera)], ..watched() },
+            "viewpoints: sample_cameras are given, too",
+        ),
+        (SessionRequest { viewpoints: everywhere(camera), ..watched() }, "viewpoints: they are spread over"),
+        (SessionRequest { viewpoints: beyond(camera), ..watched() }, "viewpoints: camera eye_in_world is not finite"),
         (SessionRequest { lighting: "x".repeat(300), ..watched() }, "lighting has 300"),
     ];
     for (request, field) in absurd {
