@@ -62,7 +62,7 @@ fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Resu
         let usable = camera.validate().map(|()| Camera::Pinhole(camera));
         usable.map_err(|error| Status::invalid_argument(format!("viewpoints: {error}")))
     };
-    let cameras = |group: &ViewGroup| group.sample_cameras(volume, size_px).into_iter().map(checked).collect();
+    let cameras = |group: &ViewGroup| group.sample_cameras(size_px).into_iter().map(checked).collect();
     groups.iter().map(cameras).collect()
 }
 

@@ -34,7 +34,7 @@ impl Cells {
     /// The workload with these cells' cameras; at most so many cells as a plan may have, and views of others are made from
     /// the nearest.
     pub(super) fn put_into(&self, workload: &mut Workload) {
-        let cameras = |group: &ViewGroup| group.sample_cameras(&workload.volume, self.size_px);
+        let cameras = |group: &ViewGroup| group.sample_cameras(self.size_px);
         let usable = |cameras: &Vec<PinholeCamera>| cameras.iter().all(|camera| camera.validate().is_ok());
         let cells: Vec<_> = self.groups.iter().map(cameras).filter(usable).take(MAX_CELLS).collect();
         workload.cell_first_indices = firsts(&cells);

@@ -32,6 +32,10 @@ type Bounds = [(f32, f32); 6];
 pub struct ViewGroup {
     /// At least one.
     views: Vec<PinholeCamera>,
+    bounds: Bounds,
+    /// The nearest view's: there a step changes most.
+    distance_m: f32,
+    cell: ViewCell,
 }
 
 impl ViewGroup {
@@ -45,7 +49,7 @@ impl ViewGroup {
             }
             let lengths = groups.iter_mut().map(|group| (group.length_with(view, scene), group));
             match lengths.min_by(|a, b| a.0.total_cmp(&b.0)) {
-                Some((length, group)) if length <= 1.0 => group.views.push(*view),
+                Some((length, group)) if length <= 1.0 => group.push(*view, scene),
                 _ => apart.push(*view),
             }
         }
@@ -55,20 +59,32 @@ impl ViewGroup {
     /// Whether a view lies between the group's views and sees no more than they do.
     #[must_use]
     pub fn serves(&self, view: &PinholeCamera, scene: &Aabb) -> bool {
-        let sees_less = || ViewCell::between(&self.views).is_some_and(|cell| cell.sees_all_of(view));
-        outside(view, &bounds(&self.views), scene) <= TOLERANCE && sees_less()
+        outside(view, &self.bounds, scene) <= TOLERANCE && self.cell.sees_all_of(view)
     }
 
     /// Where to sample for it, in images of this size.
     #[must_use]
-    pub fn sample_cameras(&self, scene: &Aabb, size_px: UVec2) -> Vec<PinholeCamera> {
-        let shortest_edge_m = SHORTEST_EDGE * least_distance_m(&self.views, scene);
-        ViewCell::between(&self.views).map_or_else(Vec::new, |cell| cell.sample_cameras(shortest_edge_m, size_px))
+    pub fn sample_cameras(&self, size_px: UVec2) -> Vec<PinholeCamera> {
+        self.cell.sample_cameras(SHORTEST_EDGE * self.distance_m, size_px)
+    }
+
+    fn of(views: Vec<PinholeCamera>, scene: &Aabb) -> Option<Self> {
+        let (bounds, distance_m) = (bounds(&views), least_distance_m(&views, scene));
+        Some(Self { cell: ViewCell::between(&views)?, views, bounds, distance_m })
+    }
+
+    fn push(&mut self, view: PinholeCamera, scene: &Aabb) {
+        self.views.push(view);
+        if let Some(grown) = Self::of(std::mem::take(&mut self.views), scene) {
+            *self = grown;
+        }
     }
 
     fn length_with(&self, view: &PinholeCamera, scene: &Aabb) -> f32 {
-        let views = [&self.views[..], &[*view]].concat();
-        longest(&views, scene).1
+        let place = place_of(view);
+        let with =
+            std::array::from_fn(|axis| (self.bounds[axis].0.min(place[axis]), self.bounds[axis].1.max(place[axis])));
+        longest(&with, self.distance_m.min(distance_m(view, scene))).1
     }
 }
 
@@ -93,19 +109,19 @@ fn halved(views: Vec<PinholeCamera>, scene: &Aabb) -> Vec<ViewGroup> {
     if views.is_empty() {
         return Vec::new();
     }
-    let (axis, length) = longest(&views, scene);
-    let (least, most) = bounds(&views)[axis];
+    let bounds = bounds(&views);
+    let (axis, length) = longest(&bounds, least_distance_m(&views, scene));
+    let (least, most) = bounds[axis];
     let (low, high): (Vec<_>, Vec<_>) = views.iter().partition(|view| place_of(view)[axis] < (least + most) * 0.5);
     if length <= 1.0 || low.is_empty() || high.is_empty() {
-        return vec![ViewGroup { views }];
+        return ViewGroup::of(views, scene).into_iter().collect();
     }
     [halved(low, scene), halved(high, scene)].concat()
 }
 
 /// The axis along which views spread most, and by how much.
-fn longest(views: &[PinholeCamera], scene: &Aabb) -> (usize, f32) {
-    let distance_m = least_distance_m(views, scene);
-    let lengths = bounds(views).into_iter().enumerate();
+fn longest(bounds: &Bounds, distance_m: f32) -> (usize, f32) {
+    let lengths = bounds.iter().enumerate();
     let lengths = lengths.map(|(axis, (least, most))| (axis, (most - least) / unit(axis, distance_m)));
     lengths.fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a })
 }
@@ -141,7 +157,6 @@ fn distance_m(view: &PinholeCamera, scene: &Aabb) -> f32 {
     (view.eye_in_world - scene.center()).length().max(radius_m * NEAREST).max(f32::MIN_POSITIVE)
 }
 
-/// The nearest view's: there a step changes most.
 fn least_distance_m(views: &[PinholeCamera], scene: &Aabb) -> f32 {
     views.iter().map(|view| distance_m(view, scene)).fold(f32::INFINITY, f32::min)
 }

@@ -25,7 +25,7 @@ fn grouped(views: &[PinholeCamera]) -> Vec<ViewGroup> {
 }
 
 fn cameras(groups: &[ViewGroup]) -> Vec<Vec<PinholeCamera>> {
-    groups.iter().map(|group| group.sample_cameras(&SCENE, SIZE)).collect()
+    groups.iter().map(|group| group.sample_cameras(SIZE)).collect()
 }
 
 #[test]
@@ -33,7 +33,7 @@ fn what_is_near_is_one_group() {
     let near: Vec<_> = (0..9).map(|i| towards_middle(0.02 * i as f32)).collect();
     let groups = grouped(&near);
     assert_eq!(groups.len(), 1);
-    assert_eq!(groups[0].sample_cameras(&SCENE, SIZE).len(), 2, "the ends of an arc");
+    assert_eq!(groups[0].sample_cameras(SIZE).len(), 2, "the ends of an arc");
     assert_eq!(grouped(&[]), []);
 }
 
@@ -44,8 +44,8 @@ fn a_circle_is_short_arcs_of_two_ends() {
     // Edges are measured along the axes: an arc that runs across both is up to √2 longer. 18 at the least; halving finds 24.
     assert_eq!(groups.len(), 24);
     for group in &groups {
-        assert!(longest(&group.views, &SCENE).1 <= 1.0);
-        assert_eq!(group.sample_cameras(&SCENE, SIZE).len(), 2);
+        assert!(longest(&group.bounds, group.distance_m).1 <= 1.0);
+        assert_eq!(group.sample_cameras(SIZE).len(), 2);
     }
     assert_eq!(groups.iter().map(|group| group.views.len()).sum::<usize>(), 360);
 }
@@ -104,7 +104,7 @@ fn eyes_in_the_middle_of_the_scene_are_grouped_too() {
     let groups = grouped(&look);
     assert_eq!(groups.len(), 6);
     for group in &groups {
-        let [sample] = group.sample_cameras(&SCENE, SIZE)[..] else { panic!("one place") };
+        let [sample] = group.sample_cameras(SIZE)[..] else { panic!("one place") };
         sample.validate().unwrap();
     }
     let nowhere = Aabb { min: Vec3::ZERO, max: Vec3::ZERO };
