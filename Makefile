@@ -33,7 +33,7 @@ cluster-test: build ## the same, with nodes that are killed; stops it all
 bench: build ## speed and accuracy against the bars; report in out/bench
 	$(CARGO) run --release --locked --package myriorama -- bench $(ARGS)
 
-bench-scaling: build ## how it scales, to eleven nodes and simulated to 1,000 (root; an hour and a half, ARGS=--quick a quarter of one)
+bench-scaling: build ## how it scales, to eleven nodes and simulated to 1,000 (root; an hour and a half, ARGS=--quick ten minutes)
 	$(CARGO) run --release --locked --package myriorama -- bench scaling $(ARGS)
 
 doc: toolchain ## the crates' documentation, in target/doc

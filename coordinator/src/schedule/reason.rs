@@ -26,7 +26,7 @@ fn ms(seconds: f64) -> String {
 }
 
 fn pipeline(demand: &Demand<'_>, samplers: usize, predicted: &Predicted) -> String {
-    let Load { images, tiles, views, in_order, still, .. } = demand.load;
+    let Load { images, tiles, cells, views, in_order, still, .. } = demand.load;
     let (nodes, mean) = (demand.nodes.len(), NodeCosts::mean(demand.nodes).costs);
     let in_turn = if in_order { "whole sets in turn, " } else { "" };
     let roles = match nodes {
@@ -34,9 +34,10 @@ fn pipeline(demand: &Demand<'_>, samplers: usize, predicted: &Predicted) -> Stri
         _ => format!("K = {samplers} of {nodes} nodes, {in_turn}the others reconstruct"),
     };
     let cut = if tiles > 1 { format!(" in {tiles} tiles each") } else { String::new() };
+    let near = if cells > 1 { format!(" for {cells} view cells") } else { String::new() };
     let once = if still { ", once," } else { "" };
     format!(
-        "Pipeline: {} a set: {images} images{cut} of {} sampled{once} by {roles} {views} views of {} + {} to encode, after {} to \
+        "Pipeline: {} a set: {images} images{near}{cut} of {} sampled{once} by {roles} {views} views of {} + {} to encode, after {} to \
          load the set (K_fd = {}, {}; trying every K gives K = {}, {}).",
         ms(predicted.pipeline_s),
         ms(mean.sample_image_s),

@@ -35,6 +35,9 @@ pub struct ViewArgs {
     coordinator: String,
     #[command(flatten)]
     which: Which,
+    /// Sample near the views, in as many view cells as they need, in place of the coordinator's sample cameras
+    #[arg(long)]
+    cells: bool,
     /// Size of the views, unless --cameras says
     #[arg(long, default_value = "200x150", value_name = "WxH")]
     size: SizePx,
@@ -115,14 +118,13 @@ struct Which {
     /// N views spread evenly over the rectangle of the sample cameras
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     views: Option<u32>,
-    /// N views on a circle around the scene, at the height of the sample cameras' middle: sampled in view cells, each
-    /// near its views
+    /// N views on a circle around the scene, at the height of the sample cameras' middle; as with --cells
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     around: Option<u32>,
-    /// One view, sampled where it is: eye, target and full vertical field of view in degrees, in the scene file's coordinates
+    /// One view: eye, target and full vertical field of view in degrees, in the scene file's coordinates
     #[arg(long, value_name = "X,Y,Z:X,Y,Z[:FOV]", allow_hyphen_values = true)]
     camera: Option<String>,
-    /// Views from a transforms.json, in the scene file's coordinates; sampled in view cells around them
+    /// Views from a transforms.json, in the scene file's coordinates
     #[arg(long, value_name = "FILE")]
     cameras: Option<PathBuf>,
 }
@@ -145,11 +147,6 @@ impl Which {
             (.., Some(count)) => cell.around(offer.volume.center(), count as usize, size.0),
             _ => cell.orbit(self.orbit.unwrap_or(24) as usize, size.0),
         })
-    }
-
-    /// Whether the views may be anywhere: then the sample cameras that came with the scene are no use.
-    fn are_anywhere(&self) -> bool {
-        self.around.is_some() || self.camera.is_some() || self.cameras.is_some()
     }
 }
 
@@ -257,7 +254,7 @@ fn wishes(args: &ViewArgs, offer: &OfferStatus) -> Wishes {
         policy: args.policy,
         planes: ViewPlanes { inverse_depth: args.depth, provenance: args.provenance },
         timeline: timeline(args.frames, args.frame_step, args.refine),
-        around_views: args.which.are_anywhere(),
+        around_views: args.cells || args.which.around.is_some(),
         ..wishes
     }
 }
