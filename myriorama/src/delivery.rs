@@ -38,8 +38,8 @@ pub struct Wishes {
     pub fallbacks: Vec<Quality>,
     /// Scene times; every set has the same views.
     pub timeline: Timeline,
-    /// Whether sample cameras shall stand around the views, in place of those that the scene came with.
-    pub around_views: bool,
+    /// From where it looks: sample cameras stand around them, in place of those that the scene came with. None: those.
+    pub viewpoints: Vec<PinholeCamera>,
 }
 
 impl Wishes {
@@ -58,7 +58,7 @@ impl Wishes {
             frames_per_s: 0.0,
             fallbacks: Vec::new(),
             timeline: Timeline::still(0.0),
-            around_views: false,
+            viewpoints: Vec::new(),
         }
     }
 
@@ -117,14 +117,15 @@ pub async fn open(client: &Client, wishes: &Wishes, views: &[PinholeCamera]) -> 
         frames_per_s: wishes.frames_per_s,
         fallbacks: wishes.fallbacks.clone(),
         forced_tile_count: wishes.tiles,
-        viewpoints: if wishes.around_views { viewpoints(views) } else { Vec::new() },
+        viewpoints: wishes.viewpoints.clone(),
     };
     let told = |event: &_| tracing::info!(?event, "session");
     Ok(client.open_session(request, told).await?)
 }
 
 /// As many of the views as a session may name, evenly.
-fn viewpoints(views: &[PinholeCamera]) -> Vec<PinholeCamera> {
+#[must_use]
+pub fn viewpoints(views: &[PinholeCamera]) -> Vec<PinholeCamera> {
     views.iter().step_by(views.len().div_ceil(MAX_VIEWPOINTS).max(1)).copied().collect()
 }
 

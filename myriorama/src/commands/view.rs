@@ -15,7 +15,7 @@ use wire::{FrameCodec, OfferStatus, PolicyChoice, Timeline};
 
 use crate::cameras::{self, NamedCamera, Placement};
 use crate::comparison;
-use crate::delivery::{Wishes, open, receive};
+use crate::delivery::{Wishes, open, receive, viewpoints};
 use crate::exit::{BadInput, Outcome};
 use crate::live::{self, Drive};
 use crate::pictures;
@@ -188,7 +188,7 @@ async fn view(args: ViewArgs) -> anyhow::Result<Outcome> {
     let folder = &args.out;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
     let views = if args.live { &cameras[..1] } else { &cameras[..] };
-    let session = open(&client, &wishes(&args, &offer), views).await?;
+    let session = open(&client, &wishes(&args, &offer, &cameras), views).await?;
     let plan = session.plan();
     println!("plan {}: {}", plan.assignment.plan_epoch, plan.reason);
     if args.live {
@@ -206,7 +206,7 @@ async fn view(args: ViewArgs) -> anyhow::Result<Outcome> {
     println!("{} views in {:.3} s, in {}", named.len(), delivered.seconds, folder.display());
     if args.compare {
         drop(session);
-        let direct = Wishes { policy: PolicyChoice::Direct, ..wishes(&args, &offer) };
+        let direct = Wishes { policy: PolicyChoice::Direct, ..wishes(&args, &offer, &cameras) };
         let session = open(&client, &direct, &cameras).await?;
         let truth = receive(&session, &cameras, |_| ()).await?;
         let (table, worst_psnr_db) = comparison::table(&truth.frames, &delivered.frames)?;
@@ -242,7 +242,7 @@ fn met(holds: bool) -> Outcome {
     if holds { Outcome::Done } else { Outcome::FellShort }
 }
 
-fn wishes(args: &ViewArgs, offer: &OfferStatus) -> Wishes {
+fn wishes(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamera]) -> Wishes {
     let mut wishes = Wishes::offered(offer);
     wishes.method = args.method.map_or(wishes.method, |method| method.to_string());
     wishes.lighting = args.lighting.map_or(wishes.lighting, |lighting| lighting.to_string());
@@ -254,7 +254,7 @@ fn wishes(args: &ViewArgs, offer: &OfferStatus) -> Wishes {
         policy: args.policy,
         planes: ViewPlanes { inverse_depth: args.depth, provenance: args.provenance },
         timeline: timeline(args.frames, args.frame_step, args.refine),
-        around_views: args.cells || args.which.around.is_some(),
+        viewpoints: if args.cells || args.which.around.is_some() { viewpoints(cameras) } else { Vec::new() },
         ..wishes
     }
 }
