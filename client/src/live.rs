@@ -141,15 +141,26 @@ pub(crate) async fn follow(
     says: watch::Sender<State>,
 ) {
     let mut retry = FIRST_RETRY;
+    // Of a coordinator that was started again epochs may begin anew.
+    let mut is_first = false;
     loop {
         while let Some(Ok(event)) = events.next().await {
             retry = FIRST_RETRY;
             match event {
                 SessionEvent::Opened { session } => says.send_modify(|state| state.session = session),
                 SessionEvent::Progress { .. } => (),
-                SessionEvent::Plan(plan) => says.send_modify(|state| {
-                    state.live = Arc::new(Live::later(*plan, state.live.learned.clone()));
-                }),
+                // Plans are told when nodes have taken them: one that was replaced meanwhile may come last, and be in force
+                // on a node that has left, with samplers that refuse it.
+                SessionEvent::Plan(plan) => {
+                    says.send_if_modified(|state| {
+                        let counts = is_first || plan.assignment.plan_epoch >= state.live.plan_epoch();
+                        if counts {
+                            state.live = Arc::new(Live::later(*plan, state.live.learned.clone()));
+                        }
+                        counts
+                    });
+                    is_first = false;
+                }
                 SessionEvent::Ended { reason } => {
                     says.send_modify(|state| state.ended = Some(reason));
                     return;
@@ -161,7 +172,10 @@ pub(crate) async fn follow(
             retry = (retry * 2).min(LAST_RETRY);
             let again = request.lock().unwrap_or_else(PoisonError::into_inner).clone();
             match coordinator.open_session(again).await {
-                Ok(events) => break events,
+                Ok(events) => {
+                    is_first = true;
+                    break events;
+                }
                 Err(status) => tracing::debug!(reason = status.message(), "the coordinator is away"),
             }
         };
