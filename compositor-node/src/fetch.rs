@@ -233,7 +233,9 @@ impl Fetcher {
 
 fn not_fetched(share: SamplerShare, status: &Status) -> NotFetched {
     let text = format!("sampler {} at {}: {}", share.node_name, share.address, status.message());
-    NotFetched { sampler: Some(share.node_name), status: Status::new(status.code(), text) }
+    // A refusal says which plan is in force: this node may not hear the coordinator, nor may its client.
+    let status = Status::with_metadata(status.code(), text, status.metadata().clone());
+    NotFetched { sampler: Some(share.node_name), status }
 }
 
 fn may_pass(status: &Status, took: Duration) -> bool {
