@@ -27,7 +27,7 @@ type Place = [f32; 6];
 /// Least and greatest of each coordinate.
 type Bounds = [(f32, f32); 6];
 
-/// Views that one sample set serves. It only grows: what has been sampled for it then stays good.
+/// Views that one sample set serves. It only grows; while it does not, what has been sampled for it stays good.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewGroup {
     /// At least one.

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use depth_image::{Camera, CameraError, DepthImage};
+use depth_image::{Camera, CameraError, DepthImage, ViewCell};
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, SamplePlanes, Visibility};
@@ -45,7 +45,8 @@ fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, S
 /// More than one submission holds, of two sizes.
 fn cameras() -> Vec<Camera> {
     let sizes = [UVec2::new(40, 30), UVec2::new(33, 17)];
-    sizes.into_iter().flat_map(|size_px| device().rig.views(20, size_px)).map(Camera::Pinhole).collect()
+    let cell = ViewCell::between(&device().rig.samples(sizes[0])).expect("four cameras");
+    sizes.into_iter().flat_map(|size_px| cell.spread(20, size_px)).map(Camera::Pinhole).collect()
 }
 
 #[test]
