@@ -8,7 +8,7 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
-use wire::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage, Workload};
+use wire::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage};
 
 use crate::schedule::{Event, Opening};
 use crate::service::Inner;
@@ -48,7 +48,8 @@ async fn measured_opening(
 ) -> Result<Opening, Status> {
     let workload = workload_of(&request, &inner.offer)?;
     let measure = MeasureCosts {
-        workload: of_one_cell(&workload),
+        // Costs are those of one image, and of one view, which is made from the images of one cell.
+        workload: workload.of_cell(0).unwrap_or_else(|| workload.clone()),
         typical_view: request.typical_view,
         batch_count: request.views_per_set.min(MEASURED_BATCH),
         planes: request.planes,
@@ -70,16 +71,6 @@ async fn measured_opening(
         costs,
         viewpoints: request.viewpoints,
     })
-}
-
-/// Costs are those of one image and of one view, which is made from the images of one cell.
-fn of_one_cell(workload: &Workload) -> Workload {
-    let cameras = workload.cameras_of_cell(0).unwrap_or_default();
-    Workload {
-        sample_cameras: workload.sample_cameras[cameras].to_vec(),
-        cell_first_indices: Vec::new(),
-        ..workload.clone()
-    }
 }
 
 /// A node may be lost while it measures: others of its kind are asked once it has left.

@@ -69,7 +69,7 @@ impl Work {
     }
 
     pub(super) fn add(&mut self, opening: &Opening) {
-        self.remove(opening.session);
+        self.sessions.retain(|session| session.number != opening.session);
         let Opening { policy, forced_samplers, forced_tiles, .. } = *opening;
         self.sessions.push(Session {
             number: opening.session,

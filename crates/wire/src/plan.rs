@@ -163,9 +163,7 @@ impl Assignment {
             SamplerShare { image_indices: of_cell.map(|image| image - images[0]).collect(), ..share.clone() }
         };
         let samplers = self.samplers.iter().map(own).filter(|share| !share.image_indices.is_empty()).collect();
-        let sample_cameras = self.workload.sample_cameras[cameras].to_vec();
-        let workload = Workload { sample_cameras, cell_first_indices: Vec::new(), ..self.workload.clone() };
-        Some(Self { workload, samplers, ..self.clone() })
+        Some(Self { workload: self.workload.of_cell(cell as usize)?, samplers, ..self.clone() })
     }
 
     /// Images, or tiles of images, of a set.

@@ -173,6 +173,13 @@ impl Workload {
         Some(first(cell)?..first(cell + 1).unwrap_or(self.sample_cameras.len()))
     }
 
+    /// The same for one view cell alone; `None` beyond the last.
+    #[must_use]
+    pub fn of_cell(&self, cell: usize) -> Option<Self> {
+        let sample_cameras = self.sample_cameras.get(self.cameras_of_cell(cell)?)?.to_vec();
+        Some(Self { sample_cameras, cell_first_indices: Vec::new(), ..self.clone() })
+    }
+
     /// The view cell that a view is in, or else nearest to.
     #[must_use]
     pub fn cell_of(&self, view: &PinholeCamera) -> u32 {
