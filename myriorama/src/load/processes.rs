@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn this_process_has_memory() {
-        assert!(memory_mib("self").is_none_or(|mib| mib > 1.0));
+        assert!(memory_mib("self").is_some_and(|mib| mib > 1.0));
         assert_eq!(memory_mib("none"), None);
     }
 }
