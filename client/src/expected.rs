@@ -7,19 +7,11 @@ use wire::FrameHeader;
 
 use crate::{ClientError, ViewRequest};
 
-/// What a frame must be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Due {
-    request: ViewRequest,
-    came: bool,
-}
-
-/// The frames of one call.
+/// The frames of one call that have not come.
 #[derive(Debug)]
 pub(crate) struct Expected {
-    due: HashMap<u64, Due>,
+    due: HashMap<u64, ViewRequest>,
     planes: ViewPlanes,
-    left: usize,
 }
 
 impl Expected {
@@ -31,36 +23,39 @@ impl Expected {
     ) -> Result<Self, ClientError> {
         let mut due = HashMap::new();
         for request in requests {
-            if due.insert(request.frame, Due { request, came: false }).is_some() {
+            if due.insert(request.frame, request).is_some() {
                 return Err(ClientError::Invalid {
                     field: "frame",
                     reason: format!("{} is asked for twice", request.frame),
                 });
             }
         }
-        let left = due.len();
-        Ok(Self { due, planes, left })
+        Ok(Self { due, planes })
     }
 
-    /// Notes a frame that came; gives what had been asked.
-    pub(crate) fn accept(&mut self, frame: u64, header: &FrameHeader) -> Result<ViewRequest, ClientError> {
-        let unexpected = |reason: String| ClientError::Unexpected { frame, reason };
-        let due = self.due.get_mut(&frame).ok_or_else(|| unexpected("was not asked for".to_owned()))?;
-        if due.came {
-            return Err(unexpected("came twice".to_owned()));
+    /// What is wrong with a frame: whoever sent it, or what it came through, has spoilt it.
+    pub(crate) fn wrong_with(&self, frame: u64, header: &FrameHeader) -> Option<String> {
+        match self.due.get(&frame) {
+            None => Some("was not asked for or has come".to_owned()),
+            Some(request) => agrees(request, self.planes, header).err(),
         }
-        agrees(&due.request, self.planes, header).map_err(unexpected)?;
-        due.came = true;
-        self.left -= 1;
-        Ok(due.request)
+    }
+
+    /// A frame has come: what had been asked; `None` if it came before.
+    pub(crate) fn take(&mut self, frame: u64) -> Option<ViewRequest> {
+        self.due.remove(&frame)
+    }
+
+    pub(crate) fn is_due(&self, frame: u64) -> bool {
+        self.due.contains_key(&frame)
     }
 
     /// Once the streams have ended.
     pub(crate) fn finish(&self) -> Result<(), ClientError> {
-        if self.left == 0 {
+        if self.due.is_empty() {
             return Ok(());
         }
-        let mut missing: Vec<u64> = self.due.iter().filter(|(_, due)| !due.came).map(|(frame, _)| *frame).collect();
+        let mut missing: Vec<u64> = self.due.keys().copied().collect();
         missing.sort_unstable();
         let count = missing.len();
         missing.truncate(8);
@@ -117,19 +112,21 @@ mod tests {
     #[test]
     fn frames_come_once_and_from_their_own_set() {
         let mut expected = Expected::new([request(4), request(7)], ViewPlanes::default()).unwrap();
-        expected.accept(4, &header(0)).unwrap();
+        assert_eq!(expected.wrong_with(4, &header(0)), None);
+        assert_eq!(expected.take(4), Some(request(4)));
         let mut elsewhere = header(0);
         elsewhere.camera.eye_in_world.x += 0.1;
         for (frame, header, reason) in [
-            (4, header(0), "twice"),
+            (4, header(0), "has come"),
             (5, header(0), "not asked"),
             (7, header(1), "sample set"),
             (7, elsewhere, "another pose"),
         ] {
-            assert!(expected.accept(frame, &header).unwrap_err().to_string().contains(reason));
+            assert!(expected.wrong_with(frame, &header).unwrap().contains(reason));
         }
+        assert_eq!((expected.take(4), expected.is_due(4), expected.is_due(7)), (None, false, true));
         assert!(expected.finish().unwrap_err().to_string().contains("1 frames are missing: [7]"));
-        expected.accept(7, &header(0)).unwrap();
+        expected.take(7).unwrap();
         expected.finish().unwrap();
         assert!(Expected::new([request(4), request(4)], ViewPlanes::default()).is_err());
     }

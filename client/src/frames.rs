@@ -1,24 +1,21 @@
 //! Frames as they come from several compositors at once.
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::available_parallelism;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use depth_image::{View, ViewPlanes};
+use depth_image::View;
 use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::task::JoinSet;
 use tokio_stream::StreamExt as _;
+use tokio_stream::wrappers::ReceiverStream;
 use tonic::Code;
-use wire::limits::MAX_VIEWS_PER_REQUEST;
 use wire::rpc::Messages;
-use wire::{
-    Assignment, DecodeLimits, FrameAssembly, FrameHeader, FramePart, RenderViews, RequestedView, WholeFrame,
-    decode_view,
-};
+use wire::{Assignment, DecodeLimits, FrameAssembly, FrameHeader, FramePart, RenderViews, WholeFrame, decode_view};
 
 use crate::ClientError;
-use crate::expected::{Expected, agrees};
+use crate::asking::{Asking, begin};
+use crate::expected::Expected;
 use crate::live::{Peer, State};
 use crate::plan_change::{lost_peer, successor};
 use crate::session::ViewRequest;
@@ -40,13 +37,13 @@ pub struct Frame {
     pub header: FrameHeader,
 }
 
-type Received = Result<(u64, FrameHeader, View), ClientError>;
+type Received = Result<Frame, ClientError>;
 
 /// The frames of one call, in the order they are ready.
 #[derive(Debug)]
 pub struct Frames {
     received: mpsc::Receiver<Received>,
-    expected: Expected,
+    expected: Arc<Mutex<Expected>>,
     failed: bool,
     /// Dropped with the frames: the calls then end too.
     _delivery: JoinSet<()>,
@@ -60,11 +57,10 @@ impl Frames {
         expected: Expected,
     ) -> Self {
         let (send, received) = mpsc::channel(FRAMES_AHEAD);
-        let outstanding = requests.iter().map(|request| (request.frame, *request)).collect();
+        let expected = Arc::new(Mutex::new(expected));
         let line = Line {
             send,
-            planes: template.planes,
-            outstanding: Arc::new(Mutex::new(outstanding)),
+            expected: expected.clone(),
             decoders: Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from))),
         };
         let mut delivery = JoinSet::new();
@@ -82,11 +78,8 @@ impl Frames {
             return None;
         }
         let next = match self.received.recv().await {
-            Some(Ok((frame, header, view))) => {
-                self.expected.accept(frame, &header).map(|request| Some(Frame { request, view, header }))
-            }
-            Some(Err(error)) => Err(error),
-            None => self.expected.finish().map(|()| None),
+            Some(received) => received.map(Some),
+            None => locked(&self.expected).finish().map(|()| None),
         };
         self.failed = next.is_err();
         next.transpose()
@@ -105,43 +98,44 @@ impl Frames {
     }
 }
 
+fn locked(expected: &Mutex<Expected>) -> MutexGuard<'_, Expected> {
+    expected.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Frames on their way to the caller.
 #[derive(Clone)]
 struct Line {
     send: mpsc::Sender<Received>,
-    planes: ViewPlanes,
-    /// Frames that have not come.
-    outstanding: Arc<Mutex<HashMap<u64, ViewRequest>>>,
+    expected: Arc<Mutex<Expected>>,
     decoders: Arc<Semaphore>,
 }
 
 impl Line {
-    /// What is wrong with a frame: whoever sent it, or what it came through, has spoilt it.
-    fn wrong_with(&self, frame: &WholeFrame, plan_epoch: Option<u64>) -> Option<String> {
-        let due = self.outstanding.lock().unwrap_or_else(PoisonError::into_inner).get(&frame.frame).copied();
+    /// What is wrong with a frame of such a plan.
+    fn wrong_with(&self, frame: &WholeFrame, plan_epoch: u64) -> Option<String> {
         let (number, set) = (frame.frame, frame.header.sample_set_id);
-        match due {
-            _ if Some(set.plan_epoch) != plan_epoch => Some(format!("sent a frame of set {set}")),
-            None => Some(format!("sent frame {number}, which was not asked for or has come")),
-            Some(request) => {
-                let wrong = agrees(&request, self.planes, &frame.header).err();
-                wrong.map(|wrong| format!("sent frame {number}, which {wrong}"))
-            }
+        if set.plan_epoch != plan_epoch {
+            return Some(format!("sent a frame of set {set}"));
         }
+        let wrong = locked(&self.expected).wrong_with(number, &frame.header);
+        wrong.map(|wrong| format!("sent frame {number}, which {wrong}"))
     }
 
     fn still_due(&self, requests: &[ViewRequest]) -> Vec<ViewRequest> {
-        let outstanding = self.outstanding.lock().unwrap_or_else(PoisonError::into_inner);
-        requests.iter().filter(|request| outstanding.contains_key(&request.frame)).copied().collect()
+        let expected = locked(&self.expected);
+        requests.iter().filter(|request| expected.is_due(request.frame)).copied().collect()
     }
 
-    /// Holds the decoder until there is room: a caller that is slow holds up the decoding. An error means that the
-    /// caller has left.
-    async fn pass(&self, frame: Received) {
-        if let Ok((number, ..)) = &frame {
-            self.outstanding.lock().unwrap_or_else(PoisonError::into_inner).remove(number);
-        }
-        let _ = self.send.send(frame).await;
+    /// A frame that has come; one that came twice counts once. Holds the decoder until there is room: a caller that is
+    /// slow holds up the decoding.
+    async fn pass(&self, frame: u64, header: FrameHeader, view: View) {
+        let Some(request) = locked(&self.expected).take(frame) else { return };
+        // An error means that the caller has left.
+        let _ = self.send.send(Ok(Frame { request, view, header })).await;
+    }
+
+    async fn fail(&self, error: ClientError) {
+        let _ = self.send.send(Err(error)).await;
     }
 }
 
@@ -195,7 +189,7 @@ async fn deliver(mut state: watch::Receiver<State>, template: RenderViews, reque
         let due = cell_by_cell(&live.plan.assignment, due);
         let peers = live.trusted();
         let ended = tokio::select! {
-            ended = call_all(&peers, &template, &due, &line) => ended,
+            ended = call_all(&peers, &template, due, &line) => ended,
             lost = lost_peer(state.clone(), plan_epoch, &peers) => Err(Failure::OfPlan(lost)),
         };
         let error = match ended {
@@ -210,7 +204,7 @@ async fn deliver(mut state: watch::Receiver<State>, template: RenderViews, reque
                 },
             },
         };
-        return line.pass(Err(error)).await;
+        return line.fail(error).await;
     }
 }
 
@@ -227,13 +221,14 @@ fn cell_by_cell(plan: &Assignment, mut requests: Vec<ViewRequest>) -> Vec<ViewRe
 async fn call_all(
     peers: &[Peer],
     template: &RenderViews,
-    requests: &[ViewRequest],
+    requests: Vec<ViewRequest>,
     line: &Line,
 ) -> Result<(), Failure> {
+    let weights: Vec<u32> = peers.iter().map(|peer| peer.share.view_weight).collect();
     let mut calls = JoinSet::new();
-    for (peer, requests) in peers.iter().zip(spread(template, requests, &weights(peers))) {
-        if !requests.is_empty() {
-            calls.spawn(receive_all(peer.clone(), requests, line.clone()));
+    for (peer, part) in peers.iter().zip(begin(template, requests, &weights)) {
+        if let Some((asking, messages)) = part {
+            calls.spawn(receive_all(peer.clone(), asking, messages, line.clone()));
         }
     }
     while let Some(ended) = calls.join_next().await {
@@ -243,54 +238,27 @@ async fn call_all(
     Ok(())
 }
 
-/// How many views each compositor should make of many; all alike where the plan does not say.
-fn weights(peers: &[Peer]) -> Vec<u64> {
-    let weights: Vec<u64> = peers.iter().map(|peer| peer.share.view_weight.into()).collect();
-    if weights.iter().all(|&weight| weight == 0) { vec![1; peers.len()] } else { weights }
-}
-
-/// The requests of each compositor: of every run of one set a contiguous share in proportion to its weight.
-fn spread(template: &RenderViews, requests: &[ViewRequest], weights: &[u64]) -> Vec<Vec<RenderViews>> {
-    let mut spread = vec![Vec::new(); weights.len()];
-    for run in requests.chunk_by(|a, b| a.set_index == b.set_index) {
-        let mut before = 0;
-        for (of_peer, weight) in spread.iter_mut().zip(weights) {
-            let share = &run[part_of(run.len(), before, weights)..part_of(run.len(), before + weight, weights)];
-            before += weight;
-            for views in share.chunks(MAX_VIEWS_PER_REQUEST) {
-                let requested =
-                    views.iter().map(|view| RequestedView { frame: view.frame, camera: view.camera }).collect();
-                of_peer.push(RenderViews { set_index: views[0].set_index, views: requested, ..template.clone() });
-            }
-        }
-    }
-    spread
-}
-
-/// Where a share begins, or ends, that so much weight comes before.
-fn part_of(count: usize, before: u64, weights: &[u64]) -> usize {
-    let all: u64 = weights.iter().sum();
-    // Rounded to the nearest: of few views the faster nodes get more.
-    ((count as u64 * before + all / 2) / all.max(1)) as usize
-}
-
-async fn receive_all(peer: Peer, requests: Vec<RenderViews>, line: Line) -> Result<(), Failure> {
-    let plan_epoch = requests.first().map(|request| request.plan_epoch);
-    let mut parts =
-        peer.client.render_views(tokio_stream::iter(requests)).await.map_err(|status| Failure::of(&peer, &status))?;
+async fn receive_all(
+    peer: Peer,
+    mut asking: Asking,
+    messages: ReceiverStream<RenderViews>,
+    line: Line,
+) -> Result<(), Failure> {
+    let mut parts = peer.client.render_views(messages).await.map_err(|status| Failure::of(&peer, &status))?;
     let mut assembly = FrameAssembly::default();
     let mut decoding = JoinSet::new();
     while let Some(frame) = next_frame(&mut parts, &mut assembly, &peer).await? {
-        if let Some(wrong) = line.wrong_with(&frame, plan_epoch) {
+        if let Some(wrong) = line.wrong_with(&frame, asking.plan_epoch()) {
             return Err(Failure::of_peer(&peer, peer.error(wrong)));
         }
+        asking.came(Instant::now());
         let Ok(decoder) = line.decoders.clone().acquire_owned().await else {
             break;
         };
         let (peer, line) = (peer.clone(), line.clone());
         decoding.spawn(async move {
-            let frame = decode(frame, &peer).await.map_err(|error| Failure::of_peer(&peer, error))?;
-            line.pass(Ok(frame)).await;
+            let (number, header, view) = decode(frame, &peer).await.map_err(|error| Failure::of_peer(&peer, error))?;
+            line.pass(number, header, view).await;
             drop(decoder);
             Ok(())
         });
@@ -327,7 +295,7 @@ async fn next_part(parts: &mut Messages<FramePart>, peer: &Peer) -> Result<Optio
     }
 }
 
-async fn decode(frame: WholeFrame, peer: &Peer) -> Received {
+async fn decode(frame: WholeFrame, peer: &Peer) -> Result<(u64, FrameHeader, View), ClientError> {
     let decoded = tokio::task::spawn_blocking(move || {
         decode_view(&frame, &DecodeLimits::default()).map(|view| (frame.frame, frame.header, view))
     })

@@ -3,6 +3,7 @@
 //! A [`Client`] knows the coordinator; a [`Session`] has a plan and talks to the compositors alone.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod asking;
 mod error;
 mod expected;
 mod frames;

@@ -1,11 +1,12 @@
 //! A session: a plan, and views asked of its compositors.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use depth_image::{PinholeCamera, ViewPlanes};
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 use tokio_stream::StreamExt as _;
+use tonic::{Code, Status};
 use wire::rpc::{CoordinatorClient, Messages};
 use wire::{ChangeSession, FrameCodec, SessionEvent, SessionPlan, SessionRequest};
 
@@ -78,20 +79,28 @@ impl Session {
     /// # Errors
     /// The coordinator's; a session that has ended.
     pub async fn look_from(&self, viewpoints: Vec<PinholeCamera>) -> Result<(), ClientError> {
-        self.say(|request| request.viewpoints = viewpoints).await
+        self.say(|request| request.viewpoints.clone_from(&viewpoints)).await
     }
 
-    async fn say(&self, change: impl FnOnce(&mut SessionRequest)) -> Result<(), ClientError> {
+    async fn say(&self, change: impl Fn(&mut SessionRequest)) -> Result<(), ClientError> {
+        let mut asked = self.request().clone();
+        change(&mut asked);
+        let SessionRequest { views_per_set, frames_per_s, viewpoints, .. } = asked;
         let session = self.state.borrow().session;
-        let change = {
-            // What is asked for when the coordinator comes back, too.
-            let mut request = self.request.lock().unwrap_or_else(PoisonError::into_inner);
+        let message = ChangeSession { session, views_per_set, frames_per_s, viewpoints };
+        let answer = self.coordinator.change_session(message).await;
+        let refuses = |status: &Status| [Code::InvalidArgument, Code::ResourceExhausted].contains(&status.code());
+        if !answer.as_ref().is_err_and(refuses) {
+            // What is asked for when the coordinator comes back, too; a session is opened for one view at least.
+            let mut request = self.request();
             change(&mut request);
-            let SessionRequest { views_per_set, frames_per_s, .. } = *request;
-            request.views_per_set = views_per_set.max(1);
-            ChangeSession { session, views_per_set, frames_per_s, viewpoints: request.viewpoints.clone() }
-        };
-        self.coordinator.change_session(change).await.map_err(ClientError::coordinator)
+            request.views_per_set = request.views_per_set.max(1);
+        }
+        answer.map_err(ClientError::coordinator)
+    }
+
+    fn request(&self) -> MutexGuard<'_, SessionRequest> {
+        self.request.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The plan in force, its costs and its reason. It changes as nodes come and go.
@@ -107,7 +116,7 @@ impl Session {
     }
 
     /// Asks for views by the session's own method. Frames come in the order they are ready; compositors
-    /// work at the same time, each on an even share of every set's views.
+    /// work at the same time, each at first on its share of every set's views, then on what is left of others'.
     ///
     /// # Errors
     /// For frame numbers given twice, sets beyond the timeline, bad cameras, and a session that has ended.

@@ -5,6 +5,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod codec;
+mod dealing;
 mod demand;
 mod error;
 mod frame;
@@ -32,6 +33,7 @@ mod conventions_tests;
 mod message_tests;
 
 pub use codec::*;
+pub use dealing::{Deal, Pace};
 pub use demand::{ChangeSession, Quality};
 pub use error::WireError;
 pub use frame::{FrameAssembly, FrameHeader, FramePart, RenderViews, RequestedView, WholeFrame};
