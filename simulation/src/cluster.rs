@@ -88,24 +88,11 @@ pub enum Transfer {
     Relay(usize),
 }
 
-/// How a set's views are divided among compositors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Dealing {
-    /// By the plan's weights, as clients do.
-    AsPlanned,
-    /// Evenly.
-    Even,
-    /// To whoever ends them first, as the schedule's formulas assume.
-    BySpeed,
-}
-
 /// How the services go about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Habits {
     /// Of images.
     pub transfer: Transfer,
-    /// Of views.
-    pub dealing: Dealing,
     /// Sets that a compositor asks samplers for beyond the one it has loaded.
     pub sets_ahead: u32,
     /// Most views of one call to the device.
@@ -117,13 +104,7 @@ pub struct Habits {
 impl Default for Habits {
     /// As compositor nodes and clients are.
     fn default() -> Self {
-        Self {
-            transfer: Transfer::Unicast,
-            dealing: Dealing::AsPlanned,
-            sets_ahead: 2,
-            batch_views: 64,
-            credit_views: 256,
-        }
+        Self { transfer: Transfer::Unicast, sets_ahead: 2, batch_views: 64, credit_views: 256 }
     }
 }
 

@@ -16,7 +16,7 @@ mod world;
 #[cfg(test)]
 mod tests;
 
-pub use cluster::{Calls, Cluster, Dealing, Habits, Machine, Transfer, spread_speeds};
+pub use cluster::{Calls, Cluster, Habits, Machine, Transfer, spread_speeds};
 pub use planning::{Demand, PlanError, plan};
 pub use run::{Busy, Limit, Run};
 pub use world::run;

@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use wire::Pace;
+
 use crate::cluster::Machine;
 use crate::run::Busy;
 
@@ -48,6 +50,31 @@ pub(crate) struct Loading {
     pub(crate) loaded: bool,
 }
 
+/// What a client has asked a compositor for: the messages under way, and how many views of the first have come since when.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Asked {
+    pub(crate) under_way: VecDeque<usize>,
+    pub(crate) came: usize,
+    pub(crate) since_s: f64,
+    pub(crate) pace: Pace,
+}
+
+impl Asked {
+    /// As clients count what comes; how many messages are complete.
+    pub(crate) fn came(&mut self, views: usize, now_s: f64) -> usize {
+        self.came += views;
+        let mut complete = 0;
+        while let Some(&message) = self.under_way.front().filter(|message| **message <= self.came) {
+            self.under_way.pop_front();
+            self.came -= message;
+            self.pace.came(message, now_s - self.since_s);
+            self.since_s = now_s;
+            complete += 1;
+        }
+        complete
+    }
+}
+
 /// A node at work.
 #[derive(Debug, Clone)]
 pub(crate) struct Node {
@@ -65,17 +92,16 @@ pub(crate) struct Node {
     pub(crate) sampled: Vec<Sampled>,
     /// By set.
     pub(crate) loading: Vec<Loading>,
-    /// Views of a set that are this node's.
-    pub(crate) share: usize,
-    /// The set whose views are being handed over, and how many of them still are to be.
-    pub(crate) next_set: u32,
-    pub(crate) to_hand_over: usize,
+    /// Messages of the client's that the node has not read: the set, and views that there was no credit for yet.
+    pub(crate) messages: VecDeque<(u32, usize)>,
     pub(crate) credit: usize,
+    /// The client's side: what it has asked for.
+    pub(crate) asked: Asked,
     pub(crate) busy: Busy,
 }
 
 impl Node {
-    pub(crate) fn new(machine: Machine, sets: u32, share: usize, credit: usize) -> Self {
+    pub(crate) fn new(machine: Machine, sets: u32, credit: usize) -> Self {
         Self {
             machine,
             urgent: VecDeque::new(),
@@ -86,28 +112,27 @@ impl Node {
             in_free_s: 0.0,
             sampled: vec![Sampled::Not; sets as usize],
             loading: vec![Loading::default(); sets as usize],
-            share,
-            next_set: 0,
-            to_hand_over: share,
+            messages: VecDeque::new(),
             credit,
+            asked: Asked::default(),
             busy: Busy::default(),
         }
     }
 
-    /// Hands over what there is credit for; whether that was all of the set.
+    /// Hands over what there is credit for of the first message; whether that was all of it.
     pub(crate) fn hand_over(&mut self) -> bool {
-        let views = self.to_hand_over.min(self.credit);
+        let Some((set, left)) = self.messages.front_mut() else { return false };
+        let (set, views) = (*set, (*left).min(self.credit));
         self.credit -= views;
-        self.to_hand_over -= views;
-        match self.waiting.back_mut().filter(|(set, _)| *set == self.next_set) {
+        *left -= views;
+        let all = *left == 0;
+        match self.waiting.back_mut().filter(|(waiting, _)| *waiting == set) {
             Some((_, waiting)) => *waiting += views,
-            None if views > 0 => self.waiting.push_back((self.next_set, views)),
+            None if views > 0 => self.waiting.push_back((set, views)),
             None => (),
         }
-        let all = self.to_hand_over == 0;
         if all {
-            self.next_set += 1;
-            self.to_hand_over = self.share;
+            self.messages.pop_front();
         }
         all
     }

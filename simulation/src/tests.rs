@@ -3,7 +3,7 @@
 use coordinator::schedule::{Load, NodeCosts, k_fd, pipeline_s, pipeline_time};
 use wire::{Costs, Policy, PolicyChoice};
 
-use crate::{Calls, Cluster, Dealing, Demand, Habits, Limit, Machine, Run, Transfer, plan, run, spread_speeds};
+use crate::{Calls, Cluster, Demand, Habits, Limit, Machine, Run, Transfer, plan, run, spread_speeds};
 
 const COSTS: Costs = Costs {
     sample_image_s: 0.1,
@@ -45,18 +45,20 @@ fn one_sampler_one_compositor_one_set() {
 fn every_batch_costs_a_call() {
     let machine = Machine { calls: Calls { reconstruct_s: 0.02, direct_s: 0.03 }, ..FREE };
     let run = ran(&equal(2, machine), &demand(PolicyChoice::Pipeline, 100, 1), Habits::default());
-    assert!(close(run.complete_s[0], 0.4 + 0.005 + 2.0 * 0.02 + 100.0 * 0.01), "64 views and 36");
-    let run = ran(&equal(2, machine), &demand(PolicyChoice::Direct, 100, 1), Habits::default());
-    assert!(close(run.complete_s[0], 0.03 + 50.0 * 0.101));
+    // The first 32 wait together for the set; after that a message at a time, of 16 views or of 8.
+    let calls = (run.complete_s[0] - (0.4 + 0.005 + 100.0 * 0.01)) / 0.02;
+    assert!((1.0 + 68.0 / 16.0..=1.0 + 69.0 / 8.0).contains(&calls) && (calls - calls.round()).abs() < 1e-6, "{calls}");
+    let run = ran(&equal(2, machine), &demand(PolicyChoice::Direct, 16, 1), Habits::default());
+    assert!(close(run.complete_s[0], 0.03 + 8.0 * 0.101));
 }
 
 #[test]
 fn a_link_delays_by_what_it_carries() {
-    // 4 MB of images at 10 MB/s, then 64 and 36 frames of 0.1 MB: the last leave while nothing else does.
+    // 4 MB of images at 10 MB/s, a first batch of 32, then frames of 0.1 MB that take as long to send as to make.
     let slow = Machine { bytes_per_s: 1e7, ..FREE };
     let run = ran(&equal(2, slow), &demand(PolicyChoice::Pipeline, 100, 1), Habits::default());
-    let made_s = 0.4 + 0.4 + 0.005 + 0.64;
-    assert!(close(run.complete_s[0], made_s + 0.64 + 0.36), "{:?}", run.complete_s);
+    let least_s = 0.4 + 0.4 + 0.005 + 0.32 + 1.0;
+    assert!((least_s..least_s + 0.1).contains(&run.complete_s[0]), "{:?}", run.complete_s);
 }
 
 #[test]
@@ -96,7 +98,9 @@ fn a_sampler_that_sends_to_all_is_bound_by_its_link_and_a_tree_is_not() {
     let k = planned.sampler_count();
     let sent_mb = (4 / k * (41 - k)) as f64;
     let unicast = run(&cluster, &planned, 1000, 12, Habits::default());
-    assert!(unicast.steady_period_s() >= sent_mb / 100.0 * (1.0 - 1e-9), "{}", unicast.steady_period_s());
+    // Whoever is late leaves a set to others, and a few need not fetch it.
+    let link_s = sent_mb / 100.0;
+    assert!((0.9 * link_s..1.1 * link_s).contains(&unicast.steady_period_s()), "{}", unicast.steady_period_s());
     assert_eq!(unicast.limit(), Limit::ImagesOut);
     let ahead = Habits { transfer: Transfer::Relay(2), sets_ahead: 3, ..Habits::default() };
     let tree = run(&cluster, &planned, 1000, 12, ahead);
@@ -119,7 +123,7 @@ fn a_relay_brings_every_image_to_every_node_once() {
         let planned = plan(&cluster, &demand).unwrap();
         let habits = Habits { transfer, ..Habits::default() };
         let run = run(&cluster, &planned, 70, 5, habits);
-        assert!(run.complete_s.is_sorted() && run.complete_s.iter().all(|s| s.is_finite()), "{policy:?} {transfer:?}");
+        assert!(run.complete_s.iter().all(|s| s.is_finite()), "{policy:?} {transfer:?}");
         let own = |node: usize| {
             let name = format!("node-{node:04}");
             planned.assignment.samplers.iter().find(|s| s.node_name == name).map_or(0, |s| s.image_indices.len())
@@ -162,17 +166,15 @@ fn unequal_nodes_are_planned_by_their_own_costs() {
     let machines = speeds.iter().map(|&speed| FREE.faster(speed)).collect();
     let cluster = Cluster { machines, images: 4, image_bytes: 1e6, frame_bytes: 1e5 };
     let known = Demand { nodes_report: true, ..demand(PolicyChoice::Pipeline, 1000, 16) };
-    let even = ran(&cluster, &known, Habits::default());
-    let by_speed = ran(&cluster, &known, Habits { dealing: Dealing::BySpeed, ..Habits::default() });
-    assert!(by_speed.steady_period_s() < 0.8 * even.steady_period_s());
-    assert_eq!((even.limit(), by_speed.limit()), (Limit::Uneven, Limit::Views));
+    let ran = ran(&cluster, &known, Habits::default());
+    assert_eq!(ran.limit(), Limit::Views, "whoever is done helps who is slow");
     let nodes: Vec<_> =
         cluster.machines.iter().map(|machine| NodeCosts { costs: machine.costs, transfer_image_s: 0.0 }).collect();
     let samplers = plan(&cluster, &known).unwrap().assignment.samplers;
     let samples: Vec<bool> =
         (0..11).map(|node| samplers.iter().any(|share| share.node_name == format!("node-{node:04}"))).collect();
     let load = Load { images: 4, sets: 16, views: 1000, ..Load::default() };
-    let ratio = by_speed.steady_period_s() / pipeline_s(&load, &nodes, &samples);
+    let ratio = ran.steady_period_s() / pipeline_s(&load, &nodes, &samples);
     assert!((0.98..1.02).contains(&ratio), "{ratio}");
 }
 
@@ -206,6 +208,6 @@ fn a_thousand_nodes_take_a_moment_and_the_same_every_time() {
     let planned = plan(&cluster, &demand).unwrap();
     let first = run(&cluster, &planned, 100_000, 12, Habits::default());
     assert_eq!(first, run(&cluster, &planned, 100_000, 12, Habits::default()));
-    assert!(first.complete_s.is_sorted());
+    assert!(first.complete_s.iter().all(|at_s| at_s.is_finite()));
     assert!(planned.assignment.policy != Policy::Direct);
 }

@@ -6,14 +6,18 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::ops::Range;
 
-use wire::{Assignment, Policy, SessionPlan};
+use wire::{Assignment, Deal, Pace, Policy, SessionPlan};
 
 use crate::cluster::{Cluster, Habits, Machine, Transfer};
-use crate::dealing::{compositors_of, receivers, shares};
+use crate::dealing::{compositors_of, deal_of, receivers};
 use crate::node::{Job, Node, Parcel, Sampled};
 use crate::planning::number_of;
 use crate::run::Run;
+
+/// Frames that are looked at together: what a client asks for next it asks before all of a batch have come.
+const PARCEL_VIEWS: usize = 8;
 
 /// What happens next; of several at the same time what was foreseen first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -32,6 +36,9 @@ struct World<'a> {
     habits: Habits,
     sets: u32,
     nodes: Vec<Node>,
+    /// Views of a set.
+    views: usize,
+    deal: Deal,
     /// Nodes that make views, in the plan's order.
     compositors: Vec<usize>,
     /// Of each node, to whom its images go under a relay; of those that sample nothing nobody.
@@ -48,9 +55,7 @@ struct World<'a> {
 pub fn run(cluster: &Cluster, plan: &SessionPlan, views: usize, sets: u32, habits: Habits) -> Run {
     let plan = &plan.assignment;
     let mut world = World::new(cluster, plan, views, sets, habits);
-    for node in world.compositors.clone() {
-        world.advance(node);
-    }
+    world.begin();
     while let Some(Reverse((at, _, what))) = world.foreseen.pop() {
         world.now_s = f64::from_bits(at);
         world.happens(what);
@@ -63,21 +68,59 @@ pub fn run(cluster: &Cluster, plan: &SessionPlan, views: usize, sets: u32, habit
 
 impl<'a> World<'a> {
     fn new(cluster: &'a Cluster, plan: &'a Assignment, views: usize, sets: u32, habits: Habits) -> Self {
-        let all = compositors_of(plan);
-        let shares = shares(cluster, plan, &all, views, habits.dealing);
+        let compositors = compositors_of(plan);
         let relayed = plan.relay_fanout.map(|fanout| Transfer::Relay(fanout.get() as usize));
         let habits = Habits { transfer: relayed.unwrap_or(habits.transfer), ..habits };
-        let node = |machine| Node::new(machine, sets, 0, habits.credit_views);
-        let mut nodes: Vec<Node> = cluster.machines.iter().copied().map(node).collect();
-        for (&at, &share) in all.iter().zip(&shares) {
-            (nodes[at].share, nodes[at].to_hand_over) = (share, share);
+        let node = |machine| Node::new(machine, sets, habits.credit_views);
+        let nodes: Vec<Node> = cluster.machines.iter().copied().map(node).collect();
+        let (deal, due) = (deal_of(plan, views, sets), vec![(views, 0.0); sets as usize]);
+        let (receivers, foreseen) = (Vec::new(), BinaryHeap::new());
+        Self {
+            cluster,
+            plan,
+            habits,
+            sets,
+            nodes,
+            views,
+            deal,
+            compositors,
+            receivers,
+            now_s: 0.0,
+            foreseen,
+            events: 0,
+            due,
         }
-        // Who has no view of a set is not asked, and loads nothing.
-        let compositors: Vec<usize> = all.into_iter().filter(|&at| nodes[at].share > 0).collect();
-        let receivers = receivers(plan, &compositors, nodes.len());
-        let (now_s, foreseen, events) = (0.0, BinaryHeap::new(), 0);
-        let due = vec![(views, 0.0); sets as usize];
-        Self { cluster, plan, habits, sets, nodes, compositors, receivers, now_s, foreseen, events, due }
+    }
+
+    /// The client's first messages. Who has no view of any set is not asked, and loads nothing.
+    fn begin(&mut self) {
+        for (place, node) in self.compositors.clone().into_iter().enumerate() {
+            while self.nodes[node].asked.under_way.len() < Pace::MESSAGES {
+                let Some(views) = self.deal.take_own(place, self.nodes[node].asked.pace.views()) else { break };
+                self.send_message(node, views);
+            }
+        }
+        let asked: Vec<usize> =
+            self.compositors.iter().copied().filter(|&node| !self.nodes[node].messages.is_empty()).collect();
+        self.receivers = receivers(self.plan, &asked, self.nodes.len());
+        asked.into_iter().for_each(|node| self.advance(node));
+    }
+
+    fn send_message(&mut self, node: usize, views: Range<usize>) {
+        let set = (views.start / self.views) as u32;
+        self.nodes[node].asked.under_way.push_back(views.len());
+        self.nodes[node].messages.push_back((set, views.len()));
+    }
+
+    /// Frames have come to the client, which asks for more when all of a message have.
+    fn came_back(&mut self, node: usize, views: usize) {
+        let complete = self.nodes[node].asked.came(views, self.now_s);
+        let place = self.compositors.iter().position(|&other| other == node);
+        let (Some(place), true) = (place, complete > 0) else { return };
+        while self.nodes[node].asked.under_way.len() < Pace::MESSAGES {
+            let Some(views) = self.deal.take(place, self.nodes[node].asked.pace.views()) else { break };
+            self.send_message(node, views);
+        }
     }
 
     /// Of an image, or of one of the tiles that the plan cuts it into.
@@ -99,11 +142,10 @@ impl<'a> World<'a> {
         }
     }
 
-    /// As far as a compositor's stream of requests gets: a set is waited for, the next one asked for, its views handed
+    /// As far as a compositor's stream of messages gets: a set is waited for, the next one asked for, its views handed
     /// over as far as there is credit.
     fn advance(&mut self, node: usize) {
-        while self.nodes[node].next_set < self.sets {
-            let set = self.nodes[node].next_set;
+        while let Some(&(set, _)) = self.nodes[node].messages.front() {
             if self.plan.policy != Policy::Direct && !self.prepare(node, set) {
                 break;
             }
@@ -251,7 +293,8 @@ impl<'a> World<'a> {
                 self.advance(node);
             }
             Some(Job::Views { set, views }) => {
-                self.nodes[node].outgoing.push_back(Parcel::Frames { set, views });
+                let parcels = (0..views).step_by(PARCEL_VIEWS).map(|first| PARCEL_VIEWS.min(views - first));
+                self.nodes[node].outgoing.extend(parcels.map(|views| Parcel::Frames { set, views }));
                 self.start_link(node);
             }
             None => (),
@@ -298,6 +341,7 @@ impl<'a> World<'a> {
             *due -= views;
             *last_s = self.now_s;
             self.nodes[node].credit += views;
+            self.came_back(node, views);
             self.advance(node);
         }
         self.start_link(node);

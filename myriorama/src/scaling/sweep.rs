@@ -1,7 +1,7 @@
 //! The simulation beyond what was measured: to 1,000 nodes and 100,000 views, on networks of several speeds.
 
 use rayon::prelude::*;
-use simulation::{Cluster, Dealing, Demand, Habits, Limit, Machine, Transfer, plan, run, spread_speeds};
+use simulation::{Cluster, Demand, Habits, Limit, Machine, Transfer, plan, run, spread_speeds};
 use wire::{Costs, Policy, PolicyChoice};
 
 use super::foretold::Traffic;
@@ -110,7 +110,7 @@ pub fn scenarios(basis: &Basis) -> Vec<Scenario> {
 fn of_ten_gbit(basis: &Basis) -> Vec<Scenario> {
     let relay = Habits { transfer: Transfer::Relay(2), sets_ahead: 3, ..Habits::default() };
     let plain = Scenario {
-        name: "unequal nodes, views dealt evenly".to_owned(),
+        name: "unequal nodes".to_owned(),
         device: "this machine".to_owned(),
         costs: basis.plain,
         gbit_per_s: 10.0,
@@ -118,8 +118,6 @@ fn of_ten_gbit(basis: &Basis) -> Vec<Scenario> {
         parts: 1,
         unequal: true,
     };
-    let by_speed = Habits { dealing: Dealing::BySpeed, ..Habits::default() };
-    let dealt = Scenario { name: "unequal nodes, views dealt by speed".to_owned(), habits: by_speed, ..plain.clone() };
     let dear = basis.dear.into_iter().flat_map(|costs| {
         let whole = Scenario { name: "dear light, whole images".to_owned(), costs, unequal: false, ..plain.clone() };
         let relayed = Scenario { name: "dear light, relay".to_owned(), habits: relay, ..whole.clone() };
@@ -127,7 +125,7 @@ fn of_ten_gbit(basis: &Basis) -> Vec<Scenario> {
         [whole, relayed, cut]
     });
     let dear: Vec<_> = dear.collect();
-    [plain, dealt].into_iter().chain(dear).collect()
+    [plain].into_iter().chain(dear).collect()
 }
 
 /// All scenarios at all P and V, most of them at the same time.
