@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use std::time::{Duration, Instant};
 
 use client::{ClientError, Frame};
-use cluster_tests::cluster::{Cluster, camera, request, views};
+use cluster_tests::cluster::{Cluster, camera, request, rig, views};
 use glam::UVec2;
 use tokio_stream::StreamExt as _;
 use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
@@ -157,6 +157,16 @@ async fn sessions_ask_for_more_and_less_and_nodes_say_what_they_did() {
         }
         assert!(start.elapsed() < Duration::from_secs(10), "{status:?}");
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_has_done_what_the_cluster_does_before_it_joins() {
+    let mut cluster = Cluster::start(1).await;
+    let session = cluster.session(request(PolicyChoice::TimeShare, MOVING)).await.unwrap();
+    cluster.add_node(|config| config);
+    cluster.client.wait_for_nodes(2, Duration::from_secs(10)).await.unwrap();
+    assert_eq!(cluster.take_counts(), vec![1; rig().len()], "nobody has asked for a view");
+    assert_eq!(session.render_views(views(1, 6)).unwrap().all().await.unwrap().len(), 6);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -18,6 +18,7 @@ mod server;
 mod service;
 mod streams;
 mod telemetry;
+mod warm;
 mod watched;
 mod work_done;
 

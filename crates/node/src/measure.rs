@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use depth_image::{Camera, View};
+use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
 use tonic::Status;
 use wire::codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet, decode_depth_image, encode_depth_image};
 use wire::{Costs, MeasureCosts, Refinement, Workload, encode_view};
@@ -53,7 +53,7 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
         .map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec))
         .collect::<Result<Vec<_>, _>>()?;
     let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?)?))?;
-    let cameras = vec![request.typical_view; request.batch_count as usize];
+    let cameras = request.views(request.batch_count);
     let work = ViewWork { cameras, method: workload.method.clone(), planes: request.planes };
     let (made, reconstruct_s) = timed(|| Ok(engine.reconstruct(set.as_ref(), &work)?))?;
     let in_order = engine.samples_in_order(&workload.sampling)?;
@@ -89,7 +89,7 @@ fn codec(error: impl ToString) -> MeasureError {
     MeasureError::Codec(error.to_string())
 }
 
-fn sample_work(workload: &Workload) -> SampleWork {
+pub(crate) fn sample_work(workload: &Workload) -> SampleWork {
     SampleWork {
         scene_hash: workload.scene.hash.to_string(),
         cameras: workload.sample_cameras.clone(),
@@ -106,7 +106,9 @@ fn sample_work(workload: &Workload) -> SampleWork {
 /// Measured on as many views as there is time for: fixed costs are shared as in real batches where a view is cheap,
 /// and hardly matter where it is not.
 fn direct_view_s(engine: &dyn Engine, request: &MeasureCosts) -> Result<f64, MeasureError> {
-    let draw = |views: u32| Ok(engine.draw_direct(&direct_work(request, views)).map(drop)?);
+    let draw = |views: u32| {
+        Ok(engine.draw_direct(&direct_work(&request.workload, request.views(views), request.planes)).map(drop)?)
+    };
     let ((), alone_s) = timed(|| draw(1))?;
     let views = direct_views(alone_s, request.batch_count);
     if views == 1 {
@@ -122,14 +124,13 @@ fn direct_views(alone_s: f64, most: u32) -> u32 {
     ((DIRECT_CALL_S / alone_s) as u32).clamp(1, most.max(1))
 }
 
-fn direct_work(request: &MeasureCosts, views: u32) -> DirectWork {
-    let workload = &request.workload;
+pub(crate) fn direct_work(workload: &Workload, cameras: Vec<PinholeCamera>, planes: ViewPlanes) -> DirectWork {
     DirectWork {
         scene_hash: workload.scene.hash.to_string(),
-        cameras: vec![request.typical_view; views as usize],
+        cameras,
         lighting: workload.lighting.clone(),
         scene_time_s: workload.timeline.start_s as f32,
-        planes: request.planes,
+        planes,
     }
 }
 
@@ -139,13 +140,17 @@ fn decoded(workload: &Workload, encoded: &[EncodedDepthImage]) -> Result<SampleS
         decode_depth_image(&image.header, *camera, &image.payload, &limits).map_err(codec)
     };
     let images = encoded.iter().zip(&workload.sample_cameras).map(decode).collect::<Result<_, _>>()?;
-    Ok(SampleSet {
+    Ok(sample_set(workload, images))
+}
+
+pub(crate) fn sample_set(workload: &Workload, images: Vec<DepthImage>) -> SampleSet {
+    SampleSet {
         images,
         volume: workload.volume,
         background_linear: workload.background_linear,
         illumination: workload.illumination.clone(),
         lighting: workload.lighting.clone(),
-    })
+    }
 }
 
 /// Of all views of the batch: one alone ends within a time slice, in which a node with a quota is as fast as any.
@@ -177,4 +182,4 @@ fn runs_after(first_s: Option<f64>) -> usize {
 
 #[cfg(test)]
 #[path = "measure_tests.rs"]
-mod tests;
+pub(crate) mod tests;

@@ -4,7 +4,7 @@ use std::any::Any;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, SpecularPlanes, ViewPlanes};
+use depth_image::{Aabb, Illumination, SpecularPlanes};
 use glam::{UVec2, Vec3};
 use wire::{SceneHash, SceneRef, Timeline};
 
@@ -13,18 +13,18 @@ use crate::UploadedSet;
 
 /// Sleeps, and notes what it was asked.
 #[derive(Default)]
-struct Sleeper {
+pub(crate) struct Sleeper {
     sample_s: f64,
     direct_view_s: f64,
     build_s: f64,
-    asked: Mutex<Asked>,
+    pub(crate) asked: Mutex<Asked>,
 }
 
 #[derive(Debug, Clone, Default, PartialEq)]
-struct Asked {
-    refinements: Vec<Refinement>,
-    drawn_views: Vec<usize>,
-    uploads: Vec<(Illumination, bool)>,
+pub(crate) struct Asked {
+    pub(crate) refinements: Vec<Refinement>,
+    pub(crate) drawn_views: Vec<usize>,
+    pub(crate) uploads: Vec<(Illumination, bool)>,
 }
 
 struct Nothing;
@@ -109,7 +109,7 @@ impl Engine for Sleeper {
     }
 }
 
-fn request(batch_count: u32) -> MeasureCosts {
+pub(crate) fn request(batch_count: u32) -> MeasureCosts {
     let lamp = depth_image::Light::Point { position_in_world: Vec3::Y, intensity_linear: Vec3::ONE, radius_m: 0.1 };
     let workload = Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
@@ -125,7 +125,7 @@ fn request(batch_count: u32) -> MeasureCosts {
         illumination: Illumination { lights: vec![lamp], ..Illumination::default() },
         refinement_steps: 4,
     };
-    MeasureCosts { workload, typical_view: camera(), batch_count, planes: ViewPlanes::default() }
+    MeasureCosts { workload, typical_views: vec![camera()], batch_count, planes: ViewPlanes::default() }
 }
 
 fn measured(engine: Sleeper, batch_count: u32) -> (Costs, Asked) {

@@ -9,6 +9,7 @@ use tonic::Status;
 use wire::rpc::{CoordinatorClient, connect};
 use wire::{JoinCluster, NodeStatus, Welcome, WorkReport};
 
+use crate::warm::warm_up;
 use crate::{CurrentPlan, Scenes, WorkDone};
 
 const FIRST_RETRY: Duration = Duration::from_millis(100);
@@ -54,6 +55,9 @@ async fn member(
         Ok(channel) => CoordinatorClient::new(channel),
         Err(status) => return status,
     };
+    if let Err(status) = warm_up(&client, scenes, plan).await {
+        tracing::warn!(reason = status.message(), "joins cold");
+    }
     let mut stream = match client.join_cluster(request).await {
         Ok(stream) => stream,
         Err(status) => return status,

@@ -35,6 +35,11 @@ impl Scenes {
         }
     }
 
+    /// Whose scenes they are.
+    pub(crate) fn engine(&self) -> Arc<dyn Engine> {
+        self.engine.clone()
+    }
+
     /// Makes sure that the device has a scene; gives the seconds that this took, 0 where it had it.
     ///
     /// # Errors

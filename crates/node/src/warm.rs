@@ -1,0 +1,77 @@
+//! A device builds shaders and trees when it first needs them: a node that joins does so before it says that it is there.
+
+use depth_image::{Camera, ViewPlanes};
+use glam::UVec2;
+use tonic::Status;
+use wire::rpc::CoordinatorClient;
+use wire::{Assignment, Policy, Workload};
+
+use crate::measure::{direct_work, sample_set, sample_work};
+use crate::{CurrentPlan, Engine, EngineError, Scenes, ViewWork, blocking};
+
+/// Pictures of the work that warms: what they show does not matter, and one tile of threads is enough.
+const SIZE_PX: UVec2 = UVec2::splat(16);
+
+/// Does a little of what the cluster does now, so that a plan finds the node warm. Nobody waits for it meanwhile.
+///
+/// # Errors
+/// The coordinator's, the scene's or the device's. A node that is cold still serves.
+pub(crate) async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) -> Result<(), Status> {
+    let served = client.status().await?.plan.map(|plan| plan.assignment);
+    // Who has had a plan has been at work.
+    let Some(served) = served.filter(|_| plan.epoch() == 0) else { return Ok(()) };
+    scenes.ensure(&served.workload.scene).await?;
+    let engine = scenes.engine();
+    blocking(move || warm(engine.as_ref(), &served)).await
+}
+
+/// One small picture of each kind that the plan has.
+fn warm(engine: &dyn Engine, plan: &Assignment) -> Result<(), EngineError> {
+    let workload = small(&plan.workload.of_cell(0).unwrap_or_else(|| plan.workload.clone()));
+    let Some(Camera::Pinhole(view)) = workload.sample_cameras.first().copied() else { return Ok(()) };
+    if plan.policy == Policy::Direct {
+        return engine.draw_direct(&direct_work(&workload, vec![view], ViewPlanes::default())).map(drop);
+    }
+    let set = engine.upload(&sample_set(&workload, engine.sample(&sample_work(&workload))?))?;
+    let work = ViewWork { cameras: vec![view], method: workload.method.clone(), planes: ViewPlanes::default() };
+    engine.reconstruct(set.as_ref(), &work).map(drop)
+}
+
+fn small(workload: &Workload) -> Workload {
+    let camera = |Camera::Pinhole(camera): &Camera| Camera::Pinhole(camera.resized(SIZE_PX));
+    Workload { sample_cameras: workload.sample_cameras.iter().map(camera).collect(), ..workload.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZeroU32;
+
+    use super::*;
+    use crate::measure::tests::{Sleeper, request};
+
+    fn plan(policy: Policy) -> Assignment {
+        Assignment {
+            plan_epoch: 1,
+            policy,
+            workload: request(1).workload,
+            samplers: Vec::new(),
+            compositors: Vec::new(),
+            tile_count: 1,
+            relay_fanout: None::<NonZeroU32>,
+        }
+    }
+
+    #[test]
+    fn a_little_of_what_the_plan_has() {
+        for (policy, sampled, drawn) in [(Policy::Direct, 0, 1), (Policy::Pipeline, 1, 0), (Policy::TimeShare, 1, 0)] {
+            let engine = Sleeper::default();
+            warm(&engine, &plan(policy)).unwrap();
+            let asked = engine.asked.into_inner().unwrap();
+            assert_eq!(
+                (asked.refinements.len(), asked.uploads.len(), asked.drawn_views.len()),
+                (sampled, sampled, drawn)
+            );
+        }
+        assert!(small(&request(1).workload).sample_cameras.iter().all(|Camera::Pinhole(c)| c.size_px == SIZE_PX));
+    }
+}
