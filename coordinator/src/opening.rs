@@ -50,7 +50,7 @@ async fn measured_opening(
     let measure = MeasureCosts {
         // Costs are those of one image, and of one view, which is made from the images of one cell.
         workload: workload.of_cell(0).unwrap_or_else(|| workload.clone()),
-        typical_view: request.typical_view,
+        typical_views: vec![request.typical_view],
         batch_count: request.views_per_set.min(MEASURED_BATCH),
         planes: request.planes,
     };

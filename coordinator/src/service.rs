@@ -190,7 +190,9 @@ fn kind_of(measure: &MeasureCosts) -> MeasureCosts {
     let mut measure = measure.clone();
     measure.workload.timeline = Timeline::still(0.0);
     measure.workload.refinement_steps = 1;
-    (measure.typical_view.eye_in_world, measure.typical_view.world_from_camera) = (Vec3::ZERO, Quat::IDENTITY);
+    for view in &mut measure.typical_views {
+        (view.eye_in_world, view.world_from_camera) = (Vec3::ZERO, Quat::IDENTITY);
+    }
     measure
 }
 

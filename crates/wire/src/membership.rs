@@ -228,8 +228,9 @@ impl From<ClusterStatus> for proto::GetStatusResponse {
 pub struct MeasureCosts {
     /// What is measured; of the timeline, set 0.
     pub workload: Workload,
-    /// The view that is reconstructed and drawn.
-    pub typical_view: PinholeCamera,
+    /// Views that are reconstructed and drawn, in turn: of one size, at least one. What a view costs depends on where it
+    /// stands.
+    pub typical_views: Vec<PinholeCamera>,
     /// Most views of one call: fewer are drawn directly where they take long.
     pub batch_count: u32,
     /// Planes of the views.
@@ -249,10 +250,29 @@ impl TryFrom<proto::MeasureCostsRequest> for MeasureCosts {
         }
         Ok(Self {
             workload,
-            typical_view: pinhole_from(r.typical_view, "typical_view")?,
+            typical_views: typical_views_from(r.typical_views)?,
             batch_count: r.batch_count,
             planes: ViewPlanes { inverse_depth: r.with_inverse_depth, provenance: r.with_provenance },
         })
+    }
+}
+
+fn typical_views_from(views: Vec<proto::PinholeCamera>) -> Result<Vec<PinholeCamera>, WireError> {
+    at_most(views.len(), MAX_BATCH as usize, "typical_views")?;
+    let views: Vec<_> =
+        views.into_iter().map(|view| pinhole_from(Some(view), "typical_views")).collect::<Result<_, _>>()?;
+    let first = views.first().ok_or(WireError::Missing { field: "typical_views" })?;
+    match views.iter().find(|view| view.size_px != first.size_px) {
+        Some(other) => Err(WireError::out_of_range("typical_views", other.size_px, "all of one size")),
+        None => Ok(views),
+    }
+}
+
+impl MeasureCosts {
+    /// So many of its views, in turn.
+    #[must_use]
+    pub fn views(&self, count: u32) -> Vec<PinholeCamera> {
+        self.typical_views.iter().copied().cycle().take(count as usize).collect()
     }
 }
 
@@ -260,7 +280,7 @@ impl From<MeasureCosts> for proto::MeasureCostsRequest {
     fn from(m: MeasureCosts) -> Self {
         Self {
             workload: Some(m.workload.into()),
-            typical_view: Some(pinhole_to(&m.typical_view)),
+            typical_views: m.typical_views.iter().map(pinhole_to).collect(),
             batch_count: m.batch_count,
             with_inverse_depth: m.planes.inverse_depth,
             with_provenance: m.planes.provenance,
@@ -316,5 +336,35 @@ impl TryFrom<proto::ApplyAssignmentResponse> for Ready {
 impl From<Ready> for proto::ApplyAssignmentResponse {
     fn from(ready: Ready) -> Self {
         Self { plan_epoch: ready.plan_epoch, scene_load_s: ready.scene_load_s }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{UVec2, Vec3};
+
+    use super::*;
+    use crate::message_tests::workload;
+
+    fn view(size_px: u32) -> PinholeCamera {
+        PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(size_px))
+    }
+
+    fn measure(typical_views: Vec<PinholeCamera>) -> MeasureCosts {
+        MeasureCosts { workload: workload(), typical_views, batch_count: 5, planes: ViewPlanes::default() }
+    }
+
+    fn sent(measure: MeasureCosts) -> Result<MeasureCosts, WireError> {
+        proto::MeasureCostsRequest::from(measure).try_into()
+    }
+
+    #[test]
+    fn views_to_be_timed_are_of_one_size_and_some() {
+        let three = measure(vec![view(8); 3]);
+        assert_eq!(sent(three.clone()), Ok(three.clone()));
+        assert_eq!(three.views(5).len(), 5);
+        for views in [vec![], vec![view(8), view(9)], vec![view(8); MAX_BATCH as usize + 1]] {
+            assert!(sent(measure(views)).unwrap_err().to_string().contains("typical_views"));
+        }
     }
 }

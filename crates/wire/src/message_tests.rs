@@ -38,7 +38,7 @@ fn illumination() -> Illumination {
     Illumination { lights, environment: Environment { zenith_linear: Vec3::ONE, nadir_linear: Vec3::splat(0.1) } }
 }
 
-fn workload() -> Workload {
+pub(crate) fn workload() -> Workload {
     Workload {
         scene: SceneRef { hash: SceneHash::of(b"scene"), package_bytes: 5 },
         sample_cameras: vec![Camera::Pinhole(camera()); 2],

@@ -4,7 +4,7 @@ use render::Lighting;
 use wire::Costs;
 
 use super::fleet::Fleet;
-use super::subject::Subject;
+use super::subject::{MEASURED_BATCH, Subject};
 
 /// The mean of several measurements; zeros without any.
 #[must_use]
@@ -22,14 +22,15 @@ pub fn mean(all: &[Costs]) -> Costs {
 }
 
 /// Costs of all nodes at the same time: alone on the machine a node has its caches and its memory to itself, which is not
-/// what it has at work. A view's cost depends on where it stands: each node has another of the sequence, whose first
-/// ones lie far apart.
+/// what it has at work. What a view costs depends on where it stands: each node has others of those that are measured.
 ///
 /// # Errors
 /// A node's.
 pub async fn measure(fleet: &Fleet, subject: &Subject, lighting: Lighting, batch: u32) -> anyhow::Result<Vec<Costs>> {
-    let views = subject.views(fleet.nodes())?;
-    fleet.measure(views.into_iter().map(|view| subject.measurement(lighting, view, batch))).await
+    let nodes = fleet.nodes();
+    let views = subject.views(nodes * MEASURED_BATCH as usize)?;
+    let of_node = |node| views.iter().skip(node).step_by(nodes).copied().collect();
+    fleet.measure((0..nodes).map(|node| subject.measurement(lighting, of_node(node), batch))).await
 }
 
 /// (S·g_s + V·(c+e)) / (P·T): what the work would take one node, over what P nodes took.

@@ -37,7 +37,7 @@ pub struct Request {
     pub dear_lighting: Option<Lighting>,
 }
 
-/// What P nodes timed at the same time, each with its quota, before the points, and in the full form after them, too.
+/// What P nodes timed at the same time, each with its quota, before the points and after them.
 #[derive(Debug, Clone, Default)]
 pub struct Timed {
     /// P.
@@ -153,7 +153,7 @@ async fn take_undisturbed(request: &Request, subject: &Subject) -> anyhow::Resul
 /// whether rays or triangles are faster is found out undisturbed.
 async fn warm(fleet: &Fleet, subject: &Subject, lighting: Lighting) -> anyhow::Result<Vec<Costs>> {
     let progress = bar("nodes load the scene and build shaders", fleet.nodes());
-    let request = subject.measurement(lighting, subject.views(1)?[0], MEASURED_BATCH);
+    let request = subject.measurement(lighting, subject.views(MEASURED_BATCH as usize)?, MEASURED_BATCH);
     let unlimited = fleet.measure_in_turn(&request, || progress.inc(1)).await;
     progress.finish_and_clear();
     unlimited
@@ -183,7 +183,7 @@ async fn points(fleet: &mut Fleet, subject: &Subject, extent: Extent, lit: &mut 
     let mut done_s = 0.0;
     for (which, Planned { ask, nodes, about_s }) in all {
         if nodes < fleet.nodes() {
-            time_again(fleet, subject, extent, lit).await?;
+            time(fleet, subject, lit).await?;
             fleet.shrink_to(nodes).await?;
             time(fleet, subject, lit).await?;
         }
@@ -196,14 +196,10 @@ async fn points(fleet: &mut Fleet, subject: &Subject, extent: Extent, lit: &mut 
         fleet.rest().await?;
     }
     progress.finish_and_clear();
-    time_again(fleet, subject, extent, lit).await
+    time(fleet, subject, lit).await
 }
 
 /// After the points of so many nodes; the quick form has no time for it.
-async fn time_again(fleet: &Fleet, subject: &Subject, extent: Extent, lit: &mut [Lit]) -> anyhow::Result<()> {
-    if extent.quick { Ok(()) } else { time(fleet, subject, lit).await }
-}
-
 fn in_words(point: &Point) -> String {
     let (Point { ask, nodes, period_s, fill_s, .. }, policy) = (point, point.policy());
     let (counted, others) = (ask.counted_sets, point.window.others_cores());

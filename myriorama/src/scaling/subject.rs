@@ -67,9 +67,9 @@ impl Subject {
         Wishes { policy, timeline, ..Wishes::new(method, sampling, lighting.to_string()) }
     }
 
-    /// What a node is to time: a set of this lighting, and a view, so often a call.
+    /// What a node is to time: a set of this lighting, and these views, so many a call.
     #[must_use]
-    pub fn measurement(&self, lighting: Lighting, typical_view: PinholeCamera, batch_count: u32) -> MeasureCosts {
+    pub fn measurement(&self, lighting: Lighting, typical_views: Vec<PinholeCamera>, batch_count: u32) -> MeasureCosts {
         let offer = &self.setup.offer;
         let workload = Workload {
             scene: offer.scene(),
@@ -85,6 +85,6 @@ impl Subject {
             illumination: offer.illumination.clone(),
             refinement_steps: 1,
         };
-        MeasureCosts { workload, typical_view, batch_count, planes: ViewPlanes::default() }
+        MeasureCosts { workload, typical_views, batch_count, planes: ViewPlanes::default() }
     }
 }
