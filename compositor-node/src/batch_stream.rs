@@ -24,14 +24,21 @@ pub(crate) struct BatchStream<'a> {
     client: &'a ClientStream,
     reply: Reply,
     credits: Arc<Semaphore>,
+    /// Whether the node has taken on a view of it: from then on it waits for room, as its client asks for the rest of a
+    /// batch only when it has some of it.
+    admitted: bool,
 }
 
 impl<'a> BatchStream<'a> {
     pub(crate) fn new(client: &'a ClientStream, reply: Reply) -> Self {
-        Self { client, reply, credits: Arc::new(Semaphore::new(STREAM_PIXELS as usize)) }
+        Self { client, reply, credits: Arc::new(Semaphore::new(STREAM_PIXELS as usize)), admitted: false }
     }
 
-    pub(crate) async fn answer(self, first: RenderViews, mut requests: Messages<RenderViews>) -> Result<(), Status> {
+    pub(crate) async fn answer(
+        mut self,
+        first: RenderViews,
+        mut requests: Messages<RenderViews>,
+    ) -> Result<(), Status> {
         let mut next = Some(first);
         while let Some(request) = next {
             if request.live.is_some() {
@@ -59,7 +66,7 @@ impl<'a> BatchStream<'a> {
     }
 
     /// Of every view cell the views that are in it; all cells' images are asked for at once.
-    async fn enqueue(&self, request: RenderViews) -> Result<(), Status> {
+    async fn enqueue(&mut self, request: RenderViews) -> Result<(), Status> {
         let (arrived, shared) = (Instant::now(), &self.client.shared);
         let plan = shared.of_compositor(shared.plan.require(request.plan_epoch)?)?;
         let asked = by_cell(&plan, &request.views).into_iter().map(|(cell, views)| {
@@ -75,7 +82,7 @@ impl<'a> BatchStream<'a> {
 
     /// Hands over views in pieces of one batch, as far as there is credit.
     async fn enqueue_of_cell(
-        &self,
+        &mut self,
         request: &RenderViews,
         (cell, views): (u32, &[RequestedView]),
         (source, id): (&Source, SampleSetId),
@@ -85,13 +92,14 @@ impl<'a> BatchStream<'a> {
             let mut batch = Vec::with_capacity(views.len());
             for view in views {
                 // What holds no credit yet must not keep back what does: at the bound, hand over first.
-                let credit = match self.try_credit(view, batch.is_empty())? {
+                let credit = match self.try_credit(view)? {
                     Some(credit) => credit,
                     None => {
                         self.hand_over(std::mem::take(&mut batch));
                         self.credit(view).await?
                     }
                 };
+                self.admitted = true;
                 batch.push(self.waiting(request, (cell, *view), (source, id), waited, credit));
             }
             self.hand_over(batch);
@@ -119,16 +127,14 @@ impl<'a> BatchStream<'a> {
         Waiting { key, source, view, codec: request.codec, waits, reply, credit }
     }
 
-    /// None where it must wait for the stream's own views; an error where others have taken the node's room, and nothing
-    /// of this stream will make any.
-    fn try_credit(&self, view: &RequestedView, is_first: bool) -> Result<Option<Credit>, Status> {
-        let has_none = is_first && !self.is_busy();
+    /// None where it must wait; an error where others have taken the node's room and this stream has had none.
+    fn try_credit(&self, view: &RequestedView) -> Result<Option<Credit>, Status> {
         let Ok(stream) = self.credits.clone().try_acquire_many_owned(price(view)) else {
             return Ok(None);
         };
         match self.client.shared.quota.try_view(&view.camera) {
             Ok(node) => Ok(Some(Credit { stream, _node: node })),
-            Err(refused) if has_none => {
+            Err(refused) if !self.admitted => {
                 self.client.shared.metrics.drop_view("node full");
                 Err(refused)
             }

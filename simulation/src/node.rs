@@ -53,6 +53,8 @@ pub(crate) struct Loading {
 /// What a client has asked a compositor for: the messages under way, and how many views of the first have come since when.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Asked {
+    /// Among those that views are dealt to.
+    pub(crate) place: usize,
     pub(crate) under_way: VecDeque<usize>,
     pub(crate) came: usize,
     pub(crate) since_s: f64,

@@ -95,6 +95,7 @@ impl<'a> World<'a> {
     /// The client's first messages. Who has no view of any set is not asked, and loads nothing.
     fn begin(&mut self) {
         for (place, node) in self.compositors.clone().into_iter().enumerate() {
+            self.nodes[node].asked.place = place;
             while self.nodes[node].asked.under_way.len() < Pace::MESSAGES {
                 let Some(views) = self.deal.take_own(place, self.nodes[node].asked.pace.views()) else { break };
                 self.send_message(node, views);
@@ -114,9 +115,10 @@ impl<'a> World<'a> {
 
     /// Frames have come to the client, which asks for more when all of a message have.
     fn came_back(&mut self, node: usize, views: usize) {
-        let complete = self.nodes[node].asked.came(views, self.now_s);
-        let place = self.compositors.iter().position(|&other| other == node);
-        let (Some(place), true) = (place, complete > 0) else { return };
+        if self.nodes[node].asked.came(views, self.now_s) == 0 {
+            return;
+        }
+        let place = self.nodes[node].asked.place;
         while self.nodes[node].asked.under_way.len() < Pace::MESSAGES {
             let Some(views) = self.deal.take(place, self.nodes[node].asked.pace.views()) else { break };
             self.send_message(node, views);

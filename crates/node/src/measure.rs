@@ -47,17 +47,13 @@ impl From<MeasureError> for Status {
 pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Costs, MeasureError> {
     let workload = &request.workload;
     let sample = sample_work(workload);
-    let (images, sample_s) = timed(|| Ok(engine.sample(&sample)?))?;
-    let encoded = images
-        .iter()
-        .map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec))
-        .collect::<Result<Vec<_>, _>>()?;
+    let (encoded, sample_s) = timed(|| sampled(engine, &sample))?;
     let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?)?))?;
     let cameras = request.views(request.batch_count);
     let work = ViewWork { cameras, method: workload.method.clone(), planes: request.planes };
     let (made, reconstruct_s) = timed(|| Ok(engine.reconstruct(set.as_ref(), &work)?))?;
     let in_order = engine.samples_in_order(&workload.sampling)?;
-    let sample_image_s = sample_s / images.len().max(1) as f64;
+    let sample_image_s = sample_s / encoded.len().max(1) as f64;
     Ok(Costs {
         sample_image_s,
         sample_overhead_s: if engine.samples_alone(&workload.sampling)? {
@@ -73,6 +69,12 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
     })
 }
 
+/// Images as they leave a sampler, which encodes one set before it samples the next.
+fn sampled(engine: &dyn Engine, work: &SampleWork) -> Result<Vec<EncodedDepthImage>, MeasureError> {
+    let images = engine.sample(work)?;
+    images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec)).collect()
+}
+
 /// What a tile of an image costs beyond its rows: of g = o + rows and g_tile = o + rows / T the o.
 fn overhead_s(engine: &dyn Engine, whole: &SampleWork, sample_image_s: f64) -> Result<f64, MeasureError> {
     let tile = |camera: &Camera| (0..MEASURED_TILES).map(|tile| camera.tile(tile, MEASURED_TILES)).nth(1);
@@ -80,7 +82,7 @@ fn overhead_s(engine: &dyn Engine, whole: &SampleWork, sample_image_s: f64) -> R
         return Ok(sample_image_s);
     };
     let work = SampleWork { cameras: vec![camera], wanted: vec![0], ..whole.clone() };
-    let (_, tile_s) = timed(|| Ok(engine.sample(&work)?))?;
+    let (_, tile_s) = timed(|| sampled(engine, &work))?;
     let tiles = f64::from(MEASURED_TILES);
     Ok(((tiles * tile_s - sample_image_s) / (tiles - 1.0)).clamp(0.0, sample_image_s))
 }

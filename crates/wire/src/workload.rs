@@ -265,7 +265,7 @@ impl From<Workload> for proto::Workload {
 /// Seconds of one operation, each alone and warm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Costs {
-    /// g_s: one finished sample image, its lighting included.
+    /// g_s: one finished sample image, its lighting and its encoding included.
     pub sample_image_s: f64,
     /// g_v: one finished view drawn directly.
     pub direct_view_s: f64,
