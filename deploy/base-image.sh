@@ -1,32 +1,35 @@
 #!/usr/bin/env bash
-# Makes sure that the base image that deploy/Dockerfile names is there: pulled, or, where no image registry can be
-# reached, made from Debian's packages by debootstrap, with software Vulkan inside.
+# Says which base image deploy/Dockerfile is to use: Debian's, pulled, or, where no image registry can be reached, one of
+# our own name made from Debian's packages by debootstrap, with software Vulkan inside.
 set -euo pipefail
 
-base="${1:-debian:bookworm-slim}"
-suite="${base#debian:}"
-suite="${suite%-slim}"
+debian=debian:bookworm-slim
+own=myriorama-base:bookworm-slim
 
-if docker image inspect "$base" >/dev/null 2>&1; then
+if docker image inspect "$debian" >/dev/null 2>&1 || timeout 60 docker pull --quiet "$debian" >/dev/null 2>&1; then
+    echo "$debian"
     exit 0
 fi
-if timeout 60 docker pull --quiet "$base" 2>/dev/null; then
+if docker image inspect "$own" >/dev/null 2>&1; then
+    echo "$own"
     exit 0
 fi
-echo "no image registry answers: making $base from Debian's packages" >&2
+echo "no image registry answers: making $own from Debian's packages" >&2
+run=()
+if [ "$(id -u)" -ne 0 ]; then run=(sudo -n); fi
 if ! command -v debootstrap >/dev/null; then
-    run=()
-    if [ "$(id -u)" -ne 0 ]; then run=(sudo -n); fi
-    "${run[@]}" apt-get update -qq && "${run[@]}" apt-get install -y -qq debootstrap >/dev/null
+    { "${run[@]}" apt-get update -qq \
+        && "${run[@]}" apt-get install -y -qq debootstrap debian-archive-keyring; } >/dev/null
 fi
 root="$(mktemp -d)"
-trap 'rm -rf "$root"' EXIT
-debootstrap --variant=minbase \
+trap '"${run[@]}" rm -rf "$root" "$root.log"' EXIT
+"${run[@]}" debootstrap --variant=minbase --force-check-gpg \
+    --keyring=/usr/share/keyrings/debian-archive-keyring.gpg \
     --include=ca-certificates,libvulkan1,mesa-vulkan-drivers,libxext6,libegl1 \
-    "$suite" "$root" "${DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$root.log" 2>&1 || {
+    bookworm "$root" "${DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$root.log" 2>&1 || {
     tail -20 "$root.log" >&2
     exit 1
 }
-rm -rf "$root/var/cache/apt/archives" "$root/var/lib/apt/lists" "$root/usr/share/doc" "$root/usr/share/man"
-tar -C "$root" -c . | docker import - "$base" >/dev/null
-rm -f "$root.log"
+"${run[@]}" rm -rf "$root/var/cache/apt/archives" "$root/var/lib/apt/lists" "$root/usr/share/doc" "$root/usr/share/man"
+"${run[@]}" tar -C "$root" -c . | docker import - "$own" >/dev/null
+echo "$own"

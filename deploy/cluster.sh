@@ -19,12 +19,17 @@ compose() {
 }
 
 build() {
-    deploy/base-image.sh
-    local context
+    local base context
+    base="$(deploy/base-image.sh)"
     context="$(mktemp -d)"
     cp "$program" "$context/myriorama"
-    docker build --quiet --file deploy/Dockerfile --tag myriorama:local "$context" >/dev/null
+    docker build --quiet --build-arg "BASE=$base" --file deploy/Dockerfile --tag myriorama:local "$context" >/dev/null || {
+        rm -rf "$context"
+        return 1
+    }
     rm -rf "$context"
+    # A program that was built against a later libc than the image's does not start there.
+    docker run --rm myriorama:local --version
 }
 
 health_of() {
@@ -66,12 +71,14 @@ kill_while_served() {
 }
 
 build
+if [ "${1:-}" = --test ]; then
+    trap 'compose down --timeout 15' EXIT
+fi
 compose up --detach
 wait_until_healthy "${services[@]}"
 views
 "$program" status --coordinator "$coordinator"
 if [ "${1:-}" = --test ]; then
-    trap 'compose down --timeout 15' EXIT
     kill_while_served node-4
     kill_while_served node-1
     views
