@@ -11,6 +11,10 @@ const LOOKS_DOWN: u32 = 3;
 const LOOKS_UP: u32 = 20;
 /// Timings of a new plan come in for so long before they are judged.
 const SETTLE: Duration = Duration::from_secs(5);
+/// What a step cost when it was left may have been somebody else's doing: where there is room at this step, the one above is
+/// tried after so long, and after twice as long each time that it has to be left again within as long.
+const FIRST_TRIAL: Duration = Duration::from_secs(30);
+const LAST_TRIAL: Duration = Duration::from_secs(480);
 
 /// How far down the fallbacks it has come.
 #[derive(Debug, Clone, Default)]
@@ -24,6 +28,11 @@ pub(super) struct Overload {
     left_at: Vec<f64>,
     /// The same when this step had settled.
     settled_at: Option<f64>,
+    /// Since when there has been room at this step.
+    room_since: Option<Duration>,
+    /// When the step above was tried last, and how often in a row it had to be left again.
+    tried_at: Option<Duration>,
+    failed_trials: u32,
 }
 
 /// What a look sees.
@@ -56,7 +65,15 @@ impl Overload {
         self.count(look, a_view / began);
         if self.full_in_a_row >= LOOKS_DOWN && self.step < look.frame_rate_ratios.len() {
             self.left_at.push(a_view);
+            self.judge_trial(now);
             self.change(now, self.step + 1);
+            return true;
+        }
+        self.room_since = (look.utilisation < ROOMY).then(|| self.room_since.unwrap_or(now));
+        if self.is_time_to_try(now) {
+            self.tried_at = Some(now);
+            self.left_at.pop();
+            self.change(now, self.step - 1);
             return true;
         }
         if self.roomy_in_a_row >= LOOKS_UP {
@@ -76,8 +93,22 @@ impl Overload {
         self.roomy_in_a_row = if roomy { self.roomy_in_a_row + 1 } else { 0 };
     }
 
+    fn trial_after(&self) -> Duration {
+        FIRST_TRIAL.saturating_mul(1 << self.failed_trials.min(8)).min(LAST_TRIAL)
+    }
+
+    fn is_time_to_try(&self, now: Duration) -> bool {
+        self.step > 0 && self.room_since.is_some_and(|since| now.saturating_sub(since) >= self.trial_after())
+    }
+
+    /// When a step is left: whether it was a trial that failed.
+    fn judge_trial(&mut self, now: Duration) {
+        let failed = self.tried_at.is_some_and(|tried_at| now.saturating_sub(tried_at) < self.trial_after());
+        self.failed_trials = if failed { self.failed_trials + 1 } else { 0 };
+    }
+
     fn change(&mut self, now: Duration, step: usize) {
-        (self.step, self.changed_at, self.settled_at) = (step, now, None);
+        (self.step, self.changed_at, self.settled_at, self.room_since) = (step, now, None, None);
         (self.full_in_a_row, self.roomy_in_a_row) = (0, 0);
     }
 }
@@ -109,9 +140,25 @@ mod tests {
         let mut overload = Overload::default();
         assert_eq!(looks(&mut overload, 0, 100, 40.0, 1.0), [] as [usize; 0], "0.8 of the time");
         assert_eq!(looks(&mut overload, 100, 100, 80.0, 1.0), [1, 2], "1.6, then 1.2, then 0.8");
-        assert_eq!(looks(&mut overload, 200, 100, 60.0, 1.0), [] as [usize; 0], "one step up would take 0.9");
-        assert_eq!(looks(&mut overload, 300, 100, 40.0, 1.0), [1], "0.6 one step up, 0.8 two");
-        assert_eq!(looks(&mut overload, 400, 100, 20.0, 1.0), [0]);
+        assert_eq!(looks(&mut overload, 200, 25, 60.0, 1.0), [] as [usize; 0], "one step up would take 0.9");
+        assert_eq!(looks(&mut overload, 225, 25, 40.0, 1.0), [1], "0.6 one step up, 0.8 two");
+        assert_eq!(looks(&mut overload, 250, 25, 20.0, 1.0), [0]);
+    }
+
+    #[test]
+    fn what_others_took_for_a_while_is_taken_up_again() {
+        let mut overload = Overload::default();
+        assert_eq!(looks(&mut overload, 0, 50, 40.0, 1.0), [] as [usize; 0]);
+        assert_eq!(looks(&mut overload, 50, 9, 40.0, 2.2), [1, 2], "1.76, 1.32, and then it is over");
+        assert_eq!(looks(&mut overload, 59, 100, 40.0, 1.0), [1, 0], "0.4, 0.6, 0.8: after half a minute each");
+        assert_eq!(looks(&mut overload, 159, 1000, 40.0, 1.0), [] as [usize; 0]);
+    }
+
+    #[test]
+    fn what_is_too_much_is_tried_ever_less_often() {
+        let mut overload = Overload::default();
+        assert_eq!(looks(&mut overload, 0, 20, 70.0, 1.0), [1, 2], "1.4, 1.05, 0.7");
+        assert_eq!(looks(&mut overload, 20, 1000, 70.0, 1.0), [[1, 2]; 5].concat(), "30, 60, 120, 240, 480 s apart");
     }
 
     #[test]
