@@ -74,11 +74,17 @@ async fn apply(inner: Arc<Inner>, sessions: Vec<u64>, mut plan: SessionPlan, add
         let detail = format!("{} nodes take plan {plan_epoch}", addresses.len());
         inner.say(session, SessionEvent::Progress { stage: SessionStage::Preparing, detail });
     }
-    let Told { scene_load_s, ready, failed } = tell_all(&inner, &plan.assignment, addresses).await;
-    // What no node can do is the sessions' fault, not the nodes'.
-    if let Some(status) = failed.as_ref().filter(|status| status.code() == Code::InvalidArgument) {
-        sessions.into_iter().for_each(|session| inner.refuse(session, status.clone()));
-        return;
+    let Told { scene_load_s, ready, cannot, failed } = tell_all(&inner, &plan.assignment, addresses).await;
+    match cannot.first() {
+        // What no node can do is the sessions' fault, not the nodes'.
+        Some((_, status)) if ready == 0 => {
+            sessions.into_iter().for_each(|session| inner.refuse(session, status.clone()));
+            return;
+        }
+        // What others can is the node's.
+        _ => cannot.into_iter().for_each(|(name, status)| {
+            inner.leave_out(plan_epoch, name, status.message().to_owned());
+        }),
     }
     if let Some(status) = &failed {
         // The schedule knows: another plan follows.
@@ -100,7 +106,9 @@ struct Told {
     scene_load_s: f64,
     /// Nodes that have taken it.
     ready: usize,
-    /// Why one of the others has not.
+    /// Nodes that it asks for what they cannot do.
+    cannot: Vec<(String, Status)>,
+    /// Why one of the others has not taken it.
     failed: Option<Status>,
 }
 
@@ -112,33 +120,33 @@ async fn tell_all(inner: &Arc<Inner>, assignment: &Assignment, addresses: Vec<St
     }
     let mut told = Told::default();
     while let Some(answer) = calls.join_next().await {
-        match answer.unwrap_or_else(|error| Err(Status::internal(error.to_string()))) {
+        // A task that panics is no node's fault.
+        let Ok((node_name, answer)) = answer else { continue };
+        match answer {
             Ok(ready) => {
                 told.ready += 1;
                 told.scene_load_s = told.scene_load_s.max(ready.scene_load_s);
             }
-            Err(status) if told.failed.as_ref().is_none_or(|failed| failed.code() != Code::InvalidArgument) => {
-                told.failed = Some(status);
-            }
-            Err(_) => (),
+            Err(status) if status.code() == Code::InvalidArgument => told.cannot.push((node_name, status)),
+            Err(status) => told.failed = Some(status),
         }
     }
     told
 }
 
-async fn tell(inner: Arc<Inner>, assignment: Assignment, address: String) -> Result<Ready, Status> {
+async fn tell(inner: Arc<Inner>, assignment: Assignment, address: String) -> (String, Result<Ready, Status>) {
     let plan_epoch = assignment.plan_epoch;
     let node_name = node_at(&assignment, &address);
     let ready = within(inner.config.ready_deadline, "getting ready", ask(&inner, &assignment, &address)).await;
     match &ready {
-        Ok(_) => inner.step(Event::Ready { plan_epoch, node_name }),
+        Ok(_) => inner.step(Event::Ready { plan_epoch, node_name: node_name.clone() }),
         // A later plan came first, or the plan asks for what cannot be.
         Err(status) if [Code::FailedPrecondition, Code::InvalidArgument].contains(&status.code()) => (),
         Err(status) => {
-            inner.leave_out(plan_epoch, node_name, status.message().to_owned());
+            inner.leave_out(plan_epoch, node_name.clone(), status.message().to_owned());
         }
     }
-    ready.map_err(|status| named(&address, &status))
+    (node_name, ready.map_err(|status| named(&address, &status)))
 }
 
 /// Asks once more where a connection broke: the node may not have heard.

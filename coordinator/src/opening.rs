@@ -1,6 +1,6 @@
 //! From a request to a session whose costs are known.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
@@ -35,6 +35,10 @@ pub(crate) async fn open(inner: Arc<Inner>, session: u64, request: SessionReques
         Ok(opening) => {
             say(&events, SessionStage::Planning, "choosing who samples and who reconstructs".to_owned()).await;
             inner.step(Event::Opened(Box::new(opening)));
+            // A client that left before the schedule had heard of its session.
+            if events.is_closed() {
+                inner.step(Event::Closed { session });
+            }
         }
         Err(status) => inner.refuse(session, status),
     }
@@ -54,11 +58,7 @@ async fn measured_opening(
         batch_count: request.views_per_set.min(MEASURED_BATCH),
         planes: request.planes,
     };
-    // One at a time: costs are measured with nothing else being measured.
-    let costs = {
-        let _one = inner.measuring.lock().await;
-        measured_in_spite(inner, &measure, events).await?
-    };
+    let costs = measured_undisturbed(inner, measure, events).await?;
     Ok(Opening {
         session,
         workload,
@@ -71,6 +71,30 @@ async fn measured_opening(
         costs,
         viewpoints: request.viewpoints,
     })
+}
+
+/// One at a time: costs are measured with nothing else being measured. A measurement that was begun ends, and its costs
+/// are kept, though its client may leave meanwhile.
+async fn measured_undisturbed(inner: &Arc<Inner>, measure: MeasureCosts, events: &Events) -> Result<Costs, Status> {
+    if let Some(known) = known(inner, &measure) {
+        return Ok(known);
+    }
+    let (inner, events) = (inner.clone(), events.clone());
+    let measuring = tokio::spawn(async move {
+        let _one = inner.measuring.lock().await;
+        match events.is_closed() {
+            true => Err(Status::cancelled("the client has left")),
+            false => measured_in_spite(&inner, &measure, &events).await,
+        }
+    });
+    measuring.await.map_err(|error| Status::internal(format!("measuring failed: {error}")))?
+}
+
+/// The slowest device's costs, where all devices' are kept.
+fn known(inner: &Inner, measure: &MeasureCosts) -> Option<Costs> {
+    let devices: BTreeSet<String> = inner.status().nodes.into_iter().map(|node| node.device_name).collect();
+    let kept: Option<Vec<Costs>> = devices.iter().map(|device| inner.kept_costs(device, measure)).collect();
+    kept?.into_iter().reduce(Costs::max)
 }
 
 /// A node may be lost while it measures: others of its kind are asked once it has left.

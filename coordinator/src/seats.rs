@@ -5,6 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::mpsc;
 use tonic::Status;
+use wire::limits::MAX_NODES;
 use wire::{NodeStatus, Welcome};
 
 /// What a member is told. Room for a welcome and an end.
@@ -32,6 +33,9 @@ impl Seats {
     /// Seats a node; a process that has its name is told to leave.
     pub(crate) fn take(&self, node: &NodeStatus, incarnation: u64, welcome: Welcome) -> Result<Told, Status> {
         let mut seats = self.locked();
+        if seats.len() >= MAX_NODES && !seats.contains_key(&node.node_name) {
+            return Err(Status::resource_exhausted(format!("node_name: there are {MAX_NODES} nodes")));
+        }
         let mut replaced = HashSet::new();
         if let Some(before) = seats.get(&node.node_name).filter(|before| before.address != node.address) {
             if before.replaced.contains(&node.address) {

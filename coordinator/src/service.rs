@@ -152,6 +152,7 @@ impl Inner {
         let full = locked(&self.sessions).get(&session).is_some_and(|events| events.try_send(Ok(event)).is_err());
         if full {
             self.forget(session);
+            self.step(Event::Closed { session });
         }
     }
 
@@ -248,6 +249,9 @@ impl Coordinator for CoordinatorService {
         }
         {
             let scheduler = &locked(&self.inner.schedule).0;
+            if !scheduler.has_session(session) {
+                return Err(Status::unavailable(format!("session_number: session {session} is still being opened")));
+            }
             let admitted = scheduler.admits(session, views_per_set, frames_per_s);
             admitted.map_err(|error| refusal(&error))?;
             if !viewpoints.is_empty() {

@@ -1,7 +1,5 @@
 //! Whole images to samplers, whole views to compositors.
 
-use std::ops::Range;
-
 use wire::{Assignment, CompositorShare, NodeStatus, Policy, SamplerShare, Workload};
 
 use super::deal::deal;
@@ -82,29 +80,18 @@ fn share_sets(images: usize, counts: &[usize]) -> Vec<Vec<u32>> {
     counts.iter().map(|&count| (0..images.min(count) as u32).collect()).collect()
 }
 
-/// Contiguous views of each of `compositors` nodes; no two differ by more than one view.
-#[must_use]
-pub fn share_views(view_count: usize, compositors: usize) -> Vec<Range<usize>> {
-    let start = |i: usize| i * view_count / compositors.max(1);
-    (0..compositors).map(|i| start(i)..start(i + 1)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn every_image_and_view_is_dealt_once_and_evenly() {
+    fn every_image_is_dealt_once_and_evenly() {
         for nodes in 1..12 {
             for count in 0..40 {
                 let counts: Vec<usize> = (0..nodes).map(|i| (count + i) / nodes).collect();
                 let mut images: Vec<u32> = share_images(&counts).concat();
                 images.sort_unstable();
                 assert_eq!(images, (0..count as u32).collect::<Vec<_>>());
-                let ranges = share_views(count, nodes);
-                let views: Vec<usize> = ranges.iter().cloned().flatten().collect();
-                assert_eq!(views, (0..count).collect::<Vec<_>>());
-                assert!(ranges.iter().all(|range| range.len() <= count.div_ceil(nodes)));
                 assert!(share_images(&counts).iter().zip(&counts).all(|(share, &count)| share.len() == count));
             }
         }

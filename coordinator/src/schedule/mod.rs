@@ -30,12 +30,11 @@ mod simulation;
 #[cfg(test)]
 mod test_support;
 
-pub use assign::{share_images, share_views};
+pub use assign::share_images;
 pub use balance::{brute_force_k, k_fd, k_fd_printed, pipeline_time};
 pub(crate) use cells::firsts;
 pub use choose::{Choice, ChoiceError, Demand, Predicted, Present, Wish, choose};
 pub use costs::NodeCosts;
-pub use deal::{Worker, deal, finish_s};
 pub use event::{Command, Event, Opening};
 pub use log::{LogError, Recorder, replay};
 pub use predict::{Load, direct_s, pipeline_by_s, pipeline_s, relay_fanout, time_share_s};

@@ -216,6 +216,12 @@ impl Scheduler {
         admit(&work, &nodes)
     }
 
+    /// Whether a session has been heard of and not ended.
+    #[must_use]
+    pub fn has_session(&self, session: u64) -> bool {
+        self.work.as_ref().is_some_and(|work| work.sessions().contains(&session))
+    }
+
     /// Whether a session may ask for so much from now on. Less than before it always may.
     ///
     /// # Errors

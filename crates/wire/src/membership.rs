@@ -33,6 +33,9 @@ pub struct NodeStatus {
     pub is_software: bool,
 }
 
+/// A coordinator goes on from the highest epoch that a member has had, which must leave room.
+const MOST_PLANS: u64 = 1 << 48;
+
 impl TryFrom<proto::JoinClusterRequest> for JoinCluster {
     type Error = WireError;
 
@@ -44,6 +47,9 @@ impl TryFrom<proto::JoinClusterRequest> for JoinCluster {
             device_name: text(r.device_name, "device_name")?,
             is_software: r.is_software_device,
         };
+        if r.plan_epoch > MOST_PLANS {
+            return Err(WireError::out_of_range("plan_epoch", r.plan_epoch, "at most 2^48"));
+        }
         Ok(Self { node, plan_epoch: r.plan_epoch })
     }
 }
@@ -359,10 +365,26 @@ mod tests {
     }
 
     #[test]
+    fn plans_have_room_to_go_on() {
+        let node = NodeStatus {
+            node_name: "n".to_owned(),
+            address: "http://127.0.0.1:1".to_owned(),
+            device_name: "d".to_owned(),
+            is_software: true,
+        };
+        let join = |plan_epoch| proto::JoinClusterRequest::from(JoinCluster { node: node.clone(), plan_epoch });
+        assert!(JoinCluster::try_from(join(MOST_PLANS)).is_ok());
+        let refused = JoinCluster::try_from(join(u64::MAX)).unwrap_err().to_string();
+        assert!(refused.contains("plan_epoch is 18446744073709551615"), "{refused}");
+    }
+
+    #[test]
     fn views_to_be_timed_are_of_one_size_and_some() {
         let three = measure(vec![view(8); 3]);
         assert_eq!(sent(three.clone()), Ok(three.clone()));
-        assert_eq!(three.views(5).len(), 5);
+        let other = PinholeCamera { eye_in_world: Vec3::X, ..view(8) };
+        let two = measure(vec![view(8), other]);
+        assert_eq!(two.views(3), [view(8), other, view(8)]);
         for views in [vec![], vec![view(8), view(9)], vec![view(8); MAX_BATCH as usize + 1]] {
             assert!(sent(measure(views)).unwrap_err().to_string().contains("typical_views"));
         }

@@ -53,6 +53,9 @@ impl Timeline {
     }
 }
 
+/// Of scene time, to either side of 0: eleven days. Views of a set grow with the time that it is shown.
+const MOST_SCENE_S: f64 = 1e6;
+
 impl TryFrom<proto::Timeline> for Timeline {
     type Error = WireError;
 
@@ -60,12 +63,13 @@ impl TryFrom<proto::Timeline> for Timeline {
         if !(1..=MAX_SETS).contains(&t.set_count) {
             return Err(WireError::out_of_range("timeline.set_count", t.set_count, "from 1 to 1048576"));
         }
-        let finite = |value: f64, field| {
-            if value.is_finite() { Ok(value) } else { Err(WireError::out_of_range(field, value, "finite")) }
+        let within = |value: f64, field| match value.abs() <= MOST_SCENE_S {
+            true => Ok(value),
+            false => Err(WireError::out_of_range(field, value, "from -1e6 to 1e6")),
         };
         Ok(Self {
-            start_s: finite(t.start_s, "timeline.start_s")?,
-            step_s: finite(t.step_s, "timeline.step_s")?,
+            start_s: within(t.start_s, "timeline.start_s")?,
+            step_s: within(t.step_s, "timeline.step_s")?,
             set_count: t.set_count,
         })
     }

@@ -15,7 +15,7 @@ use depth_image::{Camera, PinholeCamera};
 use glam::{UVec2, Vec3};
 use tonic::{Code, Status};
 use wire::rpc::{CoordinatorClient, connect};
-use wire::{SamplerReport, SessionRequest};
+use wire::{SamplerReport, SessionRequest, Timeline};
 
 use crate::{CLOSED, PROGRAM, finish};
 
@@ -119,6 +119,10 @@ async fn absurd_requests_name_their_field() {
         (SessionRequest { viewpoints: everywhere(camera), ..watched() }, "viewpoints: they are spread over"),
         (SessionRequest { viewpoints: beyond(camera), ..watched() }, "viewpoints: camera eye_in_world is not finite"),
         (SessionRequest { lighting: "x".repeat(300), ..watched() }, "lighting has 300"),
+        (
+            SessionRequest { timeline: Timeline { step_s: 1e300, ..watched().timeline }, ..watched() },
+            "timeline.step_s is 1",
+        ),
     ];
     for (request, field) in absurd {
         let open = async {
