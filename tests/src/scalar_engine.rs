@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use depth_image::{
     BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, PinholeCamera, Provenance, ProvenanceKind, Ray, Texel, View,
-    ViewPlanes, linear_from_rgb9e5, rgb9e5_from_linear, srgb8_from_linear,
+    ViewPlanes, linear_from_rgb9e5, linear_from_srgb8, rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
@@ -21,12 +21,17 @@ pub const FLOOR_LINEAR: Vec3 = Vec3::new(0.1, 0.6, 0.2);
 /// What rays meet that leave the scene.
 pub const SKY_LINEAR: Vec3 = Vec3::new(0.0, 0.0, 0.25);
 
+/// Times of the scene that look different.
+const STEPS: u32 = 100;
+
 /// The ball's colour tells the scene's time, and how many steps its light lacks, so that a view of two sets shows two
 /// colours.
 #[must_use]
 pub fn ball_linear(scene_time_s: f32, refinement: Refinement) -> Vec3 {
     let lacks = refinement.steps - 1 - refinement.step;
-    Vec3::new(0.2 + 0.08 * scene_time_s, 0.02, 0.01 + 0.08 * lacks as f32)
+    // Two codes from one time step to the next, so that quantisation keeps neighbours apart.
+    let step = (scene_time_s / 0.05).round() as u32 % STEPS;
+    Vec3::new(linear_from_srgb8(40 + 2 * step as u8), 0.02, 0.01 + 0.08 * lacks as f32)
 }
 
 /// As it arrives in a view.
@@ -268,5 +273,17 @@ impl Engine for ScalarEngine {
         self.loaded(&work.scene_hash)?;
         known("lighting", &work.lighting, "unlit")?;
         Ok(work.cameras.iter().map(|camera| draw(camera, work.scene_time_s, work.planes)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_set_of_a_timeline_has_a_colour_of_its_own() {
+        let seen = |step: u32| srgb8(ball_linear(step as f32 * 0.05, Refinement::default()));
+        let colours: HashSet<[u8; 3]> = (0..STEPS).map(seen).collect();
+        assert_eq!(colours.len(), STEPS as usize);
     }
 }
