@@ -159,11 +159,11 @@ fn sample(
         let encoded = encode_depth_image(image, PlaneSet::ALL).map_err(|error| Status::internal(error.to_string()))?;
         Ok((*index, encoded))
     };
-    let image_s = sampled_s / images.len().max(1) as f64;
-    images.iter().for_each(|_| metrics.image_s.observe(image_s));
-    metrics.images_sampled.inc_by(images.len() as u64);
     let encoded = indices.iter().zip(&images).map(encode).collect::<Result<Vec<_>, Status>>()?;
     let whole_images = images.len() as f64 / tiles;
+    let image_s = start.elapsed().as_secs_f64() / whole_images.max(f64::MIN_POSITIVE);
+    images.iter().for_each(|_| metrics.image_s.observe(image_s));
+    metrics.images_sampled.inc_by(images.len() as u64);
     metrics.done.add(Operation::SampleImage, whole_images, start.elapsed().as_secs_f64());
     metrics.done.encoded(whole_images, encoded.iter().map(|(_, image)| image.payload.len()).sum());
     tracing::debug!(

@@ -8,7 +8,7 @@ use tonic::Status;
 use wire::codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet, decode_depth_image, encode_depth_image};
 use wire::{Costs, MeasureCosts, Refinement, Workload, encode_view};
 
-use crate::{DirectWork, Engine, EngineError, SampleSet, SampleWork, ViewWork};
+use crate::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 
 /// Runs of one operation, after one that does not count: shaders are built in it.
 const RUNS: usize = 3;
@@ -49,9 +49,7 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
     let sample = sample_work(workload);
     let (encoded, sample_s) = timed(|| sampled(engine, &sample))?;
     let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?)?))?;
-    let cameras = request.views(request.batch_count);
-    let work = ViewWork { cameras, method: workload.method.clone(), planes: request.planes };
-    let (made, reconstruct_s) = timed(|| Ok(engine.reconstruct(set.as_ref(), &work)?))?;
+    let (made, reconstruct_view_s) = reconstruct_view_s(engine, set.as_ref(), request)?;
     let in_order = engine.samples_in_order(&workload.sampling)?;
     let sample_image_s = sample_s / encoded.len().max(1) as f64;
     Ok(Costs {
@@ -62,7 +60,7 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
             sample_image_s
         },
         direct_view_s: direct_view_s(engine, request)?,
-        reconstruct_view_s: reconstruct_s / f64::from(request.batch_count),
+        reconstruct_view_s,
         load_set_s,
         encode_view_s: encode_s(&made, &workload.codec)?,
         in_order,
@@ -103,6 +101,25 @@ pub(crate) fn sample_work(workload: &Workload) -> SampleWork {
         settled_at_s: None,
         refinement: Refinement::default(),
     }
+}
+
+/// Of all typical views, in calls of the batch's size; with some views that were made.
+fn reconstruct_view_s(
+    engine: &dyn Engine,
+    set: &dyn UploadedSet,
+    request: &MeasureCosts,
+) -> Result<(Vec<View>, f64), MeasureError> {
+    let batch = request.batch_count as usize;
+    let views = request.views(request.batch_count.max(request.typical_views.len() as u32));
+    let work = |cameras: &[PinholeCamera]| ViewWork {
+        cameras: cameras.to_vec(),
+        method: request.workload.method.clone(),
+        planes: request.planes,
+    };
+    let calls: Vec<ViewWork> = views.chunks(batch.max(1)).map(work).collect();
+    let make = || calls.iter().try_fold(Vec::new(), |_, work| Ok(engine.reconstruct(set, work)?));
+    let (made, seconds) = timed(make)?;
+    Ok((made, seconds / views.len() as f64))
 }
 
 /// Measured on as many views as there is time for: fixed costs are shared as in real batches where a view is cheap,

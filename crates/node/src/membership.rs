@@ -26,12 +26,12 @@ pub async fn keep_membership(
     done: WorkDone,
     shutdown: CancellationToken,
 ) {
-    let mut retry = FIRST_RETRY;
+    let (mut retry, mut warmed) = (FIRST_RETRY, false);
     loop {
         let mut joined = false;
         let request = JoinCluster { node: node.clone(), plan_epoch: plan.epoch() };
         let ended = tokio::select! {
-            ended = member(request, &coordinator, &scenes, (&plan, &done), &mut joined) => ended,
+            ended = member(request, &coordinator, &scenes, (&plan, &done), (&mut warmed, &mut joined)) => ended,
             () = shutdown.cancelled() => return,
         };
         retry = if joined { FIRST_RETRY } else { (retry * 2).min(LAST_RETRY) };
@@ -49,14 +49,14 @@ async fn member(
     coordinator: &str,
     scenes: &Arc<Scenes>,
     (plan, done): (&CurrentPlan, &WorkDone),
-    joined: &mut bool,
+    (warmed, joined): (&mut bool, &mut bool),
 ) -> Status {
     let client = match connect(coordinator).await {
         Ok(channel) => CoordinatorClient::new(channel),
         Err(status) => return status,
     };
-    if let Err(status) = warm_up(&client, scenes, plan).await {
-        tracing::warn!(reason = status.message(), "joins cold");
+    if !std::mem::replace(warmed, true) {
+        warm_up(&client, scenes, plan).await;
     }
     let mut stream = match client.join_cluster(request).await {
         Ok(stream) => stream,

@@ -1,5 +1,7 @@
 //! A device builds shaders and trees when it first needs them: a node that joins does so before it says that it is there.
 
+use std::time::{Duration, Instant};
+
 use depth_image::{Camera, ViewPlanes};
 use glam::UVec2;
 use tonic::Status;
@@ -12,11 +14,20 @@ use crate::{CurrentPlan, Engine, EngineError, Scenes, ViewWork, blocking};
 /// Pictures of the work that warms: what they show does not matter, and one tile of threads is enough.
 const SIZE_PX: UVec2 = UVec2::splat(16);
 
+/// A node that is cold after this long joins all the same: what it waits for may never come.
+const WARM: Duration = Duration::from_secs(120);
+
 /// Does a little of what the cluster does now, so that a plan finds the node warm. Nobody waits for it meanwhile.
-///
-/// # Errors
-/// The coordinator's, the scene's or the device's. A node that is cold still serves.
-pub(crate) async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) -> Result<(), Status> {
+pub(crate) async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) {
+    let start = Instant::now();
+    match tokio::time::timeout(WARM, work_along(client, scenes, plan)).await {
+        Ok(Ok(())) => tracing::debug!(seconds = start.elapsed().as_secs_f64(), "warm"),
+        Ok(Err(status)) => tracing::warn!(reason = status.message(), "joins cold"),
+        Err(_) => tracing::warn!(reason = "it took too long", "joins cold"),
+    }
+}
+
+async fn work_along(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) -> Result<(), Status> {
     let served = client.status().await?.plan.map(|plan| plan.assignment);
     // Who has had a plan has been at work.
     let Some(served) = served.filter(|_| plan.epoch() == 0) else { return Ok(()) };

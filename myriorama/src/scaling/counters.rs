@@ -7,9 +7,9 @@ use crate::processes::metrics_page;
 /// Sums over nodes, since they started.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Counters {
-    /// Images sampled.
+    /// Images sampled, or tiles of them.
     pub images: f64,
-    /// Seconds of sampling them, encoding not included.
+    /// Of each of these the seconds of a whole image, sampled and encoded.
     pub image_s: f64,
     /// Sets loaded.
     pub sets: f64,

@@ -199,7 +199,6 @@ async fn points(fleet: &mut Fleet, subject: &Subject, extent: Extent, lit: &mut 
     time(fleet, subject, lit).await
 }
 
-/// After the points of so many nodes; the quick form has no time for it.
 fn in_words(point: &Point) -> String {
     let (Point { ask, nodes, period_s, fill_s, .. }, policy) = (point, point.policy());
     let (counted, others) = (ask.counted_sets, point.window.others_cores());
