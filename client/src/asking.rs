@@ -1,15 +1,18 @@
 //! Asking compositors for the views of a batch: little at a time, and the next when that has come.
 
-use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
-use wire::{Deal, Pace, RenderViews, RequestedView};
+use wire::limits::MAX_VIEWS_PER_REQUEST;
+use wire::{Asked, Deal, RenderViews, RequestedView};
 
 use crate::session::ViewRequest;
+
+/// Room for the messages to one compositor: two of the largest, if all had one view.
+const MESSAGES: usize = 2 * MAX_VIEWS_PER_REQUEST;
 
 /// What all compositors of a plan are asked for together.
 #[derive(Debug)]
@@ -36,57 +39,46 @@ impl Batch {
 pub(crate) struct Asking {
     batch: Arc<Batch>,
     compositor: usize,
-    pace: Pace,
+    asked: Asked,
     /// None when there is nothing left to ask for: the stream of messages then ends.
     send: Option<mpsc::Sender<RenderViews>>,
-    /// How many views each message asks for.
-    under_way: VecDeque<usize>,
-    /// Of the first of them, and since when: the message before had come by then.
-    came: usize,
-    since: Instant,
+    start: Instant,
 }
 
-/// The parts of all compositors of these weights, with the messages to them; `None` for those that have no share.
+/// The parts of all compositors of these weights, with the messages to them; `None` for those that have no share. A view
+/// takes about so many seconds; 0 where that is not known.
 pub(crate) fn begin(
     template: &RenderViews,
     requests: Vec<ViewRequest>,
     weights: &[u32],
+    view_s: f64,
 ) -> Vec<Option<(Asking, ReceiverStream<RenderViews>)>> {
     let batch = Arc::new(Batch::new(template.clone(), requests, weights));
-    (0..weights.len()).map(|compositor| Asking::begin(&batch, compositor)).collect()
+    (0..weights.len()).map(|compositor| Asking::begin(&batch, compositor, view_s)).collect()
 }
 
 impl Asking {
     /// With the first messages, of the compositor's own share alone: others have not begun yet.
-    fn begin(batch: &Arc<Batch>, compositor: usize) -> Option<(Self, ReceiverStream<RenderViews>)> {
-        let (send, sent) = mpsc::channel(Pace::MESSAGES);
-        let (under_way, pace, since) = (VecDeque::new(), Pace::default(), Instant::now());
-        let mut asking = Self { batch: batch.clone(), compositor, pace, send: Some(send), under_way, came: 0, since };
-        while asking.under_way.len() < Pace::MESSAGES {
-            let Some(views) = batch.deal().take_own(compositor, pace.views()) else { break };
+    fn begin(batch: &Arc<Batch>, compositor: usize, view_s: f64) -> Option<(Self, ReceiverStream<RenderViews>)> {
+        let (send, sent) = mpsc::channel(MESSAGES);
+        let (asked, start) = (Asked::new(view_s), Instant::now());
+        let mut asking = Self { batch: batch.clone(), compositor, asked, send: Some(send), start };
+        while let Some(most) = asking.asked.room() {
+            let Some(views) = batch.deal().take_own(compositor, most) else { break };
             asking.ask(views);
         }
-        (!asking.under_way.is_empty()).then(|| (asking, ReceiverStream::new(sent)))
+        (!asking.asked.is_empty()).then(|| (asking, ReceiverStream::new(sent)))
     }
 
     pub(crate) fn plan_epoch(&self) -> u64 {
         self.batch.template.plan_epoch
     }
 
-    /// A view has come; when all of a message have, more is asked for.
-    pub(crate) fn came(&mut self, now: Instant) {
-        self.came += 1;
-        if self.under_way.front() == Some(&self.came) {
-            self.under_way.pop_front();
-            self.pace.came(self.came, (now - self.since).as_secs_f64());
-            (self.came, self.since) = (0, now);
-            self.ask_for_more();
-        }
-    }
-
-    fn ask_for_more(&mut self) {
-        while self.under_way.len() < Pace::MESSAGES {
-            let Some(views) = self.batch.deal().take(self.compositor, self.pace.views()) else {
+    /// A view has come; where there is room for a message, it is sent.
+    pub(crate) fn came(&mut self, now: Instant, waited_for_set: bool) {
+        self.asked.came((now - self.start).as_secs_f64(), waited_for_set);
+        while let Some(most) = self.asked.room() {
+            let Some(views) = self.batch.deal().take(self.compositor, most) else {
                 self.send = None;
                 return;
             };
@@ -98,7 +90,7 @@ impl Asking {
         let requests = &self.batch.requests[places];
         let (Some(first), Some(send)) = (requests.first(), &self.send) else { return };
         let views = requests.iter().map(|view| RequestedView { frame: view.frame, camera: view.camera }).collect();
-        self.under_way.push_back(requests.len());
+        self.asked.ask(requests.len());
         // There is room for all that are under way: an error means that the call has ended.
         let _ = send.try_send(RenderViews { set_index: first.set_index, views, ..self.batch.template.clone() });
     }
@@ -138,47 +130,57 @@ mod tests {
         std::iter::from_fn(|| sent.as_mut().try_recv().ok()).map(message).collect()
     }
 
-    /// Views come so many milliseconds apart; what is asked for meanwhile.
+    /// Views come so many milliseconds apart, from so many milliseconds on; what is asked for meanwhile.
     fn come(
         (asking, sent): &mut (Asking, ReceiverStream<RenderViews>),
         views: u64,
-        apart_ms: u64,
+        (from_ms, apart_ms): (u64, u64),
     ) -> Vec<(u32, u64, usize)> {
-        let start = asking.since;
+        let start = asking.start;
         let asked = (1..=views).flat_map(|view| {
-            asking.came(start + Duration::from_millis(view * apart_ms));
+            asking.came(start + Duration::from_millis(from_ms + view * apart_ms), false);
             waiting(sent)
         });
         asked.collect()
     }
 
+    /// As fast as was thought.
+    const VIEW_S: f64 = 0.0156;
+
     #[test]
     fn all_begin_with_their_own_and_help_who_is_slow() {
-        let mut parts = begin(&template(), requests(1, 100), &[1, 1]);
+        let mut parts = begin(&template(), requests(1, 100), &[1, 1], VIEW_S);
         let (mut slow, mut fast) = (parts.remove(1).unwrap(), parts.remove(0).unwrap());
         assert_eq!(waiting(&mut fast.1), [(0, 0, 16), (0, 16, 16)]);
         assert_eq!(waiting(&mut slow.1), [(0, 50, 16), (0, 66, 16)]);
-        let asked = come(&mut fast, 68, 10);
+        let asked = come(&mut fast, 68, (0, 15));
         assert_eq!(asked[..2], [(0, 32, 16), (0, 48, 2)]);
         let views: usize = asked.iter().map(|(_, _, views)| views).sum();
         assert_eq!(views, 18 + 18, "its own, and all that the slow one has not been asked for");
-        assert!(fast.0.send.is_none() && fast.0.under_way.is_empty(), "its stream ends");
-        assert_eq!(come(&mut slow, 32, 100), []);
+        assert!(fast.0.send.is_none() && fast.0.asked.is_empty(), "its stream ends");
+        assert_eq!(come(&mut slow, 32, (0, 100)), []);
         assert!(slow.0.send.is_none());
     }
 
     #[test]
     fn messages_are_of_one_set_and_as_many_as_suit_the_pace() {
-        let mut part = begin(&template(), requests(3, 40), &[9]).remove(0).unwrap();
-        let asked = [waiting(&mut part.1), come(&mut part, 120, 100)].concat();
+        let mut part = begin(&template(), requests(3, 40), &[9], VIEW_S).remove(0).unwrap();
+        let asked = [waiting(&mut part.1), come(&mut part, 120, (0, 100))].concat();
         assert_eq!(asked.iter().map(|(_, _, views)| views).sum::<usize>(), 120);
         assert!(asked.is_sorted_by_key(|(set, ..)| *set));
-        assert!(asked.iter().skip(2).all(|(_, _, views)| *views <= 8), "{asked:?}");
+        assert!(asked.iter().skip(3).all(|(_, _, views)| *views <= 8), "{asked:?}");
+    }
+
+    #[test]
+    fn of_small_sets_many_are_under_way() {
+        let mut part = begin(&template(), requests(100, 1), &[1], VIEW_S).remove(0).unwrap();
+        assert_eq!(waiting(&mut part.1).len(), 17, "of one view each: as many as fit into two messages");
     }
 
     #[test]
     fn who_has_no_share_is_not_called() {
-        assert_eq!(begin(&template(), requests(1, 1), &[1, 1, 1]).iter().filter(|part| part.is_some()).count(), 1);
-        assert!(begin(&template(), Vec::new(), &[1, 1]).iter().all(Option::is_none));
+        let called = begin(&template(), requests(1, 1), &[1, 1, 1], 0.0).iter().filter(|part| part.is_some()).count();
+        assert_eq!(called, 1);
+        assert!(begin(&template(), Vec::new(), &[1, 1], 0.0).iter().all(Option::is_none));
     }
 }

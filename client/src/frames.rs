@@ -26,6 +26,9 @@ const FRAMES_AHEAD: usize = 32;
 /// How long a compositor may be silent while frames are due: samplers on slow devices take minutes.
 const SILENCE: Duration = Duration::from_secs(600);
 
+/// A view that waited so long for its sample set says how long that took, not how fast its compositor is.
+const SET_WAIT_S: f64 = 0.05;
+
 /// A view that came.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
@@ -129,9 +132,20 @@ impl Line {
     /// A frame that has come; one that came twice counts once. Holds the decoder until there is room: a caller that is
     /// slow holds up the decoding.
     async fn pass(&self, frame: u64, header: FrameHeader, view: View) {
+        // An error means that the caller has left. Room first: between what follows nothing can end the call.
+        let Ok(room) = self.send.reserve().await else { return };
         let Some(request) = locked(&self.expected).take(frame) else { return };
-        // An error means that the caller has left.
-        let _ = self.send.send(Ok(Frame { request, view, header })).await;
+        room.send(Ok(Frame { request, view, header }));
+    }
+
+    /// Whether the caller has not taken what came.
+    fn is_full(&self) -> bool {
+        self.send.capacity() == 0
+    }
+
+    /// Until the caller takes frames again; false if it has left.
+    async fn room(&self) -> bool {
+        self.send.reserve().await.is_ok()
     }
 
     async fn fail(&self, error: ClientError) {
@@ -162,6 +176,8 @@ impl Failure {
         match status.code() {
             Code::InvalidArgument | Code::NotFound | Code::Unimplemented => Self::OfRequest(error),
             Code::ResourceExhausted => Self::Exhausted(ClientError::Exhausted { reason: error.to_string() }),
+            // It waited for this client, whose caller was busy.
+            Code::DeadlineExceeded => Self::OfPlan(error),
             // Of which plan is in force it knows better; anything else may be its own fault.
             Code::FailedPrecondition => {
                 peer.learn(status);
@@ -189,13 +205,18 @@ async fn deliver(mut state: watch::Receiver<State>, template: RenderViews, reque
         let due = cell_by_cell(&live.plan.assignment, due);
         let peers = live.trusted();
         let ended = tokio::select! {
-            ended = call_all(&peers, &template, due, &line) => ended,
+            ended = call_all(&peers, (&template, live.plan.view_s()), due, &line) => ended,
             lost = lost_peer(state.clone(), plan_epoch, &peers) => Err(Failure::OfPlan(lost)),
         };
         let error = match ended {
             // What has not come then is missing.
             Ok(()) => return,
             Err(Failure::OfRequest(error) | Failure::Exhausted(error)) => error,
+            // Calls of a caller who takes nothing end of themselves, and nobody is to blame.
+            Err(Failure::OfPlan(_)) if line.is_full() => match line.room().await {
+                true => continue,
+                false => return,
+            },
             Err(Failure::OfPlan(error)) => match trouble.pause(line.still_due(&requests).len()) {
                 None => error,
                 Some(pause) => match successor(&mut state, plan_epoch, pause, error).await {
@@ -220,13 +241,13 @@ fn cell_by_cell(plan: &Assignment, mut requests: Vec<ViewRequest>) -> Vec<ViewRe
 /// All calls of a plan, until they end or one fails.
 async fn call_all(
     peers: &[Peer],
-    template: &RenderViews,
+    (template, view_s): (&RenderViews, f64),
     requests: Vec<ViewRequest>,
     line: &Line,
 ) -> Result<(), Failure> {
     let weights: Vec<u32> = peers.iter().map(|peer| peer.share.view_weight).collect();
     let mut calls = JoinSet::new();
-    for (peer, part) in peers.iter().zip(begin(template, requests, &weights)) {
+    for (peer, part) in peers.iter().zip(begin(template, requests, &weights, view_s)) {
         if let Some((asking, messages)) = part {
             calls.spawn(receive_all(peer.clone(), asking, messages, line.clone()));
         }
@@ -251,7 +272,7 @@ async fn receive_all(
         if let Some(wrong) = line.wrong_with(&frame, asking.plan_epoch()) {
             return Err(Failure::of_peer(&peer, peer.error(wrong)));
         }
-        asking.came(Instant::now());
+        asking.came(Instant::now(), frame.header.stage_times.set_wait_s > SET_WAIT_S);
         let Ok(decoder) = line.decoders.clone().acquire_owned().await else {
             break;
         };

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use wire::Pace;
+use wire::Asked;
 
 use crate::cluster::Machine;
 use crate::run::Busy;
@@ -50,33 +50,6 @@ pub(crate) struct Loading {
     pub(crate) loaded: bool,
 }
 
-/// What a client has asked a compositor for: the messages under way, and how many views of the first have come since when.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Asked {
-    /// Among those that views are dealt to.
-    pub(crate) place: usize,
-    pub(crate) under_way: VecDeque<usize>,
-    pub(crate) came: usize,
-    pub(crate) since_s: f64,
-    pub(crate) pace: Pace,
-}
-
-impl Asked {
-    /// As clients count what comes; how many messages are complete.
-    pub(crate) fn came(&mut self, views: usize, now_s: f64) -> usize {
-        self.came += views;
-        let mut complete = 0;
-        while let Some(&message) = self.under_way.front().filter(|message| **message <= self.came) {
-            self.under_way.pop_front();
-            self.came -= message;
-            self.pace.came(message, now_s - self.since_s);
-            self.since_s = now_s;
-            complete += 1;
-        }
-        complete
-    }
-}
-
 /// A node at work.
 #[derive(Debug, Clone)]
 pub(crate) struct Node {
@@ -97,13 +70,14 @@ pub(crate) struct Node {
     /// Messages of the client's that the node has not read: the set, and views that there was no credit for yet.
     pub(crate) messages: VecDeque<(u32, usize)>,
     pub(crate) credit: usize,
-    /// The client's side: what it has asked for.
+    /// The client's side: what it has asked for, and this node's place among those that views are dealt to.
     pub(crate) asked: Asked,
+    pub(crate) place: usize,
     pub(crate) busy: Busy,
 }
 
 impl Node {
-    pub(crate) fn new(machine: Machine, sets: u32, credit: usize) -> Self {
+    pub(crate) fn new(machine: Machine, sets: u32, (credit, view_s): (usize, f64)) -> Self {
         Self {
             machine,
             urgent: VecDeque::new(),
@@ -116,7 +90,8 @@ impl Node {
             loading: vec![Loading::default(); sets as usize],
             messages: VecDeque::new(),
             credit,
-            asked: Asked::default(),
+            asked: Asked::new(view_s),
+            place: 0,
             busy: Busy::default(),
         }
     }

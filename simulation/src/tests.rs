@@ -45,19 +45,19 @@ fn one_sampler_one_compositor_one_set() {
 fn every_batch_costs_a_call() {
     let machine = Machine { calls: Calls { reconstruct_s: 0.02, direct_s: 0.03 }, ..FREE };
     let run = ran(&equal(2, machine), &demand(PolicyChoice::Pipeline, 100, 1), Habits::default());
-    // The first 32 wait together for the set; after that a message at a time, of 16 views or of 8.
+    // The first 50 wait together for the set; after that a message at a time, of 25 views or of half as many.
     let calls = (run.complete_s[0] - (0.4 + 0.005 + 100.0 * 0.01)) / 0.02;
-    assert!((1.0 + 68.0 / 16.0..=1.0 + 69.0 / 8.0).contains(&calls) && (calls - calls.round()).abs() < 1e-6, "{calls}");
+    assert!((2.9..=1.1 + 50.0 / 12.0).contains(&calls) && (calls - calls.round()).abs() < 1e-6, "{calls}");
     let run = ran(&equal(2, machine), &demand(PolicyChoice::Direct, 16, 1), Habits::default());
     assert!(close(run.complete_s[0], 0.03 + 8.0 * 0.101));
 }
 
 #[test]
 fn a_link_delays_by_what_it_carries() {
-    // 4 MB of images at 10 MB/s, a first batch of 32, then frames of 0.1 MB that take as long to send as to make.
+    // 4 MB of images at 10 MB/s, a first batch of 50, then frames of 0.1 MB that take as long to send as to make.
     let slow = Machine { bytes_per_s: 1e7, ..FREE };
     let run = ran(&equal(2, slow), &demand(PolicyChoice::Pipeline, 100, 1), Habits::default());
-    let least_s = 0.4 + 0.4 + 0.005 + 0.32 + 1.0;
+    let least_s = 0.4 + 0.4 + 0.005 + 0.5 + 1.0;
     assert!((least_s..least_s + 0.1).contains(&run.complete_s[0]), "{:?}", run.complete_s);
 }
 

@@ -8,7 +8,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-use wire::{Assignment, Deal, Pace, Policy, SessionPlan};
+use wire::{Assignment, Deal, Policy, SessionPlan};
 
 use crate::cluster::{Cluster, Habits, Machine, Transfer};
 use crate::dealing::{compositors_of, deal_of, receivers};
@@ -16,8 +16,8 @@ use crate::node::{Job, Node, Parcel, Sampled};
 use crate::planning::number_of;
 use crate::run::Run;
 
-/// Frames that are looked at together: what a client asks for next it asks before all of a batch have come.
-const PARCEL_VIEWS: usize = 8;
+/// A batch's frames leave in so many parcels: what a client asks for next it asks before all have come.
+const PARCELS: usize = 8;
 
 /// What happens next; of several at the same time what was foreseen first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -53,7 +53,6 @@ struct World<'a> {
 /// Carries a plan out for `sets` sets of `views` views.
 #[must_use]
 pub fn run(cluster: &Cluster, plan: &SessionPlan, views: usize, sets: u32, habits: Habits) -> Run {
-    let plan = &plan.assignment;
     let mut world = World::new(cluster, plan, views, sets, habits);
     world.begin();
     while let Some(Reverse((at, _, what))) = world.foreseen.pop() {
@@ -67,11 +66,12 @@ pub fn run(cluster: &Cluster, plan: &SessionPlan, views: usize, sets: u32, habit
 }
 
 impl<'a> World<'a> {
-    fn new(cluster: &'a Cluster, plan: &'a Assignment, views: usize, sets: u32, habits: Habits) -> Self {
+    fn new(cluster: &'a Cluster, plan: &'a SessionPlan, views: usize, sets: u32, habits: Habits) -> Self {
+        let (view_s, plan) = (plan.view_s(), &plan.assignment);
         let compositors = compositors_of(plan);
         let relayed = plan.relay_fanout.map(|fanout| Transfer::Relay(fanout.get() as usize));
         let habits = Habits { transfer: relayed.unwrap_or(habits.transfer), ..habits };
-        let node = |machine| Node::new(machine, sets, habits.credit_views);
+        let node = |machine| Node::new(machine, sets, (habits.credit_views, view_s));
         let nodes: Vec<Node> = cluster.machines.iter().copied().map(node).collect();
         let (deal, due) = (deal_of(plan, views, sets), vec![(views, 0.0); sets as usize]);
         let (receivers, foreseen) = (Vec::new(), BinaryHeap::new());
@@ -95,9 +95,9 @@ impl<'a> World<'a> {
     /// The client's first messages. Who has no view of any set is not asked, and loads nothing.
     fn begin(&mut self) {
         for (place, node) in self.compositors.clone().into_iter().enumerate() {
-            self.nodes[node].asked.place = place;
-            while self.nodes[node].asked.under_way.len() < Pace::MESSAGES {
-                let Some(views) = self.deal.take_own(place, self.nodes[node].asked.pace.views()) else { break };
+            self.nodes[node].place = place;
+            while let Some(most) = self.nodes[node].asked.room() {
+                let Some(views) = self.deal.take_own(place, most) else { break };
                 self.send_message(node, views);
             }
         }
@@ -109,18 +109,15 @@ impl<'a> World<'a> {
 
     fn send_message(&mut self, node: usize, views: Range<usize>) {
         let set = (views.start / self.views) as u32;
-        self.nodes[node].asked.under_way.push_back(views.len());
+        self.nodes[node].asked.ask(views.len());
         self.nodes[node].messages.push_back((set, views.len()));
     }
 
-    /// Frames have come to the client, which asks for more when all of a message have.
+    /// Frames have come to the client, which asks for more where there is room.
     fn came_back(&mut self, node: usize, views: usize) {
-        if self.nodes[node].asked.came(views, self.now_s) == 0 {
-            return;
-        }
-        let place = self.nodes[node].asked.place;
-        while self.nodes[node].asked.under_way.len() < Pace::MESSAGES {
-            let Some(views) = self.deal.take(place, self.nodes[node].asked.pace.views()) else { break };
+        (0..views).for_each(|_| self.nodes[node].asked.came(self.now_s, false));
+        while let Some(most) = self.nodes[node].asked.room() {
+            let Some(views) = self.deal.take(self.nodes[node].place, most) else { break };
             self.send_message(node, views);
         }
     }
@@ -295,7 +292,8 @@ impl<'a> World<'a> {
                 self.advance(node);
             }
             Some(Job::Views { set, views }) => {
-                let parcels = (0..views).step_by(PARCEL_VIEWS).map(|first| PARCEL_VIEWS.min(views - first));
+                let most = views.div_ceil(PARCELS).max(1);
+                let parcels = (0..views).step_by(most).map(|first| most.min(views - first));
                 self.nodes[node].outgoing.extend(parcels.map(|views| Parcel::Frames { set, views }));
                 self.start_link(node);
             }

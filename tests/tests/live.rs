@@ -69,6 +69,23 @@ async fn frames_of_a_killed_compositor_come_from_others() {
     assert!(!session.plan().assignment.composites(&format!("n{victim}")));
 }
 
+/// Frames that are decoded wait for a caller who is busy; a plan that ends meanwhile ends those who hold them.
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_that_wait_for_their_caller_outlive_their_plan() {
+    let mut cluster = Cluster::start(4).await;
+    let session = cluster.session(pipeline(MOVING)).await.unwrap();
+    let plan = session.plan().assignment;
+    let victim = plan.compositors.last().unwrap().node_name[1..].parse::<usize>().unwrap();
+    let mut frames = session.render_views(views(3, 40)).unwrap();
+    let mut came = vec![frames.next().await.unwrap().unwrap()];
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    cluster.nodes[victim].kill();
+    wait_for("another plan", async || session.plan().assignment.plan_epoch > plan.plan_epoch).await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    came.extend(frames.all().await.unwrap());
+    check(&came, 120);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn sets_of_a_killed_sampler_come_from_others() {
     let mut cluster = Cluster::start(3).await;

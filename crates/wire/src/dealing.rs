@@ -73,51 +73,100 @@ fn shares(first: usize, count: usize, weights: &[u32]) -> Vec<Range<usize>> {
     weights.iter().map(share).collect()
 }
 
-/// Cut off from a share: one view at least where there is any.
+/// Cut off from a share: all of one that is hardly worth two calls to the device.
 fn back_half(share: &mut Range<usize>) -> Range<usize> {
-    let middle = share.start + share.len() / 2;
+    let middle = if share.len() <= FEW_VIEWS { share.start } else { share.start + share.len() / 2 };
     let half = middle..share.end;
     share.end = middle;
     half
 }
 
-/// Views that a compositor is asked for in one message. It has two on its way: while one is made the other waits.
-const FIRST_VIEWS: usize = 16;
-/// A call to the device costs more than a view: fewer would not pay.
-const FEWEST_VIEWS: usize = 8;
-/// Shorter, and the network's delay shows; longer, and a slow node keeps others waiting at the end.
+/// Messages shorter than this show the network's delay, longer ones let a slow node keep others waiting at the end.
 const MESSAGE_S: Range<f64> = 0.1..0.4;
+/// Fewer would not pay, for a call to the device costs more than a view,
+const FEW_VIEWS: usize = 8;
+/// unless they take longer than this.
+const FEW_VIEWS_S: f64 = 1.0;
+/// Before anything has come.
+const FIRST_VIEWS: Range<usize> = 1..64;
 
-/// How much a compositor is asked for at a time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Pace {
-    views: usize,
-}
-
-impl Default for Pace {
-    fn default() -> Self {
-        Self { views: FIRST_VIEWS }
-    }
-}
-
-impl Pace {
-    /// Messages that are under way at a time.
-    pub const MESSAGES: usize = 2;
-
+/// What a client has asked one compositor for: at any time two messages' worth of views, one being made while the other
+/// waits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Asked {
     /// Of the next message.
+    views: usize,
+    /// Views of each message under way.
+    messages: VecDeque<usize>,
+    /// Of the first of them.
+    came: usize,
+    /// Since when how many views have come after that, and whether one of them waited for its sample set.
+    since_s: Option<f64>,
+    lately: usize,
+    waited: bool,
+}
+
+impl Asked {
+    /// Nothing yet, of a compositor that needs about so many seconds for a view; 0 where that is not known.
     #[must_use]
-    pub fn views(self) -> usize {
-        self.views
+    pub fn new(view_s: f64) -> Self {
+        let views = (MESSAGE_S.start + MESSAGE_S.end) / 2.0 / view_s;
+        // A cast saturates: views that take no time are as many as may be.
+        let views = (views as usize).max(fewest(view_s)).clamp(FIRST_VIEWS.start, FIRST_VIEWS.end);
+        Self { views, messages: VecDeque::new(), came: 0, since_s: None, lately: 0, waited: false }
     }
 
-    /// A message's views have come, all in so many seconds.
-    pub fn came(&mut self, views: usize, seconds: f64) {
-        self.views = match seconds * self.views as f64 / views.max(1) as f64 {
-            full_s if full_s < MESSAGE_S.start => (2 * self.views).min(MAX_VIEWS_PER_REQUEST),
-            full_s if full_s > MESSAGE_S.end => (self.views / 2).max(FEWEST_VIEWS),
+    /// How many views the next message should have, if there should be one.
+    #[must_use]
+    pub fn room(&self) -> Option<usize> {
+        let under_way = self.messages.iter().sum::<usize>() - self.came;
+        (under_way + self.views <= 2 * self.views).then_some(self.views)
+    }
+
+    /// A message is sent.
+    pub fn ask(&mut self, views: usize) {
+        self.messages.push_back(views);
+    }
+
+    /// Whether nothing is under way.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.messages.is_empty()
+    }
+
+    /// A view has come. Where it waited for its sample set, it does not say how fast the compositor is.
+    pub fn came(&mut self, now_s: f64, waited_for_set: bool) {
+        self.came += 1;
+        if self.messages.front().is_some_and(|views| *views <= self.came) {
+            self.messages.pop_front();
+            self.came = 0;
+        }
+        self.lately += 1;
+        self.waited |= waited_for_set;
+        // A batch's views come all at once: from the first of one to the first of another.
+        let since_s = self.since_s.unwrap_or(f64::NEG_INFINITY);
+        if now_s - since_s >= MESSAGE_S.start {
+            if since_s.is_finite() && !self.waited {
+                self.adapt(self.lately, now_s - since_s);
+            }
+            (self.since_s, self.lately, self.waited) = (Some(now_s), 0, false);
+        }
+    }
+
+    /// So many views came in so many seconds.
+    fn adapt(&mut self, views: usize, seconds: f64) {
+        let view_s = seconds / views.max(1) as f64;
+        self.views = match view_s * self.views as f64 {
+            message_s if message_s < MESSAGE_S.start => (2 * self.views).min(MAX_VIEWS_PER_REQUEST),
+            message_s if message_s > MESSAGE_S.end => (self.views / 2).max(fewest(view_s)),
             _ => self.views,
         };
     }
+}
+
+/// Of a message, where a view takes so long.
+fn fewest(view_s: f64) -> usize {
+    ((FEW_VIEWS_S / view_s) as usize).clamp(1, FEW_VIEWS)
 }
 
 #[cfg(test)]
@@ -153,12 +202,19 @@ mod tests {
     }
 
     #[test]
+    fn a_small_rest_goes_whole() {
+        let mut deal = Deal::new([40], &[1, 1]);
+        assert_eq!((deal.take(0, 20), deal.take(1, 12)), (Some(0..20), Some(20..32)));
+        assert_eq!((deal.take(0, 9), deal.take(1, 9)), (Some(32..40), None));
+    }
+
+    #[test]
     fn whoever_is_done_takes_half_of_the_largest_rest() {
         let mut deal = Deal::new([90], &[1, 1, 1]);
         assert_eq!((deal.take(0, 30), deal.take(1, 10)), (Some(0..30), Some(30..40)));
         assert_eq!(deal.take(0, 100), Some(75..90), "the third's");
         assert_eq!(deal.take(0, 100), Some(50..60));
-        assert_eq!(deal.take(2, 100), Some(60..75));
+        assert_eq!((deal.take(1, 100), deal.take(2, 100)), (Some(40..50), Some(60..75)));
     }
 
     #[test]
@@ -189,10 +245,38 @@ mod tests {
 
     #[test]
     fn a_message_lasts_a_few_tenths_of_a_second() {
-        for (view_s, views) in [(1e-5, MAX_VIEWS_PER_REQUEST), (0.001, 128), (0.01, 16), (0.2, FEWEST_VIEWS)] {
-            let mut pace = Pace::default();
-            (0..12).for_each(|_| pace.came(4, view_s * 4.0));
-            assert_eq!(pace.views(), views, "{view_s}");
+        for (view_s, views) in [(1e-5, MAX_VIEWS_PER_REQUEST), (0.001, 128), (0.01, 16), (0.2, 5), (3.0, 1)] {
+            for guess_s in [0.0, 1e-6, view_s, 100.0] {
+                let (mut asked, mut now_s) = (Asked::new(guess_s), 0.0);
+                let mut batches = 0;
+                while batches < 40 || now_s < 10.0 {
+                    batches += 1;
+                    let message = asked.room().unwrap();
+                    asked.ask(message);
+                    now_s += message as f64 * view_s;
+                    // A batch of the device.
+                    (0..message).for_each(|_| asked.came(now_s, false));
+                }
+                let message_s = asked.views as f64 * view_s;
+                assert!(
+                    asked.views.abs_diff(views) <= 1 || MESSAGE_S.contains(&message_s),
+                    "{view_s} {guess_s}: {asked:?}"
+                );
+            }
         }
+    }
+
+    #[test]
+    fn two_messages_of_views_are_under_way() {
+        let mut asked = Asked::new(0.02);
+        assert_eq!((asked.room(), asked.is_empty()), (Some(12), true));
+        (0..12).for_each(|_| asked.ask(1));
+        assert_eq!(asked.room(), Some(12), "views count, not messages");
+        asked.ask(12);
+        assert_eq!(asked.room(), None);
+        (1..=12).for_each(|view| asked.came(0.02 * f64::from(view), false));
+        assert_eq!((asked.room(), asked.views), (Some(12), 12));
+        (1..=12).for_each(|view| asked.came(60.0 + 0.02 * f64::from(view), true));
+        assert_eq!((asked.views, asked.is_empty()), (12, true), "it was the samples that were late");
     }
 }

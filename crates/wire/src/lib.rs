@@ -33,7 +33,7 @@ mod conventions_tests;
 mod message_tests;
 
 pub use codec::*;
-pub use dealing::{Deal, Pace};
+pub use dealing::{Asked, Deal};
 pub use demand::{ChangeSession, Quality};
 pub use error::WireError;
 pub use frame::{FrameAssembly, FrameHeader, FramePart, RenderViews, RequestedView, WholeFrame};

@@ -77,7 +77,7 @@ pub struct CompositorShare {
     pub node_name: String,
     /// Where it is reached.
     pub address: String,
-    /// Views are dealt in proportion to it.
+    /// Its share of the views of a set, in proportion, to begin with: whoever is done helps others.
     pub view_weight: u32,
 }
 

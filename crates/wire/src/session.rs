@@ -253,6 +253,16 @@ impl SessionPlan {
         self.assignment.samplers.len()
     }
 
+    /// Seconds of one view on a compositor, as costs were measured.
+    #[must_use]
+    pub fn view_s(&self) -> f64 {
+        let device_s = match self.assignment.policy {
+            Policy::Direct => self.costs.direct_view_s,
+            Policy::Pipeline | Policy::TimeShare => self.costs.reconstruct_view_s,
+        };
+        device_s + self.costs.encode_view_s
+    }
+
     /// Seconds a sample set by the policy that was chosen.
     #[must_use]
     pub fn predicted_s(&self) -> f64 {

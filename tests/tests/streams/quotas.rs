@@ -6,11 +6,13 @@ use client::{Client, ClientError};
 use cluster_tests::cluster::Cluster;
 use coordinator::CoordinatorConfig;
 use node::{Deadlines, NodeConfig, Quotas};
+use tokio::sync::mpsc;
 use tokio::time::timeout;
 use tokio_stream::StreamExt as _;
+use tokio_stream::wrappers::ReceiverStream;
 use tonic::Code;
-use wire::SessionRequest;
-use wire::rpc::{CompositorClient, connect};
+use wire::rpc::{CompositorClient, Messages, connect};
+use wire::{FrameAssembly, FramePart, SessionRequest, WholeFrame};
 
 use crate::raw::{HEALED, Raw, STILL, compositor_of, greedy, narrow, pipeline, seen};
 
@@ -65,6 +67,37 @@ async fn who_asks_for_thousands_does_not_starve_others() {
     }
     assert!(!bulk.is_finished(), "nothing was shared: {waited:?}");
     assert_eq!(bulk.await.unwrap(), 4000);
+}
+
+async fn whole_frame(parts: &mut Messages<FramePart>) -> WholeFrame {
+    let mut assembly = FrameAssembly::default();
+    loop {
+        if let Some(frame) = assembly.push(parts.next().await.unwrap().unwrap()).unwrap() {
+            return frame;
+        }
+    }
+}
+
+/// A client asks for the rest of a batch when it has some of it: by then others may have taken the room.
+#[tokio::test(flavor = "multi_thread")]
+async fn who_was_let_in_waits_for_room() {
+    let small = |config: NodeConfig| NodeConfig { quotas: Quotas { pixels: 4 << 20, ..config.quotas }, ..config };
+    let cluster = Cluster::start_with(1, small).await;
+    let session = cluster.session(pipeline(STILL)).await.unwrap();
+    let (address, _) = compositor_of(&session);
+    let (asks, asked) = mpsc::channel(2);
+    asks.send(greedy(&session, 1024, 1)).await.unwrap();
+    let client = CompositorClient::new(connect(&address).await.unwrap());
+    let mut let_in = client.render_views(ReceiverStream::new(asked)).await.unwrap();
+    whole_frame(&mut let_in).await;
+    let (takes_all, all_taken) = mpsc::channel(1);
+    takes_all.send(greedy(&session, 1024, 64)).await.unwrap();
+    let full = narrow(&address).await.render_views(ReceiverStream::new(all_taken)).await.unwrap();
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    asks.send(greedy(&session, 1024, 1)).await.unwrap();
+    timeout(Duration::from_millis(300), let_in.next()).await.expect_err("there is no room");
+    drop((takes_all, full));
+    timeout(HEALED, whole_frame(&mut let_in)).await.expect("there is");
 }
 
 #[tokio::test(flavor = "multi_thread")]
