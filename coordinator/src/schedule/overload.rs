@@ -70,13 +70,8 @@ impl Overload {
             return true;
         }
         self.room_since = (look.utilisation < ROOMY).then(|| self.room_since.unwrap_or(now));
-        if self.is_time_to_try(now) {
+        if self.roomy_in_a_row >= LOOKS_UP || self.is_time_to_try(now) {
             self.tried_at = Some(now);
-            self.left_at.pop();
-            self.change(now, self.step - 1);
-            return true;
-        }
-        if self.roomy_in_a_row >= LOOKS_UP {
             self.left_at.pop();
             self.change(now, self.step - 1);
             return true;
