@@ -1,29 +1,25 @@
 //! The cluster as a state machine: events in, commands out. The service does what they say.
 
+mod admission;
+
 use std::collections::BTreeMap;
 use std::time::Duration;
 
 use depth_image::{Camera, PinholeCamera};
-use wire::limits::MAX_CELLS;
 use wire::{
     Assignment, ClusterStatus, Costs, JoinCluster, MeasuredCosts, NodeCondition, NodeStatus, Policy, SessionPlan,
 };
 
 use super::assign::assignment;
-use super::choose::{Demand, Present, WORTH, check, step_from};
+use super::choose::{Demand, Present, WORTH, step_from};
 use super::costs::Estimate;
 use super::overload::Look;
 use super::patience::Gain;
 use super::work::{InForce, Work};
-use super::{
-    Choice, ChoiceError, Command, Event, Load, NodeCosts, Opening, Wish, choose, direct_s, pipeline_by_s, time_share_s,
-};
+use super::{Choice, Command, Event, Load, NodeCosts, Opening, Wish, choose, direct_s, pipeline_by_s, time_share_s};
 
 /// A node that has nothing to do is given a role for less than roles are changed for.
 const WORTH_OF_IDLE: f64 = 1.02;
-/// Of the nodes' time, at the least that sessions make do with: what is measured alone and in even batches takes longer among
-/// many viewers.
-const MOST_ADMITTED: f64 = 0.9;
 /// Changes of role of one plan, unless a node was lost.
 const MOST_CHANGES: usize = 2;
 
@@ -203,52 +199,6 @@ impl Scheduler {
         let is_told = commands.iter().any(|command| matches!(command, Command::Apply { .. }));
         commands.extend(self.in_force().filter(|_| !is_told).map(|in_force| self.tell(in_force, vec![session])));
         commands
-    }
-
-    fn check(&self, opening: &Opening) -> Result<(), ChoiceError> {
-        let shared = self.work.as_ref().filter(|work| work.suits(opening));
-        let mut work = shared.cloned().unwrap_or_else(|| Work::new(opening));
-        work.add(opening);
-        let counting = self.members.values().filter(|member| self.counts(member, opening));
-        let alone = NodeCosts { costs: opening.costs, ..NodeCosts::default() };
-        let costs = |member: &Member| if shared.is_some() { member.estimate.now() } else { alone };
-        let nodes: Vec<NodeCosts> = counting.map(costs).collect();
-        admit(&work, &nodes)
-    }
-
-    /// Whether a session has been heard of and not ended.
-    #[must_use]
-    pub fn has_session(&self, session: u64) -> bool {
-        self.work.as_ref().is_some_and(|work| work.sessions().contains(&session))
-    }
-
-    /// Whether a session may ask for so much from now on. Less than before it always may.
-    ///
-    /// # Errors
-    /// As for one that is opened.
-    pub fn admits(&self, session: u64, views_per_set: usize, frames_per_s: f64) -> Result<(), ChoiceError> {
-        let Some(before) = &self.work else { return Ok(()) };
-        let mut work = before.clone();
-        work.demand(session, views_per_set, frames_per_s);
-        if work.views_per_s() <= before.views_per_s() {
-            return Ok(());
-        }
-        admit(&work, &self.usable().map(|(_, member)| member.estimate.now()).collect::<Vec<_>>())
-    }
-
-    /// Whether a session may look from elsewhere from now on.
-    ///
-    /// # Errors
-    /// As for one that is opened, and for one that has sample cameras of its own.
-    pub fn admits_views(&self, session: u64, viewpoints: &[PinholeCamera]) -> Result<(), ChoiceError> {
-        let Some(before) = &self.work else { return Ok(()) };
-        let mut work = before.clone();
-        work.look(session, viewpoints);
-        match work.cell_count() {
-            None => Err(ChoiceError::NoCells { session }),
-            Some(cells) if cells > MAX_CELLS && Some(cells) > before.cell_count() => Err(ChoiceError::Cells { cells }),
-            Some(_) => Ok(()),
-        }
     }
 
     /// A node that could not take plans of one workload may take those of another.
@@ -483,18 +433,6 @@ fn present_s(crew: &Crew<'_>, has_role: &[bool]) -> Option<f64> {
         Policy::TimeShare => time_share_s(&load, &nodes),
     };
     (!nodes.is_empty()).then_some(time_s)
-}
-
-/// Whether a demand can be met at all; of sessions with a rate, at the least that they make do with.
-fn admit(work: &Work, nodes: &[NodeCosts]) -> Result<(), ChoiceError> {
-    let demand = Demand { load: work.load(), nodes, wish: work.wish(), present: None };
-    check(&demand)?;
-    if let Some(cells) = work.cell_count().filter(|&cells| cells > MAX_CELLS) {
-        return Err(ChoiceError::Cells { cells });
-    }
-    let least_ratio = work.fallbacks().last().map_or(1.0, |quality| quality.frame_rate_ratio);
-    let needed = work.utilisation(choose(&demand)?.time_s()) * least_ratio / work.frame_rate_ratio();
-    if needed > MOST_ADMITTED { Err(ChoiceError::Overload { needed }) } else { Ok(()) }
 }
 
 fn session_plan(assignment: Assignment, costs: Costs, choice: &Choice, reason: String) -> SessionPlan {

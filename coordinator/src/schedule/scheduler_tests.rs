@@ -1,6 +1,7 @@
 use wire::{PolicyChoice, Quality};
 
 use super::*;
+use crate::schedule::ChoiceError;
 use crate::schedule::test_support::{COSTS, join, opened, opening, workload};
 
 const PIPELINE: PolicyChoice = PolicyChoice::Pipeline;
