@@ -174,9 +174,10 @@ pub fn time_share_s(load: &Load, nodes: &[NodeCosts]) -> f64 {
     if nodes.is_empty() {
         return f64::INFINITY;
     }
-    let shares = load.mean_image_counts(nodes);
-    let sample_s = nodes.iter().zip(&shares).map(|(node, own)| own * load.part_s(node));
-    sample_s.fold(finish_s(load.views, &load.sharers(nodes)), f64::max)
+    let (shares, others) = (load.mean_image_counts(nodes), nodes.len() - 1);
+    // Who samples does so for every set, and sends it, though it may make no view.
+    let own_s = |(node, &own): (&NodeCosts, &f64)| (own * load.part_s(node)).max(exchange_s(load, node, own, others));
+    nodes.iter().zip(&shares).map(own_s).fold(finish_s(load.views, &load.sharers(nodes)), f64::max)
 }
 
 /// A node that samples and composites gets all images but its own, and sends those to all others.
@@ -226,6 +227,14 @@ mod tests {
         assert!(close(pipeline_s(&Load { views: 100, ..LOAD }, &nodes(1, COSTS), &[true]), 0.4 + 0.005 + 1.0));
         assert!(pipeline_s(&LOAD, &nodes(3, COSTS), &first(3, 3)).is_infinite());
         assert!(pipeline_s(&LOAD, &nodes(3, COSTS), &first(0, 3)).is_infinite());
+    }
+
+    #[test]
+    fn who_samples_sends_to_all_though_it_makes_no_view() {
+        let slow: Vec<NodeCosts> =
+            nodes(50, COSTS).into_iter().map(|node| NodeCosts { transfer_image_s: 0.01, ..node }).collect();
+        let time_s = time_share_s(&LOAD, &slow);
+        assert!(close(time_s, 49.0 * 0.01), "{time_s}: 46 nodes alone would make the views sooner");
     }
 
     #[test]
