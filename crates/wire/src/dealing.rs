@@ -22,12 +22,12 @@ impl Deal {
     pub fn new(runs: impl IntoIterator<Item = usize>, weights: &[u32]) -> Self {
         let weights = if weights.iter().all(|&weight| weight == 0) { &vec![1; weights.len()] } else { weights };
         let mut first = 0;
-        let shares_of = |count: usize| {
-            let shares = shares(first, count, weights);
+        let shares_of = |(set, count): (usize, usize)| {
+            let shares = shares(first..first + count, weights, rounding(set, count, weights.len()));
             first += count;
             shares
         };
-        Self { sets: runs.into_iter().map(shares_of).collect() }
+        Self { sets: runs.into_iter().enumerate().map(shares_of).collect() }
     }
 
     /// The next views of a compositor's own share, at most so many and of one set: who has none is not worth the loading
@@ -60,10 +60,21 @@ fn cut_front(share: &mut Range<usize>, most: usize) -> Range<usize> {
     front
 }
 
-/// Contiguous shares in proportion to weights; of few views the greater ones get more.
-fn shares(first: usize, count: usize, weights: &[u32]) -> Vec<Range<usize>> {
+/// Where the ends of a set's shares are rounded up, in parts of 2³²: at a half in the first set, and in the others evenly
+/// spread, so that compositors take turns with what is left over. Fewer views than compositors stay where they are: to make
+/// one, a set must be loaded.
+fn rounding(set: usize, views: usize, compositors: usize) -> u32 {
+    /// The golden section: no two sets, however many, are close to each other.
+    const STEP: u32 = 0x9e37_79b9;
+    let turn = if views < compositors { 0 } else { set as u32 };
+    (1_u32 << 31).wrapping_add(turn.wrapping_mul(STEP))
+}
+
+/// Contiguous shares in proportion to weights, their ends rounded.
+fn shares(views: Range<usize>, weights: &[u32], rounding: u32) -> Vec<Range<usize>> {
     let all: u64 = weights.iter().copied().map(u64::from).sum();
-    let end = |before: u64| first + ((count as u64 * before + all / 2) / all.max(1)) as usize;
+    let up = (all * u64::from(rounding)) >> 32;
+    let end = |before: u64| views.start + ((views.len() as u64 * before + up) / all.max(1)) as usize;
     let mut before = 0;
     let share = |&weight: &u32| {
         let start = end(before);
@@ -87,19 +98,17 @@ const MESSAGE_S: Range<f64> = 0.1..0.4;
 const FEW_VIEWS: usize = 8;
 /// unless they take longer than this.
 const FEW_VIEWS_S: f64 = 1.0;
-/// Before anything has come.
-const FIRST_VIEWS: Range<usize> = 1..64;
+/// Most before anything has come.
+const MOST_FIRST_VIEWS: usize = 64;
 
 /// What a client has asked one compositor for: at any time two messages' worth of views, one being made while the other
 /// waits.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Asked {
     /// Of the next message.
     views: usize,
-    /// Views of each message under way.
-    messages: VecDeque<usize>,
-    /// Of the first of them.
-    came: usize,
+    /// Asked for, and not come.
+    under_way: usize,
     /// Since when how many views have come after that, and whether one of them waited for its sample set.
     since_s: Option<f64>,
     lately: usize,
@@ -112,35 +121,31 @@ impl Asked {
     pub fn new(view_s: f64) -> Self {
         let views = (MESSAGE_S.start + MESSAGE_S.end) / 2.0 / view_s;
         // A cast saturates: views that take no time are as many as may be.
-        let views = (views as usize).max(fewest(view_s)).clamp(FIRST_VIEWS.start, FIRST_VIEWS.end);
-        Self { views, messages: VecDeque::new(), came: 0, since_s: None, lately: 0, waited: false }
+        let views = (views as usize).max(fewest(view_s)).min(MOST_FIRST_VIEWS);
+        Self { views, under_way: 0, since_s: None, lately: 0, waited: false }
     }
 
     /// How many views the next message should have, if there should be one.
     #[must_use]
     pub fn room(&self) -> Option<usize> {
-        let under_way = self.messages.iter().sum::<usize>() - self.came;
-        (under_way + self.views <= 2 * self.views).then_some(self.views)
+        (self.under_way <= self.views).then_some(self.views)
     }
 
     /// A message is sent.
     pub fn ask(&mut self, views: usize) {
-        self.messages.push_back(views);
+        self.under_way += views;
     }
 
     /// Whether nothing is under way.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.messages.is_empty()
+        self.under_way == 0
     }
 
-    /// A view has come. Where it waited for its sample set, it does not say how fast the compositor is.
+    /// A view has come, though it may be one that another compositor was asked for. Where it waited for its sample set, it
+    /// does not say how fast the compositor is.
     pub fn came(&mut self, now_s: f64, waited_for_set: bool) {
-        self.came += 1;
-        if self.messages.front().is_some_and(|views| *views <= self.came) {
-            self.messages.pop_front();
-            self.came = 0;
-        }
+        self.under_way = self.under_way.saturating_sub(1);
         self.lately += 1;
         self.waited |= waited_for_set;
         // A batch's views come all at once: from the first of one to the first of another.
@@ -199,6 +204,27 @@ mod tests {
         assert_eq!(deal.take(1, 16), Some(60..76), "the first set is all under way");
         assert_eq!(deal.take(0, 64), Some(40..60));
         assert_eq!((deal.take(1, 64), deal.take(1, 64), deal.take(0, 1)), (Some(76..80), None, None));
+    }
+
+    #[test]
+    fn compositors_take_turns_with_what_is_left_over() {
+        for (views, weights) in [(3, vec![1, 1]), (5, vec![7; 4]), (7, vec![3, 1]), (19, vec![1; 11])] {
+            let deal = Deal::new([views; 400], &weights);
+            for (compositor, &weight) in weights.iter().enumerate() {
+                let own: Vec<usize> = deal.sets.iter().map(|shares| shares[compositor].len()).collect();
+                let even = views as f64 * f64::from(weight) / f64::from(weights.iter().sum::<u32>());
+                assert!(own.iter().all(|&own| (own as f64 - even).abs() < 1.0), "{views} by {weights:?}");
+                let mean = own.iter().sum::<usize>() as f64 / 400.0;
+                assert!((mean - even).abs() < 0.01, "{views} by {weights:?}: {mean}, not {even}");
+            }
+        }
+    }
+
+    #[test]
+    fn few_views_are_always_made_by_the_same() {
+        let deal = Deal::new([2; 9], &[5; 4]);
+        let first = |shares: &Vec<Range<usize>>| shares.iter().map(Range::len).collect::<Vec<_>>();
+        assert!(deal.sets.iter().all(|shares| first(shares) == first(&deal.sets[0])), "each would load every set");
     }
 
     #[test]
@@ -278,5 +304,7 @@ mod tests {
         assert_eq!((asked.room(), asked.views), (Some(12), 12));
         (1..=12).for_each(|view| asked.came(60.0 + 0.02 * f64::from(view), true));
         assert_eq!((asked.views, asked.is_empty()), (12, true), "it was the samples that were late");
+        asked.came(60.3, false);
+        assert_eq!((asked.room(), asked.is_empty()), (Some(asked.views), true), "nobody asked for it");
     }
 }
