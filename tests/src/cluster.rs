@@ -11,8 +11,10 @@ use glam::{UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
+use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
-use wire::{PolicyChoice, SessionRequest, Timeline};
+use wire::rpc::Messages;
+use wire::{FrameAssembly, FramePart, PolicyChoice, SessionRequest, Timeline, WholeFrame};
 
 use crate::scalar_engine::{SKY_LINEAR, ScalarEngine};
 
@@ -236,6 +238,20 @@ impl Cluster {
             *all.entry(image).or_insert(0) += times;
         }
         all.into_values().collect()
+    }
+}
+
+/// The next frame of a stream, once all of it is there.
+///
+/// # Panics
+/// Where none comes.
+pub async fn whole_frame(parts: &mut Messages<FramePart>) -> WholeFrame {
+    let mut assembly = FrameAssembly::default();
+    loop {
+        let part = parts.next().await.expect("a frame").expect("no refusal");
+        if let Some(frame) = assembly.push(part).expect("parts in their order") {
+            return frame;
+        }
     }
 }
 

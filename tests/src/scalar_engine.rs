@@ -3,8 +3,10 @@
 
 use std::any::Any;
 use std::collections::{HashMap, HashSet};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::sleep;
+use std::time::Duration;
 
 use depth_image::{
     BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, PinholeCamera, Provenance, ProvenanceKind, Ray, Texel, View,
@@ -43,12 +45,23 @@ pub fn srgb8(linear: Vec3) -> [u8; 3] {
 /// Images sampled, by eye and first row, scene time and step: how often.
 pub type SampleCounts = HashMap<([u32; 4], u32, Refinement), usize>;
 
+/// What the device takes at the least, so that it is as fast as a test says on whatever machine.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Pace {
+    /// For one sample image.
+    pub image: Duration,
+    /// For one reconstructed view.
+    pub view: Duration,
+}
+
 /// Plain loops. Clones share what they count.
 #[derive(Debug, Clone, Default)]
 pub struct ScalarEngine {
     counts: Arc<Mutex<SampleCounts>>,
     scenes: Arc<Mutex<HashSet<String>>>,
     is_lost: Arc<AtomicBool>,
+    pace: Arc<Mutex<Pace>>,
+    reconstructed: Arc<AtomicUsize>,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -187,6 +200,21 @@ impl ScalarEngine {
         std::mem::take(&mut locked(&self.counts))
     }
 
+    /// Views reconstructed since the last call.
+    #[must_use]
+    pub fn take_reconstructed(&self) -> usize {
+        self.reconstructed.swap(0, Ordering::Relaxed)
+    }
+
+    /// From now on the device takes so long.
+    pub fn keep_pace(&self, pace: Pace) {
+        *locked(&self.pace) = pace;
+    }
+
+    fn pace(&self) -> Pace {
+        *locked(&self.pace)
+    }
+
     /// From now on the device does nothing any more.
     pub fn lose(&self) {
         self.is_lost.store(true, Ordering::Relaxed);
@@ -246,6 +274,7 @@ impl Engine for ScalarEngine {
             *locked(&self.counts).entry(image).or_default() += 1;
         }
         let image = |camera| depth_image(camera, request.scene_time_s, request.refinement);
+        sleep(self.pace().image * cameras.len() as u32);
         Ok(cameras.into_iter().map(image).collect())
     }
 
@@ -266,6 +295,8 @@ impl Engine for ScalarEngine {
         let any: &dyn Any = set;
         let Uploaded(set) =
             any.downcast_ref().ok_or_else(|| EngineError::Device("a set of another device".to_owned()))?;
+        sleep(self.pace().view * work.cameras.len() as u32);
+        self.reconstructed.fetch_add(work.cameras.len(), Ordering::Relaxed);
         Ok(work.cameras.iter().map(|camera| splat(set, camera, work.planes)).collect())
     }
 

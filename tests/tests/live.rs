@@ -7,10 +7,13 @@ use std::time::{Duration, Instant};
 use client::{Frame, Session, ViewRequest};
 use cluster_tests::cluster::{Cluster, camera, request, views};
 use glam::UVec2;
+use node::{Deadlines, NodeConfig};
 use wire::{PolicyChoice, SessionRequest, Timeline};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 const STILL: Timeline = Timeline { start_s: 0.0, step_s: 0.0, set_count: 1 };
+/// How long nodes wait that have no time.
+const HASTE: Duration = Duration::from_millis(300);
 /// Complete frames come again after so long.
 const HEALED: Duration = Duration::from_secs(5);
 
@@ -84,6 +87,24 @@ async fn frames_that_wait_for_their_caller_outlive_their_plan() {
     tokio::time::sleep(Duration::from_millis(300)).await;
     came.extend(frames.all().await.unwrap());
     check(&came, 120);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_caller_may_pause_for_longer_than_nodes_wait() {
+    let hasty = |config: NodeConfig| NodeConfig {
+        deadlines: Deadlines { stall: HASTE, idle: HASTE, ..config.deadlines },
+        ..config
+    };
+    let cluster = Cluster::start_with(2, hasty).await;
+    let session = cluster.session(pipeline(MOVING)).await.unwrap();
+    let mut frames = session.render_views(views(3, 100)).unwrap();
+    let mut came = Vec::new();
+    for _ in 0..3 {
+        came.push(frames.next().await.unwrap().unwrap());
+        tokio::time::sleep(3 * HASTE).await;
+    }
+    came.extend(frames.all().await.unwrap());
+    check(&came, 300);
 }
 
 #[tokio::test(flavor = "multi_thread")]

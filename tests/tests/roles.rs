@@ -5,13 +5,13 @@ use std::num::NonZeroU32;
 use std::time::{Duration, Instant};
 
 use client::{ClientError, Frame};
-use cluster_tests::cluster::{Cluster, camera, request, rig, views};
+use cluster_tests::cluster::{Cluster, camera, request, rig, views, whole_frame};
 use glam::UVec2;
 use tokio_stream::StreamExt as _;
 use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
 use wire::{
-    Assignment, FetchImages, FrameAssembly, FrameCodec, Policy, PolicyChoice, RenderViews, RequestedView,
-    SessionRequest, Timeline, WholeFrame,
+    Assignment, FetchImages, FrameCodec, Policy, PolicyChoice, RenderViews, RequestedView, SessionRequest, Timeline,
+    WholeFrame,
 };
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
@@ -88,13 +88,7 @@ async fn ask(address: &str, plan: &Assignment, set_index: u32) -> WholeFrame {
     };
     let client = CompositorClient::new(connect(address).await.unwrap());
     let mut parts = client.render_views(tokio_stream::iter([request])).await.unwrap();
-    let mut assembly = FrameAssembly::default();
-    while let Some(part) = parts.next().await {
-        if let Some(frame) = assembly.push(part.unwrap()).unwrap() {
-            return frame;
-        }
-    }
-    panic!("no frame of {address}");
+    whole_frame(&mut parts).await
 }
 
 #[tokio::test(flavor = "multi_thread")]

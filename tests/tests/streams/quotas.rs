@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use client::{Client, ClientError};
-use cluster_tests::cluster::Cluster;
+use cluster_tests::cluster::{Cluster, whole_frame};
 use coordinator::CoordinatorConfig;
 use node::{Deadlines, NodeConfig, Quotas};
 use tokio::sync::mpsc;
@@ -11,8 +11,8 @@ use tokio::time::timeout;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Code;
-use wire::rpc::{CompositorClient, Messages, connect};
-use wire::{FrameAssembly, FramePart, SessionRequest, WholeFrame};
+use wire::SessionRequest;
+use wire::rpc::{CompositorClient, connect};
 
 use crate::raw::{HEALED, Raw, STILL, compositor_of, greedy, narrow, pipeline, seen};
 
@@ -67,15 +67,6 @@ async fn who_asks_for_thousands_does_not_starve_others() {
     }
     assert!(!bulk.is_finished(), "nothing was shared: {waited:?}");
     assert_eq!(bulk.await.unwrap(), 4000);
-}
-
-async fn whole_frame(parts: &mut Messages<FramePart>) -> WholeFrame {
-    let mut assembly = FrameAssembly::default();
-    loop {
-        if let Some(frame) = assembly.push(parts.next().await.unwrap().unwrap()).unwrap() {
-            return frame;
-        }
-    }
 }
 
 /// A client asks for the rest of a batch when it has some of it: by then others may have taken the room.
