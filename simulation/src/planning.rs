@@ -29,6 +29,8 @@ pub struct Demand {
     pub sets: u32,
     /// Who decides.
     pub policy: PolicyChoice,
+    /// Into how many tiles images are cut, where the schedule is not to decide.
+    pub tiles: Option<usize>,
     /// Whether nodes report their own costs and bytes; otherwise all count as the slowest, and links as free, which is
     /// all that a coordinator knows when a session is opened.
     pub nodes_report: bool,
@@ -160,7 +162,7 @@ fn open(cluster: &Cluster, demand: &Demand) -> Event {
         policy: demand.policy,
         frames_per_s: 0.0,
         forced_samplers: None,
-        forced_tiles: None,
+        forced_tiles: demand.tiles,
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
         costs: slowest,

@@ -3,10 +3,11 @@
 use study::{Bar, Check};
 use wire::PolicyChoice;
 
-use super::matrix::{Extent, PAPER_NODES, PAPER_VIEWS};
+use super::matrix::{Extent, PAPER_NODES, PAPER_VIEWS, TILED_VIEWS};
 use super::measured::Measured;
 use super::paper::table_1;
 use super::tables::{Told, naive};
+use super::whole_images;
 
 /// Of the simulation from what was measured.
 const SIMULATED_WITHIN: f64 = 0.1;
@@ -24,6 +25,7 @@ pub fn checks(measured: &Measured, told: &[Told<'_>], extent: Extent) -> Vec<Che
     let mut checks: Vec<Check> =
         [PolicyChoice::Pipeline, PolicyChoice::Auto].into_iter().map(|policy| efficient(main, policy)).collect();
     checks.push(naive_beside(main));
+    checks.extend(tiles_pay(told.get(1), extent.nodes));
     checks.extend(simulated(told));
     checks.push(quiet(told));
     checks.push(equal_shares(main));
@@ -48,6 +50,18 @@ fn naive_beside(told: &Told<'_>) -> Check {
     let value = shared.zip(naive).map(|(shared, naive)| shared / naive);
     let name = "pipeline over naive at P = 11, V = 1000, efficiency (the paper's: 7.5)";
     Check::maybe(name, value, "×", Bar::AtLeast(1.0), NOT_MEASURED)
+}
+
+/// Where light is dear, images are cut: what whole ones allow at the best is passed.
+fn tiles_pay(dear: Option<&Told<'_>>, nodes: usize) -> [Check; 2] {
+    let of = |ratio: fn(&Told<'_>, usize, usize) -> Option<f64>| dear.and_then(|dear| ratio(dear, nodes, TILED_VIEWS));
+    let where_ = format!("P = {nodes}, V = {TILED_VIEWS}, dear light, pipeline");
+    let not = "no dear light was asked for";
+    let over_bound = of(whole_images::over_bound);
+    [
+        Check::maybe(format!("{where_}: over the bound of whole images"), over_bound, "×", Bar::AtLeast(1.0), not),
+        Check::maybe(format!("{where_}: over whole images"), of(whole_images::over_whole), "×", Bar::AtLeast(1.0), not),
+    ]
 }
 
 fn simulated(told: &[Told<'_>]) -> [Check; 2] {

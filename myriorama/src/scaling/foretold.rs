@@ -5,7 +5,7 @@ use simulation::{Cluster, Demand, Habits, Machine, plan, run};
 use wire::{Costs, Policy};
 
 use super::measured::{Lit, Timed};
-use super::point::Point;
+use super::point::{Ask, Point};
 
 /// Sets of the simulation beyond those that count: the first, and what is sampled ahead at the end.
 const MORE_SETS: u32 = 5;
@@ -84,7 +84,9 @@ fn equation_s(costs: &Costs, images: usize, point: &Point) -> f64 {
 /// T and whether the plan is the same: planned with the costs that the coordinator had, carried out at the mean ones.
 fn simulate(machine: Machine, traffic: &Traffic, images: usize, point: &Point) -> Option<(f64, bool)> {
     let sets = point.ask.counted_sets + MORE_SETS;
-    let demand = Demand { views: point.ask.views, sets, policy: point.ask.policy, nodes_report: false };
+    let Ask { views, policy, .. } = point.ask;
+    let tiles = point.ask.forced_tiles().map(|tiles| tiles as usize);
+    let demand = Demand { views, sets, policy, tiles, nodes_report: false };
     let planned = plan(&traffic.cluster(point.nodes, Machine::of(point.plan.costs), images), &demand).ok()?;
     let roles = |plan: &wire::Assignment| {
         let images = plan.samplers.iter().map(|share| share.image_indices.len()).collect::<Vec<_>>();

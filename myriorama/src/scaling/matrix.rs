@@ -14,10 +14,23 @@ pub const PAPER_VIEWS: usize = 1000;
 pub const FEW_NODES: usize = 5;
 /// V of the paper's headline.
 pub const HEADLINE_VIEWS: usize = 290;
+/// V at which sampling under dear light takes about as long as all views: whole images then bound T most.
+pub const TILED_VIEWS: usize = 100;
 /// What opening a session takes beside the work.
 const SESSION_S: f64 = 1.0;
 
 use PolicyChoice::{Auto, Direct, Pipeline, TimeShare};
+
+/// One point that is to be measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Who decides.
+    pub policy: PolicyChoice,
+    /// V.
+    pub views: usize,
+    /// Whether sample images stay whole.
+    pub whole_images: bool,
+}
 
 /// How much is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,12 +57,18 @@ impl Extent {
         [self.nodes].into_iter().chain(smaller).collect()
     }
 
-    /// Policy and V at so many nodes, plainly lit.
+    /// What is measured at so many nodes, plainly lit or under light that is dear.
     #[must_use]
-    pub fn points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
-        let mut points = if self.quick { self.quick_points(nodes) } else { full_points(nodes) };
-        points.retain(|(_, views)| *views <= self.views);
-        points
+    pub fn points(self, nodes: usize, is_dear: bool) -> Vec<Wanted> {
+        let shared = match (is_dear, self.quick) {
+            (true, _) => self.dear_points(nodes),
+            (false, true) => self.quick_points(nodes),
+            (false, false) => full_points(nodes),
+        };
+        let cut = shared.into_iter().map(|(policy, views)| Wanted { policy, views, whole_images: false });
+        let whole = Wanted { policy: Pipeline, views: TILED_VIEWS, whole_images: true };
+        let whole = (is_dear && nodes == self.nodes).then_some(whole);
+        cut.chain(whole).filter(|wanted| wanted.views <= self.views).collect()
     }
 
     fn quick_points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
@@ -66,13 +85,11 @@ impl Extent {
         }
     }
 
-    /// The same under light that is dear: `direct` on few views.
-    #[must_use]
-    pub fn dear_points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
-        let shared = [100, PAPER_VIEWS].into_iter().flat_map(|views| [(Pipeline, views), (Auto, views)]);
-        let all = shared.chain([(Direct, nodes)]).filter(|(_, views)| *views <= self.views).collect();
+    /// `direct` on few views.
+    fn dear_points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
+        let shared = [TILED_VIEWS, PAPER_VIEWS].into_iter().flat_map(|views| [(Pipeline, views), (Auto, views)]);
         let wanted = nodes == self.nodes || (!self.quick && [FEW_NODES, 8].contains(&nodes));
-        if wanted { all } else { Vec::new() }
+        if wanted { shared.chain([(Direct, nodes)]).collect() } else { Vec::new() }
     }
 }
 
@@ -111,12 +128,12 @@ pub fn planned(
     images: usize,
     nodes: usize,
     lighting: Lighting,
-    (policy, views): (PolicyChoice, usize),
+    Wanted { policy, views, whole_images }: Wanted,
 ) -> Planned {
     let period_s = predicted_s(costs, images, nodes, policy, views);
     let most = if extent.quick { 5.0 } else { 8.0 };
     let counted_sets = (extent.counted_s() / period_s).ceil().clamp(1.0, most) as u32;
-    let ask = Ask { lighting, policy, views, counted_sets };
+    let ask = Ask { lighting, policy, views, whole_images, counted_sets };
     let sampled_s = if policy == Direct { 0.0 } else { costs.sample_image_s * images as f64 };
     // Set 0, those that count, and what is left of the next.
     Planned { ask, nodes, about_s: (f64::from(counted_sets) + 1.5) * period_s + sampled_s + SESSION_S }
@@ -138,7 +155,7 @@ mod tests {
 
     fn all(extent: Extent) -> Vec<Planned> {
         let lighting = Lighting::default();
-        let of = |nodes: usize| extent.points(nodes).into_iter().map(move |point| (nodes, point));
+        let of = |nodes: usize| extent.points(nodes, false).into_iter().map(move |point| (nodes, point));
         let points = extent.node_counts().into_iter().flat_map(of);
         points.map(|(nodes, point)| planned(extent, &COSTS, 4, nodes, lighting, point)).collect()
     }
@@ -152,6 +169,15 @@ mod tests {
         assert!(has(Pipeline, 11, 1000) && has(Auto, 11, 1000) && has(Direct, 11, 100) && has(Pipeline, 5, 290));
         let about_s: f64 = quick.iter().map(|planned| planned.about_s).sum();
         assert!((100.0..400.0).contains(&about_s), "{about_s}");
+    }
+
+    #[test]
+    fn whole_images_are_measured_beside_tiles_where_light_is_dear() {
+        let extent = Extent { quick: true, nodes: 11, views: 100 };
+        let of = |whole_images| Wanted { policy: Pipeline, views: TILED_VIEWS, whole_images };
+        let dear = extent.points(11, true);
+        assert!(dear.contains(&of(false)) && dear.contains(&of(true)) && dear.iter().all(|wanted| wanted.views <= 100));
+        assert!(extent.points(5, true).is_empty() && !extent.points(11, false).contains(&of(true)));
     }
 
     #[test]

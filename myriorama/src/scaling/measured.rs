@@ -159,10 +159,11 @@ async fn warm(fleet: &Fleet, subject: &Subject, lighting: Lighting) -> anyhow::R
     unlimited
 }
 
-/// All lightings' costs, at as many nodes as there are.
-async fn time(fleet: &Fleet, subject: &Subject, lit: &mut [Lit]) -> anyhow::Result<()> {
+/// Costs of all lightings that are measured at as many nodes as there are.
+async fn time(fleet: &Fleet, subject: &Subject, extent: Extent, lit: &mut [Lit]) -> anyhow::Result<()> {
     let (nodes, start) = (fleet.nodes(), Instant::now());
-    for lit in lit {
+    let with_points = lit.iter_mut().enumerate().filter(|(which, _)| !extent.points(nodes, is_dear(*which)).is_empty());
+    for (_, lit) in with_points {
         if lit.timed.last().is_none_or(|timed| timed.nodes != nodes) {
             let alone = costs::measure(fleet, subject, lit.lighting, 1).await?;
             lit.timed.push(Timed { nodes, alone, ..Timed::default() });
@@ -175,7 +176,7 @@ async fn time(fleet: &Fleet, subject: &Subject, lit: &mut [Lit]) -> anyhow::Resu
 }
 
 async fn points(fleet: &mut Fleet, subject: &Subject, extent: Extent, lit: &mut [Lit]) -> anyhow::Result<()> {
-    time(fleet, subject, lit).await?;
+    time(fleet, subject, extent, lit).await?;
     let all = all_points(subject, extent, lit);
     let about_s: f64 = all.iter().map(|(_, point)| point.about_s).sum();
     println!("{} points, about {:.0} minutes", all.len(), (about_s / 60.0).ceil());
@@ -183,9 +184,9 @@ async fn points(fleet: &mut Fleet, subject: &Subject, extent: Extent, lit: &mut 
     let mut done_s = 0.0;
     for (which, Planned { ask, nodes, about_s }) in all {
         if nodes < fleet.nodes() {
-            time(fleet, subject, lit).await?;
+            time(fleet, subject, extent, lit).await?;
             fleet.shrink_to(nodes).await?;
-            time(fleet, subject, lit).await?;
+            time(fleet, subject, extent, lit).await?;
         }
         progress.set_message(format!("P = {nodes}, V = {}, {}", ask.views, ask.policy));
         let point = point(fleet, subject, ask, done_s, about_s, &progress).await?;
@@ -196,7 +197,7 @@ async fn points(fleet: &mut Fleet, subject: &Subject, extent: Extent, lit: &mut 
         fleet.rest().await?;
     }
     progress.finish_and_clear();
-    time(fleet, subject, lit).await
+    time(fleet, subject, extent, lit).await
 }
 
 fn in_words(point: &Point) -> String {
@@ -209,11 +210,16 @@ fn in_words(point: &Point) -> String {
     )
 }
 
+/// The first lighting is the paper's.
+fn is_dear(which: usize) -> bool {
+    which > 0
+}
+
 /// Nodes are only ever ended: all lightings at one P before the next.
 fn all_points(subject: &Subject, extent: Extent, lit: &[Lit]) -> Vec<(usize, Planned)> {
     let of = |nodes: usize| {
         lit.iter().enumerate().flat_map(move |(which, lit)| {
-            let points = if which == 0 { extent.points(nodes) } else { extent.dear_points(nodes) };
+            let points = extent.points(nodes, is_dear(which));
             let (costs, images) = (lit.timed.first().map_or_else(Costs::default, Timed::mean), subject.images());
             points.into_iter().map(move |point| (which, planned(extent, &costs, images, nodes, lit.lighting, point)))
         })

@@ -21,6 +21,7 @@ mod subject;
 mod sweep;
 mod sweep_report;
 mod tables;
+mod whole_images;
 
 pub use costs::efficiency;
 pub use cpu_share::{CpuGroup, CpuShareError, Hierarchy, Usage};

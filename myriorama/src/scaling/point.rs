@@ -17,7 +17,7 @@ use super::fetched::{Fetched, fetch};
 use super::fleet::Fleet;
 use super::machine::MachineTime;
 use super::subject::Subject;
-use crate::delivery::open;
+use crate::delivery::{Wishes, open};
 
 /// What is asked of the cluster.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +28,8 @@ pub struct Ask {
     pub policy: PolicyChoice,
     /// V.
     pub views: usize,
+    /// Whether sample images stay whole; else the schedule may cut them into tiles.
+    pub whole_images: bool,
     /// Sets between which time is taken.
     pub counted_sets: u32,
 }
@@ -39,6 +41,12 @@ impl Ask {
     /// Sets that can be asked for: the first fills.
     fn sets(&self) -> u32 {
         1 + self.counted_sets + if self.policy == PolicyChoice::Direct { 0 } else { SETS_BEHIND }
+    }
+
+    /// What the session wishes.
+    #[must_use]
+    pub fn forced_tiles(&self) -> Option<u32> {
+        self.whole_images.then_some(1)
     }
 
     /// Views that are waited for.
@@ -203,7 +211,8 @@ impl Arrivals {
 /// The cluster's.
 pub async fn measure(fleet: &Fleet, subject: &Subject, ask: Ask, arrived: impl FnMut()) -> anyhow::Result<Point> {
     let views = subject.views(ask.views)?;
-    let session = open(&fleet.client, &subject.wishes(ask.lighting, ask.policy, ask.sets()), &views).await?;
+    let wishes = Wishes { tiles: ask.forced_tiles(), ..subject.wishes(ask.lighting, ask.policy, ask.sets()) };
+    let session = open(&fleet.client, &wishes, &views).await?;
     let plan = session.plan();
     let before = fleet.counters().await?;
     let (arrivals, window) = receive(fleet, &session, &views, &ask, arrived).await?;

@@ -11,7 +11,7 @@ use super::matrix::{Extent, FEW_NODES, PAPER_NODES, PAPER_VIEWS};
 use super::measured::Measured;
 use super::sweep::{Basis, scenarios, sweep};
 use super::tables::{Told, costs_table, headline_table, naive, paper_table, points_table, shares_table, steps_table};
-use super::{charts, costs, sweep_report};
+use super::{charts, costs, sweep_report, whole_images};
 use crate::text_table;
 
 /// The report of a run.
@@ -25,6 +25,9 @@ pub fn report(measured: &Measured, extent: Extent, scene: &str, most_simulated: 
     report.tables.extend([paper_table(main)?, headline_table(measured, main)?, costs_table(measured, &told)?]);
     for told in &told {
         report.tables.push(points_table(told)?);
+    }
+    for told in told.iter().skip(1) {
+        report.tables.push(whole_images::table(told)?);
     }
     let few = main.node_counts().into_iter().filter(|&nodes| nodes <= FEW_NODES).max().unwrap_or(0);
     report.tables.extend([shares_table(main)?, steps_table(main, few)?]);

@@ -58,8 +58,7 @@ impl Subject {
         Timeline { start_s: f64::from(first) * SET_STEP_S, step_s: SET_STEP_S, set_count }
     }
 
-    /// What a session asks for. What else a session can wish (how an image is cut for samplers, say) is passed on here
-    /// and in [`Subject::measurement`].
+    /// What a session asks for.
     #[must_use]
     pub fn wishes(&self, lighting: Lighting, policy: PolicyChoice, set_count: u32) -> Wishes {
         let (method, sampling) = (self.args.method.to_string(), self.args.sampling.to_string());

@@ -152,7 +152,7 @@ fn cluster(basis: &Basis, scenario: &Scenario, nodes: usize) -> (Cluster, f64) {
 
 fn simulated(basis: &Basis, scenario: &Scenario, number: usize, nodes: usize, views: usize) -> Option<Simulated> {
     let (cluster, speed) = cluster(basis, scenario, nodes);
-    let demand = Demand { views, sets: SETS, policy: PolicyChoice::Auto, nodes_report: true };
+    let demand = Demand { views, sets: SETS, policy: PolicyChoice::Auto, tiles: None, nodes_report: true };
     let planned = plan(&cluster, &demand).ok()?;
     let run = run(&cluster, &planned, views, SETS, scenario.habits);
     let period_s = run.steady_period_s();

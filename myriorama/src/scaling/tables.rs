@@ -27,11 +27,11 @@ impl Told<'_> {
         efficiency(&self.lit.mean(point.nodes), self.images, point.ask.views, point.nodes, point.period_s)
     }
 
-    /// What was asked for and measured.
+    /// What was asked for and measured, images being cut as the schedule likes.
     #[must_use]
     pub fn find(&self, policy: PolicyChoice, nodes: usize, views: usize) -> Option<&Point> {
         let asked = |point: &&Point| (point.ask.policy, point.nodes, point.ask.views) == (policy, nodes, views);
-        self.lit.points.iter().find(asked)
+        self.lit.points.iter().filter(|point| !point.ask.whole_images).find(asked)
     }
 
     /// P of all points, rising.
