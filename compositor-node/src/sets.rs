@@ -20,9 +20,11 @@ const KEPT_SETS: usize = 2;
 /// While one travels and is loaded, samplers should have another to work on.
 const SETS_AHEAD: u32 = 2;
 
-/// Sets that are asked for before views need them; where sets are sampled in turn, one of each sampler.
+/// Sets that are asked for before views need them; where sets are sampled in turn, one of each sampler. A timeline may have
+/// fewer.
 fn sets_ahead(plan: &Assignment) -> u32 {
-    plan.sets_at_once().max(SETS_AHEAD)
+    let others = plan.workload.timeline.set_count.saturating_sub(1);
+    plan.sets_at_once().max(SETS_AHEAD).min(others)
 }
 
 /// Of every view cell as many: views of all of them come in turn.
