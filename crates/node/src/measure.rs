@@ -73,16 +73,17 @@ fn sampled(engine: &dyn Engine, work: &SampleWork) -> Result<Vec<EncodedDepthIma
     images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec)).collect()
 }
 
-/// What a tile of an image costs beyond its rows: of g = o + rows and g_tile = o + rows / T the o.
+/// What a tile of an image costs beyond its rows: of g = o + rows, and T tiles that cost T · o + rows, the o. Every tile is of
+/// another height, for rows differ, and of another image, for so do those.
 fn overhead_s(engine: &dyn Engine, whole: &SampleWork, sample_image_s: f64) -> Result<f64, MeasureError> {
-    let tile = |camera: &Camera| (0..MEASURED_TILES).map(|tile| camera.tile(tile, MEASURED_TILES)).nth(1);
-    let Some(camera) = whole.cameras.first().and_then(tile).filter(|Camera::Pinhole(tile)| tile.size_px.y > 0) else {
+    let cameras = (0..MEASURED_TILES).zip(whole.cameras.iter().cycle());
+    let cameras: Vec<Camera> = cameras.map(|(tile, camera)| camera.tile(tile, MEASURED_TILES)).collect();
+    if cameras.is_empty() || cameras.iter().any(|Camera::Pinhole(tile)| tile.size_px.y == 0) {
         return Ok(sample_image_s);
-    };
-    let work = SampleWork { cameras: vec![camera], wanted: vec![0], ..whole.clone() };
-    let (_, tile_s) = timed(|| sampled(engine, &work))?;
-    let tiles = f64::from(MEASURED_TILES);
-    Ok(((tiles * tile_s - sample_image_s) / (tiles - 1.0)).clamp(0.0, sample_image_s))
+    }
+    let work = SampleWork { cameras, wanted: (0..MEASURED_TILES).collect(), ..whole.clone() };
+    let (_, tiles_s) = timed(|| sampled(engine, &work))?;
+    Ok(((tiles_s - sample_image_s) / f64::from(MEASURED_TILES - 1)).clamp(0.0, sample_image_s))
 }
 
 fn codec(error: impl ToString) -> MeasureError {

@@ -17,6 +17,8 @@ pub(crate) struct Sleeper {
     sample_s: f64,
     direct_view_s: f64,
     build_s: f64,
+    /// Of an image, and of each of its rows; then images may be cut.
+    parts_s: Option<(f64, [f64; 4])>,
     pub(crate) asked: Mutex<Asked>,
 }
 
@@ -35,13 +37,15 @@ fn camera() -> PinholeCamera {
 }
 
 fn image(camera: &Camera) -> DepthImage {
+    let Camera::Pinhole(PinholeCamera { size_px, .. }) = camera;
+    let texels = size_px.element_product() as usize;
     DepthImage {
         camera: *camera,
-        inverse_depth_per_m: vec![0.5; 16],
-        color_rgb9e5: vec![0; 16],
-        normal_oct16: Some(vec![0; 16]),
+        inverse_depth_per_m: vec![0.5; texels],
+        color_rgb9e5: vec![0; texels],
+        normal_oct16: Some(vec![0; texels]),
         surface_id: None,
-        specular: Some(SpecularPlanes { reflectance_srgb8_roughness8: vec![9; 16], ..SpecularPlanes::default() }),
+        specular: Some(SpecularPlanes { reflectance_srgb8_roughness8: vec![9; texels], ..SpecularPlanes::default() }),
         passed: None,
         corner_inverse_depth_per_m: None,
     }
@@ -55,6 +59,14 @@ fn views(cameras: &[PinholeCamera]) -> Vec<View> {
         provenance: None,
     };
     cameras.iter().map(view).collect()
+}
+
+impl Sleeper {
+    fn sample_parts_s(&self, Camera::Pinhole(part): &Camera) -> f64 {
+        let Some((image_s, rows_s)) = self.parts_s else { return 0.0 };
+        let first = (camera().principal_px.y - part.principal_px.y) as usize;
+        image_s + rows_s[first..first + part.size_px.y as usize].iter().sum::<f64>()
+    }
 }
 
 impl Engine for Sleeper {
@@ -75,7 +87,7 @@ impl Engine for Sleeper {
     }
 
     fn samples_alone(&self, _: &str) -> Result<bool, EngineError> {
-        Ok(false)
+        Ok(self.parts_s.is_some())
     }
 
     fn samples_in_order(&self, _: &str) -> Result<bool, EngineError> {
@@ -84,7 +96,8 @@ impl Engine for Sleeper {
 
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
         self.asked.lock().unwrap().refinements.push(request.refinement);
-        std::thread::sleep(Duration::from_secs_f64(self.sample_s));
+        let parts_s: f64 = request.cameras.iter().map(|camera| self.sample_parts_s(camera)).sum();
+        std::thread::sleep(Duration::from_secs_f64(self.sample_s + parts_s));
         Ok(request.cameras.iter().map(image).collect())
     }
 
@@ -157,4 +170,13 @@ fn as_many_views_are_drawn_as_there_is_time_for() {
     let views = [1e-9, 0.01, 0.09, 0.3, 0.6, 40.0].map(|alone_s| direct_views(alone_s, 32));
     assert_eq!(views, [32, 32, 11, 3, 1, 1]);
     assert_eq!((direct_views(0.0, 32), direct_views(f64::NAN, 32), direct_views(0.1, 1)), (32, 1, 1));
+}
+
+#[test]
+fn what_a_tile_costs_beyond_its_rows_follows_from_tiles_of_all_heights() {
+    // One tile, of whatever height, would say 0 or 0.053 s.
+    let engine = Sleeper { parts_s: Some((0.02, [0.0, 0.0, 0.04, 0.04])), ..Sleeper::default() };
+    let (costs, _) = measured(engine, 1);
+    assert!((0.1..0.12).contains(&costs.sample_image_s), "{costs:?}");
+    assert!((0.01..0.03).contains(&costs.sample_overhead_s), "{costs:?}");
 }

@@ -16,6 +16,8 @@ pub const FEW_NODES: usize = 5;
 pub const HEADLINE_VIEWS: usize = 290;
 /// V at which sampling under dear light takes about as long as all views: whole images then bound T most.
 pub const TILED_VIEWS: usize = 100;
+/// Of one alone more may have been made ahead than is made ahead of the next.
+const LEAST_SETS: f64 = 2.0;
 /// What opening a session takes beside the work.
 const SESSION_S: f64 = 1.0;
 
@@ -46,7 +48,7 @@ pub struct Extent {
 impl Extent {
     /// Time that sets are counted for, where one takes less.
     fn counted_s(self) -> f64 {
-        if self.quick { 6.0 } else { 20.0 }
+        if self.quick { 12.0 } else { 20.0 }
     }
 
     /// P, from the greatest down: nodes are only ever ended.
@@ -132,7 +134,7 @@ pub fn planned(
 ) -> Planned {
     let period_s = predicted_s(costs, images, nodes, policy, views);
     let most = if extent.quick { 5.0 } else { 8.0 };
-    let counted_sets = (extent.counted_s() / period_s).ceil().clamp(1.0, most) as u32;
+    let counted_sets = (extent.counted_s() / period_s).ceil().clamp(LEAST_SETS, most) as u32;
     let ask = Ask { lighting, policy, views, whole_images, counted_sets };
     let sampled_s = if policy == Direct { 0.0 } else { costs.sample_image_s * images as f64 };
     // Set 0, those that count, and what is left of the next.
