@@ -34,6 +34,7 @@ impl Machine {
             encode_view_s: self.costs.encode_view_s / speed,
             in_order: self.costs.in_order,
             sample_overhead_s: self.costs.sample_overhead_s / speed,
+            sample_row_shares: self.costs.sample_row_shares,
         };
         let calls = Calls { reconstruct_s: self.calls.reconstruct_s / speed, direct_s: self.calls.direct_s / speed };
         Self { costs, calls, ..*self }

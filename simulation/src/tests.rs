@@ -13,6 +13,7 @@ const COSTS: Costs = Costs {
     encode_view_s: 0.001,
     in_order: false,
     sample_overhead_s: 1e3,
+    sample_row_shares: [0.25; 4],
 };
 
 const FREE: Machine =

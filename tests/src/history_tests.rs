@@ -54,6 +54,7 @@ fn log(plan_epoch: u64) -> Vec<u8> {
         encode_view_s: 0.001,
         in_order: false,
         sample_overhead_s: 0.1,
+        sample_row_shares: [0.1, 0.2, 0.3, 0.4],
     };
     let opening = Opening {
         session: 9,

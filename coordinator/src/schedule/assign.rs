@@ -54,7 +54,10 @@ fn compositor_shares(choice: &Choice, making: &[Candidate<'_>]) -> Vec<Composito
 fn sampler_shares(load: &Load, sampling: &[Candidate<'_>]) -> Vec<SamplerShare> {
     let costs: Vec<NodeCosts> = sampling.iter().map(|(_, costs)| *costs).collect();
     let counts = load.image_counts(&costs);
-    let images = if load.in_order { share_sets(load.images, &counts) } else { share_images(&counts) };
+    let mean = NodeCosts::mean(&costs).costs;
+    let part_s = |part: usize| mean.sample_this_tile_s(part % load.tiles, load.tiles);
+    let parts_s: Vec<f64> = (0..load.parts()).map(part_s).collect();
+    let images = if load.in_order { share_sets(load.images, &counts) } else { share_images(&counts, &parts_s) };
     let share = |((node, _), image_indices): (&Candidate<'_>, Vec<u32>)| SamplerShare {
         node_name: node.node_name.clone(),
         address: node.address.clone(),
@@ -63,16 +66,21 @@ fn sampler_shares(load: &Load, sampling: &[Candidate<'_>]) -> Vec<SamplerShare> 
     sampling.iter().zip(images).map(share).filter(|share| !share.image_indices.is_empty()).collect()
 }
 
-/// So many images to each node, dealt in turn.
+/// So many images, or tiles, to each node, the dearest first to whom has least for its number.
 #[must_use]
-pub fn share_images(counts: &[usize]) -> Vec<Vec<u32>> {
-    let mut shares = vec![Vec::new(); counts.len()];
-    let rounds = 0..counts.iter().copied().max().unwrap_or(0);
-    let turns = rounds.flat_map(|round| (0..counts.len()).filter(move |&node| counts[node] > round));
-    for (image, node) in turns.enumerate() {
-        shares[node].push(image as u32);
+pub fn share_images(counts: &[usize], images_s: &[f64]) -> Vec<Vec<u32>> {
+    let mut shares = vec![(0.0, Vec::new()); counts.len()];
+    let mut dearest_first: Vec<usize> = (0..counts.iter().sum()).collect();
+    dearest_first.sort_by(|&a, &b| images_s[b].total_cmp(&images_s[a]));
+    for image in dearest_first {
+        let with_room = shares.iter_mut().zip(counts).filter(|((_, share), count)| share.len() < **count);
+        let least = with_room.min_by(|((a, _), m), ((b, _), n)| (a / **m as f64).total_cmp(&(b / **n as f64)));
+        let Some(((share_s, share), _)) = least else { break };
+        *share_s += images_s[image];
+        share.push(image as u32);
     }
-    shares
+    shares.iter_mut().for_each(|(_, share)| share.sort_unstable());
+    shares.into_iter().map(|(_, share)| share).collect()
 }
 
 /// All images to each node that has any; they then sample sets in turn.
@@ -89,11 +97,24 @@ mod tests {
         for nodes in 1..12 {
             for count in 0..40 {
                 let counts: Vec<usize> = (0..nodes).map(|i| (count + i) / nodes).collect();
-                let mut images: Vec<u32> = share_images(&counts).concat();
+                let shares = share_images(&counts, &vec![1.0; count]);
+                let mut images: Vec<u32> = shares.concat();
                 images.sort_unstable();
                 assert_eq!(images, (0..count as u32).collect::<Vec<_>>());
-                assert!(share_images(&counts).iter().zip(&counts).all(|(share, &count)| share.len() == count));
+                assert!(shares.iter().zip(&counts).all(|(share, &count)| share.len() == count));
             }
         }
+        assert_eq!(share_images(&[2, 1, 1], &[1.0; 4]), [vec![0, 3], vec![1], vec![2]], "in turn, where all are equal");
+    }
+
+    #[test]
+    fn dear_tiles_are_spread() {
+        // Four images in four tiles, the upper half of which shows the sky.
+        let tiles_s: Vec<f64> = [0.1, 0.3, 1.0, 1.2].repeat(4);
+        let shares = share_images(&[4; 4], &tiles_s);
+        let seconds = shares.iter().map(|share| share.iter().map(|&tile| tiles_s[tile as usize]).sum::<f64>());
+        assert!(seconds.clone().all(|seconds| (seconds - 2.6).abs() < 0.2), "{:?}", seconds.collect::<Vec<_>>());
+        let uneven = share_images(&[6, 6, 2, 2], &tiles_s);
+        assert!(uneven.iter().map(Vec::len).eq([6, 6, 2, 2]));
     }
 }

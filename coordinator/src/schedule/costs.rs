@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use wire::{Costs, MeasuredCosts};
+use wire::{Costs, MeasuredCosts, ROW_PARTS};
 
 /// Reports without a timing after which it no longer counts: what the node does meanwhile says how slow it is.
 const RECENT: u32 = 30;
@@ -42,6 +42,7 @@ impl NodeCosts {
                 encode_view_s: mean(|n| n.costs.encode_view_s),
                 in_order: nodes.iter().any(|n| n.costs.in_order),
                 sample_overhead_s: mean(|n| n.costs.sample_overhead_s),
+                sample_row_shares: nodes.first().map_or_else(Default::default, |n| n.costs.sample_row_shares),
             },
             transfer_image_s: mean(|n| n.transfer_image_s),
         }
@@ -144,7 +145,15 @@ pub(super) struct Estimate {
     transfer_bytes_per_s: Smoothed,
     image_bytes: Smoothed,
     sample_overhead_s: f64,
+    sample_row_shares: [f64; ROW_PARTS],
     in_order: bool,
+}
+
+/// What of each set a node has sampled: tiles by number, of images cut into so many.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sampled<'a> {
+    pub(super) parts: &'a [u32],
+    pub(super) tiles: u32,
 }
 
 impl Estimate {
@@ -157,15 +166,18 @@ impl Estimate {
             load_set: Operation::starting_at(costs.load_set_s),
             encode_view: Operation::starting_at(costs.encode_view_s),
             sample_overhead_s: costs.sample_overhead_s,
+            sample_row_shares: costs.sample_row_shares,
             in_order: costs.in_order,
             ..Self::default()
         }
     }
 
-    pub(super) fn add(&mut self, measured: &MeasuredCosts) {
+    /// Timings of one report, and what of each set was sampled, if it is known.
+    pub(super) fn add(&mut self, measured: &MeasuredCosts, sampled: Option<Sampled<'_>>) {
         let slowness = self.slowness.value.unwrap_or(1.0);
+        let image_s = measured.sample_image_s.map(|tiles_s| self.whole_image_s(tiles_s, sampled));
         let ratios = [
-            self.sample_image.add(measured.sample_image_s, slowness),
+            self.sample_image.add(image_s, slowness),
             self.direct_view.add(measured.direct_view_s, slowness),
             self.reconstruct_view.add(measured.reconstruct_view_s, slowness),
             self.load_set.add(measured.load_set_s, slowness),
@@ -175,6 +187,27 @@ impl Estimate {
         // Nothing moves at 0 bytes/s: that is no rate.
         self.transfer_bytes_per_s.add(measured.transfer_bytes_per_s.filter(|rate| *rate > 0.0));
         self.image_bytes.add(measured.image_bytes);
+    }
+
+    /// What a mean image takes a node whose tiles take so long, each times their number in an image: tiles cost something
+    /// each, and one that shows the sky less than another, so that nodes that are equal would seem not to be.
+    fn whole_image_s(&self, tiles_s: f64, sampled: Option<Sampled<'_>>) -> f64 {
+        let Some(Sampled { parts, tiles }) = sampled.filter(|sampled| sampled.tiles > 1) else { return tiles_s };
+        let alone = self.alone();
+        let tile_s = |&part: &u32| alone.sample_this_tile_s((part % tiles) as usize, tiles as usize);
+        let expected_s = parts.iter().map(tile_s).sum::<f64>() / parts.len() as f64 * f64::from(tiles);
+        let ratio = tiles_s / expected_s;
+        if ratio.is_finite() { alone.sample_image_s * ratio } else { tiles_s }
+    }
+
+    /// What is known of sampling from when the session was opened.
+    fn alone(&self) -> Costs {
+        Costs {
+            sample_image_s: self.sample_image.alone_s,
+            sample_overhead_s: self.sample_overhead_s,
+            sample_row_shares: self.sample_row_shares,
+            ..Costs::default()
+        }
     }
 
     /// Other work is done from here on: the next timings count at once.
@@ -200,6 +233,7 @@ impl Estimate {
             encode_view_s: self.encode_view.now_s(slowness),
             in_order: self.in_order,
             sample_overhead_s: self.overhead_s(slowness),
+            sample_row_shares: self.sample_row_shares,
         };
         let image_bytes = self.image_bytes.or_zero();
         let transfer_image_s = self.transfer_bytes_per_s.value.map_or(0.0, |rate| image_bytes / rate);
@@ -223,7 +257,7 @@ mod tests {
     use super::*;
 
     fn sampled(estimate: &mut Estimate, sample_image_s: f64) -> f64 {
-        estimate.add(&MeasuredCosts { sample_image_s: Some(sample_image_s), ..MeasuredCosts::default() });
+        estimate.add(&MeasuredCosts { sample_image_s: Some(sample_image_s), ..MeasuredCosts::default() }, None);
         estimate.now().costs.sample_image_s
     }
 
@@ -246,13 +280,11 @@ mod tests {
         for timing in [f64::NAN, f64::INFINITY, -1.0] {
             assert_eq!(sampled(&mut estimate, timing), 1.0);
         }
-        estimate.add(&MeasuredCosts {
-            transfer_bytes_per_s: Some(0.0),
-            image_bytes: Some(1e6),
-            ..MeasuredCosts::default()
-        });
+        let stalled =
+            MeasuredCosts { transfer_bytes_per_s: Some(0.0), image_bytes: Some(1e6), ..MeasuredCosts::default() };
+        estimate.add(&stalled, None);
         assert_eq!(estimate.now().transfer_image_s, 0.0);
-        estimate.add(&MeasuredCosts { transfer_bytes_per_s: Some(1e8), ..MeasuredCosts::default() });
+        estimate.add(&MeasuredCosts { transfer_bytes_per_s: Some(1e8), ..MeasuredCosts::default() }, None);
         assert!((estimate.now().transfer_image_s - 0.01).abs() < 1e-12);
     }
 
@@ -262,7 +294,7 @@ mod tests {
         let mut estimate = Estimate::starting_at(&alone);
         let views = MeasuredCosts { reconstruct_view_s: Some(0.3), ..MeasuredCosts::default() };
         for _ in 0..40 {
-            estimate.add(&views);
+            estimate.add(&views, None);
         }
         let costs = estimate.now().costs;
         let times = [costs.sample_image_s / 1.0, costs.direct_view_s / 2.0, costs.reconstruct_view_s / 0.1];
@@ -271,7 +303,7 @@ mod tests {
         assert!((first_s - 3.4).abs() < 0.01, "a fifth of the way: {first_s}");
         assert!((0..30).map(|_| sampled(&mut estimate, 5.0)).last().unwrap() > 4.9, "it is timed by now");
         for _ in 0..=RECENT {
-            estimate.add(&views);
+            estimate.add(&views, None);
         }
         let (now_s, slowness) = (estimate.now().costs.sample_image_s, estimate.slowness.value.unwrap());
         assert!((now_s - slowness).abs() < 1e-9 && slowness < 4.0, "no longer, after a while: {now_s}");
@@ -286,6 +318,27 @@ mod tests {
         estimate.begin_anew();
         assert_eq!(estimate.now().costs.sample_image_s, 1.0);
         assert_eq!(sampled(&mut estimate, 0.2), 0.2);
+    }
+
+    #[test]
+    fn tiles_that_differ_do_not_make_nodes_differ() {
+        let alone = Costs {
+            sample_image_s: 5.0,
+            sample_overhead_s: 0.5,
+            sample_row_shares: [0.05, 0.15, 0.4, 0.4],
+            ..Costs::default()
+        };
+        for (tiles, parts) in [(4, vec![0]), (4, vec![2, 7]), (2, vec![1]), (8, vec![1, 2, 3]), (1, vec![0, 3])] {
+            for slow in [1.0, 3.0] {
+                let each_s = |&part: &u32| alone.sample_this_tile_s((part % tiles) as usize, tiles as usize);
+                let tiles_s = slow * parts.iter().map(each_s).sum::<f64>() / parts.len() as f64 * f64::from(tiles);
+                let measured = MeasuredCosts { sample_image_s: Some(tiles_s), ..MeasuredCosts::default() };
+                let mut estimate = Estimate::starting_at(&alone);
+                (0..30).for_each(|_| estimate.add(&measured, Some(Sampled { parts: &parts, tiles })));
+                let image_s = estimate.now().costs.sample_image_s;
+                assert!((image_s / (5.0 * slow) - 1.0).abs() < 0.01, "{tiles} {parts:?}: {image_s} of {}", 5.0 * slow);
+            }
+        }
     }
 
     #[test]

@@ -26,3 +26,27 @@ pub(super) mod option {
         text.map(|text| text.parse().map_err(D::Error::custom)).transpose()
     }
 }
+
+/// The same of several.
+pub(super) mod array {
+    use super::{Deserialize, Deserializer, Serialize, Serializer};
+    use serde::de::Error as _;
+    use wire::ROW_PARTS;
+
+    pub(in super::super) fn serialize<S: Serializer>(
+        values: &[f64; ROW_PARTS],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        values.map(|value| value.to_string()).serialize(serializer)
+    }
+
+    pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<[f64; ROW_PARTS], D::Error> {
+        let mut values = [0.0; ROW_PARTS];
+        for (value, text) in values.iter_mut().zip(<[String; ROW_PARTS]>::deserialize(deserializer)?) {
+            *value = text.parse().map_err(D::Error::custom)?;
+        }
+        Ok(values)
+    }
+}

@@ -12,7 +12,7 @@ use wire::{
 
 use super::assign::assignment;
 use super::choose::{Demand, Present, WORTH, step_from};
-use super::costs::Estimate;
+use super::costs::{Estimate, Sampled};
 use super::overload::Look;
 use super::patience::Gain;
 use super::work::{InForce, Work};
@@ -94,7 +94,7 @@ impl Scheduler {
             Event::Looked { session, viewpoints } => self.looked(session, &viewpoints),
             Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views } => {
                 self.worked(&node_name, plan_epoch, busy_s, (views, dropped_views));
-                self.measured(&node_name, &costs)
+                self.measured(&node_name, plan_epoch, &costs)
             }
             Event::Ready { plan_epoch, node_name } => self.ready(plan_epoch, node_name),
             Event::Unready { plan_epoch, node_name, reason } => self.unready(plan_epoch, &node_name, &reason),
@@ -252,9 +252,13 @@ impl Scheduler {
         work.achieved.push(achieved);
     }
 
-    fn measured(&mut self, name: &str, costs: &MeasuredCosts) -> Vec<Command> {
+    fn measured(&mut self, name: &str, plan_epoch: u64, costs: &MeasuredCosts) -> Vec<Command> {
+        let in_force = self.work.as_ref().and_then(|work| work.in_force.as_ref());
+        let plan = in_force.map(|in_force| &in_force.plan.assignment).filter(|plan| plan.plan_epoch == plan_epoch);
+        let share = plan.and_then(|plan| Some((plan, plan.samplers.iter().find(|share| share.node_name == name)?)));
+        let sampled = share.map(|(plan, share)| Sampled { parts: &share.image_indices, tiles: plan.tile_count });
         if let Some(member) = self.members.get_mut(name) {
-            member.estimate.add(costs);
+            member.estimate.add(costs, sampled);
         }
         self.look()
     }

@@ -391,6 +391,34 @@ fn heavy_images_are_cut_so_that_more_nodes_sample_them() {
     assert!(matches!(&refused[..], [Command::Refuse { error: ChoiceError::ForcedTiles { forced: 3 }, .. }]));
 }
 
+/// Equal nodes, of which each reports what its own tiles take: some show the sky alone.
+#[test]
+fn tiles_that_differ_move_no_roles() {
+    let costs = Costs {
+        sample_image_s: 5.0,
+        sample_overhead_s: 0.5,
+        sample_row_shares: [0.05, 0.15, 0.4, 0.4],
+        reconstruct_view_s: 0.114,
+        load_set_s: 0.19,
+        ..COSTS
+    };
+    let mut cluster = Cluster::of(11);
+    cluster.step(Event::Opened(Box::new(Opening { costs, ..opening(1, PIPELINE, 100) })));
+    let plan = cluster.plan();
+    assert!(plan.tile_count > 1, "{}", plan.tile_count);
+    for _ in 0..120 {
+        for share in &plan.samplers {
+            let tile_s =
+                |&part: &u32| costs.sample_this_tile_s((part % plan.tile_count) as usize, plan.tile_count as usize);
+            let tiles_s: f64 = share.image_indices.iter().map(tile_s).sum();
+            let images = share.image_indices.len() as f64 / f64::from(plan.tile_count);
+            let measured = MeasuredCosts { sample_image_s: Some(tiles_s / images), ..MeasuredCosts::default() };
+            assert_eq!(cluster.step(timed(&share.node_name, measured)), []);
+        }
+        assert_eq!(cluster.wait(1), []);
+    }
+}
+
 #[test]
 fn slow_links_are_relayed() {
     let mut cluster = Cluster::of(8);

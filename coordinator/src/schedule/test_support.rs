@@ -42,6 +42,7 @@ pub(super) const COSTS: Costs = Costs {
     in_order: false,
     // A tile costs as much as the image: none is cut.
     sample_overhead_s: 1e3,
+    sample_row_shares: [0.25; 4],
 };
 
 /// So many nodes that need `costs`.

@@ -3,7 +3,9 @@
 use depth_image::PinholeCamera;
 use serde::{Deserialize, Serialize};
 use wire::limits::{MAX_FRAMES_PER_S, MAX_TEXT_BYTES, MAX_TILES, MAX_VIEWPOINTS, MAX_VIEWS_PER_SET};
-use wire::{Costs, JoinCluster, MeasuredCosts, NodeStatus, PolicyChoice, Quality, UnknownPolicy, WireError, Workload};
+use wire::{
+    Costs, JoinCluster, MeasuredCosts, NodeStatus, PolicyChoice, Quality, ROW_PARTS, UnknownPolicy, WireError, Workload,
+};
 
 use super::{Event, Opening};
 
@@ -106,6 +108,9 @@ pub(super) struct WrittenCosts {
     in_order: bool,
     #[serde(with = "super::exact")]
     sample_overhead_s: f64,
+    /// Not in old logs.
+    #[serde(with = "super::exact::array", default)]
+    sample_row_shares: [f64; ROW_PARTS],
 }
 
 #[derive(Serialize, Deserialize)]
@@ -322,6 +327,7 @@ impl From<Costs> for WrittenCosts {
             encode_view_s: c.encode_view_s,
             in_order: c.in_order,
             sample_overhead_s: c.sample_overhead_s,
+            sample_row_shares: c.sample_row_shares,
         }
     }
 }
@@ -336,6 +342,10 @@ impl WrittenCosts {
             encode_view_s: seconds(self.encode_view_s, "encode_view_s")?,
             in_order: self.in_order,
             sample_overhead_s: seconds(self.sample_overhead_s, "sample_overhead_s")?,
+            sample_row_shares: {
+                let [a, b, c, d] = self.sample_row_shares.map(|share| seconds(share, "sample_row_shares"));
+                [a?, b?, c?, d?]
+            },
         })
     }
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
 use tonic::Status;
 use wire::codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet, decode_depth_image, encode_depth_image};
-use wire::{Costs, MeasureCosts, Refinement, Workload, encode_view};
+use wire::{Costs, MeasureCosts, ROW_PARTS, Refinement, Workload, encode_view};
 
 use crate::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 
@@ -15,8 +15,6 @@ const RUNS: usize = 3;
 /// A run that takes longer stays the only one that counts: under heavy light it may take seconds, of which little is
 /// chance.
 const LONG_RUN_S: f64 = 0.5;
-/// Into so many tiles an image is cut to see what a tile costs.
-const MEASURED_TILES: u32 = 4;
 /// Views drawn in one call take about so long at most, unless one alone takes longer.
 const DIRECT_CALL_S: f64 = 1.0;
 
@@ -52,13 +50,13 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
     let (made, reconstruct_view_s) = reconstruct_view_s(engine, set.as_ref(), request)?;
     let in_order = engine.samples_in_order(&workload.sampling)?;
     let sample_image_s = sample_s / encoded.len().max(1) as f64;
+    let alone = engine.samples_alone(&workload.sampling)?;
+    let tiles_s = if alone { quarters_s(engine, &sample)? } else { None };
+    let (sample_overhead_s, sample_row_shares) = parts_of(sample_image_s, tiles_s);
     Ok(Costs {
         sample_image_s,
-        sample_overhead_s: if engine.samples_alone(&workload.sampling)? {
-            overhead_s(engine, &sample, sample_image_s)?
-        } else {
-            sample_image_s
-        },
+        sample_overhead_s,
+        sample_row_shares,
         direct_view_s: direct_view_s(engine, request)?,
         reconstruct_view_s,
         load_set_s,
@@ -73,17 +71,33 @@ fn sampled(engine: &dyn Engine, work: &SampleWork) -> Result<Vec<EncodedDepthIma
     images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec)).collect()
 }
 
-/// What a tile of an image costs beyond its rows: of g = o + rows, and T tiles that cost T · o + rows, the o. Every tile is of
-/// another height, for rows differ, and of another image, for so do those.
-fn overhead_s(engine: &dyn Engine, whole: &SampleWork, sample_image_s: f64) -> Result<f64, MeasureError> {
-    let cameras = (0..MEASURED_TILES).zip(whole.cameras.iter().cycle());
-    let cameras: Vec<Camera> = cameras.map(|(tile, camera)| camera.tile(tile, MEASURED_TILES)).collect();
-    if cameras.is_empty() || cameras.iter().any(|Camera::Pinhole(tile)| tile.size_px.y == 0) {
-        return Ok(sample_image_s);
+/// Tiles of a quarter of an image's height, from the top, each of another image, for images differ; `None` where images
+/// have too few rows.
+fn quarters_s(engine: &dyn Engine, whole: &SampleWork) -> Result<Option<[f64; ROW_PARTS]>, MeasureError> {
+    let mut seconds = [0.0; ROW_PARTS];
+    for (quarter, camera) in whole.cameras.iter().cycle().take(ROW_PARTS).enumerate() {
+        let tile = camera.tile(quarter as u32, ROW_PARTS as u32);
+        let Camera::Pinhole(pinhole) = &tile;
+        if pinhole.size_px.y == 0 {
+            return Ok(None);
+        }
+        let work = SampleWork { cameras: vec![tile], wanted: vec![0], ..whole.clone() };
+        seconds[quarter] = timed(|| sampled(engine, &work))?.1;
     }
-    let work = SampleWork { cameras, wanted: (0..MEASURED_TILES).collect(), ..whole.clone() };
-    let (_, tiles_s) = timed(|| sampled(engine, &work))?;
-    Ok(((tiles_s - sample_image_s) / f64::from(MEASURED_TILES - 1)).clamp(0.0, sample_image_s))
+    Ok(Some(seconds))
+}
+
+/// What a tile costs beyond its rows, and how the rest is shared among quarters: of g = o + rows, and quarters that cost
+/// 4·o + rows. An image that is not cut has no rest.
+fn parts_of(sample_image_s: f64, quarters_s: Option<[f64; ROW_PARTS]>) -> (f64, [f64; ROW_PARTS]) {
+    let Some(quarters_s) = quarters_s else { return (sample_image_s, [0.0; ROW_PARTS]) };
+    let overhead_s = (quarters_s.iter().sum::<f64>() - sample_image_s) / (ROW_PARTS - 1) as f64;
+    // No tile takes less than what each costs anew.
+    let least_s = quarters_s.iter().copied().fold(sample_image_s, f64::min);
+    let overhead_s = overhead_s.clamp(0.0, least_s);
+    let rows_s = quarters_s.map(|tile_s| tile_s - overhead_s);
+    let all_s: f64 = rows_s.iter().sum();
+    (overhead_s, if all_s > 0.0 { rows_s.map(|tile_s| tile_s / all_s) } else { [0.0; ROW_PARTS] })
 }
 
 fn codec(error: impl ToString) -> MeasureError {

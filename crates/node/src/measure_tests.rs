@@ -179,4 +179,6 @@ fn what_a_tile_costs_beyond_its_rows_follows_from_tiles_of_all_heights() {
     let (costs, _) = measured(engine, 1);
     assert!((0.1..0.12).contains(&costs.sample_image_s), "{costs:?}");
     assert!((0.01..0.03).contains(&costs.sample_overhead_s), "{costs:?}");
+    let [a, b, c, d] = costs.sample_row_shares;
+    assert!(a.max(b) < 0.1 && (0.4..0.6).contains(&c) && (0.4..0.6).contains(&d), "{costs:?}");
 }

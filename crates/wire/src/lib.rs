@@ -50,4 +50,4 @@ pub use scene::{FetchScene, SceneAssembly, SceneHash, ScenePart, SceneRef};
 pub use session::{PolicyChoice, SessionEvent, SessionPlan, SessionRequest, SessionStage, UnknownPolicy};
 pub use stage_times::StageTimes;
 pub use view::{EncodedView, ViewCodecError, decode_view, encode_view};
-pub use workload::{Costs, Refinement, Timeline, Workload};
+pub use workload::{Costs, ROW_PARTS, Refinement, Timeline, Workload};

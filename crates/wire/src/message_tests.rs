@@ -134,6 +134,7 @@ fn messages_come_back() {
             encode_view_s: 0.001,
             in_order: true,
             sample_overhead_s: 0.03,
+            sample_row_shares: [0.1, 0.2, 0.3, 0.4],
         },
         reason: "because".to_owned(),
         predicted_pipeline_s: 0.1,

@@ -266,6 +266,9 @@ impl From<Workload> for proto::Workload {
     }
 }
 
+/// Quarters of a sample image's height, whose costs are told apart.
+pub const ROW_PARTS: usize = 4;
+
 /// Seconds of one operation, each alone and warm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Costs {
@@ -284,14 +287,35 @@ pub struct Costs {
     pub in_order: bool,
     /// Of g_s, what every tile of an image costs anew: work that does not shrink with its rows.
     pub sample_overhead_s: f64,
+    /// Of the rest, the shares of the image's quarters, top to bottom: rows that show the sky cost less. They add up to 1;
+    /// all 0 where nobody has measured them, which counts as equal.
+    pub sample_row_shares: [f64; ROW_PARTS],
 }
 
 impl Costs {
-    /// One of so many tiles of a sample image.
+    /// One of so many tiles of a sample image, if all were equal.
     #[must_use]
     pub fn sample_tile_s(&self, tile_count: usize) -> f64 {
         let overhead_s = self.sample_overhead_s.min(self.sample_image_s);
         overhead_s + (self.sample_image_s - overhead_s) / tile_count.max(1) as f64
+    }
+
+    /// The tile number `tile` of so many, from the top.
+    #[must_use]
+    pub fn sample_this_tile_s(&self, tile: usize, tile_count: usize) -> f64 {
+        let overhead_s = self.sample_overhead_s.min(self.sample_image_s);
+        let (top, bottom) = (tile as f64 / tile_count as f64, (tile + 1) as f64 / tile_count as f64);
+        overhead_s + (self.sample_image_s - overhead_s) * (self.share_above(bottom) - self.share_above(top))
+    }
+
+    /// Of the work on rows, the share above a height; 0 is the top of the image, 1 its bottom.
+    fn share_above(&self, height: f64) -> f64 {
+        let all: f64 = self.sample_row_shares.iter().sum();
+        if all <= 0.0 {
+            return height;
+        }
+        let covered = |part: usize| (height * ROW_PARTS as f64 - part as f64).clamp(0.0, 1.0);
+        self.sample_row_shares.iter().enumerate().map(|(part, share)| share * covered(part)).sum::<f64>() / all
     }
 
     /// The greater of each: what the slowest node needs.
@@ -305,8 +329,28 @@ impl Costs {
             encode_view_s: self.encode_view_s.max(other.encode_view_s),
             in_order: self.in_order || other.in_order,
             sample_overhead_s: self.sample_overhead_s.max(other.sample_overhead_s),
+            // Shares are of the scene rather than of the node.
+            sample_row_shares: if self.sample_row_shares.iter().any(|&share| share > 0.0) {
+                self.sample_row_shares
+            } else {
+                other.sample_row_shares
+            },
         }
     }
+}
+
+fn row_shares(shares: Option<proto::RowShares>) -> Result<[f64; ROW_PARTS], WireError> {
+    let Some(shares) = shares else { return Ok([0.0; ROW_PARTS]) };
+    let share = |value: f64, field| match value {
+        0.0..=1.0 => Ok(value),
+        _ => Err(WireError::out_of_range(field, value, "from 0 to 1")),
+    };
+    Ok([
+        share(shares.first_ratio, "sample_row_shares.first_ratio")?,
+        share(shares.second_ratio, "sample_row_shares.second_ratio")?,
+        share(shares.third_ratio, "sample_row_shares.third_ratio")?,
+        share(shares.fourth_ratio, "sample_row_shares.fourth_ratio")?,
+    ])
 }
 
 impl TryFrom<proto::Costs> for Costs {
@@ -321,12 +365,14 @@ impl TryFrom<proto::Costs> for Costs {
             encode_view_s: seconds(c.encode_view_s, "encode_view_s")?,
             in_order: c.is_sampled_in_order,
             sample_overhead_s: seconds(c.sample_overhead_s, "sample_overhead_s")?,
+            sample_row_shares: row_shares(c.sample_row_shares)?,
         })
     }
 }
 
 impl From<Costs> for proto::Costs {
     fn from(c: Costs) -> Self {
+        let [first_ratio, second_ratio, third_ratio, fourth_ratio] = c.sample_row_shares;
         Self {
             sample_image_s: c.sample_image_s,
             direct_view_s: c.direct_view_s,
@@ -335,6 +381,7 @@ impl From<Costs> for proto::Costs {
             encode_view_s: c.encode_view_s,
             is_sampled_in_order: c.in_order,
             sample_overhead_s: c.sample_overhead_s,
+            sample_row_shares: Some(proto::RowShares { first_ratio, second_ratio, third_ratio, fourth_ratio }),
         }
     }
 }

@@ -18,6 +18,9 @@ pub fn mean(all: &[Costs]) -> Costs {
         encode_view_s: of(|c| c.encode_view_s),
         in_order: all.iter().any(|c| c.in_order),
         sample_overhead_s: of(|c| c.sample_overhead_s),
+        sample_row_shares: std::array::from_fn(|part| {
+            all.iter().map(|c| c.sample_row_shares[part]).sum::<f64>() / all.len().max(1) as f64
+        }),
     }
 }
 

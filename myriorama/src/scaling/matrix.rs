@@ -153,6 +153,7 @@ mod tests {
         encode_view_s: 0.002,
         in_order: false,
         sample_overhead_s: 1e3,
+        sample_row_shares: [0.25; 4],
     };
 
     fn all(extent: Extent) -> Vec<Planned> {
