@@ -13,6 +13,13 @@ const ALPHA: f64 = 0.2;
 /// Nodes are equal when none needs so many times what another does.
 const EQUAL_WITHIN: f64 = 1.1;
 
+/// What is known beforehand of what tiles take is off by up to so many times.
+const TILES_WITHIN: f64 = 1.5;
+
+fn is_about_one(ratio: f64) -> bool {
+    (TILES_WITHIN.recip()..=TILES_WITHIN).contains(&ratio)
+}
+
 /// What is known of one node.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NodeCosts {
@@ -45,6 +52,19 @@ impl NodeCosts {
                 sample_row_shares: nodes.first().map_or_else(Default::default, |n| n.costs.sample_row_shares),
             },
             transfer_image_s: mean(|n| n.transfer_image_s),
+        }
+    }
+
+    /// Where nodes sample tiles: who needs about as long for them as most is as fast as those, and has had other tiles.
+    pub(super) fn level_sampling(nodes: &mut [Self]) {
+        let mut sorted: Vec<f64> = nodes.iter().map(|node| node.costs.sample_image_s).collect();
+        sorted.sort_by(f64::total_cmp);
+        let Some(&middle_s) = sorted.get(sorted.len() / 2) else { return };
+        let is_like_most = |node: &Self| is_about_one(node.costs.sample_image_s / middle_s);
+        let mean = Self::mean(&nodes.iter().copied().filter(is_like_most).collect::<Vec<_>>()).costs;
+        for node in nodes.iter_mut().filter(|node| is_like_most(node)) {
+            node.costs.sample_image_s = mean.sample_image_s;
+            node.costs.sample_overhead_s = mean.sample_overhead_s;
         }
     }
 
@@ -176,8 +196,10 @@ impl Estimate {
     pub(super) fn add(&mut self, measured: &MeasuredCosts, sampled: Option<Sampled<'_>>) {
         let slowness = self.slowness.value.unwrap_or(1.0);
         let image_s = measured.sample_image_s.map(|tiles_s| self.whole_image_s(tiles_s, sampled));
+        // A tile that takes somewhat longer than expected does not say that the node is slow.
+        let is_told = |ratio: &f64| sampled.is_none_or(|sampled| sampled.tiles == 1) || !is_about_one(*ratio);
         let ratios = [
-            self.sample_image.add(image_s, slowness),
+            self.sample_image.add(image_s, slowness).filter(is_told),
             self.direct_view.add(measured.direct_view_s, slowness),
             self.reconstruct_view.add(measured.reconstruct_view_s, slowness),
             self.load_set.add(measured.load_set_s, slowness),
@@ -339,6 +361,19 @@ mod tests {
                 assert!((image_s / (5.0 * slow) - 1.0).abs() < 0.01, "{tiles} {parts:?}: {image_s} of {}", 5.0 * slow);
             }
         }
+    }
+
+    #[test]
+    fn a_slow_sampler_of_tiles_is_told_from_dear_tiles() {
+        let of =
+            |sample_image_s| NodeCosts { costs: Costs { sample_image_s, ..Costs::default() }, ..NodeCosts::default() };
+        let mut nodes = [4.0, 5.0, 6.0, 5.0, 20.0].map(of);
+        NodeCosts::level_sampling(&mut nodes);
+        assert_eq!(nodes.map(|node| node.costs.sample_image_s), [5.0, 5.0, 5.0, 5.0, 20.0]);
+        NodeCosts::level_sampling(&mut []);
+        let mut idle = [0.0; 2].map(of);
+        NodeCosts::level_sampling(&mut idle);
+        assert_eq!(idle[0].costs.sample_image_s, 0.0, "nothing is known of anybody");
     }
 
     #[test]

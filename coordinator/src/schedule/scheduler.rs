@@ -312,7 +312,7 @@ impl Scheduler {
 
     fn crew(&self) -> Option<Crew<'_>> {
         let work = self.work.as_ref()?;
-        let (names, nodes): (Vec<_>, Vec<_>) = self.usable().map(|(name, m)| (name.as_str(), m.estimate.now())).unzip();
+        let (names, nodes) = (self.usable().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), self.costs_now());
         let samples = |in_force: &InForce| names.iter().map(|name| in_force.samples(name)).collect();
         let present = work.in_force.as_ref().map(|plan| Present {
             policy: plan.policy(),
@@ -325,6 +325,15 @@ impl Scheduler {
         let most = load.cut(wish.forced_tiles.unwrap_or(1)).most_samplers(names.len());
         wish.forced_samplers = wish.forced_samplers.map(|forced| forced.min(most));
         Some(Crew { names, nodes, present, load, wish })
+    }
+
+    /// Of usable nodes, in their order.
+    fn costs_now(&self) -> Vec<NodeCosts> {
+        let mut nodes: Vec<NodeCosts> = self.usable().map(|(_, member)| member.estimate.now()).collect();
+        if self.in_force().is_some_and(|in_force| in_force.plan.assignment.tile_count > 1) {
+            NodeCosts::level_sampling(&mut nodes);
+        }
+        nodes
     }
 
     fn usable(&self) -> impl Iterator<Item = (&String, &Member)> {
@@ -397,7 +406,7 @@ impl Scheduler {
     /// A plan that changes nothing is not made: epochs rise only where nodes have something new to do.
     fn put_in_force(&mut self, choice: &Choice, why: &str) -> Vec<Command> {
         let Some(work) = &self.work else { return Vec::new() };
-        let crew: Vec<_> = self.usable().map(|(_, member)| (&member.status, member.estimate.now())).collect();
+        let crew: Vec<_> = self.usable().map(|(_, member)| &member.status).zip(self.costs_now()).collect();
         let members = self.usable().map(|(name, member)| (name.clone(), member.incarnation)).collect();
         let assignment = assignment(self.plan_epoch + 1, work.workload(), choice, &crew);
         if work.in_force.as_ref().is_some_and(|old| old.members == members && old.assigns(&assignment)) {

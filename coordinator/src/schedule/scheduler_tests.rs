@@ -391,7 +391,8 @@ fn heavy_images_are_cut_so_that_more_nodes_sample_them() {
     assert!(matches!(&refused[..], [Command::Refuse { error: ChoiceError::ForcedTiles { forced: 3 }, .. }]));
 }
 
-/// Equal nodes, of which each reports what its own tiles take: some show the sky alone.
+/// Equal nodes, of which each reports what its own tiles take: some show the sky alone, and what is known of that is not
+/// exact.
 #[test]
 fn tiles_that_differ_move_no_roles() {
     let costs = Costs {
@@ -410,7 +411,8 @@ fn tiles_that_differ_move_no_roles() {
         for share in &plan.samplers {
             let tile_s =
                 |&part: &u32| costs.sample_this_tile_s((part % plan.tile_count) as usize, plan.tile_count as usize);
-            let tiles_s: f64 = share.image_indices.iter().map(tile_s).sum();
+            let more_or_less = 0.8 + 0.4 * f64::from(share.image_indices[0] % 5) / 4.0;
+            let tiles_s: f64 = more_or_less * share.image_indices.iter().map(tile_s).sum::<f64>();
             let images = share.image_indices.len() as f64 / f64::from(plan.tile_count);
             let measured = MeasuredCosts { sample_image_s: Some(tiles_s / images), ..MeasuredCosts::default() };
             assert_eq!(cluster.step(timed(&share.node_name, measured)), []);

@@ -50,9 +50,11 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
     let (made, reconstruct_view_s) = reconstruct_view_s(engine, set.as_ref(), request)?;
     let in_order = engine.samples_in_order(&workload.sampling)?;
     let sample_image_s = sample_s / encoded.len().max(1) as f64;
-    let alone = engine.samples_alone(&workload.sampling)?;
-    let tiles_s = if alone { quarters_s(engine, &sample)? } else { None };
-    let (sample_overhead_s, sample_row_shares) = parts_of(sample_image_s, tiles_s);
+    let (sample_overhead_s, sample_row_shares) = if engine.samples_alone(&workload.sampling)? {
+        parts_of(engine, &sample, sample_image_s)?
+    } else {
+        (sample_image_s, [0.0; ROW_PARTS])
+    };
     Ok(Costs {
         sample_image_s,
         sample_overhead_s,
@@ -71,30 +73,32 @@ fn sampled(engine: &dyn Engine, work: &SampleWork) -> Result<Vec<EncodedDepthIma
     images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec)).collect()
 }
 
-/// Tiles of a quarter of an image's height, from the top, each of another image, for images differ; `None` where images
-/// have too few rows.
-fn quarters_s(engine: &dyn Engine, whole: &SampleWork) -> Result<Option<[f64; ROW_PARTS]>, MeasureError> {
-    let mut seconds = [0.0; ROW_PARTS];
-    for (quarter, camera) in whole.cameras.iter().cycle().take(ROW_PARTS).enumerate() {
-        let tile = camera.tile(quarter as u32, ROW_PARTS as u32);
-        let Camera::Pinhole(pinhole) = &tile;
-        if pinhole.size_px.y == 0 {
-            return Ok(None);
-        }
-        let work = SampleWork { cameras: vec![tile], wanted: vec![0], ..whole.clone() };
-        seconds[quarter] = timed(|| sampled(engine, &work))?.1;
+/// What every tile of an image costs beyond its rows, by a tile of one row; and how rows share the rest, by quarters of the
+/// height, each of another image, for images differ. Images of too few rows are not cut.
+fn parts_of(
+    engine: &dyn Engine,
+    whole: &SampleWork,
+    sample_image_s: f64,
+) -> Result<(f64, [f64; ROW_PARTS]), MeasureError> {
+    let uncut = (sample_image_s, [0.0; ROW_PARTS]);
+    let Some(Camera::Pinhole(first)) = whole.cameras.first().copied() else { return Ok(uncut) };
+    if whole.cameras.iter().any(|Camera::Pinhole(camera)| (camera.size_px.y as usize) < ROW_PARTS) {
+        return Ok(uncut);
     }
-    Ok(Some(seconds))
+    let tile_s = |camera: Camera| {
+        let work = SampleWork { cameras: vec![camera], wanted: vec![0], ..whole.clone() };
+        Ok::<f64, MeasureError>(timed(|| sampled(engine, &work))?.1)
+    };
+    let row_s = tile_s(Camera::Pinhole(first).tile(0, first.size_px.y))?;
+    let mut quarters_s = [0.0; ROW_PARTS];
+    for (quarter, camera) in whole.cameras.iter().cycle().take(ROW_PARTS).enumerate() {
+        quarters_s[quarter] = tile_s(camera.tile(quarter as u32, ROW_PARTS as u32))?;
+    }
+    Ok(overhead_and_shares(sample_image_s, row_s, quarters_s))
 }
 
-/// What a tile costs beyond its rows, and how the rest is shared among quarters: of g = o + rows, and quarters that cost
-/// 4·o + rows. An image that is not cut has no rest.
-fn parts_of(sample_image_s: f64, quarters_s: Option<[f64; ROW_PARTS]>) -> (f64, [f64; ROW_PARTS]) {
-    let Some(quarters_s) = quarters_s else { return (sample_image_s, [0.0; ROW_PARTS]) };
-    let overhead_s = (quarters_s.iter().sum::<f64>() - sample_image_s) / (ROW_PARTS - 1) as f64;
-    // No tile takes less than what each costs anew.
-    let least_s = quarters_s.iter().copied().fold(sample_image_s, f64::min);
-    let overhead_s = overhead_s.clamp(0.0, least_s);
+fn overhead_and_shares(sample_image_s: f64, row_s: f64, quarters_s: [f64; ROW_PARTS]) -> (f64, [f64; ROW_PARTS]) {
+    let overhead_s = quarters_s.iter().copied().fold(row_s.min(sample_image_s), f64::min);
     let rows_s = quarters_s.map(|tile_s| tile_s - overhead_s);
     let all_s: f64 = rows_s.iter().sum();
     (overhead_s, if all_s > 0.0 { rows_s.map(|tile_s| tile_s / all_s) } else { [0.0; ROW_PARTS] })
