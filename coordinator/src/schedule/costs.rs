@@ -110,28 +110,36 @@ impl Smoothed {
     }
 }
 
-/// Of an even number the upper one.
+/// Of an even number the lower one: the first timing may have built shaders.
 fn median(timings: &VecDeque<f64>) -> f64 {
     let mut sorted: Vec<f64> = timings.iter().copied().collect();
     sorted.sort_by(f64::total_cmp);
-    sorted[sorted.len() / 2]
+    sorted[(sorted.len() - 1) / 2]
 }
+
+/// A first timing that is so many times what was expected is of a node that has built shaders meanwhile.
+const COLD: f64 = 2.0;
 
 /// One operation: as measured alone, and as timed since.
 #[derive(Debug, Clone, Default)]
 struct Operation {
     alone_s: f64,
+    /// Whether it has been done, and so will not be cold again.
+    is_warm: bool,
     timed: Smoothed,
     reports_without: u32,
 }
 
 impl Operation {
     fn starting_at(alone_s: f64) -> Self {
-        Self { alone_s, timed: Smoothed::starting_at(alone_s), reports_without: 0 }
+        Self { alone_s, is_warm: false, timed: Smoothed::starting_at(alone_s), reports_without: 0 }
     }
 
     /// How many times longer than alone, if anything can be said.
     fn add(&mut self, timing_s: Option<f64>, slowness: f64) -> Option<f64> {
+        let was_cold = !self.is_warm && timing_s.is_some_and(|timing_s| timing_s > COLD * self.alone_s * slowness);
+        self.is_warm |= timing_s.is_some();
+        let timing_s = timing_s.filter(|_| !was_cold);
         if self.timed.last.is_empty() {
             // Until now it was taken to be as slow as the rest.
             self.timed.value = self.timed.value.map(|_| self.alone_s * slowness);
@@ -197,9 +205,10 @@ impl Estimate {
         let slowness = self.slowness.value.unwrap_or(1.0);
         let image_s = measured.sample_image_s.map(|tiles_s| self.whole_image_s(tiles_s, sampled));
         // A tile that takes somewhat longer than expected does not say that the node is slow.
-        let is_told = |ratio: &f64| sampled.is_none_or(|sampled| sampled.tiles == 1) || !is_about_one(*ratio);
+        let is_cut = sampled.is_some_and(|sampled| sampled.tiles > 1);
+        let of_node = |ratio: f64| if is_cut && is_about_one(ratio) { 1.0 } else { ratio };
         let ratios = [
-            self.sample_image.add(image_s, slowness).filter(is_told),
+            self.sample_image.add(image_s, slowness).map(of_node),
             self.direct_view.add(measured.direct_view_s, slowness),
             self.reconstruct_view.add(measured.reconstruct_view_s, slowness),
             self.load_set.add(measured.load_set_s, slowness),
@@ -329,6 +338,13 @@ mod tests {
         }
         let (now_s, slowness) = (estimate.now().costs.sample_image_s, estimate.slowness.value.unwrap());
         assert!((now_s - slowness).abs() < 1e-9 && slowness < 4.0, "no longer, after a while: {now_s}");
+    }
+
+    #[test]
+    fn a_node_that_is_cold_is_not_slow() {
+        let mut estimate = Estimate::starting_at(&Costs { sample_image_s: 1.0, ..Costs::default() });
+        assert_eq!(sampled(&mut estimate, 4.0), 1.0, "shaders were built");
+        assert!((sampled(&mut estimate, 4.0) - 1.6).abs() < 1e-9, "they are there now");
     }
 
     #[test]
