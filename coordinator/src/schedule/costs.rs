@@ -150,14 +150,39 @@ impl Operation {
         timing_s.map(|timing_s| timing_s / self.alone_s).filter(|ratio| ratio.is_finite() && *ratio > 0.0)
     }
 
-    /// What has not been timed for long is as much slower than alone as the rest is.
-    fn now_s(&self, slowness: f64) -> f64 {
-        if self.timed.last.is_empty() || self.reports_without > RECENT {
-            self.alone_s * slowness
-        } else {
-            self.timed.or_zero()
-        }
+    fn is_timed(&self) -> bool {
+        !self.timed.last.is_empty() && self.reports_without <= RECENT
     }
+
+    /// What has not been timed for long is `slowness` times slower than alone.
+    fn now_s(&self, slowness: f64) -> f64 {
+        if self.is_timed() { self.timed.or_zero() } else { self.alone_s * slowness }
+    }
+
+    /// How many times longer than alone, where that is known.
+    fn ratio(&self) -> Option<f64> {
+        let ratio = self.timed.or_zero() / self.alone_s;
+        Some(ratio).filter(|ratio| self.is_timed() && ratio.is_finite() && *ratio > 0.0)
+    }
+}
+
+/// How many times longer than alone each operation takes now, in the order of [`Estimate::operations`]; `None` where nobody
+/// has timed it.
+pub(super) type Ratios = [Option<f64>; OPERATIONS];
+
+const OPERATIONS: usize = 5;
+/// The first of them are the device's alone, and say how fast a node is: loading a set runs beside views, and encoding one
+/// is over before it can be timed well.
+const OF_DEVICE: usize = 3;
+
+/// Of all nodes together: what takes longer at work than alone, as loading a set beside views does, takes so on every node.
+/// What a single node has timed says as much of that node as of the work.
+pub(super) fn common_ratios<'a>(estimates: impl Iterator<Item = &'a Estimate>) -> Ratios {
+    let all: Vec<Ratios> = estimates.map(Estimate::ratios).collect();
+    std::array::from_fn(|operation| {
+        let timed = all.iter().filter_map(|ratios| ratios[operation]);
+        geometric_mean(timed.clone()).filter(|_| timed.count() > 1)
+    })
 }
 
 /// One node's costs as its timings come in.
@@ -175,6 +200,8 @@ pub(super) struct Estimate {
     sample_overhead_s: f64,
     sample_row_shares: [f64; ROW_PARTS],
     in_order: bool,
+    /// Whether the last images were tiles.
+    is_cut: bool,
 }
 
 /// What of each set a node has sampled: tiles by number, of images cut into so many.
@@ -205,7 +232,8 @@ impl Estimate {
         let slowness = self.slowness.value.unwrap_or(1.0);
         let image_s = measured.sample_image_s.map(|tiles_s| self.whole_image_s(tiles_s, sampled));
         // A tile that takes somewhat longer than expected does not say that the node is slow.
-        let is_cut = sampled.is_some_and(|sampled| sampled.tiles > 1);
+        self.is_cut = sampled.map_or(self.is_cut, |sampled| sampled.tiles > 1);
+        let is_cut = self.is_cut;
         let of_node = |ratio: f64| if is_cut && is_about_one(ratio) { 1.0 } else { ratio };
         let ratios = [
             self.sample_image.add(image_s, slowness).map(of_node),
@@ -214,7 +242,7 @@ impl Estimate {
             self.load_set.add(measured.load_set_s, slowness),
             self.encode_view.add(measured.encode_view_s, slowness),
         ];
-        self.slowness.add(geometric_mean(ratios.into_iter().flatten()));
+        self.slowness.add(geometric_mean(ratios.into_iter().take(OF_DEVICE).flatten()));
         // Nothing moves at 0 bytes/s: that is no rate.
         self.transfer_bytes_per_s.add(measured.transfer_bytes_per_s.filter(|rate| *rate > 0.0));
         self.image_bytes.add(measured.image_bytes);
@@ -254,16 +282,35 @@ impl Estimate {
         }
     }
 
+    fn operations(&self) -> [&Operation; OPERATIONS] {
+        [&self.sample_image, &self.direct_view, &self.reconstruct_view, &self.load_set, &self.encode_view]
+    }
+
+    fn ratios(&self) -> Ratios {
+        self.operations().map(Operation::ratio)
+    }
+
     pub(super) fn now(&self) -> NodeCosts {
+        self.now_among(&Ratios::default())
+    }
+
+    /// Where others have timed what this node has not, that takes it as much longer than alone as it takes them, and as much
+    /// longer again as it is slower than they are.
+    pub(super) fn now_among(&self, common: &Ratios) -> NodeCosts {
         let slowness = self.slowness.value.unwrap_or(1.0);
+        let than_others = self.than_others(common);
+        let now_s = |operation: usize| {
+            let ratio = common[operation].map_or(slowness, |common| common * than_others);
+            self.operations()[operation].now_s(ratio)
+        };
         let costs = Costs {
-            sample_image_s: self.sample_image.now_s(slowness),
-            direct_view_s: self.direct_view.now_s(slowness),
-            reconstruct_view_s: self.reconstruct_view.now_s(slowness),
-            load_set_s: self.load_set.now_s(slowness),
-            encode_view_s: self.encode_view.now_s(slowness),
+            sample_image_s: now_s(0),
+            direct_view_s: now_s(1),
+            reconstruct_view_s: now_s(2),
+            load_set_s: now_s(3),
+            encode_view_s: now_s(4),
             in_order: self.in_order,
-            sample_overhead_s: self.overhead_s(slowness),
+            sample_overhead_s: self.overhead_s(now_s(0)),
             sample_row_shares: self.sample_row_shares,
         };
         let image_bytes = self.image_bytes.or_zero();
@@ -271,9 +318,20 @@ impl Estimate {
         NodeCosts { costs, transfer_image_s }
     }
 
+    /// How many times slower than other nodes, by what both have timed.
+    fn than_others(&self, common: &Ratios) -> f64 {
+        let both = self.ratios().into_iter().zip(common).take(OF_DEVICE).enumerate();
+        let ratios = both.filter_map(|(operation, (own, common))| {
+            let ratio = own? / (*common)?;
+            let is_tiles = self.is_cut && operation == 0 && is_about_one(ratio);
+            Some(if is_tiles { 1.0 } else { ratio })
+        });
+        geometric_mean(ratios).unwrap_or(1.0)
+    }
+
     /// Grows with the cost of an image.
-    fn overhead_s(&self, slowness: f64) -> f64 {
-        let ratio = self.sample_image.now_s(slowness) / self.sample_image.alone_s;
+    fn overhead_s(&self, sample_image_s: f64) -> f64 {
+        let ratio = sample_image_s / self.sample_image.alone_s;
         self.sample_overhead_s * if ratio.is_finite() { ratio } else { 1.0 }
     }
 }
@@ -338,6 +396,28 @@ mod tests {
         }
         let (now_s, slowness) = (estimate.now().costs.sample_image_s, estimate.slowness.value.unwrap());
         assert!((now_s - slowness).abs() < 1e-9 && slowness < 4.0, "no longer, after a while: {now_s}");
+    }
+
+    #[test]
+    fn what_is_dearer_at_work_is_so_on_every_node() {
+        let alone = Costs { sample_image_s: 1.0, reconstruct_view_s: 0.1, load_set_s: 0.2, ..Costs::default() };
+        let reports = |costs: MeasuredCosts| {
+            let mut estimate = Estimate::starting_at(&alone);
+            (0..30).for_each(|_| estimate.add(&costs, None));
+            estimate
+        };
+        let sampler = |sample_image_s| {
+            reports(MeasuredCosts { sample_image_s: Some(sample_image_s), ..MeasuredCosts::default() })
+        };
+        let views = MeasuredCosts { reconstruct_view_s: Some(0.1), load_set_s: Some(0.7), ..MeasuredCosts::default() };
+        let all = [sampler(1.0), sampler(1.0), reports(views), reports(views)];
+        let common = common_ratios(all.iter());
+        let [sampling, .., making] = all.map(|estimate| estimate.now_among(&common).costs);
+        assert!((sampling.load_set_s - 0.7).abs() < 0.01, "it would take a sampler as long: {sampling:?}");
+        assert!((making.load_set_s - 0.7).abs() < 0.01 && (making.sample_image_s - 1.0).abs() < 0.01, "{making:?}");
+        let slow = [sampler(1.0), sampler(1.0), sampler(4.0)];
+        let slow_s = slow[2].now_among(&common_ratios(slow.iter())).costs.reconstruct_view_s;
+        assert!(slow_s > 0.2, "who samples slowly would be slow at views: {slow_s}");
     }
 
     #[test]

@@ -12,7 +12,7 @@ use wire::{
 
 use super::assign::assignment;
 use super::choose::{Demand, Present, WORTH, step_from};
-use super::costs::{Estimate, Sampled};
+use super::costs::{Estimate, Sampled, common_ratios};
 use super::overload::Look;
 use super::patience::Gain;
 use super::work::{InForce, Work};
@@ -328,8 +328,10 @@ impl Scheduler {
     }
 
     /// Of usable nodes, in their order.
-    fn costs_now(&self) -> Vec<NodeCosts> {
-        let mut nodes: Vec<NodeCosts> = self.usable().map(|(_, member)| member.estimate.now()).collect();
+    pub(super) fn costs_now(&self) -> Vec<NodeCosts> {
+        let common = common_ratios(self.usable().map(|(_, member)| &member.estimate));
+        let now = |(_, member): (&String, &Member)| member.estimate.now_among(&common);
+        let mut nodes: Vec<NodeCosts> = self.usable().map(now).collect();
         if self.in_force().is_some_and(|in_force| in_force.plan.assignment.tile_count > 1) {
             NodeCosts::level_sampling(&mut nodes);
         }

@@ -41,7 +41,7 @@ impl Scheduler {
         if work.views_per_s() <= before.views_per_s() {
             return Ok(());
         }
-        admit(&work, &self.usable().map(|(_, member)| member.estimate.now()).collect::<Vec<_>>())
+        admit(&work, &self.costs_now())
     }
 
     /// Whether a session may look from elsewhere from now on.
