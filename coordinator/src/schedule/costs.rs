@@ -12,7 +12,6 @@ const MEDIAN_OF: usize = 5;
 const ALPHA: f64 = 0.2;
 /// Nodes are equal when none needs so many times what another does.
 const EQUAL_WITHIN: f64 = 1.1;
-
 /// What is known beforehand of what tiles take is off by up to so many times.
 const TILES_WITHIN: f64 = 1.5;
 
@@ -57,9 +56,7 @@ impl NodeCosts {
 
     /// Where nodes sample tiles: who needs about as long for them as most is as fast as those, and has had other tiles.
     pub(super) fn level_sampling(nodes: &mut [Self]) {
-        let mut sorted: Vec<f64> = nodes.iter().map(|node| node.costs.sample_image_s).collect();
-        sorted.sort_by(f64::total_cmp);
-        let Some(&middle_s) = sorted.get(sorted.len() / 2) else { return };
+        let Some(middle_s) = median(nodes.iter().map(|node| node.costs.sample_image_s)) else { return };
         let is_like_most = |node: &Self| is_about_one(node.costs.sample_image_s / middle_s);
         let mean = Self::mean(&nodes.iter().copied().filter(is_like_most).collect::<Vec<_>>()).costs;
         for node in nodes.iter_mut().filter(|node| is_like_most(node)) {
@@ -96,7 +93,7 @@ impl Smoothed {
         let Some(timing) = timing.filter(|timing| timing.is_finite() && *timing >= 0.0) else { return };
         self.last.truncate(MEDIAN_OF - 1);
         self.last.push_front(timing);
-        let median = median(&self.last);
+        let median = median(self.last.iter().copied()).unwrap_or(timing);
         self.value = Some(self.value.map_or(median, |value| value + ALPHA * (median - value)));
     }
 
@@ -111,10 +108,10 @@ impl Smoothed {
 }
 
 /// Of an even number the lower one: the first timing may have built shaders.
-fn median(timings: &VecDeque<f64>) -> f64 {
-    let mut sorted: Vec<f64> = timings.iter().copied().collect();
+fn median(timings: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut sorted: Vec<f64> = timings.collect();
     sorted.sort_by(f64::total_cmp);
-    sorted[(sorted.len() - 1) / 2]
+    sorted.get(sorted.len().saturating_sub(1) / 2).copied()
 }
 
 /// A first timing that is so many times what was expected is of a node that has built shaders meanwhile.
@@ -230,7 +227,9 @@ impl Estimate {
     /// Timings of one report, and what of each set was sampled, if it is known.
     pub(super) fn add(&mut self, measured: &MeasuredCosts, sampled: Option<Sampled<'_>>) {
         let slowness = self.slowness.value.unwrap_or(1.0);
-        let image_s = measured.sample_image_s.map(|tiles_s| self.whole_image_s(tiles_s, sampled));
+        // Of tiles that nobody knows any more, of a plan that is gone, nothing can be said.
+        let is_known = sampled.is_some() || !self.is_cut;
+        let image_s = measured.sample_image_s.filter(|_| is_known).map(|s| self.whole_image_s(s, sampled));
         // A tile that takes somewhat longer than expected does not say that the node is slow.
         self.is_cut = sampled.map_or(self.is_cut, |sampled| sampled.tiles > 1);
         let is_cut = self.is_cut;
@@ -344,6 +343,7 @@ fn geometric_mean(ratios: impl Iterator<Item = f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::schedule::test_support::DEAR;
 
     fn sampled(estimate: &mut Estimate, sample_image_s: f64) -> f64 {
         estimate.add(&MeasuredCosts { sample_image_s: Some(sample_image_s), ..MeasuredCosts::default() }, None);
@@ -440,18 +440,12 @@ mod tests {
 
     #[test]
     fn tiles_that_differ_do_not_make_nodes_differ() {
-        let alone = Costs {
-            sample_image_s: 5.0,
-            sample_overhead_s: 0.5,
-            sample_row_shares: [0.05, 0.15, 0.4, 0.4],
-            ..Costs::default()
-        };
         for (tiles, parts) in [(4, vec![0]), (4, vec![2, 7]), (2, vec![1]), (8, vec![1, 2, 3]), (1, vec![0, 3])] {
             for slow in [1.0, 3.0] {
-                let each_s = |&part: &u32| alone.sample_this_tile_s((part % tiles) as usize, tiles as usize);
+                let each_s = |&part: &u32| DEAR.sample_this_tile_s((part % tiles) as usize, tiles as usize);
                 let tiles_s = slow * parts.iter().map(each_s).sum::<f64>() / parts.len() as f64 * f64::from(tiles);
                 let measured = MeasuredCosts { sample_image_s: Some(tiles_s), ..MeasuredCosts::default() };
-                let mut estimate = Estimate::starting_at(&alone);
+                let mut estimate = Estimate::starting_at(&DEAR);
                 (0..30).for_each(|_| estimate.add(&measured, Some(Sampled { parts: &parts, tiles })));
                 let image_s = estimate.now().costs.sample_image_s;
                 assert!((image_s / (5.0 * slow) - 1.0).abs() < 0.01, "{tiles} {parts:?}: {image_s} of {}", 5.0 * slow);

@@ -2,7 +2,7 @@ use wire::{PolicyChoice, Quality};
 
 use super::*;
 use crate::schedule::ChoiceError;
-use crate::schedule::test_support::{COSTS, join, opened, opening, workload};
+use crate::schedule::test_support::{COSTS, DEAR, join, opened, opening, workload};
 
 const PIPELINE: PolicyChoice = PolicyChoice::Pipeline;
 
@@ -395,22 +395,14 @@ fn heavy_images_are_cut_so_that_more_nodes_sample_them() {
 /// exact.
 #[test]
 fn tiles_that_differ_move_no_roles() {
-    let costs = Costs {
-        sample_image_s: 5.0,
-        sample_overhead_s: 0.5,
-        sample_row_shares: [0.05, 0.15, 0.4, 0.4],
-        reconstruct_view_s: 0.114,
-        load_set_s: 0.19,
-        ..COSTS
-    };
     let mut cluster = Cluster::of(11);
-    cluster.step(Event::Opened(Box::new(Opening { costs, ..opening(1, PIPELINE, 100) })));
+    cluster.step(Event::Opened(Box::new(Opening { costs: DEAR, ..opening(1, PIPELINE, 100) })));
     let plan = cluster.plan();
     assert!(plan.tile_count > 1, "{}", plan.tile_count);
     for round in 0..120 {
         for share in &plan.samplers {
             let tile_s =
-                |&part: &u32| costs.sample_this_tile_s((part % plan.tile_count) as usize, plan.tile_count as usize);
+                |&part: &u32| DEAR.sample_this_tile_s((part % plan.tile_count) as usize, plan.tile_count as usize);
             // The first builds shaders.
             let more_or_less = if round == 0 { 3.0 } else { 1.0 } * (0.8 + 0.1 * f64::from(share.image_indices[0] % 5));
             let tiles_s: f64 = more_or_less * share.image_indices.iter().map(tile_s).sum::<f64>();

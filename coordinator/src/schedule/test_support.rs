@@ -45,6 +45,16 @@ pub(super) const COSTS: Costs = Costs {
     sample_row_shares: [0.25; 4],
 };
 
+/// Light that is dear, on images whose upper half shows the sky.
+pub(super) const DEAR: Costs = Costs {
+    sample_image_s: 5.0,
+    sample_overhead_s: 0.5,
+    sample_row_shares: [0.05, 0.15, 0.4, 0.4],
+    reconstruct_view_s: 0.114,
+    load_set_s: 0.19,
+    ..COSTS
+};
+
 /// So many nodes that need `costs`.
 pub(super) fn nodes(count: usize, costs: Costs) -> Vec<NodeCosts> {
     vec![NodeCosts { costs, transfer_image_s: 0.0 }; count]

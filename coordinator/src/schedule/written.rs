@@ -303,6 +303,13 @@ fn seconds(value: f64, field: &'static str) -> Result<f64, Wrong> {
     Err(Wrong { field, reason: format!("is {value}, must be finite and not negative") })
 }
 
+fn row_shares(shares: [f64; ROW_PARTS]) -> Result<[f64; ROW_PARTS], Wrong> {
+    match shares.iter().find(|share| !(0.0..=1.0).contains(*share)) {
+        Some(share) => Err(Wrong { field: "sample_row_shares", reason: format!("has {share}, must be from 0 to 1") }),
+        None => Ok(shares),
+    }
+}
+
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -342,10 +349,7 @@ impl WrittenCosts {
             encode_view_s: seconds(self.encode_view_s, "encode_view_s")?,
             in_order: self.in_order,
             sample_overhead_s: seconds(self.sample_overhead_s, "sample_overhead_s")?,
-            sample_row_shares: {
-                let [a, b, c, d] = self.sample_row_shares.map(|share| seconds(share, "sample_row_shares"));
-                [a?, b?, c?, d?]
-            },
+            sample_row_shares: row_shares(self.sample_row_shares)?,
         })
     }
 }

@@ -56,12 +56,12 @@ fn naive_beside(told: &Told<'_>) -> Check {
 /// Where light is dear, images are cut: what whole ones allow at the best is passed.
 fn tiles_pay(dear: Option<&Told<'_>>, nodes: usize) -> [Check; 2] {
     let of = |ratio: fn(&Told<'_>, usize, usize) -> Option<f64>| dear.and_then(|dear| ratio(dear, nodes, TILED_VIEWS));
-    let where_ = format!("P = {nodes}, V = {TILED_VIEWS}, dear light, pipeline");
+    let at = format!("P = {nodes}, V = {TILED_VIEWS}, dear light, pipeline");
     let not = "no dear light was asked for";
     let over_bound = of(whole_images::over_bound);
     [
-        Check::maybe(format!("{where_}: over the bound of whole images"), over_bound, "×", Bar::AtLeast(1.0), not),
-        Check::maybe(format!("{where_}: over whole images"), of(whole_images::over_whole), "×", Bar::AtLeast(1.0), not),
+        Check::maybe(format!("{at}: over the bound of whole images"), over_bound, "×", Bar::AtLeast(1.0), not),
+        Check::maybe(format!("{at}: over whole images"), of(whole_images::over_whole), "×", Bar::AtLeast(1.0), not),
     ]
 }
 

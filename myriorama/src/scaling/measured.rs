@@ -201,11 +201,11 @@ async fn points(fleet: &mut Fleet, subject: &Subject, extent: Extent, lit: &mut 
 }
 
 fn in_words(point: &Point) -> String {
-    let (Point { ask, nodes, period_s, fill_s, .. }, policy) = (point, point.policy());
+    let (Point { ask, nodes, period_s, fill_s, later_plans, .. }, policy) = (point, point.policy());
     let (counted, others) = (ask.counted_sets, point.window.others_cores());
     format!(
-        "P = {nodes}, V = {}, {}: {policy}, T = {period_s:.3} s by {counted} sets after {fill_s:.2} s; {others:.2} cores \
-         for other programs",
+        "P = {nodes}, V = {}, {}: {policy}, T = {period_s:.3} s by {counted} sets after {fill_s:.2} s; changes of plan: \
+         {later_plans}; {others:.2} cores for other programs",
         ask.views, ask.policy
     )
 }
@@ -243,7 +243,7 @@ async fn point(
             progress.set_position((done_s + about_s * (arrived / frames).min(1.0)) as u64);
         });
         let point = point.await?;
-        if !point.plan_changed || attempt == ATTEMPTS {
+        if point.later_plans == 0 || attempt == ATTEMPTS {
             return Ok(point);
         }
     }

@@ -93,8 +93,8 @@ pub struct Point {
     pub nodes: usize,
     /// What the coordinator decided.
     pub plan: SessionPlan,
-    /// Whether another plan came while sets were made.
-    pub plan_changed: bool,
+    /// Plans that came while sets were made: each throws away what was sampled ahead.
+    pub later_plans: u64,
     /// T.
     pub period_s: f64,
     /// From the request to the last view of the first set.
@@ -222,7 +222,7 @@ pub async fn measure(fleet: &Fleet, subject: &Subject, ask: Ask, arrived: impl F
         Policy::Pipeline => fetch(&plan.assignment, ask.counted_sets).await.ok(),
         _ => None,
     };
-    let plan_changed = session.plan().assignment.plan_epoch != plan.assignment.plan_epoch;
+    let later_plans = session.plan().assignment.plan_epoch.saturating_sub(plan.assignment.plan_epoch);
     let (first_s, sets) = (arrivals.complete_s(0), f64::from(ask.counted_sets));
     let steps = Steps {
         sample_s: counted.image_s / counted.images.max(1.0) * subject.images() as f64,
@@ -230,7 +230,7 @@ pub async fn measure(fleet: &Fleet, subject: &Subject, ask: Ask, arrived: impl F
         ..arrivals.steps_of(ask.views)
     };
     let period_s = (arrivals.complete_s(ask.counted_sets) - first_s) / sets;
-    Ok(Point { ask, nodes: fleet.nodes(), plan, plan_changed, period_s, fill_s: first_s, steps, window, fetched })
+    Ok(Point { ask, nodes: fleet.nodes(), plan, later_plans, period_s, fill_s: first_s, steps, window, fetched })
 }
 
 async fn receive(

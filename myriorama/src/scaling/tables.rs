@@ -115,6 +115,7 @@ pub fn points_table(told: &Told<'_>) -> anyhow::Result<Table> {
         ("simulated", "s"),
         ("simulated / T", ""),
         ("used of quotas", ""),
+        ("changes of plan", ""),
         ("other programs", "cores"),
     ];
     let mut table = Table::new(format!("All points, {}", told.lit.lighting), &columns);
@@ -134,6 +135,7 @@ pub fn points_table(told: &Told<'_>) -> anyhow::Result<Table> {
             foretold.simulated_s.into(),
             (foretold.simulated_s / point.period_s).into(),
             point.window.used_share().into(),
+            (point.later_plans as f64).into(),
             point.window.others_cores().into(),
         ])?;
     }

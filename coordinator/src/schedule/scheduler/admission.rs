@@ -3,7 +3,7 @@
 use depth_image::PinholeCamera;
 use wire::limits::MAX_CELLS;
 
-use super::{Member, Scheduler};
+use super::Scheduler;
 use crate::schedule::choose::{Demand, check};
 use crate::schedule::work::Work;
 use crate::schedule::{ChoiceError, NodeCosts, Opening, choose};
@@ -17,11 +17,12 @@ impl Scheduler {
         let shared = self.work.as_ref().filter(|work| work.suits(opening));
         let mut work = shared.cloned().unwrap_or_else(|| Work::new(opening));
         work.add(opening);
-        let counting = self.members.values().filter(|member| self.counts(member, opening));
+        if shared.is_some() {
+            return admit(&work, &self.costs_now());
+        }
         let alone = NodeCosts { costs: opening.costs, ..NodeCosts::default() };
-        let costs = |member: &Member| if shared.is_some() { member.estimate.now() } else { alone };
-        let nodes: Vec<NodeCosts> = counting.map(costs).collect();
-        admit(&work, &nodes)
+        let counting = self.members.values().filter(|member| self.counts(member, opening)).count();
+        admit(&work, &vec![alone; counting])
     }
 
     /// Whether a session has been heard of and not ended.
