@@ -29,7 +29,7 @@ pub(super) struct Gain {
     pub(super) ratio: f64,
     /// Less is no reason.
     pub(super) worth: f64,
-    /// A set sampled and loaded anew.
+    /// What is sampled and loaded anew.
     pub(super) switch_s: f64,
 }
 

@@ -20,6 +20,8 @@ use super::{Choice, Command, Event, Load, NodeCosts, Opening, Wish, choose, dire
 
 /// A node that has nothing to do is given a role for less than roles are changed for.
 const WORTH_OF_IDLE: f64 = 1.02;
+/// Sets that are sampled anew when another plan comes: the one that is shown next, and the two that were asked for ahead.
+const SETS_LOST: usize = 3;
 /// Changes of role of one plan, unless a node was lost.
 const MOST_CHANGES: usize = 2;
 
@@ -400,7 +402,7 @@ impl Scheduler {
         let gain = Gain {
             ratio: present_s(&crew, &has_role)? / choice.time_s(),
             worth: if has_role.contains(&false) { WORTH_OF_IDLE } else { WORTH },
-            switch_s: sampled_s + mean.load_set_s,
+            switch_s: crew.load.sets.min(SETS_LOST) as f64 * sampled_s + mean.load_set_s,
         };
         Some((step_from(&crew.demand(), choice, &has_role, MOST_CHANGES), gain))
     }
