@@ -57,9 +57,11 @@ impl SamplerService {
         let (engine, metrics) = (self.engine.clone(), self.metrics.clone());
         let key = (content, plan.tile_count, indices.clone());
         let tiles = f64::from(plan.tile_count);
-        let sampling = self.sampling.clone();
+        let (sampling, current, plan_epoch) = (self.sampling.clone(), self.plan.clone(), plan.plan_epoch);
         let make = move || async move {
             let _one = sampling.lock().await;
+            // A later plan may have come meanwhile: its sets must not wait for what nobody wants any more.
+            current.require(plan_epoch)?;
             blocking(move || sample(engine.as_ref(), &work, (&indices, tiles), &metrics)).await
         };
         self.kept.get(key, make).await

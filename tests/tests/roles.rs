@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use client::{ClientError, Frame};
 use cluster_tests::cluster::{Cluster, camera, request, rig, views, whole_frame};
+use cluster_tests::scalar_engine::Pace;
 use glam::UVec2;
 use tokio_stream::StreamExt as _;
 use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
@@ -127,6 +128,38 @@ async fn a_relay_that_is_gone_is_passed_over() {
     let start = Instant::now();
     ask(&plan.compositors[2].address, &plan, 1).await;
     assert!(start.elapsed() < Duration::from_secs(2), "the next set is not asked of it any more");
+}
+
+/// While a set is sampled and the next one waits for it, another plan comes.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_was_not_begun_when_its_plan_ended_is_not_sampled() {
+    let cluster = Cluster::start(3).await;
+    let plan = chained(&cluster).await;
+    let share = plan.samplers[0].clone();
+    let engine = &cluster.engines[share.node_name[1..].parse::<usize>().unwrap()];
+    let _ = engine.take_counts();
+    engine.keep_pace(Pace { image: Duration::from_millis(200), ..Pace::default() });
+    let fetch = |set_index| {
+        let (address, image_indices) = (share.address.clone(), share.image_indices.clone());
+        let fetch = FetchImages { plan_epoch: plan.plan_epoch, set_index, cell: 0, image_indices };
+        tokio::spawn(async move {
+            let sampler = SamplerClient::new(connect(&address).await.unwrap());
+            sampler.fetch_sample_images(fetch).await.map(drop)
+        })
+    };
+    let begun = fetch(0);
+    while engine.take_counts().is_empty() {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    let waits = fetch(1);
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    let _ = engine.take_counts();
+    let next = Assignment { plan_epoch: plan.plan_epoch + 1, ..plan.clone() };
+    NodeClient::new(connect(&share.address).await.unwrap()).apply_assignment(next).await.unwrap();
+    begun.await.unwrap().unwrap();
+    let refused = waits.await.unwrap().unwrap_err();
+    assert!(refused.message().contains("plan_epoch"), "{refused}");
+    assert!(engine.take_counts().is_empty());
 }
 
 #[tokio::test(flavor = "multi_thread")]

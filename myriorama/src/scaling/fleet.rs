@@ -1,5 +1,6 @@
 //! A coordinator and P nodes, each a process, the nodes each with an equal share of the machine.
 
+use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -43,14 +44,20 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Starts all of them, without a limit yet, and waits until all nodes have joined.
+    /// Starts all of them, without a limit yet, and waits until all nodes have joined. What happens to the schedule is
+    /// written to `event_log`, for `myriorama replay`.
     ///
     /// # Errors
     /// Where processes or control groups cannot be had.
-    pub async fn start(scene: &SceneArgs, device: DevicePreference, nodes: usize) -> anyhow::Result<Self> {
+    pub async fn start(
+        scene: &SceneArgs,
+        device: DevicePreference,
+        nodes: usize,
+        event_log: &Path,
+    ) -> anyhow::Result<Self> {
         let hierarchy = Hierarchy::find()?;
         let own = OwnGroup::new(&hierarchy, &format!("myriorama-{}", std::process::id()))?;
-        let mut coordinator = Process::start("coordinator", &coordinator_arguments(scene))?;
+        let mut coordinator = Process::start("coordinator", &coordinator_arguments(scene, event_log))?;
         own.admit(coordinator.id())?;
         let url = coordinator.address()?;
         let mut started = Vec::new();
@@ -183,9 +190,9 @@ impl Fleet {
 }
 
 /// What the coordinator offers is what sessions ask for anyway, but for the scene.
-fn coordinator_arguments(scene: &SceneArgs) -> Vec<String> {
-    let scene = scene.scene.to_string();
-    ["coordinator", "--listen", "127.0.0.1:0", "--scene", &scene].map(str::to_owned).into()
+fn coordinator_arguments(scene: &SceneArgs, event_log: &Path) -> Vec<String> {
+    let (scene, event_log) = (scene.scene.to_string(), event_log.display().to_string());
+    ["coordinator", "--listen", "127.0.0.1:0", "--scene", &scene, "--record", &event_log].map(str::to_owned).into()
 }
 
 fn node_arguments(number: usize, coordinator: &str, device: DevicePreference) -> Vec<String> {

@@ -1,5 +1,6 @@
 //! The measuring itself: from no process at all to every point, and back to none.
 
+use std::path::PathBuf;
 use std::time::Instant;
 
 use gpu::DevicePreference;
@@ -35,6 +36,8 @@ pub struct Request {
     pub lighting: Lighting,
     /// A second table's.
     pub dear_lighting: Option<Lighting>,
+    /// Where all that happens to the schedule is written.
+    pub event_log: PathBuf,
 }
 
 /// What P nodes timed at the same time, each with its quota, before the points and after them.
@@ -134,7 +137,7 @@ async fn take_undisturbed(request: &Request, subject: &Subject) -> anyhow::Resul
     let start = Instant::now();
     let nodes = request.extent.nodes;
     let quota_cores = request.quota_cores.unwrap_or_else(|| default_quota(nodes));
-    let mut fleet = Fleet::start(&subject.args, request.device, nodes).await?;
+    let mut fleet = Fleet::start(&subject.args, request.device, nodes, &request.event_log).await?;
     let device = fleet.client.status().await?.nodes.first().map_or_else(String::new, |node| node.device_name.clone());
     println!("{nodes} nodes of {quota_cores:.3} cores each on {device}");
     let unlimited = warm(&fleet, subject, request.lighting).await?;

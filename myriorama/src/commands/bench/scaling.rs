@@ -1,7 +1,9 @@
 //! `myriorama bench scaling`.
 
+use std::fs::create_dir_all;
 use std::path::PathBuf;
 
+use anyhow::Context as _;
 use clap::Args;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -78,6 +80,7 @@ impl ScalingArgs {
             quota_cores: self.quota,
             lighting: self.lighting,
             dear_lighting,
+            event_log: self.out.join("schedule.log"),
         })
     }
 }
@@ -88,6 +91,7 @@ impl ScalingArgs {
 /// Input that cannot be used, no control groups, or a failure of the cluster.
 pub fn run(args: &ScalingArgs) -> anyhow::Result<Outcome> {
     let request = args.request()?;
+    create_dir_all(&args.out).with_context(|| format!("cannot write to {}", args.out.display()))?;
     let scene = SceneArgs { method: args.method, ..SceneArgs::of(args.scene.clone()) };
     let subject = Subject::load(&scene)?;
     let measured = runtime()?.block_on(take(&request, &subject))?;
