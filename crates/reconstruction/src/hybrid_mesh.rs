@@ -10,7 +10,7 @@ use crate::{
     ErrorBound, ReconstructionError, Reconstructor, ShaderKey,
     layout::GpuCutWork,
     quads::{ImageCut, buffers},
-    word_texture,
+    word_texture::{self, WordTexture, WordTextures},
 };
 
 const WORKGROUP_PX: u32 = 8;
@@ -21,7 +21,7 @@ pub(crate) const GREATEST_EXTENT: UVec2 = UVec2::new(64, 16);
 
 /// What corners of quads are made from, on the device: see `planes` in `hybrid_mesh.wgsl`.
 pub(crate) struct CornerPlanes {
-    texels: wgpu::TextureView,
+    texels: WordTexture,
     /// Of each image its first texel.
     pub first_corners: Vec<u32>,
 }
@@ -38,7 +38,7 @@ pub(crate) fn missing_plane(images: &[DepthImage]) -> Option<(usize, &'static st
 
 impl CornerPlanes {
     /// Of images that have all planes.
-    pub fn upload(gpu: &Gpu, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
+    pub fn upload(gpu: &Gpu, textures: &WordTextures, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
         let count = images.iter().map(|image| (image.size_px() + 1).element_product() as usize).sum();
         word_texture::check(gpu, "corners", count)?;
         let mut texels = word_texture::room(count);
@@ -47,7 +47,7 @@ impl CornerPlanes {
             first_corners.push(texels.len() as u32);
             texels.extend(corner_texels(image));
         }
-        Ok(Self { texels: word_texture::upload(gpu, "corners", texels)?, first_corners })
+        Ok(Self { texels: textures.upload("corners", texels)?, first_corners })
     }
 }
 

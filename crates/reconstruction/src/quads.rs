@@ -15,6 +15,7 @@ use crate::{
     hybrid_mesh::{self, CornerPlanes},
     layout::{GpuCutWork, GpuSampleCamera, GpuViewCamera},
     mesh,
+    word_texture::WordTextures,
 };
 
 /// `CHUNK` of `cut.wgsl`.
@@ -89,14 +90,14 @@ pub(crate) struct SetMeshes {
 
 impl SetMeshes {
     /// Planes go to the device where every image has them.
-    pub fn upload(gpu: &Gpu, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
+    pub fn upload(gpu: &Gpu, textures: &WordTextures, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
         let camera = |image: &DepthImage| {
             let Camera::Pinhole(camera) = &image.camera;
             *camera
         };
         let planes = match hybrid_mesh::missing_plane(images) {
             Some(missing) => Err(missing),
-            None => Ok(CornerPlanes::upload(gpu, images)?),
+            None => Ok(CornerPlanes::upload(gpu, textures, images)?),
         };
         Ok(Self { cameras: images.iter().map(camera).collect(), planes, cut: Mutex::default() })
     }

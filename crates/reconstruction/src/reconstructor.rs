@@ -15,6 +15,7 @@ use crate::{
     layout::{GpuFillWork, GpuList, GpuSampleCamera, GpuViewCamera, GpuViewWork},
     quad_drawing::{QuadDrawing, Targets},
     shader_text,
+    word_texture::WordTextures,
 };
 
 const TILE_PX: u32 = 8;
@@ -40,6 +41,7 @@ pub struct Statistics {
 pub struct Reconstructor {
     pub(crate) gpu: Arc<Gpu>,
     pub(crate) pool: BufferPool,
+    textures: WordTextures,
     pub(crate) templates: Templates,
     pipelines: Mutex<HashMap<ShaderKey, Arc<wgpu::ComputePipeline>>>,
     pub(crate) drawing: QuadDrawing,
@@ -130,7 +132,7 @@ const FETCHES: usize = 3;
 impl Batch {
     /// What all passes over sample cameras begin with.
     fn over<'b>(&'b self, set: &'b SampleSet) -> Vec<BindingResource<'b>> {
-        let textures = [&set.nodes, &set.cell_codes].map(BindingResource::TextureView);
+        let textures = [&set.nodes, &set.cell_codes].map(|texture| BindingResource::TextureView(texture));
         [self.works.as_entire_binding()].into_iter().chain(textures).collect()
     }
 
@@ -166,6 +168,7 @@ impl Reconstructor {
         Ok(Self {
             gpu: gpu.clone(),
             pool: BufferPool::new(gpu),
+            textures: WordTextures::new(gpu),
             templates: Templates::new(SHADERS)?,
             pipelines: Mutex::default(),
             drawing: QuadDrawing::default(),
@@ -177,7 +180,7 @@ impl Reconstructor {
     /// # Errors
     /// Images, cameras or a volume that cannot be used, or the device's limits.
     pub fn upload(&self, images: &[DepthImage], set: &SetDescription<'_>) -> Result<SampleSet, ReconstructionError> {
-        SampleSet::upload(&self.gpu, images, set)
+        SampleSet::upload(&self.gpu, &self.textures, images, set)
     }
 
     /// One view a camera, in their order.

@@ -4,7 +4,8 @@ use depth_image::{DepthImage, Highlight, Illumination, SpecularPlanes};
 use gpu::{Gpu, GpuError, illumination_bytes};
 use wgpu::BufferUsages;
 
-use crate::{ReconstructionError, SetDescription, word_texture};
+use crate::word_texture::{WordTexture, WordTextures};
+use crate::{ReconstructionError, SetDescription};
 
 /// A normal and a reflector before the words of visibility.
 const WORDS_BEFORE_VISIBILITY: usize = 2;
@@ -15,7 +16,7 @@ pub(crate) struct Reflectors {
     pub highlight: Highlight,
     pub lights: usize,
     pub visibility_words: usize,
-    pub samples: wgpu::TextureView,
+    pub samples: WordTexture,
     pub illumination: wgpu::Buffer,
 }
 
@@ -23,6 +24,7 @@ impl Reflectors {
     /// `None` where no highlights are asked for or nothing reflects.
     pub fn upload(
         gpu: &Gpu,
+        textures: &WordTextures,
         images: &[DepthImage],
         set: &SetDescription<'_>,
     ) -> Result<Option<Self>, ReconstructionError> {
@@ -35,7 +37,7 @@ impl Reflectors {
             highlight,
             lights: set.illumination.lights.len(),
             visibility_words,
-            samples: word_texture::upload(gpu, "reflectors", sample_words(images, visibility_words))?,
+            samples: textures.upload("reflectors", sample_words(images, visibility_words))?,
             illumination: gpu.buffer_with("illumination", &bytes, BufferUsages::UNIFORM),
         }))
     }

@@ -10,7 +10,7 @@ use crate::{
     pyramid::{cell_row, is_among_holes},
     quads::SetMeshes,
     reflectors::Reflectors,
-    word_texture,
+    word_texture::{self, WordTexture, WordTextures},
 };
 
 /// A surface on the very face of the volume must still be entered, by all cameras, whose samples of a slope are
@@ -40,9 +40,9 @@ pub struct SampleSet {
     pub(crate) uncertain: Vec<bool>,
     pub(crate) volume: GpuVolume,
     /// Of pyramids.
-    pub(crate) nodes: wgpu::TextureView,
-    pub(crate) cell_codes: wgpu::TextureView,
-    pub(crate) cell_colors: wgpu::TextureView,
+    pub(crate) nodes: WordTexture,
+    pub(crate) cell_codes: WordTexture,
+    pub(crate) cell_colors: WordTexture,
     pub(crate) reflectors: Option<Reflectors>,
     pub(crate) meshes: SetMeshes,
 }
@@ -59,6 +59,7 @@ impl SampleSet {
     /// Too many images, planes or cameras that do not fit, or a set beyond the device's limits.
     pub(crate) fn upload(
         gpu: &Gpu,
+        textures: &WordTextures,
         images: &[DepthImage],
         set: &SetDescription<'_>,
     ) -> Result<Self, ReconstructionError> {
@@ -88,11 +89,11 @@ impl SampleSet {
             cameras,
             uncertain,
             volume: gpu_volume(&searched_volume(&set.volume, images), set.background_linear),
-            nodes: word_texture::upload(gpu, "depth pyramids", nodes)?,
-            cell_codes: word_texture::upload(gpu, "cells", codes)?,
-            cell_colors: word_texture::upload(gpu, "sample colours", colors)?,
-            reflectors: Reflectors::upload(gpu, images, set)?,
-            meshes: SetMeshes::upload(gpu, images)?,
+            nodes: textures.upload("depth pyramids", nodes)?,
+            cell_codes: textures.upload("cells", codes)?,
+            cell_colors: textures.upload("sample colours", colors)?,
+            reflectors: Reflectors::upload(gpu, textures, images, set)?,
+            meshes: SetMeshes::upload(gpu, textures, images)?,
         })
     }
 }
