@@ -1,15 +1,19 @@
 //! Views from sample sets, in batches: tile starts, the method, and the fill, in one submission each.
 
+mod bindings;
+mod in_flight;
+
 use std::{
     collections::HashMap,
     sync::{Arc, Mutex, PoisonError},
 };
 
-use depth_image::{DepthImage, PinholeCamera, Provenance, View, ViewPlanes};
+use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
-use gpu::{BufferPool, Frame, Gpu, PooledBuffer, Readback, Submitted, Templates};
+use gpu::{BufferPool, Frame, Gpu, PooledBuffer, Templates};
 use wgpu::{BindingResource, BufferUsages};
 
+use self::in_flight::{InFlight, Reads};
 use crate::{
     ReconstructionError, ReconstructionMethod, SHADERS, SampleSet, SetDescription, ShaderKey,
     layout::{GpuFillWork, GpuList, GpuSampleCamera, GpuViewCamera, GpuViewWork},
@@ -47,67 +51,6 @@ pub struct Reconstructor {
     pub(crate) drawing: QuadDrawing,
 }
 
-/// What a shader finds at a binding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Slot {
-    /// The view's uniform, at a dynamic offset.
-    View,
-    Uniform,
-    Read,
-    Write,
-    /// See `word_texture`.
-    Words,
-    /// A layer for each view of a batch: what of its depth was drawn, and of which samples.
-    DrawnDepth,
-    DrawnSamples,
-}
-
-impl Slot {
-    fn ty(self) -> wgpu::BindingType {
-        let buffer =
-            |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: self == Self::View, min_binding_size: None };
-        let texture = |sample_type, view_dimension| wgpu::BindingType::Texture {
-            sample_type,
-            view_dimension,
-            multisampled: false,
-        };
-        match self {
-            Self::View | Self::Uniform => buffer(wgpu::BufferBindingType::Uniform),
-            Self::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
-            Self::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
-            Self::Words => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
-            Self::DrawnDepth => texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2Array),
-            Self::DrawnSamples => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2Array),
-        }
-    }
-
-    fn entry(self, binding: u32) -> wgpu::BindGroupLayoutEntry {
-        let visibility = wgpu::ShaderStages::COMPUTE;
-        wgpu::BindGroupLayoutEntry { binding, visibility, ty: self.ty(), count: None }
-    }
-}
-
-/// A shader's bindings, in their order.
-fn slots(key: ShaderKey) -> Vec<Slot> {
-    use Slot::{DrawnDepth, DrawnSamples, Read, Uniform, View, Words, Write};
-    match key.name {
-        "tile_start.wgsl" => vec![View, Words, Words, Write],
-        "fill.wgsl" => vec![View, Write, Write, Read, Read, Read],
-        "specular.wgsl" => vec![View, Words, Words, Write, Read, Read, Uniform, Words],
-        "mesh.wgsl" | "hybrid_mesh.wgsl" => vec![Uniform, Words, Write, Write],
-        "merge.wgsl" | "quad_count.wgsl" => vec![Uniform, Read, Write, Write],
-        "quad_scan.wgsl" => vec![Uniform, Write, Write],
-        "quad_indices.wgsl" => vec![Uniform, Read, Read, Write],
-        _ => {
-            let mut slots = vec![View, Words, Words, Read, Write, Write, Write, Write, Write, Words];
-            slots.extend(key.count_fetches.then_some(Write));
-            slots.extend([Read, Read].into_iter().filter(|_| key.march_camera > 0));
-            slots.extend([DrawnDepth, DrawnSamples].into_iter().filter(|_| key.name == "resolve.wgsl"));
-            slots
-        }
-    }
-}
-
 /// Views of one size that are made together, and what that takes on the device.
 struct Batch {
     size_px: UVec2,
@@ -139,24 +82,6 @@ impl Batch {
     fn list(&self, pass: usize) -> [BindingResource<'_>; 2] {
         [self.list_pixels[pass].as_entire_binding(), self.lists[pass].as_entire_binding()]
     }
-}
-
-/// One batch on its way.
-struct InFlight<'g> {
-    submitted: Submitted<'g>,
-    reads: Reads,
-    size_px: UVec2,
-    count: usize,
-    /// Lent until the device is done with it.
-    _batch: Batch,
-}
-
-#[derive(Clone, Copy)]
-struct Reads {
-    srgb8: Readback,
-    inverse_depth: Option<Readback>,
-    provenance: Option<Readback>,
-    fetches: Option<Readback>,
 }
 
 impl Reconstructor {
@@ -386,32 +311,6 @@ impl Reconstructor {
         }
     }
 
-    fn layout(&self, key: ShaderKey) -> wgpu::BindGroupLayout {
-        let entries: Vec<_> = (0..).zip(slots(key)).map(|(binding, slot)| slot.entry(binding)).collect();
-        self.gpu
-            .device
-            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(key.name), entries: &entries })
-    }
-
-    /// The first resource is the views' uniforms, of which a shader sees one.
-    fn bind(
-        &self,
-        pipeline: &wgpu::ComputePipeline,
-        stride: u32,
-        mut resources: Vec<BindingResource<'_>>,
-    ) -> wgpu::BindGroup {
-        if let Some(BindingResource::Buffer(views)) = resources.first_mut() {
-            views.size = std::num::NonZeroU64::new(u64::from(stride));
-        }
-        let entries: Vec<_> =
-            (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
-        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        })
-    }
-
     pub(crate) fn pipeline(&self, key: ShaderKey) -> Result<Arc<wgpu::ComputePipeline>, ReconstructionError> {
         let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pipeline) = pipelines.get(&key) {
@@ -481,47 +380,6 @@ fn fill_works(size_px: UVec2, count: usize) -> Vec<u8> {
         let work = GpuFillWork { size_px: size_px.to_array(), first_pixel: number * size_px.element_product(), number };
         slot[..size_of::<GpuFillWork>()].copy_from_slice(bytemuck::bytes_of(&work));
     }
-    bytes
-}
-
-impl InFlight<'_> {
-    fn finish(self, views: &mut Vec<View>, statistics: &mut Statistics) -> Result<(), ReconstructionError> {
-        let result = self.submitted.wait()?;
-        statistics.device_s += result.device_s;
-        let pixels = self.size_px.element_product() as usize;
-        let planes = |readback: Readback| {
-            result.with(readback, |words: &[u32]| {
-                words.chunks(pixels).take(self.count).map(<[u32]>::to_vec).collect::<Vec<_>>()
-            })
-        };
-        let mut rgb = result
-            .with(self.reads.srgb8, |words: &[u32]| {
-                words.chunks(pixels).take(self.count).map(rgb_bytes).collect::<Vec<_>>()
-            })?
-            .into_iter();
-        let mut depths = self.reads.inverse_depth.map(planes).transpose()?.unwrap_or_default().into_iter();
-        let mut provenances = self.reads.provenance.map(planes).transpose()?.unwrap_or_default().into_iter();
-        if let Some(readback) = self.reads.fetches {
-            let sum: f64 = result
-                .with(readback, |words: &[u32]| words[..pixels * self.count].iter().map(|&n| f64::from(n)).sum())?;
-            *statistics.fetches_per_ray.get_or_insert(0.0) += sum / pixels as f64;
-        }
-        views.extend((0..self.count).map(|_| View {
-            size_px: self.size_px,
-            srgb8: rgb.next().unwrap_or_default(),
-            inverse_depth_per_m: depths.next().map(bytemuck::cast_vec),
-            provenance: provenances.next().map(|words| words.into_iter().map(Provenance).collect()),
-        }));
-        Ok(())
-    }
-}
-
-fn rgb_bytes(rgba: &[u32]) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(rgba.len() * 3);
-    bytes.extend(rgba.iter().flat_map(|word| {
-        let [r, g, b, _] = word.to_le_bytes();
-        [r, g, b]
-    }));
     bytes
 }
 
