@@ -3,6 +3,7 @@
 use depth_image::{Aabb, Camera, DepthImage, Highlight, Illumination, PinholeCamera, srgb8_from_linear};
 use glam::{Vec2, Vec3};
 use gpu::Gpu;
+use rayon::prelude::*;
 
 use crate::{
     CodedDepth, Pyramid, ReconstructionError,
@@ -65,23 +66,20 @@ impl SampleSet {
     ) -> Result<Self, ReconstructionError> {
         check(gpu, images, &set.volume)?;
         let among_holes = is_among_holes(images);
-        let mut cameras = Vec::with_capacity(images.len());
-        let mut uncertain = Vec::with_capacity(images.len());
+        let coded: Vec<CodedImage> = images.par_iter().map(|image| CodedImage::of(image, among_holes)).collect();
         let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(word_texture::room);
         let mut colors = word_texture::room(cell_count(images));
-        for image in images {
-            let depth = CodedDepth::in_set(image, among_holes);
-            let pyramid = Pyramid::of(&depth);
-            uncertain.push(!depth.uncertain.is_empty());
-            let Camera::Pinhole(camera) = &image.camera;
+        let mut cameras = Vec::with_capacity(images.len());
+        let uncertain = coded.iter().map(|coded| coded.uncertain).collect();
+        for (image, coded) in images.iter().zip(coded) {
             cameras.push(GpuSampleCamera {
                 mask: 1 << cameras.len(),
                 first_node: nodes.len() as u32,
                 first_cell: codes.len() as u32,
-                ..sample_camera(camera, &depth, &pyramid)
+                ..coded.camera
             });
-            nodes.extend(pyramid.words.iter().zip(pyramid.wide_words()).map(|(&range, wide)| [range, wide]));
-            codes.extend(depth.cell_words());
+            nodes.extend(coded.nodes);
+            codes.extend(coded.cells);
             let [columns, rows] = image.size_px().to_array().map(|side| side as usize);
             (0..rows).for_each(|y| colors.extend(cell_row(&image.color_rgb9e5, columns, y)));
         }
@@ -95,6 +93,29 @@ impl SampleSet {
             reflectors: Reflectors::upload(gpu, textures, images, set)?,
             meshes: SetMeshes::upload(gpu, textures, images)?,
         })
+    }
+}
+
+/// One image, as shaders see it.
+struct CodedImage {
+    uncertain: bool,
+    /// But for its place in the set.
+    camera: GpuSampleCamera,
+    nodes: Vec<[u32; 2]>,
+    cells: Vec<[u32; 2]>,
+}
+
+impl CodedImage {
+    fn of(image: &DepthImage, among_holes: bool) -> Self {
+        let depth = CodedDepth::in_set(image, among_holes);
+        let pyramid = Pyramid::of(&depth);
+        let Camera::Pinhole(camera) = &image.camera;
+        Self {
+            uncertain: !depth.uncertain.is_empty(),
+            camera: sample_camera(camera, &depth, &pyramid),
+            nodes: pyramid.words.iter().zip(pyramid.wide_words()).map(|(&range, wide)| [range, wide]).collect(),
+            cells: depth.cell_words(),
+        }
     }
 }
 
