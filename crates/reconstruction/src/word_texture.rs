@@ -13,8 +13,10 @@ use wgpu::util::StagingBelt;
 /// Texels in a row; the n-th lies in column `n % WIDTH`, row `n / WIDTH`.
 pub(crate) const WIDTH: u32 = 4096;
 
-/// Textures that are kept for the next set: those of two sets.
-const MOST_FREE: usize = 8;
+/// Textures that are kept for the next set: as many as a set has at the most.
+const MOST_FREE: usize = 5;
+/// Larger textures are filled through memory that is not kept: there is much of it, and a device may have no buffer so large.
+const MOST_KEPT_BYTES: usize = 64 << 20;
 /// Of rows within a chunk.
 const ROW_ALIGNMENT: wgpu::BufferSize = wgpu::BufferSize::new(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as u64).unwrap();
 
@@ -59,7 +61,7 @@ pub(crate) struct WordTextures {
     staging: Mutex<Staging>,
 }
 
-/// Chunks of one size, that of the largest texture so far: as many as are under way at once.
+/// Chunks of one size, that of the largest texture so far that was filled through it: as many as are under way at once.
 struct Staging {
     belt: StagingBelt,
     chunk_bytes: u64,
@@ -88,7 +90,13 @@ impl WordTextures {
         let rows = rows(texels.len());
         texels.resize(rows * WIDTH as usize, T::zeroed());
         let texture = self.lend(label, (T::FORMAT, rows as u32));
-        self.fill(texture.view.texture(), bytemuck::cast_slice(&texels))?;
+        let bytes: &[u8] = bytemuck::cast_slice(&texels);
+        if bytes.len() <= MOST_KEPT_BYTES {
+            self.fill(texture.view.texture(), bytes)?;
+        } else {
+            let (texture, layout) = (texture.view.texture(), row_by_row(bytes.len() / rows, 0));
+            self.gpu.queue.write_texture(texture.as_image_copy(), bytes, layout, texture.size());
+        }
         Ok(texture)
     }
 
@@ -106,8 +114,7 @@ impl WordTextures {
         let chunk = staging.chunk(&self.gpu, bytes.len() as u64);
         let lost = |error: wgpu::MapRangeError| GpuError::Lost(error.to_string());
         chunk.get_mapped_range_mut().map_err(lost)?.copy_from_slice(bytes);
-        let bytes_per_row = Some((bytes.len() / texture.height() as usize) as u32);
-        let layout = wgpu::TexelCopyBufferLayout { offset: chunk.offset(), bytes_per_row, rows_per_image: None };
+        let layout = row_by_row(bytes.len() / texture.height() as usize, chunk.offset());
         let from = wgpu::TexelCopyBufferInfo { buffer: chunk.buffer(), layout };
         let mut frame = Frame::begin(&self.gpu, "fill a texture");
         frame.encoder.copy_buffer_to_texture(from, texture.as_image_copy(), texture.size());
@@ -148,6 +155,10 @@ impl Drop for WordTexture {
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn row_by_row(row_bytes: usize, offset: u64) -> wgpu::TexelCopyBufferLayout {
+    wgpu::TexelCopyBufferLayout { offset, bytes_per_row: Some(row_bytes as u32), rows_per_image: None }
 }
 
 fn rows(texels: usize) -> usize {

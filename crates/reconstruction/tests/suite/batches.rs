@@ -64,6 +64,18 @@ fn a_set_shows_nothing_of_the_one_before_it() {
     drop(before);
 }
 
+/// Its textures are filled another way than those of small ones.
+#[test]
+fn images_of_four_million_samples_are_seen_as_they_are() {
+    let sample = corners().camera(0.0, 0.0, UVec2::splat(2100));
+    let stage = Stage::new(uv_sphere(1.0, 24), &[sample]);
+    let camera = corners().camera(0.1, 0.05, UVec2::new(32, 24));
+    let (view, twin) = (stage.view(&camera, CARVE), stage.twin(&camera, CARVE));
+    let differ = view.srgb8.iter().zip(&twin.srgb8).filter(|(a, b)| a.abs_diff(**b) > 2).count();
+    assert!(differ * 100 <= view.srgb8.len(), "{differ} of {}", view.srgb8.len());
+    assert!(view.srgb8.iter().any(|&value| value > 30), "something is seen");
+}
+
 #[test]
 fn no_views_are_no_views() {
     let set = stage().upload();
