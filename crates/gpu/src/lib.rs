@@ -16,5 +16,5 @@ mod template;
 pub use device::{DevicePreference, Gpu, GpuError};
 pub use frame::{Frame, FrameResult, Readback, Submitted};
 pub use illumination::{GpuLight, illumination_bytes, light_slots};
-pub use pool::{BufferPool, PooledBuffer};
+pub use pool::{BufferPool, Lent, Pool, PooledBuffer};
 pub use template::{TemplateError, Templates};

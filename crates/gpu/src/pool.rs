@@ -1,50 +1,111 @@
-//! Buffers that live longer than one frame: making and zeroing them each time costs more than many passes.
+//! What lives longer than one frame: making it each time costs more than many passes, and its memory a page fault for every
+//! 4 KiB where the device is a processor.
 
 use std::{
-    collections::HashMap,
+    collections::VecDeque,
     ops::Deref,
     sync::{Arc, Mutex, PoisonError, Weak},
 };
 
 use crate::Gpu;
 
-type Key = (u64, wgpu::BufferUsages);
-type Free = Mutex<HashMap<Key, Vec<wgpu::Buffer>>>;
+/// What nobody has, what was given back last at the end.
+type Free<K, T> = Mutex<VecDeque<(K, T)>>;
 
-/// Lends buffers of sizes rounded up to a power of two; they come back when dropped.
-pub struct BufferPool {
-    gpu: Arc<Gpu>,
-    free: Arc<Free>,
+/// Lends things of a kind; they come back when dropped.
+pub struct Pool<K, T> {
+    free: Arc<Free<K, T>>,
+    most_free: usize,
 }
 
-/// A buffer on loan; contents are whatever the last borrower left.
-pub struct PooledBuffer {
-    buffer: Option<wgpu::Buffer>,
-    key: Key,
-    home: Weak<Free>,
+/// On loan; contents are whatever the last borrower left.
+pub struct Lent<K, T> {
+    lent: Option<(K, T)>,
+    home: Weak<Free<K, T>>,
+    most_free: usize,
+}
+
+/// A buffer's size and usage.
+pub type BufferKind = (u64, wgpu::BufferUsages);
+/// A buffer on loan.
+pub type PooledBuffer = Lent<BufferKind, wgpu::Buffer>;
+
+/// Lends buffers of sizes rounded up to a power of two.
+pub struct BufferPool {
+    gpu: Arc<Gpu>,
+    buffers: Pool<BufferKind, wgpu::Buffer>,
+}
+
+impl<K, T> Pool<K, T> {
+    /// Keeps so many at the most that nobody has; what was given back first goes first.
+    #[must_use]
+    pub fn keeping(most_free: usize) -> Self {
+        Self { free: Arc::default(), most_free }
+    }
+}
+
+impl<K: PartialEq, T> Pool<K, T> {
+    /// One of this kind, made where none is free.
+    #[must_use]
+    pub fn lend(&self, kind: K, make: impl FnOnce(&K) -> T) -> Lent<K, T> {
+        let kept = {
+            let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
+            free.iter().rposition(|(other, _)| *other == kind).and_then(|at| free.remove(at))
+        };
+        let lent = kept.unwrap_or_else(|| {
+            let made = make(&kind);
+            (kind, made)
+        });
+        Lent { lent: Some(lent), home: Arc::downgrade(&self.free), most_free: self.most_free }
+    }
+}
+
+impl<K, T> Lent<K, T> {
+    fn lent(&self) -> &(K, T) {
+        self.lent.as_ref().expect("present until dropped")
+    }
+
+    /// Of which kind it is.
+    #[must_use]
+    pub fn kind(&self) -> &K {
+        &self.lent().0
+    }
+}
+
+impl<K, T> Deref for Lent<K, T> {
+    type Target = T;
+    fn deref(&self) -> &T {
+        &self.lent().1
+    }
+}
+
+impl<K, T> Drop for Lent<K, T> {
+    fn drop(&mut self) {
+        let (Some(home), Some(lent)) = (self.home.upgrade(), self.lent.take()) else { return };
+        let mut free = home.lock().unwrap_or_else(PoisonError::into_inner);
+        free.push_back(lent);
+        while free.len() > self.most_free {
+            free.pop_front();
+        }
+    }
 }
 
 impl BufferPool {
     /// An empty pool.
     #[must_use]
     pub fn new(gpu: &Arc<Gpu>) -> Self {
-        Self { gpu: gpu.clone(), free: Arc::default() }
+        Self { gpu: gpu.clone(), buffers: Pool::keeping(usize::MAX) }
     }
 
     /// A buffer of at least `bytes`.
     #[must_use]
     pub fn lend(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> PooledBuffer {
-        let key = (bytes.max(256).next_power_of_two().min(bytes.max(256).next_multiple_of(1 << 22)), usage);
-        let kept = self.free.lock().unwrap_or_else(PoisonError::into_inner).get_mut(&key).and_then(Vec::pop);
-        let buffer = kept.unwrap_or_else(|| {
-            self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: key.0,
-                usage,
-                mapped_at_creation: false,
-            })
-        });
-        PooledBuffer { buffer: Some(buffer), key, home: Arc::downgrade(&self.free) }
+        let size = bytes.max(256).next_power_of_two().min(bytes.max(256).next_multiple_of(1 << 22));
+        self.buffers.lend((size, usage), |_| {
+            let mapped_at_creation = false;
+            let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation };
+            self.gpu.device.create_buffer(&descriptor)
+        })
     }
 
     /// A device buffer that shaders write and copies read.
@@ -64,17 +125,25 @@ impl BufferPool {
     }
 }
 
-impl Deref for PooledBuffer {
-    type Target = wgpu::Buffer;
-    fn deref(&self) -> &wgpu::Buffer {
-        self.buffer.as_ref().expect("present until dropped")
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl Drop for PooledBuffer {
-    fn drop(&mut self) {
-        if let (Some(home), Some(buffer)) = (self.home.upgrade(), self.buffer.take()) {
-            home.lock().unwrap_or_else(PoisonError::into_inner).entry(self.key).or_default().push(buffer);
-        }
+    #[test]
+    fn what_comes_back_is_lent_again_and_not_too_much_is_kept() {
+        let pool = Pool::keeping(2);
+        let lend = |kind: char, value: u32| pool.lend(kind, |_| value);
+        let (a, b) = (lend('a', 1), lend('b', 2));
+        assert_eq!((*a, *lend('a', 3), *a.kind()), (1, 3, 'a'), "the first one is in use");
+        drop(a);
+        assert_eq!(*lend('a', 4), 1, "what came back last");
+        drop(b);
+        assert_eq!((*lend('b', 5), *lend('a', 6)), (2, 1));
+        assert_eq!(*lend('a', 7), 1);
+        drop((lend('c', 8), lend('d', 9), lend('e', 10)));
+        assert_eq!(*lend('a', 11), 11, "two are kept, none of them this");
+        let outlives = lend('f', 12);
+        drop(pool);
+        assert_eq!(*outlives, 12);
     }
 }

@@ -3,7 +3,7 @@
 
 use depth_image::{DepthImage, HOLE_INVERSE_DEPTH};
 use glam::UVec2;
-use gpu::{Frame, Gpu};
+use gpu::Frame;
 use wgpu::BindingResource;
 
 use crate::{
@@ -38,9 +38,9 @@ pub(crate) fn missing_plane(images: &[DepthImage]) -> Option<(usize, &'static st
 
 impl CornerPlanes {
     /// Of images that have all planes.
-    pub fn upload(gpu: &Gpu, textures: &WordTextures, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
+    pub fn upload(textures: &WordTextures, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
         let count = images.iter().map(|image| (image.size_px() + 1).element_product() as usize).sum();
-        word_texture::check(gpu, "corners", count)?;
+        textures.check("corners", count)?;
         let mut texels = word_texture::room(count);
         let mut first_corners = Vec::with_capacity(images.len());
         for image in images {

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use glam::{UVec2, Vec2, Vec3};
-use gpu::{Frame, Gpu, PooledBuffer, Readback};
+use gpu::{Frame, PooledBuffer, Readback};
 use wgpu::{BindingResource, BufferUsages};
 
 use crate::{
@@ -90,14 +90,14 @@ pub(crate) struct SetMeshes {
 
 impl SetMeshes {
     /// Planes go to the device where every image has them.
-    pub fn upload(gpu: &Gpu, textures: &WordTextures, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
+    pub fn upload(textures: &WordTextures, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
         let camera = |image: &DepthImage| {
             let Camera::Pinhole(camera) = &image.camera;
             *camera
         };
         let planes = match hybrid_mesh::missing_plane(images) {
             Some(missing) => Err(missing),
-            None => Ok(CornerPlanes::upload(gpu, textures, images)?),
+            None => Ok(CornerPlanes::upload(textures, images)?),
         };
         Ok(Self { cameras: images.iter().map(camera).collect(), planes, cut: Mutex::default() })
     }

@@ -105,7 +105,7 @@ impl Reconstructor {
     /// # Errors
     /// Images, cameras or a volume that cannot be used, or the device's limits.
     pub fn upload(&self, images: &[DepthImage], set: &SetDescription<'_>) -> Result<SampleSet, ReconstructionError> {
-        SampleSet::upload(&self.gpu, &self.textures, images, set)
+        SampleSet::upload(&self.textures, images, set)
     }
 
     /// One view a camera, in their order.

@@ -23,14 +23,13 @@ pub(crate) struct Reflectors {
 impl Reflectors {
     /// `None` where no highlights are asked for or nothing reflects.
     pub fn upload(
-        gpu: &Gpu,
         textures: &WordTextures,
         images: &[DepthImage],
         set: &SetDescription<'_>,
     ) -> Result<Option<Self>, ReconstructionError> {
         check(images, set.illumination)?;
         let Some(highlight) = set.highlight.filter(|_| images.iter().any(reflects)) else { return Ok(None) };
-        let bytes = illumination_bytes(set.illumination);
+        let (gpu, bytes) = (&textures.gpu, illumination_bytes(set.illumination));
         check_uniform(gpu, bytes.len())?;
         let visibility_words = visibility_words(images);
         Ok(Some(Self {

@@ -2,7 +2,6 @@
 
 use depth_image::{Aabb, Camera, DepthImage, Highlight, Illumination, PinholeCamera, srgb8_from_linear};
 use glam::{Vec2, Vec3};
-use gpu::Gpu;
 use rayon::prelude::*;
 
 use crate::{
@@ -59,12 +58,11 @@ impl SampleSet {
     /// # Errors
     /// Too many images, planes or cameras that do not fit, or a set beyond the device's limits.
     pub(crate) fn upload(
-        gpu: &Gpu,
         textures: &WordTextures,
         images: &[DepthImage],
         set: &SetDescription<'_>,
     ) -> Result<Self, ReconstructionError> {
-        check(gpu, images, &set.volume)?;
+        check(textures, images, &set.volume)?;
         let among_holes = is_among_holes(images);
         let coded: Vec<CodedImage> = images.par_iter().map(|image| CodedImage::of(image, among_holes)).collect();
         let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(word_texture::room);
@@ -90,8 +88,8 @@ impl SampleSet {
             nodes: textures.upload("depth pyramids", nodes)?,
             cell_codes: textures.upload("cells", codes)?,
             cell_colors: textures.upload("sample colours", colors)?,
-            reflectors: Reflectors::upload(gpu, textures, images, set)?,
-            meshes: SetMeshes::upload(gpu, textures, images)?,
+            reflectors: Reflectors::upload(textures, images, set)?,
+            meshes: SetMeshes::upload(textures, images)?,
         })
     }
 }
@@ -119,7 +117,7 @@ impl CodedImage {
     }
 }
 
-fn check(gpu: &Gpu, images: &[DepthImage], volume: &Aabb) -> Result<(), ReconstructionError> {
+fn check(textures: &WordTextures, images: &[DepthImage], volume: &Aabb) -> Result<(), ReconstructionError> {
     if images.is_empty() || images.len() > MAX_SAMPLE_CAMERAS {
         return Err(ReconstructionError::SampleCount(images.len()));
     }
@@ -135,8 +133,8 @@ fn check(gpu: &Gpu, images: &[DepthImage], volume: &Aabb) -> Result<(), Reconstr
             return Err(wrong("an image of one row or column has no surface between samples".to_owned()));
         }
     }
-    word_texture::check(gpu, "depth pyramids", node_count(images))?;
-    word_texture::check(gpu, "cells", cell_count(images))?;
+    textures.check("depth pyramids", node_count(images))?;
+    textures.check("cells", cell_count(images))?;
     Ok(())
 }
 

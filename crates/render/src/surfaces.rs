@@ -1,12 +1,9 @@
 //! What each pixel of one camera shows: the textures that surfaces are drawn into, and light is computed from.
 
-use std::{
-    collections::HashMap,
-    sync::{Arc, Mutex, PoisonError, Weak},
-};
+use std::sync::Arc;
 
 use glam::UVec2;
-use gpu::Gpu;
+use gpu::{Gpu, Lent, Pool};
 use wgpu::{TextureFormat, TextureUsages};
 
 /// How surfaces are found.
@@ -27,32 +24,26 @@ pub(crate) struct SurfaceViews {
     front: Option<wgpu::TextureView>,
 }
 
-type Free = Mutex<HashMap<SurfaceKind, Vec<SurfaceViews>>>;
-
 /// Lends textures; they come back when dropped.
 pub(crate) struct SurfacePool {
     gpu: Arc<Gpu>,
-    free: Arc<Free>,
+    surfaces: Pool<SurfaceKind, SurfaceViews>,
 }
 
 /// On loan; contents are whatever the last borrower left.
 pub(crate) struct Surfaces {
-    views: Option<SurfaceViews>,
+    views: Lent<SurfaceKind, SurfaceViews>,
     /// Not lent: where surface ids are drawn instead.
     own_ids: Option<wgpu::TextureView>,
-    kind: SurfaceKind,
-    home: Weak<Free>,
 }
 
 impl SurfacePool {
     pub fn new(gpu: &Arc<Gpu>) -> Self {
-        Self { gpu: gpu.clone(), free: Arc::default() }
+        Self { gpu: gpu.clone(), surfaces: Pool::keeping(usize::MAX) }
     }
 
     pub fn lend(&self, kind: SurfaceKind) -> Surfaces {
-        let kept = self.free.lock().unwrap_or_else(PoisonError::into_inner).get_mut(&kind).and_then(Vec::pop);
-        let views = kept.unwrap_or_else(|| self.make(kind));
-        Surfaces { views: Some(views), own_ids: None, kind, home: Arc::downgrade(&self.free) }
+        Surfaces { views: self.surfaces.lend(kind, |&kind| self.make(kind)), own_ids: None }
     }
 
     fn make(&self, kind: SurfaceKind) -> SurfaceViews {
@@ -95,25 +86,17 @@ impl Surfaces {
 
     /// Where surface ids are asked for.
     pub fn ids(&self) -> Option<&wgpu::TextureView> {
-        self.own_ids.as_ref().or(self.views.as_ref().and_then(|views| views.ids.as_ref()))
+        self.own_ids.as_ref().or(self.views.ids.as_ref())
     }
 
     pub fn size_px(&self) -> UVec2 {
-        self.kind.size_px
+        self.views.kind().size_px
     }
 }
 
 impl std::ops::Deref for Surfaces {
     type Target = SurfaceViews;
     fn deref(&self) -> &SurfaceViews {
-        self.views.as_ref().expect("present until dropped")
-    }
-}
-
-impl Drop for Surfaces {
-    fn drop(&mut self) {
-        if let (Some(home), Some(views)) = (self.home.upgrade(), self.views.take()) {
-            home.lock().unwrap_or_else(PoisonError::into_inner).entry(self.kind).or_default().push(views);
-        }
+        &self.views
     }
 }
