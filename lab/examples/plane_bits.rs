@@ -9,11 +9,10 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use depth_image::DepthImage;
+use engine::GpuEngine;
 use glam::UVec2;
-use myriorama::engine::GpuEngine;
-use myriorama::evaluate::median;
-use myriorama::sampling_study::{SCENES, Subject};
-use myriorama::text_table;
+use lab::evaluate::median;
+use lab::sampling_study::{SCENES, Subject};
 use render::SamplePlanes;
 use sampling::{Redundancy, SamplingMethod};
 use study::{Cell, Table};
@@ -51,7 +50,7 @@ fn main() -> anyhow::Result<()> {
             table.push(head.into_iter().chain(numbers(&images)?))?;
         }
     }
-    println!("{}", text_table::text(&table));
+    println!("{}", table.to_text());
     Ok(())
 }
 

@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Context as _;
+use app_core::setup::{SceneArgs, Setup};
 use depth_image::{Camera, DepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use engine::GpuEngine;
 use metrics::{
     DepthPlane, PixelClass, Rgb8Image, ScoreMap, class_mask, classify, depth_errors, flip_map, psnr_db, ssim_map,
     unheld_rate,
@@ -14,9 +16,6 @@ use rayon::prelude::*;
 use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
 use render::Lighting;
 use wire::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
-
-use crate::engine::GpuEngine;
-use crate::setup::{SceneArgs, Setup};
 
 /// Both planes beside colour.
 pub const ALL_PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: true };
@@ -215,7 +214,7 @@ struct Errors {
 
 impl Errors {
     fn of(truth: &View, view: &View, classes: &[PixelClass]) -> anyhow::Result<Self> {
-        let (reference, test) = (image_of(truth)?, image_of(view)?);
+        let (reference, test) = (Rgb8Image::of_view(truth)?, Rgb8Image::of_view(view)?);
         let flip = flip_map(&reference, &test)?;
         let depth = depth_errors(&known_depth(truth)?, &known_depth(view)?, None)?;
         let provenance = view.provenance.as_ref().context("a view without provenance")?;
@@ -276,17 +275,11 @@ fn row(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, errors:
 /// # Errors
 /// When views are not of one size.
 pub fn mean_flip(references: &[View], tests: &[View]) -> anyhow::Result<f64> {
-    let flip = |(reference, test): (&View, &View)| mean(&flip_map(&image_of(reference)?, &image_of(test)?)?);
+    let flip = |(reference, test): (&View, &View)| {
+        mean(&flip_map(&Rgb8Image::of_view(reference)?, &Rgb8Image::of_view(test)?)?)
+    };
     let flips = references.iter().zip(tests).map(flip).collect::<anyhow::Result<Vec<_>>>()?;
     Ok(flips.iter().sum::<f64>() / flips.len() as f64)
-}
-
-/// A view's colour, for the metrics.
-///
-/// # Errors
-/// When it is not of its size.
-pub fn image_of(view: &View) -> anyhow::Result<Rgb8Image<'_>> {
-    Ok(Rgb8Image::new(view.size_px.x, view.size_px.y, view.srgb8.as_slice())?)
 }
 
 /// Depth, unknown where it was filled in.
@@ -300,7 +293,7 @@ fn known_depth(view: &View) -> anyhow::Result<DepthPlane<'static>> {
     Ok(DepthPlane::new(view.size_px.x, view.size_px.y, plane)?)
 }
 
-pub(crate) fn mean(map: &ScoreMap) -> anyhow::Result<f64> {
+fn mean(map: &ScoreMap) -> anyhow::Result<f64> {
     Ok(map.mean(None)?.unwrap_or(f64::NAN))
 }
 

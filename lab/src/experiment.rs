@@ -4,20 +4,19 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use app_core::cluster::Cluster;
+use app_core::delivery::{Delivered, Wishes, open, receive};
+use app_core::process::{listen, runtime};
+use app_core::setup::{SceneArgs, Setup};
 use client::{Client, Frame};
 use depth_image::{PinholeCamera, ViewCell};
+use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
 use render::{Choice, Lighting};
 use tokio::runtime::Runtime;
 use wire::{PolicyChoice, Timeline};
-
-use crate::cluster::Cluster;
-use crate::delivery::{Delivered, Wishes, open, receive};
-use crate::engine::GpuEngine;
-use crate::process::{listen, runtime};
-use crate::setup::{SceneArgs, Setup};
 
 /// V of the paper's headline: 290 views of 200×150.
 pub const PAPER_VIEWS: usize = 290;

@@ -3,16 +3,16 @@
 
 use std::sync::Arc;
 
+use app_core::cluster::Cluster;
+use app_core::delivery::{Wishes, open, receive};
+use app_core::process::{listen, runtime};
+use app_core::setup::{SceneArgs, Setup};
+use app_core::sizes::SizePx;
 use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
+use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
-use myriorama::cluster::Cluster;
-use myriorama::delivery::{Wishes, open, receive};
-use myriorama::engine::GpuEngine;
-use myriorama::evaluate::{ALL_PLANES, Truth};
-use myriorama::process::{listen, runtime};
-use myriorama::setup::{SceneArgs, Setup};
-use myriorama::sizes::SizePx;
+use lab::evaluate::{ALL_PLANES, Truth};
 use node::{DirectWork, Engine as _, EngineError, SampleWork, ViewWork};
 use reconstruction::ReconstructionMethod;
 use wire::PolicyChoice;

@@ -1,18 +1,19 @@
 //! Views as pictures.
 
-use depth_image::{ProvenanceKind, View};
+use depth_image::View;
 use image::{ImageBuffer, Luma, RgbImage};
 
 /// 16-bit grey.
 pub type Grey16 = ImageBuffer<Luma<u16>, Vec<u16>>;
 
-/// Its colour; `None` where its planes are not of its size.
+/// The colour of a view; `None` where its plane is not of its size.
 #[must_use]
 pub fn rgb(view: &View) -> Option<RgbImage> {
     RgbImage::from_raw(view.size_px.x, view.size_px.y, view.srgb8.clone())
 }
 
-/// Its inverse planar depth as 16-bit grey, and what 65535 stands for, per metre; 0 is background.
+/// The inverse planar depth of a view as 16-bit grey, and the inverse depth that 65535 stands for, per metre; 0 is
+/// background.
 #[must_use]
 pub fn inverse_depth_16(view: &View) -> Option<(Grey16, f32)> {
     let plane = view.inverse_depth_per_m.as_ref()?;
@@ -22,20 +23,6 @@ pub fn inverse_depth_16(view: &View) -> Option<(Grey16, f32)> {
     let code = |&inverse: &f32| if inverse > 0.0 { ((inverse * scale + 0.5) as u16).max(1) } else { 0 };
     let image = Grey16::from_raw(view.size_px.x, view.size_px.y, plane.iter().map(code).collect())?;
     Some((image, greatest))
-}
-
-/// Where its pixels come from, as reports colour them.
-#[must_use]
-pub fn provenance(view: &View) -> Option<Vec<study::Provenance>> {
-    let plane = view.provenance.as_ref()?;
-    let of = |p: &depth_image::Provenance| match (p.kind(), p.camera_mask()) {
-        (ProvenanceKind::Empty, _) => study::Provenance::Background,
-        (ProvenanceKind::Filled, _) => study::Provenance::Fill,
-        (ProvenanceKind::Hit, 0) => study::Provenance::Direct,
-        (ProvenanceKind::Hit, mask) if mask.is_power_of_two() => study::Provenance::Sample(mask.trailing_zeros() as u8),
-        (ProvenanceKind::Hit, _) => study::Provenance::Blend,
-    };
-    Some(plane.iter().map(of).collect())
 }
 
 #[cfg(test)]
@@ -50,6 +37,6 @@ mod tests {
         let view = View { size_px: UVec2::new(2, 2), srgb8: vec![0; 12], inverse_depth_per_m: plane, provenance: None };
         let (image, greatest) = inverse_depth_16(&view).unwrap();
         assert_eq!((image.into_raw(), greatest), (vec![65_535, 32_768, 1, 0], 2.0));
-        assert!(provenance(&view).is_none() && rgb(&view).is_some());
+        assert!(rgb(&view).is_some());
     }
 }

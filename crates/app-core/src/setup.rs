@@ -7,6 +7,7 @@ use clap::Args;
 use coordinator::SceneOffer;
 use depth_image::{Camera, PinholeCamera};
 use glam::UVec2;
+use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::{Rig, SamplingMethod};
@@ -24,6 +25,14 @@ const TWO_PLANE_HEIGHT: f32 = 3.0;
 const MODEL_SPREAD_RAD: f32 = 0.12;
 /// What is closer to a camera out of a file is not seen, as a share of the scene's diagonal.
 pub const NEAR_OF_DIAGONAL: f32 = 1e-3;
+
+/// Which device.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct DeviceArgs {
+    /// any (a GPU if there is one) or software
+    #[arg(long, default_value_t, value_name = "NAME", env = "MYRIORAMA_DEVICE")]
+    pub device: DevicePreference,
+}
 
 /// Which scene, sampled and shown how.
 #[derive(Debug, Clone, Args)]

@@ -2,20 +2,21 @@
 
 use std::any::Any;
 use std::collections::HashMap;
-use std::str::FromStr;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Weak};
 use std::time::Instant;
 
 use depth_image::{DepthImage, PinholeCamera, View};
-use gpu::{DevicePreference, Gpu, GpuError};
+use gpu::{DevicePreference, Gpu};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
-use reconstruction::{ReconstructionError, ReconstructionMethod, Reconstructor, SetDescription};
+use parking_lot::Mutex;
+use reconstruction::{ReconstructionMethod, Reconstructor, SetDescription};
 use render::{
-    AccelerationReport, Choice, DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, SamplePlanes,
-    Visibility,
+    AccelerationReport, Choice, DrawWork, GpuScene, Lighting, Refinement, Renderer, SamplePlanes, Visibility,
 };
-use sampling::{Sampler, SamplingError, SamplingMethod};
+use sampling::{Sampler, SamplingMethod};
 use scene::{Limits, Scene};
+
+use crate::error::{device, invalid, parsed, reconstruction_error, render_error, sampling_error};
 
 /// Scenes that stay on the device; the one that was loaded first goes first.
 const KEPT_SCENES: usize = 8;
@@ -37,48 +38,13 @@ pub struct GpuEngine {
 struct Uploaded(reconstruction::SampleSet);
 impl UploadedSet for Uploaded {}
 
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn device(error: impl ToString) -> EngineError {
-    EngineError::Device(error.to_string())
-}
-
-fn invalid(field: &'static str, reason: impl ToString) -> EngineError {
-    EngineError::InvalidArgument { field, reason: reason.to_string() }
-}
-
-fn render_error(error: RenderError) -> EngineError {
-    match error {
-        RenderError::Camera { .. } => invalid("camera", error),
-        RenderError::Gpu(GpuError::Lost(reason)) => EngineError::Lost(reason),
-        _ => device(error),
-    }
-}
-
-fn reconstruction_error(error: ReconstructionError) -> EngineError {
-    match error {
-        ReconstructionError::Camera { .. } => invalid("camera", error),
-        ReconstructionError::Sample { .. } | ReconstructionError::SampleCount(_) => invalid("sample_images", error),
-        ReconstructionError::Volume => invalid("volume", error),
-        ReconstructionError::Gpu(GpuError::Lost(reason)) => EngineError::Lost(reason),
-        _ => device(error),
-    }
-}
-
-/// A setting out of its name.
-pub(crate) fn parsed<T: FromStr<Err: ToString>>(field: &'static str, text: &str) -> Result<T, EngineError> {
-    text.parse().map_err(|error: T::Err| invalid(field, error.to_string()))
-}
-
 impl GpuEngine {
     /// Opens a device of its own.
     ///
     /// # Errors
     /// When there is no device or a shader is broken.
     pub fn open(preference: DevicePreference) -> Result<Self, EngineError> {
-        let gpu = Gpu::open(preference).map_err(|error: GpuError| device(error))?;
+        let gpu = Gpu::open(preference).map_err(device)?;
         let renderer = Arc::new(sampling::renderer(&gpu).map_err(render_error)?);
         Ok(Self {
             sampler: Sampler::sharing(renderer.clone()),
@@ -97,7 +63,7 @@ impl GpuEngine {
     /// As [`GpuEngine::open`].
     pub fn shared(preference: DevicePreference) -> Result<Arc<Self>, EngineError> {
         static OPEN: Mutex<Option<HashMap<String, Weak<GpuEngine>>>> = Mutex::new(None);
-        let mut open = locked(&OPEN);
+        let mut open = OPEN.lock();
         let engines = open.get_or_insert_default();
         if let Some(engine) = engines.get(&preference.to_string()).and_then(Weak::upgrade) {
             return Ok(engine);
@@ -112,13 +78,13 @@ impl GpuEngine {
     /// # Errors
     /// When the device cannot hold it.
     pub fn put_scene(&self, hash: &str, scene: &Scene) -> Result<f64, EngineError> {
-        let _one = locked(&self.loading);
+        let _one = self.loading.lock();
         if self.has_scene(hash) {
             return Ok(0.0);
         }
         let start = Instant::now();
         let uploaded = Arc::new(GpuScene::upload(&self.gpu, scene).map_err(render_error)?);
-        let mut scenes = locked(&self.scenes);
+        let mut scenes = self.scenes.lock();
         if scenes.len() >= KEPT_SCENES {
             scenes.remove(0);
         }
@@ -165,7 +131,7 @@ impl GpuEngine {
     /// # Errors
     /// Where it was never loaded.
     pub fn scene(&self, hash: &str) -> Result<Arc<GpuScene>, EngineError> {
-        let found = locked(&self.scenes).iter().find(|(kept, _)| kept == hash).map(|(_, scene)| scene.clone());
+        let found = self.scenes.lock().iter().find(|(kept, _)| kept == hash).map(|(_, scene)| scene.clone());
         found.ok_or_else(|| EngineError::UnknownScene { hash: hash.to_owned() })
     }
 }
@@ -199,7 +165,7 @@ impl Engine for GpuEngine {
     }
 
     fn has_scene(&self, hash: &str) -> bool {
-        locked(&self.scenes).iter().any(|(kept, _)| kept == hash)
+        self.scenes.lock().iter().any(|(kept, _)| kept == hash)
     }
 
     fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError> {
@@ -226,11 +192,7 @@ impl Engine for GpuEngine {
             planes: planes_for(method),
             settled_at_s: request.settled_at_s,
         };
-        self.sampler.sample(&work).map_err(|error| match error {
-            SamplingError::Render(error) => render_error(error),
-            SamplingError::Layer { .. } => invalid("sample_cameras", error),
-            SamplingError::Wanted { .. } => invalid("image_indices", error),
-        })
+        self.sampler.sample(&work).map_err(sampling_error)
     }
 
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
@@ -248,7 +210,7 @@ impl Engine for GpuEngine {
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
         let Uploaded(set) = (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))?;
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
-        let _one = locked(&self.reconstructing);
+        let _one = self.reconstructing.lock();
         self.reconstructor.reconstruct(set, &work.cameras, method, work.planes).map_err(reconstruction_error)
     }
 

@@ -37,7 +37,7 @@ mod tests {
     use super::format_number;
 
     #[test]
-    fn numbers_are_short() {
+    fn a_number_has_four_significant_digits() {
         let cases = [
             (0.0, "0"),
             (1.0, "1"),

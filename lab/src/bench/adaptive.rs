@@ -3,19 +3,19 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use app_core::setup::{SceneArgs, Setup};
 use depth_image::{PinholeCamera, View, ViewPlanes};
-use metrics::psnr_db;
+use engine::GpuEngine;
+use metrics::{Rgb8Image, psnr_db};
 use render::{DrawWork, GpuScene, Lighting, Rate, Refinement, Visibility};
 use scene::SceneSpec;
 use study::{Axis, Bar, Check, Point, Report, Series, Table, XyChart};
 
 use super::BenchArgs;
 use super::timing::in_turn;
-use crate::engine::GpuEngine;
-use crate::evaluate::{image_of, mean_flip};
+use crate::evaluate::mean_flip;
 use crate::lighting_study::FINE;
 use crate::progress::bar;
-use crate::setup::{SceneArgs, Setup};
 
 /// Rays that stand for all light.
 const CONVERGED: &str = "soft 256, occlusion 256";
@@ -118,7 +118,7 @@ fn view(engine: &GpuEngine, scene: &GpuScene, camera: &PinholeCamera, lighting: 
 impl Row {
     fn of(rate: Rate, seconds: f64, view: &View, full: &View, converged: &View) -> anyhow::Result<Self> {
         let flip = |reference: &View| mean_flip(std::slice::from_ref(reference), std::slice::from_ref(view));
-        let psnr_db = psnr_db(&image_of(full)?, &image_of(view)?, None)?.unwrap_or(f64::NAN);
+        let psnr_db = psnr_db(&Rgb8Image::of_view(full)?, &Rgb8Image::of_view(view)?, None)?.unwrap_or(f64::NAN);
         Ok(Self {
             rate,
             seconds,

@@ -3,17 +3,17 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use app_core::setup::{SceneArgs, Setup};
 use depth_image::Camera;
+use engine::GpuEngine;
 use render::{AccelerationReport, DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use scene::SceneSpec;
 use study::{Axis, Bar, Check, Report, Series, Table, XyChart};
 
 use super::BenchArgs;
 use super::timing::in_turn;
-use crate::engine::GpuEngine;
 use crate::evaluate::median;
 use crate::progress::bar;
-use crate::setup::{SceneArgs, Setup};
 
 const SCENE: &str = "tree-terrain-500k-wind";
 const SCENE_QUICK: &str = "tree-terrain-30k-wind";

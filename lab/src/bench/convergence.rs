@@ -4,16 +4,16 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use app_core::setup::Setup;
 use depth_image::{Camera, DepthImage, PinholeCamera, linear_from_rgb9e5};
+use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use study::{Axis, Bar, Check, Report, Series, Table, XyChart};
 
 use super::BenchArgs;
 use super::rays::resized;
-use crate::engine::GpuEngine;
 use crate::progress::bar;
-use crate::setup::Setup;
 
 /// Rays that stand for all light.
 const REFERENCE: u32 = 1024;

@@ -4,17 +4,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use app_core::setup::SceneArgs;
 use depth_image::ViewCell;
+use engine::GpuEngine;
 use reconstruction::ReconstructionMethod;
 use scene::SceneSpec;
 use study::{Bar, Check, Report};
 
 use super::BenchArgs;
-use crate::engine::GpuEngine;
 use crate::evaluate::{Row, Truth};
 use crate::experiment::VIEW_SIZE_PX;
 use crate::progress::bar;
-use crate::setup::SceneArgs;
 use crate::sweep;
 
 /// Models of a folder that are compared, the largest files.
@@ -116,7 +116,7 @@ fn models_of(folder: &Path, most: usize) -> anyhow::Result<Vec<PathBuf>> {
     }
     anyhow::ensure!(
         !found.is_empty(),
-        crate::exit::BadInput(format!("{}: no .gltf, .glb, .obj or .ply file", folder.display()))
+        app_core::exit::BadInput(format!("{}: no .gltf, .glb, .obj or .ply file", folder.display()))
     );
     found.sort_by_key(|path| std::cmp::Reverse(std::fs::metadata(path).map_or(0, |file| file.len())));
     found.truncate(most);
@@ -126,7 +126,7 @@ fn models_of(folder: &Path, most: usize) -> anyhow::Result<Vec<PathBuf>> {
 fn entries(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let listed = std::fs::read_dir(folder)
         .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<Vec<_>>>());
-    let mut paths = listed.map_err(|error| crate::exit::BadInput(format!("{}: {error}", folder.display())))?;
+    let mut paths = listed.map_err(|error| app_core::exit::BadInput(format!("{}: {error}", folder.display())))?;
     paths.sort();
     Ok(paths)
 }

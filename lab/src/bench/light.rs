@@ -2,18 +2,18 @@
 
 use std::sync::Arc;
 
+use app_core::setup::{SceneArgs, Setup};
 use depth_image::ViewCell;
+use engine::GpuEngine;
 use render::Lighting;
 use study::{Bar, Check, Report, Table};
 use wire::PolicyChoice;
 
 use super::BenchArgs;
-use crate::engine::GpuEngine;
 use crate::evaluate::{Truth, mean_flip, median};
 use crate::experiment::{Experiment, PAPER_VIEWS, VIEW_SIZE_PX, Wish};
 use crate::lighting_study::{self, Extent, FINE};
 use crate::progress::bar;
-use crate::setup::{SceneArgs, Setup};
 
 /// Rays that stand for all light.
 const CONVERGED: &str = "soft 256, occlusion 256";

@@ -6,27 +6,26 @@ mod codec;
 mod convergence;
 mod fronts;
 mod light;
-mod load;
 mod peer;
 mod rays;
 mod sampling;
-mod scaling;
 mod throughput;
 mod timing;
 
 use std::path::PathBuf;
 
+use app_core::exit::Outcome;
+use app_core::setup::{DeviceArgs, SceneArgs};
 use clap::{Args, Subcommand};
 use node::Engine as _;
 use study::{Bar, Check, Report};
 
-use crate::cli::DeviceArgs;
 use crate::evaluate::Truth;
-use crate::exit::Outcome;
 use crate::experiment::Experiment;
-use crate::process::peak_memory_mb;
-use crate::setup::SceneArgs;
-use crate::text_table;
+use crate::load::command::LoadArgs;
+use crate::memory::peak_memory_mb;
+use crate::scaling::command::ScalingArgs;
+use crate::{load, scaling};
 
 /// Every bullet is a check: a value, a bar, holds or falls short. Checks whose input was not given are not run
 /// and do not fall short.
@@ -66,9 +65,9 @@ pub struct BenchArgs {
 #[derive(Debug, Subcommand)]
 enum Part {
     /// How many clients a cluster of processes serves, and what becomes of those that are too many
-    Load(load::LoadArgs),
+    Load(LoadArgs),
     /// How the cluster scales with nodes and views, on processes of equal CPU share and in simulation
-    Scaling(scaling::ScalingArgs),
+    Scaling(ScalingArgs),
 }
 
 impl BenchArgs {
@@ -89,8 +88,8 @@ impl BenchArgs {
 /// Input that cannot be used, or a failure of the device or the cluster.
 pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     match &args.part {
-        Some(Part::Load(args)) => return load::run(args),
-        Some(Part::Scaling(args)) => return scaling::run(args),
+        Some(Part::Load(args)) => return load::command::run(args),
+        Some(Part::Scaling(args)) => return scaling::command::run(args),
         None => (),
     }
     let experiment = Experiment::start(args.scene.clone(), Vec::new(), args.device.device, usize::from(args.nodes))?;
@@ -124,7 +123,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
         Bar::AtMost(1500.0),
         "the device has memory of its own",
     ));
-    report.tables.iter().for_each(|table| println!("\n{}", text_table::text(table)));
+    report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
     println!();
     let ok = report.finish(&args.out)?;
     Ok(if args.strict && !ok { Outcome::FellShort } else { Outcome::Done })

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
+use app_core::cameras::{self, Placement};
+use app_core::setup::{NEAR_OF_DIAGONAL, SceneArgs, Setup};
 use depth_image::PinholeCamera;
+use engine::GpuEngine;
 use render::Lighting;
 use scene::SceneSpec;
 use study::{Bar, Check, Report};
 
 use super::BenchArgs;
-use crate::cameras::{self, Placement};
-use crate::engine::GpuEngine;
 use crate::evaluate::{Row, Truth};
-use crate::setup::{NEAR_OF_DIAGONAL, SceneArgs, Setup};
 use crate::sweep;
 
 /// RVS takes 280 ms a view on two cores; a fiftieth of it is asked for.

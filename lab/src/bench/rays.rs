@@ -4,7 +4,9 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use app_core::setup::Setup;
 use depth_image::{Camera, DepthImage, Light, PinholeCamera, ViewPlanes, unit_from_oct16};
+use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use node::Engine as _;
 use render::{Choice, DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
@@ -12,9 +14,7 @@ use study::{Bar, Cell, Check, Report, Table};
 
 use super::BenchArgs;
 use super::timing::in_turn;
-use crate::engine::GpuEngine;
 use crate::evaluate::median;
-use crate::setup::Setup;
 
 /// Of every time; the median counts.
 const RUNS: usize = 3;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use depth_image::{Camera, DepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use engine::GpuEngine;
 use glam::UVec2;
 use reconstruction::{MeshStatistics, SampleSet, SetDescription};
 use render::SamplePlanes;
@@ -10,7 +11,6 @@ use sampling::SamplingMethod;
 use study::{Bar, Check, Report, Table};
 
 use super::BenchArgs;
-use crate::engine::GpuEngine;
 use crate::progress::bar;
 use crate::sampling_study::{Extent, SCENES, Subject, times, times_report};
 

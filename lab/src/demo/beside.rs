@@ -1,15 +1,15 @@
 //! Another sampling than the conventional, and conventional sampling beside it.
 
 use anyhow::Context as _;
-use metrics::flip_map;
+use app_core::setup::{SceneArgs, Setup};
+use app_core::{pictures, provenance};
+use metrics::{Rgb8Image, flip_map};
 use sampling::SamplingMethod;
 use study::{Cell, Report, Table, comparison_row};
 
 use super::COMPARED_VIEWS;
-use crate::evaluate::{ALL_PLANES, Truth, image_of};
+use crate::evaluate::{ALL_PLANES, Truth};
 use crate::experiment::Experiment;
-use crate::pictures;
-use crate::setup::{SceneArgs, Setup};
 
 /// Rows of pictures of each sampling.
 const SIDE_BY_SIDE: usize = 2;
@@ -56,10 +56,13 @@ fn taken(experiment: &Experiment, sampling: SamplingMethod) -> anyhow::Result<Tr
 fn show(truth: &Truth, sampling: SamplingMethod, args: &SceneArgs, report: &mut Report) -> anyhow::Result<()> {
     let views = truth.reconstruct(args.method, ALL_PLANES)?;
     for (index, (direct, view)) in truth.views.iter().zip(&views).take(SIDE_BY_SIDE).enumerate() {
-        let flip = flip_map(&image_of(direct)?, &image_of(view)?)?;
+        let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(view)?)?;
         let images = pictures::rgb(direct).zip(pictures::rgb(view)).context("a view is not of its size")?;
-        let (title, provenance) = (format!("{sampling}, view {index}"), pictures::provenance(view));
-        report.pictures.push(comparison_row(&title, images.0, images.1, &flip, provenance.as_deref()));
+        let (title, provenance) = (
+            format!("{sampling}, view {index}"),
+            provenance::false_color(view).map(|picture| (picture.image, picture.legend)),
+        );
+        report.pictures.push(comparison_row(&title, images.0, images.1, &flip, provenance));
     }
     Ok(())
 }

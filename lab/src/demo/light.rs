@@ -1,5 +1,6 @@
 //! The scene in its finest light, and what light of every quality costs.
 
+use app_core::setup::SceneArgs;
 use client::Frame;
 use study::{Check, Report};
 
@@ -7,7 +8,6 @@ use super::{COMPARED_VIEWS, DemoArgs, pictures};
 use crate::evaluate::{ALL_PLANES, Truth};
 use crate::experiment::Experiment;
 use crate::lighting_study::{self, Extent};
-use crate::setup::SceneArgs;
 
 /// Tables and charts, all views in the finest light that was measured, and six of them beside the truth.
 pub fn show(args: &DemoArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<Vec<Check>> {

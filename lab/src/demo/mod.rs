@@ -10,21 +10,20 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Context as _;
+use app_core::cameras::{self, Placement};
+use app_core::exit::Outcome;
+use app_core::setup::{DeviceArgs, NEAR_OF_DIAGONAL, SceneArgs};
 use clap::Args;
 use depth_image::PinholeCamera;
 use node::Engine as _;
 use scene::Limits;
 use study::{Bar, Check, Report};
 
-use crate::cameras::{self, Placement};
-use crate::cli::DeviceArgs;
 use crate::evaluate::Truth;
-use crate::exit::Outcome;
 use crate::experiment::Experiment;
-use crate::process::peak_memory_mb;
+use crate::memory::peak_memory_mb;
 use crate::progress::bar;
-use crate::setup::{NEAR_OF_DIAGONAL, SceneArgs};
-use crate::{sweep, text_table};
+use crate::sweep;
 
 /// S samples of 400×300, 290 views of 200×150, P nodes in one process; a table, and a report with pictures and
 /// charts in --out. Then the same scene
@@ -89,7 +88,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     report.checks = checks(&times, start, args);
     report.checks.extend(light);
     experiment.stop()?;
-    report.tables.iter().for_each(|table| println!("\n{}", text_table::text(table)));
+    report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
     println!("\n{}", report.summary);
     let ok = report.finish(&args.out)?;
     Ok(if args.strict && !ok { Outcome::FellShort } else { Outcome::Done })

@@ -1,15 +1,15 @@
 //! What the views look like.
 
 use anyhow::Context as _;
+use app_core::{pictures, provenance};
 use client::Frame;
 use depth_image::View;
 use image::imageops;
-use metrics::flip_map;
+use metrics::{Rgb8Image, flip_map};
 use render::Lighting;
 use study::{Picture, PictureRow, Report, comparison_row};
 
-use crate::evaluate::{Truth, image_of};
-use crate::pictures;
+use crate::evaluate::Truth;
 
 /// Views that are shown side by side with the truth.
 const SIDE_BY_SIDE: usize = 6;
@@ -34,16 +34,10 @@ pub fn contact_sheet(frames: &[Frame], lighting: &Lighting, report: &mut Report)
 /// direct | reconstructed | error map | provenance.
 pub fn comparisons(truth: &Truth, views: &[View], report: &mut Report) -> anyhow::Result<()> {
     for (index, (direct, view)) in truth.views.iter().zip(views).take(SIDE_BY_SIDE).enumerate() {
-        let flip = flip_map(&image_of(direct)?, &image_of(view)?)?;
+        let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(view)?)?;
         let images = pictures::rgb(direct).zip(pictures::rgb(view)).context("a view is not of its size")?;
-        let provenance = pictures::provenance(view);
-        report.pictures.push(comparison_row(
-            &format!("View {index}"),
-            images.0,
-            images.1,
-            &flip,
-            provenance.as_deref(),
-        ));
+        let provenance = provenance::false_color(view).map(|picture| (picture.image, picture.legend));
+        report.pictures.push(comparison_row(&format!("View {index}"), images.0, images.1, &flip, provenance));
     }
     Ok(())
 }

@@ -3,16 +3,16 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use app_core::exit::Outcome;
+use app_core::process::runtime;
 use clap::Args;
 use gpu::DevicePreference;
 use render::Lighting;
 use scene::SceneSpec;
 use study::Report;
 
-use crate::exit::Outcome;
 use crate::load::processes::Setting;
 use crate::load::{self, report};
-use crate::process::runtime;
 use crate::progress::bar;
 use crate::scaling::Hierarchy;
 

@@ -3,6 +3,7 @@
 //! [`processes`] starts a coordinator and nodes, and reads their memory; [`crowd`] is the clients, all in this process;
 //! [`phases`] are the loads; [`report`] says what came of them.
 
+pub mod command;
 pub mod crowd;
 pub mod phases;
 pub mod processes;

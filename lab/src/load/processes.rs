@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use client::Client;
 
-use crate::processes::{Process, metrics_page};
+use crate::process::{Process, metrics_page};
 use crate::scaling::{CpuGroup, Hierarchy};
 
 /// How long nodes may take to join.

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use app_core::live::{Record, STAGES, Shown, latencies, quantile};
 use study::{Axis, Bar, BarChart, Cell, Check, Report, Series, Table, XyChart};
 
 use super::crowd::Outcome;
 use super::phases::{Idle, Load, Phases};
-use crate::live::{Record, STAGES, Shown, latencies, quantile};
 
 /// Of what was asked for, undegraded.
 const DELIVERED: f64 = 0.99;

@@ -2,18 +2,17 @@
 
 use std::path::PathBuf;
 
+use app_core::exit::Outcome;
+use app_core::setup::DeviceArgs;
 use clap::Args;
+use engine::GpuEngine;
 use node::Engine as _;
 use study::Report;
 
-use crate::cli::DeviceArgs;
-use crate::engine::GpuEngine;
-use crate::exit::Outcome;
 use crate::sampling_study::{
     Extent, SCENES, Subject, detection, detection_report, reconstructions, reconstructions_report, scene_report, sizes,
     sizes_report, tables, times, times_report,
 };
-use crate::text_table;
 
 /// Conventional, non-redundant and peeled images of a bird's nest, grass, a city and a tree, from three viewpoints:
 /// how many samples are redundant, disoccluded and useful, how many of an output frame's samples are there, what views
@@ -36,6 +35,10 @@ pub struct SamplingArgs {
     strict: bool,
 }
 
+/// Measures all scenes and writes the report.
+///
+/// # Errors
+/// The device's, or a folder that cannot be written.
 pub fn run(args: &SamplingArgs) -> anyhow::Result<Outcome> {
     let engine = GpuEngine::shared(args.device.device)?;
     let extent = Extent::of(args.quick);
@@ -59,7 +62,7 @@ pub fn run(args: &SamplingArgs) -> anyhow::Result<Outcome> {
     times_report(&costs, extent, &mut report)?;
     reconstructions_report(&views, &mut report)?;
     detection_report(&detection(&engine, args.quick)?, &mut report)?;
-    report.tables.iter().for_each(|table| println!("\n{}", text_table::text(table)));
+    report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
     println!();
     let ok = report.finish(&args.out)?;
     Ok(if args.strict && !ok { Outcome::FellShort } else { Outcome::Done })

@@ -4,13 +4,13 @@
 use std::sync::Arc;
 
 use depth_image::{Camera, DepthImage, PinholeCamera};
+use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use render::{DrawWork, Lighting, Refinement, SamplePlanes, Visibility};
 use sampling::{Redundancy, SampleWork, Sampler, SamplingMethod};
 use scene::{Mesh, MeshPart, Scene, Vertex, procedural};
 use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
-use crate::engine::GpuEngine;
 use crate::progress::bar;
 
 const SIDE_PX: u32 = 64;

@@ -1,6 +1,7 @@
 //! How well methods sample a scene: the metrics of Xie §6.1.2 on the kinds of scene that the paper has.
 
 mod availability;
+pub mod command;
 mod counts;
 mod detection;
 mod pictures;

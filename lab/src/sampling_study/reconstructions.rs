@@ -1,5 +1,6 @@
 //! What views become of each sampling by each reconstruction: from as many images, and from as many samples.
 
+use app_core::setup::{SceneArgs, Setup};
 use glam::UVec2;
 use reconstruction::ReconstructionMethod;
 use sampling::SamplingMethod;
@@ -8,7 +9,6 @@ use study::{Axis, Bar, Cell, Check, Point, Report, Series, Table, XyChart};
 use super::{METHODS, Subject};
 use crate::evaluate::{Row, Truth};
 use crate::progress::bar;
-use crate::setup::{SceneArgs, Setup};
 
 const SAMPLE_PX: UVec2 = UVec2::new(400, 300);
 const VIEW_PX: UVec2 = UVec2::new(200, 150);

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use app_core::setup::{SceneArgs, Setup};
 use depth_image::{Camera, DepthImage, PinholeCamera};
+use engine::GpuEngine;
 use glam::{UVec2, Vec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use sampling::{Rig, SampleWork, Sampler, SamplingMethod};
 
 use super::IMAGES;
-use crate::engine::GpuEngine;
-use crate::setup::{SceneArgs, Setup};
 
 /// The paper's scenes, as this project makes them.
 pub const SCENES: [&str; 4] = ["bird-nest", "grass", "urban", "tree"];

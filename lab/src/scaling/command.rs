@@ -4,16 +4,15 @@ use std::fs::create_dir_all;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
+use app_core::exit::{BadInput, Outcome};
+use app_core::process::runtime;
+use app_core::setup::{DeviceArgs, SceneArgs};
 use clap::Args;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use scene::SceneSpec;
 
-use crate::cli::DeviceArgs;
-use crate::exit::{BadInput, Outcome};
-use crate::process::runtime;
 use crate::scaling::{Extent, Request, Subject, report, show, take};
-use crate::setup::SceneArgs;
 
 /// A coordinator and P nodes as processes of their own, each node with an equal share of this machine's processors
 /// (control groups of Linux, so that eleven nodes fit two cores): the time between two sample sets for P = 2…11 nodes

@@ -2,7 +2,7 @@
 
 use anyhow::Context as _;
 
-use crate::processes::metrics_page;
+use crate::process::metrics_page;
 
 /// Sums over nodes, since they started.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

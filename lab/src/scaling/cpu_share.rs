@@ -3,11 +3,10 @@
 //! The kernel lets a group run for its quota in every period and then stops it until the next one, so that several
 //! nodes on few cores are as slow as if each had a slow processor of its own. Both versions of control groups work.
 
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::Duration;
+use std::{fs, io};
 
 /// In which a quota is counted: short, so that a short operation is slowed as a long one is.
 const PERIOD_US: u64 = 10_000;

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use app_core::setup::SceneArgs;
 use client::Client;
 use gpu::DevicePreference;
 use wire::rpc::{NodeClient, connect};
@@ -11,8 +12,7 @@ use wire::{Costs, MeasureCosts};
 
 use super::counters::{Counters, read};
 use super::cpu_share::{CpuGroup, Hierarchy, OwnGroup, Usage};
-use crate::processes::Process;
-use crate::setup::SceneArgs;
+use crate::process::Process;
 
 /// Until all nodes have opened their device and joined.
 const JOIN: Duration = Duration::from_secs(300);

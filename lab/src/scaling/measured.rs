@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
+use app_core::process::stop_signal;
 use gpu::DevicePreference;
 use indicatif::ProgressBar;
 use render::Lighting;
@@ -14,7 +15,6 @@ use super::fleet::Fleet;
 use super::matrix::{Extent, Planned, planned};
 use super::point::{Ask, Point, measure};
 use super::subject::{MEASURED_BATCH, Subject};
-use crate::process::stop_signal;
 use crate::progress::bar;
 
 /// Of a point whose plan changes while it is measured: the last counts, whatever its plan did.

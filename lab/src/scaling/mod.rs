@@ -5,6 +5,7 @@
 
 mod charts;
 mod checks;
+pub mod command;
 mod costs;
 mod counters;
 mod cpu_share;

@@ -7,6 +7,7 @@
 
 use std::time::Instant;
 
+use app_core::delivery::{Wishes, open};
 use client::{Frame, Session, ViewRequest};
 use depth_image::PinholeCamera;
 use render::Lighting;
@@ -17,7 +18,6 @@ use super::fetched::{Fetched, fetch};
 use super::fleet::Fleet;
 use super::machine::MachineTime;
 use super::subject::Subject;
-use crate::delivery::{Wishes, open};
 
 /// What is asked of the cluster.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,7 +12,6 @@ use super::measured::Measured;
 use super::sweep::{Basis, scenarios, sweep};
 use super::tables::{Told, costs_table, headline_table, naive, paper_table, points_table, shares_table, steps_table};
 use super::{charts, costs, sweep_report, whole_images};
-use crate::text_table;
 
 /// The report of a run.
 ///
@@ -99,7 +98,7 @@ fn summary(main: &Told<'_>) -> String {
 /// A folder that cannot be written.
 pub fn show(report: &Report, folder: &Path) -> anyhow::Result<()> {
     let short = || report.tables.iter().filter(|table| table.name != sweep_report::SWEEP_TABLE);
-    short().for_each(|table| println!("\n{}", text_table::text(table)));
+    short().for_each(|table| println!("\n{}", table.to_text()));
     println!("\n{}", report.summary);
     std::fs::create_dir_all(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
     let path = folder.join("tables.md");

@@ -3,13 +3,13 @@
 use std::cell::Cell;
 
 use anyhow::Context as _;
+use app_core::delivery::Wishes;
+use app_core::setup::{SceneArgs, Setup};
 use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
 use render::Lighting;
 use wire::{MeasureCosts, PolicyChoice, Timeline, Workload};
 
-use crate::delivery::Wishes;
 use crate::experiment::VIEW_SIZE_PX;
-use crate::setup::{SceneArgs, Setup};
 
 /// Scene time between sets: far less than any motion, but another set, which is sampled anew as the paper's are.
 const SET_STEP_S: f64 = 1e-3;

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use client::{ClientError, LiveFrame};
-use study::{Cell, Table};
+use table::{Cell, Table};
 
 /// What a frame's age is made of, in order, with nothing left out.
 pub const STAGES: [&str; 9] = [
@@ -199,7 +199,7 @@ mod tests {
         assert!((gap_s - 1.5).abs() < 1e-9 && (since_s - 0.2).abs() < 1e-9);
         let one = record.shown[0];
         assert!((one.stages_s.iter().sum::<f64>() - one.age_s()).abs() < 1e-9);
-        let text = crate::text_table::text(&latencies("From pose to picture", record.shown.iter()).unwrap());
+        let text = latencies("From pose to picture", record.shown.iter()).unwrap().to_text();
         assert!(text.contains("age of a frame") && !text.contains("NaN"), "{text}");
         let summary = record.summary();
         assert!(summary.contains("longest without a new one 1500 ms") && summary.contains("2 poses were"), "{summary}");
