@@ -7,16 +7,19 @@
 
 pub mod bench;
 mod command;
+pub mod cpu_share;
 pub mod demo;
-pub mod evaluate;
+pub mod evaluation;
 pub mod experiment;
 pub mod lighting_study;
 pub mod load;
 pub mod memory;
 pub mod process;
 pub mod progress;
+pub mod reference_views;
 pub mod sampling_study;
 pub mod scaling;
+pub mod statistics;
 pub mod sweep;
 
 pub use command::LabCommand;

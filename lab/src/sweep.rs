@@ -3,7 +3,8 @@
 use reconstruction::ReconstructionMethod;
 use study::{Axis, Better, Cell, Point, ReportError, Series, Table, XyChart};
 
-use crate::evaluate::{Row, Truth};
+use crate::evaluation::Evaluation;
+use crate::reference_views::ReferenceViews;
 
 /// Steps of the search, as in the paper's Fig. 7 and beyond.
 const STEPS: [u32; 6] = [8, 16, 32, 64, 128, 256];
@@ -24,8 +25,13 @@ pub fn settings(quick: bool) -> Vec<ReconstructionMethod> {
 ///
 /// # Errors
 /// The device's.
-pub fn sweep(truth: &Truth, quick: bool, runs: usize, mut done: impl FnMut(&Row)) -> anyhow::Result<Vec<Row>> {
-    let row = |method| truth.evaluate(method, runs).inspect(|row| done(row));
+pub fn sweep(
+    reference: &ReferenceViews,
+    quick: bool,
+    runs: usize,
+    mut done: impl FnMut(&Evaluation),
+) -> anyhow::Result<Vec<Evaluation>> {
+    let row = |method| reference.evaluate(method, runs).inspect(|row| done(row));
     settings(quick).into_iter().map(row).collect()
 }
 
@@ -33,7 +39,7 @@ pub fn sweep(truth: &Truth, quick: bool, runs: usize, mut done: impl FnMut(&Row)
 ///
 /// # Errors
 /// None that can happen: rows and columns are written together.
-pub fn table(name: &str, rows: &[Row]) -> Result<Table, ReportError> {
+pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
     let columns = [
         ("method", ""),
         ("time a view", "ms"),
@@ -62,8 +68,8 @@ pub fn table(name: &str, rows: &[Row]) -> Result<Table, ReportError> {
 
 /// Time against FLIP, PSNR and wrong hits, each with the front of the best.
 #[must_use]
-pub fn charts(name: &str, rows: &[Row]) -> Vec<XyChart> {
-    let chart = |what: &str, unit: &str, better, value: fn(&Row) -> f64| {
+pub fn charts(name: &str, rows: &[Evaluation]) -> Vec<XyChart> {
+    let chart = |what: &str, unit: &str, better, value: fn(&Evaluation) -> f64| {
         let time = Axis::log("time a view", "ms");
         series(rows, value)
             .into_iter()
@@ -77,8 +83,8 @@ pub fn charts(name: &str, rows: &[Row]) -> Vec<XyChart> {
     ]
 }
 
-fn series(rows: &[Row], value: fn(&Row) -> f64) -> [Series; 2] {
-    let search = |row: &Row| match row.method {
+fn series(rows: &[Evaluation], value: fn(&Evaluation) -> f64) -> [Series; 2] {
+    let search = |row: &Evaluation| match row.method {
         ReconstructionMethod::LightFieldSearch { steps } => {
             Some(Point::labelled(row.ms_a_view, value(row), steps.to_string()))
         }
@@ -86,7 +92,7 @@ fn series(rows: &[Row], value: fn(&Row) -> f64) -> [Series; 2] {
         | ReconstructionMethod::Mesh
         | ReconstructionMethod::HybridMesh { .. } => None,
     };
-    let carve = |row: &Row| match row.method {
+    let carve = |row: &Evaluation| match row.method {
         ReconstructionMethod::JointCarve { stop_level } => {
             Some(Point::labelled(row.ms_a_view, value(row), format!("level {stop_level}")))
         }
@@ -102,6 +108,6 @@ fn series(rows: &[Row], value: fn(&Row) -> f64) -> [Series; 2] {
 
 /// Rows of the search and of the carve.
 #[must_use]
-pub fn split(rows: &[Row]) -> (Vec<&Row>, Vec<&Row>) {
+pub fn split(rows: &[Evaluation]) -> (Vec<&Evaluation>, Vec<&Evaluation>) {
     rows.iter().partition(|row| matches!(row.method, ReconstructionMethod::LightFieldSearch { .. }))
 }

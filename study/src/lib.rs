@@ -15,6 +15,7 @@ mod check;
 mod check_text;
 mod error;
 mod html;
+mod paths;
 mod picture;
 mod report;
 mod slug;

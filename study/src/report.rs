@@ -1,11 +1,13 @@
 //! What one run found.
 
-use std::path::Path;
-
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use crate::{Cell, Chart, Check, Outcome, PictureRow, ReportError, Table, checks_text};
+use table::{Cell, Table};
+
+use crate::chart::Chart;
+use crate::check::{Check, Outcome};
+use crate::picture::PictureRow;
 
 /// Of `report.json`; raised when a field changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -73,26 +75,5 @@ impl Report {
     #[must_use]
     pub fn exit_ok(&self) -> bool {
         self.checks.iter().all(|check| check.outcome() != Outcome::FallsShort)
-    }
-
-    /// Writes the report to a folder, made if need be: `report.json`, `index.html`, a CSV file a table,
-    /// `charts/*.svg` and `pictures/*.png`.
-    ///
-    /// # Errors
-    /// Parts that do not fit together, names that collide, or a folder that cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<(), ReportError> {
-        crate::write::write(self, folder)
-    }
-
-    /// Writes the report, says where, and prints the checks: the end of every program's output. Returns
-    /// [`Report::exit_ok`].
-    ///
-    /// # Errors
-    /// As [`Report::write`].
-    pub fn finish(&self, folder: &Path) -> Result<bool, ReportError> {
-        self.write(folder)?;
-        println!("report: {}", folder.join("index.html").display());
-        println!("{}", checks_text(&self.checks));
-        Ok(self.exit_ok())
     }
 }

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use crate::cameras::CameraFileError;
+use crate::camera_file::CameraFileError;
 
 /// How a command ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -14,7 +14,7 @@ use sampling::{Rig, SamplingMethod};
 use scene::{EnvironmentSpec, LightSpec, Limits, Scene, SceneSpec};
 use wire::OfferSettings;
 
-use crate::cameras::{self, Placement};
+use crate::camera_file::{self, Placement};
 use crate::sizes::SizePx;
 
 /// S = 4 images of 400×300, as in the paper.
@@ -148,7 +148,7 @@ impl SceneArgs {
             return self.rig_cameras(scene, size_px.unwrap_or(SAMPLE_SIZE_PX));
         };
         let near_m = (scene.bounds().size().length() * NEAR_OF_DIAGONAL).max(1e-6);
-        let cameras = cameras::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?;
+        let cameras = camera_file::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?;
         Ok(cameras.into_iter().map(|camera| size_px.map_or(camera, |size_px| resized(camera, size_px))).collect())
     }
 

@@ -1,7 +1,7 @@
 //! Camera files: what is written is read again, and what cannot be used is named.
 #![allow(clippy::unwrap_used)]
 
-use app_core::cameras::{CameraFault, MAX_FILE_BYTES, NamedCamera, Placement, read, write};
+use app_core::camera_file::{CameraFault, MAX_FILE_BYTES, NamedCamera, Placement, read, write};
 use depth_image::PinholeCamera;
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use serde_json::{Map, Value, json};
@@ -44,7 +44,7 @@ fn frame() -> Value {
     json!({"w": 200, "h": 150, "fl_x": 180.0, "transform_matrix": [[1, 0, 0, 0.5], [0, 1, 0, 0.25], [0, 0, 1, 2], [0, 0, 0, 1]]})
 }
 
-fn error_of(text: &str) -> app_core::cameras::CameraFileError {
+fn error_of(text: &str) -> app_core::camera_file::CameraFileError {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bad.json");
     std::fs::write(&path, text).unwrap();

@@ -11,9 +11,9 @@ use render::{DrawWork, GpuScene, Lighting, Rate, Refinement, Visibility};
 use scene::SceneSpec;
 use study::{Axis, Bar, Check, Point, Report, Series, Table, XyChart};
 
-use super::BenchArgs;
+use super::args::BenchArgs;
 use super::timing::in_turn;
-use crate::evaluate::mean_flip;
+use crate::evaluation::mean_flip;
 use crate::lighting_study::FINE;
 use crate::progress::bar;
 

@@ -10,10 +10,10 @@ use render::{AccelerationReport, DrawWork, GpuScene, Lighting, Refinement, Sampl
 use scene::SceneSpec;
 use study::{Axis, Bar, Check, Report, Series, Table, XyChart};
 
-use super::BenchArgs;
+use super::args::BenchArgs;
 use super::timing::in_turn;
-use crate::evaluate::median;
 use crate::progress::bar;
+use crate::statistics::median;
 
 const SCENE: &str = "tree-terrain-500k-wind";
 const SCENE_QUICK: &str = "tree-terrain-30k-wind";

@@ -7,7 +7,7 @@ use depth_image::DepthImage;
 use study::{Bar, Check, Report, Table};
 use wire::{DecodeLimits, decode_depth_plane, encode_depth_plane, inverse_depth_codes};
 
-use crate::evaluate::median;
+use crate::statistics::median;
 
 /// Repeats of one coding, some hundred microseconds each.
 const RUNS: usize = 25;

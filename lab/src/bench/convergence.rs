@@ -11,7 +11,7 @@ use glam::{UVec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use study::{Axis, Bar, Check, Report, Series, Table, XyChart};
 
-use super::BenchArgs;
+use super::args::BenchArgs;
 use super::rays::resized;
 use crate::progress::bar;
 

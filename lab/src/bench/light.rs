@@ -1,4 +1,4 @@
-//! Light sampled once and shared: gains, what a highlight costs, still scenes, and truth beside converged light.
+//! Light sampled once and shared: gains, what a highlight costs, still scenes, and reference beside converged light.
 
 use std::sync::Arc;
 
@@ -9,11 +9,13 @@ use render::Lighting;
 use study::{Bar, Check, Report, Table};
 use wire::PolicyChoice;
 
-use super::BenchArgs;
-use crate::evaluate::{Truth, mean_flip, median};
+use super::args::BenchArgs;
+use crate::evaluation::mean_flip;
 use crate::experiment::{Experiment, PAPER_VIEWS, VIEW_SIZE_PX, Wish};
 use crate::lighting_study::{self, Extent, FINE};
 use crate::progress::bar;
+use crate::reference_views::ReferenceViews;
+use crate::statistics::median;
 
 /// Rays that stand for all light.
 const CONVERGED: &str = "soft 256, occlusion 256";
@@ -46,19 +48,19 @@ fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyh
 }
 
 /// FLIP of views against light of many rays: shared, and drawn with as many rays.
-pub fn truth(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
+pub fn reference(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let views = experiment.views(if args.quick { 1 } else { CONVERGED_VIEWS })?;
     let progress = bar("converged light", 3);
     let take = |lighting: Lighting| {
         let lit = SceneArgs { lighting, ..experiment.args.clone() };
-        let truth = Truth::take(&experiment.engine, &experiment.setup, &lit, views.clone());
+        let reference = ReferenceViews::draw(&experiment.engine, &experiment.setup, &lit, views.clone());
         progress.inc(1);
-        truth
+        reference
     };
     let (unlit, fine) = (take(Lighting::UNLIT)?, take(FINE.parse()?)?);
     let converged = fine.drawn(&experiment.setup, CONVERGED.parse()?)?;
     progress.finish_and_clear();
-    let reconstructed = |truth: &Truth| truth.reconstruct(args.scene.method, Default::default());
+    let reconstructed = |reference: &ReferenceViews| reference.reconstruct(args.scene.method, Default::default());
     let shared = mean_flip(&converged, &reconstructed(&fine)?)?;
     let drawn = mean_flip(&converged, &fine.views)?;
     let geometry = mean_flip(&unlit.views, &reconstructed(&unlit)?)?;
@@ -76,11 +78,11 @@ pub fn truth(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> 
 }
 
 /// A view's milliseconds with both, medians; in turn, so that neither has the quieter machine.
-fn ms_in_turn(args: &BenchArgs, both: [&Truth; 2]) -> anyhow::Result<[f64; 2]> {
+fn ms_in_turn(args: &BenchArgs, both: [&ReferenceViews; 2]) -> anyhow::Result<[f64; 2]> {
     let mut ms = [Vec::new(), Vec::new()];
     for _ in 0..args.runs().max(RUNS_OF_NEAR_TIMES) {
-        for (ms, truth) in ms.iter_mut().zip(both) {
-            ms.push(truth.ms_a_view(args.scene.method, PAPER_VIEWS, 1)?);
+        for (ms, reference) in ms.iter_mut().zip(both) {
+            ms.push(reference.ms_a_view(args.scene.method, PAPER_VIEWS, 1)?);
         }
     }
     Ok(ms.map(median))
@@ -93,7 +95,7 @@ pub fn glossy(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) ->
     let cell = ViewCell::between(&scene.around).ok_or_else(|| anyhow::anyhow!("no sample cameras"))?;
     let take = |lighting: Lighting| {
         let lit = SceneArgs { lighting, ..args.scene.clone() };
-        Truth::take(engine, &scene, &lit, cell.spread(args.compared_views(), VIEW_SIZE_PX))
+        ReferenceViews::draw(engine, &scene, &lit, cell.spread(args.compared_views(), VIEW_SIZE_PX))
     };
     let both = [take(Lighting::UNLIT)?, take("shadows".parse()?)?];
     let [unlit, lit] = ms_in_turn(args, [&both[0], &both[1]])?;

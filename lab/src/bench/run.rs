@@ -1,86 +1,15 @@
 //! `myriorama bench`: what is promised, as ratios of one run.
 
-mod adaptive;
-mod animation;
-mod codec;
-mod convergence;
-mod fronts;
-mod light;
-mod peer;
-mod rays;
-mod sampling;
-mod throughput;
-mod timing;
-
-use std::path::PathBuf;
-
 use app_core::exit::Outcome;
-use app_core::setup::{DeviceArgs, SceneArgs};
-use clap::{Args, Subcommand};
 use node::Engine as _;
 use study::{Bar, Check, Report};
 
-use crate::evaluate::Truth;
+use super::args::{BenchArgs, Part};
+use super::{adaptive, animation, codec, convergence, fronts, light, peer, rays, sampling, throughput};
 use crate::experiment::Experiment;
-use crate::load::command::LoadArgs;
 use crate::memory::peak_memory_mb;
-use crate::scaling::command::ScalingArgs;
+use crate::reference_views::ReferenceViews;
 use crate::{load, scaling};
-
-/// Every bullet is a check: a value, a bar, holds or falls short. Checks whose input was not given are not run
-/// and do not fall short.
-#[derive(Debug, Args)]
-#[command(
-    args_conflicts_with_subcommands = true,
-    after_help = "Example: myriorama bench --models models/ --peer peer-bench/ --strict"
-)]
-pub struct BenchArgs {
-    #[command(subcommand)]
-    part: Option<Part>,
-    #[command(flatten)]
-    scene: SceneArgs,
-    #[command(flatten)]
-    device: DeviceArgs,
-    /// A folder of models (.gltf, .glb, .obj, .ply): the methods are compared on the largest of them, too
-    #[arg(long, value_name = "DIR")]
-    models: Option<PathBuf>,
-    /// A folder with bench.ply, samples.json and views.json: the truth is compared with another synthesiser's
-    #[arg(long, value_name = "DIR")]
-    peer: Option<PathBuf>,
-    /// P: nodes that share the device
-    #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
-    nodes: u16,
-    /// Where the report goes
-    #[arg(long, default_value = "out/bench", value_name = "DIR")]
-    out: PathBuf,
-    /// A smaller form of the same run: fewer repeats, views and models
-    #[arg(long)]
-    quick: bool,
-    /// Exit status 1 when a check falls short
-    #[arg(long)]
-    strict: bool,
-}
-
-/// What is measured by itself.
-#[derive(Debug, Subcommand)]
-enum Part {
-    /// How many clients a cluster of processes serves, and what becomes of those that are too many
-    Load(LoadArgs),
-    /// How the cluster scales with nodes and views, on processes of equal CPU share and in simulation
-    Scaling(ScalingArgs),
-}
-
-impl BenchArgs {
-    /// Times that a measurement is repeated; the median counts.
-    fn runs(&self) -> usize {
-        if self.quick { 1 } else { 3 }
-    }
-
-    /// Views that are compared pixel by pixel.
-    fn compared_views(&self) -> usize {
-        if self.quick { 4 } else { 8 }
-    }
-}
 
 /// Measures all of it.
 ///
@@ -97,13 +26,13 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     println!("{} on {}", args.scene.scene, experiment.engine.device_name());
     throughput::delivered(args, &experiment, &mut report)?;
     let views = experiment.views(args.compared_views())?;
-    let truth = Truth::take(&experiment.engine, &experiment.setup, &experiment.args, views)?;
-    throughput::nanoseconds(args, &truth, &experiment, &mut report)?;
-    codec::measure(&truth.images, &mut report)?;
-    fronts::compare(&args.scene.scene.to_string(), &truth, args, &mut report)?;
-    drop(truth);
+    let reference = ReferenceViews::draw(&experiment.engine, &experiment.setup, &experiment.args, views)?;
+    throughput::nanoseconds(args, &reference, &experiment, &mut report)?;
+    codec::measure(&reference.images, &mut report)?;
+    fronts::compare(&args.scene.scene.to_string(), &reference, args, &mut report)?;
+    drop(reference);
     light::qualities(args, &experiment, &mut report)?;
-    light::truth(args, &experiment, &mut report)?;
+    light::reference(args, &experiment, &mut report)?;
     let engine = experiment.engine.clone();
     rays::measure(args, &engine, &experiment.setup, &mut report)?;
     convergence::measure(args, &engine, &experiment.setup, &mut report)?;

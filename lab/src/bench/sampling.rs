@@ -10,7 +10,7 @@ use render::SamplePlanes;
 use sampling::SamplingMethod;
 use study::{Bar, Check, Report, Table};
 
-use super::BenchArgs;
+use super::args::BenchArgs;
 use crate::progress::bar;
 use crate::sampling_study::{Extent, SCENES, Subject, times, times_report};
 

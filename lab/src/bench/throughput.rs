@@ -8,10 +8,11 @@ use node::{DirectWork, Engine as _};
 use study::{Bar, Check, Report, Table};
 use wire::PolicyChoice;
 
-use super::BenchArgs;
-use crate::evaluate::{Truth, median};
+use super::args::BenchArgs;
 use crate::experiment::{Experiment, PAPER_VIEWS};
 use crate::progress::bar;
+use crate::reference_views::ReferenceViews;
+use crate::statistics::median;
 
 /// Views that direct rendering is timed on.
 const DIRECT_VIEWS: usize = 48;
@@ -48,13 +49,13 @@ pub fn delivered(args: &BenchArgs, experiment: &Experiment, report: &mut Report)
 /// c and g_v, in one batch each and to host pixels.
 pub fn nanoseconds(
     args: &BenchArgs,
-    truth: &Truth,
+    reference: &ReferenceViews,
     experiment: &Experiment,
     report: &mut Report,
 ) -> anyhow::Result<()> {
-    let pixels = truth.cameras.first().map_or(1, PinholeCamera::pixel_count) as f64;
-    let c_ns = truth.ms_a_view(args.scene.method, PAPER_VIEWS, args.runs())? * 1e6 / pixels;
-    let g_ns = direct_s_a_view(truth, experiment, args.runs())? * 1e9 / pixels;
+    let pixels = reference.cameras.first().map_or(1, PinholeCamera::pixel_count) as f64;
+    let c_ns = reference.ms_a_view(args.scene.method, PAPER_VIEWS, args.runs())? * 1e6 / pixels;
+    let g_ns = direct_s_a_view(reference, experiment, args.runs())? * 1e9 / pixels;
     let mut table = Table::new("Device time", &[("what", ""), ("time a pixel", "ns"), ("time a view", "ms")]);
     for (what, ns) in [("c: reconstruct", c_ns), ("g_v: draw from the scene", g_ns)] {
         table.push([what.into(), ns.into(), (ns * pixels * 1e-6).into()])?;
@@ -64,10 +65,10 @@ pub fn nanoseconds(
     Ok(())
 }
 
-fn direct_s_a_view(truth: &Truth, experiment: &Experiment, runs: usize) -> anyhow::Result<f64> {
+fn direct_s_a_view(reference: &ReferenceViews, experiment: &Experiment, runs: usize) -> anyhow::Result<f64> {
     let work = DirectWork {
         scene_hash: experiment.setup.offer.hash.to_string(),
-        cameras: truth.cameras.clone(),
+        cameras: reference.cameras.clone(),
         lighting: experiment.args.lighting.to_string(),
         scene_time_s: 0.0,
         planes: ViewPlanes::default(),

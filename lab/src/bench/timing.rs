@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::evaluate::median;
+use crate::statistics::median;
 
 /// Seconds of each of some works, the median of `runs` rounds after one that does not count. They take turns, so
 /// that none has the quieter machine.

@@ -9,9 +9,9 @@ use metrics::{Rgb8Image, flip_map};
 use render::Lighting;
 use study::{Picture, PictureRow, Report, comparison_row};
 
-use crate::evaluate::Truth;
+use crate::reference_views::ReferenceViews;
 
-/// Views that are shown side by side with the truth.
+/// Views that are shown side by side with the reference.
 const SIDE_BY_SIDE: usize = 6;
 const SHEET_COLUMNS: u32 = 20;
 
@@ -32,8 +32,8 @@ pub fn contact_sheet(frames: &[Frame], lighting: &Lighting, report: &mut Report)
 }
 
 /// direct | reconstructed | error map | provenance.
-pub fn comparisons(truth: &Truth, views: &[View], report: &mut Report) -> anyhow::Result<()> {
-    for (index, (direct, view)) in truth.views.iter().zip(views).take(SIDE_BY_SIDE).enumerate() {
+pub fn comparisons(reference: &ReferenceViews, views: &[View], report: &mut Report) -> anyhow::Result<()> {
+    for (index, (direct, view)) in reference.views.iter().zip(views).take(SIDE_BY_SIDE).enumerate() {
         let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(view)?)?;
         let images = pictures::rgb(direct).zip(pictures::rgb(view)).context("a view is not of its size")?;
         let provenance = provenance::false_color(view).map(|picture| (picture.image, picture.legend));

@@ -1,64 +1,25 @@
 //! `myriorama demo`: the paper's experiment on this machine.
 
-mod beside;
-mod charts;
-mod light;
-mod pictures;
-mod timing;
-
-use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Context as _;
-use app_core::cameras::{self, Placement};
+use app_core::camera_file::{self, Placement};
 use app_core::exit::Outcome;
-use app_core::setup::{DeviceArgs, NEAR_OF_DIAGONAL, SceneArgs};
-use clap::Args;
+use app_core::setup::NEAR_OF_DIAGONAL;
 use depth_image::PinholeCamera;
 use node::Engine as _;
 use scene::Limits;
 use study::{Bar, Check, Report};
 
-use crate::evaluate::Truth;
+use super::args::{COMPARED_VIEWS, DemoArgs};
+use super::{beside, charts, light, timing};
 use crate::experiment::Experiment;
 use crate::memory::peak_memory_mb;
 use crate::progress::bar;
+use crate::reference_views::ReferenceViews;
 use crate::sweep;
 
-/// S samples of 400×300, 290 views of 200×150, P nodes in one process; a table, and a report with pictures and
-/// charts in --out. Then the same scene
-/// with soft shadows and occlusion, and what light of every quality costs. Three minutes at most on two slow cores;
-/// --quick takes less than one.
-#[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:\n  myriorama demo\n  myriorama demo --scene helmet.gltf --out out/helmet\n  myriorama demo --scene tree-terrain-30k --quick"
-)]
-pub struct DemoArgs {
-    #[command(flatten)]
-    scene: SceneArgs,
-    #[command(flatten)]
-    device: DeviceArgs,
-    /// View cameras from a transforms.json, in the scene file's coordinates [default: spread between the sample
-    /// cameras]
-    #[arg(long, value_name = "FILE")]
-    cameras: Option<PathBuf>,
-    /// P: nodes that share the device
-    #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
-    nodes: u16,
-    /// Where the report goes
-    #[arg(long, default_value = "out/demo", value_name = "DIR")]
-    out: PathBuf,
-    /// A smaller form of the same run
-    #[arg(long)]
-    quick: bool,
-    /// Exit status 1 when a check falls short
-    #[arg(long)]
-    strict: bool,
-}
-
-/// Views that are compared pixel by pixel.
-const COMPARED_VIEWS: usize = 6;
-/// Of the demo, with everything.
+/// The longest that the whole demo may take.
 const TIME_LIMIT_S: f64 = 180.0;
 
 /// Runs all of it.
@@ -98,7 +59,7 @@ fn given_views(args: &DemoArgs) -> anyhow::Result<Vec<PinholeCamera>> {
     let Some(path) = &args.cameras else { return Ok(Vec::new()) };
     let scene = args.scene.scene.load(&Limits::default()).context("the scene cannot be used")?;
     let near_m = scene.bounds().size().length() * NEAR_OF_DIAGONAL;
-    Ok(cameras::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?)
+    Ok(camera_file::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?)
 }
 
 fn new_report(args: &DemoArgs, experiment: &Experiment) -> Report {
@@ -119,9 +80,10 @@ fn new_report(args: &DemoArgs, experiment: &Experiment) -> Report {
 /// Errors against time.
 fn compare(args: &DemoArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let count = COMPARED_VIEWS;
-    let truth = Truth::take(&experiment.engine, &experiment.setup, &experiment.args, experiment.views(count)?)?;
+    let reference =
+        ReferenceViews::draw(&experiment.engine, &experiment.setup, &experiment.args, experiment.views(count)?)?;
     let progress = bar("error against time", sweep::settings(args.quick).len());
-    let rows = sweep::sweep(&truth, args.quick, 1, |_| progress.inc(1))?;
+    let rows = sweep::sweep(&reference, args.quick, 1, |_| progress.inc(1))?;
     progress.finish_and_clear();
     report.tables.push(sweep::table("Error against time", &rows)?);
     let name = args.scene.scene.to_string();

@@ -11,10 +11,10 @@ use render::Lighting;
 use scene::SceneSpec;
 use study::Report;
 
-use crate::load::processes::Setting;
-use crate::load::{self, report};
+use super::processes::Setting;
+use super::{phases, report};
+use crate::cpu_share::Hierarchy;
 use crate::progress::bar;
-use crate::scaling::Hierarchy;
 
 /// Four loads, each on a coordinator and nodes that are started for it as processes: 8 clients of 10 frames a second,
 /// 16 of 15, 80 of 10, all of 320×180; and 200 that do nothing.
@@ -92,7 +92,7 @@ impl LoadArgs {
 /// Where a process does not start, or a client fails but by being refused.
 pub fn run(args: &LoadArgs) -> anyhow::Result<Outcome> {
     let progress = bar("load", 4);
-    let phases = runtime()?.block_on(load::run(&args.setting(), args.lasting(), &progress))?;
+    let phases = runtime()?.block_on(phases::run(&args.setting(), args.lasting(), &progress))?;
     progress.finish_and_clear();
     let mut report = Report::new("Myriorama bench load", phases.device.clone());
     report.version("myriorama", env!("CARGO_PKG_VERSION"));

@@ -6,8 +6,8 @@ use std::time::Duration;
 use anyhow::Context as _;
 use client::Client;
 
+use crate::cpu_share::{CpuGroup, Hierarchy};
 use crate::process::{Process, metrics_page};
-use crate::scaling::{CpuGroup, Hierarchy};
 
 /// How long nodes may take to join.
 const JOIN: Duration = Duration::from_secs(60);

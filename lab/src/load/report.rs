@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use app_core::live::{Record, STAGES, Shown, latencies, quantile};
 use study::{Axis, Bar, BarChart, Cell, Check, Report, Series, Table, XyChart};
 
-use super::crowd::Outcome;
+use super::clients::Outcome;
 use super::phases::{Idle, Load, Phases};
 
 /// Of what was asked for, undegraded.
@@ -77,11 +77,11 @@ impl Load {
 
     /// Of the rate that each client asked for, what it got once all had settled; the least first.
     fn rate_shares(&self) -> Vec<f64> {
-        let lasting_s = self.crowd.lasting.as_secs_f64();
+        let lasting_s = self.clients.lasting.as_secs_f64();
         let from_s = lasting_s * SETTLING;
         let of = |record: &Record| {
             let count = record.shown.iter().filter(|shown| (from_s..lasting_s).contains(&shown.posed_s)).count();
-            count as f64 / ((lasting_s - from_s) * self.crowd.rate_hz)
+            count as f64 / ((lasting_s - from_s) * self.clients.rate_hz)
         };
         let mut shares: Vec<f64> = self.served().map(of).collect();
         shares.sort_by(f64::total_cmp);
@@ -206,7 +206,7 @@ fn growth(load: &Load) -> f64 {
     let of = |(_, looks): &(String, Vec<(f64, f64)>)| {
         let looks = settled(looks);
         let mean = looks.iter().map(|look| look.1).sum::<f64>() / looks.len() as f64;
-        slope_mib_per_s(looks) * load.crowd.lasting.as_secs_f64() / mean
+        slope_mib_per_s(looks) * load.clients.lasting.as_secs_f64() / mean
     };
     // The clients keep every frame's times.
     load.memory.iter().filter(|(name, _)| name != "clients").map(of).fold(f64::NAN, f64::max)

@@ -9,10 +9,13 @@ use engine::GpuEngine;
 use node::Engine as _;
 use study::Report;
 
-use crate::sampling_study::{
-    Extent, SCENES, Subject, detection, detection_report, reconstructions, reconstructions_report, scene_report, sizes,
-    sizes_report, tables, times, times_report,
-};
+use super::detection::{detection, detection_report};
+use super::extent::Extent;
+use super::reconstructions::{reconstructions, reconstructions_report};
+use super::sizes::{sizes, sizes_report};
+use super::subject::{SCENES, Subject};
+use super::tables::{scene_report, tables};
+use super::times::{times, times_report};
 
 /// Conventional, non-redundant and peeled images of a bird's nest, grass, a city and a tree, from three viewpoints:
 /// how many samples are redundant, disoccluded and useful, how many of an output frame's samples are there, what views

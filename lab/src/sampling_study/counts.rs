@@ -5,7 +5,7 @@ use metrics::{Held, HeldSample, held_samples};
 use rayon::prelude::*;
 use sampling::SamplingMethod;
 
-use super::METHODS;
+use super::methods::METHODS;
 
 /// Of one image of one method; counted before anything is dilated or steadied.
 #[derive(Debug, Clone, Default)]

@@ -4,8 +4,8 @@ use depth_image::DepthImage;
 use image::{Rgb, RgbImage};
 use study::{Picture, PictureRow};
 
-use super::METHODS;
 use super::counts::ImageCount;
+use super::methods::METHODS;
 
 const NOTHING: [u8; 3] = [0, 0, 0];
 const KNOWN: [u8; 3] = [96, 96, 104];

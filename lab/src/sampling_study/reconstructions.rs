@@ -6,9 +6,11 @@ use reconstruction::ReconstructionMethod;
 use sampling::SamplingMethod;
 use study::{Axis, Bar, Cell, Check, Point, Report, Series, Table, XyChart};
 
-use super::{METHODS, Subject};
-use crate::evaluate::{Row, Truth};
+use super::methods::METHODS;
+use super::subject::Subject;
+use crate::evaluation::Evaluation;
 use crate::progress::bar;
+use crate::reference_views::ReferenceViews;
 
 const SAMPLE_PX: UVec2 = UVec2::new(400, 300);
 const VIEW_PX: UVec2 = UVec2::new(200, 150);
@@ -22,7 +24,7 @@ pub struct Reconstructed {
     samples: usize,
     /// Of the views' pixels that show a surface, the share whose surface is in no image.
     unheld: f64,
-    rows: Vec<Row>,
+    rows: Vec<Evaluation>,
 }
 
 /// Measures all pairs on a scene, then once more with about as few samples as the least of them.
@@ -65,13 +67,13 @@ fn of_method(
     // Planes for all reconstructions.
     let args =
         SceneArgs { sampling, method: ReconstructionMethod::HybridMesh { merged: None }, ..subject.args.clone() };
-    let truth = Truth::take(&subject.engine, &setup, &args, views)?;
-    let samples = truth.images.iter().flat_map(|image| &image.inverse_depth_per_m).filter(|&&d| d > 0.0).count();
+    let reference = ReferenceViews::draw(&subject.engine, &setup, &args, views)?;
+    let samples = reference.images.iter().flat_map(|image| &image.inverse_depth_per_m).filter(|&&d| d > 0.0).count();
     let rows = RECONSTRUCTIONS
         .iter()
-        .map(|name| truth.evaluate_timed_on(name.parse()?, VIEWS, 1))
+        .map(|name| reference.evaluate_timed_on(name.parse()?, VIEWS, 1))
         .collect::<anyhow::Result<_>>()?;
-    Ok(Reconstructed { sampling, size_px, samples, unheld: truth.unheld()?, rows })
+    Ok(Reconstructed { sampling, size_px, samples, unheld: reference.unheld()?, rows })
 }
 
 impl Reconstructed {

@@ -6,9 +6,10 @@ use sampling::{Redundancy, SamplingMethod};
 use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
 use super::counts::{ImageCount, image_counts, mark_useful};
-use super::subject::WITH_IDS;
+use super::extent::Extent;
+use super::methods::{IMAGES, METHODS};
+use super::subject::{Subject, WITH_IDS};
 use super::visibility::seen;
-use super::{Extent, METHODS, Subject};
 use crate::progress::bar;
 
 const SIDES_PX: [u32; 4] = [256, 512, 1024, 2048];
@@ -56,7 +57,7 @@ pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<V
             frames.iter().filter_map(Held::of).for_each(|frame| mark_useful(&mut counts, &frame));
             Ok(())
         })?;
-        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / (super::IMAGES - 1) as f64;
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / (IMAGES - 1) as f64;
         let share = |part: usize, whole: usize| 100.0 * part as f64 / whole as f64;
         rows.push(SizeRow {
             side_px,

@@ -10,7 +10,7 @@ use glam::{UVec2, Vec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use sampling::{Rig, SampleWork, Sampler, SamplingMethod};
 
-use super::IMAGES;
+use super::methods::IMAGES;
 
 /// The paper's scenes, as this project makes them.
 pub const SCENES: [&str; 4] = ["bird-nest", "grass", "urban", "tree"];

@@ -7,9 +7,11 @@ use study::{Bar, Cell, Check, Report, Table};
 
 use super::availability::Availability;
 use super::counts::{ImageCount, image_counts, mark_useful};
-use super::subject::WITH_IDS;
+use super::extent::Extent;
+use super::methods::{IMAGES, METHODS};
+use super::pictures;
+use super::subject::{Subject, WITH_IDS};
 use super::visibility::{Seen, seen};
-use super::{Extent, IMAGES, METHODS, Subject, pictures};
 use crate::progress::bar;
 
 /// Side of output frames, as in the paper.

@@ -9,8 +9,10 @@ use sampling::{SamplingMethod, scalar};
 use study::{Bar, Cell, Check, Report, Table};
 use wire::{PlaneSet, encode_depth_image};
 
-use super::{Extent, IMAGES, METHODS, Subject};
-use crate::evaluate::median;
+use super::extent::Extent;
+use super::methods::{IMAGES, METHODS};
+use super::subject::Subject;
+use crate::statistics::median;
 
 const RUNS: usize = 3;
 /// What takes so long is not run again.

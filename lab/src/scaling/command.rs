@@ -12,7 +12,10 @@ use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use scene::SceneSpec;
 
-use crate::scaling::{Extent, Request, Subject, report, show, take};
+use super::matrix::Extent;
+use super::measure::{Request, take};
+use super::report::{report, show};
+use super::subject::Subject;
 
 /// A coordinator and P nodes as processes of their own, each node with an equal share of this machine's processors
 /// (control groups of Linux, so that eleven nodes fit two cores): the time between two sample sets for P = 2…11 nodes
@@ -27,10 +30,10 @@ pub struct ScalingArgs {
     /// How surfaces are lit: as in the paper
     #[arg(long, default_value_t, value_name = "TERMS")]
     lighting: Lighting,
-    /// A second table under another lighting, where sampling is dear [default: none with --quick, else "soft 4,
+    /// A second table under another lighting, where sampling is expensive [default: none with --quick, else "soft 4,
     /// occlusion 4"]
     #[arg(long, value_name = "TERMS")]
-    dear_lighting: Option<Lighting>,
+    expensive_lighting: Option<Lighting>,
     /// How views are reconstructed
     #[arg(long, default_value_t, value_name = "NAME")]
     method: ReconstructionMethod,
@@ -60,7 +63,7 @@ pub struct ScalingArgs {
 }
 
 /// The second table's lighting, where nothing else is asked for.
-const DEAR_LIGHTING: &str = "soft 4, occlusion 4";
+const EXPENSIVE_LIGHTING: &str = "soft 4, occlusion 4";
 
 fn cores(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|cores| (0.01..=64.0).contains(cores)).ok_or_else(|| "expected 0.01 to 64".to_owned())
@@ -68,9 +71,9 @@ fn cores(text: &str) -> Result<f64, String> {
 
 impl ScalingArgs {
     fn request(&self) -> anyhow::Result<Request> {
-        let dear = || DEAR_LIGHTING.parse::<Lighting>().map_err(|error| BadInput(error.to_string()));
-        let dear_lighting = match self.dear_lighting {
-            None if !self.quick => Some(dear()?),
+        let expensive = || EXPENSIVE_LIGHTING.parse::<Lighting>().map_err(|error| BadInput(error.to_string()));
+        let expensive_lighting = match self.expensive_lighting {
+            None if !self.quick => Some(expensive()?),
             given => given,
         };
         Ok(Request {
@@ -78,7 +81,7 @@ impl ScalingArgs {
             extent: Extent { quick: self.quick, nodes: usize::from(self.nodes), views: self.views as usize },
             quota_cores: self.quota,
             lighting: self.lighting,
-            dear_lighting,
+            expensive_lighting,
             event_log: self.out.join("schedule.log"),
         })
     }

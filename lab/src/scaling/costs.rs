@@ -3,7 +3,7 @@
 use render::Lighting;
 use wire::Costs;
 
-use super::fleet::Fleet;
+use super::processes::NodeProcesses;
 use super::subject::{MEASURED_BATCH, Subject};
 
 /// The mean of several measurements; zeros without any.
@@ -29,11 +29,16 @@ pub fn mean(all: &[Costs]) -> Costs {
 ///
 /// # Errors
 /// A node's.
-pub async fn measure(fleet: &Fleet, subject: &Subject, lighting: Lighting, batch: u32) -> anyhow::Result<Vec<Costs>> {
-    let nodes = fleet.nodes();
+pub async fn measure(
+    processes: &NodeProcesses,
+    subject: &Subject,
+    lighting: Lighting,
+    batch: u32,
+) -> anyhow::Result<Vec<Costs>> {
+    let nodes = processes.nodes();
     let views = subject.views(nodes * MEASURED_BATCH as usize)?;
     let of_node = |node| views.iter().skip(node).step_by(nodes).copied().collect();
-    fleet.measure((0..nodes).map(|node| subject.measurement(lighting, of_node(node), batch))).await
+    processes.measure((0..nodes).map(|node| subject.measurement(lighting, of_node(node), batch))).await
 }
 
 /// (S·g_s + V·(c+e)) / (P·T): what the work would take one node, over what P nodes took.

@@ -13,15 +13,15 @@ use depth_image::PinholeCamera;
 use render::Lighting;
 use wire::{FrameHeader, Policy, PolicyChoice, SessionPlan};
 
-use super::cpu_share::Usage;
 use super::fetched::{Fetched, fetch};
-use super::fleet::Fleet;
 use super::machine::MachineTime;
+use super::processes::NodeProcesses;
 use super::subject::Subject;
+use crate::cpu_share::Usage;
 
 /// What is asked of the cluster.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ask {
+pub struct PointSettings {
     /// How surfaces are lit.
     pub lighting: Lighting,
     /// Who decides.
@@ -37,7 +37,7 @@ pub struct Ask {
 /// Sets of a timeline that follow the last that counts: one that is being made by then, and what is sampled ahead.
 const SETS_BEHIND: u32 = 2;
 
-impl Ask {
+impl PointSettings {
     /// Sets that can be asked for: the first fills.
     fn sets(&self) -> u32 {
         1 + self.counted_sets + if self.policy == PolicyChoice::Direct { 0 } else { SETS_BEHIND }
@@ -88,7 +88,7 @@ pub struct Window {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
     /// What was asked.
-    pub ask: Ask,
+    pub settings: PointSettings,
     /// P.
     pub nodes: usize,
     /// What the coordinator decided.
@@ -154,7 +154,7 @@ impl Point {
         let assignment = &self.plan.assignment;
         let samples = |name: &str| assignment.samplers.iter().any(|share| share.node_name == name);
         let all_sample = assignment.compositors.iter().all(|share| samples(&share.node_name));
-        let counts = |number: usize| all_sample || !samples(&Fleet::name_of(number));
+        let counts = |number: usize| all_sample || !samples(&NodeProcesses::name_of(number));
         let used = self.window.nodes.iter().enumerate().filter(|(number, _)| counts(*number));
         let (periods, throttled) = used.fold((0, 0), |sum, (_, node)| (sum.0 + node.periods, sum.1 + node.throttled));
         throttled as f64 / periods as f64
@@ -172,8 +172,8 @@ struct Arrivals {
 }
 
 impl Arrivals {
-    fn new(ask: &Ask) -> Self {
-        let sets = vec![(ask.views, 0.0); ask.sets() as usize];
+    fn new(settings: &PointSettings) -> Self {
+        let sets = vec![(settings.views, 0.0); settings.sets() as usize];
         Self { start: Instant::now(), sets, frames: 0, steps: Steps::default() }
     }
 
@@ -209,54 +209,72 @@ impl Arrivals {
 ///
 /// # Errors
 /// The cluster's.
-pub async fn measure(fleet: &Fleet, subject: &Subject, ask: Ask, arrived: impl FnMut()) -> anyhow::Result<Point> {
-    let views = subject.views(ask.views)?;
-    let wishes = Wishes { tiles: ask.forced_tiles(), ..subject.wishes(ask.lighting, ask.policy, ask.sets()) };
-    let session = open(&fleet.client, &wishes, &views).await?;
+pub async fn measure(
+    processes: &NodeProcesses,
+    subject: &Subject,
+    settings: PointSettings,
+    arrived: impl FnMut(),
+) -> anyhow::Result<Point> {
+    let views = subject.views(settings.views)?;
+    let wishes = Wishes {
+        tiles: settings.forced_tiles(),
+        ..subject.wishes(settings.lighting, settings.policy, settings.sets())
+    };
+    let session = open(&processes.client, &wishes, &views).await?;
     let plan = session.plan();
-    let before = fleet.counters().await?;
-    let (arrivals, window) = receive(fleet, &session, &views, &ask, arrived).await?;
-    let counted = fleet.counters().await?.since(&before);
+    let before = processes.counters().await?;
+    let (arrivals, window) = receive(processes, &session, &views, &settings, arrived).await?;
+    let counted = processes.counters().await?.since(&before);
     let fetched = match plan.assignment.policy {
         // Nodes that have gone on to another plan refuse: others of the lighting's points show it.
-        Policy::Pipeline => fetch(&plan.assignment, ask.counted_sets).await.ok(),
+        Policy::Pipeline => fetch(&plan.assignment, settings.counted_sets).await.ok(),
         _ => None,
     };
     let later_plans = session.plan().assignment.plan_epoch.saturating_sub(plan.assignment.plan_epoch);
-    let (first_s, sets) = (arrivals.complete_s(0), f64::from(ask.counted_sets));
+    let (first_s, sets) = (arrivals.complete_s(0), f64::from(settings.counted_sets));
     let steps = Steps {
         sample_s: counted.image_s / counted.images.max(1.0) * subject.images() as f64,
         client_s: window.machine.client_s / sets,
-        ..arrivals.steps_of(ask.views)
+        ..arrivals.steps_of(settings.views)
     };
-    let period_s = (arrivals.complete_s(ask.counted_sets) - first_s) / sets;
-    Ok(Point { ask, nodes: fleet.nodes(), plan, later_plans, period_s, fill_s: first_s, steps, window, fetched })
+    let period_s = (arrivals.complete_s(settings.counted_sets) - first_s) / sets;
+    Ok(Point {
+        settings,
+        nodes: processes.nodes(),
+        plan,
+        later_plans,
+        period_s,
+        fill_s: first_s,
+        steps,
+        window,
+        fetched,
+    })
 }
 
 async fn receive(
-    fleet: &Fleet,
+    processes: &NodeProcesses,
     session: &Session,
     views: &[PinholeCamera],
-    ask: &Ask,
+    settings: &PointSettings,
     mut arrived: impl FnMut(),
 ) -> anyhow::Result<(Arrivals, Window)> {
-    let all = (0..ask.sets()).flat_map(|set_index| views.iter().map(move |camera| (set_index, *camera)));
-    let request = |(frame, (set_index, camera))| ViewRequest { frame, set_index, camera };
+    let all = (0..settings.sets()).flat_map(|set_index| views.iter().map(move |camera| (set_index, *camera)));
+    let view_request = |(frame, (set_index, camera))| ViewRequest { frame, set_index, camera };
     // One request for all: streams of their own would take turns.
-    let mut frames = session.render_views((0..).zip(all).map(request).collect())?;
-    let (mut arrivals, mut begun) = (Arrivals::new(ask), None);
+    let mut frames = session.render_views((0..).zip(all).map(view_request).collect())?;
+    let (mut arrivals, mut begun) = (Arrivals::new(settings), None);
     while let Some(frame) = frames.next().await {
         let Frame { request: ViewRequest { set_index: set, .. }, header, .. } = frame?;
         let complete = arrivals.note(set, Instant::now(), &header);
         arrived();
         if complete && set == 0 {
-            begun = Some((Instant::now(), fleet.usage()?, MachineTime::now()));
+            begun = Some((Instant::now(), processes.usage()?, MachineTime::now()));
         }
-        if let (true, Some((since, nodes, machine))) = (complete && set == ask.counted_sets, &begun) {
+        if let (true, Some((since, nodes, machine))) = (complete && set == settings.counted_sets, &begun) {
             let window = Window {
                 seconds: since.elapsed().as_secs_f64(),
-                nodes: fleet.usage()?.iter().zip(nodes).map(|(now, then)| now.since(then)).collect(),
-                quota_cores: fleet.quota_cores(),
+                nodes: processes.usage()?.iter().zip(nodes).map(|(now, then)| now.since(then)).collect(),
+                quota_cores: processes.quota_cores(),
                 machine: MachineTime::now().since(machine),
             };
             return Ok((arrivals, window));

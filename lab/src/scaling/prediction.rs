@@ -4,15 +4,15 @@ use coordinator::schedule::pipeline_time;
 use simulation::{Cluster, Demand, Habits, Machine, plan, run};
 use wire::{Costs, Policy};
 
-use super::measured::{Lit, Timed};
-use super::point::{Ask, Point};
+use super::measured::{MeasuredLighting, Timed};
+use super::point::{Point, PointSettings};
 
 /// Sets of the simulation beyond those that count: the first, and what is sampled ahead at the end.
 const MORE_SETS: u32 = 5;
 
 /// Predictions of T.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Foretold {
+pub struct Prediction {
     /// Eq. 2 for the pipeline, eq. 1 for `direct`, and all work over all nodes for time-share: d, transfer and whole
     /// images are not in it.
     pub equation_s: f64,
@@ -43,7 +43,7 @@ impl Traffic {
         let of_fetched = |sum: f64| sum / fetched.len().max(1) as f64;
         let image_bytes = of_fetched(fetched.iter().map(|image| image.image_bytes).sum());
         let image_s = of_fetched(fetched.iter().map(|image| image.image_s).sum());
-        let views: f64 = points.iter().map(|point| point.ask.views as f64).sum();
+        let views: f64 = points.iter().map(|point| point.settings.views as f64).sum();
         let frames: f64 = points.iter().map(|point| point.steps.frame_bytes).sum();
         Self { image_bytes, frame_bytes: frames / views.max(1.0), bytes_per_s: image_bytes / image_s }
     }
@@ -57,13 +57,13 @@ impl Traffic {
 
 /// Of one point, from what as many nodes timed before and after.
 #[must_use]
-pub fn foretell(lit: &Lit, images: usize, point: &Point) -> Foretold {
+pub fn predict(lit: &MeasuredLighting, images: usize, point: &Point) -> Prediction {
     let traffic = Traffic::of(&lit.points);
     let bytes_per_s = if traffic.bytes_per_s > 0.0 { traffic.bytes_per_s } else { f64::INFINITY };
     let timed = lit.timed.iter().find(|timed| timed.nodes == point.nodes);
     let (costs, calls) = timed.map_or_else(Default::default, Timed::by_view_and_call);
     let simulated = simulate(Machine { costs, calls, bytes_per_s }, &traffic, images, point);
-    Foretold {
+    Prediction {
         equation_s: equation_s(&lit.mean(point.nodes), images, point),
         schedule_s: point.plan.predicted_s(),
         simulated_s: simulated.map_or(f64::NAN, |(period_s, _)| period_s),
@@ -72,7 +72,7 @@ pub fn foretell(lit: &Lit, images: usize, point: &Point) -> Foretold {
 }
 
 fn equation_s(costs: &Costs, images: usize, point: &Point) -> f64 {
-    let (nodes, views) = (point.nodes, point.ask.views);
+    let (nodes, views) = (point.nodes, point.settings.views);
     let (g_s, view_s) = (costs.sample_image_s, costs.reconstruct_view_s + costs.encode_view_s);
     match point.policy() {
         Policy::Pipeline => pipeline_time(images, g_s, views, view_s, nodes, point.samplers()),
@@ -83,9 +83,9 @@ fn equation_s(costs: &Costs, images: usize, point: &Point) -> f64 {
 
 /// T and whether the plan is the same: planned with the costs that the coordinator had, carried out at the mean ones.
 fn simulate(machine: Machine, traffic: &Traffic, images: usize, point: &Point) -> Option<(f64, bool)> {
-    let sets = point.ask.counted_sets + MORE_SETS;
-    let Ask { views, policy, .. } = point.ask;
-    let tiles = point.ask.forced_tiles().map(|tiles| tiles as usize);
+    let sets = point.settings.counted_sets + MORE_SETS;
+    let PointSettings { views, policy, .. } = point.settings;
+    let tiles = point.settings.forced_tiles().map(|tiles| tiles as usize);
     let demand = Demand { views, sets, policy, tiles, nodes_report: false };
     let planned = plan(&traffic.cluster(point.nodes, Machine::of(point.plan.costs), images), &demand).ok()?;
     let roles = |plan: &wire::Assignment| {
@@ -94,6 +94,6 @@ fn simulate(machine: Machine, traffic: &Traffic, images: usize, point: &Point) -
     };
     let same = roles(&planned.assignment) == roles(&point.plan.assignment);
     let cluster = traffic.cluster(point.nodes, machine, images);
-    let run = run(&cluster, &planned, point.ask.views, sets, Habits::default());
-    Some((run.period_s(point.ask.counted_sets as usize), same))
+    let run = run(&cluster, &planned, point.settings.views, sets, Habits::default());
+    Some((run.period_s(point.settings.counted_sets as usize), same))
 }

@@ -11,7 +11,7 @@ use wire::rpc::{NodeClient, connect};
 use wire::{Costs, MeasureCosts};
 
 use super::counters::{Counters, read};
-use super::cpu_share::{CpuGroup, Hierarchy, OwnGroup, Usage};
+use crate::cpu_share::{CpuGroup, Hierarchy, OwnGroup, Usage};
 use crate::process::Process;
 
 /// Until all nodes have opened their device and joined.
@@ -34,7 +34,7 @@ struct Member {
 }
 
 /// Processes that end with it.
-pub struct Fleet {
+pub struct NodeProcesses {
     /// Of the cluster.
     pub client: Client,
     members: Vec<Member>,
@@ -43,7 +43,7 @@ pub struct Fleet {
     quota_cores: Option<f64>,
 }
 
-impl Fleet {
+impl NodeProcesses {
     /// Starts all of them, without a limit yet, and waits until all nodes have joined. What happens to the schedule is
     /// written to `event_log`, for `myriorama replay`.
     ///
@@ -64,7 +64,7 @@ impl Fleet {
         for number in 0..nodes {
             let group = CpuGroup::new(&hierarchy, &format!("myriorama-{}-{number:03}", std::process::id()))?;
             let process = Process::start(&Self::name_of(number), &node_arguments(number, &url, device))?;
-            group.go_first()?;
+            group.prioritize()?;
             group.admit(process.id())?;
             started.push((process, group));
         }
@@ -160,7 +160,7 @@ impl Fleet {
     /// Waits until no node does anything any more: what was asked for and is not wanted is made to the end of its batch.
     ///
     /// # Errors
-    /// As [`Fleet::usage`].
+    /// As [`NodeProcesses::usage`].
     pub async fn rest(&self) -> anyhow::Result<()> {
         let end = tokio::time::Instant::now() + REST;
         let mut before = self.usage()?;
@@ -189,14 +189,14 @@ impl Fleet {
     }
 }
 
-/// What the coordinator offers is what sessions ask for anyway, but for the scene.
+/// What the coordinator offers is what sessions settings for anyway, but for the scene.
 fn coordinator_arguments(scene: &SceneArgs, event_log: &Path) -> Vec<String> {
     let (scene, event_log) = (scene.scene.to_string(), event_log.display().to_string());
     ["coordinator", "--listen", "127.0.0.1:0", "--scene", &scene, "--record", &event_log].map(str::to_owned).into()
 }
 
 fn node_arguments(number: usize, coordinator: &str, device: DevicePreference) -> Vec<String> {
-    let (name, device) = (Fleet::name_of(number), device.to_string());
+    let (name, device) = (NodeProcesses::name_of(number), device.to_string());
     let fixed = ["node", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0"];
     let own = ["--coordinator", coordinator, "--name", &name, "--device", &device];
     fixed.iter().chain(&own).map(|&word| word.to_owned()).collect()

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use simulation::{Cluster, Demand, Habits, Limit, Machine, Transfer, plan, run, spread_speeds};
 use wire::{Costs, Policy, PolicyChoice};
 
-use super::foretold::Traffic;
+use super::prediction::Traffic;
 
 /// P.
 const NODES: [usize; 9] = [2, 5, 11, 20, 50, 100, 200, 500, 1000];
@@ -64,13 +64,13 @@ pub struct Simulated {
     pub limit: Limit,
 }
 
-/// Costs of this machine without a limit, and, where it was measured, under dear light.
+/// Costs of this machine without a limit, and, where it was measured, under expensive lighting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Basis {
     /// Plainly lit.
     pub plain: Costs,
-    /// Under dear light.
-    pub dear: Option<Costs>,
+    /// Under expensive lighting.
+    pub expensive: Option<Costs>,
     /// S.
     pub images: usize,
     /// What travels.
@@ -106,7 +106,7 @@ pub fn scenarios(basis: &Basis) -> Vec<Scenario> {
     all
 }
 
-/// Unequal nodes, and images that are dear and cut.
+/// Unequal nodes, and images that are expensive and cut.
 fn of_ten_gbit(basis: &Basis) -> Vec<Scenario> {
     let relay = Habits { transfer: Transfer::Relay(2), sets_ahead: 3, ..Habits::default() };
     let plain = Scenario {
@@ -118,14 +118,16 @@ fn of_ten_gbit(basis: &Basis) -> Vec<Scenario> {
         parts: 1,
         unequal: true,
     };
-    let dear = basis.dear.into_iter().flat_map(|costs| {
-        let whole = Scenario { name: "dear light, whole images".to_owned(), costs, unequal: false, ..plain.clone() };
-        let relayed = Scenario { name: "dear light, relay".to_owned(), habits: relay, ..whole.clone() };
-        let cut = Scenario { name: format!("dear light, relay, images in {PARTS}"), parts: PARTS, ..relayed.clone() };
+    let expensive = basis.expensive.into_iter().flat_map(|costs| {
+        let whole =
+            Scenario { name: "expensive lighting, whole images".to_owned(), costs, unequal: false, ..plain.clone() };
+        let relayed = Scenario { name: "expensive lighting, relay".to_owned(), habits: relay, ..whole.clone() };
+        let cut =
+            Scenario { name: format!("expensive lighting, relay, images in {PARTS}"), parts: PARTS, ..relayed.clone() };
         [whole, relayed, cut]
     });
-    let dear: Vec<_> = dear.collect();
-    [plain].into_iter().chain(dear).collect()
+    let expensive: Vec<_> = expensive.collect();
+    [plain].into_iter().chain(expensive).collect()
 }
 
 /// All scenarios at all P and V, most of them at the same time.

@@ -92,7 +92,7 @@ pub fn charts(scenarios: &[Scenario], points: &[Simulated]) -> Vec<Chart> {
         chart(name, scenarios, points, |scenario| scenario.device == *device && plain(scenario))
     });
     let others = chart(
-        format!("Simulated efficiency, V = {CHARTED_VIEWS}, unequal nodes and dear light"),
+        format!("Simulated efficiency, V = {CHARTED_VIEWS}, unequal nodes and expensive lighting"),
         scenarios,
         points,
         |scenario| !plain(scenario),

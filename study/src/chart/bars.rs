@@ -5,7 +5,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
-use super::canvas::{self, Area, Drawing, Glyph, LegendEntry, message, style_mesh, text_style, text_width_px};
+use super::area::{Area, message};
+use super::canvas::{self, Drawing, Glyph, LegendEntry, style_mesh, text_style, text_width_px};
 use super::ruler::Ruler;
 use super::{Axis, Palette};
 use crate::ReportError;

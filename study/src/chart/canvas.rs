@@ -1,20 +1,20 @@
-//! What all charts share: a title, a legend above the data, and ink that follows the page.
+//! The frame of all charts: a title, a legend above the data, and ink that follows the page.
 
 use plotters::chart::MeshStyle;
-use plotters::coord::Shift;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::area::{Area, message};
 use super::marker::Marker;
 use crate::ReportError;
 
 /// Charts are drawn at this width and may be scaled.
 pub(super) const WIDTH_PX: u32 = 700;
-/// Of texts, as the chart library counts: 1.24 of a CSS pixel.
+/// Size of texts in the chart library's unit, 1.24 of a CSS pixel.
 const TEXT_SIZE: i32 = 16;
-/// A sans-serif letter at that size is about so wide.
+/// About the width of a sans-serif letter at that size.
 const LETTER_WIDTH_PX: f64 = 7.4;
 const TITLE_HEIGHT_PX: i32 = 30;
 const LEGEND_ROW_PX: i32 = 22;
@@ -25,9 +25,6 @@ const GLYPH_WIDTH_PX: i32 = 34;
 /// Stands for the page's text colour: replaced by `currentColor` when the drawing is done.
 pub(super) const INK: RGBColor = RGBColor(1, 2, 3);
 const INK_IN_SVG: &str = "#010203";
-
-/// Part of a drawing.
-pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// A finished chart.
 pub(crate) struct Drawing {
@@ -91,11 +88,6 @@ pub(super) fn draw(
     Ok(Drawing { svg: svg.replace(INK_IN_SVG, "currentColor").replacen("<svg ", &described, 1) })
 }
 
-/// The chart library's errors borrow the drawing: keep what they say.
-pub(super) fn message(error: impl std::error::Error) -> String {
-    error.to_string()
-}
-
 /// Text in the page's ink.
 pub(super) fn text_style(horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
     TextStyle::from(("sans-serif", TEXT_SIZE).into_font()).color(&INK).pos(Pos::new(horizontal, vertical))
@@ -114,7 +106,7 @@ where
         .axis_desc_style(("sans-serif", TEXT_SIZE).into_font().color(&INK));
 }
 
-/// About how wide a text is.
+/// The width of a text, about.
 pub(super) fn text_width_px(text: &str) -> i32 {
     (text.chars().count() as f64 * LETTER_WIDTH_PX).ceil() as i32
 }

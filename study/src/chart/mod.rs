@@ -1,5 +1,6 @@
 //! Charts: their data, and their drawing as SVG.
 
+mod area;
 mod axis;
 mod bars;
 mod canvas;

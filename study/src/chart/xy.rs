@@ -7,9 +7,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
-use super::canvas::{
-    self, Area, Drawing, Glyph, INK, LegendEntry, WIDTH_PX, message, style_mesh, text_style, text_width_px,
-};
+use super::area::{Area, message};
+use super::canvas::{self, Drawing, Glyph, INK, LegendEntry, WIDTH_PX, style_mesh, text_style, text_width_px};
 use super::marker::Marker;
 use super::ruler::Ruler;
 use super::{Axis, Better, Limit, Mark, Palette, Point, Series, pareto_front};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context as _;
-use app_core::cameras::{self, NamedCamera, Placement};
+use app_core::camera_file::{self, NamedCamera, Placement};
 use app_core::delivery::{Wishes, open, receive, viewpoints};
 use app_core::exit::{BadInput, Outcome};
 use app_core::live::{self, Drive};
@@ -133,7 +133,7 @@ impl Which {
         let near_m = (offer.volume.size().length() * NEAR_OF_DIAGONAL).max(1e-6);
         let placement = Placement { origin_in_source: offer.origin_in_source, near_m };
         if let Some(path) = &self.cameras {
-            return Ok(cameras::read(path, placement)?);
+            return Ok(camera_file::read(path, placement)?);
         }
         if let Some(text) = &self.camera {
             return Ok(vec![one_camera(text, placement, size)?]);
@@ -201,7 +201,7 @@ async fn view(args: ViewArgs) -> anyhow::Result<Outcome> {
         "depth".to_owned(),
         json!("16-bit: value / 65535 * inverse_depth_max_per_m, per metre; 0 is background"),
     )]);
-    cameras::write(&folder.join("cameras.json"), &named, offer.origin_in_source, about)?;
+    camera_file::write(&folder.join("cameras.json"), &named, offer.origin_in_source, about)?;
     println!("{} views in {:.3} s, in {}", named.len(), delivered.seconds, folder.display());
     if args.compare {
         drop(session);

@@ -1,0 +1,18 @@
+//! `myriorama bench`: measured values against bars, as ratios of one run.
+
+mod adaptive;
+mod animation;
+mod args;
+mod codec;
+mod convergence;
+mod fronts;
+mod light;
+mod peer;
+mod rays;
+mod run;
+mod sampling;
+mod throughput;
+mod timing;
+
+pub use args::BenchArgs;
+pub use run::run;
