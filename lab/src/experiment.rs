@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use app_core::cluster::Cluster;
-use app_core::delivery::{Delivered, Wishes, open, receive};
+use app_core::delivery::{Delivered, SessionSettings, open, receive};
 use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use client::{Client, Frame};
@@ -27,7 +27,7 @@ const RUN_STEP_S: f64 = 1e-4;
 
 /// What is asked of the cluster.
 #[derive(Debug, Clone, Copy)]
-pub struct Wish {
+pub struct DeliverySettings {
     /// How surfaces are lit.
     pub lighting: Lighting,
     /// Who makes the views.
@@ -94,25 +94,25 @@ impl Experiment {
 
     /// `views` of one set, everything else as the scene's arguments say.
     #[must_use]
-    pub fn wish(&self, policy: PolicyChoice, views: usize) -> Wish {
-        Wish { lighting: self.args.lighting, policy, method: self.args.method, views, sets: 1 }
+    pub fn delivery(&self, policy: PolicyChoice, views: usize) -> DeliverySettings {
+        DeliverySettings { lighting: self.args.lighting, policy, method: self.args.method, views, sets: 1 }
     }
 
     /// Delivers views of a sample set that nobody has yet. What the coordinator measures before is not in the time.
     ///
     /// # Errors
     /// The cluster's.
-    pub fn deliver(&self, wish: Wish, arrived: impl FnMut(&Frame)) -> anyhow::Result<Delivered> {
+    pub fn deliver(&self, settings: DeliverySettings, arrived: impl FnMut(&Frame)) -> anyhow::Result<Delivered> {
         let run = self.runs.replace(self.runs.get() + 1);
-        let (method, sampling) = (wish.method.to_string(), self.args.sampling.to_string());
-        let wishes = Wishes {
-            policy: wish.policy,
-            timeline: Timeline { set_count: wish.sets, ..Timeline::still(f64::from(run) * RUN_STEP_S) },
-            ..Wishes::new(method, sampling, wish.lighting.to_string())
+        let (method, sampling) = (settings.method.to_string(), self.args.sampling.to_string());
+        let session_settings = SessionSettings {
+            policy: settings.policy,
+            timeline: Timeline { set_count: settings.sets, ..Timeline::still(f64::from(run) * RUN_STEP_S) },
+            ..SessionSettings::new(method, sampling, settings.lighting.to_string())
         };
-        let views = self.views(wish.views)?;
+        let views = self.views(settings.views)?;
         self.runtime.block_on(async {
-            let session = open(&self.client, &wishes, &views).await?;
+            let session = open(&self.client, &session_settings, &views).await?;
             receive(&session, &views, arrived).await
         })
     }

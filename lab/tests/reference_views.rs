@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use app_core::cluster::Cluster;
-use app_core::delivery::{Wishes, open, receive};
+use app_core::delivery::{SessionSettings, open, receive};
 use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SizePx;
@@ -136,12 +136,12 @@ fn a_cluster_gives_what_one_engine_gives() {
         let offer = client.status().await.unwrap().offer.unwrap();
         assert_eq!((offer.sample_cameras, offer.settings), (setup.offer.rig.clone(), setup.offer.settings.clone()));
         let (method, sampling) = (args.method.to_string(), args.sampling.to_string());
-        let wishes = Wishes {
+        let settings = SessionSettings {
             policy: PolicyChoice::Pipeline,
             planes: ALL_PLANES,
-            ..Wishes::new(method, sampling, args.lighting.to_string())
+            ..SessionSettings::new(method, sampling, args.lighting.to_string())
         };
-        let session = open(&client, &wishes, &reference.cameras).await.unwrap();
+        let session = open(&client, &settings, &reference.cameras).await.unwrap();
         let delivered = receive(&session, &reference.cameras, |_| ()).await.unwrap();
         drop((session, client));
         cluster.drain().await.unwrap();

@@ -15,7 +15,7 @@ use crate::fallbacks;
 
 /// How views shall come about.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wishes {
+pub struct SessionSettings {
     /// Named as on the command line.
     pub method: String,
     /// Named as on the command line.
@@ -42,7 +42,7 @@ pub struct Wishes {
     pub viewpoints: Vec<PinholeCamera>,
 }
 
-impl Wishes {
+impl SessionSettings {
     /// Finished pictures of a still scene, without other planes, by whatever is predicted to be fastest.
     #[must_use]
     pub fn new(method: String, sampling: String, lighting: String) -> Self {
@@ -96,28 +96,28 @@ pub struct Delivered {
 ///
 /// # Errors
 /// The coordinator's, or no views.
-pub async fn open(client: &Client, wishes: &Wishes, views: &[PinholeCamera]) -> anyhow::Result<Session> {
+pub async fn open(client: &Client, settings: &SessionSettings, views: &[PinholeCamera]) -> anyhow::Result<Session> {
     let typical_view = *views.first().ok_or_else(|| BadInput("no views are asked for".to_owned()))?;
     let request = SessionRequest {
         scene: None,
-        method: wishes.method.clone(),
-        sampling: wishes.sampling.clone(),
-        lighting: wishes.lighting.clone(),
-        codec: wishes.codec.clone(),
+        method: settings.method.clone(),
+        sampling: settings.sampling.clone(),
+        lighting: settings.lighting.clone(),
+        codec: settings.codec.clone(),
         sample_cameras: Vec::new(),
         sample_size_px: None,
         volume: None,
         typical_view,
         views_per_set: u32::try_from(views.len())?,
-        planes: wishes.planes,
-        timeline: wishes.timeline,
-        policy: wishes.policy,
+        planes: settings.planes,
+        timeline: settings.timeline,
+        policy: settings.policy,
         forced_sampler_count: None,
-        refinement_steps: wishes.refinement_steps,
-        frames_per_s: wishes.frames_per_s,
-        fallbacks: wishes.fallbacks.clone(),
-        forced_tile_count: wishes.tiles,
-        viewpoints: wishes.viewpoints.clone(),
+        refinement_steps: settings.refinement_steps,
+        frames_per_s: settings.frames_per_s,
+        fallbacks: settings.fallbacks.clone(),
+        forced_tile_count: settings.tiles,
+        viewpoints: settings.viewpoints.clone(),
     };
     let told = |event: &_| tracing::info!(?event, "session");
     Ok(client.open_session(request, told).await?)

@@ -13,6 +13,14 @@ pub enum Outcome {
     FellShort,
 }
 
+impl Outcome {
+    /// The outcome of a check.
+    #[must_use]
+    pub fn of(holds: bool) -> Self {
+        if holds { Self::Done } else { Self::FellShort }
+    }
+}
+
 /// Something that the user gave cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]

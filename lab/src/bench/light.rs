@@ -11,7 +11,7 @@ use wire::PolicyChoice;
 
 use super::args::BenchArgs;
 use crate::evaluation::mean_flip;
-use crate::experiment::{Experiment, PAPER_VIEWS, VIEW_SIZE_PX, Wish};
+use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS, VIEW_SIZE_PX};
 use crate::lighting_study::{self, Extent, FINE};
 use crate::progress::bar;
 use crate::reference_views::ReferenceViews;
@@ -37,8 +37,9 @@ pub fn qualities(args: &BenchArgs, experiment: &Experiment, report: &mut Report)
 /// A second set that shows what the first does: only c and e are spent on it.
 fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let views = if args.quick { 64 } else { PAPER_VIEWS };
-    let wish = Wish { lighting: FINE.parse()?, sets: 2, ..experiment.wish(PolicyChoice::Pipeline, views) };
-    let delivered = experiment.deliver(wish, |_| ())?;
+    let settings =
+        DeliverySettings { lighting: FINE.parse()?, sets: 2, ..experiment.delivery(PolicyChoice::Pipeline, views) };
+    let delivered = experiment.deliver(settings, |_| ())?;
     let second = delivered.frames.iter().filter(|frame| frame.request.set_index == 1);
     let waited_s = second.map(|frame| frame.header.stage_times.set_wait_s).fold(0.0, f64::max);
     let set_s = experiment.setup.samples.len() as f64 * delivered.plan.costs.sample_image_s;

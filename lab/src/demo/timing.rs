@@ -7,7 +7,7 @@ use reconstruction::ReconstructionMethod;
 use study::{Report, Table};
 use wire::{Costs, PolicyChoice, SessionPlan};
 
-use crate::experiment::{Experiment, PAPER_VIEWS, Wish};
+use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
 use crate::progress::bar;
 
 /// The paper's 100 steps.
@@ -89,7 +89,8 @@ fn deliver(
 ) -> anyhow::Result<Delivered> {
     let name = if policy == PolicyChoice::Direct { "direct".to_owned() } else { method.to_string() };
     let progress = bar(format!("{count} views by {name}"), count);
-    let delivered = experiment.deliver(Wish { method, ..experiment.wish(policy, count) }, |_| progress.inc(1));
+    let delivered =
+        experiment.deliver(DeliverySettings { method, ..experiment.delivery(policy, count) }, |_| progress.inc(1));
     progress.finish_and_clear();
     delivered
 }

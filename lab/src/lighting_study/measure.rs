@@ -4,7 +4,7 @@ use app_core::delivery::Delivered;
 use render::Lighting;
 use wire::{Costs, PolicyChoice};
 
-use crate::experiment::{Experiment, PAPER_VIEWS, Wish};
+use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
 use crate::progress::bar;
 
 /// The finest lighting of the demo, and the one that promises are about.
@@ -75,18 +75,18 @@ fn row(
     views: &[usize],
     keep: &mut impl FnMut(Delivered),
 ) -> anyhow::Result<Row> {
-    let wish = |policy, count| Wish { lighting, ..experiment.wish(policy, count) };
+    let settings = |policy, count| DeliverySettings { lighting, ..experiment.delivery(policy, count) };
     let mut pipelines = Vec::with_capacity(views.len());
     let mut plan = None;
     for &count in views {
-        let delivered = experiment.deliver(wish(PolicyChoice::Pipeline, count), |_| ())?;
+        let delivered = experiment.deliver(settings(PolicyChoice::Pipeline, count), |_| ())?;
         pipelines.push((count, delivered.seconds));
         plan = Some(delivered.plan.clone());
         keep(delivered);
     }
     let plan = plan.ok_or_else(|| anyhow::anyhow!("no views are asked for"))?;
     let direct_views = ((DIRECT_S / plan.costs.direct_view_s) as usize).clamp(4, 48);
-    let direct = experiment.deliver(wish(PolicyChoice::Direct, direct_views), |_| ())?;
+    let direct = experiment.deliver(settings(PolicyChoice::Direct, direct_views), |_| ())?;
     Ok(Row {
         lighting,
         costs: plan.costs,

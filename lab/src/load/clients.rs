@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use anyhow::Context as _;
-use app_core::delivery::{Wishes, open};
+use app_core::delivery::{SessionSettings, open};
 use app_core::live::{Drive, Record, drive};
 use client::{Client, ClientError, LiveView, Session};
 use depth_image::{Camera, PinholeCamera, ViewCell};
@@ -42,7 +42,7 @@ pub enum Outcome {
 #[derive(Debug, Clone)]
 pub struct Tour {
     coordinator: String,
-    wishes: Wishes,
+    settings: SessionSettings,
     path: Vec<PinholeCamera>,
 }
 
@@ -56,8 +56,9 @@ impl Tour {
         let offer = status.offer.context("the coordinator does not say what it shows")?;
         let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
         let path = ViewCell::between(&samples).context("no sample cameras")?.orbit(PATH_POSES, size_px);
-        let wishes = Wishes { policy: PolicyChoice::Pipeline, ..Wishes::offered(&offer).at_rate(rate_hz) };
-        Ok(Self { coordinator: coordinator.to_owned(), wishes, path })
+        let settings =
+            SessionSettings { policy: PolicyChoice::Pipeline, ..SessionSettings::offered(&offer).at_rate(rate_hz) };
+        Ok(Self { coordinator: coordinator.to_owned(), settings, path })
     }
 
     /// Opens a connection and a session. All sessions have the same typical view, so that costs are measured once.
@@ -66,7 +67,7 @@ impl Tour {
     /// The coordinator's.
     pub async fn session(&self) -> anyhow::Result<Session> {
         let client = Client::connect(&self.coordinator).await?;
-        open(&client, &self.wishes, &self.path[..1]).await
+        open(&client, &self.settings, &self.path[..1]).await
     }
 
     /// The path, from a start of the client's own.

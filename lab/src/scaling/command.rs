@@ -101,5 +101,5 @@ pub fn run(args: &ScalingArgs) -> anyhow::Result<Outcome> {
     let report = report(&measured, request.extent, &args.scene.to_string(), usize::from(args.simulate_to))?;
     show(&report, &args.out)?;
     let ok = report.finish(&args.out)?;
-    Ok(if args.strict && !ok { Outcome::FellShort } else { Outcome::Done })
+    Ok(Outcome::of(ok || !args.strict))
 }

@@ -7,7 +7,7 @@
 
 use std::time::Instant;
 
-use app_core::delivery::{Wishes, open};
+use app_core::delivery::{SessionSettings, open};
 use client::{Frame, Session, ViewRequest};
 use depth_image::PinholeCamera;
 use render::Lighting;
@@ -43,7 +43,7 @@ impl PointSettings {
         1 + self.counted_sets + if self.policy == PolicyChoice::Direct { 0 } else { SETS_BEHIND }
     }
 
-    /// What the session wishes.
+    /// What the session session_settings.
     #[must_use]
     pub fn forced_tiles(&self) -> Option<u32> {
         self.whole_images.then_some(1)
@@ -216,11 +216,11 @@ pub async fn measure(
     arrived: impl FnMut(),
 ) -> anyhow::Result<Point> {
     let views = subject.views(settings.views)?;
-    let wishes = Wishes {
+    let session_settings = SessionSettings {
         tiles: settings.forced_tiles(),
-        ..subject.wishes(settings.lighting, settings.policy, settings.sets())
+        ..subject.session_settings(settings.lighting, settings.policy, settings.sets())
     };
-    let session = open(&processes.client, &wishes, &views).await?;
+    let session = open(&processes.client, &session_settings, &views).await?;
     let plan = session.plan();
     let before = processes.counters().await?;
     let (arrivals, window) = receive(processes, &session, &views, &settings, arrived).await?;

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use anyhow::Context as _;
-use app_core::delivery::Wishes;
+use app_core::delivery::SessionSettings;
 use app_core::setup::{SceneArgs, Setup};
 use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
 use render::Lighting;
@@ -60,10 +60,10 @@ impl Subject {
 
     /// What a session asks for.
     #[must_use]
-    pub fn wishes(&self, lighting: Lighting, policy: PolicyChoice, set_count: u32) -> Wishes {
+    pub fn session_settings(&self, lighting: Lighting, policy: PolicyChoice, set_count: u32) -> SessionSettings {
         let (method, sampling) = (self.args.method.to_string(), self.args.sampling.to_string());
         let timeline = self.fresh_timeline(set_count);
-        Wishes { policy, timeline, ..Wishes::new(method, sampling, lighting.to_string()) }
+        SessionSettings { policy, timeline, ..SessionSettings::new(method, sampling, lighting.to_string()) }
     }
 
     /// What a node is to time: a set of this lighting, and these views, so many a call.

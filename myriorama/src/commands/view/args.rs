@@ -1,0 +1,92 @@
+//! Arguments of `view`.
+
+use std::path::PathBuf;
+
+use app_core::sizes::SizePx;
+use clap::Args;
+use reconstruction::ReconstructionMethod;
+use render::Lighting;
+use wire::{FrameCodec, PolicyChoice};
+
+use super::viewpoints::Viewpoints;
+
+/// Files in --out: view_0000.png (colour); with --depth view_0000.depth.png (16-bit inverse planar depth:
+/// value / 65535 × inverse_depth_max_per_m of the frame in cameras.json, 0 for background); with --provenance
+/// view_0000.provenance.png (false colours: a colour for each sample camera, white blended, red filled); and
+/// cameras.json, in the transforms.json convention, in the scene file's own coordinates.
+#[derive(Debug, Args)]
+pub struct ViewArgs {
+    /// The coordinator
+    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR")]
+    pub(super) coordinator: String,
+    #[command(flatten)]
+    pub(super) viewpoints: Viewpoints,
+    /// Sample near the views, in as many view cells as they need, in place of the coordinator's sample cameras
+    #[arg(long)]
+    pub(super) cells: bool,
+    /// Size of the views, unless --cameras says
+    #[arg(long, default_value = "200x150", value_name = "WxH")]
+    pub(super) size: SizePx,
+    /// Where the pictures go
+    #[arg(long, default_value = "out/view", value_name = "DIR")]
+    pub(super) out: PathBuf,
+    /// Depth of every view, too
+    #[arg(long)]
+    pub(super) depth: bool,
+    /// Where every pixel comes from, too
+    #[arg(long)]
+    pub(super) provenance: bool,
+    /// How views are reconstructed [default: the coordinator's]
+    #[arg(long, value_name = "NAME")]
+    pub(super) method: Option<ReconstructionMethod>,
+    /// How surfaces are lit, as in "soft 16, occlusion 16" (see `myriorama up --help`) [default: the coordinator's]
+    #[arg(long, value_name = "TERMS")]
+    pub(super) lighting: Option<Lighting>,
+    /// Draw every view directly, too, and say how far those in --out are from it: PSNR, SSIM and FLIP, also in
+    /// comparison.csv
+    #[arg(long)]
+    pub(super) compare: bool,
+    /// With --compare: exit status 1 where a view's PSNR is below
+    #[arg(long, value_name = "DB", requires = "compare")]
+    pub(super) least_psnr: Option<f64>,
+    /// With --frames: begin with one ray a light and pixel and double them from frame to frame, so that the first
+    /// picture is there at once
+    #[arg(long)]
+    pub(super) refine: bool,
+    /// How frames travel: lz4 (without loss) or jpeg:QUALITY
+    #[arg(long, default_value = "lz4", value_name = "NAME")]
+    pub(super) codec: FrameCodec,
+    /// auto (whatever is predicted to be fastest), pipeline, direct or time-share
+    #[arg(long, default_value = "auto", value_name = "NAME")]
+    pub(super) policy: PolicyChoice,
+    /// Cut every sample image into so many tiles, to share them among samplers [default: as predicted to be fastest]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub(super) tiles: Option<u32>,
+    /// Moments of an animated scene; every view is made of each
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(super) frames: u32,
+    /// Seconds between moments
+    #[arg(long, default_value_t = 1.0 / 30.0, value_name = "S")]
+    pub(super) frame_step: f64,
+    /// Move along the views as a viewer does, at --rate for --seconds, and print where frames' time went; every frame
+    /// is in live.csv in --out, none is a picture
+    #[arg(long, conflicts_with_all = ["compare", "depth", "provenance"])]
+    pub(super) live: bool,
+    /// With --live: poses a second
+    #[arg(long, default_value_t = 10.0, value_name = "HZ", value_parser = rate)]
+    pub(super) rate: f64,
+    /// With --live: for how long
+    #[arg(long, default_value_t = 10.0, value_name = "S", value_parser = duration)]
+    pub(super) seconds: f64,
+    /// With --live: exit status 1 where no new frame came for longer
+    #[arg(long, value_name = "S", requires = "live")]
+    pub(super) longest_gap: Option<f64>,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|hz| (0.01..=1000.0).contains(hz)).ok_or_else(|| "expected 0.01 to 1000".to_owned())
+}
+
+fn duration(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|s| (0.1..=86_400.0).contains(s)).ok_or_else(|| "expected 0.1 to 86400".to_owned())
+}
