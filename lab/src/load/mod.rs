@@ -5,6 +5,8 @@
 
 pub mod clients;
 pub mod command;
+mod memory;
 pub mod phases;
 pub mod processes;
 pub mod report;
+mod statistics;

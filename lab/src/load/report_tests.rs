@@ -1,7 +1,11 @@
 use std::time::Duration;
 
+use app_core::live::{Record, Shown};
+
 use super::*;
-use crate::load::clients::Clients;
+use crate::load::clients::{Clients, Outcome};
+use crate::load::memory::slope_mib_per_s;
+use crate::load::phases::Idle;
 
 fn shown(frame: u64, posed_s: f64, fallback: u32) -> Shown {
     Shown {

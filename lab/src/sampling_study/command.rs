@@ -12,9 +12,10 @@ use study::Report;
 use super::detection::{detection, detection_report};
 use super::extent::Extent;
 use super::reconstructions::{reconstructions, reconstructions_report};
+use super::scene::scene_report;
 use super::sizes::{sizes, sizes_report};
 use super::subject::{SCENES, Subject};
-use super::tables::{scene_report, tables};
+use super::tables::tables;
 use super::times::{times, times_report};
 
 /// Conventional, non-redundant and peeled images of a bird's nest, grass, a city and a tree, from three viewpoints:

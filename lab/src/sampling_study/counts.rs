@@ -20,6 +20,11 @@ pub struct ImageCount {
     pub useful: Vec<bool>,
 }
 
+/// A share in per cent.
+pub(super) fn percent(part: usize, whole: usize) -> f64 {
+    100.0 * part as f64 / whole as f64
+}
+
 impl ImageCount {
     pub fn useful_count(&self) -> usize {
         self.useful.iter().filter(|&&useful| useful).count()

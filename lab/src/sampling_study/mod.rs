@@ -1,13 +1,16 @@
 //! Sampling methods compared: the metrics of Xie §6.1.2 on the kinds of scene that the paper has.
 
 mod availability;
+mod checks;
 pub mod command;
 mod counts;
 mod detection;
 mod extent;
 mod methods;
+mod paper;
 mod pictures;
 mod reconstructions;
+mod scene;
 mod sizes;
 mod subject;
 mod tables;

@@ -5,7 +5,7 @@ use metrics::Held;
 use sampling::{Redundancy, SamplingMethod};
 use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
-use super::counts::{ImageCount, image_counts, mark_useful};
+use super::counts::{ImageCount, image_counts, mark_useful, percent};
 use super::extent::Extent;
 use super::methods::{IMAGES, METHODS};
 use super::subject::{Subject, WITH_IDS};
@@ -58,19 +58,18 @@ pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<V
             Ok(())
         })?;
         let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / (IMAGES - 1) as f64;
-        let share = |part: usize, whole: usize| 100.0 * part as f64 / whole as f64;
         rows.push(SizeRow {
             side_px,
             redundant: [
-                mean(&mut counts[0][1..].iter().map(|c| share(c.redundant, c.samples))),
+                mean(&mut counts[0][1..].iter().map(|c| percent(c.redundant, c.samples))),
                 mean(&mut redundant[1..].iter().map(|seen| 100.0 * seen.redundant.share)),
             ],
             disoccluded: [
-                mean(&mut counts[1][1..].iter().map(|c| share(c.disoccluded.len(), c.samples))),
+                mean(&mut counts[1][1..].iter().map(|c| percent(c.disoccluded.len(), c.samples))),
                 mean(&mut disoccluded[1..].iter().map(|seen| 100.0 * seen.disoccluded.share)),
             ],
             useful: [
-                mean(&mut counts[1][1..].iter().map(|c: &ImageCount| share(c.useful_count(), c.disoccluded.len()))),
+                mean(&mut counts[1][1..].iter().map(|c: &ImageCount| percent(c.useful_count(), c.disoccluded.len()))),
                 mean(&mut disoccluded[1..].iter().map(|seen| 100.0 * seen.useful.share)),
             ],
         });

@@ -11,8 +11,9 @@ use wire::Costs;
 
 use super::costs;
 use super::matrix::{Extent, Planned, planned};
+use super::measure_point::measure;
 use super::measured::{Measured, MeasuredLighting, Timed};
-use super::point::{Point, PointSettings, measure};
+use super::point::{Point, PointSettings};
 use super::processes::NodeProcesses;
 use super::subject::{MEASURED_BATCH, Subject};
 use crate::progress::bar;

@@ -12,6 +12,7 @@ mod fetched;
 mod machine;
 mod matrix;
 mod measure;
+mod measure_point;
 mod measured;
 mod paper;
 mod point;
