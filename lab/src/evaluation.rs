@@ -48,7 +48,7 @@ impl ReferenceViews {
     /// Evaluates a method.
     ///
     /// # Errors
-    /// The device's.
+    /// The device fails.
     pub fn evaluate(&self, method: ReconstructionMethod, runs: usize) -> anyhow::Result<Evaluation> {
         self.evaluate_timed_on(method, TIMED_VIEWS, runs)
     }
@@ -56,7 +56,7 @@ impl ReferenceViews {
     /// Evaluates a method, timed on a batch of `views` views or more.
     ///
     /// # Errors
-    /// The device's.
+    /// The device fails.
     pub fn evaluate_timed_on(
         &self,
         method: ReconstructionMethod,

@@ -1,6 +1,6 @@
 //! Memory of this process.
 
-/// The most memory that this process has held, in MB; `None` where the system does not say.
+/// The most memory that this process has held, in MB; `None` where the system does not tell.
 #[must_use]
 pub fn peak_memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;

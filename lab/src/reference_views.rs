@@ -78,7 +78,7 @@ impl ReferenceViews {
     /// The same views drawn from the scene in another light.
     ///
     /// # Errors
-    /// The device's.
+    /// The device fails.
     pub fn drawn(&self, setup: &Setup, lighting: Lighting) -> anyhow::Result<Vec<View>> {
         Ok(self.engine.draw_direct(&direct_work(setup, lighting, &self.cameras, COLOR_ONLY))?)
     }
@@ -86,7 +86,7 @@ impl ReferenceViews {
     /// Reconstructs all views.
     ///
     /// # Errors
-    /// The device's.
+    /// The device fails.
     pub fn reconstruct(&self, method: ReconstructionMethod, planes: ViewPlanes) -> anyhow::Result<Vec<View>> {
         Ok(self.engine.reconstructor().reconstruct(&self.set, &self.cameras, method, planes)?)
     }
@@ -106,7 +106,7 @@ impl ReferenceViews {
     /// count.
     ///
     /// # Errors
-    /// The device's.
+    /// The device fails.
     pub fn ms_a_view(&self, method: ReconstructionMethod, at_least: usize, runs: usize) -> anyhow::Result<f64> {
         let times = at_least.div_ceil(self.cameras.len().max(1)).max(1);
         let cameras = self.cameras.repeat(times);

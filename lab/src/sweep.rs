@@ -1,4 +1,4 @@
-//! Time against error: every setting of every method on one scene.
+//! Time against error: settings of light field search and joint carve on one scene.
 
 use reconstruction::ReconstructionMethod;
 use study::{Axis, Better, Cell, Point, ReportError, Series, Table, XyChart};
@@ -6,25 +6,25 @@ use study::{Axis, Better, Cell, Point, ReportError, Series, Table, XyChart};
 use crate::evaluation::Evaluation;
 use crate::reference_views::ReferenceViews;
 
-/// Steps of the search, as in the paper's Fig. 7 and beyond.
+/// Steps of light field search, as in the paper's Fig. 7 and beyond.
 const STEPS: [u32; 6] = [8, 16, 32, 64, 128, 256];
-/// Levels at which the carve stops.
+/// Levels at which joint carve stops.
 const STOP_LEVELS: [u32; 4] = [0, 1, 2, 3];
 
-/// All settings that are compared.
+/// The settings that are compared.
 #[must_use]
 pub fn settings(quick: bool) -> Vec<ReconstructionMethod> {
-    // A quick run leaves out every other setting.
+    // A quick run skips every other setting.
     let step = if quick { 2 } else { 1 };
     let searches = STEPS.iter().step_by(step).map(|&steps| ReconstructionMethod::LightFieldSearch { steps });
     let carves = STOP_LEVELS.iter().step_by(step).map(|&stop_level| ReconstructionMethod::JointCarve { stop_level });
     searches.chain(carves).collect()
 }
 
-/// Evaluates all settings; `done` hears of each.
+/// Evaluates all settings, and calls `done` for each.
 ///
 /// # Errors
-/// The device's.
+/// The device fails.
 pub fn sweep(
     reference: &ReferenceViews,
     quick: bool,
@@ -35,10 +35,10 @@ pub fn sweep(
     settings(quick).into_iter().map(row).collect()
 }
 
-/// The rows as a table.
+/// A table of evaluations.
 ///
 /// # Errors
-/// None that can happen: rows and columns are written together.
+/// A row does not fit its table.
 pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
     let columns = [
         ("method", ""),
@@ -66,7 +66,7 @@ pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
     Ok(table)
 }
 
-/// Time against FLIP, PSNR and wrong hits, each with the front of the best.
+/// Charts of time against FLIP, PSNR and wrong hits, each with its Pareto front.
 #[must_use]
 pub fn charts(name: &str, rows: &[Evaluation]) -> Vec<XyChart> {
     let chart = |what: &str, unit: &str, better, value: fn(&Evaluation) -> f64| {
@@ -106,7 +106,7 @@ fn series(rows: &[Evaluation], value: fn(&Evaluation) -> f64) -> [Series; 2] {
     ]
 }
 
-/// Rows of the search and of the carve.
+/// Evaluations of light field search, and of joint carve.
 #[must_use]
 pub fn split(rows: &[Evaluation]) -> (Vec<&Evaluation>, Vec<&Evaluation>) {
     rows.iter().partition(|row| matches!(row.method, ReconstructionMethod::LightFieldSearch { .. }))

@@ -118,7 +118,7 @@ fn a_package_loads_as_the_scene_does() {
     let views = engine.draw_direct(&work).unwrap();
     assert_eq!(views.len(), reference.views.len());
     for (view, expected) in views.iter().zip(&reference.views) {
-        // Of rays and triangles the faster is taken, as timed for each package: they may differ in what an edge covers.
+        // The faster of rays and triangles is chosen by timing for each package; they may differ at edges.
         let same = view.srgb8.iter().zip(&expected.srgb8).filter(|(a, b)| a == b).count();
         let share = same as f64 / expected.srgb8.len() as f64;
         assert!(view.size_px == expected.size_px && share > 0.98, "{share}");

@@ -21,7 +21,7 @@ const COLUMNS: [(&str, &str); 12] = [
 /// As `myriorama status` prints it.
 ///
 /// # Errors
-/// A row that does not fit, which is a fault here.
+/// A row does not fit its table.
 pub fn text(status: &ClusterStatus) -> anyhow::Result<String> {
     let mut table = Table::new(headline(status), &COLUMNS);
     for node in &status.nodes {

@@ -8,8 +8,8 @@ use clap::{Args, Subcommand};
 use crate::load::command::LoadArgs;
 use crate::scaling::command::ScalingArgs;
 
-/// Every bullet is a check: a value, a bar, holds or falls short. Checks whose input was not given are not run
-/// and do not fall short.
+/// Holds measured values against bars and writes a report. A check without its input is not run and does not fall
+/// short.
 #[derive(Debug, Args)]
 #[command(
     args_conflicts_with_subcommands = true,
@@ -22,19 +22,19 @@ pub struct BenchArgs {
     pub(super) scene: SceneArgs,
     #[command(flatten)]
     pub(super) device: DeviceArgs,
-    /// A folder of models (.gltf, .glb, .obj, .ply): the methods are compared on the largest of them, too
+    /// A folder of models (.gltf, .glb, .obj, .ply); methods are compared on the largest of them
     #[arg(long, value_name = "DIR")]
     pub(super) models: Option<PathBuf>,
-    /// A folder with bench.ply, samples.json and views.json: the reference is compared with another synthesiser's
+    /// A folder with bench.ply, samples.json and views.json; the views are compared with another synthesiser's
     #[arg(long, value_name = "DIR")]
     pub(super) peer: Option<PathBuf>,
-    /// P: nodes that share the device
+    /// Nodes P that share the device
     #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub(super) nodes: u16,
     /// Where the report goes
     #[arg(long, default_value = "out/bench", value_name = "DIR")]
     pub(super) out: PathBuf,
-    /// A smaller form of the same run: fewer repeats, views and models
+    /// Runs a smaller form: fewer repeats, views and models
     #[arg(long)]
     pub(super) quick: bool,
     /// Exit status 1 when a check falls short
@@ -42,22 +42,22 @@ pub struct BenchArgs {
     pub(super) strict: bool,
 }
 
-/// What is measured by itself.
+/// A measurement of its own.
 #[derive(Debug, Subcommand)]
 pub(super) enum Part {
-    /// How many clients a cluster of processes serves, and what becomes of those that are too many
+    /// Measure the number of clients that a cluster serves, and the refusal of more
     Load(LoadArgs),
-    /// How the cluster scales with nodes and views, on processes of equal CPU share and in simulation
+    /// Measure how the cluster scales with nodes and views, on processes of equal CPU share and in simulation
     Scaling(ScalingArgs),
 }
 
 impl BenchArgs {
-    /// Times that a measurement is repeated; the median counts.
+    /// Repeats of a measurement; the median counts.
     pub(super) fn runs(&self) -> usize {
         if self.quick { 1 } else { 3 }
     }
 
-    /// Views that are compared pixel by pixel.
+    /// The number of views that are compared pixel by pixel.
     pub(super) fn compared_views(&self) -> usize {
         if self.quick { 4 } else { 8 }
     }

@@ -1,4 +1,4 @@
-//! The carve's front of time against error beside the search's.
+//! The fronts of time against error of joint carve and light field search.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,10 +18,10 @@ use crate::progress::bar;
 use crate::reference_views::ReferenceViews;
 use crate::sweep;
 
-/// Models of a folder that are compared, the largest files.
+/// The number of models of a folder that are compared, the largest files.
 const MODELS: usize = 4;
 
-/// Sweeps one scene; adds its table, charts and checks.
+/// Evaluates all settings on one scene; adds a table, charts and checks.
 pub fn compare(name: &str, reference: &ReferenceViews, args: &BenchArgs, report: &mut Report) -> anyhow::Result<()> {
     let progress = bar(format!("error against time, {name}"), sweep::settings(args.quick).len());
     let rows = sweep::sweep(reference, args.quick, args.runs(), |_| progress.inc(1))?;
@@ -72,10 +72,10 @@ fn checks(name: &str, rows: &[Evaluation], default: ReconstructionMethod) -> Vec
     ]
 }
 
-/// A scene whose gaps are wide enough to count: in foliage, every pixel that no camera sees is a silhouette's.
+/// A scene with gaps wide enough to count: in foliage, every pixel that no camera sees is a silhouette's.
 const GAPS: &str = "poles";
 
-/// Sweeps a scene with disocclusions.
+/// Evaluates a scene with disocclusions.
 pub fn gaps(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     sweep_scene(GAPS, GAPS.parse()?, args, engine, report)
 }
@@ -94,7 +94,7 @@ fn sweep_scene(
     compare(name, &reference, args, report)
 }
 
-/// Sweeps the models of the folder, if one is given.
+/// Evaluates the models of the folder, if one is given.
 pub fn models(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let Some(folder) = &args.models else {
         let bar = Bar::AtMost(1.0);
@@ -110,7 +110,7 @@ pub fn models(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) ->
     Ok(())
 }
 
-/// The largest model files of a folder and of its folders.
+/// The largest model files of a folder and of its subfolders.
 fn models_of(folder: &Path, most: usize) -> anyhow::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for path in entries(folder)? {

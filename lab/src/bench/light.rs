@@ -1,4 +1,4 @@
-//! Light sampled once and shared: gains, what a highlight costs, still scenes, and reference beside converged light.
+//! Light sampled once and shared: its gain, highlights, still scenes, and reference views beside converged light.
 
 use std::sync::Arc;
 
@@ -17,16 +17,16 @@ use crate::progress::bar;
 use crate::reference_views::ReferenceViews;
 use crate::statistics::median;
 
-/// Rays that stand for all light.
+/// The lighting whose picture counts as converged.
 const CONVERGED: &str = "soft 256, occlusion 256";
-/// Views that are compared with converged light.
+/// The number of views that are compared with converged light.
 const CONVERGED_VIEWS: usize = 4;
-/// Two times that are nearly alike need more repeats than others.
+/// Repeats of two nearly equal times.
 const RUNS_OF_NEAR_TIMES: usize = 5;
-/// Perceptual roughness of the scene made glossy.
+/// The perceptual roughness of the glossy scene.
 const GLOSSY: f32 = 0.3;
 
-/// Every quality of light on the scene.
+/// Measures every lighting on the scene.
 pub fn qualities(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let rows = lighting_study::measure(experiment, Extent::bench(args.quick), drop)?;
     lighting_study::report(&rows, experiment.setup.scene.illumination.lights.len(), report)?;
@@ -34,7 +34,7 @@ pub fn qualities(args: &BenchArgs, experiment: &Experiment, report: &mut Report)
     still(args, experiment, report)
 }
 
-/// A second set that shows what the first does: only c and e are spent on it.
+/// Measures a second set of a still scene: only c and e are spent on it.
 fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let views = if args.quick { 64 } else { PAPER_VIEWS };
     let settings =
@@ -48,7 +48,7 @@ fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyh
     Ok(())
 }
 
-/// FLIP of views against light of many rays: shared, and drawn with as many rays.
+/// The FLIP of views against converged light: from shared samples, and drawn with as many rays.
 pub fn reference(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let views = experiment.views(if args.quick { 1 } else { CONVERGED_VIEWS })?;
     let progress = bar("converged light", 3);
@@ -78,7 +78,7 @@ pub fn reference(args: &BenchArgs, experiment: &Experiment, report: &mut Report)
     Ok(())
 }
 
-/// A view's milliseconds with both, medians; in turn, so that neither has the quieter machine.
+/// Milliseconds a view of both, as medians. Both take turns, so that neither has the quieter machine.
 fn ms_in_turn(args: &BenchArgs, both: [&ReferenceViews; 2]) -> anyhow::Result<[f64; 2]> {
     let mut ms = [Vec::new(), Vec::new()];
     for _ in 0..args.runs().max(RUNS_OF_NEAR_TIMES) {
@@ -89,7 +89,7 @@ fn ms_in_turn(args: &BenchArgs, both: [&ReferenceViews; 2]) -> anyhow::Result<[f
     Ok(ms.map(median))
 }
 
-/// c where every surface has a highlight.
+/// Measures c where every surface has a highlight.
 pub fn glossy(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let scene = glossy_scene(args)?;
     engine.put_scene(scene.offer.hash.as_str(), &scene.scene)?;

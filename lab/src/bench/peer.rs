@@ -1,4 +1,4 @@
-//! ReferenceViews against an independent synthesiser: MPEG's RVS 4.0 on the same samples and views.
+//! Views against an independent synthesiser's: MPEG's RVS 4.0 on the same samples and cameras.
 
 use std::sync::Arc;
 
@@ -15,10 +15,10 @@ use crate::evaluation::Evaluation;
 use crate::reference_views::ReferenceViews;
 use crate::sweep;
 
-/// RVS takes 280 ms a view on two cores; a fiftieth of it is asked for.
+/// A fiftieth of the 280 ms a view that RVS takes on two cores.
 const PEER_MS_OVER_50: f64 = 5.6;
 
-/// What is compared: name, unit, bar, and our value.
+/// A comparison: name, unit, bar, and our value.
 type Comparison = (&'static str, &'static str, Bar, fn(&Evaluation) -> f64);
 const COMPARISONS: [Comparison; 5] = [
     ("peer scene: PSNR, mean (RVS 36.4)", "dB", Bar::AtLeast(36.4), |row| row.psnr_db),
@@ -28,7 +28,7 @@ const COMPARISONS: [Comparison; 5] = [
     ("peer scene: time a view (a fiftieth of RVS)", "ms", Bar::AtMost(PEER_MS_OVER_50), |row| row.ms_a_view),
 ];
 
-/// Runs the comparison, if its folder is given.
+/// Adds a table and checks, if the folder is given.
 pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let Some(folder) = &args.peer else {
         report

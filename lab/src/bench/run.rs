@@ -1,4 +1,4 @@
-//! `myriorama bench`: what is promised, as ratios of one run.
+//! The order of the bench.
 
 use app_core::exit::Outcome;
 use node::Engine as _;
@@ -11,7 +11,7 @@ use crate::memory::peak_memory_mb;
 use crate::reference_views::ReferenceViews;
 use crate::{load, scaling};
 
-/// Measures all of it.
+/// Measures everything and writes the report.
 ///
 /// # Errors
 /// Input that cannot be used, or a failure of the device or the cluster.

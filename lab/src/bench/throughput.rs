@@ -14,12 +14,13 @@ use crate::progress::bar;
 use crate::reference_views::ReferenceViews;
 use crate::statistics::median;
 
-/// Views that direct rendering is timed on.
+/// The number of views that direct rendering is timed on.
 const DIRECT_VIEWS: usize = 48;
 /// c / g of the paper's GPUs.
 const PAPER_RATIO: f64 = 0.103;
 
-/// Pipeline over direct, delivered to a client: runs of both in turn, so that neither has the quieter machine.
+/// The pipeline's throughput over direct rendering's, delivered to a client. Runs take turns, so that neither has the
+/// quieter machine.
 pub fn delivered(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let progress = bar(format!("{PAPER_VIEWS} views delivered"), 2 * args.runs());
     let (mut pipeline, mut direct) = (Vec::new(), Vec::new());
@@ -46,7 +47,7 @@ pub fn delivered(args: &BenchArgs, experiment: &Experiment, report: &mut Report)
     Ok(())
 }
 
-/// c and g_v, in one batch each and to host pixels.
+/// c and g_v, each in one batch and to host pixels.
 pub fn nanoseconds(
     args: &BenchArgs,
     reference: &ReferenceViews,

@@ -5,10 +5,9 @@ use std::path::PathBuf;
 use app_core::setup::{DeviceArgs, SceneArgs};
 use clap::Args;
 
-/// S samples of 400×300, 290 views of 200×150, P nodes in one process; a table, and a report with pictures and
-/// charts in --out. Then the same scene
-/// with soft shadows and occlusion, and what light of every quality costs. Three minutes at most on two slow cores;
-/// --quick takes less than one.
+/// Delivers 290 views of 200×150 from S samples of 400×300 by P nodes in one process. Prints tables, and writes a
+/// report with pictures and charts to --out. Repeats the scene with soft shadows and occlusion, and measures the cost
+/// of every lighting. Takes three minutes at most on two slow cores, and less than one with --quick.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  myriorama demo\n  myriorama demo --scene helmet.gltf --out out/helmet\n  myriorama demo --scene tree-terrain-30k --quick"
@@ -22,13 +21,13 @@ pub struct DemoArgs {
     /// cameras]
     #[arg(long, value_name = "FILE")]
     pub(super) cameras: Option<PathBuf>,
-    /// P: nodes that share the device
+    /// Nodes P that share the device
     #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub(super) nodes: u16,
     /// Where the report goes
     #[arg(long, default_value = "out/demo", value_name = "DIR")]
     pub(super) out: PathBuf,
-    /// A smaller form of the same run
+    /// Runs a smaller form
     #[arg(long)]
     pub(super) quick: bool,
     /// Exit status 1 when a check falls short
@@ -36,5 +35,5 @@ pub struct DemoArgs {
     pub(super) strict: bool,
 }
 
-/// Views that are compared pixel by pixel.
+/// The number of views that are compared pixel by pixel.
 pub(super) const COMPARED_VIEWS: usize = 6;

@@ -1,4 +1,4 @@
-//! Another sampling than the conventional, and conventional sampling beside it.
+//! The sampling asked for, with conventional sampling beside it.
 
 use anyhow::Context as _;
 use app_core::setup::{SceneArgs, Setup};
@@ -11,7 +11,7 @@ use super::args::COMPARED_VIEWS;
 use crate::experiment::Experiment;
 use crate::reference_views::{ALL_PLANES, ReferenceViews};
 
-/// Rows of pictures of each sampling.
+/// The rows of pictures of each sampling.
 const SIDE_BY_SIDE: usize = 2;
 
 /// Adds a table and pictures; nothing where sampling is conventional.

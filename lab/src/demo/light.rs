@@ -1,4 +1,4 @@
-//! The scene in its finest light, and what light of every quality costs.
+//! The scene in its finest light, and the cost of every lighting.
 
 use app_core::setup::SceneArgs;
 use client::Frame;
@@ -10,7 +10,7 @@ use crate::experiment::Experiment;
 use crate::lighting_study::{self, Extent};
 use crate::reference_views::{ALL_PLANES, ReferenceViews};
 
-/// Tables and charts, all views in the finest light that was measured, and six of them beside the reference.
+/// Adds tables and charts, all views in the finest light, and six of them beside reference views.
 pub fn show(args: &DemoArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<Vec<Check>> {
     let mut frames: Vec<Frame> = Vec::new();
     let rows = lighting_study::measure(experiment, Extent::demo(args.quick), |delivered| frames = delivered.frames)?;

@@ -1,4 +1,4 @@
-//! `myriorama demo`: the paper's experiment on this machine.
+//! The order of the demo.
 
 use std::time::Instant;
 
@@ -22,7 +22,7 @@ use crate::sweep;
 /// The longest that the whole demo may take.
 const TIME_LIMIT_S: f64 = 180.0;
 
-/// Runs all of it.
+/// Runs the demo and writes the report.
 ///
 /// # Errors
 /// Input that cannot be used, or a failure of the device or the cluster.
@@ -77,7 +77,7 @@ fn new_report(args: &DemoArgs, experiment: &Experiment) -> Report {
     report
 }
 
-/// Errors against time.
+/// Adds errors against time.
 fn compare(args: &DemoArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let count = COMPARED_VIEWS;
     let reference =
@@ -96,7 +96,7 @@ const PAPER_SCENE: &str = "tree-terrain-500k";
 
 fn checks(times: &timing::Times, start: Instant, args: &DemoArgs) -> Vec<Check> {
     let speed = format!("{} views delivered: pipeline over direct, throughput", times.headline_views);
-    // What sharing wins grows with the scene; other models get their figure, not a bar.
+    // The gain of sharing grows with the scene; other models have a figure, not a bar.
     let promised = !args.quick && args.scene.scene.to_string() == PAPER_SCENE;
     let k_off = times.headline_k_off_formula();
     let memory = peak_memory_mb().filter(|_| times.is_software);

@@ -35,7 +35,7 @@ pub(super) fn throughput_chart(rows: &[Row], lamps: usize) -> XyChart {
     .with(Series::line("direct", direct))
 }
 
-/// V along the axis of the chart.
+/// The numbers of views along the chart's axis.
 const VIEWS: [usize; 7] = [1, 3, 10, 32, 100, 290, 1000];
 
 /// The measured points of a series that only predicts.

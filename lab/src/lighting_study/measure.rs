@@ -1,4 +1,4 @@
-//! What light costs, and what sharing it gains: parts measured alone, and views delivered.
+//! Measurements of lightings: parts alone, and views delivered.
 
 use app_core::delivery::Delivered;
 use render::Lighting;
@@ -7,56 +7,56 @@ use wire::{Costs, PolicyChoice};
 use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
 use crate::progress::bar;
 
-/// The finest lighting of the demo, and the one that promises are about.
+/// The finest lighting of the demo, which the checks are about.
 pub const FINE: &str = "soft 16, occlusion 16";
-/// From the cheapest to the most expensive.
+/// Lightings, from the cheapest to the most expensive.
 const QUALITIES: [&str; 6] = ["unlit", "phong", "shadows", "soft 4, occlusion 4", FINE, "soft 64, occlusion 64"];
-/// Direct rendering is timed on as many views as take about this long, and extended linearly.
+/// The time for which direct rendering is timed; more views are extended linearly.
 const DIRECT_S: f64 = 2.0;
 
-/// One lighting.
+/// Measurements of one lighting.
 pub struct Row {
-    /// Which.
+    /// The lighting.
     pub lighting: Lighting,
-    /// Each part alone.
+    /// Costs of each part alone.
     pub costs: Costs,
-    /// S and P.
+    /// The numbers of sample images S and nodes P.
     pub(super) images: usize,
     pub(super) nodes: usize,
-    /// Views that direct rendering was timed on, and what one of them took until delivered.
+    /// The number of views that direct rendering was timed on, and seconds a view until delivered.
     pub(super) direct_views: usize,
     pub(super) direct_view_s: f64,
-    /// V and seconds until delivered, of sets that nobody had yet.
+    /// Numbers of views V and seconds until delivered, of new sets.
     pub(super) pipelines: Vec<(usize, f64)>,
 }
 
-/// How much is measured.
+/// The size of the study.
 #[derive(Debug, Clone, Copy)]
 pub struct Extent {
-    /// Of the qualities, from the cheapest on.
+    /// The number of lightings, from the cheapest on.
     pub qualities: usize,
-    /// V's of the finest promised lighting; the first also of the others.
+    /// Numbers of views V of the finest lighting; other lightings have the first.
     pub views: &'static [usize],
 }
 
 impl Extent {
-    /// Of the demo.
+    /// The size in the demo.
     #[must_use]
     pub fn demo(quick: bool) -> Self {
         if quick { Self { qualities: 4, views: &[64] } } else { Self { qualities: 5, views: &[PAPER_VIEWS] } }
     }
 
-    /// Of the bench.
+    /// The size in the bench.
     #[must_use]
     pub fn bench(quick: bool) -> Self {
         if quick { Self { qualities: 5, views: &[64] } } else { Self { qualities: 6, views: &[PAPER_VIEWS, 1000] } }
     }
 }
 
-/// Measures every quality; frames of the last that are delivered for the promised lighting go to `keep`.
+/// Measures every lighting, and passes every delivery to `keep`.
 ///
 /// # Errors
-/// The cluster's.
+/// The cluster fails.
 pub fn measure(experiment: &Experiment, extent: Extent, mut keep: impl FnMut(Delivered)) -> anyhow::Result<Vec<Row>> {
     let progress = bar("light", extent.qualities);
     let mut rows = Vec::with_capacity(extent.qualities);
@@ -99,17 +99,17 @@ fn row(
 }
 
 impl Row {
-    /// Rays that one pixel's finished colour takes.
+    /// Rays for the finished colour of one pixel.
     pub(super) fn rays_a_pixel(&self, lamps: usize) -> f64 {
         f64::from(1 + self.lighting.shadow_rays() * lamps as u32 + self.lighting.occlusion_rays())
     }
 
-    /// Throughput over that of direct rendering, for so many views.
+    /// The pipeline's throughput over direct rendering's.
     pub(super) fn gain(&self, (views, seconds): (usize, f64)) -> f64 {
         self.direct_view_s * views as f64 / seconds
     }
 
-    /// What the parts allow: V·g_v / (S·g_s + d + V·c).
+    /// The gain that the parts allow: V·g_v / (S·g_s + d + V·c).
     pub(super) fn allowed(&self, views: usize) -> f64 {
         let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, .. } = self.costs;
         let views = views as f64;

@@ -1,4 +1,4 @@
-//! Lightings compared: the cost of light, and the gain of sharing it; parts measured alone, and views delivered.
+//! Lightings compared: the cost of light, and the gain of sharing it.
 
 mod charts;
 mod measure;

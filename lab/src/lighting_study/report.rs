@@ -9,10 +9,10 @@ use super::tables::{gains, parts};
 /// The least share of the gain that the parts allow that must arrive at a client.
 const SHARE_OF_PARTS: f64 = 0.8;
 
-/// Tables and charts.
+/// Adds tables and charts.
 ///
 /// # Errors
-/// None that can happen: rows and columns are written together.
+/// A row does not fit its table.
 pub fn report(rows: &[Row], lamps: usize, report: &mut Report) -> anyhow::Result<()> {
     report.tables.push(parts(rows)?);
     report.tables.push(gains(rows)?);

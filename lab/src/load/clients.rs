@@ -64,7 +64,7 @@ impl Tour {
     /// Opens a connection and a session. All sessions have the same typical view, so that costs are measured once.
     ///
     /// # Errors
-    /// The coordinator's.
+    /// The coordinator refuses.
     pub async fn session(&self) -> anyhow::Result<Session> {
         let client = Client::connect(&self.coordinator).await?;
         open(&client, &self.settings, &self.path[..1]).await
@@ -80,7 +80,7 @@ impl Tour {
     /// Opens a session and a live view that asks for nothing.
     ///
     /// # Errors
-    /// The coordinator's.
+    /// The coordinator refuses.
     pub async fn idle(&self) -> anyhow::Result<(Session, LiveView)> {
         let session = self.session().await?;
         let live = session.live();
@@ -102,7 +102,7 @@ impl Tour {
 /// Lets every client follow its path, and returns the end of each.
 ///
 /// # Errors
-/// Any failure but a refusal.
+/// A client fails other than by refusal.
 pub async fn follow(tour: &Tour, clients: &Clients) -> anyhow::Result<Vec<Outcome>> {
     let mut running = JoinSet::new();
     for client in 0..clients.count {

@@ -3,7 +3,7 @@
 use study::{Axis, Cell, Series, Table, XyChart};
 
 use super::phases::{Idle, Load};
-use super::statistics::SETTLING;
+use super::statistics::WARM_UP;
 
 pub(super) fn memory(loads: &[Load]) -> anyhow::Result<Table> {
     let columns = [
@@ -11,7 +11,7 @@ pub(super) fn memory(loads: &[Load]) -> anyhow::Result<Table> {
         ("process", ""),
         ("start", "MiB"),
         ("end", "MiB"),
-        ("gained a minute, after settling", "MiB"),
+        ("gained a minute, after warm-up", "MiB"),
     ];
     let mut table = Table::new("Memory", &columns);
     for load in loads {
@@ -35,7 +35,7 @@ pub(super) fn idle(idle: &Idle) -> anyhow::Result<Table> {
 }
 
 impl Idle {
-    /// On all servers; what the clients themselves take is theirs.
+    /// Memory of each client on all servers, without the clients' own.
     pub(super) fn each_mib(&self) -> f64 {
         let servers = self.memory.iter().filter(|(name, ..)| name != "clients");
         servers.map(|(_, before, after)| after - before).sum::<f64>() / self.clients as f64
@@ -43,10 +43,10 @@ impl Idle {
 }
 
 fn steady(looks: &[(f64, f64)]) -> &[(f64, f64)] {
-    &looks[(looks.len() as f64 * SETTLING) as usize..]
+    &looks[(looks.len() as f64 * WARM_UP) as usize..]
 }
 
-/// By least squares.
+/// The slope by least squares.
 pub(super) fn slope_mib_per_s(looks: &[(f64, f64)]) -> f64 {
     let count = looks.len() as f64;
     let mean = |value: fn(&(f64, f64)) -> f64| looks.iter().map(value).sum::<f64>() / count;
@@ -55,14 +55,14 @@ pub(super) fn slope_mib_per_s(looks: &[(f64, f64)]) -> f64 {
     above / looks.iter().map(|look| (look.0 - x).powi(2)).sum::<f64>()
 }
 
-/// Of the process that gains most, by its slope, over the whole load and as a share of what it had.
+/// The growth of the process that gains most, over the whole load, as a share of its memory.
 pub(super) fn growth(load: &Load) -> f64 {
     let of = |(_, looks): &(String, Vec<(f64, f64)>)| {
         let looks = steady(looks);
         let mean = looks.iter().map(|look| look.1).sum::<f64>() / looks.len() as f64;
         slope_mib_per_s(looks) * load.clients.lasting.as_secs_f64() / mean
     };
-    // The clients keep every frame's times.
+    // The clients keep the times of every frame.
     load.memory.iter().filter(|(name, _)| name != "clients").map(of).fold(f64::NAN, f64::max)
 }
 

@@ -1,4 +1,4 @@
-//! The loads, each on a cluster that was started for it.
+//! Loads, each on a cluster of its own.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};

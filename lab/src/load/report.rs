@@ -1,4 +1,4 @@
-//! What came of the loads: tables, charts, checks.
+//! The report of the loads: tables, charts, checks.
 
 use std::collections::BTreeMap;
 
@@ -8,19 +8,19 @@ use study::{Axis, Bar, BarChart, Cell, Check, Report, Series, Table, XyChart};
 use super::memory::{growth, idle, memory, memory_chart};
 use super::phases::{Load, Phases};
 
-/// Of what was asked for, undegraded.
+/// The least share of frames that must come undegraded.
 const DELIVERED: f64 = 0.99;
-/// Of the rate that a client asked for and was admitted with.
+/// The least share of its rate that an admitted client must keep.
 const KEPT_RATE: f64 = 0.8;
-/// MiB of an idle client, on all servers together.
+/// The most memory of an idle client on all servers together, in MiB.
 const IDLE_MIB: f64 = 1.0;
-/// Memory that a process may have gained at the end, as a share.
+/// The most memory that a process may gain, as a share.
 const GROWTH: f64 = 0.05;
 
 /// Adds tables, charts and checks.
 ///
 /// # Errors
-/// A row that does not fit, which is a fault here.
+/// A row does not fit its table.
 pub fn add(phases: &Phases, report: &mut Report) -> anyhow::Result<()> {
     report.tables.push(clients(&phases.loads)?);
     for load in &phases.loads {
@@ -70,7 +70,7 @@ fn clients(loads: &[Load]) -> anyhow::Result<Table> {
     Ok(table)
 }
 
-/// In the order in which they were come to.
+/// Fallbacks, in the order of their first use.
 fn fallbacks(loads: &[Load]) -> anyhow::Result<Table> {
     let columns = [("clients × frames/s", ""), ("fallback", ""), ("first", "s"), ("frames", ""), ("of all", "%")];
     let mut table = Table::new("Frames by what they make do with", &columns);

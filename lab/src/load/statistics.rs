@@ -6,7 +6,7 @@ use super::clients::Outcome;
 use super::phases::Load;
 
 /// The share of a load's time in which caches fill and later refused clients arrive.
-pub(super) const SETTLING: f64 = 0.25;
+pub(super) const WARM_UP: f64 = 0.25;
 
 impl Load {
     pub(super) fn served(&self) -> impl Iterator<Item = &Record> {
@@ -32,22 +32,22 @@ impl Load {
         self.shown().filter(|shown| shown.fallback > 0).count()
     }
 
-    /// Of the poses of clients that were served, those whose frame came as it was asked for.
+    /// The share of the poses of admitted clients whose frame came undegraded.
     pub(super) fn undegraded_share(&self) -> f64 {
         (self.shown().count() - self.degraded()) as f64 / self.posed() as f64
     }
 
-    /// In milliseconds.
+    /// A quantile of the age of frames, in milliseconds.
     pub(super) fn age_ms(&self, share: f64) -> f64 {
         let mut ages: Vec<f64> = self.shown().map(Shown::age_s).collect();
         ages.sort_by(f64::total_cmp);
         quantile(&ages, share) * 1e3
     }
 
-    /// Of the rate that each client asked for, what it got once all had settled; the least first.
+    /// The shares of its rate that each client got after the warm-up, the least first.
     pub(super) fn rate_shares(&self) -> Vec<f64> {
         let lasting_s = self.clients.lasting.as_secs_f64();
-        let from_s = lasting_s * SETTLING;
+        let from_s = lasting_s * WARM_UP;
         let of = |record: &Record| {
             let count = record.shown.iter().filter(|shown| (from_s..lasting_s).contains(&shown.posed_s)).count();
             count as f64 / ((lasting_s - from_s) * self.clients.rate_hz)

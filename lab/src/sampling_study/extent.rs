@@ -1,18 +1,18 @@
 //! The size of the study.
 
-/// How much is measured.
+/// The size of the study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Extent {
-    /// Side of sample images.
+    /// The side of sample images.
     pub side_px: u32,
-    /// Views between the sample cameras.
+    /// The number of views between the sample cameras.
     pub views: usize,
-    /// Samples an image whose visibility is asked for.
+    /// The number of samples an image whose visibility is traced.
     pub seeds: usize,
 }
 
 impl Extent {
-    /// The paper's, or a smaller form of it.
+    /// The paper's size, or a smaller one.
     #[must_use]
     pub fn of(quick: bool) -> Self {
         if quick {

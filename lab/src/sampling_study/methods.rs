@@ -2,9 +2,9 @@
 
 use sampling::{Redundancy, SamplingMethod};
 
-/// Images of a set, as in the paper.
+/// The number of images of a set, as in the paper.
 pub const IMAGES: usize = 3;
-/// What is compared, conventional sampling first.
+/// The methods that are compared, conventional sampling first.
 pub const METHODS: [SamplingMethod; 6] = [
     SamplingMethod::Conventional,
     SamplingMethod::NonRedundant(Redundancy::Pixel),

@@ -3,8 +3,7 @@
 use sampling::SamplingMethod;
 use study::Cell;
 
-/// Xie, Table 1: redundant of conventional images 1 and 2; disoccluded (useful) of non-redundant images 1 and 2, and
-/// of peeled layers 0 to 2. In the order of [`super::SCENES`].
+/// Xie, Table 1, in the order of [`super::SCENES`].
 const PAPER: [PaperRow; 4] = [
     PaperRow {
         scene: "bird-nest",
@@ -32,14 +31,14 @@ const PAPER: [PaperRow; 4] = [
     },
 ];
 
-/// In per cent; pairs are disoccluded and useful.
+/// A row in per cent; pairs are disoccluded and useful.
 struct PaperRow {
     scene: &'static str,
-    /// Of conventional images 1 and 2.
+    /// Redundant samples of conventional images 1 and 2.
     redundant: [f64; 2],
-    /// Of non-redundant images 1 and 2.
+    /// Disoccluded and useful samples of non-redundant images 1 and 2.
     apart: [[f64; 2]; 2],
-    /// Of layers 0 to 2.
+    /// Disoccluded and useful samples of layers 0 to 2.
     peeled: [[f64; 2]; 3],
 }
 
@@ -64,7 +63,7 @@ pub(super) fn paper(scene: &str, method: SamplingMethod, image: usize) -> [Cell;
     [redundant, disoccluded, useful].map(Cell::from)
 }
 
-/// Xie, Table 2: average and least of conventional, non-redundant and peeled.
+/// Xie, Table 2: average and least of conventional, non-redundant and peeled images.
 pub(super) const PAPER_AVAILABLE: [(&str, [[f64; 2]; 3]); 4] = [
     ("bird-nest", [[90.0, 89.0], [93.0, 92.0], [92.0, 89.0]]),
     ("grass", [[86.0, 81.0], [96.0, 91.0], [93.0, 88.0]]),

@@ -1,4 +1,4 @@
-//! What views become of each sampling by each reconstruction: from as many images, and from as many samples.
+//! Views from each sampling by each reconstruction: from as many images, and from as many samples.
 
 use app_core::setup::{SceneArgs, Setup};
 use glam::UVec2;
@@ -17,20 +17,20 @@ const VIEW_PX: UVec2 = UVec2::new(200, 150);
 const VIEWS: usize = 8;
 const RECONSTRUCTIONS: [&str; 5] = ["joint_carve", "light_field_search:128", "mesh", "hybrid_mesh", "hybrid_mesh:0.5"];
 
-/// A sampling and what each reconstruction made of it.
+/// A sampling, and its views by each reconstruction.
 pub struct Reconstructed {
     sampling: SamplingMethod,
     size_px: UVec2,
     samples: usize,
-    /// Of the views' pixels that show a surface, the share whose surface is in no image.
+    /// The share of the views' pixels with a surface whose surface no image holds.
     unheld: f64,
     rows: Vec<Evaluation>,
 }
 
-/// Measures all pairs on a scene, then once more with about as few samples as the least of them.
+/// Measures all pairs on a scene, then again with about as few samples as the sampling with the fewest.
 ///
 /// # Errors
-/// The device's.
+/// The device fails.
 pub fn reconstructions(subject: &Subject, quick: bool) -> anyhow::Result<Vec<Reconstructed>> {
     let progress = bar(format!("{}: views", subject.name), 2 * METHODS.len() - 1);
     let mut all = Vec::with_capacity(2 * METHODS.len() - 1);
@@ -64,7 +64,7 @@ fn of_method(
         offer: subject.setup.offer.clone(),
     };
     let views = subject.between(if quick { 2 } else { VIEWS }, VIEW_PX);
-    // Planes for all reconstructions.
+    // The planes of the hybrid mesh are enough for all reconstructions.
     let args =
         SceneArgs { sampling, method: ReconstructionMethod::HybridMesh { merged: None }, ..subject.args.clone() };
     let reference = ReferenceViews::draw(&subject.engine, &setup, &args, views)?;
@@ -93,10 +93,10 @@ impl Reconstructed {
     }
 }
 
-/// Table, chart and checks over all scenes.
+/// Adds a table, charts and checks over all scenes.
 ///
 /// # Errors
-/// A row that does not fit, which is a fault here.
+/// A row does not fit its table.
 pub fn reconstructions_report(scenes: &[(String, Vec<Reconstructed>)], report: &mut Report) -> anyhow::Result<()> {
     let columns = [
         ("scene", ""),

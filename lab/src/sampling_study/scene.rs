@@ -14,7 +14,7 @@ use super::subject::{Subject, WITH_IDS};
 use super::visibility::{Seen, seen};
 use crate::progress::bar;
 
-/// Side of output frames, as in the paper.
+/// The side of output frames, as in the paper.
 const FRAME_PX: UVec2 = UVec2::splat(512);
 
 /// Measurements of one scene, by method.
@@ -28,7 +28,7 @@ pub struct SceneRow {
 /// Measures a scene, and adds its false colours.
 ///
 /// # Errors
-/// The device's.
+/// The device fails.
 pub fn scene_report(subject: &Subject, extent: Extent, report: &mut Report) -> anyhow::Result<SceneRow> {
     let size_px = UVec2::splat(extent.side_px);
     let sets =

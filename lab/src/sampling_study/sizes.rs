@@ -1,4 +1,4 @@
-//! Fig. 7: redundancy by pixel comes to redundancy by visibility as images grow.
+//! Fig. 7: redundancy by pixel approaches redundancy by visibility as images grow.
 
 use glam::UVec2;
 use metrics::Held;
@@ -13,14 +13,14 @@ use super::visibility::seen;
 use crate::progress::bar;
 
 const SIDES_PX: [u32; 4] = [256, 512, 1024, 2048];
-/// As in the paper.
+/// The scenes of the paper's figure.
 const SCENES: [&str; 2] = ["bird-nest", "urban"];
 
-/// Views between the viewpoints, of the images' size, that say what is useful.
+/// The number of views that decide which samples are useful.
 const VIEWS: usize = 24;
 
-/// Of one size, means over images 1 and 2, in per cent, by pixel and by visibility: redundant of conventional images,
-/// disoccluded of non-redundant ones, and useful of these.
+/// Means over images 1 and 2 of one size, in per cent, by pixel and by visibility. Redundant samples are those of
+/// conventional images, disoccluded and useful ones those of non-redundant images.
 pub struct SizeRow {
     side_px: u32,
     redundant: [f64; 2],
@@ -28,13 +28,13 @@ pub struct SizeRow {
     useful: [f64; 2],
 }
 
-/// Its name, and its values by pixel and by visibility.
+/// The name of a metric, and its values by pixel and by visibility.
 type Metric = (&'static str, fn(&SizeRow) -> [f64; 2]);
 
 /// Measures a scene if the paper shows it.
 ///
 /// # Errors
-/// The device's.
+/// The device fails.
 pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<Vec<SizeRow>> {
     if !SCENES.contains(&subject.name.as_str()) {
         return Ok(Vec::new());
@@ -79,10 +79,10 @@ pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<V
     Ok(rows)
 }
 
-/// Table, charts and checks of one scene.
+/// Adds a table, charts and checks of one scene.
 ///
 /// # Errors
-/// A row that does not fit, which is a fault here.
+/// A row does not fit its table.
 pub fn sizes_report(scene: &str, rows: &[SizeRow], report: &mut Report) -> anyhow::Result<()> {
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
     let columns = [

@@ -9,10 +9,10 @@ use super::methods::METHODS;
 use super::paper::{PAPER_AVAILABLE, paper};
 use super::scene::SceneRow;
 
-/// Tables and checks of all scenes.
+/// Adds tables and checks of all scenes.
 ///
 /// # Errors
-/// A row that does not fit, which is a fault here.
+/// A row does not fit its table.
 pub fn tables(rows: &[SceneRow], report: &mut Report) -> anyhow::Result<()> {
     report.tables.push(by_pixel(rows)?);
     report.tables.push(by_visibility(rows)?);

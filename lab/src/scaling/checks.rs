@@ -1,4 +1,4 @@
-//! What is promised of the measured points.
+//! Checks of the measured points.
 
 use study::{Bar, Check};
 use wire::PolicyChoice;
@@ -9,16 +9,16 @@ use super::paper::table_1;
 use super::results::Results;
 use super::whole_images;
 
-/// Of the simulation from what was measured.
+/// The largest relative difference between simulated and measured times.
 const SIMULATED_WITHIN: f64 = 0.1;
-/// Cores that other programs may have while anything is measured.
+/// Cores that other programs may use during a measurement.
 const QUIET_CORES: f64 = 0.1;
-/// Of the processor time that compositors had, at the most nodes and views.
+/// The share of the processor time that compositors must use, at the most nodes and views.
 const USED: f64 = 0.9;
-/// Of the quick form.
+/// The longest time of the quick form, seconds.
 const QUICK_S: f64 = 600.0;
 
-/// All of them.
+/// All checks of the measured points.
 #[must_use]
 pub fn checks(measured: &Measured, results: &[Results<'_>], extent: Extent) -> Vec<Check> {
     let Some(main) = results.first() else { return Vec::new() };
@@ -44,7 +44,7 @@ fn efficient(results: &Results<'_>, policy: PolicyChoice) -> Check {
     Check::maybe(name, value, "", Bar::AtLeast(bar), NOT_MEASURED)
 }
 
-/// Sharing pays: what the paper shows with 0.829 beside 0.110.
+/// Sharing is worth its cost: the paper shows 0.829 beside 0.110.
 fn naive_beside(results: &Results<'_>) -> Check {
     let shared = results.find(PolicyChoice::Pipeline, PAPER_NODES, PAPER_VIEWS).map(|point| results.efficiency(point));
     let naive = results.naive(PAPER_NODES).map(|(efficiency, _)| efficiency);
@@ -53,7 +53,7 @@ fn naive_beside(results: &Results<'_>) -> Check {
     Check::maybe(name, value, "×", Bar::AtLeast(1.0), NOT_MEASURED)
 }
 
-/// Where light is expensive, images are cut: what whole ones allow at the best is passed.
+/// Tiles beat the bound of whole images under expensive lighting.
 fn tiles_pay(expensive: Option<&Results<'_>>, nodes: usize) -> [Check; 2] {
     let of = |ratio: fn(&Results<'_>, usize, usize) -> Option<f64>| {
         expensive.and_then(|expensive| ratio(expensive, nodes, TILED_VIEWS))
@@ -76,7 +76,7 @@ fn simulated(results: &[Results<'_>]) -> [Check; 2] {
             .zip(&results.predictions)
             .map(|(point, prediction)| (prediction.simulated_s / point.period_s - 1.0).abs())
     });
-    // NaN is no small error, wherever it stands.
+    // NaN counts as the largest difference.
     let most = off.fold(0.0, |most: f64, off| if most.is_nan() || off <= most { most } else { off });
     let others =
         results.iter().flat_map(|results| &results.predictions).filter(|prediction| !prediction.same_plan).count();
@@ -86,14 +86,14 @@ fn simulated(results: &[Results<'_>]) -> [Check; 2] {
     ]
 }
 
-/// Whoever else used the processors has made these figures worse, and unevenly so.
+/// Other programs slow these measurements, and unevenly so.
 fn quiet(results: &[Results<'_>]) -> Check {
     let points = results.iter().flat_map(|results| &results.lit.points);
     let most = points.map(|point| point.window.others_cores()).fold(0.0, f64::max);
     Check::new("cores that other programs had meanwhile, worst point", most, "cores", Bar::AtMost(QUIET_CORES))
 }
 
-/// What a compositor waits for is its quota: otherwise nodes would hold each other up, and P would not be P.
+/// Compositors wait for their quota alone; otherwise nodes delay each other.
 fn equal_shares(results: &Results<'_>) -> Check {
     let value = results.find(PolicyChoice::Auto, PAPER_NODES, PAPER_VIEWS).map(|point| point.window.used_share());
     Check::maybe(

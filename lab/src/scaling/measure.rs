@@ -1,4 +1,4 @@
-//! The measuring itself: from no process at all to every point, and back to none.
+//! The measurement of all points, from the start of the processes to their end.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -18,41 +18,41 @@ use super::processes::NodeProcesses;
 use super::subject::{MEASURED_BATCH, Subject};
 use crate::progress::bar;
 
-/// Of a point whose plan changes while it is measured: the last counts, whatever its plan did.
+/// Attempts at a point whose plan changes while it is measured; the last one counts.
 const ATTEMPTS: u32 = 2;
 
-/// Cores that the client, the coordinator and the kernel's part in their traffic need beside the nodes'.
+/// Cores for the client, the coordinator and the kernel's part in their traffic.
 const CLIENT_CORES: f64 = 0.35;
 
-/// What is to be measured.
+/// A measurement to make.
 #[derive(Debug, Clone)]
 pub struct Request {
-    /// Which device nodes open.
+    /// The device that nodes open.
     pub device: DevicePreference,
-    /// How much.
+    /// The size of the measurement.
     pub extent: Extent,
-    /// Cores a node; as many as fit this machine without it.
+    /// Cores of a node; by default as many as fit this machine.
     pub quota_cores: Option<f64>,
-    /// Whose points are the paper's.
+    /// The paper's lighting.
     pub lighting: Lighting,
-    /// A second table's.
+    /// The expensive lighting of the second table.
     pub expensive_lighting: Option<Lighting>,
-    /// Where all that happens to the schedule is written.
+    /// The file for the schedule's events.
     pub event_log: PathBuf,
 }
 
-/// So many nodes share all cores but the client's.
+/// Cores of each of `nodes` nodes, which share all cores but the client's.
 #[must_use]
 pub fn default_quota(nodes: usize) -> f64 {
     let cores = std::thread::available_parallelism().map_or(1, usize::from) as f64;
-    // In thousandths, as they are written to the kernel.
+    // The kernel takes thousandths.
     ((cores - CLIENT_CORES).max(0.5 * cores) / nodes as f64 * 1000.0).floor() / 1000.0
 }
 
-/// Measures everything. Ends all processes and removes their groups whatever happens, a signal included.
+/// Measures everything. All processes end and their groups are removed on every way out, a signal included.
 ///
 /// # Errors
-/// Where processes or groups cannot be had, a point cannot be measured, or a signal came.
+/// Processes or groups are not to be had, a point cannot be measured, or a signal came.
 pub async fn take(request: &Request, subject: &Subject) -> anyhow::Result<Measured> {
     tokio::select! {
         measured = take_undisturbed(request, subject) => measured,
@@ -84,8 +84,8 @@ async fn take_undisturbed(request: &Request, subject: &Subject) -> anyhow::Resul
     Ok(Measured { device, cores, quota_cores, images, unlimited, lit, seconds })
 }
 
-/// Every node once does all kinds of work, alone and without a limit: shaders are built, the scene is there, and
-/// whether rays or triangles are faster is found out undisturbed.
+/// Lets every node do all kinds of work once, alone and without a limit. Shaders are then built, the scene is loaded,
+/// and rays and triangles are timed undisturbed.
 async fn warm(processes: &NodeProcesses, subject: &Subject, lighting: Lighting) -> anyhow::Result<Vec<Costs>> {
     let progress = bar("nodes load the scene and build shaders", processes.nodes());
     let request = subject.measurement(lighting, subject.views(MEASURED_BATCH as usize)?, MEASURED_BATCH);
@@ -94,7 +94,7 @@ async fn warm(processes: &NodeProcesses, subject: &Subject, lighting: Lighting) 
     unlimited
 }
 
-/// Costs of all lightings that are measured at as many nodes as there are.
+/// Times the costs of all lightings that have points at this number of nodes.
 async fn time(
     processes: &NodeProcesses,
     subject: &Subject,
@@ -156,12 +156,12 @@ fn in_words(point: &Point) -> String {
     )
 }
 
-/// The first lighting is the paper's.
+/// All lightings but the first, the paper's, are expensive.
 fn is_expensive(which: usize) -> bool {
     which > 0
 }
 
-/// Nodes are only ever ended: all lightings at one P before the next.
+/// All lightings at one number of nodes come before the next: nodes are only ever ended.
 fn all_points(subject: &Subject, extent: Extent, lit: &[MeasuredLighting]) -> Vec<(usize, Planned)> {
     let of = |nodes: usize| {
         lit.iter().enumerate().flat_map(move |(which, lit)| {

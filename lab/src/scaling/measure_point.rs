@@ -1,10 +1,9 @@
 //! The measurement of one point.
 //!
-//! T is the time between two sets in the steady state, at the client. It begins when the last view of set 0 was
-//! received, decoded and checksummed, and ends at the same moment of the last set that counts; the difference is divided
-//! by the number of sets between. Set 0 fills the pipeline. The client asks for all sets at once, in their order. Where
-//! samples are shared, more sets follow the last that counts, so that it is sampled ahead as all before were; the client
-//! does not wait for them.
+//! T is the time between two sets in the steady state, at the client: from the moment when the last view of set 0 is
+//! decoded and checksummed to the same moment of the last set that counts, over the sets between. Set 0 fills the
+//! pipeline. The client asks for all sets at once, in order. Where samples are shared, more sets follow, so that the
+//! last set that counts is sampled ahead as all others are.
 
 use std::time::Instant;
 
@@ -19,10 +18,10 @@ use super::point::{Point, PointSettings, Steps, Window};
 use super::processes::NodeProcesses;
 use super::subject::Subject;
 
-/// What came so far.
+/// Frames that have arrived.
 struct Arrivals {
     start: Instant,
-    /// Views of each set that are still to come, and when the last of them came.
+    /// Views of each set that are still missing, and the arrival of the last one.
     sets: Vec<(usize, f64)>,
     frames: usize,
     /// Sums over frames.
@@ -35,7 +34,7 @@ impl Arrivals {
         Self { start: Instant::now(), sets, frames: 0, steps: Steps::default() }
     }
 
-    /// Whether the frame completes its set.
+    /// Notes a frame; true where it completes its set.
     fn note(&mut self, set: u32, at: Instant, header: &FrameHeader) -> bool {
         self.frames += 1;
         self.steps.reconstruct_s += header.stage_times.reconstruct_s;
@@ -51,7 +50,7 @@ impl Arrivals {
         self.sets.get(set as usize).map_or(f64::NAN, |(_, last_s)| *last_s)
     }
 
-    /// Of one set of so many views.
+    /// Times of the steps of one set of `views` views.
     fn steps_of(&self, views: usize) -> Steps {
         let share = views as f64 / self.frames.max(1) as f64;
         Steps {
@@ -63,10 +62,10 @@ impl Arrivals {
     }
 }
 
-/// Measures one point; `arrived` hears of every frame.
+/// Measures one point, and calls `arrived` for every frame.
 ///
 /// # Errors
-/// The cluster's.
+/// The cluster fails.
 pub async fn measure(
     processes: &NodeProcesses,
     subject: &Subject,
@@ -84,7 +83,7 @@ pub async fn measure(
     let (arrivals, window) = receive(processes, &session, &views, &settings, arrived).await?;
     let counted = processes.counters().await?.since(&before);
     let fetched = match plan.assignment.policy {
-        // Nodes that have gone on to another plan refuse: others of the lighting's points show it.
+        // Nodes that have a later plan refuse: other points of the lighting show the transfer.
         Policy::Pipeline => fetch(&plan.assignment, settings.counted_sets).await.ok(),
         _ => None,
     };
@@ -118,7 +117,7 @@ async fn receive(
 ) -> anyhow::Result<(Arrivals, Window)> {
     let all = (0..settings.sets()).flat_map(|set_index| views.iter().map(move |camera| (set_index, *camera)));
     let view_request = |(frame, (set_index, camera))| ViewRequest { frame, set_index, camera };
-    // One request for all: streams of their own would take turns.
+    // One request for all views: several streams would take turns.
     let mut frames = session.render_views((0..).zip(all).map(view_request).collect())?;
     let (mut arrivals, mut begun) = (Arrivals::new(settings), None);
     while let Some(frame) = frames.next().await {

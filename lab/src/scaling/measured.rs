@@ -8,49 +8,49 @@ use super::costs;
 use super::point::Point;
 use super::subject::MEASURED_BATCH;
 
-/// What P nodes timed at the same time, each with its quota, before the points and after them.
+/// Costs that P nodes timed at the same time, each with its quota, before and after the points.
 #[derive(Debug, Clone, Default)]
 pub struct Timed {
-    /// P.
+    /// The number of nodes, P.
     pub nodes: usize,
-    /// Of every node, as often as it was asked.
+    /// Costs of every node, once for each request.
     pub costs: Vec<Costs>,
-    /// The same with one view a call.
+    /// Costs with one view a call.
     pub alone: Vec<Costs>,
 }
 
-/// One lighting's costs and points.
+/// Costs and points of one lighting.
 #[derive(Debug, Clone)]
 pub struct MeasuredLighting {
-    /// Which.
+    /// The lighting.
     pub lighting: Lighting,
-    /// By P, falling.
+    /// Costs, by falling P.
     pub timed: Vec<Timed>,
-    /// In the order they were measured.
+    /// Points, in the order of measurement.
     pub points: Vec<Point>,
 }
 
-/// All that was measured.
+/// All measured values.
 #[derive(Debug, Clone)]
 pub struct Measured {
-    /// As nodes name it.
+    /// The device, as nodes name it.
     pub device: String,
-    /// Of this machine.
+    /// Cores of this machine.
     pub cores: f64,
-    /// Cores a node.
+    /// Cores of a node.
     pub quota_cores: f64,
-    /// S.
+    /// The number of sample images, S.
     pub images: usize,
-    /// One node's costs without a limit: on all cores, the others at rest; one after the other.
+    /// Costs of single nodes without a limit, on all cores, while the others rest.
     pub unlimited: Vec<Costs>,
     /// The paper's lighting, then the expensive one.
     pub lit: Vec<MeasuredLighting>,
-    /// Of all of it.
+    /// Seconds of the whole measurement.
     pub seconds: f64,
 }
 
 impl MeasuredLighting {
-    /// The mean of what so many nodes timed; zeros where they did not.
+    /// The mean of the costs at a number of nodes; zeros where there are none.
     #[must_use]
     pub fn mean(&self, nodes: usize) -> Costs {
         self.timed.iter().find(|timed| timed.nodes == nodes).map_or_else(Costs::default, Timed::mean)
@@ -58,13 +58,13 @@ impl MeasuredLighting {
 }
 
 impl Timed {
-    /// Of all nodes and times.
+    /// The mean over all nodes and times.
     #[must_use]
     pub fn mean(&self) -> Costs {
         costs::mean(&self.costs)
     }
 
-    /// What a call to the device takes, and each view of it: both follow from calls of one view and of many.
+    /// Costs of a view, and of a call to the device: both follow from calls of one view and of many.
     #[must_use]
     pub fn by_view_and_call(&self) -> (Costs, Calls) {
         let (costs, alone) = (self.mean(), costs::mean(&self.alone));
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn calls_and_views_are_told_apart() {
+    fn costs_of_calls_and_views_are_separated() {
         // 10 ms a call and 2 ms a view, drawn directly at 5 ms a view and nothing a call.
         let many = f64::from(MEASURED_BATCH);
         let of_many = Costs { reconstruct_view_s: 0.01 / many + 0.002, direct_view_s: 0.005, ..Costs::default() };

@@ -8,91 +8,91 @@ use super::machine::MachineTime;
 use super::processes::NodeProcesses;
 use crate::cpu_share::Usage;
 
-/// What is asked of the cluster.
+/// Settings of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointSettings {
-    /// How surfaces are lit.
+    /// The lighting.
     pub lighting: Lighting,
-    /// Who decides.
+    /// The policy asked for.
     pub policy: PolicyChoice,
-    /// V.
+    /// The number of views, V.
     pub views: usize,
-    /// Whether sample images stay whole; else the schedule may cut them into tiles.
+    /// True where sample images stay whole; otherwise the schedule may tile them.
     pub whole_images: bool,
-    /// Sets between which time is taken.
+    /// The number of sets that time is taken over.
     pub counted_sets: u32,
 }
 
-/// Sets of a timeline that follow the last that counts: one that is being made by then, and what is sampled ahead.
+/// Sets of a timeline after the last that counts: one that is being made by then, and those sampled ahead.
 const SETS_BEHIND: u32 = 2;
 
 impl PointSettings {
-    /// Sets that can be asked for: the first fills.
+    /// The number of sets of the timeline; the first fills the pipeline.
     pub(super) fn sets(&self) -> u32 {
         1 + self.counted_sets + if self.policy == PolicyChoice::Direct { 0 } else { SETS_BEHIND }
     }
 
-    /// What the session session_settings.
+    /// The tiles that the session forces.
     #[must_use]
     pub fn forced_tiles(&self) -> Option<u32> {
         self.whole_images.then_some(1)
     }
 
-    /// Views that are waited for.
+    /// The number of views that are waited for.
     #[must_use]
     pub fn awaited_views(&self) -> usize {
         self.views * (1 + self.counted_sets as usize)
     }
 }
 
-/// What one set takes, summed over its images and views.
+/// Times of the steps of one set, summed over its images and views.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Steps {
-    /// On samplers' devices.
+    /// Seconds on samplers' devices.
     pub sample_s: f64,
-    /// On compositors' devices.
+    /// Seconds on compositors' devices.
     pub reconstruct_s: f64,
-    /// Encoding frames, waiting for a processor included.
+    /// Seconds of encoding frames, with waits for a processor.
     pub encode_s: f64,
-    /// The client's processor time, the system's for receiving included.
+    /// The client's processor time, with the system's for receiving.
     pub client_s: f64,
     /// Bytes of frames.
     pub frame_bytes: f64,
 }
 
-/// While the counted sets were made.
+/// Processor time while the counted sets were made.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Window {
-    /// Of the wall clock.
+    /// Seconds of the wall clock.
     pub seconds: f64,
-    /// Of each node.
+    /// Processor time of each node.
     pub nodes: Vec<Usage>,
-    /// What each had.
+    /// Cores of each node.
     pub quota_cores: f64,
-    /// Of all.
+    /// Processor time of the machine.
     pub machine: MachineTime,
 }
 
 /// One measured point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
-    /// What was asked.
+    /// The settings.
     pub settings: PointSettings,
-    /// P.
+    /// The number of nodes, P.
     pub nodes: usize,
-    /// What the coordinator decided.
+    /// The coordinator's plan.
     pub plan: SessionPlan,
-    /// Plans that came while sets were made: each throws away what was sampled ahead.
+    /// The number of plans that came while sets were made; each throws away samples taken ahead.
     pub later_plans: u64,
-    /// T.
+    /// The time between two sets, T.
     pub period_s: f64,
-    /// From the request to the last view of the first set.
+    /// The time from the request to the last view of the first set.
     pub fill_s: f64,
-    /// Of one set.
+    /// Times of the steps of one set.
     pub steps: Steps,
-    /// While the counted sets were made.
+    /// Processor time while the counted sets were made.
     pub window: Window,
-    /// What a compositor gets from a sampler, in the pipeline.
+    /// The images that a compositor fetches from a sampler, in the pipeline.
     pub fetched: Option<Fetched>,
 }
 
@@ -103,13 +103,13 @@ impl Window {
         self.nodes.iter().map(|usage| usage.cpu_s).sum()
     }
 
-    /// Of the processor time that all nodes had.
+    /// The share of the nodes' processor time that they used.
     #[must_use]
     pub fn used_share(&self) -> f64 {
         self.nodes_s() / (self.quota_cores * self.nodes.len() as f64 * self.seconds)
     }
 
-    /// Cores that programs had which have nothing to do with this.
+    /// Cores that other programs used meanwhile.
     #[must_use]
     pub fn others_cores(&self) -> f64 {
         let own_s = self.nodes_s() + self.machine.client_s;
@@ -118,26 +118,26 @@ impl Window {
 }
 
 impl Point {
-    /// How the views came about.
+    /// The policy of the plan.
     #[must_use]
     pub fn policy(&self) -> Policy {
         self.plan.assignment.policy
     }
 
-    /// K; 0 where nothing is sampled.
+    /// The number of samplers, K; 0 where nothing is sampled.
     #[must_use]
     pub fn samplers(&self) -> usize {
         self.plan.sampler_count()
     }
 
-    /// P − K, or P where every node makes views.
+    /// The number of compositors: P − K, or P where every node makes views.
     #[must_use]
     pub fn compositors(&self) -> usize {
         self.plan.assignment.compositors.len()
     }
 
-    /// Of the periods in which nodes that make views and sample nothing had something to do, the share in which they
-    /// used up their quota. Near 1 it is the quota that they wait for, and nothing else.
+    /// The share of busy periods in which compositors that sample nothing used up their quota. Near 1, the quota is all
+    /// that they wait for.
     #[must_use]
     pub fn throttled_share(&self) -> f64 {
         let assignment = &self.plan.assignment;

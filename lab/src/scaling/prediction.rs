@@ -1,4 +1,4 @@
-//! What was to be expected of a measured point: by the paper's equations, by the schedule, and by the simulation.
+//! Predictions of a measured point: by the paper's equations, by the schedule, and by the simulation.
 
 use coordinator::schedule::pipeline_time;
 use simulation::{Cluster, Demand, Habits, Machine, plan, run};
@@ -7,36 +7,36 @@ use wire::{Costs, Policy};
 use super::measured::{MeasuredLighting, Timed};
 use super::point::{Point, PointSettings};
 
-/// Sets of the simulation beyond those that count: the first, and what is sampled ahead at the end.
+/// Simulated sets beyond those that count: the first, and those sampled ahead at the end.
 const MORE_SETS: u32 = 5;
 
 /// Predictions of T.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prediction {
-    /// Eq. 2 for the pipeline, eq. 1 for `direct`, and all work over all nodes for time-share: d, transfer and whole
-    /// images are not in it.
+    /// Eq. 2 for the pipeline, eq. 1 for `direct`, and all work over all nodes for time-share. Loads, transfer and
+    /// whole images are not included.
     pub equation_s: f64,
-    /// What the coordinator said when it planned, from the costs that it had measured.
+    /// The coordinator's prediction, from the costs that it had measured.
     pub schedule_s: f64,
-    /// From the simulation, in the way T was measured.
+    /// The simulation's result, taken as T is measured.
     pub simulated_s: f64,
-    /// Whether the simulated schedule divided the nodes as the real one did.
+    /// True where the simulated schedule divides the nodes as the real one does.
     pub same_plan: bool,
 }
 
-/// B, the bytes of a frame, and the rate at which images come, of all points of a lighting.
+/// Bytes on the network and their rate, as means over all points of a lighting.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Traffic {
-    /// One sample image.
+    /// Bytes of one sample image, B.
     pub image_bytes: f64,
-    /// One frame.
+    /// Bytes of one frame.
     pub frame_bytes: f64,
-    /// Between two processes of this machine.
+    /// The rate between two processes of this machine.
     pub bytes_per_s: f64,
 }
 
 impl Traffic {
-    /// Means over the points that show them.
+    /// The means over the points that show them.
     #[must_use]
     pub fn of(points: &[Point]) -> Self {
         let fetched: Vec<_> = points.iter().filter_map(|point| point.fetched).collect();
@@ -48,14 +48,14 @@ impl Traffic {
         Self { image_bytes, frame_bytes: frames / views.max(1.0), bytes_per_s: image_bytes / image_s }
     }
 
-    /// So many equal nodes.
+    /// A cluster of `nodes` equal nodes.
     #[must_use]
     pub fn cluster(&self, nodes: usize, machine: Machine, images: usize) -> Cluster {
         Cluster::equal(nodes, machine, images, self.image_bytes, self.frame_bytes)
     }
 }
 
-/// Of one point, from what as many nodes timed before and after.
+/// Predicts a point from the costs that as many nodes timed.
 #[must_use]
 pub fn predict(lit: &MeasuredLighting, images: usize, point: &Point) -> Prediction {
     let traffic = Traffic::of(&lit.points);
@@ -81,7 +81,7 @@ fn equation_s(costs: &Costs, images: usize, point: &Point) -> f64 {
     }
 }
 
-/// T and whether the plan is the same: planned with the costs that the coordinator had, carried out at the mean ones.
+/// T, and true for an equal plan: planned with the coordinator's costs and executed at the mean ones.
 fn simulate(machine: Machine, traffic: &Traffic, images: usize, point: &Point) -> Option<(f64, bool)> {
     let sets = point.settings.counted_sets + MORE_SETS;
     let PointSettings { views, policy, .. } = point.settings;

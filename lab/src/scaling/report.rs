@@ -1,4 +1,4 @@
-//! All of it as a report.
+//! The report of a run.
 
 use std::path::Path;
 
@@ -14,10 +14,10 @@ use super::sweep::{Basis, scenarios, sweep};
 use super::tables::{costs_table, headline_table, paper_table, points_table, shares_table, steps_table};
 use super::{charts, costs, sweep_report, whole_images};
 
-/// The report of a run.
+/// Makes the report of a run.
 ///
 /// # Errors
-/// Tables that do not fit, which is a fault here.
+/// A row does not fit its table.
 pub fn report(measured: &Measured, extent: Extent, scene: &str, most_simulated: usize) -> anyhow::Result<Report> {
     let all: Vec<Results<'_>> = measured.lit.iter().map(|lit| results_of(measured, lit)).collect();
     let main = all.first().context("nothing was measured")?;
@@ -64,7 +64,7 @@ fn new_report(measured: &Measured, extent: Extent, scene: &str) -> Report {
 
 fn simulate(measured: &Measured, main: &Results<'_>, most_nodes: usize, report: &mut Report) -> anyhow::Result<()> {
     let plain = costs::mean(&measured.unlimited);
-    // Expensive lighting was timed with a quota alone: as many times faster without as plain light is.
+    // Expensive lighting was timed with a quota alone; without it, the speed-up is that of the paper's lighting.
     let nodes = main.node_counts().into_iter().max().unwrap_or(PAPER_NODES);
     let speed = main.lit.mean(nodes).sample_image_s / plain.sample_image_s;
     let expensive = measured.lit.get(1).map(|lit| lit.mean(nodes));
@@ -93,10 +93,10 @@ fn summary(main: &Results<'_>) -> String {
     )
 }
 
-/// Prints all tables but the longest, and writes them to `tables.md`, ready to be pasted.
+/// Prints all tables but the longest, and writes them to `tables.md` in Markdown.
 ///
 /// # Errors
-/// A folder that cannot be written.
+/// The folder cannot be written.
 pub fn show(report: &Report, folder: &Path) -> anyhow::Result<()> {
     let short = || report.tables.iter().filter(|table| table.name != sweep_report::SWEEP_TABLE);
     short().for_each(|table| println!("\n{}", table.to_text()));

@@ -19,7 +19,7 @@ pub struct Results<'a> {
 }
 
 impl<'a> Results<'a> {
-    /// (S·g_s + V·(c+e)) / (P·T) of a measured point.
+    /// The efficiency (S·g_s + V·(c+e)) / (P·T) of a measured point.
     #[must_use]
     pub fn efficiency(&self, point: &Point) -> f64 {
         efficiency(&self.lit.mean(point.nodes), self.images, point.settings.views, point.nodes, point.period_s)

@@ -1,4 +1,4 @@
-//! The tables of what was measured.
+//! Tables of measured points.
 
 use study::{Cell, Table};
 use wire::{Costs, Policy, PolicyChoice};
@@ -10,7 +10,7 @@ use super::paper::{HEADLINE_S, table_1};
 use super::point::Point;
 use super::results::{Results, STEPS};
 
-/// Table 1: efficiency at V = 1000, the paper's beside ours. `direct` where it was measured at most views.
+/// Table 1: efficiency at V = 1000, the paper's beside ours. `direct` is measured at fewer views.
 pub fn paper_table(results: &Results<'_>) -> anyhow::Result<Table> {
     let columns = [
         ("P", ""),
@@ -54,7 +54,7 @@ pub fn paper_table(results: &Results<'_>) -> anyhow::Result<Table> {
     Ok(table)
 }
 
-/// Every point, with what was prediction of it.
+/// A table of all points with their predictions.
 pub fn points_table(results: &Results<'_>) -> anyhow::Result<Table> {
     let columns = [
         ("P", ""),
@@ -98,7 +98,7 @@ pub fn points_table(results: &Results<'_>) -> anyhow::Result<Table> {
     Ok(table)
 }
 
-/// One operation, by lighting and share of the machine.
+/// Costs of one operation, by lighting and share of the machine.
 pub fn costs_table(measured: &Measured, all: &[Results<'_>]) -> anyhow::Result<Table> {
     let columns = [
         ("lighting", ""),
@@ -139,7 +139,7 @@ pub fn costs_table(measured: &Measured, all: &[Results<'_>]) -> anyhow::Result<T
     Ok(table)
 }
 
-/// What became of the nodes' processor time at the most views.
+/// The uses of the nodes' processor time, at the most views.
 pub fn shares_table(results: &Results<'_>) -> anyhow::Result<Table> {
     let columns = [
         ("P", ""),
@@ -187,7 +187,7 @@ pub fn steps_table(results: &Results<'_>, nodes: usize) -> anyhow::Result<Table>
     Ok(table)
 }
 
-/// 290 views by five nodes. What five whole machines would take follows from the costs without a limit.
+/// 290 views by five nodes; five whole machines are predicted from the costs without a limit.
 pub fn headline_table(measured: &Measured, results: &Results<'_>) -> anyhow::Result<Table> {
     let mut table = Table::new("290 views by five nodes", &[("what", ""), ("time between sets", "s")]);
     table.push(["the paper, five GPUs".into(), HEADLINE_S.into()])?;

@@ -1,4 +1,4 @@
-//! What whole sample images allow, and what tiles make of it: with whole images no more than S nodes can sample.
+//! Whole sample images beside tiles: with whole images, no more than S nodes can sample.
 
 use study::Table;
 use wire::{Costs, PolicyChoice};
@@ -7,8 +7,8 @@ use super::costs::efficiency;
 use super::point::Point;
 use super::results::Results;
 
-/// The least T of eq. 2 that whole images allow, seconds: max(⌈S/K⌉·g_s, V·(c+e)/(P−K)) at the best K, nothing else
-/// taking any time. Infinite without a node for each role.
+/// The least T of eq. 2 with whole images, in seconds: max(⌈S/K⌉·g_s, V·(c+e)/(P−K)) at the best K, with no other
+/// costs. It is infinite without a node for each role.
 #[must_use]
 pub fn least_s(costs: &Costs, images: usize, views: usize, nodes: usize) -> f64 {
     let view_s = costs.reconstruct_view_s + costs.encode_view_s;
@@ -19,19 +19,19 @@ pub fn least_s(costs: &Costs, images: usize, views: usize, nodes: usize) -> f64 
     (1..nodes).map(with).fold(f64::INFINITY, f64::min)
 }
 
-/// A measured point's T under that.
+/// The least T of a measured point.
 fn bound_s(results: &Results<'_>, point: &Point) -> f64 {
     least_s(&results.lit.mean(point.nodes), results.images, point.settings.views, point.nodes)
 }
 
-/// How many times the efficiency that whole images allow at the best; of the pipeline.
+/// The pipeline's efficiency over the best that whole images allow.
 #[must_use]
 pub fn over_bound(results: &Results<'_>, nodes: usize, views: usize) -> Option<f64> {
     let point = results.find(PolicyChoice::Pipeline, nodes, views)?;
     Some(bound_s(results, point) / point.period_s)
 }
 
-/// How many times as fast as the same with whole images, measured.
+/// The pipeline's speed over that with whole images, both measured.
 #[must_use]
 pub fn over_whole(results: &Results<'_>, nodes: usize, views: usize) -> Option<f64> {
     let cut = results.find(PolicyChoice::Pipeline, nodes, views)?;
@@ -39,7 +39,7 @@ pub fn over_whole(results: &Results<'_>, nodes: usize, views: usize) -> Option<f
     Some(results.lit.points.iter().find(same)?.period_s / cut.period_s)
 }
 
-/// Every point whose views are made from samples.
+/// A table of every point whose views are made from samples.
 pub fn table(results: &Results<'_>) -> anyhow::Result<Table> {
     let columns = [
         ("P", ""),

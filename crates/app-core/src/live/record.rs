@@ -98,7 +98,7 @@ impl Record {
     /// Every frame that was shown.
     ///
     /// # Errors
-    /// A row that does not fit, which is a fault here.
+    /// A row does not fit its table.
     pub fn frames(&self) -> anyhow::Result<Table> {
         let head = ["frame", "posed", "shown", "plan_epoch", "set_index", "fallback", "age of its samples"];
         let units = ["", "s", "s", "", "", "", "s"];

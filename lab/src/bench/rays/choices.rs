@@ -57,7 +57,7 @@ fn chosen_over_other(choice: &Choice, again: &Choice) -> f64 {
     if choice.rays_are_faster() { rays_over_triangles } else { rays_over_triangles.recip() }
 }
 
-/// Both ways in turn.
+/// Times both ways in turn.
 fn again(subject: &Subject<'_>, camera: &PinholeCamera) -> anyhow::Result<Choice> {
     let draw = |visibility| {
         let work = subject.work(Lighting::UNLIT, visibility);

@@ -38,7 +38,7 @@ pub(super) fn measure(subject: &Subject<'_>, rays_a_second: f64, report: &mut Re
     Ok(())
 }
 
-/// Bytes of tree and triangles, and how many of them a second.
+/// Bytes of tree and triangles, and bytes read a second.
 fn plain_reading(subject: &Subject<'_>) -> anyhow::Result<(f64, f64)> {
     let pass = |_| subject.engine.renderer().read_acceleration(subject.scene, 0.0);
     let passes = (0..RUNS).map(pass).collect::<Result<Vec<_>, _>>()?;

@@ -1,4 +1,4 @@
-//! Rays: how many a second by kind, how far from the memory's limit, the tree, and how surfaces are found.
+//! Rays: their speed by kind, the memory that they read, the tree, and the choice between rays and triangles.
 
 mod choices;
 mod memory;

@@ -8,12 +8,12 @@ use study::{Cell, Report, Table};
 use super::subject::{RUNS, Subject};
 use crate::bench::timing::in_turn;
 
-/// Rays a pixel and lamp, and of occlusion a pixel, as in the lightings below.
+/// Rays a pixel and lamp, or of occlusion a pixel, in the lightings below.
 const MANY: usize = 16;
-/// The lightings that are timed, by their places in [`Kind`].
+/// The lightings that are timed; [`Kind`] has indices into them.
 const LIGHTINGS: [&str; 5] = ["unlit", "phong", "shadows", "soft 16", "phong, occlusion 16"];
 
-/// Rays of one kind: what they take is one lighting's time less that of another without them.
+/// Rays of one kind: their time is that of one lighting less that of another without them.
 struct Kind {
     name: &'static str,
     with: usize,
@@ -32,9 +32,9 @@ const KINDS: [Kind; 4] = [
 #[derive(Default)]
 struct Counts {
     pixels: usize,
-    /// Pixels that show one.
+    /// Pixels with a surface.
     surfaces: usize,
-    /// Lamps whose light reaches a surface's front from their middle, over all surfaces.
+    /// Lamps whose light reaches the front of a surface, over all surfaces.
     lamps_faced: usize,
 }
 
@@ -48,7 +48,7 @@ const SPEEDS: [(&str, &str); 7] = [
     ("speed", "million rays/s"),
 ];
 
-/// Adds the table; gives primary rays a second on the whole device.
+/// Adds the table; returns primary rays a second on the whole device.
 pub(super) fn measure(subject: &Subject<'_>, lamps: &[Light], report: &mut Report) -> anyhow::Result<f64> {
     let lightings = LIGHTINGS.map(str::parse::<Lighting>).into_iter().collect::<Result<Vec<_>, _>>()?;
     let draw = |lighting| subject.draw(lighting, SamplePlanes::default()).map(drop);

@@ -31,7 +31,7 @@ impl Subject<'_> {
         self.cameras.first().context("no sample cameras")
     }
 
-    /// The unit that speeds are given for: a core where shaders run on the processor.
+    /// The unit of speeds: a core where shaders run on the processor.
     pub(super) fn workers(&self) -> (&'static str, f64) {
         let cores = || std::thread::available_parallelism().map_or(1, usize::from) as f64;
         if self.engine.is_software() { ("a core", cores()) } else { ("the device", 1.0) }
