@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Context as _;
+use codec::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
 use depth_image::{Camera, DepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use metrics::{
     DepthPlane, PixelClass, Rgb8Image, ScoreMap, class_mask, classify, depth_errors, flip_map, psnr_db, ssim_map,
@@ -13,7 +14,6 @@ use node::{DirectWork, Engine as _, SampleWork};
 use rayon::prelude::*;
 use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
 use render::Lighting;
-use wire::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
 
 use crate::engine::GpuEngine;
 use crate::setup::{SceneArgs, Setup};
@@ -92,7 +92,7 @@ impl Truth {
             lighting: lighting.clone(),
             scene_time_s: 0.0,
             settled_at_s: None,
-            refinement: wire::Refinement::default(),
+            refinement: cluster::Refinement::default(),
         };
         let images = engine.sample(&work)?.iter().map(travelled).collect::<anyhow::Result<Vec<_>>>()?;
         let description = SetDescription {

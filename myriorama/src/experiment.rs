@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use client::{Client, Frame};
+use cluster::{PolicyChoice, Timeline};
 use depth_image::{PinholeCamera, ViewCell};
 use glam::UVec2;
 use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
 use render::{Choice, Lighting};
 use tokio::runtime::Runtime;
-use wire::{PolicyChoice, Timeline};
 
 use crate::cluster::Cluster;
 use crate::delivery::{Delivered, Wishes, open, receive};

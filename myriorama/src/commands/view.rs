@@ -6,12 +6,13 @@ use std::time::Duration;
 use anyhow::Context as _;
 use clap::Args;
 use client::{Client, Frame, Session};
+use cluster::{OfferStatus, PolicyChoice, Timeline};
+use codec::FrameCodec;
 use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use indicatif::ProgressBar;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use serde_json::{Map, json};
-use wire::{FrameCodec, OfferStatus, PolicyChoice, Timeline};
 
 use crate::cameras::{self, NamedCamera, Placement};
 use crate::comparison;

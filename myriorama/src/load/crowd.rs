@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use client::{Client, ClientError, LiveView, Session};
+use cluster::PolicyChoice;
 use depth_image::{Camera, PinholeCamera, ViewCell};
 use glam::UVec2;
 use tokio::task::JoinSet;
-use wire::PolicyChoice;
 
 use crate::delivery::{Wishes, open};
 use crate::live::{Drive, Record, drive};

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
+use cluster::Costs;
 use gpu::DevicePreference;
 use indicatif::ProgressBar;
 use render::Lighting;
 use simulation::Calls;
-use wire::Costs;
 
 use super::costs;
 use super::fleet::Fleet;

@@ -3,9 +3,9 @@
 use std::cell::Cell;
 
 use anyhow::Context as _;
+use cluster::{MeasureCosts, PolicyChoice, Timeline, Workload};
 use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
 use render::Lighting;
-use wire::{MeasureCosts, PolicyChoice, Timeline, Workload};
 
 use crate::delivery::Wishes;
 use crate::experiment::VIEW_SIZE_PX;

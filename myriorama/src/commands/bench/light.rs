@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use cluster::PolicyChoice;
 use depth_image::ViewCell;
 use render::Lighting;
 use study::{Bar, Check, Report, Table};
-use wire::PolicyChoice;
 
 use super::BenchArgs;
 use crate::engine::GpuEngine;
