@@ -60,6 +60,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "app-core",
             "client",
+            "cluster",
+            "codec",
             "coordinator",
             "depth-image",
             "engine",
