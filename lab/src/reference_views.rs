@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use app_core::setup::{SceneArgs, Setup};
+use codec::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
 use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
 use engine::GpuEngine;
 use metrics::{PixelClass, classify, unheld_rate};
 use node::{DirectWork, Engine as _, SampleWork};
 use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
 use render::Lighting;
-use wire::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
 
 use crate::statistics::median;
 
@@ -132,7 +132,7 @@ fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result
         lighting: args.lighting.to_string(),
         scene_time_s: 0.0,
         settled_at_s: None,
-        refinement: wire::Refinement::default(),
+        refinement: cluster::Refinement::default(),
     };
     engine.sample(&work)?.iter().map(encoded_and_decoded).collect()
 }

@@ -1,11 +1,11 @@
 //! Delivery times against the number of views, by method.
 
 use app_core::delivery::Delivered;
+use cluster::{Costs, PolicyChoice, SessionPlan};
 use coordinator::schedule::{brute_force_k, k_fd, k_fd_printed};
 use node::Engine as _;
 use reconstruction::ReconstructionMethod;
 use study::{Report, Table};
-use wire::{Costs, PolicyChoice, SessionPlan};
 
 use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
 use crate::progress::bar;

@@ -1,8 +1,8 @@
 //! Measurements of lightings: parts alone, and views delivered.
 
 use app_core::delivery::Delivered;
+use cluster::{Costs, PolicyChoice};
 use render::Lighting;
-use wire::{Costs, PolicyChoice};
 
 use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
 use crate::progress::bar;

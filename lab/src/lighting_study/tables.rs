@@ -1,8 +1,8 @@
 //! Tables of lightings.
 
+use cluster::Costs;
 use coordinator::schedule::k_fd;
 use study::Table;
-use wire::Costs;
 
 use super::measure::Row;
 

@@ -1,7 +1,7 @@
 //! Figures 5 to 8 of the paper, from measured points.
 
+use cluster::PolicyChoice;
 use study::{Axis, BarChart, Chart, Series, XyChart};
-use wire::PolicyChoice;
 
 use super::matrix::{FEW_NODES, PAPER_VIEWS};
 use super::paper::{PaperRow, TABLE_1};

@@ -9,8 +9,9 @@ use std::time::Instant;
 
 use app_core::delivery::{SessionSettings, open};
 use client::{Frame, Session, ViewRequest};
+use cluster::Policy;
+use codec::FrameHeader;
 use depth_image::PinholeCamera;
-use wire::{FrameHeader, Policy};
 
 use super::fetched::fetch;
 use super::machine::MachineTime;

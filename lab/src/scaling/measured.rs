@@ -1,8 +1,8 @@
 //! Measured costs and points.
 
+use cluster::Costs;
 use render::Lighting;
 use simulation::Calls;
-use wire::Costs;
 
 use super::costs;
 use super::point::Point;

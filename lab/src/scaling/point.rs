@@ -1,7 +1,7 @@
 //! One measured point: V views of several sample sets, delivered by P nodes.
 
+use cluster::{Policy, PolicyChoice, SessionPlan};
 use render::Lighting;
-use wire::{Policy, PolicyChoice, SessionPlan};
 
 use super::fetched::Fetched;
 use super::machine::MachineTime;

@@ -1,6 +1,6 @@
 //! Measured points of a lighting beside their predictions.
 
-use wire::PolicyChoice;
+use cluster::PolicyChoice;
 
 use super::costs::efficiency;
 use super::matrix::PAPER_VIEWS;

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use app_core::sizes::SizePx;
 use clap::Args;
+use cluster::PolicyChoice;
+use codec::FrameCodec;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
-use wire::{FrameCodec, PolicyChoice};
 
 use super::viewpoints::Viewpoints;
 

@@ -14,10 +14,10 @@ use app_core::delivery::{Delivered, SessionSettings, open, receive};
 use app_core::exit::Outcome;
 use app_core::process::runtime;
 use client::{Client, Session};
+use cluster::{OfferStatus, PolicyChoice};
 use depth_image::PinholeCamera;
 use indicatif::ProgressBar;
 use serde_json::{Map, json};
-use wire::{OfferStatus, PolicyChoice};
 
 use self::request::session_settings;
 use crate::comparison;

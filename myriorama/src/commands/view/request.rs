@@ -1,9 +1,9 @@
 //! Settings of the session that views are asked in.
 
 use app_core::delivery::{SessionSettings, viewpoints};
+use cluster::{OfferStatus, Timeline};
 use depth_image::{PinholeCamera, ViewPlanes};
 use render::Lighting;
-use wire::{OfferStatus, Timeline};
 
 use super::args::ViewArgs;
 

@@ -8,8 +8,8 @@ use app_core::exit::BadInput;
 use app_core::setup::NEAR_OF_DIAGONAL;
 use app_core::sizes::{GridSize, SizePx};
 use clap::Args;
+use cluster::OfferStatus;
 use depth_image::{Camera, PinholeCamera, ViewCell};
-use wire::OfferStatus;
 
 /// One way to place the views; without any, an orbit of 24.
 #[derive(Debug, Args)]
