@@ -60,7 +60,7 @@ fn is_invalid(error: &EngineError, named: &str) -> bool {
 }
 
 #[test]
-fn what_it_does_not_know_is_named() {
+fn unknown_names_are_refused_with_their_field() {
     let (engine, args, setup, reference) = reference("uv-sphere", 1);
     let hash = setup.offer.hash.to_string();
     let samples: Vec<_> = setup.samples.iter().copied().map(Camera::Pinhole).collect();

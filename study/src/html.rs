@@ -10,7 +10,7 @@ use crate::paths::{chart_path, picture_path, table_path};
 use crate::picture::{Picture, PictureRow};
 use crate::report::Report;
 
-/// Fills the page in. Whatever comes from the report is escaped, but for the charts, which are SVG.
+/// Fills in the page. All text of the report is escaped; charts are SVG.
 pub(crate) fn page(report: &Report, charts: Vec<String>) -> Result<String, ReportError> {
     let mut environment = Environment::new();
     // Names that end in .html are escaped.

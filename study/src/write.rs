@@ -1,4 +1,4 @@
-//! A report's files.
+//! Files of a report.
 
 use std::collections::HashSet;
 use std::fs;
@@ -15,20 +15,19 @@ use crate::report::Report;
 use crate::slug::slug;
 
 impl Report {
-    /// Writes the report to a folder, made if need be: `report.json`, `index.html`, a CSV file a table,
+    /// Writes the report to a folder, which is made if need be: `report.json`, `index.html`, a CSV file a table,
     /// `charts/*.svg` and `pictures/*.png`.
     ///
     /// # Errors
-    /// Parts that do not fit together, names that collide, or a folder that cannot be written.
+    /// Parts do not fit together, names collide, or the folder cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), ReportError> {
         write(self, folder)
     }
 
-    /// Writes the report, says where, and prints the checks: the end of every program's output. Returns
-    /// [`Report::exit_ok`].
+    /// Writes the report, prints its path and its checks, and returns [`Report::exit_ok`].
     ///
     /// # Errors
-    /// As [`Report::write`].
+    /// The report cannot be written.
     pub fn finish(&self, folder: &Path) -> Result<bool, ReportError> {
         self.write(folder)?;
         println!("report: {}", folder.join("index.html").display());

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use app_core::setup::Setup;
+use app_core::setup::{Setup, resized};
 use depth_image::{Camera, DepthImage, PinholeCamera, linear_from_rgb9e5};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
@@ -11,7 +11,6 @@ use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility}
 use study::{Axis, Bar, Check, Report, Series, Table, XyChart};
 
 use super::args::BenchArgs;
-use super::rays::resized;
 use crate::progress::bar;
 
 /// Rays of the reference.
@@ -48,7 +47,7 @@ struct Error {
 /// Adds a table, a chart and checks.
 pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, setup: &Setup, report: &mut Report) -> anyhow::Result<()> {
     let scene = engine.scene(setup.offer.hash.as_str())?;
-    let camera = resized(setup.samples.first().context("no sample cameras")?, SIZE_PX);
+    let camera = resized(*setup.samples.first().context("no sample cameras")?, SIZE_PX);
     let rays = if args.quick { &RAYS[..QUICK] } else { &RAYS[..] };
     let progress = bar("error against rays", KINDS.len() * (1 + rays.len()));
     let mut of_kinds = Vec::with_capacity(KINDS.len());

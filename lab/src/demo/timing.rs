@@ -194,9 +194,9 @@ fn samplers(times: &Times) -> anyhow::Result<Table> {
         ("formula, floor", ""),
         ("as printed, ceil", ""),
         ("brute force", ""),
-        ("pipeline foretold", "s"),
-        ("direct foretold", "s"),
-        ("left alone it would be", ""),
+        ("pipeline predicted", "s"),
+        ("direct predicted", "s"),
+        ("policy by prediction", ""),
     ];
     let mut table = Table::new(format!("K of P = {} nodes", times.nodes), &columns);
     for run in times.pipelines.first().map(|(_, runs)| runs.as_slice()).unwrap_or_default() {
@@ -205,8 +205,8 @@ fn samplers(times: &Times) -> anyhow::Result<Table> {
         let by = |rule: fn(usize, f64, usize, f64, usize) -> usize| rule(times.images, g, run.views, c, times.nodes);
         let would = if plan.predicted_direct_s < plan.predicted_pipeline_s { "direct" } else { "pipeline" };
         let ks = [run.views, plan.sampler_count(), by(k_fd), by(k_fd_printed), by(brute_force_k)];
-        let foretold = [plan.predicted_pipeline_s, plan.predicted_direct_s];
-        table.push(ks.map(Into::into).into_iter().chain(foretold.map(Into::into)).chain([would.into()]))?;
+        let predicted = [plan.predicted_pipeline_s, plan.predicted_direct_s];
+        table.push(ks.map(Into::into).into_iter().chain(predicted.map(Into::into)).chain([would.into()]))?;
     }
     Ok(table)
 }

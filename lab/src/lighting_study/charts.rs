@@ -15,7 +15,7 @@ pub(super) fn ratio_chart(rows: &[Row], lamps: usize) -> XyChart {
         .map(|row| labelled(row, row.rays_a_pixel(lamps), row.costs.reconstruct_view_s / row.costs.direct_view_s));
     let mut chart = XyChart::new("c / g against lighting", Axis::log("rays a pixel", ""), Axis::log("c / g_v", ""))
         .with(Series::line("c / g_v", points));
-    chart.note = "Reconstructing a view costs the same whatever its light; drawing it does not.".to_owned();
+    chart.note = "Reconstructing a view costs the same in every light; drawing it does not.".to_owned();
     chart
 }
 

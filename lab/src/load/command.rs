@@ -33,8 +33,8 @@ pub struct LoadArgs {
     /// The number of node processes, P
     #[arg(long, default_value_t = 1, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=64))]
     nodes: u16,
-    /// Cores of each node, by a control group; 0 sets no limit. Nodes that share a machine would otherwise each promise
-    /// all of it [default: all but half a core, divided; no limit for one node, or without control groups]
+    /// Cores of each node, by a control group; 0 sets no limit. Without a limit, each node of a machine promises all of
+    /// it [default: all cores but half a one, divided; no limit for one node, or without control groups]
     #[arg(long, value_name = "CORES", value_parser = cores)]
     share: Option<f64>,
     /// The time of each load

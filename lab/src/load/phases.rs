@@ -7,7 +7,8 @@ use glam::UVec2;
 use indicatif::ProgressBar;
 
 use super::clients::{Clients, Outcome, Tour, follow};
-use super::processes::{Processes, Setting, memory_mib};
+use super::processes::{Processes, Setting};
+use crate::memory::memory_mib;
 
 /// Size of every frame.
 const SIZE_PX: UVec2 = UVec2::new(320, 180);

@@ -7,6 +7,7 @@ use anyhow::Context as _;
 use client::Client;
 
 use crate::cpu_share::{CpuGroup, Hierarchy};
+use crate::memory::memory_mib;
 use crate::process::{Process, metrics_page};
 
 /// The longest wait for nodes to join.
@@ -107,15 +108,6 @@ fn limited(process: &Process, cores: f64) -> anyhow::Result<CpuGroup> {
     Ok(group)
 }
 
-/// Resident memory of a process, by number or `self`; `None` where the system does not tell.
-#[must_use]
-pub fn memory_mib(process: &str) -> Option<f64> {
-    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-    let kib: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib / 1024.0)
-}
-
 fn dropped_in(page: &str) -> Vec<(String, u64)> {
     let reason = |line: &str| {
         let rest = line.strip_prefix("myriorama_dropped_views_total{reason=\"")?;
@@ -134,11 +126,5 @@ mod tests {
         let page = "# TYPE x\nmyriorama_dropped_views_total{reason=\"newer pose\"} 12\nmyriorama_views_total 4\n\
                     myriorama_dropped_views_total{reason=\"client gone\"} 1\n";
         assert_eq!(dropped_in(page), [("newer pose".to_owned(), 12), ("client gone".to_owned(), 1)]);
-    }
-
-    #[test]
-    fn this_process_has_memory() {
-        assert!(memory_mib("self").is_some_and(|mib| mib > 1.0));
-        assert_eq!(memory_mib("none"), None);
     }
 }

@@ -73,7 +73,7 @@ fn clients(loads: &[Load]) -> anyhow::Result<Table> {
 /// Fallbacks, in the order of their first use.
 fn fallbacks(loads: &[Load]) -> anyhow::Result<Table> {
     let columns = [("clients × frames/s", ""), ("fallback", ""), ("first", "s"), ("frames", ""), ("of all", "%")];
-    let mut table = Table::new("Frames by what they make do with", &columns);
+    let mut table = Table::new("Frames by fallback", &columns);
     for load in loads {
         let mut steps: BTreeMap<u32, (f64, usize)> = BTreeMap::new();
         for shown in load.shown() {

@@ -138,6 +138,6 @@ pub fn detection_report(rows: &Detection, report: &mut Report) -> anyhow::Result
         "",
         Bar::AtLeast(1.0),
     ));
-    report.checks.push(Check::new("tolerance finds, whatever the size", least, "", Bar::AtLeast(0.95)));
+    report.checks.push(Check::new("tolerance finds at every size", least, "", Bar::AtLeast(0.95)));
     Ok(())
 }

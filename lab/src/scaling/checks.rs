@@ -44,7 +44,7 @@ fn efficient(results: &Results<'_>, policy: PolicyChoice) -> Check {
     Check::maybe(name, value, "", Bar::AtLeast(bar), NOT_MEASURED)
 }
 
-/// Sharing is worth its cost: the paper shows 0.829 beside 0.110.
+/// Sharing pays: the paper shows 0.829 beside 0.110.
 fn naive_beside(results: &Results<'_>) -> Check {
     let shared = results.find(PolicyChoice::Pipeline, PAPER_NODES, PAPER_VIEWS).map(|point| results.efficiency(point));
     let naive = results.naive(PAPER_NODES).map(|(efficiency, _)| efficiency);

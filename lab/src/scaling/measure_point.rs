@@ -1,9 +1,9 @@
 //! The measurement of one point.
 //!
-//! T is the time between two sets in the steady state, at the client: from the moment when the last view of set 0 is
-//! decoded and checksummed to the same moment of the last set that counts, over the sets between. Set 0 fills the
-//! pipeline. The client asks for all sets at once, in order. Where samples are shared, more sets follow, so that the
-//! last set that counts is sampled ahead as all others are.
+//! T is the time between two sets in the steady state, at the client. It starts when the last view of set 0 is decoded
+//! and checksummed, and ends when the same holds of the last set that counts; the number of sets between divides it.
+//! Set 0 fills the pipeline. The client asks for all sets at once, in order. Where samples are shared, more sets
+//! follow, so that the last set that counts is sampled ahead as all others are.
 
 use std::time::Instant;
 

@@ -1,7 +1,7 @@
 //! The paper's experiments on real processes, and a simulation beyond them.
 //!
-//! [`command`] starts a coordinator and P nodes, gives every node an equal share of the processors, and measures the
-//! time between two sample sets by number of nodes, number of views and policy. See `docs/scaling.md`.
+//! [`command`] starts a coordinator and P nodes, each with an equal share of the processors. It measures the time
+//! between two sample sets by number of nodes, number of views and policy. See `docs/scaling.md`.
 
 mod charts;
 mod checks;

@@ -19,10 +19,10 @@ const LETTER_WIDTH_PX: f64 = 7.4;
 const TITLE_HEIGHT_PX: i32 = 30;
 const LEGEND_ROW_PX: i32 = 22;
 const MARGIN_PX: i32 = 14;
-/// From a legend's glyph to its text.
+/// The distance from a legend's glyph to its text.
 const GLYPH_WIDTH_PX: i32 = 34;
 
-/// Stands for the page's text colour: replaced by `currentColor` when the drawing is done.
+/// A stand-in for the page's text colour, replaced by `currentColor` at the end.
 pub(super) const INK: RGBColor = RGBColor(1, 2, 3);
 const INK_IN_SVG: &str = "#010203";
 
@@ -48,7 +48,7 @@ impl Drawing {
     }
 }
 
-/// How a legend shows an entry.
+/// The glyph of a legend's entry.
 pub(super) enum Glyph {
     /// A block of colour.
     Swatch(RGBColor),
@@ -60,7 +60,7 @@ pub(super) enum Glyph {
     Dashes(Marker),
 }
 
-/// A line of a legend.
+/// An entry of a legend.
 pub(super) struct LegendEntry {
     pub(super) text: String,
     pub(super) glyph: Glyph,
@@ -111,7 +111,7 @@ pub(super) fn text_width_px(text: &str) -> i32 {
     (text.chars().count() as f64 * LETTER_WIDTH_PX).ceil() as i32
 }
 
-/// Entries in rows, as many a row as fit.
+/// Entries in rows, with as many a row as fit.
 fn legend_rows(legend: &[LegendEntry]) -> Vec<Vec<(i32, &LegendEntry)>> {
     let mut rows: Vec<Vec<(i32, &LegendEntry)>> = Vec::new();
     let mut next_px = i32::MAX;

@@ -1,4 +1,4 @@
-//! Marks of single points, a shape as well as a colour a series.
+//! Markers of points: each series has a shape as well as a colour.
 
 use plotters::prelude::*;
 
@@ -13,7 +13,7 @@ pub(super) struct Marker {
     /// Circle, square, diamond, triangle.
     pub(super) shape: usize,
     pub(super) color: RGBColor,
-    /// Filled: measured. Hollow: extrapolated.
+    /// True for measured points, false for extrapolated ones.
     pub(super) filled: bool,
 }
 

@@ -13,7 +13,7 @@ use super::placement::Placement;
 pub const MAX_FILE_BYTES: u64 = 32 << 20;
 /// The most cameras of a file.
 pub const MAX_FRAMES: usize = 65_536;
-/// How far a matrix's axes may be from unit length and right angles.
+/// The tolerance of a matrix's axes to unit length and right angles.
 const RIGID_TOLERANCE: f64 = 1e-3;
 const MODELS: [&str; 3] = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE"];
 const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
@@ -33,7 +33,7 @@ impl Fault {
 /// Reads all cameras of a file.
 ///
 /// # Errors
-/// Names the file, the frame, the field and the reason.
+/// The error names the file, the frame, the field and the reason.
 pub fn read(path: &Path, placement: Placement) -> Result<Vec<PinholeCamera>, CameraFileError> {
     let cameras = text_of(path).and_then(|text| parse(&text, placement));
     cameras.map_err(|fault| CameraFileError { file: path.display().to_string(), place: fault.place, kind: fault.kind })
@@ -44,7 +44,7 @@ fn text_of(path: &Path) -> Result<String, Fault> {
     let io = |error: std::io::Error| Fault::at("file", error.into());
     let file = std::fs::File::open(path).map_err(io)?;
     let mut text = String::new();
-    // One more than allowed: a pipe has no length to look at first.
+    // One byte more than allowed: a pipe has no length to check first.
     file.take(MAX_FILE_BYTES + 1).read_to_string(&mut text).map_err(io)?;
     at_most("file", text.len() as u64, MAX_FILE_BYTES)?;
     Ok(text)
@@ -66,14 +66,15 @@ fn parse(text: &str, placement: Placement) -> Result<Vec<PinholeCamera>, Fault> 
     frames.iter().enumerate().map(|(index, frame)| Frame::of(index, frame, shared)?.camera(placement)).collect()
 }
 
-/// Python writes NaN and Infinity, which JSON has not: as `null` they are reported with frame and field.
+/// Replaces NaN and Infinity, which Python writes and JSON does not have, by `null`: they are reported with frame and
+/// field.
 fn without_nan(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for (index, part) in text.split('"').enumerate() {
         if index > 0 {
             out.push('"');
         }
-        // Strings of camera files hold no escaped quotes; one that does is merely left as it is or refused.
+        // Strings of camera files hold no escaped quotes.
         if index % 2 == 0 {
             out.push_str(&part.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null"));
         } else {
@@ -83,7 +84,7 @@ fn without_nan(text: &str) -> String {
     out
 }
 
-/// A frame and what the file says for all frames.
+/// A frame, and the fields that the file has for all frames.
 struct Frame<'a> {
     index: usize,
     own: &'a Map<String, Value>,

@@ -14,8 +14,6 @@ use study::{Report, Table};
 use self::subject::Subject;
 use super::args::BenchArgs;
 
-pub(crate) use subject::resized;
-
 /// Adds tables and checks.
 pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, setup: &Setup, report: &mut Report) -> anyhow::Result<()> {
     let scene = engine.scene(setup.offer.hash.as_str())?;

@@ -37,9 +37,3 @@ impl Subject<'_> {
         if self.engine.is_software() { ("a core", cores()) } else { ("the device", 1.0) }
     }
 }
-
-/// The same field of view in another size.
-pub(crate) fn resized(camera: &PinholeCamera, size_px: UVec2) -> PinholeCamera {
-    let scale = size_px.as_vec2() / camera.size_px.as_vec2();
-    PinholeCamera { size_px, focal_px: camera.focal_px * scale, principal_px: camera.principal_px * scale, ..*camera }
-}

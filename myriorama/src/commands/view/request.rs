@@ -1,4 +1,4 @@
-//! Settings of the session that views are asked in.
+//! Settings of the session of the views.
 
 use app_core::delivery::{SessionSettings, viewpoints};
 use cluster::{OfferStatus, Timeline};

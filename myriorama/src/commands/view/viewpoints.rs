@@ -1,4 +1,4 @@
-//! Cameras of the views that are asked for.
+//! Cameras of the views.
 
 use std::path::PathBuf;
 
@@ -18,13 +18,13 @@ pub(super) struct Viewpoints {
     /// N views on an ellipse between the sample cameras
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) orbit: Option<u32>,
-    /// Columns × rows of views over the rectangle of the sample cameras
+    /// Columns × rows of views on the rectangle of the sample cameras
     #[arg(long, value_name = "CxR")]
     pub(super) grid: Option<GridSize>,
-    /// N views spread evenly over the rectangle of the sample cameras
+    /// N views spread evenly on the rectangle of the sample cameras
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) views: Option<u32>,
-    /// N views on a circle around the scene, at the height of the sample cameras' middle; as with --cells
+    /// N views on a circle around the scene, at the height of the sample cameras' centre; implies --cells
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) around: Option<u32>,
     /// One view: eye, target and full vertical field of view in degrees, in the scene file's coordinates
@@ -36,7 +36,7 @@ pub(super) struct Viewpoints {
 }
 
 impl Viewpoints {
-    /// The cameras, and the file's own where one is given.
+    /// The cameras of the views.
     ///
     /// # Errors
     /// A file or a camera cannot be used, or the coordinator has no sample cameras.
