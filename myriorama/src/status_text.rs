@@ -1,9 +1,7 @@
 //! A cluster's state as a table: nodes, roles, costs, and why.
 
 use cluster::{ClusterStatus, Costs, NodeStatus};
-use study::{Cell, Table};
-
-use crate::text_table;
+use table::{Cell, Table};
 
 const COLUMNS: [(&str, &str); 12] = [
     ("node", ""),
@@ -33,7 +31,7 @@ pub fn text(status: &ClusterStatus) -> anyhow::Result<String> {
         .plan
         .as_ref()
         .map_or_else(|| "No plan: nobody has asked for views.".to_owned(), |plan| plan.reason.clone());
-    Ok(format!("{}\n\n{why}\n{}", text_table::text(&table), achieved(status)))
+    Ok(format!("{}\n\n{why}\n{}", table.to_text(), achieved(status)))
 }
 
 /// What each policy took that has been in force, and whether nodes have time left.

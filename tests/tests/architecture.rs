@@ -33,25 +33,65 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("coordinator", &["node", "wire", "cluster", "codec", "depth-image"]),
     ("client", &["wire", "cluster", "codec", "depth-image"]),
     ("simulation", &["client", "coordinator", "cluster", "depth-image"]),
-    ("study", &["metrics", "depth-image"]),
+    ("table", &[]),
+    ("study", &["metrics", "table"]),
+    ("engine", &["node", "reconstruction", "sampling", "render", "gpu", "scene", "cluster", "depth-image"]),
     (
-        "myriorama",
+        "app-core",
         &[
             "client",
             "cluster",
-            "codec",
             "coordinator",
             "depth-image",
             "gpu",
-            "metrics",
             "node",
             "node-host",
             "reconstruction",
             "render",
             "sampling",
             "scene",
+            "table",
+        ],
+    ),
+    (
+        "lab",
+        &[
+            "app-core",
+            "client",
+            "cluster",
+            "codec",
+            "coordinator",
+            "depth-image",
+            "engine",
+            "gpu",
+            "metrics",
+            "node",
+            "reconstruction",
+            "render",
+            "sampling",
+            "scene",
             "simulation",
             "study",
+            "wire",
+        ],
+    ),
+    (
+        "myriorama",
+        &[
+            "app-core",
+            "client",
+            "cluster",
+            "codec",
+            "coordinator",
+            "depth-image",
+            "engine",
+            "lab",
+            "metrics",
+            "node",
+            "node-host",
+            "reconstruction",
+            "render",
+            "table",
             "wire",
         ],
     ),
@@ -66,6 +106,9 @@ const MESSAGES: [&str; 5] = ["prost", "prost-types", "prost-build", "tonic-prost
 
 /// What a thin client must not have in it.
 const DEVICE: [&str; 5] = ["wgpu", "wgpu-core", "wgpu-hal", "naga", "ash"];
+
+/// What a program without its lab must not have in it: measurements, and the charts of their reports.
+const LAB: [&str; 4] = ["lab", "plotters", "simulation", "study"];
 
 /// What a decision may not depend on.
 const IMPURE: [&str; 8] =
@@ -262,6 +305,22 @@ fn services_see_the_device_through_the_engine_only() {
     for name in ["node", "sampler-node", "compositor-node", "node-host", "coordinator"] {
         assert_eq!(device_crates(&closure(name, &uses)), Vec::<&str>::new(), "{name}");
     }
+}
+
+/// The packages of a program without its optional ones.
+fn thin_closure(of: &str, uses: &BTreeMap<String, BTreeSet<String>>) -> BTreeSet<String> {
+    let packages = graph().workspace_packages();
+    let program = packages.iter().find(|package| package.name.as_str() == of).expect("the program");
+    let kept = program.dependencies.iter().filter(|used| used.kind == DependencyKind::Normal && !used.optional);
+    kept.flat_map(|used| closure(&used.name, uses)).collect()
+}
+
+#[test]
+fn a_thin_program_measures_nothing() {
+    let uses = resolved();
+    let lab = |of: &BTreeSet<String>| LAB.into_iter().filter(|name| of.contains(*name)).collect::<Vec<_>>();
+    assert_eq!(lab(&thin_closure("myriorama", &uses)), Vec::<&str>::new());
+    assert_eq!(lab(&closure("myriorama", &uses)), LAB, "the check sees the lab where it is");
 }
 
 #[test]
