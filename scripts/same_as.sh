@@ -5,8 +5,8 @@
 #   scripts/same_as.sh COMMIT --times   the ratios of g_s, g_v, c and d, on a machine that does nothing else
 #
 # Both commits are built; both serve each scene in turn; one client of this commit asks both and hashes what they send.
-# A renderer chooses rays or triangles by timing. A row that differs is therefore asked again of new processes, up to
-# six times: it is equal once both commits have given one same answer. Exit status 1: a row differs.
+# A renderer chooses rays or triangles by timing. Rows that differ are therefore asked again of new processes, up to
+# five times: a row is equal once both commits have given one same answer. Exit status 1: a row differs.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -34,7 +34,7 @@ build() {
     cargo build --release --locked --package myriorama --package cluster-tests --bin myriorama --bin compare_clusters
     old="$out/build/release/myriorama"
     new="target/release/myriorama"
-    compare="target/release/compare_clusters"
+    client="target/release/compare_clusters"
 }
 
 # serve PROGRAM SCENE LOG: starts a cluster; `url` is its coordinator's.
@@ -50,53 +50,52 @@ serve() {
     return 1
 }
 
-# ask PROGRAM SCENE NAME [TEXT]: the answers of a new process, into NAME.txt.
+# ask PROGRAM SCENE NAME [ROWS]: the answers of a new process to all rows, or to those of a file, are added to NAME.txt.
 ask() {
     serve "$1" "$2" "$out/$3.log"
-    "$compare" bytes "$url" "${4:-}" >"$out/$3.txt"
+    "$client" bytes "$url" ${4:+"$4"} >>"$out/$3.txt"
     stop
 }
 
-# A line of an answer is "row | hashes".
-differing_rows() {
-    diff --changed-group-format='%<' --unchanged-group-format='' "$1" "$2" | sed 's/ | [^|]*$//' || true
+# The rows of answers: a line of an answer is "row | hashes".
+rows_of() {
+    sed 's/ | [^|]*$//' "$@"
 }
 
-# Whether new processes of both commits ever give one same answer to a row.
-settles() {
-    local scene="$1" row="$2"
-    : >"$out/old_answers.txt"
-    : >"$out/new_answers.txt"
-    for _ in 1 2 3 4 5 6; do
-        ask "$old" "$scene" retry_old "$row"
-        ask "$new" "$scene" retry_new "$row"
-        cat "$out/retry_old.txt" >>"$out/old_answers.txt"
-        cat "$out/retry_new.txt" >>"$out/new_answers.txt"
-        if grep -qxFf "$out/old_answers.txt" "$out/new_answers.txt"; then return 0; fi
-    done
-    return 1
+# Rows of a scene to which the two commits have not yet given one same answer, into differing.txt.
+compare() {
+    comm -12 <(sort -u "$out/old-$1.txt") <(sort -u "$out/new-$1.txt") >"$out/common.txt"
+    rows_of "$out/new-$1.txt" | sort -u | grep -vxFf <(rows_of "$out/common.txt") >"$out/differing.txt" || true
 }
 
 bytes() {
     local equal=0 different=0 scene row
     for scene in "${scenes[@]}"; do
+        rm -f "$out/old-$scene.txt" "$out/new-$scene.txt"
         ask "$old" "$scene" "old-$scene"
         ask "$new" "$scene" "new-$scene"
-        if ! cmp -s <(sed 's/ | [^|]*$//' "$out/old-$scene.txt") <(sed 's/ | [^|]*$//' "$out/new-$scene.txt"); then
+        rows_of "$out/new-$scene.txt" >"$out/rows.txt"
+        if ! rows_of "$out/old-$scene.txt" | cmp -s - "$out/rows.txt"; then
             echo "$scene: the commits were not asked the same rows" >&2
             return 1
         fi
-        differing_rows "$out/old-$scene.txt" "$out/new-$scene.txt" >"$out/differing.txt"
-        while IFS= read -r answer; do
-            row="${answer% | *}"
-            if ! grep -qxF "$row" "$out/differing.txt" || settles "$scene" "$row"; then
-                echo "equal    $scene | $row"
-                equal=$((equal + 1))
-            else
+        compare "$scene"
+        for _ in 1 2 3 4 5; do
+            [ -s "$out/differing.txt" ] || break
+            cp "$out/differing.txt" "$out/again.txt"
+            ask "$old" "$scene" "old-$scene" "$out/again.txt"
+            ask "$new" "$scene" "new-$scene" "$out/again.txt"
+            compare "$scene"
+        done
+        while IFS= read -r row; do
+            if grep -qxF "$row" "$out/differing.txt"; then
                 echo "differs  $scene | $row"
                 different=$((different + 1))
+            else
+                echo "equal    $scene | $row"
+                equal=$((equal + 1))
             fi
-        done <"$out/new-$scene.txt"
+        done <"$out/rows.txt"
     done
     echo "$equal equal, $different different"
     [ "$different" -eq 0 ] && [ "$equal" -gt 0 ]
@@ -109,7 +108,7 @@ times() {
         urls+=("$url")
     done
     echo "old ${urls[0]}, new ${urls[1]}, old once more ${urls[2]}; $(uptime)"
-    "$compare" times "${urls[@]}"
+    "$client" times "${urls[@]}"
 }
 
 build

@@ -5,7 +5,9 @@
 //! `times OLD NEW OLD` measures costs on the clusters in turn and prints the ratio of the second and third to the first.
 #![allow(clippy::print_stdout, reason = "the lines are the program's output")]
 
+use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher as _};
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -52,9 +54,8 @@ enum Command {
     Bytes {
         /// The coordinator
         url: String,
-        /// Only rows that contain this text
-        #[arg(default_value = "")]
-        containing: String,
+        /// A file with the rows that are asked, a line each [default: all rows]
+        rows: Option<PathBuf>,
     },
     /// What operations cost on several clusters, measured in turn
     Times {
@@ -67,15 +68,19 @@ enum Command {
 #[tokio::main]
 async fn main() -> anyhow::Result<()> {
     match Command::parse() {
-        Command::Bytes { url, containing } => bytes(&url, &containing).await,
+        Command::Bytes { url, rows } => bytes(&url, rows.as_deref()).await,
         Command::Times { urls } => times(&urls).await,
     }
 }
 
-async fn bytes(url: &str, containing: &str) -> anyhow::Result<()> {
+async fn bytes(url: &str, file: Option<&Path>) -> anyhow::Result<()> {
+    let wanted = file.map(fs::read_to_string).transpose()?;
     let client = Client::connect(url).await?;
     let views = views_between_samples(&client, VIEW_SIZE_PX, VIEWS).await?;
-    for row in rows().into_iter().filter(|row| row.to_string().contains(containing)) {
+    for row in rows()
+        .into_iter()
+        .filter(|row| wanted.as_ref().is_none_or(|text| text.lines().any(|line| line == row.to_string())))
+    {
         println!(
             "{row} | {}",
             answer(&client, row, &views).await.unwrap_or_else(|error| format!("refused: {error:#}"))
@@ -133,7 +138,7 @@ fn request(row: Row, typical_view: PinholeCamera) -> SessionRequest {
         sampling: row.sampling.to_owned(),
         lighting: row.lighting.to_owned(),
         codec: row.codec.to_owned(),
-        sample_cameras: Vec::new(),
+        sample_cameras: sample_cameras(row.sampling, typical_view),
         sample_size_px: None,
         volume: None,
         typical_view,
@@ -150,7 +155,12 @@ fn request(row: Row, typical_view: PinholeCamera) -> SessionRequest {
     }
 }
 
-/// Of all chunks of both sets, as samplers send them, but for the number of the plan.
+/// The offered cameras, or one camera for all layers where a method takes layers from one place.
+fn sample_cameras(sampling: &str, view: PinholeCamera) -> Vec<Camera> {
+    if sampling.starts_with("depth_peeling") { vec![Camera::Pinhole(view); 3] } else { Vec::new() }
+}
+
+/// The hash of all chunks of both sets, as samplers send them, without the number of the plan.
 async fn image_hash(session: &Session) -> anyhow::Result<u64> {
     let plan = session.plan().assignment;
     let mut chunks = Vec::new();
@@ -178,7 +188,7 @@ async fn image_hash(session: &Session) -> anyhow::Result<u64> {
     Ok(hash(&chunks))
 }
 
-/// Of all views of both sets, as they were encoded (by their checksum and lengths) and as they are decoded.
+/// The hash of all views of both sets, as they were encoded (by their checksum and lengths) and as they are decoded.
 async fn frame_hash(session: &Session, views: &[PinholeCamera]) -> anyhow::Result<u64> {
     let sets = session.plan().assignment.workload.timeline.set_count;
     let all = (0..sets).flat_map(|set_index| views.iter().map(move |camera| (set_index, *camera)));
