@@ -90,7 +90,7 @@ impl Truth {
             method: args.method.to_string(),
             lighting: lighting.clone(),
             scene_time_s: 0.0,
-            settled_at_s: None,
+            temporal_reference_s: None,
             refinement: cluster::Refinement::default(),
         };
         let images = engine.sample(&work)?.iter().map(travelled).collect::<anyhow::Result<Vec<_>>>()?;

@@ -74,7 +74,7 @@ fn what_it_does_not_know_is_named() {
                 method: "joint_carve".to_owned(),
                 lighting: lighting.to_owned(),
                 scene_time_s: 0.0,
-                settled_at_s: None,
+                temporal_reference_s: None,
                 refinement: cluster::Refinement::default(),
             })
             .unwrap_err()

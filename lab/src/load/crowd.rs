@@ -92,7 +92,7 @@ impl Tour {
     /// Where it does not come.
     pub async fn warm(&self) -> anyhow::Result<(Session, LiveView)> {
         let (session, mut live) = self.idle().await?;
-        live.look(self.way[0], 0)?;
+        live.set_pose(self.way[0], 0)?;
         live.next().await?;
         Ok((session, live))
     }
