@@ -8,7 +8,7 @@ use client::{Client, ClientError, Session, ViewRequest};
 use cluster::{PolicyChoice, SessionRequest, Timeline};
 use codec::{FrameAssembly, FramePart, WholeFrame};
 use coordinator::{CoordinatorConfig, Observers, SceneOffer};
-use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, ViewPlanes};
+use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
 use tokio::net::TcpListener;
@@ -17,7 +17,7 @@ use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
 use wire::rpc::Messages;
 
-use crate::scalar_engine::{SKY_LINEAR, ScalarEngine};
+use crate::scalar_engine::{SKY_LINEAR, ScalarEngine, illumination};
 
 /// A server with its own runtime.
 pub struct Server {
@@ -121,13 +121,6 @@ pub fn rig() -> Vec<Camera> {
 pub fn offer() -> SceneOffer {
     let volume = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) };
     SceneOffer { illumination: illumination(), ..SceneOffer::new(package(), rig(), volume, SKY_LINEAR) }
-}
-
-/// A lamp above the ball, and a sky; the scalar device checks that they arrive and shades with neither.
-#[must_use]
-pub fn illumination() -> Illumination {
-    let lamp = Light::Point { position_in_world: Vec3::Y * 4.0, intensity_linear: Vec3::splat(9.0), radius_m: 0.2 };
-    Illumination { lights: vec![lamp], environment: Environment::uniform(SKY_LINEAR) }
 }
 
 /// A camera in front of the ball.

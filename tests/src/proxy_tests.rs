@@ -35,7 +35,7 @@ async fn echoed(stream: &mut TcpStream, count: usize) -> io::Result<(Vec<u8>, Du
 }
 
 #[tokio::test]
-async fn bytes_pass_are_late_slow_and_spoilt() {
+async fn bytes_are_delayed_throttled_and_spoilt_as_ordered() {
     let proxy = Proxy::to(&echo().await, 1);
     let mut stream = connected(&proxy).await;
     assert_eq!(echoed(&mut stream, 5000).await.unwrap().0, vec![7; 5000]);
@@ -63,7 +63,7 @@ async fn a_partition_is_silent_and_loses_nothing() {
 }
 
 #[tokio::test]
-async fn connections_are_cut_and_refused() {
+async fn connections_are_cut_and_refused_as_ordered() {
     let proxy = Proxy::to(&echo().await, 1);
     let mut stream = connected(&proxy).await;
     echoed(&mut stream, 10).await.unwrap();

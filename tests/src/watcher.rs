@@ -1,11 +1,12 @@
 //! A client that asks for views all the time, and remembers what came of it.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use client::{Client, Session, ViewRequest};
 use cluster::{PolicyChoice, Refinement, SessionRequest, Timeline};
 use glam::UVec2;
+use parking_lot::{Mutex, MutexGuard};
 use tokio::task::JoinHandle;
 
 use crate::cluster::{camera, request};
@@ -63,7 +64,7 @@ impl Watcher {
     }
 
     fn locked(&self) -> MutexGuard<'_, History> {
-        self.history.lock().unwrap_or_else(PoisonError::into_inner)
+        self.history.lock()
     }
 
     /// The plan that holds for the client.
@@ -112,7 +113,7 @@ async fn ask(session: Arc<Session>, history: Arc<Mutex<History>>) {
         let plan = session.plan().assignment;
         let call = ask_once(&session, number).await;
         {
-            let mut history = history.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut history = history.lock();
             if history.plans.last() != Some(&plan) {
                 history.plans.push(plan);
             }

@@ -50,7 +50,7 @@ fn around(count: usize) -> impl Iterator<Item = f32> {
 
 /// One rig in front knows nothing of what is seen from behind: the curve falls. With cells it is level.
 #[tokio::test(flavor = "multi_thread")]
-async fn all_around_every_view_is_as_good() {
+async fn views_from_all_sides_are_equally_good() {
     let cluster = Cluster::start(4).await;
     let alone = SessionRequest { viewpoints: Vec::new(), ..looking_from([]) };
     let session = cluster.session(alone).await.unwrap();
@@ -70,7 +70,7 @@ async fn all_around_every_view_is_as_good() {
 
 /// What changes elsewhere costs nothing here.
 #[tokio::test(flavor = "multi_thread")]
-async fn sessions_come_and_go_without_sampling_others_again() {
+async fn a_session_that_opens_or_closes_samples_no_other_cell_again() {
     let cluster = Cluster::start(3).await;
     let here = cluster.session(looking_from([0.0, 0.1])).await.unwrap();
     frames(&here, [0.0, 0.05, 0.1]).await;
@@ -88,20 +88,20 @@ async fn sessions_come_and_go_without_sampling_others_again() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_viewer_walks_around() {
+async fn cells_follow_a_viewer_that_walks_around() {
     let cluster = Cluster::start(3).await;
     let session = cluster.session(looking_from([0.0])).await.unwrap();
     let mut live = session.live();
     for step in 0..6 {
         let azimuth = step as f32;
-        session.look_from(vec![view(azimuth)]).await.unwrap();
+        session.set_viewpoints(vec![view(azimuth)]).await.unwrap();
         let cell = || session.plan().assignment.workload.sample_cameras[0];
         let near = |camera: depth_image::Camera| {
             let depth_image::Camera::Pinhole(camera) = camera;
             (camera.eye_in_world - view(azimuth).eye_in_world).length() < 1e-3
         };
         cluster_tests::watcher::eventually("a cell here", std::time::Duration::from_secs(5), || near(cell())).await;
-        let number = live.look(view(azimuth), 0).unwrap();
+        let number = live.set_pose(view(azimuth), 0).unwrap();
         let shown = loop {
             let frame = live.next().await.unwrap().frame;
             if frame.request.frame == number {
@@ -111,6 +111,6 @@ async fn a_viewer_walks_around() {
         assert!(known(&shown) > 0.5, "{azimuth}");
     }
     let own_cameras = cluster.session(request(PolicyChoice::Pipeline, STILL)).await.unwrap();
-    let error = own_cameras.look_from(vec![view(0.0)]).await.unwrap_err().to_string();
+    let error = own_cameras.set_viewpoints(vec![view(0.0)]).await.unwrap_err().to_string();
     assert!(error.contains("was opened with sample cameras"), "{error}");
 }

@@ -55,7 +55,7 @@ async fn until_replanned(session: &Session, plan_epoch: u64) -> Duration {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_of_a_killed_compositor_come_from_others() {
+async fn other_compositors_send_the_frames_of_a_killed_one() {
     let mut cluster = Cluster::start(4).await;
     let session = cluster.session(pipeline(MOVING)).await.unwrap();
     let plan = session.plan();
@@ -74,7 +74,7 @@ async fn frames_of_a_killed_compositor_come_from_others() {
 
 /// Frames that are decoded wait for a caller who is busy; a plan that ends meanwhile ends those who hold them.
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_that_wait_for_their_caller_outlive_their_plan() {
+async fn frames_that_their_caller_has_not_taken_outlive_their_plan() {
     let mut cluster = Cluster::start(4).await;
     let session = cluster.session(pipeline(MOVING)).await.unwrap();
     let plan = session.plan().assignment;
@@ -108,7 +108,7 @@ async fn a_caller_may_pause_for_longer_than_nodes_wait() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn sets_of_a_killed_sampler_come_from_others() {
+async fn other_samplers_make_the_sets_of_a_killed_one() {
     let mut cluster = Cluster::start(3).await;
     let session = cluster.session(pipeline(MOVING)).await.unwrap();
     let plan = session.plan();
@@ -122,7 +122,7 @@ async fn sets_of_a_killed_sampler_come_from_others() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_last_node_s_work_waits_for_the_next() {
+async fn a_session_without_nodes_waits_for_the_next() {
     let mut cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(MOVING)).await.unwrap();
     cluster.nodes[0].kill();
@@ -132,7 +132,7 @@ async fn the_last_node_s_work_waits_for_the_next() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_new_node_takes_part_without_a_lost_frame() {
+async fn a_new_node_gets_a_role_without_a_lost_frame() {
     let mut cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let epoch = session.plan().assignment.plan_epoch;
@@ -195,7 +195,7 @@ async fn sessions_of_one_workload_share_a_plan() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn another_workload_takes_the_cluster_over() {
+async fn a_session_of_another_workload_ends_the_one_before() {
     let cluster = Cluster::start(2).await;
     let old = cluster.session(pipeline(MOVING)).await.unwrap();
     let new = cluster.session(pipeline(STILL)).await.unwrap();

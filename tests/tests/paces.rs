@@ -29,7 +29,7 @@ fn number_of(node_name: &str) -> usize {
 
 /// The views of one set, shared by three equal nodes, of which one has become five times as slow since it was measured.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_compositor_that_has_become_slow_is_helped() {
+async fn views_of_a_compositor_that_became_slow_are_stolen() {
     const VIEWS: u32 = 600;
     let cluster = cluster_of(4, of_ms(1, 10)).await;
     let asked = request(PolicyChoice::Pipeline, Timeline { set_count: 1, ..MOVING });

@@ -37,7 +37,7 @@ async fn delivered(cluster: &Cluster, request: SessionRequest) -> (Assignment, V
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn views_from_tiles_are_those_from_whole_images() {
+async fn views_from_tiles_equal_those_from_whole_images() {
     let cluster = Cluster::start(4).await;
     let forced = |tiles| SessionRequest { forced_tile_count: Some(tiles), ..pipeline() };
     let (plan, whole) = delivered(&cluster, forced(1)).await;
@@ -54,7 +54,7 @@ async fn views_from_tiles_are_those_from_whole_images() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn tiles_need_images_that_stand_alone() {
+async fn tiles_are_refused_where_images_are_not_independent() {
     let cluster = Cluster::start(2).await;
     let cut = SessionRequest { sampling: "in_order".to_owned(), forced_tile_count: Some(2), ..pipeline() };
     let error = cluster.session(cut).await.unwrap_err().to_string();
@@ -91,7 +91,7 @@ async fn ask(address: &str, plan: &Assignment, set_index: u32) -> WholeFrame {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn compositors_pass_images_on_in_a_chain() {
+async fn compositors_relay_images_in_a_chain() {
     let cluster = Cluster::start(4).await;
     let plan = chained(&cluster).await;
     let [first, second, last] = &plan.compositors[..] else { panic!("{:?}", plan.compositors) };
@@ -114,7 +114,7 @@ async fn compositors_pass_images_on_in_a_chain() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_relay_that_is_gone_is_passed_over() {
+async fn samplers_replace_a_relay_that_is_lost() {
     let mut cluster = Cluster::start(4).await;
     let plan = chained(&cluster).await;
     let relay = plan.compositors[1].node_name[1..].parse::<usize>().unwrap();
@@ -130,7 +130,7 @@ async fn a_relay_that_is_gone_is_passed_over() {
 
 /// While a set is sampled and the next one waits for it, another plan comes.
 #[tokio::test(flavor = "multi_thread")]
-async fn what_was_not_begun_when_its_plan_ended_is_not_sampled() {
+async fn a_set_that_was_not_begun_when_its_plan_ended_is_not_sampled() {
     let cluster = Cluster::start(3).await;
     let plan = chained(&cluster).await;
     let share = plan.samplers[0].clone();
@@ -161,7 +161,7 @@ async fn what_was_not_begun_when_its_plan_ended_is_not_sampled() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn sessions_ask_for_more_and_less_and_nodes_say_what_they_did() {
+async fn sessions_change_their_demand_and_nodes_report_their_work() {
     let cluster = Cluster::start(3).await;
     let session = cluster.session(pipeline()).await.unwrap();
     session.change(500, None).await.unwrap();
@@ -185,7 +185,7 @@ async fn sessions_ask_for_more_and_less_and_nodes_say_what_they_did() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_has_done_what_the_cluster_does_before_it_joins() {
+async fn a_node_warms_up_before_it_joins() {
     let mut cluster = Cluster::start(1).await;
     let session = cluster.session(request(PolicyChoice::TimeShare, MOVING)).await.unwrap();
     cluster.add_node(|config| config);
@@ -195,7 +195,7 @@ async fn a_node_has_done_what_the_cluster_does_before_it_joins() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_nodes_cannot_do_is_refused_and_others_go_on() {
+async fn a_rate_beyond_the_nodes_is_refused_and_other_sessions_go_on() {
     let cluster = Cluster::start(2).await;
     let session = cluster.session(pipeline()).await.unwrap();
     let still = Timeline::still(0.0);

@@ -53,7 +53,7 @@ async fn refusal<T>(call: impl Future<Output = Result<T, Status>>) -> Status {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn other_versions_and_what_is_no_message_are_refused() {
+async fn other_versions_and_malformed_messages_are_refused() {
     let beside = Beside::start(2).await;
     let (coordinator, node) = (&beside.cluster.coordinator.address, &beside.cluster.nodes[0].address);
     let join = [raw::text_field(1, "old"), raw::text_field(2, "http://127.0.0.1:1")].concat();
@@ -90,7 +90,7 @@ fn beyond(camera: PinholeCamera) -> Vec<PinholeCamera> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn absurd_requests_name_their_field() {
+async fn absurd_requests_are_refused_by_field() {
     let beside = Beside::start(2).await;
     let coordinator = CoordinatorClient::new(connect(&beside.cluster.coordinator.address).await.unwrap());
     let camera = watched().typical_view;
@@ -160,7 +160,7 @@ fn answer(address: &str, bytes: &[u8]) -> (Vec<u8>, Duration) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn who_does_not_speak_http2_is_cut_off() {
+async fn connections_without_http2_are_cut() {
     let beside = Beside::start(2).await;
     let mut random = Random::new(6);
     let noise: Vec<u8> = (0..100_000).map(|_| random.bits() as u8).collect();
@@ -192,7 +192,7 @@ fn until_refused(mut stream: TcpStream) -> Duration {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_length_of_4_gib_takes_no_memory() {
+async fn a_claimed_length_of_4_gib_takes_no_memory() {
     let beside = Beside::start(2).await;
     let node = &beside.cluster.nodes[0];
     let before = node.memory_bytes();
@@ -240,7 +240,7 @@ async fn of_two_processes_with_one_name_the_later_counts_and_the_earlier_waits()
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn reports_that_fit_no_plan_change_nothing() {
+async fn reports_of_another_plan_change_nothing() {
     let beside = Beside::start(2).await;
     let coordinator = CoordinatorClient::new(connect(&beside.cluster.coordinator.address).await.unwrap());
     let epoch = beside.watcher.epoch();

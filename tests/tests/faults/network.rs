@@ -132,7 +132,7 @@ async fn thin_line() {
 
 /// Keepalive takes up to 10 s to notice: all at the same time.
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
-async fn silence_heals_within_15_s() {
+async fn frames_go_on_within_15_s_of_a_silent_partition() {
     tokio::join!(
         lost_host("sampler's host lost", sampler_of),
         lost_host("compositor's host lost", compositor_of),
@@ -148,7 +148,7 @@ async fn silence_heals_within_15_s() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn cut_connections_are_made_again() {
+async fn frames_go_on_after_connections_are_cut() {
     let network = Network::start(3).await;
     for victim in [compositor_of, sampler_of] {
         let (_, to_node, to_coordinator) = network.links_of(victim);
@@ -161,7 +161,7 @@ async fn cut_connections_are_made_again() {
 
 /// The node is a member and cannot be connected to.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_that_refuses_connections_is_left_out() {
+async fn a_node_that_refuses_connections_is_quarantined() {
     for (what, victim) in [("sampler", sampler_of as fn(&Session) -> String), ("compositor", compositor_of)] {
         let network = Network::start(3).await;
         let (name, to_node, _) = network.links_of(victim);
@@ -191,7 +191,7 @@ async fn frames_go_on_over_late_slow_and_lossy_links() {
 
 /// Where the length of a message is spoilt, whoever reads waits for what never comes: for as long as keepalive does.
 #[tokio::test(flavor = "multi_thread")]
-async fn bytes_that_are_spoilt_on_the_way_are_not_shown() {
+async fn frames_that_are_spoilt_on_the_way_are_not_shown() {
     let network = Network::start(3).await;
     for proxy in &network.to_node {
         proxy.set(Way::Pass, Way::Spoilt { one_in: 40 });
@@ -206,7 +206,7 @@ async fn bytes_that_are_spoilt_on_the_way_are_not_shown() {
 
 /// Who asks for much and reads nothing holds up nobody else, and what waits for it is bounded.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_client_that_does_not_read_harms_nobody() {
+async fn a_client_that_does_not_read_delays_no_other() {
     let network = Network::start(2).await;
     let plan = network.watcher.session.plan().assignment;
     let name = compositor_of(&network.watcher.session);
@@ -233,7 +233,7 @@ async fn a_client_that_does_not_read_harms_nobody() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_thousand_connections_leave_nothing_behind() {
+async fn a_thousand_connections_leak_nothing() {
     let cluster = Processes::start(PROGRAM, 1).await;
     let watcher = Watcher::start(&cluster.client).await;
     let servers = [&cluster.coordinator, &cluster.nodes[0]];

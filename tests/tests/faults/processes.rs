@@ -92,7 +92,7 @@ async fn stopped_coordinator() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_that_is_asked_to_end_does_so_under_load_and_no_frame_is_lost() {
+async fn a_node_that_is_terminated_under_load_ends_and_no_frame_is_lost() {
     let mut cluster = Processes::start(PROGRAM, 3).await;
     let watcher = Watcher::start(&cluster.client).await;
     for victim in [compositor_of, sampler_of] {
@@ -107,7 +107,7 @@ async fn a_node_that_is_asked_to_end_does_so_under_load_and_no_frame_is_lost() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_whose_device_is_lost_ends_and_others_take_its_place() {
+async fn a_node_whose_device_is_lost_ends_and_is_replaced() {
     let mut cluster = Processes::start(PROGRAM, 3).await;
     let watcher = Watcher::start(&cluster.client).await;
     let (name, since) = (compositor_of(&watcher.session), Instant::now());

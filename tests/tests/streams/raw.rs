@@ -27,7 +27,7 @@ pub fn pipeline(timeline: Timeline) -> SessionRequest {
 
 /// The next frame is of this pose, and says so; its stages make the time at the compositor.
 pub async fn seen(live: &mut LiveView, x_m: f32, set_index: u32) -> LiveFrame {
-    let number = live.look(camera(x_m, SIZE_PX), set_index).unwrap();
+    let number = live.set_pose(camera(x_m, SIZE_PX), set_index).unwrap();
     loop {
         let came = timeout(HEALED, live.next()).await.expect("a frame in time").unwrap();
         let header = &came.frame.header;
@@ -35,7 +35,7 @@ pub async fn seen(live: &mut LiveView, x_m: f32, set_index: u32) -> LiveFrame {
         let t = header.stage_times;
         let stages = t.set_wait_s + t.credit_wait_s + t.queue_s + t.batch_s + t.encode_s + t.send_wait_s;
         assert!((stages - t.compositor_s).abs() < 1e-3, "{t:?}");
-        assert!(t.compositor_s <= came.times.came.duration_since(came.times.sent).as_secs_f64() + 1e-3, "{t:?}");
+        assert!(t.compositor_s <= came.times.received.duration_since(came.times.sent).as_secs_f64() + 1e-3, "{t:?}");
         if came.frame.request.frame == number {
             assert_eq!(header.camera, camera(x_m, SIZE_PX));
             assert_eq!(header.sample_set_id.index, u64::from(set_index));
