@@ -1,4 +1,4 @@
-//! Pixel classes: which part of an error is due to edges, to what no sample camera saw, and to neither.
+//! Pixel classes, which attribute errors to edges, to disocclusion, or to neither.
 
 use depth_image::{DepthImage, PinholeCamera, PixelDepth};
 use glam::{Vec2, Vec3};
@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::{MetricsError, error::expect_len, steps::step_pixels};
 
-/// What a pixel of the reference shows. Decided in this order: the first that holds.
+/// The class of a pixel of the reference. The first class that holds, in this order, counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PixelClass {
@@ -37,17 +37,16 @@ impl PixelClass {
     }
 }
 
-/// How far a point may be from a sample's depth, in units of `z / f`, three texel footprints…
+/// Greatest distance of a point from a sample's depth, in units of `z / f`, three texel footprints…
 const MATCH_FOOTPRINTS: f32 = 3.0;
-/// …or as a share of its depth, whichever is more.
+/// …or as a share of its depth; the greater of the two counts.
 const MATCH_RELATIVE: f32 = 0.01;
 
 /// Classifies every pixel of a reference.
 ///
-/// `reference_inverse_depth` is per metre of planar depth: above 0 a surface, anything else background. A
-/// point matches a sample camera if the texel that it projects into holds a depth within
-/// `max(3·z/f, 1 %)` of the point's own depth `z` there. A hole matches nothing: in a non-redundant set the
-/// point's sample is in another image.
+/// `reference_inverse_depth` is one over planar depth in metres: above 0 a surface, otherwise background. A point
+/// matches a sample camera if its texel there holds a depth within `max(3·z/f, 1 %)` of the point's depth `z`. A hole
+/// matches no point: in a non-redundant set the point's sample is in another image.
 ///
 /// # Errors
 /// Planes that do not fit their cameras.
@@ -72,8 +71,8 @@ pub fn classify(
         .collect())
 }
 
-/// Pixels whose surface no sample image holds, over all whose reference shows a surface, silhouettes or not; `None` where
-/// there is no surface. Of a scene that is all edges nothing else is left to count.
+/// The share of foreground pixels, silhouettes included, whose surface no sample image holds; `None` without
+/// foreground. It also counts in a scene of edges alone.
 ///
 /// # Errors
 /// As [`classify`].
@@ -99,8 +98,7 @@ pub fn class_mask(classes: &[PixelClass], class: PixelClass) -> Vec<bool> {
     classes.iter().map(|&one| one == class).collect()
 }
 
-/// Disoccluded pixels over all pixels whose reference shows a surface, those at silhouettes included;
-/// `None` where there is no surface.
+/// The share of disoccluded pixels in the foreground, silhouettes included; `None` without foreground.
 ///
 /// # Errors
 /// Planes of different sizes.
@@ -168,7 +166,7 @@ mod tests {
     use depth_image::Camera;
     use glam::UVec2;
 
-    /// A card 2 m ahead that hides the middle of a wall 4 m ahead, seen from `(eye_x, 0, 0)`.
+    /// A view from `(eye_x, 0, 0)` of a card 2 m ahead that hides the middle of a wall 4 m ahead.
     fn card_before_wall(eye_x: f32) -> (PinholeCamera, Vec<f32>) {
         let eye = Vec3::new(eye_x, 0.0, 0.0);
         let camera = PinholeCamera::looking_at(eye, eye - Vec3::Z, Vec3::Y, 1.0, UVec2::new(160, 120));
@@ -215,14 +213,14 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_covers_all_that_it_sees() {
+    fn a_camera_covers_all_its_surfaces() {
         let (camera, depth) = card_before_wall(0.0);
         let classes = classify(&camera, &depth, &[sample(0.0)]).unwrap();
         assert_eq!(disocclusion_rate(&classes, &depth).unwrap(), Some(0.0));
     }
 
     #[test]
-    fn what_the_card_hides_from_the_sample_is_disoccluded() {
+    fn the_wall_behind_the_card_is_disoccluded() {
         let (camera, depth) = card_before_wall(0.0);
         let classes = classify(&camera, &depth, &[sample(0.4)]).unwrap();
         // The card's shadow on the wall moves by 0.4 m of 4 m: 0.4 · f / 4 columns of the view, less the silhouette.
@@ -248,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_planes_are_named() {
+    fn invalid_planes_are_refused_by_name() {
         let (camera, depth) = card_before_wall(0.0);
         assert!(matches!(classify(&camera, &depth[1..], &[]), Err(MetricsError::BufferSize { .. })));
         let mut bad = sample(0.0);

@@ -8,8 +8,8 @@ use crate::{
     max_channel_difference, pdiff_map, psnr_db, ssim_map,
 };
 
-/// PSNR is infinite for equal images, which JSON cannot say: in reports anything above this *is* this, and
-/// reads "at least". Below it nothing is lost; `null` is left to mean that there was no pixel.
+/// Greatest PSNR in reports, which reads "at least". Equal images have an infinite PSNR, which JSON lacks; `null` means
+/// that there was no pixel.
 pub const PSNR_CAP_DB: f64 = 99.99;
 
 /// The errors of one set of pixels.
@@ -17,11 +17,11 @@ pub const PSNR_CAP_DB: f64 = 99.99;
 pub struct ImageErrors {
     /// Pixels in the set.
     pub pixels: usize,
-    /// Infinite where all are equal, written as at most [`PSNR_CAP_DB`]; `None` without pixels.
+    /// Infinite for equal pixels, written as at most [`PSNR_CAP_DB`]; `None` without pixels.
     #[serde(serialize_with = "capped_db")]
     pub psnr_db: Option<f64>,
-    /// Mean over the pixels whose 7×7 window lies in the image; `None` without any. Near a class's border
-    /// the window takes in pixels of other classes.
+    /// Mean over the pixels whose 7×7 window lies in the image; `None` without any. Near a class's border the window
+    /// includes pixels of other classes.
     pub ssim: Option<f64>,
     /// Mean of LDR-FLIP; `None` without pixels.
     pub flip: Option<f64>,
@@ -44,12 +44,12 @@ pub struct ClassErrors {
     pub background: ImageErrors,
 }
 
-/// What [`compare`] finds.
+/// The result of [`compare`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Of all pixels.
+    /// Errors of all pixels.
     pub overall: ImageErrors,
-    /// Of each class, if classes were given.
+    /// Errors of each class, if classes were given.
     pub by_class: Option<ClassErrors>,
     /// FLIP at every pixel, for error maps.
     #[serde(skip)]
@@ -70,7 +70,7 @@ pub fn compare(
     Ok(Comparison { overall: maps.errors(None)?, by_class, flip_map: maps.flip })
 }
 
-/// The maps that the means are taken from.
+/// The maps from which means are computed.
 struct Maps<'a> {
     reference: &'a Rgb8Image<'a>,
     test: &'a Rgb8Image<'a>,
@@ -113,7 +113,7 @@ impl<'a> Maps<'a> {
     }
 }
 
-// serde hands the field over by reference.
+// serde passes the field by reference.
 fn capped_db<S: Serializer>(psnr_db: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
     psnr_db.map(|db| db.min(PSNR_CAP_DB)).serialize(serializer)
 }
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn identical_is_perfect_and_serialises_without_null() {
+    fn identical_images_are_perfect_and_serialise_without_null() {
         let comparison = compare(&pattern(0), &pattern(0), None).unwrap();
         assert_eq!(comparison.overall.psnr_db, Some(f64::INFINITY));
         assert_eq!((comparison.overall.flip, comparison.overall.pdiff_failing_px), (Some(0.0), 0));
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn every_comparator_sees_a_shift_of_one_pixel() {
+    fn every_comparator_detects_a_shift_of_one_pixel() {
         let errors = compare(&pattern(0), &pattern(1), None).unwrap().overall;
         assert!(errors.psnr_db.unwrap() < 25.0, "{errors:?}");
         assert!(errors.ssim.unwrap() < 0.95, "{errors:?}");
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_must_agree() {
+    fn images_of_different_sizes_are_refused() {
         let small = Rgb8Image::new(3, 2, vec![5; 18]).unwrap();
         assert!(compare(&small, &pattern(0), None).is_err());
         assert!(compare(&small, &small, Some(&[PixelClass::Covered])).is_err());

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-/// What lies beyond the image's edge.
+/// The values beyond the image's edge.
 #[derive(Clone, Copy)]
 pub(crate) enum Edge {
-    /// The edge pixel, again and again.
+    /// The edge pixel, repeated.
     Repeat,
     /// The image mirrored about the edge pixel's centre.
     Mirror,
@@ -32,8 +32,8 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    /// Weighs the neighbours along the row by `row_kernel`, then those along the column by
-    /// `column_kernel`. Kernels have odd lengths; their middle entry is the pixel's own weight.
+    /// Convolves rows with `row_kernel`, then columns with `column_kernel`. Kernels have odd lengths; their middle
+    /// entry is the pixel's own weight.
     pub(crate) fn convolved(&self, row_kernel: &[f32], column_kernel: &[f32], edge: Edge) -> Self {
         self.along_rows(row_kernel, edge).along_columns(column_kernel, edge)
     }

@@ -1,10 +1,10 @@
-//! How wrong a reconstructed depth is, and how often it is no answer at all.
+//! Errors of reconstructed depth, and the share of unknown pixels.
 
 use serde::Serialize;
 
 use crate::{DepthPlane, MetricsError, error::expect_mask};
 
-/// A hit that is off by more than this share of the true depth is a wrong hit.
+/// Relative depth error above which a hit is wrong.
 pub const WRONG_HIT_RELATIVE: f64 = 0.01;
 
 /// Errors of planar depth. In the test plane, above 0 is a HIT, 0 a MISS, below 0 (and NaN) UNKNOWN.
@@ -16,11 +16,11 @@ pub struct DepthErrors {
     pub foreground_px: usize,
     /// Test pixels with a depth.
     pub hit_px: usize,
-    /// Test pixels that are sure to show nothing.
+    /// Test pixels that are known to be empty.
     pub miss_px: usize,
-    /// Test pixels without an answer, to be filled from elsewhere; in no error below.
+    /// Unknown test pixels, to be filled; they are in no error below.
     pub unknown_px: usize,
-    /// Hits off by more than 1 % in depth, and hits where the reference shows nothing.
+    /// Hits off by more than 1 % in depth, and hits where the reference shows background.
     pub wrong_hit_px: usize,
     /// Misses where the reference shows a surface.
     pub wrong_miss_px: usize,
@@ -30,9 +30,9 @@ pub struct DepthErrors {
     pub unknown_rate: Option<f64>,
     /// Median of |z' - z| / z, over hits where the reference shows a surface.
     pub relative_p50: Option<f64>,
-    /// Its 95th percentile.
+    /// 95th percentile of the same.
     pub relative_p95: Option<f64>,
-    /// Its maximum.
+    /// Maximum of the same.
     pub relative_max: Option<f64>,
 }
 
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn identical_has_no_error_and_an_empty_mask_no_rates() {
+    fn identical_planes_have_no_error_and_an_empty_mask_no_rates() {
         let depth = plane(&[0.5, 0.0]);
         let errors = depth_errors(&depth, &depth, None).unwrap();
         assert_eq!((errors.wrong_hit_rate, errors.relative_max), (Some(0.0), Some(0.0)));
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_must_agree() {
+    fn planes_of_different_sizes_are_refused() {
         assert!(depth_errors(&plane(&[0.5]), &plane(&[0.5, 0.5]), None).is_err());
         assert!(depth_errors(&plane(&[0.5]), &plane(&[0.5]), Some(&[])).is_err());
     }

@@ -1,9 +1,9 @@
-//! Which surfaces an image holds: the pixel redundancy that sampling is judged by (Xie §6.1.2).
+//! The surfaces that an image holds: the pixel redundancy by which sampling is judged (Xie §6.1.2).
 
 use depth_image::{Camera, DepthImage, SurfaceId};
 use glam::{Vec3, Vec4};
 
-/// An image's surface ids, to be asked for many points.
+/// An image's surface ids, for queries of many points.
 #[derive(Debug, Clone, Copy)]
 pub struct Held<'a> {
     homogeneous_pixel_from_world: [Vec4; 3],
@@ -17,11 +17,11 @@ pub struct Held<'a> {
 /// A sample's place in its image, in the world, and its surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldSample {
-    /// Row by row.
+    /// Index of the sample, row by row.
     pub index: usize,
-    /// Where it lies.
+    /// Place of the sample.
     pub point_in_world: Vec3,
-    /// Of which triangle.
+    /// Triangle of the sample.
     pub id: SurfaceId,
 }
 
@@ -41,8 +41,7 @@ impl<'a> Held<'a> {
         })
     }
 
-    /// Whether the image has a sample of the same triangle at the pixel that the point is seen at (Xie,
-    /// Algorithm 3).
+    /// Returns whether the image has a sample of the same triangle at the point's pixel (Xie, Algorithm 3).
     #[must_use]
     pub fn has(&self, sample: &HeldSample) -> bool {
         let p = sample.point_in_world.extend(1.0);
@@ -76,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_image_holds_its_own_samples_and_no_holes() {
+    fn an_image_holds_its_own_samples_but_no_holes() {
         let camera = PinholeCamera::looking_at(Vec3::Z * 4.0, Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(16, 12));
         let id = |i: u32| SurfaceId { instance: 0, primitive: i };
         let mut image = DepthImage {

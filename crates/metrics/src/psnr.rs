@@ -2,8 +2,7 @@
 
 use crate::{MetricsError, Rgb8Image, error::expect_mask};
 
-/// Peak signal-to-noise ratio over all three channels, decibels; infinite where nothing differs, `None`
-/// for an empty mask.
+/// Peak signal-to-noise ratio over all three channels, decibels; infinite for equal pixels, `None` for an empty mask.
 ///
 /// # Errors
 /// Images or mask of different sizes.
@@ -79,13 +78,13 @@ mod tests {
     }
 
     #[test]
-    fn identical_is_infinite_and_an_empty_mask_is_none() {
+    fn psnr_of_identical_images_is_infinite_and_of_an_empty_mask_none() {
         assert_eq!(psnr_db(&flat(7), &flat(7), None).unwrap(), Some(f64::INFINITY));
         assert_eq!(psnr_db(&flat(7), &flat(9), Some(&[false; 12])).unwrap(), None);
     }
 
     #[test]
-    fn a_mask_selects() {
+    fn a_mask_selects_pixels() {
         let mut bytes = vec![50; 36];
         bytes[0] = 60;
         let test = Rgb8Image::new(4, 3, bytes).unwrap();
@@ -96,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_must_agree() {
+    fn images_of_different_sizes_are_refused() {
         let other = Rgb8Image::new(3, 4, vec![0; 36]).unwrap();
         assert!(matches!(psnr_db(&flat(0), &other, None), Err(MetricsError::SizesDiffer { .. })));
         assert!(matches!(psnr_db(&flat(0), &flat(0), Some(&[true])), Err(MetricsError::BufferSize { .. })));

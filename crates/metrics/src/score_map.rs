@@ -2,8 +2,8 @@
 
 use crate::{MetricsError, error::expect_mask};
 
-/// A metric's value at every pixel. A metric that needs a window has none within `border_px` of the
-/// image's edge; those pixels hold 0 and are in no mean.
+/// A metric's value at every pixel. A metric with a window has no value within `border_px` of the image's edge; those
+/// pixels hold 0 and are in no mean.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoreMap {
     pub(crate) width_px: u32,
@@ -31,8 +31,7 @@ impl ScoreMap {
         &self.values
     }
 
-    /// The mean over all pixels that have a value, or over those also in the mask; `None` where that
-    /// is none.
+    /// The mean over all pixels that have a value, or over those also in the mask; `None` without pixels.
     ///
     /// # Errors
     /// A mask of another size.

@@ -1,9 +1,8 @@
-//! Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004), with the choices that scikit-image's
-//! `structural_similarity(a, b, channel_axis=2)` makes for 8-bit images: a 7×7 uniform window, the
-//! sample covariance (divided by n-1), `K1 = 0.01`, `K2 = 0.03`, and the mean over the pixels whose whole
-//! window lies in the image.
+//! Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004), as scikit-image's
+//! `structural_similarity(a, b, channel_axis=2)` for 8-bit images. It has a 7×7 uniform window, the sample covariance
+//! (divided by n-1), `K1 = 0.01` and `K2 = 0.03`. The mean is over the pixels whose whole window lies in the image.
 //!
-//! Window sums of 8-bit values are whole numbers, so they are exact here.
+//! Window sums of 8-bit values are whole numbers, and exact.
 
 use rayon::prelude::*;
 
@@ -99,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn identical_is_one() {
+    fn identical_images_score_one() {
         let bytes: Vec<u8> = (0..9 * 8 * 3).map(|i| (i * 37 % 251) as u8).collect();
         let image = Rgb8Image::new(9, 8, bytes).unwrap();
         let map = ssim_map(&image, &image).unwrap();

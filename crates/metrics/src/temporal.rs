@@ -1,9 +1,9 @@
-//! Flicker: how far the change from one frame to the next is from the reference's change.
+//! Flicker: the difference of the changes between two frames from the reference's changes.
 
 use crate::{MetricsError, Rgb8Image, psnr::db_from_mean_squared_error};
 
-/// PSNR of `test[1] - test[0]` against `reference[1] - reference[0]`, decibels, with a peak of 255; infinite
-/// where both change alike.
+/// PSNR of `test[1] - test[0]` against `reference[1] - reference[0]`, decibels, with a peak of 255; infinite for equal
+/// changes.
 ///
 /// # Errors
 /// Images of different sizes.
