@@ -8,6 +8,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
+use codec::{DecodeLimits, EncodedDepthImage, PlaneKind, PlaneSet, decode_depth_image, encode_depth_image};
 use depth_image::DepthImage;
 use engine::GpuEngine;
 use glam::UVec2;
@@ -16,7 +17,6 @@ use lab::sampling_study::{SCENES, Subject};
 use render::SamplePlanes;
 use sampling::{Redundancy, SamplingMethod};
 use study::{Cell, Table};
-use wire::{DecodeLimits, EncodedDepthImage, PlaneKind, PlaneSet, decode_depth_image, encode_depth_image};
 
 const SIZE_PX: UVec2 = UVec2::splat(1024);
 const METHODS: [SamplingMethod; 2] = [SamplingMethod::Conventional, SamplingMethod::NonRedundant(Redundancy::Pixel)];

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use app_core::setup::{SceneArgs, Setup};
+use codec::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
 use depth_image::{Camera, DepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use engine::GpuEngine;
 use metrics::{
@@ -15,7 +16,6 @@ use node::{DirectWork, Engine as _, SampleWork};
 use rayon::prelude::*;
 use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
 use render::Lighting;
-use wire::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
 
 /// Both planes beside colour.
 pub const ALL_PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: true };
@@ -91,7 +91,7 @@ impl Truth {
             lighting: lighting.clone(),
             scene_time_s: 0.0,
             settled_at_s: None,
-            refinement: wire::Refinement::default(),
+            refinement: cluster::Refinement::default(),
         };
         let images = engine.sample(&work)?.iter().map(travelled).collect::<anyhow::Result<Vec<_>>>()?;
         let description = SetDescription {

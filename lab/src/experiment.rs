@@ -9,6 +9,7 @@ use app_core::delivery::{Delivered, Wishes, open, receive};
 use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use client::{Client, Frame};
+use cluster::{PolicyChoice, Timeline};
 use depth_image::{PinholeCamera, ViewCell};
 use engine::GpuEngine;
 use glam::UVec2;
@@ -16,7 +17,6 @@ use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
 use render::{Choice, Lighting};
 use tokio::runtime::Runtime;
-use wire::{PolicyChoice, Timeline};
 
 /// V of the paper's headline: 290 views of 200×150.
 pub const PAPER_VIEWS: usize = 290;

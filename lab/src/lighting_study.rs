@@ -1,10 +1,10 @@
 //! What light costs, and what sharing it gains: parts measured alone, and views delivered.
 
 use app_core::delivery::Delivered;
+use cluster::{Costs, PolicyChoice};
 use coordinator::schedule::k_fd;
 use render::Lighting;
 use study::{Axis, Bar, Check, Point, Report, Series, Table, XyChart};
-use wire::{Costs, PolicyChoice};
 
 use crate::experiment::{Experiment, PAPER_VIEWS, Wish};
 use crate::progress::bar;

@@ -8,6 +8,7 @@ use app_core::delivery::{Wishes, open, receive};
 use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SizePx;
+use cluster::PolicyChoice;
 use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
@@ -15,7 +16,6 @@ use gpu::DevicePreference;
 use lab::evaluate::{ALL_PLANES, Truth};
 use node::{DirectWork, Engine as _, EngineError, SampleWork, ViewWork};
 use reconstruction::ReconstructionMethod;
-use wire::PolicyChoice;
 
 const VIEW_SIZE: UVec2 = UVec2::new(64, 48);
 
@@ -75,7 +75,7 @@ fn what_it_does_not_know_is_named() {
                 lighting: lighting.to_owned(),
                 scene_time_s: 0.0,
                 settled_at_s: None,
-                refinement: wire::Refinement::default(),
+                refinement: cluster::Refinement::default(),
             })
             .unwrap_err()
     };

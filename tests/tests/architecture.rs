@@ -23,21 +23,25 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("sampling", &["render", "gpu", "scene", "depth-image"]),
     ("reconstruction", &["gpu", "depth-image"]),
     ("metrics", &["depth-image"]),
-    ("wire", &["depth-image"]),
-    ("node", &["wire", "depth-image"]),
-    ("sampler-node", &["node", "wire", "depth-image"]),
-    ("compositor-node", &["node", "wire", "depth-image"]),
-    ("node-host", &["sampler-node", "compositor-node", "node", "wire"]),
-    ("coordinator", &["node", "wire", "depth-image"]),
-    ("client", &["wire", "depth-image"]),
-    ("simulation", &["coordinator", "wire", "depth-image"]),
+    ("codec", &["depth-image"]),
+    ("cluster", &["codec", "depth-image"]),
+    ("wire", &["cluster", "codec", "depth-image"]),
+    ("node", &["wire", "cluster", "codec", "depth-image"]),
+    ("sampler-node", &["node", "wire", "cluster", "codec", "depth-image"]),
+    ("compositor-node", &["node", "wire", "cluster", "codec", "depth-image"]),
+    ("node-host", &["sampler-node", "compositor-node", "node", "wire", "cluster"]),
+    ("coordinator", &["node", "wire", "cluster", "codec", "depth-image"]),
+    ("client", &["wire", "cluster", "codec", "depth-image"]),
+    ("simulation", &["client", "coordinator", "cluster", "depth-image"]),
     ("table", &[]),
     ("study", &["metrics", "table"]),
-    ("engine", &["node", "reconstruction", "sampling", "render", "gpu", "scene", "wire", "depth-image"]),
+    ("engine", &["node", "reconstruction", "sampling", "render", "gpu", "scene", "cluster", "depth-image"]),
     (
         "app-core",
         &[
             "client",
+            "cluster",
+            "codec",
             "coordinator",
             "depth-image",
             "gpu",
@@ -56,6 +60,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "app-core",
             "client",
+            "cluster",
+            "codec",
             "coordinator",
             "depth-image",
             "engine",
@@ -76,6 +82,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "app-core",
             "client",
+            "cluster",
+            "codec",
             "coordinator",
             "depth-image",
             "engine",
@@ -89,7 +97,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "wire",
         ],
     ),
-    ("cluster-tests", &["client", "coordinator", "depth-image", "node", "node-host", "wire"]),
+    ("cluster-tests", &["client", "cluster", "codec", "coordinator", "depth-image", "node", "node-host", "wire"]),
 ];
 
 /// What works on pictures in different ways knows nothing of each other, in tests neither.
@@ -280,6 +288,17 @@ fn thin_clients_link_no_graphics() {
     assert!(client.contains("wire") && client.contains("tonic"), "the graph was read");
     assert_eq!(device_crates(&client), Vec::<&str>::new());
     assert!(device_crates(&closure("reconstruction", &uses)).contains(&"wgpu"), "the check sees wgpu where it is");
+}
+
+#[test]
+fn codecs_need_no_rpc_and_no_runtime() {
+    const RPC: [&str; 3] = ["prost", "tonic", "tokio"];
+    let uses = resolved();
+    let rpc_crates = |of: &str| RPC.into_iter().filter(|name| closure(of, &uses).contains(*name)).collect::<Vec<_>>();
+    assert!(closure("codec", &uses).contains("lz4_flex"), "the graph was read");
+    assert_eq!(rpc_crates("codec"), [""; 0]);
+    assert_eq!(rpc_crates("cluster"), [""; 0]);
+    assert_eq!(rpc_crates("wire"), RPC, "the check sees them where they are");
 }
 
 #[test]

@@ -3,12 +3,12 @@
 use std::time::Instant;
 
 use client::{Client, Frame, Session, ViewRequest};
+use cluster::limits::MAX_VIEWPOINTS;
+use cluster::{OfferSettings, OfferStatus, PolicyChoice, Quality, SessionPlan, SessionRequest, Timeline};
 use depth_image::{PinholeCamera, ViewPlanes};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::SamplingMethod;
-use wire::limits::MAX_VIEWPOINTS;
-use wire::{OfferSettings, OfferStatus, PolicyChoice, Quality, SessionPlan, SessionRequest, Timeline};
 
 use crate::exit::BadInput;
 use crate::fallbacks;
@@ -32,8 +32,8 @@ pub struct Wishes {
     pub tiles: Option<u32>,
     /// Steps in which the light of a static scene grows; 1 for all of it at once.
     pub refinement_steps: u32,
-    /// Pictures a second; 0: as fast as they come.
-    pub frames_per_s: f64,
+    /// Pictures a second; `None`: as fast as they come.
+    pub frames_per_s: Option<f64>,
     /// What the session makes do with under overload.
     pub fallbacks: Vec<Quality>,
     /// Scene times; every set has the same views.
@@ -55,7 +55,7 @@ impl Wishes {
             planes: ViewPlanes::default(),
             tiles: None,
             refinement_steps: 1,
-            frames_per_s: 0.0,
+            frames_per_s: None,
             fallbacks: Vec::new(),
             timeline: Timeline::still(0.0),
             viewpoints: Vec::new(),
@@ -65,7 +65,7 @@ impl Wishes {
     /// The same, as the coordinator offers its scene.
     #[must_use]
     pub fn offered(offer: &OfferStatus) -> Self {
-        let or = |offered: &str, default: String| if offered.is_empty() { default } else { offered.to_owned() };
+        let or = |offered: &Option<String>, default: String| offered.clone().unwrap_or(default);
         let OfferSettings { method, sampling, lighting } = &offer.settings;
         Self::new(
             or(method, ReconstructionMethod::default().to_string()),
@@ -77,7 +77,7 @@ impl Wishes {
     /// So many pictures a second, or fewer under overload, after all else that can be given up.
     #[must_use]
     pub fn at_rate(self, frames_per_s: f64) -> Self {
-        Self { frames_per_s, fallbacks: fallbacks::ladder(&self.lighting, &self.method), ..self }
+        Self { frames_per_s: Some(frames_per_s), fallbacks: fallbacks::ladder(&self.lighting, &self.method), ..self }
     }
 }
 

@@ -1,9 +1,9 @@
 //! What a live session makes do with when nodes have no time left, in the stated order: fewer rays of light, fewer
 //! steps of the search, smaller sample images, fewer pictures a second. Each goes on from the one before.
 
+use cluster::Quality;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
-use wire::Quality;
 
 /// Sides of sample images, of those asked for.
 const SAMPLE_SIDE_RATIO: f64 = 0.7;

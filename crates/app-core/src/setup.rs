@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Args;
+use cluster::OfferSettings;
 use coordinator::SceneOffer;
 use depth_image::{Camera, PinholeCamera};
 use glam::UVec2;
@@ -12,7 +13,6 @@ use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::{Rig, SamplingMethod};
 use scene::{EnvironmentSpec, LightSpec, Limits, Scene, SceneSpec};
-use wire::OfferSettings;
 
 use crate::cameras::{self, Placement};
 use crate::sizes::SizePx;
@@ -124,9 +124,9 @@ impl SceneArgs {
         offer.origin_in_source = scene.origin_in_source;
         offer.illumination = scene.illumination.clone();
         offer.settings = OfferSettings {
-            method: self.method.to_string(),
-            sampling: self.sampling.to_string(),
-            lighting: self.lighting.to_string(),
+            method: Some(self.method.to_string()),
+            sampling: Some(self.sampling.to_string()),
+            lighting: Some(self.lighting.to_string()),
         };
         Ok(Setup { scene, around, samples, offer })
     }

@@ -26,7 +26,7 @@ pub use highlight::{Highlight, Reflector, highlight_linear};
 pub use image::{
     BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId, Texel,
 };
-pub use light::{Environment, Illumination, Incident, Light, LightError, disc_from_square, tangents_of};
+pub use light::{Environment, Illumination, Incident, Light, LightError, MAX_LIGHTS, disc_from_square, tangents_of};
 pub use normal::{oct16_from_unit, unit_from_oct16};
 pub use tiles::TileError;
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};

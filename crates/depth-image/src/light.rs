@@ -8,6 +8,9 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
+/// Lights of one scene: with the environment they fill 64 planes of visibility.
+pub const MAX_LIGHTS: usize = 255;
+
 /// All light of a scene.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Illumination {

@@ -178,7 +178,7 @@ impl Engine for GpuEngine {
 
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
         let scene = self.scene(&request.scene_hash)?;
-        let wire::Refinement { step, steps } = request.refinement;
+        let cluster::Refinement { step, steps } = request.refinement;
         let draw = DrawWork {
             refinement: Refinement { step, steps },
             ..draw_work(&scene, parsed("lighting", &request.lighting)?, request.scene_time_s)

@@ -3,9 +3,9 @@
 use std::hint::black_box;
 use std::time::Instant;
 
+use codec::{DecodeLimits, decode_depth_plane, encode_depth_plane, inverse_depth_codes};
 use depth_image::DepthImage;
 use study::{Bar, Check, Report, Table};
-use wire::{DecodeLimits, decode_depth_plane, encode_depth_plane, inverse_depth_codes};
 
 use crate::evaluate::median;
 

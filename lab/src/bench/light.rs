@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use app_core::setup::{SceneArgs, Setup};
+use cluster::PolicyChoice;
 use depth_image::ViewCell;
 use engine::GpuEngine;
 use render::Lighting;
 use study::{Bar, Check, Report, Table};
-use wire::PolicyChoice;
 
 use super::BenchArgs;
 use crate::evaluate::{Truth, mean_flip, median};

@@ -3,10 +3,10 @@
 use std::time::Instant;
 
 use anyhow::Context as _;
+use cluster::PolicyChoice;
 use depth_image::{PinholeCamera, ViewPlanes};
 use node::{DirectWork, Engine as _};
 use study::{Bar, Check, Report, Table};
-use wire::PolicyChoice;
 
 use super::BenchArgs;
 use crate::evaluate::{Truth, median};

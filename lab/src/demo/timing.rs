@@ -1,11 +1,11 @@
 //! Views delivered against the number of views, by each method.
 
 use app_core::delivery::Delivered;
+use cluster::{Costs, PolicyChoice, SessionPlan};
 use coordinator::schedule::{brute_force_k, k_fd, k_fd_printed};
 use node::Engine as _;
 use reconstruction::ReconstructionMethod;
 use study::{Report, Table};
-use wire::{Costs, PolicyChoice, SessionPlan};
 
 use crate::experiment::{Experiment, PAPER_VIEWS, Wish};
 use crate::progress::bar;

@@ -6,10 +6,10 @@ use anyhow::Context as _;
 use app_core::delivery::{Wishes, open};
 use app_core::live::{Drive, Record, drive};
 use client::{Client, ClientError, LiveView, Session};
+use cluster::PolicyChoice;
 use depth_image::{Camera, PinholeCamera, ViewCell};
 use glam::UVec2;
 use tokio::task::JoinSet;
-use wire::PolicyChoice;
 
 /// Poses of a way around; at 10 a second it takes 24 s.
 const WAY: usize = 240;

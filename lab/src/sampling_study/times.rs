@@ -2,12 +2,12 @@
 
 use std::time::Instant;
 
+use codec::{PlaneSet, encode_depth_image};
 use depth_image::DepthImage;
 use glam::UVec2;
 use render::SamplePlanes;
 use sampling::{SamplingMethod, scalar};
 use study::{Bar, Cell, Check, Report, Table};
-use wire::{PlaneSet, encode_depth_image};
 
 use super::{Extent, IMAGES, METHODS, Subject};
 use crate::evaluate::median;

@@ -1,7 +1,7 @@
 //! The paper's figures 5 to 8, of what was measured.
 
+use cluster::PolicyChoice;
 use study::{Axis, BarChart, Chart, Series, XyChart};
-use wire::PolicyChoice;
 
 use super::foretold::Foretold;
 use super::matrix::{FEW_NODES, PAPER_VIEWS};

@@ -1,7 +1,7 @@
 //! What is promised of the measured points.
 
+use cluster::PolicyChoice;
 use study::{Bar, Check};
-use wire::PolicyChoice;
 
 use super::matrix::{Extent, PAPER_NODES, PAPER_VIEWS, TILED_VIEWS};
 use super::measured::Measured;

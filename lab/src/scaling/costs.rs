@@ -1,7 +1,7 @@
 //! What operations cost one node, with its share of the machine, while the others do the same.
 
+use cluster::{Costs, ROW_PARTS, TileCosts};
 use render::Lighting;
-use wire::Costs;
 
 use super::fleet::Fleet;
 use super::subject::{MEASURED_BATCH, Subject};
@@ -10,6 +10,10 @@ use super::subject::{MEASURED_BATCH, Subject};
 #[must_use]
 pub fn mean(all: &[Costs]) -> Costs {
     let of = |cost: fn(&Costs) -> f64| all.iter().map(cost).sum::<f64>() / all.len().max(1) as f64;
+    let shares: Option<Vec<_>> = all.iter().map(|c| c.tiles?.row_shares).collect();
+    let mean = |shares: Vec<[f64; ROW_PARTS]>| {
+        std::array::from_fn(|part| shares.iter().map(|shares| shares[part]).sum::<f64>() / shares.len().max(1) as f64)
+    };
     Costs {
         sample_image_s: of(|c| c.sample_image_s),
         direct_view_s: of(|c| c.direct_view_s),
@@ -17,10 +21,7 @@ pub fn mean(all: &[Costs]) -> Costs {
         load_set_s: of(|c| c.load_set_s),
         encode_view_s: of(|c| c.encode_view_s),
         in_order: all.iter().any(|c| c.in_order),
-        sample_overhead_s: of(|c| c.sample_overhead_s),
-        sample_row_shares: std::array::from_fn(|part| {
-            all.iter().map(|c| c.sample_row_shares[part]).sum::<f64>() / all.len().max(1) as f64
-        }),
+        tiles: TileCosts::of_image(of(|c| c.sample_image_s), of(Costs::tile_overhead_s), shares.map(mean)),
     }
 }
 

@@ -3,9 +3,10 @@
 use std::time::Instant;
 
 use anyhow::Context as _;
+use cluster::{Assignment, FetchImages};
+use codec::ChunkBody;
 use tokio_stream::StreamExt as _;
 use wire::rpc::{SamplerClient, connect};
-use wire::{Assignment, ChunkBody, FetchImages};
 
 /// Images of one set, fetched as a compositor fetches them.
 #[derive(Debug, Clone, Copy, PartialEq)]

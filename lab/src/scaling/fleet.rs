@@ -6,9 +6,9 @@ use std::time::Duration;
 use anyhow::Context as _;
 use app_core::setup::SceneArgs;
 use client::Client;
+use cluster::{Costs, MeasureCosts};
 use gpu::DevicePreference;
 use wire::rpc::{NodeClient, connect};
-use wire::{Costs, MeasureCosts};
 
 use super::counters::{Counters, read};
 use super::cpu_share::{CpuGroup, Hierarchy, OwnGroup, Usage};

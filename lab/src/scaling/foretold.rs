@@ -1,8 +1,8 @@
 //! What was to be expected of a measured point: by the paper's equations, by the schedule, and by the simulation.
 
+use cluster::{Costs, Policy};
 use coordinator::schedule::pipeline_time;
 use simulation::{Cluster, Demand, Habits, Machine, plan, run};
-use wire::{Costs, Policy};
 
 use super::measured::{Lit, Timed};
 use super::point::{Ask, Point};
@@ -88,7 +88,7 @@ fn simulate(machine: Machine, traffic: &Traffic, images: usize, point: &Point) -
     let tiles = point.ask.forced_tiles().map(|tiles| tiles as usize);
     let demand = Demand { views, sets, policy, tiles, nodes_report: false };
     let planned = plan(&traffic.cluster(point.nodes, Machine::of(point.plan.costs), images), &demand).ok()?;
-    let roles = |plan: &wire::Assignment| {
+    let roles = |plan: &cluster::Assignment| {
         let images = plan.samplers.iter().map(|share| share.image_indices.len()).collect::<Vec<_>>();
         (plan.policy, images, plan.compositors.len())
     };

@@ -1,8 +1,8 @@
 //! Which points are measured, and about how long that takes.
 
+use cluster::{Costs, PolicyChoice};
 use coordinator::schedule::{Demand, Load, NodeCosts, Wish, choose};
 use render::Lighting;
-use wire::{Costs, PolicyChoice};
 
 use super::point::Ask;
 
@@ -152,8 +152,7 @@ mod tests {
         load_set_s: 0.24,
         encode_view_s: 0.002,
         in_order: false,
-        sample_overhead_s: 1e3,
-        sample_row_shares: [0.25; 4],
+        tiles: None,
     };
 
     fn all(extent: Extent) -> Vec<Planned> {

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use app_core::process::stop_signal;
+use cluster::Costs;
 use gpu::DevicePreference;
 use indicatif::ProgressBar;
 use render::Lighting;
 use simulation::Calls;
-use wire::Costs;
 
 use super::costs;
 use super::fleet::Fleet;

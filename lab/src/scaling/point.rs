@@ -9,9 +9,10 @@ use std::time::Instant;
 
 use app_core::delivery::{Wishes, open};
 use client::{Frame, Session, ViewRequest};
+use cluster::{Policy, PolicyChoice, SessionPlan};
+use codec::FrameHeader;
 use depth_image::PinholeCamera;
 use render::Lighting;
-use wire::{FrameHeader, Policy, PolicyChoice, SessionPlan};
 
 use super::cpu_share::Usage;
 use super::fetched::{Fetched, fetch};

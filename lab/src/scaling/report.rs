@@ -67,7 +67,7 @@ fn simulate(measured: &Measured, main: &Told<'_>, most_nodes: usize, report: &mu
     let nodes = main.node_counts().into_iter().max().unwrap_or(PAPER_NODES);
     let speed = main.lit.mean(nodes).sample_image_s / plain.sample_image_s;
     let dear = measured.lit.get(1).map(|lit| lit.mean(nodes));
-    let unlimited = |costs: wire::Costs| simulation::Machine::of(costs).faster(speed).costs;
+    let unlimited = |costs: cluster::Costs| simulation::Machine::of(costs).faster(speed).costs;
     let traffic = Traffic::of(&main.lit.points);
     let basis = Basis { plain, dear: dear.map(unlimited), images: measured.images, traffic };
     let scenarios = scenarios(&basis);
@@ -86,8 +86,8 @@ fn summary(main: &Told<'_>) -> String {
     let text = |value: Option<f64>| value.map_or_else(|| "not measured".to_owned(), |value| format!("{value:.3}"));
     format!(
         "Efficiency at P = {nodes}, V = 1000: pipeline {}, auto {}, naive {}. The paper's at eleven: 0.829 and 0.110.",
-        text(of(wire::PolicyChoice::Pipeline)),
-        text(of(wire::PolicyChoice::Auto)),
+        text(of(cluster::PolicyChoice::Pipeline)),
+        text(of(cluster::PolicyChoice::Auto)),
         text(naive(main, nodes).map(|(efficiency, _)| efficiency)),
     )
 }

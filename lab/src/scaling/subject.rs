@@ -5,9 +5,9 @@ use std::cell::Cell;
 use anyhow::Context as _;
 use app_core::delivery::Wishes;
 use app_core::setup::{SceneArgs, Setup};
+use cluster::{MeasureCosts, PolicyChoice, Timeline, Workload};
 use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
 use render::Lighting;
-use wire::{MeasureCosts, PolicyChoice, Timeline, Workload};
 
 use crate::experiment::VIEW_SIZE_PX;
 

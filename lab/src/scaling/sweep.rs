@@ -1,8 +1,8 @@
 //! The simulation beyond what was measured: to 1,000 nodes and 100,000 views, on networks of several speeds.
 
+use cluster::{Costs, Policy, PolicyChoice};
 use rayon::prelude::*;
 use simulation::{Cluster, Demand, Habits, Limit, Machine, Transfer, plan, run, spread_speeds};
-use wire::{Costs, Policy, PolicyChoice};
 
 use super::foretold::Traffic;
 

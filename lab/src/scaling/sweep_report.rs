@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
+use cluster::{Costs, PolicyChoice};
 use coordinator::schedule::{Demand, Load, NodeCosts, Wish, choose};
 use simulation::spread_speeds;
 use study::{Axis, Chart, Series, Table, XyChart};
-use wire::{Costs, PolicyChoice};
 
 use super::sweep::{Basis, Scenario, Simulated, VIEWS, reach};
 

@@ -1,7 +1,7 @@
 //! The tables of what was measured.
 
+use cluster::{Costs, Policy, PolicyChoice};
 use study::{Cell, Table};
-use wire::{Costs, Policy, PolicyChoice};
 
 use super::costs::efficiency;
 use super::foretold::Foretold;

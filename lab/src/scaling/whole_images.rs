@@ -1,7 +1,7 @@
 //! What whole sample images allow, and what tiles make of it: with whole images no more than S nodes can sample.
 
+use cluster::{Costs, PolicyChoice};
 use study::Table;
-use wire::{Costs, PolicyChoice};
 
 use super::costs::efficiency;
 use super::point::Point;

@@ -14,12 +14,13 @@ use app_core::sizes::{GridSize, SizePx};
 use app_core::{pictures, provenance};
 use clap::Args;
 use client::{Client, Frame, Session};
+use cluster::{OfferStatus, PolicyChoice, Timeline};
+use codec::FrameCodec;
 use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use indicatif::ProgressBar;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use serde_json::{Map, json};
-use wire::{FrameCodec, OfferStatus, PolicyChoice, Timeline};
 
 use crate::comparison;
 

@@ -13,11 +13,12 @@ use std::time::Duration;
 use anyhow::Context as _;
 use clap::Parser;
 use client::{Client, Frame, Session, ViewRequest};
+use cluster::{Costs, FetchImages, MeasureCosts, PolicyChoice, SessionRequest, Timeline};
+use codec::ChunkBody;
 use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use glam::UVec2;
 use tokio_stream::StreamExt as _;
 use wire::rpc::{NodeClient, SamplerClient, connect};
-use wire::{ChunkBody, Costs, FetchImages, MeasureCosts, PolicyChoice, SessionRequest, Timeline};
 
 const VIEWS: usize = 2;
 const VIEW_SIZE_PX: UVec2 = UVec2::new(120, 90);
@@ -147,7 +148,7 @@ fn request(row: Row, typical_view: PinholeCamera) -> SessionRequest {
         policy: row.policy,
         forced_sampler_count: None,
         refinement_steps: 1,
-        frames_per_s: 0.0,
+        frames_per_s: None,
         fallbacks: Vec::new(),
         forced_tile_count: Some(row.tile_count),
         viewpoints: Vec::new(),

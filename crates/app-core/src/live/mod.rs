@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use client::{ClientError, LiveFrame, LiveView, Session};
+use cluster::SessionPlan;
 use depth_image::PinholeCamera;
 use tokio::time::MissedTickBehavior;
-use wire::SessionPlan;
 
 pub use record::{Record, STAGES, Shown, latencies, quantile};
 
@@ -98,7 +98,7 @@ impl Driving<'_> {
     /// The plan in force; what it makes do with is kept for frames of it that come later.
     fn plan(&mut self) -> SessionPlan {
         let plan = self.session.plan();
-        self.fallbacks.insert(plan.assignment.plan_epoch, plan.fallback_number);
+        self.fallbacks.insert(plan.assignment.plan_epoch, plan.fallback_index.map_or(0, |index| index + 1));
         plan
     }
 
