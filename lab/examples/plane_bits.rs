@@ -1,6 +1,6 @@
 //! Where the bits of depth images go, by plane, and what packing them takes, on one core.
 //!
-//! `cargo run --release -p myriorama --example plane_bits [-- SCENE...]`
+//! `cargo run --release -p lab --example plane_bits [-- SCENE...]`
 //!
 //! Sets of three images of 1024² of the scenes of `myriorama study sampling`, conventional and with what earlier
 //! images hold left out. Bits are of the packed planes over the set's samples; milliseconds are medians, of an image.
