@@ -1,4 +1,4 @@
-//! A sampler that sends what it should not: it stands before a node, asks it, and spoils what it passes on.
+//! A front before a node that corrupts the chunks of its sampler.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -17,19 +17,19 @@ use wire::rpc::{
     node_server, sampler_server,
 };
 
-/// What becomes of the chunks of one answer.
+/// A change of the chunks of one answer.
 pub type Spoil = fn(&mut Vec<Chunk>);
 
 #[derive(Default)]
 struct Orders {
     spoil: Option<Spoil>,
-    /// Answers left to be spoilt.
+    /// Number of answers still to be corrupted.
     times: usize,
 }
 
-/// Serves until it is dropped.
+/// A server that ends when it is dropped.
 pub struct Mangler {
-    /// What the node is to advertise.
+    /// The address for the node to advertise.
     pub address: String,
     node: Arc<Mutex<String>>,
     orders: Arc<Mutex<Orders>>,
@@ -37,10 +37,10 @@ pub struct Mangler {
 }
 
 impl Mangler {
-    /// Before a node that is named later.
+    /// Starts a front; [`Mangler::stand_before`] names its node.
     ///
     /// # Panics
-    /// Where there is no port.
+    /// No port is free.
     pub async fn start() -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = format!("http://{}", listener.local_addr().expect("an address"));
@@ -51,17 +51,17 @@ impl Mangler {
         Self { address, node, orders, _ends: shutdown.drop_guard() }
     }
 
-    /// Which node is asked.
+    /// Names the node behind the front.
     pub fn stand_before(&self, address: &str) {
         *self.node.lock().unwrap_or_else(PoisonError::into_inner) = address.to_owned();
     }
 
-    /// Spoils the next answers.
+    /// Corrupts the next `times` answers.
     pub fn spoil(&self, times: usize, spoil: Spoil) {
         *self.orders.lock().unwrap_or_else(PoisonError::into_inner) = Orders { spoil: Some(spoil), times };
     }
 
-    /// Answers that are still to be spoilt.
+    /// The number of answers still to be corrupted.
     #[must_use]
     pub fn left(&self) -> usize {
         self.orders.lock().unwrap_or_else(PoisonError::into_inner).times

@@ -1,4 +1,4 @@
-//! Live streams: the newest pose counts, and nobody holds up another.
+//! Live streams: the newest pose counts, and no stream delays another.
 #![allow(clippy::unwrap_used)]
 
 mod quotas;
@@ -32,7 +32,7 @@ async fn every_frame_shows_its_pose() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bad_poses_are_refused_before_they_are_sent() {
+async fn invalid_poses_are_refused_before_they_are_sent() {
     let cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let mut live = session.live();
@@ -49,7 +49,7 @@ async fn live_views_outlive_their_compositor() {
     let mut cluster = Cluster::start(4).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let plan = session.plan().assignment;
-    // On all compositors, each its own.
+    // The streams are on all compositors.
     let mut lives: Vec<LiveView> = plan.compositors.iter().map(|_| session.live()).collect();
     for live in &mut lives {
         seen(live, 0.0, 0).await;
@@ -73,7 +73,7 @@ async fn live_views_follow_the_plan() {
     let mut live = session.live();
     let (mut epoch, start) = (seen(&mut live, 0.0, 0).await.frame.header.sample_set_id.plan_epoch, Instant::now());
     let first = epoch;
-    // Its compositor may be the one that has to sample from now on.
+    // Its compositor may have become a sampler.
     let sampler = session.plan().assignment.samplers[0].node_name[1..].parse::<usize>().unwrap();
     cluster.nodes[sampler].kill();
     for i in 0.. {
@@ -111,7 +111,7 @@ async fn the_newest_pose_counts_and_two_frames_are_on_their_way() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn live_requests_that_cannot_be_are_named() {
+async fn invalid_live_requests_are_refused_with_their_field() {
     let cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let (address, epoch) = compositor_of(&session);
@@ -132,7 +132,7 @@ async fn live_requests_that_cannot_be_are_named() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_plan_that_shows_the_same_serves_those_who_have_not_heard_of_it() {
+async fn a_plan_of_the_same_workload_serves_streams_of_the_older_plan() {
     let cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let (address, epoch) = compositor_of(&session);
@@ -152,7 +152,7 @@ async fn a_plan_that_shows_the_same_serves_those_who_have_not_heard_of_it() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_viewer_that_takes_nothing_for_a_while_goes_on_where_it_looks() {
+async fn a_viewer_continues_with_its_newest_pose_after_a_pause() {
     let cluster = Cluster::start(2).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let mut live = session.live();
@@ -165,6 +165,6 @@ async fn a_viewer_that_takes_nothing_for_a_while_goes_on_where_it_looks() {
         numbers.push(timeout(HEALED, live.next()).await.unwrap().unwrap().frame.request.frame);
     }
     assert!(numbers.is_sorted() && numbers.len() <= 4, "{numbers:?}: two, one that was asked for, and the newest");
-    // Batches of the same session are not touched by it.
+    // Batches of the same session are unaffected.
     assert_eq!(session.render_views(views(1, 6)).unwrap().all().await.unwrap().len(), 6);
 }
