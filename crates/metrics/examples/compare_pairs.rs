@@ -1,5 +1,5 @@
-//! Writes the pairs of `tests/agreement` as binary PPM files into a folder, and prints this crate's errors of them.
-//! `tests/agreement/reference_values.py` prints the errors of other implementations.
+//! Writes the pairs of `tests/agreement` as binary PPM files into a folder, and prints what this crate
+//! makes of them. `tests/agreement/reference_values.py` prints what others make of the files.
 //!
 //! With a second argument, compares two PPM files instead.
 
@@ -39,7 +39,7 @@ fn print_comparison(name: &str, reference: &Rgb8Image, test: &Rgb8Image) -> Resu
     Ok(())
 }
 
-/// Reads a header as this program writes it: three lines, no comments.
+/// The header must be as this program writes it: three lines, no comments.
 fn read_ppm(path: &str) -> Result<Rgb8Image<'static>, Box<dyn std::error::Error>> {
     let bytes = std::fs::read(path)?;
     let mut lines = bytes.splitn(4, |&byte| byte == b'\n');

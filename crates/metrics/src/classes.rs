@@ -1,4 +1,4 @@
-//! Pixel classes, which attribute errors to edges, to disocclusion, or to neither.
+//! Pixel classes: errors of edges, of surfaces that no sample camera saw, and of all others.
 
 use depth_image::{DepthImage, PinholeCamera, PixelDepth};
 use glam::{Vec2, Vec3};
@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::{MetricsError, error::expect_len, steps::step_pixels};
 
-/// The class of a pixel of the reference. The first class that holds, in this order, counts.
+/// The class of a pixel of the reference: the first of these that holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PixelClass {
@@ -22,10 +22,10 @@ pub enum PixelClass {
 }
 
 impl PixelClass {
-    /// All, in order.
+    /// All classes, in order.
     pub const ALL: [Self; 4] = [Self::Silhouette, Self::Disoccluded, Self::Covered, Self::Background];
 
-    /// As in reports.
+    /// The name in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -37,19 +37,20 @@ impl PixelClass {
     }
 }
 
-/// Greatest distance of a point from a sample's depth, in units of `z / f`, three texel footprints…
+/// The tolerance of a point to a sample's depth, in units of `z / f`: three texel footprints…
 const MATCH_FOOTPRINTS: f32 = 3.0;
-/// …or as a share of its depth; the greater of the two counts.
+/// …or this share of its depth, if that is more.
 const MATCH_RELATIVE: f32 = 0.01;
 
 /// Classifies every pixel of a reference.
 ///
-/// `reference_inverse_depth` is one over planar depth in metres: above 0 a surface, otherwise background. A point
-/// matches a sample camera if its texel there holds a depth within `max(3·z/f, 1 %)` of the point's depth `z`. A hole
-/// matches no point: in a non-redundant set the point's sample is in another image.
+/// `reference_inverse_depth` is per metre of planar depth: above 0 a surface, anything else background. A
+/// point matches a sample camera if the texel that it projects into holds a depth within
+/// `max(3·z/f, 1 %)` of the point's own depth `z` there. A hole matches nothing: in a non-redundant set the
+/// point's sample is in another image.
 ///
 /// # Errors
-/// Planes that do not fit their cameras.
+/// Planes do not fit their cameras.
 pub fn classify(
     reference_camera: &PinholeCamera,
     reference_inverse_depth: &[f32],
@@ -71,11 +72,11 @@ pub fn classify(
         .collect())
 }
 
-/// The share of foreground pixels, silhouettes included, whose surface no sample image holds; `None` without
-/// foreground. It also counts in a scene of edges alone.
+/// The share of pixels whose surface no sample image holds, over all pixels with a surface, silhouettes included;
+/// `None` where there is no surface. In a scene of edges alone, all pixels are silhouettes.
 ///
 /// # Errors
-/// As [`classify`].
+/// Planes do not fit their cameras.
 pub fn unheld_rate(
     reference_camera: &PinholeCamera,
     reference_inverse_depth: &[f32],
@@ -98,10 +99,11 @@ pub fn class_mask(classes: &[PixelClass], class: PixelClass) -> Vec<bool> {
     classes.iter().map(|&one| one == class).collect()
 }
 
-/// The share of disoccluded pixels in the foreground, silhouettes included; `None` without foreground.
+/// The share of disoccluded pixels over all pixels with a surface, silhouettes included; `None` where there is no
+/// surface.
 ///
 /// # Errors
-/// Planes of different sizes.
+/// Planes differ in size.
 pub fn disocclusion_rate(classes: &[PixelClass], reference_inverse_depth: &[f32]) -> Result<Option<f64>, MetricsError> {
     expect_len("classes", classes.len(), reference_inverse_depth.len())?;
     let foreground = reference_inverse_depth.iter().filter(|&&depth| depth > 0.0).count();
@@ -109,7 +111,7 @@ pub fn disocclusion_rate(classes: &[PixelClass], reference_inverse_depth: &[f32]
     Ok((foreground > 0).then(|| disoccluded as f64 / foreground as f64))
 }
 
-/// Pixels of each class.
+/// The number of pixels of each class.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct ClassCounts {
     /// [`PixelClass::Silhouette`].
@@ -123,7 +125,7 @@ pub struct ClassCounts {
 }
 
 impl ClassCounts {
-    /// Counts them.
+    /// Counts the pixels of each class.
     #[must_use]
     pub fn of(classes: &[PixelClass]) -> Self {
         let count = |class| classes.iter().filter(|&&one| one == class).count();
@@ -166,7 +168,7 @@ mod tests {
     use depth_image::Camera;
     use glam::UVec2;
 
-    /// A view from `(eye_x, 0, 0)` of a card 2 m ahead that hides the middle of a wall 4 m ahead.
+    /// A card 2 m ahead that hides the middle of a wall 4 m ahead, seen from `(eye_x, 0, 0)`.
     fn card_before_wall(eye_x: f32) -> (PinholeCamera, Vec<f32>) {
         let eye = Vec3::new(eye_x, 0.0, 0.0);
         let camera = PinholeCamera::looking_at(eye, eye - Vec3::Z, Vec3::Y, 1.0, UVec2::new(160, 120));
@@ -213,14 +215,14 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_covers_all_its_surfaces() {
+    fn a_camera_covers_all_that_it_sees() {
         let (camera, depth) = card_before_wall(0.0);
         let classes = classify(&camera, &depth, &[sample(0.0)]).unwrap();
         assert_eq!(disocclusion_rate(&classes, &depth).unwrap(), Some(0.0));
     }
 
     #[test]
-    fn the_wall_behind_the_card_is_disoccluded() {
+    fn a_surface_behind_the_card_is_disoccluded() {
         let (camera, depth) = card_before_wall(0.0);
         let classes = classify(&camera, &depth, &[sample(0.4)]).unwrap();
         // The card's shadow on the wall moves by 0.4 m of 4 m: 0.4 · f / 4 columns of the view, less the silhouette.
@@ -246,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_planes_are_refused_by_name() {
+    fn bad_planes_are_named() {
         let (camera, depth) = card_before_wall(0.0);
         assert!(matches!(classify(&camera, &depth[1..], &[]), Err(MetricsError::BufferSize { .. })));
         let mut bad = sample(0.0);

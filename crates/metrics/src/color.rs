@@ -20,7 +20,7 @@ pub(crate) const ADOBE_RGB: DMat3 = DMat3::from_cols(
     DVec3::new(0.188_229, 0.075_291, 0.991_338),
 );
 
-/// Matrices from linear RGB to XYZ relative to white, and back.
+/// Linear RGB to XYZ divided by that of white, and back.
 #[derive(Clone, Copy)]
 pub(crate) struct WhiteRelative {
     xyz_from_linear: glam::Mat3,
@@ -64,13 +64,13 @@ pub(crate) fn lab_from_relative_xyz(xyz: Vec3) -> Vec3 {
     Vec3::new(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
 }
 
-/// Maps every pixel through a curve from 8 bits to linear, then through `convert`.
+/// Every pixel through a curve from 8 bits to linear, then through `convert`.
 pub(crate) fn convert_pixels<T>(image: &Rgb8Image, curve: impl Fn(u8) -> f32, convert: impl Fn(Vec3) -> T) -> Vec<T> {
     let table: Vec<f32> = (0..=255).map(curve).collect();
     image.pixels().map(|rgb| convert(Vec3::from(rgb.map(|channel| table[usize::from(channel)])))).collect()
 }
 
-/// Maps every pixel to linear sRGB, then through `convert`.
+/// Every pixel in linear sRGB, then through `convert`.
 pub(crate) fn convert_srgb_pixels<T>(image: &Rgb8Image, convert: impl Fn(Vec3) -> T) -> Vec<T> {
     convert_pixels(image, linear_from_srgb8, convert)
 }

@@ -8,26 +8,26 @@ use crate::{
     max_channel_difference, pdiff_map, psnr_db, ssim_map,
 };
 
-/// Greatest PSNR in reports, which reads "at least". Equal images have an infinite PSNR, which JSON lacks; `null` means
-/// that there was no pixel.
+/// The PSNR of equal images in reports: JSON has no infinity. A value above is written as this one, which reads "at
+/// least"; `null` means that there was no pixel.
 pub const PSNR_CAP_DB: f64 = 99.99;
 
 /// The errors of one set of pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ImageErrors {
-    /// Pixels in the set.
+    /// The number of pixels.
     pub pixels: usize,
-    /// Infinite for equal pixels, written as at most [`PSNR_CAP_DB`]; `None` without pixels.
+    /// PSNR, infinite for equal images and written as at most [`PSNR_CAP_DB`]; `None` without pixels.
     #[serde(serialize_with = "capped_db")]
     pub psnr_db: Option<f64>,
-    /// Mean over the pixels whose 7×7 window lies in the image; `None` without any. Near a class's border the window
-    /// includes pixels of other classes.
+    /// Mean SSIM over the pixels whose 7×7 window lies in the image; `None` without any. Near the border of a class,
+    /// the window has pixels of other classes.
     pub ssim: Option<f64>,
-    /// Mean of LDR-FLIP; `None` without pixels.
+    /// Mean LDR-FLIP; `None` without pixels.
     pub flip: Option<f64>,
-    /// Pixels that fail Yee's perceptual difference.
+    /// The number of pixels that fail Yee's perceptual difference.
     pub pdiff_failing_px: usize,
-    /// Greatest difference in any channel, 8-bit steps; `None` without pixels.
+    /// The greatest difference in any channel, in 8-bit steps; `None` without pixels.
     pub max_channel_difference: Option<u8>,
 }
 
@@ -59,7 +59,7 @@ pub struct Comparison {
 /// Compares two images by every metric, overall and, with one class a pixel, by class.
 ///
 /// # Errors
-/// Images or classes of different sizes.
+/// Images or classes differ in size.
 pub fn compare(
     reference: &Rgb8Image,
     test: &Rgb8Image,
@@ -70,7 +70,7 @@ pub fn compare(
     Ok(Comparison { overall: maps.errors(None)?, by_class, flip_map: maps.flip })
 }
 
-/// The maps from which means are computed.
+/// Maps that the means are taken from.
 struct Maps<'a> {
     reference: &'a Rgb8Image<'a>,
     test: &'a Rgb8Image<'a>,
@@ -113,7 +113,7 @@ impl<'a> Maps<'a> {
     }
 }
 
-// serde passes the field by reference.
+// serde hands the field over by reference.
 fn capped_db<S: Serializer>(psnr_db: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
     psnr_db.map(|db| db.min(PSNR_CAP_DB)).serialize(serializer)
 }
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn identical_images_are_perfect_and_serialise_without_null() {
+    fn identical_is_perfect_and_serialises_without_null() {
         let comparison = compare(&pattern(0), &pattern(0), None).unwrap();
         assert_eq!(comparison.overall.psnr_db, Some(f64::INFINITY));
         assert_eq!((comparison.overall.flip, comparison.overall.pdiff_failing_px), (Some(0.0), 0));
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn every_comparator_detects_a_shift_of_one_pixel() {
+    fn every_comparator_sees_a_shift_of_one_pixel() {
         let errors = compare(&pattern(0), &pattern(1), None).unwrap().overall;
         assert!(errors.psnr_db.unwrap() < 25.0, "{errors:?}");
         assert!(errors.ssim.unwrap() < 0.95, "{errors:?}");
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn images_of_different_sizes_are_refused() {
+    fn sizes_must_agree() {
         let small = Rgb8Image::new(3, 2, vec![5; 18]).unwrap();
         assert!(compare(&small, &pattern(0), None).is_err());
         assert!(compare(&small, &small, Some(&[PixelClass::Covered])).is_err());

@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-/// The values beyond the image's edge.
+/// The extension of an image beyond its edge.
 #[derive(Clone, Copy)]
 pub(crate) enum Edge {
-    /// The edge pixel, repeated.
+    /// The edge pixel is repeated.
     Repeat,
-    /// The image mirrored about the edge pixel's centre.
+    /// The image is mirrored about the edge pixel's centre.
     Mirror,
 }
 
@@ -32,8 +32,8 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    /// Convolves rows with `row_kernel`, then columns with `column_kernel`. Kernels have odd lengths; their middle
-    /// entry is the pixel's own weight.
+    /// Weighs the neighbours along the row by `row_kernel`, then those along the column by
+    /// `column_kernel`. Kernels have odd lengths; their middle entry is the pixel's own weight.
     pub(crate) fn convolved(&self, row_kernel: &[f32], column_kernel: &[f32], edge: Edge) -> Self {
         self.along_rows(row_kernel, edge).along_columns(column_kernel, edge)
     }

@@ -1,25 +1,30 @@
-//! Errors of the inputs of a comparison.
+//! Errors of comparisons.
 
-/// Inputs that cannot be compared.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+/// Data that cannot be compared.
 #[allow(missing_docs, reason = "self-naming fields")]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MetricsError {
+    /// A buffer's length does not follow from its width and height.
     #[error("{what} holds {len} values, its size calls for {expected}")]
     BufferSize { what: &'static str, len: usize, expected: usize },
-    /// Two images of different sizes, columns and rows.
+    /// Two images of different sizes.
     #[error("reference is {reference_px:?} pixels, test is {test_px:?}")]
     SizesDiffer { reference_px: (u32, u32), test_px: (u32, u32) },
+    /// A side of length 0.
     #[error("{what} has no pixels")]
     Empty { what: &'static str },
+    /// The image is smaller than one window of the metric.
     #[error("image of {size_px:?} pixels is smaller than the window of {window_px}")]
     SmallerThanWindow { size_px: (u32, u32), window_px: u32 },
+    /// A setting is outside the range of the metric.
     #[error("{what} must be finite and above 0")]
     Setting { what: &'static str },
+    /// The planes of a sample image do not fit its camera.
     #[error("sample image {index}: {source}")]
     SampleImage { index: usize, source: depth_image::DepthImageError },
 }
 
-/// Fails unless `len` equals `expected`.
+/// Fails unless `len` is what is expected.
 pub(crate) fn expect_len(what: &'static str, len: usize, expected: usize) -> Result<(), MetricsError> {
     match len == expected {
         true => Ok(()),
@@ -27,7 +32,7 @@ pub(crate) fn expect_len(what: &'static str, len: usize, expected: usize) -> Res
     }
 }
 
-/// Fails for a mask without one entry per pixel.
+/// Fails if there is a mask without one entry a pixel.
 pub(crate) fn expect_mask(mask: Option<&[bool]>, pixels: usize) -> Result<(), MetricsError> {
     mask.map_or(Ok(()), |mask| expect_len("mask", mask.len(), pixels))
 }

@@ -1,4 +1,4 @@
-//! The inputs of comparisons: pixels, borrowed or owned, of checked sizes.
+//! Images and depth planes to compare: borrowed or owned, of a size that is checked.
 
 use std::borrow::Cow;
 
@@ -90,8 +90,8 @@ impl<'a> Rgb8Image<'a> {
     }
 }
 
-/// A plane of inverse planar depth, per metre: above 0 a surface, 0 background, below 0 (and NaN) a hole, as in
-/// [`depth_image::DepthImage`].
+/// A plane of inverse planar depth, per metre: above 0 a surface, 0 background, below 0 (and NaN) no
+/// sample, as in [`depth_image::DepthImage`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthPlane<'a> {
     width_px: u32,

@@ -1,8 +1,8 @@
 //! Image, depth and visibility error.
 //!
-//! Charts and checks take all their errors from here, computed from 8-bit sRGB images and planes of inverse depth. Each
-//! image metric gives a map first and a mean second, so that it can be split by [`PixelClass`]. [`compare`] does that
-//! for all metrics at once.
+//! All numbers of charts and checks are made here, from 8-bit sRGB images and planes of inverse depth. Each image
+//! metric gives a map first and a mean second, so that it can be split by [`PixelClass`]. [`compare`] does that for all
+//! metrics at once.
 //!
 //! | metric | what it is | agrees with |
 //! |---|---|---|

@@ -2,10 +2,11 @@
 
 use crate::{MetricsError, Rgb8Image, error::expect_mask};
 
-/// Peak signal-to-noise ratio over all three channels, decibels; infinite for equal pixels, `None` for an empty mask.
+/// Peak signal-to-noise ratio over all three channels, decibels; infinite where nothing differs, `None`
+/// for an empty mask.
 ///
 /// # Errors
-/// Images or mask of different sizes.
+/// Images or mask differ in size.
 pub fn psnr_db(reference: &Rgb8Image, test: &Rgb8Image, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
     Ok(mean_squared_error(reference, test, mask)?.map(db_from_mean_squared_error))
 }
@@ -13,7 +14,7 @@ pub fn psnr_db(reference: &Rgb8Image, test: &Rgb8Image, mask: Option<&[bool]>) -
 /// The mean over pixels and channels of the squared difference in 8-bit steps; `None` for an empty mask.
 ///
 /// # Errors
-/// Images or mask of different sizes.
+/// Images or mask differ in size.
 pub fn mean_squared_error(
     reference: &Rgb8Image,
     test: &Rgb8Image,
@@ -27,7 +28,7 @@ pub fn mean_squared_error(
 /// The greatest difference in any channel, in 8-bit steps; `None` for an empty mask.
 ///
 /// # Errors
-/// Images or mask of different sizes.
+/// Images or mask differ in size.
 pub fn max_channel_difference(
     reference: &Rgb8Image,
     test: &Rgb8Image,
@@ -78,13 +79,13 @@ mod tests {
     }
 
     #[test]
-    fn psnr_of_identical_images_is_infinite_and_of_an_empty_mask_none() {
+    fn identical_images_have_infinite_psnr_and_an_empty_mask_has_no_mean() {
         assert_eq!(psnr_db(&flat(7), &flat(7), None).unwrap(), Some(f64::INFINITY));
         assert_eq!(psnr_db(&flat(7), &flat(9), Some(&[false; 12])).unwrap(), None);
     }
 
     #[test]
-    fn a_mask_selects_pixels() {
+    fn a_mask_selects() {
         let mut bytes = vec![50; 36];
         bytes[0] = 60;
         let test = Rgb8Image::new(4, 3, bytes).unwrap();
@@ -95,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn images_of_different_sizes_are_refused() {
+    fn sizes_must_agree() {
         let other = Rgb8Image::new(3, 4, vec![0; 36]).unwrap();
         assert!(matches!(psnr_db(&flat(0), &other, None), Err(MetricsError::SizesDiffer { .. })));
         assert!(matches!(psnr_db(&flat(0), &flat(0), Some(&[true])), Err(MetricsError::BufferSize { .. })));

@@ -19,7 +19,7 @@ impl ScoreMap {
         (self.width_px, self.height_px)
     }
 
-    /// Pixels at each edge without a value.
+    /// The number of pixels at each edge without a value.
     #[must_use]
     pub fn border_px(&self) -> u32 {
         self.border_px
@@ -31,10 +31,10 @@ impl ScoreMap {
         &self.values
     }
 
-    /// The mean over all pixels that have a value, or over those also in the mask; `None` without pixels.
+    /// The mean over all pixels with a value, or over those in the mask; `None` without such pixels.
     ///
     /// # Errors
-    /// A mask of another size.
+    /// The mask has another size.
     pub fn mean(&self, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
         expect_mask(mask, self.values.len())?;
         let selected = |index: &usize| mask.is_none_or(|mask| mask[*index]);

@@ -1,8 +1,8 @@
-//! Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004), as scikit-image's
-//! `structural_similarity(a, b, channel_axis=2)` for 8-bit images. It has a 7×7 uniform window, the sample covariance
-//! (divided by n-1), `K1 = 0.01` and `K2 = 0.03`. The mean is over the pixels whose whole window lies in the image.
+//! Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004). The choices are those of scikit-image's
+//! `structural_similarity(a, b, channel_axis=2)` for 8-bit images: a 7×7 uniform window, the sample covariance (divided
+//! by n-1), `K1 = 0.01` and `K2 = 0.03`. The mean is over the pixels whose whole window lies in the image.
 //!
-//! Window sums of 8-bit values are whole numbers, and exact.
+//! Window sums of 8-bit values are whole numbers, so they are exact here.
 
 use rayon::prelude::*;
 
@@ -16,10 +16,10 @@ const SAMPLES: f64 = (SSIM_WINDOW_PX * SSIM_WINDOW_PX) as f64;
 const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
 const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 
-/// Structural similarity, mean of the three channels, of the window around every pixel.
+/// The structural similarity of the window around every pixel, mean of the three channels.
 ///
 /// # Errors
-/// Images of different sizes, or smaller than the window.
+/// Images differ in size, or are smaller than the window.
 pub fn ssim_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, MetricsError> {
     reference.expect_same_size(test)?;
     let (width_px, height_px) = reference.size_px();
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn identical_images_score_one() {
+    fn identical_is_one() {
         let bytes: Vec<u8> = (0..9 * 8 * 3).map(|i| (i * 37 % 251) as u8).collect();
         let image = Rgb8Image::new(9, 8, bytes).unwrap();
         let map = ssim_map(&image, &image).unwrap();

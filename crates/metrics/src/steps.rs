@@ -1,18 +1,18 @@
 //! Discontinuities of depth.
 //!
-//! Inverse depth is linear in the image on any plane, so that a slope alone is no step. The jumps before *a* and after
-//! *b* predict the jump between neighbours *a* and *b*. On a plane all three are equal, and at a crease the middle one
-//! lies between the others. A **step** is a jump outside the range of the two by more than [`STEP_RELATIVE`] of the
-//! larger inverse depth. The border between a surface and background is a step too. The measure is a ratio, independent
-//! of the scene's scale.
+//! Inverse depth is linear in the image on a plane of any slope, so a slope alone is no step. The jump between
+//! neighbours *a* and *b* is predicted from the jumps before *a* and after *b*. On a plane all three are equal, and at
+//! a crease the middle one lies between the others. There is a **step** where the jump lies outside their range by more
+//! than [`STEP_RELATIVE`] of the larger inverse depth. There is also one where only one of the two is a surface. The
+//! measure is a ratio: scenes have no scale here.
 
-/// The least step, as a share of the larger inverse depth; it is also the least depth error that counts.
+/// The least step, as a share of the larger inverse depth; also the least depth error that counts.
 pub const STEP_RELATIVE: f32 = 0.01;
 
-/// Number of pixels on either side of a step that are near it: centres 0.5 and 1.5 px away.
+/// The number of pixels on either side of a step that are near it: centres 0.5 and 1.5 px away.
 const NEAR_PX: usize = 2;
 
-/// Marks the pixels within 2 px of a step. `inverse_depth_per_m` has whole rows of `width_px`.
+/// Marks pixels within 2 px of a step. `inverse_depth_per_m` has whole rows of `width_px`.
 #[must_use]
 pub fn step_pixels(inverse_depth_per_m: &[f32], width_px: u32) -> Vec<bool> {
     let width = width_px as usize;
@@ -36,13 +36,13 @@ struct Line {
 }
 
 impl Line {
-    /// The surface at a position; `None` outside the image and on background.
+    /// The surface at a position; `None` outside the image and without a surface.
     fn surface(self, inverse_depth: &[f32], at: isize) -> Option<f32> {
         let at = usize::try_from(at).ok().filter(|&at| at < self.len)?;
         Some(inverse_depth[self.start + at * self.stride]).filter(|&depth| depth > 0.0)
     }
 
-    /// Returns whether there is a step between positions `at` and `at + 1`.
+    /// True if there is a step between positions `at` and `at + 1`.
     fn steps_after(self, inverse_depth: &[f32], at: isize) -> bool {
         let [before, a, b, after] = [-1, 0, 1, 2].map(|offset| self.surface(inverse_depth, at + offset));
         match (a, b) {
@@ -55,8 +55,8 @@ impl Line {
     }
 }
 
-/// Returns whether a jump lies outside the prediction of its neighbours. A missing neighbour predicts the same as the
-/// other; without neighbours the prediction is no jump.
+/// True if a jump lies outside the range that its neighbours predict. Without one neighbour, the other predicts alone;
+/// without both, there is no prediction.
 fn jump_is_step(jump: f32, before: Option<f32>, after: Option<f32>, larger: f32) -> bool {
     let first = before.or(after).unwrap_or(0.0);
     let second = after.or(before).unwrap_or(0.0);
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_steep_plane_is_no_step() {
+    fn no_plane_is_a_step_however_steep() {
         let steep: Vec<f32> = (1..40).map(|x| 0.05 * x as f32).collect();
         assert!(row_mask(&steep).iter().all(|&step| !step));
     }
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_are_independent_of_scale() {
+    fn scale_does_not_matter() {
         let metres = [0.5, 0.5, 0.5, 0.4, 0.4, 0.4, 0.398, 0.396];
         for scale in [1e-4, 1.0, 1e4] {
             assert_eq!(row_mask(&metres.map(|depth| depth * scale)), row_mask(&metres));
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_along_columns_are_found() {
+    fn columns_are_seen_too() {
         let mask = step_pixels(&[0.5, 0.5, 0.5, 0.4, 0.4, 0.4], 1);
         assert_eq!(mask, [false, true, true, true, true, false]);
         assert!(step_pixels(&[], 0).is_empty());

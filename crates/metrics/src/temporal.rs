@@ -1,12 +1,12 @@
-//! Flicker: the difference of the changes between two frames from the reference's changes.
+//! Flicker: the change from frame to frame against the reference's change.
 
 use crate::{MetricsError, Rgb8Image, psnr::db_from_mean_squared_error};
 
-/// PSNR of `test[1] - test[0]` against `reference[1] - reference[0]`, decibels, with a peak of 255; infinite for equal
-/// changes.
+/// PSNR of `test[1] - test[0]` against `reference[1] - reference[0]`, decibels, with a peak of 255; infinite
+/// where both change alike.
 ///
 /// # Errors
-/// Images of different sizes.
+/// Images differ in size.
 pub fn temporal_psnr_db(reference: [&Rgb8Image; 2], test: [&Rgb8Image; 2]) -> Result<f64, MetricsError> {
     for image in [reference[1], test[0], test[1]] {
         reference[0].expect_same_size(image)?;

@@ -6,9 +6,9 @@ use rayon::prelude::*;
 use super::kernels::{ACHROMATIC, BLUE_YELLOW, RED_GREEN, Sensitivity};
 use crate::{color::REC_709, color::WhiteRelative, convolution::Edge, convolution::Plane};
 
-/// Exponent that compresses differences.
+/// Differences are compressed by this power.
 const POWER: f32 = 0.7;
-/// Errors up to this share of the greatest…
+/// Errors up to this share of the greatest error…
 const KNEE: f32 = 0.4;
 /// …are spread over this share of the output.
 const KNEE_OUTPUT: f32 = 0.95;
@@ -22,7 +22,7 @@ pub(super) fn map(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize, p
     reference.par_iter().zip(&test).map(|(a, b)| remapped(hyab(*a, *b).powf(POWER), greatest)).collect()
 }
 
-/// Hunt-adjusted L*a*b* after the eye's filter.
+/// Hunt-adjusted L*a*b* of what the eye resolves.
 fn perceived(ycxcz: &[Vec3], width: usize, pixels_per_degree: f32, space: &WhiteRelative) -> Vec<Vec3> {
     let channel = |of: fn(&Vec3) -> f32| Plane { width, values: ycxcz.iter().map(of).collect() };
     let y = filtered(&channel(|c| c.x), &[ACHROMATIC], pixels_per_degree);
@@ -32,7 +32,7 @@ fn perceived(ycxcz: &[Vec3], width: usize, pixels_per_degree: f32, space: &White
     pixels.map(|ycxcz| hunt_adjusted(space, space.linear_from_ycxcz(ycxcz).clamp(Vec3::ZERO, Vec3::ONE))).collect()
 }
 
-/// Convolves a plane with a sum of sensitivities of total weight 1.
+/// The plane convolved with a sum of sensitivities that together weigh 1.
 fn filtered(plane: &Plane, sensitivities: &[Sensitivity], pixels_per_degree: f32) -> Vec<f32> {
     let kernels: Vec<_> = sensitivities.iter().map(|one| one.kernel(pixels_per_degree)).collect();
     let total: f32 = kernels.iter().map(|(_, volume)| volume).sum();
@@ -44,13 +44,13 @@ fn filtered(plane: &Plane, sensitivities: &[Sensitivity], pixels_per_degree: f32
     sum
 }
 
-/// Hunt adjustment: chroma counts for less in dark colours.
+/// Chroma counts less in the dark.
 fn hunt_adjusted(space: &WhiteRelative, linear: Vec3) -> Vec3 {
     let lab = space.lab_from_linear(linear);
     Vec3::new(lab.x, 0.01 * lab.x * lab.y, 0.01 * lab.x * lab.z)
 }
 
-/// Distance: city-block in lightness, Euclidean in chroma (Abasi et al. 2020).
+/// City-block in lightness, Euclidean in chroma (Abasi et al. 2020).
 fn hyab(a: Vec3, b: Vec3) -> f32 {
     let delta = a - b;
     delta.x.abs() + delta.y.hypot(delta.z)
@@ -61,7 +61,7 @@ fn greatest_difference(space: &WhiteRelative) -> f32 {
     hyab(hunt_adjusted(space, Vec3::Y), hunt_adjusted(space, Vec3::Z)).powf(POWER)
 }
 
-/// Maps differences to 0…1, with most of the range for small ones.
+/// To 0…1, most of it for the small differences.
 fn remapped(difference: f32, greatest: f32) -> f32 {
     let knee = KNEE * greatest;
     match difference < knee {

@@ -15,7 +15,7 @@ pub(super) fn map(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize, p
     edges.zip(points).map(|(edge, point)| (edge.max(point) / 2.0_f32.sqrt()).sqrt().min(1.0)).collect()
 }
 
-/// Strengths of features at every pixel.
+/// Strengths of edges and points at every pixel.
 struct Features {
     edge: Vec<f32>,
     point: Vec<f32>,

@@ -1,8 +1,8 @@
 //! LDR-FLIP: Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild, "FLIP: A Difference
 //! Evaluator for Alternating Images", HPG 2020. Section numbers below are the paper's.
 //!
-//! The eye's contrast sensitivity blurs both images before the colour difference. A feature difference (edges and
-//! points that only one image has) raises it: `ΔE = ΔEc^(1 - ΔEf)`.
+//! A colour difference is raised by a feature difference: `ΔE = ΔEc^(1 - ΔEf)`. The colour difference is that of both
+//! images blurred by the eye's contrast sensitivity; features are edges and points that only one image has.
 
 mod color_difference;
 mod feature_difference;
@@ -18,15 +18,15 @@ pub const FLIP_PIXELS_PER_DEGREE: f32 = 67.020_64;
 /// FLIP's error of every pixel, 0 to 1, for the default viewer.
 ///
 /// # Errors
-/// Images of different sizes.
+/// Images differ in size.
 pub fn flip_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, MetricsError> {
     flip_map_at(reference, test, FLIP_PIXELS_PER_DEGREE)
 }
 
-/// FLIP's error of every pixel, 0 to 1, for a viewer with a given number of pixels a degree.
+/// FLIP's error of every pixel, 0 to 1, for a viewer with this many pixels a degree.
 ///
 /// # Errors
-/// Images of different sizes, or an impossible viewer.
+/// Images of different sizes, or no such viewer.
 pub fn flip_map_at(reference: &Rgb8Image, test: &Rgb8Image, pixels_per_degree: f32) -> Result<ScoreMap, MetricsError> {
     reference.expect_same_size(test)?;
     if !(pixels_per_degree.is_finite() && pixels_per_degree > 0.0) {
@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn identical_images_have_no_error() {
+    fn identical_is_zero() {
         let map = flip_map(&flat([9, 200, 77]), &flat([9, 200, 77])).unwrap();
         assert_eq!(map.mean(None).unwrap(), Some(0.0));
     }

@@ -1,10 +1,10 @@
-//! Published curves of visible differences.
+//! Published curves of human vision.
 
 use super::{BANDS, LEVELS};
 
 /// The frequency of peak contrast sensitivity at 100 cd/m², cycles a degree.
 const PEAK_CYCLES_PER_DEGREE: f32 = 3.248;
-/// Yee's lower bound of sensitivity.
+/// Yee's bound on the fall of sensitivity.
 const GREATEST_ELEVATION: f32 = 10.0;
 
 /// The spatial frequencies of the pyramid's bands for one viewer.
@@ -29,12 +29,12 @@ impl FrequencyBands {
         }
     }
 
-    /// The level whose smoothing covers the degree around a pixel to which the eye adapts.
+    /// The level whose smoothing stands for the degree around a pixel that the eye adapts to.
     pub(super) fn adaptation_level(&self) -> usize {
         self.adaptation_level
     }
 
-    /// `F`: the factor of the threshold, 1 to 10.
+    /// `F`: the rise of the threshold, 1 to 10.
     pub(super) fn threshold_elevation(&self, contrast: &[f32; BANDS], adaptation_cd_m2: f32) -> f32 {
         let weighted = contrast.iter().zip(self.cycles_per_degree).zip(self.inverse_relative_sensitivity);
         let elevations = weighted.map(|((&contrast, cycles), inverse_sensitivity)| {
@@ -45,7 +45,7 @@ impl FrequencyBands {
     }
 }
 
-/// The first level whose doubling support exceeds the image's width in degrees.
+/// The first level whose doubling support is wider than the image is in degrees.
 fn adaptation_level(image_deg: f32) -> usize {
     (0..LEVELS - 1).find(|&level| (1_u32 << level) as f32 > image_deg).unwrap_or(LEVELS - 1)
 }
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sensitivity_peaks_at_the_published_frequency() {
+    fn sensitivity_peaks_where_it_should() {
         let peak = contrast_sensitivity(PEAK_CYCLES_PER_DEGREE, 100.0);
         for cycles in [0.5, 2.0, 5.0, 16.0] {
             assert!(contrast_sensitivity(cycles, 100.0) < peak, "{cycles}");
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn the_threshold_is_almost_continuous_between_its_pieces() {
+    fn the_threshold_has_no_great_jump_where_its_pieces_meet() {
         for log in [-3.94_f32, -1.44, -0.0184, 1.9] {
             let (below, above) =
                 (threshold_vs_intensity(10_f32.powf(log - 1e-3)), threshold_vs_intensity(10_f32.powf(log + 1e-3)));
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn elevation_stays_within_its_bounds() {
+    fn elevation_keeps_its_bounds() {
         let bands = FrequencyBands::new(4096, 45.0);
         for contrast in [[0.0; BANDS], [1e-6; BANDS], [1.0; BANDS], [1e5; BANDS]] {
             let elevation = bands.threshold_elevation(&contrast, 30.0);
