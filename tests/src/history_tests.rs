@@ -1,4 +1,4 @@
-//! The checker sees what it is there to see.
+//! The checker detects every violation.
 
 use cluster::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneRef, Timeline, Workload};
 use coordinator::schedule::{Event, Opening, Recorder};
@@ -45,7 +45,7 @@ fn joined(name: &str, plan_epoch: u64) -> Event {
     Event::Joined { incarnation: plan_epoch + 1, join: JoinCluster { node, plan_epoch } }
 }
 
-/// Two nodes join, which have seen `plan_epoch`, a session opens, and one of them leaves.
+/// Two nodes that have seen `plan_epoch` join, a session opens, and one of them leaves.
 fn log(plan_epoch: u64) -> Vec<u8> {
     let costs = Costs {
         sample_image_s: 0.1,
@@ -78,7 +78,7 @@ fn log(plan_epoch: u64) -> Vec<u8> {
     text
 }
 
-/// Nothing is wrong with it.
+/// A history without violations.
 fn good() -> History {
     let start = Instant::now();
     let calls = vec![call(start, 0..3, 1), call(start, 3..6, 1), call(start, 6..9, 2)];

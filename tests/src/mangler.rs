@@ -24,11 +24,11 @@ pub type Spoil = fn(&mut Vec<Chunk>);
 #[derive(Default)]
 struct Orders {
     spoil: Option<Spoil>,
-    /// Answers left to be spoilt.
+    /// Number of answers still to be corrupted.
     times: usize,
 }
 
-/// Serves until it is dropped.
+/// A server that ends when it is dropped.
 pub struct Mangler {
     /// The address that the node is to advertise.
     pub address: String,
@@ -41,7 +41,7 @@ impl Mangler {
     /// Starts a mangler for a node that is named later.
     ///
     /// # Panics
-    /// Where there is no port.
+    /// No port is free.
     pub async fn start() -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = format!("http://{}", listener.local_addr().expect("an address"));
@@ -57,12 +57,12 @@ impl Mangler {
         *self.node.lock() = address.to_owned();
     }
 
-    /// Spoils the next answers.
+    /// Corrupts the next `times` answers.
     pub fn spoil(&self, times: usize, spoil: Spoil) {
         *self.orders.lock() = Orders { spoil: Some(spoil), times };
     }
 
-    /// Answers that are still to be spoilt.
+    /// The number of answers still to be corrupted.
     #[must_use]
     pub fn left(&self) -> usize {
         self.orders.lock().times

@@ -20,7 +20,7 @@ use parking_lot::Mutex;
 
 /// The floor's colour.
 pub const FLOOR_LINEAR: Vec3 = Vec3::new(0.1, 0.6, 0.2);
-/// What rays meet that leave the scene.
+/// The colour of rays that leave the scene.
 pub const SKY_LINEAR: Vec3 = Vec3::new(0.0, 0.0, 0.25);
 
 /// A lamp above the ball, and a sky; the scalar device checks that they arrive and shades with neither.
@@ -33,7 +33,7 @@ pub fn illumination() -> Illumination {
 /// Times of the scene that look different.
 const STEPS: u32 = 100;
 
-/// The ball's colour tells the scene's time, and how many steps its light lacks, so that a view of two sets shows two
+/// The ball's colour encodes the scene's time and its missing refinement steps, so that a view of two sets shows two
 /// colours.
 #[must_use]
 pub fn ball_linear(scene_time_s: f32, refinement: Refinement) -> Vec3 {
@@ -43,25 +43,25 @@ pub fn ball_linear(scene_time_s: f32, refinement: Refinement) -> Vec3 {
     Vec3::new(linear_from_srgb8(40 + 2 * step as u8), 0.02, 0.01 + 0.08 * lacks as f32)
 }
 
-/// As it arrives in a view.
+/// A colour as it arrives in a view.
 #[must_use]
 pub fn srgb8(linear: Vec3) -> [u8; 3] {
     linear_from_rgb9e5(rgb9e5_from_linear(linear)).to_array().map(srgb8_from_linear)
 }
 
-/// Images sampled, by eye and first row, scene time and step: how often.
+/// Number of times that each image was sampled, by eye and first row, scene time and step.
 pub type SampleCounts = HashMap<([u32; 4], u32, Refinement), usize>;
 
-/// What the device takes at the least, so that it is as fast as a test says on whatever machine.
+/// Least times of the device, which give it a stated speed on any machine.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Pace {
-    /// For one sample image.
+    /// Time of one sample image.
     pub image: Duration,
-    /// For one reconstructed view.
+    /// Time of one reconstructed view.
     pub view: Duration,
 }
 
-/// Plain loops. Clones share what they count.
+/// A device of plain loops. Clones share their counters.
 #[derive(Debug, Clone, Default)]
 pub struct ScalarEngine {
     counts: Arc<Mutex<SampleCounts>>,
@@ -197,7 +197,7 @@ fn known(field: &'static str, value: &str, known: &str) -> Result<(), EngineErro
 }
 
 impl ScalarEngine {
-    /// What was sampled since the last call.
+    /// The samples since the last call.
     #[must_use]
     pub fn take_counts(&self) -> SampleCounts {
         std::mem::take(&mut self.counts.lock())
@@ -209,7 +209,7 @@ impl ScalarEngine {
         self.reconstructed.swap(0, Ordering::Relaxed)
     }
 
-    /// From now on the device takes so long.
+    /// Sets the device's least times.
     pub fn keep_pace(&self, pace: Pace) {
         *self.pace.lock() = pace;
     }
@@ -218,7 +218,7 @@ impl ScalarEngine {
         *self.pace.lock()
     }
 
-    /// From now on the device does nothing any more.
+    /// Loses the device.
     pub fn lose(&self) {
         self.is_lost.store(true, Ordering::Relaxed);
     }

@@ -1,4 +1,4 @@
-//! View cells: views from all around, each made from images that were sampled near it.
+//! View cells: views from all around, each made from images of near sample cameras.
 #![allow(clippy::unwrap_used)]
 
 use std::f32::consts::{PI, TAU};
@@ -11,7 +11,7 @@ use glam::{UVec2, Vec3};
 
 const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
 
-/// On a circle around the ball.
+/// A camera on a circle around the ball.
 fn view(azimuth_rad: f32) -> PinholeCamera {
     let target = Vec3::new(0.0, 0.5, 0.0);
     let eye = target + Vec3::new(3.0 * azimuth_rad.sin(), 0.7, 3.0 * azimuth_rad.cos());
@@ -48,7 +48,7 @@ fn around(count: usize) -> impl Iterator<Item = f32> {
     (0..count).map(move |i| TAU * i as f32 / count as f32)
 }
 
-/// One rig in front knows nothing of what is seen from behind: the curve falls. With cells it is level.
+/// One rig in front has no samples of the back: the curve falls. With cells it is level.
 #[tokio::test(flavor = "multi_thread")]
 async fn views_from_all_sides_are_equally_good() {
     let cluster = Cluster::start(4).await;
@@ -65,10 +65,10 @@ async fn views_from_all_sides_are_equally_good() {
     assert!(of_rig[..12].is_sorted_by(|a, b| a >= b) && of_rig[12] < 0.5 * of_rig[0], "{of_rig:?}");
     assert!(of_cells.iter().all(|known| (known / of_rig[0] - 1.0).abs() < 0.01), "{of_cells:?}");
     let images = plan.image_count();
-    assert_eq!(cluster.take_counts(), vec![1; images], "each image once, whoever made views of it");
+    assert_eq!(cluster.take_counts(), vec![1; images], "each image once, for all compositors");
 }
 
-/// What changes elsewhere costs nothing here.
+/// Changes elsewhere cause no sampling here.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_that_opens_or_closes_samples_no_other_cell_again() {
     let cluster = Cluster::start(3).await;

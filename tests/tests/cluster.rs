@@ -1,4 +1,4 @@
-//! Clusters in one process over real ports: every view comes once, and from one set.
+//! Clusters in one process over real ports: every view arrives once, and from one set.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::HashSet;
@@ -12,7 +12,7 @@ use node::NodeConfig;
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 
-/// The ball shows its own time and step and no other; floor and sky are there; nothing else is.
+/// The ball shows its own time and step and no other; floor and sky are there, and no other colour.
 fn shows_only(frame: &Frame, scene_time_s: f32, refinement: Refinement) {
     assert_eq!(fault_of(frame, scene_time_s, refinement), None);
 }
@@ -43,7 +43,7 @@ async fn pipeline_of(nodes: usize) {
     );
     let frames = session.render_views(views(3, 12)).unwrap().all().await.unwrap();
     all_came(&frames, 36);
-    // Three sets of three images; the next set is fetched ahead, but none twice.
+    // There are three sets of three images; the next set is fetched ahead, and no image twice.
     assert_eq!(cluster.take_counts(), [1; 9]);
     let again = session.render_views(views(3, 12)).unwrap().all().await.unwrap();
     all_came(&again, 36);
@@ -83,7 +83,7 @@ async fn every_number_of_samplers_gives_the_same_pictures() {
     assert!(error.contains("forced_sampler_count is 4, at most 3"), "{error}");
 }
 
-/// Whole sets in turn: each image once, whatever K, and the same pictures.
+/// Nodes take whole sets in turn: each image is sampled once for any K, and pictures are equal.
 #[tokio::test(flavor = "multi_thread")]
 async fn sets_of_sequential_images_stay_on_one_node() {
     let cluster = Cluster::start(4).await;
@@ -178,7 +178,7 @@ async fn a_moving_scene_is_finished_in_every_set() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_go_on_when_the_coordinator_is_gone() {
+async fn frames_go_on_while_the_coordinator_is_gone() {
     let mut cluster = Cluster::start(2).await;
     let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
     cluster.coordinator.kill();

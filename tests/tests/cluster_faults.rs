@@ -1,4 +1,4 @@
-//! What goes wrong in a cluster is refused, named and survived.
+//! Faulty requests are refused by name, and the cluster survives them.
 #![allow(clippy::unwrap_used)]
 
 use std::time::Duration;
@@ -15,7 +15,7 @@ use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 
-/// One request on a stream of its own; how it ends.
+/// Sends one request on its own stream; returns how it ends.
 async fn ask(address: &str, request: RenderViews) -> Result<usize, tonic::Status> {
     let client = CompositorClient::new(connect(address).await?);
     let mut parts = client.render_views(tokio_stream::iter([request])).await?;
@@ -41,10 +41,10 @@ fn raw_request(session: &Session) -> RenderViews {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn old_plans_are_refused_everywhere() {
+async fn old_plans_are_refused_by_every_service() {
     let cluster = Cluster::start(2).await;
     let old = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
-    // Of another workload: sessions of one share a plan.
+    // The workload differs, since sessions of one workload share a plan.
     let other = cluster::SessionRequest { refinement_steps: 2, ..request(PolicyChoice::Pipeline, MOVING) };
     let new = cluster.session(other).await.unwrap();
     let (old_plan, new_plan) = (&old.plan().assignment, &new.plan().assignment);

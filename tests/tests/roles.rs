@@ -1,4 +1,4 @@
-//! What plans say beside who does what: tiles, relays, demand that changes, and what nodes report of their work.
+//! Tiles, relays, changing demand, and nodes' reports of their work.
 #![allow(clippy::unwrap_used)]
 
 use std::num::NonZeroU32;
@@ -19,7 +19,7 @@ fn pipeline() -> SessionRequest {
     request(PolicyChoice::Pipeline, MOVING)
 }
 
-/// What share of all pixels' bytes two deliveries have in common.
+/// The share of equal bytes in two deliveries.
 fn alike(a: &[Frame], b: &[Frame]) -> f64 {
     let (mut same, mut all) = (0, 0);
     for frame in a {
@@ -61,7 +61,7 @@ async fn tiles_are_refused_where_images_are_not_independent() {
     assert!(error.contains("forced_tile_count is 2"), "{error}");
 }
 
-/// A chain: one sampler, and compositors that pass images on.
+/// A chain: one sampler, and compositors that relay images.
 async fn chained(cluster: &Cluster) -> Assignment {
     let forced = SessionRequest { forced_sampler_count: Some(1), ..pipeline() };
     let session = cluster.session(forced).await.unwrap();
@@ -74,7 +74,7 @@ async fn chained(cluster: &Cluster) -> Assignment {
     chain
 }
 
-/// One view of a set, of one compositor.
+/// Requests one view of a set from one compositor.
 async fn ask(address: &str, plan: &Assignment, set_index: u32) -> WholeFrame {
     let request = RenderViews {
         plan_epoch: plan.plan_epoch,
@@ -97,19 +97,19 @@ async fn compositors_relay_images_in_a_chain() {
     let [first, second, last] = &plan.compositors[..] else { panic!("{:?}", plan.compositors) };
     assert_eq!((plan.relay_of(&first.node_name), plan.relay_of(&last.node_name)), (None, Some(second)));
     cluster.take_counts();
-    // The last one first: its asking goes all the way up.
+    // The last compositor first: its request goes all the way up.
     let far = ask(&last.address, &plan, 1).await;
     let near = ask(&first.address, &plan, 1).await;
     assert_eq!(far.data, near.data);
     assert!(cluster.take_counts().iter().all(|&times| times == 1), "sampled once");
-    let passed_on = |address: String, plan_epoch| async move {
+    let relayed = |address: String, plan_epoch| async move {
         let sampler = SamplerClient::new(connect(&address).await.unwrap());
         let fetch = FetchImages { plan_epoch, set_index: 1, cell: 0, image_indices: vec![0, 1, 2] };
         sampler.fetch_sample_images(fetch).await.map(|chunks| chunks.collect::<Vec<_>>())
     };
-    let chunks = passed_on(second.address.clone(), 100).await.unwrap().await;
+    let chunks = relayed(second.address.clone(), 100).await.unwrap().await;
     assert!(chunks.len() >= 6 && chunks.iter().all(Result::is_ok), "header and data of each of three images");
-    let refused = passed_on(last.address.clone(), 100).await.err().unwrap();
+    let refused = relayed(last.address.clone(), 100).await.err().unwrap();
     assert!(refused.message().contains("is not sampled by"), "nobody asks the last one: {refused}");
 }
 
@@ -128,7 +128,7 @@ async fn samplers_replace_a_relay_that_is_lost() {
     assert!(start.elapsed() < Duration::from_secs(2), "the next set is not asked of it any more");
 }
 
-/// While a set is sampled and the next one waits for it, another plan comes.
+/// Another plan arrives while one set is sampled and the next waits.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_set_that_was_not_begun_when_its_plan_ended_is_not_sampled() {
     let cluster = Cluster::start(3).await;

@@ -1,5 +1,5 @@
-//! Peers that ask for what cannot be, speak another version or no language at all, or have another's name. Each is
-//! refused within a second, by a status that names the field where there is one; a client beside them notices nothing.
+//! Peers with invalid requests, another version, another protocol, or another's name. Each is refused within a second,
+//! by a status that names the field where there is one. A concurrent client sees no effect.
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -19,7 +19,7 @@ use wire::rpc::{CoordinatorClient, connect};
 
 use crate::{CLOSED, PROGRAM, finish};
 
-/// Refusals take no longer.
+/// Greatest time of a refusal.
 const AT_ONCE: Duration = Duration::from_secs(1);
 const JOIN: &str = "/myriorama.v1.CoordinatorService/JoinCluster";
 const OPEN: &str = "/myriorama.v1.CoordinatorService/OpenSession";
@@ -39,7 +39,7 @@ impl Beside {
         Self { cluster, watcher, since: Instant::now() }
     }
 
-    /// Nobody else was harmed.
+    /// The concurrent client saw no fault.
     async fn finish(self, what: &str) {
         let wait = self.watcher.healed(self.since, CLOSED, |_| true).await;
         assert!(wait < 2 * AT_ONCE, "{what}: no frames for {wait:?}");
@@ -47,7 +47,7 @@ impl Beside {
     }
 }
 
-/// Within a second.
+/// Runs a request within the deadline.
 async fn refusal<T>(call: impl Future<Output = Result<T, Status>>) -> Status {
     tokio::time::timeout(AT_ONCE, call).await.expect("at once").err().expect("refused")
 }
@@ -79,12 +79,12 @@ async fn other_versions_and_malformed_messages_are_refused() {
     beside.finish("other versions and noise").await;
 }
 
-/// In a hundred places, each half as far again as the one before.
+/// Viewpoints in a hundred places, each half as far again as the one before.
 fn everywhere(camera: PinholeCamera) -> Vec<PinholeCamera> {
     (0..100).map(|i| PinholeCamera { eye_in_world: camera.eye_in_world * 1.5f32.powi(i), ..camera }).collect()
 }
 
-/// So far apart that no number says how far.
+/// Viewpoints whose distance is not finite.
 fn beyond(camera: PinholeCamera) -> Vec<PinholeCamera> {
     [-3e38, 3e38].map(|x| PinholeCamera { eye_in_world: Vec3::X * x, ..camera }).to_vec()
 }
@@ -149,7 +149,7 @@ fn socket(address: &str) -> TcpStream {
     stream
 }
 
-/// All that comes back until the server ends the connection; how long that takes.
+/// The bytes until the server ends the connection, and the time that takes.
 fn answer(address: &str, bytes: &[u8]) -> (Vec<u8>, Duration) {
     let (mut stream, start, mut all) = (socket(address), Instant::now(), Vec::new());
     let _ = stream.write_all(bytes);
@@ -172,14 +172,14 @@ async fn connections_without_http2_are_cut() {
             assert!(took < AT_ONCE, "{took:?}");
         }
     }
-    // Who says nothing may be slow: for as long as keepalive waits.
+    // A silent peer may be slow: the limit is that of keepalive.
     let server = beside.cluster.nodes[0].address.clone();
     let (_, took) = tokio::task::spawn_blocking(move || answer(&server, b"PRI")).await.unwrap();
     assert!((4.0..7.0).contains(&took.as_secs_f64()), "{took:?}");
     beside.finish("peers without a language").await;
 }
 
-/// Until the call has ended: headers with which the server says no more. The status is in them.
+/// Reads until the headers that end the call, which have its status.
 fn until_refused(mut stream: TcpStream) -> Duration {
     const HEADERS_AND_END: [u8; 6] = [1, 5, 0, 0, 0, 1];
     let (mut all, mut part, start) = (Vec::new(), [0; 4096], Instant::now());
@@ -210,9 +210,9 @@ async fn a_claimed_length_of_4_gib_takes_no_memory() {
     beside.finish("lengths of 4 GiB").await;
 }
 
-/// Of two processes with one name the later counts, and the earlier waits until it has left.
+/// The later of two processes with one name counts; the earlier waits until it has left.
 #[tokio::test(flavor = "multi_thread")]
-async fn of_two_processes_with_one_name_the_later_counts_and_the_earlier_waits() {
+async fn the_later_of_two_processes_with_one_name_counts() {
     let beside = Beside::start(2).await;
     let Beside { cluster, watcher, .. } = &beside;
     let address_of = async || {

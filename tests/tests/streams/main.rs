@@ -1,4 +1,4 @@
-//! Live streams: the newest pose counts, and nobody holds up another.
+//! Live streams: the newest pose counts, and no stream delays another.
 #![allow(clippy::unwrap_used)]
 
 mod quotas;
@@ -32,7 +32,7 @@ async fn every_frame_shows_its_pose() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bad_poses_are_refused_before_they_are_sent() {
+async fn invalid_poses_are_refused_before_they_are_sent() {
     let cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let mut live = session.live();
@@ -49,7 +49,7 @@ async fn live_views_outlive_their_compositor() {
     let mut cluster = Cluster::start(4).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let plan = session.plan().assignment;
-    // On all compositors, each its own.
+    // The streams are on all compositors.
     let mut lives: Vec<LiveView> = plan.compositors.iter().map(|_| session.live()).collect();
     for live in &mut lives {
         seen(live, 0.0, 0).await;
@@ -73,7 +73,7 @@ async fn live_views_follow_the_plan() {
     let mut live = session.live();
     let (mut epoch, start) = (seen(&mut live, 0.0, 0).await.frame.header.sample_set_id.plan_epoch, Instant::now());
     let first = epoch;
-    // Its compositor may be the one that has to sample from now on.
+    // Its compositor may have become a sampler.
     let sampler = session.plan().assignment.samplers[0].node_name[1..].parse::<usize>().unwrap();
     cluster.nodes[sampler].kill();
     for i in 0.. {
@@ -165,6 +165,6 @@ async fn a_viewer_that_pauses_goes_on_at_its_newest_pose() {
         numbers.push(timeout(HEALED, live.next()).await.unwrap().unwrap().frame.request.frame);
     }
     assert!(numbers.is_sorted() && numbers.len() <= 4, "{numbers:?}: two, one that was asked for, and the newest");
-    // Batches of the same session are not touched by it.
+    // Batches of the same session are unaffected.
     assert_eq!(session.render_views(views(1, 6)).unwrap().all().await.unwrap().len(), 6);
 }

@@ -1,4 +1,4 @@
-//! Nobody holds up another, and what is too much is refused by its name.
+//! No stream delays another, and requests beyond a quota are refused by its name.
 
 use std::time::{Duration, Instant};
 
@@ -69,7 +69,7 @@ async fn a_client_with_thousands_of_views_does_not_starve_others() {
     assert_eq!(bulk.await.unwrap(), 4000);
 }
 
-/// A client asks for the rest of a batch when it has some of it: by then others may have taken the room.
+/// A client requests the rest of a batch when it has some of it: by then others may have used the quota.
 #[tokio::test(flavor = "multi_thread")]
 async fn an_admitted_stream_waits_for_room() {
     let small = |config: NodeConfig| NodeConfig { quotas: Quotas { pixels: 4 << 20, ..config.quotas }, ..config };
@@ -104,7 +104,7 @@ async fn a_request_beyond_a_quota_of_a_node_is_refused_by_name() {
         let request = greedy(&session, 1024, count);
         narrow(&address).await.render_views(tokio_stream::once(request).chain(tokio_stream::pending())).await
     };
-    // Takes nothing, and keeps the node's pixels.
+    // This client takes no frames, and holds the node's pixels.
     let _first = ask(64).await.unwrap();
     tokio::time::sleep(Duration::from_millis(300)).await;
     let mut second = ask(1).await.unwrap();
@@ -171,7 +171,7 @@ async fn two_hundred_idle_streams_delay_no_frame() {
     for i in 0..10 {
         seen(&mut live, i as f32 * 0.01, 0).await;
     }
-    // None was let go.
+    // No stream was ended.
     for (_, live) in &mut idle {
         seen(live, 0.3, 0).await;
     }
