@@ -3,15 +3,14 @@
 //! [`schedule`] decides and does nothing else: no clock, no await. `service` asks it and does the rest.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod carrying_out;
 mod config;
-mod leaving_out;
+mod executor;
+mod membership;
 mod metrics;
 mod observers;
 mod opening;
-mod reports;
+mod probe;
 pub mod schedule;
-mod seats;
 mod service;
 mod workload;
 

@@ -21,12 +21,12 @@ use wire::{
     SessionRequest, Timeline, Welcome, WorkReport,
 };
 
-use crate::carrying_out::{Commands, carry_out, refusal};
-use crate::leaving_out::probe;
+use crate::executor::{Commands, carry_out, refusal};
+use crate::membership::Seats;
 use crate::opening::{Events, open};
-use crate::reports::Reports;
+use crate::probe::probe;
+use crate::schedule::reports::Reports;
 use crate::schedule::{Event, Scheduler};
-use crate::seats::Seats;
 use crate::{CoordinatorConfig, Observers, SceneOffer};
 
 /// Events that a session's client has not read yet.

@@ -7,7 +7,7 @@ use wire::limits::MAX_CELLS;
 use wire::{SessionRequest, Workload};
 
 use crate::SceneOffer;
-use crate::carrying_out::refusal;
+use crate::executor::refusal;
 use crate::schedule::{ChoiceError, firsts};
 
 /// Completes a request with the scene's defaults.

@@ -2,7 +2,7 @@
 
 use wire::{Assignment, CompositorShare, NodeStatus, Policy, SamplerShare, Workload};
 
-use super::deal::deal;
+use super::makespan::deal;
 use super::{Choice, Load, NodeCosts, relay_fanout};
 
 /// So many views at least are dealt to see who should make how many: of few, some nodes would get none.

@@ -8,25 +8,26 @@ mod assign;
 mod balance;
 mod cells;
 mod choose;
-mod costs;
-mod deal;
+mod estimate;
 mod event;
+mod event_log;
+mod event_record;
 mod exact;
-mod log;
+mod hysteresis;
+mod makespan;
 mod overload;
-mod patience;
-mod predict;
+mod prediction;
 mod reason;
+mod relay_tree;
+pub(crate) mod reports;
 mod scheduler;
 mod search;
-mod transfer;
-mod work;
-mod written;
+mod workload_state;
 
 #[cfg(test)]
 mod cells_tests;
 #[cfg(test)]
-mod simulation;
+mod simulated_cluster;
 #[cfg(test)]
 mod test_support;
 
@@ -34,10 +35,10 @@ pub use assign::share_images;
 pub use balance::{brute_force_k, k_fd, k_fd_printed, pipeline_time};
 pub(crate) use cells::firsts;
 pub use choose::{Choice, ChoiceError, Demand, Predicted, Present, Wish, choose};
-pub use costs::NodeCosts;
+pub use estimate::NodeCosts;
 pub use event::{Command, Event, Opening};
-pub use log::{LogError, Recorder, replay};
-pub use predict::{Load, direct_s, pipeline_by_s, pipeline_s, relay_fanout, time_share_s};
+pub use event_log::{LogError, Recorder, replay};
+pub use prediction::{Load, direct_s, pipeline_by_s, pipeline_s, relay_fanout, time_share_s};
 pub use scheduler::Scheduler;
 pub use search::{Division, enumerate};
 pub use wire::MeasuredCosts;

@@ -12,10 +12,10 @@ use wire::{
 
 use super::assign::assignment;
 use super::choose::{Demand, Present, WORTH, step_from};
-use super::costs::{Estimate, Sampled, common_ratios};
+use super::estimate::{Estimate, Sampled, common_ratios};
+use super::hysteresis::Gain;
 use super::overload::Look;
-use super::patience::Gain;
-use super::work::{InForce, Work};
+use super::workload_state::{InForce, Work};
 use super::{Choice, Command, Event, Load, NodeCosts, Opening, Wish, choose, direct_s, pipeline_by_s, time_share_s};
 
 /// A node that has nothing to do is given a role for less than roles are changed for.

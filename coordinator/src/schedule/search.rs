@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::predict::pipeline_s;
+use super::prediction::pipeline_s;
 use super::{Load, NodeCosts};
 
 /// Most nodes of which moves and swaps are tried: beyond, every look would take longer than it saves.

@@ -5,7 +5,7 @@ use wire::limits::MAX_CELLS;
 
 use super::Scheduler;
 use crate::schedule::choose::{Demand, check};
-use crate::schedule::work::Work;
+use crate::schedule::workload_state::Work;
 use crate::schedule::{ChoiceError, NodeCosts, Opening, choose};
 
 /// Of the nodes' time, at the least that sessions make do with: what is measured alone and in even batches takes longer among

@@ -8,8 +8,8 @@ use glam::UVec2;
 use wire::{AchievedTime, Assignment, Costs, Policy, Quality, SessionPlan, Workload};
 
 use super::cells::Cells;
+use super::hysteresis::Patience;
 use super::overload::Overload;
-use super::patience::Patience;
 use super::{Load, Opening, Wish};
 
 /// One session's part.

@@ -7,8 +7,8 @@ use std::num::NonZeroU32;
 use wire::Policy;
 
 use super::NodeCosts;
-use super::deal::{Worker, deal, finish_s};
-use super::transfer::{Links, best_way};
+use super::makespan::{Worker, deal, finish_s};
+use super::relay_tree::{Links, best_way};
 
 /// What is asked of the cluster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

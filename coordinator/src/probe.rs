@@ -8,8 +8,8 @@ use tonic::{Code, Status};
 use wire::rpc::is_serving;
 use wire::{NodeStatus, SamplerReport};
 
-use crate::reports::{Verdict, concerns};
 use crate::schedule::Event;
+use crate::schedule::reports::{Verdict, concerns};
 use crate::service::Inner;
 
 /// How long a node is left out: its link may be mended by then. Where nobody else is left, only as long as it takes not

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::written::{Written, Wrong};
+use super::event_record::{Written, Wrong};
 use super::{Command, Event, Scheduler};
 
 /// What the first line says.
@@ -145,5 +145,5 @@ struct Line {
 }
 
 #[cfg(test)]
-#[path = "log_tests.rs"]
+#[path = "event_log_tests.rs"]
 mod tests;
