@@ -1,77 +1,62 @@
-//! One process a member: which one it is, and how its membership is ended.
+//! Membership: one process for each node name.
 
 use std::collections::{HashMap, HashSet};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use parking_lot::Mutex;
 use tokio::sync::mpsc;
 use tonic::Status;
 use wire::limits::MAX_NODES;
 use wire::{NodeStatus, Welcome};
 
-/// What a member is told. Room for a welcome and an end.
-type Says = mpsc::Sender<Result<Welcome, Status>>;
-pub(crate) type Told = mpsc::Receiver<Result<Welcome, Status>>;
+/// The stream by which a member hears of its membership: a welcome, and an end.
+pub(crate) type MembershipStream = mpsc::Receiver<Result<Welcome, Status>>;
 
-struct Seat {
+struct Membership {
     incarnation: u64,
     address: String,
-    says: Says,
-    /// Processes of this name that came before, and may not take it back while this one is here.
+    stream: mpsc::Sender<Result<Welcome, Status>>,
+    /// Addresses of earlier processes of this name, which may not take the name back while this one is a member.
     replaced: HashSet<String>,
 }
 
-/// Members by name. Of two processes with one name the later counts; the earlier waits until that one has left, or they
-/// would replace each other for ever.
+/// Members by name. The later of two processes with one name counts; the earlier waits until the later has left, or they
+/// would replace each other forever.
 #[derive(Default)]
-pub(crate) struct Seats(Mutex<HashMap<String, Seat>>);
+pub(crate) struct MembershipRegistry(Mutex<HashMap<String, Membership>>);
 
-impl Seats {
-    fn locked(&self) -> MutexGuard<'_, HashMap<String, Seat>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Seats a node; a process that has its name is told to leave.
-    pub(crate) fn take(&self, node: &NodeStatus, incarnation: u64, welcome: Welcome) -> Result<Told, Status> {
-        let mut seats = self.locked();
-        if seats.len() >= MAX_NODES && !seats.contains_key(&node.node_name) {
+impl MembershipRegistry {
+    /// Registers a node; a process that has its name is told to leave.
+    pub(crate) fn join(
+        &self,
+        node: &NodeStatus,
+        incarnation: u64,
+        welcome: Welcome,
+    ) -> Result<MembershipStream, Status> {
+        let mut members = self.0.lock();
+        if members.len() >= MAX_NODES && !members.contains_key(&node.node_name) {
             return Err(Status::resource_exhausted(format!("node_name: there are {MAX_NODES} nodes")));
         }
         let mut replaced = HashSet::new();
-        if let Some(before) = seats.get(&node.node_name).filter(|before| before.address != node.address) {
+        if let Some(before) = members.get(&node.node_name).filter(|before| before.address != node.address) {
             if before.replaced.contains(&node.address) {
                 return Err(taken(&node.node_name, &before.address));
             }
             replaced.extend(before.replaced.iter().cloned().chain([before.address.clone()]));
         }
-        let (says, told) = mpsc::channel(2);
-        let _ = says.try_send(Ok(welcome));
-        let seat = Seat { incarnation, address: node.address.clone(), says, replaced };
-        if let Some(before) = seats.insert(node.node_name.clone(), seat) {
-            let _ = before.says.try_send(Err(taken(&node.node_name, &node.address)));
+        let (stream, receiver) = mpsc::channel(2);
+        let _ = stream.try_send(Ok(welcome));
+        let membership = Membership { incarnation, address: node.address.clone(), stream, replaced };
+        if let Some(before) = members.insert(node.node_name.clone(), membership) {
+            let _ = before.stream.try_send(Err(taken(&node.node_name, &node.address)));
         }
-        Ok(told)
+        Ok(receiver)
     }
 
     /// The membership has ended.
     pub(crate) fn leave(&self, node_name: &str, incarnation: u64) {
-        let mut seats = self.locked();
-        if seats.get(node_name).is_some_and(|seat| seat.incarnation == incarnation) {
-            seats.remove(node_name);
-        }
-    }
-
-    /// Who has the name now.
-    pub(crate) fn incarnation(&self, node_name: &str) -> Option<u64> {
-        self.locked().get(node_name).map(|seat| seat.incarnation)
-    }
-
-    /// Ends a membership, if it is still the same; the node may join again.
-    pub(crate) fn end(&self, node_name: &str, incarnation: u64, why: &str) {
-        let mut seats = self.locked();
-        if seats.get(node_name).is_some_and(|seat| seat.incarnation == incarnation)
-            && let Some(seat) = seats.remove(node_name)
-        {
-            let _ = seat.says.try_send(Err(Status::aborted(why)));
+        let mut members = self.0.lock();
+        if members.get(node_name).is_some_and(|member| member.incarnation == incarnation) {
+            members.remove(node_name);
         }
     }
 }
@@ -95,39 +80,37 @@ mod tests {
         }
     }
 
-    fn take(seats: &Seats, address: &str, incarnation: u64) -> Result<Told, Code> {
-        let mut told = seats.take(&node(address), incarnation, Welcome::default()).map_err(|status| status.code())?;
-        assert_eq!(told.try_recv().unwrap().unwrap(), Welcome::default());
-        Ok(told)
+    fn join(registry: &MembershipRegistry, address: &str, incarnation: u64) -> Result<MembershipStream, Code> {
+        let joined = registry.join(&node(address), incarnation, Welcome::default());
+        let mut stream = joined.map_err(|status| status.code())?;
+        assert_eq!(stream.try_recv().unwrap().unwrap(), Welcome::default());
+        Ok(stream)
     }
 
     #[test]
-    fn the_later_counts_and_the_earlier_waits_until_it_has_left() {
-        let seats = Seats::default();
-        let mut first = take(&seats, "a", 1).unwrap();
-        let mut second = take(&seats, "b", 2).unwrap();
+    fn the_later_process_of_a_name_is_the_member_until_it_has_left() {
+        let registry = MembershipRegistry::default();
+        let mut first = join(&registry, "a", 1).unwrap();
+        let mut second = join(&registry, "b", 2).unwrap();
         assert_eq!(first.try_recv().unwrap().unwrap_err().code(), Code::AlreadyExists);
-        seats.leave("n", 1);
-        assert_eq!(take(&seats, "a", 3).err(), Some(Code::AlreadyExists));
-        let mut third = take(&seats, "c", 4).unwrap();
+        registry.leave("n", 1);
+        assert_eq!(join(&registry, "a", 3).err(), Some(Code::AlreadyExists));
+        let mut third = join(&registry, "c", 4).unwrap();
         assert!(second.try_recv().unwrap().is_err());
-        assert_eq!(take(&seats, "a", 5).err(), Some(Code::AlreadyExists));
-        assert_eq!(take(&seats, "b", 6).err(), Some(Code::AlreadyExists));
+        assert_eq!(join(&registry, "a", 5).err(), Some(Code::AlreadyExists));
+        assert_eq!(join(&registry, "b", 6).err(), Some(Code::AlreadyExists));
         assert!(third.try_recv().is_err(), "it stays");
-        seats.leave("n", 4);
-        take(&seats, "a", 7).unwrap();
+        registry.leave("n", 4);
+        join(&registry, "a", 7).unwrap();
     }
 
     #[test]
-    fn a_process_may_join_again_where_it_is() {
-        let seats = Seats::default();
-        let _first = take(&seats, "a", 1).unwrap();
-        let _again = take(&seats, "a", 2).unwrap();
-        let mut third = take(&seats, "a", 3).unwrap();
-        seats.end("n", 2, "of before");
-        assert_eq!(seats.incarnation("n"), Some(3));
-        seats.end("n", 3, "because");
-        assert_eq!(third.try_recv().unwrap().unwrap_err().message(), "because");
-        assert_eq!(seats.incarnation("n"), None);
+    fn a_process_may_join_again_at_its_address() {
+        let registry = MembershipRegistry::default();
+        let _first = join(&registry, "a", 1).unwrap();
+        let _second = join(&registry, "a", 2).unwrap();
+        registry.leave("n", 1);
+        assert_eq!(join(&registry, "b", 3).map(drop), Ok(()), "the end of the first is not that of the second");
+        assert_eq!(join(&registry, "a", 4).err(), Some(Code::AlreadyExists));
     }
 }

@@ -1,107 +1,83 @@
-//! Nodes that are members and yet of no use: who cannot be reached, or whose images nobody can get.
+//! Probes: whether a node serves, and whether a sampler's images arrive whole.
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::task::JoinSet;
+use depth_image::Camera;
+use node::blocking;
+use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
-use wire::rpc::is_serving;
-use wire::{NodeStatus, SamplerReport};
+use wire::rpc::{SamplerClient, is_serving};
+use wire::{DecodeLimits, FetchImages, Reassembled, Reassembler, SampleSetId, WireError, decode_depth_image};
 
-use crate::schedule::Event;
-use crate::schedule::reports::{Verdict, concerns};
-use crate::service::Inner;
+use crate::schedule::{Event, Probe, ProbedImage};
+use crate::shared::Shared;
+use crate::status::within;
 
-/// How long a node is left out: its link may be mended by then. Where nobody else is left, only as long as it takes not
-/// to plan the same again and again.
-const LEFT_OUT: Duration = Duration::from_secs(30);
-const LEFT_OUT_ALONE: Duration = Duration::from_secs(2);
-/// Between two probes of a node, and how long its answer may take: as keepalive does. Membership shows only that the
-/// node reaches us.
-const PROBES_APART: Duration = Duration::from_secs(5);
-const ANSWERS_WITHIN: Duration = Duration::from_secs(5);
-const ASKED_AGAIN: Duration = Duration::from_millis(200);
+/// A single failure may be the network's.
+const ATTEMPTS: usize = 3;
+const PAUSE: Duration = Duration::from_millis(200);
 
-/// Asks all nodes of the plan in force whether they serve. Runs until it is aborted.
-pub(crate) async fn probe(inner: Arc<Inner>) {
-    loop {
-        tokio::time::sleep(PROBES_APART).await;
-        let status = inner.status();
-        let Some(plan) = status.plan else { continue };
-        let plan_epoch = plan.assignment.plan_epoch;
-        let ready: Vec<_> = status.conditions.iter().filter(|node| node.is_ready).map(|node| &node.node_name).collect();
-        let mut probes = JoinSet::new();
-        for node in status.nodes.into_iter().filter(|node| ready.contains(&&node.node_name)) {
-            probes.spawn(answer(node));
+/// Probes a node and tells the schedule.
+pub(crate) async fn probe(shared: Arc<Shared>, probe: Probe) {
+    let failed = within(probe.deadline, "an answer", attempts(&shared, &probe)).await.err();
+    let failure = failed.map(|status| match &probe.image {
+        None => format!("at {} does not answer: {}", probe.address, status.message()),
+        Some(_) => status.message().to_owned(),
+    });
+    let kind = probe.kind();
+    let Probe { plan_epoch, node_name, incarnation, .. } = probe;
+    shared.step(Event::Probed { plan_epoch, node_name, incarnation, kind, failure });
+}
+
+async fn attempts(shared: &Shared, probe: &Probe) -> Result<(), Status> {
+    for _ in 1..ATTEMPTS {
+        if attempt(shared, probe).await.is_ok() {
+            return Ok(());
         }
-        while let Some(ended) = probes.join_next().await {
-            if let Ok(Some((node_name, reason))) = ended {
-                // Of several, each leads to another plan.
-                let plan_epoch = inner.status().plan.map_or(plan_epoch, |plan| plan.assignment.plan_epoch);
-                inner.leave_out(plan_epoch, node_name, reason);
+        tokio::time::sleep(PAUSE).await;
+    }
+    attempt(shared, probe).await
+}
+
+async fn attempt(shared: &Shared, probe: &Probe) -> Result<(), Status> {
+    match &probe.image {
+        None => serves(&probe.address).await,
+        Some(image) => check_image(shared, &probe.address, image).await,
+    }
+}
+
+/// A node without a health service, or with too much work, answers as well.
+async fn serves(address: &str) -> Result<(), Status> {
+    match is_serving(address, "").await {
+        Err(status) if ![Code::Unimplemented, Code::NotFound, Code::ResourceExhausted].contains(&status.code()) => {
+            Err(status)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Fetches an image and decodes it, as a compositor does.
+async fn check_image(shared: &Shared, address: &str, image: &ProbedImage) -> Result<(), Status> {
+    let FetchImages { plan_epoch, set_index, image_indices, .. } = &image.request;
+    let id = SampleSetId { plan_epoch: *plan_epoch, index: u64::from(*set_index) };
+    let client = SamplerClient::new(shared.connections.to(address).await?);
+    let mut chunks = client.fetch_sample_images(image.request.clone()).await?;
+    let mut reassembler = Reassembler::new(DecodeLimits::default(), id);
+    while let Some(chunk) = chunks.next().await {
+        if let Some(whole) = reassembler.push(chunk?).map_err(WireError::from)? {
+            if whole.sample_set_id != id || !image_indices.contains(&whole.image_index) {
+                let (got, set) = (whole.image_index, whole.sample_set_id);
+                return Err(Status::data_loss(format!("image {got} of sample set {set} came for {id}")));
             }
+            return decode(image.camera, whole).await;
         }
     }
+    Err(Status::data_loss("no whole image came"))
 }
 
-/// A node that does not answer, and why.
-async fn answer(node: NodeStatus) -> Option<(String, String)> {
-    let late = |_| Status::deadline_exceeded(format!("no answer for {} s", ANSWERS_WITHIN.as_secs()));
-    // What breaks at once may be the network's fault.
-    let mut attempts = 3;
-    let failed = loop {
-        let asked = tokio::time::timeout(ANSWERS_WITHIN, is_serving(&node.address, "")).await.map_err(late);
-        let failed = asked.and_then(|asked| asked).err()?;
-        attempts -= 1;
-        if attempts == 0 || failed.code() == Code::DeadlineExceeded {
-            break failed;
-        }
-        tokio::time::sleep(ASKED_AGAIN).await;
-    };
-    // One that has no such service, or too much to do, answers.
-    let silent = ![Code::Unimplemented, Code::NotFound, Code::ResourceExhausted].contains(&failed.code());
-    silent.then(|| (node.node_name, format!("{} does not answer: {}", node.address, failed.message())))
-}
-
-impl Inner {
-    /// The plan goes on without a node, if it is in force. After a while the node may join again.
-    pub(crate) fn leave_out(self: &Arc<Self>, plan_epoch: u64, node_name: String, reason: String) {
-        let counts = self.status().plan.is_some_and(|plan| plan.assignment.plan_epoch == plan_epoch);
-        let membership = self.seats.incarnation(&node_name).filter(|_| counts);
-        tracing::warn!(node = node_name, plan_epoch, reason, "left out");
-        self.step(Event::Unready { plan_epoch, node_name: node_name.clone(), reason });
-        if let Some(incarnation) = membership {
-            tokio::spawn(let_back(self.clone(), node_name, incarnation));
-        }
-    }
-
-    /// Hears a compositor's report.
-    pub(crate) fn hear(self: &Arc<Self>, report: &SamplerReport) -> Result<(), Status> {
-        let plan = self.status().plan;
-        if !plan.is_some_and(|plan| concerns(report, &plan)) {
-            return Err(Status::failed_precondition(format!("plan_epoch {} gives no such roles", report.plan_epoch)));
-        }
-        let reason = format!("{} cannot get images of {}: {}", report.compositor, report.sampler, report.reason);
-        match self.reports.judge(report) {
-            Verdict::Sampler => self.leave_out(report.plan_epoch, report.sampler.clone(), reason),
-            Verdict::Compositor { blamed } => {
-                self.leave_out(report.plan_epoch, report.compositor.clone(), reason);
-                if let Some(incarnation) = self.seats.incarnation(&blamed) {
-                    self.seats.end(&blamed, incarnation, "was left out for another's fault: join again");
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
-async fn let_back(inner: Arc<Inner>, node_name: String, incarnation: u64) {
-    let others_work = async || {
-        while inner.status().plan.is_some() {
-            tokio::time::sleep(ASKED_AGAIN).await;
-        }
-    };
-    tokio::time::sleep(LEFT_OUT_ALONE).await;
-    let _ = tokio::time::timeout(LEFT_OUT.saturating_sub(LEFT_OUT_ALONE), others_work()).await;
-    inner.seats.end(&node_name, incarnation, "was left out for a while: join again");
+async fn decode(camera: Camera, whole: Reassembled) -> Result<(), Status> {
+    let decode =
+        move || decode_depth_image(&whole.image.header, camera, &whole.image.payload, &DecodeLimits::default());
+    blocking(move || decode().map(drop).map_err(|error| Status::data_loss(error.to_string()))).await
 }

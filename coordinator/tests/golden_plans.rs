@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Duration;
 
-use coordinator::schedule::{Command, Event, MeasuredCosts, Opening, Scheduler};
+use coordinator::schedule::{Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 use wire::{
@@ -67,10 +67,8 @@ fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) -> Opening 
         session,
         workload: workload(4, Timeline::still(0.0)),
         views_per_set,
-        frames_per_s: 0.0,
-        policy,
-        forced_samplers: None,
-        forced_tiles: None,
+        frames_per_s: None,
+        policy_override: PolicyOverride { policy, ..PolicyOverride::default() },
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
         costs: WHOLE,
@@ -81,16 +79,20 @@ fn opened(opening: Opening) -> Event {
     Event::Opened(Box::new(opening))
 }
 
-fn demanded(session: u64, views_per_set: usize, frames_per_s: f64) -> Event {
-    Event::Demanded { session, views_per_set, frames_per_s }
+fn demanded(session: u64, views_per_set: usize, frames_per_s: Option<f64>) -> Event {
+    Event::DemandChanged { session, views_per_set, frames_per_s }
 }
 
-fn looked(session: u64, viewpoints: Vec<PinholeCamera>) -> Event {
-    Event::Looked { session, viewpoints }
+fn viewpoints_changed(session: u64, viewpoints: Vec<PinholeCamera>) -> Event {
+    Event::ViewpointsChanged { session, viewpoints }
 }
 
-fn frame_rate(frames_per_s: f64) -> f64 {
-    frames_per_s
+fn frame_rate(frames_per_s: f64) -> Option<f64> {
+    (frames_per_s > 0.0).then_some(frames_per_s)
+}
+
+fn forced(forced_samplers: Option<usize>, forced_tiles: Option<usize>) -> PolicyOverride {
+    PolicyOverride { policy: PolicyChoice::Pipeline, forced_samplers, forced_tiles }
 }
 
 /// A scheduler, its clock, and the text of its plans.
@@ -135,6 +137,8 @@ impl Script {
                     writeln!(self.text, "{at_s:.1} s, session {session} is refused").unwrap();
                 }
                 Command::End { session, .. } => writeln!(self.text, "{at_s:.1} s, session {session} ends").unwrap(),
+                Command::Probe(_) => (),
+                Command::Quarantine { .. } | Command::Readmit { .. } => panic!("no node is at fault"),
             }
         }
     }
@@ -228,9 +232,10 @@ fn every_policy_on_every_cluster() -> String {
 
 fn forced_samplers() -> String {
     let mut text = String::new();
-    for forced in 0..6 {
-        let mut script = Script::new(&format!("K = {forced} is forced on 5 nodes"), 5);
-        script.step(opened(Opening { forced_samplers: Some(forced), ..opening(1, PolicyChoice::Pipeline, 40) }));
+    for k in 0..6 {
+        let mut script = Script::new(&format!("K = {k} is forced on 5 nodes"), 5);
+        let policy_override = forced(Some(k), None);
+        script.step(opened(Opening { policy_override, ..opening(1, PolicyChoice::Pipeline, 40) }));
         script.leave(0);
         script.leave(1);
         script.wait(20);
@@ -249,19 +254,15 @@ fn tiles() -> String {
             text += &script.text;
         }
     }
-    for forced in [1, 2, 4, 16] {
-        let mut script = Script::new(&format!("{forced} tiles are forced"), 6);
-        let forced = Some(forced);
-        script.step(opened(Opening { forced_tiles: forced, ..opening(1, PolicyChoice::Pipeline, 10) }));
-        script.step(opened(Opening { forced_tiles: forced, costs: TILEABLE, ..opening(2, PolicyChoice::Auto, 10) }));
+    for tiles in [1, 2, 4, 16] {
+        let mut script = Script::new(&format!("{tiles} tiles are forced"), 6);
+        let pipeline = forced(None, Some(tiles));
+        let auto = PolicyOverride { policy: PolicyChoice::Auto, ..pipeline };
+        script.step(opened(Opening { policy_override: pipeline, ..opening(1, PolicyChoice::Pipeline, 10) }));
+        let tileable = Opening { costs: TILEABLE, ..opening(2, PolicyChoice::Auto, 10) };
+        script.step(opened(Opening { policy_override: auto, ..tileable.clone() }));
         let other = workload(3, Timeline::still(0.0));
-        let opening = Opening {
-            forced_tiles: forced,
-            workload: other,
-            costs: TILEABLE,
-            ..opening(3, PolicyChoice::Pipeline, 10)
-        };
-        script.step(opened(opening));
+        script.step(opened(Opening { session: 3, policy_override: pipeline, workload: other, ..tileable }));
         script.wait(20);
         text += &script.text;
     }
@@ -388,7 +389,7 @@ fn view_cells() -> String {
     script.step(from(1, vec![view(0.0), view(0.1)]));
     script.step(from(2, vec![view(0.05)]));
     script.step(from(3, vec![view(3.0)]));
-    script.step(looked(1, vec![view(0.0), view(1.5)]));
+    script.step(viewpoints_changed(1, vec![view(0.0), view(1.5)]));
     script.wait(10);
     script.step(from(4, (0..30).map(|i| view(0.2 * i as f32)).collect()));
     script.step(demanded(4, 2000, frame_rate(0.0)));

@@ -6,11 +6,13 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::event_record::{Written, Wrong};
-use super::{Command, Event, Scheduler};
+use super::command::Command;
+use super::event::Event;
+use super::event_record::{EventRecord, WrongField};
+use super::scheduler::Scheduler;
 
 /// What the first line says.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// A line that is longer is no event.
 const MAX_LINE_BYTES: u64 = 1 << 20;
 
@@ -91,11 +93,20 @@ fn write_line(writer: &mut impl Write, line: &impl Serialize) -> io::Result<()> 
     writer.flush()
 }
 
-/// Runs a log through a new scheduler: every event, when it came and what followed.
+/// One event of a replayed log, and the commands that followed.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct Step {
+    pub now: Duration,
+    pub event: Event,
+    pub commands: Vec<Command>,
+}
+
+/// Runs a log through a new scheduler.
 ///
 /// # Errors
 /// At the first line that is no event.
-pub fn replay(mut reader: impl BufRead) -> Result<Vec<(Duration, Event, Vec<Command>)>, LogError> {
+pub fn replay(mut reader: impl BufRead) -> Result<Vec<Step>, LogError> {
     let first = next_line(&mut reader, 1)?.unwrap_or_default();
     let Header { version } = parse(&first, 1)?;
     if version != VERSION {
@@ -107,7 +118,7 @@ pub fn replay(mut reader: impl BufRead) -> Result<Vec<(Duration, Event, Vec<Comm
         let Line { now_ns, event } = parse(&text, line)?;
         let (now, event) = (Duration::from_nanos(now_ns), event.read().map_err(|wrong| wrong_at(wrong, line))?);
         let commands = scheduler.step(now, event.clone());
-        steps.push((now, event, commands));
+        steps.push(Step { now, event, commands });
     }
     Ok(steps)
 }
@@ -123,7 +134,7 @@ fn next_line(reader: &mut impl BufRead, line: usize) -> Result<Option<Vec<u8>>, 
     Ok((count > 0).then_some(text))
 }
 
-fn wrong_at(wrong: Wrong, line: usize) -> LogError {
+fn wrong_at(wrong: WrongField, line: usize) -> LogError {
     LogError::Field { line, field: wrong.field, reason: wrong.reason }
 }
 
@@ -141,7 +152,7 @@ struct Line {
     /// Since the coordinator started.
     now_ns: u64,
     #[serde(flatten)]
-    event: Written,
+    event: EventRecord,
 }
 
 #[cfg(test)]

@@ -1,11 +1,10 @@
-use wire::PolicyChoice;
+use wire::{MeasuredCosts, PolicyChoice, SamplerReport};
 
 use super::*;
-use crate::schedule::MeasuredCosts;
-use crate::schedule::Opening;
+use crate::schedule::event::{Opening, ProbeKind};
 use crate::schedule::test_support::{Random, join, opened, opening, view};
 
-fn incident() -> Vec<(Duration, Event)> {
+fn history() -> Vec<(Duration, Event)> {
     let measured =
         MeasuredCosts { sample_image_s: Some(0.1 + 0.2), image_bytes: Some(1e5), ..MeasuredCosts::default() };
     let named = "n0".to_owned();
@@ -14,8 +13,8 @@ fn incident() -> Vec<(Duration, Event)> {
         join("n1", 2, 0),
         opened(7, PolicyChoice::Pipeline, 40),
         Event::Ready { plan_epoch: 4, node_name: named.clone() },
-        Event::Demanded { session: 7, views_per_set: 500, frames_per_s: 0.1 },
-        Event::Looked { session: 7, viewpoints: vec![view(0.1), view(1.0 / 3.0)] },
+        Event::DemandChanged { session: 7, views_per_set: 500, frames_per_s: Some(0.1) },
+        Event::ViewpointsChanged { session: 7, viewpoints: vec![view(0.1), view(1.0 / 3.0)] },
         Event::Measured {
             node_name: named.clone(),
             plan_epoch: 4,
@@ -25,6 +24,16 @@ fn incident() -> Vec<(Duration, Event)> {
             dropped_views: 1,
         },
         Event::Unready { plan_epoch: 4, node_name: named.clone(), reason: "no \"disk\"\nleft".to_owned() },
+        Event::Rejected { plan_epoch: 4, node_name: "n1".to_owned(), reason: "lighting".to_owned() },
+        Event::Applied { plan_epoch: 4 },
+        Event::Reported(SamplerReport {
+            plan_epoch: 5,
+            compositor: "n1".to_owned(),
+            sampler: named.clone(),
+            reason: String::new(),
+        }),
+        probed(ProbeKind::Image, Some("no images")),
+        probed(ProbeKind::Liveness, None),
         Event::Left { incarnation: 1, node_name: named },
         opened(8, PolicyChoice::TimeShare, 1),
         Event::Opened(Box::new(Opening { viewpoints: vec![view(0.7)], ..opening(9, PolicyChoice::Pipeline, 3) })),
@@ -34,10 +43,15 @@ fn incident() -> Vec<(Duration, Event)> {
     events.into_iter().enumerate().map(|(i, event)| (Duration::new(i as u64, 123_456_789), event)).collect()
 }
 
+fn probed(kind: ProbeKind, failure: Option<&str>) -> Event {
+    let (node_name, failure) = ("n0".to_owned(), failure.map(str::to_owned));
+    Event::Probed { plan_epoch: 5, node_name, incarnation: 1, kind, failure }
+}
+
 fn recorded() -> Vec<u8> {
     let mut text = Vec::new();
     let mut recorder = Recorder::new(&mut text).unwrap();
-    incident().iter().for_each(|(now, event)| recorder.record(*now, event).unwrap());
+    history().iter().for_each(|(now, event)| recorder.record(*now, event).unwrap());
     text
 }
 
@@ -50,33 +64,33 @@ fn a_replayed_log_gives_the_same_commands() {
     let mut scheduler = Scheduler::default();
     let mut commanded = 0;
     let steps = replay(&recorded()[..]).unwrap();
-    assert_eq!(steps.len(), incident().len());
-    for ((now, event), step) in incident().into_iter().zip(steps) {
+    assert_eq!(steps.len(), history().len());
+    for ((now, event), step) in history().into_iter().zip(steps) {
         let commands = scheduler.step(now, event.clone());
         commanded += commands.len();
-        assert_eq!(step, (now, event, commands));
+        assert_eq!(step, Step { now, event, commands });
     }
     assert!(commanded > 2, "{commanded}");
 }
 
 #[test]
-fn one_line_an_event_after_the_version() {
+fn a_log_has_one_line_an_event_after_its_version() {
     let text = String::from_utf8(recorded()).unwrap();
     let lines: Vec<&str> = text.lines().collect();
-    assert_eq!(lines.len(), incident().len() + 1);
-    assert_eq!(lines[0], r#"{"version":2}"#);
+    assert_eq!(lines.len(), history().len() + 1);
+    assert_eq!(lines[0], r#"{"version":3}"#);
     assert_eq!(
         lines[5],
-        r#"{"now_ns":4123456789,"event":"demanded","session":7,"views_per_set":500,"frames_per_s":"0.1"}"#
+        r#"{"now_ns":4123456789,"event":"demand_changed","session":7,"views_per_set":500,"frames_per_s":"0.1"}"#
     );
 }
 
 #[test]
-fn what_is_wrong_is_named_with_its_line() {
-    let after_header = |line: &str| refusal(format!("{{\"version\":2}}\n{line}\n").as_bytes());
+fn an_invalid_line_is_refused_with_its_number_and_field() {
+    let after_header = |line: &str| refusal(format!("{{\"version\":3}}\n{line}\n").as_bytes());
     let cases = [
         (
-            r#"{"now_ns":0,"event":"demanded","session":1,"views_per_set":9999999,"frames_per_s":"0"}"#,
+            r#"{"now_ns":0,"event":"demand_changed","session":1,"views_per_set":9999999}"#,
             "line 2: views_per_set is 9999999",
         ),
         (r#"{"now_ns":0,"event":"left","incarnation":1,"node_name":""}"#, "line 2: node_name has 0 bytes"),
@@ -95,7 +109,7 @@ fn what_is_wrong_is_named_with_its_line() {
         ("\"workload\":\"", "\"workload\":\"xy", "line 4: workload is not hexadecimal"),
         ("\"workload\":\"", "\"workload\":\"00", "line 4: workload workload is corrupt"),
         ("\"load_set_s\":\"0.005\"", "\"load_set_s\":\"-1\"", "line 4: load_set_s is -1"),
-        ("\"version\":2", "\"version\":1", "version is 1, must be 2"),
+        ("\"version\":3", "\"version\":2", "version is 2, must be 3"),
     ] {
         let text = refusal(whole.replacen(from, to, 1).as_bytes());
         assert!(text.contains(part), "{text}");
@@ -105,7 +119,7 @@ fn what_is_wrong_is_named_with_its_line() {
 }
 
 #[test]
-fn damaged_logs_are_refused_or_replayed_and_never_panic() {
+fn damaged_logs_are_refused_or_replayed_without_a_panic() {
     let whole = recorded();
     let mut refused = 0;
     for seed in 0..2000 {

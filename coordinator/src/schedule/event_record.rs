@@ -4,24 +4,26 @@ use depth_image::PinholeCamera;
 use serde::{Deserialize, Serialize};
 use wire::limits::{MAX_FRAMES_PER_S, MAX_TEXT_BYTES, MAX_TILES, MAX_VIEWPOINTS, MAX_VIEWS_PER_SET};
 use wire::{
-    Costs, JoinCluster, MeasuredCosts, NodeStatus, PolicyChoice, Quality, ROW_PARTS, UnknownPolicy, WireError, Workload,
+    Costs, JoinCluster, MeasuredCosts, NodeStatus, PolicyChoice, Quality, ROW_PARTS, SamplerReport, UnknownPolicy,
+    WireError, Workload,
 };
 
-use super::{Event, Opening};
+use super::demand::PolicyOverride;
+use super::event::{Event, Opening, ProbeKind};
 
 /// A field that is wrong, before its line is known.
-pub(super) struct Wrong {
+pub(super) struct WrongField {
     pub(super) field: &'static str,
     pub(super) reason: String,
 }
 
-impl From<WireError> for Wrong {
+impl From<WireError> for WrongField {
     fn from(error: WireError) -> Self {
         Self { field: "workload", reason: error.to_string() }
     }
 }
 
-impl From<UnknownPolicy> for Wrong {
+impl From<UnknownPolicy> for WrongField {
     fn from(error: UnknownPolicy) -> Self {
         Self { field: "policy", reason: error.to_string() }
     }
@@ -30,7 +32,7 @@ impl From<UnknownPolicy> for Wrong {
 /// An event as it is written.
 #[derive(Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
-pub(super) enum Written {
+pub(super) enum EventRecord {
     Joined {
         incarnation: u64,
         node_name: String,
@@ -46,25 +48,25 @@ pub(super) enum Written {
     Opened {
         session: u64,
         views_per_set: usize,
-        #[serde(with = "super::exact")]
-        frames_per_s: f64,
+        #[serde(with = "super::exact::option", default)]
+        frames_per_s: Option<f64>,
         policy: String,
         forced_samplers: Option<usize>,
         forced_tiles: Option<usize>,
-        fallbacks: Vec<WrittenQuality>,
-        costs: WrittenCosts,
+        fallbacks: Vec<RecordedQuality>,
+        costs: RecordedCosts,
         /// The message that nodes get, in hexadecimal.
         workload: String,
         #[serde(default)]
         viewpoints: Vec<PinholeCamera>,
     },
-    Demanded {
+    DemandChanged {
         session: u64,
         views_per_set: usize,
-        #[serde(with = "super::exact")]
-        frames_per_s: f64,
+        #[serde(with = "super::exact::option", default)]
+        frames_per_s: Option<f64>,
     },
-    Looked {
+    ViewpointsChanged {
         session: u64,
         viewpoints: Vec<PinholeCamera>,
     },
@@ -76,7 +78,7 @@ pub(super) enum Written {
         views: u64,
         dropped_views: u64,
         #[serde(flatten)]
-        costs: WrittenTimings,
+        costs: RecordedTimings,
     },
     Ready {
         plan_epoch: u64,
@@ -87,6 +89,27 @@ pub(super) enum Written {
         node_name: String,
         reason: String,
     },
+    Rejected {
+        plan_epoch: u64,
+        node_name: String,
+        reason: String,
+    },
+    Applied {
+        plan_epoch: u64,
+    },
+    Reported {
+        plan_epoch: u64,
+        compositor: String,
+        sampler: String,
+        reason: String,
+    },
+    Probed {
+        plan_epoch: u64,
+        node_name: String,
+        incarnation: u64,
+        is_image: bool,
+        failure: Option<String>,
+    },
     Closed {
         session: u64,
     },
@@ -94,7 +117,7 @@ pub(super) enum Written {
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct WrittenCosts {
+pub(super) struct RecordedCosts {
     #[serde(with = "super::exact")]
     sample_image_s: f64,
     #[serde(with = "super::exact")]
@@ -114,7 +137,7 @@ pub(super) struct WrittenCosts {
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct WrittenQuality {
+pub(super) struct RecordedQuality {
     lighting: String,
     method: String,
     #[serde(with = "super::exact")]
@@ -124,7 +147,7 @@ pub(super) struct WrittenQuality {
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct WrittenTimings {
+pub(super) struct RecordedTimings {
     #[serde(with = "super::exact::option", default)]
     sample_image_s: Option<f64>,
     #[serde(with = "super::exact::option", default)]
@@ -141,28 +164,37 @@ pub(super) struct WrittenTimings {
     image_bytes: Option<f64>,
 }
 
-impl From<&Event> for Written {
+impl From<&Event> for EventRecord {
     fn from(event: &Event) -> Self {
         match event.clone() {
             Event::Joined { incarnation, join } => Self::joined(incarnation, join),
             Event::Left { incarnation, node_name } => Self::Left { incarnation, node_name },
             Event::Opened(opening) => Self::opened(*opening),
-            Event::Demanded { session, views_per_set, frames_per_s } => {
-                Self::Demanded { session, views_per_set, frames_per_s }
+            Event::DemandChanged { session, views_per_set, frames_per_s } => {
+                Self::DemandChanged { session, views_per_set, frames_per_s }
             }
-            Event::Looked { session, viewpoints } => Self::Looked { session, viewpoints },
+            Event::ViewpointsChanged { session, viewpoints } => Self::ViewpointsChanged { session, viewpoints },
             Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views } => {
                 Self::Measured { node_name, plan_epoch, busy_s, views, dropped_views, costs: costs.into() }
             }
             Event::Ready { plan_epoch, node_name } => Self::Ready { plan_epoch, node_name },
             Event::Unready { plan_epoch, node_name, reason } => Self::Unready { plan_epoch, node_name, reason },
+            Event::Rejected { plan_epoch, node_name, reason } => Self::Rejected { plan_epoch, node_name, reason },
+            Event::Applied { plan_epoch } => Self::Applied { plan_epoch },
+            Event::Reported(SamplerReport { plan_epoch, compositor, sampler, reason }) => {
+                Self::Reported { plan_epoch, compositor, sampler, reason }
+            }
+            Event::Probed { plan_epoch, node_name, incarnation, kind, failure } => {
+                let is_image = kind == ProbeKind::Image;
+                Self::Probed { plan_epoch, node_name, incarnation, is_image, failure }
+            }
             Event::Closed { session } => Self::Closed { session },
             Event::Tick => Self::Tick,
         }
     }
 }
 
-impl Written {
+impl EventRecord {
     fn joined(incarnation: u64, join: JoinCluster) -> Self {
         let NodeStatus { node_name, address, device_name, is_software } = join.node;
         Self::Joined { incarnation, node_name, address, device_name, is_software, plan_epoch: join.plan_epoch }
@@ -173,9 +205,9 @@ impl Written {
             session: opening.session,
             views_per_set: opening.views_per_set,
             frames_per_s: opening.frames_per_s,
-            policy: opening.policy.to_string(),
-            forced_samplers: opening.forced_samplers,
-            forced_tiles: opening.forced_tiles,
+            policy: opening.policy_override.policy.to_string(),
+            forced_samplers: opening.policy_override.forced_samplers,
+            forced_tiles: opening.policy_override.forced_tiles,
             fallbacks: opening.fallbacks.into_iter().map(Into::into).collect(),
             costs: opening.costs.into(),
             workload: hex(&opening.workload.to_bytes()),
@@ -183,7 +215,7 @@ impl Written {
         }
     }
 
-    pub(super) fn read(self) -> Result<Event, Wrong> {
+    pub(super) fn read(self) -> Result<Event, WrongField> {
         Ok(match self {
             Self::Joined { incarnation, node_name, address, device_name, is_software, plan_epoch } => {
                 let node = NodeStatus { node_name: name(node_name)?, address, device_name, is_software };
@@ -206,17 +238,23 @@ impl Written {
                 workload: Workload::from_bytes(&bytes(&workload)?)?,
                 views_per_set: views(views_per_set)?,
                 frames_per_s: rate(frames_per_s)?,
-                policy: policy.parse::<PolicyChoice>()?,
-                forced_samplers,
-                forced_tiles: tiles(forced_tiles)?,
-                fallbacks: fallbacks.into_iter().map(WrittenQuality::read).collect::<Result<_, _>>()?,
+                policy_override: PolicyOverride {
+                    policy: policy.parse::<PolicyChoice>()?,
+                    forced_samplers,
+                    forced_tiles: tiles(forced_tiles)?,
+                },
+                fallbacks: fallbacks.into_iter().map(RecordedQuality::read).collect::<Result<_, _>>()?,
                 costs: costs.read()?,
-                viewpoints: looks(viewpoints)?,
+                viewpoints: valid_viewpoints(viewpoints)?,
             })),
-            Self::Demanded { session, views_per_set, frames_per_s } => {
-                Event::Demanded { session, views_per_set: views(views_per_set)?, frames_per_s: rate(frames_per_s)? }
+            Self::DemandChanged { session, views_per_set, frames_per_s } => Event::DemandChanged {
+                session,
+                views_per_set: views(views_per_set)?,
+                frames_per_s: rate(frames_per_s)?,
+            },
+            Self::ViewpointsChanged { session, viewpoints } => {
+                Event::ViewpointsChanged { session, viewpoints: valid_viewpoints(viewpoints)? }
             }
-            Self::Looked { session, viewpoints } => Event::Looked { session, viewpoints: looks(viewpoints)? },
             Self::Measured { node_name, plan_epoch, busy_s, views, dropped_views, costs } => Event::Measured {
                 node_name: name(node_name)?,
                 plan_epoch,
@@ -229,21 +267,36 @@ impl Written {
             Self::Unready { plan_epoch, node_name, reason } => {
                 Event::Unready { plan_epoch, node_name: name(node_name)?, reason }
             }
+            Self::Rejected { plan_epoch, node_name, reason } => {
+                Event::Rejected { plan_epoch, node_name: name(node_name)?, reason }
+            }
+            Self::Applied { plan_epoch } => Event::Applied { plan_epoch },
+            Self::Reported { plan_epoch, compositor, sampler, reason } => {
+                let (compositor, sampler) = (name(compositor)?, name(sampler)?);
+                Event::Reported(SamplerReport { plan_epoch, compositor, sampler, reason })
+            }
+            Self::Probed { plan_epoch, node_name, incarnation, is_image, failure } => {
+                let kind = if is_image { ProbeKind::Image } else { ProbeKind::Liveness };
+                Event::Probed { plan_epoch, node_name: name(node_name)?, incarnation, kind, failure }
+            }
             Self::Closed { session } => Event::Closed { session },
             Self::Tick => Event::Tick,
         })
     }
 }
 
-fn name(node_name: String) -> Result<String, Wrong> {
+fn name(node_name: String) -> Result<String, WrongField> {
     if (1..=MAX_TEXT_BYTES).contains(&node_name.len()) {
         return Ok(node_name);
     }
-    Err(Wrong { field: "node_name", reason: format!("has {} bytes, must have 1 to {MAX_TEXT_BYTES}", node_name.len()) })
+    Err(WrongField {
+        field: "node_name",
+        reason: format!("has {} bytes, must have 1 to {MAX_TEXT_BYTES}", node_name.len()),
+    })
 }
 
-fn looks(viewpoints: Vec<PinholeCamera>) -> Result<Vec<PinholeCamera>, Wrong> {
-    let wrong = |reason: String| Wrong { field: "viewpoints", reason };
+fn valid_viewpoints(viewpoints: Vec<PinholeCamera>) -> Result<Vec<PinholeCamera>, WrongField> {
+    let wrong = |reason: String| WrongField { field: "viewpoints", reason };
     if viewpoints.len() > MAX_VIEWPOINTS {
         return Err(wrong(format!("{} are more than {MAX_VIEWPOINTS}", viewpoints.len())));
     }
@@ -251,40 +304,43 @@ fn looks(viewpoints: Vec<PinholeCamera>) -> Result<Vec<PinholeCamera>, Wrong> {
     Ok(viewpoints)
 }
 
-fn views(views_per_set: usize) -> Result<usize, Wrong> {
+fn views(views_per_set: usize) -> Result<usize, WrongField> {
     if views_per_set <= MAX_VIEWS_PER_SET as usize {
         return Ok(views_per_set);
     }
     let reason = format!("is {views_per_set}, at most {MAX_VIEWS_PER_SET} are allowed");
-    Err(Wrong { field: "views_per_set", reason })
+    Err(WrongField { field: "views_per_set", reason })
 }
 
-fn rate(frames_per_s: f64) -> Result<f64, Wrong> {
-    if (0.0..=MAX_FRAMES_PER_S).contains(&frames_per_s) {
-        return Ok(frames_per_s);
+fn rate(frames_per_s: Option<f64>) -> Result<Option<f64>, WrongField> {
+    match frames_per_s {
+        Some(rate) if !(rate > 0.0 && rate <= MAX_FRAMES_PER_S) => {
+            let reason = format!("is {rate}, must be above 0 and at most {MAX_FRAMES_PER_S}");
+            Err(WrongField { field: "frames_per_s", reason })
+        }
+        _ => Ok(frames_per_s),
     }
-    Err(Wrong { field: "frames_per_s", reason: format!("is {frames_per_s}, must be from 0 to {MAX_FRAMES_PER_S}") })
 }
 
-fn tiles(forced: Option<usize>) -> Result<Option<usize>, Wrong> {
+fn tiles(forced: Option<usize>) -> Result<Option<usize>, WrongField> {
     if forced.is_none_or(|forced| (1..=MAX_TILES as usize).contains(&forced)) {
         return Ok(forced);
     }
-    Err(Wrong { field: "forced_tiles", reason: format!("is {forced:?}, must be from 1 to {MAX_TILES}") })
+    Err(WrongField { field: "forced_tiles", reason: format!("is {forced:?}, must be from 1 to {MAX_TILES}") })
 }
 
-impl From<Quality> for WrittenQuality {
+impl From<Quality> for RecordedQuality {
     fn from(q: Quality) -> Self {
         let Quality { lighting, method, sample_side_ratio, frame_rate_ratio } = q;
         Self { lighting, method, sample_side_ratio, frame_rate_ratio }
     }
 }
 
-impl WrittenQuality {
-    fn read(self) -> Result<Quality, Wrong> {
+impl RecordedQuality {
+    fn read(self) -> Result<Quality, WrongField> {
         let Self { lighting, method, sample_side_ratio, frame_rate_ratio } = self;
         let ratio = |value: f64, field| {
-            let wrong = Wrong { field, reason: format!("is {value}, must be above 0 and at most 1") };
+            let wrong = WrongField { field, reason: format!("is {value}, must be above 0 and at most 1") };
             if value > 0.0 && value <= 1.0 { Ok(value) } else { Err(wrong) }
         };
         Ok(Quality {
@@ -296,16 +352,18 @@ impl WrittenQuality {
     }
 }
 
-fn seconds(value: f64, field: &'static str) -> Result<f64, Wrong> {
+fn seconds(value: f64, field: &'static str) -> Result<f64, WrongField> {
     if value.is_finite() && value >= 0.0 {
         return Ok(value);
     }
-    Err(Wrong { field, reason: format!("is {value}, must be finite and not negative") })
+    Err(WrongField { field, reason: format!("is {value}, must be finite and not negative") })
 }
 
-fn row_shares(shares: [f64; ROW_PARTS]) -> Result<[f64; ROW_PARTS], Wrong> {
+fn row_shares(shares: [f64; ROW_PARTS]) -> Result<[f64; ROW_PARTS], WrongField> {
     match shares.iter().find(|share| !(0.0..=1.0).contains(*share)) {
-        Some(share) => Err(Wrong { field: "sample_row_shares", reason: format!("has {share}, must be from 0 to 1") }),
+        Some(share) => {
+            Err(WrongField { field: "sample_row_shares", reason: format!("has {share}, must be from 0 to 1") })
+        }
         None => Ok(shares),
     }
 }
@@ -314,17 +372,17 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn bytes(hex: &str) -> Result<Vec<u8>, Wrong> {
+fn bytes(hex: &str) -> Result<Vec<u8>, WrongField> {
     let digit = |digit: &u8| char::from(*digit).to_digit(16).map(|digit| digit as u8);
     let pair = |pair: &[u8]| match pair {
         [high, low] => Some(digit(high)? << 4 | digit(low)?),
         _ => None,
     };
     let read: Option<Vec<u8>> = hex.as_bytes().chunks(2).map(pair).collect();
-    read.ok_or_else(|| Wrong { field: "workload", reason: "is not hexadecimal".to_owned() })
+    read.ok_or_else(|| WrongField { field: "workload", reason: "is not hexadecimal".to_owned() })
 }
 
-impl From<Costs> for WrittenCosts {
+impl From<Costs> for RecordedCosts {
     fn from(c: Costs) -> Self {
         Self {
             sample_image_s: c.sample_image_s,
@@ -339,8 +397,8 @@ impl From<Costs> for WrittenCosts {
     }
 }
 
-impl WrittenCosts {
-    fn read(self) -> Result<Costs, Wrong> {
+impl RecordedCosts {
+    fn read(self) -> Result<Costs, WrongField> {
         Ok(Costs {
             sample_image_s: seconds(self.sample_image_s, "sample_image_s")?,
             direct_view_s: seconds(self.direct_view_s, "direct_view_s")?,
@@ -354,7 +412,7 @@ impl WrittenCosts {
     }
 }
 
-impl From<MeasuredCosts> for WrittenTimings {
+impl From<MeasuredCosts> for RecordedTimings {
     fn from(c: MeasuredCosts) -> Self {
         Self {
             sample_image_s: c.sample_image_s,
@@ -369,8 +427,8 @@ impl From<MeasuredCosts> for WrittenTimings {
 }
 
 /// A timing that cannot be says nothing, here as where it was recorded.
-impl From<WrittenTimings> for MeasuredCosts {
-    fn from(c: WrittenTimings) -> Self {
+impl From<RecordedTimings> for MeasuredCosts {
+    fn from(c: RecordedTimings) -> Self {
         Self {
             sample_image_s: c.sample_image_s,
             direct_view_s: c.direct_view_s,

@@ -1,59 +1,56 @@
-//! When a better plan takes the place of one that works: not at once, not often, and only where it pays.
+//! Hysteresis between plans: a better plan replaces one that works late, seldom, and only where the switch is repaid.
 
-use std::collections::BTreeSet;
 use std::time::Duration;
 
-/// Looks in a row that must all find the better plan better.
-const LOOKS: u32 = 3;
-/// Between two looks that count.
-const LOOK_APART: Duration = Duration::from_millis(500);
-/// What a plan lasts at least, unless a node is lost.
+/// Evaluations in a row that must all find the other plan better.
+const CONFIRMATIONS: u32 = 3;
+/// The least time between two evaluations.
+const EVALUATION_INTERVAL: Duration = Duration::from_millis(500);
+/// The least duration of a plan, unless a node is lost.
 const DWELL: Duration = Duration::from_secs(5);
-/// Nodes that have not said that they are ready are waited for so long.
+/// Nodes that are not ready delay another plan for this long at most.
 const READY_WITHIN: Duration = Duration::from_secs(10);
 
-/// How long a plan has been in force, and what was seen meanwhile.
+/// How long a plan has been in force, and how often another was better.
 #[derive(Debug, Clone)]
-pub(super) struct Patience {
+pub(super) struct PlanHysteresis {
     since: Duration,
-    looked_at: Duration,
+    evaluated_at: Duration,
     better_in_a_row: u32,
-    /// Who has taken the plan.
-    pub(super) ready: BTreeSet<String>,
 }
 
-/// What another plan would bring.
+/// The gain of another plan.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gain {
-    /// Predicted time now over predicted time then.
+    /// Predicted time of the present plan over that of the other.
     pub(super) ratio: f64,
-    /// Less is no reason.
+    /// The ratio above which the other plan is better.
     pub(super) worth: f64,
-    /// What is sampled and loaded anew.
+    /// Time in which sets are sampled and loaded again.
     pub(super) switch_s: f64,
 }
 
-impl Patience {
-    pub(super) fn from(now: Duration) -> Self {
-        Self { since: now, looked_at: now, better_in_a_row: 0, ready: BTreeSet::new() }
+impl PlanHysteresis {
+    pub(super) fn starting_at(now: Duration) -> Self {
+        Self { since: now, evaluated_at: now, better_in_a_row: 0 }
     }
 
-    /// Whether it is time to look.
+    /// Whether another evaluation may be made.
     pub(super) fn is_due(&self, now: Duration) -> bool {
-        now.saturating_sub(self.looked_at) >= LOOK_APART
+        now.saturating_sub(self.evaluated_at) >= EVALUATION_INTERVAL
     }
 
-    /// Notes what a look found; whether the plan is to be changed now.
-    pub(super) fn is_over(&mut self, now: Duration, gain: Gain, nodes: usize) -> bool {
-        self.looked_at = now;
+    /// Adds an evaluation; whether the plan is to be replaced now.
+    pub(super) fn confirms(&mut self, now: Duration, gain: Gain, all_are_ready: bool) -> bool {
+        self.evaluated_at = now;
         self.better_in_a_row = if gain.ratio > gain.worth { self.better_in_a_row + 1 } else { 0 };
         let lasted = now.saturating_sub(self.since);
-        let settled = self.ready.len() >= nodes || lasted >= READY_WITHIN;
-        settled && self.better_in_a_row >= LOOKS && lasted >= DWELL && repays(gain, lasted)
+        let settled = all_are_ready || lasted >= READY_WITHIN;
+        settled && self.better_in_a_row >= CONFIRMATIONS && lasted >= DWELL && repays(gain, lasted)
     }
 }
 
-/// Demand lasts about as long again as it has lasted: what the better plan saves in that time must repay the switch.
+/// Demand lasts about as long again as it has lasted: the time that the better plan saves until then must repay the switch.
 fn repays(gain: Gain, lasted: Duration) -> bool {
     (1.0 - gain.ratio.recip()) * lasted.as_secs_f64() >= gain.switch_s
 }
@@ -64,33 +61,31 @@ mod tests {
 
     const BETTER: Gain = Gain { ratio: 1.5, worth: 1.1, switch_s: 0.1 };
 
-    fn looks(gains: impl Fn(u64) -> Gain) -> Option<u64> {
-        let mut patience = Patience::from(Duration::ZERO);
-        patience.ready.insert("a".to_owned());
+    /// The evaluation that replaces the plan; there are two a second.
+    fn replaced(gains: impl Fn(u64) -> Gain, all_are_ready: bool) -> Option<u64> {
+        let mut hysteresis = PlanHysteresis::starting_at(Duration::ZERO);
         (1..100).find(|&i| {
             let now = Duration::from_millis(500 * i);
-            assert!(patience.is_due(now) && !patience.is_due(now - Duration::from_millis(1)));
-            patience.is_over(now, gains(i), 1)
+            assert!(hysteresis.is_due(now) && !hysteresis.is_due(now - Duration::from_millis(1)));
+            hysteresis.confirms(now, gains(i), all_are_ready)
         })
     }
 
     #[test]
-    fn a_plan_dwells_and_three_looks_in_a_row_must_agree() {
-        assert_eq!(looks(|_| BETTER), Some(10));
-        assert_eq!(looks(|i| Gain { ratio: if i % 3 == 0 { 1.05 } else { 1.5 }, ..BETTER }), None);
-        assert_eq!(looks(|i| Gain { ratio: if i < 20 { 1.0 } else { 1.5 }, ..BETTER }), Some(22));
+    fn a_plan_dwells_and_three_evaluations_in_a_row_must_agree() {
+        assert_eq!(replaced(|_| BETTER, true), Some(10));
+        assert_eq!(replaced(|i| Gain { ratio: if i % 3 == 0 { 1.05 } else { 1.5 }, ..BETTER }, true), None);
+        assert_eq!(replaced(|i| Gain { ratio: if i < 20 { 1.0 } else { 1.5 }, ..BETTER }, true), Some(22));
     }
 
     #[test]
-    fn a_dear_switch_is_made_when_as_much_time_has_passed_as_repays_it() {
-        assert_eq!(looks(|_| Gain { switch_s: 5.0, ..BETTER }), Some(30), "a third of 15 s");
-        assert_eq!(looks(|_| Gain { ratio: 1.0, switch_s: 0.0, ..BETTER }), None);
+    fn an_expensive_switch_waits_until_it_is_repaid() {
+        assert_eq!(replaced(|_| Gain { switch_s: 5.0, ..BETTER }, true), Some(30), "a third of 15 s");
+        assert_eq!(replaced(|_| Gain { ratio: 1.0, switch_s: 0.0, ..BETTER }, true), None);
     }
 
     #[test]
-    fn nodes_that_are_not_ready_are_waited_for_but_not_for_ever() {
-        let mut patience = Patience::from(Duration::ZERO);
-        let over = (1..100).find(|&i| patience.is_over(Duration::from_millis(500 * i), BETTER, 1));
-        assert_eq!(over, Some(20));
+    fn nodes_that_are_not_ready_delay_a_plan_for_ten_seconds() {
+        assert_eq!(replaced(|_| BETTER, false), Some(20));
     }
 }

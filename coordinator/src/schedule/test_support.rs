@@ -1,10 +1,12 @@
-//! What tests of several files share: numbers from a seed, costs, and events.
+//! Shared by tests: random numbers, costs, and events.
 
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 use wire::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, Timeline, Workload};
 
-use super::{Event, NodeCosts, Opening};
+use super::demand::PolicyOverride;
+use super::event::{Event, Opening};
+use super::node_costs::NodeCosts;
 
 /// Numbers from a seed (SplitMix64).
 pub(super) struct Random(pub(super) u64);
@@ -40,13 +42,13 @@ pub(super) const COSTS: Costs = Costs {
     load_set_s: 0.005,
     encode_view_s: 0.001,
     in_order: false,
-    // A tile costs as much as the image: none is cut.
+    // A tile costs as much as the image: images are not tileable.
     sample_overhead_s: 1e3,
     sample_row_shares: [0.25; 4],
 };
 
-/// Light that is dear, on images whose upper half shows the sky.
-pub(super) const DEAR: Costs = Costs {
+/// Expensive lighting, on images whose upper half shows the sky.
+pub(super) const TILEABLE: Costs = Costs {
     sample_image_s: 5.0,
     sample_overhead_s: 0.5,
     sample_row_shares: [0.05, 0.15, 0.4, 0.4],
@@ -55,9 +57,9 @@ pub(super) const DEAR: Costs = Costs {
     ..COSTS
 };
 
-/// So many nodes that need `costs`.
+/// `count` equal nodes.
 pub(super) fn nodes(count: usize, costs: Costs) -> Vec<NodeCosts> {
-    vec![NodeCosts { costs, transfer_image_s: 0.0 }; count]
+    vec![NodeCosts { costs, transfer_image_s: None }; count]
 }
 
 pub(super) fn join(name: &str, incarnation: u64, plan_epoch: u64) -> Event {
@@ -99,10 +101,8 @@ pub(super) fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) 
         session,
         workload: workload(4),
         views_per_set,
-        frames_per_s: 0.0,
-        policy,
-        forced_samplers: None,
-        forced_tiles: None,
+        frames_per_s: None,
+        policy_override: PolicyOverride { policy, ..PolicyOverride::default() },
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
         costs: COSTS,
