@@ -1,7 +1,7 @@
 //! Tells the coordinator of samplers whose images cannot be had.
 
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use node::NodeConfig;
 use tonic::{Code, Status};
@@ -10,6 +10,8 @@ use wire::rpc::{CoordinatorClient, connect};
 
 /// How long telling may take.
 const DEADLINE: Duration = Duration::from_secs(5);
+/// The same report is repeated after this: the coordinator quarantines no node for a single one.
+const REPEAT_AFTER: Duration = Duration::from_secs(1);
 
 /// A set that could not be fetched.
 #[derive(Debug)]
@@ -30,22 +32,20 @@ impl From<Status> for NotFetched {
 pub(crate) struct Reports {
     node_name: String,
     coordinator: String,
-    /// Each is reported once a plan.
-    told: Arc<Mutex<Option<(u64, String)>>>,
+    /// The last report: its plan, its sampler, and when it was made.
+    last: Arc<Mutex<Option<(u64, String, Instant)>>>,
 }
 
 impl Reports {
     pub(crate) fn new(config: &NodeConfig) -> Self {
-        Self { node_name: config.node_name.clone(), coordinator: config.coordinator.clone(), told: Arc::default() }
+        Self { node_name: config.node_name.clone(), coordinator: config.coordinator.clone(), last: Arc::default() }
     }
 
     /// Reports a sampler in the background, unless its fault may be the plan's or the request's.
     pub(crate) fn tell(&self, plan_epoch: u64, failed: &NotFetched) {
         let Some(sampler) = failed.sampler.clone().filter(|sampler| *sampler != self.node_name) else { return };
         let its_fault = [Code::Unavailable, Code::DataLoss, Code::DeadlineExceeded, Code::Unknown];
-        let told = Some((plan_epoch, sampler.clone()));
-        let before = std::mem::replace(&mut *self.told.lock().unwrap_or_else(PoisonError::into_inner), told.clone());
-        if !its_fault.contains(&failed.status.code()) || before == told {
+        if !its_fault.contains(&failed.status.code()) || self.is_repeated(plan_epoch, &sampler) {
             return;
         }
         let reason = failed.status.message().chars().take(256).collect();
@@ -56,6 +56,19 @@ impl Reports {
                 tracing::debug!(reason = status.message(), "a sampler could not be reported");
             }
         });
+    }
+
+    /// Whether the same report was made just now.
+    fn is_repeated(&self, plan_epoch: u64, sampler: &str) -> bool {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_repeated = |(epoch, name, at): &(u64, String, Instant)| {
+            *epoch == plan_epoch && name == sampler && at.elapsed() < REPEAT_AFTER
+        };
+        if last.as_ref().is_some_and(is_repeated) {
+            return true;
+        }
+        *last = Some((plan_epoch, sampler.to_owned(), Instant::now()));
+        false
     }
 }
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 use coordinator::schedule::{Demand, Load, NodeCosts, PolicyOverride, choose};
 use simulation::spread_speeds;
 use study::{Axis, Chart, Series, Table, XyChart};
-use wire::{Costs, PolicyChoice};
+use wire::Costs;
 
 use super::sweep::{Basis, Scenario, Simulated, VIEWS, reach};
 

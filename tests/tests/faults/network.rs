@@ -160,7 +160,7 @@ async fn cut_connections_are_made_again() {
 
 /// The node is a member and cannot be connected to.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_that_refuses_connections_is_left_out() {
+async fn a_node_that_refuses_connections_is_replaced() {
     for (what, victim) in [("sampler", sampler_of as fn(&Session) -> String), ("compositor", compositor_of)] {
         let network = Network::start(3).await;
         let (name, to_node, _) = network.links_of(victim);
