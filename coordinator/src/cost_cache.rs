@@ -1,8 +1,8 @@
 //! Measured costs, kept for sessions that ask for the same.
 
+use cluster::{Costs, MeasureCosts, Timeline};
 use glam::{Quat, Vec3};
 use parking_lot::Mutex;
-use wire::{Costs, MeasureCosts, Timeline};
 
 /// The number of measurements that are kept.
 const CAPACITY: usize = 16;

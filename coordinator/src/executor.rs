@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use cluster::{Assignment, NodeStatus, Ready, SessionEvent, SessionPlan, SessionStage};
 use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
-use wire::{Assignment, NodeStatus, Ready, SessionEvent, SessionPlan, SessionStage};
 
 use crate::probe::probe;
 use crate::schedule::{Command, Event};

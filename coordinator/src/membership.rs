@@ -2,11 +2,11 @@
 
 use std::collections::{HashMap, HashSet};
 
+use cluster::limits::MAX_NODES;
+use cluster::{NodeStatus, Welcome};
 use parking_lot::Mutex;
 use tokio::sync::mpsc;
 use tonic::Status;
-use wire::limits::MAX_NODES;
-use wire::{NodeStatus, Welcome};
 
 /// The stream by which a member hears of its membership: a welcome, and an end.
 pub(crate) type MembershipStream = mpsc::Receiver<Result<Welcome, Status>>;

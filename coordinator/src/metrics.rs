@@ -1,8 +1,8 @@
 //! Metrics of the coordinator.
 
+use cluster::ClusterStatus;
 use node::Telemetry;
 use prometheus_client::metrics::{counter::Counter, gauge::Gauge};
-use wire::ClusterStatus;
 
 use crate::schedule::Command;
 

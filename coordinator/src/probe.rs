@@ -3,12 +3,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use cluster::FetchImages;
+use codec::{DecodeLimits, Reassembled, Reassembler, SampleSetId, decode_depth_image};
 use depth_image::Camera;
 use node::blocking;
 use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
 use wire::rpc::{SamplerClient, is_serving};
-use wire::{DecodeLimits, FetchImages, Reassembled, Reassembler, SampleSetId, WireError, decode_depth_image};
 
 use crate::schedule::{Event, Probe, ProbedImage};
 use crate::shared::Shared;
@@ -65,7 +66,7 @@ async fn check_image(shared: &Shared, address: &str, image: &ProbedImage) -> Res
     let mut chunks = client.fetch_sample_images(image.request.clone()).await?;
     let mut reassembler = Reassembler::new(DecodeLimits::default(), id);
     while let Some(chunk) = chunks.next().await {
-        if let Some(whole) = reassembler.push(chunk?).map_err(WireError::from)? {
+        if let Some(whole) = reassembler.push(chunk?).map_err(data_loss)? {
             if whole.sample_set_id != id || !image_indices.contains(&whole.image_index) {
                 let (got, set) = (whole.image_index, whole.sample_set_id);
                 return Err(Status::data_loss(format!("image {got} of sample set {set} came for {id}")));
@@ -79,5 +80,9 @@ async fn check_image(shared: &Shared, address: &str, image: &ProbedImage) -> Res
 async fn decode(camera: Camera, whole: Reassembled) -> Result<(), Status> {
     let decode =
         move || decode_depth_image(&whole.image.header, camera, &whole.image.payload, &DecodeLimits::default());
-    blocking(move || decode().map(drop).map_err(|error| Status::data_loss(error.to_string()))).await
+    blocking(move || decode().map(drop).map_err(data_loss)).await
+}
+
+fn data_loss(error: impl ToString) -> Status {
+    Status::data_loss(error.to_string())
 }

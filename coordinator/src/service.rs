@@ -3,6 +3,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use cluster::{
+    ChangeSession, ClusterStatus, FetchScene, JoinCluster, SamplerReport, ScenePart, SessionEvent, SessionRequest,
+    Welcome, WorkReport,
+};
+use codec::MAX_CHUNK_BYTES;
 use node::{ServeError, health, until_drained, with_guard, with_reflection};
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
@@ -10,12 +15,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 use tonic::{Status, async_trait};
-use wire::limits::PART_BYTES;
 use wire::rpc::{Coordinator, Messages, coordinator_server};
-use wire::{
-    ChangeSession, ClusterStatus, FetchScene, JoinCluster, SamplerReport, ScenePart, SessionEvent, SessionRequest,
-    Welcome, WorkReport,
-};
 
 use crate::config::{CoordinatorConfig, SceneOffer};
 use crate::executor::execute;
@@ -108,10 +108,10 @@ impl Coordinator for CoordinatorService {
             return Err(Status::not_found(format!("session_number: no session {} is open", request.session)));
         }
         self.shared.with_scheduler(|scheduler| check_change(scheduler, &request))?;
-        let ChangeSession { session, views_per_set, viewpoints, .. } = request;
-        let (views_per_set, frames_per_s) = (views_per_set as usize, rate(request.frames_per_s));
+        let ChangeSession { session, views_per_set, frames_per_s, viewpoints } = request;
+        let views_per_set = views_per_set as usize;
         self.shared.step(Event::DemandChanged { session, views_per_set, frames_per_s });
-        if !viewpoints.is_empty() {
+        if let Some(viewpoints) = viewpoints {
             self.shared.step(Event::ViewpointsChanged { session, viewpoints });
         }
         Ok(())
@@ -138,9 +138,9 @@ impl Coordinator for CoordinatorService {
         let package = offer.package.clone();
         let part = move |start: usize| ScenePart {
             offset_bytes: start as u64,
-            data: package.slice(start..package.len().min(start + PART_BYTES)),
+            data: package.slice(start..package.len().min(start + MAX_CHUNK_BYTES)),
         };
-        let parts = (start..offer.package.len()).step_by(PART_BYTES).map(part).map(Ok);
+        let parts = (start..offer.package.len()).step_by(MAX_CHUNK_BYTES).map(part).map(Ok);
         Ok(until_drained(Box::pin(tokio_stream::iter(parts)), self.shutdown.clone()))
     }
 
@@ -159,19 +159,14 @@ impl Coordinator for CoordinatorService {
 
 /// Whether the schedule admits a change, before it is told of it.
 fn check_change(scheduler: &Scheduler, change: &ChangeSession) -> Result<(), Status> {
-    let ChangeSession { session, views_per_set, viewpoints, .. } = change;
+    let ChangeSession { session, views_per_set, frames_per_s, viewpoints } = change;
     if !scheduler.has_session(*session) {
         return Err(Status::unavailable(format!("session_number: session {session} is still being opened")));
     }
-    let admitted = scheduler.admits(*session, *views_per_set as usize, rate(change.frames_per_s));
+    let admitted = scheduler.admits(*session, *views_per_set as usize, *frames_per_s);
     admitted.map_err(|error| refusal(&error))?;
-    if !viewpoints.is_empty() {
+    if let Some(viewpoints) = viewpoints {
         scheduler.admits_viewpoints(*session, viewpoints).map_err(|error| refusal(&error))?;
     }
     Ok(())
-}
-
-/// 0 on the wire: as fast as they come.
-fn rate(frames_per_s: f64) -> Option<f64> {
-    (frames_per_s > 0.0).then_some(frames_per_s)
 }

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
+use cluster::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage};
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
-use wire::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage};
 
 use crate::schedule::{Event, Opening, PolicyOverride};
 use crate::sessions::EventSender;
@@ -59,7 +59,7 @@ async fn measured_opening(
         session,
         workload,
         views_per_set: request.views_per_set as usize,
-        frames_per_s: (request.frames_per_s > 0.0).then_some(request.frames_per_s),
+        frames_per_s: request.frames_per_s,
         policy_override: PolicyOverride {
             policy: request.policy,
             forced_samplers: request.forced_sampler_count.map(|count| count as usize),

@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
+use cluster::SessionEvent;
 use parking_lot::Mutex;
 use tokio::sync::mpsc;
 use tonic::Status;
-use wire::SessionEvent;
 
 /// Events that a session's client has not read yet.
 const UNREAD_EVENTS: usize = 64;

@@ -4,10 +4,10 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
+use cluster::{ClusterStatus, SessionEvent};
 use node::Connections;
 use parking_lot::Mutex;
 use tokio::sync::Notify;
-use wire::{ClusterStatus, SessionEvent};
 
 use crate::config::{CoordinatorConfig, SceneOffer};
 use crate::cost_cache::CostCache;

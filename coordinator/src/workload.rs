@@ -1,10 +1,10 @@
 //! The workload of a session: its own settings, completed with those of the scene on offer.
 
+use cluster::limits::MAX_CELLS;
+use cluster::{SessionRequest, Workload};
 use depth_image::{Aabb, Camera, PinholeCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
-use wire::limits::MAX_CELLS;
-use wire::{SessionRequest, Workload};
 
 use crate::config::SceneOffer;
 use crate::schedule::{ChoiceError, first_indices};

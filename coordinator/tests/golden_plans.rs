@@ -6,12 +6,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Duration;
 
+use cluster::{
+    Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, Quality, SceneHash, SceneRef, TileCosts, Timeline,
+    Workload,
+};
 use coordinator::schedule::{Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
-use wire::{
-    Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, Quality, SceneHash, SceneRef, Timeline, Workload,
-};
 
 /// Images that cannot be cut into tiles.
 const WHOLE: Costs = Costs {
@@ -21,15 +22,13 @@ const WHOLE: Costs = Costs {
     load_set_s: 0.005,
     encode_view_s: 0.001,
     in_order: false,
-    sample_overhead_s: 1e3,
-    sample_row_shares: [0.25; 4],
+    tiles: None,
 };
 
 /// Expensive lighting on images whose upper half shows the sky.
 const TILEABLE: Costs = Costs {
     sample_image_s: 5.0,
-    sample_overhead_s: 0.5,
-    sample_row_shares: [0.05, 0.15, 0.4, 0.4],
+    tiles: Some(TileCosts { overhead_s: 0.5, row_shares: Some([0.05, 0.15, 0.4, 0.4]) }),
     reconstruct_view_s: 0.114,
     load_set_s: 0.19,
     ..WHOLE
@@ -129,7 +128,7 @@ impl Script {
             match command {
                 Command::Apply { sessions, plan, .. } => {
                     let plan_text = described(&plan.assignment);
-                    let fallback = plan.fallback_number;
+                    let fallback = plan.fallback_index.map_or(0, |index| index + 1);
                     writeln!(self.text, "{at_s:.1} s, sessions {sessions:?}, fallback {fallback}: {plan_text}")
                         .unwrap();
                 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use wire::{AchievedTime, Assignment, Policy, SamplerReport, SessionPlan};
+use cluster::{AchievedTime, Assignment, Policy, SamplerReport, SessionPlan};
 
 use super::hysteresis::PlanHysteresis;
 

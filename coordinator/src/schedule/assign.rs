@@ -1,6 +1,6 @@
 //! The assignment of a choice: whole images to samplers, whole views to compositors.
 
-use wire::{Assignment, CompositorShare, NodeStatus, Policy, SamplerShare, Workload};
+use cluster::{Assignment, CompositorShare, NodeStatus, Policy, SamplerShare, Workload};
 
 use super::demand::Choice;
 use super::load::Load;

@@ -1,9 +1,9 @@
 //! View cells: sample cameras that follow from the viewpoints of sessions.
 
+use cluster::Workload;
+use cluster::limits::MAX_CELLS;
 use depth_image::{Aabb, Camera, PinholeCamera, ViewGroup};
 use glam::UVec2;
-use wire::Workload;
-use wire::limits::MAX_CELLS;
 
 /// The cells of one workload. A cell that still has viewpoints stays as it is, whatever changes elsewhere: its samples stay
 /// valid.

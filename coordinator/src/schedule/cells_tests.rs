@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
+use cluster::limits::MAX_CELLS;
+use cluster::{Assignment, PolicyChoice};
 use depth_image::PinholeCamera;
-use wire::limits::MAX_CELLS;
-use wire::{Assignment, PolicyChoice, Workload};
 
 use super::command::Command;
 use super::demand::ChoiceError;
@@ -36,7 +36,7 @@ fn cells(scheduler: &Scheduler) -> Vec<u32> {
 }
 
 /// The content hash of each cell's set.
-fn contents(scheduler: &Scheduler) -> Vec<wire::SetContent> {
+fn contents(scheduler: &Scheduler) -> Vec<cluster::SetContent> {
     let plan = plan(scheduler);
     let of_cell = |cell| plan.of_cell(cell).and_then(|plan| plan.set_content(0)).expect("a set");
     (0..plan.workload.cell_count() as u32).map(of_cell).collect()
@@ -93,7 +93,7 @@ fn every_image_of_every_cell_has_one_sampler() {
     let plan = plan(&scheduler);
     let workload = &plan.workload;
     assert!(workload.cell_count() > 8 && workload.cell_count() <= MAX_CELLS, "{}", workload.cell_count());
-    assert_eq!(Workload::from_bytes(&workload.to_bytes()).as_ref(), Ok(workload));
+    assert_eq!(workload.validate(), Ok(()));
     let mut images = 0;
     for cell in 0..workload.cell_count() as u32 {
         let of_cell = plan.of_cell(cell).expect("a cell");

@@ -1,6 +1,6 @@
 //! A policy and a division of the nodes, by predicted time, unless the session overrides them.
 
-use wire::{Policy, PolicyChoice};
+use cluster::{Policy, PolicyChoice};
 
 use super::balance::k_fd;
 use super::demand::{Choice, ChoiceError, Demand, Predicted};
@@ -52,10 +52,8 @@ fn tile_counts(demand: &Demand<'_>) -> Vec<usize> {
     }
 }
 
-/// A tile that takes as long as its image saves nothing.
 fn is_tileable(demand: &Demand<'_>) -> bool {
-    let mean = NodeCosts::mean(demand.nodes);
-    !demand.load.images_are_sequential && mean.sample_overhead_s < mean.sample_image_s
+    !demand.load.images_are_sequential && NodeCosts::mean(demand.nodes).tiles.is_some()
 }
 
 /// With the load's number of tiles.

@@ -3,8 +3,8 @@
 use std::fmt;
 use std::time::Duration;
 
+use cluster::{FetchImages, NodeStatus, SessionPlan};
 use depth_image::Camera;
-use wire::{FetchImages, NodeStatus, SessionPlan};
 
 use super::demand::ChoiceError;
 use super::event::ProbeKind;

@@ -2,14 +2,15 @@
 
 use std::num::NonZeroU32;
 
-use wire::{Policy, PolicyChoice};
+use cluster::{InvalidField, Policy, PolicyChoice, tile_count};
+use serde::{Deserialize, Serialize};
 
 use super::load::Load;
 use super::node_costs::NodeCosts;
 use super::search::Division;
 
 /// Decisions that a session takes from the schedule.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct PolicyOverride {
     /// How views come about.
     pub policy: PolicyChoice,
@@ -17,6 +18,15 @@ pub struct PolicyOverride {
     pub forced_samplers: Option<usize>,
     /// Tiles of an image, instead of as many as are predicted to be fastest.
     pub forced_tiles: Option<usize>,
+}
+
+impl PolicyOverride {
+    /// # Errors
+    /// For a number of tiles that no image may have.
+    pub(super) fn validate(&self) -> Result<(), InvalidField> {
+        let tiles = self.forced_tiles.map(|tiles| u32::try_from(tiles).unwrap_or(u32::MAX));
+        tiles.map(tile_count).transpose().map(drop)
+    }
 }
 
 /// Roles of the nodes in the plan in force; those without a role count as compositors.

@@ -1,6 +1,6 @@
 //! The costs of one node, estimated from its own timings.
 
-use wire::{Costs, MeasuredCosts};
+use cluster::{Costs, MeasuredCosts, TileCosts};
 
 use super::node_costs::{NodeCosts, is_within_tiles_error};
 use super::operations::PerOperation;
@@ -160,16 +160,18 @@ impl Estimate {
             .as_ref()
             .zip(*common)
             .map(|(operation, common)| operation.now_s(common.map_or(slowness, |common| common * than_others)));
-        // The overhead grows with the cost of an image.
-        let times = now_s.sample_image / self.alone.sample_image_s;
+        // The overhead of a tile grows with the cost of an image.
+        let times =
+            Some(now_s.sample_image / self.alone.sample_image_s).filter(|times| times.is_finite()).unwrap_or(1.0);
+        let tiles = self.alone.tiles.map(|tiles| TileCosts { overhead_s: tiles.overhead_s * times, ..tiles });
         let costs = Costs {
             sample_image_s: now_s.sample_image,
             direct_view_s: now_s.direct_view,
             reconstruct_view_s: now_s.reconstruct_view,
             load_set_s: now_s.load_set,
             encode_view_s: now_s.encode_view,
-            sample_overhead_s: self.alone.sample_overhead_s * if times.is_finite() { times } else { 1.0 },
-            ..self.alone
+            in_order: self.alone.in_order,
+            tiles,
         };
         let image_bytes = self.image_bytes.value().unwrap_or(0.0);
         NodeCosts { costs, transfer_image_s: self.transfer_bytes_per_s.value().map(|rate| image_bytes / rate) }

@@ -1,12 +1,18 @@
 //! Inputs of the schedule: what happened in the cluster.
 
+use cluster::limits::MAX_VIEWS_PER_SET;
+use cluster::{
+    Costs, InvalidField, JoinCluster, MeasuredCosts, Quality, SamplerReport, Workload, finite_seconds, frame_rate,
+    nonempty, viewpoints,
+};
 use depth_image::PinholeCamera;
-use wire::{Costs, JoinCluster, MeasuredCosts, Quality, SamplerReport, Workload};
+use serde::{Deserialize, Serialize};
 
 use super::demand::PolicyOverride;
 
 /// What happened. Events of an epoch concern the plan of that epoch alone.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[allow(missing_docs, reason = "self-naming fields")]
 pub enum Event {
     /// A node joined, or joined again. `incarnation` rises with every joining and tells two processes of one name apart.
@@ -40,7 +46,8 @@ pub enum Event {
 }
 
 /// What a probe asks of a node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ProbeKind {
     /// An answer of its health service.
     Liveness,
@@ -49,7 +56,7 @@ pub enum ProbeKind {
 }
 
 /// A session whose costs are known.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Opening {
     /// Its number.
     pub session: u64,
@@ -68,4 +75,47 @@ pub struct Opening {
     /// The workload's sample cameras are the cells of these viewpoints, as if the session were alone. Empty: it brings
     /// sample cameras of its own.
     pub viewpoints: Vec<PinholeCamera>,
+}
+
+impl Event {
+    /// # Errors
+    /// For values that no peer may send, as a damaged log may have them.
+    pub(super) fn validate(&self) -> Result<(), InvalidField> {
+        match self {
+            Self::Joined { join, .. } => join.validate(),
+            Self::Opened(opening) => opening.validate(),
+            Self::DemandChanged { views_per_set, frames_per_s, .. } => check_demand(*views_per_set, *frames_per_s),
+            Self::ViewpointsChanged { viewpoints: changed, .. } => viewpoints(changed),
+            Self::Measured { node_name, costs, busy_s, .. } => {
+                nonempty(node_name, "node_name")?;
+                costs.validate()?;
+                finite_seconds(*busy_s, "busy_s").map(drop)
+            }
+            Self::Left { node_name, .. }
+            | Self::Ready { node_name, .. }
+            | Self::Rejected { node_name, .. }
+            | Self::Unready { node_name, .. }
+            | Self::Probed { node_name, .. } => nonempty(node_name, "node_name"),
+            Self::Reported(report) => report.validate(),
+            Self::Applied { .. } | Self::Closed { .. } | Self::Tick => Ok(()),
+        }
+    }
+}
+
+impl Opening {
+    fn validate(&self) -> Result<(), InvalidField> {
+        self.workload.validate()?;
+        check_demand(self.views_per_set, self.frames_per_s)?;
+        self.policy_override.validate()?;
+        self.fallbacks.iter().try_for_each(Quality::validate)?;
+        self.costs.validate()?;
+        viewpoints(&self.viewpoints)
+    }
+}
+
+fn check_demand(views_per_set: usize, frames_per_s: Option<f64>) -> Result<(), InvalidField> {
+    if views_per_set > MAX_VIEWS_PER_SET as usize {
+        return Err(InvalidField::out_of_range("views_per_set", views_per_set, "from 0 to 65536"));
+    }
+    frame_rate(frames_per_s).map(drop)
 }

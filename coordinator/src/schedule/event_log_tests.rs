@@ -1,4 +1,4 @@
-use wire::{MeasuredCosts, PolicyChoice, SamplerReport};
+use cluster::{MeasuredCosts, PolicyChoice, SamplerReport};
 
 use super::*;
 use crate::schedule::event::{Opening, ProbeKind};
@@ -81,8 +81,33 @@ fn a_log_has_one_line_an_event_after_its_version() {
     assert_eq!(lines[0], r#"{"version":3}"#);
     assert_eq!(
         lines[5],
-        r#"{"now_ns":4123456789,"event":"demand_changed","session":7,"views_per_set":500,"frames_per_s":"0.1"}"#
+        r#"{"now_ns":4123456789,"event":{"demand_changed":{"session":7,"views_per_set":500,"frames_per_s":0.1}}}"#
     );
+    assert_eq!(lines[lines.len() - 2], r#"{"now_ns":16123456789,"event":"tick"}"#);
+}
+
+/// Bit by bit, of any exponent.
+#[test]
+fn floats_of_a_log_keep_every_bit() {
+    let mut random = Random(7);
+    for _ in 0..2000 {
+        let busy_s = f64::from_bits(random.next() >> 1);
+        let eye_m = f32::from_bits((random.next() >> 33) as u32);
+        if !(busy_s.is_finite() && eye_m.is_finite()) {
+            continue;
+        }
+        let (node_name, costs) =
+            ("n".to_owned(), MeasuredCosts { image_bytes: Some(busy_s), ..MeasuredCosts::default() });
+        let mut viewpoint = view(0.0);
+        viewpoint.eye_in_world.x = eye_m;
+        for event in [
+            Event::Measured { node_name, plan_epoch: 0, costs, busy_s, views: u64::MAX, dropped_views: 0 },
+            Event::ViewpointsChanged { session: 1, viewpoints: vec![viewpoint] },
+        ] {
+            let text = serde_json::to_string(&event).unwrap();
+            assert_eq!(serde_json::from_str::<Event>(&text).unwrap(), event, "{text}");
+        }
+    }
 }
 
 #[test]
@@ -90,11 +115,11 @@ fn an_invalid_line_is_refused_with_its_number_and_field() {
     let after_header = |line: &str| refusal(format!("{{\"version\":3}}\n{line}\n").as_bytes());
     let cases = [
         (
-            r#"{"now_ns":0,"event":"demand_changed","session":1,"views_per_set":9999999}"#,
+            r#"{"now_ns":0,"event":{"demand_changed":{"session":1,"views_per_set":9999999}}}"#,
             "line 2: views_per_set is 9999999",
         ),
-        (r#"{"now_ns":0,"event":"left","incarnation":1,"node_name":""}"#, "line 2: node_name has 0 bytes"),
-        (r#"{"now_ns":0,"event":"closed"}"#, "missing field `session`"),
+        (r#"{"now_ns":0,"event":{"left":{"incarnation":1,"node_name":""}}}"#, "line 2: node_name is missing"),
+        (r#"{"now_ns":0,"event":{"closed":{}}}"#, "missing field `session`"),
         (r#"{"now_ns":0,"event":"exploded"}"#, "unknown variant `exploded`"),
         (r#"{"event":"tick"}"#, "missing field `now_ns`"),
         (r#"{"now_ns":-1,"event":"tick"}"#, "line 2: "),
@@ -105,17 +130,24 @@ fn an_invalid_line_is_refused_with_its_number_and_field() {
     }
     let whole = String::from_utf8(recorded()).unwrap();
     for (from, to, part) in [
-        ("\"pipeline\"", "\"best\"", "line 4: policy unknown policy"),
-        ("\"workload\":\"", "\"workload\":\"xy", "line 4: workload is not hexadecimal"),
-        ("\"workload\":\"", "\"workload\":\"00", "line 4: workload workload is corrupt"),
-        ("\"load_set_s\":\"0.005\"", "\"load_set_s\":\"-1\"", "line 4: load_set_s is -1"),
-        ("\"version\":3", "\"version\":2", "version is 2, must be 3"),
+        ("\"Pipeline\"", "\"Best\"", "line 4: unknown variant `Best`"),
+        ("\"lighting\":\"unlit\"", "\"lighting\":\"\"", "line 4: lighting is missing"),
+        ("\"load_set_s\":0.005", "\"load_set_s\":-1.0", "line 4: load_set_s is -1"),
     ] {
+        assert!(whole.contains(from), "{whole}");
         let text = refusal(whole.replacen(from, to, 1).as_bytes());
         assert!(text.contains(part), "{text}");
     }
     assert!(refusal(b"").starts_with("line 1: "));
     assert!(refusal(&vec![b' '; 2 << 20]).contains("line 1 has more than 1048576 bytes"));
+}
+
+/// Version 2 wrote workloads as hexadecimal messages, and numbers as text.
+#[test]
+fn a_log_of_another_version_is_refused_by_its_version() {
+    let old = b"{\"version\":2}\n{\"now_ns\":0,\"event\":\"tick\"}\n";
+    assert_eq!(refusal(old), "line 1: version is 2, must be 3");
+    assert_eq!(refusal(b"{\"version\":4}\n"), "line 1: version is 4, must be 3");
 }
 
 #[test]

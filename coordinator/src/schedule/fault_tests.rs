@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use wire::{Assignment, PolicyChoice, SamplerReport};
+use cluster::{Assignment, PolicyChoice, SamplerReport};
 
 use super::command::{Command, Probe};
 use super::demand::PolicyOverride;

@@ -1,6 +1,6 @@
 //! The work that sessions ask of the cluster, and a node's part in it.
 
-use wire::{Costs, Policy};
+use cluster::{Costs, Policy};
 
 use super::makespan::{Worker, distribute};
 use super::node_costs::NodeCosts;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use wire::{Costs, NodeStatus};
+use cluster::{Costs, NodeStatus};
 
 use super::estimate::Estimate;
 

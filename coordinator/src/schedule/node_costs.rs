@@ -1,6 +1,6 @@
 //! What operations cost one node, and nodes compared.
 
-use wire::Costs;
+use cluster::{Costs, TileCosts};
 
 use super::smoothing::median;
 
@@ -39,15 +39,16 @@ impl NodeCosts {
     pub(super) fn mean(nodes: &[Self]) -> Costs {
         let mean =
             |of: fn(&Costs) -> f64| nodes.iter().map(|node| of(&node.costs)).sum::<f64>() / nodes.len().max(1) as f64;
+        let sample_image_s = mean(|costs| costs.sample_image_s);
+        let row_shares = nodes.first().and_then(|node| node.costs.tiles?.row_shares);
         Costs {
-            sample_image_s: mean(|costs| costs.sample_image_s),
+            sample_image_s,
             direct_view_s: mean(|costs| costs.direct_view_s),
             reconstruct_view_s: mean(|costs| costs.reconstruct_view_s),
             load_set_s: mean(|costs| costs.load_set_s),
             encode_view_s: mean(|costs| costs.encode_view_s),
             in_order: nodes.iter().any(|node| node.costs.in_order),
-            sample_overhead_s: mean(|costs| costs.sample_overhead_s),
-            sample_row_shares: nodes.first().map_or_else(Default::default, |node| node.costs.sample_row_shares),
+            tiles: TileCosts::of_image(sample_image_s, mean(Costs::tile_overhead_s), row_shares),
         }
     }
 
@@ -58,7 +59,8 @@ impl NodeCosts {
         let mean = Self::mean(&nodes.iter().copied().filter(is_like_most).collect::<Vec<_>>());
         for node in nodes.iter_mut().filter(|node| is_like_most(node)) {
             node.costs.sample_image_s = mean.sample_image_s;
-            node.costs.sample_overhead_s = mean.sample_overhead_s;
+            let tiles = node.costs.tiles.zip(mean.tiles);
+            node.costs.tiles = tiles.map(|(tiles, mean)| TileCosts { overhead_s: mean.overhead_s, ..tiles });
         }
     }
 

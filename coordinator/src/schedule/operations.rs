@@ -1,6 +1,6 @@
 //! The five operations whose costs are measured.
 
-use wire::{Costs, MeasuredCosts};
+use cluster::{Costs, MeasuredCosts};
 
 /// One value for each operation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -85,7 +85,7 @@ pub(super) fn direct_s(load: &Load, nodes: &[NodeCosts]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use wire::Costs;
+    use cluster::{Costs, TileCosts};
 
     use super::*;
     use crate::schedule::test_support::{COSTS, nodes};
@@ -138,7 +138,8 @@ mod tests {
 
     #[test]
     fn tiles_employ_samplers_that_whole_images_leave_idle() {
-        let node = NodeCosts { costs: Costs { sample_overhead_s: 0.02, ..COSTS }, transfer_image_s: None };
+        let tiles = Some(TileCosts { overhead_s: 0.02, row_shares: None });
+        let node = NodeCosts { costs: Costs { tiles, ..COSTS }, transfer_image_s: None };
         let (load, nodes) = (Load { views: 1, ..LOAD }, [node; 12]);
         assert!(close(pipeline_s(&load, &nodes, &first(8, 12)), 0.1), "four of eight have nothing to do");
         assert!(close(pipeline_s(&load.tiled(2), &nodes, &first(8, 12)), 0.06), "0.02 + 0.08 / 2 each");

@@ -1,6 +1,6 @@
 //! The reason of a choice, in plain words.
 
-use wire::{Policy, PolicyChoice};
+use cluster::{Policy, PolicyChoice};
 
 use super::demand::{Demand, Predicted};
 use super::load::Load;

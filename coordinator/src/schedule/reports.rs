@@ -7,7 +7,7 @@
 
 use std::time::Duration;
 
-use wire::SamplerReport;
+use cluster::SamplerReport;
 
 /// Reports further apart have causes of their own.
 const WINDOW: Duration = Duration::from_secs(60);

@@ -9,7 +9,7 @@ mod status;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use wire::{JoinCluster, MeasuredCosts};
+use cluster::{JoinCluster, MeasuredCosts};
 
 use super::active_plan::ActivePlan;
 use super::command::Command;

@@ -1,5 +1,5 @@
+use cluster::{Assignment, Costs, Policy, PolicyChoice, Quality, SessionPlan, TileCosts};
 use depth_image::Camera;
-use wire::{Assignment, Costs, Policy, PolicyChoice, Quality, SessionPlan};
 
 use super::*;
 use crate::schedule::demand::{ChoiceError, PolicyOverride};
@@ -301,7 +301,7 @@ fn a_static_scene_with_a_rate_is_sampled_once_and_all_nodes_make_views() {
     let commands = cluster.step(rated(1, 100.0, Vec::new()));
     let plan = assignment_of(&commands);
     assert_eq!((plan.policy, plan.compositors.len()), (Policy::TimeShare, 5), "{}", applied(&commands).1.reason);
-    let utilisation = cluster.scheduler.status().utilisation;
+    let utilisation = cluster.scheduler.status().utilisation.unwrap();
     assert!((utilisation - 0.2).abs() < 1e-9, "100 views of 10 ms by 5 nodes: {utilisation}");
 }
 
@@ -353,18 +353,18 @@ fn overload_steps_down_the_fallbacks_and_plans_name_them() {
         cluster.now += Duration::from_millis(500);
         let commands = cluster.step(Event::Tick);
         seen.extend(commands.iter().filter_map(|command| match command {
-            Command::Apply { plan, .. } => Some(plan.fallback_number),
+            Command::Apply { plan, .. } => Some(plan.fallback_index),
             _ => None,
         }));
     }
-    assert_eq!(seen, [1, 2], "1.125 of their time at 180, 0.9 at 144");
+    assert_eq!(seen, [Some(0), Some(1)], "1.125 of their time at 180, 0.9 at 144");
     let plan = cluster.plan();
     assert_eq!(plan.workload.method, "joint_carve:2");
     let Camera::Pinhole(camera) = plan.workload.sample_cameras[0];
     assert_eq!(camera.size_px.x, 4, "half of 8");
     cluster.step(Event::DemandChanged { session: 1, views_per_set: 1, frames_per_s: Some(20.0) });
-    let plans: Vec<u32> = (0..2).map(|_| applied(&cluster.wait(60)).1.fallback_number).collect();
-    assert_eq!(plans, [1, 0], "with less to do they get all again");
+    let plans: Vec<Option<u32>> = (0..2).map(|_| applied(&cluster.wait(60)).1.fallback_index).collect();
+    assert_eq!(plans, [Some(0), None], "with less to do they get all again");
     assert_eq!(cluster.plan().workload.method, "joint_carve");
 }
 
@@ -393,7 +393,8 @@ fn the_achieved_time_of_a_set_is_that_of_the_busiest_node() {
 #[test]
 fn expensive_images_are_tiled_so_that_more_nodes_sample_them() {
     let mut cluster = Cluster::of(11);
-    let costs = Costs { sample_image_s: 10.0, sample_overhead_s: 0.05, ..COSTS };
+    let tiles = Some(TileCosts { overhead_s: 0.05, row_shares: None });
+    let costs = Costs { sample_image_s: 10.0, tiles, ..COSTS };
     let commands = cluster.step(Event::Opened(Box::new(Opening { costs, ..opening(1, PIPELINE, 1000) })));
     let (plan, session) = (assignment_of(&commands), applied(&commands).1);
     assert!(plan.tile_count > 1 && plan.samplers.len() > 4, "{}", session.reason);

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use wire::{Assignment, Costs, MeasuredCosts, NodeStatus, PolicyChoice, SessionPlan};
+use cluster::{Assignment, Costs, MeasuredCosts, NodeStatus, PolicyChoice, SessionPlan};
 
 use super::balance::k_fd;
 use super::command::Command;
@@ -274,7 +274,7 @@ impl World {
             return;
         }
         assert!(self.now - self.last_at >= DWELL, "{:?} after the last plan: {}", self.now - self.last_at, plan.reason);
-        let is_pipeline = [last.policy, plan.assignment.policy] == [wire::Policy::Pipeline; 2];
+        let is_pipeline = [last.policy, plan.assignment.policy] == [cluster::Policy::Pipeline; 2];
         assert!(!is_pipeline || changes(last, &plan.assignment) <= 2, "{}", plan.reason);
     }
 
@@ -304,7 +304,7 @@ impl World {
         let mut images: Vec<u32> = plan.samplers.iter().flat_map(|s| s.image_indices.clone()).collect();
         images.sort_unstable();
         let all = 0..plan.image_count() as u32;
-        assert_eq!(images, if plan.policy == wire::Policy::Direct { vec![] } else { all.collect::<Vec<_>>() });
+        assert_eq!(images, if plan.policy == cluster::Policy::Direct { vec![] } else { all.collect::<Vec<_>>() });
     }
 
     /// While there are nodes and sessions there is a plan, of members.

@@ -1,8 +1,8 @@
 //! Shared by tests: random numbers, costs, and events.
 
+use cluster::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, TileCosts, Timeline, Workload};
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
-use wire::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, Timeline, Workload};
 
 use super::demand::PolicyOverride;
 use super::event::{Event, Opening};
@@ -42,16 +42,13 @@ pub(super) const COSTS: Costs = Costs {
     load_set_s: 0.005,
     encode_view_s: 0.001,
     in_order: false,
-    // A tile costs as much as the image: images are not tileable.
-    sample_overhead_s: 1e3,
-    sample_row_shares: [0.25; 4],
+    tiles: None,
 };
 
 /// Expensive lighting, on images whose upper half shows the sky.
 pub(super) const TILEABLE: Costs = Costs {
     sample_image_s: 5.0,
-    sample_overhead_s: 0.5,
-    sample_row_shares: [0.05, 0.15, 0.4, 0.4],
+    tiles: Some(TileCosts { overhead_s: 0.5, row_shares: Some([0.05, 0.15, 0.4, 0.4]) }),
     reconstruct_view_s: 0.114,
     load_set_s: 0.19,
     ..COSTS

@@ -1,8 +1,8 @@
 //! The demand of all sessions together, and the plan that serves them.
 
+use cluster::{AchievedTime, Costs, Quality, Workload};
 use depth_image::{Camera, PinholeCamera};
 use glam::UVec2;
-use wire::{AchievedTime, Costs, Quality, Workload};
 
 use super::active_plan::ActivePlan;
 use super::cells::Cells;

@@ -4,14 +4,15 @@ use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use client::Session;
+use cluster::{PolicyChoice, Refinement, SamplerReport, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, request, views};
 use cluster_tests::mangler::{Mangler, Spoil};
 use cluster_tests::picture::fault_of;
 use cluster_tests::processes::number_of;
 use cluster_tests::watcher::eventually;
+use codec::{ChunkBody, SampleSetId};
 use node::NodeConfig;
 use wire::rpc::{CoordinatorClient, connect};
-use wire::{ChunkBody, PolicyChoice, Refinement, SampleSetId, SamplerReport, SessionRequest, Timeline};
 
 use crate::{CLOSED, ONE_WITNESS, compositor_of, has_role, sampler_of};
 

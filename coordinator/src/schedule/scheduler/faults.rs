@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use wire::{Assignment, FetchImages, SamplerReport};
+use cluster::{Assignment, FetchImages, SamplerReport};
 
 use super::Scheduler;
 use crate::schedule::command::{Command, Probe, ProbedImage};

@@ -1,6 +1,6 @@
 //! The state of the cluster, for status calls and metrics.
 
-use wire::{ClusterStatus, NodeCondition};
+use cluster::{ClusterStatus, NodeCondition};
 
 use super::Scheduler;
 use crate::schedule::member::Member;
@@ -19,7 +19,7 @@ impl Scheduler {
             views_per_set: workload.map_or(0, |workload| workload.views() as u64),
             conditions: workload.map_or_else(Vec::new, |_| self.conditions()),
             achieved: workload.map_or_else(Vec::new, |workload| workload.achieved.clone()),
-            utilisation: self.utilisation().unwrap_or(0.0),
+            utilisation: self.utilisation().filter(|&utilisation| utilisation > 0.0),
         }
     }
 
