@@ -9,7 +9,7 @@ use std::time::Instant;
 use depth_image::{DepthImage, PinholeCamera, View};
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
-use reconstruction::{ReconstructionError, ReconstructionMethod, Reconstructor, SetDescription};
+use reconstruction::{ReconstructionError, ReconstructionMethod, Reconstructor, RequiredPlanes, SetDescription};
 use render::{
     AccelerationReport, Choice, DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, SamplePlanes,
     Visibility,
@@ -173,8 +173,8 @@ impl GpuEngine {
 /// What images must have for views to be reconstructed from them.
 #[must_use]
 pub fn planes_for(method: ReconstructionMethod) -> SamplePlanes {
-    let hybrid = matches!(method, ReconstructionMethod::HybridMesh { .. });
-    SamplePlanes { specular: true, normal: hybrid, corners: hybrid, ..SamplePlanes::default() }
+    let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
+    SamplePlanes { specular: true, normal, corners: corner_inverse_depth, ..SamplePlanes::default() }
 }
 
 fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {

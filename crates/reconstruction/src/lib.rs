@@ -4,26 +4,28 @@
 //! [`Reconstructor::reconstruct`] draws views from it, many in one submission. Each method is one enum
 //! variant, one `.rs` and `.wgsl` pair, and has a scalar twin.
 
-mod hybrid_mesh;
+mod error_bound;
 mod layout;
 #[cfg(test)]
 mod layout_tests;
-mod mesh;
-mod method;
+mod methods;
 mod pyramid;
 mod quad_drawing;
 mod quads;
 mod reconstructor;
 mod reflectors;
+mod required_planes;
 mod sample_set;
 pub mod scalar;
 mod shaders;
 mod word_texture;
 
-pub use method::{ErrorBound, ReconstructionMethod, UnknownMethod};
+pub use error_bound::ErrorBound;
+pub use methods::{METHODS, ReconstructionMethod, UnknownMethod};
 pub use pyramid::{CodedDepth, Pyramid};
 pub use quads::{MeshStatistics, Quad};
 pub use reconstructor::{Reconstructor, Statistics};
+pub use required_planes::RequiredPlanes;
 pub use sample_set::{MAX_SAMPLE_CAMERAS, SampleSet, SetDescription};
 pub use shaders::{SHADERS, ShaderKey, shader_text};
 

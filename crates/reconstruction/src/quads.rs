@@ -12,9 +12,11 @@ use wgpu::{BindingResource, BufferUsages};
 
 use crate::{
     ErrorBound, ReconstructionError, ReconstructionMethod, Reconstructor, SampleSet, ShaderKey,
-    hybrid_mesh::{self, CornerPlanes},
     layout::{GpuCutWork, GpuSampleCamera, GpuViewCamera},
-    mesh,
+    methods::{
+        hybrid_mesh::{self, CornerPlanes},
+        mesh,
+    },
     word_texture::WordTextures,
 };
 
@@ -95,7 +97,7 @@ impl SetMeshes {
             let Camera::Pinhole(camera) = &image.camera;
             *camera
         };
-        let planes = match hybrid_mesh::missing_plane(images) {
+        let planes = match hybrid_mesh::REQUIRED_PLANES.missing(images) {
             Some(missing) => Err(missing),
             None => Ok(CornerPlanes::upload(textures, images)?),
         };

@@ -3,7 +3,7 @@
 use depth_image::{Camera, DepthImage, PinholeCamera, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 
-use crate::{ErrorBound, Quad, hybrid_mesh::GREATEST_EXTENT, shaders::GREATEST_SLOPE};
+use crate::{ErrorBound, Quad, methods::hybrid_mesh::GREATEST_EXTENT, shaders::GREATEST_SLOPE};
 
 /// As in `pyramid.rs`.
 const FLAT_FOOTPRINTS: f32 = 2.0;

@@ -3,14 +3,14 @@
 //! An oracle for tests, written to be read beside the shaders; it is slow and takes only what
 //! [`crate::Reconstructor::upload`] accepts.
 
-mod carve;
 mod draw;
 mod fill;
 mod hybrid_mesh;
+mod joint_carve;
+mod light_field_search;
 mod march;
 mod mesh;
 mod sample_camera;
-mod search;
 mod specular;
 mod surface;
 mod tile_start;
@@ -137,7 +137,7 @@ fn pixels_from(
             let start = starts[rays.tile_index(place)];
             match method {
                 ReconstructionMethod::LightFieldSearch { steps } => {
-                    search::light_field_search(cameras, &ray, start, steps, background_srgb8)
+                    light_field_search::light_field_search(cameras, &ray, start, steps, background_srgb8)
                 }
                 ReconstructionMethod::JointCarve { stop_level } => {
                     joint_carve(cameras, &ray, start, stop_level, background_srgb8)
@@ -188,5 +188,5 @@ fn joint_carve(
             return Pixel::hit(blend.color_linear, t, blend.camera_mask);
         }
     }
-    carve::carve(cameras, ray, t, stop_level, background_srgb8)
+    joint_carve::carve(cameras, ray, t, stop_level, background_srgb8)
 }

@@ -7,7 +7,7 @@ use gpu::Frame;
 use wgpu::BindingResource;
 
 use crate::{
-    ErrorBound, ReconstructionError, Reconstructor, ShaderKey,
+    ErrorBound, ReconstructionError, Reconstructor, RequiredPlanes, ShaderKey,
     layout::GpuCutWork,
     quads::{ImageCut, buffers},
     word_texture::{self, WordTexture, WordTextures},
@@ -26,14 +26,10 @@ pub(crate) struct CornerPlanes {
     pub first_corners: Vec<u32>,
 }
 
-/// The first image that lacks a plane, and which.
-pub(crate) fn missing_plane(images: &[DepthImage]) -> Option<(usize, &'static str)> {
-    let missing = |image: &DepthImage| match image {
-        DepthImage { normal_oct16: None, .. } => Some("normal"),
-        DepthImage { corner_inverse_depth_per_m: None, .. } => Some("corner_inverse_depth"),
-        _ => None,
-    };
-    images.iter().enumerate().find_map(|(index, image)| Some((index, missing(image)?)))
+pub(crate) const REQUIRED_PLANES: RequiredPlanes = RequiredPlanes { normal: true, corner_inverse_depth: true };
+
+pub(super) fn parse_bound(text: &str) -> Option<ErrorBound> {
+    text.parse().ok().and_then(ErrorBound::from_px)
 }
 
 impl CornerPlanes {
