@@ -2,6 +2,8 @@
 
 use std::{fmt, str::FromStr, sync::Arc};
 
+use crate::error::GpuError;
+
 /// What to look for among the adapters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DevicePreference {
@@ -30,38 +32,6 @@ impl fmt::Display for DevicePreference {
             Self::Software => "software",
         })
     }
-}
-
-/// What can go wrong on a device.
-#[derive(Debug, thiserror::Error)]
-pub enum GpuError {
-    /// No adapter at all.
-    #[error("no graphics device found ({0}); on Debian `apt-get install mesa-vulkan-drivers` brings the software one")]
-    NoDevice(String),
-    /// The adapter refused.
-    #[error("device {name} could not be opened: {reason}")]
-    Open {
-        /// The adapter.
-        name: String,
-        /// Its words.
-        reason: String,
-    },
-    /// Not `any` or `software`.
-    #[error("unknown device preference {0:?}, expected any or software")]
-    UnknownPreference(String),
-    /// A buffer or texture beyond the device's limits.
-    #[error("{what} needs {needed}, the device allows {limit}")]
-    Limit {
-        /// What was to be made.
-        what: String,
-        /// How much.
-        needed: u64,
-        /// The device's limit.
-        limit: u64,
-    },
-    /// Work failed after submission.
-    #[error("device lost or read-back failed: {0}")]
-    Lost(String),
 }
 
 /// An open device. One is shared by everything in a process.
@@ -142,11 +112,7 @@ impl Gpu {
     /// Names the buffer, its size and the limit.
     pub fn check_storage_bytes(&self, what: &str, bytes: u64) -> Result<(), GpuError> {
         let limits = self.device.limits();
-        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        if bytes > limit {
-            return Err(GpuError::Limit { what: what.to_owned(), needed: bytes, limit });
-        }
-        Ok(())
+        GpuError::check_limit(what, bytes, limits.max_storage_buffer_binding_size.min(limits.max_buffer_size))
     }
 
     /// A compute pipeline with entry point `main`, and an automatic layout where none is given for group 0.

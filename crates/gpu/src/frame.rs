@@ -2,7 +2,7 @@
 
 use std::{ops::Range, sync::mpsc, time::Instant};
 
-use crate::{Gpu, GpuError, PooledBuffer};
+use crate::{device::Gpu, error::GpuError, pool::PooledBuffer};
 
 /// Work being recorded.
 pub struct Frame<'g> {

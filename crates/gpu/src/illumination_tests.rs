@@ -15,8 +15,8 @@ use minijinja::context;
 use wgpu::BufferUsages;
 
 use crate::{
-    BufferPool, DevicePreference, Frame, Gpu, GpuLight, Templates, illumination::GpuIllumination, illumination_bytes,
-    light_slots,
+    Binding, BufferPool, ComputePass, DevicePreference, DispatchSize, Frame, Gpu, GpuLight, Shader, Templates,
+    illumination::GpuIllumination, illumination_bytes, light_slots,
 };
 
 /// One question to the device.
@@ -42,9 +42,9 @@ struct Question {
     point_in_world: vec3f, light: u32, normal: vec3f, reflector: u32, towards_eye: vec3f, padding: u32,
     place: vec2f, more_padding: vec2u, visibility: vec4u,
 }
-@group(0) @binding(0) var<uniform> illumination: Illumination;
-@group(0) @binding(1) var<storage, read> questions: array<Question>;
-@group(0) @binding(2) var<storage, read_write> answers: array<vec4f>;
+@group(0) var<uniform> illumination: Illumination;
+@group(0) var<storage, read> questions: array<Question>;
+@group(0) var<storage, read_write> answers: array<vec4f>;
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= arrayLength(&questions) { return; }
@@ -85,15 +85,17 @@ fn gpu() -> Arc<Gpu> {
 
 fn answers(kind: Highlight, illumination: &Illumination, words: usize, questions: &[Question]) -> Vec<Answer> {
     let gpu = gpu();
-    let pipeline = gpu.compute_pipeline("test", &text(kind, illumination.lights.len(), words), None);
+    let shader = Shader::new(&gpu, "test", &text(kind, illumination.lights.len(), words), &[]).expect("a shader");
+    let pass = ComputePass::new(&gpu, shader);
     let uniform = gpu.buffer_with("illumination", &illumination_bytes(illumination), BufferUsages::UNIFORM);
     let asked = gpu.buffer_with("questions", questions, BufferUsages::STORAGE);
     let pool = BufferPool::new(&gpu);
     let bytes = size_of_val(questions) as u64 / size_of::<Question>() as u64 * size_of::<Answer>() as u64;
     let out = pool.lend_storage("answers", bytes);
-    let bound = gpu.bind(&pipeline, &[&uniform, &asked, &out]);
+    let bindings = [("illumination", &uniform), ("questions", &asked), ("answers", &*out)];
+    let bound = pass.bind(0, bindings.map(|(name, buffer)| Binding::buffer(name, buffer))).expect("all names");
     let mut frame = Frame::begin(&gpu, "test");
-    frame.compute("test", &pipeline, &bound, [questions.len().div_ceil(64) as u32, 1, 1]);
+    pass.dispatch(&mut frame, &[&bound], DispatchSize::Invocations([questions.len() as u32, 1, 1]));
     let read = frame.read_back(&out, 0..bytes, pool.lend_host("answers", bytes));
     let result = frame.submit().wait().expect("a result");
     result.with(read, |answers: &[Answer]| answers[..questions.len()].to_vec()).expect("answers")

@@ -6,15 +6,24 @@
 //! dynamically costs several times as much as naming them.
 
 mod device;
+mod error;
 mod frame;
 mod illumination;
 #[cfg(test)]
 mod illumination_tests;
 mod pool;
-mod template;
+mod shader;
+mod table;
+mod uniform;
 
-pub use device::{DevicePreference, Gpu, GpuError};
+pub use device::{DevicePreference, Gpu};
+pub use error::{GpuError, ShaderError};
 pub use frame::{Frame, FrameResult, Readback, Submitted};
 pub use illumination::{GpuLight, illumination_bytes, light_slots};
 pub use pool::{BufferPool, Lent, Pool, PooledBuffer};
-pub use template::{TemplateError, Templates};
+pub use shader::{
+    Binding, ComputePass, DispatchSize, DrawPass, DrawState, DrawVariant, Pass, PassCache, ResourceTrait,
+    ResourceTraits, Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, sources,
+};
+pub use table::{TABLE_WIDTH, Table, TablePool};
+pub use uniform::{uniform_elements, uniform_stride};

@@ -4,10 +4,12 @@
 use std::{
     collections::VecDeque,
     ops::Deref,
-    sync::{Arc, Mutex, PoisonError, Weak},
+    sync::{Arc, Weak},
 };
 
-use crate::Gpu;
+use parking_lot::Mutex;
+
+use crate::device::Gpu;
 
 /// What nobody has, what was given back last at the end.
 type Free<K, T> = Mutex<VecDeque<(K, T)>>;
@@ -49,7 +51,7 @@ impl<K: PartialEq, T> Pool<K, T> {
     #[must_use]
     pub fn lend(&self, kind: K, make: impl FnOnce(&K) -> T) -> Lent<K, T> {
         let kept = {
-            let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut free = self.free.lock();
             free.iter().rposition(|(other, _)| *other == kind).and_then(|at| free.remove(at))
         };
         let lent = kept.unwrap_or_else(|| {
@@ -82,7 +84,7 @@ impl<K, T> Deref for Lent<K, T> {
 impl<K, T> Drop for Lent<K, T> {
     fn drop(&mut self) {
         let (Some(home), Some(lent)) = (self.home.upgrade(), self.lent.take()) else { return };
-        let mut free = home.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut free = home.lock();
         free.push_back(lent);
         while free.len() > self.most_free {
             free.pop_front();

@@ -37,7 +37,7 @@ pub enum ReconstructionError {
     Gpu(#[from] gpu::GpuError),
     /// A shader that cannot be written out.
     #[error(transparent)]
-    Template(#[from] gpu::TemplateError),
+    Template(#[from] gpu::ShaderError),
     /// A camera that cannot be used.
     #[error("view camera {index}: {source}")]
     Camera {

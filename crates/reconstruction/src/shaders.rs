@@ -1,7 +1,7 @@
 //! The shaders' texts, written out for a number of cameras.
 
 use depth_image::Highlight;
-use gpu::{TemplateError, Templates, light_slots};
+use gpu::{ShaderError, Templates, light_slots};
 use minijinja::context;
 
 use crate::{reflectors::sample_texels, word_texture};
@@ -73,7 +73,7 @@ pub struct ShaderKey {
 ///
 /// # Errors
 /// When a template is broken.
-pub fn shader_text(templates: &Templates, key: ShaderKey) -> Result<String, TemplateError> {
+pub fn shader_text(templates: &Templates, key: ShaderKey) -> Result<String, ShaderError> {
     const DIRECTIONS: [[i32; 2]; 8] = [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]];
     let decimal = |v: f32| format!("{v:?}");
     let highlight = match key.highlight {

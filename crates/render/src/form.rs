@@ -6,7 +6,7 @@ use std::{
 };
 
 use depth_image::{Highlight, SpecularPlanes};
-use gpu::{Gpu, TemplateError, Templates, light_slots};
+use gpu::{Gpu, ShaderError, Templates, light_slots};
 use minijinja::{Value, context};
 
 use crate::{
@@ -265,7 +265,7 @@ impl Form {
 ///
 /// # Errors
 /// When a template is broken.
-pub fn shader_text(templates: &Templates, form: Form) -> Result<String, TemplateError> {
+pub fn shader_text(templates: &Templates, form: Form) -> Result<String, ShaderError> {
     templates.render(form.template(), form.context())
 }
 

@@ -67,7 +67,7 @@ pub enum RenderError {
     Gpu(#[from] gpu::GpuError),
     /// A shader that cannot be written out.
     #[error(transparent)]
-    Template(#[from] gpu::TemplateError),
+    Template(#[from] gpu::ShaderError),
     /// A camera that cannot be drawn with.
     #[error("camera {index}: {source}")]
     Camera {

@@ -1,0 +1,45 @@
+//! Errors of the device and of shaders.
+
+/// A fault or limit of the device.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum GpuError {
+    #[error("no graphics device found ({0}); on Debian `apt-get install mesa-vulkan-drivers` brings the software one")]
+    NoDevice(String),
+    #[error("device {name} could not be opened: {reason}")]
+    Open { name: String, reason: String },
+    #[error("unknown device preference {0:?}, expected any or software")]
+    UnknownPreference(String),
+    /// A buffer or texture is beyond the device's limits.
+    #[error("{what} needs {needed}, the device allows {limit}")]
+    Limit { what: String, needed: u64, limit: u64 },
+    /// Work failed after its submission.
+    #[error("device lost or read-back failed: {0}")]
+    Lost(String),
+}
+
+/// A fault of a shader, or of what is bound to it.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum ShaderError {
+    #[error("shader template {name}: {source}")]
+    Template { name: String, source: minijinja::Error },
+    #[error("shader {shader} is invalid: {message}")]
+    Invalid { shader: String, message: String },
+    #[error("shader {shader}: {name} of group {group} is not bound")]
+    Unbound { shader: String, group: u32, name: String },
+    #[error("shader {shader}: {name} is bound, but is not in group {group}")]
+    NotInGroup { shader: String, group: u32, name: String },
+    #[error("shader {shader}: {name} of group {group} is bound twice")]
+    BoundTwice { shader: String, group: u32, name: String },
+}
+
+impl GpuError {
+    /// Refuses what is beyond a limit.
+    ///
+    /// # Errors
+    /// [`GpuError::Limit`] with the name and both numbers.
+    pub fn check_limit(what: &str, needed: u64, limit: u64) -> Result<(), Self> {
+        if needed <= limit { Ok(()) } else { Err(Self::Limit { what: what.to_owned(), needed, limit }) }
+    }
+}

@@ -1,0 +1,98 @@
+//! A compute shader that is bound by name and dispatched.
+
+use std::ops::Range;
+
+use wgpu::BindGroup;
+
+use super::{
+    binding::Binding,
+    compiled::Shader,
+    variant::{Pass, ShaderVariant},
+};
+use crate::{device::Gpu, error::ShaderError, frame::Frame};
+
+/// A compute pipeline with its layout. The shader's entry point is `main`.
+pub struct ComputePass {
+    shader: Shader,
+    pipeline: wgpu::ComputePipeline,
+}
+
+/// The size of a dispatch.
+#[derive(Debug, Clone, Copy)]
+pub enum DispatchSize<'b> {
+    /// At least this many invocations along x, y and z, in whole workgroups.
+    Invocations([u32; 3]),
+    /// The workgroups that the device has written at `16 · n` for the n-th element.
+    Indirect(&'b wgpu::Buffer),
+}
+
+impl ComputePass {
+    /// Builds the pipeline.
+    #[must_use]
+    pub fn new(gpu: &Gpu, shader: Shader) -> Self {
+        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(shader.interface().shader()),
+            layout: Some(&shader.layout),
+            module: &shader.module,
+            entry_point: Some("main"),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
+            cache: None,
+        });
+        Self { shader, pipeline }
+    }
+
+    /// Binds resources to all variables of a group.
+    ///
+    /// # Errors
+    /// A name that is missing, not in the group, or there twice.
+    pub fn bind<'r>(
+        &self,
+        group: u32,
+        bindings: impl IntoIterator<Item = Binding<'r>>,
+    ) -> Result<BindGroup, ShaderError> {
+        self.shader.bind(group, bindings)
+    }
+
+    /// Records one dispatch, which sees the first element of buffers at dynamic offsets. `groups` are all groups, from 0.
+    pub fn dispatch(&self, frame: &mut Frame<'_>, groups: &[&BindGroup], size: DispatchSize<'_>) {
+        self.dispatch_each(frame, groups, 0..1, size);
+    }
+
+    /// Records one dispatch for each element: it sees that element of buffers at dynamic offsets.
+    pub fn dispatch_each(
+        &self,
+        frame: &mut Frame<'_>,
+        groups: &[&BindGroup],
+        elements: Range<u32>,
+        size: DispatchSize<'_>,
+    ) {
+        let interface = self.shader.interface();
+        let label = Some(interface.shader());
+        let mut pass = frame.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes: None });
+        pass.set_pipeline(&self.pipeline);
+        for (number, element) in (0..).zip(elements) {
+            for (group, bound) in groups.iter().enumerate() {
+                let offsets: Vec<u32> = interface.strides(group).map(|stride| element * stride).collect();
+                if number == 0 || !offsets.is_empty() {
+                    pass.set_bind_group(group as u32, *bound, &offsets);
+                }
+            }
+            match size {
+                DispatchSize::Invocations(invocations) => {
+                    let axis = |axis: usize| invocations[axis].div_ceil(interface.workgroup_size[axis]);
+                    pass.dispatch_workgroups(axis(0), axis(1), axis(2));
+                }
+                DispatchSize::Indirect(arguments) => pass.dispatch_workgroups_indirect(arguments, 16 * number),
+            }
+        }
+    }
+}
+
+impl<V: ShaderVariant> Pass<V> for ComputePass {
+    fn build(gpu: &Gpu, shader: Shader, _: &V) -> Self {
+        Self::new(gpu, shader)
+    }
+}

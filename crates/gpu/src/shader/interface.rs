@@ -1,0 +1,247 @@
+//! The resources that a shader declares, read from its WGSL.
+
+use naga::{
+    AddressSpace, GlobalVariable, ImageClass, ImageDimension, Module, ScalarKind, ShaderStage, StorageAccess,
+    StorageFormat, TypeInner,
+    front::wgsl::{Frontend, Options},
+    valid::Capabilities,
+};
+use wgpu::{BindingType, BufferBindingType, SamplerBindingType, StorageTextureAccess, TextureFormat};
+
+use super::binding::Binding;
+use crate::{error::ShaderError, uniform::uniform_stride};
+
+/// A property of a resource that WGSL does not say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ResourceTrait {
+    /// One element of a buffer, chosen by each dispatch or draw.
+    DynamicOffset,
+    /// A texture of floats that a sampler filters.
+    Filterable,
+}
+
+/// Names of resources with their traits.
+pub type ResourceTraits = &'static [(&'static str, ResourceTrait)];
+
+/// A resource at its binding.
+#[derive(Debug, Clone)]
+pub(crate) struct Resource {
+    pub name: String,
+    pub binding: u32,
+    pub ty: BindingType,
+    /// The size of one element where the offset is dynamic.
+    pub element_bytes: Option<u32>,
+}
+
+/// A shader's resources and entry points.
+#[derive(Debug, Clone)]
+pub struct ShaderInterface {
+    shader: String,
+    /// The resources of each group.
+    groups: Vec<Vec<Resource>>,
+    /// Stages that have an entry point.
+    pub(crate) stages: wgpu::ShaderStages,
+    /// The invocations of one workgroup, 0 in drawing shaders.
+    pub(crate) workgroup_size: [u32; 3],
+}
+
+impl ShaderInterface {
+    /// Reads `wgsl`.
+    ///
+    /// # Errors
+    /// WGSL that cannot be parsed, or a trait of a resource that is not declared.
+    pub fn of(shader: &str, wgsl: &str, traits: ResourceTraits) -> Result<Self, ShaderError> {
+        let invalid = |message: String| ShaderError::Invalid { shader: shader.to_owned(), message };
+        let mut options = Options::new();
+        options.capabilities = Capabilities::all();
+        let module = Frontend::new_with_options(options)
+            .parse(wgsl)
+            .map_err(|error| invalid(error.emit_to_string_with_path(wgsl, shader)))?;
+        let mut interface = Self {
+            shader: shader.to_owned(),
+            groups: Vec::new(),
+            stages: module.entry_points.iter().map(|entry| stage(entry.stage)).collect(),
+            workgroup_size: module.entry_points.first().map_or([0; 3], |entry| entry.workgroup_size),
+        };
+        for (_, variable) in module.global_variables.iter() {
+            let Some(place) = variable.binding else { continue };
+            let name = variable.name.clone().unwrap_or_default();
+            let has = |wanted| traits.contains(&(name.as_str(), wanted));
+            let ty = binding_type(&module, variable, &has)
+                .ok_or_else(|| invalid(format!("{name} has a type that is not supported")))?;
+            let bytes = module.types[variable.ty].inner.try_size(module.to_ctx());
+            let element_bytes = bytes.filter(|_| has(ResourceTrait::DynamicOffset));
+            let groups = interface.groups.len().max(place.group as usize + 1);
+            interface.groups.resize(groups, Vec::new());
+            interface.groups[place.group as usize].push(Resource { name, binding: place.binding, ty, element_bytes });
+        }
+        let declared = |name: &str| interface.groups.iter().flatten().any(|resource| resource.name == name);
+        match traits.iter().find(|(name, _)| !declared(name)) {
+            Some((name, _)) => Err(invalid(format!("{name} has a trait but is not declared"))),
+            None => Ok(interface),
+        }
+    }
+
+    pub(crate) fn shader(&self) -> &str {
+        &self.shader
+    }
+
+    pub(crate) fn groups(&self) -> &[Vec<Resource>] {
+        &self.groups
+    }
+
+    /// The bytes from one element to the next of each dynamic resource of a group.
+    pub(crate) fn strides(&self, group: usize) -> impl Iterator<Item = u32> {
+        self.groups[group].iter().filter_map(|resource| resource.element_bytes).map(uniform_stride)
+    }
+
+    /// Checks that bindings name all variables of a group, each once.
+    ///
+    /// # Errors
+    /// A name that is missing, not in the group, or there twice.
+    pub fn check(&self, group: u32, bindings: &[Binding<'_>]) -> Result<(), ShaderError> {
+        self.matched(group, bindings.iter().map(|binding| binding.name)).map(|_| ())
+    }
+
+    /// The resources of a group that `names` are bound to, in their order.
+    ///
+    /// # Errors
+    /// A name that is missing, not in the group, or there twice.
+    pub(crate) fn matched<'n>(
+        &self,
+        group: u32,
+        names: impl Iterator<Item = &'n str>,
+    ) -> Result<Vec<&Resource>, ShaderError> {
+        let resources = self.groups.get(group as usize).map(Vec::as_slice).unwrap_or_default();
+        let shader = || self.shader.clone();
+        let mut matched: Vec<&Resource> = Vec::with_capacity(resources.len());
+        for name in names {
+            let Some(resource) = resources.iter().find(|resource| resource.name == name) else {
+                return Err(ShaderError::NotInGroup { shader: shader(), group, name: name.to_owned() });
+            };
+            if matched.iter().any(|other| other.binding == resource.binding) {
+                return Err(ShaderError::BoundTwice { shader: shader(), group, name: name.to_owned() });
+            }
+            matched.push(resource);
+        }
+        let is_bound = |resource: &Resource| matched.iter().any(|other| other.binding == resource.binding);
+        match resources.iter().find(|resource| !is_bound(resource)) {
+            Some(Resource { name, .. }) => Err(ShaderError::Unbound { shader: shader(), group, name: name.clone() }),
+            None => Ok(matched),
+        }
+    }
+}
+
+fn stage(stage: ShaderStage) -> wgpu::ShaderStages {
+    match stage {
+        ShaderStage::Vertex => wgpu::ShaderStages::VERTEX,
+        ShaderStage::Fragment => wgpu::ShaderStages::FRAGMENT,
+        _ => wgpu::ShaderStages::COMPUTE,
+    }
+}
+
+/// The type of a variable's binding; `None` for types that no shader here uses.
+fn binding_type(
+    module: &Module,
+    variable: &GlobalVariable,
+    has: &impl Fn(ResourceTrait) -> bool,
+) -> Option<BindingType> {
+    let has_dynamic_offset = has(ResourceTrait::DynamicOffset);
+    let buffer = |ty| Some(BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None });
+    match (variable.space, &module.types[variable.ty].inner) {
+        (AddressSpace::Uniform, _) => buffer(BufferBindingType::Uniform),
+        (AddressSpace::Storage { access }, _) => {
+            buffer(BufferBindingType::Storage { read_only: !access.contains(StorageAccess::STORE) })
+        }
+        (AddressSpace::Handle, &TypeInner::Image { dim, arrayed, class }) => {
+            image_type(dim, arrayed, class, has(ResourceTrait::Filterable))
+        }
+        (AddressSpace::Handle, TypeInner::Sampler { comparison }) => {
+            let ty = if *comparison { SamplerBindingType::Comparison } else { SamplerBindingType::Filtering };
+            Some(BindingType::Sampler(ty))
+        }
+        _ => None,
+    }
+}
+
+fn image_type(dim: ImageDimension, arrayed: bool, class: ImageClass, filterable: bool) -> Option<BindingType> {
+    let view_dimension = match (dim, arrayed) {
+        (ImageDimension::D2, false) => wgpu::TextureViewDimension::D2,
+        (ImageDimension::D2, true) => wgpu::TextureViewDimension::D2Array,
+        _ => return None,
+    };
+    let texture = |sample_type, multisampled| Some(BindingType::Texture { sample_type, view_dimension, multisampled });
+    match class {
+        ImageClass::Sampled { kind: ScalarKind::Float, multi } => {
+            texture(wgpu::TextureSampleType::Float { filterable }, multi)
+        }
+        ImageClass::Sampled { kind: ScalarKind::Uint, multi } => texture(wgpu::TextureSampleType::Uint, multi),
+        ImageClass::Depth { multi } => texture(wgpu::TextureSampleType::Depth, multi),
+        ImageClass::Storage { format, access } if access == StorageAccess::STORE => Some(BindingType::StorageTexture {
+            access: StorageTextureAccess::WriteOnly,
+            format: texture_format(format)?,
+            view_dimension,
+        }),
+        _ => None,
+    }
+}
+
+fn texture_format(format: StorageFormat) -> Option<TextureFormat> {
+    match format {
+        StorageFormat::R32Float => Some(TextureFormat::R32Float),
+        StorageFormat::Rg32Uint => Some(TextureFormat::Rg32Uint),
+        StorageFormat::Rgba32Uint => Some(TextureFormat::Rgba32Uint),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WGSL: &str = "
+        struct Camera { eye: vec3f, near: f32 }
+        @group(0) @binding(0) var<uniform> camera: Camera;
+        @group(0) @binding(1) var depth: texture_depth_2d;
+        @group(1) @binding(0) var<storage, read_write> words: array<u32>;
+        @compute @workgroup_size(8, 4) fn main() { words[0] = u32(camera.near); }
+    ";
+    const CAMERA: ResourceTraits = &[("camera", ResourceTrait::DynamicOffset)];
+
+    fn interface() -> ShaderInterface {
+        ShaderInterface::of("test", WGSL, CAMERA).expect("an interface")
+    }
+
+    fn matched(group: u32, names: &[&str]) -> Result<usize, ShaderError> {
+        interface().matched(group, names.iter().copied()).map(|resources| resources.len())
+    }
+
+    #[test]
+    fn resources_are_found_with_their_types() {
+        let interface = interface();
+        assert_eq!(interface.workgroup_size, [8, 4, 1]);
+        assert_eq!(interface.strides(0).collect::<Vec<_>>(), [256]);
+        let storage = BufferBindingType::Storage { read_only: false };
+        let words = BindingType::Buffer { ty: storage, has_dynamic_offset: false, min_binding_size: None };
+        assert_eq!(interface.groups()[1][0].ty, words);
+        let found = matched(0, &["depth", "camera"]).expect("both names");
+        assert_eq!(found, 2);
+    }
+
+    #[test]
+    fn a_missing_an_extra_and_a_repeated_name_are_errors() {
+        assert!(matches!(matched(0, &["camera"]), Err(ShaderError::Unbound { name, .. }) if name == "depth"));
+        let extra = matched(0, &["camera", "depth", "words"]);
+        assert!(matches!(extra, Err(ShaderError::NotInGroup { name, .. }) if name == "words"));
+        let twice = matched(0, &["camera", "depth", "depth"]);
+        assert!(matches!(twice, Err(ShaderError::BoundTwice { name, .. }) if name == "depth"));
+        assert!(matches!(matched(2, &["words"]), Err(ShaderError::NotInGroup { .. })));
+    }
+
+    #[test]
+    fn a_trait_of_an_undeclared_resource_and_invalid_wgsl_are_errors() {
+        let unknown = ShaderInterface::of("test", WGSL, &[("cameras", ResourceTrait::DynamicOffset)]);
+        assert!(matches!(unknown, Err(ShaderError::Invalid { .. })));
+        assert!(matches!(ShaderInterface::of("test", "fn f( {", &[]), Err(ShaderError::Invalid { .. })));
+    }
+}

@@ -1,0 +1,51 @@
+//! Variants of a shader: the switches that are written into its text.
+
+use std::{fmt::Debug, hash::Hash};
+
+use minijinja::Value;
+
+use super::{compiled::Shader, interface::ResourceTraits, template::Templates};
+use crate::{device::Gpu, error::ShaderError};
+
+/// A shader's switches. Each set of them is a text of its own.
+pub trait ShaderVariant: Debug + Clone + Eq + Hash {
+    /// The template, which is also the label of its passes.
+    fn template(&self) -> &'static str;
+
+    /// The values that the template uses.
+    fn context(&self) -> Value;
+
+    /// What WGSL does not say of resources.
+    fn traits(&self) -> ResourceTraits {
+        &[]
+    }
+
+    /// The variants that stand for all: each switch in each position, few and many of what is counted.
+    fn all() -> Vec<Self>;
+}
+
+/// A pass that is built from a variant's shader.
+pub trait Pass<V>: Sized {
+    /// Builds the pipeline.
+    fn build(gpu: &Gpu, shader: Shader, variant: &V) -> Self;
+}
+
+/// A variant, written out.
+#[derive(Debug, Clone)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct ShaderSource {
+    /// The variant with its switches.
+    pub name: String,
+    pub template: &'static str,
+    pub wgsl: String,
+    pub traits: ResourceTraits,
+}
+
+/// The texts of [`ShaderVariant::all`].
+pub fn sources<V: ShaderVariant>(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
+    V::all().into_iter().map(|variant| {
+        let (template, traits) = (variant.template(), variant.traits());
+        let wgsl = templates.render(template, variant.context())?;
+        Ok(ShaderSource { name: format!("{template}: {variant:?}"), template, wgsl, traits })
+    })
+}
