@@ -10,9 +10,11 @@ const FIRST_CODE: f32 = 2.0;
 const LAST_CODE: f32 = 32_767.0;
 
 /// Neighbours whose depths differ by less, in footprints, are one surface whatever is around them.
-const FLAT_FOOTPRINTS: f32 = 2.0;
+pub(crate) const FLAT_FOOTPRINTS: f32 = 2.0;
 /// So much may a jump in depth leave the range of the jumps before and after it, in footprints.
 const SLOPE_FOOTPRINTS: f32 = 2.0;
+/// A jump in depth may leave it by this share of itself, too.
+pub(crate) const SLOPE_SHARE: f32 = 0.2;
 
 /// A depth plane as codes linear in inverse depth: `code = scale / planar_depth_m + offset`.
 #[derive(Debug, Clone, PartialEq)]
@@ -181,7 +183,7 @@ fn is_one_surface(plane: &[f32], index: usize, stride: usize, place: usize, coun
     let before = (place > 0).then(|| plane[index - stride]).filter(|&d| d > 0.0).map(|d| a - d);
     let after = (place + 2 < count).then(|| plane[index + 2 * stride]).filter(|&d| d > 0.0).map(|d| d - b);
     let slack = SLOPE_FOOTPRINTS * footprint;
-    [before, after].into_iter().flatten().any(|slope| (slope - jump).abs() <= slack.max(0.2 * jump.abs()))
+    [before, after].into_iter().flatten().any(|slope| (slope - jump).abs() <= slack.max(SLOPE_SHARE * jump.abs()))
 }
 
 /// Levels of words over the cells between texel centres, sides padded to powers of two. Level 0 is the cells and has

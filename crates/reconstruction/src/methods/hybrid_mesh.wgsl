@@ -4,32 +4,31 @@
 {% include "normal.wgsl" %}
 {% include "cut.wgsl" %}
 
-// Of each texel corner: the inverse depth and normal of the sample to its lower right, and its own inverse depth.
-@group(0) @binding(1) var planes: texture_2d<u32>;
-// Of each sample's corners: upper left, upper right, lower left, lower right.
-@group(0) @binding(2) var<storage, read_write> inverse_depths: array<vec4f>;
-@group(0) @binding(3) var<storage, read_write> extents: array<u32>;
+// For each texel corner: the inverse depth and normal of the sample to its lower right, and its own inverse depth.
+@group(0) var planes: texture_2d<u32>;
+// For each sample its corners: upper left, upper right, lower left, lower right.
+@group(0) var<storage, read_write> inverse_depths: array<vec4f>;
+@group(0) var<storage, read_write> extents: array<u32>;
 
-// As in pyramid.rs.
-const FLAT_FOOTPRINTS: f32 = 2.0;
-const SLOPE_SHARE: f32 = 0.2;
+const FLAT_FOOTPRINTS: f32 = {{ flat_footprints }};
+const SLOPE_SHARE: f32 = {{ slope_share }};
 const GREATEST_SLOPE: f32 = {{ greatest_slope }};
 const HALF_DIAGONAL_PX: f32 = 0.70710678;
 
 struct Sample { inverse_depth: f32, ray: vec3f, normal: vec3f, tame_normal: vec3f }
 
 fn plane_texel(at: vec2u) -> vec4u {
-    return textureLoad(planes, texel_of(work.first_corner + at.y * (work.size_px.x + 1u) + at.x), 0);
+    return textureLoad(planes, texel_at(work.first_corner + at.y * (work.size_px.x + 1u) + at.x), 0);
 }
 
 // Faces the eye, by at least as much as a surface of the greatest slope.
 fn tamed(normal: vec3f, ray: vec3f) -> vec3f {
-    let sight = normalize(ray);
-    let facing = select(normal, -normal, dot(normal, sight) > 0.0);
-    let cosine = -dot(facing, sight);
-    let sideways = facing + sight * cosine;
+    let towards = normalize(ray);
+    let facing = select(normal, -normal, dot(normal, towards) > 0.0);
+    let cosine = -dot(facing, towards);
+    let sideways = facing + towards * cosine;
     let least_cosine = inverseSqrt(1.0 + GREATEST_SLOPE * GREATEST_SLOPE);
-    let tilted = sideways * (GREATEST_SLOPE / max(length(sideways), 1e-6)) - sight;
+    let tilted = sideways * (GREATEST_SLOPE / max(length(sideways), 1e-6)) - towards;
     return select(facing, tilted * least_cosine, cosine < least_cosine);
 }
 

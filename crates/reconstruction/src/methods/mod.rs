@@ -4,15 +4,25 @@
 //! twin. No product code outside this folder names a method.
 
 pub(crate) mod hybrid_mesh;
-mod joint_carve;
-mod light_field_search;
-pub(crate) mod mesh;
+pub(crate) mod joint_carve;
+pub(crate) mod light_field_search;
+mod mesh;
 
-use std::{fmt, mem::discriminant, str::FromStr};
+use std::{fmt, mem::discriminant, str::FromStr, sync::Arc};
 
 use depth_image::{NamedMethod, Setting, method_forms, method_help, method_named};
+use gpu::{Gpu, PassCache, ShaderError, ShaderSource, Templates, sources as of};
 
-use crate::{ErrorBound, RequiredPlanes};
+use crate::{
+    device::Device,
+    error::ReconstructionError,
+    error_bound::ErrorBound,
+    pixel_list::PixelList,
+    quads::{Mesh as QuadMesh, QuadPasses},
+    recording::Recording,
+    required_planes::RequiredPlanes,
+    sample_set::SampleSet,
+};
 
 /// How views are found in depth images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -70,6 +80,37 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 4] = [
     },
 ];
 
+pub(crate) const SHADERS: [(&str, &str); 5] =
+    [joint_carve::SHADER, joint_carve::march::SHADER, light_field_search::SHADER, mesh::SHADER, hybrid_mesh::SHADER];
+
+/// The texts of all variants of all methods' passes.
+pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
+    let carve = of::<joint_carve::march::March>(templates).chain(of::<joint_carve::Carve>(templates));
+    let cut = of::<mesh::CutBetweenSamples>(templates).chain(of::<hybrid_mesh::CutTexels>(templates));
+    carve.chain(of::<light_field_search::Search>(templates)).chain(cut)
+}
+
+/// The passes of all methods.
+pub(crate) struct MethodPasses {
+    joint_carve: joint_carve::CarvePasses,
+    light_field_search: PassCache<light_field_search::Search>,
+    mesh: PassCache<mesh::CutBetweenSamples>,
+    hybrid_mesh: hybrid_mesh::HybridPasses,
+    quads: QuadPasses,
+}
+
+impl MethodPasses {
+    pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
+        Self {
+            joint_carve: joint_carve::CarvePasses::new(gpu, templates),
+            light_field_search: PassCache::new(gpu, templates),
+            mesh: PassCache::new(gpu, templates),
+            hybrid_mesh: hybrid_mesh::HybridPasses::new(gpu, templates),
+            quads: QuadPasses::new(gpu, templates),
+        }
+    }
+}
+
 impl Default for ReconstructionMethod {
     fn default() -> Self {
         METHODS[0].method
@@ -103,6 +144,43 @@ impl ReconstructionMethod {
                 joint_carve::coarser_level(stop_level).map(|stop_level| JointCarve { stop_level })
             }
             Mesh | HybridMesh { .. } => None,
+        }
+    }
+
+    /// Rays are followed from where their tiles start; other methods draw.
+    pub(crate) fn follows_rays(self) -> bool {
+        match self {
+            LightFieldSearch { .. } | JointCarve { .. } => true,
+            Mesh | HybridMesh { .. } => false,
+        }
+    }
+
+    /// Records the method's passes; gives the pixels that stay unknown.
+    pub(crate) fn record(
+        self,
+        passes: &MethodPasses,
+        recording: &mut Recording<'_>,
+    ) -> Result<PixelList, ReconstructionError> {
+        match self {
+            LightFieldSearch { steps } => light_field_search::record(&passes.light_field_search, recording, steps),
+            JointCarve { stop_level } => joint_carve::record(&passes.joint_carve, recording, stop_level),
+            Mesh => mesh::record(&passes.mesh, &passes.quads, recording),
+            HybridMesh { merged } => hybrid_mesh::record(&passes.hybrid_mesh, &passes.quads, recording, merged),
+        }
+    }
+
+    /// The set's quads, cut when they are first asked for; `None` for methods that draw none.
+    pub(crate) fn mesh(
+        self,
+        passes: &MethodPasses,
+        device: &Device,
+        set: &SampleSet,
+    ) -> Result<Option<Arc<QuadMesh>>, ReconstructionError> {
+        let MethodPasses { mesh, hybrid_mesh, quads, .. } = passes;
+        match self {
+            LightFieldSearch { .. } | JointCarve { .. } => Ok(None),
+            Mesh => mesh::mesh(mesh, quads, device, set).map(Some),
+            HybridMesh { merged } => hybrid_mesh::mesh(hybrid_mesh, quads, device, set, merged).map(Some),
         }
     }
 

@@ -3,13 +3,11 @@
 use depth_image::ProvenanceKind;
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
-use super::{FAR_AWAY, Pixel, sample_camera::SampleCamera, surface::bilinear_shares, view_ray::ViewRay};
-use crate::pyramid::HOLE_CODE;
+use super::{pixel::Pixel, sample_camera::SampleCamera, surface::bilinear_shares, view_ray::ViewRay};
+use crate::{methods::light_field_search::BISECTIONS, pyramid::HOLE_CODE, view_work::FAR_AWAY};
 
-const BISECTIONS: u32 = 8;
-
-/// Inside for every camera that sees the point, and whether any does.
-struct Verdict {
+/// `entered`: the point is inside for every camera that sees it; `seen`: some camera does.
+struct Evaluation {
     entered: bool,
     seen: bool,
 }
@@ -30,7 +28,7 @@ pub(super) fn light_field_search(
     let (mut entered, mut never_unseen, mut t) = (false, true, ray.near);
     for step in first_step..=steps {
         t = ray.near + stride * step as f32;
-        let v = verdict(cameras, ray, t);
+        let v = evaluate_cameras(cameras, ray, t);
         never_unseen &= v.seen;
         entered = v.entered;
         if entered {
@@ -40,7 +38,7 @@ pub(super) fn light_field_search(
     let (mut low, mut high) = ((t - stride).max(ray.near), t);
     for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
-        if verdict(cameras, ray, middle).entered {
+        if evaluate_cameras(cameras, ray, middle).entered {
             high = middle;
         } else {
             low = middle;
@@ -70,10 +68,10 @@ fn in_image(camera: &SampleCamera, ray: &ViewRay, t: f32) -> Vec3 {
     a + b * t
 }
 
-fn verdict(cameras: &[SampleCamera], ray: &ViewRay, t: f32) -> Verdict {
+fn evaluate_cameras(cameras: &[SampleCamera], ray: &ViewRay, t: f32) -> Evaluation {
     let depths: Vec<f32> = cameras.iter().filter_map(|camera| penetration(camera, ray, t)).collect();
     let seen = !depths.is_empty();
-    Verdict { entered: seen && depths.iter().all(|&depth| depth >= 0.0), seen }
+    Evaluation { entered: seen && depths.iter().all(|&depth| depth >= 0.0), seen }
 }
 
 /// The camera whose surface is closest.

@@ -3,7 +3,11 @@
 use depth_image::{Camera, DepthImage, linear_from_rgb9e5};
 use glam::{UVec2, Vec2, Vec3, Vec4};
 
-use crate::{CodedDepth, Pyramid, pyramid::BACKGROUND_CODE, sample_set::stretch};
+use crate::{
+    pyramid::{BACKGROUND_CODE, CodedDepth, Pyramid},
+    sample_set::stretch,
+    view_work::FAR_AWAY,
+};
 
 /// One sample image, its depth as codes and their pyramid.
 pub(super) struct SampleCamera {
@@ -36,9 +40,9 @@ pub(super) struct Corners {
     pub proven: [f32; 4],
 }
 
-/// Of a node's word; a hole may be as near as anything, nearer than any code.
+/// The nearest code in a node's word; a hole may be as near as anything, nearer than any code.
 fn nearest_code(word: u32) -> f32 {
-    if word & 0xffff == 0xffff { super::FAR_AWAY } else { (word & 0xffff) as f32 }
+    if word & 0xffff == 0xffff { FAR_AWAY } else { (word & 0xffff) as f32 }
 }
 
 impl SampleCamera {
@@ -92,7 +96,7 @@ impl SampleCamera {
         self.depth.is_uncertain(texel.x, texel.y)
     }
 
-    /// Of the image.
+    /// Whether nothing before some sample is proven free.
     pub fn has_uncertain(&self) -> bool {
         !self.depth.uncertain.is_empty()
     }

@@ -7,12 +7,12 @@ use depth_image::{
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{
-    Pixel,
+    pixel::Pixel,
     sample_camera::SampleCamera,
     surface::{bilinear, bilinear_shares},
     view_ray::{ViewRay, ViewRays},
 };
-use crate::{SetDescription, shaders::THICKNESS_FOOTPRINTS};
+use crate::{set_description::SetDescription, surface::THICKNESS_FOOTPRINTS};
 
 /// What the samples around a point say together.
 struct Gathered {

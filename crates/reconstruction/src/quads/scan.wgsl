@@ -1,13 +1,12 @@
 // Turns counts of chunks into places where their quads begin, and says how much there is to draw. One workgroup.
 {% include "cut.wgsl" %}
 
-@group(0) @binding(1) var<storage, read_write> counts: array<u32>;
+@group(0) var<storage, read_write> counts: array<u32>;
 // Arguments of an indexed indirect draw.
 struct Draw { index_count: u32, instance_count: u32, first_index: u32, base_vertex: u32, first_instance: u32 }
-@group(0) @binding(2) var<storage, read_write> draw: Draw;
+@group(0) var<storage, read_write> draw: Draw;
 
 const LANES: u32 = 64u;
-const INDICES_A_QUAD: u32 = 6u;
 
 var<workgroup> sums: array<u32, LANES>;
 

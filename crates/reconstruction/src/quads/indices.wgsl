@@ -1,16 +1,14 @@
 // Lists the quads of an image in the order of their samples, as two triangles each.
 {% include "cut.wgsl" %}
 
-@group(0) @binding(1) var<storage, read> extents: array<u32>;
+@group(0) var<storage, read> extents: array<u32>;
 // Where each chunk's quads begin.
-@group(0) @binding(2) var<storage, read> places: array<u32>;
-@group(0) @binding(3) var<storage, read_write> indices: array<u32>;
-
-const INDICES_A_QUAD: u32 = 6u;
+@group(0) var<storage, read> places: array<u32>;
+@group(0) var<storage, read_write> indices: array<u32>;
 
 // Vertices: upper left, upper right, lower left, lower right.
 fn corners_of(index: u32, extent: vec2u) -> vec4u {
-{% if hybrid %}
+{% if at_texel_corners %}
     // A merged quad borrows its corners from the samples at its corners.
     let last = extent - 1u;
     let below = index + last.y * work.size_px.x;

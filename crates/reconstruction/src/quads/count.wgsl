@@ -1,10 +1,10 @@
 // Counts the quads of each chunk of samples, so that they can be listed in their order.
 {% include "cut.wgsl" %}
 
-@group(0) @binding(1) var<storage, read> extents: array<u32>;
-@group(0) @binding(2) var<storage, read_write> counts: array<u32>;
+@group(0) var<storage, read> extents: array<u32>;
+@group(0) var<storage, read_write> counts: array<u32>;
 struct Report { greatest_error_px: u32, quads_before: atomic<u32> }
-@group(0) @binding(3) var<storage, read_write> report: Report;
+@group(0) var<storage, read_write> report: Report;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {

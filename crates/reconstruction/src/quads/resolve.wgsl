@@ -1,16 +1,13 @@
 // Gives the pixels of a drawn view their colour: the depth says where the surface is, and all cameras are asked what
 // it looks like there. Where none knows, the drawn sample's own colour stands.
 {% include "color.wgsl" %}
-{% include "sample_set.wgsl" %}
+{% include "view_work.wgsl" %}
 {% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 
 // A layer for each view of the batch.
-@group(0) @binding({{ 10 + count_fetches|int }}) var drawn_depth: texture_depth_2d_array;
-@group(0) @binding({{ 11 + count_fetches|int }}) var drawn_sample: texture_2d_array<u32>;
-
-const THICKNESS_FOOTPRINTS: f32 = {{ thickness_footprints }};
-const BACKGROUND: u32 = 1u;
+@group(0) var drawn_depth: texture_depth_2d_array;
+@group(0) var drawn_sample: texture_2d_array<u32>;
 
 fn shows_background(camera: SampleCamera, point_in_world: vec3f) -> bool {
     let p = homogeneous(camera.homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
@@ -19,12 +16,12 @@ fn shows_background(camera: SampleCamera, point_in_world: vec3f) -> bool {
     let inside = p.z > 0.0 && all(uv >= vec2f(0.0)) && all(uv < camera.cells + 1.0);
 {% if count_fetches %}    fetches += 1u;
 {% endif %}
-    let words = textureLoad(cell_codes, texel_of(camera.first_cell + texel.y * camera.width_px + texel.x), 0);
+    let words = textureLoad(cell_codes, texel_at(camera.first_cell + texel.y * camera.width_px + texel.x), 0);
     // Not where the ray passed what other images hold: bit 15 says so.
     return inside && (words.x & 0xffffu) == BACKGROUND;
 }
 
-// The bit of the camera that a sample is of.
+// The bit of a sample's camera.
 fn mask_of(sample: u32) -> u32 {
     var mask = 0u;
 {% for k in range(cameras) %}
@@ -37,7 +34,7 @@ fn mask_of(sample: u32) -> u32 {
     return mask;
 }
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size({{ tile_px }}, {{ tile_px }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= work.view.size_px) { return; }
     let pixel = pixel_of(id.xy);
@@ -49,10 +46,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     // Reversed depth: near over planar depth.
     let t = select(span.far, work.view.near_m / depth, drawn);
     let point_in_world = work.view.eye_in_world + pixel.direction * t;
-    let blend = blended(point_in_world, pixel.direction, THICKNESS_FOOTPRINTS);
+    let blend = blend_two_best(point_in_world, pixel.direction);
 {% if count_fetches %}    fetches += 1u;
 {% endif %}
-    let own = linear_from_rgb9e5(textureLoad(cell_colors, texel_of(sample), 0).x);
+    let own = linear_from_rgb9e5(textureLoad(cell_colors, texel_at(sample), 0).x);
     let known = blend.camera_mask != 0u;
     let mask = select(mask_of(sample), blend.camera_mask, known);
     // Some camera looks past everything at where the ray leaves the volume.
@@ -63,5 +60,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let color = select(work.background_srgb8, srgb8_from_linear(select(own, blend.color_linear, known)), drawn);
     let without = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, empty);
     write_pixel(pixel.index, color, select(0.0, 1.0 / t, drawn), select(without, PROVENANCE_HIT | (mask << 8u), drawn));
-    if !drawn && !empty { leave_for_later(pixel.index); }
+    if !drawn && !empty { leave_undecided(pixel.index); }
 }

@@ -3,17 +3,17 @@
 // segment of a line, one dispatch an axis.
 {% include "cut.wgsl" %}
 
-@group(0) @binding(1) var<storage, read> inverse_depths: array<vec4f>;
-@group(0) @binding(2) var<storage, read_write> extents: array<u32>;
+@group(0) var<storage, read> inverse_depths: array<vec4f>;
+@group(0) var<storage, read_write> extents: array<u32>;
 // Bits of a number that is not negative: they have its order.
 struct Report { greatest_error_px: atomic<u32>, quads_before: atomic<u32> }
-@group(0) @binding(3) var<storage, read_write> report: Report;
+@group(0) var<storage, read_write> report: Report;
 
 struct Block { origin: vec2u, size: vec2u }
 // Quads along a line that become one.
 struct Run { count: u32, error_px: f32 }
 
-fn texel_at(line: u32, place: u32) -> vec2u {
+fn texel_on_line(line: u32, place: u32) -> vec2u {
     return select(vec2u(place, line), vec2u(line, place), work.axis == 1u);
 }
 
@@ -21,7 +21,7 @@ fn index_of(texel: vec2u) -> u32 {
     return texel.y * work.size_px.x + texel.x;
 }
 
-// Of the two triangles that are drawn, at a place inside the block; linear in the image, as planes are.
+// The two triangles that are drawn, at a place inside the block; linear in the image, as planes are.
 fn merged_at(corners: vec4f, at: vec2f) -> f32 {
     let upper = corners.x + (corners.y - corners.x) * at.x + (corners.z - corners.x) * at.y;
     let lower = corners.w + (corners.z - corners.w) * (1.0 - at.x) + (corners.y - corners.w) * (1.0 - at.y);
@@ -45,7 +45,7 @@ fn error_of_quad(corners: vec4f, block: Block, place: vec2u) -> f32 {
     );
 }
 
-// Of all its samples' quads, as far as the bound is kept.
+// The greatest error of all its samples' quads, as far as the bound is kept.
 fn error_of_block(block: Block) -> f32 {
     let last = block.origin + block.size - 1u;
     let corners = vec4f(
@@ -60,7 +60,7 @@ fn error_of_block(block: Block) -> f32 {
 }
 
 fn block_of(origin: vec2u, extent: vec2u, count: u32) -> Block {
-    return Block(origin, extent * texel_at(1u, count));
+    return Block(origin, extent * texel_on_line(1u, count));
 }
 
 // Not quad by quad: a run may end badly at one sample and well at a later one.
@@ -68,7 +68,7 @@ fn longest_run(origin: vec2u, extent: vec2u, alike: u32) -> Run {
     var run = Run(1u, 0.0);
     for (var step = work.segment / 2u; step > 0u; step /= 2u) {
         let count = run.count + step;
-        for (var look = count <= alike; look; look = false) {
+        for (var once = count <= alike; once; once = false) {
             let error = error_of_block(block_of(origin, extent, count));
             if error <= work.bound_px { run = Run(count, error); }
         }
@@ -79,13 +79,13 @@ fn longest_run(origin: vec2u, extent: vec2u, alike: u32) -> Run {
 // Where quads along the line are no longer like the one at a place.
 fn end_of_alike(line: u32, place: u32, end_of_segment: u32, word: u32) -> u32 {
     var end = place + 1u;
-    for (; end < end_of_segment && extents[index_of(texel_at(line, end))] == word; end++) {}
+    for (; end < end_of_segment && extents[index_of(texel_on_line(line, end))] == word; end++) {}
     return end;
 }
 
 fn merge(line: u32, place: u32, extent: vec2u, run: Run) {
-    for (var i = 1u; i < run.count; i++) { extents[index_of(texel_at(line, place + i))] = 0u; }
-    let origin = texel_at(line, place);
+    for (var i = 1u; i < run.count; i++) { extents[index_of(texel_on_line(line, place + i))] = 0u; }
+    let origin = texel_on_line(line, place);
     extents[index_of(origin)] = word_of(block_of(origin, extent, run.count).size);
     atomicMax(&report.greatest_error_px, bitcast<u32>(run.error_px));
 }
@@ -97,11 +97,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let end = min(begin + work.segment, work.size_px[work.axis]);
     var alike_until = begin;
     for (var place = begin; place < end;) {
-        let origin = texel_at(id.x, place);
+        let origin = texel_on_line(id.x, place);
         let word = extents[index_of(origin)];
         if place == alike_until { alike_until = end_of_alike(id.x, place, end, word); }
         var run = Run(alike_until - place, 0.0);
-        for (var look = word != 0u; look; look = false) {
+        for (var once = word != 0u; once; once = false) {
             run = longest_run(origin, extent_of(word), run.count);
             merge(id.x, place, extent_of(word), run);
         }

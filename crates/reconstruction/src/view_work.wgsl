@@ -1,10 +1,17 @@
-// What every search along view rays needs: sample cameras, their depth pyramids and colours, and views.
+// What passes over sample cameras see of a view: its camera, the volume, and the sample cameras with their pyramids.
+{% include "table.wgsl" %}
 //
 // Depth is kept as 15-bit codes, linear in inverse depth: code = 2 + (1/z - least) / step, so that along
 // a projected ray it is linear in screen space like everything else. 1 is background, farther than any
 // sample; 0 is a hole, which certifies nothing and blocks nothing.
 
-const HOLE: u32 = 0u;
+const HOLE: u32 = {{ hole_code }}u;
+const BACKGROUND: u32 = {{ background_code }}u;
+
+// The lowest byte of a pixel's provenance; a bit for each contributing camera follows.
+const PROVENANCE_EMPTY: u32 = {{ provenance_empty }}u;
+const PROVENANCE_HIT: u32 = {{ provenance_hit }}u;
+const PROVENANCE_FILLED: u32 = {{ provenance_filled }}u;
 
 struct SampleCamera {
     // Rows that take (point_in_world, 1) to (column · w, row · w, w), w the planar depth in metres.
@@ -41,9 +48,9 @@ struct ViewCamera {
     corner_in_world: vec3f,
     first_tile: u32,
     size_px: vec2u,
-    steps: u32,
     // This view's number in the batch.
     number: u32,
+    padding: u32,
 }
 
 // One dispatch a view: what is the same for a whole dispatch costs nothing a ray. Sample cameras are
@@ -57,13 +64,12 @@ struct ViewWork {
     cameras: array<SampleCamera, {{ cameras }}>,
 }
 
-@group(0) @binding(0) var<uniform> work: ViewWork;
-// Words that are read by place lie in textures: a load there brings up to four, for less than one of a buffer.
+@group(0) var<uniform> work: ViewWork;
 // Nodes of the pyramids: a range (nearest code low, farthest high), and the nearest code of 2 × 2 nodes.
-@group(0) @binding(1) var nodes: texture_2d<u32>;
+@group(0) var nodes: texture_2d<u32>;
 
-const TILE_PX: u32 = 8u;
-const FAR_AWAY: f32 = 3.0e38;
+const TILE_PX: u32 = {{ tile_px }}u;
+const FAR_AWAY: f32 = {{ far_away }};
 
 struct Span { near: f32, far: f32 }
 
@@ -82,17 +88,12 @@ fn homogeneous(rows: array<vec4f, 3>, v: vec4f) -> vec3f {
     return vec3f(dot(rows[0], v), dot(rows[1], v), dot(rows[2], v));
 }
 
-// Where the n-th texel of such a texture lies.
-fn texel_of(index: u32) -> vec2u {
-    return vec2u(index % {{ texture_width }}u, index / {{ texture_width }}u);
-}
-
 // The coarsest level of a pyramid.
 fn top_level(log2_sides: vec2u) -> u32 {
     return min(log2_sides.x, log2_sides.y);
 }
 
-// Of a node of level 1 or coarser, which are all there are: what is below are cells.
+// The place of a node of level 1 or coarser; below these levels are cells.
 fn node_index(log2_sides: vec2u, level: u32, node: vec2u) -> u32 {
     let finest = 1u << (log2_sides.x + log2_sides.y - 2u);
     let begin = (finest - (finest >> (2u * (level - 1u)))) / 3u * 4u;

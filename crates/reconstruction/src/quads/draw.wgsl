@@ -1,4 +1,4 @@
-// Draws the quads of one image into one view: depth, and of which sample each pixel is.
+// Draws the quads of one image into one view: depth, and the sample of each pixel.
 //
 // A vertex is an inverse depth on a known ray of the image, eye + ray / d. Times d, which changes no place on the
 // screen, its clip position is linear in d, column and row: no more work than a matrix for four bytes a vertex, and
@@ -15,7 +15,7 @@ struct QuadWork {
     padding: vec2u,
 }
 
-@group(0) @binding(0) var<uniform> work: QuadWork;
+@group(0) var<uniform> work: QuadWork;
 
 struct Vertex {
     @builtin(position) position: vec4f,
@@ -24,7 +24,7 @@ struct Vertex {
 
 @vertex
 fn vertex(@builtin(vertex_index) number: u32, @location(0) inverse_depth: f32) -> Vertex {
-{% if hybrid %}
+{% if at_texel_corners %}
     let sample = number / 4u;
     let offset = vec2f(vec2u(number & 1u, (number >> 1u) & 1u));
 {% else %}

@@ -1,5 +1,6 @@
-// What cutting a sample image into quads needs to know of it. Corners of quads lie on fixed rays of the image: their
-// inverse depths say all of where they are.
+// A sample image that is cut into quads. Corners of quads lie on fixed rays of the image: their inverse depths say all of
+// where they are.
+{% include "table.wgsl" %}
 
 struct CutWork {
     // world direction of a pixel = column · x + row · y + corner; its parameter is planar depth in metres.
@@ -14,25 +15,22 @@ struct CutWork {
     // Where this image's samples begin among those of the set, and its corners in `planes`.
     first_sample: u32,
     first_corner: u32,
-    // Of merging: 0 across, 1 down, and the greatest error in pixels.
+    // For merging: 0 across, 1 down, and the greatest error in pixels.
     axis: u32,
     bound_px: f32,
-    // Of CHUNK samples each.
+    // Chunks of CHUNK samples.
     chunks: u32,
-    // Of merging: into how long pieces lines are cut, in texels.
+    // For merging: the length of the pieces that lines are cut into, in texels.
     segment: u32,
 }
 
-@group(0) @binding(0) var<uniform> work: CutWork;
+@group(0) var<uniform> work: CutWork;
 
 // Samples that one thread counts and lists.
-const CHUNK: u32 = 64u;
+const CHUNK: u32 = {{ chunk }}u;
+const INDICES_A_QUAD: u32 = {{ indices_a_quad }}u;
 
-fn texel_of(index: u32) -> vec2u {
-    return vec2u(index % {{ texture_width }}u, index / {{ texture_width }}u);
-}
-
-// Of a quad, columns and rows in texels: its word among the extents of an image's quads, 0 where none begins.
+// Columns and rows of a quad in texels: its word among the extents of an image's quads, 0 where none begins.
 fn extent_of(word: u32) -> vec2u { return vec2u(word & 0xffffu, word >> 16u); }
 fn word_of(extent: vec2u) -> u32 { return extent.x | (extent.y << 16u); }
 
