@@ -35,7 +35,7 @@ pub fn shaders() -> Vec<(&'static str, &'static str)> {
     [&INCLUDES[..], &passes, &quads::SHADERS, &methods::SHADERS].concat()
 }
 
-/// All templates of this crate, to be written out.
+/// All templates of this crate.
 ///
 /// # Errors
 /// When a text is not a template.

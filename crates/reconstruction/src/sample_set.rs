@@ -18,14 +18,14 @@ use crate::{
 /// Tables of one set.
 pub(crate) const MAX_TABLES: usize = 5;
 
-/// A surface on the very face of the volume must still be entered, by all cameras, whose samples of a slope are
-/// steps: in parts of the volume's longest edge.
+/// The padding of the volume, in parts of its longest edge. All cameras must still enter a surface on the very face of the
+/// volume, although their samples of a slope are steps.
 pub(crate) const VOLUME_MARGIN: f32 = 0.005;
 
 /// One complete sample set: what views are reconstructed from.
 pub struct SampleSet {
     pub(crate) cameras: Vec<GpuSampleCamera>,
-    /// Whether some texels of an image prove nothing, by the image's bit in provenance.
+    /// Images of which some texels prove nothing, by their bits in provenance.
     pub(crate) uncertain: Vec<bool>,
     pub(crate) volume: GpuVolume,
     /// Two words for each node of the pyramids.
@@ -167,8 +167,8 @@ pub(crate) fn stretch(camera: &PinholeCamera) -> f32 {
     camera.focal_px.max_element() * (1.0 + slope.length_squared()).sqrt()
 }
 
-/// The volume with room for what samples do not know: a search must still be inside where it meets a surface
-/// on the volume's very face.
+/// The volume with room for the error of samples: a search must still be inside where it meets a surface on the volume's
+/// very face.
 pub(crate) fn searched_volume(volume: &Aabb, images: &[DepthImage]) -> Aabb {
     let among_holes = is_among_holes(images);
     let depth_error_m = images.iter().map(|image| CodedDepth::greatest_error_m(image, among_holes)).fold(0.0, f32::max);

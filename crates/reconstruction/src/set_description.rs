@@ -12,6 +12,6 @@ pub struct SetDescription<'a> {
     pub background_linear: Vec3,
     /// The scene's lights; they are seen in highlights only, since the samples' colours hold the rest.
     pub illumination: &'a Illumination,
-    /// How surfaces reflect towards the viewer; `None` leaves highlights out, whatever planes images have.
+    /// How surfaces reflect towards the viewer; `None` leaves highlights away, even where images have planes for them.
     pub highlight: Option<Highlight>,
 }

@@ -1,8 +1,8 @@
-// Adds the light that depends on the viewer to pixels that show a surface: their colour so far is what the
-// surface sends to all sides alike. Works on the finished view, whatever method found it.
+// Adds the light that depends on the viewer to pixels that show a surface. Their colour so far is the light that the
+// surface sends to all sides alike. The pass works on the finished view of any method.
 //
 // The samples around the point tell what a surface reflects: those of the contributing camera that is nearest to
-// the view. What is filled shows no surface that a camera saw, and gets no highlight.
+// the view. A filled pixel shows no surface that a camera saw, and gets no highlight.
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
 {% include "light.wgsl" %}
@@ -21,7 +21,7 @@
 const THICKNESS_FOOTPRINTS: f32 = {{ thickness_footprints }};
 const SAMPLE_TEXELS: u32 = {{ sample_texels }}u;
 
-// What the samples around a point say together, packed as one sample's, and the share of them that reflects.
+// The mean of the samples around a point, packed as one sample, and the share of them that reflects.
 struct Gathered { normal: vec3f, reflector: u32, visibility: VisibilityWords, reflecting: f32 }
 
 fn sample_texel(sample: u32, texel: u32) -> vec4u {

@@ -1,4 +1,4 @@
-//! What all cameras together say of a point: `surface.wgsl`, the common part of passes that find surfaces.
+//! The vote of all cameras on a point: `surface.wgsl`, the common part of passes that find surfaces.
 
 use gpu::Binding;
 use minijinja::{Value, context};
@@ -11,7 +11,7 @@ use crate::{
 
 /// The surface's thickness, in texel footprints: the best of a sweep (docs/methods/joint_carve.md).
 pub(crate) const THICKNESS_FOOTPRINTS: f32 = 2.0;
-/// How much a sample counts behind a surface that was left out, beside one that nothing was left out before.
+/// The weight of a sample behind a redundant surface that its image omits, beside a sample with nothing omitted before it.
 pub(crate) const HIDDEN_WEIGHT: f32 = 0.02;
 /// Added to the squared angle between two lines of sight, so that no camera's weight is unbounded.
 pub(crate) const ANGLE_FLOOR: f32 = 1e-2;

@@ -1,4 +1,4 @@
-// The surface that one camera's samples describe around a position, and what it says of a point there.
+// The vote of all cameras on a point: the surfaces that their samples describe around it.
 
 // RGB9E5 of each cell's corners, in their order.
 @group(0) var cell_colors: texture_2d<u32>;
@@ -71,14 +71,14 @@ fn colors_of(cell_index: u32) -> Colors {
 }
 
 {% if holes %}
-// How much a sample counts behind a surface that was left out, beside one that nothing was left out before.
+// The weight of a sample behind a surface that its image omits, beside a sample with nothing omitted before it.
 const HIDDEN_WEIGHT: f32 = {{ hidden_weight }};
 
 fn faded(share: f32) -> f32 { return clamp((share - 0.05) / 0.95, 0.0, 1.0); }
 {% endif %}
 
-// A camera's vote on a point: how much its colour counts and where it is found, and the share of the texels around that
-// lie on the point's own surface or show what is beyond it.
+// A camera's vote on a point: the weight and the place of its colour, and shares of the texels around. `same` lies on the
+// point's own surface, `beyond` shows what is beyond it.
 struct CameraVote { weight: f32, cell: u32, shares: vec4f, same: f32, beyond: f32 }
 
 fn vote_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f) -> CameraVote {
@@ -101,7 +101,7 @@ fn vote_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f) -
     let shares = select(vec4f(0.0), share, (abs(gaps) < vec4f(reach)) & (corners.codes > vec4f(1.5)));
     let same = dot(shares, vec4f(1.0));
 {% if holes %}
-    // What is not proven free says nothing of what lies before it.
+    // A texel whose way is not proven free proves nothing of the space before it.
     let proven = share * select(0.0, 1.0, corners.certain);
 {% else %}
     let proven = share;
@@ -115,8 +115,8 @@ fn vote_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f) -
     let footprint = camera.focal_px * inverse_distance;
     let weight = border * footprint * footprint / (dot(off, off) + {{ angle_floor }});
 {% if holes %}
-    // Weight fades towards texels that were left out: it goes over to the image that holds them, without a seam. What
-    // lies close behind a surface that was left out is not that surface: it counts where nothing else does.
+    // Weight fades towards omitted texels: it goes over to the image that holds them, without a seam. A sample close
+    // behind an omitted surface is not that surface: it counts where nothing else does.
     let own = shares * mix(vec4f(HIDDEN_WEIGHT), vec4f(1.0), corners.proven);
     let fade = faded(dot(shares, corners.proven)) + HIDDEN_WEIGHT * faded(same);
 {% else %}
@@ -139,8 +139,8 @@ fn color_of(vote: CameraVote) -> vec3f {
 {% endif %}
 }
 
-// The two cameras that know a point best, each weighted by how far it surpasses the third, so that no seam
-// shows where cameras change places (Buehler et al. 2001, with k = 2). The order of cameras does not matter.
+// The two cameras that know a point best, each weighted by how far it surpasses the third (Buehler et al. 2001, with
+// k = 2). No seam shows where cameras change places. The order of cameras does not matter.
 fn blend_two_best(point_in_world: vec3f, direction: vec3f) -> Blend {
     let view_direction = normalize(direction);
     var first = vote_of(work.cameras[0], point_in_world, view_direction);

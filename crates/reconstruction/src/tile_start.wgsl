@@ -1,9 +1,8 @@
-// For each tile of pixels, how far all of its rays run through space that some camera has seen empty
-// or that none sees at all.
+// Finds how far all rays of a tile run through space that some camera has seen empty, or that none sees at all.
 //
-// A disc around the tile's middle ray bounds the points of all its rays at one parameter t. t moves on
-// while some camera shows everything in the footprint of the disc's way to be farther away, or no camera
-// that sees a part of it shows anything else.
+// A disc around the tile's middle ray bounds the points of all its rays at one parameter t. The tile moves on while some camera
+// shows everything in the footprint of the disc's way to be farther away. It also moves on while all cameras that see a
+// part of the way do.
 {% include "view_work.wgsl" %}
 
 @group(0) var<storage, read_write> tile_start_m: array<f32>;
@@ -17,7 +16,7 @@ const PROVEN: u32 = 1u;
 // No point that this camera sees may be occupied; it need not see them all.
 const UNOPPOSED: u32 = 2u;
 
-// What a camera knows of the disc's way from t to t_end.
+// The flags of a camera for the disc's way from t to t_end.
 fn evaluate_camera(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, t_end: f32, slope: f32) -> u32 {
     let p = a + b * t;
     let q = a + b * t_end;
@@ -78,8 +77,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     tile_start_m[work.view.first_tile + id.y * tiles.x + id.x] = t;
 }
 
-// The least parameter at which a corner ray of the tile enters the volume; its near plane where the
-// corners miss it although something between them may not.
+// The least parameter at which a corner ray of the tile enters the volume. A corner ray that misses it counts with the
+// near plane: rays between the corners may enter.
 fn entry(tile: vec2u) -> f32 {
     var least = FAR_AWAY;
     for (var corner = 0u; corner < 4u; corner++) {

@@ -1,4 +1,4 @@
-//! What passes over sample cameras see of a view: `view_work.wgsl`. A test compares layouts with the WGSL.
+//! The uniform of a view in passes over sample cameras: `view_work.wgsl`. A test compares layouts with the WGSL.
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{PinholeCamera, ProvenanceKind};

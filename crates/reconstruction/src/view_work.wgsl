@@ -1,9 +1,9 @@
-// What passes over sample cameras see of a view: its camera, the volume, and the sample cameras with their pyramids.
+// The uniform of a view in passes over sample cameras: its camera, the volume, and the sample cameras.
 {% include "table.wgsl" %}
 //
-// Depth is kept as 15-bit codes, linear in inverse depth: code = 2 + (1/z - least) / step, so that along
-// a projected ray it is linear in screen space like everything else. 1 is background, farther than any
-// sample; 0 is a hole, which certifies nothing and blocks nothing.
+// Depth is kept as 15-bit codes, linear in inverse depth: code = 2 + (1/z - least) / step. So it is linear in screen
+// space along a projected ray. 1 is background, farther than any sample; 0 is a hole, which certifies nothing and blocks
+// nothing.
 
 const HOLE: u32 = {{ hole_code }}u;
 const BACKGROUND: u32 = {{ background_code }}u;

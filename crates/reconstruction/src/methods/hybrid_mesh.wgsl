@@ -1,6 +1,6 @@
 // Makes each sample of an image a quad of its texel (Xie et al., Algorithm 4). A corner is what the corner image holds,
-// the same for all quads around it, unless a discontinuity lies between it and the sample; then it is where the
-// corner's ray meets the sample's own plane.
+// the same for all quads around it. Where a discontinuity lies between corner and sample, it is where the corner's ray
+// meets the sample's own plane.
 {% include "normal.wgsl" %}
 {% include "cut.wgsl" %}
 
@@ -47,7 +47,7 @@ fn is_shared(sample: Sample, held: f32, ray: vec3f) -> bool {
 }
 
 // On the sample's own plane, but no farther off than half a texel's diagonal on the greatest slope, nor than the half or
-// double depth. Where the corner's ray is known to go past the surface, its silhouette lies before the corner: a steep
+// double depth. Where the corner's ray is known to go past the surface, its silhouette lies before the corner. A steep
 // plane would stand out there like a flap.
 fn guessed(sample: Sample, held: f32, ray: vec3f) -> f32 {
     let guess = on_plane(sample, sample.tame_normal, ray);

@@ -19,8 +19,8 @@ use crate::{
 pub(super) const SHADER: (&str, &str) = ("joint_carve.wgsl", include_str!("joint_carve.wgsl"));
 
 const MAX_STOP_LEVEL: u32 = 8;
-/// Moves of a ray. A ray that is not done by then wanders behind what every camera sees, and whatever it still met would
-/// more likely be wrong than right (docs/methods/joint_carve.md): it stays unknown.
+/// Moves of a ray. A ray that is not done by then wanders behind all that cameras see, and stays unknown. A surface that
+/// it still met would more likely be wrong than right (docs/methods/joint_carve.md).
 pub(crate) const MAX_MOVES: u32 = 24;
 /// Moves of a ray in a set with holes: texels that prove nothing are crossed one by one.
 pub(crate) const MAX_MOVES_AMONG_HOLES: u32 = 96;

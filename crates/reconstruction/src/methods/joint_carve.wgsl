@@ -15,7 +15,7 @@ const STOP_LEVEL: u32 = {{ stop_level }}u;
 // Past a node's edge, in pixels.
 const NUDGE_PX: f32 = {{ nudge_px }};
 
-// What a camera knows of the ray from t on.
+// A camera's knowledge of the ray from t on.
 struct Evaluation {
     // The way is free up to here (t where nothing is proven).
     free_until: f32,
@@ -26,8 +26,7 @@ struct Evaluation {
     penetration: f32,
     // Finer levels could say more.
     undecided: bool,
-    // At the finest level: the share of the texels around the ray that lie on one surface with it, less the
-    // share that show what is beyond it.
+    // The share of the texels around the ray on one surface with it, less the share that show what is beyond it.
     vote: f32,
 }
 
@@ -124,7 +123,7 @@ fn evaluate_cell(camera: SampleCamera, ray: ImageRay, cell_exit: f32, cell: vec2
     let gaps = vec4f(HALF_CODE + ray.code) - samples;
     let gaps_at_exit = vec4f(HALF_CODE + code_beyond(camera, exit_w)) - samples_at_exit;
     let ahead = gaps > vec4f(0.0);
-    // Of the surfaces still ahead the nearest is met first.
+    // The nearest of the surfaces still ahead is met first.
     let next_gap = least_of(gaps, ahead);
     let next_gap_at_exit = next_gap + least_of(gaps_at_exit - gaps, ahead);
     let meets = any(ahead) && next_gap_at_exit <= 0.0;
@@ -210,7 +209,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     finish(index, pixel.direction, t, hit, !hit && known && t >= span.far);
 }
 
-// What all cameras together show of the point found; `empty` where the whole way is proven free.
+// Writes the pixel as all cameras together show the point found; `empty`: the whole way is proven free.
 fn finish(index: u32, direction: vec3f, t: f32, hit: bool, empty: bool) {
     let blend = blend_two_best(work.view.eye_in_world + direction * t, direction);
     let found = hit && blend.camera_mask != 0u;

@@ -1,6 +1,5 @@
-// Lages §4.2: a linear search along the view ray, entered only when inside for every camera that sees
-// the point, refined by bisection; the colour comes from the most conservative camera, the one whose
-// surface is closest.
+// Lages §4.2: a linear search along the view ray, refined by bisection. A surface is entered where the point is inside for
+// every camera that sees it. The colour comes from the most conservative camera, the one whose surface is closest.
 {% include "color.wgsl" %}
 {% include "view_work.wgsl" %}
 {% include "cell.wgsl" %}
@@ -29,7 +28,7 @@ fn depth_in(camera: SampleCamera, p: vec3f) -> Depth {
     let code = word & 0x7fffu;
     let penetration = (f32(code) - camera.code_offset) / camera.code_scale - inverse_w;
 {% if holes %}
-    // What lies before a sample whose ray passed other surfaces is not seen.
+    // The space before a sample whose ray passed other surfaces is not seen.
     let known = (word & 0x8000u) == 0u || penetration >= 0.0;
 {% else %}
     let known = true;
@@ -55,7 +54,7 @@ fn image_rays(direction: vec3f) -> ImageRays {
     return rays;
 }
 
-// What the cameras that see a point say of it: it is inside for all of them, and there are any.
+// `entered`: the point is inside for all cameras that see it; `seen`: some camera does.
 struct Evaluation { entered: bool, seen: bool }
 
 fn evaluate_cameras(rays: ImageRays, t: f32) -> Evaluation {

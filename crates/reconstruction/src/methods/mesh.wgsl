@@ -1,4 +1,4 @@
-// Cuts an image into quads between samples: a cell whose four corners are one surface is a quad, any other is none.
+// Cuts an image into quads between samples: a cell whose four corners are one surface becomes a quad.
 {% include "cut.wgsl" %}
 
 // As in cell.wgsl.

@@ -118,7 +118,7 @@ impl Default for ReconstructionMethod {
 }
 
 impl ReconstructionMethod {
-    /// What `--help` says of all methods.
+    /// The text of `--help` on all methods.
     #[must_use]
     pub fn help() -> String {
         method_help(&METHODS)

@@ -228,8 +228,8 @@ fn quad_work(view: &PinholeCamera, image: &PinholeCamera) -> GpuQuadWork {
     }
 }
 
-/// The clip direction of a direction in the world; a point at distance 1 in it, times a weight, would add
-/// `near · weight` to z: reversed depth is `near / planar depth`, 1 at the near plane and 0 at infinity.
+/// The clip direction of a direction in the world. A point at distance 1 in it, times a weight, would add
+/// `near · weight` to z. Reversed depth is `near / planar depth`, 1 at the near plane and 0 at infinity.
 fn clip_direction(view: &PinholeCamera, direction: Vec3) -> Vec4 {
     let in_camera = view.world_from_camera.conjugate() * direction;
     let (size, depth) = (view.size_px.as_vec2(), -in_camera.z);

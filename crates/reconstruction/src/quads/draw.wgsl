@@ -1,8 +1,8 @@
 // Draws the quads of one image into one view: depth, and the sample of each pixel.
 //
 // A vertex is an inverse depth on a known ray of the image, eye + ray / d. Times d, which changes no place on the
-// screen, its clip position is linear in d, column and row: no more work than a matrix for four bytes a vertex, and
-// quads that share a corner get the very same position.
+// screen, its clip position is linear in d, column and row. That is no more work than a matrix for four bytes a vertex,
+// and quads that share a corner get the very same position.
 
 struct QuadWork {
     clip_from_inverse_depth: vec4f,

@@ -1,5 +1,5 @@
-// Merges quads of one extent that follow one another along a line, where no corner of all the samples' own quads lies
-// farther from the merged quad than the bound: rows into runs, then columns of equal runs into rectangles. One thread a
+// Merges quads of one extent that follow one another along a line: rows into runs, then columns of equal runs into
+// rectangles. No corner of all the samples' own quads lies farther from the merged quad than the bound. One thread a
 // segment of a line, one dispatch an axis.
 {% include "cut.wgsl" %}
 

@@ -82,7 +82,7 @@ pub(crate) struct ImageQuads {
     pub draw: wgpu::Buffer,
 }
 
-/// What a set keeps for methods that draw quads.
+/// A set's planes and meshes for methods that draw quads.
 pub(crate) struct SetMeshes {
     pub cameras: Vec<PinholeCamera>,
     /// Or the image that lacks a plane, and the plane.

@@ -1,5 +1,5 @@
-// Gives the pixels of a drawn view their colour: the depth says where the surface is, and all cameras are asked what
-// it looks like there. Where none knows, the drawn sample's own colour stands.
+// Gives the pixels of a drawn view their colour: the depth says where the surface is, and all cameras vote on the point.
+// Where none knows it, the drawn sample's own colour stands.
 {% include "color.wgsl" %}
 {% include "view_work.wgsl" %}
 {% include "cell.wgsl" %}
@@ -52,7 +52,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let own = linear_from_rgb9e5(textureLoad(cell_colors, texel_at(sample), 0).x);
     let known = blend.camera_mask != 0u;
     let mask = select(mask_of(sample), blend.camera_mask, known);
-    // Some camera looks past everything at where the ray leaves the volume.
+    // Some camera sees the background where the ray leaves the volume.
     var empty = span.near > span.far;
 {% for k in range(cameras) %}
     empty = empty || shows_background(work.cameras[{{ k }}], point_in_world);

@@ -96,7 +96,7 @@ fn resolved(drawn: Drawn, images: &[DepthImage], cameras: &[SampleCamera], ray: 
     Pixel::hit(own, drawn.t, 1 << drawn.image)
 }
 
-/// Empty where the ray misses the volume, or some camera looks past everything at where it leaves.
+/// Empty where the ray misses the volume, or some camera sees the background where the ray leaves it.
 fn kind_of_nothing(cameras: &[SampleCamera], ray: &ViewRay) -> ProvenanceKind {
     let point = ray.at(ray.far);
     if ray.near > ray.far || cameras.iter().any(|camera| shows_background(camera, point)) {

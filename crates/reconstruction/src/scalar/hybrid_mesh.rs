@@ -45,7 +45,7 @@ impl Sample {
         self.inverse_depth * normal.dot(ray) / if along.abs() < 1e-12 { 1e-12 } else { along }
     }
 
-    /// Whether no discontinuity lies between the sample and what its corner's ray meets.
+    /// No discontinuity lies between the sample and what its corner's ray meets.
     fn shares(&self, held: f32, ray: Vec3, focal_px: f32) -> bool {
         let slack = FLAT_FOOTPRINTS * held.max(self.inverse_depth) / focal_px;
         let expected = self.on_plane(self.normal, ray);

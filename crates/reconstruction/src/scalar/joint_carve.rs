@@ -19,7 +19,7 @@ use crate::{
     view_work::FAR_AWAY,
 };
 
-/// What a camera knows of the ray from t on; the shader's `Evaluation`.
+/// A camera's knowledge of the ray from t on; the shader's `Evaluation`.
 #[derive(Debug, Clone, Copy)]
 struct Evaluation {
     /// The way is free up to here (t where nothing is proven).
@@ -219,7 +219,7 @@ fn evaluate_cell(camera: &SampleCamera, within: &InNode, corners: Corners) -> Ev
     let gaps = samples(at).map(|sample| HALF_CODE + code - sample);
     let gaps_at_exit = samples(exit_at).map(|sample| HALF_CODE + exit_code - sample);
     let ahead: Vec<usize> = (0..4).filter(|&i| gaps[i] > 0.0).collect();
-    // Of the surfaces still ahead the nearest is met first.
+    // The nearest of the surfaces still ahead is met first.
     let least = |values: &dyn Fn(usize) -> f32| ahead.iter().fold(FAR_AWAY, |least, &i| least.min(values(i)));
     let next_gap = least(&|i| gaps[i]);
     let next_gap_at_exit = next_gap + least(&|i| gaps_at_exit[i] - gaps[i]);

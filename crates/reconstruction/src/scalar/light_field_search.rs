@@ -59,7 +59,7 @@ fn penetration(camera: &SampleCamera, ray: &ViewRay, t: f32) -> Option<f32> {
     let seen = p.z > 0.0 && uv.cmpge(Vec2::splat(0.5)).all() && uv.cmple(camera.cells + 0.49).all();
     let code = seen.then(|| camera.code_at(uv.as_uvec2())).filter(|&code| code != HOLE_CODE)?;
     let penetration = camera.inverse_depth_per_m(f32::from(code)) - p.z.recip();
-    // What lies before a sample whose ray passed other surfaces is not seen.
+    // The space before a sample whose ray passed other surfaces is not seen.
     (penetration >= 0.0 || !camera.is_uncertain(uv.as_uvec2())).then_some(penetration)
 }
 

@@ -1,7 +1,7 @@
 //! Twin of `march.wgsl`: a ray in the image of one sample camera alone.
 //!
-//! There the ray is a straight line along which columns, rows and the depth code are linear in one
-//! parameter `s`, 0 where the march begins and 1 where it ends.
+//! There the ray is a straight line. Columns, rows and the depth code are linear along it in one parameter `s`, 0 where
+//! the march begins and 1 where it ends.
 
 use glam::{Vec2, Vec3, Vec3Swizzles};
 

@@ -42,8 +42,8 @@ pub fn reconstruct(
     finished(pixels, images, set, &cameras, &rays)
 }
 
-/// As [`reconstruct`], but each ray is followed from where it enters the volume: tile starts must not change that, except
-/// for the space that no camera sees. For methods that follow rays.
+/// As [`reconstruct`], but each ray is followed from where it enters the volume. Tile starts must not change the view,
+/// except for the space that no camera sees. For methods that follow rays.
 #[must_use]
 pub fn reconstruct_from_entry(
     images: &[DepthImage],
@@ -90,7 +90,7 @@ fn nearest_first(images: &[DepthImage], camera: &PinholeCamera) -> Vec<SampleCam
     cameras
 }
 
-/// What the method finds, row by row.
+/// The pixels that the method finds, row by row.
 fn pixels_from(
     cameras: &[SampleCamera],
     rays: &ViewRays,

@@ -1,9 +1,9 @@
-//! What is written for a pixel.
+//! The colour, depth and provenance of a pixel.
 
 use depth_image::{Provenance, ProvenanceKind, srgb8_from_linear};
 use glam::Vec3;
 
-/// What is written for a pixel.
+/// The colour, depth and provenance of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pixel {
     pub srgb8: [u8; 3],

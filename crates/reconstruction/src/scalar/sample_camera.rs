@@ -20,7 +20,7 @@ pub(super) struct SampleCamera {
     pub stretch: f32,
     /// This camera's bit in provenance.
     pub mask: u32,
-    /// Whether some texels of some image of the set prove nothing of what lies before them.
+    /// Some texels of some image of the set prove nothing of what lies before them.
     pub among_holes: bool,
     depth: CodedDepth,
     pyramid: Pyramid,
@@ -34,7 +34,7 @@ pub(super) struct SampleCamera {
 pub(super) struct Corners {
     pub codes: [f32; 4],
     pub connected: bool,
-    /// Whether the ways to all four are proven free.
+    /// The ways to all four are proven free.
     pub certain: bool,
     /// 1 for each corner whose own way is, else 0.
     pub proven: [f32; 4],
@@ -91,12 +91,12 @@ impl SampleCamera {
         self.depth.at(texel.x, texel.y)
     }
 
-    /// Whether nothing before a texel's sample is proven free.
+    /// Nothing before a texel's sample is proven free.
     pub fn is_uncertain(&self, texel: UVec2) -> bool {
         self.depth.is_uncertain(texel.x, texel.y)
     }
 
-    /// Whether nothing before some sample is proven free.
+    /// Nothing before some sample is proven free.
     pub fn has_uncertain(&self) -> bool {
         !self.depth.uncertain.is_empty()
     }

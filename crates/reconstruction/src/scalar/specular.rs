@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{set_description::SetDescription, surface::THICKNESS_FOOTPRINTS};
 
-/// What the samples around a point say together.
+/// The mean of the samples around a point.
 struct Gathered {
     normal_in_world: Vec3,
     /// Bytes, as in the images.

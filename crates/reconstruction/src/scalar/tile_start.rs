@@ -11,7 +11,7 @@ use crate::{
     view_work::{FAR_AWAY, TILE_PX},
 };
 
-/// What a camera knows of a part of the way of all rays of a tile.
+/// A camera's knowledge of a part of the way of all rays of a tile.
 struct Evaluation {
     /// Each ray's point is proven empty by this camera.
     proven: bool,

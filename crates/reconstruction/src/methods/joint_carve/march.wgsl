@@ -2,8 +2,8 @@
 // about the point found. Most pixels end with the nearest camera and most others with the second nearest;
 // what is left goes to joint_carve.wgsl.
 //
-// In the camera's image the ray is a straight line along which columns, rows and the depth code are linear
-// in one parameter s, so that a step needs no division.
+// In the camera's image the ray is a straight line. Columns, rows and the depth code are linear along it in one parameter
+// s, so that a step needs no division.
 {% include "color.wgsl" %}
 {% include "view_work.wgsl" %}
 {% include "cell.wgsl" %}
