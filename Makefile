@@ -1,13 +1,13 @@
-# Everything is built with the release profile: the software device and the scalar references need it, and
-# nothing is then compiled for a second profile.
+# The release profile builds everything: the software device and the scalar references need it, and no second
+# profile is then compiled.
 #
-# Needed: Rust (Cargo.toml says from which version), a linker (`cc`) and a Vulkan device. The targets install
-# the last two where they are missing and that is possible without asking; see scripts/.
+# Requirements are Rust (its version is in Cargo.toml), a linker (`cc`) and a Vulkan device. The targets install
+# the last two where they are missing and no question is needed; see scripts/.
 
 CARGO ?= cargo
 ARGS ?=
 export CARGO
-# Mesa's device selection asks for a Wayland display, and complains where there is none.
+# Mesa's device selection looks for a Wayland display, and warns where there is none.
 ifndef XDG_RUNTIME_DIR
 export NODEVICE_SELECT = 1
 endif
@@ -15,9 +15,9 @@ endif
 .DEFAULT_GOAL := help
 .PHONY: help build demo cluster cluster-test test fmt-check lint unit bench doc audit vulkan toolchain lint-toolchain clean bench-scaling
 
-help: ## what can be made
+help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
-	@echo '  ARGS="…" is passed on, as in: make demo ARGS="--scene model.glb"'
+	@echo '  ARGS="…" goes to the program, as in: make demo ARGS="--scene model.glb"'
 
 demo: build ## the paper's experiment on this machine; pictures and report in out/demo
 	$(CARGO) run --release --locked --package myriorama -- demo $(ARGS)
@@ -27,13 +27,13 @@ test: fmt-check lint unit ## format, lints and all tests
 cluster: build ## a coordinator and four nodes in containers; leaves them running
 	deploy/cluster.sh
 
-cluster-test: build ## the same, with nodes that are killed; stops it all
+cluster-test: build ## the same, kills nodes while it serves a client, and stops the cluster
 	deploy/cluster.sh --test
 
 bench: build ## speed and accuracy against the bars; report in out/bench
 	$(CARGO) run --release --locked --package myriorama -- bench $(ARGS)
 
-bench-scaling: build ## how it scales, to eleven nodes and simulated to 1,000 (root; an hour and a half, ARGS=--quick ten minutes)
+bench-scaling: build ## scaling to eleven nodes, simulated to 1,000 (root; an hour and a half, ARGS=--quick ten minutes)
 	$(CARGO) run --release --locked --package myriorama -- bench scaling $(ARGS)
 
 doc: toolchain ## the crates' documentation, in target/doc
@@ -43,7 +43,7 @@ audit: toolchain ## licences, advisories, bans and sources of all dependencies
 	@$(CARGO) deny --version >/dev/null 2>&1 || { echo 'cargo-deny is missing: cargo install --locked cargo-deny' >&2; exit 1; }
 	$(CARGO) deny --locked check
 
-clean: ## removes all that was built and written
+clean: ## remove all build output and reports
 	$(CARGO) clean
 	rm -rf out
 

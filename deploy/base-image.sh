@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Says which base image deploy/Dockerfile is to use: Debian's, pulled, or, where no image registry can be reached, one of
-# our own name made from Debian's packages by debootstrap, with software Vulkan inside.
+# Prints the name of the base image for deploy/Dockerfile. It is Debian's, pulled. Where no image registry can be
+# reached, debootstrap makes one under our own name from Debian's packages, with software Vulkan inside.
 set -euo pipefail
 
 debian=debian:bookworm-slim

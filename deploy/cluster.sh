@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Starts the cluster of deploy/compose.yaml, waits until all of it is healthy, and asks it for 24 views, which have to
-# agree with direct rendering. With --test it goes on to kill nodes while a client is served, and stops it all.
+# Starts the cluster of deploy/compose.yaml, waits until all services are healthy, and requests 24 views, which must
+# agree with direct rendering. With --test it also kills nodes while a client is served, and then stops the cluster.
 #
-# Expects the program at target/release/myriorama, or at $MYRIORAMA.
+# The program is expected at target/release/myriorama, or at $MYRIORAMA.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -28,7 +28,7 @@ build() {
         return 1
     }
     rm -rf "$context"
-    # A program that was built against a later libc than the image's does not start there.
+    # A program built against a later libc than the image's does not start there.
     docker run --rm myriorama:local --version
 }
 
@@ -56,7 +56,7 @@ views() {
         --out out/cluster
 }
 
-# A client moves for 20 s; after 5 s a node is killed without a word, after 12 s it is started again.
+# A client moves for 20 s; a node is killed after 5 s and started again after 12 s.
 kill_while_served() {
     local victim="$1" live
     "$program" view --coordinator "$coordinator" --orbit 120 --policy pipeline --live --rate 10 --seconds 20 \

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Makes sure that Cargo can link, and with `lint` as argument that rustfmt and clippy are there. What is
-# missing is installed where that needs no question: a linker on Debian and Ubuntu as root or with sudo that
-# asks no password, components by rustup. Elsewhere it says what to install and ends with status 1.
+# Makes sure that Cargo can link and, with `lint` as argument, that rustfmt and clippy are there. The script installs
+# missing parts where no question is needed. These are a linker on Debian and Ubuntu, as root or with passwordless
+# sudo, and components by rustup. Elsewhere it names the packages to install and ends with status 1.
 set -euo pipefail
 
 cargo="${CARGO:-cargo}"

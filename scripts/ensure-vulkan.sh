@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Makes sure that this machine has a Vulkan device, a software one where there is no other.
+# Makes sure that this machine has a Vulkan device, a software device where there is no other.
 #
-# Looks for the loader (libvulkan.so.1) and for a driver's manifest. Where one is missing it installs
-# Mesa's software device on Debian and Ubuntu, as root or with sudo that asks no password; elsewhere it
-# says what to install and ends with status 1. macOS and Windows have devices of their own.
+# The script looks for the loader (libvulkan.so.1) and for a driver's manifest. Where one is missing, it installs
+# Mesa's software device on Debian and Ubuntu, as root or with passwordless sudo. Elsewhere it names the packages
+# to install and ends with status 1. macOS and Windows have devices of their own.
 set -euo pipefail
 
 case "$(uname -s)" in
@@ -12,7 +12,7 @@ case "$(uname -s)" in
 esac
 
 has_driver() {
-    # Named ones replace the folders.
+    # Drivers that are named replace those in the folders.
     local named="${VK_DRIVER_FILES:-${VK_ICD_FILENAMES:-}}" folder file
     if [ -n "$named" ]; then
         local IFS=:

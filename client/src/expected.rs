@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
+use codec::FrameHeader;
 use depth_image::ViewPlanes;
-use wire::FrameHeader;
 
 use crate::{ClientError, ViewRequest};
 
@@ -81,8 +81,8 @@ pub(crate) fn agrees(request: &ViewRequest, planes: ViewPlanes, header: &FrameHe
 #[cfg(test)]
 mod tests {
     use super::*;
+    use codec::{FrameCodec, SampleSetId, StageTimes};
     use depth_image::PinholeCamera;
-    use wire::{FrameCodec, SampleSetId, StageTimes};
 
     fn request(frame: u64) -> ViewRequest {
         let camera = PinholeCamera::looking_at(

@@ -4,6 +4,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
+use cluster::{Assignment, RenderViews};
+use codec::{DecodeLimits, FrameAssembly, FrameAssemblyError, FrameHeader, FramePart, WholeFrame, decode_view};
 use depth_image::View;
 use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::task::JoinSet;
@@ -11,13 +13,12 @@ use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Code;
 use wire::rpc::Messages;
-use wire::{Assignment, DecodeLimits, FrameAssembly, FrameHeader, FramePart, RenderViews, WholeFrame, decode_view};
 
 use crate::ClientError;
-use crate::asking::{Asking, begin};
 use crate::expected::Expected;
 use crate::live::{Peer, State};
 use crate::plan_change::{lost_peer, successor};
+use crate::request_pump::{RequestPump, start_pumps};
 use crate::session::ViewRequest;
 use crate::trouble::Trouble;
 
@@ -247,9 +248,9 @@ async fn call_all(
 ) -> Result<(), Failure> {
     let weights: Vec<u32> = peers.iter().map(|peer| peer.share.view_weight).collect();
     let mut calls = JoinSet::new();
-    for (peer, part) in peers.iter().zip(begin(template, requests, &weights, view_s)) {
-        if let Some((asking, messages)) = part {
-            calls.spawn(receive_all(peer.clone(), asking, messages, line.clone()));
+    for (peer, part) in peers.iter().zip(start_pumps(template, requests, &weights, Some(view_s))) {
+        if let Some((pump, messages)) = part {
+            calls.spawn(receive_all(peer.clone(), pump, messages, line.clone()));
         }
     }
     while let Some(ended) = calls.join_next().await {
@@ -261,7 +262,7 @@ async fn call_all(
 
 async fn receive_all(
     peer: Peer,
-    mut asking: Asking,
+    mut pump: RequestPump,
     messages: ReceiverStream<RenderViews>,
     line: Line,
 ) -> Result<(), Failure> {
@@ -269,10 +270,10 @@ async fn receive_all(
     let mut assembly = FrameAssembly::default();
     let mut decoding = JoinSet::new();
     while let Some(frame) = next_frame(&mut parts, &mut assembly, &peer).await? {
-        if let Some(wrong) = line.wrong_with(&frame, asking.plan_epoch()) {
+        if let Some(wrong) = line.wrong_with(&frame, pump.plan_epoch()) {
             return Err(Failure::of_peer(&peer, peer.error(wrong)));
         }
-        asking.came(Instant::now(), frame.header.stage_times.set_wait_s > SET_WAIT_S);
+        pump.received(Instant::now(), frame.header.stage_times.set_wait_s > SET_WAIT_S);
         let Ok(decoder) = line.decoders.clone().acquire_owned().await else {
             break;
         };
@@ -299,7 +300,7 @@ pub(crate) async fn next_frame(
     assembly: &mut FrameAssembly,
     peer: &Peer,
 ) -> Result<Option<WholeFrame>, Failure> {
-    let corrupt = |error: wire::WireError| Failure::of_peer(peer, peer.error(error));
+    let corrupt = |error: FrameAssemblyError| Failure::of_peer(peer, peer.error(error));
     while let Some(part) = next_part(parts, peer).await? {
         if let Some(frame) = assembly.push(part).map_err(corrupt)? {
             return Ok(Some(frame));

@@ -3,9 +3,9 @@
 //! A [`Client`] knows the coordinator; a [`Session`] has a plan and talks to the compositors alone.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod asking;
 mod error;
 mod expected;
+mod flow_control;
 mod frames;
 mod live;
 mod live_stream;
@@ -13,19 +13,23 @@ mod live_view;
 mod places;
 mod plan_change;
 mod poses;
+mod request_pump;
 mod session;
 mod trouble;
+mod work_stealing;
 
 use std::time::Duration;
 
+use cluster::{ClusterStatus, SessionEvent, SessionRequest};
 use tokio::time::Instant;
 use wire::rpc::{CoordinatorClient, connect};
-use wire::{ClusterStatus, SessionEvent, SessionRequest};
 
 pub use error::ClientError;
+pub use flow_control::FlowControl;
 pub use frames::{Frame, Frames};
 pub use live_view::{LiveFrame, LiveTimes, LiveView};
 pub use session::{Session, ViewRequest};
+pub use work_stealing::WorkStealing;
 
 /// A connection to a coordinator.
 #[derive(Debug, Clone)]

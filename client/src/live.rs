@@ -3,12 +3,13 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use cluster::{Assignment, CompositorShare, SessionEvent, SessionPlan, SessionRequest};
 use tokio::sync::{mpsc, watch};
 use tokio_stream::StreamExt as _;
 use tonic::Status;
 use tonic::transport::Channel;
+use wire::plan_in_force;
 use wire::rpc::{CompositorClient, CoordinatorClient, Messages, connect, connect_later};
-use wire::{Assignment, CompositorShare, SessionEvent, SessionPlan, SessionRequest};
 
 use crate::ClientError;
 use crate::trouble::Suspicion;
@@ -34,7 +35,7 @@ impl Peer {
 
     /// A compositor that refuses a plan says which is in force: the coordinator may be out of reach.
     pub(crate) fn learn(&self, refusal: &Status) {
-        if let Some(assignment) = Assignment::told_by(refusal) {
+        if let Some(assignment) = plan_in_force(refusal) {
             // Where there is no room, others have said so.
             let _ = self.learned.try_send(assignment);
         }

@@ -2,15 +2,13 @@
 
 use std::time::{Duration, Instant};
 
+use cluster::{LiveRequest, RenderViews, RequestedView};
+use codec::{DecodeLimits, FrameAssembly, FrameCodec, FramePart, WholeFrame, decode_view};
 use depth_image::ViewPlanes;
 use tokio::sync::{mpsc, watch};
 use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
 use tokio_stream::wrappers::ReceiverStream;
 use wire::rpc::{CALL_TIMEOUT, Messages};
-use wire::{
-    DecodeLimits, FrameAssembly, FrameCodec, FramePart, LiveRequest, RenderViews, RequestedView, WholeFrame,
-    decode_view,
-};
 
 use crate::expected::agrees;
 use crate::frames::{Failure, Frame, next_frame};

@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
+use codec::FrameCodec;
 use depth_image::{PinholeCamera, ViewPlanes};
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
-use wire::FrameCodec;
 
 use crate::frames::Frame;
 use crate::live::State;

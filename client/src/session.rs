@@ -2,13 +2,14 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use cluster::{ChangeSession, SessionEvent, SessionPlan, SessionRequest};
+use codec::FrameCodec;
 use depth_image::{PinholeCamera, ViewPlanes};
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
 use wire::rpc::{CoordinatorClient, Messages};
-use wire::{ChangeSession, FrameCodec, SessionEvent, SessionPlan, SessionRequest};
 
 use crate::ClientError;
 use crate::expected::Expected;
@@ -69,7 +70,7 @@ impl Session {
     ///
     /// # Errors
     /// The coordinator's; a session that has ended.
-    pub async fn change(&self, views_per_set: u32, frames_per_s: f64) -> Result<(), ClientError> {
+    pub async fn change(&self, views_per_set: u32, frames_per_s: Option<f64>) -> Result<(), ClientError> {
         self.say(|request| (request.views_per_set, request.frames_per_s) = (views_per_set, frames_per_s)).await
     }
 
@@ -87,6 +88,7 @@ impl Session {
         change(&mut asked);
         let SessionRequest { views_per_set, frames_per_s, viewpoints, .. } = asked;
         let session = self.state.borrow().session;
+        let viewpoints = (!viewpoints.is_empty()).then_some(viewpoints);
         let message = ChangeSession { session, views_per_set, frames_per_s, viewpoints };
         let answer = self.coordinator.change_session(message).await;
         let refuses = |status: &Status| [Code::InvalidArgument, Code::ResourceExhausted].contains(&status.code());
@@ -140,7 +142,7 @@ impl Session {
         }
         requests.iter().try_for_each(|request| check(request, &live))?;
         let expected = Expected::new(requests.iter().copied(), self.planes)?;
-        let template = wire::RenderViews {
+        let template = cluster::RenderViews {
             plan_epoch: live.plan.assignment.plan_epoch,
             set_index: 0,
             method: method.unwrap_or_default().to_owned(),

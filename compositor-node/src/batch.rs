@@ -2,9 +2,10 @@
 
 use std::time::Instant;
 
+use cluster::RequestedView;
+use codec::{FrameCodec, SampleSetId};
 use depth_image::ViewPlanes;
 use glam::UVec2;
-use wire::{FrameCodec, RequestedView, SampleSetId};
 
 use crate::outbox::Reply;
 use crate::quota::Credit;

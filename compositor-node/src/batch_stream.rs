@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
+use cluster::{Assignment, RenderViews, RequestedView};
+use codec::SampleSetId;
 use node::next_within;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::{Code, Status};
 use wire::rpc::Messages;
-use wire::{Assignment, RenderViews, RequestedView, SampleSetId};
 
 use crate::batch::{BatchKey, MAX_BATCH, Source, Waiting, Waits};
 use crate::outbox::Reply;

@@ -4,12 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use cluster::{FetchImages, SamplerShare};
+use codec::{Chunk, DecodeLimits, Reassembler, SampleSetId};
 use depth_image::DepthImage;
 use node::{CellPlan, Connections, Deadlines, SampleSet};
 use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::{Messages, SamplerClient};
-use wire::{Chunk, DecodeLimits, FetchImages, Reassembler, SampleSetId, SamplerShare, WireError};
 
 use crate::incoming::{Incoming, check, check_visibility, decode, whole};
 use crate::passing::Passing;
@@ -202,7 +203,9 @@ impl Fetcher {
         let cameras = plan.sampled_cameras();
         let (mut images, mut decode_s) = (Vec::new(), 0.0);
         while let Some(chunk) = incoming.next().await? {
-            let Some(whole) = reassembler.push(chunk).map_err(WireError::from)? else {
+            let Some(whole) =
+                reassembler.push(chunk).map_err(|error| Status::data_loss(format!("chunk is corrupt: {error}")))?
+            else {
                 continue;
             };
             check(&whole, id, share, &images)?;

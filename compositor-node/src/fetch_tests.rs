@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use cluster::{Policy, SceneHash, SceneRef, Timeline, Workload};
+use codec::{Chunk, ChunkBody, PlaneSet, encode_depth_image, split_into_chunks};
 use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, SpecularPlanes};
 use glam::{UVec2, Vec3};
 use tokio::net::TcpListener;
@@ -10,9 +12,6 @@ use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 use tonic::{Code, async_trait};
 use wire::rpc::{Messages, Sampler, sampler_server};
-use wire::{
-    Chunk, ChunkBody, PlaneSet, Policy, SceneHash, SceneRef, Timeline, Workload, encode_depth_image, split_into_chunks,
-};
 
 use super::*;
 
@@ -97,7 +96,7 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
         refinement_steps: 1,
     };
     let share = SamplerShare { node_name: "n7".to_owned(), address, image_indices: vec![0, 1] };
-    let plan = Arc::new(wire::Assignment {
+    let plan = Arc::new(cluster::Assignment {
         plan_epoch: 5,
         policy: Policy::Pipeline,
         workload,

@@ -2,11 +2,12 @@
 
 use std::time::{Duration, Instant};
 
+use cluster::{Assignment, SamplerShare};
+use codec::{Chunk, DecodeLimits, Reassembled, SampleSetId, decode_depth_image};
 use depth_image::{Camera, DepthImage, SpecularPlanes};
 use node::{CellPlan, blocking, next_within};
 use tonic::Status;
 use wire::rpc::Messages;
-use wire::{Assignment, Chunk, DecodeLimits, Reassembled, SampleSetId, SamplerShare, decode_depth_image};
 
 /// Chunks, and what waiting for them took after the first.
 pub(crate) struct Incoming {

@@ -8,11 +8,12 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Instant;
 
+use cluster::{Assignment, LiveRequest, RenderViews, RequestedView};
+use codec::SampleSetId;
 use node::next_within;
 use tokio::sync::Semaphore;
 use tonic::Status;
 use wire::rpc::Messages;
-use wire::{Assignment, LiveRequest, RenderViews, RequestedView, SampleSetId};
 
 use crate::arrivals::Viewer;
 use crate::batch::{BatchKey, Source, Waiting, Waits};

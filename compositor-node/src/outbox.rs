@@ -11,12 +11,12 @@ use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use codec::{FrameHeader, FramePart};
 use node::NodeMetrics;
 use tokio::sync::OwnedSemaphorePermit;
 use tokio_stream::Stream;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
-use wire::{FrameHeader, FramePart};
 
 use crate::quota::Credit;
 

@@ -1,10 +1,10 @@
+use codec::MAX_CHUNK_BYTES;
+use codec::{FrameCodec, SampleSetId, StageTimes};
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
 use node::Quotas;
 use tokio::sync::Semaphore;
 use tokio_stream::StreamExt as _;
-use wire::limits::PART_BYTES;
-use wire::{FrameCodec, SampleSetId, StageTimes};
 
 use super::*;
 use crate::quota::NodeQuota;
@@ -58,7 +58,7 @@ impl Bench {
 #[tokio::test]
 async fn a_batch_s_credit_comes_back_with_the_last_part() {
     let mut bench = bench(false);
-    bench.put(5, 2 * PART_BYTES);
+    bench.put(5, 2 * MAX_CHUNK_BYTES);
     assert_eq!((bench.frame().await, bench.credits.available_permits()), (5, 1));
     assert_eq!((bench.frame().await, bench.credits.available_permits()), (5, 2));
 }
@@ -115,7 +115,7 @@ async fn an_error_comes_after_what_is_ready_and_then_nothing() {
 #[tokio::test]
 async fn what_a_client_does_not_take_is_taken_away() {
     let mut bench = bench(false);
-    bench.put(1, 2 * PART_BYTES);
+    bench.put(1, 2 * MAX_CHUNK_BYTES);
     bench.put(2, 10);
     bench.frame().await;
     tokio::time::timeout(Duration::from_secs(5), bench.outbox.stalled(Duration::from_millis(20))).await.unwrap();

@@ -1,10 +1,10 @@
 //! Encoded images of one set as they come, for compositors that ask this one for them.
 
+use codec::EncodedDepthImage;
 use tokio::sync::watch;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::WatchStream;
 use tonic::Status;
-use wire::EncodedDepthImage;
 use wire::rpc::Messages;
 
 /// What has come so far.
@@ -91,7 +91,7 @@ impl tokio_stream::Stream for Flattened {
 
 #[cfg(test)]
 mod tests {
-    use wire::{EncodedDepthImage, ImageHeader, InverseDepthRange};
+    use codec::{EncodedDepthImage, ImageHeader, InverseDepthRange};
 
     use super::*;
 

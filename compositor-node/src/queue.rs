@@ -117,9 +117,9 @@ fn shared(wanted: &BatchKey) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use codec::SampleSetId;
     use depth_image::ViewPlanes;
     use glam::UVec2;
-    use wire::SampleSetId;
 
     use super::*;
 

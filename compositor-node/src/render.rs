@@ -4,11 +4,11 @@ use std::sync::Arc;
 use std::thread::available_parallelism;
 use std::time::Instant;
 
+use codec::{StageTimes, encode_view};
 use depth_image::View;
 use node::{DirectWork, Engine, NodeMetrics, Operation, ViewWork, blocking};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::Status;
-use wire::{StageTimes, encode_view};
 
 use crate::arrivals::Arrivals;
 use crate::batch::{Source, Waiting};

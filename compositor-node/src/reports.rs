@@ -3,9 +3,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use cluster::SamplerReport;
 use node::NodeConfig;
 use tonic::{Code, Status};
-use wire::SamplerReport;
 use wire::rpc::{CoordinatorClient, connect};
 
 /// How long telling may take.

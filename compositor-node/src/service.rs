@@ -4,12 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
+use cluster::{Assignment, Policy, RenderViews};
+use codec::{FramePart, SampleSetId};
 use node::{CellPlan, CurrentPlan, Deadlines, Engine, NodeConfig, NodeMetrics, Relay, next_within, until_drained};
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Compositor, Messages};
-use wire::{Assignment, FramePart, Policy, RenderViews, SampleSetId};
 
 use crate::arrivals::Arrivals;
 use crate::batch::Source;

@@ -4,11 +4,12 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+use cluster::{Assignment, SetContent};
+use codec::EncodedDepthImage;
 use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, UploadedSet, blocking};
 use tokio::sync::OnceCell;
 use tonic::{Status, async_trait};
 use wire::rpc::Messages;
-use wire::{Assignment, EncodedDepthImage, SetContent};
 
 use crate::fetch::{Fetched, Fetcher};
 use crate::passing::Passing;

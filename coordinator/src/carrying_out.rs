@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use cluster::{Assignment, Ready, SessionEvent, SessionPlan, SessionStage};
 use tokio::sync::Notify;
 use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
-use wire::{Assignment, Ready, SessionEvent, SessionPlan, SessionStage};
 
 use crate::opening::{named, within};
 use crate::schedule::{ChoiceError, Command, Event};

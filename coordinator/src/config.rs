@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use bytes::Bytes;
+use cluster::{OfferSettings, OfferStatus, SceneHash, SceneRef};
 use depth_image::{Aabb, Camera, Illumination};
 use glam::{DVec3, Vec3};
-use wire::{OfferSettings, OfferStatus, SceneHash, SceneRef};
 
 /// The coordinator's configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

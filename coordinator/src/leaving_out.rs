@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use cluster::{NodeStatus, SamplerReport};
 use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::is_serving;
-use wire::{NodeStatus, SamplerReport};
 
 use crate::reports::{Verdict, concerns};
 use crate::schedule::Event;

@@ -1,8 +1,8 @@
 //! What the coordinator counts.
 
+use cluster::ClusterStatus;
 use node::Telemetry;
 use prometheus_client::metrics::{counter::Counter, gauge::Gauge};
-use wire::ClusterStatus;
 
 use crate::schedule::Command;
 

@@ -5,10 +5,10 @@ use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
 
+use cluster::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage};
 use tokio::sync::mpsc;
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
-use wire::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage};
 
 use crate::schedule::{Event, Opening};
 use crate::service::Inner;
@@ -63,7 +63,7 @@ async fn measured_opening(
         session,
         workload,
         views_per_set: request.views_per_set as usize,
-        frames_per_s: request.frames_per_s,
+        frames_per_s: request.frames_per_s.unwrap_or(0.0),
         policy: request.policy,
         forced_samplers: request.forced_sampler_count.map(|count| count as usize),
         forced_tiles: request.forced_tile_count.map(|count| count as usize),

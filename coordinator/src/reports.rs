@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use wire::{SamplerReport, SessionPlan};
+use cluster::{SamplerReport, SessionPlan};
 
 /// Reports further apart have causes of their own.
 const TOGETHER: Duration = Duration::from_secs(60);

@@ -3,10 +3,10 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use cluster::limits::MAX_NODES;
+use cluster::{NodeStatus, Welcome};
 use tokio::sync::mpsc;
 use tonic::Status;
-use wire::limits::MAX_NODES;
-use wire::{NodeStatus, Welcome};
 
 /// What a member is told. Room for a welcome and an end.
 type Says = mpsc::Sender<Result<Welcome, Status>>;

@@ -5,6 +5,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use cluster::{
+    ChangeSession, ClusterStatus, Costs, FetchScene, JoinCluster, MeasureCosts, SamplerReport, ScenePart, SessionEvent,
+    SessionRequest, Timeline, Welcome, WorkReport,
+};
+use codec::MAX_CHUNK_BYTES;
 use glam::{Quat, Vec3};
 use node::{Connections, ServeError, health, until_drained, with_guard, with_reflection};
 use tokio::net::TcpListener;
@@ -14,12 +19,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 use tonic::{Status, async_trait};
-use wire::limits::PART_BYTES;
 use wire::rpc::{Coordinator, Messages, coordinator_server};
-use wire::{
-    ChangeSession, ClusterStatus, Costs, FetchScene, JoinCluster, MeasureCosts, SamplerReport, ScenePart, SessionEvent,
-    SessionRequest, Timeline, Welcome, WorkReport,
-};
 
 use crate::carrying_out::{Commands, carry_out, refusal};
 use crate::leaving_out::probe;
@@ -243,7 +243,7 @@ impl Coordinator for CoordinatorService {
 
     async fn change_session(&self, request: ChangeSession) -> Result<(), Status> {
         let ChangeSession { session, views_per_set, frames_per_s, viewpoints } = request;
-        let views_per_set = views_per_set as usize;
+        let (views_per_set, frames_per_s) = (views_per_set as usize, frames_per_s.unwrap_or(0.0));
         if !locked(&self.inner.sessions).contains_key(&session) {
             return Err(Status::not_found(format!("session_number: no session {session} is open")));
         }
@@ -254,12 +254,12 @@ impl Coordinator for CoordinatorService {
             }
             let admitted = scheduler.admits(session, views_per_set, frames_per_s);
             admitted.map_err(|error| refusal(&error))?;
-            if !viewpoints.is_empty() {
-                scheduler.admits_views(session, &viewpoints).map_err(|error| refusal(&error))?;
+            if let Some(viewpoints) = &viewpoints {
+                scheduler.admits_views(session, viewpoints).map_err(|error| refusal(&error))?;
             }
         }
         self.inner.step(Event::Demanded { session, views_per_set, frames_per_s });
-        if !viewpoints.is_empty() {
+        if let Some(viewpoints) = viewpoints {
             self.inner.step(Event::Looked { session, viewpoints });
         }
         Ok(())
@@ -286,9 +286,9 @@ impl Coordinator for CoordinatorService {
         let package = offer.package.clone();
         let part = move |start: usize| ScenePart {
             offset_bytes: start as u64,
-            data: package.slice(start..package.len().min(start + PART_BYTES)),
+            data: package.slice(start..package.len().min(start + MAX_CHUNK_BYTES)),
         };
-        let parts = (start..offer.package.len()).step_by(PART_BYTES).map(part).map(Ok);
+        let parts = (start..offer.package.len()).step_by(MAX_CHUNK_BYTES).map(part).map(Ok);
         Ok(until_drained(Box::pin(tokio_stream::iter(parts)), self.shutdown.clone()))
     }
 

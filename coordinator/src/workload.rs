@@ -1,10 +1,10 @@
 //! What a session samples: its own wishes, else what came with the scene.
 
+use cluster::limits::MAX_CELLS;
+use cluster::{SessionRequest, Workload};
 use depth_image::{Aabb, Camera, PinholeCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
-use wire::limits::MAX_CELLS;
-use wire::{SessionRequest, Workload};
 
 use crate::SceneOffer;
 use crate::carrying_out::refusal;

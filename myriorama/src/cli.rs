@@ -1,10 +1,9 @@
 //! The command line.
 
-use clap::{Args, Parser, Subcommand};
-use gpu::DevicePreference;
+use app_core::exit::Outcome;
+use clap::{Parser, Subcommand};
 
-use crate::commands::{bench, coordinator, demo, health, node, replay, status, study, up, view};
-use crate::exit::Outcome;
+use crate::commands::{coordinator, health, node, replay, status, up, view};
 
 /// Many views of one scene from a few depth images.
 ///
@@ -51,28 +50,17 @@ pub enum Command {
     Replay(replay::ReplayArgs),
     /// Ask a coordinator or a node whether it serves
     Health(health::HealthArgs),
-    /// Run the paper's experiment on this machine and write a report
-    Demo(demo::DemoArgs),
-    /// Measure speed and accuracy against what is promised, and write a report
-    Bench(bench::BenchArgs),
-    /// Repeat a paper's experiments, its figures beside ours, and write a report
-    #[command(subcommand)]
-    Study(study::StudyCommand),
-}
-
-/// Which device.
-#[derive(Debug, Clone, Copy, Args)]
-pub struct DeviceArgs {
-    /// any (a GPU if there is one) or software
-    #[arg(long, default_value_t, value_name = "NAME", env = "MYRIORAMA_DEVICE")]
-    pub device: DevicePreference,
+    /// Subcommands that measure
+    #[cfg(feature = "lab")]
+    #[command(flatten)]
+    Lab(lab::LabCommand),
 }
 
 impl Command {
     /// Runs it to its end.
     ///
     /// # Errors
-    /// Input that cannot be used, or a failure at run time; [`crate::exit::code_of`] tells them apart.
+    /// Input that cannot be used, or a failure at run time; [`app_core::exit::code_of`] tells them apart.
     pub fn run(self) -> anyhow::Result<Outcome> {
         match self {
             Self::Up(args) => up::run(args),
@@ -82,9 +70,8 @@ impl Command {
             Self::Status(args) => status::run(&args),
             Self::Replay(args) => replay::run(&args),
             Self::Health(args) => health::run(&args),
-            Self::Demo(args) => demo::run(&args),
-            Self::Bench(args) => bench::run(&args),
-            Self::Study(command) => command.run(),
+            #[cfg(feature = "lab")]
+            Self::Lab(command) => command.run(),
         }
     }
 }

@@ -1,10 +1,8 @@
 //! Delivered views beside the same views drawn directly.
 
 use client::Frame;
-use metrics::{flip_map, psnr_db, ssim_map};
-use study::Table;
-
-use crate::evaluate::{image_of, mean};
+use metrics::{Rgb8Image, ScoreMap, flip_map, psnr_db, ssim_map};
+use table::Table;
 
 /// Errors of one view.
 struct Errors {
@@ -35,10 +33,14 @@ pub fn table(truth: &[Frame], delivered: &[Frame]) -> anyhow::Result<(Table, f64
 }
 
 fn errors((truth, delivered): (&Frame, &Frame)) -> anyhow::Result<Errors> {
-    let (reference, test) = (image_of(&truth.view)?, image_of(&delivered.view)?);
+    let (reference, test) = (Rgb8Image::of_view(&truth.view)?, Rgb8Image::of_view(&delivered.view)?);
     Ok(Errors {
         psnr_db: psnr_db(&reference, &test, None)?.unwrap_or(f64::NAN).min(metrics::PSNR_CAP_DB),
         ssim: mean(&ssim_map(&reference, &test)?)?,
         flip: mean(&flip_map(&reference, &test)?)?,
     })
+}
+
+fn mean(map: &ScoreMap) -> anyhow::Result<f64> {
+    Ok(map.mean(None)?.unwrap_or(f64::NAN))
 }

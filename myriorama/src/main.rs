@@ -2,8 +2,9 @@
 
 use std::process::ExitCode;
 
+use app_core::exit;
 use clap::Parser as _;
-use myriorama::{cli::Cli, exit};
+use myriorama::cli::Cli;
 
 fn main() -> ExitCode {
     node::init_logging("warn");

@@ -1,9 +1,7 @@
 //! A cluster's state as a table: nodes, roles, costs, and why.
 
-use study::{Cell, Table};
-use wire::{ClusterStatus, Costs, NodeStatus};
-
-use crate::text_table;
+use cluster::{ClusterStatus, Costs, NodeStatus};
+use table::{Cell, Table};
 
 const COLUMNS: [(&str, &str); 12] = [
     ("node", ""),
@@ -33,17 +31,17 @@ pub fn text(status: &ClusterStatus) -> anyhow::Result<String> {
         .plan
         .as_ref()
         .map_or_else(|| "No plan: nobody has asked for views.".to_owned(), |plan| plan.reason.clone());
-    Ok(format!("{}\n\n{why}\n{}", text_table::text(&table), achieved(status)))
+    Ok(format!("{}\n\n{why}\n{}", table.to_text(), achieved(status)))
 }
 
 /// What each policy took that has been in force, and whether nodes have time left.
 fn achieved(status: &ClusterStatus) -> String {
     let mut lines: Vec<String> =
         status.achieved.iter().map(|a| format!("Achieved by {}: {:.3} ms a set.", a.policy, a.busy_s * 1e3)).collect();
-    if status.utilisation > 0.0 {
-        let fallback = status.plan.as_ref().map_or(0, |plan| plan.fallback_number);
-        let quality = if fallback > 0 { format!("fallback {fallback}") } else { "all that was asked for".to_owned() };
-        lines.push(format!("Sessions take {:.0} % of the nodes' time and get {quality}.", status.utilisation * 100.0));
+    if let Some(utilisation) = status.utilisation {
+        let fallback = status.plan.as_ref().and_then(|plan| plan.fallback_index);
+        let quality = fallback.map_or("all that was asked for".to_owned(), |index| format!("fallback {}", index + 1));
+        lines.push(format!("Sessions take {:.0} % of the nodes' time and get {quality}.", utilisation * 100.0));
     }
     lines.join("\n")
 }

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 use std::sync::Arc;
 
+use cluster::NodeStatus;
 use compositor_node::CompositorService;
 use node::{
     CurrentPlan, Engine, NodeConfig, NodeMetrics, NodeService, Scenes, ServeError, Watched, health, keep_membership,
@@ -12,7 +13,6 @@ use sampler_node::SamplerService;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
-use wire::NodeStatus;
 use wire::rpc::{compositor_server, node_server, sampler_server};
 
 /// Serves both roles on one port and stays a member of the coordinator's cluster until `shutdown`; then

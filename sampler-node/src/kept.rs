@@ -4,9 +4,10 @@ use std::collections::VecDeque;
 use std::future::Future;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use cluster::SetContent;
+use codec::EncodedDepthImage;
 use tokio::sync::OnceCell;
 use tonic::Status;
-use wire::{EncodedDepthImage, SetContent};
 
 /// What is sampled: a set, into how many tiles its images are cut, and which of them. Not the plan: a static scene stays
 /// sampled.
@@ -72,9 +73,10 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::time::Duration;
 
+    use cluster::{Assignment, Policy, SceneHash, SceneRef, Timeline, Workload};
+    use codec::{PlaneSet, encode_depth_image};
     use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera};
     use glam::{UVec2, Vec3};
-    use wire::{Assignment, PlaneSet, Policy, SceneHash, SceneRef, Timeline, Workload, encode_depth_image};
 
     use super::*;
 

@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use cluster::{Assignment, FetchImages};
+use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
 use node::{
     CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, SampleWork, blocking, until_drained,
 };
@@ -12,9 +14,6 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Messages, Sampler};
-use wire::{
-    Assignment, Chunk, EncodedDepthImage, FetchImages, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks,
-};
 
 use crate::kept::{EncodedImages, Kept};
 
@@ -139,7 +138,7 @@ fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Opt
         method: workload.method.clone(),
         lighting: workload.lighting.clone(),
         scene_time_s,
-        settled_at_s: workload.timeline.settled_at_s(set_index),
+        settled_at_s: workload.timeline.temporal_reference_s(set_index),
         refinement: workload.refinement(set_index),
     };
     Ok(workload.timeline.time_s(set_index).map(work))

@@ -1,6 +1,6 @@
 //! What a cluster is made of, and how it goes about its work.
 
-use wire::Costs;
+use cluster::{Costs, TileCosts};
 
 /// Seconds of a call to the device beside the views that it makes; 0 where it does not count.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -33,8 +33,7 @@ impl Machine {
             load_set_s: self.costs.load_set_s / speed,
             encode_view_s: self.costs.encode_view_s / speed,
             in_order: self.costs.in_order,
-            sample_overhead_s: self.costs.sample_overhead_s / speed,
-            sample_row_shares: self.costs.sample_row_shares,
+            tiles: self.costs.tiles.map(|tiles| TileCosts { overhead_s: tiles.overhead_s / speed, ..tiles }),
         };
         let calls = Calls { reconstruct_s: self.calls.reconstruct_s / speed, direct_s: self.calls.direct_s / speed };
         Self { costs, calls, ..*self }
@@ -73,8 +72,8 @@ impl Cluster {
         let share = 1.0 / parts.max(1) as f64;
         for machine in &mut self.machines {
             machine.costs.sample_image_s *= share;
-            // They are not cut again.
-            machine.costs.sample_overhead_s = machine.costs.sample_image_s;
+            // Parts are not cut again.
+            machine.costs.tiles = None;
         }
         Self { images: self.images * parts.max(1), image_bytes: self.image_bytes * share, ..self }
     }

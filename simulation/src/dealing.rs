@@ -1,6 +1,7 @@
 //! Who gets which views, and who passes images on to whom.
 
-use wire::{Assignment, Deal};
+use client::WorkStealing;
+use cluster::Assignment;
 
 use crate::planning::number_of;
 
@@ -10,9 +11,9 @@ pub(crate) fn compositors_of(plan: &Assignment) -> Vec<usize> {
 }
 
 /// The views of all sets, as clients deal them.
-pub(crate) fn deal_of(plan: &Assignment, views: usize, sets: u32) -> Deal {
+pub(crate) fn deal_of(plan: &Assignment, views: usize, sets: u32) -> WorkStealing {
     let weights: Vec<u32> = plan.compositors.iter().map(|share| share.view_weight).collect();
-    Deal::new((0..sets).map(|_| views), &weights)
+    WorkStealing::new((0..sets).map(|_| views), &weights)
 }
 
 /// The receivers of each of `nodes` nodes that samples: all compositors, from the one behind it on, so that several

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use wire::Asked;
+use client::FlowControl;
 
 use crate::cluster::Machine;
 use crate::run::Busy;
@@ -70,8 +70,8 @@ pub(crate) struct Node {
     /// Messages of the client's that the node has not read: the set, and views that there was no credit for yet.
     pub(crate) messages: VecDeque<(u32, usize)>,
     pub(crate) credit: usize,
-    /// The client's side: what it has asked for, and this node's place among those that views are dealt to.
-    pub(crate) asked: Asked,
+    /// The client's side: its flow control, and this node's place among the compositors.
+    pub(crate) flow: FlowControl,
     pub(crate) place: usize,
     pub(crate) busy: Busy,
 }
@@ -90,7 +90,7 @@ impl Node {
             loading: vec![Loading::default(); sets as usize],
             messages: VecDeque::new(),
             credit,
-            asked: Asked::new(view_s),
+            flow: FlowControl::new(Some(view_s)),
             place: 0,
             busy: Busy::default(),
         }

@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
+use cluster::{
+    Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, SessionPlan, Timeline, Workload,
+};
 use coordinator::schedule::{ChoiceError, Command, Event, MeasuredCosts, Opening, Scheduler};
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
-use wire::{
-    Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, SessionPlan, Timeline, Workload,
-};
 
 use crate::cluster::{Cluster, Machine};
 

@@ -1,7 +1,7 @@
 //! Closed forms.
 
+use cluster::{Costs, Policy, PolicyChoice};
 use coordinator::schedule::{Load, NodeCosts, k_fd, pipeline_s, pipeline_time};
-use wire::{Costs, Policy, PolicyChoice};
 
 use crate::{Calls, Cluster, Demand, Habits, Limit, Machine, Run, Transfer, plan, run, spread_speeds};
 
@@ -12,8 +12,7 @@ const COSTS: Costs = Costs {
     load_set_s: 0.005,
     encode_view_s: 0.001,
     in_order: false,
-    sample_overhead_s: 1e3,
-    sample_row_shares: [0.25; 4],
+    tiles: None,
 };
 
 const FREE: Machine =

@@ -8,7 +8,8 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-use wire::{Assignment, Deal, Policy, SessionPlan};
+use client::WorkStealing;
+use cluster::{Assignment, Policy, SessionPlan};
 
 use crate::cluster::{Cluster, Habits, Machine, Transfer};
 use crate::dealing::{compositors_of, deal_of, receivers};
@@ -38,7 +39,7 @@ struct World<'a> {
     nodes: Vec<Node>,
     /// Views of a set.
     views: usize,
-    deal: Deal,
+    unrequested: WorkStealing,
     /// Nodes that make views, in the plan's order.
     compositors: Vec<usize>,
     /// Of each node, to whom its images go under a relay; of those that sample nothing nobody.
@@ -73,7 +74,7 @@ impl<'a> World<'a> {
         let habits = Habits { transfer: relayed.unwrap_or(habits.transfer), ..habits };
         let node = |machine| Node::new(machine, sets, (habits.credit_views, view_s));
         let nodes: Vec<Node> = cluster.machines.iter().copied().map(node).collect();
-        let (deal, due) = (deal_of(plan, views, sets), vec![(views, 0.0); sets as usize]);
+        let (unrequested, due) = (deal_of(plan, views, sets), vec![(views, 0.0); sets as usize]);
         let (receivers, foreseen) = (Vec::new(), BinaryHeap::new());
         Self {
             cluster,
@@ -82,7 +83,7 @@ impl<'a> World<'a> {
             sets,
             nodes,
             views,
-            deal,
+            unrequested,
             compositors,
             receivers,
             now_s: 0.0,
@@ -96,8 +97,8 @@ impl<'a> World<'a> {
     fn begin(&mut self) {
         for (place, node) in self.compositors.clone().into_iter().enumerate() {
             self.nodes[node].place = place;
-            while let Some(most) = self.nodes[node].asked.room() {
-                let Some(views) = self.deal.take_own(place, most) else { break };
+            while let Some(most) = self.nodes[node].flow.room() {
+                let Some(views) = self.unrequested.take_local(place, most) else { break };
                 self.send_message(node, views);
             }
         }
@@ -109,15 +110,15 @@ impl<'a> World<'a> {
 
     fn send_message(&mut self, node: usize, views: Range<usize>) {
         let set = (views.start / self.views) as u32;
-        self.nodes[node].asked.ask(views.len());
+        self.nodes[node].flow.sent(views.len());
         self.nodes[node].messages.push_back((set, views.len()));
     }
 
     /// Frames have come to the client, which asks for more where there is room.
     fn came_back(&mut self, node: usize, views: usize) {
-        (0..views).for_each(|_| self.nodes[node].asked.came(self.now_s, false));
-        while let Some(most) = self.nodes[node].asked.room() {
-            let Some(views) = self.deal.take(self.nodes[node].place, most) else { break };
+        (0..views).for_each(|_| self.nodes[node].flow.received(self.now_s, false));
+        while let Some(most) = self.nodes[node].flow.room() {
+            let Some(views) = self.unrequested.take(self.nodes[node].place, most) else { break };
             self.send_message(node, views);
         }
     }

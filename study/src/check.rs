@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::format_number;
+use table::format_number;
 
 /// What a value must reach.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use table::TableError;
+
 /// Why a report, chart or picture could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
@@ -21,18 +23,9 @@ pub enum ReportError {
         /// The file name without its ending.
         name: String,
     },
-    /// A row has not one cell a column.
-    #[error("row {row} of table {table:?} has {cells} cells, its columns are {columns}")]
-    RowLength {
-        /// The table's name.
-        table: String,
-        /// Counted from 0.
-        row: usize,
-        /// Cells in it.
-        cells: usize,
-        /// Columns of the table.
-        columns: usize,
-    },
+    /// A table cannot be written.
+    #[error(transparent)]
+    Table(#[from] TableError),
     /// A bar chart's stage has not one value a bar.
     #[error("stage {stage:?} of chart {chart:?} has {values} values, its bars are {bars}")]
     StageLength {
@@ -45,16 +38,6 @@ pub enum ReportError {
         /// Bars of the chart.
         bars: usize,
     },
-    /// Pixels do not make a picture of the size stated.
-    #[error("{what} holds {len} values, {width_px} columns do not divide them")]
-    PictureSize {
-        /// Which picture.
-        what: &'static str,
-        /// Values given.
-        len: usize,
-        /// Columns stated.
-        width_px: u32,
-    },
     /// The chart library failed.
     #[error("cannot draw chart {chart:?}: {message}")]
     Draw {
@@ -66,9 +49,6 @@ pub enum ReportError {
     /// JSON could not be written.
     #[error("cannot write report.json: {0}")]
     Json(#[from] serde_json::Error),
-    /// CSV could not be written.
-    #[error("cannot write a table: {0}")]
-    Csv(#[from] csv::Error),
     /// A picture could not be encoded.
     #[error("cannot write a picture: {0}")]
     Image(#[from] image::ImageError),

@@ -15,11 +15,9 @@ mod check;
 mod check_text;
 mod error;
 mod html;
-mod number;
 mod picture;
 mod report;
 mod slug;
-mod table;
 mod write;
 
 pub use chart::{
@@ -28,11 +26,7 @@ pub use chart::{
 pub use check::{Bar, Check, Outcome};
 pub use check_text::checks_text;
 pub use error::ReportError;
-pub use number::format_number;
-pub use picture::{
-    Picture, PictureRow, Provenance, comparison_row, contact_sheet, depth_false_color, error_map,
-    provenance_false_color, rgb_image,
-};
+pub use picture::{Legend, Picture, PictureRow, comparison_row, contact_sheet, error_map};
 pub use report::{Report, SCHEMA_VERSION};
 pub use slug::slug;
-pub use table::{Cell, Column, Table};
+pub use table::{Cell, Column, Table, TableError};

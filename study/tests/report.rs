@@ -8,7 +8,7 @@ use std::path::Path;
 use image::RgbImage;
 use study::{
     Axis, Bar, BarChart, Better, Cell, Check, Outcome, Palette, Picture, PictureRow, Point, Report, ReportError,
-    Series, Table, XyChart,
+    Series, Table, TableError, XyChart,
 };
 
 const HOSTILE: &str = "a<script>&\"b\"";
@@ -165,7 +165,7 @@ fn parts_that_do_not_fit_are_named() {
     let duplicate = write(|report| report.charts.push(BarChart::new("Stages!", Axis::linear("t", ""), ["a"]).into()));
     assert!(matches!(duplicate, ReportError::DuplicateName { kind: "charts", .. }));
     let ragged = write(|report| report.tables[0].rows[0].truncate(1));
-    assert!(matches!(ragged, ReportError::RowLength { row: 0, .. }));
+    assert!(matches!(ragged, ReportError::Table(TableError::RowLength { row: 0, .. })));
     let stage = write(|report| {
         report.charts.push(BarChart::new("b", Axis::linear("t", ""), ["a"]).with("s", [1.0, 2.0]).into())
     });

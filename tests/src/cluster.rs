@@ -5,6 +5,8 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use client::{Client, ClientError, Session, ViewRequest};
+use cluster::{PolicyChoice, SessionRequest, Timeline};
+use codec::{FrameAssembly, FramePart, WholeFrame};
 use coordinator::{CoordinatorConfig, Observers, SceneOffer};
 use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
@@ -14,7 +16,6 @@ use tokio::runtime::{Builder, Runtime};
 use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
 use wire::rpc::Messages;
-use wire::{FrameAssembly, FramePart, PolicyChoice, SessionRequest, Timeline, WholeFrame};
 
 use crate::scalar_engine::{SKY_LINEAR, ScalarEngine};
 
@@ -154,7 +155,7 @@ pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
         policy,
         forced_sampler_count: None,
         refinement_steps: 1,
-        frames_per_s: 0.0,
+        frames_per_s: None,
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
         forced_tile_count: None,

@@ -5,8 +5,8 @@ use std::io::Cursor;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use cluster::{Assignment, Policy};
 use coordinator::schedule::{Command, replay};
-use wire::{Assignment, Policy};
 
 /// A frame that came.
 #[derive(Debug, Clone, PartialEq)]

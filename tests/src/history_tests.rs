@@ -1,7 +1,7 @@
 //! The checker sees what it is there to see.
 
+use cluster::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneRef, Timeline, Workload};
 use coordinator::schedule::{Event, Opening, Recorder};
-use wire::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneRef, Timeline, Workload};
 
 use super::*;
 use crate::cluster::{illumination, offer, rig};
@@ -53,8 +53,7 @@ fn log(plan_epoch: u64) -> Vec<u8> {
         load_set_s: 0.01,
         encode_view_s: 0.001,
         in_order: false,
-        sample_overhead_s: 0.1,
-        sample_row_shares: [0.1, 0.2, 0.3, 0.4],
+        tiles: None,
     };
     let opening = Opening {
         session: 9,

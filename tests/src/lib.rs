@@ -7,6 +7,7 @@
 
 pub mod cluster;
 pub mod history;
+pub mod imports;
 pub mod mangler;
 pub mod picture;
 pub mod processes;

@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use cluster::{Assignment, Costs, FetchImages, MeasureCosts, Ready, RenderViews};
+use codec::{Chunk, FramePart};
 use node::{ServeError, serve};
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
@@ -14,7 +16,6 @@ use wire::rpc::{
     Compositor, CompositorClient, Messages, Node, NodeClient, Sampler, SamplerClient, compositor_server, connect,
     node_server, sampler_server,
 };
-use wire::{Assignment, Chunk, Costs, FetchImages, FramePart, MeasureCosts, Ready, RenderViews};
 
 /// What becomes of the chunks of one answer.
 pub type Spoil = fn(&mut Vec<Chunk>);

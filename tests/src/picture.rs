@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use client::Frame;
-use wire::Refinement;
+use cluster::Refinement;
 
 use crate::scalar_engine::{FLOOR_LINEAR, SKY_LINEAR, ball_linear, srgb8};
 

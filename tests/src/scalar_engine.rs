@@ -8,13 +8,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::Duration;
 
+use cluster::Refinement;
 use depth_image::{
     BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, PinholeCamera, Provenance, ProvenanceKind, Ray, Texel, View,
     ViewPlanes, linear_from_rgb9e5, linear_from_srgb8, rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
-use wire::Refinement;
 
 use crate::cluster::illumination;
 

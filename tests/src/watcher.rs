@@ -4,9 +4,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use client::{Client, Session, ViewRequest};
+use cluster::{PolicyChoice, Refinement, SessionRequest, Timeline};
 use glam::UVec2;
 use tokio::task::JoinHandle;
-use wire::{PolicyChoice, Refinement, SessionRequest, Timeline};
 
 use crate::cluster::{camera, request};
 use crate::history::{Call, History, Seen};

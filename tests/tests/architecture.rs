@@ -23,25 +23,51 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("sampling", &["render", "gpu", "scene", "depth-image"]),
     ("reconstruction", &["gpu", "depth-image"]),
     ("metrics", &["depth-image"]),
-    ("wire", &["depth-image"]),
-    ("node", &["wire", "depth-image"]),
-    ("sampler-node", &["node", "wire", "depth-image"]),
-    ("compositor-node", &["node", "wire", "depth-image"]),
-    ("node-host", &["sampler-node", "compositor-node", "node", "wire"]),
-    ("coordinator", &["node", "wire", "depth-image"]),
-    ("client", &["wire", "depth-image"]),
-    ("simulation", &["coordinator", "wire", "depth-image"]),
-    ("study", &["metrics", "depth-image"]),
+    ("codec", &["depth-image"]),
+    ("cluster", &["codec", "depth-image"]),
+    ("wire", &["cluster", "codec", "depth-image"]),
+    ("node", &["wire", "cluster", "codec", "depth-image"]),
+    ("sampler-node", &["node", "wire", "cluster", "codec", "depth-image"]),
+    ("compositor-node", &["node", "wire", "cluster", "codec", "depth-image"]),
+    ("node-host", &["sampler-node", "compositor-node", "node", "wire", "cluster"]),
+    ("coordinator", &["node", "wire", "cluster", "codec", "depth-image"]),
+    ("client", &["wire", "cluster", "codec", "depth-image"]),
+    ("simulation", &["client", "coordinator", "cluster", "depth-image"]),
+    ("table", &[]),
+    ("study", &["metrics", "table"]),
+    ("engine", &["node", "reconstruction", "sampling", "render", "gpu", "scene", "cluster", "depth-image"]),
     (
-        "myriorama",
+        "app-core",
         &[
             "client",
+            "cluster",
+            "codec",
             "coordinator",
             "depth-image",
             "gpu",
-            "metrics",
             "node",
             "node-host",
+            "reconstruction",
+            "render",
+            "sampling",
+            "scene",
+            "table",
+            "wire",
+        ],
+    ),
+    (
+        "lab",
+        &[
+            "app-core",
+            "client",
+            "cluster",
+            "codec",
+            "coordinator",
+            "depth-image",
+            "engine",
+            "gpu",
+            "metrics",
+            "node",
             "reconstruction",
             "render",
             "sampling",
@@ -51,7 +77,27 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "wire",
         ],
     ),
-    ("cluster-tests", &["client", "coordinator", "depth-image", "node", "node-host", "wire"]),
+    (
+        "myriorama",
+        &[
+            "app-core",
+            "client",
+            "cluster",
+            "codec",
+            "coordinator",
+            "depth-image",
+            "engine",
+            "lab",
+            "metrics",
+            "node",
+            "node-host",
+            "reconstruction",
+            "render",
+            "table",
+            "wire",
+        ],
+    ),
+    ("cluster-tests", &["client", "cluster", "codec", "coordinator", "depth-image", "node", "node-host", "wire"]),
 ];
 
 /// What works on pictures in different ways knows nothing of each other, in tests neither.
@@ -62,6 +108,9 @@ const MESSAGES: [&str; 5] = ["prost", "prost-types", "prost-build", "tonic-prost
 
 /// What a thin client must not have in it.
 const DEVICE: [&str; 5] = ["wgpu", "wgpu-core", "wgpu-hal", "naga", "ash"];
+
+/// What a program without its lab must not have in it: measurements, and the charts of their reports.
+const LAB: [&str; 4] = ["lab", "plotters", "simulation", "study"];
 
 /// What a decision may not depend on.
 const IMPURE: [&str; 8] =
@@ -242,11 +291,38 @@ fn thin_clients_link_no_graphics() {
 }
 
 #[test]
+fn codecs_need_no_rpc_and_no_runtime() {
+    const RPC: [&str; 3] = ["prost", "tonic", "tokio"];
+    let uses = resolved();
+    let rpc_crates = |of: &str| RPC.into_iter().filter(|name| closure(of, &uses).contains(*name)).collect::<Vec<_>>();
+    assert!(closure("codec", &uses).contains("lz4_flex"), "the graph was read");
+    assert_eq!(rpc_crates("codec"), [""; 0]);
+    assert_eq!(rpc_crates("cluster"), [""; 0]);
+    assert_eq!(rpc_crates("wire"), RPC, "the check sees them where they are");
+}
+
+#[test]
 fn services_see_the_device_through_the_engine_only() {
     let uses = resolved();
     for name in ["node", "sampler-node", "compositor-node", "node-host", "coordinator"] {
         assert_eq!(device_crates(&closure(name, &uses)), Vec::<&str>::new(), "{name}");
     }
+}
+
+/// The packages of a program without its optional ones.
+fn thin_closure(of: &str, uses: &BTreeMap<String, BTreeSet<String>>) -> BTreeSet<String> {
+    let packages = graph().workspace_packages();
+    let program = packages.iter().find(|package| package.name.as_str() == of).expect("the program");
+    let kept = program.dependencies.iter().filter(|used| used.kind == DependencyKind::Normal && !used.optional);
+    kept.flat_map(|used| closure(&used.name, uses)).collect()
+}
+
+#[test]
+fn a_thin_program_measures_nothing() {
+    let uses = resolved();
+    let lab = |of: &BTreeSet<String>| LAB.into_iter().filter(|name| of.contains(*name)).collect::<Vec<_>>();
+    assert_eq!(lab(&thin_closure("myriorama", &uses)), Vec::<&str>::new());
+    assert_eq!(lab(&closure("myriorama", &uses)), LAB, "the check sees the lab where it is");
 }
 
 #[test]

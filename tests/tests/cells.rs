@@ -4,10 +4,10 @@
 use std::f32::consts::{PI, TAU};
 
 use client::{Frame, ViewRequest};
+use cluster::{PolicyChoice, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, request};
 use depth_image::{PinholeCamera, ProvenanceKind};
 use glam::{UVec2, Vec3};
-use wire::{PolicyChoice, SessionRequest, Timeline};
 
 const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
 

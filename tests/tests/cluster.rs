@@ -4,11 +4,11 @@
 use std::collections::HashSet;
 
 use client::Frame;
+use cluster::{Policy, PolicyChoice, Refinement, SceneHash, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, package, request, views};
 use cluster_tests::picture::fault_of;
 use depth_image::ProvenanceKind;
 use node::NodeConfig;
-use wire::{Policy, PolicyChoice, Refinement, SceneHash, SessionRequest, Timeline};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 

@@ -4,13 +4,14 @@
 use std::time::Duration;
 
 use client::{ClientError, Session};
+use cluster::{FetchImages, PolicyChoice, RenderViews, RequestedView, SceneHash, Timeline};
 use cluster_tests::cluster::{Cluster, request, rig, views};
+use codec::FrameCodec;
 use depth_image::Camera;
 use node::{Deadlines, NodeConfig};
 use tokio_stream::StreamExt as _;
 use tonic::Code;
 use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
-use wire::{FetchImages, FrameCodec, PolicyChoice, RenderViews, RequestedView, SceneHash, Timeline};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 
@@ -44,7 +45,7 @@ async fn old_plans_are_refused_everywhere() {
     let cluster = Cluster::start(2).await;
     let old = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
     // Of another workload: sessions of one share a plan.
-    let other = wire::SessionRequest { refinement_steps: 2, ..request(PolicyChoice::Pipeline, MOVING) };
+    let other = cluster::SessionRequest { refinement_steps: 2, ..request(PolicyChoice::Pipeline, MOVING) };
     let new = cluster.session(other).await.unwrap();
     let (old_plan, new_plan) = (&old.plan().assignment, &new.plan().assignment);
     assert!(new_plan.plan_epoch > old_plan.plan_epoch);
@@ -114,14 +115,14 @@ async fn bad_sessions_are_named() {
     };
     assert!(sampler.fetch_sample_images(fetch).await.err().unwrap().message().contains("image_indices: 77"));
     assert!(matches!(session.render_views(views(4, 1)), Err(ClientError::Invalid { field: "set_index", .. })));
-    let unknown = wire::SessionRequest { lighting: "moonlight".to_owned(), ..request(PolicyChoice::Auto, MOVING) };
+    let unknown = cluster::SessionRequest { lighting: "moonlight".to_owned(), ..request(PolicyChoice::Auto, MOVING) };
     let error = cluster.session(unknown).await.unwrap_err().to_string();
     assert!(error.contains("lighting: moonlight is unknown"), "{error}");
-    let patient = wire::SessionRequest { refinement_steps: 65, ..request(PolicyChoice::Auto, MOVING) };
+    let patient = cluster::SessionRequest { refinement_steps: 65, ..request(PolicyChoice::Auto, MOVING) };
     let error = cluster.session(patient).await.unwrap_err().to_string();
     assert!(error.contains("refinement_step_count is 65"), "{error}");
     let elsewhere =
-        wire::SessionRequest { scene: Some(SceneHash::of(b"other")), ..request(PolicyChoice::Auto, MOVING) };
+        cluster::SessionRequest { scene: Some(SceneHash::of(b"other")), ..request(PolicyChoice::Auto, MOVING) };
     assert!(cluster.session(elsewhere).await.unwrap_err().to_string().contains("scene_hash"));
 }
 

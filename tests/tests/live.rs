@@ -5,10 +5,10 @@ use std::collections::{BTreeSet, HashMap};
 use std::time::{Duration, Instant};
 
 use client::{Frame, Session, ViewRequest};
+use cluster::{PolicyChoice, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, camera, request, views};
 use glam::UVec2;
 use node::{Deadlines, NodeConfig};
-use wire::{PolicyChoice, SessionRequest, Timeline};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 const STILL: Timeline = Timeline { start_s: 0.0, step_s: 0.0, set_count: 1 };

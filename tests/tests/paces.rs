@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
 use client::{Session, ViewRequest};
+use cluster::{Assignment, PolicyChoice, SessionPlan, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, request, views};
 use cluster_tests::scalar_engine::Pace;
-use wire::{Assignment, PolicyChoice, SessionPlan, SessionRequest, Timeline};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 /// A better plan is in force after so long: it waits for three looks, and for the one before it to have lasted 5 s.
@@ -62,7 +62,7 @@ fn changes_of_role(from: &Assignment, to: &Assignment) -> usize {
 /// Asks for V views of each set, again and again, until K is right; what was asked for came, whole, all the time.
 async fn follow(session: &Session, views_per_set: u32, k: usize) -> SessionPlan {
     let before = session.plan();
-    session.change(views_per_set, 0.0).await.unwrap();
+    session.change(views_per_set, None).await.unwrap();
     let start = Instant::now();
     while session.plan().sampler_count() != k {
         let asked: Vec<ViewRequest> = views(MOVING.set_count, views_per_set);

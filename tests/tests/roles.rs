@@ -5,15 +5,13 @@ use std::num::NonZeroU32;
 use std::time::{Duration, Instant};
 
 use client::{ClientError, Frame};
+use cluster::{Assignment, FetchImages, Policy, PolicyChoice, RenderViews, RequestedView, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, camera, request, rig, views, whole_frame};
 use cluster_tests::scalar_engine::Pace;
+use codec::{FrameCodec, WholeFrame};
 use glam::UVec2;
 use tokio_stream::StreamExt as _;
 use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
-use wire::{
-    Assignment, FetchImages, FrameCodec, Policy, PolicyChoice, RenderViews, RequestedView, SessionRequest, Timeline,
-    WholeFrame,
-};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 
@@ -166,10 +164,10 @@ async fn what_was_not_begun_when_its_plan_ended_is_not_sampled() {
 async fn sessions_ask_for_more_and_less_and_nodes_say_what_they_did() {
     let cluster = Cluster::start(3).await;
     let session = cluster.session(pipeline()).await.unwrap();
-    session.change(500, 0.0).await.unwrap();
+    session.change(500, None).await.unwrap();
     let status = cluster.client.status().await.unwrap();
     assert_eq!(status.views_per_set, 500);
-    session.change(12, 0.0).await.unwrap();
+    session.change(12, None).await.unwrap();
     let (start, mut made) = (Instant::now(), 0);
     loop {
         made += session.render_views(views(3, 12)).unwrap().all().await.unwrap().len() as u64;
@@ -201,7 +199,8 @@ async fn what_nodes_cannot_do_is_refused_and_others_go_on() {
     let cluster = Cluster::start(2).await;
     let session = cluster.session(pipeline()).await.unwrap();
     let still = Timeline::still(0.0);
-    let greedy = SessionRequest { frames_per_s: 1000.0, views_per_set: 1 << 16, ..request(PolicyChoice::Auto, still) };
+    let greedy =
+        SessionRequest { frames_per_s: Some(1000.0), views_per_set: 1 << 16, ..request(PolicyChoice::Auto, still) };
     let refused = cluster.session(greedy).await.unwrap_err();
     let ClientError::Exhausted { reason } = &refused else { panic!("{refused:?}") };
     assert!(reason.contains("frames_per_s: all sessions together would take"), "{reason}");

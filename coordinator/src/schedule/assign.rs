@@ -1,6 +1,6 @@
 //! Whole images to samplers, whole views to compositors.
 
-use wire::{Assignment, CompositorShare, NodeStatus, Policy, SamplerShare, Workload};
+use cluster::{Assignment, CompositorShare, NodeStatus, Policy, SamplerShare, Workload};
 
 use super::deal::deal;
 use super::{Choice, Load, NodeCosts, relay_fanout};

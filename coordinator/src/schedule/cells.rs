@@ -1,9 +1,9 @@
 //! View cells: what is sampled follows from where sessions look.
 
+use cluster::Workload;
+use cluster::limits::MAX_CELLS;
 use depth_image::{Aabb, Camera, PinholeCamera, ViewGroup};
 use glam::UVec2;
-use wire::Workload;
-use wire::limits::MAX_CELLS;
 
 /// The cells of one workload. One that is still looked from stays as it is, whatever comes and goes elsewhere: what was
 /// sampled for it stays good.

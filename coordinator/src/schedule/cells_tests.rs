@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
+use cluster::limits::MAX_CELLS;
+use cluster::{Assignment, PolicyChoice};
 use depth_image::PinholeCamera;
-use wire::limits::MAX_CELLS;
-use wire::{Assignment, PolicyChoice, Workload};
 
 use super::test_support::{join, opening, view};
 use super::{ChoiceError, Command, Event, Opening, Scheduler};
@@ -33,7 +33,7 @@ fn cells(scheduler: &Scheduler) -> Vec<u32> {
 }
 
 /// What a sampler and a compositor know a cell's set by.
-fn contents(scheduler: &Scheduler) -> Vec<wire::SetContent> {
+fn contents(scheduler: &Scheduler) -> Vec<cluster::SetContent> {
     let plan = plan(scheduler);
     let of_cell = |cell| plan.of_cell(cell).and_then(|plan| plan.set_content(0)).expect("a set");
     (0..plan.workload.cell_count() as u32).map(of_cell).collect()
@@ -86,7 +86,7 @@ fn a_plan_of_cells_is_whole_and_so_is_each_cells() {
     let plan = plan(&scheduler);
     let workload = &plan.workload;
     assert!(workload.cell_count() > 8 && workload.cell_count() <= MAX_CELLS, "{}", workload.cell_count());
-    assert_eq!(Workload::from_bytes(&workload.to_bytes()).as_ref(), Ok(workload));
+    assert_eq!(wire::workload_from_bytes(&wire::workload_to_bytes(workload)).as_ref(), Ok(workload));
     let mut images = 0;
     for cell in 0..workload.cell_count() as u32 {
         let of_cell = plan.of_cell(cell).expect("a cell");

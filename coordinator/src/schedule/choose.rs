@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 
-use wire::{Policy, PolicyChoice};
+use cluster::{Policy, PolicyChoice};
 
 use super::reason::reason;
 use super::search::{Division, enumerate, first, improve, order, towards};
@@ -188,7 +188,7 @@ fn tile_counts(demand: &Demand<'_>) -> Vec<usize> {
 
 fn is_cut(demand: &Demand<'_>) -> bool {
     let mean = NodeCosts::mean(demand.nodes).costs;
-    !demand.load.in_order && mean.sample_overhead_s < mean.sample_image_s
+    !demand.load.in_order && mean.tiles.is_some()
 }
 
 /// With images cut as the load says.

@@ -1,4 +1,4 @@
-use wire::Costs;
+use cluster::Costs;
 
 use super::*;
 use crate::schedule::test_support::{COSTS, nodes};

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use wire::{Costs, MeasuredCosts, ROW_PARTS};
+use cluster::{Costs, MeasuredCosts, TileCosts};
 
 /// Reports without a timing after which it no longer counts: what the node does meanwhile says how slow it is.
 const RECENT: u32 = 30;
@@ -47,8 +47,11 @@ impl NodeCosts {
                 load_set_s: mean(|n| n.costs.load_set_s),
                 encode_view_s: mean(|n| n.costs.encode_view_s),
                 in_order: nodes.iter().any(|n| n.costs.in_order),
-                sample_overhead_s: mean(|n| n.costs.sample_overhead_s),
-                sample_row_shares: nodes.first().map_or_else(Default::default, |n| n.costs.sample_row_shares),
+                tiles: TileCosts::of_image(
+                    mean(|n| n.costs.sample_image_s),
+                    mean(|n| n.costs.tile_overhead_s()),
+                    nodes.first().and_then(|n| n.costs.tiles?.row_shares),
+                ),
             },
             transfer_image_s: mean(|n| n.transfer_image_s),
         }
@@ -61,7 +64,11 @@ impl NodeCosts {
         let mean = Self::mean(&nodes.iter().copied().filter(is_like_most).collect::<Vec<_>>()).costs;
         for node in nodes.iter_mut().filter(|node| is_like_most(node)) {
             node.costs.sample_image_s = mean.sample_image_s;
-            node.costs.sample_overhead_s = mean.sample_overhead_s;
+            node.costs.tiles = node
+                .costs
+                .tiles
+                .zip(mean.tiles)
+                .map(|(tiles, mean)| TileCosts { overhead_s: mean.overhead_s, ..tiles });
         }
     }
 
@@ -194,8 +201,7 @@ pub(super) struct Estimate {
     slowness: Smoothed,
     transfer_bytes_per_s: Smoothed,
     image_bytes: Smoothed,
-    sample_overhead_s: f64,
-    sample_row_shares: [f64; ROW_PARTS],
+    tiles: Option<TileCosts>,
     in_order: bool,
     /// Whether the last images were tiles.
     is_cut: bool,
@@ -217,8 +223,7 @@ impl Estimate {
             reconstruct_view: Operation::starting_at(costs.reconstruct_view_s),
             load_set: Operation::starting_at(costs.load_set_s),
             encode_view: Operation::starting_at(costs.encode_view_s),
-            sample_overhead_s: costs.sample_overhead_s,
-            sample_row_shares: costs.sample_row_shares,
+            tiles: costs.tiles,
             in_order: costs.in_order,
             ..Self::default()
         }
@@ -260,12 +265,7 @@ impl Estimate {
 
     /// What is known of sampling from when the session was opened.
     fn alone(&self) -> Costs {
-        Costs {
-            sample_image_s: self.sample_image.alone_s,
-            sample_overhead_s: self.sample_overhead_s,
-            sample_row_shares: self.sample_row_shares,
-            ..Costs::default()
-        }
+        Costs { sample_image_s: self.sample_image.alone_s, tiles: self.tiles, ..Costs::default() }
     }
 
     /// Other work is done from here on: the next timings count at once.
@@ -309,8 +309,7 @@ impl Estimate {
             load_set_s: now_s(3),
             encode_view_s: now_s(4),
             in_order: self.in_order,
-            sample_overhead_s: self.overhead_s(now_s(0)),
-            sample_row_shares: self.sample_row_shares,
+            tiles: self.tiles_at(now_s(0)),
         };
         let image_bytes = self.image_bytes.or_zero();
         let transfer_image_s = self.transfer_bytes_per_s.value.map_or(0.0, |rate| image_bytes / rate);
@@ -328,10 +327,11 @@ impl Estimate {
         geometric_mean(ratios).unwrap_or(1.0)
     }
 
-    /// Grows with the cost of an image.
-    fn overhead_s(&self, sample_image_s: f64) -> f64 {
+    /// A tile's overhead grows with the cost of an image.
+    fn tiles_at(&self, sample_image_s: f64) -> Option<TileCosts> {
         let ratio = sample_image_s / self.sample_image.alone_s;
-        self.sample_overhead_s * if ratio.is_finite() { ratio } else { 1.0 }
+        let ratio = if ratio.is_finite() { ratio } else { 1.0 };
+        self.tiles.map(|tiles| TileCosts { overhead_s: tiles.overhead_s * ratio, ..tiles })
     }
 }
 

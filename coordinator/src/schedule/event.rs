@@ -2,8 +2,8 @@
 
 use std::fmt;
 
+use cluster::{Costs, JoinCluster, MeasuredCosts, PolicyChoice, Quality, SessionPlan, Workload};
 use depth_image::PinholeCamera;
-use wire::{Costs, JoinCluster, MeasuredCosts, PolicyChoice, Quality, SessionPlan, Workload};
 
 use super::ChoiceError;
 

@@ -30,8 +30,8 @@ pub(super) mod option {
 /// The same of several.
 pub(super) mod array {
     use super::{Deserialize, Deserializer, Serialize, Serializer};
+    use cluster::ROW_PARTS;
     use serde::de::Error as _;
-    use wire::ROW_PARTS;
 
     pub(in super::super) fn serialize<S: Serializer>(
         values: &[f64; ROW_PARTS],

@@ -1,4 +1,4 @@
-use wire::PolicyChoice;
+use cluster::PolicyChoice;
 
 use super::*;
 use crate::schedule::MeasuredCosts;

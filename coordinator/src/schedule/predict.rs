@@ -4,7 +4,7 @@
 
 use std::num::NonZeroU32;
 
-use wire::Policy;
+use cluster::Policy;
 
 use super::NodeCosts;
 use super::deal::{Worker, deal, finish_s};
@@ -203,7 +203,7 @@ fn views_s(load: &Load, compositors: &[NodeCosts]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use wire::Costs;
+    use cluster::{Costs, TileCosts};
 
     use super::*;
     use crate::schedule::test_support::{COSTS, nodes};
@@ -248,7 +248,10 @@ mod tests {
 
     #[test]
     fn tiles_share_what_whole_images_cannot() {
-        let node = NodeCosts { costs: Costs { sample_overhead_s: 0.02, ..COSTS }, transfer_image_s: 0.0 };
+        let node = NodeCosts {
+            costs: Costs { tiles: Some(TileCosts { overhead_s: 0.02, row_shares: None }), ..COSTS },
+            transfer_image_s: 0.0,
+        };
         let (load, nodes) = (Load { views: 1, ..LOAD }, [node; 12]);
         assert!(close(pipeline_s(&load, &nodes, &first(8, 12)), 0.1), "four of eight have nothing to do");
         assert!(close(pipeline_s(&load.cut(2), &nodes, &first(8, 12)), 0.06), "0.02 + 0.08 / 2 each");

@@ -1,6 +1,6 @@
 //! Why a policy and a K were chosen, in plain words.
 
-use wire::{Policy, PolicyChoice};
+use cluster::{Policy, PolicyChoice};
 
 use super::choose::{Demand, Predicted};
 use super::{Load, NodeCosts};

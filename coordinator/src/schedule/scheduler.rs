@@ -5,10 +5,10 @@ mod admission;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use depth_image::{Camera, PinholeCamera};
-use wire::{
+use cluster::{
     Assignment, ClusterStatus, Costs, JoinCluster, MeasuredCosts, NodeCondition, NodeStatus, Policy, SessionPlan,
 };
+use depth_image::{Camera, PinholeCamera};
 
 use super::assign::assignment;
 use super::choose::{Demand, Present, WORTH, step_from};
@@ -118,7 +118,7 @@ impl Scheduler {
             views_per_set: work.map_or(0, |work| work.views() as u64),
             conditions: work.map_or_else(Vec::new, |_| self.conditions()),
             achieved: work.map_or_else(Vec::new, |work| work.achieved.clone()),
-            utilisation: self.utilisation().unwrap_or(0.0),
+            utilisation: self.utilisation().filter(|&utilisation| utilisation > 0.0),
         }
     }
 
@@ -419,7 +419,8 @@ impl Scheduler {
         let slowest = crew.iter().fold(Costs::default(), |slowest, (_, node)| slowest.max(node.costs));
         let anew = if work.in_force.is_some() { format!(" Planned anew: {why}.") } else { String::new() };
         let mut plan = session_plan(assignment, slowest, choice, format!("{}{anew}", choice.reason));
-        (plan.fallback_number, plan.frame_rate_ratio) = (work.overload.step as u32, work.frame_rate_ratio());
+        plan.fallback_index = work.overload.step.checked_sub(1).map(|index| index as u32);
+        plan.frame_rate_ratio = work.frame_rate_ratio();
         self.enforce(InForce::new(plan, members, self.now))
     }
 
@@ -466,7 +467,7 @@ fn session_plan(assignment: Assignment, costs: Costs, choice: &Choice, reason: S
         enumerated_sampler_count: predicted.enumerated as u32,
         predicted_enumerated_s: predicted.enumerated_s,
         scene_load_s: 0.0,
-        fallback_number: 0,
+        fallback_index: None,
         frame_rate_ratio: 1.0,
     }
 }

@@ -1,4 +1,4 @@
-use wire::{PolicyChoice, Quality};
+use cluster::{PolicyChoice, Quality, TileCosts};
 
 use super::*;
 use crate::schedule::ChoiceError;
@@ -291,7 +291,7 @@ fn a_still_scene_that_is_looked_at_is_sampled_once_and_all_make_views() {
     let commands = cluster.step(rated(1, 100.0, Vec::new()));
     let plan = assignment_of(&commands);
     assert_eq!((plan.policy, plan.compositors.len()), (Policy::TimeShare, 5), "{}", applied(&commands).1.reason);
-    let utilisation = cluster.scheduler.status().utilisation;
+    let utilisation = cluster.scheduler.status().utilisation.unwrap();
     assert!((utilisation - 0.2).abs() < 1e-9, "100 views of 10 ms by 5 nodes: {utilisation}");
 }
 
@@ -336,18 +336,18 @@ fn overload_goes_down_the_fallbacks_and_every_plan_says_so() {
         cluster.now += Duration::from_millis(500);
         let commands = cluster.step(Event::Tick);
         seen.extend(commands.iter().filter_map(|command| match command {
-            Command::Apply { plan, .. } => Some(plan.fallback_number),
+            Command::Apply { plan, .. } => Some(plan.fallback_index),
             _ => None,
         }));
     }
-    assert_eq!(seen, [1, 2], "1.125 of their time at 180, 0.9 at 144");
+    assert_eq!(seen, [Some(0), Some(1)], "1.125 of their time at 180, 0.9 at 144");
     let plan = cluster.plan();
     assert_eq!(plan.workload.method, "joint_carve:2");
     let Camera::Pinhole(camera) = plan.workload.sample_cameras[0];
     assert_eq!(camera.size_px.x, 4, "half of 8");
     cluster.step(Event::Demanded { session: 1, views_per_set: 1, frames_per_s: 20.0 });
-    let plans: Vec<u32> = (0..2).map(|_| applied(&cluster.wait(60)).1.fallback_number).collect();
-    assert_eq!(plans, [1, 0], "with less to do they get all again");
+    let plans: Vec<Option<u32>> = (0..2).map(|_| applied(&cluster.wait(60)).1.fallback_index).collect();
+    assert_eq!(plans, [Some(0), None], "with less to do they get all again");
     assert_eq!(cluster.plan().workload.method, "joint_carve");
 }
 
@@ -376,7 +376,7 @@ fn what_a_set_took_is_the_time_of_the_busiest_node() {
 #[test]
 fn heavy_images_are_cut_so_that_more_nodes_sample_them() {
     let mut cluster = Cluster::of(11);
-    let costs = Costs { sample_image_s: 10.0, sample_overhead_s: 0.05, ..COSTS };
+    let costs = Costs { sample_image_s: 10.0, tiles: Some(TileCosts { overhead_s: 0.05, row_shares: None }), ..COSTS };
     let commands = cluster.step(Event::Opened(Box::new(Opening { costs, ..opening(1, PIPELINE, 1000) })));
     let (plan, session) = (assignment_of(&commands), applied(&commands).1);
     assert!(plan.tile_count > 1 && plan.samplers.len() > 4, "{}", session.reason);

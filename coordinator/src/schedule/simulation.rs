@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use wire::{Assignment, Costs, PolicyChoice, SessionPlan};
+use cluster::{Assignment, Costs, PolicyChoice, SessionPlan};
 
 use super::search::{first, order};
 use super::test_support::{COSTS, Random, join, opened, opening, workload};
@@ -298,7 +298,7 @@ impl World {
         let mut images: Vec<u32> = plan.samplers.iter().flat_map(|s| s.image_indices.clone()).collect();
         images.sort_unstable();
         let all = 0..plan.image_count() as u32;
-        assert_eq!(images, if plan.policy == wire::Policy::Direct { vec![] } else { all.collect::<Vec<_>>() });
+        assert_eq!(images, if plan.policy == cluster::Policy::Direct { vec![] } else { all.collect::<Vec<_>>() });
     }
 
     /// While there are nodes and sessions there is a plan, at once, and of nodes that are there.

@@ -1,8 +1,8 @@
 //! What tests of several files share: numbers from a seed, costs, and events.
 
+use cluster::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, TileCosts, Timeline, Workload};
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
-use wire::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, Timeline, Workload};
 
 use super::{Event, NodeCosts, Opening};
 
@@ -40,16 +40,13 @@ pub(super) const COSTS: Costs = Costs {
     load_set_s: 0.005,
     encode_view_s: 0.001,
     in_order: false,
-    // A tile costs as much as the image: none is cut.
-    sample_overhead_s: 1e3,
-    sample_row_shares: [0.25; 4],
+    tiles: None,
 };
 
 /// Light that is dear, on images whose upper half shows the sky.
 pub(super) const DEAR: Costs = Costs {
     sample_image_s: 5.0,
-    sample_overhead_s: 0.5,
-    sample_row_shares: [0.05, 0.15, 0.4, 0.4],
+    tiles: Some(TileCosts { overhead_s: 0.5, row_shares: Some([0.05, 0.15, 0.4, 0.4]) }),
     reconstruct_view_s: 0.114,
     load_set_s: 0.19,
     ..COSTS

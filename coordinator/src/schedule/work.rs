@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use cluster::{AchievedTime, Assignment, Costs, Policy, Quality, SessionPlan, Workload};
 use depth_image::{Camera, PinholeCamera};
 use glam::UVec2;
-use wire::{AchievedTime, Assignment, Costs, Policy, Quality, SessionPlan, Workload};
 
 use super::cells::Cells;
 use super::overload::Overload;

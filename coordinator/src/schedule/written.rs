@@ -1,11 +1,11 @@
 //! Events as a log has them, and back; values that no event has are named.
 
+use cluster::limits::{MAX_FRAMES_PER_S, MAX_TEXT_BYTES, MAX_TILES, MAX_VIEWPOINTS, MAX_VIEWS_PER_SET};
+use cluster::{
+    Costs, JoinCluster, MeasuredCosts, NodeStatus, PolicyChoice, Quality, ROW_PARTS, TileCosts, UnknownPolicy,
+};
 use depth_image::PinholeCamera;
 use serde::{Deserialize, Serialize};
-use wire::limits::{MAX_FRAMES_PER_S, MAX_TEXT_BYTES, MAX_TILES, MAX_VIEWPOINTS, MAX_VIEWS_PER_SET};
-use wire::{
-    Costs, JoinCluster, MeasuredCosts, NodeStatus, PolicyChoice, Quality, ROW_PARTS, UnknownPolicy, WireError, Workload,
-};
 
 use super::{Event, Opening};
 
@@ -13,12 +13,6 @@ use super::{Event, Opening};
 pub(super) struct Wrong {
     pub(super) field: &'static str,
     pub(super) reason: String,
-}
-
-impl From<WireError> for Wrong {
-    fn from(error: WireError) -> Self {
-        Self { field: "workload", reason: error.to_string() }
-    }
 }
 
 impl From<UnknownPolicy> for Wrong {
@@ -178,7 +172,7 @@ impl Written {
             forced_tiles: opening.forced_tiles,
             fallbacks: opening.fallbacks.into_iter().map(Into::into).collect(),
             costs: opening.costs.into(),
-            workload: hex(&opening.workload.to_bytes()),
+            workload: hex(&wire::workload_to_bytes(&opening.workload)),
             viewpoints: opening.viewpoints,
         }
     }
@@ -203,7 +197,8 @@ impl Written {
                 viewpoints,
             } => Event::Opened(Box::new(Opening {
                 session,
-                workload: Workload::from_bytes(&bytes(&workload)?)?,
+                workload: wire::workload_from_bytes(&bytes(&workload)?)
+                    .map_err(|reason| Wrong { field: "workload", reason })?,
                 views_per_set: views(views_per_set)?,
                 frames_per_s: rate(frames_per_s)?,
                 policy: policy.parse::<PolicyChoice>()?,
@@ -333,14 +328,16 @@ impl From<Costs> for WrittenCosts {
             load_set_s: c.load_set_s,
             encode_view_s: c.encode_view_s,
             in_order: c.in_order,
-            sample_overhead_s: c.sample_overhead_s,
-            sample_row_shares: c.sample_row_shares,
+            sample_overhead_s: c.tile_overhead_s(),
+            sample_row_shares: c.tiles.and_then(|tiles| tiles.row_shares).unwrap_or_default(),
         }
     }
 }
 
 impl WrittenCosts {
     fn read(self) -> Result<Costs, Wrong> {
+        let shares = row_shares(self.sample_row_shares)?;
+        let overhead_s = seconds(self.sample_overhead_s, "sample_overhead_s")?;
         Ok(Costs {
             sample_image_s: seconds(self.sample_image_s, "sample_image_s")?,
             direct_view_s: seconds(self.direct_view_s, "direct_view_s")?,
@@ -348,8 +345,11 @@ impl WrittenCosts {
             load_set_s: seconds(self.load_set_s, "load_set_s")?,
             encode_view_s: seconds(self.encode_view_s, "encode_view_s")?,
             in_order: self.in_order,
-            sample_overhead_s: seconds(self.sample_overhead_s, "sample_overhead_s")?,
-            sample_row_shares: row_shares(self.sample_row_shares)?,
+            tiles: TileCosts::of_image(
+                self.sample_image_s,
+                overhead_s,
+                shares.iter().any(|&share| share > 0.0).then_some(shares),
+            ),
         })
     }
 }

@@ -15,7 +15,7 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box that holds nothing; growing it by a point gives that point.
+    /// The box without points; `grown_to` makes it the box of one point.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
     /// The smallest box around `points`.
@@ -24,7 +24,7 @@ impl Aabb {
         points.into_iter().fold(Self::EMPTY, Self::grown_to)
     }
 
-    /// This box and `point`.
+    /// The smallest box around this box and `point`.
     #[must_use]
     pub fn grown_to(self, point: Vec3) -> Self {
         Self { min: self.min.min(point), max: self.max.max(point) }
@@ -36,13 +36,13 @@ impl Aabb {
         Self { min: self.min - margin_m, max: self.max + margin_m }
     }
 
-    /// Whether it holds no point.
+    /// Returns whether the box holds no point.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.min.cmpgt(self.max).any()
     }
 
-    /// Its middle.
+    /// Middle of the box.
     #[must_use]
     pub fn center(&self) -> Vec3 {
         (self.min + self.max) * 0.5
@@ -66,8 +66,8 @@ impl Aabb {
         })
     }
 
-    /// The ray's parameters where it enters and leaves; `None` where it misses. The entry may be
-    /// negative: the origin is then inside or beyond.
+    /// The ray's parameters at entry and exit; `None` where it misses. The entry may be negative: the origin
+    /// is then inside or beyond.
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<(f32, f32)> {
         let inverse = ray.direction_in_world.recip();

@@ -1,4 +1,4 @@
-//! Camera models: a closed set. Whatever cannot be done for every pixel or point says so in its type.
+//! Camera models: a closed set. An operation that some pixels or points lack returns an `Option`.
 
 use glam::{Affine3A, Mat3A, Quat, UVec2, Vec2, Vec3, Vec3A, Vec4};
 use serde::{Deserialize, Serialize};
@@ -8,10 +8,9 @@ pub const MAX_IMAGE_SIDE_PX: u32 = 16_384;
 
 /// A half-line: `origin + t · direction`, `t >= 0`. The direction need not have unit length.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub struct Ray {
-    /// Where it starts.
     pub origin_in_world: Vec3,
-    /// Where it goes.
     pub direction_in_world: Vec3,
 }
 
@@ -23,7 +22,7 @@ impl Ray {
     }
 }
 
-/// A position in an image and the depth of what is there.
+/// A position in an image and the depth there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PixelDepth {
     /// Columns to the right, rows down; pixel centres at +0.5.
@@ -32,7 +31,7 @@ pub struct PixelDepth {
     pub planar_depth_m: f32,
 }
 
-/// How an image maps to rays.
+/// The map from an image to rays.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Camera {
     /// Straight rays through one eye, with lens shift.
@@ -40,7 +39,7 @@ pub enum Camera {
 }
 
 impl Camera {
-    /// Where a point is seen; `None` behind the eye.
+    /// The position and depth of a point; `None` behind the eye.
     #[must_use]
     pub fn project(&self, point_in_world: Vec3) -> Option<PixelDepth> {
         match self {
@@ -68,44 +67,33 @@ impl Camera {
 /// A pinhole camera; the principal point may lie anywhere (lens shift).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PinholeCamera {
-    /// The eye.
+    /// The centre of projection, metres.
     pub eye_in_world: Vec3,
-    /// Camera to world: looking down -Z, +Y up. Unit length.
+    /// Camera to world, a unit quaternion. The camera looks down -Z, +Y up.
     pub world_from_camera: Quat,
     /// Focal lengths in pixels, both positive.
     pub focal_px: Vec2,
-    /// Where the forward axis meets the image, in pixels.
+    /// The intersection of the forward axis with the image, in pixels.
     pub principal_px: Vec2,
     /// Columns and rows.
     pub size_px: UVec2,
-    /// What is closer is not seen, metres.
+    /// Closer surfaces are invisible, metres of planar depth.
     pub near_m: f32,
 }
 
-/// Why a camera cannot be used.
+/// An unusable camera.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum CameraError {
-    /// NaN or infinite.
     #[error("camera {field} is not finite")]
-    NotFinite {
-        /// Which.
-        field: &'static str,
-    },
-    /// Outside what the field allows.
+    NotFinite { field: &'static str },
     #[error("camera {field} is {value}, must be {allowed}")]
-    OutOfRange {
-        /// Which.
-        field: &'static str,
-        /// What was given.
-        value: f64,
-        /// What would be right.
-        allowed: &'static str,
-    },
+    OutOfRange { field: &'static str, value: f64, allowed: &'static str },
 }
 
 impl PinholeCamera {
-    /// A camera at `eye` that looks at `target`, with square pixels and a centred axis. `up` is used as
-    /// far as it is not parallel to the view.
+    /// A camera at `eye` aimed at `target`, with square pixels and a centred axis. Only the part of `up` that is
+    /// perpendicular to the view counts.
     #[must_use]
     pub fn looking_at(eye: Vec3, target: Vec3, up: Vec3, fov_y_rad: f32, size_px: UVec2) -> Self {
         let back = (eye - target).try_normalize().unwrap_or(Vec3::Z);
@@ -125,7 +113,7 @@ impl PinholeCamera {
     /// Checks every field.
     ///
     /// # Errors
-    /// Names the field that is not finite or out of range.
+    /// The first field that is not finite or out of range.
     pub fn validate(&self) -> Result<(), CameraError> {
         let finite = [
             ("eye_in_world", self.eye_in_world.is_finite()),
@@ -166,7 +154,7 @@ impl PinholeCamera {
         Self { size_px, focal_px: self.focal_px * scale, principal_px: self.principal_px * scale, ..*self }
     }
 
-    /// Pixels in the image.
+    /// Number of pixels.
     #[must_use]
     pub fn pixel_count(&self) -> usize {
         self.size_px.x as usize * self.size_px.y as usize
@@ -184,8 +172,8 @@ impl PinholeCamera {
         self.world_from_camera * Vec3::NEG_Z
     }
 
-    /// Three rows that take `(point_in_world, 1)` to homogeneous pixels `(column · w, row · w, w)`, `w`
-    /// being the planar depth in metres.
+    /// Three rows that map `(point_in_world, 1)` to homogeneous pixels `(column · w, row · w, w)`, where `w`
+    /// is the planar depth in metres.
     #[must_use]
     pub fn homogeneous_pixel_from_world(&self) -> [Vec4; 3] {
         let right = self.world_from_camera * Vec3::X;
@@ -200,7 +188,7 @@ impl PinholeCamera {
         ]
     }
 
-    /// Where a point is seen, inside the image or not; `None` at or behind the eye.
+    /// The position, inside the image or not, and depth of a point; `None` at or behind the eye.
     #[must_use]
     pub fn project(&self, point_in_world: Vec3) -> Option<PixelDepth> {
         let in_camera = self.world_from_camera.conjugate() * (point_in_world - self.eye_in_world);
@@ -211,7 +199,7 @@ impl PinholeCamera {
         })
     }
 
-    /// The point at a position and depth.
+    /// The point at a position and depth, in world space.
     #[must_use]
     pub fn unproject(&self, at: PixelDepth) -> Vec3 {
         self.ray(at.pixel).at(at.planar_depth_m)
@@ -225,7 +213,7 @@ impl PinholeCamera {
         Ray { origin_in_world: self.eye_in_world, direction_in_world: direction.into() }
     }
 
-    /// Whether a position lies inside the image.
+    /// Returns whether a position lies inside the image.
     #[must_use]
     pub fn contains(&self, pixel: Vec2) -> bool {
         pixel.cmpge(Vec2::ZERO).all() && pixel.cmplt(self.size_px.as_vec2()).all()
@@ -271,14 +259,14 @@ mod tests {
     }
 
     #[test]
-    fn behind_the_eye_is_nowhere() {
+    fn a_point_behind_the_eye_has_no_pixel() {
         let camera = shifted();
         assert_eq!(camera.project(camera.eye_in_world - camera.forward_in_world()), None);
         assert_eq!(camera.project(camera.eye_in_world), None);
     }
 
     #[test]
-    fn bad_cameras_are_named() {
+    fn an_invalid_camera_is_refused_with_its_field() {
         let good = shifted();
         good.validate().expect("good");
         let bad = [

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 /// Shared-exponent linear RGB, the layout of `VK_FORMAT_E5B9G9R9_UFLOAT_PACK32`. Negative and NaN
-/// become 0; more than 65,408 is clamped.
+/// become 0; larger values are clamped to 65,408.
 #[must_use]
 pub fn rgb9e5_from_linear(linear: Vec3) -> u32 {
     const MAX: f32 = 65_408.0;

@@ -1,7 +1,7 @@
-//! Light that depends on the viewer. The scalar reference of highlight.wgsl.
+//! View-dependent light: the scalar reference of highlight.wgsl.
 //!
-//! Intensities are those of light.rs: the reflectance's 1/π is part of the unit, so that what a
-//! distribution function has below its fraction line is not there.
+//! Intensities are those of light.rs: the reflectance's 1/π is part of the unit. Distribution functions are
+//! therefore without the π of their denominator.
 
 use std::f32::consts::PI;
 
@@ -9,22 +9,22 @@ use glam::{Vec3, Vec4};
 
 use crate::{Environment, Illumination, Incident, Light, linear_from_srgb8, srgb8_from_linear};
 
-/// How surfaces reflect.
+/// The reflection model of surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Highlight {
     /// Blinn-Phong: the reflectance is its strength, the roughness gives its exponent. Lamps only.
     BlinnPhong,
-    /// Microfacets of Trowbridge-Reitz (GGX), of lamps and the environment.
+    /// Microfacets of Trowbridge-Reitz (GGX), for lamps and the environment.
     #[default]
     Ggx,
 }
 
-/// A surface that has a highlight.
+/// The highlight parameters of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reflector {
-    /// At normal incidence, linear RGB from 0 to 1.
+    /// Reflectance at normal incidence, linear RGB from 0 to 1.
     pub reflectance_linear: Vec3,
-    /// Perceptual: the square root of the microfacets' alpha, from 0 to 1.
+    /// Perceptual roughness: the square root of the microfacets' alpha, from 0 to 1.
     pub roughness: f32,
 }
 
@@ -37,15 +37,15 @@ struct Mirror {
     reflector: Reflector,
 }
 
-/// Smoother than this counts as this: the peak of a highlight stays finite. A lamp of no extent has a peak of
-/// at most 1/(4 · 0.045⁴), some 60,000.
+/// Lower bound of the roughness, which keeps the peak of a highlight finite. A lamp without extent has a peak of at
+/// most 1/(4 · 0.045⁴), some 60,000.
 const LEAST_ROUGHNESS: f32 = 0.045;
 const LEAST_COSINE: f32 = 1e-4;
-/// Of Blinn-Phong lobes.
+/// Range of the exponents of Blinn-Phong lobes.
 const EXPONENTS: [f32; 2] = [1.0, 1024.0];
 
 impl Reflector {
-    /// As in [`crate::SpecularPlanes::reflectance_srgb8_roughness8`]; 0 for what reflects nothing.
+    /// The word of [`crate::SpecularPlanes::reflectance_srgb8_roughness8`]; 0 without reflectance.
     #[must_use]
     pub fn pack(self) -> u32 {
         let [r, g, b] = self.reflectance_linear.to_array().map(srgb8_from_linear);
@@ -81,8 +81,8 @@ impl Reflector {
     }
 }
 
-/// What a surface adds for one eye to the light that it reflects alike to all sides. `visibility` gives the
-/// share of the environment (0) and of the i-th light (1 + i) that arrives; the two directions are unit vectors.
+/// The view-dependent light of a surface for one eye, beside its diffuse light. `visibility` gives the arriving share
+/// of the environment (0) and of the i-th light (1 + i). The two directions are unit vectors.
 #[must_use]
 pub fn highlight_linear(
     kind: Highlight,
@@ -103,7 +103,7 @@ pub fn highlight_linear(
 }
 
 impl Mirror {
-    /// With nothing in between.
+    /// The highlight of an unoccluded lamp.
     fn lamp(&self, kind: Highlight, light: &Light) -> Vec3 {
         let incident = light.from_middle(self.point_in_world);
         let half_way = (incident.towards_light_in_world + self.towards_eye_in_world).normalize_or_zero();
@@ -111,7 +111,7 @@ impl Mirror {
         let reflected = match kind {
             Highlight::BlinnPhong => self.blinn_phong(half_way),
             Highlight::Ggx => {
-                // A light with an extent is as good as a rougher surface (Karis 2013).
+                // The extent of a light acts as additional roughness (Karis 2013).
                 let alpha = (self.reflector.alpha() + 0.5 * apparent_radius(light, &incident)).min(1.0);
                 self.ggx(half_way, n_l, alpha)
             }
@@ -124,14 +124,14 @@ impl Mirror {
         self.reflector.reflectance_linear * lobe
     }
 
-    /// The distribution function, times π.
+    /// The reflected share, times π.
     fn ggx(&self, half_way: Vec3, n_l: f32, alpha: f32) -> Vec3 {
         let n_v = self.normal_in_world.dot(self.towards_eye_in_world).max(LEAST_COSINE);
         let lobe = ggx_distribution(self.normal_in_world, half_way, alpha) * ggx_visibility(n_l, n_v, alpha);
         schlick(self.reflector.reflectance_linear, self.towards_eye_in_world.dot(half_way).max(0.0)) * lobe
     }
 
-    /// With nothing in between: split sum, with Karis' fit for the surface's part
+    /// The highlight of the unoccluded environment: split sum, with Karis' fit for the surface's part
     /// ("Physically Based Shading on Mobile", 2014).
     fn environment(&self, environment: &Environment) -> Vec3 {
         let n_v = self.normal_in_world.dot(self.towards_eye_in_world).clamp(0.0, 1.0);
@@ -144,14 +144,14 @@ impl Mirror {
     }
 }
 
-/// How much of the environment's gradient a rough surface's lobe still sees, of its mean over the lobe: 2/3 for
-/// the roughest, as for white paint. Within 0.03 of the integral.
+/// The share of the environment's gradient that remains after averaging over a rough surface's lobe. It is 2/3 for
+/// the roughest, as for white paint, and within 0.03 of the integral.
 fn contrast(roughness: f32) -> f32 {
     let alpha = roughness * roughness;
     1.0 - alpha * (0.5 - alpha / 6.0)
 }
 
-/// The tangent of half the angle that the light is seen under, as if it were round.
+/// The tangent of half the angular diameter of a light, as if it were round.
 fn apparent_radius(light: &Light, incident: &Incident) -> f32 {
     match *light {
         Light::Directional { angular_radius_rad, .. } => angular_radius_rad.tan(),
@@ -163,8 +163,7 @@ fn apparent_radius(light: &Light, incident: &Incident) -> f32 {
     }
 }
 
-/// Trowbridge-Reitz, times π. From the sine, which is exact where the cosine is 1 but for its last bits. Nothing
-/// where there is no half-way.
+/// Trowbridge-Reitz, times π; 0 for a zero half-way vector. The sine keeps precision where the cosine is almost 1.
 fn ggx_distribution(normal: Vec3, half_way: Vec3, alpha: f32) -> f32 {
     let (cosine, squared) = (normal.dot(half_way).max(0.0), alpha * alpha);
     let spread = (normal.cross(half_way).length_squared() + cosine * cosine * squared).max(squared);
@@ -198,7 +197,7 @@ mod tests {
         Vec3::new(angle_rad.sin() * around_rad.cos(), angle_rad.cos(), angle_rad.sin() * around_rad.sin())
     }
 
-    /// Of a level surface under parallel light of irradiance 1, red.
+    /// The red light of a level surface under parallel light of irradiance 1.
     fn reflected(kind: Highlight, reflector: &Reflector, towards_light: Vec3, towards_eye: Vec3) -> f32 {
         let sun = Light::Directional {
             towards_light_in_world: towards_light,
@@ -209,7 +208,7 @@ mod tests {
         highlight_linear(kind, &illumination, &|_| 1.0, Vec3::ZERO, Vec3::Y, towards_eye, reflector).x
     }
 
-    /// Directions over the upper hemisphere with their solid angles, densest straight up.
+    /// Directions over the upper hemisphere with their solid angles, densest at the zenith.
     fn hemisphere() -> impl Iterator<Item = (Vec3, f32)> {
         const RINGS: usize = 600;
         const SPOKES: usize = 600;
@@ -222,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn words_round_trip_and_black_is_no_reflector() {
+    fn a_reflector_round_trips_and_black_packs_to_zero() {
         assert_eq!(Reflector::unpack(0), None);
         let black = Reflector { reflectance_linear: Vec3::ZERO, roughness: 0.5 };
         assert_eq!(black.pack(), 0);
@@ -249,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn blinn_phong_is_its_closed_form() {
+    fn blinn_phong_equals_its_closed_form() {
         let (towards_light, towards_eye) = (tilted(0.5, 0.3), tilted(0.7, 2.9));
         let reflector = Reflector { reflectance_linear: Vec3::splat(0.4), roughness: 0.5 };
         let half_way = (towards_light + towards_eye).normalize_or_zero();
@@ -259,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn every_microfacet_is_counted_once() {
+    fn the_microfacet_distribution_integrates_to_one() {
         for roughness in POLISHED_TO_ROUGH {
             let alpha = white(roughness).alpha();
             let sum: f64 =
@@ -269,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_is_reflected_than_arrives() {
+    fn a_lobe_reflects_at_most_the_arriving_light() {
         for roughness in POLISHED_TO_ROUGH.into_iter().skip(1) {
             for tilt in TILTS_RAD {
                 let eye = tilted(tilt, 0.0);
@@ -284,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn the_environment_gives_no_more_than_arrives() {
+    fn the_environment_reflects_at_most_its_light() {
         let illumination = Illumination { lights: vec![], environment: Environment::uniform(Vec3::ONE) };
         for roughness in POLISHED_TO_ROUGH {
             for tilt in TILTS_RAD {
@@ -307,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gradient_under_a_lobe_is_about_its_integral() {
+    fn the_contrast_is_within_a_bound_of_the_integral() {
         for roughness in [0.2f32, 0.4, 0.6, 0.8, 1.0] {
             let alpha = roughness * roughness;
             let (mut sum, mut weights) = (0.0f64, 0.0f64);
@@ -323,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn light_and_eye_may_change_places() {
+    fn ggx_is_reciprocal() {
         for roughness in POLISHED_TO_ROUGH {
             let (a, b) = (tilted(0.4, 0.2), tilted(1.1, 2.0));
             let there = reflected(Highlight::Ggx, &white(roughness), a, b) / a.y;
@@ -333,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mirrors_direction_is_the_brightest() {
+    fn the_mirror_direction_is_the_brightest() {
         for kind in [Highlight::BlinnPhong, Highlight::Ggx] {
             let sun = tilted(0.5, 0.0);
             let at = |tilt: f32| reflected(kind, &white(0.3), sun, tilted(tilt, PI));
@@ -345,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn smoother_is_brighter_and_never_infinite() {
+    fn the_peak_rises_with_smoothness_and_stays_finite() {
         let sun = tilted(0.5, 0.0);
         let peaks: Vec<f32> =
             (0..=100).map(|i| reflected(Highlight::Ggx, &white(1.0 - i as f32 * 0.01), sun, tilted(0.5, PI))).collect();
@@ -355,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn an_extent_is_seen_as_roughness() {
+    fn a_lamps_extent_widens_its_highlight() {
         let lamp = |radius_m| Light::Point { position_in_world: Vec3::Y * 2.0, intensity_linear: Vec3::ONE, radius_m };
         let at = |radius_m, eye| {
             let illumination = Illumination { lights: vec![lamp(radius_m)], ..Illumination::default() };
@@ -363,7 +362,7 @@ mod tests {
         };
         assert!(at(0.2, Vec3::Y) < at(0.0, Vec3::Y), "a wide light has no sharp peak");
         assert!(at(0.2, tilted(0.4, 0.0)) > at(0.0, tilted(0.4, 0.0)), "but is seen farther aside");
-        // A square of the same area is the same light, but for what is seen of it from aside.
+        // A square of the same area, seen from its front, has the same apparent radius.
         let half = PI.sqrt() / 2.0 * 0.2;
         let square = Light::Rectangle {
             center_in_world: Vec3::Y * 2.0,
@@ -375,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_arrives_is_reflected() {
+    fn a_highlight_scales_with_the_lamps_visibility() {
         let sun = |x: f32| Light::Directional {
             towards_light_in_world: tilted(0.3 * x, 0.0),
             irradiance_linear: Vec3::splat(x),
@@ -394,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_nan_at_the_back_or_in_a_light() {
+    fn a_highlight_is_finite_at_the_back_and_inside_a_light() {
         let lamp = Light::Point { position_in_world: Vec3::ZERO, intensity_linear: Vec3::ONE, radius_m: 0.1 };
         let plate = Light::Rectangle {
             center_in_world: Vec3::ZERO,

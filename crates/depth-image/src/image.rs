@@ -1,104 +1,96 @@
-//! A depth image: what one sample camera saw. Holes are explicit.
+//! A depth image: the samples of one sample camera. Holes are explicit.
 
 use glam::{UVec2, Vec3};
 
 use crate::{Camera, PinholeCamera, PixelDepth, linear_from_rgb9e5};
 
-/// Marks a texel that has *no sample*: it says nothing about what its ray meets.
+/// Marks a texel *without a sample*: its ray's surfaces are unknown.
 pub const HOLE_INVERSE_DEPTH: f32 = -1.0;
-/// Marks a texel whose ray was seen to meet nothing: free space all the way.
+/// Marks a texel whose ray meets no surface: free space all the way.
 pub const BACKGROUND_INVERSE_DEPTH: f32 = 0.0;
 
-/// Which surface a sample lies on: the redundancy key of Xie §3.
+/// The surface of a sample: the redundancy key of Xie §3.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct SurfaceId {
-    /// Into the scene's instances.
+    /// Index into the scene's instances.
     pub instance: u32,
-    /// Triangle number, the same on every node: unique in the scene, shared by all instances of a mesh.
+    /// Triangle number, equal on every node, unique in the scene and shared by all instances of a mesh.
     pub primitive: u32,
 }
 
-/// What one texel holds.
+/// The content of one texel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Texel {
-    /// No sample: nothing is known.
+    /// No sample: the surface is unknown.
     Hole,
     /// The ray meets no surface.
     Background,
-    /// A surface.
+    /// A sample of a surface.
     Sample {
-        /// Along the forward axis.
+        /// Depth along the forward axis.
         planar_depth_m: f32,
         /// Outgoing radiance, linear RGB.
         color_linear: Vec3,
     },
 }
 
-/// Planes of one size, rows top-down. Colour and inverse depth are always there; the others when a
-/// method asked for them.
+/// Planes of one size, rows top-down. Colour and inverse depth are always there; the other planes exist where a
+/// method requires them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthImage {
-    /// What it was taken with; its size is the planes' size.
+    /// The sample camera; its size is the planes' size.
     pub camera: Camera,
-    /// Per metre of planar depth; [`BACKGROUND_INVERSE_DEPTH`] or [`HOLE_INVERSE_DEPTH`] otherwise.
+    /// One over planar depth, or [`BACKGROUND_INVERSE_DEPTH`] or [`HOLE_INVERSE_DEPTH`].
     pub inverse_depth_per_m: Vec<f32>,
-    /// RGB9E5, linear.
+    /// Outgoing radiance, linear RGB9E5.
     pub color_rgb9e5: Vec<u32>,
     /// Octahedral unit normals in world space, two signed 16-bit numbers.
     pub normal_oct16: Option<Vec<u32>>,
-    /// Surface keys; meaningless where there is no sample.
+    /// Surface keys; meaningless in texels without a sample.
     pub surface_id: Option<Vec<SurfaceId>>,
-    /// What highlights need, where a surface has any: needs `normal_oct16`.
+    /// Inputs of highlights, where a surface has any; requires `normal_oct16`.
     pub specular: Option<SpecularPlanes>,
-    /// Whether a texel's ray went through surfaces that were left out, because an earlier image holds them, before
-    /// it reached what the texel shows. Nothing before such a sample is proven free. `None` where no ray did.
+    /// Marks texels whose ray passed omitted surfaces, which an earlier image holds, before the texel's own surface. No
+    /// space before such a sample is proven free. `None` where no ray passed one.
     pub passed: Option<Vec<bool>>,
-    /// Inverse depths at the corners of texels, one column and one row more than the other planes: the image H of
-    /// Xie's Algorithm 4, taken half a pixel up and to the left.
+    /// Inverse depths at the corners of texels, with one column and one row more than the other planes. This is the
+    /// image H of Xie's Algorithm 4, taken half a pixel up and to the left.
     pub corner_inverse_depth_per_m: Option<Vec<f32>>,
 }
 
-/// What a compositor needs to add light that depends on the viewer.
+/// Inputs from which a compositor computes view-dependent light.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct SpecularPlanes {
     /// Reflectance at normal incidence (three bytes, sRGB-encoded) and perceptual roughness (the high byte);
     /// 0 where a surface has no highlight.
     pub reflectance_srgb8_roughness8: Vec<u32>,
-    /// What share of each light arrives, 255 for all of it; the environment's is the first, then one byte a
-    /// light in their order. Each plane has four bytes a texel, the first in the low byte. Empty where nothing
-    /// casts shadows.
+    /// The arriving share of each light, 255 for all of it: first the environment's, then one byte a light in their
+    /// order. Each plane has four bytes a texel, the first in the low byte. Empty without shadows.
     pub visibility8: Vec<Vec<u32>>,
 }
 
 impl SpecularPlanes {
-    /// Planes of [`SpecularPlanes::visibility8`] for so many lights.
+    /// Number of planes of [`SpecularPlanes::visibility8`] for `light_count` lights.
     #[must_use]
     pub const fn visibility_planes(light_count: usize) -> usize {
         (light_count + 1).div_ceil(4)
     }
 }
 
-/// Why planes do not make a depth image.
+/// Inconsistent planes of a depth image.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum DepthImageError {
-    /// A plane's length is not width times height.
     #[error("depth image plane {plane} has {len} texels, the camera {expected}")]
-    PlaneSize {
-        /// Which.
-        plane: &'static str,
-        /// Texels given.
-        len: usize,
-        /// Texels of the camera.
-        expected: usize,
-    },
+    PlaneSize { plane: &'static str, len: usize, expected: usize },
 }
 
 impl DepthImage {
     /// Checks that all planes have the camera's size.
     ///
     /// # Errors
-    /// Names the first plane that has not.
+    /// The first plane of another size.
     pub fn validate(&self) -> Result<(), DepthImageError> {
         let expected = self.size_px().element_product() as usize;
         let planes = [
@@ -127,7 +119,7 @@ impl DepthImage {
         if len == expected { Ok(()) } else { Err(wrong) }
     }
 
-    /// Whether the texel's ray passed a surface that other images hold: see [`DepthImage::passed`].
+    /// Returns whether the texel's ray passed an omitted surface: see [`DepthImage::passed`].
     #[must_use]
     pub fn has_passed(&self, index: usize) -> bool {
         self.passed.as_ref().is_some_and(|passed| passed[index])
@@ -147,7 +139,7 @@ impl DepthImage {
         }
     }
 
-    /// What the texel at column `x`, row `y` holds.
+    /// The content of the texel at column `x`, row `y`.
     #[must_use]
     pub fn texel(&self, x: u32, y: u32) -> Texel {
         let index = (y * self.size_px().x + x) as usize;
@@ -161,7 +153,7 @@ impl DepthImage {
         }
     }
 
-    /// The point in the world that a texel's sample lies at.
+    /// The sample's point in world space; `None` without a sample.
     #[must_use]
     pub fn sample_in_world(&self, x: u32, y: u32) -> Option<Vec3> {
         let Texel::Sample { planar_depth_m, .. } = self.texel(x, y) else { return None };
@@ -169,7 +161,7 @@ impl DepthImage {
         Some(self.camera.unproject(PixelDepth { pixel, planar_depth_m }))
     }
 
-    /// Finite, positive inverse depths: least and greatest; `None` where no texel has a sample.
+    /// Least and greatest inverse depth of the samples; `None` without samples.
     #[must_use]
     pub fn inverse_depth_range(&self) -> Option<(f32, f32)> {
         let samples = self.inverse_depth_per_m.iter().copied().filter(|&d| d > 0.0);

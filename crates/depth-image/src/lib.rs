@@ -1,9 +1,9 @@
 //! Camera models, depth images with explicit holes, and the scalar reference of project, unproject
 //! and intersect.
 //!
-//! Spaces: world is right-handed, metres, +Y up; a camera looks down its -Z. Pixels run top-down with
-//! centres at +0.5. *Planar depth* is the distance along the camera's forward axis; *inverse depth* its
-//! reciprocal, which is linear in screen space on planes and along projected rays.
+//! World space is right-handed, in metres, +Y up; a camera looks down its -Z. Pixels run top-down with centres at
+//! +0.5. *Planar depth* is the distance along the camera's forward axis. *Inverse depth* is its reciprocal, which is
+//! linear in screen space on planes and along projected rays.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
@@ -27,7 +27,7 @@ pub use highlight::{Highlight, Reflector, highlight_linear};
 pub use image::{
     BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId, Texel,
 };
-pub use light::{Environment, Illumination, Incident, Light, LightError, disc_from_square, tangents_of};
+pub use light::{Environment, Illumination, Incident, Light, LightError, MAX_LIGHTS, disc_from_square, tangents_of};
 pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_named};
 pub use normal::{oct16_from_unit, unit_from_oct16};
 pub use tiles::TileError;

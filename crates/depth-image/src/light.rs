@@ -1,19 +1,22 @@
-//! What lights a scene: lamps with an extent, and an environment. The scalar reference of light.wgsl.
+//! The light of a scene: lamps with an extent, and an environment. The scalar reference of light.wgsl.
 //!
-//! Intensities are in terms of what a white surface reflects: a surface of albedo 1 that faces a light of
-//! irradiance 1 has radiance 1; the reflectance's 1/π is part of the unit.
+//! The unit of intensity includes the reflectance's 1/π: a surface of albedo 1 that faces a light of irradiance 1 has
+//! radiance 1.
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// All light there is.
+/// Lights of one scene: with the environment they fill 64 planes of visibility.
+pub const MAX_LIGHTS: usize = 255;
+
+/// All light of a scene.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Illumination {
-    /// Lamps; what names a light, as a plane of visibility does, names its place here.
+    /// Lamps. Their order is the order of the planes of visibility.
     pub lights: Vec<Light>,
-    /// From everywhere.
+    /// Light from all directions.
     pub environment: Environment,
 }
 
@@ -24,42 +27,42 @@ pub enum Light {
     Directional {
         /// Unit vector from a surface towards the middle of the light.
         towards_light_in_world: Vec3,
-        /// On a surface that faces the light.
+        /// Irradiance on a surface that faces the light.
         irradiance_linear: Vec3,
-        /// Half the angle under which the light is seen; 0 casts hard shadows.
+        /// Half the angular diameter of the light; 0 casts hard shadows.
         angular_radius_rad: f32,
     },
-    /// A lamp that shines everywhere alike; falls off with the square of the distance.
+    /// A lamp of equal intensity in all directions; irradiance falls with the square of the distance.
     Point {
-        /// Its middle.
+        /// Centre of the lamp.
         position_in_world: Vec3,
-        /// As irradiance, at a distance of one metre.
+        /// Irradiance at a distance of one metre.
         intensity_linear: Vec3,
         /// 0 casts hard shadows.
         radius_m: f32,
     },
     /// A point light that shines into a cone, as in `KHR_lights_punctual`.
     Spot {
-        /// Its middle.
+        /// Centre of the lamp.
         position_in_world: Vec3,
         /// Unit vector along the cone's axis, away from the light.
         forward_in_world: Vec3,
-        /// On the axis: as irradiance, at a distance of one metre.
+        /// Irradiance on the axis at a distance of one metre.
         intensity_linear: Vec3,
         /// Angle from the axis at which light begins to fade.
         inner_cone_rad: f32,
-        /// Angle from the axis at which it is gone.
+        /// Angle from the axis at which light is gone.
         outer_cone_rad: f32,
         /// 0 casts hard shadows.
         radius_m: f32,
     },
     /// A rectangle that shines to the side of `half_edges[0] × half_edges[1]`, by Lambert's law.
     Rectangle {
-        /// Its middle.
+        /// Centre of the rectangle.
         center_in_world: Vec3,
-        /// From the middle to the middles of two neighbouring edges; perpendicular to each other.
+        /// Vectors from the centre to the middles of two neighbouring edges, perpendicular to each other.
         half_edges_in_world: [Vec3; 2],
-        /// Given off, the same everywhere: what a camera sees of it.
+        /// Emitted radiance, equal over the rectangle, as a camera sees it.
         radiance_linear: Vec3,
     },
 }
@@ -73,53 +76,52 @@ pub struct Environment {
     pub nadir_linear: Vec3,
 }
 
-/// Light that arrives at a point from one point of a light, were nothing in between.
+/// Unoccluded light that arrives at a point from one point of a light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Incident {
     /// Unit vector from the point to the light.
     pub towards_light_in_world: Vec3,
-    /// To the light; infinite for parallel light.
+    /// Distance to the light; infinite for parallel light.
     pub distance_m: f32,
-    /// On a surface that faces the light.
+    /// Irradiance on a surface that faces the light.
     pub irradiance_linear: Vec3,
 }
 
-/// Why a light cannot be used.
+/// An unusable light.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {reason}")]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub struct LightError {
-    /// Which number.
     pub field: &'static str,
-    /// What is wrong with it.
     pub reason: &'static str,
 }
 
-/// Nearer to a light than this share of a metre it grows no stronger: no division by zero.
+/// Irradiance stays constant below this distance, which avoids a division by zero.
 const LEAST_DISTANCE_M: f32 = 1e-6;
 
 impl Environment {
-    /// The same from everywhere.
+    /// The same radiance from all directions.
     #[must_use]
     pub const fn uniform(radiance_linear: Vec3) -> Self {
         Self { zenith_linear: radiance_linear, nadir_linear: radiance_linear }
     }
 
-    /// What arrives from a direction.
+    /// Radiance that arrives from a direction, a unit vector.
     #[must_use]
     pub fn radiance_linear(&self, towards_in_world: Vec3) -> Vec3 {
         self.nadir_linear.lerp(self.zenith_linear, 0.5 + 0.5 * towards_in_world.y)
     }
 
-    /// What a white surface reflects with nothing in between: the gradient under a cosine lobe.
+    /// Radiance of an unoccluded white surface: the gradient under a cosine lobe.
     #[must_use]
     pub fn diffuse_linear(&self, normal_in_world: Vec3) -> Vec3 {
         self.nadir_linear.lerp(self.zenith_linear, 0.5 + normal_in_world.y / 3.0)
     }
 
-    /// Checks that its colours can be light.
+    /// Checks that both colours are finite and not negative.
     ///
     /// # Errors
-    /// Names the number that cannot.
+    /// The first colour that is not.
     pub fn validate(&self) -> Result<(), LightError> {
         radiance("zenith", self.zenith_linear)?;
         radiance("nadir", self.nadir_linear)
@@ -127,14 +129,13 @@ impl Environment {
 }
 
 impl Light {
-    /// What arrives from the light's middle.
+    /// Unoccluded light from the light's centre.
     #[must_use]
     pub fn from_middle(&self, point_in_world: Vec3) -> Incident {
         self.from_sample(point_in_world, Vec2::splat(0.5))
     }
 
-    /// What arrives from one point of the light, weighted so that the mean over `place` in the unit square is
-    /// the whole light's.
+    /// Unoccluded light from one point of the light. Its mean over `place` in the unit square is the whole light's.
     #[must_use]
     pub fn from_sample(&self, point_in_world: Vec3, place: Vec2) -> Incident {
         match *self {
@@ -169,7 +170,7 @@ impl Light {
         }
     }
 
-    /// Whether it casts soft shadows.
+    /// Returns whether the light casts soft shadows.
     #[must_use]
     pub fn has_extent(&self) -> bool {
         match *self {
@@ -180,10 +181,10 @@ impl Light {
         }
     }
 
-    /// Checks that every number can be a light's.
+    /// Checks every field.
     ///
     /// # Errors
-    /// Names the one that cannot.
+    /// The first field that is out of range or not finite.
     pub fn validate(&self) -> Result<(), LightError> {
         match *self {
             Self::Directional { towards_light_in_world, irradiance_linear, angular_radius_rad } => {
@@ -241,7 +242,7 @@ pub fn tangents_of(unit: Vec3) -> [Vec3; 2] {
     ]
 }
 
-/// The unit square to the unit disc, keeping areas and neighbours (Shirley and Chiu 1997).
+/// The map from the unit square to the unit disc that keeps areas and neighbours (Shirley and Chiu 1997).
 #[must_use]
 pub fn disc_from_square(place: Vec2) -> Vec2 {
     let p = place * 2.0 - 1.0;
@@ -258,14 +259,14 @@ fn disc_offset(axis: Vec3, place: Vec2) -> Vec3 {
     tangent * disc.x + bitangent * disc.y
 }
 
-/// From a disc that faces the point: as a sphere is seen from afar.
+/// Light of a sphere, as of a disc that faces the point.
 fn round_lamp(position: Vec3, radius_m: f32, intensity_linear: Vec3, point: Vec3, place: Vec2) -> Incident {
     let axis = (position - point).normalize_or(Vec3::Y);
     let incident = towards(position + disc_offset(axis, place) * radius_m, point);
     Incident { irradiance_linear: intensity_linear * incident.irradiance_linear, ..incident }
 }
 
-/// Irradiance of a lamp of unit intensity.
+/// Light of a lamp of unit intensity.
 fn towards(at_in_world: Vec3, point_in_world: Vec3) -> Incident {
     let offset = at_in_world - point_in_world;
     let distance_m = offset.length().max(LEAST_DISTANCE_M);
@@ -276,7 +277,7 @@ fn towards(at_in_world: Vec3, point_in_world: Vec3) -> Incident {
     }
 }
 
-/// As in `KHR_lights_punctual`.
+/// The share of a spot's intensity at an angle from its axis, as in `KHR_lights_punctual`.
 fn spot_share(axis_cosine: f32, inner_cone_rad: f32, outer_cone_rad: f32) -> f32 {
     let (inner, outer) = (inner_cone_rad.cos(), outer_cone_rad.cos());
     let share = ((axis_cosine - outer) / (inner - outer).max(1e-4)).clamp(0.0, 1.0);
@@ -318,14 +319,14 @@ mod tests {
     }
 
     #[test]
-    fn a_rectangle_gives_what_its_form_factor_says() {
+    fn a_rectangles_irradiance_equals_its_form_factor() {
         let (a, h) = (1.5f32, 2.0f32);
         let light = Light::Rectangle {
             center_in_world: Vec3::Y * h,
             half_edges_in_world: [Vec3::X * a, Vec3::Z * a],
             radiance_linear: Vec3::ONE,
         };
-        // x × z = −y: it shines down. Four times the form factor of a quarter, seen from its corner.
+        // x × z = −y: the rectangle shines down. The sum is four times the form factor of a quarter, from its corner.
         let x = a / h;
         let quarter = 2.0 * x / (1.0 + x * x).sqrt() * (x / (1.0 + x * x).sqrt()).atan() / (2.0 * PI);
         let measured = mean_irradiance(&light, Vec3::ZERO, Vec3::Y);
@@ -334,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_small_round_lamp_is_a_point_light() {
+    fn a_small_round_lamp_equals_a_point_light() {
         let lamp = |radius_m| Light::Point { position_in_world: Vec3::Y, intensity_linear: Vec3::ONE, radius_m };
         let (point, normal) = (Vec3::new(0.3, 0.0, 0.1), Vec3::Y);
         let (small, hard) = (mean_irradiance(&lamp(1e-3), point, normal), mean_irradiance(&lamp(0.0), point, normal));
@@ -343,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gradient_under_a_cosine_lobe_is_its_closed_form() {
+    fn the_gradient_under_a_cosine_lobe_equals_its_closed_form() {
         let environment = Environment { zenith_linear: Vec3::ONE, nadir_linear: Vec3::ZERO };
         let normal = Vec3::new(0.6, 0.64, 0.48);
         let [tangent, bitangent] = tangents_of(normal);
@@ -377,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_a_light_is_named() {
+    fn an_invalid_light_is_refused_with_its_field() {
         let point =
             |intensity_linear, radius_m| Light::Point { position_in_world: Vec3::ZERO, intensity_linear, radius_m };
         assert_eq!(point(Vec3::ONE, 0.1).validate(), Ok(()));
@@ -396,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_nan_inside_a_light() {
+    fn light_is_finite_inside_a_lamp() {
         let lamp = Light::Point { position_in_world: Vec3::ZERO, intensity_linear: Vec3::ONE, radius_m: 0.0 };
         let incident = lamp.from_middle(Vec3::ZERO);
         assert!(incident.irradiance_linear.is_finite() && incident.towards_light_in_world.is_finite());

@@ -7,7 +7,7 @@ fn wrapped(v: Vec2) -> Vec2 {
     Vec2::new((1.0 - v.y.abs()) * sign(v.x), (1.0 - v.x.abs()) * sign(v.y))
 }
 
-/// Packs a unit vector; anything that is not one gives some unit vector when unpacked, never NaN.
+/// Packs a unit vector. Any other input unpacks to some unit vector, never NaN.
 #[must_use]
 pub fn oct16_from_unit(unit: Vec3) -> u32 {
     let length = unit.abs().element_sum();
@@ -18,7 +18,7 @@ pub fn oct16_from_unit(unit: Vec3) -> u32 {
     quantise(folded.x) | quantise(folded.y) << 16
 }
 
-/// The inverse of [`oct16_from_unit`], of unit length.
+/// The inverse of [`oct16_from_unit`]; the result has unit length.
 #[must_use]
 pub fn unit_from_oct16(packed: u32) -> Vec3 {
     let signed = |bits: u32| (f32::from(bits as u16 as i16) / 32767.0).max(-1.0);
@@ -45,7 +45,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_still_gives_a_unit_vector() {
+    fn every_input_gives_a_unit_vector() {
         for v in [Vec3::ZERO, Vec3::NAN, Vec3::INFINITY] {
             assert!((unit_from_oct16(oct16_from_unit(v)).length() - 1.0).abs() < 1e-5);
         }

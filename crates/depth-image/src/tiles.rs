@@ -1,40 +1,24 @@
-//! A sample image in tiles, one above the other: each is taken by a camera of its own, and together they are the image.
+//! Tiles of a sample image, one above the other. Each has its own camera, and together they are the image.
 
 use glam::{UVec2, Vec2};
 
 use crate::{Camera, DepthImage, DepthImageError, PinholeCamera, SpecularPlanes};
 
-/// Why tiles do not make an image.
+/// Tiles that do not form an image; `tile` counts from the top.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum TileError {
-    /// Rows or columns that are not the image's.
     #[error("tile {tile} has {given} pixels, the image's has {expected}")]
-    Size {
-        /// Which, from the top.
-        tile: usize,
-        /// Its size.
-        given: UVec2,
-        /// What the camera says.
-        expected: UVec2,
-    },
-    /// Its planes.
+    Size { tile: usize, given: UVec2, expected: UVec2 },
     #[error("tile {tile}: {source}")]
-    Planes {
-        /// Which, from the top.
-        tile: usize,
-        /// Which plane.
-        source: DepthImageError,
-    },
-    /// A plane that only some tiles have, though nothing can be said for the others.
+    Planes { tile: usize, source: DepthImageError },
+    /// A plane without a default value for tiles that lack it.
     #[error("some tiles have the plane {plane}, and some have not")]
-    Mixed {
-        /// Which.
-        plane: &'static str,
-    },
+    Mixed { plane: &'static str },
 }
 
 impl Camera {
-    /// The camera of one of `count` tiles, from the top; where there are fewer rows than tiles, some have none.
+    /// The camera of tile number `tile`, from the top, of `count`. With fewer rows than tiles, some tiles are empty.
     #[must_use]
     pub fn tile(&self, tile: u32, count: u32) -> Self {
         let Self::Pinhole(camera) = self;
@@ -49,10 +33,10 @@ impl Camera {
 }
 
 impl DepthImage {
-    /// The image whose tiles these are, from the top.
+    /// Joins tiles, from the top, to one image.
     ///
     /// # Errors
-    /// For tiles of other sizes, and planes that only some of them have.
+    /// Tiles of other sizes, and planes that only some of them have.
     pub fn from_tiles(camera: Camera, tiles: Vec<Self>) -> Result<Self, TileError> {
         let count = tiles.len() as u32;
         for (number, tile) in tiles.iter().enumerate() {
@@ -84,7 +68,7 @@ fn concat<T: Copy>(tiles: &[DepthImage], plane: impl Fn(&DepthImage) -> &Vec<T>)
     tiles.iter().flat_map(|tile| plane(tile).iter().copied()).collect()
 }
 
-/// A plane that all tiles have, or none.
+/// Joins a plane that either all tiles have, or none.
 fn joined<T: Copy>(
     tiles: &[DepthImage],
     name: &'static str,
@@ -98,7 +82,7 @@ fn joined<T: Copy>(
     }
 }
 
-/// A plane that a tile is without where all of it would be zero.
+/// Joins a plane that a tile lacks where all of it would be zero.
 fn filled<T: Copy + Default>(tiles: &[DepthImage], plane: impl Fn(&DepthImage) -> Option<&[T]>) -> Option<Vec<T>> {
     tiles.iter().any(|tile| plane(tile).is_some()).then(|| {
         let of = |tile: &DepthImage| plane(tile).map_or_else(|| vec![T::default(); texels(tile)], <[T]>::to_vec);
@@ -110,7 +94,7 @@ fn texels(tile: &DepthImage) -> usize {
     tile.size_px().element_product() as usize
 }
 
-/// What has no highlight needs no visibility.
+/// Joins the inputs of highlights. A tile without highlights has no visibility either.
 fn specular(tiles: &[DepthImage]) -> Result<Option<SpecularPlanes>, TileError> {
     if tiles.iter().all(|tile| tile.specular.is_none()) {
         return Ok(None);
@@ -131,7 +115,7 @@ fn specular(tiles: &[DepthImage]) -> Result<Option<SpecularPlanes>, TileError> {
     }))
 }
 
-/// Corners between two tiles are in both: the lower one's are taken.
+/// Joins the corners. Those between two tiles are in both; the lower tile's are used.
 fn shared_corners(tiles: &[DepthImage]) -> Vec<f32> {
     let mut corners = Vec::new();
     for (number, tile) in tiles.iter().enumerate() {

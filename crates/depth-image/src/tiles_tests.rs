@@ -6,17 +6,17 @@ fn camera() -> Camera {
     Camera::Pinhole(PinholeCamera::looking_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Y, 0.9, UVec2::new(7, 11)))
 }
 
-/// Every texel tells its ray, so that a row in the wrong place is seen.
+/// Every texel encodes its ray, so that a test detects a row in the wrong place.
 fn image(camera: Camera) -> DepthImage {
     let Camera::Pinhole(pinhole) = camera;
     let texels = |size: UVec2| (0..size.y).flat_map(move |y| (0..size.x).map(move |x| UVec2::new(x, y)));
-    let tells = |texel: UVec2| {
+    let encoded = |texel: UVec2| {
         let direction = pinhole.ray(texel.as_vec2() + 0.5).direction_in_world;
         (direction.dot(Vec3::new(3.0, 5.0, 7.0)) * 1000.0).round()
     };
     let corner =
         |texel: UVec2| (pinhole.ray(texel.as_vec2()).direction_in_world.dot(Vec3::new(3.0, 5.0, 7.0)) * 1000.0).round();
-    let plane: Vec<f32> = texels(pinhole.size_px).map(tells).collect();
+    let plane: Vec<f32> = texels(pinhole.size_px).map(encoded).collect();
     DepthImage {
         camera,
         inverse_depth_per_m: plane.clone(),
@@ -33,7 +33,7 @@ fn image(camera: Camera) -> DepthImage {
 }
 
 #[test]
-fn tiles_make_the_image_they_were_cut_from() {
+fn joined_tiles_equal_the_image() {
     let whole = image(camera());
     for count in 1..=11 {
         let tiles: Vec<_> = (0..count).map(|tile| image(camera().tile(tile, count))).collect();
@@ -43,7 +43,7 @@ fn tiles_make_the_image_they_were_cut_from() {
 }
 
 #[test]
-fn a_tile_without_highlights_has_none_in_the_image() {
+fn a_tile_without_highlights_joins_as_zeros() {
     let mut tiles: Vec<_> = (0..2).map(|tile| image(camera().tile(tile, 2))).collect();
     (tiles[0].specular, tiles[0].passed) = (None, None);
     let joined = DepthImage::from_tiles(camera(), tiles).expect("they fit");
@@ -55,7 +55,7 @@ fn a_tile_without_highlights_has_none_in_the_image() {
 }
 
 #[test]
-fn tiles_that_do_not_fit_are_named() {
+fn tiles_that_do_not_fit_are_refused_by_number() {
     let tiles = || (0..3).map(|tile| image(camera().tile(tile, 3))).collect::<Vec<_>>();
     let mut swapped = tiles();
     swapped.swap(0, 2);

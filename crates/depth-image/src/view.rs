@@ -1,9 +1,9 @@
-//! What a client receives: a picture and, on request, its depth and where each pixel came from.
+//! A finished view: a picture and, on request, its depth and provenance.
 
 use glam::UVec2;
 
-/// Where a pixel's colour came from, packed in 32 bits: the kind in the low byte, and above it one bit
-/// for each sample camera that contributed.
+/// The origin of a pixel's colour, packed in 32 bits. The low byte is the kind; above it is one bit for each sample
+/// camera that contributed.
 #[repr(transparent)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Provenance(pub u32);
@@ -13,23 +13,23 @@ pub struct Provenance(pub u32);
 pub enum ProvenanceKind {
     /// The ray meets nothing: background.
     Empty,
-    /// A surface that at least one sample camera sees.
+    /// A surface visible to at least one sample camera.
     Hit,
-    /// No sample camera knows; filled from the farther side of the gap.
+    /// A surface that no sample camera saw; its colour comes from the farther side of the gap.
     Filled,
 }
 
 impl Provenance {
-    /// Background.
+    /// A pixel of the background.
     pub const EMPTY: Self = Self(0);
 
-    /// A pixel of one kind, from the cameras whose bits are set.
+    /// Packs a kind and the contributing cameras, one bit each.
     #[must_use]
     pub fn new(kind: ProvenanceKind, camera_mask: u32) -> Self {
         Self(kind as u32 | camera_mask << 8)
     }
 
-    /// What the pixel is. Unknown codes, as from a newer peer, count as filled.
+    /// The kind of the pixel. Unknown codes, as from a newer peer, count as filled.
     #[must_use]
     pub fn kind(self) -> ProvenanceKind {
         match self.0 & 0xff {
@@ -39,7 +39,7 @@ impl Provenance {
         }
     }
 
-    /// One bit a sample camera.
+    /// The contributing sample cameras, one bit each.
     #[must_use]
     pub fn camera_mask(self) -> u32 {
         self.0 >> 8
@@ -51,15 +51,15 @@ impl Provenance {
 pub struct View {
     /// Columns and rows.
     pub size_px: UVec2,
-    /// Three bytes a pixel, sRGB.
+    /// sRGB, three bytes a pixel.
     pub srgb8: Vec<u8>,
-    /// Per metre of planar depth, 0 for background; on request.
+    /// One over planar depth, 0 for background; on request.
     pub inverse_depth_per_m: Option<Vec<f32>>,
-    /// On request.
+    /// Origin of each pixel; on request.
     pub provenance: Option<Vec<Provenance>>,
 }
 
-/// Which planes a view shall have beside its colour.
+/// The requested planes of a view beside its colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub struct ViewPlanes {
     /// [`View::inverse_depth_per_m`].

@@ -4,41 +4,40 @@ use glam::{Mat3, Quat, UVec2, Vec2, Vec3};
 
 use crate::PinholeCamera;
 
-/// The farthest that cameras may be from looking at one point, as a share of its distance.
+/// Greatest distance of cameras' axes from a common target, as a share of its distance.
 const CONVERGENCE: f32 = 0.02;
-/// Half an image's side at unit distance, at most: 150 degrees.
+/// Greatest half side of an image at unit distance: 150 degrees.
 const STEEPEST: f32 = 3.7;
-/// Cameras that are turned by less, in radians, do not say what is up for them all.
+/// Smallest rotation between cameras, in radians, from which a common up vector follows.
 const LEAST_TURN: f32 = 1e-2;
-/// By how much equal fields of view may differ.
+/// Tolerance of equal fields of view.
 const ROUNDING: f32 = 1e-3;
 
-/// A box of viewpoints and what all of them look at.
+/// A box of viewpoints and their common aim.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewCell {
     center_in_world: Vec3,
-    /// From the middle to the right, upper and rear faces.
+    /// Vectors from the middle to the right, upper and rear faces.
     half_edges_in_world: [Vec3; 3],
     aim: Aim,
     up_in_world: Vec3,
-    /// Of the first camera: focal length in image heights.
+    /// Focal length of the first camera, in image heights.
     focal_heights: f32,
-    /// Half the sides, at unit distance, of an image in which all is that the cameras see.
+    /// Half sides, at unit distance, of an image that contains the cameras' fields of view.
     half_sides: Vec2,
     near_m: f32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Aim {
-    /// All look at one point.
+    /// All cameras are aimed at one point.
     Target(Vec3),
-    /// All look the same way.
+    /// All cameras have one orientation.
     Parallel(Quat),
 }
 
 impl ViewCell {
-    /// The cell that cameras span, be they sample cameras or views; `None` without any. For a rig of four corners it is
-    /// their rectangle.
+    /// The cell of sample cameras or views; `None` without any. The cell of a rig of four corners is their rectangle.
     #[must_use]
     pub fn between(cameras: &[PinholeCamera]) -> Option<Self> {
         let first = cameras.first()?;
@@ -57,8 +56,8 @@ impl ViewCell {
         Some(Self { half_sides, ..cell })
     }
 
-    /// Cameras that between them see what views of the cell see: one at each corner of the box. An edge that is not longer
-    /// than `shortest_edge_m` is none; so they are 1, 2 at the ends of a line, 4 or 8.
+    /// Cameras that together see the fields of view of all views of the cell, one at each corner of the box. Edges up to
+    /// `shortest_edge_m` do not count: there are 1, 2 (the ends of a line), 4 or 8 cameras.
     #[must_use]
     pub fn sample_cameras(&self, shortest_edge_m: f32, size_px: UVec2) -> Vec<PinholeCamera> {
         let focal_px = (size_px.as_vec2() * 0.5 / self.half_sides).min_element();
@@ -70,12 +69,12 @@ impl ViewCell {
         places.map(|place| self.camera(place, focal_px, size_px)).collect()
     }
 
-    /// Whether all that a camera within the cell sees is in its sample images.
+    /// Returns whether the sample images contain the field of view of a camera within the cell.
     pub(crate) fn sees_all_of(&self, camera: &PinholeCamera) -> bool {
         self.half_sides_of(camera).cmple(self.half_sides * (1.0 + ROUNDING)).all()
     }
 
-    /// The camera at a place of the rectangle halfway between front and rear, -1 to 1 each way.
+    /// The camera at a place of the rectangle halfway between front and rear, -1 to 1 in both directions.
     #[must_use]
     pub fn camera_at(&self, place: Vec2, size_px: UVec2) -> PinholeCamera {
         self.camera(place.extend(0.0), self.focal_heights * size_px.y as f32, size_px)
@@ -104,8 +103,8 @@ impl ViewCell {
         (0..count).map(|i| self.camera_at(place(i), size_px)).collect()
     }
 
-    /// `count` views on a full circle around an upright axis, of the cell's height and field of view, all turned as the
-    /// one in its middle.
+    /// `count` views on a full circle around an upright axis. They have the cell's height and field of view, and are
+    /// oriented like the view in its middle.
     #[must_use]
     pub fn around(&self, axis_in_world: Vec3, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
         let middle = self.camera_at(Vec2::ZERO, size_px);
@@ -142,7 +141,7 @@ impl ViewCell {
         }
     }
 
-    /// Of an image from the same eye in which all is that a camera sees.
+    /// Half sides of an image from the same eye that contains the camera's field of view.
     fn half_sides_of(&self, camera: &PinholeCamera) -> Vec2 {
         let cell_from_camera = self.turn_at(camera.eye_in_world).conjugate() * camera.world_from_camera;
         let near = -camera.principal_px / camera.focal_px;
@@ -156,9 +155,9 @@ impl ViewCell {
     }
 }
 
-/// Middle and half edges of the box that is turned as the cameras are.
+/// Middle and half edges of the box in the cameras' orientation.
 fn extent(cameras: &[PinholeCamera], turn: Quat) -> (Vec3, [Vec3; 3]) {
-    // From one of them: far from the world's origin nothing is lost.
+    // Offsets from one camera keep precision far from the world's origin.
     let from = cameras.first().map_or(Vec3::ZERO, |camera| camera.eye_in_world);
     let eyes = cameras.iter().map(|camera| turn.conjugate() * (camera.eye_in_world - from));
     let (least, most) = eyes.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), eye| (a.min(eye), b.max(eye)));
@@ -166,7 +165,7 @@ fn extent(cameras: &[PinholeCamera], turn: Quat) -> (Vec3, [Vec3; 3]) {
     (from + turn * (least + half), [turn * Vec3::X * half.x, turn * Vec3::Y * half.y, turn * Vec3::Z * half.z])
 }
 
-/// Of four cameras in rows from the bottom left, as rigs list them.
+/// Middle and half edges of four cameras in rows from the bottom left, as rigs list them.
 fn corners(cameras: &[PinholeCamera]) -> Option<(Vec3, [Vec3; 3])> {
     let [a, b, c, d] =
         <[&PinholeCamera; 4]>::try_from(cameras.iter().collect::<Vec<_>>()).ok()?.map(|camera| camera.eye_in_world);
@@ -185,8 +184,8 @@ fn mean_turn(cameras: &[PinholeCamera]) -> Quat {
     if sum.length() > 1e-3 { sum.normalize() } else { first }
 }
 
-/// What is up for all cameras: at a right angle to the right of those that differ most from the first; else as they are
-/// turned in the mean.
+/// The common up vector: perpendicular to the right axes of the first camera and the one that differs most from it.
+/// Without such a camera it is that of the mean orientation.
 fn common_up(cameras: &[PinholeCamera], turn: Quat) -> Vec3 {
     let rights = cameras.iter().map(|camera| camera.world_from_camera * Vec3::X);
     let first = cameras.first().map_or(Vec3::X, |camera| camera.world_from_camera * Vec3::X);
@@ -199,7 +198,7 @@ fn common_up(cameras: &[PinholeCamera], turn: Quat) -> Vec3 {
     }
 }
 
-/// The point nearest to all forward axes, by least squares; `None` where they run in parallel, part, or miss it.
+/// The point nearest to all forward axes, by least squares; `None` where they are parallel, diverge or miss it.
 fn common_target(cameras: &[PinholeCamera]) -> Option<Vec3> {
     let mut matrix = Mat3::ZERO;
     let mut right_side = Vec3::ZERO;

@@ -1,4 +1,4 @@
-//! Closed forms.
+//! Tests against closed forms.
 
 use super::*;
 
@@ -32,7 +32,7 @@ fn parallel_cameras_stay_parallel() {
 }
 
 #[test]
-fn one_camera_is_a_cell_of_one_point_and_none_is_none() {
+fn one_camera_gives_a_cell_of_one_point_and_no_camera_gives_none() {
     let one = towards_middle(Vec3::ONE);
     let cell = ViewCell::between(&[one]).unwrap();
     assert_eq!(cell.orbit(5, SIZE)[3].eye_in_world, Vec3::ONE);
@@ -42,7 +42,7 @@ fn one_camera_is_a_cell_of_one_point_and_none_is_none() {
 }
 
 #[test]
-fn samples_stand_at_ends_and_corners() {
+fn sample_cameras_stand_at_ends_and_corners() {
     let ends = ViewCell::between(&line()).unwrap().sample_cameras(0.01, SIZE);
     let eyes: Vec<Vec3> = ends.iter().map(|camera| camera.eye_in_world).collect();
     let expected = [Vec3::new(-0.2, 1.0, 3.0), Vec3::new(0.4, 1.0, 3.0)];
@@ -54,14 +54,14 @@ fn samples_stand_at_ends_and_corners() {
     let is_corner = |eye: Vec3| (eye.cmpeq(corners[0]) | eye.cmpeq(corners[1])).all();
     assert!(samples.len() == 8 && samples.iter().all(|camera| is_corner(camera.eye_in_world)), "{samples:?}");
     let flat = cell.sample_cameras(0.6, SIZE);
-    assert!(flat.len() == 4 && flat.iter().all(|camera| camera.eye_in_world.y == 0.25), "a short edge is none");
+    assert!(flat.len() == 4 && flat.iter().all(|camera| camera.eye_in_world.y == 0.25), "a short edge does not count");
 }
 
-/// What any view of a cell sees far away, every sample camera sees.
+/// Every sample camera contains the distant corners of every view.
 #[test]
-fn samples_see_what_views_see() {
+fn sample_cameras_contain_the_views() {
     let mut views = line();
-    // One is turned and rolled, one has another shape, one another lens shift.
+    // One view is turned and rolled, one has another shape, one another lens shift.
     views[1].world_from_camera *= Quat::from_rotation_y(0.2) * Quat::from_rotation_z(0.3);
     views[2] = views[2].resized(UVec2::new(90, 30));
     views[2].focal_px.x = views[2].focal_px.y;
@@ -81,7 +81,7 @@ fn samples_see_what_views_see() {
 }
 
 #[test]
-fn what_converges_keeps_its_field_of_view() {
+fn converging_views_keep_their_field_of_view() {
     let views: Vec<_> =
         [-0.3f32, -0.1, 0.1, 0.3].map(|x| towards_middle(Vec3::new(3.0 * x.sin(), 1.0, 3.0 * x.cos()))).to_vec();
     let samples = ViewCell::between(&views).unwrap().sample_cameras(0.2, SIZE);
@@ -93,7 +93,7 @@ fn what_converges_keeps_its_field_of_view() {
 }
 
 #[test]
-fn a_circle_comes_round() {
+fn views_around_an_axis_form_a_circle() {
     let cell = ViewCell::between(&[towards_middle(Vec3::new(0.0, 1.0, 3.0))]).unwrap();
     let views = cell.around(Vec3::ZERO, 8, SIZE);
     for view in &views {
@@ -103,9 +103,8 @@ fn a_circle_comes_round() {
     assert!((views[4].eye_in_world - Vec3::new(0.0, 1.0, -3.0)).length() < 1e-5);
 }
 
-/// What looks every which way still gives cameras that can be used.
 #[test]
-fn views_that_part_give_finite_cameras() {
+fn diverging_views_give_valid_cameras() {
     let apart = [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::Y]
         .map(|aim| PinholeCamera::looking_at(Vec3::ZERO, aim, Vec3::Y, 1.0, SIZE));
     for sample in ViewCell::between(&apart).unwrap().sample_cameras(0.0, SIZE) {

@@ -1,46 +1,46 @@
-//! Views that are near enough to each other for one sample set, and the set that a view is nearest to.
+//! Groups of views that share one sample set, and the set nearest to a view.
 //!
-//! How far two views are apart is measured by what it does to a picture: by how much the middle of the scene is seen from
-//! another side, and by the angle between the ways they look. Both are coordinates of one space, in which a group is no
-//! longer than 1 along any axis.
+//! The distance of two views follows from the change of the picture. It combines the parallax of the scene's middle with
+//! the angle between the directions. Both are coordinates of one space, in which a group extends at most 1 along any axis.
 
 use glam::UVec2;
 
 use crate::{Aabb, PinholeCamera, ViewCell};
 
-/// The longest edge of a group's eyes, as a share of their distance from the scene's middle.
+/// Longest edge of a group's eyes, as a share of their distance from the scene's middle.
 const LONGEST_EDGE: f32 = 0.25;
-/// The greatest difference between the ways in which they look: along an axis of the unit sphere.
-const WIDEST_LOOK: f32 = 0.5;
-/// Eyes that are nearer to each other than this, as a share of the distance, are as good as at one place.
+/// Greatest difference of directions along an axis of the unit sphere.
+const WIDEST_DIRECTION: f32 = 0.5;
+/// Eyes closer than this share of the distance count as one place.
 const SHORTEST_EDGE: f32 = 0.02;
-/// Within the scene its middle may be nearer than what is seen: distances are at least this share of its radius.
+/// Lower bound of distances, as a share of the scene's radius: inside the scene its middle may be nearer than its
+/// surfaces.
 const NEAREST: f32 = 0.5;
-/// A view that is so little outside is inside: of the longest group's length.
+/// A view this little outside of a group, as a share of the longest group, counts as inside.
 const TOLERANCE: f32 = 0.01;
-/// Of two sets that are as near, the one whose middle is nearer: of how far that is, so much counts.
+/// Weight of the distance to a set's middle, which decides between sets at equal distance.
 const OF_MIDDLE: f32 = 1e-3;
 
-/// Where a view is and which way it looks.
+/// Eye and direction of a view.
 type Place = [f32; 6];
 
 /// Least and greatest of each coordinate.
 type Bounds = [(f32, f32); 6];
 
-/// Views that one sample set serves. It only grows; while it does not, what has been sampled for it stays good.
+/// Views that one sample set serves. A group only grows; its samples stay valid while it does not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewGroup {
-    /// At least one.
+    /// One or more.
     views: Vec<PinholeCamera>,
     bounds: Bounds,
-    /// The nearest view's: there a step changes most.
+    /// Distance of the nearest view, whose picture changes most with a step.
     distance_m: f32,
     cell: ViewCell,
 }
 
 impl ViewGroup {
-    /// Adds views to the groups that they are in, else to those that they do not make too long, else as new groups: as few
-    /// as halving finds. Groups that need not change do not.
+    /// Adds views to groups. A view inside a group changes nothing. Any other joins the group that it extends least, if that
+    /// stays within the limit. The remaining views form new groups by halving.
     pub fn add(groups: &mut Vec<Self>, views: &[PinholeCamera], scene: &Aabb) {
         let mut apart = Vec::new();
         for view in views {
@@ -56,13 +56,13 @@ impl ViewGroup {
         groups.extend(halved(apart, scene));
     }
 
-    /// Whether a view lies between the group's views and sees no more than they do.
+    /// Returns whether a view lies between the group's views, within their field of view.
     #[must_use]
     pub fn serves(&self, view: &PinholeCamera, scene: &Aabb) -> bool {
         outside(view, &self.bounds, scene) <= TOLERANCE && self.cell.sees_all_of(view)
     }
 
-    /// Where to sample for it, in images of this size.
+    /// The group's sample cameras, for images of this size.
     #[must_use]
     pub fn sample_cameras(&self, size_px: UVec2) -> Vec<PinholeCamera> {
         self.cell.sample_cameras(SHORTEST_EDGE * self.distance_m, size_px)
@@ -88,7 +88,7 @@ impl ViewGroup {
     }
 }
 
-/// Which of several sample sets a view is nearest to, each given by its cameras; `None` without any.
+/// Index of the sample set nearest to a view; each set is given by its cameras. `None` without sets.
 #[must_use]
 pub fn nearest_set(
     view: &PinholeCamera,
@@ -104,7 +104,7 @@ pub fn nearest_set(
     far.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(set, _)| set)
 }
 
-/// What is too long is halved along its longest axis.
+/// Halves views that spread too far along their longest axis, until each group is within the limit.
 fn halved(views: Vec<PinholeCamera>, scene: &Aabb) -> Vec<ViewGroup> {
     if views.is_empty() {
         return Vec::new();
@@ -119,14 +119,14 @@ fn halved(views: Vec<PinholeCamera>, scene: &Aabb) -> Vec<ViewGroup> {
     [halved(low, scene), halved(high, scene)].concat()
 }
 
-/// The axis along which views spread most, and by how much.
+/// The axis of the greatest spread, and the spread.
 fn longest(bounds: &Bounds, distance_m: f32) -> (usize, f32) {
     let lengths = bounds.iter().enumerate();
     let lengths = lengths.map(|(axis, (least, most))| (axis, (most - least) / unit(axis, distance_m)));
     lengths.fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a })
 }
 
-/// How far a view lies outside of bounds.
+/// Distance of a view from bounds, 0 inside.
 fn outside(view: &PinholeCamera, bounds: &Bounds, scene: &Aabb) -> f32 {
     let (place, distance_m) = (place_of(view), distance_m(view, scene));
     let off = |axis: usize| {
@@ -147,9 +147,9 @@ fn bounds(views: &[PinholeCamera]) -> Bounds {
     })
 }
 
-/// What a coordinate is divided by.
+/// Divisor of a coordinate.
 fn unit(axis: usize, distance_m: f32) -> f32 {
-    if axis < 3 { LONGEST_EDGE * distance_m } else { WIDEST_LOOK }
+    if axis < 3 { LONGEST_EDGE * distance_m } else { WIDEST_DIRECTION }
 }
 
 fn distance_m(view: &PinholeCamera, scene: &Aabb) -> f32 {

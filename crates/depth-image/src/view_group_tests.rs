@@ -1,4 +1,4 @@
-//! Closed forms.
+//! Tests against closed forms.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use super::*;
 
 const SIZE: UVec2 = UVec2::new(40, 30);
 const SCENE: Aabb = Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE };
-/// Of all eyes below.
+/// Distance of all eyes below.
 const DISTANCE_M: f32 = 4.0;
 
 fn towards_middle(azimuth_rad: f32) -> PinholeCamera {
@@ -29,7 +29,7 @@ fn cameras(groups: &[ViewGroup]) -> Vec<Vec<PinholeCamera>> {
 }
 
 #[test]
-fn what_is_near_is_one_group() {
+fn near_views_form_one_group() {
     let near: Vec<_> = (0..9).map(|i| towards_middle(0.02 * i as f32)).collect();
     let groups = grouped(&near);
     assert_eq!(groups.len(), 1);
@@ -38,10 +38,10 @@ fn what_is_near_is_one_group() {
 }
 
 #[test]
-fn a_circle_is_short_arcs_of_two_ends() {
+fn a_circle_splits_into_arcs_of_two_cameras() {
     let views = circle(360);
     let groups = grouped(&views);
-    // Edges are measured along the axes: an arc that runs across both is up to √2 longer. 18 at the least; halving finds 24.
+    // Edges are measured along the axes: an arc across both is up to √2 longer. The minimum is 18; halving finds 24.
     assert_eq!(groups.len(), 24);
     for group in &groups {
         assert!(longest(&group.bounds, group.distance_m).1 <= 1.0);
@@ -51,13 +51,13 @@ fn a_circle_is_short_arcs_of_two_ends() {
 }
 
 #[test]
-fn a_view_goes_to_the_set_that_was_made_for_it() {
+fn the_nearest_set_of_a_view_is_that_of_its_group() {
     let groups = grouped(&circle(360));
     for (number, group) in groups.iter().enumerate() {
         for view in &group.views {
             assert!(group.serves(view, &SCENE));
             let nearest = nearest_set(view, cameras(&groups), &SCENE).unwrap();
-            // Arcs of ends stand a little inside: at its end a view may be as near to the next.
+            // Sample cameras stand a little inside their arc: a view at its end may be as near to the next set.
             assert!(nearest == number || groups[nearest].length_with(view, &SCENE) < 1.05, "{number} {nearest}");
         }
     }
@@ -65,7 +65,7 @@ fn a_view_goes_to_the_set_that_was_made_for_it() {
 }
 
 #[test]
-fn who_looks_the_other_way_is_in_another_group() {
+fn opposite_views_are_in_different_groups() {
     let here = towards_middle(0.0);
     let back = PinholeCamera::looking_at(here.eye_in_world, here.eye_in_world * 2.0, Vec3::Y, 0.8, SIZE);
     let groups = grouped(&[here, back]);
@@ -76,9 +76,8 @@ fn who_looks_the_other_way_is_in_another_group() {
     }
 }
 
-/// Clients that come one after the other share sets; nothing changes for those that are far away.
 #[test]
-fn groups_grow_and_others_stay() {
+fn a_near_view_extends_its_group_and_leaves_others_unchanged() {
     let mut groups = grouped(&[towards_middle(0.0), towards_middle(2.0)]);
     let before = groups.clone();
     ViewGroup::add(&mut groups, &[towards_middle(0.1)], &SCENE);
@@ -87,10 +86,10 @@ fn groups_grow_and_others_stay() {
     assert_eq!(far.len(), 1, "one has grown");
     let grown = groups.clone();
     ViewGroup::add(&mut groups, &[towards_middle(0.05), towards_middle(2.0)], &SCENE);
-    assert_eq!(groups, grown, "they are in what there is");
+    assert_eq!(groups, grown, "both views are inside existing groups");
     let mut wide = towards_middle(0.05);
     wide.focal_px *= 0.5;
-    assert!(!groups.iter().any(|group| group.serves(&wide, &SCENE)), "sees more");
+    assert!(!groups.iter().any(|group| group.serves(&wide, &SCENE)), "its field of view is wider");
     ViewGroup::add(&mut groups, &[wide], &SCENE);
     assert!(groups.len() == 2 && groups.iter().any(|group| group.serves(&wide, &SCENE)));
     ViewGroup::add(&mut groups, &[towards_middle(1.0)], &SCENE);
@@ -100,8 +99,8 @@ fn groups_grow_and_others_stay() {
 #[test]
 fn eyes_in_the_middle_of_the_scene_are_grouped_too() {
     let aims = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
-    let look = aims.map(|aim| PinholeCamera::looking_at(Vec3::ZERO, aim, Vec3::Y, 1.0, SIZE));
-    let groups = grouped(&look);
+    let views = aims.map(|aim| PinholeCamera::looking_at(Vec3::ZERO, aim, Vec3::Y, 1.0, SIZE));
+    let groups = grouped(&views);
     assert_eq!(groups.len(), 6);
     for group in &groups {
         let [sample] = group.sample_cameras(SIZE)[..] else { panic!("one place") };
@@ -109,6 +108,6 @@ fn eyes_in_the_middle_of_the_scene_are_grouped_too() {
     }
     let nowhere = Aabb { min: Vec3::ZERO, max: Vec3::ZERO };
     let mut groups = Vec::new();
-    ViewGroup::add(&mut groups, &look, &nowhere);
+    ViewGroup::add(&mut groups, &views, &nowhere);
     assert_eq!(groups.len(), 6);
 }

@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use depth_image::View;
+
 use crate::{MetricsError, error::expect_len};
 
 /// An 8-bit sRGB image, three bytes a pixel, rows top-down.
@@ -24,6 +26,14 @@ impl<'a> Rgb8Image<'a> {
         }
         expect_len("image", srgb8.len(), width_px as usize * height_px as usize * 3)?;
         Ok(Self { width_px, height_px, srgb8 })
+    }
+
+    /// Borrows the colour of a view.
+    ///
+    /// # Errors
+    /// A side of 0, or a plane that is not of the view's size.
+    pub fn of_view(view: &'a View) -> Result<Self, MetricsError> {
+        Self::new(view.size_px.x, view.size_px.y, view.srgb8.as_slice())
     }
 
     /// Drops the alpha of four bytes a pixel.

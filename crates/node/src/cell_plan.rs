@@ -3,8 +3,8 @@
 use std::ops::Deref;
 use std::sync::Arc;
 
+use cluster::Assignment;
 use tonic::Status;
-use wire::Assignment;
 
 /// The plan of one view cell: its images are all the images there are. Clones share it.
 #[derive(Debug, Clone)]

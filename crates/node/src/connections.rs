@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
+use cluster::limits::MAX_NODES;
 use tokio::sync::Mutex;
 use tonic::Status;
 use tonic::transport::Channel;
-use wire::limits::MAX_NODES;
 use wire::rpc::connect;
 
 /// Channels by address. A channel reconnects by itself.

@@ -3,10 +3,10 @@
 use std::any::Any;
 use std::sync::Arc;
 
+use cluster::Refinement;
 use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, View, ViewPlanes};
 use glam::Vec3;
 use tonic::Status;
-use wire::Refinement;
 
 /// What a node can do on its device. Calls block; services run them on blocking threads. Methods,
 /// sampling and lighting are text, as on the command line, parsed here.

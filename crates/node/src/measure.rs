@@ -3,10 +3,11 @@
 
 use std::time::Instant;
 
+use cluster::{Costs, MeasureCosts, ROW_PARTS, Refinement, TileCosts, Workload};
+use codec::encode_view;
+use codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet, decode_depth_image, encode_depth_image};
 use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
 use tonic::Status;
-use wire::codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet, decode_depth_image, encode_depth_image};
-use wire::{Costs, MeasureCosts, ROW_PARTS, Refinement, Workload, encode_view};
 
 use crate::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 
@@ -50,15 +51,10 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
     let (made, reconstruct_view_s) = reconstruct_view_s(engine, set.as_ref(), request)?;
     let in_order = engine.samples_in_order(&workload.sampling)?;
     let sample_image_s = sample_s / encoded.len().max(1) as f64;
-    let (sample_overhead_s, sample_row_shares) = if engine.samples_alone(&workload.sampling)? {
-        parts_of(engine, &sample, sample_image_s)?
-    } else {
-        (sample_image_s, [0.0; ROW_PARTS])
-    };
+    let is_tileable = engine.samples_alone(&workload.sampling)?;
     Ok(Costs {
         sample_image_s,
-        sample_overhead_s,
-        sample_row_shares,
+        tiles: if is_tileable { tile_costs(engine, &sample, sample_image_s)? } else { None },
         direct_view_s: direct_view_s(engine, request)?,
         reconstruct_view_s,
         load_set_s,
@@ -73,17 +69,12 @@ fn sampled(engine: &dyn Engine, work: &SampleWork) -> Result<Vec<EncodedDepthIma
     images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec)).collect()
 }
 
-/// What every tile of an image costs beyond its rows, by a tile of one row; and how rows share the rest, by quarters of the
-/// height, each of another image, for images differ. Images of too few rows are not cut.
-fn parts_of(
-    engine: &dyn Engine,
-    whole: &SampleWork,
-    sample_image_s: f64,
-) -> Result<(f64, [f64; ROW_PARTS]), MeasureError> {
-    let uncut = (sample_image_s, [0.0; ROW_PARTS]);
-    let Some(Camera::Pinhole(first)) = whole.cameras.first().copied() else { return Ok(uncut) };
+/// The overhead of a tile, by a tile of one row, and the shares of rows, by quarters of the height, each of another image,
+/// for images differ. Images of too few rows are not tileable.
+fn tile_costs(engine: &dyn Engine, whole: &SampleWork, sample_image_s: f64) -> Result<Option<TileCosts>, MeasureError> {
+    let Some(Camera::Pinhole(first)) = whole.cameras.first().copied() else { return Ok(None) };
     if whole.cameras.iter().any(|Camera::Pinhole(camera)| (camera.size_px.y as usize) < ROW_PARTS) {
-        return Ok(uncut);
+        return Ok(None);
     }
     let tile_s = |camera: Camera| {
         let work = SampleWork { cameras: vec![camera], wanted: vec![0], ..whole.clone() };
@@ -94,14 +85,14 @@ fn parts_of(
     for (quarter, camera) in whole.cameras.iter().cycle().take(ROW_PARTS).enumerate() {
         quarters_s[quarter] = tile_s(camera.tile(quarter as u32, ROW_PARTS as u32))?;
     }
-    Ok(overhead_and_shares(sample_image_s, row_s, quarters_s))
+    Ok(split_into_overhead_and_shares(sample_image_s, row_s, quarters_s))
 }
 
-fn overhead_and_shares(sample_image_s: f64, row_s: f64, quarters_s: [f64; ROW_PARTS]) -> (f64, [f64; ROW_PARTS]) {
+fn split_into_overhead_and_shares(sample_image_s: f64, row_s: f64, quarters_s: [f64; ROW_PARTS]) -> Option<TileCosts> {
     let overhead_s = quarters_s.iter().copied().fold(row_s.min(sample_image_s), f64::min);
     let rows_s = quarters_s.map(|tile_s| tile_s - overhead_s);
     let all_s: f64 = rows_s.iter().sum();
-    (overhead_s, if all_s > 0.0 { rows_s.map(|tile_s| tile_s / all_s) } else { [0.0; ROW_PARTS] })
+    TileCosts::of_image(sample_image_s, overhead_s, (all_s > 0.0).then(|| rows_s.map(|tile_s| tile_s / all_s)))
 }
 
 fn codec(error: impl ToString) -> MeasureError {

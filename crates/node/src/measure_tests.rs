@@ -4,9 +4,9 @@ use std::any::Any;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use cluster::{SceneHash, SceneRef, Timeline};
 use depth_image::{Aabb, Illumination, SpecularPlanes};
 use glam::{UVec2, Vec3};
-use wire::{SceneHash, SceneRef, Timeline};
 
 use super::*;
 use crate::UploadedSet;
@@ -178,7 +178,8 @@ fn what_a_tile_costs_beyond_its_rows_follows_from_tiles_of_all_heights() {
     let engine = Sleeper { parts_s: Some((0.02, [0.0, 0.0, 0.04, 0.04])), ..Sleeper::default() };
     let (costs, _) = measured(engine, 1);
     assert!((0.1..0.12).contains(&costs.sample_image_s), "{costs:?}");
-    assert!((0.01..0.03).contains(&costs.sample_overhead_s), "{costs:?}");
-    let [a, b, c, d] = costs.sample_row_shares;
+    let tiles = costs.tiles.unwrap();
+    assert!((0.01..0.03).contains(&tiles.overhead_s), "{costs:?}");
+    let [a, b, c, d] = tiles.row_shares.unwrap();
     assert!(a.max(b) < 0.1 && (0.4..0.6).contains(&c) && (0.4..0.6).contains(&d), "{costs:?}");
 }

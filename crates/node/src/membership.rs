@@ -3,11 +3,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use cluster::{JoinCluster, NodeStatus, Welcome, WorkReport};
 use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
 use wire::rpc::{CoordinatorClient, connect};
-use wire::{JoinCluster, NodeStatus, Welcome, WorkReport};
 
 use crate::warm::warm_up;
 use crate::{CurrentPlan, Scenes, WorkDone};

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use cluster::Assignment;
 use tokio::sync::watch;
 use tonic::Status;
-use wire::Assignment;
+use wire::refuse_plan;
 
 /// The node's name and what it was last told.
 #[derive(Debug, Clone)]
@@ -87,10 +88,10 @@ impl CurrentPlan {
     pub fn require(&self, plan_epoch: u64) -> Result<Arc<Assignment>, Status> {
         match self.in_force() {
             Some(plan) if plan.plan_epoch == plan_epoch => Ok(plan),
-            Some(plan) => Err(plan.refusal(format!(
-                "plan_epoch {plan_epoch} is not in force on {}, {} is",
-                self.node_name, plan.plan_epoch
-            ))),
+            Some(plan) => Err(refuse_plan(
+                &plan,
+                format!("plan_epoch {plan_epoch} is not in force on {}, {} is", self.node_name, plan.plan_epoch),
+            )),
             None => Err(Status::failed_precondition(format!(
                 "plan_epoch {plan_epoch} is not in force on {}, none is",
                 self.node_name
@@ -101,9 +102,9 @@ impl CurrentPlan {
 
 #[cfg(test)]
 mod tests {
+    use cluster::{Policy, SceneHash, SceneRef, Timeline, Workload};
     use depth_image::{Aabb, Illumination};
     use glam::Vec3;
-    use wire::{Policy, SceneHash, SceneRef, Timeline, Workload};
 
     use super::*;
 

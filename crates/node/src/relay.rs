@@ -1,7 +1,7 @@
 //! Images that a node has from others and passes on to others.
 
+use codec::EncodedDepthImage;
 use tonic::{Status, async_trait};
-use wire::EncodedDepthImage;
 use wire::rpc::Messages;
 
 use crate::CellPlan;

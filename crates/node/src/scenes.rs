@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use std::{fs, io};
 
+use cluster::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, SceneRef};
 use tokio::sync::Mutex;
 use tonic::Status;
 use wire::rpc::{CoordinatorClient, connect};
-use wire::{FetchScene, SceneAssembly, SceneHash, SceneRef};
 
 use crate::{Engine, NodeConfig, blocking, next_within};
 
@@ -75,16 +75,20 @@ impl Scenes {
         let mut parts = client.fetch_scene(FetchScene { hash: scene.hash.clone(), offset_bytes: 0 }).await?;
         let mut assembly = SceneAssembly::new(scene.clone());
         while let Some(part) = next_within(&mut parts, self.part_deadline, "scene").await? {
-            assembly.push(&part)?;
+            assembly.push(&part).map_err(spoilt)?;
         }
         let (folder, hash) = (self.folder.clone(), scene.hash.clone());
         blocking(move || {
-            let package = assembly.finish()?;
+            let package = assembly.finish().map_err(spoilt)?;
             keep(folder.as_deref(), &hash, &package);
-            Ok::<_, wire::WireError>(package)
+            Ok::<_, Status>(package)
         })
         .await
     }
+}
+
+fn spoilt(error: SceneAssemblyError) -> Status {
+    Status::data_loss(error.to_string())
 }
 
 fn file_of(folder: &Path, hash: &SceneHash) -> PathBuf {

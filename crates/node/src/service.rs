@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use cluster::{Assignment, Costs, MeasureCosts, Ready};
 use tonic::{Status, async_trait};
-use wire::{Assignment, Costs, MeasureCosts, Ready, rpc};
+use wire::rpc;
 
 use crate::{CurrentPlan, Engine, NodeMetrics, Scenes, blocking, measure_costs};
 

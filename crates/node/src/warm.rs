@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
+use cluster::{Assignment, Policy, Workload};
 use depth_image::{Camera, ViewPlanes};
 use glam::UVec2;
 use tonic::Status;
 use wire::rpc::CoordinatorClient;
-use wire::{Assignment, Policy, Workload};
 
 use crate::measure::{direct_work, sample_set, sample_work};
 use crate::{CurrentPlan, Engine, EngineError, Scenes, ViewWork, blocking};

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use wire::MeasuredCosts;
+use cluster::MeasuredCosts;
 
 /// What takes time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

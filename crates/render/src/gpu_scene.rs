@@ -6,7 +6,7 @@ use std::sync::{
 };
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Aabb, Highlight};
+use depth_image::{Aabb, Highlight, MAX_LIGHTS};
 use glam::{Affine3A, Mat3, Vec3};
 use gpu::{Gpu, GpuError, switches, uniform_elements};
 use indexmap::IndexSet;
@@ -35,9 +35,6 @@ pub(crate) struct GpuObject {
     pub phong_reflector: u32,
     pub instance: u32,
 }
-
-/// Lights travel in a uniform.
-const MAX_LIGHTS: u64 = 255;
 
 /// The part of the scene that is the same for every vertex and fragment.
 #[repr(C)]
@@ -187,7 +184,7 @@ fn check_sizes(gpu: &Gpu, scene: &Scene) -> Result<(), GpuError> {
     let vertices: usize = scene.meshes.iter().map(|mesh| mesh.vertices.len()).sum();
     let bytes = (vertices * size_of::<scene::Vertex>()) as u64;
     GpuError::check_limit("the scene's vertices (bytes)", bytes, gpu.device.limits().max_buffer_size)?;
-    GpuError::check_limit("the scene's lights", scene.illumination.lights.len() as u64, MAX_LIGHTS)?;
+    GpuError::check_limit("the scene's lights", scene.illumination.lights.len() as u64, MAX_LIGHTS as u64)?;
     let side = u64::from(gpu.device.limits().max_texture_dimension_2d);
     let largest = scene.textures.iter().map(|t| u64::from(t.width_px.max(t.height_px))).max().unwrap_or(0);
     GpuError::check_limit("the scene's largest texture (side in pixels)", largest, side)

@@ -1,5 +1,5 @@
-//! Prints what scenes hold and how long they take: `cargo run --release -p scene --example inspect --
-//! tree-terrain-500k model.glb`.
+//! Prints the contents and loading times of scenes:
+//! `cargo run --release -p scene --example inspect -- tree-terrain-500k model.glb`.
 
 use std::time::Instant;
 

@@ -1,11 +1,11 @@
-//! What can be wrong with a scene: where, which element, and why.
+//! Errors of scenes: the file, the element and the reason.
 
 use std::fmt;
 use std::path::Path;
 
 use depth_image::LightError;
 
-/// A scene that cannot be used. Display reads `file: element: reason`.
+/// An unusable scene. Display reads `file: element: reason`.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {element}: {kind}")]
 pub struct SceneError {
@@ -17,34 +17,26 @@ pub struct SceneError {
     pub kind: SceneErrorKind,
 }
 
-/// Why a scene cannot be used.
+/// The reason for which a scene is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneErrorKind {
     /// The operating system refused.
     #[error("cannot be read or written: {0}")]
     Io(#[from] std::io::Error),
-    /// The bytes are not what the format says.
+    /// The bytes violate the format.
     #[error("{0}")]
     Malformed(String),
-    /// Well-formed, but a feature that this program does not have.
+    /// The file is well-formed and uses a feature that this program lacks.
     #[error("not supported: {0}")]
     Unsupported(String),
-    /// A reference to something outside the scene's folder.
+    /// The file refers to something outside the scene's folder.
     #[error("refers to {reference:?}, which {reason}")]
-    Forbidden {
-        /// What the file asked for.
-        reference: String,
-        /// Why it does not get it.
-        reason: &'static str,
-    },
-    /// More than [`crate::Limits`] allows.
+    #[allow(missing_docs, reason = "self-naming fields")]
+    Forbidden { reference: String, reason: &'static str },
+    /// A number exceeds [`crate::Limits`].
     #[error("{actual} is over the limit of {limit}")]
-    TooLarge {
-        /// What the file asked for.
-        actual: u64,
-        /// What is allowed.
-        limit: u64,
-    },
+    #[allow(missing_docs, reason = "self-naming fields")]
+    TooLarge { actual: u64, limit: u64 },
 }
 
 /// A [`SceneError`] before the file's name is known.
@@ -92,7 +84,7 @@ impl Fault {
     }
 }
 
-/// `Err` when `actual` is over `limit`.
+/// Fails when `actual` is over `limit`.
 pub(crate) fn at_most(element: impl fmt::Display, actual: u64, limit: u64) -> Result<(), Fault> {
     if actual > limit { Err(Fault::new(element, SceneErrorKind::TooLarge { actual, limit })) } else { Ok(()) }
 }

@@ -4,9 +4,9 @@
 //! World space is right-handed, in metres, +Y up (glTF). Positions are `f32` around
 //! [`Scene::origin_in_source`], so that geometry in national-grid coordinates loses no precision.
 //!
-//! Every scene that comes from outside, from a file ([`load_file`]) or from a peer ([`unpack`]), has
-//! passed [`Scene::validate`]; sizes are checked against [`Limits`] before memory is taken for them,
-//! and what does not pass is a [`SceneError`] that names the file, the element and the reason.
+//! Every scene from a file ([`load_file`]) or from a peer ([`unpack`]) has passed [`Scene::validate`]. Sizes are
+//! checked against [`Limits`] before memory is allocated for them. A refusal is a [`SceneError`] that names the file,
+//! the element and the reason.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 

@@ -1,9 +1,9 @@
-//! Parts that lights have in common.
+//! Common parts of all kinds of lights.
 
 use depth_image::Light;
 use glam::Vec3;
 
-/// What a light gives off, in the unit of its kind.
+/// The strength of a light, in the unit of its kind.
 pub(crate) fn color_mut(light: &mut Light) -> &mut Vec3 {
     match light {
         Light::Directional { irradiance_linear: color, .. }
@@ -19,7 +19,7 @@ pub(crate) fn color(light: &Light) -> Vec3 {
     *color_mut(&mut light)
 }
 
-/// `None` for light from infinitely far away.
+/// Position of a light; `None` for parallel light.
 pub(crate) fn position_mut(light: &mut Light) -> Option<&mut Vec3> {
     match light {
         Light::Directional { .. } => None,

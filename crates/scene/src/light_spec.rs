@@ -15,65 +15,61 @@ use glam::{DVec3, Vec3};
 /// rectangle at=X,Y,Z u=X,Y,Z v=X,Y,Z [radiance=V]
 /// ```
 ///
-/// A colour V is a grey, `R,G,B` in linear RGB, or `#rrggbb` in sRGB. Where it is left out it is 1; a sun is
-/// then as wide as the real one, a spot has glTF's cones (0° and 45°), and lamps are points. A sun's `towards`
-/// is where it stands, a spot's where it shines. `angle` and `radius` are half of what is seen; `u` and `v`
-/// lead from a rectangle's middle to those of two edges, and it shines to the side of `u × v`. Positions are in
-/// metres, in the coordinates of the scene's source: [`Scene::lit_by`](crate::Scene::lit_by) takes them so.
+/// A colour V is a grey, `R,G,B` in linear RGB, or `#rrggbb` in sRGB; its default is 1. By default a sun has the real
+/// sun's angle, a spot glTF's cones (0° and 45°), and lamps have no radius. A sun's `towards` points to the sun, a
+/// spot's along its light. `angle` and `radius` are half the apparent extent. The vectors `u` and `v` lead from a
+/// rectangle's middle to the middles of two edges; it shines to the side of `u × v`. Positions are in metres, in the
+/// coordinates of the scene's source, as in [`Scene::lit_by`](crate::Scene::lit_by).
 ///
-/// Displayed so that it is parsed as the same light.
+/// The display form parses to the same light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightSpec(pub Light);
 
-/// An environment as text: one colour as in [`LightSpec`], or two, `ZENITH/NADIR`. Displayed so that it is
-/// parsed as the same.
+/// An environment as text: one colour as in [`LightSpec`], or two, `ZENITH/NADIR`. The display form parses to the same
+/// environment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnvironmentSpec(pub Environment);
 
-/// Why a text is no light, or no environment. Display reads `field: reason`.
+/// A text that is no light or environment. Display reads `field: reason`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {kind}")]
 pub struct LightSpecError {
-    /// The field's name as it is written.
+    /// The field's name in the text.
     pub field: String,
     /// The reason; Display includes it, so it is no source.
     pub kind: LightSpecErrorKind,
 }
 
-/// What is wrong with a field.
+/// The reason for which a field is refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LightSpecErrorKind {
-    /// It is not one of those that there are.
+    /// The kind or field does not exist.
     #[error("unknown; known are {}", .0.join(", "))]
     Unknown(&'static [&'static str]),
-    /// It is there twice.
+    /// The field occurs twice.
     #[error("given twice")]
     Repeated,
-    /// It is needed and not there.
+    /// A required field is missing.
     #[error("missing")]
     Missing,
-    /// Its text does not say what it should.
+    /// The text has another form than expected.
     #[error("{text:?} is not {expected}")]
-    Malformed {
-        /// What is there.
-        text: String,
-        /// What should be.
-        expected: &'static str,
-    },
-    /// No light can have this value.
+    #[allow(missing_docs, reason = "self-naming fields")]
+    Malformed { text: String, expected: &'static str },
+    /// The value is out of range for a light.
     #[error("{0}")]
     Invalid(&'static str),
 }
 
 const KINDS: &[&str] = &["sun", "point", "spot", "rectangle"];
-/// Of the sun as seen from here.
+/// Angular radius of the real sun.
 const SUN_RADIUS_DEG: f64 = 0.27;
-/// `KHR_lights_punctual`'s.
+/// Default cones of `KHR_lights_punctual`.
 const SPOT_CONES_DEG: [f64; 2] = [0.0, 45.0];
-/// Squared lengths this near to 1 are left as they are: what was normalised once stays the same to the bit.
+/// Vectors whose squared length is this close to 1 stay unchanged, so that a normalised vector keeps its bits.
 const UNIT_TOLERANCE: f64 = 1e-6;
 
-/// The fields of one kind of light to that light.
+/// Makes one kind of light from its fields.
 type Read = fn(&Fields) -> Result<Light, LightSpecError>;
 
 impl FromStr for LightSpec {
@@ -145,7 +141,7 @@ impl FromStr for EnvironmentSpec {
     }
 }
 
-/// `name=value` pairs, each known and there once.
+/// `name=value` pairs; each name is known and occurs once.
 struct Fields<'a>(Vec<(&'a str, &'a str)>);
 
 impl<'a> Fields<'a> {
@@ -231,7 +227,7 @@ fn malformed(field: &str, text: &str, expected: &'static str) -> LightSpecError 
     wrong(field, LightSpecErrorKind::Malformed { text: text.to_owned(), expected })
 }
 
-/// The model's name of a field to the one that is written.
+/// Renames a field of the model to its name in the text.
 fn invalid(error: &LightError) -> LightSpecError {
     let field = match error.field {
         "towards_light" | "forward" => "towards",
@@ -295,7 +291,7 @@ impl fmt::Display for Triple {
     }
 }
 
-/// One number where it is a grey.
+/// Displays a grey as one number.
 struct Color(Vec3);
 
 impl fmt::Display for Color {
@@ -305,7 +301,7 @@ impl fmt::Display for Color {
     }
 }
 
-/// Radians, shown with as few decimals as give the same radians again.
+/// Displays radians as degrees, with the fewest decimals that parse to the same radians.
 struct Degrees(f32);
 
 impl fmt::Display for Degrees {

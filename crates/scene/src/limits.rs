@@ -1,10 +1,10 @@
-//! How large a scene may be.
+//! Limits on the size of a scene.
 
-/// Bounds that are checked before memory is taken. The defaults hold a scene of several gigabytes;
-/// a service that takes scenes from strangers sets them lower.
+/// Bounds that are checked before memory is allocated. The defaults admit a scene of several gigabytes; a service for
+/// untrusted scenes needs lower bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes of a scene's file and all that it refers to, and of a package.
+    /// Bytes of a scene's file with all files that it refers to, and of a package.
     pub file_bytes: u64,
     /// Triangles, those of a mesh counted once for each of its instances.
     pub triangles: u64,
@@ -24,7 +24,7 @@ pub struct Limits {
     pub json_objects: u64,
     /// Materials and cameras, each.
     pub attributes: u64,
-    /// Light sources. What is seen of each from a sample is named by a byte.
+    /// Light sources. Each has a byte of visibility in every sample.
     pub lights: u64,
 }
 

@@ -6,8 +6,7 @@ use glam::{Affine3A, Vec3};
 use crate::{Mesh, Scene};
 
 impl Scene {
-    /// The box around everything at every scene time, the wind's sway included. Empty for a scene
-    /// without vertices.
+    /// The box around all surfaces at every scene time, including the wind's sway. Empty for a scene without vertices.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         let boxes = self.instances.iter().filter_map(|instance| {
@@ -32,7 +31,7 @@ impl Scene {
         self.instances.iter().map(|i| of(i.mesh)).sum()
     }
 
-    /// Whether the picture depends on scene time.
+    /// Returns whether the picture depends on scene time.
     #[must_use]
     pub fn is_animated(&self) -> bool {
         self.wind.is_some_and(|w| w.amplitude_m > 0.0)

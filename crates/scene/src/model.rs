@@ -1,13 +1,13 @@
-//! The scene itself: plain data, the same on every node.
+//! The scene as plain data, equal on every node.
 
 use depth_image::Illumination;
 use glam::{Affine3A, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// Everything that can be rendered. All indices are valid once a scene has been made by this crate.
+/// A renderable scene. All indices of a scene from this crate are valid.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
-    /// What to call it in reports.
+    /// Name of the scene in reports.
     pub name: String,
     /// Triangle meshes in their own space.
     pub meshes: Vec<Mesh>,
@@ -17,15 +17,15 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Images that materials refer to.
     pub textures: Vec<Texture>,
-    /// Light sources, and the light from all around. Nothing at all leaves the scene black, and valid.
+    /// Lamps and environment. A scene without light is black and valid.
     pub illumination: Illumination,
-    /// Colour where no surface is seen, linear RGB.
+    /// Colour of pixels without a surface, linear RGB.
     pub background_linear: Vec3,
     /// Cameras that the source file listed.
     pub cameras: Vec<SourceCamera>,
     /// Motion as a function of scene time; `None` for a static scene.
     pub wind: Option<Wind>,
-    /// The point of the source file's space that lies at the world's origin here.
+    /// The point of the source file's space that became the world's origin.
     pub origin_in_source: DVec3,
 }
 
@@ -45,9 +45,9 @@ pub struct Mesh {
 pub struct MeshPart {
     /// First of its entries in [`Mesh::indices`]; a multiple of three.
     pub first_index: u32,
-    /// How many entries; a multiple of three.
+    /// Number of entries; a multiple of three.
     pub index_count: u32,
-    /// Into [`Scene::materials`].
+    /// Index into [`Scene::materials`].
     pub material: u32,
 }
 
@@ -55,54 +55,53 @@ pub struct MeshPart {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Vertex {
-    /// In the mesh's space, metres.
+    /// Position in the mesh's space, metres.
     pub position: [f32; 3],
-    /// Unit length, in the mesh's space.
+    /// Unit normal in the mesh's space.
     pub normal: [f32; 3],
     /// Texture coordinates, (0,0) at the image's top left corner.
     pub uv: [f32; 2],
     /// Vertex colour, sRGB-encoded RGB and linear alpha; white where the source has none.
     pub color_srgba8: [u8; 4],
-    /// How far the wind moves this vertex, 0 (rooted) to 1.
+    /// Share of the wind's displacement, 0 (rooted) to 1.
     pub sway: f32,
 }
 
 /// A mesh placed in the world.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Instance {
-    /// Into [`Scene::meshes`].
+    /// Index into [`Scene::meshes`].
     pub mesh: u32,
-    /// Finite and invertible, and not a mirror: its determinant is positive, so that counter-clockwise
-    /// stays counter-clockwise.
+    /// Finite, with a positive determinant: without a mirror, counter-clockwise triangles stay so.
     pub world_from_mesh: Affine3A,
 }
 
 /// A surface: metallic-roughness as in glTF 2.0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Material {
-    /// The source's name, for messages.
+    /// Name in the source, for messages.
     pub name: String,
-    /// Multiplies texture and vertex colour; linear RGB and alpha.
+    /// Factor of texture and vertex colour, linear RGB and alpha.
     pub base_color_linear: [f32; 4],
-    /// Into [`Scene::textures`]; sRGB.
+    /// Index into [`Scene::textures`]; sRGB.
     pub base_color_texture: Option<u32>,
-    /// 0 dielectric, 1 metal; multiplied with the texture's where there is one.
+    /// 0 for a dielectric, 1 for a metal; multiplied by the texture's value.
     pub metallic: f32,
-    /// Perceptual roughness, 0 to 1; multiplied with the texture's where there is one.
+    /// Perceptual roughness, 0 to 1; multiplied by the texture's value.
     pub roughness: f32,
-    /// Into [`Scene::textures`]; green is roughness and blue is metallic, linear: `is_srgb` is false.
+    /// Index into [`Scene::textures`]; green is roughness and blue is metallic, linear: `is_srgb` is false.
     pub metallic_roughness_texture: Option<u32>,
-    /// Linear RGB radiance given off.
+    /// Emitted radiance, linear RGB.
     pub emissive_linear: Vec3,
-    /// Blinn-Phong specular strength and exponent for `phong` lighting; of a texture, for its mean.
+    /// Blinn-Phong specular strength and exponent for `phong` lighting; a texture counts by its mean.
     pub phong_specular: f32,
     /// See `phong_specular`.
     pub phong_exponent: f32,
-    /// Fragments with less alpha than this are not there; 0 for opaque surfaces.
+    /// Fragments with less alpha are discarded; 0 for opaque surfaces.
     pub alpha_cutoff: f32,
-    /// Whether the back is seen too (its normal then faces the viewer).
+    /// The back is visible too; its normal then faces the viewer.
     pub double_sided: bool,
-    /// Shown as it is, whatever the light (`KHR_materials_unlit`).
+    /// The colour is independent of light (`KHR_materials_unlit`).
     pub unlit: bool,
 }
 
@@ -129,8 +128,8 @@ impl Default for Material {
 const LEAST_MATT_ROUGHNESS: f32 = 0.95;
 
 impl Material {
-    /// Blinn-Phong strength and exponent whose highlight is about as bright and wide as that of a
-    /// metallic-roughness surface.
+    /// Blinn-Phong strength and exponent of a highlight about as bright and wide as that of a metallic-roughness
+    /// surface.
     #[must_use]
     pub fn phong_from_metallic_roughness(metallic: f32, roughness: f32) -> (f32, f32) {
         // Blinn-Phong and GGX agree near the peak for exponent = 2 / alpha^2 - 2 (Karis 2013).
@@ -139,18 +138,17 @@ impl Material {
         (strength, (2.0 / (alpha * alpha) - 2.0).clamp(1.0, 1024.0))
     }
 
-    /// Whether light that depends on the viewer matters for it under GGX. Samples keep such light apart from
-    /// what looks the same from everywhere, at a cost, and a scene should pay for no more than it needs. A
-    /// dielectric (reflectance 0.04 head on) of roughness 0.95 or more has a highlight of about a hundredth
-    /// of what a white surface reflects: that is left out. What a texture says of it is not looked at: it
-    /// may vary, and then it matters.
+    /// Returns whether the material has a visible highlight under GGX. Samples keep view-dependent light apart, at a
+    /// cost that a scene should pay only where it needs it. A dielectric (reflectance 0.04 head on) of roughness 0.95
+    /// or more reflects about a hundredth of a white surface's light, and counts as matt. A roughness texture always
+    /// counts as visible, because it may vary.
     #[must_use]
     pub fn is_specular(&self) -> bool {
         let is_smooth_or_metal = self.metallic > 0.0 || self.roughness < LEAST_MATT_ROUGHNESS;
         !self.unlit && (is_smooth_or_metal || self.metallic_roughness_texture.is_some())
     }
 
-    /// The perceptual roughness that goes with a Blinn-Phong exponent.
+    /// The perceptual roughness that corresponds to a Blinn-Phong exponent.
     #[must_use]
     pub fn roughness_from_phong_exponent(exponent: f32) -> f32 {
         (2.0 / (exponent.max(0.0) + 2.0)).powf(0.25).clamp(0.0, 1.0)
@@ -164,16 +162,16 @@ pub struct Texture {
     pub width_px: u32,
     /// Rows, at least 1.
     pub height_px: u32,
-    /// Whether RGB is sRGB-encoded, as colours are; else it is linear, as other data is.
+    /// RGB is sRGB-encoded (colours) or linear (other data).
     pub is_srgb: bool,
-    /// `width_px * height_px` texels, RGB as `is_srgb` says and linear alpha.
+    /// `width_px * height_px` texels of RGB, encoded as in `is_srgb`, and linear alpha.
     pub srgba8: Vec<u8>,
 }
 
 /// A camera named by the source file, for use as a view.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceCamera {
-    /// The source's name, or its number.
+    /// Name in the source, or its number.
     pub name: String,
     /// Camera to world: looking down -Z, +Y up.
     pub world_from_camera: Affine3A,
@@ -189,14 +187,14 @@ pub struct Wind {
     pub direction_in_world: Vec3,
     /// Largest displacement, metres.
     pub amplitude_m: f32,
-    /// Swings a second.
+    /// Frequency, swings a second.
     pub frequency_hz: f32,
     /// Spatial phase: a travelling wave's wave vector over 2π, per metre.
     pub waves_per_m: Vec3,
 }
 
 impl Wind {
-    /// How far a vertex at rest at `position_in_world` is displaced at `scene_time_s`; the vertex
+    /// Displacement, metres, at `scene_time_s` of a vertex whose rest position is `position_in_world`; the vertex
     /// shader's twin.
     #[must_use]
     pub fn displacement_in_world(&self, position_in_world: Vec3, sway: f32, scene_time_s: f32) -> Vec3 {

@@ -8,7 +8,7 @@ use crate::error::at_most;
 use crate::procedural::{self, GrassDensity, grass, tree_terrain};
 use crate::{Limits, Scene, SceneError, load_file};
 
-/// The names that are not files. Each `tree-terrain-…` may be followed by `-wind`, and `grass` by `:` and a
+/// Names of the built-in scenes. A `tree-terrain-…` may have the suffix `-wind`, and `grass` a `:` with a
 /// [density](GrassDensity). A file of such a name is reached as `./name`.
 pub const BUILT_IN_NAMES: [&str; 15] = [
     "tree-terrain-30k",
@@ -28,25 +28,25 @@ pub const BUILT_IN_NAMES: [&str; 15] = [
     "tree",
 ];
 
-/// Before the density of a meadow.
+/// The name before the density of a meadow.
 const GRASS: &str = "grass";
 
-/// The seed of the named trees, so that all nodes and all runs grow the same one.
+/// The seed of the named trees, equal on all nodes and in all runs.
 const TREE_SEED: u64 = 2007;
 
-/// Where a scene comes from.
+/// The origin of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SceneSpec {
     /// The paper's scene, by its number of triangles.
     TreeTerrain {
-        /// Within 3 %.
+        /// Number of triangles, met within 3 %.
         triangles: u32,
-        /// Whether the tree sways.
+        /// The tree sways in wind.
         wind: bool,
     },
-    /// The meadow.
+    /// The meadow of [`BUILT_IN_NAMES`].
     Grass {
-        /// How fine it is.
+        /// Density of the blades.
         density: GrassDensity,
     },
     /// One of the other [`BUILT_IN_NAMES`].
@@ -55,13 +55,13 @@ pub enum SceneSpec {
     File(PathBuf),
 }
 
-/// Why a text names no scene.
+/// A text that names no scene.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SceneSpecError {
-    /// What follows `grass:` is no number.
+    /// The density is not a number.
     #[error("grass: the density {0:?} is not a number")]
     DensityMalformed(String),
-    /// It is a number, and no meadow is made of it.
+    /// The density is out of range.
     #[error(
         "grass: the density {0:?} is not between {min} and {max}",
         min = GrassDensity::MIN,
@@ -71,10 +71,10 @@ pub enum SceneSpecError {
 }
 
 impl SceneSpec {
-    /// Makes or reads the scene, and lights it where its source does not.
+    /// Makes or reads the scene, and adds default lights to a scene without light.
     ///
     /// # Errors
-    /// Those of [`load_file`]; a meadow that is over the limits.
+    /// The errors of [`load_file`], and a meadow over the limits.
     pub fn load(&self, limits: &Limits) -> Result<Scene, SceneError> {
         match self {
             Self::File(path) => Ok(load_file(path, limits)?.with_default_lights()),
@@ -84,7 +84,7 @@ impl SceneSpec {
         }
     }
 
-    /// Sizes are known, and checked, before memory is taken.
+    /// Checks sizes before memory is allocated.
     fn sown(&self, density: GrassDensity, limits: &Limits) -> Result<Scene, SceneError> {
         at_most("triangles", density.triangles(), limits.triangles)
             .and_then(|()| at_most("vertices", density.vertices(), limits.vertices))
@@ -105,7 +105,7 @@ fn named(spec: &SceneSpec, scene: Scene) -> Scene {
 impl FromStr for SceneSpec {
     type Err = SceneSpecError;
 
-    /// What is no name is a file. Fails on a density that cannot be.
+    /// Parses a built-in name; any other text is a file. Fails on an invalid density.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let (base, wind) = text.strip_suffix("-wind").map_or((text, false), |base| (base, true));
         if let Some(triangles) = tree_triangles(base) {
@@ -119,7 +119,7 @@ impl FromStr for SceneSpec {
     }
 }
 
-/// `None` of what is no meadow.
+/// Parses a meadow; `None` for other names.
 fn grass_density(text: &str) -> Result<Option<GrassDensity>, SceneSpecError> {
     let density = match text.strip_prefix(GRASS) {
         Some("") => return Ok(Some(GrassDensity::ONE)),
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn every_name_is_shown_as_it_is_parsed() {
+    fn every_built_in_name_round_trips() {
         for name in BUILT_IN_NAMES {
             assert!(!matches!(parsed(name), SceneSpec::File(_)), "{name}");
             assert_eq!(parsed(name).to_string(), name);
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn all_else_is_a_file() {
+    fn any_other_name_is_a_file() {
         for text in [
             "quad.obj",
             "./quad",
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn densities_that_cannot_be_are_refused() {
+    fn invalid_densities_are_refused() {
         for text in ["", "x", "1,5", " 2", "2x", "16:1"] {
             let expected = SceneSpecError::DensityMalformed(text.into());
             assert_eq!(format!("grass:{text}").parse::<SceneSpec>(), Err(expected));
@@ -218,7 +218,7 @@ mod tests {
         }
     }
 
-    /// Made first, the larger one would take gigabytes.
+    /// The larger meadow would take gigabytes if it were made before the check.
     #[test]
     fn a_meadow_over_the_limits_is_refused_before_it_is_made() {
         let limits = Limits { triangles: 55_000, ..Limits::default() };
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn the_small_ones_load_lit_and_valid() {
+    fn built_in_scenes_load_lit_and_valid() {
         let limits = Limits::default();
         for name in BUILT_IN_NAMES.iter().filter(|n| !n.starts_with("tree-terrain") || n.ends_with("30k")) {
             let scene = parsed(name).load(&limits).unwrap();

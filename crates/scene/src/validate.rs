@@ -1,4 +1,4 @@
-//! What every scene must satisfy, wherever it comes from.
+//! Validation of scenes from any source.
 
 use depth_image::LightError;
 use glam::{Affine3A, Vec3};
@@ -15,10 +15,10 @@ pub const MAX_COORDINATE_M: f32 = 1e9;
 const MIN_RELATIVE_DETERMINANT: f32 = 1e-12;
 
 impl Scene {
-    /// Checks every promise of the model: indices in range, numbers finite, sizes within `limits`.
+    /// Checks every guarantee of the model: indices in range, numbers finite, sizes within `limits`.
     ///
     /// # Errors
-    /// Names the first element that breaks one.
+    /// The first element that violates one.
     pub fn validate(&self, limits: &Limits) -> Result<(), SceneError> {
         self.check(limits).map_err(|fault| fault.in_file(&*self.name))
     }

@@ -1,4 +1,4 @@
-//! Files cut at every length and with bytes changed at random: a scene or an error, and no panic.
+//! Files that are truncated at every length, or have bytes changed at random, give a scene or an error, and no panic.
 #![allow(clippy::unwrap_used)]
 
 mod samples;
@@ -10,7 +10,7 @@ use samples::{GltfCube, cube_obj, cube_ply_ascii, cube_ply_binary};
 use scene::procedural::{checker_sphere, unit_cube};
 use scene::{Limits, load_file, pack, unpack};
 
-/// Tight, so that a changed size cannot make the test slow.
+/// Tight limits keep a changed size from making the test slow.
 fn limits() -> Limits {
     Limits {
         vertices: 1_000_000,
@@ -30,7 +30,7 @@ impl Random {
     }
 }
 
-/// What counts, offsets and indices go wrong at.
+/// Numbers at which counts, offsets and indices fail.
 const EXTREMES: [&str; 16] = [
     "0",
     "1",
@@ -50,8 +50,8 @@ const EXTREMES: [&str; 16] = [
     "nan",
 ];
 
-/// One to three numbers of a text replaced whole: the syntax stays right, so that what they mean is
-/// reached, where a changed byte mostly ends in the parser.
+/// Replaces one to three whole numbers of a text. The syntax stays valid, so that the code behind the parser is tested;
+/// a changed byte mostly ends in the parser.
 fn with_other_numbers(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     let mut copy = bytes.to_vec();
     for _ in 0..=random.below(3) {
@@ -113,7 +113,7 @@ fn load_damaged(name: &str, bytes: &[u8], changed: usize) {
     assert!(refused > 100, "{name}: {loaded} loaded, {refused} refused");
 }
 
-/// As a new file: file systems flush one that is cut and written again, which takes most of the time.
+/// Writes a new file: file systems flush one that is truncated and written again, which takes most of the time.
 fn rewrite(path: &Path, bytes: &[u8]) {
     std::fs::remove_file(path).ok();
     std::fs::write(path, bytes).unwrap();

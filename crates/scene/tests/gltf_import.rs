@@ -1,4 +1,4 @@
-//! glTF: what it holds comes out, and what it must not hold is refused.
+//! Import of glTF: valid content is kept and invalid content is refused.
 #![allow(clippy::unwrap_used)]
 
 mod samples;
@@ -20,7 +20,7 @@ fn refused(change: impl FnOnce(&mut GltfCube)) -> String {
 }
 
 #[test]
-fn a_cube_has_twelve_flat_triangles_where_they_belong() {
+fn a_cube_has_twelve_flat_triangles_in_place() {
     let scene = load("cube.glb", &GltfCube::default().glb()).unwrap();
     assert_eq!((scene.triangle_count(), scene.name.as_str()), (12, "cube"));
     assert_eq!((scene.bounds().min, scene.bounds().max), (Vec3::splat(-0.5), Vec3::splat(0.5)));
@@ -94,7 +94,7 @@ fn strips_fans_and_unindexed_triangles() {
 }
 
 #[test]
-fn materials_keep_what_the_model_has_room_for() {
+fn materials_keep_the_factors_of_the_model() {
     let scene = load(
         "m.glb",
         &cube(|c| {
@@ -231,7 +231,7 @@ fn lights_of_any_unit_are_exposed_and_keep_their_ratios() {
         assert!(cross.abs() <= 1e-5 * sun_lux.max(lamp_candela), "{sun_lux} {lamp_candela}: {sun} {lamp}");
         assert!(lamp.x == 0.0 || lamp.distance(lamp.x * Vec3::new(1.0, 0.5, 0.25)) < 1e-5 * lamp.x);
     }
-    // Meant to be looked at as it is, bright or dim; and nothing cannot be made brighter.
+    // Lights within two stops of white, and a scene without light, stay unchanged.
     for (sun_lux, lamp_candela) in [(3.0, 1.0), (9.0, 9.0), (1.0, 0.0), (0.0, 0.0)] {
         let [sun, lamp] = read(sun_lux, lamp_candela);
         assert_eq!((sun.x, lamp.x), (sun_lux as f32 * FRAC_1_PI, lamp_candela as f32 * FRAC_1_PI));
@@ -271,7 +271,7 @@ fn lights_move_with_the_origin() {
 }
 
 #[test]
-fn lights_that_cannot_be_are_refused_by_file_light_and_field() {
+fn invalid_lights_are_refused_by_file_light_and_field() {
     let sun = r#""type":"directional""#;
     let cases = [
         (r#""type":"point","intensity":-1"#, "light 1: intensity"),
@@ -372,7 +372,7 @@ fn a_texture_with_coordinates_of_its_own_is_reduced_to_its_mean() {
 }
 
 #[test]
-fn factors_out_of_range_are_brought_into_it_and_infinite_ones_refused() {
+fn factors_out_of_range_are_clamped_and_infinite_ones_refused() {
     let material = |members: &str| {
         let material = format!(r#""materials":[{{"alphaMode":"MASK",{members}}}],"#);
         load("m.glb", &cube(|c| c.more = material).glb())
@@ -441,7 +441,7 @@ fn a_sparse_accessor_overwrites_its_base() {
 }
 
 #[test]
-fn counts_beyond_the_data_are_refused_before_memory_is_taken() {
+fn counts_beyond_the_data_are_refused_before_allocation() {
     let huge = |from: &str| cube(|c| c.accessors = c.accessors.replace(from, r#""count":2147483648"#));
     for from in [r#""count":8"#, r#""count":36"#] {
         assert!(refusal("bad.glb", &huge(from).glb()).contains("2147483648"));
@@ -457,7 +457,7 @@ fn counts_beyond_the_data_are_refused_before_memory_is_taken() {
 }
 
 #[test]
-fn references_to_nothing_are_refused_by_name() {
+fn dangling_references_are_refused_by_name() {
     assert!(refused(|c| c.primitive = r#"{"attributes":{"POSITION":7},"indices":1}"#.into()).contains("accessor 7"));
     assert!(refused(|c| c.primitive = r#"{"attributes":{"POSITION":0},"indices":9}"#.into()).contains("accessor 9"));
     assert!(refused(|c| c.primitive = r#"{"attributes":{"POSITION":0},"material":5}"#.into()).contains("material 5"));

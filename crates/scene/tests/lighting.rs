@@ -1,4 +1,4 @@
-//! Lights as text, the default lights, and what needs none.
+//! Lights as text, the default lights, and scenes without light.
 #![allow(clippy::unwrap_used)]
 
 use depth_image::linear_from_srgb8;
@@ -17,7 +17,7 @@ fn radians(degrees: f64) -> f32 {
 }
 
 #[test]
-fn every_kind_is_read_with_its_defaults_and_without() {
+fn every_kind_of_light_is_parsed_with_and_without_defaults() {
     let Light::Directional { towards_light_in_world, irradiance_linear, angular_radius_rad } =
         light("sun towards=0,3,4")
     else {
@@ -55,7 +55,7 @@ fn every_kind_is_read_with_its_defaults_and_without() {
 }
 
 #[test]
-fn environments_are_a_colour_or_two() {
+fn an_environment_is_one_colour_or_two() {
     let read = |text: &str| text.parse::<EnvironmentSpec>().unwrap().0;
     assert_eq!(read("0.25"), Environment::uniform(Vec3::splat(0.25)));
     assert_eq!(read(" #000000 "), Environment::default());
@@ -64,7 +64,7 @@ fn environments_are_a_colour_or_two() {
 }
 
 #[test]
-fn what_is_shown_is_read_as_the_same() {
+fn a_displayed_light_parses_to_the_same_light() {
     let texts = [
         "sun towards=-3,6,4",
         "sun towards=1,0,1e-3 irradiance=0.1,0.2,0.3 angle=2",
@@ -89,7 +89,7 @@ fn what_is_shown_is_read_as_the_same() {
 }
 
 #[test]
-fn what_is_no_light_is_refused_by_field() {
+fn an_invalid_light_is_refused_by_field() {
     use LightSpecErrorKind::{Invalid, Malformed, Missing, Repeated, Unknown};
     type IsKind = fn(&LightSpecErrorKind) -> bool;
     let (unknown, repeated, missing): (IsKind, IsKind, IsKind) =
@@ -151,7 +151,7 @@ fn what_is_no_light_is_refused_by_field() {
 }
 
 #[test]
-fn other_light_replaces_what_there_was_of_its_kind() {
+fn given_light_replaces_the_light_of_its_kind() {
     let cube = unit_cube();
     assert_eq!(cube.clone().lit_by(None, None), cube);
     let sky = Environment::uniform(Vec3::X);
@@ -190,7 +190,7 @@ fn the_default_lights_are_soft_and_under_a_sky() {
 }
 
 #[test]
-fn only_what_has_a_highlight_is_specular() {
+fn only_a_material_with_a_highlight_is_specular() {
     let matt = Material::default();
     assert!(!matt.is_specular() && !Material { roughness: 0.95, ..matt.clone() }.is_specular());
     let shiny = [

@@ -1,4 +1,4 @@
-//! OBJ and PLY: what they hold comes out, and what they must not hold is refused.
+//! Import of OBJ and PLY: valid content is kept and invalid content is refused.
 #![allow(clippy::unwrap_used)]
 
 mod samples;
@@ -51,7 +51,7 @@ fn mtl_materials_and_their_textures_are_found() {
 }
 
 #[test]
-fn mtl_numbers_out_of_range_are_brought_into_it() {
+fn mtl_numbers_out_of_range_are_clamped() {
     let library = b"newmtl a\nKd -1 0.5 2\nKs -0.1 0 0\nNs -3\nd 1.5\nnewmtl b\nKs 0.4\nNs 200\nnewmtl c\nNs 200\n";
     let faces = cube_obj().replace("f 5 6", "usemtl b\nf 5 6").replace("f 1 2", "usemtl c\nf 1 2");
     let scene = Sample::new("a.obj", format!("mtllib a.mtl\nusemtl a\n{faces}").as_bytes())
@@ -75,7 +75,7 @@ fn triangles_without_area_are_kept_with_unit_normals() {
     let rows = "0 0 0 1 2 3\n1 0 0 1 2 3\n2 0 0 1 2 3\n0 1 0 1 2 3\n3 0 1 3\n3 0 0 1\n3 2 2 2\n3 0 1 2\n";
     let ply = ply_header("ascii", 4, 4) + rows;
     assert_keeps_flat_ones(&load("flat.ply", ply.as_bytes()).unwrap(), 4);
-    // Nothing has area, and all of it is in one point.
+    // All triangles lie in one point.
     assert_keeps_flat_ones(&load("point.obj", b"v 7 7 7\nf 1 1 1\n").unwrap(), 1);
 }
 
@@ -136,7 +136,7 @@ fn bad_obj_lines_are_refused_by_number() {
 }
 
 #[test]
-fn ply_rows_that_the_file_cannot_hold_are_refused_before_memory_is_taken() {
+fn ply_rows_beyond_the_file_are_refused_before_allocation() {
     for (format, vertices, faces) in
         [("ascii", 1 << 31, 1), ("binary_little_endian", 8, usize::MAX), ("binary_big_endian", 1 << 40, 6)]
     {

@@ -1,4 +1,4 @@
-//! Packages and scenes made by arithmetic.
+//! Packages, and procedural scenes.
 #![allow(clippy::unwrap_used)]
 
 mod samples;
@@ -21,7 +21,7 @@ fn packing_is_deterministic_and_loses_nothing() {
 }
 
 #[test]
-fn hashes_are_shown_and_parsed() {
+fn hashes_round_trip_as_text() {
     let hash = pack(&unit_cube()).hash;
     assert_eq!(hash.to_string().parse::<SceneHash>().unwrap(), hash);
     assert_eq!(hash.to_string().len(), 64);
@@ -31,7 +31,7 @@ fn hashes_are_shown_and_parsed() {
 }
 
 #[test]
-fn a_scene_that_breaks_a_promise_is_not_unpacked() {
+fn an_invalid_scene_is_not_unpacked() {
     let broken: [fn(&mut Scene); 16] = [
         |s| s.meshes[0].indices[0] = 99,
         |s| s.meshes[0].vertices[3].position[1] = f32::NAN,
@@ -59,7 +59,7 @@ fn a_scene_that_breaks_a_promise_is_not_unpacked() {
 }
 
 #[test]
-fn a_light_that_cannot_be_is_named_with_its_field() {
+fn an_invalid_light_is_refused_with_its_field() {
     let lit_by = |lights| Scene { illumination: Illumination { lights, ..Illumination::default() }, ..unit_cube() };
     let with = |light| lit_by(vec![sun(), light]);
     let far = Vec3::X * 2e9;
@@ -126,7 +126,7 @@ fn the_limits_hold_for_packages() {
 }
 
 #[test]
-fn the_store_gives_back_only_what_has_its_hash() {
+fn the_store_returns_only_packages_with_the_right_hash() {
     let dir = tempfile::tempdir().unwrap();
     let store = PackageStore::open(dir.path().join("new/folder")).unwrap();
     let package = pack(&unit_cube());
@@ -142,7 +142,7 @@ fn the_store_gives_back_only_what_has_its_hash() {
 }
 
 #[test]
-fn trees_have_the_triangles_asked_for_and_stay_in_their_block() {
+fn trees_have_the_requested_triangles_and_stay_in_their_block() {
     for asked in [30_000u32, 125_000, 500_000] {
         let scene = tree_terrain(asked, 2007);
         scene.validate(&Limits::default()).unwrap();
@@ -197,7 +197,7 @@ fn the_wind_moves_leaves_and_neither_ground_nor_roots() {
 }
 
 #[test]
-fn small_scenes_are_what_they_say() {
+fn small_scenes_have_their_stated_geometry() {
     assert_eq!(unit_cube().triangle_count(), 12);
     assert!((signed_volume(&unit_cube()) - 1.0).abs() < 1e-6);
     let sphere = uv_sphere(2.0, 64);
@@ -210,7 +210,7 @@ fn small_scenes_are_what_they_say() {
 }
 
 #[test]
-fn a_quad_faces_where_it_is_told() {
+fn a_quad_faces_along_its_normal() {
     for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z, Vec3::new(1.0, 2.0, -3.0)] {
         let scene = quad(Vec3::new(0.0, 0.0, -4.0), 2.0, normal, [1, 2, 3]);
         scene.validate(&Limits::default()).unwrap();

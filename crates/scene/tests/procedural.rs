@@ -1,5 +1,5 @@
-//! The scenes of Xie, Wang and Popescu's *Non-redundant rendering*, made here: as large as theirs, sound, and the
-//! same each time.
+//! The stand-ins for the scenes of Xie, Wang and Popescu's *Non-redundant rendering*: equally large, valid and
+//! deterministic.
 
 #![allow(clippy::unwrap_used)]
 
@@ -20,7 +20,7 @@ fn triangles(mesh: &Mesh) -> impl Iterator<Item = [Vec3; 3]> + '_ {
 }
 
 #[test]
-fn they_have_as_many_triangles_as_the_papers() {
+fn stand_ins_have_as_many_triangles_as_the_papers_scenes() {
     for (name, expected, _) in SCENES {
         let count = load(name).triangle_count() as f64;
         assert!((count / expected - 1.0).abs() < 0.02, "{name} has {count}");
@@ -28,7 +28,7 @@ fn they_have_as_many_triangles_as_the_papers() {
 }
 
 #[test]
-fn they_are_valid_lit_matt_and_as_large_as_said() {
+fn stand_ins_are_valid_lit_matt_and_of_the_stated_size() {
     for (name, _, width_m) in SCENES {
         let scene = load(name);
         scene.validate(&Limits::default()).unwrap();
@@ -40,7 +40,7 @@ fn they_are_valid_lit_matt_and_as_large_as_said() {
 }
 
 #[test]
-fn they_are_the_same_each_time() {
+fn stand_ins_are_deterministic() {
     for (name, ..) in SCENES {
         assert!(load(name) == load(name), "{name}");
     }
@@ -48,7 +48,7 @@ fn they_are_the_same_each_time() {
 }
 
 #[test]
-fn no_triangle_is_without_area() {
+fn every_triangle_has_area() {
     for name in SCENES.map(|s| s.0).into_iter().chain(["blocks", "grass:4"]) {
         for (number, mesh) in load(name).meshes.iter().enumerate() {
             let flat = triangles(mesh).filter(|[a, b, c]| (b - a).cross(c - a).length_squared() <= 0.0).count();
@@ -57,9 +57,9 @@ fn no_triangle_is_without_area() {
     }
 }
 
-/// A triangle that is wound the wrong way is not seen from where its normals say it is.
+/// A triangle with the wrong winding is invisible from the side of its normals.
 #[test]
-fn triangles_face_where_their_normals_do() {
+fn triangles_face_along_their_normals() {
     for (name, ..) in SCENES {
         for mesh in &load(name).meshes {
             let normal = |i: u32| Vec3::from(mesh.vertices[i as usize].normal);
@@ -71,7 +71,7 @@ fn triangles_face_where_their_normals_do() {
                 })
                 .count();
             let share = against as f64 / triangles(mesh).count() as f64;
-            // Normals of leaves and blades are bent towards the whole, further than some of them are tilted.
+            // Normals of leaves and blades are bent towards the whole plant, further than some of them are tilted.
             let tolerated = if name == "grass" || name == "tree" { 0.25 } else { 0.002 };
             assert!(share <= tolerated, "{name}: {share}");
         }

@@ -2,11 +2,19 @@
 
 use std::num::NonZeroU32;
 
-use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, ViewPlanes};
-use glam::{UVec2, Vec3};
+use cluster::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
+use cluster::{
+    AchievedTime, Assignment, ChangeSession, ClusterStatus, CompositorShare, Costs, InvalidField, JoinCluster,
+    LiveRequest, MeasureCosts, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings, OfferStatus, Policy,
+    PolicyChoice, Quality, RenderViews, RequestedView, SamplerReport, SamplerShare, SceneHash, SceneRef, SessionEvent,
+    SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload,
+};
+use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
+use depth_image::{Aabb, Camera, Environment, Illumination, Light, MAX_LIGHTS, PinholeCamera, ViewPlanes};
+use glam::{DVec3, UVec2, Vec3};
 
-use crate::geometry::pinhole_to;
-use crate::*;
+use crate::convert::geometry::pinhole_to;
+use crate::{PROTOCOL_VERSION, WireError, plan_in_force, proto, refuse_plan};
 
 fn camera() -> PinholeCamera {
     PinholeCamera::looking_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(40, 30))
@@ -38,7 +46,7 @@ fn illumination() -> Illumination {
     Illumination { lights, environment: Environment { zenith_linear: Vec3::ONE, nadir_linear: Vec3::splat(0.1) } }
 }
 
-pub(crate) fn workload() -> Workload {
+fn workload() -> Workload {
     Workload {
         scene: SceneRef { hash: SceneHash::of(b"scene"), package_bytes: 5 },
         sample_cameras: vec![Camera::Pinhole(camera()); 2],
@@ -92,7 +100,7 @@ fn request() -> SessionRequest {
         policy: PolicyChoice::Auto,
         forced_sampler_count: None,
         refinement_steps: 4,
-        frames_per_s: 25.0,
+        frames_per_s: Some(25.0),
         fallbacks: vec![Quality {
             lighting: "unlit".to_owned(),
             method: "joint_carve:1".to_owned(),
@@ -119,6 +127,10 @@ fn views() -> RenderViews {
 #[test]
 fn messages_come_back() {
     assert_eq!(Assignment::try_from(proto::Assignment::from(assignment())), Ok(assignment()));
+    let mut cells = Assignment { tile_count: 2, relay_fanout: NonZeroU32::new(3), ..assignment() };
+    cells.workload.cell_first_indices = vec![0, 1];
+    cells.samplers[0].image_indices = vec![3, 1, 2, 0];
+    assert_eq!(Assignment::try_from(proto::Assignment::from(cells.clone())), Ok(cells));
     assert_eq!(SessionRequest::try_from(proto::OpenSessionRequest::from(request())), Ok(request()));
     assert_eq!(RenderViews::try_from(proto::RenderViewsRequest::from(views())), Ok(views()));
     let live =
@@ -133,8 +145,7 @@ fn messages_come_back() {
             load_set_s: 0.02,
             encode_view_s: 0.001,
             in_order: true,
-            sample_overhead_s: 0.03,
-            sample_row_shares: [0.1, 0.2, 0.3, 0.4],
+            tiles: Some(TileCosts { overhead_s: 0.03, row_shares: Some([0.1, 0.2, 0.3, 0.4]) }),
         },
         reason: "because".to_owned(),
         predicted_pipeline_s: 0.1,
@@ -145,7 +156,7 @@ fn messages_come_back() {
         enumerated_sampler_count: 2,
         predicted_enumerated_s: 0.5,
         scene_load_s: 0.0,
-        fallback_number: 1,
+        fallback_index: Some(0),
         frame_rate_ratio: 0.5,
     }));
     assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(plan.clone())), Ok(plan.clone()));
@@ -165,7 +176,7 @@ fn messages_come_back() {
         views_per_set: 70,
         conditions: vec![condition],
         achieved: vec![AchievedTime { policy: Policy::TimeShare, busy_s: 0.3 }],
-        utilisation: 0.6,
+        utilisation: Some(0.6),
         ..ClusterStatus::default()
     };
     assert_eq!(ClusterStatus::try_from(proto::GetStatusResponse::from(status.clone())), Ok(status));
@@ -176,10 +187,10 @@ fn messages_come_back() {
         reason: "corrupt".to_owned(),
     };
     assert_eq!(SamplerReport::try_from(proto::ReportSamplerRequest::from(report.clone())), Ok(report));
-    assert_eq!(Workload::from_bytes(&workload().to_bytes()), Ok(workload()));
     let opened = SessionEvent::Opened { session: 7 };
     assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(opened.clone())), Ok(opened));
-    let change = ChangeSession { session: 7, views_per_set: 0, frames_per_s: 12.5, viewpoints: vec![camera()] };
+    let change =
+        ChangeSession { session: 7, views_per_set: 0, frames_per_s: Some(12.5), viewpoints: Some(vec![camera()]) };
     assert_eq!(ChangeSession::try_from(proto::ChangeSessionRequest::from(change.clone())), Ok(change));
     assert_eq!(WorkReport::try_from(proto::ReportWorkRequest::from(work_report())), Ok(work_report()));
 }
@@ -211,65 +222,15 @@ fn bad_reports_and_demands_are_refused() {
 }
 
 #[test]
-fn tiles_are_images_of_their_own_to_samplers() {
-    let mut cut = Assignment { tile_count: 2, ..assignment() };
-    cut.samplers[0].image_indices = vec![0, 3];
-    let other = SamplerShare { node_name: "c".to_owned(), image_indices: vec![1, 2], ..cut.samplers[0].clone() };
-    cut.samplers.push(other);
-    assert_eq!(Assignment::try_from(proto::Assignment::from(cut.clone())), Ok(cut.clone()));
-    let heights: Vec<u32> = cut.sampled_cameras().iter().map(|Camera::Pinhole(c)| c.size_px.y).collect();
-    assert_eq!((heights.len(), heights[0] + heights[1]), (4, camera().size_px.y));
-    assert_eq!(cut.sets_at_once(), 1);
-    assert_eq!(cut.set_content(0), assignment().set_content(0), "a set shows the same however it is cut");
-    let lost = Assignment { tile_count: 4, ..cut.clone() };
-    assert!(refusal::<_, Assignment>(proto::Assignment::from(lost)).contains("image_indices"));
-    assert!(refusal::<_, Assignment>(proto::Assignment { tile_count: 17, ..cut.into() }).contains("tile_count is 17"));
-}
-
-#[test]
 fn a_refusal_names_the_plan_in_force() {
-    let refusal = assignment().refusal("plan_epoch 3 is not in force".to_owned());
-    assert_eq!((refusal.code(), Assignment::told_by(&refusal)), (tonic::Code::FailedPrecondition, Some(assignment())));
+    let refusal = refuse_plan(&assignment(), "plan_epoch 3 is not in force".to_owned());
+    assert_eq!((refusal.code(), plan_in_force(&refusal)), (tonic::Code::FailedPrecondition, Some(assignment())));
     let mut large = assignment();
     large.workload.sample_cameras = vec![Camera::Pinhole(camera()); 16];
     large.workload.illumination.lights = vec![illumination().lights[1]; 255];
-    let refusal = large.refusal(String::new());
-    assert!(Assignment::told_by(&refusal).is_none_or(|told| told == large), "whole or not at all");
-    assert_eq!(Assignment::told_by(&tonic::Status::failed_precondition("of something else")), None);
-}
-
-#[test]
-fn relays_reach_every_compositor() {
-    for fanout in [None, NonZeroU32::new(1), NonZeroU32::new(2), NonZeroU32::new(3)] {
-        let compositor = |i: u32| CompositorShare { node_name: format!("c{i}"), ..assignment().compositors[0].clone() };
-        let plan = Assignment { compositors: (0..10).map(compositor).collect(), relay_fanout: fanout, ..assignment() };
-        assert_eq!(Assignment::try_from(proto::Assignment::from(plan.clone())), Ok(plan.clone()));
-        let mut asked = std::collections::HashMap::new();
-        for i in 0..10 {
-            let (mut steps, mut at) = (0, format!("c{i}"));
-            while let Some(relay) = plan.relay_of(&at) {
-                (steps, at) = (steps + 1, relay.node_name.clone());
-            }
-            assert!(steps < 10, "the way ends at the samplers");
-            if let Some(relay) = plan.relay_of(&format!("c{i}")) {
-                assert!(plan.relays(&relay.node_name));
-                *asked.entry(relay.node_name.clone()).or_insert(0) += 1;
-            }
-        }
-        assert!(asked.values().all(|&count| count <= fanout.map_or(0, NonZeroU32::get)));
-        assert_eq!(asked.values().sum::<u32>(), 10 - fanout.map_or(10, NonZeroU32::get));
-    }
-}
-
-#[test]
-fn policies_have_names() {
-    for choice in [PolicyChoice::Auto, PolicyChoice::Pipeline, PolicyChoice::Direct, PolicyChoice::TimeShare] {
-        assert_eq!(choice.to_string().parse(), Ok(choice));
-        let asked = SessionRequest { policy: choice, ..request() };
-        assert_eq!(SessionRequest::try_from(proto::OpenSessionRequest::from(asked.clone())), Ok(asked));
-    }
-    let unknown = "best".parse::<PolicyChoice>().unwrap_err().to_string();
-    assert!(unknown.contains("\"best\"") && unknown.contains("time-share"), "{unknown}");
+    let refusal = refuse_plan(&large, String::new());
+    assert!(plan_in_force(&refusal).is_none_or(|told| told == large), "whole or not at all");
+    assert_eq!(plan_in_force(&tonic::Status::failed_precondition("of something else")), None);
 }
 
 fn refusal<P, D: TryFrom<P, Error = WireError>>(message: P) -> String {
@@ -395,23 +356,9 @@ fn bad_lights_are_refused() {
 #[test]
 fn as_many_lights_as_have_a_plane_come_back() {
     let light = illumination().lights[1];
-    let most = Illumination { lights: vec![light; limits::MAX_LIGHTS], ..illumination() };
-    assert_eq!(limits::MAX_VISIBILITY_PLANES, 64);
+    let most = Illumination { lights: vec![light; MAX_LIGHTS], ..illumination() };
+    assert_eq!(MAX_VISIBILITY_PLANES, 64);
     assert_eq!(Illumination::try_from(proto::Illumination::from(most.clone())), Ok(most));
-}
-
-#[test]
-fn a_still_picture_is_refined_set_by_set_and_a_moving_one_is_finished() {
-    let steps = |refinement_steps, step_s| {
-        let timeline = Timeline { start_s: 0.0, step_s, set_count: 8 };
-        let workload = Workload { refinement_steps, timeline, ..workload() };
-        (0..8).map(|set_index| workload.refinement(set_index)).collect::<Vec<_>>()
-    };
-    let of_4 = |step| Refinement { step, steps: 4 };
-    assert_eq!(steps(4, 0.0), [0, 1, 2, 3, 3, 3, 3, 3].map(of_4));
-    assert_eq!(steps(4, 0.1), [of_4(3); 8]);
-    assert_eq!(steps(1, 0.0), [Refinement::default(); 8]);
-    assert!(of_4(3).is_last() && !of_4(2).is_last() && Refinement::default().is_last());
 }
 
 #[test]
@@ -431,122 +378,111 @@ fn unknown_enums_and_empty_oneofs_are_refused() {
 }
 
 #[test]
-fn plans_sample_each_image_once() {
-    let spoilt = |indices: &[u32]| {
-        let mut message = proto::Assignment::from(assignment());
-        message.samplers[0].image_indices = indices.to_vec();
-        refusal::<_, Assignment>(message)
-    };
-    for indices in [&[0][..], &[0, 0], &[0, 1, 1], &[0, 2], &[u32::MAX]] {
-        assert!(spoilt(indices).contains("image_indices"), "{indices:?}");
-    }
-    let mut message = proto::Assignment::from(assignment());
-    message.compositors.clear();
-    assert!(refusal::<_, Assignment>(message).contains("compositors"));
-}
-
-#[test]
-fn set_content_names_what_a_set_shows() {
-    let id = |change: &dyn Fn(&mut Assignment)| {
-        let mut assignment = assignment();
-        change(&mut assignment);
-        assignment.set_content(1).unwrap()
-    };
-    let same = id(&|_| ());
-    assert_eq!(id(&|a| a.plan_epoch = 9), same, "the plan is not what a set shows");
-    assert_ne!(id(&|a| a.workload.timeline.step_s = 0.6), same);
-    assert_ne!(id(&|a| a.workload.lighting = "unlit".to_owned()), same);
-    assert_ne!(id(&|a| a.workload.sample_cameras.truncate(1)), same);
-    assert_ne!(id(&|a| a.workload.refinement_steps = 2), same);
-    assert_ne!(id(&|a| a.workload.illumination.lights.truncate(3)), same);
-    assert_ne!(id(&|a| a.workload.illumination.environment = Environment::default()), same);
-    assert_eq!((assignment().set_content(3), assignment().sample_set_id(3)), (None, None));
-    let still = |index| {
-        Assignment {
-            workload: Workload { timeline: Timeline { step_s: 0.0, ..workload().timeline }, ..workload() },
-            ..assignment()
-        }
-        .set_content(index)
-    };
-    assert_eq!(still(0), still(2), "a static scene has one set");
-    let timeline = Timeline { step_s: 0.0, set_count: 8, ..workload().timeline };
-    let refined = Assignment { workload: Workload { timeline, refinement_steps: 4, ..workload() }, ..assignment() };
-    let contents: Vec<_> = (0..8).map(|set_index| refined.set_content(set_index).unwrap()).collect();
-    assert!((0..3).all(|i| !contents[i + 1..].contains(&contents[i])), "each step is another");
-    assert!(contents[3..].iter().all(|content| *content == contents[3]), "the last stays");
-}
-
-#[test]
 fn errors_become_statuses() {
-    let refused = tonic::Status::from(WireError::Missing { field: "views" });
+    let refused = tonic::Status::from(WireError::from(InvalidField::Missing { field: "views" }));
     assert_eq!((refused.code(), refused.message()), (tonic::Code::InvalidArgument, "views is missing"));
-    assert_eq!(tonic::Status::from(WireError::corrupt("data", "x")).code(), tonic::Code::DataLoss);
 }
 
-/// Three cells of 1, 2 and 1 cameras in four tiles' plan of two samplers.
-fn of_cells() -> Assignment {
-    let looking = |x: f32| {
-        let eye = Vec3::new(x, 0.0, 9.0);
-        Camera::Pinhole(PinholeCamera { eye_in_world: eye, ..camera() })
-    };
-    let workload = Workload {
-        sample_cameras: [0.0, 10.0, 11.0, 30.0].map(looking).to_vec(),
-        cell_first_indices: vec![0, 1, 3],
-        ..workload()
-    };
-    let share = |name: &str, image_indices: Vec<u32>| SamplerShare {
-        node_name: name.to_owned(),
-        address: "http://127.0.0.1:1".to_owned(),
-        image_indices,
-    };
-    let samplers = vec![share("a", vec![0, 1, 2]), share("c", vec![3, 4, 5, 6, 7])];
-    Assignment { workload, samplers, tile_count: 2, ..assignment() }
-}
-
-#[test]
-fn a_cells_plan_has_its_images_and_no_others() {
-    let plan = of_cells();
-    assert_eq!(Assignment::try_from(proto::Assignment::from(plan.clone())), Ok(plan.clone()));
-    let of = |cell: u32| {
-        let of_cell = plan.of_cell(cell).unwrap();
-        let shares: Vec<_> = of_cell.samplers.iter().map(|s| (s.node_name.clone(), s.image_indices.clone())).collect();
-        assert_eq!(Assignment::try_from(proto::Assignment::from(of_cell.clone())), Ok(of_cell.clone()));
-        (of_cell.workload.sample_cameras.len(), shares)
-    };
-    let share = |name: &str, images: &[u32]| (name.to_owned(), images.to_vec());
-    assert_eq!(of(0), (1, vec![share("a", &[0, 1])]));
-    assert_eq!(of(1), (2, vec![share("a", &[0]), share("c", &[1, 2, 3])]));
-    assert_eq!(of(2), (1, vec![share("c", &[0, 1])]));
-    assert_eq!(plan.of_cell(3), None);
-    let one = assignment();
-    assert_eq!((one.of_cell(0), one.of_cell(1)), (Some(one.clone()), None));
-}
-
-#[test]
-fn a_view_is_of_the_nearest_cell_and_what_a_cell_shows_is_its_own() {
-    let plan = of_cells();
-    let view = |x: f32| PinholeCamera { eye_in_world: Vec3::new(x, 0.0, 9.0), ..camera() };
-    assert_eq!([-3.0, 4.0, 6.0, 10.5, 17.0, 40.0].map(|x| plan.cell_of(&view(x))), [0, 0, 1, 1, 1, 2]);
-    assert_eq!(Assignment { policy: Policy::Direct, ..plan.clone() }.cell_of(&view(40.0)), 0);
-    let content = |plan: &Assignment, cell: u32| plan.of_cell(cell).unwrap().set_content(0);
-    let mut fewer = plan.clone();
-    fewer.workload.sample_cameras.pop();
-    fewer.workload.cell_first_indices.pop();
-    fewer.plan_epoch += 1;
-    assert_eq!([0, 1].map(|cell| content(&fewer, cell)), [0, 1].map(|cell| content(&plan, cell)));
-    assert_ne!(content(&plan, 0), content(&plan, 1));
-}
-
-#[test]
-fn cells_that_cannot_be_are_refused() {
-    let spoilt = |firsts: Vec<u32>| {
-        let mut message = proto::Assignment::from(of_cells());
-        message.workload.as_mut().unwrap().cell_first_indices = firsts;
-        refusal::<_, Assignment>(message)
-    };
-    for firsts in [vec![1, 2], vec![0, 0, 3], vec![0, 3, 1], vec![0, 4], vec![0, u32::MAX]] {
-        let text = spoilt(firsts);
-        assert!(text.contains("cell_first_indices is ") && text.contains("of 4 sample_cameras"), "{text}");
+fn header() -> FrameHeader {
+    FrameHeader {
+        sample_set_id: SampleSetId { plan_epoch: 1, index: 0 },
+        camera: camera(),
+        size_px: camera().size_px,
+        codec: FrameCodec::Lz4,
+        color_bytes: 4,
+        inverse_depth_bytes: 0,
+        provenance_bytes: 0,
+        crc32: 0x1234,
+        stage_times: StageTimes { queue_s: 0.3, batch_count: 2, ..StageTimes::default() },
     }
-    assert!(spoilt(vec![0; 65]).contains("cell_first_indices has 65"));
+}
+
+#[test]
+fn headers_come_back_with_their_pose() {
+    let header = header();
+    assert_eq!(FrameHeader::try_from(proto::FrameHeader::from(header.clone())), Ok(header));
+}
+
+#[test]
+fn headers_that_claim_too_much_are_refused() {
+    let spoil = |change: &dyn Fn(&mut proto::FrameHeader)| {
+        let mut message = proto::FrameHeader::from(header());
+        change(&mut message);
+        FrameHeader::try_from(message).expect_err("refused").to_string()
+    };
+    assert!(spoil(&|h| h.color_bytes = u64::MAX).contains("total_bytes"));
+    assert!(spoil(&|h| (h.width_px, h.height_px) = (65_535, 65_535)).contains("size_px"));
+    assert!(spoil(&|h| h.width_px = 0).contains("size_px"));
+    assert!(spoil(&|h| h.frame_codec = "zip".to_owned()).contains("frame_codec"));
+    assert!(spoil(&|h| h.stage_times = None).contains("stage_times"));
+    assert!(spoil(&|h| h.camera = None).contains("header.camera is missing"));
+    assert!(spoil(&|h| h.camera.as_mut().unwrap().near_m = -1.0).contains("header.camera"));
+    assert!(spoil(&|h| h.camera.as_mut().unwrap().width_px = 9).contains("header.camera.size_px"));
+}
+
+#[test]
+fn impossible_stage_times_are_named() {
+    let spoil = |change: &dyn Fn(&mut proto::StageTimes)| {
+        let mut message = proto::StageTimes::from(StageTimes::default());
+        change(&mut message);
+        StageTimes::try_from(message).unwrap_err().to_string()
+    };
+    assert!(spoil(&|t| t.compositor_s = f64::NAN).contains("compositor_s"));
+    assert!(spoil(&|t| t.send_wait_s = -1.0).contains("send_wait_s"));
+    assert!(spoil(&|t| t.set_age_s = f64::INFINITY).contains("set_age_s"));
+}
+
+#[test]
+fn zero_on_the_wire_is_none() {
+    let asked = SessionRequest { frames_per_s: None, forced_tile_count: None, ..request() };
+    let message = proto::OpenSessionRequest::from(asked.clone());
+    assert_eq!((message.frames_per_s, message.forced_tile_count), (0.0, 0));
+    assert_eq!(SessionRequest::try_from(message), Ok(asked));
+    let settings = OfferSettings { lighting: Some("unlit".to_owned()), ..OfferSettings::default() };
+    let Workload { scene, sample_cameras, volume, .. } = workload();
+    let offer = OfferStatus { scene, sample_cameras, volume, origin_in_source: DVec3::X, settings };
+    let message = proto::SceneOffer::from(offer.clone());
+    assert_eq!((message.sampling_method.as_str(), message.lighting.as_str()), ("", "unlit"));
+    assert_eq!(OfferStatus::try_from(message), Ok(offer));
+    let even =
+        Costs { tiles: Some(TileCosts { overhead_s: 0.1, row_shares: None }), sample_image_s: 0.5, ..Costs::default() };
+    let whole = Costs { tiles: None, ..even };
+    for (costs, overhead_s) in [(even, 0.1), (whole, 0.5)] {
+        let message = proto::Costs::from(costs);
+        assert_eq!(message.sample_overhead_s, overhead_s);
+        assert_eq!(message.sample_row_shares, Some(proto::RowShares::default()));
+        assert_eq!(Costs::try_from(message), Ok(costs));
+    }
+}
+
+#[test]
+fn a_member_that_leaves_no_room_for_later_plans_is_refused() {
+    let node = NodeStatus {
+        node_name: "n".to_owned(),
+        address: "http://127.0.0.1:1".to_owned(),
+        device_name: "d".to_owned(),
+        is_software: true,
+    };
+    let join = |plan_epoch| proto::JoinClusterRequest::from(JoinCluster { node: node.clone(), plan_epoch });
+    assert!(JoinCluster::try_from(join(MAX_JOINING_EPOCH)).is_ok());
+    assert!(refusal::<_, JoinCluster>(join(u64::MAX)).contains("plan_epoch is 18446744073709551615"));
+}
+
+#[test]
+fn typical_views_of_several_sizes_or_none_are_refused() {
+    let view = |size_px: u32| PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(size_px));
+    let measure = |typical_views: Vec<PinholeCamera>| MeasureCosts {
+        workload: workload(),
+        typical_views,
+        batch_count: 5,
+        planes: ViewPlanes::default(),
+    };
+    let sent = |measure: MeasureCosts| MeasureCosts::try_from(proto::MeasureCostsRequest::from(measure));
+    let three = measure(vec![view(8); 3]);
+    assert_eq!(sent(three.clone()), Ok(three));
+    let other = PinholeCamera { eye_in_world: Vec3::X, ..view(8) };
+    assert_eq!(measure(vec![view(8), other]).views(3), [view(8), other, view(8)]);
+    for views in [vec![], vec![view(8), view(9)], vec![view(8); MAX_BATCH as usize + 1]] {
+        assert!(sent(measure(views)).unwrap_err().to_string().contains("typical_views"));
+    }
 }

@@ -1,12 +1,12 @@
-//! Which programs understand each other.
+//! Versions of the protocol.
 
 use crate::error::WireError;
 
-/// Rises whenever a message comes to mean something else: programs that join a cluster must have the coordinator's.
+/// Rises whenever the meaning of a message changes: programs that join a cluster must have the coordinator's.
 pub const PROTOCOL_VERSION: u32 = 1;
 
-/// Refuses other versions, and programs of before there were any.
-pub(crate) fn same_version(found: u32) -> Result<(), WireError> {
+/// Refuses other versions, and programs from before versions were stated.
+pub(crate) fn check_version(found: u32) -> Result<(), WireError> {
     if found == PROTOCOL_VERSION {
         return Ok(());
     }

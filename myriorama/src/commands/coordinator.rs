@@ -5,15 +5,14 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use app_core::exit::Outcome;
+use app_core::process::{listen, runtime, serve_metrics, stop_signal};
+use app_core::setup::{SceneArgs, Setup};
 use clap::Args;
 use coordinator::schedule::Recorder;
 use coordinator::{CoordinatorConfig, CoordinatorMetrics, EventLog, Observers};
 use node::Telemetry;
 use tokio_util::sync::CancellationToken;
-
-use crate::exit::Outcome;
-use crate::process::{listen, runtime, serve_metrics, stop_signal};
-use crate::setup::{SceneArgs, Setup};
 
 /// Draws nothing itself: it needs no device.
 #[derive(Debug, Args)]

@@ -3,10 +3,9 @@
 use std::time::Duration;
 
 use anyhow::{Context as _, bail};
+use app_core::exit::Outcome;
+use app_core::process::runtime;
 use clap::Args;
-
-use crate::exit::Outcome;
-use crate::process::runtime;
 
 const DEADLINE: Duration = Duration::from_secs(4);
 

@@ -3,14 +3,13 @@
 use std::net::{SocketAddr, UdpSocket};
 use std::path::PathBuf;
 
+use app_core::exit::Outcome;
+use app_core::process::{listen, runtime, serve_metrics, stop_signal};
+use app_core::setup::DeviceArgs;
 use clap::Args;
+use engine::GpuEngine;
 use node::{Engine as _, NodeConfig, NodeMetrics, Quotas, Telemetry};
 use tokio_util::sync::CancellationToken;
-
-use crate::cli::DeviceArgs;
-use crate::engine::GpuEngine;
-use crate::exit::Outcome;
-use crate::process::{listen, runtime, serve_metrics, stop_signal};
 
 /// Stays a member, and joins again when the coordinator was away.
 #[derive(Debug, Args)]

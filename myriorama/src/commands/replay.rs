@@ -5,10 +5,9 @@ use std::io::BufReader;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
+use app_core::exit::{BadInput, Outcome};
 use clap::Args;
 use coordinator::schedule::{LogError, replay};
-
-use crate::exit::{BadInput, Outcome};
 
 /// Runs the events that `myriorama coordinator --record` wrote through the schedule once more and prints its commands,
 /// each with the time since the coordinator's start. The same events give the same commands.

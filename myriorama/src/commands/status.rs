@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use app_core::exit::Outcome;
+use app_core::process::runtime;
 use clap::Args;
 use client::Client;
 
-use crate::exit::Outcome;
-use crate::process::runtime;
 use crate::terminal_picture;
 
 /// Prints the cluster's nodes with their roles, the plan and its reason; with --watch again and again.

@@ -2,15 +2,13 @@
 
 use std::net::SocketAddr;
 
+use app_core::cluster::Cluster;
+use app_core::exit::Outcome;
+use app_core::process::{listen, runtime, stop_signal};
+use app_core::setup::{DeviceArgs, SceneArgs, Setup};
 use clap::Args;
+use engine::GpuEngine;
 use node::Engine as _;
-
-use crate::cli::DeviceArgs;
-use crate::cluster::Cluster;
-use crate::engine::GpuEngine;
-use crate::exit::Outcome;
-use crate::process::{listen, runtime, stop_signal};
-use crate::setup::{SceneArgs, Setup};
 
 /// Serves until ctrl-c or SIGTERM, then drains for at most 10 s.
 #[derive(Debug, Args)]

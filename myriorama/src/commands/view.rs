@@ -4,25 +4,25 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context as _;
+use app_core::cameras::{self, NamedCamera, Placement};
+use app_core::delivery::{Wishes, open, receive, viewpoints};
+use app_core::exit::{BadInput, Outcome};
+use app_core::live::{self, Drive};
+use app_core::process::runtime;
+use app_core::setup::NEAR_OF_DIAGONAL;
+use app_core::sizes::{GridSize, SizePx};
+use app_core::{pictures, provenance};
 use clap::Args;
 use client::{Client, Frame, Session};
+use cluster::{OfferStatus, PolicyChoice, Timeline};
+use codec::FrameCodec;
 use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use indicatif::ProgressBar;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use serde_json::{Map, json};
-use wire::{FrameCodec, OfferStatus, PolicyChoice, Timeline};
 
-use crate::cameras::{self, NamedCamera, Placement};
 use crate::comparison;
-use crate::delivery::{Wishes, open, receive, viewpoints};
-use crate::exit::{BadInput, Outcome};
-use crate::live::{self, Drive};
-use crate::pictures;
-use crate::process::runtime;
-use crate::setup::NEAR_OF_DIAGONAL;
-use crate::sizes::{GridSize, SizePx};
-use crate::text_table;
 
 /// Files in --out: view_0000.png (colour); with --depth view_0000.depth.png (16-bit inverse planar depth:
 /// value / 65535 × inverse_depth_max_per_m of the frame in cameras.json, 0 for background); with --provenance
@@ -210,7 +210,7 @@ async fn view(args: ViewArgs) -> anyhow::Result<Outcome> {
         let session = open(&client, &direct, &cameras).await?;
         let truth = receive(&session, &cameras, |_| ()).await?;
         let (table, worst_psnr_db) = comparison::table(&truth.frames, &delivered.frames)?;
-        println!("\n{}", text_table::text(&table));
+        println!("\n{}", table.to_text());
         let path = folder.join("comparison.csv");
         std::fs::write(&path, table.to_csv()?).with_context(|| format!("cannot write {}", path.display()))?;
         return Ok(met(args.least_psnr.is_none_or(|least| worst_psnr_db >= least)));
@@ -230,7 +230,7 @@ async fn live(args: &ViewArgs, session: &Session, path: Vec<PinholeCamera>) -> a
     let file = args.out.join("live.csv");
     std::fs::write(&file, record.frames()?.to_csv()?).with_context(|| format!("cannot write {}", file.display()))?;
     let latencies = live::latencies("From pose to picture", record.shown.iter())?;
-    println!("{}\n\n{}", text_table::text(&latencies), record.summary());
+    println!("{}\n\n{}", latencies.to_text(), record.summary());
     if let Some(error) = record.error {
         return Err(error.into());
     }
@@ -284,10 +284,9 @@ fn write_frame(folder: &Path, frame: &Frame) -> anyhow::Result<NamedCamera> {
         more.insert("depth_file_path".to_owned(), json!(name));
         more.insert("inverse_depth_max_per_m".to_owned(), json!(greatest));
     }
-    if let Some(provenance) = pictures::provenance(&frame.view) {
+    if let Some(provenance) = provenance::false_color(&frame.view) {
         let name = format!("{stem}.provenance.png");
-        let image = study::provenance_false_color(&provenance, frame.view.size_px.x)?;
-        save(folder.join(&name), image.into())?;
+        save(folder.join(&name), provenance.image.into())?;
         more.insert("provenance_file_path".to_owned(), json!(name));
     }
     Ok(NamedCamera { file_path, camera: frame.request.camera, more })

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::canvas::{self, Area, Drawing, Glyph, LegendEntry, message, style_mesh, text_style, text_width_px};
 use super::ruler::Ruler;
 use super::{Axis, Palette};
-use crate::{ReportError, format_number};
+use crate::ReportError;
+use table::format_number;
 
 const BAR_PITCH_PX: u32 = 34;
 const AXIS_HEIGHT_PX: u32 = 66;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
 use super::Axis;
-use crate::format_number;
+use table::format_number;
 
 /// A range of axis space.
 #[derive(Clone)]

@@ -1,14 +1,17 @@
 //! Pictures of a report: rows of labelled images, contact sheets, false colours.
 
 mod contact_sheet;
-mod false_color;
+mod error_map;
 
 use image::RgbImage;
-use metrics::{Rgb8Image, ScoreMap};
+use metrics::ScoreMap;
 use serde::{Deserialize, Serialize};
 
 pub use contact_sheet::contact_sheet;
-pub use false_color::{Provenance, depth_false_color, error_map, provenance_false_color};
+pub use error_map::error_map;
+
+/// Names of colours.
+pub type Legend = Vec<(String, [u8; 3])>;
 
 /// One image, written as `pictures/{slug(name)}.png`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,7 +22,7 @@ pub struct Picture {
     pub caption: String,
     /// Names of the colours in it, if they mean something.
     #[serde(default)]
-    pub legend: Vec<(String, [u8; 3])>,
+    pub legend: Legend,
     /// Its pixels; not in `report.json`, so empty in a report that was read back.
     #[serde(skip)]
     pub image: RgbImage,
@@ -49,26 +52,14 @@ pub fn comparison_row(
     direct: RgbImage,
     reconstructed: RgbImage,
     flip: &ScoreMap,
-    provenance: Option<&[Provenance]>,
+    provenance: Option<(RgbImage, Legend)>,
 ) -> PictureRow {
-    let width_px = direct.width();
     let picture = |what: &str, image| Picture::new(format!("{title} {what}"), what, image);
     let mut pictures = vec![
         picture("direct", direct),
         picture("reconstructed", reconstructed),
         picture("error map (FLIP, 0 to 1)", error_map(flip)),
     ];
-    pictures.extend(provenance.and_then(|provenance| {
-        let image = provenance_false_color(provenance, width_px).ok()?;
-        Some(Picture { legend: Provenance::legend(provenance), ..picture("provenance", image) })
-    }));
+    pictures.extend(provenance.map(|(image, legend)| Picture { legend, ..picture("provenance", image) }));
     PictureRow { title: title.into(), pictures }
-}
-
-/// A copy in the image library's type.
-#[must_use]
-pub fn rgb_image(image: &Rgb8Image) -> RgbImage {
-    let (width_px, height_px) = image.size_px();
-    let pixels: Vec<[u8; 3]> = image.pixels().collect();
-    RgbImage::from_fn(width_px, height_px, |x, y| image::Rgb(pixels[(y * width_px + x) as usize]))
 }

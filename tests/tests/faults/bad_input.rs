@@ -6,6 +6,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use cluster::{SamplerReport, SessionRequest, Timeline};
 use cluster_tests::cluster::connected;
 use cluster_tests::processes::Processes;
 use cluster_tests::random::Random;
@@ -15,7 +16,6 @@ use depth_image::{Camera, PinholeCamera};
 use glam::{UVec2, Vec3};
 use tonic::{Code, Status};
 use wire::rpc::{CoordinatorClient, connect};
-use wire::{SamplerReport, SessionRequest, Timeline};
 
 use crate::{CLOSED, PROGRAM, finish};
 

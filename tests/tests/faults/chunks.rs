@@ -5,12 +5,13 @@ use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use client::Session;
+use cluster::{PolicyChoice, Refinement, Timeline};
 use cluster_tests::cluster::{Cluster, request, views};
 use cluster_tests::mangler::{Mangler, Spoil};
 use cluster_tests::picture::fault_of;
 use cluster_tests::processes::number_of;
+use codec::{ChunkBody, SampleSetId};
 use node::NodeConfig;
-use wire::{ChunkBody, PolicyChoice, Refinement, SampleSetId, Timeline};
 
 use crate::{CLOSED, has_role, sampler_of};
 

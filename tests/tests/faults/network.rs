@@ -3,15 +3,16 @@
 use std::time::{Duration, Instant};
 
 use client::Session;
+use cluster::{RenderViews, RequestedView};
 use cluster_tests::cluster::{camera, connected};
 use cluster_tests::processes::{Processes, number_of};
 use cluster_tests::proxy::{Proxy, Way};
 use cluster_tests::watcher::Watcher;
+use codec::FrameCodec;
 use depth_image::ViewPlanes;
 use glam::UVec2;
 use tokio_stream::StreamExt as _;
 use wire::rpc::{CompositorClient, connect};
-use wire::{FrameCodec, RenderViews, RequestedView};
 
 use crate::{CLOSED, PROGRAM, SILENT, compositor_of, finish, has_role, sampler_of};
 

@@ -7,12 +7,12 @@ mod raw;
 use std::time::{Duration, Instant};
 
 use client::{ClientError, LiveView};
+use cluster::{SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, camera, views};
 use tokio::time::timeout;
 use tokio_stream::StreamExt as _;
 use tonic::Code;
 use wire::rpc::connect;
-use wire::{SessionRequest, Timeline};
 
 use raw::{HEALED, Raw, SIZE_PX, STILL, compositor_of, pipeline, seen};
 
@@ -141,12 +141,12 @@ async fn a_plan_that_shows_the_same_serves_those_who_have_not_heard_of_it() {
     assert_eq!(raw.frame().await, Some(1));
     let node = wire::rpc::NodeClient::new(connect(&address).await.unwrap());
     let plan = session.plan().assignment;
-    node.apply_assignment(wire::Assignment { plan_epoch: epoch + 1, ..plan.clone() }).await.unwrap();
+    node.apply_assignment(cluster::Assignment { plan_epoch: epoch + 1, ..plan.clone() }).await.unwrap();
     raw.say(Some(2), 1).await;
     let part = timeout(HEALED, raw.parts.next()).await.unwrap().unwrap().unwrap();
     assert_eq!((part.frame, part.header.unwrap().sample_set_id.plan_epoch), (2, epoch + 1));
-    let workload = wire::Workload { refinement_steps: 2, ..plan.workload.clone() };
-    node.apply_assignment(wire::Assignment { plan_epoch: epoch + 2, workload, ..plan }).await.unwrap();
+    let workload = cluster::Workload { refinement_steps: 2, ..plan.workload.clone() };
+    node.apply_assignment(cluster::Assignment { plan_epoch: epoch + 2, workload, ..plan }).await.unwrap();
     raw.say(Some(3), 2).await;
     assert_eq!(raw.refused().await.code(), Code::FailedPrecondition, "it shows something else");
 }

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use client::{Client, ClientError};
+use cluster::SessionRequest;
 use cluster_tests::cluster::{Cluster, whole_frame};
 use coordinator::CoordinatorConfig;
 use node::{Deadlines, NodeConfig, Quotas};
@@ -11,7 +12,6 @@ use tokio::time::timeout;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Code;
-use wire::SessionRequest;
 use wire::rpc::{CompositorClient, connect};
 
 use crate::raw::{HEALED, Raw, STILL, compositor_of, greedy, narrow, pipeline, seen};

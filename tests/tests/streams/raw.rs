@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use client::{LiveFrame, LiveView, Session};
+use cluster::{LiveRequest, PolicyChoice, RenderViews, RequestedView, SessionRequest, Timeline};
 use cluster_tests::cluster::{camera, request};
+use codec::{FrameCodec, FramePart};
 use depth_image::ViewPlanes;
 use glam::UVec2;
 use tokio::sync::mpsc;
@@ -13,7 +15,6 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 use tonic::transport::Endpoint;
 use wire::rpc::{CompositorClient, Messages, connect};
-use wire::{FrameCodec, FramePart, LiveRequest, PolicyChoice, RenderViews, RequestedView, SessionRequest, Timeline};
 
 pub const STILL: Timeline = Timeline { start_s: 0.0, step_s: 0.0, set_count: 1 };
 /// Frames come again after a fault, within so long.

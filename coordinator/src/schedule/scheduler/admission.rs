@@ -1,7 +1,7 @@
 //! Whether what sessions ask for can be met at all.
 
+use cluster::limits::MAX_CELLS;
 use depth_image::PinholeCamera;
-use wire::limits::MAX_CELLS;
 
 use super::Scheduler;
 use crate::schedule::choose::{Demand, check};

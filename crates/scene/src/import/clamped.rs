@@ -1,12 +1,12 @@
-//! Numbers that a file gets slightly wrong.
+//! Numbers slightly out of range.
 
 use std::fmt;
 use std::ops::RangeInclusive;
 
 use crate::error::Fault;
 
-/// `value` in `range`: a colour of −0.01 or a roughness of 1.5 is rounding or a habit of the exporter, and no
-/// reason to refuse a model. What is no number is one.
+/// Clamps `value` to `range`: a colour of −0.01 or a roughness of 1.5 is an exporter's rounding and no reason to refuse
+/// a model. A value that is not a finite number is refused.
 pub(crate) fn clamped(element: impl fmt::Display, value: f32, range: RangeInclusive<f32>) -> Result<f32, Fault> {
     if value.is_finite() {
         let within = value.clamp(*range.start(), *range.end());
@@ -19,7 +19,7 @@ pub(crate) fn clamped(element: impl fmt::Display, value: f32, range: RangeInclus
     }
 }
 
-/// Each of `values`; see [`clamped`].
+/// Clamps each of `values`; see [`clamped`].
 pub(crate) fn all_clamped<const N: usize>(
     element: impl fmt::Display,
     mut values: [f32; N],

@@ -1,4 +1,4 @@
-//! The one door to the file system for what a scene refers to.
+//! The only access to files that a scene refers to.
 
 use std::cell::Cell;
 use std::fs::File;
@@ -10,14 +10,14 @@ use percent_encoding::percent_decode_str;
 use crate::Limits;
 use crate::error::{Fault, at_most};
 
-/// A scene's folder; nothing outside it is read, and no more bytes than the limit altogether.
+/// A scene's folder. No file outside it is read, and the bytes of all files together are limited.
 pub(crate) struct Folder {
     canonical_root: PathBuf,
     bytes_left: Cell<u64>,
 }
 
 impl Folder {
-    /// The folder of the scene file `path`, and that file's bytes.
+    /// Opens the folder of the scene file `path`; returns it with that file's bytes.
     pub(crate) fn opened_with(path: &Path, limits: &Limits) -> Result<(Self, Vec<u8>), Fault> {
         let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let canonical_root = parent.canonicalize().map_err(|e| Fault::io("folder", e))?;
@@ -26,7 +26,7 @@ impl Folder {
         Ok((folder, bytes))
     }
 
-    /// Reads a file named by a URI reference, as in glTF: percent-encoding is undone first.
+    /// Reads a file named by a URI reference, as in glTF; percent-encoding is decoded first.
     pub(crate) fn read_uri(&self, element: &str, uri: &str) -> Result<Vec<u8>, Fault> {
         let decoded = percent_decode_str(uri).decode_utf8();
         let name = decoded.map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_every_way_out() {
+    fn refuses_every_path_out_of_the_folder() {
         let (dir, folder) = folder_with_file();
         let absolute = dir.path().join("secret.bin").display().to_string();
         let names = [
@@ -131,7 +131,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn refuses_links_that_leave() {
+    fn refuses_links_out_of_the_folder() {
         let (dir, folder) = folder_with_file();
         std::os::unix::fs::symlink(dir.path().join("secret.bin"), dir.path().join("scene/link.bin")).unwrap();
         let fault = folder.read_name("buffer 0", "link.bin").unwrap_err().in_file("a.gltf");
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_are_limited_over_all_files() {
+    fn the_limit_on_bytes_counts_all_files() {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("a.gltf"), [0; 60]).unwrap();
         let limits = Limits { file_bytes: 100, ..Limits::default() };

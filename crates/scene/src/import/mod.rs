@@ -1,5 +1,5 @@
-//! Files to scenes. Each format fills a [`source_scene::SourceScene`] in double precision; what they
-//! share (re-centring, mirrored placements, limits, validation) happens once, in its `finish`.
+//! Import of scene files. Each format fills a [`source_scene::SourceScene`] in double precision. Its `finish` does the
+//! common steps: re-centring, mirrored placements, limits, validation.
 
 mod clamped;
 mod folder;
@@ -21,13 +21,13 @@ use source_scene::SourceScene;
 /// from its own folder and below. The scene has the lights that the file lists, which may be none: see
 /// [`Scene::with_default_lights`].
 ///
-/// Axes and units are kept as in the file (only glTF defines them). Coordinates are kept too, unless the
-/// scene lies so far from the origin that `f32` would lose detail: then [`Scene::origin_in_source`] says
-/// by how much everything, lights and cameras included, has been moved. That is when the centre of its
-/// bounds is more than 10 km, or more than 1000 times the bounds' diagonal, from the origin.
+/// Axes and units are kept as in the file (only glTF defines them). Coordinates are kept too, unless `f32` would lose
+/// detail far from the origin. That is the case when the centre of the bounds is more than 10 km, or more than 1000
+/// times the bounds' diagonal, from the origin. Then all parts, lights and cameras included, are moved by
+/// [`Scene::origin_in_source`].
 ///
 /// # Errors
-/// Names the file, the element at fault, and the reason.
+/// The file, the element at fault, and the reason.
 pub fn load_file(path: &Path, limits: &Limits) -> Result<Scene, SceneError> {
     let scene = read_source(path, limits).and_then(|source| source.finish(limits));
     scene.map_err(|fault| fault.in_path(path))

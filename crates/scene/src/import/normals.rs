@@ -1,5 +1,5 @@
-//! Normals for sources that have none: the angle-weighted mean of the faces around a corner, over those
-//! that bend away by less than a crease angle. Corners that disagree get vertices of their own.
+//! Normals for sources without normals. A corner's normal is the angle-weighted mean of the faces around it that bend
+//! away by less than a crease angle. Corners that disagree get separate vertices.
 
 use std::collections::HashMap;
 
@@ -7,9 +7,9 @@ use glam::DVec3;
 
 use super::source_scene::SourceMesh;
 
-/// Smooth, with edges sharper than 60° kept: for formats that do not say how to shade.
+/// Smooth, with edges sharper than 60° kept, for formats without shading information.
 pub(crate) const CREASE_60_DEGREES: f64 = 0.5;
-/// Flat but for coplanar faces: what glTF 2.0 (3.7.2.1) asks for.
+/// Flat except for coplanar faces, as glTF 2.0 (3.7.2.1) requires.
 pub(crate) const FLAT: f64 = 0.999_999;
 
 /// Around a hub of more corners than this, all are averaged: the pairwise comparison would be quadratic.
@@ -20,7 +20,7 @@ pub(crate) fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
     let faces = Faces::of(mesh);
     let corners_at = CornersByPosition::of(mesh);
     let original_count = mesh.vertices.len();
-    // For each vertex, the copies made of it so far: a chain through `next_copy`.
+    // The copies of each vertex form a chain through `next_copy`.
     let mut next_copy: Vec<Option<u32>> = vec![None; original_count];
     let mut is_set = vec![false; original_count];
     for corner in 0..mesh.indices.len() {
@@ -34,12 +34,12 @@ pub(crate) fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
             vertex
         };
     }
-    // Vertices of no triangle are never drawn, but must be valid.
+    // Vertices without a triangle are never drawn, but must be valid.
     let unused = is_set.iter().enumerate().filter(|(_, set)| !**set);
     unused.for_each(|(i, _)| mesh.vertices[i].normal = [0.0, 1.0, 0.0]);
 }
 
-/// Normalises the normals that there are, and fills in those of no length with the mean of their faces.
+/// Normalises the given normals, and replaces those of zero length by the mean of their faces.
 pub(crate) fn repair(mesh: &mut SourceMesh) {
     let length = |n: [f32; 3]| DVec3::from(n.map(f64::from)).length();
     if mesh.vertices.iter().any(|v| length(v.normal) < 1e-6) {
@@ -106,7 +106,7 @@ impl Faces {
             let joins = !compares || normal.dot(own) >= crease_cosine;
             if joins { normal * self.corner_angles_rad[other as usize] } else { DVec3::ZERO }
         };
-        // A hub's sum would be as long for each of its corners; a stride keeps the whole linear.
+        // A hub's sum would be as long for each of its corners; a stride keeps the total linear.
         let stride = if compares { 1 } else { around.len() / MAX_CORNERS_COMPARED };
         let sum: DVec3 = around.iter().step_by(stride).map(weighted).sum();
         sum.try_normalize().or_else(|| own.try_normalize()).unwrap_or(DVec3::Y)
@@ -119,7 +119,7 @@ fn corner_angle_rad(at: DVec3, next: DVec3, last: DVec3) -> f64 {
     if lengths > 0.0 { (a.dot(b) / lengths).clamp(-1.0, 1.0).acos() } else { 0.0 }
 }
 
-/// Which corners of triangles meet at a point, whatever vertex they name.
+/// The corners of triangles that meet at each point, for any vertex numbers.
 struct CornersByPosition {
     group_of_vertex: Vec<u32>,
     first_of_group: Vec<u32>,
@@ -147,7 +147,7 @@ impl CornersByPosition {
         Self { group_of_vertex, first_of_group, corners }
     }
 
-    /// `vertex` may be a copy made later: copies are only asked for by their original's number.
+    /// `vertex` may be a later copy, since lookups use the original's number.
     fn around(&self, vertex: u32) -> &[u32] {
         let group = self.group_of_vertex[vertex as usize] as usize;
         &self.corners[self.first_of_group[group] as usize..self.first_of_group[group + 1] as usize]
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fan_around_one_hub_is_linear_in_time() {
+    fn a_fan_around_one_hub_takes_linear_time() {
         let rim = 300_000u32;
         let on_rim = |i: u32| [f64::from(i).cos(), 0.0, f64::from(i).sin()];
         let points: Vec<_> = std::iter::once([0.0; 3]).chain((0..=rim).map(on_rim)).collect();
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn degenerate_triangles_get_some_unit_normal() {
+    fn degenerate_triangles_get_a_unit_normal() {
         let mut degenerate = mesh(&[[0.; 3], [0.; 3], [0.; 3]], &[0, 1, 2]);
         generate(&mut degenerate, FLAT);
         assert!(degenerate.vertices.iter().all(|v| v.normal == [0.0, 1.0, 0.0]));

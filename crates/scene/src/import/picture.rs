@@ -1,4 +1,4 @@
-//! Encoded images to textures, their sizes checked before a texel is decoded.
+//! Textures from encoded images; sizes are checked before a texel is decoded.
 
 use std::io::Cursor;
 
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::error::{Fault, at_most};
 use crate::{Limits, Texture};
 
-/// An image file's bytes and how to call it in messages.
+/// An image file's bytes and its name in messages.
 pub(crate) struct EncodedPicture {
     pub element: String,
     pub bytes: Vec<u8>,
@@ -16,7 +16,7 @@ pub(crate) struct EncodedPicture {
     pub is_srgb: bool,
 }
 
-/// Decodes all, in parallel, once their headers show that they fit the limits together.
+/// Decodes all images in parallel, after their headers show that they fit the limits together.
 pub(crate) fn decode_all(pictures: &[EncodedPicture], limits: &Limits) -> Result<Vec<Texture>, Fault> {
     let mut decoded_bytes = 0u64;
     for picture in pictures {
@@ -80,7 +80,7 @@ mod tests {
     fn a_header_that_claims_65535_squared_is_refused_before_decoding() {
         let mut picture = png(1, 1);
         picture.bytes[16..24].copy_from_slice(&[0, 0, 255, 255, 0, 0, 255, 255]);
-        // The header's checksum is wrong now as well; either reason will do, an allocation will not.
+        // The header's checksum is wrong as well. Either reason is right; an allocation is not.
         assert!(decode_all(&[picture], &Limits::default()).is_err());
     }
 

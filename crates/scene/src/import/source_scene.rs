@@ -1,4 +1,4 @@
-//! A scene in the source's own coordinates, in double precision, and its way to a [`Scene`].
+//! A scene in the source's own coordinates, in double precision, and its conversion to a [`Scene`].
 
 use std::collections::HashMap;
 
@@ -8,12 +8,12 @@ use crate::error::{Fault, at_most};
 use crate::light_parts::{color, color_mut, position_mut};
 use crate::{Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Vertex};
 
-/// Further from the origin than this, a millimetre is lost in `f32`.
+/// Distance from the origin beyond which `f32` loses a millimetre.
 const FAR_M: f64 = 1e4;
-/// Further than this many diagonals, a hundred-thousandth of the model is lost.
+/// Distance in diagonals beyond which `f32` loses a hundred-thousandth of the model.
 const FAR_IN_DIAGONALS: f64 = 1e3;
 
-/// What an importer fills.
+/// The result of an importer.
 #[derive(Default)]
 pub(crate) struct SourceScene {
     pub name: String,
@@ -25,7 +25,7 @@ pub(crate) struct SourceScene {
     pub cameras: Vec<PlacedCamera>,
 }
 
-/// A mesh; `vertices[i].position` is not set, `positions_in_mesh[i]` is.
+/// A mesh whose positions are in `positions_in_mesh`; `vertices[i].position` is unset.
 #[derive(Default, Clone)]
 pub(crate) struct SourceMesh {
     pub positions_in_mesh: Vec<DVec3>,
@@ -40,7 +40,7 @@ pub(crate) struct SourceInstance {
     pub source_from_mesh: DAffine3,
 }
 
-/// A light, all but its position, which is not set in `light`.
+/// A light whose position is outside of `light`, where it is unset.
 pub(crate) struct SourceLight {
     pub light: Light,
     pub position_in_source: DVec3,
@@ -52,7 +52,7 @@ pub(crate) struct PlacedCamera {
     pub fov_y_rad: f32,
 }
 
-/// A vertex as it is where the source says nothing.
+/// The default vertex.
 pub(crate) fn plain_vertex() -> Vertex {
     Vertex { position: [0.0; 3], normal: [0.0; 3], uv: [0.0; 2], color_srgba8: [255; 4], sway: 0.0 }
 }
@@ -95,7 +95,7 @@ impl SourceScene {
         })
     }
 
-    /// A mesh far from its own origin is brought there, and its instances take the distance over.
+    /// Moves a mesh that is far from its own origin there; its instances take over the distance.
     fn recentre_meshes(&mut self) -> Result<(), Fault> {
         for (number, mesh) in self.meshes.iter_mut().enumerate() {
             let bad = mesh.positions_in_mesh.iter().position(|p| !p.is_finite());
@@ -120,7 +120,7 @@ impl SourceScene {
         Ok(recentring_offset(all))
     }
 
-    /// Around all instances; not finite where there are none, or where a position is not.
+    /// Bounds of all instances; not finite without instances, or where a position is not.
     pub(crate) fn bounds_in_source(&self) -> Box3 {
         let boxes: Vec<_> = self.meshes.iter().map(|m| Box3::around(m.positions_in_mesh.iter().copied())).collect();
         let corners = self.instances.iter().flat_map(|instance| {
@@ -131,8 +131,7 @@ impl SourceScene {
         Box3::around(corners)
     }
 
-    /// A placement that mirrors would turn triangles inside out; mirror the mesh once instead, and place
-    /// that without a mirror.
+    /// Mirrors a mesh once in place of its mirroring placements, which would turn triangles inside out.
     fn unmirror(&mut self) {
         let mirror_x = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
         let mut mirrored_of = HashMap::new();
@@ -183,15 +182,14 @@ impl SourceInstance {
 }
 
 impl SourceLight {
-    /// Irradiance at a point, with nothing in between and a spot turned there; no distance counts as less
-    /// than `least_m`.
+    /// Unoccluded irradiance at a point, with spots aimed at it; distances count as at least `least_m`.
     pub(crate) fn arriving_at(&self, point_in_source: DVec3, least_m: f64) -> DVec3 {
         let color = color(&self.light).as_dvec3();
         let distance_m = self.position_in_source.distance(point_in_source).max(least_m);
         if matches!(self.light, Light::Directional { .. }) { color } else { color / (distance_m * distance_m) }
     }
 
-    /// In double precision: a factor may be too small for `f32` where what comes out is not.
+    /// Scales in double precision: a factor may be too small for `f32` where the result is not.
     pub(crate) fn scale(&mut self, factor: f64) {
         let color = color_mut(&mut self.light);
         *color = (color.as_dvec3() * factor).as_vec3();
@@ -224,7 +222,7 @@ pub(crate) fn is_invertible(transform: &DAffine3) -> bool {
     transform.is_finite() && (transform.matrix3 * largest.recip()).determinant().abs() > 1e-12
 }
 
-/// By how much to move what fills `bounds` towards the origin: whole metres, unless it is too small.
+/// Offset that moves `bounds` to the origin, in whole metres unless the bounds are too small.
 fn recentring_offset(bounds: Box3) -> DVec3 {
     if bounds.is_empty() {
         return DVec3::ZERO;

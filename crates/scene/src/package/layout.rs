@@ -1,12 +1,12 @@
-//! The bytes of a package, little-endian throughout:
+//! The layout of a package, little-endian throughout:
 //!
 //! ```text
 //! magic "MYRSCENE" | version u32 | header length u32 | header (postcard)
 //! then for each mesh: vertices (40 bytes each), indices (4 bytes each); for each texture: texels
 //! ```
 //!
-//! The arrays are as they are in memory, so that packing and unpacking are copies; the header has their
-//! lengths, which are checked against what is left of the bytes before anything is allocated.
+//! Arrays have their layout in memory, so that packing and unpacking are copies. The header has their lengths, which
+//! are checked against the remaining bytes before memory is allocated.
 
 use bytemuck::Pod;
 use depth_image::Illumination;
@@ -52,7 +52,7 @@ struct TextureHeader {
 }
 
 pub(super) fn bytes_from_scene(scene: &Scene) -> Vec<u8> {
-    // Writing to a growing vector cannot fail, and no field is of a kind that postcard refuses.
+    // Writing to a growing vector cannot fail, and postcard supports all fields.
     let header = postcard::to_stdvec(&header_of(scene)).unwrap_or_default();
     let mut bytes = Vec::with_capacity(16 + header.len() + array_bytes(scene));
     bytes.extend_from_slice(MAGIC);

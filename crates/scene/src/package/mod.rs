@@ -1,4 +1,4 @@
-//! A scene as bytes, named by their hash: what travels between nodes.
+//! A scene as bytes that are named by their hash, for the transfer between nodes.
 
 mod hash;
 mod layout;
@@ -9,10 +9,10 @@ pub use store::PackageStore;
 
 use crate::{Limits, Scene, SceneError};
 
-/// A packed scene. The same scene always gives the same bytes, and the same bytes the same hash.
+/// A packed scene. Equal scenes give equal bytes, and equal bytes an equal hash.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Package {
-    /// Of `bytes`.
+    /// Hash of `bytes`.
     pub hash: SceneHash,
     /// See [`unpack`].
     pub bytes: Vec<u8>,
@@ -25,10 +25,10 @@ pub fn pack(scene: &Scene) -> Package {
     Package { hash: SceneHash::of(&bytes), bytes }
 }
 
-/// Unpacks a scene and validates it: the bytes may come from anyone. Does not check their hash.
+/// Unpacks a scene and validates it, since the bytes are untrusted. It does not check their hash.
 ///
 /// # Errors
-/// Names the part of the package at fault. Takes no more memory than a few times the bytes' length.
+/// The part of the package at fault. Memory is bounded by a few times the bytes' length.
 pub fn unpack(bytes: &[u8], limits: &Limits) -> Result<Scene, SceneError> {
     let scene = layout::scene_from_bytes(bytes, limits);
     let checked = scene.and_then(|scene| scene.check(limits).map(|()| scene));

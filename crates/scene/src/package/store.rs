@@ -16,33 +16,33 @@ pub struct PackageStore {
 }
 
 impl PackageStore {
-    /// Opens a folder; makes it where there is none.
+    /// Opens a folder, and creates it where it does not exist.
     ///
     /// # Errors
-    /// When it can be neither found nor made.
+    /// The folder can neither be found nor created.
     pub fn open(folder: impl Into<PathBuf>) -> Result<Self, SceneError> {
         let folder = folder.into();
         std::fs::create_dir_all(&folder).map_err(|e| Fault::io("package folder", e).in_path(&folder))?;
         Ok(Self { folder })
     }
 
-    /// The bytes of a package; `None` where it is absent, unreadable, or does not have its hash.
+    /// The bytes of a package; `None` where it is absent, unreadable, or of another hash.
     #[must_use]
     pub fn get(&self, hash: SceneHash) -> Option<Vec<u8>> {
         let bytes = std::fs::read(self.path(hash)).ok()?;
         (SceneHash::of(&bytes) == hash).then_some(bytes)
     }
 
-    /// Whether there is a package of this name; its contents are checked by [`PackageStore::get`].
+    /// Returns whether a package of this name exists; [`PackageStore::get`] checks its contents.
     #[must_use]
     pub fn contains(&self, hash: SceneHash) -> bool {
         self.path(hash).is_file()
     }
 
-    /// Keeps a package. It appears whole or not at all, whatever stops the program.
+    /// Stores a package. It appears whole or not at all, even where the program is stopped.
     ///
     /// # Errors
-    /// When the bytes do not have that hash, or cannot be written.
+    /// The bytes have another hash, or cannot be written.
     pub fn put(&self, hash: SceneHash, bytes: &[u8]) -> Result<(), SceneError> {
         let path = self.path(hash);
         let actual = SceneHash::of(bytes);

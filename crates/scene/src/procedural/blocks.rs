@@ -13,8 +13,8 @@ const ORIGIN_AHEAD: f32 = 4.0;
 /// All blocks stand this far below the viewpoints, in the same units.
 const FOOT: f32 = -0.5;
 
-/// A block's extent to the right and ahead of V0, and its top over the viewpoints. The unit is the distance from
-/// V0 to V1, which lies to the right of it.
+/// A block's extent to the right and ahead of V0, and its top above the viewpoints. The unit is the distance from V0 to
+/// V1 on its right.
 struct Block {
     right: [f32; 2],
     ahead: [f32; 2],
@@ -22,11 +22,10 @@ struct Block {
     color_srgb: Vec3,
 }
 
-/// A stands before V0 and D before V1, with a gap between. B lies in the shadow that A casts from V0, and shows
-/// in the gap from V1. C lies in V0's shadow of B and in V1's shadow of D, and shows in the gap from between.
-/// A reaches to the left of V0 and D to the right of V1: each viewpoint sees of the block before it the front
-/// alone, no side that the other one does not see.
-/// In the order A, B, C, D.
+/// The blocks A, B, C and D, in this order. A stands before V0 and D before V1, with a gap between. A hides B from V0,
+/// and the gap shows B to V1. B hides C from V0 and D hides C from V1; the gap shows C to a viewpoint in the middle. A
+/// reaches to the left of V0 and D to the right of V1, so that each viewpoint sees only the front of the block before
+/// it.
 const LAYOUT: [Block; 4] = [
     block([-0.5, 0.3], [2.0, 2.5], 0.6, [206, 84, 62]),
     block([-0.1, 0.45], [4.0, 4.4], 0.5, [88, 150, 86]),
@@ -38,12 +37,12 @@ const fn block(right: [f32; 2], ahead: [f32; 2], top: f32, [r, g, b]: [u8; 3]) -
     Block { right, ahead, top, color_srgb: Vec3::new(r as f32, g as f32, b as f32) }
 }
 
-/// From where [`blocks`] is looked at.
+/// The viewpoints of [`blocks`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlocksViewpoints {
-    /// V0 sees A and D; V1 sees B besides. Neither sees C, which the middle between them does.
+    /// V0 and V1. V0 sees A and D; V1 also sees B. Only the middle between them sees C.
     pub eyes_in_world: [Vec3; 2],
-    /// What cameras there look at.
+    /// The cameras' target.
     pub target_in_world: Vec3,
 }
 
@@ -56,8 +55,7 @@ pub fn blocks_viewpoints() -> BlocksViewpoints {
     }
 }
 
-/// Blocks A (red), B (green), C (yellow) and D (blue), 12 triangles each, that are seen from
-/// [`blocks_viewpoints`].
+/// Blocks A (red), B (green), C (yellow) and D (blue), 12 triangles each, for [`blocks_viewpoints`].
 #[must_use]
 pub fn blocks() -> Scene {
     let mut builder = MeshBuilder::default();
@@ -69,7 +67,7 @@ pub fn blocks() -> Scene {
 }
 
 impl Block {
-    /// Least and greatest.
+    /// Least and greatest corner.
     fn corners_in_world(&self) -> [Vec3; 2] {
         let [left, right] = self.right;
         let [near, far] = self.ahead;
@@ -77,7 +75,7 @@ impl Block {
     }
 }
 
-/// The plan (to the right, ahead) and a height over the viewpoints, to world space: ahead is -z.
+/// Maps plan coordinates (to the right, ahead) and a height above the viewpoints to world space: ahead is -z.
 fn in_world(plan: Vec2, height: f32) -> Vec3 {
     Vec3::new(plan.x - 0.5, height, ORIGIN_AHEAD - plan.y) * SCALE_M
 }
@@ -91,7 +89,7 @@ mod tests {
     const C: usize = 2;
     const D: usize = 3;
 
-    /// Where the way from `eye` to `target` enters a box, if it does well before its end.
+    /// The entry of the way from `eye` to `target` into a box, if it lies well before the target.
     fn entry(eye: Vec3, target: Vec3, block: usize) -> Option<Vec3> {
         let [min, max] = LAYOUT[block].corners_in_world();
         let along = target - eye;
@@ -104,7 +102,7 @@ mod tests {
         (0..4).filter(|&block| entry(eye, target, block).is_some()).collect()
     }
 
-    /// Over the face that looks towards the viewpoints, its rim left out.
+    /// Points on the face towards the viewpoints, without its rim.
     fn front(block: usize) -> Vec<Vec3> {
         let [min, max] = LAYOUT[block].corners_in_world();
         let steps = || (0..=20).map(|i| 0.005 + 0.99 * i as f32 / 20.0);
@@ -119,7 +117,7 @@ mod tests {
         front(block).iter().all(|&point| in_front_of(eye, point).is_empty())
     }
 
-    /// Over all six faces.
+    /// Points on all six faces.
     fn surface(block: usize) -> Vec<Vec3> {
         let [min, max] = LAYOUT[block].corners_in_world();
         let steps: Vec<Vec3> = (0..9 * 9 * 9u16)
@@ -153,16 +151,16 @@ mod tests {
         assert!(is_front_seen(v0.midpoint(v1), C));
     }
 
-    /// Two layers of depth peeling from V0 therefore miss it.
+    /// Two layers of depth peeling from V0 therefore miss C.
     #[test]
     fn c_is_doubly_hidden_from_v0_by_a_and_b() {
         let [v0, _] = blocks_viewpoints().eyes_in_world;
         assert!(front(C).iter().all(|&point| in_front_of(v0, point) == [A, B]));
     }
 
-    /// What V0 has seen is left out of V1's image; then nothing is left before C.
+    /// V1's image omits the surfaces that V0 has seen; then no surface is left before C.
     #[test]
-    fn all_that_hides_c_from_v1_is_seen_from_v0() {
+    fn v0_sees_every_surface_that_hides_c_from_v1() {
         let [v0, v1] = blocks_viewpoints().eyes_in_world;
         let front_of_d_m = LAYOUT[D].corners_in_world()[1].z;
         for point in front(C) {
@@ -173,7 +171,7 @@ mod tests {
         }
     }
 
-    /// The rays above see where boxes are: one that is moved out of its place is noticed.
+    /// A displaced box is detected, because the rays above find the boxes' places.
     #[test]
     fn the_scene_holds_the_boxes_in_order() {
         let scene = blocks();

@@ -1,4 +1,4 @@
-//! A yard that no camera outside sees.
+//! A yard that is hidden from cameras outside.
 
 use glam::Vec3;
 
@@ -9,9 +9,9 @@ const HALF_WIDTH_M: f32 = 2.0;
 const WALL_THICKNESS_M: f32 = 0.2;
 const WALL_HEIGHT_M: f32 = 2.0;
 
-/// Four walls 2 m high around a yard of 3.6 × 3.6 m, centred at the origin on ground 16 m wide. The yard's
-/// red floor and the pillar in it (0.8 m) are seen only from inside or from above: from no point that is
-/// both outside the walls and below their tops.
+/// Four walls 2 m high around a yard of 3.6 × 3.6 m, centred at the origin on ground 16 m wide. The yard's red floor
+/// and its pillar (0.8 m) are visible only from inside or from above. They are hidden from points outside the walls and
+/// below their tops.
 #[must_use]
 pub fn courtyard() -> Scene {
     let mut builder = MeshBuilder::default();
@@ -31,7 +31,7 @@ pub fn courtyard() -> Scene {
     builder.into_scene("courtyard", Material::default())
 }
 
-/// A frame around the walls, so that nothing lies in the plane of the yard's floor but the floor.
+/// A frame around the walls, so that only the floor lies in the plane of the yard's floor.
 fn add_ground(builder: &mut MeshBuilder) {
     const REACH_M: f32 = 8.0;
     let half_strip = (REACH_M - HALF_WIDTH_M) * 0.5;

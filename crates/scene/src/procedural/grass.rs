@@ -1,4 +1,4 @@
-//! A patch of meadow: thin blades before thin blades.
+//! A patch of meadow: many layers of thin blades.
 
 use std::f32::consts::TAU;
 use std::fmt;
@@ -11,22 +11,22 @@ use super::rng::Rng;
 use super::solids::matt;
 use crate::{Material, Scene, Vertex};
 
-/// At density 1, as of the model in the paper's table 1.
+/// Number of triangles at density 1, that of the model in the paper's table 1.
 const TRIANGLES: f64 = 56_000.0;
-/// One triangle in so many is ground.
+/// The inverse of the ground's share of the triangles.
 const GROUND_SHARE: u32 = 14;
 const SEED: u64 = 56;
 const HALF_WIDTH_M: f32 = 2.0;
-/// At density 1.
+/// Width of a blade at density 1.
 const BLADE_WIDTH_M: f32 = 0.017;
-/// Width of a blade at each of its sections, of that at the root; the last one is the tip.
+/// Width of a blade at each of its sections, as a share of that at the root; the last one is the tip.
 const TAPER: [f32; 4] = [0.8, 1.0, 0.7, 0.0];
 const TRIANGLES_OF_BLADE: u32 = 2 * (TAPER.len() as u32 - 1) - 1;
 
 const GROUND_MATERIAL: u32 = 0;
 const BLADE_MATERIAL: u32 = 1;
 
-/// How many triangles a meadow has, in units of 56,000; see [`grass`].
+/// Density of a meadow, in units of 56,000 triangles; see [`grass`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GrassDensity(f32);
 
@@ -34,27 +34,27 @@ pub struct GrassDensity(f32);
 impl Eq for GrassDensity {}
 
 impl GrassDensity {
-    /// The usual one.
+    /// The default density.
     pub const ONE: Self = Self(1.0);
     /// A few blades: 56 triangles.
     pub const MIN: f32 = 0.001;
-    /// 56 million triangles, of blades as thin as `f32` can still tell their two sides apart.
+    /// 56 million triangles. Thinner blades would lose the distance of their two sides in `f32`.
     pub const MAX: f32 = 1000.0;
 
-    /// `None` for what is not a number between [`Self::MIN`] and [`Self::MAX`].
+    /// A density between [`Self::MIN`] and [`Self::MAX`]; `None` otherwise.
     #[must_use]
     pub fn new(density: f32) -> Option<Self> {
         (Self::MIN..=Self::MAX).contains(&density).then_some(Self(density))
     }
 
-    /// Triangles of the meadow, known before it is made.
+    /// Number of triangles of the meadow, before it is made.
     #[must_use]
     pub fn triangles(self) -> u64 {
         let Plan { cells, blades } = Plan::of(self);
         u64::from(2 * cells * cells) + u64::from(blades) * u64::from(TRIANGLES_OF_BLADE)
     }
 
-    /// Vertices of the meadow, known before it is made.
+    /// Number of vertices of the meadow, before it is made.
     #[must_use]
     pub fn vertices(self) -> u64 {
         let Plan { cells, blades } = Plan::of(self);
@@ -82,9 +82,9 @@ impl Plan {
     }
 }
 
-/// Bent blades of grass, both sides of which are seen, on an undulating patch of 4 m × 4 m around the origin:
-/// 56,000 triangles times `density`. Of twice as many blades each is half as wide and as high as before, so that
-/// as much of the ground is covered and the meadow looks alike, only finer, at every density.
+/// Bent, two-sided blades of grass on an undulating patch of 4 m × 4 m around the origin: 56,000 triangles times
+/// `density`. Twice as many blades are each half as wide and equally high. They cover the same share of the ground at
+/// every density, only finer.
 #[must_use]
 pub fn grass(density: GrassDensity) -> Scene {
     let plan = Plan::of(density);
@@ -100,7 +100,7 @@ pub fn grass(density: GrassDensity) -> Scene {
     Scene { background_linear: Vec3::new(0.46, 0.60, 0.80), ..scene }
 }
 
-/// Places spread evenly over the unit square however many of them are used: the R2 sequence (Roberts 2018).
+/// Places spread evenly over the unit square for any number of them: the R2 sequence (Roberts 2018).
 fn spread(number: u32) -> Vec2 {
     let at = |step: f64| (0.5 + step * f64::from(number)).fract() as f32;
     Vec2::new(at(0.754_877_666_246_693), at(0.569_840_290_998_053))
@@ -161,14 +161,14 @@ impl Meadow {
     }
 }
 
-/// One blade, which bends over its flat side.
+/// A blade that bends over its flat side.
 struct Blade {
     root: Vec3,
     height_m: f32,
     width_m: f32,
     /// Horizontal and of unit length.
     lean: Vec3,
-    /// How far its tip is bent over, of its height.
+    /// Displacement of the tip, as a share of the height.
     bend: f32,
     color_srgb: Vec3,
 }
@@ -177,7 +177,7 @@ impl Blade {
     fn sprouting(meadow: &Meadow, at: Vec2, rng: &mut Rng) -> Self {
         let dryness = (meadow.dryness(at) + rng.between(-0.25, 0.25)).clamp(0.0, 1.0);
         let growth = 0.85 + 0.45 * meadow.noise.fractal(at * 1.3 + 60.0, 3);
-        // Most lean anywhere, all a little with the wind.
+        // Most blades lean in any direction, all a little with the wind.
         let heading = Vec2::from_angle(rng.between(0.0, TAU)) + Vec2::new(0.45, 0.2);
         let heading = heading.normalize_or(Vec2::X);
         let lush = mix(Vec3::new(86.0, 134.0, 44.0), Vec3::new(134.0, 176.0, 70.0), rng.unit());
@@ -192,14 +192,14 @@ impl Blade {
         }
     }
 
-    /// On the left (-1), the right (1) or the axis (0) of a section.
+    /// A vertex on the left (-1), the right (1) or the axis (0) of a section.
     fn vertex(&self, section: usize, side: f32) -> Vertex {
         let t = section as f32 / (TAPER.len() - 1) as f32;
         let across = Vec3::Y.cross(self.lean);
         let axis = Vec3::Y * (t - 0.35 * self.bend * t * t) + self.lean * (self.bend * t * t);
         let along = Vec3::Y * (1.0 - 0.7 * self.bend * t) + self.lean * (2.0 * self.bend * t);
         let flat = across.cross(along).normalize_or(self.lean);
-        // Rounded across, as blades are, and turned up a little, which makes the meadow one surface.
+        // Normals are rounded across the blade and turned up a little, which makes the meadow one surface.
         let normal = (flat + across * (0.4 * side) + Vec3::Y * 0.5).normalize_or(Vec3::Y);
         let position = self.root + axis * self.height_m + across * (0.5 * self.width_m * TAPER[section] * side);
         let color = self.color_srgb * lerp(0.55, 1.15, t);
@@ -212,7 +212,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn triangles_grow_with_density_and_are_known_beforehand() {
+    fn triangles_grow_with_density_as_predicted() {
         for density in [0.001, 0.01, 0.3, 1.0, 4.0] {
             let density = GrassDensity::new(density).unwrap();
             let scene = grass(density);
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn blades_cover_as_much_at_every_density() {
+    fn blades_cover_the_same_share_at_every_density() {
         let area_m2 = |density| {
             let mesh = &grass(GrassDensity::new(density).unwrap()).meshes[0];
             let corner = |i: u32| Vec3::from(mesh.vertices[i as usize].position);
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn densities_that_cannot_be_are_none() {
+    fn invalid_densities_are_none() {
         for density in [0.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-9, 1000.1] {
             assert_eq!(GrassDensity::new(density), None, "{density}");
         }

@@ -1,4 +1,4 @@
-//! One tree and the ground that it stands on, little more.
+//! One tree on its mound.
 
 use std::f32::consts::TAU;
 
@@ -10,10 +10,10 @@ use super::solids::matt;
 use super::tree::{TreePlan, tree_mesh};
 use crate::{Instance, Material, Mesh, Scene};
 
-/// Of the model in the paper's table 1.
+/// Number of triangles of the model in the paper's table 1.
 const TRIANGLES: u32 = 113_000;
 const SEED: u64 = 1113;
-/// The tree is grown at the height that its leaves are made for, and placed larger.
+/// The tree grows at the height for which its leaves are made, and is scaled afterwards.
 const GROWN_HEIGHT_M: f32 = 0.8;
 const SCALE: f32 = 12.0;
 const GROUND_RADIUS_M: f32 = 5.5;

@@ -1,4 +1,4 @@
-//! Gathers triangles into a mesh, and a mesh into a scene.
+//! Collects triangles into a mesh, and a mesh into a scene.
 
 use glam::{Affine3A, Vec2, Vec3};
 
@@ -23,13 +23,13 @@ impl MeshBuilder {
         self.vertices.len() as u32 - 1
     }
 
-    /// Two triangles through corners that run counter-clockwise, seen from the front.
+    /// Adds two triangles through corners that run counter-clockwise, seen from the front.
     pub(super) fn quad(&mut self, corners: [u32; 4]) {
         let [a, b, c, d] = corners;
         self.indices.extend([a, b, c, a, c, d]);
     }
 
-    /// A parallelogram facing `right × up`, its corners at `centre ± right ± up`.
+    /// Adds a parallelogram that faces `right × up`, with corners at `centre ± right ± up`.
     pub(super) fn rectangle(&mut self, centre: Vec3, right: Vec3, up: Vec3, color_srgb: Vec3) {
         let normal = right.cross(up).normalize_or(Vec3::Y);
         let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(r, u): (f32, f32)| {
@@ -39,7 +39,7 @@ impl MeshBuilder {
         self.quad(corners);
     }
 
-    /// An axis-aligned box: 12 triangles facing out.
+    /// Adds an axis-aligned box: 12 triangles that face out.
     pub(super) fn cuboid(&mut self, min: Vec3, max: Vec3, color_srgb: Vec3) {
         let (centre, half) = ((min + max) * 0.5, (max - min) * 0.5);
         for axis in 0..3 {
@@ -50,7 +50,7 @@ impl MeshBuilder {
         }
     }
 
-    /// A flat quadrilateral, its corners counter-clockwise seen from the front.
+    /// Adds a flat quadrilateral, its corners counter-clockwise seen from the front.
     pub(super) fn facet(&mut self, corners: [Vec3; 4], color_srgb: Vec3) {
         let [a, b, c, d] = corners;
         let normal = (c - a).cross(d - b).normalize_or(Vec3::Y);
@@ -62,7 +62,7 @@ impl MeshBuilder {
         self.indices.len() as u32 / 3
     }
 
-    /// Ends a part: all indices since the last one.
+    /// Ends a part of all indices since the last one.
     pub(super) fn finish_part(&mut self, material: u32) {
         let first_index = self.parts.last().map_or(0, |p| p.first_index + p.index_count);
         let index_count = self.indices.len() as u32 - first_index;

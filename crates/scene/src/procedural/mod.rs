@@ -1,4 +1,5 @@
-//! Scenes made by arithmetic: the paper's tree over a terrain, and small ones in closed form for tests.
+//! Procedural scenes: the paper's tree over a terrain, the scenes of *Non-redundant rendering*, and small ones in
+//! closed form for tests.
 //!
 //! The same arguments give the same scene, bit for bit, on the same build.
 
@@ -32,8 +33,7 @@ use glam::Vec3;
 
 use crate::Scene;
 
-/// The scene of one of [`crate::BUILT_IN_NAMES`], with its usual arguments; the cube for any other
-/// name.
+/// The scene of one of [`crate::BUILT_IN_NAMES`], with its default arguments; the cube for any other name.
 pub(crate) fn by_name(name: &str) -> Scene {
     match name {
         "quad" => quad(Vec3::ZERO, 0.5, Vec3::Z, [200, 120, 60]),

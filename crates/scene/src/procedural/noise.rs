@@ -32,7 +32,7 @@ impl Noise {
     pub(super) fn fractal(&self, point: Vec2, octaves: u32) -> f32 {
         let (mut sum, mut height, mut total) = (0.0, 1.0, 0.0);
         for octave in 0..octaves {
-            // An offset a octave, so that the zeros at lattice points do not line up.
+            // An offset per octave keeps the zeros at lattice points from lining up.
             let shift = Vec2::splat(17.3 * octave as f32);
             sum += height * self.at(point * 2f32.powi(octave as i32) + shift);
             total += height;

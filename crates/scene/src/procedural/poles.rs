@@ -1,4 +1,4 @@
-//! Thin poles before a wall: all silhouettes, and a wall of which each view sees other parts.
+//! Thin poles before a wall: many silhouettes, and a wall that shows different parts to each view.
 
 use std::f32::consts::TAU;
 
@@ -11,8 +11,8 @@ const POLE_COUNT: u32 = 9;
 const POLE_SIDES: u32 = 12;
 const HALF_HEIGHT_M: f32 = 1.5;
 
-/// Nine upright poles of `radius_m` in the plane z = -1, at x = -2, -1.5 … 2, 3 m high around y = 0; and
-/// in the plane z = -3 a wall 10 m wide and 6 m high of coloured squares of half a metre. Seen from z > 0.
+/// Nine upright poles of `radius_m` in the plane z = -1, at x = -2, -1.5 … 2, 3 m high around y = 0. A wall in the
+/// plane z = -3 is 10 m wide and 6 m high, with coloured squares of half a metre. Views are at z > 0.
 #[must_use]
 pub fn poles(radius_m: f32) -> Scene {
     let mut builder = MeshBuilder::default();
@@ -35,7 +35,7 @@ fn add_wall(builder: &mut MeshBuilder) {
     }
 }
 
-/// Open at its ends.
+/// A tube, open at its ends.
 fn add_pole(builder: &mut MeshBuilder, foot: Vec3, radius_m: f32) {
     let first = builder.vertices.len() as u32;
     for side in 0..POLE_SIDES {

@@ -8,12 +8,12 @@ pub(super) struct Rng {
 }
 
 impl Rng {
-    /// Streams of different `purpose` are unrelated, so that one may draw more without moving the others.
+    /// Streams of different `purpose` are independent: more numbers from one do not change the others.
     pub(super) fn new(seed: u64, purpose: u64) -> Self {
         Self { state: mixed(seed ^ mixed(purpose)) }
     }
 
-    /// 0 up to but not 1.
+    /// A number from 0 up to, but not, 1.
     pub(super) fn unit(&mut self) -> f32 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         (mixed(self.state) >> 40) as f32 / (1u64 << 24) as f32
@@ -23,7 +23,7 @@ impl Rng {
         low + (high - low) * self.unit()
     }
 
-    /// In the cube from -1 to 1.
+    /// A point in the cube from -1 to 1.
     pub(super) fn vector(&mut self) -> Vec3 {
         Vec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
     }

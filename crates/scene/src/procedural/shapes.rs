@@ -9,8 +9,7 @@ use crate::{Material, Scene, Texture, Vertex};
 
 const WHITE: Vec3 = Vec3::splat(255.0);
 
-/// A square that faces along `normal` (+Y where that has no length): two triangles, unlit, of exactly
-/// `color_srgb8`.
+/// A square that faces along `normal` (+Y for a zero vector): two triangles, unlit, of exactly `color_srgb8`.
 #[must_use]
 pub fn quad(center: Vec3, half_size_m: f32, normal: Vec3, color_srgb8: [u8; 3]) -> Scene {
     let normal = normal.normalize_or(Vec3::Y);
@@ -64,7 +63,7 @@ fn sphere(radius_m: f32, segments: u32) -> MeshBuilder {
     for row in 0..=rows {
         for column in 0..=columns {
             let uv = [column as f32 / columns as f32, row as f32 / rows as f32];
-            // The seam's two ends, and each pole, must be the same point to the last bit.
+            // The seam's two ends, and each pole, must be equal to the last bit.
             let azimuth = TAU * (column % columns) as f32 / columns as f32;
             let ring = if row % rows == 0 { 0.0 } else { (PI * uv[1]).sin() };
             let normal = Vec3::new(ring * azimuth.sin(), (PI * uv[1]).cos(), ring * azimuth.cos());

@@ -1,4 +1,4 @@
-//! Closed solids that several scenes are put together from.
+//! Closed solids, the parts of several scenes.
 
 use std::f32::consts::{PI, TAU};
 
@@ -8,7 +8,7 @@ use super::mesh_builder::{MeshBuilder, vertex};
 use super::noise::Noise;
 use crate::Material;
 
-/// A material without any light that depends on the viewer; colours come from the vertices.
+/// A material without highlights; colours come from the vertices.
 pub(super) fn matt(name: &str) -> Material {
     Material { name: name.into(), metallic: 0.0, roughness: 1.0, ..Material::default() }
 }
@@ -36,7 +36,7 @@ pub(super) fn sweep_around(
     }
 }
 
-/// A place on a beam's axis: the middle of its section, and where the section's top looks.
+/// A place on a beam's axis: the middle of its section, and the direction of the section's top.
 #[derive(Clone, Copy)]
 pub(super) struct Station {
     pub middle: Vec3,

@@ -1,5 +1,5 @@
-//! The paper's scene: "one highly tessellated tree over a heightfield terrain", about 500 thousand
-//! triangles under a simple Phong shader (Lages et al.), in their block between two planes.
+//! The paper's scene (Lages et al.): "one highly tessellated tree over a heightfield terrain", about 500 thousand
+//! triangles under a simple Phong shader. It lies in their block between two planes.
 
 use glam::{Affine3A, Vec2, Vec3};
 
@@ -8,13 +8,13 @@ use super::tree::{TreePlan, tree_mesh};
 use crate::light_rig::SOFT_SUN_RAD;
 use crate::{Environment, Illumination, Instance, Light, Material, Scene, Wind};
 
-/// Where the tree stands, x and z.
+/// Place of the tree, x and z.
 const TREE_FOOT: Vec2 = Vec2::new(-0.05, 0.04);
 /// Top of the block.
 const CEILING_M: f32 = 0.98;
 const TREE_HEIGHT_M: f32 = 0.8;
 
-/// A blue sky over a meadow that gives some of it back: `(0.20, 0.23, 0.27)` on level ground.
+/// A blue sky over a meadow that reflects some of it: `(0.20, 0.23, 0.27)` on level ground.
 const ENVIRONMENT: Environment =
     Environment { zenith_linear: Vec3::new(0.220, 0.258, 0.312), nadir_linear: Vec3::new(0.10, 0.09, 0.06) };
 
@@ -22,9 +22,9 @@ const ENVIRONMENT: Environment =
 const BARK_MATERIAL: u32 = 1;
 const LEAF_MATERIAL: u32 = 2;
 
-/// A tree on a hilly meadow of 2 m × 2 m, all of it within x, z in [-1, 1] and y in [0, 1]; half of the
-/// triangles are ground and half are tree. The count is met within 3 % from some 10,000 triangles up.
-/// Static: see [`Scene::with_wind`].
+/// A tree on a hilly meadow of 2 m × 2 m, within x, z in [-1, 1] and y in [0, 1]. Half of the triangles are ground and
+/// half are tree. The count is met within 3 % from some 10,000 triangles up. The scene is static: see
+/// [`Scene::with_wind`].
 #[must_use]
 pub fn tree_terrain(triangles: u32, seed: u64) -> Scene {
     let cells = (f64::from(triangles) / 4.0).sqrt().round().max(1.0) as u32;
@@ -51,8 +51,8 @@ pub fn tree_terrain(triangles: u32, seed: u64) -> Scene {
 }
 
 impl Scene {
-    /// This scene with a breeze: whatever has sway moves by up to a fortieth of a metre, more towards the
-    /// ends. Without sway in its vertices a scene stays at rest.
+    /// Adds a breeze that moves vertices with sway by up to a fortieth of a metre. A scene without sway in its vertices
+    /// stays at rest.
     #[must_use]
     pub fn with_wind(mut self) -> Self {
         self.wind = Some(Wind {
@@ -65,8 +65,8 @@ impl Scene {
     }
 }
 
-/// All matt under GGX, leaves too: the paper's scene then has no light that depends on the viewer, and its
-/// samples need no planes for it. The paper's own shading has its highlights, which go with `phong` lighting.
+/// All materials are matt under GGX, leaves too. The paper's scene then has no view-dependent light, and its samples
+/// need no planes for it. The paper's highlights belong to `phong` lighting.
 fn materials() -> Vec<Material> {
     let matt = |name: &str, phong_specular: f32, phong_exponent: f32| Material {
         name: name.into(),
@@ -80,8 +80,8 @@ fn materials() -> Vec<Material> {
     vec![matt("ground", 0.02, 8.0), matt("bark", 0.05, 12.0), leaves]
 }
 
-/// A late sun, and a weak lamp on the shaded side. The lamp is broad: seen from the tree it is twice as wide
-/// as the sun, as what fills shadows should have none to speak of.
+/// A late sun, and a weak lamp on the shaded side. The lamp appears twice as wide as the sun from the tree, because a
+/// fill light should cast no distinct shadows.
 fn lights() -> Vec<Light> {
     vec![
         Light::Directional {

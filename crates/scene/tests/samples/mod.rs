@@ -1,4 +1,4 @@
-//! Tiny files of every format, made here.
+//! Small files of every format for tests.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::path::PathBuf;
@@ -52,7 +52,7 @@ pub fn load(name: &str, bytes: &[u8]) -> Result<Scene, SceneError> {
     Sample::new(name, bytes).load()
 }
 
-/// The message of the error that loading must give; a second is the time for it.
+/// The message of the error that loading must give within a second.
 pub fn refusal(name: &str, bytes: &[u8]) -> String {
     let start = std::time::Instant::now();
     let message = load(name, bytes).expect_err("it must be refused").to_string();

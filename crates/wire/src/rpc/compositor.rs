@@ -1,13 +1,15 @@
 //! The compositor's service.
 
+use cluster::RenderViews;
+use codec::FramePart;
 use tokio_stream::StreamExt as _;
 use tonic::transport::Channel;
 use tonic::{Request, Response, Status, Streaming, async_trait};
 
 use super::{Messages, answer, answers, capped, incoming, outgoing};
+use crate::proto;
 use crate::proto::compositor_service_client::CompositorServiceClient;
 use crate::proto::compositor_service_server::{CompositorService, CompositorServiceServer};
-use crate::{FramePart, RenderViews, proto};
 
 /// Makes views.
 #[async_trait]

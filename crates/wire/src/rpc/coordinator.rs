@@ -1,15 +1,16 @@
 //! The coordinator's service.
 
+use cluster::{
+    ChangeSession, ClusterStatus, FetchScene, JoinCluster, SamplerReport, ScenePart, SessionEvent, SessionRequest,
+    Welcome, WorkReport,
+};
 use tonic::transport::Channel;
 use tonic::{Request, Response, Status, async_trait};
 
 use super::{Messages, answer, answered, answers, capped, checked, outgoing};
+use crate::proto;
 use crate::proto::coordinator_service_client::CoordinatorServiceClient;
 use crate::proto::coordinator_service_server::{CoordinatorService, CoordinatorServiceServer};
-use crate::{
-    ChangeSession, ClusterStatus, FetchScene, JoinCluster, SamplerReport, ScenePart, SessionEvent, SessionRequest,
-    Welcome, WorkReport, proto,
-};
 
 /// Knows the members, plans sessions and hands out scenes.
 #[async_trait]

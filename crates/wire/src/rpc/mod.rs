@@ -21,7 +21,10 @@ pub use node::{Node, NodeClient, node_server};
 pub use reflection::reflection_server;
 pub use sampler::{Sampler, SamplerClient, sampler_server};
 
-use crate::WireError;
+use crate::error::WireError;
+
+/// Bytes of one decoded message: tonic's default of 4 MiB is reserved in full on a five-byte header.
+pub const MAX_MESSAGE_BYTES: usize = 2 << 20;
 
 /// A stream of messages, already checked.
 pub type Messages<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
@@ -73,8 +76,8 @@ fn answer<D, P: From<D>>(value: D) -> Response<P> {
 macro_rules! capped {
     ($server:expr) => {
         $server
-            .max_decoding_message_size(crate::limits::MAX_MESSAGE_BYTES)
-            .max_encoding_message_size(crate::limits::MAX_MESSAGE_BYTES)
+            .max_decoding_message_size(crate::rpc::MAX_MESSAGE_BYTES)
+            .max_encoding_message_size(crate::rpc::MAX_MESSAGE_BYTES)
     };
 }
 use capped;

@@ -1,12 +1,13 @@
 //! What every node serves.
 
+use cluster::{Assignment, Costs, MeasureCosts, Ready};
 use tonic::transport::Channel;
 use tonic::{Request, Response, Status, async_trait};
 
 use super::{answer, answered, capped, checked};
+use crate::proto;
 use crate::proto::node_service_client::NodeServiceClient;
 use crate::proto::node_service_server::{NodeService, NodeServiceServer};
-use crate::{Assignment, Costs, MeasureCosts, Ready, proto};
 
 /// Is measured and told what to do.
 #[async_trait]

@@ -1,13 +1,14 @@
 //! The sampler's service.
 
+use cluster::FetchImages;
+use codec::Chunk;
 use tonic::transport::Channel;
 use tonic::{Request, Response, Status, async_trait};
 
 use super::{Messages, answer, answers, capped, checked, outgoing};
-use crate::codec::Chunk;
+use crate::proto;
 use crate::proto::sampler_service_client::SamplerServiceClient;
 use crate::proto::sampler_service_server::{SamplerService, SamplerServiceServer};
-use crate::{FetchImages, proto};
 
 /// Serves encoded depth images.
 #[async_trait]

@@ -12,8 +12,8 @@ use super::super::folder::Folder;
 use crate::Limits;
 use crate::error::{Fault, at_most};
 
-/// The bytes of all buffers, and how much may still be read from them: primitives may share an accessor,
-/// so that a small file could otherwise unfold without bound.
+/// The bytes of all buffers, and a budget of bytes to read. Primitives may share an accessor, so that a small file
+/// could otherwise expand without bound.
 pub(super) struct Buffers<'a> {
     contents: Vec<std::borrow::Cow<'a, [u8]>>,
     elements_left: Cell<u64>,
@@ -133,8 +133,8 @@ impl<'a> Buffers<'a> {
         Ok(elements)
     }
 
-    /// An accessor without a view holds zeros. As no byte of the file backs its count, the file's size
-    /// bounds it instead.
+    /// An accessor without a view holds zeros. No byte of the file backs its count, so the file's size bounds it
+    /// instead.
     fn zeros<T: Copy>(&self, layout: &Layout, zero: T) -> Result<Vec<T>, Fault> {
         let backed = self.contents.iter().map(|c| c.len() as u64).sum();
         at_most(format!("{}, elements without data", layout.name), layout.count, backed)?;
@@ -180,7 +180,7 @@ pub(super) fn read_uri(element: &str, uri: &str, folder: &Folder) -> Result<Vec<
     Ok(bytes)
 }
 
-/// What an accessor says about itself, its types known.
+/// An accessor's description with checked types.
 struct Layout<'a> {
     name: String,
     accessor: &'a Accessor,
@@ -201,7 +201,7 @@ pub(super) struct ViewBytes<'a> {
 }
 
 impl<'a> ViewBytes<'a> {
-    /// `count` elements of `element_bytes` from `offset` on; `Err` where the last one leaves the view.
+    /// `count` elements of `element_bytes` from `offset` on. Fails where the last one leaves the view.
     fn chunks(
         &self,
         offset: u64,
@@ -251,7 +251,7 @@ fn is_index_type(component: ComponentType) -> bool {
     matches!(component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
 }
 
-/// `bytes` is as long as the component says.
+/// Reads one component; `bytes` has the component's length.
 fn unsigned(bytes: &[u8], component: ComponentType) -> u32 {
     match component {
         ComponentType::I8 | ComponentType::U8 => u32::from(bytes[0]),

@@ -1,4 +1,4 @@
-//! From the file's bytes to parsed JSON and the binary chunk.
+//! The parsed JSON and the binary chunk of a file.
 
 use gltf::binary::Glb;
 use gltf::json::Root;
@@ -11,7 +11,7 @@ const GLB_HEADER_BYTES: u32 = 12;
 
 pub(super) fn parse<'a>(bytes: &'a [u8], limits: &Limits) -> Result<(Root, Option<&'a [u8]>), Fault> {
     let (json, binary_chunk) = if bytes.starts_with(GLB_MAGIC) { split(bytes)? } else { (bytes, None) };
-    // Each object of the JSON becomes a struct of some hundred bytes, be it only `{}`.
+    // Each object of the JSON, even `{}`, becomes a struct of some hundred bytes.
     let objects = json.iter().filter(|&&b| b == b'{').count();
     at_most("JSON objects", objects as u64, limits.json_objects)?;
     let root = Root::from_slice(json).map_err(|e| Fault::malformed("JSON", e.to_string()))?;
@@ -28,7 +28,7 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
         return Err(Fault::malformed("GLB header", "the length is smaller than the header"));
     }
     let glb = Glb::from_slice(bytes).map_err(|e| Fault::malformed("GLB header", e.to_string()))?;
-    // Only its borrowed form is ever made from a slice; an owned one would not outlive this function.
+    // A slice only gives the borrowed form; an owned one would not outlive this function.
     let borrowed = |chunk| match chunk {
         std::borrow::Cow::Borrowed(slice) => Some(slice),
         std::borrow::Cow::Owned(_) => None,

@@ -13,14 +13,14 @@ use super::super::source_scene::{SourceLight, SourceScene};
 use crate::Light;
 use crate::error::Fault;
 
-/// Largest channel of what arrives at the middle of a scene that is taken as it is: two stops to either side
-/// of what makes white white.
+/// Range of the largest channel of irradiance at the middle of a scene that is not exposed: two stops to either side of
+/// white.
 const UNEXPOSED: RangeInclusive<f64> = 0.25..=4.0;
 
-/// No light counts as nearer to the middle than this share of the bounds' diagonal: a lamp in the middle of a
-/// room lights its walls, and nothing is where it is.
+/// Least distance of a light from the middle, as a share of the bounds' diagonal: a lamp in the middle of a room lights
+/// its walls.
 const LEAST_DISTANCE_IN_DIAGONALS: f64 = 0.25;
-/// And than this, in metres, where all of a scene is in one point.
+/// Least distance of a light from the middle, in metres, for a scene in one point.
 const LEAST_DISTANCE_M: f64 = 1e-3;
 
 /// Angles over 90° by less than this, radians, are 90°.
@@ -52,7 +52,7 @@ pub(super) fn placed(
     Ok(SourceLight { light, position_in_source: source_from_node.translation })
 }
 
-/// Lux and candela, of which a white surface reflects 1/π into each direction.
+/// Conversion from lux and candela: a white surface reflects 1/π of them into each direction.
 fn color(light: &JsonLight) -> Result<Vec3, LightError> {
     let color = Vec3::from(light.color);
     require(color.min_element() >= 0.0 && color.is_finite(), "color", "negative or not finite")?;
@@ -84,7 +84,7 @@ fn require(holds: bool, field: &'static str, reason: &'static str) -> Result<(),
     if holds { Ok(()) } else { Err(LightError { field, reason }) }
 }
 
-/// Takes the place of the exposure that a file does not have; see [`super`].
+/// Applies an exposure, which a file lacks; see [`super`].
 pub(super) fn expose(scene: &mut SourceScene) {
     let bounds = scene.bounds_in_source();
     let least_m = (bounds.diagonal() * LEAST_DISTANCE_IN_DIAGONALS).max(LEAST_DISTANCE_M);

@@ -19,7 +19,7 @@ use super::accessors::{Buffers, read_uri};
 use crate::error::Fault;
 use crate::{Limits, Material, Texture};
 
-/// Where `alphaMode: BLEND` is cut: there is no blending, as a depth image holds one surface a texel.
+/// The cut-off of `alphaMode: BLEND`. There is no blending, since a depth image holds one surface a texel.
 const BLEND_CUTOFF: f32 = 0.5;
 
 /// Fills the scene's materials, one more than the file's (its default), and its textures.
@@ -54,7 +54,7 @@ pub(super) fn material_number(root: &Root, material: Option<Index<JsonMaterial>>
     Ok(number as u32)
 }
 
-/// Which texture coordinates a texture takes, and `KHR_texture_transform`.
+/// The texture coordinates of a texture, and `KHR_texture_transform`.
 #[derive(PartialEq)]
 pub(super) struct UvSource {
     pub set: u32,
@@ -91,8 +91,7 @@ impl UvSource {
     }
 }
 
-/// The images that materials use, and whether as colours: each once, or twice where one holds colours here
-/// and data there.
+/// The images that materials use. An image that holds colours here and data there occurs twice.
 #[derive(Default)]
 struct Pictures {
     uses: Vec<(Index<Image>, bool)>,
@@ -224,7 +223,7 @@ fn emissive(material: &JsonMaterial, uses: &Uses, means: &Means, element: &str) 
     all_clamped(element, color, 0.0..=f32::MAX).map(Vec3::from)
 }
 
-/// Means of textures. Each is made once, when it is first asked for: many materials may share a large one.
+/// Means of textures. Each is computed once, on first use: many materials may share a large texture.
 struct Means<'a>(Vec<(&'a Texture, OnceCell<Vec3>)>);
 
 impl<'a> Means<'a> {
@@ -232,7 +231,7 @@ impl<'a> Means<'a> {
         Self(textures.iter().map(|texture| (texture, OnceCell::new())).collect())
     }
 
-    /// Of the texture's colour channels, linear.
+    /// Mean of the texture's colour channels, linear.
     fn linear(&self, place: usize) -> Vec3 {
         let (texture, mean) = &self.0[place];
         *mean.get_or_init(|| mean_linear(texture))
@@ -250,7 +249,7 @@ fn mean_linear(texture: &Texture) -> Vec3 {
     Vec3::from(sum.map(|s| (s / texels) as f32))
 }
 
-/// Drops the textures of which only the mean was needed, and renumbers the others.
+/// Drops textures that served for their mean alone, and renumbers the others.
 fn keep_referred_to(textures: Vec<Texture>, materials: &mut [Material]) -> Vec<Texture> {
     let mut kept = vec![false; textures.len()];
     let used = materials.iter().flat_map(|m| [m.base_color_texture, m.metallic_roughness_texture]).flatten();
@@ -268,7 +267,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_quarter_turn_takes_u_to_minus_v() {
+    fn a_quarter_turn_maps_u_to_minus_v() {
         let turn =
             UvSource { set: 0, offset: [1.0, 2.0], scale: [2.0, 1.0], rotation_rad: std::f32::consts::FRAC_PI_2 };
         let [u, v] = turn.apply([0.5, 0.0]);

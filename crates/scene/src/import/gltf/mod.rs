@@ -4,25 +4,25 @@
 //! used. The crate's own validation and readers are not called: both index without checking
 //! (`primitive_validate_hook`, `accessor::Iter`), which a malformed file turns into a panic.
 //!
-//! What is read: node transforms, meshes (one mesh a glTF mesh, however many nodes use it), triangles,
-//! strips and fans, base colour with texture and `KHR_texture_transform` (baked into the coordinates),
-//! `COLOR_0`, metallic and roughness with their texture (its mean where its coordinates are not the base
-//! colour's: a vertex has one pair), alpha masks (blending becomes a mask at 0.5), the mean of an emissive
-//! texture, `KHR_materials_unlit`, `KHR_materials_emissive_strength`, `KHR_lights_punctual` and perspective
-//! cameras. Points and lines are skipped. Missing normals are flat, as the specification asks. Not read:
-//! normal and occlusion maps, skins (shown in bind pose), morph targets, animations, sampler wrap modes (all
-//! textures repeat), textures in other than PNG and JPEG.
+//! The importer reads node transforms, meshes (one per glTF mesh, shared by its nodes), triangles, strips and fans.
+//! Materials have base colour with texture and `KHR_texture_transform` (baked into the coordinates), `COLOR_0`, and
+//! metallic and roughness with their texture. That texture counts by its mean where its coordinates differ from the
+//! base colour's, since a vertex has one pair.
 //!
-//! Factors of materials that leave their range are brought back into it; one that is not finite is refused.
-//! So is a light with a number that cannot be a light's.
+//! It also reads alpha masks (blending becomes a mask at 0.5), the mean of an emissive texture, `KHR_materials_unlit`,
+//! `KHR_materials_emissive_strength`, `KHR_lights_punctual` and perspective cameras. Missing normals are flat, as the
+//! specification requires.
 //!
-//! Lights have no extent, as in the file; their `range`, a hint for culling, is not read. Their intensities
-//! are lux and candela, and how bright a picture becomes is then up to a camera's exposure, which a file does
-//! not have: sunlight of 100,000 lux and a sun of strength 3 are both meant to be seen. Where the light that
-//! arrives at the middle of the bounds from all lights together, with nothing in between and each spot turned
-//! there, is within two stops of what makes a white surface white, it stays as it is. Else all lights are
-//! multiplied by the one number that makes it so: ratios between them stay. Emissive surfaces are not
-//! exposed: in files they are relative to white already.
+//! It skips points and lines, normal and occlusion maps, skins (shown in bind pose), morph targets and animations. It
+//! also skips sampler wrap modes (all textures repeat) and textures in formats other than PNG and JPEG.
+//!
+//! Factors of materials are clamped to their range. A factor that is not finite is refused, as is an invalid light.
+//!
+//! Lights have no extent, as in the file; their `range`, a hint for culling, is not read. Their intensities are lux and
+//! candela, for a camera's exposure that a file lacks: sunlight of 100,000 lux and a sun of strength 3 both occur. The
+//! importer therefore sums the unoccluded light of all lamps at the middle of the bounds, with spots aimed there. Where
+//! the sum is within two stops of white, lights stay unchanged. Otherwise one factor makes the sum white, which keeps
+//! the lights' ratios. Emissive surfaces are not exposed: in files they are relative to white already.
 
 mod accessors;
 mod container;
@@ -68,7 +68,7 @@ fn check_counts(root: &Root, limits: &Limits) -> Result<(), Fault> {
     at_most("images", root.images.len() as u64, limits.attributes)
 }
 
-/// Mesh `i` of the file becomes mesh `i` of the scene; one of lines only stays empty.
+/// Mesh `i` of the file becomes mesh `i` of the scene; a mesh of lines alone stays empty.
 fn read_meshes(root: &Root, buffers: &Buffers, scene: &mut SourceScene) -> Result<(), Fault> {
     for (number, mesh) in root.meshes.iter().enumerate() {
         let mut merged = SourceMesh::default();

@@ -1,4 +1,4 @@
-//! The node tree: where meshes, lights and cameras are.
+//! The node tree: the places of meshes, lights and cameras.
 
 use glam::{DAffine3, DMat4, DQuat, DVec3, Mat4, Quat, Vec3};
 use gltf::json::{Index, Node, Root, Scene as JsonScene};
@@ -8,8 +8,8 @@ use super::lights;
 use crate::Limits;
 use crate::error::{Fault, at_most};
 
-/// Walks the default scene (else the first; else all nodes that are no other's child). A node reached
-/// twice is a cycle or has two parents; glTF allows neither.
+/// Walks the default scene, else the first, else all nodes without a parent. A node reached twice is in a cycle or has
+/// two parents; glTF allows neither.
 pub(super) fn read(root: &Root, limits: &Limits, scene: &mut SourceScene) -> Result<(), Fault> {
     let mut is_visited = vec![false; root.nodes.len()];
     let mut pending: Vec<_> = roots(root)?.into_iter().map(|node| (node, DAffine3::IDENTITY, 0u32)).collect();
@@ -99,7 +99,7 @@ fn from_parts(node: &Node) -> Option<DAffine3> {
     is_usable.then(|| DAffine3::from_scale_rotation_translation(scale, rotation / length, translation))
 }
 
-/// `None` for an orthographic camera. The pose is rigid: a node's scale says nothing about a view.
+/// `None` for an orthographic camera. The pose is rigid: a node's scale does not affect a view.
 fn placed_camera(
     root: &Root,
     node: &Node,

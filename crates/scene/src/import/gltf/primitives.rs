@@ -62,7 +62,7 @@ fn read_normals(
     Ok(true)
 }
 
-/// Primitives may share one large set of vertices; each keeps the ones that its triangles use.
+/// Keeps the vertices that the triangles use: primitives may share one large set.
 fn drop_unused(
     mesh: &mut SourceMesh,
     read_normals: impl FnOnce(&mut SourceMesh) -> Result<bool, Fault>,
@@ -155,7 +155,8 @@ fn triangles(
     }
 }
 
-/// Every other triangle of a strip runs the other way; those that repeat a vertex only steer the strip.
+/// The triangles of a strip. Every other triangle is reversed; those that repeat a vertex only connect parts of the
+/// strip.
 fn from_strip(indices: &[u32]) -> Vec<u32> {
     let windows = indices.windows(3).enumerate();
     let turned = windows.map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] });

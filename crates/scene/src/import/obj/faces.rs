@@ -1,4 +1,4 @@
-//! Polygons to indexed triangles.
+//! Indexed triangles from polygons.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use crate::{Limits, Vertex};
 
 const NONE: u32 = u32::MAX;
 
-/// Positions, coordinates and normals have numbers of their own; a vertex is a triple of them.
+/// Positions, coordinates and normals are numbered separately; a vertex is a triple of these numbers.
 type Corner = [u32; 3];
 
 #[derive(Default)]
@@ -109,7 +109,7 @@ fn corner(word: &str, attributes: &Attributes) -> Result<Corner, &'static str> {
     if is_complete { Ok(corner) } else { Err("is not a corner") }
 }
 
-/// From 1, or backwards from the last one so far.
+/// Resolves a number that counts from 1, or backwards from the last element so far.
 fn resolved(field: &str, count: usize) -> Result<u32, &'static str> {
     let number: i64 = field.parse().map_err(|_| "is not a corner")?;
     let from_zero = if number < 0 { number.checked_add(count as i64) } else { number.checked_sub(1) };

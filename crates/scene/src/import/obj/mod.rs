@@ -1,12 +1,11 @@
 //! Wavefront OBJ with MTL.
 //!
-//! Parsed here, in double precision, rather than by `tobj`: that parses to the precision of the whole
-//! build, drops the texture coordinates of an object in which one face has none, and panics on indices
-//! near `i64::MAX` and on MTL colours of fewer than three numbers.
+//! The parser here has double precision and replaces `tobj`, whose precision is that of the whole build. `tobj` also
+//! drops the texture coordinates of an object in which one face has none. It panics on indices near `i64::MAX` and on
+//! MTL colours of fewer than three numbers.
 //!
-//! Polygons become fans. Normals that are missing are made smooth up to creases of 60°. Axes are kept.
-//! Points, lines, free-form curves and smoothing groups are skipped. A material library that is missing
-//! gives default materials.
+//! Polygons become fans. Missing normals are smooth up to creases of 60°. Axes are kept. Points, lines, free-form
+//! curves and smoothing groups are skipped. A missing material library gives default materials.
 
 mod faces;
 mod mtl;
@@ -42,11 +41,11 @@ struct ObjFile {
     libraries: Vec<String>,
 }
 
-/// What faces refer to by number.
+/// The numbered elements of faces.
 #[derive(Default)]
 struct Attributes {
     positions_in_source: Vec<DVec3>,
-    /// One for each position once any position has one.
+    /// Colours, one for each position once any position has one.
     colors_srgba8: Vec<[u8; 4]>,
     uvs: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
@@ -75,7 +74,7 @@ impl ObjFile {
 }
 
 impl Attributes {
-    /// `v x y z`, then nothing, a weight, or a colour, as several programs write it.
+    /// `v x y z`, optionally followed by a weight or a colour, as several programs write it.
     fn take_position(&mut self, line: &Line) -> Result<(), Fault> {
         let [x, y, z, a, g, b] = floats::<6>(line, 3)?;
         let position = DVec3::new(x, y, z);
@@ -91,7 +90,7 @@ impl Attributes {
     }
 }
 
-/// Sorted by material: one part each.
+/// Sorts triangles by material, one part each.
 fn parts_of(indices_of_material: Vec<Vec<u32>>, numbers: &[u32]) -> (Vec<u32>, Vec<MeshPart>) {
     let (mut indices, mut parts) = (Vec::new(), Vec::new());
     for (own, &material) in indices_of_material.into_iter().zip(numbers) {
@@ -104,7 +103,7 @@ fn parts_of(indices_of_material: Vec<Vec<u32>>, numbers: &[u32]) -> (Vec<u32>, V
     (indices, parts)
 }
 
-/// Makes normals where the file gave none at all, and fills gaps where it gave some.
+/// Makes normals for a file without normals, and fills gaps otherwise.
 fn with_normals(mut mesh: SourceMesh, has_normals: bool) -> SourceMesh {
     if has_normals {
         normals::repair(&mut mesh)

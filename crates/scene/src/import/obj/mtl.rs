@@ -12,8 +12,8 @@ use super::text::{Line, floats, lines};
 use crate::error::{Fault, at_most};
 use crate::{Limits, Material, SceneErrorKind};
 
-/// Fills the scene's materials and textures, and numbers them for `names`. Libraries and textures that do
-/// not exist are left out; those outside the folder are refused.
+/// Fills the scene's materials and textures, and numbers them for `names`. Missing libraries and textures are skipped;
+/// those outside the folder are refused.
 pub(super) fn read_materials(
     libraries: &[String],
     names: &[String],
@@ -35,7 +35,7 @@ pub(super) fn read_materials(
         let Entry { mut material, picture } = known.get(name).cloned().unwrap_or_default();
         material.name.clone_from(name);
         if material.phong_specular == 0.0 {
-            // No highlight, whatever its exponent, which many programs write all the same.
+            // A material without a highlight; many programs write an exponent all the same.
             material.roughness = 1.0;
         }
         material.base_color_texture = picture.map(|file| textures.number_of(&file, folder)).transpose()?.flatten();
@@ -93,15 +93,15 @@ impl Entry {
 }
 
 impl Material {
-    /// As glTF's blending: no surface is see-through, one of less than half is not there.
+    /// Opacity acts as glTF's blending: surfaces are opaque, and those below one half are discarded.
     fn set_opacity(&mut self, opacity: f32) {
         self.base_color_linear[3] = opacity.clamp(0.0, 1.0);
         self.alpha_cutoff = if opacity < 1.0 { 0.5 } else { 0.0 };
     }
 }
 
-/// One or three numbers; writers disagree on whether they are linear, and this takes them as linear, as
-/// the glTF converters do. Negative ones are black.
+/// A colour of one or three numbers. Exporters disagree on their encoding; they count as linear, as in the glTF
+/// converters. Negative numbers are black.
 fn color(line: &Line) -> Result<Vec3, Fault> {
     if line.rest.starts_with("spectral") || line.rest.starts_with("xyz") {
         return Err(Fault::unsupported(line, "colours other than RGB"));
@@ -117,7 +117,7 @@ fn non_negative(line: &Line) -> Result<f32, Fault> {
     clamped(line, value as f32, 0.0..=f32::MAX)
 }
 
-/// The name comes after options such as `-s 1 1 1`; without options it may hold spaces.
+/// The name follows options such as `-s 1 1 1`; without options it may contain spaces.
 fn file_name(rest: &str) -> &str {
     if rest.starts_with('-') { rest.split_ascii_whitespace().next_back().unwrap_or(rest) } else { rest }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::error::Fault;
 
-/// `keyword rest`, trimmed.
+/// Splits a line into keyword and rest, trimmed.
 pub(super) struct Line<'a> {
     pub number: usize,
     pub keyword: &'a str,
@@ -17,8 +17,8 @@ impl fmt::Display for Line<'_> {
     }
 }
 
-/// All lines but empty ones and comments. Lines continued by a backslash are not joined: the backslash
-/// is then refused as no number and no corner.
+/// All lines except empty ones and comments. Lines that continue after a backslash are not joined; the backslash is
+/// then refused as a number or corner.
 pub(super) fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
     let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).map(|(number, line)| {
@@ -27,7 +27,7 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
     })
 }
 
-/// Up to `N` finite numbers, at least `required`; what is missing is 0.
+/// Parses up to `N` finite numbers, at least `required`; missing ones are 0.
 pub(super) fn floats<const N: usize>(line: &Line, required: usize) -> Result<[f64; N], Fault> {
     let mut values = [0.0; N];
     let mut words = line.rest.split_ascii_whitespace();

@@ -1,12 +1,12 @@
-//! What a PLY header claims, checked before a row is read.
+//! The checks of a PLY header before a row is read.
 
 use serde_ply::{ElementDef, PlyFormat, PlyHeader, PropertyType, ScalarType};
 
 use crate::Limits;
 use crate::error::{Fault, at_most};
 
-/// Refuses counts that the file is too short for, that are over the limits, or that have no rows to
-/// speak of; and files without vertices or faces.
+/// Refuses counts that exceed the file's length or the limits, rows without properties, and files without vertices or
+/// faces.
 pub(super) fn check(header: &PlyHeader, file_bytes: u64, limits: &Limits) -> Result<(), Fault> {
     let mut least_bytes = 0u64;
     for element in &header.elem_defs {
@@ -17,7 +17,7 @@ pub(super) fn check(header: &PlyHeader, file_bytes: u64, limits: &Limits) -> Res
             return Err(Fault::malformed(name, "it has rows but no properties"));
         }
         least_bytes = least_bytes.saturating_add(count.saturating_mul(row));
-        // One byte more: the last number of an ASCII file needs no white space after it.
+        // The extra byte is for the last number of an ASCII file, which needs no white space after it.
         if least_bytes > file_bytes + 1 {
             return Err(Fault::malformed(name, format!("{count} rows do not fit a file of {file_bytes} bytes")));
         }
@@ -34,7 +34,7 @@ pub(super) fn check(header: &PlyHeader, file_bytes: u64, limits: &Limits) -> Res
     Ok(())
 }
 
-/// What to multiply a colour channel with to get a byte: integers are bytes, floats are 0…1.
+/// Factor from a colour channel to a byte: integers are bytes, floats are 0…1.
 pub(super) fn color_scale(vertex: &ElementDef) -> f32 {
     match vertex.get_property("red").map(|p| &p.property_type) {
         Some(PropertyType::Scalar(ScalarType::F32 | ScalarType::F64)) => 255.0,

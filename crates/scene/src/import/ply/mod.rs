@@ -1,9 +1,8 @@
-//! PLY, ASCII and binary, by `serde-ply` (which streams rows; sizes are checked against the file before).
+//! PLY, ASCII and binary, by `serde-ply`, which streams rows. Sizes are checked against the file first.
 //!
-//! Read are `vertex` (x y z; nx ny nz; red green blue alpha, as sRGB bytes kept as they are, or as 0…1;
-//! s t, u v or texture_u texture_v) and `face` (vertex_indices or vertex_index; polygons become fans).
-//! Normals that are missing are made smooth up to creases of 60°. Axes are kept. Other elements are
-//! skipped.
+//! The importer reads two elements. `vertex` has x y z, nx ny nz, red green blue alpha (sRGB bytes, or 0…1), and s t, u
+//! v or texture_u texture_v. `face` has vertex_indices or vertex_index; polygons become fans. Missing normals are
+//! smooth up to creases of 60°. Axes are kept. Other elements are skipped.
 
 mod header;
 mod rows;
@@ -87,7 +86,7 @@ fn read_faces(reader: &mut PlyReader<impl BufRead>, mesh: &mut SourceMesh, limit
 
 const TOO_MANY: &str = "too many triangles";
 
-/// Feeds the rows of the reader's next element to `take`, up to the first that it refuses.
+/// Passes the rows of the reader's next element to `take`, up to the first that it refuses.
 fn each_row<'de, R: BufRead, T: serde::Deserialize<'de>>(
     mut reader: &mut PlyReader<R>,
     mut take: impl FnMut(T) -> Result<(), String>,

@@ -6,8 +6,8 @@ use serde::Deserialize;
 use super::super::source_scene::plain_vertex;
 use crate::Vertex;
 
-/// A vertex; numbers of any type. Position and colour come first, and no field has an alias: then
-/// `serde-ply` reads the common rows by offset rather than by name.
+/// A vertex of numbers of any type. Position and colour come first, and no field has an alias, so that `serde-ply`
+/// reads common rows by offset instead of by name.
 #[derive(Deserialize)]
 pub(super) struct VertexRow {
     x: f64,
@@ -48,7 +48,7 @@ pub(super) struct FaceRow {
     vertex_indices: Vec<u32>,
 }
 
-/// A row of an element that scenes have no use for.
+/// A row of an element that scenes do not use.
 #[derive(Deserialize)]
 pub(super) struct SkippedRow {}
 

@@ -1,4 +1,4 @@
-//! What the nest holds: the field, three tiers of stands, and the floors behind them.
+//! The inside of the nest: the field, three tiers of stands, and the floors behind them.
 
 use std::f32::consts::TAU;
 
@@ -21,7 +21,7 @@ const LAWN_M: Vec2 = Vec2::new(225.0, 208.0);
 
 struct Tier {
     rows: u32,
-    /// Its share of the way from the front row to the rearmost.
+    /// Share of the way from the front row to the rearmost.
     reach: [f32; 2],
     heights_m: [f32; 2],
 }
@@ -33,11 +33,10 @@ const TIERS: [Tier; 3] = [
 ];
 /// Between a tier's lowest step and its underside.
 const SLAB_M: f32 = 1.2;
-/// By how much more than the lowest place the stands rise towards the middle of the long sides, and by how much
-/// less towards the ends.
+/// Additional rise of the stands towards the middle of the long sides, and reduction towards the ends.
 const SADDLE: f32 = 0.14;
 
-/// Level at y = 0, in rings of one colour each around the middle of the field.
+/// Level ground at y = 0, in rings of one colour each around the middle of the field.
 pub(super) fn add_ground(builder: &mut MeshBuilder) {
     let at =
         |half_axes_m: Vec2, sector: u32| on_ellipse(half_axes_m, TAU * (sector % SECTORS) as f32 / SECTORS as f32, 0.0);
@@ -88,7 +87,7 @@ fn add_tier(builder: &mut MeshBuilder, number: usize, tier: &Tier) {
     let point = |station: u32, i: u32| height(TAU * station as f32 / SECTORS as f32, outline[i as usize]);
     let mut rng = Rng::new(SEED, 10 + number as u64);
     let seats = |station: u32, i: u32| {
-        // After the underside and the rear, treads and risers take turns, from the top down.
+        // After the underside and the rear, treads and risers alternate, from the top down.
         if i < 2 || i + 1 >= outline.len() as u32 {
             return Vec3::new(158.0, 154.0, 148.0);
         }

@@ -1,4 +1,4 @@
-//! Steel: trusses that carry, and beams at all angles between them, in four shells.
+//! The steel: trusses that carry, and beams at all angles between them, in four shells.
 
 use std::f32::consts::TAU;
 
@@ -11,20 +11,20 @@ use super::super::solids::{Station, beam};
 use super::{SECTORS, SEED, shell};
 
 const TRUSSES: u32 = 24;
-/// Half of what a truss turns around the stadium on its way from the foot to the opening.
+/// Half the angle by which a truss turns around the stadium from its foot to the opening.
 const TRUSS_TURN_RAD: f32 = 0.62;
-/// Between the two chords of a truss.
+/// Distance of the two chords of a truss.
 const TRUSS_DEPTH_M: f32 = 7.0;
 const CHORD_PIECES: u32 = 14;
 const WEBS: u32 = 16;
 const SECONDARY_BEAMS: u32 = 120;
 const SECONDARY_PIECES: u32 = 10;
 const TERTIARY_PIECES: u32 = 5;
-/// Of a beam of so many pieces, see [`beam`].
+/// Triangles of a tertiary beam, see [`beam`].
 const TERTIARY_TRIANGLES: u32 = 8 * TERTIARY_PIECES + 4;
 /// Shells of the tertiary beams, behind the outermost chords.
 const TERTIARY_SHELLS_M: [f32; 3] = [1.0, 3.4, 5.6];
-/// Where beams end on the ground, they go on a little into it.
+/// Depth of beams' ends below the ground.
 const GROUND: f32 = -0.01;
 
 /// A straight line over the unrolled shell, from (angle, up) to (angle, up).
@@ -87,7 +87,7 @@ fn add_truss(builder: &mut MeshBuilder, outer: Line, rng: &mut Rng) {
     }
 }
 
-/// Long beams at many angles in the outermost shell, from the ground over the eave: what makes it a nest.
+/// Long beams at many angles in the outermost shell, from the ground over the eave.
 fn add_secondary(builder: &mut MeshBuilder, number: u32, rng: &mut Rng) {
     let foot_rad = TAU * (number as f32 + rng.unit()) / SECONDARY_BEAMS as f32;
     let steepness = rng.between(0.1, 1.0) * if number.is_multiple_of(2) { 1.0 } else { -1.0 };

@@ -1,7 +1,7 @@
-//! A stadium within a nest of steel: beams before beams before stands.
+//! A stadium within a nest of steel: several layers of beams before stands.
 //!
-//! After the model of the Beijing National Stadium in Xie, Wang and Popescu's *Non-redundant rendering*, table
-//! 1: its plan, its saddle and its three orders of beams; no drawing of it was at hand.
+//! It follows the model of the Beijing National Stadium in Xie, Wang and Popescu's *Non-redundant rendering*, table 1.
+//! It has the plan, the saddle and the three orders of beams; no drawing of it was at hand.
 
 mod bowl;
 mod lattice;
@@ -13,11 +13,11 @@ use super::mesh_builder::MeshBuilder;
 use super::solids::matt;
 use crate::Scene;
 
-/// Of the model in the paper's table 1.
+/// Number of triangles of the model in the paper's table 1.
 const TRIANGLES: u32 = 67_000;
 const SEED: u64 = 2008;
 
-/// Of an ellipse around the stadium.
+/// Number of sectors of an ellipse around the stadium.
 const SECTORS: u32 = 96;
 
 /// A stadium of 332 m × 296 m around the origin, 42 m to 68 m high, on ground at y = 0: 67,000 triangles.

@@ -1,4 +1,4 @@
-//! The surface that the beams lie in: a facade that leans out, a round eave, and a roof with an opening.
+//! The surface of the beams: a facade that leans out, a round eave, and a roof with an opening.
 
 use glam::{Vec2, Vec3};
 
@@ -8,14 +8,14 @@ use super::super::solids::{Station, on_ellipse};
 /// Half axes of the eave and of the opening of the roof, in plan.
 const EAVE_M: Vec2 = Vec2::new(166.0, 148.0);
 const OPENING_M: Vec2 = Vec2::new(91.0, 62.0);
-/// The eave's height at the ends of the longer axis, and how much higher it is at those of the shorter.
+/// The eave's height at the ends of the longer axis, and its additional height at those of the shorter.
 const LOW_M: f32 = 42.0;
 const RISE_M: f32 = 26.0;
-/// How far the facade's foot stands back behind the eave.
+/// Distance of the facade's foot behind the eave.
 const LEAN_M: f32 = 13.0;
-/// From where the eave would have its edge, to where its rounding ends.
+/// Distance from the sharp edge of an eave to the end of its rounding.
 const ROUNDING_M: f32 = 13.0;
-/// Where on the way up, 0 at the foot and 1 at the opening, the rounding begins and ends.
+/// Begin and end of the rounding on the way up, 0 at the foot and 1 at the opening.
 const ROUNDED: [f32; 2] = [0.3, 0.45];
 
 /// Height of the eave.
@@ -23,8 +23,8 @@ pub(super) fn eave_height_m(angle_rad: f32) -> f32 {
     LOW_M + RISE_M * angle_rad.sin().powi(2)
 }
 
-/// At an angle around, and `up` from 0 at the ground over the eave at about 0.4 to 1 at the opening;
-/// `inwards_m` behind the outermost shell.
+/// A point at an angle around the stadium, `inwards_m` behind the outermost shell. `up` is 0 at the ground, about 0.4
+/// at the eave and 1 at the opening.
 pub(super) fn station(angle_rad: f32, up: f32, inwards_m: f32) -> Station {
     const STEP: f32 = 1e-3;
     let around = outermost(angle_rad + STEP, up) - outermost(angle_rad - STEP, up);

@@ -13,7 +13,7 @@ use crate::Vertex;
 const RINGS: [f32; LEVELS] = [40.0, 18.0, 9.0, 5.0, 2.0];
 const SIDES: [f32; LEVELS] = [28.0, 13.0, 8.0, 5.0, 4.0];
 
-/// How finely each level is drawn, and what share of its branches.
+/// Detail of each level, and the share of its branches.
 #[derive(Clone, Copy)]
 struct Detail {
     rings: [u32; LEVELS],
@@ -21,8 +21,7 @@ struct Detail {
     share: [f32; LEVELS],
 }
 
-/// Adds the branches, in at most `budget` triangles; where that is small, without most of the twigs, which
-/// the leaves hide.
+/// Adds the branches in at most `budget` triangles. A small budget omits most of the twigs, which the leaves hide.
 pub(super) fn add(builder: &mut MeshBuilder, skeleton: &Skeleton, budget: u32, seed: u64) {
     let detail = Detail::within(budget, skeleton);
     let noise = Noise::new(seed ^ 0xba4c);
@@ -79,7 +78,7 @@ fn add_tube(builder: &mut MeshBuilder, branch: &Branch, rings: u32, sides: u32, 
     for ring in 0..=rings {
         let t = ring as f32 / rings as f32;
         let along = branch.direction_at(t);
-        // The frame is carried along rather than made anew, so that the tube does not twist.
+        // The frame is transported along the branch, so that the tube does not twist.
         side = (side - along * side.dot(along)).normalize_or(along.any_orthonormal_vector());
         for i in 0..sides {
             let angle = TAU * i as f32 / sides as f32;

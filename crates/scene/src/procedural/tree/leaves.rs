@@ -8,15 +8,15 @@ use super::super::rng::Rng;
 use super::skeleton::{Branch, LEVELS, Skeleton};
 use crate::Vertex;
 
-/// One side of all leaves together, for a tree of this size: about four layers over the crown.
+/// Area of one side of all leaves, for a tree of this size: about four layers over the crown.
 const TOTAL_AREA_M2: f32 = 1.9;
 const WIDTH_OF_LENGTH: f32 = 0.56;
 /// Area of a leaf's outline over length times width.
 const FILL: f32 = 0.62;
 const MAX_LENGTH_M: f32 = 0.034;
-/// Fewer triangles than this in all leaves, and each is a rhomb of two instead of a folded one of six.
+/// Number of triangles of all leaves below which a leaf is a rhomb of two triangles instead of a folded one of six.
 const FEW_TRIANGLES: u32 = 40_000;
-/// How much further the tip of a leaf sways than the twig.
+/// Additional sway of a leaf's tip over the twig's.
 const LEAF_SWAY: f32 = 0.18;
 
 /// Adds leaves until `triangles` are used up.
@@ -28,20 +28,20 @@ pub(super) fn add(builder: &mut MeshBuilder, skeleton: &Skeleton, triangles: u32
     let noise = Noise::new(seed ^ 0x1eaf);
     let mut rng = Rng::new(seed, 3);
     for i in 0..count as usize {
-        // Evenly over the twigs, whatever the count.
+        // Leaves are spread evenly over the twigs for any count.
         let twig = twigs[(i as u64 * twigs.len() as u64 / u64::from(count)) as usize];
         let leaf = Leaf::sprouting(twig, skeleton, length_m, &noise, &mut rng);
         if is_folded { leaf.add_folded(builder) } else { leaf.add_rhomb(builder) }
     }
 }
 
-/// A leaf's own axes, and its looks.
+/// A leaf's axes, and its colour.
 struct Leaf {
     base: Vec3,
     along: Vec3,
     across: Vec3,
     up: Vec3,
-    /// Towards the outside of the crown: bends the normals a little, which makes the crown look full.
+    /// Direction to the outside of the crown. It bends the normals a little, which makes the crown appear full.
     outwards: Vec3,
     color_srgb: Vec3,
     sway: f32,
@@ -70,7 +70,7 @@ impl Leaf {
         }
     }
 
-    /// At `t` along the leaf and `s` across, both sides raised as in an open book, the tip hanging.
+    /// A point at `t` along the leaf and `s` across. Both sides are raised as in an open book, and the tip hangs.
     fn vertex(&self, t: f32, s: f32, normal: Vec3, shade: f32) -> Vertex {
         let length_m = self.along.length();
         let lift = self.up * length_m * (0.16 * s.abs() - 0.22 * t * t);

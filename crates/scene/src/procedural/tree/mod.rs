@@ -10,7 +10,7 @@ use super::mesh_builder::MeshBuilder;
 use crate::Mesh;
 use skeleton::Skeleton;
 
-/// Of the triangles, what may go to the bark; leaves take the rest.
+/// Greatest share of the triangles for the bark; leaves take the rest.
 const BARK_SHARE: f32 = 0.42;
 
 pub(super) struct TreePlan {
@@ -21,8 +21,7 @@ pub(super) struct TreePlan {
     pub leaf_material: u32,
 }
 
-/// The tree in world space. Its shape depends on the seed only; the triangles decide how finely it is
-/// drawn.
+/// Adds the tree in world space. Its shape depends on the seed only, its detail on the number of triangles.
 pub(super) fn tree_mesh(plan: &TreePlan, seed: u64) -> Mesh {
     let skeleton = Skeleton::grown(seed).fitted(plan.foot_in_world, plan.height_m);
     let mut builder = MeshBuilder::default();

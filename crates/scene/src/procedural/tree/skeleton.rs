@@ -1,5 +1,5 @@
-//! Branches by recursion, after Weber and Penn (1995): each bears shorter ones along its length, turned by
-//! the golden angle, and all bend with the light and their own weight.
+//! Branches by recursion, after Weber and Penn (1995). Each bears shorter ones along its length, turned by the golden
+//! angle. All bend towards the light and under their own weight.
 
 use glam::{Quat, Vec3};
 
@@ -11,21 +11,21 @@ pub(super) const LEVELS: usize = 5;
 
 const GOLDEN_ANGLE_RAD: f32 = 2.399_963;
 
-/// How the branches of a level grow.
+/// Growth parameters of the branches of a level.
 struct Habit {
     knots: u32,
     children: u32,
-    /// Along the branch, where its first child is.
+    /// Place of the first child along the branch.
     first_child: f32,
     /// Change of direction a knot, at random.
     wander: f32,
     /// Change of direction a knot, upwards.
     rise: f32,
-    /// Length, of the parent's.
+    /// Length as a share of the parent's.
     length: f32,
-    /// Angle from the parent at its foot and at its tip.
+    /// Angle to the parent at its foot and at its tip.
     angles_rad: [f32; 2],
-    /// How much more the wind moves its tip than its foot.
+    /// Additional sway of the tip over the foot.
     sway: f32,
 }
 
@@ -103,7 +103,7 @@ pub(super) struct Skeleton {
 }
 
 impl Skeleton {
-    /// About one unit high, its foot at the origin.
+    /// Grows a tree about one unit high, with its foot at the origin.
     pub(super) fn grown(seed: u64) -> Self {
         let mut rng = Rng::new(seed, 1);
         let foot = Knot { position: Vec3::ZERO, radius_m: 0.034, sway: 0.0 };
@@ -118,7 +118,7 @@ impl Skeleton {
         Self { branches, crown_centre: Vec3::ZERO, crown_radii: Vec3::ONE }
     }
 
-    /// Scaled to `height_m` and moved to `foot`; then the crown is measured.
+    /// Scales the tree to `height_m`, moves it to `foot`, and measures the crown.
     pub(super) fn fitted(mut self, foot: Vec3, height_m: f32) -> Self {
         /// Room for the leaves at the very top, and for the crown within the block.
         const LEAF_MARGIN_M: f32 = 0.02;
@@ -185,7 +185,7 @@ fn grow(level: usize, foot: Knot, direction: Vec3, length: f32, rng: &mut Rng) -
         let lift = habit.rise * lerp(-0.6, 2.2, t);
         direction = (direction + rng.vector() * habit.wander + Vec3::Y * lift).normalize_or(Vec3::Y);
         position += direction * step * rng.between(0.9, 1.1);
-        // Never below the ground that the tree stands on.
+        // Branches stay above the ground.
         position.y = position.y.max(0.04);
         let taper = if level == 0 { lerp(1.0, 0.12, t.powf(0.9)) } else { lerp(1.0, 0.22, t) };
         knots.push(Knot { position, radius_m: foot.radius_m * taper, sway: foot.sway + habit.sway * t.powf(1.3) });

@@ -1,4 +1,4 @@
-//! Houses: walls with recessed windows, ledges, and roofs with parapets and what stands on them.
+//! Buildings: walls with recessed windows, ledges, and roofs with parapets and fittings.
 
 use glam::{Vec2, Vec3};
 
@@ -8,7 +8,7 @@ use super::super::solids::{drum, sweep_around};
 use super::KERB_M;
 
 const RECESS_M: f32 = 0.6;
-/// Windows of a house, about: those of a higher one are wider.
+/// Approximate number of windows of a building: those of a higher one are wider.
 const WINDOWS: f32 = 45.0;
 
 const WALLS_SRGB: [[f32; 3]; 6] = [
@@ -20,17 +20,17 @@ const WALLS_SRGB: [[f32; 3]; 6] = [
     [120.0, 110.0, 104.0],
 ];
 
-/// An upright box without top and bottom, its walls divided into rows and columns with a window each.
+/// An upright box without top and bottom. Its walls are divided into rows and columns with a window each.
 struct Walls {
     min: Vec3,
     max: Vec3,
     rows: u32,
-    /// Of the walls across x, and of those across z.
+    /// Columns of the walls across x, and of those across z.
     columns: [u32; 2],
     color_srgb: Vec3,
 }
 
-/// A house on a quarter of a block, `half_m` to each side of `middle`.
+/// A building on a quarter of a block, `half_m` to each side of `middle`.
 pub(super) fn add(builder: &mut MeshBuilder, middle: Vec2, half_m: f32, is_central: bool, rng: &mut Rng) {
     let half = Vec2::new(half_m - rng.between(1.0, 7.0), half_m - rng.between(1.0, 7.0));
     let height_m = if is_central { rng.between(34.0, 78.0) } else { rng.between(12.0, 36.0) };
@@ -97,7 +97,7 @@ impl Walls {
         self.add_wall(builder, Vec3::new(min.x, y, min.z), Vec3::Z * (max.z - min.z), self.columns[1], rng);
     }
 
-    /// From its lower left corner, as far to the right as `right`.
+    /// The wall from its lower left corner to the right by `right`.
     fn add_wall(&self, builder: &mut MeshBuilder, corner: Vec3, right: Vec3, columns: u32, rng: &mut Rng) {
         let (right, up) = (right / columns as f32, Vec3::Y * ((self.max.y - self.min.y) / self.rows as f32));
         for row in 0..self.rows {
@@ -110,7 +110,7 @@ impl Walls {
     }
 }
 
-/// A piece of wall with a window in it: 18 triangles. Its corners are those of its neighbours, so that no gap shows.
+/// A piece of wall with a window: 18 triangles. It shares its neighbours' corners, so that no gap shows.
 fn add_cell(builder: &mut MeshBuilder, corner: Vec3, right: Vec3, up: Vec3, color_srgb: Vec3, rng: &mut Rng) {
     let inwards = up.cross(right).normalize_or(Vec3::X) * RECESS_M;
     let (width_m, height_m) = (right.length(), up.length());

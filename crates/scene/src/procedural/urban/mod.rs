@@ -10,20 +10,20 @@ use super::rng::Rng;
 use super::solids::matt;
 use crate::Scene;
 
-/// Of the model in the paper's table 1.
+/// Number of triangles of the model in the paper's table 1.
 const TRIANGLES: u32 = 50_000;
 const SEED: u64 = 1950;
 
 const HALF_WIDTH_M: f32 = 200.0;
-/// Blocks a side, with a street on each side of each.
+/// Number of blocks a side; each has streets on all sides.
 const BLOCKS: u32 = 3;
 const STREET_M: f32 = 19.0;
 const BLOCK_M: f32 = (2.0 * HALF_WIDTH_M - (BLOCKS + 1) as f32 * STREET_M) / BLOCKS as f32;
 const KERB_M: f32 = 0.2;
-/// From the kerb to the houses.
+/// Distance from the kerb to the buildings.
 const PAVEMENT_M: f32 = 5.0;
 
-/// Nine blocks of houses and towers around the origin, 400 m × 400 m, the streets at y = 0: 50,000 triangles.
+/// Nine blocks of buildings and towers around the origin, 400 m × 400 m, with streets at y = 0: 50,000 triangles.
 #[must_use]
 pub fn urban() -> Scene {
     let mut builder = MeshBuilder::default();
@@ -44,7 +44,7 @@ fn blocks() -> impl Iterator<Item = Vec2> {
     (0..BLOCKS * BLOCKS).map(move |i| Vec2::new(along(i % BLOCKS), along(i / BLOCKS)))
 }
 
-/// Which of the blocks' quarters are green instead: (block, quarter).
+/// Quarters of blocks that are parks: (block, quarter).
 const PARKS: [(usize, u32); 5] = [(1, 3), (4, 1), (4, 3), (6, 1), (8, 0)];
 
 fn add_block(builder: &mut MeshBuilder, number: usize, corner: Vec2, rng: &mut Rng) {

@@ -1,4 +1,4 @@
-//! Streets, pavements, parks, and what stands in them.
+//! Streets, pavements and parks, with trees, lamps and cars.
 
 use glam::{Vec2, Vec3};
 
@@ -8,7 +8,7 @@ use super::super::rng::Rng;
 use super::super::solids::{drum, lumpy_ball};
 use super::{BLOCK_M, BLOCKS, HALF_WIDTH_M, KERB_M, SEED, STREET_M, blocks};
 
-/// How high paint lies on a street: enough to be told from it by 16 bits of depth.
+/// Height of paint above a street, enough for 16 bits of depth to separate them.
 const PAINT_M: f32 = 0.05;
 const DASHES: u32 = 26;
 /// Trees a side of a block, lamps between them, and places to park.
@@ -75,7 +75,7 @@ pub(super) fn add_furniture(builder: &mut MeshBuilder, triangles: u32) {
     let places: Vec<(Side, u32)> = sides().flat_map(|side| (0..PARKING).map(move |i| (side, i))).collect();
     let cars = (triangles.saturating_sub(builder.triangle_count()) / CAR_TRIANGLES).min(places.len() as u32);
     for car in 0..cars as usize {
-        // Evenly over the city, whatever their number.
+        // Cars are spread evenly over the city for any number.
         let (side, place) = &places[car * places.len() / cars as usize];
         let along_m = 8.0 + (BLOCK_M - 16.0) * (*place as f32 + 0.5) / PARKING as f32;
         add_car(builder, side, along_m, &mut rng);

@@ -1,0 +1,127 @@
+//! A client that moves: poses at a set rate, the frames that come of them, and where each frame's time went.
+
+mod record;
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use client::{ClientError, LiveFrame, LiveView, Session};
+use cluster::SessionPlan;
+use depth_image::PinholeCamera;
+use tokio::time::MissedTickBehavior;
+
+pub use record::{Record, STAGES, Shown, latencies, quantile};
+
+/// After the last pose: for its frame, or another plan's.
+const LAST_FRAME: Duration = Duration::from_secs(2);
+
+/// A path, and how it is followed.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    /// One pose after the other; after the last comes the first.
+    pub path: Vec<PinholeCamera>,
+    /// Poses a second.
+    pub rate_hz: f64,
+    /// For how long.
+    pub lasting: Duration,
+    /// Seconds between sample sets of a scene that moves.
+    pub set_step_s: f64,
+    /// How many there are, shown over and over.
+    pub set_count: u32,
+}
+
+/// A drive under way.
+struct Driving<'a> {
+    session: &'a Session,
+    /// By epoch, which of the session's fallbacks a plan makes do with.
+    fallbacks: BTreeMap<u64, u32>,
+    live: LiveView,
+    start: Instant,
+    record: Record,
+    /// Of a pose, where a plan has fewer pictures a second than were asked for.
+    due: f64,
+    last_frame: u64,
+}
+
+/// Follows the path.
+///
+/// # Errors
+/// Where a pose cannot be: the session has ended, or a pose is not valid. What ends the frames is in the record.
+pub async fn drive(session: &Session, drive: &Drive) -> Result<Record, ClientError> {
+    let mut driving = Driving {
+        session,
+        fallbacks: BTreeMap::new(),
+        live: session.live(),
+        start: Instant::now(),
+        record: Record::default(),
+        due: 0.0,
+        last_frame: 0,
+    };
+    driving.follow(drive).await?;
+    driving.wait_for_the_last().await;
+    driving.record.seconds = driving.start.elapsed().as_secs_f64();
+    Ok(driving.record)
+}
+
+impl Drive {
+    fn pose(&self, number: u64, posed_s: f64) -> (PinholeCamera, u32) {
+        let camera = self.path[(number % self.path.len() as u64) as usize];
+        (camera, ((posed_s / self.set_step_s) as u64 % u64::from(self.set_count)) as u32)
+    }
+}
+
+impl Driving<'_> {
+    async fn follow(&mut self, drive: &Drive) -> Result<(), ClientError> {
+        let mut ticks = tokio::time::interval(Duration::from_secs_f64(1.0 / drive.rate_hz));
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        while self.start.elapsed() < drive.lasting && self.record.error.is_none() {
+            tokio::select! {
+                _ = ticks.tick() => self.pose(drive)?,
+                frame = self.live.next() => self.take(frame),
+            }
+        }
+        Ok(())
+    }
+
+    /// As often as the plan in force has pictures for.
+    fn pose(&mut self, drive: &Drive) -> Result<(), ClientError> {
+        let (camera, set_index) = drive.pose(self.record.posed, self.start.elapsed().as_secs_f64());
+        self.record.posed += 1;
+        self.due += self.plan().frame_rate_ratio;
+        if self.due >= 1.0 {
+            self.due -= 1.0;
+            self.last_frame = self.live.look(camera, set_index)?;
+        }
+        Ok(())
+    }
+
+    /// The plan in force; what it makes do with is kept for frames of it that come later.
+    fn plan(&mut self) -> SessionPlan {
+        let plan = self.session.plan();
+        self.fallbacks.insert(plan.assignment.plan_epoch, plan.fallback_index.map_or(0, |index| index + 1));
+        plan
+    }
+
+    async fn wait_for_the_last(&mut self) {
+        let end = Instant::now() + LAST_FRAME;
+        while self.record.error.is_none() && self.record.shown.last().is_none_or(|last| last.frame < self.last_frame) {
+            match tokio::time::timeout_at(end.into(), self.live.next()).await {
+                Ok(frame) => self.take(frame),
+                Err(_) => return,
+            }
+        }
+    }
+
+    fn take(&mut self, frame: Result<LiveFrame, ClientError>) {
+        match frame {
+            Ok(frame) => {
+                self.plan();
+                let plan_epoch = frame.frame.header.sample_set_id.plan_epoch;
+                // Nodes may be a plan ahead of what is known here.
+                let fallback = self.fallbacks.range(..=plan_epoch).next_back().map_or(0, |(_, fallback)| *fallback);
+                self.record.shown.push(Shown::of(&frame, self.start, fallback));
+            }
+            Err(error) => self.record.error = Some(error),
+        }
+    }
+}

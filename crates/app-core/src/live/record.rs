@@ -1,0 +1,216 @@
+//! What became of all poses.
+
+use std::time::Instant;
+
+use client::{ClientError, LiveFrame};
+use table::{Cell, Table};
+
+/// What a frame's age is made of, in order, with nothing left out.
+pub const STAGES: [&str; 9] = [
+    "waiting to be sent",
+    "waiting for samples",
+    "waiting for frames before it",
+    "waiting for the device",
+    "reconstructing its batch",
+    "encoding",
+    "waiting to go out",
+    "network",
+    "decoding",
+];
+
+/// A frame that was shown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shown {
+    /// Its number: the pose's, from 1.
+    pub frame: u64,
+    /// When its pose was given, since the start.
+    pub posed_s: f64,
+    /// When it was here, decoded.
+    pub shown_s: f64,
+    /// Of the plan that made it.
+    pub plan_epoch: u64,
+    /// Of that plan.
+    pub set_index: u64,
+    /// How old its samples were when it was made.
+    pub set_age_s: f64,
+    /// By [`STAGES`].
+    pub stages_s: [f64; 9],
+    /// Which of its session's fallbacks it was made with, from 1; 0: as it was asked for.
+    pub fallback: u32,
+}
+
+impl Shown {
+    pub(super) fn of(frame: &LiveFrame, start: Instant, fallback: u32) -> Self {
+        let (here, header) = (&frame.times, &frame.frame.header);
+        let since = |time: Instant| time.saturating_duration_since(start).as_secs_f64();
+        let there = header.stage_times;
+        let away_s = here.came.saturating_duration_since(here.sent).as_secs_f64();
+        Self {
+            frame: frame.frame.request.frame,
+            posed_s: since(here.looked),
+            shown_s: since(here.decoded),
+            plan_epoch: header.sample_set_id.plan_epoch,
+            set_index: header.sample_set_id.index,
+            set_age_s: there.set_age_s,
+            stages_s: [
+                since(here.sent) - since(here.looked),
+                there.set_wait_s,
+                there.credit_wait_s,
+                there.queue_s,
+                there.batch_s,
+                there.encode_s,
+                there.send_wait_s,
+                (away_s - there.compositor_s).max(0.0),
+                since(here.decoded) - since(here.came),
+            ],
+            fallback,
+        }
+    }
+
+    /// From its pose to the picture.
+    #[must_use]
+    pub fn age_s(&self) -> f64 {
+        self.shown_s - self.posed_s
+    }
+}
+
+/// What became of all poses of one viewer.
+#[derive(Debug, Clone, Default)]
+pub struct Record {
+    /// In the order they were shown.
+    pub shown: Vec<Shown>,
+    /// Poses that were due at the rate that was asked for.
+    pub posed: u64,
+    /// Why no more frames came.
+    pub error: Option<ClientError>,
+    /// From the first pose to the last frame.
+    pub seconds: f64,
+}
+
+impl Record {
+    /// The longest time without a new frame, and since when.
+    #[must_use]
+    pub fn longest_gap_s(&self) -> Option<(f64, f64)> {
+        let gaps = self.shown.windows(2).map(|pair| (pair[1].shown_s - pair[0].shown_s, pair[0].shown_s));
+        gaps.max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Every frame that was shown.
+    ///
+    /// # Errors
+    /// A row that does not fit, which is a fault here.
+    pub fn frames(&self) -> anyhow::Result<Table> {
+        let head = ["frame", "posed", "shown", "plan_epoch", "set_index", "fallback", "age of its samples"];
+        let units = ["", "s", "s", "", "", "", "s"];
+        let stages = STAGES.into_iter().map(|name| (name, "s"));
+        let columns: Vec<_> = head.into_iter().zip(units).chain(stages).collect();
+        let mut table = Table::new("Frames", &columns);
+        for shown in &self.shown {
+            let numbers = [shown.frame as f64, shown.posed_s, shown.shown_s, shown.plan_epoch as f64];
+            let rest = [Cell::from(shown.set_index as f64), shown.fallback.into(), shown.set_age_s.into()];
+            table.push(numbers.map(Cell::from).into_iter().chain(rest).chain(shown.stages_s.map(Cell::from)))?;
+        }
+        Ok(table)
+    }
+
+    /// In one line.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let Self { shown, posed, seconds, error } = self;
+        let gap = self.longest_gap_s().map_or_else(String::new, |(gap_s, since_s)| {
+            format!("; longest without a new one {:.0} ms, from {since_s:.2} s on", gap_s * 1e3)
+        });
+        let rate_hz = shown.len() as f64 / seconds.max(1e-9);
+        let plans = shown.iter().map(|shown| shown.plan_epoch).collect::<std::collections::BTreeSet<_>>().len();
+        let replaced = posed.saturating_sub(shown.len() as u64);
+        let degraded = shown.iter().filter(|shown| shown.fallback > 0).count();
+        let degraded = if degraded == 0 { String::new() } else { format!(", {degraded} with less than was asked for") };
+        let error = error.as_ref().map_or_else(String::new, |error| format!("; then none: {error}"));
+        format!(
+            "{} frames shown of {posed} poses in {seconds:.1} s, {rate_hz:.1} a second, of {plans} plans{degraded}; \
+             {replaced} poses were replaced by newer ones{gap}{error}",
+            shown.len()
+        )
+    }
+}
+
+/// Where frames' time went, stage by stage.
+///
+/// # Errors
+/// As [`Record::frames`].
+pub fn latencies<'a>(name: &str, shown: impl Iterator<Item = &'a Shown>) -> anyhow::Result<Table> {
+    let columns = [("stage", ""), ("mean", "ms"), ("median", "ms"), ("95 %", "ms"), ("99 %", "ms"), ("most", "ms")];
+    let mut table = Table::new(name, &columns);
+    let shown: Vec<&Shown> = shown.collect();
+    let stage = |at: usize| shown.iter().map(|shown| shown.stages_s[at]).collect();
+    let stages = STAGES.into_iter().enumerate().map(|(at, name)| (name, stage(at)));
+    let whole = [
+        ("age of a frame", shown.iter().map(|shown| shown.age_s()).collect()),
+        ("age of its samples", shown.iter().map(|shown| shown.set_age_s).collect::<Vec<f64>>()),
+    ];
+    for (name, values_s) in stages.chain(whole) {
+        table.push([Cell::from(name)].into_iter().chain(figures_ms(values_s).map(Cell::from)))?;
+    }
+    Ok(table)
+}
+
+/// Mean, median, 95 %, 99 % and most.
+fn figures_ms(mut values_s: Vec<f64>) -> [f64; 5] {
+    values_s.sort_by(f64::total_cmp);
+    let mean = values_s.iter().sum::<f64>() / values_s.len() as f64;
+    let shares = [0.5, 0.95, 0.99, 1.0].map(|share| quantile(&values_s, share));
+    [mean, shares[0], shares[1], shares[2], shares[3]].map(|s| s * 1e3)
+}
+
+/// Of sorted values; NaN of none.
+#[must_use]
+pub fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let at = ((sorted.len() as f64 * share) as usize).min(sorted.len().wrapping_sub(1));
+    sorted.get(at).copied().unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shown(frame: u64, shown_s: f64) -> Shown {
+        let stages_s = [0.001, 0.0, 0.0, 0.001, 0.002, 0.001, 0.001, 0.003, 0.001];
+        Shown {
+            frame,
+            posed_s: shown_s - 0.01,
+            shown_s,
+            plan_epoch: 1,
+            set_index: 0,
+            set_age_s: 0.5,
+            stages_s,
+            fallback: 0,
+        }
+    }
+
+    #[test]
+    fn a_gap_is_found_and_times_add_up() {
+        let record = Record {
+            shown: vec![shown(1, 0.1), shown(2, 0.2), shown(5, 1.7), shown(6, 1.8)],
+            posed: 6,
+            seconds: 2.0,
+            error: None,
+        };
+        let (gap_s, since_s) = record.longest_gap_s().unwrap();
+        assert!((gap_s - 1.5).abs() < 1e-9 && (since_s - 0.2).abs() < 1e-9);
+        let one = record.shown[0];
+        assert!((one.stages_s.iter().sum::<f64>() - one.age_s()).abs() < 1e-9);
+        let text = latencies("From pose to picture", record.shown.iter()).unwrap().to_text();
+        assert!(text.contains("age of a frame") && !text.contains("NaN"), "{text}");
+        let summary = record.summary();
+        assert!(summary.contains("longest without a new one 1500 ms") && summary.contains("2 poses were"), "{summary}");
+        assert_eq!(record.frames().unwrap().rows.len(), 4);
+        assert!(latencies("none", [].iter()).is_ok() && Record::default().longest_gap_s().is_none());
+    }
+
+    #[test]
+    fn quantiles_are_of_the_values() {
+        let sorted: Vec<f64> = (0..100).map(f64::from).collect();
+        assert_eq!([0.0, 0.5, 0.99, 1.0].map(|share| quantile(&sorted, share)), [0.0, 50.0, 99.0, 99.0]);
+        assert!(quantile(&[], 0.5).is_nan());
+    }
+}

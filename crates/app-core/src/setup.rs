@@ -1,0 +1,168 @@
+//! From arguments to a scene on offer: the scene, its sample cameras, and how it is shown.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::Args;
+use cluster::OfferSettings;
+use coordinator::SceneOffer;
+use depth_image::{Camera, PinholeCamera};
+use glam::UVec2;
+use gpu::DevicePreference;
+use reconstruction::ReconstructionMethod;
+use render::Lighting;
+use sampling::{Rig, SamplingMethod};
+use scene::{EnvironmentSpec, LightSpec, Limits, Scene, SceneSpec};
+
+use crate::cameras::{self, Placement};
+use crate::sizes::SizePx;
+
+/// S = 4 images of 400×300, as in the paper.
+const SAMPLE_SIZE_PX: UVec2 = UVec2::new(400, 300);
+/// Height of the paper's sample cameras over the block, in halves of its width.
+const TWO_PLANE_HEIGHT: f32 = 3.0;
+/// Half the angle between neighbouring cameras in front of a model.
+const MODEL_SPREAD_RAD: f32 = 0.12;
+/// What is closer to a camera out of a file is not seen, as a share of the scene's diagonal.
+pub const NEAR_OF_DIAGONAL: f32 = 1e-3;
+
+/// Which device.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct DeviceArgs {
+    /// any (a GPU if there is one) or software
+    #[arg(long, default_value_t, value_name = "NAME", env = "MYRIORAMA_DEVICE")]
+    pub device: DevicePreference,
+}
+
+/// Which scene, sampled and shown how.
+#[derive(Debug, Clone, Args)]
+pub struct SceneArgs {
+    /// A scene by name (tree-terrain-30k, -125k, -500k, -2m, each also with -wind; bird-nest, urban, tree, grass or
+    /// grass:DENSITY, blocks, courtyard, uv-sphere…) or a file (.gltf, .glb, .obj, .ply)
+    #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
+    pub scene: SceneSpec,
+    /// How surfaces are lit, in terms with commas between them: unlit, phong, shadows or soft N (rays a light);
+    /// occlusion N or occlusion N RADIUSm (rays of ambient occlusion); adaptive or adaptive TOLERANCE (rays only where
+    /// light changes)
+    #[arg(long, default_value_t, value_name = "TERMS")]
+    pub lighting: Lighting,
+    /// A lamp in place of the scene's, as often as wanted, in the scene file's own coordinates: "sun towards=X,Y,Z
+    /// [irradiance=V] [angle=DEG]", "point at=X,Y,Z [intensity=V] [radius=M]", "spot at=… towards=… [intensity=V]
+    /// [inner=DEG] [outer=DEG] [radius=M]" or "rectangle at=… u=X,Y,Z v=X,Y,Z [radiance=V]"; V is a grey, R,G,B or
+    /// #rrggbb
+    #[arg(long = "light", value_name = "LAMP")]
+    pub lights: Vec<LightSpec>,
+    /// Light from all around in place of the scene's: V, or ZENITH/NADIR
+    #[arg(long, value_name = "V[/V]")]
+    pub environment: Option<EnvironmentSpec>,
+    /// How views are reconstructed: joint_carve, joint_carve:LEVEL, light_field_search, light_field_search:STEPS,
+    /// mesh, hybrid_mesh or hybrid_mesh:PX (quads merged where that moves nothing by more than PX pixels)
+    #[arg(long, visible_alias = "reconstruction", default_value_t, value_name = "NAME")]
+    pub method: ReconstructionMethod,
+    /// The sampling method
+    #[arg(long, default_value_t, value_name = "NAME",
+        help = format!("Which samples are taken. {}", SamplingMethod::help()))]
+    pub sampling: SamplingMethod,
+    /// Size of the sample images [default: 400x300, or as in --samples]
+    #[arg(long, value_name = "WxH")]
+    pub sample_size: Option<SizePx>,
+    /// Sample cameras from a transforms.json, in the scene file's own coordinates [default: four, placed from
+    /// the scene's bounds]
+    #[arg(long, value_name = "FILE")]
+    pub samples: Option<PathBuf>,
+}
+
+/// A scene with its sample cameras.
+pub struct Setup {
+    /// The scene.
+    pub scene: Scene,
+    /// The cameras that views stand between.
+    pub around: Vec<PinholeCamera>,
+    /// Where it is sampled from: there too, unless the sampling method has another place.
+    pub samples: Vec<PinholeCamera>,
+    /// What a coordinator is given.
+    pub offer: SceneOffer,
+}
+
+impl SceneArgs {
+    /// A scene by its name or file, everything else by default.
+    #[must_use]
+    pub fn of(scene: SceneSpec) -> Self {
+        Self {
+            scene,
+            lighting: Lighting::default(),
+            lights: Vec::new(),
+            environment: None,
+            method: ReconstructionMethod::default(),
+            sampling: SamplingMethod::default(),
+            sample_size: None,
+            samples: None,
+        }
+    }
+
+    /// Loads the scene and places its sample cameras.
+    ///
+    /// # Errors
+    /// For a scene or a camera file that cannot be used.
+    pub fn load(&self) -> anyhow::Result<Setup> {
+        self.load_changed(|_| ())
+    }
+
+    /// As [`SceneArgs::load`], with the scene changed before anything is made of it.
+    ///
+    /// # Errors
+    /// As [`SceneArgs::load`].
+    pub fn load_changed(&self, change: impl FnOnce(&mut Scene)) -> anyhow::Result<Setup> {
+        let mut scene = self.load_scene()?;
+        change(&mut scene);
+        let around = self.sample_cameras(&scene)?;
+        let samples = self.sampling.cameras(around.clone());
+        let rig = samples.iter().copied().map(Camera::Pinhole).collect();
+        let package = scene::pack(&scene).bytes.into();
+        let mut offer = SceneOffer::new(package, rig, scene.bounds(), scene.background_linear);
+        offer.origin_in_source = scene.origin_in_source;
+        offer.illumination = scene.illumination.clone();
+        offer.settings = OfferSettings {
+            method: Some(self.method.to_string()),
+            sampling: Some(self.sampling.to_string()),
+            lighting: Some(self.lighting.to_string()),
+        };
+        Ok(Setup { scene, around, samples, offer })
+    }
+
+    fn load_scene(&self) -> anyhow::Result<Scene> {
+        let scene = self.scene.load(&Limits::default()).context("the scene cannot be used")?;
+        let lights = (!self.lights.is_empty()).then(|| self.lights.iter().map(|spec| spec.0).collect());
+        let lit = scene.lit_by(lights, self.environment.map(|spec| spec.0));
+        lit.validate(&Limits::default()).context("the scene cannot be used")?;
+        if self.lighting.is_lit() && !lit.has_light() {
+            tracing::warn!("nothing lights the scene: all that gives off no light itself will be black");
+        }
+        Ok(lit)
+    }
+
+    fn sample_cameras(&self, scene: &Scene) -> anyhow::Result<Vec<PinholeCamera>> {
+        let size_px = self.sample_size.map(|size| size.0);
+        let Some(path) = &self.samples else {
+            return self.rig_cameras(scene, size_px.unwrap_or(SAMPLE_SIZE_PX));
+        };
+        let near_m = (scene.bounds().size().length() * NEAR_OF_DIAGONAL).max(1e-6);
+        let cameras = cameras::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?;
+        Ok(cameras.into_iter().map(|camera| size_px.map_or(camera, |size_px| resized(camera, size_px))).collect())
+    }
+
+    fn rig_cameras(&self, scene: &Scene, size_px: UVec2) -> anyhow::Result<Vec<PinholeCamera>> {
+        let bounds = scene.bounds();
+        let rig = match self.scene {
+            SceneSpec::TreeTerrain { .. } => Rig::two_plane(&bounds, TWO_PLANE_HEIGHT),
+            _ => Rig::in_front_of(&bounds, MODEL_SPREAD_RAD),
+        };
+        Ok(rig.with_context(|| format!("{}: no sample cameras", self.scene))?.samples(size_px))
+    }
+}
+
+/// The same field of view in another size.
+fn resized(camera: PinholeCamera, size_px: UVec2) -> PinholeCamera {
+    let scale = size_px.as_vec2() / camera.size_px.as_vec2();
+    PinholeCamera { size_px, focal_px: camera.focal_px * scale, principal_px: camera.principal_px * scale, ..camera }
+}

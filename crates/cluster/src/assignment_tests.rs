@@ -1,0 +1,179 @@
+//! Plans: their images, tiles, cells and relays.
+
+use std::num::NonZeroU32;
+
+use depth_image::{Camera, Environment, PinholeCamera};
+use glam::Vec3;
+
+use crate::test_support::{assignment, camera, workload};
+use crate::{Assignment, CompositorShare, Policy, Refinement, SamplerShare, Timeline, Workload};
+
+fn refusal(plan: &Assignment) -> String {
+    plan.validate().expect_err("refused").to_string()
+}
+
+#[test]
+fn relays_reach_every_compositor_at_every_fanout() {
+    for fanout in [None, NonZeroU32::new(1), NonZeroU32::new(2), NonZeroU32::new(3)] {
+        let compositor = |i: u32| CompositorShare { node_name: format!("c{i}"), ..assignment().compositors[0].clone() };
+        let plan = Assignment { compositors: (0..10).map(compositor).collect(), relay_fanout: fanout, ..assignment() };
+        assert_eq!(plan.validate(), Ok(()));
+        let mut asked = std::collections::HashMap::new();
+        for i in 0..10 {
+            let (mut steps, mut at) = (0, format!("c{i}"));
+            while let Some(relay) = plan.relay_of(&at) {
+                (steps, at) = (steps + 1, relay.node_name.clone());
+            }
+            assert!(steps < 10, "the way ends at the samplers");
+            if let Some(relay) = plan.relay_of(&format!("c{i}")) {
+                assert!(plan.relays(&relay.node_name));
+                *asked.entry(relay.node_name.clone()).or_insert(0) += 1;
+            }
+        }
+        assert!(asked.values().all(|&count| count <= fanout.map_or(0, NonZeroU32::get)));
+        assert_eq!(asked.values().sum::<u32>(), 10 - fanout.map_or(10, NonZeroU32::get));
+    }
+}
+
+#[test]
+fn a_static_scene_is_refined_set_by_set_and_a_moving_one_is_finished_at_once() {
+    let steps = |refinement_steps, step_s| {
+        let timeline = Timeline { start_s: 0.0, step_s, set_count: 8 };
+        let workload = Workload { refinement_steps, timeline, ..workload() };
+        (0..8).map(|set_index| workload.refinement(set_index)).collect::<Vec<_>>()
+    };
+    let of_4 = |step| Refinement { step, steps: 4 };
+    assert_eq!(steps(4, 0.0), [0, 1, 2, 3, 3, 3, 3, 3].map(of_4));
+    assert_eq!(steps(4, 0.1), [of_4(3); 8]);
+    assert_eq!(steps(1, 0.0), [Refinement::default(); 8]);
+    assert!(of_4(3).is_last() && !of_4(2).is_last() && Refinement::default().is_last());
+}
+
+#[test]
+fn set_content_differs_where_and_only_where_a_set_shows_something_else() {
+    let id = |change: &dyn Fn(&mut Assignment)| {
+        let mut assignment = assignment();
+        change(&mut assignment);
+        assignment.set_content(1).unwrap()
+    };
+    let same = id(&|_| ());
+    assert_eq!(id(&|a| a.plan_epoch = 9), same, "the plan is not what a set shows");
+    assert_ne!(id(&|a| a.workload.timeline.step_s = 0.6), same);
+    assert_ne!(id(&|a| a.workload.lighting = "unlit".to_owned()), same);
+    assert_ne!(id(&|a| a.workload.sample_cameras.truncate(1)), same);
+    assert_ne!(id(&|a| a.workload.refinement_steps = 2), same);
+    assert_ne!(id(&|a| a.workload.illumination.lights.truncate(3)), same);
+    assert_ne!(id(&|a| a.workload.illumination.environment = Environment::default()), same);
+    assert_eq!((assignment().set_content(3), assignment().sample_set_id(3)), (None, None));
+    let still = |index| {
+        Assignment {
+            workload: Workload { timeline: Timeline { step_s: 0.0, ..workload().timeline }, ..workload() },
+            ..assignment()
+        }
+        .set_content(index)
+    };
+    assert_eq!(still(0), still(2), "a static scene has one set");
+    let timeline = Timeline { step_s: 0.0, set_count: 8, ..workload().timeline };
+    let refined = Assignment { workload: Workload { timeline, refinement_steps: 4, ..workload() }, ..assignment() };
+    let contents: Vec<_> = (0..8).map(|set_index| refined.set_content(set_index).unwrap()).collect();
+    assert!((0..3).all(|i| !contents[i + 1..].contains(&contents[i])), "each step is another");
+    assert!(contents[3..].iter().all(|content| *content == contents[3]), "the last stays");
+}
+
+#[test]
+fn a_view_belongs_to_the_nearest_cell_and_content_is_of_one_cell() {
+    let plan = of_cells();
+    let view = |x: f32| PinholeCamera { eye_in_world: Vec3::new(x, 0.0, 9.0), ..camera() };
+    assert_eq!([-3.0, 4.0, 6.0, 10.5, 17.0, 40.0].map(|x| plan.cell_of(&view(x))), [0, 0, 1, 1, 1, 2]);
+    assert_eq!(Assignment { policy: Policy::Direct, ..plan.clone() }.cell_of(&view(40.0)), 0);
+    let content = |plan: &Assignment, cell: u32| plan.of_cell(cell).unwrap().set_content(0);
+    let mut fewer = plan.clone();
+    fewer.workload.sample_cameras.pop();
+    fewer.workload.cell_first_indices.pop();
+    fewer.plan_epoch += 1;
+    assert_eq!([0, 1].map(|cell| content(&fewer, cell)), [0, 1].map(|cell| content(&plan, cell)));
+    assert_ne!(content(&plan, 0), content(&plan, 1));
+}
+
+/// A plan of two samplers for three cells of 1, 2 and 1 cameras, with two tiles an image.
+fn of_cells() -> Assignment {
+    let looking = |x: f32| {
+        let eye = Vec3::new(x, 0.0, 9.0);
+        Camera::Pinhole(PinholeCamera { eye_in_world: eye, ..camera() })
+    };
+    let workload = Workload {
+        sample_cameras: [0.0, 10.0, 11.0, 30.0].map(looking).to_vec(),
+        cell_first_indices: vec![0, 1, 3],
+        ..workload()
+    };
+    let share = |name: &str, image_indices: Vec<u32>| SamplerShare {
+        node_name: name.to_owned(),
+        address: "http://127.0.0.1:1".to_owned(),
+        image_indices,
+    };
+    let samplers = vec![share("a", vec![0, 1, 2]), share("c", vec![3, 4, 5, 6, 7])];
+    Assignment { workload, samplers, tile_count: 2, ..assignment() }
+}
+
+#[test]
+fn samplers_treat_tiles_as_images() {
+    let mut cut = Assignment { tile_count: 2, ..assignment() };
+    cut.samplers[0].image_indices = vec![0, 3];
+    let other = SamplerShare { node_name: "c".to_owned(), image_indices: vec![1, 2], ..cut.samplers[0].clone() };
+    cut.samplers.push(other);
+    assert_eq!(cut.validate(), Ok(()));
+    let heights: Vec<u32> = cut.sampled_cameras().iter().map(|Camera::Pinhole(c)| c.size_px.y).collect();
+    assert_eq!((heights.len(), heights[0] + heights[1]), (4, camera().size_px.y));
+    assert_eq!(cut.sets_at_once(), 1);
+    assert_eq!(cut.set_content(0), assignment().set_content(0), "a set shows the same however it is cut");
+    let lost = Assignment { tile_count: 4, ..cut.clone() };
+    assert!(refusal(&lost).contains("image_indices"));
+    assert!(refusal(&Assignment { tile_count: 17, ..cut }).contains("tile_count is 17"));
+}
+
+#[test]
+fn the_plan_of_a_cell_has_the_images_of_that_cell_alone() {
+    let plan = of_cells();
+    assert_eq!(plan.validate(), Ok(()));
+    let of = |cell: u32| {
+        let of_cell = plan.of_cell(cell).unwrap();
+        let shares: Vec<_> = of_cell.samplers.iter().map(|s| (s.node_name.clone(), s.image_indices.clone())).collect();
+        assert_eq!(of_cell.validate(), Ok(()));
+        (of_cell.workload.sample_cameras.len(), shares)
+    };
+    let share = |name: &str, images: &[u32]| (name.to_owned(), images.to_vec());
+    assert_eq!(of(0), (1, vec![share("a", &[0, 1])]));
+    assert_eq!(of(1), (2, vec![share("a", &[0]), share("c", &[1, 2, 3])]));
+    assert_eq!(of(2), (1, vec![share("c", &[0, 1])]));
+    assert_eq!(plan.of_cell(3), None);
+    let one = assignment();
+    assert_eq!((one.of_cell(0), one.of_cell(1)), (Some(one.clone()), None));
+}
+
+#[test]
+fn a_plan_that_samples_an_image_twice_or_never_is_refused() {
+    let spoilt = |indices: &[u32]| {
+        let mut plan = assignment();
+        plan.samplers[0].image_indices = indices.to_vec();
+        refusal(&plan)
+    };
+    for indices in [&[0][..], &[0, 0], &[0, 1, 1], &[0, 2], &[u32::MAX]] {
+        assert!(spoilt(indices).contains("image_indices"), "{indices:?}");
+    }
+    let plan = Assignment { compositors: Vec::new(), ..assignment() };
+    assert!(refusal(&plan).contains("compositors"));
+}
+
+#[test]
+fn cells_that_are_empty_or_out_of_order_are_refused() {
+    let spoilt = |firsts: Vec<u32>| {
+        let mut plan = of_cells();
+        plan.workload.cell_first_indices = firsts;
+        refusal(&plan)
+    };
+    for firsts in [vec![1, 2], vec![0, 0, 3], vec![0, 3, 1], vec![0, 4], vec![0, u32::MAX]] {
+        let text = spoilt(firsts);
+        assert!(text.contains("cell_first_indices is ") && text.contains("of 4 sample_cameras"), "{text}");
+    }
+    assert!(spoilt(vec![0; 65]).contains("cell_first_indices has 65"));
+}

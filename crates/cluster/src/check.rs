@@ -1,0 +1,90 @@
+//! Checks that several types share. Each gives the value back, or names the field.
+
+use depth_image::PinholeCamera;
+
+use crate::error::InvalidField;
+use crate::limits::{MAX_FRAMES_PER_S, MAX_REASON_BYTES, MAX_TEXT_BYTES, MAX_TILES, MAX_VIEWPOINTS};
+
+/// At most `limit` entries or bytes.
+///
+/// # Errors
+/// For more.
+pub fn at_most(count: usize, limit: usize, field: &'static str) -> Result<(), InvalidField> {
+    if count <= limit { Ok(()) } else { Err(InvalidField::TooMany { field, count: count as u64, limit: limit as u64 }) }
+}
+
+/// A text of at most [`MAX_TEXT_BYTES`].
+///
+/// # Errors
+/// For a longer one.
+pub fn text(value: &str, field: &'static str) -> Result<(), InvalidField> {
+    at_most(value.len(), MAX_TEXT_BYTES, field)
+}
+
+/// A text of 1 to [`MAX_TEXT_BYTES`].
+///
+/// # Errors
+/// For an empty or a longer one.
+pub fn nonempty(value: &str, field: &'static str) -> Result<(), InvalidField> {
+    if value.is_empty() { Err(InvalidField::Missing { field }) } else { text(value, field) }
+}
+
+/// A text for a person, of at most [`MAX_REASON_BYTES`].
+///
+/// # Errors
+/// For a longer one.
+pub fn reason(value: &str, field: &'static str) -> Result<(), InvalidField> {
+    at_most(value.len(), MAX_REASON_BYTES, field)
+}
+
+/// A finite number that is not negative.
+///
+/// # Errors
+/// For any other.
+pub fn finite_seconds(value: f64, field: &'static str) -> Result<f64, InvalidField> {
+    let is_valid = value.is_finite() && value >= 0.0;
+    if is_valid { Ok(value) } else { Err(InvalidField::out_of_range(field, value, "finite and not negative")) }
+}
+
+/// A number above 0 and at most 1.
+///
+/// # Errors
+/// For any other.
+pub fn ratio(value: f64, field: &'static str) -> Result<f64, InvalidField> {
+    let is_valid = value > 0.0 && value <= 1.0;
+    if is_valid { Ok(value) } else { Err(InvalidField::out_of_range(field, value, "above 0 and at most 1")) }
+}
+
+/// Pictures a second: above 0, at most [`MAX_FRAMES_PER_S`]; `None`: as fast as they come.
+///
+/// # Errors
+/// For any other rate.
+pub fn frame_rate(frames_per_s: Option<f64>) -> Result<Option<f64>, InvalidField> {
+    match frames_per_s {
+        Some(rate) if !(rate > 0.0 && rate <= MAX_FRAMES_PER_S) => {
+            Err(InvalidField::out_of_range("frames_per_s", rate, "above 0 and at most 1000"))
+        }
+        _ => Ok(frames_per_s),
+    }
+}
+
+/// Tiles of an image: from 1 to [`MAX_TILES`].
+///
+/// # Errors
+/// For any other count.
+pub fn tile_count(count: u32) -> Result<u32, InvalidField> {
+    let is_valid = (1..=MAX_TILES).contains(&count);
+    if is_valid { Ok(count) } else { Err(InvalidField::out_of_range("tile_count", count, "from 1 to 16")) }
+}
+
+/// The viewpoints of a session: at most [`MAX_VIEWPOINTS`] valid cameras.
+///
+/// # Errors
+/// For more, and for a camera that cannot be used.
+pub fn viewpoints(viewpoints: &[PinholeCamera]) -> Result<(), InvalidField> {
+    at_most(viewpoints.len(), MAX_VIEWPOINTS, "viewpoints")?;
+    let check = |camera: &PinholeCamera| {
+        camera.validate().map_err(|source| InvalidField::Camera { field: "viewpoints", source })
+    };
+    viewpoints.iter().try_for_each(check)
+}

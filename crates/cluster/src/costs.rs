@@ -1,0 +1,152 @@
+//! What operations cost.
+
+use serde::{Deserialize, Serialize};
+
+use crate::check::finite_seconds;
+use crate::error::InvalidField;
+
+/// Quarters of a sample image's height, whose costs are told apart.
+pub const ROW_PARTS: usize = 4;
+
+/// Seconds of one operation, each alone and warm.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Costs {
+    /// g_s: one finished sample image, its lighting and its encoding included.
+    pub sample_image_s: f64,
+    /// g_v: one finished view drawn directly.
+    pub direct_view_s: f64,
+    /// c: one reconstructed view, to host pixels.
+    pub reconstruct_view_s: f64,
+    /// d: decode and upload of one sample set on one compositor.
+    pub load_set_s: f64,
+    /// e: encoding of one view.
+    pub encode_view_s: f64,
+    /// Whether an image of a set can only be sampled after those before it: then one node samples the whole set,
+    /// and several nodes sample sets in turn.
+    pub in_order: bool,
+    /// How g_s splits among tiles; `None`: images are not tileable.
+    pub tiles: Option<TileCosts>,
+}
+
+/// How the cost of a sample image splits among its tiles.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct TileCosts {
+    /// Of g_s, the seconds that every tile costs anew: work that does not shrink with its rows.
+    pub overhead_s: f64,
+    /// Of the rest, the shares of the image's quarters, top to bottom: rows that show the sky cost less. They add up to 1.
+    /// `None`: not measured, and assumed to be equal.
+    pub row_shares: Option<[f64; ROW_PARTS]>,
+}
+
+impl TileCosts {
+    /// `None` where a tile costs as much as the image: such an image is not tileable.
+    #[must_use]
+    pub fn of_image(sample_image_s: f64, overhead_s: f64, row_shares: Option<[f64; ROW_PARTS]>) -> Option<Self> {
+        (overhead_s < sample_image_s).then_some(Self { overhead_s, row_shares })
+    }
+
+    /// Of the work on rows, the share above a height; 0 is the top of the image, 1 its bottom.
+    fn share_above(&self, height: f64) -> f64 {
+        let Some(shares) = self.row_shares else { return height };
+        let all: f64 = shares.iter().sum();
+        let covered = |part: usize| (height * ROW_PARTS as f64 - part as f64).clamp(0.0, 1.0);
+        shares.iter().enumerate().map(|(part, share)| share * covered(part)).sum::<f64>() / all
+    }
+}
+
+impl Costs {
+    /// The mean tile of an image that is cut into `tile_count`.
+    #[must_use]
+    pub fn sample_tile_s(&self, tile_count: usize) -> f64 {
+        let overhead_s = self.tile_overhead_s();
+        overhead_s + (self.sample_image_s - overhead_s) / tile_count.max(1) as f64
+    }
+
+    /// Tile number `tile` of `tile_count`, from the top.
+    #[must_use]
+    pub fn sample_this_tile_s(&self, tile: usize, tile_count: usize) -> f64 {
+        let overhead_s = self.tile_overhead_s();
+        let (top, bottom) = (tile as f64 / tile_count as f64, (tile + 1) as f64 / tile_count as f64);
+        let share_above = |height| self.tiles.unwrap_or_default().share_above(height);
+        overhead_s + (self.sample_image_s - overhead_s) * (share_above(bottom) - share_above(top))
+    }
+
+    /// Seconds that every tile costs anew: those of the whole image where it is not tileable.
+    #[must_use]
+    pub fn tile_overhead_s(&self) -> f64 {
+        self.tiles.map_or(self.sample_image_s, |tiles| tiles.overhead_s.min(self.sample_image_s))
+    }
+
+    /// The greater of each: what the slowest node needs.
+    #[must_use]
+    pub fn max(self, other: Self) -> Self {
+        let sample_image_s = self.sample_image_s.max(other.sample_image_s);
+        let overhead_s = self.tile_overhead_s().max(other.tile_overhead_s());
+        // Shares are a property of the scene rather than of the node.
+        let row_shares = [self.tiles, other.tiles].into_iter().flatten().find_map(|tiles| tiles.row_shares);
+        Self {
+            sample_image_s,
+            direct_view_s: self.direct_view_s.max(other.direct_view_s),
+            reconstruct_view_s: self.reconstruct_view_s.max(other.reconstruct_view_s),
+            load_set_s: self.load_set_s.max(other.load_set_s),
+            encode_view_s: self.encode_view_s.max(other.encode_view_s),
+            in_order: self.in_order || other.in_order,
+            tiles: TileCosts::of_image(sample_image_s, overhead_s, row_shares),
+        }
+    }
+
+    /// # Errors
+    /// For times that are negative or not finite, and for shares that are not from 0 to 1 or all 0.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        finite_seconds(self.sample_image_s, "sample_image_s")?;
+        finite_seconds(self.direct_view_s, "direct_view_s")?;
+        finite_seconds(self.reconstruct_view_s, "reconstruct_view_s")?;
+        finite_seconds(self.load_set_s, "load_set_s")?;
+        finite_seconds(self.encode_view_s, "encode_view_s")?;
+        let Some(tiles) = self.tiles else { return Ok(()) };
+        finite_seconds(tiles.overhead_s, "sample_overhead_s")?;
+        let Some(shares) = tiles.row_shares else { return Ok(()) };
+        let is_valid =
+            shares.iter().all(|share| (0.0..=1.0).contains(share)) && shares.iter().any(|&share| share > 0.0);
+        let given = || format!("{shares:?}");
+        if is_valid { Ok(()) } else { Err(InvalidField::out_of_range("sample_row_shares", given(), "from 0 to 1")) }
+    }
+}
+
+/// A node's own timings of one report, the mean of each operation; `None` for what it did not do.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct MeasuredCosts {
+    /// g_s: one finished sample image.
+    pub sample_image_s: Option<f64>,
+    /// g_v: one view drawn directly.
+    pub direct_view_s: Option<f64>,
+    /// c: one view reconstructed.
+    pub reconstruct_view_s: Option<f64>,
+    /// d: one sample set decoded and uploaded.
+    pub load_set_s: Option<f64>,
+    /// e: one view encoded.
+    pub encode_view_s: Option<f64>,
+    /// Depth images to this node.
+    pub transfer_bytes_per_s: Option<f64>,
+    /// B: one encoded sample image.
+    pub image_bytes: Option<f64>,
+}
+
+impl MeasuredCosts {
+    /// # Errors
+    /// For times and rates that are negative or not finite.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        for (value, field) in [
+            (self.sample_image_s, "sample_image_s"),
+            (self.direct_view_s, "direct_view_s"),
+            (self.reconstruct_view_s, "reconstruct_view_s"),
+            (self.load_set_s, "load_set_s"),
+            (self.encode_view_s, "encode_view_s"),
+            (self.transfer_bytes_per_s, "transfer_bytes_per_s"),
+            (self.image_bytes, "image_bytes"),
+        ] {
+            value.map(|value| finite_seconds(value, field)).transpose()?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,47 @@
+//! The cluster's model: what sessions ask for, what members say of themselves, and the plans that tell members what to do.
+//!
+//! Types of the domain, without protobuf: `wire` converts messages to them. A value that a type does not allow is an
+//! [`InvalidField`], which names the field; types with a `validate` can be read from anywhere and checked afterwards.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod assignment;
+mod check;
+mod costs;
+mod demand;
+mod error;
+mod images;
+pub mod limits;
+mod node;
+mod offer;
+mod policy;
+mod report;
+mod scene;
+mod session;
+mod set_content;
+mod status;
+mod timeline;
+mod views;
+mod workload;
+
+#[cfg(test)]
+mod assignment_tests;
+#[cfg(test)]
+mod test_support;
+
+pub use assignment::{Assignment, CompositorShare, SamplerShare};
+pub use check::{at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints};
+pub use costs::{Costs, MeasuredCosts, ROW_PARTS, TileCosts};
+pub use demand::{ChangeSession, Quality};
+pub use error::InvalidField;
+pub use images::FetchImages;
+pub use node::{JoinCluster, MeasureCosts, NodeStatus, Ready, Welcome};
+pub use offer::{OfferSettings, OfferStatus};
+pub use policy::{Policy, PolicyChoice, UnknownPolicy};
+pub use report::{SamplerReport, WorkReport};
+pub use scene::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, ScenePart, SceneRef};
+pub use session::{SessionEvent, SessionPlan, SessionRequest, SessionStage};
+pub use set_content::SetContent;
+pub use status::{AchievedTime, ClusterStatus, NodeCondition};
+pub use timeline::{Refinement, Timeline};
+pub use views::{LiveRequest, RenderViews, RequestedView};
+pub use workload::Workload;

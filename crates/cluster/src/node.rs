@@ -1,0 +1,118 @@
+//! Members: joining, being measured and being told what to do.
+
+use depth_image::{PinholeCamera, ViewPlanes};
+use serde::{Deserialize, Serialize};
+
+use crate::check::{at_most, finite_seconds, nonempty, text};
+use crate::error::InvalidField;
+use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH, MAX_SCENES};
+use crate::scene::SceneRef;
+use crate::workload::Workload;
+
+/// A node that wants to be a member.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct JoinCluster {
+    /// The node, its address and its device.
+    pub node: NodeStatus,
+    /// The highest plan it has seen.
+    pub plan_epoch: u64,
+}
+
+impl JoinCluster {
+    /// # Errors
+    /// For names and addresses that are missing or too long, and for an epoch that leaves no room for later plans.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        nonempty(&self.node.node_name, "node_name")?;
+        nonempty(&self.node.address, "node_address")?;
+        text(&self.node.device_name, "device_name")?;
+        if self.plan_epoch > MAX_JOINING_EPOCH {
+            return Err(InvalidField::out_of_range("plan_epoch", self.plan_epoch, "at most 2^48"));
+        }
+        Ok(())
+    }
+}
+
+/// A member.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NodeStatus {
+    /// Unique in the cluster; of two with one name the later counts.
+    pub node_name: String,
+    /// Where other processes reach it, as `http://host:port`.
+    pub address: String,
+    /// As every reported time names it.
+    pub device_name: String,
+    /// Whether the device is a CPU.
+    pub is_software: bool,
+}
+
+/// The coordinator's answer to a member that joins.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Welcome {
+    /// Scenes on offer, to be loaded ahead.
+    pub scenes: Vec<SceneRef>,
+}
+
+impl Welcome {
+    /// # Errors
+    /// For too many scenes, and for one that is too large.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        at_most(self.scenes.len(), MAX_SCENES, "scenes")?;
+        self.scenes.iter().try_for_each(SceneRef::validate)
+    }
+}
+
+/// Asks a node what operations cost it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasureCosts {
+    /// The workload to measure, at set 0 of its timeline.
+    pub workload: Workload,
+    /// Views that are reconstructed and drawn, in turn: of one size, at least one. A view's cost depends on its place.
+    pub typical_views: Vec<PinholeCamera>,
+    /// Most views of one call: fewer are drawn directly where they take long.
+    pub batch_count: u32,
+    /// Planes of the views.
+    pub planes: ViewPlanes,
+}
+
+impl MeasureCosts {
+    /// The first `count` of its views, repeated in turn.
+    #[must_use]
+    pub fn views(&self, count: u32) -> Vec<PinholeCamera> {
+        self.typical_views.iter().copied().cycle().take(count as usize).collect()
+    }
+
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        if !(1..=MAX_BATCH).contains(&self.batch_count) {
+            return Err(InvalidField::out_of_range("batch_count", self.batch_count, "from 1 to 64"));
+        }
+        self.workload.validate()?;
+        if self.workload.sample_cameras.is_empty() {
+            return Err(InvalidField::Missing { field: "sample_cameras" });
+        }
+        at_most(self.typical_views.len(), MAX_BATCH as usize, "typical_views")?;
+        let first = self.typical_views.first().ok_or(InvalidField::Missing { field: "typical_views" })?;
+        match self.typical_views.iter().find(|view| view.size_px != first.size_px) {
+            Some(other) => Err(InvalidField::out_of_range("typical_views", other.size_px, "all of one size")),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A node is ready for a plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ready {
+    /// The plan's epoch.
+    pub plan_epoch: u64,
+    /// Time to load the scene; 0 where it was loaded already.
+    pub scene_load_s: f64,
+}
+
+impl Ready {
+    /// # Errors
+    /// For a time that is negative or not finite.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        finite_seconds(self.scene_load_s, "scene_load_s").map(drop)
+    }
+}

@@ -1,0 +1,195 @@
+//! Sessions: what a client asks for and what it is told.
+
+use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
+use glam::UVec2;
+
+use crate::assignment::Assignment;
+use crate::check::{at_most, finite_seconds, frame_rate, nonempty, ratio, reason, tile_count, viewpoints};
+use crate::costs::Costs;
+use crate::demand::Quality;
+use crate::error::InvalidField;
+use crate::limits::{MAX_FALLBACKS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS, MAX_VIEWS_PER_SET};
+use crate::policy::{Policy, PolicyChoice};
+use crate::scene::SceneHash;
+use crate::timeline::Timeline;
+
+/// The request that opens a session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionRequest {
+    /// `None`: the coordinator's own scene.
+    pub scene: Option<SceneHash>,
+    /// How views are reconstructed.
+    pub method: String,
+    /// How images are sampled.
+    pub sampling: String,
+    /// How samples are lit.
+    pub lighting: String,
+    /// How frames are encoded.
+    pub codec: String,
+    /// Empty: the rig that the coordinator was given with the scene.
+    pub sample_cameras: Vec<Camera>,
+    /// Gives the sample images another size, at the same field of view.
+    pub sample_size_px: Option<UVec2>,
+    /// `None`: the volume that the coordinator was given with the scene.
+    pub volume: Option<Aabb>,
+    /// A view as most will be: costs are measured on it.
+    pub typical_view: PinholeCamera,
+    /// V: views that are asked of each sample set.
+    pub views_per_set: u32,
+    /// Planes that views will have.
+    pub planes: ViewPlanes,
+    /// Scene times.
+    pub timeline: Timeline,
+    /// The policy, or that the schedule decides.
+    pub policy: PolicyChoice,
+    /// K, instead of the balance formula's.
+    pub forced_sampler_count: Option<u32>,
+    /// Steps in which a still picture is refined, one a set; see [`Workload::refinement`](crate::Workload::refinement).
+    /// From 1, where every set is finished, to [`MAX_REFINEMENT_STEPS`](crate::limits::MAX_REFINEMENT_STEPS).
+    pub refinement_steps: u32,
+    /// Pictures a second, of `views_per_set` views each; `None`: as fast as they come, as of a batch.
+    pub frames_per_s: Option<f64>,
+    /// Qualities that it accepts under overload, in this order.
+    pub fallbacks: Vec<Quality>,
+    /// Tiles of a sample image, instead of as many as are predicted to be fastest.
+    pub forced_tile_count: Option<u32>,
+    /// Viewpoints of the session, in place of `sample_cameras`: sample cameras are placed around them, in view cells where
+    /// they are far apart.
+    pub viewpoints: Vec<PinholeCamera>,
+}
+
+impl SessionRequest {
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        let counts = [
+            ("views_per_set_count", self.views_per_set, MAX_VIEWS_PER_SET, "from 1 to 65536"),
+            ("refinement_step_count", self.refinement_steps, MAX_REFINEMENT_STEPS, "from 1 to 64"),
+        ];
+        if let Some(&(field, count, _, allowed)) =
+            counts.iter().find(|(_, count, most, _)| !(1..=*most).contains(count))
+        {
+            return Err(InvalidField::out_of_range(field, count, allowed));
+        }
+        nonempty(&self.method, "reconstruction_method")?;
+        nonempty(&self.sampling, "sampling_method")?;
+        nonempty(&self.lighting, "lighting")?;
+        nonempty(&self.codec, "frame_codec")?;
+        at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras")?;
+        self.timeline.validate()?;
+        frame_rate(self.frames_per_s)?;
+        at_most(self.fallbacks.len(), MAX_FALLBACKS, "fallbacks")?;
+        self.fallbacks.iter().try_for_each(Quality::validate)?;
+        self.forced_tile_count.map(tile_count).transpose()?;
+        viewpoints(&self.viewpoints)
+    }
+}
+
+/// The coordinator's work on a session before its plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SessionStage {
+    /// Nodes measure their costs.
+    Measuring,
+    /// K and the policy are chosen.
+    Planning,
+    /// Nodes load the scene and take their roles.
+    Preparing,
+}
+
+/// The plan, and why it is so.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionPlan {
+    /// The plan that every node was told.
+    pub assignment: Assignment,
+    /// The slowest node's costs, as measured.
+    pub costs: Costs,
+    /// Why the plan is so, in plain words, with the figures.
+    pub reason: String,
+    /// Seconds a sample set with samplers and compositors.
+    pub predicted_pipeline_s: f64,
+    /// Seconds a sample set's views when drawn from the scene.
+    pub predicted_direct_s: f64,
+    /// Seconds a sample set where every node both samples and makes views.
+    pub predicted_time_share_s: f64,
+    /// K by the balance formula, on the mean of the nodes' costs.
+    pub k_fd_sampler_count: u32,
+    /// Seconds a sample set with that K.
+    pub predicted_k_fd_s: f64,
+    /// K of the best assignment that enumeration finds.
+    pub enumerated_sampler_count: u32,
+    /// Seconds a sample set with that assignment.
+    pub predicted_enumerated_s: f64,
+    /// The slowest node's time to load the scene; 0 where all had loaded it.
+    pub scene_load_s: f64,
+    /// Index into the session's fallbacks; `None`: the quality that was asked for.
+    pub fallback_index: Option<u32>,
+    /// Pictures a second, of those asked for.
+    pub frame_rate_ratio: f64,
+}
+
+impl SessionPlan {
+    /// K: nodes that sample.
+    #[must_use]
+    pub fn sampler_count(&self) -> usize {
+        self.assignment.samplers.len()
+    }
+
+    /// Seconds of one view on a compositor, as costs were measured.
+    #[must_use]
+    pub fn view_s(&self) -> f64 {
+        let device_s = match self.assignment.policy {
+            Policy::Direct => self.costs.direct_view_s,
+            Policy::Pipeline | Policy::TimeShare => self.costs.reconstruct_view_s,
+        };
+        device_s + self.costs.encode_view_s
+    }
+
+    /// Seconds a sample set by the policy that was chosen.
+    #[must_use]
+    pub fn predicted_s(&self) -> f64 {
+        match self.assignment.policy {
+            Policy::Pipeline => self.predicted_pipeline_s,
+            Policy::Direct => self.predicted_direct_s,
+            Policy::TimeShare => self.predicted_time_share_s,
+        }
+    }
+
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        self.assignment.validate()?;
+        self.costs.validate()?;
+        reason(&self.reason, "plan.reason")?;
+        finite_seconds(self.predicted_pipeline_s, "predicted_pipeline_s")?;
+        finite_seconds(self.predicted_direct_s, "predicted_direct_s")?;
+        finite_seconds(self.predicted_time_share_s, "predicted_time_share_s")?;
+        finite_seconds(self.predicted_k_fd_s, "predicted_k_fd_s")?;
+        finite_seconds(self.predicted_enumerated_s, "predicted_enumerated_s")?;
+        finite_seconds(self.scene_load_s, "scene_load_s")?;
+        ratio(self.frame_rate_ratio, "frame_rate_ratio").map(drop)
+    }
+}
+
+/// A message of a session's stream.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SessionEvent {
+    /// The first message.
+    Opened {
+        /// The session's number, which changes of the session name.
+        session: u64,
+    },
+    /// Before the plan.
+    Progress {
+        /// The work under way.
+        stage: SessionStage,
+        /// Details for a person.
+        detail: String,
+    },
+    /// A plan is in force.
+    Plan(Box<SessionPlan>),
+    /// The session has ended.
+    Ended {
+        /// Why.
+        reason: String,
+    },
+}

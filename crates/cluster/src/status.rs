@@ -1,0 +1,85 @@
+//! The cluster as the coordinator sees it.
+
+use crate::check::{at_most, finite_seconds, nonempty};
+use crate::costs::Costs;
+use crate::error::InvalidField;
+use crate::limits::MAX_NODES;
+use crate::node::NodeStatus;
+use crate::offer::OfferStatus;
+use crate::policy::Policy;
+use crate::session::SessionPlan;
+
+/// More policies than there will be.
+const MAX_POLICIES: usize = 16;
+
+/// The cluster as the coordinator sees it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ClusterStatus {
+    /// The highest plan so far.
+    pub plan_epoch: u64,
+    /// Members by name.
+    pub nodes: Vec<NodeStatus>,
+    /// The scene on offer.
+    pub offer: Option<OfferStatus>,
+    /// The plan in force; `None` while no session is open, or no node is a member.
+    pub plan: Option<Box<SessionPlan>>,
+    /// Sessions that share the plan, or wait for one.
+    pub session_count: u32,
+    /// V: views that all sessions ask of each sample set.
+    pub views_per_set: u64,
+    /// The condition of every member while a session is open.
+    pub conditions: Vec<NodeCondition>,
+    /// One entry for each policy that has been in force for the open sessions.
+    pub achieved: Vec<AchievedTime>,
+    /// The share of the plan's nodes' time that all sessions' frame rates take; `None` where no session states a rate.
+    pub utilisation: Option<f64>,
+}
+
+impl ClusterStatus {
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        at_most(self.nodes.len(), MAX_NODES, "nodes")?;
+        at_most(self.conditions.len(), MAX_NODES, "conditions")?;
+        at_most(self.achieved.len(), MAX_POLICIES, "achieved_times")?;
+        self.offer.as_ref().map_or(Ok(()), OfferStatus::validate)?;
+        self.plan.as_ref().map_or(Ok(()), |plan| plan.validate())?;
+        self.conditions.iter().try_for_each(NodeCondition::validate)?;
+        self.achieved.iter().try_for_each(|achieved| finite_seconds(achieved.busy_s, "busy_s").map(drop))?;
+        finite_seconds(self.utilisation.unwrap_or_default(), "utilisation_ratio").map(drop)
+    }
+}
+
+/// The time that a policy took, as nodes timed themselves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AchievedTime {
+    /// The policy.
+    pub policy: Policy,
+    /// Seconds of the busiest node, for all views of a set.
+    pub busy_s: f64,
+}
+
+/// The condition of a member.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodeCondition {
+    /// The member's unique name.
+    pub node_name: String,
+    /// Whether it is ready for the plan in force.
+    pub is_ready: bool,
+    /// As estimated now, from the node's own timings.
+    pub costs: Costs,
+    /// Views made since it joined.
+    pub views: u64,
+    /// Views not made, or not sent, since it joined.
+    pub dropped_views: u64,
+    /// The share of its last report's time that it worked; two operations at a time count twice.
+    pub busy_ratio: f64,
+}
+
+impl NodeCondition {
+    fn validate(&self) -> Result<(), InvalidField> {
+        nonempty(&self.node_name, "node_name")?;
+        self.costs.validate()?;
+        finite_seconds(self.busy_ratio, "busy_ratio").map(drop)
+    }
+}

@@ -1,0 +1,93 @@
+//! When sample sets show the scene, and how far their light is refined.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::InvalidField;
+use crate::limits::{MAX_SCENE_TIME_S, MAX_SETS};
+
+/// Sets in a row that share one temporal reference.
+const SETS_PER_REFERENCE: u32 = 16;
+
+/// Scene times of the sample sets.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Timeline {
+    /// Scene time of set 0.
+    pub start_s: f64,
+    /// Scene time from set to set; 0 for a static scene.
+    pub step_s: f64,
+    /// Sample sets, from 1 to [`MAX_SETS`].
+    pub set_count: u32,
+}
+
+impl Timeline {
+    /// One set.
+    #[must_use]
+    pub fn still(at_s: f64) -> Self {
+        Self { start_s: at_s, step_s: 0.0, set_count: 1 }
+    }
+
+    /// Whether sets differ in scene time: one set never does.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.step_s != 0.0 && self.set_count > 1
+    }
+
+    /// Scene time of the set's temporal reference: the first set of its run, whose samples the set keeps so that they do
+    /// not flicker. `None` for the reference itself, and where nothing moves.
+    #[must_use]
+    pub fn temporal_reference_s(&self, set_index: u32) -> Option<f32> {
+        let first = set_index - set_index % SETS_PER_REFERENCE;
+        (self.moves() && first != set_index).then(|| self.time_s(first)).flatten()
+    }
+
+    /// Scene time of a set; `None` beyond the last.
+    #[must_use]
+    pub fn time_s(&self, set_index: u32) -> Option<f32> {
+        (set_index < self.set_count).then(|| (self.start_s + f64::from(set_index) * self.step_s) as f32)
+    }
+
+    /// # Errors
+    /// For no sets or too many, and for times that are not finite or too far from 0.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        if !(1..=MAX_SETS).contains(&self.set_count) {
+            return Err(InvalidField::out_of_range("timeline.set_count", self.set_count, "from 1 to 1048576"));
+        }
+        let within = |value: f64, field| match value.abs() <= MAX_SCENE_TIME_S {
+            true => Ok(()),
+            false => Err(InvalidField::out_of_range(field, value, "from -1e6 to 1e6")),
+        };
+        within(self.start_s, "timeline.start_s")?;
+        within(self.step_s, "timeline.step_s")
+    }
+}
+
+/// How far the light of a set is refined: every step samples it with more rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Refinement {
+    /// From 0 to `steps - 1`, which is full quality.
+    pub step: u32,
+    /// At least 1.
+    pub steps: u32,
+}
+
+impl Default for Refinement {
+    /// Full quality at once.
+    fn default() -> Self {
+        Self { step: 0, steps: 1 }
+    }
+}
+
+impl Refinement {
+    /// The last of `steps` steps; 0 counts as 1.
+    #[must_use]
+    pub const fn last_of(steps: u32) -> Self {
+        let step = steps.saturating_sub(1);
+        Self { step, steps: step + 1 }
+    }
+
+    /// Whether this is full quality.
+    #[must_use]
+    pub const fn is_last(&self) -> bool {
+        self.step + 1 >= self.steps
+    }
+}

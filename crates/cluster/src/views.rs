@@ -1,0 +1,76 @@
+//! Views that a client asks a compositor for.
+
+use codec::FrameCodec;
+use depth_image::{PinholeCamera, ViewPlanes};
+
+use crate::check::{at_most, nonempty};
+use crate::error::InvalidField;
+use crate::limits::{MAX_LIVE_VIEWS_PER_REQUEST, MAX_VIEWS_PER_REQUEST};
+
+/// Views of one sample set, all made alike.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RenderViews {
+    /// The epoch of the session's plan.
+    pub plan_epoch: u64,
+    /// Index into the timeline.
+    pub set_index: u32,
+    /// How views are reconstructed.
+    pub method: String,
+    /// How frames are encoded.
+    pub codec: FrameCodec,
+    /// Planes beside colour.
+    pub planes: ViewPlanes,
+    /// Frame numbers and cameras; one at most for a live stream.
+    pub views: Vec<RequestedView>,
+    /// `Some` where the stream is live.
+    pub live: Option<LiveRequest>,
+}
+
+/// One view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RequestedView {
+    /// The client's own number.
+    pub frame: u64,
+    /// The camera of the view.
+    pub camera: PinholeCamera,
+}
+
+/// What a live stream's request says beside its view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LiveRequest {
+    /// All frames up to this number have been received.
+    pub acknowledged_frame: u64,
+    /// The client's own choice: names it in logs.
+    pub client_id: u64,
+}
+
+impl RenderViews {
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        at_most(self.views.len(), MAX_VIEWS_PER_REQUEST, "views")?;
+        check_view_count(self.views.len(), self.live.is_some())?;
+        nonempty(&self.method, "reconstruction_method")
+    }
+}
+
+/// A live stream may open, and acknowledge, without a view; all others ask for one at least.
+fn check_view_count(count: usize, is_live: bool) -> Result<(), InvalidField> {
+    match (is_live, count) {
+        (true, _) => at_most(count, MAX_LIVE_VIEWS_PER_REQUEST, "views of a live stream"),
+        (false, 0) => Err(InvalidField::Missing { field: "views" }),
+        (false, _) => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_live_streams_may_request_no_view() {
+        assert!(check_view_count(0, true).is_ok() && check_view_count(1, true).is_ok());
+        assert!(check_view_count(9, false).is_ok() && check_view_count(0, false).is_err());
+        assert!(check_view_count(2, true).unwrap_err().to_string().contains("views of a live stream has 2"));
+    }
+}

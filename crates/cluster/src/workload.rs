@@ -1,0 +1,137 @@
+//! What a session samples.
+
+use std::ops::Range;
+
+use depth_image::{Aabb, Camera, Illumination, MAX_LIGHTS, PinholeCamera, nearest_set};
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::check::{at_most, nonempty};
+use crate::error::InvalidField;
+use crate::limits::{MAX_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS};
+use crate::scene::SceneRef;
+use crate::timeline::{Refinement, Timeline};
+
+/// What is sampled, when and how. Methods are text, as on the command line: nodes parse them, so that a new method changes
+/// nothing here.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Workload {
+    /// The scene.
+    pub scene: SceneRef,
+    /// Every set has one image for each; cameras of a view cell stand next to each other.
+    pub sample_cameras: Vec<Camera>,
+    /// Where each view cell's cameras begin, the first's at 0; empty: one cell has all.
+    pub cell_first_indices: Vec<u32>,
+    /// How images are sampled.
+    pub sampling: String,
+    /// How samples are lit.
+    pub lighting: String,
+    /// How views are reconstructed, unless they ask for another method.
+    pub method: String,
+    /// How frames are encoded, unless views ask for another codec.
+    pub codec: String,
+    /// The bounds of reconstruction.
+    pub volume: Aabb,
+    /// Radiance of rays that leave the scene, linear RGB.
+    pub background_linear: Vec3,
+    /// Scene times.
+    pub timeline: Timeline,
+    /// The scene's lamps and environment: compositors add what depends on the viewer.
+    pub illumination: Illumination,
+    /// Steps in which a still picture is refined: from 1, finished at once, to [`MAX_REFINEMENT_STEPS`].
+    pub refinement_steps: u32,
+}
+
+impl Workload {
+    /// The step of refinement that a set shows. In a static scene every set is one step further, up to the last; sets beyond
+    /// it are equal and are not sampled again. A timeline that ends before shows no finished set. A scene that moves has no
+    /// time for steps: each set shows the last. So do views drawn directly.
+    #[must_use]
+    pub fn refinement(&self, set_index: u32) -> Refinement {
+        let last = Refinement::last_of(self.refinement_steps);
+        if self.timeline.moves() { last } else { Refinement { step: set_index.min(last.step), ..last } }
+    }
+
+    /// View cells: each view is made from the images of one cell.
+    #[must_use]
+    pub fn cell_count(&self) -> usize {
+        self.cell_first_indices.len().max(1)
+    }
+
+    /// The range of sample cameras of a view cell; `None` beyond the last cell.
+    #[must_use]
+    pub fn cameras_of_cell(&self, cell: usize) -> Option<Range<usize>> {
+        let firsts = if self.cell_first_indices.is_empty() { &[0][..] } else { &self.cell_first_indices };
+        let first = |cell: usize| firsts.get(cell).map(|&first| first as usize);
+        Some(first(cell)?..first(cell + 1).unwrap_or(self.sample_cameras.len()))
+    }
+
+    /// The workload of one view cell alone; `None` beyond the last.
+    #[must_use]
+    pub fn of_cell(&self, cell: usize) -> Option<Self> {
+        let sample_cameras = self.sample_cameras.get(self.cameras_of_cell(cell)?)?.to_vec();
+        Some(Self { sample_cameras, cell_first_indices: Vec::new(), ..self.clone() })
+    }
+
+    /// The view cell that a view is in, or else nearest to.
+    #[must_use]
+    pub fn cell_of(&self, view: &PinholeCamera) -> u32 {
+        if self.cell_count() == 1 {
+            return 0;
+        }
+        let cameras = |cell: usize| {
+            let range = self.cameras_of_cell(cell).unwrap_or_default();
+            self.sample_cameras[range].iter().map(|Camera::Pinhole(camera)| *camera).collect()
+        };
+        nearest_set(view, (0..self.cell_count()).map(cameras), &self.volume).unwrap_or(0) as u32
+    }
+
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        self.scene.validate()?;
+        self.check_cells()?;
+        for Camera::Pinhole(camera) in &self.sample_cameras {
+            camera.validate().map_err(|source| InvalidField::Camera { field: "sample_cameras", source })?;
+        }
+        nonempty(&self.sampling, "sampling_method")?;
+        nonempty(&self.lighting, "lighting")?;
+        nonempty(&self.method, "reconstruction_method")?;
+        nonempty(&self.codec, "frame_codec")?;
+        if self.volume.is_empty() {
+            return Err(InvalidField::out_of_range("bounds", "empty", "min <= max on every axis"));
+        }
+        self.timeline.validate()?;
+        validate_illumination(&self.illumination)?;
+        if !(1..=MAX_REFINEMENT_STEPS).contains(&self.refinement_steps) {
+            return Err(InvalidField::out_of_range("refinement_step_count", self.refinement_steps, "from 1 to 64"));
+        }
+        Ok(())
+    }
+
+    fn check_cells(&self) -> Result<(), InvalidField> {
+        let firsts = &self.cell_first_indices;
+        at_most(firsts.len(), MAX_CELLS, "cell_first_indices")?;
+        at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS * self.cell_count(), "sample_cameras")?;
+        let ends = firsts.iter().skip(1).copied().chain([self.sample_cameras.len() as u32]);
+        let is_cell = |(&first, end): (&u32, u32)| first < end && end - first <= MAX_SAMPLE_CAMERAS as u32;
+        if firsts.first().is_some_and(|&first| first > 0) || !firsts.iter().zip(ends).all(is_cell) {
+            let given = format!("{firsts:?} of {} sample_cameras", self.sample_cameras.len());
+            return Err(InvalidField::out_of_range(
+                "cell_first_indices",
+                given,
+                "rising from 0, by 1 to 16 cameras each",
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn validate_illumination(illumination: &Illumination) -> Result<(), InvalidField> {
+    at_most(illumination.lights.len(), MAX_LIGHTS, "illumination.lights")?;
+    let light_error = |field| move |source| InvalidField::Light { field, source };
+    for light in &illumination.lights {
+        light.validate().map_err(light_error("illumination.lights"))?;
+    }
+    illumination.environment.validate().map_err(light_error("illumination.environment"))
+}

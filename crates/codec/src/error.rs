@@ -1,0 +1,121 @@
+//! What decoders refuse, and how much they take on.
+
+use depth_image::MAX_IMAGE_SIDE_PX;
+
+/// Why bytes do not make an image or a plane.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeError {
+    /// A field of the header cannot be right.
+    #[error("image header {field}: {reason}")]
+    Header {
+        /// Which.
+        field: &'static str,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// More than the receiver allows.
+    #[error("{field} is {value}, the limit is {limit}")]
+    Limit {
+        /// Of what.
+        field: &'static str,
+        /// What was asked for.
+        value: u64,
+        /// What is allowed.
+        limit: u64,
+    },
+    /// The image is not of its camera's size.
+    #[error("image of {width}×{height} for a camera of {camera_width}×{camera_height}")]
+    CameraSize {
+        /// Columns in the header.
+        width: u32,
+        /// Rows in the header.
+        height: u32,
+        /// Columns of the camera.
+        camera_width: u32,
+        /// Rows of the camera.
+        camera_height: u32,
+    },
+    /// Bytes that do not decode.
+    #[error("payload {field}: {reason}")]
+    Corrupt {
+        /// Which part.
+        field: &'static str,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+}
+
+/// Why a frame is not encoded or decoded.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum FrameError {
+    /// Not three bytes a pixel.
+    #[error("{rgb_bytes} bytes of RGB for a frame of {width}×{height}")]
+    Size {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Given.
+        rgb_bytes: usize,
+    },
+    /// JPEG qualities go from 1 to 100.
+    #[error("JPEG quality {0}, must be 1 to 100")]
+    Quality(u8),
+    /// What the JPEG library says.
+    #[error("JPEG: {0}")]
+    Jpeg(String),
+    /// The data is not what was sent.
+    #[error("frame checksum does not match")]
+    Checksum,
+    /// Size over the limits, or data that does not decode.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+}
+
+/// How much a decoder takes on before it allocates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DecodeLimits {
+    /// Longest side of an image.
+    pub max_side_px: u32,
+    /// Texels of one image.
+    pub max_texels: usize,
+    /// Packed bytes of one image, all planes.
+    pub max_payload_bytes: usize,
+    /// Bytes of one image before any packing, all planes: what packs best would take the most memory.
+    pub max_image_bytes: usize,
+}
+
+impl Default for DecodeLimits {
+    /// 16 million texels, 256 MiB packed: some fifty times what the largest planned sample image needs. 1 GiB
+    /// unpacked: all lights' visibility at 1920×1080 takes half of that.
+    fn default() -> Self {
+        Self {
+            max_side_px: MAX_IMAGE_SIDE_PX,
+            max_texels: 1 << 24,
+            max_payload_bytes: 256 << 20,
+            max_image_bytes: 1 << 30,
+        }
+    }
+}
+
+impl DecodeLimits {
+    /// Texels of an image that is within the limits.
+    ///
+    /// # Errors
+    /// Names the side or the product that is zero or too large.
+    pub fn texels(&self, width: u32, height: u32) -> Result<usize, DecodeError> {
+        if width == 0 || height == 0 {
+            return Err(DecodeError::Header { field: "size", reason: "zero" });
+        }
+        for (field, side) in [("width", width), ("height", height)] {
+            check_limit(field, u64::from(side), u64::from(self.max_side_px))?;
+        }
+        let texels = u64::from(width) * u64::from(height);
+        check_limit("texels", texels, self.max_texels as u64)?;
+        Ok(texels as usize)
+    }
+}
+
+pub(crate) fn check_limit(field: &'static str, value: u64, limit: u64) -> Result<(), DecodeError> {
+    if value > limit { Err(DecodeError::Limit { field, value, limit }) } else { Ok(()) }
+}

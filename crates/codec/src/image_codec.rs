@@ -1,0 +1,247 @@
+//! A depth image to header and payload, and back.
+
+use bytes::Bytes;
+use depth_image::{Camera, DepthImage, DepthImageError, SpecularPlanes, SurfaceId};
+
+use crate::{
+    DecodeError, DecodeLimits, ImageHeader, InverseDepthRange, PlaneHeader, PlaneKind, PlaneSet,
+    color_codec::{pack_colors, unpack_colors},
+    depth_codec::{decode_depth, encode_depth},
+    image_header::CORNER_RANGE_BYTES,
+    lz4::expand_lz4,
+    runs::Runs,
+    tagged::take,
+    words_codec::{WordLayout, pack_words, unpack_words},
+};
+
+/// A depth image as it travels, without its camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EncodedDepthImage {
+    /// What the payload holds.
+    pub header: ImageHeader,
+    /// The planes, one after the other.
+    pub payload: Bytes,
+}
+
+/// Packs an image. Inverse depth is quantised to 16 bits over the image's range; all else is kept to the
+/// bit at samples, and not at all elsewhere: texels without a sample decode to zeros in other planes.
+///
+/// # Errors
+/// Planes that are not of the camera's size; what highlights need without normals.
+pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<EncodedDepthImage, DepthImageError> {
+    image.validate()?;
+    let specular = image.specular.as_ref().filter(|_| planes.specular);
+    if specular.is_some() && image.normal_oct16.is_none() {
+        return Err(DepthImageError::PlaneSize { plane: "normal", len: 0, expected: image.inverse_depth_per_m.len() });
+    }
+    let depth = encode_depth(&image.inverse_depth_per_m);
+    let runs = &depth.runs;
+    let mut packer = Packer::default();
+    packer.push(PlaneKind::InverseDepth, &depth.bytes);
+    packer.push(PlaneKind::ColorRgb9e5, &raw(|out| pack_colors(&runs.gather(&image.color_rgb9e5), out)));
+    if let Some(normals) = image.normal_oct16.as_ref().filter(|_| planes.normal || specular.is_some()) {
+        packer.push(PlaneKind::NormalOct16, &raw(|out| pack_words(&runs.gather(normals), WordLayout::Halves, out)));
+    }
+    if let Some(ids) = image.surface_id.as_ref().filter(|_| planes.surface_id) {
+        packer.push(PlaneKind::SurfaceId, &raw(|out| pack_surface_ids(&runs.gather(ids), out)));
+    }
+    if let Some(specular) = specular {
+        push_specular(&mut packer, specular, runs);
+    }
+    if let Some(passed) = &image.passed {
+        packer.push(PlaneKind::Passed1, &pack_bits(passed));
+    }
+    if let Some(corners) = image.corner_inverse_depth_per_m.as_ref().filter(|_| planes.corners) {
+        packer.push(PlaneKind::CornerInverseDepth, &pack_corners(corners));
+    }
+    let size_px = image.size_px();
+    Ok(EncodedDepthImage {
+        header: ImageHeader {
+            width: size_px.x,
+            height: size_px.y,
+            inverse_depth_range: depth.range,
+            planes: packer.planes,
+        },
+        payload: packer.payload.into(),
+    })
+}
+
+/// Unpacks an image. The camera must have passed its own validation.
+///
+/// # Errors
+/// A header that is inconsistent, over the limits or not of the camera's size; a payload that does not
+/// decode to exactly what the header says.
+pub fn decode_depth_image(
+    header: &ImageHeader,
+    camera: Camera,
+    payload: &[u8],
+    limits: &DecodeLimits,
+) -> Result<DepthImage, DecodeError> {
+    let texels = header.validate(limits)?;
+    check_camera(header, &camera)?;
+    if payload.len() as u64 != header.payload_bytes() {
+        return Err(DecodeError::Corrupt { field: "payload", reason: "not as long as the header says" });
+    }
+    let (runs, inverse_depth_per_m, others) = decode_depth_plane(header, payload, texels)?;
+    let mut image = DepthImage {
+        camera,
+        inverse_depth_per_m,
+        color_rgb9e5: Vec::new(),
+        normal_oct16: None,
+        surface_id: None,
+        specular: None,
+        passed: None,
+        corner_inverse_depth_per_m: None,
+    };
+    let mut packed = others;
+    for plane in header.planes.iter().skip(1) {
+        decode_plane(plane, &mut packed, &runs, header.corners(), &mut image)?;
+    }
+    Ok(image)
+}
+
+fn push_specular(packer: &mut Packer, specular: &SpecularPlanes, runs: &Runs) {
+    let packed = |plane| raw(|out| pack_words(&runs.gather(plane), WordLayout::Bytes, out));
+    packer.push(PlaneKind::ReflectanceRoughness8, &packed(&specular.reflectance_srgb8_roughness8));
+    for visibility in &specular.visibility8 {
+        packer.push(PlaneKind::Visibility8, &packed(visibility));
+    }
+}
+
+#[derive(Default)]
+struct Packer {
+    planes: Vec<PlaneHeader>,
+    payload: Vec<u8>,
+}
+
+impl Packer {
+    fn push(&mut self, kind: PlaneKind, raw: &[u8]) {
+        let packed = lz4_flex::block::compress(raw);
+        self.payload.extend_from_slice(&packed);
+        self.planes.push(PlaneHeader {
+            kind,
+            encoding: kind.encoding(),
+            raw_bytes: raw.len() as u32,
+            packed_bytes: packed.len() as u32,
+        });
+    }
+}
+
+fn raw(write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    let mut out = Vec::new();
+    write(&mut out);
+    out
+}
+
+fn check_camera(header: &ImageHeader, camera: &Camera) -> Result<(), DecodeError> {
+    let Camera::Pinhole(pinhole) = camera;
+    let (width, height) = (header.width, header.height);
+    let [camera_width, camera_height] = pinhole.size_px.to_array();
+    if (width, height) == (camera_width, camera_height) {
+        return Ok(());
+    }
+    Err(DecodeError::CameraSize { width, height, camera_width, camera_height })
+}
+
+/// The runs, the plane, and the bytes of the other planes.
+fn decode_depth_plane<'a>(
+    header: &ImageHeader,
+    payload: &'a [u8],
+    texels: usize,
+) -> Result<(Runs, Vec<f32>, &'a [u8]), DecodeError> {
+    let mut packed = payload;
+    let plane = header.planes.first().ok_or(DecodeError::Header { field: "planes", reason: "none" })?;
+    let raw = expand_plane(plane, &mut packed)?;
+    let (runs, inverse_depth_per_m) = decode_depth(&raw, texels, header.inverse_depth_range)?;
+    Ok((runs, inverse_depth_per_m, packed))
+}
+
+fn expand_plane(plane: &PlaneHeader, packed: &mut &[u8]) -> Result<Vec<u8>, DecodeError> {
+    let field = plane.kind.name();
+    let (own, rest) = packed
+        .split_at_checked(plane.packed_bytes as usize)
+        .ok_or(DecodeError::Corrupt { field, reason: "ends too early" })?;
+    *packed = rest;
+    expand_lz4(own, plane.raw_bytes as usize, field)
+}
+
+fn decode_plane(
+    plane: &PlaneHeader,
+    packed: &mut &[u8],
+    runs: &Runs,
+    corners: usize,
+    image: &mut DepthImage,
+) -> Result<(), DecodeError> {
+    let raw = expand_plane(plane, packed)?;
+    let mut input = &raw[..];
+    let samples = runs.sample_count();
+    match plane.kind {
+        PlaneKind::InverseDepth => {}
+        PlaneKind::ColorRgb9e5 => image.color_rgb9e5 = runs.scatter(&unpack_colors(&mut input, samples)?, 0),
+        PlaneKind::NormalOct16 => {
+            let normals = unpack_words(&mut input, samples, WordLayout::Halves)?;
+            image.normal_oct16 = Some(runs.scatter(&normals, 0));
+        }
+        PlaneKind::SurfaceId => {
+            let nothing = SurfaceId { instance: 0, primitive: 0 };
+            image.surface_id = Some(runs.scatter(&unpack_surface_ids(&mut input, samples)?, nothing));
+        }
+        PlaneKind::ReflectanceRoughness8 => {
+            let reflectances = unpack_words(&mut input, samples, WordLayout::Bytes)?;
+            image.specular.get_or_insert_default().reflectance_srgb8_roughness8 = runs.scatter(&reflectances, 0);
+        }
+        PlaneKind::Visibility8 => {
+            let visibilities = unpack_words(&mut input, samples, WordLayout::Bytes)?;
+            image.specular.get_or_insert_default().visibility8.push(runs.scatter(&visibilities, 0));
+        }
+        PlaneKind::Passed1 => {
+            image.passed = Some(unpack_bits(take(&mut input, image.inverse_depth_per_m.len().div_ceil(8))?, image));
+        }
+        PlaneKind::CornerInverseDepth => {
+            image.corner_inverse_depth_per_m = Some(unpack_corners(std::mem::take(&mut input), corners)?);
+        }
+    }
+    if input.is_empty() {
+        return Ok(());
+    }
+    Err(DecodeError::Corrupt { field: plane.kind.name(), reason: "bytes left over" })
+}
+
+fn pack_bits(bits: &[bool]) -> Vec<u8> {
+    bits.chunks(8).map(|eight| (0..).zip(eight).map(|(place, &bit)| u8::from(bit) << place).sum()).collect()
+}
+
+fn unpack_bits(bytes: &[u8], image: &DepthImage) -> Vec<bool> {
+    (0..image.inverse_depth_per_m.len()).map(|index| bytes[index / 8] >> (index % 8) & 1 != 0).collect()
+}
+
+fn pack_corners(corners: &[f32]) -> Vec<u8> {
+    let depth = encode_depth(corners);
+    let range = [depth.range.least_per_m, depth.range.greatest_per_m].map(f32::to_le_bytes);
+    [range.as_flattened(), &depth.bytes].concat()
+}
+
+fn unpack_corners(mut input: &[u8], corners: usize) -> Result<Vec<f32>, DecodeError> {
+    let range = take(&mut input, CORNER_RANGE_BYTES)?;
+    let at = |place: usize| range[place..].first_chunk().map_or(0.0, |&bytes| f32::from_le_bytes(bytes));
+    let range = InverseDepthRange { least_per_m: at(0), greatest_per_m: at(4) };
+    range.validate()?;
+    Ok(decode_depth(input, corners, range)?.1)
+}
+
+fn pack_surface_ids(ids: &[SurfaceId], out: &mut Vec<u8>) {
+    let (instances, primitives): (Vec<_>, Vec<_>) = ids.iter().map(|id| (id.instance, id.primitive)).unzip();
+    pack_words(&instances, WordLayout::Whole, out);
+    pack_words(&primitives, WordLayout::Whole, out);
+}
+
+fn unpack_surface_ids(input: &mut &[u8], count: usize) -> Result<Vec<SurfaceId>, DecodeError> {
+    let instances = unpack_words(input, count, WordLayout::Whole)?;
+    let primitives = unpack_words(input, count, WordLayout::Whole)?;
+    let pairs = instances.into_iter().zip(primitives);
+    Ok(pairs.map(|(instance, primitive)| SurfaceId { instance, primitive }).collect())
+}
+
+#[cfg(test)]
+#[path = "image_codec_tests.rs"]
+mod tests;

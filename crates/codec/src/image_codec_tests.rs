@@ -1,0 +1,337 @@
+//! Round trips, and thousands of damaged headers and payloads.
+
+use depth_image::PinholeCamera;
+use glam::{UVec2, Vec3};
+
+use super::*;
+use crate::{
+    InverseDepthRange, PlaneEncoding,
+    test_planes::{Random, tree_over_terrain},
+};
+
+fn camera(width: u32, height: u32) -> Camera {
+    Camera::Pinhole(PinholeCamera::looking_at(Vec3::Y, Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(width, height)))
+}
+
+fn image(width: u32, height: u32) -> DepthImage {
+    let mut random = Random::new(8);
+    let mut inverse_depth_per_m = tree_over_terrain(width as usize, height as usize, 9);
+    inverse_depth_per_m.iter_mut().skip(5).step_by(97).for_each(|texel| *texel = depth_image::HOLE_INVERSE_DEPTH);
+    // As decoded: nothing where there is no sample.
+    let mut word = |inverse: &f32, bits: u32| {
+        if *inverse > 0.0 { random.next_u32() >> (32 - bits) } else { 0 }
+    };
+    let color_rgb9e5 = inverse_depth_per_m.iter().map(|inverse| word(inverse, 25)).collect();
+    let normal_oct16 = Some(inverse_depth_per_m.iter().map(|inverse| word(inverse, 32)).collect());
+    let id = |inverse| SurfaceId { instance: word(inverse, 2), primitive: word(inverse, 17) };
+    let surface_id = Some(inverse_depth_per_m.iter().map(id).collect());
+    DepthImage {
+        camera: camera(width, height),
+        inverse_depth_per_m,
+        color_rgb9e5,
+        normal_oct16,
+        surface_id,
+        specular: None,
+        passed: None,
+        corner_inverse_depth_per_m: None,
+    }
+}
+
+/// With so many planes of visibility.
+fn shiny(width: u32, height: u32, visibilities: usize) -> DepthImage {
+    let mut random = Random::new(20);
+    let image = image(width, height);
+    let mut plane = || {
+        let word = |&inverse: &f32| if inverse > 0.0 { random.next_u32() } else { 0 };
+        image.inverse_depth_per_m.iter().map(word).collect::<Vec<_>>()
+    };
+    let reflectance_srgb8_roughness8 = plane();
+    let visibility8 = (0..visibilities).map(|_| plane()).collect();
+    DepthImage { specular: Some(SpecularPlanes { reflectance_srgb8_roughness8, visibility8 }), ..image }
+}
+
+fn decode(image: &EncodedDepthImage) -> Result<DepthImage, DecodeError> {
+    let limits = DecodeLimits { max_texels: 1 << 16, ..DecodeLimits::default() };
+    decode_depth_image(&image.header, camera(image.header.width, image.header.height), &image.payload, &limits)
+}
+
+#[test]
+fn an_image_survives() {
+    for size in [(1, 1), (7, 3), (160, 120)] {
+        let image = image(size.0, size.1);
+        let encoded = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+        let back = decode(&encoded).expect("own encoding");
+        let half_step = encoded.header.inverse_depth_range.half_step_per_m() as f32 * 1.01;
+        for (&was, &is) in image.inverse_depth_per_m.iter().zip(&back.inverse_depth_per_m) {
+            assert!((was - is).abs() <= half_step && (was > 0.0 || was == is));
+        }
+        let DepthImage { inverse_depth_per_m, .. } = &back;
+        assert_eq!(back, DepthImage { inverse_depth_per_m: inverse_depth_per_m.clone(), ..image });
+    }
+}
+
+/// As an image that leaves out what others hold has them.
+fn apart(width: u32, height: u32) -> DepthImage {
+    let image = image(width, height);
+    let passed = Some(image.inverse_depth_per_m.iter().map(|d| !(0.0..=0.3).contains(d)).collect());
+    let corner_inverse_depth_per_m = Some(tree_over_terrain(width as usize + 1, height as usize + 1, 4));
+    DepthImage { passed, corner_inverse_depth_per_m, ..image }
+}
+
+#[test]
+fn what_was_passed_and_corners_survive() {
+    for (width, height) in [(1, 1), (7, 3), (160, 120)] {
+        let image = apart(width, height);
+        let encoded = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+        let back = decode(&encoded).expect("own encoding");
+        assert_eq!(back.passed, image.passed);
+        let corners = |image: &DepthImage| image.corner_inverse_depth_per_m.clone().expect("corners");
+        let (was, is) = (corners(&image), corners(&back));
+        assert_eq!(was.len(), is.len());
+        assert!(was.iter().zip(&is).all(|(was, is)| (was - is).abs() < 1e-4 && (*was > 0.0 || was == is)));
+        let without = encode_depth_image(&image, PlaneSet::DEPTH_COLOR).expect("consistent planes");
+        let back = decode(&without).expect("own encoding");
+        assert!(back.corner_inverse_depth_per_m.is_none() && back.passed == image.passed);
+    }
+}
+
+#[test]
+fn damaged_planes_of_images_apart_are_refused() {
+    let good = encode_depth_image(&apart(48, 32), PlaneSet::ALL).expect("consistent planes");
+    type Damage = fn(&mut Vec<PlaneHeader>);
+    let cases: [(&str, Damage); 5] = [
+        ("repeated or out of order", |p| p.swap(4, 5)),
+        ("repeated or out of order", |p| p.push(p[5])),
+        ("repeated or out of order", |p| p.swap(3, 4)),
+        ("planes.raw_bytes", |p| p[4].raw_bytes = u32::MAX),
+        ("planes.raw_bytes", |p| p[5].raw_bytes = u32::MAX),
+    ];
+    for (name, damage) in cases {
+        let mut bad = good.clone();
+        damage(&mut bad.header.planes);
+        let error = decode(&bad).expect_err(name).to_string();
+        assert!(error.contains(name), "{name}: {error}");
+    }
+    let mut random = Random::new(3);
+    for _ in 0..3000 {
+        let mut payload = good.payload.to_vec();
+        let place = random.next_u32() as usize % payload.len();
+        payload[place] ^= 1 << (random.next_u32() % 8);
+        // Whatever comes out is of the right size, or an error.
+        if let Ok(image) = decode(&EncodedDepthImage { payload: payload.into(), ..good.clone() }) {
+            image.validate().expect("planes of one size");
+        }
+    }
+}
+
+#[test]
+fn planes_travel_only_when_asked_for() {
+    let encoded = encode_depth_image(&image(20, 20), PlaneSet::DEPTH_COLOR).expect("consistent planes");
+    let back = decode(&encoded).expect("own encoding");
+    assert_eq!((encoded.header.planes.len(), back.normal_oct16, back.surface_id), (2, None, None));
+}
+
+#[test]
+fn what_highlights_need_survives_and_brings_normals() {
+    let specular_only = PlaneSet { specular: true, ..PlaneSet::DEPTH_COLOR };
+    for visibilities in [0, 1, 2, 64] {
+        let image = shiny(20, 20, visibilities);
+        let encoded = encode_depth_image(&image, specular_only).expect("consistent planes");
+        let back = decode(&encoded).expect("own encoding");
+        assert_eq!((back.normal_oct16, back.surface_id), (image.normal_oct16.clone(), None));
+        assert_eq!(back.specular, image.specular);
+        assert_eq!(decode(&encode_depth_image(&image, PlaneSet::ALL).unwrap()).unwrap().specular, image.specular);
+        let unwanted = PlaneSet { specular: false, ..PlaneSet::ALL };
+        let plain = encode_depth_image(&image, unwanted).unwrap();
+        assert_eq!((plain.header.planes.len(), decode(&plain).unwrap().specular), (4, None));
+    }
+    let dull = encode_depth_image(&image(20, 20), PlaneSet::ALL).expect("consistent planes");
+    assert_eq!((dull.header.planes.len(), decode(&dull).expect("own encoding").specular), (4, None));
+    let dull = encode_depth_image(&image(20, 20), specular_only).expect("consistent planes");
+    assert_eq!(dull.header.planes.len(), 2);
+}
+
+#[test]
+fn nothing_but_samples_travels() {
+    let mut image = shiny(20, 20, 1);
+    let good = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+    let empty: Vec<_> = (0..400).filter(|&i| image.inverse_depth_per_m[i] <= 0.0).collect();
+    assert!(empty.len() > 10);
+    let specular = image.specular.as_mut().expect("made so");
+    for at in empty {
+        specular.reflectance_srgb8_roughness8[at] = u32::MAX;
+        specular.visibility8[0][at] = u32::MAX;
+    }
+    assert_eq!(encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes"), good);
+}
+
+#[test]
+fn inconsistent_planes_are_refused() {
+    let mut bad = image(20, 20);
+    bad.color_rgb9e5.pop();
+    assert!(encode_depth_image(&bad, PlaneSet::ALL).is_err());
+    let mut bad = shiny(20, 20, 2);
+    bad.specular.as_mut().expect("made so").visibility8[1].pop();
+    assert!(encode_depth_image(&bad, PlaneSet::ALL).is_err());
+    let bad = DepthImage { normal_oct16: None, ..shiny(20, 20, 2) };
+    let error = encode_depth_image(&bad, PlaneSet::ALL).expect_err("no normals").to_string();
+    assert!(error.contains("plane normal has 0"), "{error}");
+    assert!(encode_depth_image(&bad, PlaneSet::DEPTH_COLOR).is_ok(), "then nothing needs them");
+}
+
+/// Damaged images may decode to something, but never to nonsense.
+fn assert_sound(result: Result<DepthImage, DecodeError>) {
+    let Ok(image) = result else { return };
+    assert_eq!(image.validate(), Ok(()));
+    let sound = |&inverse: &f32| inverse.is_finite() && (inverse >= 0.0 || inverse == depth_image::HOLE_INVERSE_DEPTH);
+    assert!(image.inverse_depth_per_m.iter().all(sound));
+}
+
+#[test]
+fn damaged_payloads_never_panic() {
+    let good = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
+    let mut random = Random::new(10);
+    for _ in 0..6000 {
+        let mut bad = good.clone();
+        let mut payload = good.payload.to_vec();
+        for _ in 0..1 + random.below(4) {
+            let at = random.below(payload.len());
+            payload[at] ^= 1 << random.below(8);
+        }
+        bad.payload = payload.into();
+        assert_sound(decode(&bad));
+    }
+}
+
+#[test]
+fn damaged_planes_behind_a_sound_lz4_never_panic() {
+    let good = image(48, 32);
+    let depth = encode_depth(&good.inverse_depth_per_m);
+    let mut random = Random::new(11);
+    for _ in 0..6000 {
+        let mut bytes = depth.bytes.clone();
+        let at = random.below(bytes.len());
+        bytes[at] = random.next_u32() as u8;
+        bytes.truncate(if random.below(4) == 0 { random.below(bytes.len()) } else { bytes.len() });
+        if let Ok((_, plane)) = decode_depth(&bytes, 48 * 32, depth.range) {
+            assert!(plane.iter().all(|&inverse| inverse.is_finite() && inverse <= depth.range.greatest_per_m));
+        }
+    }
+}
+
+#[test]
+fn damaged_words_behind_a_sound_lz4_never_panic() {
+    let mut random = Random::new(14);
+    let words: Vec<u32> = (0..500).map(|_| random.next_u32() >> random.below(32)).collect();
+    for layout in [WordLayout::Whole, WordLayout::Halves, WordLayout::Bytes] {
+        let mut good = Vec::new();
+        pack_words(&words, layout, &mut good);
+        for _ in 0..2000 {
+            let mut bytes = good.clone();
+            let at = random.below(bytes.len());
+            bytes[at] = random.next_u32() as u8;
+            bytes.truncate(if random.below(4) == 0 { random.below(bytes.len()) } else { bytes.len() });
+            let back = unpack_words(&mut &bytes[..], words.len(), layout);
+            assert!(back.is_err() || back.is_ok_and(|back| back.len() == words.len()));
+        }
+    }
+}
+
+#[test]
+fn cut_and_random_payloads_are_refused() {
+    let good = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
+    for length in 0..good.payload.len() {
+        assert!(decode(&EncodedDepthImage { payload: good.payload.slice(..length), ..good.clone() }).is_err());
+    }
+    let mut random = Random::new(12);
+    for _ in 0..2000 {
+        let payload: Vec<u8> = (0..good.payload.len()).map(|_| random.next_u32() as u8).collect();
+        assert_sound(decode(&EncodedDepthImage { payload: payload.into(), ..good.clone() }));
+    }
+}
+
+#[test]
+fn damaged_headers_are_named() {
+    let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
+    type Damage = fn(&mut ImageHeader);
+    let cases: [(&str, Damage); 13] = [
+        ("size", |h| h.width = 0),
+        ("width", |h| h.width = 65_535),
+        ("texels", |h| (h.width, h.height) = (16_384, 16_384)),
+        ("payload runs", |h| h.height += 1),
+        ("inverse_depth_range", |h| h.inverse_depth_range.least_per_m = f32::NAN),
+        ("payload runs", |h| h.inverse_depth_range = InverseDepthRange { least_per_m: 0.0, greatest_per_m: 0.0 }),
+        ("planes.kind", |h| h.planes.clear()),
+        ("planes.kind", |h| h.planes[2].kind = PlaneKind::ColorRgb9e5),
+        ("planes.encoding", |h| h.planes[1].encoding = PlaneEncoding::SlopeTaggedLz4),
+        ("planes.encoding", |h| h.planes[1].encoding = PlaneEncoding::DifferenceTaggedLz4),
+        ("planes.raw_bytes", |h| h.planes[3].raw_bytes = u32::MAX),
+        ("payload_bytes", |h| h.planes[3].packed_bytes = u32::MAX),
+        ("LZ4 block is too short", |h| h.planes[0].raw_bytes += 1),
+    ];
+    for (name, damage) in cases {
+        let mut bad = good.clone();
+        damage(&mut bad.header);
+        let error = decode(&bad).expect_err(name).to_string();
+        assert!(error.contains(name), "{name}: {error}");
+    }
+}
+
+#[test]
+fn planes_of_highlights_must_come_in_their_order() {
+    let good = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
+    let kinds = |header: &ImageHeader| header.planes.iter().map(|plane| plane.kind).collect::<Vec<_>>();
+    assert_eq!(
+        kinds(&good.header)[2..],
+        [
+            PlaneKind::NormalOct16,
+            PlaneKind::SurfaceId,
+            PlaneKind::ReflectanceRoughness8,
+            PlaneKind::Visibility8,
+            PlaneKind::Visibility8
+        ]
+    );
+    type Damage = fn(&mut Vec<PlaneHeader>);
+    let cases: [(&str, Damage); 9] = [
+        ("reflectance without normals", |p| drop(p.drain(2..3))),
+        ("reflectance without normals", |p| drop(p.drain(2..4))),
+        ("visibility without reflectance", |p| drop(p.drain(4..5))),
+        ("out of order", |p| p.swap(4, 5)),
+        ("out of order", |p| p.swap(3, 4)),
+        ("out of order", |p| p.swap(2, 6)),
+        ("repeated", |p| p.insert(4, p[4])),
+        ("planes.visibility8 is 65", |p| p.extend([p[6]; 63])),
+        ("planes.raw_bytes", |p| p[6].raw_bytes = u32::MAX),
+    ];
+    for (name, damage) in cases {
+        let mut bad = good.clone();
+        damage(&mut bad.header.planes);
+        let error = decode(&bad).expect_err(name).to_string();
+        assert!(error.contains(name), "{name}: {error}");
+    }
+}
+
+#[test]
+fn what_packs_well_does_not_claim_all_memory() {
+    let mut bad = encode_depth_image(&shiny(48, 32, 64), PlaneSet::ALL).expect("consistent planes");
+    (bad.header.width, bad.header.height) = (4096, 4096);
+    let result = decode_depth_image(&bad.header, camera(4096, 4096), &bad.payload, &DecodeLimits::default());
+    assert!(matches!(result, Err(DecodeError::Limit { field: "image_bytes", .. })), "{result:?}");
+}
+
+#[test]
+fn the_camera_must_have_the_images_size() {
+    let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
+    let result = decode_depth_image(&good.header, camera(32, 48), &good.payload, &DecodeLimits::default());
+    assert!(matches!(result, Err(DecodeError::CameraSize { .. })));
+}
+
+#[test]
+fn a_small_payload_does_not_claim_a_large_buffer() {
+    let mut bad = encode_depth_image(&image(200, 200), PlaneSet::DEPTH_COLOR).expect("consistent planes");
+    bad.header.planes[0].packed_bytes = 2;
+    bad.header.planes[1].packed_bytes = 2;
+    bad.payload = Bytes::from_static(&[0xff, 0xff, 0xff, 0xff]);
+    let error = decode(&bad).expect_err("four bytes");
+    assert!(error.to_string().contains("claims more"), "{error}");
+}

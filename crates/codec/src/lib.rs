@@ -1,0 +1,49 @@
+//! Depth images, views and frames as bytes, and those bytes in chunks.
+//!
+//! Planes: [`quantise`], [`runs`] and [`tagged`] are the pieces; `depth_codec`, `color_codec` and `words_codec` make planes
+//! of them. Depth images: `image_codec` puts planes together and `chunk` cuts the result. Views: `frame_codec` packs the
+//! colour, `view_codec` adds the other planes, and `frame_parts` cuts the result.
+//!
+//! Decoders trust nothing: sizes follow from a validated header and are held against [`DecodeLimits`] before memory is
+//! taken.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod chunk;
+mod color_codec;
+mod depth_codec;
+mod depth_plane;
+mod error;
+mod frame_codec;
+mod frame_header;
+mod frame_parts;
+mod frame_planes;
+mod image_codec;
+mod image_header;
+mod jpeg;
+mod lz4;
+mod quantise;
+mod reassembler;
+mod rgb_filter;
+mod runs;
+mod sample_set_id;
+mod stage_times;
+mod tagged;
+#[cfg(test)]
+mod test_planes;
+mod view_codec;
+mod words_codec;
+
+pub use chunk::{Chunk, ChunkBody, MAX_CHUNK_BYTES, split_into_chunks};
+pub use depth_plane::{EncodedDepthPlane, decode_depth_plane, encode_depth_plane, inverse_depth_codes};
+pub use error::{DecodeError, DecodeLimits, FrameError};
+pub use frame_codec::{EncodedFrame, FrameCodec, ParseFrameCodecError, decode_frame, encode_frame};
+pub use frame_header::{FrameHeader, MAX_FRAME_BYTES, WholeFrame};
+pub use frame_parts::{FrameAssembly, FrameAssemblyError, FramePart};
+pub use frame_planes::{pack_f32_plane, pack_u32_plane, unpack_f32_plane, unpack_u32_plane};
+pub use image_codec::{EncodedDepthImage, decode_depth_image, encode_depth_image};
+pub use image_header::{ImageHeader, MAX_VISIBILITY_PLANES, PlaneEncoding, PlaneHeader, PlaneKind, PlaneSet};
+pub use quantise::{BACKGROUND_CODE, FIRST_SAMPLE_CODE, HOLE_CODE, InverseDepthRange};
+pub use reassembler::{ChunkError, Reassembled, Reassembler};
+pub use sample_set_id::SampleSetId;
+pub use stage_times::StageTimes;
+pub use view_codec::{EncodedView, ViewCodecError, decode_view, encode_view};

@@ -1,0 +1,233 @@
+//! Chunks back to images. One reassembler serves one stream, one image at a time.
+
+use bytes::{Bytes, BytesMut};
+
+use crate::{
+    Chunk, ChunkBody, DecodeError, DecodeLimits, EncodedDepthImage, ImageHeader, MAX_CHUNK_BYTES, SampleSetId,
+    chunk::chunk_count,
+};
+
+/// An image whose chunks have all come.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reassembled {
+    /// The set it belongs to.
+    pub sample_set_id: SampleSetId,
+    /// Which image of the set.
+    pub image_index: u32,
+    /// The image; its header has passed [`ImageHeader::validate`].
+    pub image: EncodedDepthImage,
+}
+
+/// Why a chunk is refused. An image under way is dropped, unless the chunk was stale or a duplicate.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ChunkError {
+    /// Of a set before those that are wanted.
+    #[error("chunk of sample set {got}, older than {oldest}")]
+    StaleSet {
+        /// The chunk's.
+        got: SampleSetId,
+        /// The oldest that is accepted.
+        oldest: SampleSetId,
+    },
+    /// Already there.
+    #[error("chunk {got} again, chunk {expected} is next")]
+    Duplicate {
+        /// The chunk's.
+        got: u32,
+        /// What should have come.
+        expected: u32,
+    },
+    /// Chunks were lost or overtaken.
+    #[error("chunk {got} of image {image_index} in sample set {sample_set_id}, but chunk {expected} is missing")]
+    Missing {
+        /// The set under way.
+        sample_set_id: SampleSetId,
+        /// The image under way.
+        image_index: u32,
+        /// The chunk's.
+        got: u32,
+        /// What should have come.
+        expected: u32,
+    },
+    /// Data without the header of its image.
+    #[error("chunk {got} of image {image_index} without a header")]
+    NoHeader {
+        /// The chunk's image.
+        image_index: u32,
+        /// The chunk's sequence.
+        got: u32,
+    },
+    /// A body of the wrong kind, size or count.
+    #[error("chunk {sequence}: {field} is wrong")]
+    Malformed {
+        /// The chunk's.
+        sequence: u32,
+        /// Which.
+        field: &'static str,
+    },
+    /// The body is not what was sent.
+    #[error("chunk {sequence}: checksum does not match")]
+    Checksum {
+        /// The chunk's.
+        sequence: u32,
+    },
+    /// The header does not pass, or asks for too much.
+    #[error(transparent)]
+    Header(#[from] DecodeError),
+}
+
+/// Accepts the chunks of one stream in order.
+#[derive(Debug)]
+pub struct Reassembler {
+    limits: DecodeLimits,
+    oldest: SampleSetId,
+    under_way: Option<UnderWay>,
+    abandoned: u64,
+}
+
+#[derive(Debug)]
+struct UnderWay {
+    sample_set_id: SampleSetId,
+    image_index: u32,
+    next_sequence: u32,
+    chunk_count: u32,
+    header: ImageHeader,
+    payload: Payload,
+}
+
+/// A payload in one chunk is passed on as it came; longer ones are joined.
+#[derive(Debug)]
+enum Payload {
+    Whole(Bytes),
+    Joined(BytesMut),
+}
+
+impl Reassembler {
+    /// Nothing before `oldest` is accepted, nor any image over `limits`.
+    #[must_use]
+    pub fn new(limits: DecodeLimits, oldest: SampleSetId) -> Self {
+        Self { limits, oldest, under_way: None, abandoned: 0 }
+    }
+
+    /// Refuses sets before `oldest` from now on; an unfinished image of one is dropped.
+    pub fn forget_before(&mut self, oldest: SampleSetId) {
+        self.oldest = self.oldest.max(oldest);
+        let stale = |image: &mut UnderWay| image.sample_set_id < oldest;
+        self.abandoned += u64::from(self.under_way.take_if(stale).is_some());
+    }
+
+    /// Images that were begun and never finished.
+    #[must_use]
+    pub fn abandoned(&self) -> u64 {
+        self.abandoned
+    }
+
+    /// Takes the next chunk; the image when it was the last.
+    ///
+    /// # Errors
+    /// See [`ChunkError`].
+    pub fn push(&mut self, chunk: Chunk) -> Result<Option<Reassembled>, ChunkError> {
+        if chunk.sample_set_id < self.oldest {
+            return Err(ChunkError::StaleSet { got: chunk.sample_set_id, oldest: self.oldest });
+        }
+        self.check_sequence(&chunk)?;
+        let result = self.accept(chunk);
+        if result.is_err() {
+            self.abandon();
+        }
+        result
+    }
+
+    /// A header of a later set may cut off an image; nothing else may come out of turn.
+    fn check_sequence(&mut self, chunk: &Chunk) -> Result<(), ChunkError> {
+        let got = chunk.sequence;
+        let Some(image) = &self.under_way else {
+            return Ok(());
+        };
+        let (sample_set_id, image_index, expected) = (image.sample_set_id, image.image_index, image.next_sequence);
+        if (chunk.sample_set_id, chunk.image_index) == (sample_set_id, image_index) && got <= expected {
+            return if got == expected { Ok(()) } else { Err(ChunkError::Duplicate { got, expected }) };
+        }
+        self.abandon();
+        if got == 0 && chunk.sample_set_id > sample_set_id {
+            return Ok(());
+        }
+        Err(ChunkError::Missing { sample_set_id, image_index, got, expected })
+    }
+
+    fn abandon(&mut self) {
+        self.abandoned += u64::from(self.under_way.take().is_some());
+    }
+
+    fn accept(&mut self, chunk: Chunk) -> Result<Option<Reassembled>, ChunkError> {
+        let Chunk { sequence, image_index, .. } = chunk;
+        if chunk.body.crc32() != chunk.crc32 {
+            return Err(ChunkError::Checksum { sequence });
+        }
+        match (sequence, chunk.body, &mut self.under_way) {
+            (0, ChunkBody::Header(header), under_way) => {
+                check_header(&header, chunk.chunk_count, &self.limits)?;
+                let image = UnderWay::new(chunk.sample_set_id, image_index, chunk.chunk_count, header);
+                *under_way = Some(image);
+            }
+            (1.., ChunkBody::Data(data), Some(image)) => image.append(sequence, chunk.chunk_count, data)?,
+            (1.., ChunkBody::Data(_), None) => {
+                return Err(ChunkError::NoHeader { image_index, got: sequence });
+            }
+            _ => {
+                return Err(ChunkError::Malformed { sequence, field: "body" });
+            }
+        }
+        Ok(self.under_way.take_if(|image| image.next_sequence == image.chunk_count).map(UnderWay::finish))
+    }
+}
+
+/// The limits are held against the header before anything of the payload's size is allocated.
+fn check_header(header: &ImageHeader, count: u32, limits: &DecodeLimits) -> Result<(), ChunkError> {
+    header.validate(limits)?;
+    if u64::from(count) == chunk_count(header.payload_bytes()) {
+        return Ok(());
+    }
+    Err(ChunkError::Malformed { sequence: 0, field: "chunk_count" })
+}
+
+impl UnderWay {
+    fn new(sample_set_id: SampleSetId, image_index: u32, chunk_count: u32, header: ImageHeader) -> Self {
+        let payload = match chunk_count {
+            0..=2 => Payload::Whole(Bytes::new()),
+            _ => Payload::Joined(BytesMut::with_capacity(header.payload_bytes() as usize)),
+        };
+        Self { sample_set_id, image_index, next_sequence: 1, chunk_count, header, payload }
+    }
+
+    fn append(&mut self, sequence: u32, chunk_count: u32, data: Bytes) -> Result<(), ChunkError> {
+        let malformed = |field| Err(ChunkError::Malformed { sequence, field });
+        if chunk_count != self.chunk_count {
+            return malformed("chunk_count");
+        }
+        let before = (u64::from(sequence) - 1) * MAX_CHUNK_BYTES as u64;
+        let left = self.header.payload_bytes().saturating_sub(before);
+        if data.len() as u64 != left.min(MAX_CHUNK_BYTES as u64) {
+            return malformed("data length");
+        }
+        match &mut self.payload {
+            Payload::Whole(whole) => *whole = data,
+            Payload::Joined(joined) => joined.extend_from_slice(&data),
+        }
+        self.next_sequence += 1;
+        Ok(())
+    }
+
+    fn finish(self) -> Reassembled {
+        let payload = match self.payload {
+            Payload::Whole(whole) => whole,
+            Payload::Joined(joined) => joined.freeze(),
+        };
+        let image = EncodedDepthImage { header: self.header, payload };
+        Reassembled { sample_set_id: self.sample_set_id, image_index: self.image_index, image }
+    }
+}
+
+#[cfg(test)]
+#[path = "reassembler_tests.rs"]
+mod tests;

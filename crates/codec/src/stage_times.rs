@@ -1,0 +1,61 @@
+//! Where a frame's time went, in durations: clocks of machines differ.
+
+/// Where a frame's time went at its compositor.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StageTimes {
+    /// Until the sample set was there.
+    pub set_wait_s: f64,
+    /// Until frames before it had been sent, and, of a live stream, acknowledged.
+    pub credit_wait_s: f64,
+    /// In the queue for the device.
+    pub queue_s: f64,
+    /// The batch's device time: each of its views waits for all of them.
+    pub batch_s: f64,
+    /// The batch's device time divided by its views.
+    pub reconstruct_s: f64,
+    /// Encoding.
+    pub encode_s: f64,
+    /// Made, but waiting: for an encoder, and for frames before it to go out.
+    pub send_wait_s: f64,
+    /// From the request's arrival to the frame's departure.
+    pub compositor_s: f64,
+    /// How long the sample set had been there when the batch was begun; 0 where views are drawn from the scene.
+    pub set_age_s: f64,
+    /// Views of the batch.
+    pub batch_count: u32,
+}
+
+impl StageTimes {
+    /// The stages that follow one another, up to encoding.
+    fn made_s(&self) -> f64 {
+        self.set_wait_s + self.credit_wait_s + self.queue_s + self.batch_s + self.encode_s
+    }
+
+    /// The times of a frame that leaves so long after its request came: what no other stage accounts for, it waited.
+    #[must_use]
+    pub fn leaving_after(self, compositor_s: f64) -> Self {
+        Self { compositor_s, send_wait_s: (compositor_s - self.made_s()).max(0.0), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_make_the_whole() {
+        let made = StageTimes {
+            set_wait_s: 0.1,
+            credit_wait_s: 0.2,
+            queue_s: 0.3,
+            batch_s: 0.4,
+            encode_s: 0.5,
+            reconstruct_s: 0.2,
+            set_age_s: 9.0,
+            ..StageTimes::default()
+        };
+        let left = made.leaving_after(2.0);
+        assert!((left.made_s() + left.send_wait_s - left.compositor_s).abs() < 1e-12);
+        assert_eq!(made.leaving_after(1.0).send_wait_s, 0.0, "clocks that were read in another order");
+    }
+}

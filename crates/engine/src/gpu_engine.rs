@@ -1,0 +1,222 @@
+//! The device behind a node: [`node::Engine`] over the drawing, sampling and reconstruction crates.
+
+use std::any::Any;
+use std::collections::HashMap;
+use std::sync::{Arc, Weak};
+use std::time::Instant;
+
+use depth_image::{DepthImage, PinholeCamera, View};
+use gpu::{DevicePreference, Gpu};
+use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
+use parking_lot::Mutex;
+use reconstruction::{ReconstructionMethod, Reconstructor, SetDescription};
+use render::{
+    AccelerationReport, Choice, DrawWork, GpuScene, Lighting, Refinement, Renderer, SamplePlanes, Visibility,
+};
+use sampling::{Sampler, SamplingMethod};
+use scene::{Limits, Scene};
+
+use crate::error::{device, invalid, parsed, reconstruction_error, render_error, sampling_error};
+
+/// Scenes that stay on the device; the one that was loaded first goes first.
+const KEPT_SCENES: usize = 8;
+
+/// One device, its pipelines, and the scenes on it.
+pub struct GpuEngine {
+    gpu: Arc<Gpu>,
+    renderer: Arc<Renderer>,
+    sampler: Sampler,
+    reconstructor: Reconstructor,
+    scenes: Mutex<Vec<(String, Arc<GpuScene>)>>,
+    /// One batch at a time: the device makes no more of several, and memory holds one.
+    reconstructing: Mutex<()>,
+    /// One load at a time: nodes of one process want the same scene at the same moment.
+    loading: Mutex<()>,
+}
+
+/// A sample set on this engine's device.
+struct Uploaded(reconstruction::SampleSet);
+impl UploadedSet for Uploaded {}
+
+impl GpuEngine {
+    /// Opens a device of its own.
+    ///
+    /// # Errors
+    /// When there is no device or a shader is broken.
+    pub fn open(preference: DevicePreference) -> Result<Self, EngineError> {
+        let gpu = Gpu::open(preference).map_err(device)?;
+        let renderer = Arc::new(sampling::renderer(&gpu).map_err(render_error)?);
+        Ok(Self {
+            sampler: Sampler::sharing(renderer.clone()),
+            reconstructor: Reconstructor::new(&gpu).map_err(reconstruction_error)?,
+            renderer,
+            gpu,
+            scenes: Mutex::default(),
+            reconstructing: Mutex::default(),
+            loading: Mutex::default(),
+        })
+    }
+
+    /// The engine that all nodes of this process share; it closes with the last of them.
+    ///
+    /// # Errors
+    /// As [`GpuEngine::open`].
+    pub fn shared(preference: DevicePreference) -> Result<Arc<Self>, EngineError> {
+        static OPEN: Mutex<Option<HashMap<String, Weak<GpuEngine>>>> = Mutex::new(None);
+        let mut open = OPEN.lock();
+        let engines = open.get_or_insert_default();
+        if let Some(engine) = engines.get(&preference.to_string()).and_then(Weak::upgrade) {
+            return Ok(engine);
+        }
+        let engine = Arc::new(Self::open(preference)?);
+        engines.insert(preference.to_string(), Arc::downgrade(&engine));
+        Ok(engine)
+    }
+
+    /// Uploads a scene under the hash of its package, unless it is there; gives the seconds spent.
+    ///
+    /// # Errors
+    /// When the device cannot hold it.
+    pub fn put_scene(&self, hash: &str, scene: &Scene) -> Result<f64, EngineError> {
+        let _one = self.loading.lock();
+        if self.has_scene(hash) {
+            return Ok(0.0);
+        }
+        let start = Instant::now();
+        let uploaded = Arc::new(GpuScene::upload(&self.gpu, scene).map_err(render_error)?);
+        let mut scenes = self.scenes.lock();
+        if scenes.len() >= KEPT_SCENES {
+            scenes.remove(0);
+        }
+        scenes.push((hash.to_owned(), uploaded));
+        Ok(start.elapsed().as_secs_f64())
+    }
+
+    /// The pipelines that reconstruct, for measuring without a service in between.
+    #[must_use]
+    pub fn reconstructor(&self) -> &Reconstructor {
+        &self.reconstructor
+    }
+
+    /// What draws, for measuring without a service in between.
+    #[must_use]
+    pub fn renderer(&self) -> &Renderer {
+        &self.renderer
+    }
+
+    /// As [`GpuEngine::renderer`], to be shared with another sampler.
+    #[must_use]
+    pub fn shared_renderer(&self) -> Arc<Renderer> {
+        self.renderer.clone()
+    }
+
+    /// How surfaces of a scene are found in pictures of a camera's size, by what both ways cost.
+    ///
+    /// # Errors
+    /// For a scene it has not, or a device that fails.
+    pub fn visibility_choice(&self, hash: &str, camera: &PinholeCamera) -> Result<Choice, EngineError> {
+        self.renderer.choice(&*self.scene(hash)?, camera, 0.0).map_err(render_error)
+    }
+
+    /// The tree that rays go through.
+    ///
+    /// # Errors
+    /// For a scene it has not, or one that does not fit the device.
+    pub fn acceleration(&self, hash: &str, scene_time_s: f32) -> Result<AccelerationReport, EngineError> {
+        self.scene(hash)?.acceleration(scene_time_s).map_err(render_error)
+    }
+
+    /// A scene on the device.
+    ///
+    /// # Errors
+    /// Where it was never loaded.
+    pub fn scene(&self, hash: &str) -> Result<Arc<GpuScene>, EngineError> {
+        let found = self.scenes.lock().iter().find(|(kept, _)| kept == hash).map(|(_, scene)| scene.clone());
+        found.ok_or_else(|| EngineError::UnknownScene { hash: hash.to_owned() })
+    }
+}
+
+/// What images must have for views to be reconstructed from them.
+#[must_use]
+pub fn planes_for(method: ReconstructionMethod) -> SamplePlanes {
+    let hybrid = matches!(method, ReconstructionMethod::HybridMesh { .. });
+    SamplePlanes { specular: true, normal: hybrid, corners: hybrid, ..SamplePlanes::default() }
+}
+
+fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {
+    let (visibility, refinement) = (Visibility::Measured, Refinement::default());
+    DrawWork { scene, lighting, scene_time_s, visibility, refinement }
+}
+
+impl Engine for GpuEngine {
+    fn device_name(&self) -> String {
+        self.gpu.name()
+    }
+
+    fn is_software(&self) -> bool {
+        self.gpu.is_software()
+    }
+
+    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<f64, EngineError> {
+        let start = Instant::now();
+        let scene = scene::unpack(package, &Limits::default()).map_err(|error| invalid("package", error))?;
+        self.put_scene(hash, &scene)?;
+        Ok(start.elapsed().as_secs_f64())
+    }
+
+    fn has_scene(&self, hash: &str) -> bool {
+        self.scenes.lock().iter().any(|(kept, _)| kept == hash)
+    }
+
+    fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError> {
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.images_are_sequential())
+    }
+
+    fn samples_alone(&self, sampling: &str) -> Result<bool, EngineError> {
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.images_are_independent())
+    }
+
+    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
+        let scene = self.scene(&request.scene_hash)?;
+        let cluster::Refinement { step, steps } = request.refinement;
+        let draw = DrawWork {
+            refinement: Refinement { step, steps },
+            ..draw_work(&scene, parsed("lighting", &request.lighting)?, request.scene_time_s)
+        };
+        let method: ReconstructionMethod = parsed("reconstruction_method", &request.method)?;
+        let work = sampling::SampleWork {
+            draw,
+            cameras: &request.cameras,
+            wanted: &request.wanted,
+            method: parsed("sampling_method", &request.sampling)?,
+            planes: planes_for(method),
+            reference_time_s: request.settled_at_s,
+        };
+        self.sampler.sample(&work).map_err(sampling_error)
+    }
+
+    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        let lighting: Lighting = parsed("lighting", &set.lighting)?;
+        let description = SetDescription {
+            volume: set.volume,
+            background_linear: set.background_linear,
+            illumination: &set.illumination,
+            highlight: lighting.highlight(),
+        };
+        let uploaded = self.reconstructor.upload(&set.images, &description);
+        Ok(Arc::new(Uploaded(uploaded.map_err(reconstruction_error)?)))
+    }
+
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
+        let Uploaded(set) = (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))?;
+        let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
+        let _one = self.reconstructing.lock();
+        self.reconstructor.reconstruct(set, &work.cameras, method, work.planes).map_err(reconstruction_error)
+    }
+
+    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
+        let scene = self.scene(&work.scene_hash)?;
+        let draw = draw_work(&scene, parsed("lighting", &work.lighting)?, work.scene_time_s);
+        self.renderer.draw_views(draw, &work.cameras, work.planes).map_err(render_error)
+    }
+}

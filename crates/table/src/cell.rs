@@ -1,0 +1,119 @@
+//! Values of a table.
+
+use serde::{Deserialize, Serialize};
+
+use crate::number::format_number;
+
+/// One value of a table.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Cell {
+    /// Not measured, not finite or not applicable: `null`, an empty CSV field.
+    Missing,
+    /// Yes or no.
+    Flag(bool),
+    /// A count.
+    Integer(i64),
+    /// A measure; always finite.
+    Number(f64),
+    /// Words.
+    Text(String),
+}
+
+impl Cell {
+    /// As in an HTML table: numbers to four significant digits.
+    #[must_use]
+    pub fn display(&self) -> String {
+        match self {
+            Self::Missing => "–".into(),
+            Self::Flag(flag) => if *flag { "yes" } else { "no" }.into(),
+            Self::Integer(integer) => integer.to_string(),
+            Self::Number(number) => format_number(*number),
+            Self::Text(text) => text.clone(),
+        }
+    }
+
+    /// As in a CSV file: numbers in full.
+    #[must_use]
+    pub fn full(&self) -> String {
+        match self {
+            Self::Missing => String::new(),
+            Self::Flag(flag) => flag.to_string(),
+            Self::Number(number) => number.to_string(),
+            Self::Integer(_) | Self::Text(_) => self.display(),
+        }
+    }
+
+    /// Whether it reads best aligned right.
+    #[must_use]
+    pub fn is_numeric(&self) -> bool {
+        matches!(self, Self::Integer(_) | Self::Number(_))
+    }
+}
+
+impl From<f64> for Cell {
+    fn from(number: f64) -> Self {
+        if number.is_finite() { Self::Number(number) } else { Self::Missing }
+    }
+}
+
+impl From<f32> for Cell {
+    fn from(number: f32) -> Self {
+        f64::from(number).into()
+    }
+}
+
+impl From<i64> for Cell {
+    fn from(integer: i64) -> Self {
+        Self::Integer(integer)
+    }
+}
+
+impl From<u32> for Cell {
+    fn from(integer: u32) -> Self {
+        Self::Integer(integer.into())
+    }
+}
+
+impl From<usize> for Cell {
+    fn from(integer: usize) -> Self {
+        i64::try_from(integer).map_or(Self::Number(integer as f64), Self::Integer)
+    }
+}
+
+impl From<bool> for Cell {
+    fn from(flag: bool) -> Self {
+        Self::Flag(flag)
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::Text(text.into())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl<T: Into<Self>> From<Option<T>> for Cell {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::Missing, Into::into)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_survive_json() {
+        let cells = [Cell::Missing, true.into(), 3_u32.into(), 0.5.into(), 2.0.into(), "x".into(), None::<f64>.into()];
+        let text = serde_json::to_string(&cells).unwrap();
+        assert_eq!(text, r#"[null,true,3,0.5,2.0,"x",null]"#);
+        assert_eq!(serde_json::from_str::<Vec<Cell>>(&text).unwrap(), cells);
+    }
+}

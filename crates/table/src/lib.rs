@@ -1,0 +1,14 @@
+//! Tables of measured values: columns with units, rows of cells, written as text, CSV or Markdown.
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod cell;
+mod error;
+mod number;
+mod table;
+mod text;
+
+pub use cell::Cell;
+pub use error::TableError;
+pub use number::format_number;
+pub use table::{Column, Table};

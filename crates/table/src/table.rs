@@ -1,0 +1,122 @@
+//! Tables: columns with units, rows of cells.
+
+use serde::{Deserialize, Serialize};
+
+use crate::cell::Cell;
+use crate::error::TableError;
+
+/// What a column holds.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Column {
+    /// Its heading.
+    pub name: String,
+    /// `ms`, `dB`, `px`…; empty for none.
+    pub unit: String,
+}
+
+impl Column {
+    /// A column with a unit, or with `""`.
+    #[must_use]
+    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { name: name.into(), unit: unit.into() }
+    }
+
+    /// `name (unit)`.
+    #[must_use]
+    pub fn heading(&self) -> String {
+        match self.unit.is_empty() {
+            true => self.name.clone(),
+            false => format!("{} ({})", self.name, self.unit),
+        }
+    }
+}
+
+/// A table, written as `{slug(name)}.csv`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    /// What it is about.
+    pub name: String,
+    /// Left to right.
+    pub columns: Vec<Column>,
+    /// Top to bottom, one cell a column each.
+    pub rows: Vec<Vec<Cell>>,
+}
+
+impl Table {
+    /// An empty table of `(heading, unit)` columns.
+    #[must_use]
+    pub fn new(name: impl Into<String>, columns: &[(&str, &str)]) -> Self {
+        let columns = columns.iter().map(|&(name, unit)| Column::new(name, unit)).collect();
+        Self { name: name.into(), columns, rows: Vec::new() }
+    }
+
+    /// Adds a row.
+    ///
+    /// # Errors
+    /// Not one cell a column.
+    pub fn push(&mut self, row: impl IntoIterator<Item = Cell>) -> Result<(), TableError> {
+        self.rows.push(row.into_iter().collect());
+        self.validate()
+    }
+
+    /// Checks that every row has one cell a column.
+    pub fn validate(&self) -> Result<(), TableError> {
+        let columns = self.columns.len();
+        match self.rows.iter().enumerate().find(|(_, row)| row.len() != columns) {
+            Some((row, cells)) => {
+                Err(TableError::RowLength { table: self.name.clone(), row, cells: cells.len(), columns })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The table with a heading line, quoted as RFC 4180 wants it.
+    ///
+    /// # Errors
+    /// When a row has more or fewer cells than there are columns.
+    pub fn to_csv(&self) -> Result<Vec<u8>, TableError> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(self.columns.iter().map(Column::heading))?;
+        for row in &self.rows {
+            writer.write_record(row.iter().map(Cell::full))?;
+        }
+        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()).into())
+    }
+
+    /// As it stands in a Markdown page, rounded as on paper.
+    #[must_use]
+    pub fn to_markdown(&self) -> String {
+        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let heads = line(self.columns.iter().map(Column::heading).collect());
+        let rule = format!("|{}\n", "---|".repeat(self.columns.len()));
+        let rows: String = self.rows.iter().map(|row| line(row.iter().map(Cell::display).collect())).collect();
+        format!("**{}**\n\n{heads}{rule}{rows}", self.name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn csv_is_quoted_and_in_full() {
+        let mut table = Table::new("costs", &[("what", ""), ("time", "ms")]);
+        table.push(["a, \"b\"".into(), 1.234_567_8.into()]).unwrap();
+        table.push(["none".into(), f64::NAN.into()]).unwrap();
+        let text = String::from_utf8(table.to_csv().unwrap()).unwrap();
+        assert_eq!(text, "what,time (ms)\n\"a, \"\"b\"\"\",1.2345678\nnone,\n");
+    }
+
+    #[test]
+    fn tables_read_as_markdown() {
+        let mut table = Table::new("Times", &[("P", ""), ("T", "s")]);
+        table.push([2_u32.into(), 1.5.into()]).unwrap();
+        assert_eq!(table.to_markdown(), "**Times**\n\n| P | T (s) |\n|---|---|\n| 2 | 1.5 |\n");
+    }
+
+    #[test]
+    fn a_short_row_is_refused() {
+        let mut table = Table::new("costs", &[("what", ""), ("time", "ms")]);
+        assert!(matches!(table.push([1_u32.into()]), Err(TableError::RowLength { cells: 1, columns: 2, .. })));
+    }
+}

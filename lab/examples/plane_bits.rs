@@ -1,0 +1,107 @@
+//! Where the bits of depth images go, by plane, and what packing them takes, on one core.
+//!
+//! `cargo run --release -p myriorama --example plane_bits [-- SCENE...]`
+//!
+//! Sets of three images of 1024² of the scenes of `myriorama study sampling`, conventional and with what earlier
+//! images hold left out. Bits are of the packed planes over the set's samples; milliseconds are medians, of an image.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use codec::{DecodeLimits, EncodedDepthImage, PlaneKind, PlaneSet, decode_depth_image, encode_depth_image};
+use depth_image::DepthImage;
+use engine::GpuEngine;
+use glam::UVec2;
+use lab::evaluate::median;
+use lab::sampling_study::{SCENES, Subject};
+use render::SamplePlanes;
+use sampling::{Redundancy, SamplingMethod};
+use study::{Cell, Table};
+
+const SIZE_PX: UVec2 = UVec2::splat(1024);
+const METHODS: [SamplingMethod; 2] = [SamplingMethod::Conventional, SamplingMethod::NonRedundant(Redundancy::Pixel)];
+const PLANES: [PlaneKind; 3] = [PlaneKind::InverseDepth, PlaneKind::ColorRgb9e5, PlaneKind::Passed1];
+const RUNS: usize = 15;
+
+fn main() -> anyhow::Result<()> {
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
+    let engine = GpuEngine::shared("any".parse()?)?;
+    let mut table = Table::new(
+        "Bits a sample",
+        &[
+            ("scene", ""),
+            ("sampling", ""),
+            ("samples", ""),
+            ("samples a run", ""),
+            ("depth", ""),
+            ("colour", ""),
+            ("passed", ""),
+            ("all", ""),
+            ("a set", "kB"),
+            ("encode", "ms"),
+            ("decode", "ms"),
+        ],
+    );
+    for scene in SCENES.iter().filter(|scene| wanted.is_empty() || wanted.iter().any(|name| name == *scene)) {
+        let subject = Subject::load(&engine, scene)?;
+        for method in METHODS {
+            let images = subject.sample(method, SIZE_PX, SamplePlanes::default())?;
+            let head = [scene.to_string().into(), method.to_string().into()];
+            table.push(head.into_iter().chain(numbers(&images)?))?;
+        }
+    }
+    println!("{}", table.to_text());
+    Ok(())
+}
+
+fn numbers(images: &[DepthImage]) -> anyhow::Result<Vec<Cell>> {
+    let encoded = images.iter().map(|image| encode_depth_image(image, PlaneSet::DEPTH_COLOR));
+    let encoded = encoded.collect::<Result<Vec<_>, _>>()?;
+    let samples: usize = images.iter().map(samples).sum();
+    let runs: usize = images.iter().map(sample_runs).sum();
+    let bits = |bytes: usize| 8.0 * bytes as f64 / samples as f64;
+    let bytes: usize = encoded.iter().map(|image| image.payload.len()).sum();
+    let [encode_ms, decode_ms] = times_ms(images, &encoded)?;
+    let mut cells = vec![samples.into(), (samples as f64 / runs as f64).into()];
+    cells.extend(PLANES.map(|kind| bits(encoded.iter().map(|image| plane_bytes(image, kind)).sum()).into()));
+    cells.extend([bits(bytes), bytes as f64 / 1e3, encode_ms, decode_ms].map(Cell::from));
+    Ok(cells)
+}
+
+fn samples(image: &DepthImage) -> usize {
+    image.inverse_depth_per_m.iter().filter(|&&inverse| inverse > 0.0).count()
+}
+
+/// How often samples begin along the rows.
+fn sample_runs(image: &DepthImage) -> usize {
+    let is_sample = |inverse: &f32| *inverse > 0.0;
+    image.inverse_depth_per_m.chunk_by(|a, b| is_sample(a) == is_sample(b)).filter(|run| is_sample(&run[0])).count()
+}
+
+fn plane_bytes(image: &EncodedDepthImage, kind: PlaneKind) -> usize {
+    let planes = image.header.planes.iter().filter(|plane| plane.kind == kind);
+    planes.map(|plane| plane.packed_bytes as usize).sum()
+}
+
+/// To encode and to decode an image.
+fn times_ms(images: &[DepthImage], encoded: &[EncodedDepthImage]) -> anyhow::Result<[f64; 2]> {
+    let limits = DecodeLimits::default();
+    let decode = |(image, encoded): (&DepthImage, &EncodedDepthImage)| {
+        decode_depth_image(&encoded.header, image.camera, &encoded.payload, &limits)
+    };
+    images.iter().zip(encoded).try_for_each(|pair| decode(pair).map(drop))?;
+    let encode_all = || {
+        images.iter().for_each(|image| drop(black_box(encode_depth_image(image, PlaneSet::DEPTH_COLOR))));
+    };
+    let decode_all = || images.iter().zip(encoded).for_each(|pair| drop(black_box(decode(pair))));
+    Ok([median_ms(encode_all), median_ms(decode_all)].map(|set_ms| set_ms / images.len() as f64))
+}
+
+fn median_ms(run: impl Fn()) -> f64 {
+    let timed = |_| {
+        let start = Instant::now();
+        run();
+        start.elapsed().as_secs_f64() * 1e3
+    };
+    median((0..RUNS).map(timed).collect())
+}

@@ -1,0 +1,181 @@
+//! Rays only where light changes: the time it saves, and what it does to the picture.
+
+use std::sync::Arc;
+
+use anyhow::Context as _;
+use app_core::setup::{SceneArgs, Setup};
+use depth_image::{PinholeCamera, View, ViewPlanes};
+use engine::GpuEngine;
+use metrics::{Rgb8Image, psnr_db};
+use render::{DrawWork, GpuScene, Lighting, Rate, Refinement, Visibility};
+use scene::SceneSpec;
+use study::{Axis, Bar, Check, Point, Report, Series, Table, XyChart};
+
+use super::BenchArgs;
+use super::timing::in_turn;
+use crate::evaluate::mean_flip;
+use crate::lighting_study::FINE;
+use crate::progress::bar;
+
+/// Rays that stand for all light.
+const CONVERGED: &str = "soft 256, occlusion 256";
+/// A scene of large smooth surfaces beside the one of the bench.
+const SMOOTH: &str = "courtyard";
+/// Beside the default.
+const TOLERANCES: [f32; 5] = [0.02, 0.05, 0.1, 0.2, 0.3];
+/// Of the error of full rate, so much is allowed to the default tolerance.
+const ALLOWED: f64 = 1.1;
+
+/// One rate on one scene.
+struct Row {
+    rate: Rate,
+    /// A view.
+    seconds: f64,
+    /// Beside full rate.
+    flip_to_full: f64,
+    psnr_to_full_db: f64,
+    /// Beside light by many rays.
+    flip_to_converged: f64,
+}
+
+const COLUMNS: [(&str, &str); 8] = [
+    ("scene", ""),
+    ("rate", ""),
+    ("time a view", "ms"),
+    ("over full rate", "×"),
+    ("FLIP to full rate", ""),
+    ("PSNR to full rate", "dB"),
+    ("FLIP to converged", ""),
+    ("over full rate's", "×"),
+];
+
+/// Adds a table, charts and checks.
+pub fn compare(args: &BenchArgs, engine: &Arc<GpuEngine>, setup: &Setup, report: &mut Report) -> anyhow::Result<()> {
+    let spec: SceneSpec = SMOOTH.parse()?;
+    let smooth = SceneArgs { sample_size: args.scene.sample_size, ..SceneArgs::of(spec) }.load()?;
+    engine.put_scene(smooth.offer.hash.as_str(), &smooth.scene)?;
+    let mut table = Table::new(format!("Adaptive rate, {FINE}"), &COLUMNS);
+    let own = args.scene.scene.to_string();
+    let also = (own != SMOOTH).then(|| (SMOOTH.to_owned(), &smooth));
+    for (name, setup) in [(own, setup)].into_iter().chain(also) {
+        let rows = rows(args, engine, setup)?;
+        push(&mut table, &name, &rows)?;
+        report.charts.push(chart(&name, &rows).into());
+        report.checks.extend(checks(&name, &rows)?);
+    }
+    report.tables.push(table);
+    Ok(())
+}
+
+/// The full rate first, then adaptive ones from the strictest on.
+fn rates() -> anyhow::Result<Vec<Rate>> {
+    let Rate::Adaptive { tolerance: default } = default_rate()? else { anyhow::bail!("the default is not adaptive") };
+    let mut tolerances: Vec<f32> = TOLERANCES.into_iter().filter(|&t| t != default).chain([default]).collect();
+    tolerances.sort_by(f32::total_cmp);
+    Ok([Rate::Full].into_iter().chain(tolerances.into_iter().map(|tolerance| Rate::Adaptive { tolerance })).collect())
+}
+
+fn default_rate() -> anyhow::Result<Rate> {
+    Ok(format!("{FINE}, adaptive").parse::<Lighting>()?.rate)
+}
+
+fn rows(args: &BenchArgs, engine: &GpuEngine, setup: &Setup) -> anyhow::Result<Vec<Row>> {
+    let scene = engine.scene(setup.offer.hash.as_str())?;
+    let camera = setup.samples.first().context("no sample cameras")?;
+    let fine: Lighting = FINE.parse()?;
+    let rates = rates()?;
+    let progress = bar("adaptive rate", rates.len() * (1 + args.runs()) + 1);
+    let draw = |lighting: Lighting| {
+        let view = view(engine, &scene, camera, lighting);
+        progress.inc(1);
+        view
+    };
+    let mut views: Vec<Option<View>> = vec![None; rates.len()];
+    let places: Vec<usize> = (0..rates.len()).collect();
+    let seconds = in_turn(&places, args.runs(), |place| {
+        views[place] = Some(draw(Lighting { rate: rates[place], ..fine })?);
+        Ok(())
+    })?;
+    let converged = draw(CONVERGED.parse()?)?;
+    progress.finish_and_clear();
+    let views: Vec<View> = views.into_iter().flatten().collect();
+    let full = views.first().context("no view")?;
+    rates
+        .into_iter()
+        .zip(seconds)
+        .zip(&views)
+        .map(|((rate, seconds), view)| Row::of(rate, seconds, view, full, &converged))
+        .collect()
+}
+
+fn view(engine: &GpuEngine, scene: &GpuScene, camera: &PinholeCamera, lighting: Lighting) -> anyhow::Result<View> {
+    let refinement = Refinement::default();
+    let work = DrawWork { scene, lighting, scene_time_s: 0.0, visibility: Visibility::Measured, refinement };
+    let views = engine.renderer().draw_views(work, &[*camera], ViewPlanes::default())?;
+    views.into_iter().next().context("no view")
+}
+
+impl Row {
+    fn of(rate: Rate, seconds: f64, view: &View, full: &View, converged: &View) -> anyhow::Result<Self> {
+        let flip = |reference: &View| mean_flip(std::slice::from_ref(reference), std::slice::from_ref(view));
+        let psnr_db = psnr_db(&Rgb8Image::of_view(full)?, &Rgb8Image::of_view(view)?, None)?.unwrap_or(f64::NAN);
+        Ok(Self {
+            rate,
+            seconds,
+            flip_to_full: flip(full)?,
+            psnr_to_full_db: psnr_db,
+            flip_to_converged: flip(converged)?,
+        })
+    }
+
+    fn name(&self) -> String {
+        match self.rate {
+            Rate::Full => "full".to_owned(),
+            Rate::Adaptive { tolerance } => format!("adaptive {tolerance}"),
+        }
+    }
+}
+
+fn push(table: &mut Table, scene: &str, rows: &[Row]) -> anyhow::Result<()> {
+    let Some(full) = rows.first() else { return Ok(()) };
+    for row in rows {
+        let numbers = [
+            row.seconds * 1e3,
+            row.seconds / full.seconds,
+            row.flip_to_full,
+            row.psnr_to_full_db,
+            row.flip_to_converged,
+            row.flip_to_converged / full.flip_to_converged,
+        ];
+        table.push([scene.into(), row.name().into()].into_iter().chain(numbers.map(Into::into)))?;
+    }
+    Ok(())
+}
+
+fn chart(scene: &str, rows: &[Row]) -> XyChart {
+    let point = |row: &Row| Point::labelled(row.seconds * 1e3, row.flip_to_converged, row.name());
+    let (full, adaptive): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|row| row.rate == Rate::Full);
+    let (x, y) = (Axis::linear("time a view", "ms"), Axis::linear("FLIP to converged", ""));
+    let mut chart = XyChart::new(format!("Adaptive rate, {scene}"), x, y)
+        .with(Series::points("full rate", full.into_iter().map(point)))
+        .with(Series::line("adaptive", adaptive.into_iter().map(point)));
+    chart.note = format!("{FINE}; labels are tolerances. Converged: {CONVERGED}.");
+    chart
+}
+
+fn checks(scene: &str, rows: &[Row]) -> anyhow::Result<[Check; 2]> {
+    let default = default_rate()?;
+    let find = |rate: Rate| rows.iter().find(|row| row.rate == rate).context("a rate is missing");
+    let (full, adaptive) = (find(Rate::Full)?, find(default)?);
+    let error = adaptive.flip_to_converged / full.flip_to_converged;
+    let time = adaptive.seconds / full.seconds;
+    Ok([
+        Check::new(
+            format!("{scene}: FLIP to converged light, adaptive over full rate"),
+            error,
+            "×",
+            Bar::AtMost(ALLOWED),
+        ),
+        Check::new(format!("{scene}: time, adaptive over full rate"), time, "×", Bar::AtMost(1.0)),
+    ])
+}

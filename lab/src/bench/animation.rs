@@ -1,0 +1,163 @@
+//! A scene that moves: trees refitted or built anew, and what sampling through them takes.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use app_core::setup::{SceneArgs, Setup};
+use depth_image::Camera;
+use engine::GpuEngine;
+use render::{AccelerationReport, DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
+use scene::SceneSpec;
+use study::{Axis, Bar, Check, Report, Series, Table, XyChart};
+
+use super::BenchArgs;
+use super::timing::in_turn;
+use crate::evaluate::median;
+use crate::progress::bar;
+
+const SCENE: &str = "tree-terrain-500k-wind";
+const SCENE_QUICK: &str = "tree-terrain-30k-wind";
+/// Moments in tenths of a second. The first tree is that of 0, which all others are refitted from.
+const TENTHS: [u32; 6] = [1, 2, 3, 4, 5, 6];
+const QUICK: usize = 3;
+/// Of the samples: all rays that there are go through the tree.
+const LIGHTING: &str = "shadows";
+/// At which the renderer gives up a refitted tree.
+const WORST_REFIT: f64 = 1.3;
+
+/// A tree, and sampling with it.
+#[derive(Clone, Copy)]
+struct Tree {
+    report: AccelerationReport,
+    /// Until rays could go through it, with all that was uploaded.
+    ready_s: f64,
+    sample_set_s: f64,
+}
+
+/// Both ways to a tree at one moment.
+struct Moment {
+    scene_time_s: f32,
+    /// What the renderer takes by itself.
+    chosen: Tree,
+    rebuilt: Tree,
+}
+
+/// Adds a table, a chart and checks.
+pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
+    let name = if args.quick { SCENE_QUICK } else { SCENE };
+    let spec: SceneSpec = name.parse()?;
+    let setup = SceneArgs::of(spec).load()?;
+    engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
+    let scene = engine.scene(setup.offer.hash.as_str())?;
+    let moments = moments(args, engine, &scene, &setup)?;
+    report.tables.push(table(name, &moments)?);
+    report.charts.push(chart(name, &moments).into());
+    report.checks.extend(checks(name, &moments));
+    Ok(())
+}
+
+fn moments(args: &BenchArgs, engine: &GpuEngine, scene: &GpuScene, setup: &Setup) -> anyhow::Result<Vec<Moment>> {
+    let tenths = if args.quick { &TENTHS[..QUICK] } else { &TENTHS[..] };
+    let times_s: Vec<f32> = tenths.iter().map(|&tenth| tenth as f32 * 0.1).collect();
+    let progress = bar("trees that move", 2 * times_s.len());
+    let tree = |time_s: f32, made: fn(&GpuScene, f32) -> Result<AccelerationReport, render::RenderError>| {
+        let start = Instant::now();
+        let report = made(scene, time_s)?;
+        let ready_s = start.elapsed().as_secs_f64();
+        let sample_set_s = sample_set_s(args, engine, scene, setup, time_s)?;
+        progress.inc(1);
+        anyhow::Ok(Tree { report, ready_s, sample_set_s })
+    };
+    scene.rebuilt_acceleration(0.0)?;
+    // One after the other, as they are in an animation; then all anew.
+    let chosen = times_s.iter().map(|&t| tree(t, GpuScene::acceleration)).collect::<anyhow::Result<Vec<_>>>()?;
+    let rebuilt =
+        times_s.iter().map(|&t| tree(t, GpuScene::rebuilt_acceleration)).collect::<anyhow::Result<Vec<_>>>()?;
+    progress.finish_and_clear();
+    let pairs = times_s.into_iter().zip(chosen.into_iter().zip(rebuilt));
+    Ok(pairs.map(|(scene_time_s, (chosen, rebuilt))| Moment { scene_time_s, chosen, rebuilt }).collect())
+}
+
+fn sample_set_s(
+    args: &BenchArgs,
+    engine: &GpuEngine,
+    scene: &GpuScene,
+    setup: &Setup,
+    scene_time_s: f32,
+) -> anyhow::Result<f64> {
+    let cameras: Vec<Camera> = setup.samples.iter().copied().map(Camera::Pinhole).collect();
+    let lighting: Lighting = LIGHTING.parse()?;
+    let (visibility, refinement) = (Visibility::Measured, Refinement::default());
+    let work = DrawWork { scene, lighting, scene_time_s, visibility, refinement };
+    let draw = |()| {
+        engine.renderer().draw_depth_images(work, &cameras, SamplePlanes::default())?;
+        Ok(())
+    };
+    Ok(in_turn(&[()], args.runs(), draw)?.into_iter().sum())
+}
+
+impl Moment {
+    /// Expected visits and tests of a random ray.
+    fn cost_ratio(&self) -> f64 {
+        f64::from(self.chosen.report.cost) / f64::from(self.rebuilt.report.cost)
+    }
+}
+
+const COLUMNS: [(&str, &str); 8] = [
+    ("scene time", "s"),
+    ("way", ""),
+    ("boxes", "ms"),
+    ("upload", "ms"),
+    ("ready after", "ms"),
+    ("sample set", "ms"),
+    ("expected visits and tests of a random ray", ""),
+    ("over built anew", "×"),
+];
+
+fn table(scene: &str, moments: &[Moment]) -> anyhow::Result<Table> {
+    let mut table = Table::new(format!("Trees that move, {scene}, samples with {LIGHTING}"), &COLUMNS);
+    for moment in moments {
+        let ways = [(&moment.chosen, Some(moment.cost_ratio())), (&moment.rebuilt, None)];
+        for (tree, ratio) in ways {
+            let way = if tree.report.refitted { "refitted" } else { "built anew" };
+            let ms = [tree.report.build_s, tree.report.upload_s, tree.ready_s, tree.sample_set_s].map(|s| s * 1e3);
+            let head = [f64::from(moment.scene_time_s).into(), way.into()];
+            let tail = [tree.report.cost.into(), ratio.into()];
+            table.push(head.into_iter().chain(ms.map(Into::into)).chain(tail))?;
+        }
+    }
+    Ok(table)
+}
+
+fn chart(scene: &str, moments: &[Moment]) -> XyChart {
+    let points = |tree: fn(&Moment) -> &Tree| {
+        moments.iter().map(move |moment| (f64::from(moment.scene_time_s), f64::from(tree(moment).report.cost)))
+    };
+    let (x, y) = (Axis::linear("scene time", "s"), Axis::linear("expected visits and tests of a random ray", ""));
+    XyChart::new(format!("Refitted trees, {scene}"), x, y)
+        .with(Series::line("refitted from 0 s", points(|moment| &moment.chosen)))
+        .with(Series::line("built anew", points(|moment| &moment.rebuilt)))
+}
+
+fn checks(scene: &str, moments: &[Moment]) -> [Check; 2] {
+    let refitted: Vec<&Moment> = moments.iter().filter(|moment| moment.chosen.report.refitted).collect();
+    let worst = refitted.iter().map(|moment| moment.cost_ratio()).fold(f64::NAN, f64::max);
+    let none = "no tree was refitted";
+    let found = |value: f64| Some(value).filter(|_| !refitted.is_empty());
+    let way = format!("{scene}: time until rays are ready, the renderer's way over the other");
+    let boxes = format!("{scene}: expected visits and tests, refitted tree over a new one, worst moment");
+    [
+        Check::maybe(way, found(chosen_over_other(moments, &refitted)), "×", Bar::AtMost(1.0), none),
+        Check::maybe(boxes, found(worst), "×", Bar::AtMost(WORST_REFIT), none),
+    ]
+}
+
+/// The first moment is refitted to see what that takes; the last one's way is what the renderer settled on.
+fn chosen_over_other(moments: &[Moment], refitted: &[&Moment]) -> f64 {
+    let refit_s = median(refitted.iter().map(|moment| moment.chosen.ready_s).collect());
+    let build_s = median(moments.iter().map(|moment| moment.rebuilt.ready_s).collect());
+    match moments.last() {
+        Some(last) if last.chosen.report.refitted => refit_s / build_s,
+        _ => build_s / refit_s,
+    }
+}

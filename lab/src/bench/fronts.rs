@@ -1,0 +1,137 @@
+//! The carve's front of time against error beside the search's.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::Context as _;
+use app_core::setup::SceneArgs;
+use depth_image::ViewCell;
+use engine::GpuEngine;
+use reconstruction::ReconstructionMethod;
+use scene::SceneSpec;
+use study::{Bar, Check, Report};
+
+use super::BenchArgs;
+use crate::evaluate::{Row, Truth};
+use crate::experiment::VIEW_SIZE_PX;
+use crate::progress::bar;
+use crate::sweep;
+
+/// Models of a folder that are compared, the largest files.
+const MODELS: usize = 4;
+
+/// Sweeps one scene; adds its table, charts and checks.
+pub fn compare(name: &str, truth: &Truth, args: &BenchArgs, report: &mut Report) -> anyhow::Result<()> {
+    let progress = bar(format!("error against time, {name}"), sweep::settings(args.quick).len());
+    let rows = sweep::sweep(truth, args.quick, args.runs(), |_| progress.inc(1))?;
+    progress.finish_and_clear();
+    report.tables.push(sweep::table(&format!("Error against time, {name}"), &rows)?);
+    report.charts.extend(sweep::charts(name, &rows).into_iter().map(Into::into));
+    report.checks.extend(checks(name, &rows, args.scene.method));
+    Ok(())
+}
+
+/// Names of the checks of one scene, in the order of [`checks`].
+fn check_names(name: &str) -> [String; 3] {
+    [
+        "wrong hits, the carve's over the fewest of any search",
+        "disoccluded coloured wrong, the carve's over the least of any search",
+        "settings that beat the default in time and FLIP",
+    ]
+    .map(|what| format!("{name}: {what}"))
+}
+
+fn checks(name: &str, rows: &[Row], default: ReconstructionMethod) -> Vec<Check> {
+    let (searches, carves) = sweep::split(rows);
+    let least = |rows: &[&Row], value: fn(&Row) -> f64| rows.iter().map(|row| value(row)).fold(f64::NAN, f64::min);
+    let exact = |value: fn(&Row) -> f64| {
+        carves
+            .iter()
+            .find(|row| row.method == ReconstructionMethod::JointCarve { stop_level: 0 })
+            .map_or(f64::NAN, |row| value(row))
+    };
+    let [hits, colors, beaten] = check_names(name);
+    let disoccluded = exact(|row| row.disoccluded_wrong) / least(&searches, |row| row.disoccluded_wrong);
+    let better = rows
+        .iter()
+        .find(|row| row.method == default)
+        .map(|own| rows.iter().filter(|row| row.ms_a_view < own.ms_a_view && row.flip < own.flip).count() as f64);
+    vec![
+        Check::new(hits, exact(|row| row.wrong_hits) / least(&searches, |row| row.wrong_hits), "×", Bar::AtMost(1.0)),
+        Check::maybe(
+            colors,
+            Some(disoccluded).filter(|ratio| !ratio.is_nan()),
+            "×",
+            Bar::AtMost(1.0),
+            "no view has disocclusions",
+        ),
+        Check::maybe(beaten, better, "", Bar::Equal(0.0), "the default is not among the settings"),
+    ]
+}
+
+/// A scene whose gaps are wide enough to count: in foliage, every pixel that no camera sees is a silhouette's.
+const GAPS: &str = "poles";
+
+/// Sweeps a scene with disocclusions.
+pub fn gaps(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
+    sweep_scene(GAPS, GAPS.parse()?, args, engine, report)
+}
+
+fn sweep_scene(
+    name: &str,
+    spec: SceneSpec,
+    args: &BenchArgs,
+    engine: &Arc<GpuEngine>,
+    report: &mut Report,
+) -> anyhow::Result<()> {
+    let scene = SceneArgs { lighting: args.scene.lighting, ..SceneArgs::of(spec) };
+    let setup = scene.load()?;
+    let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
+    let truth = Truth::take(engine, &setup, &scene, cell.spread(args.compared_views(), VIEW_SIZE_PX))?;
+    compare(name, &truth, args, report)
+}
+
+/// Sweeps the models of the folder, if one is given.
+pub fn models(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
+    let Some(folder) = &args.models else {
+        let bar = Bar::AtMost(1.0);
+        report.checks.extend(
+            check_names("real models").into_iter().map(|name| Check::not_run(name, "", bar, "--models is not given")),
+        );
+        return Ok(());
+    };
+    for path in models_of(folder, if args.quick { 2 } else { MODELS })? {
+        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        sweep_scene(&name, SceneSpec::File(path), args, engine, report)?;
+    }
+    Ok(())
+}
+
+/// The largest model files of a folder and of its folders.
+fn models_of(folder: &Path, most: usize) -> anyhow::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for path in entries(folder)? {
+        let inside = if path.is_dir() { entries(&path)? } else { vec![path] };
+        found.extend(inside.into_iter().filter(|path| is_model(path)));
+    }
+    anyhow::ensure!(
+        !found.is_empty(),
+        app_core::exit::BadInput(format!("{}: no .gltf, .glb, .obj or .ply file", folder.display()))
+    );
+    found.sort_by_key(|path| std::cmp::Reverse(std::fs::metadata(path).map_or(0, |file| file.len())));
+    found.truncate(most);
+    Ok(found)
+}
+
+fn entries(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let listed = std::fs::read_dir(folder)
+        .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<Vec<_>>>());
+    let mut paths = listed.map_err(|error| app_core::exit::BadInput(format!("{}: {error}", folder.display())))?;
+    paths.sort();
+    Ok(paths)
+}
+
+fn is_model(path: &Path) -> bool {
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_ascii_lowercase();
+    ["gltf", "glb", "obj", "ply"].contains(&extension.as_str())
+}

@@ -1,0 +1,111 @@
+//! Light sampled once and shared: gains, what a highlight costs, still scenes, and truth beside converged light.
+
+use std::sync::Arc;
+
+use app_core::setup::{SceneArgs, Setup};
+use cluster::PolicyChoice;
+use depth_image::ViewCell;
+use engine::GpuEngine;
+use render::Lighting;
+use study::{Bar, Check, Report, Table};
+
+use super::BenchArgs;
+use crate::evaluate::{Truth, mean_flip, median};
+use crate::experiment::{Experiment, PAPER_VIEWS, VIEW_SIZE_PX, Wish};
+use crate::lighting_study::{self, Extent, FINE};
+use crate::progress::bar;
+
+/// Rays that stand for all light.
+const CONVERGED: &str = "soft 256, occlusion 256";
+/// Views that are compared with converged light.
+const CONVERGED_VIEWS: usize = 4;
+/// Two times that are nearly alike need more repeats than others.
+const RUNS_OF_NEAR_TIMES: usize = 5;
+/// Perceptual roughness of the scene made glossy.
+const GLOSSY: f32 = 0.3;
+
+/// Every quality of light on the scene.
+pub fn qualities(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
+    let rows = lighting_study::measure(experiment, Extent::bench(args.quick), drop)?;
+    lighting_study::report(&rows, experiment.setup.scene.illumination.lights.len(), report)?;
+    report.checks.extend(lighting_study::checks(&rows));
+    still(args, experiment, report)
+}
+
+/// A second set that shows what the first does: only c and e are spent on it.
+fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
+    let views = if args.quick { 64 } else { PAPER_VIEWS };
+    let wish = Wish { lighting: FINE.parse()?, sets: 2, ..experiment.wish(PolicyChoice::Pipeline, views) };
+    let delivered = experiment.deliver(wish, |_| ())?;
+    let second = delivered.frames.iter().filter(|frame| frame.request.set_index == 1);
+    let waited_s = second.map(|frame| frame.header.stage_times.set_wait_s).fold(0.0, f64::max);
+    let set_s = experiment.setup.samples.len() as f64 * delivered.plan.costs.sample_image_s;
+    let name = "still scene: longest wait of a second frame for its samples, over sampling them";
+    report.checks.push(Check::new(name, waited_s / set_s, "", Bar::AtMost(0.01)));
+    Ok(())
+}
+
+/// FLIP of views against light of many rays: shared, and drawn with as many rays.
+pub fn truth(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
+    let views = experiment.views(if args.quick { 1 } else { CONVERGED_VIEWS })?;
+    let progress = bar("converged light", 3);
+    let take = |lighting: Lighting| {
+        let lit = SceneArgs { lighting, ..experiment.args.clone() };
+        let truth = Truth::take(&experiment.engine, &experiment.setup, &lit, views.clone());
+        progress.inc(1);
+        truth
+    };
+    let (unlit, fine) = (take(Lighting::UNLIT)?, take(FINE.parse()?)?);
+    let converged = fine.drawn(&experiment.setup, CONVERGED.parse()?)?;
+    progress.finish_and_clear();
+    let reconstructed = |truth: &Truth| truth.reconstruct(args.scene.method, Default::default());
+    let shared = mean_flip(&converged, &reconstructed(&fine)?)?;
+    let drawn = mean_flip(&converged, &fine.views)?;
+    let geometry = mean_flip(&unlit.views, &reconstructed(&unlit)?)?;
+    let mut table = Table::new("Light beside converged light", &[("views", ""), ("FLIP", "")]);
+    table.push([format!("pipeline, {FINE}").into(), shared.into()])?;
+    table.push([format!("direct, {FINE}").into(), drawn.into()])?;
+    table.push(["pipeline beside direct, unlit".into(), geometry.into()])?;
+    report.tables.push(table);
+    let [plain, lit] = ms_in_turn(args, [&unlit, &fine])?;
+    let name = format!("c with {FINE} over c unlit");
+    report.checks.push(Check::new(name, lit / plain, "×", Bar::AtMost(1.25)));
+    let name = "FLIP to converged light: the pipeline's over direct's plus the unlit pipeline's";
+    report.checks.push(Check::new(name, shared / (drawn + geometry), "×", Bar::AtMost(1.0)));
+    Ok(())
+}
+
+/// A view's milliseconds with both, medians; in turn, so that neither has the quieter machine.
+fn ms_in_turn(args: &BenchArgs, both: [&Truth; 2]) -> anyhow::Result<[f64; 2]> {
+    let mut ms = [Vec::new(), Vec::new()];
+    for _ in 0..args.runs().max(RUNS_OF_NEAR_TIMES) {
+        for (ms, truth) in ms.iter_mut().zip(both) {
+            ms.push(truth.ms_a_view(args.scene.method, PAPER_VIEWS, 1)?);
+        }
+    }
+    Ok(ms.map(median))
+}
+
+/// c where every surface has a highlight.
+pub fn glossy(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
+    let scene = glossy_scene(args)?;
+    engine.put_scene(scene.offer.hash.as_str(), &scene.scene)?;
+    let cell = ViewCell::between(&scene.around).ok_or_else(|| anyhow::anyhow!("no sample cameras"))?;
+    let take = |lighting: Lighting| {
+        let lit = SceneArgs { lighting, ..args.scene.clone() };
+        Truth::take(engine, &scene, &lit, cell.spread(args.compared_views(), VIEW_SIZE_PX))
+    };
+    let both = [take(Lighting::UNLIT)?, take("shadows".parse()?)?];
+    let [unlit, lit] = ms_in_turn(args, [&both[0], &both[1]])?;
+    let mut table = Table::new("Highlights everywhere", &[("lighting", ""), ("c a view", "ms")]);
+    table.push(["unlit".into(), unlit.into()])?;
+    table.push(["shadows, with highlights".into(), lit.into()])?;
+    report.tables.push(table);
+    let name = format!("{} made glossy: c with highlights over c unlit", args.scene.scene);
+    report.checks.push(Check::new(name, lit / unlit, "×", Bar::AtMost(1.25)));
+    Ok(())
+}
+
+fn glossy_scene(args: &BenchArgs) -> anyhow::Result<Setup> {
+    args.scene.load_changed(|scene| scene.materials.iter_mut().for_each(|material| material.roughness = GLOSSY))
+}

@@ -1,0 +1,82 @@
+//! Views a second at the client, and nanoseconds a pixel on the device.
+
+use std::time::Instant;
+
+use anyhow::Context as _;
+use cluster::PolicyChoice;
+use depth_image::{PinholeCamera, ViewPlanes};
+use node::{DirectWork, Engine as _};
+use study::{Bar, Check, Report, Table};
+
+use super::BenchArgs;
+use crate::evaluate::{Truth, median};
+use crate::experiment::{Experiment, PAPER_VIEWS};
+use crate::progress::bar;
+
+/// Views that direct rendering is timed on.
+const DIRECT_VIEWS: usize = 48;
+/// c / g of the paper's GPUs.
+const PAPER_RATIO: f64 = 0.103;
+
+/// Pipeline over direct, delivered to a client: runs of both in turn, so that neither has the quieter machine.
+pub fn delivered(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
+    let progress = bar(format!("{PAPER_VIEWS} views delivered"), 2 * args.runs());
+    let (mut pipeline, mut direct) = (Vec::new(), Vec::new());
+    let mut reason = String::new();
+    for _ in 0..args.runs() {
+        let run = experiment.deliver(experiment.wish(PolicyChoice::Pipeline, PAPER_VIEWS), |_| ())?;
+        reason = run.plan.reason;
+        pipeline.push(PAPER_VIEWS as f64 / run.seconds);
+        progress.inc(1);
+        let run = experiment.deliver(experiment.wish(PolicyChoice::Direct, DIRECT_VIEWS), |_| ())?;
+        direct.push(DIRECT_VIEWS as f64 / run.seconds);
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    let (pipeline, direct) = (median(pipeline), median(direct));
+    let mut table =
+        Table::new("Delivered to a client", &[("policy", ""), ("views timed", ""), ("throughput", "views/s")]);
+    table.push(["pipeline".into(), PAPER_VIEWS.into(), pipeline.into()])?;
+    table.push(["direct".into(), DIRECT_VIEWS.into(), direct.into()])?;
+    report.tables.push(table);
+    report.parameter("plan", reason);
+    let name = format!("{PAPER_VIEWS} views delivered: pipeline over direct, throughput (aim 12)");
+    report.checks.push(Check::new(name, pipeline / direct, "×", Bar::AtLeast(6.0)));
+    Ok(())
+}
+
+/// c and g_v, in one batch each and to host pixels.
+pub fn nanoseconds(
+    args: &BenchArgs,
+    truth: &Truth,
+    experiment: &Experiment,
+    report: &mut Report,
+) -> anyhow::Result<()> {
+    let pixels = truth.cameras.first().map_or(1, PinholeCamera::pixel_count) as f64;
+    let c_ns = truth.ms_a_view(args.scene.method, PAPER_VIEWS, args.runs())? * 1e6 / pixels;
+    let g_ns = direct_s_a_view(truth, experiment, args.runs())? * 1e9 / pixels;
+    let mut table = Table::new("Device time", &[("what", ""), ("time a pixel", "ns"), ("time a view", "ms")]);
+    for (what, ns) in [("c: reconstruct", c_ns), ("g_v: draw from the scene", g_ns)] {
+        table.push([what.into(), ns.into(), (ns * pixels * 1e-6).into()])?;
+    }
+    report.tables.push(table);
+    report.checks.push(Check::new("c / g_v (the paper's GPUs: 0.103)", c_ns / g_ns, "", Bar::AtMost(PAPER_RATIO)));
+    Ok(())
+}
+
+fn direct_s_a_view(truth: &Truth, experiment: &Experiment, runs: usize) -> anyhow::Result<f64> {
+    let work = DirectWork {
+        scene_hash: experiment.setup.offer.hash.to_string(),
+        cameras: truth.cameras.clone(),
+        lighting: experiment.args.lighting.to_string(),
+        scene_time_s: 0.0,
+        planes: ViewPlanes::default(),
+    };
+    let run = || {
+        let start = Instant::now();
+        experiment.engine.draw_direct(&work).context("drawing views")?;
+        anyhow::Ok(start.elapsed().as_secs_f64() / work.cameras.len() as f64)
+    };
+    run()?;
+    Ok(median((0..runs).map(|_| run()).collect::<anyhow::Result<_>>()?))
+}

@@ -1,0 +1,41 @@
+//! Subcommands of the lab.
+
+use app_core::exit::Outcome;
+use clap::Subcommand;
+
+use crate::bench::{self, BenchArgs};
+use crate::demo::{self, DemoArgs};
+use crate::sampling_study::command::{self as sampling, SamplingArgs};
+
+/// A subcommand that measures.
+#[derive(Debug, Subcommand)]
+pub enum LabCommand {
+    /// Run the paper's experiment on this machine and write a report
+    Demo(DemoArgs),
+    /// Measure speed and accuracy against what is promised, and write a report
+    Bench(BenchArgs),
+    /// Repeat a paper's experiments, its figures beside ours, and write a report
+    #[command(subcommand)]
+    Study(StudyCommand),
+}
+
+/// A study of one paper.
+#[derive(Debug, Subcommand)]
+pub enum StudyCommand {
+    /// How well sampling methods sample four kinds of scene: Tables 1 and 2, Fig. 6 and 7 of Xie et al., and more
+    Sampling(SamplingArgs),
+}
+
+impl LabCommand {
+    /// Runs the subcommand to its end.
+    ///
+    /// # Errors
+    /// Input that cannot be used, or a failure of the device, the cluster or the report's folder.
+    pub fn run(&self) -> anyhow::Result<Outcome> {
+        match self {
+            Self::Demo(args) => demo::run(args),
+            Self::Bench(args) => bench::run(args),
+            Self::Study(StudyCommand::Sampling(args)) => sampling::run(args),
+        }
+    }
+}

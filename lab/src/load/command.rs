@@ -1,0 +1,110 @@
+//! `myriorama bench load`: many clients on real processes.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use app_core::exit::Outcome;
+use app_core::process::runtime;
+use clap::Args;
+use gpu::DevicePreference;
+use render::Lighting;
+use scene::SceneSpec;
+use study::Report;
+
+use crate::load::processes::Setting;
+use crate::load::{self, report};
+use crate::progress::bar;
+use crate::scaling::Hierarchy;
+
+/// Four loads, each on a coordinator and nodes that are started for it as processes: 8 clients of 10 frames a second,
+/// 16 of 15, 80 of 10, all of 320×180; and 200 that do nothing.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: myriorama bench load --minutes 10 --strict")]
+pub struct LoadArgs {
+    /// What is shown
+    #[arg(long, value_name = "SPEC", default_value = "courtyard")]
+    scene: SceneSpec,
+    /// How it is lit
+    #[arg(long, value_name = "TERMS", default_value_t)]
+    lighting: Lighting,
+    /// any (a GPU if there is one) or software
+    #[arg(long, default_value_t, value_name = "NAME", env = "MYRIORAMA_DEVICE")]
+    device: DevicePreference,
+    /// P: node processes
+    #[arg(long, default_value_t = 1, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=64))]
+    nodes: u16,
+    /// Cores of each node, by a control group: nodes that share a machine would otherwise each promise all of it. 0: no
+    /// limit [default: all but half a core, divided; no limit for one node, or without control groups]
+    #[arg(long, value_name = "CORES", value_parser = cores)]
+    share: Option<f64>,
+    /// How long each load lasts
+    #[arg(long, default_value_t = 10.0, value_name = "MIN", value_parser = minutes)]
+    minutes: f64,
+    /// Half a minute each
+    #[arg(long)]
+    quick: bool,
+    /// Where the report goes
+    #[arg(long, default_value = "out/bench-load", value_name = "DIR")]
+    out: PathBuf,
+    /// Exit status 1 when a check falls short
+    #[arg(long)]
+    strict: bool,
+}
+
+fn cores(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|cores| (0.0..=1024.0).contains(cores)).ok_or_else(|| "expected 0 to 1024".to_owned())
+}
+
+fn minutes(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|minutes| (0.1..=1440.0).contains(minutes))
+        .ok_or_else(|| "expected 0.1 to 1440".to_owned())
+}
+
+impl LoadArgs {
+    fn lasting(&self) -> Duration {
+        Duration::from_secs_f64(if self.quick { 30.0 } else { self.minutes * 60.0 })
+    }
+
+    fn setting(&self) -> Setting {
+        let scene = ["--scene".to_owned(), self.scene.to_string(), "--lighting".to_owned(), self.lighting.to_string()];
+        let device = ["--device".to_owned(), self.device.to_string()];
+        Setting {
+            scene: scene.into(),
+            device: device.into(),
+            nodes: self.nodes.into(),
+            share_cores: self.share_cores(),
+        }
+    }
+
+    fn share_cores(&self) -> Option<f64> {
+        let all = std::thread::available_parallelism().map_or(1.0, |cores| cores.get() as f64);
+        let is_shared = self.nodes > 1 && Hierarchy::find().is_ok();
+        let equal = || is_shared.then(|| (all - 0.5) / f64::from(self.nodes));
+        self.share.or_else(equal).filter(|cores| *cores > 0.0)
+    }
+}
+
+/// Measures all of it.
+///
+/// # Errors
+/// Where a process does not start, or a client fails but by being refused.
+pub fn run(args: &LoadArgs) -> anyhow::Result<Outcome> {
+    let progress = bar("load", 4);
+    let phases = runtime()?.block_on(load::run(&args.setting(), args.lasting(), &progress))?;
+    progress.finish_and_clear();
+    let mut report = Report::new("Myriorama bench load", phases.device.clone());
+    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    report.parameter("scene", args.scene.to_string());
+    report.parameter("lighting", args.lighting.to_string());
+    report.parameter("nodes P", u32::from(args.nodes));
+    let share = args.share_cores().map_or_else(|| "all".to_owned(), |cores| format!("{cores:.2}"));
+    report.parameter("cores of each node", share);
+    report.parameter("each load", format!("{} s", args.lasting().as_secs()));
+    report::add(&phases, &mut report)?;
+    println!("{}\n", phases.device);
+    report.tables.iter().for_each(|table| println!("{}", table.to_markdown()));
+    let ok = report.finish(&args.out)?;
+    Ok(if args.strict && !ok { Outcome::FellShort } else { Outcome::Done })
+}

@@ -1,0 +1,144 @@
+//! A coordinator and nodes, each a process of its own.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use client::Client;
+
+use crate::process::{Process, metrics_page};
+use crate::scaling::{CpuGroup, Hierarchy};
+
+/// How long nodes may take to join.
+const JOIN: Duration = Duration::from_secs(60);
+
+/// What the cluster is started with.
+#[derive(Debug, Clone)]
+pub struct Setting {
+    /// What the coordinator shows: arguments of `myriorama coordinator`.
+    pub scene: Vec<String>,
+    /// Arguments of every `myriorama node`.
+    pub device: Vec<String>,
+    /// P.
+    pub nodes: usize,
+    /// Cores of each node; `None`: as many as there are, all nodes together.
+    pub share_cores: Option<f64>,
+}
+
+/// One node.
+#[derive(Debug)]
+struct Member {
+    process: Process,
+    metrics: String,
+    /// Dropped last: a group cannot be removed before its process has ended.
+    _group: Option<CpuGroup>,
+}
+
+/// A coordinator and its nodes. Nodes end first: they need not hear that their coordinator has gone.
+#[derive(Debug)]
+pub struct Processes {
+    /// Where the coordinator listens, as `http://host:port`.
+    pub address: String,
+    /// As the nodes name it.
+    pub device: String,
+    nodes: Vec<Member>,
+    coordinator: Process,
+}
+
+impl Processes {
+    /// Starts them and waits until the nodes have joined.
+    ///
+    /// # Errors
+    /// Where a process does not start or serve.
+    pub async fn start(setting: &Setting) -> anyhow::Result<Self> {
+        let listen = ["--listen", "127.0.0.1:0"].map(str::to_owned);
+        let arguments = [&["coordinator".to_owned()], &setting.scene[..], &listen].concat();
+        let mut coordinator = Process::start("coordinator", &arguments)?;
+        let address = coordinator.address()?;
+        let member = |number| Member::start(setting, &address, number);
+        let nodes = (0..setting.nodes).map(member).collect::<anyhow::Result<Vec<_>>>()?;
+        let status = Client::connect(&address).await?.wait_for_nodes(setting.nodes, JOIN).await?;
+        let device = status.nodes.first().map_or_else(String::new, |node| node.device_name.clone());
+        Ok(Self { address, device, nodes, coordinator })
+    }
+
+    /// Memory of each, now, in MiB: the coordinator, then the nodes.
+    #[must_use]
+    pub fn memory_mib(&self) -> Vec<(String, f64)> {
+        let of = |process: &Process| memory_mib(&process.id().to_string()).unwrap_or(f64::NAN);
+        let all = [&self.coordinator].into_iter().chain(self.nodes.iter().map(|node| &node.process));
+        all.map(|process| (process.name().to_owned(), of(process))).collect()
+    }
+
+    /// Views that all nodes together dropped, by reason.
+    ///
+    /// # Errors
+    /// Where a node's metrics cannot be read.
+    pub async fn dropped(&self) -> anyhow::Result<BTreeMap<String, u64>> {
+        let mut dropped = BTreeMap::new();
+        for node in &self.nodes {
+            for (reason, count) in dropped_in(&metrics_page(&node.metrics).await?) {
+                *dropped.entry(reason).or_insert(0) += count;
+            }
+        }
+        Ok(dropped)
+    }
+}
+
+impl Member {
+    fn start(setting: &Setting, coordinator: &str, number: usize) -> anyhow::Result<Self> {
+        let name = format!("node-{number:03}");
+        let fixed = ["node", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0"];
+        let own = ["--coordinator", coordinator, "--name", &name];
+        let arguments: Vec<String> = fixed.iter().chain(&own).map(|&word| word.to_owned()).collect();
+        let mut process = Process::start(&name, &[arguments, setting.device.clone()].concat())?;
+        let (_, metrics) = (process.address()?, process.address()?);
+        let limit = |cores| limited(&process, cores);
+        let group = setting.share_cores.map(limit).transpose()?;
+        Ok(Self { process, metrics, _group: group })
+    }
+}
+
+/// So many cores: nodes of one machine that each had all of it would promise all of it, each.
+fn limited(process: &Process, cores: f64) -> anyhow::Result<CpuGroup> {
+    let group = CpuGroup::new(&Hierarchy::find()?, &format!("myriorama-{}-{}", std::process::id(), process.name()))?;
+    group.limit(Some(cores))?;
+    group.admit(process.id()).context("a node cannot be given its share")?;
+    Ok(group)
+}
+
+/// Resident memory of a process, by number or `self`; `None` where the system does not say.
+#[must_use]
+pub fn memory_mib(process: &str) -> Option<f64> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    let kib: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib / 1024.0)
+}
+
+fn dropped_in(page: &str) -> Vec<(String, u64)> {
+    let reason = |line: &str| {
+        let rest = line.strip_prefix("myriorama_dropped_views_total{reason=\"")?;
+        let (reason, count) = rest.split_once("\"} ")?;
+        Some((reason.to_owned(), count.trim().parse().ok()?))
+    };
+    page.lines().filter_map(reason).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drops_are_read_by_reason() {
+        let page = "# TYPE x\nmyriorama_dropped_views_total{reason=\"newer pose\"} 12\nmyriorama_views_total 4\n\
+                    myriorama_dropped_views_total{reason=\"client gone\"} 1\n";
+        assert_eq!(dropped_in(page), [("newer pose".to_owned(), 12), ("client gone".to_owned(), 1)]);
+    }
+
+    #[test]
+    fn this_process_has_memory() {
+        assert!(memory_mib("self").is_some_and(|mib| mib > 1.0));
+        assert_eq!(memory_mib("none"), None);
+    }
+}

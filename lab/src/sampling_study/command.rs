@@ -1,0 +1,69 @@
+//! `myriorama study sampling`.
+
+use std::path::PathBuf;
+
+use app_core::exit::Outcome;
+use app_core::setup::DeviceArgs;
+use clap::Args;
+use engine::GpuEngine;
+use node::Engine as _;
+use study::Report;
+
+use crate::sampling_study::{
+    Extent, SCENES, Subject, detection, detection_report, reconstructions, reconstructions_report, scene_report, sizes,
+    sizes_report, tables, times, times_report,
+};
+
+/// Conventional, non-redundant and peeled images of a bird's nest, grass, a city and a tree, from three viewpoints:
+/// how many samples are redundant, disoccluded and useful, how many of an output frame's samples are there, what views
+/// reconstructed from them are worth, and what it all costs.
+#[derive(Debug, Args)]
+pub struct SamplingArgs {
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Where the report goes
+    #[arg(long, default_value = "out/study/sampling", value_name = "DIR")]
+    out: PathBuf,
+    /// Smaller images, fewer views
+    #[arg(long)]
+    quick: bool,
+    /// Only these of bird-nest, grass, urban and tree
+    #[arg(long = "scene", value_name = "NAME", value_parser = SCENES)]
+    scenes: Vec<String>,
+    /// Exit status 1 when a relation does not hold
+    #[arg(long)]
+    strict: bool,
+}
+
+/// Measures all scenes and writes the report.
+///
+/// # Errors
+/// The device's, or a folder that cannot be written.
+pub fn run(args: &SamplingArgs) -> anyhow::Result<Outcome> {
+    let engine = GpuEngine::shared(args.device.device)?;
+    let extent = Extent::of(args.quick);
+    let mut report = Report::new("Myriorama study: sampling", engine.device_name());
+    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    report.parameter("sample images", format!("3 of {0}×{0}", extent.side_px));
+    report.parameter("views between them", extent.views);
+    report.parameter("seeded samples an image", extent.seeds);
+    let (mut rows, mut costs, mut views) = (Vec::new(), Vec::new(), Vec::new());
+    for name in SCENES.iter().filter(|name| args.scenes.is_empty() || args.scenes.iter().any(|wanted| wanted == *name))
+    {
+        let subject = Subject::load(&engine, name)?;
+        // Times first: they want the machine as it is found.
+        costs.push((subject.name.clone(), times(&subject, extent)?));
+        rows.push(scene_report(&subject, extent, &mut report)?);
+        let of_sizes = sizes(&subject, extent, args.quick)?;
+        sizes_report(&subject.name, &of_sizes, &mut report)?;
+        views.push((subject.name.clone(), reconstructions(&subject, args.quick)?));
+    }
+    tables(&rows, &mut report)?;
+    times_report(&costs, extent, &mut report)?;
+    reconstructions_report(&views, &mut report)?;
+    detection_report(&detection(&engine, args.quick)?, &mut report)?;
+    report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
+    println!();
+    let ok = report.finish(&args.out)?;
+    Ok(if args.strict && !ok { Outcome::FellShort } else { Outcome::Done })
+}

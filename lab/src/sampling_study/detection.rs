@@ -1,0 +1,144 @@
+//! How surely a redundant sample is found to be one, against the size of triangles: a finely cut wall, all of which
+//! both images see.
+
+use std::sync::Arc;
+
+use depth_image::{Camera, DepthImage, PinholeCamera};
+use engine::GpuEngine;
+use glam::{UVec2, Vec3};
+use render::{DrawWork, Lighting, Refinement, SamplePlanes, Visibility};
+use sampling::{Redundancy, SampleWork, Sampler, SamplingMethod};
+use scene::{Mesh, MeshPart, Scene, Vertex, procedural};
+use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
+
+use crate::progress::bar;
+
+const SIDE_PX: u32 = 64;
+const DISTANCE_M: f32 = 4.0;
+/// Between the two viewpoints.
+const BASELINE_M: f32 = 0.37;
+const LEGS_PX: [f32; 9] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 64.0];
+const TESTS: [Redundancy; 3] = [Redundancy::Pixel, Redundancy::Visibility, Redundancy::Tolerance];
+/// Of triangle ids, measured by a prototype (legs in pixels, probability).
+const EXPECTED: [(f32, f64); 5] = [(0.5, 0.13), (1.0, 0.375), (2.0, 0.63), (4.0, 0.81), (16.0, 0.95)];
+
+/// For each length of legs, the share that each test finds.
+pub type Detection = Vec<(f32, [f64; 3])>;
+
+/// Measures all lengths.
+///
+/// # Errors
+/// The device's.
+pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detection> {
+    let sampler = Sampler::sharing(engine.shared_renderer());
+    let legs = if quick { &LEGS_PX[2..] } else { &LEGS_PX[..] };
+    let progress = bar("detection against triangle size", legs.len());
+    let mut rows = Vec::with_capacity(legs.len());
+    for &leg_px in legs {
+        let name = format!("wall cut to {leg_px} px");
+        engine.put_scene(&name, &wall(leg_px))?;
+        let on_device = engine.scene(&name)?;
+        let draw = DrawWork {
+            scene: &on_device,
+            lighting: Lighting::UNLIT,
+            scene_time_s: 0.0,
+            visibility: Visibility::Measured,
+            refinement: Refinement::default(),
+        };
+        let mut found = [0.0; 3];
+        for (found, test) in found.iter_mut().zip(TESTS) {
+            let method = SamplingMethod::NonRedundant(test);
+            let planes = SamplePlanes::default();
+            let images = sampler.sample(&SampleWork {
+                draw,
+                cameras: &cameras(),
+                wanted: &[0, 1],
+                method,
+                planes,
+                reference_time_s: None,
+            })?;
+            *found = left_out(&images[1]);
+        }
+        rows.push((leg_px, found));
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    Ok(rows)
+}
+
+fn cameras() -> [Camera; 2] {
+    let camera = |x: f32| {
+        let eye = Vec3::new(x, 0.11 * x, DISTANCE_M);
+        PinholeCamera::looking_at(eye, eye - Vec3::Z, Vec3::Y, 0.6, UVec2::splat(SIDE_PX))
+    };
+    [camera(0.0), camera(BASELINE_M)].map(Camera::Pinhole)
+}
+
+/// The middle third, which the first image sees whole.
+fn left_out(image: &DepthImage) -> f64 {
+    let third = SIDE_PX / 3;
+    let places = (third..2 * third).flat_map(|y| (third..2 * third).map(move |x| (y * SIDE_PX + x) as usize));
+    let (count, dropped) = places.fold((0, 0), |(count, dropped), index| {
+        (count + 1, dropped + usize::from(image.inverse_depth_per_m[index] < 0.0))
+    });
+    f64::from(dropped as u32) / f64::from(count)
+}
+
+/// A little turned, so that its rows are not the images'.
+fn wall(leg_px: f32) -> Scene {
+    let pixel_m = DISTANCE_M * (0.3f32).tan() * 2.0 / SIDE_PX as f32;
+    let leg_m = leg_px * pixel_m;
+    let half = ((0.75 * SIDE_PX as f32 * pixel_m) / leg_m).ceil().max(1.0) as i32;
+    let turn = glam::Mat2::from_angle(0.35);
+    let columns = (2 * half + 1) as u32;
+    let vertex = |x: i32, y: i32| {
+        let p = turn * (glam::Vec2::new(x as f32 + 0.31, y as f32 + 0.17) * leg_m);
+        let position = [p.x, p.y, 0.0];
+        Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2], color_srgba8: [200, 200, 200, 255], sway: 0.0 }
+    };
+    let vertices = (-half..=half).flat_map(|y| (-half..=half).map(move |x| vertex(x, y))).collect();
+    let square = |(x, y): (u32, u32)| {
+        let a = y * columns + x;
+        [a, a + 1, a + columns, a + columns, a + 1, a + columns + 1]
+    };
+    let indices: Vec<u32> =
+        (0..columns - 1).flat_map(|y| (0..columns - 1).map(move |x| (x, y))).flat_map(square).collect();
+    let mut scene = procedural::quad(Vec3::ZERO, 1.0, Vec3::Z, [200; 3]);
+    let parts = vec![MeshPart { first_index: 0, index_count: indices.len() as u32, material: 0 }];
+    scene.meshes = vec![Mesh { vertices, indices, parts }];
+    scene
+}
+
+/// Table, chart and checks.
+///
+/// # Errors
+/// A row that does not fit, which is a fault here.
+pub fn detection_report(rows: &Detection, report: &mut Report) -> anyhow::Result<()> {
+    let columns = [("leg", "px"), ("pixel", ""), ("visibility", ""), ("tolerance", ""), ("pixel, expected", "")];
+    let mut table = Table::new("Redundant samples that are found", &columns);
+    for (leg_px, found) in rows {
+        let expected = EXPECTED.iter().find(|(leg, _)| leg == leg_px).map_or(f64::NAN, |(_, share)| *share);
+        let cells = found.iter().copied().chain([expected]).map(Cell::from);
+        table.push([f64::from(*leg_px).into()].into_iter().chain(cells))?;
+    }
+    report.tables.push(table);
+    let axes = (Axis::log("leg of triangles", "px"), Axis::linear("found", ""));
+    let chart = TESTS.iter().enumerate().fold(
+        XyChart::new("Detection against triangle size", axes.0, axes.1),
+        |chart, (place, test)| {
+            let points = rows.iter().map(|(leg, found)| (f64::from(*leg), found[place]));
+            chart.with(Series::line(SamplingMethod::NonRedundant(*test).to_string(), points))
+        },
+    );
+    report.charts.push(chart.into());
+    let rises = rows.windows(2).all(|pair| pair[0].1[0] <= pair[1].1[0] + 0.03);
+    let least = rows.iter().map(|(_, found)| found[2]).fold(f64::INFINITY, f64::min);
+    report.checks.push(Check::new(
+        "pixel finds more the larger triangles are",
+        f64::from(rises),
+        "",
+        Bar::AtLeast(1.0),
+    ));
+    report.checks.push(Check::new("tolerance finds, whatever the size", least, "", Bar::AtLeast(0.95)));
+    Ok(())
+}

@@ -1,0 +1,144 @@
+//! One scene and the triangle of viewpoints that it is sampled from.
+
+use std::sync::Arc;
+
+use anyhow::Context as _;
+use app_core::setup::{SceneArgs, Setup};
+use depth_image::{Camera, DepthImage, PinholeCamera};
+use engine::GpuEngine;
+use glam::{UVec2, Vec2, Vec3};
+use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
+use sampling::{Rig, SampleWork, Sampler, SamplingMethod};
+
+use super::IMAGES;
+
+/// The paper's scenes, as this project makes them.
+pub const SCENES: [&str; 4] = ["bird-nest", "grass", "urban", "tree"];
+/// Half the angle between neighbouring viewpoints, seen from the scene's middle.
+const SPREAD_RAD: f32 = 0.12;
+/// Of the distance from which all of the scene is in view: closer, so that it fills the picture.
+const CLOSER: f32 = 0.6;
+/// Towards the viewpoints: from the side and above.
+const BACKWARDS: Vec3 = Vec3::new(0.35, 0.65, 1.0);
+/// Views in a triangle are drawn so many at a time.
+const FRAMES_AT_ONCE: usize = 4;
+
+/// A scene on the device.
+pub struct Subject {
+    /// Its name.
+    pub name: String,
+    /// For reconstructing, with the study's cameras.
+    pub setup: Setup,
+    /// Everything by default.
+    pub args: SceneArgs,
+    rig: Rig,
+    pub(super) engine: Arc<GpuEngine>,
+    pub(super) scene: Arc<GpuScene>,
+    sampler: Sampler,
+}
+
+/// The same rig, closer and higher.
+fn raised(rig: &Rig) -> Rig {
+    let distance_m = (rig.center_in_world - rig.target_in_world).length() * CLOSER;
+    let backwards = BACKWARDS.normalize_or(Vec3::Z);
+    let right = Vec3::Y.cross(backwards).normalize_or(Vec3::X);
+    let half_m = rig.half_edges_in_world[0].length() * CLOSER;
+    Rig {
+        center_in_world: rig.target_in_world + backwards * distance_m,
+        half_edges_in_world: [right * half_m, backwards.cross(right) * half_m],
+        near_m: distance_m * 0.05,
+        ..*rig
+    }
+}
+
+/// The corners of the triangle, in halves of the rig's edges.
+const CORNERS: [Vec2; IMAGES] = [Vec2::new(-1.0, -1.0), Vec2::new(1.0, -1.0), Vec2::new(0.0, 1.0)];
+
+impl Subject {
+    /// Loads a scene by its name.
+    ///
+    /// # Errors
+    /// A scene that cannot be used, or the device's.
+    pub fn load(engine: &Arc<GpuEngine>, name: &str) -> anyhow::Result<Self> {
+        let args = SceneArgs::of(name.parse().with_context(|| name.to_owned())?);
+        let setup = args.load()?;
+        let hash = setup.offer.hash.to_string();
+        engine.put_scene(&hash, &setup.scene)?;
+        let rig = raised(&Rig::in_front_of(&setup.scene.bounds(), SPREAD_RAD).with_context(|| name.to_owned())?);
+        let (scene, engine) = (engine.scene(&hash)?, engine.clone());
+        let sampler = Sampler::sharing(engine.shared_renderer());
+        Ok(Self { name: name.to_owned(), setup, args, rig, engine, scene, sampler })
+    }
+
+    /// The sample cameras of a method.
+    #[must_use]
+    pub fn cameras(&self, method: SamplingMethod, size_px: UVec2) -> Vec<PinholeCamera> {
+        method.cameras(CORNERS.iter().map(|&corner| self.rig.camera_at(corner, size_px)).collect())
+    }
+
+    /// Views spread over the triangle between the viewpoints (R2, folded).
+    #[must_use]
+    pub fn between(&self, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
+        const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
+        let place = |i: usize| {
+            let p = (Vec2::splat(0.5) + STEP * i as f32).fract();
+            let p = if p.x + p.y > 1.0 { Vec2::ONE - p } else { p };
+            CORNERS[0] + (CORNERS[1] - CORNERS[0]) * p.x + (CORNERS[2] - CORNERS[0]) * p.y
+        };
+        (0..count).map(|i| self.rig.camera_at(place(i), size_px)).collect()
+    }
+
+    pub(super) fn work(&self) -> DrawWork<'_> {
+        DrawWork {
+            scene: &self.scene,
+            lighting: Lighting::UNLIT,
+            scene_time_s: 0.0,
+            visibility: Visibility::Measured,
+            refinement: Refinement::default(),
+        }
+    }
+
+    /// A method's images, with surface ids where they are asked for.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn sample(
+        &self,
+        method: SamplingMethod,
+        size_px: UVec2,
+        planes: SamplePlanes,
+    ) -> anyhow::Result<Vec<DepthImage>> {
+        let cameras: Vec<Camera> = self.cameras(method, size_px).into_iter().map(Camera::Pinhole).collect();
+        let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
+        let work = SampleWork {
+            draw: self.work(),
+            cameras: &cameras,
+            wanted: &wanted,
+            method,
+            planes,
+            reference_time_s: None,
+        };
+        Ok(self.sampler.sample(&work)?)
+    }
+
+    /// Draws views with surface ids, a few at a time.
+    ///
+    /// # Errors
+    /// The device's, or `each`'s.
+    pub fn each_frame(
+        &self,
+        cameras: &[PinholeCamera],
+        mut each: impl FnMut(&[DepthImage]) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let planes = SamplePlanes { surface_id: true, ..SamplePlanes::default() };
+        for cameras in cameras.chunks(FRAMES_AT_ONCE) {
+            let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
+            each(&self.engine.renderer().draw_depth_images(self.work(), &cameras, planes)?)?;
+        }
+        Ok(())
+    }
+}
+
+/// The plane that all metrics by pixel need.
+pub(super) const WITH_IDS: SamplePlanes =
+    SamplePlanes { normal: false, surface_id: true, specular: false, corners: false };

@@ -1,0 +1,102 @@
+//! `myriorama bench scaling`.
+
+use std::fs::create_dir_all;
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use app_core::exit::{BadInput, Outcome};
+use app_core::process::runtime;
+use app_core::setup::{DeviceArgs, SceneArgs};
+use clap::Args;
+use reconstruction::ReconstructionMethod;
+use render::Lighting;
+use scene::SceneSpec;
+
+use crate::scaling::{Extent, Request, Subject, report, show, take};
+
+/// A coordinator and P nodes as processes of their own, each node with an equal share of this machine's processors
+/// (control groups of Linux, so that eleven nodes fit two cores): the time between two sample sets for P = 2…11 nodes
+/// and V = 10…1000 views, by `pipeline`, `time-share`, `auto` and `direct`; the paper's figures and the predictions
+/// beside it. Then a simulation around the same schedule, held against what was measured and taken to 1,000 nodes.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  myriorama bench scaling --quick\n  myriorama bench scaling --out out/scaling")]
+pub struct ScalingArgs {
+    /// A scene by name, or a file
+    #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
+    scene: SceneSpec,
+    /// How surfaces are lit: as in the paper
+    #[arg(long, default_value_t, value_name = "TERMS")]
+    lighting: Lighting,
+    /// A second table under another lighting, where sampling is dear [default: none with --quick, else "soft 4,
+    /// occlusion 4"]
+    #[arg(long, value_name = "TERMS")]
+    dear_lighting: Option<Lighting>,
+    /// How views are reconstructed
+    #[arg(long, default_value_t, value_name = "NAME")]
+    method: ReconstructionMethod,
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// P at most
+    #[arg(long, default_value_t = 11, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=64))]
+    nodes: u16,
+    /// V at most
+    #[arg(long, default_value_t = 1000, value_name = "V", value_parser = clap::value_parser!(u32).range(10..=1000))]
+    views: u32,
+    /// Cores that each node has [default: all but 0.35 for the client, in equal parts]
+    #[arg(long, value_name = "CORES", value_parser = cores)]
+    quota: Option<f64>,
+    /// P at most of the simulation
+    #[arg(long, default_value_t = 1000, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=1000))]
+    simulate_to: u16,
+    /// Where the report goes
+    #[arg(long, default_value = "out/bench-scaling", value_name = "DIR")]
+    out: PathBuf,
+    /// A subset in under ten minutes: P = 11 and 5
+    #[arg(long)]
+    quick: bool,
+    /// Exit status 1 when a check falls short
+    #[arg(long)]
+    strict: bool,
+}
+
+/// The second table's lighting, where nothing else is asked for.
+const DEAR_LIGHTING: &str = "soft 4, occlusion 4";
+
+fn cores(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|cores| (0.01..=64.0).contains(cores)).ok_or_else(|| "expected 0.01 to 64".to_owned())
+}
+
+impl ScalingArgs {
+    fn request(&self) -> anyhow::Result<Request> {
+        let dear = || DEAR_LIGHTING.parse::<Lighting>().map_err(|error| BadInput(error.to_string()));
+        let dear_lighting = match self.dear_lighting {
+            None if !self.quick => Some(dear()?),
+            given => given,
+        };
+        Ok(Request {
+            device: self.device.device,
+            extent: Extent { quick: self.quick, nodes: usize::from(self.nodes), views: self.views as usize },
+            quota_cores: self.quota,
+            lighting: self.lighting,
+            dear_lighting,
+            event_log: self.out.join("schedule.log"),
+        })
+    }
+}
+
+/// Measures, simulates, reports.
+///
+/// # Errors
+/// Input that cannot be used, no control groups, or a failure of the cluster.
+pub fn run(args: &ScalingArgs) -> anyhow::Result<Outcome> {
+    let request = args.request()?;
+    create_dir_all(&args.out).with_context(|| format!("cannot write to {}", args.out.display()))?;
+    let scene = SceneArgs { method: args.method, ..SceneArgs::of(args.scene.clone()) };
+    let subject = Subject::load(&scene)?;
+    let measured = runtime()?.block_on(take(&request, &subject))?;
+    println!("simulating up to {} nodes", args.simulate_to);
+    let report = report(&measured, request.extent, &args.scene.to_string(), usize::from(args.simulate_to))?;
+    show(&report, &args.out)?;
+    let ok = report.finish(&args.out)?;
+    Ok(if args.strict && !ok { Outcome::FellShort } else { Outcome::Done })
+}

@@ -1,0 +1,195 @@
+//! Which points are measured, and about how long that takes.
+
+use cluster::{Costs, PolicyChoice};
+use coordinator::schedule::{Demand, Load, NodeCosts, Wish, choose};
+use render::Lighting;
+
+use super::point::Ask;
+
+/// P of Table 1's last row.
+pub const PAPER_NODES: usize = 11;
+/// V of Table 1, Fig. 7 and Fig. 8.
+pub const PAPER_VIEWS: usize = 1000;
+/// P of Fig. 5.
+pub const FEW_NODES: usize = 5;
+/// V of the paper's headline.
+pub const HEADLINE_VIEWS: usize = 290;
+/// V at which sampling under dear light takes about as long as all views: whole images then bound T most.
+pub const TILED_VIEWS: usize = 100;
+/// Of one alone more may have been made ahead than is made ahead of the next.
+const LEAST_SETS: f64 = 2.0;
+/// What opening a session takes beside the work.
+const SESSION_S: f64 = 1.0;
+
+use PolicyChoice::{Auto, Direct, Pipeline, TimeShare};
+
+/// One point that is to be measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Who decides.
+    pub policy: PolicyChoice,
+    /// V.
+    pub views: usize,
+    /// Whether sample images stay whole.
+    pub whole_images: bool,
+}
+
+/// How much is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// A stated subset.
+    pub quick: bool,
+    /// P at most.
+    pub nodes: usize,
+    /// V at most.
+    pub views: usize,
+}
+
+impl Extent {
+    /// Time that sets are counted for, where one takes less.
+    fn counted_s(self) -> f64 {
+        if self.quick { 12.0 } else { 20.0 }
+    }
+
+    /// P, from the greatest down: nodes are only ever ended.
+    #[must_use]
+    pub fn node_counts(self) -> Vec<usize> {
+        let all: &[usize] = if self.quick { &[11, 5] } else { &[11, 10, 9, 8, 7, 6, 5, 4, 3, 2] };
+        let smaller = all.iter().copied().filter(|&nodes| nodes < self.nodes);
+        [self.nodes].into_iter().chain(smaller).collect()
+    }
+
+    /// What is measured at so many nodes, plainly lit or under light that is dear.
+    #[must_use]
+    pub fn points(self, nodes: usize, is_dear: bool) -> Vec<Wanted> {
+        let shared = match (is_dear, self.quick) {
+            (true, _) => self.dear_points(nodes),
+            (false, true) => self.quick_points(nodes),
+            (false, false) => full_points(nodes),
+        };
+        let cut = shared.into_iter().map(|(policy, views)| Wanted { policy, views, whole_images: false });
+        let whole = Wanted { policy: Pipeline, views: TILED_VIEWS, whole_images: true };
+        let whole = (is_dear && nodes == self.nodes).then_some(whole);
+        cut.chain(whole).filter(|wanted| wanted.views <= self.views).collect()
+    }
+
+    fn quick_points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
+        match nodes {
+            _ if nodes == self.nodes => [10, 100, PAPER_VIEWS]
+                .into_iter()
+                .flat_map(|views| [(Pipeline, views), (Auto, views), (Direct, views)])
+                // Naive at V = 1000 takes as long as all else: its T grows as V.
+                .filter(|point| ![(Auto, 10), (Auto, 100), (Direct, PAPER_VIEWS)].contains(point))
+                .chain([(TimeShare, 100)])
+                .collect(),
+            FEW_NODES => vec![(Pipeline, 10), (Pipeline, 100), (Pipeline, HEADLINE_VIEWS), (Direct, 10), (Direct, 100)],
+            _ => vec![(Pipeline, 10), (Pipeline, 100), (Direct, 10)],
+        }
+    }
+
+    /// `direct` on few views.
+    fn dear_points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
+        let shared = [TILED_VIEWS, PAPER_VIEWS].into_iter().flat_map(|views| [(Pipeline, views), (Auto, views)]);
+        let wanted = nodes == self.nodes || (!self.quick && [FEW_NODES, 8].contains(&nodes));
+        if wanted { shared.chain([(Direct, nodes)]).collect() } else { Vec::new() }
+    }
+}
+
+fn full_points(nodes: usize) -> Vec<(PolicyChoice, usize)> {
+    let more: &[usize] = if nodes == FEW_NODES { &[20, 50, 200, HEADLINE_VIEWS, 500] } else { &[] };
+    let mut counts: Vec<usize> = [10, 100, PAPER_VIEWS].iter().chain(more).copied().collect();
+    counts.sort_unstable();
+    counts.into_iter().flat_map(|views| [Pipeline, TimeShare, Auto, Direct].map(|policy| (policy, views))).collect()
+}
+
+/// What the schedule predicts of P equal nodes.
+#[must_use]
+pub fn predicted_s(costs: &Costs, images: usize, nodes: usize, policy: PolicyChoice, views: usize) -> f64 {
+    let nodes = vec![NodeCosts { costs: *costs, transfer_image_s: 0.0 }; nodes];
+    let load = Load { images, sets: 2, views, in_order: costs.in_order, ..Load::default() };
+    let wish = Wish { policy, forced_samplers: None, forced_tiles: None };
+    choose(&Demand { load, nodes: &nodes, wish, present: None }).map_or(f64::NAN, |choice| choice.time_s())
+}
+
+/// One point with the sets it takes, and about how many seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Planned {
+    /// What is asked.
+    pub ask: Ask,
+    /// P.
+    pub nodes: usize,
+    /// Of the wall clock.
+    pub about_s: f64,
+}
+
+/// Sets to be counted, at the costs that were measured.
+#[must_use]
+pub fn planned(
+    extent: Extent,
+    costs: &Costs,
+    images: usize,
+    nodes: usize,
+    lighting: Lighting,
+    Wanted { policy, views, whole_images }: Wanted,
+) -> Planned {
+    let period_s = predicted_s(costs, images, nodes, policy, views);
+    let most = if extent.quick { 5.0 } else { 8.0 };
+    let counted_sets = (extent.counted_s() / period_s).ceil().clamp(LEAST_SETS, most) as u32;
+    let ask = Ask { lighting, policy, views, whole_images, counted_sets };
+    let sampled_s = if policy == Direct { 0.0 } else { costs.sample_image_s * images as f64 };
+    // Set 0, those that count, and what is left of the next.
+    Planned { ask, nodes, about_s: (f64::from(counted_sets) + 1.5) * period_s + sampled_s + SESSION_S }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COSTS: Costs = Costs {
+        sample_image_s: 0.45,
+        direct_view_s: 0.13,
+        reconstruct_view_s: 0.08,
+        load_set_s: 0.24,
+        encode_view_s: 0.002,
+        in_order: false,
+        tiles: None,
+    };
+
+    fn all(extent: Extent) -> Vec<Planned> {
+        let lighting = Lighting::default();
+        let of = |nodes: usize| extent.points(nodes, false).into_iter().map(move |point| (nodes, point));
+        let points = extent.node_counts().into_iter().flat_map(of);
+        points.map(|(nodes, point)| planned(extent, &COSTS, 4, nodes, lighting, point)).collect()
+    }
+
+    #[test]
+    fn the_quick_form_has_table_1s_ends_and_takes_minutes() {
+        let quick = all(Extent { quick: true, nodes: 11, views: 1000 });
+        let has = |policy, nodes, views| {
+            quick.iter().any(|p| p.ask.policy == policy && p.nodes == nodes && p.ask.views == views)
+        };
+        assert!(has(Pipeline, 11, 1000) && has(Auto, 11, 1000) && has(Direct, 11, 100) && has(Pipeline, 5, 290));
+        let about_s: f64 = quick.iter().map(|planned| planned.about_s).sum();
+        assert!((100.0..400.0).contains(&about_s), "{about_s}");
+    }
+
+    #[test]
+    fn whole_images_are_measured_beside_tiles_where_light_is_dear() {
+        let extent = Extent { quick: true, nodes: 11, views: 100 };
+        let of = |whole_images| Wanted { policy: Pipeline, views: TILED_VIEWS, whole_images };
+        let dear = extent.points(11, true);
+        assert!(dear.contains(&of(false)) && dear.contains(&of(true)) && dear.iter().all(|wanted| wanted.views <= 100));
+        assert!(extent.points(5, true).is_empty() && !extent.points(11, false).contains(&of(true)));
+    }
+
+    #[test]
+    fn the_full_form_has_all_of_table_1() {
+        let full = all(Extent { quick: false, nodes: 11, views: 1000 });
+        for nodes in 2..=11 {
+            let views = |policy| full.iter().any(|p| p.nodes == nodes && p.ask.policy == policy && p.ask.views == 1000);
+            assert!([Pipeline, TimeShare, Auto, Direct].into_iter().all(views), "{nodes}");
+        }
+        let counts = Extent { quick: false, nodes: 6, views: 1000 }.node_counts();
+        assert_eq!(counts, [6, 5, 4, 3, 2], "fewer nodes than the paper's");
+    }
+}

@@ -1,0 +1,89 @@
+//! What is measured: the scene, its sample cameras, and the views between them.
+
+use std::cell::Cell;
+
+use anyhow::Context as _;
+use app_core::delivery::Wishes;
+use app_core::setup::{SceneArgs, Setup};
+use cluster::{MeasureCosts, PolicyChoice, Timeline, Workload};
+use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
+use render::Lighting;
+
+use crate::experiment::VIEW_SIZE_PX;
+
+/// Scene time between sets: far less than any motion, but another set, which is sampled anew as the paper's are.
+const SET_STEP_S: f64 = 1e-3;
+/// Views of one measured call, as the coordinator's own.
+pub const MEASURED_BATCH: u32 = 32;
+/// How frames travel.
+const CODEC: &str = "lz4";
+
+/// A scene and its rig. Every run of it has scene times that no run before had.
+pub struct Subject {
+    /// As on the command line.
+    pub args: SceneArgs,
+    /// The scene on offer.
+    pub setup: Setup,
+    sets_so_far: Cell<u32>,
+}
+
+impl Subject {
+    /// Loads it.
+    ///
+    /// # Errors
+    /// For a scene that cannot be used.
+    pub fn load(args: &SceneArgs) -> anyhow::Result<Self> {
+        Ok(Self { args: args.clone(), setup: args.load()?, sets_so_far: Cell::new(0) })
+    }
+
+    /// S.
+    #[must_use]
+    pub fn images(&self) -> usize {
+        self.setup.samples.len()
+    }
+
+    /// The first `count` views of a sequence that fills the cell between the sample cameras evenly.
+    ///
+    /// # Errors
+    /// Without sample cameras.
+    pub fn views(&self, count: usize) -> anyhow::Result<Vec<PinholeCamera>> {
+        let cell = ViewCell::between(&self.setup.around).context("no sample cameras")?;
+        Ok(cell.spread(count, VIEW_SIZE_PX))
+    }
+
+    /// So many sets that nobody has sampled yet.
+    #[must_use]
+    pub fn fresh_timeline(&self, set_count: u32) -> Timeline {
+        let first = self.sets_so_far.replace(self.sets_so_far.get() + set_count);
+        Timeline { start_s: f64::from(first) * SET_STEP_S, step_s: SET_STEP_S, set_count }
+    }
+
+    /// What a session asks for.
+    #[must_use]
+    pub fn wishes(&self, lighting: Lighting, policy: PolicyChoice, set_count: u32) -> Wishes {
+        let (method, sampling) = (self.args.method.to_string(), self.args.sampling.to_string());
+        let timeline = self.fresh_timeline(set_count);
+        Wishes { policy, timeline, ..Wishes::new(method, sampling, lighting.to_string()) }
+    }
+
+    /// What a node is to time: a set of this lighting, and these views, so many a call.
+    #[must_use]
+    pub fn measurement(&self, lighting: Lighting, typical_views: Vec<PinholeCamera>, batch_count: u32) -> MeasureCosts {
+        let offer = &self.setup.offer;
+        let workload = Workload {
+            scene: offer.scene(),
+            sample_cameras: offer.rig.clone(),
+            cell_first_indices: Vec::new(),
+            sampling: self.args.sampling.to_string(),
+            lighting: lighting.to_string(),
+            method: self.args.method.to_string(),
+            codec: CODEC.to_owned(),
+            volume: offer.volume,
+            background_linear: offer.background_linear,
+            timeline: self.fresh_timeline(1),
+            illumination: offer.illumination.clone(),
+            refinement_steps: 1,
+        };
+        MeasureCosts { workload, typical_views, batch_count, planes: ViewPlanes::default() }
+    }
+}

@@ -1,0 +1,91 @@
+//! What whole sample images allow, and what tiles make of it: with whole images no more than S nodes can sample.
+
+use cluster::{Costs, PolicyChoice};
+use study::Table;
+
+use super::costs::efficiency;
+use super::point::Point;
+use super::tables::Told;
+
+/// The least T of eq. 2 that whole images allow, seconds: max(⌈S/K⌉·g_s, V·(c+e)/(P−K)) at the best K, nothing else
+/// taking any time. Infinite without a node for each role.
+#[must_use]
+pub fn least_s(costs: &Costs, images: usize, views: usize, nodes: usize) -> f64 {
+    let view_s = costs.reconstruct_view_s + costs.encode_view_s;
+    let with = |k: usize| {
+        let sample_s = images.div_ceil(k) as f64 * costs.sample_image_s;
+        sample_s.max(views as f64 * view_s / (nodes - k) as f64)
+    };
+    (1..nodes).map(with).fold(f64::INFINITY, f64::min)
+}
+
+/// A measured point's T under that.
+fn bound_s(told: &Told<'_>, point: &Point) -> f64 {
+    least_s(&told.lit.mean(point.nodes), told.images, point.ask.views, point.nodes)
+}
+
+/// How many times the efficiency that whole images allow at the best; of the pipeline.
+#[must_use]
+pub fn over_bound(told: &Told<'_>, nodes: usize, views: usize) -> Option<f64> {
+    let point = told.find(PolicyChoice::Pipeline, nodes, views)?;
+    Some(bound_s(told, point) / point.period_s)
+}
+
+/// How many times as fast as the same with whole images, measured.
+#[must_use]
+pub fn over_whole(told: &Told<'_>, nodes: usize, views: usize) -> Option<f64> {
+    let cut = told.find(PolicyChoice::Pipeline, nodes, views)?;
+    let same = |point: &&Point| point.ask.whole_images && (point.nodes, point.ask.views) == (nodes, views);
+    Some(told.lit.points.iter().find(same)?.period_s / cut.period_s)
+}
+
+/// Every point whose views are made from samples.
+pub fn table(told: &Told<'_>) -> anyhow::Result<Table> {
+    let columns = [
+        ("P", ""),
+        ("V", ""),
+        ("asked for", ""),
+        ("images", ""),
+        ("policy", ""),
+        ("K", ""),
+        ("tiles of an image", ""),
+        ("T", "s"),
+        ("efficiency", ""),
+        ("whole images allow T", "s"),
+        ("whole images allow efficiency", ""),
+    ];
+    let mut table = Table::new(format!("Whole images and tiles, {}", told.lit.lighting), &columns);
+    for point in told.lit.points.iter().filter(|point| point.ask.policy != PolicyChoice::Direct) {
+        let (costs, bound_s) = (told.lit.mean(point.nodes), bound_s(told, point));
+        table.push([
+            point.nodes.into(),
+            point.ask.views.into(),
+            point.ask.policy.to_string().into(),
+            if point.ask.whole_images { "whole" } else { "as the schedule likes" }.into(),
+            point.policy().to_string().into(),
+            point.samplers().into(),
+            point.plan.assignment.tile_count.into(),
+            point.period_s.into(),
+            told.efficiency(point).into(),
+            bound_s.into(),
+            efficiency(&costs, told.images, point.ask.views, point.nodes, bound_s).into(),
+        ])?;
+    }
+    Ok(table)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn as_stated_for_the_papers_ratios() {
+        let of = |ratio: f64| {
+            let costs = Costs { sample_image_s: 1.0, reconstruct_view_s: ratio, ..Costs::default() };
+            efficiency(&costs, 4, 1000, 11, least_s(&costs, 4, 1000, 11))
+        };
+        assert!((of(0.01) - 0.891).abs() < 0.001, "{}", of(0.01));
+        assert!((of(0.103) - 0.944).abs() < 0.001, "{}", of(0.103));
+        assert!(least_s(&Costs::default(), 4, 10, 1).is_infinite(), "nobody is left to make views");
+    }
+}

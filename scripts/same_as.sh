@@ -1,0 +1,115 @@
+#!/usr/bin/env bash
+# Whether this commit makes the same pictures, frames and depth images as another, to the byte, and as fast.
+#
+#   scripts/same_as.sh COMMIT           a matrix of 4 scenes x sampling x reconstruction x lighting, and policies
+#   scripts/same_as.sh COMMIT --times   the ratios of g_s, g_v, c and d, on a machine that does nothing else
+#
+# Both commits are built; both serve each scene in turn; one client of this commit asks both and hashes what they send.
+# A renderer chooses rays or triangles by timing. Rows that differ are therefore asked again of new processes, up to
+# five times: a row is equal once both commits have given one same answer. Exit status 1: a row differs.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+commit="${1:?usage: scripts/same_as.sh COMMIT [--times]}"
+mode="${2:-}"
+scenes=(courtyard tree-terrain-30k-wind blocks bird-nest)
+out="target/same_as"
+old_tree="$out/tree"
+mkdir -p "$out"
+[ -n "${XDG_RUNTIME_DIR:-}" ] || export NODEVICE_SELECT=1
+
+servers=()
+stop() {
+    for server in "${servers[@]}"; do kill "$server" 2>/dev/null || true; done
+    for server in "${servers[@]}"; do wait "$server" 2>/dev/null || true; done
+    servers=()
+}
+trap stop EXIT
+
+build() {
+    rm -rf "$old_tree"
+    mkdir -p "$old_tree"
+    git archive "$commit" | tar -x -C "$old_tree"
+    (cd "$old_tree" && cargo build --release --locked --package myriorama --target-dir ../build)
+    cargo build --release --locked --package myriorama --package cluster-tests --bin myriorama --bin compare_clusters
+    old="$out/build/release/myriorama"
+    new="target/release/myriorama"
+    client="target/release/compare_clusters"
+}
+
+# serve PROGRAM SCENE LOG: starts a cluster; `url` is its coordinator's.
+serve() {
+    "$1" up --scene "$2" --nodes 3 --listen 127.0.0.1:0 --sample-size 160x120 >"$3" 2>&1 &
+    servers+=("$!")
+    for _ in $(seq 600); do
+        url="$(sed -n 's|.* at \(http://[0-9.:]*\)$|\1|p' "$3")"
+        [ -z "$url" ] || return 0
+        sleep 0.1
+    done
+    echo "$1 does not serve $2: see $3" >&2
+    return 1
+}
+
+# ask PROGRAM SCENE NAME [ROWS]: the answers of a new process to all rows, or to those of a file, are added to NAME.txt.
+ask() {
+    serve "$1" "$2" "$out/$3.log"
+    "$client" bytes "$url" ${4:+"$4"} >>"$out/$3.txt"
+    stop
+}
+
+# The rows of answers: a line of an answer is "row | hashes".
+rows_of() {
+    sed 's/ | [^|]*$//' "$@"
+}
+
+# Rows of a scene to which the two commits have not yet given one same answer, into differing.txt.
+compare() {
+    comm -12 <(sort -u "$out/old-$1.txt") <(sort -u "$out/new-$1.txt") >"$out/common.txt"
+    rows_of "$out/new-$1.txt" | sort -u | grep -vxFf <(rows_of "$out/common.txt") >"$out/differing.txt" || true
+}
+
+bytes() {
+    local equal=0 different=0 scene row
+    for scene in "${scenes[@]}"; do
+        rm -f "$out/old-$scene.txt" "$out/new-$scene.txt"
+        ask "$old" "$scene" "old-$scene"
+        ask "$new" "$scene" "new-$scene"
+        rows_of "$out/new-$scene.txt" >"$out/rows.txt"
+        if ! rows_of "$out/old-$scene.txt" | cmp -s - "$out/rows.txt"; then
+            echo "$scene: the commits were not asked the same rows" >&2
+            return 1
+        fi
+        compare "$scene"
+        for _ in 1 2 3 4 5; do
+            [ -s "$out/differing.txt" ] || break
+            cp "$out/differing.txt" "$out/again.txt"
+            ask "$old" "$scene" "old-$scene" "$out/again.txt"
+            ask "$new" "$scene" "new-$scene" "$out/again.txt"
+            compare "$scene"
+        done
+        while IFS= read -r row; do
+            if grep -qxF "$row" "$out/differing.txt"; then
+                echo "differs  $scene | $row"
+                different=$((different + 1))
+            else
+                echo "equal    $scene | $row"
+                equal=$((equal + 1))
+            fi
+        done <"$out/rows.txt"
+    done
+    echo "$equal equal, $different different"
+    [ "$different" -eq 0 ] && [ "$equal" -gt 0 ]
+}
+
+times() {
+    local urls=() program
+    for program in "$old" "$new" "$old"; do
+        serve "$program" tree-terrain-30k "$out/times-${#urls[@]}.log"
+        urls+=("$url")
+    done
+    echo "old ${urls[0]}, new ${urls[1]}, old once more ${urls[2]}; $(uptime)"
+    "$client" times "${urls[@]}"
+}
+
+build
+if [ "$mode" = --times ]; then times; else bytes; fi
