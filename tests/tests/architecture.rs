@@ -397,8 +397,8 @@ fn next_reconstruction(method: Option<ReconstructionMethod>) -> Option<Reconstru
 fn next_sampling(method: Option<SamplingMethod>) -> Option<SamplingMethod> {
     match method {
         None => Some(SamplingMethod::Conventional),
-        Some(SamplingMethod::Conventional) => Some(SamplingMethod::NonRedundant(Redundancy::default())),
-        Some(SamplingMethod::NonRedundant(_)) => Some(SamplingMethod::Useful(Redundancy::default())),
+        Some(SamplingMethod::Conventional) => Some(SamplingMethod::NonRedundant(Redundancy::Pixel)),
+        Some(SamplingMethod::NonRedundant(_)) => Some(SamplingMethod::Useful(Redundancy::Pixel)),
         Some(SamplingMethod::Useful(_)) => Some(SamplingMethod::DepthPeeling { layers: 4 }),
         Some(SamplingMethod::DepthPeeling { .. }) => None,
     }

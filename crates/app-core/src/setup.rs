@@ -59,10 +59,9 @@ pub struct SceneArgs {
     #[arg(long, visible_alias = "reconstruction", default_value_t, value_name = "NAME",
         help = format!("How views are reconstructed. {}", ReconstructionMethod::help()))]
     pub method: ReconstructionMethod,
-    /// Which samples are taken: conventional (all that is seen); non_redundant:pixel, :visibility or :tolerance
-    /// (what no image before holds; non_redundant is :pixel); useful, alike (less what no view between the cameras can
-    /// see); or depth_peeling:LAYERS (layer behind layer, from the middle)
-    #[arg(long, default_value_t, value_name = "NAME")]
+    /// The sampling method
+    #[arg(long, default_value_t, value_name = "NAME",
+        help = format!("Which samples are taken. {}", SamplingMethod::help()))]
     pub sampling: SamplingMethod,
     /// Size of the sample images [default: 400x300, or as in --samples]
     #[arg(long, value_name = "WxH")]

@@ -169,11 +169,11 @@ impl Engine for GpuEngine {
     }
 
     fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError> {
-        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.is_chained())
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.images_are_sequential())
     }
 
     fn samples_alone(&self, sampling: &str) -> Result<bool, EngineError> {
-        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.leave_out().is_none())
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.images_are_independent())
     }
 
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
@@ -190,7 +190,7 @@ impl Engine for GpuEngine {
             wanted: &request.wanted,
             method: parsed("sampling_method", &request.sampling)?,
             planes: planes_for(method),
-            settled_at_s: request.settled_at_s,
+            reference_time_s: request.settled_at_s,
         };
         self.sampler.sample(&work).map_err(sampling_error)
     }

@@ -1,20 +1,17 @@
 // Tolerance redundancy: one of the four samples around the place in the image before lies on the same surface, faces
-// the same way, and is not much coarser. What was kept before stays until all four do, by a margin.
+// the same way, and is not much coarser. A sample of the temporal reference stays until all four do, by a margin.
 
-const DEPTH_FOOTPRINTS: f32 = 2.0;
-// How far, in pixels, a surface may go on changing its depth at its own slope.
-const SLOPE_PX: f32 = 1.0;
-// 25 degrees.
-const SAME_FACING: f32 = 0.906307787;
-const COARSER: f32 = 1.5;
-// Of what the others allow, for what was kept before; and 20 degrees.
-const CLEARLY: f32 = 0.8;
-const CLEARLY_SAME_FACING: f32 = 0.939692621;
+const DEPTH_FOOTPRINTS: f32 = {{ DEPTH_FOOTPRINTS }};
+const SLOPE_PX: f32 = {{ SLOPE_PX }};
+const SAME_FACING: f32 = {{ SAME_FACING }};
+const COARSER: f32 = {{ COARSER }};
+const CLEARLY: f32 = {{ CLEARLY }};
+const CLEARLY_SAME_FACING: f32 = {{ CLEARLY_SAME_FACING }};
 
-fn is_known(candidate: Candidate, number: u32, camera: KnownCamera) -> bool {
+fn is_redundant_with(candidate: Candidate, number: u32, camera: KnownCamera) -> bool {
     let p = homogeneous_in(camera, candidate);
     let along = abs(dot(candidate.normal, candidate.point_in_world - camera.eye_in_world)) / p.z;
-    // Of planar depth, from one pixel to the next on the candidate's own plane.
+    // The change of planar depth from one pixel to the next on the candidate's own plane.
     let across = abs(dot(candidate.normal, camera.column_in_world)) + abs(dot(candidate.normal, camera.row_in_world));
     let slope = p.z * across / max(along, 1e-6);
     let allowed = select(1.0, CLEARLY, candidate.was_kept);

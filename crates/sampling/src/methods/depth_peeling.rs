@@ -2,19 +2,32 @@
 
 use depth_image::{Camera, PinholeCamera};
 use glam::{Mat3, Quat, Vec3};
-use render::{Asks, LeaveOut};
+use gpu::wgsl_constants;
+use render::{Evidence, RedundancyTest};
 
-use crate::SamplingError;
+use crate::error::SamplingError;
 
-const SHADER: &str = "depth_peeling.wgsl";
+/// Layers are drawn from one place, and depths differ by rounding at most.
+pub const SAME_LAYER: f32 = 1e-6;
+/// The most images of a set, as reconstruction takes them.
+const MAX_LAYERS: u32 = 16;
+pub(super) const DEFAULT_LAYERS: u32 = 4;
 
-pub(crate) const SHADERS: [(&str, &str); 1] = [(SHADER, include_str!("depth_peeling.wgsl"))];
+pub(super) const SHADER: (&str, &str) = ("depth_peeling.wgsl", include_str!("depth_peeling.wgsl"));
 
-pub(crate) const TEST: LeaveOut =
-    LeaveOut { shader: SHADER, asks: Asks::Samples, from_one_place: true, settled: false, only_useful: false };
+pub(super) const TEST: RedundancyTest =
+    RedundancyTest { shader: SHADER.0, consults: Evidence::Samples, from_one_place: true, usefulness: None };
+
+pub(super) fn constants() -> [(&'static str, String); 1] {
+    wgsl_constants![SAME_LAYER]
+}
+
+pub(super) fn parse_layers(text: &str) -> Option<u32> {
+    text.parse().ok().filter(|layers| (1..=MAX_LAYERS).contains(layers))
+}
 
 /// One camera in the middle of a rig, for each layer; it looks as the rig's cameras do together.
-pub(crate) fn cameras(rig: &[PinholeCamera], layers: usize) -> Vec<PinholeCamera> {
+pub(super) fn cameras(rig: &[PinholeCamera], layers: usize) -> Vec<PinholeCamera> {
     let Some(first) = rig.first() else { return Vec::new() };
     let mean = |of: fn(&PinholeCamera) -> Vec3| rig.iter().map(of).sum::<Vec3>() / rig.len() as f32;
     let backwards = mean(|camera| camera.world_from_camera * Vec3::Z).normalize_or(first.world_from_camera * Vec3::Z);
@@ -29,9 +42,11 @@ pub(crate) fn cameras(rig: &[PinholeCamera], layers: usize) -> Vec<PinholeCamera
     vec![middle; layers]
 }
 
+/// Checks that all layers have one camera.
+///
 /// # Errors
 /// For layers that are not all of one camera.
-pub(crate) fn check(cameras: &[Camera]) -> Result<(), SamplingError> {
+pub(super) fn check(cameras: &[Camera]) -> Result<(), SamplingError> {
     let other = cameras.iter().position(|camera| *camera != cameras[0]);
     other.map_or(Ok(()), |index| Err(SamplingError::Layer { index }))
 }

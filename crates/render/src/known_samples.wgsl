@@ -1,5 +1,5 @@
-// What cameras before this one hold of the scene, and the test by which an image leaves out what they hold. The
-// test is another template: `is_known(candidate, number, camera)`, of one candidate and one of those cameras.
+// The samples that images before this one hold, and the test that says which candidates of this image are redundant. The
+// test is another template: `is_redundant_with(candidate, number, camera)`, of one candidate and one of those cameras.
 
 struct KnownCamera {
     // Rows that take (column · w, row · w, w, 1) of the image that asks to (column · w, row · w, w) of this one; w is
@@ -30,13 +30,13 @@ struct Candidate {
     footprint_m: f32,
     id: vec2u,
     pixel: vec2u,
-    // Whether this image kept it at the moment that it settled at: then it stays unless it is clearly redundant.
+    // Whether this image holds it in the temporal reference: then it stays unless it is clearly redundant.
     was_kept: bool,
 }
 
-// A layer a camera; what a texel holds is for the test to know.
-@group({{ known_group }}) @binding(0) var known_samples: texture_2d_array<u32>;
-@group({{ known_group }}) @binding(1) var<uniform> known_cameras: array<KnownCamera, {{ [earlier, 1] | max }}>;
+// A layer for each camera, with texels as the test wants them.
+@group({{ known_group }}) var known_samples: texture_2d_array<u32>;
+@group({{ known_group }}) var<uniform> known_cameras: array<KnownCamera, {{ [earlier, 1] | max }}>;
 
 {% include "footprint.wgsl" %}
 
@@ -46,49 +46,49 @@ fn homogeneous_in(camera: KnownCamera, candidate: Candidate) -> vec3f {
     return vec3f(dot(rows[0], p), dot(rows[1], p), dot(rows[2], p));
 }
 
-// Whether it projects into the image: outside of it nothing is known.
+// Outside of the image nothing is known.
 fn is_in_view(camera: KnownCamera, homogeneous: vec3f) -> bool {
     let size = vec2f(camera.columns, camera.rows) * homogeneous.z;
     return homogeneous.z > camera.near_m && all(homogeneous.xy >= vec2f(0.0)) && all(homogeneous.xy < size);
 }
 
-// The texel that it projects to, or one at the image's rim.
+// The texel of the projection, or the nearest one at the image's rim.
 fn nearest_texel(camera: KnownCamera, homogeneous: vec3f) -> vec2u {
     let at = homogeneous.xy / max(homogeneous.z, 1e-30);
     return vec2u(clamp(at, vec2f(0.0), vec2f(camera.columns, camera.rows) - 1.0));
 }
 
-{% if settled %}
-// What this set held when it settled, and this image's camera then.
-@group({{ known_group }}) @binding(2) var settled_samples: texture_2d_array<u32>;
-@group({{ known_group }}) @binding(3) var<uniform> settled_camera: KnownCamera;
+{% if temporal_reference %}
+// The samples of this set at its reference time, and this image's camera then.
+@group({{ known_group }}) var reference_samples: texture_2d_array<u32>;
+@group({{ known_group }}) var<uniform> reference_camera: KnownCamera;
 
-const SETTLED_FOOTPRINTS: f32 = 4.0;
+const REFERENCE_FOOTPRINTS: f32 = {{ REFERENCE_FOOTPRINTS }};
 
 fn was_kept(candidate: Candidate) -> bool {
-    let p = homogeneous_in(settled_camera, candidate);
-    let held = textureLoad(settled_samples, nearest_texel(settled_camera, p), {{ earlier }}, 0);
+    let p = homogeneous_in(reference_camera, candidate);
+    let held = textureLoad(reference_samples, nearest_texel(reference_camera, p), {{ earlier }}, 0);
     let depth_m = 1.0 / max(bitcast<f32>(held.x), 1e-30);
     // Stretched footprints: a steep surface may change its depth more from texel to texel.
-    let room = SETTLED_FOOTPRINTS * max(bitcast<f32>(held.y), candidate.footprint_m);
-    return is_in_view(settled_camera, p) && held.x != 0u && abs(depth_m - p.z) < room;
+    let room = REFERENCE_FOOTPRINTS * max(bitcast<f32>(held.y), candidate.footprint_m);
+    return is_in_view(reference_camera, p) && held.x != 0u && abs(depth_m - p.z) < room;
 }
 {% endif %}
-{% include leave_out %}
+{% include redundancy_test %}
 
-fn is_left_out(found: Candidate) -> bool {
+fn is_redundant(found: Candidate) -> bool {
     var candidate = found;
-{% if settled %}    candidate.was_kept = was_kept(found);
+{% if temporal_reference %}    candidate.was_kept = was_kept(found);
 {% endif %}
-    var known = false;
+    var redundant = false;
 {% if test_traces_rays %}
-    for (var number = 0u; number < {{ earlier }}u && !known; number++) {
-        known = is_known(candidate, number, known_cameras[number]);
+    for (var number = 0u; number < {{ earlier }}u && !redundant; number++) {
+        redundant = is_redundant_with(candidate, number, known_cameras[number]);
     }
 {% else %}
 {% for number in range(earlier) %}
-    known = is_known(candidate, {{ number }}u, known_cameras[{{ number }}]) || known;
+    redundant = is_redundant_with(candidate, {{ number }}u, known_cameras[{{ number }}]) || redundant;
 {% endfor %}
 {% endif %}
-    return known;
+    return redundant;
 }
