@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::ProvenanceKind;
-use gpu::{Binding, PassCache, ResourceTrait, ResourceTraits, ShaderVariant, uniform_elements};
+use gpu::{Binding, PassCache, ResourceTrait, ResourceTraits, ShaderVariant, WgslLiteral as _, uniform_elements};
 use minijinja::{Value, context};
 use wgpu::BufferUsages;
 
@@ -11,7 +11,6 @@ use crate::{
     error::ReconstructionError,
     pixel_list::{LIST_WORKGROUP, PixelList},
     recording::Recording,
-    view_work::wgsl_f32,
 };
 
 pub(crate) const SHADER: (&str, &str) = ("fill.wgsl", include_str!("fill.wgsl"));
@@ -44,7 +43,7 @@ impl ShaderVariant for Fill {
     fn context(&self) -> Value {
         context! {
             reach_px => REACH_PX,
-            same_side => wgsl_f32(SAME_SIDE),
+            same_side => SAME_SIDE.wgsl_literal(),
             directions => DIRECTIONS,
             list_workgroup => LIST_WORKGROUP,
             provenance_filled => ProvenanceKind::Filled as u32,

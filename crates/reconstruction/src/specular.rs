@@ -1,7 +1,7 @@
 //! Adds the light that depends on the viewer to pixels that show a surface.
 
 use depth_image::Highlight;
-use gpu::{Binding, PassCache, ResourceTraits, ShaderVariant, light_slots};
+use gpu::{Binding, PassCache, ResourceTraits, ShaderVariant, WgslLiteral as _, highlight_name, light_slots};
 use minijinja::{Value, context};
 
 use crate::{
@@ -9,7 +9,7 @@ use crate::{
     recording::Recording,
     reflectors::sample_texels,
     surface::THICKNESS_FOOTPRINTS,
-    view_work::{ONE_VIEW, SetVariant, wgsl_f32},
+    view_work::{ONE_VIEW, SetVariant},
 };
 
 pub(crate) const SHADER: (&str, &str) = ("specular.wgsl", include_str!("specular.wgsl"));
@@ -30,16 +30,12 @@ impl ShaderVariant for Specular {
     }
 
     fn context(&self) -> Value {
-        let highlight = match self.highlight {
-            Highlight::BlinnPhong => "blinn_phong",
-            Highlight::Ggx => "ggx",
-        };
         context! {
-            highlight,
+            highlight => highlight_name(self.highlight),
             light_slots => light_slots(self.lights),
             visibility_words => self.visibility_words,
             sample_texels => sample_texels(self.visibility_words),
-            thickness_footprints => wgsl_f32(THICKNESS_FOOTPRINTS),
+            thickness_footprints => THICKNESS_FOOTPRINTS.wgsl_literal(),
             ..self.set.context()
         }
     }

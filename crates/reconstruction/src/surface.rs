@@ -1,12 +1,12 @@
 //! The vote of all cameras on a point: `surface.wgsl`, the common part of passes that find surfaces.
 
-use gpu::Binding;
+use gpu::{Binding, WgslLiteral as _};
 use minijinja::{Value, context};
 
 use crate::{
     pixel_list::{LIST_WORKGROUP, PixelList},
     recording::Recording,
-    view_work::{SetVariant, wgsl_f32},
+    view_work::SetVariant,
 };
 
 /// The surface's thickness, in texel footprints: the best of a sweep (docs/methods/joint_carve.md).
@@ -34,10 +34,10 @@ impl SurfaceVariant {
     pub fn context(self) -> Value {
         context! {
             count_fetches => self.count_fetches,
-            thickness_footprints => wgsl_f32(THICKNESS_FOOTPRINTS),
-            hidden_weight => wgsl_f32(HIDDEN_WEIGHT),
-            angle_floor => wgsl_f32(ANGLE_FLOOR),
-            half_code => wgsl_f32(HALF_CODE),
+            thickness_footprints => THICKNESS_FOOTPRINTS.wgsl_literal(),
+            hidden_weight => HIDDEN_WEIGHT.wgsl_literal(),
+            angle_floor => ANGLE_FLOOR.wgsl_literal(),
+            half_code => HALF_CODE.wgsl_literal(),
             list_workgroup => LIST_WORKGROUP,
             ..self.set.context()
         }

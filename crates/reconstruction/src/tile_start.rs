@@ -1,12 +1,12 @@
 //! How far all rays of a tile run through space that is proven empty, or that no camera sees.
 
-use gpu::{Binding, DispatchSize, PassCache, ResourceTraits, ShaderVariant};
+use gpu::{Binding, DispatchSize, PassCache, ResourceTraits, ShaderVariant, WgslLiteral as _};
 use minijinja::{Value, context};
 
 use crate::{
     error::ReconstructionError,
     recording::Recording,
-    view_work::{ONE_VIEW, SetVariant, wgsl_f32},
+    view_work::{ONE_VIEW, SetVariant},
 };
 
 pub(crate) const SHADER: (&str, &str) = ("tile_start.wgsl", include_str!("tile_start.wgsl"));
@@ -29,8 +29,8 @@ impl ShaderVariant for TileStart {
     fn context(&self) -> Value {
         context! {
             max_moves => MAX_MOVES,
-            greatest_move => wgsl_f32(GREATEST_MOVE),
-            least_move => wgsl_f32(LEAST_MOVE),
+            greatest_move => GREATEST_MOVE.wgsl_literal(),
+            least_move => LEAST_MOVE.wgsl_literal(),
             ..self.0.context()
         }
     }

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use depth_image::{PinholeCamera, ProvenanceKind};
 use glam::{UVec2, Vec3};
-use gpu::{ResourceTrait, ResourceTraits};
+use gpu::{ResourceTrait, ResourceTraits, WgslLiteral as _};
 use minijinja::{Value, context};
 
 use crate::pyramid::{BACKGROUND_CODE, HOLE_CODE};
@@ -32,7 +32,7 @@ impl SetVariant {
             holes => self.holes,
             count_fetches => false,
             tile_px => TILE_PX,
-            far_away => wgsl_f32(FAR_AWAY),
+            far_away => FAR_AWAY.wgsl_literal(),
             hole_code => HOLE_CODE,
             background_code => BACKGROUND_CODE,
             provenance_empty => ProvenanceKind::Empty as u32,
@@ -45,11 +45,6 @@ impl SetVariant {
         let counts = [1, 2, 4, MAX_SAMPLE_CAMERAS].into_iter();
         counts.flat_map(|cameras| [false, true].map(|holes| Self { cameras, holes })).collect()
     }
-}
-
-/// A number as WGSL reads it.
-pub(crate) fn wgsl_f32(value: f32) -> String {
-    format!("{value:?}")
 }
 
 /// `SampleCamera` of the shader.

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use gpu::{Binding, Gpu, PassCache, ShaderVariant, Templates};
+use gpu::{Binding, Gpu, PassCache, ShaderVariant, Templates, WgslLiteral as _};
 use minijinja::{Value, context};
 
 use crate::{
@@ -16,7 +16,6 @@ use crate::{
     recording::Recording,
     required_planes::RequiredPlanes,
     sample_set::SampleSet,
-    view_work::wgsl_f32,
 };
 
 pub(super) const SHADER: (&str, &str) = ("hybrid_mesh.wgsl", include_str!("hybrid_mesh.wgsl"));
@@ -38,9 +37,9 @@ impl ShaderVariant for CutTexels {
 
     fn context(&self) -> Value {
         context! {
-            flat_footprints => wgsl_f32(FLAT_FOOTPRINTS),
-            slope_share => wgsl_f32(SLOPE_SHARE),
-            greatest_slope => wgsl_f32(GREATEST_SLOPE),
+            flat_footprints => FLAT_FOOTPRINTS.wgsl_literal(),
+            slope_share => SLOPE_SHARE.wgsl_literal(),
+            greatest_slope => GREATEST_SLOPE.wgsl_literal(),
             ..quads::context()
         }
     }

@@ -4,7 +4,7 @@ pub(crate) mod march;
 
 use std::sync::Arc;
 
-use gpu::{Gpu, PassCache, ResourceTraits, ShaderVariant, Templates};
+use gpu::{Gpu, PassCache, ResourceTraits, ShaderVariant, Templates, WgslLiteral as _};
 use minijinja::{Value, context};
 
 use self::march::{MARCHES, March, NUDGE_PX, START_LEVEL};
@@ -13,7 +13,7 @@ use crate::{
     pixel_list::PixelList,
     recording::Recording,
     surface::{self, SurfaceVariant},
-    view_work::{ONE_VIEW, wgsl_f32},
+    view_work::ONE_VIEW,
 };
 
 pub(super) const SHADER: (&str, &str) = ("joint_carve.wgsl", include_str!("joint_carve.wgsl"));
@@ -43,7 +43,7 @@ impl ShaderVariant for Carve {
             max_moves => if self.surface.set.holes { MAX_MOVES_AMONG_HOLES } else { MAX_MOVES },
             start_level => START_LEVEL.max(self.stop_level),
             stop_level => self.stop_level,
-            nudge_px => wgsl_f32(NUDGE_PX),
+            nudge_px => NUDGE_PX.wgsl_literal(),
             ..self.surface.context()
         }
     }

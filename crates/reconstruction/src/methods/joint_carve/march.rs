@@ -1,6 +1,6 @@
 //! Marches in the image of one sample camera, then asks all cameras about the point found.
 
-use gpu::{Binding, PassCache, ResourceTraits, ShaderVariant};
+use gpu::{Binding, PassCache, ResourceTraits, ShaderVariant, WgslLiteral as _};
 use minijinja::{Value, context};
 
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
     pixel_list::PixelList,
     recording::Recording,
     surface::{self, SurfaceVariant},
-    view_work::{ONE_VIEW, wgsl_f32},
+    view_work::ONE_VIEW,
 };
 
 pub(crate) const SHADER: (&str, &str) = ("march.wgsl", include_str!("march.wgsl"));
@@ -43,7 +43,7 @@ impl ShaderVariant for March {
             start_level => START_LEVEL,
             max_coarse_moves => MAX_COARSE_MOVES,
             max_fine_moves => MAX_FINE_MOVES,
-            nudge_px => wgsl_f32(NUDGE_PX),
+            nudge_px => NUDGE_PX.wgsl_literal(),
             ..self.surface.context()
         }
     }
