@@ -44,7 +44,7 @@ pub(crate) struct RedundancyVariant {
     shader: &'static str,
     traces_rays: bool,
     temporal_reference: bool,
-    /// How many images are before.
+    /// The number of images before.
     earlier: usize,
 }
 
@@ -225,12 +225,12 @@ impl KnownSamples {
         bind(bindings)
     }
 
-    /// Where the `number`-th image's surface ids are to be drawn, where the test consults them.
+    /// The layer for the `number`-th image's surface ids, where a test consults them.
     pub fn surface_ids(&self, number: usize) -> Option<&wgpu::TextureView> {
         self.layer(number, Evidence::SurfaceIds)
     }
 
-    /// Where the `number`-th image's samples are to be kept, where the test consults them.
+    /// The layer for the `number`-th image's samples, where a test consults them.
     pub fn samples(&self, number: usize) -> Option<&wgpu::TextureView> {
         self.layer(number, Evidence::Samples)
     }

@@ -35,6 +35,8 @@ mod shaders;
 mod stages;
 mod sums;
 mod surfaces;
+#[cfg(test)]
+mod test_support;
 mod texture;
 mod visibility;
 mod work;

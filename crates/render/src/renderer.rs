@@ -193,7 +193,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// How surfaces of `camera`'s kind are found where that is left to the device: measured the first time.
+    /// The faster way of finding surfaces for pictures of `camera`'s size: measured the first time.
     ///
     /// # Errors
     /// The device's.

@@ -1,4 +1,4 @@
-//! What to sample.
+//! Requests to sample.
 
 use depth_image::Camera;
 use render::{DrawWork, SamplePlanes};
@@ -14,7 +14,7 @@ pub struct SampleWork<'a> {
     pub cameras: &'a [Camera],
     /// The images that are taken. Images in sequence are taken all together.
     pub wanted: &'a [u32],
-    /// Which samples are taken.
+    /// The choice of samples.
     pub method: SamplingMethod,
     /// Planes beside colour and depth.
     pub planes: SamplePlanes,
