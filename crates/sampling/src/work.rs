@@ -19,5 +19,5 @@ pub struct SampleWork<'a> {
     /// Planes beside colour and depth.
     pub planes: SamplePlanes,
     /// The moment of the temporal reference, where the method has hysteresis.
-    pub reference_time_s: Option<f32>,
+    pub temporal_reference_s: Option<f32>,
 }

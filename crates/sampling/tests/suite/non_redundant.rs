@@ -33,7 +33,7 @@ fn taken(
         wanted: &wanted,
         method,
         planes: ALL,
-        reference_time_s: None,
+        temporal_reference_s: None,
     })
 }
 
@@ -228,7 +228,7 @@ fn independent_images_can_be_taken_one_by_one() {
             wanted,
             method,
             planes: ALL,
-            reference_time_s: None,
+            temporal_reference_s: None,
         })
     };
     assert_eq!(part(&[3, 1], method).expect("two images"), [whole[3].clone(), whole[1].clone()]);
