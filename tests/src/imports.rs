@@ -196,7 +196,8 @@ fn is_double_colon(tokens: &[TokenTree], at: usize) -> bool {
 }
 
 /// Returns whether an attribute is `cfg(test)`, or `cfg(all(test, …))`.
-fn is_for_tests(attribute: Option<&TokenTree>) -> bool {
+#[must_use]
+pub fn is_for_tests(attribute: Option<&TokenTree>) -> bool {
     let text = attribute.map(ToString::to_string).unwrap_or_default().replace(' ', "");
     text.starts_with("[cfg(test") || text.starts_with("[cfg(all(test")
 }

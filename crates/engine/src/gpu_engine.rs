@@ -9,7 +9,7 @@ use depth_image::{DepthImage, PinholeCamera, View};
 use gpu::{DevicePreference, Gpu};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 use parking_lot::Mutex;
-use reconstruction::{ReconstructionMethod, Reconstructor, SetDescription};
+use reconstruction::{ReconstructionMethod, Reconstructor, RequiredPlanes, SetDescription};
 use render::{
     AccelerationReport, Choice, DrawWork, GpuScene, Lighting, Refinement, Renderer, SamplePlanes, Visibility,
 };
@@ -139,8 +139,8 @@ impl GpuEngine {
 /// The planes that a reconstruction method needs in sample images.
 #[must_use]
 pub fn planes_for(method: ReconstructionMethod) -> SamplePlanes {
-    let hybrid = matches!(method, ReconstructionMethod::HybridMesh { .. });
-    SamplePlanes { specular: true, normal: hybrid, corners: hybrid, ..SamplePlanes::default() }
+    let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
+    SamplePlanes { specular: true, normal, corners: corner_inverse_depth, ..SamplePlanes::default() }
 }
 
 fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {

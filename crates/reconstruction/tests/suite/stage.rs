@@ -1,4 +1,4 @@
-//! What all tests here share: one device, scenes with sample images, and a comparison of views.
+//! The common ground of all tests here: one device, scenes with sample images, and a comparison of views.
 
 use std::sync::{Arc, OnceLock};
 
@@ -44,7 +44,7 @@ pub fn reconstructor() -> &'static Reconstructor {
 
 static DARK: Illumination = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
 
-/// Of a set in which nothing depends on the viewer.
+/// A set in which nothing depends on the viewer.
 pub fn matt(volume: Aabb, background_linear: Vec3) -> SetDescription<'static> {
     SetDescription { volume, background_linear, illumination: &DARK, highlight: None }
 }
@@ -64,7 +64,7 @@ impl Stage {
         Self { scene, images, volume }
     }
 
-    /// Whose images have normals and texel corners.
+    /// With images that have normals and texel corners.
     pub fn with_corners(scene: Scene, cameras: &[PinholeCamera]) -> Self {
         let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
         let images = depth_images(&scene, cameras, planes);
@@ -72,7 +72,7 @@ impl Stage {
         Self { scene, images, volume }
     }
 
-    /// Of images that leave out what those before them hold.
+    /// With images that omit what those before them hold.
     pub fn apart(scene: Scene, cameras: &[PinholeCamera]) -> Self {
         let on_device = GpuScene::upload(&device().gpu, &scene).expect("a scene");
         let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
