@@ -136,7 +136,7 @@ mod tests {
     use super::*;
     use crate::{
         image_sequence::ImageSequence,
-        known_samples::{KeptLayers, KnownSamples},
+        known_samples::{KnownSamples, LayerCache},
         test_support::{TEST, TestStage},
     };
 
@@ -154,7 +154,7 @@ mod tests {
         let stage = TestStage::new();
         let traced = stage.scene.rays.at(0.0).expect("a tree");
         let camera = PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 0.8, UVec2::ONE);
-        let known = || KnownSamples::of(&stage.gpu, &KeptLayers::default(), &[camera; 2], TEST).expect("known samples");
+        let known = || KnownSamples::of(&stage.gpu, &LayerCache::default(), &[camera; 2], TEST).expect("known samples");
         let reference = known().into_reference();
         for known in [known(), known().after(Some(&reference))] {
             let sequence = ImageSequence { known: &known, wanted: &[0, 1], first: 0, keeps: true };

@@ -237,7 +237,7 @@ fn independent_images_can_be_taken_one_by_one() {
         assert_eq!(part(wanted, method).is_ok(), allowed);
     }
     let chained = SamplingMethod::NonRedundant(Redundancy::Pixel);
-    assert!(matches!(part(&[1, 2], chained), Err(SamplingError::Wanted { index: 1, cameras: 4, .. })));
+    assert!(matches!(part(&[1, 2], chained), Err(SamplingError::Selection { index: 1, cameras: 4, .. })));
 }
 
 /// Of two walls behind each other the hidden one is useless in its middle and useful at its rim, the more so the larger
