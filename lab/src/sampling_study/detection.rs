@@ -54,7 +54,7 @@ pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detecti
                 wanted: &[0, 1],
                 method,
                 planes,
-                reference_time_s: None,
+                temporal_reference_s: None,
             })?;
             *found = left_out(&images[1]);
         }
