@@ -79,7 +79,7 @@ impl Drop for Server {
     }
 }
 
-/// Whoever was there before may take a moment to go.
+/// The node before may take a moment to leave.
 fn bind(address: &str) -> std::net::TcpListener {
     for _ in 0..500 {
         if let Ok(listener) = std::net::TcpListener::bind(address) {

@@ -1,4 +1,4 @@
-//! What happened, as a client saw it and as coordinators wrote it down; and the invariants that no fault may break.
+//! The history of a cluster, as a client saw it and coordinators recorded it, and the invariants that no fault may break.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::io::Cursor;
@@ -162,7 +162,7 @@ impl History {
         Ok(plans)
     }
 
-    /// One leader an epoch: whoever has a plan of an epoch has the same, and it is the one that was recorded.
+    /// One leader an epoch: all that have a plan of an epoch have the same, and it is the one that was recorded.
     fn leaders(&self, commanded: &[Assignment]) -> Vec<String> {
         let mut first: BTreeMap<u64, &Assignment> = BTreeMap::new();
         let mut wrong = Vec::new();

@@ -24,7 +24,7 @@ pub type Spoil = fn(&mut Vec<Chunk>);
 #[derive(Default)]
 struct Orders {
     spoil: Option<Spoil>,
-    /// Answers left to be spoilt.
+    /// Answers that are still to be changed.
     times: usize,
 }
 
@@ -62,7 +62,7 @@ impl Mangler {
         *self.orders.lock() = Orders { spoil: Some(spoil), times };
     }
 
-    /// Answers that are still to be spoilt.
+    /// Answers that are still to be changed.
     #[must_use]
     pub fn left(&self) -> usize {
         self.orders.lock().times

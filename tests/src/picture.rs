@@ -1,4 +1,4 @@
-//! Whether a picture shows one sample set, and the right one.
+//! A check that a picture shows one sample set, and the right one.
 
 use std::collections::HashSet;
 

@@ -188,7 +188,7 @@ async fn far_of(target: SocketAddr) -> io::Result<TcpStream> {
 async fn carry(mut near: TcpStream, mut far: TcpStream, network: watch::Receiver<Network>, seeds: [u64; 2]) {
     let (cuts, mut watched) = (network.borrow().cuts, network.clone());
     let _ = (near.set_nodelay(true), far.set_nodelay(true));
-    let is_cut = {
+    let is_closed = {
         let ((near_in, near_out), (far_in, far_out)) = (near.split(), far.split());
         let [forth, back] = seeds.map(Random::new);
         let forth = pump(near_in, far_out, network.clone(), |network| network.forth, forth);
@@ -198,7 +198,7 @@ async fn carry(mut near: TcpStream, mut far: TcpStream, network: watch::Receiver
             _ = watched.wait_for(|network| network.cuts > cuts) => true,
         }
     };
-    if is_cut {
+    if is_closed {
         let _ = (near.set_zero_linger(), far.set_zero_linger());
     }
 }

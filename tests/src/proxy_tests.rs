@@ -35,7 +35,7 @@ async fn echoed(stream: &mut TcpStream, count: usize) -> io::Result<(Vec<u8>, Du
 }
 
 #[tokio::test]
-async fn bytes_are_delayed_throttled_and_spoilt_as_ordered() {
+async fn bytes_are_delayed_throttled_and_corrupted_as_ordered() {
     let proxy = Proxy::to(&echo().await, 1);
     let mut stream = connected(&proxy).await;
     assert_eq!(echoed(&mut stream, 5000).await.unwrap().0, vec![7; 5000]);
@@ -50,7 +50,7 @@ async fn bytes_are_delayed_throttled_and_spoilt_as_ordered() {
 }
 
 #[tokio::test]
-async fn a_partition_is_silent_and_loses_nothing() {
+async fn a_partition_delays_all_bytes_and_loses_none() {
     let proxy = Proxy::to(&echo().await, 1);
     let mut stream = connected(&proxy).await;
     proxy.partition();

@@ -102,14 +102,14 @@ async fn compositors_relay_images_in_a_chain() {
     let near = ask(&first.address, &plan, 1).await;
     assert_eq!(far.data, near.data);
     assert!(cluster.take_counts().iter().all(|&times| times == 1), "sampled once");
-    let passed_on = |address: String, plan_epoch| async move {
+    let relayed = |address: String, plan_epoch| async move {
         let sampler = SamplerClient::new(connect(&address).await.unwrap());
         let fetch = FetchImages { plan_epoch, set_index: 1, cell: 0, image_indices: vec![0, 1, 2] };
         sampler.fetch_sample_images(fetch).await.map(|chunks| chunks.collect::<Vec<_>>())
     };
-    let chunks = passed_on(second.address.clone(), 100).await.unwrap().await;
+    let chunks = relayed(second.address.clone(), 100).await.unwrap().await;
     assert!(chunks.len() >= 6 && chunks.iter().all(Result::is_ok), "header and data of each of three images");
-    let refused = passed_on(last.address.clone(), 100).await.err().unwrap();
+    let refused = relayed(last.address.clone(), 100).await.err().unwrap();
     assert!(refused.message().contains("is not sampled by"), "nobody asks the last one: {refused}");
 }
 

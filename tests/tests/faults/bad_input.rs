@@ -212,7 +212,7 @@ async fn a_claimed_length_of_4_gib_takes_no_memory() {
 
 /// Of two processes with one name the later counts, and the earlier waits until it has left.
 #[tokio::test(flavor = "multi_thread")]
-async fn of_two_processes_with_one_name_the_later_counts_and_the_earlier_waits() {
+async fn a_later_process_of_a_name_is_the_member_and_the_earlier_one_waits() {
     let beside = Beside::start(2).await;
     let Beside { cluster, watcher, .. } = &beside;
     let address_of = async || {

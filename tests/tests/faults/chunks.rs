@@ -1,5 +1,4 @@
-//! Chunks of sample images that are not what they should be: asked for again, and whoever sends nothing else is left
-//! out.
+//! Corrupt chunks of sample images are fetched again; a sampler that sends nothing else is quarantined.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -60,7 +59,7 @@ async fn show(session: &Session, set_index: u32) -> Duration {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn spoilt_chunks_are_fetched_again() {
+async fn corrupt_chunks_are_fetched_again() {
     let (cluster, manglers) = start(2).await;
     let session = session(&cluster).await;
     show(&session, 0).await;
@@ -73,10 +72,10 @@ async fn spoilt_chunks_are_fetched_again() {
         assert!(took < CLOSED, "{what}: {took:?}");
         assert_eq!(manglers[sampler].left(), 0, "{what}");
     }
-    assert_eq!(session.plan().assignment.plan_epoch, epoch, "nobody was left out for it");
+    assert_eq!(session.plan().assignment.plan_epoch, epoch, "no node was quarantined for it");
 }
 
-async fn left_out((what, spoil): (&str, Spoil)) {
+async fn quarantined((what, spoil): (&str, Spoil)) {
     let (cluster, manglers) = start(3).await;
     let session = session(&cluster).await;
     show(&session, 0).await;
@@ -90,8 +89,8 @@ async fn left_out((what, spoil): (&str, Spoil)) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_sampler_that_sends_only_spoilt_chunks_is_quarantined() {
+async fn a_sampler_that_sends_only_corrupt_chunks_is_quarantined() {
     for spoilt in [SPOILT[0], SPOILT[1], SPOILT[5]] {
-        left_out(spoilt).await;
+        quarantined(spoilt).await;
     }
 }

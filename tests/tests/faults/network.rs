@@ -132,7 +132,7 @@ async fn thin_line() {
 
 /// Keepalive takes up to 10 s to notice: all at the same time.
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
-async fn frames_go_on_within_15_s_of_a_silent_partition() {
+async fn frames_go_on_within_15_s_of_a_partition() {
     tokio::join!(
         lost_host("sampler's host lost", sampler_of),
         lost_host("compositor's host lost", compositor_of),
@@ -191,7 +191,7 @@ async fn frames_go_on_over_late_slow_and_lossy_links() {
 
 /// Where the length of a message is spoilt, whoever reads waits for what never comes: for as long as keepalive does.
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_that_are_spoilt_on_the_way_are_not_shown() {
+async fn frames_that_are_corrupted_on_the_way_are_not_shown() {
     let network = Network::start(3).await;
     for proxy in &network.to_node {
         proxy.set(Way::Pass, Way::Spoilt { one_in: 40 });
