@@ -1,4 +1,4 @@
-//! This program, started once more: a coordinator or a node of its own, for benches.
+//! Processes of this program: a coordinator or a node of its own, for benches.
 
 use std::io::{BufRead as _, BufReader};
 use std::process::{Child, ChildStdout, Command, Stdio};
@@ -9,10 +9,10 @@ use anyhow::Context as _;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
-/// How long a process may take until it serves: a scene is made, or a device found.
+/// The longest time until a process serves: a scene is made, or a device found.
 const START: Duration = Duration::from_secs(300);
 
-/// A process of this program. It is killed when dropped.
+/// A process of this program, which is killed when dropped.
 #[derive(Debug)]
 pub struct Process {
     name: String,
@@ -22,17 +22,17 @@ pub struct Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // One that has ended already cannot be killed, which is as well.
+        // A process that has ended already cannot be killed.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
 impl Process {
-    /// With arguments as on the command line.
+    /// Starts a process with arguments as on the command line.
     ///
     /// # Errors
-    /// Where the system starts none.
+    /// The system starts no process.
     pub fn start(name: &str, arguments: &[String]) -> anyhow::Result<Self> {
         let program = std::env::current_exe().context("this program's file is not known")?;
         let mut command = Command::new(program);
@@ -42,22 +42,22 @@ impl Process {
         Ok(Self { name: name.to_owned(), child, lines: lines_of(output) })
     }
 
-    /// As it was started.
+    /// The name that it was started with.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// As the system numbers it.
+    /// The system's number of the process.
     #[must_use]
     pub fn id(&self) -> u32 {
         self.child.id()
     }
 
-    /// The address at the end of the next line that ends in one.
+    /// The address at the end of the next line that ends in an address.
     ///
     /// # Errors
-    /// Where the process ends before, or says nothing for long.
+    /// The process ends before, or prints nothing for long.
     pub fn address(&mut self) -> anyhow::Result<String> {
         loop {
             let line = self.lines.recv_timeout(START).with_context(|| format!("{} does not serve", self.name))?;
@@ -68,22 +68,22 @@ impl Process {
     }
 }
 
-/// Read to the end: a process that cannot print waits for ever.
+/// Output is read to the end: a process that cannot print stops.
 fn lines_of(output: ChildStdout) -> mpsc::Receiver<String> {
     let (send, lines) = mpsc::channel();
     std::thread::spawn(move || {
         for line in BufReader::new(output).lines().map_while(Result::ok) {
-            // Nobody listens any more once it serves.
+            // Nobody reads the lines once the process serves.
             let _ = send.send(line);
         }
     });
     lines
 }
 
-/// What a process counts, as Prometheus reads it at `http://HOST:PORT/metrics`.
+/// The Prometheus page of a process at `http://HOST:PORT/metrics`.
 ///
 /// # Errors
-/// Where nobody answers.
+/// Nobody answers.
 pub async fn metrics_page(url: &str) -> anyhow::Result<String> {
     let authority = url.trim_start_matches("http://").split('/').next().unwrap_or_default();
     let mut socket = TcpStream::connect(authority).await.with_context(|| format!("no metrics at {url}"))?;

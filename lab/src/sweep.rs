@@ -1,39 +1,45 @@
-//! Time against error: every setting of every method on one scene.
+//! Time against error: settings of light field search and joint carve on one scene.
 
 use reconstruction::ReconstructionMethod;
 use study::{Axis, Better, Cell, Point, ReportError, Series, Table, XyChart};
 
-use crate::evaluate::{Row, Truth};
+use crate::evaluation::Evaluation;
+use crate::reference_views::ReferenceViews;
 
-/// Steps of the search, as in the paper's Fig. 7 and beyond.
+/// Steps of light field search, as in the paper's Fig. 7 and beyond.
 const STEPS: [u32; 6] = [8, 16, 32, 64, 128, 256];
-/// Levels at which the carve stops.
+/// Levels at which joint carve stops.
 const STOP_LEVELS: [u32; 4] = [0, 1, 2, 3];
 
-/// All settings that are compared.
+/// The settings that are compared.
 #[must_use]
 pub fn settings(quick: bool) -> Vec<ReconstructionMethod> {
-    // A quick run leaves out every other setting.
+    // A quick run skips every other setting.
     let step = if quick { 2 } else { 1 };
     let searches = STEPS.iter().step_by(step).map(|&steps| ReconstructionMethod::LightFieldSearch { steps });
     let carves = STOP_LEVELS.iter().step_by(step).map(|&stop_level| ReconstructionMethod::JointCarve { stop_level });
     searches.chain(carves).collect()
 }
 
-/// Evaluates all settings; `done` hears of each.
+/// Evaluates all settings, and calls `done` for each.
 ///
 /// # Errors
-/// The device's.
-pub fn sweep(truth: &Truth, quick: bool, runs: usize, mut done: impl FnMut(&Row)) -> anyhow::Result<Vec<Row>> {
-    let row = |method| truth.evaluate(method, runs).inspect(|row| done(row));
+/// The device fails.
+pub fn sweep(
+    reference: &ReferenceViews,
+    quick: bool,
+    runs: usize,
+    mut done: impl FnMut(&Evaluation),
+) -> anyhow::Result<Vec<Evaluation>> {
+    let row = |method| reference.evaluate(method, runs).inspect(|row| done(row));
     settings(quick).into_iter().map(row).collect()
 }
 
-/// The rows as a table.
+/// A table of evaluations.
 ///
 /// # Errors
-/// None that can happen: rows and columns are written together.
-pub fn table(name: &str, rows: &[Row]) -> Result<Table, ReportError> {
+/// A row does not fit its table.
+pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
     let columns = [
         ("method", ""),
         ("time a view", "ms"),
@@ -60,10 +66,10 @@ pub fn table(name: &str, rows: &[Row]) -> Result<Table, ReportError> {
     Ok(table)
 }
 
-/// Time against FLIP, PSNR and wrong hits, each with the front of the best.
+/// Charts of time against FLIP, PSNR and wrong hits, each with its Pareto front.
 #[must_use]
-pub fn charts(name: &str, rows: &[Row]) -> Vec<XyChart> {
-    let chart = |what: &str, unit: &str, better, value: fn(&Row) -> f64| {
+pub fn charts(name: &str, rows: &[Evaluation]) -> Vec<XyChart> {
+    let chart = |what: &str, unit: &str, better, value: fn(&Evaluation) -> f64| {
         let time = Axis::log("time a view", "ms");
         series(rows, value)
             .into_iter()
@@ -77,8 +83,8 @@ pub fn charts(name: &str, rows: &[Row]) -> Vec<XyChart> {
     ]
 }
 
-fn series(rows: &[Row], value: fn(&Row) -> f64) -> [Series; 2] {
-    let search = |row: &Row| match row.method {
+fn series(rows: &[Evaluation], value: fn(&Evaluation) -> f64) -> [Series; 2] {
+    let search = |row: &Evaluation| match row.method {
         ReconstructionMethod::LightFieldSearch { steps } => {
             Some(Point::labelled(row.ms_a_view, value(row), steps.to_string()))
         }
@@ -86,7 +92,7 @@ fn series(rows: &[Row], value: fn(&Row) -> f64) -> [Series; 2] {
         | ReconstructionMethod::Mesh
         | ReconstructionMethod::HybridMesh { .. } => None,
     };
-    let carve = |row: &Row| match row.method {
+    let carve = |row: &Evaluation| match row.method {
         ReconstructionMethod::JointCarve { stop_level } => {
             Some(Point::labelled(row.ms_a_view, value(row), format!("level {stop_level}")))
         }
@@ -100,8 +106,8 @@ fn series(rows: &[Row], value: fn(&Row) -> f64) -> [Series; 2] {
     ]
 }
 
-/// Rows of the search and of the carve.
+/// Evaluations of light field search, and of joint carve.
 #[must_use]
-pub fn split(rows: &[Row]) -> (Vec<&Row>, Vec<&Row>) {
+pub fn split(rows: &[Evaluation]) -> (Vec<&Evaluation>, Vec<&Evaluation>) {
     rows.iter().partition(|row| matches!(row.method, ReconstructionMethod::LightFieldSearch { .. }))
 }

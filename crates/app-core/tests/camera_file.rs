@@ -1,7 +1,7 @@
-//! Camera files: what is written is read again, and what cannot be used is named.
+//! Camera files survive a round trip, and faults are named.
 #![allow(clippy::unwrap_used)]
 
-use app_core::cameras::{CameraFault, MAX_FILE_BYTES, NamedCamera, Placement, read, write};
+use app_core::camera_file::{CameraFault, MAX_FILE_BYTES, NamedCamera, Placement, read, write};
 use depth_image::PinholeCamera;
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use serde_json::{Map, Value, json};
@@ -25,7 +25,7 @@ fn close(a: &PinholeCamera, b: &PinholeCamera) -> bool {
 }
 
 #[test]
-fn what_is_written_is_read_again_also_far_from_the_origin() {
+fn cameras_survive_a_round_trip_far_from_the_origin() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cameras.json");
     for origin_in_source in [DVec3::ZERO, DVec3::new(2_683_123.25, 408.5, -1_247_321.75)] {
@@ -44,7 +44,7 @@ fn frame() -> Value {
     json!({"w": 200, "h": 150, "fl_x": 180.0, "transform_matrix": [[1, 0, 0, 0.5], [0, 1, 0, 0.25], [0, 0, 1, 2], [0, 0, 0, 1]]})
 }
 
-fn error_of(text: &str) -> app_core::cameras::CameraFileError {
+fn error_of(text: &str) -> app_core::camera_file::CameraFileError {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bad.json");
     std::fs::write(&path, text).unwrap();
@@ -53,7 +53,7 @@ fn error_of(text: &str) -> app_core::cameras::CameraFileError {
     error
 }
 
-/// A second frame in which one field is another.
+/// A second frame with another value of one field.
 fn with(field: &str, value: Value) -> String {
     let mut bad = frame();
     bad[field] = value;
@@ -61,7 +61,7 @@ fn with(field: &str, value: Value) -> String {
 }
 
 #[test]
-fn intrinsics_may_be_given_once_for_all() {
+fn shared_intrinsics_hold_for_all_frames() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("shared.json");
     let pose = json!({"transform_matrix": frame()["transform_matrix"]});
@@ -116,7 +116,7 @@ fn nan_and_infinity_as_python_writes_them_are_named() {
 }
 
 #[test]
-fn files_that_are_none_are_refused() {
+fn files_without_cameras_are_refused() {
     assert!(matches!(error_of("{ \"frames\": [").kind, CameraFault::Json(_)));
     for text in ["[]", "{}", "{\"frames\": []}", "{\"frames\": [3]}"] {
         assert!(matches!(error_of(text).kind, CameraFault::Missing), "{text}");

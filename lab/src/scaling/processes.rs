@@ -1,4 +1,4 @@
-//! A coordinator and P nodes, each a process, the nodes each with an equal share of the machine.
+//! A coordinator and P nodes as processes, each node with an equal share of the machine.
 
 use std::path::Path;
 use std::time::Duration;
@@ -11,15 +11,15 @@ use gpu::DevicePreference;
 use wire::rpc::{NodeClient, connect};
 
 use super::counters::{Counters, read};
-use super::cpu_share::{CpuGroup, Hierarchy, OwnGroup, Usage};
+use crate::cpu_share::{CpuGroup, Hierarchy, OwnGroup, Usage};
 use crate::process::Process;
 
-/// Until all nodes have opened their device and joined.
+/// The longest wait for all nodes to open their device and join.
 const JOIN: Duration = Duration::from_secs(300);
-/// Until a node that was killed is missed.
+/// The longest wait for the coordinator to miss a killed node.
 const LEAVE: Duration = Duration::from_secs(30);
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
-/// Nodes are at rest when none uses more than this share of a core between two looks; most that is waited for it.
+/// Nodes are at rest when none uses more than this share of a core between two readings.
 const AT_REST: f64 = 0.01;
 const REST_LOOK: Duration = Duration::from_millis(250);
 const REST: Duration = Duration::from_secs(120);
@@ -28,14 +28,14 @@ const REST: Duration = Duration::from_secs(120);
 struct Member {
     address: String,
     metrics: String,
-    // Dropped in this order: a group cannot be removed before its process has ended.
+    // Fields are dropped in this order: a group cannot be removed before its process has ended.
     _process: Process,
     group: CpuGroup,
 }
 
-/// Processes that end with it.
-pub struct Fleet {
-    /// Of the cluster.
+/// Processes of a cluster, which end when this is dropped.
+pub struct NodeProcesses {
+    /// A client of the cluster.
     pub client: Client,
     members: Vec<Member>,
     _coordinator: Process,
@@ -43,12 +43,12 @@ pub struct Fleet {
     quota_cores: Option<f64>,
 }
 
-impl Fleet {
-    /// Starts all of them, without a limit yet, and waits until all nodes have joined. What happens to the schedule is
-    /// written to `event_log`, for `myriorama replay`.
+impl NodeProcesses {
+    /// Starts all processes without a limit, and waits until all nodes have joined. The schedule's events are written
+    /// to `event_log`, for `myriorama replay`.
     ///
     /// # Errors
-    /// Where processes or control groups cannot be had.
+    /// Processes or control groups are not to be had.
     pub async fn start(
         scene: &SceneArgs,
         device: DevicePreference,
@@ -64,7 +64,7 @@ impl Fleet {
         for number in 0..nodes {
             let group = CpuGroup::new(&hierarchy, &format!("myriorama-{}-{number:03}", std::process::id()))?;
             let process = Process::start(&Self::name_of(number), &node_arguments(number, &url, device))?;
-            group.go_first()?;
+            group.prioritize()?;
             group.admit(process.id())?;
             started.push((process, group));
         }
@@ -78,37 +78,37 @@ impl Fleet {
         Ok(Self { client, members, _coordinator: coordinator, _own: own, quota_cores: None })
     }
 
-    /// P.
+    /// The number of nodes, P.
     #[must_use]
     pub fn nodes(&self) -> usize {
         self.members.len()
     }
 
-    /// Gives every node so many cores, or as many as there are.
+    /// Limits every node to a number of cores, or to none.
     ///
     /// # Errors
-    /// Where the kernel does not take it.
+    /// The kernel refuses the value.
     pub fn limit(&mut self, cores: Option<f64>) -> anyhow::Result<()> {
         self.quota_cores = cores;
         Ok(self.members.iter().try_for_each(|member| member.group.limit(cores))?)
     }
 
-    /// What each node has; endless without a limit.
+    /// The cores of each node; infinite without a limit.
     #[must_use]
     pub fn quota_cores(&self) -> f64 {
         self.quota_cores.unwrap_or(f64::INFINITY)
     }
 
-    /// As many digits as sort well: members are listed by name.
+    /// The name of a node, with enough digits to sort well.
     #[must_use]
     pub fn name_of(number: usize) -> String {
         format!("node-{number:03}")
     }
 
-    /// Has nodes time their work at the same time: the first node the first request, and so on.
+    /// Lets nodes time their work at the same time, each with its own request.
     ///
     /// # Errors
-    /// The first node's that fails.
+    /// A node fails.
     pub async fn measure(&self, requests: impl IntoIterator<Item = MeasureCosts>) -> anyhow::Result<Vec<Costs>> {
         let measuring = self.members.iter().zip(requests).map(|(member, request)| {
             let address = member.address.clone();
@@ -121,10 +121,10 @@ impl Fleet {
         Ok(all)
     }
 
-    /// The same, one node after the other.
+    /// Lets nodes time their work one after the other.
     ///
     /// # Errors
-    /// As there.
+    /// A node fails.
     pub async fn measure_in_turn(&self, request: &MeasureCosts, mut done: impl FnMut()) -> anyhow::Result<Vec<Costs>> {
         let mut all = Vec::new();
         for member in &self.members {
@@ -135,10 +135,10 @@ impl Fleet {
         Ok(all)
     }
 
-    /// Ends the last nodes, so that so many are left, and waits until they are missed.
+    /// Ends the last nodes, so that `nodes` are left, and waits until the coordinator misses them.
     ///
     /// # Errors
-    /// The coordinator's, or where it does not notice.
+    /// The coordinator does not answer, or does not notice.
     pub async fn shrink_to(&mut self, nodes: usize) -> anyhow::Result<()> {
         self.members.truncate(nodes);
         let end = tokio::time::Instant::now() + LEAVE;
@@ -149,18 +149,18 @@ impl Fleet {
         Ok(())
     }
 
-    /// What every node has used so far.
+    /// The processor time that every node has used.
     ///
     /// # Errors
-    /// Where the kernel's counters cannot be read.
+    /// The kernel's counters cannot be read.
     pub fn usage(&self) -> anyhow::Result<Vec<Usage>> {
         Ok(self.members.iter().map(|member| member.group.usage()).collect::<Result<_, _>>()?)
     }
 
-    /// Waits until no node does anything any more: what was asked for and is not wanted is made to the end of its batch.
+    /// Waits until all nodes are at rest: batches that nobody waits for are made to their end.
     ///
     /// # Errors
-    /// As [`Fleet::usage`].
+    /// As [`NodeProcesses::usage`].
     pub async fn rest(&self) -> anyhow::Result<()> {
         let end = tokio::time::Instant::now() + REST;
         let mut before = self.usage()?;
@@ -176,10 +176,10 @@ impl Fleet {
         Ok(())
     }
 
-    /// What all nodes together have counted so far.
+    /// Counters of all nodes together.
     ///
     /// # Errors
-    /// Where a node does not answer.
+    /// A node does not answer.
     pub async fn counters(&self) -> anyhow::Result<Counters> {
         let mut sum = Counters::default();
         for member in &self.members {
@@ -189,14 +189,14 @@ impl Fleet {
     }
 }
 
-/// What the coordinator offers is what sessions ask for anyway, but for the scene.
+/// Arguments of the coordinator: sessions state everything else that it offers.
 fn coordinator_arguments(scene: &SceneArgs, event_log: &Path) -> Vec<String> {
     let (scene, event_log) = (scene.scene.to_string(), event_log.display().to_string());
     ["coordinator", "--listen", "127.0.0.1:0", "--scene", &scene, "--record", &event_log].map(str::to_owned).into()
 }
 
 fn node_arguments(number: usize, coordinator: &str, device: DevicePreference) -> Vec<String> {
-    let (name, device) = (Fleet::name_of(number), device.to_string());
+    let (name, device) = (NodeProcesses::name_of(number), device.to_string());
     let fixed = ["node", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0"];
     let own = ["--coordinator", coordinator, "--name", &name, "--device", &device];
     fixed.iter().chain(&own).map(|&word| word.to_owned()).collect()

@@ -1,85 +1,22 @@
-//! Cameras in files: nerfstudio's `transforms.json`, so that anyone can run someone else's experiment.
-//!
-//! `transform_matrix` is camera to world, the camera looking down -Z with +Y up; focal lengths and principal
-//! points are in pixels, for a frame or for all. Only pinhole cameras can be used here: distortion that is not
-//! zero is refused by name. Files are in the scene file's own space; where a scene was re-centred, its origin
-//! is subtracted in double precision.
+//! Reading camera files.
 
 use std::path::Path;
 
-use depth_image::{CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera};
+use depth_image::{MAX_IMAGE_SIDE_PX, PinholeCamera};
 use glam::{DMat3, DQuat, DVec3, UVec2, Vec2};
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
-/// Bytes of a camera file: a thousand cameras take about 0.5 MB.
+use super::error::{CameraFault, CameraFileError};
+use super::placement::Placement;
+
+/// The most bytes of a camera file: a thousand cameras take about 0.5 MB.
 pub const MAX_FILE_BYTES: u64 = 32 << 20;
-/// Cameras of a file.
+/// The most cameras of a file.
 pub const MAX_FRAMES: usize = 65_536;
-/// How far a matrix's axes may be from unit length and right angles.
+/// The tolerance of a matrix's axes to unit length and right angles.
 const RIGID_TOLERANCE: f64 = 1e-3;
 const MODELS: [&str; 3] = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE"];
 const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
-
-/// A camera file that cannot be used: which file, where in it, and why.
-#[derive(Debug, thiserror::Error)]
-#[error("{file}: {place}: {kind}")]
-pub struct CameraFileError {
-    /// The file.
-    pub file: String,
-    /// `frame 3, fl_x`, or the part outside frames.
-    pub place: String,
-    /// The reason.
-    #[source]
-    pub kind: CameraFault,
-}
-
-/// Why a camera file cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum CameraFault {
-    /// The operating system refused.
-    #[error("cannot be read or written: {0}")]
-    Io(#[from] std::io::Error),
-    /// It is not JSON.
-    #[error("{0}")]
-    Json(#[from] serde_json::Error),
-    /// More than is allowed.
-    #[error("{actual} is over the limit of {limit}")]
-    TooLarge {
-        /// Given.
-        actual: u64,
-        /// Allowed.
-        limit: u64,
-    },
-    /// Something that must be there is not.
-    #[error("is missing")]
-    Missing,
-    /// NaN, infinite, or of another type.
-    #[error("is {0}, must be a finite number")]
-    NotFinite(String),
-    /// Outside what the field allows.
-    #[error("is {value}, must be {allowed}")]
-    OutOfRange {
-        /// Given.
-        value: String,
-        /// Right.
-        allowed: &'static str,
-    },
-    /// A model or a distortion that a pinhole camera has not.
-    #[error("{0} is not supported: cameras here are pinholes without distortion")]
-    Unsupported(String),
-    /// The camera as a whole.
-    #[error(transparent)]
-    Camera(#[from] CameraError),
-}
-
-/// What a file does not say.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Placement {
-    /// The point of the file's space that is the world's origin.
-    pub origin_in_source: DVec3,
-    /// What is closer is not seen.
-    pub near_m: f32,
-}
 
 /// A fault and its place, before the file's name is known.
 struct Fault {
@@ -96,7 +33,7 @@ impl Fault {
 /// Reads all cameras of a file.
 ///
 /// # Errors
-/// Names the file, the frame, the field and the reason.
+/// The error names the file, the frame, the field and the reason.
 pub fn read(path: &Path, placement: Placement) -> Result<Vec<PinholeCamera>, CameraFileError> {
     let cameras = text_of(path).and_then(|text| parse(&text, placement));
     cameras.map_err(|fault| CameraFileError { file: path.display().to_string(), place: fault.place, kind: fault.kind })
@@ -107,7 +44,7 @@ fn text_of(path: &Path) -> Result<String, Fault> {
     let io = |error: std::io::Error| Fault::at("file", error.into());
     let file = std::fs::File::open(path).map_err(io)?;
     let mut text = String::new();
-    // One more than allowed: a pipe has no length to look at first.
+    // One byte more than allowed: a pipe has no length to check first.
     file.take(MAX_FILE_BYTES + 1).read_to_string(&mut text).map_err(io)?;
     at_most("file", text.len() as u64, MAX_FILE_BYTES)?;
     Ok(text)
@@ -129,14 +66,15 @@ fn parse(text: &str, placement: Placement) -> Result<Vec<PinholeCamera>, Fault> 
     frames.iter().enumerate().map(|(index, frame)| Frame::of(index, frame, shared)?.camera(placement)).collect()
 }
 
-/// Python writes NaN and Infinity, which JSON has not: as `null` they are reported with frame and field.
+/// Replaces NaN and Infinity, which Python writes and JSON does not have, by `null`: they are reported with frame and
+/// field.
 fn without_nan(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for (index, part) in text.split('"').enumerate() {
         if index > 0 {
             out.push('"');
         }
-        // Strings of camera files hold no escaped quotes; one that does is merely left as it is or refused.
+        // Strings of camera files hold no escaped quotes.
         if index % 2 == 0 {
             out.push_str(&part.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null"));
         } else {
@@ -146,7 +84,7 @@ fn without_nan(text: &str) -> String {
     out
 }
 
-/// A frame and what the file says for all frames.
+/// A frame, and the fields that the file has for all frames.
 struct Frame<'a> {
     index: usize,
     own: &'a Map<String, Value>,
@@ -266,48 +204,4 @@ impl<'a> Frame<'a> {
 fn finite(value: &Value) -> Result<f64, CameraFault> {
     let told = || if value.is_null() { "null, NaN or infinite".to_owned() } else { value.to_string() };
     value.as_f64().filter(|v| v.is_finite()).ok_or_else(|| CameraFault::NotFinite(told()))
-}
-
-/// A camera to write, with whatever else is to be known of it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NamedCamera {
-    /// `file_path`: the picture that it took.
-    pub file_path: String,
-    /// The camera.
-    pub camera: PinholeCamera,
-    /// More fields of its frame.
-    pub more: Map<String, Value>,
-}
-
-/// Writes cameras in the same convention; `more` goes beside the frames.
-///
-/// # Errors
-/// Where the file cannot be written.
-pub fn write(
-    path: &Path,
-    cameras: &[NamedCamera],
-    origin_in_source: DVec3,
-    more: Map<String, Value>,
-) -> Result<(), CameraFileError> {
-    let mut file = more;
-    file.insert("camera_model".to_owned(), json!("OPENCV"));
-    file.insert("frames".to_owned(), cameras.iter().map(|named| frame_of(named, origin_in_source)).collect());
-    let written =
-        serde_json::to_vec_pretty(&file).map_err(CameraFault::from).and_then(|text| Ok(std::fs::write(path, text)?));
-    written.map_err(|kind| CameraFileError { file: path.display().to_string(), place: "file".to_owned(), kind })
-}
-
-fn frame_of(named: &NamedCamera, origin_in_source: DVec3) -> Value {
-    let camera = &named.camera;
-    let axes = DMat3::from_quat(camera.world_from_camera.as_dquat().normalize());
-    let eye = camera.eye_in_world.as_dvec3() + origin_in_source;
-    let row = |i: usize| json!([axes.x_axis[i], axes.y_axis[i], axes.z_axis[i], eye[i]]);
-    let mut frame = named.more.clone();
-    let fields = json!({
-        "file_path": named.file_path, "w": camera.size_px.x, "h": camera.size_px.y,
-        "fl_x": camera.focal_px.x, "fl_y": camera.focal_px.y, "cx": camera.principal_px.x, "cy": camera.principal_px.y,
-        "transform_matrix": [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]],
-    });
-    frame.extend(fields.as_object().cloned().unwrap_or_default());
-    Value::Object(frame)
 }

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use app_core::cluster::Cluster;
-use app_core::delivery::{Wishes, open, receive};
+use app_core::delivery::{SessionSettings, open, receive};
 use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SizePx;
@@ -13,7 +13,7 @@ use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
-use lab::evaluate::{ALL_PLANES, Truth};
+use lab::reference_views::{ALL_PLANES, ReferenceViews};
 use node::{DirectWork, Engine as _, EngineError, SampleWork, ViewWork};
 use reconstruction::ReconstructionMethod;
 
@@ -27,18 +27,18 @@ fn views(setup: &Setup, count: usize) -> Vec<PinholeCamera> {
     ViewCell::between(&setup.samples).unwrap().spread(count, VIEW_SIZE)
 }
 
-fn truth(scene: &str, count: usize) -> (Arc<GpuEngine>, SceneArgs, Setup, Truth) {
+fn reference(scene: &str, count: usize) -> (Arc<GpuEngine>, SceneArgs, Setup, ReferenceViews) {
     let (engine, args) = (GpuEngine::shared(DevicePreference::Any).unwrap(), args(scene));
     let setup = args.load().unwrap();
-    let truth = Truth::take(&engine, &setup, &args, views(&setup, count)).unwrap();
-    (engine, args, setup, truth)
+    let reference = ReferenceViews::draw(&engine, &setup, &args, views(&setup, count)).unwrap();
+    (engine, args, setup, reference)
 }
 
 #[test]
 fn views_from_samples_are_as_those_from_the_scene() {
     for scene in ["uv-sphere", "courtyard"] {
-        let (_, _, _, truth) = truth(scene, 4);
-        let row = truth.evaluate(ReconstructionMethod::default(), 1).unwrap();
+        let (_, _, _, reference) = reference(scene, 4);
+        let row = reference.evaluate(ReconstructionMethod::default(), 1).unwrap();
         assert!(row.psnr_db > 30.0, "{scene}: {row:?}");
         assert!(row.wrong_hits < 0.05 && row.unknown < 0.1, "{scene}: {row:?}");
         assert!(row.fetches_a_ray > 0.0 && row.ms_a_view > 0.0, "{scene}: {row:?}");
@@ -47,10 +47,10 @@ fn views_from_samples_are_as_those_from_the_scene() {
 
 #[test]
 fn the_comparison_sees_views_of_another_place() {
-    let (engine, args, setup, truth) = truth("courtyard", 2);
-    let own = truth.evaluate(ReconstructionMethod::default(), 1).unwrap();
-    let mut moved = Truth::take(&engine, &setup, &args, views(&setup, 6).split_off(4)).unwrap();
-    moved.views.clone_from(&truth.views);
+    let (engine, args, setup, reference) = reference("courtyard", 2);
+    let own = reference.evaluate(ReconstructionMethod::default(), 1).unwrap();
+    let mut moved = ReferenceViews::draw(&engine, &setup, &args, views(&setup, 6).split_off(4)).unwrap();
+    moved.views.clone_from(&reference.views);
     let row = moved.evaluate(ReconstructionMethod::default(), 1).unwrap();
     assert!(row.psnr_db < own.psnr_db - 3.0 && row.flip > 2.0 * own.flip, "{row:?} {own:?}");
 }
@@ -60,8 +60,8 @@ fn is_invalid(error: &EngineError, named: &str) -> bool {
 }
 
 #[test]
-fn what_it_does_not_know_is_named() {
-    let (engine, args, setup, truth) = truth("uv-sphere", 1);
+fn unknown_names_are_refused_with_their_field() {
+    let (engine, args, setup, reference) = reference("uv-sphere", 1);
     let hash = setup.offer.hash.to_string();
     let samples: Vec<_> = setup.samples.iter().copied().map(Camera::Pinhole).collect();
     let sample = |scene_hash: &str, sampling: &str, lighting: &str| {
@@ -83,7 +83,7 @@ fn what_it_does_not_know_is_named() {
     assert!(is_invalid(&sample(&hash, "random", "unlit"), "sampling_method"));
     assert!(is_invalid(&sample(&hash, "conventional", "candles"), "lighting"));
     let set = node::SampleSet {
-        images: truth.images.clone(),
+        images: reference.images.clone(),
         volume: setup.offer.volume,
         background_linear: glam::Vec3::ZERO,
         illumination: setup.offer.illumination.clone(),
@@ -91,7 +91,7 @@ fn what_it_does_not_know_is_named() {
     };
     let uploaded = engine.upload(&set).unwrap();
     let work = |method: &str, near_m: f32| ViewWork {
-        cameras: vec![PinholeCamera { near_m, ..truth.cameras[0] }],
+        cameras: vec![PinholeCamera { near_m, ..reference.cameras[0] }],
         method: method.to_owned(),
         planes: ViewPlanes::default(),
     };
@@ -104,21 +104,21 @@ fn what_it_does_not_know_is_named() {
 
 #[test]
 fn a_package_loads_as_the_scene_does() {
-    let (engine, _, setup, truth) = truth("unit-cube", 2);
+    let (engine, _, setup, reference) = reference("unit-cube", 2);
     let package = scene::pack(&setup.scene);
     engine.load_scene("by package", &package.bytes).unwrap();
     assert!(engine.has_scene("by package"));
     let work = DirectWork {
         scene_hash: "by package".to_owned(),
-        cameras: truth.cameras.clone(),
+        cameras: reference.cameras.clone(),
         lighting: "phong".to_owned(),
         scene_time_s: 0.0,
         planes: ALL_PLANES,
     };
     let views = engine.draw_direct(&work).unwrap();
-    assert_eq!(views.len(), truth.views.len());
-    for (view, expected) in views.iter().zip(&truth.views) {
-        // Of rays and triangles the faster is taken, as timed for each package: they may differ in what an edge covers.
+    assert_eq!(views.len(), reference.views.len());
+    for (view, expected) in views.iter().zip(&reference.views) {
+        // The faster of rays and triangles is chosen by timing for each package; they may differ at edges.
         let same = view.srgb8.iter().zip(&expected.srgb8).filter(|(a, b)| a == b).count();
         let share = same as f64 / expected.srgb8.len() as f64;
         assert!(view.size_px == expected.size_px && share > 0.98, "{share}");
@@ -127,8 +127,8 @@ fn a_package_loads_as_the_scene_does() {
 
 #[test]
 fn a_cluster_gives_what_one_engine_gives() {
-    let (engine, args, setup, truth) = truth("uv-sphere", 16);
-    let alone = truth.reconstruct(args.method, ALL_PLANES).unwrap();
+    let (engine, args, setup, reference) = reference("uv-sphere", 16);
+    let alone = reference.reconstruct(args.method, ALL_PLANES).unwrap();
     let delivered = runtime().unwrap().block_on(async {
         let listener = listen(([127, 0, 0, 1], 0).into(), false).await.unwrap();
         let cluster = Cluster::start(listener, setup.offer.clone(), engine, 3, false).await.unwrap();
@@ -136,13 +136,13 @@ fn a_cluster_gives_what_one_engine_gives() {
         let offer = client.status().await.unwrap().offer.unwrap();
         assert_eq!((offer.sample_cameras, offer.settings), (setup.offer.rig.clone(), setup.offer.settings.clone()));
         let (method, sampling) = (args.method.to_string(), args.sampling.to_string());
-        let wishes = Wishes {
+        let settings = SessionSettings {
             policy: PolicyChoice::Pipeline,
             planes: ALL_PLANES,
-            ..Wishes::new(method, sampling, args.lighting.to_string())
+            ..SessionSettings::new(method, sampling, args.lighting.to_string())
         };
-        let session = open(&client, &wishes, &truth.cameras).await.unwrap();
-        let delivered = receive(&session, &truth.cameras, |_| ()).await.unwrap();
+        let session = open(&client, &settings, &reference.cameras).await.unwrap();
+        let delivered = receive(&session, &reference.cameras, |_| ()).await.unwrap();
         drop((session, client));
         cluster.drain().await.unwrap();
         delivered
