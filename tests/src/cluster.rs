@@ -96,7 +96,7 @@ pub struct Cluster {
     pub coordinator: Server,
     /// `n0`, `n1`…
     pub nodes: Vec<Server>,
-    /// What all nodes count together.
+    /// The counts of all nodes together.
     pub engines: Vec<ScalarEngine>,
     /// Connected.
     pub client: Client,
@@ -116,7 +116,7 @@ pub fn rig() -> Vec<Camera> {
     [-0.6, 0.0, 0.6].map(|x| Camera::Pinhole(camera(x, UVec2::new(64, 48)))).to_vec()
 }
 
-/// What a coordinator of the scalar device shows.
+/// The offer of a coordinator of the scalar device.
 #[must_use]
 pub fn offer() -> SceneOffer {
     let volume = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) };
@@ -155,7 +155,7 @@ pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
     }
 }
 
-/// So many views of each set, from left to right.
+/// `count` views of each set, from left to right.
 #[must_use]
 pub fn views(sets: u32, per_set: u32) -> Vec<ViewRequest> {
     let view = |i: u32| ViewRequest {

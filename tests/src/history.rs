@@ -13,11 +13,11 @@ use coordinator::schedule::{Command, replay};
 pub struct Seen {
     /// The client's number.
     pub frame: u64,
-    /// Of the plan that made it.
+    /// The plan that made it.
     pub plan_epoch: u64,
-    /// What it shows.
+    /// The set that it shows.
     pub set_index: u64,
-    /// What is wrong with its picture.
+    /// The fault of its picture.
     pub fault: Option<String>,
 }
 
@@ -30,9 +30,9 @@ pub struct Call {
     pub ended: Instant,
     /// The numbers asked for.
     pub wanted: std::ops::Range<u64>,
-    /// Of which sample set.
+    /// The sample set of the views.
     pub set_index: u64,
-    /// What came.
+    /// The frames that were received.
     pub frames: Vec<Seen>,
     /// Why not all came.
     pub error: Option<String>,
@@ -41,11 +41,11 @@ pub struct Call {
 /// All that is known of one cluster.
 #[derive(Debug, Clone, Default)]
 pub struct History {
-    /// Of one client, in their order.
+    /// The calls of one client, in their order.
     pub calls: Vec<Call>,
     /// The plans that the client was given.
     pub plans: Vec<Assignment>,
-    /// What coordinators recorded, the first one's log first.
+    /// The records of coordinators, the first one's log first.
     pub logs: Vec<Vec<u8>>,
 }
 

@@ -18,26 +18,26 @@ use crate::random::Random;
 const PIECE_BYTES: usize = 8 << 10;
 /// Pieces under way: more would be a network with more memory than routers have.
 const PIECES_UNDER_WAY: usize = 16;
-/// Of each socket, so that what is under way can be seen from outside.
+/// The buffer of each socket, small so that bytes in flight can be seen from outside.
 const SOCKET_BYTES: u32 = 64 << 10;
 
-/// What happens to the bytes of one direction.
+/// The treatment of the bytes of one direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Way {
     /// They arrive.
     Pass,
-    /// They wait, and whoever sent them hears nothing: a cable that was cut, a host without power.
+    /// They wait, and their sender hears nothing: a cable that was cut, a host without power.
     Stall,
     /// They arrive later, in their order; in one of `one_in` pieces a segment was lost and is sent again.
     Late {
         /// At least.
         delay: Duration,
-        /// At most so much more.
+        /// At most this much more.
         jitter: Duration,
         /// 0: none is lost.
         one_in: u64,
     },
-    /// So many a second.
+    /// Bytes a second.
     Slow {
         /// The rate.
         bytes_per_s: f64,
@@ -49,7 +49,7 @@ pub enum Way {
     },
 }
 
-/// What a lost segment costs: the least time after which Linux sends it again.
+/// The delay of a lost segment: the least time after which Linux sends it again.
 const RETRANSMISSION: Duration = Duration::from_millis(200);
 
 /// Both directions.
@@ -59,7 +59,7 @@ pub struct Network {
     pub forth: Way,
     /// And back.
     pub back: Way,
-    /// Whether connections are reset as soon as they come.
+    /// Whether connections are reset on arrival.
     pub refuses: bool,
     /// Connections of before this number rose are reset.
     cuts: u64,
@@ -84,7 +84,7 @@ impl Drop for Proxy {
 }
 
 impl Proxy {
-    /// Passes all on to what is told later; what comes before that waits. `seed` is that of delays and spoilt bytes.
+    /// Forwards all connections to an address that is set later; connections before that wait. `seed` is that of delays and corrupted bytes.
     ///
     /// # Panics
     /// Where there is no port.
@@ -125,7 +125,7 @@ impl Proxy {
         self.network.send_modify(|network| (network.forth, network.back) = (forth, back));
     }
 
-    /// Nothing gets through, and nobody is told.
+    /// No byte gets through, and neither side is notified.
     pub fn partition(&self) {
         self.set(Way::Stall, Way::Stall);
     }
@@ -240,7 +240,7 @@ async fn take(
     }
 }
 
-/// The time that pieces take one after the other; spoils those that are to be spoilt.
+/// The time that pieces take one after the other; corrupts those that are to be corrupted.
 fn spent(way: Way, bytes: &mut [u8], random: &mut Random) -> Duration {
     match way {
         Way::Slow { bytes_per_s } => Duration::from_secs_f64(bytes.len() as f64 / bytes_per_s),
@@ -268,7 +268,7 @@ async fn give(
 ) -> io::Result<()> {
     let mut last = Instant::now();
     while let Some((due, bytes)) = receive.recv().await {
-        // What was lost holds up what comes after it.
+        // A lost piece delays those after it.
         last = last.max(due);
         sleep_until(last).await;
         if network.wait_for(|network| way(network) != Way::Stall).await.is_err() {

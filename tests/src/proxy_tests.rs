@@ -1,4 +1,4 @@
-//! The proxy does what it is told, or tests behind it would pass for nothing.
+//! The proxy follows its orders; without that, tests behind it would prove nothing.
 
 use std::io::ErrorKind;
 
@@ -25,7 +25,7 @@ async fn connected(proxy: &Proxy) -> TcpStream {
     TcpStream::connect(proxy.address.trim_start_matches("http://")).await.unwrap()
 }
 
-/// What comes back for so many bytes, within a second, and how long that takes.
+/// The bytes that are echoed within a second, and the time that this takes.
 async fn echoed(stream: &mut TcpStream, count: usize) -> io::Result<(Vec<u8>, Duration)> {
     let start = Instant::now();
     let mut bytes = vec![7; count];

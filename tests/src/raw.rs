@@ -1,4 +1,4 @@
-//! What no client of ours would send: any bytes as a message, and HTTP/2 by hand.
+//! Messages that no client of ours sends: any bytes, and HTTP/2 by hand.
 
 use bytes::{Buf, BufMut, Bytes};
 use tonic::client::Grpc;

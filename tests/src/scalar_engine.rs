@@ -20,7 +20,7 @@ use parking_lot::Mutex;
 
 /// The floor's colour.
 pub const FLOOR_LINEAR: Vec3 = Vec3::new(0.1, 0.6, 0.2);
-/// What rays meet that leave the scene.
+/// Radiance of rays that leave the scene.
 pub const SKY_LINEAR: Vec3 = Vec3::new(0.0, 0.0, 0.25);
 
 /// A lamp above the ball, and a sky; the scalar device checks that they arrive and shades with neither.
@@ -52,7 +52,7 @@ pub fn srgb8(linear: Vec3) -> [u8; 3] {
 /// Images sampled, by eye and first row, scene time and step: how often.
 pub type SampleCounts = HashMap<([u32; 4], u32, Refinement), usize>;
 
-/// What the device takes at the least, so that it is as fast as a test says on whatever machine.
+/// The least times of the device, so that it is as fast as a test demands on any machine.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Pace {
     /// For one sample image.
@@ -197,7 +197,7 @@ fn known(field: &'static str, value: &str, known: &str) -> Result<(), EngineErro
 }
 
 impl ScalarEngine {
-    /// What was sampled since the last call.
+    /// The images that were sampled since the last call.
     #[must_use]
     pub fn take_counts(&self) -> SampleCounts {
         std::mem::take(&mut self.counts.lock())

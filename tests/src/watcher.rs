@@ -22,16 +22,16 @@ const PAUSE: Duration = Duration::from_millis(20);
 /// needed all the time.
 pub const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 0.05, set_count: 40 };
 
-/// The session that is watched.
+/// The session under test.
 #[must_use]
 pub fn watched() -> SessionRequest {
     request(PolicyChoice::Pipeline, MOVING)
 }
 
-/// Asks until it is told to stop.
+/// Requests frames until it is stopped.
 #[derive(Debug)]
 pub struct Watcher {
-    /// What it asks by.
+    /// The session of the requests.
     pub session: Arc<Session>,
     history: Arc<Mutex<History>>,
     asking: JoinHandle<()>,
@@ -73,7 +73,7 @@ impl Watcher {
         self.session.plan().assignment.plan_epoch
     }
 
-    /// Waits for so many calls that began after `since` and were answered in full.
+    /// Waits for `count` calls that began after `since` and were answered in full.
     ///
     /// # Panics
     /// Where they take longer than `deadline`.

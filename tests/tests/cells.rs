@@ -65,10 +65,10 @@ async fn views_from_all_sides_are_equally_good() {
     assert!(of_rig[..12].is_sorted_by(|a, b| a >= b) && of_rig[12] < 0.5 * of_rig[0], "{of_rig:?}");
     assert!(of_cells.iter().all(|known| (known / of_rig[0] - 1.0).abs() < 0.01), "{of_cells:?}");
     let images = plan.image_count();
-    assert_eq!(cluster.take_counts(), vec![1; images], "each image once, whoever made views of it");
+    assert_eq!(cluster.take_counts(), vec![1; images], "each image once, for any compositors");
 }
 
-/// What changes elsewhere costs nothing here.
+/// A change of other cells costs nothing in these.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_that_opens_or_closes_samples_no_other_cell_again() {
     let cluster = Cluster::start(3).await;

@@ -83,7 +83,7 @@ async fn every_number_of_samplers_gives_the_same_pictures() {
     assert!(error.contains("forced_sampler_count is 4, at most 3"), "{error}");
 }
 
-/// Whole sets in turn: each image once, whatever K, and the same pictures.
+/// Whole sets in turn: each image once for any K, and the same pictures.
 #[tokio::test(flavor = "multi_thread")]
 async fn sets_of_sequential_images_stay_on_one_node() {
     let cluster = Cluster::start(4).await;

@@ -1,4 +1,4 @@
-//! What goes wrong in a cluster is refused, named and survived.
+//! Faults and bad requests are refused by name, and the cluster survives them.
 #![allow(clippy::unwrap_used)]
 
 use std::time::Duration;
@@ -44,7 +44,7 @@ fn raw_request(session: &Session) -> RenderViews {
 async fn old_plans_are_refused_everywhere() {
     let cluster = Cluster::start(2).await;
     let old = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
-    // Of another workload: sessions of one share a plan.
+    // A session of another workload: sessions of the same share a plan.
     let other = cluster::SessionRequest { refinement_steps: 2, ..request(PolicyChoice::Pipeline, MOVING) };
     let new = cluster.session(other).await.unwrap();
     let (old_plan, new_plan) = (&old.plan().assignment, &new.plan().assignment);

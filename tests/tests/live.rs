@@ -1,4 +1,4 @@
-//! What clients see while nodes come and go: whole pictures, each of one set, and all that they asked for.
+//! Clients receive all frames they request, each of one set, while nodes join and leave.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::{BTreeSet, HashMap};

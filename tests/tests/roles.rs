@@ -1,4 +1,4 @@
-//! What plans say beside who does what: tiles, relays, demand that changes, and what nodes report of their work.
+//! Plans beyond their roles: tiles, relays, changes of demand, and reports of nodes.
 #![allow(clippy::unwrap_used)]
 
 use std::num::NonZeroU32;
@@ -19,7 +19,7 @@ fn pipeline() -> SessionRequest {
     request(PolicyChoice::Pipeline, MOVING)
 }
 
-/// What share of all pixels' bytes two deliveries have in common.
+/// The share of all pixels' bytes that two deliveries have in common.
 fn alike(a: &[Frame], b: &[Frame]) -> f64 {
     let (mut same, mut all) = (0, 0);
     for frame in a {
