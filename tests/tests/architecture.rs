@@ -41,7 +41,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "client",
             "cluster",
-            "codec",
             "coordinator",
             "depth-image",
             "gpu",
@@ -52,7 +51,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "sampling",
             "scene",
             "table",
-            "wire",
         ],
     ),
     (
