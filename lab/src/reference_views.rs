@@ -131,7 +131,7 @@ fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result
         method: args.method.to_string(),
         lighting: args.lighting.to_string(),
         scene_time_s: 0.0,
-        settled_at_s: None,
+        temporal_reference_s: None,
         refinement: cluster::Refinement::default(),
     };
     engine.sample(&work)?.iter().map(encoded_and_decoded).collect()

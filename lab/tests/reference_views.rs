@@ -74,7 +74,7 @@ fn unknown_names_are_refused_with_their_field() {
                 method: "joint_carve".to_owned(),
                 lighting: lighting.to_owned(),
                 scene_time_s: 0.0,
-                settled_at_s: None,
+                temporal_reference_s: None,
                 refinement: cluster::Refinement::default(),
             })
             .unwrap_err()

@@ -254,7 +254,7 @@ fn crates_use_only_what_the_table_allows() {
 }
 
 #[test]
-fn a_new_arrow_a_new_crate_and_a_lost_crate_are_seen() {
+fn a_new_arrow_a_new_crate_and_a_lost_crate_are_found() {
     let all = members();
     assert_eq!(forbidden(&all, &[arrow("client", "gpu")]), ["client -> gpu"]);
     assert_eq!(forbidden(&all, &[arrow("depth-image", "scene")]), ["depth-image -> scene"]);

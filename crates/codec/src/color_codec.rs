@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn colors_that_stay_take_a_bit_each() {
+    fn constant_colors_take_a_bit_each() {
         let mut bytes = Vec::new();
         pack_colors(&[0; 1001], &mut bytes);
         assert_eq!(bytes[..126], [0; 126]);

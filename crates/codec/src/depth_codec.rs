@@ -145,7 +145,7 @@ mod tests {
     use crate::test_planes::{Random, tree_over_terrain};
 
     #[test]
-    fn prediction_inverts() {
+    fn decoding_inverts_prediction() {
         let mut random = Random::new(3);
         for length in (0..20).chain([1000]) {
             let mask = if length % 2 == 0 { 0xffff } else { 0x1ff };
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_leaves_almost_nothing() {
+    fn a_plane_in_the_world_packs_to_almost_nothing() {
         let codes: Vec<_> = (0..10_000).map(|x| 1000 + x * 3).collect();
         let mut residuals = vec![0; codes.len()];
         predict(&codes, &mut residuals);
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn halves_raw_lz4_on_a_tree() {
+    fn a_tree_packs_to_half_of_raw_lz4() {
         let plane = tree_over_terrain(400, 300, 4);
         let encoded = encode_depth(&plane);
         let packed = lz4_flex::block::compress(&encoded.bytes).len();

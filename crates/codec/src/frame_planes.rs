@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_that_is_not_finite_comes_out() {
+    fn numbers_that_are_not_finite_are_not_decoded() {
         let packed = pack_f32_plane(&[0.5, f32::NAN, f32::INFINITY, -0.0]);
         assert_eq!(unpack_f32_plane(&packed, 4), Ok(vec![0.5, HOLE_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, 0.0]));
         assert!(unpack_f32_plane(&pack_u32_plane(&[f32::NAN.to_bits()]), 1).is_err());

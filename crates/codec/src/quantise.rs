@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_becomes_a_hole() {
+    fn numbers_that_are_not_finite_become_holes() {
         let hole = HOLE_INVERSE_DEPTH;
         let (range, back) = round_trip(&[f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.5, -0.0, 0.5, 0.25]);
         assert_eq!(back, [hole, hole, hole, hole, 0.0, 0.5, 0.25]);

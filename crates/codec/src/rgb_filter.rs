@@ -34,7 +34,7 @@ mod tests {
     use crate::test_planes::Random;
 
     #[test]
-    fn filtering_inverts() {
+    fn unfiltering_inverts_filtering() {
         let mut random = Random::new(20);
         let rgb: Vec<[u8; 3]> = (0..1000).map(|_| [0; 3].map(|_: u8| random.next_u32() as u8)).collect();
         let mut filtered = filter(&rgb);

@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stages_make_the_whole() {
+    fn stages_add_up_to_the_whole() {
         let made = StageTimes {
             set_wait_s: 0.1,
             credit_wait_s: 0.2,

@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn zigzag_inverts() {
+    fn unzigzag_inverts_zigzag() {
         assert!((0..=u16::MAX).all(|difference| unzigzag(zigzag(difference)) == difference));
         assert_eq!([0, 1, u16::MAX, 2].map(zigzag), [0, 2, 1, 4]);
     }

@@ -153,14 +153,14 @@ mod tests {
     }
 
     #[test]
-    fn views_come_back_to_the_bit() {
+    fn views_survive_to_the_bit() {
         for view in [view(false), view(true)] {
             assert_eq!(decode_view(&sent(&view), &DecodeLimits::default()).unwrap(), view);
         }
     }
 
     #[test]
-    fn wrong_lengths_are_refused() {
+    fn planes_of_wrong_lengths_are_refused() {
         let limits = DecodeLimits::default();
         let good = sent(&view(true));
         let spoilt = |change: &dyn Fn(&mut WholeFrame)| {

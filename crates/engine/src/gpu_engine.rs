@@ -168,11 +168,11 @@ impl Engine for GpuEngine {
         self.scenes.lock().iter().any(|(kept, _)| kept == hash)
     }
 
-    fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError> {
+    fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
         Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.is_chained())
     }
 
-    fn samples_alone(&self, sampling: &str) -> Result<bool, EngineError> {
+    fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError> {
         Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.leave_out().is_none())
     }
 
@@ -190,7 +190,7 @@ impl Engine for GpuEngine {
             wanted: &request.wanted,
             method: parsed("sampling_method", &request.sampling)?,
             planes: planes_for(method),
-            settled_at_s: request.settled_at_s,
+            temporal_reference_s: request.temporal_reference_s,
         };
         self.sampler.sample(&work).map_err(sampling_error)
     }

@@ -49,9 +49,9 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
     let (encoded, sample_s) = timed(|| sampled(engine, &sample))?;
     let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?)?))?;
     let (made, reconstruct_view_s) = reconstruct_view_s(engine, set.as_ref(), request)?;
-    let in_order = engine.samples_in_order(&workload.sampling)?;
+    let in_order = engine.images_are_sequential(&workload.sampling)?;
     let sample_image_s = sample_s / encoded.len().max(1) as f64;
-    let is_tileable = engine.samples_alone(&workload.sampling)?;
+    let is_tileable = engine.images_are_independent(&workload.sampling)?;
     Ok(Costs {
         sample_image_s,
         tiles: if is_tileable { tile_costs(engine, &sample, sample_image_s)? } else { None },
@@ -108,7 +108,7 @@ pub(crate) fn sample_work(workload: &Workload) -> SampleWork {
         method: workload.method.clone(),
         lighting: workload.lighting.clone(),
         scene_time_s: workload.timeline.start_s as f32,
-        settled_at_s: None,
+        temporal_reference_s: None,
         refinement: Refinement::default(),
     }
 }

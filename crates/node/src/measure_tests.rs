@@ -86,11 +86,11 @@ impl Engine for Sleeper {
         true
     }
 
-    fn samples_alone(&self, _: &str) -> Result<bool, EngineError> {
+    fn images_are_independent(&self, _: &str) -> Result<bool, EngineError> {
         Ok(self.parts_s.is_some())
     }
 
-    fn samples_in_order(&self, _: &str) -> Result<bool, EngineError> {
+    fn images_are_sequential(&self, _: &str) -> Result<bool, EngineError> {
         Ok(false)
     }
 
@@ -147,7 +147,7 @@ fn measured(engine: Sleeper, batch_count: u32) -> (Costs, Asked) {
 }
 
 #[test]
-fn quick_operations_run_three_times_after_one_that_does_not_count() {
+fn quick_operations_run_three_times_after_a_warm_up() {
     // The first draw builds shaders for longer than a view may take.
     let engine = Sleeper { direct_view_s: 1e-3, build_s: 0.6, ..Sleeper::default() };
     let (costs, asked) = measured(engine, 32);
@@ -158,7 +158,7 @@ fn quick_operations_run_three_times_after_one_that_does_not_count() {
 }
 
 #[test]
-fn slow_operations_run_once_after_one_that_does_not_count() {
+fn slow_operations_run_once_after_a_warm_up() {
     let (costs, asked) = measured(Sleeper { sample_s: 0.51, direct_view_s: 0.51, ..Sleeper::default() }, 32);
     assert_eq!((asked.refinements.len(), asked.drawn_views), (2, vec![1, 1]));
     assert!((0.51..2.0).contains(&costs.direct_view_s), "{costs:?}");
@@ -166,14 +166,14 @@ fn slow_operations_run_once_after_one_that_does_not_count() {
 }
 
 #[test]
-fn as_many_views_are_drawn_as_there_is_time_for() {
+fn as_many_views_are_drawn_as_time_allows() {
     let views = [1e-9, 0.01, 0.09, 0.3, 0.6, 40.0].map(|alone_s| direct_views(alone_s, 32));
     assert_eq!(views, [32, 32, 11, 3, 1, 1]);
     assert_eq!((direct_views(0.0, 32), direct_views(f64::NAN, 32), direct_views(0.1, 1)), (32, 1, 1));
 }
 
 #[test]
-fn what_a_tile_costs_beyond_its_rows_follows_from_tiles_of_all_heights() {
+fn the_overhead_of_a_tile_follows_from_tiles_of_two_heights() {
     // One tile, of whatever height, would say 0 or 0.053 s.
     let engine = Sleeper { parts_s: Some((0.02, [0.0, 0.0, 0.04, 0.04])), ..Sleeper::default() };
     let (costs, _) = measured(engine, 1);

@@ -46,7 +46,7 @@ pub struct SampleWork<'a> {
     /// Planes beside colour and depth.
     pub planes: SamplePlanes,
     /// A moment of a moving scene, what is kept at which is kept on to, where the method settles.
-    pub settled_at_s: Option<f32>,
+    pub temporal_reference_s: Option<f32>,
 }
 
 /// Takes samples; shares its pipelines with direct rendering.

@@ -31,7 +31,7 @@ impl Settling {
         leave_out: LeaveOut,
     ) -> Result<Option<Settled>, RenderError> {
         let moves = |&time_s: &f32| work.method.settles() && time_s != work.draw.scene_time_s;
-        let Some(time_s) = work.settled_at_s.filter(moves) else { return Ok(None) };
+        let Some(time_s) = work.temporal_reference_s.filter(moves) else { return Ok(None) };
         let (scene, cameras) = (work.draw.scene.identity(), work.cameras.to_vec());
         let moment = Moment { scene, time_s, cameras, method: work.method };
         let mut last = self.0.lock().unwrap_or_else(PoisonError::into_inner);

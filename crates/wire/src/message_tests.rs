@@ -125,7 +125,7 @@ fn views() -> RenderViews {
 }
 
 #[test]
-fn messages_come_back() {
+fn messages_survive_the_round_trip() {
     assert_eq!(Assignment::try_from(proto::Assignment::from(assignment())), Ok(assignment()));
     let mut cells = Assignment { tile_count: 2, relay_fanout: NonZeroU32::new(3), ..assignment() };
     cells.workload.cell_first_indices = vec![0, 1];
@@ -201,7 +201,7 @@ fn work_report() -> WorkReport {
 }
 
 #[test]
-fn bad_reports_and_demands_are_refused() {
+fn bad_reports_and_changes_are_refused_by_field() {
     let spoilt = |spoil: &dyn Fn(&mut proto::ReportWorkRequest)| {
         let mut message = proto::ReportWorkRequest::from(work_report());
         spoil(&mut message);
@@ -248,7 +248,7 @@ fn spoilt_camera(spoil: impl FnOnce(&mut proto::PinholeCamera)) -> String {
 }
 
 #[test]
-fn bad_cameras_are_refused() {
+fn bad_cameras_are_refused_by_field() {
     assert!(spoilt_camera(|c| c.eye_in_world_m = None).contains("eye_in_world_m"));
     assert!(spoilt_camera(|c| c.eye_in_world_m.as_mut().unwrap().x = f32::NAN).contains("eye_in_world"));
     assert!(
@@ -262,7 +262,7 @@ fn bad_cameras_are_refused() {
 }
 
 #[test]
-fn bad_counts_are_refused() {
+fn bad_counts_are_refused_by_field() {
     assert!(spoilt_views(|m| m.views.clear()).contains("views is missing"));
     assert!(spoilt_views(|m| m.views = vec![proto::RequestedView::default(); 1_000_000]).contains("views has 1000000"));
     assert!(spoilt_views(|m| m.frame_codec = "x".repeat(300)).contains("frame_codec"));
@@ -301,7 +301,7 @@ fn other_versions_are_refused_before_anything_else() {
 }
 
 #[test]
-fn without_a_wish_every_set_is_finished() {
+fn a_request_without_refinement_steps_has_one() {
     let message = proto::OpenSessionRequest { refinement_step_count: 0, ..request().into() };
     assert_eq!(SessionRequest::try_from(message).map(|request| request.refinement_steps), Ok(1));
 }
@@ -317,7 +317,7 @@ fn spoilt_light(place: usize, spoil: impl FnOnce(&mut proto::light::Kind)) -> St
 }
 
 #[test]
-fn bad_lights_are_refused() {
+fn bad_lights_are_refused_by_field() {
     use proto::light::Kind;
 
     assert!(spoilt_workload(|w| w.illumination = None).contains("workload.illumination is missing"));
@@ -354,7 +354,7 @@ fn bad_lights_are_refused() {
 }
 
 #[test]
-fn as_many_lights_as_have_a_plane_come_back() {
+fn the_largest_number_of_lights_survives_the_round_trip() {
     let light = illumination().lights[1];
     let most = Illumination { lights: vec![light; MAX_LIGHTS], ..illumination() };
     assert_eq!(MAX_VISIBILITY_PLANES, 64);
@@ -398,13 +398,13 @@ fn header() -> FrameHeader {
 }
 
 #[test]
-fn headers_come_back_with_their_pose() {
+fn frame_headers_survive_with_their_camera() {
     let header = header();
     assert_eq!(FrameHeader::try_from(proto::FrameHeader::from(header.clone())), Ok(header));
 }
 
 #[test]
-fn headers_that_claim_too_much_are_refused() {
+fn frame_headers_that_claim_too_much_are_refused() {
     let spoil = |change: &dyn Fn(&mut proto::FrameHeader)| {
         let mut message = proto::FrameHeader::from(header());
         change(&mut message);
@@ -421,7 +421,7 @@ fn headers_that_claim_too_much_are_refused() {
 }
 
 #[test]
-fn impossible_stage_times_are_named() {
+fn impossible_stage_times_are_refused_by_field() {
     let spoil = |change: &dyn Fn(&mut proto::StageTimes)| {
         let mut message = proto::StageTimes::from(StageTimes::default());
         change(&mut message);

@@ -84,7 +84,7 @@ impl Tour {
     /// The frame does not come.
     pub async fn warm(&self) -> anyhow::Result<(Session, LiveView)> {
         let (session, mut live) = self.idle().await?;
-        live.look(self.path[0], 0)?;
+        live.set_pose(self.path[0], 0)?;
         live.next().await?;
         Ok((session, live))
     }

@@ -110,8 +110,14 @@ impl Subject {
     ) -> anyhow::Result<Vec<DepthImage>> {
         let cameras: Vec<Camera> = self.cameras(method, size_px).into_iter().map(Camera::Pinhole).collect();
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-        let work =
-            SampleWork { draw: self.work(), cameras: &cameras, wanted: &wanted, method, planes, settled_at_s: None };
+        let work = SampleWork {
+            draw: self.work(),
+            cameras: &cameras,
+            wanted: &wanted,
+            method,
+            planes,
+            temporal_reference_s: None,
+        };
         Ok(self.sampler.sample(&work)?)
     }
 

@@ -60,7 +60,7 @@ async fn show(session: &Session, set_index: u32) -> Duration {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn spoilt_chunks_are_asked_for_again() {
+async fn spoilt_chunks_are_fetched_again() {
     let (cluster, manglers) = start(2).await;
     let session = session(&cluster).await;
     show(&session, 0).await;
@@ -90,7 +90,7 @@ async fn left_out((what, spoil): (&str, Spoil)) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn who_sends_nothing_but_spoilt_chunks_is_left_out() {
+async fn a_sampler_that_sends_only_spoilt_chunks_is_quarantined() {
     for spoilt in [SPOILT[0], SPOILT[1], SPOILT[5]] {
         left_out(spoilt).await;
     }

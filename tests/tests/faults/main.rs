@@ -1,6 +1,6 @@
-//! Faults, injected into real processes, real sockets and what is sent between them. Each test holds what a client saw
-//! and what the coordinator recorded against the invariants, and prints how long clients went without frames.
-//! `docs/faults.md` has the table.
+//! Faults, injected into real processes, real sockets and the data between them. Each test checks the client's frames
+//! and the coordinator's records against the invariants, and prints the longest time without frames. `docs/faults.md`
+//! has the table.
 #![allow(clippy::unwrap_used)]
 
 mod bad_input;
@@ -14,14 +14,14 @@ use client::Session;
 use cluster_tests::processes::Processes;
 use cluster_tests::watcher::Watcher;
 
-/// The program that is killed.
+/// The program that tests kill.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_scalar_cluster");
-/// Complete frames come again after a closed connection.
+/// Greatest time until complete frames after a closed connection.
 const CLOSED: Duration = Duration::from_secs(5);
-/// And after a silent loss.
+/// Greatest time until complete frames after a silent loss.
 const SILENT: Duration = Duration::from_secs(15);
 
-/// Prints the time to heal. Nothing may have been violated, by what the coordinators wrote down either.
+/// Prints the time to recover, and checks all invariants, also in the coordinators' logs.
 fn finish(what: &str, wait: Duration, cluster: &Processes, watcher: &Watcher) {
     let mut history = watcher.history();
     cluster.logs().iter().for_each(|log| history.add_log(log).unwrap());

@@ -51,8 +51,7 @@ async fn frames_go_on_without_a_coordinator_and_a_plan_follows_its_return() {
     );
 }
 
-/// What is lost without a word: sockets stay open, and nothing answers. Afterwards the process goes on as if nothing
-/// had been.
+/// Stops a process silently: its sockets stay open, and it does not answer. Later it continues.
 async fn stopped(what: &str, victim: fn(&Session) -> String) {
     let cluster = Processes::start(PROGRAM, 3).await;
     let watcher = Watcher::start(&cluster.client).await;
@@ -68,9 +67,9 @@ async fn stopped(what: &str, victim: fn(&Session) -> String) {
     finish(what, wait, &cluster, &watcher);
 }
 
-/// Keepalive takes up to 10 s to notice: all at the same time.
+/// Keepalive takes up to 10 s to notice, so that all faults run at the same time.
 #[tokio::test(flavor = "multi_thread")]
-async fn stopped_processes_are_replaced_and_fenced_when_they_go_on() {
+async fn stopped_processes_are_replaced_and_fenced_when_they_continue() {
     tokio::join!(
         stopped("sampler stopped", sampler_of),
         stopped("compositor stopped", compositor_of),
@@ -92,7 +91,7 @@ async fn stopped_coordinator() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_that_is_asked_to_end_does_so_under_load_and_no_frame_is_lost() {
+async fn a_node_that_is_terminated_under_load_ends_and_no_frame_is_lost() {
     let mut cluster = Processes::start(PROGRAM, 3).await;
     let watcher = Watcher::start(&cluster.client).await;
     for victim in [compositor_of, sampler_of] {
@@ -107,19 +106,19 @@ async fn a_node_that_is_asked_to_end_does_so_under_load_and_no_frame_is_lost() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_whose_device_is_lost_ends_and_others_take_its_place() {
+async fn a_node_whose_device_is_lost_ends_and_is_replaced() {
     let mut cluster = Processes::start(PROGRAM, 3).await;
     let watcher = Watcher::start(&cluster.client).await;
     let (name, since) = (compositor_of(&watcher.session), Instant::now());
     let node = &mut cluster.nodes[number_of(&name)];
     node.signal(Signal::USR1);
     let (status, _) = node.ended(CLOSED).await;
-    assert!(!status.success(), "whoever started it may start it again");
+    assert!(!status.success(), "its supervisor may start it again");
     let wait = watcher.healed(since, CLOSED, |session| !has_role(session, &name)).await;
     finish("device of a compositor lost", wait, &cluster, &watcher);
 }
 
-/// What was sampled is kept: the sampler's device is needed again for another workload only, and to measure its costs.
+/// Samples are kept: the sampler's device is used again only for another workload, and to measure its costs.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_opens_though_a_device_is_lost_meanwhile() {
     let mut cluster = Processes::start(PROGRAM, 3).await;

@@ -90,7 +90,7 @@ impl Driving<'_> {
         self.due += self.plan().frame_rate_ratio;
         if self.due >= 1.0 {
             self.due -= 1.0;
-            self.last_frame = self.live.look(camera, set_index)?;
+            self.last_frame = self.live.set_pose(camera, set_index)?;
         }
         Ok(())
     }

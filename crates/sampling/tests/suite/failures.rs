@@ -19,7 +19,7 @@ fn sample(scene: &GpuScene, cameras: &[PinholeCamera], method: SamplingMethod) -
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let cameras = pinholes(cameras);
     let planes = SamplePlanes { normal: true, surface_id: true, ..SamplePlanes::default() };
-    let work = SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes, settled_at_s: None };
+    let work = SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes, temporal_reference_s: None };
     device().sampler.sample(&work).expect("images")
 }
 
@@ -191,10 +191,11 @@ fn settled_sets_do_not_depend_on_their_order() {
     let scene = upload(&grass(GrassDensity::new(0.2).expect("a density")));
     let eye = |x: f32| PinholeCamera::looking_at(Vec3::new(x, 1.2, 3.0), Vec3::ZERO, Vec3::Y, 0.7, SIZE_PX);
     let cameras = pinholes(&[eye(-0.2), eye(0.2)]);
-    let at = |scene_time_s: f32, settled_at_s: Option<f32>| {
+    let at = |scene_time_s: f32, temporal_reference_s: Option<f32>| {
         let draw = DrawWork { scene_time_s, ..unlit(&scene) };
         let planes = SamplePlanes::default();
-        let work = SampleWork { draw, cameras: &cameras, wanted: &[0, 1], method: TOLERANCE, planes, settled_at_s };
+        let work =
+            SampleWork { draw, cameras: &cameras, wanted: &[0, 1], method: TOLERANCE, planes, temporal_reference_s };
         device().sampler.sample(&work).expect("images")
     };
     let later = at(0.4, Some(0.0));

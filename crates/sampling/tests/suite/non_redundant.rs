@@ -33,7 +33,7 @@ fn taken(
         wanted: &wanted,
         method,
         planes: ALL,
-        settled_at_s: None,
+        temporal_reference_s: None,
     })
 }
 
@@ -228,7 +228,7 @@ fn what_needs_no_earlier_image_can_be_taken_apart() {
             wanted,
             method,
             planes: ALL,
-            settled_at_s: None,
+            temporal_reference_s: None,
         })
     };
     assert_eq!(part(&[3, 1], method).expect("two images"), [whole[3].clone(), whole[1].clone()]);

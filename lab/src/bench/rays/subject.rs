@@ -3,7 +3,6 @@
 use anyhow::Context as _;
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use engine::GpuEngine;
-use glam::UVec2;
 use node::Engine as _;
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 

@@ -1,4 +1,4 @@
-//! Who gets which views, and who passes images on to whom.
+//! The distribution of views among compositors, and the receivers of images under a relay.
 
 use client::WorkStealing;
 use cluster::Assignment;
@@ -10,14 +10,14 @@ pub(crate) fn compositors_of(plan: &Assignment) -> Vec<usize> {
     plan.compositors.iter().filter_map(|share| number_of(&share.node_name)).collect()
 }
 
-/// The views of all sets, as clients deal them.
-pub(crate) fn deal_of(plan: &Assignment, views: usize, sets: u32) -> WorkStealing {
+/// The views of all sets, shared out as clients do.
+pub(crate) fn unrequested_views(plan: &Assignment, views: usize, sets: u32) -> WorkStealing {
     let weights: Vec<u32> = plan.compositors.iter().map(|share| share.view_weight).collect();
     WorkStealing::new((0..sets).map(|_| views), &weights)
 }
 
-/// The receivers of each of `nodes` nodes that samples: all compositors, from the one behind it on, so that several
-/// samplers begin with different ones.
+/// The receivers of each sampler's images, by node: all compositors, from the one behind it on, so that several samplers
+/// begin with different ones.
 pub(crate) fn receivers(plan: &Assignment, compositors: &[usize], nodes: usize) -> Vec<Vec<usize>> {
     let mut receivers = vec![Vec::new(); nodes];
     for sampler in plan.samplers.iter().filter_map(|share| number_of(&share.node_name)) {

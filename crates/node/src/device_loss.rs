@@ -1,35 +1,35 @@
-//! A device that may be lost: whoever serves by it hears of that at once.
+//! The loss of a device, noticed at the first call that fails for it.
 
 use std::sync::Arc;
 
 use depth_image::{DepthImage, View};
 use tokio::sync::watch;
 
-use crate::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
+use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 
-/// Passes everything on to an engine, and remembers when it says that its device is lost.
+/// An engine that notices when the device of the engine inside is lost.
 #[derive(Clone)]
-pub struct Watched {
+pub struct DeviceLossMonitor {
     engine: Arc<dyn Engine>,
     lost: watch::Sender<Option<String>>,
 }
 
-impl Watched {
-    /// Of an engine whose device is there.
+impl DeviceLossMonitor {
+    /// Monitors an engine.
     #[must_use]
     pub fn new(engine: Arc<dyn Engine>) -> Self {
         Self { engine, lost: watch::Sender::new(None) }
     }
 
-    /// Resolves when the device is lost; says how.
+    /// Resolves when the device is lost, with the reason.
     pub async fn lost(&self) -> String {
         let mut lost = self.lost.subscribe();
-        // The sender is ours: it lasts as long as this.
+        // This value owns a sender, which therefore outlives the wait.
         let reason = lost.wait_for(Option::is_some).await.ok().and_then(|reason| reason.clone());
         reason.unwrap_or_default()
     }
 
-    fn noted<T>(&self, done: Result<T, EngineError>) -> Result<T, EngineError> {
+    fn monitored<T>(&self, done: Result<T, EngineError>) -> Result<T, EngineError> {
         if let Err(EngineError::Lost(reason)) = &done {
             self.lost.send_replace(Some(reason.clone()));
         }
@@ -37,7 +37,7 @@ impl Watched {
     }
 }
 
-impl Engine for Watched {
+impl Engine for DeviceLossMonitor {
     fn device_name(&self) -> String {
         self.engine.device_name()
     }
@@ -47,34 +47,34 @@ impl Engine for Watched {
     }
 
     fn load_scene(&self, hash: &str, package: &[u8]) -> Result<f64, EngineError> {
-        self.noted(self.engine.load_scene(hash, package))
+        self.monitored(self.engine.load_scene(hash, package))
     }
 
     fn has_scene(&self, hash: &str) -> bool {
         self.engine.has_scene(hash)
     }
 
-    fn samples_alone(&self, sampling: &str) -> Result<bool, EngineError> {
-        self.noted(self.engine.samples_alone(sampling))
+    fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError> {
+        self.monitored(self.engine.images_are_independent(sampling))
     }
 
-    fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError> {
-        self.noted(self.engine.samples_in_order(sampling))
+    fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
+        self.monitored(self.engine.images_are_sequential(sampling))
     }
 
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
-        self.noted(self.engine.sample(request))
+        self.monitored(self.engine.sample(request))
     }
 
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
-        self.noted(self.engine.upload(set))
+        self.monitored(self.engine.upload(set))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
-        self.noted(self.engine.reconstruct(set, work))
+        self.monitored(self.engine.reconstruct(set, work))
     }
 
     fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
-        self.noted(self.engine.draw_direct(work))
+        self.monitored(self.engine.draw_direct(work))
     }
 }

@@ -1,16 +1,17 @@
-//! The last few sets, encoded. Each is made once, however many ask at the same time.
+//! The latest few sets, encoded. Each is sampled once, however many requests wait for it.
 
 use std::collections::VecDeque;
 use std::future::Future;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use cluster::SetContent;
 use codec::EncodedDepthImage;
+use parking_lot::Mutex;
 use tokio::sync::OnceCell;
 use tonic::Status;
 
-/// What is sampled: a set, into how many tiles its images are cut, and which of them. Not the plan: a static scene stays
-/// sampled.
+/// The content of a set, the number of tiles of an image, and the indices of images or tiles. Without the plan: a static
+/// scene is not sampled again for another.
 pub(crate) type Key = (SetContent, u32, Vec<u32>);
 
 /// Encoded images with their indices.
@@ -18,19 +19,19 @@ pub(crate) type EncodedImages = Arc<Vec<(u32, EncodedDepthImage)>>;
 
 type Cell = Arc<OnceCell<EncodedImages>>;
 
-/// Bounded by bytes; what was used longest ago goes first.
+/// A cache that is bounded by bytes and evicts the set that was used longest ago.
 #[derive(Debug)]
-pub(crate) struct Kept {
+pub(crate) struct EncodedSetCache {
     max_bytes: usize,
     sets: Mutex<VecDeque<(Key, Cell)>>,
 }
 
-impl Kept {
+impl EncodedSetCache {
     pub(crate) fn new(max_bytes: usize) -> Self {
         Self { max_bytes, sets: Mutex::default() }
     }
 
-    /// The images of a set, made by the first who asks. They go on being made when that one leaves.
+    /// The images of a set, made for the first request. Making goes on when that request is dropped.
     pub(crate) async fn get<F>(
         self: &Arc<Self>,
         key: Key,
@@ -39,17 +40,17 @@ impl Kept {
     where
         F: Future<Output = Result<EncodedImages, Status>> + Send + 'static,
     {
-        let (cell, kept) = (self.cell(key), self.clone());
+        let (cell, cache) = (self.cell(key), self.clone());
         let making = tokio::spawn(async move {
             let images = cell.get_or_try_init(make).await?.clone();
-            kept.forget_oldest();
+            cache.evict();
             Ok(images)
         });
         making.await.map_err(|error| Status::internal(format!("sampling failed: {error}")))?
     }
 
     fn cell(&self, key: Key) -> Cell {
-        let mut sets = self.sets.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut sets = self.sets.lock();
         let at = sets.iter().position(|(other, _)| *other == key);
         let entry = at.and_then(|at| sets.remove(at)).unwrap_or_else(|| (key, Cell::default()));
         let cell = entry.1.clone();
@@ -57,8 +58,9 @@ impl Kept {
         cell
     }
 
-    fn forget_oldest(&self) {
-        let mut sets = self.sets.lock().unwrap_or_else(PoisonError::into_inner);
+    /// Evicts sets until the rest fits; the latest stays.
+    fn evict(&self) {
+        let mut sets = self.sets.lock();
         let bytes =
             |cell: &Cell| cell.get().map_or(0, |images| images.iter().map(|(_, image)| image.payload.len()).sum());
         let mut total: usize = sets.iter().map(|(_, cell)| bytes(cell)).sum();
@@ -125,43 +127,43 @@ mod tests {
         Arc::new(vec![(0, encode_depth_image(&image, PlaneSet::ALL).unwrap())])
     }
 
-    async fn get(kept: &Arc<Kept>, set_index: u32, made: &Arc<AtomicUsize>) -> EncodedImages {
+    async fn get(cache: &Arc<EncodedSetCache>, set_index: u32, made: &Arc<AtomicUsize>) -> EncodedImages {
         let made = made.clone();
         let make = move || async move {
             tokio::time::sleep(Duration::from_millis(20)).await;
             made.fetch_add(1, Ordering::SeqCst);
             Ok(images())
         };
-        kept.get(key(set_index), make).await.unwrap()
+        cache.get(key(set_index), make).await.unwrap()
     }
 
     #[tokio::test]
-    async fn who_asks_at_the_same_time_or_leaves_makes_nothing_twice() {
-        let (kept, made) = (Arc::new(Kept::new(1 << 20)), Arc::new(AtomicUsize::new(0)));
-        let impatient = tokio::time::timeout(Duration::from_millis(2), get(&kept, 0, &made)).await;
+    async fn requests_at_the_same_time_or_dropped_ones_make_no_set_twice() {
+        let (cache, made) = (Arc::new(EncodedSetCache::new(1 << 20)), Arc::new(AtomicUsize::new(0)));
+        let impatient = tokio::time::timeout(Duration::from_millis(2), get(&cache, 0, &made)).await;
         assert!(impatient.is_err());
-        let (a, b) = tokio::join!(get(&kept, 0, &made), get(&kept, 0, &made));
+        let (a, b) = tokio::join!(get(&cache, 0, &made), get(&cache, 0, &made));
         assert!(Arc::ptr_eq(&a, &b));
         assert_eq!(made.load(Ordering::SeqCst), 1);
     }
 
     #[tokio::test]
-    async fn what_was_used_longest_ago_goes_first() {
+    async fn the_set_that_was_used_longest_ago_is_evicted() {
         let bytes: usize = images().iter().map(|(_, image)| image.payload.len()).sum();
-        let (kept, made) = (Arc::new(Kept::new(2 * bytes)), Arc::new(AtomicUsize::new(0)));
+        let (cache, made) = (Arc::new(EncodedSetCache::new(2 * bytes)), Arc::new(AtomicUsize::new(0)));
         for set_index in [0, 1, 0, 2, 0] {
-            get(&kept, set_index, &made).await;
+            get(&cache, set_index, &made).await;
         }
-        assert_eq!(made.load(Ordering::SeqCst), 3, "set 0 was kept");
-        get(&kept, 1, &made).await;
+        assert_eq!(made.load(Ordering::SeqCst), 3, "set 0 was cached");
+        get(&cache, 1, &made).await;
         assert_eq!(made.load(Ordering::SeqCst), 4, "set 1 was not");
     }
 
     #[tokio::test]
-    async fn a_failure_is_not_kept() {
-        let (kept, made) = (Arc::new(Kept::new(1 << 20)), Arc::new(AtomicUsize::new(0)));
-        let failed = kept.get(key(0), || async { Err(Status::internal("lost")) }).await;
+    async fn a_failure_is_not_cached() {
+        let (cache, made) = (Arc::new(EncodedSetCache::new(1 << 20)), Arc::new(AtomicUsize::new(0)));
+        let failed = cache.get(key(0), || async { Err(Status::internal("lost")) }).await;
         assert_eq!(failed.unwrap_err().message(), "lost");
-        get(&kept, 0, &made).await;
+        get(&cache, 0, &made).await;
     }
 }

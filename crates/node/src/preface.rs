@@ -1,4 +1,4 @@
-//! Connections, let in once they have said what they want.
+//! Connections, accepted once they have sent the preface of HTTP/2.
 
 use std::io;
 use std::time::Duration;
@@ -8,26 +8,26 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;
 
-/// What a connection says first: the preface of HTTP/2.
+/// The first bytes of a connection of HTTP/2.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
-/// How long that may take. Keepalive watches over connections only from then on.
-const GREETING: Duration = Duration::from_secs(5);
-const LOOK_AGAIN: Duration = Duration::from_millis(20);
-/// Connections that may be silent at the same time: further ones wait in the system's queue.
+/// The time that the preface may take. Keepalive covers connections only from then on.
+const PREFACE_TIMEOUT: Duration = Duration::from_secs(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
+/// Connections that may be without a preface at the same time: further ones wait in the system's queue.
 const MAX_SILENT: usize = 1024;
-/// Where the system has no more files, others must close theirs first.
+/// The delay after a failure to accept: where the system has no more files, others must close theirs first.
 const AFTER_ERROR: Duration = Duration::from_millis(100);
 
-/// Connections that speak HTTP/2; others are cut. Accepts until the stream is dropped.
-pub(crate) fn greeted(listener: TcpListener) -> ReceiverStream<io::Result<TcpStream>> {
-    let (send, greeted) = mpsc::channel(16);
+/// Connections of HTTP/2; others are cut. Accepts until the stream is dropped.
+pub(crate) fn accept_http2(listener: TcpListener) -> ReceiverStream<io::Result<TcpStream>> {
+    let (send, accepted) = mpsc::channel(16);
     tokio::spawn(async move {
         tokio::select! {
             () = accept(listener, send.clone()) => (),
             () = send.closed() => (),
         }
     });
-    ReceiverStream::new(greeted)
+    ReceiverStream::new(accepted)
 }
 
 async fn accept(listener: TcpListener, send: mpsc::Sender<io::Result<TcpStream>>) {
@@ -38,7 +38,7 @@ async fn accept(listener: TcpListener, send: mpsc::Sender<io::Result<TcpStream>>
         }
         while silent.try_join_next().is_some() {}
         match listener.accept().await {
-            Ok((stream, _)) => drop(silent.spawn(let_in(stream, send.clone()))),
+            Ok((stream, _)) => drop(silent.spawn(admit(stream, send.clone()))),
             Err(error) => {
                 tracing::warn!(%error, "no connection can be accepted");
                 tokio::time::sleep(AFTER_ERROR).await;
@@ -47,26 +47,26 @@ async fn accept(listener: TcpListener, send: mpsc::Sender<io::Result<TcpStream>>
     }
 }
 
-async fn let_in(stream: TcpStream, send: mpsc::Sender<io::Result<TcpStream>>) {
-    if let Ok(Ok(true)) = tokio::time::timeout(GREETING, greets(&stream)).await {
+async fn admit(stream: TcpStream, send: mpsc::Sender<io::Result<TcpStream>>) {
+    if let Ok(Ok(true)) = tokio::time::timeout(PREFACE_TIMEOUT, has_preface(&stream)).await {
         let _ = stream.set_nodelay(true);
         let _ = send.send(Ok(stream)).await;
     }
 }
 
-/// Whether it begins as it must. The bytes stay where they are.
-async fn greets(stream: &TcpStream) -> io::Result<bool> {
-    let mut said = [0; PREFACE.len()];
+/// Whether a connection begins with the preface, whose bytes stay unread.
+async fn has_preface(stream: &TcpStream) -> io::Result<bool> {
+    let mut received = [0; PREFACE.len()];
     loop {
-        let count = stream.peek(&mut said).await?;
-        if count == 0 || !PREFACE.starts_with(&said[..count]) {
+        let count = stream.peek(&mut received).await?;
+        if count == 0 || !PREFACE.starts_with(&received[..count]) {
             return Ok(false);
         }
         if count == PREFACE.len() {
             return Ok(true);
         }
-        // Peeking again at once would find the same.
-        tokio::time::sleep(LOOK_AGAIN).await;
+        // Another peek at once would find the same bytes.
+        tokio::time::sleep(POLL_INTERVAL).await;
     }
 }
 
@@ -78,22 +78,22 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn only_http2_is_let_in() {
+    async fn connections_without_the_preface_of_http2_are_cut() {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
-        let mut greeted = greeted(listener);
+        let mut accepted = accept_http2(listener);
         for wrong in [&b"GET / HTTP/1.1\r\n\r\n"[..], b"PRI * HTTP/1.0", b"\0"] {
             let mut stream = TcpStream::connect(address).await.unwrap();
             stream.write_all(wrong).await.unwrap();
-            // Reset or ended: at once.
+            // It is reset or ended at once.
             let ended = tokio::time::timeout(Duration::from_secs(1), stream.read(&mut [0; 8])).await.unwrap();
             assert!(ended.map_or(true, |count| count == 0));
         }
         let mut stream = TcpStream::connect(address).await.unwrap();
         stream.write_all(&PREFACE[..9]).await.unwrap();
-        tokio::time::sleep(2 * LOOK_AGAIN).await;
+        tokio::time::sleep(2 * POLL_INTERVAL).await;
         stream.write_all(&PREFACE[9..]).await.unwrap();
-        let mut served = greeted.next().await.unwrap().unwrap();
+        let mut served = accepted.next().await.unwrap().unwrap();
         let mut said = [0; PREFACE.len()];
         served.read_exact(&mut said).await.unwrap();
         assert_eq!(said, PREFACE);

@@ -1,4 +1,4 @@
-//! What comes of a sampler: chunks, and images that are checked and decoded.
+//! Chunks from a sampler, and the images that are checked and decoded from them.
 
 use std::time::{Duration, Instant};
 
@@ -9,8 +9,8 @@ use node::{CellPlan, blocking, next_within};
 use tonic::Status;
 use wire::rpc::Messages;
 
-/// Chunks, and what waiting for them took after the first.
-pub(crate) struct Incoming {
+/// The chunks of one call, and the time spent waiting for them after the first.
+pub(crate) struct ChunkStream {
     chunks: Messages<Chunk>,
     first_within: Option<Duration>,
     chunk_within: Duration,
@@ -18,7 +18,7 @@ pub(crate) struct Incoming {
     pub(crate) bytes: usize,
 }
 
-impl Incoming {
+impl ChunkStream {
     pub(crate) fn new(chunks: Messages<Chunk>, first_within: Duration, chunk_within: Duration) -> Self {
         Self { chunks, first_within: Some(first_within), chunk_within, transfer_s: 0.0, bytes: 0 }
     }
@@ -35,7 +35,8 @@ impl Incoming {
     }
 }
 
-pub(crate) fn check(
+/// Checks that an image belongs to the set, was requested and is new.
+pub(crate) fn check_image(
     whole: &Reassembled,
     id: SampleSetId,
     share: &SamplerShare,
@@ -43,15 +44,16 @@ pub(crate) fn check(
 ) -> Result<(), Status> {
     let index = whole.image_index;
     if whole.sample_set_id != id {
-        return Err(Status::data_loss(format!("an image of sample set {} came for {id}", whole.sample_set_id)));
+        return Err(Status::data_loss(format!("an image of sample set {} was sent for {id}", whole.sample_set_id)));
     }
     if !share.image_indices.contains(&index) || have.iter().any(|(other, _)| *other == index) {
-        return Err(Status::data_loss(format!("image {index} was not asked for, or came twice")));
+        return Err(Status::data_loss(format!("image {index} was not requested, or was sent twice")));
     }
     Ok(())
 }
 
-/// Highlights find a light's visibility by its place: there is a byte for every light, or none at all.
+/// Checks the planes of visibility. Highlights find a light's visibility by its place: there is a byte for every light, or
+/// none at all.
 pub(crate) fn check_visibility(plan: &Assignment, index: u32, image: &DepthImage) -> Result<(), Status> {
     let lights = plan.workload.illumination.lights.len();
     let planes = image.specular.as_ref().map_or(0, |specular| specular.visibility8.len());
@@ -69,8 +71,8 @@ pub(crate) async fn decode(cameras: &[Camera], whole: Reassembled) -> Result<Dep
     blocking(move || decode().map_err(|error| Status::data_loss(error.to_string()))).await
 }
 
-/// The set's images out of what was sampled: the same, or their tiles.
-pub(crate) async fn whole(plan: &CellPlan, sampled: Vec<DepthImage>) -> Result<Vec<DepthImage>, Status> {
+/// The images of a set from those that were sampled: the same, or joined from tiles.
+pub(crate) async fn join_tiles(plan: &CellPlan, sampled: Vec<DepthImage>) -> Result<Vec<DepthImage>, Status> {
     if plan.tile_count == 1 {
         return Ok(sampled);
     }

@@ -1,18 +1,19 @@
-//! Which compositor a live stream goes to.
+//! The choice of a compositor for a live stream.
 
 use std::collections::HashSet;
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::ClientError;
-use crate::live::{Live, Peer};
+use crate::active_plan::ActivePlan;
+use crate::error::ClientError;
+use crate::peer::Peer;
 
-/// Begins anywhere, so that clients in different processes begin at different compositors; rises by one, so that those of
-/// one process go to all compositors evenly.
+/// The first id of a process is random, so that clients of different processes begin at different compositors. Ids rise by
+/// one, so that clients of one process go to all compositors evenly.
 static NEXT: LazyLock<AtomicU64> = LazyLock::new(|| AtomicU64::new(RandomState::new().build_hasher().finish()));
 
-/// Names a client in logs, and chooses its compositor.
+/// An id that names a client in logs and chooses its compositor.
 pub(crate) fn new_client_id() -> u64 {
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
@@ -23,7 +24,8 @@ fn order(client_id: u64, weights: &[u32]) -> impl Iterator<Item = usize> + use<>
     (0..count).map(move |i| (first + i) % count)
 }
 
-/// Equal nodes in turn; others as often as their weight says, by the golden section, which spreads any number of clients.
+/// Equal compositors take turns. Others are chosen in proportion to their weights, by the golden section, which spreads
+/// any number of clients evenly.
 fn first(client_id: u64, weights: &[u32]) -> usize {
     let all: u64 = weights.iter().map(|&weight| u64::from(weight)).sum();
     if all == 0 || weights.iter().all(|weight| *weight == weights[0]) {
@@ -40,7 +42,7 @@ fn first(client_id: u64, weights: &[u32]) -> usize {
     0
 }
 
-/// Compositors of a plan that did not do it, and why.
+/// Compositors of a plan that have failed this client, and why.
 #[derive(Debug, Default)]
 pub(crate) struct Tried {
     pub(crate) plan_epoch: u64,
@@ -50,7 +52,7 @@ pub(crate) struct Tried {
 }
 
 impl Tried {
-    /// Nobody has been tried.
+    /// No compositor has been tried.
     pub(crate) fn none(plan_epoch: u64) -> Self {
         Self { plan_epoch, all_exhausted: true, ..Self::default() }
     }
@@ -61,13 +63,13 @@ impl Tried {
         self.last = Some(error);
     }
 
-    /// Where a client goes next.
-    pub(crate) fn next<'a>(&self, client_id: u64, live: &'a Live) -> Option<&'a Peer> {
-        let weights: Vec<u32> = live.peers.iter().map(|peer| peer.share.view_weight).collect();
-        order(client_id, &weights).map(|at| &live.peers[at]).find(|peer| !self.names.contains(&peer.share.node_name))
+    /// The compositor that a client tries next; `None` where it has tried all.
+    pub(crate) fn next<'a>(&self, client_id: u64, active: &'a ActivePlan) -> Option<&'a Peer> {
+        let weights: Vec<u32> = active.peers.iter().map(|peer| peer.share.view_weight).collect();
+        order(client_id, &weights).map(|at| &active.peers[at]).find(|peer| !self.names.contains(&peer.share.node_name))
     }
 
-    /// Whether no compositor has room.
+    /// Whether all compositors that were tried had no room.
     pub(crate) fn is_exhausted(&self) -> bool {
         self.all_exhausted && !self.names.is_empty()
     }
@@ -78,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn clients_of_a_process_spread_evenly() {
+    fn clients_of_a_process_spread_evenly_over_equal_compositors() {
         let mut clients = [0; 3];
         let first = new_client_id();
         (0..12).for_each(|i| clients[order(first + i, &[7; 3]).next().unwrap()] += 1);
@@ -87,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn faster_nodes_get_more_clients() {
+    fn compositors_get_clients_in_proportion_to_their_weights() {
         for start in [0, 12_345, u64::MAX - 30] {
             let mut clients = [0i32; 3];
             (0..60).for_each(|i| clients[order(start.wrapping_add(i), &[10, 20, 0]).next().unwrap()] += 1);
@@ -96,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn every_compositor_is_tried_once() {
+    fn every_compositor_is_tried_once_whatever_its_weight() {
         for weights in [[0; 5], [1, 2, 0, 4, 5]] {
             let mut tried: Vec<usize> = order(u64::MAX, &weights).collect();
             tried.sort_unstable();
