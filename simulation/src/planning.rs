@@ -5,7 +5,7 @@ use std::time::Duration;
 use cluster::{
     Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, SessionPlan, Timeline, Workload,
 };
-use coordinator::schedule::{ChoiceError, Command, Event, MeasuredCosts, Opening, Scheduler};
+use coordinator::schedule::{ChoiceError, Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
@@ -84,6 +84,7 @@ impl Coordinator {
                 Command::Apply { plan, .. } => self.apply(*plan),
                 Command::Refuse { error, .. } => self.refused = Some(error),
                 Command::End { .. } => self.plan = None,
+                Command::Probe(_) | Command::Quarantine { .. } | Command::Readmit { .. } => (),
             }
         }
     }
@@ -159,10 +160,8 @@ fn open(cluster: &Cluster, demand: &Demand) -> Event {
         session: 1,
         workload: workload(cluster.images, demand.sets),
         views_per_set: demand.views,
-        policy: demand.policy,
-        frames_per_s: 0.0,
-        forced_samplers: None,
-        forced_tiles: demand.tiles,
+        policy_override: PolicyOverride { policy: demand.policy, forced_samplers: None, forced_tiles: demand.tiles },
+        frames_per_s: None,
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
         costs: slowest,

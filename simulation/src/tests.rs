@@ -170,7 +170,7 @@ fn unequal_nodes_are_planned_by_their_own_costs() {
     let ran = ran(&cluster, &known, Habits::default());
     assert_eq!(ran.limit(), Limit::Views, "whoever is done helps who is slow");
     let nodes: Vec<_> =
-        cluster.machines.iter().map(|machine| NodeCosts { costs: machine.costs, transfer_image_s: 0.0 }).collect();
+        cluster.machines.iter().map(|machine| NodeCosts { costs: machine.costs, transfer_image_s: None }).collect();
     let samplers = plan(&cluster, &known).unwrap().assignment.samplers;
     let samples: Vec<bool> =
         (0..11).map(|node| samplers.iter().any(|share| share.node_name == format!("node-{node:04}"))).collect();

@@ -10,8 +10,6 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
-use reconstruction::ReconstructionMethod;
-use sampling::{Redundancy, SamplingMethod};
 
 /// Which crates of the workspace each one may use, in programs and build scripts. What is not here is not
 /// allowed.
@@ -381,35 +379,12 @@ fn every_crate_forbids_unsafe_code() {
     assert_eq!(setting("[package]\nname = \"x\"\n[lints.rust]\n", "lints", "workspace"), None);
 }
 
-/// Each variant after the one before: one that is new does not compile until it has a place here.
-fn next_reconstruction(method: Option<ReconstructionMethod>) -> Option<ReconstructionMethod> {
-    match method {
-        None => Some(ReconstructionMethod::LightFieldSearch { steps: 100 }),
-        Some(ReconstructionMethod::LightFieldSearch { .. }) => Some(ReconstructionMethod::JointCarve { stop_level: 0 }),
-        Some(ReconstructionMethod::JointCarve { .. }) => Some(ReconstructionMethod::Mesh),
-        Some(ReconstructionMethod::Mesh) => Some(ReconstructionMethod::HybridMesh { merged: None }),
-        Some(ReconstructionMethod::HybridMesh { .. }) => None,
-    }
-}
-
-fn next_sampling(method: Option<SamplingMethod>) -> Option<SamplingMethod> {
-    match method {
-        None => Some(SamplingMethod::Conventional),
-        Some(SamplingMethod::Conventional) => Some(SamplingMethod::NonRedundant(Redundancy::default())),
-        Some(SamplingMethod::NonRedundant(_)) => Some(SamplingMethod::Useful(Redundancy::default())),
-        Some(SamplingMethod::Useful(_)) => Some(SamplingMethod::DepthPeeling { layers: 4 }),
-        Some(SamplingMethod::DepthPeeling { .. }) => None,
-    }
-}
-
-/// Names of all methods, without their numbers.
-fn methods() -> Vec<String> {
-    let reconstruction = std::iter::successors(next_reconstruction(None), |&m| next_reconstruction(Some(m)));
-    let sampling = std::iter::successors(next_sampling(None), |&m| next_sampling(Some(m)));
-    let names = reconstruction.map(|m| m.to_string()).chain(sampling.map(|m| m.to_string()));
-    let bare = names.map(|name| name.split(':').next().unwrap_or_default().to_owned());
+/// Names of all methods.
+fn methods() -> Vec<&'static str> {
+    let methods =
+        reconstruction::METHODS.iter().map(|row| row.name).chain(sampling::METHODS.iter().map(|row| row.name));
     // Drawn from the triangles: a policy, not a variant.
-    bare.chain(["direct".to_owned()]).collect()
+    methods.chain(["direct"]).collect()
 }
 
 #[test]

@@ -14,7 +14,7 @@ const FRAME_RATE_RATIO: f64 = 0.8;
 #[must_use]
 pub fn ladder(lighting: &str, method: &str) -> Vec<Quality> {
     let fewer_rays = lighting.parse().ok().and_then(|lighting: Lighting| lighting.with_fewer_rays());
-    let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.with_fewer_steps());
+    let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.coarser());
     let all = Quality {
         lighting: lighting.to_owned(),
         method: method.to_owned(),

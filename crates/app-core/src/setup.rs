@@ -55,14 +55,13 @@ pub struct SceneArgs {
     /// Light from all directions in place of the scene's: V, or ZENITH/NADIR
     #[arg(long, value_name = "V[/V]")]
     pub environment: Option<EnvironmentSpec>,
-    /// How views are reconstructed: joint_carve, joint_carve:LEVEL, light_field_search, light_field_search:STEPS,
-    /// mesh, hybrid_mesh or hybrid_mesh:PX (quads merged where that moves nothing by more than PX pixels)
-    #[arg(long, visible_alias = "reconstruction", default_value_t, value_name = "NAME")]
+    /// The reconstruction method
+    #[arg(long, visible_alias = "reconstruction", default_value_t, value_name = "NAME",
+        help = format!("How views are reconstructed. {}", ReconstructionMethod::help()))]
     pub method: ReconstructionMethod,
-    /// Which samples are taken: conventional (all that is seen); non_redundant:pixel, :visibility or :tolerance
-    /// (what no image before holds; non_redundant is :pixel); useful, alike (less what no view between the cameras can
-    /// see); or depth_peeling:LAYERS (layer behind layer, from the middle)
-    #[arg(long, default_value_t, value_name = "NAME")]
+    /// The sampling method
+    #[arg(long, default_value_t, value_name = "NAME",
+        help = format!("Which samples are taken. {}", SamplingMethod::help()))]
     pub sampling: SamplingMethod,
     /// Size of the sample images [default: 400x300, or as in --samples]
     #[arg(long, value_name = "WxH")]

@@ -9,7 +9,7 @@ use depth_image::{DepthImage, PinholeCamera, View};
 use gpu::{DevicePreference, Gpu};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 use parking_lot::Mutex;
-use reconstruction::{ReconstructionMethod, Reconstructor, SetDescription};
+use reconstruction::{ReconstructionMethod, Reconstructor, RequiredPlanes, SetDescription};
 use render::{
     AccelerationReport, Choice, DrawWork, GpuScene, Lighting, Refinement, Renderer, SamplePlanes, Visibility,
 };
@@ -139,8 +139,8 @@ impl GpuEngine {
 /// The planes that a reconstruction method needs in sample images.
 #[must_use]
 pub fn planes_for(method: ReconstructionMethod) -> SamplePlanes {
-    let hybrid = matches!(method, ReconstructionMethod::HybridMesh { .. });
-    SamplePlanes { specular: true, normal: hybrid, corners: hybrid, ..SamplePlanes::default() }
+    let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
+    SamplePlanes { specular: true, normal, corners: corner_inverse_depth, ..SamplePlanes::default() }
 }
 
 fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {
@@ -169,11 +169,11 @@ impl Engine for GpuEngine {
     }
 
     fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
-        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.is_chained())
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.images_are_sequential())
     }
 
     fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError> {
-        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.leave_out().is_none())
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.images_are_independent())
     }
 
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
@@ -190,7 +190,7 @@ impl Engine for GpuEngine {
             wanted: &request.wanted,
             method: parsed("sampling_method", &request.sampling)?,
             planes: planes_for(method),
-            temporal_reference_s: request.temporal_reference_s,
+            reference_time_s: request.temporal_reference_s,
         };
         self.sampler.sample(&work).map_err(sampling_error)
     }

@@ -115,59 +115,6 @@ impl Gpu {
         GpuError::check_limit(what, bytes, limits.max_storage_buffer_binding_size.min(limits.max_buffer_size))
     }
 
-    /// A compute pipeline with entry point `main`, and an automatic layout where none is given for group 0.
-    #[must_use]
-    pub fn compute_pipeline(
-        &self,
-        label: &str,
-        wgsl: &str,
-        layout: Option<&wgpu::BindGroupLayout>,
-    ) -> wgpu::ComputePipeline {
-        let module = self.shader(label, wgsl);
-        let layout = layout.map(|group| {
-            let descriptor = wgpu::PipelineLayoutDescriptor {
-                label: Some(label),
-                bind_group_layouts: &[Some(group)],
-                immediate_size: 0,
-            };
-            self.device.create_pipeline_layout(&descriptor)
-        });
-        self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(label),
-            layout: layout.as_ref(),
-            module: &module,
-            entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                zero_initialize_workgroup_memory: false,
-                ..Default::default()
-            },
-            cache: None,
-        })
-    }
-
-    /// Compiles WGSL text.
-    #[must_use]
-    pub fn shader(&self, label: &str, wgsl: &str) -> wgpu::ShaderModule {
-        self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(wgsl.into()),
-        })
-    }
-
-    /// Binds whole buffers to `pipeline`'s group 0, at bindings 0, 1, 2….
-    #[must_use]
-    pub fn bind(&self, pipeline: &wgpu::ComputePipeline, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
-        let entries: Vec<_> = (0..)
-            .zip(buffers)
-            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-            .collect();
-        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        })
-    }
-
     /// A buffer with contents.
     #[must_use]
     pub fn buffer_with<T: bytemuck::NoUninit>(

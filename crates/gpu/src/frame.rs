@@ -53,62 +53,6 @@ impl<'g> Frame<'g> {
         Self { gpu, encoder, timer, reads: Vec::new() }
     }
 
-    /// One compute dispatch.
-    pub fn compute(
-        &mut self,
-        label: &str,
-        pipeline: &wgpu::ComputePipeline,
-        bind_group: &wgpu::BindGroup,
-        workgroups: [u32; 3],
-    ) {
-        let mut pass = self
-            .encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, bind_group, &[]);
-        pass.dispatch_workgroups(workgroups[0], workgroups[1], workgroups[2]);
-    }
-
-    /// `count` dispatches in one pass; the n-th sees its uniform at the dynamic offset `n · stride_bytes`.
-    pub fn compute_each(
-        &mut self,
-        label: &str,
-        pipeline: &wgpu::ComputePipeline,
-        bind_group: &wgpu::BindGroup,
-        stride_bytes: u32,
-        count: usize,
-        workgroups: [u32; 3],
-    ) {
-        let mut pass = self
-            .encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
-        pass.set_pipeline(pipeline);
-        for number in 0..count as u32 {
-            pass.set_bind_group(0, bind_group, &[number * stride_bytes]);
-            pass.dispatch_workgroups(workgroups[0], workgroups[1], workgroups[2]);
-        }
-    }
-
-    /// As [`Frame::compute_each`], with the n-th dispatch's size in `arguments` at `16 · n`.
-    pub fn compute_each_indirect(
-        &mut self,
-        label: &str,
-        pipeline: &wgpu::ComputePipeline,
-        bind_group: &wgpu::BindGroup,
-        stride_bytes: u32,
-        count: usize,
-        arguments: &wgpu::Buffer,
-    ) {
-        let mut pass = self
-            .encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
-        pass.set_pipeline(pipeline);
-        for number in 0..count as u32 {
-            pass.set_bind_group(0, bind_group, &[number * stride_bytes]);
-            pass.dispatch_workgroups_indirect(arguments, u64::from(number) * 16);
-        }
-    }
-
     /// Copies `range` (multiples of 4) of `source` to host memory that `host` lends.
     pub fn read_back(&mut self, source: &wgpu::Buffer, range: Range<u64>, host: PooledBuffer) -> Readback {
         self.encoder.copy_buffer_to_buffer(source, range.start, &host, 0, range.end - range.start);

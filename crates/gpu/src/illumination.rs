@@ -1,7 +1,7 @@
 //! Light sources as `light.wgsl` reads them.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Illumination, Light};
+use depth_image::{Highlight, Illumination, Light};
 use glam::Vec3;
 
 /// `Light` of `light.wgsl`.
@@ -103,6 +103,15 @@ fn round(position_in_world: Vec3, intensity_linear: Vec3, radius_m: f32) -> GpuL
 #[must_use]
 pub const fn light_slots(light_count: usize) -> usize {
     if light_count == 0 { 1 } else { light_count }
+}
+
+/// `highlight` of `highlight.wgsl`.
+#[must_use]
+pub const fn highlight_name(highlight: Highlight) -> &'static str {
+    match highlight {
+        Highlight::BlinnPhong => "blinn_phong",
+        Highlight::Ggx => "ggx",
+    }
 }
 
 /// The bytes of an `Illumination` uniform of [`light_slots`] lights.

@@ -16,7 +16,7 @@ use wgpu::BufferUsages;
 
 use crate::{
     Binding, BufferPool, ComputePass, DevicePreference, DispatchSize, Frame, Gpu, GpuLight, Shader, Templates,
-    illumination::GpuIllumination, illumination_bytes, light_slots,
+    highlight_name, illumination::GpuIllumination, illumination_bytes, light_slots,
 };
 
 /// One question to the device.
@@ -69,11 +69,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 type Answer = [[f32; 4]; 8];
 
 fn text(kind: Highlight, lights: usize, visibility_words: usize) -> String {
-    let highlight = match kind {
-        Highlight::BlinnPhong => "blinn_phong",
-        Highlight::Ggx => "ggx",
-    };
-    let form = context! { highlight, light_slots => light_slots(lights), visibility_words };
+    let form = context! { highlight => highlight_name(kind), light_slots => light_slots(lights), visibility_words };
     let templates = Templates::new(&[("test.wgsl", SHADER)]).expect("templates");
     templates.render("test.wgsl", form).expect("a text")
 }

@@ -19,11 +19,12 @@ mod uniform;
 pub use device::{DevicePreference, Gpu};
 pub use error::{GpuError, ShaderError};
 pub use frame::{Frame, FrameResult, Readback, Submitted};
-pub use illumination::{GpuLight, illumination_bytes, light_slots};
+pub use illumination::{GpuLight, highlight_name, illumination_bytes, light_slots};
 pub use pool::{BufferPool, Lent, Pool, PooledBuffer};
 pub use shader::{
     Binding, ComputePass, DispatchSize, DrawPass, DrawState, DrawVariant, Pass, PassCache, ResourceTrait,
-    ResourceTraits, Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, sources,
+    ResourceTraits, Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, WgslLiteral, source, sources,
+    switches,
 };
 pub use table::{TABLE_WIDTH, Table, TablePool};
 pub use uniform::{uniform_elements, uniform_stride};

@@ -3,13 +3,20 @@
 use std::mem::offset_of;
 
 use bytemuck::Zeroable as _;
-use gpu::Templates;
-use naga::TypeInner;
+use gpu::ShaderVariant as _;
+use naga::{
+    TypeInner,
+    front::wgsl::{Frontend, Options},
+    valid::Capabilities,
+};
 
 use crate::gpu_scene::{GpuObject, GpuSurroundings};
-use crate::known::KnownCamera;
+use crate::keep::KeepVariant;
+use crate::known_samples::KnownCamera;
 use crate::pixel_camera::PixelCamera;
-use crate::raster::RasterCamera;
+use crate::raster::{RasterCamera, RasterVariant};
+use crate::redundancy_test::{Evidence, RedundancyTest};
+use crate::shaders::templates;
 
 /// Fields with their offsets, and the size of the whole.
 #[derive(Debug, PartialEq, Eq)]
@@ -26,13 +33,15 @@ macro_rules! host {
     }};
 }
 
-fn parsed(name: &str, form: minijinja::Value) -> naga::Module {
-    let test =
-        ("known_test.wgsl", "fn is_known(c: Candidate, number: u32, camera: KnownCamera) -> bool { return false; }");
-    let text = Templates::new(&[crate::SHADERS, &[test]].concat())
-        .and_then(|templates| templates.render(name, form))
-        .expect("a text");
-    naga::front::wgsl::parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)))
+const NEVER: &str = "fn is_redundant_with(c: Candidate, number: u32, camera: KnownCamera) -> bool { return false; }";
+
+fn parsed(variant: &impl gpu::ShaderVariant) -> naga::Module {
+    let templates = templates(&[("never.wgsl", NEVER)]).expect("templates");
+    let wgsl = gpu::source(&templates, variant).expect("a text").wgsl;
+    let mut options = Options::new();
+    options.capabilities = Capabilities::all();
+    let parsed = Frontend::new_with_options(options).parse(&wgsl);
+    parsed.unwrap_or_else(|error| panic!("{}", error.emit_to_string(&wgsl)))
 }
 
 /// A WGSL struct's.
@@ -47,17 +56,10 @@ fn shader(module: &naga::Module, name: &str) -> Layout {
 
 #[test]
 fn everything_shared_agrees() {
-    let form = minijinja::context! {
-        wind => true, shading => "ggx", surface_id => false, double_sided => true, alpha_tested => true,
-        textured => true, coat_textured => true, unlit => false, specular => true, leave_out => (), depth_only => false,
-        test_traces_rays => false, settled => true, earlier => 0, known_group => 3,
-    };
-    let raster = parsed("raster.wgsl", form);
-    let camera = parsed("camera.wgsl", minijinja::context! {});
-    let test = minijinja::context! {
-        leave_out => "known_test.wgsl", depth_only => false, test_traces_rays => false, settled => true, earlier => 2, known_group => 3,
-    };
-    let known = parsed("known.wgsl", test);
+    let test =
+        RedundancyTest { shader: "never.wgsl", consults: Evidence::Samples, from_one_place: false, usefulness: None };
+    let raster = parsed(&RasterVariant::with_tests(&[test]).next().expect("a variant"));
+    let camera = parsed(&KeepVariant::all().remove(0));
     let shared = [
         (
             &raster,
@@ -88,7 +90,7 @@ fn everything_shared_agrees() {
             }),
         ),
         (
-            &known,
+            &raster,
             "KnownCamera",
             host!(KnownCamera {
                 homogeneous_pixel_from_own,

@@ -39,7 +39,7 @@ fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, S
     };
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let method = SamplingMethod::Conventional;
-    device().sampler.sample(&SampleWork { draw, cameras, wanted: &wanted, method, planes, temporal_reference_s: None })
+    device().sampler.sample(&SampleWork { draw, cameras, wanted: &wanted, method, planes, reference_time_s: None })
 }
 
 /// More than one submission holds, of two sizes.

@@ -51,7 +51,7 @@ pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detecti
                 wanted: &[0, 1],
                 method,
                 planes,
-                temporal_reference_s: None,
+                reference_time_s: None,
             })?;
             *found = left_out(&images[1]);
         }

@@ -15,7 +15,9 @@ use crate::reference_views::ReferenceViews;
 const SAMPLE_PX: UVec2 = UVec2::new(400, 300);
 const VIEW_PX: UVec2 = UVec2::new(200, 150);
 const VIEWS: usize = 8;
-const RECONSTRUCTIONS: [&str; 5] = ["joint_carve", "light_field_search:128", "mesh", "hybrid_mesh", "hybrid_mesh:0.5"];
+/// Settings that are compared in place of a method's default.
+const SETTINGS: [(&str, &[&str]); 2] =
+    [("light_field_search", &["light_field_search:128"]), ("hybrid_mesh", &["hybrid_mesh", "hybrid_mesh:0.5"])];
 
 /// A sampling, and its views by each reconstruction.
 pub struct Reconstructed {
@@ -66,11 +68,18 @@ fn of_method(
         SceneArgs { sampling, method: ReconstructionMethod::HybridMesh { merged: None }, ..subject.args.clone() };
     let reference = ReferenceViews::draw(&subject.engine, &setup, &args, views)?;
     let samples = reference.images.iter().flat_map(|image| &image.inverse_depth_per_m).filter(|&&d| d > 0.0).count();
-    let rows = RECONSTRUCTIONS
-        .iter()
+    let rows = reconstruction_names()
         .map(|name| reference.evaluate_timed_on(name.parse()?, VIEWS, 1))
         .collect::<anyhow::Result<_>>()?;
     Ok(Reconstructed { sampling, size_px, samples, unheld: reference.unheld()?, rows })
+}
+
+/// All methods, with the settings that are compared.
+fn reconstruction_names() -> impl Iterator<Item = &'static str> {
+    reconstruction::METHODS.iter().flat_map(|row| {
+        let settings = SETTINGS.iter().find(|(name, _)| *name == row.name);
+        settings.map_or_else(|| vec![row.name], |(_, settings)| settings.to_vec())
+    })
 }
 
 impl Reconstructed {
@@ -124,11 +133,11 @@ pub fn reconstructions_report(scenes: &[(String, Vec<Reconstructed>)], report: &
 
 fn chart(scene: &str, all: &[Reconstructed]) -> XyChart {
     let axes = (Axis::log("samples", ""), Axis::linear("FLIP", ""));
-    RECONSTRUCTIONS.iter().enumerate().fold(
+    reconstruction_names().enumerate().fold(
         XyChart::new(format!("FLIP against samples, {scene}"), axes.0, axes.1),
         |chart, (place, reconstruction)| {
             let points = all.iter().map(|r| Point::labelled(r.samples as f64, r.rows[place].flip, r.name()));
-            chart.with(Series::points(*reconstruction, points))
+            chart.with(Series::points(reconstruction, points))
         },
     )
 }

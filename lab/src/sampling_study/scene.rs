@@ -46,7 +46,7 @@ pub fn scene_report(subject: &Subject, extent: Extent, report: &mut Report) -> a
         Ok(())
     })?;
     progress.finish_and_clear();
-    let rays = subject.scene.scalar_rays(0.0)?;
+    let rays = render::scalar::rays::Scene::of(&subject.scene, 0.0)?;
     let viewpoints = subject.cameras(SamplingMethod::Conventional, size_px);
     let seen = METHODS
         .iter()

@@ -37,7 +37,7 @@ pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<V
         return Ok(Vec::new());
     }
     let sides = if quick { &SIDES_PX[..2] } else { &SIDES_PX[..] };
-    let rays = subject.scene.scalar_rays(0.0)?;
+    let rays = render::scalar::rays::Scene::of(&subject.scene, 0.0)?;
     let progress = bar(format!("{}: sizes of images", subject.name), sides.len());
     let mut rows = Vec::with_capacity(sides.len());
     for &side_px in sides {

@@ -116,7 +116,7 @@ impl Subject {
             wanted: &wanted,
             method,
             planes,
-            temporal_reference_s: None,
+            reference_time_s: None,
         };
         Ok(self.sampler.sample(&work)?)
     }

@@ -76,11 +76,11 @@ fn of_method(subject: &Subject, method: SamplingMethod, size_px: UVec2) -> anyho
 }
 
 fn rays_a_pixel(subject: &Subject, method: SamplingMethod) -> anyhow::Result<f64> {
-    if method.leave_out().is_none_or(|test| !test.traces_rays()) {
+    if method.redundancy_test().is_none_or(|test| !test.traces_rays()) {
         return Ok(f64::NAN);
     }
     let cameras = subject.cameras(method, UVec2::splat(COUNTED_PX));
-    let rays = scalar::rays_of_visibility(&subject.scene.scalar_rays(0.0)?, &cameras);
+    let rays = scalar::rays_of_visibility(&render::scalar::rays::Scene::of(&subject.scene, 0.0)?, &cameras);
     Ok(rays as f64 / f64::from((IMAGES as u32 - 1) * COUNTED_PX * COUNTED_PX))
 }
 

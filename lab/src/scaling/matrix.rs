@@ -1,7 +1,7 @@
 //! Points to measure, and the time that they take.
 
 use cluster::{Costs, PolicyChoice};
-use coordinator::schedule::{Demand, Load, NodeCosts, Wish, choose};
+use coordinator::schedule::{Demand, Load, NodeCosts, PolicyOverride, choose};
 use render::Lighting;
 
 use super::point::PointSettings;
@@ -101,10 +101,10 @@ fn full_points(nodes: usize) -> Vec<(PolicyChoice, usize)> {
 /// The time between two sets that the schedule predicts for P equal nodes.
 #[must_use]
 pub fn predicted_s(costs: &Costs, images: usize, nodes: usize, policy: PolicyChoice, views: usize) -> f64 {
-    let nodes = vec![NodeCosts { costs: *costs, transfer_image_s: 0.0 }; nodes];
-    let load = Load { images, sets: 2, views, in_order: costs.in_order, ..Load::default() };
-    let wish = Wish { policy, forced_samplers: None, forced_tiles: None };
-    choose(&Demand { load, nodes: &nodes, wish, present: None }).map_or(f64::NAN, |choice| choice.time_s())
+    let nodes = vec![NodeCosts { costs: *costs, transfer_image_s: None }; nodes];
+    let load = Load { images, sets: 2, views, images_are_sequential: costs.in_order, ..Load::default() };
+    let policy_override = PolicyOverride { policy, ..PolicyOverride::default() };
+    choose(&Demand { load, nodes: &nodes, policy_override, current: None }).map_or(f64::NAN, |choice| choice.time_s())
 }
 
 /// A point with its sets, and the seconds that it takes, about.

@@ -162,7 +162,7 @@ async fn frames_go_on_after_connections_are_cut() {
 
 /// The node is a member and refuses connections.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_that_refuses_connections_is_quarantined() {
+async fn a_node_that_refuses_connections_is_replaced() {
     for (what, victim) in [("sampler", sampler_of as fn(&Session) -> String), ("compositor", compositor_of)] {
         let network = Network::start(3).await;
         let (name, to_node, _) = network.links_of(victim);

@@ -38,6 +38,13 @@ impl Templates {
         Ok(Self { environment })
     }
 
+    /// Adds numbers that Rust shares with WGSL, as [`wgsl_constants!`](crate::wgsl_constants) lists them.
+    #[must_use]
+    pub fn with_constants(mut self, constants: impl IntoIterator<Item = (&'static str, String)>) -> Self {
+        constants.into_iter().for_each(|(name, literal)| self.environment.add_global(name, literal));
+        self
+    }
+
     /// The WGSL of `name` with `context` filled in.
     ///
     /// # Errors

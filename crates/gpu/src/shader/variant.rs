@@ -43,9 +43,20 @@ pub struct ShaderSource {
 
 /// The texts of [`ShaderVariant::all`].
 pub fn sources<V: ShaderVariant>(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    V::all().into_iter().map(|variant| {
-        let (template, traits) = (variant.template(), variant.traits());
-        let wgsl = templates.render(template, variant.context())?;
-        Ok(ShaderSource { name: format!("{template}: {variant:?}"), template, wgsl, traits })
-    })
+    V::all().into_iter().map(|variant| source(templates, &variant))
+}
+
+/// The text of a variant.
+///
+/// # Errors
+/// A template that is broken.
+pub fn source<V: ShaderVariant>(templates: &Templates, variant: &V) -> Result<ShaderSource, ShaderError> {
+    let (template, traits) = (variant.template(), variant.traits());
+    let wgsl = templates.render(template, variant.context())?;
+    Ok(ShaderSource { name: format!("{template}: {variant:?}"), template, wgsl, traits })
+}
+
+/// Every position of `N` switches.
+pub fn switches<const N: usize>() -> impl Iterator<Item = [bool; N]> {
+    (0..1_usize << N).map(|bits| std::array::from_fn(|switch| bits >> switch & 1 == 1))
 }

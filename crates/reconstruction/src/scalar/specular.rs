@@ -7,14 +7,14 @@ use depth_image::{
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{
-    Pixel,
+    pixel::Pixel,
     sample_camera::SampleCamera,
     surface::{bilinear, bilinear_shares},
     view_ray::{ViewRay, ViewRays},
 };
-use crate::{SetDescription, shaders::THICKNESS_FOOTPRINTS};
+use crate::{set_description::SetDescription, surface::THICKNESS_FOOTPRINTS};
 
-/// What the samples around a point say together.
+/// The mean of the samples around a point.
 struct Gathered {
     normal_in_world: Vec3,
     /// Bytes, as in the images.

@@ -17,8 +17,10 @@ pub const UNLIT: u32 = 1 << 29;
 pub const SPECULAR: u32 = 1 << 28;
 /// Those that a ray must know before it knows what it met.
 pub const CORNER_FLAGS: u32 = ALPHA_TESTED | DOUBLE_SIDED;
-/// Vertex numbers share a word with the flags.
-pub const MAX_VERTICES: u64 = 1 << 30;
+/// The bits of a vertex' number, which shares a word with the flags.
+pub const VERTEX: u32 = (1 << 30) - 1;
+/// As many as have a number.
+pub const MAX_VERTICES: u64 = VERTEX as u64 + 1;
 
 /// One corner besides its position: one texel on the device.
 #[repr(C)]

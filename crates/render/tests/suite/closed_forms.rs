@@ -67,7 +67,7 @@ fn every_ray_visits_what_its_twin_visits() {
     for scene in [courtyard(), uv_sphere(1.0, 96), tree_terrain(30_000, 1)] {
         let (on_device, camera) = (upload(&scene), before(&scene));
         let counted = device().1.count_visits(work(&on_device, "unlit"), &camera).expect("counts").of_pixel;
-        let twin = on_device.scalar_rays(0.0).expect("a tree");
+        let twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
         let pixels = (0..SIZE_PX.y).flat_map(|y| (0..SIZE_PX.x).map(move |x| UVec2::new(x, y)));
         let same = pixels.zip(&counted).filter(|(pixel, counts)| {
             let (_, visits) = twin.closest(&scalar::rays::pixel_ray(&camera, *pixel), camera.near_m);
@@ -83,7 +83,7 @@ fn a_million_rays_find_no_gap_in_a_closed_mesh() {
     let mut scene = uv_sphere(1.0, 160);
     scene.materials[0].double_sided = true;
     let on_device = upload(&scene);
-    let twin = on_device.scalar_rays(0.0).expect("a tree");
+    let twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     let place = |n: u32, salt: u32| {
         let axis = |i: u32| scalar::sequence::hashed(n.wrapping_mul(7) ^ salt ^ i) as f32 / u32::MAX as f32 * 2.0 - 1.0;
         Vec3::new(axis(0x51), axis(0x7f31), axis(0x1f0a3))

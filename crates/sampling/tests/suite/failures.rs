@@ -19,7 +19,7 @@ fn sample(scene: &GpuScene, cameras: &[PinholeCamera], method: SamplingMethod) -
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let cameras = pinholes(cameras);
     let planes = SamplePlanes { normal: true, surface_id: true, ..SamplePlanes::default() };
-    let work = SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes, temporal_reference_s: None };
+    let work = SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes, reference_time_s: None };
     device().sampler.sample(&work).expect("images")
 }
 
@@ -78,7 +78,7 @@ fn instances_are_not_confused() {
     let camera =
         |x: f32| PinholeCamera::looking_at(Vec3::new(x, 0.0, 4.0), Vec3::ZERO, Vec3::Y, 0.9, UVec2::splat(128));
     let cameras = [camera(-0.3), camera(0.3)];
-    let rays = on_device.scalar_rays(0.0).expect("a tree");
+    let rays = render::scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     let (device, reference) = (sample(&on_device, &cameras, PIXEL), scalar::sample(&rays, &cameras, PIXEL));
     let pairs = device[1].inverse_depth_per_m.iter().zip(&reference[1].inverse_depth_per_m);
     let differ = pairs.filter(|(a, b)| (*a - *b).abs() > 1e-3 * a.abs()).count();
@@ -162,13 +162,13 @@ fn masks_flicker_little_under_jitter() {
 fn what_has_settled_flickers_less() {
     let scene = poles(0.05);
     let on_device = upload(&scene);
-    let rays = on_device.scalar_rays(0.0).expect("a tree");
+    let rays = render::scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     let camera = |x: f32| PinholeCamera::looking_at(Vec3::new(x, 0.0, 4.0), Vec3::NEG_Z * 2.0, Vec3::Y, 0.8, SIZE_PX);
     let pixel_m = 6.0 / camera(0.0).focal_px.x;
     let still = [camera(-0.4), camera(0.4)];
     let before = scalar::sample(&rays, &still, TOLERANCE);
     let settled = settle(&on_device, &still);
-    let settings = scalar::Settings { before: Some(&before), ..scalar::Settings::default() };
+    let settings = scalar::Settings { reference: Some(&before), ..scalar::Settings::default() };
     let mask = |image: &DepthImage| -> Vec<bool> { image.inverse_depth_per_m.iter().map(|&d| d > 0.0).collect() };
     let flips = |image: &DepthImage| {
         let pairs = mask(&before[1]).into_iter().zip(mask(image));
@@ -191,11 +191,10 @@ fn settled_sets_do_not_depend_on_their_order() {
     let scene = upload(&grass(GrassDensity::new(0.2).expect("a density")));
     let eye = |x: f32| PinholeCamera::looking_at(Vec3::new(x, 1.2, 3.0), Vec3::ZERO, Vec3::Y, 0.7, SIZE_PX);
     let cameras = pinholes(&[eye(-0.2), eye(0.2)]);
-    let at = |scene_time_s: f32, temporal_reference_s: Option<f32>| {
+    let at = |scene_time_s: f32, reference_time_s: Option<f32>| {
         let draw = DrawWork { scene_time_s, ..unlit(&scene) };
         let planes = SamplePlanes::default();
-        let work =
-            SampleWork { draw, cameras: &cameras, wanted: &[0, 1], method: TOLERANCE, planes, temporal_reference_s };
+        let work = SampleWork { draw, cameras: &cameras, wanted: &[0, 1], method: TOLERANCE, planes, reference_time_s };
         device().sampler.sample(&work).expect("images")
     };
     let later = at(0.4, Some(0.0));
@@ -210,7 +209,7 @@ fn settled_sets_do_not_depend_on_their_order() {
 #[test]
 fn more_tolerance_keeps_less_and_loses_more() {
     let scene = courtyard();
-    let rays = upload(&scene).scalar_rays(0.0).expect("a tree");
+    let rays = render::scalar::rays::Scene::of(&upload(&scene), 0.0).expect("a tree");
     let bounds = scene.bounds();
     let reach = bounds.size().length();
     let camera = |x: f32| {

@@ -33,7 +33,7 @@ fn taken(
         wanted: &wanted,
         method,
         planes: ALL,
-        temporal_reference_s: None,
+        reference_time_s: None,
     })
 }
 
@@ -70,14 +70,14 @@ fn the_device_leaves_out_what_the_reference_leaves_out() {
         ("courtyard", courtyard(), two_plane(&courtyard())),
     ] {
         let on_device = upload(&scene);
-        let rays = on_device.scalar_rays(0.0).expect("a tree");
+        let rays = render::scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
         let peeling = SamplingMethod::DepthPeeling { layers: 3 };
         let useful = [Redundancy::Pixel, Redundancy::Visibility].map(SamplingMethod::Useful);
         for method in APART.into_iter().chain(useful).chain([peeling]) {
             let cameras = method.cameras(cameras.clone());
             let reference = scalar::sample(&rays, &cameras, method);
             for visibility in [Visibility::Rays, Visibility::Triangles] {
-                if visibility == Visibility::Triangles && !method.is_chained() {
+                if visibility == Visibility::Triangles && !method.images_are_sequential() {
                     continue;
                 }
                 let images = taken(&on_device, &cameras, method, visibility).expect("images");
@@ -193,7 +193,7 @@ fn who_sees_nothing_has_nothing() {
     let on_device = upload(&scene);
     let up = PinholeCamera::looking_at(Vec3::Y * 50.0, Vec3::Y * 100.0, Vec3::X, 0.5, SIZE_PX);
     let inside = PinholeCamera::looking_at(scene.bounds().center(), scene.bounds().max, Vec3::Y, 0.5, SIZE_PX);
-    for method in SamplingMethod::ALL {
+    for method in SamplingMethod::all() {
         let cameras = method.cameras(vec![up, up]);
         for image in sample(&on_device, &cameras, method) {
             assert!(image.inverse_depth_per_m.iter().all(|&d| d == 0.0), "{method}");
@@ -228,7 +228,7 @@ fn what_needs_no_earlier_image_can_be_taken_apart() {
             wanted,
             method,
             planes: ALL,
-            temporal_reference_s: None,
+            reference_time_s: None,
         })
     };
     assert_eq!(part(&[3, 1], method).expect("two images"), [whole[3].clone(), whole[1].clone()]);
