@@ -1,4 +1,4 @@
-//! No product file outside `methods/` names a method, by its variant or by its text: a method is added by its file pair and
+//! No product file outside `methods/` names a method, by its variant or by its text. A method is added by its file pair and
 //! its row in a table.
 
 use std::fmt::Debug;

@@ -9,7 +9,7 @@ pub struct NamedMethod<M> {
     pub method: M,
     /// The setting that may follow the name and a colon.
     pub setting: Option<Setting<M>>,
-    /// What the method does, for `--help`.
+    /// The sentence of `--help` on the method.
     pub help: &'static str,
 }
 
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     const METHODS: [NamedMethod<u32>; 2] = [
-        NamedMethod { name: "look_twice", method: 2, setting: None, help: "looks twice" },
+        NamedMethod { name: "count_twice", method: 2, setting: None, help: "counts twice" },
         NamedMethod {
             name: "count",
             method: 7,
@@ -73,15 +73,15 @@ mod tests {
     #[test]
     fn names_and_settings_are_parsed() {
         let named = |text: &str| method_named(&METHODS, text);
-        assert_eq!([named("look-twice"), named("count"), named("count:3")], [Some(2), Some(7), Some(3)]);
-        for text in ["", "look", "look_twice:1", "look_twice:", "count:", "count:10", "count:3:4"] {
+        assert_eq!([named("count-twice"), named("count"), named("count:3")], [Some(2), Some(7), Some(3)]);
+        for text in ["", "twice", "count_twice:1", "count_twice:", "count:", "count:10", "count:3:4"] {
             assert_eq!(named(text), None, "{text}");
         }
     }
 
     #[test]
     fn errors_and_help_list_every_form() {
-        assert_eq!(method_forms(&METHODS), "look_twice, count or count:N (0 to 9)");
-        assert_eq!(method_help(&METHODS), "look_twice: looks twice; count or count:N (0 to 9): counts");
+        assert_eq!(method_forms(&METHODS), "count_twice, count or count:N (0 to 9)");
+        assert_eq!(method_help(&METHODS), "count_twice: counts twice; count or count:N (0 to 9): counts");
     }
 }

@@ -9,7 +9,7 @@ struct Corners { codes: vec4f, connected: bool }
 {% endif %}
 
 // Two words for each cell: the codes of its upper and of its lower corners. The highest bit of the first says that the
-// corners are one surface. The highest bit of the second says that some way to them is not proven free; bit 15 of the
+// corners are one surface. The highest bit of the second says that some way to them is not proven free. Bit 15 of the
 // first says so of the upper left corner.
 @group(0) var cell_codes: texture_2d<u32>;
 

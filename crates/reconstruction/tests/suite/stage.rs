@@ -18,7 +18,7 @@ pub const CARVE: ReconstructionMethod = ReconstructionMethod::JointCarve { stop_
 pub const SEARCH: ReconstructionMethod = ReconstructionMethod::LightFieldSearch { steps: 64 };
 pub const ALL_PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: true };
 
-/// By which images leave out what those before them hold: the test of sampling `non_redundant:pixel`.
+/// The redundancy test of sampling `non_redundant:pixel`.
 const APART: (&str, &str) = ("apart.wgsl", include_str!("../../../sampling/src/methods/non_redundant/pixel.wgsl"));
 
 struct Device {
