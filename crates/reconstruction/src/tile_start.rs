@@ -22,9 +22,8 @@ pub(crate) const LEAST_MOVE: f32 = 1.01;
 pub(crate) struct TileStart(SetVariant);
 
 impl ShaderVariant for TileStart {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! {
@@ -33,10 +32,6 @@ impl ShaderVariant for TileStart {
             least_move => LEAST_MOVE.wgsl_literal(),
             ..self.0.context()
         }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        ONE_VIEW
     }
 
     fn all() -> Vec<Self> {

@@ -34,9 +34,8 @@ pub(super) struct Carve {
 }
 
 impl ShaderVariant for Carve {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! {
@@ -46,10 +45,6 @@ impl ShaderVariant for Carve {
             nudge_px => NUDGE_PX.wgsl_literal(),
             ..self.surface.context()
         }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        ONE_VIEW
     }
 
     fn all() -> Vec<Self> {

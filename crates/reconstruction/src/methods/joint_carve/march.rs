@@ -33,9 +33,8 @@ pub(crate) struct March {
 }
 
 impl ShaderVariant for March {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! {
@@ -46,10 +45,6 @@ impl ShaderVariant for March {
             nudge_px => NUDGE_PX.wgsl_literal(),
             ..self.surface.context()
         }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        ONE_VIEW
     }
 
     fn all() -> Vec<Self> {
