@@ -5,8 +5,8 @@
 #   scripts/same_as.sh COMMIT --times   the ratios of g_s, g_v, c and d, on an otherwise idle machine
 #
 # Builds both commits, which serve each scene in turn; one client of this commit hashes the answers of both.
-# A renderer chooses rays or triangles by timing. Rows that differ are therefore asked again of new processes, up to
-# five times: a row is equal once both commits have given one same answer. Exit status 1: a row differs.
+# A renderer chooses rays or triangles by timing. New processes therefore repeat rows that differ, up to five times: a
+# row is equal once both commits have given one same answer. Exit status 1: a row differs.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,7 +1,7 @@
 //! Reports to the coordinator on samplers whose images cannot be fetched.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use cluster::SamplerReport;
 use node::NodeConfig;
@@ -11,6 +11,8 @@ use wire::rpc::{CoordinatorClient, connect};
 
 /// The time that a report may take.
 const DEADLINE: Duration = Duration::from_secs(5);
+/// The same report is repeated after this: the coordinator quarantines no node for a single one.
+const REPEAT_AFTER: Duration = Duration::from_secs(1);
 
 /// A set that could not be fetched.
 #[derive(Debug)]
@@ -31,8 +33,8 @@ impl From<Status> for NotFetched {
 pub(crate) struct Reports {
     node_name: String,
     coordinator: String,
-    /// The last report: each sampler is reported once a plan.
-    last: Arc<Mutex<Option<(u64, String)>>>,
+    /// The last report: its plan, its sampler, and when it was made.
+    last: Arc<Mutex<Option<(u64, String, Instant)>>>,
 }
 
 impl Reports {
@@ -44,9 +46,7 @@ impl Reports {
     pub(crate) fn report(&self, plan_epoch: u64, failed: &NotFetched) {
         let Some(sampler) = failed.sampler.clone().filter(|sampler| *sampler != self.node_name) else { return };
         let its_fault = [Code::Unavailable, Code::DataLoss, Code::DeadlineExceeded, Code::Unknown];
-        let report = Some((plan_epoch, sampler.clone()));
-        let last = std::mem::replace(&mut *self.last.lock(), report.clone());
-        if !its_fault.contains(&failed.status.code()) || last == report {
+        if !its_fault.contains(&failed.status.code()) || self.is_repeated(plan_epoch, &sampler) {
             return;
         }
         let reason = failed.status.message().chars().take(256).collect();
@@ -57,6 +57,19 @@ impl Reports {
                 tracing::debug!(reason = status.message(), "a sampler could not be reported");
             }
         });
+    }
+
+    /// Whether the same report was made just now.
+    fn is_repeated(&self, plan_epoch: u64, sampler: &str) -> bool {
+        let mut last = self.last.lock();
+        let is_repeated = |(epoch, name, at): &(u64, String, Instant)| {
+            *epoch == plan_epoch && name == sampler && at.elapsed() < REPEAT_AFTER
+        };
+        if last.as_ref().is_some_and(is_repeated) {
+            return true;
+        }
+        *last = Some((plan_epoch, sampler.to_owned(), Instant::now()));
+        false
     }
 }
 

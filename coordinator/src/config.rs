@@ -1,4 +1,4 @@
-//! What the coordinator is given.
+//! The coordinator's configuration, and the scene that it offers.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use glam::{DVec3, Vec3};
 pub struct CoordinatorConfig {
     /// Allows another bind address than loopback, without TLS.
     pub insecure_bind: bool,
-    /// Says by reflection what services and messages there are.
+    /// Serves the reflection service.
     pub reflection: bool,
     /// How long one node may measure.
     pub measure_deadline: Duration,
@@ -34,24 +34,24 @@ impl Default for CoordinatorConfig {
     }
 }
 
-/// The scene that the cluster shows. Its contents are the nodes' business.
+/// The scene that the cluster shows. Only nodes look into its package.
 #[derive(Debug, Clone)]
 pub struct SceneOffer {
-    /// Of the package.
+    /// The content hash of the package.
     pub hash: SceneHash,
     /// The package.
     pub package: Bytes,
     /// Sample cameras for sessions that bring none.
     pub rig: Vec<Camera>,
-    /// What reconstruction looks at, unless a session says otherwise.
+    /// The volume that is reconstructed, unless a session brings its own.
     pub volume: Aabb,
-    /// What rays meet that leave the scene.
+    /// The colour of rays that leave the scene.
     pub background_linear: Vec3,
-    /// What lights the scene: compositors add what of it depends on the viewer.
+    /// Lamps and environment: compositors add the highlights, which depend on the viewer.
     pub illumination: Illumination,
     /// The point of the source file's space that is the world's origin.
     pub origin_in_source: DVec3,
-    /// For sessions that have no wish; empty where they may choose.
+    /// Defaults of sessions.
     pub settings: OfferSettings,
 }
 
@@ -71,7 +71,7 @@ impl SceneOffer {
         }
     }
 
-    /// What clients are told.
+    /// The offer as clients see it.
     #[must_use]
     pub fn status(&self) -> OfferStatus {
         OfferStatus {
@@ -83,7 +83,7 @@ impl SceneOffer {
         }
     }
 
-    /// Its name and size.
+    /// The name and size of the scene.
     #[must_use]
     pub fn scene(&self) -> SceneRef {
         SceneRef { hash: self.hash.clone(), package_bytes: self.package.len() as u64 }

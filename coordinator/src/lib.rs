@@ -1,18 +1,22 @@
 //! The coordinator's service, the cluster's state and its pure schedule.
 //!
-//! [`schedule`] decides and does nothing else: no clock, no await. `service` asks it and does the rest.
+//! [`schedule`] makes all decisions, and does nothing else: no clock, no await. `service` turns calls into its events, and
+//! `executor` carries its commands out.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod carrying_out;
 mod config;
-mod leaving_out;
+mod cost_cache;
+mod executor;
+mod membership;
 mod metrics;
 mod observers;
-mod opening;
-mod reports;
+mod probe;
 pub mod schedule;
-mod seats;
 mod service;
+mod session_opening;
+mod sessions;
+mod shared;
+mod status;
 mod workload;
 
 pub use config::{CoordinatorConfig, SceneOffer};

@@ -1,4 +1,4 @@
-//! What the coordinator counts.
+//! Metrics of the coordinator.
 
 use cluster::ClusterStatus;
 use node::Telemetry;
@@ -35,7 +35,7 @@ impl CoordinatorMetrics {
         registry.register("cluster_sessions", "Sessions of the plan", metrics.sessions.clone());
         registry.register("cluster_views_per_set", "V: views of a sample set", metrics.views_per_set.clone());
         registry.register("cluster_plan_epoch", "The plan in force", metrics.plan_epoch.clone());
-        registry.register("cluster_plans", "Plans that were made", metrics.plans.clone());
+        registry.register("cluster_plans", "Plans made", metrics.plans.clone());
         drop(registry);
         metrics
     }

@@ -1,4 +1,4 @@
-//! What a session samples: its own wishes, else what came with the scene.
+//! The workload of a session: its own settings, completed with those of the scene on offer.
 
 use cluster::limits::MAX_CELLS;
 use cluster::{SessionRequest, Workload};
@@ -6,21 +6,21 @@ use depth_image::{Aabb, Camera, PinholeCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
 
-use crate::SceneOffer;
-use crate::carrying_out::refusal;
-use crate::schedule::{ChoiceError, firsts};
+use crate::config::SceneOffer;
+use crate::schedule::{ChoiceError, first_indices};
+use crate::status::refusal;
 
 /// Completes a request with the scene's defaults.
 ///
 /// # Errors
-/// For another scene than the one on offer, and cameras that cannot be.
+/// For another scene than the one on offer, and invalid cameras.
 pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Result<Workload, Status> {
     if request.scene.as_ref().is_some_and(|hash| *hash != offer.hash) {
         return Err(Status::not_found(format!("scene_hash: the scene on offer is {}", offer.hash)));
     }
     let volume = request.volume.unwrap_or(offer.volume);
     let cells = cells_of(request, offer, &volume)?;
-    let cell_first_indices = firsts(&cells);
+    let cell_first_indices = first_indices(&cells);
     let cameras = match (cells.is_empty(), request.sample_cameras.is_empty()) {
         (false, false) => return Err(Status::invalid_argument("viewpoints: sample_cameras are given, too")),
         (false, true) => cells.concat(),
@@ -48,8 +48,7 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
     })
 }
 
-/// Of a session that says from where it looks: the sample cameras of each of its view cells, as if it were alone, in the
-/// size of the offered ones.
+/// The sample cameras of each view cell of the session's viewpoints, as if it were alone, in the size of the offered ones.
 fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Result<Vec<Vec<Camera>>, Status> {
     let offered = offer.rig.first().map(|Camera::Pinhole(camera)| camera.size_px);
     let size_px = request.sample_size_px.or(offered).unwrap_or(request.typical_view.size_px);

@@ -158,7 +158,7 @@ impl History {
             if once != again {
                 return Err("a log is not replayed twice alike".to_owned());
             }
-            plans.extend(once.into_iter().flat_map(|(_, _, commands)| commands).filter_map(plan_of));
+            plans.extend(once.into_iter().flat_map(|step| step.commands).filter_map(plan_of));
         }
         Ok(plans)
     }

@@ -1,7 +1,7 @@
 //! The checker detects every violation.
 
 use cluster::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneRef, Timeline, Workload};
-use coordinator::schedule::{Event, Opening, Recorder};
+use coordinator::schedule::{Event, Opening, PolicyOverride, Recorder};
 
 use super::*;
 use crate::cluster::{offer, rig};
@@ -60,12 +60,10 @@ fn log(plan_epoch: u64) -> Vec<u8> {
         session: 9,
         workload: workload(),
         views_per_set: 10,
-        frames_per_s: 0.0,
-        forced_tiles: None,
+        frames_per_s: None,
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
-        policy: PolicyChoice::Pipeline,
-        forced_samplers: None,
+        policy_override: PolicyOverride { policy: PolicyChoice::Pipeline, ..PolicyOverride::default() },
         costs,
     };
     let left = Event::Left { incarnation: plan_epoch + 1, node_name: "b".to_owned() };

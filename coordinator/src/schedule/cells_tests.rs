@@ -1,4 +1,4 @@
-//! What is sampled follows from where sessions look.
+//! Sample cameras follow the viewpoints of sessions.
 
 use std::time::Duration;
 
@@ -6,8 +6,11 @@ use cluster::limits::MAX_CELLS;
 use cluster::{Assignment, PolicyChoice};
 use depth_image::PinholeCamera;
 
+use super::command::Command;
+use super::demand::ChoiceError;
+use super::event::{Event, Opening};
+use super::scheduler::Scheduler;
 use super::test_support::{join, opening, view};
-use super::{ChoiceError, Command, Event, Opening, Scheduler};
 
 fn of(nodes: u64) -> Scheduler {
     let mut scheduler = Scheduler::default();
@@ -15,7 +18,7 @@ fn of(nodes: u64) -> Scheduler {
     scheduler
 }
 
-fn looks(session: u64, viewpoints: Vec<PinholeCamera>) -> Event {
+fn looking_from(session: u64, viewpoints: Vec<PinholeCamera>) -> Event {
     Event::Opened(Box::new(Opening { viewpoints, ..opening(session, PolicyChoice::Pipeline, 40) }))
 }
 
@@ -32,7 +35,7 @@ fn cells(scheduler: &Scheduler) -> Vec<u32> {
     (0..workload.cell_count()).filter_map(|cell| Some(workload.cameras_of_cell(cell)?.len() as u32)).collect()
 }
 
-/// What a sampler and a compositor know a cell's set by.
+/// The content hash of each cell's set.
 fn contents(scheduler: &Scheduler) -> Vec<cluster::SetContent> {
     let plan = plan(scheduler);
     let of_cell = |cell| plan.of_cell(cell).and_then(|plan| plan.set_content(0)).expect("a set");
@@ -40,53 +43,57 @@ fn contents(scheduler: &Scheduler) -> Vec<cluster::SetContent> {
 }
 
 #[test]
-fn sessions_near_each_other_share_cells_and_others_have_their_own() {
+fn sessions_near_each_other_share_cells_and_distant_ones_do_not() {
     let mut scheduler = of(4);
-    step(&mut scheduler, looks(1, vec![view(0.0), view(0.1)]));
+    step(&mut scheduler, looking_from(1, vec![view(0.0), view(0.1)]));
     assert_eq!(cells(&scheduler), [2]);
     let alone = contents(&scheduler);
-    let commands = step(&mut scheduler, looks(2, vec![view(0.05)]));
+    let commands = step(&mut scheduler, looking_from(2, vec![view(0.05)]));
     assert!(matches!(&commands[..], [Command::Apply { sessions, .. }] if sessions == &[2]), "{commands:?}");
     assert_eq!((plan(&scheduler).plan_epoch, contents(&scheduler)), (1, alone.clone()), "nothing has changed");
 
-    let commands = step(&mut scheduler, looks(3, vec![view(3.0)]));
+    let commands = step(&mut scheduler, looking_from(3, vec![view(3.0)]));
     let [Command::Apply { sessions, plan: told, .. }] = &commands[..] else { panic!("{commands:?}") };
     assert_eq!((&sessions[..], told.assignment.plan_epoch), (&[1, 2, 3][..], 2));
     assert!(told.reason.contains("sessions look from elsewhere"), "{}", told.reason);
     assert_eq!(cells(&scheduler), [2, 1]);
-    assert_eq!(contents(&scheduler)[0], alone[0], "what was sampled stays good");
+    assert_eq!(contents(&scheduler)[0], alone[0], "the samples of this cell stay valid");
     let workload = plan(&scheduler).workload;
     assert_eq!([0.02, 3.0].map(|azimuth| workload.cell_of(&view(azimuth))), [0, 1]);
 
     step(&mut scheduler, Event::Closed { session: 1 });
     assert_eq!(contents(&scheduler)[0], alone[0], "session 2 still looks from there");
     step(&mut scheduler, Event::Closed { session: 2 });
-    assert_eq!(cells(&scheduler), [1], "nobody does");
+    assert_eq!(cells(&scheduler), [1], "no session does");
 }
 
 #[test]
-fn a_session_that_moves_leaves_cells_behind() {
+fn a_cell_without_viewpoints_is_removed() {
     let mut scheduler = of(3);
-    step(&mut scheduler, looks(1, vec![view(0.0)]));
+    step(&mut scheduler, looking_from(1, vec![view(0.0)]));
     let before = contents(&scheduler);
-    let commands = step(&mut scheduler, Event::Looked { session: 1, viewpoints: vec![view(0.0), view(2.0)] });
+    let commands =
+        step(&mut scheduler, Event::ViewpointsChanged { session: 1, viewpoints: vec![view(0.0), view(2.0)] });
     assert!(matches!(&commands[..], [Command::Apply { .. }]));
     assert_eq!((cells(&scheduler), contents(&scheduler)[0]), (vec![1, 1], before[0]));
-    step(&mut scheduler, Event::Looked { session: 1, viewpoints: vec![view(2.0)] });
+    step(&mut scheduler, Event::ViewpointsChanged { session: 1, viewpoints: vec![view(2.0)] });
     assert_eq!(cells(&scheduler), [1]);
     assert_ne!(contents(&scheduler), before);
-    assert_eq!(step(&mut scheduler, Event::Looked { session: 77, viewpoints: vec![view(1.0)] }), [], "nobody's");
+    assert_eq!(
+        step(&mut scheduler, Event::ViewpointsChanged { session: 77, viewpoints: vec![view(1.0)] }),
+        [],
+        "an unknown session"
+    );
 }
 
-/// Each image of each cell by one sampler, and a cell's plan is one that peers take.
 #[test]
-fn a_plan_of_cells_is_whole_and_so_is_each_cells() {
+fn every_image_of_every_cell_has_one_sampler() {
     let mut scheduler = of(5);
-    step(&mut scheduler, looks(1, (0..30).map(|i| view(0.2 * i as f32)).collect()));
+    step(&mut scheduler, looking_from(1, (0..30).map(|i| view(0.2 * i as f32)).collect()));
     let plan = plan(&scheduler);
     let workload = &plan.workload;
     assert!(workload.cell_count() > 8 && workload.cell_count() <= MAX_CELLS, "{}", workload.cell_count());
-    assert_eq!(wire::workload_from_bytes(&wire::workload_to_bytes(workload)).as_ref(), Ok(workload));
+    assert_eq!(workload.validate(), Ok(()));
     let mut images = 0;
     for cell in 0..workload.cell_count() as u32 {
         let of_cell = plan.of_cell(cell).expect("a cell");
@@ -100,8 +107,8 @@ fn a_plan_of_cells_is_whole_and_so_is_each_cells() {
 }
 
 #[test]
-fn too_many_cells_are_refused_and_sample_cameras_are_not_the_schedules() {
-    // Seven each on circles of which each is twice as far away as the one before.
+fn too_many_cells_are_refused_and_given_sample_cameras_are_kept() {
+    // Seven views on each circle; each circle is twice as far away as the one before.
     let at = |circle: usize, azimuth: usize| {
         let mut view = view(0.5 * azimuth as f32);
         view.eye_in_world *= 2f32.powi(circle as i32);
@@ -109,19 +116,19 @@ fn too_many_cells_are_refused_and_sample_cameras_are_not_the_schedules() {
     };
     let spread = |circles: usize| (0..7 * circles).map(|i| at(i / 7, i % 7)).collect::<Vec<_>>();
     let mut scheduler = of(3);
-    let refused = step(&mut scheduler, looks(1, spread(12)));
+    let refused = step(&mut scheduler, looking_from(1, spread(12)));
     assert!(matches!(&refused[..], [Command::Refuse { error: ChoiceError::Cells { cells: 84 }, .. }]), "{refused:?}");
-    step(&mut scheduler, looks(1, spread(4)));
+    step(&mut scheduler, looking_from(1, spread(4)));
     assert_eq!(cells(&scheduler).len(), 28);
-    assert_eq!(scheduler.admits_views(1, &spread(12)), Err(ChoiceError::Cells { cells: 84 }));
-    assert_eq!(scheduler.admits_views(1, &spread(2)), Ok(()));
-    // Told all the same, as a log may have it: the nearest cell serves.
-    step(&mut scheduler, Event::Looked { session: 1, viewpoints: spread(12) });
+    assert_eq!(scheduler.admits_viewpoints(1, &spread(12)), Err(ChoiceError::Cells { cells: 84 }));
+    assert_eq!(scheduler.admits_viewpoints(1, &spread(2)), Ok(()));
+    // A log may have the event all the same: the nearest cell serves.
+    step(&mut scheduler, Event::ViewpointsChanged { session: 1, viewpoints: spread(12) });
     assert_eq!(cells(&scheduler).len(), MAX_CELLS);
 
     let mut scheduler = of(3);
     step(&mut scheduler, Event::Opened(Box::new(opening(1, PolicyChoice::Pipeline, 40))));
-    assert_eq!(scheduler.admits_views(1, &spread(1)), Err(ChoiceError::NoCells { session: 1 }));
-    let commands = step(&mut scheduler, looks(2, spread(1)));
+    assert_eq!(scheduler.admits_viewpoints(1, &spread(1)), Err(ChoiceError::NoCells { session: 1 }));
+    let commands = step(&mut scheduler, looking_from(2, spread(1)));
     assert!(matches!(&commands[..], [Command::End { session: 1, .. }, Command::Apply { .. }]), "{commands:?}");
 }

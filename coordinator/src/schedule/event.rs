@@ -1,89 +1,62 @@
-//! What happens to the schedule, and what it says is to be done.
+//! Inputs of the schedule: what happened in the cluster.
 
-use std::fmt;
-
-use cluster::{Costs, JoinCluster, MeasuredCosts, PolicyChoice, Quality, SessionPlan, Workload};
+use cluster::limits::MAX_VIEWS_PER_SET;
+use cluster::{
+    Costs, InvalidField, JoinCluster, MeasuredCosts, Quality, SamplerReport, Workload, finite_seconds, frame_rate,
+    nonempty, viewpoints,
+};
 use depth_image::PinholeCamera;
+use serde::{Deserialize, Serialize};
 
-use super::ChoiceError;
+use super::demand::PolicyOverride;
 
-/// What happened.
-#[derive(Debug, Clone, PartialEq)]
+/// What happened. Events of an epoch concern the plan of that epoch alone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum Event {
-    /// A node came, or came again.
-    Joined {
-        /// Rises with every joining, so that two processes of one name are told apart.
-        incarnation: u64,
-        /// Who.
-        join: JoinCluster,
-    },
+    /// A node joined, or joined again. `incarnation` rises with every joining and tells two processes of one name apart.
+    Joined { incarnation: u64, join: JoinCluster },
     /// A membership ended.
-    Left {
-        /// Which joining.
-        incarnation: u64,
-        /// Who.
-        node_name: String,
-    },
+    Left { incarnation: u64, node_name: String },
     /// A session is ready to be planned.
     Opened(Box<Opening>),
-    /// A session wants another number of views.
-    Demanded {
-        /// Which.
-        session: u64,
-        /// V.
-        views_per_set: usize,
-        /// Pictures a second; 0: as fast as they come.
-        frames_per_s: f64,
-    },
-    /// A session looks from elsewhere.
-    Looked {
-        /// Which.
-        session: u64,
-        /// From where, in place of what it said before.
-        viewpoints: Vec<PinholeCamera>,
-    },
-    /// A node timed its own work.
-    Measured {
-        /// Who.
-        node_name: String,
-        /// Under which plan.
-        plan_epoch: u64,
-        /// What it did.
-        costs: MeasuredCosts,
-        /// Seconds of all of it.
-        busy_s: f64,
-        /// Views made.
-        views: u64,
-        /// Views not made, or not sent.
-        dropped_views: u64,
-    },
-    /// A node has taken a plan.
-    Ready {
-        /// Which plan.
-        plan_epoch: u64,
-        /// Who.
-        node_name: String,
-    },
-    /// A node cannot take a plan.
-    Unready {
-        /// Which plan.
-        plan_epoch: u64,
-        /// Who.
-        node_name: String,
-        /// Why.
-        reason: String,
-    },
-    /// A client went, or its session failed.
-    Closed {
-        /// Which.
-        session: u64,
-    },
+    /// A session asks for another number of views a set, or another rate; `None`: as fast as they come.
+    DemandChanged { session: u64, views_per_set: usize, frames_per_s: Option<f64> },
+    /// A session looks from these viewpoints, in place of those before.
+    ViewpointsChanged { session: u64, viewpoints: Vec<PinholeCamera> },
+    /// A node timed its own work. `busy_s` is the time of all of it.
+    Measured { node_name: String, plan_epoch: u64, costs: MeasuredCosts, busy_s: f64, views: u64, dropped_views: u64 },
+    /// A node has taken the plan.
+    Ready { plan_epoch: u64, node_name: String },
+    /// A node refuses the plan: it asks for what this node cannot do.
+    Rejected { plan_epoch: u64, node_name: String, reason: String },
+    /// A node failed to take the plan.
+    Unready { plan_epoch: u64, node_name: String, reason: String },
+    /// All nodes have answered to the plan, or failed to.
+    Applied { plan_epoch: u64 },
+    /// A compositor cannot get images of a sampler.
+    Reported(SamplerReport),
+    /// The answer to a [`Probe`](super::Probe); `failure` is `None` where the node passed.
+    Probed { plan_epoch: u64, node_name: String, incarnation: u64, kind: ProbeKind, failure: Option<String> },
+    /// A client left, or its session failed.
+    Closed { session: u64 },
     /// Only time has passed.
     Tick,
 }
 
+/// What a probe asks of a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ProbeKind {
+    /// An answer of its health service.
+    Liveness,
+    /// One image of the plan, whole and decodable.
+    Image,
+}
+
 /// A session whose costs are known.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Opening {
     /// Its number.
     pub session: u64,
@@ -91,74 +64,58 @@ pub struct Opening {
     pub workload: Workload,
     /// V.
     pub views_per_set: usize,
-    /// Pictures a second, of so many views each; 0: as fast as they come.
-    pub frames_per_s: f64,
-    /// Who decides.
-    pub policy: PolicyChoice,
-    /// K, instead of the formula's.
-    pub forced_samplers: Option<usize>,
-    /// Tiles of an image, instead of as many as are predicted to be fastest.
-    pub forced_tiles: Option<usize>,
-    /// What it makes do with under overload, in this order.
+    /// Pictures a second, of `views_per_set` views each; `None`: as fast as they come.
+    pub frames_per_s: Option<f64>,
+    /// Decisions that the session takes from the schedule.
+    pub policy_override: PolicyOverride,
+    /// Qualities to fall back to under overload, in this order.
     pub fallbacks: Vec<Quality>,
     /// As measured: every node's until it reports its own.
     pub costs: Costs,
-    /// From where it looks; the workload's sample cameras are then its own cells', as if it were alone. Empty: it has
+    /// The workload's sample cameras are the cells of these viewpoints, as if the session were alone. Empty: it brings
     /// sample cameras of its own.
     pub viewpoints: Vec<PinholeCamera>,
 }
 
-/// What is to be done.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Command {
-    /// Tell every node of the plan, then these sessions.
-    Apply {
-        /// For whom.
-        sessions: Vec<u64>,
-        /// The plan.
-        plan: Box<SessionPlan>,
-        /// Addresses of the plan's nodes.
-        addresses: Vec<String>,
-    },
-    /// No plan can be made.
-    Refuse {
-        /// Whose.
-        session: u64,
-        /// Why.
-        error: ChoiceError,
-    },
-    /// A session's plan no longer holds, and it gets no other.
-    End {
-        /// Whose.
-        session: u64,
-        /// Why.
-        reason: String,
-    },
-}
-
-impl fmt::Display for Command {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Event {
+    /// # Errors
+    /// For values that no peer may send, as a damaged log may have them.
+    pub(super) fn validate(&self) -> Result<(), InvalidField> {
         match self {
-            Self::Apply { sessions, plan, .. } => write_plan(f, sessions, plan),
-            Self::Refuse { session, error } => write!(f, "refuse session {session}: {error}"),
-            Self::End { session, reason } => write!(f, "end session {session}: {reason}"),
+            Self::Joined { join, .. } => join.validate(),
+            Self::Opened(opening) => opening.validate(),
+            Self::DemandChanged { views_per_set, frames_per_s, .. } => check_demand(*views_per_set, *frames_per_s),
+            Self::ViewpointsChanged { viewpoints: changed, .. } => viewpoints(changed),
+            Self::Measured { node_name, costs, busy_s, .. } => {
+                nonempty(node_name, "node_name")?;
+                costs.validate()?;
+                finite_seconds(*busy_s, "busy_s").map(drop)
+            }
+            Self::Left { node_name, .. }
+            | Self::Ready { node_name, .. }
+            | Self::Rejected { node_name, .. }
+            | Self::Unready { node_name, .. }
+            | Self::Probed { node_name, .. } => nonempty(node_name, "node_name"),
+            Self::Reported(report) => report.validate(),
+            Self::Applied { .. } | Self::Closed { .. } | Self::Tick => Ok(()),
         }
     }
 }
 
-fn write_plan(f: &mut fmt::Formatter<'_>, sessions: &[u64], plan: &SessionPlan) -> fmt::Result {
-    let assignment = &plan.assignment;
-    let images = |images: &[u32]| images.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
-    let samplers = assignment.samplers.iter().map(|s| format!("{}[{}]", s.node_name, images(&s.image_indices)));
-    let compositors = assignment.compositors.iter().map(|share| share.node_name.clone());
-    write!(
-        f,
-        "apply plan {} to sessions {sessions:?}: {}, samplers {}, compositors {}, predicted {:.6} s a set: {}",
-        assignment.plan_epoch,
-        assignment.policy,
-        samplers.collect::<Vec<_>>().join(" "),
-        compositors.collect::<Vec<_>>().join(" "),
-        plan.predicted_s(),
-        plan.reason,
-    )
+impl Opening {
+    fn validate(&self) -> Result<(), InvalidField> {
+        self.workload.validate()?;
+        check_demand(self.views_per_set, self.frames_per_s)?;
+        self.policy_override.validate()?;
+        self.fallbacks.iter().try_for_each(Quality::validate)?;
+        self.costs.validate()?;
+        viewpoints(&self.viewpoints)
+    }
+}
+
+fn check_demand(views_per_set: usize, frames_per_s: Option<f64>) -> Result<(), InvalidField> {
+    if views_per_set > MAX_VIEWS_PER_SET as usize {
+        return Err(InvalidField::out_of_range("views_per_set", views_per_set, "from 0 to 65536"));
+    }
+    frame_rate(frames_per_s).map(drop)
 }

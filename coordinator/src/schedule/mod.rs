@@ -1,43 +1,54 @@
-//! Who does what. Pure: no clock, no await; the same events give the same commands.
+//! Roles of the nodes, and when they change. Pure: no clock, no await; the same events give the same commands.
 //!
-//! [`Scheduler`] takes events and says what is to be done. It divides nodes by what work is predicted to take
-//! ([`choose`]), from costs that nodes time themselves ([`MeasuredCosts`]), and changes a plan that works only where
-//! that pays. See `docs/scheduling.md`.
+//! [`Scheduler`] turns events into commands. It divides nodes by the time that work is predicted to take ([`choose`]), from
+//! costs that nodes time themselves ([`MeasuredCosts`]), replaces a plan that works only where the switch is repaid, and
+//! puts nodes at fault in quarantine. See `docs/scheduling.md`.
 
+mod active_plan;
 mod assign;
 mod balance;
 mod cells;
 mod choose;
-mod costs;
-mod deal;
+mod command;
+mod demand;
+mod estimate;
 mod event;
-mod exact;
-mod log;
+mod event_log;
+mod hysteresis;
+mod load;
+mod makespan;
+mod member;
+mod node_costs;
+mod operations;
 mod overload;
-mod patience;
-mod predict;
+mod prediction;
 mod reason;
+mod relay_tree;
+mod reports;
 mod scheduler;
 mod search;
-mod transfer;
-mod work;
-mod written;
+mod smoothing;
+mod workload_state;
 
 #[cfg(test)]
 mod cells_tests;
 #[cfg(test)]
-mod simulation;
+mod fault_tests;
+#[cfg(test)]
+mod simulated_cluster;
 #[cfg(test)]
 mod test_support;
 
-pub use assign::share_images;
 pub use balance::{brute_force_k, k_fd, k_fd_printed, pipeline_time};
-pub(crate) use cells::firsts;
-pub use choose::{Choice, ChoiceError, Demand, Predicted, Present, Wish, choose};
+pub(crate) use cells::first_indices;
+pub use choose::choose;
 pub use cluster::MeasuredCosts;
-pub use costs::NodeCosts;
-pub use event::{Command, Event, Opening};
-pub use log::{LogError, Recorder, replay};
-pub use predict::{Load, direct_s, pipeline_by_s, pipeline_s, relay_fanout, time_share_s};
+pub use command::{Command, Probe, ProbedImage};
+pub use demand::{Choice, ChoiceError, CurrentRoles, Demand, PolicyOverride, Predicted};
+pub use event::{Event, Opening, ProbeKind};
+pub use event_log::{LogError, Recorder, Step, replay};
+pub use load::Load;
+pub use node_costs::NodeCosts;
+pub use prediction::pipeline_s;
 pub use scheduler::Scheduler;
-pub use search::{Division, enumerate};
+pub use search::Division;

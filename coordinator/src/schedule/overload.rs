@@ -1,52 +1,53 @@
-//! When sessions make do with less, and when they get more again: one fallback at a time, in the order they were given.
+//! Overload control: when sessions fall back to a lower quality, and when they return. One fallback at a time, in the
+//! order in which the session gave them.
 
 use std::time::Duration;
 
-/// Above this share of the nodes' time frames begin to wait.
+/// Frames begin to wait above this utilisation.
 const FULL: f64 = 0.95;
-/// What was left is taken up again where it would leave so much room.
+/// A step up is taken where its predicted utilisation is below this.
 const ROOMY: f64 = 0.75;
-/// Looks in a row that must agree before less is done, and before more is.
-const LOOKS_DOWN: u32 = 3;
-const LOOKS_UP: u32 = 20;
-/// Timings of a new plan come in for so long before they are judged.
+/// Samples in a row that must agree before a step down, and before a step up.
+const CONFIRMATIONS_DOWN: u32 = 3;
+const CONFIRMATIONS_UP: u32 = 20;
+/// Timings of a new plan come in for this long before they are judged.
 const SETTLE: Duration = Duration::from_secs(5);
-/// What a step cost when it was left may have been somebody else's doing: where there is room at this step, the one above is
-/// tried after so long, and after twice as long each time that it has to be left again within as long.
+/// Another program may have caused the cost of a step when it was left: while this step is roomy, the step above is tried
+/// after this long, and after twice as long each time that the trial fails within as long.
 const FIRST_TRIAL: Duration = Duration::from_secs(30);
 const LAST_TRIAL: Duration = Duration::from_secs(480);
 
-/// How far down the fallbacks it has come.
+/// The present step down the fallbacks, and what was seen at each.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Overload {
-    /// 0: all that was asked for.
+    /// 0: the quality that was asked for.
     pub(super) step: usize,
     full_in_a_row: u32,
     roomy_in_a_row: u32,
     changed_at: Duration,
-    /// The nodes' time for one view a second, when each step was left.
-    left_at: Vec<f64>,
+    /// Utilisation by one view a second, when each step was left.
+    view_utilisation_when_left: Vec<f64>,
     /// The same when this step had settled.
-    settled_at: Option<f64>,
-    /// Since when there has been room at this step.
-    room_since: Option<Duration>,
-    /// When the step above was tried last, and how often in a row it had to be left again.
+    settled_view_utilisation: Option<f64>,
+    /// Since when this step has been roomy.
+    roomy_since: Option<Duration>,
+    /// The last trial of the step above, and the trials in a row that failed.
     tried_at: Option<Duration>,
     failed_trials: u32,
 }
 
-/// What a look sees.
+/// One sample of the nodes' utilisation.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Look<'a> {
+pub(super) struct UtilizationSample<'a> {
     /// Share of the nodes' time, at this step.
     pub(super) utilisation: f64,
-    /// That sessions ask for, undegraded.
+    /// Views that sessions ask for, undegraded.
     pub(super) views_per_s: f64,
-    /// Pictures a second of those asked for, by fallback.
+    /// Pictures a second over those asked for, by fallback.
     pub(super) frame_rate_ratios: &'a [f64],
 }
 
-impl Look<'_> {
+impl UtilizationSample<'_> {
     fn rate(&self, step: usize) -> f64 {
         let ratio = step.checked_sub(1).and_then(|i| self.frame_rate_ratios.get(i));
         self.views_per_s * ratio.copied().unwrap_or(1.0)
@@ -54,36 +55,39 @@ impl Look<'_> {
 }
 
 impl Overload {
-    /// Whether the step has changed. To be asked at every look.
-    pub(super) fn judge(&mut self, now: Duration, look: Look<'_>) -> bool {
+    /// Adds a sample; whether the step has changed.
+    pub(super) fn add(&mut self, now: Duration, sample: UtilizationSample<'_>) -> bool {
         let settled = now.saturating_sub(self.changed_at) >= SETTLE;
-        if !settled || look.views_per_s <= 0.0 {
+        if !settled || sample.views_per_s <= 0.0 {
             return false;
         }
-        let a_view = look.utilisation / look.rate(self.step);
-        let began = *self.settled_at.get_or_insert(a_view);
-        self.count(look, a_view / began);
-        if self.full_in_a_row >= LOOKS_DOWN && self.step < look.frame_rate_ratios.len() {
-            self.left_at.push(a_view);
-            self.judge_trial(now);
+        let view_utilisation = sample.utilisation / sample.rate(self.step);
+        let settled_view = *self.settled_view_utilisation.get_or_insert(view_utilisation);
+        self.count(sample, view_utilisation / settled_view);
+        if self.full_in_a_row >= CONFIRMATIONS_DOWN && self.step < sample.frame_rate_ratios.len() {
+            self.view_utilisation_when_left.push(view_utilisation);
+            self.count_trial(now);
             self.change(now, self.step + 1);
             return true;
         }
-        self.room_since = (look.utilisation < ROOMY).then(|| self.room_since.unwrap_or(now));
-        if self.roomy_in_a_row >= LOOKS_UP || self.is_time_to_try(now) {
+        self.roomy_since = (sample.utilisation < ROOMY).then(|| self.roomy_since.unwrap_or(now));
+        if self.roomy_in_a_row >= CONFIRMATIONS_UP || self.is_trial_due(now) {
             self.tried_at = Some(now);
-            self.left_at.pop();
+            self.view_utilisation_when_left.pop();
             self.change(now, self.step - 1);
             return true;
         }
         false
     }
 
-    fn count(&mut self, look: Look<'_>, slower: f64) {
-        let full = look.utilisation > FULL;
+    fn count(&mut self, sample: UtilizationSample<'_>, slower: f64) {
+        let full = sample.utilisation > FULL;
         self.full_in_a_row = if full { self.full_in_a_row + 1 } else { 0 };
-        // One step up costs what it did when it was left, times how nodes have changed since.
-        let above = self.left_at.last().map(|a_view| a_view * slower * look.rate(self.step - 1));
+        // One step up costs as much as when it was left, times how nodes have changed since.
+        let above = self
+            .view_utilisation_when_left
+            .last()
+            .map(|view_utilisation| view_utilisation * slower * sample.rate(self.step - 1));
         let roomy = above.is_some_and(|utilisation| utilisation < ROOMY);
         self.roomy_in_a_row = if roomy { self.roomy_in_a_row + 1 } else { 0 };
     }
@@ -92,18 +96,18 @@ impl Overload {
         FIRST_TRIAL.saturating_mul(1 << self.failed_trials.min(8)).min(LAST_TRIAL)
     }
 
-    fn is_time_to_try(&self, now: Duration) -> bool {
-        self.step > 0 && self.room_since.is_some_and(|since| now.saturating_sub(since) >= self.trial_after())
+    fn is_trial_due(&self, now: Duration) -> bool {
+        self.step > 0 && self.roomy_since.is_some_and(|since| now.saturating_sub(since) >= self.trial_after())
     }
 
-    /// When a step is left: whether it was a trial that failed.
-    fn judge_trial(&mut self, now: Duration) {
+    /// A step that is left soon after it was tried is a trial that failed.
+    fn count_trial(&mut self, now: Duration) {
         let failed = self.tried_at.is_some_and(|tried_at| now.saturating_sub(tried_at) < self.trial_after());
         self.failed_trials = if failed { self.failed_trials + 1 } else { 0 };
     }
 
     fn change(&mut self, now: Duration, step: usize) {
-        (self.step, self.changed_at, self.settled_at, self.room_since) = (step, now, None, None);
+        (self.step, self.changed_at, self.settled_view_utilisation, self.roomy_since) = (step, now, None, None);
         (self.full_in_a_row, self.roomy_in_a_row) = (0, 0);
     }
 }
@@ -113,66 +117,66 @@ mod tests {
     use super::*;
 
     const RATIOS: [f64; 3] = [1.0, 1.0, 0.5];
-    /// The nodes' time for one view a second, at each step.
-    const A_VIEW: [f64; 4] = [0.02, 0.015, 0.01, 0.01];
+    /// Utilisation by one view a second, at each step.
+    const VIEW_UTILISATION: [f64; 4] = [0.02, 0.015, 0.01, 0.01];
 
-    /// Looks twice a second for so long; the steps that were gone to.
-    fn looks(overload: &mut Overload, from_s: u64, for_s: u64, views_per_s: f64, nodes_slower: f64) -> Vec<usize> {
-        let mut steps = Vec::new();
+    /// Samples utilisation twice a second for `for_s`; the steps that were taken.
+    fn steps(overload: &mut Overload, from_s: u64, for_s: u64, views_per_s: f64, nodes_slower: f64) -> Vec<usize> {
+        let mut taken = Vec::new();
         for tick in from_s * 2..(from_s + for_s) * 2 {
             let (now, step) = (Duration::from_millis(tick * 500), overload.step);
             let ratio = if step == 0 { 1.0 } else { RATIOS[step - 1] };
-            let utilisation = A_VIEW[step] * nodes_slower * views_per_s * ratio;
-            if overload.judge(now, Look { utilisation, views_per_s, frame_rate_ratios: &RATIOS }) {
-                steps.push(overload.step);
+            let utilisation = VIEW_UTILISATION[step] * nodes_slower * views_per_s * ratio;
+            if overload.add(now, UtilizationSample { utilisation, views_per_s, frame_rate_ratios: &RATIOS }) {
+                taken.push(overload.step);
             }
         }
-        steps
+        taken
     }
 
     #[test]
-    fn it_goes_down_in_order_as_far_as_it_must_and_comes_back() {
+    fn overload_steps_down_in_order_and_returns_when_demand_falls() {
         let mut overload = Overload::default();
-        assert_eq!(looks(&mut overload, 0, 100, 40.0, 1.0), [] as [usize; 0], "0.8 of the time");
-        assert_eq!(looks(&mut overload, 100, 100, 80.0, 1.0), [1, 2], "1.6, then 1.2, then 0.8");
-        assert_eq!(looks(&mut overload, 200, 25, 60.0, 1.0), [] as [usize; 0], "one step up would take 0.9");
-        assert_eq!(looks(&mut overload, 225, 25, 40.0, 1.0), [1], "0.6 one step up, 0.8 two");
-        assert_eq!(looks(&mut overload, 250, 25, 20.0, 1.0), [0]);
+        assert_eq!(steps(&mut overload, 0, 100, 40.0, 1.0), [] as [usize; 0], "0.8 of the time");
+        assert_eq!(steps(&mut overload, 100, 100, 80.0, 1.0), [1, 2], "1.6, then 1.2, then 0.8");
+        assert_eq!(steps(&mut overload, 200, 25, 60.0, 1.0), [] as [usize; 0], "one step up would take 0.9");
+        assert_eq!(steps(&mut overload, 225, 25, 40.0, 1.0), [1], "0.6 one step up, 0.8 two");
+        assert_eq!(steps(&mut overload, 250, 25, 20.0, 1.0), [0]);
     }
 
     #[test]
-    fn what_others_took_for_a_while_is_taken_up_again() {
+    fn a_load_by_another_program_is_followed_by_a_return() {
         let mut overload = Overload::default();
-        assert_eq!(looks(&mut overload, 0, 50, 40.0, 1.0), [] as [usize; 0]);
-        assert_eq!(looks(&mut overload, 50, 9, 40.0, 2.2), [1, 2], "1.76, 1.32, and then it is over");
-        assert_eq!(looks(&mut overload, 59, 100, 40.0, 1.0), [1, 0], "0.4, 0.6, 0.8: after half a minute each");
-        assert_eq!(looks(&mut overload, 159, 1000, 40.0, 1.0), [] as [usize; 0]);
+        assert_eq!(steps(&mut overload, 0, 50, 40.0, 1.0), [] as [usize; 0]);
+        assert_eq!(steps(&mut overload, 50, 9, 40.0, 2.2), [1, 2], "1.76, 1.32, and then it is over");
+        assert_eq!(steps(&mut overload, 59, 100, 40.0, 1.0), [1, 0], "0.4, 0.6, 0.8: after half a minute each");
+        assert_eq!(steps(&mut overload, 159, 1000, 40.0, 1.0), [] as [usize; 0]);
     }
 
     #[test]
-    fn what_is_too_much_is_tried_ever_less_often() {
+    fn a_step_that_stays_overloaded_is_tried_ever_less_often() {
         let mut overload = Overload::default();
-        assert_eq!(looks(&mut overload, 0, 20, 70.0, 1.0), [1, 2], "1.4, 1.05, 0.7");
-        assert_eq!(looks(&mut overload, 20, 1000, 70.0, 1.0), [[1, 2]; 5].concat(), "30, 60, 120, 240, 480 s apart");
+        assert_eq!(steps(&mut overload, 0, 20, 70.0, 1.0), [1, 2], "1.4, 1.05, 0.7");
+        assert_eq!(steps(&mut overload, 20, 1000, 70.0, 1.0), [[1, 2]; 5].concat(), "30, 60, 120, 240, 480 s apart");
     }
 
     #[test]
-    fn it_goes_no_further_than_there_are_fallbacks() {
+    fn overload_stops_at_the_last_fallback() {
         let mut overload = Overload::default();
-        assert_eq!(looks(&mut overload, 0, 200, 500.0, 1.0), [1, 2, 3]);
+        assert_eq!(steps(&mut overload, 0, 200, 500.0, 1.0), [1, 2, 3]);
     }
 
     #[test]
-    fn nodes_that_slow_down_bring_it_down_and_do_not_hold_it_there() {
+    fn nodes_that_slow_down_and_recover_are_followed_both_ways() {
         let mut overload = Overload::default();
-        assert_eq!(looks(&mut overload, 0, 50, 40.0, 1.0), [] as [usize; 0]);
-        assert_eq!(looks(&mut overload, 50, 50, 40.0, 1.5), [1], "1.2, then 0.9");
-        assert_eq!(looks(&mut overload, 100, 50, 40.0, 0.75), [0], "0.6 by now");
+        assert_eq!(steps(&mut overload, 0, 50, 40.0, 1.0), [] as [usize; 0]);
+        assert_eq!(steps(&mut overload, 50, 50, 40.0, 1.5), [1], "1.2, then 0.9");
+        assert_eq!(steps(&mut overload, 100, 50, 40.0, 0.75), [0], "0.6 by now");
     }
 
     #[test]
-    fn sessions_without_a_rate_are_never_too_many() {
+    fn sessions_without_a_rate_cause_no_overload() {
         let mut overload = Overload::default();
-        assert_eq!(looks(&mut overload, 0, 50, 0.0, 1.0), [] as [usize; 0]);
+        assert_eq!(steps(&mut overload, 0, 50, 0.0, 1.0), [] as [usize; 0]);
     }
 }

@@ -1,19 +1,20 @@
-//! Why a policy and a K were chosen, in plain words.
+//! The reason of a choice, in plain words.
 
 use cluster::{Policy, PolicyChoice};
 
-use super::choose::{Demand, Predicted};
-use super::{Load, NodeCosts};
+use super::demand::{Demand, Predicted};
+use super::load::Load;
+use super::node_costs::NodeCosts;
 
 /// Every figure that the choice rests on.
 pub(super) fn reason(demand: &Demand<'_>, policy: Policy, samplers: usize, predicted: &Predicted) -> String {
     let parts = [pipeline(demand, samplers, predicted), time_share(demand, predicted), direct(demand, predicted)];
     let unequal = if NodeCosts::are_equal(demand.nodes) { "" } else { " Nodes are unequal: costs are their mean." };
-    format!("{policy}, {}. {}{unequal}", who(demand), parts.join(" "))
+    format!("{policy}, {}. {}{unequal}", origin(demand), parts.join(" "))
 }
 
-fn who(demand: &Demand<'_>) -> &'static str {
-    match (demand.wish.policy, demand.wish.forced_samplers) {
+fn origin(demand: &Demand<'_>) -> &'static str {
+    match (demand.policy_override.policy, demand.policy_override.forced_samplers) {
         (PolicyChoice::Auto, None) => "predicted to be faster",
         (PolicyChoice::Auto, Some(_)) => "predicted to be faster, with K as asked for",
         (_, None) => "asked for",
@@ -26,18 +27,18 @@ fn ms(seconds: f64) -> String {
 }
 
 fn pipeline(demand: &Demand<'_>, samplers: usize, predicted: &Predicted) -> String {
-    let Load { images, tiles, cells, views, in_order, still, .. } = demand.load;
-    let (nodes, mean) = (demand.nodes.len(), NodeCosts::mean(demand.nodes).costs);
-    let in_turn = if in_order { "whole sets in turn, " } else { "" };
+    let Load { images, tiles, cells, views, images_are_sequential, is_already_sampled, .. } = demand.load;
+    let (nodes, mean) = (demand.nodes.len(), NodeCosts::mean(demand.nodes));
+    let in_turn = if images_are_sequential { "whole sets in turn, " } else { "" };
     let roles = match nodes {
         1 => "1 node in turn".to_owned(),
         _ => format!("K = {samplers} of {nodes} nodes, {in_turn}the others reconstruct"),
     };
-    let cut = if tiles > 1 { format!(" in {tiles} tiles each") } else { String::new() };
+    let tiled = if tiles > 1 { format!(" in {tiles} tiles each") } else { String::new() };
     let near = if cells > 1 { format!(" for {cells} view cells") } else { String::new() };
-    let once = if still { ", once," } else { "" };
+    let once = if is_already_sampled { ", once," } else { "" };
     format!(
-        "Pipeline: {} a set: {images} images{near}{cut} of {} sampled{once} by {roles} {views} views of {} + {} to encode, after {} to \
+        "Pipeline: {} a set: {images} images{near}{tiled} of {} sampled{once} by {roles} {views} views of {} + {} to encode, after {} to \
          load the set (K_fd = {}, {}; trying every K gives K = {}, {}).",
         ms(predicted.pipeline_s),
         ms(mean.sample_image_s),
@@ -60,7 +61,7 @@ fn time_share(demand: &Demand<'_>, predicted: &Predicted) -> String {
 }
 
 fn direct(demand: &Demand<'_>, predicted: &Predicted) -> String {
-    let (nodes, views, mean) = (demand.nodes.len(), demand.load.views, NodeCosts::mean(demand.nodes).costs);
+    let (nodes, views, mean) = (demand.nodes.len(), demand.load.views, NodeCosts::mean(demand.nodes));
     format!(
         "Direct: {} a set: {views} views of {} + {} to encode on {nodes} nodes.",
         ms(predicted.direct_s),

@@ -1,15 +1,16 @@
-//! Who samples, by trying: every K over the nodes in order, then single moves and swaps.
+//! The division of the nodes with the least predicted time: every K over the nodes in order, then moves and swaps.
 
 use std::cmp::Ordering;
 
-use super::predict::pipeline_s;
-use super::{Load, NodeCosts};
+use super::load::Load;
+use super::node_costs::NodeCosts;
+use super::prediction::pipeline_s;
 
-/// Most nodes of which moves and swaps are tried: beyond, every look would take longer than it saves.
+/// Most nodes of which moves and swaps are tried: beyond, the search takes longer than it saves.
 const MOST_NODES_TO_MOVE: usize = 32;
 /// Divisions that are improved by moves.
 const STARTS: usize = 4;
-/// A move that gains less is none: rounding would move nodes back and forth.
+/// A move that gains less is ignored: rounding would move nodes back and forth.
 const LEAST_GAIN: f64 = 1e-9;
 
 /// A division of the nodes.
@@ -17,7 +18,7 @@ const LEAST_GAIN: f64 = 1e-9;
 pub struct Division {
     /// Whether each node samples; the others composite.
     pub samples: Vec<bool>,
-    /// T of it.
+    /// T of the division.
     pub time_s: f64,
 }
 
@@ -44,22 +45,20 @@ impl Division {
     }
 }
 
-/// Nodes by what they should do, best samplers first. Equal ones by what they do now (`sampled`), so that K ± 1 is one
-/// change of role; unequal ones by s/q, how much faster they sample than they composite.
-#[must_use]
-pub fn order(nodes: &[NodeCosts], sampled: &[bool]) -> Vec<usize> {
+/// Nodes in the order in which they become samplers. Equal nodes: present samplers (`sampled`) first, so that K ± 1 is one
+/// change of role. Unequal nodes: by s/q, how much faster they sample than they composite.
+pub(super) fn order(nodes: &[NodeCosts], sampled: &[bool]) -> Vec<usize> {
     let equal = NodeCosts::are_equal(nodes);
     let ratio = |i: usize| nodes[i].view_s() / nodes[i].costs.sample_image_s.max(f64::MIN_POSITIVE);
     let by_speed = |a: usize, b: usize| if equal { Ordering::Equal } else { ratio(b).total_cmp(&ratio(a)) };
-    let does = |i: usize| sampled.get(i).copied().unwrap_or(false);
+    let samples = |i: usize| sampled.get(i).copied().unwrap_or(false);
     let mut order: Vec<usize> = (0..nodes.len()).collect();
-    order.sort_by(|&a, &b| by_speed(a, b).then(does(b).cmp(&does(a))));
+    order.sort_by(|&a, &b| by_speed(a, b).then(samples(b).cmp(&samples(a))));
     order
 }
 
 /// The first K in `order` sample.
-#[must_use]
-pub fn first(load: &Load, nodes: &[NodeCosts], order: &[usize], k: usize) -> Division {
+pub(super) fn first(load: &Load, nodes: &[NodeCosts], order: &[usize], k: usize) -> Division {
     let mut samples = vec![false; nodes.len()];
     for &i in order.iter().take(k) {
         samples[i] = true;
@@ -67,9 +66,8 @@ pub fn first(load: &Load, nodes: &[NodeCosts], order: &[usize], k: usize) -> Div
     Division::new(load, nodes, samples)
 }
 
-/// The best of every K; with `moves`, and unequal nodes, the best few of them improved. Of equal times the least K.
-#[must_use]
-pub fn enumerate(load: &Load, nodes: &[NodeCosts], order: &[usize], moves: bool) -> Division {
+/// The best division of every K; with `moves`, and unequal nodes, the best few are improved. The least K of equal times.
+pub(super) fn enumerate(load: &Load, nodes: &[NodeCosts], order: &[usize], moves: bool) -> Division {
     let mut all: Vec<Division> = (1..=load.most_samplers(nodes.len())).map(|k| first(load, nodes, order, k)).collect();
     all.sort_by(by_time);
     if moves && !NodeCosts::are_equal(nodes) && nodes.len() <= MOST_NODES_TO_MOVE {
@@ -84,8 +82,7 @@ fn by_time(a: &Division, b: &Division) -> Ordering {
 }
 
 /// Single moves (where K may change) and swaps, the best one first, until none gains.
-#[must_use]
-pub fn improve(load: &Load, nodes: &[NodeCosts], mut best: Division, k_may_change: bool) -> Division {
+pub(super) fn improve(load: &Load, nodes: &[NodeCosts], mut best: Division, k_may_change: bool) -> Division {
     while let Some(better) = neighbours(load, nodes, &best, k_may_change).min_by(by_time) {
         if better.time_s >= best.time_s * (1.0 - LEAST_GAIN) {
             break;
@@ -109,10 +106,9 @@ fn neighbours<'a>(
     singles.chain(swaps).map(|flips| from.flipped(load, nodes, &flips)).filter(possible)
 }
 
-/// From a division towards another with at most `changes` changes of role, the best first. `has_role` says whose
-/// change counts: a node that does nothing yet takes its role at once.
-#[must_use]
-pub fn towards(
+/// A step from the present division towards another by at most `changes` changes of role, the best change first. Nodes
+/// without `has_role` take their role at once, uncounted.
+pub(super) fn towards(
     load: &Load,
     nodes: &[NodeCosts],
     present: &[bool],

@@ -1,10 +1,12 @@
-//! What tests of several files share: numbers from a seed, costs, and events.
+//! Shared by tests: random numbers, costs, and events.
 
 use cluster::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, TileCosts, Timeline, Workload};
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
-use super::{Event, NodeCosts, Opening};
+use super::demand::PolicyOverride;
+use super::event::{Event, Opening};
+use super::node_costs::NodeCosts;
 
 /// Numbers from a seed (SplitMix64).
 pub(super) struct Random(pub(super) u64);
@@ -43,8 +45,8 @@ pub(super) const COSTS: Costs = Costs {
     tiles: None,
 };
 
-/// Light that is dear, on images whose upper half shows the sky.
-pub(super) const DEAR: Costs = Costs {
+/// Expensive lighting, on images whose upper half shows the sky.
+pub(super) const TILEABLE: Costs = Costs {
     sample_image_s: 5.0,
     tiles: Some(TileCosts { overhead_s: 0.5, row_shares: Some([0.05, 0.15, 0.4, 0.4]) }),
     reconstruct_view_s: 0.114,
@@ -52,9 +54,9 @@ pub(super) const DEAR: Costs = Costs {
     ..COSTS
 };
 
-/// So many nodes that need `costs`.
+/// `count` equal nodes.
 pub(super) fn nodes(count: usize, costs: Costs) -> Vec<NodeCosts> {
-    vec![NodeCosts { costs, transfer_image_s: 0.0 }; count]
+    vec![NodeCosts { costs, transfer_image_s: None }; count]
 }
 
 pub(super) fn join(name: &str, incarnation: u64, plan_epoch: u64) -> Event {
@@ -96,10 +98,8 @@ pub(super) fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) 
         session,
         workload: workload(4),
         views_per_set,
-        frames_per_s: 0.0,
-        policy,
-        forced_samplers: None,
-        forced_tiles: None,
+        frames_per_s: None,
+        policy_override: PolicyOverride { policy, ..PolicyOverride::default() },
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
         costs: COSTS,

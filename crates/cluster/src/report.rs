@@ -1,4 +1,6 @@
-//! What nodes say of their own work, and of each other.
+//! Reports of nodes on their own work, and on each other.
+
+use serde::{Deserialize, Serialize};
 
 use crate::check::{finite_seconds, nonempty, reason};
 use crate::costs::MeasuredCosts;
@@ -32,7 +34,7 @@ impl WorkReport {
 }
 
 /// A compositor cannot get images of a sampler, though it asked again.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SamplerReport {
     /// The plan in which both have their roles.
     pub plan_epoch: u64,

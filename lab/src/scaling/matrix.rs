@@ -1,7 +1,7 @@
 //! Points to measure, and the time that they take.
 
 use cluster::{Costs, PolicyChoice};
-use coordinator::schedule::{Demand, Load, NodeCosts, Wish, choose};
+use coordinator::schedule::{Demand, Load, NodeCosts, PolicyOverride, choose};
 use render::Lighting;
 
 use super::point::PointSettings;
@@ -26,9 +26,7 @@ use PolicyChoice::{Auto, Direct, Pipeline, TimeShare};
 /// A point to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointSpec {
-    /// The policy asked for.
     pub policy: PolicyChoice,
-    /// The number of views, V.
     pub views: usize,
     /// True where sample images stay whole.
     pub whole_images: bool,
@@ -39,9 +37,7 @@ pub struct PointSpec {
 pub struct Extent {
     /// True for a stated subset.
     pub quick: bool,
-    /// The most nodes.
     pub nodes: usize,
-    /// The most views.
     pub views: usize,
 }
 
@@ -105,18 +101,16 @@ fn full_points(nodes: usize) -> Vec<(PolicyChoice, usize)> {
 /// The time between two sets that the schedule predicts for P equal nodes.
 #[must_use]
 pub fn predicted_s(costs: &Costs, images: usize, nodes: usize, policy: PolicyChoice, views: usize) -> f64 {
-    let nodes = vec![NodeCosts { costs: *costs, transfer_image_s: 0.0 }; nodes];
-    let load = Load { images, sets: 2, views, in_order: costs.in_order, ..Load::default() };
-    let wish = Wish { policy, forced_samplers: None, forced_tiles: None };
-    choose(&Demand { load, nodes: &nodes, wish, present: None }).map_or(f64::NAN, |choice| choice.time_s())
+    let nodes = vec![NodeCosts { costs: *costs, transfer_image_s: None }; nodes];
+    let load = Load { images, sets: 2, views, images_are_sequential: costs.in_order, ..Load::default() };
+    let policy_override = PolicyOverride { policy, ..PolicyOverride::default() };
+    choose(&Demand { load, nodes: &nodes, policy_override, current: None }).map_or(f64::NAN, |choice| choice.time_s())
 }
 
 /// A point with its sets, and the seconds that it takes, about.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Planned {
-    /// The settings.
     pub settings: PointSettings,
-    /// The number of nodes, P.
     pub nodes: usize,
     /// Seconds of the wall clock, about.
     pub about_s: f64,

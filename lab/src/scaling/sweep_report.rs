@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use cluster::{Costs, PolicyChoice};
-use coordinator::schedule::{Demand, Load, NodeCosts, Wish, choose};
+use cluster::Costs;
+use coordinator::schedule::{Demand, Load, NodeCosts, PolicyOverride, choose};
 use simulation::spread_speeds;
 use study::{Axis, Chart, Series, Table, XyChart};
 
@@ -128,12 +128,12 @@ pub fn decisions_table(basis: &Basis, views: usize) -> anyhow::Result<Table> {
 
 fn decision_s(costs: &Costs, images: usize, speeds: &[f64], views: usize) -> f64 {
     let node =
-        |&speed: &f64| NodeCosts { costs: simulation::Machine::of(*costs).faster(speed).costs, transfer_image_s: 0.0 };
+        |&speed: &f64| NodeCosts { costs: simulation::Machine::of(*costs).faster(speed).costs, transfer_image_s: None };
     let nodes: Vec<_> = speeds.iter().map(node).collect();
     let load = Load { images, sets: 2, views, ..Load::default() };
-    let wish = Wish { policy: PolicyChoice::Auto, forced_samplers: None, forced_tiles: None };
+    let policy_override = PolicyOverride::default();
     let start = Instant::now();
-    let chosen = choose(&Demand { load, nodes: &nodes, wish, present: None });
+    let chosen = choose(&Demand { load, nodes: &nodes, policy_override, current: None });
     let seconds = start.elapsed().as_secs_f64();
     chosen.map_or(f64::NAN, |_| seconds)
 }

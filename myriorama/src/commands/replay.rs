@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use app_core::exit::{BadInput, Outcome};
 use clap::Args;
-use coordinator::schedule::{LogError, replay};
+use coordinator::schedule::{Command, LogError, ProbeKind, Step, replay};
 
 /// Replays the events that `myriorama coordinator --record` wrote, and prints the schedule's commands, each with the
 /// time since the coordinator's start. The same events give the same commands.
@@ -26,13 +26,18 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<Outcome> {
     let file = File::open(&args.log).with_context(|| format!("cannot read {}", args.log.display()))?;
     let steps = replay(BufReader::new(file)).map_err(|error| wrong(args, error))?;
     let events = steps.len();
-    for (now, _, commands) in steps {
-        for command in commands {
+    for Step { now, commands, .. } in steps {
+        for command in commands.iter().filter(|command| !is_routine(command)) {
             println!("{:>10.3} s  {command}", now.as_secs_f64());
         }
     }
     eprintln!("{events} events");
     Ok(Outcome::Done)
+}
+
+/// Liveness probes of all nodes come every few seconds.
+fn is_routine(command: &Command) -> bool {
+    matches!(command, Command::Probe(probe) if probe.kind() == ProbeKind::Liveness)
 }
 
 fn wrong(args: &ReplayArgs, error: LogError) -> anyhow::Error {

@@ -1,19 +1,20 @@
-//! Chunks of sample images that are not what they should be: asked for again, and whoever sends nothing else is left
-//! out.
+//! Spoilt chunks of sample images are asked for again; a sampler that sends nothing else is replaced.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use client::Session;
-use cluster::{PolicyChoice, Refinement, Timeline};
+use cluster::{PolicyChoice, Refinement, SamplerReport, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, request, views};
 use cluster_tests::mangler::{Mangler, Spoil};
 use cluster_tests::picture::fault_of;
 use cluster_tests::processes::number_of;
+use cluster_tests::watcher::eventually;
 use codec::{ChunkBody, SampleSetId};
 use node::NodeConfig;
+use wire::rpc::{CoordinatorClient, connect};
 
-use crate::{CLOSED, has_role, sampler_of};
+use crate::{CLOSED, ONE_WITNESS, compositor_of, has_role, sampler_of};
 
 const SPOILT: [(&str, Spoil); 8] = [
     ("corrupt", |c| c[1].body = ChunkBody::Data(vec![0; 30].into())),
@@ -26,7 +27,7 @@ const SPOILT: [(&str, Spoil); 8] = [
     ("of another image", |c| c.iter_mut().for_each(|c| c.image_index += 7)),
 ];
 
-/// Each node has a mangler before it.
+/// Every node has a mangler before it.
 async fn start(nodes: usize) -> (Cluster, Vec<Mangler>) {
     let (mut cluster, mut manglers) = (Cluster::start(0).await, Vec::new());
     for number in 0..nodes {
@@ -45,7 +46,7 @@ async fn session(cluster: &Cluster) -> Session {
     cluster.session(request(PolicyChoice::Pipeline, timeline)).await.unwrap()
 }
 
-/// The views of a set that was not there before; all must be right.
+/// Shows the views of a set that no node has; all must be right.
 async fn show(session: &Session, set_index: u32) -> Duration {
     let start = Instant::now();
     let asked = views(set_index + 1, 3).into_iter().filter(|view| view.set_index == set_index).collect();
@@ -60,7 +61,7 @@ async fn show(session: &Session, set_index: u32) -> Duration {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn spoilt_chunks_are_fetched_again() {
+async fn corrupt_chunks_are_fetched_again() {
     let (cluster, manglers) = start(2).await;
     let session = session(&cluster).await;
     show(&session, 0).await;
@@ -73,25 +74,77 @@ async fn spoilt_chunks_are_fetched_again() {
         assert!(took < CLOSED, "{what}: {took:?}");
         assert_eq!(manglers[sampler].left(), 0, "{what}");
     }
-    assert_eq!(session.plan().assignment.plan_epoch, epoch, "nobody was left out for it");
+    assert_eq!(session.plan().assignment.plan_epoch, epoch, "no node was quarantined for it");
 }
 
-async fn left_out((what, spoil): (&str, Spoil)) {
-    let (cluster, manglers) = start(3).await;
+/// A sampler is replaced that sends nothing but spoilt chunks from now on.
+async fn replaced(nodes: usize, (what, spoil): (&str, Spoil), deadline: Duration) {
+    let (cluster, manglers) = start(nodes).await;
     let session = session(&cluster).await;
     show(&session, 0).await;
     let name = sampler_of(&session);
     manglers[number_of(&name)].spoil(usize::MAX, spoil);
     let took = show(&session, 50).await;
-    println!("always {what}: frames after {:.2} s, without {name}", took.as_secs_f64());
-    assert!(took < CLOSED, "{what}: {took:?}");
+    println!("always {what}, {nodes} nodes: frames after {:.2} s, without {name}", took.as_secs_f64());
+    assert!(took < deadline, "{what}: {took:?}");
     assert!(!has_role(&session, &name), "{what}");
     show(&session, 70).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_sampler_that_sends_only_spoilt_chunks_is_quarantined() {
+async fn a_sampler_that_sends_only_spoilt_chunks_is_replaced() {
     for spoilt in [SPOILT[0], SPOILT[1], SPOILT[5]] {
-        left_out(spoilt).await;
+        replaced(3, spoilt, CLOSED).await;
     }
+}
+
+/// The coordinator's own probe confirms the report of the only compositor.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_spoilt_sampler_is_replaced_without_a_second_compositor() {
+    for spoilt in [SPOILT[0], SPOILT[6], SPOILT[7]] {
+        replaced(2, spoilt, ONE_WITNESS).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn two_samplers_that_fail_within_a_minute_cost_their_compositor_nothing() {
+    let (cluster, manglers) = start(3).await;
+    let timeline = Timeline { start_s: 0.0, step_s: 0.05, set_count: 100 };
+    let asked = SessionRequest { forced_sampler_count: Some(2), ..request(PolicyChoice::Pipeline, timeline) };
+    let session = cluster.session(asked).await.unwrap();
+    show(&session, 0).await;
+    let honest = compositor_of(&session);
+    let failing: Vec<String> = (0..3).map(|number| format!("n{number}")).filter(|name| *name != honest).collect();
+    for (set_index, name) in (1..).zip(&failing) {
+        manglers[number_of(name)].spoil(usize::MAX, SPOILT[0].1);
+        let took = show(&session, 20 * set_index).await;
+        println!("sampler {name} fails: frames after {:.2} s", took.as_secs_f64());
+        assert!(took < ONE_WITNESS, "{took:?}");
+        assert!(!has_role(&session, name) && has_role(&session, &honest), "{name} fails, {honest} does not");
+    }
+    show(&session, 80).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_compositor_whose_reports_no_probe_confirms_is_quarantined() {
+    let (cluster, _manglers) = start(3).await;
+    let session = session(&cluster).await;
+    show(&session, 0).await;
+    let (liar, sampler) = (compositor_of(&session), sampler_of(&session));
+    let plan_epoch = session.plan().assignment.plan_epoch;
+    let coordinator = CoordinatorClient::new(connect(&cluster.coordinator.address).await.unwrap());
+    let report = || SamplerReport {
+        plan_epoch,
+        compositor: liar.clone(),
+        sampler: sampler.clone(),
+        reason: "nothing came".to_owned(),
+    };
+    coordinator.report_sampler(report()).await.unwrap();
+    // The probe passes meanwhile.
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    assert_eq!(session.plan().assignment.plan_epoch, plan_epoch, "a single report changes nothing");
+    coordinator.report_sampler(report()).await.unwrap();
+    eventually("a plan without the compositor", CLOSED, || !has_role(&session, &liar)).await;
+    assert!(has_role(&session, &sampler));
+    show(&session, 50).await;
 }

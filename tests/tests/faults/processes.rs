@@ -8,7 +8,7 @@ use cluster_tests::processes::{Processes, number_of};
 use cluster_tests::watcher::Watcher;
 use rustix::process::Signal;
 
-use crate::{CLOSED, PROGRAM, SILENT, compositor_of, finish, has_role, sampler_of};
+use crate::{CLOSED, ONE_WITNESS, PROGRAM, SILENT, compositor_of, finish, has_role, sampler_of};
 
 async fn killed(what: &str, victim: fn(&Session) -> String) {
     let mut cluster = Processes::start(PROGRAM, 3).await;
@@ -51,28 +51,29 @@ async fn frames_go_on_without_a_coordinator_and_a_plan_follows_its_return() {
     );
 }
 
-/// Stops a process silently: its sockets stay open, and it does not answer. Later it continues.
-async fn stopped(what: &str, victim: fn(&Session) -> String) {
-    let cluster = Processes::start(PROGRAM, 3).await;
+/// Sockets of a stopped process stay open, and nothing answers. Afterwards the process goes on as if nothing had happened.
+async fn stopped(what: &str, nodes: usize, victim: fn(&Session) -> String, deadline: Duration) {
+    let cluster = Processes::start(PROGRAM, nodes).await;
     let watcher = Watcher::start(&cluster.client).await;
     let (name, epoch) = (victim(&watcher.session), watcher.epoch());
     let since = Instant::now();
     let zombie = &cluster.nodes[number_of(&name)];
     zombie.signal(Signal::STOP);
-    let wait = watcher.healed(since, SILENT, |session| !has_role(session, &name)).await;
+    let wait = watcher.healed(since, deadline, |session| !has_role(session, &name)).await;
     zombie.signal(Signal::CONT);
-    cluster.client.wait_for_nodes(3, CLOSED).await.unwrap();
+    cluster.client.wait_for_nodes(nodes, CLOSED).await.unwrap();
     watcher.calls_after(Instant::now(), 10, CLOSED).await;
     assert!(watcher.epoch() > epoch);
     finish(what, wait, &cluster, &watcher);
 }
 
-/// Keepalive takes up to 10 s to notice, so that all faults run at the same time.
+/// Probes and keepalive take seconds to notice: all at the same time.
 #[tokio::test(flavor = "multi_thread")]
 async fn stopped_processes_are_replaced_and_fenced_when_they_continue() {
     tokio::join!(
-        stopped("sampler stopped", sampler_of),
-        stopped("compositor stopped", compositor_of),
+        stopped("sampler stopped", 3, sampler_of, SILENT),
+        stopped("the only compositor's sampler stopped", 2, sampler_of, ONE_WITNESS),
+        stopped("compositor stopped", 3, compositor_of, SILENT),
         stopped_coordinator(),
     );
 }

@@ -1,15 +1,13 @@
-//! Equal jobs dealt to unequal workers, so that the last one ends as early as can be.
+//! Equal jobs on workers of unequal speed, distributed so that the last worker ends as early as possible.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Who does jobs.
+/// When a worker begins its first job, and what each job takes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Worker {
-    /// Before the first job.
-    pub start_s: f64,
-    /// Of one job.
-    pub job_s: f64,
+pub(super) struct Worker {
+    pub(super) start_s: f64,
+    pub(super) job_s: f64,
 }
 
 /// Less than any job; free jobs would never fill a worker.
@@ -25,20 +23,19 @@ impl Worker {
     }
 }
 
-/// Jobs of each worker.
-#[must_use]
-pub fn deal(jobs: usize, workers: &[Worker]) -> Vec<usize> {
+/// The number of jobs of each worker.
+pub(super) fn distribute(jobs: usize, workers: &[Worker]) -> Vec<usize> {
     let level_s = level_s(jobs, workers);
     // Rounded down a little, so that the sum never exceeds the jobs.
     let below = |worker: &Worker| ((level_s - worker.start_s) / worker.job_s() * (1.0 - 1e-12)).max(0.0) as usize;
     let mut shares: Vec<usize> = workers.iter().map(below).collect();
     let left = jobs.saturating_sub(shares.iter().sum());
-    deal_rest(left, workers, &mut shares);
+    distribute_rest(left, workers, &mut shares);
     shares
 }
 
-/// Each of the jobs left to whoever ends it first; of several the first one.
-fn deal_rest(left: usize, workers: &[Worker], shares: &mut [usize]) {
+/// Gives each of the jobs left to the worker that ends it first; among several, to the first.
+fn distribute_rest(left: usize, workers: &[Worker], shares: &mut [usize]) {
     // Times are not negative, so that their bits are in their order.
     let next = |i: usize, share: usize| Reverse((workers[i].end_s(share + 1).to_bits(), i));
     let mut ends: BinaryHeap<_> = shares.iter().enumerate().map(|(i, &share)| next(i, share)).collect();
@@ -49,7 +46,8 @@ fn deal_rest(left: usize, workers: &[Worker], shares: &mut [usize]) {
     }
 }
 
-/// When all end together if jobs can be cut: Σ (t - start) / job = jobs over those who begin before t.
+/// When all workers would end together if jobs were divisible: Σ (t - start) / job = jobs, over the workers that begin
+/// before t.
 fn level_s(jobs: usize, workers: &[Worker]) -> f64 {
     let mut level_s = f64::INFINITY;
     loop {
@@ -66,12 +64,11 @@ fn level_s(jobs: usize, workers: &[Worker]) -> f64 {
 }
 
 /// When the last worker ends; 0 without jobs, and infinite without workers.
-#[must_use]
-pub fn finish_s(jobs: usize, workers: &[Worker]) -> f64 {
+pub(super) fn makespan_s(jobs: usize, workers: &[Worker]) -> f64 {
     if jobs > 0 && workers.is_empty() {
         return f64::INFINITY;
     }
-    deal(jobs, workers).iter().zip(workers).map(|(&share, worker)| worker.end_s(share)).fold(0.0, f64::max)
+    distribute(jobs, workers).iter().zip(workers).map(|(&share, worker)| worker.end_s(share)).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -87,38 +84,38 @@ mod tests {
     fn equal_workers_get_even_shares() {
         for count in 1..12 {
             for jobs in 0..40 {
-                let shares = deal(jobs, &equal(count));
+                let shares = distribute(jobs, &equal(count));
                 assert_eq!(shares.iter().sum::<usize>(), jobs);
                 assert!(shares.iter().all(|&share| share <= jobs.div_ceil(count)), "{jobs} {shares:?}");
                 let end_s = jobs.div_ceil(count) as f64 * 0.1;
-                assert!((finish_s(jobs, &equal(count)) - end_s).abs() < 1e-9);
+                assert!((makespan_s(jobs, &equal(count)) - end_s).abs() < 1e-9);
             }
         }
     }
 
     #[test]
-    fn edges() {
-        assert_eq!(deal(3, &[]), Vec::<usize>::new());
-        assert!(finish_s(3, &[]).is_infinite());
-        assert_eq!(finish_s(0, &[]), 0.0);
-        assert_eq!(deal(5, &[Worker { start_s: 9.0, job_s: 1.0 }, Worker { start_s: 0.0, job_s: 1.0 }]), [0, 5]);
-        let free = deal(1 << 20, &[Worker { start_s: 0.0, job_s: 0.0 }; 3]);
+    fn few_free_and_late_workers_get_their_jobs() {
+        assert_eq!(distribute(3, &[]), Vec::<usize>::new());
+        assert!(makespan_s(3, &[]).is_infinite());
+        assert_eq!(makespan_s(0, &[]), 0.0);
+        assert_eq!(distribute(5, &[Worker { start_s: 9.0, job_s: 1.0 }, Worker { start_s: 0.0, job_s: 1.0 }]), [0, 5]);
+        let free = distribute(1 << 20, &[Worker { start_s: 0.0, job_s: 0.0 }; 3]);
         assert_eq!(free.iter().sum::<usize>(), 1 << 20);
     }
 
-    /// One job after the other to whoever ends it first is optimal for equal jobs, and slow.
+    /// Each job in turn to the worker that ends it first is optimal for equal jobs, and slow.
     #[test]
-    fn as_good_as_one_by_one() {
+    fn the_makespan_is_that_of_jobs_given_one_by_one() {
         let mut random = Random(1);
         for _ in 0..500 {
             let worker = |random: &mut Random| Worker { start_s: random.unit(), job_s: 0.01 + random.unit() };
             let workers: Vec<Worker> = (0..1 + random.below(8)).map(|_| worker(&mut random)).collect();
             let jobs = random.below(60) as usize;
             let mut shares = vec![0; workers.len()];
-            deal_rest(jobs, &workers, &mut shares);
+            distribute_rest(jobs, &workers, &mut shares);
             let slow_s = shares.iter().zip(&workers).map(|(&n, worker)| worker.end_s(n)).fold(0.0, f64::max);
-            assert!(finish_s(jobs, &workers) <= slow_s + 1e-9);
-            assert_eq!(deal(jobs, &workers).iter().sum::<usize>(), jobs);
+            assert!(makespan_s(jobs, &workers) <= slow_s + 1e-9);
+            assert_eq!(distribute(jobs, &workers).iter().sum::<usize>(), jobs);
         }
     }
 }

@@ -1,22 +1,28 @@
-//! The scheduler in a made-up cluster: nodes that die, come back, answer late or not at all, clients that come and go,
-//! all from a seed. What must always hold is checked after every step; a seed that fails is named.
+//! The scheduler in a simulated cluster: nodes die, come back, and answer late or never; clients come and go, all from a
+//! seed. Invariants are checked after every step; a seed that fails is named.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use cluster::{Assignment, Costs, PolicyChoice, SessionPlan};
+use cluster::{Assignment, Costs, MeasuredCosts, NodeStatus, PolicyChoice, SessionPlan};
 
+use super::balance::k_fd;
+use super::command::Command;
+use super::event::{Event, Opening};
+use super::load::Load;
+use super::node_costs::NodeCosts;
+use super::prediction::pipeline_s;
+use super::scheduler::Scheduler;
 use super::search::{first, order};
 use super::test_support::{COSTS, Random, join, opened, opening, workload};
-use super::{Command, Event, Load, MeasuredCosts, NodeCosts, Opening, Scheduler, k_fd, pipeline_s};
 
 const SEEDS: u64 = 500;
-/// Of faults, before the calm.
+/// Steps with faults, before the calm.
 const STEPS: usize = 300;
 const DWELL: Duration = Duration::from_secs(5);
 const MOST_NODES: u64 = 12;
 
-/// What nodes, clients and the network do, and what the scheduler has said so far.
+/// Nodes, clients and the network, and the scheduler's commands so far.
 struct World {
     random: Random,
     scheduler: Scheduler,
@@ -27,8 +33,8 @@ struct World {
     alive: BTreeMap<String, (u64, f64)>,
     /// Members as the coordinator knows them.
     members: BTreeMap<String, u64>,
-    /// Could not take a plan since they joined.
-    out: BTreeSet<String>,
+    /// Nodes in quarantine.
+    quarantined: BTreeSet<String>,
     /// Open sessions and the number of images of their workload.
     sessions: BTreeMap<u64, usize>,
     /// Events on their way.
@@ -52,7 +58,7 @@ impl World {
             next_session: 1,
             alive: BTreeMap::new(),
             members: BTreeMap::new(),
-            out: BTreeSet::new(),
+            quarantined: BTreeSet::new(),
             sessions: BTreeMap::new(),
             coming: Vec::new(),
             seen: 0,
@@ -81,7 +87,7 @@ impl World {
         self.coming.push((self.now + delay, event));
     }
 
-    /// One of the things that go wrong, or only happen.
+    /// A fault, or another event.
     fn fault(&mut self) {
         match self.random.below(20) {
             0..4 => self.start(),
@@ -137,13 +143,13 @@ impl World {
         let images = if self.random.below(8) == 0 { 6 } else { 4 };
         let policy = self.random_policy();
         let views_per_set = self.random.between(1.0, 500.0) as usize;
-        let asked = Opening { workload: workload(images), ..opening(session, policy, views_per_set) };
+        let opening = Opening { workload: workload(images), ..opening(session, policy, views_per_set) };
         if self.sessions.values().next() != Some(&images) {
-            self.out.clear();
+            self.quarantined.clear();
         }
         self.sessions.insert(session, images);
         self.may_replan = true;
-        self.tell(Event::Opened(Box::new(asked)));
+        self.tell(Event::Opened(Box::new(opening)));
     }
 
     fn random_session(&mut self) -> Option<u64> {
@@ -155,9 +161,6 @@ impl World {
         if let Some(session) = self.random_session() {
             self.sessions.remove(&session);
             self.may_replan = true;
-            if self.sessions.is_empty() {
-                self.out.clear();
-            }
             self.tell(Event::Closed { session });
         }
     }
@@ -165,7 +168,7 @@ impl World {
     fn swing(&mut self) {
         if let Some(session) = self.random_session() {
             let views_per_set = [1, 500, 30][self.random.below(3) as usize];
-            self.tell(Event::Demanded { session, views_per_set, frames_per_s: 0.0 });
+            self.tell(Event::DemandChanged { session, views_per_set, frames_per_s: None });
         }
     }
 
@@ -174,7 +177,7 @@ impl World {
         self.tell(Event::Unready { plan_epoch, node_name: name, reason: "no disk".to_owned() });
     }
 
-    /// What was sent long ago.
+    /// Events of an earlier plan and an earlier process.
     fn stale(&mut self) {
         let (node_name, plan_epoch) = (self.random_name(), self.epoch().saturating_sub(1));
         self.tell(Event::Unready { plan_epoch, node_name: node_name.clone(), reason: "late".to_owned() });
@@ -186,7 +189,7 @@ impl World {
         let name = self.random_name();
         if let Some(&(_, speed)) = self.alive.get(&name) {
             let noise = self.random.between(0.8, 1.25);
-            self.tell(measured(name, timings(speed * noise)));
+            self.tell(measured(name, self.epoch(), timings(speed * noise)));
         }
     }
 
@@ -205,18 +208,21 @@ impl World {
         }
     }
 
-    /// Steps the scheduler and holds what it says against what is so.
+    /// Steps the scheduler and checks its commands.
     fn tell(&mut self, event: Event) {
         self.note(&event);
         for command in self.scheduler.step(self.now, event) {
             match command {
-                Command::Apply { sessions, plan, addresses } => self.applied(&sessions, *plan, &addresses),
+                Command::Apply { sessions, plan, nodes } => self.applied(&sessions, *plan, &nodes),
+                Command::Probe(_) => (),
+                Command::Quarantine { node_name, .. } => assert!(self.quarantined.contains(&node_name), "{node_name}"),
+                Command::Readmit { node_name } => assert!(self.quarantined.remove(&node_name), "{node_name}"),
                 Command::Refuse { session, .. } | Command::End { session, .. } => {
                     self.sessions.remove(&session).expect("it was open");
                 }
             }
         }
-        self.always();
+        self.check_always();
     }
 
     fn note(&mut self, event: &Event) {
@@ -224,7 +230,7 @@ impl World {
             Event::Joined { incarnation, join } => {
                 let name = &join.node.node_name;
                 self.may_replan |= self.knows(name);
-                self.out.remove(name);
+                self.quarantined.remove(name);
                 self.seen = self.seen.max(join.plan_epoch);
                 self.members.insert(name.clone(), *incarnation);
             }
@@ -233,10 +239,10 @@ impl World {
                 self.members.remove(node_name);
             }
             Event::Unready { plan_epoch, node_name, .. } => {
-                let in_force = self.scheduler.in_force().map(|in_force| in_force.plan.assignment.plan_epoch);
-                if in_force == Some(*plan_epoch) && self.members.contains_key(node_name) && self.knows(node_name) {
+                let is_known = self.scheduler.active_plan_epoch() == Some(*plan_epoch) && self.knows(node_name);
+                if is_known && self.members.contains_key(node_name) {
                     self.may_replan = true;
-                    self.out.insert(node_name.clone());
+                    self.quarantined.insert(node_name.clone());
                 }
             }
             _ => (),
@@ -245,34 +251,34 @@ impl World {
 
     /// Whether the plan in force was made for this node, with or without a role in it.
     fn knows(&self, name: &str) -> bool {
-        self.scheduler.in_force().is_some_and(|in_force| in_force.members.contains_key(name))
+        self.scheduler.plans_with(name)
     }
 
-    fn applied(&mut self, sessions: &[u64], plan: SessionPlan, addresses: &[String]) {
+    fn applied(&mut self, sessions: &[u64], plan: SessionPlan, nodes: &[NodeStatus]) {
         assert!(!sessions.is_empty() && sessions.iter().all(|session| self.sessions.contains_key(session)));
-        self.whole(&plan.assignment, addresses);
+        self.check_plan(&plan.assignment, nodes);
         match &self.last {
             Some(last) if last.assignment.plan_epoch == plan.assignment.plan_epoch => assert_eq!(*last, plan),
             Some(last) => {
                 assert!(plan.assignment.plan_epoch > last.assignment.plan_epoch, "epochs rise");
-                self.calm_change(&last.assignment, &plan);
-                self.in_force(plan);
+                self.check_calm_change(&last.assignment, &plan);
+                self.activated(plan);
             }
-            None => self.in_force(plan),
+            None => self.activated(plan),
         }
     }
 
-    /// Where nobody was lost and nobody else decides, plans dwell and change two roles at most.
-    fn calm_change(&self, last: &Assignment, plan: &SessionPlan) {
+    /// Without losses, and without another session that decides, plans dwell, and pipelines change two roles at most.
+    fn check_calm_change(&self, last: &Assignment, plan: &SessionPlan) {
         if self.may_replan {
             return;
         }
         assert!(self.now - self.last_at >= DWELL, "{:?} after the last plan: {}", self.now - self.last_at, plan.reason);
-        let one_policy = last.policy == plan.assignment.policy;
-        assert!(!one_policy || changes(last, &plan.assignment) <= 2, "{}", plan.reason);
+        let is_pipeline = [last.policy, plan.assignment.policy] == [cluster::Policy::Pipeline; 2];
+        assert!(!is_pipeline || changes(last, &plan.assignment) <= 2, "{}", plan.reason);
     }
 
-    fn in_force(&mut self, plan: SessionPlan) {
+    fn activated(&mut self, plan: SessionPlan) {
         let epoch = plan.assignment.plan_epoch;
         assert!(epoch > self.seen, "above what nodes have seen");
         for name in self.alive.keys().cloned().collect::<Vec<_>>() {
@@ -287,12 +293,12 @@ impl World {
     }
 
     /// Every node of a plan is a member, and each image is sampled once.
-    fn whole(&self, plan: &Assignment, addresses: &[String]) {
+    fn check_plan(&self, plan: &Assignment, nodes: &[NodeStatus]) {
         let names = plan.samplers.iter().map(|s| (&s.node_name, &s.address));
         for (name, address) in names.chain(plan.compositors.iter().map(|c| (&c.node_name, &c.address))) {
             let incarnation = self.members.get(name).expect("a member");
             assert_eq!(*address, format!("http://{name}:{incarnation}"));
-            assert!(addresses.contains(address) && !self.out.contains(name), "{name}");
+            assert!(nodes.iter().any(|node| node.address == *address) && !self.quarantined.contains(name), "{name}");
         }
         assert!(!plan.compositors.is_empty());
         let mut images: Vec<u32> = plan.samplers.iter().flat_map(|s| s.image_indices.clone()).collect();
@@ -301,17 +307,17 @@ impl World {
         assert_eq!(images, if plan.policy == cluster::Policy::Direct { vec![] } else { all.collect::<Vec<_>>() });
     }
 
-    /// While there are nodes and sessions there is a plan, at once, and of nodes that are there.
-    fn always(&self) {
-        let in_force = self.scheduler.in_force();
-        let usable = self.members.keys().any(|name| !self.out.contains(name));
-        assert_eq!(in_force.is_some(), usable && !self.sessions.is_empty(), "{:?} {:?}", self.members, self.sessions);
-        if let Some(in_force) = in_force {
-            assert!(roles(&in_force.plan.assignment).keys().all(|name| self.members.contains_key(*name)));
+    /// While there are nodes and sessions there is a plan, of members.
+    fn check_always(&self) {
+        let plan = self.scheduler.status().plan;
+        let usable = self.members.keys().any(|name| !self.quarantined.contains(name));
+        assert_eq!(plan.is_some(), usable && !self.sessions.is_empty(), "{:?} {:?}", self.members, self.sessions);
+        if let Some(plan) = plan {
+            assert!(roles(&plan.assignment).keys().all(|name| self.members.contains_key(*name)));
         }
     }
 
-    /// No more faults: what is on its way arrives, and the schedule comes to rest.
+    /// No more faults: late events arrive, and plans come to rest.
     fn calm(&mut self) {
         let plans = self.plans;
         for _ in 0..600 {
@@ -328,8 +334,8 @@ impl World {
     }
 }
 
-fn measured(node_name: String, costs: MeasuredCosts) -> Event {
-    Event::Measured { node_name, plan_epoch: 1, costs, busy_s: 0.1, views: 3, dropped_views: 0 }
+fn measured(node_name: String, plan_epoch: u64, costs: MeasuredCosts) -> Event {
+    Event::Measured { node_name, plan_epoch, costs, busy_s: 0.1, views: 3, dropped_views: 0 }
 }
 
 fn timings(times: f64) -> MeasuredCosts {
@@ -361,7 +367,7 @@ fn for_seeds(seeds: std::ops::Range<u64>, run: impl Fn(u64) + std::panic::RefUnw
 }
 
 #[test]
-fn faults_of_all_kinds() {
+fn invariants_hold_under_faults_of_all_kinds() {
     for_seeds(0..SEEDS, |seed| {
         let mut world = World::new(seed);
         for _ in 0..STEPS {
@@ -387,10 +393,10 @@ fn k_follows_views_up_and_down_without_flapping() {
             ..COSTS
         };
         world.sessions.insert(1, images);
-        let asked = Opening { workload: workload(images), costs, ..opening(1, PolicyChoice::Pipeline, 1) };
-        world.tell(Event::Opened(Box::new(asked)));
+        let opening = Opening { workload: workload(images), costs, ..opening(1, PolicyChoice::Pipeline, 1) };
+        world.tell(Event::Opened(Box::new(opening)));
         for views in [500, 1, 30, 500, 30, 1] {
-            world.tell(Event::Demanded { session: 1, views_per_set: views, frames_per_s: 0.0 });
+            world.tell(Event::DemandChanged { session: 1, views_per_set: views, frames_per_s: None });
             let k = settle(&mut world);
             assert!(k.is_sorted() || k.is_sorted_by(|a, b| a >= b), "K turned back: {k:?}");
             assert!(near_k_fd(&world, &costs, images, views), "{views} views, K {k:?}");
@@ -414,7 +420,7 @@ fn settle(world: &mut World) -> Vec<usize> {
 
 fn near_k_fd(world: &World, costs: &Costs, images: usize, views: usize) -> bool {
     let plan = &world.last.as_ref().expect("a plan").assignment;
-    let nodes = vec![NodeCosts { costs: *costs, transfer_image_s: 0.0 }; world.members.len()];
+    let nodes = vec![NodeCosts { costs: *costs, transfer_image_s: None }; world.members.len()];
     let load = Load { images, views, ..Load::default() };
     let samples =
         world.members.keys().map(|name| plan.samplers.iter().any(|s| s.node_name == *name)).collect::<Vec<_>>();
@@ -423,9 +429,8 @@ fn near_k_fd(world: &World, costs: &Costs, images: usize, views: usize) -> bool 
     pipeline_s(&load, &nodes, &samples) <= by_formula.time_s * 1.1 * (1.0 + 1e-9)
 }
 
-/// Timings that vary by a fifth move nothing.
 #[test]
-fn noise_moves_no_roles() {
+fn timings_that_vary_by_a_fifth_move_no_roles() {
     for_seeds(0..50, |seed| {
         let mut world = World::new(seed);
         (0..8).for_each(|i| world.tell(join(&format!("n{i:02}"), i, 0)));
@@ -433,7 +438,7 @@ fn noise_moves_no_roles() {
         world.tell(opened(1, PolicyChoice::Pipeline, 200));
         for _ in 0..1000 {
             let (name, noise) = (format!("n{:02}", world.random.below(8)), world.random.between(0.8, 1.25));
-            world.tell(measured(name, timings(noise)));
+            world.tell(measured(name, world.epoch(), timings(noise)));
             world.pass(300);
         }
         assert!(world.plans == 1, "{} plans", world.plans);

@@ -1,60 +1,40 @@
-//! What happened to a schedule, kept as text: one JSON line an event, after a first line with the version. Run through
-//! a scheduler again it gives the same commands.
+//! The log of a schedule's events, one JSON line each, after a first line with the version. Replayed, it gives the same
+//! commands. Floats keep every bit (`float_roundtrip` of `serde_json`); events hold finite numbers only.
 
 use std::io::{self, BufRead, Read as _, Write};
 use std::time::Duration;
 
+use cluster::InvalidField;
 use serde::{Deserialize, Serialize};
 
-use super::written::{Written, Wrong};
-use super::{Command, Event, Scheduler};
+use super::command::Command;
+use super::event::Event;
+use super::scheduler::Scheduler;
 
-/// What the first line says.
-const VERSION: u32 = 2;
+/// Logs of other versions are refused.
+const VERSION: u32 = 3;
 /// A line that is longer is no event.
 const MAX_LINE_BYTES: u64 = 1 << 20;
 
-/// Why a log cannot be replayed.
+/// Why a log cannot be replayed. Lines are counted from 1.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum LogError {
     /// The reader failed.
     #[error("line {line} cannot be read: {source}")]
-    Read {
-        /// From 1.
-        line: usize,
-        /// Why.
-        source: io::Error,
-    },
+    Read { line: usize, source: io::Error },
     /// Longer than any event.
     #[error("line {line} has more than {MAX_LINE_BYTES} bytes")]
-    TooLong {
-        /// From 1.
-        line: usize,
-    },
-    /// No JSON, or a field is missing, unknown or of another type.
+    TooLong { line: usize },
+    /// No JSON, or a field is missing or of another type.
     #[error("line {line}: {source}")]
-    Json {
-        /// From 1.
-        line: usize,
-        /// Names the field.
-        source: serde_json::Error,
-    },
-    /// Of a program that writes another form.
+    Json { line: usize, source: serde_json::Error },
+    /// The log of another version of the program.
     #[error("line 1: version is {found}, must be {VERSION}")]
-    Version {
-        /// Given.
-        found: u32,
-    },
+    Version { found: u32 },
     /// A field with a value that no event has.
-    #[error("line {line}: {field} {reason}")]
-    Field {
-        /// From 1.
-        line: usize,
-        /// Which.
-        field: &'static str,
-        /// What is wrong with it.
-        reason: String,
-    },
+    #[error("line {line}: {source}")]
+    Field { line: usize, source: InvalidField },
 }
 
 /// Writes a log.
@@ -79,7 +59,7 @@ impl<W: Write> Recorder<W> {
     /// Where the writer fails.
     pub fn record(&mut self, now: Duration, event: &Event) -> io::Result<()> {
         let now_ns = u64::try_from(now.as_nanos()).unwrap_or(u64::MAX);
-        write_line(&mut self.writer, &Line { now_ns, event: event.into() })
+        write_line(&mut self.writer, &EventRecord { now_ns, event })
     }
 }
 
@@ -91,11 +71,20 @@ fn write_line(writer: &mut impl Write, line: &impl Serialize) -> io::Result<()> 
     writer.flush()
 }
 
-/// Runs a log through a new scheduler: every event, when it came and what followed.
+/// One event of a replayed log, and the commands that followed.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct Step {
+    pub now: Duration,
+    pub event: Event,
+    pub commands: Vec<Command>,
+}
+
+/// Runs a log through a new scheduler.
 ///
 /// # Errors
 /// At the first line that is no event.
-pub fn replay(mut reader: impl BufRead) -> Result<Vec<(Duration, Event, Vec<Command>)>, LogError> {
+pub fn replay(mut reader: impl BufRead) -> Result<Vec<Step>, LogError> {
     let first = next_line(&mut reader, 1)?.unwrap_or_default();
     let Header { version } = parse(&first, 1)?;
     if version != VERSION {
@@ -104,10 +93,11 @@ pub fn replay(mut reader: impl BufRead) -> Result<Vec<(Duration, Event, Vec<Comm
     let (mut scheduler, mut steps) = (Scheduler::default(), Vec::new());
     while let Some(text) = next_line(&mut reader, steps.len() + 2)? {
         let line = steps.len() + 2;
-        let Line { now_ns, event } = parse(&text, line)?;
-        let (now, event) = (Duration::from_nanos(now_ns), event.read().map_err(|wrong| wrong_at(wrong, line))?);
+        let EventRecord::<Event> { now_ns, event } = parse(&text, line)?;
+        event.validate().map_err(|source| LogError::Field { line, source })?;
+        let now = Duration::from_nanos(now_ns);
         let commands = scheduler.step(now, event.clone());
-        steps.push((now, event, commands));
+        steps.push(Step { now, event, commands });
     }
     Ok(steps)
 }
@@ -123,10 +113,6 @@ fn next_line(reader: &mut impl BufRead, line: usize) -> Result<Option<Vec<u8>>, 
     Ok((count > 0).then_some(text))
 }
 
-fn wrong_at(wrong: Wrong, line: usize) -> LogError {
-    LogError::Field { line, field: wrong.field, reason: wrong.reason }
-}
-
 fn parse<'t, T: Deserialize<'t>>(text: &'t [u8], line: usize) -> Result<T, LogError> {
     serde_json::from_slice(text).map_err(|source| LogError::Json { line, source })
 }
@@ -136,14 +122,13 @@ struct Header {
     version: u32,
 }
 
+/// An event, and the time since the coordinator started.
 #[derive(Serialize, Deserialize)]
-struct Line {
-    /// Since the coordinator started.
+struct EventRecord<E> {
     now_ns: u64,
-    #[serde(flatten)]
-    event: Written,
+    event: E,
 }
 
 #[cfg(test)]
-#[path = "log_tests.rs"]
+#[path = "event_log_tests.rs"]
 mod tests;

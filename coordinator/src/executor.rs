@@ -1,0 +1,112 @@
+//! Executes the schedule's commands: applies plans to nodes, then announces them to sessions, and probes nodes.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use cluster::{Assignment, NodeStatus, Ready, SessionEvent, SessionPlan, SessionStage};
+use tokio::task::JoinSet;
+use tonic::{Code, Status};
+use wire::rpc::NodeClient;
+
+use crate::probe::probe;
+use crate::schedule::{Command, Event};
+use crate::shared::Shared;
+use crate::status::{of_node, refusal, within};
+
+/// A call that breaks sooner than this is tried again, after a pause.
+const SOON: Duration = Duration::from_secs(1);
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// Runs until it is aborted. Plans do not wait for one another: nodes refuse a plan that a later one has replaced.
+pub(crate) async fn execute(shared: Arc<Shared>) {
+    loop {
+        match shared.commands.next().await {
+            Command::Apply { sessions, plan, nodes } => {
+                tokio::spawn(apply(shared.clone(), sessions, *plan, nodes));
+            }
+            Command::Probe(asked) => {
+                tokio::spawn(probe(shared.clone(), *asked));
+            }
+            Command::Quarantine { node_name, reason } => tracing::warn!(node = node_name, reason, "quarantined"),
+            Command::Readmit { node_name } => tracing::info!(node = node_name, "readmitted"),
+            Command::Refuse { session, error } => shared.sessions.refuse(session, refusal(&error)),
+            Command::End { session, reason } => shared.sessions.end(session, reason),
+        }
+    }
+}
+
+async fn apply(shared: Arc<Shared>, sessions: Vec<u64>, mut plan: SessionPlan, nodes: Vec<NodeStatus>) {
+    let plan_epoch = plan.assignment.plan_epoch;
+    tracing::info!(plan_epoch, reason = plan.reason, "planned");
+    for &session in &sessions {
+        let detail = format!("{} nodes take plan {plan_epoch}", nodes.len());
+        shared.send(session, SessionEvent::Progress { stage: SessionStage::Preparing, detail });
+    }
+    // Nodes that have taken the plan refuse requests under the plan before.
+    if let Some(scene_load_s) = apply_to_all(&shared, &plan.assignment, nodes).await {
+        plan.scene_load_s = scene_load_s;
+        for session in sessions {
+            shared.send(session, SessionEvent::Plan(Box::new(plan.clone())));
+        }
+    }
+    shared.step(Event::Applied { plan_epoch });
+}
+
+/// Gives the seconds of the node that took longest to load the scene; `None` where no node has taken the plan.
+async fn apply_to_all(shared: &Arc<Shared>, assignment: &Assignment, nodes: Vec<NodeStatus>) -> Option<f64> {
+    let mut calls = JoinSet::new();
+    for node in nodes {
+        calls.spawn(apply_to(shared.clone(), assignment.clone(), node));
+    }
+    let mut longest_s: Option<f64> = None;
+    while let Some(answer) = calls.join_next().await {
+        // A task that panics is no node's fault.
+        if let Ok(Some(ready)) = answer {
+            longest_s = Some(longest_s.unwrap_or(0.0).max(ready.scene_load_s));
+        }
+    }
+    longest_s
+}
+
+async fn apply_to(shared: Arc<Shared>, assignment: Assignment, node: NodeStatus) -> Option<Ready> {
+    let plan_epoch = assignment.plan_epoch;
+    let NodeStatus { node_name, address, .. } = node;
+    let call = call(&shared, &assignment, &address);
+    match within(shared.config.ready_deadline, "getting ready", call).await {
+        Ok(ready) => {
+            shared.step(Event::Ready { plan_epoch, node_name });
+            return Some(ready);
+        }
+        // A later plan came first.
+        Err(status) if status.code() == Code::FailedPrecondition => {
+            tracing::debug!(node = node_name, plan_epoch, reason = status.message(), "plan not taken");
+        }
+        Err(status) if status.code() == Code::InvalidArgument => {
+            let reason = of_node(&address, &status).message().to_owned();
+            shared.step(Event::Rejected { plan_epoch, node_name, reason });
+        }
+        Err(status) => {
+            let reason = status.message().to_owned();
+            shared.step(Event::Unready { plan_epoch, node_name, reason });
+        }
+    }
+    None
+}
+
+/// Calls once more where a connection broke: the node may not have received the call.
+async fn call(shared: &Shared, assignment: &Assignment, address: &str) -> Result<Ready, Status> {
+    let apply =
+        async || NodeClient::new(shared.connections.to(address).await?).apply_assignment(assignment.clone()).await;
+    let start = Instant::now();
+    match apply().await {
+        Err(status) if is_of_connection(&status) && start.elapsed() < SOON => {
+            tokio::time::sleep(PAUSE).await;
+            apply().await
+        }
+        done => done,
+    }
+}
+
+fn is_of_connection(status: &Status) -> bool {
+    [Code::Unavailable, Code::Unknown, Code::Internal, Code::Cancelled, Code::DataLoss].contains(&status.code())
+}

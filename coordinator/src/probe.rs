@@ -1,0 +1,88 @@
+//! Probes: whether a node serves, and whether a sampler's images arrive whole.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use cluster::FetchImages;
+use codec::{DecodeLimits, Reassembled, Reassembler, SampleSetId, decode_depth_image};
+use depth_image::Camera;
+use node::blocking;
+use tokio_stream::StreamExt as _;
+use tonic::{Code, Status};
+use wire::rpc::{SamplerClient, is_serving};
+
+use crate::schedule::{Event, Probe, ProbedImage};
+use crate::shared::Shared;
+use crate::status::within;
+
+/// A single failure may be the network's.
+const ATTEMPTS: usize = 3;
+const PAUSE: Duration = Duration::from_millis(200);
+
+/// Probes a node and tells the schedule.
+pub(crate) async fn probe(shared: Arc<Shared>, probe: Probe) {
+    let failed = within(probe.deadline, "an answer", attempts(&shared, &probe)).await.err();
+    let failure = failed.map(|status| match &probe.image {
+        None => format!("at {} does not answer: {}", probe.address, status.message()),
+        Some(_) => status.message().to_owned(),
+    });
+    let kind = probe.kind();
+    let Probe { plan_epoch, node_name, incarnation, .. } = probe;
+    shared.step(Event::Probed { plan_epoch, node_name, incarnation, kind, failure });
+}
+
+async fn attempts(shared: &Shared, probe: &Probe) -> Result<(), Status> {
+    for _ in 1..ATTEMPTS {
+        if attempt(shared, probe).await.is_ok() {
+            return Ok(());
+        }
+        tokio::time::sleep(PAUSE).await;
+    }
+    attempt(shared, probe).await
+}
+
+async fn attempt(shared: &Shared, probe: &Probe) -> Result<(), Status> {
+    match &probe.image {
+        None => serves(&probe.address).await,
+        Some(image) => check_image(shared, &probe.address, image).await,
+    }
+}
+
+/// A node without a health service, or with too much work, answers as well.
+async fn serves(address: &str) -> Result<(), Status> {
+    match is_serving(address, "").await {
+        Err(status) if ![Code::Unimplemented, Code::NotFound, Code::ResourceExhausted].contains(&status.code()) => {
+            Err(status)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Fetches an image and decodes it, as a compositor does.
+async fn check_image(shared: &Shared, address: &str, image: &ProbedImage) -> Result<(), Status> {
+    let FetchImages { plan_epoch, set_index, image_indices, .. } = &image.request;
+    let id = SampleSetId { plan_epoch: *plan_epoch, index: u64::from(*set_index) };
+    let client = SamplerClient::new(shared.connections.to(address).await?);
+    let mut chunks = client.fetch_sample_images(image.request.clone()).await?;
+    let mut reassembler = Reassembler::new(DecodeLimits::default(), id);
+    while let Some(chunk) = chunks.next().await {
+        if let Some(whole) = reassembler.push(chunk?).map_err(data_loss)? {
+            if whole.sample_set_id != id || !image_indices.contains(&whole.image_index) {
+                let (got, set) = (whole.image_index, whole.sample_set_id);
+                return Err(Status::data_loss(format!("image {got} of sample set {set} came for {id}")));
+            }
+            return decode(image.camera, whole).await;
+        }
+    }
+    Err(Status::data_loss("no whole image came"))
+}
+
+async fn decode(camera: Camera, whole: Reassembled) -> Result<(), Status> {
+    let decode =
+        move || decode_depth_image(&whole.image.header, camera, &whole.image.payload, &DecodeLimits::default());
+    blocking(move || decode().map(drop).map_err(data_loss)).await
+}
+
+fn data_loss(error: impl ToString) -> Status {
+    Status::data_loss(error.to_string())
+}

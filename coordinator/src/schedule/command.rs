@@ -1,0 +1,101 @@
+//! Outputs of the schedule: what the executor does.
+
+use std::fmt;
+use std::time::Duration;
+
+use cluster::{FetchImages, NodeStatus, SessionPlan};
+use depth_image::Camera;
+
+use super::demand::ChoiceError;
+use super::event::ProbeKind;
+
+/// What is to be done.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum Command {
+    /// Apply the plan on every node, then announce it to the sessions and answer with
+    /// [`Event::Applied`](super::Event::Applied).
+    Apply { sessions: Vec<u64>, plan: Box<SessionPlan>, nodes: Vec<NodeStatus> },
+    /// Probe a node, and answer with [`Event::Probed`](super::Event::Probed).
+    Probe(Box<Probe>),
+    /// The node stays a member, and gets no role until it is readmitted.
+    Quarantine { node_name: String, reason: String },
+    /// The node may get roles again.
+    Readmit { node_name: String },
+    /// No plan can be made for the session.
+    Refuse { session: u64, error: ChoiceError },
+    /// The session's plan no longer holds, and it gets no other.
+    End { session: u64, reason: String },
+}
+
+/// A question that the coordinator asks a node itself.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct Probe {
+    pub plan_epoch: u64,
+    pub node_name: String,
+    pub incarnation: u64,
+    pub address: String,
+    /// `None`: whether the node serves.
+    pub image: Option<ProbedImage>,
+    /// An answer that takes longer is a failure.
+    pub deadline: Duration,
+}
+
+/// The image that a probe fetches.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProbedImage {
+    /// For one image.
+    pub request: FetchImages,
+    /// The image's.
+    pub camera: Camera,
+}
+
+impl Probe {
+    /// What is asked.
+    #[must_use]
+    pub fn kind(&self) -> ProbeKind {
+        if self.image.is_some() { ProbeKind::Image } else { ProbeKind::Liveness }
+    }
+}
+
+impl fmt::Display for Command {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Apply { sessions, plan, .. } => write_plan(f, sessions, plan),
+            Self::Probe(probe) => write_probe(f, probe),
+            Self::Quarantine { node_name, reason } => write!(f, "quarantine {node_name}: {reason}"),
+            Self::Readmit { node_name } => write!(f, "readmit {node_name}"),
+            Self::Refuse { session, error } => write!(f, "refuse session {session}: {error}"),
+            Self::End { session, reason } => write!(f, "end session {session}: {reason}"),
+        }
+    }
+}
+
+fn write_probe(f: &mut fmt::Formatter<'_>, probe: &Probe) -> fmt::Result {
+    match &probe.image {
+        None => write!(f, "probe whether {} serves", probe.node_name),
+        Some(ProbedImage { request, .. }) => write!(
+            f,
+            "probe image {:?} of set {} and cell {} of {}",
+            request.image_indices, request.set_index, request.cell, probe.node_name
+        ),
+    }
+}
+
+fn write_plan(f: &mut fmt::Formatter<'_>, sessions: &[u64], plan: &SessionPlan) -> fmt::Result {
+    let assignment = &plan.assignment;
+    let images = |images: &[u32]| images.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
+    let samplers = assignment.samplers.iter().map(|s| format!("{}[{}]", s.node_name, images(&s.image_indices)));
+    let compositors = assignment.compositors.iter().map(|share| share.node_name.clone());
+    write!(
+        f,
+        "apply plan {} to sessions {sessions:?}: {}, samplers {}, compositors {}, predicted {:.6} s a set: {}",
+        assignment.plan_epoch,
+        assignment.policy,
+        samplers.collect::<Vec<_>>().join(" "),
+        compositors.collect::<Vec<_>>().join(" "),
+        plan.predicted_s(),
+        plan.reason,
+    )
+}

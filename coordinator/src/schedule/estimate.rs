@@ -1,0 +1,300 @@
+//! The costs of one node, estimated from its own timings.
+
+use cluster::{Costs, MeasuredCosts, TileCosts};
+
+use super::node_costs::{NodeCosts, is_within_tiles_error};
+use super::operations::PerOperation;
+use super::smoothing::{Smoothed, geometric_mean, is_valid};
+
+/// Reports without a timing after which the operation counts as not timed.
+const RECENT: u32 = 30;
+/// A first timing of this many times the expected one includes the building of shaders, and is ignored.
+const COLD: f64 = 2.0;
+
+/// One operation: as measured alone, and as timed since.
+#[derive(Debug, Clone, Default)]
+struct Operation {
+    alone_s: f64,
+    /// It has been done, and so is not cold again.
+    is_warm: bool,
+    timed: Smoothed,
+    reports_without: u32,
+}
+
+impl Operation {
+    fn starting_at(alone_s: f64) -> Self {
+        Self { alone_s, is_warm: false, timed: Smoothed::starting_at(alone_s), reports_without: 0 }
+    }
+
+    /// Gives how many times longer than alone the timing is, where it is valid.
+    fn add(&mut self, timing_s: Option<f64>, slowness: f64) -> Option<f64> {
+        let was_cold = !self.is_warm && timing_s.is_some_and(|timing_s| timing_s > COLD * self.alone_s * slowness);
+        self.is_warm |= timing_s.is_some();
+        self.timed.expect(self.alone_s * slowness);
+        let timing_s = timing_s.filter(|timing_s| !was_cold && is_valid(*timing_s));
+        self.reports_without = if timing_s.is_some() { 0 } else { self.reports_without.saturating_add(1) };
+        self.timed.add(timing_s);
+        timing_s.map(|timing_s| timing_s / self.alone_s).filter(|ratio| ratio.is_finite() && *ratio > 0.0)
+    }
+
+    fn is_timed(&self) -> bool {
+        self.timed.has_timings() && self.reports_without <= RECENT
+    }
+
+    fn timed_s(&self) -> f64 {
+        self.timed.value().unwrap_or(0.0)
+    }
+
+    /// An operation without recent timings is `slowness` times slower than alone.
+    fn now_s(&self, slowness: f64) -> f64 {
+        if self.is_timed() { self.timed_s() } else { self.alone_s * slowness }
+    }
+
+    /// How many times longer than alone it takes, where that is known.
+    fn ratio(&self) -> Option<f64> {
+        let ratio = self.timed_s() / self.alone_s;
+        Some(ratio).filter(|ratio| self.is_timed() && ratio.is_finite() && *ratio > 0.0)
+    }
+}
+
+/// How many times longer than alone each operation takes now; `None` where no node has timed it.
+pub(super) type Ratios = PerOperation<Option<f64>>;
+
+/// Ratios of all nodes together: an operation that is slower at work than alone, as loading a set beside views is, is so on
+/// every node. The timings of a single node say as much of that node as of the operation, and do not count.
+pub(super) fn common_ratios<'a>(estimates: impl Iterator<Item = &'a Estimate>) -> Ratios {
+    let all: Vec<Ratios> = estimates.map(Estimate::ratios).collect();
+    let common = |of: fn(&Ratios) -> Option<f64>| {
+        let timed = all.iter().filter_map(of);
+        geometric_mean(timed.clone()).filter(|_| timed.count() > 1)
+    };
+    Ratios {
+        sample_image: common(|ratios| ratios.sample_image),
+        direct_view: common(|ratios| ratios.direct_view),
+        reconstruct_view: common(|ratios| ratios.reconstruct_view),
+        load_set: common(|ratios| ratios.load_set),
+        encode_view: common(|ratios| ratios.encode_view),
+    }
+}
+
+/// One node's costs as its timings come in.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Estimate {
+    /// As measured when the session was opened.
+    alone: Costs,
+    operations: PerOperation<Operation>,
+    /// How many times longer than alone the node's operations take now.
+    slowness: Smoothed,
+    transfer_bytes_per_s: Smoothed,
+    image_bytes: Smoothed,
+    /// The last images that were sampled were tiles.
+    samples_tiles: bool,
+}
+
+/// The parts of each set that a node has sampled: numbers of tiles, of images in so many tiles.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SampledParts<'a> {
+    pub(super) parts: &'a [u32],
+    pub(super) tiles: u32,
+}
+
+impl Estimate {
+    /// As measured when the session was opened.
+    pub(super) fn starting_at(costs: &Costs) -> Self {
+        let operations = PerOperation::from(costs).map(Operation::starting_at);
+        Self { alone: *costs, operations, ..Self::default() }
+    }
+
+    /// Adds the timings of one report. `sampled` is the node's share in the plan that the report is of.
+    pub(super) fn add(&mut self, measured: &MeasuredCosts, sampled: Option<SampledParts<'_>>) {
+        let slowness = self.slowness.value().unwrap_or(1.0);
+        let mut timings = PerOperation::from(measured);
+        // Tiles of a plan that is gone are not known any more.
+        let is_known = sampled.is_some() || !self.samples_tiles;
+        timings.sample_image = timings.sample_image.filter(|_| is_known).map(|s| self.whole_image_s(s, sampled));
+        self.samples_tiles = sampled.map_or(self.samples_tiles, |sampled| sampled.tiles > 1);
+        let mut ratios =
+            self.operations.as_mut().zip(timings).map(|(operation, timing_s)| operation.add(timing_s, slowness));
+        ratios.sample_image = ratios.sample_image.map(|ratio| self.without_tiles_error(ratio));
+        self.slowness.add(geometric_mean(ratios.of_device().into_iter().flatten()));
+        // A rate of 0 bytes/s is no rate: nothing was transferred.
+        self.transfer_bytes_per_s.add(measured.transfer_bytes_per_s.filter(|rate| *rate > 0.0));
+        self.image_bytes.add(measured.image_bytes);
+    }
+
+    /// A tile that takes somewhat longer than expected does not say that the node is slow.
+    fn without_tiles_error(&self, ratio: f64) -> f64 {
+        if self.samples_tiles && is_within_tiles_error(ratio) { 1.0 } else { ratio }
+    }
+
+    /// The cost of a mean image on a node whose tiles take `tiles_s`, each times their number in an image. Tiles have an
+    /// overhead each, and show the sky or not: unscaled, equal nodes would seem unequal.
+    fn whole_image_s(&self, tiles_s: f64, sampled: Option<SampledParts<'_>>) -> f64 {
+        let Some(SampledParts { parts, tiles }) = sampled.filter(|sampled| sampled.tiles > 1) else { return tiles_s };
+        let tile_s = |&part: &u32| self.alone.sample_this_tile_s((part % tiles) as usize, tiles as usize);
+        let expected_s = parts.iter().map(tile_s).sum::<f64>() / parts.len() as f64 * f64::from(tiles);
+        let ratio = tiles_s / expected_s;
+        if ratio.is_finite() { self.alone.sample_image_s * ratio } else { tiles_s }
+    }
+
+    /// Forgets all timings: other work is done from here on.
+    pub(super) fn restart(&mut self) {
+        self.operations.as_mut().map(|operation| operation.timed.restart());
+    }
+
+    fn ratios(&self) -> Ratios {
+        self.operations.as_ref().map(Operation::ratio)
+    }
+
+    pub(super) fn now(&self) -> NodeCosts {
+        self.now_among(&Ratios::default())
+    }
+
+    /// An operation that this node has not timed takes it as much longer than alone as it takes the nodes that have, times
+    /// what this node is slower than they are.
+    pub(super) fn now_among(&self, common: &Ratios) -> NodeCosts {
+        let slowness = self.slowness.value().unwrap_or(1.0);
+        let than_others = self.slowness_among(common);
+        let now_s = self
+            .operations
+            .as_ref()
+            .zip(*common)
+            .map(|(operation, common)| operation.now_s(common.map_or(slowness, |common| common * than_others)));
+        // The overhead of a tile grows with the cost of an image.
+        let times =
+            Some(now_s.sample_image / self.alone.sample_image_s).filter(|times| times.is_finite()).unwrap_or(1.0);
+        let tiles = self.alone.tiles.map(|tiles| TileCosts { overhead_s: tiles.overhead_s * times, ..tiles });
+        let costs = Costs {
+            sample_image_s: now_s.sample_image,
+            direct_view_s: now_s.direct_view,
+            reconstruct_view_s: now_s.reconstruct_view,
+            load_set_s: now_s.load_set,
+            encode_view_s: now_s.encode_view,
+            in_order: self.alone.in_order,
+            tiles,
+        };
+        let image_bytes = self.image_bytes.value().unwrap_or(0.0);
+        NodeCosts { costs, transfer_image_s: self.transfer_bytes_per_s.value().map(|rate| image_bytes / rate) }
+    }
+
+    /// How many times slower than other nodes this one is, by operations that both have timed.
+    fn slowness_among(&self, common: &Ratios) -> f64 {
+        let mut ratios = self.ratios().zip(*common).map(|(own, common)| Some(own? / common?));
+        ratios.sample_image = ratios.sample_image.map(|ratio| self.without_tiles_error(ratio));
+        geometric_mean(ratios.of_device().into_iter().flatten()).unwrap_or(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::schedule::test_support::TILEABLE;
+
+    fn sampled(estimate: &mut Estimate, sample_image_s: f64) -> f64 {
+        estimate.add(&MeasuredCosts { sample_image_s: Some(sample_image_s), ..MeasuredCosts::default() }, None);
+        estimate.now().costs.sample_image_s
+    }
+
+    #[test]
+    fn one_outlier_is_ignored_and_a_change_is_followed() {
+        let mut estimate = Estimate::starting_at(&Costs { sample_image_s: 1.0, ..Costs::default() });
+        for _ in 0..3 {
+            assert_eq!(sampled(&mut estimate, 1.0), 1.0);
+        }
+        assert_eq!(sampled(&mut estimate, 100.0), 1.0, "one of four");
+        for _ in 0..4 {
+            sampled(&mut estimate, 1.0);
+        }
+        assert!((0..30).map(|_| sampled(&mut estimate, 2.0)).last().unwrap() > 1.98);
+    }
+
+    #[test]
+    fn non_finite_and_negative_timings_are_ignored() {
+        let mut estimate = Estimate::starting_at(&Costs { sample_image_s: 1.0, ..Costs::default() });
+        for timing in [f64::NAN, f64::INFINITY, -1.0] {
+            assert_eq!(sampled(&mut estimate, timing), 1.0);
+        }
+        let stalled =
+            MeasuredCosts { transfer_bytes_per_s: Some(0.0), image_bytes: Some(1e6), ..MeasuredCosts::default() };
+        estimate.add(&stalled, None);
+        assert_eq!(estimate.now().transfer_image_s, None);
+        estimate.add(&MeasuredCosts { transfer_bytes_per_s: Some(1e8), ..MeasuredCosts::default() }, None);
+        assert!((estimate.now().transfer_image_s.unwrap() - 0.01).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_operation_without_timings_is_as_slow_as_the_others() {
+        let alone = Costs { sample_image_s: 1.0, direct_view_s: 2.0, reconstruct_view_s: 0.1, ..Costs::default() };
+        let mut estimate = Estimate::starting_at(&alone);
+        let views = MeasuredCosts { reconstruct_view_s: Some(0.3), ..MeasuredCosts::default() };
+        for _ in 0..40 {
+            estimate.add(&views, None);
+        }
+        let costs = estimate.now().costs;
+        let times = [costs.sample_image_s / 1.0, costs.direct_view_s / 2.0, costs.reconstruct_view_s / 0.1];
+        assert!(times.iter().all(|times| (times - 3.0).abs() < 0.01), "{times:?}");
+        let first_s = sampled(&mut estimate, 5.0);
+        assert!((first_s - 3.4).abs() < 0.01, "a fifth of the way: {first_s}");
+        assert!((0..30).map(|_| sampled(&mut estimate, 5.0)).last().unwrap() > 4.9, "it is timed by now");
+        for _ in 0..=RECENT {
+            estimate.add(&views, None);
+        }
+        let (now_s, slowness) = (estimate.now().costs.sample_image_s, estimate.slowness.value().unwrap());
+        assert!((now_s - slowness).abs() < 1e-9 && slowness < 4.0, "no longer, after a while: {now_s}");
+    }
+
+    #[test]
+    fn an_operation_that_is_slower_at_work_is_so_on_every_node() {
+        let alone = Costs { sample_image_s: 1.0, reconstruct_view_s: 0.1, load_set_s: 0.2, ..Costs::default() };
+        let reports = |costs: MeasuredCosts| {
+            let mut estimate = Estimate::starting_at(&alone);
+            (0..30).for_each(|_| estimate.add(&costs, None));
+            estimate
+        };
+        let sampler = |sample_image_s| {
+            reports(MeasuredCosts { sample_image_s: Some(sample_image_s), ..MeasuredCosts::default() })
+        };
+        let views = MeasuredCosts { reconstruct_view_s: Some(0.1), load_set_s: Some(0.7), ..MeasuredCosts::default() };
+        let all = [sampler(1.0), sampler(1.0), reports(views), reports(views)];
+        let common = common_ratios(all.iter());
+        let [sampling, .., making] = all.map(|estimate| estimate.now_among(&common).costs);
+        assert!((sampling.load_set_s - 0.7).abs() < 0.01, "it would take a sampler as long: {sampling:?}");
+        assert!((making.load_set_s - 0.7).abs() < 0.01 && (making.sample_image_s - 1.0).abs() < 0.01, "{making:?}");
+        let slow = [sampler(1.0), sampler(1.0), sampler(4.0)];
+        let slow_s = slow[2].now_among(&common_ratios(slow.iter())).costs.reconstruct_view_s;
+        assert!(slow_s > 0.2, "a slow sampler would be slow at views: {slow_s}");
+    }
+
+    #[test]
+    fn a_first_timing_of_a_cold_node_is_ignored() {
+        let mut estimate = Estimate::starting_at(&Costs { sample_image_s: 1.0, ..Costs::default() });
+        assert_eq!(sampled(&mut estimate, 4.0), 1.0, "shaders were built");
+        assert!((sampled(&mut estimate, 4.0) - 1.6).abs() < 1e-9, "they are there now");
+    }
+
+    #[test]
+    fn timings_after_a_restart_count_at_once() {
+        let mut estimate = Estimate::starting_at(&Costs { sample_image_s: 1.0, ..Costs::default() });
+        for _ in 0..9 {
+            sampled(&mut estimate, 1.0);
+        }
+        estimate.restart();
+        assert_eq!(estimate.now().costs.sample_image_s, 1.0);
+        assert_eq!(sampled(&mut estimate, 0.2), 0.2);
+    }
+
+    #[test]
+    fn nodes_with_different_tiles_have_equal_costs() {
+        for (tiles, parts) in [(4, vec![0]), (4, vec![2, 7]), (2, vec![1]), (8, vec![1, 2, 3]), (1, vec![0, 3])] {
+            for slow in [1.0, 3.0] {
+                let each_s = |&part: &u32| TILEABLE.sample_this_tile_s((part % tiles) as usize, tiles as usize);
+                let tiles_s = slow * parts.iter().map(each_s).sum::<f64>() / parts.len() as f64 * f64::from(tiles);
+                let measured = MeasuredCosts { sample_image_s: Some(tiles_s), ..MeasuredCosts::default() };
+                let mut estimate = Estimate::starting_at(&TILEABLE);
+                (0..30).for_each(|_| estimate.add(&measured, Some(SampledParts { parts: &parts, tiles })));
+                let image_s = estimate.now().costs.sample_image_s;
+                assert!((image_s / (5.0 * slow) - 1.0).abs() < 0.01, "{tiles} {parts:?}: {image_s} of {}", 5.0 * slow);
+            }
+        }
+    }
+}

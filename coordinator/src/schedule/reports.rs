@@ -1,0 +1,132 @@
+//! Fault attribution: whether the sampler or the compositor is at fault when a compositor cannot get a sampler's images.
+//!
+//! A report alone proves nothing. It counts against the sampler when a second compositor reports the same sampler, or when
+//! the coordinator's own probe of that sampler fails. A report whose probe passes counts against the compositor: after
+//! [`REFUTED_LIMIT`] refuted reports within [`WINDOW`] the compositor is the one that is cut off. Reports of a sampler that
+//! turns out to be at fault are dropped, so that they never count against those that made them.
+
+use std::time::Duration;
+
+use cluster::SamplerReport;
+
+/// Reports further apart have causes of their own.
+const WINDOW: Duration = Duration::from_secs(60);
+/// Refuted reports of one compositor that quarantine it.
+const REFUTED_LIMIT: usize = 2;
+
+/// Reports of the last minute.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SamplerReports(Vec<Filed>);
+
+#[derive(Debug, Clone)]
+struct Filed {
+    at: Duration,
+    compositor: String,
+    sampler: String,
+    reason: String,
+    /// A probe of the sampler has passed since.
+    is_refuted: bool,
+}
+
+/// What follows from a report.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Verdict {
+    /// Two compositors agree: the sampler is at fault.
+    SamplerAtFault,
+    /// The coordinator has to probe the sampler.
+    Probe,
+}
+
+impl SamplerReports {
+    /// Files a report.
+    pub(super) fn file(&mut self, now: Duration, report: SamplerReport) -> Verdict {
+        self.0.retain(|filed| now.saturating_sub(filed.at) < WINDOW);
+        let SamplerReport { compositor, sampler, reason, .. } = report;
+        let agrees = self.0.iter().any(|filed| filed.sampler == sampler && filed.compositor != compositor);
+        // One probe answers all reports before it.
+        self.0.retain(|filed| filed.is_refuted || (&filed.sampler, &filed.compositor) != (&sampler, &compositor));
+        self.0.push(Filed { at: now, compositor, sampler, reason, is_refuted: false });
+        if agrees { Verdict::SamplerAtFault } else { Verdict::Probe }
+    }
+
+    /// A probe of the sampler has passed. Gives the compositors that are now at fault, and why.
+    pub(super) fn refute(&mut self, sampler: &str) -> Vec<(String, String)> {
+        let mut at_fault = Vec::new();
+        for filed in self.0.iter_mut().filter(|filed| filed.sampler == sampler && !filed.is_refuted) {
+            filed.is_refuted = true;
+            at_fault.push((filed.compositor.clone(), filed.reason.clone()));
+        }
+        at_fault.retain(|(compositor, _)| self.refuted(compositor) >= REFUTED_LIMIT);
+        at_fault
+    }
+
+    /// Reports on file of a compositor that were refuted.
+    fn refuted(&self, compositor: &str) -> usize {
+        self.0.iter().filter(|filed| filed.is_refuted && filed.compositor == compositor).count()
+    }
+
+    /// Reports on file of a sampler: the number of the image that is probed next.
+    pub(super) fn count_of(&self, sampler: &str) -> usize {
+        self.0.iter().filter(|filed| filed.sampler == sampler).count()
+    }
+
+    /// A node is quarantined: neither reports of it nor by it count any more.
+    pub(super) fn forget(&mut self, node_name: &str) {
+        self.0.retain(|filed| filed.sampler != node_name && filed.compositor != node_name);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(compositor: &str, sampler: &str) -> SamplerReport {
+        SamplerReport {
+            plan_epoch: 1,
+            compositor: compositor.to_owned(),
+            sampler: sampler.to_owned(),
+            reason: "no images".to_owned(),
+        }
+    }
+
+    const START: Duration = Duration::ZERO;
+
+    #[test]
+    fn a_second_compositor_convicts_the_sampler_and_a_repeated_report_does_not() {
+        let mut reports = SamplerReports::default();
+        assert_eq!(reports.file(START, report("c", "a")), Verdict::Probe);
+        assert_eq!(reports.file(START, report("c", "a")), Verdict::Probe, "the same compositor again");
+        assert_eq!(reports.file(START, report("d", "b")), Verdict::Probe, "another sampler");
+        assert_eq!(reports.file(START, report("d", "a")), Verdict::SamplerAtFault);
+        assert_eq!(SamplerReports::default().file(START, report("d", "a")), Verdict::Probe);
+    }
+
+    #[test]
+    fn reports_a_minute_apart_do_not_agree() {
+        let mut reports = SamplerReports::default();
+        reports.file(START, report("c", "a"));
+        assert_eq!(reports.file(START + WINDOW, report("d", "a")), Verdict::Probe);
+    }
+
+    #[test]
+    fn two_refuted_reports_convict_the_compositor() {
+        let mut reports = SamplerReports::default();
+        reports.file(START, report("c", "a"));
+        reports.file(START, report("c", "a"));
+        assert_eq!(reports.refute("a"), [], "one probe answers both");
+        assert_eq!(reports.refute("a"), [], "a report is refuted once");
+        reports.file(START, report("c", "b"));
+        assert_eq!(reports.refute("b"), [("c".to_owned(), "no images".to_owned())]);
+    }
+
+    #[test]
+    fn reports_of_a_sampler_at_fault_do_not_count_against_its_compositors() {
+        let mut reports = SamplerReports::default();
+        reports.file(START, report("c", "a"));
+        reports.refute("a");
+        reports.forget("a");
+        reports.file(START, report("c", "b"));
+        assert_eq!(reports.refute("b"), []);
+        assert_eq!((reports.count_of("a"), reports.count_of("b")), (0, 1));
+    }
+}

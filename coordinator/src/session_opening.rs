@@ -1,0 +1,152 @@
+//! From a request to a session whose costs are measured.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Duration;
+
+use cluster::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage};
+use tonic::{Code, Status};
+use wire::rpc::NodeClient;
+
+use crate::schedule::{Event, Opening, PolicyOverride};
+use crate::sessions::EventSender;
+use crate::shared::Shared;
+use crate::status::{of_node, within};
+use crate::workload::workload_of;
+
+/// Views of one measured call: as many as in a batch of real work, since fewer cost more each, and few enough that a slow
+/// device does not take minutes.
+const MEASURED_BATCH: u32 = 32;
+/// Attempts to measure costs where a node is lost meanwhile, and the pause in which it leaves.
+const ATTEMPTS: usize = 11;
+const PAUSE: Duration = Duration::from_millis(200);
+
+/// Measures the costs of a session, and hands it to the schedule; its plans come through `events`, as do refusals.
+pub(crate) async fn open(shared: Arc<Shared>, session: u64, request: SessionRequest, events: EventSender) {
+    let opened = tokio::select! {
+        opened = measured_opening(&shared, session, request, &events) => opened,
+        () = events.closed() => return,
+    };
+    match opened {
+        Ok(opening) => {
+            send_progress(&events, SessionStage::Planning, "choosing samplers and compositors".to_owned()).await;
+            shared.step(Event::Opened(Box::new(opening)));
+            // A client that left before the schedule had heard of its session.
+            if events.is_closed() {
+                shared.step(Event::Closed { session });
+            }
+        }
+        Err(status) => shared.sessions.refuse(session, status),
+    }
+}
+
+async fn measured_opening(
+    shared: &Arc<Shared>,
+    session: u64,
+    request: SessionRequest,
+    events: &EventSender,
+) -> Result<Opening, Status> {
+    let workload = workload_of(&request, &shared.offer)?;
+    let measurement = MeasureCosts {
+        // Costs are those of one image, and of one view, which is made from the images of one cell.
+        workload: workload.of_cell(0).unwrap_or_else(|| workload.clone()),
+        typical_views: vec![request.typical_view],
+        batch_count: request.views_per_set.min(MEASURED_BATCH),
+        planes: request.planes,
+    };
+    let costs = measured_undisturbed(shared, measurement, events).await?;
+    Ok(Opening {
+        session,
+        workload,
+        views_per_set: request.views_per_set as usize,
+        frames_per_s: request.frames_per_s,
+        policy_override: PolicyOverride {
+            policy: request.policy,
+            forced_samplers: request.forced_sampler_count.map(|count| count as usize),
+            forced_tiles: request.forced_tile_count.map(|count| count as usize),
+        },
+        fallbacks: request.fallbacks,
+        costs,
+        viewpoints: request.viewpoints,
+    })
+}
+
+/// Costs are measured one session at a time, with nothing else being measured. A measurement that was begun ends, and its
+/// costs are kept, though its client may leave meanwhile.
+async fn measured_undisturbed(
+    shared: &Arc<Shared>,
+    measurement: MeasureCosts,
+    events: &EventSender,
+) -> Result<Costs, Status> {
+    if let Some(known) = known(shared, &measurement) {
+        return Ok(known);
+    }
+    let (shared, events) = (shared.clone(), events.clone());
+    let measuring = tokio::spawn(async move {
+        let _one = shared.measuring.lock().await;
+        match events.is_closed() {
+            true => Err(Status::cancelled("the client has left")),
+            false => measured_on_present_nodes(&shared, &measurement, &events).await,
+        }
+    });
+    measuring.await.map_err(|error| Status::internal(format!("measuring failed: {error}")))?
+}
+
+/// The slowest device's costs, where all devices' are kept.
+fn known(shared: &Shared, measurement: &MeasureCosts) -> Option<Costs> {
+    let devices: BTreeSet<String> = shared.status().nodes.into_iter().map(|node| node.device_name).collect();
+    let kept: Option<Vec<Costs>> = devices.iter().map(|device| shared.costs.get(device, measurement)).collect();
+    kept?.into_iter().reduce(Costs::max)
+}
+
+/// A node may be lost while it measures: others of its kind are asked once it has left.
+async fn measured_on_present_nodes(
+    shared: &Shared,
+    measurement: &MeasureCosts,
+    events: &EventSender,
+) -> Result<Costs, Status> {
+    for _ in 1..ATTEMPTS {
+        match measured(shared, measurement, events).await {
+            Err(status) if [Code::Unavailable, Code::Unknown].contains(&status.code()) => {
+                let detail = format!("measuring again: {}", status.message());
+                send_progress(events, SessionStage::Measuring, detail).await;
+                tokio::time::sleep(PAUSE).await;
+            }
+            done => return done,
+        }
+    }
+    measured(shared, measurement, events).await
+}
+
+async fn send_progress(events: &EventSender, stage: SessionStage, detail: String) {
+    // The guard of a client's stream notices that the client has left.
+    let _ = events.send(Ok(SessionEvent::Progress { stage, detail })).await;
+}
+
+/// The slowest device's costs: one node of each device measures, one after the other.
+async fn measured(shared: &Shared, measurement: &MeasureCosts, events: &EventSender) -> Result<Costs, Status> {
+    let nodes = shared.status().nodes;
+    let devices: BTreeMap<String, NodeStatus> =
+        nodes.into_iter().rev().map(|node| (node.device_name.clone(), node)).collect();
+    let mut slowest: Option<Costs> = None;
+    for (device, node) in devices {
+        let costs = match shared.costs.get(&device, measurement) {
+            Some(known) => known,
+            None => {
+                let detail = format!("{} measures its costs on {device}", node.node_name);
+                send_progress(events, SessionStage::Measuring, detail).await;
+                let fresh = measure_on(shared, &node, measurement.clone()).await?;
+                shared.costs.insert(device, measurement, fresh);
+                fresh
+            }
+        };
+        slowest = Some(slowest.map_or(costs, |slowest| slowest.max(costs)));
+    }
+    slowest.ok_or_else(|| Status::failed_precondition("no node has joined the cluster"))
+}
+
+async fn measure_on(shared: &Shared, node: &NodeStatus, measurement: MeasureCosts) -> Result<Costs, Status> {
+    let call = async { NodeClient::new(shared.connections.to(&node.address).await?).measure_costs(measurement).await };
+    let measured = within(shared.config.measure_deadline, "measuring", call).await;
+    measured.map_err(|status| of_node(&node.node_name, &status))
+}

@@ -1,0 +1,118 @@
+//! State that all calls share.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use cluster::{ClusterStatus, SessionEvent};
+use node::Connections;
+use parking_lot::Mutex;
+use tokio::sync::Notify;
+
+use crate::config::{CoordinatorConfig, SceneOffer};
+use crate::cost_cache::CostCache;
+use crate::membership::MembershipRegistry;
+use crate::observers::Observers;
+use crate::schedule::{Command, Event, Scheduler};
+use crate::sessions::SessionRegistry;
+
+pub(crate) struct Shared {
+    pub(crate) config: CoordinatorConfig,
+    pub(crate) offer: SceneOffer,
+    pub(crate) connections: Connections,
+    /// Costs are measured one session at a time.
+    pub(crate) measuring: tokio::sync::Mutex<()>,
+    pub(crate) costs: CostCache,
+    pub(crate) commands: CommandQueue,
+    pub(crate) membership: MembershipRegistry,
+    pub(crate) sessions: SessionRegistry,
+    /// One node at a time: the schedule hears of nodes in the order in which they are registered.
+    pub(crate) joining: Mutex<()>,
+    started: Instant,
+    schedule: Mutex<Schedule>,
+    last_number: AtomicU64,
+}
+
+/// The schedule, and those that watch its events.
+struct Schedule {
+    scheduler: Scheduler,
+    observers: Observers,
+}
+
+impl Shared {
+    pub(crate) fn new(config: CoordinatorConfig, offer: SceneOffer, observers: Observers) -> Self {
+        Self {
+            config,
+            offer,
+            connections: Connections::default(),
+            measuring: tokio::sync::Mutex::default(),
+            costs: CostCache::default(),
+            commands: CommandQueue::default(),
+            membership: MembershipRegistry::default(),
+            sessions: SessionRegistry::default(),
+            joining: Mutex::default(),
+            started: Instant::now(),
+            schedule: Mutex::new(Schedule { scheduler: Scheduler::default(), observers }),
+            last_number: AtomicU64::new(0),
+        }
+    }
+
+    /// Tells the schedule; its commands are executed in its order.
+    pub(crate) fn step(&self, event: Event) {
+        let Schedule { scheduler, observers } = &mut *self.schedule.lock();
+        let now = self.started.elapsed();
+        observers.record(now, &event);
+        let is_tick = matches!(event, Event::Tick);
+        let commands = scheduler.step(now, event);
+        // Nodes report often, and gauges are read seldom.
+        if is_tick || !commands.is_empty() {
+            observers.metrics.show(&scheduler.status(), &commands);
+        }
+        self.commands.push(commands);
+    }
+
+    /// Reads the schedule.
+    pub(crate) fn with_scheduler<T>(&self, read: impl FnOnce(&Scheduler) -> T) -> T {
+        read(&self.schedule.lock().scheduler)
+    }
+
+    pub(crate) fn status(&self) -> ClusterStatus {
+        self.with_scheduler(Scheduler::status)
+    }
+
+    /// A session whose client does not read its events is closed.
+    pub(crate) fn send(&self, session: u64, event: SessionEvent) {
+        if !self.sessions.send(session, event) {
+            self.step(Event::Closed { session });
+        }
+    }
+
+    /// A number that no session and no incarnation has had.
+    pub(crate) fn next_number(&self) -> u64 {
+        self.last_number.fetch_add(1, Ordering::Relaxed) + 1
+    }
+}
+
+/// Commands in their order. None may be lost, and only an admitted event adds any.
+#[derive(Default)]
+pub(crate) struct CommandQueue {
+    waiting: Mutex<VecDeque<Command>>,
+    added: Notify,
+}
+
+impl CommandQueue {
+    fn push(&self, commands: Vec<Command>) {
+        self.waiting.lock().extend(commands);
+        self.added.notify_one();
+    }
+
+    pub(crate) async fn next(&self) -> Command {
+        loop {
+            let next = self.waiting.lock().pop_front();
+            match next {
+                Some(command) => return command,
+                None => self.added.notified().await,
+            }
+        }
+    }
+}
