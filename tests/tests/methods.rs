@@ -105,12 +105,13 @@ fn variants_after(tokens: &[TokenTree], set: &Methods) -> Vec<String> {
 
 /// The method that a literal names: a word of two parts anywhere, a plain word where it is the whole text or has a setting.
 fn text_of(set: &Methods, literal: &str) -> Option<String> {
-    let text = literal.trim_matches(|c: char| !c.is_alphanumeric());
+    let (_, text) = literal.split_once('"')?;
+    let text = text.trim_end_matches('#').trim_end_matches('"');
     let is_named = |name: &&&str| {
         let mut words = text.split(|c: char| !c.is_alphanumeric() && c != '_');
         text.split(':').next() == Some(**name) || (name.contains('_') && words.any(|word| word == **name))
     };
-    set.names.iter().find(is_named).filter(|_| literal.ends_with(['"', '#'])).map(|name| (*name).to_owned())
+    set.names.iter().find(is_named).map(|name| (*name).to_owned())
 }
 
 fn root() -> PathBuf {

@@ -87,7 +87,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let camera = work.cameras[nearest];
     let p = homogeneous(camera.homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
     let inverse_w = safe_reciprocal(p.z);
-    let uv = clamp(p.xy * inverse_w - 0.5, vec2f(0.0), camera.cells - 0.01);
+    let uv = clamp(p.xy * inverse_w - 0.5, vec2f(0.0), camera.cells - CELL_MARGIN_PX);
     let cell = vec2u(uv);
     let at = uv - floor(uv);
     let cell_index = camera.first_cell + cell.y * camera.width_px + cell.x;

@@ -15,6 +15,12 @@ pub(crate) const THICKNESS_FOOTPRINTS: f32 = 2.0;
 pub(crate) const HIDDEN_WEIGHT: f32 = 0.02;
 /// Added to the squared angle between two lines of sight, so that no camera's weight is unbounded.
 pub(crate) const ANGLE_FLOOR: f32 = 1e-2;
+/// A camera counts where more than this share of the texels around a point lies on the point's own surface.
+pub(crate) const LEAST_SHARE: f32 = 0.05;
+/// A camera carves a point where more than this share of the texels around shows what is beyond it.
+pub(crate) const CARVING_SHARE: f32 = 0.999;
+/// Weight falls towards the border of an image from this distance on.
+pub(crate) const BORDER_PX: f32 = 8.0;
 /// Depth is known to half a code; a ray that reached a plane's very depth is still before it.
 pub(crate) const HALF_CODE: f32 = 0.5;
 
@@ -37,6 +43,9 @@ impl SurfaceVariant {
             thickness_footprints => THICKNESS_FOOTPRINTS.wgsl_literal(),
             hidden_weight => HIDDEN_WEIGHT.wgsl_literal(),
             angle_floor => ANGLE_FLOOR.wgsl_literal(),
+            least_share => LEAST_SHARE.wgsl_literal(),
+            carving_share => CARVING_SHARE.wgsl_literal(),
+            border_px => BORDER_PX.wgsl_literal(),
             half_code => HALF_CODE.wgsl_literal(),
             list_workgroup => LIST_WORKGROUP,
             ..self.set.context()

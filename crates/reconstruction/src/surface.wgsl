@@ -16,6 +16,10 @@ var<private> fetches: u32 = 0u;
 
 const LIST_WORKGROUP: u32 = {{ list_workgroup }}u;
 const THICKNESS_FOOTPRINTS: f32 = {{ thickness_footprints }};
+const LEAST_SHARE: f32 = {{ least_share }};
+const CARVING_SHARE: f32 = {{ carving_share }};
+const ANGLE_FLOOR: f32 = {{ angle_floor }};
+const BORDER_PX: f32 = {{ border_px }};
 
 // Leaves a pixel to the next pass.
 fn leave_undecided(index: u32) {
@@ -74,7 +78,7 @@ fn colors_of(cell_index: u32) -> Colors {
 // The weight of a sample behind a surface that its image omits, beside a sample with nothing omitted before it.
 const HIDDEN_WEIGHT: f32 = {{ hidden_weight }};
 
-fn faded(share: f32) -> f32 { return clamp((share - 0.05) / 0.95, 0.0, 1.0); }
+fn faded(share: f32) -> f32 { return clamp((share - LEAST_SHARE) / (1.0 - LEAST_SHARE), 0.0, 1.0); }
 {% endif %}
 
 // A camera's vote on a point: the weight and the place of its colour, and shares of the texels around. `same` lies on the
@@ -87,7 +91,7 @@ fn vote_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f) -
     let inverse_w = 1.0 / p.z;
     let uv = p.xy * inverse_w - 0.5;
     let inside = p.z > 0.0 && all(uv >= vec2f(0.0)) && all(uv < cells);
-    let clamped = clamp(uv, vec2f(0.0), cells - 0.01);
+    let clamped = clamp(uv, vec2f(0.0), cells - CELL_MARGIN_PX);
     let cell = vec2u(clamped);
     let at = clamped - floor(clamped);
     let cell_index = camera.first_cell + cell.y * camera.width_px + cell.x;
@@ -111,9 +115,9 @@ fn vote_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f) -
     let eye_to_point = point_in_world - camera.eye_in_world;
     let inverse_distance = inverseSqrt(dot(eye_to_point, eye_to_point));
     let off = eye_to_point * inverse_distance - view_direction;
-    let border = min(min(min(uv.x, cells.x - uv.x), min(uv.y, cells.y - uv.y)) * 0.125, 1.0) + 1e-3;
+    let border = min(min(min(uv.x, cells.x - uv.x), min(uv.y, cells.y - uv.y)) / BORDER_PX, 1.0) + 1e-3;
     let footprint = camera.focal_px * inverse_distance;
-    let weight = border * footprint * footprint / (dot(off, off) + {{ angle_floor }});
+    let weight = border * footprint * footprint / (dot(off, off) + ANGLE_FLOOR);
 {% if holes %}
     // Weight fades towards omitted texels: it goes over to the image that holds them, without a seam. A sample close
     // behind an omitted surface is not that surface: it counts where nothing else does.
@@ -122,7 +126,7 @@ fn vote_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f) -
 {% else %}
     let fade = 1.0;
 {% endif %}
-    return CameraVote(select(0.0, weight * fade, inside && same > 0.05), cell_index, {{ "own" if holes else "shares" }}, select(0.0, same, inside), select(0.0, beyond, inside));
+    return CameraVote(select(0.0, weight * fade, inside && same > LEAST_SHARE), cell_index, {{ "own" if holes else "shares" }}, select(0.0, same, inside), select(0.0, beyond, inside));
 }
 
 // `occupied`: the cameras together hold that there is a surface. A silhouette lies somewhere within
@@ -135,7 +139,7 @@ fn color_of(vote: CameraVote) -> vec3f {
 {% if holes %}
     return color / max(dot(vote.shares, vec4f(1.0)), 1e-6);
 {% else %}
-    return color / max(vote.same, 0.05);
+    return color / max(vote.same, LEAST_SHARE);
 {% endif %}
 }
 
@@ -147,7 +151,7 @@ fn blend_two_best(point_in_world: vec3f, direction: vec3f) -> Blend {
     var first_mask = work.cameras[0].mask;
     var same = first.same;
     var beyond = first.beyond;
-    var carved = first.beyond > 0.999;
+    var carved = first.beyond > CARVING_SHARE;
     var second = CameraVote(0.0, 0u, vec4f(0.0), 0.0, 0.0);
     var second_mask = 0u;
     var third_weight = 0.0;
@@ -157,7 +161,7 @@ fn blend_two_best(point_in_world: vec3f, direction: vec3f) -> Blend {
         let mask = work.cameras[{{ k }}].mask;
         same += vote.same;
         beyond += vote.beyond;
-        carved = carved || vote.beyond > 0.999;
+        carved = carved || vote.beyond > CARVING_SHARE;
         let best = vote.weight > first.weight;
         let better = vote.weight > second.weight;
         third_weight = max(third_weight, min(vote.weight, second.weight));

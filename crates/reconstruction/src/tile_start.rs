@@ -17,6 +17,9 @@ pub(crate) const GREATEST_MOVE: f32 = 1.3;
 /// The tile stops where moves get shorter.
 pub(crate) const LEAST_MOVE: f32 = 1.01;
 
+/// Half the diagonal of a tile of side 1, and a little for rounding.
+pub(crate) const HALF_DIAGONAL: f32 = 0.7072;
+
 /// The switches of `tile_start.wgsl`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct TileStart(SetVariant);
@@ -30,6 +33,7 @@ impl ShaderVariant for TileStart {
             max_moves => MAX_MOVES,
             greatest_move => GREATEST_MOVE.wgsl_literal(),
             least_move => LEAST_MOVE.wgsl_literal(),
+            half_diagonal => HALF_DIAGONAL.wgsl_literal(),
             ..self.0.context()
         }
     }

@@ -10,6 +10,7 @@
 const MAX_MOVES: u32 = {{ max_moves }}u;
 const GREATEST_MOVE: f32 = {{ greatest_move }};
 const LEAST_MOVE: f32 = {{ least_move }};
+const HALF_DIAGONAL: f32 = {{ half_diagonal }};
 
 // Each ray's point is proven empty by this camera.
 const PROVEN: u32 = 1u;
@@ -51,7 +52,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let middle = (vec2f(id.xy) + 0.5) * f32(TILE_PX);
     let direction = work.view.column_in_world * middle.x + work.view.row_in_world * middle.y + work.view.corner_in_world;
     // Half a tile's diagonal at depth 1, and a little for rounding.
-    let slope = (0.7072 * f32(TILE_PX)) / work.view.focal_px;
+    let slope = (HALF_DIAGONAL * f32(TILE_PX)) / work.view.focal_px;
     // The middle ray may miss the volume where others of the tile enter it: start at the eye's near plane.
     let far = length(max(abs(work.volume_min_in_world - work.view.eye_in_world), abs(work.volume_max_in_world - work.view.eye_in_world)));
 {% for k in range(cameras) %}

@@ -14,6 +14,8 @@ pub const MAX_SAMPLE_CAMERAS: usize = 16;
 pub(crate) const TILE_PX: u32 = 8;
 /// Greater than every parameter and gap.
 pub(crate) const FAR_AWAY: f32 = 3.0e38;
+/// Positions in an image are kept this far from the border of the last cell.
+pub(crate) const CELL_MARGIN_PX: f32 = 0.01;
 /// Each dispatch sees one view of a batch.
 pub(crate) const ONE_VIEW: ResourceTraits = &[("work", ResourceTrait::DynamicOffset)];
 
@@ -33,6 +35,7 @@ impl SetVariant {
             count_fetches => false,
             tile_px => TILE_PX,
             far_away => FAR_AWAY.wgsl_literal(),
+            cell_margin_px => CELL_MARGIN_PX.wgsl_literal(),
             hole_code => HOLE_CODE,
             background_code => BACKGROUND_CODE,
             provenance_empty => ProvenanceKind::Empty as u32,

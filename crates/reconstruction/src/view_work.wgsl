@@ -70,6 +70,7 @@ struct ViewWork {
 
 const TILE_PX: u32 = {{ tile_px }}u;
 const FAR_AWAY: f32 = {{ far_away }};
+const CELL_MARGIN_PX: f32 = {{ cell_margin_px }};
 
 struct Span { near: f32, far: f32 }
 

@@ -25,6 +25,11 @@ pub(crate) const MAX_MOVES: u32 = 24;
 /// Moves of a ray in a set with holes: texels that prove nothing are crossed one by one.
 pub(crate) const MAX_MOVES_AMONG_HOLES: u32 = 96;
 
+/// A ray that leaves no node moves by this share of its way in the volume.
+pub(crate) const BLIND_MOVE: f32 = 0.01;
+/// The least move into the unknown, as a factor.
+pub(crate) const LEAST_MOVE: f32 = 1.00001;
+
 /// The switches of `joint_carve.wgsl`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct Carve {
@@ -43,6 +48,8 @@ impl ShaderVariant for Carve {
             start_level => START_LEVEL.max(self.stop_level),
             stop_level => self.stop_level,
             nudge_px => NUDGE_PX.wgsl_literal(),
+            blind_move => BLIND_MOVE.wgsl_literal(),
+            least_move => LEAST_MOVE.wgsl_literal(),
             ..self.surface.context()
         }
     }

@@ -14,6 +14,8 @@ const START_LEVEL: u32 = {{ start_level }}u;
 const STOP_LEVEL: u32 = {{ stop_level }}u;
 // Past a node's edge, in pixels.
 const NUDGE_PX: f32 = {{ nudge_px }};
+const BLIND_MOVE: f32 = {{ blind_move }};
+const LEAST_MOVE: f32 = {{ least_move }};
 
 // A camera's knowledge of the ray from t on.
 struct Evaluation {
@@ -200,7 +202,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let rejected = candidate && arrived && !hit;
         let unknown = !free && !descend && !candidate;
         known = known && !unknown;
-        let beyond = max(select(exit, t + (span.far - span.near) * 0.01, exit >= FAR_AWAY), t * 1.00001);
+        let beyond = max(select(exit, t + (span.far - span.near) * BLIND_MOVE, exit >= FAR_AWAY), t * LEAST_MOVE);
         t = select(free_until, beyond, unknown || rejected);
         level = select(min(level + 1u, START_LEVEL), level - 1u, descend);
         level = select(level, STOP_LEVEL, candidate);

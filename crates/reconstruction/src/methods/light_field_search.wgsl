@@ -112,7 +112,7 @@ fn most_conservative(rays: ImageRays, t: f32) -> Place {
     var place = Place(vec2f(0.0), 0u, 1u, 0u);
 {% for k in range(cameras) %}
     let is{{ k }} = chosen == {{ 2 ** k }}u;
-    let uv{{ k }} = clamp(p{{ k }}.xy / p{{ k }}.z - 0.5, vec2f(0.0), rays.camera{{ k }}.cells - 0.01);
+    let uv{{ k }} = clamp(p{{ k }}.xy / p{{ k }}.z - 0.5, vec2f(0.0), rays.camera{{ k }}.cells - CELL_MARGIN_PX);
     place.uv = select(place.uv, uv{{ k }}, is{{ k }});
     place.first_cell = select(place.first_cell, rays.camera{{ k }}.first_cell, is{{ k }});
     place.width_px = select(place.width_px, rays.camera{{ k }}.width_px, is{{ k }});

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     methods::joint_carve::{
-        MAX_MOVES, MAX_MOVES_AMONG_HOLES,
+        BLIND_MOVE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_AMONG_HOLES,
         march::{MARCHES, NUDGE_PX, START_LEVEL},
     },
     surface::{HALF_CODE, THICKNESS_FOOTPRINTS},
@@ -94,8 +94,8 @@ fn carve(cameras: &[SampleCamera], ray: &ViewRay, begin: f32, stop_level: u32, b
         known &= !unknown;
         t = if unknown || (candidate && arrived && !hit) {
             let exit = evaluations.iter().fold(FAR_AWAY, |least, v| least.min(v.exit));
-            let beyond = if exit >= FAR_AWAY { t + (ray.far - ray.near) * 0.01 } else { exit };
-            beyond.max(t * 1.00001)
+            let beyond = if exit >= FAR_AWAY { t + (ray.far - ray.near) * BLIND_MOVE } else { exit };
+            beyond.max(t * LEAST_MOVE)
         } else {
             free_until
         };

@@ -4,7 +4,11 @@ use depth_image::ProvenanceKind;
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{pixel::Pixel, sample_camera::SampleCamera, surface::bilinear_shares, view_ray::ViewRay};
-use crate::{methods::light_field_search::BISECTIONS, pyramid::HOLE_CODE, view_work::FAR_AWAY};
+use crate::{
+    methods::light_field_search::BISECTIONS,
+    pyramid::HOLE_CODE,
+    view_work::{CELL_MARGIN_PX, FAR_AWAY},
+};
 
 /// `entered`: the point is inside for every camera that sees it; `seen`: some camera does.
 struct Evaluation {
@@ -89,7 +93,7 @@ fn most_conservative<'c>(cameras: &'c [SampleCamera], ray: &ViewRay, t: f32) -> 
 /// Bilinear between samples.
 fn color(camera: &SampleCamera, ray: &ViewRay, t: f32) -> Vec3 {
     let p = in_image(camera, ray, t);
-    let uv = (p.xy() / p.z - 0.5).max(Vec2::ZERO).min(camera.cells - 0.01);
+    let uv = (p.xy() / p.z - 0.5).max(Vec2::ZERO).min(camera.cells - CELL_MARGIN_PX);
     let (cell, at) = (uv.as_uvec2(), uv - uv.floor());
     // Holes have no colour.
     let corners = (0..4u32).map(|i| cell + UVec2::new(i & 1, i >> 1)).zip(bilinear_shares(at));

@@ -11,8 +11,9 @@ use super::{
     view_ray::ViewRay,
 };
 use crate::{
-    methods::joint_carve::march::{MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL},
+    methods::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL},
     surface::HALF_CODE,
+    view_work::CELL_MARGIN_PX,
 };
 
 /// How far the way is free, and whether it ends at a surface.
@@ -54,7 +55,7 @@ pub(super) fn march(camera: &SampleCamera, ray: &ViewRay, near: f32) -> March {
     let far = ray.far.max(near);
     let p0 = a + b * near;
     // The line ends before the plane through the camera's eye.
-    let end = if b.z < 0.0 { far.min((0.01 * p0.z - a.z) * safe_reciprocal(b.z)) } else { far };
+    let end = if b.z < 0.0 { far.min((EYE_SHARE * p0.z - a.z) * safe_reciprocal(b.z)) } else { far };
     let p1 = a + b * end;
     let in_image = |p: Vec3| (p.xy() / p.z - 0.5).extend(camera.code(p.z.recip()));
     let origin = in_image(p0);
@@ -109,7 +110,7 @@ fn march_cells(camera: &SampleCamera, line: &Line, mut s: f32) -> (f32, bool) {
             break;
         }
         let at = line.at(s);
-        let cell = at.xy().max(Vec2::ZERO).min(camera.cells - 0.01).floor();
+        let cell = at.xy().max(Vec2::ZERO).min(camera.cells - CELL_MARGIN_PX).floor();
         let exit = line.exit(s, cell, 1.0);
         let beyond = line.at(exit);
         let corners = camera.corners(cell.as_uvec2());

@@ -3,7 +3,10 @@
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{sample_camera::SampleCamera, view_ray::ViewRay};
-use crate::surface::{ANGLE_FLOOR, HIDDEN_WEIGHT, THICKNESS_FOOTPRINTS};
+use crate::{
+    surface::{ANGLE_FLOOR, BORDER_PX, CARVING_SHARE, HIDDEN_WEIGHT, LEAST_SHARE, THICKNESS_FOOTPRINTS},
+    view_work::CELL_MARGIN_PX,
+};
 
 /// Between four corners, in their order.
 pub(super) fn bilinear(corners: [f32; 4], at: Vec2) -> f32 {
@@ -56,7 +59,7 @@ pub(super) fn blend_two_best(cameras: &[SampleCamera], ray: &ViewRay, t: f32) ->
         camera_mask |= if second.weight > third_weight { second.mask } else { 0 };
     }
     let [same, beyond]: [f32; 2] = [votes.iter().map(|s| s.same).sum(), votes.iter().map(|s| s.beyond).sum()];
-    let carved = votes.iter().any(|s| s.beyond > 0.999);
+    let carved = votes.iter().any(|s| s.beyond > CARVING_SHARE);
     Blend { color_linear: color / weights, camera_mask, occupied: same >= beyond && camera_mask != 0 && !carved }
 }
 
@@ -67,7 +70,7 @@ fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> Ca
     if !(p.z > 0.0 && uv.cmpge(Vec2::ZERO).all() && uv.cmplt(camera.cells).all()) {
         return CameraVote { weight: 0.0, color_linear: Vec3::ZERO, mask: camera.mask, same: 0.0, beyond: 0.0 };
     }
-    let clamped = uv.min(camera.cells - 0.01);
+    let clamped = uv.min(camera.cells - CELL_MARGIN_PX);
     let (cell, at) = (clamped.as_uvec2(), clamped - clamped.floor());
     let corners = camera.corners(cell);
     let reach = THICKNESS_FOOTPRINTS * camera.code_above(inverse_w) / camera.focal_px;
@@ -89,10 +92,10 @@ fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> Ca
             beyond += share;
         }
     }
-    let faded = |share: f32| ((share - 0.05) / 0.95).clamp(0.0, 1.0);
+    let faded = |share: f32| ((share - LEAST_SHARE) / (1.0 - LEAST_SHARE)).clamp(0.0, 1.0);
     let fade = if camera.among_holes { faded(proven) + HIDDEN_WEIGHT * faded(same) } else { 1.0 };
-    let of: f32 = if camera.among_holes { own.max(1e-6) } else { same.max(0.05) };
-    let weight = if same > 0.05 { weight(camera, uv, point_in_world, view_direction) * fade } else { 0.0 };
+    let of: f32 = if camera.among_holes { own.max(1e-6) } else { same.max(LEAST_SHARE) };
+    let weight = if same > LEAST_SHARE { weight(camera, uv, point_in_world, view_direction) * fade } else { 0.0 };
     CameraVote { weight, color_linear: color / of, mask: camera.mask, same, beyond }
 }
 
@@ -101,7 +104,7 @@ fn weight(camera: &SampleCamera, uv: Vec2, point_in_world: Vec3, view_direction:
     let eye_to_point = point_in_world - camera.eye_in_world;
     let inverse_distance = eye_to_point.length().recip();
     let off = eye_to_point * inverse_distance - view_direction;
-    let border = (uv.min(camera.cells - uv).min_element() * 0.125).min(1.0) + 1e-3;
+    let border = (uv.min(camera.cells - uv).min_element() / BORDER_PX).min(1.0) + 1e-3;
     let footprint = camera.focal_px * inverse_distance;
     border * footprint * footprint / (off.length_squared() + ANGLE_FLOOR)
 }

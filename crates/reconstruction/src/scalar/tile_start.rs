@@ -7,7 +7,7 @@ use super::{
     view_ray::{ViewRay, ViewRays},
 };
 use crate::{
-    tile_start::{GREATEST_MOVE, LEAST_MOVE, MAX_MOVES},
+    tile_start::{GREATEST_MOVE, HALF_DIAGONAL, LEAST_MOVE, MAX_MOVES},
     view_work::{FAR_AWAY, TILE_PX},
 };
 
@@ -29,7 +29,7 @@ pub(super) fn tile_starts(cameras: &[SampleCamera], rays: &ViewRays) -> Vec<f32>
 fn tile_start(cameras: &[SampleCamera], rays: &ViewRays, tile: UVec2) -> f32 {
     let middle = rays.ray_at((tile.as_vec2() + 0.5) * TILE_PX as f32);
     // Half a tile's diagonal at depth 1, and a little for rounding.
-    let slope = 0.7072 * TILE_PX as f32 / rays.focal_px();
+    let slope = HALF_DIAGONAL * TILE_PX as f32 / rays.focal_px();
     let farthest = (rays.volume.min - rays.eye()).abs().max((rays.volume.max - rays.eye()).abs()).length();
     let mut t = entry(rays, tile);
     let mut stride = GREATEST_MOVE;

@@ -24,6 +24,9 @@ pub(crate) const MAX_FINE_MOVES: u32 = 12;
 /// Rays move this far past the edge of a node.
 pub(crate) const NUDGE_PX: f32 = 1e-3;
 
+/// A march ends at this share of its first depth before the plane through the camera's eye.
+pub(crate) const EYE_SHARE: f32 = 0.01;
+
 /// The switches of `march.wgsl`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct March {
@@ -43,6 +46,7 @@ impl ShaderVariant for March {
             max_coarse_moves => MAX_COARSE_MOVES,
             max_fine_moves => MAX_FINE_MOVES,
             nudge_px => NUDGE_PX.wgsl_literal(),
+            eye_share => EYE_SHARE.wgsl_literal(),
             ..self.surface.context()
         }
     }

@@ -13,6 +13,7 @@ const MAX_COARSE_MOVES: u32 = {{ max_coarse_moves }}u;
 const MAX_FINE_MOVES: u32 = {{ max_fine_moves }}u;
 const START_LEVEL: u32 = {{ start_level }}u;
 const NUDGE_PX: f32 = {{ nudge_px }};
+const EYE_SHARE: f32 = {{ eye_share }};
 const CAMERA: u32 = {{ march_camera }}u;
 
 // How far the way is free, and whether it ends at a surface.
@@ -77,7 +78,7 @@ fn march_cells(line: Line, begin: Progress) -> Progress {
     var crossed = false;
     for (var i = 0u; i < MAX_FINE_MOVES && marching && s < line.s_end; i++) {
         let at = line.origin + line.line * s;
-        let cell = floor(clamp(at.xy, vec2f(0.0), cells - 0.01));
+        let cell = floor(clamp(at.xy, vec2f(0.0), cells - CELL_MARGIN_PX));
         let exit = exit_of(line, s, cell, 1.0);
         let beyond = line.origin + line.line * exit;
         let node = vec2u(cell);
@@ -101,7 +102,7 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
     let offset = work.cameras[CAMERA].code_offset;
     let p0 = a + b * near;
     // The line ends before the plane through the camera's eye.
-    let end = select(far, min(far, (0.01 * p0.z - a.z) * safe_reciprocal(b.z)), b.z < 0.0);
+    let end = select(far, min(far, (EYE_SHARE * p0.z - a.z) * safe_reciprocal(b.z)), b.z < 0.0);
     let p1 = a + b * end;
     let origin = vec3f(p0.xy / p0.z - 0.5, scale / p0.z + offset);
     let line = line_between(origin, vec3f(p1.xy / p1.z - 0.5, scale / p1.z + offset));
