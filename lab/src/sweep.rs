@@ -88,17 +88,13 @@ fn series(rows: &[Evaluation], value: fn(&Evaluation) -> f64) -> [Series; 2] {
         ReconstructionMethod::LightFieldSearch { steps } => {
             Some(Point::labelled(row.ms_a_view, value(row), steps.to_string()))
         }
-        ReconstructionMethod::JointCarve { .. }
-        | ReconstructionMethod::Mesh
-        | ReconstructionMethod::HybridMesh { .. } => None,
+        _ => None,
     };
     let carve = |row: &Evaluation| match row.method {
         ReconstructionMethod::JointCarve { stop_level } => {
             Some(Point::labelled(row.ms_a_view, value(row), format!("level {stop_level}")))
         }
-        ReconstructionMethod::LightFieldSearch { .. }
-        | ReconstructionMethod::Mesh
-        | ReconstructionMethod::HybridMesh { .. } => None,
+        _ => None,
     };
     [
         Series::line("light_field_search", rows.iter().filter_map(search)),

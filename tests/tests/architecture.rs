@@ -391,7 +391,7 @@ fn methods() -> Vec<&'static str> {
 fn every_method_has_its_page() {
     const PARTS: [&str; 4] = ["## Source", "## Equations", "## Cost", "## Known failures"];
     let folder = root().join("docs/methods");
-    assert_eq!(methods().len(), 9);
+    assert!(methods().len() >= 9, "the tables were read");
     for name in methods() {
         let page = folder.join(format!("{name}.md"));
         let text = fs::read_to_string(&page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));
