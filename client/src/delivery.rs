@@ -21,7 +21,7 @@ use crate::view_request::ViewRequest;
 /// A view that waited longer for its sample set does not show its compositor's speed.
 const SET_WAIT_S: f64 = 0.05;
 
-/// What all views of a request have in common.
+/// The settings that all views of a request share.
 #[derive(Debug, Clone)]
 pub(crate) struct Template {
     /// `None`: the method of the plan in force.

@@ -34,7 +34,7 @@ impl Expected {
         Ok(Self { due, planes })
     }
 
-    /// What is wrong with a frame: its compositor, or the network, has spoilt it.
+    /// The fault of a frame, of its compositor or of the network; `None` for a good frame.
     pub(crate) fn fault_of(&self, frame: u64, header: &FrameHeader) -> Option<String> {
         match self.due.get(&frame) {
             None => Some("was not requested or has been received".to_owned()),

@@ -29,7 +29,7 @@ impl FrameSink {
         Self { received, expected, decoders }
     }
 
-    /// What is wrong with a frame under a plan of this epoch.
+    /// The fault of a frame under a plan of this epoch; `None` for a good frame.
     pub(crate) fn fault_of(&self, frame: &WholeFrame, plan_epoch: u64) -> Option<String> {
         let (number, set) = (frame.frame, frame.header.sample_set_id);
         if set.plan_epoch != plan_epoch {
@@ -59,7 +59,7 @@ impl FrameSink {
         room.send(Ok(Frame { request, view, header }));
     }
 
-    /// Whether the caller has not taken the frames that were passed on.
+    /// Whether all room for frames is taken: the caller takes none.
     pub(crate) fn is_full(&self) -> bool {
         self.received.capacity() == 0
     }

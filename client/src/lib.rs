@@ -1,9 +1,8 @@
 //! Thin client library: request views, receive frames. Links no wgpu.
 //!
 //! A [`Client`] knows the coordinator; a [`Session`] has a plan and talks to the compositors alone. [`Frames`] are those of
-//! one request: `delivery` asks all compositors for them through a `request_pump` each, which shares the views out
-//! ([`WorkStealing`]) and keeps as many in flight as a compositor can make ([`FlowControl`]). A [`LiveView`] is a camera that
-//! moves.
+//! one request. `delivery` requests them from all compositors, through a `request_pump` for each: [`WorkStealing`] shares
+//! the views out, and [`FlowControl`] keeps a fast compositor busy. A [`LiveView`] is a camera that moves.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod active_plan;

@@ -13,8 +13,8 @@ use crate::live_frame::{CREDITS, LiveFrame, Newest, Pose};
 use crate::live_stream::{LiveStream, decode_all};
 use crate::view_request::ViewRequest;
 
-/// Frames of a camera that moves. A newer pose replaces one that is not being made yet, wherever that waits; two frames at
-/// most are on their way or not taken by [`LiveView::next`]. It outlives compositors and plans, and ends with its session.
+/// Frames of a camera that moves. A newer pose replaces one that is not being made yet. Two frames at most are on their way
+/// or not taken by [`LiveView::next`]. A live view outlives compositors and plans, and ends with its session.
 #[derive(Debug)]
 pub struct LiveView {
     newest: watch::Sender<Newest>,
@@ -59,8 +59,8 @@ impl LiveView {
     /// loses no frame.
     ///
     /// # Errors
-    /// Errors that no other compositor could mend: an invalid request, no room anywhere, a session that has ended, a plan
-    /// without a compositor that answers. Nothing follows an error.
+    /// For an invalid request, no room anywhere, a session that has ended, and a plan without a compositor that answers.
+    /// Nothing follows an error.
     pub async fn next(&mut self) -> Result<LiveFrame, ClientError> {
         let over = || ClientError::Ended { reason: "the view has ended".to_owned() };
         let frame = self.frames.recv().await.ok_or_else(over)??;

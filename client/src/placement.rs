@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn every_compositor_is_tried_once_whatever_its_weight() {
+    fn every_compositor_is_tried_once_for_any_weights() {
         for weights in [[0; 5], [1, 2, 0, 4, 5]] {
             let mut tried: Vec<usize> = order(u64::MAX, &weights).collect();
             tried.sort_unstable();

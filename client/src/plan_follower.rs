@@ -79,8 +79,8 @@ fn take_over(event: SessionEvent, state: &watch::Sender<SessionState>, is_new_se
     false
 }
 
-/// The coordinator tells of a plan when its nodes have taken it: one that has been replaced may come last, and be in force
-/// on a node that has left, with samplers that refuse it.
+/// Puts a plan in force, unless it is older than the one in force. The coordinator sends a plan when its nodes have taken
+/// it, so that one that was replaced meanwhile may arrive last.
 fn put_in_force(plan: SessionPlan, state: &watch::Sender<SessionState>, is_new_session: bool) {
     state.send_if_modified(|state| {
         let is_current = is_new_session || plan.assignment.plan_epoch >= state.active.plan_epoch();

@@ -107,8 +107,8 @@ impl Session {
         self.state.borrow().ended.clone()
     }
 
-    /// Requests views by the method of the plan in force. Frames are received in the order they are ready; compositors work
-    /// at the same time, each at first on its own share of every set's views, then on those of others.
+    /// Requests views by the method of the plan in force. Frames are received in the order they are ready. All
+    /// compositors work at the same time, each at first on its own share of every set's views.
     ///
     /// # Errors
     /// For frame numbers given twice, sets beyond the timeline, bad cameras, and a session that has ended.
@@ -135,8 +135,8 @@ impl Session {
         Ok(Frames::start(self.state.clone(), template, requests, expected))
     }
 
-    /// Frames of a camera that moves, by the method of the plan in force: one long stream to one compositor, on which the
-    /// newest pose counts.
+    /// Frames of a camera that moves, by the method of the plan in force. They are sent on one long stream from one
+    /// compositor, on which the newest pose counts.
     #[must_use]
     pub fn live(&self) -> LiveView {
         LiveView::start(self.state.clone(), self.codec, self.planes)

@@ -166,8 +166,8 @@ fn by_cell(plan: &Assignment, views: &[RequestedView]) -> BTreeMap<u32, Vec<Requ
     cells
 }
 
-/// The pixels of its stream that a view takes: at least so many that the views are bounded, too; at most all, so that one
-/// view larger than the bound still passes, alone.
+/// The pixels of its stream that a view takes. Small views take more than they have, so that their number is bounded. A
+/// view takes at most all, so that one larger than the bound still passes, alone.
 fn price(view: &RequestedView) -> u32 {
     let pixels = u32::try_from(view.camera.pixel_count()).unwrap_or(STREAM_PIXELS);
     pixels.clamp(STREAM_PIXELS / STREAM_VIEWS, STREAM_PIXELS)

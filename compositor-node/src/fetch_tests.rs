@@ -1,4 +1,4 @@
-//! A sampler that sends spoilt chunks, over a real port.
+//! A sampler that sends corrupt chunks, over a real port.
 
 use std::time::Duration;
 
@@ -139,7 +139,7 @@ async fn an_image_with_visibility_of_other_lights_is_refused() {
 }
 
 #[tokio::test]
-async fn spoilt_chunks_are_refused_with_the_name_of_the_sampler() {
+async fn corrupt_chunks_are_refused_with_the_name_of_the_sampler() {
     let spoilt: [(&str, Spoil); 8] = [
         ("corrupt", |c| c[1].body = ChunkBody::Data(vec![0; 30].into())),
         ("truncated", |c| drop(c.pop())),

@@ -1,6 +1,6 @@
 //! The compositor's service: one complete sample set, many views.
 //!
-//! Sets: `fetch` gathers the images of a set from its samplers, or from a compositor that relays them; `fetch_share` talks
+//! Sets: `fetch` gathers the images of a set from its samplers, or from a compositor that relays them. `fetch_share` talks
 //! to one of these nodes, `chunk_stream` checks and decodes, and `relay_buffer` relays images to other compositors. `sets`
 //! keeps the latest few on the device and fetches the next ahead; `reports` names samplers that fail.
 //!

@@ -1,7 +1,7 @@
 //! A stream that follows a moving camera: the newest pose counts.
 //!
 //! A pose waits for its set, for its client to take a frame, and for the device. A stream has one pose at most in each of
-//! these places, and a newer one replaces it. A set that is being fetched is never given up for a newer one: where sets
+//! these places, and a newer one replaces it. A set that is being fetched is never given up for a newer one. Where sets
 //! arrive more slowly than poses, every set is shown, with its newest pose.
 
 use std::pin::Pin;
@@ -24,7 +24,7 @@ use crate::shared::{ClientStream, Loaded};
 /// Frames that may be in flight until the client acknowledges them: a third would only be older.
 const CREDITS: usize = 2;
 
-type Work<T> = Pin<Box<dyn Future<Output = Result<T, Status>> + Send>>;
+type Pending<T> = Pin<Box<dyn Future<Output = Result<T, Status>> + Send>>;
 
 /// A view that was requested.
 struct Pose {
@@ -49,7 +49,7 @@ struct Ready {
     id: SampleSetId,
     set_wait_s: f64,
     /// The wait for room.
-    credit: Work<Credit>,
+    credit: Pending<Credit>,
 }
 
 pub(crate) struct LiveStream<'a> {
@@ -59,7 +59,7 @@ pub(crate) struct LiveStream<'a> {
     /// The newest pose, whose set is not being fetched yet.
     newest: Option<Pose>,
     /// The pose whose set is being fetched.
-    loading: Option<(Pose, Work<Loaded>)>,
+    loading: Option<(Pose, Pending<Loaded>)>,
     ready: Option<Ready>,
     /// The plan that the stream was opened under, or its successor.
     plan: Option<Arc<Assignment>>,
@@ -247,7 +247,7 @@ impl<'a> LiveStream<'a> {
         self.client.shared.arrivals.push(self.client.stream, [waiting]);
     }
 
-    fn credit(&self, view: &RequestedView) -> Work<Credit> {
+    fn credit(&self, view: &RequestedView) -> Pending<Credit> {
         let (credits, shared) = (self.credits.clone(), self.client.shared.clone());
         let pixels = view.camera.pixel_count() as u64;
         Box::pin(async move {
@@ -258,7 +258,7 @@ impl<'a> LiveStream<'a> {
 }
 
 /// Waits for the work; without any, waits for ever.
-async fn wait_for<T>(work: Option<&mut Work<T>>) -> Result<T, Status> {
+async fn wait_for<T>(work: Option<&mut Pending<T>>) -> Result<T, Status> {
     match work {
         Some(work) => work.await,
         None => std::future::pending().await,

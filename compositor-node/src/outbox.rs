@@ -1,6 +1,6 @@
 //! Finished frames of one stream on their way out.
 //!
-//! Frames wait here, not in the transport, until the client takes them: a client that takes none delays nobody but itself,
+//! Frames wait here, not in the transport, until the client takes them. A client that takes none delays nobody but itself,
 //! and its frames can be dropped.
 
 use std::collections::VecDeque;
@@ -110,7 +110,7 @@ impl Outbox {
         state.wake();
     }
 
-    /// Ends the stream at once, whatever is ready.
+    /// Ends the stream at once, before the frames that are ready.
     pub(crate) fn cut(&self, status: Status) {
         let mut state = self.state.lock();
         self.drop_ready(&mut state, "client stalled");

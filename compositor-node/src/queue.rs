@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 use crate::batch::{BatchKey, MAX_BATCH};
 
-/// Views that a stream may have in a batch while others wait, and all together while live streams are open: a single view
-/// then waits for few.
+/// Views that a stream may have in a batch while others wait, and all together while live streams are open. A single view
+/// then waits for few others.
 const SHARED_VIEWS: usize = 8;
 /// Pixels of these views.
 const SHARED_PIXELS: usize = 1 << 20;
@@ -53,8 +53,7 @@ impl<T: Keyed> FairQueue<T> {
         self.streams.remove(&stream).unwrap_or_default()
     }
 
-    /// The next stream's first view and those that can be made with it: one of each stream in turn, round by round, each
-    /// stream's in their order. Streams that had no part in it have the next turn.
+    /// The next stream's first view and those that can be made with it, one of each stream in turn, round by round. Streams that had no part in it have the next turn.
     pub(crate) fn take_batch(&mut self) -> Vec<T> {
         let order = self.order();
         let Some(wanted) = order.first().and_then(|first| self.first_key(*first)) else {

@@ -52,7 +52,7 @@ impl NodeQuota {
         self.streams.clone().try_acquire_owned().map_err(refused)
     }
 
-    /// Room for a view of a batch; an error where there is none now.
+    /// Room for a view of a batch; an error while all room is taken.
     pub(crate) fn try_view(&self, camera: &PinholeCamera) -> Result<NodeCredit, Status> {
         let few = |_| self.exceeded("views", self.limits.views, "views are in flight");
         let small = |_| self.exceeded("pixels", self.limits.pixels, "pixels of views are in flight");

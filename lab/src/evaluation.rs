@@ -46,17 +46,11 @@ pub struct Evaluation {
 
 impl ReferenceViews {
     /// Evaluates a method.
-    ///
-    /// # Errors
-    /// The device fails.
     pub fn evaluate(&self, method: ReconstructionMethod, runs: usize) -> anyhow::Result<Evaluation> {
         self.evaluate_timed_on(method, TIMED_VIEWS, runs)
     }
 
     /// Evaluates a method, timed on a batch of `views` views or more.
-    ///
-    /// # Errors
-    /// The device fails.
     pub fn evaluate_timed_on(
         &self,
         method: ReconstructionMethod,

@@ -28,13 +28,9 @@ const RUN_STEP_S: f64 = 1e-4;
 /// Settings of one delivery.
 #[derive(Debug, Clone, Copy)]
 pub struct DeliverySettings {
-    /// The lighting.
     pub lighting: Lighting,
-    /// The policy.
     pub policy: PolicyChoice,
-    /// The reconstruction method.
     pub method: ReconstructionMethod,
-    /// The number of views, V.
     pub views: usize,
     /// Sample sets of one moment, each with all views.
     pub sets: u32,
@@ -42,11 +38,8 @@ pub struct DeliverySettings {
 
 /// A cluster that runs until it is stopped.
 pub struct Experiment {
-    /// The device.
     pub engine: Arc<GpuEngine>,
-    /// The scene.
     pub setup: Setup,
-    /// Arguments of the scene.
     pub args: SceneArgs,
     given_views: Vec<PinholeCamera>,
     runtime: Runtime,
@@ -98,9 +91,6 @@ impl Experiment {
     }
 
     /// Delivers views of a new sample set. The time excludes the coordinator's measurements.
-    ///
-    /// # Errors
-    /// The cluster fails.
     pub fn deliver(&self, settings: DeliverySettings, arrived: impl FnMut(&Frame)) -> anyhow::Result<Delivered> {
         let run = self.runs.replace(self.runs.get() + 1);
         let (method, sampling) = (settings.method.to_string(), self.args.sampling.to_string());
@@ -117,9 +107,6 @@ impl Experiment {
     }
 
     /// The renderer's choice between triangles and rays for views of this size.
-    ///
-    /// # Errors
-    /// The device fails.
     pub fn visibility(&self) -> anyhow::Result<Choice> {
         let view = self.views(1)?;
         Ok(self.engine.visibility_choice(self.setup.offer.hash.as_str(), &view[0])?)

@@ -5,21 +5,22 @@
 //! build of the program has none of this.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-pub mod bench;
+mod bench;
 mod command;
-pub mod cpu_share;
-pub mod demo;
-pub mod evaluation;
-pub mod experiment;
-pub mod lighting_study;
-pub mod load;
-pub mod memory;
-pub mod process;
-pub mod progress;
+mod cpu_share;
+mod demo;
+mod evaluation;
+mod experiment;
+mod lighting_study;
+mod load;
+mod memory;
+mod process;
+mod progress;
 pub mod reference_views;
 pub mod sampling_study;
-pub mod scaling;
+mod scaling;
 pub mod statistics;
-pub mod sweep;
+mod sweep;
 
 pub use command::LabCommand;
+pub use evaluation::Evaluation;

@@ -6,6 +6,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use gpu::DevicePreference;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
@@ -30,16 +31,28 @@ impl Drop for Process {
 
 impl Process {
     /// Starts a process with arguments as on the command line.
-    ///
-    /// # Errors
-    /// The system starts no process.
-    pub fn start(name: &str, arguments: &[String]) -> anyhow::Result<Self> {
+    fn start(name: &str, arguments: &[String]) -> anyhow::Result<Self> {
         let program = std::env::current_exe().context("this program's file is not known")?;
         let mut command = Command::new(program);
         command.args(arguments).stdin(Stdio::null()).stdout(Stdio::piped());
         let mut child = command.spawn().with_context(|| format!("cannot start {name}"))?;
         let output = child.stdout.take().context("a process without output")?;
         Ok(Self { name: name.to_owned(), child, lines: lines_of(output) })
+    }
+
+    /// Starts a coordinator on a free port, with further arguments.
+    pub fn coordinator(arguments: &[String]) -> anyhow::Result<Self> {
+        let fixed = ["coordinator", "--listen", "127.0.0.1:0"].map(str::to_owned);
+        Self::start("coordinator", &[&fixed, arguments].concat())
+    }
+
+    /// Starts a node on a free port. It prints its address, then that of its metrics.
+    pub fn node(number: usize, coordinator: &str, device: DevicePreference) -> anyhow::Result<Self> {
+        let (name, device) = (node_name(number), device.to_string());
+        let fixed = ["node", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0"];
+        let own = ["--coordinator", coordinator, "--name", &name, "--device", &device];
+        let arguments: Vec<String> = fixed.iter().chain(&own).map(|&word| word.to_owned()).collect();
+        Self::start(&name, &arguments)
     }
 
     /// The name that it was started with.
@@ -66,6 +79,12 @@ impl Process {
             }
         }
     }
+}
+
+/// The name of a node, with enough digits to sort well.
+#[must_use]
+pub fn node_name(number: usize) -> String {
+    format!("node-{number:03}")
 }
 
 /// Output is read to the end: a process that cannot print stops.

@@ -22,9 +22,6 @@ pub fn settings(quick: bool) -> Vec<ReconstructionMethod> {
 }
 
 /// Evaluates all settings, and calls `done` for each.
-///
-/// # Errors
-/// The device fails.
 pub fn sweep(
     reference: &ReferenceViews,
     quick: bool,
@@ -36,9 +33,6 @@ pub fn sweep(
 }
 
 /// A table of evaluations.
-///
-/// # Errors
-/// A row does not fit its table.
 pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
     let columns = [
         ("method", ""),
@@ -84,26 +78,27 @@ pub fn charts(name: &str, rows: &[Evaluation]) -> Vec<XyChart> {
 }
 
 fn series(rows: &[Evaluation], value: fn(&Evaluation) -> f64) -> [Series; 2] {
-    let search = |row: &Evaluation| match row.method {
-        ReconstructionMethod::LightFieldSearch { steps } => {
-            Some(Point::labelled(row.ms_a_view, value(row), steps.to_string()))
-        }
-        _ => None,
-    };
-    let carve = |row: &Evaluation| match row.method {
-        ReconstructionMethod::JointCarve { stop_level } => {
-            Some(Point::labelled(row.ms_a_view, value(row), format!("level {stop_level}")))
-        }
-        _ => None,
+    let points = |label: fn(ReconstructionMethod) -> Option<String>| {
+        rows.iter()
+            .filter_map(move |row| Some(Point::labelled(row.ms_a_view, value(row), label(row.method)?)))
+            .collect::<Vec<_>>()
     };
     [
-        Series::line("light_field_search", rows.iter().filter_map(search)),
-        Series::line("joint_carve", rows.iter().filter_map(carve)),
+        Series::line("light_field_search", points(|method| steps(method).map(|steps| steps.to_string()))),
+        Series::line("joint_carve", points(|method| stop_level(method).map(|level| format!("level {level}")))),
     ]
+}
+
+fn steps(method: ReconstructionMethod) -> Option<u32> {
+    if let ReconstructionMethod::LightFieldSearch { steps } = method { Some(steps) } else { None }
+}
+
+fn stop_level(method: ReconstructionMethod) -> Option<u32> {
+    if let ReconstructionMethod::JointCarve { stop_level } = method { Some(stop_level) } else { None }
 }
 
 /// Evaluations of light field search, and of joint carve.
 #[must_use]
 pub fn split(rows: &[Evaluation]) -> (Vec<&Evaluation>, Vec<&Evaluation>) {
-    rows.iter().partition(|row| matches!(row.method, ReconstructionMethod::LightFieldSearch { .. }))
+    rows.iter().partition(|row| steps(row.method).is_some())
 }

@@ -15,9 +15,8 @@ use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 use wire::rpc::{compositor_server, node_server, sampler_server};
 
-/// Serves both roles on one port and stays a member of the coordinator's cluster until `shutdown`; then
-/// ends its streams and returns when connections have ended, after 10 s at most. A node whose device is lost leaves at
-/// once: others take its place.
+/// Serves both roles on one port and stays a member of the coordinator's cluster until `shutdown`. Then it ends its streams
+/// and returns when connections have ended, after 10 s at most. A node whose device is lost leaves at once.
 ///
 /// # Errors
 /// Where the address is not allowed, the transport fails or the device is lost.

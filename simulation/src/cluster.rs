@@ -5,9 +5,9 @@ use cluster::{Costs, TileCosts};
 /// Seconds of a call to the device beside the views that it makes; 0 where it does not count.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Calls {
-    /// Of views that are reconstructed.
+    /// Seconds of a call that reconstructs views.
     pub reconstruct_s: f64,
-    /// Of views that are drawn from the scene.
+    /// Seconds of a call that draws views from the scene.
     pub direct_s: f64,
 }
 

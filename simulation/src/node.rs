@@ -42,10 +42,10 @@ pub(crate) enum Sampled {
 /// The state of a set on a compositor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Loading {
-    pub(crate) asked: bool,
+    pub(crate) requested: bool,
     /// Samplers whose images have arrived.
     pub(crate) arrived: usize,
-    /// Waits for the device, or has been there.
+    /// Whether it waits for the device, or has been loaded.
     pub(crate) queued: bool,
     pub(crate) loaded: bool,
 }
@@ -96,7 +96,7 @@ impl Node {
         }
     }
 
-    /// Hands over what there is credit for of the first message; whether that was all of it.
+    /// Hands over as many views of the first message as have credit; gives whether these were all.
     pub(crate) fn hand_over(&mut self) -> bool {
         let Some((set, left)) = self.messages.front_mut() else { return false };
         let (set, views) = (*set, (*left).min(self.credit));
@@ -114,7 +114,7 @@ impl Node {
         all
     }
 
-    /// What the device does next.
+    /// The next job of the device.
     pub(crate) fn next_job(&mut self, batch_views: usize) -> Option<Job> {
         if let Some(job) = self.urgent.pop_front() {
             return Some(job);

@@ -13,8 +13,8 @@ use crate::cluster::{Cluster, Machine};
 
 /// Between two ticks, as the coordinator's.
 const TICK: Duration = Duration::from_millis(250);
-/// A plan that has not changed for so long, longer than any dwell, is settled.
-const SETTLED_TICKS: usize = 40;
+/// A plan that has not changed for this many ticks, longer than any dwell, is stable.
+const STABLE_TICKS: usize = 40;
 /// A plan is taken as it is after this many: ten simulated minutes.
 const MOST_TICKS: usize = 2400;
 /// Timings of each kind that a node reports: the schedule's moving average is then within a thousandth of them.
@@ -56,7 +56,7 @@ struct Coordinator {
     refused: Option<ChoiceError>,
 }
 
-/// The plan that the schedule settles on.
+/// The stable plan of the schedule.
 ///
 /// # Errors
 /// Where the schedule refuses.
@@ -69,7 +69,7 @@ pub fn plan(cluster: &Cluster, demand: &Demand) -> Result<SessionPlan, PlanError
     if demand.nodes_report {
         (0..REPORTS).for_each(|_| coordinator.report_costs(cluster));
     }
-    coordinator.settle();
+    coordinator.wait_until_stable();
     match (coordinator.plan, coordinator.refused) {
         (_, Some(error)) => Err(error.into()),
         (Some(plan), None) => Ok(plan),
@@ -110,14 +110,14 @@ impl Coordinator {
         }
     }
 
-    fn settle(&mut self) {
-        let mut settled = 0;
+    fn wait_until_stable(&mut self) {
+        let mut stable_ticks = 0;
         for _ in 0..MOST_TICKS {
             self.now += TICK;
             let before = self.epoch();
             self.tell(Event::Tick);
-            settled = if self.epoch() == before { settled + 1 } else { 0 };
-            if settled >= SETTLED_TICKS {
+            stable_ticks = if self.epoch() == before { stable_ticks + 1 } else { 0 };
+            if stable_ticks >= STABLE_TICKS {
                 return;
             }
         }

@@ -111,7 +111,7 @@ impl Run {
     }
 }
 
-/// Of a device that holds up the rest; `mean_views_s` is what all nodes spend on views.
+/// The limit of a device that delays the rest; `mean_views_s` is the nodes' mean time on views.
 fn of_device(busy: &Busy, mean_views_s: f64) -> Limit {
     if busy.views_s < MOSTLY * busy.device_s() {
         return if busy.sample_s > busy.load_s { Limit::Sampling } else { Limit::Loading };

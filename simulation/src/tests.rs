@@ -54,7 +54,7 @@ fn every_batch_costs_a_call() {
 
 #[test]
 fn a_link_delays_by_the_bytes_it_carries() {
-    // 4 MB of images at 10 MB/s, a first batch of 50, then frames of 0.1 MB that take as long to send as to make.
+    // 4 MB of images at 10 MB/s and a first batch of 50. Frames of 0.1 MB then take as long to send as to make.
     let slow = Machine { bytes_per_s: 1e7, ..FREE };
     let run = ran(&equal(2, slow), &demand(PolicyChoice::Pipeline, 100, 1), Habits::default());
     let least_s = 0.4 + 0.4 + 0.005 + 0.5 + 1.0;
@@ -67,7 +67,7 @@ fn the_steady_state_follows_the_formulas() {
         let demand = demand(PolicyChoice::Pipeline, views, 16);
         let run = ran(&equal(nodes, FREE), &demand, Habits::default());
         let k = k_fd(4, 0.1, views, 0.01, nodes).clamp(1, 4);
-        // Compositors take turns with what is left over of a set.
+        // Compositors take turns with the remainder of a set.
         let most = views as f64 / (nodes - k) as f64 * 0.01 + 0.005;
         let formula_s = pipeline_time(4, 0.1, views, 0.01, nodes, k).max(most);
         let ratio = run.steady_period_s() / formula_s;
@@ -77,7 +77,7 @@ fn the_steady_state_follows_the_formulas() {
     assert!(close(direct.steady_period_s(), 25.0 * 0.101));
 }
 
-/// With one set asked for ahead a sampler rests while what it made travels and is loaded; with two it does not.
+/// With one set fetched ahead, a sampler is idle while its images are sent and loaded; with two it is not.
 #[test]
 fn a_sampler_is_idle_where_sets_are_requested_late() {
     let machine = Machine { bytes_per_s: 1e8, ..FREE };
@@ -99,7 +99,7 @@ fn a_sampler_that_sends_to_all_is_bound_by_its_link_and_a_tree_is_not() {
     let k = planned.sampler_count();
     let sent_mb = (4 / k * (41 - k)) as f64;
     let unicast = run(&cluster, &planned, 1000, 12, Habits::default());
-    // Whoever is late leaves a set to others, and a few need not fetch it.
+    // A late compositor leaves a set to others, and a few need not fetch it.
     let link_s = sent_mb / 100.0;
     assert!((0.9 * link_s..1.1 * link_s).contains(&unicast.steady_period_s()), "{}", unicast.steady_period_s());
     assert_eq!(unicast.limit(), Limit::ImagesOut);
@@ -168,7 +168,7 @@ fn unequal_nodes_are_planned_by_their_own_costs() {
     let cluster = Cluster { machines, images: 4, image_bytes: 1e6, frame_bytes: 1e5 };
     let known = Demand { nodes_report: true, ..demand(PolicyChoice::Pipeline, 1000, 16) };
     let ran = ran(&cluster, &known, Habits::default());
-    assert_eq!(ran.limit(), Limit::Views, "whoever is done helps who is slow");
+    assert_eq!(ran.limit(), Limit::Views, "fast nodes steal from slow ones");
     let nodes: Vec<_> =
         cluster.machines.iter().map(|machine| NodeCosts { costs: machine.costs, transfer_image_s: None }).collect();
     let samplers = plan(&cluster, &known).unwrap().assignment.samplers;
@@ -181,7 +181,7 @@ fn unequal_nodes_are_planned_by_their_own_costs() {
 
 #[test]
 fn the_limit_names_sampling_and_loading_where_they_delay_views() {
-    // Whoever samples an image makes as many views as the others.
+    // Nodes that sample an image make as many views as the others.
     let few = ran(&equal(50, FREE), &demand(PolicyChoice::TimeShare, 500, 16), Habits::default());
     assert_eq!(few.limit(), Limit::Sampling);
     let loads = Machine { costs: Costs { load_set_s: 0.2, sample_image_s: 0.01, ..COSTS }, ..FREE };

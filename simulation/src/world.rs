@@ -1,7 +1,7 @@
 //! The event loop that executes a plan.
 //!
 //! Requests take no time. A share of images occupies the sender's link while it is sent, and the receiver's link from its
-//! arrival on; both wait for what is on the link before. Frames leave over the compositor's link; clients are many, and
+//! arrival on. Parcels on a link wait for those before. Frames leave over the compositor's link; clients are many, and
 //! each has a link of its own.
 
 use std::cmp::Reverse;
@@ -102,10 +102,10 @@ impl<'a> World<'a> {
                 self.send_message(node, views);
             }
         }
-        let asked: Vec<usize> =
+        let requested: Vec<usize> =
             self.compositors.iter().copied().filter(|&node| !self.nodes[node].messages.is_empty()).collect();
-        self.receivers = receivers(self.plan, &asked, self.nodes.len());
-        asked.into_iter().for_each(|node| self.advance(node));
+        self.receivers = receivers(self.plan, &requested, self.nodes.len());
+        requested.into_iter().for_each(|node| self.advance(node));
     }
 
     fn send_message(&mut self, node: usize, views: Range<usize>) {
@@ -142,8 +142,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Reads a compositor's messages as far as it can: it waits for a set, asks for the next ones, and hands views over as
-    /// credit allows.
+    /// Reads a compositor's messages: it waits for a set, fetches the next ones, and hands views over as credit allows.
     fn advance(&mut self, node: usize) {
         while let Some(&(set, _)) = self.nodes[node].messages.front() {
             if self.plan.policy != Policy::Direct && !self.prepare(node, set) {
@@ -179,17 +178,17 @@ impl<'a> World<'a> {
             .filter_map(|share| Some((number_of(&share.node_name)?, share.image_indices.len())))
             .collect();
         let loading = &mut self.nodes[node].loading[set as usize];
-        if std::mem::replace(&mut loading.asked, true) {
+        if std::mem::replace(&mut loading.requested, true) {
             return;
         }
         for (sampler, images) in samplers {
-            self.asked(sampler, set, images, node);
+            self.images_requested(sampler, set, images, node);
         }
         // Under a relay, all images may have arrived before.
         self.load_if_complete(node, set);
     }
 
-    fn asked(&mut self, sampler: usize, set: u32, images: usize, by: usize) {
+    fn images_requested(&mut self, sampler: usize, set: u32, images: usize, by: usize) {
         match &mut self.nodes[sampler].sampled[set as usize] {
             Sampled::Soon(askers) => askers.push(by),
             Sampled::Done => self.give(sampler, set, by),
@@ -250,7 +249,7 @@ impl<'a> World<'a> {
     fn load_if_complete(&mut self, node: usize, set: u32) {
         let shares = self.plan.samplers_of(set).len();
         let loading = &mut self.nodes[node].loading[set as usize];
-        if loading.asked && loading.arrived == shares && !std::mem::replace(&mut loading.queued, true) {
+        if loading.requested && loading.arrived == shares && !std::mem::replace(&mut loading.queued, true) {
             self.nodes[node].urgent.push_back(Job::Load { set });
             self.start_device(node);
         }

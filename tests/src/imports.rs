@@ -195,7 +195,7 @@ fn is_double_colon(tokens: &[TokenTree], at: usize) -> bool {
     [at, at + 1].iter().all(|place| tokens.get(*place).is_some_and(|token| token.to_string() == ":"))
 }
 
-/// Whether an attribute is `cfg(test)`, or `cfg(all(test, …))`.
+/// Returns whether an attribute is `cfg(test)`, or `cfg(all(test, …))`.
 #[must_use]
 pub fn is_for_tests(attribute: Option<&TokenTree>) -> bool {
     let text = attribute.map(ToString::to_string).unwrap_or_default().replace(' ', "");

@@ -35,7 +35,7 @@ async fn echoed(stream: &mut TcpStream, count: usize) -> io::Result<(Vec<u8>, Du
 }
 
 #[tokio::test]
-async fn bytes_are_delayed_throttled_and_spoilt_as_ordered() {
+async fn bytes_are_delayed_throttled_and_corrupted_as_ordered() {
     let proxy = Proxy::to(&echo().await, 1);
     let mut stream = connected(&proxy).await;
     assert_eq!(echoed(&mut stream, 5000).await.unwrap().0, vec![7; 5000]);

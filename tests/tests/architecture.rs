@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
-/// Which crates of the workspace each one may use, in programs and build scripts. What is not here is not
+/// Which crates of the workspace each one may use, in programs and build scripts. Other uses are not
 /// allowed.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("depth-image", &[]),
@@ -96,19 +96,19 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("cluster-tests", &["client", "cluster", "codec", "coordinator", "depth-image", "node", "node-host", "wire"]),
 ];
 
-/// What works on pictures in different ways knows nothing of each other, in tests neither.
+/// Crates that work on pictures in different ways, and never use one another, not even in tests.
 const STRANGERS: [&str; 3] = ["sampling", "reconstruction", "effects"];
 
 /// Crates that only `wire` may name.
 const MESSAGES: [&str; 5] = ["prost", "prost-types", "prost-build", "tonic-prost", "tonic-prost-build"];
 
-/// What a thin client must not have in it.
+/// Crates that a thin client must not link.
 const DEVICE: [&str; 5] = ["wgpu", "wgpu-core", "wgpu-hal", "naga", "ash"];
 
-/// What a program without its lab must not have in it: measurements, and the charts of their reports.
+/// Crates that a program without its lab must not link: measurements, and the charts of their reports.
 const LAB: [&str; 4] = ["lab", "plotters", "simulation", "study"];
 
-/// What a decision may not depend on.
+/// Text of code that a decision may not depend on.
 const IMPURE: [&str; 8] =
     [".await", "async fn", "Instant::now", "SystemTime", "tokio::", "std::thread", "std::env", "std::fs"];
 
@@ -337,10 +337,12 @@ fn the_schedule_neither_waits_nor_reads_a_clock() {
 /// A clock that is set, by a person or over the network, moves no deadline.
 #[test]
 fn services_read_monotonic_time_only() {
-    const SERVICES: [&str; 8] = [
+    const SERVICES: [&str; 10] = [
         "client",
         "compositor-node",
         "coordinator",
+        "crates/cluster",
+        "crates/codec",
         "crates/node",
         "crates/wire",
         "node-host",

@@ -12,7 +12,7 @@ use crate::{
     rgb_filter::{filter, unfilter},
 };
 
-/// How frames are packed. `lz4`, `jpeg` or `jpeg:QUALITY` in settings.
+/// The packing of frames: `lz4`, `jpeg` or `jpeg:QUALITY` in settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum FrameCodec {
     /// Without loss: differences along the row, LZ4.
@@ -27,7 +27,7 @@ pub enum FrameCodec {
 
 const DEFAULT_JPEG_QUALITY: u8 = 90;
 
-/// A frame as it travels.
+/// An encoded frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EncodedFrame {
     /// How the data is packed.

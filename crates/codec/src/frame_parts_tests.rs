@@ -44,7 +44,7 @@ fn frames_of_any_length_survive() {
 }
 
 #[test]
-fn spoilt_streams_are_refused() {
+fn streams_that_are_corrupt_or_out_of_order_are_refused() {
     let (_, good) = parts(3 * MAX_CHUNK_BYTES);
     let spoil = |change: &dyn Fn(&mut Vec<FramePart>)| {
         let mut parts = good.clone();

@@ -37,7 +37,7 @@ fn image(width: u32, height: u32) -> DepthImage {
     }
 }
 
-/// With so many planes of visibility.
+/// An image with a number of planes of visibility.
 fn shiny(width: u32, height: u32, visibilities: usize) -> DepthImage {
     let mut random = Random::new(20);
     let image = image(width, height);
@@ -70,7 +70,7 @@ fn an_image_survives() {
     }
 }
 
-/// As an image that leaves out what others hold has them.
+/// The bits of an image that skips samples of other images.
 fn apart(width: u32, height: u32) -> DepthImage {
     let image = image(width, height);
     let passed = Some(image.inverse_depth_per_m.iter().map(|d| !(0.0..=0.3).contains(d)).collect());

@@ -43,6 +43,6 @@ pub(crate) fn sampling_error(error: SamplingError) -> EngineError {
     match error {
         SamplingError::Render(error) => render_error(error),
         SamplingError::Layer { .. } => invalid("sample_cameras", error),
-        SamplingError::Wanted { .. } => invalid("image_indices", error),
+        SamplingError::Selection { .. } => invalid("image_indices", error),
     }
 }

@@ -190,7 +190,7 @@ impl Engine for GpuEngine {
             wanted: &request.wanted,
             method: parsed("sampling_method", &request.sampling)?,
             planes: planes_for(method),
-            reference_time_s: request.temporal_reference_s,
+            temporal_reference_s: request.temporal_reference_s,
         };
         self.sampler.sample(&work).map_err(sampling_error)
     }

@@ -4,7 +4,7 @@ use std::{fmt, str::FromStr, sync::Arc};
 
 use crate::error::GpuError;
 
-/// What to look for among the adapters.
+/// The adapters to choose from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DevicePreference {
     /// A GPU if there is one, else the software device.
@@ -88,7 +88,7 @@ impl Gpu {
         Ok(Arc::new(Self { device, queue, info, timestamp_period_ns }))
     }
 
-    /// What reports call the device.
+    /// The name of the device in reports.
     #[must_use]
     pub fn name(&self) -> String {
         format!("{} ({}, {})", self.info.name, self.info.backend, self.info.driver_info)

@@ -4,10 +4,10 @@ use std::{ops::Range, sync::mpsc, time::Instant};
 
 use crate::{device::Gpu, error::GpuError, pool::PooledBuffer};
 
-/// Work being recorded.
+/// Work that is being recorded.
 pub struct Frame<'g> {
     gpu: &'g Gpu,
-    /// For passes that need more than [`Frame::compute`].
+    /// The commands so far, to which passes add theirs.
     pub encoder: wgpu::CommandEncoder,
     timer: Option<Timer>,
     reads: Vec<PooledBuffer>,
@@ -23,7 +23,7 @@ struct Timer {
     host: wgpu::Buffer,
 }
 
-/// Work under way.
+/// Work that is under way.
 pub struct Submitted<'g> {
     gpu: &'g Gpu,
     index: wgpu::SubmissionIndex,
@@ -106,17 +106,17 @@ impl Submitted<'_> {
 }
 
 impl FrameResult {
-    /// Looks at what a read-back brought, as elements of `T`.
+    /// Reads the bytes of a read-back as elements of `T`.
     ///
     /// # Errors
     /// When the device is lost.
     pub fn with<T: bytemuck::AnyBitPattern, R>(
         &self,
         readback: Readback,
-        look: impl FnOnce(&[T]) -> R,
+        read: impl FnOnce(&[T]) -> R,
     ) -> Result<R, GpuError> {
         let view = self.reads[readback.0].get_mapped_range(..).map_err(|error| GpuError::Lost(error.to_string()))?;
-        Ok(look(bytemuck::cast_slice(&view)))
+        Ok(read(bytemuck::cast_slice(&view)))
     }
 }
 

@@ -80,9 +80,9 @@ mod tests {
         for (policy, sampled, drawn) in [(Policy::Direct, 0, 1), (Policy::Pipeline, 1, 0), (Policy::TimeShare, 1, 0)] {
             let engine = Sleeper::default();
             warm(&engine, &plan(policy)).unwrap();
-            let asked = engine.asked.into_inner().unwrap();
+            let calls = engine.calls.into_inner().unwrap();
             assert_eq!(
-                (asked.refinements.len(), asked.uploads.len(), asked.drawn_views.len()),
+                (calls.refinements.len(), calls.uploads.len(), calls.drawn_views.len()),
                 (sampled, sampled, drawn)
             );
         }

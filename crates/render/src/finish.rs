@@ -34,7 +34,7 @@ pub(crate) enum Output {
     },
 }
 
-/// Whether samples of depth images may be redundant.
+/// The tests that samples of depth images have passed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Redundancy {
     None,
@@ -77,7 +77,7 @@ impl FinishVariant {
         Self { output, ..self }
     }
 
-    /// Where the planes lie among those of a camera.
+    /// The places of planes among those of a camera.
     pub fn layout(&self) -> PlaneLayout {
         let Output::DepthImage { normal, reflector, surface_id, redundancy } = self.output else {
             return PlaneLayout { count: 2, ..PlaneLayout::default() };
@@ -159,7 +159,7 @@ impl ShaderVariant for FinishVariant {
     }
 }
 
-/// What planes are finished from.
+/// The inputs of finished planes.
 #[derive(Clone, Copy)]
 pub(crate) struct FinishWork<'a> {
     pub variant: FinishVariant,
@@ -213,4 +213,21 @@ fn bindings<'r>(work: &FinishWork<'r>, finish: &'r wgpu::Buffer, target: &'r Sur
     bindings.extend(ids.map(|ids| Binding::texture("surface_ids", ids)));
     bindings.extend(layout.passed.map(|_| Binding::texture("front_depth", target.front_depth())));
     bindings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::TestStage;
+
+    #[test]
+    fn every_variant_is_bound_by_its_names() {
+        let stage = TestStage::new();
+        let TestStage { scene, buffer, .. } = &stage;
+        for variant in FinishVariant::all() {
+            let target = stage.surfaces(variant.by_rays, variant.layout().surface_id.is_some());
+            let work = FinishWork { variant, scene, view_cell_m: 0.0, cameras: buffer, sums: buffer, words: buffer };
+            stage.check(&variant, 0, &bindings(&work, buffer, &target));
+        }
+    }
 }

@@ -1,4 +1,4 @@
-// How long a pixel is on the surface that it shows.
+// The length of a pixel on the surface that it shows.
 
 // Cosine of the most grazing angle at which a footprint still grows.
 const LEAST_FACING: f32 = {{ LEAST_FACING }};

@@ -20,8 +20,8 @@ use crate::{
     texture,
 };
 
-/// What is the same for a whole draw: a mesh part where an instance places it. `Object` in the shader, which
-/// finds it at a dynamic offset: a load from a uniform costs nothing a vertex or fragment.
+/// A mesh part where an instance places it: `Object` in the shader, the same for a whole draw. It lies at a dynamic offset: a
+/// load from a uniform costs nothing a vertex or fragment.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct GpuObject {
@@ -46,14 +46,14 @@ pub(crate) struct GpuSurroundings {
     pub wind_frequency_hz: f32,
 }
 
-/// What a draw's shader has to do: pipelines are specialised, for work that is not in the shader is free.
+/// The work of a draw's shader: pipelines are specialised, for work that is not in the shader is free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct MaterialTraits {
     pub double_sided: bool,
     /// Without a test for alpha, hidden fragments are never shaded.
     pub alpha_tested: bool,
     pub textured: bool,
-    /// Whether metallic and roughness come from a texture.
+    /// Metallic and roughness come from a texture.
     pub coat_textured: bool,
     pub unlit: bool,
     pub specular: bool,
@@ -139,7 +139,7 @@ impl GpuScene {
         self.highlights[usize::from(highlight == Highlight::Ggx)]
     }
 
-    /// What tells it from every other scene of this process.
+    /// A number that no other scene of this process has.
     #[must_use]
     pub fn identity(&self) -> u64 {
         self.identity
@@ -153,7 +153,7 @@ impl GpuScene {
         Ok(self.rays.at(scene_time_s)?.report)
     }
 
-    /// As [`GpuScene::acceleration`], with a new tree whatever there was: for measuring what refitting one saves.
+    /// As [`GpuScene::acceleration`], with a new tree whatever there was: to measure the gain of refitting.
     ///
     /// # Errors
     /// As [`GpuScene::acceleration`].

@@ -17,7 +17,7 @@ use crate::{
 /// Pixels for which an adaptive rate traces rays in any case lie this far apart.
 pub(crate) const GRID_PX: u32 = 4;
 
-/// How many rays to a lamp a shader is written for.
+/// The rays to a lamp that a shader is written for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum ShadowRays {
     None,
@@ -33,7 +33,7 @@ pub(crate) enum Domain {
     All,
     /// Each [`GRID_PX`]-th in both directions.
     Grid,
-    /// Those that [`PixelList`] lists.
+    /// The pixels of a [`PixelList`].
     List,
 }
 
@@ -42,12 +42,12 @@ pub(crate) struct IlluminateVariant {
     pub by_rays: bool,
     pub domain: Domain,
     pub shadow_rays: ShadowRays,
-    /// Whether rays look for what occludes the environment.
+    /// Rays look for surfaces that occlude the environment.
     pub occluded: bool,
-    /// Whether sums are added to.
+    /// Light is added to sums of earlier rays.
     pub continued: bool,
     pub sums: SumPlanes,
-    /// Of variants that trace rays.
+    /// Present where rays are traced.
     pub traversal: Option<Traversal>,
 }
 
@@ -107,9 +107,9 @@ impl ShaderVariant for IlluminateVariant {
 /// The surfaces' light to be summed.
 #[derive(Clone, Copy)]
 pub(crate) struct IlluminateWork<'a> {
-    /// The domain, and whether sums are added to, are set for each pass.
+    /// The domain and `continued` are set for each pass.
     pub variant: IlluminateVariant,
-    /// Of variants that trace rays.
+    /// Present where rays are traced.
     pub traced: Option<&'a Traced>,
     pub illumination: &'a wgpu::Buffer,
     /// One uniform of all cameras for each part of the rays.
@@ -122,7 +122,7 @@ pub(crate) struct IlluminateWork<'a> {
 pub(crate) enum Pixels<'a> {
     All,
     Grid,
-    /// Of one camera.
+    /// The pixels of one camera.
     List(&'a PixelList),
 }
 
@@ -190,4 +190,32 @@ fn bindings<'r>(
         bindings.extend(list.bindings());
     }
     bindings
+}
+
+#[cfg(test)]
+mod tests {
+    use gpu::BufferPool;
+
+    use super::*;
+    use crate::test_support::TestStage;
+
+    #[test]
+    fn every_variant_is_bound_by_its_names() {
+        let stage = TestStage::new();
+        let (traced, buffer) = (stage.scene.rays.at(0.0).expect("a tree"), &stage.buffer);
+        let list = PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), &stage.surfaces(false, false));
+        for variant in IlluminateVariant::all() {
+            let target = stage.surfaces(variant.by_rays, false);
+            let pixels = match variant.domain {
+                Domain::All => Pixels::All,
+                Domain::Grid => Pixels::Grid,
+                Domain::List => Pixels::List(&list),
+            };
+            let work = IlluminateWork { variant, traced: None, illumination: buffer, cameras: &[], sums: buffer };
+            stage.check(&variant, 0, &bindings(&work, buffer, pixels, &target));
+            if variant.traversal.is_some() {
+                stage.check(&variant, 1, &traced.bindings());
+            }
+        }
+    }
 }

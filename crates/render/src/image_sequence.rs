@@ -29,13 +29,13 @@ impl<'a> ImageSequence<'a> {
         (count > 0).then_some(Predecessors { known: self.known, camera, count })
     }
 
-    /// Where an image's surface ids are drawn for images after it to consult, and the size of that texture.
+    /// The layer that an image's surface ids are drawn into for images after it, and the layer's size.
     pub fn surface_ids(&self, place: usize) -> Option<(wgpu::TextureView, UVec2)> {
         let ids = self.keeps.then(|| self.known.surface_ids(self.number(place))).flatten();
         ids.map(|ids| (ids.clone(), self.known.size_px()))
     }
 
-    /// Where an image's samples are kept for images after it to consult.
+    /// The layer that an image's samples are kept in for images after it.
     pub fn samples(&self, place: usize) -> Option<&'a wgpu::TextureView> {
         self.keeps.then(|| self.known.samples(self.number(place))).flatten()
     }

@@ -44,7 +44,7 @@ pub(crate) struct RedundancyVariant {
     shader: &'static str,
     traces_rays: bool,
     temporal_reference: bool,
-    /// How many images are before.
+    /// The number of images before.
     earlier: usize,
 }
 
@@ -75,7 +75,7 @@ struct Layers {
 
 /// The last layers that were made: making and clearing them costs as much as drawing a picture.
 #[derive(Default)]
-pub(crate) struct KeptLayers(Mutex<Option<Arc<Layers>>>);
+pub(crate) struct LayerCache(Mutex<Option<Arc<Layers>>>);
 
 impl RedundancyVariant {
     /// Each test after few and many images, with a temporal reference where samples are consulted.
@@ -101,7 +101,7 @@ impl RedundancyVariant {
     }
 }
 
-impl KeptLayers {
+impl LayerCache {
     /// Layers that nobody else uses; they hold what is left over.
     fn of(&self, gpu: &Gpu, size: wgpu::Extent3d, format: TextureFormat) -> Arc<Layers> {
         let mut kept = self.0.lock();
@@ -148,7 +148,12 @@ impl Layers {
 
 impl KnownSamples {
     /// Layers for the images of a set, which hold nothing yet.
-    pub fn of(gpu: &Gpu, kept: &KeptLayers, cameras: &[PinholeCamera], test: RedundancyTest) -> Result<Self, GpuError> {
+    pub fn of(
+        gpu: &Gpu,
+        cache: &LayerCache,
+        cameras: &[PinholeCamera],
+        test: RedundancyTest,
+    ) -> Result<Self, GpuError> {
         let limits = &gpu.device.limits();
         GpuError::check_limit("images of a set", cameras.len() as u64, limits.max_texture_array_layers.into())?;
         let bytes = (size_of::<KnownCamera>() * cameras.len()) as u64;
@@ -166,7 +171,7 @@ impl KnownSamples {
             view_cell_m: view_cell_m(cameras),
             cameras: cameras.to_vec(),
             test,
-            layers: kept.of(gpu, size, if by_id { SURFACE_ID_FORMAT } else { TextureFormat::Rgba32Uint }),
+            layers: cache.of(gpu, size, if by_id { SURFACE_ID_FORMAT } else { TextureFormat::Rgba32Uint }),
             reference: None,
             keeps_last: false,
         })
@@ -225,12 +230,12 @@ impl KnownSamples {
         bind(bindings)
     }
 
-    /// Where the `number`-th image's surface ids are to be drawn, where the test consults them.
+    /// The layer for the `number`-th image's surface ids, where a test consults them.
     pub fn surface_ids(&self, number: usize) -> Option<&wgpu::TextureView> {
         self.layer(number, Evidence::SurfaceIds)
     }
 
-    /// Where the `number`-th image's samples are to be kept, where the test consults them.
+    /// The layer for the `number`-th image's samples, where a test consults them.
     pub fn samples(&self, number: usize) -> Option<&wgpu::TextureView> {
         self.layer(number, Evidence::Samples)
     }

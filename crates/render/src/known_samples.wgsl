@@ -30,7 +30,7 @@ struct Candidate {
     footprint_m: f32,
     id: vec2u,
     pixel: vec2u,
-    // Whether this image holds it in the temporal reference: then it stays unless it is clearly redundant.
+    // The temporal reference of this image holds it, too: then it stays unless it is clearly redundant.
     was_kept: bool,
 }
 

@@ -1,9 +1,10 @@
 //! Finished pictures of triangles: what sampling and direct rendering share.
 //!
 //! [`GpuScene`] holds a scene on the device. A [`Renderer`] makes views of it ([`Renderer::draw_views`], the method
-//! `direct`) or depth images ([`Renderer::draw_depth_images`]) in three steps, recorded together: which surface each
-//! pixel shows, by drawing triangles or by rays ([`Visibility`]); the light that arrives there ([`Lighting`]), by
-//! rays where it is to be finer; and the planes that are asked for.
+//! `direct`) or depth images ([`Renderer::draw_depth_images`]) in three stages, recorded together (`stages.rs`): the surface
+//! that each pixel shows, by drawing triangles or by rays ([`Visibility`]); the light that arrives there ([`Lighting`]), by
+//! rays where it is to be finer; and the planes that are asked for. Each pass is a file pair, and its variant says which
+//! switches its shader has.
 
 mod accumulation;
 mod batch;
@@ -35,6 +36,8 @@ mod shaders;
 mod stages;
 mod sums;
 mod surfaces;
+#[cfg(test)]
+mod test_support;
 mod texture;
 mod visibility;
 mod work;

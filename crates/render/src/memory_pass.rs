@@ -1,5 +1,5 @@
-//! How fast a device reads what rays read: tables in textures, every texel once, with nothing done but to add.
-//! Rays that met no cache and waited for nothing else could go no faster.
+//! The speed at which a device reads the tables that rays read: every texel once, with nothing done but to add. It bounds the
+//! speed of rays whose loads miss the cache.
 
 use gpu::{
     Binding, BufferPool, ComputePass, DispatchSize, Frame, Gpu, PooledBuffer, Shader, Templates, wgsl_constants,

@@ -1,5 +1,5 @@
-// What is known of a surface once it is found, in four words: its albedo (albedo.wgsl), what it gives off itself
-// (RGB9E5), where it faces (octahedral), and its reflector, 0 where there is no highlight.
+// A surface in four words: albedo (albedo.wgsl), emission (RGB9E5), normal (octahedral), and reflector, 0 where there is no
+// highlight.
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
 {% include "albedo.wgsl" %}

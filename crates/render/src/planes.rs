@@ -4,7 +4,7 @@ use depth_image::{
     Camera, DepthImage, PinholeCamera, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View, ViewPlanes,
 };
 
-/// Where planes lie among those of a camera, after colour (0) and inverse depth (1).
+/// The places of planes among those of a camera, after colour (0) and inverse depth (1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct PlaneLayout {
     pub normal: Option<usize>,

@@ -47,7 +47,7 @@ pub(crate) struct RasterCamera {
     pub padding_1: u32,
 }
 
-/// What to draw, besides from where.
+/// The surfaces to draw, besides the cameras.
 #[derive(Clone, Copy)]
 pub(crate) struct RasterWork<'a> {
     pub scene: &'a GpuScene,
@@ -310,7 +310,7 @@ fn vertex_layout() -> wgpu::VertexBufferLayout<'static> {
     }
 }
 
-/// Nothing in each channel.
+/// [`NOTHING`] in each channel.
 const CLEAR: wgpu::Color = {
     let word = NOTHING as f64;
     wgpu::Color { r: word, g: word, b: word, a: word }

@@ -5,7 +5,7 @@
 pub struct RedundancyTest {
     /// The template of `fn is_redundant_with(candidate: Candidate, number: u32, camera: KnownCamera) -> bool`.
     pub shader: &'static str,
-    /// What the test looks at.
+    /// The evidence that the test looks at.
     pub consults: Evidence,
     /// Whether all images have one camera, so that pixels are compared with the same pixel.
     pub from_one_place: bool,
@@ -14,7 +14,7 @@ pub struct RedundancyTest {
     pub usefulness: Option<&'static str>,
 }
 
-/// What a test consults.
+/// The evidence of redundancy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Evidence {
     /// The scene, by rays.

@@ -10,7 +10,7 @@ use crate::{
     batch::Batch,
     finish::{FinishVariant, Output, Redundancy},
     image_sequence::ImageSequence,
-    known_samples::{KeptLayers, KnownSamples, TemporalReference},
+    known_samples::{KnownSamples, LayerCache, TemporalReference},
     memory_pass::{self, MemoryPass},
     planes,
     redundancy_test::RedundancyTest,
@@ -36,7 +36,7 @@ pub struct Visits {
 pub struct Renderer {
     gpu: Arc<Gpu>,
     stages: Stages,
-    kept_layers: KeptLayers,
+    layer_cache: LayerCache,
     choices: Choices,
 }
 
@@ -53,7 +53,7 @@ impl Renderer {
     #[must_use]
     pub fn with_templates(gpu: &Arc<Gpu>, templates: Templates) -> Self {
         let stages = Stages::new(gpu, &Arc::new(templates));
-        Self { gpu: gpu.clone(), stages, kept_layers: KeptLayers::default(), choices: Choices::default() }
+        Self { gpu: gpu.clone(), stages, layer_cache: LayerCache::default(), choices: Choices::default() }
     }
 
     /// Finished views: the method `direct`. Provenance of a surface is a hit without cameras.
@@ -119,7 +119,7 @@ impl Renderer {
     ) -> Result<Vec<DepthImage>, RenderError> {
         let all = pinholes(cameras);
         self.check(&all)?;
-        let known = KnownSamples::of(&self.gpu, &self.kept_layers, &all, test)?.after(reference);
+        let known = KnownSamples::of(&self.gpu, &self.layer_cache, &all, test)?.after(reference);
         let redundancy = Redundancy::of(test);
         let sequence = ImageSequence { known: &known, wanted, first: 0, keeps: !test.traces_rays() };
         let pinholes: Vec<PinholeCamera> = wanted.iter().map(|&number| all[number as usize]).collect();
@@ -128,7 +128,7 @@ impl Renderer {
             // Where pixels are compared with the same pixel, corners are compared with corners.
             let keeps = test.from_one_place;
             let corners = corner_cameras(&pinholes);
-            let corners = keeps.then(|| KnownSamples::of(&self.gpu, &self.kept_layers, &corners, test)).transpose()?;
+            let corners = keeps.then(|| KnownSamples::of(&self.gpu, &self.layer_cache, &corners, test)).transpose()?;
             let sequence = ImageSequence { keeps, known: corners.as_ref().unwrap_or(&known), ..sequence };
             self.add_corners(work, &mut images, &pinholes, redundancy, Some(sequence))?;
         }
@@ -147,7 +147,7 @@ impl Renderer {
     ) -> Result<TemporalReference, RenderError> {
         let (work, cameras) = (work.unlit(), pinholes(cameras));
         self.check(&cameras)?;
-        let known = KnownSamples::of(&self.gpu, &self.kept_layers, &cameras, test)?.keeping_all();
+        let known = KnownSamples::of(&self.gpu, &self.layer_cache, &cameras, test)?.keeping_all();
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
         let sequence = ImageSequence { known: &known, wanted: &wanted, first: 0, keeps: true };
         let finish = images_finish(work, SamplePlanes::default(), Redundancy::of(test));
@@ -193,7 +193,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// How surfaces of `camera`'s kind are found where that is left to the device: measured the first time.
+    /// The faster way of finding surfaces for pictures of `camera`'s size: measured the first time.
     ///
     /// # Errors
     /// The device's.

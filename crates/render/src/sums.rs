@@ -7,11 +7,11 @@ use minijinja::{Value, context};
 /// Planes of colour, before those that say what rays met.
 pub(crate) const COLOR_SUMS: u32 = 6;
 
-/// What is summed.
+/// The quantities that are summed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct SumPlanes {
     pub light_count: usize,
-    /// Whether highlights need to know what each light's rays met.
+    /// Counts of unblocked rays to each light, for highlights.
     pub visibility: bool,
 }
 

@@ -20,7 +20,7 @@ pub(crate) struct SurfaceKind {
     pub size_px: UVec2,
     pub by_rays: bool,
     pub surface_id: bool,
-    /// Whether the nearest surface is wanted besides the one that is shown.
+    /// The nearest surface is wanted besides the one that is shown.
     pub front: bool,
 }
 

@@ -1,4 +1,4 @@
-//! How surfaces are found: by drawing triangles, or by one ray a pixel. What is faster depends on the scene, the
+//! Ways of finding surfaces: by drawing triangles, or by one ray a pixel. The faster way depends on the scene, the
 //! size of its pictures and the device, so it is measured.
 
 use std::{fmt, str::FromStr};

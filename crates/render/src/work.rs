@@ -1,4 +1,4 @@
-//! What to draw, besides the cameras.
+//! Requests to draw, besides the cameras.
 
 use crate::{GpuScene, Lighting, Visibility};
 
@@ -10,9 +10,9 @@ pub struct DrawWork<'a> {
     pub lighting: Lighting,
     /// The moment of an animated scene.
     pub scene_time_s: f32,
-    /// How surfaces are found.
+    /// The way of finding surfaces.
     pub visibility: Visibility,
-    /// How far a still scene's light has been refined.
+    /// The refinement of a still scene's light.
     pub refinement: Refinement,
 }
 
@@ -39,7 +39,7 @@ impl Default for Refinement {
 }
 
 impl Refinement {
-    /// How many of all `rays` have been traced with this step.
+    /// The number of `rays` that have been traced with this step.
     pub(crate) fn share_of(self, rays: u32) -> u32 {
         let to_go = self.steps.saturating_sub(self.step + 1).min(31);
         rays.div_ceil(1 << to_go)

@@ -8,9 +8,9 @@ pub enum SamplingError {
     #[error(transparent)]
     Render(#[from] render::RenderError),
     /// Layers are peeled from one place.
-    #[error("camera {index}: the layers of depth_peeling are taken by one camera, this is another")]
+    #[error("camera {index} is another than the first: all layers are taken by one camera")]
     Layer { index: usize },
-    /// An image that is not there, or images of a sequence without the others.
+    /// A selected image is not in the set, or images in sequence are not all selected.
     #[error("image {index} is not among the {cameras} of the set, or not wanted with all others by {method}")]
-    Wanted { index: u32, cameras: usize, method: String },
+    Selection { index: u32, cameras: usize, method: String },
 }

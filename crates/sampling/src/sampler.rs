@@ -53,7 +53,7 @@ fn check_wanted(work: &SampleWork<'_>) -> Result<(), SamplingError> {
     let missing = work.wanted.iter().copied().find(|&index| index as usize >= cameras);
     let broken = (work.method.images_are_sequential() && !all()).then(|| work.wanted.first().copied().unwrap_or(0));
     match missing.or(broken) {
-        Some(index) => Err(SamplingError::Wanted { index, cameras, method: work.method.to_string() }),
+        Some(index) => Err(SamplingError::Selection { index, cameras, method: work.method.to_string() }),
         None => Ok(()),
     }
 }

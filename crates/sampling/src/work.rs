@@ -1,4 +1,4 @@
-//! What to sample.
+//! Requests to sample.
 
 use depth_image::Camera;
 use render::{DrawWork, SamplePlanes};
@@ -14,10 +14,10 @@ pub struct SampleWork<'a> {
     pub cameras: &'a [Camera],
     /// The images that are taken. Images in sequence are taken all together.
     pub wanted: &'a [u32],
-    /// Which samples are taken.
+    /// The choice of samples.
     pub method: SamplingMethod,
     /// Planes beside colour and depth.
     pub planes: SamplePlanes,
     /// The moment of the temporal reference, where the method has hysteresis.
-    pub reference_time_s: Option<f32>,
+    pub temporal_reference_s: Option<f32>,
 }

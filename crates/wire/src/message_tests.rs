@@ -214,8 +214,8 @@ fn bad_reports_and_changes_are_refused_by_field() {
     let many = proto::ChangeSessionRequest { views_per_set_count: 1_000_000_000, ..change.clone() };
     assert!(refusal::<_, ChangeSession>(many).contains("views_per_set_count is 1000000000"));
     let viewpoint = pinhole_to(&camera());
-    let crowd = proto::ChangeSessionRequest { viewpoints: vec![viewpoint; 257], ..change.clone() };
-    assert!(refusal::<_, ChangeSession>(crowd).contains("viewpoints has 257"));
+    let too_many = proto::ChangeSessionRequest { viewpoints: vec![viewpoint; 257], ..change.clone() };
+    assert!(refusal::<_, ChangeSession>(too_many).contains("viewpoints has 257"));
     let nowhere = proto::PinholeCamera { near_m: f32::NAN, ..viewpoint };
     let lost = proto::ChangeSessionRequest { viewpoints: vec![nowhere], ..change };
     assert!(refusal::<_, ChangeSession>(lost).contains("viewpoints: camera near_m"));
@@ -229,7 +229,7 @@ fn a_refusal_names_the_plan_in_force() {
     large.workload.sample_cameras = vec![Camera::Pinhole(camera()); 16];
     large.workload.illumination.lights = vec![illumination().lights[1]; 255];
     let refusal = refuse_plan(&large, String::new());
-    assert!(plan_in_force(&refusal).is_none_or(|told| told == large), "whole or not at all");
+    assert!(plan_in_force(&refusal).is_none_or(|named| named == large), "whole or not at all");
     assert_eq!(plan_in_force(&tonic::Status::failed_precondition("of something else")), None);
 }
 
@@ -433,7 +433,7 @@ fn impossible_stage_times_are_refused_by_field() {
 }
 
 #[test]
-fn zero_on_the_wire_is_none() {
+fn zeros_and_empty_texts_of_the_wire_become_none() {
     let asked = SessionRequest { frames_per_s: None, forced_tile_count: None, ..request() };
     let message = proto::OpenSessionRequest::from(asked.clone());
     assert_eq!((message.frames_per_s, message.forced_tile_count), (0.0, 0));

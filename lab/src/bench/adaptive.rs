@@ -29,12 +29,9 @@ const ALLOWED: f64 = 1.1;
 /// Results of one rate on one scene.
 struct Row {
     rate: Rate,
-    /// Seconds a view.
     seconds: f64,
-    /// FLIP against full rate.
     flip_to_full: f64,
     psnr_to_full_db: f64,
-    /// FLIP against converged light.
     flip_to_converged: f64,
 }
 

@@ -70,9 +70,6 @@ impl CpuGroup {
     }
 
     /// Limits the group to a number of cores, or to none.
-    ///
-    /// # Errors
-    /// The kernel refuses the value.
     pub fn limit(&self, cores: Option<f64>) -> Result<(), CpuShareError> {
         let (period_us, quota_us) = cores.map_or((PERIOD_US, None), |cores| {
             let period_us = period_us(cores);
@@ -90,9 +87,6 @@ impl CpuGroup {
 
     /// Runs the group ahead of other programs of the machine, within its quota: they then cost it little more than
     /// their place in the caches.
-    ///
-    /// # Errors
-    /// The kernel refuses the value.
     pub fn prioritize(&self) -> Result<(), CpuShareError> {
         let (file, weight) = if self.is_v2 { ("cpu.weight", "10000") } else { ("cpu.shares", "262144") };
         write(&self.folders[0].join(file), weight)
@@ -107,9 +101,6 @@ impl CpuGroup {
     }
 
     /// The processor time that the group has used.
-    ///
-    /// # Errors
-    /// The kernel's counters cannot be read.
     pub fn usage(&self) -> Result<Usage, CpuShareError> {
         let stat_path = self.folders[0].join("cpu.stat");
         let stat = read(&stat_path)?;

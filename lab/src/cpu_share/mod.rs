@@ -9,7 +9,6 @@ mod hierarchy;
 mod own_group;
 mod usage;
 
-pub use error::CpuShareError;
 pub use group::CpuGroup;
 pub use hierarchy::Hierarchy;
 pub use own_group::OwnGroup;

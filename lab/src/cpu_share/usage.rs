@@ -5,7 +5,6 @@
 pub struct Usage {
     /// Seconds of one core.
     pub cpu_s: f64,
-    /// Periods in which the group had something to do.
     pub periods: u64,
     /// Periods in which the group used up its quota and was stopped.
     pub throttled: u64,

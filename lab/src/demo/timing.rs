@@ -17,13 +17,11 @@ const DIRECT_VIEWS: [usize; 3] = [1, 10, 32];
 
 /// One delivery.
 pub struct Run {
-    /// The number of views, V.
     pub views: usize,
     /// Seconds until the last view was decoded.
     pub seconds: f64,
     /// The longest wait of a frame for its sample set.
     pub set_wait_s: f64,
-    /// The coordinator's plan.
     pub plan: SessionPlan,
 }
 
@@ -31,9 +29,7 @@ pub struct Run {
 pub struct Times {
     /// The number of views of the headline and of the stages.
     pub headline_views: usize,
-    /// The number of sample images, S.
     pub images: usize,
-    /// The number of nodes, P.
     pub nodes: usize,
     /// True where the device is a processor.
     pub is_software: bool,

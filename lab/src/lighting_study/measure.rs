@@ -16,7 +16,6 @@ const DIRECT_S: f64 = 2.0;
 
 /// Measurements of one lighting.
 pub struct Row {
-    /// The lighting.
     pub lighting: Lighting,
     /// Costs of each part alone.
     pub costs: Costs,
@@ -54,9 +53,6 @@ impl Extent {
 }
 
 /// Measures every lighting, and passes every delivery to `keep`.
-///
-/// # Errors
-/// The cluster fails.
 pub fn measure(experiment: &Experiment, extent: Extent, mut keep: impl FnMut(Delivered)) -> anyhow::Result<Vec<Row>> {
     let progress = bar("light", extent.qualities);
     let mut rows = Vec::with_capacity(extent.qualities);

@@ -10,9 +10,6 @@ use super::tables::{gains, parts};
 const SHARE_OF_PARTS: f64 = 0.8;
 
 /// Adds tables and charts.
-///
-/// # Errors
-/// A row does not fit its table.
 pub fn report(rows: &[Row], lamps: usize, report: &mut Report) -> anyhow::Result<()> {
     report.tables.push(parts(rows)?);
     report.tables.push(gains(rows)?);

@@ -19,11 +19,8 @@ const START_INTERVAL: Duration = Duration::from_millis(50);
 /// A number of equal clients.
 #[derive(Debug, Clone)]
 pub struct Clients {
-    /// The number.
     pub count: usize,
-    /// Frames a second of each client.
     pub rate_hz: f64,
-    /// Size of each frame.
     pub size_px: UVec2,
     /// The time for which each client asks.
     pub lasting: Duration,
@@ -35,7 +32,7 @@ pub enum Outcome {
     /// The client had a session and a stream.
     Served(Record),
     /// The cluster had no room for the client, at once or after a while.
-    Refused(String),
+    Refused,
 }
 
 /// A session to open, and a path for its camera.
@@ -62,9 +59,6 @@ impl Tour {
     }
 
     /// Opens a connection and a session. All sessions have the same typical view, so that costs are measured once.
-    ///
-    /// # Errors
-    /// The coordinator refuses.
     pub async fn session(&self) -> anyhow::Result<Session> {
         let client = Client::connect(&self.coordinator).await?;
         open(&client, &self.settings, &self.path[..1]).await
@@ -78,9 +72,6 @@ impl Tour {
     }
 
     /// Opens a session and a live view that asks for nothing.
-    ///
-    /// # Errors
-    /// The coordinator refuses.
     pub async fn idle(&self) -> anyhow::Result<(Session, LiveView)> {
         let session = self.session().await?;
         let live = session.live();
@@ -133,7 +124,7 @@ async fn one(tour: &Tour, clients: &Clients, client: usize) -> anyhow::Result<Ou
 
 fn refused(error: anyhow::Error) -> anyhow::Result<Outcome> {
     match error.downcast_ref() {
-        Some(ClientError::Exhausted { reason }) => Ok(Outcome::Refused(reason.clone())),
+        Some(ClientError::Exhausted { .. }) => Ok(Outcome::Refused),
         _ => Err(error),
     }
 }

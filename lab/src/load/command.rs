@@ -69,13 +69,7 @@ impl LoadArgs {
 
     fn setting(&self) -> Setting {
         let scene = ["--scene".to_owned(), self.scene.to_string(), "--lighting".to_owned(), self.lighting.to_string()];
-        let device = ["--device".to_owned(), self.device.to_string()];
-        Setting {
-            scene: scene.into(),
-            device: device.into(),
-            nodes: self.nodes.into(),
-            share_cores: self.share_cores(),
-        }
+        Setting { scene: scene.into(), device: self.device, nodes: self.nodes.into(), share_cores: self.share_cores() }
     }
 
     fn share_cores(&self) -> Option<f64> {

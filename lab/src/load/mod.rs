@@ -3,10 +3,10 @@
 //! [`processes`] starts a coordinator and nodes and reads their memory; [`clients`] are all in this process; [`phases`]
 //! are the loads; [`report`] shows the results.
 
-pub mod clients;
+mod clients;
 pub mod command;
 mod memory;
-pub mod phases;
-pub mod processes;
-pub mod report;
+mod phases;
+mod processes;
+mod report;
 mod statistics;

@@ -22,11 +22,8 @@ const MEMORY_INTERVAL: Duration = Duration::from_secs(1);
 /// Results of one load.
 #[derive(Debug, Clone)]
 pub struct Load {
-    /// The name in tables.
     pub name: String,
-    /// The clients.
     pub clients: Clients,
-    /// The end of each client.
     pub outcomes: Vec<Outcome>,
     /// Views that nodes dropped, by reason.
     pub dropped: BTreeMap<String, u64>,
@@ -37,7 +34,6 @@ pub struct Load {
 /// Memory that idle clients take.
 #[derive(Debug, Clone)]
 pub struct Idle {
-    /// The number of clients.
     pub clients: usize,
     /// Memory of each process, clients last: MiB before, and with all clients.
     pub memory: Vec<(String, f64, f64)>,
@@ -46,11 +42,9 @@ pub struct Idle {
 /// Results of all loads.
 #[derive(Debug, Clone)]
 pub struct Phases {
-    /// The device, as nodes name it.
     pub device: String,
     /// Loads with few enough clients for all, with too many, and with far too many.
     pub loads: Vec<Load>,
-    /// 200 idle clients.
     pub idle: Idle,
 }
 

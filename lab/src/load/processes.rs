@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use client::Client;
+use gpu::DevicePreference;
 
 use crate::cpu_share::{CpuGroup, Hierarchy};
 use crate::memory::memory_mib;
@@ -18,9 +19,7 @@ const JOIN: Duration = Duration::from_secs(60);
 pub struct Setting {
     /// The scene, as arguments of `myriorama coordinator`.
     pub scene: Vec<String>,
-    /// Arguments of every `myriorama node`.
-    pub device: Vec<String>,
-    /// The number of nodes, P.
+    pub device: DevicePreference,
     pub nodes: usize,
     /// Cores of each node; `None` sets no limit.
     pub share_cores: Option<f64>,
@@ -40,7 +39,6 @@ struct Member {
 pub struct Processes {
     /// The address of the coordinator, as `http://host:port`.
     pub address: String,
-    /// The device, as nodes name it.
     pub device: String,
     nodes: Vec<Member>,
     coordinator: Process,
@@ -52,9 +50,7 @@ impl Processes {
     /// # Errors
     /// A process does not start or serve.
     pub async fn start(setting: &Setting) -> anyhow::Result<Self> {
-        let listen = ["--listen", "127.0.0.1:0"].map(str::to_owned);
-        let arguments = [&["coordinator".to_owned()], &setting.scene[..], &listen].concat();
-        let mut coordinator = Process::start("coordinator", &arguments)?;
+        let mut coordinator = Process::coordinator(&setting.scene)?;
         let address = coordinator.address()?;
         let member = |number| Member::start(setting, &address, number);
         let nodes = (0..setting.nodes).map(member).collect::<anyhow::Result<Vec<_>>>()?;
@@ -88,11 +84,7 @@ impl Processes {
 
 impl Member {
     fn start(setting: &Setting, coordinator: &str, number: usize) -> anyhow::Result<Self> {
-        let name = format!("node-{number:03}");
-        let fixed = ["node", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0"];
-        let own = ["--coordinator", coordinator, "--name", &name];
-        let arguments: Vec<String> = fixed.iter().chain(&own).map(|&word| word.to_owned()).collect();
-        let mut process = Process::start(&name, &[arguments, setting.device.clone()].concat())?;
+        let mut process = Process::node(number, coordinator, setting.device)?;
         let (_, metrics) = (process.address()?, process.address()?);
         let limit = |cores| limited(&process, cores);
         let group = setting.share_cores.map(limit).transpose()?;

@@ -18,9 +18,6 @@ const IDLE_MIB: f64 = 1.0;
 const GROWTH: f64 = 0.05;
 
 /// Adds tables, charts and checks.
-///
-/// # Errors
-/// A row does not fit its table.
 pub fn add(phases: &Phases, report: &mut Report) -> anyhow::Result<()> {
     report.tables.push(clients(&phases.loads)?);
     for load in &phases.loads {

@@ -30,7 +30,7 @@ fn load() -> Load {
     Load {
         name: "2 × 10".to_owned(),
         clients,
-        outcomes: vec![Outcome::Served(record), Outcome::Refused("quota".to_owned())],
+        outcomes: vec![Outcome::Served(record), Outcome::Refused],
         dropped: [("newer pose".to_owned(), 10)].into(),
         memory: vec![("node-000".to_owned(), looks)],
     }

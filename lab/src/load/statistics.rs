@@ -12,7 +12,7 @@ impl Load {
     pub(super) fn served(&self) -> impl Iterator<Item = &Record> {
         self.outcomes.iter().filter_map(|outcome| match outcome {
             Outcome::Served(record) => Some(record),
-            Outcome::Refused(_) => None,
+            Outcome::Refused => None,
         })
     }
 

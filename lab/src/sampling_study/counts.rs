@@ -10,7 +10,6 @@ use super::methods::METHODS;
 /// Samples of one image of one method, before dilation and hysteresis.
 #[derive(Debug, Clone, Default)]
 pub struct ImageCount {
-    /// The number of samples.
     pub samples: usize,
     /// The number of samples that an earlier image holds.
     pub redundant: usize,

@@ -25,9 +25,6 @@ const EXPECTED: [(f32, f64); 5] = [(0.5, 0.13), (1.0, 0.375), (2.0, 0.63), (4.0,
 pub type Detection = Vec<(f32, [f64; 3])>;
 
 /// Measures all lengths.
-///
-/// # Errors
-/// The device fails.
 pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detection> {
     let sampler = Sampler::sharing(engine.shared_renderer());
     let legs = if quick { &LEGS_PX[2..] } else { &LEGS_PX[..] };
@@ -54,7 +51,7 @@ pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detecti
                 wanted: &[0, 1],
                 method,
                 planes,
-                reference_time_s: None,
+                temporal_reference_s: None,
             })?;
             *found = left_out(&images[1]);
         }
@@ -109,9 +106,6 @@ fn wall(leg_px: f32) -> Scene {
 }
 
 /// Adds a table, a chart and checks.
-///
-/// # Errors
-/// A row does not fit its table.
 pub fn detection_report(rows: &Detection, report: &mut Report) -> anyhow::Result<()> {
     let columns = [("leg", "px"), ("pixel", ""), ("visibility", ""), ("tolerance", ""), ("pixel, expected", "")];
     let mut table = Table::new("Redundant samples that are found", &columns);

@@ -30,9 +30,6 @@ pub struct Reconstructed {
 }
 
 /// Measures all pairs on a scene, then again with about as few samples as the sampling with the fewest.
-///
-/// # Errors
-/// The device fails.
 pub fn reconstructions(subject: &Subject, quick: bool) -> anyhow::Result<Vec<Reconstructed>> {
     let progress = bar(format!("{}: views", subject.name), 2 * METHODS.len() - 1);
     let mut all = Vec::with_capacity(2 * METHODS.len() - 1);
@@ -103,9 +100,6 @@ impl Reconstructed {
 }
 
 /// Adds a table, charts and checks over all scenes.
-///
-/// # Errors
-/// A row does not fit its table.
 pub fn reconstructions_report(scenes: &[(String, Vec<Reconstructed>)], report: &mut Report) -> anyhow::Result<()> {
     let columns = [
         ("scene", ""),

@@ -26,9 +26,6 @@ pub struct SceneRow {
 }
 
 /// Measures a scene, and adds its false colours.
-///
-/// # Errors
-/// The device fails.
 pub fn scene_report(subject: &Subject, extent: Extent, report: &mut Report) -> anyhow::Result<SceneRow> {
     let size_px = UVec2::splat(extent.side_px);
     let sets =

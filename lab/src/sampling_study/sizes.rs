@@ -32,9 +32,6 @@ pub struct SizeRow {
 type Metric = (&'static str, fn(&SizeRow) -> [f64; 2]);
 
 /// Measures a scene if the paper shows it.
-///
-/// # Errors
-/// The device fails.
 pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<Vec<SizeRow>> {
     if !SCENES.contains(&subject.name.as_str()) {
         return Ok(Vec::new());
@@ -80,9 +77,6 @@ pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<V
 }
 
 /// Adds a table, charts and checks of one scene.
-///
-/// # Errors
-/// A row does not fit its table.
 pub fn sizes_report(scene: &str, rows: &[SizeRow], report: &mut Report) -> anyhow::Result<()> {
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
     let columns = [

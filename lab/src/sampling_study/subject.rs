@@ -116,7 +116,7 @@ impl Subject {
             wanted: &wanted,
             method,
             planes,
-            reference_time_s: None,
+            temporal_reference_s: None,
         };
         Ok(self.sampler.sample(&work)?)
     }

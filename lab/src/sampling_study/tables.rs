@@ -10,9 +10,6 @@ use super::paper::{PAPER_AVAILABLE, paper};
 use super::scene::SceneRow;
 
 /// Adds tables and checks of all scenes.
-///
-/// # Errors
-/// A row does not fit its table.
 pub fn tables(rows: &[SceneRow], report: &mut Report) -> anyhow::Result<()> {
     report.tables.push(by_pixel(rows)?);
     report.tables.push(by_visibility(rows)?);
@@ -93,8 +90,8 @@ fn availabilities(rows: &[SceneRow]) -> anyhow::Result<Table> {
         for (method, available) in METHODS.iter().zip(&row.available) {
             let kind = match method {
                 SamplingMethod::Conventional => 0,
-                SamplingMethod::NonRedundant(_) | SamplingMethod::Useful(_) => 1,
                 SamplingMethod::DepthPeeling { .. } => 2,
+                _ => 1,
             };
             let figures = paper.map_or([f64::NAN; 2], |figures| figures[kind]);
             let ours = [available.mean(), available.least()];

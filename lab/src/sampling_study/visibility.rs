@@ -18,9 +18,7 @@ pub struct Estimate {
 /// Estimates of one image.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Seen {
-    /// The share of its samples.
     pub redundant: Estimate,
-    /// The share of its samples.
     pub disoccluded: Estimate,
     /// The share of its disoccluded samples.
     pub useful: Estimate,

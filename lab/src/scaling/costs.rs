@@ -27,9 +27,6 @@ pub fn mean(all: &[Costs]) -> Costs {
 
 /// Costs of all nodes at the same time: a node that is alone on the machine has its caches and memory to itself. The
 /// cost of a view depends on its place, so each node has views of its own.
-///
-/// # Errors
-/// A node fails.
 pub async fn measure(
     processes: &NodeProcesses,
     subject: &Subject,

@@ -11,9 +11,7 @@ pub struct Counters {
     pub images: f64,
     /// Seconds of sampling and encoding, as if of whole images.
     pub image_s: f64,
-    /// Loaded sets.
     pub sets: f64,
-    /// Views.
     pub views: f64,
     /// Seconds of the device for views.
     pub view_s: f64,

@@ -26,9 +26,7 @@ use PolicyChoice::{Auto, Direct, Pipeline, TimeShare};
 /// A point to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointSpec {
-    /// The policy asked for.
     pub policy: PolicyChoice,
-    /// The number of views, V.
     pub views: usize,
     /// True where sample images stay whole.
     pub whole_images: bool,
@@ -39,9 +37,7 @@ pub struct PointSpec {
 pub struct Extent {
     /// True for a stated subset.
     pub quick: bool,
-    /// The most nodes.
     pub nodes: usize,
-    /// The most views.
     pub views: usize,
 }
 
@@ -114,9 +110,7 @@ pub fn predicted_s(costs: &Costs, images: usize, nodes: usize, policy: PolicyCho
 /// A point with its sets, and the seconds that it takes, about.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Planned {
-    /// The settings.
     pub settings: PointSettings,
-    /// The number of nodes, P.
     pub nodes: usize,
     /// Seconds of the wall clock, about.
     pub about_s: f64,

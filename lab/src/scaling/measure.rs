@@ -27,17 +27,12 @@ const CLIENT_CORES: f64 = 0.35;
 /// A measurement to make.
 #[derive(Debug, Clone)]
 pub struct Request {
-    /// The device that nodes open.
     pub device: DevicePreference,
-    /// The size of the measurement.
     pub extent: Extent,
     /// Cores of a node; by default as many as fit this machine.
     pub quota_cores: Option<f64>,
-    /// The paper's lighting.
     pub lighting: Lighting,
-    /// The expensive lighting of the second table.
     pub expensive_lighting: Option<Lighting>,
-    /// The file for the schedule's events.
     pub event_log: PathBuf,
 }
 

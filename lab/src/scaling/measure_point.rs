@@ -64,9 +64,6 @@ impl Arrivals {
 }
 
 /// Measures one point, and calls `arrived` for every frame.
-///
-/// # Errors
-/// The cluster fails.
 pub async fn measure(
     processes: &NodeProcesses,
     subject: &Subject,

@@ -11,7 +11,6 @@ use super::subject::MEASURED_BATCH;
 /// Costs that P nodes timed at the same time, each with its quota, before and after the points.
 #[derive(Debug, Clone, Default)]
 pub struct Timed {
-    /// The number of nodes, P.
     pub nodes: usize,
     /// Costs of every node, once for each request.
     pub costs: Vec<Costs>,
@@ -22,7 +21,6 @@ pub struct Timed {
 /// Costs and points of one lighting.
 #[derive(Debug, Clone)]
 pub struct MeasuredLighting {
-    /// The lighting.
     pub lighting: Lighting,
     /// Costs, by falling P.
     pub timed: Vec<Timed>,
@@ -33,19 +31,14 @@ pub struct MeasuredLighting {
 /// All measured values.
 #[derive(Debug, Clone)]
 pub struct Measured {
-    /// The device, as nodes name it.
     pub device: String,
-    /// Cores of this machine.
     pub cores: f64,
-    /// Cores of a node.
     pub quota_cores: f64,
-    /// The number of sample images, S.
     pub images: usize,
     /// Costs of single nodes without a limit, on all cores, while the others rest.
     pub unlimited: Vec<Costs>,
     /// The paper's lighting, then the expensive one.
     pub lit: Vec<MeasuredLighting>,
-    /// Seconds of the whole measurement.
     pub seconds: f64,
 }
 

@@ -3,7 +3,6 @@
 /// One row of Table 1: V = 1000, K = 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaperRow {
-    /// The number of nodes, P.
     pub nodes: usize,
     /// Efficiency of the proposed architecture.
     pub proposed: f64,

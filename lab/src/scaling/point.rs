@@ -5,17 +5,14 @@ use render::Lighting;
 
 use super::fetched::Fetched;
 use super::machine::MachineTime;
-use super::processes::NodeProcesses;
 use crate::cpu_share::Usage;
+use crate::process::node_name;
 
 /// Settings of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointSettings {
-    /// The lighting.
     pub lighting: Lighting,
-    /// The policy asked for.
     pub policy: PolicyChoice,
-    /// The number of views, V.
     pub views: usize,
     /// True where sample images stay whole; otherwise the schedule may tile them.
     pub whole_images: bool,
@@ -56,31 +53,23 @@ pub struct Steps {
     pub encode_s: f64,
     /// The client's processor time, with the system's for receiving.
     pub client_s: f64,
-    /// Bytes of frames.
     pub frame_bytes: f64,
 }
 
 /// Processor time while the counted sets were made.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Window {
-    /// Seconds of the wall clock.
     pub seconds: f64,
-    /// Processor time of each node.
     pub nodes: Vec<Usage>,
-    /// Cores of each node.
     pub quota_cores: f64,
-    /// Processor time of the machine.
     pub machine: MachineTime,
 }
 
 /// One measured point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
-    /// The settings.
     pub settings: PointSettings,
-    /// The number of nodes, P.
     pub nodes: usize,
-    /// The coordinator's plan.
     pub plan: SessionPlan,
     /// The number of plans that came while sets were made; each throws away samples taken ahead.
     pub later_plans: u64,
@@ -88,7 +77,6 @@ pub struct Point {
     pub period_s: f64,
     /// The time from the request to the last view of the first set.
     pub fill_s: f64,
-    /// Times of the steps of one set.
     pub steps: Steps,
     /// Processor time while the counted sets were made.
     pub window: Window,
@@ -143,7 +131,7 @@ impl Point {
         let assignment = &self.plan.assignment;
         let samples = |name: &str| assignment.samplers.iter().any(|share| share.node_name == name);
         let all_sample = assignment.compositors.iter().all(|share| samples(&share.node_name));
-        let counts = |number: usize| all_sample || !samples(&NodeProcesses::name_of(number));
+        let counts = |number: usize| all_sample || !samples(&node_name(number));
         let used = self.window.nodes.iter().enumerate().filter(|(number, _)| counts(*number));
         let (periods, throttled) = used.fold((0, 0), |sum, (_, node)| (sum.0 + node.periods, sum.1 + node.throttled));
         throttled as f64 / periods as f64

@@ -27,9 +27,7 @@ pub struct Prediction {
 /// Bytes on the network and their rate, as means over all points of a lighting.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Traffic {
-    /// Bytes of one sample image, B.
     pub image_bytes: f64,
-    /// Bytes of one frame.
     pub frame_bytes: f64,
     /// The rate between two processes of this machine.
     pub bytes_per_s: f64,

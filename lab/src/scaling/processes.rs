@@ -35,7 +35,6 @@ struct Member {
 
 /// Processes of a cluster, which end when this is dropped.
 pub struct NodeProcesses {
-    /// A client of the cluster.
     pub client: Client,
     members: Vec<Member>,
     _coordinator: Process,
@@ -57,13 +56,13 @@ impl NodeProcesses {
     ) -> anyhow::Result<Self> {
         let hierarchy = Hierarchy::find()?;
         let own = OwnGroup::new(&hierarchy, &format!("myriorama-{}", std::process::id()))?;
-        let mut coordinator = Process::start("coordinator", &coordinator_arguments(scene, event_log))?;
+        let mut coordinator = Process::coordinator(&coordinator_arguments(scene, event_log))?;
         own.admit(coordinator.id())?;
         let url = coordinator.address()?;
         let mut started = Vec::new();
         for number in 0..nodes {
             let group = CpuGroup::new(&hierarchy, &format!("myriorama-{}-{number:03}", std::process::id()))?;
-            let process = Process::start(&Self::name_of(number), &node_arguments(number, &url, device))?;
+            let process = Process::node(number, &url, device)?;
             group.prioritize()?;
             group.admit(process.id())?;
             started.push((process, group));
@@ -85,9 +84,6 @@ impl NodeProcesses {
     }
 
     /// Limits every node to a number of cores, or to none.
-    ///
-    /// # Errors
-    /// The kernel refuses the value.
     pub fn limit(&mut self, cores: Option<f64>) -> anyhow::Result<()> {
         self.quota_cores = cores;
         Ok(self.members.iter().try_for_each(|member| member.group.limit(cores))?)
@@ -99,16 +95,7 @@ impl NodeProcesses {
         self.quota_cores.unwrap_or(f64::INFINITY)
     }
 
-    /// The name of a node, with enough digits to sort well.
-    #[must_use]
-    pub fn name_of(number: usize) -> String {
-        format!("node-{number:03}")
-    }
-
     /// Lets nodes time their work at the same time, each with its own request.
-    ///
-    /// # Errors
-    /// A node fails.
     pub async fn measure(&self, requests: impl IntoIterator<Item = MeasureCosts>) -> anyhow::Result<Vec<Costs>> {
         let measuring = self.members.iter().zip(requests).map(|(member, request)| {
             let address = member.address.clone();
@@ -122,9 +109,6 @@ impl NodeProcesses {
     }
 
     /// Lets nodes time their work one after the other.
-    ///
-    /// # Errors
-    /// A node fails.
     pub async fn measure_in_turn(&self, request: &MeasureCosts, mut done: impl FnMut()) -> anyhow::Result<Vec<Costs>> {
         let mut all = Vec::new();
         for member in &self.members {
@@ -150,9 +134,6 @@ impl NodeProcesses {
     }
 
     /// The processor time that every node has used.
-    ///
-    /// # Errors
-    /// The kernel's counters cannot be read.
     pub fn usage(&self) -> anyhow::Result<Vec<Usage>> {
         Ok(self.members.iter().map(|member| member.group.usage()).collect::<Result<_, _>>()?)
     }
@@ -192,12 +173,5 @@ impl NodeProcesses {
 /// Arguments of the coordinator: sessions state everything else that it offers.
 fn coordinator_arguments(scene: &SceneArgs, event_log: &Path) -> Vec<String> {
     let (scene, event_log) = (scene.scene.to_string(), event_log.display().to_string());
-    ["coordinator", "--listen", "127.0.0.1:0", "--scene", &scene, "--record", &event_log].map(str::to_owned).into()
-}
-
-fn node_arguments(number: usize, coordinator: &str, device: DevicePreference) -> Vec<String> {
-    let (name, device) = (NodeProcesses::name_of(number), device.to_string());
-    let fixed = ["node", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0"];
-    let own = ["--coordinator", coordinator, "--name", &name, "--device", &device];
-    fixed.iter().chain(&own).map(|&word| word.to_owned()).collect()
+    ["--scene", &scene, "--record", &event_log].map(str::to_owned).into()
 }

@@ -15,9 +15,6 @@ use super::tables::{costs_table, headline_table, paper_table, points_table, shar
 use super::{charts, costs, sweep_report, whole_images};
 
 /// Makes the report of a run.
-///
-/// # Errors
-/// A row does not fit its table.
 pub fn report(measured: &Measured, extent: Extent, scene: &str, most_simulated: usize) -> anyhow::Result<Report> {
     let all: Vec<Results<'_>> = measured.lit.iter().map(|lit| results_of(measured, lit)).collect();
     let main = all.first().context("nothing was measured")?;

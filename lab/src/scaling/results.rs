@@ -12,9 +12,7 @@ use super::prediction::Prediction;
 pub struct Results<'a> {
     /// Measured costs and points.
     pub lit: &'a MeasuredLighting,
-    /// Predictions, in the order of the points.
     pub predictions: Vec<Prediction>,
-    /// The number of sample images, S.
     pub images: usize,
 }
 

@@ -20,9 +20,7 @@ const CODEC: &str = "lz4";
 
 /// A scene and its rig. No two runs have the same scene times.
 pub struct Subject {
-    /// Arguments, as on the command line.
     pub args: SceneArgs,
-    /// The scene on offer.
     pub setup: Setup,
     sets_so_far: Cell<u32>,
 }

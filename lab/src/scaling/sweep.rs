@@ -27,17 +27,13 @@ const PARTS: usize = 16;
 /// A cluster to simulate, beside P and V.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
-    /// The name in the legend.
     pub name: String,
     /// The device that the costs belong to, and its speed.
     pub device: String,
-    /// Costs of the device.
     pub costs: Costs,
     /// The speed of every link.
     pub gbit_per_s: f64,
-    /// Habits of the services.
     pub habits: Habits,
-    /// Parts of a sample image.
     pub parts: usize,
     /// True where the speeds of nodes differ.
     pub unequal: bool,
@@ -46,21 +42,16 @@ pub struct Scenario {
 /// One simulated point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
-    /// The index of the scenario.
     pub scenario: usize,
-    /// The number of nodes, P.
     pub nodes: usize,
-    /// The number of views, V.
     pub views: usize,
     /// The policy that `auto` chose.
     pub policy: Policy,
-    /// The number of samplers, K.
     pub samplers: usize,
     /// The time between two sets, T.
     pub period_s: f64,
     /// Efficiency as at measured points; for unequal nodes over the sum of their speeds.
     pub efficiency: f64,
-    /// The limit of the throughput.
     pub limit: Limit,
 }
 
@@ -71,7 +62,6 @@ pub struct Basis {
     pub plain: Costs,
     /// Costs under expensive lighting, where it was measured.
     pub expensive: Option<Costs>,
-    /// The number of sample images, S.
     pub images: usize,
     /// Bytes on the network.
     pub traffic: Traffic,

@@ -133,7 +133,7 @@ async fn low_bandwidth() {
 
 /// Keepalive takes up to 10 s to notice, so that all faults run at the same time.
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
-async fn frames_go_on_within_15_s_of_a_silent_partition() {
+async fn frames_go_on_within_15_s_of_a_partition() {
     tokio::join!(
         lost_host("sampler's host lost", sampler_of),
         lost_host("compositor's host lost", compositor_of),
@@ -192,7 +192,7 @@ async fn frames_go_on_over_late_slow_and_lossy_links() {
 
 /// After a corrupt length of a message the reader waits for missing bytes, until keepalive ends the connection.
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_that_are_spoilt_on_the_way_are_not_shown() {
+async fn frames_that_are_corrupted_on_the_way_are_not_shown() {
     let network = Network::start(3).await;
     for proxy in &network.to_node {
         proxy.set(Way::Pass, Way::Spoilt { one_in: 40 });

@@ -40,7 +40,7 @@ async fn a_client_that_takes_no_frames_delays_no_other_and_is_cut_off() {
         }
     };
     assert_eq!(ended.code(), Code::DeadlineExceeded);
-    assert!(ended.message().contains("nothing was taken"), "{ended}");
+    assert!(ended.message().contains("none was taken"), "{ended}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -63,10 +63,6 @@ fn with_binding_numbers(text: &str) -> String {
     let mut counts: HashMap<&str, u32> = HashMap::new();
     for part in parts {
         let (group, declaration) = part.split_once(')').unwrap_or((part, ""));
-        if declaration.starts_with(" @binding") {
-            wgsl.push_str(&format!("@group({group}){declaration}"));
-            continue;
-        }
         let count = counts.entry(group).or_default();
         wgsl.push_str(&format!("@group({group}) @binding({count}){declaration}"));
         *count += 1;

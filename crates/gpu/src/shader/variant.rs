@@ -15,7 +15,7 @@ pub trait ShaderVariant: Debug + Clone + Eq + Hash {
     /// The values that the template uses.
     fn context(&self) -> Value;
 
-    /// What WGSL does not say of resources.
+    /// Properties of resources that WGSL does not say.
     fn traits(&self) -> ResourceTraits {
         &[]
     }

@@ -66,7 +66,7 @@ impl ShaderVariant for PrimaryVariant {
     }
 }
 
-/// What surfaces are looked for.
+/// The surfaces that are looked for.
 #[derive(Clone, Copy)]
 pub(crate) struct PrimaryWork<'a> {
     pub traced: &'a Traced,
@@ -125,4 +125,52 @@ fn bindings<'r>(work: &PrimaryWork<'r>, target: &'r Surfaces) -> Vec<Binding<'r>
     bindings.extend(work.predecessors.map(|_| Binding::texture("front_depth", target.front_depth())));
     bindings.extend(work.visit_counts.map(|counts| Binding::buffer("visit_counts", counts)));
     bindings
+}
+
+#[cfg(test)]
+mod tests {
+    use depth_image::PinholeCamera;
+    use glam::{UVec2, Vec3};
+    use gpu::ShaderError;
+
+    use super::*;
+    use crate::{
+        image_sequence::ImageSequence,
+        known_samples::{KnownSamples, LayerCache},
+        test_support::{TEST, TestStage},
+    };
+
+    fn check(stage: &TestStage, traced: &Traced, predecessors: Option<Predecessors<'_>>, variant: &PrimaryVariant) {
+        let target = stage.surfaces(true, variant.surface_id);
+        let visit_counts = variant.count_visits.then_some(&stage.buffer);
+        let (shading, surface_id, cameras) = (variant.shading, variant.surface_id, &stage.buffer);
+        let work = PrimaryWork { traced, shading, surface_id, cameras, first: 0, visit_counts, predecessors };
+        stage.check(variant, 0, &bindings(&work, &target));
+        stage.check(variant, 1, &traced.bindings());
+    }
+
+    #[test]
+    fn every_variant_is_bound_by_its_names() {
+        let stage = TestStage::new();
+        let traced = stage.scene.rays.at(0.0).expect("a tree");
+        let camera = PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 0.8, UVec2::ONE);
+        let known = || KnownSamples::of(&stage.gpu, &LayerCache::default(), &[camera; 2], TEST).expect("known samples");
+        let reference = known().into_reference();
+        for known in [known(), known().after(Some(&reference))] {
+            let sequence = ImageSequence { known: &known, wanted: &[0, 1], first: 0, keeps: true };
+            let images = sequence.predecessors(1, &camera).expect("an image before");
+            for variant in PrimaryVariant::all() {
+                check(&stage, &traced, None, &variant);
+                let variant = PrimaryVariant { redundancy: Some(images.variant()), ..variant };
+                check(&stage, &traced, Some(images), &variant);
+                let mut count = 0;
+                let _ = images.bind(&stage.gpu, |bindings| {
+                    count = bindings.len();
+                    stage.check(&variant, KNOWN_GROUP, &bindings);
+                    Err(ShaderError::Invalid { shader: String::new(), message: "checked".to_owned() })
+                });
+                assert!(count >= 2);
+            }
+        }
+    }
 }

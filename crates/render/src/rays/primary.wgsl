@@ -1,4 +1,4 @@
-// Which surface each pixel shows, by one ray each: what raster.wgsl draws, found the other way round.
+// The surface that each pixel shows, by one ray each: the same that raster.wgsl draws.
 {% include "camera.wgsl" %}
 {% include "packed_surface.wgsl" %}
 {% include "rays/traverse.wgsl" %}

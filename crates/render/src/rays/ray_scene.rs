@@ -18,10 +18,10 @@ use super::{
 };
 use crate::{material::phong_reflector, texture};
 
-/// How the tree over a scene's triangles came about.
+/// The making of the tree over a scene's triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct AccelerationReport {
-    /// Whether boxes were moved, not made anew.
+    /// Boxes were moved, not made anew.
     pub refitted: bool,
     /// On the host.
     pub build_s: f64,
@@ -45,7 +45,7 @@ pub struct RayScene {
     state: Mutex<Option<Built>>,
 }
 
-/// What does not depend on the tree.
+/// Tables that do not depend on the tree.
 struct Tables {
     materials: Vec<[u32; 4]>,
     texels: Vec<[u8; 4]>,
@@ -67,11 +67,11 @@ pub struct Traced {
     fixed: Arc<Fixed>,
     pub(crate) depth: u32,
     pub(crate) alpha_tested: bool,
-    /// How it came about.
+    /// The making of the tree.
     pub report: AccelerationReport,
 }
 
-/// What stays while triangles move, but for their order, which a new tree changes.
+/// Tables that stay while triangles move; a new tree changes the order of triangles.
 struct Fixed {
     vertices: Table,
     triangles: Table,

@@ -9,12 +9,12 @@ pub(crate) const BOX_SLACK: f32 = 1.000_001;
 /// A few roundings of the products that a volume is a sum of: what is nearer to an edge may be on either side.
 pub(crate) const EDGE_ROUNDINGS: f32 = 4e-7;
 
-/// How a shader goes through a tree.
+/// The switches of a traversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct Traversal {
     /// Room for unvisited nodes.
     stack: u32,
-    /// Whether textures decide where some triangles are.
+    /// Triangles may have holes where their texture is transparent.
     alpha_tested: bool,
 }
 

@@ -84,7 +84,7 @@ fn visit(index: u32, ray: Ray, t_max: f32) -> Node {
 // Nearer than `t` at barycentric coordinates of the second and third corner.
 struct Crossing { t: f32, second: f32, third: f32, met: bool, front: bool, corners: vec3u }
 
-// Of the products that a volume is a sum of, a few roundings: what is nearer to an edge may be on either side.
+// A few roundings of the products that a volume is a sum of: a point nearer to an edge may be on either side.
 const EDGE_ROUNDINGS: f32 = {{ EDGE_ROUNDINGS }};
 
 fn taxicab(v: vec3f) -> f32 { return abs(v.x) + abs(v.y) + abs(v.z); }
@@ -123,7 +123,7 @@ struct Todo { first_child: u32, hits: u32 }
 
 fn is_done(todo: Todo) -> bool { return todo.hits <= 0x00ffffffu; }
 
-// Of the children still to be visited the nearest: its number among the nodes.
+// The number among the nodes of the nearest child that is still to be visited.
 fn nearest_child(todo: Todo, ray: Ray) -> u32 {
     let slot = (firstLeadingBit(todo.hits) - 24u) ^ (ray.octant4 & 255u);
     return todo.first_child + countOneBits(todo.hits & ~(NOTHING << slot));
@@ -146,7 +146,7 @@ fn is_there(slot: u32, crossing: Crossing) -> bool {
 }
 {% endif %}
 
-// Whether anything lies on the way, whichever way it faces.
+// Triangles block rays whichever way they face.
 fn is_blocked(ray: Ray, t_max: f32) -> bool {
     var stack: array<Todo, STACK>;
     var height = 0u;

@@ -1,6 +1,6 @@
 //! The twin of `rays/traverse.wgsl`: the same tree and triangles, the same operations on `f32` in the same order.
-//! What may differ on a device is what WGSL leaves open: the last bits of quotients, and whether a product and a
-//! sum are rounded once or twice.
+//! A device may differ where WGSL leaves it open: in the last bits of quotients, and in whether a product
+//! and a sum are rounded once or twice.
 
 use depth_image::{PinholeCamera, Ray, SurfaceId, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
@@ -28,7 +28,7 @@ pub struct Scene {
     texels: Vec<[u8; 4]>,
 }
 
-/// Where a ray meets a triangle.
+/// A ray's crossing of a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     /// The ray's parameter.
@@ -41,7 +41,7 @@ pub struct Hit {
     pub front: bool,
 }
 
-/// What a search looked at.
+/// The steps of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Visits {
     /// Nodes of the tree.
@@ -131,7 +131,7 @@ impl Scene {
         self.closest_between(ray, near, FAR_AWAY)
     }
 
-    /// As [`Scene::closest`], of those before `far`.
+    /// As [`Scene::closest`], among the triangles before `far`.
     #[must_use]
     pub fn closest_between(&self, ray: &Ray, near: f32, far: f32) -> (Option<Hit>, Visits) {
         let mut hit = None;
@@ -157,7 +157,7 @@ impl Scene {
         (blocked, visits)
     }
 
-    /// Which surface a hit lies on.
+    /// The surface that a hit lies on.
     #[must_use]
     pub fn surface_id(&self, hit: &Hit) -> SurfaceId {
         let FlatTriangle { instance, primitive, .. } = self.triangles[hit.slot as usize];

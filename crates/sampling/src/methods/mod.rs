@@ -16,7 +16,7 @@ use render::RedundancyTest;
 use crate::error::SamplingError;
 pub use non_redundant::Redundancy;
 
-/// Which samples of the scene are taken.
+/// The choice of samples of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum SamplingMethod {
     /// Every visible surface, whether another image holds it too or not (Lages §4.1).

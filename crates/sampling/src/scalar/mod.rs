@@ -24,7 +24,7 @@ use self::{
     depth_peeling::is_in_layer,
     texel::Texel,
     tolerance::{is_tolerance_redundant, was_kept},
-    useful::leave_out_useless,
+    useful::omit_useless,
 };
 use crate::methods::{Redundancy, SamplingMethod};
 
@@ -43,7 +43,7 @@ pub fn sample(scene: &Scene, cameras: &[PinholeCamera], method: SamplingMethod) 
 pub struct Settings<'a> {
     /// The same images at the reference time.
     pub reference: Option<&'a [DepthImage]>,
-    /// Depths and footprints may differ by so many times what the method allows.
+    /// A factor on the differences of depth and footprint that the method allows.
     pub allowed: f32,
 }
 
@@ -68,14 +68,14 @@ pub fn sample_with(
         let pixels = (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| UVec2::new(x, y)));
         let mut texels: Vec<Texel> = pixels.map(|pixel| texel(&query, camera, pixel)).collect();
         if let SamplingMethod::Useful(_) = method {
-            leave_out_useless(&mut texels, camera, view_cell_m(cameras));
+            omit_useless(&mut texels, camera, view_cell_m(cameras));
         }
         images.push(image(camera, &texels));
     }
     images
 }
 
-/// What a candidate is compared with.
+/// The evidence that a candidate is compared with.
 struct Query<'a> {
     scene: &'a Scene,
     /// The images before the candidate's own.

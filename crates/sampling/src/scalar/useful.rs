@@ -7,7 +7,7 @@ use super::{candidate::index_of, texel::Texel};
 use crate::methods::useful::{BLOCKER_FOOTPRINTS, RING};
 
 /// Samples behind a blocker that fills the whole ring around it are not seen from the cell: they become holes.
-pub(super) fn leave_out_useless(texels: &mut [Texel], camera: &PinholeCamera, view_cell_m: f32) {
+pub(super) fn omit_useless(texels: &mut [Texel], camera: &PinholeCamera, view_cell_m: f32) {
     let front = |texel: &Texel| texel.passed_m.map_or(texel.inverse_depth_per_m.max(0.0), |m: f32| m.recip());
     let fronts: Vec<f32> = texels.iter().map(front).collect();
     let width = camera.size_px.x;

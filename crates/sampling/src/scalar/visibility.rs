@@ -21,8 +21,8 @@ pub fn is_visibility_redundant(scene: &Scene, point_in_world: Vec3, footprint_m:
     met.is_some_and(|hit| hit.t >= depth_m - room_m)
 }
 
-/// How many rays sampling by visibility sends for the images after the first: those through pixels, and those from
-/// earlier viewpoints.
+/// The number of rays that sampling by visibility sends for the images after the first: through pixels, and from earlier
+/// viewpoints.
 #[must_use]
 pub fn rays_of_visibility(scene: &Scene, cameras: &[PinholeCamera]) -> usize {
     let of_image = |(number, camera): (usize, &PinholeCamera)| -> usize {

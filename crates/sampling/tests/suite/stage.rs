@@ -49,7 +49,7 @@ fn tolerance() -> RedundancyTest {
 }
 
 /// What a set by tolerance holds.
-pub fn settle(scene: &GpuScene, cameras: &[PinholeCamera]) -> TemporalReference {
+pub fn reference(scene: &GpuScene, cameras: &[PinholeCamera]) -> TemporalReference {
     device().renderer.temporal_reference(unlit(scene), &pinholes(cameras), tolerance()).expect("a set")
 }
 

@@ -39,7 +39,7 @@ where
     Box::pin(stream.map(|message| message.and_then(|message| D::try_from(message).map_err(Status::from))))
 }
 
-/// As [`incoming`], of what a server answers: what is wrong with that is no fault of the request.
+/// As [`incoming`], for answers of a server: their faults are not the request's.
 fn answers<P, D>(stream: Streaming<P>) -> Messages<D>
 where
     P: Send + 'static,

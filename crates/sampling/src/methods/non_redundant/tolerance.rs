@@ -4,7 +4,7 @@ use gpu::wgsl_constants;
 
 /// Depths are the same within this many footprints.
 pub const DEPTH_FOOTPRINTS: f32 = 2.0;
-/// How far, in pixels, a surface may go on changing its depth at its own slope.
+/// The pixels for which a surface may go on changing its depth at its own slope.
 pub const SLOPE_PX: f32 = 1.0;
 /// The cosine of 25 degrees.
 pub const SAME_FACING: f32 = 0.906_307_8;
