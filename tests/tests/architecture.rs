@@ -194,7 +194,7 @@ fn closure(of: &str, uses: &BTreeMap<String, BTreeSet<String>>) -> BTreeSet<Stri
     found
 }
 
-/// Who uses whom when a program is built, outside crates too.
+/// The packages that each package uses in a program, outside crates too.
 fn resolved() -> BTreeMap<String, BTreeSet<String>> {
     let graph = graph();
     let resolve = graph.resolve.as_ref().expect("a resolved graph");
