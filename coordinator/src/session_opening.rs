@@ -14,8 +14,8 @@ use crate::shared::Shared;
 use crate::status::{of_node, within};
 use crate::workload::workload_of;
 
-/// Views of one measured call: as many as in a batch of real work, since fewer cost more each, and few enough that a slow
-/// device does not take minutes.
+/// Views of one measured call: as in a batch of real work, since fewer views cost more each. A slow device must not
+/// take minutes.
 const MEASURED_BATCH: u32 = 32;
 /// Attempts to measure costs where a node is lost meanwhile, and the pause in which it leaves.
 const ATTEMPTS: usize = 11;

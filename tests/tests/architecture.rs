@@ -194,7 +194,7 @@ fn closure(of: &str, uses: &BTreeMap<String, BTreeSet<String>>) -> BTreeSet<Stri
     found
 }
 
-/// Who uses whom when a program is built, outside crates too.
+/// The packages that each package uses in a program, outside crates too.
 fn resolved() -> BTreeMap<String, BTreeSet<String>> {
     let graph = graph();
     let resolve = graph.resolve.as_ref().expect("a resolved graph");
@@ -393,7 +393,7 @@ fn methods() -> Vec<&'static str> {
 fn every_method_has_its_page() {
     const PARTS: [&str; 4] = ["## Source", "## Equations", "## Cost", "## Known failures"];
     let folder = root().join("docs/methods");
-    assert_eq!(methods().len(), 9);
+    assert!(methods().len() >= 9, "the tables were read");
     for name in methods() {
         let page = folder.join(format!("{name}.md"));
         let text = fs::read_to_string(&page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));

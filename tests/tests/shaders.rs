@@ -43,7 +43,7 @@ fn every_variant_of_reconstruction_is_a_valid_shader() {
     assert_eq!(found, shaders.map(|(name, _)| name).collect());
 }
 
-/// The variants of [`render::Renderer`], with the redundancy tests of all sampling methods.
+/// All variants of pipelines of [`render::Renderer`], with the redundancy tests of all sampling methods.
 #[test]
 fn every_variant_of_drawing_is_a_valid_shader() {
     let templates = sampling::templates().expect("templates");

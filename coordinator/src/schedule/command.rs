@@ -9,7 +9,7 @@ use depth_image::Camera;
 use super::demand::ChoiceError;
 use super::event::ProbeKind;
 
-/// What is to be done.
+/// A command to the executor.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs, reason = "self-naming fields")]
 pub enum Command {
@@ -52,7 +52,7 @@ pub struct ProbedImage {
 }
 
 impl Probe {
-    /// What is asked.
+    /// The kind of this probe.
     #[must_use]
     pub fn kind(&self) -> ProbeKind {
         if self.image.is_some() { ProbeKind::Image } else { ProbeKind::Liveness }

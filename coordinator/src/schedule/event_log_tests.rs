@@ -130,7 +130,7 @@ fn an_invalid_line_is_refused_with_its_number_and_field() {
     }
     let whole = String::from_utf8(recorded()).unwrap();
     for (from, to, part) in [
-        ("\"Pipeline\"", "\"Best\"", "line 4: unknown variant `Best`"),
+        ("\"pipeline\"", "\"best\"", "line 4: unknown variant `best`"),
         ("\"lighting\":\"unlit\"", "\"lighting\":\"\"", "line 4: lighting is missing"),
         ("\"load_set_s\":0.005", "\"load_set_s\":-1.0", "line 4: load_set_s is -1"),
     ] {

@@ -28,7 +28,7 @@ struct Filed {
     is_refuted: bool,
 }
 
-/// What follows from a report.
+/// The consequence of a report.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Verdict {
     /// Two compositors agree: the sampler is at fault.

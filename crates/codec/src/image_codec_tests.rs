@@ -117,7 +117,7 @@ fn damaged_planes_of_images_apart_are_refused() {
         let mut payload = good.payload.to_vec();
         let place = random.next_u32() as usize % payload.len();
         payload[place] ^= 1 << (random.next_u32() % 8);
-        // Whatever comes out is of the right size, or an error.
+        // Every result is of the right size, or an error.
         if let Ok(image) = decode(&EncodedDepthImage { payload: payload.into(), ..good.clone() }) {
             image.validate().expect("planes of one size");
         }

@@ -9,7 +9,7 @@ pub struct NamedMethod<M> {
     pub method: M,
     /// The setting that may follow the name and a colon.
     pub setting: Option<Setting<M>>,
-    /// The sentence of `--help` on the method.
+    /// Description of the method, for `--help`.
     pub help: &'static str,
 }
 

@@ -49,7 +49,7 @@ impl Gpu {
     /// Opens the preferred device with all of its limits.
     ///
     /// # Errors
-    /// When there is none, or it cannot be opened.
+    /// No device exists, or it cannot be opened.
     pub fn open(preference: DevicePreference) -> Result<Arc<Self>, GpuError> {
         pollster::block_on(Self::open_async(preference))
     }
@@ -81,7 +81,7 @@ impl Gpu {
             .map_err(|error| GpuError::Open { name: info.name.clone(), reason: error.to_string() })?;
         let has_timestamps =
             features.contains(wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
-        // On a processor, wall clock around submit and wait is the truth; its time stamps are not.
+        // On a processor, wall clock around submit and wait is right; its time stamps are not.
         let timestamp_period_ns =
             (has_timestamps && info.device_type != wgpu::DeviceType::Cpu).then(|| queue.get_timestamp_period());
         tracing::info!(device = info.name, backend = %info.backend, "graphics device opened");

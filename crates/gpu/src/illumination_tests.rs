@@ -181,7 +181,7 @@ fn incident_light_equals_the_scalar_twins() {
 fn highlights_equal_the_scalar_twins() {
     let questions = questions();
     for kind in [Highlight::BlinnPhong, Highlight::Ggx] {
-        // Written out, and as loops.
+        // Unrolled, and as loops.
         for (lights, words) in [(4, 0), (3, 1), (4, 2), (11, 0), (11, 3)] {
             let four = illumination();
             let lights = four.lights.iter().copied().cycle().take(lights).collect();

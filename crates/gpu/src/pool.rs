@@ -20,7 +20,7 @@ pub struct Pool<K, T> {
     most_free: usize,
 }
 
-/// An item on loan; contents are whatever the last borrower left.
+/// An item on loan, with the contents of its last loan.
 pub struct Lent<K, T> {
     lent: Option<(K, T)>,
     home: Weak<Free<K, T>>,

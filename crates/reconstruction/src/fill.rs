@@ -36,9 +36,8 @@ pub(crate) struct GpuFillWork {
 pub(crate) struct Fill;
 
 impl ShaderVariant for Fill {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = &[("work", ResourceTrait::DynamicOffset)];
 
     fn context(&self) -> Value {
         context! {
@@ -48,10 +47,6 @@ impl ShaderVariant for Fill {
             list_workgroup => LIST_WORKGROUP,
             provenance_filled => ProvenanceKind::Filled as u32,
         }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        &[("work", ResourceTrait::DynamicOffset)]
     }
 
     fn all() -> Vec<Self> {

@@ -25,9 +25,8 @@ pub(crate) struct Specular {
 }
 
 impl ShaderVariant for Specular {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! {
@@ -38,10 +37,6 @@ impl ShaderVariant for Specular {
             thickness_footprints => THICKNESS_FOOTPRINTS.wgsl_literal(),
             ..self.set.context()
         }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        ONE_VIEW
     }
 
     fn all() -> Vec<Self> {

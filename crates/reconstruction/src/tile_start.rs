@@ -25,9 +25,8 @@ pub(crate) const HALF_DIAGONAL: f32 = 0.7072;
 pub(crate) struct TileStart(SetVariant);
 
 impl ShaderVariant for TileStart {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! {
@@ -37,10 +36,6 @@ impl ShaderVariant for TileStart {
             half_diagonal => HALF_DIAGONAL.wgsl_literal(),
             ..self.0.context()
         }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        ONE_VIEW
     }
 
     fn all() -> Vec<Self> {

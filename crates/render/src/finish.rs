@@ -59,22 +59,13 @@ impl Redundancy {
 impl FinishVariant {
     /// The variants with each usefulness test.
     pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
-        let useful: HashSet<_> =
-            tests.iter().filter_map(|test| test.usefulness).map(Redundancy::TestedUseful).collect();
-        let tested = |variant: &Self| variant.redundancy() == Redundancy::Tested;
-        useful.into_iter().flat_map(move |useful| {
-            Self::all().into_iter().filter(tested).map(move |variant| variant.with_redundancy(useful))
-        })
+        let useful: HashSet<_> = tests.iter().filter_map(|test| test.usefulness).collect();
+        useful.into_iter().flat_map(|test| Output::images(Redundancy::TestedUseful(test))).flat_map(Self::of_output)
     }
 
-    fn with_redundancy(self, tested: Redundancy) -> Self {
-        let output = match self.output {
-            Output::DepthImage { normal, reflector, surface_id, .. } => {
-                Output::DepthImage { normal, reflector, surface_id, redundancy: tested }
-            }
-            view @ Output::View { .. } => view,
-        };
-        Self { output, ..self }
+    fn of_output(output: Output) -> impl Iterator<Item = Self> {
+        let each = move |sums| switches().map(move |[by_rays, lit]| Self { by_rays, lit, sums, output });
+        SumPlanes::all().flat_map(each)
     }
 
     /// The places of planes among those of a camera.
@@ -112,24 +103,23 @@ impl FinishVariant {
 }
 
 impl Output {
-    fn all() -> Vec<Self> {
-        let views = [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)].map(|highlight| Self::View { highlight });
-        let images = switches().flat_map(|[normal, reflector, surface_id]| {
-            [Redundancy::None, Redundancy::Tested].map(|redundancy| Self::DepthImage {
-                normal,
-                reflector,
-                surface_id,
-                redundancy,
-            })
-        });
-        views.into_iter().chain(images).collect()
+    fn views() -> [Self; 3] {
+        [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)].map(|highlight| Self::View { highlight })
+    }
+
+    fn images(redundancy: Redundancy) -> impl Iterator<Item = Self> {
+        switches().map(move |[normal, reflector, surface_id]| Self::DepthImage {
+            normal,
+            reflector,
+            surface_id,
+            redundancy,
+        })
     }
 }
 
 impl ShaderVariant for FinishVariant {
-    fn template(&self) -> &'static str {
-        "finish.wgsl"
-    }
+    const TEMPLATE: &'static str = "finish.wgsl";
+    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         let PlaneLayout { normal, reflector, surface_id, passed, .. } = self.layout();
@@ -146,16 +136,9 @@ impl ShaderVariant for FinishVariant {
         }
     }
 
-    fn traits(&self) -> ResourceTraits {
-        CAMERA_TRAITS
-    }
-
     fn all() -> Vec<Self> {
-        let each = |output| {
-            let each = move |sums| switches().map(move |[by_rays, lit]| Self { by_rays, lit, sums, output });
-            SumPlanes::all().flat_map(each)
-        };
-        Output::all().into_iter().flat_map(each).collect()
+        let images = [Redundancy::None, Redundancy::Tested].into_iter().flat_map(Output::images);
+        Output::views().into_iter().chain(images).flat_map(Self::of_output).collect()
     }
 }
 

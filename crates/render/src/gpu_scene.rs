@@ -249,16 +249,6 @@ impl Draw {
 }
 
 impl MaterialTraits {
-    /// All at once.
-    pub const ALL: Self = Self {
-        double_sided: true,
-        alpha_tested: true,
-        textured: true,
-        coat_textured: true,
-        unlit: true,
-        specular: true,
-    };
-
     /// Every combination.
     pub fn all() -> impl Iterator<Item = Self> {
         switches().map(|[double_sided, alpha_tested, textured, coat_textured, unlit, specular]| Self {

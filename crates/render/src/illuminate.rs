@@ -52,9 +52,8 @@ pub(crate) struct IlluminateVariant {
 }
 
 impl ShaderVariant for IlluminateVariant {
-    fn template(&self) -> &'static str {
-        "illuminate.wgsl"
-    }
+    const TEMPLATE: &'static str = "illuminate.wgsl";
+    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         context! {
@@ -72,10 +71,6 @@ impl ShaderVariant for IlluminateVariant {
             count_visits => false,
             ..merge_maps([self.sums.context(), self.traversal.map(Traversal::context).unwrap_or_default()])
         }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        CAMERA_TRAITS
     }
 
     fn all() -> Vec<Self> {

@@ -17,16 +17,11 @@ pub(crate) struct InterpolateVariant {
 }
 
 impl ShaderVariant for InterpolateVariant {
-    fn template(&self) -> &'static str {
-        "interpolate.wgsl"
-    }
+    const TEMPLATE: &'static str = "interpolate.wgsl";
+    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         context! { by_rays => self.by_rays, step_px => self.step_px, sum_planes => self.sum_planes }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        CAMERA_TRAITS
     }
 
     fn all() -> Vec<Self> {

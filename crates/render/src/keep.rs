@@ -13,16 +13,11 @@ pub(crate) struct KeepVariant {
 }
 
 impl ShaderVariant for KeepVariant {
-    fn template(&self) -> &'static str {
-        "keep.wgsl"
-    }
+    const TEMPLATE: &'static str = "keep.wgsl";
+    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         context! { by_rays => self.by_rays }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        CAMERA_TRAITS
     }
 
     fn all() -> Vec<Self> {

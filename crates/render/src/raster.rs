@@ -79,23 +79,23 @@ impl RasterVariant {
         Self { material, shading, surface_id, depth_only, wind: work.scene.is_animated(), redundancy }
     }
 
-    /// The variants with each redundancy test that needs no rays.
+    /// The variants of one material with each redundancy test that needs no rays.
     pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
         let tests: Vec<_> = tests.iter().copied().filter(|test| !test.traces_rays()).collect();
-        let each = |redundancy| {
-            let shading = Some(Highlight::Ggx);
-            let (surface_id, depth_only, redundancy) = (true, false, Some(redundancy));
-            let material = MaterialTraits::ALL;
-            [false, true].map(|wind| Self { material, shading, surface_id, depth_only, wind, redundancy })
-        };
+        let bases: Vec<_> = Self::all().into_iter().filter(|variant| !variant.depth_only).rev().take(4).collect();
+        let each = move |test| bases.clone().into_iter().map(move |base| Self { redundancy: Some(test), ..base });
         RedundancyVariant::all(&tests).into_iter().flat_map(each)
     }
 }
 
 impl ShaderVariant for RasterVariant {
-    fn template(&self) -> &'static str {
-        "raster.wgsl"
-    }
+    const TEMPLATE: &'static str = "raster.wgsl";
+    const TRAITS: ResourceTraits = &[
+        ("camera", ResourceTrait::DynamicOffset),
+        ("object", ResourceTrait::DynamicOffset),
+        ("base_color_texture", ResourceTrait::Filterable),
+        ("metallic_roughness_texture", ResourceTrait::Filterable),
+    ];
 
     fn context(&self) -> Value {
         let MaterialTraits { double_sided, alpha_tested, textured, coat_textured, unlit, specular } = self.material;
@@ -108,15 +108,6 @@ impl ShaderVariant for RasterVariant {
             coat_textured => coat_textured && self.shading == Some(Highlight::Ggx),
             ..RedundancyVariant::context(self.redundancy, KNOWN_GROUP)
         }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        &[
-            ("camera", ResourceTrait::DynamicOffset),
-            ("object", ResourceTrait::DynamicOffset),
-            ("base_color_texture", ResourceTrait::Filterable),
-            ("metallic_roughness_texture", ResourceTrait::Filterable),
-        ]
     }
 
     fn all() -> Vec<Self> {

@@ -17,7 +17,6 @@ mod conventions_tests;
 #[cfg(test)]
 mod message_tests;
 
-pub use convert::{workload_from_bytes, workload_to_bytes};
 pub use error::WireError;
 pub use protocol::PROTOCOL_VERSION;
 pub use refusal::{plan_in_force, refuse_plan};

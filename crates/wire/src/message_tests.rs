@@ -136,42 +136,19 @@ fn messages_survive_the_round_trip() {
     let live =
         RenderViews { live: Some(LiveRequest { acknowledged_frame: 8, client_id: 5 }), views: Vec::new(), ..views() };
     assert_eq!(RenderViews::try_from(proto::RenderViewsRequest::from(live.clone())), Ok(live));
-    let plan = SessionEvent::Plan(Box::new(SessionPlan {
-        assignment: assignment(),
-        costs: Costs {
-            sample_image_s: 0.1,
-            direct_view_s: 0.2,
-            reconstruct_view_s: 0.01,
-            load_set_s: 0.02,
-            encode_view_s: 0.001,
-            in_order: true,
-            tiles: Some(TileCosts { overhead_s: 0.03, row_shares: Some([0.1, 0.2, 0.3, 0.4]) }),
-        },
-        reason: "because".to_owned(),
-        predicted_pipeline_s: 0.1,
-        predicted_direct_s: 0.2,
-        predicted_time_share_s: 0.3,
-        k_fd_sampler_count: 1,
-        predicted_k_fd_s: 0.4,
-        enumerated_sampler_count: 2,
-        predicted_enumerated_s: 0.5,
-        scene_load_s: 0.0,
-        fallback_index: Some(0),
-        frame_rate_ratio: 0.5,
-    }));
-    assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(plan.clone())), Ok(plan.clone()));
-    let SessionEvent::Plan(plan) = plan else { panic!("{plan:?}") };
+    let plan = SessionEvent::Plan(Box::new(session_plan()));
+    assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(plan.clone())), Ok(plan));
     let condition = NodeCondition {
         node_name: "a".to_owned(),
         is_ready: true,
-        costs: plan.costs,
+        costs: session_plan().costs,
         views: 3,
         dropped_views: 1,
         busy_ratio: 0.7,
     };
     let status = ClusterStatus {
         plan_epoch: 4,
-        plan: Some(plan),
+        plan: Some(Box::new(session_plan())),
         session_count: 2,
         views_per_set: 70,
         conditions: vec![condition],
@@ -193,6 +170,32 @@ fn messages_survive_the_round_trip() {
         ChangeSession { session: 7, views_per_set: 0, frames_per_s: Some(12.5), viewpoints: Some(vec![camera()]) };
     assert_eq!(ChangeSession::try_from(proto::ChangeSessionRequest::from(change.clone())), Ok(change));
     assert_eq!(WorkReport::try_from(proto::ReportWorkRequest::from(work_report())), Ok(work_report()));
+}
+
+fn session_plan() -> SessionPlan {
+    SessionPlan {
+        assignment: assignment(),
+        costs: Costs {
+            sample_image_s: 0.1,
+            direct_view_s: 0.2,
+            reconstruct_view_s: 0.01,
+            load_set_s: 0.02,
+            encode_view_s: 0.001,
+            in_order: true,
+            tiles: Some(TileCosts { overhead_s: 0.03, row_shares: Some([0.1, 0.2, 0.3, 0.4]) }),
+        },
+        reason: "because".to_owned(),
+        predicted_pipeline_s: 0.1,
+        predicted_direct_s: 0.2,
+        predicted_time_share_s: 0.3,
+        k_fd_sampler_count: 1,
+        predicted_k_fd_s: 0.4,
+        enumerated_sampler_count: 2,
+        predicted_enumerated_s: 0.5,
+        scene_load_s: 0.0,
+        fallback_index: Some(0),
+        frame_rate_ratio: 0.5,
+    }
 }
 
 fn work_report() -> WorkReport {

@@ -10,7 +10,7 @@ use crate::schedule::demand::ChoiceError;
 use crate::schedule::event::ProbeKind;
 use crate::schedule::reports::Verdict;
 
-/// Duration of a quarantine: a link may be mended by then.
+/// Duration of a quarantine, after which a link may be restored.
 const QUARANTINE: Duration = Duration::from_secs(30);
 /// The same while there is no plan: long enough that the same plan is not made over and over.
 const QUARANTINE_WITHOUT_PLAN: Duration = Duration::from_secs(2);

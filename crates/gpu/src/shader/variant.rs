@@ -10,15 +10,12 @@ use crate::{device::Gpu, error::ShaderError};
 /// A shader's switches. Each set of them is a text of its own.
 pub trait ShaderVariant: Debug + Clone + Eq + Hash {
     /// The template, which is also the label of its passes.
-    fn template(&self) -> &'static str;
+    const TEMPLATE: &'static str;
+    /// Properties of resources that WGSL does not say.
+    const TRAITS: ResourceTraits = &[];
 
     /// The values that the template uses.
     fn context(&self) -> Value;
-
-    /// Properties of resources that WGSL does not say.
-    fn traits(&self) -> ResourceTraits {
-        &[]
-    }
 
     /// The variants that stand for all: each switch in each position, few and many of what is counted.
     fn all() -> Vec<Self>;
@@ -51,9 +48,9 @@ pub fn sources<V: ShaderVariant>(templates: &Templates) -> impl Iterator<Item = 
 /// # Errors
 /// A template that is broken.
 pub fn source<V: ShaderVariant>(templates: &Templates, variant: &V) -> Result<ShaderSource, ShaderError> {
-    let (template, traits) = (variant.template(), variant.traits());
-    let wgsl = templates.render(template, variant.context())?;
-    Ok(ShaderSource { name: format!("{template}: {variant:?}"), template, wgsl, traits })
+    let wgsl = templates.render(V::TEMPLATE, variant.context())?;
+    let name = format!("{}: {variant:?}", V::TEMPLATE);
+    Ok(ShaderSource { name, template: V::TEMPLATE, wgsl, traits: V::TRAITS })
 }
 
 /// Every position of `N` switches.

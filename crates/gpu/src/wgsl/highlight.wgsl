@@ -107,7 +107,7 @@ fn highlight(
     let mirror = Mirror(point_in_world, normal, towards_eye, unpack_reflector(reflector_word));
     var sum = highlight_from_environment(mirror){% if visibility_words > 0 %} * unpack4x8unorm(visibility[0]).x{% endif %};
 {% if light_slots <= 8 %}
-    // Written out, which is a third cheaper than a loop; a slot without a light is dark.
+    // Unrolled, which is a third faster than a loop; a slot without a light is dark.
 {% for i in range(light_slots) %}
     sum += highlight_from_light(illumination.lights[{{ i }}], mirror){% if visibility_words > 0 %} * unpack4x8unorm(visibility[{{ (i + 1) // 4 }}])[{{ (i + 1) % 4 }}]{% endif %};
 {% endfor %}

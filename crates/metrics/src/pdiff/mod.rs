@@ -15,12 +15,8 @@ use rayon::prelude::*;
 use crate::color::{ADOBE_RGB, REC_709, WhiteRelative, convert_pixels, lab_from_relative_xyz};
 use crate::convolution::{Edge, Plane};
 use crate::{MetricsError, Rgb8Image, error::expect_mask};
-use vision::{FrequencyBands, threshold_vs_intensity};
+use vision::{FrequencyBands, LEVELS, threshold_vs_intensity};
 
-/// The number of levels of the pyramid, each about an octave smoother than the one before.
-const LEVELS: usize = 8;
-/// The number of octaves of contrast: a band needs the two levels above it.
-const BANDS: usize = LEVELS - 2;
 /// Burt and Adelson's generating kernel.
 const BINOMIAL: [f32; 5] = [0.05, 0.25, 0.4, 0.25, 0.05];
 /// The least luminance, cd/m².

@@ -1,7 +1,9 @@
 //! Published curves of human vision.
 
-use super::{BANDS, LEVELS};
-
+/// The number of levels of the pyramid, each about an octave smoother than the one before.
+pub(super) const LEVELS: usize = 8;
+/// The number of octaves of contrast: a band needs the two levels above it.
+pub(super) const BANDS: usize = LEVELS - 2;
 /// The frequency of peak contrast sensitivity at 100 cd/m², cycles a degree.
 const PEAK_CYCLES_PER_DEGREE: f32 = 3.248;
 /// Yee's bound on the fall of sensitivity.

@@ -31,9 +31,7 @@ pub(crate) const GREATEST_SLOPE: f32 = 22.903_765;
 pub(super) struct CutTexels;
 
 impl ShaderVariant for CutTexels {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
 
     fn context(&self) -> Value {
         context! {

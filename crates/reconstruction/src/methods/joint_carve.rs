@@ -39,9 +39,8 @@ pub(super) struct Carve {
 }
 
 impl ShaderVariant for Carve {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! {
@@ -53,10 +52,6 @@ impl ShaderVariant for Carve {
             least_move => LEAST_MOVE.wgsl_literal(),
             ..self.surface.context()
         }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        ONE_VIEW
     }
 
     fn all() -> Vec<Self> {

@@ -24,16 +24,11 @@ pub(crate) const BISECTIONS: u32 = 8;
 pub(super) struct Search(SurfaceVariant);
 
 impl ShaderVariant for Search {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! { bisections => BISECTIONS, ..self.0.context() }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        ONE_VIEW
     }
 
     fn all() -> Vec<Self> {

@@ -23,9 +23,7 @@ const CUT: Cut = Cut { vertices: QuadVertices::AtSamples, merged: None };
 pub(super) struct CutBetweenSamples;
 
 impl ShaderVariant for CutBetweenSamples {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
 
     fn context(&self) -> Value {
         quads::context()

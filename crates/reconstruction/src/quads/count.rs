@@ -13,9 +13,7 @@ pub(super) const SHADER: (&str, &str) = ("count.wgsl", include_str!("count.wgsl"
 pub(crate) struct Count;
 
 impl ShaderVariant for Count {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
 
     fn context(&self) -> Value {
         cut::context()

@@ -39,16 +39,11 @@ pub(crate) struct GpuQuadWork {
 pub(crate) struct DrawQuads(QuadVertices);
 
 impl ShaderVariant for DrawQuads {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = &[("work", ResourceTrait::DynamicOffset)];
 
     fn context(&self) -> Value {
         context! { at_texel_corners => self.0.are_at_texel_corners() }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        &[("work", ResourceTrait::DynamicOffset)]
     }
 
     fn all() -> Vec<Self> {

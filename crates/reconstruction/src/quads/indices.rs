@@ -16,9 +16,7 @@ pub(super) const SHADER: (&str, &str) = ("indices.wgsl", include_str!("indices.w
 pub(crate) struct Indices(pub QuadVertices);
 
 impl ShaderVariant for Indices {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
 
     fn context(&self) -> Value {
         context! { at_texel_corners => self.0.are_at_texel_corners(), ..cut::context() }

@@ -18,9 +18,7 @@ pub(crate) const GREATEST_EXTENT: UVec2 = UVec2::new(64, 16);
 pub(crate) struct Merge;
 
 impl ShaderVariant for Merge {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
 
     fn context(&self) -> Value {
         cut::context()

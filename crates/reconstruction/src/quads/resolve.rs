@@ -19,16 +19,11 @@ pub(super) const SHADER: (&str, &str) = ("resolve.wgsl", include_str!("resolve.w
 pub(crate) struct Resolve(SurfaceVariant);
 
 impl ShaderVariant for Resolve {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
         self.0.context()
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        ONE_VIEW
     }
 
     fn all() -> Vec<Self> {

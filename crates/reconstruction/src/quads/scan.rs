@@ -13,9 +13,7 @@ pub(super) const SHADER: (&str, &str) = ("scan.wgsl", include_str!("scan.wgsl"))
 pub(crate) struct Scan;
 
 impl ShaderVariant for Scan {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
 
     fn context(&self) -> Value {
         cut::context()

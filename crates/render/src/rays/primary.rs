@@ -37,9 +37,8 @@ impl PrimaryVariant {
 }
 
 impl ShaderVariant for PrimaryVariant {
-    fn template(&self) -> &'static str {
-        "rays/primary.wgsl"
-    }
+    const TEMPLATE: &'static str = "rays/primary.wgsl";
+    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         context! {
@@ -49,10 +48,6 @@ impl ShaderVariant for PrimaryVariant {
             count_visits => self.count_visits,
             ..merge_maps([self.traversal.context(), RedundancyVariant::context(self.redundancy, KNOWN_GROUP)])
         }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        CAMERA_TRAITS
     }
 
     fn all() -> Vec<Self> {

@@ -185,7 +185,7 @@ fn temporal_hysteresis_reduces_flicker() {
     }
 }
 
-/// A meadow in wind: the samples of a set follow from its time and its reference time, whatever was sampled before.
+/// A meadow in wind: the samples of a set follow from its time and its reference time, in any order of sampling.
 #[test]
 fn sets_with_a_temporal_reference_do_not_depend_on_their_order() {
     let scene = upload(&grass(GrassDensity::new(0.2).expect("a density")));
@@ -205,8 +205,8 @@ fn sets_with_a_temporal_reference_do_not_depend_on_their_order() {
     assert!(at(0.4, Some(0.4)) == at(0.4, None), "the first of its run is its own reference");
 }
 
-/// What the test by tolerance allows, from an eighth to eight times: little leaves in twice what is there, and much
-/// leaves out what nothing else holds.
+/// Tolerances from an eighth to eight times: small ones keep redundant samples, large ones omit samples that no other
+/// image holds.
 #[test]
 fn more_tolerance_keeps_fewer_samples_and_loses_more_surface() {
     let scene = courtyard();

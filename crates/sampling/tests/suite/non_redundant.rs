@@ -52,7 +52,7 @@ fn fig_3() -> Vec<PinholeCamera> {
     viewpoints.eyes_in_world.map(camera).to_vec()
 }
 
-/// Of all texels, those that hold something else: another kind of texel, another depth, or another way there.
+/// The share of texels that differ: another kind of texel, another depth, or another way there.
 fn differing(a: &DepthImage, b: &DepthImage) -> f64 {
     let differs = |(i, (&a_depth, &b_depth)): (usize, (&f32, &f32))| {
         let far = (a_depth - b_depth).abs() > 1e-3 * a_depth.abs();
@@ -240,8 +240,7 @@ fn independent_images_can_be_taken_one_by_one() {
     assert!(matches!(part(&[1, 2], chained), Err(SamplingError::Selection { index: 1, cameras: 4, .. })));
 }
 
-/// Of two walls behind each other the hidden one is useless in its middle and useful at its rim, the more so the larger
-/// the cell.
+/// The hidden one of two walls is useless in its middle and useful at its rim, more so with a larger cell.
 #[test]
 fn samples_that_no_view_can_see_are_omitted() {
     let mut scene = quad(Vec3::ZERO, 1.5, Vec3::Z, [200; 3]);

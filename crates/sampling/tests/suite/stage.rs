@@ -1,4 +1,4 @@
-//! What these tests sample with.
+//! The scene and cameras of these tests.
 
 use std::sync::{Arc, OnceLock};
 
@@ -48,7 +48,7 @@ fn tolerance() -> RedundancyTest {
     SamplingMethod::NonRedundant(Redundancy::Tolerance).redundancy_test().expect("a test")
 }
 
-/// What a set by tolerance holds.
+/// The contents of a set by tolerance.
 pub fn reference(scene: &GpuScene, cameras: &[PinholeCamera]) -> TemporalReference {
     device().renderer.temporal_reference(unlit(scene), &pinholes(cameras), tolerance()).expect("a set")
 }

@@ -14,5 +14,3 @@ mod session;
 mod status;
 mod views;
 mod workload;
-
-pub use workload::{workload_from_bytes, workload_to_bytes};

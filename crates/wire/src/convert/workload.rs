@@ -2,26 +2,10 @@
 
 use cluster::limits::MAX_CELLS;
 use cluster::{Costs, TileCosts, Timeline, Workload, finite_seconds};
-use prost::Message as _;
 
 use super::geometry::{bounds_from, bounds_to, camera_to, sample_cameras_from, vec3_from, vec3_to};
 use crate::error::{WireError, required};
 use crate::proto;
-
-/// The message of a workload, for a log of events.
-#[must_use]
-pub fn workload_to_bytes(workload: &Workload) -> Vec<u8> {
-    proto::Workload::from(workload.clone()).encode_to_vec()
-}
-
-/// Reads what [`workload_to_bytes`] made.
-///
-/// # Errors
-/// For bytes that are no such message, and for a message that is refused of a peer, too.
-pub fn workload_from_bytes(bytes: &[u8]) -> Result<Workload, String> {
-    let message = proto::Workload::decode(bytes).map_err(|error| format!("workload is corrupt: {error}"))?;
-    message.try_into().map_err(|error: WireError| error.to_string())
-}
 
 impl From<proto::Timeline> for Timeline {
     fn from(t: proto::Timeline) -> Self {

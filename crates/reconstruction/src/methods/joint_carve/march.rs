@@ -36,9 +36,8 @@ pub(crate) struct March {
 }
 
 impl ShaderVariant for March {
-    fn template(&self) -> &'static str {
-        SHADER.0
-    }
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! {
@@ -50,10 +49,6 @@ impl ShaderVariant for March {
             eye_share => EYE_SHARE.wgsl_literal(),
             ..self.surface.context()
         }
-    }
-
-    fn traits(&self) -> ResourceTraits {
-        ONE_VIEW
     }
 
     fn all() -> Vec<Self> {

@@ -8,7 +8,7 @@ use super::super::mesh_builder::{MeshBuilder, vertex};
 use super::super::noise::mix;
 use super::super::rng::{Rng, mixed};
 use super::super::solids::{on_ellipse, sweep_around};
-use super::{SECTORS, SEED};
+use super::shell::{SECTORS, SEED};
 
 /// Half axes of the front row, and of the rearmost one.
 const FRONT_M: Vec2 = Vec2::new(100.0, 72.0);
