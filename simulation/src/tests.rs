@@ -194,10 +194,10 @@ fn parts_of_images_cost_what_images_cost() {
     let cut = equal(11, FREE).cut(16);
     assert_eq!(cut.images, 64);
     assert!(close(cut.machines[0].costs.sample_image_s * 64.0, 0.4) && close(cut.image_bytes * 64.0, 4e6));
-    let dear = Machine { costs: Costs { sample_image_s: 2.0, ..COSTS }, ..FREE };
+    let expensive = Machine { costs: Costs { sample_image_s: 2.0, ..COSTS }, ..FREE };
     let demand = demand(PolicyChoice::Pipeline, 1000, 16);
-    let whole = ran(&equal(11, dear), &demand, Habits::default()).steady_period_s();
-    let cut = ran(&equal(11, dear).cut(16), &demand, Habits::default()).steady_period_s();
+    let whole = ran(&equal(11, expensive), &demand, Habits::default()).steady_period_s();
+    let cut = ran(&equal(11, expensive).cut(16), &demand, Habits::default()).steady_period_s();
     assert!(cut < 0.9 * whole, "{cut} {whole}");
 }
 

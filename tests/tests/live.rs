@@ -61,13 +61,13 @@ async fn other_compositors_send_the_frames_of_a_killed_one() {
     let plan = session.plan();
     let victim = plan.assignment.compositors.last().unwrap().node_name[1..].parse::<usize>().unwrap();
     let mut frames = session.render_views(views(3, 40)).unwrap();
-    let mut came = vec![frames.next().await.unwrap().unwrap()];
+    let mut received = vec![frames.next().await.unwrap().unwrap()];
     cluster.nodes[victim].kill();
     let start = Instant::now();
-    came.extend(frames.all().await.unwrap());
+    received.extend(frames.all().await.unwrap());
     println!("healed after {:?}", start.elapsed());
     assert!(start.elapsed() < HEALED);
-    check(&came, 120);
+    check(&received, 120);
     assert!(session.plan().assignment.plan_epoch > plan.assignment.plan_epoch);
     assert!(!session.plan().assignment.composites(&format!("n{victim}")));
 }
@@ -80,13 +80,13 @@ async fn frames_that_their_caller_has_not_taken_outlive_their_plan() {
     let plan = session.plan().assignment;
     let victim = plan.compositors.last().unwrap().node_name[1..].parse::<usize>().unwrap();
     let mut frames = session.render_views(views(3, 40)).unwrap();
-    let mut came = vec![frames.next().await.unwrap().unwrap()];
+    let mut received = vec![frames.next().await.unwrap().unwrap()];
     tokio::time::sleep(Duration::from_millis(300)).await;
     cluster.nodes[victim].kill();
     wait_for("another plan", async || session.plan().assignment.plan_epoch > plan.plan_epoch).await;
     tokio::time::sleep(Duration::from_millis(300)).await;
-    came.extend(frames.all().await.unwrap());
-    check(&came, 120);
+    received.extend(frames.all().await.unwrap());
+    check(&received, 120);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -98,13 +98,13 @@ async fn a_caller_may_pause_for_longer_than_nodes_wait() {
     let cluster = Cluster::start_with(2, hasty).await;
     let session = cluster.session(pipeline(MOVING)).await.unwrap();
     let mut frames = session.render_views(views(3, 100)).unwrap();
-    let mut came = Vec::new();
+    let mut received = Vec::new();
     for _ in 0..3 {
-        came.push(frames.next().await.unwrap().unwrap());
+        received.push(frames.next().await.unwrap().unwrap());
         tokio::time::sleep(3 * HASTE).await;
     }
-    came.extend(frames.all().await.unwrap());
-    check(&came, 300);
+    received.extend(frames.all().await.unwrap());
+    check(&received, 300);
 }
 
 #[tokio::test(flavor = "multi_thread")]

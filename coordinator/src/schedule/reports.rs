@@ -30,7 +30,7 @@ struct Filed {
 
 /// The consequence of a report.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Verdict {
+pub(super) enum Attribution {
     /// Two compositors agree: the sampler is at fault.
     SamplerAtFault,
     /// The coordinator has to probe the sampler.
@@ -39,14 +39,14 @@ pub(super) enum Verdict {
 
 impl SamplerReports {
     /// Files a report.
-    pub(super) fn file(&mut self, now: Duration, report: SamplerReport) -> Verdict {
+    pub(super) fn file(&mut self, now: Duration, report: SamplerReport) -> Attribution {
         self.0.retain(|filed| now.saturating_sub(filed.at) < WINDOW);
         let SamplerReport { compositor, sampler, reason, .. } = report;
         let agrees = self.0.iter().any(|filed| filed.sampler == sampler && filed.compositor != compositor);
         // One probe answers all reports before it.
         self.0.retain(|filed| filed.is_refuted || (&filed.sampler, &filed.compositor) != (&sampler, &compositor));
         self.0.push(Filed { at: now, compositor, sampler, reason, is_refuted: false });
-        if agrees { Verdict::SamplerAtFault } else { Verdict::Probe }
+        if agrees { Attribution::SamplerAtFault } else { Attribution::Probe }
     }
 
     /// A probe of the sampler has passed. Gives the compositors that are now at fault, and why.
@@ -94,18 +94,18 @@ mod tests {
     #[test]
     fn a_second_compositor_convicts_the_sampler_and_a_repeated_report_does_not() {
         let mut reports = SamplerReports::default();
-        assert_eq!(reports.file(START, report("c", "a")), Verdict::Probe);
-        assert_eq!(reports.file(START, report("c", "a")), Verdict::Probe, "the same compositor again");
-        assert_eq!(reports.file(START, report("d", "b")), Verdict::Probe, "another sampler");
-        assert_eq!(reports.file(START, report("d", "a")), Verdict::SamplerAtFault);
-        assert_eq!(SamplerReports::default().file(START, report("d", "a")), Verdict::Probe);
+        assert_eq!(reports.file(START, report("c", "a")), Attribution::Probe);
+        assert_eq!(reports.file(START, report("c", "a")), Attribution::Probe, "the same compositor again");
+        assert_eq!(reports.file(START, report("d", "b")), Attribution::Probe, "another sampler");
+        assert_eq!(reports.file(START, report("d", "a")), Attribution::SamplerAtFault);
+        assert_eq!(SamplerReports::default().file(START, report("d", "a")), Attribution::Probe);
     }
 
     #[test]
     fn reports_a_minute_apart_do_not_agree() {
         let mut reports = SamplerReports::default();
         reports.file(START, report("c", "a"));
-        assert_eq!(reports.file(START + WINDOW, report("d", "a")), Verdict::Probe);
+        assert_eq!(reports.file(START + WINDOW, report("d", "a")), Attribution::Probe);
     }
 
     #[test]

@@ -25,9 +25,9 @@ async fn every_frame_shows_its_pose() {
     let mut live = session.live();
     let mut last = 0;
     for i in 0..30 {
-        let came = seen(&mut live, i as f32 * 0.01, i / 10).await;
-        assert!(came.frame.request.frame > last);
-        last = came.frame.request.frame;
+        let received = seen(&mut live, i as f32 * 0.01, i / 10).await;
+        assert!(received.frame.request.frame > last);
+        last = received.frame.request.frame;
     }
 }
 
@@ -77,8 +77,8 @@ async fn live_views_follow_the_plan() {
     let sampler = session.plan().assignment.samplers[0].node_name[1..].parse::<usize>().unwrap();
     cluster.nodes[sampler].kill();
     for i in 0.. {
-        let came = seen(&mut live, (i % 50) as f32 * 0.01, 0).await;
-        let next = came.frame.header.sample_set_id.plan_epoch;
+        let received = seen(&mut live, (i % 50) as f32 * 0.01, 0).await;
+        let next = received.frame.header.sample_set_id.plan_epoch;
         assert!(next >= epoch);
         epoch = next;
         if epoch > first {

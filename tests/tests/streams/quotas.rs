@@ -62,8 +62,8 @@ async fn a_client_with_thousands_of_views_does_not_starve_others() {
     let mut live = session.live();
     let mut waited = Vec::new();
     for i in 0..20 {
-        let came = seen(&mut live, i as f32 * 0.01, 0).await;
-        waited.push(came.times.decoded - came.times.posed);
+        let received = seen(&mut live, i as f32 * 0.01, 0).await;
+        waited.push(received.times.decoded - received.times.posed);
     }
     assert!(!bulk.is_finished(), "nothing was shared: {waited:?}");
     assert_eq!(bulk.await.unwrap(), 4000);

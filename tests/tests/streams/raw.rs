@@ -29,19 +29,22 @@ pub fn pipeline(timeline: Timeline) -> SessionRequest {
 pub async fn seen(live: &mut LiveView, x_m: f32, set_index: u32) -> LiveFrame {
     let number = live.set_pose(camera(x_m, SIZE_PX), set_index).unwrap();
     loop {
-        let came = timeout(HEALED, live.next()).await.expect("a frame in time").unwrap();
-        let header = &came.frame.header;
-        assert_eq!(header.camera, came.frame.request.camera);
+        let received = timeout(HEALED, live.next()).await.expect("a frame in time").unwrap();
+        let header = &received.frame.header;
+        assert_eq!(header.camera, received.frame.request.camera);
         let t = header.stage_times;
         let stages = t.set_wait_s + t.credit_wait_s + t.queue_s + t.batch_s + t.encode_s + t.send_wait_s;
         assert!((stages - t.compositor_s).abs() < 1e-3, "{t:?}");
-        assert!(t.compositor_s <= came.times.received.duration_since(came.times.sent).as_secs_f64() + 1e-3, "{t:?}");
-        if came.frame.request.frame == number {
+        assert!(
+            t.compositor_s <= received.times.received.duration_since(received.times.sent).as_secs_f64() + 1e-3,
+            "{t:?}"
+        );
+        if received.frame.request.frame == number {
             assert_eq!(header.camera, camera(x_m, SIZE_PX));
             assert_eq!(header.sample_set_id.index, u64::from(set_index));
-            return came;
+            return received;
         }
-        assert!(came.frame.request.frame < number);
+        assert!(received.frame.request.frame < number);
     }
 }
 

@@ -8,7 +8,7 @@ use super::Scheduler;
 use crate::schedule::command::{Command, Probe, ProbedImage};
 use crate::schedule::demand::ChoiceError;
 use crate::schedule::event::ProbeKind;
-use crate::schedule::reports::Verdict;
+use crate::schedule::reports::Attribution;
 
 /// Duration of a quarantine, after which a link may be restored.
 const QUARANTINE: Duration = Duration::from_secs(30);
@@ -99,10 +99,10 @@ impl Scheduler {
         }
         let SamplerReport { plan_epoch, compositor, sampler, reason } = report.clone();
         match self.reports.file(self.now, report) {
-            Verdict::SamplerAtFault => {
+            Attribution::SamplerAtFault => {
                 self.quarantine(&sampler, &format!("sends no images to {compositor} and others: {reason}"))
             }
-            Verdict::Probe => self.probe_image(plan_epoch, &sampler).into_iter().collect(),
+            Attribution::Probe => self.probe_image(plan_epoch, &sampler).into_iter().collect(),
         }
     }
 
