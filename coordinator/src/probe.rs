@@ -11,9 +11,9 @@ use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
 use wire::rpc::{SamplerClient, is_serving};
 
+use crate::grpc_status::within;
 use crate::schedule::{Event, Probe, ProbedImage};
 use crate::shared::Shared;
-use crate::status::within;
 
 /// A single failure may be the network's.
 const ATTEMPTS: usize = 3;

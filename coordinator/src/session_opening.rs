@@ -1,4 +1,4 @@
-//! From a request to a session whose costs are measured.
+//! Session opening: the costs of a requested session are measured.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -8,10 +8,10 @@ use cluster::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, Ses
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
 
+use crate::grpc_status::{of_node, within};
 use crate::schedule::{Event, Opening, PolicyOverride};
 use crate::sessions::EventSender;
 use crate::shared::Shared;
-use crate::status::{of_node, within};
 use crate::workload::workload_of;
 
 /// Views of one measured call: as many as in a batch of real work, since fewer cost more each, and few enough that a slow

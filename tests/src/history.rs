@@ -1,4 +1,4 @@
-//! What happened, as a client saw it and as coordinators wrote it down; and the invariants that no fault may break.
+//! The history of a cluster, as a client saw it and as coordinators recorded it, and invariants that no fault may break.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::io::Cursor;
@@ -8,44 +8,44 @@ use std::time::{Duration, Instant};
 use cluster::{Assignment, Policy};
 use coordinator::schedule::{Command, replay};
 
-/// A frame that came.
+/// A frame that the client received.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
     /// The client's number.
     pub frame: u64,
-    /// Of the plan that made it.
+    /// The plan that made it.
     pub plan_epoch: u64,
-    /// What it shows.
+    /// The set that it shows.
     pub set_index: u64,
-    /// What is wrong with its picture.
+    /// The fault of its picture, if any.
     pub fault: Option<String>,
 }
 
-/// Views that were asked for together.
+/// Views that were requested together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Call {
-    /// When.
+    /// When they were requested.
     pub asked: Instant,
-    /// When all had come, or none was waited for any more.
+    /// When all were received, or no more were awaited.
     pub ended: Instant,
-    /// The numbers asked for.
+    /// The requested frame numbers.
     pub wanted: std::ops::Range<u64>,
-    /// Of which sample set.
+    /// The requested sample set.
     pub set_index: u64,
-    /// What came.
+    /// Frames received.
     pub frames: Vec<Seen>,
-    /// Why not all came.
+    /// Why frames are missing.
     pub error: Option<String>,
 }
 
-/// All that is known of one cluster.
+/// The history of one cluster.
 #[derive(Debug, Clone, Default)]
 pub struct History {
-    /// Of one client, in their order.
+    /// Calls of one client, in their order.
     pub calls: Vec<Call>,
     /// The plans that the client was given.
     pub plans: Vec<Assignment>,
-    /// What coordinators recorded, the first one's log first.
+    /// Logs of coordinators, the first one's first.
     pub logs: Vec<Vec<u8>>,
 }
 
@@ -59,7 +59,7 @@ impl History {
         Ok(())
     }
 
-    /// Frames that came whole.
+    /// The number of frames received.
     #[must_use]
     pub fn frames(&self) -> usize {
         self.calls.iter().map(|call| call.frames.len()).sum()
@@ -77,7 +77,7 @@ impl History {
         longest
     }
 
-    /// Every invariant that does not hold, in words. Nothing seen is one too.
+    /// Every violated invariant, in words. A history without frames violates one.
     #[must_use]
     pub fn violations(&self) -> Vec<String> {
         let mut wrong = Vec::new();
@@ -98,14 +98,14 @@ impl History {
         wrong
     }
 
-    /// All that was asked for came.
+    /// Frames that were requested and not received.
     fn lost(&self) -> Vec<String> {
         let lost =
             self.calls.iter().filter(|call| call.error.is_some() || call.frames.len() != call.wanted.clone().count());
         lost.map(|call| format!("of frames {:?} {} came: {:?}", call.wanted, call.frames.len(), call.error)).collect()
     }
 
-    /// Each number once, none after those of a later call, and none that was not asked for.
+    /// Frames that came twice, after those of a later call, or unrequested.
     fn numbers(&self) -> Vec<String> {
         let (mut wrong, mut seen) = (Vec::new(), HashSet::new());
         let mut highest = None;
@@ -123,7 +123,7 @@ impl History {
         wrong
     }
 
-    /// One sample set a picture: the one that was asked for.
+    /// Pictures that do not show the requested sample set alone.
     fn pictures(&self) -> Vec<String> {
         let frames = self.calls.iter().flat_map(|call| call.frames.iter().map(move |seen| (call, seen)));
         let wrong = |(call, seen): (&Call, &Seen)| {
@@ -134,7 +134,7 @@ impl History {
         frames.filter_map(wrong).collect()
     }
 
-    /// Plans of frames rise from call to call: nothing comes of a plan that was replaced.
+    /// Calls with frames of a plan that was replaced before: plans rise from call to call.
     fn epochs_of_frames(&self) -> Vec<String> {
         let epochs = |call: &Call| call.frames.iter().map(|seen| seen.plan_epoch).collect::<BTreeSet<_>>();
         let (mut wrong, mut highest) = (Vec::new(), 0);
@@ -148,7 +148,7 @@ impl History {
         wrong
     }
 
-    /// The plans of all logs, in their order. A log gives the same commands whenever it is replayed.
+    /// The plans of all logs, in their order. Every replay of a log gives the same commands.
     fn commanded(&self) -> Result<Vec<Assignment>, String> {
         let mut plans = Vec::new();
         for log in &self.logs {
@@ -162,7 +162,7 @@ impl History {
         Ok(plans)
     }
 
-    /// One leader an epoch: whoever has a plan of an epoch has the same, and it is the one that was recorded.
+    /// Epochs with two plans, or with a plan that no coordinator recorded.
     fn leaders(&self, commanded: &[Assignment]) -> Vec<String> {
         let mut first: BTreeMap<u64, &Assignment> = BTreeMap::new();
         let mut wrong = Vec::new();
@@ -186,7 +186,7 @@ fn plan_of(command: Command) -> Option<Assignment> {
     }
 }
 
-/// A view has one compositor, an image, or its tile, one sampler.
+/// Roles that a plan gives twice or to no node: a view has one compositor; an image, or its tile, one sampler.
 fn roles(plan: &Assignment) -> Vec<String> {
     let names: Vec<_> = plan.compositors.iter().map(|share| &share.node_name).collect();
     let addresses: HashSet<_> = plan.compositors.iter().map(|share| &share.address).collect();
@@ -204,7 +204,7 @@ fn roles(plan: &Assignment) -> Vec<String> {
 }
 
 fn rising(commanded: &[Assignment]) -> Vec<String> {
-    // A plan is told again to sessions that come later.
+    // A plan is announced again to sessions that come later.
     let again = |pair: &&[Assignment]| pair[0].plan_epoch > pair[1].plan_epoch;
     let falls = commanded.windows(2).filter(again);
     falls.map(|pair| format!("plan {} after plan {}", pair[1].plan_epoch, pair[0].plan_epoch)).collect()

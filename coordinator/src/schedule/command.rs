@@ -1,4 +1,4 @@
-//! Outputs of the schedule: what the executor does.
+//! Outputs of the schedule, which the executor executes.
 
 use std::fmt;
 use std::time::Duration;
@@ -9,7 +9,7 @@ use depth_image::Camera;
 use super::demand::ChoiceError;
 use super::event::ProbeKind;
 
-/// What is to be done.
+/// One action of the executor.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs, reason = "self-naming fields")]
 pub enum Command {
@@ -45,14 +45,14 @@ pub struct Probe {
 /// The image that a probe fetches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProbedImage {
-    /// For one image.
+    /// A request for one image.
     pub request: FetchImages,
-    /// The image's.
+    /// The image's camera.
     pub camera: Camera,
 }
 
 impl Probe {
-    /// What is asked.
+    /// The question without its details.
     #[must_use]
     pub fn kind(&self) -> ProbeKind {
         if self.image.is_some() { ProbeKind::Image } else { ProbeKind::Liveness }

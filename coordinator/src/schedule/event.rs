@@ -1,4 +1,4 @@
-//! Inputs of the schedule: what happened in the cluster.
+//! Inputs of the schedule.
 
 use cluster::limits::MAX_VIEWS_PER_SET;
 use cluster::{
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::demand::PolicyOverride;
 
-/// What happened. Events of an epoch concern the plan of that epoch alone.
+/// One occurrence in the cluster. Events with an epoch concern the plan of that epoch alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs, reason = "self-naming fields")]
@@ -45,7 +45,7 @@ pub enum Event {
     Tick,
 }
 
-/// What a probe asks of a node.
+/// The question of a probe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ProbeKind {
@@ -60,7 +60,7 @@ pub enum ProbeKind {
 pub struct Opening {
     /// Its number.
     pub session: u64,
-    /// What is sampled.
+    /// The workload to sample.
     pub workload: Workload,
     /// V.
     pub views_per_set: usize,
@@ -70,7 +70,7 @@ pub struct Opening {
     pub policy_override: PolicyOverride,
     /// Qualities to fall back to under overload, in this order.
     pub fallbacks: Vec<Quality>,
-    /// As measured: every node's until it reports its own.
+    /// Measured costs: every node's until it reports its own.
     pub costs: Costs,
     /// The workload's sample cameras are the cells of these viewpoints, as if the session were alone. Empty: it brings
     /// sample cameras of its own.

@@ -1,4 +1,4 @@
-//! What operations cost one node, and nodes compared.
+//! The costs of operations on one node, and a comparison of nodes.
 
 use cluster::{Costs, TileCosts};
 
