@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Whether this commit makes the same pictures, frames and depth images as another, to the byte, and as fast.
+# Compares this commit with another: equal pictures, frames and depth images, to the byte, and equal speed.
 #
 #   scripts/same_as.sh COMMIT           a matrix of 4 scenes x sampling x reconstruction x lighting, and policies
-#   scripts/same_as.sh COMMIT --times   the ratios of g_s, g_v, c and d, on a machine that does nothing else
+#   scripts/same_as.sh COMMIT --times   the ratios of g_s, g_v, c and d, on an otherwise idle machine
 #
-# Both commits are built; both serve each scene in turn; one client of this commit asks both and hashes what they send.
-# A renderer chooses rays or triangles by timing. Rows that differ are therefore asked again of new processes, up to
-# five times: a row is equal once both commits have given one same answer. Exit status 1: a row differs.
+# Builds both commits, which serve each scene in turn; one client of this commit hashes the answers of both.
+# A renderer chooses rays or triangles by timing. New processes therefore repeat rows that differ, up to five times: a
+# row is equal once both commits have given one same answer. Exit status 1: a row differs.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

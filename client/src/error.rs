@@ -1,70 +1,36 @@
-//! What can go wrong for a client.
+//! Errors of a client.
 
+use cluster::CompositorShare;
 use tonic::{Code, Status};
 
-/// Why views did not come.
+/// Why views were not received.
 #[derive(Debug, Clone, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum ClientError {
     /// The coordinator cannot be reached, or refuses.
     #[error("coordinator: {reason}")]
-    Coordinator {
-        /// What it says.
-        reason: String,
-    },
-    /// There is no room: a quota, or all nodes' time. Others are not affected, and may be done later.
+    Coordinator { reason: String },
+    /// A quota, or all nodes' time, is used up. Other clients are not affected, and may be done later.
     #[error("no room: {reason}")]
-    Exhausted {
-        /// Which quota, and whose.
-        reason: String,
-    },
+    Exhausted { reason: String },
     /// Nodes did not join in time.
     #[error("{joined} of {wanted} nodes have joined")]
-    FewNodes {
-        /// Members now.
-        joined: usize,
-        /// Members needed.
-        wanted: usize,
-    },
+    FewNodes { joined: usize, wanted: usize },
     /// The plan no longer holds: a node left, or another session took its place.
     #[error("the session has ended: {reason}")]
-    Ended {
-        /// Why.
-        reason: String,
-    },
+    Ended { reason: String },
     /// A compositor cannot be reached, or refuses.
     #[error("compositor {node_name} at {address}: {reason}")]
-    Compositor {
-        /// Which.
-        node_name: String,
-        /// Where.
-        address: String,
-        /// What it says.
-        reason: String,
-    },
-    /// A request that cannot be.
+    Compositor { node_name: String, address: String, reason: String },
+    /// A request that cannot be met.
     #[error("{field}: {reason}")]
-    Invalid {
-        /// Which.
-        field: &'static str,
-        /// Why.
-        reason: String,
-    },
-    /// Streams ended and frames are not there.
+    Invalid { field: &'static str, reason: String },
+    /// Streams ended and frames are missing; `first` names some of them.
     #[error("{count} frames are missing: {first:?}{}", if *.count > .first.len() { " and more" } else { "" })]
-    Missing {
-        /// How many.
-        count: usize,
-        /// Some of them.
-        first: Vec<u64>,
-    },
-    /// A frame that was not asked for, came twice, or shows another sample set.
+    Missing { count: usize, first: Vec<u64> },
+    /// A frame that was not requested, was received twice, or shows another sample set.
     #[error("frame {frame}: {reason}")]
-    Unexpected {
-        /// Which.
-        frame: u64,
-        /// What is wrong with it.
-        reason: String,
-    },
+    Unexpected { frame: u64, reason: String },
 }
 
 impl ClientError {
@@ -74,5 +40,10 @@ impl ClientError {
             Code::ResourceExhausted => Self::Exhausted { reason: format!("coordinator: {reason}") },
             _ => Self::Coordinator { reason },
         }
+    }
+
+    pub(crate) fn compositor(share: &CompositorShare, reason: impl ToString) -> Self {
+        let CompositorShare { node_name, address, .. } = share.clone();
+        Self::Compositor { node_name, address, reason: reason.to_string() }
     }
 }

@@ -1,13 +1,14 @@
-//! Which frames are due: each once, and from its own sample set.
+//! The frames that are due: each once, and from its own sample set.
 
 use std::collections::HashMap;
 
 use codec::FrameHeader;
 use depth_image::ViewPlanes;
 
-use crate::{ClientError, ViewRequest};
+use crate::error::ClientError;
+use crate::view_request::ViewRequest;
 
-/// The frames of one call that have not come.
+/// The frames of one request that have not been received.
 #[derive(Debug)]
 pub(crate) struct Expected {
     due: HashMap<u64, ViewRequest>,
@@ -26,22 +27,22 @@ impl Expected {
             if due.insert(request.frame, request).is_some() {
                 return Err(ClientError::Invalid {
                     field: "frame",
-                    reason: format!("{} is asked for twice", request.frame),
+                    reason: format!("{} is requested twice", request.frame),
                 });
             }
         }
         Ok(Self { due, planes })
     }
 
-    /// What is wrong with a frame: whoever sent it, or what it came through, has spoilt it.
-    pub(crate) fn wrong_with(&self, frame: u64, header: &FrameHeader) -> Option<String> {
+    /// The fault of a frame, of its compositor or of the network; `None` for a good frame.
+    pub(crate) fn fault_of(&self, frame: u64, header: &FrameHeader) -> Option<String> {
         match self.due.get(&frame) {
-            None => Some("was not asked for or has come".to_owned()),
-            Some(request) => agrees(request, self.planes, header).err(),
+            None => Some("was not requested or has been received".to_owned()),
+            Some(request) => check_frame(request, self.planes, header).err(),
         }
     }
 
-    /// A frame has come: what had been asked; `None` if it came before.
+    /// Counts a frame as received and gives its request; `None` if it was received before.
     pub(crate) fn take(&mut self, frame: u64) -> Option<ViewRequest> {
         self.due.remove(&frame)
     }
@@ -50,7 +51,7 @@ impl Expected {
         self.due.contains_key(&frame)
     }
 
-    /// Once the streams have ended.
+    /// Checks, at the end of all streams, that no frame is missing.
     pub(crate) fn finish(&self) -> Result<(), ClientError> {
         if self.due.is_empty() {
             return Ok(());
@@ -63,17 +64,17 @@ impl Expected {
     }
 }
 
-/// Whether a frame shows what was asked for, of whichever plan. Else says what is wrong with it.
-pub(crate) fn agrees(request: &ViewRequest, planes: ViewPlanes, header: &FrameHeader) -> Result<(), String> {
+/// Checks that a frame shows what was requested, under whichever plan; else says what is wrong with it.
+pub(crate) fn check_frame(request: &ViewRequest, planes: ViewPlanes, header: &FrameHeader) -> Result<(), String> {
     if header.sample_set_id.index != u64::from(request.set_index) {
         return Err(format!("shows sample set {} in place of {}", header.sample_set_id, request.set_index));
     }
     let has = ViewPlanes { inverse_depth: header.inverse_depth_bytes > 0, provenance: header.provenance_bytes > 0 };
     if header.size_px != request.camera.size_px || has != planes {
-        return Err("has another size or other planes than asked for".to_owned());
+        return Err("has another size or other planes than requested".to_owned());
     }
     if header.camera != request.camera {
-        return Err("shows another pose than asked for".to_owned());
+        return Err("shows another pose than requested".to_owned());
     }
     Ok(())
 }
@@ -110,19 +111,19 @@ mod tests {
     }
 
     #[test]
-    fn frames_come_once_and_from_their_own_set() {
+    fn a_frame_is_accepted_once_and_from_its_own_set() {
         let mut expected = Expected::new([request(4), request(7)], ViewPlanes::default()).unwrap();
-        assert_eq!(expected.wrong_with(4, &header(0)), None);
+        assert_eq!(expected.fault_of(4, &header(0)), None);
         assert_eq!(expected.take(4), Some(request(4)));
         let mut elsewhere = header(0);
         elsewhere.camera.eye_in_world.x += 0.1;
         for (frame, header, reason) in [
-            (4, header(0), "has come"),
-            (5, header(0), "not asked"),
+            (4, header(0), "has been received"),
+            (5, header(0), "not requested"),
             (7, header(1), "sample set"),
             (7, elsewhere, "another pose"),
         ] {
-            assert!(expected.wrong_with(frame, &header).unwrap().contains(reason));
+            assert!(expected.fault_of(frame, &header).unwrap().contains(reason));
         }
         assert_eq!((expected.take(4), expected.is_due(4), expected.is_due(7)), (None, false, true));
         assert!(expected.finish().unwrap_err().to_string().contains("1 frames are missing: [7]"));

@@ -1,61 +1,60 @@
-//! One stream after the other to the compositors of the plan in force.
+//! The stream of a live view, from one compositor of the plan in force to the next.
 
 use std::time::{Duration, Instant};
 
 use cluster::{LiveRequest, RenderViews, RequestedView};
-use codec::{DecodeLimits, FrameAssembly, FrameCodec, FramePart, WholeFrame, decode_view};
+use codec::{FrameCodec, WholeFrame};
 use depth_image::ViewPlanes;
 use tokio::sync::{mpsc, watch};
 use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
 use tokio_stream::wrappers::ReceiverStream;
-use wire::rpc::{CALL_TIMEOUT, Messages};
+use wire::rpc::CALL_TIMEOUT;
 
-use crate::expected::agrees;
-use crate::frames::{Failure, Frame, next_frame};
-use crate::live::{Peer, State};
-use crate::live_view::{LiveFrame, LiveTimes};
-use crate::places::{Tried, new_client_id};
-use crate::poses::{Pose, Poses, Sent};
-use crate::trouble::PATIENCE;
-use crate::{ClientError, ViewRequest};
+use crate::active_plan::SessionState;
+use crate::delivery::Template;
+use crate::error::ClientError;
+use crate::expected::check_frame;
+use crate::frame_stream::{FrameStream, decode};
+use crate::live_frame::{LiveFrame, LiveTimes, Newest, SentPose};
+use crate::peer::{Failure, Peer};
+use crate::placement::{Tried, new_client_id};
+use crate::poses::Poses;
+use crate::retry::GIVE_UP_AFTER;
+use crate::view_request::{Frame, ViewRequest};
 
-/// A compositor hears of its client at least so often: one that is silent is cut off.
+/// The longest silence of a client: its compositor cuts off one that is silent for longer.
 const HEARTBEAT: Duration = Duration::from_secs(20);
-/// Before compositors that failed are tried again, where no other plan comes.
+/// The delay before compositors that failed are tried again, where no other plan is in force by then.
 const RETRY: Duration = Duration::from_millis(200);
 
-pub(crate) type Received = Result<LiveFrame, ClientError>;
-
-/// What the viewer last said.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Newest {
-    pub(crate) pose: Option<Pose>,
-    /// The last frame that was taken.
-    pub(crate) taken: u64,
+/// A frame before it is decoded.
+pub(crate) struct Encoded {
+    frame: WholeFrame,
+    /// The pose that it answers.
+    answers: SentPose,
+    received: Instant,
+    peer: Peer,
 }
 
-/// A frame that is here, with the pose that it answers.
-pub(crate) type Came = (WholeFrame, Sent, Instant, Peer);
-
 pub(crate) struct LiveStream {
-    state: watch::Receiver<State>,
+    state: watch::Receiver<SessionState>,
     newest: watch::Receiver<Newest>,
     client_id: u64,
     codec: FrameCodec,
     planes: ViewPlanes,
-    frames: mpsc::Sender<Result<Came, ClientError>>,
+    frames: mpsc::Sender<Result<Encoded, ClientError>>,
     poses: Poses,
-    /// Of the last frame: epochs rise.
+    /// The plan of the last frame: epochs rise.
     plan_epoch: u64,
-    /// Since when nothing has come though it was tried.
+    /// The first of the failures since the last frame.
     failing_since: Option<Instant>,
 }
 
 /// Why a stream is left.
 enum Left {
-    /// Nobody looks any more.
+    /// The viewer has left.
     ByViewer,
-    /// Another compositor's turn.
+    /// The plan places this client elsewhere.
     ForPlan,
 }
 
@@ -63,19 +62,18 @@ enum Left {
 struct Call {
     peer: Peer,
     requests: mpsc::Sender<RenderViews>,
-    parts: Messages<FramePart>,
-    assembly: FrameAssembly,
+    frames: FrameStream,
     heartbeat: Interval,
-    /// There is something to say.
+    /// Whether a request is due.
     is_due: bool,
 }
 
 impl LiveStream {
     pub(crate) fn new(
-        state: watch::Receiver<State>,
+        state: watch::Receiver<SessionState>,
         newest: watch::Receiver<Newest>,
         (codec, planes): (FrameCodec, ViewPlanes),
-        frames: mpsc::Sender<Result<Came, ClientError>>,
+        frames: mpsc::Sender<Result<Encoded, ClientError>>,
     ) -> Self {
         let (client_id, poses) = (new_client_id(), Poses::default());
         Self { state, newest, client_id, codec, planes, frames, poses, plan_epoch: 0, failing_since: None }
@@ -83,24 +81,24 @@ impl LiveStream {
 
     pub(crate) async fn run(mut self) {
         if let Err(error) = self.follow().await {
-            // Only an error here means that the viewer has left.
+            // A failure to send means that the viewer has left.
             let _ = self.frames.send(Err(error)).await;
         }
     }
 
-    /// From compositor to compositor, and from plan to plan.
+    /// Streams from one compositor after the other, and from one plan after the other.
     async fn follow(&mut self) -> Result<(), ClientError> {
         let mut tried = Tried::none(0);
         loop {
-            let State { live, ended, .. } = self.state.borrow_and_update().clone();
+            let SessionState { active, ended, .. } = self.state.borrow_and_update().clone();
             if let Some(reason) = ended {
                 return Err(ClientError::Ended { reason });
             }
-            let plan_epoch = live.plan.assignment.plan_epoch;
+            let plan_epoch = active.plan_epoch();
             if tried.plan_epoch != plan_epoch {
                 tried = Tried::none(plan_epoch);
             }
-            let Some(peer) = tried.next(self.client_id, &live) else {
+            let Some(peer) = tried.next(self.client_id, &active) else {
                 tried = self.wait_for_others(tried).await?;
                 continue;
             };
@@ -111,7 +109,7 @@ impl LiveStream {
                 Err(Failure::OfRequest(error)) => return Err(error),
                 Err(Failure::OfPlan(error) | Failure::Exhausted(error)) => {
                     tracing::debug!(client = self.client_id, node = peer.share.node_name, %error, "a live stream ends");
-                    // One that lasted was not part of a row of failures, though perhaps nothing was asked of it.
+                    // A stream that lasted ends a series of failures, even if no frame was requested on it.
                     self.failing_since = self.failing_since.filter(|_| start.elapsed() < CALL_TIMEOUT);
                     tried.add(peer, error);
                 }
@@ -119,12 +117,12 @@ impl LiveStream {
         }
     }
 
-    /// Until there is another plan, or the same may be tried again.
+    /// Waits until there is another plan, or the same may be tried again.
     async fn wait_for_others(&mut self, tried: Tried) -> Result<Tried, ClientError> {
-        let is_over = self.failing_since.get_or_insert_with(Instant::now).elapsed() > PATIENCE;
+        let is_over = self.failing_since.get_or_insert_with(Instant::now).elapsed() > GIVE_UP_AFTER;
         if tried.is_exhausted() || is_over {
-            let nobody = || ClientError::Ended { reason: "the plan has no compositor".to_owned() };
-            return Err(tried.last.unwrap_or_else(nobody));
+            let no_compositor = || ClientError::Ended { reason: "the plan has no compositor".to_owned() };
+            return Err(tried.last.unwrap_or_else(no_compositor));
         }
         match timeout(RETRY, self.state.changed()).await {
             Ok(Err(_)) => Err(closed()),
@@ -132,10 +130,10 @@ impl LiveStream {
         }
     }
 
-    /// One call, until it fails or another compositor is to be asked.
+    /// Streams from one compositor, until the call fails or another compositor is to be asked.
     async fn stream_from(&mut self, peer: &Peer) -> Result<Left, Failure> {
         let mut call = Call::open(peer.clone()).await?;
-        self.poses.on_another_stream();
+        self.poses.begin_stream();
         loop {
             tokio::select! {
                 changed = self.newest.changed() => match changed {
@@ -153,10 +151,10 @@ impl LiveStream {
                         place.send(self.request());
                         call.is_due = false;
                     }
-                    // The other direction says why.
+                    // The other direction gives the reason.
                     Err(_) => call.is_due = false,
                 },
-                frame = next_frame(&mut call.parts, &mut call.assembly, &call.peer) => match frame? {
+                frame = call.frames.next(&call.peer) => match frame? {
                     Some(frame) => self.accept(frame, &call.peer)?,
                     None => return Err(Failure::OfPlan(call.peer.error("ended the stream"))),
                 },
@@ -164,15 +162,15 @@ impl LiveStream {
         }
     }
 
-    /// Whether the plan in force, which may be another, leaves this client where it is.
+    /// Whether the plan in force, which may be a new one, leaves this client where it is.
     fn is_still_with(&self, peer: &Peer) -> bool {
         let state = self.state.borrow();
         let place = |peer: &Peer| (peer.share.node_name.clone(), peer.share.address.clone());
-        let wanted = Tried::none(0).next(self.client_id, &state.live).map(place);
+        let wanted = Tried::none(0).next(self.client_id, &state.active).map(place);
         state.ended.is_none() && wanted == Some(place(peer))
     }
 
-    /// The newest pose, if it was not sent, and what has been taken.
+    /// A request for the newest pose, if it was not sent, which acknowledges the frames that were taken.
     fn request(&mut self) -> RenderViews {
         let Newest { pose, taken } = self.newest.borrow_and_update().clone();
         self.poses.taken(taken);
@@ -185,36 +183,28 @@ impl LiveStream {
         request
     }
 
-    /// By the method of whatever plan is in force.
+    /// A request without a pose.
     fn acknowledgement(&self, acknowledged_frame: u64) -> RenderViews {
-        let live = self.state.borrow().live.clone();
-        let assignment = &live.plan.assignment;
-        RenderViews {
-            plan_epoch: assignment.plan_epoch,
-            set_index: 0,
-            method: assignment.workload.method.clone(),
-            codec: self.codec,
-            planes: self.planes,
-            views: Vec::new(),
-            live: Some(LiveRequest { acknowledged_frame, client_id: self.client_id }),
-        }
+        let template = Template { method: None, codec: self.codec, planes: self.planes };
+        let live = LiveRequest { acknowledged_frame, client_id: self.client_id };
+        RenderViews { live: Some(live), ..template.message(&self.state.borrow().active.plan.assignment) }
     }
 
-    fn accept(&mut self, whole: WholeFrame, peer: &Peer) -> Result<(), Failure> {
-        let unexpected = |reason: &str| {
-            let error = ClientError::Unexpected { frame: whole.frame, reason: reason.to_owned() };
-            Failure::of_peer(peer, error)
-        };
-        let sent = self.poses.answer(whole.frame).ok_or_else(|| unexpected("was not asked for, or comes late"))?;
-        agrees(&sent.pose.request, self.planes, &whole.header).map_err(|reason| unexpected(&reason))?;
-        let plan_epoch = whole.header.sample_set_id.plan_epoch;
+    fn accept(&mut self, frame: WholeFrame, peer: &Peer) -> Result<(), Failure> {
+        let number = frame.frame;
+        let unexpected =
+            |reason: &str| Failure::of_peer(peer, ClientError::Unexpected { frame: number, reason: reason.to_owned() });
+        let answers = self.poses.answer(number).ok_or_else(|| unexpected("was not requested, or is late"))?;
+        check_frame(&answers.pose.request, self.planes, &frame.header).map_err(|reason| unexpected(&reason))?;
+        let plan_epoch = frame.header.sample_set_id.plan_epoch;
         if plan_epoch < self.plan_epoch {
             return Err(unexpected("is of an older plan than the frame before"));
         }
         (self.plan_epoch, self.failing_since) = (plan_epoch, None);
-        tracing::debug!(client = self.client_id, frame = whole.frame, set = %whole.header.sample_set_id, "came");
+        tracing::debug!(client = self.client_id, frame = number, set = %frame.header.sample_set_id, "received");
         let too_many = |_| Failure::OfPlan(peer.error("sends more frames than are taken"));
-        self.frames.try_send(Ok((whole, sent, Instant::now(), peer.clone()))).map_err(too_many)
+        let encoded = Encoded { frame, answers, received: Instant::now(), peer: peer.clone() };
+        self.frames.try_send(Ok(encoded)).map_err(too_many)
     }
 }
 
@@ -223,10 +213,10 @@ impl Call {
         let (requests, outgoing) = mpsc::channel(1);
         let answer = timeout(CALL_TIMEOUT, peer.client.render_views(ReceiverStream::new(outgoing))).await;
         let late = |_| Failure::OfPlan(peer.error(format!("no answer for {} s", CALL_TIMEOUT.as_secs())));
-        let parts = answer.map_err(late)?.map_err(|status| Failure::of(&peer, &status))?;
+        let parts = answer.map_err(late)?.map_err(|status| Failure::of_status(&peer, &status))?;
         let mut heartbeat = interval(HEARTBEAT);
         heartbeat.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        Ok(Self { peer, requests, parts, assembly: FrameAssembly::default(), heartbeat, is_due: true })
+        Ok(Self { peer, requests, frames: FrameStream::new(parts), heartbeat, is_due: true })
     }
 }
 
@@ -234,14 +224,14 @@ fn closed() -> ClientError {
     ClientError::Ended { reason: "the session was closed".to_owned() }
 }
 
-/// One after the other, so that they stay in their order.
+/// Decodes one frame after the other, so that they keep their order.
 pub(crate) async fn decode_all(
-    mut encoded: mpsc::Receiver<Result<Came, ClientError>>,
-    decoded: mpsc::Sender<Received>,
+    mut encoded: mpsc::Receiver<Result<Encoded, ClientError>>,
+    decoded: mpsc::Sender<Result<LiveFrame, ClientError>>,
 ) {
-    while let Some(came) = encoded.recv().await {
-        let frame = match came {
-            Ok(came) => decode(came).await,
+    while let Some(received) = encoded.recv().await {
+        let frame = match received {
+            Ok(encoded) => encoded.decode().await,
             Err(error) => Err(error),
         };
         let is_over = frame.is_err();
@@ -251,12 +241,11 @@ pub(crate) async fn decode_all(
     }
 }
 
-async fn decode((whole, Sent { pose, sent }, came, peer): Came) -> Received {
-    let decoding = move || decode_view(&whole, &DecodeLimits::default()).map(|view| (whole.header, view));
-    let (header, view) = match tokio::task::spawn_blocking(decoding).await {
-        Ok(decoded) => decoded.map_err(|error| peer.error(error))?,
-        Err(error) => return Err(peer.error(error)),
-    };
-    let times = LiveTimes { looked: pose.looked, sent, came, decoded: Instant::now() };
-    Ok(LiveFrame { frame: Frame { request: pose.request, view, header }, times })
+impl Encoded {
+    async fn decode(self) -> Result<LiveFrame, ClientError> {
+        let Self { frame, answers: SentPose { pose, sent }, received, peer } = self;
+        let (header, view) = decode(frame, &peer).await?;
+        let times = LiveTimes { posed: pose.posed, sent, received, decoded: Instant::now() };
+        Ok(LiveFrame { frame: Frame { request: pose.request, view, header }, times })
+    }
 }

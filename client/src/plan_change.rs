@@ -1,38 +1,43 @@
-//! What another plan means for frames that were asked for under this one.
+//! The effect of a plan change on frames that were requested under the plan before.
 
 use std::time::Duration;
 
 use tokio::sync::watch;
 
-use crate::ClientError;
-use crate::live::{Peer, State};
+use crate::active_plan::SessionState;
+use crate::error::ClientError;
+use crate::peer::Peer;
 
-/// How long a compositor that the next plan has no more may take to send what it was asked for.
+/// The time that a compositor without a place in the next plan has to send the frames it was asked for.
 const LAST_WORK: Duration = Duration::from_secs(1);
 
-/// Waits for a later plan for a while; says why no plan is to be tried any more.
-pub(crate) async fn successor(
-    state: &mut watch::Receiver<State>,
+/// Waits for a later plan for `delay`; gives an error where no plan is to be tried any more.
+pub(crate) async fn wait_for_successor(
+    state: &mut watch::Receiver<SessionState>,
     plan_epoch: u64,
-    pause: Duration,
+    delay: Duration,
     error: ClientError,
-) -> Option<ClientError> {
-    let later = |state: &State| state.ended.is_some() || state.live.plan_epoch() > plan_epoch;
-    match tokio::time::timeout(pause, state.wait_for(later)).await {
-        Ok(Ok(state)) => {
-            let reason = state.ended.as_ref()?;
-            Some(ClientError::Ended { reason: format!("{reason} ({error})") })
-        }
+) -> Result<(), ClientError> {
+    let is_later = |state: &SessionState| state.ended.is_some() || state.active.plan_epoch() > plan_epoch;
+    match tokio::time::timeout(delay, state.wait_for(is_later)).await {
+        Ok(Ok(state)) => match &state.ended {
+            Some(reason) => Err(ClientError::Ended { reason: format!("{reason} ({error})") }),
+            None => Ok(()),
+        },
         // The session was dropped.
-        Ok(Err(_)) => Some(error),
-        Err(_) => None,
+        Ok(Err(_)) => Err(error),
+        Err(_) => Ok(()),
     }
 }
 
-/// Resolves when a later plan has no place for one of `peers`: it may be gone without a word.
-pub(crate) async fn lost_peer(mut state: watch::Receiver<State>, plan_epoch: u64, peers: &[Peer]) -> ClientError {
-    let lost = |state: &State| {
-        let plan = &state.live.plan.assignment;
+/// Resolves when a later plan has no place for one of `peers`: it may be lost without a word.
+pub(crate) async fn wait_for_lost_peer(
+    mut state: watch::Receiver<SessionState>,
+    plan_epoch: u64,
+    peers: &[Peer],
+) -> ClientError {
+    let lost = |state: &SessionState| {
+        let plan = &state.active.plan.assignment;
         let lost = peers.iter().find(|peer| !plan.composites(&peer.share.node_name));
         lost.filter(|_| plan.plan_epoch > plan_epoch).cloned()
     };

@@ -11,7 +11,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
 use crate::flow_control::FlowControl;
-use crate::session::ViewRequest;
+use crate::view_request::ViewRequest;
 use crate::work_stealing::WorkStealing;
 
 /// Room for the messages to one compositor: two of the largest, if all had one view.

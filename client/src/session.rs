@@ -1,42 +1,35 @@
 //! A session: a plan, and views asked of its compositors.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use cluster::{ChangeSession, SessionEvent, SessionPlan, SessionRequest};
 use codec::FrameCodec;
 use depth_image::{PinholeCamera, ViewPlanes};
+use parking_lot::Mutex;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
 use wire::rpc::{CoordinatorClient, Messages};
 
-use crate::ClientError;
+use crate::active_plan::{ActivePlan, SessionState};
+use crate::delivery::Template;
+use crate::error::ClientError;
 use crate::expected::Expected;
 use crate::frames::Frames;
-use crate::live::{Live, State, follow, learn};
 use crate::live_view::LiveView;
+use crate::plan_follower::{follow_compositors, follow_coordinator};
+use crate::view_request::ViewRequest;
 
-/// Plans that compositors have named and nobody has looked at.
-const PLANS_LEARNED: usize = 4;
-
-/// One view.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ViewRequest {
-    /// The client's own number, once a call.
-    pub frame: u64,
-    /// Into the session's timeline.
-    pub set_index: u32,
-    /// From where.
-    pub camera: PinholeCamera,
-}
+/// Plans that compositors have named and the session has not taken over yet.
+const NAMED_PLANS: usize = 4;
 
 /// An open session. Dropping it closes it.
 #[derive(Debug)]
 pub struct Session {
     codec: FrameCodec,
     planes: ViewPlanes,
-    state: watch::Receiver<State>,
+    state: watch::Receiver<SessionState>,
     /// Dropped with the session.
     _following: JoinSet<()>,
     coordinator: CoordinatorClient,
@@ -56,59 +49,56 @@ impl Session {
             .map_err(|error| ClientError::Invalid { field: "codec", reason: format!("{error}") })?;
         let mut events = coordinator.open_session(request.clone()).await.map_err(ClientError::coordinator)?;
         let (session, plan) = plan_of(&mut events, progress).await?;
-        let (learned, learning) = mpsc::channel(PLANS_LEARNED);
-        let live = Arc::new(Live::reach(plan, &learned).await?);
-        let (says, state) = watch::channel(State { session, live, ended: None });
+        let (named_plans, to_follow) = mpsc::channel(NAMED_PLANS);
+        let active = Arc::new(ActivePlan::connect(plan, &named_plans).await?);
+        let (changes, state) = watch::channel(SessionState { session, active, ended: None });
         let request = Arc::new(Mutex::new(request));
         let mut following = JoinSet::new();
-        following.spawn(learn(learning, says.clone()));
-        following.spawn(follow(coordinator.clone(), request.clone(), events, says));
+        following.spawn(follow_compositors(to_follow, changes.clone()));
+        following.spawn(follow_coordinator(coordinator.clone(), request.clone(), events, changes));
         Ok(Self { codec, planes, state, _following: following, coordinator: coordinator.clone(), request })
     }
 
-    /// Asks for another number of views a set, or another rate, from now on; plans follow.
+    /// Asks for another number of views a set, or another frame rate, from now on; plans follow.
     ///
     /// # Errors
     /// The coordinator's; a session that has ended.
     pub async fn change(&self, views_per_set: u32, frames_per_s: Option<f64>) -> Result<(), ClientError> {
-        self.say(|request| (request.views_per_set, request.frames_per_s) = (views_per_set, frames_per_s)).await
+        self.change_request(|request| (request.views_per_set, request.frames_per_s) = (views_per_set, frames_per_s))
+            .await
     }
 
-    /// Looks from elsewhere from now on: plans follow, with view cells around these viewpoints. Only of a session that was
-    /// opened with viewpoints.
+    /// Moves the session's viewpoints; plans follow, with view cells around them. The session must have been opened with
+    /// viewpoints.
     ///
     /// # Errors
     /// The coordinator's; a session that has ended.
-    pub async fn look_from(&self, viewpoints: Vec<PinholeCamera>) -> Result<(), ClientError> {
-        self.say(|request| request.viewpoints.clone_from(&viewpoints)).await
+    pub async fn set_viewpoints(&self, viewpoints: Vec<PinholeCamera>) -> Result<(), ClientError> {
+        self.change_request(|request| request.viewpoints.clone_from(&viewpoints)).await
     }
 
-    async fn say(&self, change: impl Fn(&mut SessionRequest)) -> Result<(), ClientError> {
-        let mut asked = self.request().clone();
-        change(&mut asked);
-        let SessionRequest { views_per_set, frames_per_s, viewpoints, .. } = asked;
+    async fn change_request(&self, change: impl Fn(&mut SessionRequest)) -> Result<(), ClientError> {
+        let mut changed = self.request.lock().clone();
+        change(&mut changed);
+        let SessionRequest { views_per_set, frames_per_s, viewpoints, .. } = changed;
         let session = self.state.borrow().session;
         let viewpoints = (!viewpoints.is_empty()).then_some(viewpoints);
         let message = ChangeSession { session, views_per_set, frames_per_s, viewpoints };
         let answer = self.coordinator.change_session(message).await;
         let refuses = |status: &Status| [Code::InvalidArgument, Code::ResourceExhausted].contains(&status.code());
         if !answer.as_ref().is_err_and(refuses) {
-            // What is asked for when the coordinator comes back, too; a session is opened for one view at least.
-            let mut request = self.request();
+            // The session is opened again with it when the coordinator comes back; a session has one view at least.
+            let mut request = self.request.lock();
             change(&mut request);
             request.views_per_set = request.views_per_set.max(1);
         }
         answer.map_err(ClientError::coordinator)
     }
 
-    fn request(&self) -> MutexGuard<'_, SessionRequest> {
-        self.request.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// The plan in force, its costs and its reason. It changes as nodes come and go.
     #[must_use]
     pub fn plan(&self) -> SessionPlan {
-        self.state.borrow().live.plan.clone()
+        self.state.borrow().active.plan.clone()
     }
 
     /// Why the session has ended, if it has.
@@ -117,13 +107,13 @@ impl Session {
         self.state.borrow().ended.clone()
     }
 
-    /// Asks for views by the session's own method. Frames come in the order they are ready; compositors
-    /// work at the same time, each at first on its share of every set's views, then on what is left of others'.
+    /// Requests views by the method of the plan in force. Frames are received in the order they are ready. All
+    /// compositors work at the same time, each at first on its own share of every set's views.
     ///
     /// # Errors
     /// For frame numbers given twice, sets beyond the timeline, bad cameras, and a session that has ended.
     pub fn render_views(&self, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
-        self.ask(None, requests)
+        self.request_views(None, requests)
     }
 
     /// As [`Session::render_views`], by another method.
@@ -131,46 +121,26 @@ impl Session {
     /// # Errors
     /// As there.
     pub fn render_views_by(&self, method: &str, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
-        self.ask(Some(method), requests)
+        self.request_views(Some(method), requests)
     }
 
-    /// By the method of whatever plan is in force, unless one is given.
-    fn ask(&self, method: Option<&str>, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
-        let live = self.state.borrow().live.clone();
+    fn request_views(&self, method: Option<&str>, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
+        let active = self.state.borrow().active.clone();
         if let Some(reason) = self.ended() {
             return Err(ClientError::Ended { reason });
         }
-        requests.iter().try_for_each(|request| check(request, &live))?;
+        requests.iter().try_for_each(|request| request.check(&active.plan.assignment))?;
         let expected = Expected::new(requests.iter().copied(), self.planes)?;
-        let template = cluster::RenderViews {
-            plan_epoch: live.plan.assignment.plan_epoch,
-            set_index: 0,
-            method: method.unwrap_or_default().to_owned(),
-            codec: self.codec,
-            planes: self.planes,
-            views: Vec::new(),
-            live: None,
-        };
+        let template = Template { method: method.map(str::to_owned), codec: self.codec, planes: self.planes };
         Ok(Frames::start(self.state.clone(), template, requests, expected))
     }
 
-    /// Frames of a camera that moves, by the session's own method: one long stream to one compositor, of which the newest
-    /// pose counts.
+    /// Frames of a camera that moves, by the method of the plan in force. They are sent on one long stream from one
+    /// compositor, on which the newest pose counts.
     #[must_use]
     pub fn live(&self) -> LiveView {
         LiveView::start(self.state.clone(), self.codec, self.planes)
     }
-}
-
-pub(crate) fn check(request: &ViewRequest, live: &Live) -> Result<(), ClientError> {
-    let camera_error = |error: depth_image::CameraError| ClientError::Invalid {
-        field: "camera",
-        reason: format!("frame {}: {error}", request.frame),
-    };
-    request.camera.validate().map_err(camera_error)?;
-    let beyond =
-        || ClientError::Invalid { field: "set_index", reason: format!("{} is beyond the timeline", request.set_index) };
-    live.plan.assignment.sample_set_id(request.set_index).map(drop).ok_or_else(beyond)
 }
 
 async fn plan_of(

@@ -1,7 +1,7 @@
 //! The distribution of a batch's views among compositors, by work stealing.
 //!
 //! Every compositor begins with a contiguous share of each set by its weight, and is asked for little of it at a time. A
-//! compositor whose share is used up takes the back half of the largest share that is left: deliveries show a node's speed
+//! compositor whose share is used up takes the back half of the largest share that is left. Deliveries show a node's speed
 //! sooner than anything else (Lages §6, dynamic load balancing).
 
 use std::collections::VecDeque;
@@ -61,8 +61,8 @@ fn cut_front(share: &mut Range<usize>, most: usize) -> Range<usize> {
     front
 }
 
-/// The fraction from which the ends of a set's shares are rounded up, in parts of 2³²: a half in the first set, and evenly
-/// spread in the others, so that compositors take turns with the remainder. Sets of fewer views than compositors are all
+/// The fraction from which the ends of a set's shares are rounded up, in parts of 2³². It is a half in the first set, and
+/// evenly spread in the others, so that compositors take turns with the remainder. Sets of fewer views than compositors are all
 /// rounded alike: to make one view, a set must be loaded.
 fn rounding(set: usize, views: usize, compositors: usize) -> u32 {
     /// The golden section spreads any number of sets evenly.

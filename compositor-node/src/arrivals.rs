@@ -1,8 +1,9 @@
-//! Where streams leave views for the device.
+//! The views of all streams that wait for the device.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
+use parking_lot::Mutex;
 use tokio::sync::Notify;
 
 use crate::batch::{BatchKey, Waiting};
@@ -14,7 +15,7 @@ impl Keyed for Waiting {
     }
 }
 
-/// All views that wait. Bounded: each holds a credit.
+/// Bounded: each view that waits holds a credit.
 #[derive(Default)]
 pub(crate) struct Arrivals {
     queue: Mutex<FairQueue<Waiting>>,
@@ -22,30 +23,26 @@ pub(crate) struct Arrivals {
 }
 
 impl Arrivals {
-    fn locked(&self) -> MutexGuard<'_, FairQueue<Waiting>> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     pub(crate) fn push(&self, stream: u64, views: impl IntoIterator<Item = Waiting>) {
-        self.locked().push(stream, views);
+        self.queue.lock().push(stream, views);
         self.added.notify_one();
     }
 
-    /// Batches are kept small as long as the viewer is there.
+    /// Counts a live stream as open: batches are small until the guard is dropped.
     pub(crate) fn viewer(self: &Arc<Self>) -> Viewer {
-        self.locked().add_viewer();
+        self.queue.lock().add_viewer();
         Viewer(self.clone())
     }
 
-    /// Takes back what a stream has here.
+    /// Takes back a stream's views.
     pub(crate) fn withdraw(&self, stream: u64) -> VecDeque<Waiting> {
-        self.locked().withdraw(stream)
+        self.queue.lock().withdraw(stream)
     }
 
-    /// The next batch, as soon as there is one.
+    /// Waits for the next batch.
     pub(crate) async fn next_batch(&self) -> Vec<Waiting> {
         loop {
-            let batch = self.locked().take_batch();
+            let batch = self.queue.lock().take_batch();
             if !batch.is_empty() {
                 return batch;
             }
@@ -59,6 +56,6 @@ pub(crate) struct Viewer(Arc<Arrivals>);
 
 impl Drop for Viewer {
     fn drop(&mut self) {
-        self.0.locked().remove_viewer();
+        self.0.queue.lock().remove_viewer();
     }
 }

@@ -20,7 +20,7 @@ const MAX_BATCH_PIXELS: usize = 64 << 20;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct BatchKey {
     pub(crate) sample_set_id: SampleSetId,
-    /// Whose images of the set it is made from.
+    /// The view cell whose images of the set it is made from.
     pub(crate) cell: u32,
     pub(crate) method: String,
     pub(crate) planes: ViewPlanes,
@@ -28,13 +28,13 @@ pub(crate) struct BatchKey {
 }
 
 impl BatchKey {
-    /// Views of one call.
-    pub(crate) fn most(&self) -> usize {
+    /// The most views of one call to the device.
+    pub(crate) fn max_views(&self) -> usize {
         (MAX_BATCH_PIXELS / (self.size_px.element_product() as usize).max(1)).clamp(1, MAX_BATCH)
     }
 }
 
-/// What views are made from.
+/// The source of views.
 #[derive(Clone)]
 pub(crate) enum Source {
     /// A complete sample set.
@@ -44,7 +44,7 @@ pub(crate) enum Source {
 }
 
 impl Source {
-    /// How long the set has been there.
+    /// The age of the set at `now`; 0 where views are drawn from the scene.
     pub(crate) fn age_s(&self, now: Instant) -> f64 {
         match self {
             Self::Set(set) => now.saturating_duration_since(set.since).as_secs_f64(),
@@ -53,22 +53,22 @@ impl Source {
     }
 }
 
-/// When a view's request came, and what it has waited for so far.
+/// The waits of a view before it is made.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Waits {
     pub(crate) arrived: Instant,
     pub(crate) set_wait_s: f64,
-    /// When it was ready for the device.
+    /// The time at which it was ready for the device.
     pub(crate) queued: Instant,
 }
 
 impl Waits {
-    /// Of a view that is ready for the device now.
+    /// The waits of a view that is ready for the device now.
     pub(crate) fn until_now(arrived: Instant, set_wait_s: f64) -> Self {
         Self { arrived, set_wait_s, queued: Instant::now() }
     }
 
-    /// What it waited for room, before it was ready.
+    /// The wait for room, before it was ready.
     pub(crate) fn credit_wait_s(&self) -> f64 {
         (self.queued.saturating_duration_since(self.arrived).as_secs_f64() - self.set_wait_s).max(0.0)
     }

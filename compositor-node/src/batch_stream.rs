@@ -1,4 +1,4 @@
-//! A stream whose every view is made.
+//! A stream on which every view is made.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,19 +14,19 @@ use wire::rpc::Messages;
 use crate::batch::{BatchKey, MAX_BATCH, Source, Waiting, Waits};
 use crate::outbox::Reply;
 use crate::quota::{Credit, closed};
-use crate::service::ClientStream;
+use crate::shared::ClientStream;
 
-/// Pixels of one stream's views that wait or are not sent yet.
+/// Pixels of one stream's views that are waiting or not sent yet.
 const STREAM_PIXELS: u32 = 128 << 20;
-/// Views of one stream that wait or are not sent yet.
+/// Views of one stream that are waiting or not sent yet.
 const STREAM_VIEWS: u32 = 256;
 
 pub(crate) struct BatchStream<'a> {
     client: &'a ClientStream,
     reply: Reply,
     credits: Arc<Semaphore>,
-    /// Whether the node has taken on a view of it: from then on it waits for room, as its client asks for the rest of a
-    /// batch only when it has some of it.
+    /// Whether the node has accepted a view of it. From then on it waits for room: its client requests the rest of a batch
+    /// only when it has received some of it.
     admitted: bool,
 }
 
@@ -61,27 +61,27 @@ impl<'a> BatchStream<'a> {
         }
     }
 
-    /// Whether views are under way.
+    /// Whether views are in flight.
     fn is_busy(&self) -> bool {
         self.credits.available_permits() < STREAM_PIXELS as usize
     }
 
-    /// Of every view cell the views that are in it; all cells' images are asked for at once.
+    /// Enqueues the views of every view cell; the images of all cells are fetched at once.
     async fn enqueue(&mut self, request: RenderViews) -> Result<(), Status> {
         let (arrived, shared) = (Instant::now(), &self.client.shared);
         let plan = shared.of_compositor(shared.plan.require(request.plan_epoch)?)?;
-        let asked = by_cell(&plan, &request.views).into_iter().map(|(cell, views)| {
+        let sources = by_cell(&plan, &request.views).into_iter().map(|(cell, views)| {
             let (shared, plan, set_index) = (shared.clone(), plan.clone(), request.set_index);
             (cell, views, tokio::spawn(async move { shared.source(&plan, (set_index, cell)).await }))
         });
-        for (cell, views, source) in asked.collect::<Vec<_>>() {
+        for (cell, views, source) in sources.collect::<Vec<_>>() {
             let (source, id, set_wait_s) = source.await.map_err(|error| Status::internal(error.to_string()))??;
             self.enqueue_of_cell(&request, (cell, &views), (&source, id), (arrived, set_wait_s)).await?;
         }
         Ok(())
     }
 
-    /// Hands over views in pieces of one batch, as far as there is credit.
+    /// Hands over views in pieces of one batch, as credit allows.
     async fn enqueue_of_cell(
         &mut self,
         request: &RenderViews,
@@ -92,7 +92,7 @@ impl<'a> BatchStream<'a> {
         for views in views.chunks(MAX_BATCH) {
             let mut batch = Vec::with_capacity(views.len());
             for view in views {
-                // What holds no credit yet must not keep back what does: at the bound, hand over first.
+                // A view without credit must not keep back those with credit: these are handed over first.
                 let credit = match self.try_credit(view)? {
                     Some(credit) => credit,
                     None => {
@@ -128,7 +128,7 @@ impl<'a> BatchStream<'a> {
         Waiting { key, source, view, codec: request.codec, waits, reply, credit }
     }
 
-    /// None where it must wait; an error where others have taken the node's room and this stream has had none.
+    /// `None` where the view must wait; an error where other streams have taken the node's room and this one has had none.
     fn try_credit(&self, view: &RequestedView) -> Result<Option<Credit>, Status> {
         let Ok(stream) = self.credits.clone().try_acquire_many_owned(price(view)) else {
             return Ok(None);
@@ -166,8 +166,8 @@ fn by_cell(plan: &Assignment, views: &[RequestedView]) -> BTreeMap<u32, Vec<Requ
     cells
 }
 
-/// What a view takes of its stream's pixels: at least so much that the views are bounded too, at most
-/// all, so that one view larger than the bound still passes, alone.
+/// The pixels of its stream that a view takes. Small views take more than they have, so that their number is bounded. A
+/// view takes at most all, so that one larger than the bound still passes, alone.
 fn price(view: &RequestedView) -> u32 {
     let pixels = u32::try_from(view.camera.pixel_count()).unwrap_or(STREAM_PIXELS);
     pixels.clamp(STREAM_PIXELS / STREAM_VIEWS, STREAM_PIXELS)

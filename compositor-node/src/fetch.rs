@@ -1,30 +1,24 @@
-//! One complete sample set: pulled from all its samplers at once, or from a compositor that passes it on.
+//! One complete sample set: fetched from all its samplers at once, or from a compositor that relays it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use cluster::{FetchImages, SamplerShare};
-use codec::{Chunk, DecodeLimits, Reassembler, SampleSetId};
+use cluster::SamplerShare;
 use depth_image::DepthImage;
 use node::{CellPlan, Connections, Deadlines, SampleSet};
 use tokio::task::JoinSet;
-use tonic::{Code, Status};
-use wire::rpc::{Messages, SamplerClient};
+use tonic::Status;
 
-use crate::incoming::{Incoming, check, check_visibility, decode, whole};
-use crate::passing::Passing;
+use crate::chunk_stream::join_tiles;
+use crate::fetch_share::{FetchTimes, FetchedShare, ShareRequest, fetch_share};
+use crate::relay_buffer::RelayBuffer;
 use crate::reports::NotFetched;
 
-/// Before a sampler is asked again for what it has already made.
-const PAUSES: [Duration; 2] = [Duration::from_millis(50), Duration::from_millis(200)];
-/// Who took longer than this to fail would do so again.
-const SOON: Duration = Duration::from_secs(2);
+/// The time that a relay may be silent. The samplers are asked then, and have the images or not.
+const RELAY_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// How long a relay may be silent: samplers are asked then, who have sampled by that time or not.
-const RELAY_PATIENCE: Duration = Duration::from_secs(3);
-
-/// What fetches sets for one compositor.
+/// Fetches sets for one compositor.
 #[derive(Debug)]
 pub(crate) struct Fetcher {
     node_name: String,
@@ -34,41 +28,28 @@ pub(crate) struct Fetcher {
     failed_relay_epoch: AtomicU64,
 }
 
-/// A set, and what fetching it took.
+/// A set, and the times of its fetch.
 #[derive(Debug)]
 pub(crate) struct Fetched {
     pub(crate) set: SampleSet,
-    pub(crate) took: Took,
+    pub(crate) times: FetchTimes,
 }
 
-/// Of one fetch.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Took {
-    /// Decoding, of all images.
-    pub(crate) decode_s: f64,
-    /// Waiting for bytes after the first, and how many they were.
-    pub(crate) transfer_s: f64,
-    pub(crate) bytes: usize,
+/// The images of a set that have been fetched so far.
+struct Gathered {
+    images: Vec<Option<DepthImage>>,
+    times: FetchTimes,
 }
 
-impl Took {
-    fn add(&mut self, other: Self) {
-        self.decode_s += other.decode_s;
-        self.transfer_s += other.transfer_s;
-        self.bytes += other.bytes;
+impl Gathered {
+    fn add(&mut self, shares: Vec<FetchedShare>) {
+        for share in shares {
+            self.times.add(share.times);
+            for (index, image) in share.images {
+                self.images[index as usize] = Some(image);
+            }
+        }
     }
-}
-
-type Images = Vec<(u32, DepthImage)>;
-
-/// Whom to ask for which images.
-#[derive(Debug, Clone)]
-struct Ask {
-    share: SamplerShare,
-    /// Until it answers: a sampler does so when it has sampled.
-    answer_within: Duration,
-    /// From then on to the first chunk.
-    first_within: Duration,
 }
 
 impl Fetcher {
@@ -77,182 +58,114 @@ impl Fetcher {
         Self { node_name, connections, deadlines, failed_relay_epoch: AtomicU64::new(0) }
     }
 
-    /// Every image of a set, whole and decoded. They are passed on as they come.
+    /// Every image of a set, whole and decoded. They go to `relay` as they arrive.
     pub(crate) async fn fetch(
         self: &Arc<Self>,
         plan: &CellPlan,
         set_index: u32,
-        passing: Option<&Passing>,
+        relay: Option<&RelayBuffer>,
     ) -> Result<Fetched, NotFetched> {
-        let fetched = self.fetch_images(plan, set_index, passing).await;
-        if let Some(passing) = passing {
-            passing.end(fetched.as_ref().map(drop).map_err(|failed| failed.status.clone()));
+        let fetched = self.fetch_images(plan, set_index, relay).await;
+        if let Some(relay) = relay {
+            relay.end(fetched.as_ref().map(drop).map_err(|failed| failed.status.clone()));
         }
-        let (images, took) = fetched?;
+        let (images, times) = fetched?;
         let workload = &plan.workload;
         let set = SampleSet {
-            images: whole(plan, images).await?,
+            images: join_tiles(plan, images).await?,
             volume: workload.volume,
             background_linear: workload.background_linear,
             illumination: workload.illumination.clone(),
             lighting: workload.lighting.clone(),
         };
-        Ok(Fetched { set, took })
+        Ok(Fetched { set, times })
     }
 
-    /// All that is sampled of a set, in its order.
+    /// All images of a set, or their tiles, in their order.
     async fn fetch_images(
         self: &Arc<Self>,
         plan: &CellPlan,
         set_index: u32,
-        passing: Option<&Passing>,
-    ) -> Result<(Vec<DepthImage>, Took), NotFetched> {
-        let mut images: Vec<Option<DepthImage>> = vec![None; plan.image_count()];
-        let mut took = Took::default();
-        if let Some(relay) = self.relay(plan) {
-            match self.fetch_all(plan, set_index, vec![relay], passing).await {
-                Ok(came) => keep(&mut images, &mut took, came),
+        relay: Option<&RelayBuffer>,
+    ) -> Result<(Vec<DepthImage>, FetchTimes), NotFetched> {
+        let mut gathered = Gathered { images: vec![None; plan.image_count()], times: FetchTimes::default() };
+        if let Some(request) = self.request_to_relay(plan) {
+            match self.fetch_all(plan, set_index, vec![request], relay).await {
+                Ok(shares) => gathered.add(shares),
                 Err(NotFetched { status, .. }) => {
-                    tracing::info!(
-                        plan_epoch = plan.plan_epoch,
-                        reason = status.message(),
-                        "samplers in place of a relay"
-                    );
+                    let (plan_epoch, reason) = (plan.plan_epoch, status.message());
+                    tracing::info!(plan_epoch, reason, "samplers in place of a relay");
                     self.failed_relay_epoch.store(plan.plan_epoch, Ordering::Relaxed);
                 }
             }
         }
-        let missing = self.asks(plan, set_index, &images);
-        keep(&mut images, &mut took, self.fetch_all(plan, set_index, missing, passing).await?);
-        let complete = images.into_iter().collect::<Option<_>>();
+        let missing = self.requests_to_samplers(plan, set_index, &gathered.images);
+        gathered.add(self.fetch_all(plan, set_index, missing, relay).await?);
+        let complete = gathered.images.into_iter().collect::<Option<_>>();
         let complete = complete.ok_or_else(|| Status::data_loss(format!("sample set {set_index} is not complete")))?;
-        Ok((complete, took))
+        Ok((complete, gathered.times))
     }
 
-    fn relay(&self, plan: &CellPlan) -> Option<Ask> {
+    /// All images, from the relay of this compositor; `None` without one, or where it has failed.
+    fn request_to_relay(&self, plan: &CellPlan) -> Option<ShareRequest> {
         let has_failed = self.failed_relay_epoch.load(Ordering::Relaxed) == plan.plan_epoch;
         let relay = plan.relay_of(&self.node_name).filter(|_| !has_failed)?;
         let image_indices = (0..plan.image_count() as u32).collect();
-        let share = SamplerShare { node_name: relay.node_name.clone(), address: relay.address.clone(), image_indices };
-        Some(Ask { share, answer_within: RELAY_PATIENCE, first_within: RELAY_PATIENCE })
+        Some(ShareRequest {
+            share: SamplerShare { node_name: relay.node_name.clone(), address: relay.address.clone(), image_indices },
+            answer_within: RELAY_TIMEOUT,
+            first_within: RELAY_TIMEOUT,
+            chunk_within: self.deadlines.chunk,
+        })
     }
 
-    fn asks(&self, plan: &CellPlan, set_index: u32, have: &[Option<DepthImage>]) -> Vec<Ask> {
-        let ask = |share: &SamplerShare| {
-            let is_missing = |index: &u32| have.get(*index as usize).is_some_and(Option::is_none);
+    /// The missing images, from their samplers.
+    fn requests_to_samplers(
+        &self,
+        plan: &CellPlan,
+        set_index: u32,
+        images: &[Option<DepthImage>],
+    ) -> Vec<ShareRequest> {
+        let Deadlines { work, chunk, .. } = self.deadlines;
+        let request = |share: &SamplerShare| {
+            let is_missing = |index: &u32| images.get(*index as usize).is_some_and(Option::is_none);
             let image_indices = share.image_indices.iter().copied().filter(is_missing).collect();
-            let Deadlines { work, chunk, .. } = self.deadlines;
             let share = SamplerShare { image_indices, ..share.clone() };
-            Ask { share, answer_within: work, first_within: chunk }
+            ShareRequest { share, answer_within: work, first_within: chunk, chunk_within: chunk }
         };
-        let asks = plan.samplers_of(set_index).iter().map(ask);
-        asks.filter(|ask| !ask.share.image_indices.is_empty()).collect()
+        let requests = plan.samplers_of(set_index).iter().map(request);
+        requests.filter(|request| !request.share.image_indices.is_empty()).collect()
     }
 
+    /// Fetches all shares at the same time.
     async fn fetch_all(
         self: &Arc<Self>,
         plan: &CellPlan,
         set_index: u32,
-        asks: Vec<Ask>,
-        passing: Option<&Passing>,
-    ) -> Result<Vec<(Images, Took)>, NotFetched> {
+        requests: Vec<ShareRequest>,
+        relay: Option<&RelayBuffer>,
+    ) -> Result<Vec<FetchedShare>, NotFetched> {
         let mut fetches = JoinSet::new();
-        for ask in asks {
-            let (fetcher, plan, passing) = (self.clone(), plan.clone(), passing.cloned());
+        for request in requests {
+            let (fetcher, plan, relay) = (self.clone(), plan.clone(), relay.cloned());
             fetches.spawn(async move {
-                let images = fetcher.fetch_again(&plan, set_index, &ask, passing.as_ref()).await;
-                images.map_err(|status| not_fetched(ask.share, &status))
+                let fetched = fetch_share(&fetcher.connections, &plan, set_index, &request, relay.as_ref()).await;
+                fetched.map_err(|status| not_fetched(request.share, &status))
             });
         }
-        let mut all = Vec::new();
+        let mut shares = Vec::new();
         while let Some(share) = fetches.join_next().await {
-            all.push(share.map_err(|error| Status::internal(error.to_string()))??);
+            shares.push(share.map_err(|error| Status::internal(error.to_string()))??);
         }
-        Ok(all)
-    }
-
-    /// A share, asked for again where a fault may have been the network's.
-    async fn fetch_again(
-        &self,
-        plan: &CellPlan,
-        set_index: u32,
-        ask: &Ask,
-        passing: Option<&Passing>,
-    ) -> Result<(Images, Took), Status> {
-        for pause in PAUSES {
-            let start = Instant::now();
-            match self.fetch_share(plan, set_index, ask, passing).await {
-                Err(status) if may_pass(&status, start.elapsed()) => tokio::time::sleep(pause).await,
-                done => return done,
-            }
-        }
-        self.fetch_share(plan, set_index, ask, passing).await
-    }
-
-    async fn fetch_share(
-        &self,
-        plan: &CellPlan,
-        set_index: u32,
-        ask: &Ask,
-        passing: Option<&Passing>,
-    ) -> Result<(Images, Took), Status> {
-        let share = &ask.share;
-        let id = SampleSetId { plan_epoch: plan.plan_epoch, index: set_index.into() };
-        let mut incoming = Incoming::new(self.call(plan, id, ask).await?, ask.first_within, self.deadlines.chunk);
-        let mut reassembler = Reassembler::new(DecodeLimits::default(), id);
-        let cameras = plan.sampled_cameras();
-        let (mut images, mut decode_s) = (Vec::new(), 0.0);
-        while let Some(chunk) = incoming.next().await? {
-            let Some(whole) =
-                reassembler.push(chunk).map_err(|error| Status::data_loss(format!("chunk is corrupt: {error}")))?
-            else {
-                continue;
-            };
-            check(&whole, id, share, &images)?;
-            let (index, encoded) = (whole.image_index, whole.image.clone());
-            let start = Instant::now();
-            let image = decode(&cameras, whole).await?;
-            decode_s += start.elapsed().as_secs_f64();
-            check_visibility(plan, index, &image)?;
-            passing.into_iter().for_each(|passing| passing.add(index, encoded.clone()));
-            images.push((index, image));
-        }
-        if images.len() < share.image_indices.len() {
-            let (came, wanted) = (images.len(), share.image_indices.len());
-            return Err(Status::data_loss(format!("{came} images came of {wanted}")));
-        }
-        Ok((images, Took { decode_s, transfer_s: incoming.transfer_s, bytes: incoming.bytes }))
-    }
-
-    async fn call(&self, plan: &CellPlan, id: SampleSetId, ask: &Ask) -> Result<Messages<Chunk>, Status> {
-        let client = SamplerClient::new(self.connections.to(&ask.share.address).await?);
-        let image_indices = ask.share.image_indices.clone();
-        let SampleSetId { plan_epoch, index } = id;
-        let request = FetchImages { plan_epoch, set_index: index as u32, cell: plan.cell(), image_indices };
-        let answer = tokio::time::timeout(ask.answer_within, client.fetch_sample_images(request)).await;
-        answer.map_err(|_| Status::deadline_exceeded("no images in time"))?
+        Ok(shares)
     }
 }
 
 fn not_fetched(share: SamplerShare, status: &Status) -> NotFetched {
     let text = format!("sampler {} at {}: {}", share.node_name, share.address, status.message());
-    // A refusal says which plan is in force: this node may not hear the coordinator, nor may its client.
+    // The status keeps the plan in force that a refusal names: this node, and its client, may not reach the coordinator.
     let status = Status::with_metadata(status.code(), text, status.metadata().clone());
     NotFetched { sampler: Some(share.node_name), status }
-}
-
-fn may_pass(status: &Status, took: Duration) -> bool {
-    let network = [Code::Unavailable, Code::Unknown, Code::Internal, Code::Cancelled, Code::OutOfRange];
-    status.code() == Code::DataLoss || (network.contains(&status.code()) && took < SOON)
-}
-
-fn keep(images: &mut [Option<DepthImage>], took: &mut Took, came: Vec<(Images, Took)>) {
-    for (of_one, took_one) in came {
-        took.add(took_one);
-        for (index, image) in of_one {
-            images[index as usize] = Some(image);
-        }
-    }
 }
 
 #[cfg(test)]

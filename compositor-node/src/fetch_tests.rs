@@ -1,9 +1,9 @@
-//! A sampler that sends what it should not, over a real port.
+//! A sampler that sends corrupt chunks, over a real port.
 
 use std::time::Duration;
 
-use cluster::{Policy, SceneHash, SceneRef, Timeline, Workload};
-use codec::{Chunk, ChunkBody, PlaneSet, encode_depth_image, split_into_chunks};
+use cluster::{FetchImages, Policy, SceneHash, SceneRef, Timeline, Workload};
+use codec::{Chunk, ChunkBody, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
 use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, SpecularPlanes};
 use glam::{UVec2, Vec3};
 use tokio::net::TcpListener;
@@ -40,7 +40,7 @@ fn dull() -> DepthImage {
     }
 }
 
-/// With so many planes of visibility.
+/// An image with `visibilities` planes of visibility.
 fn shiny(visibilities: usize) -> DepthImage {
     let specular = SpecularPlanes {
         reflectance_srgb8_roughness8: (0..256).rev().collect(),
@@ -56,12 +56,12 @@ fn chunks_of(image: &DepthImage) -> Vec<Chunk> {
     (0..2).flat_map(|index| split_into_chunks(id, index, encoded.clone())).collect()
 }
 
-/// The right ones.
-fn right() -> Vec<Chunk> {
+/// Chunks as they should be.
+fn good_chunks() -> Vec<Chunk> {
     chunks_of(&dull())
 }
 
-/// Sends chunks as they are, and then says nothing more.
+/// Sends chunks as they are, and then is silent.
 struct Script {
     chunks: Vec<Chunk>,
     stays_open: bool,
@@ -116,12 +116,12 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
 }
 
 #[tokio::test]
-async fn a_whole_set_arrives() {
-    assert_eq!(fetched(right(), false).await.unwrap().images.len(), 2);
+async fn a_whole_set_is_fetched() {
+    assert_eq!(fetched(good_chunks(), false).await.unwrap().images.len(), 2);
 }
 
 #[tokio::test]
-async fn what_highlights_need_arrives() {
+async fn planes_of_highlights_are_fetched() {
     for visibilities in [0, 2] {
         let set = fetched(chunks_of(&shiny(visibilities)), false).await.unwrap();
         assert_eq!(set.illumination, illumination());
@@ -130,7 +130,7 @@ async fn what_highlights_need_arrives() {
 }
 
 #[tokio::test]
-async fn visibility_of_other_lights_is_refused() {
+async fn an_image_with_visibility_of_other_lights_is_refused() {
     for visibilities in [1, 3] {
         let refused = fetched(chunks_of(&shiny(visibilities)), false).await.expect_err("for other lights");
         assert_eq!(refused.code(), Code::DataLoss, "{refused}");
@@ -139,7 +139,7 @@ async fn visibility_of_other_lights_is_refused() {
 }
 
 #[tokio::test]
-async fn spoilt_chunks_are_refused_by_name() {
+async fn corrupt_chunks_are_refused_with_the_name_of_the_sampler() {
     let spoilt: [(&str, Spoil); 8] = [
         ("corrupt", |c| c[1].body = ChunkBody::Data(vec![0; 30].into())),
         ("truncated", |c| drop(c.pop())),
@@ -151,7 +151,7 @@ async fn spoilt_chunks_are_refused_by_name() {
         ("another image", |c| c.iter_mut().for_each(|c| c.image_index += 7)),
     ];
     for (what, spoil) in spoilt {
-        let mut chunks = right();
+        let mut chunks = good_chunks();
         spoil(&mut chunks);
         let refused = fetched(chunks, false).await.expect_err(what);
         assert_eq!(refused.code(), Code::DataLoss, "{what}: {refused}");
@@ -160,7 +160,7 @@ async fn spoilt_chunks_are_refused_by_name() {
 }
 
 #[tokio::test]
-async fn slow_chunks_have_a_deadline() {
-    let refused = fetched(right()[..3].to_vec(), true).await.expect_err("silent");
+async fn chunks_after_the_deadline_are_not_waited_for() {
+    let refused = fetched(good_chunks()[..3].to_vec(), true).await.expect_err("silent");
     assert_eq!(refused.code(), Code::DeadlineExceeded, "{refused}");
 }

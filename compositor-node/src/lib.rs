@@ -1,25 +1,29 @@
 //! The compositor's service: one complete sample set, many views.
 //!
-//! `fetch` pulls a set from its samplers, or from a compositor that passes it on (`passing`), `incoming` checks and decodes
-//! what comes, `sets` keeps the last few on
-//! the device and fetches the next ahead. `service` answers clients: `batch_stream` those that want every view they ask
-//! for, `live_stream` those that want the newest. Views wait in `arrivals`, where `queue` says whose turn it is; `render`
-//! makes and encodes them batch by batch, and `outbox` sends them. `quota` bounds all of it.
+//! Sets: `fetch` gathers the images of a set from its samplers, or from a compositor that relays them. `fetch_share` talks
+//! to one of these nodes, `chunk_stream` checks and decodes, and `relay_buffer` relays images to other compositors. `sets`
+//! keeps the latest few on the device and fetches the next ahead; `reports` names samplers that fail.
+//!
+//! Views: `service` answers clients. A `batch_stream` makes every view that is requested, a `live_stream` the newest. Views
+//! wait in `arrivals`, in the order of `queue`; `render` makes and encodes them batch by batch, and `outbox` sends them.
+//! `quota` bounds them all.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod arrivals;
 mod batch;
 mod batch_stream;
+mod chunk_stream;
 mod fetch;
-mod incoming;
+mod fetch_share;
 mod live_stream;
 mod outbox;
-mod passing;
 mod queue;
 mod quota;
+mod relay_buffer;
 mod render;
 mod reports;
 mod service;
 mod sets;
+mod shared;
 
 pub use service::CompositorService;

@@ -1,8 +1,8 @@
-//! A stream that shows what a camera sees as it moves: the newest pose counts.
+//! A stream that follows a moving camera: the newest pose counts.
 //!
-//! A pose waits in three places: until its set is there, until its client has taken a frame, and for the device. In each
-//! there is one of a stream at most, and a newer one takes its place. A set that is being fetched is never given up for a
-//! newer one: where sets come slower than poses, every set that comes is shown, with the newest pose of it.
+//! A pose waits for its set, for its client to take a frame, and for the device. A stream has one pose at most in each of
+//! these places, and a newer one replaces it. A set that is being fetched is never given up for a newer one. Where sets
+//! arrive more slowly than poses, every set is shown, with its newest pose.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -19,16 +19,14 @@ use crate::arrivals::Viewer;
 use crate::batch::{BatchKey, Source, Waiting, Waits};
 use crate::outbox::Reply;
 use crate::quota::{Credit, closed};
-use crate::service::ClientStream;
+use crate::shared::{ClientStream, Loaded};
 
-/// Frames that may be under way at once, until the client says that they have come: a third would only be older then.
+/// Frames that may be in flight until the client acknowledges them: a third would only be older.
 const CREDITS: usize = 2;
 
-/// What views of a set are made from, its name, and the seconds until it was there.
-type Loaded = (Source, SampleSetId, f64);
-type Work<T> = Pin<Box<dyn Future<Output = Result<T, Status>> + Send>>;
+type Pending<T> = Pin<Box<dyn Future<Output = Result<T, Status>> + Send>>;
 
-/// A view that was asked for.
+/// A view that was requested.
 struct Pose {
     request: RenderViews,
     view: RequestedView,
@@ -44,34 +42,34 @@ impl Pose {
     }
 }
 
-/// A pose whose set is there.
+/// A pose whose set is ready.
 struct Ready {
     pose: Pose,
     source: Source,
     id: SampleSetId,
     set_wait_s: f64,
-    /// Until there is room for it.
-    credit: Work<Credit>,
+    /// The wait for room.
+    credit: Pending<Credit>,
 }
 
 pub(crate) struct LiveStream<'a> {
     client: &'a ClientStream,
     reply: Reply,
     credits: Arc<Semaphore>,
-    /// The newest pose, of a set that is not asked for yet.
+    /// The newest pose, whose set is not being fetched yet.
     newest: Option<Pose>,
-    /// A pose whose set is on its way.
-    loading: Option<(Pose, Work<Loaded>)>,
+    /// The pose whose set is being fetched.
+    loading: Option<(Pose, Pending<Loaded>)>,
     ready: Option<Ready>,
-    /// That it was opened for, or that has followed.
+    /// The plan that the stream was opened under, or its successor.
     plan: Option<Arc<Assignment>>,
     last_frame: Option<u64>,
     _viewer: Viewer,
 }
 
-/// What comes next.
+/// The next event of a stream.
 enum Step {
-    Asked(Option<RenderViews>),
+    Requested(Option<RenderViews>),
     Loaded(Loaded),
     Credited(Credit),
 }
@@ -98,15 +96,15 @@ impl<'a> LiveStream<'a> {
         mut requests: Messages<RenderViews>,
     ) -> Result<(), Status> {
         let mut is_open = true;
-        self.take(first)?;
+        self.accept(first)?;
         while is_open || self.newest.is_some() || self.loading.is_some() || self.ready.is_some() {
             match self.step(&mut requests, is_open).await? {
-                Step::Asked(Some(request)) => self.take(request)?,
-                Step::Asked(None) => is_open = false,
+                Step::Requested(Some(request)) => self.accept(request)?,
+                Step::Requested(None) => is_open = false,
                 Step::Loaded(set) => self.loaded(set),
                 Step::Credited(credit) => self.credited(credit),
             }
-            self.go_on();
+            self.fetch_next();
         }
         Ok(())
     }
@@ -117,14 +115,14 @@ impl<'a> LiveStream<'a> {
         let loading = self.loading.as_mut().map(|(_, work)| work);
         tokio::select! {
             biased;
-            asked = next_within(requests, idle, "poses"), if is_open => asked.map(Step::Asked),
-            set = of(loading) => set.map(Step::Loaded),
-            credit = of(ready) => credit.map(Step::Credited),
+            request = next_within(requests, idle, "poses"), if is_open => request.map(Step::Requested),
+            set = wait_for(loading) => set.map(Step::Loaded),
+            credit = wait_for(ready) => credit.map(Step::Credited),
         }
     }
 
-    /// A request: what it acknowledges, and its pose, which takes the place of an older one of its set.
-    fn take(&mut self, request: RenderViews) -> Result<(), Status> {
+    /// Accepts an acknowledgement, and a pose, which replaces an older one of its set.
+    fn accept(&mut self, request: RenderViews) -> Result<(), Status> {
         let live = request.live.ok_or_else(|| Status::invalid_argument("live: the stream's first request was"))?;
         self.client.outbox.acknowledge(live.acknowledged_frame);
         let plan = self.plan_of(request.plan_epoch)?;
@@ -134,14 +132,14 @@ impl<'a> LiveStream<'a> {
         self.check_number(view.frame)?;
         let cell = plan.cell_of(&view.camera);
         let pose = Pose { request, view, plan, cell, arrived: Instant::now() };
-        self.note(&pose, &live);
+        self.log_request(&pose, &live);
         let older = self.put(pose);
-        self.replaced(older);
-        self.go_on();
+        self.count_replaced(older);
+        self.fetch_next();
         Ok(())
     }
 
-    /// Where a pose of the same set waits, or else for its set to be asked for; gives the one whose place it takes.
+    /// Puts a pose in place of one of the same set, or else in place of the newest; gives the pose that it replaces.
     fn put(&mut self, pose: Pose) -> Option<Pose> {
         if self.ready.as_ref().is_some_and(|ready| ready.pose.shows_set_of(&pose)) {
             let credit = self.credit(&pose.view);
@@ -157,14 +155,14 @@ impl<'a> LiveStream<'a> {
         }
     }
 
-    fn note(&self, pose: &Pose, live: &LiveRequest) {
+    fn log_request(&self, pose: &Pose, live: &LiveRequest) {
         tracing::debug!(
             stream = self.client.stream,
             client = live.client_id,
             frame = pose.view.frame,
             plan_epoch = pose.plan.plan_epoch,
             set_index = pose.request.set_index,
-            "asked"
+            "requested"
         );
     }
 
@@ -177,8 +175,8 @@ impl<'a> LiveStream<'a> {
         }
     }
 
-    /// Nodes take a plan before clients hear of it. Until they do, they are served by the new one, where it shows the
-    /// same.
+    /// The plan of a request. Nodes take a plan before clients hear of it: until they do, the new plan serves them, where it
+    /// shows the same.
     fn plan_of(&mut self, plan_epoch: u64) -> Result<Arc<Assignment>, Status> {
         let shared = &self.client.shared;
         let follows = |plan: &Arc<Assignment>| {
@@ -193,15 +191,15 @@ impl<'a> LiveStream<'a> {
         Ok(plan)
     }
 
-    fn replaced(&self, older: Option<Pose>) {
+    fn count_replaced(&self, older: Option<Pose>) {
         if let Some(older) = older {
             tracing::debug!(stream = self.client.stream, frame = older.view.frame, "replaced by a newer pose");
             self.client.shared.metrics.drop_view("newer pose");
         }
     }
 
-    /// Asks for the newest pose's set, if no other is being asked for.
-    fn go_on(&mut self) {
+    /// Fetches the newest pose's set, if no other is being fetched.
+    fn fetch_next(&mut self) {
         if self.loading.is_some() {
             return;
         }
@@ -213,16 +211,16 @@ impl<'a> LiveStream<'a> {
 
     fn loaded(&mut self, (source, id, set_wait_s): Loaded) {
         let Some((pose, _)) = self.loading.take() else { return };
-        // It may have come after the set was asked for.
+        // The pose may have arrived after the fetch began.
         let set_wait_s = set_wait_s.min(pose.arrived.elapsed().as_secs_f64());
         let ready = Ready { credit: self.credit(&pose.view), pose, source, id, set_wait_s };
         let older = self.ready.replace(ready);
-        self.replaced(older.map(|ready| ready.pose));
-        self.take_place_of_waiting();
+        self.count_replaced(older.map(|ready| ready.pose));
+        self.replace_waiting();
     }
 
-    /// A view of this stream that still waits for the device gives up its place, and its credit.
-    fn take_place_of_waiting(&mut self) {
+    /// Replaces a view of this stream that still waits for the device, and takes its credit.
+    fn replace_waiting(&mut self) {
         let same_price = |ready: &Ready, waiting: &Waiting| ready.pose.view.camera.size_px == waiting.key.size_px;
         let waiting = self.client.shared.arrivals.withdraw(self.client.stream).pop_front();
         let Some((waiting, ready)) = waiting.zip(self.ready.as_ref()) else { return };
@@ -249,7 +247,7 @@ impl<'a> LiveStream<'a> {
         self.client.shared.arrivals.push(self.client.stream, [waiting]);
     }
 
-    fn credit(&self, view: &RequestedView) -> Work<Credit> {
+    fn credit(&self, view: &RequestedView) -> Pending<Credit> {
         let (credits, shared) = (self.credits.clone(), self.client.shared.clone());
         let pixels = view.camera.pixel_count() as u64;
         Box::pin(async move {
@@ -259,8 +257,8 @@ impl<'a> LiveStream<'a> {
     }
 }
 
-/// What is there to be waited for; else nothing, for ever.
-async fn of<T>(work: Option<&mut Work<T>>) -> Result<T, Status> {
+/// Waits for the work; without any, waits for ever.
+async fn wait_for<T>(work: Option<&mut Pending<T>>) -> Result<T, Status> {
     match work {
         Some(work) => work.await,
         None => std::future::pending().await,

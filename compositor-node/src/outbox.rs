@@ -1,18 +1,19 @@
 //! Finished frames of one stream on their way out.
 //!
-//! Frames lie here, not in the transport, until the client takes them: what a client does not take holds up nobody but
-//! itself, and can be taken away from it.
+//! Frames wait here, not in the transport, until the client takes them. A client that takes none delays nobody but itself,
+//! and its frames can be dropped.
 
 use std::collections::VecDeque;
 use std::iter::Peekable;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use codec::{FrameHeader, FramePart};
 use node::NodeMetrics;
+use parking_lot::Mutex;
 use tokio::sync::OwnedSemaphorePermit;
 use tokio_stream::Stream;
 use tokio_util::sync::CancellationToken;
@@ -25,7 +26,7 @@ pub(crate) struct Output {
     pub(crate) frame: u64,
     pub(crate) header: FrameHeader,
     pub(crate) data: Bytes,
-    /// When its request came.
+    /// The arrival of its request.
     pub(crate) arrived: Instant,
     pub(crate) credit: Credit,
 }
@@ -41,20 +42,20 @@ struct Current {
 struct State {
     ready: VecDeque<Output>,
     current: Option<Current>,
-    /// Sent, but not acknowledged; of live streams only.
+    /// Frames of a live stream that were sent and not acknowledged.
     unacknowledged: VecDeque<(u64, OwnedSemaphorePermit)>,
-    /// Numbers must rise, and frames be acknowledged.
+    /// Whether numbers must rise and frames are acknowledged.
     is_live: bool,
     /// The last frame that was begun.
     last: u64,
-    /// Since when the client could have taken something.
+    /// The time since which frames wait for the client.
     untaken_since: Option<Instant>,
-    /// How it ends once all has been sent.
+    /// The end of the stream, once all has been sent.
     end: Option<Result<(), Status>>,
     waker: Option<Waker>,
 }
 
-/// Shared by whoever makes frames and the response that sends them.
+/// The outbox of one stream, shared by the makers of frames and the response that sends them.
 pub(crate) struct Outbox {
     stream: u64,
     metrics: NodeMetrics,
@@ -67,13 +68,9 @@ impl Outbox {
         Arc::new(Self { stream, metrics, state: Mutex::default(), gone: CancellationToken::new() })
     }
 
-    fn locked(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// From here on numbers must rise, and frames be acknowledged.
+    /// From here on numbers must rise and frames are acknowledged.
     pub(crate) fn set_live(&self) {
-        self.locked().is_live = true;
+        self.state.lock().is_live = true;
     }
 
     /// Whether the client has left.
@@ -86,10 +83,10 @@ impl Outbox {
         self.gone.cancelled().await;
     }
 
-    /// Resolves when the client has taken nothing for so long of what was ready.
+    /// Resolves when frames have waited for the client for `deadline`.
     pub(crate) async fn stalled(&self, deadline: Duration) {
         loop {
-            let since = self.locked().untaken_since;
+            let since = self.state.lock().untaken_since;
             let left = deadline.saturating_sub(since.map_or(Duration::ZERO, |since| since.elapsed()));
             if left.is_zero() {
                 return;
@@ -100,7 +97,7 @@ impl Outbox {
 
     /// Gives back the credit of all frames up to this one.
     pub(crate) fn acknowledge(&self, frame: u64) {
-        let unacknowledged = &mut self.locked().unacknowledged;
+        let unacknowledged = &mut self.state.lock().unacknowledged;
         while unacknowledged.front().is_some_and(|(sent, _)| *sent <= frame) {
             unacknowledged.pop_front();
         }
@@ -108,21 +105,21 @@ impl Outbox {
 
     /// Ends the stream, after the frames that are ready.
     pub(crate) fn end(&self, end: Result<(), Status>) {
-        let mut state = self.locked();
+        let mut state = self.state.lock();
         state.end.get_or_insert(end);
         state.wake();
     }
 
-    /// Ends the stream at once, whatever is ready.
+    /// Ends the stream at once, before the frames that are ready.
     pub(crate) fn cut(&self, status: Status) {
-        let mut state = self.locked();
+        let mut state = self.state.lock();
         self.drop_ready(&mut state, "client stalled");
         (state.current, state.end) = (None, Some(Err(status)));
         state.wake();
     }
 
     fn put(&self, output: Output) {
-        let mut state = self.locked();
+        let mut state = self.state.lock();
         if self.is_gone() || state.end.as_ref().is_some_and(Result::is_err) {
             return self.metrics.drop_view("client gone");
         }
@@ -156,7 +153,7 @@ impl Outbox {
         part
     }
 
-    /// From here on the frame is the transport's.
+    /// Hands the frame to the transport.
     fn begin(&self, output: Output) -> Current {
         let Output { frame, mut header, data, arrived, credit } = output;
         header.stage_times = header.stage_times.leaving_after(arrived.elapsed().as_secs_f64());
@@ -172,7 +169,7 @@ impl Outbox {
     }
 
     fn poll(&self, cx: &Context<'_>) -> Poll<Option<Result<FramePart, Status>>> {
-        let mut state = self.locked();
+        let mut state = self.state.lock();
         let part = self.next_part(&mut state);
         let is_left = state.current.is_some() || !state.ready.is_empty();
         state.untaken_since = is_left.then(Instant::now);
@@ -190,7 +187,7 @@ impl Outbox {
 
     fn leave(&self) {
         self.gone.cancel();
-        let mut state = self.locked();
+        let mut state = self.state.lock();
         self.drop_ready(&mut state, "client gone");
         (state.current, state.unacknowledged) = (None, VecDeque::new());
     }
@@ -204,7 +201,7 @@ impl State {
     }
 }
 
-/// The way to an outbox. With the last of its clones the stream ends.
+/// The way to an outbox. The stream ends when the last clone is dropped.
 #[derive(Clone)]
 pub(crate) struct Reply(Arc<Closing>);
 
@@ -225,12 +222,12 @@ impl Reply {
         &self.0.0
     }
 
-    /// Which stream, in logs.
+    /// The number of the stream in logs.
     pub(crate) fn stream(&self) -> u64 {
         self.outbox().stream
     }
 
-    /// Waits for nobody: every frame has a credit.
+    /// Never blocks: every frame has a credit.
     pub(crate) fn send(&self, output: Result<Output, Status>) {
         match output {
             Ok(output) => self.outbox().put(output),

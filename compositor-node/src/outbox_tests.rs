@@ -56,7 +56,7 @@ impl Bench {
 }
 
 #[tokio::test]
-async fn a_batch_s_credit_comes_back_with_the_last_part() {
+async fn the_credit_of_a_frame_returns_with_its_last_part() {
     let mut bench = bench(false);
     bench.put(5, 2 * MAX_CHUNK_BYTES);
     assert_eq!((bench.frame().await, bench.credits.available_permits()), (5, 1));
@@ -64,7 +64,7 @@ async fn a_batch_s_credit_comes_back_with_the_last_part() {
 }
 
 #[tokio::test]
-async fn a_live_frame_s_credit_comes_back_when_it_is_acknowledged() {
+async fn the_credit_of_a_live_frame_returns_with_its_acknowledgement() {
     let mut bench = bench(true);
     bench.put(5, 10);
     bench.put(6, 10);
@@ -79,7 +79,7 @@ async fn a_live_frame_s_credit_comes_back_when_it_is_acknowledged() {
 }
 
 #[tokio::test]
-async fn live_numbers_rise() {
+async fn a_live_frame_after_a_later_one_is_dropped() {
     let mut bench = bench(true);
     bench.put(6, 10);
     bench.put(5, 10);
@@ -91,7 +91,7 @@ async fn live_numbers_rise() {
 }
 
 #[tokio::test]
-async fn it_ends_with_the_last_who_may_send_after_what_is_ready() {
+async fn a_stream_ends_after_the_ready_frames_when_the_last_reply_is_dropped() {
     let mut bench = bench(false);
     let other = bench.reply.clone();
     bench.put(1, 10);
@@ -103,7 +103,7 @@ async fn it_ends_with_the_last_who_may_send_after_what_is_ready() {
 }
 
 #[tokio::test]
-async fn an_error_comes_after_what_is_ready_and_then_nothing() {
+async fn an_error_follows_the_ready_frames_and_ends_the_stream() {
     let mut bench = bench(false);
     bench.put(1, 10);
     bench.reply.send(Err(Status::internal("device")));
@@ -113,7 +113,7 @@ async fn an_error_comes_after_what_is_ready_and_then_nothing() {
 }
 
 #[tokio::test]
-async fn what_a_client_does_not_take_is_taken_away() {
+async fn frames_that_a_client_does_not_take_are_dropped() {
     let mut bench = bench(false);
     bench.put(1, 2 * MAX_CHUNK_BYTES);
     bench.put(2, 10);
@@ -126,7 +126,7 @@ async fn what_a_client_does_not_take_is_taken_away() {
 }
 
 #[tokio::test]
-async fn a_client_that_takes_everything_is_never_stalled() {
+async fn a_client_that_takes_all_frames_is_never_stalled() {
     let mut bench = bench(false);
     bench.put(1, 10);
     bench.frame().await;
@@ -135,7 +135,7 @@ async fn a_client_that_takes_everything_is_never_stalled() {
 }
 
 #[tokio::test]
-async fn a_client_that_leaves_gives_everything_back() {
+async fn a_client_that_leaves_returns_all_credit() {
     let bench = bench(true);
     bench.put(1, 10);
     let Bench { outbox, outgoing, credits, .. } = bench;

@@ -1,26 +1,26 @@
-//! Whose turn it is: streams take turns, and a live stream's newest view takes the place of the one before.
+//! The order of views: streams take turns, and a live stream's newest view replaces the one before.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use crate::batch::{BatchKey, MAX_BATCH};
 
-/// Views that a stream may have in a batch while others wait, and all may have while somebody looks on live: who asks
-/// for one waits for few.
+/// Views that a stream may have in a batch while others wait, and all together while live streams are open. A single view
+/// then waits for few others.
 const SHARED_VIEWS: usize = 8;
-/// Pixels of them.
+/// Pixels of these views.
 const SHARED_PIXELS: usize = 1 << 20;
 
-/// What can be put into batches.
+/// Views that can be put into batches.
 pub(crate) trait Keyed {
-    /// What batches must agree on.
+    /// The key that all views of a batch share.
     fn key(&self) -> &BatchKey;
 }
 
 /// Views that wait for the device, by stream.
 pub(crate) struct FairQueue<T> {
-    /// None is empty.
+    /// Without empty queues.
     streams: BTreeMap<u64, VecDeque<T>>,
-    /// Up to where streams have had their turn.
+    /// The last stream that has had its turn.
     last: u64,
     /// Live streams that are open, whether they wait or not: the next pose may come at any time.
     viewers: usize,
@@ -53,14 +53,13 @@ impl<T: Keyed> FairQueue<T> {
         self.streams.remove(&stream).unwrap_or_default()
     }
 
-    /// The next stream's first view and those that can be made with it: one of each stream in turn, round by round,
-    /// each stream's in their order. Whoever could not take part, or had no room, comes next.
+    /// The next stream's first view and those that can be made with it, one of each stream in turn, round by round. Streams that had no part in it have the next turn.
     pub(crate) fn take_batch(&mut self) -> Vec<T> {
         let order = self.order();
         let Some(wanted) = order.first().and_then(|first| self.first_key(*first)) else {
             return Vec::new();
         };
-        let (most, rounds) = (self.most(&wanted), self.rounds(order.len(), &wanted));
+        let (most, rounds) = (self.max_views(&wanted), self.rounds(order.len(), &wanted));
         let first = self.take_round(&order, &wanted, most);
         let served = order.iter().zip(&first).take_while(|(stream, (of, _))| *stream == of).last();
         self.last = served.map_or(self.last, |(stream, _)| *stream);
@@ -79,23 +78,23 @@ impl<T: Keyed> FairQueue<T> {
         self.streams.get(&stream)?.front().map(|view| view.key().clone())
     }
 
-    /// Views of a batch. A pose may come at any time where there are viewers.
-    fn most(&self, wanted: &BatchKey) -> usize {
-        if self.viewers == 0 { wanted.most() } else { shared(wanted) }
+    /// The most views of a batch. While live streams are open, a pose may arrive at any time.
+    fn max_views(&self, wanted: &BatchKey) -> usize {
+        if self.viewers == 0 { wanted.max_views() } else { shared(wanted) }
     }
 
-    /// Views that each stream may have in a batch.
+    /// The most views of each stream in a batch.
     fn rounds(&self, waiting: usize, wanted: &BatchKey) -> usize {
         if waiting == 1 { MAX_BATCH } else { shared(wanted) }
     }
 
-    /// From the one after the last that had its turn.
+    /// All streams, from the one after the last that had its turn.
     fn order(&self) -> Vec<u64> {
         let (before, after): (Vec<u64>, Vec<u64>) = self.streams.keys().partition(|stream| **stream <= self.last);
         [after, before].concat()
     }
 
-    /// One view of each stream, with whose it is.
+    /// One view of each stream, with its stream.
     fn take_round(&mut self, order: &[u64], wanted: &BatchKey, room: usize) -> Vec<(u64, T)> {
         order.iter().filter_map(|&stream| Some((stream, self.take(stream, wanted)?))).take(room).collect()
     }
@@ -148,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn batches_never_mix_sets_and_keep_the_order() {
+    fn a_batch_has_views_of_one_set_in_their_order() {
         let mut queue = FairQueue::default();
         queue.push(1, (0..200).map(|i| view(1, i, u64::from(i / 3 % 2), 64)));
         let mut seen = Vec::new();
@@ -176,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn who_asks_for_thousands_leaves_room_for_others() {
+    fn a_stream_with_thousands_of_views_leaves_room_for_others() {
         let mut queue = FairQueue::default();
         queue.push(1, (0..5000).map(|i| view(1, i, 0, 64)));
         (2..10).for_each(|stream| queue.push(stream, [view(stream, 0, 0, 64)]));
@@ -186,7 +185,7 @@ mod tests {
         assert!((2..10).all(|stream| of(stream) == 1), "views of one size go together");
         assert_eq!(queue.take_batch().len(), MAX_BATCH, "alone, it has the device");
         queue.add_viewer();
-        assert_eq!(queue.take_batch().len(), SHARED_VIEWS, "a pose may come at any time");
+        assert_eq!(queue.take_batch().len(), SHARED_VIEWS, "a pose may arrive at any time");
         queue.remove_viewer();
         assert_eq!(queue.take_batch().len(), MAX_BATCH);
     }
@@ -212,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn who_asks_for_large_views_gets_few_at_a_time() {
+    fn a_stream_with_large_views_gets_few_at_a_time() {
         let mut queue = FairQueue::default();
         queue.push(1, (0..9).map(|i| view(1, i, 0, 1024)));
         queue.push(2, [view(2, 0, 0, 64)]);
@@ -230,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stream_that_leaves_takes_its_views_along() {
+    fn a_stream_that_leaves_withdraws_its_views() {
         let mut queue = FairQueue::default();
         queue.push(3, (0..5).map(|i| view(3, i, 0, 64)));
         queue.push(4, [view(4, 9, 0, 64)]);

@@ -1,4 +1,4 @@
-//! What streams, and all of them together, may have under way.
+//! Bounds on the views in flight, of each stream and of all together.
 
 use std::sync::Arc;
 
@@ -7,12 +7,12 @@ use node::Quotas;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::Status;
 
-/// Room that a view takes until its frame has been sent.
+/// The room that a view takes until its frame has been sent.
 #[derive(Debug)]
 pub(crate) struct Credit {
-    /// Of its stream; a live stream's until its client says that the frame has come.
+    /// Room in its stream; that of a live stream is held until its client acknowledges the frame.
     pub(crate) stream: OwnedSemaphorePermit,
-    /// Of the node.
+    /// Room on the node.
     pub(crate) _node: NodeCredit,
 }
 
@@ -20,7 +20,7 @@ pub(crate) struct Credit {
 #[derive(Debug)]
 pub(crate) struct NodeCredit {
     _pixels: OwnedSemaphorePermit,
-    /// `None` of live streams: they are bounded by their number, each having two views under way at most.
+    /// `None` for live streams: these are bounded by their number, as each has two views in flight at most.
     _view: Option<OwnedSemaphorePermit>,
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct NodeQuota {
     streams: Arc<Semaphore>,
     views: Arc<Semaphore>,
     pixels: Arc<Semaphore>,
-    /// Of live streams: what batches hold does not keep a viewer waiting.
+    /// Pixels of live streams: views of batches do not keep a viewer waiting.
     live_pixels: Arc<Semaphore>,
 }
 
@@ -52,23 +52,23 @@ impl NodeQuota {
         self.streams.clone().try_acquire_owned().map_err(refused)
     }
 
-    /// Room for a view of a batch, if there is any now.
+    /// Room for a view of a batch; an error while all room is taken.
     pub(crate) fn try_view(&self, camera: &PinholeCamera) -> Result<NodeCredit, Status> {
-        let few = |_| self.exceeded("views", self.limits.views, "views are under way");
-        let small = |_| self.exceeded("pixels", self.limits.pixels, "pixels of views are under way");
+        let few = |_| self.exceeded("views", self.limits.views, "views are in flight");
+        let small = |_| self.exceeded("pixels", self.limits.pixels, "pixels of views are in flight");
         let view = self.views.clone().try_acquire_owned().map_err(few)?;
         let pixels = self.pixels.clone().try_acquire_many_owned(self.price(camera)).map_err(small)?;
         Ok(NodeCredit { _pixels: pixels, _view: Some(view) })
     }
 
-    /// Room for a view of a batch, as soon as there is any.
+    /// Waits for room for a view of a batch.
     pub(crate) async fn view(&self, camera: &PinholeCamera) -> Result<NodeCredit, Status> {
         let view = self.views.clone().acquire_owned().await.map_err(closed)?;
         let pixels = self.pixels.clone().acquire_many_owned(self.price(camera)).await.map_err(closed)?;
         Ok(NodeCredit { _pixels: pixels, _view: Some(view) })
     }
 
-    /// Room for a live stream's view, as soon as there is any.
+    /// Waits for room for a view of a live stream.
     pub(crate) async fn live_view(&self, pixels: u64) -> Result<NodeCredit, Status> {
         let pixels = self.live_pixels.clone().acquire_many_owned(self.price_of(pixels)).await.map_err(closed)?;
         Ok(NodeCredit { _pixels: pixels, _view: None })
@@ -78,7 +78,7 @@ impl NodeQuota {
         self.price_of(camera.pixel_count() as u64)
     }
 
-    /// At most all: one view larger than the bound still passes, alone.
+    /// At most all pixels: one view larger than the bound still passes, alone.
     fn price_of(&self, pixels: u64) -> u32 {
         let most = u32::try_from(self.limits.pixels.max(1)).unwrap_or(u32::MAX);
         u32::try_from(pixels).unwrap_or(u32::MAX).min(most)
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_beyond_is_refused_and_named() {
+    fn a_request_beyond_a_quota_is_refused_by_its_name() {
         let quota = quota();
         let stream = quota.stream().unwrap();
         let refused = quota.stream().unwrap_err();
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn live_views_wait_for_each_other_alone() {
+    async fn live_views_wait_for_other_live_views_alone() {
         let quota = quota();
         let _views = [quota.try_view(&camera(10)).unwrap(), quota.try_view(&camera(10)).unwrap()];
         assert!(quota.try_view(&camera(1)).is_err());

@@ -14,7 +14,7 @@ use crate::arrivals::Arrivals;
 use crate::batch::{Source, Waiting};
 use crate::outbox::Output;
 
-/// Batches whose frames are being encoded while the device makes the next.
+/// Batches that are being encoded while the device makes the next.
 const BATCHES_BEHIND: usize = 2;
 
 /// Runs until it is aborted.
@@ -22,7 +22,7 @@ pub(crate) async fn render_loop(engine: Arc<dyn Engine>, arrivals: Arc<Arrivals>
     let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
     let behind = Arc::new(Semaphore::new(BATCHES_BEHIND));
     loop {
-        // First: what comes while frames wait for encoders is then newer.
+        // Before the batch is chosen: views that arrive while frames wait for encoders are newer.
         let Ok(place) = behind.clone().acquire_owned().await else {
             return;
         };
@@ -114,7 +114,7 @@ async fn encode_all(
         let Ok(encoder) = encoders.clone().acquire_owned().await else {
             return;
         };
-        let times = times(&waiting, start, batch_s, count);
+        let times = stage_times(&waiting, start, batch_s, count);
         let metrics = metrics.clone();
         encodings.spawn(async move {
             encode_and_send(waiting, view, times, &metrics).await;
@@ -125,8 +125,8 @@ async fn encode_all(
     drop(place);
 }
 
-/// Of a view in a batch of so many that was begun then.
-fn times(waiting: &Waiting, start: Instant, batch_s: f64, count: usize) -> StageTimes {
+/// The stage times of a view in a batch of `count` views that was begun at `start`.
+fn stage_times(waiting: &Waiting, start: Instant, batch_s: f64, count: usize) -> StageTimes {
     let times = StageTimes {
         set_wait_s: waiting.waits.set_wait_s,
         credit_wait_s: waiting.waits.credit_wait_s(),

@@ -1,14 +1,15 @@
-//! Tells the coordinator of samplers whose images cannot be had.
+//! Reports to the coordinator on samplers whose images cannot be fetched.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cluster::SamplerReport;
 use node::NodeConfig;
+use parking_lot::Mutex;
 use tonic::{Code, Status};
 use wire::rpc::{CoordinatorClient, connect};
 
-/// How long telling may take.
+/// The time that a report may take.
 const DEADLINE: Duration = Duration::from_secs(5);
 /// The same report is repeated after this: the coordinator quarantines no node for a single one.
 const REPEAT_AFTER: Duration = Duration::from_secs(1);
@@ -16,7 +17,7 @@ const REPEAT_AFTER: Duration = Duration::from_secs(1);
 /// A set that could not be fetched.
 #[derive(Debug)]
 pub(crate) struct NotFetched {
-    /// Whose images did not come; `None` where no sampler is at fault.
+    /// The sampler whose images were not received; `None` where no sampler is at fault.
     pub(crate) sampler: Option<String>,
     pub(crate) status: Status,
 }
@@ -27,7 +28,7 @@ impl From<Status> for NotFetched {
     }
 }
 
-/// Of one compositor.
+/// The reports of one compositor.
 #[derive(Debug, Clone)]
 pub(crate) struct Reports {
     node_name: String,
@@ -42,7 +43,7 @@ impl Reports {
     }
 
     /// Reports a sampler in the background, unless its fault may be the plan's or the request's.
-    pub(crate) fn tell(&self, plan_epoch: u64, failed: &NotFetched) {
+    pub(crate) fn report(&self, plan_epoch: u64, failed: &NotFetched) {
         let Some(sampler) = failed.sampler.clone().filter(|sampler| *sampler != self.node_name) else { return };
         let its_fault = [Code::Unavailable, Code::DataLoss, Code::DeadlineExceeded, Code::Unknown];
         if !its_fault.contains(&failed.status.code()) || self.is_repeated(plan_epoch, &sampler) {
@@ -60,7 +61,7 @@ impl Reports {
 
     /// Whether the same report was made just now.
     fn is_repeated(&self, plan_epoch: u64, sampler: &str) -> bool {
-        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut last = self.last.lock();
         let is_repeated = |(epoch, name, at): &(u64, String, Instant)| {
             *epoch == plan_epoch && name == sampler && at.elapsed() < REPEAT_AFTER
         };

@@ -25,7 +25,7 @@ struct Membership {
 pub(crate) struct MembershipRegistry(Mutex<HashMap<String, Membership>>);
 
 impl MembershipRegistry {
-    /// Registers a node; a process that has its name is told to leave.
+    /// Registers a node; an earlier process of that name has to leave.
     pub(crate) fn join(
         &self,
         node: &NodeStatus,

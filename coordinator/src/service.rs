@@ -157,7 +157,7 @@ impl Coordinator for CoordinatorService {
     }
 }
 
-/// Whether the schedule admits a change, before it is told of it.
+/// Whether the schedule would admit a change.
 fn check_change(scheduler: &Scheduler, change: &ChangeSession) -> Result<(), Status> {
     let ChangeSession { session, views_per_set, frames_per_s, viewpoints } = change;
     if !scheduler.has_session(*session) {

@@ -1,5 +1,5 @@
-//! Scripts of events with fixed costs and without faults: policy, K, roles, tiles and epochs of every plan are those of
-//! `golden_plans.txt`, which the scheduler wrote before its decisions on faults moved into it.
+//! Scripts of events with fixed costs and without faults. Policy, K, roles, tiles and epochs of every plan equal those
+//! of `golden_plans.txt`, from the scheduler before decisions on faults moved into it.
 #![allow(clippy::unwrap_used)]
 
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ use coordinator::schedule::{Command, Event, MeasuredCosts, Opening, PolicyOverri
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
-/// Images that cannot be cut into tiles.
+/// Images that are not tileable.
 const WHOLE: Costs = Costs {
     sample_image_s: 0.1,
     direct_view_s: 0.1,

@@ -1,9 +1,9 @@
-//! Where the bits of depth images go, by plane, and what packing them takes, on one core.
+//! Bits of depth images by plane, and the time of packing them on one core.
 //!
-//! `cargo run --release -p myriorama --example plane_bits [-- SCENE...]`
+//! `cargo run --release -p lab --example plane_bits [-- SCENE...]`
 //!
-//! Sets of three images of 1024² of the scenes of `myriorama study sampling`, conventional and with what earlier
-//! images hold left out. Bits are of the packed planes over the set's samples; milliseconds are medians, of an image.
+//! Sets are three images of 1024² of the scenes of `myriorama study sampling`, conventional and non-redundant. Bits are
+//! those of the packed planes over the set's samples; milliseconds are medians, of an image.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -12,8 +12,8 @@ use codec::{DecodeLimits, EncodedDepthImage, PlaneKind, PlaneSet, decode_depth_i
 use depth_image::DepthImage;
 use engine::GpuEngine;
 use glam::UVec2;
-use lab::evaluate::median;
 use lab::sampling_study::{SCENES, Subject};
+use lab::statistics::median;
 use render::SamplePlanes;
 use sampling::{Redundancy, SamplingMethod};
 use study::{Cell, Table};
@@ -72,7 +72,7 @@ fn samples(image: &DepthImage) -> usize {
     image.inverse_depth_per_m.iter().filter(|&&inverse| inverse > 0.0).count()
 }
 
-/// How often samples begin along the rows.
+/// The number of runs of samples along the rows.
 fn sample_runs(image: &DepthImage) -> usize {
     let is_sample = |inverse: &f32| *inverse > 0.0;
     image.inverse_depth_per_m.chunk_by(|a, b| is_sample(a) == is_sample(b)).filter(|run| is_sample(&run[0])).count()
@@ -83,7 +83,7 @@ fn plane_bytes(image: &EncodedDepthImage, kind: PlaneKind) -> usize {
     planes.map(|plane| plane.packed_bytes as usize).sum()
 }
 
-/// To encode and to decode an image.
+/// Milliseconds to encode and to decode an image.
 fn times_ms(images: &[DepthImage], encoded: &[EncodedDepthImage]) -> anyhow::Result<[f64; 2]> {
     let limits = DecodeLimits::default();
     let decode = |(image, encoded): (&DepthImage, &EncodedDepthImage)| {

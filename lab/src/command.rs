@@ -10,11 +10,11 @@ use crate::sampling_study::command::{self as sampling, SamplingArgs};
 /// A subcommand that measures.
 #[derive(Debug, Subcommand)]
 pub enum LabCommand {
-    /// Run the paper's experiment on this machine and write a report
+    /// Runs the paper's experiment on this machine and writes a report
     Demo(DemoArgs),
-    /// Measure speed and accuracy against what is promised, and write a report
+    /// Measures speed and accuracy against bars and writes a report
     Bench(BenchArgs),
-    /// Repeat a paper's experiments, its figures beside ours, and write a report
+    /// Repeats the experiments of a paper, its figures beside ours, and writes a report
     #[command(subcommand)]
     Study(StudyCommand),
 }
@@ -22,7 +22,7 @@ pub enum LabCommand {
 /// A study of one paper.
 #[derive(Debug, Subcommand)]
 pub enum StudyCommand {
-    /// How well sampling methods sample four kinds of scene: Tables 1 and 2, Fig. 6 and 7 of Xie et al., and more
+    /// Measures how well methods sample four kinds of scene: Tables 1 and 2, Fig. 6 and 7 of Xie et al., and more
     Sampling(SamplingArgs),
 }
 

@@ -1,11 +1,11 @@
-//! A scene, a cluster in this process and a client of it: what demo and bench measure on.
+//! A scene, a cluster in this process, and a client of it.
 
 use std::cell::Cell;
 use std::sync::Arc;
 
 use anyhow::Context as _;
 use app_core::cluster::Cluster;
-use app_core::delivery::{Delivered, Wishes, open, receive};
+use app_core::delivery::{Delivered, SessionSettings, open, receive};
 use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use client::{Client, Frame};
@@ -18,35 +18,28 @@ use reconstruction::ReconstructionMethod;
 use render::{Choice, Lighting};
 use tokio::runtime::Runtime;
 
-/// V of the paper's headline: 290 views of 200×150.
+/// The number of views V of the paper's headline: 290 views of 200×150.
 pub const PAPER_VIEWS: usize = 290;
-/// Of every view, unless cameras were given.
+/// The size of every view, unless cameras are given.
 pub const VIEW_SIZE_PX: UVec2 = UVec2::new(200, 150);
-/// Scene time between runs: far less than any motion, but another sample set, which no node has kept.
+/// Scene time between runs: far less than any motion, but a new sample set, which no node has kept.
 const RUN_STEP_S: f64 = 1e-4;
 
-/// What is asked of the cluster.
+/// Settings of one delivery.
 #[derive(Debug, Clone, Copy)]
-pub struct Wish {
-    /// How surfaces are lit.
+pub struct DeliverySettings {
     pub lighting: Lighting,
-    /// Who makes the views.
     pub policy: PolicyChoice,
-    /// How they are reconstructed.
     pub method: ReconstructionMethod,
-    /// V.
     pub views: usize,
     /// Sample sets of one moment, each with all views.
     pub sets: u32,
 }
 
-/// Runs until it is stopped.
+/// A cluster that runs until it is stopped.
 pub struct Experiment {
-    /// The device.
     pub engine: Arc<GpuEngine>,
-    /// The scene.
     pub setup: Setup,
-    /// How it is sampled and lit.
     pub args: SceneArgs,
     given_views: Vec<PinholeCamera>,
     runtime: Runtime,
@@ -56,11 +49,10 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// Loads the scene and starts `nodes` nodes. Views are those given; without any they are spread between the
-    /// sample cameras.
+    /// Loads the scene and starts `nodes` nodes. Without given views, views are spread between the sample cameras.
     ///
     /// # Errors
-    /// Input that cannot be used, or a device or port that cannot be had.
+    /// Input cannot be used, or a device or port is not to be had.
     pub fn start(
         args: SceneArgs,
         given_views: Vec<PinholeCamera>,
@@ -80,10 +72,10 @@ impl Experiment {
         Ok(Self { engine, setup, args, given_views, runtime, cluster, client, runs: Cell::new(0) })
     }
 
-    /// `count` views: those given, again from the first where there are fewer, or spread between the samples.
+    /// `count` views: the given ones, repeated as needed, or views spread between the sample cameras.
     ///
     /// # Errors
-    /// Without sample cameras.
+    /// There are no sample cameras.
     pub fn views(&self, count: usize) -> anyhow::Result<Vec<PinholeCamera>> {
         if !self.given_views.is_empty() {
             return Ok(self.given_views.iter().copied().cycle().take(count).collect());
@@ -92,35 +84,29 @@ impl Experiment {
         Ok(cell.spread(count, VIEW_SIZE_PX))
     }
 
-    /// `views` of one set, everything else as the scene's arguments say.
+    /// Settings for `views` of one set, with everything else from the scene's arguments.
     #[must_use]
-    pub fn wish(&self, policy: PolicyChoice, views: usize) -> Wish {
-        Wish { lighting: self.args.lighting, policy, method: self.args.method, views, sets: 1 }
+    pub fn delivery(&self, policy: PolicyChoice, views: usize) -> DeliverySettings {
+        DeliverySettings { lighting: self.args.lighting, policy, method: self.args.method, views, sets: 1 }
     }
 
-    /// Delivers views of a sample set that nobody has yet. What the coordinator measures before is not in the time.
-    ///
-    /// # Errors
-    /// The cluster's.
-    pub fn deliver(&self, wish: Wish, arrived: impl FnMut(&Frame)) -> anyhow::Result<Delivered> {
+    /// Delivers views of a new sample set. The time excludes the coordinator's measurements.
+    pub fn deliver(&self, settings: DeliverySettings, arrived: impl FnMut(&Frame)) -> anyhow::Result<Delivered> {
         let run = self.runs.replace(self.runs.get() + 1);
-        let (method, sampling) = (wish.method.to_string(), self.args.sampling.to_string());
-        let wishes = Wishes {
-            policy: wish.policy,
-            timeline: Timeline { set_count: wish.sets, ..Timeline::still(f64::from(run) * RUN_STEP_S) },
-            ..Wishes::new(method, sampling, wish.lighting.to_string())
+        let (method, sampling) = (settings.method.to_string(), self.args.sampling.to_string());
+        let session_settings = SessionSettings {
+            policy: settings.policy,
+            timeline: Timeline { set_count: settings.sets, ..Timeline::still(f64::from(run) * RUN_STEP_S) },
+            ..SessionSettings::new(method, sampling, settings.lighting.to_string())
         };
-        let views = self.views(wish.views)?;
+        let views = self.views(settings.views)?;
         self.runtime.block_on(async {
-            let session = open(&self.client, &wishes, &views).await?;
+            let session = open(&self.client, &session_settings, &views).await?;
             receive(&session, &views, arrived).await
         })
     }
 
-    /// How direct rendering finds surfaces in views of this size.
-    ///
-    /// # Errors
-    /// The device's.
+    /// The renderer's choice between triangles and rays for views of this size.
     pub fn visibility(&self) -> anyhow::Result<Choice> {
         let view = self.views(1)?;
         Ok(self.engine.visibility_choice(self.setup.offer.hash.as_str(), &view[0])?)
@@ -129,7 +115,7 @@ impl Experiment {
     /// Drains the cluster.
     ///
     /// # Errors
-    /// When a server failed.
+    /// A server failed.
     pub fn stop(self) -> anyhow::Result<()> {
         drop(self.client);
         self.runtime.block_on(self.cluster.drain())

@@ -1,22 +1,26 @@
 //! Measurements of the program: speed, accuracy and scaling, each as a report.
 //!
-//! [`demo`] is the paper's experiment on this machine, [`bench`] holds measured values against bars, [`load`] and
-//! [`scaling`] start clusters of processes, and [`sampling_study`] repeats the experiments of a paper on sampling. All
-//! of it is left out of a thin build of the program.
+//! [`demo`] is the paper's experiment on this machine. [`bench`] compares measured values with bars. [`load`] and
+//! [`scaling`] start clusters of processes. [`sampling_study`] repeats the experiments of a paper on sampling. A thin
+//! build of the program has none of this.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-pub mod bench;
+mod bench;
 mod command;
-pub mod demo;
-pub mod evaluate;
-pub mod experiment;
-pub mod lighting_study;
-pub mod load;
-pub mod memory;
-pub mod process;
-pub mod progress;
+mod cpu_share;
+mod demo;
+mod evaluation;
+mod experiment;
+mod lighting_study;
+mod load;
+mod memory;
+mod process;
+mod progress;
+pub mod reference_views;
 pub mod sampling_study;
-pub mod scaling;
-pub mod sweep;
+mod scaling;
+pub mod statistics;
+mod sweep;
 
 pub use command::LabCommand;
+pub use evaluation::Evaluation;

@@ -1,10 +1,31 @@
-//! Memory of this process.
+//! Memory of processes, as Linux reports it.
 
-/// The most memory that this process has held, in MB; `None` where the system does not say.
+/// The most memory that this process has held, in MB; `None` where the system does not tell.
 #[must_use]
 pub fn peak_memory_mb() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(status_bytes("self", "VmHWM:")? / 1e6)
+}
+
+/// Resident memory of a process, by number or `self`, in MiB; `None` where the system does not tell.
+#[must_use]
+pub fn memory_mib(process: &str) -> Option<f64> {
+    Some(status_bytes(process, "VmRSS:")? / f64::from(1 << 20))
+}
+
+fn status_bytes(process: &str, field: &str) -> Option<f64> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix(field))?;
     let kib: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib * 1024.0 / 1e6)
+    Some(kib * 1024.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn this_process_has_memory() {
+        assert!(memory_mib("self").is_some_and(|mib| mib > 1.0));
+        assert_eq!(memory_mib("none"), None);
+    }
 }

@@ -1,4 +1,4 @@
-//! This program, started once more: a coordinator or a node of its own, for benches.
+//! Processes of this program: a coordinator or a node of its own, for benches.
 
 use std::io::{BufRead as _, BufReader};
 use std::process::{Child, ChildStdout, Command, Stdio};
@@ -6,13 +6,14 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use gpu::DevicePreference;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
-/// How long a process may take until it serves: a scene is made, or a device found.
+/// The longest time until a process serves: a scene is made, or a device found.
 const START: Duration = Duration::from_secs(300);
 
-/// A process of this program. It is killed when dropped.
+/// A process of this program, which is killed when dropped.
 #[derive(Debug)]
 pub struct Process {
     name: String,
@@ -22,18 +23,15 @@ pub struct Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // One that has ended already cannot be killed, which is as well.
+        // A process that has ended already cannot be killed.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
 impl Process {
-    /// With arguments as on the command line.
-    ///
-    /// # Errors
-    /// Where the system starts none.
-    pub fn start(name: &str, arguments: &[String]) -> anyhow::Result<Self> {
+    /// Starts a process with arguments as on the command line.
+    fn start(name: &str, arguments: &[String]) -> anyhow::Result<Self> {
         let program = std::env::current_exe().context("this program's file is not known")?;
         let mut command = Command::new(program);
         command.args(arguments).stdin(Stdio::null()).stdout(Stdio::piped());
@@ -42,22 +40,37 @@ impl Process {
         Ok(Self { name: name.to_owned(), child, lines: lines_of(output) })
     }
 
-    /// As it was started.
+    /// Starts a coordinator on a free port, with further arguments.
+    pub fn coordinator(arguments: &[String]) -> anyhow::Result<Self> {
+        let fixed = ["coordinator", "--listen", "127.0.0.1:0"].map(str::to_owned);
+        Self::start("coordinator", &[&fixed, arguments].concat())
+    }
+
+    /// Starts a node on a free port. It prints its address, then that of its metrics.
+    pub fn node(number: usize, coordinator: &str, device: DevicePreference) -> anyhow::Result<Self> {
+        let (name, device) = (node_name(number), device.to_string());
+        let fixed = ["node", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0"];
+        let own = ["--coordinator", coordinator, "--name", &name, "--device", &device];
+        let arguments: Vec<String> = fixed.iter().chain(&own).map(|&word| word.to_owned()).collect();
+        Self::start(&name, &arguments)
+    }
+
+    /// The name that it was started with.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// As the system numbers it.
+    /// The system's number of the process.
     #[must_use]
     pub fn id(&self) -> u32 {
         self.child.id()
     }
 
-    /// The address at the end of the next line that ends in one.
+    /// The address at the end of the next line that ends in an address.
     ///
     /// # Errors
-    /// Where the process ends before, or says nothing for long.
+    /// The process ends before, or prints nothing for long.
     pub fn address(&mut self) -> anyhow::Result<String> {
         loop {
             let line = self.lines.recv_timeout(START).with_context(|| format!("{} does not serve", self.name))?;
@@ -68,22 +81,28 @@ impl Process {
     }
 }
 
-/// Read to the end: a process that cannot print waits for ever.
+/// The name of a node, with enough digits to sort well.
+#[must_use]
+pub fn node_name(number: usize) -> String {
+    format!("node-{number:03}")
+}
+
+/// Output is read to the end: a process that cannot print stops.
 fn lines_of(output: ChildStdout) -> mpsc::Receiver<String> {
     let (send, lines) = mpsc::channel();
     std::thread::spawn(move || {
         for line in BufReader::new(output).lines().map_while(Result::ok) {
-            // Nobody listens any more once it serves.
+            // Nobody reads the lines once the process serves.
             let _ = send.send(line);
         }
     });
     lines
 }
 
-/// What a process counts, as Prometheus reads it at `http://HOST:PORT/metrics`.
+/// The Prometheus page of a process at `http://HOST:PORT/metrics`.
 ///
 /// # Errors
-/// Where nobody answers.
+/// Nobody answers.
 pub async fn metrics_page(url: &str) -> anyhow::Result<String> {
     let authority = url.trim_start_matches("http://").split('/').next().unwrap_or_default();
     let mut socket = TcpStream::connect(authority).await.with_context(|| format!("no metrics at {url}"))?;

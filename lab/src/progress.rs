@@ -1,10 +1,10 @@
-//! Progress on a terminal; silent elsewhere.
+//! Progress bars, on terminals only.
 
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A bar for `length` steps of something.
+/// A bar of `length` steps.
 #[must_use]
 pub fn bar(what: impl Into<String>, length: usize) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg:44} {bar:24} {pos}/{len} {elapsed}")

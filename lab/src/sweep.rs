@@ -1,39 +1,39 @@
-//! Time against error: every setting of every method on one scene.
+//! Time against error: settings of light field search and joint carve on one scene.
 
 use reconstruction::ReconstructionMethod;
 use study::{Axis, Better, Cell, Point, ReportError, Series, Table, XyChart};
 
-use crate::evaluate::{Row, Truth};
+use crate::evaluation::Evaluation;
+use crate::reference_views::ReferenceViews;
 
-/// Steps of the search, as in the paper's Fig. 7 and beyond.
+/// Steps of light field search, as in the paper's Fig. 7 and beyond.
 const STEPS: [u32; 6] = [8, 16, 32, 64, 128, 256];
-/// Levels at which the carve stops.
+/// Levels at which joint carve stops.
 const STOP_LEVELS: [u32; 4] = [0, 1, 2, 3];
 
-/// All settings that are compared.
+/// The settings that are compared.
 #[must_use]
 pub fn settings(quick: bool) -> Vec<ReconstructionMethod> {
-    // A quick run leaves out every other setting.
+    // A quick run skips every other setting.
     let step = if quick { 2 } else { 1 };
     let searches = STEPS.iter().step_by(step).map(|&steps| ReconstructionMethod::LightFieldSearch { steps });
     let carves = STOP_LEVELS.iter().step_by(step).map(|&stop_level| ReconstructionMethod::JointCarve { stop_level });
     searches.chain(carves).collect()
 }
 
-/// Evaluates all settings; `done` hears of each.
-///
-/// # Errors
-/// The device's.
-pub fn sweep(truth: &Truth, quick: bool, runs: usize, mut done: impl FnMut(&Row)) -> anyhow::Result<Vec<Row>> {
-    let row = |method| truth.evaluate(method, runs).inspect(|row| done(row));
+/// Evaluates all settings, and calls `done` for each.
+pub fn sweep(
+    reference: &ReferenceViews,
+    quick: bool,
+    runs: usize,
+    mut done: impl FnMut(&Evaluation),
+) -> anyhow::Result<Vec<Evaluation>> {
+    let row = |method| reference.evaluate(method, runs).inspect(|row| done(row));
     settings(quick).into_iter().map(row).collect()
 }
 
-/// The rows as a table.
-///
-/// # Errors
-/// None that can happen: rows and columns are written together.
-pub fn table(name: &str, rows: &[Row]) -> Result<Table, ReportError> {
+/// A table of evaluations.
+pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
     let columns = [
         ("method", ""),
         ("time a view", "ms"),
@@ -60,10 +60,10 @@ pub fn table(name: &str, rows: &[Row]) -> Result<Table, ReportError> {
     Ok(table)
 }
 
-/// Time against FLIP, PSNR and wrong hits, each with the front of the best.
+/// Charts of time against FLIP, PSNR and wrong hits, each with its Pareto front.
 #[must_use]
-pub fn charts(name: &str, rows: &[Row]) -> Vec<XyChart> {
-    let chart = |what: &str, unit: &str, better, value: fn(&Row) -> f64| {
+pub fn charts(name: &str, rows: &[Evaluation]) -> Vec<XyChart> {
+    let chart = |what: &str, unit: &str, better, value: fn(&Evaluation) -> f64| {
         let time = Axis::log("time a view", "ms");
         series(rows, value)
             .into_iter()
@@ -77,31 +77,28 @@ pub fn charts(name: &str, rows: &[Row]) -> Vec<XyChart> {
     ]
 }
 
-fn series(rows: &[Row], value: fn(&Row) -> f64) -> [Series; 2] {
-    let search = |row: &Row| match row.method {
-        ReconstructionMethod::LightFieldSearch { steps } => {
-            Some(Point::labelled(row.ms_a_view, value(row), steps.to_string()))
-        }
-        ReconstructionMethod::JointCarve { .. }
-        | ReconstructionMethod::Mesh
-        | ReconstructionMethod::HybridMesh { .. } => None,
-    };
-    let carve = |row: &Row| match row.method {
-        ReconstructionMethod::JointCarve { stop_level } => {
-            Some(Point::labelled(row.ms_a_view, value(row), format!("level {stop_level}")))
-        }
-        ReconstructionMethod::LightFieldSearch { .. }
-        | ReconstructionMethod::Mesh
-        | ReconstructionMethod::HybridMesh { .. } => None,
+fn series(rows: &[Evaluation], value: fn(&Evaluation) -> f64) -> [Series; 2] {
+    let points = |label: fn(ReconstructionMethod) -> Option<String>| {
+        rows.iter()
+            .filter_map(move |row| Some(Point::labelled(row.ms_a_view, value(row), label(row.method)?)))
+            .collect::<Vec<_>>()
     };
     [
-        Series::line("light_field_search", rows.iter().filter_map(search)),
-        Series::line("joint_carve", rows.iter().filter_map(carve)),
+        Series::line("light_field_search", points(|method| steps(method).map(|steps| steps.to_string()))),
+        Series::line("joint_carve", points(|method| stop_level(method).map(|level| format!("level {level}")))),
     ]
 }
 
-/// Rows of the search and of the carve.
+fn steps(method: ReconstructionMethod) -> Option<u32> {
+    if let ReconstructionMethod::LightFieldSearch { steps } = method { Some(steps) } else { None }
+}
+
+fn stop_level(method: ReconstructionMethod) -> Option<u32> {
+    if let ReconstructionMethod::JointCarve { stop_level } = method { Some(stop_level) } else { None }
+}
+
+/// Evaluations of light field search, and of joint carve.
 #[must_use]
-pub fn split(rows: &[Row]) -> (Vec<&Row>, Vec<&Row>) {
-    rows.iter().partition(|row| matches!(row.method, ReconstructionMethod::LightFieldSearch { .. }))
+pub fn split(rows: &[Evaluation]) -> (Vec<&Evaluation>, Vec<&Evaluation>) {
+    rows.iter().partition(|row| steps(row.method).is_some())
 }

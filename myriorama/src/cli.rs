@@ -7,12 +7,12 @@ use crate::commands::{coordinator, health, node, replay, status, up, view};
 
 /// Many views of one scene from a few depth images.
 ///
-/// A few depth images sample the scene; every view is reconstructed from them, so that one more view costs a
+/// A few depth images sample the scene; every view is reconstructed from them. One more view then costs a
 /// reconstruction, not a rendering. Nodes share the work: samplers make the images, compositors the views.
 #[derive(Debug, Parser)]
 #[command(name = "myriorama", version, propagate_version = true, after_help = EXAMPLES)]
 pub struct Cli {
-    /// What to do.
+    /// The subcommand.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -33,22 +33,22 @@ The same on several machines or terminals:
 Exit status: 0 done; 1 a check that was asked for fell short; 2 arguments or input that cannot be used; 3 a failure
 at run time. RUST_LOG=info (or debug) says what is going on.";
 
-/// What the program does.
+/// A subcommand of the program.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Serve a scene with a whole cluster in this process
+    /// Serves a scene with a whole cluster in this process
     Up(up::UpArgs),
-    /// Serve a scene as the coordinator of nodes that join it
+    /// Serves a scene as the coordinator of nodes that join it
     Coordinator(coordinator::CoordinatorArgs),
-    /// Join a coordinator: sample and composite as it says
+    /// Joins a coordinator, to sample and composite by its plan
     Node(node::NodeArgs),
-    /// Ask a cluster for views and write them as pictures
+    /// Asks a cluster for views and writes them as pictures
     View(view::ViewArgs),
-    /// Show a cluster's nodes, their roles, and why they have them
+    /// Shows the nodes of a cluster, their roles, and the reason of the plan
     Status(status::StatusArgs),
-    /// Run a coordinator's recorded events through the schedule once more
+    /// Replays a coordinator's recorded events through the schedule
     Replay(replay::ReplayArgs),
-    /// Ask a coordinator or a node whether it serves
+    /// Asks a coordinator or a node whether it serves
     Health(health::HealthArgs),
     /// Subcommands that measure
     #[cfg(feature = "lab")]
@@ -57,10 +57,10 @@ pub enum Command {
 }
 
 impl Command {
-    /// Runs it to its end.
+    /// Runs the subcommand to its end.
     ///
     /// # Errors
-    /// Input that cannot be used, or a failure at run time; [`app_core::exit::code_of`] tells them apart.
+    /// Input cannot be used, or the program fails at run time; [`app_core::exit::code_of`] separates the two.
     pub fn run(self) -> anyhow::Result<Outcome> {
         match self {
             Self::Up(args) => up::run(args),

@@ -11,10 +11,10 @@ struct Errors {
     flip: f64,
 }
 
-/// A row a view, then their mean and the worst of each column; and the worst PSNR.
+/// A table with a row a view, the mean and the worst of each column; and the worst PSNR.
 ///
 /// # Errors
-/// When views are not of one size.
+/// Views differ in size.
 pub fn table(truth: &[Frame], delivered: &[Frame]) -> anyhow::Result<(Table, f64)> {
     let columns = [("view", ""), ("PSNR", "dB"), ("SSIM", ""), ("FLIP", "")];
     let mut table = Table::new("Against views drawn directly", &columns);

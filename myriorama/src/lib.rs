@@ -1,5 +1,5 @@
-//! The program `myriorama`: one binary that is a cluster, a part of one, and its client; with the feature `lab` it
-//! also measures itself.
+//! The program `myriorama`: a whole cluster, a part of one, or its client. With the feature `lab` it also measures
+//! itself.
 //!
 //! Each of [`commands`] is one subcommand of [`cli`].
 #![cfg_attr(test, allow(clippy::unwrap_used))]

@@ -1,4 +1,4 @@
-//! A cluster's state as a table: nodes, roles, costs, and why.
+//! The state of a cluster as a table: nodes, roles, costs, and the reason of the plan.
 
 use cluster::{ClusterStatus, Costs, NodeStatus};
 use table::{Cell, Table};
@@ -18,10 +18,10 @@ const COLUMNS: [(&str, &str); 12] = [
     ("device", ""),
 ];
 
-/// As `myriorama status` prints it.
+/// The text that `myriorama status` prints.
 ///
 /// # Errors
-/// A row that does not fit, which is a fault here.
+/// A row does not fit its table.
 pub fn text(status: &ClusterStatus) -> anyhow::Result<String> {
     let mut table = Table::new(headline(status), &COLUMNS);
     for node in &status.nodes {
@@ -34,7 +34,7 @@ pub fn text(status: &ClusterStatus) -> anyhow::Result<String> {
     Ok(format!("{}\n\n{why}\n{}", table.to_text(), achieved(status)))
 }
 
-/// What each policy took that has been in force, and whether nodes have time left.
+/// Times that policies achieved, and the load of the nodes.
 fn achieved(status: &ClusterStatus) -> String {
     let mut lines: Vec<String> =
         status.achieved.iter().map(|a| format!("Achieved by {}: {:.3} ms a set.", a.policy, a.busy_s * 1e3)).collect();

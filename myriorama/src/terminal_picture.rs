@@ -1,11 +1,11 @@
-//! Text as a terminal shows it, as an SVG picture.
+//! Text of a terminal as an SVG picture.
 
 use std::fmt::Write as _;
 
-/// Of one character, in pixels; rows stand a little apart.
+/// The size of one character, in pixels; rows stand a little apart.
 const CHARACTER_PX: (f64, f64) = (7.8, 18.0);
 const MARGIN_PX: f64 = 14.0;
-/// Longer lines go on in the next row.
+/// The columns of a row; longer lines are wrapped.
 const COLUMNS: usize = 124;
 
 /// An SVG picture of lines of text.
@@ -29,7 +29,7 @@ pub fn svg(text: &str) -> String {
     picture + "</g>\n</svg>\n"
 }
 
-/// At spaces, where there are any.
+/// Wraps a line at spaces.
 fn wrapped(line: &str) -> Vec<String> {
     let (mut rows, mut row) = (Vec::new(), String::new());
     for word in line.split_inclusive(' ') {
@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_line_is_there_and_long_ones_go_on() {
+    fn every_line_is_drawn_and_long_lines_are_wrapped() {
         let long = "word ".repeat(60);
         let picture = svg(&format!("a < b & c\n\n{long}"));
         assert!(picture.contains("a &lt; b &amp; c"));

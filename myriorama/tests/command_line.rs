@@ -1,4 +1,4 @@
-//! The program as a person meets it: help, exit status, messages.
+//! The command line: help, exit status, messages.
 #![allow(clippy::unwrap_used)]
 
 use std::process::{Command, Output};
@@ -7,7 +7,7 @@ fn myriorama(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_myriorama")).args(arguments).output().unwrap()
 }
 
-fn told(output: &Output) -> (Option<i32>, String) {
+fn status_and_message(output: &Output) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
@@ -16,12 +16,12 @@ fn help_teaches_every_command() {
     let help = myriorama(&["--help"]);
     let text = String::from_utf8_lossy(&help.stdout).into_owned();
     assert!(help.status.success());
-    for command in ["up", "coordinator", "node", "view", "demo", "bench"] {
+    let lab: &[&str] = if cfg!(feature = "lab") { &["demo", "bench", "study"] } else { &[] };
+    for command in ["up", "coordinator", "node", "view", "status", "health", "replay"].iter().chain(lab) {
         assert!(text.contains(&format!("\n  {command} ")), "{command} in {text}");
         assert!(myriorama(&[command, "--help"]).status.success(), "{command} --help");
     }
     assert!(text.contains("Examples:") && text.contains("Exit status:"));
-    assert!(myriorama(&["bench", "scaling", "--help"]).status.success(), "bench scaling --help");
     assert!(String::from_utf8_lossy(&myriorama(&["--version"]).stdout).starts_with("myriorama "));
 }
 
@@ -33,9 +33,7 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
     let cameras = folder.path().join("cameras.json");
     std::fs::write(&cameras, b"{\"frames\": [{}]}").unwrap();
     let (broken, cameras) = (broken.to_str().unwrap(), cameras.to_str().unwrap());
-    let cases: [(&[&str], &str); 9] = [
-        (&["bench", "scaling", "--quota", "0"], "0.01 to 64"),
-        (&["demo", "--scene", "/nowhere/absent.glb"], "absent.glb"),
+    let cases: [(&[&str], &str); 7] = [
         (&["up", "--scene", broken], "broken.glb"),
         (&["coordinator", "--scene", broken], "broken.glb"),
         (&["up", "--scene", "quad", "--samples", cameras], "cameras.json: frame 0, w"),
@@ -45,15 +43,31 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
         (&["view", "--orbit", "3", "--grid", "2x2"], "--grid"),
     ];
     for (arguments, named) in cases {
-        let (status, message) = told(&myriorama(arguments));
+        let (status, message) = status_and_message(&myriorama(arguments));
+        assert_eq!(status, Some(2), "{arguments:?}: {message}");
+        assert!(message.contains(named), "{arguments:?}: {message}");
+    }
+}
+
+#[cfg(feature = "lab")]
+#[test]
+fn input_of_the_lab_that_cannot_be_used_is_named_with_status_2() {
+    assert!(myriorama(&["bench", "scaling", "--help"]).status.success(), "bench scaling --help");
+    let cases: [(&[&str], &str); 2] = [
+        (&["bench", "scaling", "--quota", "0"], "0.01 to 64"),
+        (&["demo", "--scene", "/nowhere/absent.glb"], "absent.glb"),
+    ];
+    for (arguments, named) in cases {
+        let (status, message) = status_and_message(&myriorama(arguments));
         assert_eq!(status, Some(2), "{arguments:?}: {message}");
         assert!(message.contains(named), "{arguments:?}: {message}");
     }
 }
 
 #[test]
-fn a_cluster_that_is_not_there_is_a_failure_at_run_time() {
-    let (status, message) = told(&myriorama(&["view", "--coordinator", "http://127.0.0.1:9", "--orbit", "2"]));
+fn an_absent_cluster_is_a_failure_at_run_time() {
+    let (status, message) =
+        status_and_message(&myriorama(&["view", "--coordinator", "http://127.0.0.1:9", "--orbit", "2"]));
     assert_eq!(status, Some(3), "{message}");
     assert!(message.contains("127.0.0.1:9"), "{message}");
 }

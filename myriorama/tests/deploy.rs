@@ -1,4 +1,4 @@
-//! What is deployed fits the program: metrics on the dashboard exist, and commands in the compose file are understood.
+//! Deployed files fit the program: metrics of the dashboard exist, and commands of the compose file are valid.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeSet;
@@ -49,7 +49,7 @@ fn commands_in(compose: &str) -> Vec<Vec<String>> {
 }
 
 #[test]
-fn every_command_of_the_compose_file_is_understood() {
+fn every_command_of_the_compose_file_is_valid() {
     let commands = commands_in(&deployed("compose.yaml"));
     assert_eq!(commands.len(), 2, "{commands:?}");
     for command in commands {

@@ -1,4 +1,4 @@
-//! One node process: it can sample and composite, and does what the plan says.
+//! One node process: it can sample and composite, and takes its roles from the plan.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -6,8 +6,8 @@ use std::sync::Arc;
 use cluster::NodeStatus;
 use compositor_node::CompositorService;
 use node::{
-    CurrentPlan, Engine, NodeConfig, NodeMetrics, NodeService, Scenes, ServeError, Watched, health, keep_membership,
-    with_reflection,
+    CurrentPlan, DeviceLossMonitor, Engine, NodeConfig, NodeMetrics, NodeService, Scenes, ServeError, health,
+    keep_membership, with_reflection,
 };
 use sampler_node::SamplerService;
 use tokio::net::TcpListener;
@@ -15,9 +15,8 @@ use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 use wire::rpc::{compositor_server, node_server, sampler_server};
 
-/// Serves both roles on one port and stays a member of the coordinator's cluster until `shutdown`; then
-/// ends its streams and returns when connections have ended, after 10 s at most. A node whose device is lost leaves at
-/// once: others take its place.
+/// Serves both roles on one port and stays a member of the coordinator's cluster until `shutdown`. Then it ends its streams
+/// and returns when connections have ended, after 10 s at most. A node whose device is lost leaves at once.
 ///
 /// # Errors
 /// Where the address is not allowed, the transport fails or the device is lost.
@@ -28,8 +27,8 @@ pub async fn serve(
     metrics: NodeMetrics,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
-    let watched = Watched::new(engine);
-    let engine: Arc<dyn Engine> = Arc::new(watched.clone());
+    let monitor = DeviceLossMonitor::new(engine);
+    let engine: Arc<dyn Engine> = Arc::new(monitor.clone());
     let plan = CurrentPlan::new(&config.node_name);
     let scenes = Arc::new(Scenes::new(engine.clone(), &config));
     let status = status_of(&config, listener.local_addr()?, engine.as_ref());
@@ -46,9 +45,9 @@ pub async fn serve(
     let membership = tokio::spawn(member);
     let served = tokio::select! {
         served = node::serve(listener, routes, config.insecure_bind, shutdown) => served,
-        reason = watched.lost() => Err(ServeError::DeviceLost { reason }),
+        reason = monitor.lost() => Err(ServeError::DeviceLost { reason }),
     };
-    // Where serving ended by itself, nobody has cancelled it.
+    // Where serving has ended by itself, `shutdown` is not cancelled.
     membership.abort();
     served
 }

@@ -1,7 +1,7 @@
-//! The sampler's service: images are pulled, sampled once and kept for whoever comes next.
+//! The sampler's service: images are sampled on the first request and cached for the next.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod kept;
+mod encoded_set_cache;
 mod service;
 
 pub use service::SamplerService;

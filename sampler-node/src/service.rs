@@ -1,4 +1,4 @@
-//! Answers compositors that ask for images.
+//! The service that compositors fetch images from.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -15,17 +15,17 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Messages, Sampler};
 
-use crate::kept::{EncodedImages, Kept};
+use crate::encoded_set_cache::{EncodedImages, EncodedSetCache};
 
-/// Chunks of images that are passed on and not sent yet.
+/// Chunks of relayed images that are not sent yet.
 const CHUNKS_AHEAD: usize = 4;
 
 /// The sampler's role.
 pub struct SamplerService {
     engine: Arc<dyn Engine>,
     plan: CurrentPlan,
-    kept: Arc<Kept>,
-    /// Sets are sampled in the order in which they are asked for: the next one is waited for first.
+    cache: Arc<EncodedSetCache>,
+    /// Sets are sampled in the order of their requests: the one that is needed next comes first.
     sampling: Arc<tokio::sync::Mutex<()>>,
     relay: Arc<dyn Relay>,
     metrics: NodeMetrics,
@@ -33,7 +33,7 @@ pub struct SamplerService {
 }
 
 impl SamplerService {
-    /// Of a node, which passes on what `relay` has.
+    /// The service of a node, which relays the images of `relay`.
     #[must_use]
     pub fn new(
         engine: Arc<dyn Engine>,
@@ -43,11 +43,11 @@ impl SamplerService {
         metrics: NodeMetrics,
         shutdown: CancellationToken,
     ) -> Self {
-        let kept = Arc::new(Kept::new(config.kept_sample_bytes));
-        Self { engine, plan, kept, sampling: Arc::default(), relay, metrics, shutdown }
+        let cache = Arc::new(EncodedSetCache::new(config.sample_cache_bytes));
+        Self { engine, plan, cache, sampling: Arc::default(), relay, metrics, shutdown }
     }
 
-    /// All of this node's images of a set: the first request makes them, in one submission.
+    /// All of this node's images of a set, made for the first request in one submission.
     async fn images(&self, plan: &Assignment, set_index: u32) -> Result<EncodedImages, Status> {
         let beyond = || Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"));
         let content = plan.set_content(set_index).ok_or_else(beyond)?;
@@ -59,19 +59,19 @@ impl SamplerService {
         let (sampling, current, plan_epoch) = (self.sampling.clone(), self.plan.clone(), plan.plan_epoch);
         let make = move || async move {
             let _one = sampling.lock().await;
-            // A later plan may have come meanwhile: its sets must not wait for what nobody wants any more.
+            // A later plan may be in force by now: its sets must not wait for sets of this one.
             current.require(plan_epoch)?;
             blocking(move || sample(engine.as_ref(), &work, (&indices, tiles), &metrics)).await
         };
-        self.kept.get(key, make).await
+        self.cache.get(key, make).await
     }
 
-    /// Images of others, as they come.
-    async fn passed_on(&self, plan: &CellPlan, request: FetchImages) -> Result<Messages<Chunk>, Status> {
+    /// Images of other samplers, as they arrive.
+    async fn relayed(&self, plan: &CellPlan, request: FetchImages) -> Result<Messages<Chunk>, Status> {
         let id = SampleSetId { plan_epoch: plan.plan_epoch, index: request.set_index.into() };
         let images = self.relay.images(plan, request.set_index).await?;
         let (send, chunks) = mpsc::channel(CHUNKS_AHEAD);
-        tokio::spawn(pass_on(images, id, request.image_indices, send));
+        tokio::spawn(relay(images, id, request.image_indices, send));
         Ok(until_drained(Box::pin(ReceiverStream::new(chunks)), self.shutdown.clone()))
     }
 }
@@ -83,7 +83,7 @@ impl Sampler for SamplerService {
         let own = plan.images_of(self.plan.node_name(), request.set_index);
         if let Some(index) = request.image_indices.iter().find(|index| !own.contains(index)) {
             if plan.relays(self.plan.node_name()) {
-                return self.passed_on(&plan, request).await;
+                return self.relayed(&plan, request).await;
             }
             return Err(Status::invalid_argument(format!(
                 "image_indices: {index} is not sampled by {}",
@@ -100,8 +100,8 @@ impl Sampler for SamplerService {
     }
 }
 
-/// Until all have gone out, one fails, or nobody listens any more.
-async fn pass_on(
+/// Sends the wanted images as chunks, until all are sent, one fails, or the receiver is dropped.
+async fn relay(
     mut images: Messages<(u32, EncodedDepthImage)>,
     id: SampleSetId,
     wanted: Vec<u32>,
@@ -124,7 +124,7 @@ async fn pass_on(
     }
 }
 
-/// `None` beyond the timeline.
+/// The work of sampling a set; `None` beyond the timeline.
 fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Option<SampleWork>, Status> {
     let (workload, cameras) = (&plan.workload, plan.sampled_cameras());
     if indices.iter().any(|&index| index as usize >= cameras.len()) {
@@ -138,7 +138,7 @@ fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Opt
         method: workload.method.clone(),
         lighting: workload.lighting.clone(),
         scene_time_s,
-        settled_at_s: workload.timeline.temporal_reference_s(set_index),
+        temporal_reference_s: workload.timeline.temporal_reference_s(set_index),
         refinement: workload.refinement(set_index),
     };
     Ok(workload.timeline.time_s(set_index).map(work))

@@ -1,13 +1,13 @@
-//! What a cluster is made of, and how it goes about its work.
+//! The machines of a cluster, and the habits of its services.
 
 use cluster::{Costs, TileCosts};
 
 /// Seconds of a call to the device beside the views that it makes; 0 where it does not count.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Calls {
-    /// Of views that are reconstructed.
+    /// Seconds of a call that reconstructs views.
     pub reconstruct_s: f64,
-    /// Of views that are drawn from the scene.
+    /// Seconds of a call that draws views from the scene.
     pub direct_s: f64,
 }
 
@@ -16,14 +16,14 @@ pub struct Calls {
 pub struct Machine {
     /// Seconds of one operation, of a view as one of a batch.
     pub costs: Costs,
-    /// What every batch takes beside its views: reconstructed, and drawn directly.
+    /// The time of every batch beside its views: reconstructed, and drawn directly.
     pub calls: Calls,
-    /// Of the link, each way; infinite where it does not count.
+    /// The rate of the link, each way; infinite where it does not count.
     pub bytes_per_s: f64,
 }
 
 impl Machine {
-    /// So many times as fast, on the same link.
+    /// A machine that is `speed` times as fast, on the same link.
     #[must_use]
     pub fn faster(&self, speed: f64) -> Self {
         let costs = Costs {
@@ -39,7 +39,7 @@ impl Machine {
         Self { costs, calls, ..*self }
     }
 
-    /// Costs alone, on a link that does not count.
+    /// A machine of these costs, on a link that does not count.
     #[must_use]
     pub fn of(costs: Costs) -> Self {
         Self { costs, calls: Calls::default(), bytes_per_s: f64::INFINITY }
@@ -60,13 +60,13 @@ pub struct Cluster {
 }
 
 impl Cluster {
-    /// So many equal nodes.
+    /// A cluster of `nodes` equal nodes.
     #[must_use]
     pub fn equal(nodes: usize, machine: Machine, images: usize, image_bytes: f64, frame_bytes: f64) -> Self {
         Self { machines: vec![machine; nodes], images, image_bytes, frame_bytes }
     }
 
-    /// Every image cut into so many parts, as work units of their own: their costs and bytes add up to the image's.
+    /// Cuts every image into `parts`, as work units of their own: their costs and bytes add up to the image's.
     #[must_use]
     pub fn cut(mut self, parts: usize) -> Self {
         let share = 1.0 / parts.max(1) as f64;
@@ -84,31 +84,31 @@ impl Cluster {
 pub enum Transfer {
     /// Each sampler sends to each compositor, as the services do unless the plan names relays.
     Unicast,
-    /// Each sampler sends to one compositor; whoever has received passes on to so many others. With one it is a chain.
+    /// Each sampler sends to one compositor; every receiver sends to this many others. With one it is a chain.
     Relay(usize),
 }
 
-/// How the services go about it.
+/// The habits of the services.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Habits {
-    /// Of images.
+    /// The transfer of images.
     pub transfer: Transfer,
     /// Sets that a compositor asks samplers for beyond the one it has loaded.
     pub sets_ahead: u32,
     /// Most views of one call to the device.
     pub batch_views: usize,
-    /// Views that a compositor has taken on and not sent yet.
+    /// Views that a compositor has accepted and not sent yet.
     pub credit_views: usize,
 }
 
 impl Default for Habits {
-    /// As compositor nodes and clients are.
+    /// The habits of the real services.
     fn default() -> Self {
         Self { transfer: Transfer::Unicast, sets_ahead: 2, batch_views: 64, credit_views: 256 }
     }
 }
 
-/// So many speeds, evenly spread over the logarithm between 1/√`ratio` and √`ratio` (SplitMix64).
+/// `count` speeds, evenly spread over the logarithm between 1/√`ratio` and √`ratio` (SplitMix64).
 #[must_use]
 pub fn spread_speeds(count: usize, ratio: f64, seed: u64) -> Vec<f64> {
     let mut state = seed;

@@ -1,4 +1,4 @@
-//! One simulated node: what waits for its device and its link, and how far its stream of views is.
+//! One simulated node: the queues of its device and its link, and the state of its stream of views.
 
 use std::collections::VecDeque;
 
@@ -7,7 +7,7 @@ use client::FlowControl;
 use crate::cluster::Machine;
 use crate::run::Busy;
 
-/// What a device does.
+/// A job of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Job {
     /// All of the node's images of a set, in one go.
@@ -18,34 +18,34 @@ pub(crate) enum Job {
     Views { set: u32, views: usize },
 }
 
-/// What goes over a link.
+/// A parcel on a link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Parcel {
-    /// A sampler's images of a set, to a compositor: the place in the sampler's list of receivers.
+    /// A sampler's images of a set; `place` is the compositor's place in the sampler's list of receivers.
     Images { set: u32, sampler: usize, images: usize, place: usize },
     /// Frames to clients.
     Frames { set: u32, views: usize },
 }
 
-/// How far a sampler is with a set.
+/// The state of a set on a sampler.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) enum Sampled {
-    /// Nobody has asked.
+    /// Not requested.
     #[default]
     Not,
-    /// Under way; who has asked meanwhile.
+    /// Being sampled, for these compositors.
     Soon(Vec<usize>),
-    /// Kept for whoever asks.
+    /// Cached for later requests.
     Done,
 }
 
-/// How far a compositor is with a set.
+/// The state of a set on a compositor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Loading {
-    pub(crate) asked: bool,
-    /// Samplers whose images have come.
-    pub(crate) came: usize,
-    /// Waits for the device, or has been there.
+    pub(crate) requested: bool,
+    /// Samplers whose images have arrived.
+    pub(crate) arrived: usize,
+    /// Whether it waits for the device, or has been loaded.
     pub(crate) queued: bool,
     pub(crate) loaded: bool,
 }
@@ -54,20 +54,20 @@ pub(crate) struct Loading {
 #[derive(Debug, Clone)]
 pub(crate) struct Node {
     pub(crate) machine: Machine,
-    /// Sampling and loading: what many wait for goes before the next batch of views.
+    /// Sampling and loading, which go before the next batch of views.
     pub(crate) urgent: VecDeque<Job>,
     /// Views that wait for the device, by set, in their order.
     pub(crate) waiting: VecDeque<(u32, usize)>,
     pub(crate) running: Option<Job>,
     pub(crate) outgoing: VecDeque<Parcel>,
     pub(crate) sending: Option<Parcel>,
-    /// When the link is free for what comes in.
+    /// The time at which the link is free for incoming parcels.
     pub(crate) in_free_s: f64,
     /// By set.
     pub(crate) sampled: Vec<Sampled>,
     /// By set.
     pub(crate) loading: Vec<Loading>,
-    /// Messages of the client's that the node has not read: the set, and views that there was no credit for yet.
+    /// Messages that the node has not read: the set, and the views that have no credit yet.
     pub(crate) messages: VecDeque<(u32, usize)>,
     pub(crate) credit: usize,
     /// The client's side: its flow control, and this node's place among the compositors.
@@ -96,7 +96,7 @@ impl Node {
         }
     }
 
-    /// Hands over what there is credit for of the first message; whether that was all of it.
+    /// Hands over as many views of the first message as have credit; gives whether these were all.
     pub(crate) fn hand_over(&mut self) -> bool {
         let Some((set, left)) = self.messages.front_mut() else { return false };
         let (set, views) = (*set, (*left).min(self.credit));
@@ -114,7 +114,7 @@ impl Node {
         all
     }
 
-    /// What the device does next.
+    /// The next job of the device.
     pub(crate) fn next_job(&mut self, batch_views: usize) -> Option<Job> {
         if let Some(job) = self.urgent.pop_front() {
             return Some(job);

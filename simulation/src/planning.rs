@@ -1,4 +1,4 @@
-//! The real schedule, told what a coordinator would tell it.
+//! The real schedule, with the events that a coordinator would hand it.
 
 use std::time::Duration;
 
@@ -13,41 +13,41 @@ use crate::cluster::{Cluster, Machine};
 
 /// Between two ticks, as the coordinator's.
 const TICK: Duration = Duration::from_millis(250);
-/// A plan that has not changed for so long, longer than any dwell, is settled.
-const SETTLED_TICKS: usize = 40;
-/// After so many it is taken as it is: ten simulated minutes.
+/// A plan that has not changed for this many ticks, longer than any dwell, is stable.
+const STABLE_TICKS: usize = 40;
+/// A plan is taken as it is after this many: ten simulated minutes.
 const MOST_TICKS: usize = 2400;
 /// Timings of each kind that a node reports: the schedule's moving average is then within a thousandth of them.
 const REPORTS: usize = 32;
 
-/// What one session asks for.
+/// The demand of one session.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Demand {
     /// V.
     pub views: usize,
     /// Sample sets, all different.
     pub sets: u32,
-    /// Who decides.
+    /// The policy, or that the schedule decides.
     pub policy: PolicyChoice,
-    /// Into how many tiles images are cut, where the schedule is not to decide.
+    /// Tiles of an image; `None`: the schedule decides.
     pub tiles: Option<usize>,
-    /// Whether nodes report their own costs and bytes; otherwise all count as the slowest, and links as free, which is
-    /// all that a coordinator knows when a session is opened.
+    /// Whether nodes report their own costs and bytes. Otherwise all count as the slowest, and links as free: a coordinator
+    /// knows no more when a session is opened.
     pub nodes_report: bool,
 }
 
 /// Why there is no plan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// The schedule says so.
+    /// The schedule refuses the session.
     #[error(transparent)]
     Refused(#[from] ChoiceError),
-    /// It said nothing at all.
+    /// The schedule gave no command.
     #[error("the schedule made no plan")]
     None,
 }
 
-/// A schedule and what it last said.
+/// A schedule and its last commands.
 #[derive(Default)]
 struct Coordinator {
     scheduler: Scheduler,
@@ -56,7 +56,7 @@ struct Coordinator {
     refused: Option<ChoiceError>,
 }
 
-/// The plan that the schedule comes to rest at.
+/// The stable plan of the schedule.
 ///
 /// # Errors
 /// Where the schedule refuses.
@@ -67,9 +67,9 @@ pub fn plan(cluster: &Cluster, demand: &Demand) -> Result<SessionPlan, PlanError
     }
     coordinator.tell(open(cluster, demand));
     if demand.nodes_report {
-        (0..REPORTS).for_each(|_| coordinator.hear_costs(cluster));
+        (0..REPORTS).for_each(|_| coordinator.report_costs(cluster));
     }
-    coordinator.settle();
+    coordinator.wait_until_stable();
     match (coordinator.plan, coordinator.refused) {
         (_, Some(error)) => Err(error.into()),
         (Some(plan), None) => Ok(plan),
@@ -97,7 +97,7 @@ impl Coordinator {
         names.into_iter().for_each(|name| self.tell(ready(name)));
     }
 
-    fn hear_costs(&mut self, cluster: &Cluster) {
+    fn report_costs(&mut self, cluster: &Cluster) {
         for (number, machine) in cluster.machines.iter().enumerate() {
             self.tell(Event::Measured {
                 node_name: name(number),
@@ -110,14 +110,14 @@ impl Coordinator {
         }
     }
 
-    fn settle(&mut self) {
-        let mut settled = 0;
+    fn wait_until_stable(&mut self) {
+        let mut stable_ticks = 0;
         for _ in 0..MOST_TICKS {
             self.now += TICK;
             let before = self.epoch();
             self.tell(Event::Tick);
-            settled = if self.epoch() == before { settled + 1 } else { 0 };
-            if settled >= SETTLED_TICKS {
+            stable_ticks = if self.epoch() == before { stable_ticks + 1 } else { 0 };
+            if stable_ticks >= STABLE_TICKS {
                 return;
             }
         }
@@ -128,12 +128,12 @@ impl Coordinator {
     }
 }
 
-/// As many digits as sort well: the schedule lists nodes by name.
+/// The name of a node. Digits are padded, as the schedule lists nodes by name.
 fn name(number: usize) -> String {
     format!("node-{number:04}")
 }
 
-/// The node of a name in a plan of ours.
+/// The number in a node's name.
 pub(crate) fn number_of(name: &str) -> Option<usize> {
     name.strip_prefix("node-")?.parse().ok()
 }
@@ -181,7 +181,7 @@ fn timings(machine: &Machine, image_bytes: f64) -> MeasuredCosts {
     }
 }
 
-/// Of a workload the schedule looks at the number of images and sets alone.
+/// The schedule uses only the number of images and sets of a workload.
 fn workload(images: usize, sets: u32) -> Workload {
     let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8));
     Workload {

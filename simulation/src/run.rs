@@ -1,4 +1,4 @@
-//! What came of a run: when sets were complete, what was busy, and what the limit is.
+//! The result of a run: the times of complete sets, the busy parts, and the limit.
 
 use std::fmt;
 
@@ -25,7 +25,7 @@ impl Busy {
     }
 }
 
-/// What keeps a cluster from being faster.
+/// The part that limits a cluster's speed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Limit {
     /// A device that samples whole images, be it beside its views.
@@ -42,7 +42,7 @@ pub enum Limit {
     ImagesIn,
     /// The link of a node that sends frames to clients.
     FramesOut,
-    /// Nothing is busy all the time: each waits for the other.
+    /// No part is busy all the time: each waits for another.
     Waiting,
 }
 
@@ -61,18 +61,18 @@ impl fmt::Display for Limit {
     }
 }
 
-/// A run's times.
+/// The times of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// When the last view of each set was delivered.
+    /// The time at which the last view of each set was delivered.
     pub complete_s: Vec<f64>,
-    /// Of each node.
+    /// The busy times of each node.
     pub busy: Vec<Busy>,
 }
 
-/// Sets that are asked for after the last that counts.
+/// Sets after the last one that counts.
 const DRAINING: usize = 4;
-/// What is busy for less than this share of the time does not hold up the rest.
+/// A part that is busy for less than this share of the time does not limit the rest.
 const BUSY: f64 = 0.9;
 /// A device that makes views for this share of its time is where it should be.
 const MOSTLY: f64 = 0.8;
@@ -95,7 +95,7 @@ impl Run {
         (at(last) - at(first)) / last.saturating_sub(first) as f64
     }
 
-    /// What the part that is busy for the greatest share of T does.
+    /// The limit: the part that is busy for the greatest share of T.
     #[must_use]
     pub fn limit(&self) -> Limit {
         let set_s = self.steady_period_s() * self.complete_s.len() as f64;
@@ -111,7 +111,7 @@ impl Run {
     }
 }
 
-/// Of a device that holds up the rest; `mean_views_s` is what all nodes spend on views.
+/// The limit of a device that delays the rest; `mean_views_s` is the nodes' mean time on views.
 fn of_device(busy: &Busy, mean_views_s: f64) -> Limit {
     if busy.views_s < MOSTLY * busy.device_s() {
         return if busy.sample_s > busy.load_s { Limit::Sampling } else { Limit::Loading };

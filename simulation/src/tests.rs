@@ -35,7 +35,7 @@ fn close(a: f64, b: f64) -> bool {
 }
 
 #[test]
-fn one_sampler_one_compositor_one_set() {
+fn a_set_takes_the_sum_of_its_steps_on_two_nodes() {
     let run = ran(&equal(2, FREE), &demand(PolicyChoice::Pipeline, 100, 1), Habits::default());
     assert!(close(run.complete_s[0], 0.4 + 0.005 + 100.0 * 0.01), "{run:?}");
     assert!(close(run.busy[0].sample_s, 0.4) && close(run.busy[1].views_s, 1.0));
@@ -53,8 +53,8 @@ fn every_batch_costs_a_call() {
 }
 
 #[test]
-fn a_link_delays_by_what_it_carries() {
-    // 4 MB of images at 10 MB/s, a first batch of 50, then frames of 0.1 MB that take as long to send as to make.
+fn a_link_delays_by_the_bytes_it_carries() {
+    // 4 MB of images at 10 MB/s and a first batch of 50. Frames of 0.1 MB then take as long to send as to make.
     let slow = Machine { bytes_per_s: 1e7, ..FREE };
     let run = ran(&equal(2, slow), &demand(PolicyChoice::Pipeline, 100, 1), Habits::default());
     let least_s = 0.4 + 0.4 + 0.005 + 0.5 + 1.0;
@@ -62,12 +62,12 @@ fn a_link_delays_by_what_it_carries() {
 }
 
 #[test]
-fn the_steady_state_is_the_formulas() {
+fn the_steady_state_follows_the_formulas() {
     for (nodes, views) in [(2, 100), (5, 1000), (11, 1000), (11, 290)] {
         let demand = demand(PolicyChoice::Pipeline, views, 16);
         let run = ran(&equal(nodes, FREE), &demand, Habits::default());
         let k = k_fd(4, 0.1, views, 0.01, nodes).clamp(1, 4);
-        // Compositors take turns with what is left over of a set.
+        // Compositors take turns with the remainder of a set.
         let most = views as f64 / (nodes - k) as f64 * 0.01 + 0.005;
         let formula_s = pipeline_time(4, 0.1, views, 0.01, nodes, k).max(most);
         let ratio = run.steady_period_s() / formula_s;
@@ -77,9 +77,9 @@ fn the_steady_state_is_the_formulas() {
     assert!(close(direct.steady_period_s(), 25.0 * 0.101));
 }
 
-/// With one set asked for ahead a sampler rests while what it made travels and is loaded; with two it does not.
+/// With one set fetched ahead, a sampler is idle while its images are sent and loaded; with two it is not.
 #[test]
-fn a_sampler_that_is_asked_late_rests_meanwhile() {
+fn a_sampler_is_idle_where_sets_are_requested_late() {
     let machine = Machine { bytes_per_s: 1e8, ..FREE };
     let demand = demand(PolicyChoice::Pipeline, 2, 24);
     let one = ran(&equal(2, machine), &demand, Habits { sets_ahead: 1, ..Habits::default() });
@@ -99,7 +99,7 @@ fn a_sampler_that_sends_to_all_is_bound_by_its_link_and_a_tree_is_not() {
     let k = planned.sampler_count();
     let sent_mb = (4 / k * (41 - k)) as f64;
     let unicast = run(&cluster, &planned, 1000, 12, Habits::default());
-    // Whoever is late leaves a set to others, and a few need not fetch it.
+    // A late compositor leaves a set to others, and a few need not fetch it.
     let link_s = sent_mb / 100.0;
     assert!((0.9 * link_s..1.1 * link_s).contains(&unicast.steady_period_s()), "{}", unicast.steady_period_s());
     assert_eq!(unicast.limit(), Limit::ImagesOut);
@@ -110,7 +110,7 @@ fn a_sampler_that_sends_to_all_is_bound_by_its_link_and_a_tree_is_not() {
 }
 
 #[test]
-fn a_relay_brings_every_image_to_every_node_once() {
+fn a_relay_sends_every_image_to_every_node_once() {
     for (policy, transfer) in [
         (PolicyChoice::Pipeline, Transfer::Relay(1)),
         (PolicyChoice::Pipeline, Transfer::Relay(3)),
@@ -138,7 +138,7 @@ fn a_relay_brings_every_image_to_every_node_once() {
 }
 
 #[test]
-fn time_share_and_few_views() {
+fn time_share_with_few_views_is_bound_by_sampling() {
     let one = ran(&equal(1, FREE), &demand(PolicyChoice::Auto, 100, 12), Habits::default());
     assert!(close(one.steady_period_s(), 0.4 + 0.005 + 1.0), "{}", one.steady_period_s());
     // A set that is sampled ahead may fall before or behind the end of the time that counts.
@@ -149,7 +149,7 @@ fn time_share_and_few_views() {
 }
 
 #[test]
-fn images_in_order_are_sampled_by_nodes_in_turn() {
+fn nodes_take_turns_with_sets_of_sequential_images() {
     let costs = Costs { in_order: true, ..COSTS };
     let cluster = equal(5, Machine { costs, ..FREE });
     let run = ran(&cluster, &demand(PolicyChoice::Pipeline, 10, 40), Habits::default());
@@ -168,7 +168,7 @@ fn unequal_nodes_are_planned_by_their_own_costs() {
     let cluster = Cluster { machines, images: 4, image_bytes: 1e6, frame_bytes: 1e5 };
     let known = Demand { nodes_report: true, ..demand(PolicyChoice::Pipeline, 1000, 16) };
     let ran = ran(&cluster, &known, Habits::default());
-    assert_eq!(ran.limit(), Limit::Views, "whoever is done helps who is slow");
+    assert_eq!(ran.limit(), Limit::Views, "fast nodes steal from slow ones");
     let nodes: Vec<_> =
         cluster.machines.iter().map(|machine| NodeCosts { costs: machine.costs, transfer_image_s: None }).collect();
     let samplers = plan(&cluster, &known).unwrap().assignment.samplers;
@@ -180,8 +180,8 @@ fn unequal_nodes_are_planned_by_their_own_costs() {
 }
 
 #[test]
-fn a_device_is_held_up_by_what_is_not_views() {
-    // Whoever samples an image makes as many views as the others.
+fn the_limit_names_sampling_and_loading_where_they_delay_views() {
+    // Nodes that sample an image make as many views as the others.
     let few = ran(&equal(50, FREE), &demand(PolicyChoice::TimeShare, 500, 16), Habits::default());
     assert_eq!(few.limit(), Limit::Sampling);
     let loads = Machine { costs: Costs { load_set_s: 0.2, sample_image_s: 0.01, ..COSTS }, ..FREE };
@@ -202,7 +202,7 @@ fn parts_of_images_cost_what_images_cost() {
 }
 
 #[test]
-fn a_thousand_nodes_take_a_moment_and_the_same_every_time() {
+fn a_run_of_a_thousand_nodes_is_quick_and_deterministic() {
     let machine = Machine { bytes_per_s: 1.25e9, ..FREE };
     let demand = demand(PolicyChoice::Auto, 100_000, 12);
     let cluster = equal(1000, machine);

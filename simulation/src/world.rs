@@ -1,8 +1,8 @@
-//! The event loop: a plan carried out.
+//! The event loop that executes a plan.
 //!
-//! Requests take no time. An image share that is sent occupies the sender's link for as long as it takes, and the
-//! receiver's from the moment it arrives there; what is in the way is waited for. Frames leave over the compositor's
-//! link; clients are many, and their links are their own.
+//! Requests take no time. A share of images occupies the sender's link while it is sent, and the receiver's link from its
+//! arrival on. Parcels on a link wait for those before. Frames leave over the compositor's link; clients are many, and
+//! each has a link of its own.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -12,17 +12,17 @@ use client::WorkStealing;
 use cluster::{Assignment, Policy, SessionPlan};
 
 use crate::cluster::{Cluster, Habits, Machine, Transfer};
-use crate::dealing::{compositors_of, deal_of, receivers};
+use crate::distribution::{compositors_of, receivers, unrequested_views};
 use crate::node::{Job, Node, Parcel, Sampled};
 use crate::planning::number_of;
 use crate::run::Run;
 
-/// A batch's frames leave in so many parcels: what a client asks for next it asks before all have come.
+/// The parcels that a batch's frames leave in: a client requests more before it has received all of them.
 const PARCELS: usize = 8;
 
-/// What happens next; of several at the same time what was foreseen first.
+/// A future event; of several at the same time, the one that was scheduled first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Happens {
+enum Event {
     /// A device has ended its job.
     Done { node: usize },
     /// A link has sent its parcel.
@@ -42,23 +42,23 @@ struct World<'a> {
     unrequested: WorkStealing,
     /// Nodes that make views, in the plan's order.
     compositors: Vec<usize>,
-    /// Of each node, to whom its images go under a relay; of those that sample nothing nobody.
+    /// The receivers of each node's images under a relay; none for nodes that do not sample.
     receivers: Vec<Vec<usize>>,
     now_s: f64,
-    foreseen: BinaryHeap<Reverse<(u64, u64, Happens)>>,
+    scheduled: BinaryHeap<Reverse<(u64, u64, Event)>>,
     events: u64,
     /// Views of each set that are still to be delivered, and when the last was.
     due: Vec<(usize, f64)>,
 }
 
-/// Carries a plan out for `sets` sets of `views` views.
+/// Executes a plan for `sets` sets of `views` views.
 #[must_use]
 pub fn run(cluster: &Cluster, plan: &SessionPlan, views: usize, sets: u32, habits: Habits) -> Run {
     let mut world = World::new(cluster, plan, views, sets, habits);
     world.begin();
-    while let Some(Reverse((at, _, what))) = world.foreseen.pop() {
+    while let Some(Reverse((at, _, event))) = world.scheduled.pop() {
         world.now_s = f64::from_bits(at);
-        world.happens(what);
+        world.handle(event);
     }
     Run {
         complete_s: world.due.iter().map(|(due, last_s)| if *due == 0 { *last_s } else { f64::NAN }).collect(),
@@ -74,8 +74,8 @@ impl<'a> World<'a> {
         let habits = Habits { transfer: relayed.unwrap_or(habits.transfer), ..habits };
         let node = |machine| Node::new(machine, sets, (habits.credit_views, view_s));
         let nodes: Vec<Node> = cluster.machines.iter().copied().map(node).collect();
-        let (unrequested, due) = (deal_of(plan, views, sets), vec![(views, 0.0); sets as usize]);
-        let (receivers, foreseen) = (Vec::new(), BinaryHeap::new());
+        let (unrequested, due) = (unrequested_views(plan, views, sets), vec![(views, 0.0); sets as usize]);
+        let (receivers, scheduled) = (Vec::new(), BinaryHeap::new());
         Self {
             cluster,
             plan,
@@ -87,13 +87,13 @@ impl<'a> World<'a> {
             compositors,
             receivers,
             now_s: 0.0,
-            foreseen,
+            scheduled,
             events: 0,
             due,
         }
     }
 
-    /// The client's first messages. Who has no view of any set is not asked, and loads nothing.
+    /// Sends the client's first messages. A compositor without a view of any set is not asked, and loads nothing.
     fn begin(&mut self) {
         for (place, node) in self.compositors.clone().into_iter().enumerate() {
             self.nodes[node].place = place;
@@ -102,10 +102,10 @@ impl<'a> World<'a> {
                 self.send_message(node, views);
             }
         }
-        let asked: Vec<usize> =
+        let requested: Vec<usize> =
             self.compositors.iter().copied().filter(|&node| !self.nodes[node].messages.is_empty()).collect();
-        self.receivers = receivers(self.plan, &asked, self.nodes.len());
-        asked.into_iter().for_each(|node| self.advance(node));
+        self.receivers = receivers(self.plan, &requested, self.nodes.len());
+        requested.into_iter().for_each(|node| self.advance(node));
     }
 
     fn send_message(&mut self, node: usize, views: Range<usize>) {
@@ -114,8 +114,8 @@ impl<'a> World<'a> {
         self.nodes[node].messages.push_back((set, views.len()));
     }
 
-    /// Frames have come to the client, which asks for more where there is room.
-    fn came_back(&mut self, node: usize, views: usize) {
+    /// The client receives frames, and requests more where there is room.
+    fn client_received(&mut self, node: usize, views: usize) {
         (0..views).for_each(|_| self.nodes[node].flow.received(self.now_s, false));
         while let Some(most) = self.nodes[node].flow.room() {
             let Some(views) = self.unrequested.take(self.nodes[node].place, most) else { break };
@@ -123,27 +123,26 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Of an image, or of one of the tiles that the plan cuts it into.
+    /// Bytes of an image, or of one of the tiles that the plan cuts it into.
     fn part_bytes(&self) -> f64 {
         self.cluster.image_bytes / f64::from(self.plan.tile_count)
     }
 
-    fn foresee(&mut self, at_s: f64, what: Happens) {
+    fn schedule(&mut self, at_s: f64, event: Event) {
         // Times are not negative, so that their bits are in their order.
-        self.foreseen.push(Reverse((at_s.to_bits(), self.events, what)));
+        self.scheduled.push(Reverse((at_s.to_bits(), self.events, event)));
         self.events += 1;
     }
 
-    fn happens(&mut self, what: Happens) {
-        match what {
-            Happens::Done { node } => self.done(node),
-            Happens::Sent { node } => self.sent(node),
-            Happens::Arrived { sampler, set, place, node } => self.arrived(sampler, set, place, node),
+    fn handle(&mut self, event: Event) {
+        match event {
+            Event::Done { node } => self.done(node),
+            Event::Sent { node } => self.sent(node),
+            Event::Arrived { sampler, set, place, node } => self.arrived(sampler, set, place, node),
         }
     }
 
-    /// As far as a compositor's stream of messages gets: a set is waited for, the next one asked for, its views handed
-    /// over as far as there is credit.
+    /// Reads a compositor's messages: it waits for a set, fetches the next ones, and hands views over as credit allows.
     fn advance(&mut self, node: usize) {
         while let Some(&(set, _)) = self.nodes[node].messages.front() {
             if self.plan.policy != Policy::Direct && !self.prepare(node, set) {
@@ -156,8 +155,8 @@ impl<'a> World<'a> {
         self.start_device(node);
     }
 
-    /// Whether a set is there; asks for it and those after it otherwise. Where sets are sampled in turn, the others'
-    /// samplers need not wait for this one.
+    /// Whether a set is loaded; asks for it and those after it otherwise. Where samplers take turns, those of later sets
+    /// need not wait for this one.
     fn prepare(&mut self, node: usize, set: u32) -> bool {
         let at_once = self.plan.sets_at_once();
         let ahead = at_once.max(self.habits.sets_ahead);
@@ -179,17 +178,17 @@ impl<'a> World<'a> {
             .filter_map(|share| Some((number_of(&share.node_name)?, share.image_indices.len())))
             .collect();
         let loading = &mut self.nodes[node].loading[set as usize];
-        if std::mem::replace(&mut loading.asked, true) {
+        if std::mem::replace(&mut loading.requested, true) {
             return;
         }
         for (sampler, images) in samplers {
-            self.asked(sampler, set, images, node);
+            self.images_requested(sampler, set, images, node);
         }
-        // Under a relay all may have come unasked.
+        // Under a relay, all images may have arrived before.
         self.load_if_complete(node, set);
     }
 
-    fn asked(&mut self, sampler: usize, set: u32, images: usize, by: usize) {
+    fn images_requested(&mut self, sampler: usize, set: u32, images: usize, by: usize) {
         match &mut self.nodes[sampler].sampled[set as usize] {
             Sampled::Soon(askers) => askers.push(by),
             Sampled::Done => self.give(sampler, set, by),
@@ -201,10 +200,10 @@ impl<'a> World<'a> {
         }
     }
 
-    /// To one that asked. Its own images need no link, and under a relay others pass them on.
+    /// Gives a set's images to a compositor that asked. Its own images need no link, and under a relay others send them.
     fn give(&mut self, sampler: usize, set: u32, to: usize) {
         if to == sampler {
-            self.came(to, set);
+            self.images_arrived(to, set);
         } else if self.habits.transfer == Transfer::Unicast {
             self.send_images(sampler, sampler, set, to);
         }
@@ -218,7 +217,7 @@ impl<'a> World<'a> {
         self.start_link(from);
     }
 
-    /// Passes on what came, in a tree over the sampler's receivers.
+    /// Relays images that arrived, in a tree over the sampler's receivers.
     fn relay(&mut self, from: usize, sampler: usize, set: u32, place: Option<usize>) {
         let Transfer::Relay(children) = self.habits.transfer else { return };
         let receivers = self.receivers[sampler].len();
@@ -239,18 +238,18 @@ impl<'a> World<'a> {
 
     fn arrived(&mut self, sampler: usize, set: u32, place: usize, node: usize) {
         self.relay(node, sampler, set, Some(place));
-        self.came(node, set);
+        self.images_arrived(node, set);
     }
 
-    fn came(&mut self, node: usize, set: u32) {
-        self.nodes[node].loading[set as usize].came += 1;
+    fn images_arrived(&mut self, node: usize, set: u32) {
+        self.nodes[node].loading[set as usize].arrived += 1;
         self.load_if_complete(node, set);
     }
 
     fn load_if_complete(&mut self, node: usize, set: u32) {
         let shares = self.plan.samplers_of(set).len();
         let loading = &mut self.nodes[node].loading[set as usize];
-        if loading.asked && loading.came == shares && !std::mem::replace(&mut loading.queued, true) {
+        if loading.requested && loading.arrived == shares && !std::mem::replace(&mut loading.queued, true) {
             self.nodes[node].urgent.push_back(Job::Load { set });
             self.start_device(node);
         }
@@ -277,7 +276,7 @@ impl<'a> World<'a> {
         };
         *busy += seconds;
         this.running = Some(job);
-        self.foresee(self.now_s + seconds, Happens::Done { node });
+        self.schedule(self.now_s + seconds, Event::Done { node });
     }
 
     fn done(&mut self, node: usize) {
@@ -322,10 +321,10 @@ impl<'a> World<'a> {
                 seconds
             }
         };
-        self.foresee(self.now_s + seconds, Happens::Sent { node });
+        self.schedule(self.now_s + seconds, Event::Sent { node });
     }
 
-    /// Occupies the receiver's link behind what is coming in already.
+    /// Occupies the receiver's link behind the parcels before.
     fn receive(&mut self, sampler: usize, set: u32, images: usize, place: usize, sending_s: f64) {
         let (node, part_bytes) = (self.receiver(sampler, place), self.part_bytes());
         let this = &mut self.nodes[node];
@@ -333,7 +332,7 @@ impl<'a> World<'a> {
         let end_s = (this.in_free_s.max(self.now_s) + seconds).max(self.now_s + sending_s);
         this.in_free_s = end_s;
         this.busy.in_s += seconds;
-        self.foresee(end_s, Happens::Arrived { sampler, set, place, node });
+        self.schedule(end_s, Event::Arrived { sampler, set, place, node });
     }
 
     fn sent(&mut self, node: usize) {
@@ -342,7 +341,7 @@ impl<'a> World<'a> {
             *due -= views;
             *last_s = self.now_s;
             self.nodes[node].credit += views;
-            self.came_back(node, views);
+            self.client_received(node, views);
             self.advance(node);
         }
         self.start_link(node);

@@ -4,20 +4,20 @@ use serde::{Deserialize, Serialize};
 
 use table::format_number;
 
-/// What a value must reach.
+/// A bar for a value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bar {
-    /// This or more.
+    /// The least value.
     AtLeast(f64),
-    /// This or less.
+    /// The greatest value.
     AtMost(f64),
-    /// Exactly this: for counts.
+    /// The exact value, for counts.
     Equal(f64),
 }
 
 impl Bar {
-    /// Whether a value reaches it. NaN never does.
+    /// True where a value reaches the bar. NaN reaches none.
     #[must_use]
     pub fn holds(self, value: f64) -> bool {
         match self {
@@ -39,19 +39,19 @@ impl std::fmt::Display for Bar {
     }
 }
 
-/// How a check came out.
+/// The outcome of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// The value reaches the bar.
     Holds,
-    /// It does not.
+    /// The value does not reach the bar.
     FallsShort,
     /// There is no value.
     NotRun,
 }
 
 impl Outcome {
-    /// As printed.
+    /// The printed words.
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {
@@ -62,24 +62,24 @@ impl Outcome {
     }
 }
 
-/// One promise, and whether it was kept.
+/// A value against a bar.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Check {
     name: String,
-    /// `null` where not run, or not finite.
+    /// The value; `null` where not run, or not finite.
     value: Option<f64>,
     unit: String,
     bar: Bar,
-    /// `null` where not run.
+    /// The outcome; `null` where not run.
     holds: Option<bool>,
-    /// Why not run.
+    /// The reason why the check was not run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     reason: Option<String>,
 }
 
 impl Check {
-    /// Holds the value against the bar. A value that is not finite is kept out of the file, but judged:
-    /// +∞ dB reaches any bar, NaN none.
+    /// Compares a value with the bar. A value that is not finite is compared, but not kept: +∞ dB reaches any bar, NaN
+    /// none.
     #[must_use]
     pub fn new(name: impl Into<String>, value: f64, unit: impl Into<String>, bar: Bar) -> Self {
         Self {
@@ -92,13 +92,13 @@ impl Check {
         }
     }
 
-    /// A check that could not be made here.
+    /// A check that was not run.
     #[must_use]
     pub fn not_run(name: impl Into<String>, unit: impl Into<String>, bar: Bar, reason: impl Into<String>) -> Self {
         Self { name: name.into(), value: None, unit: unit.into(), bar, holds: None, reason: Some(reason.into()) }
     }
 
-    /// Holds a value that may be missing against the bar: not run, for the reason, where it is.
+    /// Compares a value with the bar; without a value, the check was not run for `reason`.
     #[must_use]
     pub fn maybe(
         name: impl Into<String>,
@@ -113,37 +113,37 @@ impl Check {
         }
     }
 
-    /// What is promised.
+    /// The name of the check.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What was measured, if it is finite.
+    /// The measured value, if it is finite.
     #[must_use]
     pub fn value(&self) -> Option<f64> {
         self.value
     }
 
-    /// Of value and bar; empty for none.
+    /// The unit of value and bar; empty for none.
     #[must_use]
     pub fn unit(&self) -> &str {
         &self.unit
     }
 
-    /// What the value must reach.
+    /// The bar.
     #[must_use]
     pub fn bar(&self) -> Bar {
         self.bar
     }
 
-    /// Why it was not run.
+    /// The reason why the check was not run.
     #[must_use]
     pub fn reason(&self) -> Option<&str> {
         self.reason.as_deref()
     }
 
-    /// How it came out.
+    /// The outcome.
     #[must_use]
     pub fn outcome(&self) -> Outcome {
         match self.holds {
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bars_include_themselves() {
+    fn a_value_equal_to_its_bar_reaches_it() {
         for bar in [Bar::AtLeast(2.0), Bar::AtMost(2.0), Bar::Equal(2.0)] {
             assert_eq!(Check::new("x", 2.0, "", bar).outcome(), Outcome::Holds, "{bar}");
             assert_eq!(Check::new("x", f64::NAN, "", bar).outcome(), Outcome::FallsShort, "{bar}");

@@ -1,8 +1,8 @@
-//! Checks as the table that ends a program's output.
+//! Checks as a table, the end of a program's output.
 
 use crate::{Check, Outcome};
 
-/// An aligned table: name, value, bar, and whether it holds; then one line of totals.
+/// An aligned table of name, value, bar and outcome, then one line of totals.
 #[must_use]
 pub fn checks_text(checks: &[Check]) -> String {
     let header = ["check", "value", "bar", "outcome"].map(String::from);
@@ -21,7 +21,7 @@ fn row(check: &Check) -> [String; 4] {
     [check.name().into(), check.value_text(), check.bar_text(), outcome]
 }
 
-/// Names to the left, values to the right, the rest to the left.
+/// Names are aligned left, values right, the rest left.
 fn line([name, value, bar, outcome]: &[String; 4], widths: [usize; 4]) -> String {
     format!("{name:<0$}  {value:>1$}  {bar:<2$}  {outcome}", widths[0], widths[1], widths[2])
 }
@@ -32,7 +32,7 @@ fn totals(checks: &[Check]) -> String {
     format!("{} checks: {holds} hold, {short} fall short, {not_run} not run", checks.len())
 }
 
-/// Characters, as `format!` pads them.
+/// Width in characters, as `format!` pads them.
 fn width(text: &str) -> usize {
     text.chars().count()
 }

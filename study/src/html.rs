@@ -2,10 +2,15 @@
 
 use minijinja::{Environment, Value, context};
 
-use crate::write::{chart_path, picture_path, table_path};
-use crate::{Check, Outcome, Report, ReportError, Table};
+use table::{Cell, Column, Table};
 
-/// Fills the page in. Whatever comes from the report is escaped, but for the charts, which are SVG.
+use crate::check::{Check, Outcome};
+use crate::error::ReportError;
+use crate::paths::{chart_path, picture_path, table_path};
+use crate::picture::{Picture, PictureRow};
+use crate::report::Report;
+
+/// Fills in the page. All text of the report is escaped; charts are SVG.
 pub(crate) fn page(report: &Report, charts: Vec<String>) -> Result<String, ReportError> {
     let mut environment = Environment::new();
     // Names that end in .html are escaped.
@@ -48,20 +53,20 @@ fn check(check: &Check) -> Value {
 }
 
 fn table(table: &Table) -> Value {
-    let row = |row: &Vec<crate::Cell>| {
+    let row = |row: &Vec<Cell>| {
         let cells = row.iter().map(|cell| context! { text => cell.display(), numeric => cell.is_numeric() });
         cells.collect::<Vec<_>>()
     };
     context! {
         name => table.name.as_str(),
         file => table_path(table),
-        columns => table.columns.iter().map(crate::Column::heading).collect::<Vec<_>>(),
+        columns => table.columns.iter().map(Column::heading).collect::<Vec<_>>(),
         rows => table.rows.iter().map(row).collect::<Vec<_>>(),
     }
 }
 
-fn pictures(row: &crate::PictureRow) -> Value {
-    let picture = |picture: &crate::Picture| {
+fn pictures(row: &PictureRow) -> Value {
+    let picture = |picture: &Picture| {
         let legend =
             picture.legend.iter().map(|(name, [r, g, b])| context! { name, color => format!("rgb({r},{g},{b})") });
         context! {

@@ -1,12 +1,11 @@
-//! Reports: what `demo`, `bench` and `study` leave behind.
+//! Reports of `demo`, `bench` and `study`.
 //!
 //! A caller gathers numbers into a [`Report`]: tables, [`Check`]s against a bar, [`Chart`]s, pictures.
-//! [`Report::write`] makes files of them (`report.json`, a CSV a table, an SVG a chart, PNGs and an
-//! `index.html`), [`Report::finish`] also prints the checks. Nothing here measures, and nothing draws on a
-//! GPU: data in, files out. The format is described in `docs/report-format.md`.
+//! [`Report::write`] makes files of them, and [`Report::finish`] also prints the checks. Nothing here measures, and
+//! nothing draws on a GPU: data in, files out. The format is described in `docs/report-format.md`.
 //!
-//! Charts share one look: a name has the same colour in all of them ([`Palette`]), axes carry units, and
-//! what was extrapolated is dashed.
+//! Charts share one look: a name has the same colour in all of them ([`Palette`]), axes carry units, and extrapolated
+//! parts are dashed.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
@@ -15,6 +14,7 @@ mod check;
 mod check_text;
 mod error;
 mod html;
+mod paths;
 mod picture;
 mod report;
 mod slug;

@@ -1,41 +1,42 @@
-//! What one run found.
-
-use std::path::Path;
+//! The contents of a report.
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use crate::{Cell, Chart, Check, Outcome, PictureRow, ReportError, Table, checks_text};
+use table::{Cell, Table};
 
-/// Of `report.json`; raised when a field changes its meaning.
+use crate::chart::Chart;
+use crate::check::{Check, Outcome};
+use crate::picture::PictureRow;
+
+/// The version of `report.json`; raised when a field changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// Everything that one run leaves behind. It is `report.json`, field by field; only the pixels of pictures
-/// are in files of their own.
+/// The contents of a report: `report.json`, field by field. Only the pixels of pictures are in files of their own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
-    /// [`SCHEMA_VERSION`].
+    /// The value of [`SCHEMA_VERSION`].
     pub schema: u32,
-    /// What was run.
+    /// The title of the run.
     pub title: String,
-    /// One or two sentences that say what was found; may be empty.
+    /// One or two sentences with the result; may be empty.
     #[serde(default)]
     pub summary: String,
-    /// What it was measured on; no time means anything without it.
+    /// The device of the measurements.
     pub device: String,
-    /// Programs and libraries, in order.
+    /// Versions of programs and libraries, in order.
     pub versions: IndexMap<String, String>,
-    /// What the run was asked to do, in order.
+    /// Parameters of the run, in order.
     pub parameters: IndexMap<String, Cell>,
     /// Tables.
     #[serde(rename = "rows")]
     pub tables: Vec<Table>,
-    /// Promises and whether they were kept.
+    /// Checks, with their outcomes.
     pub checks: Vec<Check>,
     /// Charts, with their data.
     #[serde(default)]
     pub charts: Vec<Chart>,
-    /// Pictures, a labelled row at a time.
+    /// Pictures, by labelled rows.
     #[serde(default)]
     pub pictures: Vec<PictureRow>,
 }
@@ -68,31 +69,9 @@ impl Report {
         self.parameters.insert(name.into(), value.into());
     }
 
-    /// Whether no check falls short: what `--strict` makes the exit status of. A check that was not run does
-    /// not fall short; the printed table says that it was not run, and why.
+    /// True where no check falls short, as `--strict` demands. A check that was not run does not fall short.
     #[must_use]
     pub fn exit_ok(&self) -> bool {
         self.checks.iter().all(|check| check.outcome() != Outcome::FallsShort)
-    }
-
-    /// Writes the report to a folder, made if need be: `report.json`, `index.html`, a CSV file a table,
-    /// `charts/*.svg` and `pictures/*.png`.
-    ///
-    /// # Errors
-    /// Parts that do not fit together, names that collide, or a folder that cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<(), ReportError> {
-        crate::write::write(self, folder)
-    }
-
-    /// Writes the report, says where, and prints the checks: the end of every program's output. Returns
-    /// [`Report::exit_ok`].
-    ///
-    /// # Errors
-    /// As [`Report::write`].
-    pub fn finish(&self, folder: &Path) -> Result<bool, ReportError> {
-        self.write(folder)?;
-        println!("report: {}", folder.join("index.html").display());
-        println!("{}", checks_text(&self.checks));
-        Ok(self.exit_ok())
     }
 }

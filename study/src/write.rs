@@ -1,13 +1,43 @@
-//! A report's files.
+//! Files of a report.
 
 use std::collections::HashSet;
 use std::fs;
 use std::path::Path;
 
-use crate::{Chart, Palette, Report, ReportError, Table, html, slug};
+use table::Table;
 
-/// Writes all files. Everything is validated and drawn before the first is written.
-pub(crate) fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
+use crate::chart::{Chart, Palette};
+use crate::check_text::checks_text;
+use crate::error::ReportError;
+use crate::html;
+use crate::paths::{chart_path, picture_path, table_path};
+use crate::report::Report;
+use crate::slug::slug;
+
+impl Report {
+    /// Writes the report to a folder, which is made if need be: `report.json`, `index.html`, a CSV file a table,
+    /// `charts/*.svg` and `pictures/*.png`.
+    ///
+    /// # Errors
+    /// Parts do not fit together, names collide, or the folder cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), ReportError> {
+        write(self, folder)
+    }
+
+    /// Writes the report, prints its path and its checks, and returns [`Report::exit_ok`].
+    ///
+    /// # Errors
+    /// The report cannot be written.
+    pub fn finish(&self, folder: &Path) -> Result<bool, ReportError> {
+        self.write(folder)?;
+        println!("report: {}", folder.join("index.html").display());
+        println!("{}", checks_text(&self.checks));
+        Ok(self.exit_ok())
+    }
+}
+
+/// Everything is validated and drawn before the first file is written.
+fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
     validate(report)?;
     let palette = Palette::for_names(report.charts.iter().flat_map(Chart::series_names));
     let charts = report.charts.iter().map(|chart| chart.draw(&palette)).collect::<Result<Vec<_>, _>>()?;
@@ -22,21 +52,6 @@ pub(crate) fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
     write_pictures(report, folder)?;
     write_file(&folder.join("report.json"), serde_json::to_string_pretty(report)?.as_bytes())?;
     write_file(&folder.join("index.html"), page.as_bytes())
-}
-
-/// Where a chart's drawing is, from the report's folder.
-pub(crate) fn chart_path(chart: &Chart) -> String {
-    format!("charts/{}.svg", slug(chart.name()))
-}
-
-/// Where a table's CSV is, from the report's folder.
-pub(crate) fn table_path(table: &Table) -> String {
-    format!("{}.csv", slug(&table.name))
-}
-
-/// Where a picture is, from the report's folder.
-pub(crate) fn picture_path(name: &str) -> String {
-    format!("pictures/{}.png", slug(name))
 }
 
 fn validate(report: &Report) -> Result<(), ReportError> {

@@ -130,7 +130,7 @@ fn charts_are_xml_that_names_their_series_axes_and_limits() {
 }
 
 #[test]
-fn odd_charts_are_drawn_too() {
+fn charts_without_points_are_drawn() {
     let empty = XyChart::new("empty", Axis::log("x", ""), Axis::linear("y", ""));
     let unplaceable = empty.clone().with(Series::line("zero", [(0.0, 1.0), (-1.0, f64::NAN), (f64::INFINITY, 2.0)]));
     let single = empty.clone().with(Series::line("one", [(5.0, 0.0)])).with_front(Better::Low, Better::High);

@@ -1,5 +1,5 @@
-//! A cluster in one process over real loopback ports. Every node has a runtime of its own, so that one can
-//! be killed without a word.
+//! A cluster in one process over real loopback ports. Every node has its own runtime, so that a test can kill it
+//! abruptly.
 
 use std::time::{Duration, Instant};
 
@@ -8,7 +8,7 @@ use client::{Client, ClientError, Session, ViewRequest};
 use cluster::{PolicyChoice, SessionRequest, Timeline};
 use codec::{FrameAssembly, FramePart, WholeFrame};
 use coordinator::{CoordinatorConfig, Observers, SceneOffer};
-use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, ViewPlanes};
+use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
 use tokio::net::TcpListener;
@@ -17,14 +17,14 @@ use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
 use wire::rpc::Messages;
 
-use crate::scalar_engine::{SKY_LINEAR, ScalarEngine};
+use crate::scalar_engine::{SKY_LINEAR, ScalarEngine, illumination};
 
 /// A server with its own runtime.
 pub struct Server {
     runtime: Option<Runtime>,
     shutdown: CancellationToken,
     stopped: tokio::sync::watch::Receiver<bool>,
-    /// Where it serves, as `http://host:port`.
+    /// Its address, as `http://host:port`.
     pub address: String,
 }
 
@@ -37,7 +37,7 @@ impl Server {
         Self::start_at("127.0.0.1:0", serve)
     }
 
-    /// As [`Server::start`], where another may have been.
+    /// As [`Server::start`], at a port that another server may have used.
     fn start_at<F>(address: &str, serve: impl FnOnce(TcpListener, CancellationToken) -> F + Send + 'static) -> Self
     where
         F: Future<Output = Result<(), node::ServeError>> + Send + 'static,
@@ -57,14 +57,14 @@ impl Server {
         Self { runtime: Some(runtime), shutdown, stopped, address }
     }
 
-    /// Ends it at once; connections break.
+    /// Ends the server at once; connections break.
     pub fn kill(&mut self) {
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_background();
         }
     }
 
-    /// Asks it to end; how long that took.
+    /// Asks the server to end; returns the time that took.
     pub async fn drain(&mut self) -> Duration {
         let start = Instant::now();
         self.shutdown.cancel();
@@ -79,7 +79,7 @@ impl Drop for Server {
     }
 }
 
-/// Whoever was there before may take a moment to go.
+/// Binds a port that its last user may still hold for a moment.
 fn bind(address: &str) -> std::net::TcpListener {
     for _ in 0..500 {
         if let Ok(listener) = std::net::TcpListener::bind(address) {
@@ -96,9 +96,9 @@ pub struct Cluster {
     pub coordinator: Server,
     /// `n0`, `n1`…
     pub nodes: Vec<Server>,
-    /// What all nodes count together.
+    /// The counters of all nodes together.
     pub engines: Vec<ScalarEngine>,
-    /// Connected.
+    /// A connected client.
     pub client: Client,
 }
 
@@ -116,18 +116,11 @@ pub fn rig() -> Vec<Camera> {
     [-0.6, 0.0, 0.6].map(|x| Camera::Pinhole(camera(x, UVec2::new(64, 48)))).to_vec()
 }
 
-/// What a coordinator of the scalar device shows.
+/// The offer of a coordinator of the scalar device.
 #[must_use]
 pub fn offer() -> SceneOffer {
     let volume = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) };
     SceneOffer { illumination: illumination(), ..SceneOffer::new(package(), rig(), volume, SKY_LINEAR) }
-}
-
-/// A lamp above the ball, and a sky; the scalar device checks that they arrive and shades with neither.
-#[must_use]
-pub fn illumination() -> Illumination {
-    let lamp = Light::Point { position_in_world: Vec3::Y * 4.0, intensity_linear: Vec3::splat(9.0), radius_m: 0.2 };
-    Illumination { lights: vec![lamp], environment: Environment::uniform(SKY_LINEAR) }
 }
 
 /// A camera in front of the ball.
@@ -162,7 +155,7 @@ pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
     }
 }
 
-/// So many views of each set, from left to right.
+/// `per_set` views of each set, from left to right.
 #[must_use]
 pub fn views(sets: u32, per_set: u32) -> Vec<ViewRequest> {
     let view = |i: u32| ViewRequest {
@@ -179,7 +172,7 @@ impl Cluster {
         Self::start_with(nodes, |config| config).await
     }
 
-    /// As [`Cluster::start`], each node's configuration changed by `change`.
+    /// As [`Cluster::start`], with each node's configuration changed by `change`.
     pub async fn start_with(nodes: usize, change: impl Fn(NodeConfig) -> NodeConfig) -> Self {
         Self::start_limited(CoordinatorConfig::default(), nodes, change).await
     }
@@ -200,7 +193,7 @@ impl Cluster {
         cluster
     }
 
-    /// One more node, which joins soon.
+    /// Adds a node, which joins soon.
     pub fn add_node(&mut self, change: impl Fn(NodeConfig) -> NodeConfig) {
         let engine = ScalarEngine::default();
         let config = change(NodeConfig::new(format!("n{}", self.nodes.len()), &self.coordinator.address));
@@ -210,29 +203,29 @@ impl Cluster {
         }));
     }
 
-    /// Ends the coordinator without a word.
+    /// Kills the coordinator abruptly.
     pub fn kill_coordinator(&mut self) {
         self.coordinator.kill();
     }
 
-    /// Starts one where the other was.
+    /// Starts a coordinator at the address of the last one.
     pub fn restart_coordinator(&mut self) {
         let address = self.coordinator.address.trim_start_matches("http://").to_owned();
         let config = CoordinatorConfig::default();
         self.coordinator = Server::start_at(&address, move |listener, shutdown| coordinate(config, listener, shutdown));
     }
 
-    /// An open session; what was sampled for measuring is forgotten.
+    /// Opens a session, and resets the sample counts of the measurement.
     ///
     /// # Errors
-    /// The client's.
+    /// The client's error.
     pub async fn session(&self, request: SessionRequest) -> Result<Session, ClientError> {
         let session = self.client.open_session(request, |_| ()).await?;
         self.take_counts();
         Ok(session)
     }
 
-    /// How often each image was sampled since the last call, on all nodes together.
+    /// The number of times that each image was sampled since the last call, over all nodes.
     pub fn take_counts(&self) -> Vec<usize> {
         let mut all = std::collections::HashMap::new();
         for (image, times) in self.engines.iter().flat_map(ScalarEngine::take_counts) {
@@ -242,10 +235,10 @@ impl Cluster {
     }
 }
 
-/// The next frame of a stream, once all of it is there.
+/// The next complete frame of a stream.
 ///
 /// # Panics
-/// Where none comes.
+/// No frame arrives.
 pub async fn whole_frame(parts: &mut Messages<FramePart>) -> WholeFrame {
     let mut assembly = FrameAssembly::default();
     loop {
@@ -264,10 +257,10 @@ async fn coordinate(
     coordinator::serve(listener, config, offer(), Observers::default(), shutdown).await
 }
 
-/// A client of a coordinator that is there soon.
+/// A client of a coordinator that starts soon.
 ///
 /// # Panics
-/// Where it is not.
+/// The coordinator does not start.
 pub async fn connected(address: &str) -> Client {
     for _ in 0..200 {
         if let Ok(client) = Client::connect(address).await {

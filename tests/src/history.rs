@@ -1,4 +1,5 @@
-//! The history of a cluster, as a client saw it and as coordinators recorded it, and invariants that no fault may break.
+//! The history of a test, as a client saw it and as coordinators recorded it, and the invariants that hold under all
+//! faults.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::io::Cursor;
@@ -8,44 +9,44 @@ use std::time::{Duration, Instant};
 use cluster::{Assignment, Policy};
 use coordinator::schedule::{Command, replay};
 
-/// A frame that the client received.
+/// A received frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
-    /// The client's number.
+    /// The client's frame number.
     pub frame: u64,
-    /// The plan that made it.
+    /// Epoch of the plan that made it.
     pub plan_epoch: u64,
-    /// The set that it shows.
+    /// The sample set that it shows.
     pub set_index: u64,
     /// The fault of its picture, if any.
     pub fault: Option<String>,
 }
 
-/// Views that were requested together.
+/// Views of one request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Call {
-    /// When they were requested.
+    /// Time of the request.
     pub asked: Instant,
-    /// When all were received, or no more were awaited.
+    /// Time of the last frame, or of the error.
     pub ended: Instant,
     /// The requested frame numbers.
     pub wanted: std::ops::Range<u64>,
     /// The requested sample set.
     pub set_index: u64,
-    /// Frames received.
+    /// The received frames.
     pub frames: Vec<Seen>,
-    /// Why frames are missing.
+    /// The reason for missing frames.
     pub error: Option<String>,
 }
 
 /// The history of one cluster.
 #[derive(Debug, Clone, Default)]
 pub struct History {
-    /// Calls of one client, in their order.
+    /// The calls of one client, in order.
     pub calls: Vec<Call>,
-    /// The plans that the client was given.
+    /// The plans that the client received.
     pub plans: Vec<Assignment>,
-    /// Logs of coordinators, the first one's first.
+    /// The coordinators' event logs, the first one's first.
     pub logs: Vec<Vec<u8>>,
 }
 
@@ -53,19 +54,19 @@ impl History {
     /// Adds a coordinator's log.
     ///
     /// # Errors
-    /// Where it cannot be read.
+    /// The log cannot be read.
     pub fn add_log(&mut self, path: &Path) -> std::io::Result<()> {
         self.logs.push(std::fs::read(path)?);
         Ok(())
     }
 
-    /// The number of frames received.
+    /// The complete frames.
     #[must_use]
     pub fn frames(&self) -> usize {
         self.calls.iter().map(|call| call.frames.len()).sum()
     }
 
-    /// The longest time after `since` in which no call was answered in full.
+    /// The longest time after `since` without a complete answer.
     #[must_use]
     pub fn longest_wait(&self, since: Instant) -> Duration {
         let answered = self.calls.iter().filter(|call| call.error.is_none() && call.ended > since);
@@ -77,7 +78,7 @@ impl History {
         longest
     }
 
-    /// Every violated invariant, in words. A history without frames violates one.
+    /// Describes every violated invariant. A history without frames violates one too.
     #[must_use]
     pub fn violations(&self) -> Vec<String> {
         let mut wrong = Vec::new();
@@ -98,14 +99,14 @@ impl History {
         wrong
     }
 
-    /// Frames that were requested and not received.
+    /// Every requested frame arrived.
     fn lost(&self) -> Vec<String> {
         let lost =
             self.calls.iter().filter(|call| call.error.is_some() || call.frames.len() != call.wanted.clone().count());
         lost.map(|call| format!("of frames {:?} {} came: {:?}", call.wanted, call.frames.len(), call.error)).collect()
     }
 
-    /// Frames that came twice, after those of a later call, or unrequested.
+    /// Each frame number arrived once, in the order of the calls, and was requested.
     fn numbers(&self) -> Vec<String> {
         let (mut wrong, mut seen) = (Vec::new(), HashSet::new());
         let mut highest = None;
@@ -123,7 +124,7 @@ impl History {
         wrong
     }
 
-    /// Pictures that do not show the requested sample set alone.
+    /// A picture shows one sample set, the requested one.
     fn pictures(&self) -> Vec<String> {
         let frames = self.calls.iter().flat_map(|call| call.frames.iter().map(move |seen| (call, seen)));
         let wrong = |(call, seen): (&Call, &Seen)| {
@@ -134,7 +135,7 @@ impl History {
         frames.filter_map(wrong).collect()
     }
 
-    /// Calls with frames of a plan that was replaced before: plans rise from call to call.
+    /// Plan epochs of frames rise from call to call: no frame comes from a replaced plan.
     fn epochs_of_frames(&self) -> Vec<String> {
         let epochs = |call: &Call| call.frames.iter().map(|seen| seen.plan_epoch).collect::<BTreeSet<_>>();
         let (mut wrong, mut highest) = (Vec::new(), 0);
@@ -162,7 +163,7 @@ impl History {
         Ok(plans)
     }
 
-    /// Epochs with two plans, or with a plan that no coordinator recorded.
+    /// An epoch has one plan: the client and the coordinators have the recorded one.
     fn leaders(&self, commanded: &[Assignment]) -> Vec<String> {
         let mut first: BTreeMap<u64, &Assignment> = BTreeMap::new();
         let mut wrong = Vec::new();
@@ -186,7 +187,7 @@ fn plan_of(command: Command) -> Option<Assignment> {
     }
 }
 
-/// Roles that a plan gives twice or to no node: a view has one compositor; an image, or its tile, one sampler.
+/// A view has one compositor; an image, or its tile, has one sampler.
 fn roles(plan: &Assignment) -> Vec<String> {
     let names: Vec<_> = plan.compositors.iter().map(|share| &share.node_name).collect();
     let addresses: HashSet<_> = plan.compositors.iter().map(|share| &share.address).collect();
@@ -204,7 +205,7 @@ fn roles(plan: &Assignment) -> Vec<String> {
 }
 
 fn rising(commanded: &[Assignment]) -> Vec<String> {
-    // A plan is announced again to sessions that come later.
+    // Later sessions receive the same plan again.
     let again = |pair: &&[Assignment]| pair[0].plan_epoch > pair[1].plan_epoch;
     let falls = commanded.windows(2).filter(again);
     falls.map(|pair| format!("plan {} after plan {}", pair[1].plan_epoch, pair[0].plan_epoch)).collect()

@@ -1,10 +1,11 @@
-//! The checker sees what it is there to see.
+//! The checker detects every violation.
 
 use cluster::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneRef, Timeline, Workload};
 use coordinator::schedule::{Event, Opening, PolicyOverride, Recorder};
 
 use super::*;
-use crate::cluster::{illumination, offer, rig};
+use crate::cluster::{offer, rig};
+use crate::scalar_engine::illumination;
 
 fn seen(frame: u64, plan_epoch: u64) -> Seen {
     Seen { frame, plan_epoch, set_index: 0, fault: None }
@@ -44,7 +45,7 @@ fn joined(name: &str, plan_epoch: u64) -> Event {
     Event::Joined { incarnation: plan_epoch + 1, join: JoinCluster { node, plan_epoch } }
 }
 
-/// Two nodes join, which have seen `plan_epoch`, a session opens, and one of them leaves.
+/// Two nodes that have seen `plan_epoch` join, a session opens, and one of them leaves.
 fn log(plan_epoch: u64) -> Vec<u8> {
     let costs = Costs {
         sample_image_s: 0.1,
@@ -75,7 +76,7 @@ fn log(plan_epoch: u64) -> Vec<u8> {
     text
 }
 
-/// Nothing is wrong with it.
+/// A history without violations.
 fn good() -> History {
     let start = Instant::now();
     let calls = vec![call(start, 0..3, 1), call(start, 3..6, 1), call(start, 6..9, 2)];
@@ -85,7 +86,7 @@ fn good() -> History {
 }
 
 #[test]
-fn a_good_history_has_nothing_wrong() {
+fn a_good_history_violates_no_invariant() {
     let history = good();
     assert_eq!(history.plans.iter().map(|plan| plan.plan_epoch).collect::<Vec<_>>(), [1, 2]);
     assert_eq!(history.violations(), [""; 0]);
@@ -98,7 +99,7 @@ fn a_good_history_has_nothing_wrong() {
 type Spoil = fn(&mut History);
 
 #[test]
-fn every_violation_is_seen() {
+fn every_violation_of_an_invariant_is_found() {
     let spoilt: [(&str, Spoil); 12] = [
         ("no frame came", |h| h.calls.clear()),
         ("of frames 3..6 2 came", |h| drop(h.calls[1].frames.pop())),
@@ -122,7 +123,7 @@ fn every_violation_is_seen() {
 }
 
 #[test]
-fn roles_are_given_once() {
+fn a_plan_that_gives_a_role_twice_is_found() {
     let plan = good().plans.remove(0);
     assert_eq!(roles(&plan), [""; 0]);
     let mut twice = plan.clone();

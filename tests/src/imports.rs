@@ -25,7 +25,7 @@ struct Use {
     name: String,
 }
 
-/// What one file says.
+/// The contents of one file.
 #[derive(Debug, Default)]
 struct Module {
     uses: Vec<Use>,
@@ -182,7 +182,7 @@ impl Module {
     }
 }
 
-/// Whether a token is a name, or the star for all names.
+/// Returns whether a token is a name, or the star for all names.
 fn is_segment(token: &TokenTree) -> bool {
     matches!(token, TokenTree::Ident(_)) || token.to_string() == "*"
 }
@@ -195,8 +195,9 @@ fn is_double_colon(tokens: &[TokenTree], at: usize) -> bool {
     [at, at + 1].iter().all(|place| tokens.get(*place).is_some_and(|token| token.to_string() == ":"))
 }
 
-/// Whether an attribute is `cfg(test)`, or `cfg(all(test, …))`.
-fn is_for_tests(attribute: Option<&TokenTree>) -> bool {
+/// Returns whether an attribute is `cfg(test)`, or `cfg(all(test, …))`.
+#[must_use]
+pub fn is_for_tests(attribute: Option<&TokenTree>) -> bool {
     let text = attribute.map(ToString::to_string).unwrap_or_default().replace(' ', "");
     text.starts_with("[cfg(test") || text.starts_with("[cfg(all(test")
 }
@@ -207,7 +208,7 @@ struct Graph<'a>(&'a BTreeMap<ModulePath, Module>);
 impl Graph<'_> {
     fn used_by(&self, own: &ModulePath) -> BTreeSet<ModulePath> {
         let module = &self.0[own];
-        // A name that is only passed on is not used here.
+        // A name that is only re-exported is not used here.
         let is_used = |declared: &&Use| !declared.is_public || module.names.contains(&declared.name);
         let imported = module.uses.iter().filter(is_used).map(|declared| &declared.path);
         let paths = imported.chain(&module.paths).filter_map(|path| self.absolute(own, path));
@@ -233,7 +234,7 @@ impl Graph<'_> {
         let length = (0..=path.len()).rev().find(|length| self.0.contains_key(&path[..*length])).unwrap_or(0);
         let (module, rest) = path.split_at(length);
         let Some(name) = rest.first().filter(|_| depth < 16) else { return module.to_vec() };
-        let passed_on = self.0.get(module).into_iter().flat_map(|module| &module.uses).find_map(|declared| {
+        let re_exported = self.0.get(module).into_iter().flat_map(|module| &module.uses).find_map(|declared| {
             let target = self.absolute(&module.to_vec(), &declared.path)?;
             match declared.name.as_str() {
                 "*" => {
@@ -245,6 +246,6 @@ impl Graph<'_> {
                 _ => None,
             }
         });
-        passed_on.map_or_else(|| module.to_vec(), |target| self.definer(target, depth + 1))
+        re_exported.map_or_else(|| module.to_vec(), |target| self.definer(target, depth + 1))
     }
 }

@@ -1,8 +1,8 @@
 //! Whole-project tests: architecture and clusters on real processes and ports.
 //!
-//! Here is what they share: a small scalar device; clusters in one process ([`cluster`]) and in many ([`processes`]);
-//! networks that fail ([`proxy`]) and samplers that send what they should not ([`mangler`]); and what a client saw
-//! meanwhile ([`watcher`]), held against the invariants ([`history`]).
+//! The tests share a small scalar device, and clusters in one process ([`cluster`]) and in many ([`processes`]). They
+//! share networks that fail ([`proxy`]) and samplers that send corrupt data ([`mangler`]). A client records its frames
+//! ([`watcher`]), which are checked against the invariants ([`history`]).
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod cluster;

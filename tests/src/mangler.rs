@@ -1,10 +1,11 @@
-//! A sampler that sends what it should not: it stands before a node, asks it, and spoils what it passes on.
+//! A proxy before a node that spoils the chunks of its answers.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use cluster::{Assignment, Costs, FetchImages, MeasureCosts, Ready, RenderViews};
 use codec::{Chunk, FramePart};
 use node::{ServeError, serve};
+use parking_lot::Mutex;
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
 use tokio_stream::StreamExt as _;
@@ -17,19 +18,19 @@ use wire::rpc::{
     node_server, sampler_server,
 };
 
-/// What becomes of the chunks of one answer.
+/// A change to the chunks of one answer.
 pub type Spoil = fn(&mut Vec<Chunk>);
 
 #[derive(Default)]
 struct Orders {
     spoil: Option<Spoil>,
-    /// Answers left to be spoilt.
+    /// Number of answers still to be corrupted.
     times: usize,
 }
 
-/// Serves until it is dropped.
+/// A server that ends when it is dropped.
 pub struct Mangler {
-    /// What the node is to advertise.
+    /// The address that the node is to advertise.
     pub address: String,
     node: Arc<Mutex<String>>,
     orders: Arc<Mutex<Orders>>,
@@ -37,10 +38,10 @@ pub struct Mangler {
 }
 
 impl Mangler {
-    /// Before a node that is named later.
+    /// Starts a mangler for a node that is named later.
     ///
     /// # Panics
-    /// Where there is no port.
+    /// No port is free.
     pub async fn start() -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = format!("http://{}", listener.local_addr().expect("an address"));
@@ -51,20 +52,20 @@ impl Mangler {
         Self { address, node, orders, _ends: shutdown.drop_guard() }
     }
 
-    /// Which node is asked.
+    /// Sets the node that is asked.
     pub fn stand_before(&self, address: &str) {
-        *self.node.lock().unwrap_or_else(PoisonError::into_inner) = address.to_owned();
+        *self.node.lock() = address.to_owned();
     }
 
-    /// Spoils the next answers.
+    /// Corrupts the next `times` answers.
     pub fn spoil(&self, times: usize, spoil: Spoil) {
-        *self.orders.lock().unwrap_or_else(PoisonError::into_inner) = Orders { spoil: Some(spoil), times };
+        *self.orders.lock() = Orders { spoil: Some(spoil), times };
     }
 
-    /// Answers that are still to be spoilt.
+    /// The number of answers still to be corrupted.
     #[must_use]
     pub fn left(&self) -> usize {
-        self.orders.lock().unwrap_or_else(PoisonError::into_inner).times
+        self.orders.lock().times
     }
 }
 
@@ -83,11 +84,11 @@ struct Front {
 
 impl Front {
     fn node(&self) -> String {
-        self.node.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.node.lock().clone()
     }
 
     fn spoilt(&self, chunks: &mut Vec<Chunk>) {
-        let mut orders = self.orders.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut orders = self.orders.lock();
         if let Some(spoil) = orders.spoil.filter(|_| orders.times > 0) {
             orders.times -= 1;
             spoil(chunks);

@@ -1,4 +1,4 @@
-//! Whether a picture shows one sample set, and the right one.
+//! The check that a picture shows one sample set, the right one.
 
 use std::collections::HashSet;
 
@@ -7,8 +7,8 @@ use cluster::Refinement;
 
 use crate::scalar_engine::{FLOOR_LINEAR, SKY_LINEAR, ball_linear, srgb8};
 
-/// What is wrong with a frame of the scalar device: the ball must show this time and step and no other, floor and sky
-/// must be there, and nothing else.
+/// The fault of a frame of the scalar device, if any. The ball must show this time and step and no other; floor and sky
+/// must be there, and no other colour.
 #[must_use]
 pub fn fault_of(frame: &Frame, scene_time_s: f32, refinement: Refinement) -> Option<String> {
     let right = [ball_linear(scene_time_s, refinement), FLOOR_LINEAR, SKY_LINEAR].map(srgb8);

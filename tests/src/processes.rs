@@ -15,17 +15,17 @@ use crate::cluster::connected;
 #[derive(Debug)]
 pub struct Process {
     child: Child,
-    /// It ends with its input: nothing stays behind where a test is killed.
+    /// The process ends with its input, so that none stays behind when a test is killed.
     _input: Option<ChildStdin>,
-    /// Where it serves, as `http://host:port`.
+    /// Its address, as `http://host:port`.
     pub address: String,
 }
 
 impl Process {
-    /// Starts it; it says first where it serves.
+    /// Starts a process, which first prints its address.
     ///
     /// # Panics
-    /// Where it does not.
+    /// The process does not start.
     #[must_use]
     pub fn start(program: &str, arguments: &[&str]) -> Self {
         let mut command = Command::new(program);
@@ -44,12 +44,12 @@ impl Process {
     /// Sends a signal.
     ///
     /// # Panics
-    /// Where it has ended.
+    /// The process has ended.
     pub fn signal(&self, signal: Signal) {
         kill_process(self.pid(), signal).expect("it runs");
     }
 
-    /// Ends it without a word.
+    /// Kills it abruptly.
     pub fn kill(&mut self) {
         let _ = (self.child.kill(), self.child.wait());
     }
@@ -57,7 +57,7 @@ impl Process {
     /// Waits until it has ended.
     ///
     /// # Panics
-    /// Where that takes longer than `deadline`.
+    /// It takes longer than `deadline`.
     pub async fn ended(&mut self, deadline: Duration) -> (ExitStatus, Duration) {
         let start = Instant::now();
         loop {
@@ -72,7 +72,7 @@ impl Process {
     /// Its open files and connections.
     ///
     /// # Panics
-    /// Where the system does not say.
+    /// The system does not report it.
     #[must_use]
     pub fn open_files(&self) -> usize {
         std::fs::read_dir(format!("/proc/{}/fd", self.child.id())).expect("it runs").count()
@@ -81,7 +81,7 @@ impl Process {
     /// The memory that it holds.
     ///
     /// # Panics
-    /// Where the system does not say.
+    /// The system does not report it.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).expect("it runs");
@@ -106,7 +106,7 @@ pub struct Processes {
     pub coordinator: Process,
     /// The nodes.
     pub nodes: Vec<Process>,
-    /// Of the coordinator.
+    /// Further arguments of the coordinator.
     pub client: Client,
 }
 
@@ -114,7 +114,7 @@ impl Processes {
     /// Starts them, each on a port of the system's choice, and waits until all nodes have joined.
     ///
     /// # Panics
-    /// Where they do not.
+    /// They do not start.
     pub async fn start(program: &'static str, nodes: usize) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let coordinator = coordinator(program, "127.0.0.1:0", &log_path(folder.path(), 0));
@@ -141,7 +141,7 @@ impl Processes {
         Process::start(self.program, &[&arguments[..], more].concat())
     }
 
-    /// Starts another coordinator where the first one was, with a log of its own.
+    /// Starts another coordinator at the first one's address, with its own log.
     pub fn restart_coordinator(&mut self) {
         let address = self.coordinator.address.trim_start_matches("http://").to_owned();
         let log = log_path(self.folder.path(), self.coordinators);
@@ -168,7 +168,7 @@ fn coordinator(program: &str, listen: &str, log: &Path) -> Process {
 /// The place of a node in its cluster, by its name.
 ///
 /// # Panics
-/// For other names than `n0`, `n1`….
+/// The name is not `n0`, `n1`….
 #[must_use]
 pub fn number_of(node_name: &str) -> usize {
     node_name.trim_start_matches('n').parse().expect("n and a number")

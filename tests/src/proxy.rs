@@ -1,4 +1,4 @@
-//! A network that fails: a TCP proxy between any two processes, switched while they talk.
+//! A network that fails: a TCP proxy between two processes, switched while they communicate.
 
 use std::io;
 use std::net::SocketAddr;
@@ -14,63 +14,63 @@ use tokio::time::{Instant, sleep_until};
 
 use crate::random::Random;
 
-/// Bytes that go on at once.
+/// Greatest size of a piece.
 const PIECE_BYTES: usize = 8 << 10;
-/// Pieces under way: more would be a network with more memory than routers have.
+/// Number of pieces under way, bounded as in routers.
 const PIECES_UNDER_WAY: usize = 16;
-/// Of each socket, so that what is under way can be seen from outside.
+/// Buffer of each socket, small enough that bytes under way are visible from outside.
 const SOCKET_BYTES: u32 = 64 << 10;
 
-/// What happens to the bytes of one direction.
+/// The behaviour of one direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Way {
-    /// They arrive.
+    /// Bytes arrive.
     Pass,
-    /// They wait, and whoever sent them hears nothing: a cable that was cut, a host without power.
+    /// Bytes wait without an error: a cut cable, or a host without power.
     Stall,
-    /// They arrive later, in their order; in one of `one_in` pieces a segment was lost and is sent again.
+    /// Bytes arrive later, in order; one in `one_in` pieces loses a segment, which is sent again.
     Late {
-        /// At least.
+        /// Least delay.
         delay: Duration,
-        /// At most so much more.
+        /// Greatest additional delay.
         jitter: Duration,
-        /// 0: none is lost.
+        /// 0 for no loss.
         one_in: u64,
     },
-    /// So many a second.
+    /// Bytes arrive at a limited rate.
     Slow {
-        /// The rate.
+        /// Rate of the direction.
         bytes_per_s: f64,
     },
-    /// In one of `one_in` pieces a byte becomes another.
+    /// One in `one_in` pieces has a byte changed.
     Spoilt {
-        /// 1: in each.
+        /// 1 for every piece.
         one_in: u64,
     },
 }
 
-/// What a lost segment costs: the least time after which Linux sends it again.
+/// Delay of a lost segment: the least time after which Linux sends it again.
 const RETRANSMISSION: Duration = Duration::from_millis(200);
 
 /// Both directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Network {
-    /// From who connects to who serves.
+    /// From the client to the server.
     pub forth: Way,
-    /// And back.
+    /// From the server to the client.
     pub back: Way,
-    /// Whether connections are reset as soon as they come.
+    /// New connections are reset at once.
     pub refuses: bool,
-    /// Connections of before this number rose are reset.
+    /// Connections from before the last increase are reset.
     cuts: u64,
 }
 
 const GOOD: Network = Network { forth: Way::Pass, back: Way::Pass, refuses: false, cuts: 0 };
 
-/// Listens until it is dropped.
+/// A proxy that ends when it is dropped.
 #[derive(Debug)]
 pub struct Proxy {
-    /// Where it listens, as `http://host:port`.
+    /// Its address, as `http://host:port`.
     pub address: String,
     target: watch::Sender<Option<SocketAddr>>,
     network: watch::Sender<Network>,
@@ -84,10 +84,10 @@ impl Drop for Proxy {
 }
 
 impl Proxy {
-    /// Passes all on to what is told later; what comes before that waits. `seed` is that of delays and spoilt bytes.
+    /// Starts a proxy whose target is set later; earlier bytes wait. `seed` is that of delays and changed bytes.
     ///
     /// # Panics
-    /// Where there is no port.
+    /// No port is free.
     #[must_use]
     pub fn start(seed: u64) -> Self {
         let socket = TcpSocket::new_v4().expect("a socket");
@@ -100,7 +100,7 @@ impl Proxy {
         Self { address, target, network, listening }
     }
 
-    /// In front of a server.
+    /// Starts a proxy in front of a server.
     ///
     /// # Panics
     /// As [`Proxy::start`].
@@ -111,36 +111,36 @@ impl Proxy {
         proxy
     }
 
-    /// Says where it leads: `http://host:port`.
+    /// Sets the target: `http://host:port`.
     ///
     /// # Panics
-    /// For anything else.
+    /// The address has another form.
     pub fn lead_to(&self, address: &str) {
         let target = address.trim_start_matches("http://").parse().expect("host:port");
         self.target.send_replace(Some(target));
     }
 
-    /// Changes both directions, of open connections too.
+    /// Changes both directions, also of open connections.
     pub fn set(&self, forth: Way, back: Way) {
         self.network.send_modify(|network| (network.forth, network.back) = (forth, back));
     }
 
-    /// Nothing gets through, and nobody is told.
+    /// Stalls both directions, without an error.
     pub fn partition(&self) {
         self.set(Way::Stall, Way::Stall);
     }
 
-    /// All is well again.
+    /// Restores the network.
     pub fn heal(&self) {
         self.network.send_modify(|network| *network = Network { cuts: network.cuts, ..GOOD });
     }
 
-    /// Resets all connections; others can be made.
+    /// Resets all connections; new ones are possible.
     pub fn cut(&self) {
         self.network.send_modify(|network| network.cuts += 1);
     }
 
-    /// Resets all connections, and those that are tried from now on.
+    /// Resets all connections, and later attempts.
     pub fn refuse(&self) {
         self.network.send_modify(|network| (network.refuses, network.cuts) = (true, network.cuts + 1));
     }
@@ -184,11 +184,11 @@ async fn far_of(target: SocketAddr) -> io::Result<TcpStream> {
     socket.connect(target).await
 }
 
-/// Until one side resets the connection, both have ended, or it is cut.
+/// Copies bytes until one side resets the connection, both have ended, or it is cut.
 async fn carry(mut near: TcpStream, mut far: TcpStream, network: watch::Receiver<Network>, seeds: [u64; 2]) {
     let (cuts, mut watched) = (network.borrow().cuts, network.clone());
     let _ = (near.set_nodelay(true), far.set_nodelay(true));
-    let is_cut = {
+    let is_reset = {
         let ((near_in, near_out), (far_in, far_out)) = (near.split(), far.split());
         let [forth, back] = seeds.map(Random::new);
         let forth = pump(near_in, far_out, network.clone(), |network| network.forth, forth);
@@ -198,15 +198,15 @@ async fn carry(mut near: TcpStream, mut far: TcpStream, network: watch::Receiver
             _ = watched.wait_for(|network| network.cuts > cuts) => true,
         }
     };
-    if is_cut {
+    if is_reset {
         let _ = (near.set_zero_linger(), far.set_zero_linger());
     }
 }
 
-/// A piece, and when it arrives.
+/// A piece, and its time of arrival.
 type UnderWay = (Instant, Vec<u8>);
 
-/// Reads while what was read before is under way: a late network is not a slow one.
+/// Reads while earlier pieces are under way: a late network is not a slow one.
 async fn pump(
     from: ReadHalf<'_>,
     to: WriteHalf<'_>,
@@ -240,7 +240,7 @@ async fn take(
     }
 }
 
-/// The time that pieces take one after the other; spoils those that are to be spoilt.
+/// The serial time of a piece; changes a byte where the direction corrupts.
 fn spent(way: Way, bytes: &mut [u8], random: &mut Random) -> Duration {
     match way {
         Way::Slow { bytes_per_s } => Duration::from_secs_f64(bytes.len() as f64 / bytes_per_s),
@@ -253,7 +253,7 @@ fn spent(way: Way, bytes: &mut [u8], random: &mut Random) -> Duration {
     }
 }
 
-/// The time that a piece takes beside others.
+/// The additional time of a piece that overlaps with others.
 fn waited(way: Way, random: &mut Random) -> Duration {
     let Way::Late { delay, jitter, one_in } = way else { return Duration::ZERO };
     let again = if one_in > 0 && random.below(one_in) == 0 { RETRANSMISSION } else { Duration::ZERO };
@@ -268,7 +268,7 @@ async fn give(
 ) -> io::Result<()> {
     let mut last = Instant::now();
     while let Some((due, bytes)) = receive.recv().await {
-        // What was lost holds up what comes after it.
+        // A lost segment delays the pieces after it.
         last = last.max(due);
         sleep_until(last).await;
         if network.wait_for(|network| way(network) != Way::Stall).await.is_err() {

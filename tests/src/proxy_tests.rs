@@ -1,4 +1,4 @@
-//! The proxy does what it is told, or tests behind it would pass for nothing.
+//! Tests of the proxy, on which other tests rely.
 
 use std::io::ErrorKind;
 
@@ -6,7 +6,7 @@ use tokio::time::timeout;
 
 use super::*;
 
-/// Sends back all that it gets.
+/// Sends back all bytes.
 async fn echo() -> String {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = format!("http://{}", listener.local_addr().unwrap());
@@ -25,7 +25,7 @@ async fn connected(proxy: &Proxy) -> TcpStream {
     TcpStream::connect(proxy.address.trim_start_matches("http://")).await.unwrap()
 }
 
-/// What comes back for so many bytes, within a second, and how long that takes.
+/// The bytes that come back within a second, and the time that takes.
 async fn echoed(stream: &mut TcpStream, count: usize) -> io::Result<(Vec<u8>, Duration)> {
     let start = Instant::now();
     let mut bytes = vec![7; count];
@@ -35,7 +35,7 @@ async fn echoed(stream: &mut TcpStream, count: usize) -> io::Result<(Vec<u8>, Du
 }
 
 #[tokio::test]
-async fn bytes_pass_are_late_slow_and_spoilt() {
+async fn bytes_are_delayed_throttled_and_corrupted_as_ordered() {
     let proxy = Proxy::to(&echo().await, 1);
     let mut stream = connected(&proxy).await;
     assert_eq!(echoed(&mut stream, 5000).await.unwrap().0, vec![7; 5000]);
@@ -50,7 +50,7 @@ async fn bytes_pass_are_late_slow_and_spoilt() {
 }
 
 #[tokio::test]
-async fn a_partition_is_silent_and_loses_nothing() {
+async fn a_partition_delays_bytes_and_loses_none() {
     let proxy = Proxy::to(&echo().await, 1);
     let mut stream = connected(&proxy).await;
     proxy.partition();
@@ -63,7 +63,7 @@ async fn a_partition_is_silent_and_loses_nothing() {
 }
 
 #[tokio::test]
-async fn connections_are_cut_and_refused() {
+async fn connections_are_cut_and_refused_as_ordered() {
     let proxy = Proxy::to(&echo().await, 1);
     let mut stream = connected(&proxy).await;
     echoed(&mut stream, 10).await.unwrap();

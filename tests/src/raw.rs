@@ -1,4 +1,4 @@
-//! What no client of ours would send: any bytes as a message, and HTTP/2 by hand.
+//! Input that no regular client sends: any bytes as a message, and HTTP/2 by hand.
 
 use bytes::{Buf, BufMut, Bytes};
 use tonic::client::Grpc;
@@ -49,7 +49,7 @@ impl Decoder for Raw {
 /// Calls `path` with a message of any bytes; its first answer.
 ///
 /// # Errors
-/// The server's.
+/// The server's error.
 pub async fn call(address: &str, path: &'static str, message: Bytes) -> Result<Bytes, Status> {
     let mut client = Grpc::new(connect(address).await?);
     client.ready().await.map_err(|error| Status::unavailable(error.to_string()))?;
@@ -111,7 +111,7 @@ pub fn call_headers(path: &str) -> Vec<u8> {
     frame(1, END_HEADERS, 1, &block)
 }
 
-/// A message's head: what its sender says of its length.
+/// A message's head with a stated length.
 #[must_use]
 pub fn message_head(bytes: u32) -> Vec<u8> {
     [&[0][..], &bytes.to_be_bytes()].concat()

@@ -3,30 +3,37 @@
 
 use std::any::Any;
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::Duration;
 
 use cluster::Refinement;
 use depth_image::{
-    BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, PinholeCamera, Provenance, ProvenanceKind, Ray, Texel, View,
-    ViewPlanes, linear_from_rgb9e5, linear_from_srgb8, rgb9e5_from_linear, srgb8_from_linear,
+    BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, Environment, Illumination, Light, PinholeCamera, Provenance,
+    ProvenanceKind, Ray, Texel, View, ViewPlanes, linear_from_rgb9e5, linear_from_srgb8, rgb9e5_from_linear,
+    srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
-
-use crate::cluster::illumination;
+use parking_lot::Mutex;
 
 /// The floor's colour.
 pub const FLOOR_LINEAR: Vec3 = Vec3::new(0.1, 0.6, 0.2);
-/// What rays meet that leave the scene.
+/// The colour of rays that leave the scene.
 pub const SKY_LINEAR: Vec3 = Vec3::new(0.0, 0.0, 0.25);
+
+/// A lamp above the ball, and a sky; the scalar device checks that they arrive and shades with neither.
+#[must_use]
+pub fn illumination() -> Illumination {
+    let lamp = Light::Point { position_in_world: Vec3::Y * 4.0, intensity_linear: Vec3::splat(9.0), radius_m: 0.2 };
+    Illumination { lights: vec![lamp], environment: Environment::uniform(SKY_LINEAR) }
+}
 
 /// Times of the scene that look different.
 const STEPS: u32 = 100;
 
-/// The ball's colour tells the scene's time, and how many steps its light lacks, so that a view of two sets shows two
+/// The ball's colour encodes the scene's time and its missing refinement steps, so that a view of two sets shows two
 /// colours.
 #[must_use]
 pub fn ball_linear(scene_time_s: f32, refinement: Refinement) -> Vec3 {
@@ -36,25 +43,25 @@ pub fn ball_linear(scene_time_s: f32, refinement: Refinement) -> Vec3 {
     Vec3::new(linear_from_srgb8(40 + 2 * step as u8), 0.02, 0.01 + 0.08 * lacks as f32)
 }
 
-/// As it arrives in a view.
+/// A colour as it arrives in a view.
 #[must_use]
 pub fn srgb8(linear: Vec3) -> [u8; 3] {
     linear_from_rgb9e5(rgb9e5_from_linear(linear)).to_array().map(srgb8_from_linear)
 }
 
-/// Images sampled, by eye and first row, scene time and step: how often.
+/// Number of times that each image was sampled, by eye and first row, scene time and step.
 pub type SampleCounts = HashMap<([u32; 4], u32, Refinement), usize>;
 
-/// What the device takes at the least, so that it is as fast as a test says on whatever machine.
+/// Least times of the device, which give it a stated speed on any machine.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Pace {
-    /// For one sample image.
+    /// Time of one sample image.
     pub image: Duration,
-    /// For one reconstructed view.
+    /// Time of one reconstructed view.
     pub view: Duration,
 }
 
-/// Plain loops. Clones share what they count.
+/// A device of plain loops. Clones share their counters.
 #[derive(Debug, Clone, Default)]
 pub struct ScalarEngine {
     counts: Arc<Mutex<SampleCounts>>,
@@ -62,10 +69,6 @@ pub struct ScalarEngine {
     is_lost: Arc<AtomicBool>,
     pace: Arc<Mutex<Pace>>,
     reconstructed: Arc<AtomicUsize>,
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 struct Meets {
@@ -194,10 +197,10 @@ fn known(field: &'static str, value: &str, known: &str) -> Result<(), EngineErro
 }
 
 impl ScalarEngine {
-    /// What was sampled since the last call.
+    /// The samples since the last call.
     #[must_use]
     pub fn take_counts(&self) -> SampleCounts {
-        std::mem::take(&mut locked(&self.counts))
+        std::mem::take(&mut self.counts.lock())
     }
 
     /// Views reconstructed since the last call.
@@ -206,16 +209,16 @@ impl ScalarEngine {
         self.reconstructed.swap(0, Ordering::Relaxed)
     }
 
-    /// From now on the device takes so long.
+    /// Sets the device's least times.
     pub fn keep_pace(&self, pace: Pace) {
-        *locked(&self.pace) = pace;
+        *self.pace.lock() = pace;
     }
 
     fn pace(&self) -> Pace {
-        *locked(&self.pace)
+        *self.pace.lock()
     }
 
-    /// From now on the device does nothing any more.
+    /// Loses the device.
     pub fn lose(&self) {
         self.is_lost.store(true, Ordering::Relaxed);
     }
@@ -244,34 +247,34 @@ impl Engine for ScalarEngine {
         if !package.starts_with(b"ball over floor") {
             return Err(EngineError::InvalidArgument { field: "package", reason: "is no scene of mine".to_owned() });
         }
-        locked(&self.scenes).insert(hash.to_owned());
+        self.scenes.lock().insert(hash.to_owned());
         Ok(0.0)
     }
 
     fn has_scene(&self, hash: &str) -> bool {
-        locked(&self.scenes).contains(hash)
+        self.scenes.lock().contains(hash)
     }
 
-    fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError> {
+    fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
         match sampling {
             "in_order" => Ok(true),
             _ => known("sampling", sampling, "conventional").map(|()| false),
         }
     }
 
-    fn samples_alone(&self, sampling: &str) -> Result<bool, EngineError> {
+    fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError> {
         Ok(sampling == "conventional")
     }
 
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
         self.loaded(&request.scene_hash)?;
-        self.samples_in_order(&request.sampling)?;
+        self.images_are_sequential(&request.sampling)?;
         known("lighting", &request.lighting, "unlit")?;
         let cameras: Vec<&Camera> = request.wanted.iter().map(|&index| &request.cameras[index as usize]).collect();
         for Camera::Pinhole(camera) in &cameras {
             let eye = camera.eye_in_world.extend(camera.principal_px.y).to_array().map(f32::to_bits);
             let image = (eye, request.scene_time_s.to_bits(), request.refinement);
-            *locked(&self.counts).entry(image).or_default() += 1;
+            *self.counts.lock().entry(image).or_default() += 1;
         }
         let image = |camera| depth_image(camera, request.scene_time_s, request.refinement);
         sleep(self.pace().image * cameras.len() as u32);

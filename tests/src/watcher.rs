@@ -1,11 +1,12 @@
-//! A client that asks for views all the time, and remembers what came of it.
+//! A client that requests views all the time, and records the answers.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use client::{Client, Session, ViewRequest};
 use cluster::{PolicyChoice, Refinement, SessionRequest, Timeline};
 use glam::UVec2;
+use parking_lot::{Mutex, MutexGuard};
 use tokio::task::JoinHandle;
 
 use crate::cluster::{camera, request};
@@ -14,23 +15,23 @@ use crate::picture::fault_of;
 
 /// Views of one call: enough for every compositor of a small cluster.
 const VIEWS: u64 = 4;
-/// Between two calls, so that others get on.
+/// Pause between two calls, which leaves time for other work.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// Sets of which each shows another time, over and over. They are more than a compositor keeps, so that samplers are
-/// needed all the time.
+/// A repeated timeline of distinct sets. They are more than a compositor keeps, so that samplers are needed all the
+/// time.
 pub const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 0.05, set_count: 40 };
 
-/// The session that is watched.
+/// The request of the recorded session.
 #[must_use]
 pub fn watched() -> SessionRequest {
     request(PolicyChoice::Pipeline, MOVING)
 }
 
-/// Asks until it is told to stop.
+/// A client that requests views until it is dropped.
 #[derive(Debug)]
 pub struct Watcher {
-    /// What it asks by.
+    /// The session of its requests.
     pub session: Arc<Session>,
     history: Arc<Mutex<History>>,
     asking: JoinHandle<()>,
@@ -43,10 +44,10 @@ impl Drop for Watcher {
 }
 
 impl Watcher {
-    /// Opens a session and begins.
+    /// Opens a session and starts the requests.
     ///
     /// # Panics
-    /// Where there is none to be had, or its first frames do not come.
+    /// No session opens, or its first frames do not arrive.
     pub async fn start(client: &Client) -> Self {
         let session = Arc::new(client.open_session(watched(), |_| ()).await.expect("a session"));
         let history = Arc::<Mutex<History>>::default();
@@ -56,36 +57,36 @@ impl Watcher {
         watcher
     }
 
-    /// Up to now.
+    /// The history up to now.
     #[must_use]
     pub fn history(&self) -> History {
         self.locked().clone()
     }
 
     fn locked(&self) -> MutexGuard<'_, History> {
-        self.history.lock().unwrap_or_else(PoisonError::into_inner)
+        self.history.lock()
     }
 
-    /// The plan that holds for the client.
+    /// The client's present plan.
     #[must_use]
     pub fn epoch(&self) -> u64 {
         self.session.plan().assignment.plan_epoch
     }
 
-    /// Waits for so many calls that began after `since` and were answered in full.
+    /// Waits for `count` complete calls that began after `since`.
     ///
     /// # Panics
-    /// Where they take longer than `deadline`.
+    /// They take longer than `deadline`.
     pub async fn calls_after(&self, since: Instant, count: usize, deadline: Duration) {
         let answered = |call: &&Call| call.error.is_none() && call.asked >= since;
         let what = format!("{count} calls in full");
         eventually(&what, deadline, || self.locked().calls.iter().filter(answered).count() >= count).await;
     }
 
-    /// Waits for a plan that `holds` and frames of it; gives the longest time without frames since then.
+    /// Waits for a plan that `holds` and frames of it; returns the longest time without frames since then.
     ///
     /// # Panics
-    /// Where that takes longer than `deadline`.
+    /// It takes longer than `deadline`.
     pub async fn healed(&self, since: Instant, deadline: Duration, holds: impl Fn(&Session) -> bool) -> Duration {
         eventually("another plan", deadline, || holds(&self.session)).await;
         self.calls_after(Instant::now(), 2, deadline).await;
@@ -95,10 +96,10 @@ impl Watcher {
     }
 }
 
-/// Waits for what is soon.
+/// Waits for a condition.
 ///
 /// # Panics
-/// Where it takes longer than `deadline`.
+/// It takes longer than `deadline`.
 pub async fn eventually(what: &str, deadline: Duration, mut holds: impl FnMut() -> bool) {
     let start = Instant::now();
     while !holds() {
@@ -112,7 +113,7 @@ async fn ask(session: Arc<Session>, history: Arc<Mutex<History>>) {
         let plan = session.plan().assignment;
         let call = ask_once(&session, number).await;
         {
-            let mut history = history.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut history = history.lock();
             if history.plans.last() != Some(&plan) {
                 history.plans.push(plan);
             }

@@ -1,4 +1,4 @@
-//! View cells: views from all around, each made from images that were sampled near it.
+//! View cells: views from all around, each made from images of near sample cameras.
 #![allow(clippy::unwrap_used)]
 
 use std::f32::consts::{PI, TAU};
@@ -11,7 +11,7 @@ use glam::{UVec2, Vec3};
 
 const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
 
-/// On a circle around the ball.
+/// A camera on a circle around the ball.
 fn view(azimuth_rad: f32) -> PinholeCamera {
     let target = Vec3::new(0.0, 0.5, 0.0);
     let eye = target + Vec3::new(3.0 * azimuth_rad.sin(), 0.7, 3.0 * azimuth_rad.cos());
@@ -48,9 +48,9 @@ fn around(count: usize) -> impl Iterator<Item = f32> {
     (0..count).map(move |i| TAU * i as f32 / count as f32)
 }
 
-/// One rig in front knows nothing of what is seen from behind: the curve falls. With cells it is level.
+/// One rig in front has no samples of the back: the curve falls. With cells it is level.
 #[tokio::test(flavor = "multi_thread")]
-async fn all_around_every_view_is_as_good() {
+async fn views_from_all_sides_are_equally_good() {
     let cluster = Cluster::start(4).await;
     let alone = SessionRequest { viewpoints: Vec::new(), ..looking_from([]) };
     let session = cluster.session(alone).await.unwrap();
@@ -65,12 +65,12 @@ async fn all_around_every_view_is_as_good() {
     assert!(of_rig[..12].is_sorted_by(|a, b| a >= b) && of_rig[12] < 0.5 * of_rig[0], "{of_rig:?}");
     assert!(of_cells.iter().all(|known| (known / of_rig[0] - 1.0).abs() < 0.01), "{of_cells:?}");
     let images = plan.image_count();
-    assert_eq!(cluster.take_counts(), vec![1; images], "each image once, whoever made views of it");
+    assert_eq!(cluster.take_counts(), vec![1; images], "each image once, for all compositors");
 }
 
-/// What changes elsewhere costs nothing here.
+/// Changes elsewhere cause no sampling here.
 #[tokio::test(flavor = "multi_thread")]
-async fn sessions_come_and_go_without_sampling_others_again() {
+async fn a_session_that_opens_or_closes_samples_no_other_cell_again() {
     let cluster = Cluster::start(3).await;
     let here = cluster.session(looking_from([0.0, 0.1])).await.unwrap();
     frames(&here, [0.0, 0.05, 0.1]).await;
@@ -88,20 +88,20 @@ async fn sessions_come_and_go_without_sampling_others_again() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_viewer_walks_around() {
+async fn cells_follow_a_viewer_that_walks_around() {
     let cluster = Cluster::start(3).await;
     let session = cluster.session(looking_from([0.0])).await.unwrap();
     let mut live = session.live();
     for step in 0..6 {
         let azimuth = step as f32;
-        session.look_from(vec![view(azimuth)]).await.unwrap();
+        session.set_viewpoints(vec![view(azimuth)]).await.unwrap();
         let cell = || session.plan().assignment.workload.sample_cameras[0];
         let near = |camera: depth_image::Camera| {
             let depth_image::Camera::Pinhole(camera) = camera;
             (camera.eye_in_world - view(azimuth).eye_in_world).length() < 1e-3
         };
         cluster_tests::watcher::eventually("a cell here", std::time::Duration::from_secs(5), || near(cell())).await;
-        let number = live.look(view(azimuth), 0).unwrap();
+        let number = live.set_pose(view(azimuth), 0).unwrap();
         let shown = loop {
             let frame = live.next().await.unwrap().frame;
             if frame.request.frame == number {
@@ -111,6 +111,6 @@ async fn a_viewer_walks_around() {
         assert!(known(&shown) > 0.5, "{azimuth}");
     }
     let own_cameras = cluster.session(request(PolicyChoice::Pipeline, STILL)).await.unwrap();
-    let error = own_cameras.look_from(vec![view(0.0)]).await.unwrap_err().to_string();
+    let error = own_cameras.set_viewpoints(vec![view(0.0)]).await.unwrap_err().to_string();
     assert!(error.contains("was opened with sample cameras"), "{error}");
 }

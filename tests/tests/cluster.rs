@@ -1,4 +1,4 @@
-//! Clusters in one process over real ports: every view comes once, and from one set.
+//! Clusters in one process over real ports: every view arrives once, and from one set.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::HashSet;
@@ -12,7 +12,7 @@ use node::NodeConfig;
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 
-/// The ball shows its own time and step and no other; floor and sky are there; nothing else is.
+/// The ball shows its own time and step and no other; floor and sky are there, and no other colour.
 fn shows_only(frame: &Frame, scene_time_s: f32, refinement: Refinement) {
     assert_eq!(fault_of(frame, scene_time_s, refinement), None);
 }
@@ -43,7 +43,7 @@ async fn pipeline_of(nodes: usize) {
     );
     let frames = session.render_views(views(3, 12)).unwrap().all().await.unwrap();
     all_came(&frames, 36);
-    // Three sets of three images; the next set is fetched ahead, but none twice.
+    // There are three sets of three images; the next set is fetched ahead, and no image twice.
     assert_eq!(cluster.take_counts(), [1; 9]);
     let again = session.render_views(views(3, 12)).unwrap().all().await.unwrap();
     all_came(&again, 36);
@@ -51,22 +51,22 @@ async fn pipeline_of(nodes: usize) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn one_node_does_both() {
+async fn one_node_samples_and_composites() {
     pipeline_of(1).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn three_nodes_share_the_work() {
+async fn three_nodes_share_images_and_views() {
     pipeline_of(3).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn five_nodes_share_the_work() {
+async fn five_nodes_share_images_and_views() {
     pipeline_of(5).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_k_gives_the_same_pictures() {
+async fn every_number_of_samplers_gives_the_same_pictures() {
     let cluster = Cluster::start(4).await;
     let mut pictures = Vec::new();
     for k in 1..=3 {
@@ -83,9 +83,9 @@ async fn every_k_gives_the_same_pictures() {
     assert!(error.contains("forced_sampler_count is 4, at most 3"), "{error}");
 }
 
-/// Whole sets in turn: each image once, whatever K, and the same pictures.
+/// Nodes take whole sets in turn: each image is sampled once for any K, and pictures are equal.
 #[tokio::test(flavor = "multi_thread")]
-async fn sets_that_are_sampled_in_order_stay_on_one_node() {
+async fn sets_of_sequential_images_stay_on_one_node() {
     let cluster = Cluster::start(4).await;
     let mut pictures = Vec::new();
     for k in 1..=3 {
@@ -114,7 +114,7 @@ async fn sets_that_are_sampled_in_order_stay_on_one_node() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn direct_draws_on_every_node_and_samples_nothing() {
+async fn the_direct_policy_draws_on_every_node_and_samples_nothing() {
     let cluster = Cluster::start(3).await;
     let session = cluster.session(request(PolicyChoice::Direct, MOVING)).await.unwrap();
     assert_eq!((session.plan().sampler_count(), session.plan().assignment.compositors.len()), (0, 3));
@@ -146,7 +146,7 @@ async fn a_static_scene_is_sampled_once_for_all_sets_and_plans() {
 
 /// Four steps over eight sets, by one node and by samplers apart from compositors.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_still_picture_is_refined_step_by_step_and_each_step_sampled_once() {
+async fn a_static_scene_is_refined_step_by_step_and_each_step_sampled_once() {
     for nodes in [1, 3] {
         let cluster = Cluster::start(nodes).await;
         let timeline = Timeline { start_s: 0.0, step_s: 0.0, set_count: 8 };
@@ -169,7 +169,7 @@ async fn a_still_picture_is_refined_step_by_step_and_each_step_sampled_once() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_moving_picture_is_finished_in_every_set() {
+async fn a_moving_scene_is_finished_in_every_set() {
     let cluster = Cluster::start(2).await;
     let refined = SessionRequest { refinement_steps: 4, ..request(PolicyChoice::Pipeline, MOVING) };
     let session = cluster.session(refined).await.unwrap();
@@ -178,7 +178,7 @@ async fn a_moving_picture_is_finished_in_every_set() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_go_on_when_the_coordinator_is_gone() {
+async fn frames_go_on_while_the_coordinator_is_gone() {
     let mut cluster = Cluster::start(2).await;
     let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
     cluster.coordinator.kill();
@@ -187,7 +187,7 @@ async fn frames_go_on_when_the_coordinator_is_gone() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn scenes_come_by_hash_and_are_kept_in_the_folder() {
+async fn scenes_are_fetched_by_hash_and_stored_in_the_folder() {
     let folder = tempfile::tempdir().unwrap();
     let with_folder = |config: NodeConfig| NodeConfig { scene_folder: Some(folder.path().to_owned()), ..config };
     let cluster = Cluster::start_with(1, with_folder).await;

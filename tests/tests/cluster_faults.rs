@@ -1,4 +1,4 @@
-//! What goes wrong in a cluster is refused, named and survived.
+//! Faulty requests are refused by name, and the cluster survives them.
 #![allow(clippy::unwrap_used)]
 
 use std::time::Duration;
@@ -15,7 +15,7 @@ use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 
-/// One request on a stream of its own; how it ends.
+/// Sends one request on its own stream; returns how it ends.
 async fn ask(address: &str, request: RenderViews) -> Result<usize, tonic::Status> {
     let client = CompositorClient::new(connect(address).await?);
     let mut parts = client.render_views(tokio_stream::iter([request])).await?;
@@ -41,10 +41,10 @@ fn raw_request(session: &Session) -> RenderViews {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn old_plans_are_refused_everywhere() {
+async fn old_plans_are_refused_by_every_service() {
     let cluster = Cluster::start(2).await;
     let old = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
-    // Of another workload: sessions of one share a plan.
+    // The workload differs, since sessions of one workload share a plan.
     let other = cluster::SessionRequest { refinement_steps: 2, ..request(PolicyChoice::Pipeline, MOVING) };
     let new = cluster.session(other).await.unwrap();
     let (old_plan, new_plan) = (&old.plan().assignment, &new.plan().assignment);
@@ -78,7 +78,7 @@ async fn old_plans_are_refused_everywhere() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bad_requests_are_named() {
+async fn bad_requests_are_refused_by_field() {
     let cluster = Cluster::start(2).await;
     let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
     let compositor = session.plan().assignment.compositors[0].address.clone();
@@ -102,7 +102,7 @@ async fn bad_requests_are_named() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bad_sessions_are_named() {
+async fn bad_sessions_are_refused_by_field() {
     let cluster = Cluster::start(2).await;
     let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
     let share = &session.plan().assignment.samplers[0];
@@ -133,7 +133,7 @@ fn with_camera(good: &RenderViews, change: impl Fn(&mut depth_image::PinholeCame
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn drain_ends_open_streams_in_time() {
+async fn a_drain_ends_open_streams_in_time() {
     let mut cluster = Cluster::start(2).await;
     let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
     let compositor = session.plan().assignment.compositors[0].address.clone();
@@ -150,7 +150,7 @@ async fn drain_ends_open_streams_in_time() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_idle_stream_ends() {
+async fn an_idle_stream_ends_at_its_deadline() {
     let hasty = |config: NodeConfig| NodeConfig {
         deadlines: Deadlines { idle: Duration::from_millis(200), ..config.deadlines },
         ..config
@@ -165,7 +165,7 @@ async fn an_idle_stream_ends() {
 }
 
 #[tokio::test]
-async fn only_loopback_is_served_without_being_asked() {
+async fn another_address_than_loopback_needs_a_flag() {
     let listener = tokio::net::TcpListener::bind("0.0.0.0:0").await.unwrap();
     let engine = std::sync::Arc::new(cluster_tests::scalar_engine::ScalarEngine::default());
     let refused = node_host::serve(
@@ -180,7 +180,7 @@ async fn only_loopback_is_served_without_being_asked() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_session_needs_nodes() {
+async fn a_session_without_nodes_is_refused() {
     let cluster = Cluster::start(0).await;
     let error = cluster.session(request(PolicyChoice::Auto, MOVING)).await.unwrap_err().to_string();
     assert!(error.contains("no node has joined"), "{error}");

@@ -1,4 +1,4 @@
-//! What clients see while nodes come and go: whole pictures, each of one set, and all that they asked for.
+//! Clients receive all requested pictures, whole and each of one set, while nodes come and go.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::{BTreeSet, HashMap};
@@ -12,16 +12,16 @@ use node::{Deadlines, NodeConfig};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 const STILL: Timeline = Timeline { start_s: 0.0, step_s: 0.0, set_count: 1 };
-/// How long nodes wait that have no time.
+/// Short deadline of nodes for stalled and idle streams.
 const HASTE: Duration = Duration::from_millis(300);
-/// Complete frames come again after so long.
+/// Greatest time until complete frames arrive again.
 const HEALED: Duration = Duration::from_secs(5);
 
 fn pipeline(timeline: Timeline) -> SessionRequest {
     request(PolicyChoice::Pipeline, timeline)
 }
 
-/// The invariants of a history: each frame once, and of plans that only rise.
+/// The invariants of a history: each frame arrives once, and plans only rise.
 fn check(frames: &[Frame], asked: usize) {
     let numbers: BTreeSet<u64> = frames.iter().map(|frame| frame.request.frame).collect();
     assert_eq!((numbers.len(), frames.len()), (asked, asked));
@@ -38,7 +38,7 @@ async fn wait_for(what: &str, holds: impl AsyncFn() -> bool) {
     }
 }
 
-/// The same view, again and again, until it comes of a plan above `plan_epoch`; how long that took.
+/// Requests the same view until it comes from a plan above `plan_epoch`; returns the time that took.
 async fn until_replanned(session: &Session, plan_epoch: u64) -> Duration {
     let start = Instant::now();
     for frame in 0.. {
@@ -55,7 +55,7 @@ async fn until_replanned(session: &Session, plan_epoch: u64) -> Duration {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_of_a_killed_compositor_come_from_others() {
+async fn other_compositors_send_the_frames_of_a_killed_one() {
     let mut cluster = Cluster::start(4).await;
     let session = cluster.session(pipeline(MOVING)).await.unwrap();
     let plan = session.plan();
@@ -72,9 +72,9 @@ async fn frames_of_a_killed_compositor_come_from_others() {
     assert!(!session.plan().assignment.composites(&format!("n{victim}")));
 }
 
-/// Frames that are decoded wait for a caller who is busy; a plan that ends meanwhile ends those who hold them.
+/// Decoded frames wait for a busy caller, though their plan ends meanwhile.
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_that_wait_for_their_caller_outlive_their_plan() {
+async fn frames_that_their_caller_has_not_taken_outlive_their_plan() {
     let mut cluster = Cluster::start(4).await;
     let session = cluster.session(pipeline(MOVING)).await.unwrap();
     let plan = session.plan().assignment;
@@ -108,7 +108,7 @@ async fn a_caller_may_pause_for_longer_than_nodes_wait() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn sets_of_a_killed_sampler_come_from_others() {
+async fn other_samplers_make_the_sets_of_a_killed_one() {
     let mut cluster = Cluster::start(3).await;
     let session = cluster.session(pipeline(MOVING)).await.unwrap();
     let plan = session.plan();
@@ -122,7 +122,7 @@ async fn sets_of_a_killed_sampler_come_from_others() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_last_node_s_work_waits_for_the_next() {
+async fn a_session_without_nodes_waits_for_the_next() {
     let mut cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(MOVING)).await.unwrap();
     cluster.nodes[0].kill();
@@ -132,7 +132,7 @@ async fn the_last_node_s_work_waits_for_the_next() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_new_node_takes_part_without_a_lost_frame() {
+async fn a_new_node_gets_a_role_without_a_lost_frame() {
     let mut cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let epoch = session.plan().assignment.plan_epoch;
@@ -195,7 +195,7 @@ async fn sessions_of_one_workload_share_a_plan() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn another_workload_takes_the_cluster_over() {
+async fn a_session_of_another_workload_ends_the_one_before() {
     let cluster = Cluster::start(2).await;
     let old = cluster.session(pipeline(MOVING)).await.unwrap();
     let new = cluster.session(pipeline(STILL)).await.unwrap();

@@ -1,4 +1,4 @@
-//! Nodes of a stated pace: who is slow is helped, and K follows V.
+//! Nodes of a stated speed: views of a slow node are stolen, and K follows V.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,7 +10,7 @@ use cluster_tests::cluster::{Cluster, request, views};
 use cluster_tests::scalar_engine::Pace;
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
-/// A better plan is in force after so long: it waits for three looks, and for the one before it to have lasted 5 s.
+/// Time until a better plan is in force: three reevaluations, and a dwell of 5 s of the plan before it.
 const SETTLED: Duration = Duration::from_secs(20);
 
 fn of_ms(image_ms: u64, view_ms: u64) -> Pace {
@@ -27,9 +27,9 @@ fn number_of(node_name: &str) -> usize {
     node_name[1..].parse().unwrap()
 }
 
-/// The views of one set, shared by three equal nodes, of which one has become five times as slow since it was measured.
+/// Three equal nodes share the views of one set; one has become five times as slow since it was measured.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_compositor_that_has_become_slow_is_helped() {
+async fn views_of_a_compositor_that_became_slow_are_stolen() {
     const VIEWS: u32 = 600;
     let cluster = cluster_of(4, of_ms(1, 10)).await;
     let asked = request(PolicyChoice::Pipeline, Timeline { set_count: 1, ..MOVING });
@@ -39,7 +39,7 @@ async fn a_compositor_that_has_become_slow_is_helped() {
         session.plan().assignment.compositors.iter().map(|share| number_of(&share.node_name)).collect();
     let slow = compositors[1];
     cluster.engines[slow].keep_pace(of_ms(1, 50));
-    // Those by which costs were measured.
+    // The views of the measurement.
     compositors.iter().for_each(|&node| _ = cluster.engines[node].take_reconstructed());
     let frames = session.render_views(views(1, VIEWS)).unwrap().all().await.unwrap();
     let numbers: BTreeSet<u64> = frames.iter().map(|frame| frame.request.frame).collect();
@@ -52,14 +52,14 @@ async fn a_compositor_that_has_become_slow_is_helped() {
     assert!(made.iter().all(|(&node, &made)| node == slow || made > 200));
 }
 
-/// Nodes that had one role and have another.
+/// The number of nodes whose role changed.
 fn changes_of_role(from: &Assignment, to: &Assignment) -> usize {
     let names =
         |plan: &Assignment| -> BTreeSet<String> { plan.samplers.iter().map(|share| share.node_name.clone()).collect() };
     names(from).symmetric_difference(&names(to)).count()
 }
 
-/// Asks for V views of each set, again and again, until K is right; what was asked for came, whole, all the time.
+/// Requests V views of each set until K is right; all requested views arrive meanwhile.
 async fn follow(session: &Session, views_per_set: u32, k: usize) -> SessionPlan {
     let before = session.plan();
     session.change(views_per_set, None).await.unwrap();

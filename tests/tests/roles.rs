@@ -1,4 +1,4 @@
-//! What plans say beside who does what: tiles, relays, demand that changes, and what nodes report of their work.
+//! Tiles, relays, changing demand, and nodes' reports of their work.
 #![allow(clippy::unwrap_used)]
 
 use std::num::NonZeroU32;
@@ -19,7 +19,7 @@ fn pipeline() -> SessionRequest {
     request(PolicyChoice::Pipeline, MOVING)
 }
 
-/// What share of all pixels' bytes two deliveries have in common.
+/// The share of equal bytes in two deliveries.
 fn alike(a: &[Frame], b: &[Frame]) -> f64 {
     let (mut same, mut all) = (0, 0);
     for frame in a {
@@ -37,7 +37,7 @@ async fn delivered(cluster: &Cluster, request: SessionRequest) -> (Assignment, V
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn views_from_tiles_are_those_from_whole_images() {
+async fn views_from_tiles_equal_those_from_whole_images() {
     let cluster = Cluster::start(4).await;
     let forced = |tiles| SessionRequest { forced_tile_count: Some(tiles), ..pipeline() };
     let (plan, whole) = delivered(&cluster, forced(1)).await;
@@ -54,14 +54,14 @@ async fn views_from_tiles_are_those_from_whole_images() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn tiles_need_images_that_stand_alone() {
+async fn tiles_are_refused_where_images_are_not_independent() {
     let cluster = Cluster::start(2).await;
     let cut = SessionRequest { sampling: "in_order".to_owned(), forced_tile_count: Some(2), ..pipeline() };
     let error = cluster.session(cut).await.unwrap_err().to_string();
     assert!(error.contains("forced_tile_count is 2"), "{error}");
 }
 
-/// A chain: one sampler, and compositors that pass images on.
+/// A chain: one sampler, and compositors that relay images.
 async fn chained(cluster: &Cluster) -> Assignment {
     let forced = SessionRequest { forced_sampler_count: Some(1), ..pipeline() };
     let session = cluster.session(forced).await.unwrap();
@@ -74,7 +74,7 @@ async fn chained(cluster: &Cluster) -> Assignment {
     chain
 }
 
-/// One view of a set, of one compositor.
+/// Requests one view of a set from one compositor.
 async fn ask(address: &str, plan: &Assignment, set_index: u32) -> WholeFrame {
     let request = RenderViews {
         plan_epoch: plan.plan_epoch,
@@ -91,30 +91,30 @@ async fn ask(address: &str, plan: &Assignment, set_index: u32) -> WholeFrame {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn compositors_pass_images_on_in_a_chain() {
+async fn compositors_relay_images_in_a_chain() {
     let cluster = Cluster::start(4).await;
     let plan = chained(&cluster).await;
     let [first, second, last] = &plan.compositors[..] else { panic!("{:?}", plan.compositors) };
     assert_eq!((plan.relay_of(&first.node_name), plan.relay_of(&last.node_name)), (None, Some(second)));
     cluster.take_counts();
-    // The last one first: its asking goes all the way up.
+    // The last compositor first: its request goes all the way up.
     let far = ask(&last.address, &plan, 1).await;
     let near = ask(&first.address, &plan, 1).await;
     assert_eq!(far.data, near.data);
     assert!(cluster.take_counts().iter().all(|&times| times == 1), "sampled once");
-    let passed_on = |address: String, plan_epoch| async move {
+    let relayed = |address: String, plan_epoch| async move {
         let sampler = SamplerClient::new(connect(&address).await.unwrap());
         let fetch = FetchImages { plan_epoch, set_index: 1, cell: 0, image_indices: vec![0, 1, 2] };
         sampler.fetch_sample_images(fetch).await.map(|chunks| chunks.collect::<Vec<_>>())
     };
-    let chunks = passed_on(second.address.clone(), 100).await.unwrap().await;
+    let chunks = relayed(second.address.clone(), 100).await.unwrap().await;
     assert!(chunks.len() >= 6 && chunks.iter().all(Result::is_ok), "header and data of each of three images");
-    let refused = passed_on(last.address.clone(), 100).await.err().unwrap();
+    let refused = relayed(last.address.clone(), 100).await.err().unwrap();
     assert!(refused.message().contains("is not sampled by"), "nobody asks the last one: {refused}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_relay_that_is_gone_is_passed_over() {
+async fn samplers_replace_a_relay_that_is_lost() {
     let mut cluster = Cluster::start(4).await;
     let plan = chained(&cluster).await;
     let relay = plan.compositors[1].node_name[1..].parse::<usize>().unwrap();
@@ -128,9 +128,9 @@ async fn a_relay_that_is_gone_is_passed_over() {
     assert!(start.elapsed() < Duration::from_secs(2), "the next set is not asked of it any more");
 }
 
-/// While a set is sampled and the next one waits for it, another plan comes.
+/// Another plan arrives while one set is sampled and the next waits.
 #[tokio::test(flavor = "multi_thread")]
-async fn what_was_not_begun_when_its_plan_ended_is_not_sampled() {
+async fn a_set_that_was_not_begun_when_its_plan_ended_is_not_sampled() {
     let cluster = Cluster::start(3).await;
     let plan = chained(&cluster).await;
     let share = plan.samplers[0].clone();
@@ -161,7 +161,7 @@ async fn what_was_not_begun_when_its_plan_ended_is_not_sampled() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn sessions_ask_for_more_and_less_and_nodes_say_what_they_did() {
+async fn sessions_change_their_demand_and_nodes_report_their_work() {
     let cluster = Cluster::start(3).await;
     let session = cluster.session(pipeline()).await.unwrap();
     session.change(500, None).await.unwrap();
@@ -185,7 +185,7 @@ async fn sessions_ask_for_more_and_less_and_nodes_say_what_they_did() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_has_done_what_the_cluster_does_before_it_joins() {
+async fn a_node_warms_up_before_it_joins() {
     let mut cluster = Cluster::start(1).await;
     let session = cluster.session(request(PolicyChoice::TimeShare, MOVING)).await.unwrap();
     cluster.add_node(|config| config);
@@ -195,7 +195,7 @@ async fn a_node_has_done_what_the_cluster_does_before_it_joins() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_nodes_cannot_do_is_refused_and_others_go_on() {
+async fn a_rate_beyond_the_nodes_is_refused_and_other_sessions_go_on() {
     let cluster = Cluster::start(2).await;
     let session = cluster.session(pipeline()).await.unwrap();
     let still = Timeline::still(0.0);

@@ -67,7 +67,7 @@ impl ActivePlan {
         self.samples(node_name) || self.plan.assignment.composites(node_name)
     }
 
-    /// Whether both nodes have the roles in this plan that the report says.
+    /// Whether both nodes have the reported roles in this plan.
     pub(super) fn concerns(&self, report: &SamplerReport) -> bool {
         self.epoch() == report.plan_epoch
             && self.plan.assignment.composites(&report.compositor)

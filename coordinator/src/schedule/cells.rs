@@ -31,8 +31,8 @@ impl Cells {
         ViewGroup::add(&mut self.groups, viewpoints, scene);
     }
 
-    /// Gives the workload the cameras of these cells, up to the number of cells that a plan may have; views of further cells
-    /// are made from the nearest.
+    /// Gives the workload the cameras of these cells, up to the limit of a plan. Views of further cells are made from
+    /// the nearest.
     pub(super) fn place_cameras(&self, workload: &mut Workload) {
         let cameras = |group: &ViewGroup| group.sample_cameras(self.size_px);
         let usable = |cameras: &Vec<PinholeCamera>| cameras.iter().all(|camera| camera.validate().is_ok());

@@ -9,7 +9,7 @@ use depth_image::Camera;
 use super::demand::ChoiceError;
 use super::event::ProbeKind;
 
-/// One action of the executor.
+/// A command to the executor.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs, reason = "self-naming fields")]
 pub enum Command {
@@ -52,7 +52,7 @@ pub struct ProbedImage {
 }
 
 impl Probe {
-    /// The question without its details.
+    /// The kind of this probe.
     #[must_use]
     pub fn kind(&self) -> ProbeKind {
         if self.image.is_some() { ProbeKind::Image } else { ProbeKind::Liveness }

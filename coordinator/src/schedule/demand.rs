@@ -1,4 +1,4 @@
-//! The demand that a plan is chosen for, and the choice.
+//! The input and the result of the choice of a plan.
 
 use std::num::NonZeroU32;
 
@@ -42,7 +42,7 @@ pub struct CurrentRoles {
     pub relay_fanout: Option<NonZeroU32>,
 }
 
-/// The load, and the nodes that share it.
+/// The demand, and the nodes that serve it.
 #[derive(Debug, Clone, Copy)]
 pub struct Demand<'a> {
     /// The work.
@@ -97,7 +97,7 @@ pub struct Choice {
     pub division: Division,
     /// The reason in plain words, with the figures.
     pub reason: String,
-    /// Times of every policy.
+    /// Predicted times of every policy.
     pub predicted: Predicted,
 }
 

@@ -150,8 +150,8 @@ impl Estimate {
         self.now_among(&Ratios::default())
     }
 
-    /// An operation that this node has not timed takes it as much longer than alone as it takes the nodes that have, times
-    /// what this node is slower than they are.
+    /// An operation without timings of this node is as much slower than alone as on nodes with timings, times this
+    /// node's relative slowness.
     pub(super) fn now_among(&self, common: &Ratios) -> NodeCosts {
         let slowness = self.slowness.value().unwrap_or(1.0);
         let than_others = self.slowness_among(common);

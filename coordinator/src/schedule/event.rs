@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::demand::PolicyOverride;
 
-/// One occurrence in the cluster. Events with an epoch concern the plan of that epoch alone.
+/// An event of the cluster. Events of an epoch concern the plan of that epoch alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs, reason = "self-naming fields")]
@@ -45,7 +45,7 @@ pub enum Event {
     Tick,
 }
 
-/// The question of a probe.
+/// The kind of a probe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ProbeKind {
@@ -60,7 +60,7 @@ pub enum ProbeKind {
 pub struct Opening {
     /// Its number.
     pub session: u64,
-    /// The workload to sample.
+    /// The session's workload.
     pub workload: Workload,
     /// V.
     pub views_per_set: usize,

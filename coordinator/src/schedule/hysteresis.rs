@@ -45,8 +45,8 @@ impl PlanHysteresis {
         self.evaluated_at = now;
         self.better_in_a_row = if gain.ratio > gain.worth { self.better_in_a_row + 1 } else { 0 };
         let lasted = now.saturating_sub(self.since);
-        let settled = all_are_ready || lasted >= READY_WITHIN;
-        settled && self.better_in_a_row >= CONFIRMATIONS && lasted >= DWELL && repays(gain, lasted)
+        let has_settled = all_are_ready || lasted >= READY_WITHIN;
+        has_settled && self.better_in_a_row >= CONFIRMATIONS && lasted >= DWELL && repays(gain, lasted)
     }
 }
 

@@ -5,7 +5,7 @@ use cluster::{Costs, Policy};
 use super::makespan::{Worker, distribute};
 use super::node_costs::NodeCosts;
 
-/// The work of the cluster.
+/// The load of the cluster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Load {
     /// S: images of a sample set.

@@ -1,4 +1,4 @@
-//! The costs of operations on one node, and a comparison of nodes.
+//! Costs of one node, and their comparison between nodes.
 
 use cluster::{Costs, TileCosts};
 
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_sampler_of_tiles_is_told_from_one_with_expensive_tiles() {
+    fn a_slow_sampler_of_tiles_differs_from_one_with_expensive_tiles() {
         let mut nodes = [4.0, 5.0, 6.0, 5.0, 20.0].map(sampling);
         NodeCosts::level_sampling(&mut nodes);
         assert_eq!(nodes.map(|node| node.costs.sample_image_s), [5.0, 5.0, 5.0, 5.0, 20.0]);

@@ -12,8 +12,8 @@ const CONFIRMATIONS_DOWN: u32 = 3;
 const CONFIRMATIONS_UP: u32 = 20;
 /// Timings of a new plan come in for this long before they are judged.
 const SETTLE: Duration = Duration::from_secs(5);
-/// Another program may have caused the cost of a step when it was left: while this step is roomy, the step above is tried
-/// after this long, and after twice as long each time that the trial fails within as long.
+/// Time until a trial of the step above while this step has room, since another program may have caused its cost. It
+/// doubles each time that a trial fails within it.
 const FIRST_TRIAL: Duration = Duration::from_secs(30);
 const LAST_TRIAL: Duration = Duration::from_secs(480);
 
@@ -57,8 +57,8 @@ impl UtilizationSample<'_> {
 impl Overload {
     /// Adds a sample; whether the step has changed.
     pub(super) fn add(&mut self, now: Duration, sample: UtilizationSample<'_>) -> bool {
-        let settled = now.saturating_sub(self.changed_at) >= SETTLE;
-        if !settled || sample.views_per_s <= 0.0 {
+        let has_settled = now.saturating_sub(self.changed_at) >= SETTLE;
+        if !has_settled || sample.views_per_s <= 0.0 {
             return false;
         }
         let view_utilisation = sample.utilisation / sample.rate(self.step);

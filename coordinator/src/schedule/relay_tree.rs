@@ -8,7 +8,7 @@ const FANOUTS: [u32; 3] = [4, 2, 1];
 /// A longer way must be faster by more than this factor.
 const WORTH: f64 = 1.1;
 
-/// Times that links take for one set.
+/// The load of links by one set.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Links {
     /// For each sampler, seconds of one copy of its images.

@@ -53,7 +53,7 @@ pub(super) fn is_valid(timing: f64) -> bool {
     timing.is_finite() && timing >= 0.0
 }
 
-/// The median; the lower of the two middle timings, since the first timing may include the building of shaders.
+/// The median; the lower one of an even number of timings, since the first may include the building of shaders.
 pub(super) fn median(timings: impl Iterator<Item = f64>) -> Option<f64> {
     let mut sorted: Vec<f64> = timings.collect();
     sorted.sort_by(f64::total_cmp);

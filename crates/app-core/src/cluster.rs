@@ -11,23 +11,23 @@ use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
-/// How long nodes of one process may take to join.
+/// The longest wait for nodes of one process to join.
 const JOIN: Duration = Duration::from_secs(30);
 
-/// Servers that run until they are drained.
+/// Servers of a cluster, which run until they are drained.
 pub struct Cluster {
-    /// The coordinator, as `http://host:port`.
+    /// The address of the coordinator, as `http://host:port`.
     pub address: String,
     shutdown: CancellationToken,
     servers: JoinSet<Result<(), ServeError>>,
 }
 
 impl Cluster {
-    /// Starts a coordinator on `listener` and `nodes` nodes, and waits until all have joined. The scene should
-    /// be on the engine already; otherwise each node fetches it.
+    /// Starts a coordinator on `listener` and `nodes` nodes, and waits until all have joined. Nodes fetch the scene
+    /// unless the engine has it.
     ///
     /// # Errors
-    /// When a port cannot be had or nodes do not join.
+    /// A port is not to be had, or nodes do not join.
     pub async fn start(
         listener: TcpListener,
         offer: SceneOffer,
@@ -54,7 +54,7 @@ impl Cluster {
 
     async fn add_node(&mut self, number: usize, engine: Arc<dyn Engine>) -> anyhow::Result<()> {
         let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
-        // As many digits as sort well: members are listed by name.
+        // Enough digits to sort well: members are listed by name.
         let config = NodeConfig::new(format!("node-{number:03}"), &self.address);
         self.servers.spawn(node_host::serve(listener, config, engine, NodeMetrics::default(), self.shutdown.clone()));
         Ok(())
@@ -63,15 +63,15 @@ impl Cluster {
     /// A client of this cluster.
     ///
     /// # Errors
-    /// When the coordinator does not answer.
+    /// The coordinator does not answer.
     pub async fn client(&self) -> anyhow::Result<Client> {
         Ok(Client::connect(&self.address).await?)
     }
 
-    /// The first server that ends by itself, if one does: a cluster that serves never resolves.
+    /// Waits for the first server that ends by itself.
     ///
     /// # Errors
-    /// Why it ended.
+    /// The reason of its end.
     pub async fn failed(&mut self) -> anyhow::Result<()> {
         match self.servers.join_next().await {
             Some(ended) => Ok(ended.context("a server stopped")??),
@@ -82,7 +82,7 @@ impl Cluster {
     /// Ends streams and waits for the servers, 10 s at most.
     ///
     /// # Errors
-    /// When a server failed.
+    /// A server failed.
     pub async fn drain(mut self) -> anyhow::Result<()> {
         self.shutdown.cancel();
         while let Some(ended) = self.servers.join_next().await {
@@ -92,7 +92,7 @@ impl Cluster {
     }
 }
 
-/// Where this process reaches a listener that may be bound to all addresses.
+/// The address at which this process reaches a listener, which may be bound to all addresses.
 fn loopback_of(listener: &TcpListener) -> anyhow::Result<std::net::SocketAddr> {
     let mut address = listener.local_addr()?;
     if address.ip().is_unspecified() {

@@ -1,4 +1,4 @@
-//! Views asked of a cluster as any client asks, and the time until they are all here.
+//! Views asked of a cluster as any client asks, and the time until all have arrived.
 
 use std::time::Instant;
 
@@ -13,37 +13,37 @@ use sampling::SamplingMethod;
 use crate::exit::BadInput;
 use crate::fallbacks;
 
-/// How views shall come about.
+/// Settings of a session.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wishes {
-    /// Named as on the command line.
+pub struct SessionSettings {
+    /// The reconstruction method, named as on the command line.
     pub method: String,
-    /// Named as on the command line.
+    /// The sampling method, named as on the command line.
     pub sampling: String,
-    /// Named as on the command line.
+    /// The lighting, named as on the command line.
     pub lighting: String,
-    /// Named as on the command line.
+    /// The codec of frames, named as on the command line.
     pub codec: String,
-    /// Who decides between pipeline and direct.
+    /// The policy, or the coordinator's choice.
     pub policy: PolicyChoice,
     /// Planes beside colour.
     pub planes: ViewPlanes,
-    /// Tiles of a sample image; `None`: as many as are predicted to be fastest.
+    /// Tiles of a sample image; `None` for as many as are predicted to be fastest.
     pub tiles: Option<u32>,
-    /// Steps in which the light of a static scene grows; 1 for all of it at once.
+    /// Steps in which the light of a static scene is refined; 1 for all of it at once.
     pub refinement_steps: u32,
-    /// Pictures a second; `None`: as fast as they come.
+    /// Pictures a second; `None` for as many as possible.
     pub frames_per_s: Option<f64>,
-    /// What the session makes do with under overload.
+    /// Fallbacks under overload.
     pub fallbacks: Vec<Quality>,
     /// Scene times; every set has the same views.
     pub timeline: Timeline,
-    /// From where it looks: sample cameras stand around them, in place of those that the scene came with. None: those.
+    /// Viewpoints that sample cameras are placed around; empty for the cameras of the scene.
     pub viewpoints: Vec<PinholeCamera>,
 }
 
-impl Wishes {
-    /// Finished pictures of a still scene, without other planes, by whatever is predicted to be fastest.
+impl SessionSettings {
+    /// Finished pictures of a still scene, without other planes, by the policy that is predicted to be fastest.
     #[must_use]
     pub fn new(method: String, sampling: String, lighting: String) -> Self {
         Self {
@@ -62,7 +62,7 @@ impl Wishes {
         }
     }
 
-    /// The same, as the coordinator offers its scene.
+    /// The same, with the settings that the coordinator offers.
     #[must_use]
     pub fn offered(offer: &OfferStatus) -> Self {
         let or = |offered: &Option<String>, default: String| offered.clone().unwrap_or(default);
@@ -74,65 +74,65 @@ impl Wishes {
         )
     }
 
-    /// So many pictures a second, or fewer under overload, after all else that can be given up.
+    /// The same at a rate, with fallbacks under overload.
     #[must_use]
     pub fn at_rate(self, frames_per_s: f64) -> Self {
         Self { frames_per_s: Some(frames_per_s), fallbacks: fallbacks::ladder(&self.lighting, &self.method), ..self }
     }
 }
 
-/// Views that came.
+/// Delivered views.
 #[derive(Debug)]
 pub struct Delivered {
-    /// What the coordinator decided, and the costs that it measured.
+    /// The coordinator's plan, and the costs that it measured.
     pub plan: SessionPlan,
-    /// From the request to the last frame, decoded and checksummed.
+    /// Seconds from the request to the last frame, decoded and checksummed.
     pub seconds: f64,
-    /// In the order of their numbers: set by set, in each the views in their order.
+    /// Frames by number: set by set, and view by view in each.
     pub frames: Vec<Frame>,
 }
 
 /// Opens a session for `views` a set.
 ///
 /// # Errors
-/// The coordinator's, or no views.
-pub async fn open(client: &Client, wishes: &Wishes, views: &[PinholeCamera]) -> anyhow::Result<Session> {
+/// The coordinator refuses, or there are no views.
+pub async fn open(client: &Client, settings: &SessionSettings, views: &[PinholeCamera]) -> anyhow::Result<Session> {
     let typical_view = *views.first().ok_or_else(|| BadInput("no views are asked for".to_owned()))?;
     let request = SessionRequest {
         scene: None,
-        method: wishes.method.clone(),
-        sampling: wishes.sampling.clone(),
-        lighting: wishes.lighting.clone(),
-        codec: wishes.codec.clone(),
+        method: settings.method.clone(),
+        sampling: settings.sampling.clone(),
+        lighting: settings.lighting.clone(),
+        codec: settings.codec.clone(),
         sample_cameras: Vec::new(),
         sample_size_px: None,
         volume: None,
         typical_view,
         views_per_set: u32::try_from(views.len())?,
-        planes: wishes.planes,
-        timeline: wishes.timeline,
-        policy: wishes.policy,
+        planes: settings.planes,
+        timeline: settings.timeline,
+        policy: settings.policy,
         forced_sampler_count: None,
-        refinement_steps: wishes.refinement_steps,
-        frames_per_s: wishes.frames_per_s,
-        fallbacks: wishes.fallbacks.clone(),
-        forced_tile_count: wishes.tiles,
-        viewpoints: wishes.viewpoints.clone(),
+        refinement_steps: settings.refinement_steps,
+        frames_per_s: settings.frames_per_s,
+        fallbacks: settings.fallbacks.clone(),
+        forced_tile_count: settings.tiles,
+        viewpoints: settings.viewpoints.clone(),
     };
     let told = |event: &_| tracing::info!(?event, "session");
     Ok(client.open_session(request, told).await?)
 }
 
-/// As many of the views as a session may name, evenly.
+/// The views evenly thinned to as many as a session may name.
 #[must_use]
 pub fn viewpoints(views: &[PinholeCamera]) -> Vec<PinholeCamera> {
     views.iter().step_by(views.len().div_ceil(MAX_VIEWPOINTS).max(1)).copied().collect()
 }
 
-/// Asks for all views of all sets and waits for them; `arrived` hears of each.
+/// Asks for all views of all sets and waits for them; `arrived` is called for each.
 ///
 /// # Errors
-/// The cluster's, or frames that are missing.
+/// The cluster fails, or frames are missing.
 pub async fn receive(
     session: &Session,
     views: &[PinholeCamera],

@@ -1,24 +1,33 @@
-//! What the program's exit status says.
+//! The exit status of the program.
 
 use std::process::ExitCode;
 
-use crate::cameras::CameraFileError;
+use crate::camera_file::CameraFileError;
 
-/// How a command ended.
+/// The end of a command that did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// Everything was done.
     Done,
-    /// Done, but a check that was asked for fell short: by `--strict`, `--least-psnr` or `--longest-gap`.
+    /// All was done, but a check fell short: by `--strict`, `--least-psnr` or `--longest-gap`.
     FellShort,
 }
 
-/// Something that the user gave cannot be used.
+impl Outcome {
+    /// The outcome of a check.
+    #[must_use]
+    pub fn of(holds: bool) -> Self {
+        if holds { Self::Done } else { Self::FellShort }
+    }
+}
+
+/// Input that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct BadInput(pub String);
 
-/// 0 done, 1 a check that was asked for fell short, 2 input that cannot be used, 3 a failure at run time.
+/// The exit status: 0 done, 1 a check fell short, 2 input that cannot be used, 3 a failure at run time.
+/// time.
 #[must_use]
 pub fn code_of(result: &anyhow::Result<Outcome>) -> u8 {
     match result {
@@ -41,7 +50,7 @@ fn is_bad_input(error: &(dyn std::error::Error + 'static)) -> bool {
         || error.is::<CameraFileError>()
 }
 
-/// Says what went wrong, on standard error, and gives the exit status.
+/// Prints the error on standard error, and returns the exit status.
 #[must_use]
 pub fn report(result: &anyhow::Result<Outcome>) -> ExitCode {
     if let Err(error) = result {

@@ -1,20 +1,20 @@
-//! What a live session makes do with when nodes have no time left, in the stated order: fewer rays of light, fewer
-//! steps of the search, smaller sample images, fewer pictures a second. Each goes on from the one before.
+//! Fallbacks of a live session under overload, in order: fewer rays of light, a coarser method, smaller sample images,
+//! fewer pictures a second. Each fallback includes those before it.
 
 use cluster::Quality;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 
-/// Sides of sample images, of those asked for.
+/// Sides of sample images, over those asked for.
 const SAMPLE_SIDE_RATIO: f64 = 0.7;
-/// Pictures a second, of those asked for.
+/// Pictures a second, over those asked for.
 const FRAME_RATE_RATIO: f64 = 0.8;
 
-/// All there are, for names as on the command line; what has fewer rays or steps to give is passed over.
+/// All fallbacks of a lighting and a method, named as on the command line. Steps that they do not have are skipped.
 #[must_use]
 pub fn ladder(lighting: &str, method: &str) -> Vec<Quality> {
     let fewer_rays = lighting.parse().ok().and_then(|lighting: Lighting| lighting.with_fewer_rays());
-    let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.with_fewer_steps());
+    let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.coarser());
     let all = Quality {
         lighting: lighting.to_owned(),
         method: method.to_owned(),
@@ -35,7 +35,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn light_goes_first_and_pictures_a_second_last() {
+    fn light_is_reduced_first_and_the_frame_rate_last() {
         let ladder = ladder("soft 16, occlusion 8", "light_field_search:100");
         let steps: Vec<_> = ladder
             .iter()
@@ -54,7 +54,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_nothing_to_give_is_passed_over() {
+    fn steps_without_a_coarser_setting_are_skipped() {
         assert_eq!(ladder("phong", "mesh").len(), 2);
         assert_eq!(ladder("phong", "joint_carve").len(), 3);
         assert_eq!(ladder("of the future", "of the future").len(), 2);

@@ -1,11 +1,11 @@
 //! Common parts of the program's commands and the lab's.
 //!
-//! [`setup`] makes a scene on offer out of arguments; [`cluster`] runs coordinator and nodes in one process;
-//! [`delivery`] opens sessions and receives views, [`live`] follows a path with a moving camera; [`cameras`] reads and
-//! writes camera files; [`exit`] says what an exit status means.
+//! [`setup`] makes a scene on offer out of arguments. [`cluster`] runs coordinator and nodes in one process.
+//! [`delivery`] opens sessions and receives views, and [`live`] follows a path with a moving camera. [`camera_file`]
+//! reads and writes camera files. [`exit`] defines the exit status.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-pub mod cameras;
+pub mod camera_file;
 pub mod cluster;
 pub mod delivery;
 pub mod exit;

@@ -1,4 +1,4 @@
-//! What every command needs of the process: a runtime, a signal, its memory.
+//! Basics of every command: a runtime, a signal, ports.
 
 use std::net::SocketAddr;
 
@@ -14,15 +14,15 @@ use crate::exit::BadInput;
 /// A runtime for services and clients.
 ///
 /// # Errors
-/// When the system refuses threads.
+/// The system refuses threads.
 pub fn runtime() -> anyhow::Result<Runtime> {
     tokio::runtime::Builder::new_multi_thread().enable_all().build().context("no runtime")
 }
 
-/// Resolves at ctrl-c or SIGTERM.
+/// Waits for ctrl-c or SIGTERM.
 ///
 /// # Errors
-/// When signals cannot be listened to.
+/// Signals cannot be received.
 pub async fn stop_signal() -> anyhow::Result<()> {
     let mut terminate = signal(SignalKind::terminate())?;
     tokio::select! {
@@ -32,10 +32,10 @@ pub async fn stop_signal() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A port to serve on.
+/// Opens a port to serve on.
 ///
 /// # Errors
-/// When it is taken or not ours; addresses that are not loopback need `insecure_bind`.
+/// The port is taken or reserved, or the address is not loopback and `insecure_bind` is not given.
 pub async fn listen(address: SocketAddr, insecure_bind: bool) -> anyhow::Result<TcpListener> {
     if !address.ip().is_loopback() && !insecure_bind {
         let reason = format!("{address} is not loopback: give --insecure-bind to serve there without TLS");
@@ -44,7 +44,7 @@ pub async fn listen(address: SocketAddr, insecure_bind: bool) -> anyhow::Result<
     TcpListener::bind(address).await.with_context(|| format!("cannot listen on {address}"))
 }
 
-/// Serves a process's metrics until `shutdown`, where an address is given.
+/// Serves the process's metrics until `shutdown`, where an address is given.
 ///
 /// # Errors
 /// As [`listen`].

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use depth_image::{Provenance, ProvenanceKind, View};
 use image::RgbImage;
 
-/// One colour a sample camera; more cameras begin again.
+/// Colours of sample cameras; more cameras repeat them.
 const CAMERAS: [[u8; 3]; 8] = [
     [86, 180, 233],
     [230, 159, 0],

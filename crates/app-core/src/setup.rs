@@ -1,4 +1,4 @@
-//! From arguments to a scene on offer: the scene, its sample cameras, and how it is shown.
+//! Arguments that several commands share, and the scene on offer that they make.
 
 use std::path::PathBuf;
 
@@ -14,19 +14,19 @@ use render::Lighting;
 use sampling::{Rig, SamplingMethod};
 use scene::{EnvironmentSpec, LightSpec, Limits, Scene, SceneSpec};
 
-use crate::cameras::{self, Placement};
+use crate::camera_file::{self, Placement};
 use crate::sizes::SizePx;
 
-/// S = 4 images of 400×300, as in the paper.
+/// The size of the sample images, as in the paper.
 const SAMPLE_SIZE_PX: UVec2 = UVec2::new(400, 300);
-/// Height of the paper's sample cameras over the block, in halves of its width.
+/// The height of the paper's sample cameras over the block, in halves of its width.
 const TWO_PLANE_HEIGHT: f32 = 3.0;
 /// Half the angle between neighbouring cameras in front of a model.
 const MODEL_SPREAD_RAD: f32 = 0.12;
-/// What is closer to a camera out of a file is not seen, as a share of the scene's diagonal.
+/// The distance to the near plane of a camera from a file, as a share of the scene's diagonal.
 pub const NEAR_OF_DIAGONAL: f32 = 1e-3;
 
-/// Which device.
+/// The device.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct DeviceArgs {
     /// any (a GPU if there is one) or software
@@ -34,41 +34,40 @@ pub struct DeviceArgs {
     pub device: DevicePreference,
 }
 
-/// Which scene, sampled and shown how.
+/// The scene, its sampling and its lighting.
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
-    /// A scene by name (tree-terrain-30k, -125k, -500k, -2m, each also with -wind; bird-nest, urban, tree, grass or
-    /// grass:DENSITY, blocks, courtyard, uv-sphere…) or a file (.gltf, .glb, .obj, .ply)
+    /// A scene by name or a file (.gltf, .glb, .obj, .ply). Names: tree-terrain-30k, -125k, -500k, -2m (each also with
+    /// -wind), bird-nest, urban, tree, grass, grass:DENSITY, blocks, courtyard, uv-sphere, and more
     #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
     pub scene: SceneSpec,
-    /// How surfaces are lit, in terms with commas between them: unlit, phong, shadows or soft N (rays a light);
-    /// occlusion N or occlusion N RADIUSm (rays of ambient occlusion); adaptive or adaptive TOLERANCE (rays only where
-    /// light changes)
+    /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, or soft N (N rays
+    /// a light). Ambient occlusion: occlusion N [RADIUSm]. Rate: adaptive [TOLERANCE] traces rays only where light
+    /// changes
     #[arg(long, default_value_t, value_name = "TERMS")]
     pub lighting: Lighting,
-    /// A lamp in place of the scene's, as often as wanted, in the scene file's own coordinates: "sun towards=X,Y,Z
-    /// [irradiance=V] [angle=DEG]", "point at=X,Y,Z [intensity=V] [radius=M]", "spot at=… towards=… [intensity=V]
-    /// [inner=DEG] [outer=DEG] [radius=M]" or "rectangle at=… u=X,Y,Z v=X,Y,Z [radiance=V]"; V is a grey, R,G,B or
-    /// #rrggbb
+    /// A lamp in place of the scene's lamps, in the scene file's coordinates; may be repeated. Forms: "sun
+    /// towards=X,Y,Z [irradiance=V] [angle=DEG]", "point at=X,Y,Z [intensity=V] [radius=M]", "spot at=X,Y,Z
+    /// towards=X,Y,Z [intensity=V] [inner=DEG] [outer=DEG] [radius=M]", "rectangle at=X,Y,Z u=X,Y,Z v=X,Y,Z
+    /// [radiance=V]". V is a grey, R,G,B or #rrggbb
     #[arg(long = "light", value_name = "LAMP")]
     pub lights: Vec<LightSpec>,
-    /// Light from all around in place of the scene's: V, or ZENITH/NADIR
+    /// Light from all directions in place of the scene's: V, or ZENITH/NADIR
     #[arg(long, value_name = "V[/V]")]
     pub environment: Option<EnvironmentSpec>,
-    /// How views are reconstructed: joint_carve, joint_carve:LEVEL, light_field_search, light_field_search:STEPS,
-    /// mesh, hybrid_mesh or hybrid_mesh:PX (quads merged where that moves nothing by more than PX pixels)
-    #[arg(long, visible_alias = "reconstruction", default_value_t, value_name = "NAME")]
+    /// The reconstruction method
+    #[arg(long, visible_alias = "reconstruction", default_value_t, value_name = "NAME",
+        help = format!("How views are reconstructed. {}", ReconstructionMethod::help()))]
     pub method: ReconstructionMethod,
-    /// Which samples are taken: conventional (all that is seen); non_redundant:pixel, :visibility or :tolerance
-    /// (what no image before holds; non_redundant is :pixel); useful, alike (less what no view between the cameras can
-    /// see); or depth_peeling:LAYERS (layer behind layer, from the middle)
-    #[arg(long, default_value_t, value_name = "NAME")]
+    /// The sampling method
+    #[arg(long, default_value_t, value_name = "NAME",
+        help = format!("Which samples are taken. {}", SamplingMethod::help()))]
     pub sampling: SamplingMethod,
     /// Size of the sample images [default: 400x300, or as in --samples]
     #[arg(long, value_name = "WxH")]
     pub sample_size: Option<SizePx>,
-    /// Sample cameras from a transforms.json, in the scene file's own coordinates [default: four, placed from
-    /// the scene's bounds]
+    /// Sample cameras from a transforms.json, in the scene file's coordinates [default: four, placed from the scene's
+    /// bounds]
     #[arg(long, value_name = "FILE")]
     pub samples: Option<PathBuf>,
 }
@@ -79,14 +78,14 @@ pub struct Setup {
     pub scene: Scene,
     /// The cameras that views stand between.
     pub around: Vec<PinholeCamera>,
-    /// Where it is sampled from: there too, unless the sampling method has another place.
+    /// The cameras of the samples: the same, unless the sampling method places them elsewhere.
     pub samples: Vec<PinholeCamera>,
-    /// What a coordinator is given.
+    /// The offer for a coordinator.
     pub offer: SceneOffer,
 }
 
 impl SceneArgs {
-    /// A scene by its name or file, everything else by default.
+    /// A scene with all other arguments by default.
     #[must_use]
     pub fn of(scene: SceneSpec) -> Self {
         Self {
@@ -104,15 +103,15 @@ impl SceneArgs {
     /// Loads the scene and places its sample cameras.
     ///
     /// # Errors
-    /// For a scene or a camera file that cannot be used.
+    /// A scene or a camera file cannot be used.
     pub fn load(&self) -> anyhow::Result<Setup> {
         self.load_changed(|_| ())
     }
 
-    /// As [`SceneArgs::load`], with the scene changed before anything is made of it.
+    /// Loads the scene as [`SceneArgs::load`] does, after a change to it.
     ///
     /// # Errors
-    /// As [`SceneArgs::load`].
+    /// A scene or a camera file cannot be used.
     pub fn load_changed(&self, change: impl FnOnce(&mut Scene)) -> anyhow::Result<Setup> {
         let mut scene = self.load_scene()?;
         change(&mut scene);
@@ -148,7 +147,7 @@ impl SceneArgs {
             return self.rig_cameras(scene, size_px.unwrap_or(SAMPLE_SIZE_PX));
         };
         let near_m = (scene.bounds().size().length() * NEAR_OF_DIAGONAL).max(1e-6);
-        let cameras = cameras::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?;
+        let cameras = camera_file::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?;
         Ok(cameras.into_iter().map(|camera| size_px.map_or(camera, |size_px| resized(camera, size_px))).collect())
     }
 
@@ -162,8 +161,9 @@ impl SceneArgs {
     }
 }
 
-/// The same field of view in another size.
-fn resized(camera: PinholeCamera, size_px: UVec2) -> PinholeCamera {
+/// The camera with the same field of view and another size.
+#[must_use]
+pub fn resized(camera: PinholeCamera, size_px: UVec2) -> PinholeCamera {
     let scale = size_px.as_vec2() / camera.size_px.as_vec2();
     PinholeCamera { size_px, focal_px: camera.focal_px * scale, principal_px: camera.principal_px * scale, ..camera }
 }

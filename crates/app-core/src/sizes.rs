@@ -13,16 +13,16 @@ pub struct SizePx(pub UVec2);
 /// Columns and rows of a grid of views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GridSize {
-    /// Side by side.
+    /// Views side by side.
     pub columns: u32,
-    /// Above each other.
+    /// Views above each other.
     pub rows: u32,
 }
 
-/// Most columns or rows of a grid.
+/// The most columns or rows of a grid.
 const MAX_GRID_SIDE: u32 = 1000;
 
-/// Not two numbers, or too large ones.
+/// A text that is no pair of numbers, or has too large ones.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{text:?} is no size: expected two whole numbers from 1 to {most} with an x between, as in 400x300")]
 pub struct SizeError {

@@ -41,7 +41,7 @@ pub struct Assignment {
     pub plan_epoch: u64,
     /// How views come about.
     pub policy: Policy,
-    /// What is sampled.
+    /// The images to sample, when and how.
     pub workload: Workload,
     /// None in the direct policy.
     pub samplers: Vec<SamplerShare>,

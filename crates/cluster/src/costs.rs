@@ -1,11 +1,11 @@
-//! What operations cost.
+//! Costs of operations.
 
 use serde::{Deserialize, Serialize};
 
 use crate::check::finite_seconds;
 use crate::error::InvalidField;
 
-/// Quarters of a sample image's height, whose costs are told apart.
+/// Quarters of a sample image's height, each with a cost of its own.
 pub const ROW_PARTS: usize = 4;
 
 /// Seconds of one operation, each alone and warm.
@@ -21,8 +21,8 @@ pub struct Costs {
     pub load_set_s: f64,
     /// e: encoding of one view.
     pub encode_view_s: f64,
-    /// Whether an image of a set can only be sampled after those before it: then one node samples the whole set,
-    /// and several nodes sample sets in turn.
+    /// Whether an image of a set depends on those before it. One node then samples the whole set, and several nodes sample
+    /// sets in turn.
     pub in_order: bool,
     /// How g_s splits among tiles; `None`: images are not tileable.
     pub tiles: Option<TileCosts>,
@@ -31,9 +31,9 @@ pub struct Costs {
 /// How the cost of a sample image splits among its tiles.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct TileCosts {
-    /// Of g_s, the seconds that every tile costs anew: work that does not shrink with its rows.
+    /// The part of g_s that every tile costs anew, in seconds: work that does not shrink with its rows.
     pub overhead_s: f64,
-    /// Of the rest, the shares of the image's quarters, top to bottom: rows that show the sky cost less. They add up to 1.
+    /// The shares of the image's quarters in the rest, top to bottom: rows that show the sky cost less. They add up to 1.
     /// `None`: not measured, and assumed to be equal.
     pub row_shares: Option<[f64; ROW_PARTS]>,
 }
@@ -45,7 +45,7 @@ impl TileCosts {
         (overhead_s < sample_image_s).then_some(Self { overhead_s, row_shares })
     }
 
-    /// Of the work on rows, the share above a height; 0 is the top of the image, 1 its bottom.
+    /// The share of the work on rows above a height; 0 is the top of the image, 1 its bottom.
     fn share_above(&self, height: f64) -> f64 {
         let Some(shares) = self.row_shares else { return height };
         let all: f64 = shares.iter().sum();

@@ -14,7 +14,7 @@ pub struct FetchImages {
     /// Index into the workload's view cells.
     pub cell: u32,
     /// Indices into [`Assignment::sampled_cameras`](crate::Assignment::sampled_cameras) of the cell: images that the
-    /// sampler samples, or that a relay passes on.
+    /// sampler samples, or that a relay relays.
     pub image_indices: Vec<u32>,
 }
 

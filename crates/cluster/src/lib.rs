@@ -1,7 +1,8 @@
-//! The cluster's model: what sessions ask for, what members say of themselves, and the plans that tell members what to do.
+//! The cluster's model: requests of sessions, reports of members, and the plans that give members their roles.
 //!
-//! Types of the domain, without protobuf: `wire` converts messages to them. A value that a type does not allow is an
-//! [`InvalidField`], which names the field; types with a `validate` can be read from anywhere and checked afterwards.
+//! These are the types of the domain, without protobuf: `wire` converts messages to them. A value that a type does not
+//! allow is an [`InvalidField`], which names the field. Types with a `validate` can be read from any source and checked
+//! afterwards.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod assignment;

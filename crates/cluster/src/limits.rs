@@ -1,4 +1,4 @@
-//! What any peer may ask for. Checked before anything is allocated.
+//! Limits on the requests of any peer, checked before anything is allocated.
 
 /// Sample cameras of one view cell; provenance has room for 24.
 pub const MAX_SAMPLE_CAMERAS: usize = 16;

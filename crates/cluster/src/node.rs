@@ -1,4 +1,4 @@
-//! Members: joining, being measured and being told what to do.
+//! Members: joining, measuring and being ready for plans.
 
 use depth_image::{PinholeCamera, ViewPlanes};
 use serde::{Deserialize, Serialize};

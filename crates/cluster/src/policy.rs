@@ -30,7 +30,7 @@ impl fmt::Display for Policy {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PolicyChoice {
-    /// Whatever is predicted to be faster.
+    /// The policy that is predicted to be fastest.
     #[default]
     Auto,
     /// See [`Policy::Pipeline`].

@@ -1,4 +1,4 @@
-//! What nodes say of their own work, and of each other.
+//! Reports of nodes on their own work, and on each other.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! Sessions: what a client asks for and what it is told.
+//! Sessions: requests of clients, and the answers.
 
 use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
 use glam::UVec2;
@@ -99,7 +99,7 @@ pub enum SessionStage {
 /// The plan, and why it is so.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionPlan {
-    /// The plan that every node was told.
+    /// The plan that every node gets.
     pub assignment: Assignment,
     /// The slowest node's costs, as measured.
     pub costs: Costs,

@@ -6,12 +6,12 @@ use serde::Serialize;
 
 use crate::workload::Workload;
 
-/// Names what a sample set shows, of one view cell: equal for equal scene, time, cameras, sampling, lighting, step of
-/// refinement, lights and volume, whatever the plan. Sets of equal content are not sampled again.
+/// The name of a sample set's content, of one view cell. It is equal for equal scene, time, cameras, sampling, lighting,
+/// step of refinement, lights and volume, under any plan. Sets of equal content are not sampled again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SetContent([u8; 32]);
 
-/// All that decides what a set shows.
+/// Everything that the content of a set depends on.
 #[derive(Serialize)]
 struct Shown<'a> {
     scene: &'a str,
@@ -46,7 +46,7 @@ impl SetContent {
             illumination: &workload.illumination,
             sample_cameras: &workload.sample_cameras,
         };
-        // Postcard prefixes lengths, so that no two sets have the same bytes. A hasher takes whatever is written to it.
+        // Postcard prefixes lengths, so that no two sets have the same bytes. Writing to a hasher does not fail.
         let hash = postcard::to_io(&shown, blake3::Hasher::new()).ok()?;
         Some(Self(hash.finalize().into()))
     }

@@ -35,7 +35,7 @@ pub struct RequestedView {
     pub camera: PinholeCamera,
 }
 
-/// What a live stream's request says beside its view.
+/// The part of a live stream's request beside its view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LiveRequest {
     /// All frames up to this number have been received.

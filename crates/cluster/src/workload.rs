@@ -1,4 +1,4 @@
-//! What a session samples.
+//! The workload of a session.
 
 use std::ops::Range;
 
@@ -12,8 +12,8 @@ use crate::limits::{MAX_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS};
 use crate::scene::SceneRef;
 use crate::timeline::{Refinement, Timeline};
 
-/// What is sampled, when and how. Methods are text, as on the command line: nodes parse them, so that a new method changes
-/// nothing here.
+/// The images to sample, when and how. Methods are text, as on the command line: nodes parse them, so that a new method
+/// changes nothing here.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Workload {
     /// The scene.

@@ -1,8 +1,8 @@
-//! What the codecs cost and save, on one core.
+//! Times of the codecs, and the bytes that they save, on one core.
 //!
 //! `cargo run --release -p codec --example depth_codec_bench [-- PLANE.f32 WIDTH HEIGHT]...`
 //!
-//! Without arguments it takes a made-up tree over terrain; a file holds inverse depths per metre as
+//! Without arguments it takes a made-up tree over terrain. A file holds inverse depths per metre as
 //! little-endian `f32`, rows top-down, 0 for background, negative for holes. Speeds are of the 16-bit
 //! plane's bytes (colour and what highlights need: 32-bit; frames: 24-bit), quantising and LZ4 included, medians.
 
@@ -112,7 +112,7 @@ fn reflectance(plane: &[f32], random: &mut test_planes::Random) -> Vec<u32> {
     plane.iter().map(&mut word).collect()
 }
 
-/// Shares of four lights by so many rays; one ray from the light's middle casts a hard shadow.
+/// Shares of four lights by a number of rays; one ray from the light's middle casts a hard shadow.
 fn visibility(plane: &[f32], width: usize, rays: u32, random: &mut test_planes::Random) -> Vec<u32> {
     let mut share = |at: usize, light: usize| {
         let (x, y) = ((at % width) as f32 / width as f32, (at / width) as f32 / width as f32);

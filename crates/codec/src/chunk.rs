@@ -7,10 +7,10 @@ use crate::{EncodedDepthImage, ImageHeader, SampleSetId};
 /// Data of one chunk; the last of an image may have less.
 pub const MAX_CHUNK_BYTES: usize = 512 << 10;
 
-/// What a chunk carries.
+/// The body of a chunk.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ChunkBody {
-    /// Of sequence 0.
+    /// The body of sequence 0.
     Header(ImageHeader),
     /// A piece of the payload, at most [`MAX_CHUNK_BYTES`].
     Data(Bytes),
@@ -21,13 +21,13 @@ pub enum ChunkBody {
 pub struct Chunk {
     /// The set that the image belongs to.
     pub sample_set_id: SampleSetId,
-    /// Which image of the set.
+    /// Index of the image in the set.
     pub image_index: u32,
     /// 0 for the header, then one more for each piece.
     pub sequence: u32,
-    /// Of this image, the header's included.
+    /// Chunks of this image, the header's included.
     pub chunk_count: u32,
-    /// Of the body.
+    /// CRC-32 of the body.
     pub crc32: u32,
     /// Header or data.
     pub body: ChunkBody,

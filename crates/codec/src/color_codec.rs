@@ -1,11 +1,11 @@
-//! RGB9E5 colours, without loss: which differ from that of the sample before, and by how much.
+//! RGB9E5 colours, without loss: a bit for each that differs from the sample before, and the differences.
 //!
-//! One bit a sample says whether the colour changes: unlit surfaces seldom do, and LZ4 shortens the bits where they are
-//! all alike. Of the colours that are left, each mantissa and the exponent follow as differences. Green goes first and
-//! red and blue as how much more they change: hues vary less than brightness. The differences are of mantissas as they
-//! stand: where the exponent changes they jump, which is rare.
+//! One bit a sample marks a change of colour: unlit surfaces seldom change, and LZ4 shortens bits that are all alike. The
+//! mantissas and the exponent of colours that change follow as differences. Green comes first; red and blue are stored as
+//! how much more they change, since hues vary less than brightness. The differences are of mantissas as they stand: they
+//! jump where the exponent changes, which is rare.
 //!
-//! `docs/methods/depth_codec.md` has what the bits save.
+//! `docs/methods/depth_codec.md` shows how much the bits save.
 
 use crate::{
     DecodeError,
@@ -32,7 +32,7 @@ pub(crate) fn pack_colors(colors_rgb9e5: &[u32], out: &mut Vec<u8>) {
 }
 
 /// Appends a bit for each colour, the first in the lowest: whether it differs from the one before, 0 before the first.
-/// Puts those that do first in `changed`, and says how many; of these, too, each differs from the one before.
+/// Puts the colours that differ first in `changed` and gives their count; each of these differs from the one before, too.
 fn pack_changes(colors_rgb9e5: &[u32], changed: &mut [u32], out: &mut Vec<u8>) -> usize {
     let (mut count, mut last) = (0, 0);
     out.extend(colors_rgb9e5.chunks(8).map(|eight| {
@@ -65,7 +65,7 @@ fn pack_differences(colors_rgb9e5: &[u32], packer: &mut Packer, out: &mut Vec<u8
 pub(crate) fn unpack_colors(input: &mut &[u8], count: usize) -> Result<Vec<u32>, DecodeError> {
     let mut colors = Vec::with_capacity(count);
     let mut channels = [(); 4].map(|()| vec![0; count.min(BLOCK)]);
-    // Behind the 0 before the first.
+    // The first entry is the 0 before the first colour.
     let mut changed = vec![0; count.min(BLOCK) + 1];
     while colors.len() < count {
         let block = (count - colors.len()).min(BLOCK);
@@ -105,7 +105,7 @@ fn unpack_differences(
     Ok(())
 }
 
-/// Appends `count` colours; `changed` has what is before the first, then one for each bit in `changes`.
+/// Appends `count` colours; `changed` has the colour before the first, then one for each bit in `changes`.
 fn extend_by_repeats(colors_rgb9e5: &mut Vec<u32>, changed: &[u32], changes: &[u8], count: usize) {
     let start = colors_rgb9e5.len();
     colors_rgb9e5.resize(start + count, 0);
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn colors_that_stay_take_a_bit_each() {
+    fn constant_colors_take_a_bit_each() {
         let mut bytes = Vec::new();
         pack_colors(&[0; 1001], &mut bytes);
         assert_eq!(bytes[..126], [0; 126]);

@@ -1,4 +1,4 @@
-//! One plane of inverse depths by itself: what the codec's bench measures, and images without colour.
+//! One plane of inverse depths by itself, for the bench of the codec.
 
 use crate::{
     DecodeError, DecodeLimits, InverseDepthRange,
@@ -11,9 +11,9 @@ use crate::{
 /// A packed plane of inverse depths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EncodedDepthPlane {
-    /// What the codes span.
+    /// The range that the codes span.
     pub range: InverseDepthRange,
-    /// Before LZ4.
+    /// Bytes before LZ4.
     pub raw_bytes: u32,
     /// An LZ4 block.
     pub packed: Vec<u8>,

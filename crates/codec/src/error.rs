@@ -1,67 +1,36 @@
-//! What decoders refuse, and how much they take on.
+//! Errors of decoders, and the limits that they keep.
 
 use depth_image::MAX_IMAGE_SIDE_PX;
 
 /// Why bytes do not make an image or a plane.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum DecodeError {
     /// A field of the header cannot be right.
     #[error("image header {field}: {reason}")]
-    Header {
-        /// Which.
-        field: &'static str,
-        /// What is wrong with it.
-        reason: &'static str,
-    },
-    /// More than the receiver allows.
+    Header { field: &'static str, reason: &'static str },
+    /// A size that the receiver does not allow.
     #[error("{field} is {value}, the limit is {limit}")]
-    Limit {
-        /// Of what.
-        field: &'static str,
-        /// What was asked for.
-        value: u64,
-        /// What is allowed.
-        limit: u64,
-    },
+    Limit { field: &'static str, value: u64, limit: u64 },
     /// The image is not of its camera's size.
     #[error("image of {width}×{height} for a camera of {camera_width}×{camera_height}")]
-    CameraSize {
-        /// Columns in the header.
-        width: u32,
-        /// Rows in the header.
-        height: u32,
-        /// Columns of the camera.
-        camera_width: u32,
-        /// Rows of the camera.
-        camera_height: u32,
-    },
+    CameraSize { width: u32, height: u32, camera_width: u32, camera_height: u32 },
     /// Bytes that do not decode.
     #[error("payload {field}: {reason}")]
-    Corrupt {
-        /// Which part.
-        field: &'static str,
-        /// What is wrong with it.
-        reason: &'static str,
-    },
+    Corrupt { field: &'static str, reason: &'static str },
 }
 
 /// Why a frame is not encoded or decoded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum FrameError {
-    /// Not three bytes a pixel.
+    /// The slice has not three bytes a pixel.
     #[error("{rgb_bytes} bytes of RGB for a frame of {width}×{height}")]
-    Size {
-        /// Columns.
-        width: u32,
-        /// Rows.
-        height: u32,
-        /// Given.
-        rgb_bytes: usize,
-    },
+    Size { width: u32, height: u32, rgb_bytes: usize },
     /// JPEG qualities go from 1 to 100.
     #[error("JPEG quality {0}, must be 1 to 100")]
     Quality(u8),
-    /// What the JPEG library says.
+    /// The JPEG library refuses.
     #[error("JPEG: {0}")]
     Jpeg(String),
     /// The data is not what was sent.
@@ -72,7 +41,7 @@ pub enum FrameError {
     Decode(#[from] DecodeError),
 }
 
-/// How much a decoder takes on before it allocates.
+/// Limits that a decoder checks before it allocates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DecodeLimits {
     /// Longest side of an image.
@@ -81,13 +50,13 @@ pub struct DecodeLimits {
     pub max_texels: usize,
     /// Packed bytes of one image, all planes.
     pub max_payload_bytes: usize,
-    /// Bytes of one image before any packing, all planes: what packs best would take the most memory.
+    /// Bytes of one image before any packing, all planes: images that pack best would take the most memory.
     pub max_image_bytes: usize,
 }
 
 impl Default for DecodeLimits {
-    /// 16 million texels, 256 MiB packed: some fifty times what the largest planned sample image needs. 1 GiB
-    /// unpacked: all lights' visibility at 1920×1080 takes half of that.
+    /// 16 million texels, 256 MiB packed: some fifty times the needs of the largest planned sample image. 1 GiB unpacked:
+    /// the visibility of all lights at 1920×1080 takes half of that.
     fn default() -> Self {
         Self {
             max_side_px: MAX_IMAGE_SIDE_PX,

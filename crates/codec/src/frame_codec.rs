@@ -12,7 +12,7 @@ use crate::{
     rgb_filter::{filter, unfilter},
 };
 
-/// How frames are packed. `lz4`, `jpeg` or `jpeg:QUALITY` in settings.
+/// The packing of frames: `lz4`, `jpeg` or `jpeg:QUALITY` in settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum FrameCodec {
     /// Without loss: differences along the row, LZ4.
@@ -27,7 +27,7 @@ pub enum FrameCodec {
 
 const DEFAULT_JPEG_QUALITY: u8 = 90;
 
-/// A frame as it travels.
+/// An encoded frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EncodedFrame {
     /// How the data is packed.
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn lossless_is_lossless() {
+    fn lz4_frames_survive_to_the_bit() {
         for (width, height) in [(1, 1), (3, 2), (200, 150)] {
             let rgb = picture(width, height);
             let frame = encode_frame(FrameCodec::Lz4, width as u32, height as u32, &rgb).expect("right size");
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn jpeg_is_close() {
+    fn jpeg_frames_are_close() {
         let rgb: Vec<u8> = (0..64 * 48).flat_map(|i| [(i % 64) as u8 * 2, (i / 64) as u8 * 3, 90]).collect();
         let frame = encode_frame(FrameCodec::Jpeg { quality: 95 }, 64, 48, &rgb).expect("right size");
         let back = decode_frame(&frame, &limits()).expect("own encoding");
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn names_survive() {
+    fn names_of_codecs_survive() {
         for name in ["lz4", "jpeg:1", "jpeg:90", "jpeg:100"] {
             assert_eq!(name.parse::<FrameCodec>().expect(name).to_string(), name);
         }

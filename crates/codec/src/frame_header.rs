@@ -1,4 +1,4 @@
-//! What a frame says about itself.
+//! The headers of frames.
 
 use bytes::Bytes;
 use depth_image::PinholeCamera;
@@ -9,7 +9,7 @@ use crate::{FrameCodec, SampleSetId, StageTimes};
 /// Bytes of one encoded frame, all planes.
 pub const MAX_FRAME_BYTES: u64 = 512 << 20;
 
-/// What precedes a frame's data, in which the planes' bytes follow one another.
+/// The header of a frame, whose planes' bytes follow one another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameHeader {
     /// The set that the frame shows: one, never a mixture.

@@ -35,7 +35,7 @@ fn push_all(parts: Vec<FramePart>) -> Result<Option<WholeFrame>, FrameAssemblyEr
 }
 
 #[test]
-fn frames_of_any_length_come_back() {
+fn frames_of_any_length_survive() {
     for len in [0, 1, MAX_CHUNK_BYTES, MAX_CHUNK_BYTES + 1, 3 * MAX_CHUNK_BYTES] {
         let (data, parts) = parts(len);
         let frame = push_all(parts).unwrap().expect("whole");
@@ -44,7 +44,7 @@ fn frames_of_any_length_come_back() {
 }
 
 #[test]
-fn spoilt_streams_are_named() {
+fn streams_that_are_corrupt_or_out_of_order_are_refused() {
     let (_, good) = parts(3 * MAX_CHUNK_BYTES);
     let spoil = |change: &dyn Fn(&mut Vec<FramePart>)| {
         let mut parts = good.clone();

@@ -1,4 +1,4 @@
-//! What may travel with a frame, without loss: a view's inverse depth and where its pixels came from.
+//! Planes beside a frame's colour, without loss: inverse depth and provenance.
 
 use depth_image::HOLE_INVERSE_DEPTH;
 
@@ -8,7 +8,7 @@ use crate::{
     words_codec::{WordLayout, max_words_bytes, pack_words, unpack_words},
 };
 
-/// Packs a plane of 32-bit words: provenance of pixels, say.
+/// Packs a plane of 32-bit words, such as the provenance of pixels.
 #[must_use]
 pub fn pack_u32_plane(words: &[u32]) -> Vec<u8> {
     let mut packed = Vec::with_capacity(2 * words.len());
@@ -20,7 +20,7 @@ pub fn pack_u32_plane(words: &[u32]) -> Vec<u8> {
 /// [`DecodeLimits::texels`](crate::DecodeLimits::texels) has passed.
 ///
 /// # Errors
-/// Data that does not decode to exactly so many.
+/// Data that does not decode to exactly `texels`.
 pub fn unpack_u32_plane(data: &[u8], texels: usize) -> Result<Vec<u32>, DecodeError> {
     let packed = expand_lz4_up_to(data, max_words_bytes(texels, WordLayout::Whole), "plane")?;
     let mut input = &packed[..];
@@ -28,7 +28,7 @@ pub fn unpack_u32_plane(data: &[u8], texels: usize) -> Result<Vec<u32>, DecodeEr
     if input.is_empty() { Ok(words) } else { Err(DecodeError::Corrupt { field: "plane", reason: "bytes left over" }) }
 }
 
-/// Packs a plane of inverse depths to the bit; what is not finite becomes a hole.
+/// Packs a plane of inverse depths to the bit; numbers that are not finite become holes.
 #[must_use]
 pub fn pack_f32_plane(inverse_depth_per_m: &[f32]) -> Vec<u8> {
     let finite = |&value: &f32| {
@@ -41,7 +41,7 @@ pub fn pack_f32_plane(inverse_depth_per_m: &[f32]) -> Vec<u8> {
 /// The inverse of [`pack_f32_plane`], with `texels` as in [`unpack_u32_plane`].
 ///
 /// # Errors
-/// Data that does not decode to exactly so many, or to anything that is not finite.
+/// Data that does not decode to exactly `texels`, all finite.
 pub fn unpack_f32_plane(data: &[u8], texels: usize) -> Result<Vec<f32>, DecodeError> {
     let plane: Vec<f32> = unpack_u32_plane(data, texels)?.into_iter().map(f32::from_bits).collect();
     if plane.iter().all(|value| value.is_finite()) {
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_that_is_not_finite_comes_out() {
+    fn numbers_that_are_not_finite_are_not_decoded() {
         let packed = pack_f32_plane(&[0.5, f32::NAN, f32::INFINITY, -0.0]);
         assert_eq!(unpack_f32_plane(&packed, 4), Ok(vec![0.5, HOLE_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, 0.0]));
         assert!(unpack_f32_plane(&pack_u32_plane(&[f32::NAN.to_bits()]), 1).is_err());

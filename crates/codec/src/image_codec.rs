@@ -14,20 +14,20 @@ use crate::{
     words_codec::{WordLayout, pack_words, unpack_words},
 };
 
-/// A depth image as it travels, without its camera.
+/// An encoded depth image, without its camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EncodedDepthImage {
-    /// What the payload holds.
+    /// The description of the payload.
     pub header: ImageHeader,
     /// The planes, one after the other.
     pub payload: Bytes,
 }
 
-/// Packs an image. Inverse depth is quantised to 16 bits over the image's range; all else is kept to the
-/// bit at samples, and not at all elsewhere: texels without a sample decode to zeros in other planes.
+/// Packs an image. Inverse depth is quantised to 16 bits over the image's range. Other planes are kept to the bit at
+/// samples, and decode to zeros at texels without one.
 ///
 /// # Errors
-/// Planes that are not of the camera's size; what highlights need without normals.
+/// Planes that are not of the camera's size; planes of highlights without normals.
 pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<EncodedDepthImage, DepthImageError> {
     image.validate()?;
     let specular = image.specular.as_ref().filter(|_| planes.specular);
@@ -69,8 +69,8 @@ pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<Encode
 /// Unpacks an image. The camera must have passed its own validation.
 ///
 /// # Errors
-/// A header that is inconsistent, over the limits or not of the camera's size; a payload that does not
-/// decode to exactly what the header says.
+/// A header that is inconsistent, over the limits or not of the camera's size. A payload that does not decode to exactly
+/// the planes of the header.
 pub fn decode_depth_image(
     header: &ImageHeader,
     camera: Camera,

@@ -37,7 +37,7 @@ fn image(width: u32, height: u32) -> DepthImage {
     }
 }
 
-/// With so many planes of visibility.
+/// An image with a number of planes of visibility.
 fn shiny(width: u32, height: u32, visibilities: usize) -> DepthImage {
     let mut random = Random::new(20);
     let image = image(width, height);
@@ -70,7 +70,7 @@ fn an_image_survives() {
     }
 }
 
-/// As an image that leaves out what others hold has them.
+/// The bits of an image that skips samples of other images.
 fn apart(width: u32, height: u32) -> DepthImage {
     let image = image(width, height);
     let passed = Some(image.inverse_depth_per_m.iter().map(|d| !(0.0..=0.3).contains(d)).collect());
@@ -79,7 +79,7 @@ fn apart(width: u32, height: u32) -> DepthImage {
 }
 
 #[test]
-fn what_was_passed_and_corners_survive() {
+fn passed_bits_and_corners_survive() {
     for (width, height) in [(1, 1), (7, 3), (160, 120)] {
         let image = apart(width, height);
         let encoded = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
@@ -117,7 +117,7 @@ fn damaged_planes_of_images_apart_are_refused() {
         let mut payload = good.payload.to_vec();
         let place = random.next_u32() as usize % payload.len();
         payload[place] ^= 1 << (random.next_u32() % 8);
-        // Whatever comes out is of the right size, or an error.
+        // Every result is of the right size, or an error.
         if let Ok(image) = decode(&EncodedDepthImage { payload: payload.into(), ..good.clone() }) {
             image.validate().expect("planes of one size");
         }
@@ -125,14 +125,14 @@ fn damaged_planes_of_images_apart_are_refused() {
 }
 
 #[test]
-fn planes_travel_only_when_asked_for() {
+fn planes_are_encoded_only_on_request() {
     let encoded = encode_depth_image(&image(20, 20), PlaneSet::DEPTH_COLOR).expect("consistent planes");
     let back = decode(&encoded).expect("own encoding");
     assert_eq!((encoded.header.planes.len(), back.normal_oct16, back.surface_id), (2, None, None));
 }
 
 #[test]
-fn what_highlights_need_survives_and_brings_normals() {
+fn planes_of_highlights_survive_and_bring_normals() {
     let specular_only = PlaneSet { specular: true, ..PlaneSet::DEPTH_COLOR };
     for visibilities in [0, 1, 2, 64] {
         let image = shiny(20, 20, visibilities);
@@ -152,7 +152,7 @@ fn what_highlights_need_survives_and_brings_normals() {
 }
 
 #[test]
-fn nothing_but_samples_travels() {
+fn only_samples_are_encoded() {
     let mut image = shiny(20, 20, 1);
     let good = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
     let empty: Vec<_> = (0..400).filter(|&i| image.inverse_depth_per_m[i] <= 0.0).collect();
@@ -251,7 +251,7 @@ fn cut_and_random_payloads_are_refused() {
 }
 
 #[test]
-fn damaged_headers_are_named() {
+fn damaged_headers_are_refused_by_field() {
     let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
     type Damage = fn(&mut ImageHeader);
     let cases: [(&str, Damage); 13] = [
@@ -278,7 +278,7 @@ fn damaged_headers_are_named() {
 }
 
 #[test]
-fn planes_of_highlights_must_come_in_their_order() {
+fn planes_of_highlights_out_of_order_are_refused() {
     let good = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
     let kinds = |header: &ImageHeader| header.planes.iter().map(|plane| plane.kind).collect::<Vec<_>>();
     assert_eq!(
@@ -312,7 +312,7 @@ fn planes_of_highlights_must_come_in_their_order() {
 }
 
 #[test]
-fn what_packs_well_does_not_claim_all_memory() {
+fn planes_that_pack_well_claim_bounded_memory() {
     let mut bad = encode_depth_image(&shiny(48, 32, 64), PlaneSet::ALL).expect("consistent planes");
     (bad.header.width, bad.header.height) = (4096, 4096);
     let result = decode_depth_image(&bad.header, camera(4096, 4096), &bad.payload, &DecodeLimits::default());
@@ -320,14 +320,14 @@ fn what_packs_well_does_not_claim_all_memory() {
 }
 
 #[test]
-fn the_camera_must_have_the_images_size() {
+fn a_camera_of_another_size_than_the_image_is_refused() {
     let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
     let result = decode_depth_image(&good.header, camera(32, 48), &good.payload, &DecodeLimits::default());
     assert!(matches!(result, Err(DecodeError::CameraSize { .. })));
 }
 
 #[test]
-fn a_small_payload_does_not_claim_a_large_buffer() {
+fn a_small_payload_claims_no_large_buffer() {
     let mut bad = encode_depth_image(&image(200, 200), PlaneSet::DEPTH_COLOR).expect("consistent planes");
     bad.header.planes[0].packed_bytes = 2;
     bad.header.planes[1].packed_bytes = 2;

@@ -1,4 +1,4 @@
-//! What an encoded depth image says about itself, and the checks it must pass.
+//! The header of an encoded depth image, and its checks.
 
 use std::hash::Hasher;
 
@@ -15,7 +15,7 @@ use crate::{
 /// Planes of visibility of one sample image: one byte for the environment and each light.
 pub const MAX_VISIBILITY_PLANES: usize = SpecularPlanes::visibility_planes(MAX_LIGHTS);
 
-/// What a plane holds.
+/// The content of a plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PlaneKind {
     /// 16-bit codes of inverse depth, with background and holes. Always the first plane.
@@ -28,9 +28,9 @@ pub enum PlaneKind {
     SurfaceId,
     /// Reflectance and roughness, 8 bits each. Needs normals.
     ReflectanceRoughness8,
-    /// What share of four lights arrives. Needs reflectance; the one kind of which an image may have several.
+    /// The shares of four lights that arrive. Needs reflectance; an image may have several planes of this kind alone.
     Visibility8,
-    /// Which rays passed surfaces that other images hold.
+    /// One bit for each ray: whether it passed surfaces that other images hold.
     Passed1,
     /// Inverse depth at texels' corners, with a range of its own.
     CornerInverseDepth,
@@ -89,7 +89,7 @@ impl PlaneKind {
         }
     }
 
-    /// Most bytes that a plane of `texels` with so many `corners` has before LZ4.
+    /// Most bytes that a plane of `texels` with `corners` has before LZ4.
     const fn max_raw_bytes(self, texels: usize, corners: usize) -> usize {
         match self {
             Self::InverseDepth => max_unpacked_bytes(texels),
@@ -106,54 +106,54 @@ impl PlaneKind {
 /// One plane of an image's payload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct PlaneHeader {
-    /// What it holds.
+    /// The content of the plane.
     pub kind: PlaneKind,
-    /// How.
+    /// The packing of the plane.
     pub encoding: PlaneEncoding,
-    /// Before LZ4. Bounded by the image's size.
+    /// Bytes before LZ4. Bounded by the image's size.
     pub raw_bytes: u32,
-    /// In the payload.
+    /// Bytes in the payload.
     pub packed_bytes: u32,
 }
 
-/// The planes that travel besides inverse depth and colour.
+/// The planes that are encoded besides inverse depth and colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct PlaneSet {
     /// Octahedral normals, where the image has them.
     pub normal: bool,
     /// Surface keys, where the image has them.
     pub surface_id: bool,
-    /// What highlights need, where the image has it. Normals then travel too, wanted or not.
+    /// Planes of highlights, where the image has them. Normals are then encoded, too.
     pub specular: bool,
     /// Depths at texels' corners, where the image has them.
     pub corners: bool,
 }
 
-/// Of a plane of corners, before its codes.
+/// Bytes of a plane of corners before its codes.
 pub(crate) const CORNER_RANGE_BYTES: usize = 8;
 
 impl PlaneSet {
-    /// Inverse depth and colour only, and which rays passed something, without which depths would be misread.
+    /// Inverse depth and colour only, and the bits of passed surfaces, without which depths would be misread.
     pub const DEPTH_COLOR: Self = Self { normal: false, surface_id: false, specular: false, corners: false };
-    /// Whatever the image has.
+    /// All planes that the image has.
     pub const ALL: Self = Self { normal: true, surface_id: true, specular: true, corners: true };
 }
 
-/// Size, planes and range of an encoded depth image. The camera travels beside it.
+/// Size, planes and range of an encoded depth image. The camera is sent apart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageHeader {
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// What the 16-bit codes span.
+    /// The range that the 16-bit codes span.
     pub inverse_depth_range: InverseDepthRange,
-    /// In the order of the payload.
+    /// The planes, in the order of the payload.
     pub planes: Vec<PlaneHeader>,
 }
 
 impl ImageHeader {
-    /// Checks everything that can be checked without the payload; the number of texels.
+    /// Checks everything that can be checked without the payload; gives the number of texels.
     ///
     /// # Errors
     /// Names the field that is wrong or over a limit.
@@ -200,7 +200,7 @@ impl ImageHeader {
         check_limit("planes.visibility8", visibilities as u64, MAX_VISIBILITY_PLANES as u64)
     }
 
-    /// Corners of texels. Sides have been checked.
+    /// Corners of texels, for sides that have been checked.
     pub(crate) fn corners(&self) -> usize {
         (self.width as usize + 1) * (self.height as usize + 1)
     }
@@ -228,7 +228,7 @@ impl ImageHeader {
     }
 }
 
-/// How many of a kind come first, and what follows.
+/// The count of planes of a kind at the front, and the planes that follow.
 fn leading(kinds: &[PlaneKind], kind: PlaneKind) -> (usize, &[PlaneKind]) {
     let count = kinds.iter().take_while(|&&other| other == kind).count();
     (count, &kinds[count..])

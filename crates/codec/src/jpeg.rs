@@ -1,4 +1,4 @@
-//! Baseline JPEG by the libraries, with the size held against what the frame says.
+//! Baseline JPEG by the libraries, with the size checked against the frame's.
 
 use std::io::Cursor;
 
@@ -20,7 +20,7 @@ pub(crate) fn encode(width: u32, height: u32, rgb: &[u8], quality: u8) -> Result
     Ok(data)
 }
 
-/// Unpacks a picture that must be of the given size, which the caller has held against its limits.
+/// Unpacks a picture that must be of the given size, which the caller has checked against its limits.
 pub(crate) fn decode(width: u32, height: u32, data: &[u8]) -> Result<Vec<u8>, FrameError> {
     let jpeg_error = |error: image::ImageError| FrameError::Jpeg(error.to_string());
     let mut decoder = JpegDecoder::new(Cursor::new(data)).map_err(jpeg_error)?;

@@ -4,7 +4,7 @@
 //! of them. Depth images: `image_codec` puts planes together and `chunk` cuts the result. Views: `frame_codec` packs the
 //! colour, `view_codec` adds the other planes, and `frame_parts` cuts the result.
 //!
-//! Decoders trust nothing: sizes follow from a validated header and are held against [`DecodeLimits`] before memory is
+//! Decoders trust nothing: sizes follow from a validated header and are checked against [`DecodeLimits`] before memory is
 //! taken.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 

@@ -1,7 +1,7 @@
 //! Inverse depths as 16-bit codes, linear over an image's own range.
 //!
-//! The sums are done in `f64`, so that the error stays within half a step whatever the range (plus the
-//! rounding of the result to `f32`).
+//! The sums are done in `f64`. The error is therefore within half a step for any range, plus the rounding of the result to
+//! `f32`.
 
 use depth_image::{BACKGROUND_INVERSE_DEPTH, HOLE_INVERSE_DEPTH};
 
@@ -21,9 +21,9 @@ const ROUND_TO_INTEGER: f64 = (1u64 << 52) as f64;
 /// The inverse depths that the codes of an image span. Both are 0 in an image without samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InverseDepthRange {
-    /// Of code [`FIRST_SAMPLE_CODE`], per metre.
+    /// Inverse depth of code [`FIRST_SAMPLE_CODE`], per metre.
     pub least_per_m: f32,
-    /// Of code `u16::MAX`, per metre.
+    /// Inverse depth of code `u16::MAX`, per metre.
     pub greatest_per_m: f32,
 }
 
@@ -92,7 +92,7 @@ pub(crate) fn quantise(inverse_depth_per_m: &[f32], range: InverseDepthRange, co
     }
 }
 
-/// Inverse depths of sample codes. Whatever the codes, the results lie within the range.
+/// Inverse depths of sample codes. The results lie within the range for any codes.
 pub(crate) fn dequantise(sample_codes: &[u16], range: InverseDepthRange, inverse_depth_per_m: &mut [f32]) {
     let least = f64::from(range.least_per_m);
     let step = range.step_per_m();
@@ -102,7 +102,7 @@ pub(crate) fn dequantise(sample_codes: &[u16], range: InverseDepthRange, inverse
     }
 }
 
-/// What stands in the plane for a code without a sample.
+/// The value in the plane for a code without a sample.
 pub(crate) fn empty_inverse_depth(code: u16) -> f32 {
     if code == BACKGROUND_CODE { BACKGROUND_INVERSE_DEPTH } else { HOLE_INVERSE_DEPTH }
 }
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_becomes_a_hole() {
+    fn numbers_that_are_not_finite_become_holes() {
         let hole = HOLE_INVERSE_DEPTH;
         let (range, back) = round_trip(&[f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.5, -0.0, 0.5, 0.25]);
         assert_eq!(back, [hole, hole, hole, hole, 0.0, 0.5, 0.25]);

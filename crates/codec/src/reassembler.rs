@@ -7,71 +7,40 @@ use crate::{
     chunk::chunk_count,
 };
 
-/// An image whose chunks have all come.
+/// An image whose chunks have all arrived.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reassembled {
     /// The set it belongs to.
     pub sample_set_id: SampleSetId,
-    /// Which image of the set.
+    /// Index of the image in the set.
     pub image_index: u32,
     /// The image; its header has passed [`ImageHeader::validate`].
     pub image: EncodedDepthImage,
 }
 
-/// Why a chunk is refused. An image under way is dropped, unless the chunk was stale or a duplicate.
+/// Why a chunk is refused. An incomplete image is dropped, unless the chunk was stale or a duplicate.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum ChunkError {
-    /// Of a set before those that are wanted.
+    /// The chunk is of a set before those that are wanted.
     #[error("chunk of sample set {got}, older than {oldest}")]
-    StaleSet {
-        /// The chunk's.
-        got: SampleSetId,
-        /// The oldest that is accepted.
-        oldest: SampleSetId,
-    },
-    /// Already there.
+    StaleSet { got: SampleSetId, oldest: SampleSetId },
+    /// The chunk has arrived before.
     #[error("chunk {got} again, chunk {expected} is next")]
-    Duplicate {
-        /// The chunk's.
-        got: u32,
-        /// What should have come.
-        expected: u32,
-    },
+    Duplicate { got: u32, expected: u32 },
     /// Chunks were lost or overtaken.
     #[error("chunk {got} of image {image_index} in sample set {sample_set_id}, but chunk {expected} is missing")]
-    Missing {
-        /// The set under way.
-        sample_set_id: SampleSetId,
-        /// The image under way.
-        image_index: u32,
-        /// The chunk's.
-        got: u32,
-        /// What should have come.
-        expected: u32,
-    },
-    /// Data without the header of its image.
+    Missing { sample_set_id: SampleSetId, image_index: u32, got: u32, expected: u32 },
+    /// Data arrived without the header of its image.
     #[error("chunk {got} of image {image_index} without a header")]
-    NoHeader {
-        /// The chunk's image.
-        image_index: u32,
-        /// The chunk's sequence.
-        got: u32,
-    },
-    /// A body of the wrong kind, size or count.
+    NoHeader { image_index: u32, got: u32 },
+    /// The body is of the wrong kind, size or count.
     #[error("chunk {sequence}: {field} is wrong")]
-    Malformed {
-        /// The chunk's.
-        sequence: u32,
-        /// Which.
-        field: &'static str,
-    },
+    Malformed { sequence: u32, field: &'static str },
     /// The body is not what was sent.
     #[error("chunk {sequence}: checksum does not match")]
-    Checksum {
-        /// The chunk's.
-        sequence: u32,
-    },
-    /// The header does not pass, or asks for too much.
+    Checksum { sequence: u32 },
+    /// The header is invalid, or over a limit.
     #[error(transparent)]
     Header(#[from] DecodeError),
 }
@@ -95,7 +64,7 @@ struct UnderWay {
     payload: Payload,
 }
 
-/// A payload in one chunk is passed on as it came; longer ones are joined.
+/// A payload in one chunk is kept as it is; longer ones are joined.
 #[derive(Debug)]
 enum Payload {
     Whole(Bytes),
@@ -103,7 +72,7 @@ enum Payload {
 }
 
 impl Reassembler {
-    /// Nothing before `oldest` is accepted, nor any image over `limits`.
+    /// Accepts sets from `oldest` on, and images within `limits`.
     #[must_use]
     pub fn new(limits: DecodeLimits, oldest: SampleSetId) -> Self {
         Self { limits, oldest, under_way: None, abandoned: 0 }
@@ -122,7 +91,7 @@ impl Reassembler {
         self.abandoned
     }
 
-    /// Takes the next chunk; the image when it was the last.
+    /// Takes the next chunk; gives the image after its last.
     ///
     /// # Errors
     /// See [`ChunkError`].
@@ -138,7 +107,7 @@ impl Reassembler {
         result
     }
 
-    /// A header of a later set may cut off an image; nothing else may come out of turn.
+    /// A header of a later set may cut off an image; no other chunk may be out of turn.
     fn check_sequence(&mut self, chunk: &Chunk) -> Result<(), ChunkError> {
         let got = chunk.sequence;
         let Some(image) = &self.under_way else {
@@ -182,7 +151,7 @@ impl Reassembler {
     }
 }
 
-/// The limits are held against the header before anything of the payload's size is allocated.
+/// Checks the header against the limits before memory for the payload is allocated.
 fn check_header(header: &ImageHeader, count: u32, limits: &DecodeLimits) -> Result<(), ChunkError> {
     header.validate(limits)?;
     if u64::from(count) == chunk_count(header.payload_bytes()) {

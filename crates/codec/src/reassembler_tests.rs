@@ -53,7 +53,7 @@ fn chunks_in_order_give_the_image() {
 }
 
 #[test]
-fn a_missing_chunk_is_seen_and_the_next_image_survives() {
+fn a_missing_chunk_is_refused_and_the_next_image_survives() {
     let mut reassembler = reassembler();
     let chunks = chunks(3 * MAX_CHUNK_BYTES);
     assert_eq!(reassembler.push(chunks[0].clone()), Ok(None));
@@ -97,7 +97,7 @@ fn another_image_of_the_set_may_not_cut_in() {
 }
 
 #[test]
-fn flipped_bits_are_seen() {
+fn chunks_with_flipped_bits_are_refused() {
     let mut random = Random::new(13);
     let good = chunks(MAX_CHUNK_BYTES + 100);
     for _ in 0..200 {

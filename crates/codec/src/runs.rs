@@ -1,7 +1,7 @@
-//! Where the samples are: runs of holes, of background and of samples, row after row.
+//! The places of samples: runs of holes, of background and of samples, row after row.
 //!
-//! Each run is 16 bits, kind in the lowest two. Other planes of an image hold nothing where there is no
-//! sample, so they are sent as the samples alone and spread out again by these runs.
+//! Each run is 16 bits, kind in the lowest two. Other planes of an image are empty where there is no sample: only their
+//! samples are stored, and these runs spread them out again.
 
 use crate::{
     DecodeError,
@@ -20,7 +20,7 @@ pub(crate) struct Run {
     pub texels: usize,
 }
 
-/// The runs of a whole plane, and how many samples are in them.
+/// The runs of a whole plane, and the count of samples in them.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Runs {
     runs: Vec<Run>,
@@ -158,7 +158,7 @@ fn parse(word: u16) -> Run {
     Run { kind: word & 3, texels: usize::from(word >> 2) }
 }
 
-/// How many codes at the front hold a property. Whole blocks are tested at once.
+/// The count of codes at the front that hold a property. Whole blocks are tested at once.
 fn leading(codes: &[u16], holds: impl Fn(u16) -> bool) -> usize {
     const BLOCK: usize = 32;
     let (blocks, _) = codes.as_chunks::<BLOCK>();

@@ -1,13 +1,13 @@
-//! Where a frame's time went, in durations: clocks of machines differ.
+//! Times of a frame's stages, in durations: clocks of machines differ.
 
-/// Where a frame's time went at its compositor.
+/// Times of a frame's stages at its compositor.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StageTimes {
-    /// Until the sample set was there.
+    /// The wait for the sample set.
     pub set_wait_s: f64,
-    /// Until frames before it had been sent, and, of a live stream, acknowledged.
+    /// The wait until earlier frames were sent, and, on a live stream, acknowledged.
     pub credit_wait_s: f64,
-    /// In the queue for the device.
+    /// The wait in the queue for the device.
     pub queue_s: f64,
     /// The batch's device time: each of its views waits for all of them.
     pub batch_s: f64,
@@ -15,23 +15,23 @@ pub struct StageTimes {
     pub reconstruct_s: f64,
     /// Encoding.
     pub encode_s: f64,
-    /// Made, but waiting: for an encoder, and for frames before it to go out.
+    /// The wait of the finished view for an encoder, and for earlier frames to be sent.
     pub send_wait_s: f64,
     /// From the request's arrival to the frame's departure.
     pub compositor_s: f64,
-    /// How long the sample set had been there when the batch was begun; 0 where views are drawn from the scene.
+    /// The age of the sample set when the batch was begun; 0 where views are drawn from the scene.
     pub set_age_s: f64,
     /// Views of the batch.
     pub batch_count: u32,
 }
 
 impl StageTimes {
-    /// The stages that follow one another, up to encoding.
+    /// The sum of the stages up to encoding.
     fn made_s(&self) -> f64 {
         self.set_wait_s + self.credit_wait_s + self.queue_s + self.batch_s + self.encode_s
     }
 
-    /// The times of a frame that leaves so long after its request came: what no other stage accounts for, it waited.
+    /// The times of a frame that leaves `compositor_s` after its request: time that no other stage accounts for is a wait.
     #[must_use]
     pub fn leaving_after(self, compositor_s: f64) -> Self {
         Self { compositor_s, send_wait_s: (compositor_s - self.made_s()).max(0.0), ..self }
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stages_make_the_whole() {
+    fn stages_add_up_to_the_whole() {
         let made = StageTimes {
             set_wait_s: 0.1,
             credit_wait_s: 0.2,

@@ -1,8 +1,8 @@
 //! Small numbers in few bits: a two-bit tag per number names one of four widths, the numbers follow
 //! packed at those widths.
 //!
-//! What lies where follows from the tags alone, so that neither side waits for one number before it
-//! finds the next. The widths are chosen for each stream from a histogram of bit lengths. The tags
+//! The places of the numbers follow from the tags alone, so that neither side waits for one number before it finds the
+//! next. The widths are chosen for each stream from a histogram of bit lengths. The tags
 //! are left for LZ4 to shorten: where an image is smooth they are all alike.
 //!
 //! Layout of a block: three width bytes (the fourth width is 16), one byte for every four tags, then the
@@ -16,10 +16,9 @@ pub(crate) const BLOCK: usize = 1 << 14;
 
 const WIDEST_BITS: u8 = 16;
 const WIDTHS_BYTES: usize = 3;
-/// What eight bytes take besides the bits of an unfinished byte, with one to spare: shifting all 64 out
-/// is not a shift.
+/// Bits that eight bytes hold besides those of an unfinished byte, with one to spare: a shift by all 64 is not defined.
 const ROOM_BITS: u8 = 56;
-/// What one store may write beyond the fields.
+/// Bytes that one store may write beyond the fields.
 const SLACK_BYTES: usize = 8;
 
 /// Most bytes of `count` numbers in blocks.
@@ -52,8 +51,7 @@ impl Packer {
         Self { numbers: vec![0; numbers], tags: vec![0; numbers], fields: vec![0; numbers * 2 + SLACK_BYTES] }
     }
 
-    /// Appends one block to `out`: `count` numbers, at most [`BLOCK`] and what [`Packer::new`] was told,
-    /// that `fill` writes.
+    /// Appends one block to `out`: `count` numbers that `fill` writes, at most [`BLOCK`] and the count of [`Packer::new`].
     pub(crate) fn pack(&mut self, count: usize, out: &mut Vec<u8>, fill: impl FnOnce(&mut [u16])) {
         fill(&mut self.numbers[..count]);
         let padded = count.next_multiple_of(4);
@@ -131,7 +129,7 @@ fn choose_widths(numbers: &[u16]) -> [u8; 4] {
     for length in 1..up_to.len() {
         up_to[length] += up_to[length - 1];
     }
-    // Against 16 bits for all, each width saves its distance to the next for whatever fits it.
+    // Against 16 bits for all, each width saves its distance to the next for every number that fits it.
     let saved_bits = |&[a, b, c, _]: &[u8; 4]| {
         let saved = |narrow: u8, wide: u8| up_to[usize::from(narrow)] * u32::from(wide - narrow);
         saved(a, b) + saved(b, c) + saved(c, WIDEST_BITS)
@@ -144,7 +142,7 @@ fn candidate_widths() -> impl Iterator<Item = [u8; 4]> {
     (0..14).flat_map(ordered)
 }
 
-/// What a byte of four tags says.
+/// The meaning of a byte of four tags.
 #[derive(Clone, Copy)]
 struct Quad {
     masks: [u16; 4],
@@ -254,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn zigzag_inverts() {
+    fn unzigzag_inverts_zigzag() {
         assert!((0..=u16::MAX).all(|difference| unzigzag(zigzag(difference)) == difference));
         assert_eq!([0, 1, u16::MAX, 2].map(zigzag), [0, 2, 1, 4]);
     }

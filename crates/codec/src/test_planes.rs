@@ -1,4 +1,4 @@
-//! Planes to test codecs on, for tests and the codec bench: a tree of thousands of small leaves over
+//! Planes for tests and the bench of the codec: a tree of thousands of small leaves over
 //! rolling ground, under a sky that meets nothing.
 
 /// SplitMix64: small, seeded, good enough for tests.

@@ -11,28 +11,17 @@ use crate::{
 
 /// Why a view is not encoded or decoded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum ViewCodecError {
-    /// Its colour.
+    /// The colour is at fault.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// Another plane.
+    /// Another plane is at fault.
     #[error("{plane}: {source}")]
-    Plane {
-        /// Which.
-        plane: &'static str,
-        /// Why.
-        source: DecodeError,
-    },
+    Plane { plane: &'static str, source: DecodeError },
     /// Planes of other lengths than the header says, or than the view's size.
     #[error("{plane} has {len} texels or bytes, must have {expected}")]
-    Length {
-        /// Which.
-        plane: &'static str,
-        /// Given.
-        len: usize,
-        /// Right.
-        expected: usize,
-    },
+    Length { plane: &'static str, len: usize, expected: usize },
 }
 
 /// A view's bytes, planes one after the other.
@@ -40,7 +29,7 @@ pub enum ViewCodecError {
 pub struct EncodedView {
     size_px: UVec2,
     codec: FrameCodec,
-    /// Of colour, inverse depth and provenance.
+    /// Bytes of colour, inverse depth and provenance.
     lengths: [u64; 3],
     crc32: u32,
     /// All planes.
@@ -93,10 +82,10 @@ fn words_of(plane: &[Provenance]) -> Vec<u32> {
     plane.iter().map(|provenance| provenance.0).collect()
 }
 
-/// Decodes a frame that has come whole.
+/// Decodes a whole frame.
 ///
 /// # Errors
-/// For sizes over the limits, and data that does not decode to what the header says.
+/// For sizes over the limits, and data that does not decode to the planes of the header.
 pub fn decode_view(frame: &WholeFrame, limits: &DecodeLimits) -> Result<View, ViewCodecError> {
     let FrameHeader { size_px, codec, .. } = frame.header;
     let plane_error = |plane| move |source| ViewCodecError::Plane { plane, source };
@@ -153,14 +142,14 @@ mod tests {
     }
 
     #[test]
-    fn views_come_back_to_the_bit() {
+    fn views_survive_to_the_bit() {
         for view in [view(false), view(true)] {
             assert_eq!(decode_view(&sent(&view), &DecodeLimits::default()).unwrap(), view);
         }
     }
 
     #[test]
-    fn wrong_lengths_are_refused() {
+    fn planes_of_wrong_lengths_are_refused() {
         let limits = DecodeLimits::default();
         let good = sent(&view(true));
         let spoilt = |change: &dyn Fn(&mut WholeFrame)| {

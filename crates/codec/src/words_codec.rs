@@ -3,18 +3,24 @@
 //! LZ4 alone finds only what repeats to the bit. Differences of neighbours are small where a surface is
 //! smooth and nothing where it is flat.
 //!
-//! Words of four bytes, as a share of LZ4 alone, 400×300 and 1024², by the `depth_codec_bench` example: two
-//! materials, one of uneven roughness, 0.49 and 0.47; visibility of four lights by 256 rays 0.49 and 0.46, by 16
-//! rays 0.82 and 0.80, hard 0.83 and 0.80. Measured once: as halves, uneven roughness takes twice as much and
-//! visibility by 256 rays two fifths more; byte planes before LZ4 are a tenth smaller by 16 rays and a sixth
-//! larger by 256.
+//! Bytes of words of four parts, as a share of LZ4 alone, by the `depth_codec_bench` example:
+//!
+//! | | 400×300 | 1024² |
+//! |---|---|---|
+//! | two materials, one of uneven roughness | 0.49 | 0.47 |
+//! | visibility of four lights, 256 rays | 0.49 | 0.46 |
+//! | visibility, 16 rays | 0.82 | 0.80 |
+//! | visibility, hard shadows | 0.83 | 0.80 |
+//!
+//! Packed as halves, uneven roughness takes twice as much, and visibility by 256 rays two fifths more. Byte planes before
+//! LZ4 are a tenth smaller by 16 rays and a sixth larger by 256.
 
 use crate::{
     DecodeError,
     tagged::{BLOCK, Packer, max_packed_bytes, unpack, unzigzag, zigzag},
 };
 
-/// What a word is made of. Each part is a stream of its own: what changes much does not make wide what does not.
+/// The parts of a word. Each part is a stream of its own, so that a part that changes much does not widen the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum WordLayout {
     /// One number of 32 bits, sent as two halves.
@@ -34,7 +40,7 @@ impl WordLayout {
         }
     }
 
-    /// Where a part begins in its word.
+    /// The bit at which a part begins in its word.
     const fn shift(self, part: usize) -> usize {
         part * 32 / self.parts()
     }
@@ -71,7 +77,7 @@ fn differences(words: &[u32], layout: WordLayout, shift: usize, out: &mut [u16])
     }
 }
 
-/// What `number` makes of each word and the one before, 0 before the first.
+/// Applies `number` to each word and the one before, which is 0 before the first.
 #[inline]
 pub(crate) fn for_neighbours(words: &[u32], out: &mut [u16], number: impl Fn(u32, u32) -> u16) {
     let Some((first, others)) = out.split_first_mut() else {
@@ -100,8 +106,8 @@ pub(crate) fn unpack_words(input: &mut &[u8], count: usize, layout: WordLayout) 
     Ok(words)
 }
 
-/// Appends what each word of a block changes; `numbers` holds the block's parts one after the other. Apart from
-/// the sums, which wait for each other, this is done for many words at once.
+/// Appends the change of each word of a block; `numbers` holds the block's parts one after the other. All but the sums,
+/// which wait for each other, is done for many words at once.
 fn extend_by_changes(words: &mut Vec<u32>, numbers: &[u16], block: usize, layout: WordLayout) {
     let (low, high) = numbers.split_at(numbers.len() / 2);
     match layout {
@@ -123,7 +129,7 @@ fn extend_by_changes(words: &mut Vec<u32>, numbers: &[u16], block: usize, layout
     }
 }
 
-/// Words from what each changes of the one before, which is 0 before the first.
+/// Words from their changes to the one before, which is 0 before the first.
 fn sum_up(changes: &mut [u32], layout: WordLayout) {
     match layout {
         WordLayout::Whole => scan(changes, u32::wrapping_add),

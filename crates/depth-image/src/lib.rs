@@ -13,6 +13,7 @@ mod color;
 mod highlight;
 mod image;
 mod light;
+mod method_table;
 mod normal;
 mod tiles;
 mod view;
@@ -27,6 +28,7 @@ pub use image::{
     BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId, Texel,
 };
 pub use light::{Environment, Illumination, Incident, Light, LightError, MAX_LIGHTS, disc_from_square, tangents_of};
+pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_named};
 pub use normal::{oct16_from_unit, unit_from_oct16};
 pub use tiles::TileError;
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};

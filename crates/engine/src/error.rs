@@ -1,4 +1,4 @@
-//! Errors of the device crates as the services name them.
+//! Errors of the device crates in the terms of services.
 
 use std::str::FromStr;
 
@@ -34,7 +34,7 @@ pub(crate) fn reconstruction_error(error: ReconstructionError) -> EngineError {
     }
 }
 
-/// A setting out of its name.
+/// Parses a setting.
 pub(crate) fn parsed<T: FromStr<Err: ToString>>(field: &'static str, text: &str) -> Result<T, EngineError> {
     text.parse().map_err(|error: T::Err| invalid(field, error.to_string()))
 }
@@ -43,6 +43,6 @@ pub(crate) fn sampling_error(error: SamplingError) -> EngineError {
     match error {
         SamplingError::Render(error) => render_error(error),
         SamplingError::Layer { .. } => invalid("sample_cameras", error),
-        SamplingError::Wanted { .. } => invalid("image_indices", error),
+        SamplingError::Selection { .. } => invalid("image_indices", error),
     }
 }

@@ -9,7 +9,7 @@ use depth_image::{DepthImage, PinholeCamera, View};
 use gpu::{DevicePreference, Gpu};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 use parking_lot::Mutex;
-use reconstruction::{ReconstructionMethod, Reconstructor, SetDescription};
+use reconstruction::{ReconstructionMethod, Reconstructor, RequiredPlanes, SetDescription};
 use render::{
     AccelerationReport, Choice, DrawWork, GpuScene, Lighting, Refinement, Renderer, SamplePlanes, Visibility,
 };
@@ -18,7 +18,7 @@ use scene::{Limits, Scene};
 
 use crate::error::{device, invalid, parsed, reconstruction_error, render_error, sampling_error};
 
-/// Scenes that stay on the device; the one that was loaded first goes first.
+/// The most scenes on the device; the one that was loaded first is evicted first.
 const KEPT_SCENES: usize = 8;
 
 /// One device, its pipelines, and the scenes on it.
@@ -28,9 +28,9 @@ pub struct GpuEngine {
     sampler: Sampler,
     reconstructor: Reconstructor,
     scenes: Mutex<Vec<(String, Arc<GpuScene>)>>,
-    /// One batch at a time: the device makes no more of several, and memory holds one.
+    /// Batches run one at a time: the device is no faster with several, and memory holds one.
     reconstructing: Mutex<()>,
-    /// One load at a time: nodes of one process want the same scene at the same moment.
+    /// Scenes load one at a time: nodes of one process need the same scene at the same moment.
     loading: Mutex<()>,
 }
 
@@ -39,10 +39,10 @@ struct Uploaded(reconstruction::SampleSet);
 impl UploadedSet for Uploaded {}
 
 impl GpuEngine {
-    /// Opens a device of its own.
+    /// Opens a device for this engine.
     ///
     /// # Errors
-    /// When there is no device or a shader is broken.
+    /// There is no device, or a shader is broken.
     pub fn open(preference: DevicePreference) -> Result<Self, EngineError> {
         let gpu = Gpu::open(preference).map_err(device)?;
         let renderer = Arc::new(sampling::renderer(&gpu).map_err(render_error)?);
@@ -60,7 +60,7 @@ impl GpuEngine {
     /// The engine that all nodes of this process share; it closes with the last of them.
     ///
     /// # Errors
-    /// As [`GpuEngine::open`].
+    /// There is no device, or a shader is broken.
     pub fn shared(preference: DevicePreference) -> Result<Arc<Self>, EngineError> {
         static OPEN: Mutex<Option<HashMap<String, Weak<GpuEngine>>>> = Mutex::new(None);
         let mut open = OPEN.lock();
@@ -73,10 +73,10 @@ impl GpuEngine {
         Ok(engine)
     }
 
-    /// Uploads a scene under the hash of its package, unless it is there; gives the seconds spent.
+    /// Uploads a scene under the hash of its package, unless it is there; returns the seconds spent.
     ///
     /// # Errors
-    /// When the device cannot hold it.
+    /// The device cannot hold the scene.
     pub fn put_scene(&self, hash: &str, scene: &Scene) -> Result<f64, EngineError> {
         let _one = self.loading.lock();
         if self.has_scene(hash) {
@@ -92,36 +92,36 @@ impl GpuEngine {
         Ok(start.elapsed().as_secs_f64())
     }
 
-    /// The pipelines that reconstruct, for measuring without a service in between.
+    /// The pipelines that reconstruct, for measurements without a service in between.
     #[must_use]
     pub fn reconstructor(&self) -> &Reconstructor {
         &self.reconstructor
     }
 
-    /// What draws, for measuring without a service in between.
+    /// The renderer, for measurements without a service in between.
     #[must_use]
     pub fn renderer(&self) -> &Renderer {
         &self.renderer
     }
 
-    /// As [`GpuEngine::renderer`], to be shared with another sampler.
+    /// The renderer, to be shared with another sampler.
     #[must_use]
     pub fn shared_renderer(&self) -> Arc<Renderer> {
         self.renderer.clone()
     }
 
-    /// How surfaces of a scene are found in pictures of a camera's size, by what both ways cost.
+    /// The renderer's choice between triangles and rays for pictures of a camera's size, with both costs.
     ///
     /// # Errors
-    /// For a scene it has not, or a device that fails.
+    /// The scene is not loaded, or the device fails.
     pub fn visibility_choice(&self, hash: &str, camera: &PinholeCamera) -> Result<Choice, EngineError> {
         self.renderer.choice(&*self.scene(hash)?, camera, 0.0).map_err(render_error)
     }
 
-    /// The tree that rays go through.
+    /// The tree that rays traverse.
     ///
     /// # Errors
-    /// For a scene it has not, or one that does not fit the device.
+    /// The scene is not loaded, or does not fit the device.
     pub fn acceleration(&self, hash: &str, scene_time_s: f32) -> Result<AccelerationReport, EngineError> {
         self.scene(hash)?.acceleration(scene_time_s).map_err(render_error)
     }
@@ -129,18 +129,18 @@ impl GpuEngine {
     /// A scene on the device.
     ///
     /// # Errors
-    /// Where it was never loaded.
+    /// The scene was never loaded.
     pub fn scene(&self, hash: &str) -> Result<Arc<GpuScene>, EngineError> {
         let found = self.scenes.lock().iter().find(|(kept, _)| kept == hash).map(|(_, scene)| scene.clone());
         found.ok_or_else(|| EngineError::UnknownScene { hash: hash.to_owned() })
     }
 }
 
-/// What images must have for views to be reconstructed from them.
+/// The planes that a reconstruction method needs in sample images.
 #[must_use]
 pub fn planes_for(method: ReconstructionMethod) -> SamplePlanes {
-    let hybrid = matches!(method, ReconstructionMethod::HybridMesh { .. });
-    SamplePlanes { specular: true, normal: hybrid, corners: hybrid, ..SamplePlanes::default() }
+    let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
+    SamplePlanes { specular: true, normal, corners: corner_inverse_depth, ..SamplePlanes::default() }
 }
 
 fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {
@@ -168,12 +168,12 @@ impl Engine for GpuEngine {
         self.scenes.lock().iter().any(|(kept, _)| kept == hash)
     }
 
-    fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError> {
-        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.is_chained())
+    fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.images_are_sequential())
     }
 
-    fn samples_alone(&self, sampling: &str) -> Result<bool, EngineError> {
-        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.leave_out().is_none())
+    fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError> {
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.images_are_independent())
     }
 
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
@@ -190,7 +190,7 @@ impl Engine for GpuEngine {
             wanted: &request.wanted,
             method: parsed("sampling_method", &request.sampling)?,
             planes: planes_for(method),
-            settled_at_s: request.settled_at_s,
+            temporal_reference_s: request.temporal_reference_s,
         };
         self.sampler.sample(&work).map_err(sampling_error)
     }

@@ -4,7 +4,7 @@ use std::{fmt, str::FromStr, sync::Arc};
 
 use crate::error::GpuError;
 
-/// What to look for among the adapters.
+/// The adapters to choose from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DevicePreference {
     /// A GPU if there is one, else the software device.
@@ -49,7 +49,7 @@ impl Gpu {
     /// Opens the preferred device with all of its limits.
     ///
     /// # Errors
-    /// When there is none, or it cannot be opened.
+    /// No device exists, or it cannot be opened.
     pub fn open(preference: DevicePreference) -> Result<Arc<Self>, GpuError> {
         pollster::block_on(Self::open_async(preference))
     }
@@ -81,14 +81,14 @@ impl Gpu {
             .map_err(|error| GpuError::Open { name: info.name.clone(), reason: error.to_string() })?;
         let has_timestamps =
             features.contains(wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
-        // On a processor, wall clock around submit and wait is the truth; its time stamps are not.
+        // On a processor, wall clock around submit and wait is right; its time stamps are not.
         let timestamp_period_ns =
             (has_timestamps && info.device_type != wgpu::DeviceType::Cpu).then(|| queue.get_timestamp_period());
         tracing::info!(device = info.name, backend = %info.backend, "graphics device opened");
         Ok(Arc::new(Self { device, queue, info, timestamp_period_ns }))
     }
 
-    /// What reports call the device.
+    /// The name of the device in reports.
     #[must_use]
     pub fn name(&self) -> String {
         format!("{} ({}, {})", self.info.name, self.info.backend, self.info.driver_info)
@@ -113,59 +113,6 @@ impl Gpu {
     pub fn check_storage_bytes(&self, what: &str, bytes: u64) -> Result<(), GpuError> {
         let limits = self.device.limits();
         GpuError::check_limit(what, bytes, limits.max_storage_buffer_binding_size.min(limits.max_buffer_size))
-    }
-
-    /// A compute pipeline with entry point `main`, and an automatic layout where none is given for group 0.
-    #[must_use]
-    pub fn compute_pipeline(
-        &self,
-        label: &str,
-        wgsl: &str,
-        layout: Option<&wgpu::BindGroupLayout>,
-    ) -> wgpu::ComputePipeline {
-        let module = self.shader(label, wgsl);
-        let layout = layout.map(|group| {
-            let descriptor = wgpu::PipelineLayoutDescriptor {
-                label: Some(label),
-                bind_group_layouts: &[Some(group)],
-                immediate_size: 0,
-            };
-            self.device.create_pipeline_layout(&descriptor)
-        });
-        self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(label),
-            layout: layout.as_ref(),
-            module: &module,
-            entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                zero_initialize_workgroup_memory: false,
-                ..Default::default()
-            },
-            cache: None,
-        })
-    }
-
-    /// Compiles WGSL text.
-    #[must_use]
-    pub fn shader(&self, label: &str, wgsl: &str) -> wgpu::ShaderModule {
-        self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(wgsl.into()),
-        })
-    }
-
-    /// Binds whole buffers to `pipeline`'s group 0, at bindings 0, 1, 2….
-    #[must_use]
-    pub fn bind(&self, pipeline: &wgpu::ComputePipeline, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
-        let entries: Vec<_> = (0..)
-            .zip(buffers)
-            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-            .collect();
-        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        })
     }
 
     /// A buffer with contents.

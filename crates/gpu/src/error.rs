@@ -26,6 +26,8 @@ pub enum ShaderError {
     Template { name: String, source: minijinja::Error },
     #[error("shader {shader} is invalid: {message}")]
     Invalid { shader: String, message: String },
+    #[error("shader {shader} has no group {group}")]
+    NoGroup { shader: String, group: u32 },
     #[error("shader {shader}: {name} of group {group} is not bound")]
     Unbound { shader: String, group: u32, name: String },
     #[error("shader {shader}: {name} is bound, but is not in group {group}")]

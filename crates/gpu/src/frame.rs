@@ -4,10 +4,10 @@ use std::{ops::Range, sync::mpsc, time::Instant};
 
 use crate::{device::Gpu, error::GpuError, pool::PooledBuffer};
 
-/// Work being recorded.
+/// Work that is being recorded.
 pub struct Frame<'g> {
     gpu: &'g Gpu,
-    /// For passes that need more than [`Frame::compute`].
+    /// The commands so far, to which passes add theirs.
     pub encoder: wgpu::CommandEncoder,
     timer: Option<Timer>,
     reads: Vec<PooledBuffer>,
@@ -23,7 +23,7 @@ struct Timer {
     host: wgpu::Buffer,
 }
 
-/// Work under way.
+/// Work that is under way.
 pub struct Submitted<'g> {
     gpu: &'g Gpu,
     index: wgpu::SubmissionIndex,
@@ -51,62 +51,6 @@ impl<'g> Frame<'g> {
             encoder.write_timestamp(&timer.queries, 0);
         }
         Self { gpu, encoder, timer, reads: Vec::new() }
-    }
-
-    /// One compute dispatch.
-    pub fn compute(
-        &mut self,
-        label: &str,
-        pipeline: &wgpu::ComputePipeline,
-        bind_group: &wgpu::BindGroup,
-        workgroups: [u32; 3],
-    ) {
-        let mut pass = self
-            .encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, bind_group, &[]);
-        pass.dispatch_workgroups(workgroups[0], workgroups[1], workgroups[2]);
-    }
-
-    /// `count` dispatches in one pass; the n-th sees its uniform at the dynamic offset `n · stride_bytes`.
-    pub fn compute_each(
-        &mut self,
-        label: &str,
-        pipeline: &wgpu::ComputePipeline,
-        bind_group: &wgpu::BindGroup,
-        stride_bytes: u32,
-        count: usize,
-        workgroups: [u32; 3],
-    ) {
-        let mut pass = self
-            .encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
-        pass.set_pipeline(pipeline);
-        for number in 0..count as u32 {
-            pass.set_bind_group(0, bind_group, &[number * stride_bytes]);
-            pass.dispatch_workgroups(workgroups[0], workgroups[1], workgroups[2]);
-        }
-    }
-
-    /// As [`Frame::compute_each`], with the n-th dispatch's size in `arguments` at `16 · n`.
-    pub fn compute_each_indirect(
-        &mut self,
-        label: &str,
-        pipeline: &wgpu::ComputePipeline,
-        bind_group: &wgpu::BindGroup,
-        stride_bytes: u32,
-        count: usize,
-        arguments: &wgpu::Buffer,
-    ) {
-        let mut pass = self
-            .encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None });
-        pass.set_pipeline(pipeline);
-        for number in 0..count as u32 {
-            pass.set_bind_group(0, bind_group, &[number * stride_bytes]);
-            pass.dispatch_workgroups_indirect(arguments, u64::from(number) * 16);
-        }
     }
 
     /// Copies `range` (multiples of 4) of `source` to host memory that `host` lends.
@@ -162,17 +106,17 @@ impl Submitted<'_> {
 }
 
 impl FrameResult {
-    /// Looks at what a read-back brought, as elements of `T`.
+    /// Reads the bytes of a read-back as elements of `T`.
     ///
     /// # Errors
     /// When the device is lost.
     pub fn with<T: bytemuck::AnyBitPattern, R>(
         &self,
         readback: Readback,
-        look: impl FnOnce(&[T]) -> R,
+        read: impl FnOnce(&[T]) -> R,
     ) -> Result<R, GpuError> {
         let view = self.reads[readback.0].get_mapped_range(..).map_err(|error| GpuError::Lost(error.to_string()))?;
-        Ok(look(bytemuck::cast_slice(&view)))
+        Ok(read(bytemuck::cast_slice(&view)))
     }
 }
 

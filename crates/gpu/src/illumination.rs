@@ -1,26 +1,26 @@
 //! Light sources as `light.wgsl` reads them.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Illumination, Light};
+use depth_image::{Highlight, Illumination, Light};
 use glam::Vec3;
 
 /// `Light` of `light.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct GpuLight {
-    /// Its middle; of parallel light, the unit vector towards it.
+    /// The middle; for parallel light, the unit vector towards it.
     pub middle_in_world: [f32; 3],
     /// Parallel, round or a rectangle.
     pub kind: u32,
-    /// Intensity, of a rectangle radiance, of parallel light irradiance.
+    /// Intensity; radiance of a rectangle, irradiance of parallel light.
     pub color_linear: [f32; 3],
-    /// Radius in metres; of parallel light the tangent of the angular radius.
+    /// Radius in metres; for parallel light the tangent of the angular radius.
     pub extent: f32,
-    /// Of a spot its cone's axis, away from the light; of a rectangle half an edge.
+    /// A spot's axis, away from the light; half an edge of a rectangle.
     pub axis_in_world: [f32; 3],
-    /// Where a spot's light ends; −1 for what is no spot.
+    /// The cosine at which a spot's light ends; −1 for all other lights.
     pub outer_cosine: f32,
-    /// Of a rectangle, half of the next edge.
+    /// Half of the next edge of a rectangle.
     pub next_edge_in_world: [f32; 3],
     /// From cosines beyond the outer one to a spot's share.
     pub cone_scale: f32,
@@ -40,7 +40,7 @@ const PARALLEL: u32 = 0;
 const ROUND: u32 = 1;
 const RECTANGLE: u32 = 2;
 
-/// Shines in no colour, from nowhere, and into all directions alike.
+/// A light without colour or place, the same in all directions.
 const NOTHING: GpuLight = GpuLight {
     middle_in_world: [0.0; 3],
     kind: ROUND,
@@ -103,6 +103,15 @@ fn round(position_in_world: Vec3, intensity_linear: Vec3, radius_m: f32) -> GpuL
 #[must_use]
 pub const fn light_slots(light_count: usize) -> usize {
     if light_count == 0 { 1 } else { light_count }
+}
+
+/// `highlight` of `highlight.wgsl`.
+#[must_use]
+pub const fn highlight_name(highlight: Highlight) -> &'static str {
+    match highlight {
+        Highlight::BlinnPhong => "blinn_phong",
+        Highlight::Ggx => "ggx",
+    }
 }
 
 /// The bytes of an `Illumination` uniform of [`light_slots`] lights.

@@ -16,7 +16,7 @@ use wgpu::BufferUsages;
 
 use crate::{
     Binding, BufferPool, ComputePass, DevicePreference, DispatchSize, Frame, Gpu, GpuLight, Shader, Templates,
-    illumination::GpuIllumination, illumination_bytes, light_slots,
+    highlight_name, illumination::GpuIllumination, illumination_bytes, light_slots,
 };
 
 /// One question to the device.
@@ -69,11 +69,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 type Answer = [[f32; 4]; 8];
 
 fn text(kind: Highlight, lights: usize, visibility_words: usize) -> String {
-    let highlight = match kind {
-        Highlight::BlinnPhong => "blinn_phong",
-        Highlight::Ggx => "ggx",
-    };
-    let form = context! { highlight, light_slots => light_slots(lights), visibility_words };
+    let form = context! { highlight => highlight_name(kind), light_slots => light_slots(lights), visibility_words };
     let templates = Templates::new(&[("test.wgsl", SHADER)]).expect("templates");
     templates.render("test.wgsl", form).expect("a text")
 }
@@ -163,7 +159,7 @@ fn close(found: [f32; 4], expected: Vec3, slack: f32) -> bool {
 }
 
 #[test]
-fn light_arrives_as_in_the_twin() {
+fn incident_light_equals_the_scalar_twins() {
     let (illumination, questions) = (illumination(), questions());
     for (q, answer) in questions.iter().zip(answers(Highlight::Ggx, &illumination, 0, &questions)) {
         let place = Vec2::from(q.place);
@@ -182,10 +178,10 @@ fn light_arrives_as_in_the_twin() {
 }
 
 #[test]
-fn highlights_are_the_twins() {
+fn highlights_equal_the_scalar_twins() {
     let questions = questions();
     for kind in [Highlight::BlinnPhong, Highlight::Ggx] {
-        // Written out, and as loops.
+        // Unrolled, and as loops.
         for (lights, words) in [(4, 0), (3, 1), (4, 2), (11, 0), (11, 3)] {
             let four = illumination();
             let lights = four.lights.iter().copied().cycle().take(lights).collect();
@@ -212,7 +208,7 @@ fn highlights_are_the_twins() {
 }
 
 #[test]
-fn a_visibility_out_of_place_is_seen() {
+fn a_shifted_visibility_byte_is_detected() {
     let (illumination, questions) = (illumination(), questions());
     let found = answers(Highlight::BlinnPhong, &illumination, 2, &questions);
     let differ = questions.iter().zip(found).filter(|(q, answer)| {
@@ -226,7 +222,7 @@ fn a_visibility_out_of_place_is_seen() {
 }
 
 #[test]
-fn nothing_on_the_device_is_nan() {
+fn degenerate_inputs_give_finite_light() {
     let mut illumination = illumination();
     illumination.lights[1] = Light::Point { position_in_world: Vec3::ZERO, intensity_linear: Vec3::ONE, radius_m: 0.1 };
     let directions = [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0; 3]];
@@ -253,7 +249,7 @@ fn nothing_on_the_device_is_nan() {
 }
 
 #[test]
-fn no_reflector_and_no_light_add_nothing() {
+fn highlights_are_black_without_reflector_or_light() {
     let asked: Vec<Question> = questions().iter().map(|q| Question { light: 0, reflector: 0, ..*q }).collect();
     let dark = Illumination::default();
     assert_eq!(illumination_bytes(&dark).len(), size_of::<GpuIllumination>() + size_of::<GpuLight>());
@@ -285,7 +281,7 @@ macro_rules! host {
 }
 
 #[test]
-fn structs_have_the_shaders_layout() {
+fn host_structs_have_the_wgsl_layout() {
     for (lights, slots) in [(0, 1), (3, 3)] {
         let text = text(Highlight::Ggx, lights, 1);
         let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));

@@ -1,9 +1,9 @@
 //! The wgpu device, WGSL templates, frames of passes, read-back and timing.
 //!
-//! A pass records into a [`Frame`] and never submits or reads back; whoever owns the frame does, once
-//! for many passes. Shaders are [templates](Templates): numbers that are known when a pipeline is
-//! built (how many cameras, which planes) are written into the text, because indexing cameras
-//! dynamically costs several times as much as naming them.
+//! A pass records into a [`Frame`] and never submits or reads back; the owner of the frame does, once for many passes. Shaders
+//! are [templates](Templates): numbers that are known when a pipeline is built (how many cameras, which planes) are written
+//! into the text, because indexing cameras dynamically costs several times as much as naming them. A [`ShaderVariant`] holds
+//! the switches of one shader, and a [`PassCache`] its pipelines. Resources are bound to a shader's variables by name.
 
 mod device;
 mod error;
@@ -19,11 +19,12 @@ mod uniform;
 pub use device::{DevicePreference, Gpu};
 pub use error::{GpuError, ShaderError};
 pub use frame::{Frame, FrameResult, Readback, Submitted};
-pub use illumination::{GpuLight, illumination_bytes, light_slots};
+pub use illumination::{GpuLight, highlight_name, illumination_bytes, light_slots};
 pub use pool::{BufferPool, Lent, Pool, PooledBuffer};
 pub use shader::{
     Binding, ComputePass, DispatchSize, DrawPass, DrawState, DrawVariant, Pass, PassCache, ResourceTrait,
-    ResourceTraits, Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, sources,
+    ResourceTraits, Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, WgslLiteral, source, sources,
+    switches,
 };
 pub use table::{TABLE_WIDTH, Table, TablePool};
 pub use uniform::{uniform_elements, uniform_stride};

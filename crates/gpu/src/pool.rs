@@ -1,5 +1,5 @@
-//! What lives longer than one frame: making it each time costs more than many passes, and its memory a page fault for every
-//! 4 KiB where the device is a processor.
+//! Resources that live longer than one frame: making them each time costs more than many passes, and their memory a page
+//! fault for every 4 KiB where the device is a processor.
 
 use std::{
     collections::VecDeque,
@@ -11,16 +11,16 @@ use parking_lot::Mutex;
 
 use crate::device::Gpu;
 
-/// What nobody has, what was given back last at the end.
+/// Items that nobody has; the one that came back last is at the end.
 type Free<K, T> = Mutex<VecDeque<(K, T)>>;
 
-/// Lends things of a kind; they come back when dropped.
+/// Lends items of a kind; they come back when dropped.
 pub struct Pool<K, T> {
     free: Arc<Free<K, T>>,
     most_free: usize,
 }
 
-/// On loan; contents are whatever the last borrower left.
+/// An item on loan, with the contents of its last loan.
 pub struct Lent<K, T> {
     lent: Option<(K, T)>,
     home: Weak<Free<K, T>>,
@@ -39,7 +39,7 @@ pub struct BufferPool {
 }
 
 impl<K, T> Pool<K, T> {
-    /// Keeps so many at the most that nobody has; what was given back first goes first.
+    /// A pool that keeps at most `most_free` items that nobody has; the one that came back first goes first.
     #[must_use]
     pub fn keeping(most_free: usize) -> Self {
         Self { free: Arc::default(), most_free }
@@ -47,7 +47,7 @@ impl<K, T> Pool<K, T> {
 }
 
 impl<K: PartialEq, T> Pool<K, T> {
-    /// One of this kind, made where none is free.
+    /// An item of this kind, made where none is free.
     #[must_use]
     pub fn lend(&self, kind: K, make: impl FnOnce(&K) -> T) -> Lent<K, T> {
         let kept = {
@@ -67,7 +67,7 @@ impl<K, T> Lent<K, T> {
         self.lent.as_ref().expect("present until dropped")
     }
 
-    /// Of which kind it is.
+    /// The kind that was asked for.
     #[must_use]
     pub fn kind(&self) -> &K {
         &self.lent().0
@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_comes_back_is_lent_again_and_not_too_much_is_kept() {
+    fn returned_items_are_lent_again_and_surplus_ones_dropped() {
         let pool = Pool::keeping(2);
         let lend = |kind: char, value: u32| pool.lend(kind, |_| value);
         let (a, b) = (lend('a', 1), lend('b', 2));

@@ -151,7 +151,7 @@ impl Staging {
 }
 
 impl Gpu {
-    /// Checks that the device has a table of so many texels, before they are gathered.
+    /// Checks that the device can hold a table of this size, before its texels are gathered.
     ///
     /// # Errors
     /// Names the table, its texels and the limit.

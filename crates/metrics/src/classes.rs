@@ -1,4 +1,4 @@
-//! Pixel classes: which part of an error is due to edges, to what no sample camera saw, and to neither.
+//! Pixel classes: errors of edges, of surfaces that no sample camera saw, and of all others.
 
 use depth_image::{DepthImage, PinholeCamera, PixelDepth};
 use glam::{Vec2, Vec3};
@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::{MetricsError, error::expect_len, steps::step_pixels};
 
-/// What a pixel of the reference shows. Decided in this order: the first that holds.
+/// The class of a pixel of the reference: the first of these that holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PixelClass {
@@ -22,10 +22,10 @@ pub enum PixelClass {
 }
 
 impl PixelClass {
-    /// All, in order.
+    /// All classes, in order.
     pub const ALL: [Self; 4] = [Self::Silhouette, Self::Disoccluded, Self::Covered, Self::Background];
 
-    /// As in reports.
+    /// The name in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -37,9 +37,9 @@ impl PixelClass {
     }
 }
 
-/// How far a point may be from a sample's depth, in units of `z / f`, three texel footprints…
+/// The tolerance of a point to a sample's depth, in units of `z / f`: three texel footprints…
 const MATCH_FOOTPRINTS: f32 = 3.0;
-/// …or as a share of its depth, whichever is more.
+/// …or this share of its depth, if that is more.
 const MATCH_RELATIVE: f32 = 0.01;
 
 /// Classifies every pixel of a reference.
@@ -50,7 +50,7 @@ const MATCH_RELATIVE: f32 = 0.01;
 /// point's sample is in another image.
 ///
 /// # Errors
-/// Planes that do not fit their cameras.
+/// Planes do not fit their cameras.
 pub fn classify(
     reference_camera: &PinholeCamera,
     reference_inverse_depth: &[f32],
@@ -72,11 +72,11 @@ pub fn classify(
         .collect())
 }
 
-/// Pixels whose surface no sample image holds, over all whose reference shows a surface, silhouettes or not; `None` where
-/// there is no surface. Of a scene that is all edges nothing else is left to count.
+/// The share of pixels whose surface no sample image holds, over all pixels with a surface, silhouettes included;
+/// `None` where there is no surface. In a scene of edges alone, all pixels are silhouettes.
 ///
 /// # Errors
-/// As [`classify`].
+/// Planes do not fit their cameras.
 pub fn unheld_rate(
     reference_camera: &PinholeCamera,
     reference_inverse_depth: &[f32],
@@ -99,11 +99,11 @@ pub fn class_mask(classes: &[PixelClass], class: PixelClass) -> Vec<bool> {
     classes.iter().map(|&one| one == class).collect()
 }
 
-/// Disoccluded pixels over all pixels whose reference shows a surface, those at silhouettes included;
-/// `None` where there is no surface.
+/// The share of disoccluded pixels over all pixels with a surface, silhouettes included; `None` where there is no
+/// surface.
 ///
 /// # Errors
-/// Planes of different sizes.
+/// Planes differ in size.
 pub fn disocclusion_rate(classes: &[PixelClass], reference_inverse_depth: &[f32]) -> Result<Option<f64>, MetricsError> {
     expect_len("classes", classes.len(), reference_inverse_depth.len())?;
     let foreground = reference_inverse_depth.iter().filter(|&&depth| depth > 0.0).count();
@@ -111,7 +111,7 @@ pub fn disocclusion_rate(classes: &[PixelClass], reference_inverse_depth: &[f32]
     Ok((foreground > 0).then(|| disoccluded as f64 / foreground as f64))
 }
 
-/// Pixels of each class.
+/// The number of pixels of each class.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct ClassCounts {
     /// [`PixelClass::Silhouette`].
@@ -125,7 +125,7 @@ pub struct ClassCounts {
 }
 
 impl ClassCounts {
-    /// Counts them.
+    /// Counts the pixels of each class.
     #[must_use]
     pub fn of(classes: &[PixelClass]) -> Self {
         let count = |class| classes.iter().filter(|&&one| one == class).count();
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_card_hides_from_the_sample_is_disoccluded() {
+    fn a_surface_behind_the_card_is_disoccluded() {
         let (camera, depth) = card_before_wall(0.0);
         let classes = classify(&camera, &depth, &[sample(0.4)]).unwrap();
         // The card's shadow on the wall moves by 0.4 m of 4 m: 0.4 · f / 4 columns of the view, less the silhouette.

@@ -8,26 +8,26 @@ use crate::{
     max_channel_difference, pdiff_map, psnr_db, ssim_map,
 };
 
-/// PSNR is infinite for equal images, which JSON cannot say: in reports anything above this *is* this, and
-/// reads "at least". Below it nothing is lost; `null` is left to mean that there was no pixel.
+/// The PSNR of equal images in reports: JSON has no infinity. A value above is written as this one, which reads "at
+/// least"; `null` means that there was no pixel.
 pub const PSNR_CAP_DB: f64 = 99.99;
 
 /// The errors of one set of pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ImageErrors {
-    /// Pixels in the set.
+    /// The number of pixels.
     pub pixels: usize,
-    /// Infinite where all are equal, written as at most [`PSNR_CAP_DB`]; `None` without pixels.
+    /// PSNR, infinite for equal images and written as at most [`PSNR_CAP_DB`]; `None` without pixels.
     #[serde(serialize_with = "capped_db")]
     pub psnr_db: Option<f64>,
-    /// Mean over the pixels whose 7×7 window lies in the image; `None` without any. Near a class's border
-    /// the window takes in pixels of other classes.
+    /// Mean SSIM over the pixels whose 7×7 window lies in the image; `None` without any. Near the border of a class,
+    /// the window has pixels of other classes.
     pub ssim: Option<f64>,
-    /// Mean of LDR-FLIP; `None` without pixels.
+    /// Mean LDR-FLIP; `None` without pixels.
     pub flip: Option<f64>,
-    /// Pixels that fail Yee's perceptual difference.
+    /// The number of pixels that fail Yee's perceptual difference.
     pub pdiff_failing_px: usize,
-    /// Greatest difference in any channel, 8-bit steps; `None` without pixels.
+    /// The greatest difference in any channel, in 8-bit steps; `None` without pixels.
     pub max_channel_difference: Option<u8>,
 }
 
@@ -44,12 +44,12 @@ pub struct ClassErrors {
     pub background: ImageErrors,
 }
 
-/// What [`compare`] finds.
+/// The result of [`compare`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Of all pixels.
+    /// Errors of all pixels.
     pub overall: ImageErrors,
-    /// Of each class, if classes were given.
+    /// Errors of each class, if classes were given.
     pub by_class: Option<ClassErrors>,
     /// FLIP at every pixel, for error maps.
     #[serde(skip)]
@@ -59,7 +59,7 @@ pub struct Comparison {
 /// Compares two images by every metric, overall and, with one class a pixel, by class.
 ///
 /// # Errors
-/// Images or classes of different sizes.
+/// Images or classes differ in size.
 pub fn compare(
     reference: &Rgb8Image,
     test: &Rgb8Image,
@@ -70,7 +70,7 @@ pub fn compare(
     Ok(Comparison { overall: maps.errors(None)?, by_class, flip_map: maps.flip })
 }
 
-/// The maps that the means are taken from.
+/// Maps that the means are taken from.
 struct Maps<'a> {
     reference: &'a Rgb8Image<'a>,
     test: &'a Rgb8Image<'a>,

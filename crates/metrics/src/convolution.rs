@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-/// What lies beyond the image's edge.
+/// The extension of an image beyond its edge.
 #[derive(Clone, Copy)]
 pub(crate) enum Edge {
-    /// The edge pixel, again and again.
+    /// The edge pixel is repeated.
     Repeat,
-    /// The image mirrored about the edge pixel's centre.
+    /// The image is mirrored about the edge pixel's centre.
     Mirror,
 }
 

@@ -1,45 +1,45 @@
-//! How wrong a reconstructed depth is, and how often it is no answer at all.
+//! Errors of reconstructed depth, and the rate of pixels without an answer.
 
 use serde::Serialize;
 
 use crate::{DepthPlane, MetricsError, error::expect_mask};
 
-/// A hit that is off by more than this share of the true depth is a wrong hit.
+/// The relative depth error above which a hit is wrong.
 pub const WRONG_HIT_RELATIVE: f64 = 0.01;
 
 /// Errors of planar depth. In the test plane, above 0 is a HIT, 0 a MISS, below 0 (and NaN) UNKNOWN.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct DepthErrors {
-    /// Pixels compared.
+    /// The number of pixels compared.
     pub pixels: usize,
-    /// Pixels whose reference shows a surface.
+    /// Pixels whose reference has a surface.
     pub foreground_px: usize,
     /// Test pixels with a depth.
     pub hit_px: usize,
-    /// Test pixels that are sure to show nothing.
+    /// Test pixels that are certain to show nothing.
     pub miss_px: usize,
-    /// Test pixels without an answer, to be filled from elsewhere; in no error below.
+    /// Test pixels without an answer, which count in no error below.
     pub unknown_px: usize,
-    /// Hits off by more than 1 % in depth, and hits where the reference shows nothing.
+    /// Hits off by more than 1 % in depth, and hits where the reference has nothing.
     pub wrong_hit_px: usize,
-    /// Misses where the reference shows a surface.
+    /// Misses where the reference has a surface.
     pub wrong_miss_px: usize,
     /// `wrong_hit_px / hit_px`.
     pub wrong_hit_rate: Option<f64>,
     /// `unknown_px / pixels`.
     pub unknown_rate: Option<f64>,
-    /// Median of |z' - z| / z, over hits where the reference shows a surface.
+    /// The median of |z' - z| / z, over hits where the reference has a surface.
     pub relative_p50: Option<f64>,
-    /// Its 95th percentile.
+    /// The 95th percentile.
     pub relative_p95: Option<f64>,
-    /// Its maximum.
+    /// The maximum.
     pub relative_max: Option<f64>,
 }
 
 /// Compares planes of inverse planar depth of one camera, over all pixels or those of a mask.
 ///
 /// # Errors
-/// Planes or mask of different sizes.
+/// Planes or mask differ in size.
 pub fn depth_errors(
     reference: &DepthPlane,
     test: &DepthPlane,

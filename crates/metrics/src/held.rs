@@ -1,9 +1,9 @@
-//! Which surfaces an image holds: the pixel redundancy that sampling is judged by (Xie §6.1.2).
+//! Surfaces that an image holds: pixel redundancy, the measure of sampling methods (Xie §6.1.2).
 
 use depth_image::{Camera, DepthImage, SurfaceId};
 use glam::{Vec3, Vec4};
 
-/// An image's surface ids, to be asked for many points.
+/// The surface ids of an image.
 #[derive(Debug, Clone, Copy)]
 pub struct Held<'a> {
     homogeneous_pixel_from_world: [Vec4; 3],
@@ -14,19 +14,19 @@ pub struct Held<'a> {
     ids: &'a [SurfaceId],
 }
 
-/// A sample's place in its image, in the world, and its surface.
+/// A sample: its place in the image and in the world, and its surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldSample {
-    /// Row by row.
+    /// The index in the image, row by row.
     pub index: usize,
-    /// Where it lies.
+    /// The position in the world.
     pub point_in_world: Vec3,
-    /// Of which triangle.
+    /// The id of the triangle.
     pub id: SurfaceId,
 }
 
 impl<'a> Held<'a> {
-    /// `None` for an image without surface ids.
+    /// The surfaces of an image; `None` without surface ids.
     #[must_use]
     pub fn of(image: &'a DepthImage) -> Option<Self> {
         let Camera::Pinhole(camera) = &image.camera;
@@ -41,8 +41,7 @@ impl<'a> Held<'a> {
         })
     }
 
-    /// Whether the image has a sample of the same triangle at the pixel that the point is seen at (Xie,
-    /// Algorithm 3).
+    /// True if the image has a sample of the same triangle at the pixel where the point is seen (Xie, Algorithm 3).
     #[must_use]
     pub fn has(&self, sample: &HeldSample) -> bool {
         let p = sample.point_in_world.extend(1.0);

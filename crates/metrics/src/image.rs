@@ -1,4 +1,4 @@
-//! What is compared: views of pixels, borrowed or owned, whose sizes are known to be right.
+//! Images and depth planes to compare: borrowed or owned, of a size that is checked.
 
 use std::borrow::Cow;
 

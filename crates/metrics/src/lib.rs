@@ -1,8 +1,8 @@
 //! Image, depth and visibility error.
 //!
-//! Every number that a chart, a check or a planner quotes is made here, from 8-bit sRGB images and
-//! planes of inverse depth. Each image metric gives a map first and a mean second, so that any of them
-//! can be split by [`PixelClass`]; [`compare`] does that for all of them at once.
+//! All numbers of charts and checks are made here, from 8-bit sRGB images and planes of inverse depth. Each image
+//! metric gives a map first and a mean second, so that it can be split by [`PixelClass`]. [`compare`] does that for all
+//! metrics at once.
 //!
 //! | metric | what it is | agrees with |
 //! |---|---|---|

@@ -6,7 +6,7 @@ use crate::{MetricsError, Rgb8Image, error::expect_mask};
 /// for an empty mask.
 ///
 /// # Errors
-/// Images or mask of different sizes.
+/// Images or mask differ in size.
 pub fn psnr_db(reference: &Rgb8Image, test: &Rgb8Image, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
     Ok(mean_squared_error(reference, test, mask)?.map(db_from_mean_squared_error))
 }
@@ -14,7 +14,7 @@ pub fn psnr_db(reference: &Rgb8Image, test: &Rgb8Image, mask: Option<&[bool]>) -
 /// The mean over pixels and channels of the squared difference in 8-bit steps; `None` for an empty mask.
 ///
 /// # Errors
-/// Images or mask of different sizes.
+/// Images or mask differ in size.
 pub fn mean_squared_error(
     reference: &Rgb8Image,
     test: &Rgb8Image,
@@ -28,7 +28,7 @@ pub fn mean_squared_error(
 /// The greatest difference in any channel, in 8-bit steps; `None` for an empty mask.
 ///
 /// # Errors
-/// Images or mask of different sizes.
+/// Images or mask differ in size.
 pub fn max_channel_difference(
     reference: &Rgb8Image,
     test: &Rgb8Image,
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn identical_is_infinite_and_an_empty_mask_is_none() {
+    fn identical_images_have_infinite_psnr_and_an_empty_mask_has_no_mean() {
         assert_eq!(psnr_db(&flat(7), &flat(7), None).unwrap(), Some(f64::INFINITY));
         assert_eq!(psnr_db(&flat(7), &flat(9), Some(&[false; 12])).unwrap(), None);
     }

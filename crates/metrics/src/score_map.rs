@@ -2,8 +2,8 @@
 
 use crate::{MetricsError, error::expect_mask};
 
-/// A metric's value at every pixel. A metric that needs a window has none within `border_px` of the
-/// image's edge; those pixels hold 0 and are in no mean.
+/// A metric's value at every pixel. A metric with a window has no value within `border_px` of the image's edge; those
+/// pixels hold 0 and are in no mean.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoreMap {
     pub(crate) width_px: u32,
@@ -19,7 +19,7 @@ impl ScoreMap {
         (self.width_px, self.height_px)
     }
 
-    /// Pixels at each edge without a value.
+    /// The number of pixels at each edge without a value.
     #[must_use]
     pub fn border_px(&self) -> u32 {
         self.border_px
@@ -31,11 +31,10 @@ impl ScoreMap {
         &self.values
     }
 
-    /// The mean over all pixels that have a value, or over those also in the mask; `None` where that
-    /// is none.
+    /// The mean over all pixels with a value, or over those in the mask; `None` without such pixels.
     ///
     /// # Errors
-    /// A mask of another size.
+    /// The mask has another size.
     pub fn mean(&self, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
         expect_mask(mask, self.values.len())?;
         let selected = |index: &usize| mask.is_none_or(|mask| mask[*index]);

@@ -1,7 +1,6 @@
-//! Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004), with the choices that scikit-image's
-//! `structural_similarity(a, b, channel_axis=2)` makes for 8-bit images: a 7×7 uniform window, the
-//! sample covariance (divided by n-1), `K1 = 0.01`, `K2 = 0.03`, and the mean over the pixels whose whole
-//! window lies in the image.
+//! Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004). The choices are those of scikit-image's
+//! `structural_similarity(a, b, channel_axis=2)` for 8-bit images: a 7×7 uniform window, the sample covariance (divided
+//! by n-1), `K1 = 0.01` and `K2 = 0.03`. The mean is over the pixels whose whole window lies in the image.
 //!
 //! Window sums of 8-bit values are whole numbers, so they are exact here.
 
@@ -17,10 +16,10 @@ const SAMPLES: f64 = (SSIM_WINDOW_PX * SSIM_WINDOW_PX) as f64;
 const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
 const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 
-/// Structural similarity, mean of the three channels, of the window around every pixel.
+/// The structural similarity of the window around every pixel, mean of the three channels.
 ///
 /// # Errors
-/// Images of different sizes, or smaller than the window.
+/// Images differ in size, or are smaller than the window.
 pub fn ssim_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, MetricsError> {
     reference.expect_same_size(test)?;
     let (width_px, height_px) = reference.size_px();

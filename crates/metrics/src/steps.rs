@@ -1,18 +1,18 @@
-//! Where depth is discontinuous.
+//! Discontinuities of depth.
 //!
-//! Inverse depth is linear in the image on a plane, whatever its slope, so a slope alone is no step. Between
-//! neighbours *a* and *b* the jump is foretold from the jumps before *a* and after *b*: on a plane all three
-//! are equal, and at a crease the middle one lies between the others. There is a **step** where the jump lies
-//! outside the range of the two by more than [`STEP_RELATIVE`] of the larger inverse depth, and wherever one
-//! of the two is a surface and the other is not. The measure is a ratio: scenes have no scale here.
+//! Inverse depth is linear in the image on a plane of any slope, so a slope alone is no step. The jump between
+//! neighbours *a* and *b* is predicted from the jumps before *a* and after *b*. On a plane all three are equal, and at
+//! a crease the middle one lies between the others. There is a **step** where the jump lies outside their range by more
+//! than [`STEP_RELATIVE`] of the larger inverse depth. There is also one where only one of the two is a surface. The
+//! measure is a ratio: scenes have no scale here.
 
-/// The least step, as a share of the larger inverse depth: what is also the least depth error to matter.
+/// The least step, as a share of the larger inverse depth; also the least depth error that counts.
 pub const STEP_RELATIVE: f32 = 0.01;
 
-/// Pixels on either side of a step that are near it: centres 0.5 and 1.5 px away.
+/// The number of pixels on either side of a step that are near it: centres 0.5 and 1.5 px away.
 const NEAR_PX: usize = 2;
 
-/// Which pixels lie within 2 px of a step. `inverse_depth_per_m` has whole rows of `width_px`.
+/// Marks pixels within 2 px of a step. `inverse_depth_per_m` has whole rows of `width_px`.
 #[must_use]
 pub fn step_pixels(inverse_depth_per_m: &[f32], width_px: u32) -> Vec<bool> {
     let width = width_px as usize;
@@ -36,13 +36,13 @@ struct Line {
 }
 
 impl Line {
-    /// The surface at a position; `None` outside the image and where there is none.
+    /// The surface at a position; `None` outside the image and without a surface.
     fn surface(self, inverse_depth: &[f32], at: isize) -> Option<f32> {
         let at = usize::try_from(at).ok().filter(|&at| at < self.len)?;
         Some(inverse_depth[self.start + at * self.stride]).filter(|&depth| depth > 0.0)
     }
 
-    /// Whether there is a step between positions `at` and `at + 1`.
+    /// True if there is a step between positions `at` and `at + 1`.
     fn steps_after(self, inverse_depth: &[f32], at: isize) -> bool {
         let [before, a, b, after] = [-1, 0, 1, 2].map(|offset| self.surface(inverse_depth, at + offset));
         match (a, b) {
@@ -55,8 +55,8 @@ impl Line {
     }
 }
 
-/// Whether a jump lies outside what its neighbours foretell. A missing neighbour foretells what the other
-/// does; if both are missing, none is foretold.
+/// True if a jump lies outside the range that its neighbours predict. Without one neighbour, the other predicts alone;
+/// without both, there is no prediction.
 fn jump_is_step(jump: f32, before: Option<f32>, after: Option<f32>, larger: f32) -> bool {
     let first = before.or(after).unwrap_or(0.0);
     let second = after.or(before).unwrap_or(0.0);

@@ -1,4 +1,4 @@
-//! Flicker: how far the change from one frame to the next is from the reference's change.
+//! Flicker: the change from frame to frame against the reference's change.
 
 use crate::{MetricsError, Rgb8Image, psnr::db_from_mean_squared_error};
 
@@ -6,7 +6,7 @@ use crate::{MetricsError, Rgb8Image, psnr::db_from_mean_squared_error};
 /// where both change alike.
 ///
 /// # Errors
-/// Images of different sizes.
+/// Images differ in size.
 pub fn temporal_psnr_db(reference: [&Rgb8Image; 2], test: [&Rgb8Image; 2]) -> Result<f64, MetricsError> {
     for image in [reference[1], test[0], test[1]] {
         reference[0].expect_same_size(image)?;

@@ -1,4 +1,4 @@
-//! Device and codec work, away from the threads that serve connections.
+//! Work of devices and codecs, away from the threads that serve connections.
 
 use tonic::Status;
 

@@ -1,4 +1,4 @@
-//! A plan as seen from one view cell.
+//! The plan of one view cell.
 
 use std::ops::Deref;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use cluster::Assignment;
 use tonic::Status;
 
-/// The plan of one view cell: its images are all the images there are. Clones share it.
+/// The plan of one view cell, without the images of other cells. Clones share it.
 #[derive(Debug, Clone)]
 pub struct CellPlan {
     plan: Arc<Assignment>,
@@ -15,6 +15,8 @@ pub struct CellPlan {
 }
 
 impl CellPlan {
+    /// The part of `plan` for one view cell.
+    ///
     /// # Errors
     /// For a cell beyond the plan's last.
     pub fn of(plan: &Arc<Assignment>, cell: u32) -> Result<Self, Status> {
@@ -26,13 +28,13 @@ impl CellPlan {
         Ok(Self { plan: Arc::new(plan.of_cell(cell).ok_or_else(beyond)?), cell, cell_count })
     }
 
-    /// Into the plan's view cells.
+    /// Index into the plan's view cells.
     #[must_use]
     pub fn cell(&self) -> u32 {
         self.cell
     }
 
-    /// View cells of the plan.
+    /// The number of view cells of the whole plan.
     #[must_use]
     pub fn cell_count(&self) -> usize {
         self.cell_count

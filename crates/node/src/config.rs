@@ -1,4 +1,4 @@
-//! One resolved configuration; where its values come from is the program's business.
+//! The resolved configuration of a node; its sources are the program's.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -10,19 +10,19 @@ pub struct NodeConfig {
     pub node_name: String,
     /// The coordinator, as `http://host:port`.
     pub coordinator: String,
-    /// Where others reach this node; `None`: the address it listens on.
+    /// The address at which others reach this node; `None`: the one it listens on.
     pub advertised_address: Option<String>,
     /// Scene packages by hash.
     pub scene_folder: Option<PathBuf>,
     /// Allows another bind address than loopback, without TLS.
     pub insecure_bind: bool,
-    /// Says by reflection what services and messages there are.
+    /// Serves reflection: the names of services and messages.
     pub reflection: bool,
-    /// Most bytes of encoded sample images that are kept for compositors that come later.
-    pub kept_sample_bytes: usize,
-    /// How long to wait.
+    /// Most bytes of encoded sample images that are cached for later requests.
+    pub sample_cache_bytes: usize,
+    /// Deadlines of streams.
     pub deadlines: Deadlines,
-    /// How much to take on.
+    /// Bounds on the work in flight.
     pub quotas: Quotas,
 }
 
@@ -37,23 +37,23 @@ impl NodeConfig {
             scene_folder: None,
             insecure_bind: false,
             reflection: false,
-            kept_sample_bytes: 1 << 30,
+            sample_cache_bytes: 1 << 30,
             deadlines: Deadlines::default(),
             quotas: Quotas::default(),
         }
     }
 }
 
-/// How long a stream may be silent.
+/// The longest silence of each kind of stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Deadlines {
     /// A client's stream of poses, while none of its frames is due.
     pub idle: Duration,
     /// A sampler's first chunk: the device may be slow.
     pub work: Duration,
-    /// Between chunks of what is ready.
+    /// Between chunks of images that are ready.
     pub chunk: Duration,
-    /// A client that takes none of the frames that are ready for it.
+    /// A client that takes none of the frames that wait for it.
     pub stall: Duration,
 }
 
@@ -68,15 +68,15 @@ impl Default for Deadlines {
     }
 }
 
-/// What a node takes on for all its clients together. What is beyond is refused with `RESOURCE_EXHAUSTED`, before memory
-/// is taken for it.
+/// Bounds on the work in flight for all clients together. Requests beyond are refused with `RESOURCE_EXHAUSTED`, before
+/// memory is taken for them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quotas {
-    /// Clients' streams that are open.
+    /// Open streams of clients.
     pub streams: usize,
-    /// Views of batches that wait, or are not sent yet.
+    /// Views of batches that are waiting or not sent yet.
     pub views: usize,
-    /// Pixels of them; and as many of live streams' views.
+    /// Pixels of these views; and as many of live streams' views.
     pub pixels: usize,
 }
 

@@ -1,4 +1,4 @@
-//! One channel a peer.
+//! Channels to peers.
 
 use std::collections::HashMap;
 
@@ -13,10 +13,10 @@ use wire::rpc::connect;
 pub struct Connections(Mutex<HashMap<String, Channel>>);
 
 impl Connections {
-    /// The channel to an address, made when first asked for.
+    /// The channel to an address, connected on first use.
     ///
     /// # Errors
-    /// Where nobody answers there.
+    /// Where the address does not answer.
     pub async fn to(&self, address: &str) -> Result<Channel, Status> {
         if let Some(channel) = self.0.lock().await.get(address) {
             return Ok(channel.clone());

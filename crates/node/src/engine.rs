@@ -8,54 +8,54 @@ use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, View, V
 use glam::Vec3;
 use tonic::Status;
 
-/// What a node can do on its device. Calls block; services run them on blocking threads. Methods,
-/// sampling and lighting are text, as on the command line, parsed here.
+/// The operations of a node's device. Calls block; services run them on blocking threads. Methods, sampling and lighting are
+/// text, as on the command line, and are parsed here.
 pub trait Engine: Send + Sync + 'static {
-    /// As every reported time names it.
+    /// The device's name, which every reported time is listed with.
     fn device_name(&self) -> String;
     /// Whether the device is a CPU.
     fn is_software(&self) -> bool;
-    /// Loads a scene package, whose bytes have been checked against the hash, and keeps it under it;
-    /// gives the seconds spent.
+    /// Loads a scene package, whose bytes have been checked against the hash, under its hash; gives the seconds that this
+    /// took.
     ///
     /// # Errors
     /// Where the package cannot be read or the device cannot hold it.
     fn load_scene(&self, hash: &str, package: &[u8]) -> Result<f64, EngineError>;
-    /// Whether [`Engine::load_scene`] has been here.
+    /// Whether [`Engine::load_scene`] has loaded the scene.
     fn has_scene(&self, hash: &str) -> bool;
-    /// Whether a sampling method takes an image only after those before it, so that a set stays on one node.
+    /// Whether an image depends on the images before it, so that one node samples a whole set.
     ///
     /// # Errors
-    /// For a method it does not know.
-    fn samples_in_order(&self, sampling: &str) -> Result<bool, EngineError>;
-    /// Whether an image depends on its own camera alone, so that it can be cut into tiles.
+    /// For an unknown method.
+    fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError>;
+    /// Whether an image depends on its own camera alone, so that it is tileable.
     ///
     /// # Errors
-    /// For a method it does not know.
-    fn samples_alone(&self, sampling: &str) -> Result<bool, EngineError>;
-    /// The wanted images of a set, in their order.
+    /// For an unknown method.
+    fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError>;
+    /// Samples the wanted images of a set, in their order.
     ///
     /// # Errors
-    /// For settings it does not know, a scene it has not, or a device that fails.
+    /// For unknown settings, a scene that is not loaded, or a device that fails.
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError>;
-    /// Makes a set ready to be reconstructed from.
+    /// Uploads a set for reconstruction.
     ///
     /// # Errors
-    /// For images it cannot take, or a device that fails.
+    /// For images that the device cannot take, or a device that fails.
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError>;
-    /// One view a camera, in one submission.
+    /// Reconstructs one view for each camera, in one submission.
     ///
     /// # Errors
-    /// For settings it does not know, or a device that fails.
+    /// For unknown settings, or a device that fails.
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError>;
-    /// One view a camera, from the scene itself.
+    /// Draws one view for each camera from the scene itself.
     ///
     /// # Errors
-    /// For settings it does not know, a scene it has not, or a device that fails.
+    /// For unknown settings, a scene that is not loaded, or a device that fails.
     fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError>;
 }
 
-/// A sample set on the device; the engine knows what it is.
+/// A sample set on the device; the engine downcasts it to its own type.
 pub trait UploadedSet: Any + Send + Sync {}
 
 /// Images to sample.
@@ -63,47 +63,47 @@ pub trait UploadedSet: Any + Send + Sync {}
 pub struct SampleWork {
     /// A loaded scene.
     pub scene_hash: String,
-    /// Of the whole set, in its order: what an image shows may depend on the cameras before its own.
+    /// The cameras of the whole set, in its order: an image may depend on the cameras before its own.
     pub cameras: Vec<Camera>,
-    /// Which of them are to be sampled.
+    /// Indices of the cameras to sample.
     pub wanted: Vec<u32>,
     /// The sampling method.
     pub sampling: String,
-    /// The reconstruction method, which says what planes images need.
+    /// The reconstruction method, which decides which planes images need.
     pub method: String,
     /// The lighting.
     pub lighting: String,
-    /// Where animation stands.
+    /// Scene time of the animation.
     pub scene_time_s: f32,
-    /// Where it stood in the set that this one keeps on to the samples of, where the sampling method settles.
-    pub settled_at_s: Option<f32>,
-    /// How far its light has come. Any step may be asked for first, or alone.
+    /// Scene time of the temporal reference, for sampling methods with temporal hysteresis.
+    pub temporal_reference_s: Option<f32>,
+    /// How far the light is refined. Any step may be asked for first, or alone.
     pub refinement: Refinement,
 }
 
 /// The images of one set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleSet {
-    /// One a sample camera, in their order.
+    /// One image for each sample camera, in their order.
     pub images: Vec<DepthImage>,
-    /// What reconstruction looks at.
+    /// The bounds of reconstruction.
     pub volume: Aabb,
-    /// What rays meet that leave the scene.
+    /// Radiance of rays that leave the scene, linear RGB.
     pub background_linear: Vec3,
-    /// Of the scene: what highlights are made of, in the order of the images' visibility.
+    /// The scene's lamps and environment, for highlights; in the order of the images' visibility.
     pub illumination: Illumination,
-    /// The lighting that the images were sampled with: whose formula highlights follow.
+    /// The lighting that the images were sampled with; highlights follow its formula.
     pub lighting: String,
 }
 
 /// Views to reconstruct.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewWork {
-    /// All of one size.
+    /// Cameras of one size.
     pub cameras: Vec<PinholeCamera>,
     /// The reconstruction method.
     pub method: String,
-    /// Beside colour.
+    /// Planes beside colour.
     pub planes: ViewPlanes,
 }
 
@@ -112,37 +112,30 @@ pub struct ViewWork {
 pub struct DirectWork {
     /// A loaded scene.
     pub scene_hash: String,
-    /// All of one size.
+    /// Cameras of one size.
     pub cameras: Vec<PinholeCamera>,
     /// The lighting.
     pub lighting: String,
-    /// Where animation stands.
+    /// Scene time of the animation.
     pub scene_time_s: f32,
-    /// Beside colour.
+    /// Planes beside colour.
     pub planes: ViewPlanes,
 }
 
-/// Why the device did not do it.
+/// Why an operation of the device failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum EngineError {
     /// A setting that cannot be used.
     #[error("{field}: {reason}")]
-    InvalidArgument {
-        /// Which.
-        field: &'static str,
-        /// Why.
-        reason: String,
-    },
+    InvalidArgument { field: &'static str, reason: String },
     /// A scene that was never loaded.
     #[error("scene {hash} is not loaded")]
-    UnknownScene {
-        /// Which.
-        hash: String,
-    },
-    /// The device, or its memory, could not do this one thing.
+    UnknownScene { hash: String },
+    /// The device, or its memory, failed in this one operation.
     #[error("device: {0}")]
     Device(String),
-    /// The device does nothing any more.
+    /// The device is lost for all operations.
     #[error("device lost: {0}")]
     Lost(String),
 }

@@ -1,17 +1,18 @@
-//! What every service shares: the device's boundary, configuration, logging, health, measured costs,
-//! the plan in force, scenes by hash, membership and drain.
+//! The parts that all services share: the device's boundary, configuration, logging, health, measured costs, the plan in
+//! force, scenes by hash, membership and drain.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod blocking;
 mod cell_plan;
 mod config;
 mod connections;
+mod device_loss;
 mod engine;
-mod incoming;
 mod logging;
 mod measure;
 mod membership;
 mod plan;
+mod preface;
 mod relay;
 mod scenes;
 mod server;
@@ -19,13 +20,13 @@ mod service;
 mod streams;
 mod telemetry;
 mod warm;
-mod watched;
 mod work_done;
 
 pub use blocking::blocking;
 pub use cell_plan::CellPlan;
 pub use config::{Deadlines, NodeConfig, Quotas};
 pub use connections::Connections;
+pub use device_loss::DeviceLossMonitor;
 pub use engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 pub use logging::init_logging;
 pub use measure::{MeasureError, measure_costs};
@@ -37,5 +38,4 @@ pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve, with_reflection}
 pub use service::NodeService;
 pub use streams::{next_within, until_drained, with_guard};
 pub use telemetry::{NodeMetrics, Reason, Telemetry};
-pub use watched::Watched;
 pub use work_done::{Operation, Sums, WorkDone};

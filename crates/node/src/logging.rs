@@ -2,7 +2,7 @@
 
 use tracing_subscriber::EnvFilter;
 
-/// Starts logging; `default_filter` holds where `RUST_LOG` says nothing. A second call does nothing.
+/// Starts logging; `default_filter` applies where `RUST_LOG` is not set. A second call does nothing.
 pub fn init_logging(default_filter: &str) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default_filter));
     let logging = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);

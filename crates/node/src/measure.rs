@@ -1,5 +1,5 @@
-//! What operations cost on this node, each alone and warm: pictures as they are when finished, by the session's
-//! lighting, so that g_s and g_v hold all the light that samplers compute and c what compositors add.
+//! Measured costs of this node's operations, each alone and warm. Pictures are finished, by the session's lighting: g_s and
+//! g_v hold all light that samplers compute, and c the light that compositors add.
 
 use std::time::Instant;
 
@@ -11,21 +11,20 @@ use tonic::Status;
 
 use crate::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 
-/// Runs of one operation, after one that does not count: shaders are built in it.
+/// Runs of one operation after a warm-up, in which shaders are built.
 const RUNS: usize = 3;
-/// A run that takes longer stays the only one that counts: under heavy light it may take seconds, of which little is
-/// chance.
+/// A run that takes longer is not repeated: with expensive lighting it takes seconds, and varies little.
 const LONG_RUN_S: f64 = 0.5;
-/// Views drawn in one call take about so long at most, unless one alone takes longer.
+/// The longest time of views that are drawn in one call, unless one alone takes longer.
 const DIRECT_CALL_S: f64 = 1.0;
 
 /// Why costs could not be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
-    /// The device.
+    /// The device failed.
     #[error(transparent)]
     Engine(#[from] EngineError),
-    /// Encoding or decoding; the text names what.
+    /// Encoding or decoding failed.
     #[error("codec: {0}")]
     Codec(String),
 }
@@ -49,9 +48,9 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
     let (encoded, sample_s) = timed(|| sampled(engine, &sample))?;
     let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?)?))?;
     let (made, reconstruct_view_s) = reconstruct_view_s(engine, set.as_ref(), request)?;
-    let in_order = engine.samples_in_order(&workload.sampling)?;
+    let in_order = engine.images_are_sequential(&workload.sampling)?;
     let sample_image_s = sample_s / encoded.len().max(1) as f64;
-    let is_tileable = engine.samples_alone(&workload.sampling)?;
+    let is_tileable = engine.images_are_independent(&workload.sampling)?;
     Ok(Costs {
         sample_image_s,
         tiles: if is_tileable { tile_costs(engine, &sample, sample_image_s)? } else { None },
@@ -69,8 +68,8 @@ fn sampled(engine: &dyn Engine, work: &SampleWork) -> Result<Vec<EncodedDepthIma
     images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec)).collect()
 }
 
-/// The overhead of a tile, by a tile of one row, and the shares of rows, by quarters of the height, each of another image,
-/// for images differ. Images of too few rows are not tileable.
+/// The overhead of a tile, measured on a tile of one row, and the shares of rows, measured on quarters of the height. Each
+/// quarter is of another image, since images differ. Images of too few rows are not tileable.
 fn tile_costs(engine: &dyn Engine, whole: &SampleWork, sample_image_s: f64) -> Result<Option<TileCosts>, MeasureError> {
     let Some(Camera::Pinhole(first)) = whole.cameras.first().copied() else { return Ok(None) };
     if whole.cameras.iter().any(|Camera::Pinhole(camera)| (camera.size_px.y as usize) < ROW_PARTS) {
@@ -108,12 +107,12 @@ pub(crate) fn sample_work(workload: &Workload) -> SampleWork {
         method: workload.method.clone(),
         lighting: workload.lighting.clone(),
         scene_time_s: workload.timeline.start_s as f32,
-        settled_at_s: None,
+        temporal_reference_s: None,
         refinement: Refinement::default(),
     }
 }
 
-/// Of all typical views, in calls of the batch's size; with some views that were made.
+/// The cost of one view over all typical views, in calls of the batch's size; with some of the views.
 fn reconstruct_view_s(
     engine: &dyn Engine,
     set: &dyn UploadedSet,
@@ -132,8 +131,8 @@ fn reconstruct_view_s(
     Ok((made, seconds / views.len() as f64))
 }
 
-/// Measured on as many views as there is time for: fixed costs are shared as in real batches where a view is cheap,
-/// and hardly matter where it is not.
+/// Measured on as many views as time allows. Fixed costs are shared as in real batches where a view is quick, and hardly
+/// matter where it is not.
 fn direct_view_s(engine: &dyn Engine, request: &MeasureCosts) -> Result<f64, MeasureError> {
     let draw = |views: u32| {
         Ok(engine.draw_direct(&direct_work(&request.workload, request.views(views), request.planes)).map(drop)?)
@@ -147,9 +146,9 @@ fn direct_view_s(engine: &dyn Engine, request: &MeasureCosts) -> Result<f64, Mea
     Ok(direct_s / f64::from(views))
 }
 
-/// How many views to draw in one call, where one alone takes so long.
+/// The number of views to draw in one call, where one alone takes `alone_s`.
 fn direct_views(alone_s: f64, most: u32) -> u32 {
-    // A cast saturates: views that take no time are as many as may be.
+    // A cast saturates: views that take no time give the largest batch.
     ((DIRECT_CALL_S / alone_s) as u32).clamp(1, most.max(1))
 }
 
@@ -182,7 +181,8 @@ pub(crate) fn sample_set(workload: &Workload, images: Vec<DepthImage>) -> Sample
     }
 }
 
-/// Of all views of the batch: one alone ends within a time slice, in which a node with a quota is as fast as any.
+/// The mean cost over all views of the batch. A single view ends within a time slice, in which a node with a CPU quota is
+/// as fast as any.
 fn encode_s(made: &[View], codec_name: &str) -> Result<f64, MeasureError> {
     let frame_codec: FrameCodec = codec_name.parse().map_err(codec)?;
     let ((), seconds) =
@@ -190,8 +190,8 @@ fn encode_s(made: &[View], codec_name: &str) -> Result<f64, MeasureError> {
     Ok(seconds / made.len().max(1) as f64)
 }
 
-/// The result of one run that does not count, and the median time of those that do: one long run, or [`RUNS`].
-/// How many is judged by the first that counts, for the one before may have spent its time on shaders.
+/// The result of a warm-up, and the median time of the runs after it: one long run, or [`RUNS`]. The first run after the
+/// warm-up decides how many, since the warm-up may have built shaders.
 fn timed<T>(mut run: impl FnMut() -> Result<T, MeasureError>) -> Result<(T, f64), MeasureError> {
     let result = run()?;
     let mut seconds = Vec::with_capacity(RUNS);
@@ -204,7 +204,7 @@ fn timed<T>(mut run: impl FnMut() -> Result<T, MeasureError>) -> Result<(T, f64)
     Ok((result, seconds[seconds.len() / 2]))
 }
 
-/// Runs that count, where the first took so long.
+/// The number of runs, by the time of the first.
 fn runs_after(first_s: Option<f64>) -> usize {
     if first_s.is_some_and(|first_s| first_s > LONG_RUN_S) { 1 } else { RUNS }
 }

@@ -1,4 +1,4 @@
-//! How often operations run, on a device that takes as long as it is told.
+//! The number of runs of each operation, on a device with given times.
 
 use std::any::Any;
 use std::sync::{Arc, Mutex};
@@ -11,19 +11,19 @@ use glam::{UVec2, Vec3};
 use super::*;
 use crate::UploadedSet;
 
-/// Sleeps, and notes what it was asked.
+/// A device that sleeps and notes its calls.
 #[derive(Default)]
 pub(crate) struct Sleeper {
     sample_s: f64,
     direct_view_s: f64,
     build_s: f64,
-    /// Of an image, and of each of its rows; then images may be cut.
+    /// Seconds of an image, and of each of its rows; images are then tileable.
     parts_s: Option<(f64, [f64; 4])>,
-    pub(crate) asked: Mutex<Asked>,
+    pub(crate) calls: Mutex<Calls>,
 }
 
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Asked {
+pub(crate) struct Calls {
     pub(crate) refinements: Vec<Refinement>,
     pub(crate) drawn_views: Vec<usize>,
     pub(crate) uploads: Vec<(Illumination, bool)>,
@@ -86,16 +86,16 @@ impl Engine for Sleeper {
         true
     }
 
-    fn samples_alone(&self, _: &str) -> Result<bool, EngineError> {
+    fn images_are_independent(&self, _: &str) -> Result<bool, EngineError> {
         Ok(self.parts_s.is_some())
     }
 
-    fn samples_in_order(&self, _: &str) -> Result<bool, EngineError> {
+    fn images_are_sequential(&self, _: &str) -> Result<bool, EngineError> {
         Ok(false)
     }
 
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
-        self.asked.lock().unwrap().refinements.push(request.refinement);
+        self.calls.lock().unwrap().refinements.push(request.refinement);
         let parts_s: f64 = request.cameras.iter().map(|camera| self.sample_parts_s(camera)).sum();
         std::thread::sleep(Duration::from_secs_f64(self.sample_s + parts_s));
         Ok(request.cameras.iter().map(image).collect())
@@ -103,7 +103,7 @@ impl Engine for Sleeper {
 
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
         let shiny = set.images.iter().all(|image| image.specular.is_some());
-        self.asked.lock().unwrap().uploads.push((set.illumination.clone(), shiny));
+        self.calls.lock().unwrap().uploads.push((set.illumination.clone(), shiny));
         Ok(Arc::new(Nothing))
     }
 
@@ -114,9 +114,9 @@ impl Engine for Sleeper {
     }
 
     fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
-        let mut asked = self.asked.lock().unwrap();
-        let build_s = if asked.drawn_views.is_empty() { self.build_s } else { 0.0 };
-        asked.drawn_views.push(work.cameras.len());
+        let mut calls = self.calls.lock().unwrap();
+        let build_s = if calls.drawn_views.is_empty() { self.build_s } else { 0.0 };
+        calls.drawn_views.push(work.cameras.len());
         std::thread::sleep(Duration::from_secs_f64(build_s + self.direct_view_s * work.cameras.len() as f64));
         Ok(views(&work.cameras))
     }
@@ -141,40 +141,40 @@ pub(crate) fn request(batch_count: u32) -> MeasureCosts {
     MeasureCosts { workload, typical_views: vec![camera()], batch_count, planes: ViewPlanes::default() }
 }
 
-fn measured(engine: Sleeper, batch_count: u32) -> (Costs, Asked) {
+fn measured(engine: Sleeper, batch_count: u32) -> (Costs, Calls) {
     let costs = measure_costs(&engine, &request(batch_count)).unwrap();
-    (costs, engine.asked.into_inner().unwrap())
+    (costs, engine.calls.into_inner().unwrap())
 }
 
 #[test]
-fn quick_operations_run_three_times_after_one_that_does_not_count() {
+fn quick_operations_run_three_times_after_a_warm_up() {
     // The first draw builds shaders for longer than a view may take.
     let engine = Sleeper { direct_view_s: 1e-3, build_s: 0.6, ..Sleeper::default() };
-    let (costs, asked) = measured(engine, 32);
-    assert_eq!(asked.refinements, [Refinement::default(); 4], "finished, whatever the session's steps");
-    assert_eq!(asked.drawn_views, [1, 1, 1, 1, 32, 32, 32, 32]);
+    let (costs, calls) = measured(engine, 32);
+    assert_eq!(calls.refinements, [Refinement::default(); 4], "finished, for any number of steps");
+    assert_eq!(calls.drawn_views, [1, 1, 1, 1, 32, 32, 32, 32]);
     assert!((1e-3..0.01).contains(&costs.direct_view_s), "{costs:?}");
-    assert_eq!(asked.uploads, vec![(request(1).workload.illumination, true); 4], "with what highlights need");
+    assert_eq!(calls.uploads, vec![(request(1).workload.illumination, true); 4], "with what highlights need");
 }
 
 #[test]
-fn slow_operations_run_once_after_one_that_does_not_count() {
-    let (costs, asked) = measured(Sleeper { sample_s: 0.51, direct_view_s: 0.51, ..Sleeper::default() }, 32);
-    assert_eq!((asked.refinements.len(), asked.drawn_views), (2, vec![1, 1]));
+fn slow_operations_run_once_after_a_warm_up() {
+    let (costs, calls) = measured(Sleeper { sample_s: 0.51, direct_view_s: 0.51, ..Sleeper::default() }, 32);
+    assert_eq!((calls.refinements.len(), calls.drawn_views), (2, vec![1, 1]));
     assert!((0.51..2.0).contains(&costs.direct_view_s), "{costs:?}");
     assert!((0.255..1.0).contains(&costs.sample_image_s), "two images a run: {costs:?}");
 }
 
 #[test]
-fn as_many_views_are_drawn_as_there_is_time_for() {
+fn as_many_views_are_drawn_as_time_allows() {
     let views = [1e-9, 0.01, 0.09, 0.3, 0.6, 40.0].map(|alone_s| direct_views(alone_s, 32));
     assert_eq!(views, [32, 32, 11, 3, 1, 1]);
     assert_eq!((direct_views(0.0, 32), direct_views(f64::NAN, 32), direct_views(0.1, 1)), (32, 1, 1));
 }
 
 #[test]
-fn what_a_tile_costs_beyond_its_rows_follows_from_tiles_of_all_heights() {
-    // One tile, of whatever height, would say 0 or 0.053 s.
+fn the_overhead_of_a_tile_follows_from_tiles_of_two_heights() {
+    // A single tile, of any height, would give 0 or 0.053 s.
     let engine = Sleeper { parts_s: Some((0.02, [0.0, 0.0, 0.04, 0.04])), ..Sleeper::default() };
     let (costs, _) = measured(engine, 1);
     assert!((0.1..0.12).contains(&costs.sample_image_s), "{costs:?}");

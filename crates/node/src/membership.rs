@@ -1,4 +1,4 @@
-//! Joining the coordinator, and joining again when it was away.
+//! Membership: joining the coordinator, again after it was away.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -7,14 +7,14 @@ use cluster::{JoinCluster, NodeStatus, Welcome, WorkReport};
 use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
-use wire::rpc::{CoordinatorClient, connect};
+use wire::rpc::{Backoff, CoordinatorClient, connect};
 
+use crate::plan::CurrentPlan;
+use crate::scenes::Scenes;
 use crate::warm::warm_up;
-use crate::{CurrentPlan, Scenes, WorkDone};
+use crate::work_done::WorkDone;
 
-const FIRST_RETRY: Duration = Duration::from_millis(100);
-const LAST_RETRY: Duration = Duration::from_secs(1);
-/// How often a member says what it did.
+/// The interval of a member's reports on its work.
 const REPORT: Duration = Duration::from_secs(1);
 
 /// Stays a member until `shutdown`; frames go on while the coordinator is away.
@@ -26,7 +26,7 @@ pub async fn keep_membership(
     done: WorkDone,
     shutdown: CancellationToken,
 ) {
-    let (mut retry, mut warmed) = (FIRST_RETRY, false);
+    let (mut backoff, mut warmed) = (Backoff::reconnect(), false);
     loop {
         let mut joined = false;
         let request = JoinCluster { node: node.clone(), plan_epoch: plan.epoch() };
@@ -34,16 +34,18 @@ pub async fn keep_membership(
             ended = member(request, &coordinator, &scenes, (&plan, &done), (&mut warmed, &mut joined)) => ended,
             () = shutdown.cancelled() => return,
         };
-        retry = if joined { FIRST_RETRY } else { (retry * 2).min(LAST_RETRY) };
+        if joined {
+            backoff.reset();
+        }
         tracing::warn!(node = node.node_name, %coordinator, reason = ended.message(), "no longer a member");
         tokio::select! {
-            () = tokio::time::sleep(retry) => (),
+            () = tokio::time::sleep(backoff.next_delay()) => (),
             () = shutdown.cancelled() => return,
         }
     }
 }
 
-/// One membership, until it ends; says why.
+/// One membership, until it ends, with the reason.
 async fn member(
     request: JoinCluster,
     coordinator: &str,
@@ -76,7 +78,7 @@ async fn member(
     }
 }
 
-/// What a coordinator does not hear it does without.
+/// Reports the work since the last report; a report that fails is not repeated.
 async fn report(client: &CoordinatorClient, plan: &CurrentPlan, done: &WorkDone) {
     let sums = done.take();
     if sums.is_empty() {
@@ -92,7 +94,7 @@ async fn report(client: &CoordinatorClient, plan: &CurrentPlan, done: &WorkDone)
     };
     match tokio::time::timeout(REPORT, client.report_work(report)).await {
         Ok(Ok(())) => (),
-        Ok(Err(status)) => tracing::debug!(reason = status.message(), "the report was not taken"),
+        Ok(Err(status)) => tracing::debug!(reason = status.message(), "the report was refused"),
         Err(_) => tracing::debug!("the report took too long"),
     }
 }

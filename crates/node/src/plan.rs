@@ -7,7 +7,7 @@ use tokio::sync::watch;
 use tonic::Status;
 use wire::refuse_plan;
 
-/// The node's name and what it was last told.
+/// The node's name and the plan in force on it.
 #[derive(Debug, Clone)]
 pub struct CurrentPlan {
     node_name: Arc<str>,
@@ -21,7 +21,7 @@ impl CurrentPlan {
         Self { node_name: node_name.into(), plan: watch::Sender::new(None) }
     }
 
-    /// This node.
+    /// The name of this node.
     #[must_use]
     pub fn node_name(&self) -> &str {
         &self.node_name
@@ -58,30 +58,29 @@ impl CurrentPlan {
     /// # Errors
     /// As [`CurrentPlan::admits`].
     pub fn apply(&self, assignment: Assignment) -> Result<(), Status> {
-        let mut verdict = Ok(());
-        // Judged under the lock: of two plans that were being prepared the higher one stays.
+        let mut result = Ok(());
+        // Compared under the lock: of two plans that were prepared at the same time the higher one stays.
         self.plan.send_if_modified(|current| {
             let higher = current.as_ref().is_none_or(|current| assignment.plan_epoch > current.plan_epoch);
             let same = current.as_ref().is_some_and(|current| **current == assignment);
             if higher {
                 *current = Some(Arc::new(assignment));
             } else if !same {
-                verdict =
-                    Err(Status::failed_precondition(format!("plan_epoch {} came too late", assignment.plan_epoch)));
+                result = Err(Status::failed_precondition(format!("plan_epoch {} is too late", assignment.plan_epoch)));
             }
             higher
         });
-        verdict
+        result
     }
 
-    /// Resolves when a later plan than this is in force.
+    /// Resolves when a later plan than `plan_epoch` is in force.
     pub async fn replaced(&self, plan_epoch: u64) {
         let later = |plan: &Option<Arc<Assignment>>| plan.as_ref().is_some_and(|plan| plan.plan_epoch > plan_epoch);
-        // The sender is ours: it lasts as long as this.
+        // This value owns a sender, which therefore outlives the wait.
         let _ = self.plan.subscribe().wait_for(later).await;
     }
 
-    /// The plan that a caller names.
+    /// The plan that a caller names, if it is in force.
     ///
     /// # Errors
     /// `FAILED_PRECONDITION` where it is not the one in force, which the refusal names.
@@ -148,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn epochs_only_rise() {
+    fn a_plan_with_a_lower_epoch_is_refused() {
         let current = CurrentPlan::new("n");
         assert!(current.require(0).is_err(), "no plan yet");
         current.apply(plan(3, "unlit")).unwrap();

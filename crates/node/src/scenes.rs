@@ -1,4 +1,4 @@
-//! Scenes by hash: from the mounted folder, else from the coordinator.
+//! Scenes by hash: from the mounted folder, or else from the coordinator.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,9 +10,12 @@ use tokio::sync::Mutex;
 use tonic::Status;
 use wire::rpc::{CoordinatorClient, connect};
 
-use crate::{Engine, NodeConfig, blocking, next_within};
+use crate::blocking::blocking;
+use crate::config::NodeConfig;
+use crate::engine::Engine;
+use crate::streams::next_within;
 
-/// Gets scenes onto the device.
+/// Loads scenes onto the device.
 pub struct Scenes {
     engine: Arc<dyn Engine>,
     folder: Option<PathBuf>,
@@ -23,7 +26,7 @@ pub struct Scenes {
 }
 
 impl Scenes {
-    /// Of a node.
+    /// The scenes of one node.
     #[must_use]
     pub fn new(engine: Arc<dyn Engine>, config: &NodeConfig) -> Self {
         Self {
@@ -35,15 +38,15 @@ impl Scenes {
         }
     }
 
-    /// Whose scenes they are.
+    /// The engine that the scenes are loaded onto.
     pub(crate) fn engine(&self) -> Arc<dyn Engine> {
         self.engine.clone()
     }
 
-    /// Makes sure that the device has a scene; gives the seconds that this took, 0 where it had it.
+    /// Makes sure that the device has a scene; gives the seconds that this took, 0 where it was loaded already.
     ///
     /// # Errors
-    /// Where it is nowhere to be had, is not what its hash says, or cannot be loaded.
+    /// Where it cannot be found, does not have its hash, or cannot be loaded.
     pub async fn ensure(&self, scene: &SceneRef) -> Result<f64, Status> {
         let _one = self.loading.lock().await;
         if self.engine.has_scene(scene.hash.as_str()) {
@@ -80,7 +83,7 @@ impl Scenes {
         let (folder, hash) = (self.folder.clone(), scene.hash.clone());
         blocking(move || {
             let package = assembly.finish().map_err(spoilt)?;
-            keep(folder.as_deref(), &hash, &package);
+            store(folder.as_deref(), &hash, &package);
             Ok::<_, Status>(package)
         })
         .await
@@ -95,7 +98,7 @@ fn file_of(folder: &Path, hash: &SceneHash) -> PathBuf {
     folder.join(format!("{hash}.scene"))
 }
 
-/// A file that is not what its name says counts as absent: it may be half written.
+/// A file without the hash in its name counts as absent: it may be half written.
 fn read_verified(folder: &Path, hash: &SceneHash) -> Result<Option<Vec<u8>>, Status> {
     let package = match fs::read(file_of(folder, hash)) {
         Ok(package) => package,
@@ -109,12 +112,12 @@ fn read_verified(folder: &Path, hash: &SceneHash) -> Result<Option<Vec<u8>>, Sta
     Ok(right.then_some(package))
 }
 
-/// Keeps a package for the next start; a folder that cannot be written to is no failure.
-fn keep(folder: Option<&Path>, hash: &SceneHash, package: &[u8]) {
+/// Stores a package for the next start; a folder that cannot be written to is no failure.
+fn store(folder: Option<&Path>, hash: &SceneHash, package: &[u8]) {
     let Some(folder) = folder else { return };
     let partial = folder.join(format!("{hash}.{}.partial", std::process::id()));
-    let kept = fs::write(&partial, package).and_then(|()| fs::rename(&partial, file_of(folder, hash)));
-    if let Err(error) = kept {
+    let stored = fs::write(&partial, package).and_then(|()| fs::rename(&partial, file_of(folder, hash)));
+    if let Err(error) = stored {
         tracing::debug!(scene = %hash, %error, "the scene folder is not writable");
     }
 }
@@ -124,11 +127,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_folder_gives_only_what_has_its_hash() {
+    fn a_file_without_its_hash_counts_as_absent() {
         let folder = tempfile::tempdir().unwrap();
         let hash = SceneHash::of(b"scene");
         assert_eq!(read_verified(folder.path(), &hash).unwrap(), None);
-        keep(Some(folder.path()), &hash, b"scene");
+        store(Some(folder.path()), &hash, b"scene");
         assert_eq!(read_verified(folder.path(), &hash).unwrap().as_deref(), Some(&b"scene"[..]));
         fs::write(file_of(folder.path(), &hash), b"scenery").unwrap();
         assert_eq!(read_verified(folder.path(), &hash).unwrap(), None);

@@ -11,35 +11,30 @@ use tonic_health::ServingStatus;
 use tonic_health::pb::health_server::{Health, HealthServer};
 use wire::rpc::{KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT, reflection_server};
 
-use crate::incoming::greeted;
+use crate::preface::accept_http2;
 
-/// How long connections may take to end after the streams were ended.
+/// The time that connections may take to end after their streams have ended.
 pub const DRAIN: Duration = Duration::from_secs(10);
-/// Streams, and calls being answered, of one connection.
+/// Most streams, and calls that are being answered, of one connection.
 pub const MAX_STREAMS: u32 = 64;
 
 /// Why a server did not serve.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum ServeError {
     /// Others could reach it and nothing protects it.
     #[error("{address} is not loopback: give --insecure-bind to serve there without TLS")]
-    NotLoopback {
-        /// Where it would have listened.
-        address: SocketAddr,
-    },
-    /// The socket.
+    NotLoopback { address: SocketAddr },
+    /// The socket cannot be used.
     #[error("listening: {0}")]
     Listen(#[from] std::io::Error),
-    /// What services there are could not be described.
+    /// The services could not be described.
     #[error("reflection: {0}")]
     Reflection(String),
-    /// Nothing can be made here any more; whatever started the process may start it again.
+    /// The process can make nothing any more; a supervisor may start it again.
     #[error("device lost: {reason}")]
-    DeviceLost {
-        /// How.
-        reason: String,
-    },
-    /// The transport.
+    DeviceLost { reason: String },
+    /// The transport failed.
     #[error("serving: {0}")]
     Transport(#[from] tonic::transport::Error),
 }
@@ -60,7 +55,7 @@ pub async fn serve(
     }
     let serving = builder()
         .add_routes(routes)
-        .serve_with_incoming_shutdown(greeted(listener), shutdown.clone().cancelled_owned());
+        .serve_with_incoming_shutdown(accept_http2(listener), shutdown.clone().cancelled_owned());
     let overdue = async {
         shutdown.cancelled().await;
         tokio::time::sleep(DRAIN).await;

@@ -1,16 +1,22 @@
-//! What every node answers: its costs, and that it is ready for a plan.
+//! The service of every node: it measures costs and takes plans.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use cluster::{Assignment, Costs, MeasureCosts, Ready};
+use parking_lot::Mutex;
 use tonic::{Status, async_trait};
 use wire::rpc;
 
-use crate::{CurrentPlan, Engine, NodeMetrics, Scenes, blocking, measure_costs};
+use crate::blocking::blocking;
+use crate::engine::Engine;
+use crate::measure::measure_costs;
+use crate::plan::CurrentPlan;
+use crate::scenes::Scenes;
+use crate::telemetry::NodeMetrics;
 
-/// Measured costs that are kept.
-const KEPT: usize = 16;
+/// Measured costs that are cached.
+const MAX_MEASURED: usize = 16;
 
 /// The node's own service.
 pub struct NodeService {
@@ -18,26 +24,26 @@ pub struct NodeService {
     plan: CurrentPlan,
     scenes: Arc<Scenes>,
     metrics: NodeMetrics,
-    /// What was measured, the oldest first: a coordinator that was restarted need not wait for it again.
+    /// Measured costs, the oldest first: a coordinator that was restarted need not wait for them again.
     measured: Mutex<VecDeque<(MeasureCosts, Costs)>>,
 }
 
 impl NodeService {
-    /// Of a node.
+    /// The service of one node.
     #[must_use]
     pub fn new(engine: Arc<dyn Engine>, plan: CurrentPlan, scenes: Arc<Scenes>, metrics: NodeMetrics) -> Self {
         Self { engine, plan, scenes, metrics, measured: Mutex::default() }
     }
 
     fn known(&self, request: &MeasureCosts) -> Option<Costs> {
-        let measured = self.measured.lock().unwrap_or_else(PoisonError::into_inner);
+        let measured = self.measured.lock();
         measured.iter().find(|(known, _)| known == request).map(|(_, costs)| *costs)
     }
 
     fn keep(&self, request: MeasureCosts, costs: Costs) {
-        let mut measured = self.measured.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut measured = self.measured.lock();
         measured.push_back((request, costs));
-        while measured.len() > KEPT {
+        while measured.len() > MAX_MEASURED {
             measured.pop_front();
         }
     }

@@ -1,4 +1,4 @@
-//! Streams that end: on drain, by deadline, and with whatever they kept alive.
+//! Ends of streams: on drain, by deadline, and with the guards that they hold.
 
 use std::pin::Pin;
 use std::task::{Context, Poll};
@@ -10,7 +10,7 @@ use tonic::Status;
 use wire::rpc::Messages;
 
 struct UntilDrained<T> {
-    /// `None` when it has ended.
+    /// `None` after the end.
     inner: Option<Messages<T>>,
     shutdown: Pin<Box<WaitForCancellationFutureOwned>>,
 }
@@ -33,7 +33,7 @@ impl<T> Stream for UntilDrained<T> {
     }
 }
 
-/// Ends a stream with `UNAVAILABLE` once the process shuts down. What is ready still goes out.
+/// Ends a stream with `UNAVAILABLE` once the process shuts down, after the messages that are ready.
 pub fn until_drained<T: Send + 'static>(stream: Messages<T>, shutdown: CancellationToken) -> Messages<T> {
     Box::pin(UntilDrained { inner: Some(stream), shutdown: Box::pin(shutdown.cancelled_owned()) })
 }
@@ -59,11 +59,13 @@ pub fn with_guard<T: Send + 'static, G: Unpin + Send + 'static>(inner: Messages<
 /// The next message; `None` at the end.
 ///
 /// # Errors
-/// The stream's own; `DEADLINE_EXCEEDED` where nothing comes in time.
+/// The stream's own; `DEADLINE_EXCEEDED` where no message arrives in time.
 pub async fn next_within<T>(stream: &mut Messages<T>, deadline: Duration, what: &str) -> Result<Option<T>, Status> {
     match tokio::time::timeout(deadline, stream.next()).await {
         Ok(next) => next.transpose(),
-        Err(_) => Err(Status::deadline_exceeded(format!("{what}: nothing came for {:.1} s", deadline.as_secs_f64()))),
+        Err(_) => {
+            Err(Status::deadline_exceeded(format!("{what}: nothing was received for {:.1} s", deadline.as_secs_f64())))
+        }
     }
 }
 
@@ -76,7 +78,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn silence_has_a_deadline() {
+    async fn a_silent_stream_ends_at_the_deadline() {
         let mut stream = silent();
         let deadline = Duration::from_millis(20);
         assert_eq!(next_within(&mut stream, deadline, "chunks").await.unwrap(), Some(1));
@@ -86,7 +88,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn drain_ends_a_stream_after_what_is_ready() {
+    async fn a_drain_ends_a_stream_after_the_messages_that_are_ready() {
         let shutdown = CancellationToken::new();
         let mut stream = until_drained(silent(), shutdown.clone());
         shutdown.cancel();

@@ -1,8 +1,9 @@
-//! What a process counts, and the page at which Prometheus reads it. Base units; labels are few and bounded.
+//! Metrics of a process, and the page at which Prometheus reads them. Base units; labels are few and bounded.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use axum::{Router, http::header, routing::get};
+use parking_lot::{Mutex, MutexGuard};
 use prometheus_client::encoding::{EncodeLabelSet, text::encode};
 use prometheus_client::metrics::{
     counter::Counter,
@@ -14,7 +15,7 @@ use prometheus_client::registry::{Registry, Unit};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
-use crate::WorkDone;
+use crate::work_done::WorkDone;
 
 const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
@@ -29,9 +30,9 @@ impl Default for Telemetry {
 }
 
 impl Telemetry {
-    /// To register metrics in.
+    /// The registry, to register metrics in.
     pub fn registry(&self) -> MutexGuard<'_, Registry> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock()
     }
 
     /// The page, in the OpenMetrics text format.
@@ -54,14 +55,14 @@ impl Telemetry {
     }
 }
 
-/// Why something that was made or asked for did not go out.
+/// Why a view was dropped.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 pub struct Reason {
-    /// One of few.
+    /// One of a few texts.
     pub reason: &'static str,
 }
 
-/// What a node counts.
+/// The metrics of a node.
 #[derive(Debug, Clone)]
 pub struct NodeMetrics {
     /// Images sampled and encoded.
@@ -86,7 +87,7 @@ pub struct NodeMetrics {
     pub streams: Gauge,
     /// The plan in force.
     pub plan_epoch: Gauge,
-    /// For the coordinator.
+    /// The work to report to the coordinator.
     pub done: WorkDone,
 }
 
@@ -95,7 +96,7 @@ fn seconds() -> Histogram {
 }
 
 impl NodeMetrics {
-    /// Registered, all at zero.
+    /// Registers all metrics, at zero.
     #[must_use]
     pub fn new(telemetry: &Telemetry) -> Self {
         let metrics = Self {
@@ -150,7 +151,7 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn the_page_has_what_was_counted() {
+    async fn the_page_has_every_metric_that_was_counted() {
         let telemetry = Telemetry::default();
         let metrics = NodeMetrics::new(&telemetry);
         metrics.images_sampled.inc_by(3);

@@ -1,4 +1,4 @@
-//! A device builds shaders and trees when it first needs them: a node that joins does so before it says that it is there.
+//! Warming up: a device builds shaders and trees when it first needs them, so a node does a little work before it joins.
 
 use std::time::{Duration, Instant};
 
@@ -8,35 +8,38 @@ use glam::UVec2;
 use tonic::Status;
 use wire::rpc::CoordinatorClient;
 
+use crate::blocking::blocking;
+use crate::engine::{Engine, EngineError, ViewWork};
 use crate::measure::{direct_work, sample_set, sample_work};
-use crate::{CurrentPlan, Engine, EngineError, Scenes, ViewWork, blocking};
+use crate::plan::CurrentPlan;
+use crate::scenes::Scenes;
 
-/// Pictures of the work that warms: what they show does not matter, and one tile of threads is enough.
+/// The size of pictures that warm up: their content does not matter, and one tile of threads is enough.
 const SIZE_PX: UVec2 = UVec2::splat(16);
 
-/// A node that is cold after this long joins all the same: what it waits for may never come.
-const WARM: Duration = Duration::from_secs(120);
+/// The longest warm-up; a node that is still cold then joins all the same.
+const WARM_UP_TIMEOUT: Duration = Duration::from_secs(120);
 
-/// Does a little of what the cluster does now, so that a plan finds the node warm. Nobody waits for it meanwhile.
+/// Does a little of the cluster's present work, so that a plan finds the node warm. No other node waits for it.
 pub(crate) async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) {
     let start = Instant::now();
-    match tokio::time::timeout(WARM, work_along(client, scenes, plan)).await {
+    match tokio::time::timeout(WARM_UP_TIMEOUT, do_a_little(client, scenes, plan)).await {
         Ok(Ok(())) => tracing::debug!(seconds = start.elapsed().as_secs_f64(), "warm"),
         Ok(Err(status)) => tracing::warn!(reason = status.message(), "joins cold"),
         Err(_) => tracing::warn!(reason = "it took too long", "joins cold"),
     }
 }
 
-async fn work_along(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) -> Result<(), Status> {
+async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) -> Result<(), Status> {
     let served = client.status().await?.plan.map(|plan| plan.assignment);
-    // Who has had a plan has been at work.
+    // A node that has had a plan is warm.
     let Some(served) = served.filter(|_| plan.epoch() == 0) else { return Ok(()) };
     scenes.ensure(&served.workload.scene).await?;
     let engine = scenes.engine();
     blocking(move || warm(engine.as_ref(), &served)).await
 }
 
-/// One small picture of each kind that the plan has.
+/// Makes one small picture of each kind that the plan has.
 fn warm(engine: &dyn Engine, plan: &Assignment) -> Result<(), EngineError> {
     let workload = small(&plan.workload.of_cell(0).unwrap_or_else(|| plan.workload.clone()));
     let Some(Camera::Pinhole(view)) = workload.sample_cameras.first().copied() else { return Ok(()) };
@@ -73,13 +76,13 @@ mod tests {
     }
 
     #[test]
-    fn a_little_of_what_the_plan_has() {
+    fn a_warm_up_makes_one_picture_of_each_kind_in_the_plan() {
         for (policy, sampled, drawn) in [(Policy::Direct, 0, 1), (Policy::Pipeline, 1, 0), (Policy::TimeShare, 1, 0)] {
             let engine = Sleeper::default();
             warm(&engine, &plan(policy)).unwrap();
-            let asked = engine.asked.into_inner().unwrap();
+            let calls = engine.calls.into_inner().unwrap();
             assert_eq!(
-                (asked.refinements.len(), asked.uploads.len(), asked.drawn_views.len()),
+                (calls.refinements.len(), calls.uploads.len(), calls.drawn_views.len()),
                 (sampled, sampled, drawn)
             );
         }

@@ -1,10 +1,11 @@
-//! What this node has done since it last said so, and what that took.
+//! A node's work since its last report, and the time that it took.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use cluster::MeasuredCosts;
+use parking_lot::Mutex;
 
-/// What takes time.
+/// An operation that is timed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Operation {
     /// g_s: one sample image, whole. A tile counts as its part of one.
@@ -23,29 +24,29 @@ pub enum Operation {
 #[derive(Debug, Clone, Default)]
 pub struct WorkDone(Arc<Mutex<Sums>>);
 
-/// Of all that was done since the last report.
+/// The work since the last report.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sums {
-    /// By [`Operation`]: how many, and seconds of all.
+    /// Count and seconds of each [`Operation`].
     operations: [(f64, f64); 5],
-    /// Bytes of images that came, and seconds of their coming.
+    /// Bytes of images that were received, and the seconds that this took.
     transferred: (f64, f64),
-    /// Encoded images, and their bytes.
+    /// Count of encoded images, and their bytes.
     encoded: (f64, f64),
     /// Seconds of all operations.
     pub busy_s: f64,
-    /// Made.
+    /// Views made.
     pub views: u64,
-    /// Not made, or not sent.
+    /// Views not made, or not sent.
     pub dropped_views: u64,
 }
 
 impl WorkDone {
     fn change(&self, change: impl FnOnce(&mut Sums)) {
-        change(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner));
+        change(&mut self.0.lock());
     }
 
-    /// So many operations that took so long together; a part of one counts as that.
+    /// Adds `count` operations that took `seconds` together; the count may be a fraction.
     pub fn add(&self, operation: Operation, count: f64, seconds: f64) {
         self.change(|sums| {
             let sum = &mut sums.operations[operation as usize];
@@ -57,36 +58,36 @@ impl WorkDone {
         });
     }
 
-    /// Bytes that came in so many seconds.
+    /// Adds bytes that were received in `seconds`.
     pub fn transferred(&self, bytes: usize, seconds: f64) {
         self.change(|sums| sums.transferred = (sums.transferred.0 + bytes as f64, sums.transferred.1 + seconds));
     }
 
-    /// Whole images of so many bytes together.
+    /// Adds whole images that were encoded to `bytes` together.
     pub fn encoded(&self, images: f64, bytes: usize) {
         self.change(|sums| sums.encoded = (sums.encoded.0 + images, sums.encoded.1 + bytes as f64));
     }
 
-    /// A view that was not made or not sent.
+    /// Counts a view that was not made or not sent.
     pub fn dropped(&self) {
         self.change(|sums| sums.dropped_views += 1);
     }
 
-    /// All since the last call.
+    /// Takes the work since the last call.
     #[must_use]
     pub fn take(&self) -> Sums {
-        std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(&mut self.0.lock())
     }
 }
 
 impl Sums {
-    /// Whether there is nothing to say.
+    /// Whether there is nothing to report.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// The mean of each operation; what was not done is `None`.
+    /// The mean time of each operation; `None` where it was not done.
     #[must_use]
     pub fn costs(&self) -> MeasuredCosts {
         let mean = |operation: Operation| quotient(self.operations[operation as usize]);
@@ -104,7 +105,7 @@ impl Sums {
     }
 }
 
-/// The second by the first.
+/// The sum divided by the count; `None` for a count of 0.
 fn quotient((count, sum): (f64, f64)) -> Option<f64> {
     (count > 0.0).then(|| sum / count)
 }
@@ -114,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn means_are_of_what_was_done_since() {
+    fn costs_are_the_means_since_the_last_report() {
         let done = WorkDone::default();
         assert!(done.take().is_empty());
         done.add(Operation::ReconstructView, 32.0, 0.32);

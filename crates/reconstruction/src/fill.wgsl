@@ -1,6 +1,7 @@
 // Gives pixels that no camera knows the colour of the farther side of their gap: what is disoccluded lies
 // behind what occluded it. They stay marked as filled.
 {% include "color.wgsl" %}
+{% include "pixel_list.wgsl" %}
 
 struct FillWork {
     size_px: vec2u,
@@ -8,18 +9,14 @@ struct FillWork {
     number: u32,
 }
 
-@group(0) @binding(0) var<uniform> work: FillWork;
-@group(0) @binding(1) var<storage, read_write> srgb8: array<u32>;
-@group(0) @binding(2) var<storage, read_write> inverse_depth: array<f32>;
-@group(0) @binding(3) var<storage, read> provenance: array<u32>;
-struct Later { workgroups: u32, y: u32, z: u32, count: u32 }
-@group(0) @binding(4) var<storage, read> unknown_pixels: array<u32>;
-@group(0) @binding(5) var<storage, read> unknown: array<Later>;
+@group(0) var<uniform> work: FillWork;
+@group(0) var<storage, read_write> srgb8: array<u32>;
+@group(0) var<storage, read_write> inverse_depth: array<f32>;
+@group(0) var<storage, read> provenance: array<u32>;
 
-const FILLED: u32 = 2u;
-const REACH_PX: i32 = 48;
-// Depths that differ by less are one side of the gap.
-const SAME_SIDE: f32 = 0.95;
+const PROVENANCE_FILLED: u32 = {{ provenance_filled }}u;
+const REACH_PX: i32 = {{ reach_px }};
+const SAME_SIDE: f32 = {{ same_side }};
 
 struct Neighbour { inverse_depth: f32, color_linear: vec3f, weight: f32 }
 
@@ -29,7 +26,7 @@ fn known_towards(origin: vec2i, towards: vec2i, first: u32) -> Neighbour {
         let at = origin + towards * i;
         if any(at < vec2i(0)) || any(at >= vec2i(work.size_px)) { break; }
         let index = first + u32(at.y) * work.size_px.x + u32(at.x);
-        if (provenance[index] & 0xffu) != FILLED {
+        if (provenance[index] & 0xffu) != PROVENANCE_FILLED {
             let color = linear_from_srgb(unpack4x8unorm(srgb8[index]).rgb);
             return Neighbour(inverse_depth[index], color, 1.0 / (f32(i) * length(vec2f(towards))));
         }
@@ -37,11 +34,11 @@ fn known_towards(origin: vec2i, towards: vec2i, first: u32) -> Neighbour {
     return Neighbour(0.0, vec3f(0.0), 0.0);
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size({{ list_workgroup }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= unknown[work.number].count { return; }
+    if id.x >= lists[work.number].count { return; }
     let first = work.first_pixel;
-    let index = unknown_pixels[first + id.x];
+    let index = listed_pixels[first + id.x];
     let origin = vec2i(vec2u((index - first) % work.size_px.x, (index - first) / work.size_px.x));
     var farthest = 3.0e38;
 {% for d in directions %}

@@ -1,18 +1,18 @@
 //! Structs shared with the shaders have the shaders' layout: naga's offsets against Rust's.
 
-use std::mem::offset_of;
+use std::{collections::BTreeSet, mem::offset_of, sync::OnceLock};
 
 use bytemuck::Zeroable as _;
-use gpu::Templates;
-use naga::TypeInner;
+use gpu::ShaderSource;
+use naga::{Module, TypeInner};
 
 use crate::{
-    SHADERS, ShaderKey,
-    layout::{GpuCutWork, GpuFillWork, GpuList, GpuQuadWork, GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume},
-    shader_text,
+    fill::GpuFillWork,
+    pixel_list::GpuPixelList,
+    quads::{GpuCutWork, GpuQuadWork},
+    reconstructor::{shader_sources, templates},
+    view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume},
 };
-
-const CAMERAS: usize = 4;
 
 /// Fields with their offsets, and the size of the whole.
 #[derive(Debug, PartialEq, Eq)]
@@ -35,16 +35,33 @@ macro_rules! host {
     }};
 }
 
-fn module(name: &'static str) -> naga::Module {
-    let templates = Templates::new(SHADERS).expect("templates");
-    let march_camera = if name == "joint_carve.wgsl" { CAMERAS } else { 0 };
-    let key = ShaderKey { name, cameras: CAMERAS, march_camera, ..ShaderKey::default() };
-    let text = shader_text(&templates, key).expect("a text");
-    naga::front::wgsl::parse_str(&text).unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&text)))
+/// All variants of all passes that declare a struct.
+fn modules_with(name: &str) -> impl Iterator<Item = &'static (ShaderSource, Module)> {
+    static MODULES: OnceLock<Vec<(ShaderSource, Module)>> = OnceLock::new();
+    let modules = MODULES.get_or_init(|| {
+        let templates = templates().expect("templates");
+        let sources = shader_sources(&templates).map(|source| source.expect("a text"));
+        sources.map(|source| (parsed(&source.wgsl), source)).map(|(module, source)| (source, module)).collect()
+    });
+    modules.iter().filter(move |(_, module)| module.types.iter().any(|(_, ty)| ty.name.as_deref() == Some(name)))
+}
+
+fn parsed(wgsl: &str) -> Module {
+    naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|error| panic!("{}", error.emit_to_string(wgsl)))
+}
+
+/// The templates whose variants declare a struct, which has a host's layout in all of them.
+fn templates_that_agree(name: &str, host: &Layout) -> BTreeSet<&'static str> {
+    modules_with(name)
+        .map(|(source, module)| {
+            assert_eq!(shader(module, name), *host, "{}", source.name);
+            source.template
+        })
+        .collect()
 }
 
 /// A WGSL struct's.
-fn shader(module: &naga::Module, name: &str) -> Layout {
+fn shader(module: &Module, name: &str) -> Layout {
     let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
     let Some((_, naga::Type { inner: TypeInner::Struct { members, span }, .. })) = found else {
         panic!("no struct {name}")
@@ -53,8 +70,17 @@ fn shader(module: &naga::Module, name: &str) -> Layout {
     Layout { fields: members.iter().map(field).collect(), bytes: *span as usize }
 }
 
-fn view_camera() -> Layout {
-    host!(GpuViewCamera {
+#[test]
+fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
+    let passes = BTreeSet::from([
+        "joint_carve.wgsl",
+        "light_field_search.wgsl",
+        "march.wgsl",
+        "resolve.wgsl",
+        "specular.wgsl",
+        "tile_start.wgsl",
+    ]);
+    let view_camera = host!(GpuViewCamera {
         eye_in_world,
         near_m,
         column_in_world,
@@ -64,13 +90,11 @@ fn view_camera() -> Layout {
         corner_in_world,
         first_tile,
         size_px,
-        steps,
-        number
-    })
-}
-
-fn sample_camera() -> Layout {
-    host!(GpuSampleCamera {
+        number,
+        padding
+    });
+    assert_eq!(templates_that_agree("ViewCamera", &view_camera), passes);
+    let sample_camera = host!(GpuSampleCamera {
         homogeneous_pixel_from_world,
         eye_in_world,
         code_scale,
@@ -84,11 +108,18 @@ fn sample_camera() -> Layout {
         stretch,
         mask,
         padding
-    })
+    });
+    assert_eq!(templates_that_agree("SampleCamera", &sample_camera), passes);
+    for (source, module) in modules_with("ViewWork") {
+        let found = shader(module, "ViewWork");
+        let cameras = (found.bytes - size_of::<GpuViewWork>()) / size_of::<GpuSampleCamera>();
+        assert_eq!(found, view_work(cameras), "{}", source.name);
+        assert!(source.wgsl.contains(&format!("cameras: array<SampleCamera, {cameras}>")), "{}", source.name);
+    }
 }
 
-/// Of the volume the shader has the fields, not the struct; the cameras follow.
-fn view_work() -> Layout {
+/// The shader has the volume's fields in place of the struct; the cameras follow.
+fn view_work(cameras: usize) -> Layout {
     let GpuViewWork { view: _, volume: _ } = GpuViewWork::zeroed();
     let GpuVolume { min_in_world: _, background_srgb8: _, max_in_world: _, padding: _ } = GpuVolume::zeroed();
     let volume = offset_of!(GpuViewWork, volume);
@@ -100,55 +131,27 @@ fn view_work() -> Layout {
         ("padding", volume + offset_of!(GpuVolume, padding)),
         ("cameras", size_of::<GpuViewWork>()),
     ];
-    Layout::new(fields, size_of::<GpuViewWork>() + CAMERAS * size_of::<GpuSampleCamera>())
-}
-
-/// Indirect arguments by name in the shaders, three in a row on the host.
-fn list() -> Layout {
-    let GpuList { workgroups: _, count: _ } = GpuList::zeroed();
-    let first = offset_of!(GpuList, workgroups);
-    let fields = [("workgroups", first), ("y", first + 4), ("z", first + 8), ("count", offset_of!(GpuList, count))];
-    Layout::new(fields, size_of::<GpuList>())
+    Layout::new(fields, size_of::<GpuViewWork>() + cameras * size_of::<GpuSampleCamera>())
 }
 
 #[test]
-fn views_and_sample_cameras_agree_in_every_search() {
-    for name in [
-        "tile_start.wgsl",
-        "march.wgsl",
-        "joint_carve.wgsl",
-        "light_field_search.wgsl",
-        "specular.wgsl",
-        "resolve.wgsl",
-    ] {
-        let module = module(name);
-        assert_eq!(shader(&module, "ViewCamera"), view_camera(), "{name}");
-        assert_eq!(shader(&module, "SampleCamera"), sample_camera(), "{name}");
-        assert_eq!(shader(&module, "ViewWork"), view_work(), "{name}");
-    }
-}
-
-/// Every struct that begins with indirect arguments, whatever a shader calls it.
-fn lists(module: &naga::Module) -> Vec<Layout> {
-    let names = module
-        .types
-        .iter()
-        .filter_map(|(_, ty)| ty.name.as_deref().filter(|_| matches!(ty.inner, TypeInner::Struct { .. })));
-    names.map(|name| shader(module, name)).filter(|layout| layout.fields[0].0 == "workgroups").collect()
+fn lists_of_pixels_agree_where_they_are_written_and_read() {
+    let GpuPixelList { workgroups: _, count: _ } = GpuPixelList::zeroed();
+    // Indirect arguments by name in the shaders, three in a row on the host.
+    let first = offset_of!(GpuPixelList, workgroups);
+    let count = offset_of!(GpuPixelList, count);
+    let fields = [("workgroups", first), ("y", first + 4), ("z", first + 8), ("count", count)];
+    let list = Layout::new(fields, size_of::<GpuPixelList>());
+    let written = ["joint_carve.wgsl", "light_field_search.wgsl", "march.wgsl", "resolve.wgsl"];
+    assert_eq!(templates_that_agree("UndecidedList", &list), BTreeSet::from(written));
+    let read = ["fill.wgsl", "joint_carve.wgsl", "march.wgsl"];
+    assert_eq!(templates_that_agree("PixelList", &list), BTreeSet::from(read));
 }
 
 #[test]
-fn lists_and_the_fill_agree() {
-    for name in ["march.wgsl", "joint_carve.wgsl", "light_field_search.wgsl", "fill.wgsl"] {
-        let found = lists(&module(name));
-        assert!(!found.is_empty() && found.iter().all(|layout| *layout == list()), "{name}: {found:?}");
-    }
+fn filling_cutting_and_drawing_agree() {
     let fill = host!(GpuFillWork { size_px, first_pixel, number });
-    assert_eq!(shader(&module("fill.wgsl"), "FillWork"), fill);
-}
-
-#[test]
-fn cutting_and_drawing_quads_agree() {
+    assert_eq!(templates_that_agree("FillWork", &fill), BTreeSet::from(["fill.wgsl"]));
     let cut = host!(GpuCutWork {
         column_in_world,
         focal_px,
@@ -164,11 +167,8 @@ fn cutting_and_drawing_quads_agree() {
         chunks,
         segment
     });
-    let passes =
-        ["mesh.wgsl", "hybrid_mesh.wgsl", "merge.wgsl", "quad_count.wgsl", "quad_scan.wgsl", "quad_indices.wgsl"];
-    for name in passes {
-        assert_eq!(shader(&module(name), "CutWork"), cut, "{name}");
-    }
+    let passes = ["count.wgsl", "hybrid_mesh.wgsl", "indices.wgsl", "merge.wgsl", "mesh.wgsl", "scan.wgsl"];
+    assert_eq!(templates_that_agree("CutWork", &cut), BTreeSet::from(passes));
     let quads = host!(GpuQuadWork {
         clip_from_inverse_depth,
         clip_from_column,
@@ -178,12 +178,11 @@ fn cutting_and_drawing_quads_agree() {
         first_sample,
         padding
     });
-    assert_eq!(shader(&module("quads.wgsl"), "QuadWork"), quads);
+    assert_eq!(templates_that_agree("QuadWork", &quads), BTreeSet::from(["draw.wgsl"]));
 }
 
 #[test]
 fn a_field_out_of_place_is_seen() {
-    let other = naga::front::wgsl::parse_str("struct FillWork { first_pixel: u32, size_px: vec2u, number: u32 }")
-        .expect("a struct");
+    let other = parsed("struct FillWork { first_pixel: u32, size_px: vec2u, number: u32 }");
     assert_ne!(shader(&other, "FillWork"), host!(GpuFillWork { size_px, first_pixel, number }));
 }

@@ -9,10 +9,12 @@ pub const BACKGROUND_CODE: u16 = 1;
 const FIRST_CODE: f32 = 2.0;
 const LAST_CODE: f32 = 32_767.0;
 
-/// Neighbours whose depths differ by less, in footprints, are one surface whatever is around them.
-const FLAT_FOOTPRINTS: f32 = 2.0;
-/// So much may a jump in depth leave the range of the jumps before and after it, in footprints.
+/// Neighbours whose depths differ by less than this number of footprints are one surface.
+pub(crate) const FLAT_FOOTPRINTS: f32 = 2.0;
+/// The greatest distance of a jump in depth from the jump before or after it on one surface, in footprints.
 const SLOPE_FOOTPRINTS: f32 = 2.0;
+/// The same, as a share of the jump.
+pub(crate) const SLOPE_SHARE: f32 = 0.2;
 
 /// A depth plane as codes linear in inverse depth: `code = scale / planar_depth_m + offset`.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,10 +27,10 @@ pub struct CodedDepth {
     pub scale: f32,
     /// The code of infinity; negative or up to 2.
     pub offset: f32,
-    /// For each cell between four texels, whether its corners are samples of one surface.
+    /// Cells between four texels whose corners are samples of one surface.
     pub connected: Vec<bool>,
-    /// Whether the way to a texel's sample is not proven free: its ray passed what other images hold, or it is a hole.
-    /// Empty where that is so of none.
+    /// Texels whose way is not proven free: their rays passed surfaces that other images hold, or they are holes. Empty
+    /// where all ways are proven free.
     pub uncertain: Vec<bool>,
 }
 
@@ -56,8 +58,7 @@ impl CodedDepth {
         }
     }
 
-    /// Of one image among others. In a set with holes each sample's lowest bit says whether its own way is not proven
-    /// free, in images without uncertain texels too.
+    /// Quantises one image of a set. In a set with holes the lowest bit of a sample says that its way is not proven free.
     pub(crate) fn in_set(image: &DepthImage, among_holes: bool) -> Self {
         let mut depth = Self::of(image);
         if among_holes {
@@ -85,9 +86,9 @@ impl CodedDepth {
         codes * range / (LAST_CODE - FIRST_CODE) / (least * least)
     }
 
-    /// Two words for each texel and the cell to its lower right, row by row: the codes of the cell's upper left (low
-    /// half) and upper right corner (high half), and in the highest bit whether it is connected; those of its lower
-    /// corners. Bit 15 of the first says that the texel is uncertain, the highest of the second that any corner is.
+    /// Two words for each texel and the cell to its lower right, row by row. They are the codes of the cell's upper and of
+    /// its lower corners, left in the low half and right in the high half. The highest bit of the first says that the cell is
+    /// connected; that of the second, that some corner is uncertain. Bit 15 of the first says that the texel is uncertain.
     #[must_use]
     pub fn cell_words(&self) -> Vec<[u32; 2]> {
         let pair = |left: u16, right: u16| u32::from(left) | u32::from(right) << 16;
@@ -116,8 +117,7 @@ impl CodedDepth {
     }
 }
 
-/// By codes: all that is coded as a hole is one, a depth that is no number as well.
-/// Whether any texel of a set is uncertain.
+/// Some texel of a set is uncertain. Holes are counted as they are coded: a depth that is not a number is one, too.
 pub(crate) fn is_among_holes(images: &[DepthImage]) -> bool {
     let is_hole = |&inverse: &f32| inverse.is_nan() || inverse < 0.0;
     let passes = |image: &DepthImage| image.passed.as_ref().is_some_and(|passed| passed.contains(&true));
@@ -130,8 +130,8 @@ fn uncertain_texels(image: &DepthImage, codes: &[u16]) -> Vec<bool> {
     if texels.contains(&true) { texels } else { Vec::new() }
 }
 
-/// A row of cells, one to the lower right of each texel: what a plane has at their upper left, upper right, lower left
-/// and lower right corners. Beyond the border lies the border's.
+/// A row of cells, one to the lower right of each texel. Their values are those of a plane at their upper left, upper
+/// right, lower left and lower right corners. The border's values go on beyond the border.
 pub(crate) fn cell_row<T: Copy>(plane: &[T], columns: usize, y: usize) -> impl Iterator<Item = [T; 4]> {
     let row = |y: usize| &plane[y * columns..][..columns];
     let (upper, lower) = (row(y), row((y + 1).min(plane.len() / columns - 1)));
@@ -165,9 +165,9 @@ fn connected_cells(image: &DepthImage, focal_px: f32) -> Vec<bool> {
     connected
 }
 
-/// Whether the samples at `index` and `index + stride` (the `place`-th and next of `count` in their row or
-/// column) lie on one surface: close in depth, or a slope that goes on before or after. Planes are
-/// linear in inverse depth, so that no plane is ever cut, however steep.
+/// The samples at `index` and `index + stride` lie on one surface: they are close in depth, or the slope between them goes
+/// on before or after. They are the `place`-th and the next of `count` in their row or column. Planes are linear in
+/// inverse depth, so that no plane is ever cut, however steep.
 fn is_one_surface(plane: &[f32], index: usize, stride: usize, place: usize, count: usize, focal_px: f32) -> bool {
     let (a, b) = (plane[index], plane[index + stride]);
     if a <= 0.0 || b <= 0.0 {
@@ -181,17 +181,17 @@ fn is_one_surface(plane: &[f32], index: usize, stride: usize, place: usize, coun
     let before = (place > 0).then(|| plane[index - stride]).filter(|&d| d > 0.0).map(|d| a - d);
     let after = (place + 2 < count).then(|| plane[index + 2 * stride]).filter(|&d| d > 0.0).map(|d| d - b);
     let slack = SLOPE_FOOTPRINTS * footprint;
-    [before, after].into_iter().flatten().any(|slope| (slope - jump).abs() <= slack.max(0.2 * jump.abs()))
+    [before, after].into_iter().flatten().any(|slope| (slope - jump).abs() <= slack.max(SLOPE_SHARE * jump.abs()))
 }
 
 /// Levels of words over the cells between texel centres, sides padded to powers of two. Level 0 is the cells and has
 /// no words.
 ///
-/// A word of level `n` holds the nearest code (low) and the farthest (high) of the corners of 2ⁿ × 2ⁿ cells; a hole
-/// among them makes it say "anything": nearest 65535, farthest 0.
+/// A word of level `n` holds the nearest code (low) and the farthest (high) of the corners of 2ⁿ × 2ⁿ cells. A hole
+/// among them may be anything: nearest 65535, farthest 0.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pyramid {
-    /// Of level 0.
+    /// The sides of level 0.
     pub log2_sides: [u32; 2],
     /// Level after level, from level 1.
     pub words: Vec<u32>,
@@ -278,7 +278,7 @@ fn corner_range(depth: &CodedDepth, x: u32, y: u32) -> u32 {
     corners.map(|(x, y)| range_of(depth.at(x, y), depth.is_uncertain(x, y))).fold(NOTHING, join)
 }
 
-/// Of an uncertain texel: anything.
+/// The range of one texel; an uncertain texel may be anything.
 fn range_of(code: u16, uncertain: bool) -> u32 {
     if uncertain || code == HOLE_CODE { 0x0000_ffff } else { u32::from(code) << 16 | u32::from(code) }
 }

@@ -1,42 +1,42 @@
-//! What the samples of a set reflect towards a viewer, on the device.
+//! The light that the samples of a set reflect towards a viewer, on the device.
 
 use depth_image::{DepthImage, Highlight, Illumination, SpecularPlanes};
-use gpu::{Gpu, GpuError, illumination_bytes};
-use wgpu::BufferUsages;
+use gpu::{GpuError, Table, TablePool, illumination_bytes};
+use wgpu::{BufferUsages, TextureFormat};
 
-use crate::word_texture::{WordTexture, WordTextures};
-use crate::{ReconstructionError, SetDescription};
+use crate::{error::ReconstructionError, set_description::SetDescription};
 
-/// A normal and a reflector before the words of visibility.
+/// A normal and a reflector stand before the words of visibility.
 const WORDS_BEFORE_VISIBILITY: usize = 2;
 const ALL_VISIBLE: u32 = u32::MAX;
 
-/// Of a set in which anything has a highlight.
+/// The reflectors of a set in which anything has a highlight.
 pub(crate) struct Reflectors {
     pub highlight: Highlight,
     pub lights: usize,
     pub visibility_words: usize,
-    pub samples: WordTexture,
+    pub samples: Table,
     pub illumination: wgpu::Buffer,
 }
 
 impl Reflectors {
     /// `None` where no highlights are asked for or nothing reflects.
     pub fn upload(
-        textures: &WordTextures,
+        tables: &TablePool,
         images: &[DepthImage],
         set: &SetDescription<'_>,
     ) -> Result<Option<Self>, ReconstructionError> {
         check(images, set.illumination)?;
         let Some(highlight) = set.highlight.filter(|_| images.iter().any(reflects)) else { return Ok(None) };
-        let (gpu, bytes) = (&textures.gpu, illumination_bytes(set.illumination));
-        check_uniform(gpu, bytes.len())?;
+        let (gpu, bytes) = (tables.gpu(), illumination_bytes(set.illumination));
+        let limit = gpu.device.limits().max_uniform_buffer_binding_size;
+        GpuError::check_limit("the scene's lights (bytes)", bytes.len() as u64, limit)?;
         let visibility_words = visibility_words(images);
         Ok(Some(Self {
             highlight,
             lights: set.illumination.lights.len(),
             visibility_words,
-            samples: textures.upload("reflectors", sample_words(images, visibility_words))?,
+            samples: tables.upload("reflectors", TextureFormat::Rgba32Uint, &sample_words(images, visibility_words))?,
             illumination: gpu.buffer_with("illumination", &bytes, BufferUsages::UNIFORM),
         }))
     }
@@ -63,14 +63,6 @@ fn check(images: &[DepthImage], illumination: &Illumination) -> Result<(), Recon
         if found != 0 && found != expected {
             return wrong(format!("{found} planes of visibility, the lights need {expected} or none"));
         }
-    }
-    Ok(())
-}
-
-fn check_uniform(gpu: &Gpu, bytes: usize) -> Result<(), GpuError> {
-    let (needed, limit) = (bytes as u64, gpu.device.limits().max_uniform_buffer_binding_size);
-    if needed > limit {
-        return Err(GpuError::Limit { what: "the scene's lights (bytes)".to_owned(), needed, limit });
     }
     Ok(())
 }

@@ -1,56 +1,47 @@
 //! A sample set on the device.
 
-use depth_image::{Aabb, Camera, DepthImage, Highlight, Illumination, PinholeCamera, srgb8_from_linear};
+use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, srgb8_from_linear};
 use glam::{Vec2, Vec3};
+use gpu::{Table, TablePool};
 use rayon::prelude::*;
+use wgpu::TextureFormat;
 
 use crate::{
-    CodedDepth, Pyramid, ReconstructionError,
-    layout::{GpuSampleCamera, GpuVolume},
-    pyramid::{cell_row, is_among_holes},
+    error::ReconstructionError,
+    pyramid::{CodedDepth, Pyramid, cell_row, is_among_holes},
     quads::SetMeshes,
     reflectors::Reflectors,
-    word_texture::{self, WordTexture, WordTextures},
+    set_description::SetDescription,
+    view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant},
 };
 
-/// A surface on the very face of the volume must still be entered, by all cameras, whose samples of a slope are
-/// steps: in parts of the volume's longest edge.
+/// Tables of one set.
+pub(crate) const MAX_TABLES: usize = 5;
+
+/// The padding of the volume, in parts of its longest edge. All cameras must still enter a surface on the very face of the
+/// volume, although their samples of a slope are steps.
 pub(crate) const VOLUME_MARGIN: f32 = 0.005;
-
-/// Shaders name each camera; more would make them too long.
-pub const MAX_SAMPLE_CAMERAS: usize = 16;
-
-/// What the images of a set have in common.
-#[derive(Debug, Clone, Copy)]
-pub struct SetDescription<'a> {
-    /// Holds all geometry of the scene.
-    pub volume: Aabb,
-    /// Of pixels that show nothing.
-    pub background_linear: Vec3,
-    /// What lights the scene; seen in highlights only, the rest is in the samples' colours.
-    pub illumination: &'a Illumination,
-    /// How surfaces reflect towards the viewer; `None` leaves highlights out, whatever planes images have.
-    pub highlight: Option<Highlight>,
-}
 
 /// One complete sample set: what views are reconstructed from.
 pub struct SampleSet {
     pub(crate) cameras: Vec<GpuSampleCamera>,
-    /// Of each image, by its bit in provenance: whether some of its texels prove nothing.
+    /// Images of which some texels prove nothing, by their bits in provenance.
     pub(crate) uncertain: Vec<bool>,
     pub(crate) volume: GpuVolume,
-    /// Of pyramids.
-    pub(crate) nodes: WordTexture,
-    pub(crate) cell_codes: WordTexture,
-    pub(crate) cell_colors: WordTexture,
+    /// Two words for each node of the pyramids.
+    pub(crate) nodes: Table,
+    /// See [`CodedDepth::cell_words`].
+    pub(crate) cell_codes: Table,
+    /// RGB9E5 of each cell's corners.
+    pub(crate) cell_colors: Table,
     pub(crate) reflectors: Option<Reflectors>,
     pub(crate) meshes: SetMeshes,
 }
 
 impl SampleSet {
-    /// Whether any image has texels that prove nothing.
-    pub(crate) fn has_holes(&self) -> bool {
-        self.uncertain.contains(&true)
+    /// The switches of all shaders that read the set.
+    pub(crate) fn variant(&self) -> SetVariant {
+        SetVariant { cameras: self.cameras.len(), holes: self.uncertain.contains(&true) }
     }
 
     /// Builds pyramids and uploads everything.
@@ -58,15 +49,15 @@ impl SampleSet {
     /// # Errors
     /// Too many images, planes or cameras that do not fit, or a set beyond the device's limits.
     pub(crate) fn upload(
-        textures: &WordTextures,
+        tables: &TablePool,
         images: &[DepthImage],
         set: &SetDescription<'_>,
     ) -> Result<Self, ReconstructionError> {
-        check(textures, images, &set.volume)?;
+        check(tables, images, &set.volume)?;
         let among_holes = is_among_holes(images);
         let coded: Vec<CodedImage> = images.par_iter().map(|image| CodedImage::of(image, among_holes)).collect();
-        let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(word_texture::room);
-        let mut colors = word_texture::room(cell_count(images));
+        let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(Vec::with_capacity);
+        let mut colors: Vec<[u32; 4]> = Vec::with_capacity(cell_count(images));
         let mut cameras = Vec::with_capacity(images.len());
         let uncertain = coded.iter().map(|coded| coded.uncertain).collect();
         for (image, coded) in images.iter().zip(coded) {
@@ -85,11 +76,11 @@ impl SampleSet {
             cameras,
             uncertain,
             volume: gpu_volume(&searched_volume(&set.volume, images), set.background_linear),
-            nodes: textures.upload("depth pyramids", nodes)?,
-            cell_codes: textures.upload("cells", codes)?,
-            cell_colors: textures.upload("sample colours", colors)?,
-            reflectors: Reflectors::upload(textures, images, set)?,
-            meshes: SetMeshes::upload(textures, images)?,
+            nodes: tables.upload("depth pyramids", TextureFormat::Rg32Uint, &nodes)?,
+            cell_codes: tables.upload("cells", TextureFormat::Rg32Uint, &codes)?,
+            cell_colors: tables.upload("sample colours", TextureFormat::Rgba32Uint, &colors)?,
+            reflectors: Reflectors::upload(tables, images, set)?,
+            meshes: SetMeshes::upload(tables, images)?,
         })
     }
 }
@@ -97,7 +88,7 @@ impl SampleSet {
 /// One image, as shaders see it.
 struct CodedImage {
     uncertain: bool,
-    /// But for its place in the set.
+    /// Without its place in the set.
     camera: GpuSampleCamera,
     nodes: Vec<[u32; 2]>,
     cells: Vec<[u32; 2]>,
@@ -117,7 +108,7 @@ impl CodedImage {
     }
 }
 
-fn check(textures: &WordTextures, images: &[DepthImage], volume: &Aabb) -> Result<(), ReconstructionError> {
+fn check(tables: &TablePool, images: &[DepthImage], volume: &Aabb) -> Result<(), ReconstructionError> {
     if images.is_empty() || images.len() > MAX_SAMPLE_CAMERAS {
         return Err(ReconstructionError::SampleCount(images.len()));
     }
@@ -133,8 +124,8 @@ fn check(textures: &WordTextures, images: &[DepthImage], volume: &Aabb) -> Resul
             return Err(wrong("an image of one row or column has no surface between samples".to_owned()));
         }
     }
-    textures.check("depth pyramids", node_count(images))?;
-    textures.check("cells", cell_count(images))?;
+    tables.gpu().check_table("depth pyramids", node_count(images))?;
+    tables.gpu().check_table("cells", cell_count(images))?;
     Ok(())
 }
 
@@ -143,12 +134,12 @@ fn node_count(images: &[DepthImage]) -> usize {
     images.iter().map(|image| Pyramid::word_count(log2_sides(image))).sum()
 }
 
-/// One a texel.
+/// One cell a texel.
 fn cell_count(images: &[DepthImage]) -> usize {
     images.iter().map(|image| image.color_rgb9e5.len()).sum()
 }
 
-/// But for its place in the set.
+/// A sample camera without its place in the set.
 fn sample_camera(camera: &PinholeCamera, depth: &CodedDepth, pyramid: &Pyramid) -> GpuSampleCamera {
     GpuSampleCamera {
         homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world().map(|row| row.to_array()),
@@ -176,8 +167,8 @@ pub(crate) fn stretch(camera: &PinholeCamera) -> f32 {
     camera.focal_px.max_element() * (1.0 + slope.length_squared()).sqrt()
 }
 
-/// The volume with room for what samples do not know: a search must still be inside where it meets a surface
-/// on the volume's very face.
+/// The volume with room for the error of samples: a search must still be inside where it meets a surface on the volume's
+/// very face.
 pub(crate) fn searched_volume(volume: &Aabb, images: &[DepthImage]) -> Aabb {
     let among_holes = is_among_holes(images);
     let depth_error_m = images.iter().map(|image| CodedDepth::greatest_error_m(image, among_holes)).fold(0.0, f32::max);

@@ -1,32 +1,31 @@
-// Adds the light that depends on the viewer to pixels that show a surface: their colour so far is what the
-// surface sends to all sides alike. Works on the finished view, whatever method found it.
+// Adds the light that depends on the viewer to pixels that show a surface. Their colour so far is the light that the
+// surface sends to all sides alike. The pass works on the finished view of any method.
 //
-// What a surface reflects is told by the samples around the point, of the contributing camera that is nearest
-// to the view. What is filled shows no surface that a camera saw, and gets no highlight.
+// The samples around the point tell what a surface reflects: those of the contributing camera that is nearest to
+// the view. A filled pixel shows no surface that a camera saw, and gets no highlight.
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
 {% include "light.wgsl" %}
 {% include "highlight.wgsl" %}
-{% include "sample_set.wgsl" %}
+{% include "view_work.wgsl" %}
 {% include "cell.wgsl" %}
 
-@group(0) @binding(3) var<storage, read_write> out_srgb8: array<u32>;
-@group(0) @binding(4) var<storage, read> inverse_depth: array<f32>;
-@group(0) @binding(5) var<storage, read> provenance: array<u32>;
-@group(0) @binding(6) var<uniform> illumination: Illumination;
-// Of each sample its normal, its reflector and the words of its visibility, rounded up to whole texels: a load
-// brings four words.
-@group(0) @binding(7) var samples: texture_2d<u32>;
+@group(0) var<storage, read_write> out_srgb8: array<u32>;
+@group(0) var<storage, read> inverse_depth: array<f32>;
+@group(0) var<storage, read> provenance: array<u32>;
+@group(0) var<uniform> illumination: Illumination;
+// A normal, a reflector and the words of visibility for each sample, rounded up to whole texels: a load brings four
+// words.
+@group(0) var samples: texture_2d<u32>;
 
-const PROVENANCE_HIT: u32 = 1u;
 const THICKNESS_FOOTPRINTS: f32 = {{ thickness_footprints }};
 const SAMPLE_TEXELS: u32 = {{ sample_texels }}u;
 
-// What the samples around a point say together, packed as one sample's, and the share of them that reflects.
+// The mean of the samples around a point, packed as one sample, and the share of them that reflects.
 struct Gathered { normal: vec3f, reflector: u32, visibility: VisibilityWords, reflecting: f32 }
 
 fn sample_texel(sample: u32, texel: u32) -> vec4u {
-    return textureLoad(samples, texel_of(sample * SAMPLE_TEXELS + texel), 0);
+    return textureLoad(samples, texel_at(sample * SAMPLE_TEXELS + texel), 0);
 }
 
 // On the octahedron, not the sphere: neighbours are near to each other, and their mean is brought to unit length
@@ -88,12 +87,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let camera = work.cameras[nearest];
     let p = homogeneous(camera.homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
     let inverse_w = safe_reciprocal(p.z);
-    let uv = clamp(p.xy * inverse_w - 0.5, vec2f(0.0), camera.cells - 0.01);
+    let uv = clamp(p.xy * inverse_w - 0.5, vec2f(0.0), camera.cells - CELL_MARGIN_PX);
     let cell = vec2u(uv);
     let at = uv - floor(uv);
     let cell_index = camera.first_cell + cell.y * camera.width_px + cell.x;
     let corners = corners_of(cell_index);
-    // As in surface.wgsl: of a connected cell the surface itself counts, else each sample for itself.
+    // As in surface.wgsl: in a connected cell the surface itself counts, else each sample for itself.
     let code_above = camera.code_scale * inverse_w;
     let gaps = code_above + camera.code_offset - select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
     let reach = vec4f(THICKNESS_FOOTPRINTS * code_above / camera.focal_px);

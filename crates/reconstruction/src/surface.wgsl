@@ -1,42 +1,35 @@
-// The surface that one camera's samples describe around a position, and what it says of a point there.
+// The vote of all cameras on a point: the surfaces that their samples describe around it.
 
-@group(0) @binding(3) var<storage, read> tile_start_m: array<f32>;
 // RGB9E5 of each cell's corners, in their order.
-@group(0) @binding(9) var cell_colors: texture_2d<u32>;
-@group(0) @binding(4) var<storage, read_write> out_srgb8: array<u32>;
-@group(0) @binding(5) var<storage, read_write> out_inverse_depth: array<f32>;
-@group(0) @binding(6) var<storage, read_write> out_provenance: array<u32>;
-// Pixels that a later pass takes up: for each view its pixels' places, and indirect dispatch arguments.
-@group(0) @binding(7) var<storage, read_write> later_pixels: array<u32>;
-struct Later { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
-@group(0) @binding(8) var<storage, read_write> later: array<Later>;
+@group(0) var cell_colors: texture_2d<u32>;
+@group(0) var<storage, read_write> out_srgb8: array<u32>;
+@group(0) var<storage, read_write> out_inverse_depth: array<f32>;
+@group(0) var<storage, read_write> out_provenance: array<u32>;
+// Pixels that the next pass takes up, as it reads them with pixel_list.wgsl.
+@group(0) var<storage, read_write> undecided_pixels: array<u32>;
+struct UndecidedList { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
+@group(0) var<storage, read_write> undecided: array<UndecidedList>;
 {% if count_fetches %}
-@group(0) @binding(10) var<storage, read_write> out_fetches: array<u32>;
+@group(0) var<storage, read_write> out_fetches: array<u32>;
 var<private> fetches: u32 = 0u;
 {% endif %}
 
-{% if march_camera > 0 %}
-// What the pass before could not decide.
-struct Earlier { workgroups: u32, y: u32, z: u32, count: u32 }
-@group(0) @binding({{ 10 + count_fetches|int }}) var<storage, read> earlier_pixels: array<u32>;
-@group(0) @binding({{ 11 + count_fetches|int }}) var<storage, read> earlier: array<Earlier>;
-{% endif %}
-
-const LIST_WORKGROUP: u32 = 64u;
+const LIST_WORKGROUP: u32 = {{ list_workgroup }}u;
+const THICKNESS_FOOTPRINTS: f32 = {{ thickness_footprints }};
+const LEAST_SHARE: f32 = {{ least_share }};
+const CARVING_SHARE: f32 = {{ carving_share }};
+const ANGLE_FLOOR: f32 = {{ angle_floor }};
+const BORDER_PX: f32 = {{ border_px }};
 
 // Leaves a pixel to the next pass.
-fn leave_for_later(index: u32) {
-    let place = atomicAdd(&later[work.view.number].count, 1u);
-    later_pixels[work.view.first_pixel + place] = index;
-    if place % LIST_WORKGROUP == 0u { atomicAdd(&later[work.view.number].workgroups, 1u); }
+fn leave_undecided(index: u32) {
+    let place = atomicAdd(&undecided[work.view.number].count, 1u);
+    undecided_pixels[work.view.first_pixel + place] = index;
+    if place % LIST_WORKGROUP == 0u { atomicAdd(&undecided[work.view.number].workgroups, 1u); }
 }
 
-const PROVENANCE_EMPTY: u32 = 0u;
-const PROVENANCE_HIT: u32 = 1u;
-const PROVENANCE_FILLED: u32 = 2u;
-
 // Depth is known to half a code; a ray that reached a plane's very depth is still before it.
-const HALF_CODE: f32 = 0.5;
+const HALF_CODE: f32 = {{ half_code }};
 
 // A silhouette runs through a cell that is not connected: what is nearer counts until the cameras vote.
 fn surface_code(corners: Corners, at: vec2f) -> f32 {
@@ -55,6 +48,12 @@ fn pixel_of(id: vec2u) -> Pixel {
     return Pixel(index, tile, direction);
 }
 
+// Where a pixel of this view lies.
+fn place_of(index: u32) -> vec2u {
+    let place = index - work.view.first_pixel;
+    return vec2u(place % work.view.size_px.x, place / work.view.size_px.x);
+}
+
 fn write_pixel(index: u32, color_srgb8: u32, inverse_depth_per_m: f32, provenance: u32) {
     out_srgb8[index] = color_srgb8;
     out_inverse_depth[index] = inverse_depth_per_m;
@@ -63,112 +62,112 @@ fn write_pixel(index: u32, color_srgb8: u32, inverse_depth_per_m: f32, provenanc
 {% endif %}
 }
 
-// Of a cell's corners, in their order.
+// The colours of a cell's corners, in their order.
 struct Colors { corners: array<vec3f, 4> }
 
 fn colors_of(cell_index: u32) -> Colors {
 {% if count_fetches %}    fetches += 1u;
 {% endif %}
-    let words = textureLoad(cell_colors, texel_of(cell_index), 0);
+    let words = textureLoad(cell_colors, texel_at(cell_index), 0);
     return Colors(array(
         linear_from_rgb9e5(words.x), linear_from_rgb9e5(words.y), linear_from_rgb9e5(words.z), linear_from_rgb9e5(words.w),
     ));
 }
 
 {% if holes %}
-// How much a sample counts behind a surface that was left out, beside one that nothing was left out before.
+// The weight of a sample behind a surface that its image omits, beside a sample with nothing omitted before it.
 const HIDDEN_WEIGHT: f32 = {{ hidden_weight }};
 
-fn faded(share: f32) -> f32 { return clamp((share - 0.05) / 0.95, 0.0, 1.0); }
+fn faded(share: f32) -> f32 { return clamp((share - LEAST_SHARE) / (1.0 - LEAST_SHARE), 0.0, 1.0); }
 {% endif %}
 
-// What a camera makes of a point: how much its colour counts and where it is found, and the share of the
-// texels around that lie on the point's own surface or show what is beyond it.
-struct Sight { weight: f32, cell: u32, shares: vec4f, same: f32, beyond: f32 }
+// A camera's vote on a point: the weight and the place of its colour, and shares of the texels around. `same` lies on the
+// point's own surface, `beyond` shows what is beyond it.
+struct CameraVote { weight: f32, cell: u32, shares: vec4f, same: f32, beyond: f32 }
 
-fn sight_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f, slack: f32) -> Sight {
+fn vote_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f) -> CameraVote {
     let p = homogeneous(camera.homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
     let cells = camera.cells;
     let inverse_w = 1.0 / p.z;
     let uv = p.xy * inverse_w - 0.5;
     let inside = p.z > 0.0 && all(uv >= vec2f(0.0)) && all(uv < cells);
-    let clamped = clamp(uv, vec2f(0.0), cells - 0.01);
+    let clamped = clamp(uv, vec2f(0.0), cells - CELL_MARGIN_PX);
     let cell = vec2u(clamped);
     let at = clamped - floor(clamped);
     let cell_index = camera.first_cell + cell.y * camera.width_px + cell.x;
     let corners = corners_of(cell_index);
     let code_above = camera.code_scale * inverse_w;
     let code = code_above + camera.code_offset;
-    let reach = slack * code_above / camera.focal_px;
-    // Of a connected cell, the surface itself counts; else each sample for itself.
+    let reach = THICKNESS_FOOTPRINTS * code_above / camera.focal_px;
+    // In a connected cell the surface itself counts, else each sample for itself.
     let gaps = code - select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
     let share = bilinear_shares(at);
     let shares = select(vec4f(0.0), share, (abs(gaps) < vec4f(reach)) & (corners.codes > vec4f(1.5)));
     let same = dot(shares, vec4f(1.0));
 {% if holes %}
-    // What is not proven free says nothing of what lies before it.
+    // A texel whose way is not proven free proves nothing of the space before it.
     let proven = share * select(0.0, 1.0, corners.certain);
 {% else %}
     let proven = share;
 {% endif %}
     let beyond = dot(select(vec4f(0.0), proven, (gaps > vec4f(reach)) & (corners.codes > vec4f(0.5))), vec4f(1.0));
     // Angle between the two lines of sight, footprint and distance to the border.
-    let sight = point_in_world - camera.eye_in_world;
-    let inverse_distance = inverseSqrt(dot(sight, sight));
-    let off = sight * inverse_distance - view_direction;
-    let border = min(min(min(uv.x, cells.x - uv.x), min(uv.y, cells.y - uv.y)) * 0.125, 1.0) + 1e-3;
+    let eye_to_point = point_in_world - camera.eye_in_world;
+    let inverse_distance = inverseSqrt(dot(eye_to_point, eye_to_point));
+    let off = eye_to_point * inverse_distance - view_direction;
+    let border = min(min(min(uv.x, cells.x - uv.x), min(uv.y, cells.y - uv.y)) / BORDER_PX, 1.0) + 1e-3;
     let footprint = camera.focal_px * inverse_distance;
-    let weight = border * footprint * footprint / (dot(off, off) + {{ angle_floor }});
+    let weight = border * footprint * footprint / (dot(off, off) + ANGLE_FLOOR);
 {% if holes %}
-    // Weight fades towards texels that were left out: it goes over to the image that holds them, without a seam. What
-    // lies close behind a surface that was left out is not that surface: it counts where nothing else does.
+    // Weight fades towards omitted texels: it goes over to the image that holds them, without a seam. A sample close
+    // behind an omitted surface is not that surface: it counts where nothing else does.
     let own = shares * mix(vec4f(HIDDEN_WEIGHT), vec4f(1.0), corners.proven);
-    let kept = faded(dot(shares, corners.proven)) + HIDDEN_WEIGHT * faded(same);
+    let fade = faded(dot(shares, corners.proven)) + HIDDEN_WEIGHT * faded(same);
 {% else %}
-    let kept = 1.0;
+    let fade = 1.0;
 {% endif %}
-    return Sight(select(0.0, weight * kept, inside && same > 0.05), cell_index, {{ "own" if holes else "shares" }}, select(0.0, same, inside), select(0.0, beyond, inside));
+    return CameraVote(select(0.0, weight * fade, inside && same > LEAST_SHARE), cell_index, {{ "own" if holes else "shares" }}, select(0.0, same, inside), select(0.0, beyond, inside));
 }
 
-// `occupied`: whether the cameras together hold that there is a surface. A silhouette lies somewhere within
+// `occupied`: the cameras together hold that there is a surface. A silhouette lies somewhere within
 // a texel; the mean of what all cameras show around a point tells better where than any one does.
 struct Blend { color_linear: vec3f, camera_mask: u32, occupied: bool }
 
-fn color_of(sight: Sight) -> vec3f {
-    let colors = colors_of(sight.cell).corners;
-    let color = sight.shares.x * colors[0] + sight.shares.y * colors[1] + sight.shares.z * colors[2] + sight.shares.w * colors[3];
+fn color_of(vote: CameraVote) -> vec3f {
+    let colors = colors_of(vote.cell).corners;
+    let color = vote.shares.x * colors[0] + vote.shares.y * colors[1] + vote.shares.z * colors[2] + vote.shares.w * colors[3];
 {% if holes %}
-    return color / max(dot(sight.shares, vec4f(1.0)), 1e-6);
+    return color / max(dot(vote.shares, vec4f(1.0)), 1e-6);
 {% else %}
-    return color / max(sight.same, 0.05);
+    return color / max(vote.same, LEAST_SHARE);
 {% endif %}
 }
 
-// The two cameras that know a point best, each weighted by how far it surpasses the third, so that no seam
-// shows where cameras change places (Buehler et al. 2001, with k = 2). The order of cameras is no matter.
-fn blended(point_in_world: vec3f, direction: vec3f, slack: f32) -> Blend {
+// The two cameras that know a point best, each weighted by how far it surpasses the third (Buehler et al. 2001, with
+// k = 2). No seam shows where cameras change places. The order of cameras does not matter.
+fn blend_two_best(point_in_world: vec3f, direction: vec3f) -> Blend {
     let view_direction = normalize(direction);
-    var first = sight_of(work.cameras[0], point_in_world, view_direction, slack);
+    var first = vote_of(work.cameras[0], point_in_world, view_direction);
     var first_mask = work.cameras[0].mask;
     var same = first.same;
     var beyond = first.beyond;
-    var carved = first.beyond > 0.999;
-    var second = Sight(0.0, 0u, vec4f(0.0), 0.0, 0.0);
+    var carved = first.beyond > CARVING_SHARE;
+    var second = CameraVote(0.0, 0u, vec4f(0.0), 0.0, 0.0);
     var second_mask = 0u;
     var third_weight = 0.0;
 {% for k in range(1, cameras) %}
     {
-        let sight = sight_of(work.cameras[{{ k }}], point_in_world, view_direction, slack);
+        let vote = vote_of(work.cameras[{{ k }}], point_in_world, view_direction);
         let mask = work.cameras[{{ k }}].mask;
-        same += sight.same;
-        beyond += sight.beyond;
-        carved = carved || sight.beyond > 0.999;
-        let best = sight.weight > first.weight;
-        let better = sight.weight > second.weight;
-        third_weight = max(third_weight, min(sight.weight, second.weight));
-        second = pick_sight(pick_sight(second, sight, better), first, best);
+        same += vote.same;
+        beyond += vote.beyond;
+        carved = carved || vote.beyond > CARVING_SHARE;
+        let best = vote.weight > first.weight;
+        let better = vote.weight > second.weight;
+        third_weight = max(third_weight, min(vote.weight, second.weight));
+        second = pick_vote(pick_vote(second, vote, better), first, best);
         second_mask = select(select(second_mask, mask, better), first_mask, best);
-        first = pick_sight(first, sight, best);
+        first = pick_vote(first, vote, best);
         first_mask = select(first_mask, mask, best);
     }
 {% endfor %}
@@ -178,8 +177,8 @@ fn blended(point_in_world: vec3f, direction: vec3f, slack: f32) -> Blend {
     return Blend(color, mask, same >= beyond && mask != 0u && !carved);
 }
 
-fn pick_sight(a: Sight, b: Sight, second: bool) -> Sight {
-    return Sight(
+fn pick_vote(a: CameraVote, b: CameraVote, second: bool) -> CameraVote {
+    return CameraVote(
         select(a.weight, b.weight, second), select(a.cell, b.cell, second), select(a.shares, b.shares, second),
         select(a.same, b.same, second), 0.0,
     );

@@ -1,24 +1,24 @@
-// For each tile of 8×8 pixels, how far all of its rays run through space that some camera has seen empty
-// or that none sees at all.
+// Finds how far all rays of a tile run through space that some camera has seen empty, or that none sees at all.
 //
-// A disc around the tile's middle ray bounds the points of all its rays at one parameter t. t moves on
-// while some camera shows everything in the footprint of the disc's way to be farther away, or no camera
-// that sees a part of it shows anything else.
-{% include "sample_set.wgsl" %}
+// A disc around the tile's middle ray bounds the points of all its rays at one parameter t. The tile moves on while some camera
+// shows everything in the footprint of the disc's way to be farther away. It also moves on while all cameras that see a
+// part of the way do.
+{% include "view_work.wgsl" %}
 
-@group(0) @binding(3) var<storage, read_write> tile_start_m: array<f32>;
+@group(0) var<storage, read_write> tile_start_m: array<f32>;
 
-const MAX_MOVES: u32 = 40u;
-const GREATEST_MOVE: f32 = 1.3;
-const LEAST_MOVE: f32 = 1.01;
+const MAX_MOVES: u32 = {{ max_moves }}u;
+const GREATEST_MOVE: f32 = {{ greatest_move }};
+const LEAST_MOVE: f32 = {{ least_move }};
+const HALF_DIAGONAL: f32 = {{ half_diagonal }};
 
 // Each ray's point is proven empty by this camera.
 const PROVEN: u32 = 1u;
 // No point that this camera sees may be occupied; it need not see them all.
 const UNOPPOSED: u32 = 2u;
 
-// What a camera knows of the disc's way from t to t_end.
-fn opinion(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, t_end: f32, slope: f32) -> u32 {
+// The flags of a camera for the disc's way from t to t_end.
+fn evaluate_camera(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, t_end: f32, slope: f32) -> u32 {
     let p = a + b * t;
     let q = a + b * t_end;
     let radii_m = slope * vec2f(t, t_end);
@@ -39,20 +39,20 @@ fn opinion(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, t_end: f32, slope: 
     let wanted = u32(max(ceil(log2(max(extent.x, extent.y) + 1e-3)), 1.0));
     let level = min(wanted, top_level(log2_sides));
     let node = camera.first_node + node_index(log2_sides, level, vec2u(first) >> vec2u(level));
-    let nearest = nearest_code(textureLoad(nodes, texel_of(node), 0).y);
+    let nearest = nearest_code(textureLoad(nodes, texel_at(node), 0).y);
     let farthest_codes = camera.code_scale / max(depths_m + radii_m, vec2f(1e-20)) + camera.code_offset;
     let empty = all(closest_m > vec2f(0.0)) && min(farthest_codes.x, farthest_codes.y) > nearest;
     return select(select(0u, select(UNOPPOSED, PROVEN | UNOPPOSED, whole), empty), UNOPPOSED, unseen);
 }
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size({{ tile_px }}, {{ tile_px }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let tiles = (work.view.size_px + TILE_PX - 1u) / TILE_PX;
     if id.x >= tiles.x || id.y >= tiles.y { return; }
     let middle = (vec2f(id.xy) + 0.5) * f32(TILE_PX);
     let direction = work.view.column_in_world * middle.x + work.view.row_in_world * middle.y + work.view.corner_in_world;
     // Half a tile's diagonal at depth 1, and a little for rounding.
-    let slope = (0.7072 * f32(TILE_PX)) / work.view.focal_px;
+    let slope = (HALF_DIAGONAL * f32(TILE_PX)) / work.view.focal_px;
     // The middle ray may miss the volume where others of the tile enter it: start at the eye's near plane.
     let far = length(max(abs(work.volume_min_in_world - work.view.eye_in_world), abs(work.volume_max_in_world - work.view.eye_in_world)));
 {% for k in range(cameras) %}
@@ -67,7 +67,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         var any_proof = 0u;
         var all_agree = UNOPPOSED;
 {% for k in range(cameras) %}
-        let o{{ k }} = opinion(camera{{ k }}, a{{ k }}, b{{ k }}, t, t_end, slope);
+        let o{{ k }} = evaluate_camera(camera{{ k }}, a{{ k }}, b{{ k }}, t, t_end, slope);
         any_proof |= o{{ k }};
         all_agree &= o{{ k }};
 {% endfor %}
@@ -78,8 +78,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     tile_start_m[work.view.first_tile + id.y * tiles.x + id.x] = t;
 }
 
-// The least parameter at which a corner ray of the tile enters the volume; its near plane where the
-// corners miss it although something between them may not.
+// The least parameter at which a corner ray of the tile enters the volume. A corner ray that misses it counts with the
+// near plane: rays between the corners may enter.
 fn entry(tile: vec2u) -> f32 {
     var least = FAR_AWAY;
     for (var corner = 0u; corner < 4u; corner++) {

@@ -1,27 +1,26 @@
-//! Light that was summed before, to be added to: what makes a still scene's samples grow better.
+//! Light that was summed before, to be added to: a still scene's samples grow better from set to set.
 
-use std::{
-    collections::VecDeque,
-    ops::Range,
-    sync::{Mutex, PoisonError},
-};
+use std::{collections::VecDeque, ops::Range};
 
 use depth_image::PinholeCamera;
 use gpu::PooledBuffer;
+use parking_lot::Mutex;
 
-use crate::{GpuScene, Lighting, form::Form};
+use crate::{Lighting, finish::FinishVariant, known_samples::RedundancyVariant};
 
 /// Sums that are kept; the oldest go first.
 const KEPT: usize = 16;
 
-/// What sums are of. Equal keys are the same light of the same pixels.
+/// The scene, light and pixels of sums.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Key {
-    scene: u64,
-    lighting: Lighting,
-    scene_time_s: f32,
-    cameras: Vec<PinholeCamera>,
-    finish: Form,
+    pub scene: u64,
+    pub lighting: Lighting,
+    pub scene_time_s: f32,
+    pub cameras: Vec<PinholeCamera>,
+    pub finish: FinishVariant,
+    /// The first image's.
+    pub redundancy: Option<RedundancyVariant>,
 }
 
 /// Sums over the first rays of every pixel's sequences.
@@ -35,20 +34,8 @@ pub(crate) struct Sums {
 #[derive(Default)]
 pub(crate) struct Accumulations(Mutex<VecDeque<(Key, Sums)>>);
 
-impl Key {
-    pub fn of(
-        scene: &GpuScene,
-        lighting: Lighting,
-        scene_time_s: f32,
-        cameras: &[PinholeCamera],
-        finish: Form,
-    ) -> Self {
-        Self { scene: scene.identity(), lighting, scene_time_s, cameras: cameras.to_vec(), finish }
-    }
-}
-
 impl Sums {
-    /// Nothing yet, and `wanted` rays to be traced.
+    /// Empty sums, and `wanted` rays to be traced.
     pub fn new(buffer: PooledBuffer, wanted: [u32; 2]) -> Self {
         let [shadow, occlusion] = wanted;
         Self { buffer, shadow: 0..shadow, occlusion: 0..occlusion }
@@ -68,7 +55,7 @@ impl Sums {
 impl Accumulations {
     /// Sums with no more rays than `wanted`, which are now to be reached.
     pub fn take(&self, key: &Key, wanted: [u32; 2]) -> Option<Sums> {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.0.lock();
         let at = kept.iter().position(|(other, sums)| {
             other == key && sums.shadow.end <= wanted[0] && sums.occlusion.end <= wanted[1]
         })?;
@@ -79,7 +66,7 @@ impl Accumulations {
 
     /// Keeps sums whose rays have been traced.
     pub fn put(&self, key: Key, sums: Sums) {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.0.lock();
         kept.push_back((key, sums));
         if kept.len() > KEPT {
             kept.pop_front();

@@ -23,11 +23,12 @@ struct PixelCamera {
     occlusion_rays_in_sum: u32,
     occlusion_radius_m: f32,
     tolerance: f32,
+    // The first pixel, from where the forward axis meets the image; wraps.
     first_from_axis: vec2u,
     padding: vec2u,
 }
 
-@group(0) @binding(0) var<uniform> camera: PixelCamera;
+@group(0) var<uniform> camera: PixelCamera;
 
 fn direction_of(pixel: vec2u) -> vec3f {
     let center = vec2f(pixel) + 0.5;

@@ -69,7 +69,7 @@ impl Frustum {
         Self([u, w * size.x - u, v, w * size.y - v, w - Vec4::W * camera.near_m])
     }
 
-    /// Whether some of the box may be seen.
+    /// True for a box of which some may be seen.
     pub fn may_see(&self, bounds: &Aabb) -> bool {
         self.0.iter().all(|plane| {
             let normal = plane.truncate();
@@ -85,7 +85,7 @@ mod tests {
     use glam::UVec2;
 
     #[test]
-    fn frustum_keeps_what_is_seen_and_drops_what_is_not() {
+    fn a_frustum_keeps_visible_boxes_and_drops_hidden_ones() {
         let camera = PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 0.8, UVec2::new(200, 100));
         let frustum = Frustum::of(&camera);
         let at = |p: Vec3| Aabb { min: p - 0.1, max: p + 0.1 };

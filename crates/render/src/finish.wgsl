@@ -3,36 +3,35 @@
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
 {% include "albedo.wgsl" %}
+{% include "surfaces.wgsl" %}
 {% if highlight %}
 {% include "light.wgsl" %}
 {% include "highlight.wgsl" %}
 {% endif %}
 
-@group(0) @binding(1) var surfaces: texture_2d<u32>;
-@group(0) @binding(2) var reversed_depth: {{ "texture_2d<f32>" if by_rays else "texture_depth_2d" }};
-// Of each camera, plane by plane.
-@group(0) @binding(3) var<storage, read_write> words: array<u32>;
-@group(0) @binding(4) var<storage, read> sums: array<f32>;
-@group(0) @binding(5) var<uniform> finish: Finish;
+// The finished planes of each camera, one after the other.
+@group(0) var<storage, read_write> words: array<u32>;
+@group(0) var<storage, read> sums: array<f32>;
+@group(0) var<uniform> finish: Finish;
 {% if highlight %}
-@group(0) @binding(6) var<uniform> illumination: Illumination;
+@group(0) var<uniform> illumination: Illumination;
 {% endif %}
 {% if surface_id %}
-@group(0) @binding(7) var surface_ids: texture_2d<u32>;
+@group(0) var surface_ids: texture_2d<u32>;
 {% endif %}
-{% if leave_out %}
-// Of the nearest surface on each pixel's ray, shown or left out.
-@group(0) @binding({{ 8 if surface_id else 7 }}) var front_depth: {{ "texture_2d<f32>" if by_rays else "texture_depth_2d" }};
+{% if redundancy %}
+// The reversed depth of the nearest surface on each pixel's ray, redundant or not.
+@group(0) var front_depth: {{ "texture_2d<f32>" if by_rays else "texture_depth_2d" }};
 {% endif %}
 {% include "sums.wgsl" %}
 
 struct Finish { background_linear: vec3f, view_cell_m: f32 }
-{% if leave_out %}
+{% if redundancy %}
 
 fn front_at(texel: vec2u) -> f32 { return textureLoad(front_depth, texel, 0){{ ".x" if by_rays else "" }}; }
 {% endif %}
-{% if only_useful %}
-{% include "useful.wgsl" %}
+{% if usefulness_test %}
+{% include usefulness_test %}
 {% endif %}
 
 fn put(plane: u32, place: u32, word: u32) { words[camera.first_word + plane * camera.pixel_count + place] = word; }
@@ -62,12 +61,12 @@ fn visibility_word(word: u32, place: u32) -> u32 {
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= camera.size_px) { return; }
     let place = id.y * camera.size_px.x + id.x;
-    let depth = textureLoad(reversed_depth, id.xy, 0){{ ".x" if by_rays else "" }};
-    let surface = textureLoad(surfaces, id.xy, 0);
+    let depth = reversed_depth_at(id.xy);
+    let surface = surface_at(id.xy);
     var met = depth > 0.0;
-{% if leave_out %}
+{% if redundancy %}
     let front = front_at(id.xy);
-{% if only_useful %}
+{% if usefulness_test %}
     for (var hidden = met && front > depth; hidden; hidden = false) { met = is_useful(id.xy, depth, front); }
 {% endif %}
 {% endif %}
@@ -92,16 +91,16 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% else %}
     put(0u, place, pack4x8unorm(vec4f(srgb_from_linear(color), 1.0)));
 {% endif %}
-{% if leave_out %}
-    // Behind what is left out and not behind something else lies a hole, of which nothing is known.
+{% if redundancy %}
+    // A hole lies behind redundant surfaces where nothing else is met: nothing is known of it.
     put(1u, place, bitcast<u32>(select(depth / camera.near_m, -1.0, !met && front > 0.0)));
     put({{ passed_plane }}u, place, select(0u, 1u, front > depth));
 {% else %}
     put(1u, place, bitcast<u32>(depth / camera.near_m));
 {% endif %}
-{% if normal_plane > 0 %}    put({{ normal_plane }}u, place, surface.z);
+{% if normal_plane %}    put({{ normal_plane }}u, place, surface.z);
 {% endif %}
-{% if reflector_plane > 0 %}    put({{ reflector_plane }}u, place, select(0u, surface.w, met));
+{% if reflector_plane %}    put({{ reflector_plane }}u, place, select(0u, surface.w, met));
 {% for word in range(visibility_words) %}    put({{ reflector_plane + 1 + word }}u, place, visibility_word({{ word }}u, place));
 {% endfor %}
 {% endif %}

@@ -6,21 +6,22 @@ use std::sync::{
 };
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Aabb, Highlight, Illumination, Reflector};
+use depth_image::{Aabb, Highlight, MAX_LIGHTS};
 use glam::{Affine3A, Mat3, Vec3};
-use gpu::{Gpu, GpuError};
+use gpu::{Gpu, GpuError, switches, uniform_elements};
 use indexmap::IndexSet;
 use scene::{Material, Scene, Wind};
 use wgpu::BufferUsages;
 
 use crate::{
     RenderError, cluster,
+    material::phong_reflector,
     rays::{AccelerationReport, OrderedMesh, RayScene},
-    scalar, texture,
+    texture,
 };
 
-/// What is the same for a whole draw: a mesh part where an instance places it. `Object` in the shader, which
-/// finds it at a dynamic offset: a load from a uniform costs nothing a vertex or fragment.
+/// A mesh part where an instance places it: `Object` in the shader, the same for a whole draw. It lies at a dynamic offset: a
+/// load from a uniform costs nothing a vertex or fragment.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct GpuObject {
@@ -35,12 +36,6 @@ pub(crate) struct GpuObject {
     pub instance: u32,
 }
 
-/// Uniform offsets must be multiples of this on every device.
-pub(crate) const UNIFORM_STRIDE: u64 = 256;
-
-/// Lights travel in a uniform.
-const MAX_LIGHTS: usize = 255;
-
 /// The part of the scene that is the same for every vertex and fragment.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -51,14 +46,14 @@ pub(crate) struct GpuSurroundings {
     pub wind_frequency_hz: f32,
 }
 
-/// What a draw's shader has to do: pipelines are specialised, for work that is not in the shader is free.
+/// The work of a draw's shader: pipelines are specialised, for work that is not in the shader is free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) struct Traits {
+pub(crate) struct MaterialTraits {
     pub double_sided: bool,
     /// Without a test for alpha, hidden fragments are never shaded.
     pub alpha_tested: bool,
     pub textured: bool,
-    /// Whether metallic and roughness come from a texture.
+    /// Metallic and roughness come from a texture.
     pub coat_textured: bool,
     pub unlit: bool,
     pub specular: bool,
@@ -71,7 +66,7 @@ pub(crate) struct Draw {
     pub base_vertex: i32,
     /// Into the pairs of textures.
     pub texture: u32,
-    pub traits: Traits,
+    pub material: MaterialTraits,
     /// Into the objects.
     pub object: u32,
     pub bounds_in_world: Aabb,
@@ -115,7 +110,11 @@ impl GpuScene {
         Ok(Self {
             vertices: gpu.buffer_with("vertices", &geometry.vertices, BufferUsages::VERTEX),
             indices: gpu.buffer_with("indices", &geometry.indices, BufferUsages::INDEX),
-            objects: gpu.buffer_with("objects", &strided(&geometry.objects), BufferUsages::UNIFORM),
+            objects: gpu.buffer_with(
+                "objects",
+                &uniform_elements(geometry.objects.iter().map(bytemuck::bytes_of)),
+                BufferUsages::UNIFORM,
+            ),
             surroundings: gpu.buffer_with("surroundings", &[surroundings(scene)], BufferUsages::UNIFORM),
             textures: geometry.textures.iter().map(|pair| pair.each_ref().map(view)).collect(),
             background_linear: scene.background_linear,
@@ -140,7 +139,7 @@ impl GpuScene {
         self.highlights[usize::from(highlight == Highlight::Ggx)]
     }
 
-    /// What tells it from every other scene of this process.
+    /// A number that no other scene of this process has.
     #[must_use]
     pub fn identity(&self) -> u64 {
         self.identity
@@ -154,20 +153,12 @@ impl GpuScene {
         Ok(self.rays.at(scene_time_s)?.report)
     }
 
-    /// As [`GpuScene::acceleration`], with a new tree whatever there was: for measuring what refitting one saves.
+    /// As [`GpuScene::acceleration`], with a new tree whatever there was: to measure the gain of refitting.
     ///
     /// # Errors
     /// As [`GpuScene::acceleration`].
     pub fn rebuilt_acceleration(&self, scene_time_s: f32) -> Result<AccelerationReport, RenderError> {
         Ok(self.rays.rebuilt_at(scene_time_s)?.report)
-    }
-
-    /// What the device traces rays against at a scene time, for the scalar twin.
-    ///
-    /// # Errors
-    /// When the device's textures are too small for the scene.
-    pub fn scalar_rays(&self, scene_time_s: f32) -> Result<scalar::rays::Scene, RenderError> {
-        Ok(self.rays.scalar(scene_time_s)?)
     }
 
     /// Whether pictures depend on scene time.
@@ -191,26 +182,12 @@ impl GpuScene {
 
 fn check_sizes(gpu: &Gpu, scene: &Scene) -> Result<(), GpuError> {
     let vertices: usize = scene.meshes.iter().map(|mesh| mesh.vertices.len()).sum();
-    let limit = gpu.device.limits().max_buffer_size;
-    let needed = (vertices * size_of::<scene::Vertex>()) as u64;
-    if needed > limit {
-        return Err(GpuError::Limit { what: "the scene's vertices (bytes)".to_owned(), needed, limit });
-    }
-    let Illumination { lights, .. } = &scene.illumination;
-    if lights.len() > MAX_LIGHTS {
-        let (needed, limit) = (lights.len() as u64, MAX_LIGHTS as u64);
-        return Err(GpuError::Limit { what: "the scene's lights".to_owned(), needed, limit });
-    }
+    let bytes = (vertices * size_of::<scene::Vertex>()) as u64;
+    GpuError::check_limit("the scene's vertices (bytes)", bytes, gpu.device.limits().max_buffer_size)?;
+    GpuError::check_limit("the scene's lights", scene.illumination.lights.len() as u64, MAX_LIGHTS as u64)?;
     let side = u64::from(gpu.device.limits().max_texture_dimension_2d);
     let largest = scene.textures.iter().map(|t| u64::from(t.width_px.max(t.height_px))).max().unwrap_or(0);
-    if largest > side {
-        return Err(GpuError::Limit {
-            what: "the scene's largest texture (side in pixels)".to_owned(),
-            needed: largest,
-            limit: side,
-        });
-    }
-    Ok(())
+    GpuError::check_limit("the scene's largest texture (side in pixels)", largest, side)
 }
 
 #[derive(Default)]
@@ -236,7 +213,7 @@ impl Geometry {
             geometry.indices.extend(indices);
         }
         // Few changes of pipeline and texture; the sort is stable, so clusters stay along their curve.
-        geometry.draws.sort_by_key(|draw| (draw.traits, draw.texture));
+        geometry.draws.sort_by_key(|draw| (draw.material, draw.texture));
         geometry
     }
 
@@ -256,7 +233,7 @@ impl Geometry {
                 index_count: cluster.triangle_count * 3,
                 base_vertex,
                 texture: texture as u32,
-                traits: Traits::of(material),
+                material: MaterialTraits::of(material),
                 object,
                 bounds_in_world: Aabb::around(corners).padded(reach_m),
             }
@@ -271,7 +248,19 @@ impl Draw {
     }
 }
 
-impl Traits {
+impl MaterialTraits {
+    /// Every combination.
+    pub fn all() -> impl Iterator<Item = Self> {
+        switches().map(|[double_sided, alpha_tested, textured, coat_textured, unlit, specular]| Self {
+            double_sided,
+            alpha_tested,
+            textured,
+            coat_textured,
+            unlit,
+            specular,
+        })
+    }
+
     fn of(material: &Material) -> Self {
         Self {
             double_sided: material.double_sided,
@@ -282,15 +271,6 @@ impl Traits {
             specular: material.is_specular(),
         }
     }
-}
-
-/// Each object at its own dynamic offset.
-fn strided(objects: &[GpuObject]) -> Vec<u8> {
-    let mut bytes = vec![0; objects.len() * UNIFORM_STRIDE as usize];
-    for (slot, object) in bytes.chunks_mut(UNIFORM_STRIDE as usize).zip(objects) {
-        slot[..size_of::<GpuObject>()].copy_from_slice(bytemuck::bytes_of(object));
-    }
-    bytes
 }
 
 fn rows(matrix: Mat3, translation: Vec3) -> [[f32; 4]; 3] {
@@ -311,15 +291,6 @@ fn gpu_object(world_from_mesh: &Affine3A, material: &Material, instance: u32) ->
         phong_reflector: phong_reflector(material),
         instance,
     }
-}
-
-/// The word of a surface's highlight under Blinn-Phong.
-pub(crate) fn phong_reflector(material: &Material) -> u32 {
-    if material.phong_specular <= 0.0 {
-        return 0;
-    }
-    let roughness = Reflector::roughness_of_exponent(material.phong_exponent);
-    Reflector { reflectance_linear: Vec3::splat(material.phong_specular), roughness }.pack()
 }
 
 fn surroundings(scene: &Scene) -> GpuSurroundings {

@@ -2,175 +2,215 @@
 
 use std::sync::Arc;
 
-use gpu::{BufferPool, Frame, Gpu, PooledBuffer};
-use wgpu::{BindingResource, BufferUsages};
+use gpu::{Binding, DispatchSize, Frame, Gpu, PassCache, ResourceTraits, ShaderVariant, Templates, switches};
+use minijinja::{Value, context, value::merge_maps};
 
 use crate::{
     RenderError,
-    binding::{bind_group, texture, window},
-    form::{ComputePipelines, Domain, Form, GRID_PX, Pass},
-    pixel_camera::{PIXEL_CAMERA_BYTES, PIXEL_CAMERA_STRIDE},
-    rays::Traced,
+    pixel_camera::CAMERA_TRAITS,
+    pixel_list::PixelList,
+    rays::{Traced, Traversal},
+    sums::SumPlanes,
     surfaces::Surfaces,
 };
 
-/// What is lit.
+/// Pixels for which an adaptive rate traces rays in any case lie this far apart.
+pub(crate) const GRID_PX: u32 = 4;
+
+/// The rays to a lamp that a shader is written for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum ShadowRays {
+    None,
+    /// One, to the middle.
+    One,
+    /// As many as the uniform says, spread over the lamp.
+    Many,
+}
+
+/// The pixels that a pass lights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Domain {
+    All,
+    /// Each [`GRID_PX`]-th in both directions.
+    Grid,
+    /// The pixels of a [`PixelList`].
+    List,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct IlluminateVariant {
+    pub by_rays: bool,
+    pub domain: Domain,
+    pub shadow_rays: ShadowRays,
+    /// Rays look for surfaces that occlude the environment.
+    pub occluded: bool,
+    /// Light is added to sums of earlier rays.
+    pub continued: bool,
+    pub sums: SumPlanes,
+    /// Present where rays are traced.
+    pub traversal: Option<Traversal>,
+}
+
+impl ShaderVariant for IlluminateVariant {
+    const TEMPLATE: &'static str = "illuminate.wgsl";
+    const TRAITS: ResourceTraits = CAMERA_TRAITS;
+
+    fn context(&self) -> Value {
+        context! {
+            by_rays => self.by_rays,
+            domain => match self.domain { Domain::All => "all", Domain::Grid => "grid", Domain::List => "list" },
+            shadow_rays => match self.shadow_rays {
+                ShadowRays::None => "none",
+                ShadowRays::One => "one",
+                ShadowRays::Many => "many",
+            },
+            occluded => self.occluded,
+            continued => self.continued,
+            traced => self.traversal.is_some(),
+            primary => false,
+            count_visits => false,
+            ..merge_maps([self.sums.context(), self.traversal.map(Traversal::context).unwrap_or_default()])
+        }
+    }
+
+    fn all() -> Vec<Self> {
+        let mut variants = Vec::new();
+        for [by_rays, occluded, continued] in switches() {
+            for domain in [Domain::All, Domain::Grid, Domain::List] {
+                for shadow_rays in [ShadowRays::None, ShadowRays::One, ShadowRays::Many] {
+                    let is_traced = occluded || shadow_rays != ShadowRays::None;
+                    let traversals = Traversal::ALL.map(|traversal| is_traced.then_some(traversal));
+                    let each = |sums| {
+                        traversals.map(|traversal| Self {
+                            by_rays,
+                            domain,
+                            shadow_rays,
+                            occluded,
+                            continued,
+                            sums,
+                            traversal,
+                        })
+                    };
+                    variants.extend(SumPlanes::all().flat_map(each));
+                }
+            }
+        }
+        variants
+    }
+}
+
+/// The surfaces' light to be summed.
 #[derive(Clone, Copy)]
 pub(crate) struct IlluminateWork<'a> {
-    /// Of the pass; its domain is set here.
-    pub form: Form,
-    /// Needed where the form traces rays.
+    /// The domain and `continued` are set for each pass.
+    pub variant: IlluminateVariant,
+    /// Present where rays are traced.
     pub traced: Option<&'a Traced>,
     pub illumination: &'a wgpu::Buffer,
     /// One uniform of all cameras for each part of the rays.
     pub cameras: &'a [wgpu::Buffer],
     pub sums: &'a wgpu::Buffer,
-    /// Whether pixels that lie between others may take their light.
-    pub adaptive: bool,
 }
 
-/// Pixels that a pass leaves to the next: their places, and the arguments of an indirect dispatch.
-struct List {
-    pixels: PooledBuffer,
-    arguments: wgpu::Buffer,
+/// The pixels to be lit.
+#[derive(Clone, Copy)]
+pub(crate) enum Pixels<'a> {
+    All,
+    Grid,
+    /// The pixels of one camera.
+    List(&'a PixelList),
 }
 
-pub(crate) struct Illuminator<'a> {
-    pub gpu: &'a Arc<Gpu>,
-    pub pool: &'a BufferPool,
-    pub pipelines: &'a ComputePipelines,
+impl<'a> Pixels<'a> {
+    fn domain(self) -> Domain {
+        match self {
+            Self::All => Domain::All,
+            Self::Grid => Domain::Grid,
+            Self::List(_) => Domain::List,
+        }
+    }
+
+    fn size(self, target: &Surfaces) -> DispatchSize<'a> {
+        match self {
+            Self::All => target.invocations(1),
+            Self::Grid => target.invocations(GRID_PX),
+            Self::List(list) => list.size(),
+        }
+    }
 }
 
-impl Illuminator<'_> {
-    /// Records the passes of all cameras. What is returned must live until the frame is done.
+pub(crate) struct Illuminate(PassCache<IlluminateVariant>);
+
+impl Illuminate {
+    pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
+        Self(PassCache::new(gpu, templates))
+    }
+
+    /// Records one dispatch for each part of the rays and camera, from the `first`-th on.
     pub fn record(
         &self,
         frame: &mut Frame<'_>,
         work: IlluminateWork<'_>,
-        surfaces: &[Surfaces],
-    ) -> Result<Vec<PooledBuffer>, RenderError> {
-        if !work.adaptive {
-            self.light(frame, work, Domain::All, surfaces, None)?;
-            return Ok(Vec::new());
-        }
-        self.light(frame, work, Domain::Grid, surfaces, None)?;
-        let mut lent = Vec::new();
-        let mut step_px = GRID_PX / 2;
-        while step_px > 0 {
-            for (number, target) in (0..).zip(surfaces) {
-                let list = self.interpolate(frame, work, (number, target), step_px)?;
-                self.light(frame, work, Domain::List, std::slice::from_ref(target), Some((number, &list)))?;
-                lent.push(list.pixels);
-            }
-            step_px /= 2;
-        }
-        Ok(lent)
-    }
-
-    /// One dispatch a camera and part of the rays; or, with a list, of the one camera that it is of.
-    fn light(
-        &self,
-        frame: &mut Frame<'_>,
-        work: IlluminateWork<'_>,
-        domain: Domain,
-        surfaces: &[Surfaces],
-        list: Option<(u32, &List)>,
+        pixels: Pixels<'_>,
+        (first, surfaces): (u32, &[Surfaces]),
     ) -> Result<(), RenderError> {
         for (part, cameras) in work.cameras.iter().enumerate() {
-            let form = Form { domain, continued: work.form.continued || part > 0, ..work.form };
-            self.light_part(frame, IlluminateWork { form, ..work }, cameras, surfaces, list)?;
-        }
-        Ok(())
-    }
-
-    fn light_part(
-        &self,
-        frame: &mut Frame<'_>,
-        work: IlluminateWork<'_>,
-        cameras: &wgpu::Buffer,
-        surfaces: &[Surfaces],
-        list: Option<(u32, &List)>,
-    ) -> Result<(), RenderError> {
-        let domain = work.form.domain;
-        let pipeline = self.pipelines.get(work.form)?;
-        let rays = work
-            .traced
-            .map(|traced| bind_group(self.gpu, &pipeline.get_bind_group_layout(1), traced.views().map(texture)));
-        let first = list.map_or(0, |(number, _)| number);
-        for (number, target) in (first..).zip(surfaces) {
-            let mut resources = self.resources(work, cameras, target);
-            resources.insert(1, work.illumination.as_entire_binding());
-            resources.extend(list.iter().flat_map(|(_, list)| list.resources()));
-            let own = bind_group(self.gpu, &pipeline.get_bind_group_layout(0), resources);
-            let mut pass = frame.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            pass.set_pipeline(&pipeline);
-            pass.set_bind_group(0, &own, &[number * PIXEL_CAMERA_STRIDE]);
-            if let Some(rays) = &rays {
-                pass.set_bind_group(1, rays, &[]);
-            }
-            match list {
-                Some((_, list)) => pass.dispatch_workgroups_indirect(&list.arguments, 0),
-                None => {
-                    let apart = if domain == Domain::Grid { GRID_PX } else { 1 };
-                    let groups = target.size_px().map(|side| side.div_ceil(apart).div_ceil(8));
-                    pass.dispatch_workgroups(groups.x, groups.y, 1);
-                }
+            let continued = work.variant.continued || part > 0;
+            let variant = IlluminateVariant { domain: pixels.domain(), continued, ..work.variant };
+            let pass = self.0.get(&variant)?;
+            let rays = work.traced.map(|traced| pass.bind(1, traced.bindings())).transpose()?;
+            for (element, target) in (first..).zip(surfaces) {
+                let own = pass.bind(0, bindings(&work, cameras, pixels, target))?;
+                let groups: Vec<_> = std::iter::once(&own).chain(&rays).collect();
+                pass.dispatch_each(frame, &groups, element..element + 1, pixels.size(target));
             }
         }
         Ok(())
-    }
-
-    /// Fills in pixels `step_px` apart from those twice as far apart, and lists the others.
-    fn interpolate(
-        &self,
-        frame: &mut Frame<'_>,
-        work: IlluminateWork<'_>,
-        (number, target): (u32, &Surfaces),
-        step_px: u32,
-    ) -> Result<List, RenderError> {
-        let Form { by_rays, visibility, light_count, .. } = work.form;
-        let form = Form { pass: Pass::Interpolate, by_rays, visibility, light_count, step_px, ..Form::default() };
-        let pipeline = self.pipelines.get(form)?;
-        let list = self.list(target);
-        // How many rays the sums hold is the same for all parts.
-        let mut resources = self.resources(work, &work.cameras[0], target);
-        resources.extend(list.resources());
-        let own = bind_group(self.gpu, &pipeline.get_bind_group_layout(0), resources);
-        let groups = target.size_px().map(|side| side.div_ceil(step_px).div_ceil(8));
-        let mut pass = frame.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        pass.set_pipeline(&pipeline);
-        pass.set_bind_group(0, &own, &[number * PIXEL_CAMERA_STRIDE]);
-        pass.dispatch_workgroups(groups.x, groups.y, 1);
-        drop(pass);
-        Ok(list)
-    }
-
-    fn resources<'r>(
-        &self,
-        work: IlluminateWork<'r>,
-        cameras: &'r wgpu::Buffer,
-        target: &'r Surfaces,
-    ) -> Vec<BindingResource<'r>> {
-        vec![
-            window(cameras, PIXEL_CAMERA_BYTES),
-            texture(&target.surface),
-            texture(&target.depth),
-            work.sums.as_entire_binding(),
-        ]
-    }
-
-    fn list(&self, target: &Surfaces) -> List {
-        let bytes = 4 * u64::from(target.size_px().element_product());
-        List {
-            pixels: self.pool.lend_storage("pixels to be lit", bytes),
-            // Workgroups along x, y and z, and the list's length.
-            arguments: self.gpu.buffer_with("list", &[0u32, 1, 1, 0], BufferUsages::STORAGE | BufferUsages::INDIRECT),
-        }
     }
 }
 
-impl List {
-    fn resources(&self) -> [BindingResource<'_>; 2] {
-        [self.pixels.as_entire_binding(), self.arguments.as_entire_binding()]
+fn bindings<'r>(
+    work: &IlluminateWork<'r>,
+    cameras: &'r wgpu::Buffer,
+    pixels: Pixels<'r>,
+    target: &'r Surfaces,
+) -> Vec<Binding<'r>> {
+    let mut bindings = vec![
+        Binding::buffer("camera", cameras),
+        Binding::buffer("illumination", work.illumination),
+        Binding::buffer("sums", work.sums),
+    ];
+    bindings.extend(target.bindings());
+    if let Pixels::List(list) = pixels {
+        bindings.extend(list.bindings());
+    }
+    bindings
+}
+
+#[cfg(test)]
+mod tests {
+    use gpu::BufferPool;
+
+    use super::*;
+    use crate::test_support::TestStage;
+
+    #[test]
+    fn every_variant_is_bound_by_its_names() {
+        let stage = TestStage::new();
+        let (traced, buffer) = (stage.scene.rays.at(0.0).expect("a tree"), &stage.buffer);
+        let list = PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), &stage.surfaces(false, false));
+        for variant in IlluminateVariant::all() {
+            let target = stage.surfaces(variant.by_rays, false);
+            let pixels = match variant.domain {
+                Domain::All => Pixels::All,
+                Domain::Grid => Pixels::Grid,
+                Domain::List => Pixels::List(&list),
+            };
+            let work = IlluminateWork { variant, traced: None, illumination: buffer, cameras: &[], sums: buffer };
+            stage.check(&variant, 0, &bindings(&work, buffer, pixels, &target));
+            if variant.traversal.is_some() {
+                stage.check(&variant, 1, &traced.bindings());
+            }
+        }
     }
 }

@@ -1,30 +1,29 @@
-// What arrives at each pixel's surface: of every lamp and of the environment, with rays where they are asked for.
-// Adds to sums that later rays can be added to.
+// Light that arrives at each pixel's surface from every lamp and from the environment, with rays where they are asked for.
+// The sums are such that later rays can be added.
 {% include "camera.wgsl" %}
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
 {% include "light.wgsl" %}
 {% include "sequence.wgsl" %}
+{% include "surfaces.wgsl" %}
 {% if traced %}
 {% include "rays/traverse.wgsl" %}
 {% endif %}
 
-@group(0) @binding(1) var<uniform> illumination: Illumination;
-@group(0) @binding(2) var surfaces: texture_2d<u32>;
-@group(0) @binding(3) var reversed_depth: {{ "texture_2d<f32>" if by_rays else "texture_depth_2d" }};
-// Of each camera, plane by plane (sums.wgsl).
-@group(0) @binding(4) var<storage, read_write> sums: array<f32>;
+@group(0) var<uniform> illumination: Illumination;
+// The sums of each camera, plane by plane (sums.wgsl).
+@group(0) var<storage, read_write> sums: array<f32>;
 {% include "sums.wgsl" %}
 {% if domain == "list" %}
 struct List { workgroups: u32, y: u32, z: u32, count: u32 }
-@group(0) @binding(5) var<storage, read> listed_pixels: array<u32>;
-@group(0) @binding(6) var<storage, read> list: List;
+@group(0) var<storage, read> listed_pixels: array<u32>;
+@group(0) var<storage, read> list: List;
 {% endif %}
 
-// Rays begin above the surface by this share of the pixel's footprint on it: less than can be seen, more than
-// what rounding makes of the point.
-const BIAS_FOOTPRINTS: f32 = {{ bias_footprints }};
-// And by so many roundings of its coordinates.
+// Rays begin above the surface by this share of the pixel's footprint on it: less than can be seen, more than the
+// rounding of the point.
+const BIAS_FOOTPRINTS: f32 = 0.015625;
+// Rays also begin higher by the rounding of coordinates, relative to the greatest.
 const BIAS_ROUNDINGS: f32 = 4e-7;
 
 struct Spot { point: vec3f, normal: vec3f, origin: vec3f, bias_m: f32, seed: u32 }
@@ -43,7 +42,7 @@ fn spot_of(pixel: vec2u, depth: f32, surface: vec4u) -> Spot {
 
 struct Arrival { linear: vec3f, open: f32 }
 
-// Of one lamp: the sum over its rays.
+// The light of one lamp: the sum over its rays.
 fn from_lamp(number: u32, spot: Spot) -> Arrival {
     let lamp = illumination.lights[number];
 {% if shadow_rays == "none" and continued %}
@@ -63,7 +62,7 @@ fn from_lamp(number: u32, spot: Spot) -> Arrival {
         let incident = incident_from(lamp, spot.point, place);
         let cosine = dot(spot.normal, incident.towards);
         var open = 0.0;
-        // A loop, for what no lane needs is left out only of loops.
+        // A loop, not a branch: the software device skips only loops that no lane needs.
         for (var lit = cosine > 0.0 && any(incident.irradiance_linear > vec3f(0.0)); lit; lit = false) {
             let blocked = is_blocked(ray_from(spot.origin, incident.towards), incident.distance_m - spot.bias_m);
             open = select(1.0, 0.0, blocked);
@@ -112,11 +111,11 @@ fn add_color(plane: u32, place: u32, linear: vec3f) {
 
 fn light_pixel(pixel: vec2u) {
     let place = pixel.y * camera.size_px.x + pixel.x;
-    let depth = textureLoad(reversed_depth, pixel, 0){{ ".x" if by_rays else "" }};
+    let depth = reversed_depth_at(pixel);
     var lamps_linear = vec3f(0.0);
     var environment = Arrival(vec3f(0.0), 0.0);
     for (var found = depth > 0.0; found; found = false) {
-        let spot = spot_of(pixel, depth, textureLoad(surfaces, pixel, 0));
+        let spot = spot_of(pixel, depth, surface_at(pixel));
         environment = from_environment(spot);
         for (var number = 0u; number < illumination.light_count; number++) {
             let lamp = from_lamp(number, spot);
@@ -132,7 +131,7 @@ fn light_pixel(pixel: vec2u) {
 }
 
 {% if domain == "list" %}
-@compute @workgroup_size(64)
+@compute @workgroup_size({{ LIST_WORKGROUP }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= list.count { return; }
     let place = listed_pixels[id.x];
@@ -141,7 +140,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% elif domain == "grid" %}
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let pixel = id.xy * {{ grid_px }}u;
+    let pixel = id.xy * {{ GRID_PX }};
     if any(pixel >= camera.size_px) { return; }
     light_pixel(pixel);
 }

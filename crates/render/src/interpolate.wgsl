@@ -2,25 +2,22 @@
 // them lie on their surface and agree; the others are listed, to be lit by rays of their own.
 {% include "camera.wgsl" %}
 {% include "normal.wgsl" %}
+{% include "surfaces.wgsl" %}
 
-@group(0) @binding(1) var surfaces: texture_2d<u32>;
-@group(0) @binding(2) var reversed_depth: {{ "texture_2d<f32>" if by_rays else "texture_depth_2d" }};
-@group(0) @binding(3) var<storage, read_write> sums: array<f32>;
+@group(0) var<storage, read_write> sums: array<f32>;
 struct List { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
-@group(0) @binding(4) var<storage, read_write> listed_pixels: array<u32>;
-@group(0) @binding(5) var<storage, read_write> list: List;
+@group(0) var<storage, read_write> listed_pixels: array<u32>;
+@group(0) var<storage, read_write> list: List;
 {% include "sums.wgsl" %}
 
 const STEP: u32 = {{ step_px }}u;
-const LIST_WORKGROUP: u32 = 64u;
+const LIST_WORKGROUP: u32 = {{ LIST_WORKGROUP }};
 // Cosine between normals of one surface.
 const SAME_FACING: f32 = 0.9;
 // Distance from the pixel's own plane, in footprints.
 const SAME_PLANE: f32 = 2.0;
 // Differences of light below this share of a white surface's are not seen.
 const LEAST_LIGHT: f32 = 0.02;
-
-fn depth_at(pixel: vec2u) -> f32 { return textureLoad(reversed_depth, pixel, 0){{ ".x" if by_rays else "" }}; }
 
 fn sum_at(plane: u32, pixel: vec2u) -> f32 {
     return sums[camera.first_sum + plane * camera.pixel_count + pixel.y * camera.size_px.x + pixel.x];
@@ -33,10 +30,10 @@ fn mean_light(pixel: vec2u) -> vec3f {
 }
 
 fn is_same_surface(point: vec3f, normal: vec3f, footprint_m: f32, other: vec2u) -> bool {
-    let depth = depth_at(other);
+    let depth = reversed_depth_at(other);
     let z = camera.near_m / max(depth, 1e-30);
     let offset = camera.eye_in_world + direction_of(other) * z - point;
-    let other_normal = unit_from_oct16(textureLoad(surfaces, other, 0).z);
+    let other_normal = unit_from_oct16(surface_at(other).z);
     let near_plane = abs(dot(normal, offset)) < SAME_PLANE * footprint_m * f32(2u * STEP);
     return depth > 0.0 && dot(normal, other_normal) > SAME_FACING && near_plane;
 }
@@ -46,11 +43,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let pixel = id.xy * STEP;
     if any(pixel >= camera.size_px) { return; }
     let place = pixel.y * camera.size_px.x + pixel.x;
-    let depth = depth_at(pixel);
+    let depth = reversed_depth_at(pixel);
     if all((id.xy & vec2u(1u)) == vec2u(0u)) || depth <= 0.0 { return; }
     let z = camera.near_m / depth;
     let point = camera.eye_in_world + direction_of(pixel) * z;
-    let normal = unit_from_oct16(textureLoad(surfaces, pixel, 0).z);
+    let normal = unit_from_oct16(surface_at(pixel).z);
     let low = (id.xy & vec2u(0xfffffffeu)) * STEP;
     let high = min(low + 2u * STEP, camera.size_px - 1u);
     var agree = all(low + 2u * STEP < camera.size_px);

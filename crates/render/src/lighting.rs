@@ -7,14 +7,14 @@ use depth_image::Highlight;
 /// Most rays a light, or of occlusion, a pixel.
 pub const MAX_RAYS: u32 = 4096;
 
-/// Written as terms with commas between them: `soft 16, occlusion 16`.
+/// A lighting, written as terms with commas between them: `soft 16, occlusion 16`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Lighting {
     /// Light of lamps.
     pub direct: Direct,
-    /// Whether light from all around is kept off by what is near; without it all of it arrives.
+    /// Rays that look for near surfaces in the way of the environment's light; without them all of it arrives.
     pub occlusion: Option<Occlusion>,
-    /// Where rays are spent.
+    /// The pixels that get rays of their own.
     pub rate: Rate,
 }
 
@@ -28,7 +28,7 @@ pub enum Direct {
     Phong,
     /// One ray to the middle of every lamp; highlights by GGX, as for all that follow.
     Shadows,
-    /// So many rays to places spread over every lamp.
+    /// This many rays to places spread over every lamp.
     Soft(NonZeroU32),
 }
 
@@ -37,11 +37,11 @@ pub enum Direct {
 pub struct Occlusion {
     /// A pixel.
     pub rays: NonZeroU32,
-    /// What is farther away keeps no light off; a share of the scene's diagonal where not given.
+    /// Surfaces farther away occlude nothing; a share of the scene's diagonal where not given.
     pub radius_m: Option<f32>,
 }
 
-/// Which pixels get rays of their own.
+/// The pixels that get rays of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Rate {
     /// All.
@@ -49,15 +49,15 @@ pub enum Rate {
     Full,
     /// A grid of pixels, and those between whose neighbours on it disagree by more than this, relatively.
     Adaptive {
-        /// Of the light that arrives.
+        /// Relative to the light that arrives.
         tolerance: f32,
     },
 }
 
-/// Of adaptive shading, where none is given: below a step of 8-bit sRGB in the middle greys.
+/// The tolerance of adaptive shading, where none is given: below a step of 8-bit sRGB in the middle greys.
 const DEFAULT_TOLERANCE: f32 = 0.04;
 
-/// Not a lighting.
+/// A text that names no lighting.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownLighting {
     /// A term with an unknown name.
@@ -123,7 +123,7 @@ impl Lighting {
         (lighting != *self).then_some(lighting)
     }
 
-    /// Whose formula highlights follow.
+    /// The formula of highlights; none for unlit surfaces.
     #[must_use]
     pub fn highlight(&self) -> Option<Highlight> {
         match self.direct {
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused_by_name() {
+    fn invalid_lightings_are_refused_with_the_reason() {
         use UnknownLighting::{Conflict, Number, Rays, Term};
         let parsed = |text: &str| text.parse::<Lighting>().expect_err(text);
         for text in ["soft 0", "soft -1", "soft 4097", "soft many", "occlusion 0", "soft 99999999999"] {
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn light_grows_by_doubling() {
+    fn refinement_steps_double_the_rays() {
         let steps = |text: &str| text.parse::<Lighting>().expect(text).refinement_steps();
         assert_eq!(
             [steps("phong"), steps("shadows"), steps("soft 1"), steps("soft 16"), steps("soft 17")],

@@ -1,14 +1,14 @@
 // Reads a table once, texel by texel as rays do, and does nothing with it but add.
 
-@group(0) @binding(0) var table: texture_2d<u32>;
+@group(0) var table: texture_2d<u32>;
 // One a thread: without them nothing would have to be read.
-@group(0) @binding(1) var<storage, read_write> sums: array<u32>;
+@group(0) var<storage, read_write> sums: array<u32>;
 
-const WORKGROUP: u32 = 64u;
+const WORKGROUP: u32 = {{ WORKGROUP }};
 // Of one thread. Those of a workgroup lie in one row next to each other, so that it reads whole cache lines.
-const TEXELS: u32 = 16u;
+const TEXELS: u32 = {{ TEXELS_A_THREAD }};
 
-@compute @workgroup_size(64)
+@compute @workgroup_size({{ WORKGROUP }})
 fn main(
     @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,

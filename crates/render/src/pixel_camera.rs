@@ -2,7 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
-use glam::{UVec2, Vec3};
+use glam::Vec3;
+use gpu::{Gpu, ResourceTrait, ResourceTraits, uniform_elements};
 use wgpu::BufferUsages;
 
 /// One camera of a batch.
@@ -28,15 +29,13 @@ pub(crate) struct PixelCamera {
     pub occlusion_rays_in_sum: u32,
     pub occlusion_radius_m: f32,
     pub tolerance: f32,
-    /// Of the first pixel from where the forward axis meets the image; wraps.
+    /// The first pixel, from where the forward axis meets the image; wraps.
     pub first_from_axis: [u32; 2],
     pub padding: [u32; 2],
 }
 
-/// What a shader sees at an offset.
-pub(crate) const PIXEL_CAMERA_BYTES: usize = size_of::<PixelCamera>();
-/// From one camera of a batch to the next: uniform offsets must be multiples of this on every device.
-pub(crate) const PIXEL_CAMERA_STRIDE: u32 = 256;
+/// The trait of `camera` in all shaders that include `camera.wgsl`.
+pub(crate) const CAMERA_TRAITS: ResourceTraits = &[("camera", ResourceTrait::DynamicOffset)];
 
 impl PixelCamera {
     /// Rays' seeds are the camera's place, and the pixel's from the forward axis: noise does not swim while nothing moves,
@@ -66,20 +65,10 @@ impl PixelCamera {
             ..Self::zeroed()
         }
     }
-
-    /// `direction_of` of the shader.
-    pub fn direction_of(&self, pixel: UVec2) -> Vec3 {
-        let center = pixel.as_vec2() + 0.5;
-        let [column, row, corner] = [self.column_in_world, self.row_in_world, self.corner_in_world].map(Vec3::from);
-        column * center.x + row * center.y + corner
-    }
 }
 
-/// A uniform of them all, each at its offset.
-pub(crate) fn uniform(gpu: &gpu::Gpu, cameras: &[PixelCamera]) -> wgpu::Buffer {
-    let mut bytes = vec![0; cameras.len() * PIXEL_CAMERA_STRIDE as usize];
-    for (slot, camera) in bytes.chunks_mut(PIXEL_CAMERA_STRIDE as usize).zip(cameras) {
-        slot[..PIXEL_CAMERA_BYTES].copy_from_slice(bytemuck::bytes_of(camera));
-    }
+/// A uniform of all cameras, each at its offset.
+pub(crate) fn uniform(gpu: &Gpu, cameras: &[PixelCamera]) -> wgpu::Buffer {
+    let bytes = uniform_elements(cameras.iter().map(bytemuck::bytes_of));
     gpu.buffer_with("pixel cameras", &bytes, BufferUsages::UNIFORM)
 }

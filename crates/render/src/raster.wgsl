@@ -1,7 +1,7 @@
-{% if surface_id or leave_out %}enable primitive_index;
+{% if surface_id or redundancy_test %}enable primitive_index;
 {% endif %}
 // Draws triangles: which surface each pixel shows. Light comes later.
-{% include "surface.wgsl" %}
+{% include "packed_surface.wgsl" %}
 
 struct Object {
     world_from_mesh: array<vec4f, 3>,
@@ -31,12 +31,12 @@ struct RasterCamera {
     padding_1: u32,
 }
 
-@group(0) @binding(0) var<uniform> camera: RasterCamera;
-@group(0) @binding(1) var<uniform> surroundings: Surroundings;
-@group(1) @binding(0) var<uniform> object: Object;
-@group(2) @binding(0) var base_color_texture: texture_2d<f32>;
-@group(2) @binding(1) var metallic_roughness_texture: texture_2d<f32>;
-@group(2) @binding(2) var material_sampler: sampler;
+@group(0) var<uniform> camera: RasterCamera;
+@group(0) var<uniform> surroundings: Surroundings;
+@group(1) var<uniform> object: Object;
+@group(2) var base_color_texture: texture_2d<f32>;
+@group(2) var metallic_roughness_texture: texture_2d<f32>;
+@group(2) var material_sampler: sampler;
 
 struct Varyings {
     // The same for all pipelines: depths of one pass are compared with those of another.
@@ -45,7 +45,7 @@ struct Varyings {
     @location(1) uv: vec2f,
     @location(2) color_linear: vec4f,
     @location(3) @interpolate(flat) first_primitive: u32,
-{% if leave_out %}    @location(4) position_in_world: vec3f,
+{% if redundancy_test %}    @location(4) position_in_world: vec3f,
 {% endif %}
 }
 
@@ -75,13 +75,13 @@ fn vertex(
     out.uv = uv;
     out.color_linear = vec4f(linear_from_srgb(color_srgb.rgb), color_srgb.a);
     out.first_primitive = first_primitive;
-{% if leave_out %}    out.position_in_world = position_in_world;
+{% if redundancy_test %}    out.position_in_world = position_in_world;
 {% endif %}
     return out;
 }
 
-{% if leave_out %}
-{% include "known.wgsl" %}
+{% if redundancy_test %}
+{% include "known_samples.wgsl" %}
 
 fn candidate_at(in: Varyings, normal: vec3f, primitive: u32) -> Candidate {
     let depth_m = camera.near_m / in.clip.z;
@@ -112,7 +112,7 @@ struct Planes {
 }
 
 @fragment
-fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface_id or leave_out %}, @builtin(primitive_index) primitive: u32{% endif %}) -> Planes {
+fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface_id or redundancy_test %}, @builtin(primitive_index) primitive: u32{% endif %}) -> Planes {
     var base = object.base_color_linear * in.color_linear;
 {% if textured %}
     base *= textureSample(base_color_texture, material_sampler, in.uv);
@@ -127,8 +127,8 @@ fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface
     coat.roughness *= metallic_roughness.g;
 {% endif %}
     let normal = normalize(in.normal_in_world){% if double_sided %} * select(-1.0, 1.0, front_facing){% endif %};
-{% if leave_out %}
-    if is_left_out(candidate_at(in, normal, primitive)) { discard; }
+{% if redundancy_test %}
+    if is_redundant(candidate_at(in, normal, primitive)) { discard; }
 {% endif %}
     var out: Planes;
     out.surface = packed_surface(base.rgb, object.emissive_linear, normal, coat);

@@ -2,5 +2,5 @@
 // environment, three planes each, and how many rays reached the environment and each lamp.
 const LAMPS: u32 = 0u;
 const ENVIRONMENT: u32 = 3u;
-const OPEN_TO_ENVIRONMENT: u32 = 6u;
-const OPEN_TO_LAMPS: u32 = 7u;
+const OPEN_TO_ENVIRONMENT: u32 = {{ COLOR_SUMS }};
+const OPEN_TO_LAMPS: u32 = OPEN_TO_ENVIRONMENT + 1u;

@@ -1,27 +1,35 @@
-//! What each pixel of one camera shows: the textures that surfaces are drawn into, and light is computed from.
+//! The surfaces of one camera: textures that `raster` or `primary` draws into, and that light is computed from.
 
 use std::sync::Arc;
 
 use glam::UVec2;
-use gpu::{Gpu, Lent, Pool};
+use gpu::{Binding, DispatchSize, DrawPass, Gpu, Lent, Pool};
 use wgpu::{TextureFormat, TextureUsages};
 
-/// How surfaces are found.
+/// Words of `packed_surface.wgsl`.
+pub(crate) const SURFACE_FORMAT: TextureFormat = TextureFormat::Rgba32Uint;
+/// Instance and primitive.
+pub(crate) const SURFACE_ID_FORMAT: TextureFormat = TextureFormat::Rg32Uint;
+
+/// All bits of a word: no instance has this number, and no triangle.
+pub(crate) const NOTHING: u32 = u32::MAX;
+
+/// The textures that are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct SurfaceKind {
     pub size_px: UVec2,
     pub by_rays: bool,
     pub surface_id: bool,
-    /// Whether what is nearest is wanted besides what is shown.
+    /// The nearest surface is wanted besides the one that is shown.
     pub front: bool,
 }
 
-/// Words of `surface.wgsl`, reversed depth, and surface ids where they are asked for.
+/// Texture views of one kind.
 pub(crate) struct SurfaceViews {
-    pub surface: wgpu::TextureView,
-    pub depth: wgpu::TextureView,
-    ids: Option<wgpu::TextureView>,
-    front: Option<wgpu::TextureView>,
+    pub surfaces: wgpu::TextureView,
+    pub reversed_depth: wgpu::TextureView,
+    surface_ids: Option<wgpu::TextureView>,
+    front_depth: Option<wgpu::TextureView>,
 }
 
 /// Lends textures; they come back when dropped.
@@ -30,10 +38,10 @@ pub(crate) struct SurfacePool {
     surfaces: Pool<SurfaceKind, SurfaceViews>,
 }
 
-/// On loan; contents are whatever the last borrower left.
+/// Textures on loan; contents are whatever the last borrower left.
 pub(crate) struct Surfaces {
     views: Lent<SurfaceKind, SurfaceViews>,
-    /// Not lent: where surface ids are drawn instead.
+    /// A texture that is not lent, where surface ids are drawn instead.
     own_ids: Option<wgpu::TextureView>,
 }
 
@@ -61,20 +69,20 @@ impl SurfacePool {
             });
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
-        let depth = if kind.by_rays { TextureFormat::R32Float } else { TextureFormat::Depth32Float };
+        let depth = if kind.by_rays { TextureFormat::R32Float } else { DrawPass::DEPTH_FORMAT };
         SurfaceViews {
-            surface: view(TextureFormat::Rgba32Uint),
-            depth: view(depth),
-            front: kind.front.then(|| view(depth)),
-            ids: kind.surface_id.then(|| view(TextureFormat::Rg32Uint)),
+            surfaces: view(SURFACE_FORMAT),
+            reversed_depth: view(depth),
+            front_depth: kind.front.then(|| view(depth)),
+            surface_ids: kind.surface_id.then(|| view(SURFACE_ID_FORMAT)),
         }
     }
 }
 
 impl SurfaceViews {
-    /// Reversed depth of the nearest surface on each pixel's ray, shown or left out.
-    pub fn front(&self) -> &wgpu::TextureView {
-        self.front.as_ref().unwrap_or(&self.depth)
+    /// The reversed depth of the nearest surface on each pixel's ray, redundant or not.
+    pub fn front_depth(&self) -> &wgpu::TextureView {
+        self.front_depth.as_ref().unwrap_or(&self.reversed_depth)
     }
 }
 
@@ -84,13 +92,24 @@ impl Surfaces {
         self
     }
 
-    /// Where surface ids are asked for.
-    pub fn ids(&self) -> Option<&wgpu::TextureView> {
-        self.own_ids.as_ref().or(self.views.ids.as_ref())
+    /// The surface ids, where they are asked for.
+    pub fn surface_ids(&self) -> Option<&wgpu::TextureView> {
+        self.own_ids.as_ref().or(self.views.surface_ids.as_ref())
     }
 
     pub fn size_px(&self) -> UVec2 {
         self.views.kind().size_px
+    }
+
+    /// The variables of `surfaces.wgsl`.
+    pub fn bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::texture("surfaces", &self.surfaces), Binding::texture("reversed_depth", &self.reversed_depth)]
+    }
+
+    /// One invocation for each pixel, or for each `step_px`-th in both directions.
+    pub fn invocations(&self, step_px: u32) -> DispatchSize<'static> {
+        let size = self.size_px().map(|side| side.div_ceil(step_px));
+        DispatchSize::Invocations([size.x, size.y, 1])
     }
 }
 

@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn halving_averages_light_not_codes() {
+    fn halved_textures_average_linear_light() {
         let mut texture = Texture { width_px: 2, height_px: 1, is_srgb: true, srgba8: vec![255; 8] };
         texture.srgba8[..3].fill(0);
         assert_eq!(halved(&texture).srgba8, [188, 188, 188, 255]);

@@ -1,17 +1,14 @@
-//! How surfaces are found: by drawing triangles, or by one ray a pixel. What is faster depends on the scene, the
+//! Ways of finding surfaces: by drawing triangles, or by one ray a pixel. The faster way depends on the scene, the
 //! size of its pictures and the device, so it is measured.
 
-use std::{
-    fmt,
-    str::FromStr,
-    sync::{Mutex, PoisonError},
-};
+use std::{fmt, str::FromStr};
 
 use glam::UVec2;
+use parking_lot::Mutex;
 
 use crate::{GpuScene, RenderError};
 
-/// A closed set.
+/// The ways of finding surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Visibility {
     /// Whichever was faster when both were tried.
@@ -23,12 +20,12 @@ pub enum Visibility {
     Rays,
 }
 
-/// Not a way to find surfaces.
+/// A text that names no way of finding surfaces.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown visibility {0:?}, expected measured, triangles or rays")]
 pub struct UnknownVisibility(String);
 
-/// What both ways cost for pictures of one size of a scene, unlit, to host pixels.
+/// The costs of both ways for pictures of one size of a scene, unlit, to host pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Choice {
     /// Seconds a view.
@@ -38,7 +35,7 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// Which is taken.
+    /// The way that is taken.
     #[must_use]
     pub fn rays_are_faster(&self) -> bool {
         self.rays_s < self.triangles_s
@@ -75,19 +72,19 @@ impl fmt::Display for Visibility {
     }
 }
 
-/// What has been measured.
+/// The choices that have been measured.
 #[derive(Default)]
 pub(crate) struct Choices(Mutex<Vec<((u64, UVec2), Choice)>>);
 
 impl Choices {
-    /// Of one scene and size; `seconds` is asked for both ways the first time.
+    /// The choice for one scene and size; `seconds` measures both ways the first time.
     pub fn get_or_measure(
         &self,
         scene: &GpuScene,
         size_px: UVec2,
         seconds: impl Fn(Visibility) -> Result<f64, RenderError>,
     ) -> Result<Choice, RenderError> {
-        let mut measured = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut measured = self.0.lock();
         let key = (scene.identity(), size_px);
         if let Some((_, choice)) = measured.iter().find(|(other, _)| *other == key) {
             return Ok(*choice);

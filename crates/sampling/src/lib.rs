@@ -1,19 +1,16 @@
 //! Sampling methods (scene to depth images) and sample-camera rigs.
 
-mod depth_peeling;
-mod method;
-mod non_redundant;
+mod error;
+mod methods;
 mod rig;
 mod sampler;
+#[cfg(feature = "scalar")]
 pub mod scalar;
-mod settling;
+mod temporal_hysteresis;
+mod work;
 
-pub use method::{Redundancy, SamplingMethod, UnknownSampling};
+pub use error::SamplingError;
+pub use methods::{METHODS, Redundancy, SamplingMethod, UnknownSampling, templates};
 pub use rig::{Rig, RigError};
-pub use sampler::{SampleWork, Sampler, SamplingError, renderer};
-
-/// The tests of what images leave out: templates that `render` includes.
-#[must_use]
-pub fn shaders() -> Vec<(&'static str, &'static str)> {
-    [&non_redundant::SHADERS[..], &depth_peeling::SHADERS[..]].concat()
-}
+pub use sampler::{Sampler, renderer};
+pub use work::SampleWork;

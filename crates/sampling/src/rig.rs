@@ -1,21 +1,21 @@
-//! Where sample cameras stand.
+//! Places of sample cameras.
 
 use depth_image::{Aabb, PinholeCamera};
 use glam::{UVec2, Vec2, Vec3};
 
 /// Four cameras at the corners of a rectangle, all looking at one point: the two-plane rig of Lages
-/// §4.1. The rectangle is the view cell; views are asked for within it.
+/// §4.1. The rectangle is the view cell; views lie within it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rig {
     /// The rectangle's middle.
     pub center_in_world: Vec3,
     /// From the middle to the right and upper edges.
     pub half_edges_in_world: [Vec3; 2],
-    /// What all cameras look at.
+    /// The point that all cameras look at.
     pub target_in_world: Vec3,
     /// Full vertical field of view.
     pub fov_y_rad: f32,
-    /// What is closer is not drawn.
+    /// Surfaces closer than this are not drawn.
     pub near_m: f32,
 }
 
@@ -31,7 +31,7 @@ pub enum RigError {
 const FOV_Y_RAD: f32 = std::f32::consts::FRAC_PI_4;
 
 impl Rig {
-    /// The paper's: cameras above the corners of a block between two horizontal planes, looking at the
+    /// The rig of the paper: cameras above the corners of a block between two horizontal planes, looking at the
     /// middle of the tile. `height` is in halves of the block's width (the paper leaves it open).
     ///
     /// # Errors
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_look_at_is_an_error() {
+    fn an_empty_volume_is_an_error() {
         assert_eq!(Rig::two_plane(&Aabb::EMPTY, 3.0), Err(RigError::EmptyVolume));
         assert_eq!(Rig::in_front_of(&Aabb { min: Vec3::NAN, max: Vec3::NAN }, 0.1), Err(RigError::EmptyVolume));
     }

@@ -39,7 +39,7 @@ fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, S
     };
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let method = SamplingMethod::Conventional;
-    device().sampler.sample(&SampleWork { draw, cameras, wanted: &wanted, method, planes, settled_at_s: None })
+    device().sampler.sample(&SampleWork { draw, cameras, wanted: &wanted, method, planes, temporal_reference_s: None })
 }
 
 /// More than one submission holds, of two sizes.
@@ -50,7 +50,7 @@ fn cameras() -> Vec<Camera> {
 }
 
 #[test]
-fn planes_come_as_asked() {
+fn requested_planes_are_present() {
     let cameras: Vec<Camera> = device().rig.samples(UVec2::new(40, 30)).into_iter().map(Camera::Pinhole).collect();
     let mut depth = None;
     for (normal, surface_id) in [(false, false), (true, false), (false, true), (true, true)] {
@@ -68,7 +68,7 @@ fn planes_come_as_asked() {
 }
 
 #[test]
-fn a_batch_is_its_singles() {
+fn a_batch_equals_its_single_images() {
     let planes = SamplePlanes { normal: true, surface_id: true, ..SamplePlanes::default() };
     let all = sample(&cameras(), planes).expect("images");
     assert_eq!(all.len(), 40);
@@ -80,7 +80,7 @@ fn a_batch_is_its_singles() {
 }
 
 #[test]
-fn a_bad_camera_is_named() {
+fn an_invalid_camera_is_named_in_the_error() {
     let mut cameras = cameras();
     let Camera::Pinhole(camera) = &mut cameras[3];
     camera.eye_in_world = Vec3::NAN;

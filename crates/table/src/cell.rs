@@ -8,7 +8,7 @@ use crate::number::format_number;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Cell {
-    /// Not measured, not finite or not applicable: `null`, an empty CSV field.
+    /// A value that was not measured, is not finite or does not apply: `null`, an empty CSV field.
     Missing,
     /// Yes or no.
     Flag(bool),
@@ -21,7 +21,7 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// As in an HTML table: numbers to four significant digits.
+    /// The value as in an HTML table: numbers with four significant digits.
     #[must_use]
     pub fn display(&self) -> String {
         match self {
@@ -33,7 +33,7 @@ impl Cell {
         }
     }
 
-    /// As in a CSV file: numbers in full.
+    /// The value as in a CSV file: numbers in full.
     #[must_use]
     pub fn full(&self) -> String {
         match self {
@@ -44,7 +44,7 @@ impl Cell {
         }
     }
 
-    /// Whether it reads best aligned right.
+    /// True for numbers, which are aligned right.
     #[must_use]
     pub fn is_numeric(&self) -> bool {
         matches!(self, Self::Integer(_) | Self::Number(_))

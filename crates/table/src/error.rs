@@ -1,4 +1,4 @@
-/// Why a table cannot be made or written.
+/// A table that cannot be made or written.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "self-naming fields")]
 pub enum TableError {

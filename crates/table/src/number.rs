@@ -1,6 +1,6 @@
-//! Numbers as people read them.
+//! Numbers for readers.
 
-/// Four significant digits, without trailing zeros; powers of ten where there are too many zeros.
+/// A number with four significant digits and without trailing zeros, with a power of ten where it has too many zeros.
 #[must_use]
 pub fn format_number(value: f64) -> String {
     if !value.is_finite() {

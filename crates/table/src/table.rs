@@ -5,12 +5,12 @@ use serde::{Deserialize, Serialize};
 use crate::cell::Cell;
 use crate::error::TableError;
 
-/// What a column holds.
+/// A column.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Column {
-    /// Its heading.
+    /// The heading.
     pub name: String,
-    /// `ms`, `dB`, `px`…; empty for none.
+    /// The unit, such as `ms`, `dB` or `px`; empty for none.
     pub unit: String,
 }
 
@@ -34,11 +34,11 @@ impl Column {
 /// A table, written as `{slug(name)}.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Table {
-    /// What it is about.
+    /// The title.
     pub name: String,
-    /// Left to right.
+    /// Columns, left to right.
     pub columns: Vec<Column>,
-    /// Top to bottom, one cell a column each.
+    /// Rows, top to bottom, each with one cell a column.
     pub rows: Vec<Vec<Cell>>,
 }
 
@@ -53,7 +53,7 @@ impl Table {
     /// Adds a row.
     ///
     /// # Errors
-    /// Not one cell a column.
+    /// Cells and columns differ in number.
     pub fn push(&mut self, row: impl IntoIterator<Item = Cell>) -> Result<(), TableError> {
         self.rows.push(row.into_iter().collect());
         self.validate()
@@ -70,10 +70,10 @@ impl Table {
         }
     }
 
-    /// The table with a heading line, quoted as RFC 4180 wants it.
+    /// The table as CSV with a heading line, quoted by RFC 4180.
     ///
     /// # Errors
-    /// When a row has more or fewer cells than there are columns.
+    /// Cells and columns differ in number.
     pub fn to_csv(&self) -> Result<Vec<u8>, TableError> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(self.columns.iter().map(Column::heading))?;
@@ -83,7 +83,7 @@ impl Table {
         writer.into_inner().map_err(|error| csv::Error::from(error.into_error()).into())
     }
 
-    /// As it stands in a Markdown page, rounded as on paper.
+    /// The table as Markdown, with numbers as in [`Cell::display`].
     #[must_use]
     pub fn to_markdown(&self) -> String {
         let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_row_is_refused() {
+    fn a_row_with_too_few_cells_is_refused() {
         let mut table = Table::new("costs", &[("what", ""), ("time", "ms")]);
         assert!(matches!(table.push([1_u32.into()]), Err(TableError::RowLength { cells: 1, columns: 2, .. })));
     }

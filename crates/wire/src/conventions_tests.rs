@@ -1,11 +1,11 @@
-//! The descriptor set keeps the conventions: versioned package, request and response per call, services
-//! that end in Service, enums with a zero, and a unit on every number.
+//! The conventions of the protos, checked on the descriptor set: a versioned package, a request and a response for each
+//! call, service names, enums with a zero, and units.
 
 use prost::Message as _;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 
-/// What a number's name must end in; counts and names of things are units too.
+/// Endings of the names of numbers; counts and indices are units, too.
 const UNITS: [&str; 18] = [
     "_m", "_per_m", "_s", "_px", "_bytes", "_count", "_epoch", "_index", "_indices", "_id", "_number", "_version",
     "_crc32", "_unit", "_rgb", "_hz", "_rad", "_ratio",

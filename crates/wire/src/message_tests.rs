@@ -125,7 +125,7 @@ fn views() -> RenderViews {
 }
 
 #[test]
-fn messages_come_back() {
+fn messages_survive_the_round_trip() {
     assert_eq!(Assignment::try_from(proto::Assignment::from(assignment())), Ok(assignment()));
     let mut cells = Assignment { tile_count: 2, relay_fanout: NonZeroU32::new(3), ..assignment() };
     cells.workload.cell_first_indices = vec![0, 1];
@@ -136,42 +136,19 @@ fn messages_come_back() {
     let live =
         RenderViews { live: Some(LiveRequest { acknowledged_frame: 8, client_id: 5 }), views: Vec::new(), ..views() };
     assert_eq!(RenderViews::try_from(proto::RenderViewsRequest::from(live.clone())), Ok(live));
-    let plan = SessionEvent::Plan(Box::new(SessionPlan {
-        assignment: assignment(),
-        costs: Costs {
-            sample_image_s: 0.1,
-            direct_view_s: 0.2,
-            reconstruct_view_s: 0.01,
-            load_set_s: 0.02,
-            encode_view_s: 0.001,
-            in_order: true,
-            tiles: Some(TileCosts { overhead_s: 0.03, row_shares: Some([0.1, 0.2, 0.3, 0.4]) }),
-        },
-        reason: "because".to_owned(),
-        predicted_pipeline_s: 0.1,
-        predicted_direct_s: 0.2,
-        predicted_time_share_s: 0.3,
-        k_fd_sampler_count: 1,
-        predicted_k_fd_s: 0.4,
-        enumerated_sampler_count: 2,
-        predicted_enumerated_s: 0.5,
-        scene_load_s: 0.0,
-        fallback_index: Some(0),
-        frame_rate_ratio: 0.5,
-    }));
-    assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(plan.clone())), Ok(plan.clone()));
-    let SessionEvent::Plan(plan) = plan else { panic!("{plan:?}") };
+    let plan = SessionEvent::Plan(Box::new(session_plan()));
+    assert_eq!(SessionEvent::try_from(proto::OpenSessionResponse::from(plan.clone())), Ok(plan));
     let condition = NodeCondition {
         node_name: "a".to_owned(),
         is_ready: true,
-        costs: plan.costs,
+        costs: session_plan().costs,
         views: 3,
         dropped_views: 1,
         busy_ratio: 0.7,
     };
     let status = ClusterStatus {
         plan_epoch: 4,
-        plan: Some(plan),
+        plan: Some(Box::new(session_plan())),
         session_count: 2,
         views_per_set: 70,
         conditions: vec![condition],
@@ -195,13 +172,39 @@ fn messages_come_back() {
     assert_eq!(WorkReport::try_from(proto::ReportWorkRequest::from(work_report())), Ok(work_report()));
 }
 
+fn session_plan() -> SessionPlan {
+    SessionPlan {
+        assignment: assignment(),
+        costs: Costs {
+            sample_image_s: 0.1,
+            direct_view_s: 0.2,
+            reconstruct_view_s: 0.01,
+            load_set_s: 0.02,
+            encode_view_s: 0.001,
+            in_order: true,
+            tiles: Some(TileCosts { overhead_s: 0.03, row_shares: Some([0.1, 0.2, 0.3, 0.4]) }),
+        },
+        reason: "because".to_owned(),
+        predicted_pipeline_s: 0.1,
+        predicted_direct_s: 0.2,
+        predicted_time_share_s: 0.3,
+        k_fd_sampler_count: 1,
+        predicted_k_fd_s: 0.4,
+        enumerated_sampler_count: 2,
+        predicted_enumerated_s: 0.5,
+        scene_load_s: 0.0,
+        fallback_index: Some(0),
+        frame_rate_ratio: 0.5,
+    }
+}
+
 fn work_report() -> WorkReport {
     let costs = MeasuredCosts { sample_image_s: Some(0.1), image_bytes: Some(1e5), ..MeasuredCosts::default() };
     WorkReport { node_name: "a".to_owned(), plan_epoch: 4, costs, busy_s: 0.9, views: 3, dropped_views: 1 }
 }
 
 #[test]
-fn bad_reports_and_demands_are_refused() {
+fn bad_reports_and_changes_are_refused_by_field() {
     let spoilt = |spoil: &dyn Fn(&mut proto::ReportWorkRequest)| {
         let mut message = proto::ReportWorkRequest::from(work_report());
         spoil(&mut message);
@@ -214,8 +217,8 @@ fn bad_reports_and_demands_are_refused() {
     let many = proto::ChangeSessionRequest { views_per_set_count: 1_000_000_000, ..change.clone() };
     assert!(refusal::<_, ChangeSession>(many).contains("views_per_set_count is 1000000000"));
     let viewpoint = pinhole_to(&camera());
-    let crowd = proto::ChangeSessionRequest { viewpoints: vec![viewpoint; 257], ..change.clone() };
-    assert!(refusal::<_, ChangeSession>(crowd).contains("viewpoints has 257"));
+    let too_many = proto::ChangeSessionRequest { viewpoints: vec![viewpoint; 257], ..change.clone() };
+    assert!(refusal::<_, ChangeSession>(too_many).contains("viewpoints has 257"));
     let nowhere = proto::PinholeCamera { near_m: f32::NAN, ..viewpoint };
     let lost = proto::ChangeSessionRequest { viewpoints: vec![nowhere], ..change };
     assert!(refusal::<_, ChangeSession>(lost).contains("viewpoints: camera near_m"));
@@ -229,7 +232,7 @@ fn a_refusal_names_the_plan_in_force() {
     large.workload.sample_cameras = vec![Camera::Pinhole(camera()); 16];
     large.workload.illumination.lights = vec![illumination().lights[1]; 255];
     let refusal = refuse_plan(&large, String::new());
-    assert!(plan_in_force(&refusal).is_none_or(|told| told == large), "whole or not at all");
+    assert!(plan_in_force(&refusal).is_none_or(|named| named == large), "whole or not at all");
     assert_eq!(plan_in_force(&tonic::Status::failed_precondition("of something else")), None);
 }
 
@@ -248,7 +251,7 @@ fn spoilt_camera(spoil: impl FnOnce(&mut proto::PinholeCamera)) -> String {
 }
 
 #[test]
-fn bad_cameras_are_refused() {
+fn bad_cameras_are_refused_by_field() {
     assert!(spoilt_camera(|c| c.eye_in_world_m = None).contains("eye_in_world_m"));
     assert!(spoilt_camera(|c| c.eye_in_world_m.as_mut().unwrap().x = f32::NAN).contains("eye_in_world"));
     assert!(
@@ -262,7 +265,7 @@ fn bad_cameras_are_refused() {
 }
 
 #[test]
-fn bad_counts_are_refused() {
+fn bad_counts_are_refused_by_field() {
     assert!(spoilt_views(|m| m.views.clear()).contains("views is missing"));
     assert!(spoilt_views(|m| m.views = vec![proto::RequestedView::default(); 1_000_000]).contains("views has 1000000"));
     assert!(spoilt_views(|m| m.frame_codec = "x".repeat(300)).contains("frame_codec"));
@@ -301,7 +304,7 @@ fn other_versions_are_refused_before_anything_else() {
 }
 
 #[test]
-fn without_a_wish_every_set_is_finished() {
+fn a_request_without_refinement_steps_has_one() {
     let message = proto::OpenSessionRequest { refinement_step_count: 0, ..request().into() };
     assert_eq!(SessionRequest::try_from(message).map(|request| request.refinement_steps), Ok(1));
 }
@@ -317,7 +320,7 @@ fn spoilt_light(place: usize, spoil: impl FnOnce(&mut proto::light::Kind)) -> St
 }
 
 #[test]
-fn bad_lights_are_refused() {
+fn bad_lights_are_refused_by_field() {
     use proto::light::Kind;
 
     assert!(spoilt_workload(|w| w.illumination = None).contains("workload.illumination is missing"));
@@ -354,7 +357,7 @@ fn bad_lights_are_refused() {
 }
 
 #[test]
-fn as_many_lights_as_have_a_plane_come_back() {
+fn the_largest_number_of_lights_survives_the_round_trip() {
     let light = illumination().lights[1];
     let most = Illumination { lights: vec![light; MAX_LIGHTS], ..illumination() };
     assert_eq!(MAX_VISIBILITY_PLANES, 64);
@@ -398,13 +401,13 @@ fn header() -> FrameHeader {
 }
 
 #[test]
-fn headers_come_back_with_their_pose() {
+fn frame_headers_survive_with_their_camera() {
     let header = header();
     assert_eq!(FrameHeader::try_from(proto::FrameHeader::from(header.clone())), Ok(header));
 }
 
 #[test]
-fn headers_that_claim_too_much_are_refused() {
+fn frame_headers_that_claim_too_much_are_refused() {
     let spoil = |change: &dyn Fn(&mut proto::FrameHeader)| {
         let mut message = proto::FrameHeader::from(header());
         change(&mut message);
@@ -421,7 +424,7 @@ fn headers_that_claim_too_much_are_refused() {
 }
 
 #[test]
-fn impossible_stage_times_are_named() {
+fn impossible_stage_times_are_refused_by_field() {
     let spoil = |change: &dyn Fn(&mut proto::StageTimes)| {
         let mut message = proto::StageTimes::from(StageTimes::default());
         change(&mut message);
@@ -433,7 +436,7 @@ fn impossible_stage_times_are_named() {
 }
 
 #[test]
-fn zero_on_the_wire_is_none() {
+fn zeros_and_empty_texts_of_the_wire_become_none() {
     let asked = SessionRequest { frames_per_s: None, forced_tile_count: None, ..request() };
     let message = proto::OpenSessionRequest::from(asked.clone());
     assert_eq!((message.frames_per_s, message.forced_tile_count), (0.0, 0));

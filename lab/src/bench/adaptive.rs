@@ -1,4 +1,4 @@
-//! Rays only where light changes: the time it saves, and what it does to the picture.
+//! Rays only where light changes: the time saved, and the effect on the picture.
 
 use std::sync::Arc;
 
@@ -11,30 +11,27 @@ use render::{DrawWork, GpuScene, Lighting, Rate, Refinement, Visibility};
 use scene::SceneSpec;
 use study::{Axis, Bar, Check, Point, Report, Series, Table, XyChart};
 
-use super::BenchArgs;
+use super::args::BenchArgs;
 use super::timing::in_turn;
-use crate::evaluate::mean_flip;
+use crate::evaluation::mean_flip;
 use crate::lighting_study::FINE;
 use crate::progress::bar;
 
-/// Rays that stand for all light.
+/// The lighting whose picture counts as converged.
 const CONVERGED: &str = "soft 256, occlusion 256";
-/// A scene of large smooth surfaces beside the one of the bench.
+/// A scene of large smooth surfaces, beside the scene of the bench.
 const SMOOTH: &str = "courtyard";
-/// Beside the default.
+/// Tolerances beside the default.
 const TOLERANCES: [f32; 5] = [0.02, 0.05, 0.1, 0.2, 0.3];
-/// Of the error of full rate, so much is allowed to the default tolerance.
+/// The most error of the default tolerance, over that of full rate.
 const ALLOWED: f64 = 1.1;
 
-/// One rate on one scene.
+/// Results of one rate on one scene.
 struct Row {
     rate: Rate,
-    /// A view.
     seconds: f64,
-    /// Beside full rate.
     flip_to_full: f64,
     psnr_to_full_db: f64,
-    /// Beside light by many rays.
     flip_to_converged: f64,
 }
 
@@ -67,7 +64,7 @@ pub fn compare(args: &BenchArgs, engine: &Arc<GpuEngine>, setup: &Setup, report:
     Ok(())
 }
 
-/// The full rate first, then adaptive ones from the strictest on.
+/// The full rate first, then adaptive rates from the strictest on.
 fn rates() -> anyhow::Result<Vec<Rate>> {
     let Rate::Adaptive { tolerance: default } = default_rate()? else { anyhow::bail!("the default is not adaptive") };
     let mut tolerances: Vec<f32> = TOLERANCES.into_iter().filter(|&t| t != default).chain([default]).collect();

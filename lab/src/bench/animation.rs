@@ -1,4 +1,4 @@
-//! A scene that moves: trees refitted or built anew, and what sampling through them takes.
+//! A scene that moves: trees refitted or rebuilt, and sampling through them.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -10,34 +10,34 @@ use render::{AccelerationReport, DrawWork, GpuScene, Lighting, Refinement, Sampl
 use scene::SceneSpec;
 use study::{Axis, Bar, Check, Report, Series, Table, XyChart};
 
-use super::BenchArgs;
+use super::args::BenchArgs;
 use super::timing::in_turn;
-use crate::evaluate::median;
 use crate::progress::bar;
+use crate::statistics::median;
 
 const SCENE: &str = "tree-terrain-500k-wind";
 const SCENE_QUICK: &str = "tree-terrain-30k-wind";
-/// Moments in tenths of a second. The first tree is that of 0, which all others are refitted from.
+/// Moments in tenths of a second. All other trees are refitted from that of moment 0.
 const TENTHS: [u32; 6] = [1, 2, 3, 4, 5, 6];
 const QUICK: usize = 3;
-/// Of the samples: all rays that there are go through the tree.
+/// The lighting of the samples: all rays go through the tree.
 const LIGHTING: &str = "shadows";
-/// At which the renderer gives up a refitted tree.
+/// The cost ratio at which the renderer gives up a refitted tree.
 const WORST_REFIT: f64 = 1.3;
 
-/// A tree, and sampling with it.
+/// A tree, and the time of sampling with it.
 #[derive(Clone, Copy)]
 struct Tree {
     report: AccelerationReport,
-    /// Until rays could go through it, with all that was uploaded.
+    /// Seconds until the tree is ready for rays, upload included.
     ready_s: f64,
     sample_set_s: f64,
 }
 
-/// Both ways to a tree at one moment.
+/// The trees of one moment.
 struct Moment {
     scene_time_s: f32,
-    /// What the renderer takes by itself.
+    /// The renderer's choice.
     chosen: Tree,
     rebuilt: Tree,
 }
@@ -69,7 +69,7 @@ fn moments(args: &BenchArgs, engine: &GpuEngine, scene: &GpuScene, setup: &Setup
         anyhow::Ok(Tree { report, ready_s, sample_set_s })
     };
     scene.rebuilt_acceleration(0.0)?;
-    // One after the other, as they are in an animation; then all anew.
+    // Trees are refitted one after the other, as in an animation, and then all rebuilt.
     let chosen = times_s.iter().map(|&t| tree(t, GpuScene::acceleration)).collect::<anyhow::Result<Vec<_>>>()?;
     let rebuilt =
         times_s.iter().map(|&t| tree(t, GpuScene::rebuilt_acceleration)).collect::<anyhow::Result<Vec<_>>>()?;
@@ -97,7 +97,7 @@ fn sample_set_s(
 }
 
 impl Moment {
-    /// Expected visits and tests of a random ray.
+    /// The ratio of the expected visits and tests of a random ray.
     fn cost_ratio(&self) -> f64 {
         f64::from(self.chosen.report.cost) / f64::from(self.rebuilt.report.cost)
     }
@@ -152,7 +152,7 @@ fn checks(scene: &str, moments: &[Moment]) -> [Check; 2] {
     ]
 }
 
-/// The first moment is refitted to see what that takes; the last one's way is what the renderer settled on.
+/// The first moment is refitted to measure a refit; the last moment shows the renderer's choice.
 fn chosen_over_other(moments: &[Moment], refitted: &[&Moment]) -> f64 {
     let refit_s = median(refitted.iter().map(|moment| moment.chosen.ready_s).collect());
     let build_s = median(moments.iter().map(|moment| moment.rebuilt.ready_s).collect());

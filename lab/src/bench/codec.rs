@@ -7,7 +7,7 @@ use codec::{DecodeLimits, decode_depth_plane, encode_depth_plane, inverse_depth_
 use depth_image::DepthImage;
 use study::{Bar, Check, Report, Table};
 
-use crate::evaluate::median;
+use crate::statistics::median;
 
 /// Repeats of one coding, some hundred microseconds each.
 const RUNS: usize = 25;

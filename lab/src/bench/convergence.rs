@@ -1,32 +1,30 @@
-//! Soft shadows and occlusion by few rays beside those by many: how fast the error falls, and whether it is noise
-//! alone.
+//! The error of soft shadows and occlusion by few rays against that by many: its slope, and its bias beside noise.
 
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use app_core::setup::Setup;
+use app_core::setup::{Setup, resized};
 use depth_image::{Camera, DepthImage, PinholeCamera, linear_from_rgb9e5};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use study::{Axis, Bar, Check, Report, Series, Table, XyChart};
 
-use super::BenchArgs;
-use super::rays::resized;
+use super::args::BenchArgs;
 use crate::progress::bar;
 
-/// Rays that stand for all light.
+/// Rays of the reference.
 const REFERENCE: u32 = 1024;
-/// Rays that are compared with them.
+/// Rays that are compared with the reference.
 const RAYS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 const QUICK: usize = 5;
-/// At which the mean is held against what noise would make of it.
+/// The number of rays at which the mean difference is compared with noise.
 const UNBIASED_AT: u32 = 16;
-/// Of a normal distribution: 99 % lie within so many standard deviations.
+/// The standard deviations that hold 99 % of a normal distribution.
 const DEVIATIONS_99: f64 = 2.576;
 const SIZE_PX: UVec2 = UVec2::new(100, 75);
 
-/// What rays are traced for.
+/// An effect that rays are traced for.
 struct Kind {
     name: &'static str,
     lighting: fn(u32) -> String,
@@ -37,19 +35,19 @@ const KINDS: [Kind; 2] = [
     Kind { name: "occlusion", lighting: |rays| format!("phong, occlusion {rays}") },
 ];
 
-/// Of a picture by few rays beside one by many, over all pixels.
+/// The error of a picture by few rays against one by many, over all pixels.
 struct Error {
     rays: u32,
-    /// Of linear light, over all channels.
+    /// The root mean square of linear light, over all channels.
     rms: f64,
-    /// The mean difference over half of the interval that noise keeps it in with 99 %.
+    /// The mean difference over half of its 99 % interval under noise.
     bias: f64,
 }
 
-/// Adds table, chart and checks.
+/// Adds a table, a chart and checks.
 pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, setup: &Setup, report: &mut Report) -> anyhow::Result<()> {
     let scene = engine.scene(setup.offer.hash.as_str())?;
-    let camera = resized(setup.samples.first().context("no sample cameras")?, SIZE_PX);
+    let camera = resized(*setup.samples.first().context("no sample cameras")?, SIZE_PX);
     let rays = if args.quick { &RAYS[..QUICK] } else { &RAYS[..] };
     let progress = bar("error against rays", KINDS.len() * (1 + rays.len()));
     let mut of_kinds = Vec::with_capacity(KINDS.len());
@@ -100,12 +98,12 @@ fn bias(differences: &[Vec3]) -> f64 {
     let n = greys.len() as f64;
     let mean = greys.iter().sum::<f64>() / n;
     let variance = greys.iter().map(|grey| (grey - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    // Pixels' rays are independent of each other.
+    // Rays of pixels are independent of each other.
     mean.abs() / (DEVIATIONS_99 * (variance / n).sqrt())
 }
 
-/// Root mean square of what rounding to the steps of RGB9E5 adds to the difference of two pictures, were it
-/// independent in both; the background is the same in both.
+/// The root mean square that rounding to RGB9E5 adds to the difference of two pictures, were it independent in both.
+/// The background is the same in both.
 fn rounding_of(image: &DepthImage) -> f64 {
     let step = |word: u32| 2f64.powi((word >> 27) as i32 - 24);
     let surfaces = image.color_rgb9e5.iter().zip(&image.inverse_depth_per_m).filter(|(_, inverse)| **inverse > 0.0);
@@ -113,13 +111,13 @@ fn rounding_of(image: &DepthImage) -> f64 {
     (2.0 * sum / image.color_rgb9e5.len() as f64).sqrt()
 }
 
-/// The error of independent random rays, but for a factor. The reference's first rays are those that are compared
-/// with it, so a little less is left than without.
+/// The error of independent random rays, up to a factor. The reference's first rays are the compared ones, which lowers
+/// the error a little.
 fn random(rays: u32) -> f64 {
     (f64::from(rays).recip() - f64::from(REFERENCE).recip()).sqrt()
 }
 
-/// By least squares, of logarithms.
+/// The slope of logarithms by least squares.
 fn slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
     let logs: Vec<(f64, f64)> = points.map(|(x, y)| (x.ln(), y.ln())).collect();
     let n = logs.len() as f64;
@@ -188,12 +186,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_power_has_its_exponent_for_slope() {
+    fn the_slope_of_a_power_is_its_exponent() {
         assert!((slope([1.0, 2.0, 8.0].map(|x: f64| (x, 3.0 * x.powf(-0.7))).into_iter()) + 0.7).abs() < 1e-12);
     }
 
     #[test]
-    fn what_differs_on_the_whole_is_told_from_noise() {
+    fn a_shift_exceeds_the_interval_of_noise() {
         let noise = |shift: f32| {
             (0..1000).map(|i| Vec3::splat(((i * 7919) % 1000) as f32 * 1e-3 - 0.4995 + shift)).collect::<Vec<_>>()
         };

@@ -1,4 +1,4 @@
-//! The carve's front of time against error beside the search's.
+//! The fronts of time against error of joint carve and light field search.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,19 +11,20 @@ use reconstruction::ReconstructionMethod;
 use scene::SceneSpec;
 use study::{Bar, Check, Report};
 
-use super::BenchArgs;
-use crate::evaluate::{Row, Truth};
+use super::args::BenchArgs;
+use crate::evaluation::Evaluation;
 use crate::experiment::VIEW_SIZE_PX;
 use crate::progress::bar;
+use crate::reference_views::ReferenceViews;
 use crate::sweep;
 
-/// Models of a folder that are compared, the largest files.
+/// The number of models of a folder that are compared, the largest files.
 const MODELS: usize = 4;
 
-/// Sweeps one scene; adds its table, charts and checks.
-pub fn compare(name: &str, truth: &Truth, args: &BenchArgs, report: &mut Report) -> anyhow::Result<()> {
+/// Evaluates all settings on one scene; adds a table, charts and checks.
+pub fn compare(name: &str, reference: &ReferenceViews, args: &BenchArgs, report: &mut Report) -> anyhow::Result<()> {
     let progress = bar(format!("error against time, {name}"), sweep::settings(args.quick).len());
-    let rows = sweep::sweep(truth, args.quick, args.runs(), |_| progress.inc(1))?;
+    let rows = sweep::sweep(reference, args.quick, args.runs(), |_| progress.inc(1))?;
     progress.finish_and_clear();
     report.tables.push(sweep::table(&format!("Error against time, {name}"), &rows)?);
     report.charts.extend(sweep::charts(name, &rows).into_iter().map(Into::into));
@@ -41,10 +42,12 @@ fn check_names(name: &str) -> [String; 3] {
     .map(|what| format!("{name}: {what}"))
 }
 
-fn checks(name: &str, rows: &[Row], default: ReconstructionMethod) -> Vec<Check> {
+fn checks(name: &str, rows: &[Evaluation], default: ReconstructionMethod) -> Vec<Check> {
     let (searches, carves) = sweep::split(rows);
-    let least = |rows: &[&Row], value: fn(&Row) -> f64| rows.iter().map(|row| value(row)).fold(f64::NAN, f64::min);
-    let exact = |value: fn(&Row) -> f64| {
+    let least = |rows: &[&Evaluation], value: fn(&Evaluation) -> f64| {
+        rows.iter().map(|row| value(row)).fold(f64::NAN, f64::min)
+    };
+    let exact = |value: fn(&Evaluation) -> f64| {
         carves
             .iter()
             .find(|row| row.method == ReconstructionMethod::JointCarve { stop_level: 0 })
@@ -69,10 +72,10 @@ fn checks(name: &str, rows: &[Row], default: ReconstructionMethod) -> Vec<Check>
     ]
 }
 
-/// A scene whose gaps are wide enough to count: in foliage, every pixel that no camera sees is a silhouette's.
+/// A scene with gaps wide enough to count: in foliage, every pixel that no camera sees is a silhouette's.
 const GAPS: &str = "poles";
 
-/// Sweeps a scene with disocclusions.
+/// Evaluates a scene with disocclusions.
 pub fn gaps(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     sweep_scene(GAPS, GAPS.parse()?, args, engine, report)
 }
@@ -87,11 +90,11 @@ fn sweep_scene(
     let scene = SceneArgs { lighting: args.scene.lighting, ..SceneArgs::of(spec) };
     let setup = scene.load()?;
     let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
-    let truth = Truth::take(engine, &setup, &scene, cell.spread(args.compared_views(), VIEW_SIZE_PX))?;
-    compare(name, &truth, args, report)
+    let reference = ReferenceViews::draw(engine, &setup, &scene, cell.spread(args.compared_views(), VIEW_SIZE_PX))?;
+    compare(name, &reference, args, report)
 }
 
-/// Sweeps the models of the folder, if one is given.
+/// Evaluates the models of the folder, if one is given.
 pub fn models(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let Some(folder) = &args.models else {
         let bar = Bar::AtMost(1.0);
@@ -107,7 +110,7 @@ pub fn models(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) ->
     Ok(())
 }
 
-/// The largest model files of a folder and of its folders.
+/// The largest model files of a folder and of its subfolders.
 fn models_of(folder: &Path, most: usize) -> anyhow::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for path in entries(folder)? {

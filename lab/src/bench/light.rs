@@ -1,4 +1,4 @@
-//! Light sampled once and shared: gains, what a highlight costs, still scenes, and truth beside converged light.
+//! Light sampled once and shared: its gain, highlights, still scenes, and reference views beside converged light.
 
 use std::sync::Arc;
 
@@ -9,22 +9,24 @@ use engine::GpuEngine;
 use render::Lighting;
 use study::{Bar, Check, Report, Table};
 
-use super::BenchArgs;
-use crate::evaluate::{Truth, mean_flip, median};
-use crate::experiment::{Experiment, PAPER_VIEWS, VIEW_SIZE_PX, Wish};
+use super::args::BenchArgs;
+use crate::evaluation::mean_flip;
+use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS, VIEW_SIZE_PX};
 use crate::lighting_study::{self, Extent, FINE};
 use crate::progress::bar;
+use crate::reference_views::ReferenceViews;
+use crate::statistics::median;
 
-/// Rays that stand for all light.
+/// The lighting whose picture counts as converged.
 const CONVERGED: &str = "soft 256, occlusion 256";
-/// Views that are compared with converged light.
+/// The number of views that are compared with converged light.
 const CONVERGED_VIEWS: usize = 4;
-/// Two times that are nearly alike need more repeats than others.
+/// Repeats of two nearly equal times.
 const RUNS_OF_NEAR_TIMES: usize = 5;
-/// Perceptual roughness of the scene made glossy.
+/// The perceptual roughness of the glossy scene.
 const GLOSSY: f32 = 0.3;
 
-/// Every quality of light on the scene.
+/// Measures every lighting on the scene.
 pub fn qualities(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let rows = lighting_study::measure(experiment, Extent::bench(args.quick), drop)?;
     lighting_study::report(&rows, experiment.setup.scene.illumination.lights.len(), report)?;
@@ -32,11 +34,12 @@ pub fn qualities(args: &BenchArgs, experiment: &Experiment, report: &mut Report)
     still(args, experiment, report)
 }
 
-/// A second set that shows what the first does: only c and e are spent on it.
+/// Measures a second set of a still scene: only c and e are spent on it.
 fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let views = if args.quick { 64 } else { PAPER_VIEWS };
-    let wish = Wish { lighting: FINE.parse()?, sets: 2, ..experiment.wish(PolicyChoice::Pipeline, views) };
-    let delivered = experiment.deliver(wish, |_| ())?;
+    let settings =
+        DeliverySettings { lighting: FINE.parse()?, sets: 2, ..experiment.delivery(PolicyChoice::Pipeline, views) };
+    let delivered = experiment.deliver(settings, |_| ())?;
     let second = delivered.frames.iter().filter(|frame| frame.request.set_index == 1);
     let waited_s = second.map(|frame| frame.header.stage_times.set_wait_s).fold(0.0, f64::max);
     let set_s = experiment.setup.samples.len() as f64 * delivered.plan.costs.sample_image_s;
@@ -45,20 +48,20 @@ fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyh
     Ok(())
 }
 
-/// FLIP of views against light of many rays: shared, and drawn with as many rays.
-pub fn truth(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
+/// The FLIP of views against converged light: from shared samples, and drawn with as many rays.
+pub fn reference(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let views = experiment.views(if args.quick { 1 } else { CONVERGED_VIEWS })?;
     let progress = bar("converged light", 3);
     let take = |lighting: Lighting| {
         let lit = SceneArgs { lighting, ..experiment.args.clone() };
-        let truth = Truth::take(&experiment.engine, &experiment.setup, &lit, views.clone());
+        let reference = ReferenceViews::draw(&experiment.engine, &experiment.setup, &lit, views.clone());
         progress.inc(1);
-        truth
+        reference
     };
     let (unlit, fine) = (take(Lighting::UNLIT)?, take(FINE.parse()?)?);
     let converged = fine.drawn(&experiment.setup, CONVERGED.parse()?)?;
     progress.finish_and_clear();
-    let reconstructed = |truth: &Truth| truth.reconstruct(args.scene.method, Default::default());
+    let reconstructed = |reference: &ReferenceViews| reference.reconstruct(args.scene.method, Default::default());
     let shared = mean_flip(&converged, &reconstructed(&fine)?)?;
     let drawn = mean_flip(&converged, &fine.views)?;
     let geometry = mean_flip(&unlit.views, &reconstructed(&unlit)?)?;
@@ -75,25 +78,25 @@ pub fn truth(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> 
     Ok(())
 }
 
-/// A view's milliseconds with both, medians; in turn, so that neither has the quieter machine.
-fn ms_in_turn(args: &BenchArgs, both: [&Truth; 2]) -> anyhow::Result<[f64; 2]> {
+/// Milliseconds a view of both, as medians. Both take turns, so that neither has the quieter machine.
+fn ms_in_turn(args: &BenchArgs, both: [&ReferenceViews; 2]) -> anyhow::Result<[f64; 2]> {
     let mut ms = [Vec::new(), Vec::new()];
     for _ in 0..args.runs().max(RUNS_OF_NEAR_TIMES) {
-        for (ms, truth) in ms.iter_mut().zip(both) {
-            ms.push(truth.ms_a_view(args.scene.method, PAPER_VIEWS, 1)?);
+        for (ms, reference) in ms.iter_mut().zip(both) {
+            ms.push(reference.ms_a_view(args.scene.method, PAPER_VIEWS, 1)?);
         }
     }
     Ok(ms.map(median))
 }
 
-/// c where every surface has a highlight.
+/// Measures c where every surface has a highlight.
 pub fn glossy(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let scene = glossy_scene(args)?;
     engine.put_scene(scene.offer.hash.as_str(), &scene.scene)?;
     let cell = ViewCell::between(&scene.around).ok_or_else(|| anyhow::anyhow!("no sample cameras"))?;
     let take = |lighting: Lighting| {
         let lit = SceneArgs { lighting, ..args.scene.clone() };
-        Truth::take(engine, &scene, &lit, cell.spread(args.compared_views(), VIEW_SIZE_PX))
+        ReferenceViews::draw(engine, &scene, &lit, cell.spread(args.compared_views(), VIEW_SIZE_PX))
     };
     let both = [take(Lighting::UNLIT)?, take("shadows".parse()?)?];
     let [unlit, lit] = ms_in_turn(args, [&both[0], &both[1]])?;

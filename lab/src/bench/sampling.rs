@@ -1,4 +1,4 @@
-//! Sampling without redundance: what it costs, and what quads cut from its images cover.
+//! Sampling without redundancy: its cost, and the coverage of quads cut from its images.
 
 use std::sync::Arc;
 
@@ -10,12 +10,12 @@ use render::SamplePlanes;
 use sampling::SamplingMethod;
 use study::{Bar, Check, Report, Table};
 
-use super::BenchArgs;
+use super::args::BenchArgs;
 use crate::progress::bar;
 use crate::sampling_study::{Extent, SCENES, Subject, times, times_report};
 
 const SIZE_PX: UVec2 = UVec2::new(400, 300);
-/// On which merging is promised, and is measured with finer images, too: of a surface's quads more lie within it.
+/// The scene on which merging is checked, with finer images as well: they have more quads within a surface.
 const FLAT: &str = "urban";
 const FINE_PX: UVec2 = UVec2::splat(1024);
 
@@ -55,7 +55,7 @@ const MERGED_COLUMNS: [(&str, &str); 8] = [
     ("cut and merged", "ms"),
 ];
 
-/// Seen from where it was taken, each sample is lost or covered.
+/// Counts the samples that are lost or covered, seen from where they were taken.
 fn cover(subject: &Subject, engine: &GpuEngine, table: &mut Table, report: &mut Report) -> anyhow::Result<()> {
     let images = conventional(subject, SIZE_PX)?;
     let (mut samples, mut lost, mut covered) = (0, 0, 0);
@@ -77,7 +77,7 @@ fn cover(subject: &Subject, engine: &GpuEngine, table: &mut Table, report: &mut 
     Ok(())
 }
 
-/// How many quads merging leaves.
+/// Measures the quads that merging leaves.
 fn merge(
     subject: &Subject,
     engine: &GpuEngine,

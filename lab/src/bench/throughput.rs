@@ -8,27 +8,29 @@ use depth_image::{PinholeCamera, ViewPlanes};
 use node::{DirectWork, Engine as _};
 use study::{Bar, Check, Report, Table};
 
-use super::BenchArgs;
-use crate::evaluate::{Truth, median};
+use super::args::BenchArgs;
 use crate::experiment::{Experiment, PAPER_VIEWS};
 use crate::progress::bar;
+use crate::reference_views::ReferenceViews;
+use crate::statistics::median;
 
-/// Views that direct rendering is timed on.
+/// The number of views that direct rendering is timed on.
 const DIRECT_VIEWS: usize = 48;
 /// c / g of the paper's GPUs.
 const PAPER_RATIO: f64 = 0.103;
 
-/// Pipeline over direct, delivered to a client: runs of both in turn, so that neither has the quieter machine.
+/// The pipeline's throughput over direct rendering's, delivered to a client. Runs take turns, so that neither has the
+/// quieter machine.
 pub fn delivered(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let progress = bar(format!("{PAPER_VIEWS} views delivered"), 2 * args.runs());
     let (mut pipeline, mut direct) = (Vec::new(), Vec::new());
     let mut reason = String::new();
     for _ in 0..args.runs() {
-        let run = experiment.deliver(experiment.wish(PolicyChoice::Pipeline, PAPER_VIEWS), |_| ())?;
+        let run = experiment.deliver(experiment.delivery(PolicyChoice::Pipeline, PAPER_VIEWS), |_| ())?;
         reason = run.plan.reason;
         pipeline.push(PAPER_VIEWS as f64 / run.seconds);
         progress.inc(1);
-        let run = experiment.deliver(experiment.wish(PolicyChoice::Direct, DIRECT_VIEWS), |_| ())?;
+        let run = experiment.deliver(experiment.delivery(PolicyChoice::Direct, DIRECT_VIEWS), |_| ())?;
         direct.push(DIRECT_VIEWS as f64 / run.seconds);
         progress.inc(1);
     }
@@ -45,16 +47,16 @@ pub fn delivered(args: &BenchArgs, experiment: &Experiment, report: &mut Report)
     Ok(())
 }
 
-/// c and g_v, in one batch each and to host pixels.
+/// c and g_v, each in one batch and to host pixels.
 pub fn nanoseconds(
     args: &BenchArgs,
-    truth: &Truth,
+    reference: &ReferenceViews,
     experiment: &Experiment,
     report: &mut Report,
 ) -> anyhow::Result<()> {
-    let pixels = truth.cameras.first().map_or(1, PinholeCamera::pixel_count) as f64;
-    let c_ns = truth.ms_a_view(args.scene.method, PAPER_VIEWS, args.runs())? * 1e6 / pixels;
-    let g_ns = direct_s_a_view(truth, experiment, args.runs())? * 1e9 / pixels;
+    let pixels = reference.cameras.first().map_or(1, PinholeCamera::pixel_count) as f64;
+    let c_ns = reference.ms_a_view(args.scene.method, PAPER_VIEWS, args.runs())? * 1e6 / pixels;
+    let g_ns = direct_s_a_view(reference, experiment, args.runs())? * 1e9 / pixels;
     let mut table = Table::new("Device time", &[("what", ""), ("time a pixel", "ns"), ("time a view", "ms")]);
     for (what, ns) in [("c: reconstruct", c_ns), ("g_v: draw from the scene", g_ns)] {
         table.push([what.into(), ns.into(), (ns * pixels * 1e-6).into()])?;
@@ -64,10 +66,10 @@ pub fn nanoseconds(
     Ok(())
 }
 
-fn direct_s_a_view(truth: &Truth, experiment: &Experiment, runs: usize) -> anyhow::Result<f64> {
+fn direct_s_a_view(reference: &ReferenceViews, experiment: &Experiment, runs: usize) -> anyhow::Result<f64> {
     let work = DirectWork {
         scene_hash: experiment.setup.offer.hash.to_string(),
-        cameras: truth.cameras.clone(),
+        cameras: reference.cameras.clone(),
         lighting: experiment.args.lighting.to_string(),
         scene_time_s: 0.0,
         planes: ViewPlanes::default(),

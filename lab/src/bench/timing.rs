@@ -1,11 +1,11 @@
-//! Times of what is compared.
+//! Times of several works.
 
 use std::time::Instant;
 
-use crate::evaluate::median;
+use crate::statistics::median;
 
-/// Seconds of each of some works, the median of `runs` rounds after one that does not count. They take turns, so
-/// that none has the quieter machine.
+/// Seconds of each work, as the median of `runs` rounds after one that does not count. The works take turns, so that
+/// none has the quieter machine.
 pub fn in_turn<W: Copy>(
     works: &[W],
     runs: usize,

@@ -1,4 +1,4 @@
-//! Another sampling than the conventional, and conventional sampling beside it.
+//! The sampling asked for, with conventional sampling beside it.
 
 use anyhow::Context as _;
 use app_core::setup::{SceneArgs, Setup};
@@ -7,11 +7,11 @@ use metrics::{Rgb8Image, flip_map};
 use sampling::SamplingMethod;
 use study::{Cell, Report, Table, comparison_row};
 
-use super::COMPARED_VIEWS;
-use crate::evaluate::{ALL_PLANES, Truth};
+use super::args::COMPARED_VIEWS;
 use crate::experiment::Experiment;
+use crate::reference_views::{ALL_PLANES, ReferenceViews};
 
-/// Rows of pictures of each sampling.
+/// The rows of pictures of each sampling.
 const SIDE_BY_SIDE: usize = 2;
 
 /// Adds a table and pictures; nothing where sampling is conventional.
@@ -32,30 +32,35 @@ pub fn conventional(experiment: &Experiment, report: &mut Report) -> anyhow::Res
     ];
     let mut table = Table::new("Conventional sampling beside it", &columns);
     for sampling in [args.sampling, SamplingMethod::Conventional] {
-        let truth = taken(experiment, sampling)?;
-        let row = truth.evaluate(args.method, 1)?;
-        let depths = truth.images.iter().flat_map(|image| &image.inverse_depth_per_m);
+        let reference = taken(experiment, sampling)?;
+        let row = reference.evaluate(args.method, 1)?;
+        let depths = reference.images.iter().flat_map(|image| &image.inverse_depth_per_m);
         let samples = depths.filter(|&&depth| depth > 0.0).count();
         let numbers = [row.ms_a_view, row.psnr_db, row.flip, row.flip_covered, 100.0 * row.unknown];
         let head = [sampling.to_string().into(), args.method.to_string().into(), samples.into()];
         table.push(head.into_iter().chain(numbers.map(Cell::from)))?;
-        show(&truth, sampling, args, report)?;
+        show(&reference, sampling, args, report)?;
     }
     report.tables.push(table);
     Ok(())
 }
 
-fn taken(experiment: &Experiment, sampling: SamplingMethod) -> anyhow::Result<Truth> {
+fn taken(experiment: &Experiment, sampling: SamplingMethod) -> anyhow::Result<ReferenceViews> {
     let Setup { scene, around, offer, .. } = &experiment.setup;
     let (around, samples) = (around.clone(), sampling.cameras(around.clone()));
     let setup = Setup { scene: scene.clone(), around, samples, offer: offer.clone() };
     let args = SceneArgs { sampling, ..experiment.args.clone() };
-    Truth::take(&experiment.engine, &setup, &args, experiment.views(COMPARED_VIEWS)?)
+    ReferenceViews::draw(&experiment.engine, &setup, &args, experiment.views(COMPARED_VIEWS)?)
 }
 
-fn show(truth: &Truth, sampling: SamplingMethod, args: &SceneArgs, report: &mut Report) -> anyhow::Result<()> {
-    let views = truth.reconstruct(args.method, ALL_PLANES)?;
-    for (index, (direct, view)) in truth.views.iter().zip(&views).take(SIDE_BY_SIDE).enumerate() {
+fn show(
+    reference: &ReferenceViews,
+    sampling: SamplingMethod,
+    args: &SceneArgs,
+    report: &mut Report,
+) -> anyhow::Result<()> {
+    let views = reference.reconstruct(args.method, ALL_PLANES)?;
+    for (index, (direct, view)) in reference.views.iter().zip(&views).take(SIDE_BY_SIDE).enumerate() {
         let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(view)?)?;
         let images = pictures::rgb(direct).zip(pictures::rgb(view)).context("a view is not of its size")?;
         let (title, provenance) = (

@@ -1,10 +1,10 @@
-//! The paper's figures 5 and 6.
+//! Figures 5 and 6 of the paper.
 
 use study::{Axis, BarChart, Series, XyChart};
 
 use super::timing::{Run, Times};
 
-/// Total time against V: direct rendering is timed on few views and extended.
+/// Total time against V; direct rendering is timed on few views and extended.
 pub fn total_time(times: &Times) -> XyChart {
     let timed = times.direct.iter().map(|run| (run.views as f64, run.seconds));
     let most = times.direct.last().map_or(0, |run| run.views);
@@ -22,10 +22,10 @@ pub fn total_time(times: &Times) -> XyChart {
     chart
 }
 
-/// Stages, left to right.
+/// The stages, left to right.
 const STAGES: [&str; 6] = ["sampling", "transfer", "decode and upload", "compositing", "encode", "delivery"];
 
-/// Time per stage at the headline's V.
+/// The time of each stage at the headline's V.
 pub fn stages(times: &Times) -> BarChart {
     let runs = times
         .pipelines

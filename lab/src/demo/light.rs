@@ -1,15 +1,16 @@
-//! The scene in its finest light, and what light of every quality costs.
+//! The scene in its finest light, and the cost of every lighting.
 
 use app_core::setup::SceneArgs;
 use client::Frame;
 use study::{Check, Report};
 
-use super::{COMPARED_VIEWS, DemoArgs, pictures};
-use crate::evaluate::{ALL_PLANES, Truth};
+use super::args::{COMPARED_VIEWS, DemoArgs};
+use super::pictures;
 use crate::experiment::Experiment;
 use crate::lighting_study::{self, Extent};
+use crate::reference_views::{ALL_PLANES, ReferenceViews};
 
-/// Tables and charts, all views in the finest light that was measured, and six of them beside the truth.
+/// Adds tables and charts, all views in the finest light, and six of them beside reference views.
 pub fn show(args: &DemoArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<Vec<Check>> {
     let mut frames: Vec<Frame> = Vec::new();
     let rows = lighting_study::measure(experiment, Extent::demo(args.quick), |delivered| frames = delivered.frames)?;
@@ -17,10 +18,11 @@ pub fn show(args: &DemoArgs, experiment: &Experiment, report: &mut Report) -> an
     lighting_study::report(&rows, lamps, report)?;
     if let Some(finest) = rows.last() {
         let lit = SceneArgs { lighting: finest.lighting, ..experiment.args.clone() };
-        let truth = Truth::take(&experiment.engine, &experiment.setup, &lit, experiment.views(COMPARED_VIEWS)?)?;
-        let views = truth.reconstruct(args.scene.method, ALL_PLANES)?;
+        let reference =
+            ReferenceViews::draw(&experiment.engine, &experiment.setup, &lit, experiment.views(COMPARED_VIEWS)?)?;
+        let views = reference.reconstruct(args.scene.method, ALL_PLANES)?;
         pictures::contact_sheet(&frames, &finest.lighting, report);
-        pictures::comparisons(&truth, &views, report)?;
+        pictures::comparisons(&reference, &views, report)?;
     }
     Ok(lighting_study::checks(&rows))
 }

@@ -1,4 +1,4 @@
-//! What the views look like.
+//! Pictures of the views.
 
 use anyhow::Context as _;
 use app_core::{pictures, provenance};
@@ -9,13 +9,13 @@ use metrics::{Rgb8Image, flip_map};
 use render::Lighting;
 use study::{Picture, PictureRow, Report, comparison_row};
 
-use crate::evaluate::Truth;
+use crate::reference_views::ReferenceViews;
 
-/// Views that are shown side by side with the truth.
+/// The number of views beside their reference.
 const SIDE_BY_SIDE: usize = 6;
 const SHEET_COLUMNS: u32 = 20;
 
-/// All views that were delivered, at half their size.
+/// Adds all delivered views, at half their size.
 pub fn contact_sheet(frames: &[Frame], lighting: &Lighting, report: &mut Report) {
     let small = |view: &View| {
         pictures::rgb(view)
@@ -31,9 +31,9 @@ pub fn contact_sheet(frames: &[Frame], lighting: &Lighting, report: &mut Report)
     report.pictures.insert(0, PictureRow { title: "All views".to_owned(), pictures: vec![picture] });
 }
 
-/// direct | reconstructed | error map | provenance.
-pub fn comparisons(truth: &Truth, views: &[View], report: &mut Report) -> anyhow::Result<()> {
-    for (index, (direct, view)) in truth.views.iter().zip(views).take(SIDE_BY_SIDE).enumerate() {
+/// Adds rows of direct, reconstructed, error map and provenance.
+pub fn comparisons(reference: &ReferenceViews, views: &[View], report: &mut Report) -> anyhow::Result<()> {
+    for (index, (direct, view)) in reference.views.iter().zip(views).take(SIDE_BY_SIDE).enumerate() {
         let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(view)?)?;
         let images = pictures::rgb(direct).zip(pictures::rgb(view)).context("a view is not of its size")?;
         let provenance = provenance::false_color(view).map(|picture| (picture.image, picture.legend));

@@ -1,4 +1,4 @@
-//! Views delivered against the number of views, by each method.
+//! Delivery times against the number of views, by method.
 
 use app_core::delivery::Delivered;
 use cluster::{Costs, PolicyChoice, SessionPlan};
@@ -7,54 +7,50 @@ use node::Engine as _;
 use reconstruction::ReconstructionMethod;
 use study::{Report, Table};
 
-use crate::experiment::{Experiment, PAPER_VIEWS, Wish};
+use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
 use crate::progress::bar;
 
-/// The paper's 100 steps.
+/// The paper's method, with its 100 steps.
 const SEARCH: ReconstructionMethod = ReconstructionMethod::LightFieldSearch { steps: 100 };
-/// What direct rendering is timed on; beyond, it is extended linearly.
+/// Numbers of views that direct rendering is timed on; more are extended linearly.
 const DIRECT_VIEWS: [usize; 3] = [1, 10, 32];
 
-/// One delivery of so many views.
+/// One delivery.
 pub struct Run {
-    /// V.
     pub views: usize,
-    /// Until the last was decoded.
+    /// Seconds until the last view was decoded.
     pub seconds: f64,
-    /// The longest that a frame waited for its sample set.
+    /// The longest wait of a frame for its sample set.
     pub set_wait_s: f64,
-    /// The coordinator's.
     pub plan: SessionPlan,
 }
 
 /// All deliveries.
 pub struct Times {
-    /// V of the headline and of the stages.
+    /// The number of views of the headline and of the stages.
     pub headline_views: usize,
-    /// S.
     pub images: usize,
-    /// P.
     pub nodes: usize,
-    /// Whether times are a processor's.
+    /// True where the device is a processor.
     pub is_software: bool,
-    /// Name and runs of each method that reconstructs; the default one first.
+    /// Names and runs of the methods that reconstruct; the default one first.
     pub pipelines: Vec<(String, Vec<Run>)>,
-    /// Few views, drawn from the scene.
+    /// Runs of few views, drawn from the scene.
     pub direct: Vec<Run>,
 }
 
-/// V along the chart's axis.
+/// The numbers of views along the chart's axis.
 fn view_counts(quick: bool) -> Vec<usize> {
     if quick { vec![1, 10, 64] } else { vec![1, 10, 32, 100, PAPER_VIEWS, 1000] }
 }
 
-/// The method asked for, and the paper's; where that was asked for, the default.
+/// The method asked for, and the paper's method or else the default.
 fn compared(method: ReconstructionMethod) -> [ReconstructionMethod; 2] {
     let other = if method == SEARCH { ReconstructionMethod::default() } else { SEARCH };
     [method, other]
 }
 
-/// Delivers all of them.
+/// Makes all deliveries.
 pub fn measure(experiment: &Experiment, quick: bool) -> anyhow::Result<Times> {
     let counts = view_counts(quick);
     let mut times = Times {
@@ -89,7 +85,8 @@ fn deliver(
 ) -> anyhow::Result<Delivered> {
     let name = if policy == PolicyChoice::Direct { "direct".to_owned() } else { method.to_string() };
     let progress = bar(format!("{count} views by {name}"), count);
-    let delivered = experiment.deliver(Wish { method, ..experiment.wish(policy, count) }, |_| progress.inc(1));
+    let delivered =
+        experiment.deliver(DeliverySettings { method, ..experiment.delivery(policy, count) }, |_| progress.inc(1));
     progress.finish_and_clear();
     delivered
 }
@@ -100,12 +97,12 @@ fn run_of(views: usize, delivered: &Delivered) -> Run {
 }
 
 impl Times {
-    /// Of direct rendering: seconds a view when many are asked for.
+    /// Seconds a view of direct rendering, when many are asked for.
     pub fn direct_view_s(&self) -> f64 {
         self.direct.last().map_or(f64::NAN, |run| run.seconds / run.views as f64)
     }
 
-    /// The default method's run that the headline is about.
+    /// The run of the headline.
     pub fn headline(&self) -> Option<&Run> {
         let runs = self.pipelines.first().map(|(_, runs)| runs)?;
         runs.iter().find(|run| run.views == self.headline_views)
@@ -117,7 +114,7 @@ impl Times {
         self.direct_view_s() * self.headline_views as f64 / seconds
     }
 
-    /// How far the coordinator's K is from the formula's, whole images considered.
+    /// The difference of the coordinator's K from the formula's, with whole images.
     pub fn headline_k_off_formula(&self) -> f64 {
         let Some(run) = self.headline() else { return f64::NAN };
         let formula = self.formula(run).clamp(1, self.images.max(1));
@@ -130,7 +127,7 @@ impl Times {
     }
 }
 
-/// Total times, costs and K.
+/// Adds total times, costs and K.
 pub fn tables(times: &Times, report: &mut Report) -> anyhow::Result<()> {
     report.tables.push(totals(times)?);
     report.tables.push(costs(times)?);
@@ -193,9 +190,9 @@ fn samplers(times: &Times) -> anyhow::Result<Table> {
         ("formula, floor", ""),
         ("as printed, ceil", ""),
         ("brute force", ""),
-        ("pipeline foretold", "s"),
-        ("direct foretold", "s"),
-        ("left alone it would be", ""),
+        ("pipeline predicted", "s"),
+        ("direct predicted", "s"),
+        ("policy by prediction", ""),
     ];
     let mut table = Table::new(format!("K of P = {} nodes", times.nodes), &columns);
     for run in times.pipelines.first().map(|(_, runs)| runs.as_slice()).unwrap_or_default() {
@@ -204,13 +201,13 @@ fn samplers(times: &Times) -> anyhow::Result<Table> {
         let by = |rule: fn(usize, f64, usize, f64, usize) -> usize| rule(times.images, g, run.views, c, times.nodes);
         let would = if plan.predicted_direct_s < plan.predicted_pipeline_s { "direct" } else { "pipeline" };
         let ks = [run.views, plan.sampler_count(), by(k_fd), by(k_fd_printed), by(brute_force_k)];
-        let foretold = [plan.predicted_pipeline_s, plan.predicted_direct_s];
-        table.push(ks.map(Into::into).into_iter().chain(foretold.map(Into::into)).chain([would.into()]))?;
+        let predicted = [plan.predicted_pipeline_s, plan.predicted_direct_s];
+        table.push(ks.map(Into::into).into_iter().chain(predicted.map(Into::into)).chain([would.into()]))?;
     }
     Ok(table)
 }
 
-/// The headline in words.
+/// A sentence with the headline.
 pub fn summary(times: &Times) -> String {
     let Some(run) = times.headline() else { return String::new() };
     let (views, seconds, ratio) = (run.views, run.seconds, times.headline_ratio());

@@ -1,12 +1,12 @@
-//! A cluster under load: real processes, many clients that move, and what each of them gets.
+//! A cluster under load: real processes, and many clients with moving cameras.
 //!
-//! [`processes`] starts a coordinator and nodes, and reads their memory; [`crowd`] is the clients, all in this process;
-//! [`phases`] are the loads; [`report`] says what came of them.
+//! [`processes`] starts a coordinator and nodes and reads their memory; [`clients`] are all in this process; [`phases`]
+//! are the loads; [`report`] shows the results.
 
+mod clients;
 pub mod command;
-pub mod crowd;
-pub mod phases;
-pub mod processes;
-pub mod report;
-
-pub use phases::{Load, Phases, run};
+mod memory;
+mod phases;
+mod processes;
+mod report;
+mod statistics;

@@ -1,7 +1,11 @@
 use std::time::Duration;
 
+use app_core::live::{Record, Shown};
+
 use super::*;
-use crate::load::crowd::Crowd;
+use crate::load::clients::{Clients, Outcome};
+use crate::load::memory::slope_mib_per_s;
+use crate::load::phases::Idle;
 
 fn shown(frame: u64, posed_s: f64, fallback: u32) -> Shown {
     Shown {
@@ -18,15 +22,15 @@ fn shown(frame: u64, posed_s: f64, fallback: u32) -> Shown {
 
 /// One frame in four is missing, the last is degraded; another client is refused.
 fn load() -> Load {
-    let crowd = Crowd { clients: 2, rate_hz: 10.0, size_px: glam::UVec2::new(8, 8), lasting: Duration::from_secs(4) };
+    let clients = Clients { count: 2, rate_hz: 10.0, size_px: glam::UVec2::new(8, 8), lasting: Duration::from_secs(4) };
     let kept = (1..=40u64).filter(|frame| frame % 4 != 0);
     let shown = kept.map(|frame| shown(frame, frame as f64 * 0.1 - 0.05, u32::from(frame == 39))).collect();
     let record = Record { shown, posed: 40, error: None, seconds: 4.0 };
     let looks = (0..40).map(|second| (f64::from(second), 100.0 + f64::from(second))).collect();
     Load {
         name: "2 × 10".to_owned(),
-        crowd,
-        outcomes: vec![Outcome::Served(record), Outcome::Refused("quota".to_owned())],
+        clients,
+        outcomes: vec![Outcome::Served(record), Outcome::Refused],
         dropped: [("newer pose".to_owned(), 10)].into(),
         memory: vec![("node-000".to_owned(), looks)],
     }

@@ -1,10 +1,10 @@
-//! By pixel: of each output frame, the samples that a set holds.
+//! Availability by pixel: the share of an output frame's samples that a set holds.
 
 use depth_image::DepthImage;
 use metrics::{Held, held_samples};
 use rayon::prelude::*;
 
-/// Over many frames.
+/// Availability over many frames.
 #[derive(Debug, Clone, Copy)]
 pub struct Availability {
     sum: f64,
@@ -32,12 +32,12 @@ impl Availability {
         self.frames += 1;
     }
 
-    /// Per cent, over frames.
+    /// The mean over frames, per cent.
     pub fn mean(&self) -> f64 {
         100.0 * self.sum / self.frames.max(1) as f64
     }
 
-    /// Per cent, of the worst frame.
+    /// The least of any frame, per cent.
     pub fn least(&self) -> f64 {
         100.0 * self.least
     }

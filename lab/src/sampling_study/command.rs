@@ -9,14 +9,18 @@ use engine::GpuEngine;
 use node::Engine as _;
 use study::Report;
 
-use crate::sampling_study::{
-    Extent, SCENES, Subject, detection, detection_report, reconstructions, reconstructions_report, scene_report, sizes,
-    sizes_report, tables, times, times_report,
-};
+use super::detection::{detection, detection_report};
+use super::extent::Extent;
+use super::reconstructions::{reconstructions, reconstructions_report};
+use super::scene::scene_report;
+use super::sizes::{sizes, sizes_report};
+use super::subject::{SCENES, Subject};
+use super::tables::tables;
+use super::times::{times, times_report};
 
-/// Conventional, non-redundant and peeled images of a bird's nest, grass, a city and a tree, from three viewpoints:
-/// how many samples are redundant, disoccluded and useful, how many of an output frame's samples are there, what views
-/// reconstructed from them are worth, and what it all costs.
+/// Samples a bird's nest, grass, a city and a tree from three viewpoints by every method. Reports redundant,
+/// disoccluded and useful samples, their availability in output frames, the quality of reconstructed views, and all
+/// costs.
 #[derive(Debug, Args)]
 pub struct SamplingArgs {
     #[command(flatten)]
@@ -24,13 +28,13 @@ pub struct SamplingArgs {
     /// Where the report goes
     #[arg(long, default_value = "out/study/sampling", value_name = "DIR")]
     out: PathBuf,
-    /// Smaller images, fewer views
+    /// Runs a smaller form: smaller images, fewer views
     #[arg(long)]
     quick: bool,
-    /// Only these of bird-nest, grass, urban and tree
+    /// Only these scenes: bird-nest, grass, urban, tree
     #[arg(long = "scene", value_name = "NAME", value_parser = SCENES)]
     scenes: Vec<String>,
-    /// Exit status 1 when a relation does not hold
+    /// Exit status 1 when a check falls short
     #[arg(long)]
     strict: bool,
 }
@@ -51,7 +55,7 @@ pub fn run(args: &SamplingArgs) -> anyhow::Result<Outcome> {
     for name in SCENES.iter().filter(|name| args.scenes.is_empty() || args.scenes.iter().any(|wanted| wanted == *name))
     {
         let subject = Subject::load(&engine, name)?;
-        // Times first: they want the machine as it is found.
+        // Times come first: they need the machine as it is.
         costs.push((subject.name.clone(), times(&subject, extent)?));
         rows.push(scene_report(&subject, extent, &mut report)?);
         let of_sizes = sizes(&subject, extent, args.quick)?;
@@ -65,5 +69,5 @@ pub fn run(args: &SamplingArgs) -> anyhow::Result<Outcome> {
     report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
     println!();
     let ok = report.finish(&args.out)?;
-    Ok(if args.strict && !ok { Outcome::FellShort } else { Outcome::Done })
+    Ok(Outcome::of(ok || !args.strict))
 }

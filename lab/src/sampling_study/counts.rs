@@ -1,23 +1,27 @@
-//! By pixel: redundant, disoccluded and useful samples.
+//! Counts by pixel: redundant, disoccluded and useful samples.
 
 use depth_image::DepthImage;
 use metrics::{Held, HeldSample, held_samples};
 use rayon::prelude::*;
 use sampling::SamplingMethod;
 
-use super::METHODS;
+use super::methods::METHODS;
 
-/// Of one image of one method; counted before anything is dilated or steadied.
+/// Samples of one image of one method, before dilation and hysteresis.
 #[derive(Debug, Clone, Default)]
 pub struct ImageCount {
-    /// All of them.
     pub samples: usize,
-    /// Those that an image before it holds.
+    /// The number of samples that an earlier image holds.
     pub redundant: usize,
-    /// Those that no conventional image holds: of the same camera, or, peeled from the middle, of any.
+    /// Samples that no conventional image holds: of the same camera or, for peeled layers, of any.
     pub disoccluded: Vec<HeldSample>,
-    /// Of those, whether some view between the viewpoints needs it.
+    /// True for each disoccluded sample that some view between the viewpoints needs.
     pub useful: Vec<bool>,
+}
+
+/// A share in per cent.
+pub(super) fn percent(part: usize, whole: usize) -> f64 {
+    100.0 * part as f64 / whole as f64
 }
 
 impl ImageCount {
@@ -26,7 +30,7 @@ impl ImageCount {
     }
 }
 
-/// The sets of all methods, in their order: conventional first.
+/// Counts of the sets of all methods, conventional sampling first.
 pub fn image_counts(sets: &[Vec<DepthImage>]) -> Vec<Vec<ImageCount>> {
     let conventional: Vec<Held<'_>> = sets[0].iter().filter_map(Held::of).collect();
     METHODS.iter().zip(sets).map(|(&method, set)| counts_of(method, set, &conventional)).collect()
@@ -53,7 +57,7 @@ fn counts_of(method: SamplingMethod, set: &[DepthImage], conventional: &[Held<'_
     set.iter().enumerate().map(count).collect()
 }
 
-/// Marks what a frame needs: samples of a surface that it shows at the same pixel.
+/// Marks samples that a frame needs: it shows their surface at the same pixel.
 pub fn mark_useful(counts: &mut [Vec<ImageCount>], frame: &Held<'_>) {
     for count in counts.iter_mut().flatten() {
         let samples = count.disoccluded.par_iter().zip(count.useful.par_iter_mut());

@@ -1,5 +1,4 @@
-//! How surely a redundant sample is found to be one, against the size of triangles: a finely cut wall, all of which
-//! both images see.
+//! Detection of redundant samples against the size of triangles: a finely tessellated wall that both images see whole.
 
 use std::sync::Arc;
 
@@ -15,20 +14,17 @@ use crate::progress::bar;
 
 const SIDE_PX: u32 = 64;
 const DISTANCE_M: f32 = 4.0;
-/// Between the two viewpoints.
+/// The distance of the two viewpoints.
 const BASELINE_M: f32 = 0.37;
 const LEGS_PX: [f32; 9] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 64.0];
 const TESTS: [Redundancy; 3] = [Redundancy::Pixel, Redundancy::Visibility, Redundancy::Tolerance];
-/// Of triangle ids, measured by a prototype (legs in pixels, probability).
+/// Detection by triangle ids, measured by a prototype (legs in pixels, probability).
 const EXPECTED: [(f32, f64); 5] = [(0.5, 0.13), (1.0, 0.375), (2.0, 0.63), (4.0, 0.81), (16.0, 0.95)];
 
-/// For each length of legs, the share that each test finds.
+/// The share that each test finds, for each length of legs.
 pub type Detection = Vec<(f32, [f64; 3])>;
 
 /// Measures all lengths.
-///
-/// # Errors
-/// The device's.
 pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detection> {
     let sampler = Sampler::sharing(engine.shared_renderer());
     let legs = if quick { &LEGS_PX[2..] } else { &LEGS_PX[..] };
@@ -55,7 +51,7 @@ pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detecti
                 wanted: &[0, 1],
                 method,
                 planes,
-                settled_at_s: None,
+                temporal_reference_s: None,
             })?;
             *found = left_out(&images[1]);
         }
@@ -74,7 +70,7 @@ fn cameras() -> [Camera; 2] {
     [camera(0.0), camera(BASELINE_M)].map(Camera::Pinhole)
 }
 
-/// The middle third, which the first image sees whole.
+/// The share of dropped samples in the middle third, which the first image sees whole.
 fn left_out(image: &DepthImage) -> f64 {
     let third = SIDE_PX / 3;
     let places = (third..2 * third).flat_map(|y| (third..2 * third).map(move |x| (y * SIDE_PX + x) as usize));
@@ -84,7 +80,7 @@ fn left_out(image: &DepthImage) -> f64 {
     f64::from(dropped as u32) / f64::from(count)
 }
 
-/// A little turned, so that its rows are not the images'.
+/// A wall that is turned a little, so that its rows are not those of the images.
 fn wall(leg_px: f32) -> Scene {
     let pixel_m = DISTANCE_M * (0.3f32).tan() * 2.0 / SIDE_PX as f32;
     let leg_m = leg_px * pixel_m;
@@ -109,10 +105,7 @@ fn wall(leg_px: f32) -> Scene {
     scene
 }
 
-/// Table, chart and checks.
-///
-/// # Errors
-/// A row that does not fit, which is a fault here.
+/// Adds a table, a chart and checks.
 pub fn detection_report(rows: &Detection, report: &mut Report) -> anyhow::Result<()> {
     let columns = [("leg", "px"), ("pixel", ""), ("visibility", ""), ("tolerance", ""), ("pixel, expected", "")];
     let mut table = Table::new("Redundant samples that are found", &columns);
@@ -139,6 +132,6 @@ pub fn detection_report(rows: &Detection, report: &mut Report) -> anyhow::Result
         "",
         Bar::AtLeast(1.0),
     ));
-    report.checks.push(Check::new("tolerance finds, whatever the size", least, "", Bar::AtLeast(0.95)));
+    report.checks.push(Check::new("tolerance finds at every size", least, "", Bar::AtLeast(0.95)));
     Ok(())
 }

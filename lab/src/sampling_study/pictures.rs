@@ -1,20 +1,20 @@
-//! Fig. 6: what is redundant, disoccluded and useful, in colours.
+//! Fig. 6: redundant, disoccluded and useful samples in colours.
 
 use depth_image::DepthImage;
 use image::{Rgb, RgbImage};
 use study::{Picture, PictureRow};
 
-use super::METHODS;
 use super::counts::ImageCount;
+use super::methods::METHODS;
 
 const NOTHING: [u8; 3] = [0, 0, 0];
 const KNOWN: [u8; 3] = [96, 96, 104];
 const DISOCCLUDED: [u8; 3] = [70, 160, 80];
 const USEFUL: [u8; 3] = [240, 210, 60];
-/// Larger ones are drawn at every so many pixels.
+/// The largest side of a picture; larger images are subsampled.
 const SIDE_PX: u32 = 512;
 
-/// One picture an image of every method but the conventional.
+/// A picture of each image of every method but the conventional one.
 pub fn false_colors(scene: &str, sets: &[Vec<DepthImage>], counts: &[Vec<ImageCount>]) -> PictureRow {
     let pictures = METHODS.iter().zip(sets).zip(counts).skip(1).flat_map(|((method, set), counts)| {
         set.iter().zip(counts).enumerate().map(move |(number, (image, count))| {

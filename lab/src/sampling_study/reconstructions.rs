@@ -1,4 +1,4 @@
-//! What views become of each sampling by each reconstruction: from as many images, and from as many samples.
+//! Views from each sampling by each reconstruction: from as many images, and from as many samples.
 
 use app_core::setup::{SceneArgs, Setup};
 use glam::UVec2;
@@ -6,29 +6,30 @@ use reconstruction::ReconstructionMethod;
 use sampling::SamplingMethod;
 use study::{Axis, Bar, Cell, Check, Point, Report, Series, Table, XyChart};
 
-use super::{METHODS, Subject};
-use crate::evaluate::{Row, Truth};
+use super::methods::METHODS;
+use super::subject::Subject;
+use crate::evaluation::Evaluation;
 use crate::progress::bar;
+use crate::reference_views::ReferenceViews;
 
 const SAMPLE_PX: UVec2 = UVec2::new(400, 300);
 const VIEW_PX: UVec2 = UVec2::new(200, 150);
 const VIEWS: usize = 8;
-const RECONSTRUCTIONS: [&str; 5] = ["joint_carve", "light_field_search:128", "mesh", "hybrid_mesh", "hybrid_mesh:0.5"];
+/// Settings that are compared in place of a method's default.
+const SETTINGS: [(&str, &[&str]); 2] =
+    [("light_field_search", &["light_field_search:128"]), ("hybrid_mesh", &["hybrid_mesh", "hybrid_mesh:0.5"])];
 
-/// A sampling and what each reconstruction made of it.
+/// A sampling, and its views by each reconstruction.
 pub struct Reconstructed {
     sampling: SamplingMethod,
     size_px: UVec2,
     samples: usize,
-    /// Of the views' pixels that show a surface, the share whose surface is in no image.
+    /// The share of the views' pixels with a surface whose surface no image holds.
     unheld: f64,
-    rows: Vec<Row>,
+    rows: Vec<Evaluation>,
 }
 
-/// Measures all pairs on a scene, then once more with about as few samples as the least of them.
-///
-/// # Errors
-/// The device's.
+/// Measures all pairs on a scene, then again with about as few samples as the sampling with the fewest.
 pub fn reconstructions(subject: &Subject, quick: bool) -> anyhow::Result<Vec<Reconstructed>> {
     let progress = bar(format!("{}: views", subject.name), 2 * METHODS.len() - 1);
     let mut all = Vec::with_capacity(2 * METHODS.len() - 1);
@@ -62,16 +63,23 @@ fn of_method(
         offer: subject.setup.offer.clone(),
     };
     let views = subject.between(if quick { 2 } else { VIEWS }, VIEW_PX);
-    // Planes for all reconstructions.
+    // The planes of the hybrid mesh are enough for all reconstructions.
     let args =
         SceneArgs { sampling, method: ReconstructionMethod::HybridMesh { merged: None }, ..subject.args.clone() };
-    let truth = Truth::take(&subject.engine, &setup, &args, views)?;
-    let samples = truth.images.iter().flat_map(|image| &image.inverse_depth_per_m).filter(|&&d| d > 0.0).count();
-    let rows = RECONSTRUCTIONS
-        .iter()
-        .map(|name| truth.evaluate_timed_on(name.parse()?, VIEWS, 1))
+    let reference = ReferenceViews::draw(&subject.engine, &setup, &args, views)?;
+    let samples = reference.images.iter().flat_map(|image| &image.inverse_depth_per_m).filter(|&&d| d > 0.0).count();
+    let rows = reconstruction_names()
+        .map(|name| reference.evaluate_timed_on(name.parse()?, VIEWS, 1))
         .collect::<anyhow::Result<_>>()?;
-    Ok(Reconstructed { sampling, size_px, samples, unheld: truth.unheld()?, rows })
+    Ok(Reconstructed { sampling, size_px, samples, unheld: reference.unheld()?, rows })
+}
+
+/// All methods, with the settings that are compared.
+fn reconstruction_names() -> impl Iterator<Item = &'static str> {
+    reconstruction::METHODS.iter().flat_map(|row| {
+        let settings = SETTINGS.iter().find(|(name, _)| *name == row.name);
+        settings.map_or_else(|| vec![row.name], |(_, settings)| settings.to_vec())
+    })
 }
 
 impl Reconstructed {
@@ -91,10 +99,7 @@ impl Reconstructed {
     }
 }
 
-/// Table, chart and checks over all scenes.
-///
-/// # Errors
-/// A row that does not fit, which is a fault here.
+/// Adds a table, charts and checks over all scenes.
 pub fn reconstructions_report(scenes: &[(String, Vec<Reconstructed>)], report: &mut Report) -> anyhow::Result<()> {
     let columns = [
         ("scene", ""),
@@ -128,11 +133,11 @@ pub fn reconstructions_report(scenes: &[(String, Vec<Reconstructed>)], report: &
 
 fn chart(scene: &str, all: &[Reconstructed]) -> XyChart {
     let axes = (Axis::log("samples", ""), Axis::linear("FLIP", ""));
-    RECONSTRUCTIONS.iter().enumerate().fold(
+    reconstruction_names().enumerate().fold(
         XyChart::new(format!("FLIP against samples, {scene}"), axes.0, axes.1),
         |chart, (place, reconstruction)| {
             let points = all.iter().map(|r| Point::labelled(r.samples as f64, r.rows[place].flip, r.name()));
-            chart.with(Series::points(*reconstruction, points))
+            chart.with(Series::points(reconstruction, points))
         },
     )
 }

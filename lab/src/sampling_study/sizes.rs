@@ -1,25 +1,26 @@
-//! Fig. 7: redundancy by pixel comes to redundancy by visibility as images grow.
+//! Fig. 7: redundancy by pixel approaches redundancy by visibility as images grow.
 
 use glam::UVec2;
 use metrics::Held;
 use sampling::{Redundancy, SamplingMethod};
 use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
-use super::counts::{ImageCount, image_counts, mark_useful};
-use super::subject::WITH_IDS;
+use super::counts::{ImageCount, image_counts, mark_useful, percent};
+use super::extent::Extent;
+use super::methods::{IMAGES, METHODS};
+use super::subject::{Subject, WITH_IDS};
 use super::visibility::seen;
-use super::{Extent, METHODS, Subject};
 use crate::progress::bar;
 
 const SIDES_PX: [u32; 4] = [256, 512, 1024, 2048];
-/// As in the paper.
+/// The scenes of the paper's figure.
 const SCENES: [&str; 2] = ["bird-nest", "urban"];
 
-/// Views between the viewpoints, of the images' size, that say what is useful.
+/// The number of views that decide which samples are useful.
 const VIEWS: usize = 24;
 
-/// Of one size, means over images 1 and 2, in per cent, by pixel and by visibility: redundant of conventional images,
-/// disoccluded of non-redundant ones, and useful of these.
+/// Means over images 1 and 2 of one size, in per cent, by pixel and by visibility. Redundant samples are those of
+/// conventional images, disoccluded and useful ones those of non-redundant images.
 pub struct SizeRow {
     side_px: u32,
     redundant: [f64; 2],
@@ -27,19 +28,16 @@ pub struct SizeRow {
     useful: [f64; 2],
 }
 
-/// Its name, and its values by pixel and by visibility.
+/// The name of a metric, and its values by pixel and by visibility.
 type Metric = (&'static str, fn(&SizeRow) -> [f64; 2]);
 
 /// Measures a scene if the paper shows it.
-///
-/// # Errors
-/// The device's.
 pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<Vec<SizeRow>> {
     if !SCENES.contains(&subject.name.as_str()) {
         return Ok(Vec::new());
     }
     let sides = if quick { &SIDES_PX[..2] } else { &SIDES_PX[..] };
-    let rays = subject.scene.scalar_rays(0.0)?;
+    let rays = render::scalar::rays::Scene::of(&subject.scene, 0.0)?;
     let progress = bar(format!("{}: sizes of images", subject.name), sides.len());
     let mut rows = Vec::with_capacity(sides.len());
     for &side_px in sides {
@@ -56,20 +54,19 @@ pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<V
             frames.iter().filter_map(Held::of).for_each(|frame| mark_useful(&mut counts, &frame));
             Ok(())
         })?;
-        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / (super::IMAGES - 1) as f64;
-        let share = |part: usize, whole: usize| 100.0 * part as f64 / whole as f64;
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / (IMAGES - 1) as f64;
         rows.push(SizeRow {
             side_px,
             redundant: [
-                mean(&mut counts[0][1..].iter().map(|c| share(c.redundant, c.samples))),
+                mean(&mut counts[0][1..].iter().map(|c| percent(c.redundant, c.samples))),
                 mean(&mut redundant[1..].iter().map(|seen| 100.0 * seen.redundant.share)),
             ],
             disoccluded: [
-                mean(&mut counts[1][1..].iter().map(|c| share(c.disoccluded.len(), c.samples))),
+                mean(&mut counts[1][1..].iter().map(|c| percent(c.disoccluded.len(), c.samples))),
                 mean(&mut disoccluded[1..].iter().map(|seen| 100.0 * seen.disoccluded.share)),
             ],
             useful: [
-                mean(&mut counts[1][1..].iter().map(|c: &ImageCount| share(c.useful_count(), c.disoccluded.len()))),
+                mean(&mut counts[1][1..].iter().map(|c: &ImageCount| percent(c.useful_count(), c.disoccluded.len()))),
                 mean(&mut disoccluded[1..].iter().map(|seen| 100.0 * seen.useful.share)),
             ],
         });
@@ -79,10 +76,7 @@ pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<V
     Ok(rows)
 }
 
-/// Table, charts and checks of one scene.
-///
-/// # Errors
-/// A row that does not fit, which is a fault here.
+/// Adds a table, charts and checks of one scene.
 pub fn sizes_report(scene: &str, rows: &[SizeRow], report: &mut Report) -> anyhow::Result<()> {
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
     let columns = [

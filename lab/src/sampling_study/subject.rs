@@ -10,26 +10,26 @@ use glam::{UVec2, Vec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use sampling::{Rig, SampleWork, Sampler, SamplingMethod};
 
-use super::IMAGES;
+use super::methods::IMAGES;
 
 /// The paper's scenes, as this project makes them.
 pub const SCENES: [&str; 4] = ["bird-nest", "grass", "urban", "tree"];
 /// Half the angle between neighbouring viewpoints, seen from the scene's middle.
 const SPREAD_RAD: f32 = 0.12;
-/// Of the distance from which all of the scene is in view: closer, so that it fills the picture.
+/// The distance of the viewpoints, over that from which all of the scene is in view.
 const CLOSER: f32 = 0.6;
-/// Towards the viewpoints: from the side and above.
+/// The direction towards the viewpoints: from the side and above.
 const BACKWARDS: Vec3 = Vec3::new(0.35, 0.65, 1.0);
-/// Views in a triangle are drawn so many at a time.
+/// The number of frames that are drawn at once.
 const FRAMES_AT_ONCE: usize = 4;
 
 /// A scene on the device.
 pub struct Subject {
-    /// Its name.
+    /// The name of the scene.
     pub name: String,
-    /// For reconstructing, with the study's cameras.
+    /// The scene on offer.
     pub setup: Setup,
-    /// Everything by default.
+    /// Arguments of the scene, all by default.
     pub args: SceneArgs,
     rig: Rig,
     pub(super) engine: Arc<GpuEngine>,
@@ -58,7 +58,7 @@ impl Subject {
     /// Loads a scene by its name.
     ///
     /// # Errors
-    /// A scene that cannot be used, or the device's.
+    /// The scene cannot be used, or the device fails.
     pub fn load(engine: &Arc<GpuEngine>, name: &str) -> anyhow::Result<Self> {
         let args = SceneArgs::of(name.parse().with_context(|| name.to_owned())?);
         let setup = args.load()?;
@@ -98,10 +98,10 @@ impl Subject {
         }
     }
 
-    /// A method's images, with surface ids where they are asked for.
+    /// Images of a method with the planes that are asked for.
     ///
     /// # Errors
-    /// The device's.
+    /// The device fails.
     pub fn sample(
         &self,
         method: SamplingMethod,
@@ -110,15 +110,21 @@ impl Subject {
     ) -> anyhow::Result<Vec<DepthImage>> {
         let cameras: Vec<Camera> = self.cameras(method, size_px).into_iter().map(Camera::Pinhole).collect();
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-        let work =
-            SampleWork { draw: self.work(), cameras: &cameras, wanted: &wanted, method, planes, settled_at_s: None };
+        let work = SampleWork {
+            draw: self.work(),
+            cameras: &cameras,
+            wanted: &wanted,
+            method,
+            planes,
+            temporal_reference_s: None,
+        };
         Ok(self.sampler.sample(&work)?)
     }
 
     /// Draws views with surface ids, a few at a time.
     ///
     /// # Errors
-    /// The device's, or `each`'s.
+    /// The device or `each` fails.
     pub fn each_frame(
         &self,
         cameras: &[PinholeCamera],
@@ -133,6 +139,6 @@ impl Subject {
     }
 }
 
-/// The plane that all metrics by pixel need.
+/// The planes that all metrics by pixel need.
 pub(super) const WITH_IDS: SamplePlanes =
     SamplePlanes { normal: false, surface_id: true, specular: false, corners: false };

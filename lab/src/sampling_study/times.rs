@@ -1,4 +1,4 @@
-//! What sampling costs beside conventional sampling, in time and in bytes.
+//! The cost of sampling over that of conventional sampling, in time and in bytes.
 
 use std::time::Instant;
 
@@ -9,36 +9,38 @@ use render::SamplePlanes;
 use sampling::{SamplingMethod, scalar};
 use study::{Bar, Cell, Check, Report, Table};
 
-use super::{Extent, IMAGES, METHODS, Subject};
-use crate::evaluate::median;
+use super::extent::Extent;
+use super::methods::{IMAGES, METHODS};
+use super::subject::Subject;
+use crate::statistics::median;
 
 const RUNS: usize = 3;
-/// What takes so long is not run again.
+/// Milliseconds after which a measurement is not repeated.
 const ENOUGH_MS: f64 = 2000.0;
-/// Side of the images whose rays are counted.
+/// The side of the images whose rays are counted.
 const COUNTED_PX: u32 = 96;
 
-/// Of one method on one scene.
+/// Costs of one method on one scene.
 #[derive(Debug, Clone, Copy)]
 pub struct Times {
-    /// A set's.
+    /// Milliseconds of a set.
     pub set_ms: f64,
-    /// Of the depths at texels' corners alone, of a set.
+    /// Milliseconds of the depths at texel corners, of a set.
     pub corners_ms: f64,
-    /// Depth and colour of a set, packed, and samples.
+    /// Bytes of depth and colour of a set, packed.
     pub bytes: usize,
-    /// Of depths at corners and normals, packed.
+    /// Bytes of depths at corners and of normals, packed.
     pub corner_bytes: usize,
-    /// Holes left out.
+    /// The number of samples; holes do not count.
     pub samples: usize,
-    /// Rays a pixel of later images, where a test traces them.
+    /// Rays a pixel of later images, where a test traces rays.
     pub rays_a_pixel: f64,
 }
 
 /// Measures all methods.
 ///
 /// # Errors
-/// The device's.
+/// The device fails.
 pub fn times(subject: &Subject, extent: Extent) -> anyhow::Result<Vec<Times>> {
     METHODS.iter().map(|&method| of_method(subject, method, UVec2::splat(extent.side_px))).collect()
 }
@@ -47,7 +49,7 @@ fn of_method(subject: &Subject, method: SamplingMethod, size_px: UVec2) -> anyho
     let hybrid = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
     let mut ms = [Vec::new(), Vec::new()];
     for (ms, planes) in ms.iter_mut().zip([SamplePlanes::default(), hybrid]) {
-        // The first builds pipelines, and finds out how surfaces of this size are found.
+        // The first run builds pipelines, and chooses between rays and triangles.
         subject.sample(method, size_px, planes)?;
         while ms.len() < RUNS && ms.iter().sum::<f64>() < ENOUGH_MS {
             let start = Instant::now();
@@ -74,16 +76,16 @@ fn of_method(subject: &Subject, method: SamplingMethod, size_px: UVec2) -> anyho
 }
 
 fn rays_a_pixel(subject: &Subject, method: SamplingMethod) -> anyhow::Result<f64> {
-    if method.leave_out().is_none_or(|test| !test.traces_rays()) {
+    if method.redundancy_test().is_none_or(|test| !test.traces_rays()) {
         return Ok(f64::NAN);
     }
     let cameras = subject.cameras(method, UVec2::splat(COUNTED_PX));
-    let rays = scalar::rays_of_visibility(&subject.scene.scalar_rays(0.0)?, &cameras);
+    let rays = scalar::rays_of_visibility(&render::scalar::rays::Scene::of(&subject.scene, 0.0)?, &cameras);
     Ok(rays as f64 / f64::from((IMAGES as u32 - 1) * COUNTED_PX * COUNTED_PX))
 }
 
 impl Times {
-    /// Of an image after the first, which is conventional.
+    /// Milliseconds of an image after the first, which is conventional.
     fn later_image_ms(&self, conventional: &Self) -> f64 {
         (self.set_ms - conventional.image_ms()) / (IMAGES - 1) as f64
     }
@@ -97,10 +99,10 @@ impl Times {
     }
 }
 
-/// Table and checks of all scenes.
+/// Adds a table and checks of all scenes.
 ///
 /// # Errors
-/// A row that does not fit, which is a fault here.
+/// A row does not fit its table.
 pub fn times_report(rows: &[(String, Vec<Times>)], extent: Extent, report: &mut Report) -> anyhow::Result<()> {
     let columns = [
         ("scene", ""),

@@ -1,4 +1,4 @@
-//! By visibility: the same metrics whatever the resolution, of seeded samples, by rays on the host.
+//! Metrics by visibility: independent of resolution, of seeded samples, by rays on the host.
 
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use metrics::{HeldSample, held_samples};
@@ -9,20 +9,18 @@ use sampling::{SamplingMethod, scalar::is_visibility_redundant};
 /// A share of seeded samples.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Estimate {
-    /// Of 1; NaN of no samples.
+    /// The share; NaN without samples.
     pub share: f64,
-    /// Half of the interval that it lies in with 95 %.
+    /// Half the width of the 95 % interval.
     pub half_width: f64,
 }
 
-/// Of one image.
+/// Estimates of one image.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Seen {
-    /// Of its samples.
     pub redundant: Estimate,
-    /// Of its samples.
     pub disoccluded: Estimate,
-    /// Of the disoccluded ones.
+    /// The share of its disoccluded samples.
     pub useful: Estimate,
 }
 
@@ -33,7 +31,7 @@ impl Estimate {
     }
 }
 
-/// All images of a set. `viewpoints` are those of conventional sampling, `views` lie between them.
+/// Estimates of all images of a set. `viewpoints` are those of conventional sampling, `views` lie between them.
 pub fn seen(
     scene: &Scene,
     method: SamplingMethod,
@@ -53,7 +51,7 @@ pub fn seen(
             let seen = |camera| is_visibility_redundant(scene, sample.point_in_world, footprint_m(sample), camera);
             cameras.iter().any(seen)
         };
-        // Peeled layers share one viewpoint: what it sees is in the first.
+        // All that the shared viewpoint of peeled layers sees is in the first layer.
         let earlier = match method {
             SamplingMethod::DepthPeeling { .. } => &own[..number.min(1)],
             _ => &own[..number],
@@ -79,14 +77,14 @@ fn pinhole(image: &DepthImage) -> PinholeCamera {
     *camera
 }
 
-/// So many of them, the same every time.
+/// The first `count` samples of a fixed permutation.
 fn seeded(mut samples: Vec<HeldSample>, count: usize) -> Vec<HeldSample> {
     samples.sort_by_key(|sample| scrambled(sample.index as u32));
     samples.truncate(count);
     samples
 }
 
-/// A permutation of the numbers without a pattern that images could share (the finish of `MurmurHash3`).
+/// A permutation of numbers without a pattern that images could share (the finish of `MurmurHash3`).
 fn scrambled(mut n: u32) -> u32 {
     n = (n ^ (n >> 16)).wrapping_mul(0x85eb_ca6b);
     n = (n ^ (n >> 13)).wrapping_mul(0xc2b2_ae35);

@@ -12,46 +12,48 @@ use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use scene::SceneSpec;
 
-use crate::scaling::{Extent, Request, Subject, report, show, take};
+use super::matrix::Extent;
+use super::measure::{Request, take};
+use super::report::{report, show};
+use super::subject::Subject;
 
-/// A coordinator and P nodes as processes of their own, each node with an equal share of this machine's processors
-/// (control groups of Linux, so that eleven nodes fit two cores): the time between two sample sets for P = 2…11 nodes
-/// and V = 10…1000 views, by `pipeline`, `time-share`, `auto` and `direct`; the paper's figures and the predictions
-/// beside it. Then a simulation around the same schedule, held against what was measured and taken to 1,000 nodes.
+/// Measures the time between two sample sets on a coordinator and P node processes, for P = 2…11 nodes, V = 10…1000
+/// views and every policy. Each node has an equal share of this machine's processors by control groups of Linux, so
+/// that eleven nodes fit two cores. The paper's figures and the predictions stand beside the results. A simulation
+/// around the same schedule is compared with them and goes on to 1,000 nodes.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  myriorama bench scaling --quick\n  myriorama bench scaling --out out/scaling")]
 pub struct ScalingArgs {
     /// A scene by name, or a file
     #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
     scene: SceneSpec,
-    /// How surfaces are lit: as in the paper
+    /// How surfaces are lit; the default is the paper's lighting
     #[arg(long, default_value_t, value_name = "TERMS")]
     lighting: Lighting,
-    /// A second table under another lighting, where sampling is dear [default: none with --quick, else "soft 4,
-    /// occlusion 4"]
+    /// An expensive lighting for a second table [default: none with --quick, else "soft 4, occlusion 4"]
     #[arg(long, value_name = "TERMS")]
-    dear_lighting: Option<Lighting>,
+    expensive_lighting: Option<Lighting>,
     /// How views are reconstructed
     #[arg(long, default_value_t, value_name = "NAME")]
     method: ReconstructionMethod,
     #[command(flatten)]
     device: DeviceArgs,
-    /// P at most
+    /// The most nodes P
     #[arg(long, default_value_t = 11, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=64))]
     nodes: u16,
-    /// V at most
+    /// The most views V
     #[arg(long, default_value_t = 1000, value_name = "V", value_parser = clap::value_parser!(u32).range(10..=1000))]
     views: u32,
-    /// Cores that each node has [default: all but 0.35 for the client, in equal parts]
+    /// Cores of each node [default: all but 0.35 for the client, in equal parts]
     #[arg(long, value_name = "CORES", value_parser = cores)]
     quota: Option<f64>,
-    /// P at most of the simulation
+    /// The most simulated nodes P
     #[arg(long, default_value_t = 1000, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=1000))]
     simulate_to: u16,
     /// Where the report goes
     #[arg(long, default_value = "out/bench-scaling", value_name = "DIR")]
     out: PathBuf,
-    /// A subset in under ten minutes: P = 11 and 5
+    /// Measures a subset in under ten minutes: P = 11 and 5
     #[arg(long)]
     quick: bool,
     /// Exit status 1 when a check falls short
@@ -59,8 +61,8 @@ pub struct ScalingArgs {
     strict: bool,
 }
 
-/// The second table's lighting, where nothing else is asked for.
-const DEAR_LIGHTING: &str = "soft 4, occlusion 4";
+/// The default lighting of the second table.
+const EXPENSIVE_LIGHTING: &str = "soft 4, occlusion 4";
 
 fn cores(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|cores| (0.01..=64.0).contains(cores)).ok_or_else(|| "expected 0.01 to 64".to_owned())
@@ -68,9 +70,9 @@ fn cores(text: &str) -> Result<f64, String> {
 
 impl ScalingArgs {
     fn request(&self) -> anyhow::Result<Request> {
-        let dear = || DEAR_LIGHTING.parse::<Lighting>().map_err(|error| BadInput(error.to_string()));
-        let dear_lighting = match self.dear_lighting {
-            None if !self.quick => Some(dear()?),
+        let expensive = || EXPENSIVE_LIGHTING.parse::<Lighting>().map_err(|error| BadInput(error.to_string()));
+        let expensive_lighting = match self.expensive_lighting {
+            None if !self.quick => Some(expensive()?),
             given => given,
         };
         Ok(Request {
@@ -78,13 +80,13 @@ impl ScalingArgs {
             extent: Extent { quick: self.quick, nodes: usize::from(self.nodes), views: self.views as usize },
             quota_cores: self.quota,
             lighting: self.lighting,
-            dear_lighting,
+            expensive_lighting,
             event_log: self.out.join("schedule.log"),
         })
     }
 }
 
-/// Measures, simulates, reports.
+/// Measures, simulates and writes the report.
 ///
 /// # Errors
 /// Input that cannot be used, no control groups, or a failure of the cluster.
@@ -98,5 +100,5 @@ pub fn run(args: &ScalingArgs) -> anyhow::Result<Outcome> {
     let report = report(&measured, request.extent, &args.scene.to_string(), usize::from(args.simulate_to))?;
     show(&report, &args.out)?;
     let ok = report.finish(&args.out)?;
-    Ok(if args.strict && !ok { Outcome::FellShort } else { Outcome::Done })
+    Ok(Outcome::of(ok || !args.strict))
 }

@@ -1,9 +1,9 @@
-//! What operations cost one node, with its share of the machine, while the others do the same.
+//! Costs of operations on a node with its share of the machine, while the other nodes do the same.
 
 use cluster::{Costs, ROW_PARTS, TileCosts};
 use render::Lighting;
 
-use super::fleet::Fleet;
+use super::processes::NodeProcesses;
 use super::subject::{MEASURED_BATCH, Subject};
 
 /// The mean of several measurements; zeros without any.
@@ -25,19 +25,21 @@ pub fn mean(all: &[Costs]) -> Costs {
     }
 }
 
-/// Costs of all nodes at the same time: alone on the machine a node has its caches and its memory to itself, which is not
-/// what it has at work. What a view costs depends on where it stands: each node has others of those that are measured.
-///
-/// # Errors
-/// A node's.
-pub async fn measure(fleet: &Fleet, subject: &Subject, lighting: Lighting, batch: u32) -> anyhow::Result<Vec<Costs>> {
-    let nodes = fleet.nodes();
+/// Costs of all nodes at the same time: a node that is alone on the machine has its caches and memory to itself. The
+/// cost of a view depends on its place, so each node has views of its own.
+pub async fn measure(
+    processes: &NodeProcesses,
+    subject: &Subject,
+    lighting: Lighting,
+    batch: u32,
+) -> anyhow::Result<Vec<Costs>> {
+    let nodes = processes.nodes();
     let views = subject.views(nodes * MEASURED_BATCH as usize)?;
     let of_node = |node| views.iter().skip(node).step_by(nodes).copied().collect();
-    fleet.measure((0..nodes).map(|node| subject.measurement(lighting, of_node(node), batch))).await
+    processes.measure((0..nodes).map(|node| subject.measurement(lighting, of_node(node), batch))).await
 }
 
-/// (S·g_s + V·(c+e)) / (P·T): what the work would take one node, over what P nodes took.
+/// (S·g_s + V·(c+e)) / (P·T): the work of one node over the time of P nodes.
 #[must_use]
 pub fn efficiency(costs: &Costs, images: usize, views: usize, nodes: usize, period_s: f64) -> f64 {
     let view_s = costs.reconstruct_view_s + costs.encode_view_s;

@@ -1,26 +1,24 @@
-//! What nodes count for Prometheus, read as Prometheus reads it.
+//! Counters of nodes, read from their Prometheus pages.
 
 use anyhow::Context as _;
 
 use crate::process::metrics_page;
 
-/// Sums over nodes, since they started.
+/// Counters of nodes, summed since they started.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Counters {
-    /// Images sampled, or tiles of them.
+    /// Sampled images, or tiles of them.
     pub images: f64,
-    /// Of each of these the seconds of a whole image, sampled and encoded.
+    /// Seconds of sampling and encoding, as if of whole images.
     pub image_s: f64,
-    /// Sets loaded.
     pub sets: f64,
-    /// Views made.
     pub views: f64,
-    /// Seconds of the device for them.
+    /// Seconds of the device for views.
     pub view_s: f64,
 }
 
 impl Counters {
-    /// Of two nodes, or of one node at two times with `-1` in front of the earlier.
+    /// The sum of two counters, the second with a factor.
     fn plus_times(&self, other: &Self, factor: f64) -> Self {
         Self {
             images: self.images + factor * other.images,
@@ -37,7 +35,7 @@ impl Counters {
         self.plus_times(other, 1.0)
     }
 
-    /// Between two readings.
+    /// The difference of two readings.
     #[must_use]
     pub fn since(&self, before: &Self) -> Self {
         self.plus_times(before, -1.0)
@@ -58,10 +56,10 @@ impl Counters {
     }
 }
 
-/// One node's, from `http://HOST:PORT/metrics`.
+/// Reads the counters of a node from `http://HOST:PORT/metrics`.
 ///
 /// # Errors
-/// Where nobody answers, or the page lacks a counter.
+/// Nobody answers, or the page lacks a counter.
 pub async fn read(url: &str) -> anyhow::Result<Counters> {
     let page = metrics_page(url).await?;
     Counters::of_page(&page)

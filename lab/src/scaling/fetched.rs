@@ -1,4 +1,4 @@
-//! What a sample image weighs, and how long one is under way from a sampler that has it.
+//! The size of a sample image, and the time that its transfer takes.
 
 use std::time::Instant;
 
@@ -11,16 +11,16 @@ use wire::rpc::{SamplerClient, connect};
 /// Images of one set, fetched as a compositor fetches them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fetched {
-    /// B: one image, encoded.
+    /// Bytes of one encoded image, B.
     pub image_bytes: f64,
-    /// From the request to the last byte, by image; checked as chunks are, not decoded.
+    /// Seconds an image from the request to the last byte; chunks are checked, not decoded.
     pub image_s: f64,
 }
 
 /// Fetches the first sampler's images of a set that has been sampled already.
 ///
 /// # Errors
-/// The sampler's.
+/// The sampler fails.
 pub async fn fetch(plan: &Assignment, set_index: u32) -> anyhow::Result<Fetched> {
     let share = plan.samplers_of(set_index).first().context("nobody samples")?;
     let client = SamplerClient::new(connect(&share.address).await?);

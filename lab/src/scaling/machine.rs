@@ -1,23 +1,23 @@
-//! How busy the machine was: whether what was measured had it for itself.
+//! The load of the machine, which shows whether a measurement had it for itself.
 
 use std::fs;
 
-/// Ticks of the kernel's counters in a second: fixed for programs since Linux 2.6, whatever the kernel's own rate.
+/// Ticks of the kernel's counters in a second: fixed for programs since Linux 2.6.
 const TICKS_PER_S: f64 = 100.0;
 
 /// Processor time so far, in seconds of one core.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MachineTime {
-    /// Of all processes.
+    /// Seconds of all processes.
     pub busy_s: f64,
-    /// Taken by other guests of the same host.
+    /// Seconds of other guests of the same host.
     pub stolen_s: f64,
-    /// Of this process: the client.
+    /// Seconds of this process, the client.
     pub client_s: f64,
 }
 
 impl MachineTime {
-    /// Now; zeros where the system does not say.
+    /// The counters now; zeros where the system has none.
     #[must_use]
     pub fn now() -> Self {
         let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
@@ -26,7 +26,7 @@ impl MachineTime {
         Self { busy_s, stolen_s, client_s: of_process(&own).unwrap_or_default() }
     }
 
-    /// Between two readings.
+    /// The difference of two readings.
     #[must_use]
     pub fn since(&self, before: &Self) -> Self {
         Self {
@@ -37,7 +37,7 @@ impl MachineTime {
     }
 }
 
-/// user, nice, system, idle, iowait, irq, softirq, steal.
+/// The fields are user, nice, system, idle, iowait, irq, softirq and steal.
 fn all(stat: &str) -> Option<(f64, f64)> {
     let line = stat.lines().find_map(|line| line.strip_prefix("cpu "))?;
     let ticks: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
@@ -45,7 +45,7 @@ fn all(stat: &str) -> Option<(f64, f64)> {
     Some((sum(&[0, 1, 2, 5, 6]), sum(&[7])))
 }
 
-/// utime and stime, the 14th and 15th field; the 2nd is a name that may hold blanks.
+/// utime and stime are the 14th and 15th field; the 2nd is a name that may hold blanks.
 fn of_process(stat: &str) -> Option<f64> {
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
     let ticks = |field: usize| fields.get(field - 3)?.parse::<f64>().ok();

@@ -1,12 +1,12 @@
-//! Which points are measured, and about how long that takes.
+//! Points to measure, and the time that they take.
 
 use cluster::{Costs, PolicyChoice};
 use coordinator::schedule::{Demand, Load, NodeCosts, PolicyOverride, choose};
 use render::Lighting;
 
-use super::point::Ask;
+use super::point::PointSettings;
 
-/// P of Table 1's last row.
+/// P of the last row of Table 1.
 pub const PAPER_NODES: usize = 11;
 /// V of Table 1, Fig. 7 and Fig. 8.
 pub const PAPER_VIEWS: usize = 1000;
@@ -14,44 +14,40 @@ pub const PAPER_VIEWS: usize = 1000;
 pub const FEW_NODES: usize = 5;
 /// V of the paper's headline.
 pub const HEADLINE_VIEWS: usize = 290;
-/// V at which sampling under dear light takes about as long as all views: whole images then bound T most.
+/// V at which sampling under expensive lighting takes about as long as all views: whole images then bound T most.
 pub const TILED_VIEWS: usize = 100;
-/// Of one alone more may have been made ahead than is made ahead of the next.
+/// The fewest sets that count: more of a single set may have been made ahead than of the next one.
 const LEAST_SETS: f64 = 2.0;
-/// What opening a session takes beside the work.
+/// Seconds of opening a session, beside the work.
 const SESSION_S: f64 = 1.0;
 
 use PolicyChoice::{Auto, Direct, Pipeline, TimeShare};
 
-/// One point that is to be measured.
+/// A point to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wanted {
-    /// Who decides.
+pub struct PointSpec {
     pub policy: PolicyChoice,
-    /// V.
     pub views: usize,
-    /// Whether sample images stay whole.
+    /// True where sample images stay whole.
     pub whole_images: bool,
 }
 
-/// How much is measured.
+/// The size of the measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
-    /// A stated subset.
+    /// True for a stated subset.
     pub quick: bool,
-    /// P at most.
     pub nodes: usize,
-    /// V at most.
     pub views: usize,
 }
 
 impl Extent {
-    /// Time that sets are counted for, where one takes less.
+    /// Seconds that sets are counted for, where one set takes less.
     fn counted_s(self) -> f64 {
         if self.quick { 12.0 } else { 20.0 }
     }
 
-    /// P, from the greatest down: nodes are only ever ended.
+    /// The numbers of nodes P, from the greatest down: nodes are only ever ended.
     #[must_use]
     pub fn node_counts(self) -> Vec<usize> {
         let all: &[usize] = if self.quick { &[11, 5] } else { &[11, 10, 9, 8, 7, 6, 5, 4, 3, 2] };
@@ -59,17 +55,17 @@ impl Extent {
         [self.nodes].into_iter().chain(smaller).collect()
     }
 
-    /// What is measured at so many nodes, plainly lit or under light that is dear.
+    /// Points at a number of nodes, under the paper's lighting or an expensive one.
     #[must_use]
-    pub fn points(self, nodes: usize, is_dear: bool) -> Vec<Wanted> {
-        let shared = match (is_dear, self.quick) {
-            (true, _) => self.dear_points(nodes),
+    pub fn points(self, nodes: usize, is_expensive: bool) -> Vec<PointSpec> {
+        let shared = match (is_expensive, self.quick) {
+            (true, _) => self.expensive_points(nodes),
             (false, true) => self.quick_points(nodes),
             (false, false) => full_points(nodes),
         };
-        let cut = shared.into_iter().map(|(policy, views)| Wanted { policy, views, whole_images: false });
-        let whole = Wanted { policy: Pipeline, views: TILED_VIEWS, whole_images: true };
-        let whole = (is_dear && nodes == self.nodes).then_some(whole);
+        let cut = shared.into_iter().map(|(policy, views)| PointSpec { policy, views, whole_images: false });
+        let whole = PointSpec { policy: Pipeline, views: TILED_VIEWS, whole_images: true };
+        let whole = (is_expensive && nodes == self.nodes).then_some(whole);
         cut.chain(whole).filter(|wanted| wanted.views <= self.views).collect()
     }
 
@@ -87,8 +83,8 @@ impl Extent {
         }
     }
 
-    /// `direct` on few views.
-    fn dear_points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
+    /// Points under expensive lighting: `direct` on few views only.
+    fn expensive_points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
         let shared = [TILED_VIEWS, PAPER_VIEWS].into_iter().flat_map(|views| [(Pipeline, views), (Auto, views)]);
         let wanted = nodes == self.nodes || (!self.quick && [FEW_NODES, 8].contains(&nodes));
         if wanted { shared.chain([(Direct, nodes)]).collect() } else { Vec::new() }
@@ -102,7 +98,7 @@ fn full_points(nodes: usize) -> Vec<(PolicyChoice, usize)> {
     counts.into_iter().flat_map(|views| [Pipeline, TimeShare, Auto, Direct].map(|policy| (policy, views))).collect()
 }
 
-/// What the schedule predicts of P equal nodes.
+/// The time between two sets that the schedule predicts for P equal nodes.
 #[must_use]
 pub fn predicted_s(costs: &Costs, images: usize, nodes: usize, policy: PolicyChoice, views: usize) -> f64 {
     let nodes = vec![NodeCosts { costs: *costs, transfer_image_s: None }; nodes];
@@ -111,18 +107,16 @@ pub fn predicted_s(costs: &Costs, images: usize, nodes: usize, policy: PolicyCho
     choose(&Demand { load, nodes: &nodes, policy_override, current: None }).map_or(f64::NAN, |choice| choice.time_s())
 }
 
-/// One point with the sets it takes, and about how many seconds.
+/// A point with its sets, and the seconds that it takes, about.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Planned {
-    /// What is asked.
-    pub ask: Ask,
-    /// P.
+    pub settings: PointSettings,
     pub nodes: usize,
-    /// Of the wall clock.
+    /// Seconds of the wall clock, about.
     pub about_s: f64,
 }
 
-/// Sets to be counted, at the costs that were measured.
+/// The sets that count follow from the measured costs.
 #[must_use]
 pub fn planned(
     extent: Extent,
@@ -130,15 +124,15 @@ pub fn planned(
     images: usize,
     nodes: usize,
     lighting: Lighting,
-    Wanted { policy, views, whole_images }: Wanted,
+    PointSpec { policy, views, whole_images }: PointSpec,
 ) -> Planned {
     let period_s = predicted_s(costs, images, nodes, policy, views);
     let most = if extent.quick { 5.0 } else { 8.0 };
     let counted_sets = (extent.counted_s() / period_s).ceil().clamp(LEAST_SETS, most) as u32;
-    let ask = Ask { lighting, policy, views, whole_images, counted_sets };
+    let settings = PointSettings { lighting, policy, views, whole_images, counted_sets };
     let sampled_s = if policy == Direct { 0.0 } else { costs.sample_image_s * images as f64 };
-    // Set 0, those that count, and what is left of the next.
-    Planned { ask, nodes, about_s: (f64::from(counted_sets) + 1.5) * period_s + sampled_s + SESSION_S }
+    // Set 0, the sets that count, and the rest of the next one.
+    Planned { settings, nodes, about_s: (f64::from(counted_sets) + 1.5) * period_s + sampled_s + SESSION_S }
 }
 
 #[cfg(test)]
@@ -166,7 +160,7 @@ mod tests {
     fn the_quick_form_has_table_1s_ends_and_takes_minutes() {
         let quick = all(Extent { quick: true, nodes: 11, views: 1000 });
         let has = |policy, nodes, views| {
-            quick.iter().any(|p| p.ask.policy == policy && p.nodes == nodes && p.ask.views == views)
+            quick.iter().any(|p| p.settings.policy == policy && p.nodes == nodes && p.settings.views == views)
         };
         assert!(has(Pipeline, 11, 1000) && has(Auto, 11, 1000) && has(Direct, 11, 100) && has(Pipeline, 5, 290));
         let about_s: f64 = quick.iter().map(|planned| planned.about_s).sum();
@@ -174,11 +168,15 @@ mod tests {
     }
 
     #[test]
-    fn whole_images_are_measured_beside_tiles_where_light_is_dear() {
+    fn whole_images_are_measured_beside_tiles_under_expensive_lighting() {
         let extent = Extent { quick: true, nodes: 11, views: 100 };
-        let of = |whole_images| Wanted { policy: Pipeline, views: TILED_VIEWS, whole_images };
-        let dear = extent.points(11, true);
-        assert!(dear.contains(&of(false)) && dear.contains(&of(true)) && dear.iter().all(|wanted| wanted.views <= 100));
+        let of = |whole_images| PointSpec { policy: Pipeline, views: TILED_VIEWS, whole_images };
+        let expensive = extent.points(11, true);
+        assert!(
+            expensive.contains(&of(false))
+                && expensive.contains(&of(true))
+                && expensive.iter().all(|wanted| wanted.views <= 100)
+        );
         assert!(extent.points(5, true).is_empty() && !extent.points(11, false).contains(&of(true)));
     }
 
@@ -186,7 +184,9 @@ mod tests {
     fn the_full_form_has_all_of_table_1() {
         let full = all(Extent { quick: false, nodes: 11, views: 1000 });
         for nodes in 2..=11 {
-            let views = |policy| full.iter().any(|p| p.nodes == nodes && p.ask.policy == policy && p.ask.views == 1000);
+            let views = |policy| {
+                full.iter().any(|p| p.nodes == nodes && p.settings.policy == policy && p.settings.views == 1000)
+            };
             assert!([Pipeline, TimeShare, Auto, Direct].into_iter().all(views), "{nodes}");
         }
         let counts = Extent { quick: false, nodes: 6, views: 1000 }.node_counts();

@@ -1,13 +1,12 @@
-//! What Lages et al. report, §5: eleven PCs, each with a GeForce 7900 GTX, over Gigabit Ethernet.
+//! Figures of Lages et al., §5: eleven PCs, each with a GeForce 7900 GTX, over Gigabit Ethernet.
 
 /// One row of Table 1: V = 1000, K = 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaperRow {
-    /// P.
     pub nodes: usize,
     /// Efficiency of the proposed architecture.
     pub proposed: f64,
-    /// Efficiency of dealing views to renderers.
+    /// Efficiency of views distributed to renderers.
     pub naive: f64,
 }
 
@@ -29,7 +28,7 @@ pub const TABLE_1: [PaperRow; 7] = [
 /// "Our system rendered 290 views in 2.61 seconds … with 5 GPUs."
 pub const HEADLINE_S: f64 = 2.61;
 
-/// Of so many nodes.
+/// The row of a number of nodes.
 #[must_use]
 pub fn table_1(nodes: usize) -> Option<&'static PaperRow> {
     TABLE_1.iter().find(|row| row.nodes == nodes)

@@ -1,4 +1,4 @@
-//! All of it as a report.
+//! The report of a run.
 
 use std::path::Path;
 
@@ -6,40 +6,38 @@ use anyhow::Context as _;
 use study::{Report, Table};
 
 use super::checks::checks;
-use super::foretold::{Traffic, foretell};
 use super::matrix::{Extent, FEW_NODES, PAPER_NODES, PAPER_VIEWS};
-use super::measured::Measured;
+use super::measured::{Measured, MeasuredLighting};
+use super::prediction::{Traffic, predict};
+use super::results::Results;
 use super::sweep::{Basis, scenarios, sweep};
-use super::tables::{Told, costs_table, headline_table, naive, paper_table, points_table, shares_table, steps_table};
+use super::tables::{costs_table, headline_table, paper_table, points_table, shares_table, steps_table};
 use super::{charts, costs, sweep_report, whole_images};
 
-/// The report of a run.
-///
-/// # Errors
-/// Tables that do not fit, which is a fault here.
+/// Makes the report of a run.
 pub fn report(measured: &Measured, extent: Extent, scene: &str, most_simulated: usize) -> anyhow::Result<Report> {
-    let told: Vec<Told<'_>> = measured.lit.iter().map(|lit| told_of(measured, lit)).collect();
-    let main = told.first().context("nothing was measured")?;
+    let all: Vec<Results<'_>> = measured.lit.iter().map(|lit| results_of(measured, lit)).collect();
+    let main = all.first().context("nothing was measured")?;
     let mut report = new_report(measured, extent, scene);
-    report.tables.extend([paper_table(main)?, headline_table(measured, main)?, costs_table(measured, &told)?]);
-    for told in &told {
-        report.tables.push(points_table(told)?);
+    report.tables.extend([paper_table(main)?, headline_table(measured, main)?, costs_table(measured, &all)?]);
+    for results in &all {
+        report.tables.push(points_table(results)?);
     }
-    for told in told.iter().skip(1) {
-        report.tables.push(whole_images::table(told)?);
+    for results in all.iter().skip(1) {
+        report.tables.push(whole_images::table(results)?);
     }
     let few = main.node_counts().into_iter().filter(|&nodes| nodes <= FEW_NODES).max().unwrap_or(0);
     report.tables.extend([shares_table(main)?, steps_table(main, few)?]);
     report.charts.extend(charts::charts(main));
     simulate(measured, main, most_simulated, &mut report)?;
     report.summary = summary(main);
-    report.checks = checks(measured, &told, extent);
+    report.checks = checks(measured, &all, extent);
     Ok(report)
 }
 
-fn told_of<'a>(measured: &Measured, lit: &'a super::measured::Lit) -> Told<'a> {
-    let foretold = lit.points.iter().map(|point| foretell(lit, measured.images, point)).collect();
-    Told { lit, foretold, images: measured.images }
+fn results_of<'a>(measured: &Measured, lit: &'a MeasuredLighting) -> Results<'a> {
+    let predictions = lit.points.iter().map(|point| predict(lit, measured.images, point)).collect();
+    Results { lit, predictions, images: measured.images }
 }
 
 fn new_report(measured: &Measured, extent: Extent, scene: &str) -> Report {
@@ -61,15 +59,15 @@ fn new_report(measured: &Measured, extent: Extent, scene: &str) -> Report {
     report
 }
 
-fn simulate(measured: &Measured, main: &Told<'_>, most_nodes: usize, report: &mut Report) -> anyhow::Result<()> {
+fn simulate(measured: &Measured, main: &Results<'_>, most_nodes: usize, report: &mut Report) -> anyhow::Result<()> {
     let plain = costs::mean(&measured.unlimited);
-    // Dear light was timed with a quota alone: as many times faster without as plain light is.
+    // Expensive lighting was timed with a quota alone; without it, the speed-up is that of the paper's lighting.
     let nodes = main.node_counts().into_iter().max().unwrap_or(PAPER_NODES);
     let speed = main.lit.mean(nodes).sample_image_s / plain.sample_image_s;
-    let dear = measured.lit.get(1).map(|lit| lit.mean(nodes));
+    let expensive = measured.lit.get(1).map(|lit| lit.mean(nodes));
     let unlimited = |costs: cluster::Costs| simulation::Machine::of(costs).faster(speed).costs;
     let traffic = Traffic::of(&main.lit.points);
-    let basis = Basis { plain, dear: dear.map(unlimited), images: measured.images, traffic };
+    let basis = Basis { plain, expensive: expensive.map(unlimited), images: measured.images, traffic };
     let scenarios = scenarios(&basis);
     let points = sweep(&basis, &scenarios, most_nodes);
     report.tables.push(sweep_report::reach_table(&scenarios, &points)?);
@@ -80,7 +78,7 @@ fn simulate(measured: &Measured, main: &Told<'_>, most_nodes: usize, report: &mu
     Ok(())
 }
 
-fn summary(main: &Told<'_>) -> String {
+fn summary(main: &Results<'_>) -> String {
     let nodes = main.node_counts().into_iter().max().unwrap_or(PAPER_NODES);
     let of = |policy| main.find(policy, nodes, PAPER_VIEWS).map(|point| main.efficiency(point));
     let text = |value: Option<f64>| value.map_or_else(|| "not measured".to_owned(), |value| format!("{value:.3}"));
@@ -88,14 +86,14 @@ fn summary(main: &Told<'_>) -> String {
         "Efficiency at P = {nodes}, V = 1000: pipeline {}, auto {}, naive {}. The paper's at eleven: 0.829 and 0.110.",
         text(of(cluster::PolicyChoice::Pipeline)),
         text(of(cluster::PolicyChoice::Auto)),
-        text(naive(main, nodes).map(|(efficiency, _)| efficiency)),
+        text(main.naive(nodes).map(|(efficiency, _)| efficiency)),
     )
 }
 
-/// Prints all tables but the longest, and writes them to `tables.md`, ready to be pasted.
+/// Prints all tables but the longest, and writes them to `tables.md` in Markdown.
 ///
 /// # Errors
-/// A folder that cannot be written.
+/// The folder cannot be written.
 pub fn show(report: &Report, folder: &Path) -> anyhow::Result<()> {
     let short = || report.tables.iter().filter(|table| table.name != sweep_report::SWEEP_TABLE);
     short().for_each(|table| println!("\n{}", table.to_text()));

@@ -1,9 +1,9 @@
-//! What is measured: the scene, its sample cameras, and the views between them.
+//! The scene to measure, its sample cameras, and the views between them.
 
 use std::cell::Cell;
 
 use anyhow::Context as _;
-use app_core::delivery::Wishes;
+use app_core::delivery::SessionSettings;
 use app_core::setup::{SceneArgs, Setup};
 use cluster::{MeasureCosts, PolicyChoice, Timeline, Workload};
 use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
@@ -11,32 +11,30 @@ use render::Lighting;
 
 use crate::experiment::VIEW_SIZE_PX;
 
-/// Scene time between sets: far less than any motion, but another set, which is sampled anew as the paper's are.
+/// Scene time between sets: far less than any motion, but a new set, which is sampled as the paper's sets are.
 const SET_STEP_S: f64 = 1e-3;
-/// Views of one measured call, as the coordinator's own.
+/// Views of one measured call, as in the coordinator's own requests.
 pub const MEASURED_BATCH: u32 = 32;
-/// How frames travel.
+/// The codec of frames.
 const CODEC: &str = "lz4";
 
-/// A scene and its rig. Every run of it has scene times that no run before had.
+/// A scene and its rig. No two runs have the same scene times.
 pub struct Subject {
-    /// As on the command line.
     pub args: SceneArgs,
-    /// The scene on offer.
     pub setup: Setup,
     sets_so_far: Cell<u32>,
 }
 
 impl Subject {
-    /// Loads it.
+    /// Loads a scene.
     ///
     /// # Errors
-    /// For a scene that cannot be used.
+    /// The scene cannot be used.
     pub fn load(args: &SceneArgs) -> anyhow::Result<Self> {
         Ok(Self { args: args.clone(), setup: args.load()?, sets_so_far: Cell::new(0) })
     }
 
-    /// S.
+    /// The number of sample images, S.
     #[must_use]
     pub fn images(&self) -> usize {
         self.setup.samples.len()
@@ -45,28 +43,28 @@ impl Subject {
     /// The first `count` views of a sequence that fills the cell between the sample cameras evenly.
     ///
     /// # Errors
-    /// Without sample cameras.
+    /// There are no sample cameras.
     pub fn views(&self, count: usize) -> anyhow::Result<Vec<PinholeCamera>> {
         let cell = ViewCell::between(&self.setup.around).context("no sample cameras")?;
         Ok(cell.spread(count, VIEW_SIZE_PX))
     }
 
-    /// So many sets that nobody has sampled yet.
+    /// A timeline of sets that no node has sampled yet.
     #[must_use]
     pub fn fresh_timeline(&self, set_count: u32) -> Timeline {
         let first = self.sets_so_far.replace(self.sets_so_far.get() + set_count);
         Timeline { start_s: f64::from(first) * SET_STEP_S, step_s: SET_STEP_S, set_count }
     }
 
-    /// What a session asks for.
+    /// Settings of a session.
     #[must_use]
-    pub fn wishes(&self, lighting: Lighting, policy: PolicyChoice, set_count: u32) -> Wishes {
+    pub fn session_settings(&self, lighting: Lighting, policy: PolicyChoice, set_count: u32) -> SessionSettings {
         let (method, sampling) = (self.args.method.to_string(), self.args.sampling.to_string());
         let timeline = self.fresh_timeline(set_count);
-        Wishes { policy, timeline, ..Wishes::new(method, sampling, lighting.to_string()) }
+        SessionSettings { policy, timeline, ..SessionSettings::new(method, sampling, lighting.to_string()) }
     }
 
-    /// What a node is to time: a set of this lighting, and these views, so many a call.
+    /// A measurement for a node: a new set of this lighting, and views in calls of `batch_count`.
     #[must_use]
     pub fn measurement(&self, lighting: Lighting, typical_views: Vec<PinholeCamera>, batch_count: u32) -> MeasureCosts {
         let offer = &self.setup.offer;

@@ -1,79 +1,69 @@
-//! The simulation beyond what was measured: to 1,000 nodes and 100,000 views, on networks of several speeds.
+//! The simulation beyond measured points: to 1,000 nodes and 100,000 views, on networks of several speeds.
 
 use cluster::{Costs, Policy, PolicyChoice};
 use rayon::prelude::*;
 use simulation::{Cluster, Demand, Habits, Limit, Machine, Transfer, plan, run, spread_speeds};
 
-use super::foretold::Traffic;
+use super::prediction::Traffic;
 
-/// P.
+/// Numbers of nodes, P.
 const NODES: [usize; 9] = [2, 5, 11, 20, 50, 100, 200, 500, 1000];
-/// V.
+/// Numbers of views, V.
 pub const VIEWS: [usize; 3] = [1_000, 10_000, 100_000];
-/// Links, each way.
+/// Speeds of links, each way.
 pub const GBITS: [f64; 3] = [1.0, 10.0, 100.0];
-/// Bits a second to bytes a second.
+/// Bytes a second of a link of 1 Gbit/s.
 const BYTES_PER_S_A_GBIT: f64 = 1.25e8;
 /// Sets of one run: enough for a steady state between filling and draining.
 const SETS: u32 = 14;
-/// Of the fastest node over the slowest, where nodes differ.
+/// The speed of the fastest node over the slowest, where nodes differ.
 const UNEQUAL_RATIO: f64 = 4.0;
 const SEED: u64 = 11;
-/// How many times this machine a device is that stands for a graphics processor.
+/// The speed of a device that stands for a graphics processor, over this machine's.
 const FAST: f64 = 30.0;
-/// Parts of a sample image, where images are cut.
+/// Parts of a sample image, where images are tiled.
 const PARTS: usize = 16;
 
-/// What is varied beside P and V.
+/// A cluster to simulate, beside P and V.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
-    /// In the legend.
     pub name: String,
-    /// Whose costs; how often as fast.
+    /// The device that the costs belong to, and its speed.
     pub device: String,
-    /// Of the device.
     pub costs: Costs,
-    /// Of every link.
+    /// The speed of every link.
     pub gbit_per_s: f64,
-    /// How the services go about it.
     pub habits: Habits,
-    /// Parts of an image.
     pub parts: usize,
-    /// Whether speeds are spread.
+    /// True where the speeds of nodes differ.
     pub unequal: bool,
 }
 
 /// One simulated point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
-    /// Of the scenarios.
     pub scenario: usize,
-    /// P.
     pub nodes: usize,
-    /// V.
     pub views: usize,
-    /// What `auto` came to.
+    /// The policy that `auto` chose.
     pub policy: Policy,
-    /// K.
     pub samplers: usize,
-    /// T.
+    /// The time between two sets, T.
     pub period_s: f64,
-    /// As where it is measured; of unequal nodes over the sum of their speeds.
+    /// Efficiency as at measured points; for unequal nodes over the sum of their speeds.
     pub efficiency: f64,
-    /// What is in the way.
     pub limit: Limit,
 }
 
-/// Costs of this machine without a limit, and, where it was measured, under dear light.
+/// Costs of this machine without a limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Basis {
-    /// Plainly lit.
+    /// Costs under the paper's lighting.
     pub plain: Costs,
-    /// Under dear light.
-    pub dear: Option<Costs>,
-    /// S.
+    /// Costs under expensive lighting, where it was measured.
+    pub expensive: Option<Costs>,
     pub images: usize,
-    /// What travels.
+    /// Bytes on the network.
     pub traffic: Traffic,
 }
 
@@ -81,7 +71,7 @@ fn times_as_fast(costs: Costs, speed: f64) -> Costs {
     Machine::of(costs).faster(speed).costs
 }
 
-/// As it is; then, one after the other, what would help.
+/// All scenarios: the cluster as it is, then one improvement after the other.
 #[must_use]
 pub fn scenarios(basis: &Basis) -> Vec<Scenario> {
     let devices = [("this machine".to_owned(), 1.0), (format!("{FAST:.0} times as fast"), FAST)];
@@ -106,7 +96,7 @@ pub fn scenarios(basis: &Basis) -> Vec<Scenario> {
     all
 }
 
-/// Unequal nodes, and images that are dear and cut.
+/// Unequal nodes, and expensive lighting with and without tiles.
 fn of_ten_gbit(basis: &Basis) -> Vec<Scenario> {
     let relay = Habits { transfer: Transfer::Relay(2), sets_ahead: 3, ..Habits::default() };
     let plain = Scenario {
@@ -118,17 +108,19 @@ fn of_ten_gbit(basis: &Basis) -> Vec<Scenario> {
         parts: 1,
         unequal: true,
     };
-    let dear = basis.dear.into_iter().flat_map(|costs| {
-        let whole = Scenario { name: "dear light, whole images".to_owned(), costs, unequal: false, ..plain.clone() };
-        let relayed = Scenario { name: "dear light, relay".to_owned(), habits: relay, ..whole.clone() };
-        let cut = Scenario { name: format!("dear light, relay, images in {PARTS}"), parts: PARTS, ..relayed.clone() };
+    let expensive = basis.expensive.into_iter().flat_map(|costs| {
+        let whole =
+            Scenario { name: "expensive lighting, whole images".to_owned(), costs, unequal: false, ..plain.clone() };
+        let relayed = Scenario { name: "expensive lighting, relay".to_owned(), habits: relay, ..whole.clone() };
+        let cut =
+            Scenario { name: format!("expensive lighting, relay, images in {PARTS}"), parts: PARTS, ..relayed.clone() };
         [whole, relayed, cut]
     });
-    let dear: Vec<_> = dear.collect();
-    [plain].into_iter().chain(dear).collect()
+    let expensive: Vec<_> = expensive.collect();
+    [plain].into_iter().chain(expensive).collect()
 }
 
-/// All scenarios at all P and V, most of them at the same time.
+/// Simulates all scenarios at all P and V, many at the same time.
 #[must_use]
 pub fn sweep(basis: &Basis, scenarios: &[Scenario], most_nodes: usize) -> Vec<Simulated> {
     let points = scenarios.iter().enumerate().flat_map(|(number, scenario)| {
@@ -168,7 +160,7 @@ fn simulated(basis: &Basis, scenario: &Scenario, number: usize, nodes: usize, vi
     })
 }
 
-/// The most nodes up to which efficiency stays above a bar, and what is in the way at the next.
+/// The most nodes up to which efficiency stays above a bar, and the first point beyond.
 #[must_use]
 pub fn reach(points: &[Simulated], scenario: usize, views: usize, bar: f64) -> (Option<usize>, Option<Simulated>) {
     let mut of: Vec<&Simulated> = points.iter().filter(|p| p.scenario == scenario && p.views == views).collect();

@@ -1,4 +1,4 @@
-//! What the simulation says of more nodes than can be measured.
+//! Tables and charts of simulated clusters.
 
 use std::time::Instant;
 
@@ -9,12 +9,12 @@ use study::{Axis, Chart, Series, Table, XyChart};
 
 use super::sweep::{Basis, Scenario, Simulated, VIEWS, reach};
 
-/// What counts as scaling.
+/// The least efficiency that counts as scaling.
 const BAR: f64 = 0.8;
-/// V of the charts.
+/// The number of views V of the charts.
 const CHARTED_VIEWS: usize = 100_000;
 
-/// Every simulated point.
+/// A table of all simulated points.
 pub fn sweep_table(scenarios: &[Scenario], points: &[Simulated]) -> anyhow::Result<Table> {
     let columns = [
         ("device", ""),
@@ -45,10 +45,10 @@ pub fn sweep_table(scenarios: &[Scenario], points: &[Simulated]) -> anyhow::Resu
     Ok(table)
 }
 
-/// Its name: too long for a terminal.
+/// The name of that table, which is too long for a terminal.
 pub const SWEEP_TABLE: &str = "Simulated points";
 
-/// Up to how many nodes each scenario scales, and why no further.
+/// The number of nodes up to which each scenario scales, and its limit beyond.
 pub fn reach_table(scenarios: &[Scenario], points: &[Simulated]) -> anyhow::Result<Table> {
     let columns = [
         ("device", ""),
@@ -79,7 +79,7 @@ pub fn reach_table(scenarios: &[Scenario], points: &[Simulated]) -> anyhow::Resu
     Ok(table)
 }
 
-/// Efficiency by P, a chart a device, and one of all that is on 10 Gbit/s besides.
+/// Efficiency by P: a chart for each device, and one for all other scenarios.
 #[must_use]
 pub fn charts(scenarios: &[Scenario], points: &[Simulated]) -> Vec<Chart> {
     let mut devices: Vec<&str> = scenarios.iter().map(|scenario| scenario.device.as_str()).collect();
@@ -92,7 +92,7 @@ pub fn charts(scenarios: &[Scenario], points: &[Simulated]) -> Vec<Chart> {
         chart(name, scenarios, points, |scenario| scenario.device == *device && plain(scenario))
     });
     let others = chart(
-        format!("Simulated efficiency, V = {CHARTED_VIEWS}, unequal nodes and dear light"),
+        format!("Simulated efficiency, V = {CHARTED_VIEWS}, unequal nodes and expensive lighting"),
         scenarios,
         points,
         |scenario| !plain(scenario),
@@ -115,7 +115,7 @@ fn chart(name: String, scenarios: &[Scenario], points: &[Simulated], is_in: impl
     chart
 }
 
-/// Milliseconds of the schedule's own decision: what the coordinator does for every look.
+/// Milliseconds of one decision of the schedule.
 pub fn decisions_table(basis: &Basis, views: usize) -> anyhow::Result<Table> {
     let columns = [("P", ""), ("equal nodes", "ms"), ("unequal nodes", "ms")];
     let mut table = Table::new("Time of one decision of the schedule", &columns);
@@ -138,7 +138,7 @@ fn decision_s(costs: &Costs, images: usize, speeds: &[f64], views: usize) -> f64
     chosen.map_or(f64::NAN, |_| seconds)
 }
 
-/// In words: as the services are, on this machine's device.
+/// A sentence for each scenario.
 #[must_use]
 pub fn summary(scenarios: &[Scenario], points: &[Simulated]) -> String {
     let sentence = |number: usize| {

@@ -1,14 +1,14 @@
-//! What whole sample images allow, and what tiles make of it: with whole images no more than S nodes can sample.
+//! Whole sample images beside tiles: with whole images, no more than S nodes can sample.
 
 use cluster::{Costs, PolicyChoice};
 use study::Table;
 
 use super::costs::efficiency;
 use super::point::Point;
-use super::tables::Told;
+use super::results::Results;
 
-/// The least T of eq. 2 that whole images allow, seconds: max(⌈S/K⌉·g_s, V·(c+e)/(P−K)) at the best K, nothing else
-/// taking any time. Infinite without a node for each role.
+/// The least T of eq. 2 with whole images, in seconds: max(⌈S/K⌉·g_s, V·(c+e)/(P−K)) at the best K, with no other
+/// costs. It is infinite without a node for each role.
 #[must_use]
 pub fn least_s(costs: &Costs, images: usize, views: usize, nodes: usize) -> f64 {
     let view_s = costs.reconstruct_view_s + costs.encode_view_s;
@@ -19,28 +19,28 @@ pub fn least_s(costs: &Costs, images: usize, views: usize, nodes: usize) -> f64 
     (1..nodes).map(with).fold(f64::INFINITY, f64::min)
 }
 
-/// A measured point's T under that.
-fn bound_s(told: &Told<'_>, point: &Point) -> f64 {
-    least_s(&told.lit.mean(point.nodes), told.images, point.ask.views, point.nodes)
+/// The least T of a measured point.
+fn bound_s(results: &Results<'_>, point: &Point) -> f64 {
+    least_s(&results.lit.mean(point.nodes), results.images, point.settings.views, point.nodes)
 }
 
-/// How many times the efficiency that whole images allow at the best; of the pipeline.
+/// The pipeline's efficiency over the best that whole images allow.
 #[must_use]
-pub fn over_bound(told: &Told<'_>, nodes: usize, views: usize) -> Option<f64> {
-    let point = told.find(PolicyChoice::Pipeline, nodes, views)?;
-    Some(bound_s(told, point) / point.period_s)
+pub fn over_bound(results: &Results<'_>, nodes: usize, views: usize) -> Option<f64> {
+    let point = results.find(PolicyChoice::Pipeline, nodes, views)?;
+    Some(bound_s(results, point) / point.period_s)
 }
 
-/// How many times as fast as the same with whole images, measured.
+/// The pipeline's speed over that with whole images, both measured.
 #[must_use]
-pub fn over_whole(told: &Told<'_>, nodes: usize, views: usize) -> Option<f64> {
-    let cut = told.find(PolicyChoice::Pipeline, nodes, views)?;
-    let same = |point: &&Point| point.ask.whole_images && (point.nodes, point.ask.views) == (nodes, views);
-    Some(told.lit.points.iter().find(same)?.period_s / cut.period_s)
+pub fn over_whole(results: &Results<'_>, nodes: usize, views: usize) -> Option<f64> {
+    let cut = results.find(PolicyChoice::Pipeline, nodes, views)?;
+    let same = |point: &&Point| point.settings.whole_images && (point.nodes, point.settings.views) == (nodes, views);
+    Some(results.lit.points.iter().find(same)?.period_s / cut.period_s)
 }
 
-/// Every point whose views are made from samples.
-pub fn table(told: &Told<'_>) -> anyhow::Result<Table> {
+/// A table of every point whose views are made from samples.
+pub fn table(results: &Results<'_>) -> anyhow::Result<Table> {
     let columns = [
         ("P", ""),
         ("V", ""),
@@ -54,21 +54,21 @@ pub fn table(told: &Told<'_>) -> anyhow::Result<Table> {
         ("whole images allow T", "s"),
         ("whole images allow efficiency", ""),
     ];
-    let mut table = Table::new(format!("Whole images and tiles, {}", told.lit.lighting), &columns);
-    for point in told.lit.points.iter().filter(|point| point.ask.policy != PolicyChoice::Direct) {
-        let (costs, bound_s) = (told.lit.mean(point.nodes), bound_s(told, point));
+    let mut table = Table::new(format!("Whole images and tiles, {}", results.lit.lighting), &columns);
+    for point in results.lit.points.iter().filter(|point| point.settings.policy != PolicyChoice::Direct) {
+        let (costs, bound_s) = (results.lit.mean(point.nodes), bound_s(results, point));
         table.push([
             point.nodes.into(),
-            point.ask.views.into(),
-            point.ask.policy.to_string().into(),
-            if point.ask.whole_images { "whole" } else { "as the schedule likes" }.into(),
+            point.settings.views.into(),
+            point.settings.policy.to_string().into(),
+            if point.settings.whole_images { "whole" } else { "as the schedule likes" }.into(),
             point.policy().to_string().into(),
             point.samplers().into(),
             point.plan.assignment.tile_count.into(),
             point.period_s.into(),
-            told.efficiency(point).into(),
+            results.efficiency(point).into(),
             bound_s.into(),
-            efficiency(&costs, told.images, point.ask.views, point.nodes, bound_s).into(),
+            efficiency(&costs, results.images, point.settings.views, point.nodes, bound_s).into(),
         ])?;
     }
     Ok(table)

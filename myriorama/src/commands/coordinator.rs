@@ -1,4 +1,4 @@
-//! `myriorama coordinator`: plans for nodes that join it, and hands them the scene.
+//! `myriorama coordinator`: plans for nodes that join it, and serves them the scene.
 
 use std::fs::File;
 use std::net::SocketAddr;
@@ -14,27 +14,27 @@ use coordinator::{CoordinatorConfig, CoordinatorMetrics, EventLog, Observers};
 use node::Telemetry;
 use tokio_util::sync::CancellationToken;
 
-/// Draws nothing itself: it needs no device.
+/// Serves a scene and plans the work of the nodes that join. A coordinator draws nothing and needs no device.
 #[derive(Debug, Args)]
 pub struct CoordinatorArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Where it listens
+    /// The address to listen on
     #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT")]
     listen: SocketAddr,
-    /// Where Prometheus reads what it counts, at /metrics
+    /// The address for Prometheus, at /metrics [default: no metrics]
     #[arg(long, value_name = "HOST:PORT")]
     metrics: Option<SocketAddr>,
-    /// Writes all that happens to the schedule here, for `myriorama replay`
+    /// Records the schedule's events to a file, for `myriorama replay`
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Say by gRPC reflection what services and messages there are, as grpcurl asks
+    /// Describes services and messages by gRPC reflection, for grpcurl and the like
     #[arg(long)]
     reflection: bool,
-    /// Sessions that may be open at once; more are refused
+    /// The most open sessions; more are refused
     #[arg(long, value_name = "N", default_value_t = CoordinatorConfig::default().max_sessions)]
     max_sessions: usize,
-    /// Serve without TLS on an address that others can reach
+    /// Serves without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
 }
@@ -42,7 +42,7 @@ pub struct CoordinatorArgs {
 /// Runs until a signal.
 ///
 /// # Errors
-/// A scene that cannot be used, or a port that is taken.
+/// The scene cannot be used, or the port is taken.
 pub fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
     let setup = args.scene.load()?;
     runtime()?.block_on(serve(args, setup))
@@ -70,7 +70,7 @@ async fn serve(args: CoordinatorArgs, setup: Setup) -> anyhow::Result<Outcome> {
     serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
     let serving = coordinator::serve(listener, config, offer, Observers { metrics, log }, shutdown.clone());
     tokio::spawn(async move {
-        // Without signals there is still the caller's way to end the process.
+        // Without signals, the caller can still kill the process.
         if stop_signal().await.is_ok() {
             shutdown.cancel();
         }

@@ -1,4 +1,4 @@
-//! `myriorama health`: whether a process serves, for those who restart it where it does not.
+//! `myriorama health`: the health of a process, for supervisors that restart it.
 
 use std::time::Duration;
 
@@ -9,13 +9,13 @@ use clap::Args;
 
 const DEADLINE: Duration = Duration::from_secs(4);
 
-/// Prints what the process says of itself; exit status 3 where it does not serve or does not answer.
+/// Prints the health of a process; exit status 3 if it does not serve or does not answer.
 #[derive(Debug, Args)]
 pub struct HealthArgs {
-    /// A coordinator or a node
+    /// The address of a coordinator or a node
     #[arg(value_name = "URL")]
     address: String,
-    /// coordinator, node, sampler or compositor; the whole process without one
+    /// The role to ask about: coordinator, node, sampler or compositor [default: the whole process]
     #[arg(long, default_value = "", value_name = "NAME")]
     role: String,
 }
@@ -23,7 +23,7 @@ pub struct HealthArgs {
 /// Asks once.
 ///
 /// # Errors
-/// Where it does not serve, or does not answer within seconds.
+/// The process does not serve, or does not answer within seconds.
 pub fn run(args: &HealthArgs) -> anyhow::Result<Outcome> {
     let asked = async { tokio::time::timeout(DEADLINE, wire::rpc::is_serving(&args.address, &args.role)).await };
     let serves = runtime()?.block_on(asked).with_context(|| format!("{} does not answer", args.address))?;

@@ -1,4 +1,4 @@
-//! One module a subcommand: its arguments, and what it does.
+//! Subcommands: one module each, with its arguments.
 
 pub mod coordinator;
 pub mod health;

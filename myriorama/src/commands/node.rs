@@ -1,4 +1,4 @@
-//! `myriorama node`: samples and composites as the coordinator says.
+//! `myriorama node`: samples and composites by the coordinator's plan.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::path::PathBuf;
@@ -11,49 +11,49 @@ use engine::GpuEngine;
 use node::{Engine as _, NodeConfig, NodeMetrics, Quotas, Telemetry};
 use tokio_util::sync::CancellationToken;
 
-/// Stays a member, and joins again when the coordinator was away.
+/// Joins a coordinator, and samples and composites by its plan. Joins again when the coordinator comes back.
 #[derive(Debug, Args)]
 pub struct NodeArgs {
-    /// The coordinator
+    /// The address of the coordinator
     #[arg(long, value_name = "URL", env = "MYRIORAMA_COORDINATOR")]
     coordinator: String,
-    /// Where it listens; port 0: any that is free
+    /// The address to listen on; port 0 takes a free port
     #[arg(long, default_value = "127.0.0.1:0", value_name = "HOST:PORT")]
     listen: SocketAddr,
-    /// Unique in the cluster [default: node-PORT, or the host's name where it listens on all addresses]
+    /// A name that is unique in the cluster [default: node-PORT, or the host's name if it listens on all addresses]
     #[arg(long)]
     name: Option<String>,
-    /// Where others reach it, if not at --listen [default, where that is all addresses: the one towards the coordinator]
+    /// The address at which others reach the node [default: --listen, or the address towards the coordinator]
     #[arg(long, value_name = "URL")]
     advertise: Option<String>,
-    /// Keeps scenes here by hash, and looks here before fetching one
+    /// A folder of scenes by hash, which is searched before a scene is fetched
     #[arg(long, value_name = "DIR")]
     scene_folder: Option<PathBuf>,
     #[command(flatten)]
     device: DeviceArgs,
-    /// Where Prometheus reads what it counts, at /metrics
+    /// The address for Prometheus, at /metrics [default: no metrics]
     #[arg(long, value_name = "HOST:PORT")]
     metrics: Option<SocketAddr>,
-    /// Say by gRPC reflection what services and messages there are, as grpcurl asks
+    /// Describes services and messages by gRPC reflection, for grpcurl and the like
     #[arg(long)]
     reflection: bool,
     #[command(flatten)]
     quotas: QuotaArgs,
-    /// Serve without TLS on an address that others can reach
+    /// Serves without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
 }
 
-/// What it takes on for all its clients together; what is beyond is refused.
+/// Quotas of a node for all its clients together; more is refused.
 #[derive(Debug, Clone, Copy, Args)]
 struct QuotaArgs {
-    /// Clients' streams that may be open
+    /// The most open streams of clients
     #[arg(long, value_name = "N", default_value_t = Quotas::default().streams)]
     max_streams: usize,
-    /// Views of batches that may wait, or be not sent yet
+    /// The most views of batches that are queued or not sent yet
     #[arg(long, value_name = "N", default_value_t = Quotas::default().views)]
     max_views: usize,
-    /// Pixels of them; and as many of live views
+    /// The most pixels of these views, and of live views
     #[arg(long, value_name = "N", default_value_t = Quotas::default().pixels)]
     max_pixels: usize,
 }
@@ -67,7 +67,7 @@ impl From<QuotaArgs> for Quotas {
 /// Runs until a signal.
 ///
 /// # Errors
-/// No device, or a port that is taken.
+/// There is no device, or the port is taken.
 pub fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
     runtime()?.block_on(serve(args))
 }
@@ -93,7 +93,7 @@ async fn serve(args: NodeArgs) -> anyhow::Result<Outcome> {
     serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
     let serving = node_host::serve(listener, config, engine, metrics, shutdown.clone());
     tokio::spawn(async move {
-        // Without signals there is still the caller's way to end the process.
+        // Without signals, the caller can still kill the process.
         if stop_signal().await.is_ok() {
             shutdown.cancel();
         }
@@ -107,11 +107,11 @@ fn name_of(address: SocketAddr) -> String {
     host.map_or_else(|| format!("node-{}", address.port()), |host| host.trim().to_owned())
 }
 
-/// Of a node that listens on all addresses: the one that the way to the coordinator goes out by.
+/// The address of the network interface towards the coordinator, for a node that listens on all addresses.
 fn own_address(coordinator: &str, address: SocketAddr) -> Option<String> {
     let authority = coordinator.split("://").last()?.split('/').next()?;
     let unspecified = SocketAddr::new(address.ip(), 0);
-    // No packet is sent: the system only chooses the way.
+    // No packet is sent: the system only chooses the interface.
     let socket = UdpSocket::bind(unspecified).ok().filter(|_| address.ip().is_unspecified())?;
     socket.connect(authority).ok()?;
     Some(format!("http://{}", SocketAddr::new(socket.local_addr().ok()?.ip(), address.port())))

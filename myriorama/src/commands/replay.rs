@@ -1,4 +1,4 @@
-//! `myriorama replay`: what the schedule makes of a recorded incident.
+//! `myriorama replay`: the schedule's commands for recorded events.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -9,19 +9,19 @@ use app_core::exit::{BadInput, Outcome};
 use clap::Args;
 use coordinator::schedule::{Command, LogError, ProbeKind, Step, replay};
 
-/// Runs the events that `myriorama coordinator --record` wrote through the schedule once more and prints its commands,
-/// each with the time since the coordinator's start. The same events give the same commands.
+/// Replays the events that `myriorama coordinator --record` wrote, and prints the schedule's commands, each with the
+/// time since the coordinator's start. The same events give the same commands.
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
-    /// As `--record` wrote it
+    /// A file that `--record` wrote
     #[arg(value_name = "LOG")]
     log: PathBuf,
 }
 
-/// Replays.
+/// Replays the log.
 ///
 /// # Errors
-/// A log that cannot be read; the text names the line and the field.
+/// The log cannot be read; the text names the line and the field.
 pub fn run(args: &ReplayArgs) -> anyhow::Result<Outcome> {
     let file = File::open(&args.log).with_context(|| format!("cannot read {}", args.log.display()))?;
     let steps = replay(BufReader::new(file)).map_err(|error| wrong(args, error))?;

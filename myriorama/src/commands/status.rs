@@ -1,4 +1,4 @@
-//! `myriorama status`: who is there, what the plan is, and why.
+//! `myriorama status`: nodes, plan, and the reason of the plan.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -11,16 +11,16 @@ use client::Client;
 
 use crate::terminal_picture;
 
-/// Prints the cluster's nodes with their roles, the plan and its reason; with --watch again and again.
+/// Prints the nodes of a cluster with their roles and costs, the plan and its reason.
 #[derive(Debug, Args)]
 pub struct StatusArgs {
-    /// The coordinator
+    /// The address of the coordinator
     #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR")]
     coordinator: String,
-    /// Every so many seconds, until ctrl-c
+    /// Repeats every S seconds until ctrl-c
     #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "1")]
     watch: Option<f64>,
-    /// Writes it as a picture, too (SVG)
+    /// Writes the text as a picture as well (SVG)
     #[arg(long, value_name = "FILE", conflicts_with = "watch")]
     picture: Option<PathBuf>,
 }
@@ -28,7 +28,7 @@ pub struct StatusArgs {
 /// Asks and prints.
 ///
 /// # Errors
-/// A coordinator that does not answer.
+/// The coordinator does not answer.
 pub fn run(args: &StatusArgs) -> anyhow::Result<Outcome> {
     runtime()?.block_on(show(args))
 }
@@ -46,7 +46,7 @@ async fn show(args: &StatusArgs) -> anyhow::Result<Outcome> {
             println!("{text}");
             return Ok(Outcome::Done);
         };
-        // Clears the terminal, so that the table stays where it is.
+        // The terminal is cleared, so that the table stays in place.
         println!("\x1b[2J\x1b[H{text}");
         tokio::time::sleep(Duration::from_secs_f64(seconds.clamp(0.1, 3600.0))).await;
     }

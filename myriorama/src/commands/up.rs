@@ -20,13 +20,13 @@ pub struct UpArgs {
     scene: SceneArgs,
     #[command(flatten)]
     device: DeviceArgs,
-    /// P: nodes that share the device
+    /// Nodes P that share the device
     #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
     nodes: u16,
-    /// Where the coordinator listens
+    /// The address that the coordinator listens on
     #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT")]
     listen: SocketAddr,
-    /// Serve without TLS on an address that others can reach
+    /// Serves without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
 }
@@ -34,7 +34,7 @@ pub struct UpArgs {
 /// Runs until a signal.
 ///
 /// # Errors
-/// A scene that cannot be used, no device, or a port that is taken.
+/// The scene cannot be used, there is no device, or the port is taken.
 pub fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     let setup = args.scene.load()?;
     runtime()?.block_on(serve(args, setup))
@@ -45,7 +45,7 @@ async fn serve(args: UpArgs, setup: Setup) -> anyhow::Result<Outcome> {
     let engine = GpuEngine::shared(args.device.device)?;
     engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
     let (name, triangles) = (setup.scene.name.clone(), setup.scene.triangle_count());
-    // The device holds it now, and the package travels: the third copy can go.
+    // The device and the package hold the scene now; the third copy is dropped.
     drop(setup.scene);
     let mut cluster =
         Cluster::start(listener, setup.offer, engine.clone(), usize::from(args.nodes), args.insecure_bind).await?;

@@ -1,36 +1,36 @@
 //! Axes: label, unit, scale, range and ticks.
 //!
-//! Drawing is always linear: a logarithmic axis is drawn over the logarithm of its values ("axis space"), so
-//! that all charts share one kind of coordinate and one choice of ticks.
+//! Drawing is always linear: a logarithmic axis is drawn over the logarithm of its values ("axis space"). All charts
+//! then share one kind of coordinate and one choice of ticks.
 
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-/// How values are spread along an axis.
+/// The scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scale {
-    /// Evenly.
+    /// Equal differences have equal distances.
     Linear,
-    /// By ratio; values must be above 0.
+    /// Equal ratios have equal distances; values must be above 0.
     Log,
 }
 
-/// What one direction of a chart means.
+/// One axis of a chart.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Axis {
-    /// What is measured.
+    /// The quantity.
     pub label: String,
-    /// In what; empty for none.
+    /// The unit; empty for none.
     pub unit: String,
-    /// How it is spread.
+    /// The scale.
     pub scale: Scale,
 }
 
-/// Ticks aimed at along an axis.
+/// The number of ticks to aim at.
 const TICKS: f64 = 6.0;
-/// A linear axis whose least value is below this share of the greatest starts at 0.
+/// A linear axis starts at 0 if its least value is below this share of the greatest.
 const NEAR_ZERO: f64 = 0.5;
 /// Room beyond the outermost values, as a share of their range.
 const PADDING: f64 = 0.04;

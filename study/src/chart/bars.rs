@@ -1,11 +1,12 @@
-//! Stacked bars: where the time goes.
+//! Stacked bars.
 
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
-use super::canvas::{self, Area, Drawing, Glyph, LegendEntry, message, style_mesh, text_style, text_width_px};
+use super::area::{Area, message};
+use super::canvas::{self, Drawing, Glyph, LegendEntry, style_mesh, text_style, text_width_px};
 use super::ruler::Ruler;
 use super::{Axis, Palette};
 use crate::ReportError;
@@ -13,35 +14,35 @@ use table::format_number;
 
 const BAR_PITCH_PX: u32 = 34;
 const AXIS_HEIGHT_PX: u32 = 66;
-/// Half a bar's height, of a pitch of 1.
+/// Half the height of a bar, of a pitch of 1.
 const HALF_BAR: f64 = 0.34;
 /// Longer names are cut.
 const GREATEST_NAME_PX: i32 = 240;
 
 type Plot<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Ruler, RangedCoordf64>>;
 
-/// One kind of part, in every bar.
+/// A part of every bar.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stage {
-    /// In the legend; the same name has the same colour in all charts.
+    /// The name in the legend; a name has the same colour in all charts.
     pub name: String,
-    /// One a bar; not below 0.
+    /// One value a bar, none below 0.
     pub values: Vec<f64>,
 }
 
 /// Horizontal bars of parts that add up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BarChart {
-    /// Its title, unique in the report.
+    /// The title, unique in the report.
     pub name: String,
-    /// What to know when reading it; may be empty.
+    /// A note for readers; may be empty.
     #[serde(default)]
     pub note: String,
-    /// What a bar's length means. Lengths add up, so it is linear, whatever its scale says.
+    /// The axis of the bars' lengths. Lengths add up, so its scale is linear.
     pub value: Axis,
-    /// What each bar is, top to bottom.
+    /// Names of the bars, top to bottom.
     pub bars: Vec<String>,
-    /// Left to right.
+    /// Parts, left to right.
     pub stages: Vec<Stage>,
 }
 
@@ -53,7 +54,7 @@ impl BarChart {
         Self { name: name.into(), note: String::new(), value, bars, stages: Vec::new() }
     }
 
-    /// The same chart with one more part in every bar. What is not finite or below 0 counts as 0.
+    /// The same chart with one more part in every bar. Values that are not finite or below 0 count as 0.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
         let drawable = |value: f64| {
@@ -141,7 +142,7 @@ impl BarChart {
         parts
     }
 
-    /// Names to the left of the bars, totals to the right.
+    /// Names stand to the left of the bars, totals to the right.
     fn draw_texts(&self, area: &Area, plot: &Plot) -> Result<(), String> {
         let (left_px, top_px) = area.get_base_pixel();
         let at = |value: f64, bar: usize, offset_px: i32| {

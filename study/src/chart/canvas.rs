@@ -1,33 +1,30 @@
-//! What all charts share: a title, a legend above the data, and ink that follows the page.
+//! The frame of all charts: a title, a legend above the data, and ink that follows the page.
 
 use plotters::chart::MeshStyle;
-use plotters::coord::Shift;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::area::{Area, message};
 use super::marker::Marker;
 use crate::ReportError;
 
 /// Charts are drawn at this width and may be scaled.
 pub(super) const WIDTH_PX: u32 = 700;
-/// Of texts, as the chart library counts: 1.24 of a CSS pixel.
+/// Size of texts in the chart library's unit, 1.24 of a CSS pixel.
 const TEXT_SIZE: i32 = 16;
-/// A sans-serif letter at that size is about so wide.
+/// About the width of a sans-serif letter at that size.
 const LETTER_WIDTH_PX: f64 = 7.4;
 const TITLE_HEIGHT_PX: i32 = 30;
 const LEGEND_ROW_PX: i32 = 22;
 const MARGIN_PX: i32 = 14;
-/// From a legend's glyph to its text.
+/// The distance from a legend's glyph to its text.
 const GLYPH_WIDTH_PX: i32 = 34;
 
-/// Stands for the page's text colour: replaced by `currentColor` when the drawing is done.
+/// A stand-in for the page's text colour, replaced by `currentColor` at the end.
 pub(super) const INK: RGBColor = RGBColor(1, 2, 3);
 const INK_IN_SVG: &str = "#010203";
-
-/// Part of a drawing.
-pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// A finished chart.
 pub(crate) struct Drawing {
@@ -51,7 +48,7 @@ impl Drawing {
     }
 }
 
-/// How a legend shows an entry.
+/// The glyph of a legend's entry.
 pub(super) enum Glyph {
     /// A block of colour.
     Swatch(RGBColor),
@@ -63,7 +60,7 @@ pub(super) enum Glyph {
     Dashes(Marker),
 }
 
-/// A line of a legend.
+/// An entry of a legend.
 pub(super) struct LegendEntry {
     pub(super) text: String,
     pub(super) glyph: Glyph,
@@ -91,11 +88,6 @@ pub(super) fn draw(
     Ok(Drawing { svg: svg.replace(INK_IN_SVG, "currentColor").replacen("<svg ", &described, 1) })
 }
 
-/// The chart library's errors borrow the drawing: keep what they say.
-pub(super) fn message(error: impl std::error::Error) -> String {
-    error.to_string()
-}
-
 /// Text in the page's ink.
 pub(super) fn text_style(horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
     TextStyle::from(("sans-serif", TEXT_SIZE).into_font()).color(&INK).pos(Pos::new(horizontal, vertical))
@@ -114,12 +106,12 @@ where
         .axis_desc_style(("sans-serif", TEXT_SIZE).into_font().color(&INK));
 }
 
-/// About how wide a text is.
+/// The width of a text, about.
 pub(super) fn text_width_px(text: &str) -> i32 {
     (text.chars().count() as f64 * LETTER_WIDTH_PX).ceil() as i32
 }
 
-/// Entries in rows, as many a row as fit.
+/// Entries in rows, with as many a row as fit.
 fn legend_rows(legend: &[LegendEntry]) -> Vec<Vec<(i32, &LegendEntry)>> {
     let mut rows: Vec<Vec<(i32, &LegendEntry)>> = Vec::new();
     let mut next_px = i32::MAX;

@@ -1,21 +1,21 @@
-//! Pareto fronts: what no other point beats in both directions.
+//! Pareto fronts: points that no other point beats in both directions.
 
 use serde::{Deserialize, Serialize};
 
 use super::Point;
 
-/// Which end of an axis is the good one.
+/// The better end of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Better {
-    /// Less is better.
+    /// Lower values are better.
     Low,
-    /// More is better.
+    /// Higher values are better.
     High,
 }
 
 impl Better {
-    /// The value, negated if need be, so that less is better.
+    /// The value, negated if need be, so that lower is better.
     fn cost(self, value: f64) -> f64 {
         match self {
             Self::Low => value,
@@ -24,7 +24,7 @@ impl Better {
     }
 }
 
-/// The points that no other is better than, in order of x from the best. Of equal points the first stays.
+/// Points that no other point beats, by x from the best. The first of equal points stays.
 #[must_use]
 pub fn pareto_front<'a>(
     points: impl IntoIterator<Item = &'a Point>,
@@ -56,7 +56,7 @@ mod tests {
     }
 
     #[test]
-    fn dominated_points_are_left_out() {
+    fn dominated_points_are_not_on_the_front() {
         let points = [(1.0, 5.0), (2.0, 3.0), (3.0, 4.0), (4.0, 1.0), (1.0, 6.0), (2.0, 3.0)];
         assert_eq!(front(&points, [Better::Low, Better::Low]), [(1.0, 5.0), (2.0, 3.0), (4.0, 1.0)]);
     }

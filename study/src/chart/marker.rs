@@ -1,8 +1,8 @@
-//! Marks of single points, a shape as well as a colour a series.
+//! Markers of points: each series has a shape as well as a colour.
 
 use plotters::prelude::*;
 
-use super::canvas::{Area, message};
+use super::area::{Area, message};
 
 /// Half a marker's size in pixels.
 const RADIUS_PX: i32 = 4;
@@ -13,7 +13,7 @@ pub(super) struct Marker {
     /// Circle, square, diamond, triangle.
     pub(super) shape: usize,
     pub(super) color: RGBColor,
-    /// Filled: measured. Hollow: extrapolated.
+    /// True for measured points, false for extrapolated ones.
     pub(super) filled: bool,
 }
 

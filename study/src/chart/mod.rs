@@ -1,5 +1,6 @@
 //! Charts: their data, and their drawing as SVG.
 
+mod area;
 mod axis;
 mod bars;
 mod canvas;
@@ -32,7 +33,7 @@ pub enum Chart {
 }
 
 impl Chart {
-    /// Its title, unique in the report.
+    /// The title, unique in the report.
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
@@ -41,7 +42,7 @@ impl Chart {
         }
     }
 
-    /// What to know when reading it; may be empty.
+    /// A note for readers; may be empty.
     #[must_use]
     pub fn note(&self) -> &str {
         match self {
@@ -50,7 +51,7 @@ impl Chart {
         }
     }
 
-    /// The names that have colours in it.
+    /// The names that have colours in the chart.
     #[must_use]
     pub fn series_names(&self) -> Vec<&str> {
         match self {
@@ -62,7 +63,7 @@ impl Chart {
     /// The chart as a file of its own, in the palette's colours.
     ///
     /// # Errors
-    /// Stages and bars that do not fit together.
+    /// Stages and bars do not fit together.
     pub fn to_svg(&self, palette: &Palette) -> Result<String, ReportError> {
         Ok(self.draw(palette)?.standalone())
     }

@@ -1,10 +1,10 @@
-//! One colour a name, in all charts.
+//! One colour for each name, in all charts.
 
 use std::collections::HashMap;
 
 use plotters::style::RGBColor;
 
-/// Told apart on white and on near black, and by most of the colour-blind.
+/// Colours that can be told apart on white and on near black, and by most of the colour-blind.
 const COLORS: [RGBColor; 12] = [
     RGBColor(47, 127, 214),
     RGBColor(224, 138, 30),
@@ -19,13 +19,13 @@ const COLORS: [RGBColor; 12] = [
     RGBColor(196, 71, 109),
     RGBColor(111, 176, 60),
 ];
-/// The baseline is grey wherever it appears.
+/// The baseline is always grey.
 const BASELINE: (&str, RGBColor) = ("direct", RGBColor(133, 141, 150));
 
 /// The colours of a report's names.
 ///
-/// A name prefers a colour by its own letters, so that it has the same one in other reports too; where two
-/// names prefer one colour, the later takes the next that is free.
+/// A name prefers a colour by its own letters, so that other reports have it, too. Where two names prefer one colour,
+/// the later name takes the next free one.
 #[derive(Debug, Clone, Default)]
 pub struct Palette {
     slots: HashMap<String, usize>,
@@ -60,7 +60,7 @@ impl Palette {
         }
     }
 
-    /// A number that picks the marker's shape.
+    /// A number that selects the marker's shape.
     pub(super) fn slot(&self, name: &str) -> usize {
         self.slots.get(name).copied().unwrap_or_else(|| preferred_slot(name))
     }
@@ -81,7 +81,7 @@ mod tests {
     const NAMES: [&str; 12] = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l"];
 
     #[test]
-    fn twelve_names_have_twelve_colours() {
+    fn twelve_names_have_twelve_different_colours() {
         let palette = Palette::for_names(NAMES);
         let colors: std::collections::HashSet<_> = NAMES
             .iter()

@@ -1,4 +1,4 @@
-//! An axis as the chart library wants it: a range with ticks of our choice.
+//! An axis as the chart library needs it: a range with given ticks.
 
 use std::ops::Range;
 

@@ -1,8 +1,8 @@
-//! What is drawn over two axes.
+//! Data over two axes.
 
 use serde::{Deserialize, Serialize};
 
-/// How a series is drawn.
+/// The mark of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mark {
@@ -12,14 +12,14 @@ pub enum Mark {
     Points,
 }
 
-/// One measurement.
+/// One data point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// Along the horizontal axis.
+    /// The horizontal coordinate.
     pub x: f64,
-    /// Along the vertical axis.
+    /// The vertical coordinate.
     pub y: f64,
-    /// Written beside it; may be empty.
+    /// The label beside the point; may be empty.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub label: String,
 }
@@ -38,17 +38,16 @@ impl From<(f64, f64)> for Point {
     }
 }
 
-/// Points under one name. Points whose coordinates are not finite are left out, and so are points that a
-/// logarithmic axis cannot show.
+/// Points under one name. Points that are not finite, or that a logarithmic axis cannot show, are not drawn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Series {
-    /// In the legend; the same name has the same colour in all charts.
+    /// The name in the legend; a name has the same colour in all charts.
     pub name: String,
-    /// In drawing order.
+    /// Points, in drawing order.
     pub points: Vec<Point>,
-    /// How they are drawn.
+    /// The mark.
     pub mark: Mark,
-    /// Index of the first point that was extrapolated, not measured: dashed, hollow and said so in the legend.
+    /// The index of the first extrapolated point: it and later ones are dashed, hollow, and named so in the legend.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub extrapolated_from: Option<usize>,
 }
@@ -79,7 +78,7 @@ impl Series {
         self
     }
 
-    /// Whether the point of an index was extrapolated.
+    /// True where the point of an index is extrapolated.
     pub(super) fn is_extrapolated(&self, index: usize) -> bool {
         self.extrapolated_from.is_some_and(|first| index >= first)
     }
@@ -88,8 +87,8 @@ impl Series {
 /// A horizontal line: a bar to reach, a theoretical bound.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Limit {
-    /// Written on it.
+    /// The label of the line.
     pub name: String,
-    /// Where it lies on the vertical axis.
+    /// The vertical coordinate.
     pub y: f64,
 }

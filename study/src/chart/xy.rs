@@ -7,9 +7,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
-use super::canvas::{
-    self, Area, Drawing, Glyph, INK, LegendEntry, WIDTH_PX, message, style_mesh, text_style, text_width_px,
-};
+use super::area::{Area, message};
+use super::canvas::{self, Drawing, Glyph, INK, LegendEntry, WIDTH_PX, style_mesh, text_style, text_width_px};
 use super::marker::Marker;
 use super::ruler::Ruler;
 use super::{Axis, Better, Limit, Mark, Palette, Point, Series, pareto_front};
@@ -20,21 +19,21 @@ const PLOT_HEIGHT_PX: u32 = 390;
 /// Series over two axes, optionally with limits to reach and the front of the best points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct XyChart {
-    /// Its title, unique in the report.
+    /// The title, unique in the report.
     pub name: String,
-    /// What to know when reading it; may be empty.
+    /// A note for readers; may be empty.
     #[serde(default)]
     pub note: String,
-    /// To the right.
+    /// The horizontal axis.
     pub x: Axis,
-    /// Upwards.
+    /// The vertical axis.
     pub y: Axis,
-    /// In drawing order.
+    /// Series, in drawing order.
     pub series: Vec<Series>,
     /// Horizontal lines.
     #[serde(default)]
     pub limits: Vec<Limit>,
-    /// Which ends of x and y are better: draws the Pareto front of all measured points.
+    /// The better ends of x and y: draws the Pareto front of all measured points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub front: Option<[Better; 2]>,
 }
@@ -152,7 +151,7 @@ impl XyChart {
                 places.iter().filter(|(index, _)| keep(*index)).map(|&(_, place)| place).collect()
             };
             draw_path(plot, part(&|index| !series.is_extrapolated(index)), style, false)?;
-            // From the last measured point on, so that the line does not break.
+            // The line starts at the last measured point, so that it does not break.
             draw_path(plot, part(&|index| series.is_extrapolated(index + 1)), style, true)?;
         }
         let pixels = plot.plotting_area().strip_coord_spec();
@@ -163,7 +162,7 @@ impl XyChart {
         })
     }
 
-    /// Labels to the right of their points, or to the left near the right edge.
+    /// Labels stand to the right of their points, or to the left near the right edge.
     fn draw_labels(&self, plot: &mut Plot, x: &Range<f64>) -> Result<(), String> {
         let labelled = self.series.iter().flat_map(|series| &series.points).filter(|point| !point.label.is_empty());
         let texts = labelled.filter_map(|point| {
@@ -184,7 +183,7 @@ fn marker(series: &Series, palette: &Palette, filled: bool) -> Marker {
     Marker { shape: palette.slot(&series.name), color: palette.color(&series.name), filled }
 }
 
-/// One entry for what was measured, one for what was extrapolated.
+/// Legend entries: one for measured points, one for extrapolated ones.
 fn legend_entries(series: &Series, palette: &Palette) -> Vec<LegendEntry> {
     let is_line = series.mark == Mark::Line;
     let entry = |text: String, filled: bool| {

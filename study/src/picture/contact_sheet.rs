@@ -1,12 +1,12 @@
-//! Many images on one.
+//! Many images on one sheet.
 
 use image::{Rgb, RgbImage, imageops};
 
-/// What shows between the images: near black, so that it is not taken for a part of them.
+/// The colour between images: near black, so that it is not taken for a part of them.
 const GAP_COLOR: Rgb<u8> = Rgb([28, 30, 34]);
 
-/// Lays images out in rows, left to right, in cells as large as the largest, `gap_px` between cells and
-/// around all. No images make an empty sheet; 0 columns are taken for 1.
+/// Lays images out in rows, in cells as large as the largest image, with `gap_px` between cells and around all. No
+/// images make an empty sheet; 0 columns count as 1.
 #[must_use]
 pub fn contact_sheet(images: &[RgbImage], columns: u32, gap_px: u32) -> RgbImage {
     let count = images.len() as u32;
@@ -35,7 +35,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_are_where_they_should_be() {
+    fn cells_stand_in_rows_with_gaps() {
         let sheet = contact_sheet(&[flat(4, 3, 100), flat(4, 3, 150), flat(2, 2, 200)], 2, 1);
         assert_eq!(sheet.dimensions(), (1 + 2 * 5, 1 + 2 * 4));
         assert_eq!(sheet.get_pixel(1, 1).0, [100; 3]);
@@ -45,7 +45,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_requests_are_met() {
+    fn empty_and_small_sheets_have_their_size() {
         assert_eq!(contact_sheet(&[], 3, 4).dimensions(), (0, 0));
         assert_eq!(contact_sheet(&[flat(4, 3, 1)], 0, 0).dimensions(), (4, 3));
         assert_eq!(contact_sheet(&[flat(4, 3, 1)], 9, 0).dimensions(), (4, 3));

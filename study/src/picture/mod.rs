@@ -18,12 +18,12 @@ pub type Legend = Vec<(String, [u8; 3])>;
 pub struct Picture {
     /// Unique in the report.
     pub name: String,
-    /// What it shows.
+    /// The caption.
     pub caption: String,
-    /// Names of the colours in it, if they mean something.
+    /// Names of the picture's colours, if they have a meaning.
     #[serde(default)]
     pub legend: Legend,
-    /// Its pixels; not in `report.json`, so empty in a report that was read back.
+    /// Pixels, which are not in `report.json`: empty in a report that was read back.
     #[serde(skip)]
     pub image: RgbImage,
 }
@@ -36,16 +36,16 @@ impl Picture {
     }
 }
 
-/// Pictures to be seen side by side.
+/// Pictures side by side.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PictureRow {
-    /// What they have in common.
+    /// The title of the row.
     pub title: String,
-    /// Left to right.
+    /// The pictures, left to right.
     pub pictures: Vec<Picture>,
 }
 
-/// The row *direct | reconstructed | error map | provenance*; the last where it is known.
+/// The row *direct | reconstructed | error map | provenance*, the last only if given.
 #[must_use]
 pub fn comparison_row(
     title: &str,

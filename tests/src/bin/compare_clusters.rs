@@ -1,8 +1,9 @@
 //! Compares running clusters that serve the same scene, for `scripts/same_as.sh`.
 //!
-//! `bytes URL` prints a line for each sampling, reconstruction, lighting and policy: the hash of the depth images that
-//! samplers send, and of the frames that compositors send. Two versions of the program are the same where the lines are.
-//! `times OLD NEW OLD` measures costs on the clusters in turn and prints the ratio of the second and third to the first.
+//! `bytes URL` prints a line for each sampling, reconstruction, lighting and policy: the hashes of the samplers' depth
+//! images and of the compositors' frames. Two versions of the program are equal where the lines are.
+//! `times OLD NEW OLD` measures costs on the clusters in turn and prints the ratio of the second and third to the
+//! first.
 #![allow(clippy::print_stdout, reason = "the lines are the program's output")]
 
 use std::fs;
@@ -36,7 +37,7 @@ const SAMPLINGS: [&str; 8] = [
 const METHODS: [&str; 6] =
     ["joint_carve", "joint_carve:2", "light_field_search:50", "mesh", "hybrid_mesh", "hybrid_mesh:0.5"];
 
-/// What is asked for.
+/// The requested comparison.
 #[derive(Debug, Clone, Copy)]
 struct Row {
     sampling: &'static str,
@@ -50,14 +51,14 @@ struct Row {
 /// The command line.
 #[derive(Debug, Parser)]
 enum Command {
-    /// What a cluster sends, as hashes
+    /// Print hashes of a cluster's images and frames
     Bytes {
         /// The coordinator
         url: String,
-        /// A file with the rows that are asked, a line each [default: all rows]
+        /// A file with the requested rows, a line each [default: all rows]
         rows: Option<PathBuf>,
     },
-    /// What operations cost on several clusters, measured in turn
+    /// Measure the costs of several clusters in turn
     Times {
         /// Their coordinators; ratios are to the first
         #[arg(required = true, num_args = 2..)]
@@ -188,7 +189,7 @@ async fn image_hash(session: &Session) -> anyhow::Result<u64> {
     Ok(hash(&chunks))
 }
 
-/// The hash of all views of both sets, as they were encoded (by their checksum and lengths) and as they are decoded.
+/// The hash of all views of both sets, encoded (by their checksum and lengths) and decoded.
 async fn frame_hash(session: &Session, views: &[PinholeCamera]) -> anyhow::Result<u64> {
     let sets = session.plan().assignment.workload.timeline.set_count;
     let all = (0..sets).flat_map(|set_index| views.iter().map(move |camera| (set_index, *camera)));
@@ -222,7 +223,7 @@ const INTERVAL: std::ops::RangeInclusive<usize> = 5..=15;
 const TIMED_VIEWS: usize = 8;
 const TIMED_VIEW_SIZE_PX: UVec2 = UVec2::new(200, 150);
 
-/// What is measured of a cluster's first node.
+/// The measured costs of a cluster's first node.
 struct Subject {
     node: NodeClient,
     work: MeasureCosts,

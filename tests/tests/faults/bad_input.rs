@@ -1,5 +1,5 @@
-//! Peers that ask for what cannot be, speak another version or no language at all, or have another's name. Each is
-//! refused within a second, by a status that names the field where there is one; a client beside them notices nothing.
+//! Peers with invalid requests, another version, another protocol, or another's name. Each is refused within a second,
+//! by a status that names the field where there is one. A concurrent client sees no effect.
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -19,7 +19,7 @@ use wire::rpc::{CoordinatorClient, connect};
 
 use crate::{CLOSED, PROGRAM, finish};
 
-/// Refusals take no longer.
+/// Greatest time of a refusal.
 const AT_ONCE: Duration = Duration::from_secs(1);
 const JOIN: &str = "/myriorama.v1.CoordinatorService/JoinCluster";
 const OPEN: &str = "/myriorama.v1.CoordinatorService/OpenSession";
@@ -39,7 +39,7 @@ impl Beside {
         Self { cluster, watcher, since: Instant::now() }
     }
 
-    /// Nobody else was harmed.
+    /// The concurrent client saw no fault.
     async fn finish(self, what: &str) {
         let wait = self.watcher.healed(self.since, CLOSED, |_| true).await;
         assert!(wait < 2 * AT_ONCE, "{what}: no frames for {wait:?}");
@@ -47,13 +47,13 @@ impl Beside {
     }
 }
 
-/// Within a second.
+/// Runs a request within the deadline.
 async fn refusal<T>(call: impl Future<Output = Result<T, Status>>) -> Status {
     tokio::time::timeout(AT_ONCE, call).await.expect("at once").err().expect("refused")
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn other_versions_and_what_is_no_message_are_refused() {
+async fn other_versions_and_malformed_messages_are_refused() {
     let beside = Beside::start(2).await;
     let (coordinator, node) = (&beside.cluster.coordinator.address, &beside.cluster.nodes[0].address);
     let join = [raw::text_field(1, "old"), raw::text_field(2, "http://127.0.0.1:1")].concat();
@@ -79,18 +79,18 @@ async fn other_versions_and_what_is_no_message_are_refused() {
     beside.finish("other versions and noise").await;
 }
 
-/// In a hundred places, each half as far again as the one before.
+/// Viewpoints in a hundred places, each half as far again as the one before.
 fn everywhere(camera: PinholeCamera) -> Vec<PinholeCamera> {
     (0..100).map(|i| PinholeCamera { eye_in_world: camera.eye_in_world * 1.5f32.powi(i), ..camera }).collect()
 }
 
-/// So far apart that no number says how far.
+/// Viewpoints whose distance is not finite.
 fn beyond(camera: PinholeCamera) -> Vec<PinholeCamera> {
     [-3e38, 3e38].map(|x| PinholeCamera { eye_in_world: Vec3::X * x, ..camera }).to_vec()
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn absurd_requests_name_their_field() {
+async fn absurd_requests_are_refused_by_field() {
     let beside = Beside::start(2).await;
     let coordinator = CoordinatorClient::new(connect(&beside.cluster.coordinator.address).await.unwrap());
     let camera = watched().typical_view;
@@ -149,7 +149,7 @@ fn socket(address: &str) -> TcpStream {
     stream
 }
 
-/// All that comes back until the server ends the connection; how long that takes.
+/// The bytes until the server ends the connection, and the time that takes.
 fn answer(address: &str, bytes: &[u8]) -> (Vec<u8>, Duration) {
     let (mut stream, start, mut all) = (socket(address), Instant::now(), Vec::new());
     let _ = stream.write_all(bytes);
@@ -160,7 +160,7 @@ fn answer(address: &str, bytes: &[u8]) -> (Vec<u8>, Duration) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn who_does_not_speak_http2_is_cut_off() {
+async fn connections_without_http2_are_cut() {
     let beside = Beside::start(2).await;
     let mut random = Random::new(6);
     let noise: Vec<u8> = (0..100_000).map(|_| random.bits() as u8).collect();
@@ -172,14 +172,14 @@ async fn who_does_not_speak_http2_is_cut_off() {
             assert!(took < AT_ONCE, "{took:?}");
         }
     }
-    // Who says nothing may be slow: for as long as keepalive waits.
+    // A silent peer may be slow: the limit is that of keepalive.
     let server = beside.cluster.nodes[0].address.clone();
     let (_, took) = tokio::task::spawn_blocking(move || answer(&server, b"PRI")).await.unwrap();
     assert!((4.0..7.0).contains(&took.as_secs_f64()), "{took:?}");
     beside.finish("peers without a language").await;
 }
 
-/// Until the call has ended: headers with which the server says no more. The status is in them.
+/// Reads until the headers that end the call, which have its status.
 fn until_refused(mut stream: TcpStream) -> Duration {
     const HEADERS_AND_END: [u8; 6] = [1, 5, 0, 0, 0, 1];
     let (mut all, mut part, start) = (Vec::new(), [0; 4096], Instant::now());
@@ -192,7 +192,7 @@ fn until_refused(mut stream: TcpStream) -> Duration {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_length_of_4_gib_takes_no_memory() {
+async fn a_claimed_length_of_4_gib_takes_no_memory() {
     let beside = Beside::start(2).await;
     let node = &beside.cluster.nodes[0];
     let before = node.memory_bytes();
@@ -210,9 +210,9 @@ async fn a_length_of_4_gib_takes_no_memory() {
     beside.finish("lengths of 4 GiB").await;
 }
 
-/// Of two processes with one name the later counts, and the earlier waits until it has left.
+/// The later of two processes with one name counts; the earlier waits until it has left.
 #[tokio::test(flavor = "multi_thread")]
-async fn of_two_processes_with_one_name_the_later_counts_and_the_earlier_waits() {
+async fn the_later_of_two_processes_with_one_name_counts() {
     let beside = Beside::start(2).await;
     let Beside { cluster, watcher, .. } = &beside;
     let address_of = async || {
@@ -240,7 +240,7 @@ async fn of_two_processes_with_one_name_the_later_counts_and_the_earlier_waits()
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn reports_that_fit_no_plan_change_nothing() {
+async fn reports_of_another_plan_change_nothing() {
     let beside = Beside::start(2).await;
     let coordinator = CoordinatorClient::new(connect(&beside.cluster.coordinator.address).await.unwrap());
     let epoch = beside.watcher.epoch();

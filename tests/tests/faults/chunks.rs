@@ -61,7 +61,7 @@ async fn show(session: &Session, set_index: u32) -> Duration {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn spoilt_chunks_are_asked_for_again() {
+async fn corrupt_chunks_are_fetched_again() {
     let (cluster, manglers) = start(2).await;
     let session = session(&cluster).await;
     show(&session, 0).await;

@@ -1,6 +1,6 @@
-//! Faults, injected into real processes, real sockets and what is sent between them. Each test holds what a client saw
-//! and what the coordinator recorded against the invariants, and prints how long clients went without frames.
-//! `docs/faults.md` has the table.
+//! Faults, injected into real processes, real sockets and the data between them. Each test checks the client's frames
+//! and the coordinator's records against the invariants, and prints the longest time without frames. `docs/faults.md`
+//! has the table.
 #![allow(clippy::unwrap_used)]
 
 mod bad_input;
@@ -14,11 +14,11 @@ use client::Session;
 use cluster_tests::processes::Processes;
 use cluster_tests::watcher::Watcher;
 
-/// The program that is killed.
+/// The program that tests kill.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_scalar_cluster");
-/// Complete frames come again after a closed connection.
+/// Greatest time until complete frames after a closed connection.
 const CLOSED: Duration = Duration::from_secs(5);
-/// And after a silent loss.
+/// Greatest time until complete frames after a silent loss.
 const SILENT: Duration = Duration::from_secs(15);
 /// A sampler at fault loses its role within this, though only one compositor can tell.
 const ONE_WITNESS: Duration = Duration::from_secs(10);

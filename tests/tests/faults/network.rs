@@ -16,15 +16,15 @@ use wire::rpc::{CompositorClient, connect};
 
 use crate::{CLOSED, PROGRAM, SILENT, compositor_of, finish, has_role, sampler_of};
 
-/// A cluster, every link of which can be made to fail.
+/// A cluster whose links can fail.
 struct Network {
     cluster: Processes,
     watcher: Watcher,
-    /// From clients, compositors and the coordinator to each node.
+    /// Links from clients, compositors and the coordinator to each node.
     to_node: Vec<Proxy>,
-    /// From each node to the coordinator.
+    /// Links from each node to the coordinator.
     to_coordinator: Vec<Proxy>,
-    /// From the client to the coordinator.
+    /// The link from the client to the coordinator.
     of_client: Proxy,
 }
 
@@ -58,7 +58,7 @@ impl Network {
         finish(what, wait, &self.cluster, &self.watcher);
     }
 
-    /// How long the client went without frames while a fault lasted.
+    /// The longest time without frames during a fault.
     async fn through(&self, what: &str, lasting: Duration, most: Duration) {
         let since = Instant::now();
         tokio::time::sleep(lasting).await;
@@ -68,7 +68,7 @@ impl Network {
     }
 }
 
-/// Nothing reaches the host any more, and nothing comes from it. Later the cable is put back.
+/// All links of the host are silent, and restored later.
 async fn lost_host(what: &str, victim: fn(&Session) -> String) {
     let network = Network::start(3).await;
     let (name, to_node, to_coordinator) = network.links_of(victim);
@@ -83,7 +83,7 @@ async fn lost_host(what: &str, victim: fn(&Session) -> String) {
     network.finish(what, wait);
 }
 
-/// The node is a member, but who asks it for anything gets no answer.
+/// The node is a member, and requests to it get no answer.
 async fn half_open(what: &str, victim: fn(&Session) -> String, forth: Way) {
     let network = Network::start(3).await;
     let (name, to_node, _) = network.links_of(victim);
@@ -93,7 +93,7 @@ async fn half_open(what: &str, victim: fn(&Session) -> String, forth: Way) {
     network.finish(what, wait);
 }
 
-/// Whose links to the coordinator fail.
+/// The processes whose links to the coordinator fail.
 type Links = fn(&Network) -> Vec<&Proxy>;
 
 fn of_nodes(network: &Network) -> Vec<&Proxy> {
@@ -104,7 +104,8 @@ fn of_client(network: &Network) -> Vec<&Proxy> {
     vec![&network.of_client]
 }
 
-/// One direction or both between the coordinator and others: frames go on, and plans when it is mended.
+/// One direction or both between the coordinator and others fail. Frames go on, and plans follow when the link is
+/// restored.
 async fn away(what: &str, links: Links, forth: Way, back: Way) {
     let network = Network::start(3).await;
     links(&network).iter().for_each(|link| link.set(forth, back));
@@ -114,8 +115,8 @@ async fn away(what: &str, links: Links, forth: Way, back: Way) {
     network.through(&format!("{what}, mended"), Duration::from_secs(1), CLOSED).await;
 }
 
-/// Large pictures take longer over a thin line than keepalive waits for an answer.
-async fn thin_line() {
+/// Large pictures take longer over a low bandwidth than keepalive waits for an answer.
+async fn low_bandwidth() {
     let network = Network::start(2).await;
     let (_, to_node, _) = network.links_of(compositor_of);
     let bytes_per_s = 80e3;
@@ -130,9 +131,9 @@ async fn thin_line() {
     assert!(start.elapsed().as_secs_f64() < 1.9 * least_s, "nothing was sent twice: {:?}", start.elapsed());
 }
 
-/// Keepalive takes up to 10 s to notice: all at the same time.
+/// Keepalive takes up to 10 s to notice, so that all faults run at the same time.
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
-async fn silence_heals_within_15_s() {
+async fn frames_go_on_within_15_s_of_a_partition() {
     tokio::join!(
         lost_host("sampler's host lost", sampler_of),
         lost_host("compositor's host lost", compositor_of),
@@ -143,12 +144,12 @@ async fn silence_heals_within_15_s() {
         away("coordinator hears no nodes", of_nodes, Way::Stall, Way::Pass),
         away("nodes do not hear the coordinator", of_nodes, Way::Pass, Way::Stall),
         away("coordinator and client partitioned", of_client, Way::Stall, Way::Stall),
-        thin_line(),
+        low_bandwidth(),
     );
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn cut_connections_are_made_again() {
+async fn frames_go_on_after_connections_are_cut() {
     let network = Network::start(3).await;
     for victim in [compositor_of, sampler_of] {
         let (_, to_node, to_coordinator) = network.links_of(victim);
@@ -159,7 +160,7 @@ async fn cut_connections_are_made_again() {
     }
 }
 
-/// The node is a member and cannot be connected to.
+/// The node is a member and refuses connections.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_node_that_refuses_connections_is_replaced() {
     for (what, victim) in [("sampler", sampler_of as fn(&Session) -> String), ("compositor", compositor_of)] {
@@ -189,9 +190,9 @@ async fn frames_go_on_over_late_slow_and_lossy_links() {
     network.through("slow sampler", Duration::from_secs(2), CLOSED).await;
 }
 
-/// Where the length of a message is spoilt, whoever reads waits for what never comes: for as long as keepalive does.
+/// After a corrupt length of a message the reader waits for missing bytes, until keepalive ends the connection.
 #[tokio::test(flavor = "multi_thread")]
-async fn bytes_that_are_spoilt_on_the_way_are_not_shown() {
+async fn frames_that_are_corrupted_on_the_way_are_not_shown() {
     let network = Network::start(3).await;
     for proxy in &network.to_node {
         proxy.set(Way::Pass, Way::Spoilt { one_in: 40 });
@@ -200,13 +201,13 @@ async fn bytes_that_are_spoilt_on_the_way_are_not_shown() {
     tokio::time::sleep(Duration::from_secs(3)).await;
     network.to_node.iter().for_each(Proxy::heal);
     let wait = network.watcher.healed(since, SILENT, |_| true).await;
-    network.finish("a byte of every fortieth piece spoilt", wait);
+    network.finish("a byte of every fortieth piece changed", wait);
     network.through("as it was", Duration::from_secs(1), SILENT).await;
 }
 
-/// Who asks for much and reads nothing holds up nobody else, and what waits for it is bounded.
+/// A client that requests many views and reads none delays no other, and its waiting frames are bounded.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_client_that_does_not_read_harms_nobody() {
+async fn a_client_that_does_not_read_delays_no_other() {
     let network = Network::start(2).await;
     let plan = network.watcher.session.plan().assignment;
     let name = compositor_of(&network.watcher.session);
@@ -233,7 +234,7 @@ async fn a_client_that_does_not_read_harms_nobody() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_thousand_connections_leave_nothing_behind() {
+async fn a_thousand_connections_leak_nothing() {
     let cluster = Processes::start(PROGRAM, 1).await;
     let watcher = Watcher::start(&cluster.client).await;
     let servers = [&cluster.coordinator, &cluster.nodes[0]];

@@ -69,7 +69,7 @@ async fn stopped(what: &str, nodes: usize, victim: fn(&Session) -> String, deadl
 
 /// Probes and keepalive take seconds to notice: all at the same time.
 #[tokio::test(flavor = "multi_thread")]
-async fn stopped_processes_are_replaced_and_fenced_when_they_go_on() {
+async fn stopped_processes_are_replaced_and_fenced_when_they_continue() {
     tokio::join!(
         stopped("sampler stopped", 3, sampler_of, SILENT),
         stopped("the only compositor's sampler stopped", 2, sampler_of, ONE_WITNESS),
@@ -92,7 +92,7 @@ async fn stopped_coordinator() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_that_is_asked_to_end_does_so_under_load_and_no_frame_is_lost() {
+async fn a_node_that_is_terminated_under_load_ends_and_no_frame_is_lost() {
     let mut cluster = Processes::start(PROGRAM, 3).await;
     let watcher = Watcher::start(&cluster.client).await;
     for victim in [compositor_of, sampler_of] {
@@ -107,19 +107,19 @@ async fn a_node_that_is_asked_to_end_does_so_under_load_and_no_frame_is_lost() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_node_whose_device_is_lost_ends_and_others_take_its_place() {
+async fn a_node_whose_device_is_lost_ends_and_is_replaced() {
     let mut cluster = Processes::start(PROGRAM, 3).await;
     let watcher = Watcher::start(&cluster.client).await;
     let (name, since) = (compositor_of(&watcher.session), Instant::now());
     let node = &mut cluster.nodes[number_of(&name)];
     node.signal(Signal::USR1);
     let (status, _) = node.ended(CLOSED).await;
-    assert!(!status.success(), "whoever started it may start it again");
+    assert!(!status.success(), "its supervisor may start it again");
     let wait = watcher.healed(since, CLOSED, |session| !has_role(session, &name)).await;
     finish("device of a compositor lost", wait, &cluster, &watcher);
 }
 
-/// What was sampled is kept: the sampler's device is needed again for another workload only, and to measure its costs.
+/// Samples are kept: the sampler's device is used again only for another workload, and to measure its costs.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_opens_though_a_device_is_lost_meanwhile() {
     let mut cluster = Processes::start(PROGRAM, 3).await;

@@ -1,4 +1,4 @@
-//! Live streams: the newest pose counts, and nobody holds up another.
+//! Live streams: the newest pose counts, and no stream delays another.
 #![allow(clippy::unwrap_used)]
 
 mod quotas;
@@ -32,12 +32,12 @@ async fn every_frame_shows_its_pose() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bad_poses_are_refused_before_they_are_sent() {
+async fn invalid_poses_are_refused_before_they_are_sent() {
     let cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let mut live = session.live();
-    assert!(matches!(live.look(camera(0.0, SIZE_PX), 1), Err(ClientError::Invalid { field: "set_index", .. })));
-    assert!(matches!(live.look(camera(f32::NAN, SIZE_PX), 0), Err(ClientError::Invalid { field: "camera", .. })));
+    assert!(matches!(live.set_pose(camera(0.0, SIZE_PX), 1), Err(ClientError::Invalid { field: "set_index", .. })));
+    assert!(matches!(live.set_pose(camera(f32::NAN, SIZE_PX), 0), Err(ClientError::Invalid { field: "camera", .. })));
     assert_eq!(seen(&mut live, 0.1, 0).await.frame.request.frame, 1);
     drop(session);
     let over = timeout(HEALED, live.next()).await.unwrap().unwrap_err();
@@ -49,7 +49,7 @@ async fn live_views_outlive_their_compositor() {
     let mut cluster = Cluster::start(4).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let plan = session.plan().assignment;
-    // On all compositors, each its own.
+    // The streams are on all compositors.
     let mut lives: Vec<LiveView> = plan.compositors.iter().map(|_| session.live()).collect();
     for live in &mut lives {
         seen(live, 0.0, 0).await;
@@ -73,7 +73,7 @@ async fn live_views_follow_the_plan() {
     let mut live = session.live();
     let (mut epoch, start) = (seen(&mut live, 0.0, 0).await.frame.header.sample_set_id.plan_epoch, Instant::now());
     let first = epoch;
-    // Its compositor may be the one that has to sample from now on.
+    // Its compositor may have become a sampler.
     let sampler = session.plan().assignment.samplers[0].node_name[1..].parse::<usize>().unwrap();
     cluster.nodes[sampler].kill();
     for i in 0.. {
@@ -93,7 +93,7 @@ async fn live_views_follow_the_plan() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_newest_pose_counts_and_two_frames_are_on_their_way() {
+async fn only_the_newest_pose_is_shown_and_two_frames_are_in_flight() {
     let cluster = Cluster::start(2).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let (address, epoch) = compositor_of(&session);
@@ -111,7 +111,7 @@ async fn the_newest_pose_counts_and_two_frames_are_on_their_way() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn live_requests_that_cannot_be_are_named() {
+async fn invalid_live_requests_are_refused_by_field() {
     let cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let (address, epoch) = compositor_of(&session);
@@ -132,7 +132,7 @@ async fn live_requests_that_cannot_be_are_named() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_plan_that_shows_the_same_serves_those_who_have_not_heard_of_it() {
+async fn a_plan_of_the_same_workload_serves_clients_of_the_plan_before() {
     let cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let (address, epoch) = compositor_of(&session);
@@ -152,12 +152,12 @@ async fn a_plan_that_shows_the_same_serves_those_who_have_not_heard_of_it() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_viewer_that_takes_nothing_for_a_while_goes_on_where_it_looks() {
+async fn a_viewer_that_pauses_goes_on_at_its_newest_pose() {
     let cluster = Cluster::start(2).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let mut live = session.live();
     for i in 0..50 {
-        live.look(camera(i as f32 * 0.005, SIZE_PX), 0).unwrap();
+        live.set_pose(camera(i as f32 * 0.005, SIZE_PX), 0).unwrap();
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
     let mut numbers = Vec::new();
@@ -165,6 +165,6 @@ async fn a_viewer_that_takes_nothing_for_a_while_goes_on_where_it_looks() {
         numbers.push(timeout(HEALED, live.next()).await.unwrap().unwrap().frame.request.frame);
     }
     assert!(numbers.is_sorted() && numbers.len() <= 4, "{numbers:?}: two, one that was asked for, and the newest");
-    // Batches of the same session are not touched by it.
+    // Batches of the same session are unaffected.
     assert_eq!(session.render_views(views(1, 6)).unwrap().all().await.unwrap().len(), 6);
 }

@@ -1,4 +1,4 @@
-//! Nobody holds up another, and what is too much is refused by its name.
+//! No stream delays another, and requests beyond a quota are refused by its name.
 
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,7 @@ use wire::rpc::{CompositorClient, connect};
 use crate::raw::{HEALED, Raw, STILL, compositor_of, greedy, narrow, pipeline, seen};
 
 #[tokio::test(flavor = "multi_thread")]
-async fn who_takes_nothing_holds_up_nobody_and_is_cut_off() {
+async fn a_client_that_takes_no_frames_delays_no_other_and_is_cut_off() {
     let hasty = |config: NodeConfig| NodeConfig {
         deadlines: Deadlines { stall: Duration::from_millis(700), ..config.deadlines },
         ..config
@@ -40,11 +40,11 @@ async fn who_takes_nothing_holds_up_nobody_and_is_cut_off() {
         }
     };
     assert_eq!(ended.code(), Code::DeadlineExceeded);
-    assert!(ended.message().contains("nothing was taken"), "{ended}");
+    assert!(ended.message().contains("none was taken"), "{ended}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn who_asks_for_thousands_does_not_starve_others() {
+async fn a_client_with_thousands_of_views_does_not_starve_others() {
     let cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let (address, _) = compositor_of(&session);
@@ -63,15 +63,15 @@ async fn who_asks_for_thousands_does_not_starve_others() {
     let mut waited = Vec::new();
     for i in 0..20 {
         let came = seen(&mut live, i as f32 * 0.01, 0).await;
-        waited.push(came.times.decoded - came.times.looked);
+        waited.push(came.times.decoded - came.times.posed);
     }
     assert!(!bulk.is_finished(), "nothing was shared: {waited:?}");
     assert_eq!(bulk.await.unwrap(), 4000);
 }
 
-/// A client asks for the rest of a batch when it has some of it: by then others may have taken the room.
+/// A client requests the rest of a batch when it has some of it: by then others may have used the quota.
 #[tokio::test(flavor = "multi_thread")]
-async fn who_was_let_in_waits_for_room() {
+async fn an_admitted_stream_waits_for_room() {
     let small = |config: NodeConfig| NodeConfig { quotas: Quotas { pixels: 4 << 20, ..config.quotas }, ..config };
     let cluster = Cluster::start_with(1, small).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
@@ -92,7 +92,7 @@ async fn who_was_let_in_waits_for_room() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_beyond_a_node_s_quota_is_refused_by_name() {
+async fn a_request_beyond_a_quota_of_a_node_is_refused_by_name() {
     let small =
         |config: NodeConfig| NodeConfig { quotas: Quotas { streams: 3, pixels: 4 << 20, ..config.quotas }, ..config };
     let cluster = Cluster::start_with(1, small).await;
@@ -104,7 +104,7 @@ async fn what_is_beyond_a_node_s_quota_is_refused_by_name() {
         let request = greedy(&session, 1024, count);
         narrow(&address).await.render_views(tokio_stream::once(request).chain(tokio_stream::pending())).await
     };
-    // Takes nothing, and keeps the node's pixels.
+    // This client takes no frames, and holds the node's pixels.
     let _first = ask(64).await.unwrap();
     tokio::time::sleep(Duration::from_millis(300)).await;
     let mut second = ask(1).await.unwrap();
@@ -122,7 +122,7 @@ async fn what_is_beyond_a_node_s_quota_is_refused_by_name() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_full_node_sends_a_live_view_to_another_and_says_where_none_has_room() {
+async fn a_live_view_goes_to_a_node_with_room_or_names_the_quota() {
     let one = |config: NodeConfig| NodeConfig { quotas: Quotas { streams: 1, ..config.quotas }, ..config };
     let cluster = Cluster::start_with(3, one).await;
     let session = cluster.session(SessionRequest { forced_sampler_count: Some(1), ..pipeline(STILL) }).await.unwrap();
@@ -140,7 +140,7 @@ async fn a_full_node_sends_a_live_view_to_another_and_says_where_none_has_room()
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn sessions_beyond_the_most_are_refused() {
+async fn sessions_beyond_the_limit_are_refused() {
     let config = CoordinatorConfig { max_sessions: 2, ..CoordinatorConfig::default() };
     let cluster = Cluster::start_limited(config, 1, |config| config).await;
     let first = cluster.session(pipeline(STILL)).await.unwrap();
@@ -157,7 +157,7 @@ async fn sessions_beyond_the_most_are_refused() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn two_hundred_idle_streams_are_no_burden() {
+async fn two_hundred_idle_streams_delay_no_frame() {
     let cluster = Cluster::start(2).await;
     let first = cluster.session(pipeline(STILL)).await.unwrap();
     let mut idle = Vec::new();
@@ -171,7 +171,7 @@ async fn two_hundred_idle_streams_are_no_burden() {
     for i in 0..10 {
         seen(&mut live, i as f32 * 0.01, 0).await;
     }
-    // None was let go.
+    // No stream was ended.
     for (_, live) in &mut idle {
         seen(live, 0.3, 0).await;
     }

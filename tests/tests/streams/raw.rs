@@ -1,4 +1,4 @@
-//! One live stream, by its client or message by message.
+//! A live stream, by its client or message by message.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ use tonic::transport::Endpoint;
 use wire::rpc::{CompositorClient, Messages, connect};
 
 pub const STILL: Timeline = Timeline { start_s: 0.0, step_s: 0.0, set_count: 1 };
-/// Frames come again after a fault, within so long.
+/// Greatest time until frames arrive after a fault.
 pub const HEALED: Duration = Duration::from_secs(5);
 pub const SIZE_PX: UVec2 = UVec2::new(48, 36);
 
@@ -25,9 +25,9 @@ pub fn pipeline(timeline: Timeline) -> SessionRequest {
     request(PolicyChoice::Pipeline, timeline)
 }
 
-/// The next frame is of this pose, and says so; its stages make the time at the compositor.
+/// The next frame shows this pose, as its header states; its stages sum to the time at the compositor.
 pub async fn seen(live: &mut LiveView, x_m: f32, set_index: u32) -> LiveFrame {
-    let number = live.look(camera(x_m, SIZE_PX), set_index).unwrap();
+    let number = live.set_pose(camera(x_m, SIZE_PX), set_index).unwrap();
     loop {
         let came = timeout(HEALED, live.next()).await.expect("a frame in time").unwrap();
         let header = &came.frame.header;
@@ -35,7 +35,7 @@ pub async fn seen(live: &mut LiveView, x_m: f32, set_index: u32) -> LiveFrame {
         let t = header.stage_times;
         let stages = t.set_wait_s + t.credit_wait_s + t.queue_s + t.batch_s + t.encode_s + t.send_wait_s;
         assert!((stages - t.compositor_s).abs() < 1e-3, "{t:?}");
-        assert!(t.compositor_s <= came.times.came.duration_since(came.times.sent).as_secs_f64() + 1e-3, "{t:?}");
+        assert!(t.compositor_s <= came.times.received.duration_since(came.times.sent).as_secs_f64() + 1e-3, "{t:?}");
         if came.frame.request.frame == number {
             assert_eq!(header.camera, camera(x_m, SIZE_PX));
             assert_eq!(header.sample_set_id.index, u64::from(set_index));
@@ -79,7 +79,7 @@ impl Raw {
         let _ = self.send.send(request).await;
     }
 
-    /// The next frame's number; none where none comes in a moment.
+    /// The next frame's number; `None` where none arrives soon.
     pub async fn frame(&mut self) -> Option<u64> {
         let part = timeout(Duration::from_millis(500), self.parts.next()).await.ok()?;
         Some(part.unwrap().unwrap().frame)
@@ -94,7 +94,7 @@ impl Raw {
     }
 }
 
-/// A client whose transport takes little that it does not read.
+/// A client whose transport buffers little.
 pub async fn narrow(address: &str) -> CompositorClient {
     let endpoint = Endpoint::from_shared(address.to_owned()).unwrap();
     let endpoint = endpoint.initial_stream_window_size(65_535).initial_connection_window_size(65_535);
@@ -106,7 +106,7 @@ pub fn compositor_of(session: &Session) -> (String, u64) {
     (assignment.compositors[0].address.clone(), assignment.plan_epoch)
 }
 
-/// As many views as a request may hold, of a size that takes a while, asked for and never read.
+/// Requests the greatest number of views, of a slow size, and reads none.
 pub fn greedy(session: &Session, side_px: u32, count: u64) -> RenderViews {
     let view = |frame| RequestedView { frame, camera: camera(frame as f32 * 1e-4, UVec2::splat(side_px)) };
     RenderViews {

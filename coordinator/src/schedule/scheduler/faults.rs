@@ -11,7 +11,7 @@ use crate::schedule::event::ProbeKind;
 use crate::schedule::member::Member;
 use crate::schedule::reports::{AtFault, Verdict};
 
-/// Duration of a quarantine: a link may be mended by then.
+/// Duration of a quarantine, after which a link may be restored.
 const QUARANTINE: Duration = Duration::from_secs(30);
 /// The same while there is no plan: long enough that the same plan is not made over and over.
 const QUARANTINE_WITHOUT_PLAN: Duration = Duration::from_secs(2);

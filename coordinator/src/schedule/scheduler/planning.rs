@@ -107,7 +107,7 @@ impl Scheduler {
         Some(PlanningSnapshot { names, nodes: self.costs_now(), current, load, policy_override })
     }
 
-    /// Plans at once, whatever the plan in force; without nodes sessions wait for the next one that joins.
+    /// Plans at once, for any plan in force; without nodes, sessions wait for the next one that joins.
     pub(super) fn replan(&mut self, why: &str) -> Vec<Command> {
         let Some(snapshot) = self.snapshot() else { return Vec::new() };
         match choose(&snapshot.demand()) {

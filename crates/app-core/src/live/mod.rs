@@ -1,4 +1,4 @@
-//! A client that moves: poses at a set rate, the frames that come of them, and where each frame's time went.
+//! A moving camera: poses at a set rate, their frames, and the time of each frame by stage.
 
 mod record;
 
@@ -12,41 +12,41 @@ use tokio::time::MissedTickBehavior;
 
 pub use record::{Record, STAGES, Shown, latencies, quantile};
 
-/// After the last pose: for its frame, or another plan's.
+/// The longest wait for the frame of the last pose.
 const LAST_FRAME: Duration = Duration::from_secs(2);
 
-/// A path, and how it is followed.
+/// A path, and the way to follow it.
 #[derive(Debug, Clone)]
 pub struct Drive {
-    /// One pose after the other; after the last comes the first.
+    /// Poses, repeated from the first after the last.
     pub path: Vec<PinholeCamera>,
     /// Poses a second.
     pub rate_hz: f64,
-    /// For how long.
+    /// The time to follow the path.
     pub lasting: Duration,
     /// Seconds between sample sets of a scene that moves.
     pub set_step_s: f64,
-    /// How many there are, shown over and over.
+    /// The number of sample sets, shown over and over.
     pub set_count: u32,
 }
 
-/// A drive under way.
+/// A drive in progress.
 struct Driving<'a> {
     session: &'a Session,
-    /// By epoch, which of the session's fallbacks a plan makes do with.
+    /// The session's fallback of each plan, by epoch.
     fallbacks: BTreeMap<u64, u32>,
     live: LiveView,
     start: Instant,
     record: Record,
-    /// Of a pose, where a plan has fewer pictures a second than were asked for.
+    /// The fraction of a pose that is due, where a plan has fewer pictures a second than asked for.
     due: f64,
     last_frame: u64,
 }
 
-/// Follows the path.
+/// Follows the path. An error that ends the frames is in the record.
 ///
 /// # Errors
-/// Where a pose cannot be: the session has ended, or a pose is not valid. What ends the frames is in the record.
+/// A pose cannot be sent: the session has ended, or the pose is not valid.
 pub async fn drive(session: &Session, drive: &Drive) -> Result<Record, ClientError> {
     let mut driving = Driving {
         session,
@@ -83,19 +83,19 @@ impl Driving<'_> {
         Ok(())
     }
 
-    /// As often as the plan in force has pictures for.
+    /// Sends a pose as often as the plan has pictures for it.
     fn pose(&mut self, drive: &Drive) -> Result<(), ClientError> {
         let (camera, set_index) = drive.pose(self.record.posed, self.start.elapsed().as_secs_f64());
         self.record.posed += 1;
         self.due += self.plan().frame_rate_ratio;
         if self.due >= 1.0 {
             self.due -= 1.0;
-            self.last_frame = self.live.look(camera, set_index)?;
+            self.last_frame = self.live.set_pose(camera, set_index)?;
         }
         Ok(())
     }
 
-    /// The plan in force; what it makes do with is kept for frames of it that come later.
+    /// The plan in force; its fallback is kept for frames of it that come later.
     fn plan(&mut self) -> SessionPlan {
         let plan = self.session.plan();
         self.fallbacks.insert(plan.assignment.plan_epoch, plan.fallback_index.map_or(0, |index| index + 1));
@@ -117,7 +117,7 @@ impl Driving<'_> {
             Ok(frame) => {
                 self.plan();
                 let plan_epoch = frame.frame.header.sample_set_id.plan_epoch;
-                // Nodes may be a plan ahead of what is known here.
+                // Nodes may be a plan ahead of this client.
                 let fallback = self.fallbacks.range(..=plan_epoch).next_back().map_or(0, |(_, fallback)| *fallback);
                 self.record.shown.push(Shown::of(&frame, self.start, fallback));
             }

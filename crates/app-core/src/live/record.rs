@@ -1,11 +1,11 @@
-//! What became of all poses.
+//! The record of a viewer: all its poses and frames.
 
 use std::time::Instant;
 
 use client::{ClientError, LiveFrame};
 use table::{Cell, Table};
 
-/// What a frame's age is made of, in order, with nothing left out.
+/// Stages of a frame's age, in order and complete.
 pub const STAGES: [&str; 9] = [
     "waiting to be sent",
     "waiting for samples",
@@ -21,21 +21,21 @@ pub const STAGES: [&str; 9] = [
 /// A frame that was shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shown {
-    /// Its number: the pose's, from 1.
+    /// The number of the frame and its pose, from 1.
     pub frame: u64,
-    /// When its pose was given, since the start.
+    /// The time of the pose, since the start.
     pub posed_s: f64,
-    /// When it was here, decoded.
+    /// The time at which the frame was decoded, since the start.
     pub shown_s: f64,
-    /// Of the plan that made it.
+    /// The plan that made the frame.
     pub plan_epoch: u64,
-    /// Of that plan.
+    /// The set of that plan.
     pub set_index: u64,
-    /// How old its samples were when it was made.
+    /// The age of its samples when the frame was made.
     pub set_age_s: f64,
-    /// By [`STAGES`].
+    /// Seconds of each of [`STAGES`].
     pub stages_s: [f64; 9],
-    /// Which of its session's fallbacks it was made with, from 1; 0: as it was asked for.
+    /// The session's fallback that it was made with, from 1; 0 for none.
     pub fallback: u32,
 }
 
@@ -44,16 +44,16 @@ impl Shown {
         let (here, header) = (&frame.times, &frame.frame.header);
         let since = |time: Instant| time.saturating_duration_since(start).as_secs_f64();
         let there = header.stage_times;
-        let away_s = here.came.saturating_duration_since(here.sent).as_secs_f64();
+        let away_s = here.received.saturating_duration_since(here.sent).as_secs_f64();
         Self {
             frame: frame.frame.request.frame,
-            posed_s: since(here.looked),
+            posed_s: since(here.posed),
             shown_s: since(here.decoded),
             plan_epoch: header.sample_set_id.plan_epoch,
             set_index: header.sample_set_id.index,
             set_age_s: there.set_age_s,
             stages_s: [
-                since(here.sent) - since(here.looked),
+                since(here.sent) - since(here.posed),
                 there.set_wait_s,
                 there.credit_wait_s,
                 there.queue_s,
@@ -61,44 +61,44 @@ impl Shown {
                 there.encode_s,
                 there.send_wait_s,
                 (away_s - there.compositor_s).max(0.0),
-                since(here.decoded) - since(here.came),
+                since(here.decoded) - since(here.received),
             ],
             fallback,
         }
     }
 
-    /// From its pose to the picture.
+    /// Seconds from the pose to the picture.
     #[must_use]
     pub fn age_s(&self) -> f64 {
         self.shown_s - self.posed_s
     }
 }
 
-/// What became of all poses of one viewer.
+/// The record of one viewer.
 #[derive(Debug, Clone, Default)]
 pub struct Record {
-    /// In the order they were shown.
+    /// Frames, in the order in which they were shown.
     pub shown: Vec<Shown>,
-    /// Poses that were due at the rate that was asked for.
+    /// The number of poses that were due at the rate asked for.
     pub posed: u64,
-    /// Why no more frames came.
+    /// The error that ended the frames.
     pub error: Option<ClientError>,
-    /// From the first pose to the last frame.
+    /// Seconds from the first pose to the last frame.
     pub seconds: f64,
 }
 
 impl Record {
-    /// The longest time without a new frame, and since when.
+    /// The longest time without a new frame, and its start.
     #[must_use]
     pub fn longest_gap_s(&self) -> Option<(f64, f64)> {
         let gaps = self.shown.windows(2).map(|pair| (pair[1].shown_s - pair[0].shown_s, pair[0].shown_s));
         gaps.max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Every frame that was shown.
+    /// A table of every frame.
     ///
     /// # Errors
-    /// A row that does not fit, which is a fault here.
+    /// A row does not fit its table.
     pub fn frames(&self) -> anyhow::Result<Table> {
         let head = ["frame", "posed", "shown", "plan_epoch", "set_index", "fallback", "age of its samples"];
         let units = ["", "s", "s", "", "", "", "s"];
@@ -113,7 +113,7 @@ impl Record {
         Ok(table)
     }
 
-    /// In one line.
+    /// The record in one line.
     #[must_use]
     pub fn summary(&self) -> String {
         let Self { shown, posed, seconds, error } = self;
@@ -134,10 +134,10 @@ impl Record {
     }
 }
 
-/// Where frames' time went, stage by stage.
+/// A table of the time of frames, stage by stage.
 ///
 /// # Errors
-/// As [`Record::frames`].
+/// A row does not fit its table.
 pub fn latencies<'a>(name: &str, shown: impl Iterator<Item = &'a Shown>) -> anyhow::Result<Table> {
     let columns = [("stage", ""), ("mean", "ms"), ("median", "ms"), ("95 %", "ms"), ("99 %", "ms"), ("most", "ms")];
     let mut table = Table::new(name, &columns);
@@ -154,7 +154,7 @@ pub fn latencies<'a>(name: &str, shown: impl Iterator<Item = &'a Shown>) -> anyh
     Ok(table)
 }
 
-/// Mean, median, 95 %, 99 % and most.
+/// Mean, median, 95 %, 99 % and maximum.
 fn figures_ms(mut values_s: Vec<f64>) -> [f64; 5] {
     values_s.sort_by(f64::total_cmp);
     let mean = values_s.iter().sum::<f64>() / values_s.len() as f64;
@@ -162,7 +162,7 @@ fn figures_ms(mut values_s: Vec<f64>) -> [f64; 5] {
     [mean, shares[0], shares[1], shares[2], shares[3]].map(|s| s * 1e3)
 }
 
-/// Of sorted values; NaN of none.
+/// A quantile of sorted values; NaN without any.
 #[must_use]
 pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     let at = ((sorted.len() as f64 * share) as usize).min(sorted.len().wrapping_sub(1));
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_are_of_the_values() {
+    fn a_quantile_is_one_of_the_values() {
         let sorted: Vec<f64> = (0..100).map(f64::from).collect();
         assert_eq!([0.0, 0.5, 0.99, 1.0].map(|share| quantile(&sorted, share)), [0.0, 50.0, 99.0, 99.0]);
         assert!(quantile(&[], 0.5).is_nan());

@@ -1,15 +1,14 @@
 //! A compute shader that is bound by name and dispatched.
 
-use std::ops::Range;
+use std::ops::{Deref, Range};
 
 use wgpu::BindGroup;
 
 use super::{
-    binding::Binding,
     compiled::Shader,
     variant::{Pass, ShaderVariant},
 };
-use crate::{device::Gpu, error::ShaderError, frame::Frame};
+use crate::{device::Gpu, frame::Frame};
 
 /// A compute pipeline with its layout. The shader's entry point is `main`.
 pub struct ComputePass {
@@ -44,18 +43,6 @@ impl ComputePass {
         Self { shader, pipeline }
     }
 
-    /// Binds resources to all variables of a group.
-    ///
-    /// # Errors
-    /// A name that is missing, not in the group, or there twice.
-    pub fn bind<'r>(
-        &self,
-        group: u32,
-        bindings: impl IntoIterator<Item = Binding<'r>>,
-    ) -> Result<BindGroup, ShaderError> {
-        self.shader.bind(group, bindings)
-    }
-
     /// Records one dispatch, which sees the first element of buffers at dynamic offsets. `groups` are all groups, from 0.
     pub fn dispatch(&self, frame: &mut Frame<'_>, groups: &[&BindGroup], size: DispatchSize<'_>) {
         self.dispatch_each(frame, groups, 0..1, size);
@@ -88,6 +75,13 @@ impl ComputePass {
                 DispatchSize::Indirect(arguments) => pass.dispatch_workgroups_indirect(arguments, 16 * number),
             }
         }
+    }
+}
+
+impl Deref for ComputePass {
+    type Target = Shader;
+    fn deref(&self) -> &Shader {
+        &self.shader
     }
 }
 

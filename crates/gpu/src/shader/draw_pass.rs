@@ -1,13 +1,14 @@
 //! A drawing shader that is bound by name. Depth is reversed: 1 at the near plane, 0 at infinity.
 
-use wgpu::{BindGroup, RenderPipeline, ShaderStages, TextureFormat};
+use std::ops::Deref;
+
+use wgpu::{RenderPipeline, ShaderStages, TextureFormat};
 
 use super::{
-    binding::Binding,
     compiled::Shader,
     variant::{Pass, ShaderVariant},
 };
-use crate::{device::Gpu, error::ShaderError};
+use crate::device::Gpu;
 
 /// A render pipeline with its layout. The shader's entry points are `vertex` and, unless it draws depth alone, `fragment`.
 pub struct DrawPass {
@@ -35,22 +36,17 @@ impl DrawPass {
     /// The format of depth targets.
     pub const DEPTH_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 
-    /// Binds resources to all variables of a group; the group fits all variants that declare it alike.
-    ///
-    /// # Errors
-    /// A name that is missing, not in the group, or there twice.
-    pub fn bind<'r>(
-        &self,
-        group: u32,
-        bindings: impl IntoIterator<Item = Binding<'r>>,
-    ) -> Result<BindGroup, ShaderError> {
-        self.shader.bind(group, bindings)
-    }
-
     /// The pipeline, to be set in a render pass.
     #[must_use]
     pub fn pipeline(&self) -> &RenderPipeline {
         &self.pipeline
+    }
+}
+
+impl Deref for DrawPass {
+    type Target = Shader;
+    fn deref(&self) -> &Shader {
+        &self.shader
     }
 }
 

@@ -92,7 +92,8 @@ impl ShaderInterface {
 
     /// The bytes from one element to the next of each dynamic resource of a group.
     pub(crate) fn strides(&self, group: usize) -> impl Iterator<Item = u32> {
-        self.groups[group].iter().filter_map(|resource| resource.element_bytes).map(uniform_stride)
+        let resources = self.groups.get(group).into_iter().flatten();
+        resources.filter_map(|resource| resource.element_bytes).map(uniform_stride)
     }
 
     /// Checks that bindings name all variables of a group, each once.
@@ -112,8 +113,10 @@ impl ShaderInterface {
         group: u32,
         names: impl Iterator<Item = &'n str>,
     ) -> Result<Vec<&Resource>, ShaderError> {
-        let resources = self.groups.get(group as usize).map(Vec::as_slice).unwrap_or_default();
         let shader = || self.shader.clone();
+        let Some(resources) = self.groups.get(group as usize) else {
+            return Err(ShaderError::NoGroup { shader: shader(), group });
+        };
         let mut matched: Vec<&Resource> = Vec::with_capacity(resources.len());
         for name in names {
             let Some(resource) = resources.iter().find(|resource| resource.name == name) else {
@@ -235,7 +238,7 @@ mod tests {
         assert!(matches!(extra, Err(ShaderError::NotInGroup { name, .. }) if name == "words"));
         let twice = matched(0, &["camera", "depth", "depth"]);
         assert!(matches!(twice, Err(ShaderError::BoundTwice { name, .. }) if name == "depth"));
-        assert!(matches!(matched(2, &["words"]), Err(ShaderError::NotInGroup { .. })));
+        assert!(matches!(matched(2, &[]), Err(ShaderError::NoGroup { group: 2, .. })));
     }
 
     #[test]

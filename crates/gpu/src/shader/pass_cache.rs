@@ -35,8 +35,8 @@ impl<V: ShaderVariant, P: Pass<V>> PassCache<V, P> {
         if let Some(pass) = passes.get(variant) {
             return Ok(pass.clone());
         }
-        let wgsl = self.templates.render(variant.template(), variant.context())?;
-        let shader = Shader::new(&self.gpu, variant.template(), &wgsl, variant.traits())?;
+        let wgsl = self.templates.render(V::TEMPLATE, variant.context())?;
+        let shader = Shader::new(&self.gpu, V::TEMPLATE, &wgsl, V::TRAITS)?;
         let pass = Arc::new(P::build(&self.gpu, shader, variant));
         passes.insert(variant.clone(), pass.clone());
         Ok(pass)

@@ -38,6 +38,13 @@ impl Templates {
         Ok(Self { environment })
     }
 
+    /// Adds numbers that Rust shares with WGSL, as [`wgsl_constants!`](crate::wgsl_constants) lists them.
+    #[must_use]
+    pub fn with_constants(mut self, constants: impl IntoIterator<Item = (&'static str, String)>) -> Self {
+        constants.into_iter().for_each(|(name, literal)| self.environment.add_global(name, literal));
+        self
+    }
+
     /// The WGSL of `name` with `context` filled in.
     ///
     /// # Errors
@@ -56,10 +63,6 @@ fn with_binding_numbers(text: &str) -> String {
     let mut counts: HashMap<&str, u32> = HashMap::new();
     for part in parts {
         let (group, declaration) = part.split_once(')').unwrap_or((part, ""));
-        if declaration.starts_with(" @binding") {
-            wgsl.push_str(&format!("@group({group}){declaration}"));
-            continue;
-        }
         let count = counts.entry(group).or_default();
         wgsl.push_str(&format!("@group({group}) @binding({count}){declaration}"));
         *count += 1;

@@ -10,15 +10,12 @@ use crate::{device::Gpu, error::ShaderError};
 /// A shader's switches. Each set of them is a text of its own.
 pub trait ShaderVariant: Debug + Clone + Eq + Hash {
     /// The template, which is also the label of its passes.
-    fn template(&self) -> &'static str;
+    const TEMPLATE: &'static str;
+    /// Properties of resources that WGSL does not say.
+    const TRAITS: ResourceTraits = &[];
 
     /// The values that the template uses.
     fn context(&self) -> Value;
-
-    /// What WGSL does not say of resources.
-    fn traits(&self) -> ResourceTraits {
-        &[]
-    }
 
     /// The variants that stand for all: each switch in each position, few and many of what is counted.
     fn all() -> Vec<Self>;
@@ -43,9 +40,20 @@ pub struct ShaderSource {
 
 /// The texts of [`ShaderVariant::all`].
 pub fn sources<V: ShaderVariant>(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    V::all().into_iter().map(|variant| {
-        let (template, traits) = (variant.template(), variant.traits());
-        let wgsl = templates.render(template, variant.context())?;
-        Ok(ShaderSource { name: format!("{template}: {variant:?}"), template, wgsl, traits })
-    })
+    V::all().into_iter().map(|variant| source(templates, &variant))
+}
+
+/// The text of a variant.
+///
+/// # Errors
+/// A template that is broken.
+pub fn source<V: ShaderVariant>(templates: &Templates, variant: &V) -> Result<ShaderSource, ShaderError> {
+    let wgsl = templates.render(V::TEMPLATE, variant.context())?;
+    let name = format!("{}: {variant:?}", V::TEMPLATE);
+    Ok(ShaderSource { name, template: V::TEMPLATE, wgsl, traits: V::TRAITS })
+}
+
+/// Every position of `N` switches.
+pub fn switches<const N: usize>() -> impl Iterator<Item = [bool; N]> {
+    (0..1_usize << N).map(|bits| std::array::from_fn(|switch| bits >> switch & 1 == 1))
 }

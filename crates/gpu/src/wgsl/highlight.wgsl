@@ -48,7 +48,7 @@ fn schlick(reflectance_linear: vec3f, cosine: f32) -> vec3f {
     return reflectance_linear + (1.0 - reflectance_linear) * (squared * squared * rest);
 }
 
-// What one light adds with nothing in between.
+// The highlight of one light, unoccluded.
 fn highlight_from_light(light: Light, mirror: Mirror) -> vec3f {
     let incident = incident_from(light, mirror.point_in_world, vec2f(0.5));
     let half_way = unit_or_zero(incident.towards + mirror.towards_eye);
@@ -61,7 +61,7 @@ fn highlight_from_light(light: Light, mirror: Mirror) -> vec3f {
     return incident.irradiance_linear * fresnel * (lobe * n_l);
 }
 
-// What the environment adds with nothing in between: split sum, with Karis' fit for the surface's part.
+// The highlight of the environment, unoccluded: split sum, with Karis' fit for the surface's part.
 fn highlight_from_environment(mirror: Mirror) -> vec3f {
     let n_v = clamp(dot(mirror.normal, mirror.towards_eye), 0.0, 1.0);
     let roughness = max(mirror.reflector.roughness, LEAST_ROUGHNESS);
@@ -80,7 +80,7 @@ fn phong_exponent(roughness: f32) -> f32 {
     return clamp(2.0 / max(squared * squared, 1e-6) - 2.0, 1.0, 1024.0);
 }
 
-// What one light adds with nothing in between.
+// The highlight of one light, unoccluded.
 fn highlight_from_light(light: Light, mirror: Mirror) -> vec3f {
     let incident = incident_from(light, mirror.point_in_world, vec2f(0.5));
     let half_way = unit_or_zero(incident.towards + mirror.towards_eye);
@@ -89,13 +89,13 @@ fn highlight_from_light(light: Light, mirror: Mirror) -> vec3f {
     return incident.irradiance_linear * mirror.reflector.reflectance_linear * (lobe * n_l);
 }
 
-// A mirror image of what is all around is not part of this lighting.
+// A mirror image of the environment is not part of this lighting.
 fn highlight_from_environment(mirror: Mirror) -> vec3f {
     return vec3f(0.0);
 }
 {% endif %}
 
-// All that a surface adds for one eye; nothing where the reflector is 0. Byte 0 of the visibility is the
+// All highlights of a surface for one eye; none where the reflector is 0. Byte 0 of the visibility is the
 // environment's share, byte 1 + i the i-th light's.
 fn highlight(
     point_in_world: vec3f,
@@ -107,7 +107,7 @@ fn highlight(
     let mirror = Mirror(point_in_world, normal, towards_eye, unpack_reflector(reflector_word));
     var sum = highlight_from_environment(mirror){% if visibility_words > 0 %} * unpack4x8unorm(visibility[0]).x{% endif %};
 {% if light_slots <= 8 %}
-    // Written out, which is a third cheaper than a loop; a slot without a light is dark.
+    // Unrolled, which is a third faster than a loop; a slot without a light is dark.
 {% for i in range(light_slots) %}
     sum += highlight_from_light(illumination.lights[{{ i }}], mirror){% if visibility_words > 0 %} * unpack4x8unorm(visibility[{{ (i + 1) // 4 }}])[{{ (i + 1) % 4 }}]{% endif %};
 {% endfor %}

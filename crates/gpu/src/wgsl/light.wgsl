@@ -1,19 +1,19 @@
-// What lights a scene; the twin of depth-image's light.rs. The includer declares
+// The light of a scene; the twin of depth-image's light.rs. The includer declares
 // `var<uniform> illumination: Illumination`.
 
 struct Light {
-    // Its middle; of parallel light, the unit vector towards it.
+    // The middle; for parallel light, the unit vector towards it.
     middle_in_world: vec3f,
     kind: u32,
-    // Intensity, of a rectangle radiance, of parallel light irradiance.
+    // Intensity; radiance of a rectangle, irradiance of parallel light.
     color_linear: vec3f,
-    // Radius in metres; of parallel light the tangent of the angular radius.
+    // Radius in metres; for parallel light the tangent of the angular radius.
     extent: f32,
-    // Of a spot its cone's axis, away from the light; of a rectangle from its middle to that of an edge.
+    // A spot's axis, away from the light; the way from a rectangle's middle to that of an edge.
     axis_in_world: vec3f,
-    // A spot's share of light: clamp((cosine - outer_cosine) · cone_scale)², 1 for what is no spot.
+    // A spot's share of light: clamp((cosine - outer_cosine) · cone_scale)², 1 for all other lights.
     outer_cosine: f32,
-    // Of a rectangle, from its middle to that of the next edge.
+    // The way from a rectangle's middle to that of the next edge.
     next_edge_in_world: vec3f,
     cone_scale: f32,
 }
@@ -48,7 +48,7 @@ const PARALLEL_M: f32 = 1e30;
 const LEAST_DISTANCE_M: f32 = 1e-6;
 const LIGHT_PI: f32 = 3.1415927;
 
-// Of unit length; 0 for 0.
+// A vector of unit length; 0 for 0.
 fn unit_or_zero(v: vec3f) -> vec3f {
     return v * inverseSqrt(max(dot(v, v), 1e-30));
 }
@@ -110,12 +110,12 @@ fn apparent_radius(light: Light, incident: Incident) -> f32 {
     return radius_m / select(incident.distance_m, 1.0, light.kind == LIGHT_PARALLEL);
 }
 
-// What arrives from far away in a direction: a gradient from straight down to straight up.
+// The radiance that arrives from far away in a direction: a gradient from straight down to straight up.
 fn environment_radiance(direction: vec3f) -> vec3f {
     return mix(illumination.nadir_linear, illumination.zenith_linear, 0.5 + 0.5 * direction.y);
 }
 
-// What a white surface reflects of it with nothing in between: the gradient under a cosine lobe.
+// The radiance that a white surface reflects of it, unoccluded: the gradient under a cosine lobe.
 fn environment_diffuse(normal: vec3f) -> vec3f {
     return mix(illumination.nadir_linear, illumination.zenith_linear, 0.5 + normal.y * (1.0 / 3.0));
 }

@@ -8,7 +8,7 @@ use crate::{color::REC_709, color::WhiteRelative, convolution::Edge, convolution
 
 /// Differences are compressed by this power.
 const POWER: f32 = 0.7;
-/// Errors up to this share of the greatest…
+/// Errors up to this share of the greatest error…
 const KNEE: f32 = 0.4;
 /// …are spread over this share of the output.
 const KNEE_OUTPUT: f32 = 0.95;
@@ -44,7 +44,7 @@ fn filtered(plane: &Plane, sensitivities: &[Sensitivity], pixels_per_degree: f32
     sum
 }
 
-/// Chroma counts for less where it is dark.
+/// Chroma counts less in the dark.
 fn hunt_adjusted(space: &WhiteRelative, linear: Vec3) -> Vec3 {
     let lab = space.lab_from_linear(linear);
     Vec3::new(lab.x, 0.01 * lab.x * lab.y, 0.01 * lab.x * lab.z)

@@ -1,4 +1,4 @@
-//! FLIP's feature pipeline (§4.2): edges and points that one image has and the other has not.
+//! FLIP's feature pipeline (§4.2): edges and points that only one image has.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -15,7 +15,7 @@ pub(super) fn map(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize, p
     edges.zip(points).map(|(edge, point)| (edge.max(point) / 2.0_f32.sqrt()).sqrt().min(1.0)).collect()
 }
 
-/// Strengths at every pixel.
+/// Strengths of edges and points at every pixel.
 struct Features {
     edge: Vec<f32>,
     point: Vec<f32>,

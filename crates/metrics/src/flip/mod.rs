@@ -1,8 +1,8 @@
 //! LDR-FLIP: Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild, "FLIP: A Difference
 //! Evaluator for Alternating Images", HPG 2020. Section numbers below are the paper's.
 //!
-//! A colour difference (what remains after the eye's contrast sensitivity blurred both images) is raised
-//! by a feature difference (edges and points that only one image has): `ΔE = ΔEc^(1 - ΔEf)`.
+//! A colour difference is raised by a feature difference: `ΔE = ΔEc^(1 - ΔEf)`. The colour difference is that of both
+//! images blurred by the eye's contrast sensitivity; features are edges and points that only one image has.
 
 mod color_difference;
 mod feature_difference;
@@ -18,12 +18,12 @@ pub const FLIP_PIXELS_PER_DEGREE: f32 = 67.020_64;
 /// FLIP's error of every pixel, 0 to 1, for the default viewer.
 ///
 /// # Errors
-/// Images of different sizes.
+/// Images differ in size.
 pub fn flip_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, MetricsError> {
     flip_map_at(reference, test, FLIP_PIXELS_PER_DEGREE)
 }
 
-/// FLIP's error of every pixel, 0 to 1, for a viewer who sees so many pixels a degree.
+/// FLIP's error of every pixel, 0 to 1, for a viewer with this many pixels a degree.
 ///
 /// # Errors
 /// Images of different sizes, or no such viewer.

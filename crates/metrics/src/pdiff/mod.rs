@@ -2,10 +2,10 @@
 //! Production Testing", Journal of Graphics Tools 9(4), 2004, after Yee, Pattanaik, Greenberg, ACM TOG
 //! 20(1), 2001).
 //!
-//! A pixel fails if its luminance differs by more than `F · tvi(L)`, or its squared difference in (a*, b*)
-//! exceeds `F`. `F`, from 1 to 10, grows where the eye is insensitive: contrast sensitivity (Barten 1989)
-//! and visual masking (Daly 1993), weighed by the contrast in each octave of spatial frequency.
-//! `tvi` is Ward Larson's threshold against intensity (1997). Written from those papers.
+//! A pixel fails if its luminance differs by more than `F · tvi(L)`, or its squared difference in (a*, b*) exceeds `F`.
+//! `F`, from 1 to 10, grows where the eye is insensitive. It follows from contrast sensitivity (Barten 1989) and visual
+//! masking (Daly 1993), weighed by the contrast in each octave of spatial frequency. `tvi` is Ward Larson's threshold
+//! against intensity (1997). The code is written from those papers.
 
 mod vision;
 
@@ -15,39 +15,34 @@ use rayon::prelude::*;
 use crate::color::{ADOBE_RGB, REC_709, WhiteRelative, convert_pixels, lab_from_relative_xyz};
 use crate::convolution::{Edge, Plane};
 use crate::{MetricsError, Rgb8Image, error::expect_mask};
-use vision::{FrequencyBands, threshold_vs_intensity};
+use vision::{FrequencyBands, LEVELS, threshold_vs_intensity};
 
-/// Levels of the pyramid, each an octave or so smoother than the one before.
-const LEVELS: usize = 8;
-/// Octaves of contrast: a band needs the two levels above it.
-const BANDS: usize = LEVELS - 2;
 /// Burt and Adelson's generating kernel.
 const BINOMIAL: [f32; 5] = [0.05, 0.25, 0.4, 0.25, 0.05];
-/// Nothing is darker, cd/m².
+/// The least luminance, cd/m².
 const DARKEST_CD_M2: f32 = 1e-5;
-/// Below this adaptation colour fades, cd/m².
+/// The adaptation luminance below which colour fades, cd/m².
 const COLOR_VISION_CD_M2: f32 = 10.0;
 
-/// What light the three channels stand for.
+/// The primaries of the three channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PdiffPrimaries {
-    /// Adobe RGB (1998). The public tool takes every image for that, and so do the counts that papers
-    /// quote; it weighs chroma a little more than sRGB would.
+    /// Adobe RGB (1998): the public tool and the counts of papers assume it. It weighs chroma a little more than sRGB.
     AdobeRgb,
-    /// Rec. 709, as in sRGB: what our images mean.
+    /// Rec. 709, as in sRGB: the primaries of our images.
     Rec709,
 }
 
-/// Who looks at what.
+/// The viewer and the display.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PdiffSettings {
-    /// Horizontal angle that the image fills, degrees.
+    /// The horizontal angle of the image, degrees.
     pub field_of_view_deg: f32,
-    /// Exponent from 8 bits to light.
+    /// The exponent from 8 bits to light.
     pub gamma: f32,
-    /// Luminance of white.
+    /// The luminance of white.
     pub white_cd_m2: f32,
-    /// What light the channels stand for.
+    /// The primaries of the channels.
     pub primaries: PdiffPrimaries,
 }
 
@@ -72,7 +67,7 @@ impl PdiffSettings {
     }
 }
 
-/// Which pixels a viewer would see differ.
+/// The pixels that a viewer sees differ.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PdiffMap {
     failing: Vec<bool>,
@@ -85,10 +80,10 @@ impl PdiffMap {
         &self.failing
     }
 
-    /// Failing pixels, of all or of the mask.
+    /// The number of failing pixels, of all or of the mask.
     ///
     /// # Errors
-    /// A mask of another size.
+    /// The mask has another size.
     pub fn failing_px(&self, mask: Option<&[bool]>) -> Result<usize, MetricsError> {
         expect_mask(mask, self.failing.len())?;
         let selected = |index: usize| mask.is_none_or(|mask| mask[index]);
@@ -99,7 +94,7 @@ impl PdiffMap {
 /// Yee's perceptual difference.
 ///
 /// # Errors
-/// Images of different sizes, or settings that describe no viewer.
+/// Images differ in size, or the settings describe no viewer.
 pub fn pdiff_map(reference: &Rgb8Image, test: &Rgb8Image, settings: PdiffSettings) -> Result<PdiffMap, MetricsError> {
     reference.expect_same_size(test)?;
     settings.validate()?;
@@ -110,7 +105,7 @@ pub fn pdiff_map(reference: &Rgb8Image, test: &Rgb8Image, settings: PdiffSetting
     Ok(PdiffMap { failing })
 }
 
-/// One image as the eye has it.
+/// One image as the eye adapts to it.
 struct Seen {
     /// Luminance, cd/m², from sharp to smooth.
     pyramid: Vec<Plane>,
@@ -145,7 +140,7 @@ fn pyramid(luminance: Plane) -> Vec<Plane> {
     std::iter::successors(Some(luminance), smoother).take(LEVELS).collect()
 }
 
-/// Whether a viewer sees a pixel differ.
+/// True if a viewer sees a pixel differ.
 fn fails(reference: &Seen, test: &Seen, bands: &FrequencyBands, index: usize) -> bool {
     let level = bands.adaptation_level();
     let mean = (reference.luminance(level, index) + test.luminance(level, index)) / 2.0;
@@ -157,7 +152,7 @@ fn fails(reference: &Seen, test: &Seen, bands: &FrequencyBands, index: usize) ->
         || chroma_difference_squared(reference.ab[index], test.ab[index]) * color_scale(adaptation_cd_m2) > elevation
 }
 
-/// A band's amplitude and what it stands out from.
+/// The amplitude of a band, and its background.
 struct BandContrast {
     amplitude_cd_m2: f32,
     background_cd_m2: f32,
@@ -200,13 +195,13 @@ mod tests {
     }
 
     #[test]
-    fn what_the_eye_cannot_tell_passes() {
+    fn an_invisible_difference_passes() {
         assert_eq!(failing([120; 3], [120; 3]), 0);
         assert_eq!(failing([120; 3], [121; 3]), 0);
     }
 
     #[test]
-    fn what_the_eye_tells_fails() {
+    fn a_visible_difference_fails() {
         assert_eq!(failing([120; 3], [160; 3]), 64 * 48);
         assert_eq!(failing([200, 100, 100], [100, 145, 100]), 64 * 48, "equal luminance, other colour");
     }

@@ -1,10 +1,12 @@
-//! What the eye can tell apart, as published curves.
+//! Published curves of human vision.
 
-use super::{BANDS, LEVELS};
-
+/// The number of levels of the pyramid, each about an octave smoother than the one before.
+pub(super) const LEVELS: usize = 8;
+/// The number of octaves of contrast: a band needs the two levels above it.
+pub(super) const BANDS: usize = LEVELS - 2;
 /// The frequency of peak contrast sensitivity at 100 cd/m², cycles a degree.
 const PEAK_CYCLES_PER_DEGREE: f32 = 3.248;
-/// Yee's bound on how far sensitivity can fall.
+/// Yee's bound on the fall of sensitivity.
 const GREATEST_ELEVATION: f32 = 10.0;
 
 /// The spatial frequencies of the pyramid's bands for one viewer.
@@ -34,7 +36,7 @@ impl FrequencyBands {
         self.adaptation_level
     }
 
-    /// `F`: by how much the threshold rises, 1 to 10.
+    /// `F`: the rise of the threshold, 1 to 10.
     pub(super) fn threshold_elevation(&self, contrast: &[f32; BANDS], adaptation_cd_m2: f32) -> f32 {
         let weighted = contrast.iter().zip(self.cycles_per_degree).zip(self.inverse_relative_sensitivity);
         let elevations = weighted.map(|((&contrast, cycles), inverse_sensitivity)| {

@@ -1,15 +1,15 @@
-//! Twin of `quads.wgsl` and `resolve.wgsl`: triangles met by rays, then coloured by all cameras.
+//! Twin of `quads/draw.wgsl` and `quads/resolve.wgsl`: triangles met by rays, then coloured by all cameras.
 
 use depth_image::{DepthImage, PinholeCamera, ProvenanceKind, linear_from_rgb9e5, srgb8_from_linear};
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{
-    Pixel,
+    pixel::Pixel,
     sample_camera::SampleCamera,
     surface,
     view_ray::{ViewRay, ViewRays},
 };
-use crate::{Quad, pyramid::BACKGROUND_CODE};
+use crate::{pyramid::BACKGROUND_CODE, quads::Quad};
 
 /// The nearest triangle of a pixel.
 #[derive(Clone, Copy)]
@@ -88,7 +88,7 @@ fn meets(ray: &ViewRay, [a, b, c]: [Vec3; 3]) -> Option<f32> {
 }
 
 fn resolved(drawn: Drawn, images: &[DepthImage], cameras: &[SampleCamera], ray: &ViewRay) -> Pixel {
-    let blend = surface::blended(cameras, ray, drawn.t);
+    let blend = surface::blend_two_best(cameras, ray, drawn.t);
     if blend.camera_mask != 0 {
         return Pixel::hit(blend.color_linear, drawn.t, blend.camera_mask);
     }
@@ -96,7 +96,7 @@ fn resolved(drawn: Drawn, images: &[DepthImage], cameras: &[SampleCamera], ray: 
     Pixel::hit(own, drawn.t, 1 << drawn.image)
 }
 
-/// Empty where the ray misses the volume, or some camera looks past everything at where it leaves.
+/// Empty where the ray misses the volume, or some camera sees the background where the ray leaves it.
 fn kind_of_nothing(cameras: &[SampleCamera], ray: &ViewRay) -> ProvenanceKind {
     let point = ray.at(ray.far);
     if ray.near > ray.far || cameras.iter().any(|camera| shows_background(camera, point)) {

@@ -3,21 +3,8 @@
 use depth_image::{ProvenanceKind, linear_from_srgb8, srgb8_from_linear};
 use glam::{IVec2, UVec2, Vec3};
 
-use super::Pixel;
-
-const REACH_PX: i32 = 48;
-/// Depths that differ by less are one side of the gap.
-const SAME_SIDE: f32 = 0.95;
-const DIRECTIONS: [IVec2; 8] = [
-    IVec2::new(1, 0),
-    IVec2::new(-1, 0),
-    IVec2::new(0, 1),
-    IVec2::new(0, -1),
-    IVec2::new(1, 1),
-    IVec2::new(-1, 1),
-    IVec2::new(1, -1),
-    IVec2::new(-1, -1),
-];
+use super::pixel::Pixel;
+use crate::fill::{DIRECTIONS, REACH_PX, SAME_SIDE};
 
 /// The first known pixel in one direction, and what it counts.
 #[derive(Clone, Copy)]
@@ -31,8 +18,9 @@ pub(super) fn fill(pixels: &mut [Pixel], size_px: UVec2) {
     for (index, pixel) in pixels.iter_mut().enumerate() {
         if pixel.provenance.kind() == ProvenanceKind::Filled {
             let place = UVec2::new(index as u32 % size_px.x, index as u32 / size_px.x).as_ivec2();
+            let towards = DIRECTIONS.into_iter().map(IVec2::from);
             let neighbours: Vec<_> =
-                DIRECTIONS.into_iter().filter_map(|towards| known_towards(&known, size_px, place, towards)).collect();
+                towards.filter_map(|towards| known_towards(&known, size_px, place, towards)).collect();
             fill_pixel(pixel, &neighbours);
         }
     }

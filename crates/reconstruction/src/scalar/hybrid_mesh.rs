@@ -3,18 +3,20 @@
 use depth_image::{Camera, DepthImage, PinholeCamera, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 
-use crate::{ErrorBound, Quad, hybrid_mesh::GREATEST_EXTENT, shaders::GREATEST_SLOPE};
+use crate::{
+    error_bound::ErrorBound,
+    methods::hybrid_mesh::GREATEST_SLOPE,
+    pyramid::{FLAT_FOOTPRINTS, SLOPE_SHARE},
+    quads::{GREATEST_EXTENT, Quad},
+};
 
-/// As in `pyramid.rs`.
-const FLAT_FOOTPRINTS: f32 = 2.0;
-const SLOPE_SHARE: f32 = 0.2;
-/// Of a quad: upper left, upper right, lower left, lower right.
+/// The corners of a quad: upper left, upper right, lower left, lower right.
 const CORNERS: [UVec2; 4] = [UVec2::ZERO, UVec2::X, UVec2::Y, UVec2::ONE];
 
 /// An image, cut.
 struct Cut<'i> {
     camera: &'i PinholeCamera,
-    /// Of each sample.
+    /// The corners of each sample's quad.
     inverse_depths: Vec<[f32; 4]>,
     /// Columns and rows in texels, of the quad that begins at each sample; 0 where none does.
     extents: Vec<UVec2>,
@@ -43,7 +45,7 @@ impl Sample {
         self.inverse_depth * normal.dot(ray) / if along.abs() < 1e-12 { 1e-12 } else { along }
     }
 
-    /// Whether no discontinuity lies between the sample and what its corner's ray meets.
+    /// No discontinuity lies between the sample and what its corner's ray meets.
     fn shares(&self, held: f32, ray: Vec3, focal_px: f32) -> bool {
         let slack = FLAT_FOOTPRINTS * held.max(self.inverse_depth) / focal_px;
         let expected = self.on_plane(self.normal, ray);
@@ -63,15 +65,15 @@ impl Sample {
 
 /// Faces the eye, by at least as much as a surface of the greatest slope.
 fn tamed(normal: Vec3, ray: Vec3) -> Vec3 {
-    let sight = ray.normalize_or(Vec3::NEG_Z);
-    let facing = if normal.dot(sight) > 0.0 { -normal } else { normal };
-    let cosine = -facing.dot(sight);
+    let towards = ray.normalize_or(Vec3::NEG_Z);
+    let facing = if normal.dot(towards) > 0.0 { -normal } else { normal };
+    let cosine = -facing.dot(towards);
     let least_cosine = (1.0 + GREATEST_SLOPE * GREATEST_SLOPE).sqrt().recip();
     if cosine >= least_cosine {
         return facing;
     }
-    let sideways = facing + sight * cosine;
-    (sideways * (GREATEST_SLOPE / sideways.length().max(1e-6)) - sight) * least_cosine
+    let sideways = facing + towards * cosine;
+    (sideways * (GREATEST_SLOPE / sideways.length().max(1e-6)) - towards) * least_cosine
 }
 
 impl<'i> Cut<'i> {
@@ -180,12 +182,12 @@ impl<'i> Cut<'i> {
     }
 }
 
-/// Of so many quads along an axis.
+/// The extent of `count` quads along an axis.
 fn times(extent: UVec2, along: UVec2, count: u32) -> UVec2 {
     extent * (UVec2::ONE + along * (count - 1))
 }
 
-/// Of the two triangles that are drawn; linear in the image, as planes are.
+/// The two triangles that are drawn; linear in the image, as planes are.
 fn on_triangles([a, b, c, d]: [f32; 4], at: Vec2) -> f32 {
     if at.element_sum() <= 1.0 {
         a + (b - a) * at.x + (c - a) * at.y

@@ -1,22 +1,20 @@
 //! Twin of `march.wgsl`: a ray in the image of one sample camera alone.
 //!
-//! There the ray is a straight line along which columns, rows and the depth code are linear in one
-//! parameter `s`, 0 where the march begins and 1 where it ends.
+//! There the ray is a straight line. Columns, rows and the depth code are linear along it in one parameter `s`, 0 where
+//! the march begins and 1 where it ends.
 
 use glam::{Vec2, Vec3, Vec3Swizzles};
 
 use super::{
-    HALF_CODE,
     sample_camera::{Corners, SampleCamera},
     surface::bilinear,
     view_ray::ViewRay,
 };
-use crate::shaders::START_LEVEL;
-
-const MAX_COARSE: u32 = 64;
-const MAX_FINE: u32 = 12;
-/// Past an edge, in pixels.
-pub(super) const NUDGE_PX: f32 = 1e-3;
+use crate::{
+    methods::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL},
+    surface::HALF_CODE,
+    view_work::CELL_MARGIN_PX,
+};
 
 /// How far the way is free, and whether it ends at a surface.
 #[derive(Debug, Clone, Copy)]
@@ -29,7 +27,7 @@ pub(super) struct March {
 struct Line {
     origin: Vec3,
     line: Vec3,
-    /// Of the line's columns and rows.
+    /// The reciprocals of the line's columns and rows.
     inverse: Vec2,
     s_end: f32,
 }
@@ -52,12 +50,12 @@ impl Line {
     }
 }
 
-pub(super) fn march(camera: &SampleCamera, ray: &ViewRay, near: f32, stop_level: u32) -> March {
+pub(super) fn march(camera: &SampleCamera, ray: &ViewRay, near: f32) -> March {
     let [a, b] = ray.in_image_of(camera);
     let far = ray.far.max(near);
     let p0 = a + b * near;
     // The line ends before the plane through the camera's eye.
-    let end = if b.z < 0.0 { far.min((0.01 * p0.z - a.z) * safe_reciprocal(b.z)) } else { far };
+    let end = if b.z < 0.0 { far.min((EYE_SHARE * p0.z - a.z) * safe_reciprocal(b.z)) } else { far };
     let p1 = a + b * end;
     let in_image = |p: Vec3| (p.xy() / p.z - 0.5).extend(camera.code(p.z.recip()));
     let origin = in_image(p0);
@@ -68,17 +66,18 @@ pub(super) fn march(camera: &SampleCamera, ray: &ViewRay, near: f32, stop_level:
     let inverse = line.xy().map(|c| if c.abs() < 1e-9 { 1e9 } else { c.recip() });
     let border = (Vec2::select(inverse.cmpgt(Vec2::ZERO), camera.cells, Vec2::ZERO) - origin.xy()) * inverse;
     let line = Line { origin, line, inverse, s_end: border.min_element().min(1.0) };
-    let (s, blocked) = coarse(camera, &line, START_LEVEL.max(stop_level));
-    let (s, crossed) = if blocked { fine(camera, &line, s) } else { (s, false) };
+    let (s, blocked) = march_nodes(camera, &line);
+    let (s, crossed) = if blocked { march_cells(camera, &line, s) } else { (s, false) };
     // Back to the ray's own parameter: 1/w is linear in s.
     let share = s * p0.z / ((1.0 - s) * p1.z + s * p0.z);
     March { t: near + (end - near) * share, crossed }
 }
 
 /// Through nodes in which everything is farther away; ends before 2 × 2 cells that may hold a surface.
-fn coarse(camera: &SampleCamera, line: &Line, start_level: u32) -> (f32, bool) {
-    let (mut s, mut level) = (0.0f32, start_level.min(camera.top_level()));
-    for _ in 0..MAX_COARSE {
+fn march_nodes(camera: &SampleCamera, line: &Line) -> (f32, bool) {
+    let start_level = START_LEVEL.min(camera.top_level());
+    let (mut s, mut level) = (0.0f32, start_level);
+    for _ in 0..MAX_COARSE_MOVES {
         if s >= line.s_end {
             break;
         }
@@ -89,7 +88,7 @@ fn coarse(camera: &SampleCamera, line: &Line, start_level: u32) -> (f32, bool) {
         let (nearest, _) = camera.range(level, node);
         if at.z.min(line.at(exit).z) > nearest {
             s = exit;
-            level = (level + 1).min(start_level.min(camera.top_level()));
+            level = (level + 1).min(start_level);
             continue;
         }
         // Free up to the depth of the nearest thing in the node.
@@ -105,13 +104,13 @@ fn coarse(camera: &SampleCamera, line: &Line, start_level: u32) -> (f32, bool) {
 }
 
 /// From cell to cell, to where the ray crosses the surface or is found behind it.
-fn fine(camera: &SampleCamera, line: &Line, mut s: f32) -> (f32, bool) {
-    for _ in 0..MAX_FINE {
+fn march_cells(camera: &SampleCamera, line: &Line, mut s: f32) -> (f32, bool) {
+    for _ in 0..MAX_FINE_MOVES {
         if s >= line.s_end {
             break;
         }
         let at = line.at(s);
-        let cell = at.xy().max(Vec2::ZERO).min(camera.cells - 0.01).floor();
+        let cell = at.xy().max(Vec2::ZERO).min(camera.cells - CELL_MARGIN_PX).floor();
         let exit = line.exit(s, cell, 1.0);
         let beyond = line.at(exit);
         let corners = camera.corners(cell.as_uvec2());

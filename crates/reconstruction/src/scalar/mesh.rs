@@ -3,7 +3,7 @@
 use depth_image::{Camera, DepthImage};
 use glam::{UVec2, Vec3};
 
-use crate::{CodedDepth, Quad};
+use crate::{pyramid::CodedDepth, quads::Quad};
 
 /// In the order of their upper left samples.
 pub(super) fn quads(number: usize, image: &DepthImage) -> Vec<Quad> {

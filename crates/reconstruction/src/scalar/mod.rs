@@ -3,57 +3,25 @@
 //! An oracle for tests, written to be read beside the shaders; it is slow and takes only what
 //! [`crate::Reconstructor::upload`] accepts.
 
-mod carve;
 mod draw;
 mod fill;
 mod hybrid_mesh;
+mod joint_carve;
+mod light_field_search;
 mod march;
 mod mesh;
+mod pixel;
 mod sample_camera;
-mod search;
 mod specular;
 mod surface;
 mod tile_start;
 mod view_ray;
 
-use depth_image::{Aabb, DepthImage, PinholeCamera, Provenance, ProvenanceKind, View, srgb8_from_linear};
+use depth_image::{Aabb, DepthImage, PinholeCamera, View, srgb8_from_linear};
 use glam::Vec3;
 
-use crate::pyramid::is_among_holes;
-use crate::{Quad, ReconstructionMethod, SetDescription};
-use sample_camera::SampleCamera;
-use view_ray::{ViewRay, ViewRays};
-
-/// Greater than every parameter and gap.
-const FAR_AWAY: f32 = 3.0e38;
-/// Sides of the squares of pixels that start together.
-const TILE_PX: u32 = 8;
-/// Depth is known to half a code; a ray that reached a plane's very depth is still before it.
-const HALF_CODE: f32 = 0.5;
-/// The carve marches in so many of the nearest cameras first.
-const MARCHES: usize = 2;
-
-/// What is written for a pixel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Pixel {
-    srgb8: [u8; 3],
-    inverse_depth_per_m: f32,
-    provenance: Provenance,
-}
-
-impl Pixel {
-    fn without_surface(kind: ProvenanceKind, background_srgb8: [u8; 3]) -> Self {
-        Self { srgb8: background_srgb8, inverse_depth_per_m: 0.0, provenance: Provenance::new(kind, 0) }
-    }
-
-    fn hit(color_linear: Vec3, t: f32, camera_mask: u32) -> Self {
-        Self {
-            srgb8: color_linear.to_array().map(srgb8_from_linear),
-            inverse_depth_per_m: t.recip(),
-            provenance: Provenance::new(ProvenanceKind::Hit, camera_mask),
-        }
-    }
-}
+use self::{pixel::Pixel, sample_camera::SampleCamera, view_ray::ViewRays};
+use crate::{methods::ReconstructionMethod, pyramid::is_among_holes, quads::Quad, set_description::SetDescription};
 
 /// One view with depth and provenance.
 #[must_use]
@@ -74,8 +42,8 @@ pub fn reconstruct(
     finished(pixels, images, set, &cameras, &rays)
 }
 
-/// As [`reconstruct`], but each ray is followed from where it enters the volume: what tile starts must not
-/// change, but for the space that no camera sees. Of searches; what is drawn starts nowhere.
+/// As [`reconstruct`], but each ray is followed from where it enters the volume. Tile starts must not change the view,
+/// except for the space that no camera sees. For methods that follow rays.
 #[must_use]
 pub fn reconstruct_from_entry(
     images: &[DepthImage],
@@ -97,8 +65,8 @@ pub fn tile_starts_m(images: &[DepthImage], volume: &Aabb, camera: &PinholeCamer
     tile_start::tile_starts(&nearest_first(images, camera), &ViewRays::of(camera, volume, images))
 }
 
-/// The quads that a method draws, image after image in the order of their samples; `None` of methods that draw none.
-/// Of images without the planes that the method needs there are none either.
+/// The quads that a method draws, image after image in the order of their samples; `None` for methods that draw none.
+/// Images without the planes that the method needs give none.
 #[must_use]
 pub fn quads(images: &[DepthImage], method: ReconstructionMethod) -> Option<Vec<Quad>> {
     let images = || images.iter().enumerate();
@@ -122,7 +90,7 @@ fn nearest_first(images: &[DepthImage], camera: &PinholeCamera) -> Vec<SampleCam
     cameras
 }
 
-/// What the method finds, row by row.
+/// The pixels that the method finds, row by row.
 fn pixels_from(
     cameras: &[SampleCamera],
     rays: &ViewRays,
@@ -137,10 +105,10 @@ fn pixels_from(
             let start = starts[rays.tile_index(place)];
             match method {
                 ReconstructionMethod::LightFieldSearch { steps } => {
-                    search::light_field_search(cameras, &ray, start, steps, background_srgb8)
+                    light_field_search::light_field_search(cameras, &ray, start, steps, background_srgb8)
                 }
                 ReconstructionMethod::JointCarve { stop_level } => {
-                    joint_carve(cameras, &ray, start, stop_level, background_srgb8)
+                    joint_carve::joint_carve(cameras, &ray, start, stop_level, background_srgb8)
                 }
                 ReconstructionMethod::Mesh | ReconstructionMethod::HybridMesh { .. } => {
                     unreachable!("meshes are drawn, not searched")
@@ -150,7 +118,7 @@ fn pixels_from(
         .collect()
 }
 
-/// Fills what is unknown, then adds highlights, which are not to be spread.
+/// Fills unknown pixels, then adds highlights, which the fill would spread.
 fn finished(
     mut pixels: Vec<Pixel>,
     images: &[DepthImage],
@@ -166,27 +134,4 @@ fn finished(
         inverse_depth_per_m: Some(pixels.iter().map(|p| p.inverse_depth_per_m).collect()),
         provenance: Some(pixels.iter().map(|p| p.provenance).collect()),
     }
-}
-
-/// Marches in the nearest cameras, one after another; what they leave is carved by all together.
-fn joint_carve(
-    cameras: &[SampleCamera],
-    ray: &ViewRay,
-    start: f32,
-    stop_level: u32,
-    background_srgb8: [u8; 3],
-) -> Pixel {
-    let mut t = ray.near.max(start);
-    for marched in cameras.iter().take(MARCHES) {
-        if t >= ray.far {
-            return Pixel::without_surface(ProvenanceKind::Empty, background_srgb8);
-        }
-        let found = march::march(marched, ray, t, stop_level);
-        t = found.t;
-        let blend = surface::blended(cameras, ray, t);
-        if found.crossed && blend.occupied {
-            return Pixel::hit(blend.color_linear, t, blend.camera_mask);
-        }
-    }
-    carve::carve(cameras, ray, t, stop_level, background_srgb8)
 }

@@ -3,7 +3,11 @@
 use depth_image::{Camera, DepthImage, linear_from_rgb9e5};
 use glam::{UVec2, Vec2, Vec3, Vec4};
 
-use crate::{CodedDepth, Pyramid, pyramid::BACKGROUND_CODE, sample_set::stretch};
+use crate::{
+    pyramid::{BACKGROUND_CODE, CodedDepth, Pyramid},
+    sample_set::stretch,
+    view_work::FAR_AWAY,
+};
 
 /// One sample image, its depth as codes and their pyramid.
 pub(super) struct SampleCamera {
@@ -16,7 +20,7 @@ pub(super) struct SampleCamera {
     pub stretch: f32,
     /// This camera's bit in provenance.
     pub mask: u32,
-    /// Whether some texels of some image of the set prove nothing of what lies before them.
+    /// Some texels of some image of the set prove nothing of what lies before them.
     pub among_holes: bool,
     depth: CodedDepth,
     pyramid: Pyramid,
@@ -30,15 +34,15 @@ pub(super) struct SampleCamera {
 pub(super) struct Corners {
     pub codes: [f32; 4],
     pub connected: bool,
-    /// Whether the ways to all four are proven free.
+    /// The ways to all four are proven free.
     pub certain: bool,
     /// 1 for each corner whose own way is, else 0.
     pub proven: [f32; 4],
 }
 
-/// Of a node's word; a hole may be as near as anything, nearer than any code.
+/// The nearest code in a node's word; a hole may be as near as anything, nearer than any code.
 fn nearest_code(word: u32) -> f32 {
-    if word & 0xffff == 0xffff { super::FAR_AWAY } else { (word & 0xffff) as f32 }
+    if word & 0xffff == 0xffff { FAR_AWAY } else { (word & 0xffff) as f32 }
 }
 
 impl SampleCamera {
@@ -87,12 +91,12 @@ impl SampleCamera {
         self.depth.at(texel.x, texel.y)
     }
 
-    /// Whether nothing before a texel's sample is proven free.
+    /// Nothing before a texel's sample is proven free.
     pub fn is_uncertain(&self, texel: UVec2) -> bool {
         self.depth.is_uncertain(texel.x, texel.y)
     }
 
-    /// Of the image.
+    /// Nothing before some sample is proven free.
     pub fn has_uncertain(&self) -> bool {
         !self.depth.uncertain.is_empty()
     }

@@ -7,14 +7,14 @@ use depth_image::{
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{
-    Pixel,
+    pixel::Pixel,
     sample_camera::SampleCamera,
     surface::{bilinear, bilinear_shares},
     view_ray::{ViewRay, ViewRays},
 };
-use crate::{SetDescription, shaders::THICKNESS_FOOTPRINTS};
+use crate::{set_description::SetDescription, surface::THICKNESS_FOOTPRINTS, view_work::CELL_MARGIN_PX};
 
-/// What the samples around a point say together.
+/// The mean of the samples around a point.
 struct Gathered {
     normal_in_world: Vec3,
     /// Bytes, as in the images.
@@ -83,7 +83,7 @@ fn gathered(image: &DepthImage, camera: &SampleCamera, point_in_world: Vec3, lig
 fn shares_on_surface(camera: &SampleCamera, point_in_world: Vec3) -> (UVec2, [f32; 4]) {
     let p = camera.homogeneous(point_in_world.extend(1.0));
     let inverse_w = p.z.recip();
-    let uv = (p.xy() * inverse_w - 0.5).max(Vec2::ZERO).min(camera.cells - 0.01);
+    let uv = (p.xy() * inverse_w - 0.5).max(Vec2::ZERO).min(camera.cells - CELL_MARGIN_PX);
     let (cell, at) = (uv.as_uvec2(), uv - uv.floor());
     let corners = camera.corners(cell);
     let surfaces = if corners.connected { [bilinear(corners.codes, at); 4] } else { corners.codes };

@@ -3,21 +3,24 @@
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{sample_camera::SampleCamera, view_ray::ViewRay};
-use crate::shaders::{ANGLE_FLOOR, HIDDEN_WEIGHT, THICKNESS_FOOTPRINTS};
+use crate::{
+    surface::{ANGLE_FLOOR, BORDER_PX, CARVING_SHARE, HIDDEN_WEIGHT, LEAST_SHARE, THICKNESS_FOOTPRINTS},
+    view_work::CELL_MARGIN_PX,
+};
 
-/// Of four corners, in their order.
+/// Between four corners, in their order.
 pub(super) fn bilinear(corners: [f32; 4], at: Vec2) -> f32 {
     let upper = corners[0] + (corners[1] - corners[0]) * at.x;
     let lower = corners[2] + (corners[3] - corners[2]) * at.x;
     upper + (lower - upper) * at.y
 }
 
-/// Of each corner, in their order.
+/// The share of each corner, in their order.
 pub(super) fn bilinear_shares(at: Vec2) -> [f32; 4] {
     [(1.0 - at.x) * (1.0 - at.y), at.x * (1.0 - at.y), (1.0 - at.x) * at.y, at.x * at.y]
 }
 
-/// The cameras' colour of a point. `occupied`: whether they together hold that there is a surface.
+/// The cameras' colour of a point. `occupied`: they together hold that there is a surface.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Blend {
     pub color_linear: Vec3,
@@ -25,9 +28,9 @@ pub(super) struct Blend {
     pub occupied: bool,
 }
 
-/// What one camera makes of a point.
+/// One camera's vote on a point.
 #[derive(Debug, Clone, Copy)]
-struct Sight {
+struct CameraVote {
     /// How much its colour counts.
     weight: f32,
     color_linear: Vec3,
@@ -39,15 +42,15 @@ struct Sight {
 
 /// The two cameras that know a point best, each weighted by how far it surpasses the third (Buehler et al.
 /// 2001, with k = 2).
-pub(super) fn blended(cameras: &[SampleCamera], ray: &ViewRay, t: f32) -> Blend {
+pub(super) fn blend_two_best(cameras: &[SampleCamera], ray: &ViewRay, t: f32) -> Blend {
     let point = ray.at(t);
     let view_direction = ray.direction.normalize_or(Vec3::NEG_Z);
-    let sights: Vec<Sight> = cameras.iter().map(|camera| sight(camera, point, view_direction)).collect();
-    let mut best_first = sights.clone();
+    let votes: Vec<CameraVote> = cameras.iter().map(|camera| vote(camera, point, view_direction)).collect();
+    let mut best_first = votes.clone();
     best_first.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     let third_weight = best_first.get(2).map_or(0.0, |s| s.weight);
     let first = best_first[0];
-    let weight_of = |sight: &Sight| (sight.weight - third_weight).max(0.0);
+    let weight_of = |vote: &CameraVote| (vote.weight - third_weight).max(0.0);
     let (mut weights, mut color) = (weight_of(&first) + 1e-9, first.color_linear * (weight_of(&first) + 1e-9));
     let mut camera_mask = if first.weight > 0.0 { first.mask } else { 0 };
     if let Some(second) = best_first.get(1) {
@@ -55,26 +58,26 @@ pub(super) fn blended(cameras: &[SampleCamera], ray: &ViewRay, t: f32) -> Blend 
         weights += weight_of(second);
         camera_mask |= if second.weight > third_weight { second.mask } else { 0 };
     }
-    let [same, beyond]: [f32; 2] = [sights.iter().map(|s| s.same).sum(), sights.iter().map(|s| s.beyond).sum()];
-    let carved = sights.iter().any(|s| s.beyond > 0.999);
+    let [same, beyond]: [f32; 2] = [votes.iter().map(|s| s.same).sum(), votes.iter().map(|s| s.beyond).sum()];
+    let carved = votes.iter().any(|s| s.beyond > CARVING_SHARE);
     Blend { color_linear: color / weights, camera_mask, occupied: same >= beyond && camera_mask != 0 && !carved }
 }
 
-fn sight(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> Sight {
+fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> CameraVote {
     let p = camera.homogeneous(point_in_world.extend(1.0));
     let inverse_w = p.z.recip();
     let uv = p.xy() * inverse_w - 0.5;
     if !(p.z > 0.0 && uv.cmpge(Vec2::ZERO).all() && uv.cmplt(camera.cells).all()) {
-        return Sight { weight: 0.0, color_linear: Vec3::ZERO, mask: camera.mask, same: 0.0, beyond: 0.0 };
+        return CameraVote { weight: 0.0, color_linear: Vec3::ZERO, mask: camera.mask, same: 0.0, beyond: 0.0 };
     }
-    let clamped = uv.min(camera.cells - 0.01);
+    let clamped = uv.min(camera.cells - CELL_MARGIN_PX);
     let (cell, at) = (clamped.as_uvec2(), clamped - clamped.floor());
     let corners = camera.corners(cell);
     let reach = THICKNESS_FOOTPRINTS * camera.code_above(inverse_w) / camera.focal_px;
-    // Of a connected cell, the surface itself counts; else each sample for itself.
+    // In a connected cell the surface itself counts, else each sample for itself.
     let surfaces = if corners.connected { [bilinear(corners.codes, at); 4] } else { corners.codes };
     let (mut same, mut beyond, mut color) = (0.0, 0.0, Vec3::ZERO);
-    // Of the same surface, those that count, and those whose ways are proven free.
+    // On the same surface: shares that count, and shares whose ways are proven free.
     let (mut own, mut proven) = (0.0, 0.0);
     for (i, share) in bilinear_shares(at).into_iter().enumerate() {
         let gap = camera.code(inverse_w) - surfaces[i];
@@ -89,19 +92,19 @@ fn sight(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> S
             beyond += share;
         }
     }
-    let faded = |share: f32| ((share - 0.05) / 0.95).clamp(0.0, 1.0);
-    let kept = if camera.among_holes { faded(proven) + HIDDEN_WEIGHT * faded(same) } else { 1.0 };
-    let of: f32 = if camera.among_holes { own.max(1e-6) } else { same.max(0.05) };
-    let weight = if same > 0.05 { weight(camera, uv, point_in_world, view_direction) * kept } else { 0.0 };
-    Sight { weight, color_linear: color / of, mask: camera.mask, same, beyond }
+    let faded = |share: f32| ((share - LEAST_SHARE) / (1.0 - LEAST_SHARE)).clamp(0.0, 1.0);
+    let fade = if camera.among_holes { faded(proven) + HIDDEN_WEIGHT * faded(same) } else { 1.0 };
+    let of: f32 = if camera.among_holes { own.max(1e-6) } else { same.max(LEAST_SHARE) };
+    let weight = if same > LEAST_SHARE { weight(camera, uv, point_in_world, view_direction) * fade } else { 0.0 };
+    CameraVote { weight, color_linear: color / of, mask: camera.mask, same, beyond }
 }
 
 /// By the angle between the two lines of sight, the footprint and the distance to the border.
 fn weight(camera: &SampleCamera, uv: Vec2, point_in_world: Vec3, view_direction: Vec3) -> f32 {
-    let sight = point_in_world - camera.eye_in_world;
-    let inverse_distance = sight.length().recip();
-    let off = sight * inverse_distance - view_direction;
-    let border = (uv.min(camera.cells - uv).min_element() * 0.125).min(1.0) + 1e-3;
+    let eye_to_point = point_in_world - camera.eye_in_world;
+    let inverse_distance = eye_to_point.length().recip();
+    let off = eye_to_point * inverse_distance - view_direction;
+    let border = (uv.min(camera.cells - uv).min_element() / BORDER_PX).min(1.0) + 1e-3;
     let footprint = camera.focal_px * inverse_distance;
     border * footprint * footprint / (off.length_squared() + ANGLE_FLOOR)
 }

@@ -3,17 +3,16 @@
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{
-    FAR_AWAY, TILE_PX,
     sample_camera::SampleCamera,
     view_ray::{ViewRay, ViewRays},
 };
+use crate::{
+    tile_start::{GREATEST_MOVE, HALF_DIAGONAL, LEAST_MOVE, MAX_MOVES},
+    view_work::{FAR_AWAY, TILE_PX},
+};
 
-const MAX_MOVES: u32 = 40;
-const GREATEST_MOVE: f32 = 1.3;
-const LEAST_MOVE: f32 = 1.01;
-
-/// What a camera knows of a part of the way of all rays of a tile.
-struct Opinion {
+/// A camera's knowledge of a part of the way of all rays of a tile.
+struct Evaluation {
     /// Each ray's point is proven empty by this camera.
     proven: bool,
     /// No point that this camera sees may be occupied; it need not see them all.
@@ -30,7 +29,7 @@ pub(super) fn tile_starts(cameras: &[SampleCamera], rays: &ViewRays) -> Vec<f32>
 fn tile_start(cameras: &[SampleCamera], rays: &ViewRays, tile: UVec2) -> f32 {
     let middle = rays.ray_at((tile.as_vec2() + 0.5) * TILE_PX as f32);
     // Half a tile's diagonal at depth 1, and a little for rounding.
-    let slope = 0.7072 * TILE_PX as f32 / rays.focal_px();
+    let slope = HALF_DIAGONAL * TILE_PX as f32 / rays.focal_px();
     let farthest = (rays.volume.min - rays.eye()).abs().max((rays.volume.max - rays.eye()).abs()).length();
     let mut t = entry(rays, tile);
     let mut stride = GREATEST_MOVE;
@@ -38,8 +37,9 @@ fn tile_start(cameras: &[SampleCamera], rays: &ViewRays, tile: UVec2) -> f32 {
         if t >= farthest || stride <= LEAST_MOVE {
             break;
         }
-        let opinions: Vec<Opinion> = cameras.iter().map(|c| opinion(c, &middle, [t, t * stride], slope)).collect();
-        if opinions.iter().any(|o| o.proven) || opinions.iter().all(|o| o.unopposed) {
+        let evaluations: Vec<Evaluation> =
+            cameras.iter().map(|c| evaluate_camera(c, &middle, [t, t * stride], slope)).collect();
+        if evaluations.iter().any(|o| o.proven) || evaluations.iter().all(|o| o.unopposed) {
             t *= stride;
             stride = (1.0 + (stride - 1.0) * 1.5).min(GREATEST_MOVE);
         } else {
@@ -50,7 +50,7 @@ fn tile_start(cameras: &[SampleCamera], rays: &ViewRays, tile: UVec2) -> f32 {
 }
 
 /// A disc around the middle ray bounds the points of all rays at one parameter.
-fn opinion(camera: &SampleCamera, middle: &ViewRay, way: [f32; 2], slope: f32) -> Opinion {
+fn evaluate_camera(camera: &SampleCamera, middle: &ViewRay, way: [f32; 2], slope: f32) -> Evaluation {
     let [a, b] = middle.in_image_of(camera);
     let ends = way.map(|t| a + b * t);
     let radii_m = way.map(|t| slope * t);
@@ -63,7 +63,7 @@ fn opinion(camera: &SampleCamera, middle: &ViewRay, way: [f32; 2], slope: f32) -
     let in_front = closest_m.iter().all(|&m| m > 0.0);
     let aside = high.cmplt(Vec2::ZERO).any() || low.cmpgt(camera.cells).any();
     if farthest_m.iter().all(|&m| m <= 0.0) || (in_front && aside) {
-        return Opinion { proven: false, unopposed: true };
+        return Evaluation { proven: false, unopposed: true };
     }
     let first = low.max(Vec2::ZERO).min(camera.cells);
     let extent = high.max(Vec2::ZERO).min(camera.cells) - first;
@@ -73,7 +73,7 @@ fn opinion(camera: &SampleCamera, middle: &ViewRay, way: [f32; 2], slope: f32) -
     let farthest_code = farthest_m.map(|m| camera.code(m.max(1e-20).recip())).into_iter().fold(f32::INFINITY, f32::min);
     let empty = in_front && farthest_code > nearest;
     let whole = low.cmpge(Vec2::ZERO).all() && high.cmple(camera.cells).all();
-    Opinion { proven: empty && whole, unopposed: empty }
+    Evaluation { proven: empty && whole, unopposed: empty }
 }
 
 /// The least parameter at which a corner ray enters the volume; the near plane where a corner misses it

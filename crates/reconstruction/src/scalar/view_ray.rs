@@ -3,8 +3,11 @@
 use depth_image::{Aabb, DepthImage, PinholeCamera};
 use glam::{UVec2, Vec2, Vec3};
 
-use super::{TILE_PX, sample_camera::SampleCamera};
-use crate::{layout::GpuViewCamera, sample_set::searched_volume};
+use super::sample_camera::SampleCamera;
+use crate::{
+    sample_set::searched_volume,
+    view_work::{GpuViewCamera, TILE_PX, tiles_of},
+};
 
 /// All rays of a view.
 pub(super) struct ViewRays {
@@ -36,7 +39,7 @@ impl ViewRay {
 
 impl ViewRays {
     pub fn of(camera: &PinholeCamera, volume: &Aabb, images: &[DepthImage]) -> Self {
-        Self { view: GpuViewCamera::of(camera, 0, UVec2::ONE, 0), volume: searched_volume(volume, images) }
+        Self { view: GpuViewCamera::of(camera, 0), volume: searched_volume(volume, images) }
     }
 
     pub fn size_px(&self) -> UVec2 {
@@ -63,7 +66,7 @@ impl ViewRays {
     }
 
     pub fn tiles(&self) -> UVec2 {
-        self.size_px().map(|side| side.div_ceil(TILE_PX))
+        tiles_of(self.size_px())
     }
 
     pub fn tile_index(&self, pixel: UVec2) -> usize {

@@ -1,4 +1,4 @@
-//! What is known without any oracle.
+//! Closed forms: views that are known without any oracle.
 
 use depth_image::{DepthImage, ProvenanceKind, View};
 use glam::{UVec2, Vec3};
@@ -94,7 +94,7 @@ fn a_grazing_plane_stays_in_one_piece() {
     }
 }
 
-/// Whether each pixel and its neighbours are one surface, or all background.
+/// Pixels that are one surface with their neighbours, or all background.
 fn inside(truth: &View) -> Vec<bool> {
     let (width, height) = (truth.size_px.x as usize, truth.size_px.y as usize);
     let is_inside = |i: usize| {

@@ -73,9 +73,9 @@ fn error_falls_with_steps_then_stays() {
     assert!((before_last / last - 1.0).abs() < 0.1, "and then no more: {errors:?}");
 }
 
-/// From outside, below the walls' tops, no camera sees the yard; a view from above looks right into it.
+/// From outside, below the walls' tops, no camera sees the yard; a view from above shows all of it.
 #[test]
-fn what_no_camera_saw_is_marked() {
+fn disoccluded_pixels_are_marked() {
     let samples = [0.0f32, 0.4, 0.8, 1.2]
         .map(|a| looking(Vec3::new(9.0 * a.cos(), 1.7, 9.0 * a.sin()), Vec3::Y, 45.0, SAMPLE_PX));
     let stage = Stage::new(courtyard(), &samples);
@@ -104,7 +104,7 @@ fn what_no_camera_saw_is_marked() {
     }
 }
 
-/// Inverse depth of samples rounded to so many bits over the image's range, as a codec would.
+/// Inverse depth of samples rounded to a number of bits over the image's range, as a codec would.
 fn quantised(stage: &Stage, bits: u32) -> Stage {
     let mut coarse = stage.clone();
     for image in &mut coarse.images {
@@ -132,8 +132,8 @@ fn error_falls_with_bits_of_depth_then_stays() {
     assert!(errors.windows(2).all(|pair| pair[1].1 < pair[0].1 * 1.05), "{errors:?}");
 }
 
-/// A surface on the very face of the volume is met only as far as the volume's padding covers the error of
-/// the samples' depth: a texel's staircase for the search, half a code for the carve.
+/// A surface on the very face of the volume is met only as far as the volume's padding covers the error of the samples'
+/// depth. That error is a texel's staircase for the search, half a code for the carve.
 #[test]
 fn the_search_needs_room_behind_a_surface() {
     let corners = Corners { eye: Vec3::Z * 4.0, target: Vec3::ZERO, half_m: 0.5 };

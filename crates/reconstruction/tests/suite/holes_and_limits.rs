@@ -1,4 +1,4 @@
-//! Views from anywhere, and images with holes: never a number that is none.
+//! Views from anywhere, and images with holes: every number is finite.
 
 use depth_image::{HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind};
 use glam::{UVec2, Vec3};
@@ -56,8 +56,8 @@ fn near_and_far_together_are_pictures() {
             assert_sane(&view, &format!("{method}: far at {far_m} m"));
             let hits = count(&view, ProvenanceKind::Hit);
             println!("far/near {far_m:>7}: {method} finds {hits} of {} pixels", VIEW_PX.element_product());
-            // Known issue: where half a code at the far face is more than the volume's margin, the carve leaves
-            // the volume before it meets what lies on that face.
+            // Known issue: the carve leaves the volume before it meets a surface on the far face. This is so where half
+            // a code there is more than the volume's margin.
             let can_meet = method == CARVE && far_m <= 100.0;
             let roomy = Stage { volume: stage.volume.padded(far_m), ..stage.clone() };
             let with_room = count(&roomy.view(&camera(0.02, VIEW_PX), method), ProvenanceKind::Hit);

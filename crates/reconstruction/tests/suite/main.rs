@@ -11,3 +11,4 @@ mod non_redundant;
 mod specular;
 mod stage;
 mod twins;
+mod variants;

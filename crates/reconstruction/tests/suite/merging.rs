@@ -43,7 +43,7 @@ impl<'q> Block<'q> {
     }
 }
 
-/// What is found of all blocks of a set.
+/// Findings over all blocks of a set.
 #[derive(Debug, Default)]
 struct Found {
     samples: usize,

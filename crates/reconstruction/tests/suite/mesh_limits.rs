@@ -1,4 +1,4 @@
-//! What meshes refuse, what they make of nothing, and that they are cut once.
+//! Meshes of images without planes or samples, and meshes that are asked for again.
 
 use depth_image::{BACKGROUND_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, ProvenanceKind};
 use glam::{UVec2, Vec3};
@@ -55,7 +55,7 @@ fn nothing_seen_is_nothing_shown() {
             assert_eq!(MeshStatistics { device_s: 0.0, ..found }, MeshStatistics::default(), "{method}");
             let view = stage.view(&corners().view(), method);
             assert_sane(&view, &method.to_string());
-            // A view looks past the volume, too.
+            // Parts of a view miss the volume.
             let [hit, of_kind] = [ProvenanceKind::Hit, kind].map(|kind| count(&view, kind));
             println!("{depth} {method}: {hit} hits, {of_kind} {kind:?}");
             assert!(hit == 0 && of_kind * 2 > view.size_px.element_product() as usize, "{depth} {method}");

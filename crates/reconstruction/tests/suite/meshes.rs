@@ -93,7 +93,7 @@ fn views_are_the_twins() {
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
-/// Pixels of the inside of the truth's surfaces: they and all around them, so far, are hits.
+/// Pixels inside of the reference's surfaces: they and all pixels around them are hits.
 fn inside(truth: &View, reach_px: usize) -> Vec<usize> {
     let (width, height) = (truth.size_px.x as usize, truth.size_px.y as usize);
     let known = kinds(truth);
@@ -144,7 +144,7 @@ fn a_plane_is_whole_and_exact_however_steep() {
 }
 
 #[test]
-fn a_sphere_is_near_the_truth() {
+fn a_sphere_is_near_its_reference() {
     let corners = Corners { eye: Vec3::new(0.4, 0.9, 3.6), target: Vec3::ZERO, half_m: 0.3 };
     let stage = Stage::with_corners(uv_sphere(1.0, 64), &corners.samples(4));
     let truth = stage.truth(&corners.view());
@@ -207,10 +207,10 @@ fn only_the_hybrid_keeps_isolated_samples() {
     }
 }
 
-/// Of the samples whose own pixel the mesh does not show from their own camera, how many the hybrid shows: within four
-/// footprints of their depth.
+/// Counts samples that the mesh does not show at their own pixel from their own camera. The hybrid shows most of them
+/// within four footprints of their depth.
 #[test]
-fn silhouettes_are_kept_by_the_hybrid() {
+fn the_hybrid_shows_silhouettes_that_the_mesh_loses() {
     for (name, scene, corners) in corpus() {
         let stage = Stage::with_corners(scene, &corners.samples(1));
         let samples = &stage.images[0].inverse_depth_per_m;
@@ -228,7 +228,10 @@ fn silhouettes_are_kept_by_the_hybrid() {
         let [mesh, hybrid, merged] = [MESH, HYBRID, merged(0.5)].map(shown);
         let lost: Vec<usize> = (0..samples.len()).filter(|&i| samples[i] > 0.0 && !mesh[i]).collect();
         let [hybrid, merged] = [hybrid, merged].map(|shown| lost.iter().filter(|&&i| shown[i]).count());
-        println!("{name:<18} {:>5} samples lost by the mesh, {hybrid} kept by the hybrid, {merged} merged", lost.len());
+        println!(
+            "{name:<18} {:>5} samples lost by the mesh, {hybrid} shown by the hybrid, {merged} merged",
+            lost.len()
+        );
         assert!(!lost.is_empty() && hybrid * 100 >= lost.len() * 95 && merged * 100 >= lost.len() * 95, "{name}");
     }
 }
@@ -276,7 +279,7 @@ fn merging_keeps_its_bound() {
     }
 }
 
-/// Images that leave out what those before them hold are all borders: the mesh loses far more of them.
+/// Images without redundant samples are all borders: the mesh loses far more of them.
 #[test]
 fn hybrids_hold_images_without_redundance_together() {
     for (name, scene, corners) in corpus() {
@@ -294,7 +297,7 @@ fn hybrids_hold_images_without_redundance_together() {
     }
 }
 
-/// What the methods come to beside the carve; times are of the software device and small views.
+/// Quality and time of the meshes beside the carve, for small views on the software device.
 #[test]
 fn hybrids_cover_more_than_meshes() {
     for (name, scene, corners) in corpus() {
@@ -320,8 +323,8 @@ fn hybrids_cover_more_than_meshes() {
     }
 }
 
-/// By how much the corner of a texel runs away as the normal turns from the eye: the ratio of the quad's longer
-/// diagonal to that of the texel at the sample's depth, where no corner is held.
+/// The stretch of a texel's corners as the normal turns from the eye, where no corner is held. It is the ratio of the
+/// quad's longer diagonal to that of the texel at the sample's depth.
 #[test]
 fn corners_stay_near_however_grazing_the_normal() {
     let camera = looking(Vec3::Z * 3.0, Vec3::ZERO, 45.0, UVec2::new(3, 3) * 24);
@@ -372,7 +375,7 @@ fn views_with_random_holes_are_pictures() {
 /// On the software device, of finer images than the other tests'.
 #[test]
 #[ignore = "prints what docs/methods says of cost; ten seconds alone, and wrong beside others"]
-fn what_a_view_costs() {
+fn prints_the_cost_of_a_view() {
     const FINE_PX: UVec2 = UVec2::new(682, 512);
     const VIEWS: usize = 8;
     let corners = Corners { eye: Vec3::new(0.3, 2.2, 2.2), target: Vec3::Y * 0.3, half_m: 0.4 };

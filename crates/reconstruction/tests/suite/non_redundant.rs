@@ -1,4 +1,4 @@
-//! Images that leave out what others hold: holes, and samples to which no way is proven free.
+//! Images without redundant samples: holes, and samples to which no way is proven free.
 
 use depth_image::{
     DepthImage, HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, View, linear_from_rgb9e5, rgb9e5_from_linear,
@@ -15,7 +15,7 @@ use crate::stage::{
 
 const METHODS: [ReconstructionMethod; 2] = [CARVE, SEARCH];
 
-/// Of the foreground, what was found nowhere, and what was found too far from where it is.
+/// Shares of the foreground: not found, and found too far from where it is.
 struct Faults {
     missing: f64,
     wrong: f64,
@@ -123,9 +123,9 @@ fn nothing_but_holes_is_an_honest_nothing() {
     }
 }
 
-/// What the second image shows behind a pole that it left out proves nothing of the way there.
+/// Samples that the second image holds behind an omitted pole prove nothing of the way there.
 #[test]
-fn what_is_left_out_is_not_carved_away() {
+fn an_omitted_surface_is_not_carved_away() {
     let camera = looking(Vec3::Z * 4.0, Vec3::Z * -2.0, 60.0, SAMPLE_PX);
     // The same camera twice: the second image is what lies behind the first.
     let stage = Stage::apart(poles(0.08), &[camera, camera]);
@@ -156,7 +156,7 @@ fn painted_wall(disagreement: f32) -> (Stage, Corners) {
     (wall, corners)
 }
 
-/// The left half one image has, the right half the other; or one leaves out every other square, and the other has all.
+/// One image has the left half and the other the right half; or one omits every other square, and the other has all.
 #[test]
 fn no_seam_shows_where_one_image_hands_over_to_the_other() {
     // Narrower than the samples, that all of it is seen by both.
@@ -194,7 +194,7 @@ fn handing_over(whole: &Stage) -> [(&'static str, Stage); 2] {
     [("halves", halves), ("checker", checker)]
 }
 
-/// Of a view without gaps.
+/// A view without gaps.
 fn closed_step(stage: &Stage, camera: &PinholeCamera) -> u8 {
     let view = stage.view(camera, CARVE);
     assert_eq!(count(&view, ProvenanceKind::Hit), camera.pixel_count());
@@ -260,10 +260,10 @@ fn a_wall_that_only_passing_rays_reach_is_met() {
     assert!(both * 4 < alone, "{alone} {both}");
 }
 
-/// Ground half a footprint under a road: images that leave the road out show the ground, so close that it could be
-/// taken for the road.
+/// Ground half a footprint under a road: images that omit the road show the ground. It is so close that it could be taken
+/// for the road.
 #[test]
-fn what_lies_close_behind_does_not_shine_through() {
+fn a_surface_close_behind_does_not_shine_through() {
     let mut scene = quad(Vec3::ZERO, 1.5, Vec3::Z, [230; 3]);
     scene.meshes.extend(quad(Vec3::Z * -0.02, 1.5, Vec3::Z, [20; 3]).meshes);
     scene.instances.push(scene::Instance { mesh: 1, ..scene.instances[0] });

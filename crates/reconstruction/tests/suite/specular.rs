@@ -105,7 +105,7 @@ impl Room {
         SetDescription { volume, background_linear: Vec3::ZERO, illumination: &self.illumination, highlight }
     }
 
-    /// What an eye sees of a view's pixel.
+    /// The colour of a view's pixel, as an eye sees it.
     fn expected(&self, kind: Highlight, camera: &PinholeCamera, eye: Vec3, pixel: Vec2) -> [u8; 3] {
         let met = self.meet(&camera.ray(pixel));
         let reflector = Reflector::unpack(met.reflector.pack()).expect("a reflector");
@@ -171,7 +171,7 @@ fn each_eye_sees_its_own_highlight() {
 }
 
 #[test]
-fn what_a_light_does_not_reach_does_not_shine() {
+fn a_surface_in_shadow_does_not_shine() {
     let room = Room {
         illumination: lamps(5),
         lit: Some(|point, place| if (place % 2 == 0) == (point.x > 0.1) { 1.0 } else { 0.0 }),
@@ -225,7 +225,7 @@ fn highlights_are_the_twins() {
 }
 
 #[test]
-fn what_is_filled_does_not_shine() {
+fn filled_pixels_do_not_shine() {
     let room = with_ball();
     // From the left only: what is right of the ball is hidden.
     let images = vec![room.image(&corners().camera(-1.0, 0.0, SAMPLE_PX))];
@@ -243,7 +243,7 @@ fn what_is_filled_does_not_shine() {
 }
 
 #[test]
-fn what_reflects_nothing_stays_as_it_is() {
+fn matt_surfaces_stay_as_they_are() {
     let room = Room { wall: MATT, ball: MATT, ..with_ball() };
     let camera = corners().camera(0.23, -0.31, VIEW_PX);
     let black = room.images();

@@ -1,4 +1,4 @@
-//! What all tests here share: one device, scenes with sample images, and a comparison of views.
+//! The common ground of all tests here: one device, scenes with sample images, and a comparison of views.
 
 use std::sync::{Arc, OnceLock};
 
@@ -9,7 +9,7 @@ use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use metrics::Rgb8Image;
 use reconstruction::{ReconstructionMethod, Reconstructor, SampleSet, SetDescription};
-use render::{Asks, DrawWork, GpuScene, LeaveOut, Lighting, Refinement, Renderer, SamplePlanes, Visibility};
+use render::{DrawWork, Evidence, GpuScene, Lighting, RedundancyTest, Refinement, Renderer, SamplePlanes, Visibility};
 use scene::Scene;
 
 pub const SAMPLE_PX: UVec2 = UVec2::new(96, 72);
@@ -19,7 +19,7 @@ pub const SEARCH: ReconstructionMethod = ReconstructionMethod::LightFieldSearch 
 pub const ALL_PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: true };
 
 /// By which images leave out what those before them hold: the test of sampling `non_redundant:pixel`.
-const APART: (&str, &str) = ("apart.wgsl", include_str!("../../../sampling/src/non_redundant_pixel.wgsl"));
+const APART: (&str, &str) = ("apart.wgsl", include_str!("../../../sampling/src/methods/non_redundant/pixel.wgsl"));
 
 struct Device {
     gpu: Arc<Gpu>,
@@ -32,7 +32,7 @@ fn device() -> &'static Device {
     static DEVICE: OnceLock<Device> = OnceLock::new();
     DEVICE.get_or_init(|| {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let renderer = Renderer::with_tests(&gpu, &[APART]).expect("a renderer");
+        let renderer = Renderer::with_templates(&gpu, render::templates(&[APART]).expect("templates"));
         let reconstructor = Reconstructor::new(&gpu).expect("a reconstructor");
         Device { gpu, renderer, reconstructor }
     })
@@ -44,7 +44,7 @@ pub fn reconstructor() -> &'static Reconstructor {
 
 static DARK: Illumination = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
 
-/// Of a set in which nothing depends on the viewer.
+/// A set in which nothing depends on the viewer.
 pub fn matt(volume: Aabb, background_linear: Vec3) -> SetDescription<'static> {
     SetDescription { volume, background_linear, illumination: &DARK, highlight: None }
 }
@@ -64,7 +64,7 @@ impl Stage {
         Self { scene, images, volume }
     }
 
-    /// Whose images have normals and texel corners.
+    /// With images that have normals and texel corners.
     pub fn with_corners(scene: Scene, cameras: &[PinholeCamera]) -> Self {
         let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
         let images = depth_images(&scene, cameras, planes);
@@ -72,21 +72,16 @@ impl Stage {
         Self { scene, images, volume }
     }
 
-    /// Of images that leave out what those before them hold.
+    /// With images that omit what those before them hold.
     pub fn apart(scene: Scene, cameras: &[PinholeCamera]) -> Self {
         let on_device = GpuScene::upload(&device().gpu, &scene).expect("a scene");
         let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-        let leave_out = LeaveOut {
-            shader: APART.0,
-            asks: Asks::SurfaceIds,
-            from_one_place: false,
-            settled: false,
-            only_useful: false,
-        };
+        let test =
+            RedundancyTest { shader: APART.0, consults: Evidence::SurfaceIds, from_one_place: false, usefulness: None };
         let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
         let work = plainly_lit(&on_device);
-        let images = device().renderer.draw_depth_images_apart(work, &cameras, &wanted, planes, leave_out, None);
+        let images = device().renderer.draw_image_sequence(work, &cameras, &wanted, planes, test, None);
         Self { images: images.expect("depth images"), volume: scene.bounds(), scene }
     }
 

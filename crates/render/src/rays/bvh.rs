@@ -26,9 +26,9 @@ pub struct Bvh {
     /// Expected node visits and triangle tests of a random ray through the scene's box (the surface area
     /// heuristic).
     pub cost: f32,
-    /// Of the tree when it was built.
+    /// The cost of the tree when it was built.
     pub cost_when_built: f32,
-    /// How long the last build or refit took.
+    /// The duration of the last build or refit.
     pub took: Duration,
 }
 
@@ -62,7 +62,7 @@ impl Bvh {
         self.took = start.elapsed();
     }
 
-    /// Whether boxes have grown so that a new tree would be worth its time.
+    /// Boxes have grown so that a new tree would be worth its time.
     pub fn is_worn(&self) -> bool {
         self.cost > self.cost_when_built * WORST_REFIT
     }
@@ -192,7 +192,7 @@ fn leaf_area(node: &CwBvhNode, children: &[Option<Bounds>; 8]) -> f32 {
     leaves.filter_map(|c| children[c].map(|b| b.half_area() * node.child_primitives(c).1 as f32)).sum()
 }
 
-/// Of a step of the eight-bit boxes: more than what rounding takes off a difference.
+/// A share of a step of the eight-bit boxes: more than the rounding of a difference.
 const ROUNDING: f32 = 1e-3;
 
 /// Writes a node's box and its children's, rounded outwards.

@@ -15,10 +15,12 @@ pub const DOUBLE_SIDED: u32 = 1 << 30;
 pub const UNLIT: u32 = 1 << 29;
 /// Flag of a triangle that has highlights.
 pub const SPECULAR: u32 = 1 << 28;
-/// Those that a ray must know before it knows what it met.
+/// The flags that a ray needs before it has met a triangle.
 pub const CORNER_FLAGS: u32 = ALPHA_TESTED | DOUBLE_SIDED;
-/// Vertex numbers share a word with the flags.
-pub const MAX_VERTICES: u64 = 1 << 30;
+/// The bits of a vertex' number, which shares a word with the flags.
+pub const VERTEX: u32 = (1 << 30) - 1;
+/// The most vertices that have a number.
+pub const MAX_VERTICES: u64 = VERTEX as u64 + 1;
 
 /// One corner besides its position: one texel on the device.
 #[repr(C)]
@@ -92,7 +94,7 @@ impl FlatScene {
         self.wind.is_some()
     }
 
-    /// Where the corners of all triangles are at a scene time.
+    /// The positions of all vertices at a scene time.
     pub fn positions_in_world(&self, scene_time_s: f32) -> Vec<Vec3> {
         let Some(wind) = self.wind else { return self.rest_in_world.clone() };
         let moved = |(&rest, &sway): (&Vec3, &f32)| rest + wind.displacement_in_world(rest, sway, scene_time_s);

@@ -1,4 +1,4 @@
-// What a triangle looks like where a ray meets it: attributes between its corners, and textures by hand, for a
+// The look of a triangle where a ray meets it: attributes between its corners, and textures by hand, for a
 // shader cannot choose among samplers.
 
 struct Attributes { normal: vec3f, uv: vec2f, color_linear: vec4f }
@@ -37,7 +37,7 @@ fn bilinear_texel(first: u32, size: vec2u, uv: vec2f) -> vec4f {
     return mix(upper, lower, share.y);
 }
 
-// Of a texture whose first texel and packed size are given, white where there is none; `footprint` is a pixel's
+// The colour of a texture whose first texel and packed size are given, white where there is none; `footprint` is a pixel's
 // side on the surface, in units of uv: the level whose texels are about as large.
 fn sampled(first_texel: u32, packed_size: u32, uv: vec2f, footprint: f32) -> vec4f {
     var size = vec2u(packed_size & 0xffffu, packed_size >> 16u);
@@ -68,7 +68,7 @@ fn coat(material: u32, flags: u32, at: Attributes, footprint: f32) -> Coat {
     );
 }
 
-// How much of the texture a pixel covers, from the triangle's own scale.
+// The share of the texture that a pixel covers, from the triangle's own scale.
 fn uv_footprint(crossing: Crossing, slot: u32, side_m: f32) -> f32 {
     let p0 = bitcast<vec3f>(corner_texel(slot * 3u).xyz);
     let e1 = bitcast<vec3f>(corner_texel(slot * 3u + 1u).xyz) - p0;

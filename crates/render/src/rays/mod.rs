@@ -3,7 +3,10 @@
 mod bvh;
 pub(crate) mod flat;
 pub(crate) mod primary;
-mod ray_scene;
+pub(crate) mod ray_scene;
+pub(crate) mod traversal;
 
 pub(crate) use flat::OrderedMesh;
-pub use ray_scene::{AccelerationReport, RayScene, Traced};
+pub use ray_scene::AccelerationReport;
+pub(crate) use ray_scene::{RayScene, Traced};
+pub(crate) use traversal::Traversal;

@@ -1,28 +1,28 @@
-// Which surface each pixel shows, by one ray each: what raster.wgsl draws, found the other way round.
+// The surface that each pixel shows, by one ray each: the same that raster.wgsl draws.
 {% include "camera.wgsl" %}
-{% include "surface.wgsl" %}
+{% include "packed_surface.wgsl" %}
 {% include "rays/traverse.wgsl" %}
 
-@group(0) @binding(1) var surfaces: texture_storage_2d<rgba32uint, write>;
+@group(0) var surfaces: texture_storage_2d<rgba32uint, write>;
 // Near plane over planar depth, as a depth buffer has it; 0 where nothing is met.
-@group(0) @binding(2) var reversed_depth: texture_storage_2d<r32float, write>;
+@group(0) var reversed_depth: texture_storage_2d<r32float, write>;
 {% if surface_id %}
-@group(0) @binding(3) var surface_ids: texture_storage_2d<rg32uint, write>;
+@group(0) var surface_ids: texture_storage_2d<rg32uint, write>;
 {% endif %}
-{% if leave_out %}
-// Of the nearest surface, shown or left out.
-@group(0) @binding({{ 3 + surface_id|int }}) var front_depth: texture_storage_2d<r32float, write>;
+{% if redundancy_test %}
+// The reversed depth of the nearest surface, redundant or not.
+@group(0) var front_depth: texture_storage_2d<r32float, write>;
 {% endif %}
 {% if count_visits %}
-@group(0) @binding({{ 3 + surface_id|int + (1 if leave_out else 0) }}) var<storage, read_write> visit_counts: array<u32>;
+@group(0) var<storage, read_write> visit_counts: array<u32>;
 {% endif %}
 
 const FARTHEST: f32 = 3.0e38;
-{% if leave_out %}
-{% include "known.wgsl" %}
+{% if redundancy_test %}
+{% include "known_samples.wgsl" %}
 
-// Surfaces that one ray leaves out before it is given up: the software device ends long loops.
-const MOST_LAYERS: u32 = 64u;
+// The redundant surfaces that one ray passes before it is given up: the software device ends long loops.
+const MOST_LAYERS: u32 = {{ MOST_LAYERS }};
 
 fn candidate_at(hit: Hit, pixel: vec2u, direction: vec3f) -> Candidate {
     let facing = select(-1.0, 1.0, hit.crossing.front);
@@ -42,7 +42,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= camera.size_px) { return; }
     let direction = direction_of(id.xy);
     let ray = ray_from(camera.eye_in_world, direction);
-{% if leave_out %}
+{% if redundancy_test %}
     var hit = Hit(FARTHEST, NOTHING, Crossing(0.0, 0.0, 0.0, false, false, vec3u(0u)));
     var near = camera.near_m;
     var searching = true;
@@ -53,7 +53,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         searching = false;
         for (var met = hit.slot != NOTHING; met; met = false) {
             front = max(front, camera.near_m / hit.t);
-            searching = is_left_out(candidate_at(hit, id.xy, direction));
+            searching = is_redundant(candidate_at(hit, id.xy, direction));
         }
     }
     hit.slot = select(hit.slot, NOTHING, searching);
@@ -63,7 +63,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% endif %}
     let met = hit.slot != NOTHING;
     var surface = vec4u(0u);
-    var ids = vec2u({{ nothing }}u);
+    var ids = vec2u(NOTHING);
     for (var found = met; found; found = false) {
         let triangle = textureLoad(flat_triangles, texel_at(hit.slot), 0);
         let at = attributes_at(hit.crossing);

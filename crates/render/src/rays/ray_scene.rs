@@ -1,12 +1,13 @@
 //! A scene's triangles on the device, as rays need them: made when rays are first traced, moved when scene time is.
 
 use std::{
-    sync::{Arc, Mutex, PoisonError},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
 use glam::{Vec3, Vec4};
-use gpu::{Gpu, GpuError};
+use gpu::{Binding, Gpu, GpuError, Table};
+use parking_lot::Mutex;
 use rayon::prelude::*;
 use scene::{Material, Scene};
 use wgpu::TextureFormat;
@@ -15,12 +16,12 @@ use super::{
     bvh::{Bvh, MAX_DEPTH},
     flat::{CORNER_FLAGS, FlatScene, FlatTriangle, MAX_VERTICES, OrderedMesh},
 };
-use crate::{data_texture::DataTexture, gpu_scene::phong_reflector, scalar, texture};
+use crate::{material::phong_reflector, texture};
 
-/// How the tree over a scene's triangles came about.
+/// The making of the tree over a scene's triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct AccelerationReport {
-    /// Whether boxes were moved, not made anew.
+    /// Boxes were moved, not made anew.
     pub refitted: bool,
     /// On the host.
     pub build_s: f64,
@@ -44,7 +45,7 @@ pub struct RayScene {
     state: Mutex<Option<Built>>,
 }
 
-/// What does not depend on the tree.
+/// Tables that do not depend on the tree.
 struct Tables {
     materials: Vec<[u32; 4]>,
     texels: Vec<[u8; 4]>,
@@ -61,21 +62,32 @@ struct Built {
 
 /// Bound to shaders that trace rays.
 pub struct Traced {
-    nodes: DataTexture,
-    corners: DataTexture,
+    nodes: Table,
+    corners: Table,
     fixed: Arc<Fixed>,
     pub(crate) depth: u32,
     pub(crate) alpha_tested: bool,
-    /// How it came about.
+    /// The making of the tree.
     pub report: AccelerationReport,
 }
 
-/// What stays while triangles move, but for their order, which a new tree changes.
+/// Tables that stay while triangles move; a new tree changes the order of triangles.
 struct Fixed {
-    vertices: DataTexture,
-    triangles: DataTexture,
-    materials: DataTexture,
-    texels: DataTexture,
+    vertices: Table,
+    triangles: Table,
+    materials: Table,
+    texels: Table,
+}
+
+/// The same on the host.
+#[cfg(feature = "scalar")]
+pub(crate) struct HostTables<'t> {
+    pub nodes: &'t [obvhs::cwbvh::node::CwBvhNode],
+    pub corners: Vec<[[u32; 4]; 3]>,
+    pub triangles: Vec<FlatTriangle>,
+    pub vertices: &'t [super::flat::FlatVertex],
+    pub materials: &'t [[u32; 4]],
+    pub texels: &'t [[u8; 4]],
 }
 
 impl RayScene {
@@ -95,7 +107,7 @@ impl RayScene {
     /// # Errors
     /// When the device's textures are too small for the scene.
     pub fn at(&self, scene_time_s: f32) -> Result<Arc<Traced>, GpuError> {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut state = self.state.lock();
         Ok(self.moved_to(scene_time_s, &mut state)?.traced.clone())
     }
 
@@ -104,7 +116,7 @@ impl RayScene {
     /// # Errors
     /// As [`RayScene::at`].
     pub fn rebuilt_at(&self, scene_time_s: f32) -> Result<Arc<Traced>, GpuError> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).take();
+        self.state.lock().take();
         self.at(scene_time_s)
     }
 
@@ -123,11 +135,11 @@ impl RayScene {
     }
 
     fn built(&self, scene_time_s: f32) -> Result<Built, GpuError> {
-        at_most("the vertices of all instances", self.flat.vertices.len() as u64, MAX_VERTICES)?;
+        GpuError::check_limit("the vertices of all instances", self.flat.vertices.len() as u64, MAX_VERTICES)?;
         let start = Instant::now();
         let corners = self.corners_in_world(scene_time_s);
         let bvh = Bvh::build(&corners);
-        at_most("levels of the tree over the scene", u64::from(bvh.depth), u64::from(MAX_DEPTH))?;
+        GpuError::check_limit("levels of the tree over the scene", u64::from(bvh.depth), u64::from(MAX_DEPTH))?;
         let took = start.elapsed();
         let fixed = Arc::new(self.fixed(&bvh)?);
         let traced = self.traced(&bvh, &corners, fixed, took, false)?;
@@ -149,12 +161,12 @@ impl RayScene {
     /// Attributes and textures; triangles in the order of the tree's leaves.
     fn fixed(&self, bvh: &Bvh) -> Result<Fixed, GpuError> {
         let words = TextureFormat::Rgba32Uint;
-        let table = |what, elements: &[[u32; 4]]| DataTexture::with(&self.gpu, what, words, elements);
+        let table = |what, elements: &[[u32; 4]]| Table::new(&self.gpu, what, words, elements);
         Ok(Fixed {
-            vertices: DataTexture::with(&self.gpu, "vertex attributes", words, &self.flat.vertices)?,
-            triangles: DataTexture::with(&self.gpu, "triangle attributes", words, &self.triangles_of_leaves(bvh))?,
+            vertices: Table::new(&self.gpu, "vertex attributes", words, &self.flat.vertices)?,
+            triangles: Table::new(&self.gpu, "triangle attributes", words, &self.triangles_of_leaves(bvh))?,
             materials: table("materials", &self.tables.materials)?,
-            texels: DataTexture::with(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?,
+            texels: Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?,
         })
     }
 
@@ -168,8 +180,8 @@ impl RayScene {
     ) -> Result<Arc<Traced>, GpuError> {
         let start = Instant::now();
         let words = TextureFormat::Rgba32Uint;
-        let nodes = DataTexture::with(&self.gpu, "nodes", words, &bvh.tree.nodes)?;
-        let corners = DataTexture::with(&self.gpu, "triangles", words, &self.corner_texels(bvh, corners_in_world))?;
+        let nodes = Table::new(&self.gpu, "nodes", words, &bvh.tree.nodes)?;
+        let corners = Table::new(&self.gpu, "triangles", words, &self.corner_texels(bvh, corners_in_world))?;
         let report = AccelerationReport {
             refitted,
             build_s: took.as_secs_f64(),
@@ -199,21 +211,23 @@ impl RayScene {
         bvh.tree.primitive_indices.par_iter().map(texels).collect()
     }
 
-    /// What the device has at a scene time, for the scalar twin.
-    ///
-    /// # Errors
-    /// When the device's textures are too small for the scene.
-    pub(crate) fn scalar(&self, scene_time_s: f32) -> Result<scalar::rays::Scene, GpuError> {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+    /// The tables of a scene time, before they are put on the device.
+    #[cfg(feature = "scalar")]
+    pub(crate) fn host_tables<R>(
+        &self,
+        scene_time_s: f32,
+        read: impl FnOnce(HostTables<'_>) -> R,
+    ) -> Result<R, GpuError> {
+        let mut state = self.state.lock();
         let Built { bvh, .. } = self.moved_to(scene_time_s, &mut state)?;
-        Ok(scalar::rays::Scene {
-            nodes: bvh.tree.nodes.clone(),
+        Ok(read(HostTables {
+            nodes: &bvh.tree.nodes,
             corners: self.corner_texels(bvh, &self.corners_in_world(scene_time_s)),
             triangles: self.triangles_of_leaves(bvh),
-            vertices: self.flat.vertices.clone(),
-            materials: self.tables.materials.clone(),
-            texels: self.tables.texels.clone(),
-        })
+            vertices: &self.flat.vertices,
+            materials: &self.tables.materials,
+            texels: &self.tables.texels,
+        }))
     }
 
     fn triangles_of_leaves(&self, bvh: &Bvh) -> Vec<FlatTriangle> {
@@ -228,10 +242,22 @@ impl Built {
 }
 
 impl Traced {
-    /// In the order of group 1 of `traverse.wgsl`.
-    pub(crate) fn views(&self) -> [&wgpu::TextureView; 6] {
+    /// The variables of `traverse.wgsl`.
+    pub fn bindings(&self) -> [Binding<'_>; 6] {
         let Fixed { vertices, triangles, materials, texels } = &*self.fixed;
-        [&self.nodes, &self.corners, vertices, triangles, materials, texels].map(|table| &table.view)
+        [
+            Binding::texture("bvh_nodes", &self.nodes),
+            Binding::texture("triangle_corners", &self.corners),
+            Binding::texture("flat_vertices", vertices),
+            Binding::texture("flat_triangles", triangles),
+            Binding::texture("materials", materials),
+            Binding::texture("texels", texels),
+        ]
+    }
+
+    /// The tables that rays read most.
+    pub fn tree(&self) -> [&wgpu::TextureView; 2] {
+        [&self.nodes, &self.corners]
     }
 }
 
@@ -262,8 +288,4 @@ fn material_texels(material: &Material, place_of: impl Fn(Option<u32>) -> [u32; 
         [material.metallic.to_bits(), material.roughness.to_bits(), phong_reflector(material), 0],
         [base_first, base_size, coat_first, coat_size],
     ]
-}
-
-fn at_most(what: &str, needed: u64, limit: u64) -> Result<(), GpuError> {
-    if needed <= limit { Ok(()) } else { Err(GpuError::Limit { what: what.to_owned(), needed, limit }) }
 }

@@ -1,31 +1,31 @@
 // Rays against the triangles of a scene, through a tree with eight children a node whose boxes are in eight bits
 // (Ylitie et al. 2017), front to back by octant. Everything is read as texels of four words: on the software
 // device one such load costs a tenth of four loads from a storage buffer.
+{% include "table.wgsl" %}
 
-@group(1) @binding(0) var bvh_nodes: texture_2d<u32>;
+@group(1) var bvh_nodes: texture_2d<u32>;
 // Three texels a triangle: a corner's position and number each.
-@group(1) @binding(1) var triangle_corners: texture_2d<u32>;
-@group(1) @binding(2) var flat_vertices: texture_2d<u32>;
-@group(1) @binding(3) var flat_triangles: texture_2d<u32>;
-@group(1) @binding(4) var materials: texture_2d<u32>;
-@group(1) @binding(5) var texels: texture_2d<u32>;
+@group(1) var triangle_corners: texture_2d<u32>;
+@group(1) var flat_vertices: texture_2d<u32>;
+@group(1) var flat_triangles: texture_2d<u32>;
+@group(1) var materials: texture_2d<u32>;
+@group(1) var texels: texture_2d<u32>;
 
 const STACK: u32 = {{ stack }}u;
-const NOTHING: u32 = 0xffffffffu;
+const NOTHING: u32 = {{ NOTHING }};
 // In a corner's number (flat.rs).
-const ALPHA_TESTED: u32 = 0x80000000u;
-const DOUBLE_SIDED: u32 = 0x40000000u;
-const UNLIT: u32 = 0x20000000u;
-const SPECULAR: u32 = 0x10000000u;
-const VERTEX: u32 = 0x3fffffffu;
+const ALPHA_TESTED: u32 = {{ ALPHA_TESTED }};
+const DOUBLE_SIDED: u32 = {{ DOUBLE_SIDED }};
+const UNLIT: u32 = {{ UNLIT }};
+const SPECULAR: u32 = {{ SPECULAR }};
+const VERTEX: u32 = {{ VERTEX }};
 // Boxes are left a little later than they are: what rounding takes off must not open a gap.
-const BOX_SLACK: f32 = 1.000001;
+const BOX_SLACK: f32 = {{ BOX_SLACK }};
 {% if count_visits %}
 var<private> node_visits: u32 = 0u;
 var<private> triangle_tests: u32 = 0u;
 {% endif %}
 
-fn texel_at(index: u32) -> vec2u { return vec2u(index & 4095u, index >> 12u); }
 fn node_texel(index: u32) -> vec4u { return textureLoad(bvh_nodes, texel_at(index), 0); }
 fn corner_texel(index: u32) -> vec4u { return textureLoad(triangle_corners, texel_at(index), 0); }
 
@@ -84,8 +84,8 @@ fn visit(index: u32, ray: Ray, t_max: f32) -> Node {
 // Nearer than `t` at barycentric coordinates of the second and third corner.
 struct Crossing { t: f32, second: f32, third: f32, met: bool, front: bool, corners: vec3u }
 
-// Of the products that a volume is a sum of, a few roundings: what is nearer to an edge may be on either side.
-const EDGE_ROUNDINGS: f32 = 4e-7;
+// A few roundings of the products that a volume is a sum of: a point nearer to an edge may be on either side.
+const EDGE_ROUNDINGS: f32 = {{ EDGE_ROUNDINGS }};
 
 fn taxicab(v: vec3f) -> f32 { return abs(v.x) + abs(v.y) + abs(v.z); }
 
@@ -123,7 +123,7 @@ struct Todo { first_child: u32, hits: u32 }
 
 fn is_done(todo: Todo) -> bool { return todo.hits <= 0x00ffffffu; }
 
-// Of the children still to be visited the nearest: its number among the nodes.
+// The number among the nodes of the nearest child that is still to be visited.
 fn nearest_child(todo: Todo, ray: Ray) -> u32 {
     let slot = (firstLeadingBit(todo.hits) - 24u) ^ (ray.octant4 & 255u);
     return todo.first_child + countOneBits(todo.hits & ~(NOTHING << slot));
@@ -146,7 +146,7 @@ fn is_there(slot: u32, crossing: Crossing) -> bool {
 }
 {% endif %}
 
-// Whether anything lies on the way, whichever way it faces.
+// Triangles block rays whichever way they face.
 fn is_blocked(ray: Ray, t_max: f32) -> bool {
     var stack: array<Todo, STACK>;
     var height = 0u;

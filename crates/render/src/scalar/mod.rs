@@ -5,4 +5,8 @@ mod nearest;
 pub mod rays;
 pub mod sequence;
 
+pub use crate::{
+    known_samples::{LEAST_FACING, REFERENCE_FOOTPRINTS},
+    rays::primary::MOST_LAYERS,
+};
 pub use nearest::{Nearest, inverse_depth_per_m, nearest};

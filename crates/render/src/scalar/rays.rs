@@ -1,29 +1,34 @@
 //! The twin of `rays/traverse.wgsl`: the same tree and triangles, the same operations on `f32` in the same order.
-//! What may differ on a device is what WGSL leaves open: the last bits of quotients, and whether a product and a
-//! sum are rounded once or twice.
+//! A device may differ where WGSL leaves it open: in the last bits of quotients, and in whether a product
+//! and a sum are rounded once or twice.
 
 use depth_image::{PinholeCamera, Ray, SurfaceId, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 use obvhs::cwbvh::node::CwBvhNode;
 
 use crate::{
+    GpuScene, RenderError,
     pixel_camera::PixelCamera,
-    rays::flat::{ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatTriangle, FlatVertex},
+    rays::{
+        flat::{ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatTriangle, FlatVertex},
+        ray_scene::HostTables,
+        traversal::{BOX_SLACK, EDGE_ROUNDINGS},
+    },
 };
 
 /// The tables that a device has of a scene at one time.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    pub(crate) nodes: Vec<CwBvhNode>,
+    nodes: Vec<CwBvhNode>,
     /// In the order of the tree's leaves: corners, and their numbers with the triangle's flags.
-    pub(crate) corners: Vec<[[u32; 4]; 3]>,
-    pub(crate) triangles: Vec<FlatTriangle>,
-    pub(crate) vertices: Vec<FlatVertex>,
-    pub(crate) materials: Vec<[u32; 4]>,
-    pub(crate) texels: Vec<[u8; 4]>,
+    corners: Vec<[[u32; 4]; 3]>,
+    triangles: Vec<FlatTriangle>,
+    vertices: Vec<FlatVertex>,
+    materials: Vec<[u32; 4]>,
+    texels: Vec<[u8; 4]>,
 }
 
-/// Where a ray meets a triangle.
+/// A ray's crossing of a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     /// The ray's parameter.
@@ -36,7 +41,7 @@ pub struct Hit {
     pub front: bool,
 }
 
-/// What a search looked at.
+/// The steps of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Visits {
     /// Nodes of the tree.
@@ -48,17 +53,15 @@ pub struct Visits {
 /// The ray through the middle of a pixel, as on a device; its parameter is planar depth.
 #[must_use]
 pub fn pixel_ray(camera: &PinholeCamera, pixel: UVec2) -> Ray {
-    let direction_in_world = PixelCamera::of(camera).direction_of(pixel);
+    let rays = PixelCamera::of(camera);
+    let [column, row, corner] = [rays.column_in_world, rays.row_in_world, rays.corner_in_world].map(Vec3::from);
+    let center = pixel.as_vec2() + 0.5;
+    let direction_in_world = column * center.x + row * center.y + corner;
     Ray { origin_in_world: camera.eye_in_world, direction_in_world }
 }
 
 /// Greater than any parameter of a hit.
 const FAR_AWAY: f32 = 3.0e38;
-/// As in the shader.
-const EDGE_ROUNDINGS: f32 = 4e-7;
-/// As in the shader.
-const BOX_SLACK: f32 = 1.000_001;
-
 struct Traveller {
     origin: Vec3,
     direction: Vec3,
@@ -106,13 +109,29 @@ impl Todo {
 }
 
 impl Scene {
+    /// The tables that the device has of a scene at a scene time.
+    ///
+    /// # Errors
+    /// When the device's textures are too small for the scene.
+    pub fn of(scene: &GpuScene, scene_time_s: f32) -> Result<Self, RenderError> {
+        let tables = |tables: HostTables<'_>| Self {
+            nodes: tables.nodes.to_vec(),
+            corners: tables.corners,
+            triangles: tables.triangles,
+            vertices: tables.vertices.to_vec(),
+            materials: tables.materials.to_vec(),
+            texels: tables.texels.to_vec(),
+        };
+        Ok(scene.rays.host_tables(scene_time_s, tables)?)
+    }
+
     /// The nearest triangle beyond `near`; backs of single-sided ones are not there.
     #[must_use]
     pub fn closest(&self, ray: &Ray, near: f32) -> (Option<Hit>, Visits) {
         self.closest_between(ray, near, FAR_AWAY)
     }
 
-    /// As [`Scene::closest`], of those before `far`.
+    /// As [`Scene::closest`], among the triangles before `far`.
     #[must_use]
     pub fn closest_between(&self, ray: &Ray, near: f32, far: f32) -> (Option<Hit>, Visits) {
         let mut hit = None;
@@ -138,7 +157,7 @@ impl Scene {
         (blocked, visits)
     }
 
-    /// Which surface a hit lies on.
+    /// The surface that a hit lies on.
     #[must_use]
     pub fn surface_id(&self, hit: &Hit) -> SurfaceId {
         let FlatTriangle { instance, primitive, .. } = self.triangles[hit.slot as usize];

@@ -67,7 +67,7 @@ fn every_ray_visits_what_its_twin_visits() {
     for scene in [courtyard(), uv_sphere(1.0, 96), tree_terrain(30_000, 1)] {
         let (on_device, camera) = (upload(&scene), before(&scene));
         let counted = device().1.count_visits(work(&on_device, "unlit"), &camera).expect("counts").of_pixel;
-        let twin = on_device.scalar_rays(0.0).expect("a tree");
+        let twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
         let pixels = (0..SIZE_PX.y).flat_map(|y| (0..SIZE_PX.x).map(move |x| UVec2::new(x, y)));
         let same = pixels.zip(&counted).filter(|(pixel, counts)| {
             let (_, visits) = twin.closest(&scalar::rays::pixel_ray(&camera, *pixel), camera.near_m);
@@ -83,7 +83,7 @@ fn a_million_rays_find_no_gap_in_a_closed_mesh() {
     let mut scene = uv_sphere(1.0, 160);
     scene.materials[0].double_sided = true;
     let on_device = upload(&scene);
-    let twin = on_device.scalar_rays(0.0).expect("a tree");
+    let twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     let place = |n: u32, salt: u32| {
         let axis = |i: u32| scalar::sequence::hashed(n.wrapping_mul(7) ^ salt ^ i) as f32 / u32::MAX as f32 * 2.0 - 1.0;
         Vec3::new(axis(0x51), axis(0x7f31), axis(0x1f0a3))
@@ -107,7 +107,7 @@ fn a_million_rays_find_no_gap_in_a_closed_mesh() {
 }
 
 #[test]
-fn triangles_without_area_and_heaps_of_them_do_no_harm() {
+fn degenerate_and_stacked_triangles_are_harmless() {
     let mut scene = uv_sphere(1.0, 24);
     let mesh = &mut scene.meshes[0];
     let first = mesh.vertices.len() as u32;
@@ -128,7 +128,7 @@ fn triangles_without_area_and_heaps_of_them_do_no_harm() {
 }
 
 #[test]
-fn a_hard_shadow_lies_where_it_must() {
+fn a_hard_shadow_lies_at_its_projected_place() {
     let sun = Light::Directional {
         towards_light_in_world: Vec3::new(1.0, 1.0, 0.0).normalize_or(Vec3::Y),
         irradiance_linear: Vec3::ONE,
@@ -202,7 +202,7 @@ fn occlusion_is_none_in_the_open_half_at_a_wall_and_all_in_a_box() {
 }
 
 #[test]
-fn light_without_rays_is_the_scalar_references() {
+fn light_without_rays_equals_the_scalar_reference() {
     let lights = vec![
         Light::Point { position_in_world: Vec3::new(0.3, 0.8, 0.2), intensity_linear: Vec3::splat(0.6), radius_m: 0.1 },
         Light::Spot {
@@ -227,7 +227,7 @@ fn light_without_rays_is_the_scalar_references() {
 }
 
 #[test]
-fn what_stands_still_does_not_flicker_and_steps_add_up() {
+fn still_scenes_do_not_flicker_and_refinement_steps_add_up() {
     let scene = courtyard();
     let (on_device, camera) = (upload(&scene), before(&scene));
     let lit = work(&on_device, "soft 16, occlusion 16");
@@ -284,7 +284,7 @@ fn many_rays_through_foliage_are_all_traced() {
 }
 
 #[test]
-fn more_rays_are_not_brighter_or_darker() {
+fn more_rays_keep_the_mean_brightness() {
     let scene = courtyard();
     let (on_device, camera) = (upload(&scene), before(&scene));
     let reference = image(work(&on_device, "soft 1024, occlusion 1024"), &camera);
@@ -322,7 +322,7 @@ fn the_adaptive_rate_stays_near_the_full_one() {
 
 /// A glossy sphere under a point lamp, seen by two cameras.
 #[test]
-fn highlights_are_the_scalar_references_and_move_with_the_eye() {
+fn highlights_equal_the_scalar_reference_and_move_with_the_eye() {
     let mut scene = uv_sphere(1.0, 256);
     scene.materials[0] = scene::Material { roughness: 0.3, metallic: 0.0, ..scene::Material::default() };
     let lamp =
@@ -363,7 +363,7 @@ fn highlights_are_the_scalar_references_and_move_with_the_eye() {
 }
 
 #[test]
-fn planes_for_highlights_travel_only_where_there_are_any() {
+fn specular_planes_are_made_only_for_scenes_with_highlights() {
     let mut scene = courtyard();
     let camera = before(&scene);
     assert!(image(work(&upload(&scene), "shadows"), &camera).specular.is_none(), "everything is rough");
@@ -397,7 +397,7 @@ fn smoothness_makes_highlights_high_but_never_infinite() {
 }
 
 #[test]
-fn no_light_is_black_and_too_much_is_finite() {
+fn scenes_without_light_are_black_and_extreme_light_is_finite() {
     let dark = floor_under(&[], Illumination::default());
     let blinding =
         Light::Point { position_in_world: Vec3::Y * 1e-3, intensity_linear: Vec3::splat(1e30), radius_m: 0.0 };
@@ -451,7 +451,7 @@ fn thin_walls_hold_and_contact_shadows_begin_at_the_bias() {
 }
 
 #[test]
-fn a_refitted_tree_finds_what_a_new_one_finds() {
+fn a_refitted_tree_finds_the_surfaces_of_a_new_one() {
     let scene: Scene = "tree-terrain-30k-wind"
         .parse::<scene::SceneSpec>()
         .expect("a name")
@@ -476,7 +476,7 @@ fn a_refitted_tree_finds_what_a_new_one_finds() {
 }
 
 #[test]
-fn surfaces_in_one_place_are_seen_alike_every_time() {
+fn coincident_surfaces_give_the_same_picture_each_time() {
     let scene = floor_under(&[(Vec3::ZERO, 0.5, Vec3::Y)], sky(0.5));
     let on_device = upload(&scene);
     let seen = || image(DrawWork { visibility: Visibility::Rays, ..work(&on_device, "occlusion 4") }, &down_from(3.0));

@@ -89,7 +89,7 @@ fn canopy_far_away(at: DVec3) -> Scene {
 
 /// Swiss national coordinates lie 2.7e6 m from their origin, where an `f32` is a quarter of a metre.
 #[test]
-fn what_lies_far_away_is_lit_as_if_it_were_near() {
+fn distant_surfaces_are_lit_like_near_ones() {
     let seen = |at: DVec3| {
         let scene = canopy_far_away(at);
         assert!((scene.origin_in_source - at).length() < 2.0, "{}", scene.origin_in_source);

@@ -75,7 +75,7 @@ fn depth_error(reference: &[f32], drawn: &[f32]) -> (f32, usize, usize) {
 }
 
 #[test]
-fn depth_is_the_scalar_references() {
+fn depth_equals_the_scalar_reference() {
     let cases = [
         ("cube", unit_cube(), looking(Vec3::new(1.2, 1.0, 1.6), Vec3::ZERO)),
         ("sphere", uv_sphere(1.0, 24), looking(Vec3::new(0.5, 1.0, 3.0), Vec3::ZERO)),
@@ -137,7 +137,7 @@ fn unlit_colors_and_the_background_are_exact() {
 }
 
 #[test]
-fn samples_keep_background_apart() {
+fn background_texels_are_marked_and_samples_keep_their_color() {
     let image = sample(&wall(), &ahead());
     assert!(image.inverse_depth_per_m.contains(&depth_image::BACKGROUND_INVERSE_DEPTH));
     let wanted = Vec3::from(COLOR.map(depth_image::linear_from_srgb8));
@@ -177,7 +177,7 @@ fn fine_checks_far_away_are_grey_in_linear_light() {
 }
 
 #[test]
-fn what_the_alpha_mask_leaves_out_is_a_hole() {
+fn masked_out_texels_show_the_background() {
     // Left half opaque, right half clear.
     let mut texture = Texture { width_px: 64, height_px: 64, is_srgb: true, srgba8: vec![255; 64 * 64 * 4] };
     texture.srgba8.chunks_exact_mut(64 * 4).for_each(|row| row.as_chunks_mut::<4>().0[32..].fill([255, 255, 255, 0]));
@@ -193,7 +193,7 @@ fn what_the_alpha_mask_leaves_out_is_a_hole() {
 }
 
 #[test]
-fn backs_are_seen_of_double_sided_surfaces_only() {
+fn only_double_sided_surfaces_show_their_back() {
     let mut scene = wall();
     let behind = looking(Vec3::NEG_Z * 8.0, Vec3::ZERO);
     assert!(sample(&scene, &behind).inverse_depth_per_m.iter().all(|&d| d == 0.0));
@@ -239,7 +239,7 @@ fn instances_stand_where_they_are_placed() {
 }
 
 #[test]
-fn wind_moves_what_sways_as_it_says() {
+fn wind_displaces_swaying_vertices() {
     let wind = Wind { direction_in_world: Vec3::X, amplitude_m: 0.5, frequency_hz: 0.3, waves_per_m: Vec3::ZERO };
     let mut scene = wall();
     scene.wind = Some(wind);
@@ -299,7 +299,7 @@ fn triangles_at(scene: &Scene, point: Vec3) -> Vec<(u32, usize)> {
 }
 
 #[test]
-fn bad_cameras_are_named() {
+fn an_invalid_camera_is_named_in_the_error() {
     let scene = upload(&wall());
     let draw = work(&scene, Lighting::UNLIT, 0.0);
     let bad = PinholeCamera { eye_in_world: Vec3::NAN, ..ahead() };

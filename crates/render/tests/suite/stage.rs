@@ -1,4 +1,4 @@
-//! What all of these tests draw with.
+//! The scene and cameras of these tests.
 
 use std::sync::{Arc, OnceLock};
 
@@ -61,7 +61,7 @@ pub fn lamps(lights: Vec<Light>) -> Illumination {
     Illumination { lights, environment: Environment::default() }
 }
 
-/// What is reflected at each sample, linear green, with its place in the world.
+/// Reflected light at each sample, linear green, with its place in the world.
 pub fn lit_points(image: &DepthImage) -> Vec<(Vec3, f32)> {
     let UVec2 { x: width_px, y: height_px } = image.size_px();
     let places = (0..height_px).flat_map(|y| (0..width_px).map(move |x| (x, y)));

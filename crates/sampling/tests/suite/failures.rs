@@ -7,7 +7,7 @@ use sampling::{Redundancy, SampleWork, SamplingMethod, scalar};
 use scene::Instance;
 use scene::procedural::{GrassDensity, courtyard, grass, poles, quad};
 
-use crate::stage::{after, device, pinholes, settle, unlit, upload};
+use crate::stage::{after, device, pinholes, reference, unlit, upload};
 
 const SIZE_PX: UVec2 = UVec2::new(80, 60);
 const PIXEL: SamplingMethod = SamplingMethod::NonRedundant(Redundancy::Pixel);
@@ -19,7 +19,7 @@ fn sample(scene: &GpuScene, cameras: &[PinholeCamera], method: SamplingMethod) -
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let cameras = pinholes(cameras);
     let planes = SamplePlanes { normal: true, surface_id: true, ..SamplePlanes::default() };
-    let work = SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes, settled_at_s: None };
+    let work = SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes, temporal_reference_s: None };
     device().sampler.sample(&work).expect("images")
 }
 
@@ -37,7 +37,7 @@ fn share(part: usize, whole: usize) -> f64 {
 fn a_grazing_floor_counts_as_sampled_by_pixel_but_not_by_tolerance() {
     let scene = upload(&quad(Vec3::ZERO, 1.0, Vec3::Y, [200; 3]));
     let above = PinholeCamera::looking_at(Vec3::Y * 3.0, Vec3::ZERO, Vec3::NEG_Z, 0.6, SIZE_PX);
-    println!("angle (°): share of the second image left out by pixel, visibility, tolerance");
+    println!("angle (°): share of the second image omitted by pixel, visibility, tolerance");
     let mut kept_before = -1.0;
     for degrees in [0.0f32, 45.0, 60.0, 80.0, 85.0, 88.0, 89.0, 89.9] {
         let angle = degrees.to_radians();
@@ -63,7 +63,7 @@ fn a_grazing_floor_counts_as_sampled_by_pixel_but_not_by_tolerance() {
 
 /// Ten thousand instances of one square: the key is instance and primitive, so that none stands for another.
 #[test]
-fn instances_are_not_confused() {
+fn samples_of_other_instances_are_not_redundant() {
     let mut scene = quad(Vec3::ZERO, 0.03, Vec3::new(0.2, 0.1, 1.0), [180, 90, 40]);
     let mesh = scene.instances[0].mesh;
     scene.instances = (0..10_000u32)
@@ -78,7 +78,7 @@ fn instances_are_not_confused() {
     let camera =
         |x: f32| PinholeCamera::looking_at(Vec3::new(x, 0.0, 4.0), Vec3::ZERO, Vec3::Y, 0.9, UVec2::splat(128));
     let cameras = [camera(-0.3), camera(0.3)];
-    let rays = on_device.scalar_rays(0.0).expect("a tree");
+    let rays = render::scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     let (device, reference) = (sample(&on_device, &cameras, PIXEL), scalar::sample(&rays, &cameras, PIXEL));
     let pairs = device[1].inverse_depth_per_m.iter().zip(&reference[1].inverse_depth_per_m);
     let differ = pairs.filter(|(a, b)| (*a - *b).abs() > 1e-3 * a.abs()).count();
@@ -112,7 +112,7 @@ fn a_wall_seen_edge_on_is_never_peeled() {
 
 /// Each further image of a meadow finds less that is new.
 #[test]
-fn more_images_of_grass_bring_less_and_less() {
+fn each_further_image_of_grass_adds_fewer_samples() {
     let scene = grass(GrassDensity::new(1.0).expect("a density"));
     let on_device = upload(&scene);
     let bounds = scene.bounds();
@@ -133,7 +133,7 @@ fn more_images_of_grass_bring_less_and_less() {
     assert!(new.iter().all(|&share| share > 0.0 && share <= 1.1), "{new:?}");
 }
 
-/// The second camera moves by parts of a pixel: texels that change from kept to left out or back.
+/// The second camera moves by parts of a pixel: texels that change from kept to omitted or back.
 #[test]
 fn masks_flicker_little_under_jitter() {
     let scene = poles(0.05);
@@ -159,16 +159,16 @@ fn masks_flicker_little_under_jitter() {
 
 /// The same, compared with what was kept before the second camera moved.
 #[test]
-fn what_has_settled_flickers_less() {
+fn temporal_hysteresis_reduces_flicker() {
     let scene = poles(0.05);
     let on_device = upload(&scene);
-    let rays = on_device.scalar_rays(0.0).expect("a tree");
+    let rays = render::scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     let camera = |x: f32| PinholeCamera::looking_at(Vec3::new(x, 0.0, 4.0), Vec3::NEG_Z * 2.0, Vec3::Y, 0.8, SIZE_PX);
     let pixel_m = 6.0 / camera(0.0).focal_px.x;
     let still = [camera(-0.4), camera(0.4)];
     let before = scalar::sample(&rays, &still, TOLERANCE);
-    let settled = settle(&on_device, &still);
-    let settings = scalar::Settings { before: Some(&before), ..scalar::Settings::default() };
+    let still_samples = reference(&on_device, &still);
+    let settings = scalar::Settings { reference: Some(&before), ..scalar::Settings::default() };
     let mask = |image: &DepthImage| -> Vec<bool> { image.inverse_depth_per_m.iter().map(|&d| d > 0.0).collect() };
     let flips = |image: &DepthImage| {
         let pairs = mask(&before[1]).into_iter().zip(mask(image));
@@ -177,7 +177,7 @@ fn what_has_settled_flickers_less() {
     println!("jitter (px): texels that change sides, without and with hysteresis, and by the reference");
     for jitter_px in [0.05, 0.1, 0.25, 0.5] {
         let cameras = [still[0], camera(0.4 + jitter_px * pixel_m)];
-        let [free, kept] = [None, Some(&settled)].map(|before| flips(&after(&on_device, &cameras, before)[1]));
+        let [free, kept] = [None, Some(&still_samples)].map(|before| flips(&after(&on_device, &cameras, before)[1]));
         let twin = flips(&scalar::sample_with(&rays, &cameras, TOLERANCE, settings)[1]);
         println!("{jitter_px:5}: {free:.4} {kept:.4} {twin:.4}");
         assert!(kept <= 0.6 * free, "{jitter_px}: {kept} of {free}");
@@ -185,31 +185,32 @@ fn what_has_settled_flickers_less() {
     }
 }
 
-/// A meadow in wind: what a set holds follows from its time and the one it settled at, whatever was sampled before.
+/// A meadow in wind: the samples of a set follow from its time and its reference time, in any order of sampling.
 #[test]
-fn settled_sets_do_not_depend_on_their_order() {
+fn sets_with_a_temporal_reference_do_not_depend_on_their_order() {
     let scene = upload(&grass(GrassDensity::new(0.2).expect("a density")));
     let eye = |x: f32| PinholeCamera::looking_at(Vec3::new(x, 1.2, 3.0), Vec3::ZERO, Vec3::Y, 0.7, SIZE_PX);
     let cameras = pinholes(&[eye(-0.2), eye(0.2)]);
-    let at = |scene_time_s: f32, settled_at_s: Option<f32>| {
+    let at = |scene_time_s: f32, temporal_reference_s: Option<f32>| {
         let draw = DrawWork { scene_time_s, ..unlit(&scene) };
         let planes = SamplePlanes::default();
-        let work = SampleWork { draw, cameras: &cameras, wanted: &[0, 1], method: TOLERANCE, planes, settled_at_s };
+        let work =
+            SampleWork { draw, cameras: &cameras, wanted: &[0, 1], method: TOLERANCE, planes, temporal_reference_s };
         device().sampler.sample(&work).expect("images")
     };
     let later = at(0.4, Some(0.0));
     assert_eq!(at(0.2, Some(0.0)).len(), 2);
     assert!(at(0.9, Some(0.5)) != at(0.9, None), "hysteresis has an effect");
     assert!(at(0.4, Some(0.0)) == later, "whatever came between");
-    assert!(at(0.4, Some(0.4)) == at(0.4, None), "the first of its run settles at itself");
+    assert!(at(0.4, Some(0.4)) == at(0.4, None), "the first of its run is its own reference");
 }
 
-/// What the test by tolerance allows, from an eighth to eight times: little leaves in twice what is there, and much
-/// leaves out what nothing else holds.
+/// Tolerances from an eighth to eight times: small ones keep redundant samples, large ones omit samples that no other
+/// image holds.
 #[test]
-fn more_tolerance_keeps_less_and_loses_more() {
+fn more_tolerance_keeps_fewer_samples_and_loses_more_surface() {
     let scene = courtyard();
-    let rays = upload(&scene).scalar_rays(0.0).expect("a tree");
+    let rays = render::scalar::rays::Scene::of(&upload(&scene), 0.0).expect("a tree");
     let bounds = scene.bounds();
     let reach = bounds.size().length();
     let camera = |x: f32| {

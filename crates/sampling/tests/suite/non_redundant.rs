@@ -33,7 +33,7 @@ fn taken(
         wanted: &wanted,
         method,
         planes: ALL,
-        settled_at_s: None,
+        temporal_reference_s: None,
     })
 }
 
@@ -52,7 +52,7 @@ fn fig_3() -> Vec<PinholeCamera> {
     viewpoints.eyes_in_world.map(camera).to_vec()
 }
 
-/// Of all texels, those that hold something else: another kind of texel, another depth, or another way there.
+/// The share of texels that differ: another kind of texel, another depth, or another way there.
 fn differing(a: &DepthImage, b: &DepthImage) -> f64 {
     let differs = |(i, (&a_depth, &b_depth)): (usize, (&f32, &f32))| {
         let far = (a_depth - b_depth).abs() > 1e-3 * a_depth.abs();
@@ -63,21 +63,21 @@ fn differing(a: &DepthImage, b: &DepthImage) -> f64 {
 }
 
 #[test]
-fn the_device_leaves_out_what_the_reference_leaves_out() {
+fn the_device_omits_the_samples_that_the_scalar_reference_omits() {
     for (name, scene, cameras) in [
         ("blocks", blocks(), fig_3()),
         ("poles", poles(0.02), two_plane(&poles(0.02))),
         ("courtyard", courtyard(), two_plane(&courtyard())),
     ] {
         let on_device = upload(&scene);
-        let rays = on_device.scalar_rays(0.0).expect("a tree");
+        let rays = render::scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
         let peeling = SamplingMethod::DepthPeeling { layers: 3 };
         let useful = [Redundancy::Pixel, Redundancy::Visibility].map(SamplingMethod::Useful);
         for method in APART.into_iter().chain(useful).chain([peeling]) {
             let cameras = method.cameras(cameras.clone());
             let reference = scalar::sample(&rays, &cameras, method);
             for visibility in [Visibility::Rays, Visibility::Triangles] {
-                if visibility == Visibility::Triangles && !method.is_chained() {
+                if visibility == Visibility::Triangles && !method.images_are_sequential() {
                     continue;
                 }
                 let images = taken(&on_device, &cameras, method, visibility).expect("images");
@@ -94,7 +94,7 @@ fn the_device_leaves_out_what_the_reference_leaves_out() {
 
 /// Every sample of a conventional image is in the non-redundant one, or redundant with an earlier image.
 #[test]
-fn nothing_is_lost() {
+fn every_conventional_sample_is_held_by_some_image() {
     let scene = courtyard();
     let on_device = upload(&scene);
     let cameras = two_plane(&scene);
@@ -154,7 +154,7 @@ fn only_images_without_redundance_find_block_c() {
 }
 
 #[test]
-fn the_same_viewpoint_twice_peels() {
+fn a_repeated_viewpoint_shows_the_next_layer() {
     let scene = courtyard();
     let on_device = upload(&scene);
     let cameras = vec![two_plane(&scene)[0]; 2];
@@ -170,7 +170,7 @@ fn the_same_viewpoint_twice_peels() {
 }
 
 #[test]
-fn layers_lie_behind_each_other_and_corners_go_with_them() {
+fn layers_and_their_corners_lie_behind_one_another() {
     let scene = poles(0.02);
     let on_device = upload(&scene);
     let method = SamplingMethod::DepthPeeling { layers: 4 };
@@ -188,12 +188,12 @@ fn layers_lie_behind_each_other_and_corners_go_with_them() {
 }
 
 #[test]
-fn who_sees_nothing_has_nothing() {
+fn a_camera_that_sees_nothing_has_no_samples() {
     let scene = courtyard();
     let on_device = upload(&scene);
     let up = PinholeCamera::looking_at(Vec3::Y * 50.0, Vec3::Y * 100.0, Vec3::X, 0.5, SIZE_PX);
     let inside = PinholeCamera::looking_at(scene.bounds().center(), scene.bounds().max, Vec3::Y, 0.5, SIZE_PX);
-    for method in SamplingMethod::ALL {
+    for method in SamplingMethod::all() {
         let cameras = method.cameras(vec![up, up]);
         for image in sample(&on_device, &cameras, method) {
             assert!(image.inverse_depth_per_m.iter().all(|&d| d == 0.0), "{method}");
@@ -207,7 +207,7 @@ fn who_sees_nothing_has_nothing() {
 
 /// By visibility each image can be taken alone; a chain cannot be taken in parts.
 #[test]
-fn what_needs_no_earlier_image_can_be_taken_apart() {
+fn independent_images_can_be_taken_one_by_one() {
     let scene = poles(0.02);
     let on_device = upload(&scene);
     let cameras = two_plane(&scene);
@@ -228,7 +228,7 @@ fn what_needs_no_earlier_image_can_be_taken_apart() {
             wanted,
             method,
             planes: ALL,
-            settled_at_s: None,
+            temporal_reference_s: None,
         })
     };
     assert_eq!(part(&[3, 1], method).expect("two images"), [whole[3].clone(), whole[1].clone()]);
@@ -237,13 +237,12 @@ fn what_needs_no_earlier_image_can_be_taken_apart() {
         assert_eq!(part(wanted, method).is_ok(), allowed);
     }
     let chained = SamplingMethod::NonRedundant(Redundancy::Pixel);
-    assert!(matches!(part(&[1, 2], chained), Err(SamplingError::Wanted { index: 1, cameras: 4, .. })));
+    assert!(matches!(part(&[1, 2], chained), Err(SamplingError::Selection { index: 1, cameras: 4, .. })));
 }
 
-/// Of two walls behind each other the hidden one is useless in its middle and useful at its rim, the more so the larger
-/// the cell.
+/// The hidden one of two walls is useless in its middle and useful at its rim, more so with a larger cell.
 #[test]
-fn what_no_view_can_see_is_left_out() {
+fn samples_that_no_view_can_see_are_omitted() {
     let mut scene = quad(Vec3::ZERO, 1.5, Vec3::Z, [200; 3]);
     scene.meshes.extend(quad(Vec3::Z * -1.5, 1.5, Vec3::Z, [90; 3]).meshes);
     scene.instances.push(Instance { mesh: 1, ..scene.instances[0] });

@@ -1,10 +1,12 @@
-//! What these tests sample with.
+//! The scene and cameras of these tests.
 
 use std::sync::{Arc, OnceLock};
 
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use gpu::{DevicePreference, Gpu};
-use render::{DrawWork, GpuScene, LeaveOut, Lighting, Refinement, Renderer, SamplePlanes, Settled, Visibility};
+use render::{
+    DrawWork, GpuScene, Lighting, RedundancyTest, Refinement, Renderer, SamplePlanes, TemporalReference, Visibility,
+};
 use sampling::{Redundancy, Sampler, SamplingMethod};
 use scene::Scene;
 
@@ -42,19 +44,19 @@ pub fn pinholes(cameras: &[PinholeCamera]) -> Vec<Camera> {
     cameras.iter().copied().map(Camera::Pinhole).collect()
 }
 
-fn tolerance() -> LeaveOut {
-    SamplingMethod::NonRedundant(Redundancy::Tolerance).leave_out().expect("a test")
+fn tolerance() -> RedundancyTest {
+    SamplingMethod::NonRedundant(Redundancy::Tolerance).redundancy_test().expect("a test")
 }
 
-/// What a set by tolerance holds.
-pub fn settle(scene: &GpuScene, cameras: &[PinholeCamera]) -> Settled {
-    device().renderer.settle(unlit(scene), &pinholes(cameras), tolerance()).expect("a set")
+/// The contents of a set by tolerance.
+pub fn reference(scene: &GpuScene, cameras: &[PinholeCamera]) -> TemporalReference {
+    device().renderer.temporal_reference(unlit(scene), &pinholes(cameras), tolerance()).expect("a set")
 }
 
 /// A set by tolerance, which keeps on to another's samples.
-pub fn after(scene: &GpuScene, cameras: &[PinholeCamera], before: Option<&Settled>) -> Vec<DepthImage> {
+pub fn after(scene: &GpuScene, cameras: &[PinholeCamera], reference: Option<&TemporalReference>) -> Vec<DepthImage> {
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let (work, cameras, planes) = (unlit(scene), pinholes(cameras), SamplePlanes::default());
-    let images = device().renderer.draw_depth_images_apart(work, &cameras, &wanted, planes, tolerance(), before);
+    let images = device().renderer.draw_image_sequence(work, &cameras, &wanted, planes, tolerance(), reference);
     images.expect("images")
 }

@@ -15,12 +15,12 @@ use crate::error::{WireError, required};
 use crate::proto;
 use crate::protocol::{PROTOCOL_VERSION, check_version};
 
-/// A number that is 0 on the wire where there is none.
+/// A number that the wire writes as 0 where it is absent.
 fn nonzero(count: u32) -> Option<u32> {
     (count > 0).then_some(count)
 }
 
-/// A rate that is 0 on the wire where there is none.
+/// A rate that the wire writes as 0 where it is absent.
 fn frame_rate_from(frames_per_s: f64) -> Option<f64> {
     (frames_per_s != 0.0).then_some(frames_per_s)
 }

@@ -1,30 +1,30 @@
-//! How peers are reached.
+//! Connections to peers.
 
 use std::time::Duration;
 
 use tonic::Status;
 use tonic::transport::{Channel, Endpoint};
 
-/// How often an idle connection is probed; with [`KEEPALIVE_TIMEOUT`], silent loss is noticed after 10 s.
+/// The interval of probes of an idle connection; with [`KEEPALIVE_TIMEOUT`], a silent loss is noticed after 10 s.
 pub const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(5);
-/// How long a probe may stay unanswered.
+/// The longest wait for the answer to a probe.
 pub const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(5);
-/// How long connecting may take.
+/// The longest time to connect.
 pub const CALL_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A connection to `http://host:port`.
 ///
 /// # Errors
-/// `INVALID_ARGUMENT` for what is no address, `UNAVAILABLE` where nobody answers.
+/// `INVALID_ARGUMENT` for an invalid address, `UNAVAILABLE` where no process answers.
 pub async fn connect(address: &str) -> Result<Channel, Status> {
     let connected = endpoint(address)?.connect().await;
     connected.map_err(|error| Status::unavailable(format!("{address}: {error}")))
 }
 
-/// As [`connect`], but only when it is first used.
+/// As [`connect`], on first use.
 ///
 /// # Errors
-/// `INVALID_ARGUMENT` for what is no address.
+/// `INVALID_ARGUMENT` for an invalid address.
 pub fn connect_later(address: &str) -> Result<Channel, Status> {
     Ok(endpoint(address)?.connect_lazy())
 }
@@ -38,7 +38,7 @@ fn endpoint(address: &str) -> Result<Endpoint, Status> {
         .http2_keep_alive_interval(KEEPALIVE_INTERVAL)
         .keep_alive_timeout(KEEPALIVE_TIMEOUT)
         .keep_alive_while_idle(true)
-        // Bulk: the default window of 64 KiB would stop a sender eight times a message.
+        // The default window of 64 KiB would stop a sender of images eight times a message.
         .initial_stream_window_size(4 << 20)
         .initial_connection_window_size(16 << 20))
 }

@@ -12,22 +12,22 @@ use crate::proto;
 use crate::proto::coordinator_service_client::CoordinatorServiceClient;
 use crate::proto::coordinator_service_server::{CoordinatorService, CoordinatorServiceServer};
 
-/// Knows the members, plans sessions and hands out scenes.
+/// Knows the members, plans sessions and serves scenes.
 #[async_trait]
 pub trait Coordinator: Send + Sync + 'static {
     /// Membership lasts as long as the stream.
     async fn join_cluster(&self, request: JoinCluster) -> Result<Messages<Welcome>, Status>;
-    /// Progress, one plan, and word when it no longer holds.
+    /// The session's number, progress, every plan that comes into force, and the end of the session.
     async fn open_session(&self, request: SessionRequest) -> Result<Messages<SessionEvent>, Status>;
-    /// A session asks for more, or less.
+    /// Changes what a session asks for.
     async fn change_session(&self, request: ChangeSession) -> Result<(), Status>;
-    /// A member says what it did.
+    /// Takes a member's report on its work.
     async fn report_work(&self, request: WorkReport) -> Result<(), Status>;
     /// A scene's package from an offset on.
     async fn fetch_scene(&self, request: FetchScene) -> Result<Messages<ScenePart>, Status>;
     /// The members.
     async fn status(&self) -> Result<ClusterStatus, Status>;
-    /// A sampler that a compositor cannot get images of.
+    /// Takes a compositor's report on a sampler whose images it cannot get.
     async fn report_sampler(&self, report: SamplerReport) -> Result<(), Status>;
 }
 

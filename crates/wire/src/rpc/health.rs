@@ -1,14 +1,14 @@
-//! Whether a process serves, as the standard health service says.
+//! The client of the standard health service.
 
 use tonic::Status;
 use tonic_health::pb::{HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient};
 
 use super::connect;
 
-/// Asks the process at `http://host:port` of a role, or, with an empty name, of all of it.
+/// Whether the process at `http://host:port` serves a role, or, with an empty name, all of its roles.
 ///
 /// # Errors
-/// Where nobody answers, or the role is not known there.
+/// Where no process answers, or it does not know the role.
 pub async fn is_serving(address: &str, role: &str) -> Result<bool, Status> {
     let request = HealthCheckRequest { service: role.to_owned() };
     let answer = HealthClient::new(connect(address).await?).check(request).await?;

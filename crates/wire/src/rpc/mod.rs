@@ -1,5 +1,6 @@
 //! The services in domain types: traits to serve, clients to call, and their settings.
 
+mod backoff;
 mod channel;
 mod compositor;
 mod coordinator;
@@ -13,6 +14,7 @@ use std::pin::Pin;
 use tokio_stream::{Stream, StreamExt as _};
 use tonic::{Request, Response, Status, Streaming};
 
+pub use backoff::Backoff;
 pub use channel::{CALL_TIMEOUT, KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT, connect, connect_later};
 pub use compositor::{Compositor, CompositorClient, compositor_server};
 pub use coordinator::{Coordinator, CoordinatorClient, coordinator_server};
@@ -37,7 +39,7 @@ where
     Box::pin(stream.map(|message| message.and_then(|message| D::try_from(message).map_err(Status::from))))
 }
 
-/// As [`incoming`], of what a server answers: what is wrong with that is no fault of the request.
+/// As [`incoming`], for answers of a server: their faults are not the request's.
 fn answers<P, D>(stream: Streaming<P>) -> Messages<D>
 where
     P: Send + 'static,

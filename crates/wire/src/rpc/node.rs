@@ -1,4 +1,4 @@
-//! What every node serves.
+//! The service of every node.
 
 use cluster::{Assignment, Costs, MeasureCosts, Ready};
 use tonic::transport::Channel;
@@ -9,12 +9,12 @@ use crate::proto;
 use crate::proto::node_service_client::NodeServiceClient;
 use crate::proto::node_service_server::{NodeService, NodeServiceServer};
 
-/// Is measured and told what to do.
+/// Measures its costs and takes plans.
 #[async_trait]
 pub trait Node: Send + Sync + 'static {
-    /// Each cost alone and warm.
+    /// Measures each cost alone and warm.
     async fn measure_costs(&self, request: MeasureCosts) -> Result<Costs, Status>;
-    /// Answers when ready.
+    /// Takes a plan; answers when ready for it.
     async fn apply_assignment(&self, assignment: Assignment) -> Result<Ready, Status>;
 }
 

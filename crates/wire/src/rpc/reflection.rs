@@ -1,4 +1,4 @@
-//! What services and messages there are, as the standard reflection service says (v1).
+//! The standard reflection service (v1): the names and descriptions of services and messages.
 
 use tonic_reflection::server::v1::{ServerReflection, ServerReflectionServer};
 use tonic_reflection::server::{Builder, Error};
@@ -28,7 +28,7 @@ mod tests {
     use super::*;
     use crate::rpc::connect;
 
-    async fn asked(address: &str, request: MessageRequest) -> ServerReflectionResponse {
+    async fn ask(address: &str, request: MessageRequest) -> ServerReflectionResponse {
         let mut client = ServerReflectionClient::new(connect(address).await.unwrap());
         let request = ServerReflectionRequest { host: String::new(), message_request: Some(request) };
         let answers = client.server_reflection_info(tokio_stream::once(request)).await.unwrap();
@@ -41,13 +41,13 @@ mod tests {
         let address = format!("http://{}", listener.local_addr().unwrap());
         let server = Server::builder().add_service(reflection_server().unwrap());
         let serving = tokio::spawn(server.serve_with_incoming(TcpIncoming::from(listener)));
-        let answer = asked(&address, MessageRequest::ListServices(String::new())).await;
+        let answer = ask(&address, MessageRequest::ListServices(String::new())).await;
         let Some(MessageResponse::ListServicesResponse(list)) = answer.message_response else { panic!("{answer:?}") };
         let names: Vec<String> = list.service.into_iter().map(|service| service.name).collect();
         for service in ["Coordinator", "Node", "Sampler", "Compositor"] {
             let name = format!("myriorama.v1.{service}Service");
             assert!(names.contains(&name), "{name} in {names:?}");
-            let answer = asked(&address, MessageRequest::FileContainingSymbol(name)).await;
+            let answer = ask(&address, MessageRequest::FileContainingSymbol(name)).await;
             assert!(matches!(answer.message_response, Some(MessageResponse::FileDescriptorResponse(_))), "{answer:?}");
         }
         assert!(names.contains(&"grpc.health.v1.Health".to_owned()), "{names:?}");

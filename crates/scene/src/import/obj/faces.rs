@@ -2,11 +2,12 @@
 
 use std::collections::HashMap;
 
+use super::super::normals;
 use super::super::source_scene::{SourceMesh, plain_vertex};
+use super::attributes::Attributes;
 use super::text::Line;
-use super::{Attributes, parts_of, with_normals};
 use crate::error::{Fault, at_most};
-use crate::{Limits, Vertex};
+use crate::{Limits, MeshPart, Vertex};
 
 const NONE: u32 = u32::MAX;
 
@@ -36,7 +37,7 @@ impl Faces {
         self.current_material = Some(number);
     }
 
-    pub(super) fn take(&mut self, line: &Line, attributes: &Attributes, limits: &Limits) -> Result<(), Fault> {
+    pub(super) fn push(&mut self, line: &Line, attributes: &Attributes, limits: &Limits) -> Result<(), Fault> {
         if self.current_material.is_none() {
             self.use_material("");
         }
@@ -115,4 +116,27 @@ fn resolved(field: &str, count: usize) -> Result<u32, &'static str> {
     let from_zero = if number < 0 { number.checked_add(count as i64) } else { number.checked_sub(1) };
     let in_range = from_zero.filter(|n| (0..count.min(NONE as usize) as i64).contains(n));
     in_range.map(|n| n as u32).ok_or("refers to something that is not there")
+}
+
+/// Sorts triangles by material, one part each.
+fn parts_of(indices_of_material: Vec<Vec<u32>>, numbers: &[u32]) -> (Vec<u32>, Vec<MeshPart>) {
+    let (mut indices, mut parts) = (Vec::new(), Vec::new());
+    for (own, &material) in indices_of_material.into_iter().zip(numbers) {
+        if !own.is_empty() {
+            let (first_index, index_count) = (indices.len() as u32, own.len() as u32);
+            parts.push(MeshPart { first_index, index_count, material });
+            indices.extend(own);
+        }
+    }
+    (indices, parts)
+}
+
+/// Makes normals for a file without normals, and fills gaps otherwise.
+fn with_normals(mut mesh: SourceMesh, has_normals: bool) -> SourceMesh {
+    if has_normals {
+        normals::repair(&mut mesh)
+    } else {
+        normals::generate(&mut mesh, normals::CREASE_60_DEGREES)
+    }
+    mesh
 }

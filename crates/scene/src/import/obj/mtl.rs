@@ -62,7 +62,7 @@ fn parse(text: &str, element: &str, limits: &Limits, known: &mut HashMap<String,
             known.extend(name.replace(line.rest.to_owned()).map(|name| (name, std::mem::take(&mut entry))));
             at_most(element, known.len() as u64, limits.attributes)?;
         } else {
-            entry.take(&line)?;
+            entry.read_line(&line)?;
         }
     }
     known.extend(name.map(|name| (name, entry)));
@@ -70,7 +70,7 @@ fn parse(text: &str, element: &str, limits: &Limits, known: &mut HashMap<String,
 }
 
 impl Entry {
-    fn take(&mut self, line: &Line) -> Result<(), Fault> {
+    fn read_line(&mut self, line: &Line) -> Result<(), Fault> {
         let material = &mut self.material;
         match line.keyword {
             "Kd" => {

@@ -8,7 +8,7 @@ use super::super::mesh_builder::{MeshBuilder, vertex};
 use super::super::noise::mix;
 use super::super::rng::{Rng, mixed};
 use super::super::solids::{on_ellipse, sweep_around};
-use super::{SECTORS, SEED};
+use super::shell::{SECTORS, SEED};
 
 /// Half axes of the front row, and of the rearmost one.
 const FRONT_M: Vec2 = Vec2::new(100.0, 72.0);
@@ -86,7 +86,7 @@ fn add_tier(builder: &mut MeshBuilder, number: usize, tier: &Tier) {
     };
     let point = |station: u32, i: u32| height(TAU * station as f32 / SECTORS as f32, outline[i as usize]);
     let mut rng = Rng::new(SEED, 10 + number as u64);
-    let seats = |station: u32, i: u32| {
+    let colors = |station: u32, i: u32| {
         // After the underside and the rear, treads and risers alternate, from the top down.
         if i < 2 || i + 1 >= outline.len() as u32 {
             return Vec3::new(158.0, 154.0, 148.0);
@@ -101,7 +101,7 @@ fn add_tier(builder: &mut MeshBuilder, number: usize, tier: &Tier) {
         let is_tread = i.is_multiple_of(2);
         if is_aisle { Vec3::splat(136.0) } else { seat * if is_tread { 0.72 } else { 1.0 } }
     };
-    sweep_around(builder, SECTORS, outline.len() as u32, point, seats);
+    sweep_around(builder, SECTORS, outline.len() as u32, point, colors);
 }
 
 impl Tier {

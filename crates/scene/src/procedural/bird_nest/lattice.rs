@@ -8,7 +8,7 @@ use super::super::mesh_builder::MeshBuilder;
 use super::super::noise::lerp;
 use super::super::rng::Rng;
 use super::super::solids::{Station, beam};
-use super::{SECTORS, SEED, shell};
+use super::shell::{self, SECTORS, SEED};
 
 const TRUSSES: u32 = 24;
 /// Half the angle by which a truss turns around the stadium from its foot to the opening.

@@ -15,10 +15,6 @@ use crate::Scene;
 
 /// Number of triangles of the model in the paper's table 1.
 const TRIANGLES: u32 = 67_000;
-const SEED: u64 = 2008;
-
-/// Number of sectors of an ellipse around the stadium.
-const SECTORS: u32 = 96;
 
 /// A stadium of 332 m × 296 m around the origin, 42 m to 68 m high, on ground at y = 0: 67,000 triangles.
 #[must_use]

@@ -5,6 +5,11 @@ use glam::{Vec2, Vec3};
 use super::super::noise::lerp;
 use super::super::solids::{Station, on_ellipse};
 
+/// The seed of all that is random in the model.
+pub(super) const SEED: u64 = 2008;
+/// Number of sectors of an ellipse around the stadium.
+pub(super) const SECTORS: u32 = 96;
+
 /// Half axes of the eave and of the opening of the roof, in plan.
 const EAVE_M: Vec2 = Vec2::new(166.0, 148.0);
 const OPENING_M: Vec2 = Vec2::new(91.0, 62.0);

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use super::super::mesh_builder::MeshBuilder;
 use super::super::rng::Rng;
 use super::super::solids::{drum, sweep_around};
-use super::KERB_M;
+use super::plan::KERB_M;
 
 const RECESS_M: f32 = 0.6;
 /// Approximate number of windows of a building: those of a higher one are wider.

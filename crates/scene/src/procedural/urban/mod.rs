@@ -1,6 +1,7 @@
 //! A few blocks of a city: large flat walls and streets, with recesses, ledges and clutter on them.
 
 mod building;
+mod plan;
 mod street;
 
 use glam::{Vec2, Vec3};
@@ -9,17 +10,10 @@ use super::mesh_builder::MeshBuilder;
 use super::rng::Rng;
 use super::solids::matt;
 use crate::Scene;
+use plan::{BLOCK_M, HALF_WIDTH_M, SEED, blocks};
 
 /// Number of triangles of the model in the paper's table 1.
 const TRIANGLES: u32 = 50_000;
-const SEED: u64 = 1950;
-
-const HALF_WIDTH_M: f32 = 200.0;
-/// Number of blocks a side; each has streets on all sides.
-const BLOCKS: u32 = 3;
-const STREET_M: f32 = 19.0;
-const BLOCK_M: f32 = (2.0 * HALF_WIDTH_M - (BLOCKS + 1) as f32 * STREET_M) / BLOCKS as f32;
-const KERB_M: f32 = 0.2;
 /// Distance from the kerb to the buildings.
 const PAVEMENT_M: f32 = 5.0;
 
@@ -36,12 +30,6 @@ pub fn urban() -> Scene {
     builder.finish_part(2);
     let scene = builder.into_scene_of("urban", vec![matt("street"), matt("houses"), matt("furniture")]);
     Scene { background_linear: Vec3::new(0.52, 0.62, 0.76), ..scene }
-}
-
-/// The corner of least x and z of each block.
-fn blocks() -> impl Iterator<Item = Vec2> {
-    let along = |i: u32| -HALF_WIDTH_M + STREET_M + i as f32 * (BLOCK_M + STREET_M);
-    (0..BLOCKS * BLOCKS).map(move |i| Vec2::new(along(i % BLOCKS), along(i / BLOCKS)))
 }
 
 /// Quarters of blocks that are parks: (block, quarter).

@@ -6,7 +6,7 @@ use super::super::mesh_builder::MeshBuilder;
 use super::super::noise::{Noise, mix};
 use super::super::rng::Rng;
 use super::super::solids::{drum, lumpy_ball};
-use super::{BLOCK_M, BLOCKS, HALF_WIDTH_M, KERB_M, SEED, STREET_M, blocks};
+use super::plan::{BLOCK_M, BLOCKS, HALF_WIDTH_M, KERB_M, SEED, STREET_M, blocks};
 
 /// Height of paint above a street, enough for 16 bits of depth to separate them.
 const PAINT_M: f32 = 0.05;

@@ -1,0 +1,81 @@
+//! The plan in force and its compositors, as a session knows them.
+
+use std::sync::Arc;
+
+use cluster::{Assignment, CompositorShare, SessionPlan};
+use tokio::sync::mpsc;
+use wire::rpc::{connect, connect_later};
+
+use crate::error::ClientError;
+use crate::peer::Peer;
+
+/// A plan in force, and its compositors, but for those that cannot be reached.
+#[derive(Debug)]
+pub(crate) struct ActivePlan {
+    pub(crate) plan: SessionPlan,
+    pub(crate) peers: Vec<Peer>,
+    named_plans: mpsc::Sender<Assignment>,
+}
+
+impl ActivePlan {
+    /// Connects to the plan's compositors; what they name as the plan in force goes to `named_plans`.
+    ///
+    /// # Errors
+    /// Where no compositor can be reached.
+    pub(crate) async fn connect(
+        plan: SessionPlan,
+        named_plans: &mpsc::Sender<Assignment>,
+    ) -> Result<Self, ClientError> {
+        let (mut peers, mut failed) = (Vec::with_capacity(plan.assignment.compositors.len()), None);
+        for share in &plan.assignment.compositors {
+            match connect(&share.address).await {
+                Ok(channel) => peers.push(Peer::new(share, channel, named_plans.clone())),
+                Err(status) => failed = Some(ClientError::compositor(share, status.message())),
+            }
+        }
+        match failed.filter(|_| peers.is_empty()) {
+            Some(error) => Err(error),
+            None => Ok(Self { plan, peers, named_plans: named_plans.clone() }),
+        }
+    }
+
+    /// The plan after this one. Connects to compositors when they are first asked: some that cannot be reached now may be
+    /// back by then.
+    pub(crate) fn replaced_by(&self, plan: SessionPlan) -> Self {
+        let peer = |share: &CompositorShare| {
+            connect_later(&share.address).map(|channel| Peer::new(share, channel, self.named_plans.clone()))
+        };
+        let peers = plan.assignment.compositors.iter().filter_map(|share| peer(share).ok()).collect();
+        Self { plan, peers, named_plans: self.named_plans.clone() }
+    }
+
+    /// The plan that a compositor names as the one in force, if it can be this session's.
+    pub(crate) fn succeeded_by(&self, assignment: &Assignment) -> Option<Self> {
+        let (old, new) = (&self.plan.assignment, assignment);
+        let is_later = new.plan_epoch > old.plan_epoch;
+        let shows_the_same = new.workload.scene == old.workload.scene && new.workload.timeline == old.workload.timeline;
+        let plan =
+            || SessionPlan { assignment: new.clone(), reason: "as a compositor says".to_owned(), ..self.plan.clone() };
+        (is_later && shows_the_same).then(|| self.replaced_by(plan()))
+    }
+
+    /// All peers but those that failed lately; where that leaves none, all.
+    pub(crate) fn trusted(&self) -> Vec<Peer> {
+        let trusted: Vec<Peer> = self.peers.iter().filter(|peer| !peer.breaker.is_open()).cloned().collect();
+        if trusted.is_empty() { self.peers.clone() } else { trusted }
+    }
+
+    pub(crate) fn plan_epoch(&self) -> u64 {
+        self.plan.assignment.plan_epoch
+    }
+}
+
+/// The state of a session, as the coordinator last said.
+#[derive(Debug, Clone)]
+pub(crate) struct SessionState {
+    /// Its number at the coordinator.
+    pub(crate) session: u64,
+    pub(crate) active: Arc<ActivePlan>,
+    /// Why the session has ended, if it has.
+    pub(crate) ended: Option<String>,
+}

@@ -1,0 +1,41 @@
+//! Views that a caller asks for, and the frames that answer them.
+
+use cluster::Assignment;
+use codec::FrameHeader;
+use depth_image::{PinholeCamera, View};
+
+use crate::error::ClientError;
+
+/// One view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewRequest {
+    /// The client's own number, once a call.
+    pub frame: u64,
+    /// Index into the session's timeline.
+    pub set_index: u32,
+    /// The camera of the view.
+    pub camera: PinholeCamera,
+}
+
+impl ViewRequest {
+    /// # Errors
+    /// For a camera that cannot be used, and for a set beyond the plan's timeline.
+    pub(crate) fn check(&self, plan: &Assignment) -> Result<(), ClientError> {
+        let invalid = |field, reason| ClientError::Invalid { field, reason };
+        let camera_error = |error| invalid("camera", format!("frame {}: {error}", self.frame));
+        self.camera.validate().map_err(camera_error)?;
+        let beyond = || invalid("set_index", format!("{} is beyond the timeline", self.set_index));
+        plan.sample_set_id(self.set_index).map(drop).ok_or_else(beyond)
+    }
+}
+
+/// A frame that was received and decoded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// The request that it answers.
+    pub request: ViewRequest,
+    /// The picture.
+    pub view: View,
+    /// Its sample set, encoding and stage times.
+    pub header: FrameHeader,
+}

@@ -1,0 +1,138 @@
+//! Encoded images of one set as they arrive, for compositors that this one relays them to.
+
+use codec::EncodedDepthImage;
+use tokio::sync::watch;
+use tokio_stream::StreamExt as _;
+use tokio_stream::wrappers::WatchStream;
+use tonic::Status;
+use wire::rpc::Messages;
+
+/// The images that have arrived so far.
+#[derive(Debug, Clone, Default)]
+struct RelayState {
+    images: Vec<(u32, EncodedDepthImage)>,
+    ended: Option<Result<(), Status>>,
+}
+
+/// Images are relayed in the order they arrive. Clones share them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct RelayBuffer(watch::Sender<RelayState>);
+
+impl RelayBuffer {
+    /// Adds an image that has arrived; one that was fetched again after a fault counts once.
+    pub(crate) fn add(&self, index: u32, image: EncodedDepthImage) {
+        self.0.send_if_modified(|state| {
+            let is_new = state.images.iter().all(|(other, _)| *other != index);
+            if is_new {
+                state.images.push((index, image));
+            }
+            is_new
+        });
+    }
+
+    /// All images have arrived, or no more will.
+    pub(crate) fn end(&self, result: Result<(), Status>) {
+        self.0.send_modify(|state| state.ended = Some(result));
+    }
+
+    /// Whether images are missing and will not arrive.
+    pub(crate) fn has_failed(&self) -> bool {
+        matches!(self.0.borrow().ended, Some(Err(_)))
+    }
+
+    /// Whether no image has arrived.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.borrow().images.is_empty()
+    }
+
+    /// The images that have arrived, then those that arrive.
+    pub(crate) fn images(&self) -> Messages<(u32, EncodedDepthImage)> {
+        let mut seen = 0;
+        let changes = WatchStream::new(self.0.subscribe()).map(move |state| {
+            let fresh: Vec<_> = state.images[seen..].iter().cloned().map(Ok).collect();
+            seen = state.images.len();
+            (fresh, state.ended)
+        });
+        Box::pin(Flattened { changes: Box::pin(changes), ready: Vec::new().into_iter(), ended: None })
+    }
+}
+
+/// New images, and how the set has ended, if it has.
+type Change = (Vec<Result<(u32, EncodedDepthImage), Status>>, Option<Result<(), Status>>);
+
+struct Flattened {
+    changes: std::pin::Pin<Box<dyn tokio_stream::Stream<Item = Change> + Send>>,
+    ready: std::vec::IntoIter<Result<(u32, EncodedDepthImage), Status>>,
+    ended: Option<Result<(), Status>>,
+}
+
+impl tokio_stream::Stream for Flattened {
+    type Item = Result<(u32, EncodedDepthImage), Status>;
+
+    fn poll_next(
+        mut self: std::pin::Pin<&mut Self>,
+        cx: &mut std::task::Context<'_>,
+    ) -> std::task::Poll<Option<Self::Item>> {
+        use std::task::Poll;
+        loop {
+            if let Some(image) = self.ready.next() {
+                return Poll::Ready(Some(image));
+            }
+            if let Some(ended) = &mut self.ended {
+                return Poll::Ready(std::mem::replace(ended, Ok(())).err().map(Err));
+            }
+            let Some((fresh, ended)) = std::task::ready!(self.changes.as_mut().poll_next(cx)) else {
+                self.ended = Some(Err(Status::aborted("the set was evicted before it was complete")));
+                continue;
+            };
+            (self.ready, self.ended) = (fresh.into_iter(), ended);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use codec::{EncodedDepthImage, ImageHeader, InverseDepthRange};
+
+    use super::*;
+
+    fn image(byte: u8) -> EncodedDepthImage {
+        let inverse_depth_range = InverseDepthRange { least_per_m: 0.0, greatest_per_m: 1.0 };
+        let header = ImageHeader { width: 1, height: 1, inverse_depth_range, planes: Vec::new() };
+        EncodedDepthImage { header, payload: vec![byte].into() }
+    }
+
+    #[tokio::test]
+    async fn a_late_reader_gets_all_images_and_a_waiting_one_gets_them_as_they_arrive() {
+        let buffer = RelayBuffer::default();
+        buffer.add(2, image(2));
+        let mut early = buffer.images();
+        assert_eq!(early.next().await.unwrap().unwrap().0, 2);
+        let waiting = tokio::spawn(async move {
+            let next = early.next().await.unwrap().unwrap().0;
+            (next, early.next().await.is_none())
+        });
+        tokio::task::yield_now().await;
+        buffer.add(0, image(0));
+        buffer.end(Ok(()));
+        assert_eq!(waiting.await.unwrap(), (0, true));
+        let late: Vec<_> = buffer.images().map(|image| image.unwrap().0).collect().await;
+        assert_eq!(late, [2, 0]);
+        assert!(!buffer.has_failed() && !buffer.is_empty());
+    }
+
+    #[tokio::test]
+    async fn a_failure_and_an_eviction_end_the_stream() {
+        let buffer = RelayBuffer::default();
+        buffer.add(1, image(1));
+        buffer.end(Err(Status::unavailable("the sampler is gone")));
+        let mut images = buffer.images();
+        assert!(images.next().await.unwrap().is_ok());
+        assert_eq!(images.next().await.unwrap().unwrap_err().message(), "the sampler is gone");
+        assert!(images.next().await.is_none() && buffer.has_failed());
+        let dropped = RelayBuffer::default();
+        let mut images = dropped.images();
+        drop(dropped);
+        assert!(images.next().await.unwrap().is_err());
+    }
+}

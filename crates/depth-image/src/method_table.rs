@@ -1,0 +1,87 @@
+//! Tables of methods that users and messages name: `NAME`, or `NAME:SETTING`.
+
+/// One row of a table of methods; the first row of a table is the default.
+#[derive(Debug, Clone, Copy)]
+pub struct NamedMethod<M> {
+    /// In snake case; a `-` in a user's text counts as `_`.
+    pub name: &'static str,
+    /// The method with its default setting.
+    pub method: M,
+    /// The setting that may follow the name and a colon.
+    pub setting: Option<Setting<M>>,
+    /// Description of the method, for `--help`.
+    pub help: &'static str,
+}
+
+/// A method's setting as users spell it.
+#[derive(Debug, Clone, Copy)]
+pub struct Setting<M> {
+    /// As in `--help`: a placeholder, and the values that it stands for in parentheses.
+    pub form: &'static str,
+    /// The method with this setting; `None` for a value that it does not take.
+    pub parse: fn(&str) -> Option<M>,
+}
+
+impl<M> NamedMethod<M> {
+    /// The texts that name this method: without and with a setting.
+    fn forms(&self) -> impl Iterator<Item = String> {
+        let with_setting = self.setting.as_ref().map(|setting| format!("{}:{}", self.name, setting.form));
+        std::iter::once(self.name.to_owned()).chain(with_setting)
+    }
+}
+
+/// The method that a text names.
+#[must_use]
+pub fn method_named<M: Copy>(table: &[NamedMethod<M>], text: &str) -> Option<M> {
+    let (name, setting) = text.split_once(':').map_or((text, None), |(name, setting)| (name, Some(setting)));
+    let name = name.replace('-', "_");
+    let row = table.iter().find(|row| row.name == name)?;
+    match setting {
+        None => Some(row.method),
+        Some(setting) => (row.setting?.parse)(setting),
+    }
+}
+
+/// All texts that name a method, as an error lists them.
+#[must_use]
+pub fn method_forms<M>(table: &[NamedMethod<M>]) -> String {
+    let forms: Vec<String> = table.iter().flat_map(NamedMethod::forms).collect();
+    forms.split_last().map_or_else(String::new, |(last, others)| format!("{} or {last}", others.join(", ")))
+}
+
+/// All methods and what they do, as `--help` lists them.
+#[must_use]
+pub fn method_help<M>(table: &[NamedMethod<M>]) -> String {
+    let row = |row: &NamedMethod<M>| format!("{}: {}", row.forms().collect::<Vec<_>>().join(" or "), row.help);
+    table.iter().map(row).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const METHODS: [NamedMethod<u32>; 2] = [
+        NamedMethod { name: "look_twice", method: 2, setting: None, help: "looks twice" },
+        NamedMethod {
+            name: "count",
+            method: 7,
+            setting: Some(Setting { form: "N (0 to 9)", parse: |text| text.parse().ok().filter(|&n| n < 10) }),
+            help: "counts",
+        },
+    ];
+
+    #[test]
+    fn names_and_settings_are_parsed() {
+        let named = |text: &str| method_named(&METHODS, text);
+        assert_eq!([named("look-twice"), named("count"), named("count:3")], [Some(2), Some(7), Some(3)]);
+        for text in ["", "look", "look_twice:1", "look_twice:", "count:", "count:10", "count:3:4"] {
+            assert_eq!(named(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn errors_and_help_list_every_form() {
+        assert_eq!(method_forms(&METHODS), "look_twice, count or count:N (0 to 9)");
+        assert_eq!(method_help(&METHODS), "look_twice: looks twice; count or count:N (0 to 9): counts");
+    }
+}

@@ -1,0 +1,26 @@
+//! Why views cannot be reconstructed.
+
+use crate::view_work::MAX_SAMPLE_CAMERAS;
+
+/// Why views cannot be reconstructed.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum ReconstructionError {
+    #[error(transparent)]
+    Gpu(#[from] gpu::GpuError),
+    #[error(transparent)]
+    Shader(#[from] gpu::ShaderError),
+    /// A camera of a view is invalid; `index` is its place in the request.
+    #[error("view camera {index}: {source}")]
+    Camera { index: usize, source: depth_image::CameraError },
+    /// A sample image is invalid; `index` is its place in the set.
+    #[error("sample image {index}: {reason}")]
+    Sample { index: usize, reason: String },
+    /// A sample image lacks a plane, named as in [`depth_image::DepthImageError`].
+    #[error("sample image {index} has no plane {plane}, which the reconstruction method needs")]
+    MissingPlane { index: usize, plane: &'static str },
+    #[error("a sample set holds 1 to {MAX_SAMPLE_CAMERAS} images, not {0}")]
+    SampleCount(usize),
+    #[error("the volume of the sample set is empty or not finite")]
+    Volume,
+}

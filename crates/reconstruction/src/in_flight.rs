@@ -1,0 +1,91 @@
+//! Views on their way from the device.
+
+use depth_image::{Provenance, View, ViewPlanes};
+use gpu::{FrameResult, PooledBuffer, Readback, Submitted};
+
+use crate::{batch::Batch, error::ReconstructionError, recording::Recording};
+
+/// Device time and fetches of a reconstruction.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Statistics {
+    /// Seconds on the device, all batches.
+    pub device_s: f64,
+    /// Mean loads of depth and colour words a pixel, where counted.
+    pub fetches_per_ray: Option<f64>,
+}
+
+/// A submitted batch.
+pub(crate) struct InFlight<'g> {
+    submitted: Submitted<'g>,
+    reads: Reads,
+    /// Lent until the device is done with it.
+    batch: Batch,
+}
+
+/// A read-back of each plane.
+struct Reads {
+    srgb8: Readback,
+    inverse_depth_per_m: Option<Readback>,
+    provenance: Option<Readback>,
+    fetches: Option<Readback>,
+}
+
+impl<'g> InFlight<'g> {
+    /// Submits a recording, with read-backs of the planes that are asked for.
+    pub fn submit(recording: Recording<'g>, planes: ViewPlanes) -> Self {
+        let Recording { device, mut frame, batch, .. } = recording;
+        let bytes = batch.plane_bytes;
+        let mut read =
+            |plane: &PooledBuffer| frame.read_back(plane, 0..bytes, device.buffers.lend_host("view read-back", bytes));
+        let reads = Reads {
+            srgb8: read(&batch.srgb8),
+            inverse_depth_per_m: planes.inverse_depth.then(|| read(&batch.inverse_depth_per_m)),
+            provenance: planes.provenance.then(|| read(&batch.provenance)),
+            fetches: batch.fetches.as_ref().map(read),
+        };
+        Self { submitted: frame.submit(), reads, batch }
+    }
+
+    /// Waits, and appends the batch's views. Fetches are added up over views.
+    pub fn finish(self, views: &mut Vec<View>, statistics: &mut Statistics) -> Result<(), ReconstructionError> {
+        let Self { submitted, reads, batch } = self;
+        let result = submitted.wait()?;
+        statistics.device_s += result.device_s;
+        let planes = |readback: Readback| each_view(&result, readback, &batch, <[u32]>::to_vec);
+        let rgb = each_view(&result, reads.srgb8, &batch, rgb_bytes)?;
+        let mut depths = reads.inverse_depth_per_m.map(planes).transpose()?.unwrap_or_default().into_iter();
+        let mut provenances = reads.provenance.map(planes).transpose()?.unwrap_or_default().into_iter();
+        if let Some(readback) = reads.fetches {
+            let sums = each_view(&result, readback, &batch, |words| words.iter().map(|&n| f64::from(n)).sum::<f64>())?;
+            let pixels = f64::from(batch.size_px.element_product());
+            *statistics.fetches_per_ray.get_or_insert(0.0) += sums.iter().sum::<f64>() / pixels;
+        }
+        views.extend(rgb.into_iter().map(|srgb8| View {
+            size_px: batch.size_px,
+            srgb8,
+            inverse_depth_per_m: depths.next().map(bytemuck::cast_vec),
+            provenance: provenances.next().map(|words| words.into_iter().map(Provenance).collect()),
+        }));
+        Ok(())
+    }
+}
+
+/// A plane of each view.
+fn each_view<T>(
+    result: &FrameResult,
+    readback: Readback,
+    batch: &Batch,
+    plane: impl Fn(&[u32]) -> T,
+) -> Result<Vec<T>, gpu::GpuError> {
+    let pixels = batch.size_px.element_product() as usize;
+    result.with(readback, |words: &[u32]| words.chunks(pixels).take(batch.cameras.len()).map(plane).collect())
+}
+
+fn rgb_bytes(rgba: &[u32]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(rgba.len() * 3);
+    bytes.extend(rgba.iter().flat_map(|word| {
+        let [r, g, b, _] = word.to_le_bytes();
+        [r, g, b]
+    }));
+    bytes
+}

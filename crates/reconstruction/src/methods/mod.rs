@@ -1,0 +1,292 @@
+//! Reconstruction methods: a closed set.
+//!
+//! Each method is a variant, a row of [`METHODS`], a file pair in this folder, a page in `docs/methods` and a scalar
+//! twin. No product code outside this folder names a method.
+
+pub(crate) mod hybrid_mesh;
+pub(crate) mod joint_carve;
+pub(crate) mod light_field_search;
+mod mesh;
+
+use std::{fmt, mem::discriminant, str::FromStr, sync::Arc};
+
+use depth_image::{NamedMethod, Setting, method_forms, method_help, method_named};
+use gpu::{Gpu, PassCache, ShaderError, ShaderSource, Templates, sources as of};
+
+use crate::{
+    device::Device,
+    error::ReconstructionError,
+    error_bound::ErrorBound,
+    pixel_list::PixelList,
+    quads::{Mesh as QuadMesh, QuadPasses},
+    recording::Recording,
+    required_planes::RequiredPlanes,
+    sample_set::SampleSet,
+};
+
+/// How views are found in depth images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ReconstructionMethod {
+    /// Lages §4.2: a linear search, refined by bisection.
+    LightFieldSearch {
+        /// From where a ray enters the volume to where it leaves it.
+        steps: u32,
+    },
+    /// Min-max pyramids of all cameras traversed together; weighted blending.
+    JointCarve {
+        /// The pyramid level at which the search ends; 0 is exact.
+        stop_level: u32,
+    },
+    /// Two triangles between each four neighbouring samples of one surface.
+    Mesh,
+    /// Xie's Algorithm 4: each sample a quad of its texel, its corners shared with its neighbours.
+    HybridMesh {
+        /// Blocks of quads that are flat within this bound are merged; `None` merges none.
+        merged: Option<ErrorBound>,
+    },
+}
+
+use ReconstructionMethod::{HybridMesh, JointCarve, LightFieldSearch, Mesh};
+
+/// All methods by name; the first is the default.
+pub const METHODS: [NamedMethod<ReconstructionMethod>; 4] = [
+    NamedMethod {
+        name: "joint_carve",
+        method: JointCarve { stop_level: 0 },
+        setting: Some(Setting {
+            form: "LEVEL (0 to 8)",
+            parse: |text| joint_carve::parse_stop_level(text).map(|stop_level| JointCarve { stop_level }),
+        }),
+        help: "traverses the depth pyramids of all cameras together, down to a level; 0 is exact",
+    },
+    NamedMethod {
+        name: "light_field_search",
+        method: LightFieldSearch { steps: light_field_search::DEFAULT_STEPS },
+        setting: Some(Setting {
+            form: "STEPS (1 to 65536)",
+            parse: |text| light_field_search::parse_steps(text).map(|steps| LightFieldSearch { steps }),
+        }),
+        help: "searches along each ray in equal steps, 100 by default",
+    },
+    NamedMethod { name: "mesh", method: Mesh, setting: None, help: "draws a quad between each four samples" },
+    NamedMethod {
+        name: "hybrid_mesh",
+        method: HybridMesh { merged: None },
+        setting: Some(Setting {
+            form: "PX (0.01 to 100)",
+            parse: |text| hybrid_mesh::parse_bound(text).map(|bound| HybridMesh { merged: Some(bound) }),
+        }),
+        help: "draws a quad for each sample, and merges quads where nothing moves by more than PX pixels",
+    },
+];
+
+pub(crate) const SHADERS: [(&str, &str); 5] =
+    [joint_carve::SHADER, joint_carve::march::SHADER, light_field_search::SHADER, mesh::SHADER, hybrid_mesh::SHADER];
+
+/// The texts of all variants of all methods' passes.
+pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
+    let carve = of::<joint_carve::march::March>(templates).chain(of::<joint_carve::Carve>(templates));
+    let cut = of::<mesh::CutBetweenSamples>(templates).chain(of::<hybrid_mesh::CutTexels>(templates));
+    carve.chain(of::<light_field_search::Search>(templates)).chain(cut)
+}
+
+/// The passes of all methods.
+pub(crate) struct MethodPasses {
+    joint_carve: joint_carve::CarvePasses,
+    light_field_search: PassCache<light_field_search::Search>,
+    mesh: PassCache<mesh::CutBetweenSamples>,
+    hybrid_mesh: hybrid_mesh::HybridPasses,
+    quads: QuadPasses,
+}
+
+impl MethodPasses {
+    pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
+        Self {
+            joint_carve: joint_carve::CarvePasses::new(gpu, templates),
+            light_field_search: PassCache::new(gpu, templates),
+            mesh: PassCache::new(gpu, templates),
+            hybrid_mesh: hybrid_mesh::HybridPasses::new(gpu, templates),
+            quads: QuadPasses::new(gpu, templates),
+        }
+    }
+}
+
+impl Default for ReconstructionMethod {
+    fn default() -> Self {
+        METHODS[0].method
+    }
+}
+
+impl ReconstructionMethod {
+    /// The text of `--help` on all methods.
+    #[must_use]
+    pub fn help() -> String {
+        method_help(&METHODS)
+    }
+
+    /// Planes that sample images need beside colour and depth.
+    #[must_use]
+    pub fn required_planes(self) -> RequiredPlanes {
+        match self {
+            LightFieldSearch { .. } | JointCarve { .. } | Mesh => RequiredPlanes::default(),
+            HybridMesh { .. } => hybrid_mesh::REQUIRED_PLANES,
+        }
+    }
+
+    /// The same method with less to do for coarser views; `None` where it has no coarser setting.
+    #[must_use]
+    pub fn coarser(self) -> Option<Self> {
+        match self {
+            LightFieldSearch { steps } => {
+                light_field_search::fewer_steps(steps).map(|steps| LightFieldSearch { steps })
+            }
+            JointCarve { stop_level } => {
+                joint_carve::coarser_level(stop_level).map(|stop_level| JointCarve { stop_level })
+            }
+            Mesh | HybridMesh { .. } => None,
+        }
+    }
+
+    /// Rays are followed from where their tiles start; other methods draw.
+    pub(crate) fn follows_rays(self) -> bool {
+        match self {
+            LightFieldSearch { .. } | JointCarve { .. } => true,
+            Mesh | HybridMesh { .. } => false,
+        }
+    }
+
+    /// Records the method's passes; gives the pixels that stay unknown.
+    pub(crate) fn record(
+        self,
+        passes: &MethodPasses,
+        recording: &mut Recording<'_>,
+    ) -> Result<PixelList, ReconstructionError> {
+        match self {
+            LightFieldSearch { steps } => light_field_search::record(&passes.light_field_search, recording, steps),
+            JointCarve { stop_level } => joint_carve::record(&passes.joint_carve, recording, stop_level),
+            Mesh => mesh::record(&passes.mesh, &passes.quads, recording),
+            HybridMesh { merged } => hybrid_mesh::record(&passes.hybrid_mesh, &passes.quads, recording, merged),
+        }
+    }
+
+    /// The set's quads, cut when they are first asked for; `None` for methods that draw none.
+    pub(crate) fn mesh(
+        self,
+        passes: &MethodPasses,
+        device: &Device,
+        set: &SampleSet,
+    ) -> Result<Option<Arc<QuadMesh>>, ReconstructionError> {
+        let MethodPasses { mesh, hybrid_mesh, quads, .. } = passes;
+        match self {
+            LightFieldSearch { .. } | JointCarve { .. } => Ok(None),
+            Mesh => mesh::mesh(mesh, quads, device, set).map(Some),
+            HybridMesh { merged } => hybrid_mesh::mesh(hybrid_mesh, quads, device, set, merged).map(Some),
+        }
+    }
+
+    /// The setting as users spell it; `None` where the name alone says it.
+    fn setting(self) -> Option<String> {
+        match self {
+            LightFieldSearch { steps } => Some(steps.to_string()),
+            JointCarve { stop_level } => (stop_level > 0).then(|| stop_level.to_string()),
+            Mesh => None,
+            HybridMesh { merged } => merged.map(|bound| bound.to_string()),
+        }
+    }
+}
+
+/// The text names no method, or gives a setting that the method does not take.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("unknown reconstruction method {0:?}, expected {forms}", forms = method_forms(&METHODS))]
+pub struct UnknownMethod(String);
+
+impl FromStr for ReconstructionMethod {
+    type Err = UnknownMethod;
+    fn from_str(text: &str) -> Result<Self, UnknownMethod> {
+        method_named(&METHODS, text).ok_or_else(|| UnknownMethod(text.to_owned()))
+    }
+}
+
+impl fmt::Display for ReconstructionMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let row = METHODS.iter().find(|row| discriminant(&row.method) == discriminant(self));
+        f.write_str(row.map_or("", |row| row.name))?;
+        self.setting().map_or(Ok(()), |setting| write!(f, ":{setting}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_parsed_and_printed_alike_and_other_texts_are_refused() {
+        let meshes = ["mesh", "hybrid_mesh", "hybrid_mesh:0.01", "hybrid_mesh:0.5", "hybrid_mesh:2", "hybrid_mesh:100"];
+        for name in ["joint_carve", "joint_carve:3", "light_field_search:8"].into_iter().chain(meshes) {
+            assert_eq!(name.parse::<ReconstructionMethod>().expect(name).to_string(), name);
+            assert_eq!(name.replace('_', "-").parse::<ReconstructionMethod>().expect(name).to_string(), name);
+        }
+        for name in [
+            "",
+            "carve",
+            "joint_carve:9",
+            "light_field_search:0",
+            "light_field_search:-1",
+            "light_field_search:99999999999",
+            "mesh:1",
+            "hybrid_mesh:",
+            "hybrid_mesh:0",
+            "hybrid_mesh:0.001",
+            "hybrid_mesh:0.123",
+            "hybrid_mesh:-1",
+            "hybrid_mesh:101",
+            "hybrid_mesh:NaN",
+            "hybrid_mesh:inf",
+        ] {
+            assert!(name.parse::<ReconstructionMethod>().is_err(), "{name}");
+        }
+    }
+
+    #[test]
+    fn the_table_lists_every_method_by_its_own_name() {
+        for row in &METHODS {
+            assert_eq!(row.name.parse(), Ok(row.method), "{}", row.name);
+            assert_eq!(row.method.to_string().split(':').next(), Some(row.name));
+        }
+        assert_eq!("light_field_search".parse(), Ok(LightFieldSearch { steps: 100 }));
+    }
+
+    #[test]
+    fn settings_have_the_bounds_that_their_form_says() {
+        let mut checked = 0;
+        for (row, setting) in METHODS.iter().filter_map(|row| Some((row, row.setting?))) {
+            let range = setting.form.split(['(', ')']).nth(1).expect("a range");
+            let (least, greatest) = range.split_once(" to ").expect("two bounds");
+            for text in [least, greatest] {
+                let name = format!("{}:{text}", row.name);
+                assert!(name.parse::<ReconstructionMethod>().is_ok(), "{name}");
+            }
+            let beyond = greatest.parse::<u32>().expect("a whole number") + 1;
+            assert_eq!((setting.parse)(&beyond.to_string()), None, "{}:{beyond}", row.name);
+            checked += 1;
+        }
+        assert_eq!(checked, 3);
+    }
+
+    #[test]
+    fn coarser_settings_end() {
+        let settings = |name: &str| {
+            let next = |method: &ReconstructionMethod| method.coarser();
+            std::iter::successors(Some(name.parse::<ReconstructionMethod>().expect(name)), next).count()
+        };
+        assert_eq!((settings("light_field_search:100"), settings("joint_carve"), settings("mesh")), (7, 9, 1));
+    }
+
+    #[test]
+    fn the_error_names_every_method() {
+        let error = "carve".parse::<ReconstructionMethod>().expect_err("no method").to_string();
+        for name in ["joint_carve:LEVEL", "light_field_search:STEPS", " mesh,", "hybrid_mesh ", "hybrid_mesh:PX"] {
+            assert!(error.contains(name), "{name} is not in {error}");
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! Pixels that one pass leaves to the next: `pixel_list.wgsl`.
+
+use bytemuck::{Pod, Zeroable};
+use gpu::{Binding, PooledBuffer};
+use wgpu::BufferUsages;
+
+use crate::device::Device;
+
+/// The workgroup size of passes over lists of pixels.
+pub(crate) const LIST_WORKGROUP: u32 = 64;
+
+/// For each view of a batch, pixels that a pass left undecided.
+pub(crate) struct PixelList {
+    pub pixels: PooledBuffer,
+    /// A [`GpuPixelList`] for each view: arguments of indirect dispatches.
+    pub lists: wgpu::Buffer,
+}
+
+/// `PixelList` of `pixel_list.wgsl`: arguments of an indirect dispatch, and the length of the list.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuPixelList {
+    pub workgroups: [u32; 3],
+    pub count: u32,
+}
+
+impl PixelList {
+    /// Empty lists for `views` views of together `plane_bytes`, at four bytes a pixel.
+    pub fn lend(device: &Device, views: usize, plane_bytes: u64) -> Self {
+        let empty = GpuPixelList { workgroups: [0, 1, 1], count: 0 };
+        let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT;
+        Self {
+            pixels: device.buffers.lend_storage("undecided pixels", plane_bytes),
+            lists: device.gpu.buffer_with("lists of undecided pixels", &vec![empty; views], usage),
+        }
+    }
+
+    /// As the next pass reads it.
+    pub fn bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::buffer("listed_pixels", &self.pixels), Binding::buffer("lists", &self.lists)]
+    }
+}

@@ -1,0 +1,92 @@
+//! Cuts a set's images, and reads back what came of it.
+
+use depth_image::PinholeCamera;
+use glam::{UVec2, Vec2, Vec3};
+use gpu::{Frame, Readback};
+
+use super::{
+    cut::{BYTES_OF_DRAW, BYTES_OF_REPORT, ImageCut},
+    mesh::{Cut, INDICES_A_QUAD, Mesh, MeshStatistics, Quad, QuadVertices},
+    passes::QuadPasses,
+};
+use crate::{device::Device, error::ReconstructionError, sample_set::SampleSet};
+
+/// Read-backs of one image.
+struct Reads {
+    draw: Readback,
+    report: Readback,
+}
+
+/// Cuts all images; `record` records the passes that cut one. Quads are listed in the order of their samples, so that
+/// the same set gives the same list.
+pub(crate) fn build(
+    passes: &QuadPasses,
+    device: &Device,
+    set: &SampleSet,
+    cut: Cut,
+    record: impl Fn(&mut Frame<'_>, &ImageCut<'_>) -> Result<(), ReconstructionError>,
+) -> Result<Mesh, ReconstructionError> {
+    let mut frame = Frame::begin(&device.gpu, "cut meshes");
+    let (mut images, mut reads) = (Vec::new(), Vec::new());
+    for number in 0..set.cameras.len() {
+        let image = ImageCut::new(device, set, number, cut)?;
+        record(&mut frame, &image)?;
+        passes.list(&mut frame, &image, cut.vertices)?;
+        let mut read = |buffer: &wgpu::Buffer, bytes: u64| {
+            frame.read_back(buffer, 0..bytes, device.buffers.lend_host("mesh report", bytes))
+        };
+        let draw = read(&image.quads.draw, BYTES_OF_DRAW);
+        reads.push(Reads { draw, report: read(&image.report, BYTES_OF_REPORT) });
+        images.push(image);
+    }
+    let done = frame.submit().wait()?;
+    let mut statistics = MeshStatistics { device_s: done.device_s, ..MeshStatistics::default() };
+    for read in reads {
+        let [error_bits, before] = done.with(read.report, |words: &[u32]| [words[0], words[1]])?;
+        statistics.quads_before += u64::from(before);
+        statistics.greatest_error_px = statistics.greatest_error_px.max(f32::from_bits(error_bits));
+        statistics.quads += done.with(read.draw, |words: &[u32]| u64::from(words[0] / INDICES_A_QUAD))?;
+    }
+    Ok(Mesh { cut, images: images.into_iter().map(|image| image.quads).collect(), statistics })
+}
+
+/// The quads of a mesh, image after image.
+pub(crate) fn read(device: &Device, mesh: &Mesh, set: &SampleSet) -> Result<Vec<Quad>, ReconstructionError> {
+    let mut quads = Vec::new();
+    for number in 0..mesh.images.len() {
+        quads.extend(read_image(device, mesh, set, number)?);
+    }
+    Ok(quads)
+}
+
+fn read_image(device: &Device, mesh: &Mesh, set: &SampleSet, number: usize) -> Result<Vec<Quad>, ReconstructionError> {
+    let image = &mesh.images[number];
+    let mut frame = Frame::begin(&device.gpu, "read quads");
+    let mut read = |buffer: &wgpu::Buffer| {
+        let host = device.buffers.lend_host("quad read-back", buffer.size());
+        frame.read_back(buffer, 0..buffer.size(), host)
+    };
+    let [depths, indices, draw] = [&image.inverse_depths, &image.indices, &image.draw].map(&mut read);
+    let done = frame.submit().wait()?;
+    let count = done.with(draw, |words: &[u32]| words[0] as usize)?;
+    let indices = done.with(indices, |words: &[u32]| words[..count].to_vec())?;
+    let (camera, vertices) = (&set.meshes.cameras[number], mesh.cut.vertices);
+    let quad = |quad: &[u32], depths: &[f32]| {
+        let place = |i: usize| vertex_in_world(camera, vertices, quad[i], depths[quad[i] as usize]);
+        let samples = [quad[0], quad[3]].map(|vertex| vertex / vertices.per_sample());
+        Quad { image: number, corners_in_world: [0, 1, 2, 3].map(place), samples }
+    };
+    Ok(done.with(depths, |depths: &[f32]| {
+        indices.chunks_exact(INDICES_A_QUAD as usize).map(|indices| quad(indices, depths)).collect()
+    })?)
+}
+
+/// As `draw.wgsl` has it.
+fn vertex_in_world(camera: &PinholeCamera, vertices: QuadVertices, vertex: u32, inverse_depth_per_m: f32) -> Vec3 {
+    let (sample, offset) = match vertices {
+        QuadVertices::AtSamples => (vertex, Vec2::splat(0.5)),
+        QuadVertices::AtTexelCorners => (vertex / 4, UVec2::new(vertex & 1, vertex >> 1 & 1).as_vec2()),
+    };
+    let texel = UVec2::new(sample % camera.size_px.x, sample / camera.size_px.x);
+    camera.ray(texel.as_vec2() + offset).at(inverse_depth_per_m.recip())
+}

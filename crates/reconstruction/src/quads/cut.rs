@@ -1,0 +1,129 @@
+//! An image on its way to quads: `cut.wgsl`, the common part of passes that cut, merge and list.
+
+use bytemuck::{Pod, Zeroable};
+use glam::UVec2;
+use gpu::{Binding, ComputePass, DispatchSize, Frame, GpuError, PooledBuffer};
+use minijinja::{Value, context};
+use wgpu::BufferUsages;
+
+use super::mesh::{Cut, INDICES_A_QUAD, ImageQuads};
+use crate::{
+    device::Device,
+    error::ReconstructionError,
+    sample_set::SampleSet,
+    view_work::{GpuSampleCamera, GpuViewCamera},
+};
+
+/// Samples that one thread counts and lists.
+const CHUNK: u32 = 64;
+pub(super) const BYTES_OF_DRAW: u64 = 20;
+/// Bits of the greatest error, and quads before merging.
+pub(super) const BYTES_OF_REPORT: u64 = 8;
+
+/// `CutWork` of the shader.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuCutWork {
+    pub column_in_world: [f32; 3],
+    pub focal_px: f32,
+    pub row_in_world: [f32; 3],
+    pub code_scale: f32,
+    pub corner_in_world: [f32; 3],
+    pub code_offset: f32,
+    pub size_px: [u32; 2],
+    pub first_sample: u32,
+    pub first_corner: u32,
+    pub axis: u32,
+    pub bound_px: f32,
+    pub chunks: u32,
+    pub segment: u32,
+}
+
+/// An image on its way to quads.
+pub(crate) struct ImageCut<'s> {
+    pub device: &'s Device,
+    pub set: &'s SampleSet,
+    pub number: usize,
+    pub size_px: UVec2,
+    pub quads: ImageQuads,
+    /// See `extent_of` in the shaders.
+    pub extents: PooledBuffer,
+    pub report: wgpu::Buffer,
+}
+
+/// The values that `cut.wgsl` uses.
+pub(crate) fn context() -> Value {
+    context! { chunk => CHUNK, indices_a_quad => INDICES_A_QUAD }
+}
+
+impl<'s> ImageCut<'s> {
+    pub fn new(device: &'s Device, set: &'s SampleSet, number: usize, cut: Cut) -> Result<Self, GpuError> {
+        let size_px = set.meshes.cameras[number].size_px;
+        let samples = u64::from(size_px.element_product());
+        let storage = |label: &str, bytes: u64, usage: BufferUsages| {
+            device.gpu.check_storage_bytes(label, bytes)?;
+            let usage = usage | BufferUsages::STORAGE | BufferUsages::COPY_SRC;
+            let descriptor =
+                wgpu::BufferDescriptor { label: Some(label), size: bytes, usage, mapped_at_creation: false };
+            Ok::<_, GpuError>(device.gpu.device.create_buffer(&descriptor))
+        };
+        let vertices = u64::from(cut.vertices.per_sample()) * samples;
+        let indices = u64::from(INDICES_A_QUAD) * samples;
+        let quads = ImageQuads {
+            inverse_depths: storage("corners of quads", 4 * vertices, BufferUsages::VERTEX)?,
+            indices: storage("indices of quads (bytes)", 4 * indices, BufferUsages::INDEX)?,
+            draw: storage("quads to draw", BYTES_OF_DRAW, BufferUsages::INDIRECT)?,
+        };
+        // New buffers are zero, as the report's sums need.
+        let report = storage("mesh report", BYTES_OF_REPORT, BufferUsages::empty())?;
+        let extents = device.buffers.lend_storage("extents of quads", 4 * samples);
+        Ok(Self { device, set, number, size_px, quads, extents, report })
+    }
+
+    pub fn chunks(&self) -> u32 {
+        self.size_px.element_product().div_ceil(CHUNK)
+    }
+
+    pub fn work(&self) -> GpuCutWork {
+        let camera: &GpuSampleCamera = &self.set.cameras[self.number];
+        let rays = GpuViewCamera::of(&self.set.meshes.cameras[self.number], 0);
+        let planes = self.set.meshes.planes.as_ref();
+        GpuCutWork {
+            column_in_world: rays.column_in_world,
+            focal_px: camera.focal_px,
+            row_in_world: rays.row_in_world,
+            code_scale: camera.code_scale,
+            corner_in_world: rays.corner_in_world,
+            code_offset: camera.code_offset,
+            size_px: self.size_px.to_array(),
+            first_sample: camera.first_cell,
+            first_corner: planes.map_or(0, |planes| planes.first_corners[self.number]),
+            axis: 0,
+            bound_px: 0.0,
+            chunks: self.chunks(),
+            segment: 0,
+        }
+    }
+
+    /// The corners and extents of quads, as passes that cut and merge write them.
+    pub fn quad_bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::buffer("inverse_depths", &self.quads.inverse_depths), Binding::buffer("extents", &self.extents)]
+    }
+
+    /// Records one dispatch of a shader that includes `cut.wgsl`.
+    pub fn dispatch<'b>(
+        &self,
+        frame: &mut Frame<'_>,
+        pass: &ComputePass,
+        work: GpuCutWork,
+        bindings: impl IntoIterator<Item = Binding<'b>>,
+        invocations: [u32; 2],
+    ) -> Result<(), ReconstructionError> {
+        let work = self.device.gpu.buffer_with("cut", &[work], BufferUsages::UNIFORM);
+        let bindings: Vec<Binding<'_>> = bindings.into_iter().collect();
+        let bound = pass.bind(0, std::iter::once(Binding::buffer("work", &work)).chain(bindings))?;
+        let [x, y] = invocations;
+        pass.dispatch(frame, &[&bound], DispatchSize::Invocations([x, y, 1]));
+        Ok(())
+    }
+}

@@ -1,0 +1,126 @@
+//! Sample images as quads on the device: cut once for each set and cut, and drawn for every view.
+
+use std::sync::Arc;
+
+use depth_image::{Camera, DepthImage, PinholeCamera};
+use glam::Vec3;
+use gpu::TablePool;
+use parking_lot::Mutex;
+
+use super::corner_planes::CornerPlanes;
+use crate::{error::ReconstructionError, error_bound::ErrorBound};
+
+pub(crate) const INDICES_A_QUAD: u32 = 6;
+/// Meshes kept with a set, the last that were asked for: bounds are free to choose, memory is not.
+const MAX_MESHES: usize = 3;
+
+/// Where the vertices of quads lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum QuadVertices {
+    /// A vertex at each sample; quads lie between samples.
+    AtSamples,
+    /// Four vertices for each sample, at the corners of its texel.
+    AtTexelCorners,
+}
+
+impl QuadVertices {
+    pub const ALL: [Self; 2] = [Self::AtSamples, Self::AtTexelCorners];
+
+    pub fn are_at_texel_corners(self) -> bool {
+        self == Self::AtTexelCorners
+    }
+
+    pub fn per_sample(self) -> u32 {
+        if self.are_at_texel_corners() { 4 } else { 1 }
+    }
+}
+
+/// How images are cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Cut {
+    pub vertices: QuadVertices,
+    pub merged: Option<ErrorBound>,
+}
+
+/// Statistics of a set's quads.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MeshStatistics {
+    /// Quads before any were merged.
+    pub quads_before: u64,
+    /// Quads that are drawn.
+    pub quads: u64,
+    /// The greatest distance of a merged quad from what it replaces: in sample pixels, as seen from the side.
+    pub greatest_error_px: f32,
+    /// Seconds on the device, once a set.
+    pub device_s: f64,
+}
+
+/// Two triangles: its first three corners, and its last three.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quad {
+    /// The sample image it was cut from.
+    pub image: usize,
+    /// Upper left, upper right, lower left, lower right.
+    pub corners_in_world: [Vec3; 4],
+    /// For each of its triangles the sample it stands for where no camera knows better, row by row in the image.
+    pub samples: [u32; 2],
+}
+
+/// A set's images, cut.
+pub(crate) struct Mesh {
+    pub cut: Cut,
+    pub images: Vec<ImageQuads>,
+    pub statistics: MeshStatistics,
+}
+
+/// The quads of one image. Buffers of their own: those of all images may exceed what a device binds at once.
+pub(crate) struct ImageQuads {
+    /// On the rays of the vertices, see `draw.wgsl`.
+    pub inverse_depths: wgpu::Buffer,
+    pub indices: wgpu::Buffer,
+    /// Arguments of the indirect draw.
+    pub draw: wgpu::Buffer,
+}
+
+/// A set's planes and meshes for methods that draw quads.
+pub(crate) struct SetMeshes {
+    pub cameras: Vec<PinholeCamera>,
+    /// Or the image that lacks a plane, and the plane.
+    pub planes: Result<CornerPlanes, (usize, &'static str)>,
+    /// The one first asked for is the first.
+    meshes: Mutex<Vec<Arc<Mesh>>>,
+}
+
+impl SetMeshes {
+    /// Planes go to the device where every image has them.
+    pub fn upload(tables: &TablePool, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
+        let camera = |image: &DepthImage| {
+            let Camera::Pinhole(camera) = &image.camera;
+            *camera
+        };
+        let planes = match CornerPlanes::REQUIRED.missing(images) {
+            Some(missing) => Err(missing),
+            None => Ok(CornerPlanes::upload(tables, images)?),
+        };
+        Ok(Self { cameras: images.iter().map(camera).collect(), planes, meshes: Mutex::default() })
+    }
+
+    /// The mesh of a cut, made when it is first asked for.
+    pub fn get_or_make(
+        &self,
+        cut: Cut,
+        make: impl FnOnce() -> Result<Mesh, ReconstructionError>,
+    ) -> Result<Arc<Mesh>, ReconstructionError> {
+        // Held while it is made: concurrent callers want the same.
+        let mut meshes = self.meshes.lock();
+        if let Some(mesh) = meshes.iter().find(|mesh| mesh.cut == cut) {
+            return Ok(mesh.clone());
+        }
+        let mesh = Arc::new(make()?);
+        if meshes.len() >= MAX_MESHES {
+            meshes.remove(0);
+        }
+        meshes.push(mesh.clone());
+        Ok(mesh)
+    }
+}

@@ -1,0 +1,64 @@
+// Gives the pixels of a drawn view their colour: the depth says where the surface is, and all cameras vote on the point.
+// Where none knows it, the drawn sample's own colour stands.
+{% include "color.wgsl" %}
+{% include "view_work.wgsl" %}
+{% include "cell.wgsl" %}
+{% include "surface.wgsl" %}
+
+// A layer for each view of the batch.
+@group(0) var drawn_depth: texture_depth_2d_array;
+@group(0) var drawn_sample: texture_2d_array<u32>;
+
+fn shows_background(camera: SampleCamera, point_in_world: vec3f) -> bool {
+    let p = homogeneous(camera.homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
+    let uv = p.xy / p.z;
+    let texel = vec2u(clamp(uv, vec2f(0.0), camera.cells));
+    let inside = p.z > 0.0 && all(uv >= vec2f(0.0)) && all(uv < camera.cells + 1.0);
+{% if count_fetches %}    fetches += 1u;
+{% endif %}
+    let words = textureLoad(cell_codes, texel_at(camera.first_cell + texel.y * camera.width_px + texel.x), 0);
+    // Not where the ray passed what other images hold: bit 15 says so.
+    return inside && (words.x & 0xffffu) == BACKGROUND;
+}
+
+// The bit of a sample's camera.
+fn mask_of(sample: u32) -> u32 {
+    var mask = 0u;
+{% for k in range(cameras) %}
+    {
+        let first = work.cameras[{{ k }}].first_cell;
+        let count = work.cameras[{{ k }}].width_px * (u32(work.cameras[{{ k }}].cells.y) + 1u);
+        mask = select(mask, work.cameras[{{ k }}].mask, sample >= first && sample - first < count);
+    }
+{% endfor %}
+    return mask;
+}
+
+@compute @workgroup_size({{ tile_px }}, {{ tile_px }})
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= work.view.size_px) { return; }
+    let pixel = pixel_of(id.xy);
+    let layer = i32(work.view.number);
+    let depth = textureLoad(drawn_depth, vec2i(id.xy), layer, 0);
+    let sample = textureLoad(drawn_sample, vec2i(id.xy), layer, 0).x;
+    let drawn = depth > 0.0;
+    let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
+    // Reversed depth: near over planar depth.
+    let t = select(span.far, work.view.near_m / depth, drawn);
+    let point_in_world = work.view.eye_in_world + pixel.direction * t;
+    let blend = blend_two_best(point_in_world, pixel.direction);
+{% if count_fetches %}    fetches += 1u;
+{% endif %}
+    let own = linear_from_rgb9e5(textureLoad(cell_colors, texel_at(sample), 0).x);
+    let known = blend.camera_mask != 0u;
+    let mask = select(mask_of(sample), blend.camera_mask, known);
+    // Some camera sees the background where the ray leaves the volume.
+    var empty = span.near > span.far;
+{% for k in range(cameras) %}
+    empty = empty || shows_background(work.cameras[{{ k }}], point_in_world);
+{% endfor %}
+    let color = select(work.background_srgb8, srgb8_from_linear(select(own, blend.color_linear, known)), drawn);
+    let without = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, empty);
+    write_pixel(pixel.index, color, select(0.0, 1.0 / t, drawn), select(without, PROVENANCE_HIT | (mask << 8u), drawn));
+    if !drawn && !empty { leave_undecided(pixel.index); }
+}

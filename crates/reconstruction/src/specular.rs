@@ -1,0 +1,73 @@
+//! Adds the light that depends on the viewer to pixels that show a surface.
+
+use depth_image::Highlight;
+use gpu::{Binding, PassCache, ResourceTraits, ShaderVariant, WgslLiteral as _, highlight_name, light_slots};
+use minijinja::{Value, context};
+
+use crate::{
+    error::ReconstructionError,
+    recording::Recording,
+    reflectors::sample_texels,
+    surface::THICKNESS_FOOTPRINTS,
+    view_work::{ONE_VIEW, SetVariant},
+};
+
+pub(crate) const SHADER: (&str, &str) = ("specular.wgsl", include_str!("specular.wgsl"));
+
+/// The switches of `specular.wgsl`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Specular {
+    set: SetVariant,
+    highlight: Highlight,
+    lights: usize,
+    /// The words that say which lights a sample sees; 0 where all samples see all.
+    visibility_words: usize,
+}
+
+impl ShaderVariant for Specular {
+    const TEMPLATE: &'static str = SHADER.0;
+    const TRAITS: ResourceTraits = ONE_VIEW;
+
+    fn context(&self) -> Value {
+        context! {
+            highlight => highlight_name(self.highlight),
+            light_slots => light_slots(self.lights),
+            visibility_words => self.visibility_words,
+            sample_texels => sample_texels(self.visibility_words),
+            thickness_footprints => THICKNESS_FOOTPRINTS.wgsl_literal(),
+            ..self.set.context()
+        }
+    }
+
+    fn all() -> Vec<Self> {
+        let lights = [(0, 0), (0, 1), (3, 0), (3, 1), (9, 3), (255, 64)];
+        let kinds = [Highlight::BlinnPhong, Highlight::Ggx].into_iter();
+        let lit = kinds.flat_map(|highlight| lights.map(|(lights, words)| (highlight, lights, words)));
+        lit.flat_map(|(highlight, lights, visibility_words)| {
+            SetVariant::all().into_iter().map(move |set| Self { set, highlight, lights, visibility_words })
+        })
+        .collect()
+    }
+}
+
+/// Highlights are added after the fill, which would spread them.
+pub(crate) fn record(passes: &PassCache<Specular>, recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
+    let Some(reflectors) = &recording.set.reflectors else { return Ok(()) };
+    let pass = passes.get(&Specular {
+        set: recording.set.variant(),
+        highlight: reflectors.highlight,
+        lights: reflectors.lights,
+        visibility_words: reflectors.visibility_words,
+    })?;
+    let mut bindings = recording.cell_bindings();
+    bindings.extend([
+        Binding::buffer("out_srgb8", &recording.batch.srgb8),
+        Binding::buffer("inverse_depth", &recording.batch.inverse_depth_per_m),
+        Binding::buffer("provenance", &recording.batch.provenance),
+        Binding::buffer("illumination", &reflectors.illumination),
+        Binding::texture("samples", &reflectors.samples),
+    ]);
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_pixels(&pass, &bound);
+    Ok(())
+}

@@ -1,0 +1,75 @@
+//! The vote of all cameras on a point: `surface.wgsl`, the common part of passes that find surfaces.
+
+use gpu::{Binding, WgslLiteral as _};
+use minijinja::{Value, context};
+
+use crate::{
+    pixel_list::{LIST_WORKGROUP, PixelList},
+    recording::Recording,
+    view_work::SetVariant,
+};
+
+/// The surface's thickness, in texel footprints: the best of a sweep (docs/methods/joint_carve.md).
+pub(crate) const THICKNESS_FOOTPRINTS: f32 = 2.0;
+/// The weight of a sample behind a redundant surface that its image omits, beside a sample with nothing omitted before it.
+pub(crate) const HIDDEN_WEIGHT: f32 = 0.02;
+/// Added to the squared angle between two lines of sight, so that no camera's weight is unbounded.
+pub(crate) const ANGLE_FLOOR: f32 = 1e-2;
+/// A camera counts where more than this share of the texels around a point lies on the point's own surface.
+pub(crate) const LEAST_SHARE: f32 = 0.05;
+/// A camera carves a point where more than this share of the texels around shows what is beyond it.
+pub(crate) const CARVING_SHARE: f32 = 0.999;
+/// Weight falls towards the border of an image from this distance on.
+pub(crate) const BORDER_PX: f32 = 8.0;
+/// Depth is known to half a code; a ray that reached a plane's very depth is still before it.
+pub(crate) const HALF_CODE: f32 = 0.5;
+
+/// Switches of shaders that include `surface.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct SurfaceVariant {
+    pub set: SetVariant,
+    /// Fetches are counted for each pixel.
+    pub count_fetches: bool,
+}
+
+impl SurfaceVariant {
+    pub fn of(recording: &Recording<'_>) -> Self {
+        Self { set: recording.set.variant(), count_fetches: recording.batch.fetches.is_some() }
+    }
+
+    pub fn context(self) -> Value {
+        context! {
+            count_fetches => self.count_fetches,
+            thickness_footprints => THICKNESS_FOOTPRINTS.wgsl_literal(),
+            hidden_weight => HIDDEN_WEIGHT.wgsl_literal(),
+            angle_floor => ANGLE_FLOOR.wgsl_literal(),
+            least_share => LEAST_SHARE.wgsl_literal(),
+            carving_share => CARVING_SHARE.wgsl_literal(),
+            border_px => BORDER_PX.wgsl_literal(),
+            half_code => HALF_CODE.wgsl_literal(),
+            list_workgroup => LIST_WORKGROUP,
+            ..self.set.context()
+        }
+    }
+
+    pub fn all() -> Vec<Self> {
+        let counted = |set: SetVariant| [false, true].map(|count_fetches| Self { set, count_fetches });
+        SetVariant::all().into_iter().flat_map(counted).collect()
+    }
+}
+
+/// The resources of `surface.wgsl`. Pixels that a pass cannot decide go to `undecided`.
+pub(crate) fn bindings<'b>(recording: &'b Recording<'_>, undecided: &'b PixelList) -> Vec<Binding<'b>> {
+    let batch = &recording.batch;
+    let mut bindings = recording.cell_bindings();
+    bindings.extend([
+        Binding::texture("cell_colors", &recording.set.cell_colors),
+        Binding::buffer("out_srgb8", &batch.srgb8),
+        Binding::buffer("out_inverse_depth", &batch.inverse_depth_per_m),
+        Binding::buffer("out_provenance", &batch.provenance),
+        Binding::buffer("undecided_pixels", &undecided.pixels),
+        Binding::buffer("undecided", &undecided.lists),
+    ]);
+    bindings.extend(batch.fetches.as_ref().map(|fetches| Binding::buffer("out_fetches", fetches)));
+    bindings
+}

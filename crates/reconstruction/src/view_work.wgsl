@@ -1,0 +1,116 @@
+// The uniform of a view in passes over sample cameras: its camera, the volume, and the sample cameras.
+{% include "table.wgsl" %}
+//
+// Depth is kept as 15-bit codes, linear in inverse depth: code = 2 + (1/z - least) / step. So it is linear in screen
+// space along a projected ray. 1 is background, farther than any sample; 0 is a hole, which certifies nothing and blocks
+// nothing.
+
+const HOLE: u32 = {{ hole_code }}u;
+const BACKGROUND: u32 = {{ background_code }}u;
+
+// The lowest byte of a pixel's provenance; a bit for each contributing camera follows.
+const PROVENANCE_EMPTY: u32 = {{ provenance_empty }}u;
+const PROVENANCE_HIT: u32 = {{ provenance_hit }}u;
+const PROVENANCE_FILLED: u32 = {{ provenance_filled }}u;
+
+struct SampleCamera {
+    // Rows that take (point_in_world, 1) to (column · w, row · w, w), w the planar depth in metres.
+    homogeneous_pixel_from_world: array<vec4f, 3>,
+    eye_in_world: vec3f,
+    // code = code_scale / planar_depth_m + code_offset
+    code_scale: f32,
+    // Columns and rows less one: cells lie between texel centres.
+    cells: vec2f,
+    code_offset: f32,
+    focal_px: f32,
+    // log2 of the padded sides of level 0, and where this camera's nodes and its samples, each with the cell to its
+    // lower right, begin.
+    log2_sides: vec2u,
+    first_node: u32,
+    first_cell: u32,
+    width_px: u32,
+    // Greatest factor by which a point's sideways motion moves it in the image, over f / w.
+    stretch: f32,
+    // This camera's bit in provenance.
+    mask: u32,
+    padding: u32,
+}
+
+struct ViewCamera {
+    eye_in_world: vec3f,
+    near_m: f32,
+    // world direction of a pixel = column · x + row · y + corner; its parameter is planar depth in metres.
+    column_in_world: vec3f,
+    focal_px: f32,
+    row_in_world: vec3f,
+    // Where this view's pixels and tiles begin in the batch.
+    first_pixel: u32,
+    corner_in_world: vec3f,
+    first_tile: u32,
+    size_px: vec2u,
+    // This view's number in the batch.
+    number: u32,
+    padding: u32,
+}
+
+// One dispatch a view: what is the same for a whole dispatch costs nothing a ray. Sample cameras are
+// sorted by their distance from the view's eye, so that camera 0 knows most.
+struct ViewWork {
+    view: ViewCamera,
+    volume_min_in_world: vec3f,
+    background_srgb8: u32,
+    volume_max_in_world: vec3f,
+    padding: u32,
+    cameras: array<SampleCamera, {{ cameras }}>,
+}
+
+@group(0) var<uniform> work: ViewWork;
+// Nodes of the pyramids: a range (nearest code low, farthest high), and the nearest code of 2 × 2 nodes.
+@group(0) var nodes: texture_2d<u32>;
+
+const TILE_PX: u32 = {{ tile_px }}u;
+const FAR_AWAY: f32 = {{ far_away }};
+const CELL_MARGIN_PX: f32 = {{ cell_margin_px }};
+
+struct Span { near: f32, far: f32 }
+
+// Where a ray is inside the volume that holds the scene; empty where near > far.
+fn span_in_volume(eye: vec3f, direction: vec3f, near_m: f32) -> Span {
+    // No component may be 0: 0 · inf is NaN.
+    let d = select(direction, vec3f(1e-20), abs(direction) < vec3f(1e-20));
+    let a = (work.volume_min_in_world - eye) / d;
+    let b = (work.volume_max_in_world - eye) / d;
+    let lower = min(a, b);
+    let upper = max(a, b);
+    return Span(max(max(lower.x, lower.y), max(lower.z, near_m)), min(min(upper.x, upper.y), upper.z));
+}
+
+fn homogeneous(rows: array<vec4f, 3>, v: vec4f) -> vec3f {
+    return vec3f(dot(rows[0], v), dot(rows[1], v), dot(rows[2], v));
+}
+
+// The coarsest level of a pyramid.
+fn top_level(log2_sides: vec2u) -> u32 {
+    return min(log2_sides.x, log2_sides.y);
+}
+
+// The place of a node of level 1 or coarser; below these levels are cells.
+fn node_index(log2_sides: vec2u, level: u32, node: vec2u) -> u32 {
+    let finest = 1u << (log2_sides.x + log2_sides.y - 2u);
+    let begin = (finest - (finest >> (2u * (level - 1u)))) / 3u * 4u;
+    return begin + (node.y << (log2_sides.x - level)) + node.x;
+}
+
+// The nearest code of a node, in the lower half of its word; a hole may be as near as anything, nearer than any code.
+fn nearest_code(word: u32) -> f32 {
+{% if holes %}
+    let code = word & 0xffffu;
+    return select(f32(code), FAR_AWAY, code == 0xffffu);
+{% else %}
+    return f32(word & 0xffffu);
+{% endif %}
+}
+
+fn safe_reciprocal(v: f32) -> f32 {
+    return 1.0 / select(v, 1e-20, abs(v) < 1e-20);
+}

@@ -1,0 +1,31 @@
+//! Every pass is built and bound to its resources in every variant that changes what it binds.
+
+use depth_image::{HOLE_INVERSE_DEPTH, ProvenanceKind};
+use glam::{UVec2, Vec3};
+use reconstruction::METHODS;
+use scene::procedural::uv_sphere;
+
+use crate::stage::{ALL_PLANES, Corners, Stage, count, reconstructor};
+
+#[test]
+fn every_method_binds_all_names_of_its_shaders() {
+    let corners = Corners { eye: Vec3::new(0.4, 0.9, 3.6), target: Vec3::ZERO, half_m: 0.6 };
+    let camera = corners.camera(0.2, 0.1, UVec2::new(16, 12));
+    for (cameras, holes) in [(1, false), (1, true), (3, false), (3, true)] {
+        let mut stage = Stage::with_corners(uv_sphere(1.0, 12), &corners.samples(cameras));
+        if holes {
+            stage.images[0].inverse_depth_per_m[0] = HOLE_INVERSE_DEPTH;
+        }
+        let set = stage.upload();
+        for method in METHODS.map(|row| row.method).into_iter().flat_map(|method| [Some(method), method.coarser()]) {
+            let Some(method) = method else { continue };
+            for count_fetches in [false, true] {
+                let (views, statistics) = reconstructor()
+                    .reconstruct_measured(&set, &[camera], method, ALL_PLANES, count_fetches)
+                    .unwrap_or_else(|error| panic!("{method}, {cameras} cameras, holes {holes}: {error}"));
+                assert!(count(&views[0], ProvenanceKind::Hit) > 10, "{method}, {cameras} cameras, holes {holes}");
+                assert_eq!(statistics.fetches_per_ray.is_some_and(|fetches| fetches > 1.0), count_fetches, "{method}");
+            }
+        }
+    }
+}

@@ -1,0 +1,14 @@
+//! Errors of drawing.
+
+/// A fault of the device, a shader or a camera.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum RenderError {
+    #[error(transparent)]
+    Gpu(#[from] gpu::GpuError),
+    #[error(transparent)]
+    Shader(#[from] gpu::ShaderError),
+    /// A camera of the request is invalid.
+    #[error("camera {index}: {source}")]
+    Camera { index: usize, source: depth_image::CameraError },
+}

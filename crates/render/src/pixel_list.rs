@@ -1,0 +1,35 @@
+//! Pixels that one pass leaves to the next, and the arguments of the indirect dispatch over them.
+
+use gpu::{Binding, BufferPool, DispatchSize, Gpu, PooledBuffer};
+use wgpu::BufferUsages;
+
+use crate::surfaces::Surfaces;
+
+/// Invocations of a workgroup that lights listed pixels.
+pub(crate) const LIST_WORKGROUP: u32 = 64;
+
+/// Places of pixels; the buffer on loan must live until the frame is done.
+pub(crate) struct PixelList {
+    pixels: PooledBuffer,
+    arguments: wgpu::Buffer,
+}
+
+impl PixelList {
+    /// An empty list with room for all pixels.
+    pub fn new(gpu: &Gpu, pool: &BufferPool, target: &Surfaces) -> Self {
+        let bytes = 4 * u64::from(target.size_px().element_product());
+        Self {
+            pixels: pool.lend_storage("pixels to be lit", bytes),
+            // Workgroups along x, y and z, and the list's length.
+            arguments: gpu.buffer_with("list", &[0u32, 1, 1, 0], BufferUsages::STORAGE | BufferUsages::INDIRECT),
+        }
+    }
+
+    pub fn size(&self) -> DispatchSize<'_> {
+        DispatchSize::Indirect(&self.arguments)
+    }
+
+    pub fn bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::buffer("listed_pixels", &self.pixels), Binding::buffer("list", &self.arguments)]
+    }
+}

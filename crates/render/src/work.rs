@@ -1,0 +1,83 @@
+//! Requests to draw, besides the cameras.
+
+use crate::{GpuScene, Lighting, Visibility};
+
+/// A scene at a moment, and how it is drawn.
+#[derive(Clone, Copy)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct DrawWork<'a> {
+    pub scene: &'a GpuScene,
+    pub lighting: Lighting,
+    /// The moment of an animated scene.
+    pub scene_time_s: f32,
+    /// The way of finding surfaces.
+    pub visibility: Visibility,
+    /// The refinement of a still scene's light.
+    pub refinement: Refinement,
+}
+
+impl DrawWork<'_> {
+    /// The same surfaces, without light.
+    pub(crate) fn unlit(self) -> Self {
+        Self { lighting: Lighting::UNLIT, refinement: Refinement::default(), ..self }
+    }
+}
+
+/// A step on the way to all rays of a lighting; every step doubles them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Refinement {
+    /// From 0.
+    pub step: u32,
+    /// With the last, all rays have been traced. With only one, nothing is kept from before or for later.
+    pub steps: u32,
+}
+
+impl Default for Refinement {
+    fn default() -> Self {
+        Self { step: 0, steps: 1 }
+    }
+}
+
+impl Refinement {
+    /// The number of `rays` that have been traced with this step.
+    pub(crate) fn share_of(self, rays: u32) -> u32 {
+        let to_go = self.steps.saturating_sub(self.step + 1).min(31);
+        rays.div_ceil(1 << to_go)
+    }
+
+    /// Whether sums are kept for the next step.
+    pub(crate) fn goes_on(self) -> bool {
+        self.step + 1 < self.steps
+    }
+}
+
+/// Optional planes of depth images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct SamplePlanes {
+    /// [`DepthImage::normal_oct16`](depth_image::DepthImage::normal_oct16).
+    pub normal: bool,
+    /// [`DepthImage::surface_id`](depth_image::DepthImage::surface_id).
+    pub surface_id: bool,
+    /// [`DepthImage::specular`](depth_image::DepthImage::specular), with normals, where the scene has highlights under the
+    /// lighting.
+    pub specular: bool,
+    /// [`DepthImage::corner_inverse_depth_per_m`](depth_image::DepthImage::corner_inverse_depth_per_m): a second picture.
+    pub corners: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_step_doubles_the_rays_and_the_last_has_all() {
+        let counts = |rays: u32, steps: u32| -> Vec<u32> {
+            (0..steps).map(|step| Refinement { step, steps }.share_of(rays)).collect()
+        };
+        assert_eq!(counts(16, 5), [1, 2, 4, 8, 16]);
+        assert_eq!(counts(1, 5), [1, 1, 1, 1, 1]);
+        assert_eq!(counts(12, 3), [3, 6, 12]);
+        assert_eq!(counts(0, 2), [0, 0]);
+        assert_eq!(Refinement::default().share_of(7), 7);
+    }
+}

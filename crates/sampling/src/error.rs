@@ -1,0 +1,16 @@
+//! Errors of sampling.
+
+/// Why samples could not be taken.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum SamplingError {
+    /// A camera, the device, or a shader.
+    #[error(transparent)]
+    Render(#[from] render::RenderError),
+    /// Layers are peeled from one place.
+    #[error("camera {index} is another than the first: all layers are taken by one camera")]
+    Layer { index: usize },
+    /// A selected image is not in the set, or images in sequence are not all selected.
+    #[error("image {index} is not among the {cameras} of the set, or not wanted with all others by {method}")]
+    Selection { index: u32, cameras: usize, method: String },
+}

@@ -1,0 +1,216 @@
+//! Sampling methods: a closed set.
+//!
+//! Each method is a variant, a row of [`METHODS`], a file pair in this folder, a page in `docs/methods` and a scalar twin. No
+//! product code outside this folder names a method.
+
+pub(crate) mod depth_peeling;
+pub(crate) mod non_redundant;
+pub(crate) mod useful;
+
+use std::{fmt, mem::discriminant, str::FromStr};
+
+use depth_image::{Camera, NamedMethod, PinholeCamera, Setting, method_forms, method_help, method_named};
+use gpu::{ShaderError, Templates};
+use render::RedundancyTest;
+
+use crate::error::SamplingError;
+pub use non_redundant::Redundancy;
+
+/// The choice of samples of a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum SamplingMethod {
+    /// Every visible surface, whether another image holds it too or not (Lages §4.1).
+    Conventional,
+    /// Only samples that no image before holds; behind others rays go on (Xie §3).
+    NonRedundant(Redundancy),
+    /// The same, less the samples that no viewpoint between the sample cameras can see past their blockers.
+    Useful(Redundancy),
+    /// Layer behind layer from one place: the middle of the sample cameras.
+    DepthPeeling {
+        /// Images, each of the surfaces behind the one before.
+        layers: u32,
+    },
+}
+
+use SamplingMethod::{Conventional, DepthPeeling, NonRedundant, Useful};
+
+/// All methods by name; the first is the default.
+pub const METHODS: [NamedMethod<SamplingMethod>; 4] = [
+    NamedMethod { name: "conventional", method: Conventional, setting: None, help: "takes every visible surface" },
+    NamedMethod {
+        name: "non_redundant",
+        method: NonRedundant(Redundancy::Pixel),
+        setting: Some(Setting {
+            form: non_redundant::FORM,
+            parse: |text| non_redundant::parse(text).map(NonRedundant),
+        }),
+        help: "takes the samples that no image before holds, by a test; by pixel unless said otherwise",
+    },
+    NamedMethod {
+        name: "useful",
+        method: Useful(Redundancy::Pixel),
+        setting: Some(Setting { form: non_redundant::FORM, parse: |text| non_redundant::parse(text).map(Useful) }),
+        help: "takes the same, less the samples that no view between the cameras can see",
+    },
+    NamedMethod {
+        name: "depth_peeling",
+        method: DepthPeeling { layers: depth_peeling::DEFAULT_LAYERS },
+        setting: Some(Setting {
+            form: "LAYERS (1 to 16)",
+            parse: |text| depth_peeling::parse_layers(text).map(|layers| DepthPeeling { layers }),
+        }),
+        help: "takes layer behind layer from the middle of the cameras, 4 by default",
+    },
+];
+
+/// The templates of `render`, with the redundancy tests of all methods.
+///
+/// # Errors
+/// When a text is not a template.
+pub fn templates() -> Result<Templates, ShaderError> {
+    let own = [&non_redundant::SHADERS[..], &[useful::SHADER, depth_peeling::SHADER]].concat();
+    Ok(render::templates(&own)?
+        .with_constants(non_redundant::constants())
+        .with_constants(useful::constants())
+        .with_constants(depth_peeling::constants()))
+}
+
+impl Default for SamplingMethod {
+    fn default() -> Self {
+        METHODS[0].method
+    }
+}
+
+impl SamplingMethod {
+    /// All methods, each with all of its redundancy tests.
+    pub fn all() -> impl Iterator<Item = Self> {
+        METHODS.into_iter().flat_map(|row| match row.method {
+            NonRedundant(_) => Redundancy::ALL.map(NonRedundant).to_vec(),
+            Useful(_) => Redundancy::ALL.map(Useful).to_vec(),
+            method @ (Conventional | DepthPeeling { .. }) => vec![method],
+        })
+    }
+
+    /// The text of `--help` on all methods.
+    #[must_use]
+    pub fn help() -> String {
+        method_help(&METHODS)
+    }
+
+    /// The cameras that images are taken with, for a rig of these cameras.
+    #[must_use]
+    pub fn cameras(self, rig: Vec<PinholeCamera>) -> Vec<PinholeCamera> {
+        match self {
+            DepthPeeling { layers } => depth_peeling::cameras(&rig, layers as usize),
+            Conventional | NonRedundant(_) | Useful(_) => rig,
+        }
+    }
+
+    /// Checks that the method can take images with these cameras.
+    ///
+    /// # Errors
+    /// Names the first camera that it cannot take one with.
+    pub fn check(self, cameras: &[Camera]) -> Result<(), SamplingError> {
+        match self {
+            DepthPeeling { .. } => depth_peeling::check(cameras),
+            Conventional | NonRedundant(_) | Useful(_) => Ok(()),
+        }
+    }
+
+    /// The test by which an image leaves out samples that others hold.
+    #[must_use]
+    pub fn redundancy_test(self) -> Option<RedundancyTest> {
+        match self {
+            Conventional => None,
+            NonRedundant(redundancy) => Some(redundancy.test()),
+            Useful(redundancy) => Some(useful::test(redundancy)),
+            DepthPeeling { .. } => Some(depth_peeling::TEST),
+        }
+    }
+
+    /// Whether each image can be taken without the others.
+    #[must_use]
+    pub fn images_are_independent(self) -> bool {
+        self.redundancy_test().is_none()
+    }
+
+    /// Whether an image can only be taken after those before it: then a set's images are taken on one node.
+    #[must_use]
+    pub fn images_are_sequential(self) -> bool {
+        self.redundancy_test().is_some_and(|test| !test.traces_rays())
+    }
+
+    /// Whether samples of a moving scene are held against a temporal reference.
+    #[must_use]
+    pub fn has_hysteresis(self) -> bool {
+        match self {
+            Conventional | DepthPeeling { .. } => false,
+            NonRedundant(redundancy) | Useful(redundancy) => redundancy == Redundancy::Tolerance,
+        }
+    }
+
+    /// The setting as users spell it.
+    fn setting(self) -> Option<String> {
+        match self {
+            Conventional => None,
+            NonRedundant(redundancy) | Useful(redundancy) => Some(redundancy.to_string()),
+            DepthPeeling { layers } => Some(layers.to_string()),
+        }
+    }
+}
+
+/// The text names no method, or gives a setting that the method does not take.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("unknown sampling method {0:?}, expected {forms}", forms = method_forms(&METHODS))]
+pub struct UnknownSampling(String);
+
+impl FromStr for SamplingMethod {
+    type Err = UnknownSampling;
+    fn from_str(text: &str) -> Result<Self, UnknownSampling> {
+        method_named(&METHODS, text).ok_or_else(|| UnknownSampling(text.to_owned()))
+    }
+}
+
+impl fmt::Display for SamplingMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let row = METHODS.iter().find(|row| discriminant(&row.method) == discriminant(self));
+        f.write_str(row.map_or("", |row| row.name))?;
+        self.setting().map_or(Ok(()), |setting| write!(f, ":{setting}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_parsed_and_printed_alike_and_other_texts_are_refused() {
+        for method in SamplingMethod::all() {
+            assert_eq!(method.to_string().parse(), Ok(method));
+        }
+        assert_eq!(SamplingMethod::all().count(), 8);
+        assert_eq!("non-redundant".parse(), Ok(NonRedundant(Redundancy::Pixel)));
+        for name in
+            ["", "non_redundant:", "non_redundant:id", "depth_peeling:0", "depth_peeling:17", "depth_peeling:-1"]
+        {
+            assert!(name.parse::<SamplingMethod>().is_err(), "{name}");
+        }
+    }
+
+    #[test]
+    fn the_table_lists_every_method_by_its_own_name() {
+        for row in &METHODS {
+            assert_eq!(row.name.parse(), Ok(row.method), "{}", row.name);
+            assert_eq!(row.method.to_string().split(':').next(), Some(row.name));
+        }
+    }
+
+    #[test]
+    fn the_error_names_every_method_and_test() {
+        let error = "peeling".parse::<SamplingMethod>().expect_err("no method").to_string();
+        for name in ["conventional", "non_redundant:TEST", "visibility", "tolerance", "useful", "depth_peeling:LAYERS"]
+        {
+            assert!(error.contains(name), "{name} is not in {error}");
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! Arguments of the bench.
+
+use std::path::PathBuf;
+
+use app_core::setup::{DeviceArgs, SceneArgs};
+use clap::{Args, Subcommand};
+
+use crate::load::command::LoadArgs;
+use crate::scaling::command::ScalingArgs;
+
+/// Holds measured values against bars and writes a report. A check without its input is not run and does not fall
+/// short.
+#[derive(Debug, Args)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "Example: myriorama bench --models models/ --peer peer-bench/ --strict"
+)]
+pub struct BenchArgs {
+    #[command(subcommand)]
+    pub(super) part: Option<Part>,
+    #[command(flatten)]
+    pub(super) scene: SceneArgs,
+    #[command(flatten)]
+    pub(super) device: DeviceArgs,
+    /// A folder of models (.gltf, .glb, .obj, .ply); methods are compared on the largest of them
+    #[arg(long, value_name = "DIR")]
+    pub(super) models: Option<PathBuf>,
+    /// A folder with bench.ply, samples.json and views.json; the views are compared with another synthesiser's
+    #[arg(long, value_name = "DIR")]
+    pub(super) peer: Option<PathBuf>,
+    /// Nodes P that share the device
+    #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub(super) nodes: u16,
+    /// Where the report goes
+    #[arg(long, default_value = "out/bench", value_name = "DIR")]
+    pub(super) out: PathBuf,
+    /// Runs a smaller form: fewer repeats, views and models
+    #[arg(long)]
+    pub(super) quick: bool,
+    /// Exit status 1 when a check falls short
+    #[arg(long)]
+    pub(super) strict: bool,
+}
+
+/// A measurement of its own.
+#[derive(Debug, Subcommand)]
+pub(super) enum Part {
+    /// Measure the number of clients that a cluster serves, and the refusal of more
+    Load(LoadArgs),
+    /// Measure how the cluster scales with nodes and views, on processes of equal CPU share and in simulation
+    Scaling(ScalingArgs),
+}
+
+impl BenchArgs {
+    /// Repeats of a measurement; the median counts.
+    pub(super) fn runs(&self) -> usize {
+        if self.quick { 1 } else { 3 }
+    }
+
+    /// The number of views that are compared pixel by pixel.
+    pub(super) fn compared_views(&self) -> usize {
+        if self.quick { 4 } else { 8 }
+    }
+}

@@ -1,0 +1,47 @@
+//! Bytes that primary rays read, beside a pass that reads all there is once.
+
+use render::{Lighting, Visibility};
+use study::{Bar, Check, Report, Table};
+
+use super::subject::{RUNS, Subject};
+use crate::statistics::median;
+
+const NODE_BYTES: f64 = 80.0;
+const TRIANGLE_BYTES: f64 = 48.0;
+
+const BESIDE_MEMORY: [(&str, &str); 7] = [
+    ("node visits a ray", ""),
+    ("triangle tests a ray", ""),
+    ("a ray reads", "bytes"),
+    ("rays read", "GB/s"),
+    ("tree and triangles", "MB"),
+    ("read once", "GB/s"),
+    ("share of it", "%"),
+];
+
+/// Adds the table and a check.
+pub(super) fn measure(subject: &Subject<'_>, rays_a_second: f64, report: &mut Report) -> anyhow::Result<()> {
+    let renderer = subject.engine.renderer();
+    let work = subject.work(Lighting::UNLIT, Visibility::Rays);
+    let visits = renderer.count_visits(work, subject.camera()?)?.of_pixel;
+    let mean = |of: usize| visits.iter().map(|pair| f64::from(pair[of])).sum::<f64>() / visits.len() as f64;
+    let (nodes, tests) = (mean(0), mean(1));
+    let bytes_a_ray = nodes * NODE_BYTES + tests * TRIANGLE_BYTES;
+    let by_rays = bytes_a_ray * rays_a_second;
+    let (bytes, bytes_a_second) = plain_reading(subject)?;
+    let mut table = Table::new("Primary rays beside plain reading of nodes and triangles", &BESIDE_MEMORY);
+    let read = [by_rays * 1e-9, bytes * 1e-6, bytes_a_second * 1e-9, by_rays / bytes_a_second * 100.0];
+    table.push([nodes, tests, bytes_a_ray].into_iter().chain(read).map(Into::into))?;
+    report.tables.push(table);
+    let least = visits.iter().map(|pair| pair[0]).min().map_or(f64::NAN, f64::from);
+    report.checks.push(Check::new("node visits of a primary ray, the least", least, "", Bar::AtLeast(1.0)));
+    Ok(())
+}
+
+/// Bytes of tree and triangles, and bytes read a second.
+fn plain_reading(subject: &Subject<'_>) -> anyhow::Result<(f64, f64)> {
+    let pass = |_| subject.engine.renderer().read_acceleration(subject.scene, 0.0);
+    let passes = (0..RUNS).map(pass).collect::<Result<Vec<_>, _>>()?;
+    let bytes = passes.first().map_or(f64::NAN, |pass| pass.bytes as f64);
+    Ok((bytes, bytes / median(passes.iter().map(|pass| pass.device_s).collect())))
+}

@@ -1,0 +1,70 @@
+//! The order of the bench.
+
+use app_core::exit::Outcome;
+use node::Engine as _;
+use study::{Bar, Check, Report};
+
+use super::args::{BenchArgs, Part};
+use super::{adaptive, animation, codec, convergence, fronts, light, peer, rays, sampling, throughput};
+use crate::experiment::Experiment;
+use crate::memory::peak_memory_mb;
+use crate::reference_views::ReferenceViews;
+use crate::{load, scaling};
+
+/// Measures everything and writes the report.
+///
+/// # Errors
+/// Input that cannot be used, or a failure of the device or the cluster.
+pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
+    match &args.part {
+        Some(Part::Load(args)) => return load::command::run(args),
+        Some(Part::Scaling(args)) => return scaling::command::run(args),
+        None => (),
+    }
+    let experiment = Experiment::start(args.scene.clone(), Vec::new(), args.device.device, usize::from(args.nodes))?;
+    let mut report = new_report(args, &experiment);
+    println!("{} on {}", args.scene.scene, experiment.engine.device_name());
+    throughput::delivered(args, &experiment, &mut report)?;
+    let views = experiment.views(args.compared_views())?;
+    let reference = ReferenceViews::draw(&experiment.engine, &experiment.setup, &experiment.args, views)?;
+    throughput::nanoseconds(args, &reference, &experiment, &mut report)?;
+    codec::measure(&reference.images, &mut report)?;
+    fronts::compare(&args.scene.scene.to_string(), &reference, args, &mut report)?;
+    drop(reference);
+    light::qualities(args, &experiment, &mut report)?;
+    light::reference(args, &experiment, &mut report)?;
+    let engine = experiment.engine.clone();
+    rays::measure(args, &engine, &experiment.setup, &mut report)?;
+    convergence::measure(args, &engine, &experiment.setup, &mut report)?;
+    adaptive::compare(args, &engine, &experiment.setup, &mut report)?;
+    experiment.stop()?;
+    animation::measure(args, &engine, &mut report)?;
+    light::glossy(args, &engine, &mut report)?;
+    sampling::measure(args, &engine, &mut report)?;
+    fronts::gaps(args, &engine, &mut report)?;
+    fronts::models(args, &engine, &mut report)?;
+    peer::measure(args, &engine, &mut report)?;
+    let memory = peak_memory_mb().filter(|_| engine.is_software());
+    report.checks.push(Check::maybe(
+        "peak memory on the software device",
+        memory,
+        "MB",
+        Bar::AtMost(1500.0),
+        "the device has memory of its own",
+    ));
+    report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
+    println!();
+    let ok = report.finish(&args.out)?;
+    Ok(Outcome::of(ok || !args.strict))
+}
+
+fn new_report(args: &BenchArgs, experiment: &Experiment) -> Report {
+    let mut report = Report::new("Myriorama bench", experiment.engine.device_name());
+    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    report.parameter("scene", args.scene.scene.to_string());
+    report.parameter("method", args.scene.method.to_string());
+    report.parameter("nodes P", u32::from(args.nodes));
+    report.parameter("repeats", args.runs());
+    report.parameter("quick", args.quick);
+    report
+}

@@ -1,0 +1,168 @@
+//! Reconstructed views against reference views, pixel by pixel.
+
+use anyhow::Context as _;
+use depth_image::{ProvenanceKind, View};
+use metrics::{DepthPlane, PixelClass, Rgb8Image, ScoreMap, class_mask, depth_errors, flip_map, psnr_db, ssim_map};
+use rayon::prelude::*;
+use reconstruction::ReconstructionMethod;
+
+use crate::reference_views::{ALL_PLANES, ReferenceViews};
+
+/// A channel off by more than this, out of 255, is a wrong colour.
+const WRONG_COLOR: u8 = 16;
+/// Views that a method is timed on, unless said otherwise.
+const TIMED_VIEWS: usize = 64;
+
+/// Accuracy and speed of a method. Shares are of 1, over all views together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evaluation {
+    /// The method.
+    pub method: ReconstructionMethod,
+    /// One view in a batch, to host pixels.
+    pub ms_a_view: f64,
+    /// Mean over views.
+    pub psnr_db: f64,
+    /// The worst view.
+    pub psnr_min_db: f64,
+    /// Mean over views.
+    pub ssim: f64,
+    /// Mean over views.
+    pub flip: f64,
+    /// Mean over views that have covered pixels, over these pixels.
+    pub flip_covered: f64,
+    /// Hits off by more than 1 % in depth, of all hits.
+    pub wrong_hits: f64,
+    /// Pixels that no sample camera knows, of all.
+    pub unknown: f64,
+    /// Disoccluded pixels with a wrong colour, of the disoccluded; NaN where there are none.
+    pub disoccluded_wrong: f64,
+    /// Disoccluded pixels with a wrong colour that are not marked as filled, of the disoccluded.
+    pub disoccluded_unmarked: f64,
+    /// Disoccluded pixels, of all.
+    pub disoccluded: f64,
+    /// Loads of depth and colour words a pixel.
+    pub fetches_a_ray: f64,
+}
+
+impl ReferenceViews {
+    /// Evaluates a method.
+    pub fn evaluate(&self, method: ReconstructionMethod, runs: usize) -> anyhow::Result<Evaluation> {
+        self.evaluate_timed_on(method, TIMED_VIEWS, runs)
+    }
+
+    /// Evaluates a method, timed on a batch of `views` views or more.
+    pub fn evaluate_timed_on(
+        &self,
+        method: ReconstructionMethod,
+        views: usize,
+        runs: usize,
+    ) -> anyhow::Result<Evaluation> {
+        let ms_a_view = self.ms_a_view(method, views, runs)?;
+        let (views, fetches_a_ray) = self.reconstruct_counted(method, ALL_PLANES)?;
+        let pairs: Vec<_> = self.views.iter().zip(&views).zip(self.classes()).collect();
+        let errors = pairs
+            .into_par_iter()
+            .map(|((reference, view), classes)| Errors::of(reference, view, classes))
+            .collect::<anyhow::Result<Vec<_>>>()?;
+        Ok(evaluation(method, ms_a_view, fetches_a_ray, &errors))
+    }
+}
+
+/// Errors of one view, to be added up.
+#[derive(Debug, Clone, Copy, Default)]
+struct Errors {
+    psnr_db: f64,
+    ssim: f64,
+    flip: f64,
+    flip_covered: Option<f64>,
+    pixels: usize,
+    hits: usize,
+    wrong_hits: usize,
+    unknown: usize,
+    disoccluded: usize,
+    disoccluded_wrong: usize,
+    disoccluded_unmarked: usize,
+}
+
+impl Errors {
+    fn of(reference: &View, view: &View, classes: &[PixelClass]) -> anyhow::Result<Self> {
+        let (expected, actual) = (Rgb8Image::of_view(reference)?, Rgb8Image::of_view(view)?);
+        let flip = flip_map(&expected, &actual)?;
+        let depth = depth_errors(&known_depth(reference)?, &known_depth(view)?, None)?;
+        let errors = Self {
+            psnr_db: psnr_db(&expected, &actual, None)?.unwrap_or(f64::NAN).min(metrics::PSNR_CAP_DB),
+            ssim: mean(&ssim_map(&expected, &actual)?)?,
+            flip: mean(&flip)?,
+            flip_covered: flip.mean(Some(&class_mask(classes, PixelClass::Covered)))?,
+            pixels: depth.pixels,
+            hits: depth.hit_px,
+            wrong_hits: depth.wrong_hit_px,
+            unknown: depth.unknown_px,
+            ..Self::default()
+        };
+        errors.with_disocclusions(reference, view, classes)
+    }
+
+    /// Counts disoccluded pixels, those of a wrong colour, and those of these that are not marked as filled.
+    fn with_disocclusions(mut self, reference: &View, view: &View, classes: &[PixelClass]) -> anyhow::Result<Self> {
+        let provenance = view.provenance.as_ref().context("a view without provenance")?;
+        let colors = reference.srgb8.as_chunks::<3>().0.iter().zip(view.srgb8.as_chunks::<3>().0);
+        let wrong = colors.map(|(a, b)| (0..3).any(|i| a[i].abs_diff(b[i]) > WRONG_COLOR));
+        for ((class, wrong), provenance) in classes.iter().zip(wrong).zip(provenance) {
+            if *class == PixelClass::Disoccluded {
+                self.disoccluded += 1;
+                self.disoccluded_wrong += usize::from(wrong);
+                self.disoccluded_unmarked += usize::from(wrong && provenance.kind() != ProvenanceKind::Filled);
+            }
+        }
+        Ok(self)
+    }
+}
+
+fn evaluation(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, errors: &[Errors]) -> Evaluation {
+    let mean = |value: fn(&Errors) -> f64| errors.iter().map(value).sum::<f64>() / errors.len() as f64;
+    let sum = |value: fn(&Errors) -> usize| errors.iter().map(value).sum::<usize>() as f64;
+    let covered: Vec<f64> = errors.iter().filter_map(|e| e.flip_covered).collect();
+    Evaluation {
+        method,
+        ms_a_view,
+        psnr_db: mean(|e| e.psnr_db),
+        psnr_min_db: errors.iter().map(|e| e.psnr_db).fold(f64::INFINITY, f64::min),
+        ssim: mean(|e| e.ssim),
+        flip: mean(|e| e.flip),
+        flip_covered: covered.iter().sum::<f64>() / covered.len() as f64,
+        wrong_hits: sum(|e| e.wrong_hits) / sum(|e| e.hits),
+        unknown: sum(|e| e.unknown) / sum(|e| e.pixels),
+        disoccluded_wrong: sum(|e| e.disoccluded_wrong) / sum(|e| e.disoccluded),
+        disoccluded_unmarked: sum(|e| e.disoccluded_unmarked) / sum(|e| e.disoccluded),
+        disoccluded: sum(|e| e.disoccluded) / sum(|e| e.pixels),
+        fetches_a_ray,
+    }
+}
+
+/// The mean FLIP over views.
+///
+/// # Errors
+/// Views differ in size.
+pub fn mean_flip(references: &[View], tests: &[View]) -> anyhow::Result<f64> {
+    let flip = |(reference, test): (&View, &View)| {
+        mean(&flip_map(&Rgb8Image::of_view(reference)?, &Rgb8Image::of_view(test)?)?)
+    };
+    let flips = references.iter().zip(tests).map(flip).collect::<anyhow::Result<Vec<_>>>()?;
+    Ok(flips.iter().sum::<f64>() / flips.len() as f64)
+}
+
+/// The depth of a view, unknown where it was filled in.
+fn known_depth(view: &View) -> anyhow::Result<DepthPlane<'static>> {
+    let mut plane = view.inverse_depth_per_m.clone().context("a view without depth")?;
+    for (inverse, provenance) in plane.iter_mut().zip(view.provenance.iter().flatten()) {
+        if provenance.kind() == ProvenanceKind::Filled {
+            *inverse = depth_image::HOLE_INVERSE_DEPTH;
+        }
+    }
+    Ok(DepthPlane::new(view.size_px.x, view.size_px.y, plane)?)
+}
+
+fn mean(map: &ScoreMap) -> anyhow::Result<f64> {
+    Ok(map.mean(None)?.unwrap_or(f64::NAN))
+}

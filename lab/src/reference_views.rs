@@ -1,0 +1,157 @@
+//! Reference views: drawn from the scene, beside the sample set that other views are reconstructed from.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::Context as _;
+use app_core::setup::{SceneArgs, Setup};
+use codec::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
+use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use engine::GpuEngine;
+use metrics::{PixelClass, classify, unheld_rate};
+use node::{DirectWork, Engine as _, SampleWork};
+use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
+use render::Lighting;
+
+use crate::statistics::median;
+
+/// Both planes beside colour.
+pub const ALL_PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: true };
+const COLOR_ONLY: ViewPlanes = ViewPlanes { inverse_depth: false, provenance: false };
+
+/// A scene's sample set as compositors have it, and views drawn from the scene.
+pub struct ReferenceViews {
+    engine: Arc<GpuEngine>,
+    /// Cameras of the views.
+    pub cameras: Vec<PinholeCamera>,
+    /// Views drawn from the scene.
+    pub views: Vec<View>,
+    /// Sample images, decoded from what travels.
+    pub images: Vec<DepthImage>,
+    set: SampleSet,
+    classes: Vec<Vec<PixelClass>>,
+}
+
+impl ReferenceViews {
+    /// Samples the scene, sends the images through the codec, and draws the views.
+    ///
+    /// # Errors
+    /// The device's or the codec's.
+    pub fn draw(
+        engine: &Arc<GpuEngine>,
+        setup: &Setup,
+        args: &SceneArgs,
+        cameras: Vec<PinholeCamera>,
+    ) -> anyhow::Result<Self> {
+        engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
+        let images = sample(engine, setup, args)?;
+        let description = SetDescription {
+            volume: setup.offer.volume,
+            background_linear: setup.offer.background_linear,
+            illumination: &setup.offer.illumination,
+            highlight: args.lighting.highlight(),
+        };
+        let set = engine.reconstructor().upload(&images, &description)?;
+        let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ALL_PLANES))?;
+        let class = |(camera, view): (&PinholeCamera, &View)| Ok(classify(camera, inverse_depth(view)?, &images)?);
+        let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;
+        Ok(Self { engine: engine.clone(), cameras, views, images, set, classes })
+    }
+
+    /// The classes of the pixels of every view.
+    pub(crate) fn classes(&self) -> &[Vec<PixelClass>] {
+        &self.classes
+    }
+
+    /// The share of the views' pixels with a surface whose surface no sample image holds.
+    ///
+    /// # Errors
+    /// A view has no depth.
+    pub fn unheld(&self) -> anyhow::Result<f64> {
+        let rate = |(camera, view): (&PinholeCamera, &View)| {
+            Ok(unheld_rate(camera, inverse_depth(view)?, &self.images)?.unwrap_or(0.0))
+        };
+        let rates = self.cameras.iter().zip(&self.views).map(rate).collect::<anyhow::Result<Vec<_>>>()?;
+        Ok(rates.iter().sum::<f64>() / rates.len() as f64)
+    }
+
+    /// The same views drawn from the scene in another light.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn drawn(&self, setup: &Setup, lighting: Lighting) -> anyhow::Result<Vec<View>> {
+        Ok(self.engine.draw_direct(&direct_work(setup, lighting, &self.cameras, COLOR_ONLY))?)
+    }
+
+    /// Reconstructs all views.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn reconstruct(&self, method: ReconstructionMethod, planes: ViewPlanes) -> anyhow::Result<Vec<View>> {
+        Ok(self.engine.reconstructor().reconstruct(&self.set, &self.cameras, method, planes)?)
+    }
+
+    /// Reconstructs all views and counts the fetches of a ray; NaN where they cannot be counted.
+    pub(crate) fn reconstruct_counted(
+        &self,
+        method: ReconstructionMethod,
+        planes: ViewPlanes,
+    ) -> anyhow::Result<(Vec<View>, f64)> {
+        let reconstructor = self.engine.reconstructor();
+        let (views, statistics) = reconstructor.reconstruct_measured(&self.set, &self.cameras, method, planes, true)?;
+        Ok((views, statistics.fetches_per_ray.unwrap_or(f64::NAN)))
+    }
+
+    /// Milliseconds a view in one batch of `at_least` views or more: the median of `runs` after one that does not
+    /// count.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn ms_a_view(&self, method: ReconstructionMethod, at_least: usize, runs: usize) -> anyhow::Result<f64> {
+        let times = at_least.div_ceil(self.cameras.len().max(1)).max(1);
+        let cameras = self.cameras.repeat(times);
+        let run = || {
+            let start = Instant::now();
+            self.engine.reconstructor().reconstruct(&self.set, &cameras, method, COLOR_ONLY)?;
+            anyhow::Ok(start.elapsed().as_secs_f64())
+        };
+        run()?;
+        let seconds = (0..runs.max(1)).map(|_| run()).collect::<anyhow::Result<Vec<_>>>()?;
+        Ok(median(seconds) * 1e3 / cameras.len() as f64)
+    }
+}
+
+/// The sample set as compositors decode it.
+fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result<Vec<DepthImage>> {
+    let work = SampleWork {
+        scene_hash: setup.offer.hash.to_string(),
+        wanted: (0..setup.samples.len() as u32).collect(),
+        cameras: setup.samples.iter().copied().map(Camera::Pinhole).collect(),
+        sampling: args.sampling.to_string(),
+        method: args.method.to_string(),
+        lighting: args.lighting.to_string(),
+        scene_time_s: 0.0,
+        temporal_reference_s: None,
+        refinement: cluster::Refinement::default(),
+    };
+    engine.sample(&work)?.iter().map(encoded_and_decoded).collect()
+}
+
+fn encoded_and_decoded(image: &DepthImage) -> anyhow::Result<DepthImage> {
+    let encoded = encode_depth_image(image, PlaneSet::ALL)?;
+    Ok(decode_depth_image(&encoded.header, image.camera, &encoded.payload, &DecodeLimits::default())?)
+}
+
+fn direct_work(setup: &Setup, lighting: Lighting, cameras: &[PinholeCamera], planes: ViewPlanes) -> DirectWork {
+    DirectWork {
+        scene_hash: setup.offer.hash.to_string(),
+        cameras: cameras.to_vec(),
+        lighting: lighting.to_string(),
+        scene_time_s: 0.0,
+        planes,
+    }
+}
+
+fn inverse_depth(view: &View) -> anyhow::Result<&[f32]> {
+    Ok(view.inverse_depth_per_m.as_ref().context("a view without depth")?)
+}

@@ -1,0 +1,24 @@
+//! The size of the study.
+
+/// The size of the study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Extent {
+    /// The side of sample images.
+    pub side_px: u32,
+    /// The number of views between the sample cameras.
+    pub views: usize,
+    /// The number of samples an image whose visibility is traced.
+    pub seeds: usize,
+}
+
+impl Extent {
+    /// The paper's size, or a smaller one.
+    #[must_use]
+    pub fn of(quick: bool) -> Self {
+        if quick {
+            Self { side_px: 256, views: 64, seeds: 512 }
+        } else {
+            Self { side_px: 1024, views: 1000, seeds: 4096 }
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Predictions of a measured point: by the paper's equations, by the schedule, and by the simulation.
+
+use cluster::{Costs, Policy};
+use coordinator::schedule::pipeline_time;
+use simulation::{Cluster, Demand, Habits, Machine, plan, run};
+
+use super::measured::{MeasuredLighting, Timed};
+use super::point::{Point, PointSettings};
+
+/// Simulated sets beyond those that count: the first, and those sampled ahead at the end.
+const MORE_SETS: u32 = 5;
+
+/// Predictions of T.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prediction {
+    /// Eq. 2 for the pipeline, eq. 1 for `direct`, and all work over all nodes for time-share. Loads, transfer and
+    /// whole images are not included.
+    pub equation_s: f64,
+    /// The coordinator's prediction, from the costs that it had measured.
+    pub schedule_s: f64,
+    /// The simulation's result, taken as T is measured.
+    pub simulated_s: f64,
+    /// True where the simulated schedule divides the nodes as the real one does.
+    pub same_plan: bool,
+}
+
+/// Bytes on the network and their rate, as means over all points of a lighting.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Traffic {
+    pub image_bytes: f64,
+    pub frame_bytes: f64,
+    /// The rate between two processes of this machine.
+    pub bytes_per_s: f64,
+}
+
+impl Traffic {
+    /// The means over the points that show them.
+    #[must_use]
+    pub fn of(points: &[Point]) -> Self {
+        let fetched: Vec<_> = points.iter().filter_map(|point| point.fetched).collect();
+        let of_fetched = |sum: f64| sum / fetched.len().max(1) as f64;
+        let image_bytes = of_fetched(fetched.iter().map(|image| image.image_bytes).sum());
+        let image_s = of_fetched(fetched.iter().map(|image| image.image_s).sum());
+        let views: f64 = points.iter().map(|point| point.settings.views as f64).sum();
+        let frames: f64 = points.iter().map(|point| point.steps.frame_bytes).sum();
+        Self { image_bytes, frame_bytes: frames / views.max(1.0), bytes_per_s: image_bytes / image_s }
+    }
+
+    /// A cluster of `nodes` equal nodes.
+    #[must_use]
+    pub fn cluster(&self, nodes: usize, machine: Machine, images: usize) -> Cluster {
+        Cluster::equal(nodes, machine, images, self.image_bytes, self.frame_bytes)
+    }
+}
+
+/// Predicts a point from the costs that as many nodes timed.
+#[must_use]
+pub fn predict(lit: &MeasuredLighting, images: usize, point: &Point) -> Prediction {
+    let traffic = Traffic::of(&lit.points);
+    let bytes_per_s = if traffic.bytes_per_s > 0.0 { traffic.bytes_per_s } else { f64::INFINITY };
+    let timed = lit.timed.iter().find(|timed| timed.nodes == point.nodes);
+    let (costs, calls) = timed.map_or_else(Default::default, Timed::by_view_and_call);
+    let simulated = simulate(Machine { costs, calls, bytes_per_s }, &traffic, images, point);
+    Prediction {
+        equation_s: equation_s(&lit.mean(point.nodes), images, point),
+        schedule_s: point.plan.predicted_s(),
+        simulated_s: simulated.map_or(f64::NAN, |(period_s, _)| period_s),
+        same_plan: simulated.is_some_and(|(_, same)| same),
+    }
+}
+
+fn equation_s(costs: &Costs, images: usize, point: &Point) -> f64 {
+    let (nodes, views) = (point.nodes, point.settings.views);
+    let (g_s, view_s) = (costs.sample_image_s, costs.reconstruct_view_s + costs.encode_view_s);
+    match point.policy() {
+        Policy::Pipeline => pipeline_time(images, g_s, views, view_s, nodes, point.samplers()),
+        Policy::Direct => views as f64 * costs.direct_view_s / nodes as f64,
+        Policy::TimeShare => (images as f64 * g_s + views as f64 * view_s) / nodes as f64,
+    }
+}
+
+/// T, and true for an equal plan: planned with the coordinator's costs and executed at the mean ones.
+fn simulate(machine: Machine, traffic: &Traffic, images: usize, point: &Point) -> Option<(f64, bool)> {
+    let sets = point.settings.counted_sets + MORE_SETS;
+    let PointSettings { views, policy, .. } = point.settings;
+    let tiles = point.settings.forced_tiles().map(|tiles| tiles as usize);
+    let demand = Demand { views, sets, policy, tiles, nodes_report: false };
+    let planned = plan(&traffic.cluster(point.nodes, Machine::of(point.plan.costs), images), &demand).ok()?;
+    let roles = |plan: &cluster::Assignment| {
+        let images = plan.samplers.iter().map(|share| share.image_indices.len()).collect::<Vec<_>>();
+        (plan.policy, images, plan.compositors.len())
+    };
+    let same = roles(&planned.assignment) == roles(&point.plan.assignment);
+    let cluster = traffic.cluster(point.nodes, machine, images);
+    let run = run(&cluster, &planned, point.settings.views, sets, Habits::default());
+    Some((run.period_s(point.settings.counted_sets as usize), same))
+}

@@ -1,0 +1,157 @@
+//! The device behind a node, alone and in a cluster, against views drawn from the scene.
+#![allow(clippy::unwrap_used)]
+
+use std::sync::Arc;
+
+use app_core::cluster::Cluster;
+use app_core::delivery::{SessionSettings, open, receive};
+use app_core::process::{listen, runtime};
+use app_core::setup::{SceneArgs, Setup};
+use app_core::sizes::SizePx;
+use cluster::PolicyChoice;
+use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
+use engine::GpuEngine;
+use glam::UVec2;
+use gpu::DevicePreference;
+use lab::reference_views::{ALL_PLANES, ReferenceViews};
+use node::{DirectWork, Engine as _, EngineError, SampleWork, ViewWork};
+use reconstruction::ReconstructionMethod;
+
+const VIEW_SIZE: UVec2 = UVec2::new(64, 48);
+
+fn args(scene: &str) -> SceneArgs {
+    SceneArgs { sample_size: Some(SizePx(UVec2::new(160, 120))), ..SceneArgs::of(scene.parse().unwrap()) }
+}
+
+fn views(setup: &Setup, count: usize) -> Vec<PinholeCamera> {
+    ViewCell::between(&setup.samples).unwrap().spread(count, VIEW_SIZE)
+}
+
+fn reference(scene: &str, count: usize) -> (Arc<GpuEngine>, SceneArgs, Setup, ReferenceViews) {
+    let (engine, args) = (GpuEngine::shared(DevicePreference::Any).unwrap(), args(scene));
+    let setup = args.load().unwrap();
+    let reference = ReferenceViews::draw(&engine, &setup, &args, views(&setup, count)).unwrap();
+    (engine, args, setup, reference)
+}
+
+#[test]
+fn views_from_samples_are_as_those_from_the_scene() {
+    for scene in ["uv-sphere", "courtyard"] {
+        let (_, _, _, reference) = reference(scene, 4);
+        let row = reference.evaluate(ReconstructionMethod::default(), 1).unwrap();
+        assert!(row.psnr_db > 30.0, "{scene}: {row:?}");
+        assert!(row.wrong_hits < 0.05 && row.unknown < 0.1, "{scene}: {row:?}");
+        assert!(row.fetches_a_ray > 0.0 && row.ms_a_view > 0.0, "{scene}: {row:?}");
+    }
+}
+
+#[test]
+fn the_comparison_sees_views_of_another_place() {
+    let (engine, args, setup, reference) = reference("courtyard", 2);
+    let own = reference.evaluate(ReconstructionMethod::default(), 1).unwrap();
+    let mut moved = ReferenceViews::draw(&engine, &setup, &args, views(&setup, 6).split_off(4)).unwrap();
+    moved.views.clone_from(&reference.views);
+    let row = moved.evaluate(ReconstructionMethod::default(), 1).unwrap();
+    assert!(row.psnr_db < own.psnr_db - 3.0 && row.flip > 2.0 * own.flip, "{row:?} {own:?}");
+}
+
+fn is_invalid(error: &EngineError, named: &str) -> bool {
+    matches!(error, EngineError::InvalidArgument { field, .. } if *field == named)
+}
+
+#[test]
+fn unknown_names_are_refused_with_their_field() {
+    let (engine, args, setup, reference) = reference("uv-sphere", 1);
+    let hash = setup.offer.hash.to_string();
+    let samples: Vec<_> = setup.samples.iter().copied().map(Camera::Pinhole).collect();
+    let sample = |scene_hash: &str, sampling: &str, lighting: &str| {
+        engine
+            .sample(&SampleWork {
+                scene_hash: scene_hash.to_owned(),
+                cameras: samples.clone(),
+                wanted: vec![0, 1],
+                sampling: sampling.to_owned(),
+                method: "joint_carve".to_owned(),
+                lighting: lighting.to_owned(),
+                scene_time_s: 0.0,
+                temporal_reference_s: None,
+                refinement: cluster::Refinement::default(),
+            })
+            .unwrap_err()
+    };
+    assert_eq!(sample("none", "conventional", "unlit"), EngineError::UnknownScene { hash: "none".to_owned() });
+    assert!(is_invalid(&sample(&hash, "random", "unlit"), "sampling_method"));
+    assert!(is_invalid(&sample(&hash, "conventional", "candles"), "lighting"));
+    let set = node::SampleSet {
+        images: reference.images.clone(),
+        volume: setup.offer.volume,
+        background_linear: glam::Vec3::ZERO,
+        illumination: setup.offer.illumination.clone(),
+        lighting: args.lighting.to_string(),
+    };
+    let uploaded = engine.upload(&set).unwrap();
+    let work = |method: &str, near_m: f32| ViewWork {
+        cameras: vec![PinholeCamera { near_m, ..reference.cameras[0] }],
+        method: method.to_owned(),
+        planes: ViewPlanes::default(),
+    };
+    let refused = |work: &ViewWork| engine.reconstruct(uploaded.as_ref(), work).unwrap_err();
+    assert!(is_invalid(&refused(&work("guess", 0.01)), "reconstruction_method"));
+    assert!(is_invalid(&refused(&work("joint_carve", -1.0)), "camera"));
+    assert!(is_invalid(&engine.upload(&node::SampleSet { images: Vec::new(), ..set }).err().unwrap(), "sample_images"));
+    assert!(is_invalid(&engine.load_scene("x", b"no package").unwrap_err(), "package"));
+}
+
+#[test]
+fn a_package_loads_as_the_scene_does() {
+    let (engine, _, setup, reference) = reference("unit-cube", 2);
+    let package = scene::pack(&setup.scene);
+    engine.load_scene("by package", &package.bytes).unwrap();
+    assert!(engine.has_scene("by package"));
+    let work = DirectWork {
+        scene_hash: "by package".to_owned(),
+        cameras: reference.cameras.clone(),
+        lighting: "phong".to_owned(),
+        scene_time_s: 0.0,
+        planes: ALL_PLANES,
+    };
+    let views = engine.draw_direct(&work).unwrap();
+    assert_eq!(views.len(), reference.views.len());
+    for (view, expected) in views.iter().zip(&reference.views) {
+        // The faster of rays and triangles is chosen by timing for each package; they may differ at edges.
+        let same = view.srgb8.iter().zip(&expected.srgb8).filter(|(a, b)| a == b).count();
+        let share = same as f64 / expected.srgb8.len() as f64;
+        assert!(view.size_px == expected.size_px && share > 0.98, "{share}");
+    }
+}
+
+#[test]
+fn a_cluster_gives_what_one_engine_gives() {
+    let (engine, args, setup, reference) = reference("uv-sphere", 16);
+    let alone = reference.reconstruct(args.method, ALL_PLANES).unwrap();
+    let delivered = runtime().unwrap().block_on(async {
+        let listener = listen(([127, 0, 0, 1], 0).into(), false).await.unwrap();
+        let cluster = Cluster::start(listener, setup.offer.clone(), engine, 3, false).await.unwrap();
+        let client = cluster.client().await.unwrap();
+        let offer = client.status().await.unwrap().offer.unwrap();
+        assert_eq!((offer.sample_cameras, offer.settings), (setup.offer.rig.clone(), setup.offer.settings.clone()));
+        let (method, sampling) = (args.method.to_string(), args.sampling.to_string());
+        let settings = SessionSettings {
+            policy: PolicyChoice::Pipeline,
+            planes: ALL_PLANES,
+            ..SessionSettings::new(method, sampling, args.lighting.to_string())
+        };
+        let session = open(&client, &settings, &reference.cameras).await.unwrap();
+        let delivered = receive(&session, &reference.cameras, |_| ()).await.unwrap();
+        drop((session, client));
+        cluster.drain().await.unwrap();
+        delivered
+    });
+    assert!(
+        delivered.plan.sampler_count() >= 1
+            && delivered.plan.assignment.compositors.len() + delivered.plan.sampler_count() == 3
+    );
+    let views: Vec<_> = delivered.frames.into_iter().map(|frame| frame.view).collect();
+    assert_eq!(views.len(), 16);
+    assert!(views == alone, "views of the cluster differ from the engine's");
+}
