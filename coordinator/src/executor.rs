@@ -8,10 +8,10 @@ use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
 
+use crate::grpc_status::{of_node, refusal, within};
 use crate::probe::probe;
 use crate::schedule::{Command, Event};
 use crate::shared::Shared;
-use crate::status::{of_node, refusal, within};
 
 /// A call that breaks sooner than this is tried again, after a pause.
 const SOON: Duration = Duration::from_secs(1);

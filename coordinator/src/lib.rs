@@ -7,6 +7,7 @@
 mod config;
 mod cost_cache;
 mod executor;
+mod grpc_status;
 mod membership;
 mod metrics;
 mod observers;
@@ -16,7 +17,6 @@ mod service;
 mod session_opening;
 mod sessions;
 mod shared;
-mod status;
 mod workload;
 
 pub use config::{CoordinatorConfig, SceneOffer};

@@ -21,22 +21,21 @@ impl CoordinatorMetrics {
     /// Registered, all at zero.
     #[must_use]
     pub fn new(telemetry: &Telemetry) -> Self {
+        let mut registry = telemetry.registry();
+        let mut gauge = |name: &str, help: &str| {
+            let gauge = Gauge::default();
+            registry.register(name, help, gauge.clone());
+            gauge
+        };
         let metrics = Self {
-            nodes: Gauge::default(),
-            samplers: Gauge::default(),
-            sessions: Gauge::default(),
-            views_per_set: Gauge::default(),
-            plan_epoch: Gauge::default(),
+            nodes: gauge("cluster_nodes", "P: nodes that have joined"),
+            samplers: gauge("cluster_samplers", "K: nodes that sample"),
+            sessions: gauge("cluster_sessions", "Sessions of the plan"),
+            views_per_set: gauge("cluster_views_per_set", "V: views of a sample set"),
+            plan_epoch: gauge("cluster_plan_epoch", "The plan in force"),
             plans: Counter::default(),
         };
-        let mut registry = telemetry.registry();
-        registry.register("cluster_nodes", "P: nodes that have joined", metrics.nodes.clone());
-        registry.register("cluster_samplers", "K: nodes that sample", metrics.samplers.clone());
-        registry.register("cluster_sessions", "Sessions of the plan", metrics.sessions.clone());
-        registry.register("cluster_views_per_set", "V: views of a sample set", metrics.views_per_set.clone());
-        registry.register("cluster_plan_epoch", "The plan in force", metrics.plan_epoch.clone());
         registry.register("cluster_plans", "Plans made", metrics.plans.clone());
-        drop(registry);
         metrics
     }
 

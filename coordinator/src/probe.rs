@@ -1,7 +1,6 @@
 //! Probes: whether a node serves, and whether a sampler's images arrive whole.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use cluster::FetchImages;
 use codec::{DecodeLimits, Reassembled, Reassembler, SampleSetId, decode_depth_image};
@@ -9,15 +8,14 @@ use depth_image::Camera;
 use node::blocking;
 use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
-use wire::rpc::{SamplerClient, is_serving};
+use wire::rpc::{Backoff, SamplerClient, is_serving};
 
+use crate::grpc_status::within;
 use crate::schedule::{Event, Probe, ProbedImage};
 use crate::shared::Shared;
-use crate::status::within;
 
 /// A single failure may be the network's.
 const ATTEMPTS: usize = 3;
-const PAUSE: Duration = Duration::from_millis(200);
 
 /// Probes a node and tells the schedule.
 pub(crate) async fn probe(shared: Arc<Shared>, probe: Probe) {
@@ -32,11 +30,12 @@ pub(crate) async fn probe(shared: Arc<Shared>, probe: Probe) {
 }
 
 async fn attempts(shared: &Shared, probe: &Probe) -> Result<(), Status> {
+    let mut backoff = Backoff::reconnect();
     for _ in 1..ATTEMPTS {
         if attempt(shared, probe).await.is_ok() {
             return Ok(());
         }
-        tokio::time::sleep(PAUSE).await;
+        tokio::time::sleep(backoff.next_delay()).await;
     }
     attempt(shared, probe).await
 }

@@ -19,13 +19,13 @@ use wire::rpc::{Coordinator, Messages, coordinator_server};
 
 use crate::config::{CoordinatorConfig, SceneOffer};
 use crate::executor::execute;
+use crate::grpc_status::refusal;
 use crate::observers::Observers;
 use crate::schedule::{Event, Scheduler};
 use crate::session_opening::open;
 use crate::shared::Shared;
-use crate::status::refusal;
 
-/// How often the schedule learns that time has passed.
+/// The interval of ticks.
 const TICK: Duration = Duration::from_millis(250);
 
 /// Serves until `shutdown`; then ends its streams and returns when connections have ended, after 10 s at

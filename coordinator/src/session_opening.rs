@@ -1,25 +1,23 @@
-//! From a request to a session whose costs are measured.
+//! Session opening: the costs of a requested session are measured.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::time::Duration;
 
 use cluster::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage};
 use tonic::{Code, Status};
-use wire::rpc::NodeClient;
+use wire::rpc::{Backoff, NodeClient};
 
+use crate::grpc_status::{of_node, within};
 use crate::schedule::{Event, Opening, PolicyOverride};
 use crate::sessions::EventSender;
 use crate::shared::Shared;
-use crate::status::{of_node, within};
 use crate::workload::workload_of;
 
 /// Views of one measured call: as in a batch of real work, since fewer views cost more each. A slow device must not
 /// take minutes.
 const MEASURED_BATCH: u32 = 32;
-/// Attempts to measure costs where a node is lost meanwhile, and the pause in which it leaves.
+/// Attempts to measure costs where nodes are lost meanwhile.
 const ATTEMPTS: usize = 11;
-const PAUSE: Duration = Duration::from_millis(200);
 
 /// Measures the costs of a session, and hands it to the schedule; its plans come through `events`, as do refusals.
 pub(crate) async fn open(shared: Arc<Shared>, session: u64, request: SessionRequest, events: EventSender) {
@@ -105,12 +103,13 @@ async fn measured_on_present_nodes(
     measurement: &MeasureCosts,
     events: &EventSender,
 ) -> Result<Costs, Status> {
+    let mut backoff = Backoff::reconnect();
     for _ in 1..ATTEMPTS {
         match measured(shared, measurement, events).await {
             Err(status) if [Code::Unavailable, Code::Unknown].contains(&status.code()) => {
                 let detail = format!("measuring again: {}", status.message());
                 send_progress(events, SessionStage::Measuring, detail).await;
-                tokio::time::sleep(PAUSE).await;
+                tokio::time::sleep(backoff.next_delay()).await;
             }
             done => return done,
         }

@@ -7,8 +7,8 @@ use glam::UVec2;
 use tonic::Status;
 
 use crate::config::SceneOffer;
+use crate::grpc_status::refusal;
 use crate::schedule::{ChoiceError, first_indices};
-use crate::status::refusal;
 
 /// Completes a request with the scene's defaults.
 ///

@@ -56,7 +56,7 @@ fn is_tileable(demand: &Demand<'_>) -> bool {
     !demand.load.images_are_sequential && NodeCosts::mean(demand.nodes).tiles.is_some()
 }
 
-/// With the load's number of tiles.
+/// The choice for the load's number of tiles.
 fn choose_tiled(demand: &Demand<'_>, moves: bool) -> Choice {
     let Demand { load, nodes, .. } = demand;
     let sampled = demand.current.map_or(&[][..], |current| &current.samples);

@@ -1,4 +1,4 @@
-//! Outputs of the schedule: what the executor does.
+//! Outputs of the schedule, which the executor executes.
 
 use std::fmt;
 use std::time::Duration;
@@ -45,9 +45,9 @@ pub struct Probe {
 /// The image that a probe fetches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProbedImage {
-    /// For one image.
+    /// A request for one image.
     pub request: FetchImages,
-    /// The image's.
+    /// The image's camera.
     pub camera: Camera,
 }
 

@@ -12,7 +12,7 @@ use super::search::Division;
 /// Decisions that a session takes from the schedule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct PolicyOverride {
-    /// How views come about.
+    /// The policy.
     pub policy: PolicyChoice,
     /// K, instead of the formula's.
     pub forced_samplers: Option<usize>,
@@ -32,7 +32,7 @@ impl PolicyOverride {
 /// Roles of the nodes in the plan in force; those without a role count as compositors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CurrentRoles {
-    /// How views come about.
+    /// The policy.
     pub policy: Policy,
     /// Whether each node samples.
     pub samples: Vec<bool>,
@@ -58,19 +58,19 @@ pub struct Demand<'a> {
 /// Predicted seconds of a sample set.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Predicted {
-    /// With samplers and compositors, as divided.
+    /// Samplers and compositors, as divided.
     pub pipeline_s: f64,
-    /// From the scene.
+    /// Views drawn from the scene.
     pub direct_s: f64,
-    /// With every node doing both.
+    /// Every node samples and composites.
     pub time_share_s: f64,
     /// K by the balance formula, on the mean of the nodes' costs.
     pub k_fd: usize,
-    /// With that K.
+    /// Seconds with that K.
     pub k_fd_s: f64,
     /// K of the best division that the search finds.
     pub enumerated: usize,
-    /// With that division.
+    /// Seconds with that division.
     pub enumerated_s: f64,
 }
 
@@ -89,13 +89,13 @@ impl Predicted {
 /// A policy and a division of the nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
-    /// How views come about.
+    /// The policy.
     pub policy: Policy,
     /// The work, with images in as many tiles as is best.
     pub load: Load,
     /// Samplers of the pipeline, whether or not it was chosen.
     pub division: Division,
-    /// In plain words, with the figures.
+    /// The reason in plain words, with the figures.
     pub reason: String,
     /// Predicted times of every policy.
     pub predicted: Predicted,

@@ -91,7 +91,7 @@ pub(super) struct Estimate {
     samples_tiles: bool,
 }
 
-/// The parts of each set that a node has sampled: numbers of tiles, of images in so many tiles.
+/// The parts of each set that a node has sampled, as numbers of tiles of images in `tiles` tiles.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SampledParts<'a> {
     pub(super) parts: &'a [u32],

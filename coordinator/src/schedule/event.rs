@@ -1,4 +1,4 @@
-//! Inputs of the schedule: what happened in the cluster.
+//! Inputs of the schedule.
 
 use cluster::limits::MAX_VIEWS_PER_SET;
 use cluster::{
@@ -70,7 +70,7 @@ pub struct Opening {
     pub policy_override: PolicyOverride,
     /// Qualities to fall back to under overload, in this order.
     pub fallbacks: Vec<Quality>,
-    /// As measured: every node's until it reports its own.
+    /// Measured costs: every node's until it reports its own.
     pub costs: Costs,
     /// The workload's sample cameras are the cells of these viewpoints, as if the session were alone. Empty: it brings
     /// sample cameras of its own.

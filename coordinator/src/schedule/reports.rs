@@ -37,6 +37,13 @@ pub(super) enum Attribution {
     Probe,
 }
 
+/// A compositor that is at fault.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct AtFault {
+    pub(super) compositor: String,
+    pub(super) reason: String,
+}
+
 impl SamplerReports {
     /// Files a report.
     pub(super) fn file(&mut self, now: Duration, report: SamplerReport) -> Attribution {
@@ -49,14 +56,14 @@ impl SamplerReports {
         if agrees { Attribution::SamplerAtFault } else { Attribution::Probe }
     }
 
-    /// A probe of the sampler has passed. Gives the compositors that are now at fault, and why.
-    pub(super) fn refute(&mut self, sampler: &str) -> Vec<(String, String)> {
+    /// A probe of the sampler has passed. Gives the compositors that are now at fault.
+    pub(super) fn refute(&mut self, sampler: &str) -> Vec<AtFault> {
         let mut at_fault = Vec::new();
         for filed in self.0.iter_mut().filter(|filed| filed.sampler == sampler && !filed.is_refuted) {
             filed.is_refuted = true;
-            at_fault.push((filed.compositor.clone(), filed.reason.clone()));
+            at_fault.push(AtFault { compositor: filed.compositor.clone(), reason: filed.reason.clone() });
         }
-        at_fault.retain(|(compositor, _)| self.refuted(compositor) >= REFUTED_LIMIT);
+        at_fault.retain(|at_fault| self.refuted(&at_fault.compositor) >= REFUTED_LIMIT);
         at_fault
     }
 
@@ -116,7 +123,8 @@ mod tests {
         assert_eq!(reports.refute("a"), [], "one probe answers both");
         assert_eq!(reports.refute("a"), [], "a report is refuted once");
         reports.file(START, report("c", "b"));
-        assert_eq!(reports.refute("b"), [("c".to_owned(), "no images".to_owned())]);
+        let at_fault = AtFault { compositor: "c".to_owned(), reason: "no images".to_owned() };
+        assert_eq!(reports.refute("b"), [at_fault]);
     }
 
     #[test]

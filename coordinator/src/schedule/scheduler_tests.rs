@@ -237,8 +237,8 @@ fn events_of_old_plans_and_unknown_nodes_are_ignored() {
     let ready = |plan_epoch, name: &str| Event::Ready { plan_epoch, node_name: name.to_owned() };
     for event in [
         ready(0, "n0"),
-        ready(1, "nobody"),
-        timed("nobody", 1, MeasuredCosts::default()),
+        ready(1, "unknown"),
+        timed("unknown", 1, MeasuredCosts::default()),
         Event::DemandChanged { session: 77, views_per_set: 1, frames_per_s: None },
         Event::Closed { session: 77 },
     ] {
@@ -264,7 +264,7 @@ fn an_impossible_forced_k_is_refused_and_later_reduced() {
 }
 
 #[test]
-fn closed_sessions_are_forgotten_and_a_refused_one_ends_nobody() {
+fn closed_sessions_are_forgotten_and_a_refused_one_ends_no_other() {
     let mut cluster = Cluster::of(2);
     cluster.step(opened(1, PIPELINE, 40));
     let other = Opening { workload: workload(2), policy_override: forced_samplers(9), ..opening(2, PIPELINE, 40) };

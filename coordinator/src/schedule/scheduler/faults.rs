@@ -8,7 +8,8 @@ use super::Scheduler;
 use crate::schedule::command::{Command, Probe, ProbedImage};
 use crate::schedule::demand::ChoiceError;
 use crate::schedule::event::ProbeKind;
-use crate::schedule::reports::Attribution;
+use crate::schedule::member::Member;
+use crate::schedule::reports::{AtFault, Attribution};
 
 /// Duration of a quarantine, after which a link may be restored.
 const QUARANTINE: Duration = Duration::from_secs(30);
@@ -155,7 +156,7 @@ impl Scheduler {
         if let Some(reason) = failure {
             return self.quarantine(sampler, &format!("sends no images: {reason}"));
         }
-        let at_fault = self.reports.refute(sampler).into_iter().map(|(compositor, reason)| {
+        let at_fault = self.reports.refute(sampler).into_iter().map(|AtFault { compositor, reason }| {
             self.quarantine(&compositor, &format!("reports samplers whose images can be had: {reason}"))
         });
         at_fault.flatten().collect()
@@ -169,7 +170,7 @@ impl Scheduler {
         }
         let plan_epoch = active.epoch();
         let ready = self.members.iter().filter(|(name, _)| active.ready.contains(*name));
-        let probe = |(name, member): (&String, &crate::schedule::member::Member)| Probe {
+        let probe = |(name, member): (&String, &Member)| Probe {
             plan_epoch,
             node_name: name.clone(),
             incarnation: member.incarnation,
