@@ -47,7 +47,7 @@ fn full_report() -> Report {
     report
 }
 
-fn written(report: &Report) -> tempfile::TempDir {
+fn written_folder(report: &Report) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     report.write(folder.path()).unwrap();
     folder
@@ -60,7 +60,7 @@ fn read(folder: &Path, file: &str) -> String {
 #[test]
 fn report_json_reads_back_as_it_was() {
     let report = full_report();
-    let folder = written(&report);
+    let folder = written_folder(&report);
     let back: Report = serde_json::from_str(&read(folder.path(), "report.json")).unwrap();
     let mut without_pixels = report;
     without_pixels.pictures[0].pictures[0].image = RgbImage::default();
@@ -70,7 +70,7 @@ fn report_json_reads_back_as_it_was() {
 
 #[test]
 fn report_json_has_the_fields_that_the_format_names() {
-    let folder = written(&full_report());
+    let folder = written_folder(&full_report());
     let json: serde_json::Value = serde_json::from_str(&read(folder.path(), "report.json")).unwrap();
     for field in ["schema", "title", "device", "versions", "parameters", "rows", "checks"] {
         assert!(!json[field].is_null(), "{field}");
@@ -96,7 +96,7 @@ fn strict_fails_only_what_falls_short() {
 
 #[test]
 fn every_part_has_its_file() {
-    let folder = written(&full_report());
+    let folder = written_folder(&full_report());
     for file in ["costs.csv", "charts/cost-over-views.svg", "charts/stages.svg", "pictures/one.png", "index.html"] {
         assert!(folder.path().join(file).is_file(), "{file}");
     }
@@ -106,7 +106,7 @@ fn every_part_has_its_file() {
 
 #[test]
 fn charts_are_xml_that_names_their_series_axes_and_limits() {
-    let folder = written(&full_report());
+    let folder = written_folder(&full_report());
     let expected: [(&str, &[&str]); 2] = [
         (
             "charts/cost-over-views.svg",
@@ -146,7 +146,7 @@ fn charts_without_points_are_drawn() {
 
 #[test]
 fn the_page_escapes_what_it_is_given_and_needs_nothing_from_outside() {
-    let folder = written(&full_report());
+    let folder = written_folder(&full_report());
     let page = read(folder.path(), "index.html");
     assert!(!page.contains("<script") && page.contains("a&lt;script&gt;&amp;"));
     assert!(page.contains("<svg ") && page.contains("pictures&#x2f;one.png"));

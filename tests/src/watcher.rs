@@ -24,7 +24,7 @@ pub const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 0.05, set_count: 4
 
 /// The request of the recorded session.
 #[must_use]
-pub fn watched() -> SessionRequest {
+pub fn watched_request() -> SessionRequest {
     request(PolicyChoice::Pipeline, MOVING)
 }
 
@@ -49,7 +49,7 @@ impl Watcher {
     /// # Panics
     /// No session opens, or its first frames do not arrive.
     pub async fn start(client: &Client) -> Self {
-        let session = Arc::new(client.open_session(watched(), |_| ()).await.expect("a session"));
+        let session = Arc::new(client.open_session(watched_request(), |_| ()).await.expect("a session"));
         let history = Arc::<Mutex<History>>::default();
         let asking = tokio::spawn(ask(session.clone(), history.clone()));
         let watcher = Self { session, history, asking };

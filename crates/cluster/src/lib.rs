@@ -44,5 +44,5 @@ pub use session::{SessionEvent, SessionPlan, SessionRequest, SessionStage};
 pub use set_content::SetContent;
 pub use status::{AchievedTime, ClusterStatus, NodeCondition};
 pub use timeline::{Refinement, Timeline};
-pub use views::{LiveRequest, RenderViews, RequestedView};
+pub use views::{LiveRequest, RenderViews, RequestedView, check_view_count};
 pub use workload::Workload;

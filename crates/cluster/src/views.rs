@@ -48,18 +48,21 @@ impl RenderViews {
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        at_most(self.views.len(), MAX_VIEWS_PER_REQUEST, "views")?;
         check_view_count(self.views.len(), self.live.is_some())?;
         nonempty(&self.method, "reconstruction_method")
     }
 }
 
-/// A live stream may open, and acknowledge, without a view; all others ask for one at least.
-fn check_view_count(count: usize, is_live: bool) -> Result<(), InvalidField> {
+/// Checks the number of views of one request. A live stream may open, and acknowledge, without a view; any other request
+/// asks for one at least.
+///
+/// # Errors
+/// No view, or too many.
+pub fn check_view_count(count: usize, is_live: bool) -> Result<(), InvalidField> {
     match (is_live, count) {
         (true, _) => at_most(count, MAX_LIVE_VIEWS_PER_REQUEST, "views of a live stream"),
         (false, 0) => Err(InvalidField::Missing { field: "views" }),
-        (false, _) => Ok(()),
+        (false, _) => at_most(count, MAX_VIEWS_PER_REQUEST, "views"),
     }
 }
 

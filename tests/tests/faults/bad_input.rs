@@ -93,34 +93,47 @@ fn beyond(camera: PinholeCamera) -> Vec<PinholeCamera> {
 async fn absurd_requests_are_refused_by_field() {
     let beside = Beside::start(2).await;
     let coordinator = CoordinatorClient::new(connect(&beside.cluster.coordinator.address).await.unwrap());
-    let camera = watched().typical_view;
+    let camera = watched_request().typical_view;
     let huge = PinholeCamera { size_px: UVec2::splat(65_535), ..camera };
     let absurd = [
-        (SessionRequest { views_per_set: 1_000_000, ..watched() }, "views_per_set_count is 1000000"),
-        (SessionRequest { typical_view: huge, ..watched() }, "typical_view: camera size_px"),
+        (SessionRequest { views_per_set: 1_000_000, ..watched_request() }, "views_per_set_count is 1000000"),
+        (SessionRequest { typical_view: huge, ..watched_request() }, "typical_view: camera size_px"),
         (
-            SessionRequest { typical_view: PinholeCamera { eye_in_world: Vec3::NAN, ..camera }, ..watched() },
+            SessionRequest { typical_view: PinholeCamera { eye_in_world: Vec3::NAN, ..camera }, ..watched_request() },
             "eye_in_world",
         ),
-        (SessionRequest { sample_cameras: vec![Camera::Pinhole(huge)], ..watched() }, "camera.pinhole: camera size_px"),
-        (SessionRequest { sample_cameras: vec![Camera::Pinhole(camera); 17], ..watched() }, "sample_cameras has 17"),
         (
-            SessionRequest { sample_size_px: Some(UVec2::splat(65_535)), ..watched() },
+            SessionRequest { sample_cameras: vec![Camera::Pinhole(huge)], ..watched_request() },
+            "camera.pinhole: camera size_px",
+        ),
+        (
+            SessionRequest { sample_cameras: vec![Camera::Pinhole(camera); 17], ..watched_request() },
+            "sample_cameras has 17",
+        ),
+        (
+            SessionRequest { sample_size_px: Some(UVec2::splat(65_535)), ..watched_request() },
             "sample_image_size: camera size_px",
         ),
-        (SessionRequest { sample_size_px: Some(UVec2::ZERO), ..watched() }, "sample_image_size"),
-        (SessionRequest { method: String::new(), ..watched() }, "reconstruction_method"),
-        (SessionRequest { viewpoints: vec![camera; 257], ..watched() }, "viewpoints has 257"),
-        (SessionRequest { viewpoints: vec![huge], ..watched() }, "viewpoints: camera size_px"),
+        (SessionRequest { sample_size_px: Some(UVec2::ZERO), ..watched_request() }, "sample_image_size"),
+        (SessionRequest { method: String::new(), ..watched_request() }, "reconstruction_method"),
+        (SessionRequest { viewpoints: vec![camera; 257], ..watched_request() }, "viewpoints has 257"),
+        (SessionRequest { viewpoints: vec![huge], ..watched_request() }, "viewpoints: camera size_px"),
         (
-            SessionRequest { viewpoints: vec![camera], sample_cameras: vec![Camera::Pinhole(camera)], ..watched() },
+            SessionRequest {
+                viewpoints: vec![camera],
+                sample_cameras: vec![Camera::Pinhole(camera)],
+                ..watched_request()
+            },
             "viewpoints: sample_cameras are given, too",
         ),
-        (SessionRequest { viewpoints: everywhere(camera), ..watched() }, "viewpoints: they are spread over"),
-        (SessionRequest { viewpoints: beyond(camera), ..watched() }, "viewpoints: camera eye_in_world is not finite"),
-        (SessionRequest { lighting: "x".repeat(300), ..watched() }, "lighting has 300"),
+        (SessionRequest { viewpoints: everywhere(camera), ..watched_request() }, "viewpoints: they are spread over"),
         (
-            SessionRequest { timeline: Timeline { step_s: 1e300, ..watched().timeline }, ..watched() },
+            SessionRequest { viewpoints: beyond(camera), ..watched_request() },
+            "viewpoints: camera eye_in_world is not finite",
+        ),
+        (SessionRequest { lighting: "x".repeat(300), ..watched_request() }, "lighting has 300"),
+        (
+            SessionRequest { timeline: Timeline { step_s: 1e300, ..watched_request().timeline }, ..watched_request() },
             "timeline.step_s is 1",
         ),
     ];

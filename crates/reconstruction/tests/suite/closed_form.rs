@@ -63,7 +63,7 @@ fn a_samples_own_pose_shows_the_sample() {
         let samples = corners.samples(4);
         let stage = Stage::new(scene, &samples);
         let view = stage.view(&samples[1], CARVE);
-        let truth = stage.truth(&samples[1]);
+        let truth = stage.drawn_directly(&samples[1]);
         let inside = inside(&truth);
         let psnr = psnr_db(&truth, &view, &inside);
         let share = inside.iter().filter(|&&i| i).count() as f64 / inside.len() as f64;
@@ -85,7 +85,7 @@ fn a_grazing_plane_stays_in_one_piece() {
         let wide = |azimuth| looking(eye(azimuth), Vec3::ZERO, 60.0, SAMPLE_PX);
         let stage = Stage::new(quad(Vec3::ZERO, 2.0, Vec3::Y, COLOR), &[wide(-0.1), wide(0.1)]);
         let view = stage.view(&camera(0.03, VIEW_PX), CARVE);
-        let truth = stage.truth(&camera(0.03, VIEW_PX));
+        let truth = stage.drawn_directly(&camera(0.03, VIEW_PX));
         let both = kinds(&truth).into_iter().zip(kinds(&view)).filter(|(t, _)| *t == ProvenanceKind::Hit);
         let (covered, found) = both.fold((0, 0), |(c, f), (_, v)| (c + 1, f + usize::from(v == ProvenanceKind::Hit)));
         println!("{degrees}°: {found} of {covered} pixels");

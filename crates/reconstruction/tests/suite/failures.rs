@@ -33,7 +33,7 @@ fn few_steps_miss_thin_poles_and_the_carve_does_not() {
     let mut rows = Vec::new();
     for radius_m in [0.15, 0.08, 0.04, 0.03] {
         let stage = Stage::new(poles(radius_m), &corners.samples(4));
-        let truth = stage.truth(&corners.view());
+        let truth = stage.drawn_directly(&corners.view());
         let recalls = methods.map(|method| recall_of_poles(&truth, &stage.view(&corners.view(), method)));
         println!("{radius_m:<8} {:>8.3} {:>8.3} {:>8.3} {:>8.3}", recalls[0], recalls[1], recalls[2], recalls[3]);
         rows.push(recalls);
@@ -61,7 +61,7 @@ fn sphere() -> (Stage, PinholeCamera) {
 #[test]
 fn error_falls_with_steps_then_stays() {
     let (stage, camera) = sphere();
-    let truth = stage.truth(&camera);
+    let truth = stage.drawn_directly(&camera);
     let errors =
         [2, 4, 8, 16, 64, 256, 1024].map(|steps| (steps, depth_error(&truth, &stage.view(&camera, search(steps)))));
     for (steps, error) in errors {
@@ -80,7 +80,7 @@ fn disoccluded_pixels_are_marked() {
         .map(|a| looking(Vec3::new(9.0 * a.cos(), 1.7, 9.0 * a.sin()), Vec3::Y, 45.0, SAMPLE_PX));
     let stage = Stage::new(courtyard(), &samples);
     let above = looking(Vec3::new(0.5, 9.0, 0.5), Vec3::ZERO, 35.0, VIEW_PX);
-    let truth = stage.truth(&above);
+    let truth = stage.drawn_directly(&above);
     // The yard's floor and pillar: lower than the walls, inside them.
     let yard: Vec<usize> = (0..VIEW_PX.element_product())
         .filter(|&i| {
@@ -119,7 +119,7 @@ fn quantised(stage: &Stage, bits: u32) -> Stage {
 #[test]
 fn error_falls_with_bits_of_depth_then_stays() {
     let (stage, camera) = sphere();
-    let truth = stage.truth(&camera);
+    let truth = stage.drawn_directly(&camera);
     let whole = depth_error(&truth, &stage.view(&camera, CARVE));
     let errors =
         [6, 8, 10, 12, 14, 16].map(|bits| (bits, depth_error(&truth, &quantised(&stage, bits).view(&camera, CARVE))));
@@ -138,7 +138,7 @@ fn error_falls_with_bits_of_depth_then_stays() {
 fn the_search_needs_room_behind_a_surface() {
     let corners = Corners { eye: Vec3::Z * 4.0, target: Vec3::ZERO, half_m: 0.5 };
     let stage = Stage::new(quad(Vec3::ZERO, 1.0, Vec3::Z, [200, 60, 40]), &corners.samples(4));
-    let covered = count(&stage.truth(&corners.view()), ProvenanceKind::Hit);
+    let covered = count(&stage.drawn_directly(&corners.view()), ProvenanceKind::Hit);
     println!("margin_m  search:64  carve   of {covered} pixels");
     let rows = [0.0f32, 0.01, 0.03, 0.1, 0.3].map(|margin_m| {
         let roomy = Stage { volume: stage.volume.padded(margin_m), ..stage.clone() };

@@ -126,7 +126,7 @@ fn plane_at(degrees: f32) -> (Stage, PinholeCamera) {
 fn a_plane_is_whole_and_exact_however_steep() {
     for degrees in [0.0, 45.0, 80.0, 85.0] {
         let (stage, camera) = plane_at(degrees);
-        let truth = stage.truth(&camera);
+        let truth = stage.drawn_directly(&camera);
         for method in all_meshes() {
             let view = stage.view(&camera, method);
             let (inside, lost) = inside_and_lost(&truth, &view);
@@ -147,7 +147,7 @@ fn a_plane_is_whole_and_exact_however_steep() {
 fn a_sphere_is_near_its_reference() {
     let corners = Corners { eye: Vec3::new(0.4, 0.9, 3.6), target: Vec3::ZERO, half_m: 0.3 };
     let stage = Stage::with_corners(uv_sphere(1.0, 64), &corners.samples(4));
-    let truth = stage.truth(&corners.view());
+    let truth = stage.drawn_directly(&corners.view());
     for method in all_meshes() {
         let view = stage.view(&corners.view(), method);
         let both =
@@ -259,7 +259,7 @@ fn merging_keeps_its_bound() {
     for (name, scene, corners) in corpus() {
         let stage = Stage::with_corners(scene, &corners.samples(4));
         let set = stage.upload();
-        let truth = stage.truth(&corners.view());
+        let truth = stage.drawn_directly(&corners.view());
         let mut last = usize::MAX as u64;
         let view = reconstructor().reconstruct(&set, &[corners.view()], HYBRID, ALL_PLANES).expect("a view");
         let (inside, lost_before) = inside_and_lost(&truth, &view[0]);
@@ -284,7 +284,7 @@ fn merging_keeps_its_bound() {
 fn hybrids_hold_images_without_redundance_together() {
     for (name, scene, corners) in corpus() {
         let stage = Stage::apart(scene, &corners.samples(4));
-        let truth = stage.truth(&corners.view());
+        let truth = stage.drawn_directly(&corners.view());
         let shares = all_meshes().map(|method| {
             let view = stage.view(&corners.view(), method);
             let agreement = Agreement::of(&view, &stage.twin(&corners.view(), method));
@@ -302,7 +302,7 @@ fn hybrids_hold_images_without_redundance_together() {
 fn hybrids_cover_more_than_meshes() {
     for (name, scene, corners) in corpus() {
         let stage = Stage::with_corners(scene, &corners.samples(4));
-        let (set, truth) = (stage.upload(), stage.truth(&corners.view()));
+        let (set, truth) = (stage.upload(), stage.drawn_directly(&corners.view()));
         let cameras = [corners.view(); 16];
         let everywhere = vec![true; kinds(&truth).len()];
         let shown = |method| {
@@ -384,7 +384,7 @@ fn prints_the_cost_of_a_view() {
     let stage = Stage::with_corners(tree_terrain(30_000, 1), &samples);
     let set = stage.upload();
     let cameras = [corners.camera(0.23, -0.31, UVec2::new(320, 240)); VIEWS];
-    let truth = stage.truth(&cameras[0]);
+    let truth = stage.drawn_directly(&cameras[0]);
     for method in [MESH, HYBRID, merged(0.1), merged(0.5), merged(2.0), CARVE] {
         let cut = reconstructor().mesh_statistics(&set, method).expect("statistics").unwrap_or_default();
         let reconstruct = || reconstructor().reconstruct_measured(&set, &cameras, method, ALL_PLANES, false);

@@ -23,7 +23,7 @@ struct Faults {
 }
 
 fn faults(stage: &Stage, camera: &PinholeCamera, method: ReconstructionMethod) -> Faults {
-    let (view, truth) = (stage.view(camera, method), stage.truth(camera));
+    let (view, truth) = (stage.view(camera, method), stage.drawn_directly(camera));
     assert_sane(&view, &method.to_string());
     let classes = classify(camera, depths(&truth), &stage.images).expect("planes of one size");
     let (mut missing, mut wrong, mut covered, mut disoccluded, mut foreground) = (0, 0, 0, 0, 0);
@@ -134,7 +134,7 @@ fn an_omitted_surface_is_not_carved_away() {
     naive.images[1].passed = None;
     let aside = looking(Vec3::new(0.3, 0.0, 4.0), Vec3::Z * -2.0, 40.0, VIEW_PX);
     let kept = |stage: &Stage| {
-        let (view, truth) = (stage.view(&aside, CARVE), stage.truth(&aside));
+        let (view, truth) = (stage.view(&aside, CARVE), stage.drawn_directly(&aside));
         // The wall is the farthest.
         let wall = depths(&truth).iter().copied().filter(|&d| d > 0.0).fold(f32::MAX, f32::min);
         let poles: Vec<usize> = (0..depths(&truth).len()).filter(|&i| depths(&truth)[i] > 1.3 * wall).collect();
@@ -210,7 +210,7 @@ fn scattered_holes_leave_a_closed_wall() {
         punch(image, |x, y| usize::from(by_chance(x, y)) == number);
     }
     let camera = corners.camera(0.0, 0.0, VIEW_PX);
-    let (view, truth) = (stage.view(&camera, CARVE), stage.truth(&camera));
+    let (view, truth) = (stage.view(&camera, CARVE), stage.drawn_directly(&camera));
     assert_eq!(count(&view, ProvenanceKind::Hit), VIEW_PX.element_product() as usize);
     let off = |i: usize| (depths(&view)[i] / depths(&truth)[i] - 1.0).abs();
     let farthest = (0..depths(&view).len()).map(off).fold(0.0, f32::max);

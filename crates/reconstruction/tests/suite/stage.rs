@@ -106,7 +106,7 @@ impl Stage {
     }
 
     /// From the triangles.
-    pub fn truth(&self, camera: &PinholeCamera) -> View {
+    pub fn drawn_directly(&self, camera: &PinholeCamera) -> View {
         let scene = GpuScene::upload(&device().gpu, &self.scene).expect("a scene");
         let work = plainly_lit(&scene);
         device().renderer.draw_views(work, &[*camera], ALL_PLANES).expect("a view").remove(0)

@@ -67,7 +67,7 @@ fn tiles_start_before_every_surface() {
         let stage = Stage::new(scene, &corners.samples(4));
         let camera = corners.view();
         let starts = scalar::tile_starts_m(&stage.images, &stage.volume, &camera);
-        let truth = stage.truth(&camera);
+        let truth = stage.drawn_directly(&camera);
         let across = camera.size_px.x as usize;
         let ahead = depths(&truth).iter().enumerate().filter(|(_, inverse)| **inverse > 0.0).map(|(i, inverse)| {
             let tile = (i / across / 8) * across.div_ceil(8) + i % across / 8;

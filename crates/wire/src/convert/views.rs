@@ -1,7 +1,6 @@
 //! Requests for views.
 
-use cluster::limits::MAX_VIEWS_PER_REQUEST;
-use cluster::{LiveRequest, RenderViews, RequestedView, at_most};
+use cluster::{LiveRequest, RenderViews, RequestedView, check_view_count};
 use depth_image::ViewPlanes;
 
 use super::frames::frame_codec;
@@ -13,7 +12,7 @@ impl TryFrom<proto::RenderViewsRequest> for RenderViews {
     type Error = WireError;
 
     fn try_from(r: proto::RenderViewsRequest) -> Result<Self, WireError> {
-        at_most(r.views.len(), MAX_VIEWS_PER_REQUEST, "views")?;
+        check_view_count(r.views.len(), r.live.is_some())?;
         let request = Self {
             plan_epoch: r.plan_epoch,
             set_index: r.set_index,
