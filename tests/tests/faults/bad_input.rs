@@ -11,7 +11,7 @@ use cluster_tests::cluster::connected;
 use cluster_tests::processes::Processes;
 use cluster_tests::random::Random;
 use cluster_tests::raw;
-use cluster_tests::watcher::{Watcher, watched};
+use cluster_tests::watcher::{Watcher, watched_request};
 use depth_image::{Camera, PinholeCamera};
 use glam::{UVec2, Vec3};
 use tonic::{Code, Status};
