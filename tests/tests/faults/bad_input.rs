@@ -11,7 +11,7 @@ use cluster_tests::cluster::connected;
 use cluster_tests::processes::Processes;
 use cluster_tests::random::Random;
 use cluster_tests::raw;
-use cluster_tests::watcher::{Watcher, watched_request};
+use cluster_tests::watcher::{Watcher, watched_request as request};
 use depth_image::{Camera, PinholeCamera};
 use glam::{UVec2, Vec3};
 use tonic::{Code, Status};
@@ -93,47 +93,34 @@ fn beyond(camera: PinholeCamera) -> Vec<PinholeCamera> {
 async fn absurd_requests_are_refused_by_field() {
     let beside = Beside::start(2).await;
     let coordinator = CoordinatorClient::new(connect(&beside.cluster.coordinator.address).await.unwrap());
-    let camera = watched_request().typical_view;
+    let camera = request().typical_view;
     let huge = PinholeCamera { size_px: UVec2::splat(65_535), ..camera };
     let absurd = [
-        (SessionRequest { views_per_set: 1_000_000, ..watched_request() }, "views_per_set_count is 1000000"),
-        (SessionRequest { typical_view: huge, ..watched_request() }, "typical_view: camera size_px"),
+        (SessionRequest { views_per_set: 1_000_000, ..request() }, "views_per_set_count is 1000000"),
+        (SessionRequest { typical_view: huge, ..request() }, "typical_view: camera size_px"),
         (
-            SessionRequest { typical_view: PinholeCamera { eye_in_world: Vec3::NAN, ..camera }, ..watched_request() },
+            SessionRequest { typical_view: PinholeCamera { eye_in_world: Vec3::NAN, ..camera }, ..request() },
             "eye_in_world",
         ),
+        (SessionRequest { sample_cameras: vec![Camera::Pinhole(huge)], ..request() }, "camera.pinhole: camera size_px"),
+        (SessionRequest { sample_cameras: vec![Camera::Pinhole(camera); 17], ..request() }, "sample_cameras has 17"),
         (
-            SessionRequest { sample_cameras: vec![Camera::Pinhole(huge)], ..watched_request() },
-            "camera.pinhole: camera size_px",
-        ),
-        (
-            SessionRequest { sample_cameras: vec![Camera::Pinhole(camera); 17], ..watched_request() },
-            "sample_cameras has 17",
-        ),
-        (
-            SessionRequest { sample_size_px: Some(UVec2::splat(65_535)), ..watched_request() },
+            SessionRequest { sample_size_px: Some(UVec2::splat(65_535)), ..request() },
             "sample_image_size: camera size_px",
         ),
-        (SessionRequest { sample_size_px: Some(UVec2::ZERO), ..watched_request() }, "sample_image_size"),
-        (SessionRequest { method: String::new(), ..watched_request() }, "reconstruction_method"),
-        (SessionRequest { viewpoints: vec![camera; 257], ..watched_request() }, "viewpoints has 257"),
-        (SessionRequest { viewpoints: vec![huge], ..watched_request() }, "viewpoints: camera size_px"),
+        (SessionRequest { sample_size_px: Some(UVec2::ZERO), ..request() }, "sample_image_size"),
+        (SessionRequest { method: String::new(), ..request() }, "reconstruction_method"),
+        (SessionRequest { viewpoints: vec![camera; 257], ..request() }, "viewpoints has 257"),
+        (SessionRequest { viewpoints: vec![huge], ..request() }, "viewpoints: camera size_px"),
         (
-            SessionRequest {
-                viewpoints: vec![camera],
-                sample_cameras: vec![Camera::Pinhole(camera)],
-                ..watched_request()
-            },
+            SessionRequest { viewpoints: vec![camera], sample_cameras: vec![Camera::Pinhole(camera)], ..request() },
             "viewpoints: sample_cameras are given, too",
         ),
-        (SessionRequest { viewpoints: everywhere(camera), ..watched_request() }, "viewpoints: they are spread over"),
+        (SessionRequest { viewpoints: everywhere(camera), ..request() }, "viewpoints: they are spread over"),
+        (SessionRequest { viewpoints: beyond(camera), ..request() }, "viewpoints: camera eye_in_world is not finite"),
+        (SessionRequest { lighting: "x".repeat(300), ..request() }, "lighting has 300"),
         (
-            SessionRequest { viewpoints: beyond(camera), ..watched_request() },
-            "viewpoints: camera eye_in_world is not finite",
-        ),
-        (SessionRequest { lighting: "x".repeat(300), ..watched_request() }, "lighting has 300"),
-        (
-            SessionRequest { timeline: Timeline { step_s: 1e300, ..watched_request().timeline }, ..watched_request() },
+            SessionRequest { timeline: Timeline { step_s: 1e300, ..request().timeline }, ..request() },
             "timeline.step_s is 1",
         ),
     ];
