@@ -1,6 +1,7 @@
-//! The log of a schedule's events, one JSON line each, after a first line with the version. Replayed, it gives the same
-//! commands. Floats keep every bit (`float_roundtrip` of `serde_json`); events hold finite numbers only.
+//! The log of a schedule's events, one line of RON each, after a first line with the version. Replayed, it gives the same
+//! commands. Floats keep every bit; events hold finite numbers only.
 
+use std::collections::BTreeMap;
 use std::io::{self, BufRead, Read as _, Write};
 use std::time::Duration;
 
@@ -13,6 +14,7 @@ use super::scheduler::Scheduler;
 
 /// Logs of other versions are refused.
 const VERSION: u32 = 3;
+const VERSION_KEY: &str = "version";
 /// A line that is longer is no event.
 const MAX_LINE_BYTES: u64 = 1 << 20;
 
@@ -26,9 +28,12 @@ pub enum LogError {
     /// Longer than any event.
     #[error("line {line} has more than {MAX_LINE_BYTES} bytes")]
     TooLong { line: usize },
-    /// No JSON, or a field is missing or of another type.
+    /// The line is no event: a field is missing, unknown or of another type.
     #[error("line {line}: {source}")]
-    Json { line: usize, source: serde_json::Error },
+    Malformed { line: usize, source: ron::error::SpannedError },
+    /// The first line states no version.
+    #[error("line 1: version is missing")]
+    NoVersion,
     /// The log of another version of the program.
     #[error("line 1: version is {found}, must be {VERSION}")]
     Version { found: u32 },
@@ -49,7 +54,7 @@ impl<W: Write> Recorder<W> {
     /// # Errors
     /// Where the writer fails.
     pub fn new(mut writer: W) -> io::Result<Self> {
-        write_line(&mut writer, &Header { version: VERSION })?;
+        write_line(&mut writer, &Header::from([(VERSION_KEY.to_owned(), VERSION)]))?;
         Ok(Self { writer })
     }
 
@@ -65,9 +70,8 @@ impl<W: Write> Recorder<W> {
 
 /// Whole lines are passed on, so that a log that breaks off does so between two of them.
 fn write_line(writer: &mut impl Write, line: &impl Serialize) -> io::Result<()> {
-    let mut text = serde_json::to_vec(line)?;
-    text.push(b'\n');
-    writer.write_all(&text)?;
+    let text = ron::to_string(line).map_err(io::Error::other)?;
+    writer.write_all(format!("{text}\n").as_bytes())?;
     writer.flush()
 }
 
@@ -86,7 +90,7 @@ pub struct Step {
 /// At the first line that is no event.
 pub fn replay(mut reader: impl BufRead) -> Result<Vec<Step>, LogError> {
     let first = next_line(&mut reader, 1)?.unwrap_or_default();
-    let Header { version } = parse(&first, 1)?;
+    let version = *parse::<Header>(&first, 1)?.get(VERSION_KEY).ok_or(LogError::NoVersion)?;
     if version != VERSION {
         return Err(LogError::Version { found: version });
     }
@@ -114,13 +118,11 @@ fn next_line(reader: &mut impl BufRead, line: usize) -> Result<Option<Vec<u8>>, 
 }
 
 fn parse<'t, T: Deserialize<'t>>(text: &'t [u8], line: usize) -> Result<T, LogError> {
-    serde_json::from_slice(text).map_err(|source| LogError::Json { line, source })
+    ron::de::from_bytes(text).map_err(|source| LogError::Malformed { line, source })
 }
 
-#[derive(Serialize, Deserialize)]
-struct Header {
-    version: u32,
-}
+/// The first line: `{"version":3}`, as in all versions.
+type Header = BTreeMap<String, u32>;
 
 /// An event, and the time since the coordinator started.
 #[derive(Serialize, Deserialize)]
