@@ -197,10 +197,10 @@ async fn frames_that_are_corrupted_on_the_way_are_not_shown() {
     for proxy in &network.to_node {
         proxy.set(Way::Pass, Way::Spoilt { one_in: 40 });
     }
-    let since = Instant::now();
     tokio::time::sleep(Duration::from_secs(3)).await;
     network.to_node.iter().for_each(Proxy::heal);
-    let wait = network.watcher.healed(since, SILENT, |_| true).await;
+    // The last changed byte may be the one whose connection keepalive has to end.
+    let wait = network.watcher.healed(Instant::now(), SILENT, |_| true).await;
     network.finish("a byte of every fortieth piece changed", wait);
     network.through("as it was", Duration::from_secs(1), SILENT).await;
 }
