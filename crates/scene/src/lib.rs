@@ -12,11 +12,9 @@
 
 mod error;
 mod import;
-mod light_parts;
 mod light_rig;
 mod light_spec;
 mod limits;
-mod measure;
 mod model;
 mod package;
 pub mod procedural;
