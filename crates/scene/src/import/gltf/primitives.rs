@@ -58,18 +58,15 @@ pub(super) fn read(
 
 /// Keeps the vertices that the triangles use: primitives may share one large set.
 fn drop_unused(mesh: &mut SourceMesh) {
-    let mut is_used = vec![false; mesh.vertices.len()];
-    mesh.indices.iter().for_each(|&i| is_used[i as usize] = true);
-    let mut kept = 0u32;
-    let mut number = |&used: &bool| {
-        kept += u32::from(used);
-        kept - u32::from(used)
-    };
-    let new_number: Vec<u32> = is_used.iter().map(&mut number).collect();
-    let mut at = is_used.iter();
-    mesh.vertices.retain(|_| at.next().is_some_and(|&used| used));
-    let mut at = is_used.iter();
-    mesh.positions_in_mesh.retain(|_| at.next().is_some_and(|&used| used));
+    const UNUSED: u32 = u32::MAX;
+    let mut new_number = vec![UNUSED; mesh.vertices.len()];
+    mesh.indices.iter().for_each(|&i| new_number[i as usize] = 0);
+    let used = new_number.iter_mut().filter(|number| **number != UNUSED);
+    used.zip(0..).for_each(|(number, kept)| *number = kept);
+    let mut at = new_number.iter();
+    mesh.vertices.retain(|_| at.next() != Some(&UNUSED));
+    let mut at = new_number.iter();
+    mesh.positions_in_mesh.retain(|_| at.next() != Some(&UNUSED));
     mesh.indices.iter_mut().for_each(|i| *i = new_number[*i as usize]);
 }
 
