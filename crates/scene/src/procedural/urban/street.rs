@@ -9,8 +9,8 @@ pub(super) const SEED: u64 = 1950;
 
 pub(super) const HALF_WIDTH_M: f32 = 200.0;
 /// Number of blocks a side; each has streets on all sides.
-pub(super) const BLOCKS: u32 = 3;
-pub(super) const STREET_M: f32 = 19.0;
+const BLOCKS: u32 = 3;
+const STREET_M: f32 = 19.0;
 pub(super) const BLOCK_M: f32 = (2.0 * HALF_WIDTH_M - (BLOCKS + 1) as f32 * STREET_M) / BLOCKS as f32;
 pub(super) const KERB_M: f32 = 0.2;
 
