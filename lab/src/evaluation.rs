@@ -2,7 +2,7 @@
 
 use anyhow::Context as _;
 use depth_image::{ProvenanceKind, View};
-use metrics::{DepthPlane, PixelClass, Rgb8Image, ScoreMap, class_mask, depth_errors, flip_map, psnr_db, ssim_map};
+use metrics::{PixelClass, Rgb8Image, ScoreMap, class_mask, depth_errors, flip_map, psnr_db, ssim_map};
 use rayon::prelude::*;
 use reconstruction::ReconstructionMethod;
 
@@ -153,14 +153,14 @@ pub fn mean_flip(references: &[View], tests: &[View]) -> anyhow::Result<f64> {
 }
 
 /// The depth of a view, unknown where it was filled in.
-fn known_depth(view: &View) -> anyhow::Result<DepthPlane<'static>> {
+fn known_depth(view: &View) -> anyhow::Result<Vec<f32>> {
     let mut plane = view.inverse_depth_per_m.clone().context("a view without depth")?;
     for (inverse, provenance) in plane.iter_mut().zip(view.provenance.iter().flatten()) {
         if provenance.kind() == ProvenanceKind::Filled {
             *inverse = depth_image::HOLE_INVERSE_DEPTH;
         }
     }
-    Ok(DepthPlane::new(view.size_px.x, view.size_px.y, plane)?)
+    Ok(plane)
 }
 
 fn mean(map: &ScoreMap) -> anyhow::Result<f64> {

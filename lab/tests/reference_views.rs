@@ -106,7 +106,7 @@ fn unknown_names_are_refused_with_their_field() {
 fn a_package_loads_as_the_scene_does() {
     let (engine, _, setup, reference) = reference("unit-cube", 2);
     let package = scene::pack(&setup.scene);
-    engine.load_scene("by package", &package.bytes).unwrap();
+    engine.load_scene("by package", &package).unwrap();
     assert!(engine.has_scene("by package"));
     let work = DirectWork {
         scene_hash: "by package".to_owned(),

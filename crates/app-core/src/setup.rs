@@ -118,7 +118,7 @@ impl SceneArgs {
         let around = self.sample_cameras(&scene)?;
         let samples = self.sampling.cameras(around.clone());
         let rig = samples.iter().copied().map(Camera::Pinhole).collect();
-        let package = scene::pack(&scene).bytes.into();
+        let package = scene::pack(&scene).into();
         let mut offer = SceneOffer::new(package, rig, scene.bounds(), scene.background_linear);
         offer.origin_in_source = scene.origin_in_source;
         offer.illumination = scene.illumination.clone();

@@ -8,7 +8,7 @@ mod pairs;
 
 use std::path::Path;
 
-use metrics::{Rgb8Image, compare};
+use metrics::{PdiffSettings, Rgb8Image, flip_map, pdiff_map, psnr_db, ssim_map};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -35,7 +35,12 @@ fn write_pairs(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn print_comparison(name: &str, reference: &Rgb8Image, test: &Rgb8Image) -> Result<(), Box<dyn std::error::Error>> {
-    println!("{name} {:?}", compare(reference, test, None)?.overall);
+    let psnr_db = psnr_db(reference, test, None)?;
+    let (ssim, flip) = (ssim_map(reference, test)?.mean(None)?, flip_map(reference, test)?.mean(None)?);
+    let failing_px = pdiff_map(reference, test, PdiffSettings::default())?.failing_px(None)?;
+    println!(
+        "{name} PSNR {psnr_db:?} dB, SSIM {ssim:?}, FLIP {flip:?}, {failing_px} pixels fail the perceptual difference"
+    );
     Ok(())
 }
 

@@ -3,13 +3,11 @@
 use depth_image::{DepthImage, PinholeCamera, PixelDepth};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::{MetricsError, error::expect_len, steps::step_pixels};
 
 /// The class of a pixel of the reference: the first of these that holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PixelClass {
     /// Within 2 px of a step in the reference's inverse depth ([`crate::step_pixels`]), on either side.
     Silhouette,
@@ -19,22 +17,6 @@ pub enum PixelClass {
     Covered,
     /// No surface.
     Background,
-}
-
-impl PixelClass {
-    /// All classes, in order.
-    pub const ALL: [Self; 4] = [Self::Silhouette, Self::Disoccluded, Self::Covered, Self::Background];
-
-    /// The name in reports.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Silhouette => "silhouette",
-            Self::Disoccluded => "disoccluded",
-            Self::Covered => "covered",
-            Self::Background => "background",
-        }
-    }
 }
 
 /// The tolerance of a point to a sample's depth, in units of `z / f`: three texel footprints…
@@ -99,45 +81,6 @@ pub fn class_mask(classes: &[PixelClass], class: PixelClass) -> Vec<bool> {
     classes.iter().map(|&one| one == class).collect()
 }
 
-/// The share of disoccluded pixels over all pixels with a surface, silhouettes included; `None` where there is no
-/// surface.
-///
-/// # Errors
-/// Planes differ in size.
-pub fn disocclusion_rate(classes: &[PixelClass], reference_inverse_depth: &[f32]) -> Result<Option<f64>, MetricsError> {
-    expect_len("classes", classes.len(), reference_inverse_depth.len())?;
-    let foreground = reference_inverse_depth.iter().filter(|&&depth| depth > 0.0).count();
-    let disoccluded = ClassCounts::of(classes).disoccluded;
-    Ok((foreground > 0).then(|| disoccluded as f64 / foreground as f64))
-}
-
-/// The number of pixels of each class.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct ClassCounts {
-    /// [`PixelClass::Silhouette`].
-    pub silhouette: usize,
-    /// [`PixelClass::Disoccluded`].
-    pub disoccluded: usize,
-    /// [`PixelClass::Covered`].
-    pub covered: usize,
-    /// [`PixelClass::Background`].
-    pub background: usize,
-}
-
-impl ClassCounts {
-    /// Counts the pixels of each class.
-    #[must_use]
-    pub fn of(classes: &[PixelClass]) -> Self {
-        let count = |class| classes.iter().filter(|&&one| one == class).count();
-        Self {
-            silhouette: count(PixelClass::Silhouette),
-            disoccluded: count(PixelClass::Disoccluded),
-            covered: count(PixelClass::Covered),
-            background: count(PixelClass::Background),
-        }
-    }
-}
-
 fn surface_point(camera: &PinholeCamera, index: usize, inverse_depth: f32) -> Vec3 {
     let width = camera.size_px.x as usize;
     let pixel = Vec2::new((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
@@ -145,10 +88,8 @@ fn surface_point(camera: &PinholeCamera, index: usize, inverse_depth: f32) -> Ve
 }
 
 fn surface_class(point_in_world: Vec3, sample_images: &[DepthImage]) -> PixelClass {
-    match sample_images.iter().any(|image| matches_sample(image, point_in_world)) {
-        true => PixelClass::Covered,
-        false => PixelClass::Disoccluded,
-    }
+    let is_held = sample_images.iter().any(|image| matches_sample(image, point_in_world));
+    if is_held { PixelClass::Covered } else { PixelClass::Disoccluded }
 }
 
 fn matches_sample(image: &DepthImage, point_in_world: Vec3) -> bool {
@@ -201,24 +142,27 @@ mod tests {
         }
     }
 
+    fn count(classes: &[PixelClass], class: PixelClass) -> usize {
+        classes.iter().filter(|&&one| one == class).count()
+    }
+
     #[test]
     fn classes_partition_all_pixels_and_all_occur() {
         let (camera, depth) = card_before_wall(0.0);
         let classes = classify(&camera, &depth, &[sample(0.4)]).unwrap();
-        let counts = ClassCounts::of(&classes);
-        assert_eq!(counts.silhouette + counts.disoccluded + counts.covered + counts.background, camera.pixel_count());
-        let masks = PixelClass::ALL.map(|class| class_mask(&classes, class));
+        assert_eq!(classes.len(), camera.pixel_count());
+        let all = [PixelClass::Silhouette, PixelClass::Disoccluded, PixelClass::Covered, PixelClass::Background];
+        let masks = all.map(|class| class_mask(&classes, class));
         assert!((0..classes.len()).all(|index| masks.iter().filter(|mask| mask[index]).count() == 1));
-        assert!(
-            [counts.silhouette, counts.disoccluded, counts.covered, counts.background].iter().all(|&count| count > 100)
-        );
+        assert!(all.iter().all(|&class| count(&classes, class) > 100));
     }
 
     #[test]
     fn a_camera_covers_all_that_it_sees() {
         let (camera, depth) = card_before_wall(0.0);
         let classes = classify(&camera, &depth, &[sample(0.0)]).unwrap();
-        assert_eq!(disocclusion_rate(&classes, &depth).unwrap(), Some(0.0));
+        assert_eq!(count(&classes, PixelClass::Disoccluded), 0);
+        assert_eq!(unheld_rate(&camera, &depth, &[sample(0.0)]).unwrap(), Some(0.0));
     }
 
     #[test]
@@ -228,7 +172,7 @@ mod tests {
         // The card's shadow on the wall moves by 0.4 m of 4 m: 0.4 · f / 4 columns of the view, less the silhouette.
         let columns = 0.4 * camera.focal_px.x / 4.0;
         let rows = 0.8 * camera.focal_px.y / 2.0;
-        let disoccluded = ClassCounts::of(&classes).disoccluded as f32;
+        let disoccluded = count(&classes, PixelClass::Disoccluded) as f32;
         assert!((disoccluded / ((columns - 2.0) * rows) - 1.0).abs() < 0.1, "{disoccluded}");
         let surfaces = depth.iter().filter(|&&depth| depth > 0.0).count() as f64;
         let unheld = unheld_rate(&camera, &depth, &[sample(0.4)]).unwrap().unwrap() * surfaces;
@@ -238,13 +182,14 @@ mod tests {
     #[test]
     fn with_no_samples_everything_is_disoccluded() {
         let (camera, depth) = card_before_wall(0.0);
-        assert_eq!(ClassCounts::of(&classify(&camera, &depth, &[]).unwrap()).covered, 0);
+        assert_eq!(count(&classify(&camera, &depth, &[]).unwrap(), PixelClass::Covered), 0);
     }
 
     #[test]
     fn an_empty_view_has_no_rate() {
-        assert_eq!(disocclusion_rate(&[PixelClass::Background], &[0.0]).unwrap(), None);
-        assert!(disocclusion_rate(&[], &[0.0]).is_err());
+        let (camera, depth) = card_before_wall(0.0);
+        assert_eq!(unheld_rate(&camera, &vec![0.0; depth.len()], &[]).unwrap(), None);
+        assert!(unheld_rate(&camera, &[0.0], &[]).is_err());
     }
 
     #[test]

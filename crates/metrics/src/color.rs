@@ -1,7 +1,6 @@
 //! Colour spaces of the perceptual metrics: linear Rec. 709 RGB, CIE XYZ relative to D65, CIE L*a*b*, and
 //! the linearised YCxCz that FLIP filters in.
 
-use depth_image::linear_from_srgb8;
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::Rgb8Image;
@@ -68,11 +67,6 @@ pub(crate) fn lab_from_relative_xyz(xyz: Vec3) -> Vec3 {
 pub(crate) fn convert_pixels<T>(image: &Rgb8Image, curve: impl Fn(u8) -> f32, convert: impl Fn(Vec3) -> T) -> Vec<T> {
     let table: Vec<f32> = (0..=255).map(curve).collect();
     image.pixels().map(|rgb| convert(Vec3::from(rgb.map(|channel| table[usize::from(channel)])))).collect()
-}
-
-/// Every pixel in linear sRGB, then through `convert`.
-pub(crate) fn convert_srgb_pixels<T>(image: &Rgb8Image, convert: impl Fn(Vec3) -> T) -> Vec<T> {
-    convert_pixels(image, linear_from_srgb8, convert)
 }
 
 #[cfg(test)]

@@ -57,16 +57,11 @@ impl Plane {
         values.par_chunks_exact_mut(self.width).enumerate().for_each(|(y, out)| {
             for (weight, offset) in kernel.iter().zip(-radius..) {
                 let from = edge.index(y as isize + offset, height) * self.width;
-                add_scaled(out, &self.values[from..from + self.width], *weight);
+                let row = &self.values[from..from + self.width];
+                out.iter_mut().zip(row).for_each(|(value, neighbour)| *value += weight * neighbour);
             }
         });
         Self { width: self.width, values }
-    }
-}
-
-fn add_scaled(out: &mut [f32], row: &[f32], weight: f32) {
-    for (value, neighbour) in out.iter_mut().zip(row) {
-        *value += weight * neighbour;
     }
 }
 

@@ -1,14 +1,12 @@
 //! Errors of reconstructed depth, and the rate of pixels without an answer.
 
-use serde::Serialize;
-
-use crate::{DepthPlane, MetricsError, error::expect_mask};
+use crate::{MetricsError, error::expect_len, error::expect_mask};
 
 /// The relative depth error above which a hit is wrong.
 pub const WRONG_HIT_RELATIVE: f64 = 0.01;
 
 /// Errors of planar depth. In the test plane, above 0 is a HIT, 0 a MISS, below 0 (and NaN) UNKNOWN.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct DepthErrors {
     /// The number of pixels compared.
     pub pixels: usize,
@@ -36,20 +34,14 @@ pub struct DepthErrors {
     pub relative_max: Option<f64>,
 }
 
-/// Compares planes of inverse planar depth of one camera, over all pixels or those of a mask.
+/// Compares planes of inverse planar depth, per metre, of one camera, over all pixels or those of a mask.
 ///
 /// # Errors
 /// Planes or mask differ in size.
-pub fn depth_errors(
-    reference: &DepthPlane,
-    test: &DepthPlane,
-    mask: Option<&[bool]>,
-) -> Result<DepthErrors, MetricsError> {
-    if reference.size_px() != test.size_px() {
-        return Err(MetricsError::SizesDiffer { reference_px: reference.size_px(), test_px: test.size_px() });
-    }
-    expect_mask(mask, reference.inverse_depth_per_m().len())?;
-    let pairs = reference.inverse_depth_per_m().iter().zip(test.inverse_depth_per_m()).enumerate();
+pub fn depth_errors(reference: &[f32], test: &[f32], mask: Option<&[bool]>) -> Result<DepthErrors, MetricsError> {
+    expect_len("test depth", test.len(), reference.len())?;
+    expect_mask(mask, reference.len())?;
+    let pairs = reference.iter().zip(test).enumerate();
     let mut tally = Tally::default();
     for (_, (&reference, &test)) in pairs.filter(|(index, _)| mask.is_none_or(|mask| mask[*index])) {
         tally.add(reference, test);
@@ -111,14 +103,10 @@ fn percentile(sorted: &[f64], share: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn plane(values: &[f32]) -> DepthPlane<'_> {
-        DepthPlane::new(values.len() as u32, 1, values).unwrap()
-    }
-
     #[test]
     fn every_outcome_is_counted_once() {
-        let reference = plane(&[0.5, 0.5, 0.5, 0.5, 0.0, 0.0, 0.0]);
-        let test = plane(&[0.5, 0.4, 0.0, -1.0, 0.3, 0.0, f32::NAN]);
+        let reference = [0.5, 0.5, 0.5, 0.5, 0.0, 0.0, 0.0];
+        let test = [0.5, 0.4, 0.0, -1.0, 0.3, 0.0, f32::NAN];
         let errors = depth_errors(&reference, &test, None).unwrap();
         assert_eq!((errors.pixels, errors.foreground_px), (7, 4));
         assert_eq!((errors.hit_px, errors.miss_px, errors.unknown_px), (3, 2, 2));
@@ -129,7 +117,7 @@ mod tests {
     #[test]
     fn percentiles_of_a_ramp() {
         let test: Vec<f32> = (1..=100).map(|i| 1.0 / (1.0 + i as f32 * 1e-3)).collect();
-        let errors = depth_errors(&plane(&[1.0; 100]), &plane(&test), None).unwrap();
+        let errors = depth_errors(&[1.0; 100], &test, None).unwrap();
         assert!((errors.relative_p50.unwrap() - 0.050).abs() < 1e-6);
         assert!((errors.relative_p95.unwrap() - 0.095).abs() < 1e-6);
         assert_eq!(errors.wrong_hit_px, 90, "those of more than 1 %, the tenth being on the bound or beside it");
@@ -137,7 +125,7 @@ mod tests {
 
     #[test]
     fn identical_has_no_error_and_an_empty_mask_no_rates() {
-        let depth = plane(&[0.5, 0.0]);
+        let depth = [0.5, 0.0];
         let errors = depth_errors(&depth, &depth, None).unwrap();
         assert_eq!((errors.wrong_hit_rate, errors.relative_max), (Some(0.0), Some(0.0)));
         let none = depth_errors(&depth, &depth, Some(&[false, false])).unwrap();
@@ -146,7 +134,7 @@ mod tests {
 
     #[test]
     fn sizes_must_agree() {
-        assert!(depth_errors(&plane(&[0.5]), &plane(&[0.5, 0.5]), None).is_err());
-        assert!(depth_errors(&plane(&[0.5]), &plane(&[0.5]), Some(&[])).is_err());
+        assert!(depth_errors(&[0.5], &[0.5, 0.5], None).is_err());
+        assert!(depth_errors(&[0.5], &[0.5], Some(&[])).is_err());
     }
 }

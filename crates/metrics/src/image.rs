@@ -1,4 +1,4 @@
-//! Images and depth planes to compare: borrowed or owned, of a size that is checked.
+//! Images to compare: borrowed or owned, of a size that is checked.
 
 use std::borrow::Cow;
 
@@ -36,26 +36,10 @@ impl<'a> Rgb8Image<'a> {
         Self::new(view.size_px.x, view.size_px.y, view.srgb8.as_slice())
     }
 
-    /// Drops the alpha of four bytes a pixel.
-    ///
-    /// # Errors
-    /// A side of 0, or a length other than width × height × 4.
-    pub fn from_rgba8(width_px: u32, height_px: u32, rgba8: &[u8]) -> Result<Rgb8Image<'static>, MetricsError> {
-        expect_len("image", rgba8.len(), width_px as usize * height_px as usize * 4)?;
-        let srgb8: Vec<u8> = rgba8.chunks_exact(4).flat_map(|rgba| [rgba[0], rgba[1], rgba[2]]).collect();
-        Rgb8Image::new(width_px, height_px, srgb8)
-    }
-
     /// Columns.
     #[must_use]
     pub fn width_px(&self) -> u32 {
         self.width_px
-    }
-
-    /// Rows.
-    #[must_use]
-    pub fn height_px(&self) -> u32 {
-        self.height_px
     }
 
     /// Columns and rows.
@@ -90,46 +74,6 @@ impl<'a> Rgb8Image<'a> {
     }
 }
 
-/// A plane of inverse planar depth, per metre: above 0 a surface, 0 background, below 0 (and NaN) no
-/// sample, as in [`depth_image::DepthImage`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct DepthPlane<'a> {
-    width_px: u32,
-    height_px: u32,
-    inverse_depth_per_m: Cow<'a, [f32]>,
-}
-
-impl<'a> DepthPlane<'a> {
-    /// Wraps inverse depths, borrowed or owned.
-    ///
-    /// # Errors
-    /// A side of 0, or a length other than width × height.
-    pub fn new(
-        width_px: u32,
-        height_px: u32,
-        inverse_depth_per_m: impl Into<Cow<'a, [f32]>>,
-    ) -> Result<Self, MetricsError> {
-        let inverse_depth_per_m = inverse_depth_per_m.into();
-        if width_px == 0 || height_px == 0 {
-            return Err(MetricsError::Empty { what: "depth plane" });
-        }
-        expect_len("depth plane", inverse_depth_per_m.len(), width_px as usize * height_px as usize)?;
-        Ok(Self { width_px, height_px, inverse_depth_per_m })
-    }
-
-    /// Columns and rows.
-    #[must_use]
-    pub fn size_px(&self) -> (u32, u32) {
-        (self.width_px, self.height_px)
-    }
-
-    /// One value a pixel, row by row.
-    #[must_use]
-    pub fn inverse_depth_per_m(&self) -> &[f32] {
-        &self.inverse_depth_per_m
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,14 +83,5 @@ mod tests {
         assert_eq!(Rgb8Image::new(0, 3, vec![]).unwrap_err(), MetricsError::Empty { what: "image" });
         let short = Rgb8Image::new(2, 2, vec![0; 11]).unwrap_err();
         assert_eq!(short, MetricsError::BufferSize { what: "image", len: 11, expected: 12 });
-        assert!(Rgb8Image::from_rgba8(2, 2, &[0; 15]).is_err());
-        assert!(DepthPlane::new(2, 2, vec![0.0; 5]).is_err());
-        assert!(DepthPlane::new(2, 0, vec![]).is_err());
-    }
-
-    #[test]
-    fn alpha_is_dropped() {
-        let image = Rgb8Image::from_rgba8(2, 1, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
-        assert_eq!(image.srgb8(), [1, 2, 3, 5, 6, 7]);
     }
 }

@@ -1,8 +1,7 @@
 //! Image, depth and visibility error.
 //!
 //! All numbers of charts and checks are made here, from 8-bit sRGB images and planes of inverse depth. Each image
-//! metric gives a map first and a mean second, so that it can be split by [`PixelClass`]. [`compare`] does that for all
-//! metrics at once.
+//! metric gives a map first and a mean second, so that it can be split by [`PixelClass`].
 //!
 //! | metric | what it is | agrees with |
 //! |---|---|---|
@@ -18,30 +17,24 @@
 
 mod classes;
 mod color;
-mod compare;
 mod convolution;
 mod depth_error;
 mod error;
 mod flip;
-mod held;
 mod image;
 mod pdiff;
 mod psnr;
 mod score_map;
 mod ssim;
 mod steps;
-mod temporal;
 
-pub use classes::{ClassCounts, PixelClass, class_mask, classify, disocclusion_rate, unheld_rate};
-pub use compare::{ClassErrors, Comparison, ImageErrors, PSNR_CAP_DB, compare};
+pub use classes::{PixelClass, class_mask, classify, unheld_rate};
 pub use depth_error::{DepthErrors, WRONG_HIT_RELATIVE, depth_errors};
 pub use error::MetricsError;
 pub use flip::{FLIP_PIXELS_PER_DEGREE, flip_map, flip_map_at};
-pub use held::{Held, HeldSample, held_samples};
-pub use image::{DepthPlane, Rgb8Image};
+pub use image::Rgb8Image;
 pub use pdiff::{PdiffMap, PdiffPrimaries, PdiffSettings, pdiff_map};
-pub use psnr::{max_channel_difference, mean_squared_error, psnr_db};
+pub use psnr::{PSNR_CAP_DB, psnr_db, temporal_psnr_db};
 pub use score_map::ScoreMap;
 pub use ssim::{SSIM_WINDOW_PX, ssim_map};
 pub use steps::{STEP_RELATIVE, step_pixels};
-pub use temporal::temporal_psnr_db;

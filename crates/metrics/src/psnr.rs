@@ -1,6 +1,10 @@
-//! Peak signal-to-noise ratio on 8-bit sRGB.
+//! Peak signal-to-noise ratio on 8-bit sRGB, of images and of their change from frame to frame.
 
 use crate::{MetricsError, Rgb8Image, error::expect_mask};
+
+/// The PSNR of equal images in reports: JSON has no infinity. A value above is written as this one, which reads "at
+/// least".
+pub const PSNR_CAP_DB: f64 = 99.99;
 
 /// Peak signal-to-noise ratio over all three channels, decibels; infinite where nothing differs, `None`
 /// for an empty mask.
@@ -8,58 +12,42 @@ use crate::{MetricsError, Rgb8Image, error::expect_mask};
 /// # Errors
 /// Images or mask differ in size.
 pub fn psnr_db(reference: &Rgb8Image, test: &Rgb8Image, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
-    Ok(mean_squared_error(reference, test, mask)?.map(db_from_mean_squared_error))
+    reference.expect_same_size(test)?;
+    expect_mask(mask, reference.pixel_count())?;
+    let pairs = reference.pixels().zip(test.pixels()).enumerate();
+    let selected = pairs.filter(|(index, _)| mask.is_none_or(|mask| mask[*index]));
+    let (sum, pixels) = selected
+        .fold((0_u64, 0_u64), |(sum, pixels), (_, (a, b))| (sum + u64::from(squared_distance(a, b)), pixels + 1));
+    Ok((pixels > 0).then(|| db_from_mean_squared_error(sum as f64 / (3 * pixels) as f64)))
 }
 
-/// The mean over pixels and channels of the squared difference in 8-bit steps; `None` for an empty mask.
+/// Flicker: PSNR of `test[1] - test[0]` against `reference[1] - reference[0]`, decibels, with a peak of 255; infinite
+/// where both change alike.
 ///
 /// # Errors
-/// Images or mask differ in size.
-pub fn mean_squared_error(
-    reference: &Rgb8Image,
-    test: &Rgb8Image,
-    mask: Option<&[bool]>,
-) -> Result<Option<f64>, MetricsError> {
-    let (sum, pixels) = differences(reference, test, mask)?
-        .fold((0_u64, 0_u64), |(sum, pixels), delta| (sum + u64::from(squared_length(delta)), pixels + 1));
-    Ok((pixels > 0).then(|| sum as f64 / (3 * pixels) as f64))
-}
-
-/// The greatest difference in any channel, in 8-bit steps; `None` for an empty mask.
-///
-/// # Errors
-/// Images or mask differ in size.
-pub fn max_channel_difference(
-    reference: &Rgb8Image,
-    test: &Rgb8Image,
-    mask: Option<&[bool]>,
-) -> Result<Option<u8>, MetricsError> {
-    Ok(differences(reference, test, mask)?.flatten().max())
+/// Images differ in size.
+pub fn temporal_psnr_db(reference: [&Rgb8Image; 2], test: [&Rgb8Image; 2]) -> Result<f64, MetricsError> {
+    for image in [reference[1], test[0], test[1]] {
+        reference[0].expect_same_size(image)?;
+    }
+    let changes = |frames: [&Rgb8Image; 2], index: usize| {
+        i64::from(frames[1].srgb8()[index]) - i64::from(frames[0].srgb8()[index])
+    };
+    let bytes = reference[0].srgb8().len();
+    let squares: i64 = (0..bytes).map(|index| (changes(test, index) - changes(reference, index)).pow(2)).sum();
+    Ok(db_from_mean_squared_error(squares as f64 / bytes as f64))
 }
 
 /// 10 · log10(255² / MSE).
-pub(crate) fn db_from_mean_squared_error(mean_squared_error: f64) -> f64 {
+fn db_from_mean_squared_error(mean_squared_error: f64) -> f64 {
     match mean_squared_error > 0.0 {
         true => 10.0 * (255.0 * 255.0 / mean_squared_error).log10(),
         false => f64::INFINITY,
     }
 }
 
-/// Channel by channel differences of the selected pixels.
-fn differences<'a>(
-    reference: &'a Rgb8Image,
-    test: &'a Rgb8Image,
-    mask: Option<&'a [bool]>,
-) -> Result<impl Iterator<Item = [u8; 3]> + 'a, MetricsError> {
-    reference.expect_same_size(test)?;
-    expect_mask(mask, reference.pixel_count())?;
-    let pairs = reference.pixels().zip(test.pixels()).enumerate();
-    let selected = pairs.filter(move |(index, _)| mask.is_none_or(|mask| mask[*index]));
-    Ok(selected.map(|(_, (a, b))| std::array::from_fn(|channel| a[channel].abs_diff(b[channel]))))
-}
-
-fn squared_length(delta: [u8; 3]) -> u32 {
-    delta.iter().map(|&d| u32::from(d).pow(2)).sum()
+fn squared_distance(a: [u8; 3], b: [u8; 3]) -> u32 {
+    a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(b)).pow(2)).sum()
 }
 
 #[cfg(test)]
@@ -75,7 +63,6 @@ mod tests {
         let expected = 20.0 * (255.0_f64 / 5.0).log10();
         let psnr = psnr_db(&flat(100), &flat(105), None).unwrap().unwrap();
         assert!((psnr - expected).abs() < 1e-12);
-        assert_eq!(max_channel_difference(&flat(100), &flat(95), None).unwrap(), Some(5));
     }
 
     #[test]
@@ -91,8 +78,8 @@ mod tests {
         let test = Rgb8Image::new(4, 3, bytes).unwrap();
         let mut first = [false; 12];
         first[0] = true;
-        let error = mean_squared_error(&flat(50), &test, Some(&first)).unwrap().unwrap();
-        assert!((error - 100.0 / 3.0).abs() < 1e-12);
+        let psnr = psnr_db(&flat(50), &test, Some(&first)).unwrap().unwrap();
+        assert!((psnr - 10.0 * (255.0_f64.powi(2) * 3.0 / 100.0).log10()).abs() < 1e-12);
     }
 
     #[test]
@@ -100,5 +87,17 @@ mod tests {
         let other = Rgb8Image::new(3, 4, vec![0; 36]).unwrap();
         assert!(matches!(psnr_db(&flat(0), &other, None), Err(MetricsError::SizesDiffer { .. })));
         assert!(matches!(psnr_db(&flat(0), &flat(0), Some(&[true])), Err(MetricsError::BufferSize { .. })));
+    }
+
+    #[test]
+    fn a_constant_error_does_not_flicker() {
+        let psnr = temporal_psnr_db([&flat(10), &flat(90)], [&flat(30), &flat(110)]).unwrap();
+        assert_eq!(psnr, f64::INFINITY);
+    }
+
+    #[test]
+    fn flicker_of_a_step_is_48_db() {
+        let psnr = temporal_psnr_db([&flat(10), &flat(10)], [&flat(10), &flat(11)]).unwrap();
+        assert!((psnr - 20.0 * 255.0_f64.log10()).abs() < 1e-12);
     }
 }

@@ -6,31 +6,17 @@ use crate::{MetricsError, error::expect_mask};
 /// pixels hold 0 and are in no mean.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoreMap {
-    pub(crate) width_px: u32,
-    pub(crate) height_px: u32,
-    pub(crate) border_px: u32,
-    pub(crate) values: Vec<f32>,
+    /// Columns.
+    pub width_px: u32,
+    /// Rows.
+    pub height_px: u32,
+    /// The number of pixels at each edge without a value.
+    pub border_px: u32,
+    /// One value a pixel, row by row.
+    pub values: Vec<f32>,
 }
 
 impl ScoreMap {
-    /// Columns and rows.
-    #[must_use]
-    pub fn size_px(&self) -> (u32, u32) {
-        (self.width_px, self.height_px)
-    }
-
-    /// The number of pixels at each edge without a value.
-    #[must_use]
-    pub fn border_px(&self) -> u32 {
-        self.border_px
-    }
-
-    /// One value a pixel, row by row.
-    #[must_use]
-    pub fn values(&self) -> &[f32] {
-        &self.values
-    }
-
     /// The mean over all pixels with a value, or over those in the mask; `None` without such pixels.
     ///
     /// # Errors

@@ -33,40 +33,29 @@ pub fn ssim_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, Met
     Ok(ScoreMap { width_px, height_px, border_px: RADIUS as u32, values })
 }
 
-/// The first and second moments of a window, times its samples.
+/// The first and second moments of a window, times its samples: `a`, `b`, `aa`, `bb`, `ab`.
 #[derive(Clone, Copy, Default)]
-struct Sums {
-    a: i64,
-    b: i64,
-    aa: i64,
-    bb: i64,
-    ab: i64,
-}
+struct Sums([i64; 5]);
 
 impl Sums {
     fn of(a: u8, b: u8) -> Self {
         let (a, b) = (i64::from(a), i64::from(b));
-        Self { a, b, aa: a * a, bb: b * b, ab: a * b }
+        Self([a, b, a * a, b * b, a * b])
     }
 
     fn plus(self, other: Self, sign: i64) -> Self {
-        Self {
-            a: self.a + sign * other.a,
-            b: self.b + sign * other.b,
-            aa: self.aa + sign * other.aa,
-            bb: self.bb + sign * other.bb,
-            ab: self.ab + sign * other.ab,
-        }
+        Self(std::array::from_fn(|moment| self.0[moment] + sign * other.0[moment]))
     }
 
     fn similarity(self) -> f64 {
-        let (mean_a, mean_b) = (self.a as f64 / SAMPLES, self.b as f64 / SAMPLES);
+        let Self([a, b, aa, bb, ab]) = self;
+        let (mean_a, mean_b) = (a as f64 / SAMPLES, b as f64 / SAMPLES);
         let covariance = |product: i64, x: i64, y: i64| {
             (SAMPLES * product as f64 - x as f64 * y as f64) / (SAMPLES * (SAMPLES - 1.0))
         };
-        let variances = covariance(self.aa, self.a, self.a) + covariance(self.bb, self.b, self.b);
+        let variances = covariance(aa, a, a) + covariance(bb, b, b);
         let luminance = (2.0 * mean_a * mean_b + C1) / (mean_a * mean_a + mean_b * mean_b + C1);
-        luminance * (2.0 * covariance(self.ab, self.a, self.b) + C2) / (variances + C2)
+        luminance * (2.0 * covariance(ab, a, b) + C2) / (variances + C2)
     }
 }
 

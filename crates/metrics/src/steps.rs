@@ -45,13 +45,8 @@ impl Line {
     /// True if there is a step between positions `at` and `at + 1`.
     fn steps_after(self, inverse_depth: &[f32], at: isize) -> bool {
         let [before, a, b, after] = [-1, 0, 1, 2].map(|offset| self.surface(inverse_depth, at + offset));
-        match (a, b) {
-            (Some(a), Some(b)) => {
-                jump_is_step(b - a, before.map(|before| a - before), after.map(|after| after - b), a.max(b))
-            }
-            (None, None) => false,
-            _ => true,
-        }
+        let (Some(a), Some(b)) = (a, b) else { return a.is_some() != b.is_some() };
+        jump_is_step(b - a, before.map(|before| a - before), after.map(|after| after - b), a.max(b))
     }
 }
 

@@ -43,11 +43,7 @@ fn inspect(spec: &SceneSpec) {
     let package = pack(&scene);
     let packed = start.elapsed();
     let start = Instant::now();
-    let is_same = unpack(&package.bytes, &limits).is_ok_and(|unpacked| unpacked == scene);
-    println!(
-        "  {} bytes packed in {packed:.1?}, unpacked in {:.1?}, same: {is_same}",
-        package.bytes.len(),
-        start.elapsed()
-    );
-    println!("  {}", package.hash);
+    let is_same = unpack(&package, &limits).is_ok_and(|unpacked| unpacked == scene);
+    println!("  {} bytes packed in {packed:.1?}, unpacked in {:.1?}, same: {is_same}", package.len(), start.elapsed());
+    println!("  {}", blake3::hash(&package).to_hex());
 }

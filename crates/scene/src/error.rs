@@ -43,7 +43,7 @@ pub enum SceneErrorKind {
 #[derive(Debug)]
 pub(crate) struct Fault {
     element: String,
-    kind: SceneErrorKind,
+    pub(crate) kind: SceneErrorKind,
 }
 
 impl Fault {
@@ -69,10 +69,6 @@ impl Fault {
 
     pub(crate) fn io(element: impl fmt::Display, error: std::io::Error) -> Self {
         Self::new(element, SceneErrorKind::Io(error))
-    }
-
-    pub(crate) fn kind(&self) -> &SceneErrorKind {
-        &self.kind
     }
 
     pub(crate) fn in_file(self, file: impl Into<String>) -> SceneError {

@@ -1,5 +1,5 @@
 //! Scenes: triangles, materials, lights and wind; import of glTF, OBJ and PLY; procedural scenes;
-//! content-hashed packages.
+//! packages for the transfer between nodes.
 //!
 //! World space is right-handed, in metres, +Y up (glTF). Positions are `f32` around
 //! [`Scene::origin_in_source`], so that geometry in national-grid coordinates loses no precision.
@@ -12,11 +12,9 @@
 
 mod error;
 mod import;
-mod light_parts;
 mod light_rig;
 mod light_spec;
 mod limits;
-mod measure;
 mod model;
 mod package;
 pub mod procedural;
@@ -29,6 +27,6 @@ pub use import::load_file;
 pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorKind};
 pub use limits::Limits;
 pub use model::*;
-pub use package::{Package, PackageStore, SceneHash, SceneHashError, pack, unpack};
+pub use package::{pack, unpack};
 pub use spec::{BUILT_IN_NAMES, SceneSpec, SceneSpecError};
 pub use validate::MAX_COORDINATE_M;

@@ -1,8 +1,7 @@
-//! Default lights, replaced lights, and scenes without lighting.
+//! Default lights, replaced lights, and the common parts of all kinds of lights.
 
 use glam::Vec3;
 
-use crate::light_parts::{color, position_mut};
 use crate::{Environment, Illumination, Light, Scene};
 
 /// Angular radius of default suns: 2°, so that soft shadows are visible. The real sun's 0.27° blurs a shadow's edge by
@@ -19,7 +18,7 @@ impl Scene {
     #[must_use]
     pub fn has_light(&self) -> bool {
         let Illumination { lights, environment } = &self.illumination;
-        *environment != Environment::default() || lights.iter().any(|light| color(light) != Vec3::ZERO)
+        *environment != Environment::default() || lights.iter().any(|light| color(*light) != Vec3::ZERO)
     }
 
     /// Adds a sun over the viewer's left shoulder and a pale sky to a scene without light. A scene that [has
@@ -52,11 +51,29 @@ impl Scene {
         self.illumination.environment = environment.unwrap_or(self.illumination.environment);
         self
     }
+}
 
-    /// Makes every surface unlit, for scans whose vertex colours contain the light already.
-    #[must_use]
-    pub fn with_unlit_materials(mut self) -> Self {
-        self.materials.iter_mut().for_each(|m| m.unlit = true);
-        self
+/// The strength of a light, in the unit of its kind.
+pub(crate) fn color_mut(light: &mut Light) -> &mut Vec3 {
+    match light {
+        Light::Directional { irradiance_linear: color, .. }
+        | Light::Point { intensity_linear: color, .. }
+        | Light::Spot { intensity_linear: color, .. }
+        | Light::Rectangle { radiance_linear: color, .. } => color,
+    }
+}
+
+/// See [`color_mut`].
+pub(crate) fn color(mut light: Light) -> Vec3 {
+    *color_mut(&mut light)
+}
+
+/// Position of a light; `None` for parallel light.
+pub(crate) fn position_mut(light: &mut Light) -> Option<&mut Vec3> {
+    match light {
+        Light::Directional { .. } => None,
+        Light::Point { position_in_world: position, .. }
+        | Light::Spot { position_in_world: position, .. }
+        | Light::Rectangle { center_in_world: position, .. } => Some(position),
     }
 }

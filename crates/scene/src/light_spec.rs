@@ -174,9 +174,8 @@ impl<'a> Fields<'a> {
         if (vector.length_squared() - 1.0).abs() < UNIT_TOLERANCE {
             return Ok(vector.as_vec3());
         }
-        let unit =
-            vector.try_normalize().ok_or_else(|| wrong(name, LightSpecErrorKind::Invalid("it has no length")))?;
-        Ok(unit.as_vec3())
+        let no_length = || wrong(name, LightSpecErrorKind::Invalid("it has no length"));
+        vector.try_normalize().map(|unit| unit.as_vec3()).ok_or_else(no_length)
     }
 
     fn color(&self, name: &str) -> Result<Vec3, LightSpecError> {
@@ -244,12 +243,12 @@ fn invalid(error: &LightError) -> LightSpecError {
 impl fmt::Display for LightSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
-            Light::Directional { towards_light_in_world: towards, irradiance_linear, angular_radius_rad } => {
-                let angle = Degrees(angular_radius_rad);
-                write!(f, "sun towards={} irradiance={} angle={angle}", Triple(towards), Color(irradiance_linear))
+            Light::Directional { towards_light_in_world, irradiance_linear, angular_radius_rad } => {
+                let (towards, irradiance) = (triple(towards_light_in_world), color_text(irradiance_linear));
+                write!(f, "sun towards={towards} irradiance={irradiance} angle={}", degrees(angular_radius_rad))
             }
             Light::Point { position_in_world, intensity_linear, radius_m } => {
-                let (at, intensity) = (Triple(position_in_world), Color(intensity_linear));
+                let (at, intensity) = (triple(position_in_world), color_text(intensity_linear));
                 write!(f, "point at={at} intensity={intensity} radius={radius_m}")
             }
             Light::Spot {
@@ -260,13 +259,13 @@ impl fmt::Display for LightSpec {
                 outer_cone_rad,
                 radius_m,
             } => {
-                let (at, towards) = (Triple(position_in_world), Triple(forward_in_world));
-                write!(f, "spot at={at} towards={towards} intensity={} ", Color(intensity_linear))?;
-                write!(f, "inner={} outer={} radius={radius_m}", Degrees(inner_cone_rad), Degrees(outer_cone_rad))
+                let (at, towards) = (triple(position_in_world), triple(forward_in_world));
+                write!(f, "spot at={at} towards={towards} intensity={} ", color_text(intensity_linear))?;
+                write!(f, "inner={} outer={} radius={radius_m}", degrees(inner_cone_rad), degrees(outer_cone_rad))
             }
             Light::Rectangle { center_in_world, half_edges_in_world: [u, v], radiance_linear } => {
-                let (at, u, v) = (Triple(center_in_world), Triple(u), Triple(v));
-                write!(f, "rectangle at={at} u={u} v={v} radiance={}", Color(radiance_linear))
+                let (at, u, v) = (triple(center_in_world), triple(u), triple(v));
+                write!(f, "rectangle at={at} u={u} v={v} radiance={}", color_text(radiance_linear))
             }
         }
     }
@@ -275,40 +274,24 @@ impl fmt::Display for LightSpec {
 impl fmt::Display for EnvironmentSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Environment { zenith_linear, nadir_linear } = self.0;
-        if zenith_linear == nadir_linear {
-            return Color(zenith_linear).fmt(f);
-        }
-        write!(f, "{}/{}", Color(zenith_linear), Color(nadir_linear))
+        f.write_str(&color_text(zenith_linear))?;
+        if zenith_linear == nadir_linear { Ok(()) } else { write!(f, "/{}", color_text(nadir_linear)) }
     }
 }
 
-struct Triple(Vec3);
-
-impl fmt::Display for Triple {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [x, y, z] = self.0.to_array();
-        write!(f, "{x},{y},{z}")
-    }
+fn triple(v: Vec3) -> String {
+    format!("{},{},{}", v.x, v.y, v.z)
 }
 
-/// Displays a grey as one number.
-struct Color(Vec3);
-
-impl fmt::Display for Color {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(color) = *self;
-        if color == Vec3::splat(color.x) { write!(f, "{}", color.x) } else { Triple(color).fmt(f) }
-    }
+/// A grey is one number.
+fn color_text(color: Vec3) -> String {
+    if color == Vec3::splat(color.x) { color.x.to_string() } else { triple(color) }
 }
 
-/// Displays radians as degrees, with the fewest decimals that parse to the same radians.
-struct Degrees(f32);
-
-impl fmt::Display for Degrees {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let degrees = f64::from(self.0).to_degrees();
-        let rounded = |decimals: i32| (degrees * 10f64.powi(decimals)).round() / 10f64.powi(decimals);
-        let shortest = (0..12).map(rounded).find(|d| d.to_radians() as f32 == self.0);
-        write!(f, "{}", shortest.unwrap_or(degrees))
-    }
+/// Radians as degrees, with the fewest decimals that parse to the same radians.
+fn degrees(angle_rad: f32) -> f64 {
+    let degrees = f64::from(angle_rad).to_degrees();
+    let rounded = |decimals: i32| (degrees * 10f64.powi(decimals)).round() / 10f64.powi(decimals);
+    let shortest = (0..12).map(rounded).find(|d| d.to_radians() as f32 == angle_rad);
+    shortest.unwrap_or(degrees)
 }

@@ -76,30 +76,21 @@ impl SceneSpec {
     /// # Errors
     /// The errors of [`load_file`], and a meadow over the limits.
     pub fn load(&self, limits: &Limits) -> Result<Scene, SceneError> {
-        match self {
-            Self::File(path) => Ok(load_file(path, limits)?.with_default_lights()),
-            Self::TreeTerrain { triangles, wind } => Ok(named(self, grown(*triangles, *wind))),
-            Self::Grass { density } => Ok(named(self, self.sown(*density, limits)?)),
-            Self::BuiltIn(name) => Ok(named(self, procedural::by_name(name))),
-        }
+        let scene = match self {
+            Self::File(path) => return Ok(load_file(path, limits)?.with_default_lights()),
+            Self::TreeTerrain { triangles, wind: false } => tree_terrain(*triangles, TREE_SEED),
+            Self::TreeTerrain { triangles, wind: true } => tree_terrain(*triangles, TREE_SEED).with_wind(),
+            Self::Grass { density } => {
+                // Sizes are checked before memory is allocated.
+                at_most("triangles", density.triangles(), limits.triangles)
+                    .and_then(|()| at_most("vertices", density.vertices(), limits.vertices))
+                    .map_err(|fault| fault.in_file(self.to_string()))?;
+                grass(*density)
+            }
+            Self::BuiltIn(name) => procedural::by_name(name),
+        };
+        Ok(Scene { name: self.to_string(), ..scene })
     }
-
-    /// Checks sizes before memory is allocated.
-    fn sown(&self, density: GrassDensity, limits: &Limits) -> Result<Scene, SceneError> {
-        at_most("triangles", density.triangles(), limits.triangles)
-            .and_then(|()| at_most("vertices", density.vertices(), limits.vertices))
-            .map_err(|fault| fault.in_file(self.to_string()))?;
-        Ok(grass(density))
-    }
-}
-
-fn grown(triangles: u32, wind: bool) -> Scene {
-    let scene = tree_terrain(triangles, TREE_SEED);
-    if wind { scene.with_wind() } else { scene }
-}
-
-fn named(spec: &SceneSpec, scene: Scene) -> Scene {
-    Scene { name: spec.to_string(), ..scene }
 }
 
 impl FromStr for SceneSpec {
@@ -121,24 +112,18 @@ impl FromStr for SceneSpec {
 
 /// Parses a meadow; `None` for other names.
 fn grass_density(text: &str) -> Result<Option<GrassDensity>, SceneSpecError> {
-    let density = match text.strip_prefix(GRASS) {
-        Some("") => return Ok(Some(GrassDensity::ONE)),
-        Some(rest) => rest.strip_prefix(':'),
-        None => None,
-    };
-    let Some(density) = density else { return Ok(None) };
+    if text == GRASS {
+        return Ok(Some(GrassDensity::ONE));
+    }
+    let Some(density) = text.strip_prefix(GRASS).and_then(|rest| rest.strip_prefix(':')) else { return Ok(None) };
     let number = density.parse().map_err(|_| SceneSpecError::DensityMalformed(density.into()))?;
     GrassDensity::new(number).map(Some).ok_or_else(|| SceneSpecError::DensityOutOfRange(density.into()))
 }
 
 fn tree_triangles(base: &str) -> Option<u32> {
-    match base.strip_prefix("tree-terrain-")? {
-        "30k" => Some(30_000),
-        "125k" => Some(125_000),
-        "500k" => Some(500_000),
-        "2m" => Some(2_000_000),
-        _ => None,
-    }
+    let size = base.strip_prefix("tree-terrain-")?;
+    let known = [("30k", 30_000), ("125k", 125_000), ("500k", 500_000), ("2m", 2_000_000)];
+    known.into_iter().find(|(name, _)| *name == size).map(|(_, triangles)| triangles)
 }
 
 impl fmt::Display for SceneSpec {

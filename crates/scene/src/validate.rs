@@ -67,10 +67,8 @@ impl Scene {
 }
 
 fn each<T>(kind: &str, items: &[T], check: impl Fn(&T) -> Result<(), String>) -> Result<(), Fault> {
-    let numbered = items.iter().enumerate();
-    numbered
-        .into_iter()
-        .try_for_each(|(i, item)| check(item).map_err(|why| Fault::malformed(format!("{kind} {i}"), why)))
+    let mut numbered = items.iter().enumerate();
+    numbered.try_for_each(|(i, item)| check(item).map_err(|why| Fault::malformed(format!("{kind} {i}"), why)))
 }
 
 fn require(holds: bool, element: &str, reason: &str) -> Result<(), Fault> {
@@ -158,23 +156,18 @@ fn check_texture(texture: &Texture, limits: &Limits) -> Result<(), String> {
 
 fn check_light(light: &Light) -> Result<(), LightError> {
     light.validate()?;
-    match *light {
-        Light::Directional { .. } => Ok(()),
+    let reach = match *light {
+        Light::Directional { .. } => Vec::new(),
         Light::Point { position_in_world, radius_m, .. } | Light::Spot { position_in_world, radius_m, .. } => {
-            within_reach("position", position_in_world)?;
-            within_reach("radius", Vec3::splat(radius_m))
+            vec![("position", position_in_world), ("radius", Vec3::splat(radius_m))]
         }
         Light::Rectangle { center_in_world, half_edges_in_world: [u, v], .. } => {
-            within_reach("center", center_in_world)?;
-            within_reach("half_edges", u)?;
-            within_reach("half_edges", v)
+            vec![("center", center_in_world), ("half_edges", u), ("half_edges", v)]
         }
-    }
-}
-
-fn within_reach(field: &'static str, v: Vec3) -> Result<(), LightError> {
-    let holds = v.abs().max_element() <= MAX_COORDINATE_M;
-    if holds { Ok(()) } else { Err(LightError { field, reason: "over 1e9 m" }) }
+    };
+    let is_near = |v: Vec3| v.abs().max_element() <= MAX_COORDINATE_M;
+    let far = reach.into_iter().find(|(_, v)| !is_near(*v));
+    far.map_or(Ok(()), |(field, _)| Err(LightError { field, reason: "over 1e9 m" }))
 }
 
 fn check_camera(camera: &SourceCamera) -> Result<(), String> {

@@ -192,7 +192,7 @@ fn packages() {
     let mut textured = checker_sphere();
     textured.textures[0] = scene::Texture { width_px: 2, height_px: 2, is_srgb: true, srgba8: vec![9; 16] };
     for scene in [unit_cube().with_wind(), textured] {
-        damaged(&pack(&scene).bytes, 4000, |bytes| {
+        damaged(&pack(&scene), 4000, |bytes| {
             if let Ok(scene) = unpack(bytes, &limits()) {
                 scene.validate(&limits()).unwrap();
             }

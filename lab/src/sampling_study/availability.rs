@@ -1,8 +1,9 @@
 //! Availability by pixel: the share of an output frame's samples that a set holds.
 
 use depth_image::DepthImage;
-use metrics::{Held, held_samples};
 use rayon::prelude::*;
+
+use super::held::{Held, held_samples};
 
 /// Availability over many frames.
 #[derive(Debug, Clone, Copy)]

@@ -1,10 +1,10 @@
 //! Counts by pixel: redundant, disoccluded and useful samples.
 
 use depth_image::DepthImage;
-use metrics::{Held, HeldSample, held_samples};
 use rayon::prelude::*;
 use sampling::SamplingMethod;
 
+use super::held::{Held, HeldSample, held_samples};
 use super::methods::METHODS;
 
 /// Samples of one image of one method, before dilation and hysteresis.

@@ -6,6 +6,7 @@ pub mod command;
 mod counts;
 mod detection;
 mod extent;
+mod held;
 mod methods;
 mod paper;
 mod pictures;

@@ -1,13 +1,13 @@
 //! Measurements of one scene.
 
 use glam::UVec2;
-use metrics::Held;
 use sampling::SamplingMethod;
 use study::Report;
 
 use super::availability::Availability;
 use super::counts::{ImageCount, image_counts, mark_useful};
 use super::extent::Extent;
+use super::held::Held;
 use super::methods::METHODS;
 use super::pictures;
 use super::subject::{Subject, WITH_IDS};

@@ -1,12 +1,12 @@
 //! Fig. 7: redundancy by pixel approaches redundancy by visibility as images grow.
 
 use glam::UVec2;
-use metrics::Held;
 use sampling::{Redundancy, SamplingMethod};
 use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
 use super::counts::{ImageCount, image_counts, mark_useful, percent};
 use super::extent::Extent;
+use super::held::Held;
 use super::methods::{IMAGES, METHODS};
 use super::subject::{Subject, WITH_IDS};
 use super::visibility::seen;

@@ -1,10 +1,11 @@
 //! Metrics by visibility: independent of resolution, of seeded samples, by rays on the host.
 
 use depth_image::{Camera, DepthImage, PinholeCamera};
-use metrics::{HeldSample, held_samples};
 use rayon::prelude::*;
 use render::scalar::rays::Scene;
 use sampling::{SamplingMethod, scalar::is_visibility_redundant};
+
+use super::held::{HeldSample, held_samples};
 
 /// A share of seeded samples.
 #[derive(Debug, Clone, Copy, Default)]

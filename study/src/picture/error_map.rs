@@ -6,12 +6,12 @@ use metrics::ScoreMap;
 /// A map of 0…1 in magma: black is no error, pale yellow the greatest.
 #[must_use]
 pub fn error_map(map: &ScoreMap) -> RgbImage {
-    let (width_px, height_px) = map.size_px();
+    let ScoreMap { width_px, height_px, values, .. } = map;
     let color = |value: f32| {
         let share = if value.is_nan() { 0.0 } else { f64::from(value.clamp(0.0, 1.0)) };
         Rgb(colorous::MAGMA.eval_continuous(share).as_array())
     };
-    RgbImage::from_fn(width_px, height_px, |x, y| color(map.values()[(y * width_px + x) as usize]))
+    RgbImage::from_fn(*width_px, *height_px, |x, y| color(values[(y * width_px + x) as usize]))
 }
 
 #[cfg(test)]

@@ -31,7 +31,7 @@ impl Sensitivity {
         let weights: Vec<f32> = (-radius..=radius).map(weight).collect();
         let sum: f32 = weights.iter().sum();
         let volume = self.a * (PI / self.b).sqrt() * sum * sum;
-        (scaled(&weights, sum.recip()), volume)
+        (weights.iter().map(|weight| weight * sum.recip()).collect(), volume)
     }
 }
 
@@ -64,22 +64,12 @@ impl FeatureKernels {
 fn balanced(weights: &[f32]) -> Vec<f32> {
     let sum = |sign: f32| weights.iter().map(|weight| (sign * weight).max(0.0)).sum::<f32>();
     let (positive, negative) = (sum(1.0), sum(-1.0));
-    weights
-        .iter()
-        .map(|&weight| {
-            if weight > 0.0 {
-                weight / positive
-            } else if weight < 0.0 {
-                weight / negative
-            } else {
-                0.0
-            }
-        })
-        .collect()
-}
-
-fn scaled(weights: &[f32], factor: f32) -> Vec<f32> {
-    weights.iter().map(|weight| weight * factor).collect()
+    let balance = |&weight: &f32| match weight {
+        _ if weight > 0.0 => weight / positive,
+        _ if weight < 0.0 => weight / negative,
+        _ => 0.0,
+    };
+    weights.iter().map(balance).collect()
 }
 
 #[cfg(test)]

@@ -4,16 +4,25 @@
 //! A colour difference is raised by a feature difference: `ΔE = ΔEc^(1 - ΔEf)`. The colour difference is that of both
 //! images blurred by the eye's contrast sensitivity; features are edges and points that only one image has.
 
-mod color_difference;
-mod feature_difference;
 mod kernels;
 
+use depth_image::linear_from_srgb8;
+use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::{MetricsError, Rgb8Image, ScoreMap, color::REC_709, color::WhiteRelative, color::convert_srgb_pixels};
+use crate::color::{REC_709, WhiteRelative, convert_pixels};
+use crate::convolution::{Edge, Plane};
+use crate::{MetricsError, Rgb8Image, ScoreMap};
+use kernels::{ACHROMATIC, BLUE_YELLOW, FeatureKernels, RED_GREEN, Sensitivity};
 
 /// The paper's viewer: 0.7 m from a display 0.7 m wide with 3840 columns, 0.7 · 3840 / 0.7 · π / 180.
 pub const FLIP_PIXELS_PER_DEGREE: f32 = 67.020_64;
+/// Differences are compressed by this power.
+const POWER: f32 = 0.7;
+/// Errors up to this share of the greatest error…
+const KNEE: f32 = 0.4;
+/// …are spread over this share of the output.
+const KNEE_OUTPUT: f32 = 0.95;
 
 /// FLIP's error of every pixel, 0 to 1, for the default viewer.
 ///
@@ -33,14 +42,104 @@ pub fn flip_map_at(reference: &Rgb8Image, test: &Rgb8Image, pixels_per_degree: f
         return Err(MetricsError::Setting { what: "pixels per degree" });
     }
     let space = WhiteRelative::new(REC_709);
-    let [reference_ycxcz, test_ycxcz] =
-        [reference, test].map(|image| convert_srgb_pixels(image, |linear| space.ycxcz_from_linear(linear)));
+    let [reference_ycxcz, test_ycxcz] = [reference, test]
+        .map(|image| convert_pixels(image, linear_from_srgb8, |linear| space.ycxcz_from_linear(linear)));
     let width = reference.width_px() as usize;
-    let color = color_difference::map(&reference_ycxcz, &test_ycxcz, width, pixels_per_degree);
-    let feature = feature_difference::map(&reference_ycxcz, &test_ycxcz, width, pixels_per_degree);
+    let color = color_difference(&reference_ycxcz, &test_ycxcz, width, pixels_per_degree);
+    let feature = feature_difference(&reference_ycxcz, &test_ycxcz, width, pixels_per_degree);
     let values = color.par_iter().zip(&feature).map(|(color, feature)| color.powf(1.0 - feature)).collect();
     let (width_px, height_px) = reference.size_px();
     Ok(ScoreMap { width_px, height_px, border_px: 0, values })
+}
+
+/// The colour difference of every pixel, 0 to 1 (§4.1): filter by contrast sensitivity, then measure in Hunt-adjusted
+/// L*a*b*.
+fn color_difference(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize, pixels_per_degree: f32) -> Vec<f32> {
+    let space = WhiteRelative::new(REC_709);
+    let [reference, test] =
+        [reference_ycxcz, test_ycxcz].map(|image| perceived(image, width, pixels_per_degree, &space));
+    let greatest = greatest_difference(&space);
+    reference.par_iter().zip(&test).map(|(a, b)| remapped(hyab(*a, *b).powf(POWER), greatest)).collect()
+}
+
+/// Hunt-adjusted L*a*b* of what the eye resolves.
+fn perceived(ycxcz: &[Vec3], width: usize, pixels_per_degree: f32, space: &WhiteRelative) -> Vec<Vec3> {
+    let channel = |of: fn(&Vec3) -> f32| Plane { width, values: ycxcz.iter().map(of).collect() };
+    let y = filtered(&channel(|c| c.x), &[ACHROMATIC], pixels_per_degree);
+    let cx = filtered(&channel(|c| c.y), &[RED_GREEN], pixels_per_degree);
+    let cz = filtered(&channel(|c| c.z), &BLUE_YELLOW, pixels_per_degree);
+    let pixels = y.par_iter().zip(&cx).zip(&cz).map(|((&y, &cx), &cz)| Vec3::new(y, cx, cz));
+    pixels.map(|ycxcz| hunt_adjusted(space, space.linear_from_ycxcz(ycxcz).clamp(Vec3::ZERO, Vec3::ONE))).collect()
+}
+
+/// The plane convolved with a sum of sensitivities that together weigh 1.
+fn filtered(plane: &Plane, sensitivities: &[Sensitivity], pixels_per_degree: f32) -> Vec<f32> {
+    let kernels: Vec<_> = sensitivities.iter().map(|one| one.kernel(pixels_per_degree)).collect();
+    let total: f32 = kernels.iter().map(|(_, volume)| volume).sum();
+    let mut sum = vec![0.0; plane.values.len()];
+    for (kernel, volume) in &kernels {
+        let part = plane.convolved(kernel, kernel, Edge::Repeat);
+        sum.par_iter_mut().zip(&part.values).for_each(|(sum, value)| *sum += value * volume / total);
+    }
+    sum
+}
+
+/// Chroma counts less in the dark.
+fn hunt_adjusted(space: &WhiteRelative, linear: Vec3) -> Vec3 {
+    let lab = space.lab_from_linear(linear);
+    Vec3::new(lab.x, 0.01 * lab.x * lab.y, 0.01 * lab.x * lab.z)
+}
+
+/// City-block in lightness, Euclidean in chroma (Abasi et al. 2020).
+fn hyab(a: Vec3, b: Vec3) -> f32 {
+    let delta = a - b;
+    delta.x.abs() + delta.y.hypot(delta.z)
+}
+
+/// Green against blue: the greatest difference a display can show.
+fn greatest_difference(space: &WhiteRelative) -> f32 {
+    hyab(hunt_adjusted(space, Vec3::Y), hunt_adjusted(space, Vec3::Z)).powf(POWER)
+}
+
+/// To 0…1, most of it for the small differences.
+fn remapped(difference: f32, greatest: f32) -> f32 {
+    let knee = KNEE * greatest;
+    match difference < knee {
+        true => KNEE_OUTPUT / knee * difference,
+        false => KNEE_OUTPUT + (difference - knee) / (greatest - knee) * (1.0 - KNEE_OUTPUT),
+    }
+    .clamp(0.0, 1.0)
+}
+
+/// The feature difference of every pixel, 0 to 1 (§4.2): edges and points that only one image has.
+fn feature_difference(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize, pixels_per_degree: f32) -> Vec<f32> {
+    let kernels = FeatureKernels::new(pixels_per_degree);
+    let [reference, test] = [reference_ycxcz, test_ycxcz].map(|image| Features::of(&luminance(image, width), &kernels));
+    let edges = reference.edge.par_iter().zip(&test.edge).map(|(a, b)| (a - b).abs());
+    let points = reference.point.par_iter().zip(&test.point).map(|(a, b)| (a - b).abs());
+    edges.zip(points).map(|(edge, point)| (edge.max(point) / 2.0_f32.sqrt()).sqrt().min(1.0)).collect()
+}
+
+/// Strengths of edges and points at every pixel.
+struct Features {
+    edge: Vec<f32>,
+    point: Vec<f32>,
+}
+
+impl Features {
+    fn of(luminance: &Plane, kernels: &FeatureKernels) -> Self {
+        let strength = |derivative: &[f32]| {
+            let along_rows = luminance.convolved(derivative, &kernels.smooth, Edge::Repeat).values;
+            let along_columns = luminance.convolved(&kernels.smooth, derivative, Edge::Repeat).values;
+            along_rows.par_iter().zip(&along_columns).map(|(x, y)| x.hypot(*y)).collect()
+        };
+        Self { edge: strength(&kernels.edge), point: strength(&kernels.point) }
+    }
+}
+
+/// Y of YCxCz, scaled to 0…1.
+fn luminance(ycxcz: &[Vec3], width: usize) -> Plane {
+    Plane { width, values: ycxcz.iter().map(|color| (color.x + 16.0) / 116.0).collect() }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@
 
 mod vision;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::color::{ADOBE_RGB, REC_709, WhiteRelative, convert_pixels, lab_from_relative_xyz};
@@ -70,16 +70,11 @@ impl PdiffSettings {
 /// The pixels that a viewer sees differ.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PdiffMap {
-    failing: Vec<bool>,
+    /// One flag a pixel, row by row.
+    pub failing: Vec<bool>,
 }
 
 impl PdiffMap {
-    /// One flag a pixel, row by row.
-    #[must_use]
-    pub fn failing(&self) -> &[bool] {
-        &self.failing
-    }
-
     /// The number of failing pixels, of all or of the mask.
     ///
     /// # Errors
@@ -110,7 +105,7 @@ struct Seen {
     /// Luminance, cd/m², from sharp to smooth.
     pyramid: Vec<Plane>,
     /// (a*, b*).
-    ab: Vec<[f32; 2]>,
+    ab: Vec<Vec2>,
 }
 
 impl Seen {
@@ -125,7 +120,7 @@ impl Seen {
         let lab = xyz.iter().map(|&xyz| lab_from_relative_xyz(xyz));
         Self {
             pyramid: pyramid(Plane { width: image.width_px() as usize, values: luminance }),
-            ab: lab.map(|lab| [lab.y, lab.z]).collect(),
+            ab: lab.map(|lab| Vec2::new(lab.y, lab.z)).collect(),
         }
     }
 
@@ -142,39 +137,21 @@ fn pyramid(luminance: Plane) -> Vec<Plane> {
 
 /// True if a viewer sees a pixel differ.
 fn fails(reference: &Seen, test: &Seen, bands: &FrequencyBands, index: usize) -> bool {
-    let level = bands.adaptation_level();
+    let level = bands.adaptation_level;
     let mean = (reference.luminance(level, index) + test.luminance(level, index)) / 2.0;
     let adaptation_cd_m2 = mean.max(DARKEST_CD_M2);
-    let contrast = std::array::from_fn(|band| contrast(reference, index, band).max_of(contrast(test, index, band)));
+    let contrast = std::array::from_fn(|band| contrast([reference, test], index, band));
     let elevation = bands.threshold_elevation(&contrast, adaptation_cd_m2);
     let delta_cd_m2 = (reference.luminance(0, index) - test.luminance(0, index)).abs();
     delta_cd_m2 > elevation * threshold_vs_intensity(adaptation_cd_m2)
-        || chroma_difference_squared(reference.ab[index], test.ab[index]) * color_scale(adaptation_cd_m2) > elevation
+        || reference.ab[index].distance_squared(test.ab[index]) * color_scale(adaptation_cd_m2) > elevation
 }
 
-/// The amplitude of a band, and its background.
-struct BandContrast {
-    amplitude_cd_m2: f32,
-    background_cd_m2: f32,
-}
-
-impl BandContrast {
-    /// The contrast of the stronger amplitude against the brighter background of two images.
-    fn max_of(self, other: Self) -> f32 {
-        let background = self.background_cd_m2.max(other.background_cd_m2).max(DARKEST_CD_M2);
-        self.amplitude_cd_m2.max(other.amplitude_cd_m2) / background
-    }
-}
-
-fn contrast(seen: &Seen, index: usize, band: usize) -> BandContrast {
-    BandContrast {
-        amplitude_cd_m2: (seen.luminance(band, index) - seen.luminance(band + 1, index)).abs(),
-        background_cd_m2: seen.luminance(band + 2, index).abs(),
-    }
-}
-
-fn chroma_difference_squared(a: [f32; 2], b: [f32; 2]) -> f32 {
-    (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
+/// The contrast of a band: the stronger amplitude against the brighter background of two images.
+fn contrast(images: [&Seen; 2], index: usize, band: usize) -> f32 {
+    let amplitudes_cd_m2 = images.map(|seen| (seen.luminance(band, index) - seen.luminance(band + 1, index)).abs());
+    let [a, b] = images.map(|seen| seen.luminance(band + 2, index).abs());
+    amplitudes_cd_m2[0].max(amplitudes_cd_m2[1]) / a.max(b).max(DARKEST_CD_M2)
 }
 
 /// Colour is seen in full above 10 cd/m² and fades, squared, to nothing in the dark.

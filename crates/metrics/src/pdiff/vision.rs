@@ -14,7 +14,8 @@ pub(super) struct FrequencyBands {
     cycles_per_degree: [f32; BANDS],
     /// Peak sensitivity over that of the band, at 100 cd/m².
     inverse_relative_sensitivity: [f32; BANDS],
-    adaptation_level: usize,
+    /// The level whose smoothing stands for the degree around a pixel that the eye adapts to.
+    pub(super) adaptation_level: usize,
 }
 
 impl FrequencyBands {
@@ -29,11 +30,6 @@ impl FrequencyBands {
             inverse_relative_sensitivity: cycles_per_degree.map(inverse),
             adaptation_level: adaptation_level(image_deg),
         }
-    }
-
-    /// The level whose smoothing stands for the degree around a pixel that the eye adapts to.
-    pub(super) fn adaptation_level(&self) -> usize {
-        self.adaptation_level
     }
 
     /// `F`: the rise of the threshold, 1 to 10.

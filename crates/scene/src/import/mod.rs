@@ -35,16 +35,13 @@ pub fn load_file(path: &Path, limits: &Limits) -> Result<Scene, SceneError> {
 
 fn read_source(path: &Path, limits: &Limits) -> Result<SourceScene, Fault> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let unknown =
+        || Fault::unsupported("file name", format!("extension {extension:?}; known are gltf, glb, obj and ply"));
     let read: fn(&[u8], &Folder, &Limits) -> Result<SourceScene, Fault> = match extension.as_str() {
         "gltf" | "glb" => gltf::read,
         "obj" => obj::read,
         "ply" => ply::read,
-        _ => {
-            return Err(Fault::unsupported(
-                "file name",
-                format!("extension {extension:?}; known are gltf, glb, obj and ply"),
-            ));
-        }
+        _ => return Err(unknown()),
     };
     let (folder, bytes) = Folder::opened_with(path, limits)?;
     let mut source = read(&bytes, &folder, limits)?;

@@ -15,8 +15,13 @@ pub(crate) const FLAT: f64 = 0.999_999;
 /// Around a hub of more corners than this, all are averaged: the pairwise comparison would be quadratic.
 const MAX_CORNERS_COMPARED: usize = 256;
 
+/// Makes normals for a source without normals, and fills gaps otherwise.
+pub(crate) fn complete(mesh: &mut SourceMesh, has_normals: bool, crease_cosine: f64) {
+    if has_normals { repair(mesh) } else { generate(mesh, crease_cosine) }
+}
+
 /// Sets every normal; may add vertices.
-pub(crate) fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
+fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
     let faces = Faces::of(mesh);
     let corners_at = CornersByPosition::of(mesh);
     let original_count = mesh.vertices.len();
@@ -40,7 +45,7 @@ pub(crate) fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
 }
 
 /// Normalises the given normals, and replaces those of zero length by the mean of their faces.
-pub(crate) fn repair(mesh: &mut SourceMesh) {
+fn repair(mesh: &mut SourceMesh) {
     let length = |n: [f32; 3]| DVec3::from(n.map(f64::from)).length();
     if mesh.vertices.iter().any(|v| length(v.normal) < 1e-6) {
         let (faces, corners_at) = (Faces::of(mesh), CornersByPosition::of(mesh));

@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use image::{ImageReader, RgbaImage};
+use image::ImageReader;
 use rayon::prelude::*;
 
 use crate::error::{Fault, at_most};
@@ -49,18 +49,16 @@ fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
     // 16-bit channels and a decoder's working copy take a few times the 8-bit texels.
     image_limits.max_alloc = Some(limits.texture_bytes.saturating_mul(4));
     reader.limits(image_limits);
-    let pixels = reader.decode().map_err(|e| Fault::malformed(&picture.element, e.to_string()))?;
-    Ok(texture_from(pixels.into_rgba8(), picture.is_srgb))
-}
-
-fn texture_from(pixels: RgbaImage, is_srgb: bool) -> Texture {
-    Texture { width_px: pixels.width(), height_px: pixels.height(), is_srgb, srgba8: pixels.into_raw() }
+    let pixels = reader.decode().map_err(|e| Fault::malformed(&picture.element, e.to_string()))?.into_rgba8();
+    let (width_px, height_px) = pixels.dimensions();
+    Ok(Texture { width_px, height_px, is_srgb: picture.is_srgb, srgba8: pixels.into_raw() })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::SceneErrorKind;
+    use image::RgbaImage;
 
     fn png(width: u32, height: u32) -> EncodedPicture {
         let mut bytes = Vec::new();

@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
-use glam::{Affine3A, DAffine3, DVec3};
+use glam::{Affine3A, BVec3, DAffine3, DVec3};
 
 use crate::error::{Fault, at_most};
-use crate::light_parts::{color, color_mut, position_mut};
+use crate::light_rig::{color, color_mut, position_mut};
 use crate::{Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Vertex};
 
 /// Distance from the origin beyond which `f32` loses a millimetre.
@@ -34,6 +34,7 @@ pub(crate) struct SourceMesh {
     pub parts: Vec<MeshPart>,
 }
 
+/// A placement of a mesh; its transform is invertible.
 #[derive(Clone, Copy)]
 pub(crate) struct SourceInstance {
     pub mesh: usize,
@@ -65,15 +66,22 @@ impl SourceScene {
         let origin_in_source = self.origin_in_source()?;
         self.unmirror();
         let lights = self.lights.iter().map(|l| l.relative_to(origin_in_source)).collect();
-        let (meshes, materials, textures) = (self.meshes, self.materials, self.textures);
+        let moved = |source_from_x: &DAffine3| moved(source_from_x, origin_in_source);
+        let instance =
+            |i: &SourceInstance| Instance { mesh: i.mesh as u32, world_from_mesh: moved(&i.source_from_mesh) };
+        let camera = |PlacedCamera { name, source_from_camera, fov_y_rad }| SourceCamera {
+            name,
+            world_from_camera: moved(&source_from_camera),
+            fov_y_rad,
+        };
         let scene = Scene {
             name: self.name,
-            meshes: meshes.into_iter().map(SourceMesh::into_f32).collect(),
-            instances: self.instances.iter().map(|i| i.relative_to(origin_in_source)).collect(),
-            materials,
-            textures,
+            meshes: self.meshes.into_iter().map(SourceMesh::into_f32).collect(),
+            instances: self.instances.iter().map(instance).collect(),
+            materials: self.materials,
+            textures: self.textures,
             illumination: Illumination { lights, ..Illumination::default() },
-            cameras: self.cameras.into_iter().map(|c| c.relative_to(origin_in_source)).collect(),
+            cameras: self.cameras.into_iter().map(camera).collect(),
             origin_in_source,
             ..Scene::default()
         };
@@ -89,10 +97,7 @@ impl SourceScene {
         if triangles == 0 {
             return Err(Fault::malformed("scene", "it has no triangles"));
         }
-        let singular = self.instances.iter().position(|i| !is_invertible(&i.source_from_mesh));
-        singular.map_or(Ok(()), |i| {
-            Err(Fault::malformed(format!("instance {i}"), "its transform is singular or not finite"))
-        })
+        Ok(())
     }
 
     /// Moves a mesh that is far from its own origin there; its instances take over the distance.
@@ -175,16 +180,10 @@ impl SourceMesh {
     }
 }
 
-impl SourceInstance {
-    fn relative_to(&self, origin_in_source: DVec3) -> Instance {
-        Instance { mesh: self.mesh as u32, world_from_mesh: moved(&self.source_from_mesh, origin_in_source) }
-    }
-}
-
 impl SourceLight {
     /// Unoccluded irradiance at a point, with spots aimed at it; distances count as at least `least_m`.
     pub(crate) fn arriving_at(&self, point_in_source: DVec3, least_m: f64) -> DVec3 {
-        let color = color(&self.light).as_dvec3();
+        let color = color(self.light).as_dvec3();
         let distance_m = self.position_in_source.distance(point_in_source).max(least_m);
         if matches!(self.light, Light::Directional { .. }) { color } else { color / (distance_m * distance_m) }
     }
@@ -201,13 +200,6 @@ impl SourceLight {
             *position = (self.position_in_source - origin_in_source).as_vec3();
         }
         light
-    }
-}
-
-impl PlacedCamera {
-    fn relative_to(self, origin_in_source: DVec3) -> SourceCamera {
-        let world_from_camera = moved(&self.source_from_camera, origin_in_source);
-        SourceCamera { name: self.name, world_from_camera, fov_y_rad: self.fov_y_rad }
     }
 }
 
@@ -263,9 +255,7 @@ impl Box3 {
     }
 
     fn corners(&self) -> [DVec3; 8] {
-        let pick = |i: usize, bit: usize| {
-            if i >> bit & 1 == 0 { self.min[bit] } else { self.max[bit] }
-        };
-        std::array::from_fn(|i| DVec3::new(pick(i, 0), pick(i, 1), pick(i, 2)))
+        let is_max = |i: usize| BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0);
+        std::array::from_fn(|i| DVec3::select(is_max(i), self.max, self.min))
     }
 }

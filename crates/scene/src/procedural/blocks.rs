@@ -2,8 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::mesh_builder::MeshBuilder;
-use super::solids::matt;
+use super::geometry::{MeshBuilder, matt};
 use crate::Scene;
 
 /// World metres for a unit of [`LAYOUT`].

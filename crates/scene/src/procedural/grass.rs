@@ -5,10 +5,8 @@ use std::fmt;
 
 use glam::{Vec2, Vec3};
 
-use super::mesh_builder::{MeshBuilder, vertex};
-use super::noise::{Noise, lerp, mix};
-use super::rng::Rng;
-use super::solids::matt;
+use super::geometry::{MeshBuilder, matt, vertex};
+use super::random::{Noise, Rng, lerp, mix};
 use crate::{Material, Scene, Vertex};
 
 /// Number of triangles at density 1, that of the model in the paper's table 1.
@@ -22,9 +20,6 @@ const BLADE_WIDTH_M: f32 = 0.017;
 /// Width of a blade at each of its sections, as a share of that at the root; the last one is the tip.
 const TAPER: [f32; 4] = [0.8, 1.0, 0.7, 0.0];
 const TRIANGLES_OF_BLADE: u32 = 2 * (TAPER.len() as u32 - 1) - 1;
-
-const GROUND_MATERIAL: u32 = 0;
-const BLADE_MATERIAL: u32 = 1;
 
 /// Density of a meadow, in units of 56,000 triangles; see [`grass`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,10 +86,10 @@ pub fn grass(density: GrassDensity) -> Scene {
     let meadow = Meadow { noise: Noise::new(SEED), width_m: BLADE_WIDTH_M / density.0 };
     let mut builder = MeshBuilder::default();
     meadow.add_ground(&mut builder, plan.cells);
-    builder.finish_part(GROUND_MATERIAL);
+    builder.finish_part(0);
     let mut rng = Rng::new(SEED, 1);
     (0..plan.blades).for_each(|i| meadow.add_blade(&mut builder, spread(i), &mut rng));
-    builder.finish_part(BLADE_MATERIAL);
+    builder.finish_part(1);
     let blades = Material { double_sided: true, ..matt("blades") };
     let scene = builder.into_scene_of("grass", vec![matt("ground"), blades]);
     Scene { background_linear: Vec3::new(0.46, 0.60, 0.80), ..scene }
@@ -122,10 +117,8 @@ impl Meadow {
     }
 
     fn add_ground(&self, builder: &mut MeshBuilder, cells: u32) {
-        let side = cells + 1;
-        for i in 0..side * side {
-            let at =
-                Vec2::new((i % side) as f32, (i / side) as f32) * (2.0 * HALF_WIDTH_M / cells as f32) - HALF_WIDTH_M;
+        builder.grid(cells, |column, row| {
+            let at = Vec2::new(column as f32, row as f32) * (2.0 * HALF_WIDTH_M / cells as f32) - HALF_WIDTH_M;
             let step_m = 0.03;
             let slope =
                 |axis: Vec2| (self.height_m(at + axis * step_m) - self.height_m(at - axis * step_m)) / (2.0 * step_m);
@@ -133,12 +126,8 @@ impl Meadow {
             let mould = 0.5 + 0.5 * self.noise.fractal(at * 7.0, 3);
             let earth = mix(Vec3::new(58.0, 50.0, 30.0), Vec3::new(98.0, 88.0, 48.0), mould);
             let color = mix(earth, Vec3::new(70.0, 88.0, 34.0), 0.35 + 0.4 * mould);
-            builder.push(vertex(Vec3::new(at.x, self.height_m(at), at.y), normal, color));
-        }
-        for cell in 0..cells * cells {
-            let corner = cell / cells * side + cell % cells;
-            builder.quad([corner, corner + side, corner + side + 1, corner + 1]);
-        }
+            vertex(Vec3::new(at.x, self.height_m(at), at.y), normal, color)
+        });
     }
 
     fn add_blade(&self, builder: &mut MeshBuilder, in_square: Vec2, rng: &mut Rng) {

@@ -4,9 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::{Affine3A, Vec2, Vec3};
 
-use super::mesh_builder::{MeshBuilder, vertex};
-use super::noise::{Noise, mix};
-use super::solids::matt;
+use super::geometry::{MeshBuilder, matt, vertex};
+use super::random::{Noise, mix};
 use super::tree::{TreePlan, tree_mesh};
 use crate::{Instance, Material, Mesh, Scene};
 
@@ -20,10 +19,6 @@ const GROUND_RADIUS_M: f32 = 5.5;
 const GROUND_RINGS: u32 = 14;
 const GROUND_SECTORS: u32 = 64;
 
-const GROUND_MATERIAL: u32 = 0;
-const BARK_MATERIAL: u32 = 1;
-const LEAF_MATERIAL: u32 = 2;
-
 /// A broad-leaved tree, 9.6 m high, on a mound 11 m wide: 113,000 triangles, nearly all of them its own.
 #[must_use]
 pub fn lone_tree() -> Scene {
@@ -32,8 +27,6 @@ pub fn lone_tree() -> Scene {
         foot_in_world: Vec3::Y * -0.004,
         height_m: GROWN_HEIGHT_M,
         triangles: TRIANGLES - ground.triangle_count() as u32,
-        bark_material: BARK_MATERIAL,
-        leaf_material: LEAF_MATERIAL,
     };
     let instance = |mesh: u32, scale: f32| Instance { mesh, world_from_mesh: Affine3A::from_scale(Vec3::splat(scale)) };
     Scene {
@@ -80,6 +73,6 @@ fn ground() -> Mesh {
             builder.quad([inner, index(ring, sector + 1), index(ring + 1, sector + 1), outer]);
         }
     }
-    builder.finish_part(GROUND_MATERIAL);
+    builder.finish_part(0);
     builder.into_mesh()
 }

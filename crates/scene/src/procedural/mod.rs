@@ -5,15 +5,11 @@
 
 mod bird_nest;
 mod blocks;
-mod courtyard;
+mod geometry;
 mod grass;
 mod lone_tree;
-mod mesh_builder;
-mod noise;
-mod poles;
-mod rng;
+mod random;
 mod shapes;
-mod solids;
 mod terrain;
 mod tree;
 mod tree_terrain;
@@ -21,11 +17,9 @@ mod urban;
 
 pub use bird_nest::bird_nest;
 pub use blocks::{BlocksViewpoints, blocks, blocks_viewpoints};
-pub use courtyard::courtyard;
 pub use grass::{GrassDensity, grass};
 pub use lone_tree::lone_tree;
-pub use poles::poles;
-pub use shapes::{checker_sphere, quad, unit_cube, uv_sphere};
+pub use shapes::{checker_sphere, courtyard, poles, quad, unit_cube, uv_sphere};
 pub use tree_terrain::tree_terrain;
 pub use urban::urban;
 

@@ -1,13 +1,21 @@
-//! Shapes in closed form.
+//! Small scenes in closed form.
 
 use std::f32::consts::{PI, TAU};
 
 use glam::Vec3;
 
-use super::mesh_builder::{MeshBuilder, vertex};
+use super::geometry::{MeshBuilder, vertex};
 use crate::{Material, Scene, Texture, Vertex};
 
 const WHITE: Vec3 = Vec3::splat(255.0);
+
+const POLE_COUNT: u32 = 9;
+const POLE_SIDES: u32 = 12;
+const HALF_HEIGHT_M: f32 = 1.5;
+
+const HALF_WIDTH_M: f32 = 2.0;
+const WALL_THICKNESS_M: f32 = 0.2;
+const WALL_HEIGHT_M: f32 = 2.0;
 
 /// A square that faces along `normal` (+Y for a zero vector): two triangles, unlit, of exactly `color_srgb8`.
 #[must_use]
@@ -82,4 +90,82 @@ fn sphere(radius_m: f32, segments: u32) -> MeshBuilder {
         }
     }
     builder
+}
+
+/// Nine upright poles of `radius_m` in the plane z = -1, at x = -2, -1.5 … 2, 3 m high around y = 0. A wall in the
+/// plane z = -3 is 10 m wide and 6 m high, with coloured squares of half a metre. Views are at z > 0.
+#[must_use]
+pub fn poles(radius_m: f32) -> Scene {
+    let mut builder = MeshBuilder::default();
+    add_wall(&mut builder);
+    for pole in 0..POLE_COUNT {
+        let foot = Vec3::new(-2.0 + 0.5 * pole as f32, -HALF_HEIGHT_M, -1.0);
+        add_pole(&mut builder, foot, radius_m);
+    }
+    builder.into_scene("poles", Material::default())
+}
+
+fn add_wall(builder: &mut MeshBuilder) {
+    for row in 0..12 {
+        for column in 0..20 {
+            let centre = Vec3::new(-4.75 + 0.5 * column as f32, -2.75 + 0.5 * row as f32, -3.0);
+            let tint = Vec3::new((column * 37 % 5) as f32, (row * 53 % 7) as f32, ((row + column) % 3) as f32);
+            let color = Vec3::new(90.0, 100.0, 110.0) + tint * Vec3::new(30.0, 18.0, 40.0);
+            builder.rectangle(centre, Vec3::X * 0.25, Vec3::Y * 0.25, color);
+        }
+    }
+}
+
+/// A tube, open at its ends.
+fn add_pole(builder: &mut MeshBuilder, foot: Vec3, radius_m: f32) {
+    let first = builder.vertices.len() as u32;
+    for side in 0..POLE_SIDES {
+        let (sin, cos) = (TAU * side as f32 / POLE_SIDES as f32).sin_cos();
+        let outwards = Vec3::new(sin, 0.0, cos);
+        for height_m in [0.0, 2.0 * HALF_HEIGHT_M] {
+            builder.push(vertex(
+                foot + outwards * radius_m + Vec3::Y * height_m,
+                outwards,
+                Vec3::new(196.0, 64.0, 48.0),
+            ));
+        }
+    }
+    for side in 0..POLE_SIDES {
+        let (left, right) = (first + 2 * side, first + 2 * ((side + 1) % POLE_SIDES));
+        builder.quad([left, right, right + 1, left + 1]);
+    }
+}
+
+/// Four walls 2 m high around a yard of 3.6 × 3.6 m, centred at the origin on ground 16 m wide. The yard's red floor
+/// and its pillar (0.8 m) are visible only from inside or from above. They are hidden from points outside the walls and
+/// below their tops.
+#[must_use]
+pub fn courtyard() -> Scene {
+    let mut builder = MeshBuilder::default();
+    add_ground(&mut builder);
+    let (outer, inner) = (HALF_WIDTH_M, HALF_WIDTH_M - WALL_THICKNESS_M);
+    let stone = Vec3::new(186.0, 176.0, 158.0);
+    let mut wall = |min_x, min_z, max_x, max_z| {
+        builder.cuboid(Vec3::new(min_x, 0.0, min_z), Vec3::new(max_x, WALL_HEIGHT_M, max_z), stone);
+    };
+    wall(-outer, -outer, outer, -inner);
+    wall(-outer, inner, outer, outer);
+    wall(-outer, -inner, -inner, inner);
+    wall(inner, -inner, outer, inner);
+    let floor_right = Vec3::Z * inner;
+    builder.rectangle(Vec3::ZERO, floor_right, Vec3::X * inner, Vec3::new(200.0, 60.0, 50.0));
+    builder.cuboid(Vec3::new(-0.2, 0.0, -0.2), Vec3::new(0.2, 0.8, 0.2), Vec3::new(70.0, 90.0, 200.0));
+    builder.into_scene("courtyard", Material::default())
+}
+
+/// A frame around the walls, so that only the floor lies in the plane of the yard's floor.
+fn add_ground(builder: &mut MeshBuilder) {
+    const REACH_M: f32 = 8.0;
+    let half_strip = (REACH_M - HALF_WIDTH_M) * 0.5;
+    let middle = HALF_WIDTH_M + half_strip;
+    let grass = Vec3::new(110.0, 128.0, 84.0);
+    for side in [-1.0, 1.0] {
+        builder.rectangle(Vec3::X * (side * middle), Vec3::Z * HALF_WIDTH_M, Vec3::X * half_strip, grass);
+        builder.rectangle(Vec3::Z * (side * middle), Vec3::Z * half_strip, Vec3::X * REACH_M, grass);
+    }
 }

@@ -2,9 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-use super::mesh_builder::{MeshBuilder, vertex};
-use super::noise::{Noise, lerp, mix, smoothstep};
-use super::rng::Rng;
+use super::geometry::{MeshBuilder, vertex};
+use super::random::{Noise, Rng, lerp, mix, smoothstep};
 use crate::Mesh;
 
 /// Ground heights, metres above y = 0; between 0 and 0.3.
@@ -36,19 +35,13 @@ impl Terrain {
             (0..side * side).map(|i| self.height_m(grid_point(i % side, i / side, cells))).collect();
         let mut rng = Rng::new(self.seed, 11);
         let mut builder = MeshBuilder::default();
-        for row in 0..side {
-            for column in 0..side {
-                let at = grid_point(column, row, cells);
-                let height_m = heights[(row * side + column) as usize];
-                let normal = normal_on_grid(&heights, column, row, cells);
-                let color = self.color_srgb(at, height_m, normal, rng.unit());
-                builder.push(vertex(Vec3::new(at.x, height_m, at.y), normal, color));
-            }
-        }
-        for cell in 0..cells * cells {
-            let corner = cell / cells * side + cell % cells;
-            builder.quad([corner, corner + side, corner + side + 1, corner + 1]);
-        }
+        builder.grid(cells, |column, row| {
+            let at = grid_point(column, row, cells);
+            let height_m = heights[(row * side + column) as usize];
+            let normal = normal_on_grid(&heights, column, row, cells);
+            let color = self.color_srgb(at, height_m, normal, rng.unit());
+            vertex(Vec3::new(at.x, height_m, at.y), normal, color)
+        });
         builder.finish_part(0);
         builder.into_mesh()
     }

@@ -3,6 +3,7 @@
 
 use glam::{Affine3A, Vec2, Vec3};
 
+use super::geometry::matt;
 use super::terrain::Terrain;
 use super::tree::{TreePlan, tree_mesh};
 use crate::light_rig::SOFT_SUN_RAD;
@@ -18,10 +19,6 @@ const TREE_HEIGHT_M: f32 = 0.8;
 const ENVIRONMENT: Environment =
     Environment { zenith_linear: Vec3::new(0.220, 0.258, 0.312), nadir_linear: Vec3::new(0.10, 0.09, 0.06) };
 
-// The ground has material 0.
-const BARK_MATERIAL: u32 = 1;
-const LEAF_MATERIAL: u32 = 2;
-
 /// A tree on a hilly meadow of 2 m × 2 m, within x, z in [-1, 1] and y in [0, 1]. Half of the triangles are ground and
 /// half are tree. The count is met within 3 % from some 10,000 triangles up. The scene is static: see
 /// [`Scene::with_wind`].
@@ -35,8 +32,6 @@ pub fn tree_terrain(triangles: u32, seed: u64) -> Scene {
         foot_in_world: Vec3::new(TREE_FOOT.x, foot_y_m - 0.012, TREE_FOOT.y),
         height_m: TREE_HEIGHT_M.min(CEILING_M - foot_y_m),
         triangles: triangles.saturating_sub(2 * cells * cells),
-        bark_material: BARK_MATERIAL,
-        leaf_material: LEAF_MATERIAL,
     };
     let meshes = vec![terrain.mesh(cells), tree_mesh(&plan, seed)];
     Scene {
@@ -68,16 +63,13 @@ impl Scene {
 /// All materials are matt under GGX, leaves too. The paper's scene then has no view-dependent light, and its samples
 /// need no planes for it. The paper's highlights belong to `phong` lighting.
 fn materials() -> Vec<Material> {
-    let matt = |name: &str, phong_specular: f32, phong_exponent: f32| Material {
-        name: name.into(),
-        metallic: 0.0,
-        roughness: 1.0,
+    let shining = |name: &str, phong_specular: f32, phong_exponent: f32| Material {
         phong_specular,
         phong_exponent,
-        ..Material::default()
+        ..matt(name)
     };
-    let leaves = Material { double_sided: true, ..matt("leaves", 0.10, 20.0) };
-    vec![matt("ground", 0.02, 8.0), matt("bark", 0.05, 12.0), leaves]
+    let leaves = Material { double_sided: true, ..shining("leaves", 0.10, 20.0) };
+    vec![shining("ground", 0.02, 8.0), shining("bark", 0.05, 12.0), leaves]
 }
 
 /// A late sun, and a weak lamp on the shaded side. The lamp appears twice as wide as the sun from the tree, because a

@@ -42,11 +42,13 @@ pub(super) fn placed(
     let color = color(json).map_err(wrong)?;
     let backwards = (source_from_node.matrix3 * DVec3::Z).try_normalize().map(|v| v.as_vec3());
     let no_direction = LightError { field: "direction", reason: "its node's transform leaves none" };
-    let backwards = backwards.ok_or(no_direction);
+    let backwards = backwards.ok_or_else(|| wrong(no_direction));
     let light = match kind {
-        Type::Directional => directional(color, backwards.map_err(wrong)?),
+        Type::Directional => {
+            Light::Directional { towards_light_in_world: backwards?, irradiance_linear: color, angular_radius_rad: 0.0 }
+        }
         Type::Point => Light::Point { position_in_world: Vec3::ZERO, intensity_linear: color, radius_m: 0.0 },
-        Type::Spot => spot(json, color, -backwards.map_err(wrong)?).map_err(wrong)?,
+        Type::Spot => spot(json, color, -backwards?).map_err(wrong)?,
     };
     light.validate().map_err(wrong)?;
     Ok(SourceLight { light, position_in_source: source_from_node.translation })
@@ -58,10 +60,6 @@ fn color(light: &JsonLight) -> Result<Vec3, LightError> {
     require(color.min_element() >= 0.0 && color.is_finite(), "color", "negative or not finite")?;
     require(light.intensity >= 0.0 && light.intensity.is_finite(), "intensity", "negative or not finite")?;
     Ok(color * light.intensity * FRAC_1_PI)
-}
-
-fn directional(irradiance_linear: Vec3, towards_light_in_world: Vec3) -> Light {
-    Light::Directional { towards_light_in_world, irradiance_linear, angular_radius_rad: 0.0 }
 }
 
 fn spot(light: &JsonLight, intensity_linear: Vec3, forward_in_world: Vec3) -> Result<Light, LightError> {

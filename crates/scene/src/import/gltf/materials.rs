@@ -12,30 +12,24 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
 use super::super::clamped::{all_clamped, clamped};
-use super::super::folder::Folder;
 use super::super::picture::{EncodedPicture, decode_all};
 use super::super::source_scene::SourceScene;
-use super::accessors::{Buffers, read_uri};
+use super::document::Document;
 use crate::error::Fault;
-use crate::{Limits, Material, Texture};
+use crate::{Material, Texture};
 
 /// The cut-off of `alphaMode: BLEND`. There is no blending, since a depth image holds one surface a texel.
 const BLEND_CUTOFF: f32 = 0.5;
 
 /// Fills the scene's materials, one more than the file's (its default), and its textures.
-pub(super) fn read(
-    root: &Root,
-    buffers: &Buffers,
-    folder: &Folder,
-    limits: &Limits,
-    scene: &mut SourceScene,
-) -> Result<(), Fault> {
+pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<(), Fault> {
+    let root = document.root;
     let mut pictures = Pictures::default();
     let uses =
         root.materials.iter().enumerate().map(|(i, m)| Uses::of(root, m, &mut pictures, &format!("material {i}")));
     let uses: Vec<_> = uses.collect::<Result<_, _>>()?;
-    let encoded = pictures.uses.iter().map(|&(image, is_srgb)| encoded_picture(root, buffers, folder, image, is_srgb));
-    let textures = decode_all(&encoded.collect::<Result<Vec<_>, _>>()?, limits)?;
+    let encoded = pictures.uses.iter().map(|&(image, is_srgb)| encoded_picture(document, image, is_srgb));
+    let textures = decode_all(&encoded.collect::<Result<Vec<_>, _>>()?, document.limits)?;
     let means = Means::of(&textures);
     for (number, (material, uses)) in root.materials.iter().zip(&uses).enumerate() {
         scene.materials.push(converted(material, uses, &means, number)?);
@@ -133,21 +127,13 @@ impl Uses {
     }
 }
 
-fn encoded_picture(
-    root: &Root,
-    buffers: &Buffers,
-    folder: &Folder,
-    index: Index<Image>,
-    is_srgb: bool,
-) -> Result<EncodedPicture, Fault> {
+fn encoded_picture(document: &Document, index: Index<Image>, is_srgb: bool) -> Result<EncodedPicture, Fault> {
     let element = format!("image {}", index.value());
-    let image = root.get(index).ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
+    let image = document.root.get(index).ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
     let bytes = match (&image.uri, image.buffer_view) {
-        (Some(uri), _) => read_uri(&element, uri, folder)?,
-        (None, Some(view)) => buffers.view(root, view, &element)?.bytes.to_vec(),
-        (None, None) => {
-            return Err(Fault::malformed(element, "it has neither a uri nor a buffer view"));
-        }
+        (Some(uri), _) => document.read_uri(&element, uri)?,
+        (None, Some(view)) => document.view(view, &element)?.1.to_vec(),
+        (None, None) => return Err(Fault::malformed(element, "it has neither a uri nor a buffer view")),
     };
     Ok(EncodedPicture { element, bytes, is_srgb })
 }
@@ -206,11 +192,8 @@ impl MetallicRoughness {
         let mean = [metallic * of_texture.z, roughness * of_texture.y];
         let base = pbr.base_color_texture.as_ref();
         let has_own_coordinates = base.is_some() && uv_of(base) != uv_of(pbr.metallic_roughness_texture.as_ref());
-        Ok(if has_own_coordinates {
-            Self { factors: mean, texture: None, mean }
-        } else {
-            Self { factors, texture: Some(place as u32), mean }
-        })
+        let (factors, texture) = if has_own_coordinates { (mean, None) } else { (factors, Some(place as u32)) };
+        Ok(Self { factors, texture, mean })
     }
 }
 

@@ -24,36 +24,68 @@
 //! the sum is within two stops of white, lights stay unchanged. Otherwise one factor makes the sum white, which keeps
 //! the lights' ratios. Emissive surfaces are not exposed: in files they are relative to white already.
 
-mod accessors;
-mod container;
+mod document;
 mod lights;
 mod materials;
 mod nodes;
 mod primitives;
 
+use gltf::binary::Glb;
 use gltf::json::Root;
 
 use super::folder::Folder;
 use super::source_scene::{SourceMesh, SourceScene};
 use crate::Limits;
 use crate::error::{Fault, at_most};
-use accessors::Buffers;
+use document::Document;
 
 /// Extensions that a file may require.
 const SUPPORTED_EXTENSIONS: [&str; 4] =
     ["KHR_materials_unlit", "KHR_materials_emissive_strength", "KHR_texture_transform", "KHR_lights_punctual"];
 
+const GLB_MAGIC: &[u8] = b"glTF";
+const GLB_HEADER_BYTES: u32 = 12;
+
 pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
-    let (root, binary_chunk) = container::parse(bytes, limits)?;
+    let (root, binary_chunk) = parsed(bytes, limits)?;
     refuse_unknown_requirements(&root)?;
     check_counts(&root, limits)?;
-    let buffers = Buffers::load(&root, binary_chunk, folder, limits)?;
+    let document = Document::open(&root, binary_chunk, folder, limits)?;
     let mut scene = SourceScene::default();
-    materials::read(&root, &buffers, folder, limits, &mut scene)?;
-    read_meshes(&root, &buffers, &mut scene)?;
+    materials::read(&document, &mut scene)?;
+    read_meshes(&document, &mut scene)?;
     nodes::read(&root, limits, &mut scene)?;
     lights::expose(&mut scene);
     Ok(scene)
+}
+
+/// The JSON and the binary chunk of a file.
+fn parsed<'a>(bytes: &'a [u8], limits: &Limits) -> Result<(Root, Option<&'a [u8]>), Fault> {
+    let (json, binary_chunk) = if bytes.starts_with(GLB_MAGIC) { split(bytes)? } else { (bytes, None) };
+    // Each object of the JSON, even `{}`, becomes a struct of some hundred bytes.
+    let objects = json.iter().filter(|&&b| b == b'{').count();
+    at_most("JSON objects", objects as u64, limits.json_objects)?;
+    let root = Root::from_slice(json).map_err(|e| Fault::malformed("JSON", e.to_string()))?;
+    if !root.asset.version.starts_with("2.") {
+        return Err(Fault::unsupported("asset", format!("glTF version {}", root.asset.version)));
+    }
+    Ok((root, binary_chunk))
+}
+
+fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
+    let length = bytes.get(8..12).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes);
+    if length < GLB_HEADER_BYTES {
+        // The crate subtracts the header's size unchecked.
+        return Err(Fault::malformed("GLB header", "the length is smaller than the header"));
+    }
+    let glb = Glb::from_slice(bytes).map_err(|e| Fault::malformed("GLB header", e.to_string()))?;
+    // A slice only gives the borrowed form; an owned one would not outlive this function.
+    let borrowed = |chunk| match chunk {
+        std::borrow::Cow::Borrowed(slice) => Some(slice),
+        std::borrow::Cow::Owned(_) => None,
+    };
+    let json = borrowed(glb.json).ok_or_else(|| Fault::malformed("GLB", "no JSON chunk"))?;
+    Ok((json, glb.bin.and_then(borrowed)))
 }
 
 fn refuse_unknown_requirements(root: &Root) -> Result<(), Fault> {
@@ -69,14 +101,14 @@ fn check_counts(root: &Root, limits: &Limits) -> Result<(), Fault> {
 }
 
 /// Mesh `i` of the file becomes mesh `i` of the scene; a mesh of lines alone stays empty.
-fn read_meshes(root: &Root, buffers: &Buffers, scene: &mut SourceScene) -> Result<(), Fault> {
-    for (number, mesh) in root.meshes.iter().enumerate() {
+fn read_meshes(document: &Document, scene: &mut SourceScene) -> Result<(), Fault> {
+    for (number, mesh) in document.root.meshes.iter().enumerate() {
         let mut merged = SourceMesh::default();
         for (part, primitive) in mesh.primitives.iter().enumerate() {
             let element = format!("mesh {number}, primitive {part}");
-            let uv = materials::uv_source(root, primitive.material);
-            let material = materials::material_number(root, primitive.material, &element)?;
-            if let Some(geometry) = primitives::read(root, buffers, primitive, &uv, &element)? {
+            let uv = materials::uv_source(document.root, primitive.material);
+            let material = materials::material_number(document.root, primitive.material, &element)?;
+            if let Some(geometry) = primitives::read(document, primitive, &uv, &element)? {
                 merged.append_part(geometry, material);
             }
         }

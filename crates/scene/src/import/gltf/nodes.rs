@@ -1,9 +1,11 @@
 //! The node tree: the places of meshes, lights and cameras.
 
+use std::collections::HashSet;
+
 use glam::{DAffine3, DMat4, DQuat, DVec3, Mat4, Quat, Vec3};
 use gltf::json::{Index, Node, Root, Scene as JsonScene};
 
-use super::super::source_scene::{PlacedCamera, SourceInstance, SourceScene};
+use super::super::source_scene::{PlacedCamera, SourceInstance, SourceScene, is_invertible};
 use super::lights;
 use crate::Limits;
 use crate::error::{Fault, at_most};
@@ -21,7 +23,7 @@ pub(super) fn read(root: &Root, limits: &Limits, scene: &mut SourceScene) -> Res
             return Err(Fault::malformed(element, "it is reached twice: a cycle, or two parents"));
         }
         let source_from_node = source_from_parent * parent_from_node(node, &element)?;
-        place(root, node, source_from_node, &element, scene)?;
+        add_contents(root, node, &Place { element, source_from_node }, scene)?;
         let children = node.children.iter().flatten();
         pending.extend(children.map(|&child| (child, source_from_node, depth + 1)));
     }
@@ -34,46 +36,39 @@ fn roots(root: &Root) -> Result<Vec<Index<Node>>, Fault> {
         let scene: Option<&JsonScene> = root.get(index);
         return scene.map(|s| s.nodes.clone()).ok_or_else(|| Fault::malformed("default scene", "it does not exist"));
     }
-    let mut is_child = vec![false; root.nodes.len()];
-    for child in root.nodes.iter().flat_map(|n| n.children.iter().flatten()) {
-        if let Some(flag) = is_child.get_mut(child.value()) {
-            *flag = true;
-        }
-    }
-    Ok((0..root.nodes.len()).filter(|&i| !is_child[i]).map(|i| Index::new(i as u32)).collect())
+    let children = root.nodes.iter().flat_map(|n| n.children.iter().flatten());
+    let children: HashSet<usize> = children.map(|child| child.value()).collect();
+    Ok((0..root.nodes.len()).filter(|i| !children.contains(i)).map(|i| Index::new(i as u32)).collect())
 }
 
-fn place(
-    root: &Root,
-    node: &Node,
+/// A node's name in messages, and its transform.
+struct Place {
+    element: String,
     source_from_node: DAffine3,
-    element: &str,
-    scene: &mut SourceScene,
-) -> Result<(), Fault> {
-    if let Some(mesh) = node.mesh {
-        let mesh = mesh.value();
-        let triangles = scene.meshes.get(mesh).map(|m| m.indices.len());
-        let triangles = triangles.ok_or_else(|| Fault::malformed(element, format!("mesh {mesh} does not exist")))?;
-        if triangles > 0 {
-            refuse_singular(&source_from_node, element)?;
-            scene.instances.push(SourceInstance { mesh, source_from_mesh: source_from_node });
+}
+
+impl Place {
+    fn require_invertible(&self) -> Result<(), Fault> {
+        let singular = || Fault::malformed(&self.element, "its transform is singular or not finite");
+        is_invertible(&self.source_from_node).then_some(()).ok_or_else(singular)
+    }
+}
+
+fn add_contents(root: &Root, node: &Node, place: &Place, scene: &mut SourceScene) -> Result<(), Fault> {
+    if let Some(mesh) = node.mesh.map(|mesh| mesh.value()) {
+        let missing = || Fault::malformed(&place.element, format!("mesh {mesh} does not exist"));
+        if !scene.meshes.get(mesh).ok_or_else(missing)?.indices.is_empty() {
+            place.require_invertible()?;
+            scene.instances.push(SourceInstance { mesh, source_from_mesh: place.source_from_node });
         }
     }
     if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
-        scene.lights.push(lights::placed(root, light.light, &source_from_node, element)?);
+        scene.lights.push(lights::placed(root, light.light, &place.source_from_node, &place.element)?);
     }
     if node.camera.is_some() {
-        scene.cameras.extend(placed_camera(root, node, &source_from_node, element)?);
+        scene.cameras.extend(placed_camera(root, node, place)?);
     }
     Ok(())
-}
-
-fn refuse_singular(source_from_node: &DAffine3, element: &str) -> Result<(), Fault> {
-    if super::super::source_scene::is_invertible(source_from_node) {
-        Ok(())
-    } else {
-        Err(Fault::malformed(element, "its transform is singular or not finite"))
-    }
 }
 
 fn parent_from_node(node: &Node, element: &str) -> Result<DAffine3, Fault> {
@@ -100,25 +95,20 @@ fn from_parts(node: &Node) -> Option<DAffine3> {
 }
 
 /// `None` for an orthographic camera. The pose is rigid: a node's scale does not affect a view.
-fn placed_camera(
-    root: &Root,
-    node: &Node,
-    source_from_node: &DAffine3,
-    element: &str,
-) -> Result<Option<PlacedCamera>, Fault> {
+fn placed_camera(root: &Root, node: &Node, place: &Place) -> Result<Option<PlacedCamera>, Fault> {
     let camera = node.camera.and_then(|index| root.get(index));
-    let camera = camera.ok_or_else(|| Fault::malformed(element, "its camera does not exist"))?;
+    let camera = camera.ok_or_else(|| Fault::malformed(&place.element, "its camera does not exist"))?;
     let Some(perspective) = &camera.perspective else {
         return Ok(None);
     };
-    refuse_singular(source_from_node, element)?;
-    let backwards = (source_from_node.matrix3 * DVec3::Z).normalize_or(DVec3::Z);
-    let right = (source_from_node.matrix3 * DVec3::Y).cross(backwards).normalize_or(DVec3::X);
+    place.require_invertible()?;
+    let backwards = (place.source_from_node.matrix3 * DVec3::Z).normalize_or(DVec3::Z);
+    let right = (place.source_from_node.matrix3 * DVec3::Y).cross(backwards).normalize_or(DVec3::X);
     let rotation = glam::DMat3::from_cols(right, backwards.cross(right), backwards);
     let fallback = || format!("camera {}", node.camera.map_or(0, |c| c.value()));
     Ok(Some(PlacedCamera {
         name: camera.name.clone().or_else(|| node.name.clone()).unwrap_or_else(fallback),
-        source_from_camera: DAffine3::from_mat3_translation(rotation, source_from_node.translation),
+        source_from_camera: DAffine3::from_mat3_translation(rotation, place.source_from_node.translation),
         fov_y_rad: perspective.yfov,
     }))
 }

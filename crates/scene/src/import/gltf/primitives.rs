@@ -1,22 +1,21 @@
 //! A primitive's triangles.
 
 use depth_image::srgb8_from_linear;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
+use gltf::json::Index;
 use gltf::json::accessor::Accessor;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Root};
 
 use super::super::normals;
 use super::super::source_scene::{SourceMesh, plain_vertex};
-use super::accessors::Buffers;
+use super::document::Document;
 use super::materials::UvSource;
 use crate::error::Fault;
 
 /// `None` for points and lines.
 pub(super) fn read(
-    root: &Root,
-    buffers: &Buffers,
+    document: &Document,
     primitive: &Primitive,
     uv: &UvSource,
     element: &str,
@@ -29,93 +28,55 @@ pub(super) fn read(
     }
     let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
     let position = attribute(Semantic::Positions).ok_or_else(|| Fault::malformed(element, "it has no POSITION"))?;
-    let positions = buffers.floats::<3>(root, position, element)?;
-    let mut mesh = SourceMesh {
-        vertices: vec![plain_vertex(); positions.len()],
-        positions_in_mesh: positions.iter().map(|p| Vec3::from(*p).as_dvec3()).collect(),
-        indices: triangles(root, buffers, primitive.indices, mode, positions.len(), element)?,
-        parts: Vec::new(),
-    };
+    let positions = document.floats::<3>(position, element)?;
+    let indices = triangles(document, primitive.indices, mode, positions.len(), element)?;
+    let mut vertices = vec![plain_vertex(); positions.len()];
     if let Some(index) = attribute(Semantic::TexCoords(uv.set)) {
-        read_uvs(root, buffers, index, uv, &mut mesh, element)?;
+        let uvs = same_count(document.floats::<2>(index, element)?, positions.len(), "TEXCOORD", element)?;
+        vertices.iter_mut().zip(uvs).for_each(|(v, at)| v.uv = uv.apply(at));
     }
     if let Some(index) = attribute(Semantic::Colors(0)) {
-        read_colors(root, buffers, index, &mut mesh, element)?;
+        let colors = same_count(linear_colors(document, index, element)?, positions.len(), "COLOR_0", element)?;
+        vertices.iter_mut().zip(colors).for_each(|(v, linear)| v.color_srgba8 = srgba8_from_linear(linear));
     }
-    drop_unused(&mut mesh, |mesh| read_normals(root, buffers, attribute(Semantic::Normals), mesh, element))?;
+    let normals = attribute(Semantic::Normals);
+    if let Some(index) = normals {
+        let normals = same_count(document.floats::<3>(index, element)?, positions.len(), "NORMAL", element)?;
+        if normals.iter().any(|n| !Vec3::from(*n).is_finite()) {
+            return Err(Fault::malformed(element, "a normal is not finite"));
+        }
+        vertices.iter_mut().zip(normals).for_each(|(v, normal)| v.normal = normal);
+    }
+    let positions_in_mesh = positions.iter().map(|p| Vec3::from(*p).as_dvec3()).collect();
+    let mut mesh = SourceMesh { vertices, positions_in_mesh, indices, parts: Vec::new() };
+    drop_unused(&mut mesh);
+    if mesh.positions_in_mesh.iter().all(|p| p.is_finite()) {
+        normals::complete(&mut mesh, normals.is_some(), normals::FLAT);
+    }
     Ok(Some(mesh))
 }
 
-fn read_normals(
-    root: &Root,
-    buffers: &Buffers,
-    index: Option<Index<Accessor>>,
-    mesh: &mut SourceMesh,
-    element: &str,
-) -> Result<bool, Fault> {
-    let Some(index) = index else { return Ok(false) };
-    let normals = same_count(buffers.floats::<3>(root, index, element)?, mesh, "NORMAL", element)?;
-    if normals.iter().any(|n| !Vec3::from(*n).is_finite()) {
-        return Err(Fault::malformed(element, "a normal is not finite"));
-    }
-    mesh.vertices.iter_mut().zip(normals).for_each(|(v, normal)| v.normal = normal);
-    Ok(true)
-}
-
 /// Keeps the vertices that the triangles use: primitives may share one large set.
-fn drop_unused(
-    mesh: &mut SourceMesh,
-    read_normals: impl FnOnce(&mut SourceMesh) -> Result<bool, Fault>,
-) -> Result<(), Fault> {
-    let has_normals = read_normals(mesh)?;
-    let mut is_used = vec![false; mesh.vertices.len()];
-    mesh.indices.iter().for_each(|&i| is_used[i as usize] = true);
-    let mut new_number = vec![0u32; is_used.len()];
-    let mut kept = 0u32;
-    for (number, &used) in new_number.iter_mut().zip(&is_used) {
-        *number = kept;
-        kept += u32::from(used);
-    }
-    let mut at = is_used.iter();
-    mesh.vertices.retain(|_| at.next().is_some_and(|&used| used));
-    let mut at = is_used.iter();
-    mesh.positions_in_mesh.retain(|_| at.next().is_some_and(|&used| used));
+fn drop_unused(mesh: &mut SourceMesh) {
+    const UNUSED: u32 = u32::MAX;
+    let mut new_number = vec![UNUSED; mesh.vertices.len()];
+    mesh.indices.iter().for_each(|&i| new_number[i as usize] = 0);
+    let used = new_number.iter_mut().filter(|number| **number != UNUSED);
+    used.zip(0..).for_each(|(number, kept)| *number = kept);
+    let mut at = new_number.iter();
+    mesh.vertices.retain(|_| at.next() != Some(&UNUSED));
+    let mut at = new_number.iter();
+    mesh.positions_in_mesh.retain(|_| at.next() != Some(&UNUSED));
     mesh.indices.iter_mut().for_each(|i| *i = new_number[*i as usize]);
-    if mesh.positions_in_mesh.iter().all(|p: &DVec3| p.is_finite()) {
-        if has_normals { normals::repair(mesh) } else { normals::generate(mesh, normals::FLAT) }
-    }
-    Ok(())
 }
 
-fn read_uvs(
-    root: &Root,
-    buffers: &Buffers,
-    index: Index<Accessor>,
-    uv: &UvSource,
-    mesh: &mut SourceMesh,
-    element: &str,
-) -> Result<(), Fault> {
-    let uvs = same_count(buffers.floats::<2>(root, index, element)?, mesh, "TEXCOORD", element)?;
-    mesh.vertices.iter_mut().zip(uvs).for_each(|(v, at)| v.uv = uv.apply(at));
-    Ok(())
-}
-
-fn read_colors(
-    root: &Root,
-    buffers: &Buffers,
-    index: Index<Accessor>,
-    mesh: &mut SourceMesh,
-    element: &str,
-) -> Result<(), Fault> {
-    let colors = if buffers.component_count(root, index, element)? == 3 {
-        let rgb = buffers.floats::<3>(root, index, element)?;
-        rgb.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
+fn linear_colors(document: &Document, index: Index<Accessor>, element: &str) -> Result<Vec<[f32; 4]>, Fault> {
+    if document.component_count(index, element)? == 3 {
+        let rgb = document.floats::<3>(index, element)?;
+        Ok(rgb.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect())
     } else {
-        buffers.floats::<4>(root, index, element)?
-    };
-    let colors = same_count(colors, mesh, "COLOR_0", element)?;
-    mesh.vertices.iter_mut().zip(colors).for_each(|(v, linear)| v.color_srgba8 = srgba8_from_linear(linear));
-    Ok(())
+        document.floats::<4>(index, element)
+    }
 }
 
 fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {
@@ -123,25 +84,21 @@ fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {
     [r, g, b, (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
 }
 
-fn same_count<T>(items: Vec<T>, mesh: &SourceMesh, what: &str, element: &str) -> Result<Vec<T>, Fault> {
-    let (has, needs) = (items.len(), mesh.vertices.len());
-    if has == needs {
-        Ok(items)
-    } else {
-        Err(Fault::malformed(element, format!("{what} has {has} elements, POSITION {needs}")))
-    }
+fn same_count<T>(items: Vec<T>, needs: usize, what: &str, element: &str) -> Result<Vec<T>, Fault> {
+    let has = items.len();
+    let wrong = || Fault::malformed(element, format!("{what} has {has} elements, POSITION {needs}"));
+    (has == needs).then_some(items).ok_or_else(wrong)
 }
 
 fn triangles(
-    root: &Root,
-    buffers: &Buffers,
+    document: &Document,
     index: Option<Index<Accessor>>,
     mode: Mode,
     vertex_count: usize,
     element: &str,
 ) -> Result<Vec<u32>, Fault> {
     let indices = match index {
-        Some(index) => buffers.indices(root, index, element)?,
+        Some(index) => document.indices(index, element)?,
         None => (0..vertex_count as u32).collect(),
     };
     if let Some(bad) = indices.iter().find(|&&i| i as usize >= vertex_count) {

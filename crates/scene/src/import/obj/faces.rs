@@ -1,11 +1,12 @@
-//! Indexed triangles from polygons.
+//! The numbered elements of a file, and indexed triangles from polygons of them.
 
 use std::collections::HashMap;
 
+use glam::DVec3;
+
 use super::super::normals;
 use super::super::source_scene::{SourceMesh, plain_vertex};
-use super::attributes::Attributes;
-use super::text::Line;
+use super::text::{Line, floats};
 use crate::error::{Fault, at_most};
 use crate::{Limits, MeshPart, Vertex};
 
@@ -44,9 +45,8 @@ impl Faces {
         let material = self.current_material.unwrap_or(0);
         let mut words = line.rest.split_ascii_whitespace();
         let mut next = |faces: &mut Self| words.next().map(|word| faces.vertex(word, line, attributes)).transpose();
-        let (Some(hub), Some(mut last)) = (next(self)?, next(self)?) else {
-            return Err(Fault::malformed(line, "a face of fewer than three corners"));
-        };
+        let too_few = || Fault::malformed(line, "a face of fewer than three corners");
+        let (Some(hub), Some(mut last)) = (next(self)?, next(self)?) else { return Err(too_few()) };
         let before = self.triangle_count;
         while let Some(corner) = next(self)? {
             self.indices_of_material[material].extend([hub, last, corner]);
@@ -55,11 +55,7 @@ impl Faces {
         }
         at_most(line, self.triangle_count, limits.triangles)?;
         at_most(line, self.mesh.vertices.len() as u64, limits.vertices)?;
-        if self.triangle_count == before {
-            Err(Fault::malformed(line, "a face of fewer than three corners"))
-        } else {
-            Ok(())
-        }
+        if self.triangle_count > before { Ok(()) } else { Err(too_few()) }
     }
 
     pub(super) fn into_mesh(mut self, material_numbers: &[u32]) -> Result<SourceMesh, Fault> {
@@ -67,7 +63,8 @@ impl Faces {
         if self.mesh.indices.len() > u32::MAX as usize {
             return Err(Fault::unsupported("faces", "more than 2^32 corners"));
         }
-        Ok(with_normals(self.mesh, self.has_normals))
+        normals::complete(&mut self.mesh, self.has_normals, normals::CREASE_60_DEGREES);
+        Ok(self.mesh)
     }
 
     fn vertex(&mut self, word: &str, line: &Line, attributes: &Attributes) -> Result<u32, Fault> {
@@ -84,7 +81,32 @@ impl Faces {
     }
 }
 
+/// The numbered elements that faces refer to.
+#[derive(Default)]
+pub(super) struct Attributes {
+    pub(super) positions_in_source: Vec<DVec3>,
+    /// Colours, one for each position once any position has one.
+    pub(super) colors_srgba8: Vec<[u8; 4]>,
+    pub(super) uvs: Vec<[f32; 2]>,
+    pub(super) normals: Vec<[f32; 3]>,
+}
+
 impl Attributes {
+    /// `v x y z`, optionally followed by a weight or a colour, as several programs write it.
+    pub(super) fn push_position(&mut self, line: &Line) -> Result<(), Fault> {
+        let [x, y, z, a, g, b] = floats::<6>(line, 3)?;
+        let position = DVec3::new(x, y, z);
+        let count = line.rest.split_ascii_whitespace().count();
+        if count >= 6 {
+            self.colors_srgba8.resize(self.positions_in_source.len(), [255; 4]);
+            let [r, g, b] = [a, g, b].map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
+            self.colors_srgba8.push([r, g, b, 255]);
+        }
+        let is_weighted = count == 4 && a != 0.0;
+        self.positions_in_source.push(if is_weighted { position / a } else { position });
+        Ok(())
+    }
+
     fn vertex(&self, [position, uv, normal]: Corner) -> Vertex {
         let plain = plain_vertex();
         Vertex {
@@ -129,14 +151,4 @@ fn parts_of(indices_of_material: Vec<Vec<u32>>, numbers: &[u32]) -> (Vec<u32>, V
         }
     }
     (indices, parts)
-}
-
-/// Makes normals for a file without normals, and fills gaps otherwise.
-fn with_normals(mut mesh: SourceMesh, has_normals: bool) -> SourceMesh {
-    if has_normals {
-        normals::repair(&mut mesh)
-    } else {
-        normals::generate(&mut mesh, normals::CREASE_60_DEGREES)
-    }
-    mesh
 }

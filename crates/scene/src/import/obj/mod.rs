@@ -7,7 +7,6 @@
 //! Polygons become fans. Missing normals are smooth up to creases of 60°. Axes are kept. Points, lines, free-form
 //! curves and smoothing groups are skipped. A missing material library gives default materials.
 
-mod attributes;
 mod faces;
 mod mtl;
 mod text;
@@ -18,8 +17,7 @@ use super::folder::Folder;
 use super::source_scene::{SourceInstance, SourceScene};
 use crate::Limits;
 use crate::error::{Fault, at_most};
-use attributes::Attributes;
-use faces::Faces;
+use faces::{Attributes, Faces};
 use text::{Line, floats};
 
 pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {

@@ -145,11 +145,6 @@ impl Textures {
 
 /// `None` for a file that does not exist.
 fn existing(read: Result<Vec<u8>, Fault>) -> Result<Option<Vec<u8>>, Fault> {
-    match read {
-        Ok(bytes) => Ok(Some(bytes)),
-        Err(fault) => match fault.kind() {
-            SceneErrorKind::Io(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            _ => Err(fault),
-        },
-    }
+    let is_missing = |kind: &_| matches!(kind, SceneErrorKind::Io(e) if e.kind() == std::io::ErrorKind::NotFound);
+    read.map(Some).or_else(|fault| if is_missing(&fault.kind) { Ok(None) } else { Err(fault) })
 }

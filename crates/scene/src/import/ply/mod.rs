@@ -5,20 +5,18 @@
 //! smooth up to creases of 60°. Axes are kept. Other elements are skipped.
 
 mod header;
-mod rows;
 
 use std::io::{BufRead, Read};
 
-use glam::DAffine3;
-use serde::de::MapAccess;
+use glam::{DAffine3, DVec3};
+use serde::{Deserialize, de::MapAccess};
 use serde_ply::{PlyReader, RowVisitor};
 
 use super::folder::Folder;
 use super::normals;
-use super::source_scene::{SourceInstance, SourceMesh, SourceScene};
+use super::source_scene::{SourceInstance, SourceMesh, SourceScene, plain_vertex};
 use crate::error::{Fault, at_most};
-use crate::{Limits, Material, MeshPart};
-use rows::{FaceRow, SkippedRow, VertexRow};
+use crate::{Limits, Material, MeshPart, Vertex};
 
 pub(super) fn read(bytes: &[u8], _folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
     // The last number of an ASCII file may lack the white space that ends it.
@@ -28,11 +26,7 @@ pub(super) fn read(bytes: &[u8], _folder: &Folder, limits: &Limits) -> Result<So
     let (mut mesh, has_normals) = read_elements(reader, limits)?;
     let index_count = mesh.indices.len() as u32;
     mesh.parts.push(MeshPart { first_index: 0, index_count, material: 0 });
-    if has_normals {
-        normals::repair(&mut mesh)
-    } else {
-        normals::generate(&mut mesh, normals::CREASE_60_DEGREES)
-    }
+    normals::complete(&mut mesh, has_normals, normals::CREASE_60_DEGREES);
     Ok(SourceScene {
         meshes: vec![mesh],
         instances: vec![SourceInstance { mesh: 0, source_from_mesh: DAffine3::IDENTITY }],
@@ -87,7 +81,7 @@ fn read_faces(reader: &mut PlyReader<impl BufRead>, mesh: &mut SourceMesh, limit
 const TOO_MANY: &str = "too many triangles";
 
 /// Passes the rows of the reader's next element to `take`, up to the first that it refuses.
-fn each_row<'de, R: BufRead, T: serde::Deserialize<'de>>(
+fn each_row<'de, R: BufRead, T: Deserialize<'de>>(
     mut reader: &mut PlyReader<R>,
     mut take: impl FnMut(T) -> Result<(), String>,
 ) -> Result<(), String> {
@@ -101,5 +95,68 @@ fn each_row<'de, R: BufRead, T: serde::Deserialize<'de>>(
     match refused {
         Some(why) => Err(why),
         None => read.map_err(|e| e.0.to_string()),
+    }
+}
+
+/// A vertex of numbers of any type. Position and colour come first, and no field has an alias, so that `serde-ply`
+/// reads common rows by offset instead of by name. The header has shown that there is a position.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct VertexRow {
+    x: f64,
+    y: f64,
+    z: f64,
+    red: Option<f32>,
+    green: Option<f32>,
+    blue: Option<f32>,
+    alpha: Option<f32>,
+    nx: f32,
+    ny: f32,
+    nz: f32,
+    s: Option<f32>,
+    t: Option<f32>,
+    u: Option<f32>,
+    v: Option<f32>,
+    texture_u: Option<f32>,
+    texture_v: Option<f32>,
+}
+
+/// A polygon.
+#[derive(Deserialize)]
+struct FaceRow {
+    #[serde(alias = "vertex_index")]
+    vertex_indices: Vec<u32>,
+}
+
+/// A row of an element that scenes do not use.
+#[derive(Deserialize)]
+struct SkippedRow {}
+
+impl VertexRow {
+    fn vertex(&self, color_scale: f32) -> Result<(DVec3, Vertex), String> {
+        let position = DVec3::new(self.x, self.y, self.z);
+        let normal = [self.nx, self.ny, self.nz];
+        let u = self.s.or(self.u).or(self.texture_u).unwrap_or(0.0);
+        let v = self.t.or(self.v).or(self.texture_v).unwrap_or(0.0);
+        if !position.is_finite() || !normal.iter().chain(&[u, v]).all(|v| v.is_finite()) {
+            return Err("a position, normal or texture coordinate is not finite".into());
+        }
+        let byte = |channel: Option<f32>| channel.map_or(255, |c| (c * color_scale + 0.5) as u8);
+        let color_srgba8 = [byte(self.red), byte(self.green), byte(self.blue), byte(self.alpha)];
+        // PLY's v runs upwards.
+        Ok((position, Vertex { normal, uv: [u, 1.0 - v], color_srgba8, ..plain_vertex() }))
+    }
+}
+
+impl FaceRow {
+    fn append_fan(&self, indices: &mut Vec<u32>) -> Result<(), String> {
+        let [hub, rim @ ..] = self.vertex_indices.as_slice() else {
+            return Err("it has no corners".into());
+        };
+        if rim.len() < 2 {
+            return Err(format!("it has {} corners", rim.len() + 1));
+        }
+        indices.extend(rim.windows(2).flat_map(|edge| [*hub, edge[0], edge[1]]));
+        Ok(())
     }
 }

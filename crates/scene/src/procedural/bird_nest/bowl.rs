@@ -4,10 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3};
 
-use super::super::mesh_builder::{MeshBuilder, vertex};
-use super::super::noise::mix;
-use super::super::rng::{Rng, mixed};
-use super::super::solids::{on_ellipse, sweep_around};
+use super::super::geometry::{MeshBuilder, on_ellipse, vertex};
+use super::super::random::{Rng, mix, mixed};
 use super::shell::{SECTORS, SEED};
 
 /// Half axes of the front row, and of the rearmost one.
@@ -101,7 +99,7 @@ fn add_tier(builder: &mut MeshBuilder, number: usize, tier: &Tier) {
         let is_tread = i.is_multiple_of(2);
         if is_aisle { Vec3::splat(136.0) } else { seat * if is_tread { 0.72 } else { 1.0 } }
     };
-    sweep_around(builder, SECTORS, outline.len() as u32, point, colors);
+    builder.sweep_around(SECTORS, outline.len() as u32, point, colors);
 }
 
 impl Tier {
@@ -127,5 +125,5 @@ fn add_ring(builder: &mut MeshBuilder, [inner, outer]: [Vec2; 2], [low_m, high_m
         let (half_axes_m, y_m) = outline[i as usize];
         on_ellipse(half_axes_m, TAU * station as f32 / SECTORS as f32, y_m)
     };
-    sweep_around(builder, SECTORS, 4, point, |_, _| color_srgb);
+    builder.sweep_around(SECTORS, 4, point, |_, _| color_srgb);
 }

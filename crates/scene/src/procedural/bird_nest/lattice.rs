@@ -4,10 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 
-use super::super::mesh_builder::MeshBuilder;
-use super::super::noise::lerp;
-use super::super::rng::Rng;
-use super::super::solids::{Station, beam};
+use super::super::geometry::{MeshBuilder, Station};
+use super::super::random::{Rng, lerp};
 use super::shell::{self, SECTORS, SEED};
 
 const TRUSSES: u32 = 24;
@@ -20,7 +18,7 @@ const WEBS: u32 = 16;
 const SECONDARY_BEAMS: u32 = 120;
 const SECONDARY_PIECES: u32 = 10;
 const TERTIARY_PIECES: u32 = 5;
-/// Triangles of a tertiary beam, see [`beam`].
+/// Triangles of a tertiary beam, see [`MeshBuilder::beam`].
 const TERTIARY_TRIANGLES: u32 = 8 * TERTIARY_PIECES + 4;
 /// Shells of the tertiary beams, behind the outermost chords.
 const TERTIARY_SHELLS_M: [f32; 3] = [1.0, 3.4, 5.6];
@@ -42,7 +40,7 @@ impl Line {
 
     fn add(&self, builder: &mut MeshBuilder, pieces: u32, width_m: f32, depth_m: f32, color_srgb: Vec3) {
         let stations: Vec<Station> = (0..=pieces).map(|i| self.at(i as f32 / pieces as f32)).collect();
-        beam(builder, &stations, width_m, depth_m, color_srgb);
+        builder.beam(&stations, width_m, depth_m, color_srgb);
     }
 }
 
@@ -67,7 +65,7 @@ fn add_rim(builder: &mut MeshBuilder) {
     for inwards_m in [0.0, TRUSS_DEPTH_M] {
         let stations: Vec<Station> =
             (0..=SECTORS).map(|i| shell::station(TAU * i as f32 / SECTORS as f32, 1.0, inwards_m)).collect();
-        beam(builder, &stations, 2.4, 2.4, steel(0.9));
+        builder.beam(&stations, 2.4, 2.4, steel(0.9));
     }
 }
 
@@ -83,7 +81,7 @@ fn add_truss(builder: &mut MeshBuilder, outer: Line, rng: &mut Rng) {
         let (outside, inside) = (outer.at(outside), inner.at(inside));
         let aside = (inside.middle - outside.middle).any_orthonormal_vector();
         let ends = [outside.middle, inside.middle].map(|middle| Station { middle, up: aside });
-        beam(builder, &ends, 0.9, 0.9, color * 0.92);
+        builder.beam(&ends, 0.9, 0.9, color * 0.92);
     }
 }
 

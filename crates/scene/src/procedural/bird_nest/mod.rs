@@ -9,8 +9,7 @@ mod shell;
 
 use glam::Vec3;
 
-use super::mesh_builder::MeshBuilder;
-use super::solids::matt;
+use super::geometry::{MeshBuilder, matt};
 use crate::Scene;
 
 /// Number of triangles of the model in the paper's table 1.

@@ -2,8 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-use super::super::noise::lerp;
-use super::super::solids::{Station, on_ellipse};
+use super::super::geometry::{Station, on_ellipse};
+use super::super::random::lerp;
 
 /// The seed of all that is random in the model.
 pub(super) const SEED: u64 = 2008;

@@ -4,8 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 
-use super::super::mesh_builder::{MeshBuilder, vertex};
-use super::super::noise::{Noise, mix};
+use super::super::geometry::{MeshBuilder, vertex};
+use super::super::random::{Noise, mix};
 use super::skeleton::{Branch, LEVELS, Skeleton};
 use crate::Vertex;
 

@@ -2,9 +2,8 @@
 
 use glam::Vec3;
 
-use super::super::mesh_builder::{MeshBuilder, vertex};
-use super::super::noise::{Noise, lerp, mix};
-use super::super::rng::Rng;
+use super::super::geometry::{MeshBuilder, vertex};
+use super::super::random::{Noise, Rng, lerp, mix};
 use super::skeleton::{Branch, LEVELS, Skeleton};
 use crate::Vertex;
 

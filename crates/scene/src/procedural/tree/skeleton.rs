@@ -3,84 +3,29 @@
 
 use glam::{Quat, Vec3};
 
-use super::super::noise::lerp;
-use super::super::rng::Rng;
+use super::super::random::{Rng, lerp};
 
 /// Trunk, limbs, branches, shoots, twigs.
 pub(super) const LEVELS: usize = 5;
 
 const GOLDEN_ANGLE_RAD: f32 = 2.399_963;
 
-/// Growth parameters of the branches of a level.
-struct Habit {
-    knots: u32,
-    children: u32,
-    /// Place of the first child along the branch.
-    first_child: f32,
-    /// Change of direction a knot, at random.
-    wander: f32,
-    /// Change of direction a knot, upwards.
-    rise: f32,
-    /// Length as a share of the parent's.
-    length: f32,
-    /// Angle to the parent at its foot and at its tip.
-    angles_rad: [f32; 2],
-    /// Additional sway of the tip over the foot.
-    sway: f32,
-}
-
-const HABITS: [Habit; LEVELS] = [
-    Habit {
-        knots: 14,
-        children: 17,
-        first_child: 0.27,
-        wander: 0.07,
-        rise: 0.05,
-        length: 1.0,
-        angles_rad: [0.0; 2],
-        sway: 0.10,
-    },
-    Habit {
-        knots: 11,
-        children: 11,
-        first_child: 0.18,
-        wander: 0.13,
-        rise: 0.045,
-        length: 0.74,
-        angles_rad: [1.22, 0.55],
-        sway: 0.22,
-    },
-    Habit {
-        knots: 7,
-        children: 7,
-        first_child: 0.15,
-        wander: 0.16,
-        rise: 0.03,
-        length: 0.50,
-        angles_rad: [1.0, 0.6],
-        sway: 0.22,
-    },
-    Habit {
-        knots: 5,
-        children: 4,
-        first_child: 0.2,
-        wander: 0.2,
-        rise: 0.02,
-        length: 0.46,
-        angles_rad: [0.95, 0.6],
-        sway: 0.16,
-    },
-    Habit {
-        knots: 3,
-        children: 0,
-        first_child: 1.0,
-        wander: 0.2,
-        rise: -0.02,
-        length: 0.55,
-        angles_rad: [0.9, 0.5],
-        sway: 0.10,
-    },
-];
+// Growth of the branches of each level.
+/// Knots along a branch.
+const KNOTS: [u32; LEVELS] = [14, 11, 7, 5, 3];
+const CHILDREN: [u32; LEVELS] = [17, 11, 7, 4, 0];
+/// Place of the first child along the branch.
+const FIRST_CHILD: [f32; LEVELS] = [0.27, 0.18, 0.15, 0.2, 1.0];
+/// Change of direction a knot, at random.
+const WANDER: [f32; LEVELS] = [0.07, 0.13, 0.16, 0.2, 0.2];
+/// Change of direction a knot, upwards.
+const RISE: [f32; LEVELS] = [0.05, 0.045, 0.03, 0.02, -0.02];
+/// Length as a share of the parent's.
+const LENGTH: [f32; LEVELS] = [1.0, 0.74, 0.50, 0.46, 0.55];
+/// Angle to the parent at its foot and at its tip.
+const ANGLES_RAD: [[f32; 2]; LEVELS] = [[0.0; 2], [1.22, 0.55], [1.0, 0.6], [0.95, 0.6], [0.9, 0.5]];
+/// Additional sway of the tip over the foot.
+const SWAY: [f32; LEVELS] = [0.10, 0.22, 0.22, 0.16, 0.10];
 
 /// A point on a branch's axis.
 #[derive(Clone, Copy)]
@@ -175,45 +120,43 @@ impl Branch {
 }
 
 fn grow(level: usize, foot: Knot, direction: Vec3, length: f32, rng: &mut Rng) -> Branch {
-    let habit = &HABITS[level];
-    let step = length / habit.knots as f32;
+    let step = length / KNOTS[level] as f32;
     let mut knots = vec![foot];
     let (mut position, mut direction) = (foot.position, direction);
-    for i in 1..=habit.knots {
-        let t = i as f32 / habit.knots as f32;
+    for i in 1..=KNOTS[level] {
+        let t = i as f32 / KNOTS[level] as f32;
         // Limbs sag in the middle under their weight and lift their ends to the light.
-        let lift = habit.rise * lerp(-0.6, 2.2, t);
-        direction = (direction + rng.vector() * habit.wander + Vec3::Y * lift).normalize_or(Vec3::Y);
+        let lift = RISE[level] * lerp(-0.6, 2.2, t);
+        direction = (direction + rng.vector() * WANDER[level] + Vec3::Y * lift).normalize_or(Vec3::Y);
         position += direction * step * rng.between(0.9, 1.1);
         // Branches stay above the ground.
         position.y = position.y.max(0.04);
         let taper = if level == 0 { lerp(1.0, 0.12, t.powf(0.9)) } else { lerp(1.0, 0.22, t) };
-        knots.push(Knot { position, radius_m: foot.radius_m * taper, sway: foot.sway + habit.sway * t.powf(1.3) });
+        knots.push(Knot { position, radius_m: foot.radius_m * taper, sway: foot.sway + SWAY[level] * t.powf(1.3) });
     }
     Branch { level, knots }
 }
 
 fn children_of(parent: &Branch, rng: &mut Rng) -> Vec<Branch> {
-    let level = parent.level + 1;
-    let habit = &HABITS[parent.level];
-    if habit.children == 0 {
+    let (level, children) = (parent.level + 1, CHILDREN[parent.level]);
+    if children == 0 {
         return Vec::new();
     }
     let parent_length = parent.length_m();
     let first_turn = rng.between(0.0, std::f32::consts::TAU);
     let child = |i: u32| {
-        let u = (i as f32 + rng.between(0.1, 0.9)) / habit.children as f32;
-        let t = lerp(habit.first_child, 0.98, u);
+        let u = (i as f32 + rng.between(0.1, 0.9)) / children as f32;
+        let t = lerp(FIRST_CHILD[parent.level], 0.98, u);
         let turn = first_turn + GOLDEN_ANGLE_RAD * i as f32 + rng.between(-0.35, 0.35);
         let knot = parent.at(t);
-        let angle = lerp(HABITS[level].angles_rad[0], HABITS[level].angles_rad[1], u) + rng.between(-0.18, 0.18);
+        let angle = lerp(ANGLES_RAD[level][0], ANGLES_RAD[level][1], u) + rng.between(-0.18, 0.18);
         let direction = tilted(parent.direction_at(t), angle, turn);
-        let length = parent_length * HABITS[level].length * envelope(level, u) * rng.between(0.8, 1.2);
+        let length = parent_length * LENGTH[level] * envelope(level, u) * rng.between(0.8, 1.2);
         let thickness = if level == 1 { 0.52 } else { 0.6 };
         let radius_m = (knot.radius_m * thickness).min(0.05 * length).max(4e-4);
         grow(level, Knot { radius_m, ..knot }, direction, length, rng)
     };
-    (0..habit.children).map(child).collect()
+    (0..children).map(child).collect()
 }
 
 /// Limbs are longest a third up the crown, which makes it a dome; others shorten towards the tip.

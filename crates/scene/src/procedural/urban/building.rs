@@ -2,10 +2,9 @@
 
 use glam::{Vec2, Vec3};
 
-use super::super::mesh_builder::MeshBuilder;
-use super::super::rng::Rng;
-use super::super::solids::{drum, sweep_around};
-use super::plan::KERB_M;
+use super::super::geometry::MeshBuilder;
+use super::super::random::Rng;
+use super::street::KERB_M;
 
 const RECESS_M: f32 = 0.6;
 /// Approximate number of windows of a building: those of a higher one are wider.
@@ -19,16 +18,6 @@ const WALLS_SRGB: [[f32; 3]; 6] = [
     [186.0, 156.0, 116.0],
     [120.0, 110.0, 104.0],
 ];
-
-/// An upright box without top and bottom. Its walls are divided into rows and columns with a window each.
-struct Walls {
-    min: Vec3,
-    max: Vec3,
-    rows: u32,
-    /// Columns of the walls across x, and of those across z.
-    columns: [u32; 2],
-    color_srgb: Vec3,
-}
 
 /// A building on a quarter of a block, `half_m` to each side of `middle`.
 pub(super) fn add(builder: &mut MeshBuilder, middle: Vec2, half_m: f32, is_central: bool, rng: &mut Rng) {
@@ -57,55 +46,50 @@ fn add_body(builder: &mut MeshBuilder, min: Vec3, max: Vec3, windows: f32, color
     // Columns are as wide on all four sides.
     let share = 2.0 / (size.x + size.z);
     let columns = [size.x * share, size.z * share].map(|side| (columns * side).round().max(1.0) as u32);
-    let walls = Walls { min, max, rows: rows as u32, columns, color_srgb };
-    walls.add(builder, rng);
+    add_walls(builder, [min, max], rows as u32, columns, color_srgb, rng);
     let roof_m = Vec3::new(0.0, 0.0, size.z * 0.5);
     let middle = (min + max) * 0.5;
     let roof = Vec3::new(middle.x, max.y, middle.z);
     builder.rectangle(roof, roof_m, Vec3::X * (size.x * 0.5), Vec3::new(118.0, 114.0, 110.0));
-    add_frame(builder, min, max, [max.y - 0.7, max.y + 1.0], [-0.45, 0.4], color_srgb * 0.86);
+    add_frame(builder, [min, max], [max.y - 0.7, max.y + 1.0], [-0.45, 0.4], color_srgb * 0.86);
     let ledge_m = min.y + size.y / rows;
-    add_frame(builder, min, max, [ledge_m - 0.2, ledge_m + 0.2], [-0.2, 0.35], color_srgb * 1.06);
+    add_frame(builder, [min, max], [ledge_m - 0.2, ledge_m + 0.2], [-0.2, 0.35], color_srgb * 1.06);
 }
 
 /// A closed rectangular ring around a box, from so far within its walls to so far before them.
-fn add_frame(
-    builder: &mut MeshBuilder,
-    min: Vec3,
-    max: Vec3,
-    [low_m, high_m]: [f32; 2],
-    reach_m: [f32; 2],
-    color: Vec3,
-) {
-    let outline = [(reach_m[0], low_m), (reach_m[1], low_m), (reach_m[1], high_m), (reach_m[0], high_m)];
+fn add_frame(builder: &mut MeshBuilder, [min, max]: [Vec3; 2], y_m: [f32; 2], reach_m: [f32; 2], color: Vec3) {
+    let outline = [(reach_m[0], y_m[0]), (reach_m[1], y_m[0]), (reach_m[1], y_m[1]), (reach_m[0], y_m[1])];
     let point = |station: u32, i: u32| {
         let (out_m, y_m) = outline[i as usize];
         let x = if station < 2 { max.x + out_m } else { min.x - out_m };
         let z = if station == 1 || station == 2 { max.z + out_m } else { min.z - out_m };
         Vec3::new(x, y_m, z)
     };
-    sweep_around(builder, 4, 4, point, |_, _| color);
+    builder.sweep_around(4, 4, point, |_, _| color);
 }
 
-impl Walls {
-    fn add(&self, builder: &mut MeshBuilder, rng: &mut Rng) {
-        let Self { min, max, .. } = *self;
-        let y = min.y;
-        self.add_wall(builder, Vec3::new(min.x, y, max.z), Vec3::X * (max.x - min.x), self.columns[0], rng);
-        self.add_wall(builder, Vec3::new(max.x, y, max.z), Vec3::NEG_Z * (max.z - min.z), self.columns[1], rng);
-        self.add_wall(builder, Vec3::new(max.x, y, min.z), Vec3::NEG_X * (max.x - min.x), self.columns[0], rng);
-        self.add_wall(builder, Vec3::new(min.x, y, min.z), Vec3::Z * (max.z - min.z), self.columns[1], rng);
-    }
-
-    /// The wall from its lower left corner to the right by `right`.
-    fn add_wall(&self, builder: &mut MeshBuilder, corner: Vec3, right: Vec3, columns: u32, rng: &mut Rng) {
-        let (right, up) = (right / columns as f32, Vec3::Y * ((self.max.y - self.min.y) / self.rows as f32));
-        for row in 0..self.rows {
-            for column in 0..columns {
-                let tint = if row == 0 { 0.8 } else { 1.0 };
-                let cell = corner + right * column as f32 + up * row as f32;
-                add_cell(builder, cell, right, up, self.color_srgb * tint, rng);
-            }
+/// The walls of an upright box, divided into rows and columns with a window each. The first number of columns is that
+/// of the walls across x, the second of those across z.
+fn add_walls(
+    builder: &mut MeshBuilder,
+    [min, max]: [Vec3; 2],
+    rows: u32,
+    columns: [u32; 2],
+    color_srgb: Vec3,
+    rng: &mut Rng,
+) {
+    // Each from its lower left corner to the right.
+    let walls = [
+        (Vec3::new(min.x, min.y, max.z), Vec3::X * (max.x - min.x), columns[0]),
+        (Vec3::new(max.x, min.y, max.z), Vec3::NEG_Z * (max.z - min.z), columns[1]),
+        (Vec3::new(max.x, min.y, min.z), Vec3::NEG_X * (max.x - min.x), columns[0]),
+        (Vec3::new(min.x, min.y, min.z), Vec3::Z * (max.z - min.z), columns[1]),
+    ];
+    for (corner, right, columns) in walls {
+        let (right, up) = (right / columns as f32, Vec3::Y * ((max.y - min.y) / rows as f32));
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+            let tint = if row == 0 { 0.8 } else { 1.0 };
+            add_cell(builder, corner + right * column as f32 + up * row as f32, right, up, color_srgb * tint, rng);
         }
     }
 }
@@ -147,7 +131,7 @@ fn add_roof_details(builder: &mut MeshBuilder, middle: Vec2, half: Vec2, top_m: 
             cuboid(builder, tank + Vec2::new(x, z), Vec3::new(0.15, 1.2, 0.15), Vec3::splat(70.0));
         }
         let foot = Vec3::new(tank.x, top_m + 2.4, tank.y);
-        drum(builder, foot, [2.3, 2.3], 3.4, 12, Vec3::new(134.0, 96.0, 66.0));
-        drum(builder, foot + Vec3::Y * 3.4, [2.5, 0.2], 1.3, 12, Vec3::new(92.0, 76.0, 66.0));
+        builder.drum(foot, [2.3, 2.3], 3.4, 12, Vec3::new(134.0, 96.0, 66.0));
+        builder.drum(foot + Vec3::Y * 3.4, [2.5, 0.2], 1.3, 12, Vec3::new(92.0, 76.0, 66.0));
     }
 }

@@ -1,16 +1,14 @@
 //! A few blocks of a city: large flat walls and streets, with recesses, ledges and clutter on them.
 
 mod building;
-mod plan;
 mod street;
 
 use glam::{Vec2, Vec3};
 
-use super::mesh_builder::MeshBuilder;
-use super::rng::Rng;
-use super::solids::matt;
+use super::geometry::{MeshBuilder, matt};
+use super::random::Rng;
 use crate::Scene;
-use plan::{BLOCK_M, HALF_WIDTH_M, SEED, blocks};
+use street::{BLOCK_M, HALF_WIDTH_M, SEED, blocks};
 
 /// Number of triangles of the model in the paper's table 1.
 const TRIANGLES: u32 = 50_000;

@@ -1,12 +1,18 @@
-//! Streets, pavements and parks, with trees, lamps and cars.
+//! The plan of the city; streets, pavements and parks, with trees, lamps and cars.
 
 use glam::{Vec2, Vec3};
 
-use super::super::mesh_builder::MeshBuilder;
-use super::super::noise::{Noise, mix};
-use super::super::rng::Rng;
-use super::super::solids::{drum, lumpy_ball};
-use super::plan::{BLOCK_M, BLOCKS, HALF_WIDTH_M, KERB_M, SEED, STREET_M, blocks};
+use super::super::geometry::MeshBuilder;
+use super::super::random::{Noise, Rng, mix};
+
+pub(super) const SEED: u64 = 1950;
+
+pub(super) const HALF_WIDTH_M: f32 = 200.0;
+/// Number of blocks a side; each has streets on all sides.
+const BLOCKS: u32 = 3;
+const STREET_M: f32 = 19.0;
+pub(super) const BLOCK_M: f32 = (2.0 * HALF_WIDTH_M - (BLOCKS + 1) as f32 * STREET_M) / BLOCKS as f32;
+pub(super) const KERB_M: f32 = 0.2;
 
 /// Height of paint above a street, enough for 16 bits of depth to separate them.
 const PAINT_M: f32 = 0.05;
@@ -24,6 +30,12 @@ const CARS_SRGB: [[f32; 3]; 6] = [
     [222.0, 220.0, 212.0],
     [96.0, 104.0, 100.0],
 ];
+
+/// The corner of least x and z of each block.
+pub(super) fn blocks() -> impl Iterator<Item = Vec2> {
+    let along = |i: u32| -HALF_WIDTH_M + STREET_M + i as f32 * (BLOCK_M + STREET_M);
+    (0..BLOCKS * BLOCKS).map(move |i| Vec2::new(along(i % BLOCKS), along(i / BLOCKS)))
+}
 
 /// One large square, with dashes along the middle of each street.
 pub(super) fn add_ground(builder: &mut MeshBuilder) {
@@ -117,11 +129,11 @@ fn sides() -> impl Iterator<Item = Side> {
 }
 
 fn add_tree(builder: &mut MeshBuilder, foot: Vec3, size: f32, rng: &mut Rng) {
-    drum(builder, foot - Vec3::Y * 0.1, [0.24 * size, 0.16 * size], 3.6 * size, 4, Vec3::new(92.0, 74.0, 56.0));
+    builder.drum(foot - Vec3::Y * 0.1, [0.24 * size, 0.16 * size], 3.6 * size, 4, Vec3::new(92.0, 74.0, 56.0));
     let radii_m = Vec3::new(rng.between(2.2, 2.9), rng.between(2.4, 3.2), rng.between(2.2, 2.9)) * size;
     let green = mix(Vec3::new(74.0, 110.0, 48.0), Vec3::new(126.0, 142.0, 66.0), rng.unit());
     let crown = foot + Vec3::Y * (3.1 * size + 0.8 * radii_m.y);
-    lumpy_ball(builder, crown, radii_m, [7, 4], &Noise::new(SEED), green);
+    builder.lumpy_ball(crown, radii_m, &Noise::new(SEED), green);
 }
 
 /// A mast at the kerb with an arm over the street.

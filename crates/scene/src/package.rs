@@ -1,4 +1,4 @@
-//! The layout of a package, little-endian throughout:
+//! A scene as bytes, for the transfer between nodes. Its layout is little-endian throughout:
 //!
 //! ```text
 //! magic "MYRSCENE" | version u32 | header length u32 | header (postcard)
@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Fault, at_most};
-use crate::{Instance, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Wind};
+use crate::{Instance, Limits, Material, Mesh, MeshPart, Scene, SceneError, SourceCamera, Texture, Wind};
 
 #[cfg(target_endian = "big")]
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");
@@ -51,7 +51,9 @@ struct TextureHeader {
     is_srgb: bool,
 }
 
-pub(super) fn bytes_from_scene(scene: &Scene) -> Vec<u8> {
+/// Packs a scene. Equal scenes give equal bytes.
+#[must_use]
+pub fn pack(scene: &Scene) -> Vec<u8> {
     // Writing to a growing vector cannot fail, and postcard supports all fields.
     let header = postcard::to_stdvec(&header_of(scene)).unwrap_or_default();
     let mut bytes = Vec::with_capacity(16 + header.len() + array_bytes(scene));
@@ -67,7 +69,17 @@ pub(super) fn bytes_from_scene(scene: &Scene) -> Vec<u8> {
     bytes
 }
 
-pub(super) fn scene_from_bytes(bytes: &[u8], limits: &Limits) -> Result<Scene, Fault> {
+/// Unpacks a scene and validates it, since the bytes are untrusted.
+///
+/// # Errors
+/// The part of the package at fault. Memory is bounded by a few times the bytes' length.
+pub fn unpack(bytes: &[u8], limits: &Limits) -> Result<Scene, SceneError> {
+    let scene = scene_from_bytes(bytes, limits);
+    let checked = scene.and_then(|scene| scene.check(limits).map(|()| scene));
+    checked.map_err(|fault| fault.in_file("package"))
+}
+
+fn scene_from_bytes(bytes: &[u8], limits: &Limits) -> Result<Scene, Fault> {
     at_most("size in bytes", bytes.len() as u64, limits.file_bytes)?;
     let mut reader = Reader { rest: bytes };
     if reader.array::<8>("magic")? != *MAGIC {

@@ -1,0 +1,228 @@
+//! A file with its buffers. Every range of an accessor is checked before it is read.
+
+use std::borrow::Cow;
+use std::cell::Cell;
+
+use data_url::DataUrl;
+use gltf::json::accessor::{Accessor, ComponentType, sparse::Sparse};
+use gltf::json::buffer::View;
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Root};
+
+use super::super::folder::Folder;
+use crate::Limits;
+use crate::error::{Fault, at_most};
+
+/// The parsed JSON, the bytes of all buffers, and what else their reading takes.
+pub(super) struct Document<'a> {
+    pub root: &'a Root,
+    pub limits: &'a Limits,
+    folder: &'a Folder,
+    buffers: Vec<Cow<'a, [u8]>>,
+    /// A budget of elements to read. Primitives may share an accessor, so that a small file could otherwise expand
+    /// without bound.
+    elements_left: Cell<u64>,
+}
+
+impl<'a> Document<'a> {
+    pub(super) fn open(
+        root: &'a Root,
+        binary_chunk: Option<&'a [u8]>,
+        folder: &'a Folder,
+        limits: &'a Limits,
+    ) -> Result<Self, Fault> {
+        // Positions, normals, coordinates, colours: four elements a vertex; three indices a triangle.
+        let elements = limits.vertices.saturating_mul(4).saturating_add(limits.triangles.saturating_mul(3));
+        let mut document = Self { root, limits, folder, buffers: Vec::new(), elements_left: Cell::new(elements) };
+        for (number, buffer) in root.buffers.iter().enumerate() {
+            let element = format!("buffer {number}");
+            let bytes: Cow<[u8]> = match (&buffer.uri, binary_chunk) {
+                (Some(uri), _) => document.read_uri(&element, uri)?.into(),
+                (None, Some(chunk)) if number == 0 => chunk.into(),
+                (None, _) => return Err(Fault::malformed(element, "it has neither a uri nor a binary chunk")),
+            };
+            if (bytes.len() as u64) < buffer.byte_length.0 {
+                let claim = format!("it claims {} bytes and has {}", buffer.byte_length.0, bytes.len());
+                return Err(Fault::malformed(element, claim));
+            }
+            document.buffers.push(bytes);
+        }
+        Ok(document)
+    }
+
+    /// Reads a `data:` URI or a file of the scene's folder.
+    pub(super) fn read_uri(&self, element: &str, uri: &str) -> Result<Vec<u8>, Fault> {
+        if !uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
+            return self.folder.read_uri(element, uri);
+        }
+        let url = DataUrl::process(uri).map_err(|e| Fault::malformed(element, format!("data URI: {e:?}")))?;
+        let (bytes, _) = url.decode_to_vec().map_err(|e| Fault::malformed(element, format!("data URI: {e:?}")))?;
+        Ok(bytes)
+    }
+
+    /// A buffer view and its bytes.
+    pub(super) fn view(&self, index: Index<View>, element: &str) -> Result<(&View, &[u8]), Fault> {
+        let wrong = |reason: String| Fault::malformed(format!("{element}, buffer view {}", index.value()), reason);
+        let view = self.root.get(index).ok_or_else(|| wrong("it does not exist".into()))?;
+        let buffer = view.buffer.value();
+        let bytes = self.buffers.get(buffer).ok_or_else(|| wrong(format!("buffer {buffer} does not exist")))?;
+        let range = slice_of(bytes, view.byte_offset.map_or(0, |o| o.0), view.byte_length.0);
+        let range = range.ok_or_else(|| wrong(format!("it leaves the {} bytes of buffer {buffer}", bytes.len())))?;
+        Ok((view, range))
+    }
+
+    /// `count` elements of `size` bytes in a buffer view, from `offset` on. Fails where the last one leaves the view.
+    fn chunks(
+        &self,
+        view: Index<View>,
+        offset: u64,
+        count: u64,
+        size: usize,
+        name: &str,
+    ) -> Result<impl Iterator<Item = &[u8]> + use<'_>, Fault> {
+        let (view, bytes) = self.view(view, name)?;
+        let stride = view.byte_stride.map_or(size, |s| s.0);
+        let length = (stride as u64).checked_mul(count - 1).and_then(|l| l.checked_add(size as u64));
+        match length.and_then(|length| slice_of(bytes, offset, length)) {
+            Some(range) if stride >= size => {
+                Ok((0..count as usize).map(move |i| &range[i * stride..i * stride + size]))
+            }
+            Some(_) => Err(Fault::malformed(name, format!("stride {stride} is less than {size} bytes"))),
+            None => Err(Fault::malformed(name, format!("{count} elements leave a view of {} bytes", bytes.len()))),
+        }
+    }
+
+    /// An accessor's elements as `N` floats each; integers are scaled to 0…1 or -1…1 where `normalized`.
+    pub(super) fn floats<const N: usize>(&self, index: Index<Accessor>, element: &str) -> Result<Vec<[f32; N]>, Fault> {
+        let layout = self.layout(index, element)?;
+        if layout.components != N {
+            return Err(layout.wrong(format!("it has {} components where {N} are needed", layout.components)));
+        }
+        let (component, normalized) = (layout.component, layout.accessor.normalized);
+        let float = |bytes: &[u8], i: usize| {
+            float(&bytes[i * component.size()..(i + 1) * component.size()], component, normalized)
+        };
+        self.elements(&layout, [0.0; N], |bytes| std::array::from_fn(|i| float(bytes, i)))
+    }
+
+    /// Components of an accessor: 3 or 4 for colours.
+    pub(super) fn component_count(&self, index: Index<Accessor>, element: &str) -> Result<usize, Fault> {
+        Ok(self.layout(index, element)?.components)
+    }
+
+    /// An accessor's elements as vertex numbers.
+    pub(super) fn indices(&self, index: Index<Accessor>, element: &str) -> Result<Vec<u32>, Fault> {
+        let layout = self.layout(index, element)?;
+        let is_unsigned = matches!(layout.component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32);
+        if layout.components != 1 || !is_unsigned {
+            return Err(layout.wrong("indices must be unsigned scalars".into()));
+        }
+        self.elements(&layout, 0, unsigned)
+    }
+
+    fn layout(&self, index: Index<Accessor>, element: &str) -> Result<Layout<'_>, Fault> {
+        let name = format!("{element}, accessor {}", index.value());
+        let accessor = self.root.get(index).ok_or_else(|| Fault::malformed(&name, "it does not exist"))?;
+        let (Checked::Valid(component), Checked::Valid(shape)) = (accessor.component_type, accessor.type_) else {
+            return Err(Fault::malformed(name, "unknown component type or type"));
+        };
+        let count = accessor.count.0;
+        if count == 0 {
+            return Err(Fault::malformed(name, "it has no elements"));
+        }
+        at_most(&name, count, self.elements_left.get())?;
+        Ok(Layout { name, accessor, component: component.0, components: shape.multiplicity(), count })
+    }
+
+    fn elements<T: Copy>(&self, layout: &Layout, zero: T, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, Fault> {
+        self.elements_left.set(self.elements_left.get().saturating_sub(layout.count));
+        let mut elements = match layout.accessor.buffer_view {
+            Some(view) => {
+                let offset = layout.accessor.byte_offset.map_or(0, |o| o.0);
+                let chunks = self.chunks(view, offset, layout.count, layout.element_bytes(), &layout.name)?;
+                chunks.map(&read).collect()
+            }
+            // An accessor without a view holds zeros. No byte of the file backs its count, so the file's size bounds it
+            // instead.
+            None => {
+                let backed = self.buffers.iter().map(|b| b.len() as u64).sum();
+                at_most(format!("{}, elements without data", layout.name), layout.count, backed)?;
+                vec![zero; layout.count as usize]
+            }
+        };
+        if let Some(sparse) = &layout.accessor.sparse {
+            self.overwrite(layout, sparse, &mut elements, read)?;
+        }
+        Ok(elements)
+    }
+
+    fn overwrite<T>(
+        &self,
+        layout: &Layout,
+        sparse: &Sparse,
+        elements: &mut [T],
+        read: impl Fn(&[u8]) -> T,
+    ) -> Result<(), Fault> {
+        let Sparse { count, indices, values, .. } = sparse;
+        let Checked::Valid(index_type) = indices.component_type else {
+            return Err(layout.wrong("unknown type of sparse indices".into()));
+        };
+        let count = count.0;
+        if count == 0 || count > layout.count {
+            return Err(layout.wrong(format!("{count} sparse elements of {}", layout.count)));
+        }
+        let size = index_type.0.size();
+        let places = self.chunks(indices.buffer_view, indices.byte_offset.0, count, size, &layout.name)?;
+        let size = layout.element_bytes();
+        let values = self.chunks(values.buffer_view, values.byte_offset.0, count, size, &layout.name)?;
+        for (place, value) in places.zip(values) {
+            let place = unsigned(place) as usize;
+            let slot = elements.get_mut(place);
+            *slot.ok_or_else(|| layout.wrong(format!("sparse index {place} is out of range")))? = read(value);
+        }
+        Ok(())
+    }
+}
+
+/// An accessor's description with checked types.
+struct Layout<'a> {
+    name: String,
+    accessor: &'a Accessor,
+    component: ComponentType,
+    components: usize,
+    count: u64,
+}
+
+impl Layout<'_> {
+    fn wrong(&self, reason: String) -> Fault {
+        Fault::malformed(&self.name, reason)
+    }
+
+    fn element_bytes(&self) -> usize {
+        self.components * self.component.size()
+    }
+}
+
+fn slice_of(bytes: &[u8], offset: u64, length: u64) -> Option<&[u8]> {
+    let start = usize::try_from(offset).ok()?;
+    let end = usize::try_from(offset.checked_add(length)?).ok()?;
+    bytes.get(start..end)
+}
+
+/// Reads one component, little-endian; `bytes` has the component's length.
+fn unsigned(bytes: &[u8]) -> u32 {
+    bytes.iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
+}
+
+fn float(bytes: &[u8], component: ComponentType, normalized: bool) -> f32 {
+    let bits = unsigned(bytes);
+    let (value, largest) = match component {
+        ComponentType::F32 => return f32::from_bits(bits),
+        ComponentType::U8 => (bits as f32, 255.0),
+        ComponentType::U16 => (bits as f32, 65_535.0),
+        ComponentType::U32 => (bits as f32, u32::MAX as f32),
+        ComponentType::I8 => (f32::from(bits as u8 as i8), 127.0),
+        ComponentType::I16 => (f32::from(bits as u16 as i16), 32_767.0),
+    };
+    if normalized { (value / largest).max(-1.0) } else { value }
+}

@@ -1,0 +1,216 @@
+//! Triangles collected into a mesh, solids made of them, and a mesh as a scene.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::{Affine3A, Vec2, Vec3};
+
+use super::random::Noise;
+use crate::{Instance, Material, Mesh, MeshPart, Scene, Vertex};
+
+/// A place on a beam's axis: the middle of its section, and the direction of the section's top.
+#[derive(Clone, Copy)]
+pub(super) struct Station {
+    pub middle: Vec3,
+    pub up: Vec3,
+}
+
+#[derive(Default)]
+pub(super) struct MeshBuilder {
+    pub vertices: Vec<Vertex>,
+    pub indices: Vec<u32>,
+    parts: Vec<MeshPart>,
+}
+
+/// A vertex without texture coordinates or sway; `color_srgb` in codes of 0 to 255.
+pub(super) fn vertex(position: Vec3, normal: Vec3, color_srgb: Vec3) -> Vertex {
+    let [r, g, b] = color_srgb.to_array().map(|c| (c.clamp(0.0, 255.0) + 0.5) as u8);
+    Vertex { position: position.into(), normal: normal.into(), uv: [0.0; 2], color_srgba8: [r, g, b, 255], sway: 0.0 }
+}
+
+/// A material without highlights, as by default; colours come from the vertices.
+pub(super) fn matt(name: &str) -> Material {
+    Material { name: name.into(), ..Material::default() }
+}
+
+/// A point on an ellipse around the y axis, its parameter turning from +x to +z.
+pub(super) fn on_ellipse(half_axes_m: Vec2, angle_rad: f32, y_m: f32) -> Vec3 {
+    Vec3::new(half_axes_m.x * angle_rad.cos(), y_m, half_axes_m.y * angle_rad.sin())
+}
+
+impl MeshBuilder {
+    pub(super) fn push(&mut self, vertex: Vertex) -> u32 {
+        self.vertices.push(vertex);
+        self.vertices.len() as u32 - 1
+    }
+
+    /// Adds two triangles through corners that run counter-clockwise, seen from the front.
+    pub(super) fn quad(&mut self, corners: [u32; 4]) {
+        let [a, b, c, d] = corners;
+        self.indices.extend([a, b, c, a, c, d]);
+    }
+
+    /// Adds a parallelogram that faces `right × up`, with corners at `centre ± right ± up`.
+    pub(super) fn rectangle(&mut self, centre: Vec3, right: Vec3, up: Vec3, color_srgb: Vec3) {
+        let normal = right.cross(up).normalize_or(Vec3::Y);
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(r, u): (f32, f32)| {
+            let uv = Vec2::new(0.5 + 0.5 * r, 0.5 - 0.5 * u).to_array();
+            self.push(Vertex { uv, ..vertex(centre + right * r + up * u, normal, color_srgb) })
+        });
+        self.quad(corners);
+    }
+
+    /// Adds an axis-aligned box: 12 triangles that face out.
+    pub(super) fn cuboid(&mut self, min: Vec3, max: Vec3, color_srgb: Vec3) {
+        let (centre, half) = ((min + max) * 0.5, (max - min) * 0.5);
+        for axis in 0..3 {
+            let side = |a: usize| Vec3::AXES[a] * half[a];
+            let (out, right, up) = (side(axis), side((axis + 1) % 3), side((axis + 2) % 3));
+            self.rectangle(centre + out, right, up, color_srgb);
+            self.rectangle(centre - out, up, right, color_srgb);
+        }
+    }
+
+    /// Adds a flat quadrilateral, its corners counter-clockwise seen from the front.
+    pub(super) fn facet(&mut self, corners: [Vec3; 4], color_srgb: Vec3) {
+        let [a, b, c, d] = corners;
+        let normal = (c - a).cross(d - b).normalize_or(Vec3::Y);
+        let corners = corners.map(|corner| self.push(vertex(corner, normal, color_srgb)));
+        self.quad(corners);
+    }
+
+    /// Sweeps a closed outline around the y axis, through `stations` that turn from +x to +z. The outline runs
+    /// counter-clockwise with "away from the axis" to the right and +y up; its surface then faces out.
+    pub(super) fn sweep_around(
+        &mut self,
+        stations: u32,
+        outline_points: u32,
+        point: impl Fn(u32, u32) -> Vec3,
+        mut color_srgb: impl FnMut(u32, u32) -> Vec3,
+    ) {
+        for station in 0..stations {
+            for i in 0..outline_points {
+                let (after, next) = ((station + 1) % stations, (i + 1) % outline_points);
+                let corners = [point(station, i), point(station, next), point(after, next), point(after, i)];
+                self.facet(corners, color_srgb(station, i));
+            }
+        }
+    }
+
+    /// A box beam through two or more stations, closed at its ends: 8 triangles a piece and 4 for the ends.
+    pub(super) fn beam(&mut self, stations: &[Station], width_m: f32, depth_m: f32, color_srgb: Vec3) {
+        let last = stations.len() - 1;
+        let sections: Vec<[Vec3; 4]> = (0..=last)
+            .map(|i| {
+                let Station { middle, up } = stations[i];
+                let along = stations[(i + 1).min(last)].middle - stations[i.saturating_sub(1)].middle;
+                let along = along.normalize_or(Vec3::X);
+                let side = along.cross(up).normalize_or(along.any_orthonormal_vector());
+                let (side, up) = (side * (0.5 * width_m), side.cross(along) * (0.5 * depth_m));
+                [middle - side - up, middle + side - up, middle + side + up, middle - side + up]
+            })
+            .collect();
+        for pair in sections.windows(2) {
+            for i in 0..4 {
+                let next = (i + 1) % 4;
+                self.facet([pair[0][i], pair[1][i], pair[1][next], pair[0][next]], color_srgb);
+            }
+        }
+        self.facet(sections[0], color_srgb);
+        let [a, b, c, d] = sections[last];
+        self.facet([d, c, b, a], color_srgb);
+    }
+
+    /// An upright frustum, closed: `4 · sides - 4` triangles.
+    pub(super) fn drum(&mut self, foot: Vec3, radii_m: [f32; 2], height_m: f32, sides: u32, color_srgb: Vec3) {
+        let corner = |i: u32, top: usize| {
+            let (sin, cos) = (TAU * (i % sides) as f32 / sides as f32).sin_cos();
+            foot + Vec3::new(sin * radii_m[top], height_m * top as f32, cos * radii_m[top])
+        };
+        for i in 0..sides {
+            self.facet([corner(i, 0), corner(i + 1, 0), corner(i + 1, 1), corner(i, 1)], color_srgb);
+        }
+        for (top, normal) in [(0, Vec3::NEG_Y), (1, Vec3::Y)] {
+            let first = self.vertices.len() as u32;
+            (0..sides).for_each(|i| {
+                self.push(vertex(corner(i, top), normal, color_srgb));
+            });
+            for i in 1..sides - 1 {
+                let [left, right] = if top == 1 { [i, i + 1] } else { [i + 1, i] };
+                self.indices.extend([first, first + left, first + right]);
+            }
+        }
+    }
+
+    /// A lumpy ball, such as the crown of a far tree: `2 · columns · (rows - 1)` triangles.
+    pub(super) fn lumpy_ball(&mut self, centre: Vec3, radii_m: Vec3, noise: &Noise, color_srgb: Vec3) {
+        let (columns, rows) = (7, 4);
+        let first = self.vertices.len() as u32;
+        for row in 0..=rows {
+            for column in 0..columns {
+                let (azimuth, polar) = (TAU * column as f32 / columns as f32, PI * row as f32 / rows as f32);
+                let ring = if row % rows == 0 { 0.0 } else { polar.sin() };
+                let out = Vec3::new(ring * azimuth.sin(), polar.cos(), ring * azimuth.cos());
+                let lump = noise.in_space(out * 1.9 + centre);
+                let normal = (out / radii_m).normalize_or(Vec3::Y);
+                // Darker below, where the crown shades itself.
+                let shade = 0.82 + 0.16 * out.y + 0.16 * lump;
+                self.push(vertex(centre + out * radii_m * (1.0 + 0.24 * lump), normal, color_srgb * shade));
+            }
+        }
+        for row in 0..rows {
+            for column in 0..columns {
+                let next = (column + 1) % columns;
+                let (above, below) = (first + row * columns, first + (row + 1) * columns);
+                if row > 0 {
+                    self.indices.extend([above + column, below + column, above + next]);
+                }
+                if row + 1 < rows {
+                    self.indices.extend([above + next, below + column, below + next]);
+                }
+            }
+        }
+    }
+
+    /// Adds `cells`² squares of two triangles, the mesh's first; gets a vertex by its column and row, row by row.
+    pub(super) fn grid(&mut self, cells: u32, mut vertex: impl FnMut(u32, u32) -> Vertex) {
+        let side = cells + 1;
+        self.vertices.extend((0..side * side).map(|i| vertex(i % side, i / side)));
+        for cell in 0..cells * cells {
+            let corner = cell / cells * side + cell % cells;
+            self.quad([corner, corner + side, corner + side + 1, corner + 1]);
+        }
+    }
+
+    pub(super) fn triangle_count(&self) -> u32 {
+        self.indices.len() as u32 / 3
+    }
+
+    /// Ends a part of all indices since the last one.
+    pub(super) fn finish_part(&mut self, material: u32) {
+        let first_index = self.parts.last().map_or(0, |p| p.first_index + p.index_count);
+        let index_count = self.indices.len() as u32 - first_index;
+        self.parts.push(MeshPart { first_index, index_count, material });
+    }
+
+    pub(super) fn into_mesh(self) -> Mesh {
+        Mesh { vertices: self.vertices, indices: self.indices, parts: self.parts }
+    }
+
+    /// A scene of this mesh alone, in one material, lit.
+    pub(super) fn into_scene(mut self, name: &str, material: Material) -> Scene {
+        self.finish_part(0);
+        self.into_scene_of(name, vec![material])
+    }
+
+    /// A scene of this mesh alone, whose parts have been finished, lit.
+    pub(super) fn into_scene_of(self, name: &str, materials: Vec<Material>) -> Scene {
+        Scene {
+            name: name.into(),
+            meshes: vec![self.into_mesh()],
+            instances: vec![Instance { mesh: 0, world_from_mesh: Affine3A::IDENTITY }],
+            materials,
+            ..Scene::default()
+        }
+        .with_default_lights()
+    }
+}
