@@ -7,10 +7,9 @@ use gpu::ShaderSource;
 use naga::{Module, TypeInner};
 
 use crate::{
-    fill::GpuFillWork,
     pixel_list::GpuPixelList,
     quads::{GpuCutWork, GpuQuadWork},
-    reconstructor::{shader_sources, templates},
+    shaders::{shader_sources, templates},
     view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume},
 };
 
@@ -73,9 +72,10 @@ fn shader(module: &Module, name: &str) -> Layout {
 #[test]
 fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
     let passes = BTreeSet::from([
+        "fill.wgsl",
         "joint_carve.wgsl",
         "light_field_search.wgsl",
-        "march.wgsl",
+        "joint_carve/march.wgsl",
         "resolve.wgsl",
         "specular.wgsl",
         "tile_start.wgsl",
@@ -142,16 +142,14 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
     let count = offset_of!(GpuPixelList, count);
     let fields = [("workgroups", first), ("y", first + 4), ("z", first + 8), ("count", count)];
     let list = Layout::new(fields, size_of::<GpuPixelList>());
-    let written = ["joint_carve.wgsl", "light_field_search.wgsl", "march.wgsl", "resolve.wgsl"];
+    let written = ["joint_carve.wgsl", "light_field_search.wgsl", "joint_carve/march.wgsl", "resolve.wgsl"];
     assert_eq!(templates_that_agree("UndecidedList", &list), BTreeSet::from(written));
-    let read = ["fill.wgsl", "joint_carve.wgsl", "march.wgsl"];
+    let read = ["fill.wgsl", "joint_carve.wgsl", "joint_carve/march.wgsl"];
     assert_eq!(templates_that_agree("PixelList", &list), BTreeSet::from(read));
 }
 
 #[test]
-fn filling_cutting_and_drawing_agree() {
-    let fill = host!(GpuFillWork { size_px, first_pixel, number });
-    assert_eq!(templates_that_agree("FillWork", &fill), BTreeSet::from(["fill.wgsl"]));
+fn cutting_and_drawing_agree() {
     let cut = host!(GpuCutWork {
         column_in_world,
         focal_px,
@@ -183,6 +181,6 @@ fn filling_cutting_and_drawing_agree() {
 
 #[test]
 fn a_field_out_of_place_is_seen() {
-    let other = parsed("struct FillWork { first_pixel: u32, size_px: vec2u, number: u32 }");
-    assert_ne!(shader(&other, "FillWork"), host!(GpuFillWork { size_px, first_pixel, number }));
+    let other = parsed("struct PixelList { count: u32, workgroups: array<u32, 3> }");
+    assert_ne!(shader(&other, "PixelList"), host!(GpuPixelList { workgroups, count }));
 }

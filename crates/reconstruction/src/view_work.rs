@@ -1,12 +1,10 @@
 //! The uniform of a view in passes over sample cameras: `view_work.wgsl`. A test compares layouts with the WGSL.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{PinholeCamera, ProvenanceKind};
+use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
-use gpu::{ResourceTrait, ResourceTraits, WgslLiteral as _};
+use gpu::{ResourceTrait, ResourceTraits, switches};
 use minijinja::{Value, context};
-
-use crate::pyramid::{BACKGROUND_CODE, HOLE_CODE};
 
 /// Shaders name each camera; more would make them too long.
 pub const MAX_SAMPLE_CAMERAS: usize = 16;
@@ -20,33 +18,24 @@ pub(crate) const CELL_MARGIN_PX: f32 = 0.01;
 pub(crate) const ONE_VIEW: ResourceTraits = &[("work", ResourceTrait::DynamicOffset)];
 
 /// Switches of shaders that include `view_work.wgsl`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct SetVariant {
     pub cameras: usize,
     /// Some texels of the set prove nothing of the space before them.
     pub holes: bool,
+    /// Fetches are counted for each pixel, by passes that find surfaces.
+    pub count_fetches: bool,
 }
 
 impl SetVariant {
     pub fn context(self) -> Value {
-        context! {
-            cameras => self.cameras,
-            holes => self.holes,
-            count_fetches => false,
-            tile_px => TILE_PX,
-            far_away => FAR_AWAY.wgsl_literal(),
-            cell_margin_px => CELL_MARGIN_PX.wgsl_literal(),
-            hole_code => HOLE_CODE,
-            background_code => BACKGROUND_CODE,
-            provenance_empty => ProvenanceKind::Empty as u32,
-            provenance_hit => ProvenanceKind::Hit as u32,
-            provenance_filled => ProvenanceKind::Filled as u32,
-        }
+        context! { cameras => self.cameras, holes => self.holes, count_fetches => self.count_fetches }
     }
 
     pub fn all() -> Vec<Self> {
         let counts = [1, 2, 4, MAX_SAMPLE_CAMERAS].into_iter();
-        counts.flat_map(|cameras| [false, true].map(|holes| Self { cameras, holes })).collect()
+        let each = |cameras| switches().map(move |[holes, count_fetches]| Self { cameras, holes, count_fetches });
+        counts.flat_map(each).collect()
     }
 }
 

@@ -156,7 +156,7 @@ pub(crate) struct FinishWork<'a> {
 
 pub(crate) struct Finish {
     gpu: Arc<Gpu>,
-    passes: PassCache<FinishVariant>,
+    passes: PassCache,
 }
 
 impl Finish {

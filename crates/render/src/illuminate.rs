@@ -139,7 +139,7 @@ impl<'a> Pixels<'a> {
     }
 }
 
-pub(crate) struct Illuminate(PassCache<IlluminateVariant>);
+pub(crate) struct Illuminate(PassCache);
 
 impl Illuminate {
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {

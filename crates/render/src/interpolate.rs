@@ -36,7 +36,7 @@ impl ShaderVariant for InterpolateVariant {
     }
 }
 
-pub(crate) struct Interpolate(PassCache<InterpolateVariant>);
+pub(crate) struct Interpolate(PassCache);
 
 impl Interpolate {
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {

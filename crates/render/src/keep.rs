@@ -25,7 +25,7 @@ impl ShaderVariant for KeepVariant {
     }
 }
 
-pub(crate) struct Keep(PassCache<KeepVariant>);
+pub(crate) struct Keep(PassCache);
 
 impl Keep {
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {

@@ -69,7 +69,7 @@ struct Groups {
 pub(crate) struct Raster {
     gpu: Arc<Gpu>,
     sampler: wgpu::Sampler,
-    passes: PassCache<RasterVariant, DrawPass>,
+    passes: PassCache<DrawPass>,
 }
 
 impl RasterVariant {

@@ -8,14 +8,9 @@
 {% include "surface.wgsl" %}
 {% include "pixel_list.wgsl" %}
 
-const MAX_MOVES: u32 = {{ max_moves }}u;
-const START_LEVEL: u32 = {{ start_level }}u;
 // 0 unless the search is to be cut short.
 const STOP_LEVEL: u32 = {{ stop_level }}u;
-// Past a node's edge, in pixels.
-const NUDGE_PX: f32 = {{ nudge_px }};
-const BLIND_MOVE: f32 = {{ blind_move }};
-const LEAST_MOVE: f32 = {{ least_move }};
+const FIRST_LEVEL: u32 = max(START_LEVEL, STOP_LEVEL);
 
 // A camera's knowledge of the ray from t on.
 struct Evaluation {
@@ -160,7 +155,7 @@ fn vote_of_cell(corners: Corners, codes: vec4f, gaps: vec4f, footprint: f32, at:
     return same - beyond;
 }
 
-@compute @workgroup_size({{ list_workgroup }})
+@compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= lists[work.view.number].count { return; }
     let index = listed_pixels[work.view.first_pixel + id.x];
@@ -174,10 +169,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% endfor %}
     // The pass before left how far it got.
     var t = out_inverse_depth[index];
-    var level = START_LEVEL;
+    var level = FIRST_LEVEL;
     var hit = false;
     var known = true;
-    for (var i = 0u; i < MAX_MOVES && t < span.far; i++) {
+    for (var i = 0u; i < {{ "MAX_MOVES_AMONG_HOLES" if holes else "MAX_MOVES" }} && t < span.far; i++) {
         var free_until = t;
         var exit = FAR_AWAY;
         var penetration = FAR_AWAY;
@@ -204,20 +199,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         known = known && !unknown;
         let beyond = max(select(exit, t + (span.far - span.near) * BLIND_MOVE, exit >= FAR_AWAY), t * LEAST_MOVE);
         t = select(free_until, beyond, unknown || rejected);
-        level = select(min(level + 1u, START_LEVEL), level - 1u, descend);
+        level = select(min(level + 1u, FIRST_LEVEL), level - 1u, descend);
         level = select(level, STOP_LEVEL, candidate);
         if hit { break; }
     }
-    finish(index, pixel.direction, t, hit, !hit && known && t >= span.far);
-}
-
-// Writes the pixel as all cameras together show the point found; `empty`: the whole way is proven free.
-fn finish(index: u32, direction: vec3f, t: f32, hit: bool, empty: bool) {
-    let blend = blend_two_best(work.view.eye_in_world + direction * t, direction);
-    let found = hit && blend.camera_mask != 0u;
-    let missed = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, empty);
-    let provenance = select(missed, PROVENANCE_HIT | (blend.camera_mask << 8u), found);
-    let color = select(work.background_srgb8, srgb8_from_linear(blend.color_linear), found);
-    write_pixel(index, color, select(0.0, 1.0 / t, found), provenance);
-    if provenance == PROVENANCE_FILLED { leave_undecided(index); }
+    // As all cameras together show the point found. Empty where the whole way is proven free.
+    let blend = blend_two_best(work.view.eye_in_world + pixel.direction * t, pixel.direction);
+    let empty = !hit && known && t >= span.far;
+    write_found(index, hit && blend.camera_mask != 0u, t, blend.color_linear, blend.camera_mask, empty);
 }

@@ -9,8 +9,6 @@
 // From where a ray enters the volume to where it leaves it.
 @group(0) var<uniform> steps: u32;
 
-const BISECTIONS: u32 = {{ bisections }}u;
-
 // Penetration in inverse metres, positive inside; `seen`: the camera sees the point.
 struct Depth { penetration: f32, seen: bool }
 
@@ -33,7 +31,7 @@ fn depth_in(camera: SampleCamera, p: vec3f) -> Depth {
 {% else %}
     let known = true;
 {% endif %}
-    return Depth(penetration, p.z > 0.0 && all(uv == clamped) && code != HOLE && known);
+    return Depth(penetration, p.z > 0.0 && all(uv == clamped) && code != HOLE_CODE && known);
 }
 
 // The ray in the images of all cameras, a + b · t in each.
@@ -139,7 +137,7 @@ fn color_at(place: Place) -> vec3f {
 {% endif %}
 }
 
-@compute @workgroup_size({{ tile_px }}, {{ tile_px }})
+@compute @workgroup_size(TILE_PX, TILE_PX)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= work.view.size_px) { return; }
     let pixel = pixel_of(id.xy);
@@ -151,11 +149,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let rays = image_rays(pixel.direction);
     let found = search(rays, span, tile_start_m[pixel.tile]);
     let place = most_conservative(rays, found.t);
-    let color_linear = color_at(place);
     let hit = found.entered && place.mask != 0u;
-    let missed = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, found.never_unseen);
-    let provenance = select(missed, PROVENANCE_HIT | (place.mask << 8u), hit);
-    let color = select(work.background_srgb8, srgb8_from_linear(color_linear), hit);
-    write_pixel(pixel.index, color, select(0.0, 1.0 / found.t, hit), provenance);
-    if provenance == PROVENANCE_FILLED { leave_undecided(pixel.index); }
+    write_found(pixel.index, hit, found.t, color_at(place), place.mask, found.never_unseen);
 }

@@ -5,18 +5,13 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3, Vec4};
-use gpu::{
-    Binding, DrawPass, DrawState, DrawVariant, Frame, Gpu, GpuError, PassCache, ResourceTrait, ResourceTraits,
-    ShaderVariant, Templates, uniform_elements, uniform_stride,
-};
-use minijinja::{Value, context};
-use parking_lot::Mutex;
-use wgpu::{BufferUsages, TextureFormat, TextureView, TextureViewDimension};
+use gpu::{Binding, DrawPass, DrawState, DrawVariant, Gpu, GpuError, Lent, PassCache, Pool, Templates};
+use gpu::{shader_variant, uniform_elements, uniform_stride};
+use wgpu::{BufferUsages, TextureFormat, TextureUsages, TextureView, TextureViewDimension};
 
 use super::mesh::{Mesh, QuadVertices};
-use crate::{error::ReconstructionError, recording::Recording, view_work::GpuViewCamera};
-
-pub(super) const SHADER: (&str, &str) = ("draw.wgsl", include_str!("draw.wgsl"));
+use crate::view_work::{GpuViewCamera, ONE_VIEW};
+use crate::{error::ReconstructionError, recording::Recording};
 
 const SAMPLE_FORMAT: TextureFormat = TextureFormat::R32Uint;
 const INVERSE_DEPTH: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32];
@@ -34,22 +29,7 @@ pub(crate) struct GpuQuadWork {
     pub padding: [u32; 2],
 }
 
-/// The switch of `draw.wgsl`.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct DrawQuads(QuadVertices);
-
-impl ShaderVariant for DrawQuads {
-    const TEMPLATE: &'static str = SHADER.0;
-    const TRAITS: ResourceTraits = &[("work", ResourceTrait::DynamicOffset)];
-
-    fn context(&self) -> Value {
-        context! { at_texel_corners => self.0.are_at_texel_corners() }
-    }
-
-    fn all() -> Vec<Self> {
-        QuadVertices::ALL.map(Self).to_vec()
-    }
-}
+shader_variant!(DrawQuads(QuadVertices), "draw.wgsl", ONE_VIEW);
 
 impl DrawVariant for DrawQuads {
     fn state(&self) -> DrawState {
@@ -63,16 +43,17 @@ impl DrawVariant for DrawQuads {
     }
 }
 
-/// Drawing passes, and the targets of the last batch.
+/// The size of views, and how many there are.
+type TargetKind = (UVec2, u32);
+
+/// Drawing passes, and the targets of the last batches of two sizes: most are alike.
 pub(crate) struct QuadDrawing {
-    passes: PassCache<DrawQuads, DrawPass>,
-    /// Batches follow one another on the device, and most are alike.
-    targets: Mutex<Option<Arc<Targets>>>,
+    passes: PassCache<DrawPass>,
+    targets: Pool<TargetKind, Targets>,
 }
 
 /// The textures that views are drawn into, a layer each.
 pub(crate) struct Targets {
-    size_px: UVec2,
     depth: Layers,
     samples: Layers,
 }
@@ -83,17 +64,9 @@ struct Layers {
 }
 
 impl Layers {
-    fn new(device: &wgpu::Device, label: &str, format: TextureFormat, size_px: UVec2, count: usize) -> Self {
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d { width: size_px.x, height: size_px.y, depth_or_array_layers: count as u32 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
+    fn new(gpu: &Gpu, label: &str, format: TextureFormat, (size_px, count): TargetKind) -> Self {
+        let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
+        let texture = gpu.texture(label, size_px.extend(count).to_array(), format, usage);
         let view = |dimension, base_array_layer, count| {
             texture.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(dimension),
@@ -103,23 +76,13 @@ impl Layers {
             })
         };
         Self {
-            all: view(TextureViewDimension::D2Array, 0, count as u32),
-            each: (0..count as u32).map(|layer| view(TextureViewDimension::D2, layer, 1)).collect(),
+            all: view(TextureViewDimension::D2Array, 0, count),
+            each: (0..count).map(|layer| view(TextureViewDimension::D2, layer, 1)).collect(),
         }
     }
 }
 
 impl Targets {
-    fn new(device: &wgpu::Device, size_px: UVec2, count: usize) -> Self {
-        let layers = |label, format| Layers::new(device, label, format, size_px, count);
-        let depth = layers("drawn depth", DrawPass::DEPTH_FORMAT);
-        Self { size_px, depth, samples: layers("drawn samples", SAMPLE_FORMAT) }
-    }
-
-    fn holds(&self, size_px: UVec2, count: usize) -> bool {
-        self.size_px == size_px && self.depth.each.len() >= count
-    }
-
     /// As `resolve.wgsl` reads them.
     pub fn bindings(&self) -> [Binding<'_>; 2] {
         [Binding::texture("drawn_depth", &self.depth.all), Binding::texture("drawn_sample", &self.samples.all)]
@@ -128,18 +91,18 @@ impl Targets {
 
 impl QuadDrawing {
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        Self { passes: PassCache::new(gpu, templates), targets: Mutex::default() }
+        Self { passes: PassCache::new(gpu, templates), targets: Pool::keeping(2) }
     }
 
-    /// Targets for `count` views: those of the last batch, where they fit.
-    fn targets(&self, gpu: &Gpu, size_px: UVec2, count: usize) -> Result<Arc<Targets>, GpuError> {
-        let limits = gpu.device.limits();
+    fn targets(&self, gpu: &Gpu, kind: TargetKind) -> Result<Lent<TargetKind, Targets>, GpuError> {
+        let (limits, (size_px, views)) = (gpu.device.limits(), kind);
         let (side_px, layers) = (limits.max_texture_dimension_2d, limits.max_texture_array_layers);
         GpuError::check_limit("a drawn view's side (px)", size_px.max_element().into(), side_px.into())?;
-        GpuError::check_limit("views drawn together", count as u64, layers.into())?;
-        let mut kept = self.targets.lock();
-        let reused = kept.take().filter(|targets| targets.holds(size_px, count));
-        Ok(kept.insert(reused.unwrap_or_else(|| Arc::new(Targets::new(&gpu.device, size_px, count)))).clone())
+        GpuError::check_limit("views drawn together", views.into(), layers.into())?;
+        Ok(self.targets.lend(kind, |&kind| Targets {
+            depth: Layers::new(gpu, "drawn depth", DrawPass::DEPTH_FORMAT, kind),
+            samples: Layers::new(gpu, "drawn samples", SAMPLE_FORMAT, kind),
+        }))
     }
 }
 
@@ -148,51 +111,24 @@ pub(super) fn record(
     drawing: &QuadDrawing,
     recording: &mut Recording<'_>,
     mesh: &Mesh,
-) -> Result<Arc<Targets>, ReconstructionError> {
+) -> Result<Lent<TargetKind, Targets>, ReconstructionError> {
     let gpu = &recording.device.gpu;
-    let pass = drawing.passes.get(&DrawQuads(mesh.cut.vertices))?;
-    let targets = drawing.targets(gpu, recording.batch.size_px, recording.batch.cameras.len())?;
+    let quads = drawing.passes.get(&DrawQuads(mesh.cut.vertices))?;
+    let targets = drawing.targets(gpu, (recording.batch.size_px, recording.batch.cameras.len() as u32))?;
     let works = gpu.buffer_with("quads of views", &quad_works(recording), BufferUsages::UNIFORM);
-    let bound = pass.bind(0, [Binding::buffer("work", &works)])?;
-    for view in 0..recording.batch.cameras.len() {
-        draw_view(&mut recording.frame, &pass, &bound, mesh, (&targets, view));
+    let bound = quads.bind(0, [Binding::buffer("work", &works)])?;
+    let mut offsets = (0..).step_by(uniform_stride(size_of::<GpuQuadWork>() as u32) as usize);
+    for (samples, depth) in targets.samples.each.iter().zip(&targets.depth.each) {
+        let mut pass = recording.frame.begin_drawing("quads", &[samples], wgpu::Color::TRANSPARENT, depth);
+        pass.set_pipeline(quads.pipeline());
+        for (image, offset) in mesh.images.iter().zip(&mut offsets) {
+            pass.set_bind_group(0, &bound, &[offset]);
+            pass.set_vertex_buffer(0, image.inverse_depths.slice(..));
+            pass.set_index_buffer(image.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed_indirect(&image.draw, 0);
+        }
     }
     Ok(targets)
-}
-
-fn draw_view(
-    frame: &mut Frame<'_>,
-    pipeline: &DrawPass,
-    bound: &wgpu::BindGroup,
-    mesh: &Mesh,
-    (targets, view): (&Targets, usize),
-) {
-    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
-    let depth_ops = wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store };
-    let samples = wgpu::RenderPassColorAttachment {
-        view: &targets.samples.each[view],
-        depth_slice: None,
-        resolve_target: None,
-        ops,
-    };
-    let mut pass = frame.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("quads"),
-        color_attachments: &[Some(samples)],
-        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-            view: &targets.depth.each[view],
-            depth_ops: Some(depth_ops),
-            stencil_ops: None,
-        }),
-        ..Default::default()
-    });
-    pass.set_pipeline(pipeline.pipeline());
-    let first_work = view * mesh.images.len();
-    for (work, image) in (first_work as u32..).zip(&mesh.images) {
-        pass.set_bind_group(0, bound, &[work * uniform_stride(size_of::<GpuQuadWork>() as u32)]);
-        pass.set_vertex_buffer(0, image.inverse_depths.slice(..));
-        pass.set_index_buffer(image.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed_indirect(&image.draw, 0);
-    }
 }
 
 /// A uniform for each view and image.
@@ -201,13 +137,11 @@ fn quad_works(recording: &Recording<'_>) -> Vec<u8> {
     let images = || set.meshes.cameras.iter().zip(&set.cameras);
     let pairs = recording.batch.cameras.iter().flat_map(|view| images().map(move |image| (view, image)));
     uniform_elements(pairs.map(|(view, (image, sample_camera))| {
-        let work = GpuQuadWork { first_sample: sample_camera.first_cell, ..quad_work(view, image) };
-        bytemuck::bytes_of(&work).to_vec()
+        bytemuck::bytes_of(&quad_work(view, image, sample_camera.first_cell)).to_vec()
     }))
 }
 
-/// Without the place of the image's samples.
-fn quad_work(view: &PinholeCamera, image: &PinholeCamera) -> GpuQuadWork {
+fn quad_work(view: &PinholeCamera, image: &PinholeCamera, first_sample: u32) -> GpuQuadWork {
     let rays = GpuViewCamera::of(image, 0);
     let clip_of = |direction: Vec3| clip_direction(view, direction).to_array();
     // As a difference of eyes: nothing is lost far from the origin.
@@ -218,7 +152,7 @@ fn quad_work(view: &PinholeCamera, image: &PinholeCamera) -> GpuQuadWork {
         clip_from_row: clip_of(rays.row_in_world.into()),
         clip_from_corner: clip_of(rays.corner_in_world.into()),
         width_px: image.size_px.x,
-        first_sample: 0,
+        first_sample,
         padding: [0; 2],
     }
 }

@@ -18,7 +18,7 @@ fn shows_background(camera: SampleCamera, point_in_world: vec3f) -> bool {
 {% endif %}
     let words = textureLoad(cell_codes, texel_at(camera.first_cell + texel.y * camera.width_px + texel.x), 0);
     // Not where the ray passed what other images hold: bit 15 says so.
-    return inside && (words.x & 0xffffu) == BACKGROUND;
+    return inside && (words.x & 0xffffu) == BACKGROUND_CODE;
 }
 
 // The bit of a sample's camera.
@@ -34,7 +34,7 @@ fn mask_of(sample: u32) -> u32 {
     return mask;
 }
 
-@compute @workgroup_size({{ tile_px }}, {{ tile_px }})
+@compute @workgroup_size(TILE_PX, TILE_PX)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= work.view.size_px) { return; }
     let pixel = pixel_of(id.xy);
@@ -57,8 +57,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% for k in range(cameras) %}
     empty = empty || shows_background(work.cameras[{{ k }}], point_in_world);
 {% endfor %}
-    let color = select(work.background_srgb8, srgb8_from_linear(select(own, blend.color_linear, known)), drawn);
-    let without = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, empty);
-    write_pixel(pixel.index, color, select(0.0, 1.0 / t, drawn), select(without, PROVENANCE_HIT | (mask << 8u), drawn));
-    if !drawn && !empty { leave_undecided(pixel.index); }
+    write_found(pixel.index, drawn, t, select(own, blend.color_linear, known), mask, empty);
 }

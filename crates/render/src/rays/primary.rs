@@ -78,7 +78,7 @@ pub(crate) struct PrimaryWork<'a> {
 
 pub(crate) struct Primary {
     gpu: Arc<Gpu>,
-    passes: PassCache<PrimaryVariant>,
+    passes: PassCache,
 }
 
 impl Primary {
