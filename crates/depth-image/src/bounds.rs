@@ -3,8 +3,6 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::Ray;
-
 /// A box in world space, `min <= max` on every axis unless empty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Aabb {
@@ -64,18 +62,5 @@ impl Aabb {
                 if i & 4 == 0 { self.min.z } else { self.max.z },
             )
         })
-    }
-
-    /// The ray's parameters at entry and exit; `None` where it misses. The entry may be negative: the origin
-    /// is then inside or beyond.
-    #[must_use]
-    pub fn intersect(&self, ray: &Ray) -> Option<(f32, f32)> {
-        let inverse = ray.direction_in_world.recip();
-        let a = (self.min - ray.origin_in_world) * inverse;
-        let b = (self.max - ray.origin_in_world) * inverse;
-        // A ray along a face gives 0 * inf = NaN there; min/max of std ignore NaN, glam's may not.
-        let near = (0..3).fold(f32::NEG_INFINITY, |t, i| t.max(a[i].min(b[i])));
-        let far = (0..3).fold(f32::INFINITY, |t, i| t.min(a[i].max(b[i])));
-        (near <= far).then_some((near, far))
     }
 }
