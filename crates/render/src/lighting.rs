@@ -79,8 +79,6 @@ pub enum UnknownLighting {
 impl Lighting {
     /// Base colours as they are.
     pub const UNLIT: Self = Self { direct: Direct::Unlit, occlusion: None, rate: Rate::Full };
-    /// Lamps without shadows.
-    pub const PHONG: Self = Self { direct: Direct::Phong, occlusion: None, rate: Rate::Full };
 
     /// Whether anything arrives at surfaces.
     #[must_use]

@@ -53,12 +53,8 @@ impl fmt::Display for Choice {
 impl FromStr for Visibility {
     type Err = UnknownVisibility;
     fn from_str(text: &str) -> Result<Self, UnknownVisibility> {
-        match text {
-            "measured" => Ok(Self::Measured),
-            "triangles" => Ok(Self::Triangles),
-            "rays" => Ok(Self::Rays),
-            other => Err(UnknownVisibility(other.to_owned())),
-        }
+        let ways = [Self::Measured, Self::Triangles, Self::Rays];
+        ways.into_iter().find(|way| way.to_string() == text).ok_or_else(|| UnknownVisibility(text.to_owned()))
     }
 }
 
@@ -85,7 +81,7 @@ impl Choices {
         seconds: impl Fn(Visibility) -> Result<f64, RenderError>,
     ) -> Result<Choice, RenderError> {
         let mut measured = self.0.lock();
-        let key = (scene.identity(), size_px);
+        let key = (scene.identity, size_px);
         if let Some((_, choice)) = measured.iter().find(|(other, _)| *other == key) {
             return Ok(*choice);
         }

@@ -32,7 +32,7 @@ fn device() -> &'static Device {
 fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, SamplingError> {
     let draw = DrawWork {
         scene: &device().scene,
-        lighting: Lighting::PHONG,
+        lighting: Lighting::default(),
         scene_time_s: 0.0,
         visibility: Visibility::Triangles,
         refinement: Refinement::default(),

@@ -228,7 +228,7 @@ pub fn assert_sane(view: &View, what: &str) {
 fn plainly_lit(scene: &GpuScene) -> DrawWork<'_> {
     DrawWork {
         scene,
-        lighting: Lighting::PHONG,
+        lighting: Lighting::default(),
         scene_time_s: 0.0,
         visibility: Visibility::Triangles,
         refinement: Refinement::default(),

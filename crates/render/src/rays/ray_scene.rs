@@ -62,8 +62,8 @@ struct Built {
 
 /// Bound to shaders that trace rays.
 pub struct Traced {
-    nodes: Table,
-    corners: Table,
+    pub(crate) nodes: Table,
+    pub(crate) corners: Table,
     fixed: Arc<Fixed>,
     pub(crate) depth: u32,
     pub(crate) alpha_tested: bool,
@@ -253,11 +253,6 @@ impl Traced {
             Binding::texture("materials", materials),
             Binding::texture("texels", texels),
         ]
-    }
-
-    /// The tables that rays read most.
-    pub fn tree(&self) -> [&wgpu::TextureView; 2] {
-        [&self.nodes, &self.corners]
     }
 }
 

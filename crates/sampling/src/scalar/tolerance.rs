@@ -5,7 +5,7 @@ use glam::Vec3;
 use render::scalar::REFERENCE_FOOTPRINTS;
 
 use super::candidate::{Candidate, footprint_m, index_of, place};
-use crate::methods::non_redundant::tolerance::{
+use crate::methods::non_redundant::{
     CLEARLY, CLEARLY_SAME_FACING, COARSER, DEPTH_FOOTPRINTS, SAME_FACING, SLOPE_PX,
 };
 
