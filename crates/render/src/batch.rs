@@ -5,15 +5,9 @@ use std::{ops::Range, sync::Arc};
 use depth_image::PinholeCamera;
 use gpu::{BufferPool, Frame, Gpu, PassCache};
 
-use crate::{
-    Rate,
-    accumulation::{Key, Sums},
-    known_samples::ImageSequence,
-    pixel_camera::{PixelCamera, uniform},
-    planes::Output,
-    rays::Traced,
-    work::DrawWork,
-};
+use crate::accumulation::{Key, Sums};
+use crate::pixel_camera::{PixelCamera, uniform};
+use crate::{Rate, known_samples::ImageSequence, planes::Output, rays::Traced, work::DrawWork};
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.
 const OCCLUSION_OF_DIAGONAL: f32 = 0.05;

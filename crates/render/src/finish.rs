@@ -7,14 +7,10 @@ use gpu::{Binding, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, 
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
+use crate::batch::{Batch, Recording};
+use crate::planes::{Output, PlaneLayout};
 use crate::{
-    RenderError,
-    batch::{Batch, Recording},
-    pixel_camera::CAMERA_TRAITS,
-    planes::{Output, PlaneLayout},
-    redundancy_test::RedundancyTest,
-    sums::SumPlanes,
-    surfaces::Surfaces,
+    RenderError, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest, sums::SumPlanes, surfaces::Surfaces,
 };
 
 #[derive(Debug)]
@@ -43,9 +39,8 @@ impl Finish {
     }
 
     fn of_output(output: Output) -> impl Iterator<Item = Self> {
-        let each = move |sums| {
-            switches().map(move |[by_rays, lit]| Self { by_rays, lit, output: Output { sums, ..output } })
-        };
+        let each =
+            move |sums| switches().map(move |[by_rays, lit]| Self { by_rays, lit, output: Output { sums, ..output } });
         SumPlanes::all().flat_map(each)
     }
 }
@@ -76,10 +71,7 @@ impl ShaderVariant for Finish {
 }
 
 /// Records one dispatch for each camera; gives the words of all planes.
-pub(crate) fn record(
-    recording: &mut Recording<'_>,
-    surfaces: &[Surfaces],
-) -> Result<PooledBuffer, RenderError> {
+pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces]) -> Result<PooledBuffer, RenderError> {
     let Recording { passes, gpu, pool, batch, cameras, sums, frame, .. } = recording;
     let bytes = batch.bytes(batch.output.layout().count);
     gpu.check_storage_bytes("the planes of a batch (bytes)", bytes)?;

@@ -1,12 +1,8 @@
 //! A scene on the device.
 
-use std::{
-    ops::Range,
-    sync::{
-        Arc,
-        atomic::{AtomicU64, Ordering},
-    },
-};
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Aabb, Highlight, MAX_LIGHTS};
@@ -16,13 +12,8 @@ use indexmap::IndexSet;
 use scene::{Material, Scene, Wind};
 use wgpu::BufferUsages;
 
-use crate::{
-    RenderError, cluster,
-    material::phong_reflector,
-    pixel_camera::uniform,
-    rays::{AccelerationReport, OrderedMesh, RayScene},
-    texture,
-};
+use crate::rays::{AccelerationReport, OrderedMesh, RayScene};
+use crate::{RenderError, cluster, material::phong_reflector, pixel_camera::uniform, texture};
 
 /// A mesh part where an instance places it: `Object` in the shader, the same for a whole draw. It lies at a dynamic offset: a
 /// load from a uniform costs nothing a vertex or fragment.
@@ -147,12 +138,9 @@ impl GpuScene {
         Ok(self.rays.at(scene_time_s)?.report)
     }
 
-    /// As [`GpuScene::acceleration`], with a new tree whatever there was: to measure the gain of refitting.
-    ///
-    /// # Errors
-    /// As [`GpuScene::acceleration`].
-    pub fn rebuilt_acceleration(&self, scene_time_s: f32) -> Result<AccelerationReport, RenderError> {
-        Ok(self.rays.rebuilt_at(scene_time_s)?.report)
+    /// Forgets the tree, so that the next is not refitted from it.
+    pub fn forget_acceleration(&self) {
+        self.rays.forget();
     }
 
     /// The nodes of that tree and its triangles: the tables that rays read most.

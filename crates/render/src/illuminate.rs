@@ -4,13 +4,9 @@ use gpu::{Binding, ResourceTraits, ShaderVariant, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
+use crate::rays::Traversal;
 use crate::{
-    Direct, RenderError,
-    batch::Recording,
-    pixel_camera::CAMERA_TRAITS,
-    pixel_list::PixelList,
-    rays::{Traced, Traversal},
-    sums::SumPlanes,
+    Direct, RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, pixel_list::PixelList, sums::SumPlanes,
     surfaces::Surfaces,
 };
 

@@ -19,7 +19,7 @@ impl ShaderVariant for Keep {
     }
 
     fn all() -> Vec<Self> {
-        [false, true].map(|by_rays| Self { by_rays }).to_vec()
+        vec![Self { by_rays: false }, Self { by_rays: true }]
     }
 }
 

@@ -9,11 +9,9 @@ use gpu::{Binding, Gpu, GpuError};
 use minijinja::{Value, context};
 use wgpu::{BufferUsages, TextureFormat, TextureView};
 
-use crate::{
-    layers::{LayerCache, Layers},
-    redundancy_test::{Evidence, RedundancyTest},
-    surfaces::SURFACE_ID_FORMAT,
-};
+use crate::layers::{LayerCache, Layers};
+use crate::redundancy_test::{Evidence, RedundancyTest};
+use crate::surfaces::SURFACE_ID_FORMAT;
 
 /// A sample of the temporal reference is the same as a candidate within this many footprints: a steep surface may change its
 /// depth more from texel to texel.

@@ -4,11 +4,8 @@ use std::mem::offset_of;
 
 use bytemuck::Zeroable as _;
 use gpu::ShaderVariant as _;
-use naga::{
-    TypeInner,
-    front::wgsl::{Frontend, Options},
-    valid::Capabilities,
-};
+use naga::front::wgsl::{Frontend, Options};
+use naga::{TypeInner, valid::Capabilities};
 
 use crate::gpu_scene::{GpuObject, GpuSurroundings};
 use crate::keep::Keep;
@@ -59,8 +56,7 @@ fn raster() -> naga::Module {
 
 #[test]
 fn structs_of_draws_have_the_wgsl_layout() {
-    let camera =
-        host!(RasterCamera { clip_from_world, eye_in_world, scene_time_s, near_m, footprint, padding });
+    let camera = host!(RasterCamera { clip_from_world, eye_in_world, scene_time_s, near_m, footprint, padding });
     let object = host!(GpuObject {
         world_from_mesh,
         normal_from_mesh,

@@ -2,7 +2,8 @@
 //! and depth images.
 
 use depth_image::{
-    Camera, DepthImage, Highlight, PinholeCamera, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View, ViewPlanes,
+    Camera, DepthImage, Highlight, PinholeCamera, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View,
+    ViewPlanes,
 };
 
 use crate::sums::SumPlanes;

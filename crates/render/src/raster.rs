@@ -11,15 +11,11 @@ use gpu::{
 };
 use minijinja::{Value, context};
 
+use crate::gpu_scene::{Draw, GpuObject, MaterialTraits};
+use crate::known_samples::{Predecessors, RedundancyVariant};
+use crate::surfaces::{NOTHING, SURFACE_FORMAT, SURFACE_ID_FORMAT, Surfaces};
 use crate::{
-    GpuScene, RenderError,
-    batch::Recording,
-    cluster::Frustum,
-    gpu_scene::{Draw, GpuObject, MaterialTraits},
-    known_samples::{Predecessors, RedundancyVariant},
-    pixel_camera::uniform,
-    redundancy_test::RedundancyTest,
-    surfaces::{NOTHING, SURFACE_FORMAT, SURFACE_ID_FORMAT, Surfaces},
+    GpuScene, RenderError, batch::Recording, cluster::Frustum, pixel_camera::uniform, redundancy_test::RedundancyTest,
     work::DrawWork,
 };
 
@@ -266,9 +262,8 @@ struct Run {
 fn visible_runs(scene: &GpuScene, frustum: &Frustum) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     let visible = scene.draws.iter().enumerate().filter(|(_, draw)| frustum.may_see(&draw.bounds_in_world));
-    let joins = |run: &Run, draw: &Draw| {
-        (scene.draws[run.draw].object, run.indices.end) == (draw.object, draw.indices.start)
-    };
+    let joins =
+        |run: &Run, draw: &Draw| (scene.draws[run.draw].object, run.indices.end) == (draw.object, draw.indices.start);
     for (number, draw) in visible {
         match runs.last_mut() {
             Some(run) if joins(run, draw) => run.indices.end = draw.indices.end,

@@ -5,18 +5,13 @@ use std::{slice, sync::Arc, time::Instant};
 use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
 use gpu::{Frame, Gpu, GpuError, Templates};
 
+use crate::known_samples::{ImageSequence, KnownSamples, TemporalReference};
+use crate::planes::{self, Output};
+use crate::visibility::{Choice, Choices, Visibility};
+use crate::work::{DrawWork, SamplePlanes};
 use crate::{
-    GpuScene, Lighting, RenderError,
-    batch::Batch,
-    known_samples::{ImageSequence, KnownSamples, TemporalReference},
-    layers::LayerCache,
-    planes::{self, Output},
-    redundancy_test::RedundancyTest,
-    shaders::templates,
-    stages::Stages,
-    sums::SumPlanes,
-    visibility::{Choice, Choices, Visibility},
-    work::{DrawWork, SamplePlanes},
+    GpuScene, Lighting, RenderError, batch::Batch, layers::LayerCache, redundancy_test::RedundancyTest,
+    shaders::templates, stages::Stages, sums::SumPlanes,
 };
 
 /// Pixels in one submission: bounds the memory for surfaces, light and read-back.
@@ -111,7 +106,8 @@ impl Renderer {
         let samples = known(&all, reference)?;
         let sequence = ImageSequence { known: &samples, wanted, first: 0, kept: all.len().saturating_sub(1) };
         // Where pixels are compared with the same pixel, corners are compared with corners.
-        let corners = (planes.corners && test.from_one_place).then(|| known(&corner_cameras(&all), None)).transpose()?;
+        let corners =
+            (planes.corners && test.from_one_place).then(|| known(&corner_cameras(&all), None)).transpose()?;
         let of_corners = match &corners {
             Some(known) => ImageSequence { known, ..sequence },
             None => ImageSequence { kept: 0, ..sequence },

@@ -6,13 +6,9 @@ use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
 use super::{ray_scene::Traced, traversal::Traversal};
+use crate::known_samples::{Predecessors, RedundancyVariant};
 use crate::{
-    RenderError,
-    batch::Recording,
-    known_samples::{Predecessors, RedundancyVariant},
-    pixel_camera::CAMERA_TRAITS,
-    redundancy_test::RedundancyTest,
-    surfaces::Surfaces,
+    RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest, surfaces::Surfaces,
 };
 
 /// The redundant surfaces that one ray passes before it is given up: the software device ends long loops.
@@ -112,11 +108,8 @@ mod tests {
     use glam::{UVec2, Vec3};
 
     use super::*;
-    use crate::{
-        known_samples::KnownSamples,
-        layers::LayerCache,
-        test_support::{TEST, TestStage},
-    };
+    use crate::test_support::{TEST, TestStage};
+    use crate::{known_samples::KnownSamples, layers::LayerCache};
 
     fn check(stage: &TestStage, traced: &Traced, variant: &Primary) {
         let target = stage.surfaces(true, variant.surface_id);

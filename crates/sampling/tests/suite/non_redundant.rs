@@ -23,8 +23,13 @@ fn taken(
     method: SamplingMethod,
     visibility: Visibility,
 ) -> Result<Vec<DepthImage>, SamplingError> {
-    let draw =
-        DrawWork { scene, lighting: Lighting::default(), scene_time_s: 0.0, visibility, refinement: Refinement::default() };
+    let draw = DrawWork {
+        scene,
+        lighting: Lighting::default(),
+        scene_time_s: 0.0,
+        visibility,
+        refinement: Refinement::default(),
+    };
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
     device().sampler.sample(&SampleWork {
