@@ -51,39 +51,27 @@ impl Gpu {
     /// # Errors
     /// No device exists, or it cannot be opened.
     pub fn open(preference: DevicePreference) -> Result<Arc<Self>, GpuError> {
-        pollster::block_on(Self::open_async(preference))
-    }
-
-    async fn open_async(preference: DevicePreference) -> Result<Arc<Self>, GpuError> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-        let adapter = instance
-            .request_adapter(&wgpu::RequestAdapterOptions {
-                power_preference: wgpu::PowerPreference::HighPerformance,
-                force_fallback_adapter: preference == DevicePreference::Software,
-                ..Default::default()
-            })
-            .await
-            .map_err(|error| GpuError::NoDevice(error.to_string()))?;
+        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            force_fallback_adapter: preference == DevicePreference::Software,
+            ..Default::default()
+        }))
+        .map_err(|error| GpuError::NoDevice(error.to_string()))?;
         let info = adapter.get_info();
-        let wanted = wgpu::Features::TIMESTAMP_QUERY
-            | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS
-            | wgpu::Features::PRIMITIVE_INDEX;
-        let features = adapter.features() & wanted;
-        let (device, queue) = adapter
-            .request_device(&wgpu::DeviceDescriptor {
-                label: Some("myriorama"),
-                required_features: features,
-                required_limits: adapter.limits(),
-                memory_hints: wgpu::MemoryHints::MemoryUsage,
-                ..Default::default()
-            })
-            .await
-            .map_err(|error| GpuError::Open { name: info.name.clone(), reason: error.to_string() })?;
-        let has_timestamps =
-            features.contains(wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
+        let timestamps = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS;
+        let features = adapter.features() & (timestamps | wgpu::Features::PRIMITIVE_INDEX);
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("myriorama"),
+            required_features: features,
+            required_limits: adapter.limits(),
+            memory_hints: wgpu::MemoryHints::MemoryUsage,
+            ..Default::default()
+        }))
+        .map_err(|error| GpuError::Open { name: info.name.clone(), reason: error.to_string() })?;
         // On a processor, wall clock around submit and wait is right; its time stamps are not.
-        let timestamp_period_ns =
-            (has_timestamps && info.device_type != wgpu::DeviceType::Cpu).then(|| queue.get_timestamp_period());
+        let timestamp_period_ns = (features.contains(timestamps) && info.device_type != wgpu::DeviceType::Cpu)
+            .then(|| queue.get_timestamp_period());
         tracing::info!(device = info.name, backend = %info.backend, "graphics device opened");
         Ok(Arc::new(Self { device, queue, info, timestamp_period_ns }))
     }
@@ -100,12 +88,6 @@ impl Gpu {
         self.info.device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Whether fragment shaders know their triangle's number.
-    #[must_use]
-    pub fn has_primitive_index(&self) -> bool {
-        self.device.features().contains(wgpu::Features::PRIMITIVE_INDEX)
-    }
-
     /// Checks a storage buffer's size against the device, before it is made.
     ///
     /// # Errors
@@ -115,7 +97,36 @@ impl Gpu {
         GpuError::check_limit(what, bytes, limits.max_storage_buffer_binding_size.min(limits.max_buffer_size))
     }
 
-    /// A buffer with contents.
+    /// A buffer of zeros.
+    #[must_use]
+    pub fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+        self.device.create_buffer(&descriptor)
+    }
+
+    /// A texture of one level. `size` is columns, rows and layers.
+    #[must_use]
+    pub fn texture(
+        &self,
+        label: &str,
+        size: [u32; 3],
+        format: wgpu::TextureFormat,
+        usage: wgpu::TextureUsages,
+    ) -> wgpu::Texture {
+        let [width, height, depth_or_array_layers] = size;
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        })
+    }
+
+    /// A buffer with contents, a multiple of 4 bytes.
     #[must_use]
     pub fn buffer_with<T: bytemuck::NoUninit>(
         &self,
@@ -124,20 +135,9 @@ impl Gpu {
         usage: wgpu::BufferUsages,
     ) -> wgpu::Buffer {
         let bytes: &[u8] = bytemuck::cast_slice(contents);
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            // A binding may not be empty.
-            size: (bytes.len().next_multiple_of(4) as u64).max(16),
-            usage: usage | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        if bytes.len().is_multiple_of(4) {
-            self.queue.write_buffer(&buffer, 0, bytes);
-        } else {
-            let mut padded = bytes.to_vec();
-            padded.resize(bytes.len().next_multiple_of(4), 0);
-            self.queue.write_buffer(&buffer, 0, &padded);
-        }
+        // A binding may not be empty.
+        let buffer = self.buffer(label, bytes.len().max(16) as u64, usage | wgpu::BufferUsages::COPY_DST);
+        self.queue.write_buffer(&buffer, 0, bytes);
         buffer
     }
 }

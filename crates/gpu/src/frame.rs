@@ -2,6 +2,8 @@
 
 use std::{ops::Range, sync::mpsc, time::Instant};
 
+use wgpu::BufferUsages;
+
 use crate::{device::Gpu, error::GpuError, pool::PooledBuffer};
 
 /// Work that is being recorded.
@@ -130,16 +132,12 @@ impl Drop for FrameResult {
 
 impl Timer {
     fn new(gpu: &Gpu) -> Self {
-        let buffer = |usage| {
-            let descriptor =
-                wgpu::BufferDescriptor { label: Some("timestamps"), size: 16, usage, mapped_at_creation: false };
-            gpu.device.create_buffer(&descriptor)
-        };
+        let buffer = |usage| gpu.buffer("timestamps", 16, usage);
         let descriptor = wgpu::QuerySetDescriptor { label: Some("frame"), ty: wgpu::QueryType::Timestamp, count: 2 };
         Self {
             queries: gpu.device.create_query_set(&descriptor),
-            resolved: buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
-            host: buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
+            resolved: buffer(BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC),
+            host: buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST),
         }
     }
 

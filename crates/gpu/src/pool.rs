@@ -103,11 +103,7 @@ impl BufferPool {
     #[must_use]
     pub fn lend(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> PooledBuffer {
         let size = bytes.max(256).next_power_of_two().min(bytes.max(256).next_multiple_of(1 << 22));
-        self.buffers.lend((size, usage), |_| {
-            let mapped_at_creation = false;
-            let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation };
-            self.gpu.device.create_buffer(&descriptor)
-        })
+        self.buffers.lend((size, usage), |_| self.gpu.buffer(label, size, usage))
     }
 
     /// A device buffer that shaders write and copies read.

@@ -7,12 +7,8 @@ use bytemuck::NoUninit;
 use parking_lot::Mutex;
 use wgpu::{TextureFormat, TextureUsages, util::StagingBelt};
 
-use crate::{
-    device::Gpu,
-    error::GpuError,
-    frame::Frame,
-    pool::{Lent, Pool},
-};
+use crate::pool::{Lent, Pool};
+use crate::{device::Gpu, error::GpuError, frame::Frame};
 
 /// The n-th texel lies in column `n % TABLE_WIDTH` of row `n / TABLE_WIDTH` (`texel_at` in table.wgsl).
 pub const TABLE_WIDTH: u32 = 1 << TABLE_WIDTH_LOG2;
@@ -36,7 +32,8 @@ pub struct Table(Lent<Shape, wgpu::TextureView>);
 /// Lends tables, and keeps the memory that they are filled through: new memory costs a software device most of the time
 /// that filling takes.
 pub struct TablePool {
-    gpu: Arc<Gpu>,
+    /// The device of its tables.
+    pub gpu: Arc<Gpu>,
     textures: Pool<Shape, wgpu::TextureView>,
     staging: Mutex<Staging>,
 }
@@ -62,24 +59,15 @@ impl Table {
     fn write(&self, gpu: &Gpu, bytes: &[u8]) {
         let row_bytes = self.0.kind().row_bytes();
         let (whole, part) = bytes.split_at(bytes.len() / row_bytes * row_bytes);
-        self.write_rows(gpu, 0, whole);
-        if !part.is_empty() {
-            let mut last = part.to_vec();
-            last.resize(row_bytes, 0);
-            self.write_rows(gpu, whole.len() / row_bytes, &last);
+        let mut last = part.to_vec();
+        last.resize(part.len().next_multiple_of(row_bytes), 0);
+        for (begin, rows) in [(0, whole), (whole.len(), &*last)].into_iter().filter(|(_, rows)| !rows.is_empty()) {
+            let [first, height] = [begin, rows.len()].map(|bytes| (bytes / row_bytes) as u32);
+            let origin = wgpu::Origin3d { x: 0, y: first, z: 0 };
+            let destination = wgpu::TexelCopyTextureInfo { origin, ..self.texture().as_image_copy() };
+            let size = wgpu::Extent3d { width: TABLE_WIDTH, height, depth_or_array_layers: 1 };
+            gpu.queue.write_texture(destination, rows, row_by_row(row_bytes, 0), size);
         }
-    }
-
-    fn write_rows(&self, gpu: &Gpu, first: usize, bytes: &[u8]) {
-        let row_bytes = self.0.kind().row_bytes();
-        let height = (bytes.len() / row_bytes) as u32;
-        if height == 0 {
-            return;
-        }
-        let origin = wgpu::Origin3d { x: 0, y: first as u32, z: 0 };
-        let destination = wgpu::TexelCopyTextureInfo { origin, ..self.texture().as_image_copy() };
-        let size = wgpu::Extent3d { width: TABLE_WIDTH, height, depth_or_array_layers: 1 };
-        gpu.queue.write_texture(destination, bytes, row_by_row(row_bytes, 0), size);
     }
 }
 
@@ -96,12 +84,6 @@ impl TablePool {
     pub fn new(gpu: &Arc<Gpu>, most_free: usize) -> Self {
         let staging = Staging { belt: StagingBelt::new(gpu.device.clone(), 0), chunk_bytes: 0 };
         Self { gpu: gpu.clone(), textures: Pool::keeping(most_free), staging: Mutex::new(staging) }
-    }
-
-    /// The device of its tables.
-    #[must_use]
-    pub fn gpu(&self) -> &Arc<Gpu> {
-        &self.gpu
     }
 
     /// A table of elements, each of whole texels of `format`.
@@ -182,17 +164,8 @@ fn row_by_row(row_bytes: usize, offset: u64) -> wgpu::TexelCopyBufferLayout {
 }
 
 fn texture(gpu: &Gpu, label: &str, Shape { format, rows }: Shape) -> wgpu::TextureView {
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d { width: TABLE_WIDTH, height: rows, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
-        view_formats: &[],
-    });
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
+    let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST;
+    gpu.texture(label, [TABLE_WIDTH, rows, 1], format, usage).create_view(&Default::default())
 }
 
 #[cfg(test)]

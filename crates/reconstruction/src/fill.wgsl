@@ -14,10 +14,6 @@ struct FillWork {
 @group(0) var<storage, read_write> inverse_depth: array<f32>;
 @group(0) var<storage, read> provenance: array<u32>;
 
-const PROVENANCE_FILLED: u32 = {{ provenance_filled }}u;
-const REACH_PX: i32 = {{ reach_px }};
-const SAME_SIDE: f32 = {{ same_side }};
-
 struct Neighbour { inverse_depth: f32, color_linear: vec3f, weight: f32 }
 
 // The first known pixel in one direction.
@@ -34,14 +30,14 @@ fn known_towards(origin: vec2i, towards: vec2i, first: u32) -> Neighbour {
     return Neighbour(0.0, vec3f(0.0), 0.0);
 }
 
-@compute @workgroup_size({{ list_workgroup }})
+@compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= lists[work.number].count { return; }
     let first = work.first_pixel;
     let index = listed_pixels[first + id.x];
     let origin = vec2i(vec2u((index - first) % work.size_px.x, (index - first) / work.size_px.x));
     var farthest = 3.0e38;
-{% for d in directions %}
+{% for d in DIRECTIONS %}
     let n{{ loop.index0 }} = known_towards(origin, vec2i({{ d[0] }}, {{ d[1] }}), first);
     farthest = select(farthest, min(farthest, n{{ loop.index0 }}.inverse_depth), n{{ loop.index0 }}.weight > 0.0);
 {% endfor %}
@@ -49,7 +45,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var sum = vec3f(0.0);
     var weights = 0.0;
     var depths = 0.0;
-{% for d in directions %}
+{% for d in DIRECTIONS %}
     let w{{ loop.index0 }} = select(0.0, n{{ loop.index0 }}.weight, n{{ loop.index0 }}.inverse_depth * SAME_SIDE <= farthest);
     sum += n{{ loop.index0 }}.color_linear * w{{ loop.index0 }};
     depths += n{{ loop.index0 }}.inverse_depth * w{{ loop.index0 }};

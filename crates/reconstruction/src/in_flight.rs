@@ -3,7 +3,8 @@
 use depth_image::{Provenance, View, ViewPlanes};
 use gpu::{FrameResult, PooledBuffer, Readback, Submitted};
 
-use crate::{batch::Batch, error::ReconstructionError, recording::Recording};
+use crate::error::ReconstructionError;
+use crate::recording::{Batch, Recording};
 
 /// Device time and fetches of a reconstruction.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -10,7 +10,7 @@ use crate::{
     fill::GpuFillWork,
     pixel_list::GpuPixelList,
     quads::{GpuCutWork, GpuQuadWork},
-    reconstructor::{shader_sources, templates},
+    shaders::{shader_sources, templates},
     view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume},
 };
 
@@ -75,7 +75,7 @@ fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
     let passes = BTreeSet::from([
         "joint_carve.wgsl",
         "light_field_search.wgsl",
-        "march.wgsl",
+        "joint_carve/march.wgsl",
         "resolve.wgsl",
         "specular.wgsl",
         "tile_start.wgsl",
@@ -142,9 +142,9 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
     let count = offset_of!(GpuPixelList, count);
     let fields = [("workgroups", first), ("y", first + 4), ("z", first + 8), ("count", count)];
     let list = Layout::new(fields, size_of::<GpuPixelList>());
-    let written = ["joint_carve.wgsl", "light_field_search.wgsl", "march.wgsl", "resolve.wgsl"];
+    let written = ["joint_carve.wgsl", "light_field_search.wgsl", "joint_carve/march.wgsl", "resolve.wgsl"];
     assert_eq!(templates_that_agree("UndecidedList", &list), BTreeSet::from(written));
-    let read = ["fill.wgsl", "joint_carve.wgsl", "march.wgsl"];
+    let read = ["fill.wgsl", "joint_carve.wgsl", "joint_carve/march.wgsl"];
     assert_eq!(templates_that_agree("PixelList", &list), BTreeSet::from(read));
 }
 

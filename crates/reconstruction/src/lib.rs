@@ -4,7 +4,6 @@
 //! [`Reconstructor::reconstruct`] draws views from it, many in one submission: tile starts, the method, the fill and
 //! highlights. Each method is one enum variant, one `.rs` and `.wgsl` pair in `methods`, and has a scalar twin.
 
-mod batch;
 mod device;
 mod error;
 mod error_bound;
@@ -24,6 +23,7 @@ mod sample_set;
 #[cfg(feature = "scalar")]
 pub mod scalar;
 mod set_description;
+mod shaders;
 mod specular;
 mod surface;
 mod tile_start;
@@ -35,8 +35,9 @@ pub use in_flight::Statistics;
 pub use methods::{METHODS, ReconstructionMethod, UnknownMethod};
 pub use pyramid::{CodedDepth, Pyramid};
 pub use quads::{MeshStatistics, Quad};
-pub use reconstructor::{Reconstructor, shader_sources, shaders, templates};
+pub use reconstructor::Reconstructor;
 pub use required_planes::RequiredPlanes;
 pub use sample_set::SampleSet;
 pub use set_description::SetDescription;
+pub use shaders::{shader_sources, shaders, templates};
 pub use view_work::MAX_SAMPLE_CAMERAS;

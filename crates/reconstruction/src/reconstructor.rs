@@ -3,60 +3,22 @@
 use std::sync::Arc;
 
 use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
-use gpu::{BufferPool, Gpu, PassCache, ShaderError, ShaderSource, TablePool, Templates, sources};
+use gpu::{BufferPool, Gpu, PassCache, TablePool};
 
+use crate::in_flight::{InFlight, Statistics};
+use crate::quads::{self, MeshStatistics, Quad, QuadDrawing};
+use crate::recording::{Recording, batches};
+use crate::sample_set::{MAX_TABLES, SampleSet};
 use crate::{
-    batch::batches,
-    device::Device,
-    error::ReconstructionError,
-    fill::{self, Fill},
-    in_flight::{InFlight, Statistics},
-    methods::{self, MethodPasses, ReconstructionMethod},
-    quads::{self, MeshStatistics, Quad},
-    recording::Recording,
-    sample_set::{self, SampleSet},
-    set_description::SetDescription,
-    specular::{self, Specular},
-    tile_start::{self, TileStart},
+    device::Device, error::ReconstructionError, methods::ReconstructionMethod, set_description::SetDescription,
 };
-
-/// Templates that several shaders include.
-const INCLUDES: [(&str, &str); 4] = [
-    ("view_work.wgsl", include_str!("view_work.wgsl")),
-    ("cell.wgsl", include_str!("cell.wgsl")),
-    ("surface.wgsl", include_str!("surface.wgsl")),
-    ("pixel_list.wgsl", include_str!("pixel_list.wgsl")),
-];
-
-/// The names and texts of all templates of this crate.
-#[must_use]
-pub fn shaders() -> Vec<(&'static str, &'static str)> {
-    let passes = [tile_start::SHADER, fill::SHADER, specular::SHADER];
-    [&INCLUDES[..], &passes, &quads::SHADERS, &methods::SHADERS].concat()
-}
-
-/// All templates of this crate.
-///
-/// # Errors
-/// When a text is not a template.
-pub fn templates() -> Result<Templates, ShaderError> {
-    Templates::new(&shaders())
-}
-
-/// The texts of all variants of all passes.
-pub fn shader_sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    let frame = sources::<TileStart>(templates).chain(sources::<Fill>(templates)).chain(sources::<Specular>(templates));
-    frame.chain(quads::sources(templates)).chain(methods::sources(templates))
-}
+use crate::{fill, shaders::templates, specular, tile_start};
 
 /// Passes for every method and number of cameras that has been asked for.
 pub struct Reconstructor {
     device: Device,
     tables: TablePool,
-    tile_start: PassCache<TileStart>,
-    methods: MethodPasses,
-    fill: PassCache<Fill>,
-    specular: PassCache<Specular>,
+    drawing: QuadDrawing,
 }
 
 impl Reconstructor {
@@ -67,12 +29,9 @@ impl Reconstructor {
     pub fn new(gpu: &Arc<Gpu>) -> Result<Self, ReconstructionError> {
         let templates = Arc::new(templates()?);
         Ok(Self {
-            device: Device { gpu: gpu.clone(), buffers: BufferPool::new(gpu) },
-            tables: TablePool::new(gpu, sample_set::MAX_TABLES),
-            tile_start: PassCache::new(gpu, &templates),
-            methods: MethodPasses::new(gpu, &templates),
-            fill: PassCache::new(gpu, &templates),
-            specular: PassCache::new(gpu, &templates),
+            tables: TablePool::new(gpu, MAX_TABLES),
+            drawing: QuadDrawing::new(gpu, &templates),
+            device: Device { gpu: gpu.clone(), buffers: BufferPool::new(gpu), passes: PassCache::new(gpu, &templates) },
         })
     }
 
@@ -140,11 +99,11 @@ impl Reconstructor {
     ) -> Result<Recording<'r>, ReconstructionError> {
         let mut recording = Recording::begin(&self.device, set, cameras, count_fetches)?;
         if method.follows_rays() {
-            tile_start::record(&self.tile_start, &mut recording)?;
+            tile_start::record(&mut recording)?;
         }
-        let unknown = method.record(&self.methods, &mut recording)?;
-        fill::record(&self.fill, &mut recording, &unknown)?;
-        specular::record(&self.specular, &mut recording)?;
+        let unknown = method.record(&self.drawing, &mut recording)?;
+        fill::record(&mut recording, &unknown)?;
+        specular::record(&mut recording)?;
         Ok(recording)
     }
 
@@ -157,7 +116,7 @@ impl Reconstructor {
         set: &SampleSet,
         method: ReconstructionMethod,
     ) -> Result<Option<MeshStatistics>, ReconstructionError> {
-        Ok(method.mesh(&self.methods, &self.device, set)?.map(|mesh| mesh.statistics))
+        Ok(method.mesh(&self.device, set)?.map(|mesh| mesh.statistics))
     }
 
     /// The quads that a method draws, image after image in the order of their samples; none for methods that draw none.
@@ -165,7 +124,7 @@ impl Reconstructor {
     /// # Errors
     /// As [`Reconstructor::mesh_statistics`].
     pub fn read_quads(&self, set: &SampleSet, method: ReconstructionMethod) -> Result<Vec<Quad>, ReconstructionError> {
-        let mesh = method.mesh(&self.methods, &self.device, set)?;
+        let mesh = method.mesh(&self.device, set)?;
         mesh.map_or(Ok(Vec::new()), |mesh| quads::read(&self.device, &mesh, set))
     }
 }

@@ -28,7 +28,7 @@ impl Reflectors {
     ) -> Result<Option<Self>, ReconstructionError> {
         check(images, set.illumination)?;
         let Some(highlight) = set.highlight.filter(|_| images.iter().any(reflects)) else { return Ok(None) };
-        let (gpu, bytes) = (tables.gpu(), illumination_bytes(set.illumination));
+        let (gpu, bytes) = (&tables.gpu, illumination_bytes(set.illumination));
         let limit = gpu.device.limits().max_uniform_buffer_binding_size;
         GpuError::check_limit("the scene's lights (bytes)", bytes.len() as u64, limit)?;
         let visibility_words = visibility_words(images);

@@ -124,8 +124,8 @@ fn check(tables: &TablePool, images: &[DepthImage], volume: &Aabb) -> Result<(),
             return Err(wrong("an image of one row or column has no surface between samples".to_owned()));
         }
     }
-    tables.gpu().check_table("depth pyramids", node_count(images))?;
-    tables.gpu().check_table("cells", cell_count(images))?;
+    tables.gpu.check_table("depth pyramids", node_count(images))?;
+    tables.gpu.check_table("cells", cell_count(images))?;
     Ok(())
 }
 

@@ -1,21 +1,14 @@
 //! Adds the light that depends on the viewer to pixels that show a surface.
 
 use depth_image::Highlight;
-use gpu::{Binding, PassCache, ResourceTraits, ShaderVariant, WgslLiteral as _, highlight_name, light_slots};
+use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, light_slots};
 use minijinja::{Value, context};
 
-use crate::{
-    error::ReconstructionError,
-    recording::Recording,
-    reflectors::sample_texels,
-    surface::THICKNESS_FOOTPRINTS,
-    view_work::{ONE_VIEW, SetVariant},
-};
-
-pub(crate) const SHADER: (&str, &str) = ("specular.wgsl", include_str!("specular.wgsl"));
+use crate::view_work::{ONE_VIEW, SetVariant};
+use crate::{error::ReconstructionError, recording::Recording, reflectors::sample_texels};
 
 /// The switches of `specular.wgsl`.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[derive(Debug)]
 pub(crate) struct Specular {
     set: SetVariant,
     highlight: Highlight,
@@ -25,7 +18,7 @@ pub(crate) struct Specular {
 }
 
 impl ShaderVariant for Specular {
-    const TEMPLATE: &'static str = SHADER.0;
+    const TEMPLATE: &'static str = "specular.wgsl";
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
@@ -34,7 +27,6 @@ impl ShaderVariant for Specular {
             light_slots => light_slots(self.lights),
             visibility_words => self.visibility_words,
             sample_texels => sample_texels(self.visibility_words),
-            thickness_footprints => THICKNESS_FOOTPRINTS.wgsl_literal(),
             ..self.set.context()
         }
     }
@@ -51,9 +43,9 @@ impl ShaderVariant for Specular {
 }
 
 /// Highlights are added after the fill, which would spread them.
-pub(crate) fn record(passes: &PassCache<Specular>, recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
+pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
     let Some(reflectors) = &recording.set.reflectors else { return Ok(()) };
-    let pass = passes.get(&Specular {
+    let pass = recording.device.passes.get(&Specular {
         set: recording.set.variant(),
         highlight: reflectors.highlight,
         lights: reflectors.lights,
@@ -68,6 +60,6 @@ pub(crate) fn record(passes: &PassCache<Specular>, recording: &mut Recording<'_>
         Binding::texture("samples", &reflectors.samples),
     ]);
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&pass, &bound);
+    recording.dispatch_pixels(&pass, &bound, None);
     Ok(())
 }

@@ -18,7 +18,6 @@
 // words.
 @group(0) var samples: texture_2d<u32>;
 
-const THICKNESS_FOOTPRINTS: f32 = {{ thickness_footprints }};
 const SAMPLE_TEXELS: u32 = {{ sample_texels }}u;
 
 // The mean of the samples around a point, packed as one sample, and the share of them that reflects.

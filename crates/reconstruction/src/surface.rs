@@ -1,13 +1,9 @@
 //! The vote of all cameras on a point: `surface.wgsl`, the common part of passes that find surfaces.
 
-use gpu::{Binding, WgslLiteral as _};
+use gpu::{Binding, ShaderVariant};
 use minijinja::{Value, context};
 
-use crate::{
-    pixel_list::{LIST_WORKGROUP, PixelList},
-    recording::Recording,
-    view_work::SetVariant,
-};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, view_work::SetVariant};
 
 /// The surface's thickness, in texel footprints: the best of a sweep (docs/methods/joint_carve.md).
 pub(crate) const THICKNESS_FOOTPRINTS: f32 = 2.0;
@@ -25,7 +21,7 @@ pub(crate) const BORDER_PX: f32 = 8.0;
 pub(crate) const HALF_CODE: f32 = 0.5;
 
 /// Switches of shaders that include `surface.wgsl`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct SurfaceVariant {
     pub set: SetVariant,
     /// Fetches are counted for each pixel.
@@ -38,18 +34,7 @@ impl SurfaceVariant {
     }
 
     pub fn context(self) -> Value {
-        context! {
-            count_fetches => self.count_fetches,
-            thickness_footprints => THICKNESS_FOOTPRINTS.wgsl_literal(),
-            hidden_weight => HIDDEN_WEIGHT.wgsl_literal(),
-            angle_floor => ANGLE_FLOOR.wgsl_literal(),
-            least_share => LEAST_SHARE.wgsl_literal(),
-            carving_share => CARVING_SHARE.wgsl_literal(),
-            border_px => BORDER_PX.wgsl_literal(),
-            half_code => HALF_CODE.wgsl_literal(),
-            list_workgroup => LIST_WORKGROUP,
-            ..self.set.context()
-        }
+        context! { count_fetches => self.count_fetches, ..self.set.context() }
     }
 
     pub fn all() -> Vec<Self> {
@@ -58,9 +43,17 @@ impl SurfaceVariant {
     }
 }
 
-/// The resources of `surface.wgsl`. Pixels that a pass cannot decide go to `undecided`.
-pub(crate) fn bindings<'b>(recording: &'b Recording<'_>, undecided: &'b PixelList) -> Vec<Binding<'b>> {
+/// Records a pass that finds surfaces, with its own resources: over listed pixels, or over all from where their tiles
+/// start. Gives the pixels that it leaves undecided.
+pub(crate) fn record(
+    recording: &mut Recording<'_>,
+    variant: &impl ShaderVariant,
+    listed: Option<&PixelList>,
+    own: &[Binding<'_>],
+) -> Result<PixelList, ReconstructionError> {
+    let pass = recording.device.passes.get(variant)?;
     let batch = &recording.batch;
+    let undecided = PixelList::lend(recording.device, batch.cameras.len(), batch.plane_bytes);
     let mut bindings = recording.cell_bindings();
     bindings.extend([
         Binding::texture("cell_colors", &recording.set.cell_colors),
@@ -71,5 +64,11 @@ pub(crate) fn bindings<'b>(recording: &'b Recording<'_>, undecided: &'b PixelLis
         Binding::buffer("undecided", &undecided.lists),
     ]);
     bindings.extend(batch.fetches.as_ref().map(|fetches| Binding::buffer("out_fetches", fetches)));
-    bindings
+    let starts = batch.tile_start_m.as_ref().filter(|_| listed.is_none());
+    bindings.extend(starts.map(|starts| Binding::buffer("tile_start_m", starts)));
+    bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
+    bindings.extend(own.iter().cloned());
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_pixels(&pass, &bound, listed);
+    Ok(undecided)
 }

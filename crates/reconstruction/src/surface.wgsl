@@ -14,22 +14,12 @@ struct UndecidedList { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u3
 var<private> fetches: u32 = 0u;
 {% endif %}
 
-const LIST_WORKGROUP: u32 = {{ list_workgroup }}u;
-const THICKNESS_FOOTPRINTS: f32 = {{ thickness_footprints }};
-const LEAST_SHARE: f32 = {{ least_share }};
-const CARVING_SHARE: f32 = {{ carving_share }};
-const ANGLE_FLOOR: f32 = {{ angle_floor }};
-const BORDER_PX: f32 = {{ border_px }};
-
 // Leaves a pixel to the next pass.
 fn leave_undecided(index: u32) {
     let place = atomicAdd(&undecided[work.view.number].count, 1u);
     undecided_pixels[work.view.first_pixel + place] = index;
     if place % LIST_WORKGROUP == 0u { atomicAdd(&undecided[work.view.number].workgroups, 1u); }
 }
-
-// Depth is known to half a code; a ray that reached a plane's very depth is still before it.
-const HALF_CODE: f32 = {{ half_code }};
 
 // A silhouette runs through a cell that is not connected: what is nearer counts until the cameras vote.
 fn surface_code(corners: Corners, at: vec2f) -> f32 {
@@ -75,9 +65,6 @@ fn colors_of(cell_index: u32) -> Colors {
 }
 
 {% if holes %}
-// The weight of a sample behind a surface that its image omits, beside a sample with nothing omitted before it.
-const HIDDEN_WEIGHT: f32 = {{ hidden_weight }};
-
 fn faded(share: f32) -> f32 { return clamp((share - LEAST_SHARE) / (1.0 - LEAST_SHARE), 0.0, 1.0); }
 {% endif %}
 

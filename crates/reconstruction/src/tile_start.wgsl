@@ -7,11 +7,6 @@
 
 @group(0) var<storage, read_write> tile_start_m: array<f32>;
 
-const MAX_MOVES: u32 = {{ max_moves }}u;
-const GREATEST_MOVE: f32 = {{ greatest_move }};
-const LEAST_MOVE: f32 = {{ least_move }};
-const HALF_DIAGONAL: f32 = {{ half_diagonal }};
-
 // Each ray's point is proven empty by this camera.
 const PROVEN: u32 = 1u;
 // No point that this camera sees may be occupied; it need not see them all.
@@ -45,7 +40,7 @@ fn evaluate_camera(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, t_end: f32,
     return select(select(0u, select(UNOPPOSED, PROVEN | UNOPPOSED, whole), empty), UNOPPOSED, unseen);
 }
 
-@compute @workgroup_size({{ tile_px }}, {{ tile_px }})
+@compute @workgroup_size(TILE_PX, TILE_PX)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let tiles = (work.view.size_px + TILE_PX - 1u) / TILE_PX;
     if id.x >= tiles.x || id.y >= tiles.y { return; }
@@ -61,8 +56,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let b{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f(direction, 0.0));
 {% endfor %}
     var t = entry(id.xy);
-    var stride = GREATEST_MOVE;
-    for (var i = 0u; i < MAX_MOVES && t < far && stride > LEAST_MOVE; i++) {
+    var stride = GREATEST_TILE_MOVE;
+    for (var i = 0u; i < MAX_TILE_MOVES && t < far && stride > LEAST_TILE_MOVE; i++) {
         let t_end = t * stride;
         var any_proof = 0u;
         var all_agree = UNOPPOSED;
@@ -73,7 +68,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% endfor %}
         let free = (any_proof & PROVEN) != 0u || all_agree != 0u;
         t = select(t, t_end, free);
-        stride = select(0.5 + 0.5 * stride, min(1.0 + (stride - 1.0) * 1.5, GREATEST_MOVE), free);
+        stride = select(0.5 + 0.5 * stride, min(1.0 + (stride - 1.0) * 1.5, GREATEST_TILE_MOVE), free);
     }
     tile_start_m[work.view.first_tile + id.y * tiles.x + id.x] = t;
 }

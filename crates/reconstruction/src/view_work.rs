@@ -1,12 +1,10 @@
 //! The uniform of a view in passes over sample cameras: `view_work.wgsl`. A test compares layouts with the WGSL.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{PinholeCamera, ProvenanceKind};
+use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
-use gpu::{ResourceTrait, ResourceTraits, WgslLiteral as _};
+use gpu::{ResourceTrait, ResourceTraits};
 use minijinja::{Value, context};
-
-use crate::pyramid::{BACKGROUND_CODE, HOLE_CODE};
 
 /// Shaders name each camera; more would make them too long.
 pub const MAX_SAMPLE_CAMERAS: usize = 16;
@@ -20,7 +18,7 @@ pub(crate) const CELL_MARGIN_PX: f32 = 0.01;
 pub(crate) const ONE_VIEW: ResourceTraits = &[("work", ResourceTrait::DynamicOffset)];
 
 /// Switches of shaders that include `view_work.wgsl`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct SetVariant {
     pub cameras: usize,
     /// Some texels of the set prove nothing of the space before them.
@@ -29,19 +27,7 @@ pub(crate) struct SetVariant {
 
 impl SetVariant {
     pub fn context(self) -> Value {
-        context! {
-            cameras => self.cameras,
-            holes => self.holes,
-            count_fetches => false,
-            tile_px => TILE_PX,
-            far_away => FAR_AWAY.wgsl_literal(),
-            cell_margin_px => CELL_MARGIN_PX.wgsl_literal(),
-            hole_code => HOLE_CODE,
-            background_code => BACKGROUND_CODE,
-            provenance_empty => ProvenanceKind::Empty as u32,
-            provenance_hit => ProvenanceKind::Hit as u32,
-            provenance_filled => ProvenanceKind::Filled as u32,
-        }
+        context! { cameras => self.cameras, holes => self.holes, count_fetches => false }
     }
 
     pub fn all() -> Vec<Self> {

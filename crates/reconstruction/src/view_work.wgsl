@@ -3,15 +3,7 @@
 //
 // Depth is kept as 15-bit codes, linear in inverse depth: code = 2 + (1/z - least) / step. So it is linear in screen
 // space along a projected ray. 1 is background, farther than any sample; 0 is a hole, which certifies nothing and blocks
-// nothing.
-
-const HOLE: u32 = {{ hole_code }}u;
-const BACKGROUND: u32 = {{ background_code }}u;
-
-// The lowest byte of a pixel's provenance; a bit for each contributing camera follows.
-const PROVENANCE_EMPTY: u32 = {{ provenance_empty }}u;
-const PROVENANCE_HIT: u32 = {{ provenance_hit }}u;
-const PROVENANCE_FILLED: u32 = {{ provenance_filled }}u;
+// nothing. The lowest byte of a pixel's provenance is its kind; a bit for each contributing camera follows.
 
 struct SampleCamera {
     // Rows that take (point_in_world, 1) to (column · w, row · w, w), w the planar depth in metres.
@@ -67,10 +59,6 @@ struct ViewWork {
 @group(0) var<uniform> work: ViewWork;
 // Nodes of the pyramids: a range (nearest code low, farthest high), and the nearest code of 2 × 2 nodes.
 @group(0) var nodes: texture_2d<u32>;
-
-const TILE_PX: u32 = {{ tile_px }}u;
-const FAR_AWAY: f32 = {{ far_away }};
-const CELL_MARGIN_PX: f32 = {{ cell_margin_px }};
 
 struct Span { near: f32, far: f32 }
 

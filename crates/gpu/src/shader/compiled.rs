@@ -2,12 +2,9 @@
 
 use std::num::NonZeroU64;
 
-use wgpu::{BindGroup, BindGroupLayout, BindingResource, ShaderStages};
+use wgpu::{BindGroup, BindGroupLayout, BindingResource};
 
-use super::{
-    binding::Binding,
-    interface::{Resource, ResourceTraits, ShaderInterface},
-};
+use super::interface::{Binding, Resource, ResourceTraits, ShaderInterface};
 use crate::{device::Gpu, error::ShaderError};
 
 /// A compiled shader with the layout that its WGSL asks for.
@@ -15,7 +12,7 @@ use crate::{device::Gpu, error::ShaderError};
 /// Layouts hold every declared resource, used or not, for all stages of their kind: groups that are declared alike are
 /// shared by all variants of a shader.
 pub struct Shader {
-    interface: ShaderInterface,
+    pub(super) interface: ShaderInterface,
     pub(super) module: wgpu::ShaderModule,
     pub(super) layout: wgpu::PipelineLayout,
     groups: Vec<BindGroupLayout>,
@@ -30,10 +27,11 @@ impl Shader {
     pub fn new(gpu: &Gpu, label: &str, wgsl: &str, traits: ResourceTraits) -> Result<Self, ShaderError> {
         let interface = ShaderInterface::of(label, wgsl, traits)?;
         let device = gpu.device.clone();
-        let computes = interface.stages.contains(ShaderStages::COMPUTE);
-        let visibility = if computes { ShaderStages::COMPUTE } else { ShaderStages::VERTEX_FRAGMENT };
-        let groups: Vec<BindGroupLayout> =
-            interface.groups().iter().map(|group| group_layout(&device, label, visibility, group)).collect();
+        let group_layout = |group: &Vec<Resource>| {
+            let entries: Vec<_> = group.iter().map(|resource| resource.layout).collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+        };
+        let groups: Vec<BindGroupLayout> = interface.groups.iter().map(group_layout).collect();
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(label),
             bind_group_layouts: &groups.iter().map(Some).collect::<Vec<_>>(),
@@ -42,10 +40,6 @@ impl Shader {
         let source = wgpu::ShaderSource::Wgsl(wgsl.into());
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source });
         Ok(Self { interface, module, layout, groups, device })
-    }
-
-    pub(super) fn interface(&self) -> &ShaderInterface {
-        &self.interface
     }
 
     /// Binds resources to all variables of a group.
@@ -61,27 +55,11 @@ impl Shader {
         let resources = self.interface.matched(group, bindings.iter().map(|binding| binding.name))?;
         let entries: Vec<_> = resources.into_iter().zip(bindings).map(|(at, bound)| entry(at, bound)).collect();
         Ok(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(self.interface.shader()),
+            label: Some(&self.interface.shader),
             layout: &self.groups[group as usize],
             entries: &entries,
         }))
     }
-}
-
-fn group_layout(
-    device: &wgpu::Device,
-    label: &str,
-    visibility: ShaderStages,
-    resources: &[Resource],
-) -> BindGroupLayout {
-    let entry = |resource: &Resource| wgpu::BindGroupLayoutEntry {
-        binding: resource.binding,
-        visibility,
-        ty: resource.ty,
-        count: None,
-    };
-    let entries: Vec<_> = resources.iter().map(entry).collect();
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
 }
 
 fn entry<'r>(at: &Resource, bound: Binding<'r>) -> wgpu::BindGroupEntry<'r> {
@@ -91,5 +69,5 @@ fn entry<'r>(at: &Resource, bound: Binding<'r>) -> wgpu::BindGroupEntry<'r> {
         }
         (resource, _) => resource,
     };
-    wgpu::BindGroupEntry { binding: at.binding, resource }
+    wgpu::BindGroupEntry { binding: at.layout.binding, resource }
 }

@@ -4,10 +4,8 @@ use std::ops::{Deref, Range};
 
 use wgpu::BindGroup;
 
-use super::{
-    compiled::Shader,
-    variant::{Pass, ShaderVariant},
-};
+use super::compiled::Shader;
+use super::variant::{Pass, ShaderVariant};
 use crate::{device::Gpu, frame::Frame};
 
 /// A compute pipeline with its layout. The shader's entry point is `main`.
@@ -30,7 +28,7 @@ impl ComputePass {
     #[must_use]
     pub fn new(gpu: &Gpu, shader: Shader) -> Self {
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(shader.interface().shader()),
+            label: Some(&shader.interface.shader),
             layout: Some(&shader.layout),
             module: &shader.module,
             entry_point: Some("main"),
@@ -56,8 +54,8 @@ impl ComputePass {
         elements: Range<u32>,
         size: DispatchSize<'_>,
     ) {
-        let interface = self.shader.interface();
-        let label = Some(interface.shader());
+        let interface = &self.shader.interface;
+        let label = Some(interface.shader.as_str());
         let mut pass = frame.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes: None });
         pass.set_pipeline(&self.pipeline);
         for (number, element) in (0..).zip(elements) {

@@ -4,10 +4,8 @@ use std::ops::Deref;
 
 use wgpu::{RenderPipeline, ShaderStages, TextureFormat};
 
-use super::{
-    compiled::Shader,
-    variant::{Pass, ShaderVariant},
-};
+use super::compiled::Shader;
+use super::variant::{Pass, ShaderVariant};
 use crate::device::Gpu;
 
 /// A render pipeline with its layout. The shader's entry points are `vertex` and, unless it draws depth alone, `fragment`.
@@ -54,14 +52,14 @@ impl<V: DrawVariant> Pass<V> for DrawPass {
     fn build(gpu: &Gpu, shader: Shader, variant: &V) -> Self {
         let DrawState { vertices, cull_mode, color_formats } = variant.state();
         let targets: Vec<_> = color_formats.into_iter().map(|format| Some(format.into())).collect();
-        let fragment = shader.interface().stages.contains(ShaderStages::FRAGMENT).then(|| wgpu::FragmentState {
+        let fragment = shader.interface.stages.contains(ShaderStages::FRAGMENT).then(|| wgpu::FragmentState {
             module: &shader.module,
             entry_point: Some("fragment"),
             compilation_options: Default::default(),
             targets: &targets,
         });
         let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(shader.interface().shader()),
+            label: Some(&shader.interface.shader),
             layout: Some(&shader.layout),
             vertex: wgpu::VertexState {
                 module: &shader.module,

@@ -1,4 +1,4 @@
-//! The resources that a shader declares, read from its WGSL.
+//! The resources that a shader declares, read from its WGSL, and those that are bound to them by name.
 
 use naga::{
     AddressSpace, GlobalVariable, ImageClass, ImageDimension, Module, ScalarKind, ShaderStage, StorageAccess,
@@ -6,10 +6,36 @@ use naga::{
     front::wgsl::{Frontend, Options},
     valid::Capabilities,
 };
-use wgpu::{BindingType, BufferBindingType, SamplerBindingType, StorageTextureAccess, TextureFormat};
+use wgpu::{BindingResource, BindingType, BufferBindingType, SamplerBindingType, ShaderStages, TextureFormat};
 
-use super::binding::Binding;
 use crate::{error::ShaderError, uniform::uniform_stride};
+
+/// A resource, and the variable of a shader that it is bound to.
+#[derive(Debug, Clone)]
+pub struct Binding<'r> {
+    pub(super) name: &'static str,
+    pub(super) resource: BindingResource<'r>,
+}
+
+impl<'r> Binding<'r> {
+    /// A whole buffer; one element at a time where the variable has a dynamic offset.
+    #[must_use]
+    pub fn buffer(name: &'static str, buffer: &'r wgpu::Buffer) -> Self {
+        Self { name, resource: buffer.as_entire_binding() }
+    }
+
+    /// A texture.
+    #[must_use]
+    pub fn texture(name: &'static str, view: &'r wgpu::TextureView) -> Self {
+        Self { name, resource: BindingResource::TextureView(view) }
+    }
+
+    /// A sampler of textures.
+    #[must_use]
+    pub fn sampler(name: &'static str, sampler: &'r wgpu::Sampler) -> Self {
+        Self { name, resource: BindingResource::Sampler(sampler) }
+    }
+}
 
 /// A property of a resource that WGSL does not say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,8 +53,7 @@ pub type ResourceTraits = &'static [(&'static str, ResourceTrait)];
 #[derive(Debug, Clone)]
 pub(crate) struct Resource {
     pub name: String,
-    pub binding: u32,
-    pub ty: BindingType,
+    pub layout: wgpu::BindGroupLayoutEntry,
     /// The size of one element where the offset is dynamic.
     pub element_bytes: Option<u32>,
 }
@@ -36,11 +61,11 @@ pub(crate) struct Resource {
 /// A shader's resources and entry points.
 #[derive(Debug, Clone)]
 pub struct ShaderInterface {
-    shader: String,
+    pub(crate) shader: String,
     /// The resources of each group.
-    groups: Vec<Vec<Resource>>,
+    pub(crate) groups: Vec<Vec<Resource>>,
     /// Stages that have an entry point.
-    pub(crate) stages: wgpu::ShaderStages,
+    pub(crate) stages: ShaderStages,
     /// The invocations of one workgroup, 0 in drawing shaders.
     pub(crate) workgroup_size: [u32; 3],
 }
@@ -54,15 +79,16 @@ impl ShaderInterface {
         let invalid = |message: String| ShaderError::Invalid { shader: shader.to_owned(), message };
         let mut options = Options::new();
         options.capabilities = Capabilities::all();
-        let module = Frontend::new_with_options(options)
-            .parse(wgsl)
-            .map_err(|error| invalid(error.emit_to_string_with_path(wgsl, shader)))?;
+        let module = Frontend::new_with_options(options).parse(wgsl);
+        let module = module.map_err(|error| invalid(error.emit_to_string_with_path(wgsl, shader)))?;
         let mut interface = Self {
             shader: shader.to_owned(),
             groups: Vec::new(),
             stages: module.entry_points.iter().map(|entry| stage(entry.stage)).collect(),
             workgroup_size: module.entry_points.first().map_or([0; 3], |entry| entry.workgroup_size),
         };
+        let computes = interface.stages.contains(ShaderStages::COMPUTE);
+        let visibility = if computes { ShaderStages::COMPUTE } else { ShaderStages::VERTEX_FRAGMENT };
         for (_, variable) in module.global_variables.iter() {
             let Some(place) = variable.binding else { continue };
             let name = variable.name.clone().unwrap_or_default();
@@ -73,21 +99,14 @@ impl ShaderInterface {
             let element_bytes = bytes.filter(|_| has(ResourceTrait::DynamicOffset));
             let groups = interface.groups.len().max(place.group as usize + 1);
             interface.groups.resize(groups, Vec::new());
-            interface.groups[place.group as usize].push(Resource { name, binding: place.binding, ty, element_bytes });
+            let layout = wgpu::BindGroupLayoutEntry { binding: place.binding, visibility, ty, count: None };
+            interface.groups[place.group as usize].push(Resource { name, layout, element_bytes });
         }
         let declared = |name: &str| interface.groups.iter().flatten().any(|resource| resource.name == name);
         match traits.iter().find(|(name, _)| !declared(name)) {
             Some((name, _)) => Err(invalid(format!("{name} has a trait but is not declared"))),
             None => Ok(interface),
         }
-    }
-
-    pub(crate) fn shader(&self) -> &str {
-        &self.shader
-    }
-
-    pub(crate) fn groups(&self) -> &[Vec<Resource>] {
-        &self.groups
     }
 
     /// The bytes from one element to the next of each dynamic resource of a group.
@@ -113,33 +132,32 @@ impl ShaderInterface {
         group: u32,
         names: impl Iterator<Item = &'n str>,
     ) -> Result<Vec<&Resource>, ShaderError> {
-        let shader = || self.shader.clone();
+        let shader = self.shader.clone();
         let Some(resources) = self.groups.get(group as usize) else {
-            return Err(ShaderError::NoGroup { shader: shader(), group });
+            return Err(ShaderError::NoGroup { shader, group });
         };
         let mut matched: Vec<&Resource> = Vec::with_capacity(resources.len());
         for name in names {
             let Some(resource) = resources.iter().find(|resource| resource.name == name) else {
-                return Err(ShaderError::NotInGroup { shader: shader(), group, name: name.to_owned() });
+                return Err(ShaderError::NotInGroup { shader, group, name: name.to_owned() });
             };
-            if matched.iter().any(|other| other.binding == resource.binding) {
-                return Err(ShaderError::BoundTwice { shader: shader(), group, name: name.to_owned() });
+            if matched.iter().any(|other| other.name == name) {
+                return Err(ShaderError::BoundTwice { shader, group, name: name.to_owned() });
             }
             matched.push(resource);
         }
-        let is_bound = |resource: &Resource| matched.iter().any(|other| other.binding == resource.binding);
-        match resources.iter().find(|resource| !is_bound(resource)) {
-            Some(Resource { name, .. }) => Err(ShaderError::Unbound { shader: shader(), group, name: name.clone() }),
+        match resources.iter().find(|resource| !matched.iter().any(|other| other.name == resource.name)) {
+            Some(Resource { name, .. }) => Err(ShaderError::Unbound { shader, group, name: name.clone() }),
             None => Ok(matched),
         }
     }
 }
 
-fn stage(stage: ShaderStage) -> wgpu::ShaderStages {
+fn stage(stage: ShaderStage) -> ShaderStages {
     match stage {
-        ShaderStage::Vertex => wgpu::ShaderStages::VERTEX,
-        ShaderStage::Fragment => wgpu::ShaderStages::FRAGMENT,
-        _ => wgpu::ShaderStages::COMPUTE,
+        ShaderStage::Vertex => ShaderStages::VERTEX,
+        ShaderStage::Fragment => ShaderStages::FRAGMENT,
+        _ => ShaderStages::COMPUTE,
     }
 }
 
@@ -168,11 +186,10 @@ fn binding_type(
 }
 
 fn image_type(dim: ImageDimension, arrayed: bool, class: ImageClass, filterable: bool) -> Option<BindingType> {
-    let view_dimension = match (dim, arrayed) {
-        (ImageDimension::D2, false) => wgpu::TextureViewDimension::D2,
-        (ImageDimension::D2, true) => wgpu::TextureViewDimension::D2Array,
-        _ => return None,
-    };
+    if dim != ImageDimension::D2 {
+        return None;
+    }
+    let view_dimension = if arrayed { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
     let texture = |sample_type, multisampled| Some(BindingType::Texture { sample_type, view_dimension, multisampled });
     match class {
         ImageClass::Sampled { kind: ScalarKind::Float, multi } => {
@@ -181,7 +198,7 @@ fn image_type(dim: ImageDimension, arrayed: bool, class: ImageClass, filterable:
         ImageClass::Sampled { kind: ScalarKind::Uint, multi } => texture(wgpu::TextureSampleType::Uint, multi),
         ImageClass::Depth { multi } => texture(wgpu::TextureSampleType::Depth, multi),
         ImageClass::Storage { format, access } if access == StorageAccess::STORE => Some(BindingType::StorageTexture {
-            access: StorageTextureAccess::WriteOnly,
+            access: wgpu::StorageTextureAccess::WriteOnly,
             format: texture_format(format)?,
             view_dimension,
         }),
@@ -226,7 +243,7 @@ mod tests {
         assert_eq!(interface.strides(0).collect::<Vec<_>>(), [256]);
         let storage = BufferBindingType::Storage { read_only: false };
         let words = BindingType::Buffer { ty: storage, has_dynamic_offset: false, min_binding_size: None };
-        assert_eq!(interface.groups()[1][0].ty, words);
+        assert_eq!(interface.groups[1][0].layout.ty, words);
         let found = matched(0, &["depth", "camera"]).expect("both names");
         assert_eq!(found, 2);
     }

@@ -4,22 +4,20 @@ use std::{collections::HashMap, sync::Arc};
 
 use parking_lot::Mutex;
 
-use super::{
-    compiled::Shader,
-    compute_pass::ComputePass,
-    template::Templates,
-    variant::{Pass, ShaderVariant},
-};
+use super::compiled::Shader;
+use super::compute_pass::ComputePass;
+use super::template::Templates;
+use super::variant::{Pass, ShaderVariant, source};
 use crate::{device::Gpu, error::ShaderError};
 
-/// The passes of one shader, by its variants.
-pub struct PassCache<V, P = ComputePass> {
+/// Passes of all shaders, by the names of their variants.
+pub struct PassCache<P = ComputePass> {
     gpu: Arc<Gpu>,
     templates: Arc<Templates>,
-    passes: Mutex<HashMap<V, Arc<P>>>,
+    passes: Mutex<HashMap<String, Arc<P>>>,
 }
 
-impl<V: ShaderVariant, P: Pass<V>> PassCache<V, P> {
+impl<P> PassCache<P> {
     /// An empty cache.
     #[must_use]
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
@@ -30,15 +28,18 @@ impl<V: ShaderVariant, P: Pass<V>> PassCache<V, P> {
     ///
     /// # Errors
     /// A template that is broken, or WGSL that cannot be parsed.
-    pub fn get(&self, variant: &V) -> Result<Arc<P>, ShaderError> {
+    pub fn get<V: ShaderVariant>(&self, variant: &V) -> Result<Arc<P>, ShaderError>
+    where
+        P: Pass<V>,
+    {
         let mut passes = self.passes.lock();
-        if let Some(pass) = passes.get(variant) {
+        if let Some(pass) = passes.get(&variant.name()) {
             return Ok(pass.clone());
         }
-        let wgsl = self.templates.render(V::TEMPLATE, variant.context())?;
-        let shader = Shader::new(&self.gpu, V::TEMPLATE, &wgsl, V::TRAITS)?;
+        let source = source(&self.templates, variant)?;
+        let shader = Shader::new(&self.gpu, source.template, &source.wgsl, source.traits)?;
         let pass = Arc::new(P::build(&self.gpu, shader, variant));
-        passes.insert(variant.clone(), pass.clone());
+        passes.insert(source.name, pass.clone());
         Ok(pass)
     }
 }

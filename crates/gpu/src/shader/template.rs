@@ -1,9 +1,10 @@
 //! WGSL templates: includes, loops over cameras written out, and switches, by `minijinja`.
 //!
 //! `{% include "color.wgsl" %}` takes text from this crate; the rest is Jinja as usual. Resources have a group and no
-//! number (`@group(0) var<uniform> camera: Camera;`): they are bound by name.
+//! number (`@group(0) var<uniform> camera: Camera;`): they are bound by name. Numbers that Rust shares with WGSL are
+//! written once, in Rust.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, fmt::Debug};
 
 use minijinja::{Environment, UndefinedBehavior, Value};
 
@@ -12,6 +13,46 @@ use crate::{error::ShaderError, table::TABLE_WIDTH_LOG2};
 /// Shader texts by name.
 pub struct Templates {
     environment: Environment<'static>,
+    declared: Vec<(&'static str, String)>,
+}
+
+/// A number that WGSL has a literal for.
+pub trait WgslLiteral: Debug + Copy {
+    /// The literal's type.
+    const SUFFIX: char;
+
+    /// The literal.
+    fn wgsl_literal(self) -> String {
+        format!("{self:?}{}", Self::SUFFIX)
+    }
+}
+
+impl WgslLiteral for u16 {
+    const SUFFIX: char = 'u';
+}
+
+impl WgslLiteral for u32 {
+    const SUFFIX: char = 'u';
+}
+
+impl WgslLiteral for i32 {
+    const SUFFIX: char = 'i';
+}
+
+impl WgslLiteral for f32 {
+    const SUFFIX: char = 'f';
+}
+
+/// The names and literals of constants.
+#[macro_export]
+macro_rules! wgsl_constants {
+    ($($name:ident),* $(,)?) => { [$((stringify!($name), $crate::WgslLiteral::wgsl_literal($name))),*] };
+}
+
+/// The names and texts of WGSL files beside the file that says so.
+#[macro_export]
+macro_rules! wgsl_files {
+    ($($name:literal),+ $(,)?) => { [$(($name, include_str!($name))),+] };
 }
 
 impl Templates {
@@ -35,13 +76,20 @@ impl Templates {
                 .add_template(name, text)
                 .map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
         }
-        Ok(Self { environment })
+        Ok(Self { environment, declared: Vec::new() })
     }
 
-    /// Adds numbers that Rust shares with WGSL, as [`wgsl_constants!`](crate::wgsl_constants) lists them.
+    /// Adds values for `{{ NAME }}` in all templates, such as those of [`wgsl_constants!`](crate::wgsl_constants).
     #[must_use]
-    pub fn with_constants(mut self, constants: impl IntoIterator<Item = (&'static str, String)>) -> Self {
-        constants.into_iter().for_each(|(name, literal)| self.environment.add_global(name, literal));
+    pub fn with_constants(mut self, constants: impl IntoIterator<Item = (&'static str, impl Into<Value>)>) -> Self {
+        constants.into_iter().for_each(|(name, value)| self.environment.add_global(name, value));
+        self
+    }
+
+    /// Declares numbers of [`wgsl_constants!`](crate::wgsl_constants) in all texts that name them.
+    #[must_use]
+    pub fn declaring(mut self, constants: impl IntoIterator<Item = (&'static str, String)>) -> Self {
+        self.declared.extend(constants);
         self
     }
 
@@ -52,7 +100,9 @@ impl Templates {
     pub fn render(&self, name: &str, context: Value) -> Result<String, ShaderError> {
         let render = || self.environment.get_template(name)?.render(context);
         let text = render().map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
-        Ok(with_binding_numbers(&text))
+        let named = self.declared.iter().filter(|(name, _)| text.contains(name));
+        let declarations = named.map(|(name, literal)| format!("const {name} = {literal};\n"));
+        Ok(declarations.chain([with_binding_numbers(&text)]).collect())
     }
 }
 
@@ -72,7 +122,21 @@ fn with_binding_numbers(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use minijinja::context;
+
     use super::*;
+
+    #[test]
+    fn constants_keep_their_type_and_value_and_are_declared_where_they_are_named() {
+        const STEPS: u32 = 3;
+        const SLACK: f32 = 1e-6;
+        let literals = wgsl_constants![STEPS, SLACK];
+        assert_eq!(literals, [("STEPS", "3u".to_owned()), ("SLACK", "1e-6f".to_owned())]);
+        assert_eq!([1.0f32.wgsl_literal(), 7_u16.wgsl_literal(), (-2_i32).wgsl_literal()], ["1.0f", "7u", "-2i"]);
+        let templates = Templates::new(&[("f", "fn f() -> f32 { return SLACK; }")]).expect("a template");
+        let text = templates.declaring(literals).render("f", context! {}).expect("a text");
+        assert_eq!(text, "const SLACK = 1e-6f;\nfn f() -> f32 { return SLACK; }");
+    }
 
     #[test]
     fn bindings_are_numbered_within_their_group() {

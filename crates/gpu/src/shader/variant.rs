@@ -1,24 +1,67 @@
 //! Variants of a shader: the switches that are written into its text.
 
-use std::{fmt::Debug, hash::Hash};
+use std::fmt::Debug;
 
-use minijinja::Value;
+use minijinja::{Value, context};
 
 use super::{compiled::Shader, interface::ResourceTraits, template::Templates};
 use crate::{device::Gpu, error::ShaderError};
 
-/// A shader's switches. Each set of them is a text of its own.
-pub trait ShaderVariant: Debug + Clone + Eq + Hash {
+/// A shader's switches. Each set of them is a text of its own, and has its own `Debug` text.
+pub trait ShaderVariant: Debug {
     /// The template, which is also the label of its passes.
     const TEMPLATE: &'static str;
     /// Properties of resources that WGSL does not say.
     const TRAITS: ResourceTraits = &[];
 
     /// The values that the template uses.
-    fn context(&self) -> Value;
+    fn context(&self) -> Value {
+        context! {}
+    }
 
     /// The variants that stand for all: each switch in each position, few and many of what is counted.
-    fn all() -> Vec<Self>;
+    fn all() -> Vec<Self>
+    where
+        Self: Sized;
+
+    /// The template and the switches.
+    fn name(&self) -> String {
+        format!("{}: {self:?}", Self::TEMPLATE)
+    }
+}
+
+/// Declares a shader variant without switches, or with those that another type has: its `context` and its `all`.
+#[macro_export]
+macro_rules! shader_variant {
+    ($name:ident, $template:literal, $traits:expr) => {
+        #[doc = concat!("`", $template, "`, which has no switches.")]
+        #[derive(Debug)]
+        pub(crate) struct $name;
+
+        impl $crate::ShaderVariant for $name {
+            const TEMPLATE: &'static str = $template;
+            const TRAITS: $crate::ResourceTraits = $traits;
+            fn all() -> Vec<Self> {
+                vec![Self]
+            }
+        }
+    };
+    ($name:ident($switches:ty), $template:literal, $traits:expr) => {
+        #[doc = concat!("The switches of `", $template, "`.")]
+        #[derive(Debug)]
+        pub(crate) struct $name(pub $switches);
+
+        impl $crate::ShaderVariant for $name {
+            const TEMPLATE: &'static str = $template;
+            const TRAITS: $crate::ResourceTraits = $traits;
+            fn context(&self) -> minijinja::Value {
+                self.0.context()
+            }
+            fn all() -> Vec<Self> {
+                <$switches>::all().into_iter().map(Self).collect()
+            }
+        }
+    };
 }
 
 /// A pass that is built from a variant's shader.
@@ -31,7 +74,6 @@ pub trait Pass<V>: Sized {
 #[derive(Debug, Clone)]
 #[allow(missing_docs, reason = "self-naming fields")]
 pub struct ShaderSource {
-    /// The variant with its switches.
     pub name: String,
     pub template: &'static str,
     pub wgsl: String,
@@ -43,14 +85,19 @@ pub fn sources<V: ShaderVariant>(templates: &Templates) -> impl Iterator<Item = 
     V::all().into_iter().map(|variant| source(templates, &variant))
 }
 
+/// The texts of all variants of several shaders: `shader_sources!(&templates, Fill, Merge)`.
+#[macro_export]
+macro_rules! shader_sources {
+    ($templates:expr, $($variant:ty),+ $(,)?) => { std::iter::empty()$(.chain($crate::sources::<$variant>($templates)))+ };
+}
+
 /// The text of a variant.
 ///
 /// # Errors
 /// A template that is broken.
 pub fn source<V: ShaderVariant>(templates: &Templates, variant: &V) -> Result<ShaderSource, ShaderError> {
     let wgsl = templates.render(V::TEMPLATE, variant.context())?;
-    let name = format!("{}: {variant:?}", V::TEMPLATE);
-    Ok(ShaderSource { name, template: V::TEMPLATE, wgsl, traits: V::TRAITS })
+    Ok(ShaderSource { name: variant.name(), template: V::TEMPLATE, wgsl, traits: V::TRAITS })
 }
 
 /// Every position of `N` switches.

@@ -10,9 +10,6 @@
 @group(0) var<storage, read_write> inverse_depths: array<vec4f>;
 @group(0) var<storage, read_write> extents: array<u32>;
 
-const FLAT_FOOTPRINTS: f32 = {{ flat_footprints }};
-const SLOPE_SHARE: f32 = {{ slope_share }};
-const GREATEST_SLOPE: f32 = {{ greatest_slope }};
 const HALF_DIAGONAL_PX: f32 = 0.70710678;
 
 struct Sample { inverse_depth: f32, ray: vec3f, normal: vec3f, tame_normal: vec3f }

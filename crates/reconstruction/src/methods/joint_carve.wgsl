@@ -8,14 +8,9 @@
 {% include "surface.wgsl" %}
 {% include "pixel_list.wgsl" %}
 
-const MAX_MOVES: u32 = {{ max_moves }}u;
-const START_LEVEL: u32 = {{ start_level }}u;
 // 0 unless the search is to be cut short.
 const STOP_LEVEL: u32 = {{ stop_level }}u;
-// Past a node's edge, in pixels.
-const NUDGE_PX: f32 = {{ nudge_px }};
-const BLIND_MOVE: f32 = {{ blind_move }};
-const LEAST_MOVE: f32 = {{ least_move }};
+const FIRST_LEVEL: u32 = max(START_LEVEL, STOP_LEVEL);
 
 // A camera's knowledge of the ray from t on.
 struct Evaluation {
@@ -160,7 +155,7 @@ fn vote_of_cell(corners: Corners, codes: vec4f, gaps: vec4f, footprint: f32, at:
     return same - beyond;
 }
 
-@compute @workgroup_size({{ list_workgroup }})
+@compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= lists[work.view.number].count { return; }
     let index = listed_pixels[work.view.first_pixel + id.x];
@@ -174,10 +169,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% endfor %}
     // The pass before left how far it got.
     var t = out_inverse_depth[index];
-    var level = START_LEVEL;
+    var level = FIRST_LEVEL;
     var hit = false;
     var known = true;
-    for (var i = 0u; i < MAX_MOVES && t < span.far; i++) {
+    for (var i = 0u; i < {{ "MAX_MOVES_AMONG_HOLES" if holes else "MAX_MOVES" }} && t < span.far; i++) {
         var free_until = t;
         var exit = FAR_AWAY;
         var penetration = FAR_AWAY;
@@ -204,7 +199,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         known = known && !unknown;
         let beyond = max(select(exit, t + (span.far - span.near) * BLIND_MOVE, exit >= FAR_AWAY), t * LEAST_MOVE);
         t = select(free_until, beyond, unknown || rejected);
-        level = select(min(level + 1u, START_LEVEL), level - 1u, descend);
+        level = select(min(level + 1u, FIRST_LEVEL), level - 1u, descend);
         level = select(level, STOP_LEVEL, candidate);
         if hit { break; }
     }

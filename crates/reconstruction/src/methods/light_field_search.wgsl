@@ -9,8 +9,6 @@
 // From where a ray enters the volume to where it leaves it.
 @group(0) var<uniform> steps: u32;
 
-const BISECTIONS: u32 = {{ bisections }}u;
-
 // Penetration in inverse metres, positive inside; `seen`: the camera sees the point.
 struct Depth { penetration: f32, seen: bool }
 
@@ -33,7 +31,7 @@ fn depth_in(camera: SampleCamera, p: vec3f) -> Depth {
 {% else %}
     let known = true;
 {% endif %}
-    return Depth(penetration, p.z > 0.0 && all(uv == clamped) && code != HOLE && known);
+    return Depth(penetration, p.z > 0.0 && all(uv == clamped) && code != HOLE_CODE && known);
 }
 
 // The ray in the images of all cameras, a + b · t in each.
@@ -139,7 +137,7 @@ fn color_at(place: Place) -> vec3f {
 {% endif %}
 }
 
-@compute @workgroup_size({{ tile_px }}, {{ tile_px }})
+@compute @workgroup_size(TILE_PX, TILE_PX)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= work.view.size_px) { return; }
     let pixel = pixel_of(id.xy);

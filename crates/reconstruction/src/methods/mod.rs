@@ -11,18 +11,15 @@ mod mesh;
 use std::{fmt, mem::discriminant, str::FromStr, sync::Arc};
 
 use depth_image::{NamedMethod, Setting, method_forms, method_help, method_named};
-use gpu::{Gpu, PassCache, ShaderError, ShaderSource, Templates, sources as of};
+use gpu::{ShaderError, ShaderSource, Templates, shader_sources, wgsl_constants, wgsl_files};
 
-use crate::{
-    device::Device,
-    error::ReconstructionError,
-    error_bound::ErrorBound,
-    pixel_list::PixelList,
-    quads::{Mesh as QuadMesh, QuadPasses},
-    recording::Recording,
-    required_planes::RequiredPlanes,
-    sample_set::SampleSet,
-};
+use self::hybrid_mesh::GREATEST_SLOPE;
+use self::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL};
+use self::joint_carve::{BLIND_MOVE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_AMONG_HOLES, MAX_STOP_LEVEL};
+use self::light_field_search::{BISECTIONS, DEFAULT_STEPS, MAX_STEPS};
+use crate::quads::{self, CornerPlanes, Mesh as QuadMesh, QuadDrawing};
+use crate::{device::Device, error::ReconstructionError, error_bound::ErrorBound, pixel_list::PixelList};
+use crate::{recording::Recording, required_planes::RequiredPlanes, sample_set::SampleSet};
 
 /// How views are found in depth images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -55,16 +52,22 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 4] = [
         method: JointCarve { stop_level: 0 },
         setting: Some(Setting {
             form: "LEVEL (0 to 8)",
-            parse: |text| joint_carve::parse_stop_level(text).map(|stop_level| JointCarve { stop_level }),
+            parse: |text| {
+                let level = text.parse().ok().filter(|&level| level <= MAX_STOP_LEVEL);
+                level.map(|stop_level| JointCarve { stop_level })
+            },
         }),
         help: "traverses the depth pyramids of all cameras together, down to a level; 0 is exact",
     },
     NamedMethod {
         name: "light_field_search",
-        method: LightFieldSearch { steps: light_field_search::DEFAULT_STEPS },
+        method: LightFieldSearch { steps: DEFAULT_STEPS },
         setting: Some(Setting {
             form: "STEPS (1 to 65536)",
-            parse: |text| light_field_search::parse_steps(text).map(|steps| LightFieldSearch { steps }),
+            parse: |text| {
+                let steps = text.parse().ok().filter(|steps| (1..=MAX_STEPS).contains(steps));
+                steps.map(|steps| LightFieldSearch { steps })
+            },
         }),
         help: "searches along each ray in equal steps, 100 by default",
     },
@@ -74,41 +77,33 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 4] = [
         method: HybridMesh { merged: None },
         setting: Some(Setting {
             form: "PX (0.01 to 100)",
-            parse: |text| hybrid_mesh::parse_bound(text).map(|bound| HybridMesh { merged: Some(bound) }),
+            parse: |text| {
+                let bound = text.parse().ok().and_then(ErrorBound::from_px)?;
+                Some(HybridMesh { merged: Some(bound) })
+            },
         }),
         help: "draws a quad for each sample, and merges quads where nothing moves by more than PX pixels",
     },
 ];
 
-pub(crate) const SHADERS: [(&str, &str); 5] =
-    [joint_carve::SHADER, joint_carve::march::SHADER, light_field_search::SHADER, mesh::SHADER, hybrid_mesh::SHADER];
+/// The templates of all methods.
+pub(crate) const SHADERS: [(&str, &str); 5] = wgsl_files! {
+    "joint_carve.wgsl", "joint_carve/march.wgsl", "light_field_search.wgsl", "mesh.wgsl", "hybrid_mesh.wgsl"
+};
+
+/// The numbers that methods share with their shaders.
+pub(crate) fn constants() -> [(&'static str, String); 11] {
+    wgsl_constants! {
+        BISECTIONS, BLIND_MOVE, EYE_SHARE, GREATEST_SLOPE, LEAST_MOVE, MAX_COARSE_MOVES, MAX_FINE_MOVES, MAX_MOVES,
+        MAX_MOVES_AMONG_HOLES, NUDGE_PX, START_LEVEL
+    }
+}
 
 /// The texts of all variants of all methods' passes.
 pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    let carve = of::<joint_carve::march::March>(templates).chain(of::<joint_carve::Carve>(templates));
-    let cut = of::<mesh::CutBetweenSamples>(templates).chain(of::<hybrid_mesh::CutTexels>(templates));
-    carve.chain(of::<light_field_search::Search>(templates)).chain(cut)
-}
-
-/// The passes of all methods.
-pub(crate) struct MethodPasses {
-    joint_carve: joint_carve::CarvePasses,
-    light_field_search: PassCache<light_field_search::Search>,
-    mesh: PassCache<mesh::CutBetweenSamples>,
-    hybrid_mesh: hybrid_mesh::HybridPasses,
-    quads: QuadPasses,
-}
-
-impl MethodPasses {
-    pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        Self {
-            joint_carve: joint_carve::CarvePasses::new(gpu, templates),
-            light_field_search: PassCache::new(gpu, templates),
-            mesh: PassCache::new(gpu, templates),
-            hybrid_mesh: hybrid_mesh::HybridPasses::new(gpu, templates),
-            quads: QuadPasses::new(gpu, templates),
-        }
-    }
+    let searches =
+        shader_sources!(templates, joint_carve::march::March, joint_carve::Carve, light_field_search::Search);
+    searches.chain(shader_sources!(templates, mesh::CutBetweenSamples, hybrid_mesh::CutTexels))
 }
 
 impl Default for ReconstructionMethod {
@@ -129,7 +124,7 @@ impl ReconstructionMethod {
     pub fn required_planes(self) -> RequiredPlanes {
         match self {
             LightFieldSearch { .. } | JointCarve { .. } | Mesh => RequiredPlanes::default(),
-            HybridMesh { .. } => hybrid_mesh::REQUIRED_PLANES,
+            HybridMesh { .. } => CornerPlanes::REQUIRED,
         }
     }
 
@@ -137,50 +132,38 @@ impl ReconstructionMethod {
     #[must_use]
     pub fn coarser(self) -> Option<Self> {
         match self {
-            LightFieldSearch { steps } => {
-                light_field_search::fewer_steps(steps).map(|steps| LightFieldSearch { steps })
-            }
-            JointCarve { stop_level } => {
-                joint_carve::coarser_level(stop_level).map(|stop_level| JointCarve { stop_level })
-            }
-            Mesh | HybridMesh { .. } => None,
+            LightFieldSearch { steps } => (steps > 1).then_some(LightFieldSearch { steps: steps / 2 }),
+            JointCarve { stop_level } if stop_level < MAX_STOP_LEVEL => Some(JointCarve { stop_level: stop_level + 1 }),
+            JointCarve { .. } | Mesh | HybridMesh { .. } => None,
         }
     }
 
     /// Rays are followed from where their tiles start; other methods draw.
     pub(crate) fn follows_rays(self) -> bool {
-        match self {
-            LightFieldSearch { .. } | JointCarve { .. } => true,
-            Mesh | HybridMesh { .. } => false,
-        }
+        matches!(self, LightFieldSearch { .. } | JointCarve { .. })
     }
 
     /// Records the method's passes; gives the pixels that stay unknown.
     pub(crate) fn record(
         self,
-        passes: &MethodPasses,
+        drawing: &QuadDrawing,
         recording: &mut Recording<'_>,
     ) -> Result<PixelList, ReconstructionError> {
+        let (device, set) = (recording.device, recording.set);
         match self {
-            LightFieldSearch { steps } => light_field_search::record(&passes.light_field_search, recording, steps),
-            JointCarve { stop_level } => joint_carve::record(&passes.joint_carve, recording, stop_level),
-            Mesh => mesh::record(&passes.mesh, &passes.quads, recording),
-            HybridMesh { merged } => hybrid_mesh::record(&passes.hybrid_mesh, &passes.quads, recording, merged),
+            LightFieldSearch { steps } => light_field_search::record(recording, steps),
+            JointCarve { stop_level } => joint_carve::record(recording, stop_level),
+            Mesh => quads::record(drawing, recording, &*mesh::mesh(device, set)?),
+            HybridMesh { merged } => quads::record(drawing, recording, &*hybrid_mesh::mesh(device, set, merged)?),
         }
     }
 
     /// The set's quads, cut when they are first asked for; `None` for methods that draw none.
-    pub(crate) fn mesh(
-        self,
-        passes: &MethodPasses,
-        device: &Device,
-        set: &SampleSet,
-    ) -> Result<Option<Arc<QuadMesh>>, ReconstructionError> {
-        let MethodPasses { mesh, hybrid_mesh, quads, .. } = passes;
+    pub(crate) fn mesh(self, device: &Device, set: &SampleSet) -> Result<Option<Arc<QuadMesh>>, ReconstructionError> {
         match self {
             LightFieldSearch { .. } | JointCarve { .. } => Ok(None),
-            Mesh => mesh::mesh(mesh, quads, device, set).map(Some),
-            HybridMesh { merged } => hybrid_mesh::mesh(hybrid_mesh, quads, device, set, merged).map(Some),
+            Mesh => mesh::mesh(device, set).map(Some),
+            HybridMesh { merged } => hybrid_mesh::mesh(device, set, merged).map(Some),
         }
     }
 

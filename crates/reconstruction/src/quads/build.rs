@@ -1,26 +1,38 @@
 //! Cuts a set's images, and reads back what came of it.
 
+use std::sync::Arc;
+
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec2, Vec3};
 use gpu::{Frame, Readback};
 
-use super::{
-    cut::{BYTES_OF_DRAW, BYTES_OF_REPORT, ImageCut},
-    mesh::{Cut, INDICES_A_QUAD, Mesh, MeshStatistics, Quad, QuadVertices},
-    passes::QuadPasses,
-};
+use super::cut::ImageCut;
+use super::mesh::{Cut, INDICES_A_QUAD, MAX_MESHES, Mesh, MeshStatistics, Quad, QuadVertices};
+use super::{count, indices, scan};
 use crate::{device::Device, error::ReconstructionError, sample_set::SampleSet};
 
-/// Read-backs of one image.
-struct Reads {
-    draw: Readback,
-    report: Readback,
+/// The set's mesh of a cut, made when it is first asked for; `record` records the passes that cut one image.
+pub(crate) fn mesh(
+    device: &Device,
+    set: &SampleSet,
+    cut: Cut,
+    record: impl Fn(&mut Frame<'_>, &ImageCut<'_>) -> Result<(), ReconstructionError>,
+) -> Result<Arc<Mesh>, ReconstructionError> {
+    // Held while it is made: concurrent callers want the same.
+    let mut meshes = set.meshes.meshes.lock();
+    if let Some(mesh) = meshes.iter().find(|mesh| mesh.cut == cut) {
+        return Ok(mesh.clone());
+    }
+    let mesh = Arc::new(build(device, set, cut, record)?);
+    if meshes.len() >= MAX_MESHES {
+        meshes.remove(0);
+    }
+    meshes.push(mesh.clone());
+    Ok(mesh)
 }
 
-/// Cuts all images; `record` records the passes that cut one. Quads are listed in the order of their samples, so that
-/// the same set gives the same list.
-pub(crate) fn build(
-    passes: &QuadPasses,
+/// Quads are listed in the order of their samples, so that the same set gives the same list.
+fn build(
     device: &Device,
     set: &SampleSet,
     cut: Cut,
@@ -31,42 +43,35 @@ pub(crate) fn build(
     for number in 0..set.cameras.len() {
         let image = ImageCut::new(device, set, number, cut)?;
         record(&mut frame, &image)?;
-        passes.list(&mut frame, &image, cut.vertices)?;
-        let mut read = |buffer: &wgpu::Buffer, bytes: u64| {
-            frame.read_back(buffer, 0..bytes, device.buffers.lend_host("mesh report", bytes))
-        };
-        let draw = read(&image.quads.draw, BYTES_OF_DRAW);
-        reads.push(Reads { draw, report: read(&image.report, BYTES_OF_REPORT) });
-        images.push(image);
+        let counts = device.buffers.lend_storage("quads of chunks", 4 * u64::from(image.chunks()));
+        count::record(&mut frame, &image, &counts)?;
+        scan::record(&mut frame, &image, &counts)?;
+        indices::record(&mut frame, &image, &counts, cut.vertices)?;
+        reads.push([&image.quads.draw, &image.report].map(|buffer| read_back(device, &mut frame, buffer)));
+        images.push(image.quads);
     }
     let done = frame.submit().wait()?;
     let mut statistics = MeshStatistics { device_s: done.device_s, ..MeshStatistics::default() };
-    for read in reads {
-        let [error_bits, before] = done.with(read.report, |words: &[u32]| [words[0], words[1]])?;
+    for [draw, report] in reads {
+        let [error_bits, before] = done.with(report, |words: &[u32]| [words[0], words[1]])?;
         statistics.quads_before += u64::from(before);
         statistics.greatest_error_px = statistics.greatest_error_px.max(f32::from_bits(error_bits));
-        statistics.quads += done.with(read.draw, |words: &[u32]| u64::from(words[0] / INDICES_A_QUAD))?;
+        statistics.quads += done.with(draw, |words: &[u32]| u64::from(words[0] / INDICES_A_QUAD))?;
     }
-    Ok(Mesh { cut, images: images.into_iter().map(|image| image.quads).collect(), statistics })
+    Ok(Mesh { cut, images, statistics })
 }
 
 /// The quads of a mesh, image after image.
 pub(crate) fn read(device: &Device, mesh: &Mesh, set: &SampleSet) -> Result<Vec<Quad>, ReconstructionError> {
-    let mut quads = Vec::new();
-    for number in 0..mesh.images.len() {
-        quads.extend(read_image(device, mesh, set, number)?);
-    }
-    Ok(quads)
+    let images = (0..mesh.images.len()).map(|number| read_image(device, mesh, set, number));
+    Ok(images.collect::<Result<Vec<_>, _>>()?.concat())
 }
 
 fn read_image(device: &Device, mesh: &Mesh, set: &SampleSet, number: usize) -> Result<Vec<Quad>, ReconstructionError> {
     let image = &mesh.images[number];
     let mut frame = Frame::begin(&device.gpu, "read quads");
-    let mut read = |buffer: &wgpu::Buffer| {
-        let host = device.buffers.lend_host("quad read-back", buffer.size());
-        frame.read_back(buffer, 0..buffer.size(), host)
-    };
-    let [depths, indices, draw] = [&image.inverse_depths, &image.indices, &image.draw].map(&mut read);
+    let buffers = [&image.inverse_depths, &image.indices, &image.draw];
+    let [depths, indices, draw] = buffers.map(|buffer| read_back(device, &mut frame, buffer));
     let done = frame.submit().wait()?;
     let count = done.with(draw, |words: &[u32]| words[0] as usize)?;
     let indices = done.with(indices, |words: &[u32]| words[..count].to_vec())?;
@@ -79,6 +84,10 @@ fn read_image(device: &Device, mesh: &Mesh, set: &SampleSet, number: usize) -> R
     Ok(done.with(depths, |depths: &[f32]| {
         indices.chunks_exact(INDICES_A_QUAD as usize).map(|indices| quad(indices, depths)).collect()
     })?)
+}
+
+fn read_back(device: &Device, frame: &mut Frame<'_>, buffer: &wgpu::Buffer) -> Readback {
+    frame.read_back(buffer, 0..buffer.size(), device.buffers.lend_host("quad read-back", buffer.size()))
 }
 
 /// As `draw.wgsl` has it.

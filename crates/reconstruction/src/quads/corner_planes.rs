@@ -19,7 +19,7 @@ impl CornerPlanes {
     /// Uploads images that have all planes.
     pub fn upload(tables: &TablePool, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
         let count = images.iter().map(|image| (image.size_px() + 1).element_product() as usize).sum();
-        tables.gpu().check_table("corners", count)?;
+        tables.gpu.check_table("corners", count)?;
         let mut texels: Vec<[u32; 4]> = Vec::with_capacity(count);
         let mut first_corners = Vec::with_capacity(images.len());
         for image in images {

@@ -2,23 +2,18 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::UVec2;
-use gpu::{Binding, ComputePass, DispatchSize, Frame, GpuError, PooledBuffer};
-use minijinja::{Value, context};
+use gpu::{Binding, DispatchSize, Frame, GpuError, PooledBuffer, ShaderVariant};
 use wgpu::BufferUsages;
 
 use super::mesh::{Cut, INDICES_A_QUAD, ImageQuads};
-use crate::{
-    device::Device,
-    error::ReconstructionError,
-    sample_set::SampleSet,
-    view_work::{GpuSampleCamera, GpuViewCamera},
-};
+use crate::view_work::{GpuSampleCamera, GpuViewCamera};
+use crate::{device::Device, error::ReconstructionError, sample_set::SampleSet};
 
 /// Samples that one thread counts and lists.
-const CHUNK: u32 = 64;
-pub(super) const BYTES_OF_DRAW: u64 = 20;
+pub(super) const CHUNK: u32 = 64;
+const BYTES_OF_DRAW: u64 = 20;
 /// Bits of the greatest error, and quads before merging.
-pub(super) const BYTES_OF_REPORT: u64 = 8;
+const BYTES_OF_REPORT: u64 = 8;
 
 /// `CutWork` of the shader.
 #[repr(C)]
@@ -51,21 +46,13 @@ pub(crate) struct ImageCut<'s> {
     pub report: wgpu::Buffer,
 }
 
-/// The values that `cut.wgsl` uses.
-pub(crate) fn context() -> Value {
-    context! { chunk => CHUNK, indices_a_quad => INDICES_A_QUAD }
-}
-
 impl<'s> ImageCut<'s> {
     pub fn new(device: &'s Device, set: &'s SampleSet, number: usize, cut: Cut) -> Result<Self, GpuError> {
         let size_px = set.meshes.cameras[number].size_px;
         let samples = u64::from(size_px.element_product());
         let storage = |label: &str, bytes: u64, usage: BufferUsages| {
             device.gpu.check_storage_bytes(label, bytes)?;
-            let usage = usage | BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-            let descriptor =
-                wgpu::BufferDescriptor { label: Some(label), size: bytes, usage, mapped_at_creation: false };
-            Ok::<_, GpuError>(device.gpu.device.create_buffer(&descriptor))
+            Ok::<_, GpuError>(device.gpu.buffer(label, bytes, usage | BufferUsages::STORAGE | BufferUsages::COPY_SRC))
         };
         let vertices = u64::from(cut.vertices.per_sample()) * samples;
         let indices = u64::from(INDICES_A_QUAD) * samples;
@@ -110,19 +97,18 @@ impl<'s> ImageCut<'s> {
         [Binding::buffer("inverse_depths", &self.quads.inverse_depths), Binding::buffer("extents", &self.extents)]
     }
 
-    /// Records one dispatch of a shader that includes `cut.wgsl`.
-    pub fn dispatch<'b>(
+    /// Records one dispatch of a shader that includes `cut.wgsl`, with its own resources.
+    pub fn dispatch(
         &self,
         frame: &mut Frame<'_>,
-        pass: &ComputePass,
+        variant: &impl ShaderVariant,
         work: GpuCutWork,
-        bindings: impl IntoIterator<Item = Binding<'b>>,
-        invocations: [u32; 2],
+        own: &[Binding<'_>],
+        [x, y]: [u32; 2],
     ) -> Result<(), ReconstructionError> {
+        let pass = self.device.passes.get(variant)?;
         let work = self.device.gpu.buffer_with("cut", &[work], BufferUsages::UNIFORM);
-        let bindings: Vec<Binding<'_>> = bindings.into_iter().collect();
-        let bound = pass.bind(0, std::iter::once(Binding::buffer("work", &work)).chain(bindings))?;
-        let [x, y] = invocations;
+        let bound = pass.bind(0, own.iter().cloned().chain([Binding::buffer("work", &work)]))?;
         pass.dispatch(frame, &[&bound], DispatchSize::Invocations([x, y, 1]));
         Ok(())
     }

@@ -26,10 +26,6 @@ struct CutWork {
 
 @group(0) var<uniform> work: CutWork;
 
-// Samples that one thread counts and lists.
-const CHUNK: u32 = {{ chunk }}u;
-const INDICES_A_QUAD: u32 = {{ indices_a_quad }}u;
-
 // Columns and rows of a quad in texels: its word among the extents of an image's quads, 0 where none begins.
 fn extent_of(word: u32) -> vec2u { return vec2u(word & 0xffffu, word >> 16u); }
 fn word_of(extent: vec2u) -> u32 { return extent.x | (extent.y << 16u); }

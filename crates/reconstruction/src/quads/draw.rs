@@ -5,18 +5,13 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3, Vec4};
-use gpu::{
-    Binding, DrawPass, DrawState, DrawVariant, Frame, Gpu, GpuError, PassCache, ResourceTrait, ResourceTraits,
-    ShaderVariant, Templates, uniform_elements, uniform_stride,
-};
-use minijinja::{Value, context};
-use parking_lot::Mutex;
-use wgpu::{BufferUsages, TextureFormat, TextureView, TextureViewDimension};
+use gpu::{Binding, DrawPass, DrawState, DrawVariant, Frame, Gpu, GpuError, Lent, PassCache, Pool, Templates};
+use gpu::{shader_variant, uniform_elements, uniform_stride};
+use wgpu::{BufferUsages, TextureFormat, TextureUsages, TextureView, TextureViewDimension};
 
 use super::mesh::{Mesh, QuadVertices};
-use crate::{error::ReconstructionError, recording::Recording, view_work::GpuViewCamera};
-
-pub(super) const SHADER: (&str, &str) = ("draw.wgsl", include_str!("draw.wgsl"));
+use crate::view_work::{GpuViewCamera, ONE_VIEW};
+use crate::{error::ReconstructionError, recording::Recording};
 
 const SAMPLE_FORMAT: TextureFormat = TextureFormat::R32Uint;
 const INVERSE_DEPTH: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32];
@@ -34,22 +29,7 @@ pub(crate) struct GpuQuadWork {
     pub padding: [u32; 2],
 }
 
-/// The switch of `draw.wgsl`.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct DrawQuads(QuadVertices);
-
-impl ShaderVariant for DrawQuads {
-    const TEMPLATE: &'static str = SHADER.0;
-    const TRAITS: ResourceTraits = &[("work", ResourceTrait::DynamicOffset)];
-
-    fn context(&self) -> Value {
-        context! { at_texel_corners => self.0.are_at_texel_corners() }
-    }
-
-    fn all() -> Vec<Self> {
-        QuadVertices::ALL.map(Self).to_vec()
-    }
-}
+shader_variant!(DrawQuads(QuadVertices), "draw.wgsl", ONE_VIEW);
 
 impl DrawVariant for DrawQuads {
     fn state(&self) -> DrawState {
@@ -63,16 +43,17 @@ impl DrawVariant for DrawQuads {
     }
 }
 
-/// Drawing passes, and the targets of the last batch.
+/// Drawing passes, and the targets of the last batches of two sizes: most are alike.
 pub(crate) struct QuadDrawing {
-    passes: PassCache<DrawQuads, DrawPass>,
-    /// Batches follow one another on the device, and most are alike.
-    targets: Mutex<Option<Arc<Targets>>>,
+    passes: PassCache<DrawPass>,
+    targets: Pool<TargetKind, Targets>,
 }
+
+/// The size of views, and how many there are.
+type TargetKind = (UVec2, u32);
 
 /// The textures that views are drawn into, a layer each.
 pub(crate) struct Targets {
-    size_px: UVec2,
     depth: Layers,
     samples: Layers,
 }
@@ -83,17 +64,9 @@ struct Layers {
 }
 
 impl Layers {
-    fn new(device: &wgpu::Device, label: &str, format: TextureFormat, size_px: UVec2, count: usize) -> Self {
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d { width: size_px.x, height: size_px.y, depth_or_array_layers: count as u32 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
+    fn new(gpu: &Gpu, label: &str, format: TextureFormat, (size_px, count): TargetKind) -> Self {
+        let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
+        let texture = gpu.texture(label, size_px.extend(count).to_array(), format, usage);
         let view = |dimension, base_array_layer, count| {
             texture.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(dimension),
@@ -103,23 +76,13 @@ impl Layers {
             })
         };
         Self {
-            all: view(TextureViewDimension::D2Array, 0, count as u32),
-            each: (0..count as u32).map(|layer| view(TextureViewDimension::D2, layer, 1)).collect(),
+            all: view(TextureViewDimension::D2Array, 0, count),
+            each: (0..count).map(|layer| view(TextureViewDimension::D2, layer, 1)).collect(),
         }
     }
 }
 
 impl Targets {
-    fn new(device: &wgpu::Device, size_px: UVec2, count: usize) -> Self {
-        let layers = |label, format| Layers::new(device, label, format, size_px, count);
-        let depth = layers("drawn depth", DrawPass::DEPTH_FORMAT);
-        Self { size_px, depth, samples: layers("drawn samples", SAMPLE_FORMAT) }
-    }
-
-    fn holds(&self, size_px: UVec2, count: usize) -> bool {
-        self.size_px == size_px && self.depth.each.len() >= count
-    }
-
     /// As `resolve.wgsl` reads them.
     pub fn bindings(&self) -> [Binding<'_>; 2] {
         [Binding::texture("drawn_depth", &self.depth.all), Binding::texture("drawn_sample", &self.samples.all)]
@@ -128,18 +91,18 @@ impl Targets {
 
 impl QuadDrawing {
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        Self { passes: PassCache::new(gpu, templates), targets: Mutex::default() }
+        Self { passes: PassCache::new(gpu, templates), targets: Pool::keeping(2) }
     }
 
-    /// Targets for `count` views: those of the last batch, where they fit.
-    fn targets(&self, gpu: &Gpu, size_px: UVec2, count: usize) -> Result<Arc<Targets>, GpuError> {
-        let limits = gpu.device.limits();
+    fn targets(&self, gpu: &Gpu, kind: TargetKind) -> Result<Lent<TargetKind, Targets>, GpuError> {
+        let (limits, (size_px, views)) = (gpu.device.limits(), kind);
         let (side_px, layers) = (limits.max_texture_dimension_2d, limits.max_texture_array_layers);
         GpuError::check_limit("a drawn view's side (px)", size_px.max_element().into(), side_px.into())?;
-        GpuError::check_limit("views drawn together", count as u64, layers.into())?;
-        let mut kept = self.targets.lock();
-        let reused = kept.take().filter(|targets| targets.holds(size_px, count));
-        Ok(kept.insert(reused.unwrap_or_else(|| Arc::new(Targets::new(&gpu.device, size_px, count)))).clone())
+        GpuError::check_limit("views drawn together", views.into(), layers.into())?;
+        Ok(self.targets.lend(kind, |&kind| Targets {
+            depth: Layers::new(gpu, "drawn depth", DrawPass::DEPTH_FORMAT, kind),
+            samples: Layers::new(gpu, "drawn samples", SAMPLE_FORMAT, kind),
+        }))
     }
 }
 
@@ -148,10 +111,10 @@ pub(super) fn record(
     drawing: &QuadDrawing,
     recording: &mut Recording<'_>,
     mesh: &Mesh,
-) -> Result<Arc<Targets>, ReconstructionError> {
+) -> Result<Lent<TargetKind, Targets>, ReconstructionError> {
     let gpu = &recording.device.gpu;
     let pass = drawing.passes.get(&DrawQuads(mesh.cut.vertices))?;
-    let targets = drawing.targets(gpu, recording.batch.size_px, recording.batch.cameras.len())?;
+    let targets = drawing.targets(gpu, (recording.batch.size_px, recording.batch.cameras.len() as u32))?;
     let works = gpu.buffer_with("quads of views", &quad_works(recording), BufferUsages::UNIFORM);
     let bound = pass.bind(0, [Binding::buffer("work", &works)])?;
     for view in 0..recording.batch.cameras.len() {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use glam::Vec3;
 use gpu::TablePool;
+use minijinja::{Value, context};
 use parking_lot::Mutex;
 
 use super::corner_planes::CornerPlanes;
@@ -12,10 +13,10 @@ use crate::{error::ReconstructionError, error_bound::ErrorBound};
 
 pub(crate) const INDICES_A_QUAD: u32 = 6;
 /// Meshes kept with a set, the last that were asked for: bounds are free to choose, memory is not.
-const MAX_MESHES: usize = 3;
+pub(super) const MAX_MESHES: usize = 3;
 
 /// Where the vertices of quads lie.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum QuadVertices {
     /// A vertex at each sample; quads lie between samples.
     AtSamples,
@@ -24,14 +25,17 @@ pub(crate) enum QuadVertices {
 }
 
 impl QuadVertices {
-    pub const ALL: [Self; 2] = [Self::AtSamples, Self::AtTexelCorners];
-
-    pub fn are_at_texel_corners(self) -> bool {
-        self == Self::AtTexelCorners
+    pub fn per_sample(self) -> u32 {
+        if self == Self::AtTexelCorners { 4 } else { 1 }
     }
 
-    pub fn per_sample(self) -> u32 {
-        if self.are_at_texel_corners() { 4 } else { 1 }
+    /// The switch of shaders that know vertices.
+    pub fn context(self) -> Value {
+        context! { at_texel_corners => self == Self::AtTexelCorners }
+    }
+
+    pub fn all() -> [Self; 2] {
+        [Self::AtSamples, Self::AtTexelCorners]
     }
 }
 
@@ -88,7 +92,7 @@ pub(crate) struct SetMeshes {
     /// Or the image that lacks a plane, and the plane.
     pub planes: Result<CornerPlanes, (usize, &'static str)>,
     /// The one first asked for is the first.
-    meshes: Mutex<Vec<Arc<Mesh>>>,
+    pub(super) meshes: Mutex<Vec<Arc<Mesh>>>,
 }
 
 impl SetMeshes {
@@ -103,24 +107,5 @@ impl SetMeshes {
             None => Ok(CornerPlanes::upload(tables, images)?),
         };
         Ok(Self { cameras: images.iter().map(camera).collect(), planes, meshes: Mutex::default() })
-    }
-
-    /// The mesh of a cut, made when it is first asked for.
-    pub fn get_or_make(
-        &self,
-        cut: Cut,
-        make: impl FnOnce() -> Result<Mesh, ReconstructionError>,
-    ) -> Result<Arc<Mesh>, ReconstructionError> {
-        // Held while it is made: concurrent callers want the same.
-        let mut meshes = self.meshes.lock();
-        if let Some(mesh) = meshes.iter().find(|mesh| mesh.cut == cut) {
-            return Ok(mesh.clone());
-        }
-        let mesh = Arc::new(make()?);
-        if meshes.len() >= MAX_MESHES {
-            meshes.remove(0);
-        }
-        meshes.push(mesh.clone());
-        Ok(mesh)
     }
 }

@@ -8,40 +8,38 @@ mod draw;
 mod indices;
 mod merge;
 mod mesh;
-mod passes;
 mod resolve;
 mod scan;
 
-pub(crate) use build::{build, read};
+pub(crate) use build::{mesh, read};
 pub(crate) use corner_planes::CornerPlanes;
 #[cfg(test)]
 pub(crate) use cut::GpuCutWork;
-pub(crate) use cut::context;
 #[cfg(test)]
 pub(crate) use draw::GpuQuadWork;
+pub(crate) use draw::QuadDrawing;
 #[cfg(feature = "scalar")]
 pub(crate) use merge::GREATEST_EXTENT;
-pub(crate) use merge::{Merge, record as merge};
+pub(crate) use merge::record as merge;
 pub(crate) use mesh::{Cut, Mesh, QuadVertices, SetMeshes};
 pub use mesh::{MeshStatistics, Quad};
-pub(crate) use passes::QuadPasses;
+pub(crate) use resolve::record;
 
-use gpu::{ShaderError, ShaderSource, Templates, sources as of};
+use gpu::{ShaderError, ShaderSource, Templates, shader_sources, wgsl_constants, wgsl_files};
 
-pub(crate) const SHADERS: [(&str, &str); 7] = [
-    ("cut.wgsl", include_str!("cut.wgsl")),
-    count::SHADER,
-    scan::SHADER,
-    indices::SHADER,
-    merge::SHADER,
-    draw::SHADER,
-    resolve::SHADER,
-];
+use self::{cut::CHUNK, mesh::INDICES_A_QUAD};
+
+pub(crate) const SHADERS: [(&str, &str); 7] = wgsl_files! {
+    "cut.wgsl", "count.wgsl", "scan.wgsl", "indices.wgsl", "merge.wgsl", "draw.wgsl", "resolve.wgsl"
+};
+
+/// The numbers that shaders of quads share with Rust.
+pub(crate) fn constants() -> [(&'static str, String); 2] {
+    wgsl_constants![CHUNK, INDICES_A_QUAD]
+}
 
 /// The texts of all variants of all passes over quads.
 pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    let list =
-        of::<count::Count>(templates).chain(of::<scan::Scan>(templates)).chain(of::<indices::Indices>(templates));
-    let draw = of::<draw::DrawQuads>(templates).chain(of::<resolve::Resolve>(templates));
-    list.chain(of::<Merge>(templates)).chain(draw)
+    let list = shader_sources!(templates, count::Count, scan::Scan, indices::Indices, merge::Merge);
+    list.chain(shader_sources!(templates, draw::DrawQuads, resolve::Resolve))
 }

@@ -1,45 +1,21 @@
 //! Gives the pixels of drawn views their colour.
 
-use gpu::{PassCache, ResourceTraits, ShaderVariant};
-use minijinja::Value;
+use gpu::shader_variant;
 
-use super::draw::Targets;
-use crate::{
-    error::ReconstructionError,
-    pixel_list::PixelList,
-    recording::Recording,
-    surface::{self, SurfaceVariant},
-    view_work::ONE_VIEW,
-};
+use super::draw::{self, QuadDrawing};
+use super::mesh::Mesh;
+use crate::surface::{self, SurfaceVariant};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, view_work::ONE_VIEW};
 
-pub(super) const SHADER: (&str, &str) = ("resolve.wgsl", include_str!("resolve.wgsl"));
+shader_variant!(Resolve(SurfaceVariant), "resolve.wgsl", ONE_VIEW);
 
-/// The switches of `resolve.wgsl`.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct Resolve(SurfaceVariant);
-
-impl ShaderVariant for Resolve {
-    const TEMPLATE: &'static str = SHADER.0;
-    const TRAITS: ResourceTraits = ONE_VIEW;
-
-    fn context(&self) -> Value {
-        self.0.context()
-    }
-
-    fn all() -> Vec<Self> {
-        SurfaceVariant::all().into_iter().map(Self).collect()
-    }
-}
-
-/// Gives the pixels that stay unknown.
-pub(super) fn record(
-    passes: &PassCache<Resolve>,
+/// Draws a mesh into all views and gives pixels their colour; gives the pixels that stay unknown.
+pub(crate) fn record(
+    drawing: &QuadDrawing,
     recording: &mut Recording<'_>,
-    drawn: &Targets,
+    mesh: &Mesh,
 ) -> Result<PixelList, ReconstructionError> {
-    let pass = passes.get(&Resolve(SurfaceVariant::of(recording)))?;
-    let unknown = recording.lend_list();
-    let bound = pass.bind(0, surface::bindings(recording, &unknown).into_iter().chain(drawn.bindings()))?;
-    recording.dispatch_pixels(&pass, &bound);
-    Ok(unknown)
+    let drawn = draw::record(drawing, recording, mesh)?;
+    let resolve = Resolve(SurfaceVariant::of(recording));
+    surface::record(recording, &resolve, None, &drawn.bindings())
 }

@@ -18,7 +18,7 @@ fn shows_background(camera: SampleCamera, point_in_world: vec3f) -> bool {
 {% endif %}
     let words = textureLoad(cell_codes, texel_at(camera.first_cell + texel.y * camera.width_px + texel.x), 0);
     // Not where the ray passed what other images hold: bit 15 says so.
-    return inside && (words.x & 0xffffu) == BACKGROUND;
+    return inside && (words.x & 0xffffu) == BACKGROUND_CODE;
 }
 
 // The bit of a sample's camera.
@@ -34,7 +34,7 @@ fn mask_of(sample: u32) -> u32 {
     return mask;
 }
 
-@compute @workgroup_size({{ tile_px }}, {{ tile_px }})
+@compute @workgroup_size(TILE_PX, TILE_PX)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= work.view.size_px) { return; }
     let pixel = pixel_of(id.xy);

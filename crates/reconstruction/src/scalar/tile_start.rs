@@ -7,7 +7,7 @@ use super::{
     view_ray::{ViewRay, ViewRays},
 };
 use crate::{
-    tile_start::{GREATEST_MOVE, HALF_DIAGONAL, LEAST_MOVE, MAX_MOVES},
+    tile_start::{GREATEST_TILE_MOVE, HALF_DIAGONAL, LEAST_TILE_MOVE, MAX_TILE_MOVES},
     view_work::{FAR_AWAY, TILE_PX},
 };
 
@@ -32,16 +32,16 @@ fn tile_start(cameras: &[SampleCamera], rays: &ViewRays, tile: UVec2) -> f32 {
     let slope = HALF_DIAGONAL * TILE_PX as f32 / rays.focal_px();
     let farthest = (rays.volume.min - rays.eye()).abs().max((rays.volume.max - rays.eye()).abs()).length();
     let mut t = entry(rays, tile);
-    let mut stride = GREATEST_MOVE;
-    for _ in 0..MAX_MOVES {
-        if t >= farthest || stride <= LEAST_MOVE {
+    let mut stride = GREATEST_TILE_MOVE;
+    for _ in 0..MAX_TILE_MOVES {
+        if t >= farthest || stride <= LEAST_TILE_MOVE {
             break;
         }
         let evaluations: Vec<Evaluation> =
             cameras.iter().map(|c| evaluate_camera(c, &middle, [t, t * stride], slope)).collect();
         if evaluations.iter().any(|o| o.proven) || evaluations.iter().all(|o| o.unopposed) {
             t *= stride;
-            stride = (1.0 + (stride - 1.0) * 1.5).min(GREATEST_MOVE);
+            stride = (1.0 + (stride - 1.0) * 1.5).min(GREATEST_TILE_MOVE);
         } else {
             stride = 0.5 + 0.5 * stride;
         }

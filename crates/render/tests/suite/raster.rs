@@ -259,7 +259,10 @@ fn wind_displaces_swaying_vertices() {
 
 #[test]
 fn surface_ids_name_one_triangle_of_one_instance() {
-    assert!(device().0.has_primitive_index(), "the software device knows triangles' numbers");
+    assert!(
+        device().0.device.features().contains(wgpu::Features::PRIMITIVE_INDEX),
+        "the software device knows triangles' numbers"
+    );
     let mut scene = unit_cube();
     let at = |x: f32| Affine3A::from_translation(Vec3::new(x, 0.0, -4.0)) * Affine3A::from_rotation_y(0.5);
     scene.instances =

@@ -9,11 +9,6 @@
 {% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 
-const MAX_COARSE_MOVES: u32 = {{ max_coarse_moves }}u;
-const MAX_FINE_MOVES: u32 = {{ max_fine_moves }}u;
-const START_LEVEL: u32 = {{ start_level }}u;
-const NUDGE_PX: f32 = {{ nudge_px }};
-const EYE_SHARE: f32 = {{ eye_share }};
 const CAMERA: u32 = {{ march_camera }}u;
 
 // How far the way is free, and whether it ends at a surface.
@@ -117,7 +112,7 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
 {% if march_camera == 0 %}
 @group(0) var<storage, read> tile_start_m: array<f32>;
 
-@compute @workgroup_size({{ tile_px }}, {{ tile_px }})
+@compute @workgroup_size(TILE_PX, TILE_PX)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= work.view.size_px) { return; }
     let pixel = pixel_of(id.xy);
@@ -127,7 +122,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% else %}
 {% include "pixel_list.wgsl" %}
 
-@compute @workgroup_size({{ list_workgroup }})
+@compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= lists[work.view.number].count { return; }
     let pixel = pixel_of(place_of(listed_pixels[work.view.first_pixel + id.x]));

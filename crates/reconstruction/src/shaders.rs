@@ -1,0 +1,52 @@
+//! The shader templates of this crate, the numbers that they share with Rust, and all their variants.
+
+use depth_image::ProvenanceKind;
+use gpu::{ShaderError, ShaderSource, Templates, wgsl_constants, wgsl_files};
+use minijinja::Value;
+
+use crate::fill::{DIRECTIONS, Fill, REACH_PX, SAME_SIDE};
+use crate::pyramid::{BACKGROUND_CODE, FLAT_FOOTPRINTS, HOLE_CODE, SLOPE_SHARE};
+use crate::surface::{
+    ANGLE_FLOOR, BORDER_PX, CARVING_SHARE, HALF_CODE, HIDDEN_WEIGHT, LEAST_SHARE, THICKNESS_FOOTPRINTS,
+};
+use crate::tile_start::{GREATEST_TILE_MOVE, HALF_DIAGONAL, LEAST_TILE_MOVE, MAX_TILE_MOVES, TileStart};
+use crate::view_work::{CELL_MARGIN_PX, FAR_AWAY, TILE_PX};
+use crate::{methods, pixel_list::LIST_WORKGROUP, quads, specular::Specular};
+
+/// Passes over whole views, and templates that several shaders include.
+const SHADERS: [(&str, &str); 7] = wgsl_files! {
+    "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "pixel_list.wgsl"
+};
+
+const PROVENANCE_EMPTY: u32 = ProvenanceKind::Empty as u32;
+const PROVENANCE_HIT: u32 = ProvenanceKind::Hit as u32;
+const PROVENANCE_FILLED: u32 = ProvenanceKind::Filled as u32;
+
+/// The names and texts of all templates of this crate.
+#[must_use]
+pub fn shaders() -> Vec<(&'static str, &'static str)> {
+    [&SHADERS[..], &quads::SHADERS, &methods::SHADERS].concat()
+}
+
+/// All templates of this crate.
+///
+/// # Errors
+/// When a text is not a template.
+pub fn templates() -> Result<Templates, ShaderError> {
+    let constants = wgsl_constants! {
+        ANGLE_FLOOR, BACKGROUND_CODE, BORDER_PX, CARVING_SHARE, CELL_MARGIN_PX, FAR_AWAY, FLAT_FOOTPRINTS,
+        GREATEST_TILE_MOVE, HALF_CODE, HALF_DIAGONAL, HIDDEN_WEIGHT, HOLE_CODE, LEAST_SHARE, LEAST_TILE_MOVE,
+        LIST_WORKGROUP, MAX_TILE_MOVES, PROVENANCE_EMPTY, PROVENANCE_FILLED, PROVENANCE_HIT, REACH_PX, SAME_SIDE,
+        SLOPE_SHARE, THICKNESS_FOOTPRINTS, TILE_PX
+    };
+    let templates = Templates::new(&shaders())?
+        .with_constants([("DIRECTIONS", Value::from_iter(DIRECTIONS.map(Value::from_iter)))]);
+    Ok(templates.declaring(constants).declaring(quads::constants()).declaring(methods::constants()))
+}
+
+/// The texts of all variants of all passes.
+pub fn shader_sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
+    gpu::shader_sources!(templates, TileStart, Fill, Specular)
+        .chain(quads::sources(templates))
+        .chain(methods::sources(templates))
+}
