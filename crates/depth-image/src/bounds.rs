@@ -1,6 +1,6 @@
 //! Axis-aligned boxes.
 
-use glam::Vec3;
+use glam::{BVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// A box in world space, `min <= max` on every axis unless empty.
@@ -55,12 +55,7 @@ impl Aabb {
     /// The eight corners.
     #[must_use]
     pub fn corners(&self) -> [Vec3; 8] {
-        std::array::from_fn(|i| {
-            Vec3::new(
-                if i & 1 == 0 { self.min.x } else { self.max.x },
-                if i & 2 == 0 { self.min.y } else { self.max.y },
-                if i & 4 == 0 { self.min.z } else { self.max.z },
-            )
-        })
+        let is_least = |i: usize| BVec3::new(i & 1 == 0, i & 2 == 0, i & 4 == 0);
+        std::array::from_fn(|i| Vec3::select(is_least(i), self.min, self.max))
     }
 }

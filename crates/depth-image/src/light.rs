@@ -22,6 +22,7 @@ pub struct Illumination {
 
 /// A light source. Colours are linear RGB and finite, never negative.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub enum Light {
     /// Parallel light, as from the sun.
     Directional {
@@ -34,7 +35,6 @@ pub enum Light {
     },
     /// A lamp of equal intensity in all directions; irradiance falls with the square of the distance.
     Point {
-        /// Centre of the lamp.
         position_in_world: Vec3,
         /// Irradiance at a distance of one metre.
         intensity_linear: Vec3,
@@ -43,7 +43,6 @@ pub enum Light {
     },
     /// A point light that shines into a cone, as in `KHR_lights_punctual`.
     Spot {
-        /// Centre of the lamp.
         position_in_world: Vec3,
         /// Unit vector along the cone's axis, away from the light.
         forward_in_world: Vec3,
@@ -58,7 +57,6 @@ pub enum Light {
     },
     /// A rectangle that shines to the side of `half_edges[0] × half_edges[1]`, by Lambert's law.
     Rectangle {
-        /// Centre of the rectangle.
         center_in_world: Vec3,
         /// Vectors from the centre to the middles of two neighbouring edges, perpendicular to each other.
         half_edges_in_world: [Vec3; 2],

@@ -27,11 +27,8 @@ impl ShaderVariant for Interpolate {
 
     fn all() -> Vec<Self> {
         let each = |sums: SumPlanes| {
-            switches().map(move |[by_rays, coarse]| Self {
-                by_rays,
-                step_px: if coarse { 2 } else { 1 },
-                sum_planes: sums.count(),
-            })
+            let sum_planes = sums.count();
+            switches().map(move |[by_rays, coarse]| Self { by_rays, step_px: 1 + u32::from(coarse), sum_planes })
         };
         SumPlanes::all().flat_map(each).collect()
     }

@@ -10,8 +10,8 @@ use crate::planes::{self, Output};
 use crate::visibility::{Choice, Choices, Visibility};
 use crate::work::{DrawWork, SamplePlanes};
 use crate::{
-    GpuScene, Lighting, RenderError, batch::Batch, layers::LayerCache, redundancy_test::RedundancyTest,
-    shaders::templates, stages::Stages, sums::SumPlanes,
+    GpuScene, Lighting, RenderError, batch::Batch, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages,
+    sums::SumPlanes,
 };
 
 /// Pixels in one submission: bounds the memory for surfaces, light and read-back.
@@ -27,17 +27,9 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Pipelines are built when first used.
-    ///
-    /// # Errors
-    /// When a shader template is broken.
-    pub fn new(gpu: &Arc<Gpu>) -> Result<Self, RenderError> {
-        Ok(Self::with_templates(gpu, templates(&[])?))
-    }
-
-    /// A renderer whose `templates` hold redundancy tests for [`Renderer::draw_image_sequence`], too.
+    /// Pipelines are built when first used. `templates` may hold redundancy tests for [`Renderer::draw_image_sequence`].
     #[must_use]
-    pub fn with_templates(gpu: &Arc<Gpu>, templates: Templates) -> Self {
+    pub fn new(gpu: &Arc<Gpu>, templates: Templates) -> Self {
         let stages = Stages::new(gpu, &Arc::new(templates));
         Self { gpu: gpu.clone(), stages, layer_cache: LayerCache::default(), choices: Choices::default() }
     }

@@ -15,17 +15,9 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// Makes a renderer of its own.
-    ///
-    /// # Errors
-    /// When a shader is broken.
-    pub fn new(gpu: &Arc<Gpu>) -> Result<Self, SamplingError> {
-        Ok(Self::sharing(Arc::new(renderer(gpu)?)))
-    }
-
-    /// Uses what [`renderer`] made.
+    /// A sampler that draws with what [`renderer`] made.
     #[must_use]
-    pub fn sharing(renderer: Arc<Renderer>) -> Self {
+    pub fn new(renderer: Arc<Renderer>) -> Self {
         Self { renderer, hysteresis: TemporalHysteresis::default() }
     }
 
@@ -63,5 +55,5 @@ fn check_wanted(work: &SampleWork<'_>) -> Result<(), SamplingError> {
 /// # Errors
 /// When a shader is broken.
 pub fn renderer(gpu: &Arc<Gpu>) -> Result<Renderer, RenderError> {
-    Ok(Renderer::with_templates(gpu, templates()?))
+    Ok(Renderer::new(gpu, templates()?))
 }

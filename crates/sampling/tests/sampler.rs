@@ -6,7 +6,7 @@ use depth_image::{Camera, CameraError, DepthImage, ViewCell};
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, SamplePlanes, Visibility};
-use sampling::{Rig, SampleWork, Sampler, SamplingError, SamplingMethod};
+use sampling::{Rig, SampleWork, Sampler, SamplingError, SamplingMethod, renderer};
 use scene::procedural::courtyard;
 
 struct Device {
@@ -22,7 +22,7 @@ fn device() -> &'static Device {
         let gpu: Arc<Gpu> = Gpu::open(DevicePreference::Software).expect("a software device");
         let yard = courtyard();
         Device {
-            sampler: Sampler::new(&gpu).expect("a sampler"),
+            sampler: Sampler::new(Arc::new(renderer(&gpu).expect("a renderer"))),
             scene: GpuScene::upload(&gpu, &yard).expect("a scene"),
             rig: Rig::two_plane(&yard.bounds(), 2.5).expect("a rig"),
         }

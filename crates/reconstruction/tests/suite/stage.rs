@@ -32,7 +32,7 @@ fn device() -> &'static Device {
     static DEVICE: OnceLock<Device> = OnceLock::new();
     DEVICE.get_or_init(|| {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let renderer = Renderer::with_templates(&gpu, render::templates(&[APART]).expect("templates"));
+        let renderer = Renderer::new(&gpu, render::templates(&[APART]).expect("templates"));
         let reconstructor = Reconstructor::new(&gpu).expect("a reconstructor");
         Device { gpu, renderer, reconstructor }
     })
