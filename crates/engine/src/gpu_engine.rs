@@ -47,7 +47,7 @@ impl GpuEngine {
         let gpu = Gpu::open(preference).map_err(device)?;
         let renderer = Arc::new(sampling::renderer(&gpu).map_err(render_error)?);
         Ok(Self {
-            sampler: Sampler::new(renderer.clone()),
+            sampler: Sampler::sharing(renderer.clone()),
             reconstructor: Reconstructor::new(&gpu).map_err(reconstruction_error)?,
             renderer,
             gpu,

@@ -15,9 +15,9 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// A sampler that draws with what [`renderer`] made.
+    /// Uses what [`renderer`] made.
     #[must_use]
-    pub fn new(renderer: Arc<Renderer>) -> Self {
+    pub fn sharing(renderer: Arc<Renderer>) -> Self {
         Self { renderer, hysteresis: TemporalHysteresis::default() }
     }
 

@@ -22,7 +22,7 @@ fn device() -> &'static Device {
         let gpu: Arc<Gpu> = Gpu::open(DevicePreference::Software).expect("a software device");
         let yard = courtyard();
         Device {
-            sampler: Sampler::new(Arc::new(renderer(&gpu).expect("a renderer"))),
+            sampler: Sampler::sharing(Arc::new(renderer(&gpu).expect("a renderer"))),
             scene: GpuScene::upload(&gpu, &yard).expect("a scene"),
             rig: Rig::two_plane(&yard.bounds(), 2.5).expect("a rig"),
         }

@@ -66,7 +66,7 @@ impl Subject {
         engine.put_scene(&hash, &setup.scene)?;
         let rig = raised(&Rig::in_front_of(&setup.scene.bounds(), SPREAD_RAD).with_context(|| name.to_owned())?);
         let (scene, engine) = (engine.scene(&hash)?, engine.clone());
-        let sampler = Sampler::new(engine.shared_renderer());
+        let sampler = Sampler::sharing(engine.shared_renderer());
         Ok(Self { name: name.to_owned(), setup, args, rig, engine, scene, sampler })
     }
 

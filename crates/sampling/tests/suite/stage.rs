@@ -22,7 +22,7 @@ pub fn device() -> &'static Device {
     DEVICE.get_or_init(|| {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
         let renderer = Arc::new(sampling::renderer(&gpu).expect("a renderer"));
-        Device { gpu, sampler: Sampler::new(renderer.clone()), renderer }
+        Device { gpu, sampler: Sampler::sharing(renderer.clone()), renderer }
     })
 }
 
