@@ -14,6 +14,7 @@ const OCCLUSION_OF_DIAGONAL: f32 = 0.05;
 /// Rays of each kind that one dispatch traces for a pixel: the software device ends all loops of an invocation after
 /// 65,535 turns together, and a GPU may take a long dispatch for a hung one.
 const RAYS_A_DISPATCH: u32 = 32;
+const CAMERAS_A_SUBMISSION: usize = 32;
 
 /// One submission's work, once it is known how surfaces are found.
 pub(crate) struct Batch<'a> {
@@ -91,6 +92,22 @@ impl Batch<'_> {
         };
         uniform(gpu, "pixel cameras", self.cameras.iter().map(place))
     }
+}
+
+/// Runs of cameras, bounded in number and pixels; at least one camera each.
+pub(crate) fn batches(cameras: &[PinholeCamera], most_pixels: usize) -> impl Iterator<Item = &[PinholeCamera]> {
+    let mut rest = cameras;
+    std::iter::from_fn(move || {
+        let mut pixels = 0;
+        let fits = |camera: &&PinholeCamera| {
+            pixels += camera.pixel_count();
+            pixels <= most_pixels
+        };
+        let count = rest.iter().take(CAMERAS_A_SUBMISSION).take_while(fits).count().max(1).min(rest.len());
+        let (batch, others) = rest.split_at(count);
+        rest = others;
+        (!batch.is_empty()).then_some(batch)
+    })
 }
 
 /// Ranges of rays, cut into parts of [`RAYS_A_DISPATCH`].

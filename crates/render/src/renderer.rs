@@ -1,29 +1,32 @@
 //! Views and depth images of scenes, in as few submissions as memory allows.
 
-use std::{slice, sync::Arc, time::Instant};
+use std::{collections::HashMap, slice, sync::Arc, time::Instant};
 
 use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use glam::UVec2;
 use gpu::{Frame, Gpu, GpuError, Templates};
+use parking_lot::Mutex;
 
+use crate::batch::{Batch, batches};
 use crate::known_samples::{ImageSequence, KnownSamples, TemporalReference};
 use crate::planes::{self, Output};
-use crate::visibility::{Choice, Choices, Visibility};
+use crate::visibility::{Choice, Visibility};
 use crate::work::{DrawWork, SamplePlanes};
 use crate::{
-    GpuScene, Lighting, RenderError, batch::Batch, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages,
+    GpuScene, Lighting, RenderError, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages,
     sums::SumPlanes,
 };
 
 /// Pixels in one submission: bounds the memory for surfaces, light and read-back.
 const PIXELS_A_SUBMISSION: usize = 1 << 20;
-const CAMERAS_A_SUBMISSION: usize = 32;
 
 /// Draws on one device.
 pub struct Renderer {
     gpu: Arc<Gpu>,
     stages: Stages,
     layer_cache: LayerCache,
-    choices: Choices,
+    /// By scene and size of pictures.
+    choices: Mutex<HashMap<(u64, UVec2), Choice>>,
 }
 
 impl Renderer {
@@ -31,7 +34,7 @@ impl Renderer {
     #[must_use]
     pub fn new(gpu: &Arc<Gpu>, templates: Templates) -> Self {
         let stages = Stages::new(gpu, &Arc::new(templates));
-        Self { gpu: gpu.clone(), stages, layer_cache: LayerCache::default(), choices: Choices::default() }
+        Self { gpu: gpu.clone(), stages, layer_cache: LayerCache::default(), choices: Mutex::default() }
     }
 
     /// The device.
@@ -173,9 +176,14 @@ impl Renderer {
     /// # Errors
     /// The device's.
     pub fn choice(&self, scene: &GpuScene, camera: &PinholeCamera, scene_time_s: f32) -> Result<Choice, RenderError> {
-        let lighting = Lighting::UNLIT;
-        self.choices.get_or_measure(scene, camera.size_px, |visibility| {
-            let work = DrawWork { scene, lighting, scene_time_s, visibility, refinement: Default::default() };
+        let mut measured = self.choices.lock();
+        let key = (scene.identity, camera.size_px);
+        if let Some(choice) = measured.get(&key) {
+            return Ok(*choice);
+        }
+        let seconds = |visibility| {
+            let (lighting, refinement) = (Lighting::UNLIT, Default::default());
+            let work = DrawWork { scene, lighting, scene_time_s, visibility, refinement };
             let run = || {
                 let start = Instant::now();
                 self.draw_views(work, &[*camera], ViewPlanes::default())?;
@@ -184,7 +192,11 @@ impl Renderer {
             // Pipelines and trees are made by the first; of the others the quickest was disturbed least.
             run()?;
             (0..3).map(|_| run()).try_fold(f64::INFINITY, |least, s: Result<f64, RenderError>| s.map(|s| least.min(s)))
-        })
+        };
+        let choice = Choice { triangles_s: seconds(Visibility::Triangles)?, rays_s: seconds(Visibility::Rays)? };
+        tracing::info!(size_px = %camera.size_px, %choice, "surfaces are found by");
+        measured.insert(key, choice);
+        Ok(choice)
     }
 
     /// Visits of nodes, then tests of triangles, of each pixel's primary ray; slower than drawing.
@@ -273,20 +285,4 @@ fn images_output(work: DrawWork<'_>, planes: SamplePlanes, test: Option<Redundan
 fn output(work: DrawWork<'_>, reflects: bool) -> Output {
     let visibility = reflects && work.lighting.is_traced();
     Output { sums: SumPlanes { light_count: work.scene.light_count, visibility }, ..Output::default() }
-}
-
-/// Runs of cameras, bounded in number and pixels; at least one camera each.
-fn batches(cameras: &[PinholeCamera], most_pixels: usize) -> impl Iterator<Item = &[PinholeCamera]> {
-    let mut rest = cameras;
-    std::iter::from_fn(move || {
-        let mut pixels = 0;
-        let fits = |camera: &&PinholeCamera| {
-            pixels += camera.pixel_count();
-            pixels <= most_pixels
-        };
-        let count = rest.iter().take(CAMERAS_A_SUBMISSION).take_while(fits).count().max(1).min(rest.len());
-        let (batch, others) = rest.split_at(count);
-        rest = others;
-        (!batch.is_empty()).then_some(batch)
-    })
 }

@@ -41,6 +41,17 @@ impl Light {
         self.from_sample(point_in_world, Vec2::splat(0.5))
     }
 
+    /// Returns whether the light casts soft shadows.
+    #[must_use]
+    pub fn has_extent(&self) -> bool {
+        match *self {
+            Self::Directional { angular_radius_rad: extent, .. }
+            | Self::Point { radius_m: extent, .. }
+            | Self::Spot { radius_m: extent, .. } => extent > 0.0,
+            Self::Rectangle { .. } => true,
+        }
+    }
+
     /// Unoccluded light from one point of the light. Its mean over `place` in the unit square is the whole light's.
     #[must_use]
     pub fn from_sample(&self, point_in_world: Vec3, place: Vec2) -> Incident {

@@ -113,7 +113,7 @@ impl RayScene {
 
     fn moved_to<'s>(&self, scene_time_s: f32, state: &'s mut Option<Built>) -> Result<&'s Built, GpuError> {
         let next = match state.take() {
-            Some(built) if !self.flat.is_animated() || built.scene_time_s == scene_time_s => built,
+            Some(built) if self.flat.wind.is_none() || built.scene_time_s == scene_time_s => built,
             // Whichever took less time when it was last done.
             Some(built) if built.last_refit.is_none_or(|refit| refit < built.last_build) => {
                 self.refitted(built, scene_time_s)?
