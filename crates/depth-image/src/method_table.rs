@@ -56,6 +56,48 @@ pub fn method_help<M>(table: &[NamedMethod<M>]) -> String {
     table.iter().map(row).collect::<Vec<_>>().join("; ")
 }
 
+/// Gives an enum of methods the texts of `METHODS` beside it: its default, its help, parsing with an error of its own, and
+/// printing. The enum has a `setting`, the setting as users spell it; `None` where the name alone says it.
+#[macro_export]
+macro_rules! named_methods {
+    ($method:ident, $unknown:ident, $kind:literal) => {
+        impl Default for $method {
+            fn default() -> Self {
+                METHODS[0].method
+            }
+        }
+
+        impl $method {
+            /// The text of `--help` on all methods.
+            #[must_use]
+            pub fn help() -> String {
+                $crate::method_help(&METHODS)
+            }
+        }
+
+        /// The text names no method, or gives a setting that the method does not take.
+        #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+        #[error("unknown {kind} {0:?}, expected {forms}", kind = $kind, forms = $crate::method_forms(&METHODS))]
+        pub struct $unknown(String);
+
+        impl std::str::FromStr for $method {
+            type Err = $unknown;
+            fn from_str(text: &str) -> Result<Self, $unknown> {
+                $crate::method_named(&METHODS, text).ok_or_else(|| $unknown(text.to_owned()))
+            }
+        }
+
+        impl std::fmt::Display for $method {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                use std::mem::discriminant;
+                let row = METHODS.iter().find(|row| discriminant(&row.method) == discriminant(self));
+                f.write_str(row.map_or("", |row| row.name))?;
+                self.setting().map_or(Ok(()), |setting| write!(f, ":{setting}"))
+            }
+        }
+    };
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

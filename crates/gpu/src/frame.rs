@@ -2,7 +2,7 @@
 
 use std::{ops::Range, sync::mpsc, time::Instant};
 
-use wgpu::BufferUsages;
+use wgpu::{BufferUsages, LoadOp, Operations, RenderPassColorAttachment, RenderPassDepthStencilAttachment, StoreOp};
 
 use crate::{device::Gpu, error::GpuError, pool::PooledBuffer};
 
@@ -55,14 +55,29 @@ impl<'g> Frame<'g> {
         Self { gpu, encoder, timer, reads: Vec::new() }
     }
 
+    /// Begins a pass that draws over cleared targets. Depth is reversed: it is cleared to infinity.
+    pub fn begin_drawing(
+        &mut self,
+        label: &str,
+        colors: &[&wgpu::TextureView],
+        clear: wgpu::Color,
+        reversed_depth: &wgpu::TextureView,
+    ) -> wgpu::RenderPass<'_> {
+        let ops = Operations { load: LoadOp::Clear(clear), store: StoreOp::Store };
+        let color = |view| Some(RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops });
+        let depth_ops = Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Store });
+        let view = reversed_depth;
+        self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some(label),
+            color_attachments: &colors.iter().copied().map(color).collect::<Vec<_>>(),
+            depth_stencil_attachment: Some(RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }),
+            ..Default::default()
+        })
+    }
+
     /// Copies `range` (multiples of 4) of `source` to host memory that `host` lends.
     pub fn read_back(&mut self, source: &wgpu::Buffer, range: Range<u64>, host: PooledBuffer) -> Readback {
         self.encoder.copy_buffer_to_buffer(source, range.start, &host, 0, range.end - range.start);
-        self.read_host(host)
-    }
-
-    /// Hands over a host-visible buffer that other commands of this frame fill.
-    pub fn read_host(&mut self, host: PooledBuffer) -> Readback {
         self.reads.push(host);
         Readback(self.reads.len() - 1)
     }

@@ -4,25 +4,18 @@ use bytemuck::{Pod, Zeroable};
 use depth_image::{Highlight, Illumination, Light};
 use glam::Vec3;
 
-/// `Light` of `light.wgsl`.
+/// `Light` of `light.wgsl`, which says what its numbers are.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct GpuLight {
-    /// The middle; for parallel light, the unit vector towards it.
+pub(crate) struct GpuLight {
     pub middle_in_world: [f32; 3],
-    /// Parallel, round or a rectangle.
     pub kind: u32,
-    /// Intensity; radiance of a rectangle, irradiance of parallel light.
     pub color_linear: [f32; 3],
-    /// Radius in metres; for parallel light the tangent of the angular radius.
     pub extent: f32,
-    /// A spot's axis, away from the light; half an edge of a rectangle.
     pub axis_in_world: [f32; 3],
-    /// The cosine at which a spot's light ends; −1 for all other lights.
+    /// −1 for all lights but spots.
     pub outer_cosine: f32,
-    /// Half of the next edge of a rectangle.
     pub next_edge_in_world: [f32; 3],
-    /// From cosines beyond the outer one to a spot's share.
     pub cone_scale: f32,
 }
 
@@ -54,14 +47,16 @@ const NOTHING: GpuLight = GpuLight {
 
 impl From<&Light> for GpuLight {
     fn from(light: &Light) -> Self {
+        let round = |middle: Vec3, color: Vec3, extent: f32| Self {
+            middle_in_world: middle.to_array(),
+            color_linear: color.to_array(),
+            extent,
+            ..NOTHING
+        };
         match *light {
-            Light::Directional { towards_light_in_world, irradiance_linear, angular_radius_rad } => Self {
-                middle_in_world: towards_light_in_world.to_array(),
-                kind: PARALLEL,
-                color_linear: irradiance_linear.to_array(),
-                extent: angular_radius_rad.tan(),
-                ..NOTHING
-            },
+            Light::Directional { towards_light_in_world, irradiance_linear, angular_radius_rad } => {
+                Self { kind: PARALLEL, ..round(towards_light_in_world, irradiance_linear, angular_radius_rad.tan()) }
+            }
             Light::Point { position_in_world, intensity_linear, radius_m } => {
                 round(position_in_world, intensity_linear, radius_m)
             }
@@ -79,23 +74,12 @@ impl From<&Light> for GpuLight {
                 ..round(position_in_world, intensity_linear, radius_m)
             },
             Light::Rectangle { center_in_world, half_edges_in_world: [u, v], radiance_linear } => Self {
-                middle_in_world: center_in_world.to_array(),
                 kind: RECTANGLE,
-                color_linear: radiance_linear.to_array(),
                 axis_in_world: u.to_array(),
                 next_edge_in_world: v.to_array(),
-                ..NOTHING
+                ..round(center_in_world, radiance_linear, 0.0)
             },
         }
-    }
-}
-
-fn round(position_in_world: Vec3, intensity_linear: Vec3, radius_m: f32) -> GpuLight {
-    GpuLight {
-        middle_in_world: position_in_world.to_array(),
-        color_linear: intensity_linear.to_array(),
-        extent: radius_m,
-        ..NOTHING
     }
 }
 

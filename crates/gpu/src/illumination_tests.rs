@@ -15,8 +15,9 @@ use minijinja::context;
 use wgpu::BufferUsages;
 
 use crate::{
-    Binding, BufferPool, ComputePass, DevicePreference, DispatchSize, Frame, Gpu, GpuLight, Shader, Templates,
-    highlight_name, illumination::GpuIllumination, illumination_bytes, light_slots,
+    Binding, BufferPool, ComputePass, DevicePreference, DispatchSize, Frame, Gpu, Shader, Templates, highlight_name,
+    illumination::{GpuIllumination, GpuLight},
+    illumination_bytes, light_slots,
 };
 
 /// One question to the device.

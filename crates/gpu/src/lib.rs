@@ -14,17 +14,15 @@ mod illumination_tests;
 mod pool;
 mod shader;
 mod table;
-mod uniform;
 
 pub use device::{DevicePreference, Gpu};
 pub use error::{GpuError, ShaderError};
 pub use frame::{Frame, FrameResult, Readback, Submitted};
-pub use illumination::{GpuLight, highlight_name, illumination_bytes, light_slots};
+pub use illumination::{highlight_name, illumination_bytes, light_slots};
 pub use pool::{BufferPool, Lent, Pool, PooledBuffer};
 pub use shader::{
     Binding, ComputePass, DispatchSize, DrawPass, DrawState, DrawVariant, Pass, PassCache, ResourceTrait,
     ResourceTraits, Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, WgslLiteral, source, sources,
-    switches,
+    switches, uniform_elements, uniform_stride,
 };
 pub use table::{TABLE_WIDTH, Table, TablePool};
-pub use uniform::{uniform_elements, uniform_stride};

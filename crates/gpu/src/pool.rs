@@ -1,34 +1,31 @@
 //! Resources that live longer than one frame: making them each time costs more than many passes, and their memory a page
 //! fault for every 4 KiB where the device is a processor.
 
-use std::{
-    collections::VecDeque,
-    ops::Deref,
-    sync::{Arc, Weak},
-};
+use std::sync::{Arc, Weak};
+use std::{collections::VecDeque, ops::Deref};
 
 use parking_lot::Mutex;
+use wgpu::BufferUsages;
 
 use crate::device::Gpu;
 
 /// Items that nobody has; the one that came back last is at the end.
-type Free<K, T> = Mutex<VecDeque<(K, T)>>;
+struct Free<K, T> {
+    items: Mutex<VecDeque<(K, T)>>,
+    most: usize,
+}
 
 /// Lends items of a kind; they come back when dropped.
-pub struct Pool<K, T> {
-    free: Arc<Free<K, T>>,
-    most_free: usize,
-}
+pub struct Pool<K, T>(Arc<Free<K, T>>);
 
 /// An item on loan, with the contents of its last loan.
 pub struct Lent<K, T> {
     lent: Option<(K, T)>,
     home: Weak<Free<K, T>>,
-    most_free: usize,
 }
 
 /// A buffer's size and usage.
-pub type BufferKind = (u64, wgpu::BufferUsages);
+pub type BufferKind = (u64, BufferUsages);
 /// A buffer on loan.
 pub type PooledBuffer = Lent<BufferKind, wgpu::Buffer>;
 
@@ -42,7 +39,7 @@ impl<K, T> Pool<K, T> {
     /// A pool that keeps at most `most_free` items that nobody has; the one that came back first goes first.
     #[must_use]
     pub fn keeping(most_free: usize) -> Self {
-        Self { free: Arc::default(), most_free }
+        Self(Arc::new(Free { items: Mutex::default(), most: most_free }))
     }
 }
 
@@ -51,14 +48,14 @@ impl<K: PartialEq, T> Pool<K, T> {
     #[must_use]
     pub fn lend(&self, kind: K, make: impl FnOnce(&K) -> T) -> Lent<K, T> {
         let kept = {
-            let mut free = self.free.lock();
+            let mut free = self.0.items.lock();
             free.iter().rposition(|(other, _)| *other == kind).and_then(|at| free.remove(at))
         };
         let lent = kept.unwrap_or_else(|| {
             let made = make(&kind);
             (kind, made)
         });
-        Lent { lent: Some(lent), home: Arc::downgrade(&self.free), most_free: self.most_free }
+        Lent { lent: Some(lent), home: Arc::downgrade(&self.0) }
     }
 }
 
@@ -84,9 +81,9 @@ impl<K, T> Deref for Lent<K, T> {
 impl<K, T> Drop for Lent<K, T> {
     fn drop(&mut self) {
         let (Some(home), Some(lent)) = (self.home.upgrade(), self.lent.take()) else { return };
-        let mut free = home.lock();
+        let mut free = home.items.lock();
         free.push_back(lent);
-        while free.len() > self.most_free {
+        if free.len() > home.most {
             free.pop_front();
         }
     }
@@ -99,9 +96,7 @@ impl BufferPool {
         Self { gpu: gpu.clone(), buffers: Pool::keeping(usize::MAX) }
     }
 
-    /// A buffer of at least `bytes`.
-    #[must_use]
-    pub fn lend(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> PooledBuffer {
+    fn lend(&self, label: &str, bytes: u64, usage: BufferUsages) -> PooledBuffer {
         let size = bytes.max(256).next_power_of_two().min(bytes.max(256).next_multiple_of(1 << 22));
         self.buffers.lend((size, usage), |_| self.gpu.buffer(label, size, usage))
     }
@@ -109,17 +104,13 @@ impl BufferPool {
     /// A device buffer that shaders write and copies read.
     #[must_use]
     pub fn lend_storage(&self, label: &str, bytes: u64) -> PooledBuffer {
-        self.lend(
-            label,
-            bytes,
-            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
-        )
+        self.lend(label, bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST)
     }
 
     /// A host-visible buffer to read back into.
     #[must_use]
     pub fn lend_host(&self, label: &str, bytes: u64) -> PooledBuffer {
-        self.lend(label, bytes, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST)
+        self.lend(label, bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST)
     }
 }
 

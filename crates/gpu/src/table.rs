@@ -45,7 +45,7 @@ struct Staging {
 }
 
 impl Table {
-    /// A table that no pool keeps. Each element takes whole texels of `format`.
+    /// A table that no pool keeps. The elements take whole texels of `format`.
     ///
     /// # Errors
     /// When the device has no texture of that size.
@@ -86,7 +86,7 @@ impl TablePool {
         Self { gpu: gpu.clone(), textures: Pool::keeping(most_free), staging: Mutex::new(staging) }
     }
 
-    /// A table of elements, each of whole texels of `format`.
+    /// A table of elements, which take whole texels of `format`.
     ///
     /// # Errors
     /// When the device has no texture of that size, or is lost.

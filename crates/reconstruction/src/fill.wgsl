@@ -2,14 +2,8 @@
 // behind what occluded it. They stay marked as filled.
 {% include "color.wgsl" %}
 {% include "pixel_list.wgsl" %}
+{% include "view_work.wgsl" %}
 
-struct FillWork {
-    size_px: vec2u,
-    first_pixel: u32,
-    number: u32,
-}
-
-@group(0) var<uniform> work: FillWork;
 @group(0) var<storage, read_write> srgb8: array<u32>;
 @group(0) var<storage, read_write> inverse_depth: array<f32>;
 @group(0) var<storage, read> provenance: array<u32>;
@@ -20,8 +14,8 @@ struct Neighbour { inverse_depth: f32, color_linear: vec3f, weight: f32 }
 fn known_towards(origin: vec2i, towards: vec2i, first: u32) -> Neighbour {
     for (var i = 1; i <= REACH_PX; i++) {
         let at = origin + towards * i;
-        if any(at < vec2i(0)) || any(at >= vec2i(work.size_px)) { break; }
-        let index = first + u32(at.y) * work.size_px.x + u32(at.x);
+        if any(at < vec2i(0)) || any(at >= vec2i(work.view.size_px)) { break; }
+        let index = first + u32(at.y) * work.view.size_px.x + u32(at.x);
         if (provenance[index] & 0xffu) != PROVENANCE_FILLED {
             let color = linear_from_srgb(unpack4x8unorm(srgb8[index]).rgb);
             return Neighbour(inverse_depth[index], color, 1.0 / (f32(i) * length(vec2f(towards))));
@@ -32,10 +26,10 @@ fn known_towards(origin: vec2i, towards: vec2i, first: u32) -> Neighbour {
 
 @compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= lists[work.number].count { return; }
-    let first = work.first_pixel;
+    if id.x >= lists[work.view.number].count { return; }
+    let first = work.view.first_pixel;
     let index = listed_pixels[first + id.x];
-    let origin = vec2i(vec2u((index - first) % work.size_px.x, (index - first) / work.size_px.x));
+    let origin = vec2i(vec2u((index - first) % work.view.size_px.x, (index - first) / work.view.size_px.x));
     var farthest = 3.0e38;
 {% for d in DIRECTIONS %}
     let n{{ loop.index0 }} = known_towards(origin, vec2i({{ d[0] }}, {{ d[1] }}), first);

@@ -18,17 +18,11 @@ pub struct Statistics {
 /// A submitted batch.
 pub(crate) struct InFlight<'g> {
     submitted: Submitted<'g>,
-    reads: Reads,
+    srgb8: Readback,
+    /// Inverse depths, provenance and fetches.
+    others: [Option<Readback>; 3],
     /// Lent until the device is done with it.
     batch: Batch,
-}
-
-/// A read-back of each plane.
-struct Reads {
-    srgb8: Readback,
-    inverse_depth_per_m: Option<Readback>,
-    provenance: Option<Readback>,
-    fetches: Option<Readback>,
 }
 
 impl<'g> InFlight<'g> {
@@ -38,25 +32,23 @@ impl<'g> InFlight<'g> {
         let bytes = batch.plane_bytes;
         let mut read =
             |plane: &PooledBuffer| frame.read_back(plane, 0..bytes, device.buffers.lend_host("view read-back", bytes));
-        let reads = Reads {
-            srgb8: read(&batch.srgb8),
-            inverse_depth_per_m: planes.inverse_depth.then(|| read(&batch.inverse_depth_per_m)),
-            provenance: planes.provenance.then(|| read(&batch.provenance)),
-            fetches: batch.fetches.as_ref().map(read),
-        };
-        Self { submitted: frame.submit(), reads, batch }
+        let srgb8 = read(&batch.srgb8);
+        let inverse_depth = planes.inverse_depth.then_some(&batch.inverse_depth_per_m);
+        let provenance = planes.provenance.then_some(&batch.provenance);
+        let others = [inverse_depth, provenance, batch.fetches.as_ref()].map(|plane| plane.map(&mut read));
+        Self { submitted: frame.submit(), srgb8, others, batch }
     }
 
     /// Waits, and appends the batch's views. Fetches are added up over views.
     pub fn finish(self, views: &mut Vec<View>, statistics: &mut Statistics) -> Result<(), ReconstructionError> {
-        let Self { submitted, reads, batch } = self;
+        let Self { submitted, srgb8, others: [inverse_depth, provenance, fetches], batch } = self;
         let result = submitted.wait()?;
         statistics.device_s += result.device_s;
         let planes = |readback: Readback| each_view(&result, readback, &batch, <[u32]>::to_vec);
-        let rgb = each_view(&result, reads.srgb8, &batch, rgb_bytes)?;
-        let mut depths = reads.inverse_depth_per_m.map(planes).transpose()?.unwrap_or_default().into_iter();
-        let mut provenances = reads.provenance.map(planes).transpose()?.unwrap_or_default().into_iter();
-        if let Some(readback) = reads.fetches {
+        let rgb = each_view(&result, srgb8, &batch, rgb_bytes)?;
+        let mut depths = inverse_depth.map(planes).transpose()?.unwrap_or_default().into_iter();
+        let mut provenances = provenance.map(planes).transpose()?.unwrap_or_default().into_iter();
+        if let Some(readback) = fetches {
             let sums = each_view(&result, readback, &batch, |words| words.iter().map(|&n| f64::from(n)).sum::<f64>())?;
             let pixels = f64::from(batch.size_px.element_product());
             *statistics.fetches_per_ray.get_or_insert(0.0) += sums.iter().sum::<f64>() / pixels;
@@ -84,9 +76,6 @@ fn each_view<T>(
 
 fn rgb_bytes(rgba: &[u32]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(rgba.len() * 3);
-    bytes.extend(rgba.iter().flat_map(|word| {
-        let [r, g, b, _] = word.to_le_bytes();
-        [r, g, b]
-    }));
+    rgba.iter().for_each(|word| bytes.extend_from_slice(&word.to_le_bytes()[..3]));
     bytes
 }

@@ -6,7 +6,6 @@
 
 mod device;
 mod error;
-mod error_bound;
 mod fill;
 mod in_flight;
 #[cfg(test)]
@@ -18,11 +17,9 @@ mod quads;
 mod reconstructor;
 mod recording;
 mod reflectors;
-mod required_planes;
 mod sample_set;
 #[cfg(feature = "scalar")]
 pub mod scalar;
-mod set_description;
 mod shaders;
 mod specular;
 mod surface;
@@ -30,14 +27,11 @@ mod tile_start;
 mod view_work;
 
 pub use error::ReconstructionError;
-pub use error_bound::ErrorBound;
 pub use in_flight::Statistics;
 pub use methods::{METHODS, ReconstructionMethod, UnknownMethod};
-pub use pyramid::{CodedDepth, Pyramid};
-pub use quads::{MeshStatistics, Quad};
+pub use pyramid::CodedDepth;
+pub use quads::{ErrorBound, MeshStatistics, Quad, RequiredPlanes};
 pub use reconstructor::Reconstructor;
-pub use required_planes::RequiredPlanes;
-pub use sample_set::SampleSet;
-pub use set_description::SetDescription;
+pub use sample_set::{SampleSet, SetDescription};
 pub use shaders::{shader_sources, shaders, templates};
 pub use view_work::MAX_SAMPLE_CAMERAS;

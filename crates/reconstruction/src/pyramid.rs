@@ -3,9 +3,9 @@
 use depth_image::{Camera, DepthImage};
 
 /// Code of a texel without a sample.
-pub const HOLE_CODE: u16 = 0;
+pub(crate) const HOLE_CODE: u16 = 0;
 /// Code of a texel whose ray meets nothing: farther than every sample.
-pub const BACKGROUND_CODE: u16 = 1;
+pub(crate) const BACKGROUND_CODE: u16 = 1;
 const FIRST_CODE: f32 = 2.0;
 const LAST_CODE: f32 = 32_767.0;
 
@@ -62,20 +62,12 @@ impl CodedDepth {
     pub(crate) fn in_set(image: &DepthImage, among_holes: bool) -> Self {
         let mut depth = Self::of(image);
         if among_holes {
-            let uncertain = std::mem::take(&mut depth.uncertain);
-            let marks = uncertain.iter().copied().chain(std::iter::repeat(false));
+            let marks = depth.uncertain.iter().copied().chain(std::iter::repeat(false));
             for (code, mark) in depth.codes.iter_mut().zip(marks).filter(|(code, _)| **code > BACKGROUND_CODE) {
                 *code = (*code & !1) | u16::from(mark);
             }
-            depth.uncertain = uncertain;
         }
         depth
-    }
-
-    /// See [`CodedDepth::uncertain`].
-    pub(crate) fn is_uncertain(&self, x: u32, y: u32) -> bool {
-        let (x, y) = (x.min(self.size_px[0] - 1), y.min(self.size_px[1] - 1));
-        !self.uncertain.is_empty() && self.uncertain[(y * self.size_px[0] + x) as usize]
     }
 
     /// How far the farthest sample may lie from where its code puts it, and half as much again for rounding.
@@ -89,8 +81,7 @@ impl CodedDepth {
     /// Two words for each texel and the cell to its lower right, row by row. They are the codes of the cell's upper and of
     /// its lower corners, left in the low half and right in the high half. The highest bit of the first says that the cell is
     /// connected; that of the second, that some corner is uncertain. Bit 15 of the first says that the texel is uncertain.
-    #[must_use]
-    pub fn cell_words(&self) -> Vec<[u32; 2]> {
+    pub(crate) fn cell_words(&self) -> Vec<[u32; 2]> {
         let pair = |left: u16, right: u16| u32::from(left) | u32::from(right) << 16;
         let [columns, rows] = self.size_px.map(|side| side as usize);
         let mut words = Vec::with_capacity(columns * rows);
@@ -109,11 +100,25 @@ impl CodedDepth {
         words
     }
 
-    /// The code of a texel; positions beyond the border give the border's.
-    #[must_use]
-    pub fn at(&self, x: u32, y: u32) -> u16 {
+    /// The place of a texel; of positions beyond the border, that of the border's.
+    fn index(&self, x: u32, y: u32) -> usize {
         let (x, y) = (x.min(self.size_px[0] - 1), y.min(self.size_px[1] - 1));
-        self.codes[(y * self.size_px[0] + x) as usize]
+        (y * self.size_px[0] + x) as usize
+    }
+
+    pub(crate) fn at(&self, x: u32, y: u32) -> u16 {
+        self.codes[self.index(x, y)]
+    }
+
+    /// See [`CodedDepth::uncertain`].
+    pub(crate) fn is_uncertain(&self, x: u32, y: u32) -> bool {
+        self.uncertain.get(self.index(x, y)) == Some(&true)
+    }
+
+    /// The range of a texel; an uncertain one may be anything.
+    fn range(&self, x: u32, y: u32) -> u32 {
+        let code = u32::from(self.at(x, y));
+        if self.is_uncertain(x, y) || code == u32::from(HOLE_CODE) { 0x0000_ffff } else { code << 16 | code }
     }
 }
 
@@ -189,8 +194,7 @@ fn is_one_surface(plane: &[f32], index: usize, stride: usize, place: usize, coun
 ///
 /// A word of level `n` holds the nearest code (low) and the farthest (high) of the corners of 2ⁿ × 2ⁿ cells. A hole
 /// among them may be anything: nearest 65535, farthest 0.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Pyramid {
+pub(crate) struct Pyramid {
     /// The sides of level 0.
     pub log2_sides: [u32; 2],
     /// Level after level, from level 1.
@@ -198,25 +202,29 @@ pub struct Pyramid {
 }
 
 impl Pyramid {
-    /// Builds all levels.
-    #[must_use]
     pub fn of(depth: &CodedDepth) -> Self {
         let log2_sides = depth.size_px.map(|side| side.max(2).next_power_of_two().ilog2());
-        let mut pyramid = Self { log2_sides, words: vec![0; Self::word_count(log2_sides)] };
-        pyramid.build_first_level(depth);
-        (2..=log2_sides[0].min(log2_sides[1])).for_each(|level| pyramid.build_level(level));
-        pyramid
+        let mut words = Vec::with_capacity(Self::word_count(log2_sides));
+        words.extend(nodes(log2_sides, 1).map(|(x, y)| corner_range(depth, 2 * x as u32, 2 * y as u32)));
+        for level in 2..=log2_sides[0].min(log2_sides[1]) {
+            let below = Self::level_begin(log2_sides, level - 1);
+            let columns = 2usize << (log2_sides[0] - level);
+            for (x, y) in nodes(log2_sides, level) {
+                let upper = below + 2 * y * columns + 2 * x;
+                let children = [upper, upper + 1, upper + columns, upper + columns + 1];
+                words.push(children.map(|child| words[child]).into_iter().fold(NOTHING, join));
+            }
+        }
+        Self { log2_sides, words }
     }
 
     /// Words of all levels of padded sides.
-    #[must_use]
     pub fn word_count(log2_sides: [u32; 2]) -> usize {
         let [short, long] = [log2_sides[0].min(log2_sides[1]), log2_sides[0].max(log2_sides[1])];
         Self::level_begin(log2_sides, short) + (1 << (long - short))
     }
 
     /// Where a level from 1 on begins; the shaders' formula.
-    #[must_use]
     pub fn level_begin(log2_sides: [u32; 2], level: u32) -> usize {
         let finest = 1usize << (log2_sides[0] + log2_sides[1] - 2);
         (finest - (finest >> (2 * (level - 1)))) / 3 * 4
@@ -224,63 +232,38 @@ impl Pyramid {
 
     /// Nearest codes of 2 × 2 nodes each, at the places of the nodes: what a disc's footprint needs, in one
     /// load.
-    #[must_use]
     pub fn wide_words(&self) -> Vec<u32> {
-        let mut wide = vec![0; self.words.len()];
+        let mut wide = Vec::with_capacity(self.words.len());
         for level in 1..=self.log2_sides[0].min(self.log2_sides[1]) {
             let begin = Self::level_begin(self.log2_sides, level);
-            let columns = 1usize << (self.log2_sides[0] - level);
-            let rows = 1usize << (self.log2_sides[1] - level);
+            let [columns, rows] = self.log2_sides.map(|side| 1usize << (side - level));
             let nearest =
                 |x: usize, y: usize| self.words[begin + y.min(rows - 1) * columns + x.min(columns - 1)] & 0xffff;
-            for (x, y) in (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y))) {
-                let four = [nearest(x, y), nearest(x + 1, y), nearest(x, y + 1), nearest(x + 1, y + 1)];
-                wide[begin + y * columns + x] = four.into_iter().fold(0, u32::max);
-            }
+            wide.extend(
+                nodes(self.log2_sides, level).map(|(x, y)| {
+                    nearest(x, y).max(nearest(x + 1, y)).max(nearest(x, y + 1)).max(nearest(x + 1, y + 1))
+                }),
+            );
         }
         wide
     }
+}
 
-    fn build_first_level(&mut self, depth: &CodedDepth) {
-        let begin = Self::level_begin(self.log2_sides, 1);
-        let columns = 1u32 << (self.log2_sides[0] - 1);
-        let rows = 1u32 << (self.log2_sides[1] - 1);
-        for y in 0..rows {
-            for x in 0..columns {
-                let inside = 2 * x < depth.size_px[0] && 2 * y < depth.size_px[1];
-                self.words[begin + (y * columns + x) as usize] =
-                    if inside { corner_range(depth, 2 * x, 2 * y) } else { NOTHING };
-            }
-        }
-    }
-
-    fn build_level(&mut self, level: u32) {
-        let below = Self::level_begin(self.log2_sides, level - 1);
-        let begin = Self::level_begin(self.log2_sides, level);
-        let columns = 1usize << (self.log2_sides[0] - level);
-        let rows = 1usize << (self.log2_sides[1] - level);
-        let (finer, coarser) = self.words.split_at_mut(begin);
-        for y in 0..rows {
-            for x in 0..columns {
-                let child = |i: usize, j: usize| finer[below + (2 * y + j) * columns * 2 + 2 * x + i];
-                coarser[y * columns + x] = join(join(child(0, 0), child(1, 0)), join(child(0, 1), child(1, 1)));
-            }
-        }
-    }
+/// The columns and rows of a level's nodes, row by row.
+fn nodes(log2_sides: [u32; 2], level: u32) -> impl Iterator<Item = (usize, usize)> {
+    let [columns, rows] = log2_sides.map(|side| 1usize << (side - level));
+    (0..rows).flat_map(move |y| (0..columns).map(move |x| (x, y)))
 }
 
 /// The range of no corner at all.
 const NOTHING: u32 = 0xffff_0000;
 
-/// The range of the 3 × 3 corners of 2 × 2 cells.
+/// The range of the 3 × 3 corners of 2 × 2 cells; of none beyond the image.
 fn corner_range(depth: &CodedDepth, x: u32, y: u32) -> u32 {
-    let corners = (0..9).map(|i| (x + i % 3, y + i / 3));
-    corners.map(|(x, y)| range_of(depth.at(x, y), depth.is_uncertain(x, y))).fold(NOTHING, join)
-}
-
-/// The range of one texel; an uncertain texel may be anything.
-fn range_of(code: u16, uncertain: bool) -> u32 {
-    if uncertain || code == HOLE_CODE { 0x0000_ffff } else { u32::from(code) << 16 | u32::from(code) }
+    if x >= depth.size_px[0] || y >= depth.size_px[1] {
+        return NOTHING;
+    }
+    (0..9).map(|i| depth.range(x + i % 3, y + i / 3)).fold(NOTHING, join)
 }
 
 fn join(a: u32, b: u32) -> u32 {

@@ -8,10 +8,8 @@ use gpu::{BufferPool, Gpu, PassCache, TablePool};
 use crate::in_flight::{InFlight, Statistics};
 use crate::quads::{self, MeshStatistics, Quad, QuadDrawing};
 use crate::recording::{Recording, batches};
-use crate::sample_set::{MAX_TABLES, SampleSet};
-use crate::{
-    device::Device, error::ReconstructionError, methods::ReconstructionMethod, set_description::SetDescription,
-};
+use crate::sample_set::{MAX_TABLES, SampleSet, SetDescription};
+use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
 use crate::{fill, shaders::templates, specular, tile_start};
 
 /// Passes for every method and number of cameras that has been asked for.

@@ -5,7 +5,7 @@ use glam::{UVec2, Vec3};
 use gpu::{Binding, ComputePass, DispatchSize, Frame, PooledBuffer, uniform_elements};
 use wgpu::BufferUsages;
 
-use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork};
+use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, SetVariant};
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList, sample_set::SampleSet};
 
 /// Bounds the memory of a batch: 12 bytes a pixel on the device, up to as much again on the host.
@@ -38,10 +38,7 @@ pub(crate) struct Batch {
 }
 
 impl<'r> Recording<'r> {
-    /// Lends the planes.
-    ///
-    /// # Errors
-    /// Views beyond the device's limits.
+    /// Lends the planes; fails for views beyond the device's limits.
     pub fn begin(
         device: &'r Device,
         set: &'r SampleSet,
@@ -68,6 +65,11 @@ impl<'r> Recording<'r> {
             frame.encoder.clear_buffer(fetches, 0, None);
         }
         Ok(Self { device, set, frame, batch })
+    }
+
+    /// The switches of passes that find surfaces.
+    pub fn variant(&self) -> SetVariant {
+        SetVariant { count_fetches: self.batch.fetches.is_some(), ..self.set.variant() }
     }
 
     /// The resources of `view_work.wgsl`.

@@ -4,7 +4,7 @@ use depth_image::{DepthImage, Highlight, Illumination, SpecularPlanes};
 use gpu::{GpuError, Table, TablePool, illumination_bytes};
 use wgpu::{BufferUsages, TextureFormat};
 
-use crate::{error::ReconstructionError, set_description::SetDescription};
+use crate::error::ReconstructionError;
 
 /// A normal and a reflector stand before the words of visibility.
 const WORDS_BEFORE_VISIBILITY: usize = 2;
@@ -24,17 +24,18 @@ impl Reflectors {
     pub fn upload(
         tables: &TablePool,
         images: &[DepthImage],
-        set: &SetDescription<'_>,
+        illumination: &Illumination,
+        highlight: Option<Highlight>,
     ) -> Result<Option<Self>, ReconstructionError> {
-        check(images, set.illumination)?;
-        let Some(highlight) = set.highlight.filter(|_| images.iter().any(reflects)) else { return Ok(None) };
-        let (gpu, bytes) = (&tables.gpu, illumination_bytes(set.illumination));
+        check(images, illumination)?;
+        let Some(highlight) = highlight.filter(|_| images.iter().any(reflects)) else { return Ok(None) };
+        let (gpu, bytes) = (&tables.gpu, illumination_bytes(illumination));
         let limit = gpu.device.limits().max_uniform_buffer_binding_size;
         GpuError::check_limit("the scene's lights (bytes)", bytes.len() as u64, limit)?;
         let visibility_words = visibility_words(images);
         Ok(Some(Self {
             highlight,
-            lights: set.illumination.lights.len(),
+            lights: illumination.lights.len(),
             visibility_words,
             samples: tables.upload("reflectors", TextureFormat::Rgba32Uint, &sample_words(images, visibility_words))?,
             illumination: gpu.buffer_with("illumination", &bytes, BufferUsages::UNIFORM),
@@ -72,26 +73,22 @@ fn visibility_words(images: &[DepthImage]) -> usize {
 }
 
 /// Sample after sample, image after image; those of images without highlights reflect nothing.
-fn sample_words(images: &[DepthImage], visibility_words: usize) -> Vec<[u32; 4]> {
-    let stride = sample_texels(visibility_words);
-    let samples: usize = images.iter().map(|image| image.color_rgb9e5.len()).sum();
-    let mut texels = vec![[0; 4]; samples * stride];
-    let mut rest = texels.as_mut_slice();
+fn sample_words(images: &[DepthImage], visibility_words: usize) -> Vec<u32> {
+    let stride = 4 * sample_texels(visibility_words);
+    let samples = |image: &DepthImage| image.color_rgb9e5.len();
+    let mut words = Vec::with_capacity(images.iter().map(samples).sum::<usize>() * stride);
     for image in images {
-        let (own, others) = rest.split_at_mut(image.color_rgb9e5.len() * stride);
-        write_image(own.as_flattened_mut(), 4 * stride, image, visibility_words);
-        rest = others;
-    }
-    texels
-}
-
-fn write_image(words: &mut [u32], stride: usize, image: &DepthImage, visibility_words: usize) {
-    let (Some(planes), Some(normals)) = (&image.specular, &image.normal_oct16) else { return };
-    for (index, sample) in words.chunks_mut(stride).enumerate() {
-        sample[0] = normals[index];
-        sample[1] = planes.reflectance_srgb8_roughness8[index];
-        for (word, visible) in sample[WORDS_BEFORE_VISIBILITY..][..visibility_words].iter_mut().enumerate() {
-            *visible = planes.visibility8.get(word).map_or(ALL_VISIBLE, |plane| plane[index]);
+        let (Some(planes), Some(normals)) = (&image.specular, &image.normal_oct16) else {
+            words.resize(words.len() + samples(image) * stride, 0);
+            continue;
+        };
+        for (index, (&normal, &reflector)) in normals.iter().zip(&planes.reflectance_srgb8_roughness8).enumerate() {
+            let end = words.len() + stride;
+            words.extend([normal, reflector]);
+            let visible = |word: usize| planes.visibility8.get(word).map_or(ALL_VISIBLE, |plane| plane[index]);
+            words.extend((0..visibility_words).map(visible));
+            words.resize(end, 0);
         }
     }
+    words
 }

@@ -1,19 +1,15 @@
 //! A sample set on the device.
 
-use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, srgb8_from_linear};
+use bytemuck::Zeroable as _;
+use depth_image::{Aabb, Camera, DepthImage, Highlight, Illumination, PinholeCamera, srgb8_from_linear};
 use glam::{Vec2, Vec3};
 use gpu::{Table, TablePool};
 use rayon::prelude::*;
 use wgpu::TextureFormat;
 
-use crate::{
-    error::ReconstructionError,
-    pyramid::{CodedDepth, Pyramid, cell_row, is_among_holes},
-    quads::SetMeshes,
-    reflectors::Reflectors,
-    set_description::SetDescription,
-    view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant},
-};
+use crate::pyramid::{CodedDepth, Pyramid, cell_row, is_among_holes};
+use crate::view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant};
+use crate::{error::ReconstructionError, quads::SetMeshes, reflectors::Reflectors};
 
 /// Tables of one set.
 pub(crate) const MAX_TABLES: usize = 5;
@@ -21,6 +17,19 @@ pub(crate) const MAX_TABLES: usize = 5;
 /// The padding of the volume, in parts of its longest edge. All cameras must still enter a surface on the very face of the
 /// volume, although their samples of a slope are steps.
 pub(crate) const VOLUME_MARGIN: f32 = 0.005;
+
+/// The properties that all images of a sample set share.
+#[derive(Debug, Clone, Copy)]
+pub struct SetDescription<'a> {
+    /// Holds all geometry of the scene.
+    pub volume: Aabb,
+    /// The colour of pixels that show nothing.
+    pub background_linear: Vec3,
+    /// The scene's lights; they are seen in highlights only, since the samples' colours hold the rest.
+    pub illumination: &'a Illumination,
+    /// How surfaces reflect towards the viewer; `None` leaves highlights away, even where images have planes for them.
+    pub highlight: Option<Highlight>,
+}
 
 /// One complete sample set: what views are reconstructed from.
 pub struct SampleSet {
@@ -39,15 +48,13 @@ pub struct SampleSet {
 }
 
 impl SampleSet {
-    /// The switches of all shaders that read the set.
+    /// The switches of all shaders that read the set, without fetches.
     pub(crate) fn variant(&self) -> SetVariant {
-        SetVariant { cameras: self.cameras.len(), holes: self.uncertain.contains(&true) }
+        SetVariant { cameras: self.cameras.len(), holes: self.uncertain.contains(&true), count_fetches: false }
     }
 
-    /// Builds pyramids and uploads everything.
-    ///
-    /// # Errors
-    /// Too many images, planes or cameras that do not fit, or a set beyond the device's limits.
+    /// Builds pyramids and uploads everything. Fails for too many images, planes or cameras that do not fit, or a set
+    /// beyond the device's limits.
     pub(crate) fn upload(
         tables: &TablePool,
         images: &[DepthImage],
@@ -79,7 +86,7 @@ impl SampleSet {
             nodes: tables.upload("depth pyramids", TextureFormat::Rg32Uint, &nodes)?,
             cell_codes: tables.upload("cells", TextureFormat::Rg32Uint, &codes)?,
             cell_colors: tables.upload("sample colours", TextureFormat::Rgba32Uint, &colors)?,
-            reflectors: Reflectors::upload(tables, images, set)?,
+            reflectors: Reflectors::upload(tables, images, set.illumination, set.highlight)?,
             meshes: SetMeshes::upload(tables, images)?,
         })
     }
@@ -99,9 +106,21 @@ impl CodedImage {
         let depth = CodedDepth::in_set(image, among_holes);
         let pyramid = Pyramid::of(&depth);
         let Camera::Pinhole(camera) = &image.camera;
+        let gpu_camera = GpuSampleCamera {
+            homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world().map(|row| row.to_array()),
+            eye_in_world: camera.eye_in_world.to_array(),
+            code_scale: depth.scale,
+            cells: (camera.size_px.as_vec2() - 1.0).to_array(),
+            code_offset: depth.offset,
+            focal_px: camera.focal_px.min_element(),
+            log2_sides: pyramid.log2_sides,
+            width_px: camera.size_px.x,
+            stretch: stretch(camera),
+            ..GpuSampleCamera::zeroed()
+        };
         Self {
             uncertain: !depth.uncertain.is_empty(),
-            camera: sample_camera(camera, &depth, &pyramid),
+            camera: gpu_camera,
             nodes: pyramid.words.iter().zip(pyramid.wide_words()).map(|(&range, wide)| [range, wide]).collect(),
             cells: depth.cell_words(),
         }
@@ -137,25 +156,6 @@ fn node_count(images: &[DepthImage]) -> usize {
 /// One cell a texel.
 fn cell_count(images: &[DepthImage]) -> usize {
     images.iter().map(|image| image.color_rgb9e5.len()).sum()
-}
-
-/// A sample camera without its place in the set.
-fn sample_camera(camera: &PinholeCamera, depth: &CodedDepth, pyramid: &Pyramid) -> GpuSampleCamera {
-    GpuSampleCamera {
-        homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world().map(|row| row.to_array()),
-        eye_in_world: camera.eye_in_world.to_array(),
-        code_scale: depth.scale,
-        cells: (camera.size_px.as_vec2() - 1.0).to_array(),
-        code_offset: depth.offset,
-        focal_px: camera.focal_px.min_element(),
-        log2_sides: pyramid.log2_sides,
-        first_node: 0,
-        first_cell: 0,
-        width_px: camera.size_px.x,
-        stretch: stretch(camera),
-        mask: 0,
-        padding: 0,
-    }
 }
 
 /// `f √(1 + slope²)` at the corner farthest off the axis: a point that moves by r moves in the image by

@@ -36,7 +36,12 @@ impl ShaderVariant for Specular {
         let kinds = [Highlight::BlinnPhong, Highlight::Ggx].into_iter();
         let lit = kinds.flat_map(|highlight| lights.map(|(lights, words)| (highlight, lights, words)));
         lit.flat_map(|(highlight, lights, visibility_words)| {
-            SetVariant::all().into_iter().map(move |set| Self { set, highlight, lights, visibility_words })
+            SetVariant::all().into_iter().filter(|set| !set.count_fetches).map(move |set| Self {
+                set,
+                highlight,
+                lights,
+                visibility_words,
+            })
         })
         .collect()
     }

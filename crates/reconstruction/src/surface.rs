@@ -1,9 +1,8 @@
 //! The vote of all cameras on a point: `surface.wgsl`, the common part of passes that find surfaces.
 
 use gpu::{Binding, ShaderVariant};
-use minijinja::{Value, context};
 
-use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, view_work::SetVariant};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
 /// The surface's thickness, in texel footprints: the best of a sweep (docs/methods/joint_carve.md).
 pub(crate) const THICKNESS_FOOTPRINTS: f32 = 2.0;
@@ -19,29 +18,6 @@ pub(crate) const CARVING_SHARE: f32 = 0.999;
 pub(crate) const BORDER_PX: f32 = 8.0;
 /// Depth is known to half a code; a ray that reached a plane's very depth is still before it.
 pub(crate) const HALF_CODE: f32 = 0.5;
-
-/// Switches of shaders that include `surface.wgsl`.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct SurfaceVariant {
-    pub set: SetVariant,
-    /// Fetches are counted for each pixel.
-    pub count_fetches: bool,
-}
-
-impl SurfaceVariant {
-    pub fn of(recording: &Recording<'_>) -> Self {
-        Self { set: recording.set.variant(), count_fetches: recording.batch.fetches.is_some() }
-    }
-
-    pub fn context(self) -> Value {
-        context! { count_fetches => self.count_fetches, ..self.set.context() }
-    }
-
-    pub fn all() -> Vec<Self> {
-        let counted = |set: SetVariant| [false, true].map(|count_fetches| Self { set, count_fetches });
-        SetVariant::all().into_iter().flat_map(counted).collect()
-    }
-}
 
 /// Records a pass that finds surfaces, with its own resources: over listed pixels, or over all from where their tiles
 /// start. Gives the pixels that it leaves undecided.

@@ -52,6 +52,15 @@ fn write_pixel(index: u32, color_srgb8: u32, inverse_depth_per_m: f32, provenanc
 {% endif %}
 }
 
+// Writes the surface that was found at t, or what is where none was; `empty`: nothing is there.
+fn write_found(index: u32, found: bool, t: f32, color_linear: vec3f, camera_mask: u32, empty: bool) {
+    let missed = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, empty);
+    let provenance = select(missed, PROVENANCE_HIT | (camera_mask << 8u), found);
+    let color = select(work.background_srgb8, srgb8_from_linear(color_linear), found);
+    write_pixel(index, color, select(0.0, 1.0 / t, found), provenance);
+    if provenance == PROVENANCE_FILLED { leave_undecided(index); }
+}
+
 // The colours of a cell's corners, in their order.
 struct Colors { corners: array<vec3f, 4> }
 

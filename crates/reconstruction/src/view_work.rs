@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
-use gpu::{ResourceTrait, ResourceTraits};
+use gpu::{ResourceTrait, ResourceTraits, switches};
 use minijinja::{Value, context};
 
 /// Shaders name each camera; more would make them too long.
@@ -23,16 +23,19 @@ pub(crate) struct SetVariant {
     pub cameras: usize,
     /// Some texels of the set prove nothing of the space before them.
     pub holes: bool,
+    /// Fetches are counted for each pixel, by passes that find surfaces.
+    pub count_fetches: bool,
 }
 
 impl SetVariant {
     pub fn context(self) -> Value {
-        context! { cameras => self.cameras, holes => self.holes, count_fetches => false }
+        context! { cameras => self.cameras, holes => self.holes, count_fetches => self.count_fetches }
     }
 
     pub fn all() -> Vec<Self> {
         let counts = [1, 2, 4, MAX_SAMPLE_CAMERAS].into_iter();
-        counts.flat_map(|cameras| [false, true].map(|holes| Self { cameras, holes })).collect()
+        let each = |cameras| switches().map(move |[holes, count_fetches]| Self { cameras, holes, count_fetches });
+        counts.flat_map(each).collect()
     }
 }
 

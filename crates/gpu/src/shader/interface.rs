@@ -8,7 +8,27 @@ use naga::{
 };
 use wgpu::{BindingResource, BindingType, BufferBindingType, SamplerBindingType, ShaderStages, TextureFormat};
 
-use crate::{error::ShaderError, uniform::uniform_stride};
+use crate::error::ShaderError;
+
+/// Dynamic offsets are multiples of this on every device.
+const ALIGNMENT_BYTES: u32 = 256;
+
+/// The bytes from one element of a uniform to the next, where each dispatch or draw sees one at a dynamic offset.
+#[must_use]
+pub const fn uniform_stride(element_bytes: u32) -> u32 {
+    element_bytes.next_multiple_of(ALIGNMENT_BYTES)
+}
+
+/// Elements of one size, each at its dynamic offset.
+#[must_use]
+pub fn uniform_elements<E: AsRef<[u8]>>(elements: impl IntoIterator<Item = E>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for element in elements {
+        bytes.extend_from_slice(element.as_ref());
+        bytes.resize(bytes.len().next_multiple_of(ALIGNMENT_BYTES as usize), 0);
+    }
+    bytes
+}
 
 /// A resource, and the variable of a shader that it is bound to.
 #[derive(Debug, Clone)]
@@ -123,10 +143,7 @@ impl ShaderInterface {
         self.matched(group, bindings.iter().map(|binding| binding.name)).map(|_| ())
     }
 
-    /// The resources of a group that `names` are bound to, in their order.
-    ///
-    /// # Errors
-    /// A name that is missing, not in the group, or there twice.
+    /// The resources of a group that `names` are bound to, in their order; fails as [`ShaderInterface::check`] does.
     pub(crate) fn matched<'n>(
         &self,
         group: u32,

@@ -11,7 +11,7 @@ mod variant;
 pub use compiled::Shader;
 pub use compute_pass::{ComputePass, DispatchSize};
 pub use draw_pass::{DrawPass, DrawState, DrawVariant};
-pub use interface::{Binding, ResourceTrait, ResourceTraits, ShaderInterface};
+pub use interface::{Binding, ResourceTrait, ResourceTraits, ShaderInterface, uniform_elements, uniform_stride};
 pub use pass_cache::PassCache;
 pub use template::{Templates, WgslLiteral};
 pub use variant::{Pass, ShaderSource, ShaderVariant, source, sources, switches};

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use gpu::{Binding, shader_variant};
 
-use crate::quads::{self, Cut, Mesh, QuadVertices};
-use crate::{device::Device, error::ReconstructionError, error_bound::ErrorBound, sample_set::SampleSet};
+use crate::quads::{self, Cut, ErrorBound, Mesh, QuadVertices};
+use crate::{device::Device, error::ReconstructionError, sample_set::SampleSet};
 
 /// The greatest slope of a surface against a line of sight at a guessed corner: the tangent of 87.5°. Beyond, the
 /// corner runs to infinity.

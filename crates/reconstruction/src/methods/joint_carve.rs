@@ -6,8 +6,8 @@ use gpu::{ResourceTraits, ShaderVariant};
 use minijinja::{Value, context};
 
 use self::march::{MARCHES, March};
-use crate::surface::{self, SurfaceVariant};
-use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, view_work::ONE_VIEW};
+use crate::view_work::{ONE_VIEW, SetVariant};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, surface};
 
 pub(super) const MAX_STOP_LEVEL: u32 = 8;
 /// Moves of a ray. A ray that is not done by then wanders behind all that cameras see, and stays unknown. A surface that
@@ -23,7 +23,7 @@ pub(crate) const LEAST_MOVE: f32 = 1.00001;
 /// The switches of `joint_carve.wgsl`.
 #[derive(Debug)]
 pub(super) struct Carve {
-    surface: SurfaceVariant,
+    set: SetVariant,
     /// The pyramid level at which the search ends; 0 is exact.
     stop_level: u32,
 }
@@ -33,22 +33,22 @@ impl ShaderVariant for Carve {
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
-        context! { stop_level => self.stop_level, ..self.surface.context() }
+        context! { stop_level => self.stop_level, ..self.set.context() }
     }
 
     fn all() -> Vec<Self> {
-        let levels = |surface| [0, 1, MAX_STOP_LEVEL].map(|stop_level| Self { surface, stop_level });
-        SurfaceVariant::all().into_iter().flat_map(levels).collect()
+        let levels = |set| [0, 1, MAX_STOP_LEVEL].map(|stop_level| Self { set, stop_level });
+        SetVariant::all().into_iter().flat_map(levels).collect()
     }
 }
 
 /// Marches in the nearest cameras, one after another; what they leave is carved by all together. Gives the pixels that
 /// stay unknown.
 pub(super) fn record(recording: &mut Recording<'_>, stop_level: u32) -> Result<PixelList, ReconstructionError> {
-    let surface = SurfaceVariant::of(recording);
+    let set = recording.variant();
     let mut undecided = None;
     for camera in 0..MARCHES.min(recording.set.cameras.len()) {
-        undecided = Some(surface::record(recording, &March { surface, camera }, undecided.as_ref(), &[])?);
+        undecided = Some(surface::record(recording, &March { set, camera }, undecided.as_ref(), &[])?);
     }
-    surface::record(recording, &Carve { surface, stop_level }, undecided.as_ref(), &[])
+    surface::record(recording, &Carve { set, stop_level }, undecided.as_ref(), &[])
 }

@@ -203,16 +203,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         level = select(level, STOP_LEVEL, candidate);
         if hit { break; }
     }
-    finish(index, pixel.direction, t, hit, !hit && known && t >= span.far);
-}
-
-// Writes the pixel as all cameras together show the point found; `empty`: the whole way is proven free.
-fn finish(index: u32, direction: vec3f, t: f32, hit: bool, empty: bool) {
-    let blend = blend_two_best(work.view.eye_in_world + direction * t, direction);
-    let found = hit && blend.camera_mask != 0u;
-    let missed = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, empty);
-    let provenance = select(missed, PROVENANCE_HIT | (blend.camera_mask << 8u), found);
-    let color = select(work.background_srgb8, srgb8_from_linear(blend.color_linear), found);
-    write_pixel(index, color, select(0.0, 1.0 / t, found), provenance);
-    if provenance == PROVENANCE_FILLED { leave_undecided(index); }
+    // As all cameras together show the point found. Empty where the whole way is proven free.
+    let blend = blend_two_best(work.view.eye_in_world + pixel.direction * t, pixel.direction);
+    let empty = !hit && known && t >= span.far;
+    write_found(index, hit && blend.camera_mask != 0u, t, blend.color_linear, blend.camera_mask, empty);
 }

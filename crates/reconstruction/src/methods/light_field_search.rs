@@ -3,19 +3,19 @@
 use gpu::{Binding, shader_variant};
 use wgpu::BufferUsages;
 
-use crate::surface::{self, SurfaceVariant};
-use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, view_work::ONE_VIEW};
+use crate::view_work::{ONE_VIEW, SetVariant};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, surface};
 
 /// As in the paper.
 pub(super) const DEFAULT_STEPS: u32 = 100;
 pub(super) const MAX_STEPS: u32 = 65_536;
 pub(crate) const BISECTIONS: u32 = 8;
 
-shader_variant!(Search(SurfaceVariant), "light_field_search.wgsl", ONE_VIEW);
+shader_variant!(Search(SetVariant), "light_field_search.wgsl", ONE_VIEW);
 
 /// Gives the pixels that stay unknown.
 pub(super) fn record(recording: &mut Recording<'_>, steps: u32) -> Result<PixelList, ReconstructionError> {
     let steps = recording.device.gpu.buffer_with("steps", &[steps], BufferUsages::UNIFORM);
-    let search = Search(SurfaceVariant::of(recording));
+    let search = Search(recording.variant());
     surface::record(recording, &search, None, &[Binding::buffer("steps", &steps)])
 }

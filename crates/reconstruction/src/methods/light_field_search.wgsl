@@ -149,11 +149,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let rays = image_rays(pixel.direction);
     let found = search(rays, span, tile_start_m[pixel.tile]);
     let place = most_conservative(rays, found.t);
-    let color_linear = color_at(place);
     let hit = found.entered && place.mask != 0u;
-    let missed = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, found.never_unseen);
-    let provenance = select(missed, PROVENANCE_HIT | (place.mask << 8u), hit);
-    let color = select(work.background_srgb8, srgb8_from_linear(color_linear), hit);
-    write_pixel(pixel.index, color, select(0.0, 1.0 / found.t, hit), provenance);
-    if provenance == PROVENANCE_FILLED { leave_undecided(pixel.index); }
+    write_found(pixel.index, hit, found.t, color_at(place), place.mask, found.never_unseen);
 }

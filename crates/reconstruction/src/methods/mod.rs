@@ -8,18 +8,18 @@ pub(crate) mod joint_carve;
 pub(crate) mod light_field_search;
 mod mesh;
 
-use std::{fmt, mem::discriminant, str::FromStr, sync::Arc};
+use std::sync::Arc;
 
-use depth_image::{NamedMethod, Setting, method_forms, method_help, method_named};
+use depth_image::{NamedMethod, Setting, named_methods};
 use gpu::{ShaderError, ShaderSource, Templates, shader_sources, wgsl_constants, wgsl_files};
 
 use self::hybrid_mesh::GREATEST_SLOPE;
 use self::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL};
 use self::joint_carve::{BLIND_MOVE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_AMONG_HOLES, MAX_STOP_LEVEL};
 use self::light_field_search::{BISECTIONS, DEFAULT_STEPS, MAX_STEPS};
-use crate::quads::{self, CornerPlanes, Mesh as QuadMesh, QuadDrawing};
-use crate::{device::Device, error::ReconstructionError, error_bound::ErrorBound, pixel_list::PixelList};
-use crate::{recording::Recording, required_planes::RequiredPlanes, sample_set::SampleSet};
+use crate::quads::{self, CornerPlanes, ErrorBound, Mesh as QuadMesh, QuadDrawing, RequiredPlanes};
+use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
+use crate::{recording::Recording, sample_set::SampleSet};
 
 /// How views are found in depth images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -106,19 +106,9 @@ pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<Shad
     searches.chain(shader_sources!(templates, mesh::CutBetweenSamples, hybrid_mesh::CutTexels))
 }
 
-impl Default for ReconstructionMethod {
-    fn default() -> Self {
-        METHODS[0].method
-    }
-}
+named_methods!(ReconstructionMethod, UnknownMethod, "reconstruction method");
 
 impl ReconstructionMethod {
-    /// The text of `--help` on all methods.
-    #[must_use]
-    pub fn help() -> String {
-        method_help(&METHODS)
-    }
-
     /// Planes that sample images need beside colour and depth.
     #[must_use]
     pub fn required_planes(self) -> RequiredPlanes {
@@ -175,26 +165,6 @@ impl ReconstructionMethod {
             Mesh => None,
             HybridMesh { merged } => merged.map(|bound| bound.to_string()),
         }
-    }
-}
-
-/// The text names no method, or gives a setting that the method does not take.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown reconstruction method {0:?}, expected {forms}", forms = method_forms(&METHODS))]
-pub struct UnknownMethod(String);
-
-impl FromStr for ReconstructionMethod {
-    type Err = UnknownMethod;
-    fn from_str(text: &str) -> Result<Self, UnknownMethod> {
-        method_named(&METHODS, text).ok_or_else(|| UnknownMethod(text.to_owned()))
-    }
-}
-
-impl fmt::Display for ReconstructionMethod {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let row = METHODS.iter().find(|row| discriminant(&row.method) == discriminant(self));
-        f.write_str(row.map_or("", |row| row.name))?;
-        self.setting().map_or(Ok(()), |setting| write!(f, ":{setting}"))
     }
 }
 

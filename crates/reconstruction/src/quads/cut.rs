@@ -85,10 +85,8 @@ impl<'s> ImageCut<'s> {
             size_px: self.size_px.to_array(),
             first_sample: camera.first_cell,
             first_corner: planes.map_or(0, |planes| planes.first_corners[self.number]),
-            axis: 0,
-            bound_px: 0.0,
             chunks: self.chunks(),
-            segment: 0,
+            ..GpuCutWork::zeroed()
         }
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3, Vec4};
-use gpu::{Binding, DrawPass, DrawState, DrawVariant, Frame, Gpu, GpuError, Lent, PassCache, Pool, Templates};
+use gpu::{Binding, DrawPass, DrawState, DrawVariant, Gpu, GpuError, Lent, PassCache, Pool, Templates};
 use gpu::{shader_variant, uniform_elements, uniform_stride};
 use wgpu::{BufferUsages, TextureFormat, TextureUsages, TextureView, TextureViewDimension};
 
@@ -43,14 +43,14 @@ impl DrawVariant for DrawQuads {
     }
 }
 
+/// The size of views, and how many there are.
+type TargetKind = (UVec2, u32);
+
 /// Drawing passes, and the targets of the last batches of two sizes: most are alike.
 pub(crate) struct QuadDrawing {
     passes: PassCache<DrawPass>,
     targets: Pool<TargetKind, Targets>,
 }
-
-/// The size of views, and how many there are.
-type TargetKind = (UVec2, u32);
 
 /// The textures that views are drawn into, a layer each.
 pub(crate) struct Targets {
@@ -113,49 +113,22 @@ pub(super) fn record(
     mesh: &Mesh,
 ) -> Result<Lent<TargetKind, Targets>, ReconstructionError> {
     let gpu = &recording.device.gpu;
-    let pass = drawing.passes.get(&DrawQuads(mesh.cut.vertices))?;
+    let quads = drawing.passes.get(&DrawQuads(mesh.cut.vertices))?;
     let targets = drawing.targets(gpu, (recording.batch.size_px, recording.batch.cameras.len() as u32))?;
     let works = gpu.buffer_with("quads of views", &quad_works(recording), BufferUsages::UNIFORM);
-    let bound = pass.bind(0, [Binding::buffer("work", &works)])?;
-    for view in 0..recording.batch.cameras.len() {
-        draw_view(&mut recording.frame, &pass, &bound, mesh, (&targets, view));
+    let bound = quads.bind(0, [Binding::buffer("work", &works)])?;
+    let mut offsets = (0..).step_by(uniform_stride(size_of::<GpuQuadWork>() as u32) as usize);
+    for (samples, depth) in targets.samples.each.iter().zip(&targets.depth.each) {
+        let mut pass = recording.frame.begin_drawing("quads", &[samples], wgpu::Color::TRANSPARENT, depth);
+        pass.set_pipeline(quads.pipeline());
+        for (image, offset) in mesh.images.iter().zip(&mut offsets) {
+            pass.set_bind_group(0, &bound, &[offset]);
+            pass.set_vertex_buffer(0, image.inverse_depths.slice(..));
+            pass.set_index_buffer(image.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed_indirect(&image.draw, 0);
+        }
     }
     Ok(targets)
-}
-
-fn draw_view(
-    frame: &mut Frame<'_>,
-    pipeline: &DrawPass,
-    bound: &wgpu::BindGroup,
-    mesh: &Mesh,
-    (targets, view): (&Targets, usize),
-) {
-    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
-    let depth_ops = wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store };
-    let samples = wgpu::RenderPassColorAttachment {
-        view: &targets.samples.each[view],
-        depth_slice: None,
-        resolve_target: None,
-        ops,
-    };
-    let mut pass = frame.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("quads"),
-        color_attachments: &[Some(samples)],
-        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-            view: &targets.depth.each[view],
-            depth_ops: Some(depth_ops),
-            stencil_ops: None,
-        }),
-        ..Default::default()
-    });
-    pass.set_pipeline(pipeline.pipeline());
-    let first_work = view * mesh.images.len();
-    for (work, image) in (first_work as u32..).zip(&mesh.images) {
-        pass.set_bind_group(0, bound, &[work * uniform_stride(size_of::<GpuQuadWork>() as u32)]);
-        pass.set_vertex_buffer(0, image.inverse_depths.slice(..));
-        pass.set_index_buffer(image.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed_indirect(&image.draw, 0);
-    }
 }
 
 /// A uniform for each view and image.
@@ -164,13 +137,11 @@ fn quad_works(recording: &Recording<'_>) -> Vec<u8> {
     let images = || set.meshes.cameras.iter().zip(&set.cameras);
     let pairs = recording.batch.cameras.iter().flat_map(|view| images().map(move |image| (view, image)));
     uniform_elements(pairs.map(|(view, (image, sample_camera))| {
-        let work = GpuQuadWork { first_sample: sample_camera.first_cell, ..quad_work(view, image) };
-        bytemuck::bytes_of(&work).to_vec()
+        bytemuck::bytes_of(&quad_work(view, image, sample_camera.first_cell)).to_vec()
     }))
 }
 
-/// Without the place of the image's samples.
-fn quad_work(view: &PinholeCamera, image: &PinholeCamera) -> GpuQuadWork {
+fn quad_work(view: &PinholeCamera, image: &PinholeCamera, first_sample: u32) -> GpuQuadWork {
     let rays = GpuViewCamera::of(image, 0);
     let clip_of = |direction: Vec3| clip_direction(view, direction).to_array();
     // As a difference of eyes: nothing is lost far from the origin.
@@ -181,7 +152,7 @@ fn quad_work(view: &PinholeCamera, image: &PinholeCamera) -> GpuQuadWork {
         clip_from_row: clip_of(rays.row_in_world.into()),
         clip_from_corner: clip_of(rays.corner_in_world.into()),
         width_px: image.size_px.x,
-        first_sample: 0,
+        first_sample,
         padding: [0; 2],
     }
 }

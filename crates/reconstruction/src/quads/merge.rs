@@ -4,7 +4,8 @@ use glam::UVec2;
 use gpu::{Binding, Frame, shader_variant};
 
 use super::cut::{GpuCutWork, ImageCut};
-use crate::{error::ReconstructionError, error_bound::ErrorBound};
+use super::mesh::ErrorBound;
+use crate::error::ReconstructionError;
 
 /// The greatest merged quad, across and down in texels: lines are merged in pieces of this length. Powers of two; more
 /// would be too much for one thread of the software device, which ends loops after 65,535 turns.

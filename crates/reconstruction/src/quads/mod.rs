@@ -13,6 +13,7 @@ mod scan;
 
 pub(crate) use build::{mesh, read};
 pub(crate) use corner_planes::CornerPlanes;
+pub use corner_planes::RequiredPlanes;
 #[cfg(test)]
 pub(crate) use cut::GpuCutWork;
 #[cfg(test)]
@@ -22,7 +23,7 @@ pub(crate) use draw::QuadDrawing;
 pub(crate) use merge::GREATEST_EXTENT;
 pub(crate) use merge::record as merge;
 pub(crate) use mesh::{Cut, Mesh, QuadVertices, SetMeshes};
-pub use mesh::{MeshStatistics, Quad};
+pub use mesh::{ErrorBound, MeshStatistics, Quad};
 pub(crate) use resolve::record;
 
 use gpu::{ShaderError, ShaderSource, Templates, shader_sources, wgsl_constants, wgsl_files};

@@ -4,10 +4,10 @@ use gpu::shader_variant;
 
 use super::draw::{self, QuadDrawing};
 use super::mesh::Mesh;
-use crate::surface::{self, SurfaceVariant};
-use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, view_work::ONE_VIEW};
+use crate::view_work::{ONE_VIEW, SetVariant};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, surface};
 
-shader_variant!(Resolve(SurfaceVariant), "resolve.wgsl", ONE_VIEW);
+shader_variant!(Resolve(SetVariant), "resolve.wgsl", ONE_VIEW);
 
 /// Draws a mesh into all views and gives pixels their colour; gives the pixels that stay unknown.
 pub(crate) fn record(
@@ -16,6 +16,6 @@ pub(crate) fn record(
     mesh: &Mesh,
 ) -> Result<PixelList, ReconstructionError> {
     let drawn = draw::record(drawing, recording, mesh)?;
-    let resolve = Resolve(SurfaceVariant::of(recording));
+    let resolve = Resolve(recording.variant());
     surface::record(recording, &resolve, None, &drawn.bindings())
 }

@@ -57,8 +57,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% for k in range(cameras) %}
     empty = empty || shows_background(work.cameras[{{ k }}], point_in_world);
 {% endfor %}
-    let color = select(work.background_srgb8, srgb8_from_linear(select(own, blend.color_linear, known)), drawn);
-    let without = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, empty);
-    write_pixel(pixel.index, color, select(0.0, 1.0 / t, drawn), select(without, PROVENANCE_HIT | (mask << 8u), drawn));
-    if !drawn && !empty { leave_undecided(pixel.index); }
+    write_found(pixel.index, drawn, t, select(own, blend.color_linear, known), mask, empty);
 }

@@ -4,10 +4,9 @@ use depth_image::{Camera, DepthImage, PinholeCamera, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 
 use crate::{
-    error_bound::ErrorBound,
     methods::hybrid_mesh::GREATEST_SLOPE,
     pyramid::{FLAT_FOOTPRINTS, SLOPE_SHARE},
-    quads::{GREATEST_EXTENT, Quad},
+    quads::{ErrorBound, GREATEST_EXTENT, Quad},
 };
 
 /// The corners of a quad: upper left, upper right, lower left, lower right.

@@ -21,7 +21,7 @@ use depth_image::{Aabb, DepthImage, PinholeCamera, View, srgb8_from_linear};
 use glam::Vec3;
 
 use self::{pixel::Pixel, sample_camera::SampleCamera, view_ray::ViewRays};
-use crate::{methods::ReconstructionMethod, pyramid::is_among_holes, quads::Quad, set_description::SetDescription};
+use crate::{methods::ReconstructionMethod, pyramid::is_among_holes, quads::Quad, sample_set::SetDescription};
 
 /// One view with depth and provenance.
 #[must_use]

@@ -12,7 +12,7 @@ use super::{
     surface::{bilinear, bilinear_shares},
     view_ray::{ViewRay, ViewRays},
 };
-use crate::{set_description::SetDescription, surface::THICKNESS_FOOTPRINTS, view_work::CELL_MARGIN_PX};
+use crate::{sample_set::SetDescription, surface::THICKNESS_FOOTPRINTS, view_work::CELL_MARGIN_PX};
 
 /// The mean of the samples around a point.
 struct Gathered {

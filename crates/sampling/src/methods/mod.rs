@@ -7,9 +7,7 @@ pub(crate) mod depth_peeling;
 pub(crate) mod non_redundant;
 pub(crate) mod useful;
 
-use std::{fmt, mem::discriminant, str::FromStr};
-
-use depth_image::{Camera, NamedMethod, PinholeCamera, Setting, method_forms, method_help, method_named};
+use depth_image::{Camera, NamedMethod, PinholeCamera, Setting, named_methods};
 use gpu::{ShaderError, Templates};
 use render::RedundancyTest;
 
@@ -73,11 +71,7 @@ pub fn templates() -> Result<Templates, ShaderError> {
     Ok(render::templates(&own)?.declaring(constants))
 }
 
-impl Default for SamplingMethod {
-    fn default() -> Self {
-        METHODS[0].method
-    }
-}
+named_methods!(SamplingMethod, UnknownSampling, "sampling method");
 
 impl SamplingMethod {
     /// All methods, each with all of its redundancy tests.
@@ -87,12 +81,6 @@ impl SamplingMethod {
             Useful(_) => Redundancy::ALL.map(Useful).to_vec(),
             method @ (Conventional | DepthPeeling { .. }) => vec![method],
         })
-    }
-
-    /// The text of `--help` on all methods.
-    #[must_use]
-    pub fn help() -> String {
-        method_help(&METHODS)
     }
 
     /// The cameras that images are taken with, for a rig of these cameras.
@@ -154,26 +142,6 @@ impl SamplingMethod {
             NonRedundant(redundancy) | Useful(redundancy) => Some(redundancy.to_string()),
             DepthPeeling { layers } => Some(layers.to_string()),
         }
-    }
-}
-
-/// The text names no method, or gives a setting that the method does not take.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown sampling method {0:?}, expected {forms}", forms = method_forms(&METHODS))]
-pub struct UnknownSampling(String);
-
-impl FromStr for SamplingMethod {
-    type Err = UnknownSampling;
-    fn from_str(text: &str) -> Result<Self, UnknownSampling> {
-        method_named(&METHODS, text).ok_or_else(|| UnknownSampling(text.to_owned()))
-    }
-}
-
-impl fmt::Display for SamplingMethod {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let row = METHODS.iter().find(|row| discriminant(&row.method) == discriminant(self));
-        f.write_str(row.map_or("", |row| row.name))?;
-        self.setting().map_or(Ok(()), |setting| write!(f, ":{setting}"))
     }
 }
 

@@ -3,7 +3,7 @@
 use gpu::{ResourceTraits, ShaderVariant};
 use minijinja::{Value, context};
 
-use crate::{surface::SurfaceVariant, view_work::ONE_VIEW};
+use crate::view_work::{ONE_VIEW, SetVariant};
 
 /// The marches that come before the carve, in the nearest cameras.
 pub(crate) const MARCHES: usize = 2;
@@ -21,7 +21,7 @@ pub(crate) const EYE_SHARE: f32 = 0.01;
 /// The switches of `march.wgsl`.
 #[derive(Debug)]
 pub(crate) struct March {
-    pub surface: SurfaceVariant,
+    pub set: SetVariant,
     /// The camera among a view's, nearest first. Marches after the first are over lists of pixels.
     pub camera: usize,
 }
@@ -31,12 +31,11 @@ impl ShaderVariant for March {
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
-        context! { march_camera => self.camera, ..self.surface.context() }
+        context! { march_camera => self.camera, ..self.set.context() }
     }
 
     fn all() -> Vec<Self> {
-        let marches =
-            |surface: SurfaceVariant| (0..surface.set.cameras.min(MARCHES)).map(move |camera| Self { surface, camera });
-        SurfaceVariant::all().into_iter().flat_map(marches).collect()
+        let marches = |set: SetVariant| (0..set.cameras.min(MARCHES)).map(move |camera| Self { set, camera });
+        SetVariant::all().into_iter().flat_map(marches).collect()
     }
 }

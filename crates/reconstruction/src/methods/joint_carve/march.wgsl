@@ -111,28 +111,22 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
 
 {% if march_camera == 0 %}
 @group(0) var<storage, read> tile_start_m: array<f32>;
-
-@compute @workgroup_size(TILE_PX, TILE_PX)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= work.view.size_px) { return; }
-    let pixel = pixel_of(id.xy);
-    let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
-    find(pixel, span, max(span.near, tile_start_m[pixel.tile]));
-}
 {% else %}
 {% include "pixel_list.wgsl" %}
-
-@compute @workgroup_size(LIST_WORKGROUP)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= lists[work.view.number].count { return; }
-    let pixel = pixel_of(place_of(listed_pixels[work.view.first_pixel + id.x]));
-    let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
-    // The pass before left how far it got.
-    find(pixel, span, out_inverse_depth[pixel.index]);
-}
 {% endif %}
 
-fn find(pixel: Pixel, span: Span, begin: f32) {
+@compute @workgroup_size({{ "TILE_PX, TILE_PX" if march_camera == 0 else "LIST_WORKGROUP" }})
+fn main(@builtin(global_invocation_id) id: vec3u) {
+{% if march_camera == 0 %}
+    if any(id.xy >= work.view.size_px) { return; }
+    let pixel = pixel_of(id.xy);
+{% else %}
+    if id.x >= lists[work.view.number].count { return; }
+    let pixel = pixel_of(place_of(listed_pixels[work.view.first_pixel + id.x]));
+{% endif %}
+    let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
+    // Of listed pixels the pass before left how far it got.
+    let begin = {{ "max(span.near, tile_start_m[pixel.tile])" if march_camera == 0 else "out_inverse_depth[pixel.index]" }};
     let a = homogeneous(work.cameras[CAMERA].homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
     let b = homogeneous(work.cameras[CAMERA].homogeneous_pixel_from_world, vec4f(pixel.direction, 0.0));
     let found = march(a, b, begin, max(span.far, begin));
