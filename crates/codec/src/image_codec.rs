@@ -32,7 +32,7 @@ pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<Encode
     image.validate()?;
     let specular = image.specular.as_ref().filter(|_| planes.specular);
     if specular.is_some() && image.normal_oct16.is_none() {
-        return Err(DepthImageError::PlaneSize { plane: "normal", len: 0, expected: image.inverse_depth_per_m.len() });
+        return Err(DepthImageError { plane: "normal", len: 0, expected: image.inverse_depth_per_m.len() });
     }
     let depth = encode_depth(&image.inverse_depth_per_m);
     let runs = &depth.runs;

@@ -1,9 +1,7 @@
 //! Axis-aligned boxes.
 
-use glam::Vec3;
+use glam::{BVec3, Vec3};
 use serde::{Deserialize, Serialize};
-
-use crate::Ray;
 
 /// A box in world space, `min <= max` on every axis unless empty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -57,25 +55,7 @@ impl Aabb {
     /// The eight corners.
     #[must_use]
     pub fn corners(&self) -> [Vec3; 8] {
-        std::array::from_fn(|i| {
-            Vec3::new(
-                if i & 1 == 0 { self.min.x } else { self.max.x },
-                if i & 2 == 0 { self.min.y } else { self.max.y },
-                if i & 4 == 0 { self.min.z } else { self.max.z },
-            )
-        })
-    }
-
-    /// The ray's parameters at entry and exit; `None` where it misses. The entry may be negative: the origin
-    /// is then inside or beyond.
-    #[must_use]
-    pub fn intersect(&self, ray: &Ray) -> Option<(f32, f32)> {
-        let inverse = ray.direction_in_world.recip();
-        let a = (self.min - ray.origin_in_world) * inverse;
-        let b = (self.max - ray.origin_in_world) * inverse;
-        // A ray along a face gives 0 * inf = NaN there; min/max of std ignore NaN, glam's may not.
-        let near = (0..3).fold(f32::NEG_INFINITY, |t, i| t.max(a[i].min(b[i])));
-        let far = (0..3).fold(f32::INFINITY, |t, i| t.min(a[i].max(b[i])));
-        (near <= far).then_some((near, far))
+        let is_least = |i: usize| BVec3::new(i & 1 == 0, i & 2 == 0, i & 4 == 0);
+        std::array::from_fn(|i| Vec3::select(is_least(i), self.min, self.max))
     }
 }

@@ -1,6 +1,6 @@
 //! Camera models: a closed set. An operation that some pixels or points lack returns an `Option`.
 
-use glam::{Affine3A, Mat3A, Quat, UVec2, Vec2, Vec3, Vec3A, Vec4};
+use glam::{Mat3A, Quat, UVec2, Vec2, Vec3, Vec3A, Vec4};
 use serde::{Deserialize, Serialize};
 
 /// The largest image side that any part of the system accepts.
@@ -52,14 +52,6 @@ impl Camera {
     pub fn unproject(&self, at: PixelDepth) -> Vec3 {
         match self {
             Self::Pinhole(camera) => camera.unproject(at),
-        }
-    }
-
-    /// The ray of a pixel, parametrised by planar depth; `None` where paths bend.
-    #[must_use]
-    pub fn straight_ray(&self, pixel: Vec2) -> Option<Ray> {
-        match self {
-            Self::Pinhole(camera) => Some(camera.ray(pixel)),
         }
     }
 }
@@ -126,20 +118,16 @@ impl PinholeCamera {
             return Err(CameraError::NotFinite { field });
         }
         let length = f64::from(self.world_from_camera.length());
-        let sides = self.size_px.min_element()..=self.size_px.max_element();
+        let [least_side, side] = [self.size_px.min_element(), self.size_px.max_element()].map(f64::from);
         let focal = f64::from(self.focal_px.min_element());
+        let principal = f64::from(self.principal_px.abs().max_element());
         let checks = [
             ("world_from_camera", length, (length - 1.0).abs() < 1e-3, "of unit length"),
             ("focal_px", focal, focal > 1e-3 && self.focal_px.max_element() < 1e7, "above 0.001 and below 1e7"),
-            (
-                "principal_px",
-                f64::from(self.principal_px.abs().max_element()),
-                self.principal_px.abs().max_element() < 1e6,
-                "within a million pixels",
-            ),
+            ("principal_px", principal, principal < 1e6, "within a million pixels"),
             ("near_m", f64::from(self.near_m), self.near_m > 0.0, "above 0"),
-            ("size_px", f64::from(*sides.start()), *sides.start() >= 1, "at least 1"),
-            ("size_px", f64::from(*sides.end()), *sides.end() <= MAX_IMAGE_SIDE_PX, "at most 16384"),
+            ("size_px", least_side, least_side >= 1.0, "at least 1"),
+            ("size_px", side, side <= f64::from(MAX_IMAGE_SIDE_PX), "at most 16384"),
         ];
         match checks.iter().find(|(_, _, ok, _)| !ok) {
             Some(&(field, value, _, allowed)) => Err(CameraError::OutOfRange { field, value, allowed }),
@@ -158,12 +146,6 @@ impl PinholeCamera {
     #[must_use]
     pub fn pixel_count(&self) -> usize {
         self.size_px.x as usize * self.size_px.y as usize
-    }
-
-    /// Camera space to world space.
-    #[must_use]
-    pub fn world_from_camera_affine(&self) -> Affine3A {
-        Affine3A::from_rotation_translation(self.world_from_camera, self.eye_in_world)
     }
 
     /// Unit forward axis.

@@ -2,7 +2,7 @@
 
 use glam::{UVec2, Vec3};
 
-use crate::{Camera, PinholeCamera, PixelDepth, linear_from_rgb9e5};
+use crate::{Camera, PinholeCamera, PixelDepth};
 
 /// Marks a texel *without a sample*: its ray's surfaces are unknown.
 pub const HOLE_INVERSE_DEPTH: f32 = -1.0;
@@ -17,22 +17,6 @@ pub struct SurfaceId {
     pub instance: u32,
     /// Triangle number, equal on every node, unique in the scene and shared by all instances of a mesh.
     pub primitive: u32,
-}
-
-/// The content of one texel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Texel {
-    /// No sample: the surface is unknown.
-    Hole,
-    /// The ray meets no surface.
-    Background,
-    /// A sample of a surface.
-    Sample {
-        /// Depth along the forward axis.
-        planar_depth_m: f32,
-        /// Outgoing radiance, linear RGB.
-        color_linear: Vec3,
-    },
 }
 
 /// Planes of one size, rows top-down. Colour and inverse depth are always there; the other planes exist where a
@@ -78,12 +62,14 @@ impl SpecularPlanes {
     }
 }
 
-/// Inconsistent planes of a depth image.
+/// A plane of another size than the others.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("depth image plane {plane} has {len} texels, the camera {expected}")]
 #[allow(missing_docs, reason = "self-naming fields")]
-pub enum DepthImageError {
-    #[error("depth image plane {plane} has {len} texels, the camera {expected}")]
-    PlaneSize { plane: &'static str, len: usize, expected: usize },
+pub struct DepthImageError {
+    pub plane: &'static str,
+    pub len: usize,
+    pub expected: usize,
 }
 
 impl DepthImage {
@@ -92,7 +78,7 @@ impl DepthImage {
     /// # Errors
     /// The first plane of another size.
     pub fn validate(&self) -> Result<(), DepthImageError> {
-        let expected = self.size_px().element_product() as usize;
+        let [texels, corners] = [self.size_px(), self.size_px() + 1].map(|size| size.element_product() as usize);
         let planes = [
             ("inverse_depth", Some(self.inverse_depth_per_m.len())),
             ("color", Some(self.color_rgb9e5.len())),
@@ -102,21 +88,12 @@ impl DepthImage {
             ("passed", self.passed.as_ref().map(Vec::len)),
         ];
         let visibilities = self.specular.iter().flat_map(|s| &s.visibility8).map(|p| ("visibility", Some(p.len())));
-        match planes
-            .into_iter()
-            .chain(visibilities)
-            .find_map(|(plane, len)| len.filter(|&len| len != expected).map(|len| (plane, len)))
-        {
-            Some((plane, len)) => Err(DepthImageError::PlaneSize { plane, len, expected }),
-            None => self.validate_corners(),
-        }
-    }
-
-    fn validate_corners(&self) -> Result<(), DepthImageError> {
-        let expected = (self.size_px() + 1).element_product() as usize;
-        let len = self.corner_inverse_depth_per_m.as_ref().map_or(expected, Vec::len);
-        let wrong = DepthImageError::PlaneSize { plane: "corner_inverse_depth", len, expected };
-        if len == expected { Ok(()) } else { Err(wrong) }
+        let planes = planes.into_iter().chain(visibilities).map(|(plane, len)| (plane, len, texels));
+        let corner_plane = ("corner_inverse_depth", self.corner_inverse_depth_per_m.as_ref().map(Vec::len), corners);
+        let mut wrong = planes.chain([corner_plane]).filter_map(|(plane, len, expected)| {
+            len.filter(|&len| len != expected).map(|len| DepthImageError { plane, len, expected })
+        });
+        wrong.next().map_or(Ok(()), Err)
     }
 
     /// Returns whether the texel's ray passed an omitted surface: see [`DepthImage::passed`].
@@ -139,26 +116,12 @@ impl DepthImage {
         }
     }
 
-    /// The content of the texel at column `x`, row `y`.
-    #[must_use]
-    pub fn texel(&self, x: u32, y: u32) -> Texel {
-        let index = (y * self.size_px().x + x) as usize;
-        match self.inverse_depth_per_m[index] {
-            inverse if inverse > 0.0 => Texel::Sample {
-                planar_depth_m: inverse.recip(),
-                color_linear: linear_from_rgb9e5(self.color_rgb9e5[index]),
-            },
-            BACKGROUND_INVERSE_DEPTH => Texel::Background,
-            _ => Texel::Hole,
-        }
-    }
-
     /// The sample's point in world space; `None` without a sample.
     #[must_use]
     pub fn sample_in_world(&self, x: u32, y: u32) -> Option<Vec3> {
-        let Texel::Sample { planar_depth_m, .. } = self.texel(x, y) else { return None };
+        let inverse = self.inverse_depth_per_m[(y * self.size_px().x + x) as usize];
         let pixel = UVec2::new(x, y).as_vec2() + 0.5;
-        Some(self.camera.unproject(PixelDepth { pixel, planar_depth_m }))
+        (inverse > 0.0).then(|| self.camera.unproject(PixelDepth { pixel, planar_depth_m: inverse.recip() }))
     }
 
     /// Least and greatest inverse depth of the samples; `None` without samples.

@@ -1,5 +1,4 @@
-//! Camera models, depth images with explicit holes, and the scalar reference of project, unproject
-//! and intersect.
+//! Camera models, and depth images with explicit holes.
 //!
 //! World space is right-handed, in metres, +Y up; a camera looks down its -Z. Pixels run top-down with centres at
 //! +0.5. *Planar depth* is the distance along the camera's forward axis. *Inverse depth* is its reciprocal, which is
@@ -9,12 +8,13 @@
 
 mod bounds;
 mod camera;
-mod color;
+mod encoding;
 mod highlight;
 mod image;
 mod light;
 mod method_table;
-mod normal;
+#[cfg(any(test, feature = "scalar"))]
+mod scalar;
 mod tiles;
 mod view;
 mod view_cell;
@@ -22,14 +22,16 @@ mod view_group;
 
 pub use bounds::Aabb;
 pub use camera::{Camera, CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera, PixelDepth, Ray};
-pub use color::{linear_from_rgb9e5, linear_from_srgb8, rgb9e5_from_linear, srgb8_from_linear};
-pub use highlight::{Highlight, Reflector, highlight_linear};
-pub use image::{
-    BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId, Texel,
-};
-pub use light::{Environment, Illumination, Incident, Light, LightError, MAX_LIGHTS, disc_from_square, tangents_of};
+pub use encoding::{linear_from_srgb8, oct16_from_unit, srgb8_from_linear};
+pub use highlight::{Highlight, Reflector};
+pub use image::{BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId};
+pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
 pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_named};
-pub use normal::{oct16_from_unit, unit_from_oct16};
+#[cfg(any(test, feature = "scalar"))]
+pub use scalar::{
+    Incident, Texel, disc_from_square, highlight_linear, linear_from_rgb9e5, rgb9e5_from_linear, tangents_of,
+    unit_from_oct16,
+};
 pub use tiles::TileError;
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};
 pub use view_cell::ViewCell;

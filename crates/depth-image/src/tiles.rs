@@ -41,7 +41,10 @@ impl DepthImage {
         let count = tiles.len() as u32;
         for (number, tile) in tiles.iter().enumerate() {
             let Camera::Pinhole(expected) = camera.tile(number as u32, count);
-            check(number, tile, expected.size_px)?;
+            if tile.size_px() != expected.size_px {
+                return Err(TileError::Size { tile: number, given: tile.size_px(), expected: expected.size_px });
+            }
+            tile.validate().map_err(|source| TileError::Planes { tile: number, source })?;
         }
         let corners = joined(&tiles, "corner_inverse_depth", |tile| tile.corner_inverse_depth_per_m.as_deref())?;
         Ok(Self {
@@ -55,13 +58,6 @@ impl DepthImage {
             corner_inverse_depth_per_m: corners.map(|_| shared_corners(&tiles)),
         })
     }
-}
-
-fn check(number: usize, tile: &DepthImage, expected: UVec2) -> Result<(), TileError> {
-    if tile.size_px() != expected {
-        return Err(TileError::Size { tile: number, given: tile.size_px(), expected });
-    }
-    tile.validate().map_err(|source| TileError::Planes { tile: number, source })
 }
 
 fn concat<T: Copy>(tiles: &[DepthImage], plane: impl Fn(&DepthImage) -> &Vec<T>) -> Vec<T> {
@@ -85,33 +81,24 @@ fn joined<T: Copy>(
 /// Joins a plane that a tile lacks where all of it would be zero.
 fn filled<T: Copy + Default>(tiles: &[DepthImage], plane: impl Fn(&DepthImage) -> Option<&[T]>) -> Option<Vec<T>> {
     tiles.iter().any(|tile| plane(tile).is_some()).then(|| {
-        let of = |tile: &DepthImage| plane(tile).map_or_else(|| vec![T::default(); texels(tile)], <[T]>::to_vec);
+        let zeros = |tile: &DepthImage| vec![T::default(); tile.size_px().element_product() as usize];
+        let of = |tile: &DepthImage| plane(tile).map_or_else(|| zeros(tile), <[T]>::to_vec);
         tiles.iter().flat_map(of).collect()
     })
 }
 
-fn texels(tile: &DepthImage) -> usize {
-    tile.size_px().element_product() as usize
-}
-
 /// Joins the inputs of highlights. A tile without highlights has no visibility either.
 fn specular(tiles: &[DepthImage]) -> Result<Option<SpecularPlanes>, TileError> {
-    if tiles.iter().all(|tile| tile.specular.is_none()) {
-        return Ok(None);
-    }
-    let planes = tiles.iter().filter_map(|tile| tile.specular.as_ref()).map(|s| s.visibility8.len());
-    let (least, most) = planes.fold((usize::MAX, 0), |(least, most), len| (least.min(len), most.max(len)));
-    if least != most {
+    let mut counts = tiles.iter().filter_map(|tile| tile.specular.as_ref()).map(|s| s.visibility8.len());
+    let Some(count) = counts.next() else { return Ok(None) };
+    if counts.any(|other| other != count) {
         return Err(TileError::Mixed { plane: "visibility" });
     }
-    let visibility =
-        |number: usize| filled(tiles, |tile| tile.specular.as_ref().map(|s| s.visibility8[number].as_slice()));
+    let reflectance = filled(tiles, |tile| Some(tile.specular.as_ref()?.reflectance_srgb8_roughness8.as_slice()));
+    let visibility = |number: usize| filled(tiles, |tile| Some(tile.specular.as_ref()?.visibility8[number].as_slice()));
     Ok(Some(SpecularPlanes {
-        reflectance_srgb8_roughness8: filled(tiles, |tile| {
-            tile.specular.as_ref().map(|s| s.reflectance_srgb8_roughness8.as_slice())
-        })
-        .unwrap_or_default(),
-        visibility8: (0..most).filter_map(visibility).collect(),
+        reflectance_srgb8_roughness8: reflectance.unwrap_or_default(),
+        visibility8: (0..count).filter_map(visibility).collect(),
     }))
 }
 

@@ -1,12 +1,12 @@
 //! Light that was summed before, to be added to: a still scene's samples grow better from set to set.
 
-use std::{collections::VecDeque, ops::Range};
+use std::{array, collections::VecDeque, ops::Range};
 
 use depth_image::PinholeCamera;
 use gpu::PooledBuffer;
 use parking_lot::Mutex;
 
-use crate::{Lighting, finish::FinishVariant, known_samples::RedundancyVariant};
+use crate::{Lighting, known_samples::RedundancyVariant, planes::Output};
 
 /// Sums that are kept; the oldest go first.
 const KEPT: usize = 16;
@@ -18,7 +18,8 @@ pub(crate) struct Key {
     pub lighting: Lighting,
     pub scene_time_s: f32,
     pub cameras: Vec<PinholeCamera>,
-    pub finish: FinishVariant,
+    pub by_rays: bool,
+    pub output: Output,
     /// The first image's.
     pub redundancy: Option<RedundancyVariant>,
 }
@@ -27,41 +28,20 @@ pub(crate) struct Key {
 pub(crate) struct Sums {
     pub buffer: PooledBuffer,
     /// Numbers of the rays to be added now: to lamps, and of occlusion.
-    shadow: Range<u32>,
-    occlusion: Range<u32>,
+    pub rays: [Range<u32>; 2],
 }
 
 #[derive(Default)]
 pub(crate) struct Accumulations(Mutex<VecDeque<(Key, Sums)>>);
 
-impl Sums {
-    /// Empty sums, and `wanted` rays to be traced.
-    pub fn new(buffer: PooledBuffer, wanted: [u32; 2]) -> Self {
-        let [shadow, occlusion] = wanted;
-        Self { buffer, shadow: 0..shadow, occlusion: 0..occlusion }
-    }
-
-    /// Numbers of the rays to be traced now.
-    pub fn ranges(&self) -> [Range<u32>; 2] {
-        [self.shadow.clone(), self.occlusion.clone()]
-    }
-
-    /// Rays that are in the sums already.
-    pub fn rays_before(&self) -> u32 {
-        self.shadow.start.max(self.occlusion.start)
-    }
-}
-
 impl Accumulations {
     /// Sums with no more rays than `wanted`, which are now to be reached.
     pub fn take(&self, key: &Key, wanted: [u32; 2]) -> Option<Sums> {
         let mut kept = self.0.lock();
-        let at = kept.iter().position(|(other, sums)| {
-            other == key && sums.shadow.end <= wanted[0] && sums.occlusion.end <= wanted[1]
-        })?;
-        let (_, sums) = kept.remove(at)?;
-        let (shadow, occlusion) = (sums.shadow.end..wanted[0], sums.occlusion.end..wanted[1]);
-        Some(Sums { shadow, occlusion, ..sums })
+        let fits = |sums: &Sums| sums.rays.iter().zip(wanted).all(|(rays, wanted)| rays.end <= wanted);
+        let at = kept.iter().position(|(other, sums)| other == key && fits(sums))?;
+        let (_, Sums { buffer, rays }) = kept.remove(at)?;
+        Some(Sums { buffer, rays: array::from_fn(|kind| rays[kind].end..wanted[kind]) })
     }
 
     /// Keeps sums whose rays have been traced.

@@ -25,7 +25,6 @@ struct PixelCamera {
     tolerance: f32,
     // The first pixel, from where the forward axis meets the image; wraps.
     first_from_axis: vec2u,
-    padding: vec2u,
 }
 
 @group(0) var<uniform> camera: PixelCamera;
@@ -34,3 +33,5 @@ fn direction_of(pixel: vec2u) -> vec3f {
     let center = vec2f(pixel) + 0.5;
     return camera.column_in_world * center.x + camera.row_in_world * center.y + camera.corner_in_world;
 }
+
+fn place_of(pixel: vec2u) -> u32 { return pixel.y * camera.size_px.x + pixel.x; }

@@ -35,13 +35,6 @@ fn front_at(texel: vec2u) -> f32 { return textureLoad(front_depth, texel, 0){{ "
 {% endif %}
 
 fn put(plane: u32, place: u32, word: u32) { words[camera.first_word + plane * camera.pixel_count + place] = word; }
-fn sum_at(plane: u32, place: u32) -> f32 { return sums[camera.first_sum + plane * camera.pixel_count + place]; }
-
-fn light_at(place: u32) -> vec3f {
-    let lamps = vec3f(sum_at(LAMPS, place), sum_at(LAMPS + 1u, place), sum_at(LAMPS + 2u, place));
-    let environment = vec3f(sum_at(ENVIRONMENT, place), sum_at(ENVIRONMENT + 1u, place), sum_at(ENVIRONMENT + 2u, place));
-    return lamps / f32(camera.shadow_rays_in_sum) + environment / f32(camera.occlusion_rays_in_sum);
-}
 {% if visibility %}
 
 // Bytes of visibility: the environment's, then the lamps'.
@@ -60,7 +53,7 @@ fn visibility_word(word: u32, place: u32) -> u32 {
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= camera.size_px) { return; }
-    let place = id.y * camera.size_px.x + id.x;
+    let place = place_of(id.xy);
     let depth = reversed_depth_at(id.xy);
     let surface = surface_at(id.xy);
     var met = depth > 0.0;

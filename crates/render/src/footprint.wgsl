@@ -1,8 +1,5 @@
 // The length of a pixel on the surface that it shows.
 
-// Cosine of the most grazing angle at which a footprint still grows.
-const LEAST_FACING: f32 = {{ LEAST_FACING }};
-
 // A pixel's length on a surface at this depth that is met at this angle.
 fn stretched_footprint(planar_depth_m: f32, footprint: f32, normal: vec3f, sight: vec3f) -> f32 {
     let facing = abs(dot(normal, sight)) * inverseSqrt(max(dot(sight, sight), 1e-30));

@@ -1,24 +1,19 @@
 //! A scene on the device.
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicU64, Ordering},
-};
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Aabb, Highlight, MAX_LIGHTS};
 use glam::{Affine3A, Mat3, Vec3};
-use gpu::{Gpu, GpuError, switches, uniform_elements};
+use gpu::{Gpu, GpuError, switches};
 use indexmap::IndexSet;
 use scene::{Material, Scene, Wind};
 use wgpu::BufferUsages;
 
-use crate::{
-    RenderError, cluster,
-    material::phong_reflector,
-    rays::{AccelerationReport, OrderedMesh, RayScene},
-    texture,
-};
+use crate::rays::{AccelerationReport, OrderedMesh, RayScene};
+use crate::{RenderError, cluster, material::phong_reflector, pixel_camera::uniform, texture};
 
 /// A mesh part where an instance places it: `Object` in the shader, the same for a whole draw. It lies at a dynamic offset: a
 /// load from a uniform costs nothing a vertex or fragment.
@@ -47,7 +42,7 @@ pub(crate) struct GpuSurroundings {
 }
 
 /// The work of a draw's shader: pipelines are specialised, for work that is not in the shader is free.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub(crate) struct MaterialTraits {
     pub double_sided: bool,
     /// Without a test for alpha, hidden fragments are never shaded.
@@ -61,8 +56,7 @@ pub(crate) struct MaterialTraits {
 
 /// A cluster of one instance, ready to draw.
 pub(crate) struct Draw {
-    pub first_index: u32,
-    pub index_count: u32,
+    pub indices: Range<u32>,
     pub base_vertex: i32,
     /// Into the pairs of textures.
     pub texture: u32,
@@ -88,10 +82,12 @@ pub struct GpuScene {
     pub(crate) light_count: usize,
     pub(crate) rays: RayScene,
     highlights: [bool; 2],
-    identity: u64,
-    animated: bool,
-    bounds_in_world: Aabb,
-    triangle_count: u64,
+    /// A number that no other scene of this process has.
+    pub identity: u64,
+    /// Whether pictures depend on scene time.
+    pub(crate) animated: bool,
+    /// Around all geometry at all times.
+    pub(crate) bounds_in_world: Aabb,
 }
 
 impl GpuScene {
@@ -110,11 +106,7 @@ impl GpuScene {
         Ok(Self {
             vertices: gpu.buffer_with("vertices", &geometry.vertices, BufferUsages::VERTEX),
             indices: gpu.buffer_with("indices", &geometry.indices, BufferUsages::INDEX),
-            objects: gpu.buffer_with(
-                "objects",
-                &uniform_elements(geometry.objects.iter().map(bytemuck::bytes_of)),
-                BufferUsages::UNIFORM,
-            ),
+            objects: uniform(gpu, "objects", geometry.objects.into_iter()),
             surroundings: gpu.buffer_with("surroundings", &[surroundings(scene)], BufferUsages::UNIFORM),
             textures: geometry.textures.iter().map(|pair| pair.each_ref().map(view)).collect(),
             background_linear: scene.background_linear,
@@ -128,7 +120,6 @@ impl GpuScene {
             identity: NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed),
             animated: scene.wind.is_some(),
             bounds_in_world: scene.bounds(),
-            triangle_count: scene.triangle_count(),
             draws: geometry.draws,
         })
     }
@@ -139,12 +130,6 @@ impl GpuScene {
         self.highlights[usize::from(highlight == Highlight::Ggx)]
     }
 
-    /// A number that no other scene of this process has.
-    #[must_use]
-    pub fn identity(&self) -> u64 {
-        self.identity
-    }
-
     /// The tree that rays go through at a scene time: made now if there is none.
     ///
     /// # Errors
@@ -153,30 +138,18 @@ impl GpuScene {
         Ok(self.rays.at(scene_time_s)?.report)
     }
 
-    /// As [`GpuScene::acceleration`], with a new tree whatever there was: to measure the gain of refitting.
+    /// Forgets the tree, so that the next is not refitted from it.
+    pub fn forget_acceleration(&self) {
+        self.rays.forget();
+    }
+
+    /// The nodes of that tree and its triangles: the tables that rays read most.
     ///
     /// # Errors
     /// As [`GpuScene::acceleration`].
-    pub fn rebuilt_acceleration(&self, scene_time_s: f32) -> Result<AccelerationReport, RenderError> {
-        Ok(self.rays.rebuilt_at(scene_time_s)?.report)
-    }
-
-    /// Whether pictures depend on scene time.
-    #[must_use]
-    pub fn is_animated(&self) -> bool {
-        self.animated
-    }
-
-    /// Around all geometry at all times.
-    #[must_use]
-    pub fn bounds_in_world(&self) -> Aabb {
-        self.bounds_in_world
-    }
-
-    /// Triangles, instances counted each.
-    #[must_use]
-    pub fn triangle_count(&self) -> u64 {
-        self.triangle_count
+    pub fn tree(&self, scene_time_s: f32) -> Result<[wgpu::TextureView; 2], RenderError> {
+        let traced = self.rays.at(scene_time_s)?;
+        Ok([&traced.nodes, &traced.corners].map(|table| wgpu::TextureView::clone(table)))
     }
 }
 
@@ -221,16 +194,16 @@ impl Geometry {
     fn add(&mut self, scene: &Scene, clusters: &[cluster::Cluster], instance: u32, world_from_mesh: &Affine3A) {
         let material = &scene.materials[clusters[0].material as usize];
         let reach_m = scene.wind.map_or(0.0, |wind: Wind| wind.amplitude_m.abs());
-        let (first_index, base_vertex) = (self.indices.len() as u32, self.vertices.len() as i32);
+        let (indices, base_vertex) = (self.indices.len() as u32, self.vertices.len() as i32);
         let object = self.objects.len() as u32;
         let pair = [material.base_color_texture, material.metallic_roughness_texture];
         let (texture, _) = self.textures.insert_full(pair);
         self.objects.push(gpu_object(world_from_mesh, material, instance));
         self.draws.extend(clusters.iter().map(|cluster| {
             let corners = cluster.bounds_in_mesh.corners().map(|corner| world_from_mesh.transform_point3(corner));
+            let first_index = indices + cluster.first_triangle * 3;
             Draw {
-                first_index: first_index + cluster.first_triangle * 3,
-                index_count: cluster.triangle_count * 3,
+                indices: first_index..first_index + cluster.triangle_count * 3,
                 base_vertex,
                 texture: texture as u32,
                 material: MaterialTraits::of(material),
@@ -238,13 +211,6 @@ impl Geometry {
                 bounds_in_world: Aabb::around(corners).padded(reach_m),
             }
         }));
-    }
-}
-
-impl Draw {
-    /// Whether `next` can be drawn in one call with what ends at `end_index`.
-    pub(crate) fn joins(&self, end_index: u32, next: &Self) -> bool {
-        (end_index, self.object) == (next.first_index, next.object)
     }
 }
 
@@ -294,12 +260,10 @@ fn gpu_object(world_from_mesh: &Affine3A, material: &Material, instance: u32) ->
 }
 
 fn surroundings(scene: &Scene) -> GpuSurroundings {
-    let still = Wind { direction_in_world: Vec3::X, amplitude_m: 0.0, frequency_hz: 0.0, waves_per_m: Vec3::ZERO };
-    let wind = scene.wind.unwrap_or(still);
-    GpuSurroundings {
+    scene.wind.map_or(GpuSurroundings::zeroed(), |wind| GpuSurroundings {
         wind_direction: wind.direction_in_world.to_array(),
         wind_amplitude_m: wind.amplitude_m,
         wind_waves_per_m: wind.waves_per_m.to_array(),
         wind_frequency_hz: wind.frequency_hz,
-    }
+    })
 }

@@ -14,7 +14,7 @@
 // The sums of each camera, plane by plane (sums.wgsl).
 @group(0) var<storage, read_write> sums: array<f32>;
 {% include "sums.wgsl" %}
-{% if domain == "list" %}
+{% if listed %}
 struct List { workgroups: u32, y: u32, z: u32, count: u32 }
 @group(0) var<storage, read> listed_pixels: array<u32>;
 @group(0) var<storage, read> list: List;
@@ -110,7 +110,7 @@ fn add_color(plane: u32, place: u32, linear: vec3f) {
 }
 
 fn light_pixel(pixel: vec2u) {
-    let place = pixel.y * camera.size_px.x + pixel.x;
+    let place = place_of(pixel);
     let depth = reversed_depth_at(pixel);
     var lamps_linear = vec3f(0.0);
     var environment = Arrival(vec3f(0.0), 0.0);
@@ -130,24 +130,18 @@ fn light_pixel(pixel: vec2u) {
 {% endif %}
 }
 
-{% if domain == "list" %}
-@compute @workgroup_size({{ LIST_WORKGROUP }})
+{% if listed %}
+@compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= list.count { return; }
     let place = listed_pixels[id.x];
     light_pixel(vec2u(place % camera.size_px.x, place / camera.size_px.x));
 }
-{% elif domain == "grid" %}
-@compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    let pixel = id.xy * {{ GRID_PX }};
-    if any(pixel >= camera.size_px) { return; }
-    light_pixel(pixel);
-}
 {% else %}
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= camera.size_px) { return; }
-    light_pixel(id.xy);
+    let pixel = id.xy * {{ step_px }}u;
+    if any(pixel >= camera.size_px) { return; }
+    light_pixel(pixel);
 }
 {% endif %}

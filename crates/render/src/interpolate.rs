@@ -1,22 +1,23 @@
 //! Light between pixels that have it; the pixels where it would be wrong are listed.
 
-use std::sync::Arc;
-
-use gpu::{Binding, Frame, Gpu, PassCache, ResourceTraits, ShaderVariant, Templates, switches};
+use gpu::{Binding, ResourceTraits, ShaderVariant, switches};
 use minijinja::{Value, context};
 
-use crate::{RenderError, pixel_camera::CAMERA_TRAITS, pixel_list::PixelList, sums::SumPlanes, surfaces::Surfaces};
+use crate::{
+    RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, pixel_list::PixelList, sums::SumPlanes,
+    surfaces::Surfaces,
+};
 
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct InterpolateVariant {
-    pub by_rays: bool,
+#[derive(Debug)]
+pub(crate) struct Interpolate {
+    by_rays: bool,
     /// The distance of the pixels that are filled in.
-    pub step_px: u32,
+    step_px: u32,
     /// Planes of a pixel.
-    pub sum_planes: usize,
+    sum_planes: usize,
 }
 
-impl ShaderVariant for InterpolateVariant {
+impl ShaderVariant for Interpolate {
     const TEMPLATE: &'static str = "interpolate.wgsl";
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
@@ -26,36 +27,25 @@ impl ShaderVariant for InterpolateVariant {
 
     fn all() -> Vec<Self> {
         let each = |sums: SumPlanes| {
-            switches().map(move |[by_rays, coarse]| Self {
-                by_rays,
-                step_px: if coarse { 2 } else { 1 },
-                sum_planes: sums.count(),
-            })
+            let sum_planes = sums.count();
+            switches().map(move |[by_rays, coarse]| Self { by_rays, step_px: 1 + u32::from(coarse), sum_planes })
         };
         SumPlanes::all().flat_map(each).collect()
     }
 }
 
-pub(crate) struct Interpolate(PassCache);
-
-impl Interpolate {
-    pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        Self(PassCache::new(gpu, templates))
-    }
-
-    /// Records the pass of one camera: pixels `step_px` apart are filled in from those twice as far apart, or listed.
-    pub fn record(
-        &self,
-        frame: &mut Frame<'_>,
-        variant: &InterpolateVariant,
-        (cameras, element): (&wgpu::Buffer, u32),
-        (target, sums): (&Surfaces, &wgpu::Buffer),
-        list: &PixelList,
-    ) -> Result<(), RenderError> {
-        let pass = self.0.get(variant)?;
-        let own = [Binding::buffer("camera", cameras), Binding::buffer("sums", sums)];
-        let bound = pass.bind(0, own.into_iter().chain(target.bindings()).chain(list.bindings()))?;
-        pass.dispatch_each(frame, &[&bound], element..element + 1, target.invocations(variant.step_px));
-        Ok(())
-    }
+/// Records the pass of one camera: pixels `step_px` apart are filled in from those twice as far apart, or listed.
+pub(crate) fn record(
+    recording: &mut Recording<'_>,
+    (element, target): (u32, &Surfaces),
+    step_px: u32,
+    list: &PixelList,
+) -> Result<(), RenderError> {
+    let Recording { passes, batch, cameras, sums, frame, .. } = recording;
+    let sum_planes = batch.output.sums.count();
+    let pass = passes.get(&Interpolate { by_rays: batch.by_rays, step_px, sum_planes })?;
+    let own = [Binding::buffer("camera", cameras), Binding::buffer("sums", &sums.buffer)];
+    let bound = pass.bind(0, own.into_iter().chain(target.bindings()).chain(list.bindings()))?;
+    pass.dispatch_each(frame, &[&bound], element..element + 1, target.invocations(step_px));
+    Ok(())
 }

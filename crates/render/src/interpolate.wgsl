@@ -11,23 +11,12 @@ struct List { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
 {% include "sums.wgsl" %}
 
 const STEP: u32 = {{ step_px }}u;
-const LIST_WORKGROUP: u32 = {{ LIST_WORKGROUP }};
 // Cosine between normals of one surface.
-const SAME_FACING: f32 = 0.9;
+const SAME_NORMAL: f32 = 0.9;
 // Distance from the pixel's own plane, in footprints.
 const SAME_PLANE: f32 = 2.0;
 // Differences of light below this share of a white surface's are not seen.
 const LEAST_LIGHT: f32 = 0.02;
-
-fn sum_at(plane: u32, pixel: vec2u) -> f32 {
-    return sums[camera.first_sum + plane * camera.pixel_count + pixel.y * camera.size_px.x + pixel.x];
-}
-
-fn mean_light(pixel: vec2u) -> vec3f {
-    let lamps = vec3f(sum_at(LAMPS, pixel), sum_at(LAMPS + 1u, pixel), sum_at(LAMPS + 2u, pixel));
-    let environment = vec3f(sum_at(ENVIRONMENT, pixel), sum_at(ENVIRONMENT + 1u, pixel), sum_at(ENVIRONMENT + 2u, pixel));
-    return lamps / f32(camera.shadow_rays_in_sum) + environment / f32(camera.occlusion_rays_in_sum);
-}
 
 fn is_same_surface(point: vec3f, normal: vec3f, footprint_m: f32, other: vec2u) -> bool {
     let depth = reversed_depth_at(other);
@@ -35,14 +24,14 @@ fn is_same_surface(point: vec3f, normal: vec3f, footprint_m: f32, other: vec2u) 
     let offset = camera.eye_in_world + direction_of(other) * z - point;
     let other_normal = unit_from_oct16(surface_at(other).z);
     let near_plane = abs(dot(normal, offset)) < SAME_PLANE * footprint_m * f32(2u * STEP);
-    return depth > 0.0 && dot(normal, other_normal) > SAME_FACING && near_plane;
+    return depth > 0.0 && dot(normal, other_normal) > SAME_NORMAL && near_plane;
 }
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let pixel = id.xy * STEP;
     if any(pixel >= camera.size_px) { return; }
-    let place = pixel.y * camera.size_px.x + pixel.x;
+    let place = place_of(pixel);
     let depth = reversed_depth_at(pixel);
     if all((id.xy & vec2u(1u)) == vec2u(0u)) || depth <= 0.0 { return; }
     let z = camera.near_m / depth;
@@ -56,7 +45,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% for corner in range(4) %}
     let corner{{ corner }} = vec2u({{ "high.x" if corner % 2 == 1 else "low.x" }}, {{ "high.y" if corner // 2 == 1 else "low.y" }});
     agree = agree && is_same_surface(point, normal, z * camera.footprint, corner{{ corner }});
-    let light{{ corner }} = mean_light(corner{{ corner }});
+    let place{{ corner }} = place_of(corner{{ corner }});
+    let light{{ corner }} = light_at(place{{ corner }});
     least = min(least, light{{ corner }});
     greatest = max(greatest, light{{ corner }});
 {% endfor %}
@@ -69,8 +59,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let share = vec2f(pixel - low) / f32(2u * STEP);
     for (var plane = 0u; plane < {{ sum_planes }}u; plane++) {
-        let upper = mix(sum_at(plane, corner0), sum_at(plane, corner1), share.x);
-        let lower = mix(sum_at(plane, corner2), sum_at(plane, corner3), share.x);
+        let upper = mix(sum_at(plane, place0), sum_at(plane, place1), share.x);
+        let lower = mix(sum_at(plane, place2), sum_at(plane, place3), share.x);
         sums[camera.first_sum + plane * camera.pixel_count + place] = mix(upper, lower, share.y);
     }
 }

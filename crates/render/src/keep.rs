@@ -1,18 +1,16 @@
 //! Keeps the samples of an image for redundancy tests of those after it.
 
-use std::sync::Arc;
-
-use gpu::{Binding, Frame, Gpu, PassCache, ResourceTraits, ShaderVariant, Templates};
+use gpu::{Binding, ResourceTraits, ShaderVariant};
 use minijinja::{Value, context};
 
-use crate::{RenderError, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
+use crate::{RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
 
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct KeepVariant {
+#[derive(Debug)]
+pub(crate) struct Keep {
     by_rays: bool,
 }
 
-impl ShaderVariant for KeepVariant {
+impl ShaderVariant for Keep {
     const TEMPLATE: &'static str = "keep.wgsl";
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
@@ -21,29 +19,19 @@ impl ShaderVariant for KeepVariant {
     }
 
     fn all() -> Vec<Self> {
-        [false, true].map(|by_rays| Self { by_rays }).to_vec()
+        vec![Self { by_rays: false }, Self { by_rays: true }]
     }
 }
 
-pub(crate) struct Keep(PassCache);
-
-impl Keep {
-    pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        Self(PassCache::new(gpu, templates))
-    }
-
-    /// Records the pass of one image, whose camera is the `element`-th of `cameras`, into a layer of known samples.
-    pub fn record(
-        &self,
-        frame: &mut Frame<'_>,
-        (cameras, element): (&wgpu::Buffer, u32),
-        (surfaces, by_rays): (&Surfaces, bool),
-        held: &wgpu::TextureView,
-    ) -> Result<(), RenderError> {
-        let pass = self.0.get(&KeepVariant { by_rays })?;
-        let own = [Binding::buffer("camera", cameras), Binding::texture("held", held)];
-        let bound = pass.bind(0, own.into_iter().chain(surfaces.bindings()))?;
-        pass.dispatch_each(frame, &[&bound], element..element + 1, surfaces.invocations(1));
-        Ok(())
-    }
+/// Records the pass of one image, whose camera is the `element`-th of the batch, into a layer of known samples.
+pub(crate) fn record(
+    recording: &mut Recording<'_>,
+    (element, target): (u32, &Surfaces),
+    held: &wgpu::TextureView,
+) -> Result<(), RenderError> {
+    let pass = recording.passes.get(&Keep { by_rays: recording.batch.by_rays })?;
+    let own = [Binding::buffer("camera", &recording.cameras), Binding::texture("held", held)];
+    let bound = pass.bind(0, own.into_iter().chain(target.bindings()))?;
+    pass.dispatch_each(&mut recording.frame, &[&bound], element..element + 1, target.invocations(1));
+    Ok(())
 }

@@ -4,16 +4,14 @@ use std::{collections::HashSet, sync::Arc};
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
-use glam::{DMat4, DVec4, UVec2};
-use gpu::{Binding, Gpu, GpuError, ShaderError};
+use glam::{DMat4, DVec4, UVec2, Vec3};
+use gpu::{Binding, Gpu, GpuError};
 use minijinja::{Value, context};
-use parking_lot::Mutex;
-use wgpu::{BufferUsages, TextureFormat, TextureUsages};
+use wgpu::{BufferUsages, TextureFormat, TextureView};
 
-use crate::{
-    redundancy_test::{Evidence, RedundancyTest},
-    surfaces::SURFACE_ID_FORMAT,
-};
+use crate::layers::{LayerCache, Layers};
+use crate::redundancy_test::{Evidence, RedundancyTest};
+use crate::surfaces::SURFACE_ID_FORMAT;
 
 /// A sample of the temporal reference is the same as a candidate within this many footprints: a steep surface may change its
 /// depth more from texel to texel.
@@ -33,9 +31,7 @@ pub(crate) struct KnownCamera {
     pub row_in_world: [f32; 3],
     pub rows: f32,
     pub near_m: f32,
-    pub padding_0: f32,
-    pub padding_1: f32,
-    pub padding_2: f32,
+    pub padding: [f32; 3],
 }
 
 /// The switches of `known_samples.wgsl`.
@@ -53,10 +49,10 @@ pub(crate) struct KnownSamples {
     /// The greatest distance between two of the viewpoints.
     pub view_cell_m: f32,
     pub cameras: Vec<PinholeCamera>,
-    test: RedundancyTest,
+    pub test: RedundancyTest,
     layers: Arc<Layers>,
+    /// Another moment of the same set.
     reference: Option<TemporalReference>,
-    keeps_last: bool,
 }
 
 /// The samples of all images of a set at one moment, for the same images at another.
@@ -66,16 +62,24 @@ pub struct TemporalReference {
     layers: Arc<Layers>,
 }
 
-/// A texel for each sample, a layer for each image.
-struct Layers {
-    held: wgpu::Texture,
-    /// Each layer, to be written.
-    each: Vec<wgpu::TextureView>,
+/// The images of a set that are drawn one after the other; each leaves out the samples that those before it hold.
+#[derive(Clone, Copy)]
+pub(crate) struct ImageSequence<'a> {
+    pub known: &'a KnownSamples,
+    /// Places in the set of the images to be drawn, and which of them is the batch's first.
+    pub wanted: &'a [u32],
+    pub first: usize,
+    /// The samples of this many images are kept for those after them.
+    pub kept: usize,
 }
 
-/// The last layers that were made: making and clearing them costs as much as drawing a picture.
-#[derive(Default)]
-pub(crate) struct LayerCache(Mutex<Option<Arc<Layers>>>);
+/// The images before one, whose samples it does not show again.
+pub(crate) struct Predecessors {
+    pub variant: RedundancyVariant,
+    samples: TextureView,
+    cameras: wgpu::Buffer,
+    reference: Option<(TextureView, wgpu::Buffer)>,
+}
 
 impl RedundancyVariant {
     /// Each test after few and many images, with a temporal reference where samples are consulted.
@@ -101,51 +105,6 @@ impl RedundancyVariant {
     }
 }
 
-impl LayerCache {
-    /// Layers that nobody else uses; they hold what is left over.
-    fn of(&self, gpu: &Gpu, size: wgpu::Extent3d, format: TextureFormat) -> Arc<Layers> {
-        let mut kept = self.0.lock();
-        let fits = |layers: &&Arc<Layers>| layers.held.size() == size && layers.held.format() == format;
-        match kept.as_ref().filter(fits).filter(|layers| Arc::strong_count(layers) == 1) {
-            Some(layers) => layers.clone(),
-            None => kept.insert(Arc::new(Layers::new(gpu, size, format))).clone(),
-        }
-    }
-}
-
-impl Layers {
-    fn new(gpu: &Gpu, size: wgpu::Extent3d, format: TextureFormat) -> Self {
-        let held = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("held samples"),
-            size,
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        let layer = |base_array_layer| {
-            held.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2),
-                base_array_layer,
-                array_layer_count: Some(1),
-                ..Default::default()
-            })
-        };
-        Self { each: (0..size.depth_or_array_layers).map(layer).collect(), held }
-    }
-
-    /// The first `count` layers, to be read while others are written.
-    fn first(&self, count: usize) -> wgpu::TextureView {
-        self.held.create_view(&wgpu::TextureViewDescriptor {
-            dimension: Some(wgpu::TextureViewDimension::D2Array),
-            array_layer_count: Some(count as u32),
-            ..Default::default()
-        })
-    }
-}
-
 impl KnownSamples {
     /// Layers for the images of a set, which hold nothing yet.
     pub fn of(
@@ -153,47 +112,28 @@ impl KnownSamples {
         cache: &LayerCache,
         cameras: &[PinholeCamera],
         test: RedundancyTest,
+        reference: Option<&TemporalReference>,
     ) -> Result<Self, GpuError> {
         let limits = &gpu.device.limits();
         GpuError::check_limit("images of a set", cameras.len() as u64, limits.max_texture_array_layers.into())?;
         let bytes = (size_of::<KnownCamera>() * cameras.len()) as u64;
         GpuError::check_limit("the cameras of a set (bytes)", bytes, limits.max_uniform_buffer_binding_size)?;
-        let side = |side: fn(&PinholeCamera) -> u32| {
-            if test.traces_rays() { 1 } else { cameras.iter().map(side).max().unwrap_or(1) }
-        };
-        let size = wgpu::Extent3d {
-            width: side(|camera| camera.size_px.x),
-            height: side(|camera| camera.size_px.y),
-            depth_or_array_layers: cameras.len().max(1) as u32,
-        };
+        let largest = cameras.iter().map(|camera| camera.size_px).fold(UVec2::ONE, UVec2::max);
+        let size_px = if test.traces_rays() { UVec2::ONE } else { largest };
         let by_id = test.consults == Evidence::SurfaceIds;
+        let format = if by_id { SURFACE_ID_FORMAT } else { TextureFormat::Rgba32Uint };
         Ok(Self {
             view_cell_m: view_cell_m(cameras),
             cameras: cameras.to_vec(),
             test,
-            layers: cache.of(gpu, size, if by_id { SURFACE_ID_FORMAT } else { TextureFormat::Rgba32Uint }),
-            reference: None,
-            keeps_last: false,
+            layers: cache.of(gpu, [size_px.x, size_px.y, cameras.len().max(1) as u32], format),
+            reference: reference.cloned(),
         })
-    }
-
-    /// After another moment of the same set.
-    pub fn after(self, reference: Option<&TemporalReference>) -> Self {
-        Self { reference: reference.cloned(), ..self }
-    }
-
-    /// The last image's samples are kept, too.
-    pub fn keeping_all(self) -> Self {
-        Self { keeps_last: true, ..self }
     }
 
     /// All images' samples, once they are drawn.
     pub fn into_reference(self) -> TemporalReference {
         TemporalReference { cameras: self.cameras, layers: self.layers }
-    }
-
-    pub fn test(&self) -> RedundancyTest {
-        self.test
     }
 
     /// The switches of tests for an image after `earlier` others.
@@ -206,57 +146,51 @@ impl KnownSamples {
         }
     }
 
-    /// Binds the variables of `known_samples.wgsl`, for an image of the camera `own` after `earlier` others.
-    pub fn bind(
-        &self,
-        gpu: &Gpu,
-        own: &PinholeCamera,
-        earlier: usize,
-        bind: impl FnOnce(Vec<Binding<'_>>) -> Result<wgpu::BindGroup, ShaderError>,
-    ) -> Result<wgpu::BindGroup, ShaderError> {
+    /// The first `earlier` images, for the next one, whose camera is `own`.
+    pub fn predecessors(&self, gpu: &Gpu, earlier: usize, own: &PinholeCamera) -> Predecessors {
         let uniform = |cameras: &[PinholeCamera]| {
             let cameras: Vec<_> = cameras.iter().map(|camera| KnownCamera::of(camera, own)).collect();
             gpu.buffer_with("known cameras", &cameras, BufferUsages::UNIFORM)
         };
-        let (held, cameras) = (self.layers.first(earlier), uniform(&self.cameras[..earlier]));
         let reference = self.reference.as_ref().map(|TemporalReference { cameras, layers }| {
             (layers.first(cameras.len()), uniform(&cameras[earlier..=earlier]))
         });
-        let mut bindings = vec![Binding::texture("known_samples", &held), Binding::buffer("known_cameras", &cameras)];
-        if let Some((samples, camera)) = &reference {
-            bindings
-                .extend([Binding::texture("reference_samples", samples), Binding::buffer("reference_camera", camera)]);
-        }
-        bind(bindings)
+        let (samples, cameras) = (self.layers.first(earlier), uniform(&self.cameras[..earlier]));
+        Predecessors { variant: self.variant(earlier), samples, cameras, reference }
+    }
+}
+
+impl<'a> ImageSequence<'a> {
+    /// The place in its set of an image of the batch, which is also the number of images before it.
+    pub fn number(&self, place: usize) -> usize {
+        self.wanted[self.first + place] as usize
     }
 
-    /// The layer for the `number`-th image's surface ids, where a test consults them.
-    pub fn surface_ids(&self, number: usize) -> Option<&wgpu::TextureView> {
-        self.layer(number, Evidence::SurfaceIds)
+    /// The layer that an image leaves this evidence in for images after it, and the layer's size.
+    pub fn layer(&self, place: usize, evidence: Evidence) -> Option<(&'a TextureView, UVec2)> {
+        let (number, layers) = (self.number(place), &self.known.layers);
+        let is_kept = self.known.test.consults == evidence && number < self.kept;
+        is_kept.then(|| (&layers.each[number], layers.size_px))
     }
+}
 
-    /// The layer for the `number`-th image's samples, where a test consults them.
-    pub fn samples(&self, number: usize) -> Option<&wgpu::TextureView> {
-        self.layer(number, Evidence::Samples)
-    }
-
-    fn layer(&self, number: usize, evidence: Evidence) -> Option<&wgpu::TextureView> {
-        let is_consulted = self.keeps_last || number + 1 < self.layers.each.len();
-        (self.test.consults == evidence && is_consulted).then(|| &self.layers.each[number])
-    }
-
-    /// The largest image's size.
-    pub fn size_px(&self) -> UVec2 {
-        let size = self.layers.held.size();
-        UVec2::new(size.width, size.height)
+impl Predecessors {
+    /// The variables of `known_samples.wgsl`.
+    pub fn bindings(&self) -> Vec<Binding<'_>> {
+        let mut bindings =
+            vec![Binding::texture("known_samples", &self.samples), Binding::buffer("known_cameras", &self.cameras)];
+        bindings.extend(self.reference.iter().flat_map(|(samples, camera)| {
+            [Binding::texture("reference_samples", samples), Binding::buffer("reference_camera", camera)]
+        }));
+        bindings
     }
 }
 
 impl KnownCamera {
     /// `own` is the camera of the image that consults this one.
     fn of(camera: &PinholeCamera, own: &PinholeCamera) -> Self {
-        let column = camera.world_from_camera * glam::Vec3::X / camera.focal_px.x;
-        let row = camera.world_from_camera * glam::Vec3::NEG_Y / camera.focal_px.y;
+        let column = camera.world_from_camera * Vec3::X / camera.focal_px.x;
+        let row = camera.world_from_camera * Vec3::NEG_Y / camera.focal_px.y;
         let size = camera.size_px.as_vec2();
         Self {
             homogeneous_pixel_from_own: homogeneous_pixel_from_own(camera, own),

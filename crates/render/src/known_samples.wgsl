@@ -14,9 +14,6 @@ struct KnownCamera {
     row_in_world: vec3f,
     rows: f32,
     near_m: f32,
-    padding_0: f32,
-    padding_1: f32,
-    padding_2: f32,
 }
 
 // A sample that the image would show.
@@ -62,8 +59,6 @@ fn nearest_texel(camera: KnownCamera, homogeneous: vec3f) -> vec2u {
 // The samples of this set at its reference time, and this image's camera then.
 @group({{ known_group }}) var reference_samples: texture_2d_array<u32>;
 @group({{ known_group }}) var<uniform> reference_camera: KnownCamera;
-
-const REFERENCE_FOOTPRINTS: f32 = {{ REFERENCE_FOOTPRINTS }};
 
 fn was_kept(candidate: Candidate) -> bool {
     let p = homogeneous_in(reference_camera, candidate);

@@ -59,19 +59,16 @@ const DEFAULT_TOLERANCE: f32 = 0.04;
 
 /// A text that names no lighting.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming variants")]
 pub enum UnknownLighting {
-    /// A term with an unknown name.
     #[error(
         "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, adaptive, adaptive TOLERANCE with commas between them"
     )]
     Term(String),
-    /// A number of rays that cannot be.
     #[error("lighting {0:?}: rays must be from 1 to {MAX_RAYS}")]
     Rays(String),
-    /// A radius or tolerance that cannot be.
     #[error("lighting {0:?}: {1} must be a positive number")]
     Number(String, &'static str),
-    /// Two terms that say different things.
     #[error("lighting {0:?}: {1}")]
     Conflict(String, &'static str),
 }
@@ -79,8 +76,6 @@ pub enum UnknownLighting {
 impl Lighting {
     /// Base colours as they are.
     pub const UNLIT: Self = Self { direct: Direct::Unlit, occlusion: None, rate: Rate::Full };
-    /// Lamps without shadows.
-    pub const PHONG: Self = Self { direct: Direct::Phong, occlusion: None, rate: Rate::Full };
 
     /// Whether anything arrives at surfaces.
     #[must_use]

@@ -67,8 +67,8 @@ impl PixelCamera {
     }
 }
 
-/// A uniform of all cameras, each at its offset.
-pub(crate) fn uniform(gpu: &Gpu, cameras: &[PixelCamera]) -> wgpu::Buffer {
-    let bytes = uniform_elements(cameras.iter().map(bytemuck::bytes_of));
-    gpu.buffer_with("pixel cameras", &bytes, BufferUsages::UNIFORM)
+/// A uniform of elements, each at its dynamic offset.
+pub(crate) fn uniform<E: Pod>(gpu: &Gpu, label: &str, elements: impl Iterator<Item = E>) -> wgpu::Buffer {
+    let elements: Vec<E> = elements.collect();
+    gpu.buffer_with(label, &uniform_elements(elements.iter().map(bytemuck::bytes_of)), BufferUsages::UNIFORM)
 }

@@ -1,28 +1,62 @@
-//! Finished planes: words that a batch wrote, plane by plane and camera by camera, to views and depth images.
+//! Finished planes: those that are asked for, and the words that a batch wrote, plane by plane and camera by camera, as views
+//! and depth images.
 
 use depth_image::{
-    Camera, DepthImage, PinholeCamera, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View, ViewPlanes,
+    Camera, DepthImage, Highlight, PinholeCamera, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View,
+    ViewPlanes,
 };
 
+use crate::sums::SumPlanes;
+
+/// What a batch writes of each pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub(crate) struct Output {
+    pub sums: SumPlanes,
+    /// Samples of depth images, or else colours of views.
+    pub samples: bool,
+    /// Highlights of a view, for its own eye.
+    pub highlight: Option<Highlight>,
+    pub normal: bool,
+    pub reflector: bool,
+    pub surface_id: bool,
+    /// Whether redundant surfaces lie before the sample.
+    pub passed: bool,
+    /// The template of the test that samples behind redundant ones must pass.
+    pub usefulness_test: Option<&'static str>,
+}
+
 /// The places of planes among those of a camera, after colour (0) and inverse depth (1).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct PlaneLayout {
     pub normal: Option<usize>,
     /// Words of visibility follow.
     pub reflector: Option<usize>,
-    pub visibility_words: usize,
     /// Instance and primitive.
     pub surface_id: Option<usize>,
     pub passed: Option<usize>,
     pub count: usize,
 }
 
-/// Each camera with its planes.
-fn split<'a>(
-    mut words: &'a [u32],
-    planes: usize,
-    cameras: &'a [PinholeCamera],
-) -> impl Iterator<Item = (&'a PinholeCamera, Vec<&'a [u32]>)> {
+impl Output {
+    /// The places of planes among those of a camera.
+    pub fn layout(&self) -> PlaneLayout {
+        let mut count = 2;
+        let mut place = |is: bool, planes: usize| {
+            let first = is.then_some(count);
+            count += if is { planes } else { 0 };
+            first
+        };
+        let normal = place(self.normal, 1);
+        let reflector = place(self.reflector, 1 + self.sums.visibility_words());
+        let surface_id = place(self.surface_id, 2);
+        let passed = place(self.passed, 1);
+        PlaneLayout { normal, reflector, surface_id, passed, count }
+    }
+}
+
+/// A camera and its planes.
+type Picture<'a> = (&'a PinholeCamera, Vec<&'a [u32]>);
+
+fn split<'a>(mut words: &'a [u32], planes: usize, cameras: &'a [PinholeCamera]) -> impl Iterator<Item = Picture<'a>> {
     cameras.iter().map(move |camera| {
         let (own, rest) = words.split_at(camera.pixel_count() * planes);
         words = rest;
@@ -30,40 +64,32 @@ fn split<'a>(
     })
 }
 
-pub(crate) fn views(
-    words: &[u32],
-    layout: PlaneLayout,
-    cameras: &[PinholeCamera],
-    planes: ViewPlanes,
-    views: &mut Vec<View>,
-) {
-    for (camera, own) in split(words, layout.count, cameras) {
+pub(crate) fn views(words: &[u32], output: Output, cameras: &[PinholeCamera], planes: ViewPlanes) -> Vec<View> {
+    let view = |(camera, own): Picture<'_>| {
         let inverse_depth: &[f32] = bytemuck::cast_slice(own[1]);
         let hit =
             |&inverse: &f32| if inverse > 0.0 { Provenance::new(ProvenanceKind::Hit, 0) } else { Provenance::EMPTY };
         let rgb = |word: &u32| word.to_le_bytes().into_iter().take(3);
-        views.push(View {
+        View {
             size_px: camera.size_px,
             srgb8: own[0].iter().flat_map(rgb).collect(),
             inverse_depth_per_m: planes.inverse_depth.then(|| inverse_depth.to_vec()),
             provenance: planes.provenance.then(|| inverse_depth.iter().map(hit).collect()),
-        });
-    }
+        }
+    };
+    split(words, output.layout().count, cameras).map(view).collect()
 }
 
-pub(crate) fn depth_images(
-    words: &[u32],
-    layout: PlaneLayout,
-    cameras: &[PinholeCamera],
-    images: &mut Vec<DepthImage>,
-) {
-    for (camera, own) in split(words, layout.count, cameras) {
+pub(crate) fn depth_images(words: &[u32], output: Output, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
+    let layout = output.layout();
+    let image = |(camera, own): Picture<'_>| {
+        let visibility = |reflector: usize| &own[reflector + 1..][..output.sums.visibility_words()];
         let specular = |reflector: usize| SpecularPlanes {
             reflectance_srgb8_roughness8: own[reflector].to_vec(),
-            visibility8: own[reflector + 1..][..layout.visibility_words].iter().map(|plane| plane.to_vec()).collect(),
+            visibility8: visibility(reflector).iter().map(|plane| plane.to_vec()).collect(),
         };
         let id = |(&instance, &primitive): (&u32, &u32)| SurfaceId { instance, primitive };
-        images.push(DepthImage {
+        DepthImage {
             camera: Camera::Pinhole(*camera),
             inverse_depth_per_m: bytemuck::cast_slice(own[1]).to_vec(),
             color_rgb9e5: own[0].to_vec(),
@@ -72,8 +98,9 @@ pub(crate) fn depth_images(
             specular: layout.reflector.map(specular),
             passed: layout.passed.and_then(|passed| passed_plane(own[passed])),
             corner_inverse_depth_per_m: None,
-        });
-    }
+        }
+    };
+    split(words, layout.count, cameras).map(image).collect()
 }
 
 /// `None` where no ray passed anything.

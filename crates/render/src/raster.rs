@@ -1,24 +1,22 @@
 //! Rasterising with reversed depth, infinitely far: inverse depth comes out of the depth buffer exact.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Highlight, PinholeCamera};
 use glam::{Mat4, Vec4};
 use gpu::{
     Binding, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ResourceTrait, ResourceTraits, ShaderVariant,
-    Templates, highlight_name, switches, uniform_elements, uniform_stride,
+    Templates, highlight_name, switches, uniform_stride,
 };
 use minijinja::{Value, context};
 
+use crate::gpu_scene::{Draw, GpuObject, MaterialTraits};
+use crate::known_samples::{Predecessors, RedundancyVariant};
+use crate::surfaces::{NOTHING, SURFACE_FORMAT, SURFACE_ID_FORMAT, Surfaces};
 use crate::{
-    GpuScene, RenderError,
-    cluster::Frustum,
-    gpu_scene::{GpuObject, MaterialTraits},
-    image_sequence::Predecessors,
-    known_samples::RedundancyVariant,
-    redundancy_test::RedundancyTest,
-    surfaces::{NOTHING, SURFACE_FORMAT, SURFACE_ID_FORMAT, Surfaces},
+    GpuScene, RenderError, batch::Recording, cluster::Frustum, pixel_camera::uniform, redundancy_test::RedundancyTest,
+    work::DrawWork,
 };
 
 /// The group of known samples.
@@ -43,19 +41,7 @@ pub(crate) struct RasterCamera {
     pub scene_time_s: f32,
     pub near_m: f32,
     pub footprint: f32,
-    pub padding_0: u32,
-    pub padding_1: u32,
-}
-
-/// The surfaces to draw, besides the cameras.
-#[derive(Clone, Copy)]
-pub(crate) struct RasterWork<'a> {
-    pub scene: &'a GpuScene,
-    pub shading: Option<Highlight>,
-    pub scene_time_s: f32,
-    pub surface_id: bool,
-    /// The images whose samples are not drawn again, of a single camera.
-    pub predecessors: Option<Predecessors<'a>>,
+    pub padding: [u32; 2],
 }
 
 /// The resources of all draws of a submission.
@@ -73,12 +59,6 @@ pub(crate) struct Raster {
 }
 
 impl RasterVariant {
-    fn of(work: &RasterWork<'_>, material: MaterialTraits, depth_only: bool) -> Self {
-        let RasterWork { shading, surface_id, .. } = *work;
-        let redundancy = work.predecessors.filter(|_| !depth_only).map(Predecessors::variant);
-        Self { material, shading, surface_id, depth_only, wind: work.scene.is_animated(), redundancy }
-    }
-
     /// The variants of one material with each redundancy test that needs no rays.
     pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
         let tests: Vec<_> = tests.iter().copied().filter(|test| !test.traces_rays()).collect();
@@ -152,25 +132,41 @@ impl Raster {
         Self { gpu: gpu.clone(), sampler, passes: PassCache::new(gpu, templates) }
     }
 
-    /// Records one pass for each camera. Where samples may be redundant a pass before it draws the nearest depth: a test that
-    /// noted what it discards would write memory, and no fragment could be spared it by its depth.
+    /// Records one pass for each camera from the `first` on. With predecessors, whose samples are not drawn again, there is one
+    /// camera, and a pass before it draws the nearest depth: a test that noted what it discards would write memory, and no
+    /// fragment could be spared it by its depth.
     pub fn record(
         &self,
-        frame: &mut Frame<'_>,
-        work: RasterWork<'_>,
-        cameras: &[PinholeCamera],
-        surfaces: &[Surfaces],
+        recording: &mut Recording<'_>,
+        (first, surfaces): (usize, &[Surfaces]),
+        predecessors: Option<&Predecessors>,
     ) -> Result<(), RenderError> {
-        let groups = work.scene.draws.first().map(|draw| self.groups(&work, draw.material, cameras)).transpose()?;
+        let Recording { batch, frame, .. } = recording;
+        let scene = batch.work.scene;
+        let shown = RasterVariant {
+            material: MaterialTraits::default(),
+            shading: batch.work.lighting.highlight(),
+            surface_id: surfaces.iter().any(|target| target.surface_ids.is_some()),
+            depth_only: false,
+            wind: scene.animated,
+            redundancy: predecessors.map(|images| images.variant),
+        };
+        let front = RasterVariant { depth_only: true, redundancy: None, ..shown };
+        let cameras = &batch.cameras[first..][..surfaces.len()];
+        let groups = scene.draws.first().map(|draw| {
+            let pass = self.passes.get(&RasterVariant { material: draw.material, ..shown })?;
+            self.groups(&pass, &batch.work, cameras, predecessors)
+        });
+        let groups = groups.transpose()?;
         for (place, (camera, target)) in (0..).zip(cameras.iter().zip(surfaces)) {
-            if work.predecessors.is_some() {
-                let mut pass = begin_pass(frame, &[], target.front_depth());
-                self.draw(&mut pass, &work, (place, camera), groups.as_ref(), true)?;
+            if predecessors.is_some() {
+                let mut pass = begin_pass(frame, &[], &target.views.front_depth);
+                self.draw(&mut pass, scene, front, (place, camera), groups.as_ref())?;
             }
-            let ids = target.surface_ids().filter(|_| work.surface_id);
-            let colors: Vec<_> = std::iter::once(&target.surfaces).chain(ids).map(attachment).map(Some).collect();
-            let mut pass = begin_pass(frame, &colors, &target.reversed_depth);
-            self.draw(&mut pass, &work, (place, camera), groups.as_ref(), false)?;
+            let colors: Vec<_> =
+                std::iter::once(&target.views.surfaces).chain(&target.surface_ids).map(attachment).map(Some).collect();
+            let mut pass = begin_pass(frame, &colors, &target.views.reversed_depth);
+            self.draw(&mut pass, scene, shown, (place, camera), groups.as_ref())?;
         }
         Ok(())
     }
@@ -178,27 +174,27 @@ impl Raster {
     fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        work: &RasterWork<'_>,
+        scene: &GpuScene,
+        variant: RasterVariant,
         (place, camera): (u32, &PinholeCamera),
         groups: Option<&Groups>,
-        depth_only: bool,
     ) -> Result<(), RenderError> {
         let Some(groups) = groups else { return Ok(()) };
-        let scene = work.scene;
         // Layers of a set are as large as its largest image.
         let size = camera.size_px.as_vec2();
         pass.set_viewport(0.0, 0.0, size.x, size.y, 0.0, 1.0);
         pass.set_vertex_buffer(0, scene.vertices.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.set_bind_group(0, &groups.scene, &[place * CAMERA_STRIDE]);
-        if let Some(known) = groups.known.as_ref().filter(|_| !depth_only) {
+        if let Some(known) = groups.known.as_ref().filter(|_| variant.redundancy.is_some()) {
             pass.set_bind_group(KNOWN_GROUP, known, &[]);
         }
         let (mut material, mut texture, mut object) = (None, None, None);
         for run in visible_runs(scene, &Frustum::of(camera)) {
             let draw = &scene.draws[run.draw];
             if material.replace(draw.material) != Some(draw.material) {
-                pass.set_pipeline(self.passes.get(&RasterVariant::of(work, draw.material, depth_only))?.pipeline());
+                let variant = RasterVariant { material: draw.material, ..variant };
+                pass.set_pipeline(self.passes.get(&variant)?.pipeline());
             }
             if object.replace(draw.object) != Some(draw.object) {
                 pass.set_bind_group(1, &groups.object, &[draw.object * OBJECT_STRIDE]);
@@ -206,8 +202,8 @@ impl Raster {
             if texture.replace(draw.texture) != Some(draw.texture) {
                 pass.set_bind_group(2, &groups.textures[draw.texture as usize], &[]);
             }
-            let first_primitive = run.first_index / 3;
-            pass.draw_indexed(run.first_index..run.end_index, draw.base_vertex, first_primitive..first_primitive + 1);
+            let first_primitive = run.indices.start / 3;
+            pass.draw_indexed(run.indices, draw.base_vertex, first_primitive..first_primitive + 1);
         }
         Ok(())
     }
@@ -215,15 +211,14 @@ impl Raster {
     /// Groups that fit the variants of all materials.
     fn groups(
         &self,
-        work: &RasterWork<'_>,
-        material: MaterialTraits,
+        pass: &DrawPass,
+        work: &DrawWork<'_>,
         cameras: &[PinholeCamera],
+        predecessors: Option<&Predecessors>,
     ) -> Result<Groups, RenderError> {
-        let pass = self.passes.get(&RasterVariant::of(work, material, false))?;
         let scene = work.scene;
-        let cameras: Vec<_> = cameras.iter().map(|camera| RasterCamera::of(camera, work.scene_time_s)).collect();
-        let uniform = uniform_elements(cameras.iter().map(bytemuck::bytes_of));
-        let cameras = self.gpu.buffer_with("raster cameras", &uniform, wgpu::BufferUsages::UNIFORM);
+        let cameras = cameras.iter().map(|camera| RasterCamera::of(camera, work.scene_time_s));
+        let cameras = uniform(&self.gpu, "raster cameras", cameras);
         let textures = |[base_color, metallic_roughness]: &[wgpu::TextureView; 2]| {
             let views = [
                 Binding::texture("base_color_texture", base_color),
@@ -232,13 +227,12 @@ impl Raster {
             ];
             pass.bind(2, views)
         };
-        let bind_known = |bindings: Vec<Binding<'_>>| pass.bind(KNOWN_GROUP, bindings);
+        let own = [Binding::buffer("camera", &cameras), Binding::buffer("surroundings", &scene.surroundings)];
         Ok(Groups {
-            scene: pass
-                .bind(0, [Binding::buffer("camera", &cameras), Binding::buffer("surroundings", &scene.surroundings)])?,
+            scene: pass.bind(0, own)?,
             object: pass.bind(1, [Binding::buffer("object", &scene.objects)])?,
             textures: scene.textures.iter().map(textures).collect::<Result<_, _>>()?,
-            known: work.predecessors.map(|images| images.bind(&self.gpu, bind_known)).transpose()?,
+            known: predecessors.map(|images| pass.bind(KNOWN_GROUP, images.bindings())).transpose()?,
         })
     }
 }
@@ -254,8 +248,7 @@ impl RasterCamera {
             scene_time_s,
             near_m: camera.near_m,
             footprint: camera.focal_px.min_element().recip(),
-            padding_0: 0,
-            padding_1: 0,
+            padding: [0; 2],
         }
     }
 }
@@ -263,21 +256,18 @@ impl RasterCamera {
 /// Neighbouring clusters drawn in one call, and the first of them.
 struct Run {
     draw: usize,
-    first_index: u32,
-    end_index: u32,
+    indices: Range<u32>,
 }
 
 fn visible_runs(scene: &GpuScene, frustum: &Frustum) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     let visible = scene.draws.iter().enumerate().filter(|(_, draw)| frustum.may_see(&draw.bounds_in_world));
+    let joins =
+        |run: &Run, draw: &Draw| (scene.draws[run.draw].object, run.indices.end) == (draw.object, draw.indices.start);
     for (number, draw) in visible {
         match runs.last_mut() {
-            Some(run) if scene.draws[run.draw].joins(run.end_index, draw) => run.end_index += draw.index_count,
-            _ => runs.push(Run {
-                draw: number,
-                first_index: draw.first_index,
-                end_index: draw.first_index + draw.index_count,
-            }),
+            Some(run) if joins(run, draw) => run.indices.end = draw.indices.end,
+            _ => runs.push(Run { draw: number, indices: draw.indices.clone() }),
         }
     }
     runs

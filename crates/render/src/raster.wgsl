@@ -27,8 +27,6 @@ struct RasterCamera {
     near_m: f32,
     // A pixel's side at a depth of one metre.
     footprint: f32,
-    padding_0: u32,
-    padding_1: u32,
 }
 
 @group(0) var<uniform> camera: RasterCamera;

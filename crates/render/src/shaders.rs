@@ -1,67 +1,32 @@
 //! The shader templates of this crate, the numbers that they share with Rust, and all their variants.
 
-use gpu::{ShaderError, ShaderSource, Templates, source, sources, wgsl_constants};
+use gpu::{ShaderError, ShaderSource, Templates, source, wgsl_constants, wgsl_files};
 
+use crate::known_samples::{LEAST_FACING, REFERENCE_FOOTPRINTS};
+use crate::rays::flat::{ALPHA_TESTED, DOUBLE_SIDED, SPECULAR, UNLIT, VERTEX};
+use crate::rays::primary::{MOST_LAYERS, Primary};
+use crate::rays::traversal::{BOX_SLACK, EDGE_ROUNDINGS};
 use crate::{
-    finish::FinishVariant,
-    illuminate::{GRID_PX, IlluminateVariant},
-    interpolate::InterpolateVariant,
-    keep::KeepVariant,
-    known_samples::{LEAST_FACING, REFERENCE_FOOTPRINTS},
-    pixel_list::LIST_WORKGROUP,
-    raster::RasterVariant,
-    rays::{
-        flat::{ALPHA_TESTED, DOUBLE_SIDED, SPECULAR, UNLIT, VERTEX},
-        primary::{MOST_LAYERS, PrimaryVariant},
-        traversal::{BOX_SLACK, EDGE_ROUNDINGS},
-    },
-    redundancy_test::RedundancyTest,
-    sums::COLOR_SUMS,
-    surfaces::NOTHING,
+    finish::Finish, illuminate::Illuminate, interpolate::Interpolate, keep::Keep, pixel_list::LIST_WORKGROUP,
+    raster::RasterVariant, redundancy_test::RedundancyTest, sums::COLOR_SUMS, surfaces::NOTHING,
 };
 
 /// The shader templates of this crate.
-pub const SHADERS: &[(&str, &str)] = &[
-    ("raster.wgsl", include_str!("raster.wgsl")),
-    ("packed_surface.wgsl", include_str!("packed_surface.wgsl")),
-    ("surfaces.wgsl", include_str!("surfaces.wgsl")),
-    ("albedo.wgsl", include_str!("albedo.wgsl")),
-    ("camera.wgsl", include_str!("camera.wgsl")),
-    ("sequence.wgsl", include_str!("sequence.wgsl")),
-    ("sums.wgsl", include_str!("sums.wgsl")),
-    ("illuminate.wgsl", include_str!("illuminate.wgsl")),
-    ("interpolate.wgsl", include_str!("interpolate.wgsl")),
-    ("finish.wgsl", include_str!("finish.wgsl")),
-    ("known_samples.wgsl", include_str!("known_samples.wgsl")),
-    ("keep.wgsl", include_str!("keep.wgsl")),
-    ("footprint.wgsl", include_str!("footprint.wgsl")),
-    ("rays/traverse.wgsl", include_str!("rays/traverse.wgsl")),
-    ("rays/material.wgsl", include_str!("rays/material.wgsl")),
-    ("rays/primary.wgsl", include_str!("rays/primary.wgsl")),
-];
+pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
+    "raster.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "sequence.wgsl", "sums.wgsl",
+    "illuminate.wgsl", "interpolate.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl",
+    "rays/traverse.wgsl", "rays/material.wgsl", "rays/primary.wgsl"
+};
 
 /// [`SHADERS`] and templates of redundancy tests, each with its name.
 ///
 /// # Errors
 /// When a text is not a template.
 pub fn templates(tests: &[(&'static str, &'static str)]) -> Result<Templates, ShaderError> {
-    let constants = wgsl_constants![
-        ALPHA_TESTED,
-        BOX_SLACK,
-        COLOR_SUMS,
-        DOUBLE_SIDED,
-        EDGE_ROUNDINGS,
-        GRID_PX,
-        LEAST_FACING,
-        LIST_WORKGROUP,
-        MOST_LAYERS,
-        NOTHING,
-        REFERENCE_FOOTPRINTS,
-        SPECULAR,
-        UNLIT,
-        VERTEX,
-    ];
-    Ok(Templates::new(&[SHADERS, tests].concat())?.with_constants(constants))
+    Ok(Templates::new(&[SHADERS, tests].concat())?.declaring(wgsl_constants! {
+        ALPHA_TESTED, BOX_SLACK, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MOST_LAYERS,
+        NOTHING, REFERENCE_FOOTPRINTS, SPECULAR, UNLIT, VERTEX
+    }))
 }
 
 /// Every shader in the variants that stand for all, with `tests` that `templates` hold.
@@ -69,13 +34,8 @@ pub fn shader_sources<'t>(
     templates: &'t Templates,
     tests: &'t [RedundancyTest],
 ) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    sources::<RasterVariant>(templates)
-        .chain(sources::<PrimaryVariant>(templates))
-        .chain(sources::<KeepVariant>(templates))
-        .chain(sources::<IlluminateVariant>(templates))
-        .chain(sources::<InterpolateVariant>(templates))
-        .chain(sources::<FinishVariant>(templates))
+    gpu::shader_sources!(templates, RasterVariant, Primary, Keep, Illuminate, Interpolate, Finish)
         .chain(RasterVariant::with_tests(tests).map(|variant| source(templates, &variant)))
-        .chain(PrimaryVariant::with_tests(tests).map(|variant| source(templates, &variant)))
-        .chain(FinishVariant::with_tests(tests).map(|variant| source(templates, &variant)))
+        .chain(Primary::with_tests(tests).map(|variant| source(templates, &variant)))
+        .chain(Finish::with_tests(tests).map(|variant| source(templates, &variant)))
 }

@@ -8,7 +8,7 @@ use minijinja::{Value, context};
 pub(crate) const COLOR_SUMS: u32 = 6;
 
 /// The quantities that are summed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub(crate) struct SumPlanes {
     pub light_count: usize,
     /// Counts of unblocked rays to each light, for highlights.

@@ -2,5 +2,13 @@
 // environment, three planes each, and how many rays reached the environment and each lamp.
 const LAMPS: u32 = 0u;
 const ENVIRONMENT: u32 = 3u;
-const OPEN_TO_ENVIRONMENT: u32 = {{ COLOR_SUMS }};
+const OPEN_TO_ENVIRONMENT: u32 = COLOR_SUMS;
 const OPEN_TO_LAMPS: u32 = OPEN_TO_ENVIRONMENT + 1u;
+
+fn sum_at(plane: u32, place: u32) -> f32 { return sums[camera.first_sum + plane * camera.pixel_count + place]; }
+
+fn light_at(place: u32) -> vec3f {
+    let lamps = vec3f(sum_at(LAMPS, place), sum_at(LAMPS + 1u, place), sum_at(LAMPS + 2u, place));
+    let environment = vec3f(sum_at(ENVIRONMENT, place), sum_at(ENVIRONMENT + 1u, place), sum_at(ENVIRONMENT + 2u, place));
+    return lamps / f32(camera.shadow_rays_in_sum) + environment / f32(camera.occlusion_rays_in_sum);
+}

@@ -6,12 +6,9 @@ use glam::UVec2;
 use gpu::{Binding, DevicePreference, Gpu, ShaderInterface, ShaderSource, ShaderVariant, Templates, source};
 use wgpu::BufferUsages;
 
-use crate::{
-    GpuScene,
-    redundancy_test::{Evidence, RedundancyTest},
-    shaders::templates,
-    surfaces::{SurfaceKind, SurfacePool, Surfaces},
-};
+use crate::redundancy_test::{Evidence, RedundancyTest};
+use crate::surfaces::{SurfaceKind, SurfacePool, Surfaces};
+use crate::{GpuScene, shaders::templates};
 
 const NEVER: &str = "fn is_redundant_with(c: Candidate, number: u32, camera: KnownCamera) -> bool { return false; }";
 
@@ -44,7 +41,7 @@ impl TestStage {
     }
 
     pub fn surfaces(&self, by_rays: bool, surface_id: bool) -> Surfaces {
-        self.surfaces.lend(SurfaceKind { size_px: UVec2::ONE, by_rays, surface_id, front: true })
+        self.surfaces.lend(SurfaceKind { size_px: UVec2::ONE, by_rays, surface_id, front: true }, None)
     }
 
     /// Fails unless the bindings name all variables of a group, each once.

@@ -3,6 +3,7 @@
 use depth_image::{linear_from_srgb8, srgb8_from_linear};
 use gpu::Gpu;
 use scene::Texture;
+use wgpu::util::{DeviceExt as _, TextureDataOrder};
 
 /// One texel of white, for materials without a texture.
 pub(crate) fn white() -> Texture {
@@ -12,40 +13,25 @@ pub(crate) fn white() -> Texture {
 /// Uploads a texture and all of its mip levels.
 pub(crate) fn upload(gpu: &Gpu, texture: &Texture) -> wgpu::TextureView {
     let size = wgpu::Extent3d { width: texture.width_px, height: texture.height_px, depth_or_array_layers: 1 };
-    let levels = size.max_mips(wgpu::TextureDimension::D2);
-    let on_device = gpu.device.create_texture(&wgpu::TextureDescriptor {
+    let descriptor = wgpu::TextureDescriptor {
         label: Some("material texture"),
         size,
-        mip_level_count: levels,
+        mip_level_count: size.max_mips(wgpu::TextureDimension::D2),
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format: if texture.is_srgb { wgpu::TextureFormat::Rgba8UnormSrgb } else { wgpu::TextureFormat::Rgba8Unorm },
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
         view_formats: &[],
-    });
-    for (mip, level) in (0..levels).zip(mips(texture)) {
-        write_level(gpu, &on_device, mip, &level);
-    }
-    on_device.create_view(&wgpu::TextureViewDescriptor::default())
+    };
+    let texels: Vec<u8> = mips(texture).flat_map(|level| level.srgba8).collect();
+    let texture = gpu.device.create_texture_with_data(&gpu.queue, &descriptor, TextureDataOrder::MipMajor, &texels);
+    texture.create_view(&Default::default())
 }
 
 /// The texture and its halves, down to one texel.
 pub(crate) fn mips(texture: &Texture) -> impl Iterator<Item = Texture> {
     let next = |level: &Texture| (level.width_px.max(level.height_px) > 1).then(|| halved(level));
     std::iter::successors(Some(texture.clone()), next)
-}
-
-fn write_level(gpu: &Gpu, texture: &wgpu::Texture, mip_level: u32, level: &Texture) {
-    let destination = wgpu::TexelCopyTextureInfo {
-        texture,
-        mip_level,
-        origin: wgpu::Origin3d::ZERO,
-        aspect: wgpu::TextureAspect::All,
-    };
-    let layout =
-        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(level.width_px * 4), rows_per_image: None };
-    let size = wgpu::Extent3d { width: level.width_px, height: level.height_px, depth_or_array_layers: 1 };
-    gpu.queue.write_texture(destination, &level.srgba8, layout, size);
 }
 
 /// Half the size, each texel the mean of up to four; of colours in linear light.

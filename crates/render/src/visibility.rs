@@ -3,11 +3,6 @@
 
 use std::{fmt, str::FromStr};
 
-use glam::UVec2;
-use parking_lot::Mutex;
-
-use crate::{GpuScene, RenderError};
-
 /// The ways of finding surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Visibility {
@@ -53,12 +48,8 @@ impl fmt::Display for Choice {
 impl FromStr for Visibility {
     type Err = UnknownVisibility;
     fn from_str(text: &str) -> Result<Self, UnknownVisibility> {
-        match text {
-            "measured" => Ok(Self::Measured),
-            "triangles" => Ok(Self::Triangles),
-            "rays" => Ok(Self::Rays),
-            other => Err(UnknownVisibility(other.to_owned())),
-        }
+        let ways = [Self::Measured, Self::Triangles, Self::Rays];
+        ways.into_iter().find(|way| way.to_string() == text).ok_or_else(|| UnknownVisibility(text.to_owned()))
     }
 }
 
@@ -69,29 +60,5 @@ impl fmt::Display for Visibility {
             Self::Triangles => "triangles",
             Self::Rays => "rays",
         })
-    }
-}
-
-/// The choices that have been measured.
-#[derive(Default)]
-pub(crate) struct Choices(Mutex<Vec<((u64, UVec2), Choice)>>);
-
-impl Choices {
-    /// The choice for one scene and size; `seconds` measures both ways the first time.
-    pub fn get_or_measure(
-        &self,
-        scene: &GpuScene,
-        size_px: UVec2,
-        seconds: impl Fn(Visibility) -> Result<f64, RenderError>,
-    ) -> Result<Choice, RenderError> {
-        let mut measured = self.0.lock();
-        let key = (scene.identity(), size_px);
-        if let Some((_, choice)) = measured.iter().find(|(other, _)| *other == key) {
-            return Ok(*choice);
-        }
-        let choice = Choice { triangles_s: seconds(Visibility::Triangles)?, rays_s: seconds(Visibility::Rays)? };
-        tracing::info!(%size_px, %choice, "surfaces are found by");
-        measured.push((key, choice));
-        Ok(choice)
     }
 }

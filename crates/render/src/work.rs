@@ -1,5 +1,7 @@
 //! Requests to draw, besides the cameras.
 
+use depth_image::Highlight;
+
 use crate::{GpuScene, Lighting, Visibility};
 
 /// A scene at a moment, and how it is drawn.
@@ -20,6 +22,11 @@ impl DrawWork<'_> {
     /// The same surfaces, without light.
     pub(crate) fn unlit(self) -> Self {
         Self { lighting: Lighting::UNLIT, refinement: Refinement::default(), ..self }
+    }
+
+    /// The formula of highlights, where the scene has any.
+    pub(crate) fn highlight(self) -> Option<Highlight> {
+        self.lighting.highlight().filter(|&highlight| self.scene.has_highlights(highlight))
     }
 }
 

@@ -15,14 +15,6 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// Makes a renderer of its own.
-    ///
-    /// # Errors
-    /// When a shader is broken.
-    pub fn new(gpu: &Arc<Gpu>) -> Result<Self, SamplingError> {
-        Ok(Self::sharing(Arc::new(renderer(gpu)?)))
-    }
-
     /// Uses what [`renderer`] made.
     #[must_use]
     pub fn sharing(renderer: Arc<Renderer>) -> Self {
@@ -63,5 +55,5 @@ fn check_wanted(work: &SampleWork<'_>) -> Result<(), SamplingError> {
 /// # Errors
 /// When a shader is broken.
 pub fn renderer(gpu: &Arc<Gpu>) -> Result<Renderer, RenderError> {
-    Ok(Renderer::with_templates(gpu, templates()?))
+    Ok(Renderer::new(gpu, templates()?))
 }

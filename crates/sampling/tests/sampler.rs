@@ -6,7 +6,7 @@ use depth_image::{Camera, CameraError, DepthImage, ViewCell};
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, SamplePlanes, Visibility};
-use sampling::{Rig, SampleWork, Sampler, SamplingError, SamplingMethod};
+use sampling::{Rig, SampleWork, Sampler, SamplingError, SamplingMethod, renderer};
 use scene::procedural::courtyard;
 
 struct Device {
@@ -22,7 +22,7 @@ fn device() -> &'static Device {
         let gpu: Arc<Gpu> = Gpu::open(DevicePreference::Software).expect("a software device");
         let yard = courtyard();
         Device {
-            sampler: Sampler::new(&gpu).expect("a sampler"),
+            sampler: Sampler::sharing(Arc::new(renderer(&gpu).expect("a renderer"))),
             scene: GpuScene::upload(&gpu, &yard).expect("a scene"),
             rig: Rig::two_plane(&yard.bounds(), 2.5).expect("a rig"),
         }
@@ -32,7 +32,7 @@ fn device() -> &'static Device {
 fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, SamplingError> {
     let draw = DrawWork {
         scene: &device().scene,
-        lighting: Lighting::PHONG,
+        lighting: Lighting::default(),
         scene_time_s: 0.0,
         visibility: Visibility::Triangles,
         refinement: Refinement::default(),

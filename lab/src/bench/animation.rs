@@ -68,11 +68,15 @@ fn moments(args: &BenchArgs, engine: &GpuEngine, scene: &GpuScene, setup: &Setup
         progress.inc(1);
         anyhow::Ok(Tree { report, ready_s, sample_set_s })
     };
-    scene.rebuilt_acceleration(0.0)?;
+    scene.forget_acceleration();
+    scene.acceleration(0.0)?;
     // Trees are refitted one after the other, as in an animation, and then all rebuilt.
     let chosen = times_s.iter().map(|&t| tree(t, GpuScene::acceleration)).collect::<anyhow::Result<Vec<_>>>()?;
-    let rebuilt =
-        times_s.iter().map(|&t| tree(t, GpuScene::rebuilt_acceleration)).collect::<anyhow::Result<Vec<_>>>()?;
+    let new = |scene: &GpuScene, time_s: f32| {
+        scene.forget_acceleration();
+        scene.acceleration(time_s)
+    };
+    let rebuilt = times_s.iter().map(|&t| tree(t, new)).collect::<anyhow::Result<Vec<_>>>()?;
     progress.finish_and_clear();
     let pairs = times_s.into_iter().zip(chosen.into_iter().zip(rebuilt));
     Ok(pairs.map(|(scene_time_s, (chosen, rebuilt))| Moment { scene_time_s, chosen, rebuilt }).collect())

@@ -44,7 +44,7 @@ const NONE: [Point; 0] = [];
 pub(super) fn total_time_chart(rows: &[Row]) -> XyChart {
     let chart =
         XyChart::new("Total time against views, by lighting", Axis::log("views V", ""), Axis::log("total time", "s"));
-    let mut chart = rows.iter().filter(|row| row.lighting != Lighting::PHONG).fold(chart, |chart, row| {
+    let mut chart = rows.iter().filter(|row| row.lighting != Lighting::default()).fold(chart, |chart, row| {
         let direct = VIEWS.map(|views| (views as f64, row.direct_view_s * views as f64));
         let predicted = VIEWS.map(|views| (views as f64, row.predicted_s(views)));
         let measured = row.pipelines.iter().map(|&(views, seconds)| (views as f64, seconds));

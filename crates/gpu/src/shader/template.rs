@@ -101,8 +101,9 @@ impl Templates {
         let render = || self.environment.get_template(name)?.render(context);
         let text = render().map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
         let named = self.declared.iter().filter(|(name, _)| text.contains(name));
-        let declarations = named.map(|(name, literal)| format!("const {name} = {literal};\n"));
-        Ok(declarations.chain([with_binding_numbers(&text)]).collect())
+        // At the end: directives come first.
+        let declarations = named.map(|(name, literal)| format!("\nconst {name} = {literal};"));
+        Ok([with_binding_numbers(&text)].into_iter().chain(declarations).collect())
     }
 }
 
@@ -135,7 +136,7 @@ mod tests {
         assert_eq!([1.0f32.wgsl_literal(), 7_u16.wgsl_literal(), (-2_i32).wgsl_literal()], ["1.0f", "7u", "-2i"]);
         let templates = Templates::new(&[("f", "fn f() -> f32 { return SLACK; }")]).expect("a template");
         let text = templates.declaring(literals).render("f", context! {}).expect("a text");
-        assert_eq!(text, "const SLACK = 1e-6f;\nfn f() -> f32 { return SLACK; }");
+        assert_eq!(text, "fn f() -> f32 { return SLACK; }\nconst SLACK = 1e-6f;");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-// Colour encodings; the twins of depth-image's color.rs.
+// Colour encodings; the twins of depth-image's encoding.rs.
 
 fn linear_from_rgb9e5(packed: u32) -> vec3f {
     // The scale 2^(e - 24) is assembled as float bits.

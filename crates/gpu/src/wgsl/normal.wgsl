@@ -1,4 +1,4 @@
-// Octahedral unit vectors; the twin of depth-image's normal.rs.
+// Octahedral unit vectors; the twin of depth-image's encoding.rs.
 
 fn oct_wrapped(v: vec2f) -> vec2f {
     return (1.0 - abs(v.yx)) * select(vec2f(-1.0), vec2f(1.0), v >= vec2f(0.0));

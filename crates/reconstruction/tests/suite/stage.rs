@@ -32,7 +32,7 @@ fn device() -> &'static Device {
     static DEVICE: OnceLock<Device> = OnceLock::new();
     DEVICE.get_or_init(|| {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let renderer = Renderer::with_templates(&gpu, render::templates(&[APART]).expect("templates"));
+        let renderer = Renderer::new(&gpu, render::templates(&[APART]).expect("templates"));
         let reconstructor = Reconstructor::new(&gpu).expect("a reconstructor");
         Device { gpu, renderer, reconstructor }
     })
@@ -228,7 +228,7 @@ pub fn assert_sane(view: &View, what: &str) {
 fn plainly_lit(scene: &GpuScene) -> DrawWork<'_> {
     DrawWork {
         scene,
-        lighting: Lighting::PHONG,
+        lighting: Lighting::default(),
         scene_time_s: 0.0,
         visibility: Visibility::Triangles,
         refinement: Refinement::default(),

@@ -4,13 +4,9 @@
 use std::time::{Duration, Instant};
 
 use glam::{Vec3, Vec3A};
-use obvhs::{
-    BvhBuildParams,
-    aabb::Aabb,
-    bvh2::{Bvh2, node::Bvh2Node, reinsertion::ReinsertionOptimizer},
-    cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode},
-    ploc::PlocBuilder,
-};
+use obvhs::bvh2::{Bvh2, node::Bvh2Node, reinsertion::ReinsertionOptimizer};
+use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode};
+use obvhs::{BvhBuildParams, aabb::Aabb, ploc::PlocBuilder};
 
 /// Most levels that the device's traversal has room for.
 pub const MAX_DEPTH: u32 = 48;
@@ -49,16 +45,16 @@ impl Bvh {
     /// the last node to the first sees every box complete.
     pub fn refit(&mut self, corners_in_world: &[[Vec3; 3]]) {
         let start = Instant::now();
-        let mut bounds = vec![Bounds::EMPTY; self.tree.nodes.len()];
+        let mut bounds = vec![Aabb::empty(); self.tree.nodes.len()];
         let mut area_sum = 0.0;
         for index in (0..self.tree.nodes.len()).rev() {
             let children = self.child_bounds(index, &bounds, corners_in_world);
             let node = &mut self.tree.nodes[index];
-            bounds[index] = children.iter().flatten().fold(Bounds::EMPTY, |all, child| all.with(child));
-            area_sum += bounds[index].half_area() + leaf_area(node, &children);
+            bounds[index] = children.iter().flatten().fold(Aabb::empty(), |all, child| all.union(child));
+            area_sum += half_area(&bounds[index]) + leaf_area(node, &children);
             quantise(node, &bounds[index], &children);
         }
-        self.cost = bounds.first().map_or(0.0, |root| area_sum / root.half_area().max(f32::MIN_POSITIVE));
+        self.cost = bounds.first().map_or(0.0, |root| area_sum / half_area(root).max(f32::MIN_POSITIVE));
         self.took = start.elapsed();
     }
 
@@ -67,7 +63,7 @@ impl Bvh {
         self.cost > self.cost_when_built * WORST_REFIT
     }
 
-    fn child_bounds(&self, index: usize, nodes: &[Bounds], corners_in_world: &[[Vec3; 3]]) -> [Option<Bounds>; 8] {
+    fn child_bounds(&self, index: usize, nodes: &[Aabb], corners_in_world: &[[Vec3; 3]]) -> [Option<Aabb>; 8] {
         let node = &self.tree.nodes[index];
         std::array::from_fn(|child| {
             if node.is_child_empty(child) {
@@ -78,7 +74,11 @@ impl Bvh {
             }
             let (first, count) = node.child_primitives(child);
             let slots = &self.tree.primitive_indices[first as usize..(first + count) as usize];
-            Some(slots.iter().fold(Bounds::EMPTY, |all, &triangle| all.around(&corners_in_world[triangle as usize])))
+            Some(
+                slots
+                    .iter()
+                    .fold(Aabb::empty(), |all, &triangle| all.union(&around(&corners_in_world[triangle as usize]))),
+            )
         })
     }
 
@@ -101,7 +101,6 @@ const DEEPEST: usize = 160;
 /// A tree with two children a node: by cost, or by halves where triangles lie on one another in heaps, of which cost
 /// makes chains.
 fn two_children(corners_in_world: &[[Vec3; 3]]) -> Bvh2 {
-    let around = |[a, b, c]: &[Vec3; 3]| Aabb::new(a.min(*b).min(*c).into(), a.max(*b).max(*c).into());
     let boxes: Vec<Aabb> = corners_in_world.iter().map(around).collect();
     let BvhBuildParams {
         ploc_search_distance, sort_precision, search_depth_threshold, reinsertion_batch_ratio, ..
@@ -142,14 +141,7 @@ fn halved(boxes: &[Aabb]) -> Bvh2 {
             nodes[node] = Bvh2Node::new(bounds, 1, range.start as u32);
             continue;
         }
-        let size = bounds.max - bounds.min;
-        let axis = if size.x >= size.y && size.x >= size.z {
-            0
-        } else if size.y >= size.z {
-            1
-        } else {
-            2
-        };
+        let axis = bounds.largest_axis();
         let middle = |i: u32| boxes[i as usize].min[axis] + boxes[i as usize].max[axis];
         own.select_nth_unstable_by(range.len() / 2, |&a, &b| middle(a).total_cmp(&middle(b)));
         let (first, split) = (nodes.len(), range.start + range.len() / 2);
@@ -160,44 +152,27 @@ fn halved(boxes: &[Aabb]) -> Bvh2 {
     Bvh2 { nodes, primitive_indices: order, ..Bvh2::default() }
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Bounds {
-    min: Vec3A,
-    max: Vec3A,
+fn around(corners: &[Vec3; 3]) -> Aabb {
+    Aabb::from_points(&corners.map(Vec3A::from))
 }
 
-impl Bounds {
-    const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
-
-    fn with(self, other: &Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
-    }
-
-    fn around(self, corners: &[Vec3; 3]) -> Self {
-        corners.iter().fold(self, |all, &corner| {
-            let corner = Vec3A::from(corner);
-            Self { min: all.min.min(corner), max: all.max.max(corner) }
-        })
-    }
-
-    fn half_area(&self) -> f32 {
-        let size = (self.max - self.min).max(Vec3A::ZERO);
-        size.x * size.y + size.y * size.z + size.z * size.x
-    }
+fn half_area(bounds: &Aabb) -> f32 {
+    let size = bounds.diagonal().max(Vec3A::ZERO);
+    size.x * size.y + size.y * size.z + size.z * size.x
 }
 
 /// Area of leaves, each as often as it has triangles.
-fn leaf_area(node: &CwBvhNode, children: &[Option<Bounds>; 8]) -> f32 {
+fn leaf_area(node: &CwBvhNode, children: &[Option<Aabb>; 8]) -> f32 {
     let leaves = (0..8).filter(|&child| node.is_leaf(child));
-    leaves.filter_map(|c| children[c].map(|b| b.half_area() * node.child_primitives(c).1 as f32)).sum()
+    leaves.filter_map(|c| children[c].map(|b| half_area(&b) * node.child_primitives(c).1 as f32)).sum()
 }
 
 /// A share of a step of the eight-bit boxes: more than the rounding of a difference.
 const ROUNDING: f32 = 1e-3;
 
 /// Writes a node's box and its children's, rounded outwards.
-fn quantise(node: &mut CwBvhNode, bounds: &Bounds, children: &[Option<Bounds>; 8]) {
-    let size = (bounds.max - bounds.min).to_array();
+fn quantise(node: &mut CwBvhNode, bounds: &Aabb, children: &[Option<Aabb>; 8]) {
+    let size = bounds.diagonal().to_array();
     node.p = bounds.min.into();
     node.e = size.map(exponent);
     let scale = node.e.map(|e| f32::from_bits(u32::from(e) << 23));

@@ -53,7 +53,8 @@ pub struct FlatTriangle {
 pub struct FlatScene {
     rest_in_world: Vec<Vec3>,
     sway: Vec<f32>,
-    wind: Option<Wind>,
+    /// Positions depend on scene time where there is any.
+    pub wind: Option<Wind>,
     pub vertices: Vec<FlatVertex>,
     pub corners: Vec<[u32; 3]>,
     pub triangles: Vec<FlatTriangle>,
@@ -87,11 +88,6 @@ impl FlatScene {
             let flags = flags[material as usize];
             self.triangles.push(FlatTriangle { instance: number, primitive, material, flags });
         }
-    }
-
-    /// Whether positions depend on scene time.
-    pub fn is_animated(&self) -> bool {
-        self.wind.is_some()
     }
 
     /// The positions of all vertices at a scene time.

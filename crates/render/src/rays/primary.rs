@@ -1,15 +1,14 @@
 //! Surfaces by one ray a pixel.
 
-use std::sync::Arc;
-
 use depth_image::Highlight;
-use gpu::{Binding, Frame, Gpu, PassCache, ResourceTraits, ShaderVariant, Templates, highlight_name, switches};
+use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, switches};
 use minijinja::{Value, context, value::merge_maps};
+use wgpu::Buffer;
 
 use super::{ray_scene::Traced, traversal::Traversal};
+use crate::known_samples::{Predecessors, RedundancyVariant};
 use crate::{
-    RenderError, image_sequence::Predecessors, known_samples::RedundancyVariant, pixel_camera::CAMERA_TRAITS,
-    redundancy_test::RedundancyTest, surfaces::Surfaces,
+    RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest, surfaces::Surfaces,
 };
 
 /// The redundant surfaces that one ray passes before it is given up: the software device ends long loops.
@@ -17,8 +16,8 @@ pub const MOST_LAYERS: u32 = 64;
 /// The group of known samples.
 const KNOWN_GROUP: u32 = 2;
 
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct PrimaryVariant {
+#[derive(Debug)]
+pub(crate) struct Primary {
     traversal: Traversal,
     /// `None` shows colours as they are.
     shading: Option<Highlight>,
@@ -27,7 +26,7 @@ pub(crate) struct PrimaryVariant {
     redundancy: Option<RedundancyVariant>,
 }
 
-impl PrimaryVariant {
+impl Primary {
     /// The variants with each redundancy test.
     pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
         let each =
@@ -36,7 +35,7 @@ impl PrimaryVariant {
     }
 }
 
-impl ShaderVariant for PrimaryVariant {
+impl ShaderVariant for Primary {
     const TEMPLATE: &'static str = "rays/primary.wgsl";
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
@@ -61,64 +60,45 @@ impl ShaderVariant for PrimaryVariant {
     }
 }
 
-/// The surfaces that are looked for.
-#[derive(Clone, Copy)]
-pub(crate) struct PrimaryWork<'a> {
-    pub traced: &'a Traced,
-    pub shading: Option<Highlight>,
-    pub surface_id: bool,
-    pub cameras: &'a wgpu::Buffer,
-    /// The place of the first of the surfaces' cameras.
-    pub first: u32,
-    /// Receives node visits and triangle tests of each pixel, of a single camera.
-    pub visit_counts: Option<&'a wgpu::Buffer>,
-    /// The images whose samples are not shown again, of a single camera.
-    pub predecessors: Option<Predecessors<'a>>,
-}
-
-pub(crate) struct Primary {
-    gpu: Arc<Gpu>,
-    passes: PassCache,
-}
-
-impl Primary {
-    pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        Self { gpu: gpu.clone(), passes: PassCache::new(gpu, templates) }
+/// Records one dispatch for each camera from the `first` on into its own textures. With predecessors, whose samples are not
+/// shown again, there is one camera.
+pub(crate) fn record(
+    recording: &mut Recording<'_>,
+    traced: &Traced,
+    (first, surfaces): (usize, &[Surfaces]),
+    predecessors: Option<&Predecessors>,
+) -> Result<(), RenderError> {
+    let Recording { passes, batch, cameras, visit_counts, frame, .. } = recording;
+    let variant = Primary {
+        traversal: Traversal::of(traced),
+        shading: batch.work.lighting.highlight(),
+        surface_id: surfaces.iter().any(|target| target.surface_ids.is_some()),
+        count_visits: visit_counts.is_some(),
+        redundancy: predecessors.map(|images| images.variant),
+    };
+    let pass = passes.get(&variant)?;
+    let rays = pass.bind(1, traced.bindings())?;
+    let known = predecessors.map(|images| pass.bind(KNOWN_GROUP, images.bindings())).transpose()?;
+    for (element, target) in (first as u32..).zip(surfaces) {
+        let own = pass.bind(0, bindings(&variant, cameras, *visit_counts, target))?;
+        let groups: Vec<_> = [&own, &rays].into_iter().chain(&known).collect();
+        pass.dispatch_each(frame, &groups, element..element + 1, target.invocations(1));
     }
-
-    /// Records one dispatch for each camera into its own textures.
-    pub fn record(
-        &self,
-        frame: &mut Frame<'_>,
-        work: PrimaryWork<'_>,
-        surfaces: &[Surfaces],
-    ) -> Result<(), RenderError> {
-        let pass = self.passes.get(&PrimaryVariant {
-            traversal: Traversal::of(work.traced),
-            shading: work.shading,
-            surface_id: work.surface_id,
-            count_visits: work.visit_counts.is_some(),
-            redundancy: work.predecessors.map(Predecessors::variant),
-        })?;
-        let rays = pass.bind(1, work.traced.bindings())?;
-        let bind = |bindings: Vec<Binding<'_>>| pass.bind(KNOWN_GROUP, bindings);
-        let known = work.predecessors.map(|images| images.bind(&self.gpu, bind)).transpose()?;
-        for (element, target) in (work.first..).zip(surfaces) {
-            let own = pass.bind(0, bindings(&work, target))?;
-            let groups: Vec<_> = [&own, &rays].into_iter().chain(&known).collect();
-            pass.dispatch_each(frame, &groups, element..element + 1, target.invocations(1));
-        }
-        Ok(())
-    }
+    Ok(())
 }
 
-fn bindings<'r>(work: &PrimaryWork<'r>, target: &'r Surfaces) -> Vec<Binding<'r>> {
-    let mut bindings = vec![Binding::buffer("camera", work.cameras)];
+fn bindings<'r>(
+    variant: &Primary,
+    cameras: &'r Buffer,
+    visit_counts: Option<&'r Buffer>,
+    target: &'r Surfaces,
+) -> Vec<Binding<'r>> {
+    let mut bindings = vec![Binding::buffer("camera", cameras)];
     bindings.extend(target.bindings());
-    let ids = target.surface_ids().filter(|_| work.surface_id);
+    let ids = target.surface_ids.as_ref().filter(|_| variant.surface_id);
     bindings.extend(ids.map(|ids| Binding::texture("surface_ids", ids)));
-    bindings.extend(work.predecessors.map(|_| Binding::texture("front_depth", target.front_depth())));
-    bindings.extend(work.visit_counts.map(|counts| Binding::buffer("visit_counts", counts)));
+    bindings.extend(variant.redundancy.map(|_| Binding::texture("front_depth", &target.views.front_depth)));
+    bindings.extend(visit_counts.map(|counts| Binding::buffer("visit_counts", counts)));
     bindings
 }
 
@@ -126,21 +106,15 @@ fn bindings<'r>(work: &PrimaryWork<'r>, target: &'r Surfaces) -> Vec<Binding<'r>
 mod tests {
     use depth_image::PinholeCamera;
     use glam::{UVec2, Vec3};
-    use gpu::ShaderError;
 
     use super::*;
-    use crate::{
-        image_sequence::ImageSequence,
-        known_samples::{KnownSamples, LayerCache},
-        test_support::{TEST, TestStage},
-    };
+    use crate::test_support::{TEST, TestStage};
+    use crate::{known_samples::KnownSamples, layers::LayerCache};
 
-    fn check(stage: &TestStage, traced: &Traced, predecessors: Option<Predecessors<'_>>, variant: &PrimaryVariant) {
+    fn check(stage: &TestStage, traced: &Traced, variant: &Primary) {
         let target = stage.surfaces(true, variant.surface_id);
         let visit_counts = variant.count_visits.then_some(&stage.buffer);
-        let (shading, surface_id, cameras) = (variant.shading, variant.surface_id, &stage.buffer);
-        let work = PrimaryWork { traced, shading, surface_id, cameras, first: 0, visit_counts, predecessors };
-        stage.check(variant, 0, &bindings(&work, &target));
+        stage.check(variant, 0, &bindings(variant, &stage.buffer, visit_counts, &target));
         stage.check(variant, 1, &traced.bindings());
     }
 
@@ -149,22 +123,17 @@ mod tests {
         let stage = TestStage::new();
         let traced = stage.scene.rays.at(0.0).expect("a tree");
         let camera = PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 0.8, UVec2::ONE);
-        let known = || KnownSamples::of(&stage.gpu, &LayerCache::default(), &[camera; 2], TEST).expect("known samples");
-        let reference = known().into_reference();
-        for known in [known(), known().after(Some(&reference))] {
-            let sequence = ImageSequence { known: &known, wanted: &[0, 1], first: 0, keeps: true };
-            let images = sequence.predecessors(1, &camera).expect("an image before");
-            for variant in PrimaryVariant::all() {
-                check(&stage, &traced, None, &variant);
-                let variant = PrimaryVariant { redundancy: Some(images.variant()), ..variant };
-                check(&stage, &traced, Some(images), &variant);
-                let mut count = 0;
-                let _ = images.bind(&stage.gpu, |bindings| {
-                    count = bindings.len();
-                    stage.check(&variant, KNOWN_GROUP, &bindings);
-                    Err(ShaderError::Invalid { shader: String::new(), message: "checked".to_owned() })
-                });
-                assert!(count >= 2);
+        let known = |reference: Option<&_>| {
+            KnownSamples::of(&stage.gpu, &LayerCache::default(), &[camera; 2], TEST, reference).expect("known samples")
+        };
+        let reference = known(None).into_reference();
+        for known in [known(None), known(Some(&reference))] {
+            let images = known.predecessors(&stage.gpu, 1, &camera);
+            for variant in Primary::all() {
+                check(&stage, &traced, &variant);
+                let variant = Primary { redundancy: Some(images.variant), ..variant };
+                check(&stage, &traced, &variant);
+                stage.check(&variant, KNOWN_GROUP, &images.bindings());
             }
         }
     }

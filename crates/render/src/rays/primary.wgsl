@@ -21,9 +21,6 @@ const FARTHEST: f32 = 3.0e38;
 {% if redundancy_test %}
 {% include "known_samples.wgsl" %}
 
-// The redundant surfaces that one ray passes before it is given up: the software device ends long loops.
-const MOST_LAYERS: u32 = {{ MOST_LAYERS }};
-
 fn candidate_at(hit: Hit, pixel: vec2u, direction: vec3f) -> Candidate {
     let facing = select(-1.0, 1.0, hit.crossing.front);
     let normal = normalize(attributes_at(hit.crossing).normal + vec3f(0.0, 1e-20, 0.0)) * facing;
@@ -81,7 +78,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% if surface_id %}    textureStore(surface_ids, id.xy, vec4u(ids, 0u, 0u));
 {% endif %}
 {% if count_visits %}
-    let place = (id.y * camera.size_px.x + id.x) * 2u;
+    let place = place_of(id.xy) * 2u;
     visit_counts[place] = node_visits;
     visit_counts[place + 1u] = triangle_tests;
 {% endif %}

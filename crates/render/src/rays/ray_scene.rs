@@ -1,9 +1,7 @@
 //! A scene's triangles on the device, as rays need them: made when rays are first traced, moved when scene time is.
 
-use std::{
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use glam::{Vec3, Vec4};
 use gpu::{Binding, Gpu, GpuError, Table};
@@ -12,10 +10,8 @@ use rayon::prelude::*;
 use scene::{Material, Scene};
 use wgpu::TextureFormat;
 
-use super::{
-    bvh::{Bvh, MAX_DEPTH},
-    flat::{CORNER_FLAGS, FlatScene, FlatTriangle, MAX_VERTICES, OrderedMesh},
-};
+use super::bvh::{Bvh, MAX_DEPTH};
+use super::flat::{CORNER_FLAGS, FlatScene, FlatTriangle, MAX_VERTICES, OrderedMesh};
 use crate::{material::phong_reflector, texture};
 
 /// The making of the tree over a scene's triangles.
@@ -62,10 +58,9 @@ struct Built {
 
 /// Bound to shaders that trace rays.
 pub struct Traced {
-    nodes: Table,
-    corners: Table,
+    pub(crate) nodes: Table,
+    pub(crate) corners: Table,
     fixed: Arc<Fixed>,
-    pub(crate) depth: u32,
     pub(crate) alpha_tested: bool,
     /// The making of the tree.
     pub report: AccelerationReport,
@@ -111,19 +106,18 @@ impl RayScene {
         Ok(self.moved_to(scene_time_s, &mut state)?.traced.clone())
     }
 
-    /// As [`RayScene::at`], by a new tree whatever there was.
-    ///
-    /// # Errors
-    /// As [`RayScene::at`].
-    pub fn rebuilt_at(&self, scene_time_s: f32) -> Result<Arc<Traced>, GpuError> {
-        self.state.lock().take();
-        self.at(scene_time_s)
+    /// Forgets the tree: the next is a new one.
+    pub fn forget(&self) {
+        *self.state.lock() = None;
     }
 
     fn moved_to<'s>(&self, scene_time_s: f32, state: &'s mut Option<Built>) -> Result<&'s Built, GpuError> {
         let next = match state.take() {
-            Some(built) if !self.flat.is_animated() || built.scene_time_s == scene_time_s => built,
-            Some(built) if built.prefers_refit() => self.refitted(built, scene_time_s)?,
+            Some(built) if self.flat.wind.is_none() || built.scene_time_s == scene_time_s => built,
+            // Whichever took less time when it was last done.
+            Some(built) if built.last_refit.is_none_or(|refit| refit < built.last_build) => {
+                self.refitted(built, scene_time_s)?
+            }
             _ => self.built(scene_time_s)?,
         };
         Ok(state.insert(next))
@@ -161,11 +155,10 @@ impl RayScene {
     /// Attributes and textures; triangles in the order of the tree's leaves.
     fn fixed(&self, bvh: &Bvh) -> Result<Fixed, GpuError> {
         let words = TextureFormat::Rgba32Uint;
-        let table = |what, elements: &[[u32; 4]]| Table::new(&self.gpu, what, words, elements);
         Ok(Fixed {
             vertices: Table::new(&self.gpu, "vertex attributes", words, &self.flat.vertices)?,
             triangles: Table::new(&self.gpu, "triangle attributes", words, &self.triangles_of_leaves(bvh))?,
-            materials: table("materials", &self.tables.materials)?,
+            materials: Table::new(&self.gpu, "materials", words, &self.tables.materials)?,
             texels: Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?,
         })
     }
@@ -193,7 +186,7 @@ impl RayScene {
         };
         tracing::debug!(?report, "rays are ready");
         let alpha_tested = self.tables.alpha_tested;
-        Ok(Arc::new(Traced { nodes, corners, fixed, depth: bvh.depth, alpha_tested, report }))
+        Ok(Arc::new(Traced { nodes, corners, fixed, alpha_tested, report }))
     }
 
     /// Three texels a triangle in the order of the tree's leaves: a corner's position, and its number with the
@@ -235,12 +228,6 @@ impl RayScene {
     }
 }
 
-impl Built {
-    fn prefers_refit(&self) -> bool {
-        self.last_refit.is_none_or(|refit| refit < self.last_build)
-    }
-}
-
 impl Traced {
     /// The variables of `traverse.wgsl`.
     pub fn bindings(&self) -> [Binding<'_>; 6] {
@@ -253,11 +240,6 @@ impl Traced {
             Binding::texture("materials", materials),
             Binding::texture("texels", texels),
         ]
-    }
-
-    /// The tables that rays read most.
-    pub fn tree(&self) -> [&wgpu::TextureView; 2] {
-        [&self.nodes, &self.corners]
     }
 }
 

@@ -23,7 +23,7 @@ impl Traversal {
 
     /// Room on the stack comes in steps, so that pipelines are shared.
     pub fn of(traced: &Traced) -> Self {
-        Self { stack: traced.depth.next_multiple_of(8).max(1), alpha_tested: traced.alpha_tested }
+        Self { stack: traced.report.depth.next_multiple_of(8).max(1), alpha_tested: traced.alpha_tested }
     }
 
     pub fn context(self) -> Value {

@@ -12,15 +12,6 @@
 @group(1) var texels: texture_2d<u32>;
 
 const STACK: u32 = {{ stack }}u;
-const NOTHING: u32 = {{ NOTHING }};
-// In a corner's number (flat.rs).
-const ALPHA_TESTED: u32 = {{ ALPHA_TESTED }};
-const DOUBLE_SIDED: u32 = {{ DOUBLE_SIDED }};
-const UNLIT: u32 = {{ UNLIT }};
-const SPECULAR: u32 = {{ SPECULAR }};
-const VERTEX: u32 = {{ VERTEX }};
-// Boxes are left a little later than they are: what rounding takes off must not open a gap.
-const BOX_SLACK: f32 = {{ BOX_SLACK }};
 {% if count_visits %}
 var<private> node_visits: u32 = 0u;
 var<private> triangle_tests: u32 = 0u;
@@ -83,9 +74,6 @@ fn visit(index: u32, ray: Ray, t_max: f32) -> Node {
 
 // Nearer than `t` at barycentric coordinates of the second and third corner.
 struct Crossing { t: f32, second: f32, third: f32, met: bool, front: bool, corners: vec3u }
-
-// A few roundings of the products that a volume is a sum of: a point nearer to an edge may be on either side.
-const EDGE_ROUNDINGS: f32 = {{ EDGE_ROUNDINGS }};
 
 fn taxicab(v: vec3f) -> f32 { return abs(v.x) + abs(v.y) + abs(v.z); }
 

@@ -6,15 +6,10 @@ use depth_image::{PinholeCamera, Ray, SurfaceId, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 use obvhs::cwbvh::node::CwBvhNode;
 
-use crate::{
-    GpuScene, RenderError,
-    pixel_camera::PixelCamera,
-    rays::{
-        flat::{ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatTriangle, FlatVertex},
-        ray_scene::HostTables,
-        traversal::{BOX_SLACK, EDGE_ROUNDINGS},
-    },
-};
+use crate::rays::flat::{ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatTriangle, FlatVertex};
+use crate::rays::ray_scene::HostTables;
+use crate::rays::traversal::{BOX_SLACK, EDGE_ROUNDINGS};
+use crate::{GpuScene, RenderError, pixel_camera::PixelCamera};
 
 /// The tables that a device has of a scene at one time.
 #[derive(Debug, Clone)]

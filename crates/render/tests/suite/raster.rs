@@ -120,7 +120,7 @@ fn unlit_colors_and_the_background_are_exact() {
     let mut scene = wall();
     scene.background_linear = Vec3::new(0.2, 0.4, 0.6);
     let background = scene.background_linear.to_array().map(depth_image::srgb8_from_linear);
-    for lighting in [Lighting::UNLIT, Lighting::PHONG] {
+    for lighting in [Lighting::UNLIT, Lighting::default()] {
         let planes = ViewPlanes { inverse_depth: true, provenance: true };
         let on_device = upload(&scene);
         let view =

@@ -17,7 +17,7 @@ pub fn device() -> &'static (Arc<Gpu>, Renderer) {
     static DEVICE: OnceLock<(Arc<Gpu>, Renderer)> = OnceLock::new();
     DEVICE.get_or_init(|| {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let renderer = Renderer::new(&gpu).expect("a renderer");
+        let renderer = Renderer::new(&gpu, render::templates(&[]).expect("templates"));
         (gpu, renderer)
     })
 }

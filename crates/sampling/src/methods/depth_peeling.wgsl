@@ -1,7 +1,5 @@
 // Depth peeling: everything up to the layer before. Where that has nothing there is nothing behind it either.
 
-const SAME_LAYER: f32 = {{ SAME_LAYER }};
-
 fn is_redundant_with(candidate: Candidate, number: u32, camera: KnownCamera) -> bool {
     let held = textureLoad(known_samples, candidate.pixel, number, 0);
     let depth = bitcast<f32>(held.x) * camera.near_m;

@@ -67,10 +67,8 @@ pub const METHODS: [NamedMethod<SamplingMethod>; 4] = [
 /// When a text is not a template.
 pub fn templates() -> Result<Templates, ShaderError> {
     let own = [&non_redundant::SHADERS[..], &[useful::SHADER, depth_peeling::SHADER]].concat();
-    Ok(render::templates(&own)?
-        .with_constants(non_redundant::constants())
-        .with_constants(useful::constants())
-        .with_constants(depth_peeling::constants()))
+    let constants = [&non_redundant::constants()[..], &useful::constants(), &depth_peeling::constants()].concat();
+    Ok(render::templates(&own)?.declaring(constants))
 }
 
 named_methods!(SamplingMethod, UnknownSampling, "sampling method");

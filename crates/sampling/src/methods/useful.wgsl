@@ -2,10 +2,6 @@
 // view cell. Seen from a viewpoint at the cell's rim the blocker moves aside by the ring's radius; where all of the ring shows
 // the blocker, nothing behind it comes out.
 
-const RING: u32 = {{ RING }};
-// The blocker itself, in footprints.
-const BLOCKER_FOOTPRINTS: f32 = {{ BLOCKER_FOOTPRINTS }};
-
 // 0 beyond the image, where nothing is known.
 fn front_around(pixel: vec2i) -> f32 {
     let inside = all(pixel >= vec2i(0)) && all(pixel < vec2i(camera.size_px));

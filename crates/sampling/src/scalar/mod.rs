@@ -12,20 +12,12 @@ use depth_image::{
     BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, HOLE_INVERSE_DEPTH, PinholeCamera, SurfaceId, oct16_from_unit,
 };
 use glam::UVec2;
-use render::{
-    scalar::{
-        MOST_LAYERS,
-        rays::{Scene, pixel_ray},
-    },
-    view_cell_m,
-};
+use render::scalar::MOST_LAYERS;
+use render::scalar::rays::{Scene, pixel_ray};
+use render::view_cell_m;
 
-use self::{
-    depth_peeling::is_in_layer,
-    texel::Texel,
-    tolerance::{is_tolerance_redundant, was_kept},
-    useful::omit_useless,
-};
+use self::tolerance::{is_tolerance_redundant, was_kept};
+use self::{depth_peeling::is_in_layer, texel::Texel, useful::omit_useless};
 use crate::methods::{Redundancy, SamplingMethod};
 
 pub use candidate::Candidate;

@@ -5,9 +5,7 @@ use glam::Vec3;
 use render::scalar::REFERENCE_FOOTPRINTS;
 
 use super::candidate::{Candidate, footprint_m, index_of, place};
-use crate::methods::non_redundant::tolerance::{
-    CLEARLY, CLEARLY_SAME_FACING, COARSER, DEPTH_FOOTPRINTS, SAME_FACING, SLOPE_PX,
-};
+use crate::methods::non_redundant::{CLEARLY, CLEARLY_SAME_FACING, COARSER, DEPTH_FOOTPRINTS, SAME_FACING, SLOPE_PX};
 
 /// Whether an image has a sample where a candidate is.
 pub(super) fn was_kept(candidate: &Candidate, reference: &DepthImage) -> bool {

@@ -8,7 +8,7 @@ use render::scalar::{
 };
 
 use super::candidate::{Candidate, place};
-use crate::methods::non_redundant::visibility::{SAME_DEPTH, SAME_FOOTPRINTS};
+use crate::methods::non_redundant::{SAME_DEPTH, SAME_FOOTPRINTS};
 
 /// Xie, Algorithm 2: whether the first thing on the way from a camera to a point is the point itself.
 #[must_use]

@@ -23,8 +23,13 @@ fn taken(
     method: SamplingMethod,
     visibility: Visibility,
 ) -> Result<Vec<DepthImage>, SamplingError> {
-    let draw =
-        DrawWork { scene, lighting: Lighting::PHONG, scene_time_s: 0.0, visibility, refinement: Refinement::default() };
+    let draw = DrawWork {
+        scene,
+        lighting: Lighting::default(),
+        scene_time_s: 0.0,
+        visibility,
+        refinement: Refinement::default(),
+    };
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
     device().sampler.sample(&SampleWork {
@@ -215,7 +220,7 @@ fn independent_images_can_be_taken_one_by_one() {
     let whole = sample(&on_device, &cameras, method);
     let draw = DrawWork {
         scene: &on_device,
-        lighting: Lighting::PHONG,
+        lighting: Lighting::default(),
         scene_time_s: 0.0,
         visibility: Visibility::Measured,
         refinement: Refinement::default(),

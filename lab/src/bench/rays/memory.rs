@@ -1,9 +1,13 @@
 //! Bytes that primary rays read, beside a pass that reads all there is once.
 
+use gpu::BufferPool;
 use render::{Lighting, Visibility};
 use study::{Bar, Check, Report, Table};
 
-use super::subject::{RUNS, Subject};
+use super::{
+    memory_pass,
+    subject::{RUNS, Subject},
+};
 use crate::statistics::median;
 
 const NODE_BYTES: f64 = 80.0;
@@ -23,7 +27,7 @@ const BESIDE_MEMORY: [(&str, &str); 7] = [
 pub(super) fn measure(subject: &Subject<'_>, rays_a_second: f64, report: &mut Report) -> anyhow::Result<()> {
     let renderer = subject.engine.renderer();
     let work = subject.work(Lighting::UNLIT, Visibility::Rays);
-    let visits = renderer.count_visits(work, subject.camera()?)?.of_pixel;
+    let visits = renderer.count_visits(work, subject.camera()?)?;
     let mean = |of: usize| visits.iter().map(|pair| f64::from(pair[of])).sum::<f64>() / visits.len() as f64;
     let (nodes, tests) = (mean(0), mean(1));
     let bytes_a_ray = nodes * NODE_BYTES + tests * TRIANGLE_BYTES;
@@ -40,8 +44,10 @@ pub(super) fn measure(subject: &Subject<'_>, rays_a_second: f64, report: &mut Re
 
 /// Bytes of tree and triangles, and bytes read a second.
 fn plain_reading(subject: &Subject<'_>) -> anyhow::Result<(f64, f64)> {
-    let pass = |_| subject.engine.renderer().read_acceleration(subject.scene, 0.0);
-    let passes = (0..RUNS).map(pass).collect::<Result<Vec<_>, _>>()?;
+    let gpu = subject.engine.renderer().gpu();
+    let (pool, tree) = (BufferPool::new(gpu), subject.scene.tree(0.0)?);
+    let pass = |_| memory_pass::read(gpu, &pool, &tree.each_ref());
+    let passes = (0..RUNS).map(pass).collect::<anyhow::Result<Vec<_>>>()?;
     let bytes = passes.first().map_or(f64::NAN, |pass| pass.bytes as f64);
     Ok((bytes, bytes / median(passes.iter().map(|pass| pass.device_s).collect())))
 }

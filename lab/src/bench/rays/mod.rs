@@ -2,6 +2,7 @@
 
 mod choices;
 mod memory;
+mod memory_pass;
 mod speeds;
 mod subject;
 

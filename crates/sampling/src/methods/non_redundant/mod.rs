@@ -1,10 +1,8 @@
 //! Images that leave out samples of those before them (Xie §3, Algorithm 1), by one of three tests.
 
-pub(crate) mod tolerance;
-pub(crate) mod visibility;
-
 use std::fmt;
 
+use gpu::wgsl_constants;
 use render::{Evidence, RedundancyTest};
 
 /// When a sample is redundant with an image before it.
@@ -30,8 +28,27 @@ pub(super) const SHADERS: [(&str, &str); 3] = [
     (TOLERANCE, include_str!("tolerance.wgsl")),
 ];
 
-pub(super) fn constants() -> impl Iterator<Item = (&'static str, String)> {
-    visibility::constants().into_iter().chain(tolerance::constants())
+/// Visibility: the share of its depth that a point may be off by.
+pub const SAME_DEPTH: f32 = 2e-5;
+/// Visibility: the share of the pixel's length on the surface that a point may be off by, besides.
+pub const SAME_FOOTPRINTS: f32 = 0.0625;
+/// Tolerance: depths are the same within this many footprints.
+pub const DEPTH_FOOTPRINTS: f32 = 2.0;
+/// Tolerance: the pixels for which a surface may go on changing its depth at its own slope.
+pub const SLOPE_PX: f32 = 1.0;
+/// Tolerance: the cosine of 25 degrees.
+pub const SAME_FACING: f32 = 0.906_307_8;
+/// Tolerance: the greatest ratio of footprints.
+pub const COARSER: f32 = 1.5;
+/// Tolerance: the share of these limits that samples of the temporal reference are held to.
+pub const CLEARLY: f32 = 0.8;
+/// Tolerance: the cosine of 20 degrees, for samples of the temporal reference.
+pub const CLEARLY_SAME_FACING: f32 = 0.939_692_6;
+
+pub(super) fn constants() -> [(&'static str, String); 8] {
+    wgsl_constants! {
+        SAME_DEPTH, SAME_FOOTPRINTS, DEPTH_FOOTPRINTS, SLOPE_PX, SAME_FACING, COARSER, CLEARLY, CLEARLY_SAME_FACING
+    }
 }
 
 pub(super) fn parse(text: &str) -> Option<Redundancy> {

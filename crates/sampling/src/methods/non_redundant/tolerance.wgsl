@@ -1,13 +1,6 @@
 // Tolerance redundancy: one of the four samples around the place in the image before lies on the same surface, faces
 // the same way, and is not much coarser. A sample of the temporal reference stays until all four do, by a margin.
 
-const DEPTH_FOOTPRINTS: f32 = {{ DEPTH_FOOTPRINTS }};
-const SLOPE_PX: f32 = {{ SLOPE_PX }};
-const SAME_FACING: f32 = {{ SAME_FACING }};
-const COARSER: f32 = {{ COARSER }};
-const CLEARLY: f32 = {{ CLEARLY }};
-const CLEARLY_SAME_FACING: f32 = {{ CLEARLY_SAME_FACING }};
-
 fn is_redundant_with(candidate: Candidate, number: u32, camera: KnownCamera) -> bool {
     let p = homogeneous_in(camera, candidate);
     let along = abs(dot(candidate.normal, candidate.point_in_world - camera.eye_in_world)) / p.z;

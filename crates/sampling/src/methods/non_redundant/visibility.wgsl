@@ -1,9 +1,6 @@
 // Visibility redundancy (Xie, Algorithm 2): the first thing on the way from the other viewpoint is the sample
 // itself. Outside of that camera's view nothing is redundant with it.
 
-const SAME_DEPTH: f32 = {{ SAME_DEPTH }};
-const SAME_FOOTPRINTS: f32 = {{ SAME_FOOTPRINTS }};
-
 fn is_redundant_with(candidate: Candidate, number: u32, camera: KnownCamera) -> bool {
     let p = homogeneous_in(camera, candidate);
     var first = false;

@@ -1,6 +1,8 @@
-//! Colour encodings: linear inside, RGB9E5 in samples, 8-bit sRGB at the client.
+//! Colours in RGB9E5 and unit vectors in two 16-bit numbers: the scalar reference of color.wgsl and normal.wgsl.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
+
+use crate::encoding::wrapped;
 
 /// Shared-exponent linear RGB, the layout of `VK_FORMAT_E5B9G9R9_UFLOAT_PACK32`. Negative and NaN
 /// become 0; larger values are clamped to 65,408.
@@ -27,29 +29,20 @@ pub fn linear_from_rgb9e5(packed: u32) -> Vec3 {
     Vec3::new((packed & 511) as f32, (packed >> 9 & 511) as f32, (packed >> 18 & 511) as f32) * scale
 }
 
-/// One channel of sRGB (IEC 61966-2-1) to linear.
+/// The inverse of [`crate::oct16_from_unit`]; the result has unit length.
 #[must_use]
-pub fn linear_from_srgb8(encoded: u8) -> f32 {
-    let v = f32::from(encoded) / 255.0;
-    if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
-}
-
-/// One channel of linear to sRGB, clamped to 0…1; NaN gives 0.
-#[must_use]
-pub fn srgb8_from_linear(linear: f32) -> u8 {
-    let v = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
-    let encoded = if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-    (encoded * 255.0 + 0.5) as u8
+pub fn unit_from_oct16(packed: u32) -> Vec3 {
+    let signed = |bits: u32| (f32::from(bits as u16 as i16) / 32767.0).max(-1.0);
+    let flat = Vec2::new(signed(packed), signed(packed >> 16));
+    let z = 1.0 - flat.x.abs() - flat.y.abs();
+    let xy = if z < 0.0 { wrapped(flat) } else { flat };
+    xy.extend(z).try_normalize().unwrap_or(Vec3::Z)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn srgb_round_trips_every_code() {
-        assert!((0..=255).all(|code| srgb8_from_linear(linear_from_srgb8(code)) == code));
-    }
+    use crate::oct16_from_unit;
 
     #[test]
     fn rgb9e5_keeps_nine_bits_of_the_largest_channel() {
@@ -61,5 +54,25 @@ mod tests {
         assert_eq!(linear_from_rgb9e5(rgb9e5_from_linear(Vec3::ZERO)), Vec3::ZERO);
         assert_eq!(linear_from_rgb9e5(rgb9e5_from_linear(Vec3::NAN)), Vec3::ZERO);
         assert_eq!(linear_from_rgb9e5(rgb9e5_from_linear(Vec3::splat(1e9))), Vec3::splat(65_408.0));
+    }
+
+    #[test]
+    fn round_trip_is_within_a_hundredth_of_a_degree() {
+        for i in 0..5000 {
+            let a = i as f32 * 0.731;
+            let z = 1.0 - 2.0 * (i as f32 + 0.5) / 5000.0;
+            let r = (1.0 - z * z).sqrt();
+            let unit = Vec3::new(r * a.cos(), r * a.sin(), z);
+            let back = unit_from_oct16(oct16_from_unit(unit));
+            assert!(unit.cross(back).length() < 1.7e-4, "{unit} {back}");
+        }
+    }
+
+    #[test]
+    fn every_input_gives_a_unit_vector() {
+        for v in [Vec3::ZERO, Vec3::NAN, Vec3::INFINITY] {
+            assert!((unit_from_oct16(oct16_from_unit(v)).length() - 1.0).abs() < 1e-5);
+        }
+        assert!((0..1000u32).all(|i| unit_from_oct16(i.wrapping_mul(2_654_435_761)).is_normalized()));
     }
 }

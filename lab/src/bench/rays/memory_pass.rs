@@ -6,21 +6,19 @@ use gpu::{
 };
 use minijinja::context;
 
-use crate::RenderError;
-
 const WORKGROUP: u32 = 64;
 const TEXELS_A_THREAD: u32 = 16;
 const BYTES_A_TEXEL: u64 = 16;
 
 /// One pass over tables.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MemoryPass {
+pub(super) struct MemoryPass {
     /// Read, once each.
-    pub bytes: u64,
+    pub(super) bytes: u64,
     /// On the device.
-    pub device_s: f64,
+    pub(super) device_s: f64,
     /// The sum of all words, modulo 2³²: they were read.
-    pub sum: u32,
+    pub(super) sum: u32,
 }
 
 /// A table, and where its threads leave their sums.
@@ -32,13 +30,13 @@ struct Table {
 
 /// Reads tables whose rows are multiples of 1,024 texels of four words. The first pass, which builds the pipeline,
 /// gives the sum; the second is timed.
-pub(crate) fn read(gpu: &Gpu, pool: &BufferPool, views: &[&wgpu::TextureView]) -> Result<MemoryPass, RenderError> {
+pub(super) fn read(gpu: &Gpu, pool: &BufferPool, views: &[&wgpu::TextureView]) -> anyhow::Result<MemoryPass> {
     let templates = Templates::new(&[("memory_pass.wgsl", include_str!("memory_pass.wgsl"))])?;
     let wgsl = templates
         .with_constants(wgsl_constants![WORKGROUP, TEXELS_A_THREAD])
         .render("memory_pass.wgsl", context! {})?;
     let pass = ComputePass::new(gpu, Shader::new(gpu, "memory pass", &wgsl, &[])?);
-    let tables = views.iter().map(|view| Table::of(pool, &pass, view)).collect::<Result<Vec<_>, _>>()?;
+    let tables = views.iter().map(|view| Table::of(pool, &pass, view)).collect::<anyhow::Result<Vec<_>>>()?;
     let sum = sum(pool, recorded(gpu, &pass, &tables), &tables)?;
     let device_s = recorded(gpu, &pass, &tables).submit().wait()?.device_s;
     let texels: u64 = tables.iter().map(|table| table.count() * u64::from(TEXELS_A_THREAD)).sum();
@@ -46,7 +44,7 @@ pub(crate) fn read(gpu: &Gpu, pool: &BufferPool, views: &[&wgpu::TextureView]) -
 }
 
 impl Table {
-    fn of(pool: &BufferPool, pass: &ComputePass, view: &wgpu::TextureView) -> Result<Self, RenderError> {
+    fn of(pool: &BufferPool, pass: &ComputePass, view: &wgpu::TextureView) -> anyhow::Result<Self> {
         let size = view.texture().size();
         let threads = [size.width / TEXELS_A_THREAD, size.height];
         let sums = pool.lend_storage("sums of a table", 4 * count(threads));
@@ -71,7 +69,7 @@ fn recorded<'g>(gpu: &'g Gpu, pass: &ComputePass, tables: &[Table]) -> Frame<'g>
     frame
 }
 
-fn sum(pool: &BufferPool, mut frame: Frame<'_>, tables: &[Table]) -> Result<u32, RenderError> {
+fn sum(pool: &BufferPool, mut frame: Frame<'_>, tables: &[Table]) -> anyhow::Result<u32> {
     let read = |table: &Table| {
         let bytes = 4 * table.count();
         (frame.read_back(&table.sums, 0..bytes, pool.lend_host("sums of a table", bytes)), table.count() as usize)
