@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use cluster::{Assignment, CompositorShare, SessionPlan};
+use cluster::{Assignment, CompositorShare, RenderViews, SessionPlan};
+use codec::FrameCodec;
+use depth_image::ViewPlanes;
 use tokio::sync::mpsc;
 use wire::rpc::{connect, connect_later};
 
@@ -14,6 +16,9 @@ use crate::peer::Peer;
 pub(crate) struct ActivePlan {
     pub(crate) plan: SessionPlan,
     pub(crate) peers: Vec<Peer>,
+    /// As the session asked for.
+    pub(crate) codec: FrameCodec,
+    pub(crate) planes: ViewPlanes,
     named_plans: mpsc::Sender<Assignment>,
 }
 
@@ -24,9 +29,10 @@ impl ActivePlan {
     /// Where no compositor can be reached.
     pub(crate) async fn connect(
         plan: SessionPlan,
-        named_plans: &mpsc::Sender<Assignment>,
+        (codec, planes): (FrameCodec, ViewPlanes),
+        named_plans: mpsc::Sender<Assignment>,
     ) -> Result<Self, ClientError> {
-        let (mut peers, mut failed) = (Vec::with_capacity(plan.assignment.compositors.len()), None);
+        let (mut peers, mut failed) = (Vec::new(), None);
         for share in &plan.assignment.compositors {
             match connect(&share.address).await {
                 Ok(channel) => peers.push(Peer::new(share, channel, named_plans.clone())),
@@ -35,7 +41,7 @@ impl ActivePlan {
         }
         match failed.filter(|_| peers.is_empty()) {
             Some(error) => Err(error),
-            None => Ok(Self { plan, peers, named_plans: named_plans.clone() }),
+            None => Ok(Self { plan, peers, codec, planes, named_plans }),
         }
     }
 
@@ -46,7 +52,7 @@ impl ActivePlan {
             connect_later(&share.address).map(|channel| Peer::new(share, channel, self.named_plans.clone()))
         };
         let peers = plan.assignment.compositors.iter().filter_map(|share| peer(share).ok()).collect();
-        Self { plan, peers, named_plans: self.named_plans.clone() }
+        Self { plan, peers, codec: self.codec, planes: self.planes, named_plans: self.named_plans.clone() }
     }
 
     /// The plan that a compositor names as the one in force, if it can be this session's.
@@ -68,6 +74,19 @@ impl ActivePlan {
     pub(crate) fn plan_epoch(&self) -> u64 {
         self.plan.assignment.plan_epoch
     }
+
+    /// A request without views, of set 0.
+    pub(crate) fn request(&self) -> RenderViews {
+        RenderViews {
+            plan_epoch: self.plan_epoch(),
+            set_index: 0,
+            method: self.plan.assignment.workload.method.clone(),
+            codec: self.codec,
+            planes: self.planes,
+            views: Vec::new(),
+            live: None,
+        }
+    }
 }
 
 /// The state of a session, as the coordinator last said.
@@ -78,4 +97,15 @@ pub(crate) struct SessionState {
     pub(crate) active: Arc<ActivePlan>,
     /// Why the session has ended, if it has.
     pub(crate) ended: Option<String>,
+}
+
+impl SessionState {
+    /// # Errors
+    /// Where the session has ended.
+    pub(crate) fn in_force(&self) -> Result<Arc<ActivePlan>, ClientError> {
+        match self.ended.clone() {
+            Some(reason) => Err(ClientError::Ended { reason }),
+            None => Ok(self.active.clone()),
+        }
+    }
 }

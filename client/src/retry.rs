@@ -26,11 +26,7 @@ impl Retries {
     }
 
     /// The delay before the next attempt; `None` where no frame has been received for too long.
-    pub(crate) fn next_delay(&mut self, missing: usize) -> Option<Duration> {
-        self.next_delay_at(Instant::now(), missing)
-    }
-
-    fn next_delay_at(&mut self, now: Instant, missing: usize) -> Option<Duration> {
+    pub(crate) fn next_delay(&mut self, now: Instant, missing: usize) -> Option<Duration> {
         if missing < self.missing {
             *self = Self::new(missing);
         }
@@ -48,12 +44,12 @@ mod tests {
         let mut retries = Retries::new(9);
         let start = Instant::now();
         let at = |s: u64| start + Duration::from_secs(s);
-        assert_eq!(retries.next_delay_at(at(1), 9), Some(FIRST_DELAY));
-        assert_eq!(retries.next_delay_at(at(2), 9), Some(2 * FIRST_DELAY));
-        assert_eq!(retries.next_delay_at(at(18), 8), Some(FIRST_DELAY), "one frame was received");
-        assert_eq!(retries.next_delay_at(at(37), 8), Some(2 * FIRST_DELAY));
-        assert_eq!(retries.next_delay_at(at(39), 8), None);
-        let delays: Vec<_> = (0..9).map(|_| retries.next_delay_at(start, 8)).collect();
+        assert_eq!(retries.next_delay(at(1), 9), Some(FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(2), 9), Some(2 * FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(18), 8), Some(FIRST_DELAY), "one frame was received");
+        assert_eq!(retries.next_delay(at(37), 8), Some(2 * FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(39), 8), None);
+        let delays: Vec<_> = (0..9).map(|_| retries.next_delay(start, 8)).collect();
         assert_eq!(delays[8], Some(LONGEST_DELAY));
     }
 }

@@ -21,7 +21,7 @@ const BESIDE_MEMORY: [(&str, &str); 7] = [
 
 /// Adds the table and a check.
 pub(super) fn measure(subject: &Subject<'_>, rays_a_second: f64, report: &mut Report) -> anyhow::Result<()> {
-    let renderer = subject.engine.renderer();
+    let renderer = &subject.engine.renderer;
     let work = subject.work(Lighting::UNLIT, Visibility::Rays);
     let visits = renderer.count_visits(work, subject.camera()?)?.of_pixel;
     let mean = |of: usize| visits.iter().map(|pair| f64::from(pair[of])).sum::<f64>() / visits.len() as f64;
@@ -40,7 +40,7 @@ pub(super) fn measure(subject: &Subject<'_>, rays_a_second: f64, report: &mut Re
 
 /// Bytes of tree and triangles, and bytes read a second.
 fn plain_reading(subject: &Subject<'_>) -> anyhow::Result<(f64, f64)> {
-    let pass = |_| subject.engine.renderer().read_acceleration(subject.scene, 0.0);
+    let pass = |_| subject.engine.renderer.read_acceleration(subject.scene, 0.0);
     let passes = (0..RUNS).map(pass).collect::<Result<Vec<_>, _>>()?;
     let bytes = passes.first().map_or(f64::NAN, |pass| pass.bytes as f64);
     Ok((bytes, bytes / median(passes.iter().map(|pass| pass.device_s).collect())))
