@@ -5,13 +5,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cluster::{Assignment, RenderViews, RequestedView};
-use codec::SampleSetId;
 use node::next_within;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::Semaphore;
 use tonic::{Code, Status};
 use wire::rpc::Messages;
 
-use crate::batch::{BatchKey, MAX_BATCH, Source, Waiting, Waits};
+use crate::batch::{Loaded, MAX_BATCH, Waiting};
 use crate::outbox::Reply;
 use crate::quota::{Credit, closed};
 use crate::shared::ClientStream;
@@ -72,11 +71,11 @@ impl<'a> BatchStream<'a> {
         let plan = shared.of_compositor(shared.plan.require(request.plan_epoch)?)?;
         let sources = by_cell(&plan, &request.views).into_iter().map(|(cell, views)| {
             let (shared, plan, set_index) = (shared.clone(), plan.clone(), request.set_index);
-            (cell, views, tokio::spawn(async move { shared.source(&plan, (set_index, cell)).await }))
+            (views, tokio::spawn(async move { shared.source(&plan, set_index, cell).await }))
         });
-        for (cell, views, source) in sources.collect::<Vec<_>>() {
-            let (source, id, set_wait_s) = source.await.map_err(|error| Status::internal(error.to_string()))??;
-            self.enqueue_of_cell(&request, (cell, &views), (&source, id), (arrived, set_wait_s)).await?;
+        for (views, set) in sources.collect::<Vec<_>>() {
+            let set = set.await.map_err(|error| Status::internal(error.to_string()))??;
+            self.enqueue_of_cell(&request, &views, &set, arrived).await?;
         }
         Ok(())
     }
@@ -85,9 +84,9 @@ impl<'a> BatchStream<'a> {
     async fn enqueue_of_cell(
         &mut self,
         request: &RenderViews,
-        (cell, views): (u32, &[RequestedView]),
-        (source, id): (&Source, SampleSetId),
-        waited: (Instant, f64),
+        views: &[RequestedView],
+        set: &Loaded,
+        arrived: Instant,
     ) -> Result<(), Status> {
         for views in views.chunks(MAX_BATCH) {
             let mut batch = Vec::with_capacity(views.len());
@@ -96,36 +95,16 @@ impl<'a> BatchStream<'a> {
                 let credit = match self.try_credit(view)? {
                     Some(credit) => credit,
                     None => {
-                        self.hand_over(std::mem::take(&mut batch));
+                        self.client.queue(std::mem::take(&mut batch));
                         self.credit(view).await?
                     }
                 };
                 self.admitted = true;
-                batch.push(self.waiting(request, (cell, *view), (source, id), waited, credit));
+                batch.push(Waiting::new((request, *view, arrived), set, self.reply.clone(), credit));
             }
-            self.hand_over(batch);
+            self.client.queue(batch);
         }
         Ok(())
-    }
-
-    fn waiting(
-        &self,
-        request: &RenderViews,
-        (cell, view): (u32, RequestedView),
-        (source, sample_set_id): (&Source, SampleSetId),
-        (arrived, set_wait_s): (Instant, f64),
-        credit: Credit,
-    ) -> Waiting {
-        let key = BatchKey {
-            sample_set_id,
-            cell,
-            method: request.method.clone(),
-            planes: request.planes,
-            size_px: view.camera.size_px,
-        };
-        let waits = Waits::until_now(arrived, set_wait_s);
-        let (source, reply) = (source.clone(), self.reply.clone());
-        Waiting { key, source, view, codec: request.codec, waits, reply, credit }
     }
 
     /// `None` where the view must wait; an error where other streams have taken the node's room and this one has had none.
@@ -144,16 +123,8 @@ impl<'a> BatchStream<'a> {
     }
 
     async fn credit(&self, view: &RequestedView) -> Result<Credit, Status> {
-        let stream: OwnedSemaphorePermit =
-            self.credits.clone().acquire_many_owned(price(view)).await.map_err(closed)?;
+        let stream = self.credits.clone().acquire_many_owned(price(view)).await.map_err(closed)?;
         Ok(Credit { stream, _node: self.client.shared.quota.view(&view.camera).await? })
-    }
-
-    fn hand_over(&self, batch: Vec<Waiting>) {
-        for Waiting { key, view, .. } in &batch {
-            tracing::debug!(stream = self.client.stream, frame = view.frame, set = %key.sample_set_id, "queued");
-        }
-        self.client.shared.arrivals.push(self.client.stream, batch);
     }
 }
 

@@ -237,13 +237,7 @@ impl Reply {
 }
 
 /// A client's frames as messages.
-pub(crate) struct Outgoing(Arc<Outbox>);
-
-impl Outgoing {
-    pub(crate) fn new(outbox: Arc<Outbox>) -> Self {
-        Self(outbox)
-    }
-}
+pub(crate) struct Outgoing(pub(crate) Arc<Outbox>);
 
 impl Stream for Outgoing {
     type Item = Result<FramePart, Status>;

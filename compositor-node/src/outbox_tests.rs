@@ -22,7 +22,7 @@ fn bench(is_live: bool) -> Bench {
     if is_live {
         outbox.set_live();
     }
-    let (outgoing, reply) = (Outgoing::new(outbox.clone()), Reply::new(outbox.clone()));
+    let (outgoing, reply) = (Outgoing(outbox.clone()), Reply::new(outbox.clone()));
     Bench { outbox, outgoing, reply, credits: Arc::new(Semaphore::new(2)), quota: NodeQuota::new(Quotas::default()) }
 }
 

@@ -46,7 +46,7 @@ impl Engine for DeviceLossMonitor {
         self.engine.is_software()
     }
 
-    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<f64, EngineError> {
+    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<(), EngineError> {
         self.monitored(self.engine.load_scene(hash, package))
     }
 

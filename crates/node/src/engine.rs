@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use cluster::Refinement;
+use cluster::{Refinement, Workload};
 use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, View, ViewPlanes};
 use glam::Vec3;
 use tonic::Status;
@@ -15,12 +15,11 @@ pub trait Engine: Send + Sync + 'static {
     fn device_name(&self) -> String;
     /// Whether the device is a CPU.
     fn is_software(&self) -> bool;
-    /// Loads a scene package, whose bytes have been checked against the hash, under its hash; gives the seconds that this
-    /// took.
+    /// Loads a scene package, whose bytes have been checked against the hash, under its hash.
     ///
     /// # Errors
     /// Where the package cannot be read or the device cannot hold it.
-    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<f64, EngineError>;
+    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<(), EngineError>;
     /// Whether [`Engine::load_scene`] has loaded the scene.
     fn has_scene(&self, hash: &str) -> bool;
     /// Whether an image depends on the images before it, so that one node samples a whole set.
@@ -81,6 +80,24 @@ pub struct SampleWork {
     pub refinement: Refinement,
 }
 
+impl SampleWork {
+    /// All images of a workload's first set, finished at once.
+    #[must_use]
+    pub fn of(workload: &Workload) -> Self {
+        Self {
+            scene_hash: workload.scene.hash.to_string(),
+            cameras: workload.sample_cameras.clone(),
+            wanted: (0..workload.sample_cameras.len() as u32).collect(),
+            sampling: workload.sampling.clone(),
+            method: workload.method.clone(),
+            lighting: workload.lighting.clone(),
+            scene_time_s: workload.timeline.start_s as f32,
+            temporal_reference_s: None,
+            refinement: Refinement::default(),
+        }
+    }
+}
+
 /// The images of one set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleSet {
@@ -94,6 +111,20 @@ pub struct SampleSet {
     pub illumination: Illumination,
     /// The lighting that the images were sampled with; highlights follow its formula.
     pub lighting: String,
+}
+
+impl SampleSet {
+    /// A set of a workload.
+    #[must_use]
+    pub fn of(workload: &Workload, images: Vec<DepthImage>) -> Self {
+        Self {
+            images,
+            volume: workload.volume,
+            background_linear: workload.background_linear,
+            illumination: workload.illumination.clone(),
+            lighting: workload.lighting.clone(),
+        }
+    }
 }
 
 /// Views to reconstruct.
@@ -120,6 +151,20 @@ pub struct DirectWork {
     pub scene_time_s: f32,
     /// Planes beside colour.
     pub planes: ViewPlanes,
+}
+
+impl DirectWork {
+    /// Views of a workload's scene at its start.
+    #[must_use]
+    pub fn of(workload: &Workload, cameras: Vec<PinholeCamera>, planes: ViewPlanes) -> Self {
+        Self {
+            scene_hash: workload.scene.hash.to_string(),
+            cameras,
+            lighting: workload.lighting.clone(),
+            scene_time_s: workload.timeline.start_s as f32,
+            planes,
+        }
+    }
 }
 
 /// Why an operation of the device failed.

@@ -68,7 +68,7 @@ impl rpc::Node for NodeService {
         let scene_load_s = self.scenes.ensure(&assignment.workload.scene).await?;
         self.plan.apply(assignment)?;
         self.metrics.plan_epoch.set(i64::try_from(plan_epoch).unwrap_or(i64::MAX));
-        tracing::info!(node = self.plan.node_name(), plan_epoch, "plan in force");
+        tracing::info!(node = &*self.plan.node_name, plan_epoch, "plan in force");
         Ok(Ready { plan_epoch, scene_load_s })
     }
 }
