@@ -8,9 +8,8 @@ use tokio::task::JoinSet;
 
 use crate::active_plan::{ActivePlan, SessionState};
 use crate::error::ClientError;
-use crate::frame_stream::{FrameStream, decode};
 use crate::frames::FrameSink;
-use crate::peer::{Failure, Peer};
+use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::request_pump::{Started, start_pumps};
 use crate::retry::Retries;
 use crate::view_request::ViewRequest;

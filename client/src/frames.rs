@@ -95,7 +95,7 @@ impl FrameSink {
     /// The requests whose frames are still missing.
     pub(crate) fn missing(&self, requests: &[ViewRequest]) -> Vec<ViewRequest> {
         let expected = self.expected.lock();
-        requests.iter().filter(|request| expected.is_due(request.frame)).copied().collect()
+        requests.iter().filter(|request| expected.due.contains_key(&request.frame)).copied().collect()
     }
 
     /// Room for one more frame that is decoded; `None` when the request has ended.
@@ -165,10 +165,6 @@ impl Expected {
     /// Counts a frame as received and gives its request; `None` if it was received before.
     pub(crate) fn take(&mut self, frame: u64) -> Option<ViewRequest> {
         self.due.remove(&frame)
-    }
-
-    pub(crate) fn is_due(&self, frame: u64) -> bool {
-        self.due.contains_key(&frame)
     }
 
     /// Checks, at the end of all streams, that no frame is missing.
@@ -245,7 +241,10 @@ mod tests {
         ] {
             assert!(expected.fault_of(frame, &header).unwrap().contains(reason));
         }
-        assert_eq!((expected.take(4), expected.is_due(4), expected.is_due(7)), (None, false, true));
+        assert_eq!(
+            (expected.take(4), expected.due.contains_key(&4), expected.due.contains_key(&7)),
+            (None, false, true)
+        );
         assert!(expected.finish().unwrap_err().to_string().contains("1 frames are missing: [7]"));
         expected.take(7).unwrap();
         expected.finish().unwrap();

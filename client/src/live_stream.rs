@@ -11,9 +11,8 @@ use wire::rpc::CALL_TIMEOUT;
 
 use crate::active_plan::SessionState;
 use crate::error::ClientError;
-use crate::frame_stream::{FrameStream, decode};
 use crate::frames::check_frame;
-use crate::peer::{Failure, Peer};
+use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::placement::{Tried, new_client_id};
 use crate::poses::{Newest, Poses, SentPose};
 use crate::retry::GIVE_UP_AFTER;

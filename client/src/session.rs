@@ -14,12 +14,11 @@ use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
 use wire::rpc::{CoordinatorClient, Messages, connect};
 
-use crate::active_plan::{ActivePlan, SessionState};
+use crate::active_plan::{ActivePlan, SessionState, follow_compositors, follow_coordinator};
 use crate::delivery::deliver;
 use crate::error::ClientError;
 use crate::frames::{Expected, Frames};
 use crate::live_view::LiveView;
-use crate::plan_follower::{follow_compositors, follow_coordinator};
 use crate::view_request::ViewRequest;
 
 /// Plans that compositors have named and the session has not taken over yet.

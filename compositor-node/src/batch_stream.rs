@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, RenderViews, RequestedView};
+use cluster::{RenderViews, RequestedView};
 use node::next_within;
 use tokio::sync::Semaphore;
 use tonic::{Code, Status};
@@ -52,24 +52,24 @@ impl<'a> BatchStream<'a> {
 
     /// A client that waits for frames is not idle.
     async fn next(&self, requests: &mut Messages<RenderViews>) -> Result<Option<RenderViews>, Status> {
+        let is_busy = || self.credits.available_permits() < STREAM_PIXELS as usize;
         loop {
             match next_within(requests, self.client.shared.deadlines.idle, "views").await {
-                Err(status) if status.code() == Code::DeadlineExceeded && self.is_busy() => (),
+                Err(status) if status.code() == Code::DeadlineExceeded && is_busy() => (),
                 next => return next,
             }
         }
-    }
-
-    /// Whether views are in flight.
-    fn is_busy(&self) -> bool {
-        self.credits.available_permits() < STREAM_PIXELS as usize
     }
 
     /// Enqueues the views of every view cell; the images of all cells are fetched at once.
     async fn enqueue(&mut self, request: RenderViews) -> Result<(), Status> {
         let (arrived, shared) = (Instant::now(), &self.client.shared);
         let plan = shared.of_compositor(shared.plan.require(request.plan_epoch)?)?;
-        let sources = by_cell(&plan, &request.views).into_iter().map(|(cell, views)| {
+        let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
+        for view in &request.views {
+            cells.entry(plan.cell_of(&view.camera)).or_default().push(*view);
+        }
+        let sources = cells.into_iter().map(|(cell, views)| {
             let (shared, plan, set_index) = (shared.clone(), plan.clone(), request.set_index);
             (views, tokio::spawn(async move { shared.source(&plan, set_index, cell).await }))
         });
@@ -126,15 +126,6 @@ impl<'a> BatchStream<'a> {
         let stream = self.credits.clone().acquire_many_owned(price(view)).await.map_err(closed)?;
         Ok(Credit { stream, _node: self.client.shared.quota.view(&view.camera).await? })
     }
-}
-
-/// Views by their view cell, in their order.
-fn by_cell(plan: &Assignment, views: &[RequestedView]) -> BTreeMap<u32, Vec<RequestedView>> {
-    let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
-    for view in views {
-        cells.entry(plan.cell_of(&view.camera)).or_default().push(*view);
-    }
-    cells
 }
 
 /// The pixels of its stream that a view takes. Small views take more than they have, so that their number is bounded. A

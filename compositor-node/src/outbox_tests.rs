@@ -140,6 +140,6 @@ async fn a_client_that_leaves_returns_all_credit() {
     bench.put(1, 10);
     let Bench { outbox, outgoing, credits, .. } = bench;
     drop(outgoing);
-    outbox.gone().await;
+    outbox.gone.cancelled().await;
     assert_eq!(credits.available_permits(), 2);
 }

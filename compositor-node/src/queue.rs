@@ -216,7 +216,7 @@ mod tests {
         queue.push(1, views(1, 5000, 64));
         (2..10).for_each(|stream| queue.push(stream, vec![view(stream, 0, 0, 64)]));
         let batch = queue.take_batch();
-        let of = |stream: u64| batch.iter().filter(|view| view.reply.stream() == stream).count();
+        let of = |stream: u64| batch.iter().filter(|view| view.reply.outbox().stream == stream).count();
         assert_eq!(of(1), SHARED_VIEWS);
         assert!((2..10).all(|stream| of(stream) == 1), "views of one size go together");
         assert_eq!(queue.take_batch().len(), MAX_BATCH, "alone, it has the device");
@@ -239,7 +239,7 @@ mod tests {
             });
             let batch = queue.take_batch();
             assert_eq!(batch.len(), SHARED_VIEWS);
-            batch.iter().for_each(|view| served[view.reply.stream() as usize] += 1);
+            batch.iter().for_each(|view| served[view.reply.outbox().stream as usize] += 1);
         }
         assert_eq!(served, [2; 40]);
     }
@@ -258,7 +258,7 @@ mod tests {
         queue.push(1, views(1, 100, 64));
         queue.push(2, views(2, 30, 32));
         queue.push(7, views(7, 30, 16));
-        let leaders: Vec<u64> = (0..6).map(|_| queue.take_batch()[0].reply.stream()).collect();
+        let leaders: Vec<u64> = (0..6).map(|_| queue.take_batch()[0].reply.outbox().stream).collect();
         assert_eq!(leaders, [1, 2, 7, 1, 2, 7]);
     }
 
@@ -271,7 +271,7 @@ mod tests {
         assert_eq!(queue.withdraw(3).len(), 5);
         assert!(queue.withdraw(3).is_empty());
         let batch = queue.take_batch();
-        assert_eq!((batch.len(), batch[0].reply.stream()), (1, 4));
+        assert_eq!((batch.len(), batch[0].reply.outbox().stream), (1, 4));
         assert!(queue.take_batch().is_empty() && queue.streams.is_empty());
     }
 }

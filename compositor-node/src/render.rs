@@ -37,7 +37,7 @@ pub(crate) async fn render_loop(engine: Arc<dyn Engine>, arrivals: Arc<Arrivals>
         };
         let mut batch = arrivals.next_batch().await;
         batch.retain(|view| {
-            let is_wanted = !view.reply.outbox().is_gone();
+            let is_wanted = !view.reply.outbox().gone.is_cancelled();
             if !is_wanted {
                 rendering.metrics.drop_view("client gone");
             }
@@ -132,7 +132,7 @@ fn stage_times(waiting: &Waiting, start: Instant, batch_s: f64, count: usize) ->
         batch_count: count as u32,
         ..StageTimes::default()
     };
-    let (stream, frame) = (waiting.reply.stream(), waiting.view.frame);
+    let (stream, frame) = (waiting.reply.outbox().stream, waiting.view.frame);
     let StageTimes { queue_s, batch_count, .. } = times;
     tracing::debug!(stream, frame, set = %waiting.key.sample_set_id, queue_s, batch_s, batch_count, "reconstructed");
     times

@@ -86,7 +86,7 @@ impl ClientStream {
         let (stream, stall) = (self.stream, self.shared.deadlines.stall);
         tokio::select! {
             () = self.answer_and_send(requests) => (),
-            () = self.outbox.gone() => (),
+            () = self.outbox.gone.cancelled() => (),
             () = self.outbox.stalled(stall) => {
                 let seconds = stall.as_secs_f64();
                 tracing::warn!(stream, seconds, "a client takes no frames: cut off");
@@ -109,7 +109,7 @@ impl ClientStream {
             reply.send(Err(status));
         }
         drop(reply);
-        self.outbox.gone().await;
+        self.outbox.gone.cancelled().await;
     }
 
     async fn answer(&self, mut requests: Messages<RenderViews>, reply: Reply) -> Result<(), Status> {

@@ -9,48 +9,29 @@ use glam::Vec3;
 use tonic::Status;
 
 /// The operations of a node's device. Calls block; services run them on blocking threads. Methods, sampling and lighting are
-/// text, as on the command line, and are parsed here.
+/// text, as on the command line, and are parsed here. Calls fail for text that is unknown, a scene that is not loaded, and a
+/// device that fails.
 pub trait Engine: Send + Sync + 'static {
     /// The device's name, which every reported time is listed with.
     fn device_name(&self) -> String;
     /// Whether the device is a CPU.
     fn is_software(&self) -> bool;
-    /// Loads a scene package, whose bytes have been checked against the hash, under its hash.
-    ///
-    /// # Errors
-    /// Where the package cannot be read or the device cannot hold it.
+    /// Loads a scene package, whose bytes have been checked against the hash, under its hash. Fails where the package cannot be
+    /// read or the device cannot hold it.
     fn load_scene(&self, hash: &str, package: &[u8]) -> Result<(), EngineError>;
     /// Whether [`Engine::load_scene`] has loaded the scene.
     fn has_scene(&self, hash: &str) -> bool;
     /// Whether an image depends on the images before it, so that one node samples a whole set.
-    ///
-    /// # Errors
-    /// For an unknown method.
     fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError>;
     /// Whether an image depends on its own camera alone, so that it is tileable.
-    ///
-    /// # Errors
-    /// For an unknown method.
     fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError>;
     /// Samples the wanted images of a set, in their order.
-    ///
-    /// # Errors
-    /// For unknown settings, a scene that is not loaded, or a device that fails.
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError>;
-    /// Uploads a set for reconstruction.
-    ///
-    /// # Errors
-    /// For images that the device cannot take, or a device that fails.
+    /// Uploads a set for reconstruction. Fails for images that the device cannot take.
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError>;
     /// Reconstructs one view for each camera, in one submission.
-    ///
-    /// # Errors
-    /// For unknown settings, or a device that fails.
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError>;
     /// Draws one view for each camera from the scene itself.
-    ///
-    /// # Errors
-    /// For unknown settings, a scene that is not loaded, or a device that fails.
     fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError>;
 }
 

@@ -32,21 +32,18 @@ const AFTER_ERROR: Duration = Duration::from_millis(100);
 
 /// Why a server did not serve.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming fields")]
+#[allow(missing_docs, reason = "self-naming variants and fields")]
 pub enum ServeError {
     /// Others could reach it and nothing protects it.
     #[error("{address} is not loopback: give --insecure-bind to serve there without TLS")]
     NotLoopback { address: SocketAddr },
-    /// The socket cannot be used.
     #[error("listening: {0}")]
     Listen(#[from] io::Error),
-    /// The services could not be described.
     #[error("reflection: {0}")]
     Reflection(String),
     /// The process can make nothing any more; a supervisor may start it again.
     #[error("device lost: {reason}")]
     DeviceLost { reason: String },
-    /// The transport failed.
     #[error("serving: {0}")]
     Transport(#[from] tonic::transport::Error),
 }
@@ -65,7 +62,14 @@ pub async fn serve(
     if !address.ip().is_loopback() && !insecure_bind {
         return Err(ServeError::NotLoopback { address });
     }
-    let serving = builder()
+    let serving = Server::builder()
+        .load_shed(true)
+        .concurrency_limit_per_connection(MAX_STREAMS as usize)
+        .max_concurrent_streams(MAX_STREAMS)
+        .http2_keepalive_interval(Some(KEEPALIVE_INTERVAL))
+        .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
+        .initial_stream_window_size(4 << 20)
+        .initial_connection_window_size(16 << 20)
         .add_routes(routes)
         .serve_with_incoming_shutdown(accept_http2(listener), shutdown.clone().cancelled_owned());
     let overdue = async {
@@ -79,17 +83,6 @@ pub async fn serve(
             Ok(())
         }
     }
-}
-
-fn builder() -> Server {
-    Server::builder()
-        .load_shed(true)
-        .concurrency_limit_per_connection(MAX_STREAMS as usize)
-        .max_concurrent_streams(MAX_STREAMS)
-        .http2_keepalive_interval(Some(KEEPALIVE_INTERVAL))
-        .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
-        .initial_stream_window_size(4 << 20)
-        .initial_connection_window_size(16 << 20)
 }
 
 /// The routes, with reflection where it is wanted.

@@ -1,4 +1,5 @@
-//! Metrics of a process, and the page at which Prometheus reads them. Base units; labels are few and bounded.
+//! Metrics of a process, and the page at which Prometheus reads them. Base units; labels are few and bounded. Logs go to
+//! standard error; `RUST_LOG` filters them, and `MYRIORAMA_LOG_FORMAT=json` makes each a line of JSON.
 
 use std::sync::Arc;
 
@@ -14,10 +15,22 @@ use prometheus_client::metrics::{
 use prometheus_client::registry::{Metric, Registry, Unit};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
+use tracing_subscriber::EnvFilter;
 
 use crate::work_done::WorkDone;
 
 const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+/// Starts logging; `default_filter` applies where `RUST_LOG` is not set. A second call does nothing.
+pub fn init_logging(default_filter: &str) {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default_filter));
+    let logging = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let is_json = std::env::var("MYRIORAMA_LOG_FORMAT").is_ok_and(|format| format == "json");
+    let started = if is_json { logging.json().try_init() } else { logging.try_init() };
+    if started.is_err() {
+        tracing::debug!("logging was already started");
+    }
+}
 
 /// A process's metrics, by name.
 #[derive(Debug, Clone)]
