@@ -5,19 +5,24 @@ use std::time::{Duration, Instant};
 use cluster::Assignment;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
+use wire::rpc::Backoff;
 
 use crate::active_plan::{ActivePlan, SessionState};
 use crate::error::ClientError;
 use crate::frames::FrameSink;
 use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::request_pump::{Started, start_pumps};
-use crate::retry::Retries;
 use crate::view_request::ViewRequest;
 
 /// A view that waited longer for its sample set does not show its compositor's speed.
 const SET_WAIT_S: f64 = 0.05;
 /// The time that a compositor without a place in the next plan has to send the frames it was asked for.
 const LAST_WORK: Duration = Duration::from_secs(1);
+/// The time without any frame after which a request fails: a host that is lost without a word is missed after 15 s.
+pub(crate) const GIVE_UP_AFTER: Duration = Duration::from_secs(20);
+/// The time that a later plan is waited for before compositors of the same plan are asked again.
+const FIRST_DELAY: Duration = Duration::from_millis(50);
+const LONGEST_DELAY: Duration = Duration::from_secs(1);
 
 /// Requests all frames, and after a fault the missing ones, under the plan in force by then.
 pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, requests: Vec<ViewRequest>, sink: FrameSink) {
@@ -149,4 +154,48 @@ pub(crate) async fn wait_for_lost_peer(
     let Some(peer) = found else { return std::future::pending().await };
     tokio::time::sleep(LAST_WORK).await;
     peer.error("is not of the plan any more")
+}
+
+/// The retries of one request for frames.
+#[derive(Debug)]
+pub(crate) struct Retries {
+    /// Frames that were missing at the last fault.
+    missing: usize,
+    /// The first fault since a frame was received.
+    failing_since: Option<Instant>,
+    backoff: Backoff,
+}
+
+impl Retries {
+    pub(crate) fn new(missing: usize) -> Self {
+        Self { missing, failing_since: None, backoff: Backoff::new(FIRST_DELAY, 2, LONGEST_DELAY) }
+    }
+
+    /// The delay before the next attempt; `None` where no frame has been received for too long.
+    pub(crate) fn next_delay(&mut self, now: Instant, missing: usize) -> Option<Duration> {
+        if missing < self.missing {
+            *self = Self::new(missing);
+        }
+        let (since, delay) = (*self.failing_since.get_or_insert(now), self.backoff.next_delay());
+        (now.saturating_duration_since(since) < GIVE_UP_AFTER).then_some(delay)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn retries_end_where_no_frame_is_received() {
+        let mut retries = Retries::new(9);
+        let start = Instant::now();
+        let at = |s: u64| start + Duration::from_secs(s);
+        assert_eq!(retries.next_delay(at(1), 9), Some(FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(2), 9), Some(2 * FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(18), 8), Some(FIRST_DELAY), "one frame was received");
+        assert_eq!(retries.next_delay(at(37), 8), Some(2 * FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(39), 8), None);
+        let delays: Vec<_> = (0..9).map(|_| retries.next_delay(start, 8)).collect();
+        assert_eq!(delays[8], Some(LONGEST_DELAY));
+    }
 }

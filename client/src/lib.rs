@@ -16,7 +16,6 @@ mod peer;
 mod placement;
 mod poses;
 mod request_pump;
-mod retry;
 mod session;
 mod view_request;
 mod work_stealing;

@@ -10,12 +10,12 @@ use tokio_stream::wrappers::ReceiverStream;
 use wire::rpc::CALL_TIMEOUT;
 
 use crate::active_plan::SessionState;
+use crate::delivery::GIVE_UP_AFTER;
 use crate::error::ClientError;
 use crate::frames::check_frame;
 use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::placement::{Tried, new_client_id};
 use crate::poses::{Newest, Poses, SentPose};
-use crate::retry::GIVE_UP_AFTER;
 use crate::view_request::{Frame, LiveFrame, LiveTimes, ViewRequest};
 
 /// The longest silence of a client: its compositor cuts off one that is silent for longer.

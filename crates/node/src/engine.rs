@@ -1,4 +1,4 @@
-//! The boundary to the device.
+//! The boundary to the device, and the notice of its loss.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -6,6 +6,7 @@ use std::sync::Arc;
 use cluster::{Refinement, Workload};
 use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, View, ViewPlanes};
 use glam::Vec3;
+use tokio::sync::watch;
 use tonic::Status;
 
 /// The operations of a node's device. Calls block; services run them on blocking threads. Methods, sampling and lighting are
@@ -40,20 +41,17 @@ pub trait UploadedSet: Any + Send + Sync {}
 
 /// Images to sample.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub struct SampleWork {
-    /// A loaded scene.
     pub scene_hash: String,
     /// The cameras of the whole set, in its order: an image may depend on the cameras before its own.
     pub cameras: Vec<Camera>,
     /// Indices of the cameras to sample.
     pub wanted: Vec<u32>,
-    /// The sampling method.
     pub sampling: String,
     /// The reconstruction method, which decides which planes images need.
     pub method: String,
-    /// The lighting.
     pub lighting: String,
-    /// Scene time of the animation.
     pub scene_time_s: f32,
     /// Scene time of the temporal reference, for sampling methods with temporal hysteresis.
     pub temporal_reference_s: Option<f32>,
@@ -121,14 +119,12 @@ pub struct ViewWork {
 
 /// Views to draw from the scene.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub struct DirectWork {
-    /// A loaded scene.
     pub scene_hash: String,
     /// Cameras of one size.
     pub cameras: Vec<PinholeCamera>,
-    /// The lighting.
     pub lighting: String,
-    /// Scene time of the animation.
     pub scene_time_s: f32,
     /// Planes beside colour.
     pub planes: ViewPlanes,
@@ -176,5 +172,77 @@ impl From<EngineError> for Status {
             // Another node's device can do it.
             EngineError::Lost(_) => Self::unavailable(text),
         }
+    }
+}
+
+/// An engine that notices when the device of the engine inside is lost.
+#[derive(Clone)]
+pub struct DeviceLossMonitor {
+    engine: Arc<dyn Engine>,
+    lost: watch::Sender<Option<String>>,
+}
+
+impl DeviceLossMonitor {
+    /// Monitors an engine.
+    #[must_use]
+    pub fn new(engine: Arc<dyn Engine>) -> Self {
+        Self { engine, lost: watch::Sender::new(None) }
+    }
+
+    /// Resolves when the device is lost, with the reason.
+    pub async fn lost(&self) -> String {
+        let mut lost = self.lost.subscribe();
+        // This value owns a sender, which therefore outlives the wait.
+        let reason = lost.wait_for(Option::is_some).await.ok().and_then(|reason| reason.clone());
+        reason.unwrap_or_default()
+    }
+
+    fn monitored<T>(&self, done: Result<T, EngineError>) -> Result<T, EngineError> {
+        if let Err(EngineError::Lost(reason)) = &done {
+            self.lost.send_replace(Some(reason.clone()));
+        }
+        done
+    }
+}
+
+impl Engine for DeviceLossMonitor {
+    fn device_name(&self) -> String {
+        self.engine.device_name()
+    }
+
+    fn is_software(&self) -> bool {
+        self.engine.is_software()
+    }
+
+    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<(), EngineError> {
+        self.monitored(self.engine.load_scene(hash, package))
+    }
+
+    fn has_scene(&self, hash: &str) -> bool {
+        self.engine.has_scene(hash)
+    }
+
+    fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError> {
+        self.monitored(self.engine.images_are_independent(sampling))
+    }
+
+    fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
+        self.monitored(self.engine.images_are_sequential(sampling))
+    }
+
+    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
+        self.monitored(self.engine.sample(request))
+    }
+
+    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        self.monitored(self.engine.upload(set))
+    }
+
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
+        self.monitored(self.engine.reconstruct(set, work))
+    }
+
+    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
+        self.monitored(self.engine.draw_direct(work))
     }
 }

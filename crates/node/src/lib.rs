@@ -5,7 +5,6 @@
 mod blocking;
 mod config;
 mod connections;
-mod device_loss;
 mod engine;
 mod measure;
 mod membership;
@@ -20,8 +19,7 @@ mod work_done;
 pub use blocking::blocking;
 pub use config::{Deadlines, NodeConfig, Quotas};
 pub use connections::Connections;
-pub use device_loss::DeviceLossMonitor;
-pub use engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
+pub use engine::{DeviceLossMonitor, DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 pub use membership::keep_membership;
 pub use plan::{CellPlan, CurrentPlan, Relay, beyond_timeline};
 pub use scenes::Scenes;
