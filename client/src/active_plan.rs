@@ -1,10 +1,15 @@
-//! The plan in force and its compositors, as a session knows them.
+//! The plan in force and its compositors, as a session knows them. It changes: nodes come and go, and the coordinator may be
+//! away for a while.
 
 use std::sync::Arc;
 
-use cluster::{Assignment, CompositorShare, SessionPlan};
-use tokio::sync::mpsc;
-use wire::rpc::{connect, connect_later};
+use cluster::{Assignment, CompositorShare, RenderViews, SessionEvent, SessionPlan, SessionRequest};
+use codec::FrameCodec;
+use depth_image::ViewPlanes;
+use parking_lot::Mutex;
+use tokio::sync::{mpsc, watch};
+use tokio_stream::StreamExt as _;
+use wire::rpc::{Backoff, CoordinatorClient, Messages, connect, connect_later};
 
 use crate::error::ClientError;
 use crate::peer::Peer;
@@ -14,6 +19,9 @@ use crate::peer::Peer;
 pub(crate) struct ActivePlan {
     pub(crate) plan: SessionPlan,
     pub(crate) peers: Vec<Peer>,
+    /// As the session asked for.
+    pub(crate) codec: FrameCodec,
+    pub(crate) planes: ViewPlanes,
     named_plans: mpsc::Sender<Assignment>,
 }
 
@@ -24,9 +32,10 @@ impl ActivePlan {
     /// Where no compositor can be reached.
     pub(crate) async fn connect(
         plan: SessionPlan,
-        named_plans: &mpsc::Sender<Assignment>,
+        (codec, planes): (FrameCodec, ViewPlanes),
+        named_plans: mpsc::Sender<Assignment>,
     ) -> Result<Self, ClientError> {
-        let (mut peers, mut failed) = (Vec::with_capacity(plan.assignment.compositors.len()), None);
+        let (mut peers, mut failed) = (Vec::new(), None);
         for share in &plan.assignment.compositors {
             match connect(&share.address).await {
                 Ok(channel) => peers.push(Peer::new(share, channel, named_plans.clone())),
@@ -35,7 +44,7 @@ impl ActivePlan {
         }
         match failed.filter(|_| peers.is_empty()) {
             Some(error) => Err(error),
-            None => Ok(Self { plan, peers, named_plans: named_plans.clone() }),
+            None => Ok(Self { plan, peers, codec, planes, named_plans }),
         }
     }
 
@@ -46,7 +55,7 @@ impl ActivePlan {
             connect_later(&share.address).map(|channel| Peer::new(share, channel, self.named_plans.clone()))
         };
         let peers = plan.assignment.compositors.iter().filter_map(|share| peer(share).ok()).collect();
-        Self { plan, peers, named_plans: self.named_plans.clone() }
+        Self { plan, peers, codec: self.codec, planes: self.planes, named_plans: self.named_plans.clone() }
     }
 
     /// The plan that a compositor names as the one in force, if it can be this session's.
@@ -68,6 +77,19 @@ impl ActivePlan {
     pub(crate) fn plan_epoch(&self) -> u64 {
         self.plan.assignment.plan_epoch
     }
+
+    /// A request without views, of set 0.
+    pub(crate) fn request(&self) -> RenderViews {
+        RenderViews {
+            plan_epoch: self.plan_epoch(),
+            set_index: 0,
+            method: self.plan.assignment.workload.method.clone(),
+            codec: self.codec,
+            planes: self.planes,
+            views: Vec::new(),
+            live: None,
+        }
+    }
 }
 
 /// The state of a session, as the coordinator last said.
@@ -78,4 +100,94 @@ pub(crate) struct SessionState {
     pub(crate) active: Arc<ActivePlan>,
     /// Why the session has ended, if it has.
     pub(crate) ended: Option<String>,
+}
+
+impl SessionState {
+    /// # Errors
+    /// Where the session has ended.
+    pub(crate) fn in_force(&self) -> Result<Arc<ActivePlan>, ClientError> {
+        match self.ended.clone() {
+            Some(reason) => Err(ClientError::Ended { reason }),
+            None => Ok(self.active.clone()),
+        }
+    }
+}
+
+/// Takes over plans that compositors name, until it is aborted.
+pub(crate) async fn follow_compositors(
+    mut named_plans: mpsc::Receiver<Assignment>,
+    state: watch::Sender<SessionState>,
+) {
+    while let Some(assignment) = named_plans.recv().await {
+        state.send_if_modified(|state| {
+            let Some(active) = state.active.succeeded_by(&assignment) else { return false };
+            tracing::info!(plan_epoch = assignment.plan_epoch, "a compositor names the plan in force");
+            state.active = Arc::new(active);
+            true
+        });
+    }
+}
+
+/// Takes over what the coordinator says, until the session ends. Frames go on while the coordinator is away; the session
+/// is then opened once more.
+pub(crate) async fn follow_coordinator(
+    coordinator: CoordinatorClient,
+    request: Arc<Mutex<SessionRequest>>,
+    mut events: Messages<SessionEvent>,
+    state: watch::Sender<SessionState>,
+) {
+    let mut backoff = Backoff::reconnect();
+    // Epochs of a coordinator that was restarted may begin anew.
+    let mut is_new_session = false;
+    loop {
+        while let Some(Ok(event)) = events.next().await {
+            backoff.reset();
+            if take_over(event, &state, &mut is_new_session) {
+                return;
+            }
+        }
+        events = reopen(&coordinator, &request, &mut backoff).await;
+        is_new_session = true;
+    }
+}
+
+async fn reopen(
+    coordinator: &CoordinatorClient,
+    request: &Mutex<SessionRequest>,
+    backoff: &mut Backoff,
+) -> Messages<SessionEvent> {
+    loop {
+        tokio::time::sleep(backoff.next_delay()).await;
+        let request = request.lock().clone();
+        match coordinator.open_session(request).await {
+            Ok(events) => return events,
+            Err(status) => tracing::debug!(reason = status.message(), "the coordinator is away"),
+        }
+    }
+}
+
+/// Whether the event ends the session.
+fn take_over(event: SessionEvent, state: &watch::Sender<SessionState>, is_new_session: &mut bool) -> bool {
+    match event {
+        SessionEvent::Opened { session } => state.send_modify(|state| state.session = session),
+        SessionEvent::Progress { .. } => (),
+        SessionEvent::Plan(plan) => put_in_force(*plan, state, std::mem::take(is_new_session)),
+        SessionEvent::Ended { reason } => {
+            state.send_modify(|state| state.ended = Some(reason));
+            return true;
+        }
+    }
+    false
+}
+
+/// Puts a plan in force, unless it is older than the one in force. The coordinator sends a plan when its nodes have taken
+/// it, so that one that was replaced meanwhile may arrive last.
+fn put_in_force(plan: SessionPlan, state: &watch::Sender<SessionState>, is_new_session: bool) {
+    state.send_if_modified(|state| {
+        let is_current = is_new_session || plan.assignment.plan_epoch >= state.active.plan_epoch();
+        if is_current {
+            state.active = Arc::new(state.active.replaced_by(plan));
+        }
+        is_current
+    });
 }

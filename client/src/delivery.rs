@@ -1,57 +1,31 @@
 //! Requests frames from all compositors of a plan at once, and after a fault the missing ones from the next plan's.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use cluster::{Assignment, RenderViews};
-use codec::FrameCodec;
-use depth_image::ViewPlanes;
+use cluster::Assignment;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
-use tokio_stream::wrappers::ReceiverStream;
+use wire::rpc::Backoff;
 
 use crate::active_plan::{ActivePlan, SessionState};
-use crate::frame_sink::FrameSink;
-use crate::frame_stream::{FrameStream, decode};
-use crate::peer::{Failure, Peer};
-use crate::plan_change::{wait_for_lost_peer, wait_for_successor};
-use crate::request_pump::{RequestPump, start_pumps};
-use crate::retry::Retries;
+use crate::error::ClientError;
+use crate::frames::FrameSink;
+use crate::peer::{Failure, FrameStream, Peer, decode};
+use crate::request_pump::{Started, start_pumps};
 use crate::view_request::ViewRequest;
 
 /// A view that waited longer for its sample set does not show its compositor's speed.
 const SET_WAIT_S: f64 = 0.05;
-
-/// The settings that all views of a request share.
-#[derive(Debug, Clone)]
-pub(crate) struct Template {
-    /// `None`: the method of the plan in force.
-    pub(crate) method: Option<String>,
-    pub(crate) codec: FrameCodec,
-    pub(crate) planes: ViewPlanes,
-}
-
-impl Template {
-    /// A message without views, of set 0.
-    pub(crate) fn message(&self, plan: &Assignment) -> RenderViews {
-        RenderViews {
-            plan_epoch: plan.plan_epoch,
-            set_index: 0,
-            method: self.method.clone().unwrap_or_else(|| plan.workload.method.clone()),
-            codec: self.codec,
-            planes: self.planes,
-            views: Vec::new(),
-            live: None,
-        }
-    }
-}
+/// The time that a compositor without a place in the next plan has to send the frames it was asked for.
+const LAST_WORK: Duration = Duration::from_secs(1);
+/// The time without any frame after which a request fails: a host that is lost without a word is missed after 15 s.
+pub(crate) const GIVE_UP_AFTER: Duration = Duration::from_secs(20);
+/// The time that a later plan is waited for before compositors of the same plan are asked again.
+const FIRST_DELAY: Duration = Duration::from_millis(50);
+const LONGEST_DELAY: Duration = Duration::from_secs(1);
 
 /// Requests all frames, and after a fault the missing ones, under the plan in force by then.
-pub(crate) async fn deliver(
-    mut state: watch::Receiver<SessionState>,
-    template: Template,
-    requests: Vec<ViewRequest>,
-    sink: FrameSink,
-) {
+pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, requests: Vec<ViewRequest>, sink: FrameSink) {
     let mut retries = Retries::new(requests.len());
     loop {
         let active = state.borrow_and_update().active.clone();
@@ -59,7 +33,7 @@ pub(crate) async fn deliver(
         if missing.is_empty() {
             return;
         }
-        let error = match call_all(&state, &active, &template, missing, &sink).await {
+        let error = match call_all(&state, &active, missing, &sink).await {
             // Frames that are still missing will not come.
             Ok(()) => return,
             Err(Failure::OfRequest(error) | Failure::Exhausted(error)) => error,
@@ -68,7 +42,7 @@ pub(crate) async fn deliver(
                 true => continue,
                 false => return,
             },
-            Err(Failure::OfPlan(error)) => match retries.next_delay(sink.missing(&requests).len()) {
+            Err(Failure::OfPlan(error)) => match retries.next_delay(Instant::now(), sink.missing(&requests).len()) {
                 None => error,
                 Some(delay) => match wait_for_successor(&mut state, active.plan_epoch(), delay, error).await {
                     Ok(()) => continue,
@@ -84,18 +58,17 @@ pub(crate) async fn deliver(
 async fn call_all(
     state: &watch::Receiver<SessionState>,
     active: &ActivePlan,
-    template: &Template,
     missing: Vec<ViewRequest>,
     sink: &FrameSink,
 ) -> Result<(), Failure> {
     let plan = &active.plan.assignment;
     let (peers, requests) = (active.trusted(), cell_by_cell(plan, missing));
     let weights: Vec<u32> = peers.iter().map(|peer| peer.share.view_weight).collect();
-    let pumps = start_pumps(&template.message(plan), requests, &weights, Some(active.plan.view_s()));
+    let pumps = start_pumps(active.request(), requests, &weights, Some(active.plan.view_s()));
     let mut calls = JoinSet::new();
     for (peer, pump) in peers.iter().zip(pumps) {
-        if let Some((pump, messages)) = pump {
-            calls.spawn(receive_all(peer.clone(), pump, messages, sink.clone()));
+        if let Some(pump) = pump {
+            calls.spawn(receive_all(peer.clone(), pump, sink.clone()));
         }
     }
     tokio::select! {
@@ -122,12 +95,7 @@ async fn all(tasks: &mut JoinSet<Result<(), Failure>>) -> Result<(), Failure> {
     Ok(())
 }
 
-async fn receive_all(
-    peer: Peer,
-    mut pump: RequestPump,
-    messages: ReceiverStream<RenderViews>,
-    sink: FrameSink,
-) -> Result<(), Failure> {
+async fn receive_all(peer: Peer, (mut pump, messages): Started, sink: FrameSink) -> Result<(), Failure> {
     let parts = peer.client.render_views(messages).await.map_err(|status| Failure::of_status(&peer, &status))?;
     let mut frames = FrameStream::new(parts);
     let mut decoding = JoinSet::new();
@@ -150,4 +118,84 @@ async fn receive_all(
         }
     }
     all(&mut decoding).await
+}
+
+/// Waits for a later plan for `delay`; gives an error where no plan is to be tried any more.
+pub(crate) async fn wait_for_successor(
+    state: &mut watch::Receiver<SessionState>,
+    plan_epoch: u64,
+    delay: Duration,
+    error: ClientError,
+) -> Result<(), ClientError> {
+    let is_later = |state: &SessionState| state.ended.is_some() || state.active.plan_epoch() > plan_epoch;
+    match tokio::time::timeout(delay, state.wait_for(is_later)).await {
+        Ok(Ok(state)) => match &state.ended {
+            Some(reason) => Err(ClientError::Ended { reason: format!("{reason} ({error})") }),
+            None => Ok(()),
+        },
+        // The session was dropped.
+        Ok(Err(_)) => Err(error),
+        Err(_) => Ok(()),
+    }
+}
+
+/// Resolves when a later plan has no place for one of `peers`: it may be lost without a word.
+pub(crate) async fn wait_for_lost_peer(
+    mut state: watch::Receiver<SessionState>,
+    plan_epoch: u64,
+    peers: &[Peer],
+) -> ClientError {
+    let lost = |state: &SessionState| {
+        let plan = &state.active.plan.assignment;
+        let lost = peers.iter().find(|peer| !plan.composites(&peer.share.node_name));
+        lost.filter(|_| plan.plan_epoch > plan_epoch).cloned()
+    };
+    let found = state.wait_for(|state| lost(state).is_some()).await.ok().and_then(|state| lost(&state));
+    let Some(peer) = found else { return std::future::pending().await };
+    tokio::time::sleep(LAST_WORK).await;
+    peer.error("is not of the plan any more")
+}
+
+/// The retries of one request for frames.
+#[derive(Debug)]
+pub(crate) struct Retries {
+    /// Frames that were missing at the last fault.
+    missing: usize,
+    /// The first fault since a frame was received.
+    failing_since: Option<Instant>,
+    backoff: Backoff,
+}
+
+impl Retries {
+    pub(crate) fn new(missing: usize) -> Self {
+        Self { missing, failing_since: None, backoff: Backoff::new(FIRST_DELAY, 2, LONGEST_DELAY) }
+    }
+
+    /// The delay before the next attempt; `None` where no frame has been received for too long.
+    pub(crate) fn next_delay(&mut self, now: Instant, missing: usize) -> Option<Duration> {
+        if missing < self.missing {
+            *self = Self::new(missing);
+        }
+        let (since, delay) = (*self.failing_since.get_or_insert(now), self.backoff.next_delay());
+        (now.saturating_duration_since(since) < GIVE_UP_AFTER).then_some(delay)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn retries_end_where_no_frame_is_received() {
+        let mut retries = Retries::new(9);
+        let start = Instant::now();
+        let at = |s: u64| start + Duration::from_secs(s);
+        assert_eq!(retries.next_delay(at(1), 9), Some(FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(2), 9), Some(2 * FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(18), 8), Some(FIRST_DELAY), "one frame was received");
+        assert_eq!(retries.next_delay(at(37), 8), Some(2 * FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(39), 8), None);
+        let delays: Vec<_> = (0..9).map(|_| retries.next_delay(start, 8)).collect();
+        assert_eq!(delays[8], Some(LONGEST_DELAY));
+    }
 }

@@ -6,35 +6,24 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod active_plan;
-mod circuit_breaker;
-mod coordinator;
 mod delivery;
 mod error;
-mod expected;
 mod flow_control;
-mod frame_sink;
-mod frame_stream;
 mod frames;
-mod live_frame;
 mod live_stream;
 mod live_view;
 mod peer;
 mod placement;
-mod plan_change;
-mod plan_follower;
 mod poses;
 mod request_pump;
-mod retry;
 mod session;
 mod view_request;
 mod work_stealing;
 
-pub use coordinator::Client;
 pub use error::ClientError;
 pub use flow_control::FlowControl;
 pub use frames::Frames;
-pub use live_frame::{LiveFrame, LiveTimes};
 pub use live_view::LiveView;
-pub use session::Session;
-pub use view_request::{Frame, ViewRequest};
+pub use session::{Client, Session};
+pub use view_request::{Frame, LiveFrame, LiveTimes, ViewRequest};
 pub use work_stealing::WorkStealing;

@@ -3,24 +3,20 @@
 use std::time::{Duration, Instant};
 
 use cluster::{LiveRequest, RenderViews, RequestedView};
-use codec::{FrameCodec, WholeFrame};
-use depth_image::ViewPlanes;
+use codec::WholeFrame;
 use tokio::sync::{mpsc, watch};
 use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
 use tokio_stream::wrappers::ReceiverStream;
 use wire::rpc::CALL_TIMEOUT;
 
 use crate::active_plan::SessionState;
-use crate::delivery::Template;
+use crate::delivery::GIVE_UP_AFTER;
 use crate::error::ClientError;
-use crate::expected::check_frame;
-use crate::frame_stream::{FrameStream, decode};
-use crate::live_frame::{LiveFrame, LiveTimes, Newest, SentPose};
-use crate::peer::{Failure, Peer};
+use crate::frames::check_frame;
+use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::placement::{Tried, new_client_id};
-use crate::poses::Poses;
-use crate::retry::GIVE_UP_AFTER;
-use crate::view_request::{Frame, ViewRequest};
+use crate::poses::{Newest, Poses, SentPose};
+use crate::view_request::{Frame, LiveFrame, LiveTimes, ViewRequest};
 
 /// The longest silence of a client: its compositor cuts off one that is silent for longer.
 const HEARTBEAT: Duration = Duration::from_secs(20);
@@ -40,8 +36,6 @@ pub(crate) struct LiveStream {
     state: watch::Receiver<SessionState>,
     newest: watch::Receiver<Newest>,
     client_id: u64,
-    codec: FrameCodec,
-    planes: ViewPlanes,
     frames: mpsc::Sender<Result<Encoded, ClientError>>,
     poses: Poses,
     /// The plan of the last frame: epochs rise.
@@ -69,20 +63,19 @@ struct Call {
 }
 
 impl LiveStream {
-    pub(crate) fn new(
+    /// Streams until the session ends or the viewer leaves.
+    pub(crate) fn run(
         state: watch::Receiver<SessionState>,
         newest: watch::Receiver<Newest>,
-        (codec, planes): (FrameCodec, ViewPlanes),
         frames: mpsc::Sender<Result<Encoded, ClientError>>,
-    ) -> Self {
+    ) -> impl Future<Output = ()> {
         let (client_id, poses) = (new_client_id(), Poses::default());
-        Self { state, newest, client_id, codec, planes, frames, poses, plan_epoch: 0, failing_since: None }
-    }
-
-    pub(crate) async fn run(mut self) {
-        if let Err(error) = self.follow().await {
-            // A failure to send means that the viewer has left.
-            let _ = self.frames.send(Err(error)).await;
+        let mut stream = Self { state, newest, client_id, frames, poses, plan_epoch: 0, failing_since: None };
+        async move {
+            if let Err(error) = stream.follow().await {
+                // A failure to send means that the viewer has left.
+                let _ = stream.frames.send(Err(error)).await;
+            }
         }
     }
 
@@ -90,10 +83,7 @@ impl LiveStream {
     async fn follow(&mut self) -> Result<(), ClientError> {
         let mut tried = Tried::none(0);
         loop {
-            let SessionState { active, ended, .. } = self.state.borrow_and_update().clone();
-            if let Some(reason) = ended {
-                return Err(ClientError::Ended { reason });
-            }
+            let active = self.state.borrow_and_update().in_force()?;
             let plan_epoch = active.plan_epoch();
             if tried.plan_epoch != plan_epoch {
                 tried = Tried::none(plan_epoch);
@@ -172,9 +162,10 @@ impl LiveStream {
 
     /// A request for the newest pose, if it was not sent, which acknowledges the frames that were taken.
     fn request(&mut self) -> RenderViews {
-        let Newest { pose, taken } = self.newest.borrow_and_update().clone();
+        let Newest { pose, taken } = *self.newest.borrow_and_update();
         self.poses.taken(taken);
-        let mut request = self.acknowledgement(taken);
+        let live = LiveRequest { acknowledged_frame: taken, client_id: self.client_id };
+        let mut request = RenderViews { live: Some(live), ..self.state.borrow().active.request() };
         if let Some(pose) = pose.filter(|pose| self.poses.wants(pose)) {
             let ViewRequest { frame, set_index, camera } = pose.request;
             (request.set_index, request.views) = (set_index, vec![RequestedView { frame, camera }]);
@@ -183,19 +174,13 @@ impl LiveStream {
         request
     }
 
-    /// A request without a pose.
-    fn acknowledgement(&self, acknowledged_frame: u64) -> RenderViews {
-        let template = Template { method: None, codec: self.codec, planes: self.planes };
-        let live = LiveRequest { acknowledged_frame, client_id: self.client_id };
-        RenderViews { live: Some(live), ..template.message(&self.state.borrow().active.plan.assignment) }
-    }
-
     fn accept(&mut self, frame: WholeFrame, peer: &Peer) -> Result<(), Failure> {
         let number = frame.frame;
         let unexpected =
             |reason: &str| Failure::of_peer(peer, ClientError::Unexpected { frame: number, reason: reason.to_owned() });
         let answers = self.poses.answer(number).ok_or_else(|| unexpected("was not requested, or is late"))?;
-        check_frame(&answers.pose.request, self.planes, &frame.header).map_err(|reason| unexpected(&reason))?;
+        let planes = self.state.borrow().active.planes;
+        check_frame(&answers.pose.request, planes, &frame.header).map_err(|reason| unexpected(&reason))?;
         let plan_epoch = frame.header.sample_set_id.plan_epoch;
         if plan_epoch < self.plan_epoch {
             return Err(unexpected("is of an older plan than the frame before"));

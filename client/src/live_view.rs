@@ -2,16 +2,15 @@
 
 use std::time::Instant;
 
-use codec::FrameCodec;
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::PinholeCamera;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 
 use crate::active_plan::SessionState;
 use crate::error::ClientError;
-use crate::live_frame::{CREDITS, LiveFrame, Newest, Pose};
 use crate::live_stream::{LiveStream, decode_all};
-use crate::view_request::ViewRequest;
+use crate::poses::{CREDITS, Newest, Pose};
+use crate::view_request::{LiveFrame, ViewRequest};
 
 /// Frames of a camera that moves. A newer pose replaces one that is not being made yet. Two frames at most are on their way
 /// or not taken by [`LiveView::next`]. A live view outlives compositors and plans, and ends with its session.
@@ -26,13 +25,12 @@ pub struct LiveView {
 }
 
 impl LiveView {
-    pub(crate) fn start(state: watch::Receiver<SessionState>, codec: FrameCodec, planes: ViewPlanes) -> Self {
+    pub(crate) fn start(state: watch::Receiver<SessionState>) -> Self {
         let (newest, to_send) = watch::channel(Newest::default());
         let (encoded, to_decode) = mpsc::channel(CREDITS);
         let (decoded, frames) = mpsc::channel(CREDITS);
-        let stream = LiveStream::new(state.clone(), to_send, (codec, planes), encoded);
         let mut tasks = JoinSet::new();
-        tasks.spawn(stream.run());
+        tasks.spawn(LiveStream::run(state.clone(), to_send, encoded));
         tasks.spawn(decode_all(to_decode, decoded));
         Self { newest, frames, state, last: 0, _tasks: tasks }
     }
@@ -44,11 +42,7 @@ impl LiveView {
     /// For a set beyond the timeline, a bad camera, and a session that has ended.
     pub fn set_pose(&mut self, camera: PinholeCamera, set_index: u32) -> Result<u64, ClientError> {
         let request = ViewRequest { frame: self.last + 1, set_index, camera };
-        let SessionState { active, ended, .. } = self.state.borrow().clone();
-        if let Some(reason) = ended {
-            return Err(ClientError::Ended { reason });
-        }
-        request.check(&active.plan.assignment)?;
+        request.check(&self.state.borrow().in_force()?.plan.assignment)?;
         self.last = request.frame;
         let pose = Pose { request, posed: Instant::now() };
         self.newest.send_modify(|newest| newest.pose = Some(pose));

@@ -1,14 +1,41 @@
-//! A compositor that a client talks to, and the failures of a call to it.
+//! A compositor that a client talks to, and a call to it: its frames, received whole and then decoded, and its failures.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use cluster::{Assignment, CompositorShare};
+use codec::{DecodeLimits, FrameAssembly, FrameAssemblyError, FrameHeader, FramePart, WholeFrame, decode_view};
+use depth_image::View;
+use parking_lot::Mutex;
 use tokio::sync::mpsc;
+use tokio_stream::StreamExt as _;
 use tonic::transport::Channel;
 use tonic::{Code, Status};
 use wire::plan_in_force;
-use wire::rpc::CompositorClient;
+use wire::rpc::{CompositorClient, Messages};
 
-use crate::circuit_breaker::CircuitBreaker;
 use crate::error::ClientError;
+
+/// The time that a compositor is passed over after a failure, where there are others.
+const OPEN_FOR: Duration = Duration::from_secs(10);
+/// The time that a compositor may be silent while frames are due: samplers on slow devices take minutes.
+const SILENCE: Duration = Duration::from_secs(600);
+
+/// The circuit breaker of one compositor; clones share it.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct CircuitBreaker(Arc<Mutex<Option<Instant>>>);
+
+impl CircuitBreaker {
+    /// The compositor has failed.
+    fn trip(&self) {
+        *self.0.lock() = Some(Instant::now());
+    }
+
+    /// Whether the compositor is to be passed over.
+    pub(crate) fn is_open(&self) -> bool {
+        self.0.lock().is_some_and(|failed| failed.elapsed() < OPEN_FOR)
+    }
+}
 
 /// A compositor and the channel to it.
 #[derive(Debug, Clone)]
@@ -24,14 +51,6 @@ impl Peer {
     pub(crate) fn new(share: &CompositorShare, channel: Channel, named_plans: mpsc::Sender<Assignment>) -> Self {
         let client = CompositorClient::new(channel);
         Self { share: share.clone(), client, breaker: CircuitBreaker::default(), named_plans }
-    }
-
-    /// A compositor that refuses a plan names the one in force: the coordinator may be out of reach.
-    fn pass_on_plan(&self, refusal: &Status) {
-        if let Some(assignment) = plan_in_force(refusal) {
-            // Where there is no room, other compositors have named it.
-            let _ = self.named_plans.try_send(assignment);
-        }
     }
 
     pub(crate) fn error(&self, reason: impl ToString) -> ClientError {
@@ -65,12 +84,73 @@ impl Failure {
             Code::ResourceExhausted => Self::Exhausted(ClientError::Exhausted { reason: error.to_string() }),
             // The compositor waited for this client, whose caller was busy.
             Code::DeadlineExceeded => Self::OfPlan(error),
-            // The compositor knows better which plan is in force.
+            // The compositor knows better which plan is in force, and names it: the coordinator may be out of reach.
             Code::FailedPrecondition => {
-                peer.pass_on_plan(status);
+                if let Some(assignment) = plan_in_force(status) {
+                    // Where there is no room, other compositors have named it.
+                    let _ = peer.named_plans.try_send(assignment);
+                }
                 Self::OfPlan(error)
             }
             _ => Self::of_peer(peer, error),
         }
+    }
+}
+
+/// The frames of one call, before they are decoded.
+pub(crate) struct FrameStream {
+    parts: Messages<FramePart>,
+    assembly: FrameAssembly,
+}
+
+impl FrameStream {
+    pub(crate) fn new(parts: Messages<FramePart>) -> Self {
+        Self { parts, assembly: FrameAssembly::default() }
+    }
+
+    /// The next whole frame of `peer`; `None` at the stream's end. Can be dropped and called again without losing a frame.
+    pub(crate) async fn next(&mut self, peer: &Peer) -> Result<Option<WholeFrame>, Failure> {
+        let corrupt = |error: FrameAssemblyError| Failure::of_peer(peer, peer.error(error));
+        while let Some(part) = self.next_part(peer).await? {
+            if let Some(frame) = self.assembly.push(part).map_err(corrupt)? {
+                return Ok(Some(frame));
+            }
+        }
+        self.assembly.finish().map_err(corrupt)?;
+        Ok(None)
+    }
+
+    async fn next_part(&mut self, peer: &Peer) -> Result<Option<FramePart>, Failure> {
+        match tokio::time::timeout(SILENCE, self.parts.next()).await {
+            Ok(part) => part.transpose().map_err(|status| Failure::of_status(peer, &status)),
+            Err(_) => {
+                let reason = format!("no frame was received for {} s", SILENCE.as_secs());
+                Err(Failure::of_peer(peer, peer.error(reason)))
+            }
+        }
+    }
+}
+
+/// Decodes a frame of `peer` on a blocking thread.
+pub(crate) async fn decode(frame: WholeFrame, peer: &Peer) -> Result<(FrameHeader, View), ClientError> {
+    let decoding = move || decode_view(&frame, &DecodeLimits::default()).map(|view| (frame.header, view));
+    match tokio::task::spawn_blocking(decoding).await {
+        Ok(decoded) => decoded.map_err(|error| peer.error(error)),
+        Err(error) => Err(peer.error(error)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_breaker_opens_on_failure_and_closes_after_a_while() {
+        let breaker = CircuitBreaker::default();
+        assert!(!breaker.is_open());
+        breaker.clone().trip();
+        assert!(breaker.is_open());
+        *breaker.0.lock() = Instant::now().checked_sub(OPEN_FOR);
+        assert!(!breaker.is_open());
     }
 }

@@ -3,10 +3,34 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use crate::live_frame::{CREDITS, Pose, SentPose};
+use crate::view_request::ViewRequest;
 
+/// Frames that may be on their way, or received and not taken.
+pub(crate) const CREDITS: usize = 2;
 /// Poses that were sent and not answered; while there are this many, no more are sent.
 const MAX_SENT: usize = 64;
+
+/// A pose that was given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Pose {
+    pub(crate) request: ViewRequest,
+    pub(crate) posed: Instant,
+}
+
+/// A pose that was sent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SentPose {
+    pub(crate) pose: Pose,
+    pub(crate) sent: Instant,
+}
+
+/// The viewer's last word.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Newest {
+    pub(crate) pose: Option<Pose>,
+    /// The last frame that the viewer has taken.
+    pub(crate) taken: u64,
+}
 
 /// The poses of one stream after the other. Where a stream ends without an answer to the newest pose, the next stream is
 /// asked for it.
@@ -57,7 +81,6 @@ mod tests {
     use depth_image::PinholeCamera;
 
     use super::*;
-    use crate::view_request::ViewRequest;
 
     fn pose(frame: u64) -> Pose {
         let (eye, up) = ([0.0, 0.0, 1.0].into(), [0.0, 1.0, 0.0].into());

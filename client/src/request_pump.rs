@@ -25,14 +25,6 @@ struct Batch {
     views: Mutex<WorkStealing>,
 }
 
-impl Batch {
-    fn new(template: RenderViews, requests: Vec<ViewRequest>, weights: &[u32]) -> Self {
-        let runs = requests.chunk_by(|a, b| a.set_index == b.set_index).map(<[ViewRequest]>::len);
-        let views = Mutex::new(WorkStealing::new(runs, weights));
-        Self { template, requests, views }
-    }
-}
-
 /// Requests one compositor's views of a batch.
 #[derive(Debug)]
 pub(crate) struct RequestPump {
@@ -44,25 +36,26 @@ pub(crate) struct RequestPump {
     start: Instant,
 }
 
-/// The pumps of all compositors of these weights, with their messages; `None` for a compositor without a share. A view
-/// takes about `view_s`; `None` where that is not known.
+/// A pump that has been started, and its messages.
+pub(crate) type Started = (RequestPump, ReceiverStream<RenderViews>);
+
+/// The pumps of all compositors of these weights; `None` for a compositor without a share. A view takes about `view_s`;
+/// `None` where that is not known.
 pub(crate) fn start_pumps(
-    template: &RenderViews,
+    template: RenderViews,
     requests: Vec<ViewRequest>,
     weights: &[u32],
     view_s: Option<f64>,
-) -> Vec<Option<(RequestPump, ReceiverStream<RenderViews>)>> {
-    let batch = Arc::new(Batch::new(template.clone(), requests, weights));
+) -> Vec<Option<Started>> {
+    let runs = requests.chunk_by(|a, b| a.set_index == b.set_index).map(<[ViewRequest]>::len);
+    let views = Mutex::new(WorkStealing::new(runs, weights));
+    let batch = Arc::new(Batch { template, requests, views });
     (0..weights.len()).map(|compositor| RequestPump::start(&batch, compositor, view_s)).collect()
 }
 
 impl RequestPump {
     /// The first messages are of the compositor's own share alone: other compositors have not begun yet.
-    fn start(
-        batch: &Arc<Batch>,
-        compositor: usize,
-        view_s: Option<f64>,
-    ) -> Option<(Self, ReceiverStream<RenderViews>)> {
+    fn start(batch: &Arc<Batch>, compositor: usize, view_s: Option<f64>) -> Option<Started> {
         let (messages, sent) = mpsc::channel(MESSAGES);
         let (flow, start) = (FlowControl::new(view_s), Instant::now());
         let mut pump = Self { batch: batch.clone(), compositor, flow, messages: Some(messages), start };
@@ -134,11 +127,7 @@ mod tests {
     }
 
     /// Receives views `apart_ms` apart; gives the requests that are sent meanwhile.
-    fn receive(
-        (pump, sent): &mut (RequestPump, ReceiverStream<RenderViews>),
-        views: u64,
-        apart_ms: u64,
-    ) -> Vec<(u32, u64, usize)> {
+    fn receive((pump, sent): &mut Started, views: u64, apart_ms: u64) -> Vec<(u32, u64, usize)> {
         let start = pump.start;
         let requested = (1..=views).flat_map(|view| {
             pump.received(start + Duration::from_millis(view * apart_ms), false);
@@ -152,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_fast_compositor_finishes_its_share_and_steals_from_a_slow_one() {
-        let mut parts = start_pumps(&template(), requests(1, 100), &[1, 1], VIEW_S);
+        let mut parts = start_pumps(template(), requests(1, 100), &[1, 1], VIEW_S);
         let (mut slow, mut fast) = (parts.remove(1).unwrap(), parts.remove(0).unwrap());
         assert_eq!(waiting(&mut fast.1), [(0, 0, 16), (0, 16, 16)]);
         assert_eq!(waiting(&mut slow.1), [(0, 50, 16), (0, 66, 16)]);
@@ -167,7 +156,7 @@ mod tests {
 
     #[test]
     fn a_message_is_of_one_set_and_shrinks_for_a_slow_compositor() {
-        let mut part = start_pumps(&template(), requests(3, 40), &[9], VIEW_S).remove(0).unwrap();
+        let mut part = start_pumps(template(), requests(3, 40), &[9], VIEW_S).remove(0).unwrap();
         let asked = [waiting(&mut part.1), receive(&mut part, 120, 100)].concat();
         assert_eq!(asked.iter().map(|(_, _, views)| views).sum::<usize>(), 120);
         assert!(asked.is_sorted_by_key(|(set, ..)| *set));
@@ -176,15 +165,15 @@ mod tests {
 
     #[test]
     fn small_sets_are_requested_in_many_messages() {
-        let mut part = start_pumps(&template(), requests(100, 1), &[1], VIEW_S).remove(0).unwrap();
+        let mut part = start_pumps(template(), requests(100, 1), &[1], VIEW_S).remove(0).unwrap();
         assert_eq!(waiting(&mut part.1).len(), 17, "of one view each: as many as fit into two messages");
     }
 
     #[test]
     fn a_compositor_without_a_share_is_not_called() {
         let called =
-            start_pumps(&template(), requests(1, 1), &[1, 1, 1], None).iter().filter(|part| part.is_some()).count();
+            start_pumps(template(), requests(1, 1), &[1, 1, 1], None).iter().filter(|part| part.is_some()).count();
         assert_eq!(called, 1);
-        assert!(start_pumps(&template(), Vec::new(), &[1, 1], None).iter().all(Option::is_none));
+        assert!(start_pumps(template(), Vec::new(), &[1, 1], None).iter().all(Option::is_none));
     }
 }

@@ -1,34 +1,99 @@
-//! A session: a plan, and views asked of its compositors.
+//! The way to a coordinator; a session: a plan, and views asked of its compositors.
 
 use std::sync::Arc;
+use std::time::Duration;
 
-use cluster::{ChangeSession, SessionEvent, SessionPlan, SessionRequest};
+use cluster::{ChangeSession, ClusterStatus, SessionEvent, SessionPlan, SessionRequest};
 use codec::FrameCodec;
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::PinholeCamera;
 use parking_lot::Mutex;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
+use tokio::time::Instant;
 use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
-use wire::rpc::{CoordinatorClient, Messages};
+use wire::rpc::{CoordinatorClient, Messages, connect};
 
-use crate::active_plan::{ActivePlan, SessionState};
-use crate::delivery::Template;
+use crate::active_plan::{ActivePlan, SessionState, follow_compositors, follow_coordinator};
+use crate::delivery::deliver;
 use crate::error::ClientError;
-use crate::expected::Expected;
-use crate::frames::Frames;
+use crate::frames::{Expected, Frames};
 use crate::live_view::LiveView;
-use crate::plan_follower::{follow_compositors, follow_coordinator};
 use crate::view_request::ViewRequest;
 
 /// Plans that compositors have named and the session has not taken over yet.
 const NAMED_PLANS: usize = 4;
 
+/// A connection to a coordinator.
+#[derive(Debug, Clone)]
+pub struct Client {
+    coordinator: CoordinatorClient,
+}
+
+impl Client {
+    /// Connects to `http://host:port`.
+    ///
+    /// # Errors
+    /// Where nobody answers.
+    pub async fn connect(coordinator: &str) -> Result<Self, ClientError> {
+        let channel = connect(coordinator).await.map_err(ClientError::coordinator)?;
+        Ok(Self { coordinator: CoordinatorClient::new(channel) })
+    }
+
+    /// The cluster's members.
+    ///
+    /// # Errors
+    /// The coordinator's.
+    pub async fn status(&self) -> Result<ClusterStatus, ClientError> {
+        self.coordinator.status().await.map_err(ClientError::coordinator)
+    }
+
+    /// Waits until `wanted` nodes have joined.
+    ///
+    /// # Errors
+    /// The coordinator's; [`ClientError::FewNodes`] where they do not join in time.
+    pub async fn wait_for_nodes(&self, wanted: usize, deadline: Duration) -> Result<ClusterStatus, ClientError> {
+        let end = Instant::now() + deadline;
+        loop {
+            let status = self.status().await?;
+            if status.nodes.len() >= wanted {
+                return Ok(status);
+            }
+            if Instant::now() >= end {
+                return Err(ClientError::FewNodes { joined: status.nodes.len(), wanted });
+            }
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    }
+
+    /// Opens a session; `progress` is called with what the coordinator does meanwhile.
+    ///
+    /// # Errors
+    /// The coordinator's, with its reason.
+    pub async fn open_session(
+        &self,
+        request: SessionRequest,
+        progress: impl FnMut(&SessionEvent),
+    ) -> Result<Session, ClientError> {
+        let coordinator = self.coordinator.clone();
+        let invalid = |error| ClientError::Invalid { field: "codec", reason: format!("{error}") };
+        let codec: FrameCodec = request.codec.parse().map_err(invalid)?;
+        let mut events = coordinator.open_session(request.clone()).await.map_err(ClientError::coordinator)?;
+        let (session, plan) = plan_of(&mut events, progress).await?;
+        let (named_plans, to_follow) = mpsc::channel(NAMED_PLANS);
+        let active = Arc::new(ActivePlan::connect(plan, (codec, request.planes), named_plans).await?);
+        let (changes, state) = watch::channel(SessionState { session, active, ended: None });
+        let request = Arc::new(Mutex::new(request));
+        let mut following = JoinSet::new();
+        following.spawn(follow_compositors(to_follow, changes.clone()));
+        following.spawn(follow_coordinator(coordinator.clone(), request.clone(), events, changes));
+        Ok(Session { state, _following: following, coordinator, request })
+    }
+}
+
 /// An open session. Dropping it closes it.
 #[derive(Debug)]
 pub struct Session {
-    codec: FrameCodec,
-    planes: ViewPlanes,
     state: watch::Receiver<SessionState>,
     /// Dropped with the session.
     _following: JoinSet<()>,
@@ -37,28 +102,6 @@ pub struct Session {
 }
 
 impl Session {
-    pub(crate) async fn open(
-        coordinator: &CoordinatorClient,
-        request: SessionRequest,
-        progress: impl FnMut(&SessionEvent),
-    ) -> Result<Self, ClientError> {
-        let planes = request.planes;
-        let codec: FrameCodec = request
-            .codec
-            .parse()
-            .map_err(|error| ClientError::Invalid { field: "codec", reason: format!("{error}") })?;
-        let mut events = coordinator.open_session(request.clone()).await.map_err(ClientError::coordinator)?;
-        let (session, plan) = plan_of(&mut events, progress).await?;
-        let (named_plans, to_follow) = mpsc::channel(NAMED_PLANS);
-        let active = Arc::new(ActivePlan::connect(plan, &named_plans).await?);
-        let (changes, state) = watch::channel(SessionState { session, active, ended: None });
-        let request = Arc::new(Mutex::new(request));
-        let mut following = JoinSet::new();
-        following.spawn(follow_compositors(to_follow, changes.clone()));
-        following.spawn(follow_coordinator(coordinator.clone(), request.clone(), events, changes));
-        Ok(Self { codec, planes, state, _following: following, coordinator: coordinator.clone(), request })
-    }
-
     /// Asks for another number of views a set, or another frame rate, from now on; plans follow.
     ///
     /// # Errors
@@ -113,33 +156,17 @@ impl Session {
     /// # Errors
     /// For frame numbers given twice, sets beyond the timeline, bad cameras, and a session that has ended.
     pub fn render_views(&self, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
-        self.request_views(None, requests)
-    }
-
-    /// As [`Session::render_views`], by another method.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn render_views_by(&self, method: &str, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
-        self.request_views(Some(method), requests)
-    }
-
-    fn request_views(&self, method: Option<&str>, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
-        let active = self.state.borrow().active.clone();
-        if let Some(reason) = self.ended() {
-            return Err(ClientError::Ended { reason });
-        }
+        let active = self.state.borrow().in_force()?;
         requests.iter().try_for_each(|request| request.check(&active.plan.assignment))?;
-        let expected = Expected::new(requests.iter().copied(), self.planes)?;
-        let template = Template { method: method.map(str::to_owned), codec: self.codec, planes: self.planes };
-        Ok(Frames::start(self.state.clone(), template, requests, expected))
+        let expected = Expected::new(requests.iter().copied(), active.planes)?;
+        Ok(Frames::start(expected, |sink| deliver(self.state.clone(), requests, sink)))
     }
 
     /// Frames of a camera that moves, by the method of the plan in force. They are sent on one long stream from one
     /// compositor, on which the newest pose counts.
     #[must_use]
     pub fn live(&self) -> LiveView {
-        LiveView::start(self.state.clone(), self.codec, self.planes)
+        LiveView::start(self.state.clone())
     }
 }
 

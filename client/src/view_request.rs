@@ -1,5 +1,7 @@
 //! Views that a caller asks for, and the frames that answer them.
 
+use std::time::Instant;
+
 use cluster::Assignment;
 use codec::FrameHeader;
 use depth_image::{PinholeCamera, View};
@@ -38,4 +40,26 @@ pub struct Frame {
     pub view: View,
     /// Its sample set, encoding and stage times.
     pub header: FrameHeader,
+}
+
+/// A frame of a camera that moves, and its times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LiveFrame {
+    /// The frame; its number rises.
+    pub frame: Frame,
+    /// Times on this machine. Those elsewhere are in the frame's header.
+    pub times: LiveTimes,
+}
+
+/// Times on this machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LiveTimes {
+    /// The pose was given.
+    pub posed: Instant,
+    /// The pose was sent.
+    pub sent: Instant,
+    /// The frame was received.
+    pub received: Instant,
+    /// The frame was decoded.
+    pub decoded: Instant,
 }

@@ -1,8 +1,9 @@
 //! Views that can go to the device together.
 
+use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::RequestedView;
+use cluster::{Assignment, RenderViews, RequestedView};
 use codec::{FrameCodec, SampleSetId};
 use depth_image::ViewPlanes;
 use glam::UVec2;
@@ -40,7 +41,7 @@ pub(crate) enum Source {
     /// A complete sample set.
     Set(ReadySet),
     /// The scene itself.
-    Scene { scene_hash: String, lighting: String, scene_time_s: f32 },
+    Scene { plan: Arc<Assignment>, scene_time_s: f32 },
 }
 
 impl Source {
@@ -53,25 +54,14 @@ impl Source {
     }
 }
 
-/// The waits of a view before it is made.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Waits {
-    pub(crate) arrived: Instant,
-    pub(crate) set_wait_s: f64,
-    /// The time at which it was ready for the device.
-    pub(crate) queued: Instant,
-}
-
-impl Waits {
-    /// The waits of a view that is ready for the device now.
-    pub(crate) fn until_now(arrived: Instant, set_wait_s: f64) -> Self {
-        Self { arrived, set_wait_s, queued: Instant::now() }
-    }
-
-    /// The wait for room, before it was ready.
-    pub(crate) fn credit_wait_s(&self) -> f64 {
-        (self.queued.saturating_duration_since(self.arrived).as_secs_f64() - self.set_wait_s).max(0.0)
-    }
+/// The source of the views of a set that are in one view cell.
+#[derive(Clone)]
+pub(crate) struct Loaded {
+    pub(crate) source: Source,
+    pub(crate) id: SampleSetId,
+    pub(crate) cell: u32,
+    /// The wait for it.
+    pub(crate) wait_s: f64,
 }
 
 /// A view that waits for the device, with the way back to its client.
@@ -80,7 +70,35 @@ pub(crate) struct Waiting {
     pub(crate) source: Source,
     pub(crate) view: RequestedView,
     pub(crate) codec: FrameCodec,
-    pub(crate) waits: Waits,
+    pub(crate) arrived: Instant,
+    pub(crate) set_wait_s: f64,
+    /// The time at which it was ready for the device.
+    pub(crate) queued: Instant,
     pub(crate) reply: Reply,
     pub(crate) credit: Credit,
+}
+
+impl Waiting {
+    /// A view of a request that is ready for the device now.
+    pub(crate) fn new(
+        (request, view, arrived): (&RenderViews, RequestedView, Instant),
+        set: &Loaded,
+        reply: Reply,
+        credit: Credit,
+    ) -> Self {
+        let key = BatchKey {
+            sample_set_id: set.id,
+            cell: set.cell,
+            method: request.method.clone(),
+            planes: request.planes,
+            size_px: view.camera.size_px,
+        };
+        let (source, codec, set_wait_s, queued) = (set.source.clone(), request.codec, set.wait_s, Instant::now());
+        Self { key, source, view, codec, arrived, set_wait_s, queued, reply, credit }
+    }
+
+    /// The wait for room, before it was ready.
+    pub(crate) fn credit_wait_s(&self) -> f64 {
+        (self.queued.saturating_duration_since(self.arrived).as_secs_f64() - self.set_wait_s).max(0.0)
+    }
 }

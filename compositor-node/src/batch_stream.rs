@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, RenderViews, RequestedView};
-use codec::SampleSetId;
+use cluster::{RenderViews, RequestedView};
 use node::next_within;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::Semaphore;
 use tonic::{Code, Status};
 use wire::rpc::Messages;
 
-use crate::batch::{BatchKey, MAX_BATCH, Source, Waiting, Waits};
+use crate::batch::{Loaded, MAX_BATCH, Waiting};
 use crate::outbox::Reply;
 use crate::quota::{Credit, closed};
 use crate::shared::ClientStream;
@@ -53,30 +52,30 @@ impl<'a> BatchStream<'a> {
 
     /// A client that waits for frames is not idle.
     async fn next(&self, requests: &mut Messages<RenderViews>) -> Result<Option<RenderViews>, Status> {
+        let is_busy = || self.credits.available_permits() < STREAM_PIXELS as usize;
         loop {
             match next_within(requests, self.client.shared.deadlines.idle, "views").await {
-                Err(status) if status.code() == Code::DeadlineExceeded && self.is_busy() => (),
+                Err(status) if status.code() == Code::DeadlineExceeded && is_busy() => (),
                 next => return next,
             }
         }
-    }
-
-    /// Whether views are in flight.
-    fn is_busy(&self) -> bool {
-        self.credits.available_permits() < STREAM_PIXELS as usize
     }
 
     /// Enqueues the views of every view cell; the images of all cells are fetched at once.
     async fn enqueue(&mut self, request: RenderViews) -> Result<(), Status> {
         let (arrived, shared) = (Instant::now(), &self.client.shared);
         let plan = shared.of_compositor(shared.plan.require(request.plan_epoch)?)?;
-        let sources = by_cell(&plan, &request.views).into_iter().map(|(cell, views)| {
+        let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
+        for view in &request.views {
+            cells.entry(plan.cell_of(&view.camera)).or_default().push(*view);
+        }
+        let sources = cells.into_iter().map(|(cell, views)| {
             let (shared, plan, set_index) = (shared.clone(), plan.clone(), request.set_index);
-            (cell, views, tokio::spawn(async move { shared.source(&plan, (set_index, cell)).await }))
+            (views, tokio::spawn(async move { shared.source(&plan, set_index, cell).await }))
         });
-        for (cell, views, source) in sources.collect::<Vec<_>>() {
-            let (source, id, set_wait_s) = source.await.map_err(|error| Status::internal(error.to_string()))??;
-            self.enqueue_of_cell(&request, (cell, &views), (&source, id), (arrived, set_wait_s)).await?;
+        for (views, set) in sources.collect::<Vec<_>>() {
+            let set = set.await.map_err(|error| Status::internal(error.to_string()))??;
+            self.enqueue_of_cell(&request, &views, &set, arrived).await?;
         }
         Ok(())
     }
@@ -85,9 +84,9 @@ impl<'a> BatchStream<'a> {
     async fn enqueue_of_cell(
         &mut self,
         request: &RenderViews,
-        (cell, views): (u32, &[RequestedView]),
-        (source, id): (&Source, SampleSetId),
-        waited: (Instant, f64),
+        views: &[RequestedView],
+        set: &Loaded,
+        arrived: Instant,
     ) -> Result<(), Status> {
         for views in views.chunks(MAX_BATCH) {
             let mut batch = Vec::with_capacity(views.len());
@@ -96,36 +95,16 @@ impl<'a> BatchStream<'a> {
                 let credit = match self.try_credit(view)? {
                     Some(credit) => credit,
                     None => {
-                        self.hand_over(std::mem::take(&mut batch));
+                        self.client.queue(std::mem::take(&mut batch));
                         self.credit(view).await?
                     }
                 };
                 self.admitted = true;
-                batch.push(self.waiting(request, (cell, *view), (source, id), waited, credit));
+                batch.push(Waiting::new((request, *view, arrived), set, self.reply.clone(), credit));
             }
-            self.hand_over(batch);
+            self.client.queue(batch);
         }
         Ok(())
-    }
-
-    fn waiting(
-        &self,
-        request: &RenderViews,
-        (cell, view): (u32, RequestedView),
-        (source, sample_set_id): (&Source, SampleSetId),
-        (arrived, set_wait_s): (Instant, f64),
-        credit: Credit,
-    ) -> Waiting {
-        let key = BatchKey {
-            sample_set_id,
-            cell,
-            method: request.method.clone(),
-            planes: request.planes,
-            size_px: view.camera.size_px,
-        };
-        let waits = Waits::until_now(arrived, set_wait_s);
-        let (source, reply) = (source.clone(), self.reply.clone());
-        Waiting { key, source, view, codec: request.codec, waits, reply, credit }
     }
 
     /// `None` where the view must wait; an error where other streams have taken the node's room and this one has had none.
@@ -144,26 +123,9 @@ impl<'a> BatchStream<'a> {
     }
 
     async fn credit(&self, view: &RequestedView) -> Result<Credit, Status> {
-        let stream: OwnedSemaphorePermit =
-            self.credits.clone().acquire_many_owned(price(view)).await.map_err(closed)?;
+        let stream = self.credits.clone().acquire_many_owned(price(view)).await.map_err(closed)?;
         Ok(Credit { stream, _node: self.client.shared.quota.view(&view.camera).await? })
     }
-
-    fn hand_over(&self, batch: Vec<Waiting>) {
-        for Waiting { key, view, .. } in &batch {
-            tracing::debug!(stream = self.client.stream, frame = view.frame, set = %key.sample_set_id, "queued");
-        }
-        self.client.shared.arrivals.push(self.client.stream, batch);
-    }
-}
-
-/// Views by their view cell, in their order.
-fn by_cell(plan: &Assignment, views: &[RequestedView]) -> BTreeMap<u32, Vec<RequestedView>> {
-    let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
-    for view in views {
-        cells.entry(plan.cell_of(&view.camera)).or_default().push(*view);
-    }
-    cells
 }
 
 /// The pixels of its stream that a view takes. Small views take more than they have, so that their number is bounded. A

@@ -5,14 +5,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use cluster::SamplerShare;
-use depth_image::DepthImage;
-use node::{CellPlan, Connections, Deadlines, SampleSet};
+use depth_image::{Camera, DepthImage};
+use node::{CellPlan, Connections, Deadlines, SampleSet, blocking};
 use tokio::task::JoinSet;
 use tonic::Status;
 
-use crate::chunk_stream::join_tiles;
-use crate::fetch_share::{FetchTimes, FetchedShare, ShareRequest, fetch_share};
-use crate::relay_buffer::RelayBuffer;
+use crate::fetch_share::{FetchTimes, FetchedShare, SetRequest, ShareRequest, fetch_share};
 use crate::reports::NotFetched;
 
 /// The time that a relay may be silent. The samplers are asked then, and have the images or not.
@@ -28,28 +26,10 @@ pub(crate) struct Fetcher {
     failed_relay_epoch: AtomicU64,
 }
 
-/// A set, and the times of its fetch.
-#[derive(Debug)]
-pub(crate) struct Fetched {
-    pub(crate) set: SampleSet,
-    pub(crate) times: FetchTimes,
-}
-
 /// The images of a set that have been fetched so far.
 struct Gathered {
     images: Vec<Option<DepthImage>>,
     times: FetchTimes,
-}
-
-impl Gathered {
-    fn add(&mut self, shares: Vec<FetchedShare>) {
-        for share in shares {
-            self.times.add(share.times);
-            for (index, image) in share.images {
-                self.images[index as usize] = Some(image);
-            }
-        }
-    }
 }
 
 impl Fetcher {
@@ -58,52 +38,30 @@ impl Fetcher {
         Self { node_name, connections, deadlines, failed_relay_epoch: AtomicU64::new(0) }
     }
 
-    /// Every image of a set, whole and decoded. They go to `relay` as they arrive.
-    pub(crate) async fn fetch(
-        self: &Arc<Self>,
-        plan: &CellPlan,
-        set_index: u32,
-        relay: Option<&RelayBuffer>,
-    ) -> Result<Fetched, NotFetched> {
-        let fetched = self.fetch_images(plan, set_index, relay).await;
-        if let Some(relay) = relay {
-            relay.end(fetched.as_ref().map(drop).map_err(|failed| failed.status.clone()));
+    /// A set with every image whole and decoded, and the times of its fetch.
+    pub(crate) async fn fetch(self: &Arc<Self>, set: &SetRequest) -> Result<(SampleSet, FetchTimes), NotFetched> {
+        let gathered = self.gather(set).await;
+        if let Some(relay) = &set.relay {
+            relay.end(gathered.as_ref().map(drop).map_err(|failed| failed.status.clone()));
         }
-        let (images, times) = fetched?;
-        let workload = &plan.workload;
-        let set = SampleSet {
-            images: join_tiles(plan, images).await?,
-            volume: workload.volume,
-            background_linear: workload.background_linear,
-            illumination: workload.illumination.clone(),
-            lighting: workload.lighting.clone(),
-        };
-        Ok(Fetched { set, times })
+        let (images, times) = gathered?;
+        Ok((SampleSet::of(&set.plan.workload, join_tiles(&set.plan, images).await?), times))
     }
 
     /// All images of a set, or their tiles, in their order.
-    async fn fetch_images(
-        self: &Arc<Self>,
-        plan: &CellPlan,
-        set_index: u32,
-        relay: Option<&RelayBuffer>,
-    ) -> Result<(Vec<DepthImage>, FetchTimes), NotFetched> {
+    async fn gather(self: &Arc<Self>, set: &SetRequest) -> Result<(Vec<DepthImage>, FetchTimes), NotFetched> {
+        let plan = &set.plan;
         let mut gathered = Gathered { images: vec![None; plan.image_count()], times: FetchTimes::default() };
-        if let Some(request) = self.request_to_relay(plan) {
-            match self.fetch_all(plan, set_index, vec![request], relay).await {
-                Ok(shares) => gathered.add(shares),
-                Err(NotFetched { status, .. }) => {
-                    let (plan_epoch, reason) = (plan.plan_epoch, status.message());
-                    tracing::info!(plan_epoch, reason, "samplers in place of a relay");
-                    self.failed_relay_epoch.store(plan.plan_epoch, Ordering::Relaxed);
-                }
-            }
+        if let Some(request) = self.request_to_relay(plan)
+            && let Err(NotFetched { status, .. }) = self.fetch_all(set, vec![request], &mut gathered).await
+        {
+            tracing::info!(plan_epoch = plan.plan_epoch, reason = status.message(), "samplers in place of a relay");
+            self.failed_relay_epoch.store(plan.plan_epoch, Ordering::Relaxed);
         }
-        let missing = self.requests_to_samplers(plan, set_index, &gathered.images);
-        gathered.add(self.fetch_all(plan, set_index, missing, relay).await?);
-        let complete = gathered.images.into_iter().collect::<Option<_>>();
-        let complete = complete.ok_or_else(|| Status::data_loss(format!("sample set {set_index} is not complete")))?;
-        Ok((complete, gathered.times))
+        let missing = self.requests_to_samplers(set, &gathered.images);
+        self.fetch_all(set, missing, &mut gathered).await?;
+        let incomplete = || Status::data_loss(format!("sample set {} is not complete", set.set_index));
+        Ok((gathered.images.into_iter().collect::<Option<_>>().ok_or_else(incomplete)?, gathered.times))
     }
 
     /// All images, from the relay of this compositor; `None` without one, or where it has failed.
@@ -120,12 +78,7 @@ impl Fetcher {
     }
 
     /// The missing images, from their samplers.
-    fn requests_to_samplers(
-        &self,
-        plan: &CellPlan,
-        set_index: u32,
-        images: &[Option<DepthImage>],
-    ) -> Vec<ShareRequest> {
+    fn requests_to_samplers(&self, set: &SetRequest, images: &[Option<DepthImage>]) -> Vec<ShareRequest> {
         let Deadlines { work, chunk, .. } = self.deadlines;
         let request = |share: &SamplerShare| {
             let is_missing = |index: &u32| images.get(*index as usize).is_some_and(Option::is_none);
@@ -133,32 +86,49 @@ impl Fetcher {
             let share = SamplerShare { image_indices, ..share.clone() };
             ShareRequest { share, answer_within: work, first_within: chunk, chunk_within: chunk }
         };
-        let requests = plan.samplers_of(set_index).iter().map(request);
+        let requests = set.plan.samplers_of(set.set_index).iter().map(request);
         requests.filter(|request| !request.share.image_indices.is_empty()).collect()
     }
 
     /// Fetches all shares at the same time.
     async fn fetch_all(
         self: &Arc<Self>,
-        plan: &CellPlan,
-        set_index: u32,
+        set: &SetRequest,
         requests: Vec<ShareRequest>,
-        relay: Option<&RelayBuffer>,
-    ) -> Result<Vec<FetchedShare>, NotFetched> {
+        gathered: &mut Gathered,
+    ) -> Result<(), NotFetched> {
         let mut fetches = JoinSet::new();
         for request in requests {
-            let (fetcher, plan, relay) = (self.clone(), plan.clone(), relay.cloned());
+            let (fetcher, set) = (self.clone(), set.clone());
             fetches.spawn(async move {
-                let fetched = fetch_share(&fetcher.connections, &plan, set_index, &request, relay.as_ref()).await;
+                let fetched = fetch_share(&fetcher.connections, &set, &request).await;
                 fetched.map_err(|status| not_fetched(request.share, &status))
             });
         }
-        let mut shares = Vec::new();
         while let Some(share) = fetches.join_next().await {
-            shares.push(share.map_err(|error| Status::internal(error.to_string()))??);
+            let FetchedShare { images, times } = share.map_err(|error| Status::internal(error.to_string()))??;
+            gathered.times.add(times);
+            images.into_iter().for_each(|(index, image)| gathered.images[index as usize] = Some(image));
         }
-        Ok(shares)
+        Ok(())
     }
+}
+
+/// The images of a set from those that were sampled: the same, or joined from tiles.
+async fn join_tiles(plan: &CellPlan, sampled: Vec<DepthImage>) -> Result<Vec<DepthImage>, Status> {
+    if plan.tile_count == 1 {
+        return Ok(sampled);
+    }
+    let plan = plan.clone();
+    blocking(move || {
+        let mut sampled = sampled.into_iter();
+        let mut joined = |camera: &Camera| {
+            let tiles = sampled.by_ref().take(plan.tile_count as usize).collect();
+            DepthImage::from_tiles(*camera, tiles).map_err(|error| Status::data_loss(error.to_string()))
+        };
+        plan.workload.sample_cameras.iter().map(&mut joined).collect()
+    })
+    .await
 }
 
 fn not_fetched(share: SamplerShare, status: &Status) -> NotFetched {

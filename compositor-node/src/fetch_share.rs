@@ -2,14 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-use cluster::{FetchImages, SamplerShare};
-use codec::{Chunk, DecodeLimits, Reassembler, SampleSetId};
-use depth_image::DepthImage;
-use node::{CellPlan, Connections};
+use cluster::{Assignment, FetchImages, SamplerShare};
+use codec::{Chunk, DecodeLimits, Reassembled, Reassembler, SampleSetId, decode_depth_image};
+use depth_image::{Camera, DepthImage, SpecularPlanes};
+use node::{CellPlan, Connections, blocking, next_within};
 use tonic::{Code, Status};
 use wire::rpc::{Backoff, Messages, SamplerClient};
 
-use crate::chunk_stream::{ChunkStream, check_image, check_visibility, decode};
 use crate::relay_buffer::RelayBuffer;
 
 /// Retries of a sampler, for images that it has already made.
@@ -17,6 +16,15 @@ const MAX_RETRIES: usize = 2;
 const BACKOFF: Backoff = Backoff::new(Duration::from_millis(50), 4, Duration::from_millis(200));
 /// A call that failed later than this is not repeated: it would fail as late again.
 const FAILED_SOON: Duration = Duration::from_secs(2);
+
+/// A set to fetch.
+#[derive(Debug, Clone)]
+pub(crate) struct SetRequest {
+    pub(crate) plan: CellPlan,
+    pub(crate) set_index: u32,
+    /// Images go to it as they arrive.
+    pub(crate) relay: Option<RelayBuffer>,
+}
 
 /// The share to fetch from one node, and the deadlines of its answer.
 #[derive(Debug, Clone)]
@@ -50,31 +58,29 @@ impl FetchTimes {
 }
 
 /// The decoded images of a share, with their indices.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct FetchedShare {
     pub(crate) images: Vec<(u32, DepthImage)>,
     pub(crate) times: FetchTimes,
 }
 
-/// Fetches a share, again where a fault may have been the network's. Images go to `relay` as they arrive.
+/// Fetches a share, again where a fault may have been the network's.
 pub(crate) async fn fetch_share(
     connections: &Connections,
-    plan: &CellPlan,
-    set_index: u32,
+    set: &SetRequest,
     request: &ShareRequest,
-    relay: Option<&RelayBuffer>,
 ) -> Result<FetchedShare, Status> {
     let mut backoff = BACKOFF;
     for _ in 0..MAX_RETRIES {
         let start = Instant::now();
-        match fetch_once(connections, plan, set_index, request, relay).await {
+        match fetch_once(connections, set, request).await {
             Err(status) if is_transient(&status, start.elapsed()) => {
                 tokio::time::sleep(backoff.next_delay()).await;
             }
             done => return done,
         }
     }
-    fetch_once(connections, plan, set_index, request, relay).await
+    fetch_once(connections, set, request).await
 }
 
 fn is_transient(status: &Status, after: Duration) -> bool {
@@ -84,49 +90,100 @@ fn is_transient(status: &Status, after: Duration) -> bool {
 
 async fn fetch_once(
     connections: &Connections,
-    plan: &CellPlan,
-    set_index: u32,
+    set: &SetRequest,
     request: &ShareRequest,
-    relay: Option<&RelayBuffer>,
 ) -> Result<FetchedShare, Status> {
-    let share = &request.share;
-    let id = SampleSetId { plan_epoch: plan.plan_epoch, index: set_index.into() };
-    let chunks = call(connections, plan, set_index, request).await?;
-    let mut chunks = ChunkStream::new(chunks, request.first_within, request.chunk_within);
+    let (plan, share) = (&set.plan, &request.share);
+    let id = SampleSetId { plan_epoch: plan.plan_epoch, index: set.set_index.into() };
+    let mut chunks = call(connections, set, request).await?;
     let mut reassembler = Reassembler::new(DecodeLimits::default(), id);
     let cameras = plan.sampled_cameras();
-    let mut fetched = FetchedShare::default();
+    let mut images = Vec::new();
     while let Some(chunk) = chunks.next().await? {
         let pushed = reassembler.push(chunk);
         let Some(whole) = pushed.map_err(|error| Status::data_loss(format!("chunk is corrupt: {error}")))? else {
             continue;
         };
-        check_image(&whole, id, share, &fetched.images)?;
+        check_image(&whole, id, share, &images)?;
         let (index, encoded) = (whole.image_index, whole.image.clone());
         let start = Instant::now();
         let image = decode(&cameras, whole).await?;
-        fetched.times.decode_s += start.elapsed().as_secs_f64();
+        chunks.times.decode_s += start.elapsed().as_secs_f64();
         check_visibility(plan, index, &image)?;
-        relay.into_iter().for_each(|relay| relay.add(index, encoded.clone()));
-        fetched.images.push((index, image));
+        set.relay.iter().for_each(|relay| relay.add(index, encoded.clone()));
+        images.push((index, image));
     }
-    if fetched.images.len() < share.image_indices.len() {
-        let (received, requested) = (fetched.images.len(), share.image_indices.len());
+    if images.len() < share.image_indices.len() {
+        let (received, requested) = (images.len(), share.image_indices.len());
         return Err(Status::data_loss(format!("{received} of {requested} images were received")));
     }
-    (fetched.times.transfer_s, fetched.times.bytes) = (chunks.transfer_s, chunks.bytes);
-    Ok(fetched)
+    Ok(FetchedShare { images, times: chunks.times })
 }
 
-async fn call(
-    connections: &Connections,
-    plan: &CellPlan,
-    set_index: u32,
-    request: &ShareRequest,
-) -> Result<Messages<Chunk>, Status> {
+async fn call(connections: &Connections, set: &SetRequest, request: &ShareRequest) -> Result<ChunkStream, Status> {
     let client = SamplerClient::new(connections.to(&request.share.address).await?);
     let image_indices = request.share.image_indices.clone();
-    let images = FetchImages { plan_epoch: plan.plan_epoch, set_index, cell: plan.cell(), image_indices };
+    let (plan, set_index) = (&set.plan, set.set_index);
+    let images = FetchImages { plan_epoch: plan.plan_epoch, set_index, cell: plan.cell, image_indices };
     let answer = tokio::time::timeout(request.answer_within, client.fetch_sample_images(images)).await;
-    answer.map_err(|_| Status::deadline_exceeded("no images in time"))?
+    let chunks = answer.map_err(|_| Status::deadline_exceeded("no images in time"))??;
+    let (first_within, chunk_within) = (Some(request.first_within), request.chunk_within);
+    Ok(ChunkStream { chunks, first_within, chunk_within, times: FetchTimes::default() })
+}
+
+/// The chunks of one call, and their times.
+struct ChunkStream {
+    chunks: Messages<Chunk>,
+    first_within: Option<Duration>,
+    chunk_within: Duration,
+    times: FetchTimes,
+}
+
+impl ChunkStream {
+    async fn next(&mut self) -> Result<Option<Chunk>, Status> {
+        let (start, first_within) = (Instant::now(), self.first_within.take());
+        let within = first_within.unwrap_or(self.chunk_within);
+        let chunk = next_within(&mut self.chunks, within, "chunks").await?;
+        if first_within.is_none() {
+            self.times.transfer_s += start.elapsed().as_secs_f64();
+            self.times.bytes += chunk.as_ref().map_or(0, Chunk::data_len);
+        }
+        Ok(chunk)
+    }
+}
+
+/// Checks that an image belongs to the set, was requested and is new.
+fn check_image(
+    whole: &Reassembled,
+    id: SampleSetId,
+    share: &SamplerShare,
+    have: &[(u32, DepthImage)],
+) -> Result<(), Status> {
+    let index = whole.image_index;
+    if whole.sample_set_id != id {
+        return Err(Status::data_loss(format!("an image of sample set {} was sent for {id}", whole.sample_set_id)));
+    }
+    if !share.image_indices.contains(&index) || have.iter().any(|(other, _)| *other == index) {
+        return Err(Status::data_loss(format!("image {index} was not requested, or was sent twice")));
+    }
+    Ok(())
+}
+
+/// Checks the planes of visibility. Highlights find a light's visibility by its place: there is a byte for every light, or
+/// none at all.
+fn check_visibility(plan: &Assignment, index: u32, image: &DepthImage) -> Result<(), Status> {
+    let lights = plan.workload.illumination.lights.len();
+    let planes = image.specular.as_ref().map_or(0, |specular| specular.visibility8.len());
+    if planes == 0 || planes == SpecularPlanes::visibility_planes(lights) {
+        return Ok(());
+    }
+    Err(Status::data_loss(format!("image {index} has {planes} planes of visibility for {lights} lights")))
+}
+
+async fn decode(cameras: &[Camera], whole: Reassembled) -> Result<DepthImage, Status> {
+    let camera = cameras.get(whole.image_index as usize).copied();
+    let camera = camera.ok_or_else(|| Status::data_loss(format!("image {} has no camera", whole.image_index)))?;
+    let decode =
+        move || decode_depth_image(&whole.image.header, camera, &whole.image.payload, &DecodeLimits::default());
+    blocking(move || decode().map_err(|error| Status::data_loss(error.to_string()))).await
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cluster::{FetchImages, Policy, SceneHash, SceneRef, Timeline, Workload};
 use codec::{Chunk, ChunkBody, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
-use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera, SpecularPlanes};
+use depth_image::{Aabb, Environment, Illumination, Light, PinholeCamera, SpecularPlanes};
 use glam::{UVec2, Vec3};
 use tokio::net::TcpListener;
 use tokio_stream::StreamExt as _;
@@ -106,9 +106,10 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
         relay_fanout: None,
     });
     let deadlines = Deadlines { chunk: Duration::from_millis(200), ..Deadlines::default() };
-    let fetched = Arc::new(Fetcher::new("n0", deadlines)).fetch(&CellPlan::of(&plan, 0).unwrap(), 0, None).await;
+    let request = SetRequest { plan: CellPlan::of(&plan, 0).unwrap(), set_index: 0, relay: None };
+    let fetched = Arc::new(Fetcher::new("n0", deadlines)).fetch(&request).await;
     shutdown.cancel();
-    let set = fetched.map(|fetched| fetched.set);
+    let set = fetched.map(|(set, _)| set);
     set.map_err(|failed| {
         assert_eq!(failed.sampler.as_deref(), Some("n7"));
         failed.status

@@ -1,18 +1,15 @@
 //! The compositor's service: one complete sample set, many views.
 //!
 //! Sets: `fetch` gathers the images of a set from its samplers, or from a compositor that relays them. `fetch_share` talks
-//! to one of these nodes, `chunk_stream` checks and decodes, and `relay_buffer` relays images to other compositors. `sets`
-//! keeps the latest few on the device and fetches the next ahead; `reports` names samplers that fail.
+//! to one of these nodes, checks and decodes, and `relay_buffer` relays images to other compositors. `sets` keeps the latest
+//! few on the device and fetches the next ahead; `reports` names samplers that fail.
 //!
 //! Views: `service` answers clients. A `batch_stream` makes every view that is requested, a `live_stream` the newest. Views
-//! wait in `arrivals`, in the order of `queue`; `render` makes and encodes them batch by batch, and `outbox` sends them.
-//! `quota` bounds them all.
+//! wait in `queue`; `render` makes and encodes them batch by batch, and `outbox` sends them. `quota` bounds them all.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod arrivals;
 mod batch;
 mod batch_stream;
-mod chunk_stream;
 mod fetch;
 mod fetch_share;
 mod live_stream;

@@ -8,18 +8,17 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, LiveRequest, RenderViews, RequestedView};
-use codec::SampleSetId;
+use cluster::{Assignment, RenderViews, RequestedView};
 use node::next_within;
 use tokio::sync::Semaphore;
 use tonic::Status;
 use wire::rpc::Messages;
 
-use crate::arrivals::Viewer;
-use crate::batch::{BatchKey, Source, Waiting, Waits};
+use crate::batch::{Loaded, Waiting};
 use crate::outbox::Reply;
+use crate::queue::Viewer;
 use crate::quota::{Credit, closed};
-use crate::shared::{ClientStream, Loaded};
+use crate::shared::ClientStream;
 
 /// Frames that may be in flight until the client acknowledges them: a third would only be older.
 const CREDITS: usize = 2;
@@ -45,9 +44,7 @@ impl Pose {
 /// A pose whose set is ready.
 struct Ready {
     pose: Pose,
-    source: Source,
-    id: SampleSetId,
-    set_wait_s: f64,
+    set: Loaded,
     /// The wait for room.
     credit: Pending<Credit>,
 }
@@ -65,13 +62,6 @@ pub(crate) struct LiveStream<'a> {
     plan: Option<Arc<Assignment>>,
     last_frame: Option<u64>,
     _viewer: Viewer,
-}
-
-/// The next event of a stream.
-enum Step {
-    Requested(Option<RenderViews>),
-    Loaded(Loaded),
-    Credited(Credit),
 }
 
 impl<'a> LiveStream<'a> {
@@ -95,30 +85,22 @@ impl<'a> LiveStream<'a> {
         first: RenderViews,
         mut requests: Messages<RenderViews>,
     ) -> Result<(), Status> {
+        let idle = self.client.shared.deadlines.idle;
         let mut is_open = true;
         self.accept(first)?;
         while is_open || self.newest.is_some() || self.loading.is_some() || self.ready.is_some() {
-            match self.step(&mut requests, is_open).await? {
-                Step::Requested(Some(request)) => self.accept(request)?,
-                Step::Requested(None) => is_open = false,
-                Step::Loaded(set) => self.loaded(set),
-                Step::Credited(credit) => self.credited(credit),
-            }
             self.fetch_next();
+            tokio::select! {
+                biased;
+                request = next_within(&mut requests, idle, "poses"), if is_open => match request? {
+                    Some(request) => self.accept(request)?,
+                    None => is_open = false,
+                },
+                set = wait_for(self.loading.as_mut().map(|(_, work)| work)) => self.loaded(set?),
+                credit = wait_for(self.ready.as_mut().map(|ready| &mut ready.credit)) => self.credited(credit?),
+            }
         }
         Ok(())
-    }
-
-    async fn step(&mut self, requests: &mut Messages<RenderViews>, is_open: bool) -> Result<Step, Status> {
-        let idle = self.client.shared.deadlines.idle;
-        let ready = self.ready.as_mut().map(|ready| &mut ready.credit);
-        let loading = self.loading.as_mut().map(|(_, work)| work);
-        tokio::select! {
-            biased;
-            request = next_within(requests, idle, "poses"), if is_open => request.map(Step::Requested),
-            set = wait_for(loading) => set.map(Step::Loaded),
-            credit = wait_for(ready) => credit.map(Step::Credited),
-        }
     }
 
     /// Accepts an acknowledgement, and a pose, which replaces an older one of its set.
@@ -132,10 +114,16 @@ impl<'a> LiveStream<'a> {
         self.check_number(view.frame)?;
         let cell = plan.cell_of(&view.camera);
         let pose = Pose { request, view, plan, cell, arrived: Instant::now() };
-        self.log_request(&pose, &live);
+        tracing::debug!(
+            stream = self.client.stream,
+            client = live.client_id,
+            frame = pose.view.frame,
+            plan_epoch = pose.plan.plan_epoch,
+            set_index = pose.request.set_index,
+            "requested"
+        );
         let older = self.put(pose);
-        self.count_replaced(older);
-        self.fetch_next();
+        self.count_replaced(older.map(|pose| pose.view));
         Ok(())
     }
 
@@ -153,17 +141,6 @@ impl<'a> LiveStream<'a> {
             Some((loading, _)) if loading.shows_set_of(&pose) => Some(std::mem::replace(loading, pose)),
             _ => self.newest.replace(pose),
         }
-    }
-
-    fn log_request(&self, pose: &Pose, live: &LiveRequest) {
-        tracing::debug!(
-            stream = self.client.stream,
-            client = live.client_id,
-            frame = pose.view.frame,
-            plan_epoch = pose.plan.plan_epoch,
-            set_index = pose.request.set_index,
-            "requested"
-        );
     }
 
     fn check_number(&mut self, frame: u64) -> Result<(), Status> {
@@ -191,9 +168,9 @@ impl<'a> LiveStream<'a> {
         Ok(plan)
     }
 
-    fn count_replaced(&self, older: Option<Pose>) {
+    fn count_replaced(&self, older: Option<RequestedView>) {
         if let Some(older) = older {
-            tracing::debug!(stream = self.client.stream, frame = older.view.frame, "replaced by a newer pose");
+            tracing::debug!(stream = self.client.stream, frame = older.frame, "replaced by a newer pose");
             self.client.shared.metrics.drop_view("newer pose");
         }
     }
@@ -204,55 +181,43 @@ impl<'a> LiveStream<'a> {
             return;
         }
         let Some(pose) = self.newest.take() else { return };
-        let (shared, plan, set) = (self.client.shared.clone(), pose.plan.clone(), (pose.request.set_index, pose.cell));
-        let work = Box::pin(async move { shared.source(&plan, set).await });
+        let (shared, plan) = (self.client.shared.clone(), pose.plan.clone());
+        let (set_index, cell) = (pose.request.set_index, pose.cell);
+        let work = Box::pin(async move { shared.source(&plan, set_index, cell).await });
         self.loading = Some((pose, work));
     }
 
-    fn loaded(&mut self, (source, id, set_wait_s): Loaded) {
+    fn loaded(&mut self, set: Loaded) {
         let Some((pose, _)) = self.loading.take() else { return };
         // The pose may have arrived after the fetch began.
-        let set_wait_s = set_wait_s.min(pose.arrived.elapsed().as_secs_f64());
-        let ready = Ready { credit: self.credit(&pose.view), pose, source, id, set_wait_s };
-        let older = self.ready.replace(ready);
-        self.count_replaced(older.map(|ready| ready.pose));
+        let set = Loaded { wait_s: set.wait_s.min(pose.arrived.elapsed().as_secs_f64()), ..set };
+        let older = self.ready.replace(Ready { credit: self.credit(&pose.view), pose, set });
+        self.count_replaced(older.map(|ready| ready.pose.view));
         self.replace_waiting();
     }
 
     /// Replaces a view of this stream that still waits for the device, and takes its credit.
     fn replace_waiting(&mut self) {
-        let same_price = |ready: &Ready, waiting: &Waiting| ready.pose.view.camera.size_px == waiting.key.size_px;
         let waiting = self.client.shared.arrivals.withdraw(self.client.stream).pop_front();
         let Some((waiting, ready)) = waiting.zip(self.ready.as_ref()) else { return };
-        tracing::debug!(stream = self.client.stream, frame = waiting.view.frame, "replaced by a newer pose");
-        self.client.shared.metrics.drop_view("newer pose");
-        if same_price(ready, &waiting) {
+        self.count_replaced(Some(waiting.view));
+        if ready.pose.view.camera.size_px == waiting.key.size_px {
             self.credited(waiting.credit);
         }
     }
 
     fn credited(&mut self, credit: Credit) {
-        let Some(Ready { pose, source, id, set_wait_s, .. }) = self.ready.take() else { return };
-        let Pose { request, view, cell, arrived, .. } = pose;
-        let key = BatchKey {
-            sample_set_id: id,
-            cell,
-            method: request.method,
-            planes: request.planes,
-            size_px: view.camera.size_px,
-        };
-        let waits = Waits::until_now(arrived, set_wait_s);
-        tracing::debug!(stream = self.client.stream, frame = view.frame, set = %id, "queued");
-        let waiting = Waiting { key, source, view, codec: request.codec, waits, reply: self.reply.clone(), credit };
-        self.client.shared.arrivals.push(self.client.stream, [waiting]);
+        let Some(Ready { pose, set, .. }) = self.ready.take() else { return };
+        let requested = (&pose.request, pose.view, pose.arrived);
+        self.client.queue(vec![Waiting::new(requested, &set, self.reply.clone(), credit)]);
     }
 
     fn credit(&self, view: &RequestedView) -> Pending<Credit> {
         let (credits, shared) = (self.credits.clone(), self.client.shared.clone());
-        let pixels = view.camera.pixel_count() as u64;
+        let camera = view.camera;
         Box::pin(async move {
             let stream = credits.acquire_owned().await.map_err(closed)?;
-            Ok(Credit { stream, _node: shared.quota.live_view(pixels).await? })
+            Ok(Credit { stream, _node: shared.quota.live_view(&camera).await? })
         })
     }
 }

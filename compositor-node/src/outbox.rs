@@ -57,10 +57,12 @@ struct State {
 
 /// The outbox of one stream, shared by the makers of frames and the response that sends them.
 pub(crate) struct Outbox {
-    stream: u64,
+    /// The number of the stream in logs.
+    pub(crate) stream: u64,
     metrics: NodeMetrics,
     state: Mutex<State>,
-    gone: CancellationToken,
+    /// Cancelled when the client leaves.
+    pub(crate) gone: CancellationToken,
 }
 
 impl Outbox {
@@ -71,16 +73,6 @@ impl Outbox {
     /// From here on numbers must rise and frames are acknowledged.
     pub(crate) fn set_live(&self) {
         self.state.lock().is_live = true;
-    }
-
-    /// Whether the client has left.
-    pub(crate) fn is_gone(&self) -> bool {
-        self.gone.is_cancelled()
-    }
-
-    /// Resolves when the client leaves.
-    pub(crate) async fn gone(&self) {
-        self.gone.cancelled().await;
     }
 
     /// Resolves when frames have waited for the client for `deadline`.
@@ -120,7 +112,7 @@ impl Outbox {
 
     fn put(&self, output: Output) {
         let mut state = self.state.lock();
-        if self.is_gone() || state.end.as_ref().is_some_and(Result::is_err) {
+        if self.gone.is_cancelled() || state.end.as_ref().is_some_and(Result::is_err) {
             return self.metrics.drop_view("client gone");
         }
         state.untaken_since.get_or_insert_with(Instant::now);
@@ -222,11 +214,6 @@ impl Reply {
         &self.0.0
     }
 
-    /// The number of the stream in logs.
-    pub(crate) fn stream(&self) -> u64 {
-        self.outbox().stream
-    }
-
     /// Never blocks: every frame has a credit.
     pub(crate) fn send(&self, output: Result<Output, Status>) {
         match output {
@@ -237,13 +224,7 @@ impl Reply {
 }
 
 /// A client's frames as messages.
-pub(crate) struct Outgoing(Arc<Outbox>);
-
-impl Outgoing {
-    pub(crate) fn new(outbox: Arc<Outbox>) -> Self {
-        Self(outbox)
-    }
-}
+pub(crate) struct Outgoing(pub(crate) Arc<Outbox>);
 
 impl Stream for Outgoing {
     type Item = Result<FramePart, Status>;

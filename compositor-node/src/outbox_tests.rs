@@ -22,7 +22,7 @@ fn bench(is_live: bool) -> Bench {
     if is_live {
         outbox.set_live();
     }
-    let (outgoing, reply) = (Outgoing::new(outbox.clone()), Reply::new(outbox.clone()));
+    let (outgoing, reply) = (Outgoing(outbox.clone()), Reply::new(outbox.clone()));
     Bench { outbox, outgoing, reply, credits: Arc::new(Semaphore::new(2)), quota: NodeQuota::new(Quotas::default()) }
 }
 
@@ -140,6 +140,6 @@ async fn a_client_that_leaves_returns_all_credit() {
     bench.put(1, 10);
     let Bench { outbox, outgoing, credits, .. } = bench;
     drop(outgoing);
-    outbox.gone().await;
+    outbox.gone.cancelled().await;
     assert_eq!(credits.available_permits(), 2);
 }

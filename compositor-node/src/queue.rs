@@ -1,8 +1,12 @@
 //! The order of views: streams take turns, and a live stream's newest view replaces the one before.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 
-use crate::batch::{BatchKey, MAX_BATCH};
+use parking_lot::Mutex;
+use tokio::sync::Notify;
+
+use crate::batch::{BatchKey, MAX_BATCH, Waiting};
 
 /// Views that a stream may have in a batch while others wait, and all together while live streams are open. A single view
 /// then waits for few others.
@@ -10,60 +14,89 @@ const SHARED_VIEWS: usize = 8;
 /// Pixels of these views.
 const SHARED_PIXELS: usize = 1 << 20;
 
-/// Views that can be put into batches.
-pub(crate) trait Keyed {
-    /// The key that all views of a batch share.
-    fn key(&self) -> &BatchKey;
+/// The views of all streams that wait for the device. Bounded: each view that waits holds a credit.
+#[derive(Default)]
+pub(crate) struct Arrivals {
+    queue: Mutex<FairQueue>,
+    added: Notify,
+}
+
+impl Arrivals {
+    pub(crate) fn push(&self, stream: u64, views: Vec<Waiting>) {
+        self.queue.lock().push(stream, views);
+        self.added.notify_one();
+    }
+
+    /// Counts a live stream as open: batches are small until the guard is dropped.
+    pub(crate) fn viewer(self: &Arc<Self>) -> Viewer {
+        self.queue.lock().viewers += 1;
+        Viewer(self.clone())
+    }
+
+    /// Takes back a stream's views, oldest first.
+    pub(crate) fn withdraw(&self, stream: u64) -> VecDeque<Waiting> {
+        self.queue.lock().withdraw(stream)
+    }
+
+    /// Waits for the next batch.
+    pub(crate) async fn next_batch(&self) -> Vec<Waiting> {
+        loop {
+            let batch = self.queue.lock().take_batch();
+            if !batch.is_empty() {
+                return batch;
+            }
+            self.added.notified().await;
+        }
+    }
+}
+
+/// A live stream that is open.
+pub(crate) struct Viewer(Arc<Arrivals>);
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        self.0.queue.lock().viewers -= 1;
+    }
 }
 
 /// Views that wait for the device, by stream.
-pub(crate) struct FairQueue<T> {
+#[derive(Default)]
+struct FairQueue {
     /// Without empty queues.
-    streams: BTreeMap<u64, VecDeque<T>>,
+    streams: BTreeMap<u64, VecDeque<Waiting>>,
     /// The last stream that has had its turn.
     last: u64,
     /// Live streams that are open, whether they wait or not: the next pose may come at any time.
     viewers: usize,
 }
 
-impl<T> Default for FairQueue<T> {
-    fn default() -> Self {
-        Self { streams: BTreeMap::new(), last: 0, viewers: 0 }
-    }
-}
-
-impl<T: Keyed> FairQueue<T> {
-    pub(crate) fn push(&mut self, stream: u64, views: impl IntoIterator<Item = T>) {
-        let mut views = views.into_iter().peekable();
-        if views.peek().is_some() {
+impl FairQueue {
+    fn push(&mut self, stream: u64, views: Vec<Waiting>) {
+        if !views.is_empty() {
             self.streams.entry(stream).or_default().extend(views);
         }
     }
 
-    pub(crate) fn add_viewer(&mut self) {
-        self.viewers += 1;
-    }
-
-    pub(crate) fn remove_viewer(&mut self) {
-        self.viewers = self.viewers.saturating_sub(1);
-    }
-
-    /// Takes back a stream's views, oldest first.
-    pub(crate) fn withdraw(&mut self, stream: u64) -> VecDeque<T> {
+    fn withdraw(&mut self, stream: u64) -> VecDeque<Waiting> {
         self.streams.remove(&stream).unwrap_or_default()
     }
 
-    /// The next stream's first view and those that can be made with it, one of each stream in turn, round by round. Streams that had no part in it have the next turn.
-    pub(crate) fn take_batch(&mut self) -> Vec<T> {
+    /// The next stream's first view and those that can be made with it, one of each stream in turn, round by round. Streams
+    /// that had no part in it have the next turn.
+    fn take_batch(&mut self) -> Vec<Waiting> {
         let order = self.order();
-        let Some(wanted) = order.first().and_then(|first| self.first_key(*first)) else {
+        let first = order.first().and_then(|first| self.streams.get(first)?.front());
+        let Some(wanted) = first.map(|view| view.key.clone()) else {
             return Vec::new();
         };
-        let (most, rounds) = (self.max_views(&wanted), self.rounds(order.len(), &wanted));
+        // While live streams are open, a pose may arrive at any time.
+        let most = if self.viewers == 0 { wanted.max_views() } else { shared(&wanted) };
+        // The most views of each stream.
+        let rounds = if order.len() == 1 { MAX_BATCH } else { shared(&wanted) };
         let first = self.take_round(&order, &wanted, most);
         let served = order.iter().zip(&first).take_while(|(stream, (of, _))| *stream == of).last();
         self.last = served.map_or(self.last, |(stream, _)| *stream);
-        let mut batch: Vec<T> = first.into_iter().map(|(_, view)| view).collect();
+        let mut batch: Vec<Waiting> = first.into_iter().map(|(_, view)| view).collect();
         for _ in 1..rounds {
             let next = self.take_round(&order, &wanted, most - batch.len());
             if next.is_empty() {
@@ -74,20 +107,6 @@ impl<T: Keyed> FairQueue<T> {
         batch
     }
 
-    fn first_key(&self, stream: u64) -> Option<BatchKey> {
-        self.streams.get(&stream)?.front().map(|view| view.key().clone())
-    }
-
-    /// The most views of a batch. While live streams are open, a pose may arrive at any time.
-    fn max_views(&self, wanted: &BatchKey) -> usize {
-        if self.viewers == 0 { wanted.max_views() } else { shared(wanted) }
-    }
-
-    /// The most views of each stream in a batch.
-    fn rounds(&self, waiting: usize, wanted: &BatchKey) -> usize {
-        if waiting == 1 { MAX_BATCH } else { shared(wanted) }
-    }
-
     /// All streams, from the one after the last that had its turn.
     fn order(&self) -> Vec<u64> {
         let (before, after): (Vec<u64>, Vec<u64>) = self.streams.keys().partition(|stream| **stream <= self.last);
@@ -95,13 +114,13 @@ impl<T: Keyed> FairQueue<T> {
     }
 
     /// One view of each stream, with its stream.
-    fn take_round(&mut self, order: &[u64], wanted: &BatchKey, room: usize) -> Vec<(u64, T)> {
+    fn take_round(&mut self, order: &[u64], wanted: &BatchKey, room: usize) -> Vec<(u64, Waiting)> {
         order.iter().filter_map(|&stream| Some((stream, self.take(stream, wanted)?))).take(room).collect()
     }
 
-    fn take(&mut self, stream: u64, wanted: &BatchKey) -> Option<T> {
+    fn take(&mut self, stream: u64, wanted: &BatchKey) -> Option<Waiting> {
         let views = self.streams.get_mut(&stream)?;
-        let at = views.iter().position(|view| view.key() == wanted)?;
+        let at = views.iter().position(|view| view.key == *wanted)?;
         let view = views.remove(at);
         if views.is_empty() {
             self.streams.remove(&stream);
@@ -116,49 +135,66 @@ fn shared(wanted: &BatchKey) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use codec::SampleSetId;
-    use depth_image::ViewPlanes;
-    use glam::UVec2;
+    use std::time::Instant;
+
+    use cluster::RequestedView;
+    use codec::{FrameCodec, SampleSetId};
+    use depth_image::{PinholeCamera, ViewPlanes};
+    use glam::{UVec2, Vec3};
+    use node::{NodeMetrics, Quotas};
+    use tokio::sync::Semaphore;
 
     use super::*;
+    use crate::batch::Source;
+    use crate::outbox::{Outbox, Reply};
+    use crate::quota::{Credit, NodeQuota};
+    use crate::sets::ReadySet;
 
-    #[derive(Debug, Clone, PartialEq)]
-    struct View {
-        key: BatchKey,
-        stream: u64,
-        number: u32,
-    }
+    struct Nothing;
+    impl node::UploadedSet for Nothing {}
 
-    impl Keyed for View {
-        fn key(&self) -> &BatchKey {
-            &self.key
-        }
-    }
-
-    fn view(stream: u64, number: u32, index: u64, side_px: u32) -> View {
+    fn view(stream: u64, number: u32, index: u64, side_px: u32) -> Waiting {
+        let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(side_px));
         let key = BatchKey {
             sample_set_id: SampleSetId { plan_epoch: 1, index },
             cell: 0,
             method: String::new(),
             planes: ViewPlanes::default(),
-            size_px: UVec2::splat(side_px),
+            size_px: camera.size_px,
         };
-        View { key, stream, number }
+        let permit = Arc::new(Semaphore::new(1)).try_acquire_owned().unwrap();
+        let node = NodeQuota::new(Quotas::default()).try_view(&camera).unwrap();
+        let now = Instant::now();
+        Waiting {
+            key,
+            source: Source::Set(ReadySet { set: Arc::new(Nothing), since: now }),
+            view: RequestedView { frame: number.into(), camera },
+            codec: FrameCodec::Lz4,
+            arrived: now,
+            set_wait_s: 0.0,
+            queued: now,
+            reply: Reply::new(Outbox::new(stream, NodeMetrics::default())),
+            credit: Credit { stream: permit, _node: node },
+        }
+    }
+
+    fn views(stream: u64, count: u32, side_px: u32) -> Vec<Waiting> {
+        (0..count).map(|i| view(stream, i, 0, side_px)).collect()
     }
 
     #[test]
     fn a_batch_has_views_of_one_set_in_their_order() {
         let mut queue = FairQueue::default();
-        queue.push(1, (0..200).map(|i| view(1, i, u64::from(i / 3 % 2), 64)));
+        queue.push(1, (0..200).map(|i| view(1, i, u64::from(i / 3 % 2), 64)).collect());
         let mut seen = Vec::new();
         loop {
             let batch = queue.take_batch();
             assert!(batch.len() <= MAX_BATCH && batch.iter().all(|view| view.key == batch[0].key));
-            assert!(batch.is_sorted_by_key(|view| view.number));
+            assert!(batch.is_sorted_by_key(|view| view.view.frame));
             if batch.is_empty() {
                 break;
             }
-            seen.extend(batch.into_iter().map(|view| view.number));
+            seen.extend(batch.into_iter().map(|view| view.view.frame));
         }
         seen.sort_unstable();
         assert_eq!(seen, (0..200).collect::<Vec<_>>());
@@ -167,26 +203,26 @@ mod tests {
     #[test]
     fn large_views_make_small_batches() {
         let mut queue = FairQueue::default();
-        queue.push(1, (0..8).map(|i| view(1, i, 0, 4096)));
+        queue.push(1, views(1, 8, 4096));
         assert_eq!(queue.take_batch().len(), 4);
         let mut queue = FairQueue::default();
-        queue.push(1, (0..2).map(|i| view(1, i, 0, 16_384)));
+        queue.push(1, views(1, 2, 16_384));
         assert_eq!(queue.take_batch().len(), 1);
     }
 
     #[test]
     fn a_stream_with_thousands_of_views_leaves_room_for_others() {
         let mut queue = FairQueue::default();
-        queue.push(1, (0..5000).map(|i| view(1, i, 0, 64)));
-        (2..10).for_each(|stream| queue.push(stream, [view(stream, 0, 0, 64)]));
+        queue.push(1, views(1, 5000, 64));
+        (2..10).for_each(|stream| queue.push(stream, vec![view(stream, 0, 0, 64)]));
         let batch = queue.take_batch();
-        let of = |stream: u64| batch.iter().filter(|view| view.stream == stream).count();
+        let of = |stream: u64| batch.iter().filter(|view| view.reply.outbox().stream == stream).count();
         assert_eq!(of(1), SHARED_VIEWS);
         assert!((2..10).all(|stream| of(stream) == 1), "views of one size go together");
         assert_eq!(queue.take_batch().len(), MAX_BATCH, "alone, it has the device");
-        queue.add_viewer();
+        queue.viewers += 1;
         assert_eq!(queue.take_batch().len(), SHARED_VIEWS, "a pose may arrive at any time");
-        queue.remove_viewer();
+        queue.viewers -= 1;
         assert_eq!(queue.take_batch().len(), MAX_BATCH);
     }
 
@@ -194,18 +230,16 @@ mod tests {
     fn many_viewers_take_turns_in_small_batches() {
         let mut queue = FairQueue::default();
         let mut served = [0; 40];
-        for _ in 0..40 {
-            queue.add_viewer();
-        }
+        queue.viewers = 40;
         for _ in 0..10 {
             // Every viewer has a pose again as soon as its last was taken.
             (0..40).for_each(|stream| {
                 let waiting = queue.withdraw(stream);
-                queue.push(stream, [waiting.into_iter().next().unwrap_or_else(|| view(stream, 0, 0, 64))]);
+                queue.push(stream, vec![waiting.into_iter().next().unwrap_or_else(|| view(stream, 0, 0, 64))]);
             });
             let batch = queue.take_batch();
             assert_eq!(batch.len(), SHARED_VIEWS);
-            batch.iter().for_each(|view| served[view.stream as usize] += 1);
+            batch.iter().for_each(|view| served[view.reply.outbox().stream as usize] += 1);
         }
         assert_eq!(served, [2; 40]);
     }
@@ -213,31 +247,31 @@ mod tests {
     #[test]
     fn a_stream_with_large_views_gets_few_at_a_time() {
         let mut queue = FairQueue::default();
-        queue.push(1, (0..9).map(|i| view(1, i, 0, 1024)));
-        queue.push(2, [view(2, 0, 0, 64)]);
+        queue.push(1, views(1, 9, 1024));
+        queue.push(2, vec![view(2, 0, 0, 64)]);
         assert_eq!(queue.take_batch().len(), 1);
     }
 
     #[test]
     fn streams_that_cannot_share_a_batch_take_turns() {
         let mut queue = FairQueue::default();
-        queue.push(1, (0..100).map(|i| view(1, i, 0, 64)));
-        queue.push(2, (0..30).map(|i| view(2, i, 0, 32)));
-        queue.push(7, (0..30).map(|i| view(7, i, 0, 16)));
-        let leaders: Vec<u64> = (0..6).map(|_| queue.take_batch()[0].stream).collect();
+        queue.push(1, views(1, 100, 64));
+        queue.push(2, views(2, 30, 32));
+        queue.push(7, views(7, 30, 16));
+        let leaders: Vec<u64> = (0..6).map(|_| queue.take_batch()[0].reply.outbox().stream).collect();
         assert_eq!(leaders, [1, 2, 7, 1, 2, 7]);
     }
 
     #[test]
     fn a_stream_that_leaves_withdraws_its_views() {
         let mut queue = FairQueue::default();
-        queue.push(3, (0..5).map(|i| view(3, i, 0, 64)));
-        queue.push(4, [view(4, 9, 0, 64)]);
-        queue.push(5, []);
+        queue.push(3, views(3, 5, 64));
+        queue.push(4, vec![view(4, 9, 0, 64)]);
+        queue.push(5, Vec::new());
         assert_eq!(queue.withdraw(3).len(), 5);
         assert!(queue.withdraw(3).is_empty());
         let batch = queue.take_batch();
-        assert_eq!((batch.len(), batch[0].stream), (1, 4));
+        assert_eq!((batch.len(), batch[0].reply.outbox().stream), (1, 4));
         assert!(queue.take_batch().is_empty() && queue.streams.is_empty());
     }
 }

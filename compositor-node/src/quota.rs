@@ -69,19 +69,14 @@ impl NodeQuota {
     }
 
     /// Waits for room for a view of a live stream.
-    pub(crate) async fn live_view(&self, pixels: u64) -> Result<NodeCredit, Status> {
-        let pixels = self.live_pixels.clone().acquire_many_owned(self.price_of(pixels)).await.map_err(closed)?;
+    pub(crate) async fn live_view(&self, camera: &PinholeCamera) -> Result<NodeCredit, Status> {
+        let pixels = self.live_pixels.clone().acquire_many_owned(self.price(camera)).await.map_err(closed)?;
         Ok(NodeCredit { _pixels: pixels, _view: None })
     }
 
-    fn price(&self, camera: &PinholeCamera) -> u32 {
-        self.price_of(camera.pixel_count() as u64)
-    }
-
     /// At most all pixels: one view larger than the bound still passes, alone.
-    fn price_of(&self, pixels: u64) -> u32 {
-        let most = u32::try_from(self.limits.pixels.max(1)).unwrap_or(u32::MAX);
-        u32::try_from(pixels).unwrap_or(u32::MAX).min(most)
+    fn price(&self, camera: &PinholeCamera) -> u32 {
+        u32::try_from(camera.pixel_count().min(self.limits.pixels.max(1))).unwrap_or(u32::MAX)
     }
 
     fn exceeded(&self, quota: &str, limit: usize, what: &str) -> Status {
@@ -132,8 +127,9 @@ mod tests {
         let quota = quota();
         let _views = [quota.try_view(&camera(10)).unwrap(), quota.try_view(&camera(10)).unwrap()];
         assert!(quota.try_view(&camera(1)).is_err());
-        let live = quota.live_view(150).await.unwrap();
-        let mut waits = Box::pin(quota.live_view(100));
+        let live = quota.live_view(&camera(12)).await.unwrap();
+        let next = camera(10);
+        let mut waits = Box::pin(quota.live_view(&next));
         assert!(at_once(&mut waits).await.is_none());
         drop(live);
         assert!(waits.await.is_ok());

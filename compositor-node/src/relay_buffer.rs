@@ -3,7 +3,6 @@
 use codec::EncodedDepthImage;
 use tokio::sync::watch;
 use tokio_stream::StreamExt as _;
-use tokio_stream::wrappers::WatchStream;
 use tonic::Status;
 use wire::rpc::Messages;
 
@@ -47,47 +46,22 @@ impl RelayBuffer {
 
     /// The images that have arrived, then those that arrive.
     pub(crate) fn images(&self) -> Messages<(u32, EncodedDepthImage)> {
-        let mut seen = 0;
-        let changes = WatchStream::new(self.0.subscribe()).map(move |state| {
-            let fresh: Vec<_> = state.images[seen..].iter().cloned().map(Ok).collect();
-            seen = state.images.len();
-            (fresh, state.ended)
-        });
-        Box::pin(Flattened { changes: Box::pin(changes), ready: Vec::new().into_iter(), ended: None })
+        let state = self.0.subscribe();
+        Box::pin(tokio_stream::iter(0..).then(move |place| at(state.clone(), place)).map_while(|image| image))
     }
 }
 
-/// New images, and how the set has ended, if it has.
-type Change = (Vec<Result<(u32, EncodedDepthImage), Status>>, Option<Result<(), Status>>);
-
-struct Flattened {
-    changes: std::pin::Pin<Box<dyn tokio_stream::Stream<Item = Change> + Send>>,
-    ready: std::vec::IntoIter<Result<(u32, EncodedDepthImage), Status>>,
-    ended: Option<Result<(), Status>>,
-}
-
-impl tokio_stream::Stream for Flattened {
-    type Item = Result<(u32, EncodedDepthImage), Status>;
-
-    fn poll_next(
-        mut self: std::pin::Pin<&mut Self>,
-        cx: &mut std::task::Context<'_>,
-    ) -> std::task::Poll<Option<Self::Item>> {
-        use std::task::Poll;
-        loop {
-            if let Some(image) = self.ready.next() {
-                return Poll::Ready(Some(image));
-            }
-            if let Some(ended) = &mut self.ended {
-                return Poll::Ready(std::mem::replace(ended, Ok(())).err().map(Err));
-            }
-            let Some((fresh, ended)) = std::task::ready!(self.changes.as_mut().poll_next(cx)) else {
-                self.ended = Some(Err(Status::aborted("the set was evicted before it was complete")));
-                continue;
-            };
-            (self.ready, self.ended) = (fresh.into_iter(), ended);
-        }
+/// The image at a place, or, at the place after the last one, the error that the images end with. Waits for it.
+async fn at(mut state: watch::Receiver<RelayState>, place: usize) -> Option<Result<(u32, EncodedDepthImage), Status>> {
+    let is_known = |state: &RelayState| state.images.len() > place || state.ended.is_some();
+    let is_evicted = state.wait_for(is_known).await.is_err();
+    let state = state.borrow();
+    if let Some(image) = state.images.get(place) {
+        return Some(Ok(image.clone()));
     }
+    let evicted = is_evicted.then(|| Status::aborted("the set was evicted before it was complete"));
+    let error = evicted.or_else(|| state.ended.clone()?.err());
+    error.filter(|_| place == state.images.len()).map(Err)
 }
 
 #[cfg(test)]

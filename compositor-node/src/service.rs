@@ -5,19 +5,19 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use cluster::RenderViews;
 use codec::FramePart;
-use node::{CurrentPlan, Engine, NodeConfig, NodeMetrics, Relay, next_within, until_drained};
+use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Relay, next_within, until_drained};
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Compositor, Messages};
 
-use crate::arrivals::Arrivals;
 use crate::batch_stream::BatchStream;
 use crate::live_stream::LiveStream;
 use crate::outbox::{Outbox, Outgoing, Reply};
+use crate::queue::Arrivals;
 use crate::quota::NodeQuota;
 use crate::render::render_loop;
-use crate::sets::{SetRelay, Sets};
+use crate::sets::Sets;
 use crate::shared::{ClientStream, Shared};
 
 /// The compositor's role.
@@ -57,8 +57,9 @@ impl CompositorService {
 
     /// Relays the images that this compositor fetches to other compositors.
     #[must_use]
-    pub fn relay(&self) -> Arc<dyn Relay> {
-        Arc::new(SetRelay(self.shared.sets.clone()))
+    pub fn relay(&self) -> Relay {
+        let sets = self.shared.sets.clone();
+        Arc::new(move |plan: &CellPlan, set_index| sets.relay(plan, set_index))
     }
 }
 
@@ -74,7 +75,7 @@ impl Compositor for CompositorService {
             client.run(requests).await;
             drop(place);
         });
-        Ok(until_drained(Box::pin(Outgoing::new(outbox)), self.shutdown.clone()))
+        Ok(until_drained(Box::pin(Outgoing(outbox)), self.shutdown.clone()))
     }
 }
 
@@ -82,13 +83,17 @@ impl ClientStream {
     /// Runs until either side ends the stream; a client that takes no frames is cut off.
     async fn run(self, requests: Messages<RenderViews>) {
         self.shared.metrics.streams.inc();
-        let stall = self.shared.deadlines.stall;
+        let (stream, stall) = (self.stream, self.shared.deadlines.stall);
         tokio::select! {
             () = self.answer_and_send(requests) => (),
-            () = self.outbox.gone() => (),
-            () = self.outbox.stalled(stall) => self.cut_off(),
+            () = self.outbox.gone.cancelled() => (),
+            () = self.outbox.stalled(stall) => {
+                let seconds = stall.as_secs_f64();
+                tracing::warn!(stream, seconds, "a client takes no frames: cut off");
+                self.outbox.cut(Status::deadline_exceeded(format!("frames: none was taken for {seconds:.1} s")));
+            }
         }
-        for view in self.shared.arrivals.withdraw(self.stream) {
+        for view in self.shared.arrivals.withdraw(stream) {
             self.shared.metrics.drop_view("client gone");
             drop(view);
         }
@@ -104,7 +109,7 @@ impl ClientStream {
             reply.send(Err(status));
         }
         drop(reply);
-        self.outbox.gone().await;
+        self.outbox.gone.cancelled().await;
     }
 
     async fn answer(&self, mut requests: Messages<RenderViews>, reply: Reply) -> Result<(), Status> {
@@ -114,12 +119,5 @@ impl ClientStream {
             Some(first) if first.live.is_some() => LiveStream::new(self, reply).answer(first, requests).await,
             Some(first) => BatchStream::new(self, reply).answer(first, requests).await,
         }
-    }
-
-    fn cut_off(&self) {
-        let seconds = self.shared.deadlines.stall.as_secs_f64();
-        tracing::warn!(stream = self.stream, seconds, "a client takes no frames: cut off");
-        let reason = format!("frames: none was taken for {seconds:.1} s");
-        self.outbox.cut(Status::deadline_exceeded(reason));
     }
 }

@@ -6,13 +6,15 @@ use std::time::Instant;
 
 use cluster::{Assignment, SetContent};
 use codec::EncodedDepthImage;
-use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, UploadedSet, blocking};
+use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, SampleSet, UploadedSet};
+use node::{beyond_timeline, blocking};
 use parking_lot::Mutex;
 use tokio::sync::OnceCell;
-use tonic::{Status, async_trait};
+use tonic::Status;
 use wire::rpc::Messages;
 
-use crate::fetch::{Fetched, Fetcher};
+use crate::fetch::Fetcher;
+use crate::fetch_share::{FetchTimes, SetRequest};
 use crate::relay_buffer::RelayBuffer;
 use crate::reports::Reports;
 
@@ -26,11 +28,6 @@ const SETS_AHEAD: u32 = 2;
 fn sets_ahead(plan: &Assignment) -> u32 {
     let others = plan.workload.timeline.set_count.saturating_sub(1);
     plan.sets_at_once().max(SETS_AHEAD).min(others)
-}
-
-/// The most sets that stay cached: as many of every view cell, as views of all cells take turns.
-fn max_cached(plan: &CellPlan) -> usize {
-    (SETS_IN_USE + sets_ahead(plan) as usize) * plan.cell_count()
 }
 
 /// A complete set, ready to be reconstructed from.
@@ -51,26 +48,11 @@ struct Slot {
 /// The sets of one compositor, the latest few cached.
 pub(crate) struct Sets {
     engine: Arc<dyn Engine>,
-    node_name: String,
     fetcher: Arc<Fetcher>,
     metrics: NodeMetrics,
     current: CurrentPlan,
     reports: Reports,
     cached: Mutex<VecDeque<(SetContent, Slot)>>,
-}
-
-/// Relays the images that this node fetches.
-pub(crate) struct SetRelay(pub(crate) Arc<Sets>);
-
-#[async_trait]
-impl Relay for SetRelay {
-    async fn images(&self, plan: &CellPlan, set_index: u32) -> Result<Messages<(u32, EncodedDepthImage)>, Status> {
-        let images = self.0.relayed(plan, set_index)?;
-        let (sets, plan) = (self.0.clone(), plan.clone());
-        // The first request begins the loading, whose end the stream of images tells.
-        tokio::spawn(async move { sets.load(&plan, set_index).await.map(drop) });
-        Ok(images)
-    }
 }
 
 impl Sets {
@@ -82,7 +64,6 @@ impl Sets {
     ) -> Self {
         Self {
             engine,
-            node_name: config.node_name.clone(),
             fetcher: Arc::new(Fetcher::new(&config.node_name, config.deadlines)),
             metrics,
             current,
@@ -91,16 +72,20 @@ impl Sets {
         }
     }
 
-    /// The images of a set that is relayed. Sets that were loaded before others asked are not kept for them: they ask the
-    /// samplers.
-    fn relayed(&self, plan: &CellPlan, set_index: u32) -> Result<Messages<(u32, EncodedDepthImage)>, Status> {
-        let beyond = || Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"));
-        let content = plan.set_content(set_index).ok_or_else(beyond)?;
-        let slot = self.slot(content, max_cached(plan));
+    /// Relays the images of a set. Sets that were loaded before others asked are not kept for them: they ask the samplers.
+    pub(crate) fn relay(
+        self: &Arc<Self>,
+        plan: &CellPlan,
+        set_index: u32,
+    ) -> Result<Messages<(u32, EncodedDepthImage)>, Status> {
+        let (_, slot) = self.slot(plan, set_index)?;
         if (slot.ready.initialized() && slot.relay.is_empty()) || slot.relay.has_failed() {
             return Err(Status::failed_precondition(format!("sample set {set_index} is not relayed")));
         }
-        Ok(slot.relay.images())
+        let (images, sets, plan) = (slot.relay.images(), self.clone(), plan.clone());
+        // The first request begins the loading, whose end the stream of images tells.
+        tokio::spawn(async move { sets.load(&plan, set_index).await.map(drop) });
+        Ok(images)
     }
 
     /// Waits for a complete set; the sets after it are then fetched ahead, so that samplers work on them while this one is
@@ -135,10 +120,7 @@ impl Sets {
 
     /// Loads a set once for all that wait for it; loading goes on when the first of them leaves.
     async fn load(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<ReadySet, Status> {
-        let content = plan
-            .set_content(set_index)
-            .ok_or_else(|| Status::invalid_argument(format!("set_index {set_index} is beyond the timeline")))?;
-        let slot = self.slot(content, max_cached(plan));
+        let (content, slot) = self.slot(plan, set_index)?;
         if let Some(set) = slot.ready.get() {
             return Ok(set.clone());
         }
@@ -156,9 +138,10 @@ impl Sets {
 
     async fn fetch_and_upload(&self, plan: &CellPlan, set_index: u32, relay: &RelayBuffer) -> Result<ReadySet, Status> {
         let start = Instant::now();
-        let relay = plan.relays(&self.node_name).then_some(relay).filter(|relay| !relay.has_failed());
-        let fetched = self.fetch(plan, set_index, relay).await?;
-        let (fetched_s, times, set) = (start.elapsed().as_secs_f64(), fetched.times, fetched.set);
+        let relay = Some(relay).filter(|relay| plan.relays(&self.current.node_name) && !relay.has_failed());
+        let request = SetRequest { plan: plan.clone(), set_index, relay: relay.cloned() };
+        let (set, times) = self.fetch(&request).await?;
+        let fetched_s = start.elapsed().as_secs_f64();
         let (engine, uploading) = (self.engine.clone(), Instant::now());
         let set = blocking(move || engine.upload(&set)).await?;
         self.metrics.done.add(Operation::LoadSet, 1.0, times.decode_s + uploading.elapsed().as_secs_f64());
@@ -175,29 +158,32 @@ impl Sets {
     }
 
     /// Stops when a later plan is in force: a sampler without a place in it may be lost without a word.
-    async fn fetch(&self, plan: &CellPlan, set_index: u32, relay: Option<&RelayBuffer>) -> Result<Fetched, Status> {
+    async fn fetch(&self, request: &SetRequest) -> Result<(SampleSet, FetchTimes), Status> {
+        let plan_epoch = request.plan.plan_epoch;
         let fetched = tokio::select! {
-            fetched = self.fetcher.fetch(plan, set_index, relay) => fetched,
-            () = self.current.replaced(plan.plan_epoch) => {
-                return Err(Status::failed_precondition(format!("plan_epoch {} was replaced", plan.plan_epoch)));
+            fetched = self.fetcher.fetch(request) => fetched,
+            () = self.current.replaced(plan_epoch) => {
+                return Err(Status::failed_precondition(format!("plan_epoch {plan_epoch} was replaced")));
             }
         };
         fetched.map_err(|failed| {
-            self.reports.report(plan.plan_epoch, &failed);
+            self.reports.report(plan_epoch, &failed);
             failed.status
         })
     }
 
-    /// The slot of a set, new or cached; evicts the sets that were used longest ago.
-    fn slot(&self, content: SetContent, max_cached: usize) -> Slot {
+    /// A set's content and its slot, new or cached; evicts the sets that were used longest ago. As many sets of every view
+    /// cell stay cached, since views of all cells take turns.
+    fn slot(&self, plan: &CellPlan, set_index: u32) -> Result<(SetContent, Slot), Status> {
+        let content = plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))?;
+        let max_cached = (SETS_IN_USE + sets_ahead(plan) as usize) * plan.cell_count;
         let mut cached = self.cached.lock();
         let at = cached.iter().position(|(other, _)| *other == content);
         let entry = at.and_then(|at| cached.remove(at)).unwrap_or_else(|| (content, Slot::default()));
-        let slot = entry.1.clone();
-        cached.push_back(entry);
+        cached.push_back(entry.clone());
         while cached.len() > max_cached {
             cached.pop_front();
         }
-        slot
+        Ok(entry)
     }
 }

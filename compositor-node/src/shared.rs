@@ -5,18 +5,14 @@ use std::sync::atomic::AtomicU64;
 use std::time::Instant;
 
 use cluster::{Assignment, Policy};
-use codec::SampleSetId;
-use node::{CellPlan, CurrentPlan, Deadlines, NodeMetrics};
+use node::{CellPlan, CurrentPlan, Deadlines, NodeMetrics, beyond_timeline};
 use tonic::Status;
 
-use crate::arrivals::Arrivals;
-use crate::batch::Source;
+use crate::batch::{Loaded, Source, Waiting};
 use crate::outbox::Outbox;
+use crate::queue::Arrivals;
 use crate::quota::NodeQuota;
 use crate::sets::Sets;
-
-/// The source of a set's views, the set's name, and the seconds spent waiting for it.
-pub(crate) type Loaded = (Source, SampleSetId, f64);
 
 /// The parts that all streams share.
 pub(crate) struct Shared {
@@ -37,34 +33,40 @@ pub(crate) struct ClientStream {
     pub(crate) outbox: Arc<Outbox>,
 }
 
+impl ClientStream {
+    /// Hands views over to the device.
+    pub(crate) fn queue(&self, views: Vec<Waiting>) {
+        for Waiting { key, view, .. } in &views {
+            tracing::debug!(stream = self.stream, frame = view.frame, set = %key.sample_set_id, "queued");
+        }
+        self.shared.arrivals.push(self.stream, views);
+    }
+}
+
 impl Shared {
     /// The plan, if this node makes views in it.
     pub(crate) fn of_compositor(&self, plan: Arc<Assignment>) -> Result<Arc<Assignment>, Status> {
-        if plan.composites(self.plan.node_name()) {
+        if plan.composites(&self.plan.node_name) {
             return Ok(plan);
         }
-        Err(Status::failed_precondition(format!(
-            "{} makes no views in plan_epoch {}",
-            self.plan.node_name(),
-            plan.plan_epoch
-        )))
+        let (name, plan_epoch) = (&self.plan.node_name, plan.plan_epoch);
+        Err(Status::failed_precondition(format!("{name} makes no views in plan_epoch {plan_epoch}")))
     }
 
     /// Waits for the source of a cell's set.
-    pub(crate) async fn source(&self, plan: &Arc<Assignment>, (set_index, cell): (u32, u32)) -> Result<Loaded, Status> {
+    pub(crate) async fn source(&self, plan: &Arc<Assignment>, set_index: u32, cell: u32) -> Result<Loaded, Status> {
         let start = Instant::now();
-        let beyond = || Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"));
+        let beyond = || beyond_timeline(set_index);
         let id = plan.sample_set_id(set_index).ok_or_else(beyond)?;
         let source = match plan.policy {
             Policy::Pipeline | Policy::TimeShare => {
                 Source::Set(self.sets.get(&CellPlan::of(plan, cell)?, set_index).await?)
             }
-            Policy::Direct => Source::Scene {
-                scene_hash: plan.workload.scene.hash.to_string(),
-                lighting: plan.workload.lighting.clone(),
-                scene_time_s: plan.workload.timeline.time_s(set_index).ok_or_else(beyond)?,
-            },
+            Policy::Direct => {
+                let scene_time_s = plan.workload.timeline.time_s(set_index).ok_or_else(beyond)?;
+                Source::Scene { plan: plan.clone(), scene_time_s }
+            }
         };
-        Ok((source, id, start.elapsed().as_secs_f64()))
+        Ok(Loaded { source, id, cell, wait_s: start.elapsed().as_secs_f64() })
     }
 }

@@ -109,7 +109,8 @@ impl Experiment {
     /// The renderer's choice between triangles and rays for views of this size.
     pub fn visibility(&self) -> anyhow::Result<Choice> {
         let view = self.views(1)?;
-        Ok(self.engine.visibility_choice(self.setup.offer.hash.as_str(), &view[0])?)
+        let scene = self.engine.scene(self.setup.offer.hash.as_str())?;
+        Ok(self.engine.renderer.choice(&scene, &view[0], 0.0)?)
     }
 
     /// Drains the cluster.

@@ -51,7 +51,7 @@ impl ReferenceViews {
             illumination: &setup.offer.illumination,
             highlight: args.lighting.highlight(),
         };
-        let set = engine.reconstructor().upload(&images, &description)?;
+        let set = engine.reconstructor.upload(&images, &description)?;
         let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ALL_PLANES))?;
         let class = |(camera, view): (&PinholeCamera, &View)| Ok(classify(camera, inverse_depth(view)?, &images)?);
         let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;
@@ -88,7 +88,7 @@ impl ReferenceViews {
     /// # Errors
     /// The device fails.
     pub fn reconstruct(&self, method: ReconstructionMethod, planes: ViewPlanes) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.reconstructor().reconstruct(&self.set, &self.cameras, method, planes)?)
+        Ok(self.engine.reconstructor.reconstruct(&self.set, &self.cameras, method, planes)?)
     }
 
     /// Reconstructs all views and counts the fetches of a ray; NaN where they cannot be counted.
@@ -97,7 +97,7 @@ impl ReferenceViews {
         method: ReconstructionMethod,
         planes: ViewPlanes,
     ) -> anyhow::Result<(Vec<View>, f64)> {
-        let reconstructor = self.engine.reconstructor();
+        let reconstructor = &self.engine.reconstructor;
         let (views, statistics) = reconstructor.reconstruct_measured(&self.set, &self.cameras, method, planes, true)?;
         Ok((views, statistics.fetches_per_ray.unwrap_or(f64::NAN)))
     }
@@ -112,7 +112,7 @@ impl ReferenceViews {
         let cameras = self.cameras.repeat(times);
         let run = || {
             let start = Instant::now();
-            self.engine.reconstructor().reconstruct(&self.set, &cameras, method, COLOR_ONLY)?;
+            self.engine.reconstructor.reconstruct(&self.set, &cameras, method, COLOR_ONLY)?;
             anyhow::Ok(start.elapsed().as_secs_f64())
         };
         run()?;

@@ -1,6 +1,5 @@
 //! One node process: it can sample and composite, and takes its roles from the plan.
 
-use std::net::SocketAddr;
 use std::sync::Arc;
 
 use cluster::NodeStatus;
@@ -31,7 +30,13 @@ pub async fn serve(
     let engine: Arc<dyn Engine> = Arc::new(monitor.clone());
     let plan = CurrentPlan::new(&config.node_name);
     let scenes = Arc::new(Scenes::new(engine.clone(), &config));
-    let status = status_of(&config, listener.local_addr()?, engine.as_ref());
+    let address = listener.local_addr()?;
+    let status = NodeStatus {
+        node_name: config.node_name.clone(),
+        address: config.advertised_address.clone().unwrap_or_else(|| format!("http://{address}")),
+        device_name: engine.device_name(),
+        is_software: engine.is_software(),
+    };
     let compositor = CompositorService::new(engine.clone(), plan.clone(), &config, metrics.clone(), shutdown.clone());
     let (relay, done) = (compositor.relay(), metrics.done.clone());
     let sampler = SamplerService::new(engine.clone(), plan.clone(), &config, relay, metrics.clone(), shutdown.clone());
@@ -50,13 +55,4 @@ pub async fn serve(
     // Where serving has ended by itself, `shutdown` is not cancelled.
     membership.abort();
     served
-}
-
-fn status_of(config: &NodeConfig, address: SocketAddr, engine: &dyn Engine) -> NodeStatus {
-    NodeStatus {
-        node_name: config.node_name.clone(),
-        address: config.advertised_address.clone().unwrap_or_else(|| format!("http://{address}")),
-        device_name: engine.device_name(),
-        is_software: engine.is_software(),
-    }
 }

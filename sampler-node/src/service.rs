@@ -5,9 +5,8 @@ use std::time::Instant;
 
 use cluster::{Assignment, FetchImages};
 use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
-use node::{
-    CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, SampleWork, blocking, until_drained,
-};
+use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, SampleWork};
+use node::{beyond_timeline, blocking, until_drained};
 use tokio::sync::mpsc;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
@@ -27,7 +26,7 @@ pub struct SamplerService {
     cache: Arc<EncodedSetCache>,
     /// Sets are sampled in the order of their requests: the one that is needed next comes first.
     sampling: Arc<tokio::sync::Mutex<()>>,
-    relay: Arc<dyn Relay>,
+    relay: Relay,
     metrics: NodeMetrics,
     shutdown: CancellationToken,
 }
@@ -39,7 +38,7 @@ impl SamplerService {
         engine: Arc<dyn Engine>,
         plan: CurrentPlan,
         config: &NodeConfig,
-        relay: Arc<dyn Relay>,
+        relay: Relay,
         metrics: NodeMetrics,
         shutdown: CancellationToken,
     ) -> Self {
@@ -49,10 +48,9 @@ impl SamplerService {
 
     /// All of this node's images of a set, made for the first request in one submission.
     async fn images(&self, plan: &Assignment, set_index: u32) -> Result<EncodedImages, Status> {
-        let beyond = || Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"));
-        let content = plan.set_content(set_index).ok_or_else(beyond)?;
-        let indices = plan.images_of(self.plan.node_name(), set_index).to_vec();
-        let work = sample_work(plan, &indices, set_index)?.ok_or_else(beyond)?;
+        let content = plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))?;
+        let indices = plan.images_of(&self.plan.node_name, set_index).to_vec();
+        let work = sample_work(plan, &indices, set_index)?;
         let (engine, metrics) = (self.engine.clone(), self.metrics.clone());
         let key = (content, plan.tile_count, indices.clone());
         let tiles = f64::from(plan.tile_count);
@@ -67,9 +65,9 @@ impl SamplerService {
     }
 
     /// Images of other samplers, as they arrive.
-    async fn relayed(&self, plan: &CellPlan, request: FetchImages) -> Result<Messages<Chunk>, Status> {
+    fn relayed(&self, plan: &CellPlan, request: FetchImages) -> Result<Messages<Chunk>, Status> {
         let id = SampleSetId { plan_epoch: plan.plan_epoch, index: request.set_index.into() };
-        let images = self.relay.images(plan, request.set_index).await?;
+        let images = (self.relay)(plan, request.set_index)?;
         let (send, chunks) = mpsc::channel(CHUNKS_AHEAD);
         tokio::spawn(relay(images, id, request.image_indices, send));
         Ok(until_drained(Box::pin(ReceiverStream::new(chunks)), self.shutdown.clone()))
@@ -80,15 +78,13 @@ impl SamplerService {
 impl Sampler for SamplerService {
     async fn fetch_sample_images(&self, request: FetchImages) -> Result<Messages<Chunk>, Status> {
         let plan = CellPlan::of(&self.plan.require(request.plan_epoch)?, request.cell)?;
-        let own = plan.images_of(self.plan.node_name(), request.set_index);
+        let name = &self.plan.node_name;
+        let own = plan.images_of(name, request.set_index);
         if let Some(index) = request.image_indices.iter().find(|index| !own.contains(index)) {
-            if plan.relays(self.plan.node_name()) {
-                return self.relayed(&plan, request).await;
+            if plan.relays(name) {
+                return self.relayed(&plan, request);
             }
-            return Err(Status::invalid_argument(format!(
-                "image_indices: {index} is not sampled by {}",
-                self.plan.node_name()
-            )));
+            return Err(Status::invalid_argument(format!("image_indices: {index} is not sampled by {name}")));
         }
         let images = self.images(&plan, request.set_index).await?;
         let id = SampleSetId { plan_epoch: plan.plan_epoch, index: request.set_index.into() };
@@ -124,24 +120,20 @@ async fn relay(
     }
 }
 
-/// The work of sampling a set; `None` beyond the timeline.
-fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Option<SampleWork>, Status> {
+/// The work of sampling a set.
+fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<SampleWork, Status> {
     let (workload, cameras) = (&plan.workload, plan.sampled_cameras());
     if indices.iter().any(|&index| index as usize >= cameras.len()) {
         return Err(Status::internal("image_indices beyond the sample cameras"));
     }
-    let work = |scene_time_s| SampleWork {
-        scene_hash: workload.scene.hash.to_string(),
-        cameras: cameras.clone(),
+    Ok(SampleWork {
+        cameras,
         wanted: indices.to_vec(),
-        sampling: workload.sampling.clone(),
-        method: workload.method.clone(),
-        lighting: workload.lighting.clone(),
-        scene_time_s,
+        scene_time_s: workload.timeline.time_s(set_index).ok_or_else(|| beyond_timeline(set_index))?,
         temporal_reference_s: workload.timeline.temporal_reference_s(set_index),
         refinement: workload.refinement(set_index),
-    };
-    Ok(workload.timeline.time_s(set_index).map(work))
+        ..SampleWork::of(workload)
+    })
 }
 
 fn sample(

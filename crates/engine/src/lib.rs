@@ -1,6 +1,215 @@
 //! The device behind a node: [`node::Engine`] over the drawing, sampling and reconstruction crates.
 
-mod error;
-mod gpu_engine;
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::str::FromStr;
+use std::sync::{Arc, Weak};
 
-pub use gpu_engine::GpuEngine;
+use depth_image::{DepthImage, View};
+use gpu::{DevicePreference, Gpu, GpuError};
+use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
+use parking_lot::Mutex;
+use reconstruction::{ReconstructionError, ReconstructionMethod, Reconstructor, RequiredPlanes, SetDescription};
+use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, SamplePlanes, Visibility};
+use sampling::{Sampler, SamplingError, SamplingMethod};
+use scene::{Limits, Scene};
+
+/// The most scenes on the device; the one that was loaded first is evicted first.
+const KEPT_SCENES: usize = 8;
+
+/// One device, its pipelines, and the scenes on it.
+pub struct GpuEngine {
+    gpu: Arc<Gpu>,
+    /// The pipelines that draw, for measurements without a service in between.
+    pub renderer: Arc<Renderer>,
+    sampler: Sampler,
+    /// The pipelines that reconstruct, for measurements without a service in between.
+    pub reconstructor: Reconstructor,
+    scenes: Mutex<Vec<(String, Arc<GpuScene>)>>,
+    /// Batches run one at a time: the device is no faster with several, and memory holds one.
+    reconstructing: Mutex<()>,
+    /// Scenes load one at a time: nodes of one process need the same scene at the same moment.
+    loading: Mutex<()>,
+}
+
+/// A sample set on this engine's device.
+struct Uploaded(reconstruction::SampleSet);
+impl UploadedSet for Uploaded {}
+
+impl GpuEngine {
+    /// Opens a device for this engine.
+    ///
+    /// # Errors
+    /// There is no device, or a shader is broken.
+    pub fn open(preference: DevicePreference) -> Result<Self, EngineError> {
+        let gpu = Gpu::open(preference).map_err(device)?;
+        let renderer = Arc::new(sampling::renderer(&gpu).map_err(render_error)?);
+        Ok(Self {
+            sampler: Sampler::sharing(renderer.clone()),
+            reconstructor: Reconstructor::new(&gpu).map_err(reconstruction_error)?,
+            renderer,
+            gpu,
+            scenes: Mutex::default(),
+            reconstructing: Mutex::default(),
+            loading: Mutex::default(),
+        })
+    }
+
+    /// The engine that all nodes of this process share; it closes with the last of them.
+    ///
+    /// # Errors
+    /// There is no device, or a shader is broken.
+    pub fn shared(preference: DevicePreference) -> Result<Arc<Self>, EngineError> {
+        static OPEN: Mutex<BTreeMap<String, Weak<GpuEngine>>> = Mutex::new(BTreeMap::new());
+        let mut open = OPEN.lock();
+        if let Some(engine) = open.get(&preference.to_string()).and_then(Weak::upgrade) {
+            return Ok(engine);
+        }
+        let engine = Arc::new(Self::open(preference)?);
+        open.insert(preference.to_string(), Arc::downgrade(&engine));
+        Ok(engine)
+    }
+
+    /// Uploads a scene under the hash of its package, unless it is there.
+    ///
+    /// # Errors
+    /// The device cannot hold the scene.
+    pub fn put_scene(&self, hash: &str, scene: &Scene) -> Result<(), EngineError> {
+        let _one = self.loading.lock();
+        if self.has_scene(hash) {
+            return Ok(());
+        }
+        let uploaded = Arc::new(GpuScene::upload(&self.gpu, scene).map_err(render_error)?);
+        let mut scenes = self.scenes.lock();
+        if scenes.len() >= KEPT_SCENES {
+            scenes.remove(0);
+        }
+        scenes.push((hash.to_owned(), uploaded));
+        Ok(())
+    }
+
+    /// A scene on the device.
+    ///
+    /// # Errors
+    /// The scene was never loaded.
+    pub fn scene(&self, hash: &str) -> Result<Arc<GpuScene>, EngineError> {
+        let found = self.scenes.lock().iter().find(|(kept, _)| kept == hash).map(|(_, scene)| scene.clone());
+        found.ok_or_else(|| EngineError::UnknownScene { hash: hash.to_owned() })
+    }
+}
+
+fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {
+    let (visibility, refinement) = (Visibility::Measured, Refinement::default());
+    DrawWork { scene, lighting, scene_time_s, visibility, refinement }
+}
+
+impl Engine for GpuEngine {
+    fn device_name(&self) -> String {
+        self.gpu.name()
+    }
+
+    fn is_software(&self) -> bool {
+        self.gpu.is_software()
+    }
+
+    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<(), EngineError> {
+        let scene = scene::unpack(package, &Limits::default()).map_err(|error| invalid("package", error))?;
+        self.put_scene(hash, &scene)
+    }
+
+    fn has_scene(&self, hash: &str) -> bool {
+        self.scenes.lock().iter().any(|(kept, _)| kept == hash)
+    }
+
+    fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.images_are_sequential())
+    }
+
+    fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError> {
+        Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.images_are_independent())
+    }
+
+    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
+        let scene = self.scene(&request.scene_hash)?;
+        let cluster::Refinement { step, steps } = request.refinement;
+        let draw = DrawWork {
+            refinement: Refinement { step, steps },
+            ..draw_work(&scene, parsed("lighting", &request.lighting)?, request.scene_time_s)
+        };
+        let method: ReconstructionMethod = parsed("reconstruction_method", &request.method)?;
+        let RequiredPlanes { normal, corner_inverse_depth: corners } = method.required_planes();
+        let work = sampling::SampleWork {
+            draw,
+            cameras: &request.cameras,
+            wanted: &request.wanted,
+            method: parsed("sampling_method", &request.sampling)?,
+            planes: SamplePlanes { specular: true, normal, corners, ..SamplePlanes::default() },
+            temporal_reference_s: request.temporal_reference_s,
+        };
+        self.sampler.sample(&work).map_err(sampling_error)
+    }
+
+    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        let lighting: Lighting = parsed("lighting", &set.lighting)?;
+        let description = SetDescription {
+            volume: set.volume,
+            background_linear: set.background_linear,
+            illumination: &set.illumination,
+            highlight: lighting.highlight(),
+        };
+        let uploaded = self.reconstructor.upload(&set.images, &description);
+        Ok(Arc::new(Uploaded(uploaded.map_err(reconstruction_error)?)))
+    }
+
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
+        let Uploaded(set) = (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))?;
+        let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
+        let _one = self.reconstructing.lock();
+        self.reconstructor.reconstruct(set, &work.cameras, method, work.planes).map_err(reconstruction_error)
+    }
+
+    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
+        let scene = self.scene(&work.scene_hash)?;
+        let draw = draw_work(&scene, parsed("lighting", &work.lighting)?, work.scene_time_s);
+        self.renderer.draw_views(draw, &work.cameras, work.planes).map_err(render_error)
+    }
+}
+
+fn device(error: impl ToString) -> EngineError {
+    EngineError::Device(error.to_string())
+}
+
+fn invalid(field: &'static str, reason: impl ToString) -> EngineError {
+    EngineError::InvalidArgument { field, reason: reason.to_string() }
+}
+
+fn render_error(error: RenderError) -> EngineError {
+    match error {
+        RenderError::Camera { .. } => invalid("camera", error),
+        RenderError::Gpu(GpuError::Lost(reason)) => EngineError::Lost(reason),
+        _ => device(error),
+    }
+}
+
+fn reconstruction_error(error: ReconstructionError) -> EngineError {
+    match error {
+        ReconstructionError::Camera { .. } => invalid("camera", error),
+        ReconstructionError::Sample { .. } | ReconstructionError::SampleCount(_) => invalid("sample_images", error),
+        ReconstructionError::Volume => invalid("volume", error),
+        ReconstructionError::Gpu(GpuError::Lost(reason)) => EngineError::Lost(reason),
+        _ => device(error),
+    }
+}
+
+/// Parses a setting.
+fn parsed<T: FromStr<Err: ToString>>(field: &'static str, text: &str) -> Result<T, EngineError> {
+    text.parse().map_err(|error: T::Err| invalid(field, error.to_string()))
+}
+
+fn sampling_error(error: SamplingError) -> EngineError {
+    match error {
+        SamplingError::Render(error) => render_error(error),
+        SamplingError::Layer { .. } => invalid("sample_cameras", error),
+        SamplingError::Selection { .. } => invalid("image_indices", error),
+    }
+}

@@ -1,57 +1,38 @@
-//! The boundary to the device.
+//! The boundary to the device, and the notice of its loss.
 
 use std::any::Any;
 use std::sync::Arc;
 
-use cluster::Refinement;
+use cluster::{Refinement, Workload};
 use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, View, ViewPlanes};
 use glam::Vec3;
+use tokio::sync::watch;
 use tonic::Status;
 
 /// The operations of a node's device. Calls block; services run them on blocking threads. Methods, sampling and lighting are
-/// text, as on the command line, and are parsed here.
+/// text, as on the command line, and are parsed here. Calls fail for text that is unknown, a scene that is not loaded, and a
+/// device that fails.
 pub trait Engine: Send + Sync + 'static {
     /// The device's name, which every reported time is listed with.
     fn device_name(&self) -> String;
     /// Whether the device is a CPU.
     fn is_software(&self) -> bool;
-    /// Loads a scene package, whose bytes have been checked against the hash, under its hash; gives the seconds that this
-    /// took.
-    ///
-    /// # Errors
-    /// Where the package cannot be read or the device cannot hold it.
-    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<f64, EngineError>;
+    /// Loads a scene package, whose bytes have been checked against the hash, under its hash. Fails where the package cannot be
+    /// read or the device cannot hold it.
+    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<(), EngineError>;
     /// Whether [`Engine::load_scene`] has loaded the scene.
     fn has_scene(&self, hash: &str) -> bool;
     /// Whether an image depends on the images before it, so that one node samples a whole set.
-    ///
-    /// # Errors
-    /// For an unknown method.
     fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError>;
     /// Whether an image depends on its own camera alone, so that it is tileable.
-    ///
-    /// # Errors
-    /// For an unknown method.
     fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError>;
     /// Samples the wanted images of a set, in their order.
-    ///
-    /// # Errors
-    /// For unknown settings, a scene that is not loaded, or a device that fails.
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError>;
-    /// Uploads a set for reconstruction.
-    ///
-    /// # Errors
-    /// For images that the device cannot take, or a device that fails.
+    /// Uploads a set for reconstruction. Fails for images that the device cannot take.
     fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError>;
     /// Reconstructs one view for each camera, in one submission.
-    ///
-    /// # Errors
-    /// For unknown settings, or a device that fails.
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError>;
     /// Draws one view for each camera from the scene itself.
-    ///
-    /// # Errors
-    /// For unknown settings, a scene that is not loaded, or a device that fails.
     fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError>;
 }
 
@@ -60,25 +41,40 @@ pub trait UploadedSet: Any + Send + Sync {}
 
 /// Images to sample.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub struct SampleWork {
-    /// A loaded scene.
     pub scene_hash: String,
     /// The cameras of the whole set, in its order: an image may depend on the cameras before its own.
     pub cameras: Vec<Camera>,
     /// Indices of the cameras to sample.
     pub wanted: Vec<u32>,
-    /// The sampling method.
     pub sampling: String,
     /// The reconstruction method, which decides which planes images need.
     pub method: String,
-    /// The lighting.
     pub lighting: String,
-    /// Scene time of the animation.
     pub scene_time_s: f32,
     /// Scene time of the temporal reference, for sampling methods with temporal hysteresis.
     pub temporal_reference_s: Option<f32>,
     /// How far the light is refined. Any step may be asked for first, or alone.
     pub refinement: Refinement,
+}
+
+impl SampleWork {
+    /// All images of a workload's first set, finished at once.
+    #[must_use]
+    pub fn of(workload: &Workload) -> Self {
+        Self {
+            scene_hash: workload.scene.hash.to_string(),
+            cameras: workload.sample_cameras.clone(),
+            wanted: (0..workload.sample_cameras.len() as u32).collect(),
+            sampling: workload.sampling.clone(),
+            method: workload.method.clone(),
+            lighting: workload.lighting.clone(),
+            scene_time_s: workload.timeline.start_s as f32,
+            temporal_reference_s: None,
+            refinement: Refinement::default(),
+        }
+    }
 }
 
 /// The images of one set.
@@ -96,6 +92,20 @@ pub struct SampleSet {
     pub lighting: String,
 }
 
+impl SampleSet {
+    /// A set of a workload.
+    #[must_use]
+    pub fn of(workload: &Workload, images: Vec<DepthImage>) -> Self {
+        Self {
+            images,
+            volume: workload.volume,
+            background_linear: workload.background_linear,
+            illumination: workload.illumination.clone(),
+            lighting: workload.lighting.clone(),
+        }
+    }
+}
+
 /// Views to reconstruct.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewWork {
@@ -109,17 +119,29 @@ pub struct ViewWork {
 
 /// Views to draw from the scene.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub struct DirectWork {
-    /// A loaded scene.
     pub scene_hash: String,
     /// Cameras of one size.
     pub cameras: Vec<PinholeCamera>,
-    /// The lighting.
     pub lighting: String,
-    /// Scene time of the animation.
     pub scene_time_s: f32,
     /// Planes beside colour.
     pub planes: ViewPlanes,
+}
+
+impl DirectWork {
+    /// Views of a workload's scene at its start.
+    #[must_use]
+    pub fn of(workload: &Workload, cameras: Vec<PinholeCamera>, planes: ViewPlanes) -> Self {
+        Self {
+            scene_hash: workload.scene.hash.to_string(),
+            cameras,
+            lighting: workload.lighting.clone(),
+            scene_time_s: workload.timeline.start_s as f32,
+            planes,
+        }
+    }
 }
 
 /// Why an operation of the device failed.
@@ -150,5 +172,77 @@ impl From<EngineError> for Status {
             // Another node's device can do it.
             EngineError::Lost(_) => Self::unavailable(text),
         }
+    }
+}
+
+/// An engine that notices when the device of the engine inside is lost.
+#[derive(Clone)]
+pub struct DeviceLossMonitor {
+    engine: Arc<dyn Engine>,
+    lost: watch::Sender<Option<String>>,
+}
+
+impl DeviceLossMonitor {
+    /// Monitors an engine.
+    #[must_use]
+    pub fn new(engine: Arc<dyn Engine>) -> Self {
+        Self { engine, lost: watch::Sender::new(None) }
+    }
+
+    /// Resolves when the device is lost, with the reason.
+    pub async fn lost(&self) -> String {
+        let mut lost = self.lost.subscribe();
+        // This value owns a sender, which therefore outlives the wait.
+        let reason = lost.wait_for(Option::is_some).await.ok().and_then(|reason| reason.clone());
+        reason.unwrap_or_default()
+    }
+
+    fn monitored<T>(&self, done: Result<T, EngineError>) -> Result<T, EngineError> {
+        if let Err(EngineError::Lost(reason)) = &done {
+            self.lost.send_replace(Some(reason.clone()));
+        }
+        done
+    }
+}
+
+impl Engine for DeviceLossMonitor {
+    fn device_name(&self) -> String {
+        self.engine.device_name()
+    }
+
+    fn is_software(&self) -> bool {
+        self.engine.is_software()
+    }
+
+    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<(), EngineError> {
+        self.monitored(self.engine.load_scene(hash, package))
+    }
+
+    fn has_scene(&self, hash: &str) -> bool {
+        self.engine.has_scene(hash)
+    }
+
+    fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError> {
+        self.monitored(self.engine.images_are_independent(sampling))
+    }
+
+    fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
+        self.monitored(self.engine.images_are_sequential(sampling))
+    }
+
+    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
+        self.monitored(self.engine.sample(request))
+    }
+
+    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        self.monitored(self.engine.upload(set))
+    }
+
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
+        self.monitored(self.engine.reconstruct(set, work))
+    }
+
+    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
+        self.monitored(self.engine.draw_direct(work))
     }
 }

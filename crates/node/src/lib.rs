@@ -3,39 +3,28 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod blocking;
-mod cell_plan;
 mod config;
 mod connections;
-mod device_loss;
 mod engine;
-mod logging;
 mod measure;
 mod membership;
 mod plan;
-mod preface;
-mod relay;
 mod scenes;
 mod server;
 mod service;
 mod streams;
 mod telemetry;
-mod warm;
 mod work_done;
 
 pub use blocking::blocking;
-pub use cell_plan::CellPlan;
 pub use config::{Deadlines, NodeConfig, Quotas};
 pub use connections::Connections;
-pub use device_loss::DeviceLossMonitor;
-pub use engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
-pub use logging::init_logging;
-pub use measure::{MeasureError, measure_costs};
+pub use engine::{DeviceLossMonitor, DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 pub use membership::keep_membership;
-pub use plan::CurrentPlan;
-pub use relay::Relay;
+pub use plan::{CellPlan, CurrentPlan, Relay, beyond_timeline};
 pub use scenes::Scenes;
 pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve, with_reflection};
 pub use service::NodeService;
 pub use streams::{next_within, until_drained, with_guard};
-pub use telemetry::{NodeMetrics, Reason, Telemetry};
-pub use work_done::{Operation, Sums, WorkDone};
+pub use telemetry::{NodeMetrics, Reason, Telemetry, init_logging};
+pub use work_done::{Operation, WorkDone};

@@ -1,15 +1,16 @@
 //! Measured costs of this node's operations, each alone and warm. Pictures are finished, by the session's lighting: g_s and
 //! g_v hold all light that samplers compute, and c the light that compositors add.
 
+use std::fmt::Display;
 use std::time::Instant;
 
-use cluster::{Costs, MeasureCosts, ROW_PARTS, Refinement, TileCosts, Workload};
-use codec::encode_view;
-use codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet, decode_depth_image, encode_depth_image};
-use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use cluster::{Costs, MeasureCosts, ROW_PARTS, TileCosts, Workload};
+use codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet};
+use codec::{decode_depth_image, encode_depth_image, encode_view};
+use depth_image::{Camera, PinholeCamera, View};
 use tonic::Status;
 
-use crate::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
+use crate::engine::{DirectWork, Engine, SampleSet, SampleWork, UploadedSet, ViewWork};
 
 /// Runs of one operation after a warm-up, in which shaders are built.
 const RUNS: usize = 3;
@@ -18,33 +19,10 @@ const LONG_RUN_S: f64 = 0.5;
 /// The longest time of views that are drawn in one call, unless one alone takes longer.
 const DIRECT_CALL_S: f64 = 1.0;
 
-/// Why costs could not be measured.
-#[derive(Debug, thiserror::Error)]
-pub enum MeasureError {
-    /// The device failed.
-    #[error(transparent)]
-    Engine(#[from] EngineError),
-    /// Encoding or decoding failed.
-    #[error("codec: {0}")]
-    Codec(String),
-}
-
-impl From<MeasureError> for Status {
-    fn from(error: MeasureError) -> Self {
-        match error {
-            MeasureError::Engine(error) => error.into(),
-            MeasureError::Codec(_) => Self::internal(error.to_string()),
-        }
-    }
-}
-
 /// Measures g_s, g_v, c, d and e one after the other. Nothing else may run on the device meanwhile.
-///
-/// # Errors
-/// Where one of the operations fails.
-pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Costs, MeasureError> {
+pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Costs, Status> {
     let workload = &request.workload;
-    let sample = sample_work(workload);
+    let sample = SampleWork::of(workload);
     let (encoded, sample_s) = timed(|| sampled(engine, &sample))?;
     let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?)?))?;
     let (made, reconstruct_view_s) = reconstruct_view_s(engine, set.as_ref(), request)?;
@@ -63,21 +41,21 @@ pub fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Cost
 }
 
 /// Images as they leave a sampler, which encodes one set before it samples the next.
-fn sampled(engine: &dyn Engine, work: &SampleWork) -> Result<Vec<EncodedDepthImage>, MeasureError> {
+fn sampled(engine: &dyn Engine, work: &SampleWork) -> Result<Vec<EncodedDepthImage>, Status> {
     let images = engine.sample(work)?;
     images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec)).collect()
 }
 
 /// The overhead of a tile, measured on a tile of one row, and the shares of rows, measured on quarters of the height. Each
 /// quarter is of another image, since images differ. Images of too few rows are not tileable.
-fn tile_costs(engine: &dyn Engine, whole: &SampleWork, sample_image_s: f64) -> Result<Option<TileCosts>, MeasureError> {
+fn tile_costs(engine: &dyn Engine, whole: &SampleWork, sample_image_s: f64) -> Result<Option<TileCosts>, Status> {
     let Some(Camera::Pinhole(first)) = whole.cameras.first().copied() else { return Ok(None) };
     if whole.cameras.iter().any(|Camera::Pinhole(camera)| (camera.size_px.y as usize) < ROW_PARTS) {
         return Ok(None);
     }
     let tile_s = |camera: Camera| {
         let work = SampleWork { cameras: vec![camera], wanted: vec![0], ..whole.clone() };
-        Ok::<f64, MeasureError>(timed(|| sampled(engine, &work))?.1)
+        Ok::<f64, Status>(timed(|| sampled(engine, &work))?.1)
     };
     let row_s = tile_s(Camera::Pinhole(first).tile(0, first.size_px.y))?;
     let mut quarters_s = [0.0; ROW_PARTS];
@@ -94,22 +72,8 @@ fn split_into_overhead_and_shares(sample_image_s: f64, row_s: f64, quarters_s: [
     TileCosts::of_image(sample_image_s, overhead_s, (all_s > 0.0).then(|| rows_s.map(|tile_s| tile_s / all_s)))
 }
 
-fn codec(error: impl ToString) -> MeasureError {
-    MeasureError::Codec(error.to_string())
-}
-
-pub(crate) fn sample_work(workload: &Workload) -> SampleWork {
-    SampleWork {
-        scene_hash: workload.scene.hash.to_string(),
-        cameras: workload.sample_cameras.clone(),
-        wanted: (0..workload.sample_cameras.len() as u32).collect(),
-        sampling: workload.sampling.clone(),
-        method: workload.method.clone(),
-        lighting: workload.lighting.clone(),
-        scene_time_s: workload.timeline.start_s as f32,
-        temporal_reference_s: None,
-        refinement: Refinement::default(),
-    }
+fn codec(error: impl Display) -> Status {
+    Status::internal(format!("codec: {error}"))
 }
 
 /// The cost of one view over all typical views, in calls of the batch's size; with some of the views.
@@ -117,7 +81,7 @@ fn reconstruct_view_s(
     engine: &dyn Engine,
     set: &dyn UploadedSet,
     request: &MeasureCosts,
-) -> Result<(Vec<View>, f64), MeasureError> {
+) -> Result<(Vec<View>, f64), Status> {
     let batch = request.batch_count as usize;
     let views = request.views(request.batch_count.max(request.typical_views.len() as u32));
     let work = |cameras: &[PinholeCamera]| ViewWork {
@@ -133,10 +97,9 @@ fn reconstruct_view_s(
 
 /// Measured on as many views as time allows. Fixed costs are shared as in real batches where a view is quick, and hardly
 /// matter where it is not.
-fn direct_view_s(engine: &dyn Engine, request: &MeasureCosts) -> Result<f64, MeasureError> {
-    let draw = |views: u32| {
-        Ok(engine.draw_direct(&direct_work(&request.workload, request.views(views), request.planes)).map(drop)?)
-    };
+fn direct_view_s(engine: &dyn Engine, request: &MeasureCosts) -> Result<f64, Status> {
+    let work = |views: u32| DirectWork::of(&request.workload, request.views(views), request.planes);
+    let draw = |views: u32| Ok(engine.draw_direct(&work(views)).map(drop)?);
     let ((), alone_s) = timed(|| draw(1))?;
     let views = direct_views(alone_s, request.batch_count);
     if views == 1 {
@@ -152,38 +115,18 @@ fn direct_views(alone_s: f64, most: u32) -> u32 {
     ((DIRECT_CALL_S / alone_s) as u32).clamp(1, most.max(1))
 }
 
-pub(crate) fn direct_work(workload: &Workload, cameras: Vec<PinholeCamera>, planes: ViewPlanes) -> DirectWork {
-    DirectWork {
-        scene_hash: workload.scene.hash.to_string(),
-        cameras,
-        lighting: workload.lighting.clone(),
-        scene_time_s: workload.timeline.start_s as f32,
-        planes,
-    }
-}
-
-fn decoded(workload: &Workload, encoded: &[EncodedDepthImage]) -> Result<SampleSet, MeasureError> {
+fn decoded(workload: &Workload, encoded: &[EncodedDepthImage]) -> Result<SampleSet, Status> {
     let limits = DecodeLimits::default();
     let decode = |(image, camera): (&EncodedDepthImage, &Camera)| {
         decode_depth_image(&image.header, *camera, &image.payload, &limits).map_err(codec)
     };
     let images = encoded.iter().zip(&workload.sample_cameras).map(decode).collect::<Result<_, _>>()?;
-    Ok(sample_set(workload, images))
-}
-
-pub(crate) fn sample_set(workload: &Workload, images: Vec<DepthImage>) -> SampleSet {
-    SampleSet {
-        images,
-        volume: workload.volume,
-        background_linear: workload.background_linear,
-        illumination: workload.illumination.clone(),
-        lighting: workload.lighting.clone(),
-    }
+    Ok(SampleSet::of(workload, images))
 }
 
 /// The mean cost over all views of the batch. A single view ends within a time slice, in which a node with a CPU quota is
 /// as fast as any.
-fn encode_s(made: &[View], codec_name: &str) -> Result<f64, MeasureError> {
+fn encode_s(made: &[View], codec_name: &str) -> Result<f64, Status> {
     let frame_codec: FrameCodec = codec_name.parse().map_err(codec)?;
     let ((), seconds) =
         timed(|| made.iter().try_for_each(|view| encode_view(view, frame_codec).map(drop).map_err(codec)))?;
@@ -192,7 +135,7 @@ fn encode_s(made: &[View], codec_name: &str) -> Result<f64, MeasureError> {
 
 /// The result of a warm-up, and the median time of the runs after it: one long run, or [`RUNS`]. The first run after the
 /// warm-up decides how many, since the warm-up may have built shaders.
-fn timed<T>(mut run: impl FnMut() -> Result<T, MeasureError>) -> Result<(T, f64), MeasureError> {
+fn timed<T>(mut run: impl FnMut() -> Result<T, Status>) -> Result<(T, f64), Status> {
     let result = run()?;
     let mut seconds = Vec::with_capacity(RUNS);
     while seconds.len() < runs_after(seconds.first().copied()) {

@@ -4,12 +4,12 @@ use std::any::Any;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use cluster::{SceneHash, SceneRef, Timeline};
-use depth_image::{Aabb, Illumination, SpecularPlanes};
+use cluster::{Refinement, SceneHash, SceneRef, Timeline};
+use depth_image::{Aabb, DepthImage, Illumination, SpecularPlanes, ViewPlanes};
 use glam::{UVec2, Vec3};
 
 use super::*;
-use crate::UploadedSet;
+use crate::engine::EngineError;
 
 /// A device that sleeps and notes its calls.
 #[derive(Default)]
@@ -78,8 +78,8 @@ impl Engine for Sleeper {
         true
     }
 
-    fn load_scene(&self, _hash: &str, _package: &[u8]) -> Result<f64, EngineError> {
-        Ok(0.0)
+    fn load_scene(&self, _hash: &str, _package: &[u8]) -> Result<(), EngineError> {
+        Ok(())
     }
 
     fn has_scene(&self, _hash: &str) -> bool {

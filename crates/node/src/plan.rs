@@ -1,16 +1,20 @@
-//! The plan in force on this node. Epochs only rise.
+//! The plan in force on this node, whose epochs only rise, and the plan of one view cell.
 
+use std::ops::Deref;
 use std::sync::Arc;
 
 use cluster::Assignment;
+use codec::EncodedDepthImage;
 use tokio::sync::watch;
 use tonic::Status;
 use wire::refuse_plan;
+use wire::rpc::Messages;
 
 /// The node's name and the plan in force on it.
 #[derive(Debug, Clone)]
 pub struct CurrentPlan {
-    node_name: Arc<str>,
+    /// The name of this node.
+    pub node_name: Arc<str>,
     plan: watch::Sender<Option<Arc<Assignment>>>,
 }
 
@@ -19,12 +23,6 @@ impl CurrentPlan {
     #[must_use]
     pub fn new(node_name: &str) -> Self {
         Self { node_name: node_name.into(), plan: watch::Sender::new(None) }
-    }
-
-    /// The name of this node.
-    #[must_use]
-    pub fn node_name(&self) -> &str {
-        &self.node_name
     }
 
     /// The highest epoch so far; 0 before the first plan.
@@ -97,6 +95,48 @@ impl CurrentPlan {
             ))),
         }
     }
+}
+
+/// The plan of one view cell, without the images of other cells. Clones share it.
+#[derive(Debug, Clone)]
+pub struct CellPlan {
+    plan: Arc<Assignment>,
+    /// Index into the plan's view cells.
+    pub cell: u32,
+    /// The number of view cells of the whole plan.
+    pub cell_count: usize,
+}
+
+impl CellPlan {
+    /// The part of `plan` for one view cell.
+    ///
+    /// # Errors
+    /// For a cell beyond the plan's last.
+    pub fn of(plan: &Arc<Assignment>, cell: u32) -> Result<Self, Status> {
+        let cell_count = plan.workload.cell_count();
+        if (cell, cell_count) == (0, 1) {
+            return Ok(Self { plan: plan.clone(), cell, cell_count });
+        }
+        let beyond = || Status::invalid_argument(format!("cell_index {cell} is beyond {cell_count} view cells"));
+        Ok(Self { plan: Arc::new(plan.of_cell(cell).ok_or_else(beyond)?), cell, cell_count })
+    }
+}
+
+impl Deref for CellPlan {
+    type Target = Assignment;
+
+    fn deref(&self) -> &Assignment {
+        &self.plan
+    }
+}
+
+/// Relays a cell's set as a compositor fetches it: all its images with their indices, in the order they arrive. An error where
+/// they are no longer buffered, and in the stream where their fetch fails.
+pub type Relay = Arc<dyn Fn(&CellPlan, u32) -> Result<Messages<(u32, EncodedDepthImage)>, Status> + Send + Sync>;
+
+/// The refusal of a set that a plan's timeline does not have.
+pub fn beyond_timeline(set_index: u32) -> Status {
+    Status::invalid_argument(format!("set_index {set_index} is beyond the timeline"))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use std::{fs, io};
 
 use cluster::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, SceneRef};
@@ -17,10 +17,8 @@ use crate::streams::next_within;
 
 /// Loads scenes onto the device.
 pub struct Scenes {
-    engine: Arc<dyn Engine>,
-    folder: Option<PathBuf>,
-    coordinator: String,
-    part_deadline: Duration,
+    pub(crate) engine: Arc<dyn Engine>,
+    config: NodeConfig,
     /// One load at a time: two plans may want the same scene.
     loading: Mutex<()>,
 }
@@ -29,18 +27,7 @@ impl Scenes {
     /// The scenes of one node.
     #[must_use]
     pub fn new(engine: Arc<dyn Engine>, config: &NodeConfig) -> Self {
-        Self {
-            engine,
-            folder: config.scene_folder.clone(),
-            coordinator: config.coordinator.clone(),
-            part_deadline: config.deadlines.chunk,
-            loading: Mutex::new(()),
-        }
-    }
-
-    /// The engine that the scenes are loaded onto.
-    pub(crate) fn engine(&self) -> Arc<dyn Engine> {
-        self.engine.clone()
+        Self { engine, config: config.clone(), loading: Mutex::new(()) }
     }
 
     /// Makes sure that the device has a scene; gives the seconds that this took, 0 where it was loaded already.
@@ -65,7 +52,7 @@ impl Scenes {
     }
 
     async fn read_folder(&self, hash: &SceneHash) -> Result<Option<Vec<u8>>, Status> {
-        let Some(folder) = self.folder.clone() else {
+        let Some(folder) = self.config.scene_folder.clone() else {
             return Ok(None);
         };
         let hash = hash.clone();
@@ -74,13 +61,13 @@ impl Scenes {
 
     async fn fetch(&self, scene: &SceneRef) -> Result<Vec<u8>, Status> {
         // A channel of its own: bulk must not hold up membership.
-        let client = CoordinatorClient::new(connect(&self.coordinator).await?);
+        let client = CoordinatorClient::new(connect(&self.config.coordinator).await?);
         let mut parts = client.fetch_scene(FetchScene { hash: scene.hash.clone(), offset_bytes: 0 }).await?;
         let mut assembly = SceneAssembly::new(scene.clone());
-        while let Some(part) = next_within(&mut parts, self.part_deadline, "scene").await? {
+        while let Some(part) = next_within(&mut parts, self.config.deadlines.chunk, "scene").await? {
             assembly.push(&part).map_err(spoilt)?;
         }
-        let (folder, hash) = (self.folder.clone(), scene.hash.clone());
+        let (folder, hash) = (self.config.scene_folder.clone(), scene.hash.clone());
         blocking(move || {
             let package = assembly.finish().map_err(spoilt)?;
             store(folder.as_deref(), &hash, &package);

@@ -34,31 +34,23 @@ impl NodeService {
     pub fn new(engine: Arc<dyn Engine>, plan: CurrentPlan, scenes: Arc<Scenes>, metrics: NodeMetrics) -> Self {
         Self { engine, plan, scenes, metrics, measured: Mutex::default() }
     }
-
-    fn known(&self, request: &MeasureCosts) -> Option<Costs> {
-        let measured = self.measured.lock();
-        measured.iter().find(|(known, _)| known == request).map(|(_, costs)| *costs)
-    }
-
-    fn keep(&self, request: MeasureCosts, costs: Costs) {
-        let mut measured = self.measured.lock();
-        measured.push_back((request, costs));
-        while measured.len() > MAX_MEASURED {
-            measured.pop_front();
-        }
-    }
 }
 
 #[async_trait]
 impl rpc::Node for NodeService {
     async fn measure_costs(&self, request: MeasureCosts) -> Result<Costs, Status> {
-        if let Some(costs) = self.known(&request) {
+        let known = self.measured.lock().iter().find(|(known, _)| *known == request).map(|(_, costs)| *costs);
+        if let Some(costs) = known {
             return Ok(costs);
         }
         self.scenes.ensure(&request.workload.scene).await?;
         let (engine, measured) = (self.engine.clone(), request.clone());
         let costs = blocking(move || measure_costs(engine.as_ref(), &measured)).await?;
-        self.keep(request, costs);
+        let mut measured = self.measured.lock();
+        measured.push_back((request, costs));
+        while measured.len() > MAX_MEASURED {
+            measured.pop_front();
+        }
         Ok(costs)
     }
 
@@ -68,7 +60,7 @@ impl rpc::Node for NodeService {
         let scene_load_s = self.scenes.ensure(&assignment.workload.scene).await?;
         self.plan.apply(assignment)?;
         self.metrics.plan_epoch.set(i64::try_from(plan_epoch).unwrap_or(i64::MAX));
-        tracing::info!(node = self.plan.node_name(), plan_epoch, "plan in force");
+        tracing::info!(node = &*self.plan.node_name, plan_epoch, "plan in force");
         Ok(Ready { plan_epoch, scene_load_s })
     }
 }

@@ -38,22 +38,12 @@ pub fn until_drained<T: Send + 'static>(stream: Messages<T>, shutdown: Cancellat
     Box::pin(UntilDrained { inner: Some(stream), shutdown: Box::pin(shutdown.cancelled_owned()) })
 }
 
-struct WithGuard<T, G> {
-    inner: Messages<T>,
-    _guard: G,
-}
-
-impl<T, G: Unpin> Stream for WithGuard<T, G> {
-    type Item = Result<T, Status>;
-
-    fn poll_next(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Self::Item>> {
-        self.inner.as_mut().poll_next(cx)
-    }
-}
-
 /// A stream that drops `guard` when the peer goes away or the stream ends.
-pub fn with_guard<T: Send + 'static, G: Unpin + Send + 'static>(inner: Messages<T>, guard: G) -> Messages<T> {
-    Box::pin(WithGuard { inner, _guard: guard })
+pub fn with_guard<T: Send + 'static, G: Send + 'static>(inner: Messages<T>, guard: G) -> Messages<T> {
+    Box::pin(inner.map(move |message| {
+        let _held = &guard;
+        message
+    }))
 }
 
 /// The next message; `None` at the end.

@@ -1,4 +1,5 @@
-//! Metrics of a process, and the page at which Prometheus reads them. Base units; labels are few and bounded.
+//! Metrics of a process, and the page at which Prometheus reads them. Base units; labels are few and bounded. Logs go to
+//! standard error; `RUST_LOG` filters them, and `MYRIORAMA_LOG_FORMAT=json` makes each a line of JSON.
 
 use std::sync::Arc;
 
@@ -11,13 +12,25 @@ use prometheus_client::metrics::{
     gauge::Gauge,
     histogram::{Histogram, exponential_buckets},
 };
-use prometheus_client::registry::{Registry, Unit};
+use prometheus_client::registry::{Metric, Registry, Unit};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
+use tracing_subscriber::EnvFilter;
 
 use crate::work_done::WorkDone;
 
 const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+/// Starts logging; `default_filter` applies where `RUST_LOG` is not set. A second call does nothing.
+pub fn init_logging(default_filter: &str) {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default_filter));
+    let logging = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let is_json = std::env::var("MYRIORAMA_LOG_FORMAT").is_ok_and(|format| format == "json");
+    let started = if is_json { logging.json().try_init() } else { logging.try_init() };
+    if started.is_err() {
+        tracing::debug!("logging was already started");
+    }
+}
 
 /// A process's metrics, by name.
 #[derive(Debug, Clone)]
@@ -62,73 +75,56 @@ pub struct Reason {
     pub reason: &'static str,
 }
 
-/// The metrics of a node.
+/// The metrics of a node; their help texts are in [`NodeMetrics::new`].
 #[derive(Debug, Clone)]
+#[allow(missing_docs, reason = "self-naming fields")]
 pub struct NodeMetrics {
-    /// Images sampled and encoded.
     pub images_sampled: Counter,
-    /// Seconds an image, its light included.
     pub image_s: Histogram,
-    /// Sample sets fetched, decoded and uploaded.
     pub sets_loaded: Counter,
-    /// Seconds a set, fetching included.
     pub set_s: Histogram,
-    /// Views made.
     pub views: Counter,
-    /// Seconds of the device a view.
     pub view_s: Histogram,
-    /// Seconds between a view's request and the device.
     pub queue_s: Histogram,
-    /// Bytes of encoded frames.
     pub frame_bytes: Counter,
-    /// Views that were not made, or not sent.
     pub dropped: Family<Reason, Counter>,
-    /// Clients' streams that are open.
     pub streams: Gauge,
-    /// The plan in force.
     pub plan_epoch: Gauge,
     /// The work to report to the coordinator.
     pub done: WorkDone,
 }
 
-fn seconds() -> Histogram {
-    Histogram::new(exponential_buckets(0.0005, 2.0, 16))
+fn registered<M: Metric + Clone>(registry: &mut Registry, name: &str, help: &str, metric: M) -> M {
+    registry.register(name, help, metric.clone());
+    metric
+}
+
+fn in_unit<M: Metric + Clone>(registry: &mut Registry, name: &str, help: &str, unit: Unit, metric: M) -> M {
+    registry.register_with_unit(name, help, unit, metric.clone());
+    metric
 }
 
 impl NodeMetrics {
     /// Registers all metrics, at zero.
     #[must_use]
     pub fn new(telemetry: &Telemetry) -> Self {
-        let metrics = Self {
-            images_sampled: Counter::default(),
-            image_s: seconds(),
-            sets_loaded: Counter::default(),
-            set_s: seconds(),
-            views: Counter::default(),
-            view_s: seconds(),
-            queue_s: seconds(),
-            frame_bytes: Counter::default(),
-            dropped: Family::default(),
-            streams: Gauge::default(),
-            plan_epoch: Gauge::default(),
+        let seconds = || Histogram::new(exponential_buckets(0.0005, 2.0, 16));
+        let (counter, gauge) = (Counter::default, Gauge::default);
+        let to = &mut *telemetry.registry();
+        Self {
+            images_sampled: registered(to, "images_sampled", "Images sampled and encoded", counter()),
+            image_s: in_unit(to, "image", "Sampling of one image", Unit::Seconds, seconds()),
+            sets_loaded: registered(to, "sets_loaded", "Sample sets fetched and uploaded", counter()),
+            set_s: in_unit(to, "set_load", "Loading of one sample set", Unit::Seconds, seconds()),
+            views: registered(to, "views", "Views made", counter()),
+            view_s: in_unit(to, "view", "The device's time for one view", Unit::Seconds, seconds()),
+            queue_s: in_unit(to, "queue", "A view's wait for the device", Unit::Seconds, seconds()),
+            frame_bytes: in_unit(to, "frames", "Encoded frames", Unit::Bytes, counter()),
+            dropped: registered(to, "dropped_views", "Views not made or not sent", Family::default()),
+            streams: registered(to, "streams", "Clients' streams that are open", gauge()),
+            plan_epoch: registered(to, "plan_epoch", "The plan in force", gauge()),
             done: WorkDone::default(),
-        };
-        metrics.register(&mut telemetry.registry());
-        metrics
-    }
-
-    fn register(&self, registry: &mut Registry) {
-        registry.register("images_sampled", "Images sampled and encoded", self.images_sampled.clone());
-        registry.register_with_unit("image", "Sampling of one image", Unit::Seconds, self.image_s.clone());
-        registry.register("sets_loaded", "Sample sets fetched and uploaded", self.sets_loaded.clone());
-        registry.register_with_unit("set_load", "Loading of one sample set", Unit::Seconds, self.set_s.clone());
-        registry.register("views", "Views made", self.views.clone());
-        registry.register_with_unit("view", "The device's time for one view", Unit::Seconds, self.view_s.clone());
-        registry.register_with_unit("queue", "A view's wait for the device", Unit::Seconds, self.queue_s.clone());
-        registry.register_with_unit("frames", "Encoded frames", Unit::Bytes, self.frame_bytes.clone());
-        registry.register("dropped_views", "Views not made or not sent", self.dropped.clone());
-        registry.register("streams", "Clients' streams that are open", self.streams.clone());
-        registry.register("plan_epoch", "The plan in force", self.plan_epoch.clone());
+        }
     }
 
     /// Counts a view that was not made or not sent.

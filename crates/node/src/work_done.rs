@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cluster::MeasuredCosts;
+use cluster::{MeasuredCosts, WorkReport};
 use parking_lot::Mutex;
 
 /// An operation that is timed.
@@ -26,70 +26,64 @@ pub struct WorkDone(Arc<Mutex<Sums>>);
 
 /// The work since the last report.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sums {
+struct Sums {
     /// Count and seconds of each [`Operation`].
     operations: [(f64, f64); 5],
     /// Bytes of images that were received, and the seconds that this took.
     transferred: (f64, f64),
     /// Count of encoded images, and their bytes.
     encoded: (f64, f64),
-    /// Seconds of all operations.
-    pub busy_s: f64,
-    /// Views made.
-    pub views: u64,
-    /// Views not made, or not sent.
-    pub dropped_views: u64,
+    busy_s: f64,
+    views: u64,
+    dropped_views: u64,
 }
 
 impl WorkDone {
-    fn change(&self, change: impl FnOnce(&mut Sums)) {
-        change(&mut self.0.lock());
-    }
-
     /// Adds `count` operations that took `seconds` together; the count may be a fraction.
     pub fn add(&self, operation: Operation, count: f64, seconds: f64) {
-        self.change(|sums| {
-            let sum = &mut sums.operations[operation as usize];
-            *sum = (sum.0 + count, sum.1 + seconds);
-            sums.busy_s += seconds;
-            if matches!(operation, Operation::DirectView | Operation::ReconstructView) {
-                sums.views += count as u64;
-            }
-        });
+        let sums = &mut *self.0.lock();
+        let sum = &mut sums.operations[operation as usize];
+        *sum = (sum.0 + count, sum.1 + seconds);
+        sums.busy_s += seconds;
+        if matches!(operation, Operation::DirectView | Operation::ReconstructView) {
+            sums.views += count as u64;
+        }
     }
 
     /// Adds bytes that were received in `seconds`.
     pub fn transferred(&self, bytes: usize, seconds: f64) {
-        self.change(|sums| sums.transferred = (sums.transferred.0 + bytes as f64, sums.transferred.1 + seconds));
+        let sum = &mut self.0.lock().transferred;
+        *sum = (sum.0 + bytes as f64, sum.1 + seconds);
     }
 
     /// Adds whole images that were encoded to `bytes` together.
     pub fn encoded(&self, images: f64, bytes: usize) {
-        self.change(|sums| sums.encoded = (sums.encoded.0 + images, sums.encoded.1 + bytes as f64));
+        let sum = &mut self.0.lock().encoded;
+        *sum = (sum.0 + images, sum.1 + bytes as f64);
     }
 
     /// Counts a view that was not made or not sent.
     pub fn dropped(&self) {
-        self.change(|sums| sums.dropped_views += 1);
+        self.0.lock().dropped_views += 1;
     }
 
-    /// Takes the work since the last call.
-    #[must_use]
-    pub fn take(&self) -> Sums {
-        std::mem::take(&mut self.0.lock())
+    /// Takes the work since the last call; `None` where there is none.
+    pub(crate) fn take_report(&self, node_name: &str, plan_epoch: u64) -> Option<WorkReport> {
+        let sums = std::mem::take(&mut *self.0.lock());
+        (sums != Sums::default()).then(|| WorkReport {
+            node_name: node_name.to_owned(),
+            plan_epoch,
+            costs: sums.costs(),
+            busy_s: sums.busy_s,
+            views: sums.views,
+            dropped_views: sums.dropped_views,
+        })
     }
 }
 
 impl Sums {
-    /// Whether there is nothing to report.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
-
     /// The mean time of each operation; `None` where it was not done.
-    #[must_use]
-    pub fn costs(&self) -> MeasuredCosts {
+    fn costs(&self) -> MeasuredCosts {
         let mean = |operation: Operation| quotient(self.operations[operation as usize]);
         let (images, bytes) = self.encoded;
         let (received, seconds) = self.transferred;
@@ -117,21 +111,21 @@ mod tests {
     #[test]
     fn costs_are_the_means_since_the_last_report() {
         let done = WorkDone::default();
-        assert!(done.take().is_empty());
+        assert!(done.take_report("n", 7).is_none());
         done.add(Operation::ReconstructView, 32.0, 0.32);
         done.clone().add(Operation::ReconstructView, 8.0, 0.48);
         done.add(Operation::SampleImage, 0.25, 0.1);
         done.transferred(1 << 20, 0.5);
         done.encoded(0.5, 1000);
         done.dropped();
-        let sums = done.take();
-        let costs = sums.costs();
+        let report = done.take_report("n", 7).unwrap();
+        let costs = report.costs;
         assert_eq!(costs.reconstruct_view_s, Some(0.02));
         assert_eq!(costs.sample_image_s, Some(0.4), "a quarter of an image in 0.1 s");
         assert_eq!(costs.transfer_bytes_per_s, Some(2.0 * 1024.0 * 1024.0));
         assert_eq!((costs.image_bytes, costs.direct_view_s, costs.load_set_s), (Some(2000.0), None, None));
-        assert_eq!((sums.views, sums.dropped_views), (40, 1));
-        assert!((sums.busy_s - 0.9).abs() < 1e-12);
-        assert!(done.take().is_empty());
+        assert_eq!((report.views, report.dropped_views), (40, 1));
+        assert!((report.busy_s - 0.9).abs() < 1e-12);
+        assert!(done.take_report("n", 7).is_none());
     }
 }

@@ -94,7 +94,7 @@ fn sample_set_s(
     let (visibility, refinement) = (Visibility::Measured, Refinement::default());
     let work = DrawWork { scene, lighting, scene_time_s, visibility, refinement };
     let draw = |()| {
-        engine.renderer().draw_depth_images(work, &cameras, SamplePlanes::default())?;
+        engine.renderer.draw_depth_images(work, &cameras, SamplePlanes::default())?;
         Ok(())
     };
     Ok(in_turn(&[()], args.runs(), draw)?.into_iter().sum())

@@ -87,7 +87,7 @@ fn merge(
 ) -> anyhow::Result<()> {
     let set = upload(subject, engine, &conventional(subject, size_px)?)?;
     let cut = |method: &str| -> anyhow::Result<MeshStatistics> {
-        Ok(engine.reconstructor().mesh_statistics(&set, method.parse()?)?.unwrap_or_default())
+        Ok(engine.reconstructor.mesh_statistics(&set, method.parse()?)?.unwrap_or_default())
     };
     let (cut, merged) = (cut("hybrid_mesh")?, cut("hybrid_mesh:0.5")?);
     let share = merged.quads as f64 / merged.quads_before as f64;
@@ -123,12 +123,12 @@ fn upload(subject: &Subject, engine: &GpuEngine, images: &[DepthImage]) -> anyho
         illumination: &offer.illumination,
         highlight: None,
     };
-    Ok(engine.reconstructor().upload(images, &description)?)
+    Ok(engine.reconstructor.upload(images, &description)?)
 }
 
 fn view(engine: &GpuEngine, set: &SampleSet, camera: &PinholeCamera, method: &str) -> anyhow::Result<View> {
     let planes = ViewPlanes { inverse_depth: false, provenance: true };
-    let views = engine.reconstructor().reconstruct(set, std::slice::from_ref(camera), method.parse()?, planes)?;
+    let views = engine.reconstructor.reconstruct(set, std::slice::from_ref(camera), method.parse()?, planes)?;
     views.into_iter().next().ok_or_else(|| anyhow::anyhow!("no view came"))
 }
 

@@ -26,7 +26,7 @@ pub type Detection = Vec<(f32, [f64; 3])>;
 
 /// Measures all lengths.
 pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detection> {
-    let sampler = Sampler::sharing(engine.shared_renderer());
+    let sampler = Sampler::sharing(engine.renderer.clone());
     let legs = if quick { &LEGS_PX[2..] } else { &LEGS_PX[..] };
     let progress = bar("detection against triangle size", legs.len());
     let mut rows = Vec::with_capacity(legs.len());

@@ -66,7 +66,7 @@ impl Subject {
         engine.put_scene(&hash, &setup.scene)?;
         let rig = raised(&Rig::in_front_of(&setup.scene.bounds(), SPREAD_RAD).with_context(|| name.to_owned())?);
         let (scene, engine) = (engine.scene(&hash)?, engine.clone());
-        let sampler = Sampler::sharing(engine.shared_renderer());
+        let sampler = Sampler::sharing(engine.renderer.clone());
         Ok(Self { name: name.to_owned(), setup, args, rig, engine, scene, sampler })
     }
 
@@ -133,7 +133,7 @@ impl Subject {
         let planes = SamplePlanes { surface_id: true, ..SamplePlanes::default() };
         for cameras in cameras.chunks(FRAMES_AT_ONCE) {
             let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
-            each(&self.engine.renderer().draw_depth_images(self.work(), &cameras, planes)?)?;
+            each(&self.engine.renderer.draw_depth_images(self.work(), &cameras, planes)?)?;
         }
         Ok(())
     }

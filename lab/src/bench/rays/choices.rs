@@ -28,7 +28,7 @@ pub(super) fn measure(subject: &Subject<'_>, hash: &str, report: &mut Report) ->
     let mut worst = 0f64;
     for size_px in SIZES_PX {
         let camera = resized(*subject.camera()?, size_px);
-        let choice = subject.engine.visibility_choice(hash, &camera)?;
+        let choice = subject.engine.renderer.choice(&*subject.engine.scene(hash)?, &camera, 0.0)?;
         let again = again(subject, &camera)?;
         worst = worst.max(chosen_over_other(&choice, &again));
         table.push(choice_row(size_px, &choice, &again))?;
@@ -62,7 +62,7 @@ fn chosen_over_other(choice: &Choice, again: &Choice) -> f64 {
 fn again(subject: &Subject<'_>, camera: &PinholeCamera) -> anyhow::Result<Choice> {
     let draw = |visibility| {
         let work = subject.work(Lighting::UNLIT, visibility);
-        subject.engine.renderer().draw_views(work, &[*camera], ViewPlanes::default())?;
+        subject.engine.renderer.draw_views(work, &[*camera], ViewPlanes::default())?;
         Ok(())
     };
     let seconds = in_turn(&[Visibility::Triangles, Visibility::Rays], RUNS, draw)?;

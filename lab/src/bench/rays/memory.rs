@@ -25,7 +25,7 @@ const BESIDE_MEMORY: [(&str, &str); 7] = [
 
 /// Adds the table and a check.
 pub(super) fn measure(subject: &Subject<'_>, rays_a_second: f64, report: &mut Report) -> anyhow::Result<()> {
-    let renderer = subject.engine.renderer();
+    let renderer = &subject.engine.renderer;
     let work = subject.work(Lighting::UNLIT, Visibility::Rays);
     let visits = renderer.count_visits(work, subject.camera()?)?;
     let mean = |of: usize| visits.iter().map(|pair| f64::from(pair[of])).sum::<f64>() / visits.len() as f64;
@@ -44,7 +44,7 @@ pub(super) fn measure(subject: &Subject<'_>, rays_a_second: f64, report: &mut Re
 
 /// Bytes of tree and triangles, and bytes read a second.
 fn plain_reading(subject: &Subject<'_>) -> anyhow::Result<(f64, f64)> {
-    let gpu = subject.engine.renderer().gpu();
+    let gpu = subject.engine.renderer.gpu();
     let (pool, tree) = (BufferPool::new(gpu), subject.scene.tree(0.0)?);
     let pass = |_| memory_pass::read(gpu, &pool, &tree.each_ref());
     let passes = (0..RUNS).map(pass).collect::<anyhow::Result<Vec<_>>>()?;

@@ -23,7 +23,7 @@ impl Subject<'_> {
 
     pub(super) fn draw(&self, lighting: Lighting, planes: SamplePlanes) -> anyhow::Result<Vec<DepthImage>> {
         let cameras: Vec<Camera> = self.cameras.iter().copied().map(Camera::Pinhole).collect();
-        Ok(self.engine.renderer().draw_depth_images(self.work(lighting, Visibility::Rays), &cameras, planes)?)
+        Ok(self.engine.renderer.draw_depth_images(self.work(lighting, Visibility::Rays), &cameras, planes)?)
     }
 
     pub(super) fn camera(&self) -> anyhow::Result<&PinholeCamera> {
