@@ -8,9 +8,7 @@ use std::time::Duration;
 use cluster::InvalidField;
 use serde::{Deserialize, Serialize};
 
-use super::command::Command;
-use super::event::Event;
-use super::scheduler::Scheduler;
+use super::{Command, Event, Scheduler};
 
 /// Logs of other versions are refused.
 const VERSION: u32 = 3;

@@ -2,9 +2,7 @@
 
 use cluster::{Policy, PolicyChoice};
 
-use super::demand::{Demand, Predicted};
-use super::load::Load;
-use super::node_costs::NodeCosts;
+use super::{Demand, Load, NodeCosts, Predicted};
 
 /// Every figure that the choice rests on.
 pub(super) fn reason(demand: &Demand<'_>, policy: Policy, samplers: usize, predicted: &Predicted) -> String {

@@ -12,12 +12,11 @@ use std::time::Duration;
 use cluster::{JoinCluster, MeasuredCosts};
 
 use super::active_plan::ActivePlan;
-use super::command::Command;
 use super::estimate::SampledParts;
-use super::event::Event;
 use super::member::{Member, WorkDone};
 use super::reports::SamplerReports;
 use super::workload_state::WorkloadState;
+use super::{Command, Event};
 
 /// Members by name, the last epoch, and the demand of all sessions.
 #[derive(Debug, Clone, Default)]

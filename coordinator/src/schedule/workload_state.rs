@@ -6,10 +6,8 @@ use glam::UVec2;
 
 use super::active_plan::ActivePlan;
 use super::cells::Cells;
-use super::demand::PolicyOverride;
-use super::event::Opening;
-use super::load::Load;
 use super::overload::Overload;
+use super::{Load, Opening, PolicyOverride};
 
 /// The demand of one session.
 #[derive(Debug, Clone)]

@@ -4,11 +4,9 @@ use cluster::limits::MAX_CELLS;
 use depth_image::PinholeCamera;
 
 use super::Scheduler;
-use crate::schedule::choose::{check, choose};
-use crate::schedule::demand::{ChoiceError, Demand};
-use crate::schedule::event::Opening;
-use crate::schedule::node_costs::NodeCosts;
+use crate::schedule::choose::check;
 use crate::schedule::workload_state::WorkloadState;
+use crate::schedule::{ChoiceError, Demand, NodeCosts, Opening, choose};
 
 /// The share of the nodes' time that admitted sessions may take at their last fallback. Costs are measured alone and in even
 /// batches, and are higher among many viewers.

@@ -5,11 +5,9 @@ use std::time::Duration;
 use cluster::{Assignment, FetchImages, SamplerReport};
 
 use super::Scheduler;
-use crate::schedule::command::{Command, Probe, ProbedImage};
-use crate::schedule::demand::ChoiceError;
-use crate::schedule::event::ProbeKind;
 use crate::schedule::member::Member;
 use crate::schedule::reports::{AtFault, Attribution};
+use crate::schedule::{ChoiceError, Command, Probe, ProbeKind, ProbedImage};
 
 /// Duration of a quarantine, after which a link may be restored.
 const QUARANTINE: Duration = Duration::from_secs(30);

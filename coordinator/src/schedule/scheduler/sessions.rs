@@ -3,10 +3,8 @@
 use depth_image::{Camera, PinholeCamera};
 
 use super::Scheduler;
-use crate::schedule::command::Command;
-use crate::schedule::demand::PolicyOverride;
-use crate::schedule::event::Opening;
 use crate::schedule::workload_state::WorkloadState;
+use crate::schedule::{Command, Opening, PolicyOverride};
 
 /// The part of the demand that a plan follows at once.
 #[derive(PartialEq)]
