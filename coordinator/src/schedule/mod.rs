@@ -19,7 +19,6 @@ mod load;
 mod makespan;
 mod member;
 mod node_costs;
-mod operations;
 mod overload;
 mod prediction;
 mod reason;
