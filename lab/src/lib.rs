@@ -19,8 +19,10 @@ mod progress;
 pub mod reference_views;
 pub mod sampling_study;
 mod scaling;
+mod scene_args;
 pub mod statistics;
 mod sweep;
 
 pub use command::LabCommand;
 pub use evaluation::Evaluation;
+pub use scene_args::scene_args;

@@ -85,21 +85,6 @@ pub struct Setup {
 }
 
 impl SceneArgs {
-    /// A scene with all other arguments by default.
-    #[must_use]
-    pub fn of(scene: SceneSpec) -> Self {
-        Self {
-            scene,
-            lighting: Lighting::default(),
-            lights: Vec::new(),
-            environment: None,
-            method: ReconstructionMethod::default(),
-            sampling: SamplingMethod::default(),
-            sample_size: None,
-            samples: None,
-        }
-    }
-
     /// Loads the scene and places its sample cameras.
     ///
     /// # Errors
@@ -148,7 +133,7 @@ impl SceneArgs {
         };
         let near_m = (scene.bounds().size().length() * NEAR_OF_DIAGONAL).max(1e-6);
         let cameras = camera_file::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?;
-        Ok(cameras.into_iter().map(|camera| size_px.map_or(camera, |size_px| resized(camera, size_px))).collect())
+        Ok(cameras.into_iter().map(|camera| size_px.map_or(camera, |size_px| camera.resized(size_px))).collect())
     }
 
     fn rig_cameras(&self, scene: &Scene, size_px: UVec2) -> anyhow::Result<Vec<PinholeCamera>> {
@@ -159,11 +144,4 @@ impl SceneArgs {
         };
         Ok(rig.with_context(|| format!("{}: no sample cameras", self.scene))?.samples(size_px))
     }
-}
-
-/// The camera with the same field of view and another size.
-#[must_use]
-pub fn resized(camera: PinholeCamera, size_px: UVec2) -> PinholeCamera {
-    let scale = size_px.as_vec2() / camera.size_px.as_vec2();
-    PinholeCamera { size_px, focal_px: camera.focal_px * scale, principal_px: camera.principal_px * scale, ..camera }
 }
