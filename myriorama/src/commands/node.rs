@@ -4,7 +4,7 @@ use std::net::{SocketAddr, UdpSocket};
 use std::path::PathBuf;
 
 use app_core::exit::Outcome;
-use app_core::process::{listen, runtime, serve_metrics, stop_signal};
+use app_core::process::{cancel_at_signal, listen, serve_metrics};
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use engine::GpuEngine;
@@ -68,11 +68,7 @@ impl From<QuotaArgs> for Quotas {
 ///
 /// # Errors
 /// There is no device, or the port is taken.
-pub fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
-    runtime()?.block_on(serve(args))
-}
-
-async fn serve(args: NodeArgs) -> anyhow::Result<Outcome> {
+pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
     let listener = listen(args.listen, args.insecure_bind).await?;
     let address = listener.local_addr()?;
     let engine = GpuEngine::shared(args.device.device)?;
@@ -91,14 +87,8 @@ async fn serve(args: NodeArgs) -> anyhow::Result<Outcome> {
     let telemetry = Telemetry::default();
     let metrics = NodeMetrics::new(&telemetry);
     serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
-    let serving = node_host::serve(listener, config, engine, metrics, shutdown.clone());
-    tokio::spawn(async move {
-        // Without signals, the caller can still kill the process.
-        if stop_signal().await.is_ok() {
-            shutdown.cancel();
-        }
-    });
-    serving.await?;
+    cancel_at_signal(shutdown.clone());
+    node_host::serve(listener, config, engine, metrics, shutdown).await?;
     Ok(Outcome::Done)
 }
 
