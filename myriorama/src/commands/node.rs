@@ -37,16 +37,6 @@ pub struct NodeArgs {
     /// Describes services and messages by gRPC reflection, for grpcurl and the like
     #[arg(long)]
     reflection: bool,
-    #[command(flatten)]
-    quotas: QuotaArgs,
-    /// Serves without TLS on an address that others can reach
-    #[arg(long)]
-    insecure_bind: bool,
-}
-
-/// Quotas of a node for all its clients together; more is refused.
-#[derive(Debug, Clone, Copy, Args)]
-struct QuotaArgs {
     /// The most open streams of clients
     #[arg(long, value_name = "N", default_value_t = Quotas::default().streams)]
     max_streams: usize,
@@ -56,12 +46,9 @@ struct QuotaArgs {
     /// The most pixels of these views, and of live views
     #[arg(long, value_name = "N", default_value_t = Quotas::default().pixels)]
     max_pixels: usize,
-}
-
-impl From<QuotaArgs> for Quotas {
-    fn from(args: QuotaArgs) -> Self {
-        Self { streams: args.max_streams, views: args.max_views, pixels: args.max_pixels }
-    }
+    /// Serves without TLS on an address that others can reach
+    #[arg(long)]
+    insecure_bind: bool,
 }
 
 /// Runs until a signal.
@@ -80,7 +67,7 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
         advertised_address: advertise,
         insecure_bind: args.insecure_bind,
         reflection: args.reflection,
-        quotas: args.quotas.into(),
+        quotas: Quotas { streams: args.max_streams, views: args.max_views, pixels: args.max_pixels },
         ..NodeConfig::new(name, args.coordinator)
     };
     let shutdown = CancellationToken::new();
