@@ -134,7 +134,13 @@ async fn measured(shared: &Shared, measurement: &MeasureCosts, events: &EventSen
             None => {
                 let detail = format!("{} measures its costs on {device}", node.node_name);
                 send_progress(events, SessionStage::Measuring, detail).await;
-                let fresh = measure_on(shared, &node, measurement.clone()).await?;
+                let call = async {
+                    NodeClient::new(shared.connections.to(&node.address).await?)
+                        .measure_costs(measurement.clone())
+                        .await
+                };
+                let fresh = within(shared.config.measure_deadline, "measuring", call).await;
+                let fresh = fresh.map_err(|status| of_node(&node.node_name, &status))?;
                 shared.costs.insert(device, measurement, fresh);
                 fresh
             }
@@ -142,10 +148,4 @@ async fn measured(shared: &Shared, measurement: &MeasureCosts, events: &EventSen
         slowest = Some(slowest.map_or(costs, |slowest| slowest.max(costs)));
     }
     slowest.ok_or_else(|| Status::failed_precondition("no node has joined the cluster"))
-}
-
-async fn measure_on(shared: &Shared, node: &NodeStatus, measurement: MeasureCosts) -> Result<Costs, Status> {
-    let call = async { NodeClient::new(shared.connections.to(&node.address).await?).measure_costs(measurement).await };
-    let measured = within(shared.config.measure_deadline, "measuring", call).await;
-    measured.map_err(|status| of_node(&node.node_name, &status))
 }

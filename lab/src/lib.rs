@@ -5,6 +5,7 @@
 //! build of the program has none of this.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod balance;
 mod bench;
 mod command;
 mod cpu_share;

@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use app_core::camera_file::{self, Placement};
 use app_core::exit::BadInput;
 use app_core::setup::NEAR_OF_DIAGONAL;
-use app_core::sizes::{GridSize, SizePx};
+use app_core::sizes::{SizePx, grid};
 use clap::Args;
 use cluster::{OfferStatus, PolicyChoice};
 use codec::FrameCodec;
@@ -103,8 +103,8 @@ pub(super) struct Viewpoints {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) orbit: Option<u32>,
     /// Columns × rows of views on the rectangle of the sample cameras
-    #[arg(long, value_name = "CxR")]
-    pub(super) grid: Option<GridSize>,
+    #[arg(long, value_name = "CxR", value_parser = grid)]
+    pub(super) grid: Option<[u32; 2]>,
     /// N views spread evenly on the rectangle of the sample cameras
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) views: Option<u32>,
@@ -136,7 +136,7 @@ impl Viewpoints {
         let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
         let cell = ViewCell::between(&samples).context("the coordinator has no sample cameras: give --cameras")?;
         Ok(match (self.grid, self.views, self.around) {
-            (Some(grid), ..) => cell.grid(grid.columns, grid.rows, size.0),
+            (Some([columns, rows]), ..) => cell.grid(columns, rows, size.0),
             (_, Some(count), _) => cell.spread(count as usize, size.0),
             (.., Some(count)) => cell.around(offer.volume.center(), count as usize, size.0),
             _ => cell.orbit(self.orbit.unwrap_or(24) as usize, size.0),
