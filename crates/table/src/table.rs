@@ -26,12 +26,6 @@ pub struct Column {
 }
 
 impl Column {
-    /// A column with a unit, or with `""`.
-    #[must_use]
-    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self { name: name.into(), unit: unit.into() }
-    }
-
     /// `name (unit)`.
     #[must_use]
     pub fn heading(&self) -> String {
@@ -57,8 +51,8 @@ impl Table {
     /// An empty table of `(heading, unit)` columns.
     #[must_use]
     pub fn new(name: impl Into<String>, columns: &[(&str, &str)]) -> Self {
-        let columns = columns.iter().map(|&(name, unit)| Column::new(name, unit)).collect();
-        Self { name: name.into(), columns, rows: Vec::new() }
+        let column = |&(name, unit): &(&str, &str)| Column { name: name.into(), unit: unit.into() };
+        Self { name: name.into(), columns: columns.iter().map(column).collect(), rows: Vec::new() }
     }
 
     /// Adds a row.
@@ -102,8 +96,9 @@ impl Table {
         let width =
             |column: usize| rows.iter().chain([&heads]).map(|row| row[column].chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..heads.len()).map(width).collect();
+        let is_number = |cell: &Cell| cell.is_numeric() || *cell == Cell::Missing;
         let line = |row: &Vec<String>| {
-            let cell = |(column, text): (usize, &String)| match self.is_numeric(column) {
+            let cell = |(column, text): (usize, &String)| match self.rows.iter().all(|row| is_number(&row[column])) {
                 true => format!("{text:>0$}", widths[column]),
                 false => format!("{text:<0$}", widths[column]),
             };
@@ -111,10 +106,6 @@ impl Table {
         };
         let lines = [&heads].into_iter().chain(&rows).map(line);
         format!("{}\n{}", self.name, lines.collect::<Vec<_>>().join("\n"))
-    }
-
-    fn is_numeric(&self, column: usize) -> bool {
-        self.rows.iter().all(|row| row[column].is_numeric() || row[column] == Cell::Missing)
     }
 
     /// The table as Markdown, with numbers as in [`Cell::display`].

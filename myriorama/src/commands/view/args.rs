@@ -151,15 +151,12 @@ fn one_camera(text: &str, placement: Placement, size: SizePx) -> anyhow::Result<
         part.split(',').map(|v| v.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect::<Option<Vec<_>>>()
     };
     let parts = text.split(':').map(numbers).collect::<Option<Vec<_>>>().ok_or_else(bad)?;
-    let triple = |part: &[f64]| <[f64; 3]>::try_from(part).ok();
-    let (eye, target, fov_deg) = match &parts[..] {
-        [eye, target] => (triple(eye), triple(target), 45.0),
-        [eye, target, fov] if fov.len() == 1 && (0.1..=170.0).contains(&fov[0]) => {
-            (triple(eye), triple(target), fov[0])
-        }
-        _ => (None, None, 0.0),
+    let parts: Vec<&[f64]> = parts.iter().map(Vec::as_slice).collect();
+    let (eye, target, fov_deg) = match parts[..] {
+        [&[x, y, z], &[u, v, w]] => ([x, y, z], [u, v, w], 45.0),
+        [&[x, y, z], &[u, v, w], &[fov]] if (0.1..=170.0).contains(&fov) => ([x, y, z], [u, v, w], fov),
+        _ => return Err(bad().into()),
     };
-    let (Some(eye), Some(target)) = (eye, target) else { return Err(bad().into()) };
     let [eye, target] = [eye, target].map(|p| (DVec3::from_array(p) - placement.origin_in_source).as_vec3());
     let camera = PinholeCamera::looking_at(eye, target, Vec3::Y, (fov_deg as f32).to_radians(), size.0);
     Ok(PinholeCamera { near_m: placement.near_m, ..camera })
