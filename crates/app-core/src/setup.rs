@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Args;
-use cluster::OfferSettings;
+use cluster::{OfferSettings, SceneHash};
 use coordinator::SceneOffer;
 use depth_image::{Camera, PinholeCamera};
 use glam::UVec2;
@@ -102,15 +102,20 @@ impl SceneArgs {
         change(&mut scene);
         let around = self.sample_cameras(&scene)?;
         let samples = self.sampling.cameras(around.clone());
-        let rig = samples.iter().copied().map(Camera::Pinhole).collect();
-        let package = scene::pack(&scene).bytes.into();
-        let mut offer = SceneOffer::new(package, rig, scene.bounds(), scene.background_linear);
-        offer.origin_in_source = scene.origin_in_source;
-        offer.illumination = scene.illumination.clone();
-        offer.settings = OfferSettings {
-            method: Some(self.method.to_string()),
-            sampling: Some(self.sampling.to_string()),
-            lighting: Some(self.lighting.to_string()),
+        let package = scene::pack(&scene).bytes;
+        let offer = SceneOffer {
+            hash: SceneHash::of(&package),
+            package: package.into(),
+            rig: samples.iter().copied().map(Camera::Pinhole).collect(),
+            volume: scene.bounds(),
+            background_linear: scene.background_linear,
+            illumination: scene.illumination.clone(),
+            origin_in_source: scene.origin_in_source,
+            settings: OfferSettings {
+                method: Some(self.method.to_string()),
+                sampling: Some(self.sampling.to_string()),
+                lighting: Some(self.lighting.to_string()),
+            },
         };
         Ok(Setup { scene, around, samples, offer })
     }
