@@ -14,8 +14,8 @@ const COLD: f64 = 2.0;
 type PerOperation<T> = [T; 5];
 /// g_s.
 const SAMPLE_IMAGE: usize = 0;
-/// The first operations are those of the device alone, which say how fast a node is. Loading a set runs beside views, and
-/// the encoding of a view is too short to be timed well.
+/// The number of operations of the device alone, the first ones, which say how fast a node is. Loading a set runs beside
+/// views, and the encoding of a view is too short to be timed well.
 const OF_DEVICE: usize = 3;
 
 fn costs_s(costs: &Costs) -> PerOperation<f64> {
