@@ -1,7 +1,5 @@
 //! The coordinator's configuration, and the scene that it offers.
 
-use std::time::Duration;
-
 use bytes::Bytes;
 use cluster::{OfferSettings, OfferStatus, SceneHash, SceneRef};
 use depth_image::{Aabb, Camera, Illumination};
@@ -14,23 +12,13 @@ pub struct CoordinatorConfig {
     pub insecure_bind: bool,
     /// Serves the reflection service.
     pub reflection: bool,
-    /// How long one node may measure.
-    pub measure_deadline: Duration,
-    /// How long nodes may take to load a scene and get ready.
-    pub ready_deadline: Duration,
     /// Sessions that may be open; more are refused with `RESOURCE_EXHAUSTED`.
     pub max_sessions: usize,
 }
 
 impl Default for CoordinatorConfig {
     fn default() -> Self {
-        Self {
-            insecure_bind: false,
-            reflection: false,
-            measure_deadline: Duration::from_secs(600),
-            ready_deadline: Duration::from_secs(300),
-            max_sessions: 1024,
-        }
+        Self { insecure_bind: false, reflection: false, max_sessions: 1024 }
     }
 }
 
@@ -56,21 +44,6 @@ pub struct SceneOffer {
 }
 
 impl SceneOffer {
-    /// Computes the hash.
-    #[must_use]
-    pub fn new(package: Bytes, rig: Vec<Camera>, volume: Aabb, background_linear: Vec3) -> Self {
-        Self {
-            hash: SceneHash::of(&package),
-            package,
-            rig,
-            volume,
-            background_linear,
-            illumination: Illumination::default(),
-            origin_in_source: DVec3::ZERO,
-            settings: OfferSettings::default(),
-        }
-    }
-
     /// The offer as clients see it.
     #[must_use]
     pub fn status(&self) -> OfferStatus {

@@ -9,19 +9,12 @@ const CAPACITY: usize = 16;
 
 /// Costs by device and measurement, the oldest first.
 #[derive(Default)]
-pub(crate) struct CostCache(Mutex<Vec<Measured>>);
-
-struct Measured {
-    device: String,
-    measurement: MeasureCosts,
-    costs: Costs,
-}
+pub(crate) struct CostCache(Mutex<Vec<(String, MeasureCosts, Costs)>>);
 
 impl CostCache {
     pub(crate) fn get(&self, device: &str, measurement: &MeasureCosts) -> Option<Costs> {
-        let kept = self.0.lock();
-        let measurement = cache_key(measurement);
-        kept.iter().find(|kept| kept.device == device && kept.measurement == measurement).map(|kept| kept.costs)
+        let key = cache_key(measurement);
+        self.0.lock().iter().find(|(of, kept, _)| of == device && *kept == key).map(|(.., costs)| *costs)
     }
 
     /// Keeps costs; the oldest are evicted.
@@ -30,7 +23,7 @@ impl CostCache {
         if kept.len() >= CAPACITY {
             kept.remove(0);
         }
-        kept.push(Measured { device, measurement: cache_key(measurement), costs });
+        kept.push((device, cache_key(measurement), costs));
     }
 }
 

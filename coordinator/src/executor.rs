@@ -13,6 +13,8 @@ use crate::probe::probe;
 use crate::schedule::{Command, Event};
 use crate::shared::Shared;
 
+/// How long a node may take to load a scene and get ready.
+const READY_WITHIN: Duration = Duration::from_secs(300);
 /// A call that breaks sooner than this is tried again, after a pause.
 const SOON: Duration = Duration::from_secs(1);
 const PAUSE: Duration = Duration::from_millis(100);
@@ -72,7 +74,7 @@ async fn apply_to(shared: Arc<Shared>, assignment: Assignment, node: NodeStatus)
     let plan_epoch = assignment.plan_epoch;
     let NodeStatus { node_name, address, .. } = node;
     let call = call(&shared, &assignment, &address);
-    match within(shared.config.ready_deadline, "getting ready", call).await {
+    match within(READY_WITHIN, "getting ready", call).await {
         Ok(ready) => {
             shared.step(Event::Ready { plan_epoch, node_name });
             return Some(ready);

@@ -9,7 +9,6 @@ mod cost_cache;
 mod executor;
 mod grpc_status;
 mod membership;
-mod metrics;
 mod observers;
 mod probe;
 pub mod schedule;
@@ -20,6 +19,5 @@ mod shared;
 mod workload;
 
 pub use config::{CoordinatorConfig, SceneOffer};
-pub use metrics::CoordinatorMetrics;
-pub use observers::{EventLog, Observers};
+pub use observers::{CoordinatorMetrics, EventLog, Observers};
 pub use service::serve;

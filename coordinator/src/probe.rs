@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use cluster::FetchImages;
-use codec::{DecodeLimits, Reassembled, Reassembler, SampleSetId, decode_depth_image};
-use depth_image::Camera;
+use codec::{DecodeLimits, Reassembler, SampleSetId, decode_depth_image};
 use node::blocking;
 use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
@@ -70,16 +69,12 @@ async fn check_image(shared: &Shared, address: &str, image: &ProbedImage) -> Res
                 let (got, set) = (whole.image_index, whole.sample_set_id);
                 return Err(Status::data_loss(format!("image {got} of sample set {set} came for {id}")));
             }
-            return decode(image.camera, whole).await;
+            let (camera, limits) = (image.camera, DecodeLimits::default());
+            let decode = move || decode_depth_image(&whole.image.header, camera, &whole.image.payload, &limits);
+            return blocking(move || decode().map(drop).map_err(data_loss)).await;
         }
     }
     Err(Status::data_loss("no whole image came"))
-}
-
-async fn decode(camera: Camera, whole: Reassembled) -> Result<(), Status> {
-    let decode =
-        move || decode_depth_image(&whole.image.header, camera, &whole.image.payload, &DecodeLimits::default());
-    blocking(move || decode().map(drop).map_err(data_loss)).await
 }
 
 fn data_loss(error: impl ToString) -> Status {

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::time::Duration;
 
 use cluster::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage};
 use tonic::{Code, Status};
@@ -16,6 +17,8 @@ use crate::workload::workload_of;
 /// Views of one measured call: as in a batch of real work, since fewer views cost more each. A slow device must not
 /// take minutes.
 const MEASURED_BATCH: u32 = 32;
+/// How long one node may measure.
+const MEASURED_WITHIN: Duration = Duration::from_secs(600);
 /// Attempts to measure costs where nodes are lost meanwhile.
 const ATTEMPTS: usize = 11;
 
@@ -134,7 +137,13 @@ async fn measured(shared: &Shared, measurement: &MeasureCosts, events: &EventSen
             None => {
                 let detail = format!("{} measures its costs on {device}", node.node_name);
                 send_progress(events, SessionStage::Measuring, detail).await;
-                let fresh = measure_on(shared, &node, measurement.clone()).await?;
+                let call = async {
+                    NodeClient::new(shared.connections.to(&node.address).await?)
+                        .measure_costs(measurement.clone())
+                        .await
+                };
+                let fresh = within(MEASURED_WITHIN, "measuring", call).await;
+                let fresh = fresh.map_err(|status| of_node(&node.node_name, &status))?;
                 shared.costs.insert(device, measurement, fresh);
                 fresh
             }
@@ -142,10 +151,4 @@ async fn measured(shared: &Shared, measurement: &MeasureCosts, events: &EventSen
         slowest = Some(slowest.map_or(costs, |slowest| slowest.max(costs)));
     }
     slowest.ok_or_else(|| Status::failed_precondition("no node has joined the cluster"))
-}
-
-async fn measure_on(shared: &Shared, node: &NodeStatus, measurement: MeasureCosts) -> Result<Costs, Status> {
-    let call = async { NodeClient::new(shared.connections.to(&node.address).await?).measure_costs(measurement).await };
-    let measured = within(shared.config.measure_deadline, "measuring", call).await;
-    measured.map_err(|status| of_node(&node.node_name, &status))
 }

@@ -29,14 +29,9 @@ pub(crate) struct Shared {
     /// One node at a time: the schedule hears of nodes in the order in which they are registered.
     pub(crate) joining: Mutex<()>,
     started: Instant,
-    schedule: Mutex<Schedule>,
+    /// The schedule, and those that watch its events.
+    schedule: Mutex<(Scheduler, Observers)>,
     last_number: AtomicU64,
-}
-
-/// The schedule, and those that watch its events.
-struct Schedule {
-    scheduler: Scheduler,
-    observers: Observers,
 }
 
 impl Shared {
@@ -52,14 +47,14 @@ impl Shared {
             sessions: SessionRegistry::default(),
             joining: Mutex::default(),
             started: Instant::now(),
-            schedule: Mutex::new(Schedule { scheduler: Scheduler::default(), observers }),
-            last_number: AtomicU64::new(0),
+            schedule: Mutex::new((Scheduler::default(), observers)),
+            last_number: AtomicU64::default(),
         }
     }
 
     /// Tells the schedule; its commands are executed in its order.
     pub(crate) fn step(&self, event: Event) {
-        let Schedule { scheduler, observers } = &mut *self.schedule.lock();
+        let (scheduler, observers) = &mut *self.schedule.lock();
         let now = self.started.elapsed();
         observers.record(now, &event);
         let is_tick = matches!(event, Event::Tick);
@@ -73,7 +68,7 @@ impl Shared {
 
     /// Reads the schedule.
     pub(crate) fn with_scheduler<T>(&self, read: impl FnOnce(&Scheduler) -> T) -> T {
-        read(&self.schedule.lock().scheduler)
+        read(&self.schedule.lock().0)
     }
 
     pub(crate) fn status(&self) -> ClusterStatus {

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use app_core::cluster::Cluster;
-use app_core::delivery::{Delivered, SessionSettings, open, receive};
+use app_core::delivery::{Delivered, open, receive, request};
 use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use client::{Client, Frame};
-use cluster::{PolicyChoice, Timeline};
+use cluster::{PolicyChoice, SessionRequest, Timeline};
 use depth_image::{PinholeCamera, ViewCell};
 use engine::GpuEngine;
 use glam::UVec2;
@@ -93,15 +93,16 @@ impl Experiment {
     /// Delivers views of a new sample set. The time excludes the coordinator's measurements.
     pub fn deliver(&self, settings: DeliverySettings, arrived: impl FnMut(&Frame)) -> anyhow::Result<Delivered> {
         let run = self.runs.replace(self.runs.get() + 1);
-        let (method, sampling) = (settings.method.to_string(), self.args.sampling.to_string());
-        let session_settings = SessionSettings {
+        let views = self.views(settings.views)?;
+        let request = SessionRequest {
+            method: settings.method.to_string(),
+            lighting: settings.lighting.to_string(),
             policy: settings.policy,
             timeline: Timeline { set_count: settings.sets, ..Timeline::still(f64::from(run) * RUN_STEP_S) },
-            ..SessionSettings::new(method, sampling, settings.lighting.to_string())
+            ..request(self.setup.offer.settings.clone(), &views)?
         };
-        let views = self.views(settings.views)?;
         self.runtime.block_on(async {
-            let session = open(&self.client, &session_settings, &views).await?;
+            let session = open(&self.client, request).await?;
             receive(&session, &views, arrived).await
         })
     }

@@ -5,6 +5,7 @@
 //! build of the program has none of this.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod balance;
 mod bench;
 mod command;
 mod cpu_share;
@@ -19,8 +20,10 @@ mod progress;
 pub mod reference_views;
 pub mod sampling_study;
 mod scaling;
+mod scene_args;
 pub mod statistics;
 mod sweep;
 
 pub use command::LabCommand;
 pub use evaluation::Evaluation;
+pub use scene_args::scene_args;

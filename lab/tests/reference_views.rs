@@ -4,23 +4,24 @@
 use std::sync::Arc;
 
 use app_core::cluster::Cluster;
-use app_core::delivery::{SessionSettings, open, receive};
+use app_core::delivery::{open, receive, request};
 use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SizePx;
-use cluster::PolicyChoice;
+use cluster::{PolicyChoice, SessionRequest};
 use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
 use lab::reference_views::{ALL_PLANES, ReferenceViews};
+use lab::scene_args;
 use node::{DirectWork, Engine as _, EngineError, SampleWork, ViewWork};
 use reconstruction::ReconstructionMethod;
 
 const VIEW_SIZE: UVec2 = UVec2::new(64, 48);
 
 fn args(scene: &str) -> SceneArgs {
-    SceneArgs { sample_size: Some(SizePx(UVec2::new(160, 120))), ..SceneArgs::of(scene.parse().unwrap()) }
+    SceneArgs { sample_size: Some(SizePx(UVec2::new(160, 120))), ..scene_args(scene.parse().unwrap()) }
 }
 
 fn views(setup: &Setup, count: usize) -> Vec<PinholeCamera> {
@@ -134,14 +135,10 @@ fn a_cluster_gives_what_one_engine_gives() {
         let cluster = Cluster::start(listener, setup.offer.clone(), engine, 3, false).await.unwrap();
         let client = cluster.client().await.unwrap();
         let offer = client.status().await.unwrap().offer.unwrap();
-        assert_eq!((offer.sample_cameras, offer.settings), (setup.offer.rig.clone(), setup.offer.settings.clone()));
-        let (method, sampling) = (args.method.to_string(), args.sampling.to_string());
-        let settings = SessionSettings {
-            policy: PolicyChoice::Pipeline,
-            planes: ALL_PLANES,
-            ..SessionSettings::new(method, sampling, args.lighting.to_string())
-        };
-        let session = open(&client, &settings, &reference.cameras).await.unwrap();
+        assert_eq!((&offer.sample_cameras, &offer.settings), (&setup.offer.rig, &setup.offer.settings));
+        let request = request(offer.settings, &reference.cameras).unwrap();
+        let request = SessionRequest { policy: PolicyChoice::Pipeline, planes: ALL_PLANES, ..request };
+        let session = open(&client, request).await.unwrap();
         let delivered = receive(&session, &reference.cameras, |_| ()).await.unwrap();
         drop((session, client));
         cluster.drain().await.unwrap();

@@ -1,6 +1,7 @@
 //! The command line.
 
 use app_core::exit::Outcome;
+use app_core::process::runtime;
 use clap::{Parser, Subcommand};
 
 use crate::commands::{coordinator, health, node, replay, status, up, view};
@@ -60,16 +61,16 @@ impl Command {
     /// Runs the subcommand to its end.
     ///
     /// # Errors
-    /// Input cannot be used, or the program fails at run time; [`app_core::exit::code_of`] separates the two.
+    /// Input cannot be used, or the program fails at run time; [`app_core::exit::report`] separates the two.
     pub fn run(self) -> anyhow::Result<Outcome> {
         match self {
-            Self::Up(args) => up::run(args),
-            Self::Coordinator(args) => coordinator::run(args),
-            Self::Node(args) => node::run(args),
-            Self::View(args) => view::run(args),
-            Self::Status(args) => status::run(&args),
+            Self::Up(args) => runtime()?.block_on(up::run(args)),
+            Self::Coordinator(args) => runtime()?.block_on(coordinator::run(args)),
+            Self::Node(args) => runtime()?.block_on(node::run(args)),
+            Self::View(args) => runtime()?.block_on(view::run(args)),
+            Self::Status(args) => runtime()?.block_on(status::run(&args)),
             Self::Replay(args) => replay::run(&args),
-            Self::Health(args) => health::run(&args),
+            Self::Health(args) => runtime()?.block_on(health::run(&args)),
             #[cfg(feature = "lab")]
             Self::Lab(command) => command.run(),
         }

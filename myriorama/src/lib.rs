@@ -7,5 +7,4 @@
 pub mod cli;
 pub mod commands;
 pub mod comparison;
-pub mod status_text;
 pub mod terminal_picture;

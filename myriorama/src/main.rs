@@ -8,7 +8,5 @@ use myriorama::cli::Cli;
 
 fn main() -> ExitCode {
     node::init_logging("warn");
-    let cli = Cli::parse();
-    let result = cli.command.run();
-    exit::report(&result)
+    exit::report(&Cli::parse().command.run())
 }

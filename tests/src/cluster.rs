@@ -5,11 +5,11 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use client::{Client, ClientError, Session, ViewRequest};
-use cluster::{PolicyChoice, SessionRequest, Timeline};
+use cluster::{OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline};
 use codec::{FrameAssembly, FramePart, WholeFrame};
 use coordinator::{CoordinatorConfig, Observers, SceneOffer};
 use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
-use glam::{UVec2, Vec3};
+use glam::{DVec3, UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
@@ -119,8 +119,16 @@ pub fn rig() -> Vec<Camera> {
 /// The offer of a coordinator of the scalar device.
 #[must_use]
 pub fn offer() -> SceneOffer {
-    let volume = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) };
-    SceneOffer { illumination: illumination(), ..SceneOffer::new(package(), rig(), volume, SKY_LINEAR) }
+    SceneOffer {
+        hash: SceneHash::of(&package()),
+        package: package(),
+        rig: rig(),
+        volume: Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) },
+        background_linear: SKY_LINEAR,
+        illumination: illumination(),
+        origin_in_source: DVec3::ZERO,
+        settings: OfferSettings::default(),
+    }
 }
 
 /// A camera in front of the ball.

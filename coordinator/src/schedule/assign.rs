@@ -2,11 +2,9 @@
 
 use cluster::{Assignment, CompositorShare, NodeStatus, Policy, SamplerShare, Workload};
 
-use super::demand::Choice;
-use super::load::Load;
 use super::makespan::distribute;
-use super::node_costs::NodeCosts;
 use super::prediction::relay_fanout;
+use super::{Choice, Load, NodeCosts};
 
 /// Weights are found by distributing this many views at least: of fewer, some nodes would get none.
 const LEAST_VIEWS: usize = 1000;

@@ -2,13 +2,11 @@
 
 use cluster::{Policy, PolicyChoice};
 
-use super::balance::k_fd;
-use super::demand::{Choice, ChoiceError, Demand, Predicted};
-use super::load::Load;
-use super::node_costs::{NodeCosts, view_s};
+use super::node_costs::view_s;
 use super::prediction::{direct_s, time_share_s};
 use super::reason::reason;
-use super::search::{Division, enumerate, first, improve, order, towards};
+use super::search::{enumerate, first, improve, order, towards};
+use super::{Choice, ChoiceError, Demand, Division, Load, NodeCosts, Predicted, k_fd};
 
 /// Numbers of tiles that an image may have.
 const TILES: [usize; 5] = [1, 2, 4, 8, 16];

@@ -6,8 +6,7 @@ use std::time::Duration;
 use cluster::{FetchImages, NodeStatus, SessionPlan};
 use depth_image::Camera;
 
-use super::demand::ChoiceError;
-use super::event::ProbeKind;
+use super::{ChoiceError, ProbeKind};
 
 /// A command to the executor.
 #[derive(Debug, Clone, PartialEq)]

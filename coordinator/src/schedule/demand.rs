@@ -5,9 +5,7 @@ use std::num::NonZeroU32;
 use cluster::{InvalidField, Policy, PolicyChoice, tile_count};
 use serde::{Deserialize, Serialize};
 
-use super::load::Load;
-use super::node_costs::NodeCosts;
-use super::search::Division;
+use super::{Division, Load, NodeCosts};
 
 /// Decisions that a session takes from the schedule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

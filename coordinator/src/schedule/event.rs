@@ -8,7 +8,7 @@ use cluster::{
 use depth_image::PinholeCamera;
 use serde::{Deserialize, Serialize};
 
-use super::demand::PolicyOverride;
+use super::PolicyOverride;
 
 /// An event of the cluster. Events of an epoch concern the plan of that epoch alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

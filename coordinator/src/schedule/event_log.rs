@@ -8,9 +8,7 @@ use std::time::Duration;
 use cluster::InvalidField;
 use serde::{Deserialize, Serialize};
 
-use super::command::Command;
-use super::event::Event;
-use super::scheduler::Scheduler;
+use super::{Command, Event, Scheduler};
 
 /// Logs of other versions are refused.
 const VERSION: u32 = 3;
@@ -44,9 +42,7 @@ pub enum LogError {
 
 /// Writes a log.
 #[derive(Debug)]
-pub struct Recorder<W> {
-    writer: W,
-}
+pub struct Recorder<W>(W);
 
 impl<W: Write> Recorder<W> {
     /// Begins a log with its version.
@@ -55,7 +51,7 @@ impl<W: Write> Recorder<W> {
     /// Where the writer fails.
     pub fn new(mut writer: W) -> io::Result<Self> {
         write_line(&mut writer, &Header::from([(VERSION_KEY.to_owned(), VERSION)]))?;
-        Ok(Self { writer })
+        Ok(Self(writer))
     }
 
     /// Adds what is given to [`Scheduler::step`].
@@ -64,7 +60,7 @@ impl<W: Write> Recorder<W> {
     /// Where the writer fails.
     pub fn record(&mut self, now: Duration, event: &Event) -> io::Result<()> {
         let now_ns = u64::try_from(now.as_nanos()).unwrap_or(u64::MAX);
-        write_line(&mut self.writer, &EventRecord { now_ns, event })
+        write_line(&mut self.0, &EventRecord { now_ns, event })
     }
 }
 

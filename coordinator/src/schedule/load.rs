@@ -2,8 +2,8 @@
 
 use cluster::{Costs, Policy};
 
+use super::NodeCosts;
 use super::makespan::{Worker, distribute};
-use super::node_costs::NodeCosts;
 
 /// The load of the cluster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -26,14 +26,6 @@ pub(super) struct Activity {
     pub(super) busy_ratio: f64,
 }
 
-/// Work since the last report.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct WorkDone {
-    pub(super) busy_s: f64,
-    pub(super) views: u64,
-    pub(super) dropped_views: u64,
-}
-
 impl Member {
     pub(super) fn new(now: Duration, incarnation: u64, status: NodeStatus, costs: Option<&Costs>) -> Self {
         let estimate = costs.map(Estimate::starting_at).unwrap_or_default();
@@ -48,13 +40,14 @@ impl Member {
 }
 
 impl Activity {
-    pub(super) fn add(&mut self, now: Duration, work: WorkDone) {
+    /// Adds work since the last report.
+    pub(super) fn add(&mut self, now: Duration, busy_s: f64, views: u64, dropped_views: u64) {
         let since_s = now.saturating_sub(self.reported_at).as_secs_f64();
         *self = Self {
             reported_at: now,
-            views: self.views.saturating_add(work.views),
-            dropped_views: self.dropped_views.saturating_add(work.dropped_views),
-            busy_ratio: if since_s > 0.0 { work.busy_s / since_s } else { 0.0 },
+            views: self.views.saturating_add(views),
+            dropped_views: self.dropped_views.saturating_add(dropped_views),
+            busy_ratio: if since_s > 0.0 { busy_s / since_s } else { 0.0 },
         };
     }
 }

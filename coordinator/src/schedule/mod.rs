@@ -19,7 +19,6 @@ mod load;
 mod makespan;
 mod member;
 mod node_costs;
-mod operations;
 mod overload;
 mod prediction;
 mod reason;
@@ -39,7 +38,7 @@ mod simulated_cluster;
 #[cfg(test)]
 mod test_support;
 
-pub use balance::{brute_force_k, k_fd, k_fd_printed, pipeline_time};
+pub use balance::k_fd;
 pub(crate) use cells::first_indices;
 pub use choose::choose;
 pub use cluster::MeasuredCosts;

@@ -4,10 +4,10 @@
 
 use std::num::NonZeroU32;
 
-use super::load::{Load, drawers};
+use super::load::drawers;
 use super::makespan::makespan_s;
-use super::node_costs::NodeCosts;
 use super::relay_tree::{Links, Relaying};
+use super::{Load, NodeCosts};
 
 /// T of the pipeline: max(sampling, transfer, compositing), where `samples[i]` says whether node i samples; the others
 /// composite. Images take the best way. One node does all in turn.

@@ -1,16 +1,23 @@
 //! The reason of a choice, in plain words.
 
-use cluster::{Policy, PolicyChoice};
+use cluster::{Costs, Policy, PolicyChoice};
 
-use super::demand::{Demand, Predicted};
-use super::load::Load;
-use super::node_costs::NodeCosts;
+use super::{Demand, Load, NodeCosts, Predicted};
 
 /// Every figure that the choice rests on.
 pub(super) fn reason(demand: &Demand<'_>, policy: Policy, samplers: usize, predicted: &Predicted) -> String {
-    let parts = [pipeline(demand, samplers, predicted), time_share(demand, predicted), direct(demand, predicted)];
+    let (nodes, views, mean) = (demand.nodes.len(), demand.load.views, NodeCosts::mean(demand.nodes));
     let unequal = if NodeCosts::are_equal(demand.nodes) { "" } else { " Nodes are unequal: costs are their mean." };
-    format!("{policy}, {}. {}{unequal}", origin(demand), parts.join(" "))
+    format!(
+        "{policy}, {}. {} Time-share: {} a set: each of {nodes} nodes samples and reconstructs its part. Direct: {} a \
+         set: {views} views of {} + {} to encode on {nodes} nodes.{unequal}",
+        origin(demand),
+        pipeline(demand, &mean, samplers, predicted),
+        ms(predicted.time_share_s),
+        ms(predicted.direct_s),
+        ms(mean.direct_view_s),
+        ms(mean.encode_view_s),
+    )
 }
 
 fn origin(demand: &Demand<'_>) -> &'static str {
@@ -26,13 +33,12 @@ fn ms(seconds: f64) -> String {
     format!("{:.3} ms", seconds * 1e3)
 }
 
-fn pipeline(demand: &Demand<'_>, samplers: usize, predicted: &Predicted) -> String {
+fn pipeline(demand: &Demand<'_>, mean: &Costs, samplers: usize, predicted: &Predicted) -> String {
     let Load { images, tiles, cells, views, images_are_sequential, is_already_sampled, .. } = demand.load;
-    let (nodes, mean) = (demand.nodes.len(), NodeCosts::mean(demand.nodes));
     let in_turn = if images_are_sequential { "whole sets in turn, " } else { "" };
-    let roles = match nodes {
+    let roles = match demand.nodes.len() {
         1 => "1 node in turn".to_owned(),
-        _ => format!("K = {samplers} of {nodes} nodes, {in_turn}the others reconstruct"),
+        nodes => format!("K = {samplers} of {nodes} nodes, {in_turn}the others reconstruct"),
     };
     let tiled = if tiles > 1 { format!(" in {tiles} tiles each") } else { String::new() };
     let near = if cells > 1 { format!(" for {cells} view cells") } else { String::new() };
@@ -49,23 +55,5 @@ fn pipeline(demand: &Demand<'_>, samplers: usize, predicted: &Predicted) -> Stri
         ms(predicted.k_fd_s),
         predicted.enumerated,
         ms(predicted.enumerated_s),
-    )
-}
-
-fn time_share(demand: &Demand<'_>, predicted: &Predicted) -> String {
-    let nodes = demand.nodes.len();
-    format!(
-        "Time-share: {} a set: each of {nodes} nodes samples and reconstructs its part.",
-        ms(predicted.time_share_s)
-    )
-}
-
-fn direct(demand: &Demand<'_>, predicted: &Predicted) -> String {
-    let (nodes, views, mean) = (demand.nodes.len(), demand.load.views, NodeCosts::mean(demand.nodes));
-    format!(
-        "Direct: {} a set: {views} views of {} + {} to encode on {nodes} nodes.",
-        ms(predicted.direct_s),
-        ms(mean.direct_view_s),
-        ms(mean.encode_view_s),
     )
 }

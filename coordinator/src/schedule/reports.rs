@@ -28,48 +28,28 @@ struct Filed {
     is_refuted: bool,
 }
 
-/// The consequence of a report.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) enum Attribution {
-    /// Two compositors agree: the sampler is at fault.
-    SamplerAtFault,
-    /// The coordinator has to probe the sampler.
-    Probe,
-}
-
-/// A compositor that is at fault.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) struct AtFault {
-    pub(super) compositor: String,
-    pub(super) reason: String,
-}
-
 impl SamplerReports {
-    /// Files a report.
-    pub(super) fn file(&mut self, now: Duration, report: SamplerReport) -> Attribution {
+    /// Files a report; whether another compositor agrees, so that the sampler is at fault. Else it has to be probed.
+    pub(super) fn file(&mut self, now: Duration, report: SamplerReport) -> bool {
         self.0.retain(|filed| now.saturating_sub(filed.at) < WINDOW);
         let SamplerReport { compositor, sampler, reason, .. } = report;
         let agrees = self.0.iter().any(|filed| filed.sampler == sampler && filed.compositor != compositor);
         // One probe answers all reports before it.
         self.0.retain(|filed| filed.is_refuted || (&filed.sampler, &filed.compositor) != (&sampler, &compositor));
         self.0.push(Filed { at: now, compositor, sampler, reason, is_refuted: false });
-        if agrees { Attribution::SamplerAtFault } else { Attribution::Probe }
+        agrees
     }
 
-    /// A probe of the sampler has passed. Gives the compositors that are now at fault.
-    pub(super) fn refute(&mut self, sampler: &str) -> Vec<AtFault> {
+    /// A probe of the sampler has passed. Gives the compositors that are now at fault, and the reasons of their reports.
+    pub(super) fn refute(&mut self, sampler: &str) -> Vec<(String, String)> {
         let mut at_fault = Vec::new();
         for filed in self.0.iter_mut().filter(|filed| filed.sampler == sampler && !filed.is_refuted) {
             filed.is_refuted = true;
-            at_fault.push(AtFault { compositor: filed.compositor.clone(), reason: filed.reason.clone() });
+            at_fault.push((filed.compositor.clone(), filed.reason.clone()));
         }
-        at_fault.retain(|at_fault| self.refuted(&at_fault.compositor) >= REFUTED_LIMIT);
+        let refuted = |of: &str| self.0.iter().filter(|filed| filed.is_refuted && filed.compositor == of).count();
+        at_fault.retain(|(compositor, _)| refuted(compositor) >= REFUTED_LIMIT);
         at_fault
-    }
-
-    /// Reports on file of a compositor that were refuted.
-    fn refuted(&self, compositor: &str) -> usize {
-        self.0.iter().filter(|filed| filed.is_refuted && filed.compositor == compositor).count()
     }
 
     /// Reports on file of a sampler: the number of the image that is probed next.
@@ -101,18 +81,18 @@ mod tests {
     #[test]
     fn a_second_compositor_convicts_the_sampler_and_a_repeated_report_does_not() {
         let mut reports = SamplerReports::default();
-        assert_eq!(reports.file(START, report("c", "a")), Attribution::Probe);
-        assert_eq!(reports.file(START, report("c", "a")), Attribution::Probe, "the same compositor again");
-        assert_eq!(reports.file(START, report("d", "b")), Attribution::Probe, "another sampler");
-        assert_eq!(reports.file(START, report("d", "a")), Attribution::SamplerAtFault);
-        assert_eq!(SamplerReports::default().file(START, report("d", "a")), Attribution::Probe);
+        assert!(!reports.file(START, report("c", "a")));
+        assert!(!reports.file(START, report("c", "a")), "the same compositor again");
+        assert!(!reports.file(START, report("d", "b")), "another sampler");
+        assert!(reports.file(START, report("d", "a")));
+        assert!(!SamplerReports::default().file(START, report("d", "a")));
     }
 
     #[test]
     fn reports_a_minute_apart_do_not_agree() {
         let mut reports = SamplerReports::default();
         reports.file(START, report("c", "a"));
-        assert_eq!(reports.file(START + WINDOW, report("d", "a")), Attribution::Probe);
+        assert!(!reports.file(START + WINDOW, report("d", "a")));
     }
 
     #[test]
@@ -123,8 +103,7 @@ mod tests {
         assert_eq!(reports.refute("a"), [], "one probe answers both");
         assert_eq!(reports.refute("a"), [], "a report is refuted once");
         reports.file(START, report("c", "b"));
-        let at_fault = AtFault { compositor: "c".to_owned(), reason: "no images".to_owned() };
-        assert_eq!(reports.refute("b"), [at_fault]);
+        assert_eq!(reports.refute("b"), [("c".to_owned(), "no images".to_owned())]);
     }
 
     #[test]

@@ -1,23 +1,20 @@
 //! The cluster as a state machine: events in, commands out.
 
-mod admission;
 mod faults;
 mod planning;
 mod sessions;
-mod status;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use cluster::{JoinCluster, MeasuredCosts};
+use cluster::{ClusterStatus, JoinCluster, MeasuredCosts, NodeCondition};
 
 use super::active_plan::ActivePlan;
-use super::command::Command;
 use super::estimate::SampledParts;
-use super::event::Event;
-use super::member::{Member, WorkDone};
+use super::member::Member;
 use super::reports::SamplerReports;
 use super::workload_state::WorkloadState;
+use super::{Command, Event};
 
 /// Members by name, the last epoch, and the demand of all sessions.
 #[derive(Debug, Clone, Default)]
@@ -44,7 +41,7 @@ impl Scheduler {
             }
             Event::ViewpointsChanged { session, viewpoints } => self.viewpoints_changed(session, &viewpoints),
             Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views } => {
-                self.count_work(&node_name, plan_epoch, WorkDone { busy_s, views, dropped_views });
+                self.count_work(&node_name, plan_epoch, busy_s, views, dropped_views);
                 self.measured(&node_name, plan_epoch, &costs)
             }
             Event::Ready { plan_epoch, node_name } => self.ready(plan_epoch, node_name),
@@ -104,17 +101,18 @@ impl Scheduler {
     }
 
     /// Work for the plan in force says how long a set takes.
-    fn count_work(&mut self, name: &str, plan_epoch: u64, work: WorkDone) {
+    fn count_work(&mut self, name: &str, plan_epoch: u64, busy_s: f64, views: u64, dropped_views: u64) {
         let now = self.now;
         if let Some(member) = self.members.get_mut(name) {
-            member.activity.add(now, work);
+            member.activity.add(now, busy_s, views, dropped_views);
         }
         if let Some(active) = self.active_plan_for(plan_epoch, name) {
-            active.add_work(name, work.busy_s, work.views);
+            active.add_work(name, busy_s, views);
         }
         let Some(workload) = &mut self.workload else { return };
-        let views = workload.load().views;
-        let Some(achieved) = workload.active_plan.as_ref().and_then(|active| active.achieved(views)) else { return };
+        let views_per_set = workload.load().views;
+        let achieved = workload.active_plan.as_ref().and_then(|active| active.achieved(views_per_set));
+        let Some(achieved) = achieved else { return };
         workload.achieved.retain(|other| other.policy != achieved.policy);
         workload.achieved.push(achieved);
     }
@@ -138,6 +136,49 @@ impl Scheduler {
         commands.extend(self.reevaluate());
         commands.extend(self.probe_liveness());
         commands
+    }
+
+    /// The state of the cluster: members, the plan in force, and the demand of all sessions.
+    #[must_use]
+    pub fn status(&self) -> ClusterStatus {
+        let workload = self.workload.as_ref();
+        ClusterStatus {
+            plan_epoch: self.plan_epoch,
+            nodes: self.members.values().map(|member| member.status.clone()).collect(),
+            offer: None,
+            plan: self.active_plan().map(|active| Box::new(active.plan.clone())),
+            session_count: workload.map_or(0, |workload| workload.sessions().len() as u32),
+            views_per_set: workload.map_or(0, |workload| workload.views() as u64),
+            conditions: workload.map_or_else(Vec::new, |_| self.conditions()),
+            achieved: workload.map_or_else(Vec::new, |workload| workload.achieved.clone()),
+            utilisation: self.utilisation().filter(|&utilisation| utilisation > 0.0),
+        }
+    }
+
+    fn conditions(&self) -> Vec<NodeCondition> {
+        let is_ready = |name: &str| self.active_plan().is_some_and(|active| active.ready.contains(name));
+        let condition = |(name, member): (&String, &Member)| NodeCondition {
+            node_name: name.clone(),
+            is_ready: is_ready(name),
+            costs: member.estimate.now().costs,
+            views: member.activity.views,
+            dropped_views: member.activity.dropped_views,
+            busy_ratio: member.activity.busy_ratio,
+        };
+        self.members.iter().map(condition).collect()
+    }
+}
+
+/// For tests of the whole schedule.
+#[cfg(test)]
+impl Scheduler {
+    pub(in crate::schedule) fn active_plan_epoch(&self) -> Option<u64> {
+        Some(self.active_plan()?.epoch())
+    }
+
+    /// Whether the plan in force was made for this node, with or without a role.
+    pub(in crate::schedule) fn plans_with(&self, name: &str) -> bool {
+        self.active_plan().is_some_and(|active| active.members.contains_key(name))
     }
 }
 

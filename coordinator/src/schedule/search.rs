@@ -2,9 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::load::Load;
-use super::node_costs::NodeCosts;
-use super::prediction::pipeline_s;
+use super::{Load, NodeCosts, pipeline_s};
 
 /// Most nodes of which moves and swaps are tried: beyond, the search takes longer than it saves.
 const MOST_NODES_TO_MOVE: usize = 32;

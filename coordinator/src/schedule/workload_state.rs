@@ -6,10 +6,8 @@ use glam::UVec2;
 
 use super::active_plan::ActivePlan;
 use super::cells::Cells;
-use super::demand::PolicyOverride;
-use super::event::Opening;
-use super::load::Load;
 use super::overload::Overload;
+use super::{Load, Opening, PolicyOverride};
 
 /// The demand of one session.
 #[derive(Debug, Clone)]
@@ -172,7 +170,10 @@ impl WorkloadState {
     /// The workload at the present fallback.
     pub(super) fn degraded(&self) -> Workload {
         let Some(quality) = self.quality() else { return self.requested.clone() };
-        let sized = |camera: &Camera| smaller(camera, quality.sample_side_ratio);
+        let sized = |Camera::Pinhole(camera): &Camera| {
+            let size_px = (camera.size_px.as_dvec2() * quality.sample_side_ratio).round().as_uvec2().max(UVec2::ONE);
+            Camera::Pinhole(camera.resized(size_px))
+        };
         Workload {
             lighting: quality.lighting.clone(),
             method: quality.method.clone(),
@@ -180,10 +181,4 @@ impl WorkloadState {
             ..self.requested.clone()
         }
     }
-}
-
-fn smaller(camera: &Camera, side_ratio: f64) -> Camera {
-    let Camera::Pinhole(camera) = camera;
-    let size_px = (camera.size_px.as_dvec2() * side_ratio).round().as_uvec2().max(UVec2::ONE);
-    Camera::Pinhole(camera.resized(size_px))
 }

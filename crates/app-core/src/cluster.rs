@@ -38,26 +38,17 @@ impl Cluster {
         let address = format!("http://{}", loopback_of(&listener)?);
         let mut cluster = Self { address, shutdown: CancellationToken::new(), servers: JoinSet::new() };
         let config = CoordinatorConfig { insecure_bind, ..CoordinatorConfig::default() };
-        cluster.servers.spawn(coordinator::serve(
-            listener,
-            config,
-            offer,
-            Observers::default(),
-            cluster.shutdown.clone(),
-        ));
+        let (observers, shutdown) = (Observers::default(), cluster.shutdown.clone());
+        cluster.servers.spawn(coordinator::serve(listener, config, offer, observers, shutdown));
         for number in 0..nodes {
-            cluster.add_node(number, engine.clone()).await?;
+            let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
+            // Enough digits to sort well: members are listed by name.
+            let config = NodeConfig::new(format!("node-{number:03}"), &cluster.address);
+            let (engine, metrics, shutdown) = (engine.clone(), NodeMetrics::default(), cluster.shutdown.clone());
+            cluster.servers.spawn(node_host::serve(listener, config, engine, metrics, shutdown));
         }
         cluster.client().await?.wait_for_nodes(nodes, JOIN).await?;
         Ok(cluster)
-    }
-
-    async fn add_node(&mut self, number: usize, engine: Arc<dyn Engine>) -> anyhow::Result<()> {
-        let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
-        // Enough digits to sort well: members are listed by name.
-        let config = NodeConfig::new(format!("node-{number:03}"), &self.address);
-        self.servers.spawn(node_host::serve(listener, config, engine, NodeMetrics::default(), self.shutdown.clone()));
-        Ok(())
     }
 
     /// A client of this cluster.
@@ -73,10 +64,8 @@ impl Cluster {
     /// # Errors
     /// The reason of its end.
     pub async fn failed(&mut self) -> anyhow::Result<()> {
-        match self.servers.join_next().await {
-            Some(ended) => Ok(ended.context("a server stopped")??),
-            None => Ok(()),
-        }
+        let ended = self.servers.join_next().await;
+        ended.map_or(Ok(()), |ended| Ok(ended.context("a server stopped")??))
     }
 
     /// Ends streams and waits for the servers, 10 s at most.

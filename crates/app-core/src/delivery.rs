@@ -4,81 +4,84 @@ use std::time::Instant;
 
 use client::{Client, Frame, Session, ViewRequest};
 use cluster::limits::MAX_VIEWPOINTS;
-use cluster::{OfferSettings, OfferStatus, PolicyChoice, Quality, SessionPlan, SessionRequest, Timeline};
+use cluster::{OfferSettings, PolicyChoice, Quality, SessionPlan, SessionRequest, Timeline};
 use depth_image::{PinholeCamera, ViewPlanes};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::SamplingMethod;
 
 use crate::exit::BadInput;
-use crate::fallbacks;
 
-/// Settings of a session.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SessionSettings {
-    /// The reconstruction method, named as on the command line.
-    pub method: String,
-    /// The sampling method, named as on the command line.
-    pub sampling: String,
-    /// The lighting, named as on the command line.
-    pub lighting: String,
-    /// The codec of frames, named as on the command line.
-    pub codec: String,
-    /// The policy, or the coordinator's choice.
-    pub policy: PolicyChoice,
-    /// Planes beside colour.
-    pub planes: ViewPlanes,
-    /// Tiles of a sample image; `None` for as many as are predicted to be fastest.
-    pub tiles: Option<u32>,
-    /// Steps in which the light of a static scene is refined; 1 for all of it at once.
-    pub refinement_steps: u32,
-    /// Pictures a second; `None` for as many as possible.
-    pub frames_per_s: Option<f64>,
-    /// Fallbacks under overload.
-    pub fallbacks: Vec<Quality>,
-    /// Scene times; every set has the same views.
-    pub timeline: Timeline,
-    /// Viewpoints that sample cameras are placed around; empty for the cameras of the scene.
-    pub viewpoints: Vec<PinholeCamera>,
+/// Sides of sample images at a fallback, over those asked for.
+const SAMPLE_SIDE_RATIO: f64 = 0.7;
+/// Pictures a second at a fallback, over those asked for.
+const FRAME_RATE_RATIO: f64 = 0.8;
+
+/// A request for `views` a set: finished pictures of a still scene, without other planes, by the policy that is predicted
+/// to be fastest, with the settings that the coordinator offers.
+///
+/// # Errors
+/// There are no views.
+pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Result<SessionRequest> {
+    let OfferSettings { method, sampling, lighting } = offered;
+    Ok(SessionRequest {
+        scene: None,
+        method: method.unwrap_or_else(|| ReconstructionMethod::default().to_string()),
+        sampling: sampling.unwrap_or_else(|| SamplingMethod::default().to_string()),
+        lighting: lighting.unwrap_or_else(|| Lighting::default().to_string()),
+        codec: "lz4".to_owned(),
+        sample_cameras: Vec::new(),
+        sample_size_px: None,
+        volume: None,
+        typical_view: *views.first().ok_or_else(|| BadInput("no views are asked for".to_owned()))?,
+        views_per_set: u32::try_from(views.len())?,
+        planes: ViewPlanes::default(),
+        timeline: Timeline::still(0.0),
+        policy: PolicyChoice::Auto,
+        forced_sampler_count: None,
+        refinement_steps: 1,
+        frames_per_s: None,
+        fallbacks: Vec::new(),
+        forced_tile_count: None,
+        viewpoints: Vec::new(),
+    })
 }
 
-impl SessionSettings {
-    /// Finished pictures of a still scene, without other planes, by the policy that is predicted to be fastest.
-    #[must_use]
-    pub fn new(method: String, sampling: String, lighting: String) -> Self {
-        Self {
-            method,
-            sampling,
-            lighting,
-            codec: "lz4".to_owned(),
-            policy: PolicyChoice::Auto,
-            planes: ViewPlanes::default(),
-            tiles: None,
-            refinement_steps: 1,
-            frames_per_s: None,
-            fallbacks: Vec::new(),
-            timeline: Timeline::still(0.0),
-            viewpoints: Vec::new(),
-        }
-    }
+/// The same at a rate, with fallbacks under overload.
+#[must_use]
+pub fn at_rate(request: SessionRequest, frames_per_s: f64) -> SessionRequest {
+    let fallbacks = fallbacks(&request.lighting, &request.method);
+    SessionRequest { frames_per_s: Some(frames_per_s), fallbacks, ..request }
+}
 
-    /// The same, with the settings that the coordinator offers.
-    #[must_use]
-    pub fn offered(offer: &OfferStatus) -> Self {
-        let or = |offered: &Option<String>, default: String| offered.clone().unwrap_or(default);
-        let OfferSettings { method, sampling, lighting } = &offer.settings;
-        Self::new(
-            or(method, ReconstructionMethod::default().to_string()),
-            or(sampling, SamplingMethod::default().to_string()),
-            or(lighting, Lighting::default().to_string()),
-        )
-    }
+/// Fallbacks under overload, in order: fewer rays of light, a coarser method, smaller sample images, fewer pictures a
+/// second. Each includes those before it. Steps that the lighting and the method do not have are skipped.
+fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
+    let fewer_rays = lighting.parse().ok().and_then(|lighting: Lighting| lighting.with_fewer_rays());
+    let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.coarser());
+    let (lighting, method) = (lighting.to_owned(), method.to_owned());
+    let all = Quality { lighting, method, sample_side_ratio: 1.0, frame_rate_ratio: 1.0 };
+    let dim = fewer_rays.map(|lighting| Quality { lighting: lighting.to_string(), ..all.clone() });
+    let above = dim.clone().unwrap_or(all);
+    let coarse = fewer_steps.map(|method| Quality { method: method.to_string(), ..above.clone() });
+    let above = coarse.clone().unwrap_or(above);
+    let small = Quality { sample_side_ratio: SAMPLE_SIDE_RATIO, ..above };
+    let slow = Quality { frame_rate_ratio: FRAME_RATE_RATIO, ..small.clone() };
+    dim.into_iter().chain(coarse).chain([small, slow]).collect()
+}
 
-    /// The same at a rate, with fallbacks under overload.
-    #[must_use]
-    pub fn at_rate(self, frames_per_s: f64) -> Self {
-        Self { frames_per_s: Some(frames_per_s), fallbacks: fallbacks::ladder(&self.lighting, &self.method), ..self }
-    }
+/// Opens a session.
+///
+/// # Errors
+/// The coordinator refuses.
+pub async fn open(client: &Client, request: SessionRequest) -> anyhow::Result<Session> {
+    Ok(client.open_session(request, |event| tracing::info!(?event, "session")).await?)
+}
+
+/// The views evenly thinned to as many as a session may name.
+#[must_use]
+pub fn viewpoints(views: &[PinholeCamera]) -> Vec<PinholeCamera> {
+    views.iter().step_by(views.len().div_ceil(MAX_VIEWPOINTS).max(1)).copied().collect()
 }
 
 /// Delivered views.
@@ -92,43 +95,6 @@ pub struct Delivered {
     pub frames: Vec<Frame>,
 }
 
-/// Opens a session for `views` a set.
-///
-/// # Errors
-/// The coordinator refuses, or there are no views.
-pub async fn open(client: &Client, settings: &SessionSettings, views: &[PinholeCamera]) -> anyhow::Result<Session> {
-    let typical_view = *views.first().ok_or_else(|| BadInput("no views are asked for".to_owned()))?;
-    let request = SessionRequest {
-        scene: None,
-        method: settings.method.clone(),
-        sampling: settings.sampling.clone(),
-        lighting: settings.lighting.clone(),
-        codec: settings.codec.clone(),
-        sample_cameras: Vec::new(),
-        sample_size_px: None,
-        volume: None,
-        typical_view,
-        views_per_set: u32::try_from(views.len())?,
-        planes: settings.planes,
-        timeline: settings.timeline,
-        policy: settings.policy,
-        forced_sampler_count: None,
-        refinement_steps: settings.refinement_steps,
-        frames_per_s: settings.frames_per_s,
-        fallbacks: settings.fallbacks.clone(),
-        forced_tile_count: settings.tiles,
-        viewpoints: settings.viewpoints.clone(),
-    };
-    let told = |event: &_| tracing::info!(?event, "session");
-    Ok(client.open_session(request, told).await?)
-}
-
-/// The views evenly thinned to as many as a session may name.
-#[must_use]
-pub fn viewpoints(views: &[PinholeCamera]) -> Vec<PinholeCamera> {
-    views.iter().step_by(views.len().div_ceil(MAX_VIEWPOINTS).max(1)).copied().collect()
-}
-
 /// Asks for all views of all sets and waits for them; `arrived` is called for each.
 ///
 /// # Errors
@@ -140,10 +106,9 @@ pub async fn receive(
 ) -> anyhow::Result<Delivered> {
     let start = Instant::now();
     let sets = session.plan().assignment.workload.timeline.set_count;
-    let request =
-        |(frame, (set_index, camera)): (u64, (u32, &PinholeCamera))| ViewRequest { frame, set_index, camera: *camera };
-    let all = (0..sets).flat_map(|set| views.iter().map(move |camera| (set, camera)));
-    let mut incoming = session.render_views((0..).zip(all).map(request).collect())?;
+    let all = (0..sets).flat_map(|set_index| views.iter().map(move |&camera| (set_index, camera)));
+    let requests = (0..).zip(all).map(|(frame, (set_index, camera))| ViewRequest { frame, set_index, camera });
+    let mut incoming = session.render_views(requests.collect())?;
     let mut frames = Vec::with_capacity(views.len() * sets as usize);
     while let Some(frame) = incoming.next().await {
         let frame = frame?;
@@ -153,4 +118,35 @@ pub async fn receive(
     let seconds = start.elapsed().as_secs_f64();
     frames.sort_by_key(|frame| frame.request.frame);
     Ok(Delivered { plan: session.plan(), seconds, frames })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_is_reduced_first_and_the_frame_rate_last() {
+        let ladder = fallbacks("soft 16, occlusion 8", "light_field_search:100");
+        let steps: Vec<_> = ladder
+            .iter()
+            .map(|q| (q.lighting.as_str(), q.method.as_str(), q.sample_side_ratio, q.frame_rate_ratio))
+            .collect();
+        let (dim, coarse) = ("soft 4, occlusion 2", "light_field_search:50");
+        assert_eq!(
+            steps,
+            [
+                (dim, "light_field_search:100", 1.0, 1.0),
+                (dim, coarse, 1.0, 1.0),
+                (dim, coarse, 0.7, 1.0),
+                (dim, coarse, 0.7, 0.8)
+            ]
+        );
+    }
+
+    #[test]
+    fn steps_without_a_coarser_setting_are_skipped() {
+        assert_eq!(fallbacks("phong", "mesh").len(), 2);
+        assert_eq!(fallbacks("phong", "joint_carve").len(), 3);
+        assert_eq!(fallbacks("of the future", "of the future").len(), 2);
+    }
 }

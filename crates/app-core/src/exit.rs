@@ -26,35 +26,27 @@ impl Outcome {
 #[error("{0}")]
 pub struct BadInput(pub String);
 
-/// The exit status: 0 done, 1 a check fell short, 2 input that cannot be used, 3 a failure at run time.
-/// time.
+fn is_bad_input(error: &(dyn std::error::Error + 'static)) -> bool {
+    matches!(error.downcast_ref(), Some(client::ClientError::Invalid { .. }))
+        || matches!(error.downcast_ref(), Some(node::ServeError::NotLoopback { .. }))
+        || error.is::<sampling::RigError>()
+        || error.is::<BadInput>()
+        || error.is::<scene::SceneError>()
+        || error.is::<CameraFileError>()
+}
+
+/// Prints the error on standard error, and returns the exit status: 0 done, 1 a check fell short, 2 input that cannot be
+/// used, 3 a failure at run time.
 #[must_use]
-pub fn code_of(result: &anyhow::Result<Outcome>) -> u8 {
+pub fn report(result: &anyhow::Result<Outcome>) -> ExitCode {
+    if let Err(error) = result {
+        eprintln!("myriorama: {error:#}");
+    }
     match result {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::FellShort) => 1,
         Err(error) if error.chain().any(is_bad_input) => 2,
         Err(_) => 3,
     }
-}
-
-fn is_bad_input(error: &(dyn std::error::Error + 'static)) -> bool {
-    let refused = matches!(error.downcast_ref(), Some(client::ClientError::Invalid { .. }));
-    let not_loopback = matches!(error.downcast_ref(), Some(node::ServeError::NotLoopback { .. }));
-    let rig = error.is::<sampling::RigError>();
-    refused
-        || not_loopback
-        || rig
-        || error.is::<BadInput>()
-        || error.is::<scene::SceneError>()
-        || error.is::<CameraFileError>()
-}
-
-/// Prints the error on standard error, and returns the exit status.
-#[must_use]
-pub fn report(result: &anyhow::Result<Outcome>) -> ExitCode {
-    if let Err(error) = result {
-        eprintln!("myriorama: {error:#}");
-    }
-    code_of(result).into()
+    .into()
 }

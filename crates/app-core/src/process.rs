@@ -32,6 +32,15 @@ pub async fn stop_signal() -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Cancels `shutdown` at ctrl-c or SIGTERM. Without signals, the caller can still kill the process.
+pub fn cancel_at_signal(shutdown: CancellationToken) {
+    tokio::spawn(async move {
+        if stop_signal().await.is_ok() {
+            shutdown.cancel();
+        }
+    });
+}
+
 /// Opens a port to serve on.
 ///
 /// # Errors

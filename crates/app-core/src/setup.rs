@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Args;
-use cluster::OfferSettings;
+use cluster::{OfferSettings, SceneHash};
 use coordinator::SceneOffer;
 use depth_image::{Camera, PinholeCamera};
 use glam::UVec2;
@@ -85,21 +85,6 @@ pub struct Setup {
 }
 
 impl SceneArgs {
-    /// A scene with all other arguments by default.
-    #[must_use]
-    pub fn of(scene: SceneSpec) -> Self {
-        Self {
-            scene,
-            lighting: Lighting::default(),
-            lights: Vec::new(),
-            environment: None,
-            method: ReconstructionMethod::default(),
-            sampling: SamplingMethod::default(),
-            sample_size: None,
-            samples: None,
-        }
-    }
-
     /// Loads the scene and places its sample cameras.
     ///
     /// # Errors
@@ -117,15 +102,20 @@ impl SceneArgs {
         change(&mut scene);
         let around = self.sample_cameras(&scene)?;
         let samples = self.sampling.cameras(around.clone());
-        let rig = samples.iter().copied().map(Camera::Pinhole).collect();
-        let package = scene::pack(&scene).into();
-        let mut offer = SceneOffer::new(package, rig, scene.bounds(), scene.background_linear);
-        offer.origin_in_source = scene.origin_in_source;
-        offer.illumination = scene.illumination.clone();
-        offer.settings = OfferSettings {
-            method: Some(self.method.to_string()),
-            sampling: Some(self.sampling.to_string()),
-            lighting: Some(self.lighting.to_string()),
+        let package = scene::pack(&scene);
+        let offer = SceneOffer {
+            hash: SceneHash::of(&package),
+            package: package.into(),
+            rig: samples.iter().copied().map(Camera::Pinhole).collect(),
+            volume: scene.bounds(),
+            background_linear: scene.background_linear,
+            illumination: scene.illumination.clone(),
+            origin_in_source: scene.origin_in_source,
+            settings: OfferSettings {
+                method: Some(self.method.to_string()),
+                sampling: Some(self.sampling.to_string()),
+                lighting: Some(self.lighting.to_string()),
+            },
         };
         Ok(Setup { scene, around, samples, offer })
     }
@@ -148,7 +138,7 @@ impl SceneArgs {
         };
         let near_m = (scene.bounds().size().length() * NEAR_OF_DIAGONAL).max(1e-6);
         let cameras = camera_file::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?;
-        Ok(cameras.into_iter().map(|camera| size_px.map_or(camera, |size_px| resized(camera, size_px))).collect())
+        Ok(cameras.into_iter().map(|camera| size_px.map_or(camera, |size_px| camera.resized(size_px))).collect())
     }
 
     fn rig_cameras(&self, scene: &Scene, size_px: UVec2) -> anyhow::Result<Vec<PinholeCamera>> {
@@ -159,11 +149,4 @@ impl SceneArgs {
         };
         Ok(rig.with_context(|| format!("{}: no sample cameras", self.scene))?.samples(size_px))
     }
-}
-
-/// The camera with the same field of view and another size.
-#[must_use]
-pub fn resized(camera: PinholeCamera, size_px: UVec2) -> PinholeCamera {
-    let scale = size_px.as_vec2() / camera.size_px.as_vec2();
-    PinholeCamera { size_px, focal_px: camera.focal_px * scale, principal_px: camera.principal_px * scale, ..camera }
 }

@@ -10,15 +10,6 @@ use glam::UVec2;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SizePx(pub UVec2);
 
-/// Columns and rows of a grid of views.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct GridSize {
-    /// Views side by side.
-    pub columns: u32,
-    /// Views above each other.
-    pub rows: u32,
-}
-
 /// The most columns or rows of a grid.
 const MAX_GRID_SIDE: u32 = 1000;
 
@@ -44,11 +35,12 @@ impl FromStr for SizePx {
     }
 }
 
-impl FromStr for GridSize {
-    type Err = SizeError;
-    fn from_str(text: &str) -> Result<Self, SizeError> {
-        pair(text, MAX_GRID_SIDE).map(|[columns, rows]| Self { columns, rows })
-    }
+/// Columns and rows of a grid of views.
+///
+/// # Errors
+/// For anything else than two whole numbers from 1 to 1000.
+pub fn grid(text: &str) -> Result<[u32; 2], SizeError> {
+    pair(text, MAX_GRID_SIDE)
 }
 
 impl fmt::Display for SizePx {
@@ -64,10 +56,10 @@ mod tests {
     #[test]
     fn sizes_are_two_numbers_in_range() {
         assert_eq!("400x300".parse(), Ok(SizePx(UVec2::new(400, 300))));
-        assert_eq!("5x2".parse(), Ok(GridSize { columns: 5, rows: 2 }));
+        assert_eq!(grid("5x2"), Ok([5, 2]));
         for bad in ["", "400", "0x3", "3x0", "65535x65535", "-1x4", "axb", "4x4x4"] {
             assert!(bad.parse::<SizePx>().is_err(), "{bad}");
         }
-        assert!("1001x1".parse::<GridSize>().is_err());
+        assert!(grid("1001x1").is_err());
     }
 }

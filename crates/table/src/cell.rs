@@ -51,52 +51,26 @@ impl Cell {
     }
 }
 
-impl From<f64> for Cell {
-    fn from(number: f64) -> Self {
-        if number.is_finite() { Self::Number(number) } else { Self::Missing }
-    }
+/// Conversions to cells.
+macro_rules! cell_from {
+    ($($value:ident: $type:ty => $cell:expr;)*) => {$(
+        impl From<$type> for Cell {
+            fn from($value: $type) -> Self {
+                $cell
+            }
+        }
+    )*};
 }
 
-impl From<f32> for Cell {
-    fn from(number: f32) -> Self {
-        f64::from(number).into()
-    }
-}
-
-impl From<i64> for Cell {
-    fn from(integer: i64) -> Self {
-        Self::Integer(integer)
-    }
-}
-
-impl From<u32> for Cell {
-    fn from(integer: u32) -> Self {
-        Self::Integer(integer.into())
-    }
-}
-
-impl From<usize> for Cell {
-    fn from(integer: usize) -> Self {
-        i64::try_from(integer).map_or(Self::Number(integer as f64), Self::Integer)
-    }
-}
-
-impl From<bool> for Cell {
-    fn from(flag: bool) -> Self {
-        Self::Flag(flag)
-    }
-}
-
-impl From<&str> for Cell {
-    fn from(text: &str) -> Self {
-        Self::Text(text.into())
-    }
-}
-
-impl From<String> for Cell {
-    fn from(text: String) -> Self {
-        Self::Text(text)
-    }
+cell_from! {
+    number: f64 => if number.is_finite() { Self::Number(number) } else { Self::Missing };
+    number: f32 => f64::from(number).into();
+    integer: i64 => Self::Integer(integer);
+    integer: u32 => Self::Integer(integer.into());
+    integer: usize => i64::try_from(integer).map_or(Self::Number(integer as f64), Self::Integer);
+    flag: bool => Self::Flag(flag);
+    text: &str => Self::Text(text.into());
+    text: String => Self::Text(text);
 }
 
 impl<T: Into<Self>> From<Option<T>> for Cell {

@@ -3,12 +3,9 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod cell;
-mod error;
 mod number;
 mod table;
-mod text;
 
 pub use cell::Cell;
-pub use error::TableError;
 pub use number::format_number;
-pub use table::{Column, Table};
+pub use table::{Column, Table, TableError};

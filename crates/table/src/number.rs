@@ -3,17 +3,12 @@
 /// A number with four significant digits and without trailing zeros, with a power of ten where it has too many zeros.
 #[must_use]
 pub fn format_number(value: f64) -> String {
-    if !value.is_finite() {
-        return if value.is_nan() {
-            "not a number".into()
-        } else if value > 0.0 {
-            "∞".into()
-        } else {
-            "-∞".into()
-        };
-    }
-    if value == 0.0 {
-        return "0".into();
+    match value {
+        0.0 => return "0".into(),
+        f64::INFINITY => return "∞".into(),
+        f64::NEG_INFINITY => return "-∞".into(),
+        _ if value.is_nan() => return "not a number".into(),
+        _ => (),
     }
     // The exponent after rounding: 9999.6 is 10000.
     let scientific = format!("{value:.3e}");

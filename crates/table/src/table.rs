@@ -3,7 +3,18 @@
 use serde::{Deserialize, Serialize};
 
 use crate::cell::Cell;
-use crate::error::TableError;
+
+/// A table that cannot be made or written.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum TableError {
+    /// A row and the columns differ in number.
+    #[error("row {row} of table {table:?} has {cells} cells, its columns are {columns}")]
+    RowLength { table: String, row: usize, cells: usize, columns: usize },
+    /// The CSV writer failed.
+    #[error("cannot write a table: {0}")]
+    Csv(#[from] csv::Error),
+}
 
 /// A column.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,12 +26,6 @@ pub struct Column {
 }
 
 impl Column {
-    /// A column with a unit, or with `""`.
-    #[must_use]
-    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self { name: name.into(), unit: unit.into() }
-    }
-
     /// `name (unit)`.
     #[must_use]
     pub fn heading(&self) -> String {
@@ -46,8 +51,8 @@ impl Table {
     /// An empty table of `(heading, unit)` columns.
     #[must_use]
     pub fn new(name: impl Into<String>, columns: &[(&str, &str)]) -> Self {
-        let columns = columns.iter().map(|&(name, unit)| Column::new(name, unit)).collect();
-        Self { name: name.into(), columns, rows: Vec::new() }
+        let column = |&(name, unit): &(&str, &str)| Column { name: name.into(), unit: unit.into() };
+        Self { name: name.into(), columns: columns.iter().map(column).collect(), rows: Vec::new() }
     }
 
     /// Adds a row.
@@ -81,6 +86,26 @@ impl Table {
             writer.write_record(row.iter().map(Cell::full))?;
         }
         writer.into_inner().map_err(|error| csv::Error::from(error.into_error()).into())
+    }
+
+    /// The name, then aligned columns: words to the left, numbers to the right.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let heads: Vec<String> = self.columns.iter().map(Column::heading).collect();
+        let rows: Vec<Vec<String>> = self.rows.iter().map(|row| row.iter().map(Cell::display).collect()).collect();
+        let width =
+            |column: usize| rows.iter().chain([&heads]).map(|row| row[column].chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..heads.len()).map(width).collect();
+        let is_number = |cell: &Cell| cell.is_numeric() || *cell == Cell::Missing;
+        let line = |row: &Vec<String>| {
+            let cell = |(column, text): (usize, &String)| match self.rows.iter().all(|row| is_number(&row[column])) {
+                true => format!("{text:>0$}", widths[column]),
+                false => format!("{text:<0$}", widths[column]),
+            };
+            row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()
+        };
+        let lines = [&heads].into_iter().chain(&rows).map(line);
+        format!("{}\n{}", self.name, lines.collect::<Vec<_>>().join("\n"))
     }
 
     /// The table as Markdown, with numbers as in [`Cell::display`].
@@ -118,5 +143,15 @@ mod tests {
     fn a_row_with_too_few_cells_is_refused() {
         let mut table = Table::new("costs", &[("what", ""), ("time", "ms")]);
         assert!(matches!(table.push([1_u32.into()]), Err(TableError::RowLength { cells: 1, columns: 2, .. })));
+    }
+
+    #[test]
+    fn columns_of_text_are_aligned() {
+        let mut table = Table::new("Times", &[("method", ""), ("time", "ms")]);
+        table.push(["direct".into(), 60.0.into()]).unwrap();
+        table.push(["joint_carve".into(), 3.25.into()]).unwrap();
+        let lines: Vec<String> = table.to_text().lines().map(str::to_owned).collect();
+        assert_eq!(lines.len(), 4);
+        assert!(lines[1..].iter().all(|line| line.chars().count() == lines[1].chars().count()), "{lines:?}");
     }
 }

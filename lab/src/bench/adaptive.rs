@@ -16,6 +16,7 @@ use super::timing::in_turn;
 use crate::evaluation::mean_flip;
 use crate::lighting_study::FINE;
 use crate::progress::bar;
+use crate::scene_args::scene_args;
 
 /// The lighting whose picture counts as converged.
 const CONVERGED: &str = "soft 256, occlusion 256";
@@ -49,7 +50,7 @@ const COLUMNS: [(&str, &str); 8] = [
 /// Adds a table, charts and checks.
 pub fn compare(args: &BenchArgs, engine: &Arc<GpuEngine>, setup: &Setup, report: &mut Report) -> anyhow::Result<()> {
     let spec: SceneSpec = SMOOTH.parse()?;
-    let smooth = SceneArgs { sample_size: args.scene.sample_size, ..SceneArgs::of(spec) }.load()?;
+    let smooth = SceneArgs { sample_size: args.scene.sample_size, ..scene_args(spec) }.load()?;
     engine.put_scene(smooth.offer.hash.as_str(), &smooth.scene)?;
     let mut table = Table::new(format!("Adaptive rate, {FINE}"), &COLUMNS);
     let own = args.scene.scene.to_string();

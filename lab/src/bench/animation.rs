@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use app_core::setup::{SceneArgs, Setup};
+use app_core::setup::Setup;
 use depth_image::Camera;
 use engine::GpuEngine;
 use render::{AccelerationReport, DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
@@ -13,6 +13,7 @@ use study::{Axis, Bar, Check, Report, Series, Table, XyChart};
 use super::args::BenchArgs;
 use super::timing::in_turn;
 use crate::progress::bar;
+use crate::scene_args::scene_args;
 use crate::statistics::median;
 
 const SCENE: &str = "tree-terrain-500k-wind";
@@ -46,7 +47,7 @@ struct Moment {
 pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let name = if args.quick { SCENE_QUICK } else { SCENE };
     let spec: SceneSpec = name.parse()?;
-    let setup = SceneArgs::of(spec).load()?;
+    let setup = scene_args(spec).load()?;
     engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
     let scene = engine.scene(setup.offer.hash.as_str())?;
     let moments = moments(args, engine, &scene, &setup)?;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use app_core::setup::{Setup, resized};
+use app_core::setup::Setup;
 use depth_image::{Camera, DepthImage, PinholeCamera, linear_from_rgb9e5};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
@@ -47,7 +47,7 @@ struct Error {
 /// Adds a table, a chart and checks.
 pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, setup: &Setup, report: &mut Report) -> anyhow::Result<()> {
     let scene = engine.scene(setup.offer.hash.as_str())?;
-    let camera = resized(*setup.samples.first().context("no sample cameras")?, SIZE_PX);
+    let camera = setup.samples.first().context("no sample cameras")?.resized(SIZE_PX);
     let rays = if args.quick { &RAYS[..QUICK] } else { &RAYS[..] };
     let progress = bar("error against rays", KINDS.len() * (1 + rays.len()));
     let mut of_kinds = Vec::with_capacity(KINDS.len());

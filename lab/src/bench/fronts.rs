@@ -16,6 +16,7 @@ use crate::evaluation::Evaluation;
 use crate::experiment::VIEW_SIZE_PX;
 use crate::progress::bar;
 use crate::reference_views::ReferenceViews;
+use crate::scene_args::scene_args;
 use crate::sweep;
 
 /// The number of models of a folder that are compared, the largest files.
@@ -87,7 +88,7 @@ fn sweep_scene(
     engine: &Arc<GpuEngine>,
     report: &mut Report,
 ) -> anyhow::Result<()> {
-    let scene = SceneArgs { lighting: args.scene.lighting, ..SceneArgs::of(spec) };
+    let scene = SceneArgs { lighting: args.scene.lighting, ..scene_args(spec) };
     let setup = scene.load()?;
     let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
     let reference = ReferenceViews::draw(engine, &setup, &scene, cell.spread(args.compared_views(), VIEW_SIZE_PX))?;

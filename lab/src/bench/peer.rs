@@ -13,6 +13,7 @@ use study::{Bar, Check, Report};
 use super::args::BenchArgs;
 use crate::evaluation::Evaluation;
 use crate::reference_views::ReferenceViews;
+use crate::scene_args::scene_args;
 use crate::sweep;
 
 /// A fiftieth of the 280 ms a view that RVS takes on two cores.
@@ -39,7 +40,7 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
     let scene = SceneArgs {
         lighting: Lighting::UNLIT,
         samples: Some(folder.join("samples.json")),
-        ..SceneArgs::of(SceneSpec::File(folder.join("bench.ply")))
+        ..scene_args(SceneSpec::File(folder.join("bench.ply")))
     };
     let setup = scene.load()?;
     let views = views(args, &setup, folder)?;

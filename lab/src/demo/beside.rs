@@ -1,8 +1,8 @@
 //! The sampling asked for, with conventional sampling beside it.
 
 use anyhow::Context as _;
+use app_core::pictures;
 use app_core::setup::{SceneArgs, Setup};
-use app_core::{pictures, provenance};
 use metrics::{Rgb8Image, flip_map};
 use sampling::SamplingMethod;
 use study::{Cell, Report, Table, comparison_row};
@@ -63,11 +63,8 @@ fn show(
     for (index, (direct, view)) in reference.views.iter().zip(&views).take(SIDE_BY_SIDE).enumerate() {
         let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(view)?)?;
         let images = pictures::rgb(direct).zip(pictures::rgb(view)).context("a view is not of its size")?;
-        let (title, provenance) = (
-            format!("{sampling}, view {index}"),
-            provenance::false_color(view).map(|picture| (picture.image, picture.legend)),
-        );
-        report.pictures.push(comparison_row(&title, images.0, images.1, &flip, provenance));
+        let title = format!("{sampling}, view {index}");
+        report.pictures.push(comparison_row(&title, images.0, images.1, &flip, pictures::provenance(view)));
     }
     Ok(())
 }

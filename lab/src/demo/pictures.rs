@@ -1,7 +1,7 @@
 //! Pictures of the views.
 
 use anyhow::Context as _;
-use app_core::{pictures, provenance};
+use app_core::pictures;
 use client::Frame;
 use depth_image::View;
 use image::imageops;
@@ -36,8 +36,13 @@ pub fn comparisons(reference: &ReferenceViews, views: &[View], report: &mut Repo
     for (index, (direct, view)) in reference.views.iter().zip(views).take(SIDE_BY_SIDE).enumerate() {
         let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(view)?)?;
         let images = pictures::rgb(direct).zip(pictures::rgb(view)).context("a view is not of its size")?;
-        let provenance = provenance::false_color(view).map(|picture| (picture.image, picture.legend));
-        report.pictures.push(comparison_row(&format!("View {index}"), images.0, images.1, &flip, provenance));
+        report.pictures.push(comparison_row(
+            &format!("View {index}"),
+            images.0,
+            images.1,
+            &flip,
+            pictures::provenance(view),
+        ));
     }
     Ok(())
 }

@@ -2,11 +2,12 @@
 
 use app_core::delivery::Delivered;
 use cluster::{Costs, PolicyChoice, SessionPlan};
-use coordinator::schedule::{brute_force_k, k_fd, k_fd_printed};
+use coordinator::schedule::k_fd;
 use node::Engine as _;
 use reconstruction::ReconstructionMethod;
 use study::{Report, Table};
 
+use crate::balance::{brute_force_k, k_fd_printed};
 use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
 use crate::progress::bar;
 

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use anyhow::Context as _;
-use app_core::delivery::{SessionSettings, open};
+use app_core::delivery::{at_rate, open, request};
 use app_core::live::{Drive, Record, drive};
 use client::{Client, ClientError, LiveView, Session};
-use cluster::PolicyChoice;
+use cluster::{PolicyChoice, SessionRequest};
 use depth_image::{Camera, PinholeCamera, ViewCell};
 use glam::UVec2;
 use tokio::task::JoinSet;
@@ -39,7 +39,7 @@ pub enum Outcome {
 #[derive(Debug, Clone)]
 pub struct Tour {
     coordinator: String,
-    settings: SessionSettings,
+    request: SessionRequest,
     path: Vec<PinholeCamera>,
 }
 
@@ -53,15 +53,15 @@ impl Tour {
         let offer = status.offer.context("the coordinator does not say what it shows")?;
         let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
         let path = ViewCell::between(&samples).context("no sample cameras")?.orbit(PATH_POSES, size_px);
-        let settings =
-            SessionSettings { policy: PolicyChoice::Pipeline, ..SessionSettings::offered(&offer).at_rate(rate_hz) };
-        Ok(Self { coordinator: coordinator.to_owned(), settings, path })
+        let request = at_rate(request(offer.settings, &path[..1])?, rate_hz);
+        let request = SessionRequest { policy: PolicyChoice::Pipeline, ..request };
+        Ok(Self { coordinator: coordinator.to_owned(), request, path })
     }
 
     /// Opens a connection and a session. All sessions have the same typical view, so that costs are measured once.
     pub async fn session(&self) -> anyhow::Result<Session> {
         let client = Client::connect(&self.coordinator).await?;
-        open(&client, &self.settings, &self.path[..1]).await
+        open(&client, self.request.clone()).await
     }
 
     /// The path, from a start of the client's own.

@@ -16,6 +16,7 @@ use super::matrix::Extent;
 use super::measure::{Request, take};
 use super::report::{report, show};
 use super::subject::Subject;
+use crate::scene_args::scene_args;
 
 /// Measures the time between two sample sets on a coordinator and P node processes, for P = 2…11 nodes, V = 10…1000
 /// views and every policy. Each node has an equal share of this machine's processors by control groups of Linux, so
@@ -93,7 +94,7 @@ impl ScalingArgs {
 pub fn run(args: &ScalingArgs) -> anyhow::Result<Outcome> {
     let request = args.request()?;
     create_dir_all(&args.out).with_context(|| format!("cannot write to {}", args.out.display()))?;
-    let scene = SceneArgs { method: args.method, ..SceneArgs::of(args.scene.clone()) };
+    let scene = SceneArgs { method: args.method, ..scene_args(args.scene.clone()) };
     let subject = Subject::load(&scene)?;
     let measured = runtime()?.block_on(take(&request, &subject))?;
     println!("simulating up to {} nodes", args.simulate_to);

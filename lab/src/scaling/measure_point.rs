@@ -7,9 +7,9 @@
 
 use std::time::Instant;
 
-use app_core::delivery::{SessionSettings, open};
+use app_core::delivery::open;
 use client::{Frame, Session, ViewRequest};
-use cluster::Policy;
+use cluster::{Policy, SessionRequest};
 use codec::FrameHeader;
 use depth_image::PinholeCamera;
 
@@ -71,11 +71,11 @@ pub async fn measure(
     arrived: impl FnMut(),
 ) -> anyhow::Result<Point> {
     let views = subject.views(settings.views)?;
-    let session_settings = SessionSettings {
-        tiles: settings.forced_tiles(),
-        ..subject.session_settings(settings.lighting, settings.policy, settings.sets())
+    let request = SessionRequest {
+        forced_tile_count: settings.forced_tiles(),
+        ..subject.request(&views, settings.lighting, settings.policy, settings.sets())?
     };
-    let session = open(&processes.client, &session_settings, &views).await?;
+    let session = open(&processes.client, request).await?;
     let plan = session.plan();
     let before = processes.counters().await?;
     let (arrivals, window) = receive(processes, &session, &views, &settings, arrived).await?;

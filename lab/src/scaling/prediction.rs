@@ -1,11 +1,11 @@
 //! Predictions of a measured point: by the paper's equations, by the schedule, and by the simulation.
 
 use cluster::{Costs, Policy};
-use coordinator::schedule::pipeline_time;
 use simulation::{Cluster, Demand, Habits, Machine, plan, run};
 
 use super::measured::{MeasuredLighting, Timed};
 use super::point::{Point, PointSettings};
+use crate::balance::pipeline_time;
 
 /// Simulated sets beyond those that count: the first, and those sampled ahead at the end.
 const MORE_SETS: u32 = 5;

@@ -3,9 +3,9 @@
 use std::cell::Cell;
 
 use anyhow::Context as _;
-use app_core::delivery::SessionSettings;
+use app_core::delivery::request;
 use app_core::setup::{SceneArgs, Setup};
-use cluster::{MeasureCosts, PolicyChoice, Timeline, Workload};
+use cluster::{MeasureCosts, PolicyChoice, SessionRequest, Timeline, Workload};
 use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
 use render::Lighting;
 
@@ -56,12 +56,19 @@ impl Subject {
         Timeline { start_s: f64::from(first) * SET_STEP_S, step_s: SET_STEP_S, set_count }
     }
 
-    /// Settings of a session.
-    #[must_use]
-    pub fn session_settings(&self, lighting: Lighting, policy: PolicyChoice, set_count: u32) -> SessionSettings {
-        let (method, sampling) = (self.args.method.to_string(), self.args.sampling.to_string());
-        let timeline = self.fresh_timeline(set_count);
-        SessionSettings { policy, timeline, ..SessionSettings::new(method, sampling, lighting.to_string()) }
+    /// The request of a session for `views` of each set.
+    ///
+    /// # Errors
+    /// There are no views.
+    pub fn request(
+        &self,
+        views: &[PinholeCamera],
+        lighting: Lighting,
+        policy: PolicyChoice,
+        set_count: u32,
+    ) -> anyhow::Result<SessionRequest> {
+        let (lighting, timeline) = (lighting.to_string(), self.fresh_timeline(set_count));
+        Ok(SessionRequest { lighting, policy, timeline, ..request(self.setup.offer.settings.clone(), views)? })
     }
 
     /// A measurement for a node: a new set of this lighting, and views in calls of `batch_count`.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use app_core::exit::Outcome;
-use app_core::process::{listen, runtime, serve_metrics, stop_signal};
+use app_core::process::{cancel_at_signal, listen, serve_metrics};
 use app_core::setup::{SceneArgs, Setup};
 use clap::Args;
 use coordinator::schedule::Recorder;
@@ -43,20 +43,12 @@ pub struct CoordinatorArgs {
 ///
 /// # Errors
 /// The scene cannot be used, or the port is taken.
-pub fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
-    let setup = args.scene.load()?;
-    runtime()?.block_on(serve(args, setup))
-}
-
-async fn serve(args: CoordinatorArgs, setup: Setup) -> anyhow::Result<Outcome> {
+pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
+    let Setup { scene, offer, .. } = args.scene.load()?;
     let listener = listen(args.listen, args.insecure_bind).await?;
-    println!(
-        "{}: {} triangles offered at http://{}",
-        setup.scene.name,
-        setup.scene.triangle_count(),
-        listener.local_addr()?
-    );
-    let Setup { offer, .. } = setup;
+    let (name, triangles, address) = (&scene.name, scene.triangle_count(), listener.local_addr()?);
+    println!("{name}: {triangles} triangles offered at http://{address}");
+    drop(scene);
     let shutdown = CancellationToken::new();
     let config = CoordinatorConfig {
         insecure_bind: args.insecure_bind,
@@ -68,14 +60,8 @@ async fn serve(args: CoordinatorArgs, setup: Setup) -> anyhow::Result<Outcome> {
     let telemetry = Telemetry::default();
     let metrics = CoordinatorMetrics::new(&telemetry);
     serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
-    let serving = coordinator::serve(listener, config, offer, Observers { metrics, log }, shutdown.clone());
-    tokio::spawn(async move {
-        // Without signals, the caller can still kill the process.
-        if stop_signal().await.is_ok() {
-            shutdown.cancel();
-        }
-    });
-    serving.await?;
+    cancel_at_signal(shutdown.clone());
+    coordinator::serve(listener, config, offer, Observers { metrics, log }, shutdown).await?;
     Ok(Outcome::Done)
 }
 

@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use anyhow::{Context as _, bail};
 use app_core::exit::Outcome;
-use app_core::process::runtime;
 use clap::Args;
 
 const DEADLINE: Duration = Duration::from_secs(4);
@@ -24,10 +23,10 @@ pub struct HealthArgs {
 ///
 /// # Errors
 /// The process does not serve, or does not answer within seconds.
-pub fn run(args: &HealthArgs) -> anyhow::Result<Outcome> {
-    let asked = async { tokio::time::timeout(DEADLINE, wire::rpc::is_serving(&args.address, &args.role)).await };
-    let serves = runtime()?.block_on(asked).with_context(|| format!("{} does not answer", args.address))?;
-    if !serves.with_context(|| format!("{} does not answer", args.address))? {
+pub async fn run(args: &HealthArgs) -> anyhow::Result<Outcome> {
+    let answer = tokio::time::timeout(DEADLINE, wire::rpc::is_serving(&args.address, &args.role)).await;
+    let no_answer = || format!("{} does not answer", args.address);
+    if !answer.with_context(no_answer)?.with_context(no_answer)? {
         bail!("{} does not serve", args.address);
     }
     println!("{} serves", args.address);

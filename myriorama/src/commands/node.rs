@@ -4,7 +4,7 @@ use std::net::{SocketAddr, UdpSocket};
 use std::path::PathBuf;
 
 use app_core::exit::Outcome;
-use app_core::process::{listen, runtime, serve_metrics, stop_signal};
+use app_core::process::{cancel_at_signal, listen, serve_metrics};
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use engine::GpuEngine;
@@ -37,16 +37,6 @@ pub struct NodeArgs {
     /// Describes services and messages by gRPC reflection, for grpcurl and the like
     #[arg(long)]
     reflection: bool,
-    #[command(flatten)]
-    quotas: QuotaArgs,
-    /// Serves without TLS on an address that others can reach
-    #[arg(long)]
-    insecure_bind: bool,
-}
-
-/// Quotas of a node for all its clients together; more is refused.
-#[derive(Debug, Clone, Copy, Args)]
-struct QuotaArgs {
     /// The most open streams of clients
     #[arg(long, value_name = "N", default_value_t = Quotas::default().streams)]
     max_streams: usize,
@@ -56,23 +46,16 @@ struct QuotaArgs {
     /// The most pixels of these views, and of live views
     #[arg(long, value_name = "N", default_value_t = Quotas::default().pixels)]
     max_pixels: usize,
-}
-
-impl From<QuotaArgs> for Quotas {
-    fn from(args: QuotaArgs) -> Self {
-        Self { streams: args.max_streams, views: args.max_views, pixels: args.max_pixels }
-    }
+    /// Serves without TLS on an address that others can reach
+    #[arg(long)]
+    insecure_bind: bool,
 }
 
 /// Runs until a signal.
 ///
 /// # Errors
 /// There is no device, or the port is taken.
-pub fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
-    runtime()?.block_on(serve(args))
-}
-
-async fn serve(args: NodeArgs) -> anyhow::Result<Outcome> {
+pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
     let listener = listen(args.listen, args.insecure_bind).await?;
     let address = listener.local_addr()?;
     let engine = GpuEngine::shared(args.device.device)?;
@@ -84,21 +67,15 @@ async fn serve(args: NodeArgs) -> anyhow::Result<Outcome> {
         advertised_address: advertise,
         insecure_bind: args.insecure_bind,
         reflection: args.reflection,
-        quotas: args.quotas.into(),
+        quotas: Quotas { streams: args.max_streams, views: args.max_views, pixels: args.max_pixels },
         ..NodeConfig::new(name, args.coordinator)
     };
     let shutdown = CancellationToken::new();
     let telemetry = Telemetry::default();
     let metrics = NodeMetrics::new(&telemetry);
     serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
-    let serving = node_host::serve(listener, config, engine, metrics, shutdown.clone());
-    tokio::spawn(async move {
-        // Without signals, the caller can still kill the process.
-        if stop_signal().await.is_ok() {
-            shutdown.cancel();
-        }
-    });
-    serving.await?;
+    cancel_at_signal(shutdown.clone());
+    node_host::serve(listener, config, engine, metrics, shutdown).await?;
     Ok(Outcome::Done)
 }
 

@@ -26,6 +26,9 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<Outcome> {
     let file = File::open(&args.log).with_context(|| format!("cannot read {}", args.log.display()))?;
     let steps = replay(BufReader::new(file)).map_err(|error| wrong(args, error))?;
     let events = steps.len();
+    // Liveness probes of all nodes come every few seconds.
+    let is_routine =
+        |command: &Command| matches!(command, Command::Probe(probe) if probe.kind() == ProbeKind::Liveness);
     for Step { now, commands, .. } in steps {
         for command in commands.iter().filter(|command| !is_routine(command)) {
             println!("{:>10.3} s  {command}", now.as_secs_f64());
@@ -33,11 +36,6 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<Outcome> {
     }
     eprintln!("{events} events");
     Ok(Outcome::Done)
-}
-
-/// Liveness probes of all nodes come every few seconds.
-fn is_routine(command: &Command) -> bool {
-    matches!(command, Command::Probe(probe) if probe.kind() == ProbeKind::Liveness)
 }
 
 fn wrong(args: &ReplayArgs, error: LogError) -> anyhow::Error {

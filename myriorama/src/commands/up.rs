@@ -4,8 +4,8 @@ use std::net::SocketAddr;
 
 use app_core::cluster::Cluster;
 use app_core::exit::Outcome;
-use app_core::process::{listen, runtime, stop_signal};
-use app_core::setup::{DeviceArgs, SceneArgs, Setup};
+use app_core::process::{listen, stop_signal};
+use app_core::setup::{DeviceArgs, SceneArgs};
 use clap::Args;
 use engine::GpuEngine;
 use node::Engine as _;
@@ -35,12 +35,8 @@ pub struct UpArgs {
 ///
 /// # Errors
 /// The scene cannot be used, there is no device, or the port is taken.
-pub fn run(args: UpArgs) -> anyhow::Result<Outcome> {
+pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     let setup = args.scene.load()?;
-    runtime()?.block_on(serve(args, setup))
-}
-
-async fn serve(args: UpArgs, setup: Setup) -> anyhow::Result<Outcome> {
     let listener = listen(args.listen, args.insecure_bind).await?;
     let engine = GpuEngine::shared(args.device.device)?;
     engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;

@@ -5,11 +5,8 @@ use std::time::Duration;
 use cluster::{Assignment, FetchImages, SamplerReport};
 
 use super::Scheduler;
-use crate::schedule::command::{Command, Probe, ProbedImage};
-use crate::schedule::demand::ChoiceError;
-use crate::schedule::event::ProbeKind;
 use crate::schedule::member::Member;
-use crate::schedule::reports::{AtFault, Attribution};
+use crate::schedule::{ChoiceError, Command, Probe, ProbeKind, ProbedImage};
 
 /// Duration of a quarantine, after which a link may be restored.
 const QUARANTINE: Duration = Duration::from_secs(30);
@@ -99,12 +96,10 @@ impl Scheduler {
             return Vec::new();
         }
         let SamplerReport { plan_epoch, compositor, sampler, reason } = report.clone();
-        match self.reports.file(self.now, report) {
-            Attribution::SamplerAtFault => {
-                self.quarantine(&sampler, &format!("sends no images to {compositor} and others: {reason}"))
-            }
-            Attribution::Probe => self.probe_image(plan_epoch, &sampler).into_iter().collect(),
+        if self.reports.file(self.now, report) {
+            return self.quarantine(&sampler, &format!("sends no images to {compositor} and others: {reason}"));
         }
+        self.probe_image(plan_epoch, &sampler).into_iter().collect()
     }
 
     /// One probe of a sampler at a time. Each report on file has another image fetched.
@@ -156,7 +151,7 @@ impl Scheduler {
         if let Some(reason) = failure {
             return self.quarantine(sampler, &format!("sends no images: {reason}"));
         }
-        let at_fault = self.reports.refute(sampler).into_iter().map(|AtFault { compositor, reason }| {
+        let at_fault = self.reports.refute(sampler).into_iter().map(|(compositor, reason)| {
             self.quarantine(&compositor, &format!("reports samplers whose images can be had: {reason}"))
         });
         at_fault.flatten().collect()
@@ -186,9 +181,8 @@ impl Scheduler {
 
 /// The image of a sampler's share at `number`, counted cyclically, of the first set that the sampler samples.
 fn probed_image(plan: &Assignment, sampler: &str, number: usize) -> Option<ProbedImage> {
-    let sets = 0..plan.sets_at_once();
-    let set_index = sets.into_iter().find(|&set_index| !plan.images_of(sampler, set_index).is_empty())?;
-    let images = plan.images_of(sampler, set_index);
+    let sets = (0..plan.sets_at_once()).map(|set_index| (set_index, plan.images_of(sampler, set_index)));
+    let (set_index, images) = sets.into_iter().find(|(_, images)| !images.is_empty())?;
     let image = images.get(number % images.len()).copied()?;
     let camera = plan.sampled_cameras().get(image as usize).copied()?;
     let (cell, first) = cell_of_image(plan, image)?;

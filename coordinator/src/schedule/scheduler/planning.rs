@@ -5,16 +5,13 @@ use cluster::{Assignment, Costs, Policy, SessionPlan};
 use super::Scheduler;
 use crate::schedule::active_plan::ActivePlan;
 use crate::schedule::assign::{Candidate, assignment};
-use crate::schedule::choose::{WORTH, choose, step_from};
-use crate::schedule::command::Command;
-use crate::schedule::demand::{Choice, CurrentRoles, Demand, PolicyOverride};
+use crate::schedule::choose::{WORTH, step_from};
 use crate::schedule::estimate::common_ratios;
 use crate::schedule::hysteresis::Gain;
-use crate::schedule::load::Load;
 use crate::schedule::member::Member;
-use crate::schedule::node_costs::NodeCosts;
 use crate::schedule::overload::UtilizationSample;
 use crate::schedule::prediction::{direct_s, pipeline_by_s, time_share_s};
+use crate::schedule::{Choice, Command, CurrentRoles, Demand, Load, NodeCosts, PolicyOverride, choose};
 
 /// A node without a role gets one for a smaller gain than roles are changed for.
 const WORTH_OF_IDLE: f64 = 1.02;

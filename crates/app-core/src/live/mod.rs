@@ -63,13 +63,6 @@ pub async fn drive(session: &Session, drive: &Drive) -> Result<Record, ClientErr
     Ok(driving.record)
 }
 
-impl Drive {
-    fn pose(&self, number: u64, posed_s: f64) -> (PinholeCamera, u32) {
-        let camera = self.path[(number % self.path.len() as u64) as usize];
-        (camera, ((posed_s / self.set_step_s) as u64 % u64::from(self.set_count)) as u32)
-    }
-}
-
 impl Driving<'_> {
     async fn follow(&mut self, drive: &Drive) -> Result<(), ClientError> {
         let mut ticks = tokio::time::interval(Duration::from_secs_f64(1.0 / drive.rate_hz));
@@ -85,12 +78,13 @@ impl Driving<'_> {
 
     /// Sends a pose as often as the plan has pictures for it.
     fn pose(&mut self, drive: &Drive) -> Result<(), ClientError> {
-        let (camera, set_index) = drive.pose(self.record.posed, self.start.elapsed().as_secs_f64());
+        let camera = drive.path[(self.record.posed % drive.path.len() as u64) as usize];
+        let sets = (self.start.elapsed().as_secs_f64() / drive.set_step_s) as u64;
         self.record.posed += 1;
         self.due += self.plan().frame_rate_ratio;
         if self.due >= 1.0 {
             self.due -= 1.0;
-            self.last_frame = self.live.set_pose(camera, set_index)?;
+            self.last_frame = self.live.set_pose(camera, (sets % u64::from(drive.set_count)) as u32)?;
         }
         Ok(())
     }
@@ -105,10 +99,8 @@ impl Driving<'_> {
     async fn wait_for_the_last(&mut self) {
         let end = Instant::now() + LAST_FRAME;
         while self.record.error.is_none() && self.record.shown.last().is_none_or(|last| last.frame < self.last_frame) {
-            match tokio::time::timeout_at(end.into(), self.live.next()).await {
-                Ok(frame) => self.take(frame),
-                Err(_) => return,
-            }
+            let Ok(frame) = tokio::time::timeout_at(end.into(), self.live.next()).await else { return };
+            self.take(frame);
         }
     }
 

@@ -107,8 +107,8 @@ impl Record {
         let mut table = Table::new("Frames", &columns);
         for shown in &self.shown {
             let numbers = [shown.frame as f64, shown.posed_s, shown.shown_s, shown.plan_epoch as f64];
-            let rest = [Cell::from(shown.set_index as f64), shown.fallback.into(), shown.set_age_s.into()];
-            table.push(numbers.map(Cell::from).into_iter().chain(rest).chain(shown.stages_s.map(Cell::from)))?;
+            let rest = [shown.set_index as f64, shown.fallback.into(), shown.set_age_s];
+            table.push(numbers.into_iter().chain(rest).chain(shown.stages_s).map(Cell::from))?;
         }
         Ok(table)
     }

@@ -1,6 +1,5 @@
 //! Surfaces found by triangles or by rays: the renderer's choice beside both times.
 
-use app_core::setup::resized;
 use depth_image::{PinholeCamera, ViewPlanes};
 use glam::UVec2;
 use render::{Choice, Lighting, Visibility};
@@ -27,7 +26,7 @@ pub(super) fn measure(subject: &Subject<'_>, hash: &str, report: &mut Report) ->
     let mut table = Table::new("How surfaces are found, one view unlit", &CHOICES);
     let mut worst = 0f64;
     for size_px in SIZES_PX {
-        let camera = resized(*subject.camera()?, size_px);
+        let camera = subject.camera()?.resized(size_px);
         let choice = subject.engine.renderer.choice(&*subject.engine.scene(hash)?, &camera, 0.0)?;
         let again = again(subject, &camera)?;
         worst = worst.max(chosen_over_other(&choice, &again));

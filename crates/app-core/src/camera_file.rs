@@ -1,0 +1,270 @@
+//! Camera files: nerfstudio's `transforms.json`, so that anyone can run someone else's experiment.
+//!
+//! `transform_matrix` is camera to world, the camera looking down −Z with +Y up. Focal lengths and principal points are
+//! in pixels, for a frame or for all. Only pinhole cameras can be used: distortion that is not zero is refused by name.
+//! Files are in the scene file's own space: the origin of a re-centred scene is subtracted in double precision.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+use depth_image::{CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera};
+use glam::{DMat3, DQuat, DVec3, UVec2, Vec2};
+use serde_json::{Map, Value, json};
+
+/// The most bytes of a camera file: a thousand cameras take about 0.5 MB.
+pub const MAX_FILE_BYTES: u64 = 32 << 20;
+/// The most cameras of a file.
+const MAX_FRAMES: usize = 65_536;
+/// The tolerance of a matrix's axes to unit length and right angles.
+const RIGID_TOLERANCE: f64 = 1e-3;
+const MODELS: [&str; 3] = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE"];
+const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
+
+/// Facts that a camera file does not state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    /// The origin of world space, in the file's space.
+    pub origin_in_source: DVec3,
+    /// The distance to the near plane.
+    pub near_m: f32,
+}
+
+/// A camera file that cannot be used, with the place of the fault.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}: {place}: {kind}")]
+pub struct CameraFileError {
+    /// The path of the file.
+    pub file: String,
+    /// `frame 3, fl_x`, or the part outside frames.
+    pub place: String,
+    /// The reason.
+    #[source]
+    pub kind: CameraFault,
+}
+
+/// A fault of a camera file.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum CameraFault {
+    /// The operating system refused access.
+    #[error("cannot be read or written: {0}")]
+    Io(#[from] std::io::Error),
+    /// The file is not JSON.
+    #[error("{0}")]
+    Json(#[from] serde_json::Error),
+    /// A size or a number is over its limit.
+    #[error("{actual} is over the limit of {limit}")]
+    TooLarge { actual: u64, limit: u64 },
+    /// A required field is missing.
+    #[error("is missing")]
+    Missing,
+    /// A number is NaN, infinite, or of another type.
+    #[error("is {0}, must be a finite number")]
+    NotFinite(String),
+    /// A value is outside the range of its field.
+    #[error("is {value}, must be {allowed}")]
+    OutOfRange { value: String, allowed: &'static str },
+    /// A pinhole camera has no such model or distortion.
+    #[error("{0} is not supported: cameras here are pinholes without distortion")]
+    Unsupported(String),
+    /// The camera as a whole is not valid.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+}
+
+/// A fault at a place, before the file is named.
+fn fault(place: impl Into<String>, kind: impl Into<CameraFault>) -> CameraFileError {
+    CameraFileError { file: String::new(), place: place.into(), kind: kind.into() }
+}
+
+/// Reads all cameras of a file.
+///
+/// # Errors
+/// The error names the file, the frame, the field and the reason.
+pub fn read(path: &Path, placement: Placement) -> Result<Vec<PinholeCamera>, CameraFileError> {
+    let cameras = text_of(path).and_then(|text| parse(&text, placement));
+    cameras.map_err(|error| CameraFileError { file: path.display().to_string(), ..error })
+}
+
+fn text_of(path: &Path) -> Result<String, CameraFileError> {
+    let mut text = String::new();
+    // One byte more than allowed: a pipe has no length to check first.
+    let read = File::open(path).and_then(|file| file.take(MAX_FILE_BYTES + 1).read_to_string(&mut text));
+    read.map_err(|error| fault("file", error))?;
+    at_most("file", text.len() as u64, MAX_FILE_BYTES)?;
+    Ok(text)
+}
+
+fn at_most(place: &str, actual: u64, limit: u64) -> Result<(), CameraFileError> {
+    if actual > limit { Err(fault(place, CameraFault::TooLarge { actual, limit })) } else { Ok(()) }
+}
+
+fn parse(text: &str, placement: Placement) -> Result<Vec<PinholeCamera>, CameraFileError> {
+    let json: Value = serde_json::from_str(&without_nan(text)).map_err(|error| fault("file", error))?;
+    let shared = json.as_object().ok_or_else(|| fault("file", CameraFault::Missing))?;
+    let frames = shared.get("frames").and_then(Value::as_array).filter(|frames| !frames.is_empty());
+    let frames = frames.ok_or_else(|| fault("frames", CameraFault::Missing))?;
+    at_most("frames", frames.len() as u64, MAX_FRAMES as u64)?;
+    let camera = |(index, frame): (usize, &Value)| {
+        let own = frame.as_object().ok_or_else(|| fault(format!("frame {index}"), CameraFault::Missing))?;
+        Frame { index, own, shared }.camera(placement)
+    };
+    frames.iter().enumerate().map(camera).collect()
+}
+
+/// Replaces NaN and Infinity, which Python writes and JSON does not have, by `null`: they are reported with frame and
+/// field. Strings of camera files hold no escaped quotes.
+fn without_nan(text: &str) -> String {
+    let numbers = |part: &str| part.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");
+    let parts = text.split('"').enumerate();
+    let parts = parts.map(|(index, part)| if index % 2 == 0 { numbers(part) } else { part.to_owned() });
+    parts.collect::<Vec<_>>().join("\"")
+}
+
+/// A frame, and the fields that the file has for all frames.
+struct Frame<'a> {
+    index: usize,
+    own: &'a Map<String, Value>,
+    shared: &'a Map<String, Value>,
+}
+
+impl Frame<'_> {
+    fn fault(&self, field: &str, kind: impl Into<CameraFault>) -> CameraFileError {
+        fault(format!("frame {}, {field}", self.index), kind)
+    }
+
+    fn value(&self, field: &str) -> Option<&Value> {
+        self.own.get(field).or_else(|| self.shared.get(field))
+    }
+
+    fn optional(&self, field: &str) -> Result<Option<f64>, CameraFileError> {
+        self.value(field).map(|value| finite(value).map_err(|kind| self.fault(field, kind))).transpose()
+    }
+
+    fn number(&self, field: &str) -> Result<f64, CameraFileError> {
+        self.optional(field)?.ok_or_else(|| self.fault(field, CameraFault::Missing))
+    }
+
+    fn side(&self, field: &str) -> Result<u32, CameraFileError> {
+        let side = self.number(field)?;
+        if side.fract() == 0.0 && (1.0..=f64::from(MAX_IMAGE_SIDE_PX)).contains(&side) {
+            return Ok(side as u32);
+        }
+        let (value, allowed) = (side.to_string(), "a whole number from 1 to 16384");
+        Err(self.fault(field, CameraFault::OutOfRange { value, allowed }))
+    }
+
+    fn check_model(&self) -> Result<(), CameraFileError> {
+        let model = self.value("camera_model").and_then(Value::as_str).unwrap_or("OPENCV");
+        if !MODELS.contains(&model) {
+            return Err(self.fault("camera_model", CameraFault::Unsupported(model.to_owned())));
+        }
+        for field in DISTORTIONS {
+            if let Some(value) = self.optional(field)?.filter(|value| *value != 0.0) {
+                return Err(self.fault(field, CameraFault::Unsupported(format!("{field} = {value}"))));
+            }
+        }
+        Ok(())
+    }
+
+    fn camera(&self, placement: Placement) -> Result<PinholeCamera, CameraFileError> {
+        self.check_model()?;
+        let size_px = UVec2::new(self.side("w")?, self.side("h")?);
+        let focal_x = self.number("fl_x")?;
+        let principal = [
+            self.optional("cx")?.unwrap_or(f64::from(size_px.x) / 2.0),
+            self.optional("cy")?.unwrap_or(f64::from(size_px.y) / 2.0),
+        ];
+        let (rotation, eye_in_source) = self.pose()?;
+        let camera = PinholeCamera {
+            eye_in_world: (eye_in_source - placement.origin_in_source).as_vec3(),
+            world_from_camera: rotation.as_quat().normalize(),
+            focal_px: Vec2::new(focal_x as f32, self.optional("fl_y")?.unwrap_or(focal_x) as f32),
+            principal_px: Vec2::from_array(principal.map(|v| v as f32)),
+            size_px,
+            near_m: placement.near_m,
+        };
+        camera.validate().map_err(|error| self.fault("camera", error))?;
+        Ok(camera)
+    }
+
+    fn pose(&self) -> Result<(DQuat, DVec3), CameraFileError> {
+        let rows = self.rows()?;
+        let column = |i: usize| DVec3::new(rows[0][i], rows[1][i], rows[2][i]);
+        let axes = DMat3::from_cols(column(0), column(1), column(2));
+        let offs = (axes.transpose() * axes - DMat3::IDENTITY).to_cols_array();
+        let off = offs.into_iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        if off > RIGID_TOLERANCE || axes.determinant() < 0.0 || rows[3] != [0.0, 0.0, 0.0, 1.0] {
+            let value = format!("no rotation (determinant {:.4}, axes off by {off:.4})", axes.determinant());
+            let allowed = "rigid: a rotation, a translation and the row 0 0 0 1";
+            return Err(self.fault("transform_matrix", CameraFault::OutOfRange { value, allowed }));
+        }
+        Ok((DQuat::from_mat3(&axes).normalize(), column(3)))
+    }
+
+    fn rows(&self) -> Result<[[f64; 4]; 4], CameraFileError> {
+        let fault = |kind| self.fault("transform_matrix", kind);
+        let given = self.own.get("transform_matrix").cloned().and_then(|matrix| serde_json::from_value(matrix).ok());
+        let given: Vec<Vec<Value>> = given.ok_or_else(|| fault(CameraFault::Missing))?;
+        let count = Some(given.len()).filter(|count| !(3..=4).contains(count));
+        if let Some(wrong) = count.or_else(|| given.iter().map(Vec::len).find(|length| *length != 4)) {
+            let (value, allowed) = (format!("of {wrong} rows or columns"), "4 rows of 4 numbers");
+            return Err(fault(CameraFault::OutOfRange { value, allowed }));
+        }
+        // The last row may be left out.
+        let mut rows = [[0.0, 0.0, 0.0, 1.0]; 4];
+        for (number, value) in rows.iter_mut().flatten().zip(given.iter().flatten()) {
+            *number = finite(value).map_err(fault)?;
+        }
+        Ok(rows)
+    }
+}
+
+fn finite(value: &Value) -> Result<f64, CameraFault> {
+    let told = || if value.is_null() { "null, NaN or infinite".to_owned() } else { value.to_string() };
+    value.as_f64().filter(|v| v.is_finite()).ok_or_else(|| CameraFault::NotFinite(told()))
+}
+
+/// A camera to write, with further fields.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedCamera {
+    /// The path of the camera's picture.
+    pub file_path: String,
+    /// The camera.
+    pub camera: PinholeCamera,
+    /// Further fields of the frame.
+    pub more: Map<String, Value>,
+}
+
+/// Writes cameras in the convention of `transforms.json`; `file` has fields to go beside the frames.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(
+    path: &Path,
+    cameras: &[NamedCamera],
+    origin_in_source: DVec3,
+    mut file: Map<String, Value>,
+) -> Result<(), CameraFileError> {
+    file.insert("camera_model".to_owned(), json!("OPENCV"));
+    file.insert("frames".to_owned(), cameras.iter().map(|named| frame_of(named, origin_in_source)).collect());
+    let text = serde_json::to_vec_pretty(&file).map_err(CameraFault::from);
+    let written = text.and_then(|text| Ok(std::fs::write(path, text)?));
+    written.map_err(|kind| CameraFileError { file: path.display().to_string(), ..fault("file", kind) })
+}
+
+fn frame_of(named: &NamedCamera, origin_in_source: DVec3) -> Value {
+    let camera = &named.camera;
+    let axes = DMat3::from_quat(camera.world_from_camera.as_dquat().normalize());
+    let eye = camera.eye_in_world.as_dvec3() + origin_in_source;
+    let row = |i: usize| json!([axes.x_axis[i], axes.y_axis[i], axes.z_axis[i], eye[i]]);
+    let mut frame = named.more.clone();
+    let fields = json!({
+        "file_path": named.file_path, "w": camera.size_px.x, "h": camera.size_px.y,
+        "fl_x": camera.focal_px.x, "fl_y": camera.focal_px.y, "cx": camera.principal_px.x, "cy": camera.principal_px.y,
+        "transform_matrix": [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]],
+    });
+    frame.extend(fields.as_object().cloned().unwrap_or_default());
+    Value::Object(frame)
+}

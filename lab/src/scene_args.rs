@@ -1,0 +1,22 @@
+//! Arguments of a scene, without a command line.
+
+use app_core::setup::SceneArgs;
+use reconstruction::ReconstructionMethod;
+use render::Lighting;
+use sampling::SamplingMethod;
+use scene::SceneSpec;
+
+/// A scene with all other arguments by default.
+#[must_use]
+pub fn scene_args(scene: SceneSpec) -> SceneArgs {
+    SceneArgs {
+        scene,
+        lighting: Lighting::default(),
+        lights: Vec::new(),
+        environment: None,
+        method: ReconstructionMethod::default(),
+        sampling: SamplingMethod::default(),
+        sample_size: None,
+        samples: None,
+    }
+}
