@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::InvalidField;
+use crate::check::InvalidField;
 use crate::limits::{MAX_SCENE_TIME_S, MAX_SETS};
 
 /// Sets in a row that share one temporal reference.
