@@ -1,5 +1,7 @@
 //! Values that a type does not allow, and checks that several types share.
 
+use std::ops::RangeInclusive;
+
 use depth_image::{CameraError, LightError, PinholeCamera};
 
 use crate::limits::{MAX_FRAMES_PER_S, MAX_REASON_BYTES, MAX_TEXT_BYTES, MAX_TILES, MAX_VIEWPOINTS};
@@ -91,6 +93,19 @@ pub fn ratio(value: f64, field: &'static str) -> Result<(), InvalidField> {
     if is_valid { Ok(()) } else { Err(InvalidField::out_of_range(field, value, "above 0 and at most 1")) }
 }
 
+/// A value of a range, which `allowed` says in words.
+///
+/// # Errors
+/// For any other, NaN too.
+pub(crate) fn within<T: PartialOrd + ToString>(
+    value: T,
+    range: RangeInclusive<T>,
+    field: &'static str,
+    allowed: &'static str,
+) -> Result<(), InvalidField> {
+    if range.contains(&value) { Ok(()) } else { Err(InvalidField::out_of_range(field, value, allowed)) }
+}
+
 /// Pictures a second: above 0, at most [`MAX_FRAMES_PER_S`]; `None`: as fast as they come.
 ///
 /// # Errors
@@ -109,8 +124,7 @@ pub fn frame_rate(frames_per_s: Option<f64>) -> Result<(), InvalidField> {
 /// # Errors
 /// For any other count.
 pub fn tile_count(count: u32) -> Result<(), InvalidField> {
-    let is_valid = (1..=MAX_TILES).contains(&count);
-    if is_valid { Ok(()) } else { Err(InvalidField::out_of_range("tile_count", count, "from 1 to 16")) }
+    within(count, 1..=MAX_TILES, "tile_count", "from 1 to 16")
 }
 
 /// The viewpoints of a session: at most [`MAX_VIEWPOINTS`] valid cameras.

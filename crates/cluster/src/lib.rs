@@ -24,7 +24,9 @@ mod assignment_tests;
 mod test_support;
 
 pub use assignment::{Assignment, CompositorShare, SamplerShare};
-pub use check::{InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints};
+pub use check::{
+    InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints,
+};
 pub use costs::{Costs, MeasuredCosts, ROW_PARTS, TileCosts};
 pub use node::{JoinCluster, MeasureCosts, NodeStatus, Ready, SamplerReport, Welcome, WorkReport};
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};

@@ -3,7 +3,7 @@
 use depth_image::{PinholeCamera, ViewPlanes};
 use serde::{Deserialize, Serialize};
 
-use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text};
+use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, within};
 use crate::costs::MeasuredCosts;
 use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use crate::scene::SceneRef;
@@ -25,10 +25,7 @@ impl JoinCluster {
         nonempty(&self.node.node_name, "node_name")?;
         nonempty(&self.node.address, "node_address")?;
         text(&self.node.device_name, "device_name")?;
-        if self.plan_epoch > MAX_JOINING_EPOCH {
-            return Err(InvalidField::out_of_range("plan_epoch", self.plan_epoch, "at most 2^48"));
-        }
-        Ok(())
+        within(self.plan_epoch, 0..=MAX_JOINING_EPOCH, "plan_epoch", "at most 2^48")
     }
 }
 
@@ -75,9 +72,7 @@ impl MeasureCosts {
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        if !(1..=MAX_BATCH).contains(&self.batch_count) {
-            return Err(InvalidField::out_of_range("batch_count", self.batch_count, "from 1 to 64"));
-        }
+        within(self.batch_count, 1..=MAX_BATCH, "batch_count", "from 1 to 64")?;
         self.workload.validate()?;
         if self.workload.sample_cameras.is_empty() {
             return Err(InvalidField::Missing { field: "sample_cameras" });

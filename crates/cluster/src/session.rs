@@ -7,7 +7,7 @@ use glam::UVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::assignment::Assignment;
-use crate::check::{InvalidField, at_most, frame_rate, nonempty, ratio, reason, tile_count, viewpoints};
+use crate::check::{InvalidField, at_most, frame_rate, nonempty, ratio, reason, tile_count, viewpoints, within};
 use crate::check_seconds;
 use crate::costs::Costs;
 use crate::limits::{MAX_FALLBACKS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS, MAX_VIEWS_PER_SET};
@@ -64,15 +64,8 @@ impl SessionRequest {
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        let counts = [
-            ("views_per_set_count", self.views_per_set, MAX_VIEWS_PER_SET, "from 1 to 65536"),
-            ("refinement_step_count", self.refinement_steps, MAX_REFINEMENT_STEPS, "from 1 to 64"),
-        ];
-        if let Some(&(field, count, _, allowed)) =
-            counts.iter().find(|(_, count, most, _)| !(1..=*most).contains(count))
-        {
-            return Err(InvalidField::out_of_range(field, count, allowed));
-        }
+        within(self.views_per_set, 1..=MAX_VIEWS_PER_SET, "views_per_set_count", "from 1 to 65536")?;
+        within(self.refinement_steps, 1..=MAX_REFINEMENT_STEPS, "refinement_step_count", "from 1 to 64")?;
         nonempty(&self.method, "reconstruction_method")?;
         nonempty(&self.sampling, "sampling_method")?;
         nonempty(&self.lighting, "lighting")?;
@@ -128,9 +121,7 @@ impl ChangeSession {
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        if self.views_per_set > MAX_VIEWS_PER_SET {
-            return Err(InvalidField::out_of_range("views_per_set_count", self.views_per_set, "from 0 to 65536"));
-        }
+        within(self.views_per_set, 0..=MAX_VIEWS_PER_SET, "views_per_set_count", "from 0 to 65536")?;
         frame_rate(self.frames_per_s)?;
         viewpoints(self.viewpoints.as_deref().unwrap_or_default())
     }

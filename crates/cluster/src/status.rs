@@ -24,7 +24,7 @@ pub struct ClusterStatus {
     /// The scene on offer.
     pub offer: Option<OfferStatus>,
     /// The plan in force; `None` while no session is open, or no node is a member.
-    pub plan: Option<Box<SessionPlan>>,
+    pub plan: Option<SessionPlan>,
     /// Sessions that share the plan, or wait for one.
     pub session_count: u32,
     /// V: views that all sessions ask of each sample set.
@@ -45,7 +45,7 @@ impl ClusterStatus {
         at_most(self.conditions.len(), MAX_NODES, "conditions")?;
         at_most(self.achieved.len(), MAX_POLICIES, "achieved_times")?;
         self.offer.as_ref().map_or(Ok(()), OfferStatus::validate)?;
-        self.plan.as_ref().map_or(Ok(()), |plan| plan.validate())?;
+        self.plan.as_ref().map_or(Ok(()), SessionPlan::validate)?;
         self.conditions.iter().try_for_each(NodeCondition::validate)?;
         self.achieved.iter().try_for_each(|achieved| finite_seconds(achieved.busy_s, "busy_s"))?;
         finite_seconds(self.utilisation, "utilisation_ratio")

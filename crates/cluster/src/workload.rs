@@ -6,7 +6,7 @@ use depth_image::{Aabb, Camera, Illumination, MAX_LIGHTS, PinholeCamera, nearest
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::check::{InvalidField, at_most, nonempty};
+use crate::check::{InvalidField, at_most, nonempty, within};
 use crate::limits::{MAX_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS};
 use crate::scene::SceneRef;
 use crate::timeline::{Refinement, Timeline};
@@ -102,10 +102,7 @@ impl Workload {
         }
         self.timeline.validate()?;
         validate_illumination(&self.illumination)?;
-        if !(1..=MAX_REFINEMENT_STEPS).contains(&self.refinement_steps) {
-            return Err(InvalidField::out_of_range("refinement_step_count", self.refinement_steps, "from 1 to 64"));
-        }
-        Ok(())
+        within(self.refinement_steps, 1..=MAX_REFINEMENT_STEPS, "refinement_step_count", "from 1 to 64")
     }
 
     fn check_cells(&self) -> Result<(), InvalidField> {

@@ -156,7 +156,7 @@ fn messages_survive_the_round_trip() {
     };
     let status = ClusterStatus {
         plan_epoch: 4,
-        plan: Some(Box::new(session_plan())),
+        plan: Some(session_plan()),
         session_count: 2,
         views_per_set: 70,
         conditions: vec![condition],

@@ -3,12 +3,11 @@
 use cluster::{FetchImages, at_most};
 use codec::{
     Chunk, ChunkBody, ImageHeader, MAX_CHUNK_BYTES, MAX_VISIBILITY_PLANES, PlaneEncoding, PlaneHeader, PlaneKind,
-    SampleSetId,
 };
 
 use super::{Convert, required};
 use crate::error::WireError;
-use crate::proto::{self, chunk::Body};
+use crate::proto::chunk::Body;
 
 /// One plane of each kind; visibility may have more.
 const MAX_PLANES: usize = 5 + MAX_VISIBILITY_PLANES;
@@ -16,6 +15,10 @@ const MAX_PLANES: usize = 5 + MAX_VISIBILITY_PLANES;
 messages! {
     FetchSampleImagesRequest = FetchImages { plan_epoch, set_index, image_indices; cell: cell_index },
         then FetchImages::validate;
+    Chunk = Chunk {
+        image_index, chunk_count, body as "chunk.body";
+        sample_set_id: plan_epoch | set_index, sequence: sequence_number, crc32: body_crc32
+    };
     ImageHeader = ImageHeader {
         planes; width: width_px, height: height_px,
         inverse_depth_range: least_inverse_depth_per_m | greatest_inverse_depth_per_m
@@ -31,40 +34,23 @@ enums! {
     PlaneEncoding { SlopeTaggedLz4, DifferenceTaggedLz4, ChangeTaggedLz4, BitsLz4 }
 }
 
-impl Convert<proto::FetchSampleImagesResponse> for Chunk {
-    fn read(response: proto::FetchSampleImagesResponse, _: &'static str) -> Result<Self, WireError> {
-        let c = required(response.chunk, "chunk")?;
-        let body = match required(c.body, "chunk.body")? {
-            Body::Header(header) => ChunkBody::Header(Convert::read(header, "chunk.header")?),
+wrappers! { FetchSampleImagesResponse { chunk: Chunk } }
+
+impl Convert<Option<Body>> for ChunkBody {
+    fn read(body: Option<Body>, field: &'static str) -> Result<Self, WireError> {
+        Ok(match required(body, field)? {
+            Body::Header(header) => Self::Header(Convert::read(header, field)?),
             Body::Data(data) => {
                 at_most(data.len(), MAX_CHUNK_BYTES, "chunk.data")?;
-                ChunkBody::Data(data)
+                Self::Data(data)
             }
-        };
-        Ok(Self {
-            sample_set_id: SampleSetId { plan_epoch: c.plan_epoch, index: c.set_index },
-            image_index: c.image_index,
-            sequence: c.sequence_number,
-            chunk_count: c.chunk_count,
-            crc32: c.body_crc32,
-            body,
         })
     }
 
-    fn write(self) -> proto::FetchSampleImagesResponse {
-        let body = match self.body {
-            ChunkBody::Header(header) => Body::Header(header.write()),
-            ChunkBody::Data(data) => Body::Data(data),
-        };
-        let chunk = proto::Chunk {
-            plan_epoch: self.sample_set_id.plan_epoch,
-            set_index: self.sample_set_id.index,
-            image_index: self.image_index,
-            sequence_number: self.sequence,
-            chunk_count: self.chunk_count,
-            body_crc32: self.crc32,
-            body: Some(body),
-        };
-        proto::FetchSampleImagesResponse { chunk: Some(chunk) }
+    fn write(self) -> Option<Body> {
+        Some(match self {
+            Self::Header(header) => Body::Header(header.write()),
+            Self::Data(data) => Body::Data(data),
+        })
     }
 }

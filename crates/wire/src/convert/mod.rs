@@ -89,6 +89,21 @@ macro_rules! nested {
     )+};
 }
 
+/// Messages with one field.
+macro_rules! wrappers {
+    ($($message:ident { $field:ident: $type:ident })+) => {$(
+        impl super::Convert<crate::proto::$message> for $type {
+            fn read(message: crate::proto::$message, _: &'static str) -> Result<Self, crate::error::WireError> {
+                super::Convert::read(message.$field, stringify!($field))
+            }
+
+            fn write(self) -> crate::proto::$message {
+                crate::proto::$message { $field: Some(super::Convert::write(self)) }
+            }
+        }
+    )+};
+}
+
 /// Enums whose variants are those of the message's enum of that name, without its zero.
 macro_rules! enums {
     ($($type:ident { $($variant:ident),+ })+) => {$(
@@ -215,16 +230,6 @@ impl<P, D: Convert<P>> Convert<Option<P>> for Option<D> {
 
     fn write(self) -> Option<P> {
         self.map(D::write)
-    }
-}
-
-impl<P, D: Convert<P>> Convert<P> for Box<D> {
-    fn read(value: P, field: &'static str) -> Result<Self, WireError> {
-        D::read(value, field).map(Self::new)
-    }
-
-    fn write(self) -> P {
-        D::write(*self)
     }
 }
 

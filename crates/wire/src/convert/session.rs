@@ -55,7 +55,7 @@ impl Convert<proto::OpenSessionResponse> for SessionEvent {
                 reason(&p.detail, "detail")?;
                 Self::Progress { stage: Convert::read(p.stage, "stage")?, detail: p.detail }
             }
-            Event::Plan(plan) => Self::Plan(Convert::read(plan, "plan")?),
+            Event::Plan(plan) => Self::Plan(Box::new(Convert::read(plan, "plan")?)),
             Event::Ended(ended) => {
                 reason(&ended.reason, "ended.reason")?;
                 Self::Ended { reason: ended.reason }

@@ -48,6 +48,11 @@ fn check_node(name: &str, address: &str) -> Result<(), InvalidField> {
     nonempty(address, "node_address")
 }
 
+wrappers! {
+    MeasureCostsResponse { costs: Costs }
+    ApplyAssignmentRequest { assignment: Assignment }
+}
+
 nested!(Costs = Costs);
 
 impl Convert<proto::Costs> for Costs {
@@ -82,25 +87,5 @@ impl Convert<proto::Costs> for Costs {
             sample_overhead_s: self.tile_overhead_s(),
             sample_row_shares: Some(proto::RowShares { first_ratio, second_ratio, third_ratio, fourth_ratio }),
         }
-    }
-}
-
-impl Convert<proto::MeasureCostsResponse> for Costs {
-    fn read(response: proto::MeasureCostsResponse, _: &'static str) -> Result<Self, WireError> {
-        Self::read(response.costs, "costs")
-    }
-
-    fn write(self) -> proto::MeasureCostsResponse {
-        proto::MeasureCostsResponse { costs: self.write() }
-    }
-}
-
-impl Convert<proto::ApplyAssignmentRequest> for Assignment {
-    fn read(request: proto::ApplyAssignmentRequest, _: &'static str) -> Result<Self, WireError> {
-        Self::read(request.assignment, "assignment")
-    }
-
-    fn write(self) -> proto::ApplyAssignmentRequest {
-        proto::ApplyAssignmentRequest { assignment: self.write() }
     }
 }
