@@ -46,8 +46,8 @@ macro_rules! messages {
             fn read(mut message: crate::proto::$message, _: &'static str) -> Result<Self, crate::error::WireError> {
                 $(super::check(&mut message, $first)?;)?
                 let value = Self {
-                    $($same: super::Convert::read(message.$same, name!($same $($same_name)?))?,)*
                     $($($own: super::Convert::read(($(message.$wire),+), name!($($wire)|+ $($name)?))?,)+)?
+                    $($same: super::Convert::read(message.$same, name!($same $($same_name)?))?,)*
                 };
                 $(super::check(&value, $then)?;)?
                 Ok(value)
