@@ -144,7 +144,7 @@ impl Coordinator for CoordinatorService {
         Ok(until_drained(Box::pin(tokio_stream::iter(parts)), self.shutdown.clone()))
     }
 
-    async fn status(&self) -> Result<ClusterStatus, Status> {
+    async fn get_status(&self, (): ()) -> Result<ClusterStatus, Status> {
         Ok(ClusterStatus { offer: Some(self.shared.offer.status()), ..self.shared.status() })
     }
 

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use std::fmt::Write as _;
+use std::num::NonZeroU32;
 use std::path::Path;
 use std::time::Duration;
 
@@ -128,7 +129,7 @@ impl Script {
             match command {
                 Command::Apply { sessions, plan, .. } => {
                     let plan_text = described(&plan.assignment);
-                    let fallback = plan.fallback_index.map_or(0, |index| index + 1);
+                    let fallback = plan.fallback.map_or(0, NonZeroU32::get);
                     writeln!(self.text, "{at_s:.1} s, sessions {sessions:?}, fallback {fallback}: {plan_text}")
                         .unwrap();
                 }

@@ -23,7 +23,7 @@ impl PolicyOverride {
     /// For a number of tiles that no image may have.
     pub(super) fn validate(&self) -> Result<(), InvalidField> {
         let tiles = self.forced_tiles.map(|tiles| u32::try_from(tiles).unwrap_or(u32::MAX));
-        tiles.map(tile_count).transpose().map(drop)
+        tiles.map_or(Ok(()), tile_count)
     }
 }
 

@@ -89,7 +89,7 @@ impl Event {
             Self::Measured { node_name, costs, busy_s, .. } => {
                 nonempty(node_name, "node_name")?;
                 costs.validate()?;
-                finite_seconds(*busy_s, "busy_s").map(drop)
+                finite_seconds(*busy_s, "busy_s")
             }
             Self::Left { node_name, .. }
             | Self::Ready { node_name, .. }
@@ -117,5 +117,5 @@ fn check_demand(views_per_set: usize, frames_per_s: Option<f64>) -> Result<(), I
     if views_per_set > MAX_VIEWS_PER_SET as usize {
         return Err(InvalidField::out_of_range("views_per_set", views_per_set, "from 0 to 65536"));
     }
-    frame_rate(frames_per_s).map(drop)
+    frame_rate(frames_per_s)
 }

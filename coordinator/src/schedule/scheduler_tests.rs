@@ -1,3 +1,5 @@
+use std::num::NonZeroU32;
+
 use cluster::{Assignment, Costs, Policy, PolicyChoice, Quality, SessionPlan, TileCosts};
 use depth_image::Camera;
 
@@ -353,18 +355,18 @@ fn overload_steps_down_the_fallbacks_and_plans_name_them() {
         cluster.now += Duration::from_millis(500);
         let commands = cluster.step(Event::Tick);
         seen.extend(commands.iter().filter_map(|command| match command {
-            Command::Apply { plan, .. } => Some(plan.fallback_index),
+            Command::Apply { plan, .. } => Some(plan.fallback),
             _ => None,
         }));
     }
-    assert_eq!(seen, [Some(0), Some(1)], "1.125 of their time at 180, 0.9 at 144");
+    assert_eq!(seen, [1, 2].map(NonZeroU32::new), "1.125 of their time at 180, 0.9 at 144");
     let plan = cluster.plan();
     assert_eq!(plan.workload.method, "joint_carve:2");
     let Camera::Pinhole(camera) = plan.workload.sample_cameras[0];
     assert_eq!(camera.size_px.x, 4, "half of 8");
     cluster.step(Event::DemandChanged { session: 1, views_per_set: 1, frames_per_s: Some(20.0) });
-    let plans: Vec<Option<u32>> = (0..2).map(|_| applied(&cluster.wait(60)).1.fallback_index).collect();
-    assert_eq!(plans, [Some(0), None], "with less to do they get all again");
+    let plans: Vec<_> = (0..2).map(|_| applied(&cluster.wait(60)).1.fallback).collect();
+    assert_eq!(plans, [1, 0].map(NonZeroU32::new), "with less to do they get all again");
     assert_eq!(cluster.plan().workload.method, "joint_carve");
 }
 
@@ -450,5 +452,5 @@ fn images_are_relayed_over_slow_links() {
     }
     // 4 images of 0.1 s to each of 7 compositors: 2.8 s from one sampler, more than their views take.
     let commands = cluster.wait(30);
-    assert_eq!(assignment_of(&commands).relay_fanout.map(std::num::NonZeroU32::get), Some(2));
+    assert_eq!(assignment_of(&commands).relay_fanout.map(NonZeroU32::get), Some(2));
 }

@@ -5,11 +5,9 @@ use std::num::NonZeroU32;
 use codec::SampleSetId;
 use depth_image::{Camera, PinholeCamera};
 
-use crate::check::tile_count;
-use crate::error::InvalidField;
+use crate::check::{InvalidField, tile_count};
 use crate::policy::Policy;
-use crate::set_content::SetContent;
-use crate::workload::Workload;
+use crate::workload::{SetContent, Workload};
 
 /// The images, or tiles of images, that one node samples. It samples them of every set, or, where every sampler has all of
 /// them, of every set whose turn it is.

@@ -1,9 +1,35 @@
-//! Checks that several types share. Each gives the value back, or names the field.
+//! Values that a type does not allow, and checks that several types share.
 
-use depth_image::PinholeCamera;
+use std::ops::RangeInclusive;
 
-use crate::error::InvalidField;
+use depth_image::{CameraError, LightError, PinholeCamera};
+
 use crate::limits::{MAX_FRAMES_PER_S, MAX_REASON_BYTES, MAX_TEXT_BYTES, MAX_TILES, MAX_VIEWPOINTS};
+
+/// A value that its field does not allow.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum InvalidField {
+    #[error("{field} is missing")]
+    Missing { field: &'static str },
+    #[error("{field}: {source}")]
+    Camera { field: &'static str, source: CameraError },
+    #[error("{field}: {source}")]
+    Light { field: &'static str, source: LightError },
+    /// More entries or bytes than any peer needs.
+    #[error("{field} has {count}, at most {limit} are allowed")]
+    TooMany { field: &'static str, count: u64, limit: u64 },
+    #[error("{field} is {value}, must be {allowed}")]
+    OutOfRange { field: &'static str, value: String, allowed: &'static str },
+}
+
+impl InvalidField {
+    /// A value outside the range that a field allows.
+    #[must_use]
+    pub fn out_of_range(field: &'static str, value: impl ToString, allowed: &'static str) -> Self {
+        Self::OutOfRange { field, value: value.to_string(), allowed }
+    }
+}
 
 /// At most `limit` entries or bytes.
 ///
@@ -37,34 +63,59 @@ pub fn reason(value: &str, field: &'static str) -> Result<(), InvalidField> {
     at_most(value.len(), MAX_REASON_BYTES, field)
 }
 
-/// A finite number that is not negative.
+/// A finite number that is not negative, or none.
 ///
 /// # Errors
 /// For any other.
-pub fn finite_seconds(value: f64, field: &'static str) -> Result<f64, InvalidField> {
-    let is_valid = value.is_finite() && value >= 0.0;
-    if is_valid { Ok(value) } else { Err(InvalidField::out_of_range(field, value, "finite and not negative")) }
+pub fn finite_seconds(value: impl Into<Option<f64>>, field: &'static str) -> Result<(), InvalidField> {
+    match value.into() {
+        Some(value) if !(value.is_finite() && value >= 0.0) => {
+            Err(InvalidField::out_of_range(field, value, "finite and not negative"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Checks fields by their names, as [`finite_seconds`] does.
+#[macro_export]
+macro_rules! check_seconds {
+    ($of:expr; $($field:ident),+) => {
+        $($crate::finite_seconds($of.$field, stringify!($field))?;)+
+    };
 }
 
 /// A number above 0 and at most 1.
 ///
 /// # Errors
 /// For any other.
-pub fn ratio(value: f64, field: &'static str) -> Result<f64, InvalidField> {
+pub fn ratio(value: f64, field: &'static str) -> Result<(), InvalidField> {
     let is_valid = value > 0.0 && value <= 1.0;
-    if is_valid { Ok(value) } else { Err(InvalidField::out_of_range(field, value, "above 0 and at most 1")) }
+    if is_valid { Ok(()) } else { Err(InvalidField::out_of_range(field, value, "above 0 and at most 1")) }
+}
+
+/// A value of a range, which `allowed` says in words.
+///
+/// # Errors
+/// For any other, NaN too.
+pub(crate) fn within<T: PartialOrd + ToString>(
+    value: T,
+    range: RangeInclusive<T>,
+    field: &'static str,
+    allowed: &'static str,
+) -> Result<(), InvalidField> {
+    if range.contains(&value) { Ok(()) } else { Err(InvalidField::out_of_range(field, value, allowed)) }
 }
 
 /// Pictures a second: above 0, at most [`MAX_FRAMES_PER_S`]; `None`: as fast as they come.
 ///
 /// # Errors
 /// For any other rate.
-pub fn frame_rate(frames_per_s: Option<f64>) -> Result<Option<f64>, InvalidField> {
+pub fn frame_rate(frames_per_s: Option<f64>) -> Result<(), InvalidField> {
     match frames_per_s {
         Some(rate) if !(rate > 0.0 && rate <= MAX_FRAMES_PER_S) => {
             Err(InvalidField::out_of_range("frames_per_s", rate, "above 0 and at most 1000"))
         }
-        _ => Ok(frames_per_s),
+        _ => Ok(()),
     }
 }
 
@@ -72,9 +123,8 @@ pub fn frame_rate(frames_per_s: Option<f64>) -> Result<Option<f64>, InvalidField
 ///
 /// # Errors
 /// For any other count.
-pub fn tile_count(count: u32) -> Result<u32, InvalidField> {
-    let is_valid = (1..=MAX_TILES).contains(&count);
-    if is_valid { Ok(count) } else { Err(InvalidField::out_of_range("tile_count", count, "from 1 to 16")) }
+pub fn tile_count(count: u32) -> Result<(), InvalidField> {
+    within(count, 1..=MAX_TILES, "tile_count", "from 1 to 16")
 }
 
 /// The viewpoints of a session: at most [`MAX_VIEWPOINTS`] valid cameras.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::check::finite_seconds;
-use crate::error::InvalidField;
+use crate::check::{InvalidField, finite_seconds};
+use crate::check_seconds;
 
 /// Quarters of a sample image's height, each with a cost of its own.
 pub const ROW_PARTS: usize = 4;
@@ -98,11 +98,7 @@ impl Costs {
     /// # Errors
     /// For times that are negative or not finite, and for shares that are not from 0 to 1 or all 0.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        finite_seconds(self.sample_image_s, "sample_image_s")?;
-        finite_seconds(self.direct_view_s, "direct_view_s")?;
-        finite_seconds(self.reconstruct_view_s, "reconstruct_view_s")?;
-        finite_seconds(self.load_set_s, "load_set_s")?;
-        finite_seconds(self.encode_view_s, "encode_view_s")?;
+        check_seconds!(self; sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s);
         let Some(tiles) = self.tiles else { return Ok(()) };
         finite_seconds(tiles.overhead_s, "sample_overhead_s")?;
         let Some(shares) = tiles.row_shares else { return Ok(()) };
@@ -136,17 +132,8 @@ impl MeasuredCosts {
     /// # Errors
     /// For times and rates that are negative or not finite.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        for (value, field) in [
-            (self.sample_image_s, "sample_image_s"),
-            (self.direct_view_s, "direct_view_s"),
-            (self.reconstruct_view_s, "reconstruct_view_s"),
-            (self.load_set_s, "load_set_s"),
-            (self.encode_view_s, "encode_view_s"),
-            (self.transfer_bytes_per_s, "transfer_bytes_per_s"),
-            (self.image_bytes, "image_bytes"),
-        ] {
-            value.map(|value| finite_seconds(value, field)).transpose()?;
-        }
+        check_seconds!(self; sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s);
+        check_seconds!(self; transfer_bytes_per_s, image_bytes);
         Ok(())
     }
 }

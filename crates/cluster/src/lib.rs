@@ -8,17 +8,11 @@
 mod assignment;
 mod check;
 mod costs;
-mod demand;
-mod error;
-mod images;
 pub mod limits;
 mod node;
-mod offer;
 mod policy;
-mod report;
 mod scene;
 mod session;
-mod set_content;
 mod status;
 mod timeline;
 mod views;
@@ -30,19 +24,15 @@ mod assignment_tests;
 mod test_support;
 
 pub use assignment::{Assignment, CompositorShare, SamplerShare};
-pub use check::{at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints};
+pub use check::{
+    InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints,
+};
 pub use costs::{Costs, MeasuredCosts, ROW_PARTS, TileCosts};
-pub use demand::{ChangeSession, Quality};
-pub use error::InvalidField;
-pub use images::FetchImages;
-pub use node::{JoinCluster, MeasureCosts, NodeStatus, Ready, Welcome};
-pub use offer::{OfferSettings, OfferStatus};
+pub use node::{JoinCluster, MeasureCosts, NodeStatus, Ready, SamplerReport, Welcome, WorkReport};
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};
-pub use report::{SamplerReport, WorkReport};
 pub use scene::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, ScenePart, SceneRef};
-pub use session::{SessionEvent, SessionPlan, SessionRequest, SessionStage};
-pub use set_content::SetContent;
-pub use status::{AchievedTime, ClusterStatus, NodeCondition};
+pub use session::{ChangeSession, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage};
+pub use status::{AchievedTime, ClusterStatus, NodeCondition, OfferSettings, OfferStatus};
 pub use timeline::{Refinement, Timeline};
-pub use views::{LiveRequest, RenderViews, RequestedView, check_view_count};
-pub use workload::Workload;
+pub use views::{FetchImages, LiveRequest, RenderViews, RequestedView, check_view_count};
+pub use workload::{SetContent, Workload};

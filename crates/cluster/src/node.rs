@@ -1,11 +1,11 @@
-//! Members: joining, measuring and being ready for plans.
+//! Members: joining, measuring, being ready for plans, and reports on their own work and on each other.
 
 use depth_image::{PinholeCamera, ViewPlanes};
 use serde::{Deserialize, Serialize};
 
-use crate::check::{at_most, finite_seconds, nonempty, text};
-use crate::error::InvalidField;
-use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH, MAX_SCENES};
+use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, within};
+use crate::costs::MeasuredCosts;
+use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use crate::scene::SceneRef;
 use crate::workload::Workload;
 
@@ -25,10 +25,7 @@ impl JoinCluster {
         nonempty(&self.node.node_name, "node_name")?;
         nonempty(&self.node.address, "node_address")?;
         text(&self.node.device_name, "device_name")?;
-        if self.plan_epoch > MAX_JOINING_EPOCH {
-            return Err(InvalidField::out_of_range("plan_epoch", self.plan_epoch, "at most 2^48"));
-        }
-        Ok(())
+        within(self.plan_epoch, 0..=MAX_JOINING_EPOCH, "plan_epoch", "at most 2^48")
     }
 }
 
@@ -50,15 +47,6 @@ pub struct NodeStatus {
 pub struct Welcome {
     /// Scenes on offer, to be loaded ahead.
     pub scenes: Vec<SceneRef>,
-}
-
-impl Welcome {
-    /// # Errors
-    /// For too many scenes, and for one that is too large.
-    pub fn validate(&self) -> Result<(), InvalidField> {
-        at_most(self.scenes.len(), MAX_SCENES, "scenes")?;
-        self.scenes.iter().try_for_each(SceneRef::validate)
-    }
 }
 
 /// Asks a node what operations cost it.
@@ -84,9 +72,7 @@ impl MeasureCosts {
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        if !(1..=MAX_BATCH).contains(&self.batch_count) {
-            return Err(InvalidField::out_of_range("batch_count", self.batch_count, "from 1 to 64"));
-        }
+        within(self.batch_count, 1..=MAX_BATCH, "batch_count", "from 1 to 64")?;
         self.workload.validate()?;
         if self.workload.sample_cameras.is_empty() {
             return Err(InvalidField::Missing { field: "sample_cameras" });
@@ -113,6 +99,56 @@ impl Ready {
     /// # Errors
     /// For a time that is negative or not finite.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        finite_seconds(self.scene_load_s, "scene_load_s").map(drop)
+        finite_seconds(self.scene_load_s, "scene_load_s")
+    }
+}
+
+/// The work of a member since its last report.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorkReport {
+    /// The member's unique name.
+    pub node_name: String,
+    /// The plan under which the work was done.
+    pub plan_epoch: u64,
+    /// Mean times of the operations.
+    pub costs: MeasuredCosts,
+    /// Seconds of all operations together.
+    pub busy_s: f64,
+    /// Views made.
+    pub views: u64,
+    /// Views not made, or not sent.
+    pub dropped_views: u64,
+}
+
+impl WorkReport {
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        nonempty(&self.node_name, "node_name")?;
+        self.costs.validate()?;
+        finite_seconds(self.busy_s, "busy_s")
+    }
+}
+
+/// A compositor cannot get images of a sampler, though it asked again.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SamplerReport {
+    /// The plan in which both have their roles.
+    pub plan_epoch: u64,
+    /// The compositor that reports.
+    pub compositor: String,
+    /// The sampler that is reported.
+    pub sampler: String,
+    /// Why it gets no images.
+    pub reason: String,
+}
+
+impl SamplerReport {
+    /// # Errors
+    /// For names that are missing or too long, and for a long reason.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        nonempty(&self.compositor, "compositor_name")?;
+        nonempty(&self.sampler, "sampler_name")?;
+        reason(&self.reason, "reason")
     }
 }

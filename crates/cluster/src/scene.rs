@@ -5,7 +5,7 @@ use std::fmt;
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 
-use crate::error::InvalidField;
+use crate::check::InvalidField;
 use crate::limits::MAX_SCENE_BYTES;
 
 /// BLAKE3 of a scene package: 64 lower-case hex digits, so that it is safe as a file name.
@@ -20,23 +20,6 @@ impl SceneHash {
         Self(blake3::hash(package).to_hex().to_string())
     }
 
-    /// Reads 64 lower-case hex digits.
-    ///
-    /// # Errors
-    /// For anything else.
-    pub fn parse(hex: &str) -> Result<Self, InvalidField> {
-        let ok = hex.len() == 64 && hex.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
-        if ok {
-            Ok(Self(hex.to_owned()))
-        } else {
-            Err(InvalidField::out_of_range(
-                "scene_hash",
-                hex.escape_debug().take(80).collect::<String>(),
-                "64 lower-case hex digits",
-            ))
-        }
-    }
-
     /// The digits.
     #[must_use]
     pub fn as_str(&self) -> &str {
@@ -48,7 +31,11 @@ impl TryFrom<String> for SceneHash {
     type Error = InvalidField;
 
     fn try_from(hex: String) -> Result<Self, InvalidField> {
-        Self::parse(&hex)
+        if hex.len() == 64 && hex.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f')) {
+            return Ok(Self(hex));
+        }
+        let start: String = hex.escape_debug().take(80).collect();
+        Err(InvalidField::out_of_range("scene_hash", start, "64 lower-case hex digits"))
     }
 }
 
@@ -174,11 +161,11 @@ mod tests {
     #[test]
     fn names_that_are_no_hash_are_refused() {
         let good = SceneHash::of(b"scene");
-        assert_eq!(SceneHash::parse(good.as_str()), Ok(good.clone()));
+        assert_eq!(SceneHash::try_from(good.to_string()), Ok(good.clone()));
         for bad in
             ["", "../../etc/passwd", &good.as_str().to_uppercase(), &good.as_str()[1..], &"%2e".repeat(22)[..64], "\0"]
         {
-            assert!(SceneHash::parse(bad).expect_err(bad).to_string().contains("scene_hash"));
+            assert!(SceneHash::try_from(bad.to_owned()).expect_err(bad).to_string().contains("scene_hash"));
         }
     }
 

@@ -1,13 +1,15 @@
-//! Sessions: requests of clients, and the answers.
+//! Sessions: requests of clients, the lower qualities that they accept, and the answers.
+
+use std::num::NonZeroU32;
 
 use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
 use glam::UVec2;
+use serde::{Deserialize, Serialize};
 
 use crate::assignment::Assignment;
-use crate::check::{at_most, finite_seconds, frame_rate, nonempty, ratio, reason, tile_count, viewpoints};
+use crate::check::{InvalidField, at_most, frame_rate, nonempty, ratio, reason, tile_count, viewpoints, within};
+use crate::check_seconds;
 use crate::costs::Costs;
-use crate::demand::Quality;
-use crate::error::InvalidField;
 use crate::limits::{MAX_FALLBACKS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS, MAX_VIEWS_PER_SET};
 use crate::policy::{Policy, PolicyChoice};
 use crate::scene::SceneHash;
@@ -62,15 +64,8 @@ impl SessionRequest {
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        let counts = [
-            ("views_per_set_count", self.views_per_set, MAX_VIEWS_PER_SET, "from 1 to 65536"),
-            ("refinement_step_count", self.refinement_steps, MAX_REFINEMENT_STEPS, "from 1 to 64"),
-        ];
-        if let Some(&(field, count, _, allowed)) =
-            counts.iter().find(|(_, count, most, _)| !(1..=*most).contains(count))
-        {
-            return Err(InvalidField::out_of_range(field, count, allowed));
-        }
+        within(self.views_per_set, 1..=MAX_VIEWS_PER_SET, "views_per_set_count", "from 1 to 65536")?;
+        within(self.refinement_steps, 1..=MAX_REFINEMENT_STEPS, "refinement_step_count", "from 1 to 64")?;
         nonempty(&self.method, "reconstruction_method")?;
         nonempty(&self.sampling, "sampling_method")?;
         nonempty(&self.lighting, "lighting")?;
@@ -80,8 +75,55 @@ impl SessionRequest {
         frame_rate(self.frames_per_s)?;
         at_most(self.fallbacks.len(), MAX_FALLBACKS, "fallbacks")?;
         self.fallbacks.iter().try_for_each(Quality::validate)?;
-        self.forced_tile_count.map(tile_count).transpose()?;
+        self.forced_tile_count.map_or(Ok(()), tile_count)?;
         viewpoints(&self.viewpoints)
+    }
+}
+
+/// A quality below the one that a session asked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Quality {
+    /// How samples are lit.
+    pub lighting: String,
+    /// How views are reconstructed.
+    pub method: String,
+    /// Sides of sample images, of those asked for: above 0, at most 1.
+    pub sample_side_ratio: f64,
+    /// Pictures a second, of those asked for: above 0, at most 1.
+    pub frame_rate_ratio: f64,
+}
+
+impl Quality {
+    /// # Errors
+    /// For settings that are missing or too long, and for ratios that are not above 0 and at most 1.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        nonempty(&self.lighting, "fallbacks.lighting")?;
+        nonempty(&self.method, "fallbacks.reconstruction_method")?;
+        ratio(self.sample_side_ratio, "fallbacks.sample_side_ratio")?;
+        ratio(self.frame_rate_ratio, "fallbacks.frame_rate_ratio")
+    }
+}
+
+/// A session asks for more, or for less.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChangeSession {
+    /// The session's number at the coordinator.
+    pub session: u64,
+    /// V: views that are asked of each sample set.
+    pub views_per_set: u32,
+    /// Pictures a second; `None`: as fast as they come.
+    pub frames_per_s: Option<f64>,
+    /// New viewpoints; `None`: as before.
+    pub viewpoints: Option<Vec<PinholeCamera>>,
+}
+
+impl ChangeSession {
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        within(self.views_per_set, 0..=MAX_VIEWS_PER_SET, "views_per_set_count", "from 0 to 65536")?;
+        frame_rate(self.frames_per_s)?;
+        viewpoints(self.viewpoints.as_deref().unwrap_or_default())
     }
 }
 
@@ -121,8 +163,8 @@ pub struct SessionPlan {
     pub predicted_enumerated_s: f64,
     /// The slowest node's time to load the scene; 0 where all had loaded it.
     pub scene_load_s: f64,
-    /// Index into the session's fallbacks; `None`: the quality that was asked for.
-    pub fallback_index: Option<u32>,
+    /// The number of the session's fallback in force, from 1; `None`: the quality that was asked for.
+    pub fallback: Option<NonZeroU32>,
     /// Pictures a second, of those asked for.
     pub frame_rate_ratio: f64,
 }
@@ -160,13 +202,9 @@ impl SessionPlan {
         self.assignment.validate()?;
         self.costs.validate()?;
         reason(&self.reason, "plan.reason")?;
-        finite_seconds(self.predicted_pipeline_s, "predicted_pipeline_s")?;
-        finite_seconds(self.predicted_direct_s, "predicted_direct_s")?;
-        finite_seconds(self.predicted_time_share_s, "predicted_time_share_s")?;
-        finite_seconds(self.predicted_k_fd_s, "predicted_k_fd_s")?;
-        finite_seconds(self.predicted_enumerated_s, "predicted_enumerated_s")?;
-        finite_seconds(self.scene_load_s, "scene_load_s")?;
-        ratio(self.frame_rate_ratio, "frame_rate_ratio").map(drop)
+        check_seconds!(self; predicted_pipeline_s, predicted_direct_s, predicted_time_share_s, predicted_k_fd_s);
+        check_seconds!(self; predicted_enumerated_s, scene_load_s);
+        ratio(self.frame_rate_ratio, "frame_rate_ratio")
     }
 }
 

@@ -1,12 +1,14 @@
-//! The cluster as the coordinator sees it.
+//! The cluster as the coordinator sees it, and the scene that it offers: enough for a client to place its views.
 
-use crate::check::{at_most, finite_seconds, nonempty};
+use depth_image::{Aabb, Camera};
+use glam::DVec3;
+
+use crate::check::{InvalidField, at_most, finite_seconds, nonempty, text};
 use crate::costs::Costs;
-use crate::error::InvalidField;
-use crate::limits::MAX_NODES;
+use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS};
 use crate::node::NodeStatus;
-use crate::offer::OfferStatus;
 use crate::policy::Policy;
+use crate::scene::SceneRef;
 use crate::session::SessionPlan;
 
 /// More policies than there will be.
@@ -22,7 +24,7 @@ pub struct ClusterStatus {
     /// The scene on offer.
     pub offer: Option<OfferStatus>,
     /// The plan in force; `None` while no session is open, or no node is a member.
-    pub plan: Option<Box<SessionPlan>>,
+    pub plan: Option<SessionPlan>,
     /// Sessions that share the plan, or wait for one.
     pub session_count: u32,
     /// V: views that all sessions ask of each sample set.
@@ -43,10 +45,10 @@ impl ClusterStatus {
         at_most(self.conditions.len(), MAX_NODES, "conditions")?;
         at_most(self.achieved.len(), MAX_POLICIES, "achieved_times")?;
         self.offer.as_ref().map_or(Ok(()), OfferStatus::validate)?;
-        self.plan.as_ref().map_or(Ok(()), |plan| plan.validate())?;
+        self.plan.as_ref().map_or(Ok(()), SessionPlan::validate)?;
         self.conditions.iter().try_for_each(NodeCondition::validate)?;
-        self.achieved.iter().try_for_each(|achieved| finite_seconds(achieved.busy_s, "busy_s").map(drop))?;
-        finite_seconds(self.utilisation.unwrap_or_default(), "utilisation_ratio").map(drop)
+        self.achieved.iter().try_for_each(|achieved| finite_seconds(achieved.busy_s, "busy_s"))?;
+        finite_seconds(self.utilisation, "utilisation_ratio")
     }
 }
 
@@ -80,6 +82,51 @@ impl NodeCondition {
     fn validate(&self) -> Result<(), InvalidField> {
         nonempty(&self.node_name, "node_name")?;
         self.costs.validate()?;
-        finite_seconds(self.busy_ratio, "busy_ratio").map(drop)
+        finite_seconds(self.busy_ratio, "busy_ratio")
+    }
+}
+
+/// The scene on offer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OfferStatus {
+    /// The scene by content.
+    pub scene: SceneRef,
+    /// Sample cameras for sessions that bring none.
+    pub sample_cameras: Vec<Camera>,
+    /// The bounds of reconstruction.
+    pub volume: Aabb,
+    /// The point of the source file's space that is the world's origin.
+    pub origin_in_source: DVec3,
+    /// Settings for sessions that choose none.
+    pub settings: OfferSettings,
+}
+
+/// Settings named as on the command line; `None` where the client may choose.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct OfferSettings {
+    /// How views are reconstructed.
+    pub method: Option<String>,
+    /// How images are sampled.
+    pub sampling: Option<String>,
+    /// How samples are lit.
+    pub lighting: Option<String>,
+}
+
+impl OfferStatus {
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        if !self.origin_in_source.is_finite() {
+            return Err(InvalidField::out_of_range("origin_in_source", self.origin_in_source, "finite"));
+        }
+        self.scene.validate()?;
+        at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras")?;
+        let OfferSettings { method, sampling, lighting } = &self.settings;
+        for (setting, field) in
+            [(method, "reconstruction_method"), (sampling, "sampling_method"), (lighting, "lighting")]
+        {
+            text(setting.as_deref().unwrap_or_default(), field)?;
+        }
+        Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::InvalidField;
+use crate::check::{InvalidField, within};
 use crate::limits::{MAX_SCENE_TIME_S, MAX_SETS};
 
 /// Sets in a row that share one temporal reference.
@@ -49,15 +49,10 @@ impl Timeline {
     /// # Errors
     /// For no sets or too many, and for times that are not finite or too far from 0.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        if !(1..=MAX_SETS).contains(&self.set_count) {
-            return Err(InvalidField::out_of_range("timeline.set_count", self.set_count, "from 1 to 1048576"));
-        }
-        let within = |value: f64, field| match value.abs() <= MAX_SCENE_TIME_S {
-            true => Ok(()),
-            false => Err(InvalidField::out_of_range(field, value, "from -1e6 to 1e6")),
-        };
-        within(self.start_s, "timeline.start_s")?;
-        within(self.step_s, "timeline.step_s")
+        within(self.set_count, 1..=MAX_SETS, "timeline.set_count", "from 1 to 1048576")?;
+        let times = -MAX_SCENE_TIME_S..=MAX_SCENE_TIME_S;
+        within(self.start_s, times.clone(), "timeline.start_s", "from -1e6 to 1e6")?;
+        within(self.step_s, times, "timeline.step_s", "from -1e6 to 1e6")
     }
 }
 

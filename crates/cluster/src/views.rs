@@ -1,11 +1,10 @@
-//! Views that a client asks a compositor for.
+//! Views that a client asks a compositor for, and the images that a compositor asks a sampler or a relay for.
 
 use codec::FrameCodec;
 use depth_image::{PinholeCamera, ViewPlanes};
 
-use crate::check::{at_most, nonempty};
-use crate::error::InvalidField;
-use crate::limits::{MAX_LIVE_VIEWS_PER_REQUEST, MAX_VIEWS_PER_REQUEST};
+use crate::check::{InvalidField, at_most, nonempty};
+use crate::limits::{MAX_LIVE_VIEWS_PER_REQUEST, MAX_SAMPLE_CAMERAS, MAX_TILES, MAX_VIEWS_PER_REQUEST};
 
 /// Views of one sample set, all made alike.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,6 +62,29 @@ pub fn check_view_count(count: usize, is_live: bool) -> Result<(), InvalidField>
         (true, _) => at_most(count, MAX_LIVE_VIEWS_PER_REQUEST, "views of a live stream"),
         (false, 0) => Err(InvalidField::Missing { field: "views" }),
         (false, _) => at_most(count, MAX_VIEWS_PER_REQUEST, "views"),
+    }
+}
+
+/// Asks for encoded images of one set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FetchImages {
+    /// The epoch of the asker's plan.
+    pub plan_epoch: u64,
+    /// Index into the timeline.
+    pub set_index: u32,
+    /// Index into the workload's view cells.
+    pub cell: u32,
+    /// Indices into [`Assignment::sampled_cameras`](crate::Assignment::sampled_cameras) of the cell: images that the
+    /// sampler samples, or that a relay relays.
+    pub image_indices: Vec<u32>,
+}
+
+impl FetchImages {
+    /// # Errors
+    /// For no images, and for more than a set may have.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        at_most(self.image_indices.len(), MAX_SAMPLE_CAMERAS * MAX_TILES as usize, "image_indices")?;
+        if self.image_indices.is_empty() { Err(InvalidField::Missing { field: "image_indices" }) } else { Ok(()) }
     }
 }
 

@@ -150,12 +150,13 @@ fn report_frame(name: &str, colors: &[Vec3], width: u32, height: u32) -> Result<
     let srgb = |color: &Vec3| color.to_array().map(depth_image::srgb8_from_linear);
     let rgb: Vec<u8> = colors.iter().flat_map(srgb).collect();
     for codec in [FrameCodec::Lz4, FrameCodec::Jpeg { quality: 90 }] {
-        let frame = encode_frame(codec, width, height, &rgb)?;
+        let size_px = UVec2::new(width, height);
+        let data = encode_frame(codec, size_px, &rgb)?;
         let limits = DecodeLimits::default();
-        decode_frame(&frame, &limits)?;
-        let encode_s = median_secs(|| drop(black_box(encode_frame(codec, width, height, &rgb))));
-        let decode_s = median_secs(|| drop(black_box(decode_frame(&frame, &limits))));
-        print_row(&format!("{name} {codec}"), &rgb, frame.data.len(), encode_s, decode_s);
+        decode_frame(codec, size_px, &data, &limits)?;
+        let encode_s = median_secs(|| drop(black_box(encode_frame(codec, size_px, &rgb))));
+        let decode_s = median_secs(|| drop(black_box(decode_frame(codec, size_px, &data, &limits))));
+        print_row(&format!("{name} {codec}"), &rgb, data.len(), encode_s, decode_s);
     }
     Ok(())
 }

@@ -1,11 +1,28 @@
 //! Encoded images in pieces that fit a message: the header first, then the payload in order.
 
+use std::fmt;
+
 use bytes::Bytes;
 
-use crate::{EncodedDepthImage, ImageHeader, SampleSetId};
+use crate::{EncodedDepthImage, ImageHeader};
 
 /// Data of one chunk; the last of an image may have less.
 pub const MAX_CHUNK_BYTES: usize = 512 << 10;
+
+/// Names scene time, cameras and lighting of a set of sample images. Later sets compare greater.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct SampleSetId {
+    /// The plan that asked for it.
+    pub plan_epoch: u64,
+    /// Counts the sets of one plan.
+    pub index: u64,
+}
+
+impl fmt::Display for SampleSetId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.plan_epoch, self.index)
+    }
+}
 
 /// The body of a chunk.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,11 +7,9 @@
 //!
 //! `docs/methods/depth_codec.md` shows how much the bits save.
 
-use crate::{
-    DecodeError,
-    tagged::{BLOCK, Packer, max_packed_bytes, take, unpack, unzigzag, zigzag},
-    words_codec::for_neighbours,
-};
+use crate::DecodeError;
+use crate::tagged::{BLOCK, Packer, max_packed_bytes, take, unpack, unzigzag, zigzag};
+use crate::words_codec::for_neighbours;
 
 const MANTISSA: u32 = 511;
 const EXPONENT: u32 = 31;

@@ -24,12 +24,11 @@
 
 use std::hint::select_unpredictable;
 
-use crate::{
-    DecodeError,
-    quantise::{InverseDepthRange, dequantise, empty_inverse_depth, quantise},
-    runs::Runs,
-    tagged::{BLOCK, Packer, max_packed_bytes, unpack, unzigzag, zigzag},
-};
+use crate::lz4::expand_lz4_up_to;
+use crate::quantise::{InverseDepthRange, dequantise, empty_inverse_depth, quantise};
+use crate::runs::Runs;
+use crate::tagged::{BLOCK, Packer, max_packed_bytes, unpack, unzigzag, zigzag};
+use crate::{DecodeError, DecodeLimits};
 
 /// Differences of this many codes and more are edges: they predict nothing.
 const EDGE_CODES: u16 = 256;
@@ -137,10 +136,49 @@ fn restore(numbers: &mut [u16]) {
     }
 }
 
+/// A plane by itself, for benches of the codec.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EncodedDepthPlane {
+    /// The range that the codes span.
+    pub range: InverseDepthRange,
+    /// An LZ4 block.
+    pub packed: Vec<u8>,
+}
+
+/// The 16-bit codes of a plane, over its own range.
+#[must_use]
+pub fn inverse_depth_codes(inverse_depth_per_m: &[f32]) -> Vec<u16> {
+    let mut codes = vec![0; inverse_depth_per_m.len()];
+    quantise(inverse_depth_per_m, InverseDepthRange::of_plane(inverse_depth_per_m), &mut codes);
+    codes
+}
+
+/// Quantises and packs a plane.
+#[must_use]
+pub fn encode_depth_plane(inverse_depth_per_m: &[f32]) -> EncodedDepthPlane {
+    let depth = encode_depth(inverse_depth_per_m);
+    EncodedDepthPlane { range: depth.range, packed: lz4_flex::block::compress(&depth.bytes) }
+}
+
+/// Unpacks a plane.
+///
+/// # Errors
+/// A size over the limits, or bytes that do not decode to exactly that size.
+pub fn decode_depth_plane(
+    plane: &EncodedDepthPlane,
+    width: u32,
+    height: u32,
+    limits: &DecodeLimits,
+) -> Result<Vec<f32>, DecodeError> {
+    let texels = limits.texels(width, height)?;
+    plane.range.validate()?;
+    let bytes = expand_lz4_up_to(&plane.packed, max_unpacked_bytes(texels), "inverse_depth")?;
+    decode_depth(&bytes, texels, plane.range).map(|(_, plane)| plane)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inverse_depth_codes;
     use crate::test_planes::{Random, tree_over_terrain};
 
     #[test]

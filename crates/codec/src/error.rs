@@ -20,7 +20,7 @@ pub enum DecodeError {
     Corrupt { field: &'static str, reason: &'static str },
 }
 
-/// Why a frame is not encoded or decoded.
+/// Why a view, or its colour, is not encoded or decoded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[allow(missing_docs, reason = "self-naming fields")]
 pub enum FrameError {
@@ -33,12 +33,15 @@ pub enum FrameError {
     /// The JPEG library refuses.
     #[error("JPEG: {0}")]
     Jpeg(String),
-    /// The data is not what was sent.
-    #[error("frame checksum does not match")]
-    Checksum,
     /// Size over the limits, or data that does not decode.
     #[error(transparent)]
     Decode(#[from] DecodeError),
+    /// A plane beside the colour is at fault.
+    #[error("{plane}: {source}")]
+    Plane { plane: &'static str, source: DecodeError },
+    /// Planes of other lengths than the header says, or than the view's size.
+    #[error("{plane} has {len} texels or bytes, must have {expected}")]
+    Length { plane: &'static str, len: usize, expected: usize },
 }
 
 /// Limits that a decoder checks before it allocates.

@@ -1,16 +1,19 @@
 //! Frames for thin clients: 8-bit sRGB, with loss or without.
+//!
+//! Without loss they are made easier for LZ4: differences from the left, red and blue less green's.
+//! Against LZ4 alone: 3 % fewer bytes on two rendered bunnies, 6 % on leather; 4 % more where leaves of
+//! one colour each leave nothing to predict. Prediction by the median of left, above and their plane,
+//! packed by class, runs at half the speed. It takes 4 and 8 % fewer bytes on the bunnies, a quarter fewer on the
+//! leather, and more on the leaves.
 
 use std::{fmt, str::FromStr};
 
 use bytes::Bytes;
+use glam::UVec2;
 
-use crate::{
-    DecodeError, DecodeLimits, FrameError,
-    error::check_limit,
-    jpeg,
-    lz4::expand_lz4,
-    rgb_filter::{filter, unfilter},
-};
+use crate::error::check_limit;
+use crate::lz4::expand_lz4;
+use crate::{DecodeLimits, FrameError, jpeg};
 
 /// The packing of frames: `lz4`, `jpeg` or `jpeg:QUALITY` in settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -26,21 +29,6 @@ pub enum FrameCodec {
 }
 
 const DEFAULT_JPEG_QUALITY: u8 = 90;
-
-/// An encoded frame.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct EncodedFrame {
-    /// How the data is packed.
-    pub codec: FrameCodec,
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// CRC-32 of the data.
-    pub crc32: u32,
-    /// The packed pixels.
-    pub data: Bytes,
-}
 
 /// Why a text names no codec.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -74,42 +62,67 @@ impl fmt::Display for FrameCodec {
 ///
 /// # Errors
 /// A slice that is not of the frame's size; a size or quality that JPEG cannot have.
-pub fn encode_frame(codec: FrameCodec, width: u32, height: u32, rgb: &[u8]) -> Result<EncodedFrame, FrameError> {
+pub fn encode_frame(codec: FrameCodec, size_px: UVec2, rgb: &[u8]) -> Result<Bytes, FrameError> {
+    let UVec2 { x: width, y: height } = size_px;
     let (pixels, rest) = rgb.as_chunks::<3>();
     if !rest.is_empty() || width == 0 || pixels.len() as u64 != u64::from(width) * u64::from(height) {
         return Err(FrameError::Size { width, height, rgb_bytes: rgb.len() });
     }
-    let data: Bytes = match codec {
+    Ok(match codec {
         FrameCodec::Lz4 => lz4_flex::block::compress(&filter(pixels)).into(),
         FrameCodec::Jpeg { quality } => jpeg::encode(width, height, rgb, quality)?.into(),
-    };
-    Ok(EncodedFrame { codec, width, height, crc32: crc32fast::hash(&data), data })
+    })
 }
 
 /// Unpacks a frame to three bytes a pixel.
 ///
 /// # Errors
-/// A size or data over the limits; a wrong checksum; data that does not decode to that size.
-pub fn decode_frame(frame: &EncodedFrame, limits: &DecodeLimits) -> Result<Vec<u8>, FrameError> {
-    let pixels = limits.texels(frame.width, frame.height)?;
-    check_limit("frame data", frame.data.len() as u64, limits.max_payload_bytes as u64)?;
-    if crc32fast::hash(&frame.data) != frame.crc32 {
-        return Err(FrameError::Checksum);
-    }
-    match frame.codec {
-        FrameCodec::Lz4 => Ok(decode_lossless(&frame.data, pixels)?),
-        FrameCodec::Jpeg { .. } => jpeg::decode(frame.width, frame.height, &frame.data),
+/// A size or data over the limits; data that does not decode to that size.
+pub fn decode_frame(
+    codec: FrameCodec,
+    size_px: UVec2,
+    data: &[u8],
+    limits: &DecodeLimits,
+) -> Result<Vec<u8>, FrameError> {
+    let pixels = limits.texels(size_px.x, size_px.y)?;
+    check_limit("frame data", data.len() as u64, limits.max_payload_bytes as u64)?;
+    match codec {
+        FrameCodec::Lz4 => {
+            let mut rgb = expand_lz4(data, pixels * 3, "frame")?;
+            unfilter(&mut rgb);
+            Ok(rgb)
+        }
+        FrameCodec::Jpeg { .. } => jpeg::decode(size_px.x, size_px.y, data),
     }
 }
 
-fn decode_lossless(data: &[u8], pixels: usize) -> Result<Vec<u8>, DecodeError> {
-    let mut rgb = expand_lz4(data, pixels * 3, "frame")?;
-    unfilter(&mut rgb);
-    Ok(rgb)
+/// Differences of each pixel from the one before.
+fn filter(rgb: &[[u8; 3]]) -> Vec<u8> {
+    let mut filtered = vec![0; rgb.len() * 3];
+    let mut last = [0u8; 3];
+    for (out, &pixel) in filtered.as_chunks_mut::<3>().0.iter_mut().zip(rgb) {
+        let [red, green, blue] = [0, 1, 2].map(|channel| pixel[channel].wrapping_sub(last[channel]));
+        *out = [red.wrapping_sub(green), green, blue.wrapping_sub(green)];
+        last = pixel;
+    }
+    filtered
+}
+
+/// The inverse of [`filter`], in place.
+fn unfilter(filtered: &mut [u8]) {
+    let mut last = [0u8; 3];
+    for pixel in filtered.as_chunks_mut::<3>().0 {
+        let [red, green, blue] = *pixel;
+        let difference = [red.wrapping_add(green), green, blue.wrapping_add(green)];
+        last = [0, 1, 2].map(|channel| last[channel].wrapping_add(difference[channel]));
+        *pixel = last;
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec2Swizzles as _;
+
     use super::*;
     use crate::test_planes::{Random, tree_over_terrain};
 
@@ -127,8 +140,9 @@ mod tests {
     fn lz4_frames_survive_to_the_bit() {
         for (width, height) in [(1, 1), (3, 2), (200, 150)] {
             let rgb = picture(width, height);
-            let frame = encode_frame(FrameCodec::Lz4, width as u32, height as u32, &rgb).expect("right size");
-            assert_eq!(decode_frame(&frame, &limits()).as_ref(), Ok(&rgb));
+            let size_px = UVec2::new(width as u32, height as u32);
+            let data = encode_frame(FrameCodec::Lz4, size_px, &rgb).expect("right size");
+            assert_eq!(decode_frame(FrameCodec::Lz4, size_px, &data, &limits()).as_ref(), Ok(&rgb));
         }
     }
 
@@ -136,36 +150,33 @@ mod tests {
     fn gradients_pack_better_than_by_lz4_alone() {
         let rgb: Vec<u8> =
             (0..200 * 150).flat_map(|i| [i % 200, i / 200, i % 200 / 2 + i / 400].map(|c| c as u8)).collect();
-        let frame = encode_frame(FrameCodec::Lz4, 200, 150, &rgb).expect("right size");
-        assert!(frame.data.len() < lz4_flex::block::compress(&rgb).len());
+        let data = encode_frame(FrameCodec::Lz4, UVec2::new(200, 150), &rgb).expect("right size");
+        assert!(data.len() < lz4_flex::block::compress(&rgb).len());
     }
 
     #[test]
     fn jpeg_frames_are_close() {
         let rgb: Vec<u8> = (0..64 * 48).flat_map(|i| [(i % 64) as u8 * 2, (i / 64) as u8 * 3, 90]).collect();
-        let frame = encode_frame(FrameCodec::Jpeg { quality: 95 }, 64, 48, &rgb).expect("right size");
-        let back = decode_frame(&frame, &limits()).expect("own encoding");
+        let (codec, size_px) = (FrameCodec::Jpeg { quality: 95 }, UVec2::new(64, 48));
+        let data = encode_frame(codec, size_px, &rgb).expect("right size");
+        let back = decode_frame(codec, size_px, &data, &limits()).expect("own encoding");
         assert_eq!(back.len(), rgb.len());
         assert!(rgb.iter().zip(&back).all(|(a, b)| a.abs_diff(*b) <= 12));
-        let wrong = EncodedFrame { width: 48, height: 64, ..frame };
-        assert!(matches!(decode_frame(&wrong, &limits()), Err(FrameError::Jpeg(_))));
+        assert!(matches!(decode_frame(codec, size_px.yx(), &data, &limits()), Err(FrameError::Jpeg(_))));
     }
 
     #[test]
     fn damaged_frames_never_panic() {
-        let rgb = picture(40, 30);
+        let (rgb, size_px) = (picture(40, 30), UVec2::new(40, 30));
         let mut random = Random::new(16);
         for codec in [FrameCodec::Lz4, FrameCodec::Jpeg { quality: 80 }] {
-            let good = encode_frame(codec, 40, 30, &rgb).expect("right size");
+            let good = encode_frame(codec, size_px, &rgb).expect("right size");
             for case in 0..4000 {
-                let mut data = good.data.to_vec();
+                let mut data = good.to_vec();
                 let at = random.below(data.len());
                 data[at] ^= 1 << random.below(8);
                 data.truncate(if case % 3 == 0 { at } else { data.len() });
-                let bad = EncodedFrame { data: data.into(), ..good.clone() };
-                assert_eq!(decode_frame(&bad, &limits()), Err(FrameError::Checksum));
-                let sealed = EncodedFrame { crc32: crc32fast::hash(&bad.data), ..bad };
-                if let Ok(rgb) = decode_frame(&sealed, &limits()) {
+                if let Ok(rgb) = decode_frame(codec, size_px, &data, &limits()) {
                     assert_eq!(rgb.len(), 40 * 30 * 3);
                 }
             }
@@ -174,11 +185,11 @@ mod tests {
 
     #[test]
     fn sizes_are_checked_first() {
-        assert!(matches!(encode_frame(FrameCodec::Lz4, 2, 2, &[0; 11]), Err(FrameError::Size { .. })));
-        assert!(encode_frame(FrameCodec::Jpeg { quality: 0 }, 1, 1, &[0; 3]).is_err());
-        let frame = encode_frame(FrameCodec::Lz4, 1, 1, &[1, 2, 3]).expect("right size");
+        assert!(matches!(encode_frame(FrameCodec::Lz4, UVec2::splat(2), &[0; 11]), Err(FrameError::Size { .. })));
+        assert!(encode_frame(FrameCodec::Jpeg { quality: 0 }, UVec2::ONE, &[0; 3]).is_err());
+        let data = encode_frame(FrameCodec::Lz4, UVec2::ONE, &[1, 2, 3]).expect("right size");
         for (width, height) in [(0, 1), (65_535, 65_535), (16_384, 16_384), (300, 300), (9, 9)] {
-            assert!(decode_frame(&EncodedFrame { width, height, ..frame.clone() }, &limits()).is_err());
+            assert!(decode_frame(FrameCodec::Lz4, UVec2::new(width, height), &data, &limits()).is_err());
         }
     }
 
@@ -191,5 +202,20 @@ mod tests {
         for name in ["", "png", "lz4:3", "jpeg:0", "jpeg:101", "jpeg:", "JPEG"] {
             assert!(name.parse::<FrameCodec>().is_err(), "{name}");
         }
+    }
+
+    #[test]
+    fn unfiltering_inverts_filtering() {
+        let mut random = Random::new(20);
+        let rgb: Vec<[u8; 3]> = (0..1000).map(|_| [0; 3].map(|_: u8| random.next_u32() as u8)).collect();
+        let mut filtered = filter(&rgb);
+        unfilter(&mut filtered);
+        assert_eq!(filtered, rgb.into_flattened());
+    }
+
+    #[test]
+    fn gradients_repeat() {
+        let rgb: Vec<[u8; 3]> = (0..200).map(|x| [x, x, x]).collect();
+        assert!(filter(&rgb)[3..].as_chunks::<3>().0.iter().all(|pixel| *pixel == [0, 1, 0]));
     }
 }

@@ -1,10 +1,9 @@
 //! The headers of frames.
 
-use bytes::Bytes;
 use depth_image::PinholeCamera;
 use glam::UVec2;
 
-use crate::{FrameCodec, SampleSetId, StageTimes};
+use crate::{FrameCodec, SampleSetId};
 
 /// Bytes of one encoded frame, all planes.
 pub const MAX_FRAME_BYTES: u64 = 512 << 20;
@@ -40,13 +39,62 @@ impl FrameHeader {
     }
 }
 
-/// A frame whose parts have all come.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WholeFrame {
-    /// The client's number of the frame.
-    pub frame: u64,
-    /// Its header.
-    pub header: FrameHeader,
-    /// All planes; their checksum has been verified.
-    pub data: Bytes,
+/// Times of a frame's stages at its compositor, in durations: clocks of machines differ.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StageTimes {
+    /// The wait for the sample set.
+    pub set_wait_s: f64,
+    /// The wait until earlier frames were sent, and, on a live stream, acknowledged.
+    pub credit_wait_s: f64,
+    /// The wait in the queue for the device.
+    pub queue_s: f64,
+    /// The batch's device time: each of its views waits for all of them.
+    pub batch_s: f64,
+    /// The batch's device time divided by its views.
+    pub reconstruct_s: f64,
+    /// Encoding.
+    pub encode_s: f64,
+    /// The wait of the finished view for an encoder, and for earlier frames to be sent.
+    pub send_wait_s: f64,
+    /// From the request's arrival to the frame's departure.
+    pub compositor_s: f64,
+    /// The age of the sample set when the batch was begun; 0 where views are drawn from the scene.
+    pub set_age_s: f64,
+    /// Views of the batch.
+    pub batch_count: u32,
+}
+
+impl StageTimes {
+    /// The sum of the stages up to encoding.
+    fn made_s(&self) -> f64 {
+        self.set_wait_s + self.credit_wait_s + self.queue_s + self.batch_s + self.encode_s
+    }
+
+    /// The times of a frame that leaves `compositor_s` after its request: time that no other stage accounts for is a wait.
+    #[must_use]
+    pub fn leaving_after(self, compositor_s: f64) -> Self {
+        Self { compositor_s, send_wait_s: (compositor_s - self.made_s()).max(0.0), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_add_up_to_the_whole() {
+        let made = StageTimes {
+            set_wait_s: 0.1,
+            credit_wait_s: 0.2,
+            queue_s: 0.3,
+            batch_s: 0.4,
+            encode_s: 0.5,
+            reconstruct_s: 0.2,
+            set_age_s: 9.0,
+            ..StageTimes::default()
+        };
+        let left = made.leaving_after(2.0);
+        assert!((left.made_s() + left.send_wait_s - left.compositor_s).abs() < 1e-12);
+        assert_eq!(made.leaving_after(1.0).send_wait_s, 0.0, "clocks that were read in another order");
+    }
 }

@@ -2,8 +2,8 @@
 
 use bytes::Bytes;
 
+use crate::FrameHeader;
 use crate::chunk::MAX_CHUNK_BYTES;
-use crate::{FrameHeader, WholeFrame};
 
 /// A piece of an encoded frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +28,17 @@ impl FramePart {
             Self { frame, header: header.take(), offset_bytes: start as u64, data }
         })
     }
+}
+
+/// A frame whose parts have all come.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WholeFrame {
+    /// The client's number of the frame.
+    pub frame: u64,
+    /// Its header.
+    pub header: FrameHeader,
+    /// All planes; their checksum has been verified.
+    pub data: Bytes,
 }
 
 /// Why the parts of a stream make no frames.

@@ -1,18 +1,16 @@
 //! A depth image to header and payload, and back.
 
 use bytes::Bytes;
-use depth_image::{Camera, DepthImage, DepthImageError, SpecularPlanes, SurfaceId};
+use depth_image::{Camera, DepthImage, DepthImageError, SurfaceId};
 
-use crate::{
-    DecodeError, DecodeLimits, ImageHeader, InverseDepthRange, PlaneHeader, PlaneKind, PlaneSet,
-    color_codec::{pack_colors, unpack_colors},
-    depth_codec::{decode_depth, encode_depth},
-    image_header::CORNER_RANGE_BYTES,
-    lz4::expand_lz4,
-    runs::Runs,
-    tagged::take,
-    words_codec::{WordLayout, pack_words, unpack_words},
-};
+use crate::color_codec::{pack_colors, unpack_colors};
+use crate::depth_codec::{decode_depth, encode_depth};
+use crate::image_header::CORNER_RANGE_BYTES;
+use crate::lz4::expand_lz4;
+use crate::runs::Runs;
+use crate::tagged::take;
+use crate::words_codec::{WordLayout, pack_words, unpack_words};
+use crate::{DecodeError, DecodeLimits, ImageHeader, InverseDepthRange, PlaneHeader, PlaneKind, PlaneSet};
 
 /// An encoded depth image, without its camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,15 +36,19 @@ pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<Encode
     let runs = &depth.runs;
     let mut packer = Packer::default();
     packer.push(PlaneKind::InverseDepth, &depth.bytes);
-    packer.push(PlaneKind::ColorRgb9e5, &raw(|out| pack_colors(&runs.gather(&image.color_rgb9e5), out)));
+    packer.write(PlaneKind::ColorRgb9e5, |out| pack_colors(&runs.gather(&image.color_rgb9e5), out));
     if let Some(normals) = image.normal_oct16.as_ref().filter(|_| planes.normal || specular.is_some()) {
-        packer.push(PlaneKind::NormalOct16, &raw(|out| pack_words(&runs.gather(normals), WordLayout::Halves, out)));
+        packer.write(PlaneKind::NormalOct16, |out| pack_words(&runs.gather(normals), WordLayout::Halves, out));
     }
     if let Some(ids) = image.surface_id.as_ref().filter(|_| planes.surface_id) {
-        packer.push(PlaneKind::SurfaceId, &raw(|out| pack_surface_ids(&runs.gather(ids), out)));
+        packer.write(PlaneKind::SurfaceId, |out| pack_surface_ids(&runs.gather(ids), out));
     }
     if let Some(specular) = specular {
-        push_specular(&mut packer, specular, runs);
+        let mut write = |kind, plane: &[u32]| {
+            packer.write(kind, |out| pack_words(&runs.gather(plane), WordLayout::Bytes, out));
+        };
+        write(PlaneKind::ReflectanceRoughness8, &specular.reflectance_srgb8_roughness8);
+        specular.visibility8.iter().for_each(|visibility| write(PlaneKind::Visibility8, visibility));
     }
     if let Some(passed) = &image.passed {
         packer.push(PlaneKind::Passed1, &pack_bits(passed));
@@ -82,7 +84,12 @@ pub fn decode_depth_image(
     if payload.len() as u64 != header.payload_bytes() {
         return Err(DecodeError::Corrupt { field: "payload", reason: "not as long as the header says" });
     }
-    let (runs, inverse_depth_per_m, others) = decode_depth_plane(header, payload, texels)?;
+    let [first, others @ ..] = &header.planes[..] else {
+        return Err(DecodeError::Header { field: "planes", reason: "none" });
+    };
+    let mut packed = payload;
+    let (runs, inverse_depth_per_m) =
+        decode_depth(&expand_plane(first, &mut packed)?, texels, header.inverse_depth_range)?;
     let mut image = DepthImage {
         camera,
         inverse_depth_per_m,
@@ -93,19 +100,10 @@ pub fn decode_depth_image(
         passed: None,
         corner_inverse_depth_per_m: None,
     };
-    let mut packed = others;
-    for plane in header.planes.iter().skip(1) {
+    for plane in others {
         decode_plane(plane, &mut packed, &runs, header.corners(), &mut image)?;
     }
     Ok(image)
-}
-
-fn push_specular(packer: &mut Packer, specular: &SpecularPlanes, runs: &Runs) {
-    let packed = |plane| raw(|out| pack_words(&runs.gather(plane), WordLayout::Bytes, out));
-    packer.push(PlaneKind::ReflectanceRoughness8, &packed(&specular.reflectance_srgb8_roughness8));
-    for visibility in &specular.visibility8 {
-        packer.push(PlaneKind::Visibility8, &packed(visibility));
-    }
 }
 
 #[derive(Default)]
@@ -125,12 +123,12 @@ impl Packer {
             packed_bytes: packed.len() as u32,
         });
     }
-}
 
-fn raw(write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
-    let mut out = Vec::new();
-    write(&mut out);
-    out
+    fn write(&mut self, kind: PlaneKind, write: impl FnOnce(&mut Vec<u8>)) {
+        let mut raw = Vec::new();
+        write(&mut raw);
+        self.push(kind, &raw);
+    }
 }
 
 fn check_camera(header: &ImageHeader, camera: &Camera) -> Result<(), DecodeError> {
@@ -141,19 +139,6 @@ fn check_camera(header: &ImageHeader, camera: &Camera) -> Result<(), DecodeError
         return Ok(());
     }
     Err(DecodeError::CameraSize { width, height, camera_width, camera_height })
-}
-
-/// The runs, the plane, and the bytes of the other planes.
-fn decode_depth_plane<'a>(
-    header: &ImageHeader,
-    payload: &'a [u8],
-    texels: usize,
-) -> Result<(Runs, Vec<f32>, &'a [u8]), DecodeError> {
-    let mut packed = payload;
-    let plane = header.planes.first().ok_or(DecodeError::Header { field: "planes", reason: "none" })?;
-    let raw = expand_plane(plane, &mut packed)?;
-    let (runs, inverse_depth_per_m) = decode_depth(&raw, texels, header.inverse_depth_range)?;
-    Ok((runs, inverse_depth_per_m, packed))
 }
 
 fn expand_plane(plane: &PlaneHeader, packed: &mut &[u8]) -> Result<Vec<u8>, DecodeError> {
@@ -175,27 +160,29 @@ fn decode_plane(
     let raw = expand_plane(plane, packed)?;
     let mut input = &raw[..];
     let samples = runs.sample_count();
+    let words = |input: &mut &[u8], layout| -> Result<Vec<u32>, DecodeError> {
+        Ok(runs.scatter(&unpack_words(input, samples, layout)?, 0))
+    };
     match plane.kind {
         PlaneKind::InverseDepth => {}
         PlaneKind::ColorRgb9e5 => image.color_rgb9e5 = runs.scatter(&unpack_colors(&mut input, samples)?, 0),
-        PlaneKind::NormalOct16 => {
-            let normals = unpack_words(&mut input, samples, WordLayout::Halves)?;
-            image.normal_oct16 = Some(runs.scatter(&normals, 0));
-        }
+        PlaneKind::NormalOct16 => image.normal_oct16 = Some(words(&mut input, WordLayout::Halves)?),
         PlaneKind::SurfaceId => {
             let nothing = SurfaceId { instance: 0, primitive: 0 };
             image.surface_id = Some(runs.scatter(&unpack_surface_ids(&mut input, samples)?, nothing));
         }
         PlaneKind::ReflectanceRoughness8 => {
-            let reflectances = unpack_words(&mut input, samples, WordLayout::Bytes)?;
-            image.specular.get_or_insert_default().reflectance_srgb8_roughness8 = runs.scatter(&reflectances, 0);
+            let reflectances = words(&mut input, WordLayout::Bytes)?;
+            image.specular.get_or_insert_default().reflectance_srgb8_roughness8 = reflectances;
         }
         PlaneKind::Visibility8 => {
-            let visibilities = unpack_words(&mut input, samples, WordLayout::Bytes)?;
-            image.specular.get_or_insert_default().visibility8.push(runs.scatter(&visibilities, 0));
+            let visibilities = words(&mut input, WordLayout::Bytes)?;
+            image.specular.get_or_insert_default().visibility8.push(visibilities);
         }
         PlaneKind::Passed1 => {
-            image.passed = Some(unpack_bits(take(&mut input, image.inverse_depth_per_m.len().div_ceil(8))?, image));
+            let texels = image.inverse_depth_per_m.len();
+            let bits = take(&mut input, texels.div_ceil(8))?;
+            image.passed = Some((0..texels).map(|index| bits[index / 8] >> (index % 8) & 1 != 0).collect());
         }
         PlaneKind::CornerInverseDepth => {
             image.corner_inverse_depth_per_m = Some(unpack_corners(std::mem::take(&mut input), corners)?);
@@ -209,10 +196,6 @@ fn decode_plane(
 
 fn pack_bits(bits: &[bool]) -> Vec<u8> {
     bits.chunks(8).map(|eight| (0..).zip(eight).map(|(place, &bit)| u8::from(bit) << place).sum()).collect()
-}
-
-fn unpack_bits(bytes: &[u8], image: &DepthImage) -> Vec<bool> {
-    (0..image.inverse_depth_per_m.len()).map(|index| bytes[index / 8] >> (index % 8) & 1 != 0).collect()
 }
 
 fn pack_corners(corners: &[f32]) -> Vec<u8> {

@@ -4,13 +4,11 @@ use std::hash::Hasher;
 
 use depth_image::{MAX_LIGHTS, SpecularPlanes};
 
-use crate::{
-    DecodeError, DecodeLimits, InverseDepthRange,
-    color_codec::max_colors_bytes,
-    depth_codec::max_unpacked_bytes,
-    error::check_limit,
-    words_codec::{WordLayout, max_words_bytes},
-};
+use crate::color_codec::max_colors_bytes;
+use crate::depth_codec::max_unpacked_bytes;
+use crate::error::check_limit;
+use crate::words_codec::{WordLayout, max_words_bytes};
+use crate::{DecodeError, DecodeLimits, InverseDepthRange};
 
 /// Planes of visibility of one sample image: one byte for the environment and each light.
 pub const MAX_VISIBILITY_PLANES: usize = SpecularPlanes::visibility_planes(MAX_LIGHTS);
@@ -64,8 +62,7 @@ impl PlaneKind {
     }
 
     /// The kind's name in errors.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::InverseDepth => "inverse_depth",
             Self::ColorRgb9e5 => "color_rgb9e5",
@@ -79,8 +76,7 @@ impl PlaneKind {
     }
 
     /// Bytes of one texel before any packing.
-    #[must_use]
-    pub const fn texel_bytes(self) -> usize {
+    const fn texel_bytes(self) -> usize {
         match self {
             Self::InverseDepth | Self::CornerInverseDepth => 2,
             Self::Passed1 => 1,

@@ -8,11 +8,10 @@ pub(crate) fn expand_lz4(packed: &[u8], unpacked_bytes: usize, field: &'static s
     if unpacked_bytes / 255 > packed.len() {
         return Err(DecodeError::Corrupt { field, reason: "claims more than LZ4 can hold" });
     }
-    let mut unpacked = vec![0; unpacked_bytes];
-    match lz4_flex::block::decompress_into(packed, &mut unpacked) {
-        Ok(written) if written == unpacked_bytes => Ok(unpacked),
-        Ok(_) => Err(DecodeError::Corrupt { field, reason: "LZ4 block is too short" }),
-        Err(_) => Err(DecodeError::Corrupt { field, reason: "LZ4 block is invalid" }),
+    let unpacked = expand_lz4_up_to(packed, unpacked_bytes, field)?;
+    match unpacked.len() == unpacked_bytes {
+        true => Ok(unpacked),
+        false => Err(DecodeError::Corrupt { field, reason: "LZ4 block is too short" }),
     }
 }
 

@@ -8,11 +8,11 @@ use depth_image::{BACKGROUND_INVERSE_DEPTH, HOLE_INVERSE_DEPTH};
 use crate::DecodeError;
 
 /// A texel without a sample.
-pub const HOLE_CODE: u16 = 0;
+pub(crate) const HOLE_CODE: u16 = 0;
 /// A texel whose ray met nothing.
-pub const BACKGROUND_CODE: u16 = 1;
+pub(crate) const BACKGROUND_CODE: u16 = 1;
 /// The code of the least inverse depth; the greatest has `u16::MAX`.
-pub const FIRST_SAMPLE_CODE: u16 = 2;
+pub(crate) const FIRST_SAMPLE_CODE: u16 = 2;
 
 const STEPS: f64 = (u16::MAX - FIRST_SAMPLE_CODE) as f64;
 /// Added to a small number it leaves the number, rounded, in the lowest bits of the sum.
@@ -21,7 +21,7 @@ const ROUND_TO_INTEGER: f64 = (1u64 << 52) as f64;
 /// The inverse depths that the codes of an image span. Both are 0 in an image without samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InverseDepthRange {
-    /// Inverse depth of code [`FIRST_SAMPLE_CODE`], per metre.
+    /// Inverse depth of the least code of a sample, per metre.
     pub least_per_m: f32,
     /// Inverse depth of code `u16::MAX`, per metre.
     pub greatest_per_m: f32,
@@ -53,12 +53,6 @@ impl InverseDepthRange {
         Self { least_per_m, greatest_per_m }
     }
 
-    /// Half the distance between neighbouring codes: the bound on the error of a round trip.
-    #[must_use]
-    pub fn half_step_per_m(self) -> f64 {
-        self.step_per_m() * 0.5
-    }
-
     /// Refuses ranges that would decode to anything but positive, finite inverse depths.
     pub(crate) fn validate(self) -> Result<(), DecodeError> {
         let Self { least_per_m, greatest_per_m } = self;
@@ -73,7 +67,8 @@ impl InverseDepthRange {
         self.greatest_per_m == 0.0
     }
 
-    fn step_per_m(self) -> f64 {
+    /// The distance between neighbouring codes; half of it bounds the error of a round trip.
+    pub(crate) fn step_per_m(self) -> f64 {
         (f64::from(self.greatest_per_m) - f64::from(self.least_per_m)) / STEPS
     }
 }
@@ -136,7 +131,7 @@ mod tests {
             for (&was, &is) in plane.iter().zip(&back) {
                 let rounding = f64::from(is) * f64::from(f32::EPSILON) * 0.5 + f64::from(f32::from_bits(1));
                 let error = (f64::from(was) - f64::from(is)).abs();
-                assert!(error <= range.half_step_per_m() * (1.0 + 1e-3) + rounding, "{was} {is} {range:?}");
+                assert!(error <= range.step_per_m() * 0.5 * (1.0 + 1e-3) + rounding, "{was} {is} {range:?}");
             }
         }
     }

@@ -1,10 +1,10 @@
 //! Chunks back to images. One reassembler serves one stream, one image at a time.
 
-use bytes::{Bytes, BytesMut};
+use bytes::Bytes;
 
+use crate::chunk::chunk_count;
 use crate::{
     Chunk, ChunkBody, DecodeError, DecodeLimits, EncodedDepthImage, ImageHeader, MAX_CHUNK_BYTES, SampleSetId,
-    chunk::chunk_count,
 };
 
 /// An image whose chunks have all arrived.
@@ -51,7 +51,6 @@ pub struct Reassembler {
     limits: DecodeLimits,
     oldest: SampleSetId,
     under_way: Option<UnderWay>,
-    abandoned: u64,
 }
 
 #[derive(Debug)]
@@ -61,34 +60,14 @@ struct UnderWay {
     next_sequence: u32,
     chunk_count: u32,
     header: ImageHeader,
-    payload: Payload,
-}
-
-/// A payload in one chunk is kept as it is; longer ones are joined.
-#[derive(Debug)]
-enum Payload {
-    Whole(Bytes),
-    Joined(BytesMut),
+    pieces: Vec<Bytes>,
 }
 
 impl Reassembler {
     /// Accepts sets from `oldest` on, and images within `limits`.
     #[must_use]
     pub fn new(limits: DecodeLimits, oldest: SampleSetId) -> Self {
-        Self { limits, oldest, under_way: None, abandoned: 0 }
-    }
-
-    /// Refuses sets before `oldest` from now on; an unfinished image of one is dropped.
-    pub fn forget_before(&mut self, oldest: SampleSetId) {
-        self.oldest = self.oldest.max(oldest);
-        let stale = |image: &mut UnderWay| image.sample_set_id < oldest;
-        self.abandoned += u64::from(self.under_way.take_if(stale).is_some());
-    }
-
-    /// Images that were begun and never finished.
-    #[must_use]
-    pub fn abandoned(&self) -> u64 {
-        self.abandoned
+        Self { limits, oldest, under_way: None }
     }
 
     /// Takes the next chunk; gives the image after its last.
@@ -102,7 +81,7 @@ impl Reassembler {
         self.check_sequence(&chunk)?;
         let result = self.accept(chunk);
         if result.is_err() {
-            self.abandon();
+            self.under_way = None;
         }
         result
     }
@@ -117,29 +96,26 @@ impl Reassembler {
         if (chunk.sample_set_id, chunk.image_index) == (sample_set_id, image_index) && got <= expected {
             return if got == expected { Ok(()) } else { Err(ChunkError::Duplicate { got, expected }) };
         }
-        self.abandon();
+        self.under_way = None;
         if got == 0 && chunk.sample_set_id > sample_set_id {
             return Ok(());
         }
         Err(ChunkError::Missing { sample_set_id, image_index, got, expected })
     }
 
-    fn abandon(&mut self) {
-        self.abandoned += u64::from(self.under_way.take().is_some());
-    }
-
     fn accept(&mut self, chunk: Chunk) -> Result<Option<Reassembled>, ChunkError> {
-        let Chunk { sequence, image_index, .. } = chunk;
+        let Chunk { sample_set_id, image_index, sequence, chunk_count, .. } = chunk;
         if chunk.body.crc32() != chunk.crc32 {
             return Err(ChunkError::Checksum { sequence });
         }
         match (sequence, chunk.body, &mut self.under_way) {
             (0, ChunkBody::Header(header), under_way) => {
-                check_header(&header, chunk.chunk_count, &self.limits)?;
-                let image = UnderWay::new(chunk.sample_set_id, image_index, chunk.chunk_count, header);
-                *under_way = Some(image);
+                check_header(&header, chunk_count, &self.limits)?;
+                let pieces = Vec::new();
+                *under_way =
+                    Some(UnderWay { sample_set_id, image_index, next_sequence: 1, chunk_count, header, pieces });
             }
-            (1.., ChunkBody::Data(data), Some(image)) => image.append(sequence, chunk.chunk_count, data)?,
+            (1.., ChunkBody::Data(data), Some(image)) => image.append(sequence, chunk_count, data)?,
             (1.., ChunkBody::Data(_), None) => {
                 return Err(ChunkError::NoHeader { image_index, got: sequence });
             }
@@ -161,14 +137,6 @@ fn check_header(header: &ImageHeader, count: u32, limits: &DecodeLimits) -> Resu
 }
 
 impl UnderWay {
-    fn new(sample_set_id: SampleSetId, image_index: u32, chunk_count: u32, header: ImageHeader) -> Self {
-        let payload = match chunk_count {
-            0..=2 => Payload::Whole(Bytes::new()),
-            _ => Payload::Joined(BytesMut::with_capacity(header.payload_bytes() as usize)),
-        };
-        Self { sample_set_id, image_index, next_sequence: 1, chunk_count, header, payload }
-    }
-
     fn append(&mut self, sequence: u32, chunk_count: u32, data: Bytes) -> Result<(), ChunkError> {
         let malformed = |field| Err(ChunkError::Malformed { sequence, field });
         if chunk_count != self.chunk_count {
@@ -179,19 +147,14 @@ impl UnderWay {
         if data.len() as u64 != left.min(MAX_CHUNK_BYTES as u64) {
             return malformed("data length");
         }
-        match &mut self.payload {
-            Payload::Whole(whole) => *whole = data,
-            Payload::Joined(joined) => joined.extend_from_slice(&data),
-        }
+        self.pieces.push(data);
         self.next_sequence += 1;
         Ok(())
     }
 
     fn finish(self) -> Reassembled {
-        let payload = match self.payload {
-            Payload::Whole(whole) => whole,
-            Payload::Joined(joined) => joined.freeze(),
-        };
+        // A payload in one chunk is kept as it is.
+        let payload = <[Bytes; 1]>::try_from(self.pieces).map_or_else(|pieces| pieces.concat().into(), |[whole]| whole);
         let image = EncodedDepthImage { header: self.header, payload };
         Reassembled { sample_set_id: self.sample_set_id, image_index: self.image_index, image }
     }

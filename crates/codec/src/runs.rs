@@ -3,11 +3,9 @@
 //! Each run is 16 bits, kind in the lowest two. Other planes of an image are empty where there is no sample: only their
 //! samples are stored, and these runs spread them out again.
 
-use crate::{
-    DecodeError,
-    quantise::{BACKGROUND_CODE, FIRST_SAMPLE_CODE, HOLE_CODE},
-    tagged::take,
-};
+use crate::DecodeError;
+use crate::quantise::{BACKGROUND_CODE, FIRST_SAMPLE_CODE, HOLE_CODE};
+use crate::tagged::take;
 
 const LONGEST: usize = (u16::MAX >> 2) as usize;
 
@@ -82,6 +80,7 @@ impl Runs {
         if !odd.is_empty() {
             return Err(corrupt("odd number of bytes"));
         }
+        let parse = |word: u16| Run { kind: word & 3, texels: usize::from(word >> 2) };
         let runs: Vec<Run> = words.iter().map(|&word| parse(u16::from_le_bytes(word))).collect();
         if runs.iter().any(|run| run.texels == 0 || run.kind > FIRST_SAMPLE_CODE) {
             return Err(corrupt("empty run or unknown kind"));
@@ -89,7 +88,7 @@ impl Runs {
         if runs.iter().map(|run| run.texels).sum::<usize>() != texels {
             return Err(corrupt("do not fill the plane"));
         }
-        let sample_count = sample_runs(&runs).map(|run| run.texels).sum();
+        let sample_count = runs.iter().filter(|run| run.kind == FIRST_SAMPLE_CODE).map(|run| run.texels).sum();
         Ok(Self { runs, sample_count })
     }
 
@@ -148,14 +147,6 @@ impl Runs {
             }
         }
     }
-}
-
-fn sample_runs(runs: &[Run]) -> impl Iterator<Item = &Run> {
-    runs.iter().filter(|run| run.kind == FIRST_SAMPLE_CODE)
-}
-
-fn parse(word: u16) -> Run {
-    Run { kind: word & 3, texels: usize::from(word >> 2) }
 }
 
 /// The count of codes at the front that hold a property. Whole blocks are tested at once.

@@ -1,28 +1,13 @@
 //! Views to bytes and back: colour by the frame codec, other planes without loss.
 
 use bytes::Bytes;
-use depth_image::{PinholeCamera, Provenance, View};
+use depth_image::{HOLE_INVERSE_DEPTH, PinholeCamera, Provenance, View};
 use glam::UVec2;
 
-use crate::{
-    DecodeError, DecodeLimits, EncodedFrame, FrameCodec, FrameError, FrameHeader, SampleSetId, StageTimes, WholeFrame,
-    decode_frame, encode_frame, pack_f32_plane, pack_u32_plane, unpack_f32_plane, unpack_u32_plane,
-};
-
-/// Why a view is not encoded or decoded.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub enum ViewCodecError {
-    /// The colour is at fault.
-    #[error(transparent)]
-    Frame(#[from] FrameError),
-    /// Another plane is at fault.
-    #[error("{plane}: {source}")]
-    Plane { plane: &'static str, source: DecodeError },
-    /// Planes of other lengths than the header says, or than the view's size.
-    #[error("{plane} has {len} texels or bytes, must have {expected}")]
-    Length { plane: &'static str, len: usize, expected: usize },
-}
+use crate::frame_codec::{decode_frame, encode_frame};
+use crate::lz4::expand_lz4_up_to;
+use crate::words_codec::{WordLayout, max_words_bytes, pack_words, unpack_words};
+use crate::{DecodeError, DecodeLimits, FrameCodec, FrameError, FrameHeader, SampleSetId, StageTimes, WholeFrame};
 
 /// A view's bytes, planes one after the other.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,16 +44,17 @@ impl EncodedView {
 ///
 /// # Errors
 /// For planes that are not of the view's size, or a size that the codec cannot have.
-pub fn encode_view(view: &View, codec: FrameCodec) -> Result<EncodedView, ViewCodecError> {
+pub fn encode_view(view: &View, codec: FrameCodec) -> Result<EncodedView, FrameError> {
     let texels = view.size_px.element_product() as usize;
     let right = |plane, len| {
-        if len == texels { Ok(()) } else { Err(ViewCodecError::Length { plane, len, expected: texels }) }
+        if len == texels { Ok(()) } else { Err(FrameError::Length { plane, len, expected: texels }) }
     };
     right("inverse_depth", view.inverse_depth_per_m.as_ref().map_or(texels, Vec::len))?;
     right("provenance", view.provenance.as_ref().map_or(texels, Vec::len))?;
-    let color = encode_frame(codec, view.size_px.x, view.size_px.y, &view.srgb8)?.data;
+    let color = encode_frame(codec, view.size_px, &view.srgb8)?;
     let depth = view.inverse_depth_per_m.as_deref().map_or_else(Vec::new, pack_f32_plane);
-    let provenance = view.provenance.as_deref().map_or_else(Vec::new, |plane| pack_u32_plane(&words_of(plane)));
+    let provenance =
+        view.provenance.as_deref().map_or_else(Vec::new, |plane| pack_u32_plane(plane.iter().map(|p| p.0)));
     let lengths = [color.len(), depth.len(), provenance.len()].map(|len| len as u64);
     let data = if depth.is_empty() && provenance.is_empty() {
         color
@@ -78,36 +64,30 @@ pub fn encode_view(view: &View, codec: FrameCodec) -> Result<EncodedView, ViewCo
     Ok(EncodedView { size_px: view.size_px, codec, lengths, crc32: crc32fast::hash(&data), data })
 }
 
-fn words_of(plane: &[Provenance]) -> Vec<u32> {
-    plane.iter().map(|provenance| provenance.0).collect()
-}
-
 /// Decodes a whole frame.
 ///
 /// # Errors
 /// For sizes over the limits, and data that does not decode to the planes of the header.
-pub fn decode_view(frame: &WholeFrame, limits: &DecodeLimits) -> Result<View, ViewCodecError> {
+pub fn decode_view(frame: &WholeFrame, limits: &DecodeLimits) -> Result<View, FrameError> {
     let FrameHeader { size_px, codec, .. } = frame.header;
-    let plane_error = |plane| move |source| ViewCodecError::Plane { plane, source };
+    let plane_error = |plane| move |source| FrameError::Plane { plane, source };
     let texels = limits.texels(size_px.x, size_px.y).map_err(plane_error("size"))?;
     let [color, depth, provenance] = planes(frame)?;
-    let color =
-        EncodedFrame { codec, width: size_px.x, height: size_px.y, crc32: crc32fast::hash(&color), data: color };
     let some = |data: Bytes| (!data.is_empty()).then_some(data);
     let depth = some(depth).map(|data| unpack_f32_plane(&data, texels).map_err(plane_error("inverse_depth")));
     let provenance = some(provenance).map(|data| unpack_u32_plane(&data, texels).map_err(plane_error("provenance")));
     Ok(View {
         size_px,
-        srgb8: decode_frame(&color, limits)?,
+        srgb8: decode_frame(codec, size_px, &color, limits)?,
         inverse_depth_per_m: depth.transpose()?,
         provenance: provenance.transpose()?.map(|words| words.into_iter().map(Provenance).collect()),
     })
 }
 
-fn planes(frame: &WholeFrame) -> Result<[Bytes; 3], ViewCodecError> {
+fn planes(frame: &WholeFrame) -> Result<[Bytes; 3], FrameError> {
     let header = &frame.header;
     if frame.data.len() as u64 != header.total_bytes() {
-        return Err(ViewCodecError::Length {
+        return Err(FrameError::Length {
             plane: "data",
             len: frame.data.len(),
             expected: header.total_bytes() as usize,
@@ -119,11 +99,44 @@ fn planes(frame: &WholeFrame) -> Result<[Bytes; 3], ViewCodecError> {
     Ok([color, depth, rest])
 }
 
+fn pack_u32_plane(words: impl Iterator<Item = u32>) -> Vec<u8> {
+    let words: Vec<u32> = words.collect();
+    let mut packed = Vec::with_capacity(2 * words.len());
+    pack_words(&words, WordLayout::Whole, &mut packed);
+    lz4_flex::block::compress(&packed)
+}
+
+/// The inverse of [`pack_u32_plane`]. `texels` comes from a size that [`DecodeLimits::texels`] has passed.
+fn unpack_u32_plane(data: &[u8], texels: usize) -> Result<Vec<u32>, DecodeError> {
+    let packed = expand_lz4_up_to(data, max_words_bytes(texels, WordLayout::Whole), "plane")?;
+    let mut input = &packed[..];
+    let words = unpack_words(&mut input, texels, WordLayout::Whole)?;
+    if input.is_empty() { Ok(words) } else { Err(DecodeError::Corrupt { field: "plane", reason: "bytes left over" }) }
+}
+
+/// Packs a plane of inverse depths to the bit; numbers that are not finite become holes.
+fn pack_f32_plane(inverse_depth_per_m: &[f32]) -> Vec<u8> {
+    let finite = |&value: &f32| {
+        if value.is_finite() { value } else { HOLE_INVERSE_DEPTH }
+    };
+    pack_u32_plane(inverse_depth_per_m.iter().map(|value| finite(value).to_bits()))
+}
+
+/// The inverse of [`pack_f32_plane`], with `texels` as in [`unpack_u32_plane`].
+fn unpack_f32_plane(data: &[u8], texels: usize) -> Result<Vec<f32>, DecodeError> {
+    let plane: Vec<f32> = unpack_u32_plane(data, texels)?.into_iter().map(f32::from_bits).collect();
+    if plane.iter().all(|value| value.is_finite()) {
+        return Ok(plane);
+    }
+    Err(DecodeError::Corrupt { field: "plane", reason: "not finite" })
+}
+
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
 
     use super::*;
+    use crate::test_planes::{Random, tree_over_terrain};
 
     fn view(planes: bool) -> View {
         View {
@@ -164,5 +177,38 @@ mod tests {
         assert!(spoilt(&|f| f.header.size_px = UVec2::splat(65_535)));
         assert!(spoilt(&|f| f.data.truncate(10)));
         assert!(encode_view(&View { provenance: Some(Vec::new()), ..view(true) }, FrameCodec::Lz4).is_err());
+    }
+
+    #[test]
+    fn planes_survive_to_the_bit() {
+        let plane = tree_over_terrain(200, 150, 17);
+        let packed = pack_f32_plane(&plane);
+        let raw: Vec<u8> = plane.iter().flat_map(|value| value.to_le_bytes()).collect();
+        assert!(packed.len() < lz4_flex::block::compress(&raw).len());
+        assert_eq!(unpack_f32_plane(&packed, plane.len()), Ok(plane));
+        let words: Vec<u32> = (0..30_000).map(|i| i / 700 * 0x0101).collect();
+        assert_eq!(unpack_u32_plane(&pack_u32_plane(words.iter().copied()), words.len()), Ok(words));
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_not_decoded() {
+        let packed = pack_f32_plane(&[0.5, f32::NAN, f32::INFINITY, -0.0]);
+        assert_eq!(unpack_f32_plane(&packed, 4), Ok(vec![0.5, HOLE_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, 0.0]));
+        assert!(unpack_f32_plane(&pack_u32_plane([f32::NAN.to_bits()].into_iter()), 1).is_err());
+    }
+
+    #[test]
+    fn damaged_planes_never_panic() {
+        let good = pack_f32_plane(&tree_over_terrain(30, 20, 18));
+        let mut random = Random::new(19);
+        for _ in 0..4000 {
+            let mut bad = good.clone();
+            let at = random.below(bad.len());
+            bad[at] ^= 1 << random.below(8);
+            if let Ok(plane) = unpack_f32_plane(&bad, 600) {
+                assert!(plane.len() == 600 && plane.iter().all(|value| value.is_finite()));
+            }
+            assert!(unpack_f32_plane(&good[..at], 600).is_err());
+        }
     }
 }

@@ -15,10 +15,8 @@
 //! Packed as halves, uneven roughness takes twice as much, and visibility by 256 rays two fifths more. Byte planes before
 //! LZ4 are a tenth smaller by 16 rays and a sixth larger by 256.
 
-use crate::{
-    DecodeError,
-    tagged::{BLOCK, Packer, max_packed_bytes, unpack, unzigzag, zigzag},
-};
+use crate::DecodeError;
+use crate::tagged::{BLOCK, Packer, max_packed_bytes, unpack, unzigzag, zigzag};
 
 /// The parts of a word. Each part is a stream of its own, so that a part that changes much does not widen the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

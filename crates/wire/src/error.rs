@@ -3,6 +3,9 @@
 use cluster::InvalidField;
 use tonic::Status;
 
+/// Rises whenever the meaning of a message changes: programs that join a cluster must have the coordinator's.
+pub const PROTOCOL_VERSION: u32 = 1;
+
 /// A message that cannot be converted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "self-naming fields")]
@@ -26,7 +29,10 @@ impl From<WireError> for Status {
     }
 }
 
-/// The message in an optional field.
-pub(crate) fn required<T>(value: Option<T>, field: &'static str) -> Result<T, InvalidField> {
-    value.ok_or(InvalidField::Missing { field })
+/// Refuses other versions, and programs from before versions were stated.
+pub(crate) fn check_version(found: u32) -> Result<(), WireError> {
+    if found == PROTOCOL_VERSION {
+        return Ok(());
+    }
+    Err(WireError::Version { field: "protocol_version", found, expected: PROTOCOL_VERSION })
 }

@@ -8,7 +8,6 @@
 mod convert;
 mod error;
 mod proto;
-mod protocol;
 mod refusal;
 pub mod rpc;
 
@@ -17,6 +16,5 @@ mod conventions_tests;
 #[cfg(test)]
 mod message_tests;
 
-pub use error::WireError;
-pub use protocol::PROTOCOL_VERSION;
+pub use error::{PROTOCOL_VERSION, WireError};
 pub use refusal::{plan_in_force, refuse_plan};

@@ -5,6 +5,7 @@ use prost::Message as _;
 use tonic::metadata::{MetadataMap, MetadataValue};
 use tonic::{Code, Status};
 
+use crate::convert::Convert;
 use crate::proto;
 
 /// The metadata key of the plan in force.
@@ -15,7 +16,7 @@ const MAX_PLAN_IN_METADATA_BYTES: usize = 8 << 10;
 /// Refuses a request under another plan than `in_force`, and names that plan.
 #[must_use]
 pub fn refuse_plan(in_force: &Assignment, message: String) -> Status {
-    let bytes = proto::Assignment::from(in_force.clone()).encode_to_vec();
+    let bytes = Convert::<proto::Assignment>::write(in_force.clone()).encode_to_vec();
     let mut metadata = MetadataMap::new();
     // A plan that is too large for metadata is left to the coordinator to tell.
     if bytes.len() <= MAX_PLAN_IN_METADATA_BYTES {
@@ -28,5 +29,5 @@ pub fn refuse_plan(in_force: &Assignment, message: String) -> Status {
 #[must_use]
 pub fn plan_in_force(refusal: &Status) -> Option<Assignment> {
     let bytes = refusal.metadata().get_bin(PLAN_KEY)?.to_bytes().ok()?;
-    proto::Assignment::decode(bytes).ok()?.try_into().ok()
+    Assignment::read(proto::Assignment::decode(bytes).ok()?, PLAN_KEY).ok()
 }

@@ -1,5 +1,7 @@
 //! Plans: when another one is made, and how far it goes towards the best.
 
+use std::num::NonZeroU32;
+
 use cluster::{Assignment, Costs, Policy, SessionPlan};
 
 use super::Scheduler;
@@ -181,7 +183,7 @@ impl Scheduler {
         let slowest = candidates.iter().fold(Costs::default(), |slowest, node| slowest.max(node.costs.costs));
         let again = if workload.active_plan.is_some() { format!(" Planned again: {why}.") } else { String::new() };
         let mut plan = session_plan(assignment, slowest, choice, format!("{}{again}", choice.reason));
-        plan.fallback_index = workload.overload.step.checked_sub(1).map(|index| index as u32);
+        plan.fallback = NonZeroU32::new(workload.overload.step as u32);
         plan.frame_rate_ratio = workload.frame_rate_ratio();
         let active = ActivePlan::new(plan, members, self.now);
         self.plan_epoch = active.epoch();
@@ -211,7 +213,7 @@ fn session_plan(assignment: Assignment, costs: Costs, choice: &Choice, reason: S
         enumerated_sampler_count: predicted.enumerated as u32,
         predicted_enumerated_s: predicted.enumerated_s,
         scene_load_s: 0.0,
-        fallback_index: None,
+        fallback: None,
         frame_rate_ratio: 1.0,
     }
 }

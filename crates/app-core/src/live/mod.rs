@@ -3,6 +3,7 @@
 mod record;
 
 use std::collections::BTreeMap;
+use std::num::NonZeroU32;
 use std::time::{Duration, Instant};
 
 use client::{ClientError, LiveFrame, LiveView, Session};
@@ -92,7 +93,7 @@ impl Driving<'_> {
     /// The plan in force; its fallback is kept for frames of it that come later.
     fn plan(&mut self) -> SessionPlan {
         let plan = self.session.plan();
-        self.fallbacks.insert(plan.assignment.plan_epoch, plan.fallback_index.map_or(0, |index| index + 1));
+        self.fallbacks.insert(plan.assignment.plan_epoch, plan.fallback.map_or(0, NonZeroU32::get));
         plan
     }
 

@@ -1,16 +1,255 @@
 //! Messages to types of the domain and back. Numbers that stand for "none" on the wire become `None` here.
 
-mod assignment;
+use std::num::NonZeroU32;
+
+use cluster::{InvalidField, MeasuredCosts, NodeStatus, OfferSettings, SceneHash, at_most};
+use codec::{InverseDepthRange, SampleSetId};
+use depth_image::{PinholeCamera, ViewPlanes};
+use glam::{DVec3, UVec2};
+use prost::bytes::Bytes;
+
+use crate::error::WireError;
+use crate::proto;
+use crate::rpc::MAX_MESSAGE_BYTES;
+
+/// A value that messages hold as a `P`: a message, the type of a field, or a tuple of those of several fields.
+pub(crate) trait Convert<P>: Sized {
+    /// # Errors
+    /// For what the domain does not allow; names the field, or, in a message, the message's own.
+    fn read(value: P, field: &'static str) -> Result<Self, WireError>;
+
+    fn write(self) -> P;
+}
+
+/// The message in an optional field.
+fn required<T>(value: Option<T>, field: &'static str) -> Result<T, InvalidField> {
+    value.ok_or(InvalidField::Missing { field })
+}
+
+/// Applies a check; gives a closure's argument its type.
+fn check<T, E>(value: T, check: impl FnOnce(T) -> Result<(), E>) -> Result<(), WireError>
+where
+    WireError: From<E>,
+{
+    Ok(check(value)?)
+}
+
+/// Both conversions of messages from one list: `Message = Type { fields that share a name; field: the message's }`. A field
+/// of the type may take several of the message: `field: one | two`. Errors name the message's field, or what follows `as`.
+/// `with` sets a field that the type has not. `first` checks or completes the message, `then` checks the result.
+macro_rules! messages {
+    ($($message:ident = $type:ident {
+        $($same:ident $(as $same_name:literal)?),* $(; $($own:ident: $($wire:ident)|+ $(as $name:literal)?),+)?
+    } $(, with $fixed:ident = $value:expr)? $(, first $first:expr)? $(, then $then:expr)?;)+) => {$(
+        #[allow(unused_mut, unused_parens, reason = "`first` may complete the message; one field is no tuple")]
+        impl super::Convert<crate::proto::$message> for $type {
+            fn read(mut message: crate::proto::$message, _: &'static str) -> Result<Self, crate::error::WireError> {
+                $(super::check(&mut message, $first)?;)?
+                let value = Self {
+                    $($($own: super::Convert::read(($(message.$wire),+), name!($($wire)|+ $($name)?))?,)+)?
+                    $($same: super::Convert::read(message.$same, name!($same $($same_name)?))?,)*
+                };
+                $(super::check(&value, $then)?;)?
+                Ok(value)
+            }
+
+            fn write(self) -> crate::proto::$message {
+                $($(let ($($wire),+) = super::Convert::write(self.$own);)+)?
+                crate::proto::$message {
+                    $($same: super::Convert::write(self.$same),)* $($($($wire,)+)+)? $($fixed: $value)?
+                }
+            }
+        }
+
+        nested!($message = $type);
+    )+};
+}
+
+/// The name of a field in errors.
+macro_rules! name {
+    ($($field:ident)|+) => { stringify!($($field)|+) };
+    ($($field:ident)|+ $name:literal) => { $name };
+}
+
+/// Messages that other messages must have.
+macro_rules! nested {
+    ($($message:ident = $type:ident),+) => {$(
+        impl super::Convert<Option<crate::proto::$message>> for $type {
+            fn read(
+                message: Option<crate::proto::$message>,
+                field: &'static str,
+            ) -> Result<Self, crate::error::WireError> {
+                super::Convert::read(super::required(message, field)?, field)
+            }
+
+            fn write(self) -> Option<crate::proto::$message> {
+                Some(super::Convert::write(self))
+            }
+        }
+    )+};
+}
+
+/// Messages with one field.
+macro_rules! wrappers {
+    ($($message:ident { $field:ident: $type:ident })+) => {$(
+        impl super::Convert<crate::proto::$message> for $type {
+            fn read(message: crate::proto::$message, _: &'static str) -> Result<Self, crate::error::WireError> {
+                super::Convert::read(message.$field, stringify!($field))
+            }
+
+            fn write(self) -> crate::proto::$message {
+                crate::proto::$message { $field: Some(super::Convert::write(self)) }
+            }
+        }
+    )+};
+}
+
+/// Enums whose variants are those of the message's enum of that name, without its zero.
+macro_rules! enums {
+    ($($type:ident { $($variant:ident),+ })+) => {$(
+        impl super::Convert<i32> for $type {
+            fn read(value: i32, field: &'static str) -> Result<Self, crate::error::WireError> {
+                match crate::proto::$type::try_from(value) {
+                    $(Ok(crate::proto::$type::$variant) => Ok(Self::$variant),)+
+                    _ => Err(crate::error::WireError::UnknownEnum { field, value }),
+                }
+            }
+
+            fn write(self) -> i32 {
+                match self {
+                    $(Self::$variant => crate::proto::$type::$variant.into(),)+
+                }
+            }
+        }
+    )+};
+}
+
 mod frames;
-pub(crate) mod geometry;
+mod geometry;
 mod illumination;
 mod images;
-mod node;
-mod offer;
-mod policy;
-mod report;
-mod scene;
+mod members;
 mod session;
-mod status;
-mod views;
 mod workload;
+
+/// Values that need no check.
+macro_rules! plain {
+    ($($type:ty as $wire:ty: $read:expr, $write:expr;)+) => {$(
+        impl Convert<$wire> for $type {
+            fn read(value: $wire, _: &'static str) -> Result<Self, WireError> {
+                let read: fn($wire) -> Self = $read;
+                Ok(read(value))
+            }
+
+            fn write(self) -> $wire {
+                let write: fn(Self) -> $wire = $write;
+                write(self)
+            }
+        }
+    )+};
+}
+
+plain! {
+    bool as bool: |value| value, |value| value;
+    u32 as u32: |value| value, |value| value;
+    u64 as u64: |value| value, |value| value;
+    f32 as f32: |value| value, |value| value;
+    f64 as f64: |value| value, |value| value;
+    String as String: |value| value, |value| value;
+    u64 as u32: u64::from, |index| index as u32;
+    f64 as u64: |bytes| bytes as f64, |bytes| bytes.round() as u64;
+    Option<NonZeroU32> as u32: NonZeroU32::new, |count| count.map_or(0, NonZeroU32::get);
+    () as proto::ChangeSessionResponse: |_| (), |()| proto::ChangeSessionResponse {};
+    () as proto::ReportWorkResponse: |_| (), |()| proto::ReportWorkResponse {};
+    () as proto::ReportSamplerResponse: |_| (), |()| proto::ReportSamplerResponse {};
+    () as proto::GetStatusRequest: |_| (), |()| proto::GetStatusRequest {};
+}
+
+/// Values whose absence is a zero, or an empty text or list.
+macro_rules! absent_if_empty {
+    ($($type:ty as $wire:ty),+) => {$(
+        impl Convert<$wire> for Option<$type> {
+            fn read(value: $wire, field: &'static str) -> Result<Self, WireError> {
+                (value != <$wire>::default()).then(|| Convert::read(value, field)).transpose()
+            }
+
+            fn write(self) -> $wire {
+                self.map(Convert::write).unwrap_or_default()
+            }
+        }
+    )+};
+}
+
+absent_if_empty!(u32 as u32, f64 as f64, String as String, SceneHash as String);
+absent_if_empty!(Vec<PinholeCamera> as Vec<proto::PinholeCamera>);
+
+/// Types whose fields are the message's own.
+macro_rules! flat {
+    ($($type:ident { $($own:ident: $wire:ty),+ })+) => {$(
+        impl Convert<($($wire),+)> for $type {
+            fn read(($($own),+): ($($wire),+), _: &'static str) -> Result<Self, WireError> {
+                Ok(Self { $($own: Convert::read($own, stringify!($own))?),+ })
+            }
+
+            fn write(self) -> ($($wire),+) {
+                ($(Convert::write(self.$own)),+)
+            }
+        }
+    )+};
+}
+
+flat! {
+    UVec2 { x: u32, y: u32 }
+    DVec3 { x: f64, y: f64, z: f64 }
+    ViewPlanes { inverse_depth: bool, provenance: bool }
+    InverseDepthRange { least_per_m: f32, greatest_per_m: f32 }
+    SampleSetId { plan_epoch: u64, index: u32 }
+    SampleSetId { plan_epoch: u64, index: u64 }
+    NodeStatus { node_name: String, address: String, device_name: String, is_software: bool }
+    OfferSettings { method: String, sampling: String, lighting: String }
+    MeasuredCosts {
+        sample_image_s: Option<f64>, direct_view_s: Option<f64>, reconstruct_view_s: Option<f64>,
+        load_set_s: Option<f64>, encode_view_s: Option<f64>, transfer_bytes_per_s: Option<f64>, image_bytes: Option<u64>
+    }
+}
+
+impl<P, D: Convert<P>> Convert<Vec<P>> for Vec<D> {
+    fn read(values: Vec<P>, field: &'static str) -> Result<Self, WireError> {
+        values.into_iter().map(|value| D::read(value, field)).collect()
+    }
+
+    fn write(self) -> Vec<P> {
+        self.into_iter().map(D::write).collect()
+    }
+}
+
+impl<P, D: Convert<P>> Convert<Option<P>> for Option<D> {
+    fn read(value: Option<P>, field: &'static str) -> Result<Self, WireError> {
+        value.map(|value| D::read(value, field)).transpose()
+    }
+
+    fn write(self) -> Option<P> {
+        self.map(D::write)
+    }
+}
+
+impl Convert<Bytes> for Bytes {
+    fn read(value: Bytes, field: &'static str) -> Result<Self, WireError> {
+        at_most(value.len(), MAX_MESSAGE_BYTES, field)?;
+        Ok(value)
+    }
+
+    fn write(self) -> Bytes {
+        self
+    }
+}
+
+impl Convert<String> for SceneHash {
+    fn read(value: String, _: &'static str) -> Result<Self, WireError> {
+        Ok(Self::try_from(value)?)
+    }
+
+    fn write(self) -> String {
+        self.into()
+    }
+}

@@ -1,70 +1,62 @@
-//! Workloads, timelines and costs.
+//! Scenes, workloads, costs and plans.
 
-use cluster::limits::MAX_CELLS;
-use cluster::{Costs, TileCosts, Timeline, Workload, finite_seconds};
+use cluster::limits::{MAX_CELLS, MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_TILES};
+use cluster::{
+    Assignment, CompositorShare, Costs, FetchScene, InvalidField, Policy, SamplerShare, ScenePart, SceneRef, TileCosts,
+    Timeline, Workload, at_most, finite_seconds, nonempty,
+};
 
-use super::geometry::{bounds_from, bounds_to, camera_to, sample_cameras_from, vec3_from, vec3_to};
-use crate::error::{WireError, required};
+use super::Convert;
+use crate::error::WireError;
 use crate::proto;
 
-impl From<proto::Timeline> for Timeline {
-    fn from(t: proto::Timeline) -> Self {
-        Self { start_s: t.start_s, step_s: t.step_s, set_count: t.set_count }
-    }
-}
+enums! { Policy { Pipeline, Direct, TimeShare } }
 
-impl From<Timeline> for proto::Timeline {
-    fn from(t: Timeline) -> Self {
-        Self { start_s: t.start_s, step_s: t.step_s, set_count: t.set_count }
-    }
-}
-
-impl TryFrom<proto::Workload> for Workload {
-    type Error = WireError;
-
-    fn try_from(w: proto::Workload) -> Result<Self, WireError> {
-        let workload = Self {
-            scene: required(w.scene, "workload.scene")?.try_into()?,
-            sample_cameras: sample_cameras_from(w.sample_cameras, w.cell_first_indices.len().clamp(1, MAX_CELLS))?,
-            cell_first_indices: w.cell_first_indices,
-            sampling: w.sampling_method,
-            lighting: w.lighting,
-            method: w.reconstruction_method,
-            codec: w.frame_codec,
-            volume: bounds_from(required(w.volume, "workload.volume")?)?,
-            background_linear: vec3_from(w.background_linear_rgb, "background_linear_rgb")?,
-            timeline: required(w.timeline, "workload.timeline")?.into(),
-            illumination: required(w.illumination, "workload.illumination")?.try_into()?,
-            refinement_steps: w.refinement_step_count,
+messages! {
+    SceneRef = SceneRef { package_bytes; hash: scene_hash }, then SceneRef::validate;
+    FetchSceneRequest = FetchScene { offset_bytes; hash: scene_hash };
+    FetchSceneResponse = ScenePart { offset_bytes, data };
+    Timeline = Timeline { start_s, step_s, set_count };
+    Workload = Workload {
+        scene as "workload.scene", sample_cameras, cell_first_indices, lighting, volume as "workload.volume",
+        timeline as "workload.timeline", illumination as "workload.illumination";
+        sampling: sampling_method, method: reconstruction_method, codec: frame_codec,
+        background_linear: background_linear_rgb, refinement_steps: refinement_step_count
+    }, first |w| {
+        let cells = w.cell_first_indices.len().clamp(1, MAX_CELLS);
+        at_most(w.sample_cameras.len(), MAX_SAMPLE_CAMERAS * cells, "sample_cameras")
+    }, then Workload::validate;
+    Assignment = Assignment {
+        plan_epoch, policy, workload as "assignment.workload", samplers, compositors, tile_count;
+        relay_fanout: relay_fanout_count
+    }, first |a| {
+        a.tile_count = a.tile_count.max(1);
+        at_most(a.samplers.len(), MAX_NODES, "samplers")?;
+        at_most(a.compositors.len(), MAX_NODES, "compositors")
+    }, then Assignment::validate;
+    SamplerShare = SamplerShare { node_name, image_indices; address: node_address },
+        first |s| {
+            at_most(s.image_indices.len(), MAX_CELLS * MAX_SAMPLE_CAMERAS * MAX_TILES as usize, "image_indices")?;
+            check_node(&s.node_name, &s.node_address)
         };
-        workload.validate()?;
-        Ok(workload)
-    }
+    CompositorShare = CompositorShare { node_name; address: node_address, view_weight: dealt_view_count },
+        first |s| check_node(&s.node_name, &s.node_address);
 }
 
-impl From<Workload> for proto::Workload {
-    fn from(w: Workload) -> Self {
-        Self {
-            scene: Some(w.scene.into()),
-            sample_cameras: w.sample_cameras.iter().map(camera_to).collect(),
-            cell_first_indices: w.cell_first_indices,
-            sampling_method: w.sampling,
-            lighting: w.lighting,
-            reconstruction_method: w.method,
-            frame_codec: w.codec,
-            volume: Some(bounds_to(&w.volume)),
-            background_linear_rgb: vec3_to(w.background_linear),
-            timeline: Some(w.timeline.into()),
-            illumination: Some(w.illumination.into()),
-            refinement_step_count: w.refinement_steps,
-        }
-    }
+fn check_node(name: &str, address: &str) -> Result<(), InvalidField> {
+    nonempty(name, "node_name")?;
+    nonempty(address, "node_address")
 }
 
-impl TryFrom<proto::Costs> for Costs {
-    type Error = WireError;
+wrappers! {
+    MeasureCostsResponse { costs: Costs }
+    ApplyAssignmentRequest { assignment: Assignment }
+}
 
-    fn try_from(c: proto::Costs) -> Result<Self, WireError> {
+nested!(Costs = Costs);
+
+impl Convert<proto::Costs> for Costs {
+    fn read(c: proto::Costs, _: &'static str) -> Result<Self, WireError> {
         let shares = c.sample_row_shares.unwrap_or_default();
         let shares = [shares.first_ratio, shares.second_ratio, shares.third_ratio, shares.fourth_ratio];
         let row_shares = shares.iter().any(|&share| share != 0.0).then_some(shares);
@@ -81,20 +73,18 @@ impl TryFrom<proto::Costs> for Costs {
         costs.validate()?;
         Ok(costs)
     }
-}
 
-impl From<Costs> for proto::Costs {
-    fn from(c: Costs) -> Self {
-        let row_shares = c.tiles.and_then(|tiles| tiles.row_shares).unwrap_or_default();
+    fn write(self) -> proto::Costs {
+        let row_shares = self.tiles.and_then(|tiles| tiles.row_shares).unwrap_or_default();
         let [first_ratio, second_ratio, third_ratio, fourth_ratio] = row_shares;
-        Self {
-            sample_image_s: c.sample_image_s,
-            direct_view_s: c.direct_view_s,
-            reconstruct_view_s: c.reconstruct_view_s,
-            load_set_s: c.load_set_s,
-            encode_view_s: c.encode_view_s,
-            is_sampled_in_order: c.in_order,
-            sample_overhead_s: c.tile_overhead_s(),
+        proto::Costs {
+            sample_image_s: self.sample_image_s,
+            direct_view_s: self.direct_view_s,
+            reconstruct_view_s: self.reconstruct_view_s,
+            load_set_s: self.load_set_s,
+            encode_view_s: self.encode_view_s,
+            is_sampled_in_order: self.in_order,
+            sample_overhead_s: self.tile_overhead_s(),
             sample_row_shares: Some(proto::RowShares { first_ratio, second_ratio, third_ratio, fourth_ratio }),
         }
     }

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use tonic::Status;
 use tonic::transport::{Channel, Endpoint};
+use tonic_health::pb::{HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient};
 
 /// The interval of probes of an idle connection; with [`KEEPALIVE_TIMEOUT`], a silent loss is noticed after 10 s.
 pub const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(5);
@@ -27,6 +28,16 @@ pub async fn connect(address: &str) -> Result<Channel, Status> {
 /// `INVALID_ARGUMENT` for an invalid address.
 pub fn connect_later(address: &str) -> Result<Channel, Status> {
     Ok(endpoint(address)?.connect_lazy())
+}
+
+/// Whether the process at `http://host:port` serves a role, or, with an empty name, all of its roles.
+///
+/// # Errors
+/// Where no process answers, or it does not know the role.
+pub async fn is_serving(address: &str, role: &str) -> Result<bool, Status> {
+    let request = HealthCheckRequest { service: role.to_owned() };
+    let answer = HealthClient::new(connect(address).await?).check(request).await?;
+    Ok(answer.into_inner().status() == ServingStatus::Serving)
 }
 
 fn endpoint(address: &str) -> Result<Endpoint, Status> {

@@ -1,0 +1,38 @@
+//! Members: joining, being measured and being ready; their reports, and the cluster's status.
+
+use cluster::limits::{MAX_BATCH, MAX_SCENES};
+use cluster::{
+    AchievedTime, ClusterStatus, JoinCluster, MeasureCosts, NodeCondition, NodeStatus, Ready, SamplerReport, Welcome,
+    WorkReport, at_most,
+};
+
+use crate::error::{PROTOCOL_VERSION, check_version};
+
+messages! {
+    JoinClusterRequest = JoinCluster {
+        plan_epoch; node: node_name | node_address | device_name | is_software_device
+    }, with protocol_version = PROTOCOL_VERSION,
+        first |r| check_version(r.protocol_version), then JoinCluster::validate;
+    JoinClusterResponse = Welcome { scenes }, first |w| at_most(w.scenes.len(), MAX_SCENES, "scenes");
+    NodeStatus = NodeStatus { node_name, device_name; address: node_address, is_software: is_software_device };
+    MeasureCostsRequest = MeasureCosts {
+        workload, typical_views, batch_count; planes: with_inverse_depth | with_provenance
+    }, first |r| at_most(r.typical_views.len(), MAX_BATCH as usize, "typical_views"), then MeasureCosts::validate;
+    ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then Ready::validate;
+    ReportWorkRequest = WorkReport {
+        node_name, plan_epoch, busy_s;
+        costs: sample_image_s | direct_view_s | reconstruct_view_s | load_set_s | encode_view_s | transfer_bytes_per_s
+            | image_bytes,
+        views: view_count, dropped_views: dropped_view_count
+    }, then WorkReport::validate;
+    ReportSamplerRequest = SamplerReport { plan_epoch, reason; compositor: compositor_name, sampler: sampler_name },
+        then SamplerReport::validate;
+    AchievedTime = AchievedTime { policy, busy_s };
+    NodeCondition = NodeCondition {
+        node_name, is_ready, costs, busy_ratio; views: view_count, dropped_views: dropped_view_count
+    };
+    GetStatusResponse = ClusterStatus {
+        plan_epoch, nodes, offer, plan, session_count, conditions;
+        views_per_set: views_per_set_count, achieved: achieved_times, utilisation: utilisation_ratio
+    }, then ClusterStatus::validate;
+}

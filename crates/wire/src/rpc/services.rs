@@ -1,0 +1,230 @@
+//! The services: of each the trait that serves it, its server and its client.
+
+use std::pin::Pin;
+
+use cluster::{
+    Assignment, ChangeSession, ClusterStatus, Costs, FetchImages, FetchScene, JoinCluster, MeasureCosts, Ready,
+    RenderViews, SamplerReport, ScenePart, SessionEvent, SessionRequest, Welcome, WorkReport,
+};
+use codec::{Chunk, FramePart};
+use tokio_stream::{Stream, StreamExt as _};
+use tonic::transport::Channel;
+use tonic::{Request, Response, Status, Streaming, async_trait};
+
+use super::MAX_MESSAGE_BYTES;
+use crate::convert::Convert;
+use crate::proto;
+use crate::proto::compositor_service_client::CompositorServiceClient;
+use crate::proto::compositor_service_server::{CompositorService, CompositorServiceServer};
+use crate::proto::coordinator_service_client::CoordinatorServiceClient;
+use crate::proto::coordinator_service_server::{CoordinatorService, CoordinatorServiceServer};
+use crate::proto::node_service_client::NodeServiceClient;
+use crate::proto::node_service_server::{NodeService, NodeServiceServer};
+use crate::proto::sampler_service_client::SamplerServiceClient;
+use crate::proto::sampler_service_server::{SamplerService, SamplerServiceServer};
+
+/// A stream of messages, already checked.
+pub type Messages<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
+
+fn checked<P, D: Convert<P>>(message: P) -> Result<D, Status> {
+    Ok(D::read(message, "request")?)
+}
+
+/// As [`checked`], for answers of a server: their faults are not the request's.
+fn answered<P, D: Convert<P>>(message: P) -> Result<D, Status> {
+    D::read(message, "response").map_err(|error| Status::data_loss(error.to_string()))
+}
+
+fn each<P: 'static, D: 'static>(
+    stream: impl Stream<Item = Result<P, Status>> + Send + 'static,
+    convert: fn(P) -> Result<D, Status>,
+) -> Messages<D> {
+    Box::pin(stream.map(move |message| message.and_then(convert)))
+}
+
+/// A service: its trait, the adapter of the trait to messages, its server, and its client.
+macro_rules! service {
+    (
+        $(#[$about:meta])*
+        $trait:ident: $service:ident($generated_server:ident, $generated_client:ident)
+            as $server:ident, $adapter:ident, $client:ident;
+        calls { $($(#[$of_call:meta])* $call:ident($request:ident as $asked:ty) -> $response:ident as $answer:ty;)* }
+        streams {
+            $($(#[$of_stream:meta])*
+            $stream:ident($opening:ident as $wanted:ty) -> $stream_type:ident($part:ident as $item:ty);)*
+        }
+    ) => {
+        $(#[$about])*
+        #[async_trait]
+        pub trait $trait: Send + Sync + 'static {
+            $($(#[$of_call])* async fn $call(&self, request: $asked) -> Result<$answer, Status>;)*
+            $($(#[$of_stream])* async fn $stream(&self, request: $wanted) -> Result<Messages<$item>, Status>;)*
+        }
+
+        #[doc = concat!("Adapts a [`", stringify!($trait), "`] to its messages.")]
+        #[derive(Debug)]
+        pub struct $adapter<S>(S);
+
+        #[async_trait]
+        impl<S: $trait> $service for $adapter<S> {
+            $(type $stream_type = Messages<proto::$part>;)*
+
+            $(async fn $call(&self, request: Request<proto::$request>) -> Result<Response<proto::$response>, Status> {
+                let answer = self.0.$call(checked(request.into_inner())?).await?;
+                Ok(Response::new(answer.write()))
+            })*
+
+            $(async fn $stream(
+                &self,
+                request: Request<proto::$opening>,
+            ) -> Result<Response<Self::$stream_type>, Status> {
+                let items = self.0.$stream(checked(request.into_inner())?).await?;
+                Ok(Response::new(each(items, |item| Ok(item.write()))))
+            })*
+        }
+
+        /// The service, ready to be added to a server.
+        pub fn $server<S: $trait>(service: S) -> $generated_server<$adapter<S>> {
+            capped!($generated_server::new($adapter(service)))
+        }
+
+        #[doc = concat!("Calls a [`", stringify!($trait), "`].")]
+        #[derive(Debug, Clone)]
+        pub struct $client($generated_client<Channel>);
+
+        impl $client {
+            /// Over a connection.
+            #[must_use]
+            pub fn new(channel: Channel) -> Self {
+                Self(capped!($generated_client::new(channel)))
+            }
+
+            $($(#[$of_call])*
+            ///
+            /// # Errors
+            /// The service's.
+            pub async fn $call(&self, request: $asked) -> Result<$answer, Status> {
+                let message: proto::$request = request.write();
+                answered(self.0.clone().$call(message).await?.into_inner())
+            })*
+
+            $($(#[$of_stream])*
+            ///
+            /// # Errors
+            /// The service's.
+            pub async fn $stream(&self, request: $wanted) -> Result<Messages<$item>, Status> {
+                let message: proto::$opening = request.write();
+                Ok(each(self.0.clone().$stream(message).await?.into_inner(), answered))
+            })*
+        }
+    };
+}
+
+/// A generated server or client, with this crate's caps.
+macro_rules! capped {
+    ($generated:expr) => {
+        $generated.max_decoding_message_size(MAX_MESSAGE_BYTES).max_encoding_message_size(MAX_MESSAGE_BYTES)
+    };
+}
+
+service! {
+    /// Knows the members, plans sessions and serves scenes.
+    Coordinator: CoordinatorService(CoordinatorServiceServer, CoordinatorServiceClient)
+        as coordinator_server, CoordinatorAdapter, CoordinatorClient;
+    calls {
+        /// Changes what a session asks for.
+        change_session(ChangeSessionRequest as ChangeSession) -> ChangeSessionResponse as ();
+        /// Takes a member's report on its work.
+        report_work(ReportWorkRequest as WorkReport) -> ReportWorkResponse as ();
+        /// The members.
+        get_status(GetStatusRequest as ()) -> GetStatusResponse as ClusterStatus;
+        /// Takes a compositor's report on a sampler whose images it cannot get; `FAILED_PRECONDITION` where the plan is
+        /// not in force.
+        report_sampler(ReportSamplerRequest as SamplerReport) -> ReportSamplerResponse as ();
+    }
+    streams {
+        /// Membership lasts as long as the stream.
+        join_cluster(JoinClusterRequest as JoinCluster) -> JoinClusterStream(JoinClusterResponse as Welcome);
+        /// The session's number, progress, every plan that comes into force, and the end of the session.
+        open_session(OpenSessionRequest as SessionRequest) -> OpenSessionStream(OpenSessionResponse as SessionEvent);
+        /// A scene's package from an offset on.
+        fetch_scene(FetchSceneRequest as FetchScene) -> FetchSceneStream(FetchSceneResponse as ScenePart);
+    }
+}
+
+service! {
+    /// Measures its costs and takes plans.
+    Node: NodeService(NodeServiceServer, NodeServiceClient) as node_server, NodeAdapter, NodeClient;
+    calls {
+        /// Measures each cost alone and warm.
+        measure_costs(MeasureCostsRequest as MeasureCosts) -> MeasureCostsResponse as Costs;
+        /// Takes a plan; answers when ready for it. `FAILED_PRECONDITION` for an epoch below the one it has.
+        apply_assignment(ApplyAssignmentRequest as Assignment) -> ApplyAssignmentResponse as Ready;
+    }
+    streams {}
+}
+
+service! {
+    /// Serves encoded depth images.
+    Sampler: SamplerService(SamplerServiceServer, SamplerServiceClient)
+        as sampler_server, SamplerAdapter, SamplerClient;
+    calls {}
+    streams {
+        /// The chunks of some images of one set.
+        fetch_sample_images(FetchSampleImagesRequest as FetchImages)
+            -> FetchSampleImagesStream(FetchSampleImagesResponse as Chunk);
+    }
+}
+
+/// Makes views.
+#[async_trait]
+pub trait Compositor: Send + Sync + 'static {
+    /// Poses in, frames out, in the order they are ready.
+    async fn render_views(&self, requests: Messages<RenderViews>) -> Result<Messages<FramePart>, Status>;
+}
+
+/// Adapts a [`Compositor`] to its messages.
+#[derive(Debug)]
+pub struct CompositorAdapter<C>(C);
+
+#[async_trait]
+impl<C: Compositor> CompositorService for CompositorAdapter<C> {
+    type RenderViewsStream = Messages<proto::RenderViewsResponse>;
+
+    async fn render_views(
+        &self,
+        request: Request<Streaming<proto::RenderViewsRequest>>,
+    ) -> Result<Response<Self::RenderViewsStream>, Status> {
+        let frames = self.0.render_views(each(request.into_inner(), checked)).await?;
+        Ok(Response::new(each(frames, |part| Ok(part.write()))))
+    }
+}
+
+/// The service, ready to be added to a server.
+pub fn compositor_server<C: Compositor>(compositor: C) -> CompositorServiceServer<CompositorAdapter<C>> {
+    capped!(CompositorServiceServer::new(CompositorAdapter(compositor)))
+}
+
+/// Calls a [`Compositor`].
+#[derive(Debug, Clone)]
+pub struct CompositorClient(CompositorServiceClient<Channel>);
+
+impl CompositorClient {
+    /// Over a connection.
+    #[must_use]
+    pub fn new(channel: Channel) -> Self {
+        Self(capped!(CompositorServiceClient::new(channel)))
+    }
+
+    /// See [`Compositor::render_views`].
+    ///
+    /// # Errors
+    /// The compositor's.
+    pub async fn render_views(
+        &self,
+        requests: impl Stream<Item = RenderViews> + Send + 'static,
+    ) -> Result<Messages<FramePart>, Status> {
+        let requests = requests.map(Convert::<proto::RenderViewsRequest>::write);
+        Ok(each(self.0.clone().render_views(requests).await?.into_inner(), answered))
+    }
+}
