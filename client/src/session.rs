@@ -45,7 +45,7 @@ impl Client {
     /// # Errors
     /// The coordinator's.
     pub async fn status(&self) -> Result<ClusterStatus, ClientError> {
-        self.coordinator.status().await.map_err(ClientError::coordinator)
+        self.coordinator.get_status(()).await.map_err(ClientError::coordinator)
     }
 
     /// Waits until `wanted` nodes have joined.

@@ -146,7 +146,7 @@ impl Scheduler {
             plan_epoch: self.plan_epoch,
             nodes: self.members.values().map(|member| member.status.clone()).collect(),
             offer: None,
-            plan: self.active_plan().map(|active| Box::new(active.plan.clone())),
+            plan: self.active_plan().map(|active| active.plan.clone()),
             session_count: workload.map_or(0, |workload| workload.sessions().len() as u32),
             views_per_set: workload.map_or(0, |workload| workload.views() as u64),
             conditions: workload.map_or_else(Vec::new, |_| self.conditions()),

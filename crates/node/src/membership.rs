@@ -119,7 +119,7 @@ async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan
 }
 
 async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) -> Result<(), Status> {
-    let served = client.status().await?.plan.map(|plan| plan.assignment);
+    let served = client.get_status(()).await?.plan.map(|plan| plan.assignment);
     // A node that has had a plan is warm.
     let Some(served) = served.filter(|_| plan.epoch() == 0) else { return Ok(()) };
     scenes.ensure(&served.workload.scene).await?;

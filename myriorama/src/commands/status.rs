@@ -78,8 +78,8 @@ fn achieved(status: &ClusterStatus) -> String {
     let mut lines: Vec<String> =
         status.achieved.iter().map(|a| format!("Achieved by {}: {:.3} ms a set.", a.policy, a.busy_s * 1e3)).collect();
     if let Some(utilisation) = status.utilisation {
-        let fallback = status.plan.as_ref().and_then(|plan| plan.fallback_index);
-        let quality = fallback.map_or("all that was asked for".to_owned(), |index| format!("fallback {}", index + 1));
+        let fallback = status.plan.as_ref().and_then(|plan| plan.fallback);
+        let quality = fallback.map_or("all that was asked for".to_owned(), |number| format!("fallback {number}"));
         lines.push(format!("Sessions take {:.0} % of the nodes' time and get {quality}.", utilisation * 100.0));
     }
     lines.join("\n")
