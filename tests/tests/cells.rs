@@ -26,7 +26,7 @@ fn looking_from(azimuths: impl IntoIterator<Item = f32>) -> SessionRequest {
     }
 }
 
-fn asked(azimuths: impl IntoIterator<Item = f32>) -> Vec<ViewRequest> {
+fn requests(azimuths: impl IntoIterator<Item = f32>) -> Vec<ViewRequest> {
     let view = |(frame, azimuth)| ViewRequest { frame, set_index: 0, camera: view(azimuth) };
     (0..).zip(azimuths).map(view).collect()
 }
@@ -39,7 +39,7 @@ fn known(frame: &Frame) -> f64 {
 }
 
 async fn frames(session: &client::Session, azimuths: impl IntoIterator<Item = f32>) -> Vec<Frame> {
-    let mut frames = session.render_views(asked(azimuths)).unwrap().all().await.unwrap();
+    let mut frames = session.render_views(requests(azimuths)).unwrap().all().await.unwrap();
     frames.sort_by_key(|frame| frame.request.frame);
     frames
 }

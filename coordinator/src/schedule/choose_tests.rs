@@ -8,7 +8,7 @@ fn load(views: usize) -> Load {
     Load { images: 4, views, ..Load::default() }
 }
 
-fn asked(
+fn choice_for(
     costs: Costs,
     load: Load,
     count: usize,
@@ -20,11 +20,11 @@ fn asked(
 }
 
 fn auto(views: usize, count: usize) -> Choice {
-    asked(COSTS, load(views), count, PolicyChoice::Auto, None).unwrap()
+    choice_for(COSTS, load(views), count, PolicyChoice::Auto, None).unwrap()
 }
 
 fn pipeline(costs: Costs, load: Load, count: usize) -> Choice {
-    asked(costs, load, count, PolicyChoice::Pipeline, None).unwrap()
+    choice_for(costs, load, count, PolicyChoice::Pipeline, None).unwrap()
 }
 
 #[test]
@@ -46,14 +46,14 @@ fn many_views_are_reconstructed_and_few_views_are_drawn() {
 fn a_session_may_override_policy_and_k() {
     let policies = [PolicyChoice::Pipeline, PolicyChoice::Direct, PolicyChoice::TimeShare];
     for (choice, policy) in policies.into_iter().zip([Policy::Pipeline, Policy::Direct, Policy::TimeShare]) {
-        assert_eq!(asked(COSTS, load(5), 5, choice, None).unwrap().policy, policy);
+        assert_eq!(choice_for(COSTS, load(5), 5, choice, None).unwrap().policy, policy);
     }
-    assert_eq!(asked(COSTS, load(5), 5, PolicyChoice::Pipeline, Some(3)).unwrap().division.sampler_count(), 3);
+    assert_eq!(choice_for(COSTS, load(5), 5, PolicyChoice::Pipeline, Some(3)).unwrap().division.sampler_count(), 3);
     for forced in [0, 5, 9] {
-        let refused = asked(COSTS, load(5), 5, PolicyChoice::Pipeline, Some(forced));
+        let refused = choice_for(COSTS, load(5), 5, PolicyChoice::Pipeline, Some(forced));
         assert!(matches!(refused, Err(ChoiceError::ForcedSamplers { most: 4, .. })));
     }
-    assert_eq!(asked(COSTS, load(1), 0, PolicyChoice::Auto, None), Err(ChoiceError::NoNodes));
+    assert_eq!(choice_for(COSTS, load(1), 0, PolicyChoice::Auto, None), Err(ChoiceError::NoNodes));
 }
 
 #[test]

@@ -3,28 +3,13 @@
 use cluster::{Costs, MeasuredCosts, TileCosts};
 
 use super::node_costs::{NodeCosts, is_within_tiles_error};
+use super::operations::PerOperation;
 use super::smoothing::{Smoothed, geometric_mean, is_valid};
 
 /// Reports without a timing after which the operation counts as not timed.
 const RECENT: u32 = 30;
 /// A first timing of this many times the expected one includes the building of shaders, and is ignored.
 const COLD: f64 = 2.0;
-
-/// A value for each operation whose costs are measured: g_s, g_v, c, d and e.
-type PerOperation<T> = [T; 5];
-/// g_s.
-const SAMPLE_IMAGE: usize = 0;
-/// The number of operations of the device alone, the first ones, which say how fast a node is. Loading a set runs beside
-/// views, and the encoding of a view is too short to be timed well.
-const OF_DEVICE: usize = 3;
-
-fn costs_s(costs: &Costs) -> PerOperation<f64> {
-    [costs.sample_image_s, costs.direct_view_s, costs.reconstruct_view_s, costs.load_set_s, costs.encode_view_s]
-}
-
-fn timings_s(costs: &MeasuredCosts) -> PerOperation<Option<f64>> {
-    [costs.sample_image_s, costs.direct_view_s, costs.reconstruct_view_s, costs.load_set_s, costs.encode_view_s]
-}
 
 /// One operation: as measured alone, and as timed since.
 #[derive(Debug, Clone, Default)]
@@ -79,10 +64,17 @@ pub(super) type Ratios = PerOperation<Option<f64>>;
 /// every node. The timings of a single node say as much of that node as of the operation, and do not count.
 pub(super) fn common_ratios<'a>(estimates: impl Iterator<Item = &'a Estimate>) -> Ratios {
     let all: Vec<Ratios> = estimates.map(Estimate::ratios).collect();
-    std::array::from_fn(|operation| {
-        let timed = all.iter().filter_map(|ratios| ratios[operation]);
+    let common = |of: fn(&Ratios) -> Option<f64>| {
+        let timed = all.iter().filter_map(of);
         geometric_mean(timed.clone()).filter(|_| timed.count() > 1)
-    })
+    };
+    Ratios {
+        sample_image: common(|ratios| ratios.sample_image),
+        direct_view: common(|ratios| ratios.direct_view),
+        reconstruct_view: common(|ratios| ratios.reconstruct_view),
+        load_set: common(|ratios| ratios.load_set),
+        encode_view: common(|ratios| ratios.encode_view),
+    }
 }
 
 /// One node's costs as its timings come in.
@@ -109,19 +101,19 @@ pub(super) struct SampledParts<'a> {
 impl Estimate {
     /// As measured when the session was opened.
     pub(super) fn starting_at(costs: &Costs) -> Self {
-        Self { alone: *costs, operations: costs_s(costs).map(Operation::starting_at), ..Self::default() }
+        Self { alone: *costs, operations: PerOperation::from(costs).map(Operation::starting_at), ..Self::default() }
     }
 
     /// Adds the timings of one report. `sampled` is the node's share in the plan that the report is of.
     pub(super) fn add(&mut self, measured: &MeasuredCosts, sampled: Option<SampledParts<'_>>) {
         let slowness = self.slowness.value().unwrap_or(1.0);
-        let mut timings = timings_s(measured);
+        let mut timings = PerOperation::from(measured);
         // Tiles of a plan that is gone are not known any more.
         let is_known = sampled.is_some() || !self.samples_tiles;
-        timings[SAMPLE_IMAGE] =
-            timings[SAMPLE_IMAGE].filter(|_| is_known).map(|tiles_s| self.whole_image_s(tiles_s, sampled));
+        timings.sample_image = timings.sample_image.filter(|_| is_known).map(|s| self.whole_image_s(s, sampled));
         self.samples_tiles = sampled.map_or(self.samples_tiles, |sampled| sampled.tiles > 1);
-        let ratios = std::array::from_fn(|i| self.operations[i].add(timings[i], slowness));
+        let ratios =
+            self.operations.as_mut().zip_with(timings, |operation, timing_s| operation.add(timing_s, slowness));
         self.slowness.add(self.mean_ratio(ratios));
         // A rate of 0 bytes/s is no rate: nothing was transferred.
         self.transfer_bytes_per_s.add(measured.transfer_bytes_per_s.filter(|rate| *rate > 0.0));
@@ -132,8 +124,8 @@ impl Estimate {
     /// node is slow.
     fn mean_ratio(&self, mut ratios: Ratios) -> Option<f64> {
         let without_error = |ratio| if self.samples_tiles && is_within_tiles_error(ratio) { 1.0 } else { ratio };
-        ratios[SAMPLE_IMAGE] = ratios[SAMPLE_IMAGE].map(without_error);
-        geometric_mean(ratios[..OF_DEVICE].iter().copied().flatten())
+        ratios.sample_image = ratios.sample_image.map(without_error);
+        geometric_mean(ratios.of_device().into_iter().flatten())
     }
 
     /// The cost of a mean image on a node whose tiles take `tiles_s`, each times their number in an image. Tiles have an
@@ -148,11 +140,11 @@ impl Estimate {
 
     /// Forgets all timings: other work is done from here on.
     pub(super) fn restart(&mut self) {
-        self.operations.iter_mut().for_each(|operation| operation.timed.restart());
+        self.operations.as_mut().map(|operation| operation.timed.restart());
     }
 
     fn ratios(&self) -> Ratios {
-        self.operations.each_ref().map(Operation::ratio)
+        self.operations.as_ref().map(Operation::ratio)
     }
 
     pub(super) fn now(&self) -> NodeCosts {
@@ -163,17 +155,25 @@ impl Estimate {
     /// node's relative slowness.
     pub(super) fn now_among(&self, common: &Ratios) -> NodeCosts {
         let slowness = self.slowness.value().unwrap_or(1.0);
-        let own = self.ratios();
         // How many times slower than other nodes this one is, by operations that both have timed.
-        let than_others = self.mean_ratio(std::array::from_fn(|i| Some(own[i]? / common[i]?))).unwrap_or(1.0);
-        let [sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s] =
-            std::array::from_fn(|i| self.operations[i].now_s(common[i].map_or(slowness, |ratio| ratio * than_others)));
+        let to_others = self.ratios().zip_with(*common, |own, common| Some(own? / common?));
+        let than_others = self.mean_ratio(to_others).unwrap_or(1.0);
+        let now_s = self.operations.as_ref().zip_with(*common, |operation, common| {
+            operation.now_s(common.map_or(slowness, |common| common * than_others))
+        });
         // The overhead of a tile grows with the cost of an image.
-        let times = Some(sample_image_s / self.alone.sample_image_s).filter(|times| times.is_finite()).unwrap_or(1.0);
+        let times =
+            Some(now_s.sample_image / self.alone.sample_image_s).filter(|times| times.is_finite()).unwrap_or(1.0);
         let tiles = self.alone.tiles.map(|tiles| TileCosts { overhead_s: tiles.overhead_s * times, ..tiles });
-        let in_order = self.alone.in_order;
-        let costs =
-            Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles };
+        let costs = Costs {
+            sample_image_s: now_s.sample_image,
+            direct_view_s: now_s.direct_view,
+            reconstruct_view_s: now_s.reconstruct_view,
+            load_set_s: now_s.load_set,
+            encode_view_s: now_s.encode_view,
+            in_order: self.alone.in_order,
+            tiles,
+        };
         let image_bytes = self.image_bytes.value().unwrap_or(0.0);
         NodeCosts { costs, transfer_image_s: self.transfer_bytes_per_s.value().map(|rate| image_bytes / rate) }
     }

@@ -19,6 +19,7 @@ mod load;
 mod makespan;
 mod member;
 mod node_costs;
+mod operations;
 mod overload;
 mod prediction;
 mod reason;

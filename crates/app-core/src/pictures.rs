@@ -65,7 +65,7 @@ impl Source {
     }
 
     /// Name and colour; the name of a sample camera lacks its number.
-    fn look(self) -> (&'static str, [u8; 3]) {
+    fn name_and_color(self) -> (&'static str, [u8; 3]) {
         match self {
             Self::Sample(camera) => ("sample", CAMERAS[usize::from(camera) % CAMERAS.len()]),
             Self::Blend => ("blend", [255, 255, 255]),
@@ -76,14 +76,17 @@ impl Source {
     }
 }
 
+/// Names of the colours of a picture.
+pub type Legend = Vec<(String, [u8; 3])>;
+
 /// The provenance of a view in false colours, and the names of the colours that occur; `None` for a view without
 /// provenance.
 #[must_use]
-pub fn provenance(view: &View) -> Option<(RgbImage, Vec<(String, [u8; 3])>)> {
+pub fn provenance(view: &View) -> Option<(RgbImage, Legend)> {
     let sources: Vec<Source> = view.provenance.as_ref()?.iter().map(Source::of).collect();
-    let pixels = sources.iter().flat_map(|source| source.look().1).collect();
+    let pixels = sources.iter().flat_map(|source| source.name_and_color().1).collect();
     let image = RgbImage::from_raw(view.size_px.x, view.size_px.y, pixels)?;
-    let named = |source: Source| match (source, source.look()) {
+    let named = |source: Source| match (source, source.name_and_color()) {
         (Source::Sample(camera), (name, color)) => (format!("{name} {camera}"), color),
         (_, (name, color)) => (name.to_owned(), color),
     };

@@ -20,7 +20,7 @@ fn read<D: Convert<P>, P>(message: P) -> Result<D, WireError> {
     D::read(message, "")
 }
 
-fn written<P, D: Convert<P>>(value: D) -> P {
+fn to_message<P, D: Convert<P>>(value: D) -> P {
     value.write()
 }
 
@@ -134,18 +134,18 @@ fn views() -> RenderViews {
 
 #[test]
 fn messages_survive_the_round_trip() {
-    assert_eq!(read::<Assignment, _>(written::<proto::Assignment, _>(assignment())), Ok(assignment()));
+    assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(assignment())), Ok(assignment()));
     let mut cells = Assignment { tile_count: 2, relay_fanout: NonZeroU32::new(3), ..assignment() };
     cells.workload.cell_first_indices = vec![0, 1];
     cells.samplers[0].image_indices = vec![3, 1, 2, 0];
-    assert_eq!(read::<Assignment, _>(written::<proto::Assignment, _>(cells.clone())), Ok(cells));
-    assert_eq!(read::<SessionRequest, _>(written::<proto::OpenSessionRequest, _>(request())), Ok(request()));
-    assert_eq!(read::<RenderViews, _>(written::<proto::RenderViewsRequest, _>(views())), Ok(views()));
+    assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(cells.clone())), Ok(cells));
+    assert_eq!(read::<SessionRequest, _>(to_message::<proto::OpenSessionRequest, _>(request())), Ok(request()));
+    assert_eq!(read::<RenderViews, _>(to_message::<proto::RenderViewsRequest, _>(views())), Ok(views()));
     let live =
         RenderViews { live: Some(LiveRequest { acknowledged_frame: 8, client_id: 5 }), views: Vec::new(), ..views() };
-    assert_eq!(read::<RenderViews, _>(written::<proto::RenderViewsRequest, _>(live.clone())), Ok(live));
+    assert_eq!(read::<RenderViews, _>(to_message::<proto::RenderViewsRequest, _>(live.clone())), Ok(live));
     let plan = SessionEvent::Plan(Box::new(session_plan()));
-    assert_eq!(read::<SessionEvent, _>(written::<proto::OpenSessionResponse, _>(plan.clone())), Ok(plan));
+    assert_eq!(read::<SessionEvent, _>(to_message::<proto::OpenSessionResponse, _>(plan.clone())), Ok(plan));
     let condition = NodeCondition {
         node_name: "a".to_owned(),
         is_ready: true,
@@ -164,20 +164,20 @@ fn messages_survive_the_round_trip() {
         utilisation: Some(0.6),
         ..ClusterStatus::default()
     };
-    assert_eq!(read::<ClusterStatus, _>(written::<proto::GetStatusResponse, _>(status.clone())), Ok(status));
+    assert_eq!(read::<ClusterStatus, _>(to_message::<proto::GetStatusResponse, _>(status.clone())), Ok(status));
     let report = SamplerReport {
         plan_epoch: 4,
         compositor: "b".to_owned(),
         sampler: "a".to_owned(),
         reason: "corrupt".to_owned(),
     };
-    assert_eq!(read::<SamplerReport, _>(written::<proto::ReportSamplerRequest, _>(report.clone())), Ok(report));
+    assert_eq!(read::<SamplerReport, _>(to_message::<proto::ReportSamplerRequest, _>(report.clone())), Ok(report));
     let opened = SessionEvent::Opened { session: 7 };
-    assert_eq!(read::<SessionEvent, _>(written::<proto::OpenSessionResponse, _>(opened.clone())), Ok(opened));
+    assert_eq!(read::<SessionEvent, _>(to_message::<proto::OpenSessionResponse, _>(opened.clone())), Ok(opened));
     let change =
         ChangeSession { session: 7, views_per_set: 0, frames_per_s: Some(12.5), viewpoints: Some(vec![camera()]) };
-    assert_eq!(read::<ChangeSession, _>(written::<proto::ChangeSessionRequest, _>(change.clone())), Ok(change));
-    assert_eq!(read::<WorkReport, _>(written::<proto::ReportWorkRequest, _>(work_report())), Ok(work_report()));
+    assert_eq!(read::<ChangeSession, _>(to_message::<proto::ChangeSessionRequest, _>(change.clone())), Ok(change));
+    assert_eq!(read::<WorkReport, _>(to_message::<proto::ReportWorkRequest, _>(work_report())), Ok(work_report()));
 }
 
 fn session_plan() -> SessionPlan {
@@ -214,7 +214,7 @@ fn work_report() -> WorkReport {
 #[test]
 fn bad_reports_and_changes_are_refused_by_field() {
     let spoilt = |spoil: &dyn Fn(&mut proto::ReportWorkRequest)| {
-        let mut message = written::<proto::ReportWorkRequest, _>(work_report());
+        let mut message = to_message::<proto::ReportWorkRequest, _>(work_report());
         spoil(&mut message);
         refusal::<_, WorkReport>(message)
     };
@@ -224,7 +224,7 @@ fn bad_reports_and_changes_are_refused_by_field() {
     let change = proto::ChangeSessionRequest { session_number: 1, frames_per_s: 1.0, ..Default::default() };
     let many = proto::ChangeSessionRequest { views_per_set_count: 1_000_000_000, ..change.clone() };
     assert!(refusal::<_, ChangeSession>(many).contains("views_per_set_count is 1000000000"));
-    let viewpoint = written::<proto::PinholeCamera, _>(camera());
+    let viewpoint = to_message::<proto::PinholeCamera, _>(camera());
     let too_many = proto::ChangeSessionRequest { viewpoints: vec![viewpoint; 257], ..change.clone() };
     assert!(refusal::<_, ChangeSession>(too_many).contains("viewpoints has 257"));
     let nowhere = proto::PinholeCamera { near_m: f32::NAN, ..viewpoint };
@@ -249,7 +249,7 @@ fn refusal<P, D: Convert<P>>(message: P) -> String {
 }
 
 fn spoilt_views(spoil: impl FnOnce(&mut proto::RenderViewsRequest)) -> String {
-    let mut message = written::<proto::RenderViewsRequest, _>(views());
+    let mut message = to_message::<proto::RenderViewsRequest, _>(views());
     spoil(&mut message);
     refusal::<_, RenderViews>(message)
 }
@@ -279,7 +279,7 @@ fn bad_counts_are_refused_by_field() {
     assert!(spoilt_views(|m| m.frame_codec = "x".repeat(300)).contains("frame_codec"));
     assert!(spoilt_views(|m| m.reconstruction_method.clear()).contains("reconstruction_method"));
     let spoilt = |spoil: &dyn Fn(&mut proto::OpenSessionRequest)| {
-        let mut message = written::<proto::OpenSessionRequest, _>(request());
+        let mut message = to_message::<proto::OpenSessionRequest, _>(request());
         spoil(&mut message);
         refusal::<_, SessionRequest>(message)
     };
@@ -318,7 +318,7 @@ fn a_request_without_refinement_steps_has_one() {
 }
 
 fn spoilt_workload(spoil: impl FnOnce(&mut proto::Workload)) -> String {
-    let mut message = written::<proto::Workload, _>(workload());
+    let mut message = to_message::<proto::Workload, _>(workload());
     spoil(&mut message);
     refusal::<_, Workload>(message)
 }
@@ -369,21 +369,21 @@ fn the_largest_number_of_lights_survives_the_round_trip() {
     let light = illumination().lights[1];
     let most = Illumination { lights: vec![light; MAX_LIGHTS], ..illumination() };
     assert_eq!(MAX_VISIBILITY_PLANES, 64);
-    assert_eq!(read::<Illumination, _>(written::<proto::Illumination, _>(most.clone())), Ok(most));
+    assert_eq!(read::<Illumination, _>(to_message::<proto::Illumination, _>(most.clone())), Ok(most));
 }
 
 #[test]
 fn unknown_enums_and_empty_oneofs_are_refused() {
     for value in [0, 77, -1] {
-        let mut message = written::<proto::OpenSessionRequest, _>(request());
+        let mut message = to_message::<proto::OpenSessionRequest, _>(request());
         message.policy_choice = value;
         assert!(refusal::<_, SessionRequest>(message).contains("policy_choice"));
-        let mut message = written::<proto::Assignment, _>(assignment());
+        let mut message = to_message::<proto::Assignment, _>(assignment());
         message.policy = value;
         assert!(refusal::<_, Assignment>(message).contains("policy"));
     }
     assert!(refusal::<_, SessionEvent>(proto::OpenSessionResponse { event: None }).contains("event"));
-    let mut message = written::<proto::OpenSessionRequest, _>(request());
+    let mut message = to_message::<proto::OpenSessionRequest, _>(request());
     message.sample_cameras = vec![proto::Camera { model: None }];
     assert!(refusal::<_, SessionRequest>(message).contains("camera.model"));
 }
@@ -411,13 +411,13 @@ fn header() -> FrameHeader {
 #[test]
 fn frame_headers_survive_with_their_camera() {
     let header = header();
-    assert_eq!(read::<FrameHeader, _>(written::<proto::FrameHeader, _>(header.clone())), Ok(header));
+    assert_eq!(read::<FrameHeader, _>(to_message::<proto::FrameHeader, _>(header.clone())), Ok(header));
 }
 
 #[test]
 fn frame_headers_that_claim_too_much_are_refused() {
     let spoil = |change: &dyn Fn(&mut proto::FrameHeader)| {
-        let mut message = written::<proto::FrameHeader, _>(header());
+        let mut message = to_message::<proto::FrameHeader, _>(header());
         change(&mut message);
         read::<FrameHeader, _>(message).expect_err("refused").to_string()
     };
@@ -434,7 +434,7 @@ fn frame_headers_that_claim_too_much_are_refused() {
 #[test]
 fn impossible_stage_times_are_refused_by_field() {
     let spoil = |change: &dyn Fn(&mut proto::StageTimes)| {
-        let mut message = written::<proto::StageTimes, _>(StageTimes::default());
+        let mut message = to_message::<proto::StageTimes, _>(StageTimes::default());
         change(&mut message);
         read::<StageTimes, _>(message).unwrap_err().to_string()
     };
@@ -446,20 +446,20 @@ fn impossible_stage_times_are_refused_by_field() {
 #[test]
 fn zeros_and_empty_texts_of_the_wire_become_none() {
     let asked = SessionRequest { frames_per_s: None, forced_tile_count: None, ..request() };
-    let message = written::<proto::OpenSessionRequest, _>(asked.clone());
+    let message = to_message::<proto::OpenSessionRequest, _>(asked.clone());
     assert_eq!((message.frames_per_s, message.forced_tile_count), (0.0, 0));
     assert_eq!(read::<SessionRequest, _>(message), Ok(asked));
     let settings = OfferSettings { lighting: Some("unlit".to_owned()), ..OfferSettings::default() };
     let Workload { scene, sample_cameras, volume, .. } = workload();
     let offer = OfferStatus { scene, sample_cameras, volume, origin_in_source: DVec3::X, settings };
-    let message = written::<proto::SceneOffer, _>(offer.clone());
+    let message = to_message::<proto::SceneOffer, _>(offer.clone());
     assert_eq!((message.sampling_method.as_str(), message.lighting.as_str()), ("", "unlit"));
     assert_eq!(read::<OfferStatus, _>(message), Ok(offer));
     let even =
         Costs { tiles: Some(TileCosts { overhead_s: 0.1, row_shares: None }), sample_image_s: 0.5, ..Costs::default() };
     let whole = Costs { tiles: None, ..even };
     for (costs, overhead_s) in [(even, 0.1), (whole, 0.5)] {
-        let message = written::<proto::Costs, _>(costs);
+        let message = to_message::<proto::Costs, _>(costs);
         assert_eq!(message.sample_overhead_s, overhead_s);
         assert_eq!(message.sample_row_shares, Some(proto::RowShares::default()));
         assert_eq!(read::<Costs, _>(message), Ok(costs));
@@ -474,7 +474,7 @@ fn a_member_that_leaves_no_room_for_later_plans_is_refused() {
         device_name: "d".to_owned(),
         is_software: true,
     };
-    let join = |plan_epoch| written::<proto::JoinClusterRequest, _>(JoinCluster { node: node.clone(), plan_epoch });
+    let join = |plan_epoch| to_message::<proto::JoinClusterRequest, _>(JoinCluster { node: node.clone(), plan_epoch });
     assert!(read::<JoinCluster, _>(join(MAX_JOINING_EPOCH)).is_ok());
     assert!(refusal::<_, JoinCluster>(join(u64::MAX)).contains("plan_epoch is 18446744073709551615"));
 }
@@ -488,7 +488,7 @@ fn typical_views_of_several_sizes_or_none_are_refused() {
         batch_count: 5,
         planes: ViewPlanes::default(),
     };
-    let sent = |measure: MeasureCosts| read::<MeasureCosts, _>(written::<proto::MeasureCostsRequest, _>(measure));
+    let sent = |measure: MeasureCosts| read::<MeasureCosts, _>(to_message::<proto::MeasureCostsRequest, _>(measure));
     let three = measure(vec![view(8); 3]);
     assert_eq!(sent(three.clone()), Ok(three));
     let other = PinholeCamera { eye_in_world: Vec3::X, ..view(8) };

@@ -54,7 +54,6 @@ pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
         insecure_bind: args.insecure_bind,
         reflection: args.reflection,
         max_sessions: args.max_sessions,
-        ..CoordinatorConfig::default()
     };
     let log = args.record.as_deref().map(event_log).transpose()?;
     let telemetry = Telemetry::default();
