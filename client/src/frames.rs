@@ -13,8 +13,9 @@ use tokio::task::JoinSet;
 use crate::error::ClientError;
 use crate::view_request::{Frame, ViewRequest};
 
-/// Decoded frames that the caller has not taken yet.
+/// Most decoded frames that the caller has not taken yet: in number, and in bytes, though always one.
 const FRAMES_AHEAD: usize = 32;
+const BYTES_AHEAD: usize = 64 << 20;
 
 /// The frames of one request, in the order they are ready.
 #[derive(Debug)]
@@ -32,7 +33,7 @@ impl Frames {
         expected: Expected,
         deliver: impl FnOnce(FrameSink) -> F,
     ) -> Self {
-        let (send, received) = mpsc::channel(FRAMES_AHEAD);
+        let (send, received) = mpsc::channel(frames_ahead(expected.largest_frame_bytes()));
         let expected = Arc::new(Mutex::new(expected));
         let decoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
         let mut delivery = JoinSet::new();
@@ -68,6 +69,10 @@ impl Frames {
         }
         Ok(frames)
     }
+}
+
+fn frames_ahead(frame_bytes: usize) -> usize {
+    (BYTES_AHEAD / frame_bytes.max(1)).clamp(1, FRAMES_AHEAD)
 }
 
 /// A frame for the caller, or the error that ends its request.
@@ -154,6 +159,12 @@ impl Expected {
         Ok(Self { due, planes })
     }
 
+    /// The decoded bytes of the largest frame.
+    fn largest_frame_bytes(&self) -> usize {
+        let pixels = self.due.values().map(|request| request.camera.pixel_count()).max().unwrap_or(0);
+        pixels * self.planes.bytes_per_pixel()
+    }
+
     /// The fault of a frame, of its compositor or of the network; `None` for a good frame.
     pub(crate) fn fault_of(&self, frame: u64, header: &FrameHeader) -> Option<String> {
         match self.due.get(&frame) {
@@ -224,6 +235,13 @@ mod tests {
             crc32: 0,
             stage_times: StageTimes::default(),
         }
+    }
+
+    #[test]
+    fn large_frames_wait_in_small_numbers() {
+        assert_eq!([1, 2 << 20, 4 << 20, 22 << 20, 65 << 20].map(frames_ahead), [32, 32, 16, 2, 1]);
+        let planes = ViewPlanes { inverse_depth: true, provenance: true };
+        assert_eq!(Expected::new([request(4)], planes).unwrap().largest_frame_bytes(), 64 * (3 + 4 + 4));
     }
 
     #[test]

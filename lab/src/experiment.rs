@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use app_core::cluster::Cluster;
-use app_core::delivery::{Delivered, open, receive, request};
+use app_core::delivery::{open, receive, request};
 use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
-use client::{Client, Frame};
-use cluster::{PolicyChoice, SessionRequest, Timeline};
+use client::{Client, Frame, Session};
+use cluster::{PolicyChoice, SessionPlan, SessionRequest, Timeline};
 use depth_image::{PinholeCamera, ViewCell};
 use engine::GpuEngine;
 use glam::UVec2;
@@ -34,6 +34,37 @@ pub struct DeliverySettings {
     pub views: usize,
     /// Sample sets of one moment, each with all views.
     pub sets: u32,
+}
+
+/// Delivered views.
+#[derive(Debug)]
+pub struct Delivered {
+    /// The coordinator's plan, and the costs that it measured.
+    pub plan: SessionPlan,
+    /// Seconds from the request to the last frame, decoded and checksummed.
+    pub seconds: f64,
+    /// Frames by number: set by set, and view by view in each.
+    pub frames: Vec<Frame>,
+}
+
+/// Receives all views of all sets; `arrived` is called for each.
+///
+/// # Errors
+/// As [`receive`].
+pub async fn receive_all(
+    session: &Session,
+    views: &[PinholeCamera],
+    mut arrived: impl FnMut(&Frame),
+) -> anyhow::Result<Delivered> {
+    let mut frames = Vec::new();
+    let received = async |frame| {
+        arrived(&frame);
+        frames.push(frame);
+        Ok(())
+    };
+    let seconds = receive(session, views, received).await?;
+    frames.sort_by_key(|frame| frame.request.frame);
+    Ok(Delivered { plan: session.plan(), seconds, frames })
 }
 
 /// A cluster that runs until it is stopped.
@@ -103,7 +134,7 @@ impl Experiment {
         };
         self.runtime.block_on(async {
             let session = open(&self.client, request).await?;
-            receive(&session, &views, arrived).await
+            receive_all(&session, &views, arrived).await
         })
     }
 

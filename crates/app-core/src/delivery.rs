@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use client::{Client, Frame, Session, ViewRequest};
 use cluster::limits::MAX_VIEWPOINTS;
-use cluster::{OfferSettings, PolicyChoice, Quality, SessionPlan, SessionRequest, Timeline};
+use cluster::{OfferSettings, PolicyChoice, Quality, SessionRequest, Timeline};
 use depth_image::{PinholeCamera, ViewPlanes};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -84,40 +84,25 @@ pub fn viewpoints(views: &[PinholeCamera]) -> Vec<PinholeCamera> {
     views.iter().step_by(views.len().div_ceil(MAX_VIEWPOINTS).max(1)).copied().collect()
 }
 
-/// Delivered views.
-#[derive(Debug)]
-pub struct Delivered {
-    /// The coordinator's plan, and the costs that it measured.
-    pub plan: SessionPlan,
-    /// Seconds from the request to the last frame, decoded and checksummed.
-    pub seconds: f64,
-    /// Frames by number: set by set, and view by view in each.
-    pub frames: Vec<Frame>,
-}
-
-/// Asks for all views of all sets and waits for them; `arrived` is called for each.
+/// Asks for all views of all sets; frames are numbered set by set, and view by view in each. `received` is given each as it
+/// comes, and is waited for. Gives the seconds from the request to the last frame, decoded and checksummed.
 ///
 /// # Errors
-/// The cluster fails, or frames are missing.
+/// The cluster fails, frames are missing, or `received` fails.
 pub async fn receive(
     session: &Session,
     views: &[PinholeCamera],
-    mut arrived: impl FnMut(&Frame),
-) -> anyhow::Result<Delivered> {
+    mut received: impl AsyncFnMut(Frame) -> anyhow::Result<()>,
+) -> anyhow::Result<f64> {
     let start = Instant::now();
     let sets = session.plan().assignment.workload.timeline.set_count;
     let all = (0..sets).flat_map(|set_index| views.iter().map(move |&camera| (set_index, camera)));
     let requests = (0..).zip(all).map(|(frame, (set_index, camera))| ViewRequest { frame, set_index, camera });
     let mut incoming = session.render_views(requests.collect())?;
-    let mut frames = Vec::with_capacity(views.len() * sets as usize);
     while let Some(frame) = incoming.next().await {
-        let frame = frame?;
-        arrived(&frame);
-        frames.push(frame);
+        received(frame?).await?;
     }
-    let seconds = start.elapsed().as_secs_f64();
-    frames.sort_by_key(|frame| frame.request.frame);
-    Ok(Delivered { plan: session.plan(), seconds, frames })
+    Ok(start.elapsed().as_secs_f64())
 }
 
 #[cfg(test)]

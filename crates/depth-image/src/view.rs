@@ -67,3 +67,11 @@ pub struct ViewPlanes {
     /// [`View::provenance`].
     pub provenance: bool,
 }
+
+impl ViewPlanes {
+    /// Bytes of a decoded view for each pixel, with its colour.
+    #[must_use]
+    pub fn bytes_per_pixel(self) -> usize {
+        3 + 4 * usize::from(self.inverse_depth) + 4 * usize::from(self.provenance)
+    }
+}

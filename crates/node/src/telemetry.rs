@@ -1,6 +1,7 @@
 //! Metrics of a process, and the page at which Prometheus reads them. Base units; labels are few and bounded. Logs go to
 //! standard error; `RUST_LOG` filters them, and `MYRIORAMA_LOG_FORMAT=json` makes each a line of JSON.
 
+use std::io::IsTerminal as _;
 use std::sync::Arc;
 
 use axum::{Router, http::header, routing::get};
@@ -25,6 +26,7 @@ const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset
 pub fn init_logging(default_filter: &str) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default_filter));
     let logging = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let logging = logging.with_ansi(std::io::stderr().is_terminal());
     let is_json = std::env::var("MYRIORAMA_LOG_FORMAT").is_ok_and(|format| format == "json");
     let started = if is_json { logging.json().try_init() } else { logging.try_init() };
     if started.is_err() {

@@ -1,6 +1,5 @@
 //! Delivery times against the number of views, by method.
 
-use app_core::delivery::Delivered;
 use cluster::{Costs, PolicyChoice, SessionPlan};
 use coordinator::schedule::k_fd;
 use node::Engine as _;
@@ -8,7 +7,7 @@ use reconstruction::ReconstructionMethod;
 use study::{Report, Table};
 
 use crate::balance::{brute_force_k, k_fd_printed};
-use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
+use crate::experiment::{Delivered, DeliverySettings, Experiment, PAPER_VIEWS};
 use crate::progress::bar;
 
 /// The paper's method, with its 100 steps.

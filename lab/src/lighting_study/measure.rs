@@ -1,10 +1,9 @@
 //! Measurements of lightings: parts alone, and views delivered.
 
-use app_core::delivery::Delivered;
 use cluster::{Costs, PolicyChoice};
 use render::Lighting;
 
-use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
+use crate::experiment::{Delivered, DeliverySettings, Experiment, PAPER_VIEWS};
 use crate::progress::bar;
 
 /// The finest lighting of the demo, which the checks are about.

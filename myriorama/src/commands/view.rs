@@ -1,19 +1,18 @@
 //! `myriorama view`: a thin client that writes what it receives.
 
 mod args;
+mod writer;
 
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context as _;
-use app_core::camera_file::NamedCamera;
-use app_core::delivery::{Delivered, at_rate, open, receive, request, viewpoints};
+use app_core::delivery::{at_rate, open, receive, request, viewpoints};
 use app_core::exit::Outcome;
 use app_core::live::Drive;
-use app_core::{camera_file, live, pictures};
+use app_core::{camera_file, live};
 use client::{Client, Frame, Session};
 use cluster::{OfferStatus, PolicyChoice, SessionRequest, Timeline};
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::PinholeCamera;
 use indicatif::ProgressBar;
 use render::Lighting;
 use serde_json::{Map, json};
@@ -21,6 +20,7 @@ use serde_json::{Map, json};
 use crate::comparison;
 
 pub use args::ViewArgs;
+use writer::{PictureWriter, file_name};
 
 /// Asks for views, receives them, and writes them.
 ///
@@ -40,12 +40,12 @@ pub async fn run(args: ViewArgs) -> anyhow::Result<Outcome> {
     if args.live {
         return follow(&args, &session, cameras).await;
     }
-    let delivered = write_all(&args, &session, &offer, &cameras).await?;
+    write_all(&args, &session, &offer, &cameras).await?;
     if !args.compare {
         return Ok(Outcome::Done);
     }
     drop(session);
-    compare(&args, &client, request, &cameras, &delivered).await
+    compare(&args, &client, request, &cameras).await
 }
 
 fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamera]) -> anyhow::Result<SessionRequest> {
@@ -59,7 +59,7 @@ fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamer
         refinement_steps: if args.refine { refinement_steps(&request.lighting) } else { 1 },
         codec: args.codec.to_string(),
         policy: args.policy,
-        planes: ViewPlanes { inverse_depth: args.depth, provenance: args.provenance },
+        planes: args.planes(),
         timeline: timeline(args.frames, args.frame_step, args.refine),
         viewpoints: if args.cells || args.viewpoints.around.is_some() { viewpoints(cameras) } else { Vec::new() },
         ..request
@@ -97,60 +97,48 @@ async fn follow(args: &ViewArgs, session: &Session, path: Vec<PinholeCamera>) ->
     Ok(Outcome::of(args.longest_gap.is_none_or(|longest| gap_s <= longest)))
 }
 
-/// Receives all views and writes their pictures and cameras.
+/// Receives all views, and writes each picture as it comes and the cameras at the end.
 async fn write_all(
     args: &ViewArgs,
     session: &Session,
     offer: &OfferStatus,
     cameras: &[PinholeCamera],
-) -> anyhow::Result<Delivered> {
+) -> anyhow::Result<()> {
     let progress = ProgressBar::new(cameras.len() as u64 * u64::from(args.frames));
-    let delivered = receive(session, cameras, |_| progress.inc(1)).await?;
+    let pixels = cameras.iter().map(PinholeCamera::pixel_count).max().unwrap_or(0);
+    let mut writer = PictureWriter::new(&args.out, pixels * args.planes().bytes_per_pixel());
+    let received = async |frame| {
+        writer.write(frame).await?;
+        progress.inc(1);
+        Ok(())
+    };
+    let seconds = receive(session, cameras, received).await?;
+    let named = writer.finish().await?;
     progress.finish_and_clear();
-    let write = |frame| write_frame(&args.out, frame);
-    let named = delivered.frames.iter().map(write).collect::<anyhow::Result<Vec<_>>>()?;
     let depth = json!("16-bit: value / 65535 * inverse_depth_max_per_m, per metre; 0 is background");
     let about = Map::from_iter([("depth".to_owned(), depth)]);
     camera_file::write(&args.out.join("cameras.json"), &named, offer.origin_in_source, about)?;
-    println!("{} views in {:.3} s, in {}", named.len(), delivered.seconds, args.out.display());
-    Ok(delivered)
+    println!("{} views in {seconds:.3} s, in {}", named.len(), args.out.display());
+    Ok(())
 }
 
-/// Writes the planes of a frame, each as a picture, and returns its camera with their names.
-fn write_frame(folder: &Path, frame: &Frame) -> anyhow::Result<NamedCamera> {
-    let stem = format!("view_{:04}", frame.request.frame);
-    let file_path = format!("{stem}.png");
-    let save = |path: PathBuf, image: image::DynamicImage| {
-        image.save(&path).with_context(|| format!("cannot write {}", path.display()))
-    };
-    let color = pictures::rgb(&frame.view).context("a view is not of its size")?;
-    save(folder.join(&file_path), color.into())?;
-    let mut more = Map::from_iter([("set_index".to_owned(), json!(frame.request.set_index))]);
-    if let Some((image, greatest)) = pictures::inverse_depth_16(&frame.view) {
-        let name = format!("{stem}.depth.png");
-        save(folder.join(&name), image.into())?;
-        more.insert("depth_file_path".to_owned(), json!(name));
-        more.insert("inverse_depth_max_per_m".to_owned(), json!(greatest));
-    }
-    if let Some((image, _)) = pictures::provenance(&frame.view) {
-        let name = format!("{stem}.provenance.png");
-        save(folder.join(&name), image.into())?;
-        more.insert("provenance_file_path".to_owned(), json!(name));
-    }
-    Ok(NamedCamera { file_path, camera: frame.request.camera, more })
-}
-
-/// Asks for the same views drawn directly, and writes how far the delivered ones are from them.
+/// Asks for the same views drawn directly, and writes how far the written ones are from them.
 async fn compare(
     args: &ViewArgs,
     client: &Client,
     request: SessionRequest,
     cameras: &[PinholeCamera],
-    delivered: &Delivered,
 ) -> anyhow::Result<Outcome> {
     let session = open(client, SessionRequest { policy: PolicyChoice::Direct, ..request }).await?;
-    let reference = receive(&session, cameras, |_| ()).await?;
-    let (table, worst_psnr_db) = comparison::table(&reference.frames, &delivered.frames)?;
+    let mut rows = Vec::new();
+    let received = async |frame: Frame| {
+        let (number, written) = (frame.request.frame, args.out.join(file_name(frame.request.frame)));
+        let row = tokio::task::spawn_blocking(move || comparison::row(&frame.view, &written)).await??;
+        rows.push((number as usize, row));
+        Ok(())
+    };
+    receive(&session, cameras, received).await?;
+    let (table, worst_psnr_db) = comparison::table(rows)?;
     println!("\n{}", table.to_text());
     let path = args.out.join("comparison.csv");
     std::fs::write(&path, table.to_csv()?).with_context(|| format!("cannot write {}", path.display()))?;

@@ -10,7 +10,7 @@ use app_core::sizes::{SizePx, grid};
 use clap::Args;
 use cluster::{OfferStatus, PolicyChoice};
 use codec::FrameCodec;
-use depth_image::{Camera, PinholeCamera, ViewCell};
+use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{DVec3, Vec3};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -85,6 +85,12 @@ pub struct ViewArgs {
     /// With --live: exit status 1 if no new frame came for longer
     #[arg(long, value_name = "S", requires = "live")]
     pub(super) longest_gap: Option<f64>,
+}
+
+impl ViewArgs {
+    pub(super) fn planes(&self) -> ViewPlanes {
+        ViewPlanes { inverse_depth: self.depth, provenance: self.provenance }
+    }
 }
 
 fn rate(text: &str) -> Result<f64, String> {
