@@ -62,7 +62,7 @@ pub struct TemporalReference {
     layers: Arc<Layers>,
 }
 
-/// The images of a set that are drawn one after the other; each leaves out the samples that those before it hold.
+/// The images of a set that are drawn one after the other; each omits the samples that those before it hold.
 #[derive(Clone, Copy)]
 pub(crate) struct ImageSequence<'a> {
     pub known: &'a KnownSamples,

@@ -74,7 +74,7 @@ impl Renderer {
         self.images(work, &pinholes, planes, None, [None; 2])
     }
 
-    /// As [`Renderer::draw_depth_images`] for the `wanted` of `cameras`, but each image leaves out the samples that are
+    /// As [`Renderer::draw_depth_images`] for the `wanted` of `cameras`, but each image omits the samples that are
     /// redundant with images before it, and shows what lies behind. Surfaces that its rays passed are in
     /// [`DepthImage::passed`]; a texel with redundant surfaces and nothing behind them is a hole.
     ///

@@ -86,7 +86,8 @@ impl Templates {
         self
     }
 
-    /// Declares numbers of [`wgsl_constants!`](crate::wgsl_constants) in all texts that name them.
+    /// Declares numbers of [`wgsl_constants!`](crate::wgsl_constants) in all texts that name them. A template cannot declare
+    /// a constant of such a name itself.
     #[must_use]
     pub fn declaring(mut self, constants: impl IntoIterator<Item = (&'static str, String)>) -> Self {
         self.declared.extend(constants);

@@ -103,7 +103,7 @@ impl SamplingMethod {
         }
     }
 
-    /// The test by which an image leaves out samples that others hold.
+    /// The test by which an image omits samples that others hold.
     #[must_use]
     pub fn redundancy_test(self) -> Option<RedundancyTest> {
         match self {

@@ -1,4 +1,4 @@
-//! Images that leave out what others hold: against the scalar reference, and what must hold of them.
+//! Images that omit what others hold: against the scalar reference, and what must hold of them.
 
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use glam::{UVec2, Vec3};

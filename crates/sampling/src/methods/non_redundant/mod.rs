@@ -1,4 +1,4 @@
-//! Images that leave out samples of those before them (Xie §3, Algorithm 1), by one of three tests.
+//! Images that omit samples of those before them (Xie §3, Algorithm 1), by one of three tests.
 
 use std::fmt;
 
