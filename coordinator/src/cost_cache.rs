@@ -1,11 +1,11 @@
-//! Measured costs, kept for sessions that ask for the same.
+//! Measured costs, kept for sessions that ask for the same, and predicted for other sizes of views.
 
-use cluster::{MeasureCosts, Measured, Timeline};
-use glam::{Quat, Vec3};
+use cluster::{Costs, MeasureCosts, Measured, Timeline};
+use glam::{Quat, UVec2, Vec3};
 use parking_lot::Mutex;
 
 /// The number of measurements that are kept.
-const CAPACITY: usize = 16;
+const CAPACITY: usize = 64;
 
 /// Costs by device and measurement, the oldest first.
 #[derive(Default)]
@@ -17,13 +17,27 @@ impl CostCache {
         self.0.lock().iter().find(|(of, kept, _)| of == device && *kept == key).map(|(.., measured)| *measured)
     }
 
-    /// Keeps costs; the oldest are evicted.
+    /// Costs from measurements that differ in the view's size alone; `None` without any.
+    pub(crate) fn predict(&self, device: &str, measurement: &MeasureCosts) -> Option<Measured> {
+        let (key, pixels) = (cache_key(measurement), pixels_of(measurement));
+        let kept = self.0.lock();
+        let alike = kept.iter().filter(|(of, kept, _)| of == device && sizeless(kept) == sizeless(&key));
+        let mut sizes: Vec<(f64, Measured)> = alike.map(|(_, kept, measured)| (pixels_of(kept), *measured)).collect();
+        // The nearest first.
+        sizes.sort_by(|(a, _), (b, _)| (a / pixels).ln().abs().total_cmp(&(b / pixels).ln().abs()));
+        let nearest = sizes.first()?;
+        let other = sizes.iter().find(|(other, _)| *other != nearest.0);
+        Some(at_size(*nearest, other.copied(), pixels))
+    }
+
+    /// Keeps costs in place of earlier ones; the oldest are evicted.
     pub(crate) fn insert(&self, device: String, measurement: &MeasureCosts, measured: Measured) {
-        let mut kept = self.0.lock();
+        let (mut kept, key) = (self.0.lock(), cache_key(measurement));
+        kept.retain(|(of, other, _)| *of != device || *other != key);
         if kept.len() >= CAPACITY {
             kept.remove(0);
         }
-        kept.push((device, cache_key(measurement), measured));
+        kept.push((device, key, measured));
     }
 }
 
@@ -33,8 +47,111 @@ fn cache_key(measurement: &MeasureCosts) -> MeasureCosts {
     let mut key = measurement.clone();
     key.workload.timeline = Timeline::still(0.0);
     key.workload.refinement_steps = 1;
+    key.in_background = false;
     for view in &mut key.typical_views {
         (view.eye_in_world, view.world_from_camera) = (Vec3::ZERO, Quat::IDENTITY);
     }
     key
+}
+
+/// The key without what a prediction accounts for: the size and the number of views. Fields of view matter little.
+fn sizeless(key: &MeasureCosts) -> MeasureCosts {
+    let mut key = key.clone();
+    key.typical_views.truncate(1);
+    for view in &mut key.typical_views {
+        *view = view.resized(UVec2::ONE);
+        (view.focal_px, view.principal_px) = Default::default();
+    }
+    key.batch_count = 1;
+    key
+}
+
+fn pixels_of(measurement: &MeasureCosts) -> f64 {
+    measurement.typical_views.first().map_or(1.0, |view| view.pixel_count().max(1) as f64)
+}
+
+/// Costs of views of `pixels`: a part that every view has, and a part for each pixel. Two sizes tell them apart; of one, all
+/// is for its pixels.
+fn at_size((near_px, near): (f64, Measured), other: Option<(f64, Measured)>, pixels: f64) -> Measured {
+    let at = |of: fn(&Costs) -> f64| {
+        let near_s = of(&near.costs);
+        let slope = other.map(|(other_px, other)| (of(&other.costs) - near_s) / (other_px - near_px));
+        // Timings vary: neither part is negative.
+        let a_pixel_s = slope.unwrap_or(f64::INFINITY).clamp(0.0, near_s / near_px);
+        near_s + a_pixel_s * (pixels - near_px)
+    };
+    let costs = Costs {
+        reconstruct_view_s: at(|costs| costs.reconstruct_view_s),
+        direct_view_s: at(|costs| costs.direct_view_s),
+        encode_view_s: at(|costs| costs.encode_view_s),
+        ..near.costs
+    };
+    Measured { costs, ..near }
+}
+
+#[cfg(test)]
+mod tests {
+    use cluster::SamplePlanes;
+    use depth_image::{PinholeCamera, ViewPlanes};
+
+    use super::*;
+    use crate::schedule::workload_for_tests as workload;
+
+    fn measurement(size_px: UVec2) -> MeasureCosts {
+        MeasureCosts {
+            workload: workload(2),
+            method: "joint_carve".to_owned(),
+            codec: "lz4".to_owned(),
+            typical_views: vec![PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, size_px)],
+            batch_count: 32,
+            planes: ViewPlanes::default(),
+            in_background: false,
+        }
+    }
+
+    fn measured(reconstruct_view_s: f64) -> Measured {
+        let costs = Costs { sample_image_s: 3.0, reconstruct_view_s, encode_view_s: 0.001, ..Costs::default() };
+        Measured { costs, planes: SamplePlanes::default() }
+    }
+
+    fn predicted_s(cache: &CostCache, size_px: UVec2) -> Option<f64> {
+        Some(cache.predict("d", &measurement(size_px))?.costs.reconstruct_view_s)
+    }
+
+    #[test]
+    fn one_size_predicts_in_proportion_and_two_find_the_part_that_every_view_has() {
+        let cache = CostCache::default();
+        assert_eq!(predicted_s(&cache, UVec2::new(100, 100)), None);
+        cache.insert("d".to_owned(), &measurement(UVec2::new(100, 100)), measured(0.03));
+        assert!((predicted_s(&cache, UVec2::new(200, 100)).unwrap() - 0.06).abs() < 1e-12);
+        assert!((predicted_s(&cache, UVec2::new(50, 100)).unwrap() - 0.015).abs() < 1e-12);
+        // 0.01 s a view, and 2 µs a pixel.
+        cache.insert("d".to_owned(), &measurement(UVec2::new(300, 100)), measured(0.07));
+        assert!((predicted_s(&cache, UVec2::new(200, 100)).unwrap() - 0.05).abs() < 1e-12);
+        assert!((predicted_s(&cache, UVec2::new(50, 100)).unwrap() - 0.02).abs() < 1e-12);
+        assert_eq!(cache.predict("d", &measurement(UVec2::ONE)).unwrap().costs.sample_image_s, 3.0);
+        assert_eq!(cache.predict("other", &measurement(UVec2::ONE)), None);
+    }
+
+    #[test]
+    fn a_larger_size_that_was_timed_faster_predicts_no_negative_cost() {
+        let cache = CostCache::default();
+        cache.insert("d".to_owned(), &measurement(UVec2::new(100, 100)), measured(0.03));
+        cache.insert("d".to_owned(), &measurement(UVec2::new(200, 100)), measured(0.01));
+        for side in [1, 10, 100, 1000, 4000] {
+            let seconds = predicted_s(&cache, UVec2::splat(side)).unwrap();
+            assert!((0.01..=0.03).contains(&seconds), "{side}: {seconds}");
+        }
+    }
+
+    #[test]
+    fn another_method_or_workload_is_not_predicted() {
+        let cache = CostCache::default();
+        cache.insert("d".to_owned(), &measurement(UVec2::splat(8)), measured(0.03));
+        let wanted = measurement(UVec2::splat(9));
+        assert!(cache.predict("d", &wanted).is_some());
+        let method = MeasureCosts { method: "mesh".to_owned(), ..wanted.clone() };
+        let images = MeasureCosts { workload: workload(3), ..wanted };
+        assert!(cache.predict("d", &method).is_none() && cache.predict("d", &images).is_none());
+    }
 }

@@ -30,7 +30,7 @@ pub(crate) async fn open(shared: Arc<Shared>, session: u64, request: SessionRequ
     };
     match opened {
         Ok(opening) => {
-            send_progress(&events, SessionStage::Planning, "choosing samplers and compositors".to_owned()).await;
+            send_progress(&events, SessionStage::Planning, "choosing samplers and compositors".to_owned());
             shared.step(Event::Opened(Box::new(opening)));
             // A client that left before the schedule had heard of its session.
             if events.is_closed() {
@@ -56,6 +56,7 @@ async fn measured_opening(
         typical_views: vec![request.typical_view],
         batch_count: request.views_per_set.min(MEASURED_BATCH),
         planes: request.planes,
+        in_background: false,
     };
     let Measured { costs, planes } = measured_undisturbed(shared, measurement, events).await?;
     Ok(Opening {
@@ -75,15 +76,20 @@ async fn measured_opening(
     })
 }
 
-/// Costs are measured one session at a time, with nothing else being measured. A measurement that was begun ends, and its
-/// costs are kept, though its client may leave meanwhile.
+/// Costs of a known size, or predicted from one: those are then measured in the background, for the next session. Other costs
+/// are measured one session at a time. A measurement that was begun ends, and its costs are kept, though its client may
+/// leave meanwhile.
 async fn measured_undisturbed(
     shared: &Arc<Shared>,
     measurement: MeasureCosts,
     events: &EventSender,
 ) -> Result<Measured, Status> {
-    if let Some(known) = known(shared, &measurement) {
+    if let Some(known) = known(shared, |device| shared.costs.get(device, &measurement)) {
         return Ok(known);
+    }
+    if let Some(predicted) = known(shared, |device| shared.costs.predict(device, &measurement)) {
+        tokio::spawn(measured_in_background(shared.clone(), measurement));
+        return Ok(predicted);
     }
     let (shared, events) = (shared.clone(), events.clone());
     let measuring = tokio::spawn(async move {
@@ -96,11 +102,21 @@ async fn measured_undisturbed(
     measuring.await.map_err(|error| Status::internal(format!("measuring failed: {error}")))?
 }
 
-/// The slowest device's costs, where all devices' are kept.
-fn known(shared: &Shared, measurement: &MeasureCosts) -> Option<Measured> {
+/// The slowest device's costs, where those of all devices are known.
+fn known(shared: &Shared, of: impl Fn(&str) -> Option<Measured>) -> Option<Measured> {
     let devices: BTreeSet<String> = shared.status().nodes.into_iter().map(|node| node.device_name).collect();
-    let kept: Option<Vec<Measured>> = devices.iter().map(|device| shared.costs.get(device, measurement)).collect();
-    kept?.into_iter().reduce(slowest)
+    let known: Option<Vec<Measured>> = devices.iter().map(|device| of(device)).collect();
+    known?.into_iter().reduce(slowest)
+}
+
+/// Measures what was predicted, one size at a time: the next session of this size finds it.
+async fn measured_in_background(shared: Arc<Shared>, measurement: MeasureCosts) {
+    let _one = shared.measuring_in_background.lock().await;
+    let measurement = MeasureCosts { in_background: true, ..measurement };
+    let (events, _unread) = tokio::sync::mpsc::channel(1);
+    if let Err(status) = measured(&shared, &measurement, &events).await {
+        tracing::debug!(reason = status.message(), "not measured in the background");
+    }
 }
 
 /// A node may be lost while it measures: others of its kind are asked once it has left.
@@ -114,7 +130,7 @@ async fn measured_on_present_nodes(
         match measured(shared, measurement, events).await {
             Err(status) if [Code::Unavailable, Code::Unknown].contains(&status.code()) => {
                 let detail = format!("measuring again: {}", status.message());
-                send_progress(events, SessionStage::Measuring, detail).await;
+                send_progress(events, SessionStage::Measuring, detail);
                 tokio::time::sleep(backoff.next_delay()).await;
             }
             done => return done,
@@ -123,9 +139,9 @@ async fn measured_on_present_nodes(
     measured(shared, measurement, events).await
 }
 
-async fn send_progress(events: &EventSender, stage: SessionStage, detail: String) {
-    // The guard of a client's stream notices that the client has left.
-    let _ = events.send(Ok(SessionEvent::Progress { stage, detail })).await;
+fn send_progress(events: &EventSender, stage: SessionStage, detail: String) {
+    // The guard of a client's stream notices that the client has left. One that does not read misses a line.
+    let _ = events.try_send(Ok(SessionEvent::Progress { stage, detail }));
 }
 
 /// The slowest device's costs: one node of each device measures, one after the other.
@@ -139,7 +155,7 @@ async fn measured(shared: &Shared, measurement: &MeasureCosts, events: &EventSen
             Some(known) => known,
             None => {
                 let detail = format!("{} measures its costs on {device}", node.node_name);
-                send_progress(events, SessionStage::Measuring, detail).await;
+                send_progress(events, SessionStage::Measuring, detail);
                 let call = async {
                     NodeClient::new(shared.connections.to(&node.address).await?)
                         .measure_costs(measurement.clone())

@@ -22,6 +22,8 @@ pub(crate) struct Shared {
     pub(crate) connections: Connections,
     /// Costs are measured one session at a time.
     pub(crate) measuring: tokio::sync::Mutex<()>,
+    /// Predicted costs are measured one size at a time.
+    pub(crate) measuring_in_background: tokio::sync::Mutex<()>,
     pub(crate) costs: CostCache,
     pub(crate) commands: CommandQueue,
     pub(crate) membership: MembershipRegistry,
@@ -41,6 +43,7 @@ impl Shared {
             offers,
             connections: Connections::default(),
             measuring: tokio::sync::Mutex::default(),
+            measuring_in_background: tokio::sync::Mutex::default(),
             costs: CostCache::default(),
             commands: CommandQueue::default(),
             membership: MembershipRegistry::default(),

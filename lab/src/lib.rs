@@ -21,6 +21,7 @@ pub mod reference_views;
 pub mod sampling_study;
 mod scaling;
 mod scene_args;
+mod sharing;
 pub mod statistics;
 mod sweep;
 

@@ -46,6 +46,12 @@ impl Process {
         Self::start("coordinator", &[&fixed, arguments].concat())
     }
 
+    /// Starts a whole cluster in one process on a free port, with further arguments.
+    pub fn up(arguments: &[String]) -> anyhow::Result<Self> {
+        let fixed = ["up", "--listen", "127.0.0.1:0"].map(str::to_owned);
+        Self::start("up", &[&fixed, arguments].concat())
+    }
+
     /// Starts a node on a free port. It prints its address, then that of its metrics.
     pub fn node(number: usize, coordinator: &str, device: DevicePreference) -> anyhow::Result<Self> {
         let (name, device) = (node_name(number), device.to_string());

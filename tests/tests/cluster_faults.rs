@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use client::{ClientError, Session};
-use cluster::{FetchImages, PolicyChoice, RenderViews, RequestedView, SceneHash, Timeline};
+use cluster::{FetchImages, PolicyChoice, RenderViews, RequestedView, Timeline};
 use cluster_tests::cluster::{Cluster, request, rig, views};
 use codec::FrameCodec;
 use depth_image::Camera;

@@ -38,6 +38,8 @@ mod fault_tests;
 mod simulated_cluster;
 #[cfg(test)]
 mod test_support;
+#[cfg(test)]
+pub(crate) use test_support::workload as workload_for_tests;
 
 pub use balance::k_fd;
 pub(crate) use cells::first_indices;

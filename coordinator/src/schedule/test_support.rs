@@ -71,7 +71,7 @@ pub(super) fn join(name: &str, incarnation: u64, plan_epoch: u64) -> Event {
     Event::Joined { incarnation, join: JoinCluster { node, plan_epoch } }
 }
 
-pub(super) fn workload(images: usize) -> Workload {
+pub(crate) fn workload(images: usize) -> Workload {
     let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8));
     Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },

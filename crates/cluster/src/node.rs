@@ -64,6 +64,8 @@ pub struct MeasureCosts {
     pub batch_count: u32,
     /// Planes of the views.
     pub planes: ViewPlanes,
+    /// Nobody waits for it: all other work goes first.
+    pub in_background: bool,
 }
 
 impl MeasureCosts {

@@ -6,6 +6,9 @@ use depth_image::{PinholeCamera, ViewPlanes};
 use crate::check::{InvalidField, at_most, nonempty};
 use crate::limits::{MAX_LIVE_VIEWS_PER_REQUEST, MAX_SAMPLE_CAMERAS, MAX_TILES, MAX_VIEWS_PER_REQUEST};
 
+/// The method of a request whose views are drawn from the scene, whatever the plan.
+pub const DIRECT: &str = "direct";
+
 /// Views of one sample set, all made alike.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RenderViews {

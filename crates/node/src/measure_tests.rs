@@ -148,6 +148,7 @@ pub(crate) fn request(batch_count: u32) -> MeasureCosts {
         typical_views: vec![camera()],
         batch_count,
         planes: ViewPlanes::default(),
+        in_background: false,
     }
 }
 

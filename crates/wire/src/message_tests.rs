@@ -502,6 +502,7 @@ fn typical_views_of_several_sizes_or_none_are_refused() {
         typical_views,
         batch_count: 5,
         planes: ViewPlanes::default(),
+        in_background: true,
     };
     let sent = |measure: MeasureCosts| read::<MeasureCosts, _>(to_message::<proto::MeasureCostsRequest, _>(measure));
     let three = measure(vec![view(8); 3]);

@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 
 use crate::load::command::LoadArgs;
 use crate::scaling::command::ScalingArgs;
+use crate::sharing::command::SharingArgs;
 
 /// Holds measured values against bars and writes a report. A check without its input is not run and does not fall
 /// short.
@@ -49,6 +50,8 @@ pub(super) enum Part {
     Load(LoadArgs),
     /// Measure how the cluster scales with nodes and views, on processes of equal CPU share and in simulation
     Scaling(ScalingArgs),
+    /// Measure a live viewer beside the batches of other clients
+    Sharing(SharingArgs),
 }
 
 impl BenchArgs {

@@ -115,7 +115,7 @@ async fn one(tour: &Tour, clients: &Clients, client: usize) -> anyhow::Result<Ou
     };
     let path = tour.path_of(client, clients.count);
     let settings = Drive { path, rate_hz: clients.rate_hz, lasting: clients.lasting, set_step_s: 1.0, set_count: 1 };
-    let record = drive(&session, &settings).await?;
+    let record = drive(&session, &settings, std::future::pending::<()>()).await?;
     match record.error {
         None => Ok(Outcome::Served(record)),
         Some(error) => refused(error.into()),

@@ -95,6 +95,7 @@ impl Subject {
             typical_views,
             batch_count,
             planes: ViewPlanes::default(),
+            in_background: false,
         }
     }
 }

@@ -95,7 +95,7 @@ async fn follow(args: &ViewArgs, session: &Session, path: Vec<PinholeCamera>) ->
         set_step_s: args.frame_step,
         set_count: args.frames,
     };
-    let record = live::drive(session, &drive).await?;
+    let record = live::drive(session, &drive, std::future::pending::<()>()).await?;
     let file = args.out.join("live.csv");
     std::fs::write(&file, record.frames()?.to_csv()?).with_context(|| format!("cannot write {}", file.display()))?;
     let latencies = live::latencies("From pose to picture", record.shown.iter())?;

@@ -258,6 +258,7 @@ impl Subject {
             typical_views,
             batch_count,
             planes: ViewPlanes::default(),
+            in_background: false,
         };
         Ok(Self { node, work })
     }

@@ -44,11 +44,11 @@ struct Driving<'a> {
     last_frame: u64,
 }
 
-/// Follows the path. An error that ends the frames is in the record.
+/// Follows the path, for its time or until `stop` resolves. An error that ends the frames is in the record.
 ///
 /// # Errors
 /// A pose cannot be sent: the session has ended, or the pose is not valid.
-pub async fn drive(session: &Session, drive: &Drive) -> Result<Record, ClientError> {
+pub async fn drive(session: &Session, drive: &Drive, stop: impl Future) -> Result<Record, ClientError> {
     let mut driving = Driving {
         session,
         fallbacks: BTreeMap::new(),
@@ -58,7 +58,10 @@ pub async fn drive(session: &Session, drive: &Drive) -> Result<Record, ClientErr
         due: 0.0,
         last_frame: 0,
     };
-    driving.follow(drive).await?;
+    tokio::select! {
+        followed = driving.follow(drive) => followed?,
+        _ = stop => (),
+    }
     driving.wait_for_the_last().await;
     driving.record.seconds = driving.start.elapsed().as_secs_f64();
     Ok(driving.record)

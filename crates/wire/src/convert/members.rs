@@ -16,7 +16,7 @@ messages! {
     JoinClusterResponse = Welcome { scenes }, first |w| at_most(w.scenes.len(), MAX_SCENES, "scenes");
     NodeStatus = NodeStatus { node_name, device_name; address: node_address, is_software: is_software_device };
     MeasureCostsRequest = MeasureCosts {
-        workload, typical_views, batch_count; method: reconstruction_method, codec: frame_codec,
+        workload, typical_views, batch_count; method: reconstruction_method, codec: frame_codec, in_background: is_background,
         planes: with_inverse_depth | with_provenance
     }, first |r| at_most(r.typical_views.len(), MAX_BATCH as usize, "typical_views"), then MeasureCosts::validate;
     MeasureCostsResponse = Measured { costs; planes: with_normals | with_corner_inverse_depths };

@@ -1,0 +1,61 @@
+//! The report of the guests: a table and the checks.
+
+use study::{Bar, Cell, Check, Report, Table};
+
+use super::beside::Row;
+
+/// The longest time without a new frame.
+const LONGEST_GAP_S: f64 = 1.0;
+/// The least share of poses that are shown.
+const SHOWN: f64 = 0.9;
+/// The longest time of a batch beside the viewer, over its time alone.
+const BESIDE_OVER_ALONE: f64 = 2.5;
+/// The most that the first view of a new size waits longer than that of a known one.
+const NEW_SIZE_S: f64 = 0.3;
+
+/// All that was measured.
+pub(super) struct Measured {
+    /// Guests by name; `None` where one could not be measured.
+    pub(super) rows: Vec<(&'static str, Option<Row>)>,
+    /// Seconds until the first view of a known size, and of a new one.
+    pub(super) new_size_s: [f64; 2],
+}
+
+/// Adds the table and the checks.
+pub(super) fn add(measured: &Measured, report: &mut Report) -> anyhow::Result<()> {
+    let columns =
+        [("beside the viewer", ""), ("longest gap", "s"), ("poses shown", "%"), ("beside", "s"), ("alone", "s")];
+    let mut table = Table::new("A viewer beside other clients", &columns);
+    for (name, row) in &measured.rows {
+        let numbers = row.map_or([f64::NAN; 4], |row| {
+            [row.watched.longest_gap_s, row.watched.shown_share * 100.0, row.beside_s, row.alone_s]
+        });
+        table.push([Cell::from(*name)].into_iter().chain(numbers.map(Cell::from)))?;
+        report.checks.extend(checks(name, *row));
+    }
+    report.tables.push(table);
+    let [known_s, new_s] = measured.new_size_s;
+    let mut sizes = Table::new("The first view of a session", &[("size", ""), ("time", "s")]);
+    sizes.push([Cell::from("known"), known_s.into()])?;
+    sizes.push([Cell::from("new"), new_s.into()])?;
+    report.tables.push(sizes);
+    report.checks.push(Check::new(
+        "first view of a new size, more than of a known one",
+        new_s - known_s,
+        "s",
+        Bar::AtMost(NEW_SIZE_S),
+    ));
+    Ok(())
+}
+
+/// A guest that could not be measured falls short of every bar.
+fn checks(name: &str, row: Option<Row>) -> [Check; 3] {
+    let of = |figure: fn(&Row) -> f64, worst: f64| row.as_ref().map_or(worst, figure);
+    let [gap, shown, ratio] =
+        [": longest gap", ": poses shown", ": beside over alone"].map(|what| format!("{name}{what}"));
+    [
+        Check::new(gap, of(|row| row.watched.longest_gap_s, f64::INFINITY), "s", Bar::AtMost(LONGEST_GAP_S)),
+        Check::new(shown, of(|row| row.watched.shown_share * 100.0, 0.0), "%", Bar::AtLeast(SHOWN * 100.0)),
+        Check::new(ratio, of(|row| row.beside_s / row.alone_s, f64::INFINITY), "", Bar::AtMost(BESIDE_OVER_ALONE)),
+    ]
+}
