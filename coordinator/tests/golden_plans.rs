@@ -136,7 +136,6 @@ impl Script {
                 Command::Refuse { session, .. } => {
                     writeln!(self.text, "{at_s:.1} s, session {session} is refused").unwrap();
                 }
-                Command::End { session, .. } => writeln!(self.text, "{at_s:.1} s, session {session} ends").unwrap(),
                 Command::Probe(_) => (),
                 Command::Quarantine { .. } | Command::Readmit { .. } => panic!("no node is at fault"),
             }
@@ -144,7 +143,7 @@ impl Script {
     }
 
     fn plan(&self) -> Option<Assignment> {
-        self.scheduler.status().plan.map(|plan| plan.assignment)
+        self.scheduler.status().workloads.first()?.plan.clone().map(|plan| plan.assignment)
     }
 
     /// All nodes take the plan in force at once.

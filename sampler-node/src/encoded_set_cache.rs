@@ -103,6 +103,7 @@ mod tests {
         };
         let plan = Assignment {
             plan_epoch: 1,
+            workload_number: 1,
             policy: Policy::Pipeline,
             workload,
             samplers: Vec::new(),

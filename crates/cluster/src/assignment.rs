@@ -32,11 +32,13 @@ pub struct CompositorShare {
     pub view_weight: u32,
 }
 
-/// One plan for the whole cluster. Every node gets the same and finds its own roles in it: one, both or none.
+/// One plan of one workload. Every node gets the same and finds its own roles in it: one, both or none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assignment {
     /// Fences: a node refuses a lower one than it has.
     pub plan_epoch: u64,
+    /// The workload that the plan is of: several are served side by side. No two have had the same number.
+    pub workload_number: u64,
     /// How views come about.
     pub policy: Policy,
     /// The images to sample, when and how.

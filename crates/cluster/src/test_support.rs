@@ -35,6 +35,7 @@ pub(crate) fn workload() -> Workload {
 pub(crate) fn assignment() -> Assignment {
     Assignment {
         plan_epoch: 4,
+        workload_number: 1,
         policy: Policy::Pipeline,
         workload: workload(),
         samplers: vec![SamplerShare {

@@ -164,6 +164,7 @@ mod tests {
         };
         Assignment {
             plan_epoch,
+            workload_number: 1,
             policy: Policy::Direct,
             workload,
             samplers: Vec::new(),

@@ -27,7 +27,7 @@ messages! {
         at_most(w.sample_cameras.len(), MAX_SAMPLE_CAMERAS * cells, "sample_cameras")
     }, then Workload::validate;
     Assignment = Assignment {
-        plan_epoch, policy, workload as "assignment.workload", samplers, compositors, tile_count;
+        plan_epoch, workload_number, policy, workload as "assignment.workload", samplers, compositors, tile_count;
         relay_fanout: relay_fanout_count
     }, first |a| {
         a.tile_count = a.tile_count.max(1);
