@@ -149,7 +149,7 @@ async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes, me
         times.encode_s = encode_s;
         metrics.done.add(Operation::EncodeView, 1.0, encode_s);
         metrics.frame_bytes.inc_by(encoded.data.len() as u64);
-        let header = encoded.header(key.sample_set_id, requested.camera, times);
+        let header = encoded.header((key.sample_set_id, key.cell, false), requested.camera, times);
         Output { frame: requested.frame, header, data: encoded.data, arrived, credit }
     });
     reply.send(output);

@@ -8,8 +8,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use cluster::{
-    Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, Quality, SceneHash, SceneRef, TileCosts, Timeline,
-    Workload,
+    Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, Quality, SamplePlanes, SceneHash, SceneRef, TileCosts,
+    Timeline, Workload,
 };
 use coordinator::schedule::{Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
@@ -46,8 +46,7 @@ fn workload(images: usize, timeline: Timeline) -> Workload {
         cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
-        method: "joint_carve".to_owned(),
-        codec: "lz4".to_owned(),
+        planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::ZERO,
         timeline,
@@ -66,6 +65,7 @@ fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) -> Opening 
     Opening {
         session,
         workload: workload(4, Timeline::still(0.0)),
+        method: "joint_carve".to_owned(),
         views_per_set,
         frames_per_s: None,
         policy_override: PolicyOverride { policy, ..PolicyOverride::default() },

@@ -75,7 +75,7 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::time::Duration;
 
-    use cluster::{Assignment, Policy, SceneHash, SceneRef, Timeline, Workload};
+    use cluster::{Assignment, Policy, SamplePlanes, SceneHash, SceneRef, Timeline, Workload};
     use codec::{PlaneSet, encode_depth_image};
     use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera};
     use glam::{UVec2, Vec3};
@@ -93,8 +93,7 @@ mod tests {
             cell_first_indices: Vec::new(),
             sampling: "conventional".to_owned(),
             lighting: "unlit".to_owned(),
-            method: "joint_carve".to_owned(),
-            codec: "lz4".to_owned(),
+            planes: SamplePlanes::default(),
             volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
             background_linear: Vec3::ZERO,
             timeline: Timeline { start_s: 0.0, step_s: 1.0, set_count: 9 },

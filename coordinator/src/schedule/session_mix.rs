@@ -14,6 +14,7 @@ struct Session {
     policy_override: PolicyOverride,
     fallbacks: Vec<Quality>,
     viewpoints: Vec<PinholeCamera>,
+    method: String,
     /// As measured for its own views.
     costs: Costs,
 }
@@ -38,6 +39,7 @@ impl SessionMix {
             policy_override: opening.policy_override,
             fallbacks: opening.fallbacks.clone(),
             viewpoints: opening.viewpoints.clone(),
+            method: opening.method.clone(),
             costs: opening.costs,
         });
     }
@@ -112,6 +114,12 @@ impl SessionMix {
     /// Whether every session states this.
     pub(super) fn all_force(&self, policy_override: PolicyOverride) -> bool {
         self.0.iter().all(|session| session.policy_override == policy_override)
+    }
+
+    /// The method by which most sessions have their views reconstructed; of several, the first.
+    pub(super) fn usual_method(&self) -> Option<&str> {
+        let count = |of: &Session| self.0.iter().filter(|session| session.method == of.method).count();
+        self.0.iter().rev().max_by_key(|session| count(session)).map(|session| session.method.as_str())
     }
 
     /// The qualities that every session with a rate falls back to, in the same order.

@@ -91,9 +91,15 @@ impl WorkloadState {
     /// Whether a session asks for this workload.
     pub(super) fn is_shared_by(&self, opening: &Opening) -> bool {
         match &self.cells {
-            Some(cells) => !opening.viewpoints.is_empty() && cells.are_shareable(&self.requested, &opening.workload),
-            None => opening.viewpoints.is_empty() && self.requested == opening.workload,
+            Some(cells) => !opening.viewpoints.is_empty() && cells.are_shareable(&self.requested, &self.with_planes(&opening.workload)),
+            None => opening.viewpoints.is_empty() && self.requested == self.with_planes(&opening.workload),
         }
+    }
+
+    /// A workload whose images need no more planes than these is as good with these.
+    fn with_planes(&self, other: &Workload) -> Workload {
+        let own = self.requested.planes;
+        Workload { planes: if own.contain(other.planes) { own } else { other.planes }, ..other.clone() }
     }
 
     fn update_cells(&mut self) {
@@ -214,6 +220,12 @@ impl WorkloadState {
         self.quality().map_or(1.0, |quality| quality.frame_rate_ratio)
     }
 
+    /// How views are reconstructed: under a fallback as it says, else as most sessions ask.
+    pub(super) fn method(&self) -> String {
+        let usual = || self.sessions.usual_method().unwrap_or_default();
+        self.quality().map_or_else(usual, |quality| &quality.method).to_owned()
+    }
+
     /// The workload at the present fallback.
     pub(super) fn degraded(&self) -> Workload {
         let Some(quality) = self.quality() else { return self.requested.clone() };
@@ -223,7 +235,6 @@ impl WorkloadState {
         };
         Workload {
             lighting: quality.lighting.clone(),
-            method: quality.method.clone(),
             sample_cameras: self.requested.sample_cameras.iter().map(sized).collect(),
             ..self.requested.clone()
         }

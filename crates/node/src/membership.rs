@@ -126,20 +126,20 @@ async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plan: &Current
     for served in client.get_status(()).await?.workloads.into_iter().filter_map(|workload| workload.plan) {
         scenes.ensure(&served.assignment.workload.scene).await?;
         let engine = scenes.engine.clone();
-        blocking(move || warm(engine.as_ref(), &served.assignment)).await?;
+        blocking(move || warm(engine.as_ref(), &served.assignment, served.method)).await?;
     }
     Ok(())
 }
 
-/// Makes one small picture of each kind that the plan has.
-fn warm(engine: &dyn Engine, plan: &Assignment) -> Result<(), EngineError> {
+/// Makes one small picture of each kind that the plan has, its views by `method`.
+fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), EngineError> {
     let workload = small(&plan.workload.of_cell(0).unwrap_or_else(|| plan.workload.clone()));
     let Some(Camera::Pinhole(view)) = workload.sample_cameras.first().copied() else { return Ok(()) };
     if plan.policy == Policy::Direct {
         return engine.draw_direct(&DirectWork::of(&workload, vec![view], ViewPlanes::default())).map(drop);
     }
     let set = engine.upload(&SampleSet::of(&workload, engine.sample(&SampleWork::of(&workload))?))?;
-    let work = ViewWork { cameras: vec![view], method: workload.method.clone(), planes: ViewPlanes::default() };
+    let work = ViewWork { cameras: vec![view], method, planes: ViewPlanes::default() };
     engine.reconstruct(set.as_ref(), &work).map(drop)
 }
 
@@ -172,7 +172,7 @@ mod tests {
     fn a_warm_up_makes_one_picture_of_each_kind_in_the_plan() {
         for (policy, sampled, drawn) in [(Policy::Direct, 0, 1), (Policy::Pipeline, 1, 0), (Policy::TimeShare, 1, 0)] {
             let engine = Sleeper::default();
-            warm(&engine, &plan(policy)).unwrap();
+            warm(&engine, &plan(policy), "joint_carve".to_owned()).unwrap();
             let calls = engine.calls.into_inner().unwrap();
             assert_eq!(
                 (calls.refinements.len(), calls.uploads.len(), calls.drawn_views.len()),

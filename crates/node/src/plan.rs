@@ -141,7 +141,7 @@ pub fn beyond_timeline(set_index: u32) -> Status {
 
 #[cfg(test)]
 mod tests {
-    use cluster::{Policy, SceneHash, SceneRef, Timeline, Workload};
+    use cluster::{Policy, SamplePlanes, SceneHash, SceneRef, Timeline, Workload};
     use depth_image::{Aabb, Illumination};
     use glam::Vec3;
 
@@ -154,8 +154,7 @@ mod tests {
             cell_first_indices: Vec::new(),
             sampling: "conventional".to_owned(),
             lighting: lighting.to_owned(),
-            method: "joint_carve".to_owned(),
-            codec: "lz4".to_owned(),
+            planes: SamplePlanes::default(),
             volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
             background_linear: Vec3::ZERO,
             timeline: Timeline::still(0.0),

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use cluster::{Assignment, Costs, MeasureCosts, Ready};
+use cluster::{Assignment, MeasureCosts, Measured, Ready};
 use parking_lot::Mutex;
 use tonic::{Status, async_trait};
 use wire::rpc;
@@ -25,7 +25,7 @@ pub struct NodeService {
     scenes: Arc<Scenes>,
     metrics: NodeMetrics,
     /// Measured costs, the oldest first: a coordinator that was restarted need not wait for them again.
-    measured: Mutex<VecDeque<(MeasureCosts, Costs)>>,
+    measured: Mutex<VecDeque<(MeasureCosts, Measured)>>,
 }
 
 impl NodeService {
@@ -38,20 +38,20 @@ impl NodeService {
 
 #[async_trait]
 impl rpc::Node for NodeService {
-    async fn measure_costs(&self, request: MeasureCosts) -> Result<Costs, Status> {
-        let known = self.measured.lock().iter().find(|(known, _)| *known == request).map(|(_, costs)| *costs);
-        if let Some(costs) = known {
-            return Ok(costs);
+    async fn measure_costs(&self, request: MeasureCosts) -> Result<Measured, Status> {
+        let known = self.measured.lock().iter().find(|(known, _)| *known == request).map(|(_, measured)| *measured);
+        if let Some(measured) = known {
+            return Ok(measured);
         }
         self.scenes.ensure(&request.workload.scene).await?;
-        let (engine, measured) = (self.engine.clone(), request.clone());
-        let costs = blocking(move || measure_costs(engine.as_ref(), &measured)).await?;
-        let mut measured = self.measured.lock();
-        measured.push_back((request, costs));
-        while measured.len() > MAX_MEASURED {
-            measured.pop_front();
+        let (engine, measurement) = (self.engine.clone(), request.clone());
+        let measured = blocking(move || measure_costs(engine.as_ref(), &measurement)).await?;
+        let mut cached = self.measured.lock();
+        cached.push_back((request, measured));
+        while cached.len() > MAX_MEASURED {
+            cached.pop_front();
         }
-        Ok(costs)
+        Ok(measured)
     }
 
     async fn apply_assignment(&self, assignment: Assignment) -> Result<Ready, Status> {

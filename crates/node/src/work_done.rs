@@ -73,6 +73,7 @@ impl WorkDone {
         (sums != Sums::default()).then(|| WorkReport {
             node_name: node_name.to_owned(),
             plan_epoch,
+            workload_number: 0,
             costs: sums.costs(),
             busy_s: sums.busy_s,
             views: sums.views,

@@ -65,6 +65,7 @@ impl Raw {
         let parts = client.render_views(ReceiverStream::new(requests)).await?;
         let template = RenderViews {
             plan_epoch,
+            workload_number: 1,
             set_index: 0,
             method: "splat".to_owned(),
             codec: FrameCodec::Lz4,
@@ -114,6 +115,7 @@ pub fn greedy(session: &Session, side_px: u32, count: u64) -> RenderViews {
     let view = |frame| RequestedView { frame, camera: camera(frame as f32 * 1e-4, UVec2::splat(side_px)) };
     RenderViews {
         plan_epoch: session.plan().assignment.plan_epoch,
+        workload_number: session.plan().assignment.workload_number,
         set_index: 0,
         method: "splat".to_owned(),
         codec: FrameCodec::Lz4,

@@ -17,7 +17,7 @@ impl Scheduler {
         ClusterStatus {
             plan_epoch: self.plan_epoch,
             nodes: self.members.values().map(|member| member.status.clone()).collect(),
-            offer: None,
+            offers: Vec::new(),
             workloads: self.workloads.iter().map(|(&number, workload)| self.workload_status(number, workload)).collect(),
         }
     }

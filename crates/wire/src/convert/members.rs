@@ -2,8 +2,8 @@
 
 use cluster::limits::{MAX_BATCH, MAX_SCENES, MAX_WORKLOADS};
 use cluster::{
-    AchievedTime, ClusterStatus, JoinCluster, MeasureCosts, NodeCondition, NodeStatus, Ready, SamplerReport, Welcome,
-    WorkReport, WorkloadStatus, at_most,
+    AchievedTime, ClusterStatus, JoinCluster, MeasureCosts, Measured, NodeCondition, NodeStatus, Ready, SamplerReport,
+    Welcome, WorkReport, WorkloadStatus, at_most,
 };
 
 use crate::error::{PROTOCOL_VERSION, check_version};
@@ -16,11 +16,13 @@ messages! {
     JoinClusterResponse = Welcome { scenes }, first |w| at_most(w.scenes.len(), MAX_SCENES, "scenes");
     NodeStatus = NodeStatus { node_name, device_name; address: node_address, is_software: is_software_device };
     MeasureCostsRequest = MeasureCosts {
-        workload, typical_views, batch_count; planes: with_inverse_depth | with_provenance
+        workload, typical_views, batch_count; method: reconstruction_method, codec: frame_codec,
+        planes: with_inverse_depth | with_provenance
     }, first |r| at_most(r.typical_views.len(), MAX_BATCH as usize, "typical_views"), then MeasureCosts::validate;
+    MeasureCostsResponse = Measured { costs; planes: with_normals | with_corner_inverse_depths };
     ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then Ready::validate;
     ReportWorkRequest = WorkReport {
-        node_name, plan_epoch, busy_s;
+        node_name, plan_epoch, workload_number, busy_s;
         costs: sample_image_s | direct_view_s | reconstruct_view_s | load_set_s | encode_view_s | transfer_bytes_per_s
             | image_bytes,
         views: view_count, dropped_views: dropped_view_count
@@ -32,8 +34,11 @@ messages! {
         node_name, is_ready, costs, busy_ratio; views: view_count, dropped_views: dropped_view_count
     };
     GetStatusResponse = ClusterStatus {
-        plan_epoch, nodes, offer, workloads
-    }, first |s| at_most(s.workloads.len(), MAX_WORKLOADS, "workloads"), then ClusterStatus::validate;
+        plan_epoch, nodes, offers, workloads
+    }, first |s| {
+        at_most(s.offers.len(), MAX_SCENES, "offers")?;
+        at_most(s.workloads.len(), MAX_WORKLOADS, "workloads")
+    }, then ClusterStatus::validate;
     WorkloadStatus = WorkloadStatus {
         plan, session_count, viewer_count, conditions;
         number: workload_number, views_per_set: views_per_set_count, achieved: achieved_times,
