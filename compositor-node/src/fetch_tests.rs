@@ -97,8 +97,8 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
     };
     let share = SamplerShare { node_name: "n7".to_owned(), address, image_indices: vec![0, 1] };
     let plan = Arc::new(cluster::Assignment {
-        workload_number: 1,
         plan_epoch: 5,
+        workload_number: 1,
         policy: Policy::Pipeline,
         workload,
         samplers: vec![share],

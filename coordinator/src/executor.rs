@@ -29,10 +29,13 @@ pub(crate) async fn execute(shared: Arc<Shared>) {
             Command::Probe(asked) => {
                 tokio::spawn(probe(shared.clone(), *asked));
             }
-            Command::Quarantine { node_name, reason } => tracing::warn!(node = node_name, reason, "quarantined"),
-            Command::Readmit { node_name } => tracing::info!(node = node_name, "readmitted"),
+            Command::Quarantine { node_name, workload_number, reason } => {
+                tracing::warn!(node = node_name, workload_number, reason, "quarantined");
+            }
+            Command::Readmit { node_name, workload_number } => {
+                tracing::info!(node = node_name, workload_number, "readmitted");
+            }
             Command::Refuse { session, error } => shared.sessions.refuse(session, refusal(&error)),
-            Command::End { session, reason } => shared.sessions.end(session, reason),
         }
     }
 }

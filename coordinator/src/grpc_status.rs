@@ -10,12 +10,14 @@ use crate::schedule::ChoiceError;
 /// The status of a demand that cannot be planned.
 pub(crate) fn refusal(error: &ChoiceError) -> Status {
     match error {
-        ChoiceError::Overload { .. } => Status::resource_exhausted(error.to_string()),
+        ChoiceError::Overload { .. } | ChoiceError::Workloads { .. } => Status::resource_exhausted(error.to_string()),
         ChoiceError::Rejected { .. }
         | ChoiceError::ForcedTiles { .. }
         | ChoiceError::Cells { .. }
         | ChoiceError::NoCells { .. } => Status::invalid_argument(error.to_string()),
-        ChoiceError::NoNodes | ChoiceError::ForcedSamplers { .. } => Status::failed_precondition(error.to_string()),
+        ChoiceError::NoNodes | ChoiceError::ForcedSamplers { .. } | ChoiceError::Override { .. } => {
+            Status::failed_precondition(error.to_string())
+        }
     }
 }
 

@@ -13,6 +13,7 @@ use crate::schedule::{Command, Event, Recorder};
 #[derive(Debug, Clone)]
 pub struct CoordinatorMetrics {
     nodes: Gauge,
+    workloads: Gauge,
     samplers: Gauge,
     sessions: Gauge,
     views_per_set: Gauge,
@@ -32,10 +33,11 @@ impl CoordinatorMetrics {
         };
         let metrics = Self {
             nodes: gauge("cluster_nodes", "P: nodes that have joined"),
-            samplers: gauge("cluster_samplers", "K: nodes that sample"),
-            sessions: gauge("cluster_sessions", "Sessions of the plan"),
-            views_per_set: gauge("cluster_views_per_set", "V: views of a sample set"),
-            plan_epoch: gauge("cluster_plan_epoch", "The plan in force"),
+            workloads: gauge("cluster_workloads", "Workloads that are open"),
+            samplers: gauge("cluster_samplers", "K: nodes that sample, of all workloads"),
+            sessions: gauge("cluster_sessions", "Sessions of all workloads"),
+            views_per_set: gauge("cluster_views_per_set", "V: views of a sample set, of all workloads"),
+            plan_epoch: gauge("cluster_plan_epoch", "The last plan"),
             plans: Counter::default(),
         };
         registry.register("cluster_plans", "Plans made", metrics.plans.clone());
@@ -47,9 +49,10 @@ impl CoordinatorMetrics {
         self.plans.inc_by(plans as u64);
         let number = |count: u64| i64::try_from(count).unwrap_or(i64::MAX);
         self.nodes.set(number(status.nodes.len() as u64));
-        self.samplers.set(number(status.plan.as_ref().map_or(0, |plan| plan.assignment.samplers.len() as u64)));
-        self.sessions.set(number(status.session_count.into()));
-        self.views_per_set.set(number(status.views_per_set));
+        self.workloads.set(number(status.workloads.len() as u64));
+        self.samplers.set(number(status.sampler_count() as u64));
+        self.sessions.set(number(status.session_count()));
+        self.views_per_set.set(number(status.views_per_set()));
         self.plan_epoch.set(number(status.plan_epoch));
     }
 }

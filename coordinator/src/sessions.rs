@@ -43,14 +43,6 @@ impl SessionRegistry {
         }
     }
 
-    /// Ends a session whose plan no longer holds.
-    pub(crate) fn end(&self, session: u64, reason: String) {
-        tracing::warn!(session, reason, "session ended");
-        if let Some(events) = self.0.lock().remove(&session) {
-            let _ = events.try_send(Ok(SessionEvent::Ended { reason }));
-        }
-    }
-
     /// Sends an event. `false` where the client does not read its events: the session is removed.
     pub(crate) fn send(&self, session: u64, event: SessionEvent) -> bool {
         let mut sessions = self.0.lock();

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use cluster::{
-    Costs, JoinCluster, NodeStatus, PolicyChoice, Quality, SamplePlanes, SceneHash, SceneRef, SessionPlan, TileCosts,
+    Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, Quality, SamplePlanes, SceneHash, SceneRef, TileCosts,
     Timeline, Workload,
 };
 use coordinator::schedule::{Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
@@ -128,7 +128,7 @@ impl Script {
             let at_s = self.now.as_secs_f64();
             match command {
                 Command::Apply { sessions, plan, .. } => {
-                    let plan_text = described(&plan);
+                    let plan_text = described(&plan.assignment);
                     let fallback = plan.fallback.map_or(0, NonZeroU32::get);
                     writeln!(self.text, "{at_s:.1} s, sessions {sessions:?}, fallback {fallback}: {plan_text}")
                         .unwrap();
@@ -136,7 +136,6 @@ impl Script {
                 Command::Refuse { session, .. } => {
                     writeln!(self.text, "{at_s:.1} s, session {session} is refused").unwrap();
                 }
-                Command::End { session, .. } => writeln!(self.text, "{at_s:.1} s, session {session} ends").unwrap(),
                 Command::Probe(_) => (),
                 Command::Quarantine { .. } | Command::Readmit { .. } => panic!("no node is at fault"),
             }
@@ -144,7 +143,7 @@ impl Script {
     }
 
     fn plan(&self) -> Option<Assignment> {
-        self.scheduler.status().plan.map(|plan| plan.assignment)
+        self.scheduler.status().workloads.first()?.plan.clone().map(|plan| plan.assignment)
     }
 
     /// All nodes take the plan in force at once.
@@ -190,9 +189,9 @@ fn timings(costs: &Costs, times: f64) -> MeasuredCosts {
 }
 
 /// One line: policy, K, tiles, the relays' fan-out, the workload's size, and each node's roles.
-fn described(SessionPlan { assignment: plan, method, .. }: &SessionPlan) -> String {
+fn described(plan: &Assignment) -> String {
     let mut text = format!(
-        "plan {} {} K={} tiles={} relays={} images={} cells={} {} {}",
+        "plan {} {} K={} tiles={} relays={} images={} cells={} {}",
         plan.plan_epoch,
         plan.policy,
         plan.samplers.len(),
@@ -200,7 +199,6 @@ fn described(SessionPlan { assignment: plan, method, .. }: &SessionPlan) -> Stri
         plan.relay_fanout.map_or(0, |fanout| fanout.get()),
         plan.workload.sample_cameras.len(),
         plan.workload.cell_count(),
-        method,
         plan.workload.lighting,
     );
     for share in &plan.samplers {
@@ -255,16 +253,19 @@ fn tiles() -> String {
         }
     }
     for tiles in [1, 2, 4, 16] {
-        let mut script = Script::new(&format!("{tiles} tiles are forced"), 6);
-        let pipeline = forced(None, Some(tiles));
-        let auto = PolicyOverride { policy: PolicyChoice::Auto, ..pipeline };
-        script.step(opened(Opening { policy_override: pipeline, ..opening(1, PolicyChoice::Pipeline, 10) }));
-        let tileable = Opening { costs: TILEABLE, ..opening(2, PolicyChoice::Auto, 10) };
-        script.step(opened(Opening { policy_override: auto, ..tileable.clone() }));
-        let other = workload(3, Timeline::still(0.0));
-        script.step(opened(Opening { session: 3, policy_override: pipeline, workload: other, ..tileable }));
-        script.wait(20);
-        text += &script.text;
+        for policy in [PolicyChoice::Pipeline, PolicyChoice::Auto] {
+            for images in [3, 4] {
+                let mut script = Script::new(&format!("{tiles} tiles of {images} images are forced, {policy}"), 6);
+                let policy_override = PolicyOverride { policy, ..forced(None, Some(tiles)) };
+                let workload = workload(images, Timeline::still(0.0));
+                let whole = Opening { policy_override, workload, ..opening(1, policy, 10) };
+                script.step(opened(whole.clone()));
+                script.step(Event::Closed { session: 1 });
+                script.step(opened(Opening { session: 2, costs: TILEABLE, ..whole }));
+                script.wait(20);
+                text += &script.text;
+            }
+        }
     }
     text
 }
@@ -310,9 +311,10 @@ fn overload_of_a_static_scene() -> String {
     let rated = |session, rate, fallbacks| {
         opened(Opening { frames_per_s: frame_rate(rate), fallbacks, ..opening(session, PolicyChoice::Auto, 1) })
     };
-    script.step(rated(1, 150.0, Vec::new()));
+    let fallbacks = vec![quality("joint_carve:1", 1.0), quality("joint_carve:2", 0.8)];
+    script.step(rated(1, 150.0, fallbacks.clone()));
     script.step(rated(2, 100.0, Vec::new()));
-    script.step(rated(3, 30.0, vec![quality("joint_carve:1", 1.0), quality("joint_carve:2", 0.8)]));
+    script.step(rated(3, 30.0, fallbacks));
     script.report(0..2, timings(&WHOLE, 1.25), 60);
     script.step(demanded(1, 1, frame_rate(10.0)));
     script.wait(120);
@@ -321,19 +323,21 @@ fn overload_of_a_static_scene() -> String {
     script.text
 }
 
-fn the_last_session_decides() -> String {
-    let mut script = Script::new("the last session decides, another workload takes over", 5);
+fn one_session_after_the_other() -> String {
+    let mut script = Script::new("one session after the other, each with another policy", 5);
     for (session, policy) in (1..).zip(POLICIES) {
         script.step(opened(opening(session, policy, 40)));
         script.wait(7);
+        script.step(Event::Closed { session });
     }
-    script.step(Event::Closed { session: 4 });
-    script.step(Event::Closed { session: 2 });
     script.step(opened(Opening { workload: workload(3, MOVING), ..opening(5, PolicyChoice::Pipeline, 5) }));
+    script.wait(30);
+    script.step(Event::Closed { session: 5 });
     script.step(opened(opening(6, PolicyChoice::Auto, 400)));
+    script.step(opened(opening(7, PolicyChoice::Auto, 2)));
     script.wait(30);
     script.step(Event::Closed { session: 6 });
-    script.step(opened(opening(7, PolicyChoice::Auto, 2)));
+    script.wait(30);
     script.text
 }
 
@@ -394,7 +398,7 @@ fn view_cells() -> String {
     script.step(from(4, (0..30).map(|i| view(0.2 * i as f32)).collect()));
     script.step(demanded(4, 2000, frame_rate(0.0)));
     script.wait(30);
-    for session in [4, 1, 2] {
+    for session in [4, 1, 2, 3] {
         script.step(Event::Closed { session });
     }
     script.step(opened(opening(5, PolicyChoice::Pipeline, 40)));
@@ -442,6 +446,10 @@ impl Random {
 
 fn random_events(seed: u64) -> String {
     let (mut script, mut random) = (Script::new(&format!("random events of seed {seed}"), 3), Random(seed));
+    // Sessions of one workload, which all ask for the same.
+    let policy = POLICIES[random.below(4) as usize];
+    let images = if random.below(3) == 0 { 6 } else { 4 };
+    let costs = if random.below(3) == 0 { TILEABLE } else { WHOLE };
     let mut present: Vec<u64> = (0..3).collect();
     let mut sessions: Vec<u64> = Vec::new();
     for number in 3..150 {
@@ -455,13 +463,9 @@ fn random_events(seed: u64) -> String {
                 script.leave(node);
             }
             2..4 if sessions.len() < 4 => {
-                let policy = POLICIES[random.below(4) as usize];
-                let images = if random.below(6) == 0 { 6 } else { 4 };
-                let asked = Opening {
-                    workload: workload(images, Timeline::still(0.0)),
-                    costs: if random.below(3) == 0 { TILEABLE } else { WHOLE },
-                    ..opening(number, policy, 1 + random.below(500) as usize)
-                };
+                let workload = workload(images, Timeline::still(0.0));
+                let views = 1 + random.below(500) as usize;
+                let asked = Opening { workload, costs, ..opening(number, policy, views) };
                 script.step(opened(asked));
                 sessions.push(number);
             }
@@ -493,7 +497,7 @@ fn plans_without_faults_are_those_of_the_golden_file() {
         sequential_images(),
         animated(),
         overload_of_a_static_scene(),
-        the_last_session_decides(),
+        one_session_after_the_other(),
         nodes_of_different_speed(),
         one_slow_sampler(),
         nodes_come_and_go(),

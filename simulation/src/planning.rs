@@ -84,7 +84,6 @@ impl Coordinator {
             match command {
                 Command::Apply { plan, .. } => self.apply(*plan),
                 Command::Refuse { error, .. } => self.refused = Some(error),
-                Command::End { .. } => self.plan = None,
                 Command::Probe(_) | Command::Quarantine { .. } | Command::Readmit { .. } => (),
             }
         }

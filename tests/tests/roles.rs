@@ -173,18 +173,19 @@ async fn sessions_change_their_demand_and_nodes_report_their_work() {
     let session = cluster.session(pipeline()).await.unwrap();
     session.change(500, None).await.unwrap();
     let status = cluster.client.status().await.unwrap();
-    assert_eq!(status.views_per_set, 500);
+    assert_eq!(status.views_per_set(), 500);
     session.change(12, None).await.unwrap();
     let (start, mut made) = (Instant::now(), 0);
     loop {
         made += session.render_views(views(3, 12)).unwrap().all().await.unwrap().len() as u64;
         let status = cluster.client.status().await.unwrap();
-        let reported: u64 = status.conditions.iter().map(|condition| condition.views).sum();
+        let [workload] = &status.workloads[..] else { panic!("{status:?}") };
+        let reported: u64 = workload.conditions.iter().map(|condition| condition.views).sum();
         assert!(reported <= made, "{reported} of {made}");
-        if let Some(achieved) = status.achieved.first().filter(|_| reported > 0) {
+        if let Some(achieved) = workload.achieved.first().filter(|_| reported > 0) {
             assert_eq!(achieved.policy, Policy::Pipeline);
             assert!(achieved.busy_s > 0.0 && achieved.busy_s < 10.0, "{achieved:?}");
-            assert!(status.conditions.iter().any(|condition| condition.busy_ratio > 0.0));
+            assert!(workload.conditions.iter().any(|condition| condition.busy_ratio > 0.0));
             break;
         }
         assert!(start.elapsed() < Duration::from_secs(10), "{status:?}");

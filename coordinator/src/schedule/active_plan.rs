@@ -67,6 +67,13 @@ impl ActivePlan {
         self.samples(node_name) || self.plan.assignment.composites(node_name)
     }
 
+    /// What the plan would lose with a node: nothing without a role, more with more views.
+    pub(super) fn worth_of(&self, node_name: &str) -> f64 {
+        let views = self.plan.assignment.compositors.iter().find(|share| share.node_name == node_name);
+        let role = if self.has_role(node_name) { 1.0 } else { 0.0 };
+        role + views.map_or(0.0, |share| f64::from(share.view_weight))
+    }
+
     /// Whether both nodes have the reported roles in this plan.
     pub(super) fn concerns(&self, report: &SamplerReport) -> bool {
         self.epoch() == report.plan_epoch

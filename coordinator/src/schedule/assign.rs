@@ -24,7 +24,13 @@ impl Candidate<'_> {
 
 /// The plan of a choice. In the direct policy all nodes make views; a single node, and in time-share every node, samples
 /// too, as far as there are images.
-pub(super) fn assignment(plan_epoch: u64, workload: Workload, choice: &Choice, nodes: &[Candidate<'_>]) -> Assignment {
+pub(super) fn assignment(
+    plan_epoch: u64,
+    workload_number: u64,
+    workload: Workload,
+    choice: &Choice,
+    nodes: &[Candidate<'_>],
+) -> Assignment {
     let with_role = |sampling: bool| -> Vec<Candidate<'_>> {
         nodes.iter().zip(&choice.division.samples).filter(|(_, s)| **s == sampling).map(|(node, _)| *node).collect()
     };
@@ -37,7 +43,7 @@ pub(super) fn assignment(plan_epoch: u64, workload: Workload, choice: &Choice, n
     let relays = choice.policy == Policy::Pipeline && nodes.len() > 1;
     Assignment {
         plan_epoch,
-        workload_number: 1,
+        workload_number,
         policy: choice.policy,
         workload,
         samplers: sampler_shares(&choice.load, &sampling),

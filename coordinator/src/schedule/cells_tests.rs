@@ -27,7 +27,7 @@ fn step(scheduler: &mut Scheduler, event: Event) -> Vec<Command> {
 }
 
 fn plan(scheduler: &Scheduler) -> Assignment {
-    scheduler.status().plan.expect("a plan").assignment
+    scheduler.status().workloads[0].plan.clone().expect("a plan").assignment
 }
 
 fn cells(scheduler: &Scheduler) -> Vec<u32> {
@@ -130,5 +130,6 @@ fn too_many_cells_are_refused_and_given_sample_cameras_are_kept() {
     step(&mut scheduler, Event::Opened(Box::new(opening(1, PolicyChoice::Pipeline, 40))));
     assert_eq!(scheduler.admits_viewpoints(1, &spread(1)), Err(ChoiceError::NoCells { session: 1 }));
     let commands = step(&mut scheduler, looking_from(2, spread(1)));
-    assert!(matches!(&commands[..], [Command::End { session: 1, .. }, Command::Apply { .. }]), "{commands:?}");
+    assert!(matches!(&commands[..], [.., Command::Apply { sessions, .. }] if sessions == &[2]), "{commands:?}");
+    assert!(scheduler.has_session(1), "beside the other");
 }

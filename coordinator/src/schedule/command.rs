@@ -12,19 +12,17 @@ use super::{ChoiceError, ProbeKind};
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs, reason = "self-naming fields")]
 pub enum Command {
-    /// Apply the plan on every node, then announce it to the sessions and answer with
+    /// Apply the plan on these nodes, which have a role in it or had one in the workload's plan before, then announce it to the sessions and answer with
     /// [`Event::Applied`](super::Event::Applied).
     Apply { sessions: Vec<u64>, plan: Box<SessionPlan>, nodes: Vec<NodeStatus> },
     /// Probe a node, and answer with [`Event::Probed`](super::Event::Probed).
     Probe(Box<Probe>),
-    /// The node stays a member, and gets no role until it is readmitted.
-    Quarantine { node_name: String, reason: String },
-    /// The node may get roles again.
-    Readmit { node_name: String },
+    /// The node stays a member, and gets no role until it is readmitted: none at all, or none of one workload.
+    Quarantine { node_name: String, workload_number: Option<u64>, reason: String },
+    /// The node may get such roles again.
+    Readmit { node_name: String, workload_number: Option<u64> },
     /// No plan can be made for the session.
     Refuse { session: u64, error: ChoiceError },
-    /// The session's plan no longer holds, and it gets no other.
-    End { session: u64, reason: String },
 }
 
 /// A question that the coordinator asks a node itself.
@@ -63,12 +61,19 @@ impl fmt::Display for Command {
         match self {
             Self::Apply { sessions, plan, .. } => write_plan(f, sessions, plan),
             Self::Probe(probe) => write_probe(f, probe),
-            Self::Quarantine { node_name, reason } => write!(f, "quarantine {node_name}: {reason}"),
-            Self::Readmit { node_name } => write!(f, "readmit {node_name}"),
+            Self::Quarantine { node_name, workload_number, reason } => {
+                write!(f, "quarantine {node_name}{}: {reason}", of_workload(*workload_number))
+            }
+            Self::Readmit { node_name, workload_number } => {
+                write!(f, "readmit {node_name}{}", of_workload(*workload_number))
+            }
             Self::Refuse { session, error } => write!(f, "refuse session {session}: {error}"),
-            Self::End { session, reason } => write!(f, "end session {session}: {reason}"),
         }
     }
+}
+
+fn of_workload(number: Option<u64>) -> String {
+    number.map_or_else(String::new, |number| format!(" from workload {number}"))
 }
 
 fn write_probe(f: &mut fmt::Formatter<'_>, probe: &Probe) -> fmt::Result {
@@ -89,8 +94,9 @@ fn write_plan(f: &mut fmt::Formatter<'_>, sessions: &[u64], plan: &SessionPlan) 
     let compositors = assignment.compositors.iter().map(|share| share.node_name.clone());
     write!(
         f,
-        "apply plan {} to sessions {sessions:?}: {}, samplers {}, compositors {}, predicted {:.6} s a set: {}",
+        "apply plan {} of workload {} to sessions {sessions:?}: {}, samplers {}, compositors {}, predicted {:.6} s a set: {}",
         assignment.plan_epoch,
+        assignment.workload_number,
         assignment.policy,
         samplers.collect::<Vec<_>>().join(" "),
         compositors.collect::<Vec<_>>().join(" "),

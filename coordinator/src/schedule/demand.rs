@@ -1,5 +1,6 @@
 //! The input and the result of the choice of a plan.
 
+use std::fmt;
 use std::num::NonZeroU32;
 
 use cluster::{InvalidField, Policy, PolicyChoice, tile_count};
@@ -7,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Division, Load, NodeCosts};
 
-/// Decisions that a session takes from the schedule.
+/// Decisions that a session takes from the schedule, for its own workload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct PolicyOverride {
     /// The policy.
@@ -24,6 +25,23 @@ impl PolicyOverride {
     pub(super) fn validate(&self) -> Result<(), InvalidField> {
         let tiles = self.forced_tiles.map(|tiles| u32::try_from(tiles).unwrap_or(u32::MAX));
         tiles.map_or(Ok(()), tile_count)
+    }
+}
+
+impl PolicyOverride {
+    /// With no more samplers than a load allows: a K that was possible when it was asked for may be too many when nodes are
+    /// lost.
+    pub(super) fn possible(self, load: &Load, nodes: usize) -> Self {
+        let most = load.tiled(self.forced_tiles.unwrap_or(1)).most_samplers(nodes);
+        Self { forced_samplers: self.forced_samplers.map(|forced| forced.min(most)), ..self }
+    }
+}
+
+impl fmt::Display for PolicyOverride {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "policy {}", self.policy)?;
+        self.forced_samplers.map_or(Ok(()), |k| write!(f, ", K = {k}"))?;
+        self.forced_tiles.map_or(Ok(()), |tiles| write!(f, ", {tiles} tiles"))
     }
 }
 
@@ -123,6 +141,12 @@ pub enum ChoiceError {
     /// Sessions that state a rate ask for more than all nodes can do.
     #[error("frames_per_s: all sessions together would take {needed:.2} times what the nodes can do")]
     Overload { needed: f64 },
+    /// As many workloads as there may be.
+    #[error("workloads: {most} are open, the limit of --max-workloads")]
+    Workloads { most: usize },
+    /// A session forces what other sessions of its workload do not.
+    #[error("policy, forced_sampler_count, forced_tile_count: the workload has other sessions, with {in_force}")]
+    Override { in_force: PolicyOverride },
     /// More cells than a plan may have.
     #[error("viewpoints: they are spread over {cells} view cells, at most 64")]
     Cells { cells: usize },

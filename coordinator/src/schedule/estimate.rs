@@ -26,6 +26,17 @@ impl Operation {
         Self { alone_s, is_warm: false, timed: Smoothed::starting_at(alone_s), reports_without: 0 }
     }
 
+    /// Another cost alone, of which it takes as many times as long as of the one before.
+    fn rebase(&mut self, alone_s: f64) {
+        let times = alone_s / self.alone_s;
+        if times.is_finite() && times > 0.0 {
+            self.timed.scale(times);
+            self.alone_s = alone_s;
+        } else {
+            *self = Self::starting_at(alone_s);
+        }
+    }
+
     /// Gives how many times longer than alone the timing is, where it is valid.
     fn add(&mut self, timing_s: Option<f64>, slowness: f64) -> Option<f64> {
         let was_cold = !self.is_warm && timing_s.is_some_and(|timing_s| timing_s > COLD * self.alone_s * slowness);
@@ -136,6 +147,14 @@ impl Estimate {
         let expected_s = parts.iter().map(tile_s).sum::<f64>() / parts.len() as f64 * f64::from(tiles);
         let ratio = tiles_s / expected_s;
         if ratio.is_finite() { self.alone.sample_image_s * ratio } else { tiles_s }
+    }
+
+    /// Other views, or images of another first session, with these costs alone: the node is as slow as before.
+    pub(super) fn rebase(&mut self, costs: &Costs) {
+        if self.alone != *costs {
+            self.alone = *costs;
+            self.operations.as_mut().zip_with(PerOperation::from(costs), Operation::rebase);
+        }
     }
 
     /// Forgets all timings: other work is done from here on.
@@ -275,6 +294,19 @@ mod tests {
         estimate.restart();
         assert_eq!(estimate.now().costs.sample_image_s, 1.0);
         assert_eq!(sampled(&mut estimate, 0.2), 0.2);
+    }
+
+    #[test]
+    fn another_view_keeps_what_is_known_of_the_node() {
+        let alone = Costs { sample_image_s: 1.0, reconstruct_view_s: 0.1, ..Costs::default() };
+        let mut estimate = Estimate::starting_at(&alone);
+        (0..40).for_each(|_| drop(sampled(&mut estimate, 2.0)));
+        estimate.rebase(&Costs { sample_image_s: 3.0, reconstruct_view_s: 0.4, ..alone });
+        let now = estimate.now().costs;
+        assert!((now.sample_image_s / 6.0 - 1.0).abs() < 0.01 && (now.reconstruct_view_s / 0.8 - 1.0).abs() < 0.01);
+        let before = estimate.now();
+        estimate.rebase(&Costs { sample_image_s: 3.0, reconstruct_view_s: 0.4, ..alone });
+        assert_eq!(estimate.now(), before);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Inputs of the schedule.
 
-use cluster::limits::MAX_VIEWS_PER_SET;
+use cluster::limits::{MAX_VIEWS_PER_SET, MAX_WORKLOADS};
 use cluster::{
     Costs, InvalidField, JoinCluster, MeasuredCosts, Quality, SamplerReport, Workload, finite_seconds, frame_rate,
     nonempty, viewpoints,
@@ -15,6 +15,8 @@ use super::PolicyOverride;
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs, reason = "self-naming fields")]
 pub enum Event {
+    /// The coordinator's limits, at its start.
+    Limits { max_workloads: usize },
     /// A node joined, or joined again. `incarnation` rises with every joining and tells two processes of one name apart.
     Joined { incarnation: u64, join: JoinCluster },
     /// A membership ended.
@@ -72,7 +74,7 @@ pub struct Opening {
     pub policy_override: PolicyOverride,
     /// Qualities to fall back to under overload, in this order.
     pub fallbacks: Vec<Quality>,
-    /// Measured costs: every node's until it reports its own.
+    /// Measured costs, of the session's own views: every node's until it reports its own.
     pub costs: Costs,
     /// The workload's sample cameras are the cells of these viewpoints, as if the session were alone. Empty: it brings
     /// sample cameras of its own.
@@ -84,6 +86,7 @@ impl Event {
     /// For values that no peer may send, as a damaged log may have them.
     pub(super) fn validate(&self) -> Result<(), InvalidField> {
         match self {
+            Self::Limits { max_workloads } => max_workloads_within(*max_workloads),
             Self::Joined { join, .. } => join.validate(),
             Self::Opened(opening) => opening.validate(),
             Self::DemandChanged { views_per_set, frames_per_s, .. } => check_demand(*views_per_set, *frames_per_s),
@@ -113,6 +116,13 @@ impl Opening {
         self.fallbacks.iter().try_for_each(Quality::validate)?;
         self.costs.validate()?;
         viewpoints(&self.viewpoints)
+    }
+}
+
+fn max_workloads_within(most: usize) -> Result<(), InvalidField> {
+    match (1..=MAX_WORKLOADS).contains(&most) {
+        true => Ok(()),
+        false => Err(InvalidField::out_of_range("max_workloads", most, "from 1 to 64")),
     }
 }
 

@@ -55,7 +55,7 @@ impl Faults {
     }
 
     fn plan(&self) -> Assignment {
-        self.scheduler.status().plan.expect("a plan").assignment
+        self.scheduler.status().workloads[0].plan.clone().expect("a plan").assignment
     }
 
     fn has_role(&self, name: &str) -> bool {
@@ -92,8 +92,8 @@ impl Faults {
                     *self.convicted.entry(node_name.clone()).or_default() += 1;
                     assert!(self.quarantined.insert(node_name));
                 }
-                Command::Readmit { node_name } => assert!(self.quarantined.remove(&node_name), "{node_name}"),
-                Command::Refuse { .. } | Command::End { .. } => panic!("{command}"),
+                Command::Readmit { node_name, .. } => assert!(self.quarantined.remove(&node_name), "{node_name}"),
+                Command::Refuse { .. } => panic!("{command}"),
             }
         }
     }
@@ -253,18 +253,18 @@ fn a_plan_that_some_nodes_reject_is_made_without_them_and_one_that_all_reject_is
     let commands = at_start(&mut scheduler, Event::Applied { plan_epoch: 1 });
     let [Command::Refuse { session: 1, error }] = &commands[..] else { panic!("{commands:?}") };
     assert_eq!(error.to_string(), "unknown method");
-    assert!(scheduler.status().plan.is_none() && !scheduler.has_session(1));
+    assert!(scheduler.status().workloads.is_empty() && !scheduler.has_session(1));
 }
 
 #[test]
-fn a_node_that_fails_to_take_a_plan_is_quarantined_until_it_joins_again_or_another_workload_takes_over() {
+fn a_node_that_fails_to_take_a_plan_is_quarantined_until_it_joins_again() {
     let mut faults = Faults::new(3);
     let (name, plan_epoch) = (faults.a_compositor(), faults.plan().plan_epoch);
     let unready = |plan_epoch| Event::Unready { plan_epoch, node_name: name.clone(), reason: "no disk".to_owned() };
     faults.tell(unready(plan_epoch + 7));
     assert!(faults.has_role(&name), "of another plan");
     faults.tell(unready(plan_epoch));
-    let reason = faults.scheduler.status().plan.unwrap().reason;
+    let reason = faults.scheduler.status().workloads[0].plan.clone().unwrap().reason;
     assert!(!faults.has_role(&name) && reason.contains("no disk"), "{reason}");
     let before = faults.plan().plan_epoch;
     faults.tell(unready(plan_epoch));

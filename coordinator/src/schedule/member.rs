@@ -1,5 +1,6 @@
 //! Members of the cluster as the schedule knows them.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cluster::{Costs, NodeStatus};
@@ -11,8 +12,9 @@ use super::estimate::Estimate;
 pub(super) struct Member {
     pub(super) incarnation: u64,
     pub(super) status: NodeStatus,
-    pub(super) estimate: Estimate,
-    /// Since when the node is in quarantine.
+    /// One for each workload: their operations differ.
+    pub(super) estimates: BTreeMap<u64, Estimate>,
+    /// Since when the node is in quarantine, from all workloads.
     pub(super) quarantined_at: Option<Duration>,
     pub(super) activity: Activity,
 }
@@ -27,15 +29,14 @@ pub(super) struct Activity {
 }
 
 impl Member {
-    pub(super) fn new(now: Duration, incarnation: u64, status: NodeStatus, costs: Option<&Costs>) -> Self {
-        let estimate = costs.map(Estimate::starting_at).unwrap_or_default();
+    pub(super) fn new(now: Duration, incarnation: u64, status: NodeStatus) -> Self {
         let activity = Activity { reported_at: now, ..Activity::default() };
-        Self { incarnation, status, estimate, quarantined_at: None, activity }
+        Self { incarnation, status, estimates: BTreeMap::new(), quarantined_at: None, activity }
     }
 
-    /// Another workload: its costs, and no quarantine, for the node may be able to do it.
-    pub(super) fn restart(&mut self, costs: &Costs) {
-        (self.estimate, self.quarantined_at) = (Estimate::starting_at(costs), None);
+    /// Another workload begins, or begins anew.
+    pub(super) fn expect(&mut self, workload: u64, costs: &Costs) {
+        self.estimates.insert(workload, Estimate::starting_at(costs));
     }
 }
 

@@ -19,6 +19,7 @@ mod load;
 mod makespan;
 mod member;
 mod node_costs;
+mod node_shares;
 mod operations;
 mod overload;
 mod prediction;
@@ -27,6 +28,8 @@ mod relay_tree;
 mod reports;
 mod scheduler;
 mod search;
+mod session_mix;
+mod sharing_hysteresis;
 mod smoothing;
 mod workload_state;
 

@@ -30,6 +30,24 @@ impl NodeCosts {
         view_s(&self.costs)
     }
 
+    /// Costs of a node that serves several workloads in turn.
+    pub(super) fn times(self, times: f64) -> Self {
+        let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, .. } = self.costs;
+        let tiles = |tiles: TileCosts| TileCosts { overhead_s: tiles.overhead_s * times, ..tiles };
+        Self {
+            costs: Costs {
+                sample_image_s: sample_image_s * times,
+                direct_view_s: direct_view_s * times,
+                reconstruct_view_s: reconstruct_view_s * times,
+                load_set_s: load_set_s * times,
+                encode_view_s: encode_view_s * times,
+                in_order: self.costs.in_order,
+                tiles: self.costs.tiles.map(tiles),
+            },
+            transfer_image_s: self.transfer_image_s.map(|transfer_s| transfer_s * times),
+        }
+    }
+
     /// A link that is not measured counts as free.
     pub(super) fn transfer_s(&self) -> f64 {
         self.transfer_image_s.unwrap_or(0.0)

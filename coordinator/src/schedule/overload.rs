@@ -80,6 +80,19 @@ impl Overload {
         false
     }
 
+    /// Sessions have come or gone, and accept no more than `fallbacks` any more.
+    pub(super) fn limit(&mut self, now: Duration, fallbacks: usize) {
+        if self.step > fallbacks {
+            self.view_utilisation_when_left.truncate(fallbacks);
+            self.change(now, fallbacks);
+        }
+    }
+
+    /// The utilisation by one view a second when a step above the present one was left.
+    pub(super) fn view_utilisation_when_left(&self, step: usize) -> Option<f64> {
+        self.view_utilisation_when_left.get(step).copied()
+    }
+
     fn count(&mut self, sample: UtilizationSample<'_>, slower: f64) {
         let full = sample.utilisation > FULL;
         self.full_in_a_row = if full { self.full_in_a_row + 1 } else { 0 };

@@ -1,30 +1,57 @@
 //! The cluster as a state machine: events in, commands out.
 
+mod admission;
 mod faults;
 mod planning;
 mod sessions;
+mod sharing;
+mod state;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use cluster::{ClusterStatus, JoinCluster, MeasuredCosts, NodeCondition};
+use cluster::{JoinCluster, MeasuredCosts};
 
 use super::active_plan::ActivePlan;
 use super::estimate::SampledParts;
 use super::member::Member;
 use super::reports::SamplerReports;
+use super::sharing_hysteresis::SharingHysteresis;
 use super::workload_state::WorkloadState;
 use super::{Command, Event};
 
-/// Members by name, the last epoch, and the demand of all sessions.
-#[derive(Debug, Clone, Default)]
+/// Workloads that may be open, unless an event says otherwise.
+const MAX_WORKLOADS: usize = 8;
+
+/// Members by name, workloads by number, and the last epoch.
+#[derive(Debug, Clone)]
 pub struct Scheduler {
     now: Duration,
+    /// Of all workloads together: no two plans have the same.
     plan_epoch: u64,
+    last_workload: u64,
+    max_workloads: usize,
     members: BTreeMap<String, Member>,
-    workload: Option<WorkloadState>,
+    workloads: BTreeMap<u64, WorkloadState>,
+    sharing: SharingHysteresis,
     reports: SamplerReports,
     liveness_probed_at: Duration,
+}
+
+impl Default for Scheduler {
+    fn default() -> Self {
+        Self {
+            now: Duration::ZERO,
+            plan_epoch: 0,
+            last_workload: 0,
+            max_workloads: MAX_WORKLOADS,
+            members: BTreeMap::new(),
+            workloads: BTreeMap::new(),
+            sharing: SharingHysteresis::default(),
+            reports: SamplerReports::default(),
+            liveness_probed_at: Duration::ZERO,
+        }
+    }
 }
 
 impl Scheduler {
@@ -33,6 +60,10 @@ impl Scheduler {
     pub fn step(&mut self, now: Duration, event: Event) -> Vec<Command> {
         self.now = self.now.max(now);
         match event {
+            Event::Limits { max_workloads } => {
+                self.max_workloads = max_workloads;
+                Vec::new()
+            }
             Event::Joined { incarnation, join } => self.joined(incarnation, join),
             Event::Left { incarnation, node_name } => self.left(incarnation, &node_name),
             Event::Opened(opening) => self.opened(&opening),
@@ -57,16 +88,27 @@ impl Scheduler {
         }
     }
 
-    fn active_plan(&self) -> Option<&ActivePlan> {
-        self.workload.as_ref()?.active_plan.as_ref()
+    /// The number of the workload whose plan in force has this epoch.
+    fn workload_of_plan(&self, plan_epoch: u64) -> Option<u64> {
+        let has_epoch = |workload: &WorkloadState| workload.active_plan.as_ref().is_some_and(|a| a.epoch() == plan_epoch);
+        self.workloads.iter().find(|(_, workload)| has_epoch(workload)).map(|(&number, _)| number)
     }
 
-    /// The plan in force, if it has this epoch.
+    fn workload_of_session(&self, session: u64) -> Option<u64> {
+        self.workloads.iter().find(|(_, workload)| workload.sessions.contains(session)).map(|(&number, _)| number)
+    }
+
+    fn active_plan(&self, number: u64) -> Option<&ActivePlan> {
+        self.workloads.get(&number)?.active_plan.as_ref()
+    }
+
+    /// The plan in force with this epoch.
     fn active_plan_of(&mut self, plan_epoch: u64) -> Option<&mut ActivePlan> {
-        self.workload.as_mut()?.active_plan.as_mut().filter(|active| active.epoch() == plan_epoch)
+        let plans = self.workloads.values_mut().filter_map(|workload| workload.active_plan.as_mut());
+        plans.into_iter().find(|active| active.epoch() == plan_epoch)
     }
 
-    /// The plan in force, if it has this epoch and is for this node.
+    /// The plan in force with this epoch, if it is for this node.
     fn active_plan_for(&mut self, plan_epoch: u64, name: &str) -> Option<&mut ActivePlan> {
         self.active_plan_of(plan_epoch).filter(|active| active.members.contains_key(name))
     }
@@ -76,14 +118,11 @@ impl Scheduler {
     fn joined(&mut self, incarnation: u64, join: JoinCluster) -> Vec<Command> {
         self.plan_epoch = self.plan_epoch.max(join.plan_epoch);
         let name = join.node.node_name.clone();
-        let costs = self.workload.as_ref().map(|workload| &workload.costs);
-        let member = Member::new(self.now, incarnation, join.node, costs);
+        let mut member = Member::new(self.now, incarnation, join.node);
+        self.workloads.iter().for_each(|(&number, workload)| member.expect(number, &workload.costs));
         self.members.insert(name.clone(), member);
-        let planned = self.active_plan().and_then(|active| active.members.get(&name));
-        if planned.is_some_and(|&planned| planned != incarnation) {
-            return self.replan(&format!("node {name} was started again"));
-        }
-        self.reevaluate()
+        self.forgive(&name);
+        self.nodes_changed(&format!("node {name} was started again"))
     }
 
     fn left(&mut self, incarnation: u64, name: &str) -> Vec<Command> {
@@ -91,94 +130,75 @@ impl Scheduler {
             return Vec::new();
         }
         self.members.remove(name);
-        self.replan_without(name, &format!("node {name} left the cluster"))
+        self.forgive(name);
+        self.nodes_changed(&format!("node {name} left the cluster"))
     }
 
-    /// A plan that has lost a node is invalid: the next one is made at once.
-    fn replan_without(&mut self, name: &str, why: &str) -> Vec<Command> {
-        let planned = self.active_plan().is_some_and(|active| active.members.contains_key(name));
-        if planned { self.replan(why) } else { Vec::new() }
+    /// Whatever an earlier process could not take, the next may.
+    fn forgive(&mut self, name: &str) {
+        for workload in self.workloads.values_mut() {
+            workload.excluded.remove(name);
+        }
     }
 
-    /// Work for the plan in force says how long a set takes.
+    /// Work for a plan in force says how long a set takes, and that its workload is not idle.
     fn count_work(&mut self, name: &str, plan_epoch: u64, busy_s: f64, views: u64, dropped_views: u64) {
         let now = self.now;
         if let Some(member) = self.members.get_mut(name) {
             member.activity.add(now, busy_s, views, dropped_views);
         }
-        if let Some(active) = self.active_plan_for(plan_epoch, name) {
-            active.add_work(name, busy_s, views);
-        }
-        let Some(workload) = &mut self.workload else { return };
-        let views_per_set = workload.load().views;
-        let achieved = workload.active_plan.as_ref().and_then(|active| active.achieved(views_per_set));
-        let Some(achieved) = achieved else { return };
-        workload.achieved.retain(|other| other.policy != achieved.policy);
-        workload.achieved.push(achieved);
+        let number = self.workload_of_plan(plan_epoch);
+        let Some(workload) = number.and_then(|number| self.workloads.get_mut(&number)) else { return };
+        workload.count_work(now, name, busy_s, views);
     }
 
-    /// Timings of another plan than the one in force are of other work, and change no cost.
+    /// Timings of another plan than those in force are of other work, and change no cost.
     fn measured(&mut self, name: &str, plan_epoch: u64, costs: &MeasuredCosts) -> Vec<Command> {
-        let active = self.workload.as_ref().and_then(|workload| workload.active_plan.as_ref());
-        if let Some(active) = active.filter(|active| active.epoch() == plan_epoch)
-            && let Some(member) = self.members.get_mut(name)
-        {
-            let plan = &active.plan.assignment;
-            let share = plan.samplers.iter().find(|share| share.node_name == name);
-            let sampled = share.map(|share| SampledParts { parts: &share.image_indices, tiles: plan.tile_count });
-            member.estimate.add(costs, sampled);
+        let Some(number) = self.workload_of_plan(plan_epoch) else { return Vec::new() };
+        let plan = self.workloads.get(&number).and_then(|workload| workload.active_plan.as_ref());
+        let plan = plan.map(|active| &active.plan.assignment);
+        let share = plan.and_then(|plan| plan.samplers.iter().find(|share| share.node_name == name));
+        let sampled = plan.zip(share).map(|(plan, share)| SampledParts {
+            parts: &share.image_indices,
+            tiles: plan.tile_count,
+        });
+        if let Some(estimate) = self.members.get_mut(name).and_then(|member| member.estimates.get_mut(&number)) {
+            estimate.add(costs, sampled);
         }
-        self.reevaluate()
+        self.reevaluate(number)
     }
 
     fn tick(&mut self) -> Vec<Command> {
         let mut commands = self.readmit();
-        commands.extend(self.reevaluate());
+        commands.extend(self.share_evenly());
+        commands.extend(self.reevaluate_all());
         commands.extend(self.probe_liveness());
         commands
-    }
-
-    /// The state of the cluster: members, the plan in force, and the demand of all sessions.
-    #[must_use]
-    pub fn status(&self) -> ClusterStatus {
-        let workload = self.workload.as_ref();
-        ClusterStatus {
-            plan_epoch: self.plan_epoch,
-            nodes: self.members.values().map(|member| member.status.clone()).collect(),
-            offers: Vec::new(),
-            plan: self.active_plan().map(|active| active.plan.clone()),
-            session_count: workload.map_or(0, |workload| workload.sessions().len() as u32),
-            views_per_set: workload.map_or(0, |workload| workload.views() as u64),
-            conditions: workload.map_or_else(Vec::new, |_| self.conditions()),
-            achieved: workload.map_or_else(Vec::new, |workload| workload.achieved.clone()),
-            utilisation: self.utilisation().filter(|&utilisation| utilisation > 0.0),
-        }
-    }
-
-    fn conditions(&self) -> Vec<NodeCondition> {
-        let is_ready = |name: &str| self.active_plan().is_some_and(|active| active.ready.contains(name));
-        let condition = |(name, member): (&String, &Member)| NodeCondition {
-            node_name: name.clone(),
-            is_ready: is_ready(name),
-            costs: member.estimate.now().costs,
-            views: member.activity.views,
-            dropped_views: member.activity.dropped_views,
-            busy_ratio: member.activity.busy_ratio,
-        };
-        self.members.iter().map(condition).collect()
     }
 }
 
 /// For tests of the whole schedule.
 #[cfg(test)]
 impl Scheduler {
-    pub(in crate::schedule) fn active_plan_epoch(&self) -> Option<u64> {
-        Some(self.active_plan()?.epoch())
+    /// Whether a plan in force was made for this node, with or without a role.
+    pub(in crate::schedule) fn plans_with(&self, plan_epoch: u64, name: &str) -> bool {
+        let plan = self.workload_of_plan(plan_epoch).and_then(|number| self.active_plan(number));
+        plan.is_some_and(|active| active.members.contains_key(name))
     }
 
-    /// Whether the plan in force was made for this node, with or without a role.
-    pub(in crate::schedule) fn plans_with(&self, name: &str) -> bool {
-        self.active_plan().is_some_and(|active| active.members.contains_key(name))
+    /// The nodes of each workload.
+    pub(in crate::schedule) fn nodes_of_workloads(&self) -> BTreeMap<u64, std::collections::BTreeSet<String>> {
+        self.workloads.iter().map(|(&number, workload)| (number, workload.nodes.clone())).collect()
+    }
+
+    pub(in crate::schedule) fn is_divided_evenly(&self) -> bool {
+        !self.node_shares().is_uneven()
+    }
+
+    /// Workloads that are not idle, and their weights.
+    pub(in crate::schedule) fn weights_of_workloads(&self) -> BTreeMap<u64, f64> {
+        let weights = self.node_shares().claims.into_iter().map(|claim| claim.weight);
+        self.workloads.keys().copied().zip(weights).filter(|(_, weight)| *weight > 0.0).collect()
     }
 }
 

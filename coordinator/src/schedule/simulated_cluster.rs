@@ -1,14 +1,14 @@
-//! The scheduler in a simulated cluster: nodes die, come back, and answer late or never; clients come and go, all from a
-//! seed. Invariants are checked after every step; a seed that fails is named.
+//! The scheduler in a simulated cluster: nodes die, come back, and answer late or never; clients of one to five workloads
+//! come and go, all from a seed. Invariants are checked after every step; a seed that fails is named.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use cluster::{Assignment, Costs, MeasuredCosts, NodeStatus, PolicyChoice, SessionPlan};
+use cluster::{Assignment, Costs, MeasuredCosts, NodeStatus, PolicyChoice, SessionPlan, WorkloadStatus};
 
 use super::balance::k_fd;
 use super::command::Command;
-use super::event::{Event, Opening};
+use super::event::{Event, Opening, ProbeKind};
 use super::load::Load;
 use super::node_costs::NodeCosts;
 use super::prediction::pipeline_s;
@@ -21,39 +21,51 @@ const SEEDS: u64 = 500;
 const STEPS: usize = 300;
 const DWELL: Duration = Duration::from_secs(5);
 const MOST_NODES: u64 = 12;
+/// Images of each workload, by which tests tell them apart.
+const IMAGES: [usize; 5] = [4, 6, 3, 2, 5];
+
+/// The plan in force of one workload.
+struct LastPlan {
+    plan: SessionPlan,
+    at: Duration,
+    /// Since then a node of it was lost, or came again, or a session came or went.
+    may_replan: bool,
+}
 
 /// Nodes, clients and the network, and the scheduler's commands so far.
 struct World {
     random: Random,
     scheduler: Scheduler,
     now: Duration,
+    /// Workloads that clients choose from.
+    kinds: u64,
     next_incarnation: u64,
     next_session: u64,
     /// Processes that live, by name: incarnation, and how many times slower than others.
     alive: BTreeMap<String, (u64, f64)>,
     /// Members as the coordinator knows them.
     members: BTreeMap<String, u64>,
-    /// Nodes in quarantine.
-    quarantined: BTreeSet<String>,
+    /// Nodes in quarantine, from one workload or from all.
+    quarantined: BTreeSet<(Option<u64>, String)>,
     /// Open sessions and the number of images of their workload.
     sessions: BTreeMap<u64, usize>,
     /// Events on their way.
     coming: Vec<(Duration, Event)>,
     /// The highest epoch that any node had seen when it joined.
     seen: u64,
-    last: Option<SessionPlan>,
-    last_at: Duration,
-    /// Since the last plan a node of it was lost, or came again, or another session came to decide.
-    may_replan: bool,
+    /// The last plan of each workload, by number.
+    last: BTreeMap<u64, LastPlan>,
+    highest_epoch: u64,
     plans: usize,
 }
 
 impl World {
-    fn new(seed: u64) -> Self {
+    fn new(seed: u64, kinds: u64) -> Self {
         Self {
             random: Random(seed),
             scheduler: Scheduler::default(),
             now: Duration::ZERO,
+            kinds,
             next_incarnation: 1,
             next_session: 1,
             alive: BTreeMap::new(),
@@ -62,9 +74,8 @@ impl World {
             sessions: BTreeMap::new(),
             coming: Vec::new(),
             seen: 0,
-            last: None,
-            last_at: Duration::ZERO,
-            may_replan: true,
+            last: BTreeMap::new(),
+            highest_epoch: 0,
             plans: 0,
         }
     }
@@ -74,7 +85,7 @@ impl World {
     }
 
     fn random_policy(&mut self) -> PolicyChoice {
-        match self.random.below(6) {
+        match self.random.below(12) {
             0 => PolicyChoice::Auto,
             1 => PolicyChoice::Direct,
             2 => PolicyChoice::TimeShare,
@@ -89,7 +100,7 @@ impl World {
 
     /// A fault, or another event.
     fn fault(&mut self) {
-        match self.random.below(20) {
+        match self.random.below(22) {
             0..4 => self.start(),
             4..6 => self.kill(),
             6 => self.zombie(),
@@ -99,6 +110,8 @@ impl World {
             14 => self.cannot(),
             15 => self.stale(),
             16..18 => self.slow_down(),
+            18 => self.silent(),
+            19 => self.work(),
             _ => self.tell(Event::Tick),
         }
     }
@@ -140,15 +153,14 @@ impl World {
     fn open(&mut self) {
         let session = self.next_session;
         self.next_session += 1;
-        let images = if self.random.below(8) == 0 { 6 } else { 4 };
+        let images = IMAGES[self.random.below(self.kinds) as usize];
         let policy = self.random_policy();
         let views_per_set = self.random.between(1.0, 500.0) as usize;
-        let opening = Opening { workload: workload(images), ..opening(session, policy, views_per_set) };
-        if self.sessions.values().next() != Some(&images) {
-            self.quarantined.clear();
-        }
+        let is_live = self.random.below(4) == 0;
+        let frames_per_s = is_live.then(|| self.random.between(0.01, 0.3));
+        let opening =
+            Opening { workload: workload(images), frames_per_s, ..opening(session, policy, views_per_set) };
         self.sessions.insert(session, images);
-        self.may_replan = true;
         self.tell(Event::Opened(Box::new(opening)));
     }
 
@@ -159,8 +171,6 @@ impl World {
 
     fn close(&mut self) {
         if let Some(session) = self.random_session() {
-            self.sessions.remove(&session);
-            self.may_replan = true;
             self.tell(Event::Closed { session });
         }
     }
@@ -173,15 +183,27 @@ impl World {
     }
 
     fn cannot(&mut self) {
-        let (name, plan_epoch) = (self.random_name(), self.epoch());
+        let (name, plan_epoch) = (self.random_name(), self.random_epoch());
         self.tell(Event::Unready { plan_epoch, node_name: name, reason: "no disk".to_owned() });
+    }
+
+    /// A member does not answer.
+    fn silent(&mut self) {
+        let (node_name, plan_epoch) = (self.random_name(), self.random_epoch());
+        if let Some(&incarnation) = self.members.get(&node_name) {
+            let (kind, failure) = (ProbeKind::Liveness, Some("silent".to_owned()));
+            self.tell(Event::Probed { plan_epoch, node_name, incarnation, kind, failure });
+        }
     }
 
     /// Events of an earlier plan and an earlier process.
     fn stale(&mut self) {
-        let (node_name, plan_epoch) = (self.random_name(), self.epoch().saturating_sub(1));
-        self.tell(Event::Unready { plan_epoch, node_name: node_name.clone(), reason: "late".to_owned() });
-        self.tell(Event::Ready { plan_epoch, node_name: node_name.clone() });
+        let (node_name, plan_epoch) = (self.random_name(), self.random_epoch());
+        if self.number_of(plan_epoch.saturating_sub(1)).is_none() {
+            let plan_epoch = plan_epoch.saturating_sub(1);
+            self.tell(Event::Unready { plan_epoch, node_name: node_name.clone(), reason: "late".to_owned() });
+            self.tell(Event::Ready { plan_epoch, node_name: node_name.clone() });
+        }
         self.tell(Event::Left { incarnation: 0, node_name });
     }
 
@@ -189,12 +211,37 @@ impl World {
         let name = self.random_name();
         if let Some(&(_, speed)) = self.alive.get(&name) {
             let noise = self.random.between(0.8, 1.25);
-            self.tell(measured(name, self.epoch(), timings(speed * noise)));
+            let epoch = self.random_epoch();
+            self.tell(measured(name, epoch, timings(speed * noise)));
         }
     }
 
-    fn epoch(&self) -> u64 {
-        self.last.as_ref().map_or(0, |plan| plan.assignment.plan_epoch)
+    /// Nodes do something for every workload, which is therefore not idle.
+    fn work(&mut self) {
+        for workload in self.scheduler.status().workloads {
+            let Some(plan) = workload.plan else { continue };
+            let name = plan.assignment.compositors[0].node_name.clone();
+            self.tell(measured(name, plan.assignment.plan_epoch, MeasuredCosts::default()));
+        }
+    }
+
+    /// The epoch of some workload's plan.
+    fn random_epoch(&mut self) -> u64 {
+        let epochs: Vec<u64> = self.last.values().map(|last| last.plan.assignment.plan_epoch).collect();
+        if epochs.is_empty() { 0 } else { epochs[self.random.below(epochs.len() as u64) as usize] }
+    }
+
+    /// The workload whose plan in force has this epoch.
+    fn number_of(&self, plan_epoch: u64) -> Option<u64> {
+        let workloads = self.scheduler.status().workloads;
+        let has_epoch = |workload: &&WorkloadStatus| epoch_of(workload) == Some(plan_epoch);
+        workloads.iter().find(has_epoch).map(|workload| workload.number)
+    }
+
+    fn number_of_session(&self, session: u64) -> Option<u64> {
+        let images = self.sessions.get(&session)?;
+        let shows = |last: &&LastPlan| last.plan.assignment.workload.sample_cameras.len() == *images;
+        self.last.values().find(shows).map(|last| last.plan.assignment.workload_number)
     }
 
     /// Time passes, and what is due arrives.
@@ -210,14 +257,28 @@ impl World {
 
     /// Steps the scheduler and checks its commands.
     fn tell(&mut self, event: Event) {
+        let (before, concerned) = (self.scheduler.nodes_of_workloads(), self.concerned(&event));
         self.note(&event);
-        for command in self.scheduler.step(self.now, event) {
+        let commands = self.scheduler.step(self.now, event.clone());
+        let moved = self.moved(&before, &event);
+        for command in commands {
             match command {
-                Command::Apply { sessions, plan, nodes } => self.applied(&sessions, *plan, &nodes),
+                Command::Apply { sessions, plan, nodes } => {
+                    let number = plan.assignment.workload_number;
+                    let may_change = concerned.is_none_or(|own| own == number) || moved.contains(&number);
+                    assert!(may_change, "{event:?} disturbs workload {number}");
+                    self.applied(&sessions, *plan, &nodes);
+                }
                 Command::Probe(_) => (),
-                Command::Quarantine { node_name, .. } => assert!(self.quarantined.contains(&node_name), "{node_name}"),
-                Command::Readmit { node_name } => assert!(self.quarantined.remove(&node_name), "{node_name}"),
-                Command::Refuse { session, .. } | Command::End { session, .. } => {
+                Command::Quarantine { node_name, workload_number, .. } => {
+                    assert!(self.quarantined.contains(&(workload_number, node_name.clone())), "{node_name}");
+                }
+                Command::Readmit { node_name, workload_number } => {
+                    assert!(self.quarantined.remove(&(workload_number, node_name.clone())), "{node_name}");
+                }
+                Command::Refuse { session, .. } => {
+                    let is_opening = matches!(&event, Event::Opened(opening) if opening.session == session);
+                    assert!(is_opening, "nobody is evicted: {session} by {event:?}");
                     self.sessions.remove(&session).expect("it was open");
                 }
             }
@@ -225,61 +286,119 @@ impl World {
         self.check_always();
     }
 
+    /// The workload that an event is of, where it is of one: no other may notice it.
+    fn concerned(&self, event: &Event) -> Option<u64> {
+        match event {
+            // 0 is no workload: a new one has the next number.
+            Event::Opened(opening) => {
+                let new = self.last.keys().last().map_or(0, |last| last + 1).max(self.highest_epoch.max(self.seen) + 1);
+                Some(self.number_of_session(opening.session).unwrap_or(new))
+            }
+            Event::DemandChanged { session, .. } | Event::Closed { session } => self.number_of_session(*session),
+            Event::Measured { plan_epoch, .. } | Event::Ready { plan_epoch, .. } | Event::Unready { plan_epoch, .. } => {
+                Some(self.number_of(*plan_epoch).unwrap_or(0))
+            }
+            _ => None,
+        }
+    }
+
+    /// Workloads that have other nodes than before the step.
+    fn moved(&mut self, before: &BTreeMap<u64, BTreeSet<String>>, event: &Event) -> BTreeSet<u64> {
+        let after = self.scheduler.nodes_of_workloads();
+        // A workload whose sessions have closed has no quarantine any more, and its number does not return.
+        self.quarantined.retain(|(number, _)| number.is_none_or(|number| after.contains_key(&number)));
+        self.last.retain(|number, _| after.contains_key(number));
+        let moved: BTreeSet<u64> =
+            after.iter().filter(|(number, nodes)| before.get(number) != Some(nodes)).map(|(&number, _)| number).collect();
+        // A node that joins has a role after the dwell.
+        if !matches!(event, Event::Joined { .. }) {
+            moved.iter().for_each(|number| self.allow_replan(*number));
+        }
+        moved
+    }
+
+    fn allow_replan(&mut self, number: u64) {
+        self.last.get_mut(&number).into_iter().for_each(|last| last.may_replan = true);
+    }
+
     fn note(&mut self, event: &Event) {
         match event {
             Event::Joined { incarnation, join } => {
-                let name = &join.node.node_name;
-                self.may_replan |= self.knows(name);
-                self.quarantined.remove(name);
+                let name = join.node.node_name.clone();
+                self.lose(&name);
                 self.seen = self.seen.max(join.plan_epoch);
-                self.members.insert(name.clone(), *incarnation);
+                self.members.insert(name, *incarnation);
             }
             Event::Left { incarnation, node_name } if self.members.get(node_name) == Some(incarnation) => {
-                self.may_replan |= self.knows(node_name);
+                self.lose(node_name);
                 self.members.remove(node_name);
             }
             Event::Unready { plan_epoch, node_name, .. } => {
-                let is_known = self.scheduler.active_plan_epoch() == Some(*plan_epoch) && self.knows(node_name);
-                if is_known && self.members.contains_key(node_name) {
-                    self.may_replan = true;
-                    self.quarantined.insert(node_name.clone());
+                let number = self.number_of(*plan_epoch);
+                let is_known = self.scheduler.plans_with(*plan_epoch, node_name) && self.members.contains_key(node_name);
+                if is_known && !self.quarantined.contains(&(None, node_name.clone())) {
+                    number.into_iter().for_each(|number| self.allow_replan(number));
+                    self.quarantined.insert((number, node_name.clone()));
                 }
+            }
+            Event::Probed { node_name, .. } => {
+                self.allow_replans_with(node_name);
+                self.quarantined.insert((None, node_name.clone()));
+            }
+            Event::Opened(opening) => {
+                self.number_of_session(opening.session).into_iter().for_each(|number| self.allow_replan(number));
+            }
+            Event::Closed { session } => {
+                self.number_of_session(*session).into_iter().for_each(|number| self.allow_replan(number));
+                self.sessions.remove(session);
             }
             _ => (),
         }
     }
 
-    /// Whether the plan in force was made for this node, with or without a role in it.
-    fn knows(&self, name: &str) -> bool {
-        self.scheduler.plans_with(name)
+    /// A process of this name is no member any more.
+    fn lose(&mut self, name: &str) {
+        self.allow_replans_with(name);
+        self.quarantined.retain(|(_, quarantined)| quarantined != name);
+    }
+
+    /// Plans made for this node, with or without a role, may be replaced.
+    fn allow_replans_with(&mut self, name: &str) {
+        let scheduler = &self.scheduler;
+        let plans_with = |last: &&mut LastPlan| scheduler.plans_with(last.plan.assignment.plan_epoch, name);
+        self.last.values_mut().filter(plans_with).for_each(|last| last.may_replan = true);
     }
 
     fn applied(&mut self, sessions: &[u64], plan: SessionPlan, nodes: &[NodeStatus]) {
-        assert!(!sessions.is_empty() && sessions.iter().all(|session| self.sessions.contains_key(session)));
+        let images = plan.assignment.workload.sample_cameras.len();
+        assert!(!sessions.is_empty() && sessions.iter().all(|session| self.sessions.get(session) == Some(&images)));
         self.check_plan(&plan.assignment, nodes);
-        match &self.last {
-            Some(last) if last.assignment.plan_epoch == plan.assignment.plan_epoch => assert_eq!(*last, plan),
-            Some(last) => {
-                assert!(plan.assignment.plan_epoch > last.assignment.plan_epoch, "epochs rise");
-                self.check_calm_change(&last.assignment, &plan);
-                self.activated(plan);
-            }
-            None => self.activated(plan),
-        }
-    }
-
-    /// Without losses, and without another session that decides, plans dwell, and pipelines change two roles at most.
-    fn check_calm_change(&self, last: &Assignment, plan: &SessionPlan) {
-        if self.may_replan {
+        let last = self.last.get(&plan.assignment.workload_number);
+        if last.is_some_and(|last| last.plan.assignment.plan_epoch == plan.assignment.plan_epoch) {
+            assert_eq!(last.map(|last| &last.plan), Some(&plan));
             return;
         }
-        assert!(self.now - self.last_at >= DWELL, "{:?} after the last plan: {}", self.now - self.last_at, plan.reason);
+        assert!(plan.assignment.plan_epoch > self.highest_epoch, "epochs rise, those of all workloads together");
+        if let Some(last) = last {
+            self.check_calm_change(last, &plan);
+        }
+        self.activated(plan);
+    }
+
+    /// Without losses, and without sessions that come or go, plans dwell, and pipelines change two roles at most.
+    fn check_calm_change(&self, last: &LastPlan, plan: &SessionPlan) {
+        if last.may_replan {
+            return;
+        }
+        let lasted = self.now - last.at;
+        assert!(lasted >= DWELL, "{lasted:?} after the last plan: {}", plan.reason);
+        let last = &last.plan.assignment;
         let is_pipeline = [last.policy, plan.assignment.policy] == [cluster::Policy::Pipeline; 2];
         assert!(!is_pipeline || changes(last, &plan.assignment) <= 2, "{}", plan.reason);
     }
 
     fn activated(&mut self, plan: SessionPlan) {
-        let epoch = plan.assignment.plan_epoch;
+        let (epoch, number) = (plan.assignment.plan_epoch, plan.assignment.workload_number);
         assert!(epoch > self.seen, "above what nodes have seen");
         for name in self.alive.keys().cloned().collect::<Vec<_>>() {
             // Some answers are lost.
@@ -287,9 +406,13 @@ impl World {
                 self.later(2000, Event::Ready { plan_epoch: epoch, node_name: name });
             }
         }
-        self.last = Some(plan);
-        (self.last_at, self.may_replan) = (self.now, false);
+        self.last.insert(number, LastPlan { plan, at: self.now, may_replan: false });
+        self.highest_epoch = epoch;
         self.plans += 1;
+    }
+
+    fn may_use(&self, number: u64, name: &str) -> bool {
+        [None, Some(number)].iter().all(|scope| !self.quarantined.contains(&(*scope, name.to_owned())))
     }
 
     /// Every node of a plan is a member, and each image is sampled once.
@@ -298,7 +421,8 @@ impl World {
         for (name, address) in names.chain(plan.compositors.iter().map(|c| (&c.node_name, &c.address))) {
             let incarnation = self.members.get(name).expect("a member");
             assert_eq!(*address, format!("http://{name}:{incarnation}"));
-            assert!(nodes.iter().any(|node| node.address == *address) && !self.quarantined.contains(name), "{name}");
+            assert!(nodes.iter().any(|node| node.address == *address), "{name}");
+            assert!(self.may_use(plan.workload_number, name), "{name}");
         }
         assert!(!plan.compositors.is_empty());
         let mut images: Vec<u32> = plan.samplers.iter().flat_map(|s| s.image_indices.clone()).collect();
@@ -307,31 +431,62 @@ impl World {
         assert_eq!(images, if plan.policy == cluster::Policy::Direct { vec![] } else { all.collect::<Vec<_>>() });
     }
 
-    /// While there are nodes and sessions there is a plan, of members.
+    /// A workload has a plan while it has sessions and there is a node for it; every node that can serve one does.
     fn check_always(&self) {
-        let plan = self.scheduler.status().plan;
-        let usable = self.members.keys().any(|name| !self.quarantined.contains(name));
-        assert_eq!(plan.is_some(), usable && !self.sessions.is_empty(), "{:?} {:?}", self.members, self.sessions);
-        if let Some(plan) = plan {
-            assert!(roles(&plan.assignment).keys().all(|name| self.members.contains_key(*name)));
+        let (workloads, nodes) = (self.scheduler.status().workloads, self.scheduler.nodes_of_workloads());
+        let kinds: BTreeSet<usize> = self.sessions.values().copied().collect();
+        assert_eq!(workloads.len(), kinds.len(), "{:?}", self.sessions);
+        for WorkloadStatus { number, plan, .. } in &workloads {
+            let usable = self.members.keys().any(|name| self.may_use(*number, name));
+            assert_eq!(plan.is_some(), usable, "{number} of {:?} {:?}", self.members, self.quarantined);
+            assert_eq!(nodes[number].is_empty(), !usable, "every workload has a node");
+            assert!(nodes[number].iter().all(|name| self.may_use(*number, name)));
+            let assignment = plan.as_ref().map(|plan| &plan.assignment);
+            assert!(assignment.is_none_or(|plan| roles(plan).keys().all(|name| nodes[number].contains(*name))));
+        }
+        let serves = |name: &String| nodes.values().any(|nodes| nodes.contains(name));
+        let could = |name: &String| workloads.iter().any(|workload| self.may_use(workload.number, name));
+        assert!(self.members.keys().all(|name| serves(name) == could(name)), "{nodes:?}");
+    }
+
+    /// No more faults: late events arrive, nodes work or are idle, and plans come to rest.
+    fn calm(&mut self, is_idle: bool) {
+        let plans = self.plans;
+        self.ticks(600, is_idle);
+        let most = 8 + (self.scheduler.status().workloads.len().saturating_sub(1)) * 2 * MOST_NODES as usize;
+        assert!(self.plans - plans <= most, "{} plans in a calm", self.plans - plans);
+        let plans = self.plans;
+        self.ticks(100, is_idle);
+        assert_eq!(self.plans, plans, "it rests");
+        assert!(self.scheduler.is_divided_evenly(), "{:?}", self.scheduler.nodes_of_workloads());
+        self.check_equal_shares();
+    }
+
+    fn ticks(&mut self, count: usize, is_idle: bool) {
+        for _ in 0..count {
+            self.pass(500);
+            if !is_idle {
+                self.work();
+            }
+            self.tell(Event::Tick);
         }
     }
 
-    /// No more faults: late events arrive, and plans come to rest.
-    fn calm(&mut self) {
-        let plans = self.plans;
-        for _ in 0..600 {
-            self.pass(500);
-            self.tell(Event::Tick);
+    /// Workloads of equal weight have about as many nodes.
+    fn check_equal_shares(&self) {
+        let (nodes, weights) = (self.scheduler.nodes_of_workloads(), self.scheduler.weights_of_workloads());
+        let is_divided = weights.len() > 1 && weights.len() <= nodes.values().flatten().collect::<BTreeSet<_>>().len();
+        for (a, weight) in weights.iter().filter(|_| is_divided) {
+            for b in weights.iter().filter(|(_, other)| (*other / weight - 1.0).abs() < 0.01).map(|(b, _)| b) {
+                let (most, least) = (nodes[a].len() as f64, nodes[b].len() as f64);
+                assert!(most <= (least + 1.0) * 1.25, "{nodes:?} by {weights:?}");
+            }
         }
-        assert!(self.plans - plans <= 8, "{} plans in a calm", self.plans - plans);
-        let plans = self.plans;
-        for _ in 0..100 {
-            self.pass(500);
-            self.tell(Event::Tick);
-        }
-        assert_eq!(self.plans, plans, "it rests");
     }
+}
+
+fn epoch_of(workload: &WorkloadStatus) -> Option<u64> {
+    workload.plan.as_ref().map(|plan| plan.assignment.plan_epoch)
 }
 
 fn measured(node_name: String, plan_epoch: u64, costs: MeasuredCosts) -> Event {
@@ -367,14 +522,14 @@ fn for_seeds(seeds: std::ops::Range<u64>, run: impl Fn(u64) + std::panic::RefUnw
 }
 
 #[test]
-fn invariants_hold_under_faults_of_all_kinds() {
+fn invariants_hold_under_faults_of_all_kinds_for_one_to_five_workloads() {
     for_seeds(0..SEEDS, |seed| {
-        let mut world = World::new(seed);
+        let mut world = World::new(seed, 1 + seed % IMAGES.len() as u64);
         for _ in 0..STEPS {
             world.pass(700);
             world.fault();
         }
-        world.calm();
+        world.calm(seed % 3 == 0);
     });
 }
 
@@ -382,7 +537,7 @@ fn invariants_hold_under_faults_of_all_kinds() {
 #[test]
 fn k_follows_views_up_and_down_without_flapping() {
     for_seeds(0..SEEDS, |seed| {
-        let mut world = World::new(seed);
+        let mut world = World::new(seed, 1);
         let nodes = 2 + world.random.below(14);
         (0..nodes).for_each(|i| world.tell(join(&format!("n{i:02}"), i, 0)));
         world.alive = (0..nodes).map(|i| (format!("n{i:02}"), (i, 1.0))).collect();
@@ -406,7 +561,7 @@ fn k_follows_views_up_and_down_without_flapping() {
 
 /// K of every plan while a minute and a half passes.
 fn settle(world: &mut World) -> Vec<usize> {
-    let k = |world: &World| world.last.as_ref().map_or(0, SessionPlan::sampler_count);
+    let k = |world: &World| world.last.values().next().map_or(0, |last| last.plan.sampler_count());
     let mut seen = vec![k(world)];
     for _ in 0..360 {
         world.pass(500);
@@ -419,7 +574,7 @@ fn settle(world: &mut World) -> Vec<usize> {
 }
 
 fn near_k_fd(world: &World, costs: &Costs, images: usize, views: usize) -> bool {
-    let plan = &world.last.as_ref().expect("a plan").assignment;
+    let plan = &world.last[&1].plan.assignment;
     let nodes = vec![NodeCosts { costs: *costs, transfer_image_s: None }; world.members.len()];
     let load = Load { images, views, ..Load::default() };
     let samples =
@@ -432,13 +587,14 @@ fn near_k_fd(world: &World, costs: &Costs, images: usize, views: usize) -> bool 
 #[test]
 fn timings_that_vary_by_a_fifth_move_no_roles() {
     for_seeds(0..50, |seed| {
-        let mut world = World::new(seed);
+        let mut world = World::new(seed, 1);
         (0..8).for_each(|i| world.tell(join(&format!("n{i:02}"), i, 0)));
         world.sessions.insert(1, 4);
         world.tell(opened(1, PolicyChoice::Pipeline, 200));
         for _ in 0..1000 {
             let (name, noise) = (format!("n{:02}", world.random.below(8)), world.random.between(0.8, 1.25));
-            world.tell(measured(name, world.epoch(), timings(noise)));
+            let epoch = world.random_epoch();
+            world.tell(measured(name, epoch, timings(noise)));
             world.pass(300);
         }
         assert!(world.plans == 1, "{} plans", world.plans);

@@ -33,6 +33,11 @@ impl Smoothed {
         (self.last, self.value) = (VecDeque::new(), None);
     }
 
+    /// All timings were of work that takes `times` times as long now.
+    pub(super) fn scale(&mut self, times: f64) {
+        self.last.iter_mut().chain(&mut self.value).for_each(|timing| *timing *= times);
+    }
+
     /// Another expected value, while there is no timing.
     pub(super) fn expect(&mut self, value: f64) {
         if self.last.is_empty() {

@@ -1,96 +1,110 @@
-//! The demand of all sessions together, and the plan that serves them.
+//! One workload: its sessions, its nodes, and the plan that serves it.
 
-use cluster::{AchievedTime, Costs, Quality, Workload};
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use cluster::{AchievedTime, Costs, Policy, PolicyChoice, Quality, Workload};
 use depth_image::{Camera, PinholeCamera};
 use glam::UVec2;
 
 use super::active_plan::ActivePlan;
 use super::cells::Cells;
+use super::node_costs::view_s;
 use super::overload::Overload;
+use super::session_mix::SessionMix;
 use super::{Load, Opening, PolicyOverride};
 
-/// The demand of one session.
-#[derive(Debug, Clone)]
-struct Session {
-    number: u64,
-    views: usize,
-    frames_per_s: Option<f64>,
-    policy_override: PolicyOverride,
-    fallbacks: Vec<Quality>,
-    viewpoints: Vec<PinholeCamera>,
-    method: String,
-}
+/// A workload of which nothing is asked for this long gives nodes to others that need them.
+const IDLE_AFTER: Duration = Duration::from_secs(10);
 
-/// Sessions of one workload.
+/// Sessions that share samples, and what the cluster does for them.
 #[derive(Debug, Clone)]
 pub(super) struct WorkloadState {
     /// Undegraded, with the cells' sample cameras where there are cells.
     pub(super) requested: Workload,
     /// Where sample cameras follow viewpoints.
     cells: Option<Cells>,
-    /// As measured when it was first opened.
+    /// Of the mean view of its sessions, as measured when they were opened.
     pub(super) costs: Costs,
-    /// In the order they were opened.
-    sessions: Vec<Session>,
+    pub(super) sessions: SessionMix,
     /// The present fallback.
     pub(super) overload: Overload,
+    /// The nodes that serve it.
+    pub(super) nodes: BTreeSet<String>,
+    /// Nodes that could not take a plan of it, and since when.
+    pub(super) excluded: BTreeMap<String, Duration>,
     /// `None` while no node is there.
     pub(super) active_plan: Option<ActivePlan>,
     /// Times of each policy that has been in force.
     pub(super) achieved: Vec<AchievedTime>,
+    /// The last time that something was asked of it.
+    active_at: Duration,
+    /// A node has taken a plan of it.
+    has_been_ready: bool,
+}
+
+/// The part of the demand that a plan follows at once.
+#[derive(Debug, PartialEq)]
+pub(super) struct PlanTrigger {
+    pub(super) policy_override: PolicyOverride,
+    pub(super) sample_cameras: Vec<Camera>,
+    fallback: usize,
 }
 
 impl WorkloadState {
-    pub(super) fn new(opening: &Opening) -> Self {
-        Self {
+    /// With its first session.
+    pub(super) fn new(now: Duration, opening: &Opening) -> Self {
+        let mut workload = Self {
             requested: opening.workload.clone(),
             cells: (!opening.viewpoints.is_empty()).then(|| Cells::of(&opening.workload)),
             costs: opening.costs,
-            sessions: Vec::new(),
+            sessions: SessionMix::default(),
             overload: Overload::default(),
+            nodes: BTreeSet::new(),
+            excluded: BTreeMap::new(),
             active_plan: None,
             achieved: Vec::new(),
-        }
+            active_at: now,
+            has_been_ready: false,
+        };
+        workload.change(now, |sessions| sessions.add(opening));
+        workload
     }
 
-    pub(super) fn add(&mut self, opening: &Opening) {
-        self.sessions.retain(|session| session.number != opening.session);
-        self.sessions.push(Session {
-            number: opening.session,
-            views: opening.views_per_set,
-            frames_per_s: opening.frames_per_s,
-            policy_override: opening.policy_override,
-            fallbacks: opening.fallbacks.clone(),
-            viewpoints: opening.viewpoints.clone(),
-            method: opening.method.clone(),
-        });
+    /// Changes the sessions, and all that follows from them.
+    pub(super) fn change(&mut self, now: Duration, change: impl FnOnce(&mut SessionMix)) {
+        change(&mut self.sessions);
+        self.costs = self.sessions.costs(self.set_s()).unwrap_or(self.costs);
+        self.overload.limit(now, self.sessions.fallbacks().len());
         self.update_cells();
+        self.note_activity(now);
+    }
+
+    pub(super) fn trigger(&self) -> PlanTrigger {
+        PlanTrigger {
+            policy_override: self.sessions.policy_override(),
+            sample_cameras: self.requested.sample_cameras.clone(),
+            fallback: self.overload.step,
+        }
     }
 
     /// Whether a session asks for this workload.
     pub(super) fn is_shared_by(&self, opening: &Opening) -> bool {
         match &self.cells {
-            Some(cells) => !opening.viewpoints.is_empty() && cells.are_shareable(&self.requested, &opening.workload),
-            None => opening.viewpoints.is_empty() && self.requested == opening.workload,
+            Some(cells) => !opening.viewpoints.is_empty() && cells.are_shareable(&self.requested, &self.with_planes(&opening.workload)),
+            None => opening.viewpoints.is_empty() && self.requested == self.with_planes(&opening.workload),
         }
     }
 
-    pub(super) fn remove(&mut self, number: u64) {
-        self.sessions.retain(|session| session.number != number);
-        self.update_cells();
-    }
-
-    pub(super) fn set_viewpoints(&mut self, number: u64, viewpoints: &[PinholeCamera]) {
-        for session in self.sessions.iter_mut().filter(|session| session.number == number) {
-            session.viewpoints = viewpoints.to_vec();
-        }
-        self.update_cells();
+    /// A workload whose images need no more planes than these is as good with these.
+    fn with_planes(&self, other: &Workload) -> Workload {
+        let own = self.requested.planes;
+        Workload { planes: if own.contain(other.planes) { own } else { other.planes }, ..other.clone() }
     }
 
     fn update_cells(&mut self) {
         let Some(cells) = &mut self.cells else { return };
-        let viewpoints: Vec<_> = self.sessions.iter().flat_map(|session| session.viewpoints.iter().copied()).collect();
-        cells.follow(&viewpoints, &self.requested.volume);
+        cells.follow(&self.sessions.viewpoints(), &self.requested.volume);
         cells.place_cameras(&mut self.requested);
     }
 
@@ -99,24 +113,39 @@ impl WorkloadState {
         self.cells.as_ref().map(Cells::len)
     }
 
-    pub(super) fn set_demand(&mut self, number: u64, views: usize, frames_per_s: Option<f64>) {
-        for session in self.sessions.iter_mut().filter(|session| session.number == number) {
-            (session.views, session.frames_per_s) = (views, frames_per_s);
+    /// Something was asked of it, or done for it.
+    pub(super) fn note_activity(&mut self, now: Duration) {
+        self.active_at = now;
+    }
+
+    /// Counts work of a node for the plan in force.
+    pub(super) fn count_work(&mut self, now: Duration, name: &str, busy_s: f64, views: u64) {
+        if busy_s > 0.0 || views > 0 {
+            self.note_activity(now);
+        }
+        let views_per_set = self.load().views;
+        let Some(active) = self.active_plan.as_mut().filter(|active| active.members.contains_key(name)) else { return };
+        active.add_work(name, busy_s, views);
+        if let Some(achieved) = active.achieved(views_per_set) {
+            self.achieved.retain(|other| other.policy != achieved.policy);
+            self.achieved.push(achieved);
         }
     }
 
-    pub(super) fn sessions(&self) -> Vec<u64> {
-        self.sessions.iter().map(|session| session.number).collect()
+    /// A node has taken a plan.
+    pub(super) fn note_ready(&mut self, now: Duration) {
+        if !std::mem::replace(&mut self.has_been_ready, true) {
+            self.note_activity(now);
+        }
     }
 
-    /// V of all sessions.
-    pub(super) fn views(&self) -> usize {
-        self.sessions.iter().fold(0, |sum, session| sum.saturating_add(session.views))
+    /// Whether nothing has been asked of it for a while.
+    pub(super) fn is_idle(&self, now: Duration) -> bool {
+        self.has_been_ready && now.saturating_sub(self.active_at) >= IDLE_AFTER
     }
 
-    /// Views a second that sessions with a rate ask for, undegraded.
-    pub(super) fn views_per_s(&self) -> f64 {
-        self.sessions.iter().filter_map(|session| Some(session.frames_per_s? * session.views as f64)).sum()
+    pub(super) fn policy(&self) -> Option<Policy> {
+        self.active_plan.as_ref().map(ActivePlan::policy)
     }
 
     /// Scene time from set to set; a second for a static scene.
@@ -127,41 +156,63 @@ impl WorkloadState {
 
     /// Views of a set: those of sessions with a rate while the set is shown, and those of the others at once.
     pub(super) fn load(&self) -> Load {
+        self.load_with(self.sessions.views_at_once())
+    }
+
+    /// The load of sessions with a rate alone.
+    pub(super) fn rated_load(&self) -> Load {
+        self.load_with(0)
+    }
+
+    fn load_with(&self, views_at_once: usize) -> Load {
         let timeline = &self.requested.timeline;
-        let at_once =
-            self.sessions.iter().filter(|session| session.frames_per_s.is_none()).map(|session| session.views);
-        let at_once = at_once.fold(0usize, usize::saturating_add);
-        let rated = (self.views_per_s() * self.frame_rate_ratio() * self.set_s()).ceil() as usize;
+        let rated = (self.sessions.views_per_s() * self.frame_rate_ratio() * self.set_s()).ceil() as usize;
         Load {
             images: self.requested.sample_cameras.len(),
             tiles: 1,
             cells: self.requested.cell_count(),
             // A static scene is one set, though it be refined: the sampler keeps its sums.
             sets: if timeline.moves() { timeline.set_count as usize } else { 1 },
-            views: at_once.saturating_add(rated),
+            views: views_at_once.saturating_add(rated),
             images_are_sequential: self.costs.in_order,
-            is_already_sampled: !timeline.moves() && at_once == 0 && rated > 0,
+            is_already_sampled: !timeline.moves() && views_at_once == 0 && rated > 0,
         }
     }
 
     /// The share of the nodes' time that a plan of `time_s` a set takes; 0 where a session states no rate.
     pub(super) fn utilisation(&self, time_s: f64) -> f64 {
-        let all_rated = !self.sessions.is_empty() && self.sessions.iter().all(|session| session.frames_per_s.is_some());
-        if all_rated { time_s / self.set_s() } else { 0.0 }
+        if self.sessions.has_batch() { 0.0 } else { time_s / self.set_s() }
     }
 
-    /// The last session that was opened decides.
-    pub(super) fn policy_override(&self) -> PolicyOverride {
-        self.sessions.last().map(|session| session.policy_override).unwrap_or_default()
+    /// The share of the nodes' time that sessions with a rate take at their last fallback, where a set of their views
+    /// takes `time_s` now.
+    pub(super) fn utilisation_at_last(&self, time_s: f64) -> f64 {
+        let least_ratio = self.sessions.fallbacks().last().map_or(1.0, |quality| quality.frame_rate_ratio);
+        time_s / self.set_s() * least_ratio / self.frame_rate_ratio()
     }
 
-    /// The fallbacks of the last session, which decides on these, too.
-    pub(super) fn fallbacks(&self) -> &[Quality] {
-        self.sessions.last().map_or(&[], |session| &session.fallbacks)
+    /// Nodes that do nothing but serve sessions with a rate, at these mean costs. It does not depend on the policy in force,
+    /// which depends on the number of nodes.
+    pub(super) fn live_nodes(&self, mean: &Costs) -> f64 {
+        let is_direct = self.sessions.policy_override().policy == PolicyChoice::Direct;
+        let direct_s = mean.direct_view_s + mean.encode_view_s;
+        let each_s = if is_direct { direct_s } else { direct_s.min(view_s(mean)) };
+        let views_s = self.sessions.views_per_s() * self.frame_rate_ratio() * each_s;
+        let samples = !is_direct && self.requested.timeline.moves() && views_s > 0.0;
+        let set_s = self.requested.sample_cameras.len() as f64 * mean.sample_image_s + mean.load_set_s;
+        views_s + if samples { set_s / self.set_s() } else { 0.0 }
+    }
+
+    /// A view by the policy in force, encoded.
+    pub(super) fn view_s(&self, costs: &Costs) -> f64 {
+        match self.policy() {
+            Some(Policy::Direct) => costs.direct_view_s + costs.encode_view_s,
+            Some(Policy::Pipeline | Policy::TimeShare) | None => view_s(costs),
+        }
     }
 
     fn quality(&self) -> Option<&Quality> {
-        self.fallbacks().get(self.overload.step.checked_sub(1)?)
+        self.sessions.fallbacks().get(self.overload.step.checked_sub(1)?)
     }
 
     /// Pictures a second over those asked for.
@@ -169,10 +220,10 @@ impl WorkloadState {
         self.quality().map_or(1.0, |quality| quality.frame_rate_ratio)
     }
 
-    /// How views are reconstructed: under a fallback as it says, else as the last session asks.
+    /// How views are reconstructed: under a fallback as it says, else as most sessions ask.
     pub(super) fn method(&self) -> String {
-        let asked = self.sessions.last().map(|session| &session.method);
-        self.quality().map(|quality| &quality.method).or(asked).cloned().unwrap_or_default()
+        let usual = || self.sessions.usual_method().unwrap_or_default();
+        self.quality().map_or_else(usual, |quality| &quality.method).to_owned()
     }
 
     /// The workload at the present fallback.
@@ -187,5 +238,12 @@ impl WorkloadState {
             sample_cameras: self.requested.sample_cameras.iter().map(sized).collect(),
             ..self.requested.clone()
         }
+    }
+
+    /// Whether its samples may be seen from these viewpoints; `None` where sample cameras follow none.
+    pub(super) fn cells_seen_from(&self, now: Duration, session: u64, viewpoints: &[PinholeCamera]) -> Option<usize> {
+        let mut changed = self.clone();
+        changed.change(now, |sessions| sessions.set_viewpoints(session, viewpoints));
+        changed.cell_count()
     }
 }

@@ -32,7 +32,7 @@ pub use node::{JoinCluster, MeasureCosts, Measured, NodeStatus, Ready, SamplerRe
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};
 pub use scene::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, ScenePart, SceneRef};
 pub use session::{ChangeSession, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage};
-pub use status::{AchievedTime, ClusterStatus, NodeCondition, OfferSettings, OfferStatus};
+pub use status::{AchievedTime, ClusterStatus, NodeCondition, OfferSettings, OfferStatus, WorkloadStatus};
 pub use timeline::{Refinement, Timeline};
 pub use views::{DIRECT, FetchImages, LiveRequest, RenderViews, RequestedView, check_view_count};
 pub use workload::{SamplePlanes, SetContent, Workload};

@@ -28,6 +28,8 @@ pub const MAX_SCENE_TIME_S: f64 = 1e6;
 pub const MAX_NODES: usize = 1024;
 /// Scenes on offer.
 pub const MAX_SCENES: usize = 64;
+/// Workloads that may be open at a time.
+pub const MAX_WORKLOADS: usize = 64;
 /// Views measured in one call.
 pub const MAX_BATCH: u32 = 64;
 /// The highest epoch that a member may join with: a coordinator goes on from there, which must leave room.

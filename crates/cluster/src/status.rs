@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use crate::check::{InvalidField, at_most, finite_seconds, nonempty, text};
 use crate::costs::Costs;
-use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_SCENES};
+use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_SCENES, MAX_WORKLOADS};
 use crate::node::NodeStatus;
 use crate::policy::Policy;
 use crate::scene::SceneRef;
@@ -23,18 +23,8 @@ pub struct ClusterStatus {
     pub nodes: Vec<NodeStatus>,
     /// The scenes on offer; sessions that name none get the first.
     pub offers: Vec<OfferStatus>,
-    /// The plan in force; `None` while no session is open, or no node is a member.
-    pub plan: Option<SessionPlan>,
-    /// Sessions that share the plan, or wait for one.
-    pub session_count: u32,
-    /// V: views that all sessions ask of each sample set.
-    pub views_per_set: u64,
-    /// The condition of every member while a session is open.
-    pub conditions: Vec<NodeCondition>,
-    /// One entry for each policy that has been in force for the open sessions.
-    pub achieved: Vec<AchievedTime>,
-    /// The share of the plan's nodes' time that all sessions' frame rates take; `None` where no session states a rate.
-    pub utilisation: Option<f64>,
+    /// Every open workload.
+    pub workloads: Vec<WorkloadStatus>,
 }
 
 impl ClusterStatus {
@@ -42,14 +32,64 @@ impl ClusterStatus {
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
         at_most(self.nodes.len(), MAX_NODES, "nodes")?;
-        at_most(self.conditions.len(), MAX_NODES, "conditions")?;
-        at_most(self.achieved.len(), MAX_POLICIES, "achieved_times")?;
+        at_most(self.workloads.len(), MAX_WORKLOADS, "workloads")?;
         at_most(self.offers.len(), MAX_SCENES, "offers")?;
         self.offers.iter().try_for_each(OfferStatus::validate)?;
+        self.workloads.iter().try_for_each(WorkloadStatus::validate)
+    }
+
+    /// Sessions of all workloads.
+    #[must_use]
+    pub fn session_count(&self) -> u64 {
+        self.workloads.iter().map(|workload| u64::from(workload.session_count)).sum()
+    }
+
+    /// V: views that all sessions ask of each sample set.
+    #[must_use]
+    pub fn views_per_set(&self) -> u64 {
+        self.workloads.iter().fold(0, |sum, workload| sum.saturating_add(workload.views_per_set))
+    }
+
+    /// K: nodes that sample, each counted once for every workload that it samples for.
+    #[must_use]
+    pub fn sampler_count(&self) -> usize {
+        self.workloads.iter().filter_map(|workload| Some(workload.plan.as_ref()?.sampler_count())).sum()
+    }
+}
+
+/// One workload: sessions that share samples, and what they get.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct WorkloadStatus {
+    /// Its number, which no other workload has had.
+    pub number: u64,
+    /// The plan in force; `None` while no node serves it.
+    pub plan: Option<SessionPlan>,
+    /// Sessions that share the plan, or wait for one.
+    pub session_count: u32,
+    /// Sessions with a rate.
+    pub viewer_count: u32,
+    /// V: views that its sessions ask of each sample set.
+    pub views_per_set: u64,
+    /// The condition of every node that serves it.
+    pub conditions: Vec<NodeCondition>,
+    /// One entry for each policy that has been in force for it.
+    pub achieved: Vec<AchievedTime>,
+    /// The share of its nodes' time that its sessions' frame rates take; `None` where a session states no rate.
+    pub utilisation: Option<f64>,
+    /// The share of all nodes' time that one more viewer would take: one like the mean of its viewers, or one of 10 views a
+    /// second.
+    pub one_more_viewer: f64,
+}
+
+impl WorkloadStatus {
+    fn validate(&self) -> Result<(), InvalidField> {
+        at_most(self.conditions.len(), MAX_NODES, "conditions")?;
+        at_most(self.achieved.len(), MAX_POLICIES, "achieved_times")?;
         self.plan.as_ref().map_or(Ok(()), SessionPlan::validate)?;
         self.conditions.iter().try_for_each(NodeCondition::validate)?;
         self.achieved.iter().try_for_each(|achieved| finite_seconds(achieved.busy_s, "busy_s"))?;
-        finite_seconds(self.utilisation, "utilisation_ratio")
+        finite_seconds(self.utilisation, "utilisation_ratio")?;
+        finite_seconds(self.one_more_viewer, "one_more_viewer_ratio")
     }
 }
 

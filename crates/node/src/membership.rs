@@ -108,7 +108,7 @@ fn preload(welcome: Welcome, scenes: Arc<Scenes>) {
     });
 }
 
-/// Does a little of the cluster's present work, so that a plan finds the node warm. No other node waits for it.
+/// Does a little of the work of every plan in force, so that the next finds the node warm. No other node waits for it.
 async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) {
     let start = Instant::now();
     match tokio::time::timeout(WARM_UP_TIMEOUT, do_a_little(client, scenes, plan)).await {
@@ -119,12 +119,16 @@ async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan
 }
 
 async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) -> Result<(), Status> {
-    let served = client.get_status(()).await?.plan.map(|plan| (plan.assignment, plan.method));
     // A node that has had a plan is warm.
-    let Some((served, method)) = served.filter(|_| plan.epoch() == 0) else { return Ok(()) };
-    scenes.ensure(&served.workload.scene).await?;
-    let engine = scenes.engine.clone();
-    blocking(move || warm(engine.as_ref(), &served, method)).await
+    if plan.epoch() > 0 {
+        return Ok(());
+    }
+    for served in client.get_status(()).await?.workloads.into_iter().filter_map(|workload| workload.plan) {
+        scenes.ensure(&served.assignment.workload.scene).await?;
+        let engine = scenes.engine.clone();
+        blocking(move || warm(engine.as_ref(), &served.assignment, served.method)).await?;
+    }
+    Ok(())
 }
 
 /// Makes one small picture of each kind that the plan has, its views by `method`.

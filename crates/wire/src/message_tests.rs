@@ -7,7 +7,7 @@ use cluster::{
     AchievedTime, Assignment, ChangeSession, ClusterStatus, CompositorShare, Costs, InvalidField, JoinCluster,
     LiveRequest, MeasureCosts, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings, OfferStatus, Policy,
     PolicyChoice, Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport, SamplerShare, SceneHash, SceneRef,
-    SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload,
+    SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
 };
 use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
 use depth_image::{Aabb, Camera, Environment, Illumination, Light, MAX_LIGHTS, PinholeCamera, ViewPlanes};
@@ -155,16 +155,19 @@ fn messages_survive_the_round_trip() {
         dropped_views: 1,
         busy_ratio: 0.7,
     };
-    let status = ClusterStatus {
-        plan_epoch: 4,
+    let workload = WorkloadStatus {
+        number: 3,
         plan: Some(session_plan()),
         session_count: 2,
+        viewer_count: 1,
         views_per_set: 70,
         conditions: vec![condition],
         achieved: vec![AchievedTime { policy: Policy::TimeShare, busy_s: 0.3 }],
         utilisation: Some(0.6),
-        ..ClusterStatus::default()
+        one_more_viewer: 0.02,
     };
+    let waiting = WorkloadStatus { number: 4, ..WorkloadStatus::default() };
+    let status = ClusterStatus { plan_epoch: 4, workloads: vec![workload, waiting], ..ClusterStatus::default() };
     assert_eq!(read::<ClusterStatus, _>(to_message::<proto::GetStatusResponse, _>(status.clone())), Ok(status));
     let report = SamplerReport {
         plan_epoch: 4,

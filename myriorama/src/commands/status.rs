@@ -1,4 +1,4 @@
-//! `myriorama status`: the state of a cluster as a table of nodes, roles and costs, and the reason of the plan.
+//! `myriorama status`: workloads and their demand, nodes with their roles and costs, and the reasons of the plans.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -7,11 +7,25 @@ use anyhow::Context as _;
 use app_core::exit::Outcome;
 use clap::Args;
 use client::Client;
-use cluster::{ClusterStatus, Costs, NodeStatus};
+use cluster::{ClusterStatus, Costs, NodeCondition, NodeStatus, WorkloadStatus};
 use table::{Cell, Table};
 
 use crate::terminal_picture;
 
+const WORKLOAD_COLUMNS: [(&str, &str); 10] = [
+    ("workload", ""),
+    ("scene", ""),
+    ("light", ""),
+    ("policy", ""),
+    ("K", ""),
+    ("sessions", ""),
+    ("viewers", ""),
+    ("V", ""),
+    ("used", "%"),
+    ("one more viewer", "%"),
+];
+/// Characters of a scene's hash that tell scenes apart.
+const SHORT_HASH: usize = 8;
 const COLUMNS: [(&str, &str); 12] = [
     ("node", ""),
     ("roles", ""),
@@ -27,7 +41,7 @@ const COLUMNS: [(&str, &str); 12] = [
     ("device", ""),
 ];
 
-/// Prints the nodes of a cluster with their roles and costs, the plan and its reason.
+/// Prints the workloads of a cluster, the nodes of each with their roles and costs, and the reasons of the plans.
 #[derive(Debug, Args)]
 pub struct StatusArgs {
     /// The address of the coordinator
@@ -64,52 +78,91 @@ pub async fn run(args: &StatusArgs) -> anyhow::Result<Outcome> {
     }
 }
 
+/// The workloads, then the nodes of each.
 fn text(status: &ClusterStatus) -> anyhow::Result<String> {
-    let mut table = Table::new(headline(status), &COLUMNS);
-    for node in &status.nodes {
-        table.push(row(status, node))?;
+    let mut workloads = Table::new(headline(status), &WORKLOAD_COLUMNS);
+    for workload in &status.workloads {
+        workloads.push(workload_row(workload))?;
     }
-    let why = status.plan.as_ref().map_or("No plan: nobody has asked for views.", |plan| &plan.reason);
-    Ok(format!("{}\n\n{why}\n{}", table.to_text(), achieved(status)))
-}
-
-/// Times that policies achieved, and the load of the nodes.
-fn achieved(status: &ClusterStatus) -> String {
-    let mut lines: Vec<String> =
-        status.achieved.iter().map(|a| format!("Achieved by {}: {:.3} ms a set.", a.policy, a.busy_s * 1e3)).collect();
-    if let Some(utilisation) = status.utilisation {
-        let fallback = status.plan.as_ref().and_then(|plan| plan.fallback);
-        let quality = fallback.map_or("all that was asked for".to_owned(), |number| format!("fallback {number}"));
-        lines.push(format!("Sessions take {:.0} % of the nodes' time and get {quality}.", utilisation * 100.0));
+    let mut parts = vec![workloads.to_text()];
+    for workload in &status.workloads {
+        parts.push(workload_text(workload, &status.nodes)?);
     }
-    lines.join("\n")
+    let is_idle = |node: &&NodeStatus| !status.workloads.iter().any(|workload| condition(workload, node).is_some());
+    let idle: Vec<String> = status.nodes.iter().filter(is_idle).map(|node| node.node_name.clone()).collect();
+    if !idle.is_empty() {
+        parts.push(format!("Nodes without a workload: {}.", idle.join(", ")));
+    }
+    Ok(parts.join("\n\n"))
 }
 
 fn headline(status: &ClusterStatus) -> String {
-    let ClusterStatus { plan_epoch, nodes, session_count, views_per_set, .. } = status;
-    let (p, k) = (nodes.len(), status.plan.as_ref().map_or(0, |plan| plan.sampler_count()));
     format!(
-        "Plan {plan_epoch}: P = {p} nodes, K = {k} samplers, V = {views_per_set} views a set of {session_count} sessions"
+        "Plan {}: P = {} nodes, K = {} samplers, V = {} views a set of {} sessions",
+        status.plan_epoch,
+        status.nodes.len(),
+        status.sampler_count(),
+        status.views_per_set(),
+        status.session_count()
     )
 }
 
-fn row(status: &ClusterStatus, node: &NodeStatus) -> Vec<Cell> {
-    let condition = status.conditions.iter().find(|condition| condition.node_name == node.node_name);
-    let plan = condition.map_or("-", |condition| if condition.is_ready { "ready" } else { "not yet" });
-    let figures = condition.map(|condition| {
-        let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, .. } =
-            condition.costs;
-        let times_ms = [sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s].map(|s| s * 1e3);
-        let counts = [condition.busy_ratio * 100.0, condition.views as f64, condition.dropped_views as f64];
-        times_ms.into_iter().chain(counts).map(Cell::from).collect()
+fn workload_row(workload: &WorkloadStatus) -> Vec<Cell> {
+    let WorkloadStatus { number, session_count, viewer_count, views_per_set, utilisation, one_more_viewer, .. } = workload;
+    let plan = workload.plan.as_ref().map(|plan| {
+        let shown = &plan.assignment.workload;
+        let scene: String = shown.scene.hash.as_str().chars().take(SHORT_HASH).collect();
+        let (light, policy) = (shown.lighting.clone(), plan.assignment.policy.to_string());
+        vec![scene.into(), light.into(), policy.into(), (plan.sampler_count() as f64).into()]
     });
-    let head = [node.node_name.clone().into(), roles(status, &node.node_name).into(), plan.into()];
-    let figures = figures.unwrap_or_else(|| vec![Cell::Missing; 8]);
+    let head = [(*number as f64).into()].into_iter().chain(plan.unwrap_or_else(|| vec![Cell::Missing; 4]));
+    let counts = [f64::from(*session_count), f64::from(*viewer_count), *views_per_set as f64].map(Cell::from);
+    let used = utilisation.map_or(Cell::Missing, |utilisation| (utilisation * 100.0).into());
+    head.chain(counts).chain([used, (one_more_viewer * 100.0).into()]).collect()
+}
+
+/// The nodes of a workload, its plan's reason, and what it achieves.
+fn workload_text(workload: &WorkloadStatus, nodes: &[NodeStatus]) -> anyhow::Result<String> {
+    let mut table = Table::new(format!("Workload {}", workload.number), &COLUMNS);
+    for node in nodes {
+        if let Some(condition) = condition(workload, node) {
+            table.push(row(workload, node, condition))?;
+        }
+    }
+    let why = workload.plan.as_ref().map_or("No plan: no node can serve it now.", |plan| &plan.reason);
+    Ok(format!("{}\n\n{why}\n{}", table.to_text(), achieved(workload)))
+}
+
+/// Times that policies achieved, and the load of the nodes.
+fn achieved(workload: &WorkloadStatus) -> String {
+    let achieved = workload.achieved.iter();
+    let mut lines: Vec<String> =
+        achieved.map(|a| format!("Achieved by {}: {:.3} ms a set.", a.policy, a.busy_s * 1e3)).collect();
+    if let Some(utilisation) = workload.utilisation {
+        let fallback = workload.plan.as_ref().and_then(|plan| plan.fallback);
+        let quality = fallback.map_or("all that was asked for".to_owned(), |number| format!("fallback {number}"));
+        lines.push(format!("Sessions take {:.0} % of its nodes' time and get {quality}.", utilisation * 100.0));
+    }
+    lines.push(format!("One more viewer would take {:.1} % of all nodes' time.", workload.one_more_viewer * 100.0));
+    lines.join("\n")
+}
+
+fn condition<'a>(workload: &'a WorkloadStatus, node: &NodeStatus) -> Option<&'a NodeCondition> {
+    workload.conditions.iter().find(|condition| condition.node_name == node.node_name)
+}
+
+fn row(workload: &WorkloadStatus, node: &NodeStatus, condition: &NodeCondition) -> Vec<Cell> {
+    let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, .. } = condition.costs;
+    let times_ms = [sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s].map(|s| s * 1e3);
+    let counts = [condition.busy_ratio * 100.0, condition.views as f64, condition.dropped_views as f64];
+    let plan = if condition.is_ready { "ready" } else { "not yet" };
+    let head = [node.node_name.clone().into(), roles(workload, &node.node_name).into(), plan.into()];
+    let figures = times_ms.into_iter().chain(counts).map(Cell::from);
     head.into_iter().chain(figures).chain([node.device_name.clone().into()]).collect()
 }
 
-fn roles(status: &ClusterStatus, name: &str) -> String {
-    let Some(plan) = &status.plan else { return "-".to_owned() };
+fn roles(workload: &WorkloadStatus, name: &str) -> String {
+    let Some(plan) = &workload.plan else { return "-".to_owned() };
     let images = plan.assignment.samplers.iter().find(|share| share.node_name == name);
     let samples = images.map(|share| format!("samples {:?}", share.image_indices));
     let composites = plan.assignment.composites(name).then(|| "composites".to_owned());

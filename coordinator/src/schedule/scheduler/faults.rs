@@ -5,7 +5,9 @@ use std::time::Duration;
 use cluster::{Assignment, FetchImages, SamplerReport};
 
 use super::Scheduler;
+use crate::schedule::active_plan::ActivePlan;
 use crate::schedule::member::Member;
+use crate::schedule::workload_state::WorkloadState;
 use crate::schedule::{ChoiceError, Command, Probe, ProbeKind, ProbedImage};
 
 /// Duration of a quarantine, after which a link may be restored.
@@ -23,8 +25,11 @@ const SETS_AHEAD: f64 = 3.0;
 
 impl Scheduler {
     pub(super) fn ready(&mut self, plan_epoch: u64, name: String) -> Vec<Command> {
+        let (now, number) = (self.now, self.workload_of_plan(plan_epoch));
         if let Some(active) = self.active_plan_for(plan_epoch, &name) {
             active.ready.insert(name);
+            let workload = number.and_then(|number| self.workloads.get_mut(&number));
+            workload.into_iter().for_each(|workload| workload.note_ready(now));
         }
         Vec::new()
     }
@@ -37,50 +42,88 @@ impl Scheduler {
     }
 
     pub(super) fn unready(&mut self, plan_epoch: u64, name: &str, reason: &str) -> Vec<Command> {
+        let Some(number) = self.workload_of_plan(plan_epoch) else { return Vec::new() };
         if self.active_plan_for(plan_epoch, name).is_none() {
             return Vec::new();
         }
-        self.quarantine(name, &format!("could not take plan {plan_epoch}: {reason}"))
+        self.exclude(number, name, &format!("could not take plan {plan_epoch}: {reason}"))
     }
 
     /// A plan that every node rejects is the sessions' fault; one that some nodes have taken is the fault of the others.
     pub(super) fn applied(&mut self, plan_epoch: u64) -> Vec<Command> {
+        let Some(number) = self.workload_of_plan(plan_epoch) else { return Vec::new() };
         let Some(active) = self.active_plan_of(plan_epoch) else { return Vec::new() };
         let rejected = std::mem::take(&mut active.rejected);
         let Some(reason) = rejected.values().next().cloned() else { return Vec::new() };
         if active.ready.is_empty() {
-            let sessions = self.workload.take().map(|workload| workload.sessions()).unwrap_or_default();
-            let error = ChoiceError::Rejected { reason };
-            return sessions.into_iter().map(|session| Command::Refuse { session, error: error.clone() }).collect();
+            return self.refuse_all(number, &ChoiceError::Rejected { reason });
         }
-        let quarantined = rejected
+        let excluded = rejected
             .into_iter()
-            .map(|(name, reason)| self.quarantine(&name, &format!("cannot take plan {plan_epoch}: {reason}")));
-        quarantined.flatten().collect()
+            .map(|(name, reason)| self.exclude(number, &name, &format!("cannot take plan {plan_epoch}: {reason}")));
+        excluded.flatten().collect()
     }
 
-    /// The node gets no role until it is readmitted, joins again, or another workload takes over.
+    fn refuse_all(&mut self, number: u64, error: &ChoiceError) -> Vec<Command> {
+        let sessions = self.workloads.get(&number).map(|workload| workload.sessions.numbers()).unwrap_or_default();
+        let refuse = |session| Command::Refuse { session, error: error.clone() };
+        let mut commands: Vec<Command> = sessions.into_iter().map(refuse).collect();
+        commands.extend(self.end(number));
+        commands
+    }
+
+    /// The node gets no role in any plan until it is readmitted or joins again.
     fn quarantine(&mut self, name: &str, reason: &str) -> Vec<Command> {
         let now = self.now;
         let Some(member) = self.members.get_mut(name).filter(|member| member.quarantined_at.is_none()) else {
             return Vec::new();
         };
         member.quarantined_at = Some(now);
+        self.fault(name, None, reason)
+    }
+
+    /// The same for the plans of one workload: what a session asks for takes a node from no other.
+    fn exclude(&mut self, number: u64, name: &str, reason: &str) -> Vec<Command> {
+        let now = self.now;
+        let is_usable = self.usable().any(|(usable, _)| usable == name);
+        let Some(workload) = self.workloads.get_mut(&number).filter(|workload| {
+            is_usable && !workload.excluded.contains_key(name)
+        }) else {
+            return Vec::new();
+        };
+        workload.excluded.insert(name.to_owned(), now);
+        self.fault(name, Some(number), reason)
+    }
+
+    fn fault(&mut self, name: &str, workload_number: Option<u64>, reason: &str) -> Vec<Command> {
         self.reports.forget(name);
-        let mut commands = vec![Command::Quarantine { node_name: name.to_owned(), reason: reason.to_owned() }];
-        commands.extend(self.replan_without(name, &format!("node {name} {reason}")));
+        let quarantine =
+            Command::Quarantine { node_name: name.to_owned(), workload_number, reason: reason.to_owned() };
+        let mut commands = vec![quarantine];
+        commands.extend(self.nodes_changed(&format!("node {name} {reason}")));
         commands
     }
 
     /// Ends quarantines that have lasted. Nodes then wait for a role as if they had just joined.
     pub(super) fn readmit(&mut self) -> Vec<Command> {
-        let quarantine = if self.active_plan().is_some() { QUARANTINE } else { QUARANTINE_WITHOUT_PLAN };
+        let now = self.now;
+        let is_planned = |workload: &WorkloadState| workload.active_plan.is_some();
+        let all_are_planned = !self.workloads.is_empty() && self.workloads.values().all(is_planned);
         let mut commands = Vec::new();
         for (name, member) in &mut self.members {
-            if member.quarantined_at.is_some_and(|since| self.now.saturating_sub(since) >= quarantine) {
+            if member.quarantined_at.is_some_and(|since| has_lasted(now, since, all_are_planned)) {
                 member.quarantined_at = None;
-                commands.push(Command::Readmit { node_name: name.clone() });
+                commands.push(Command::Readmit { node_name: name.clone(), workload_number: None });
             }
+        }
+        for (&number, workload) in &mut self.workloads {
+            let is_planned = workload.active_plan.is_some();
+            let ended = workload.excluded.extract_if(.., |_, since| has_lasted(now, *since, is_planned));
+            let readmit = |(node_name, _)| Command::Readmit { node_name, workload_number: Some(number) };
+            commands.extend(ended.map(readmit));
+        }
+        if !commands.is_empty() {
+            commands.extend(self.nodes_changed("a quarantine ended"));
         }
         commands
     }
@@ -88,7 +131,8 @@ impl Scheduler {
     /// Whether a compositor may report a sampler: both have these roles in the plan in force.
     #[must_use]
     pub fn admits_report(&self, report: &SamplerReport) -> bool {
-        self.active_plan().is_some_and(|active| active.concerns(report))
+        let mut plans = self.workloads.values().filter_map(|workload| workload.active_plan.as_ref());
+        plans.any(|active| active.concerns(report))
     }
 
     pub(super) fn reported(&mut self, report: SamplerReport) -> Vec<Command> {
@@ -107,7 +151,8 @@ impl Scheduler {
         let number = self.reports.count_of(sampler).saturating_sub(1);
         let member = self.members.get(sampler)?;
         let (incarnation, address) = (member.incarnation, member.status.address.clone());
-        let sample_image_s = member.estimate.now().costs.sample_image_s;
+        let estimate = member.estimates.get(&self.workload_of_plan(plan_epoch)?)?;
+        let sample_image_s = estimate.now().costs.sample_image_s;
         let active = self.active_plan_for(plan_epoch, sampler)?;
         let plan = &active.plan.assignment;
         let images = plan.samplers.iter().find(|share| share.node_name == sampler)?.image_indices.len();
@@ -157,26 +202,32 @@ impl Scheduler {
         at_fault.flatten().collect()
     }
 
-    /// Every node that has taken the plan in force is probed at this interval.
+    /// Every node that has taken a plan in force is probed at this interval.
     pub(super) fn probe_liveness(&mut self) -> Vec<Command> {
-        let Some(active) = self.active_plan() else { return Vec::new() };
-        if self.now.saturating_sub(self.liveness_probed_at) < LIVENESS_INTERVAL {
+        let plans: Vec<&ActivePlan> = self.workloads.values().filter_map(|w| w.active_plan.as_ref()).collect();
+        if plans.is_empty() || self.now.saturating_sub(self.liveness_probed_at) < LIVENESS_INTERVAL {
             return Vec::new();
         }
-        let plan_epoch = active.epoch();
-        let ready = self.members.iter().filter(|(name, _)| active.ready.contains(*name));
-        let probe = |(name, member): (&String, &Member)| Probe {
-            plan_epoch,
-            node_name: name.clone(),
-            incarnation: member.incarnation,
-            address: member.status.address.clone(),
-            image: None,
-            deadline: PROBE_DEADLINE,
+        let probe = |(name, member): (&String, &Member)| {
+            let active = plans.iter().find(|active| active.ready.contains(name))?;
+            Some(Command::Probe(Box::new(Probe {
+                plan_epoch: active.epoch(),
+                node_name: name.clone(),
+                incarnation: member.incarnation,
+                address: member.status.address.clone(),
+                image: None,
+                deadline: PROBE_DEADLINE,
+            })))
         };
-        let commands = ready.map(probe).map(|probe| Command::Probe(Box::new(probe))).collect();
+        let commands = self.members.iter().filter_map(probe).collect();
         self.liveness_probed_at = self.now;
         commands
     }
+}
+
+/// A node is tried again sooner where there is no plan without it.
+fn has_lasted(now: Duration, since: Duration, is_planned: bool) -> bool {
+    now.saturating_sub(since) >= if is_planned { QUARANTINE } else { QUARANTINE_WITHOUT_PLAN }
 }
 
 /// The image of a sampler's share at `number`, counted cyclically, of the first set that the sampler samples.

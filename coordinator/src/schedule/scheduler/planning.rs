@@ -8,11 +8,11 @@ use super::Scheduler;
 use crate::schedule::active_plan::ActivePlan;
 use crate::schedule::assign::{Candidate, assignment};
 use crate::schedule::choose::{WORTH, step_from};
-use crate::schedule::estimate::common_ratios;
+use crate::schedule::estimate::{Estimate, common_ratios};
 use crate::schedule::hysteresis::Gain;
-use crate::schedule::member::Member;
 use crate::schedule::overload::UtilizationSample;
 use crate::schedule::prediction::{direct_s, pipeline_by_s, time_share_s};
+use crate::schedule::workload_state::WorkloadState;
 use crate::schedule::{Choice, Command, CurrentRoles, Demand, Load, NodeCosts, PolicyOverride, choose};
 
 /// A node without a role gets one for a smaller gain than roles are changed for.
@@ -22,7 +22,7 @@ const SETS_LOST: usize = 3;
 /// Changes of role of one plan, unless a node was lost.
 const MOST_CHANGES: usize = 2;
 
-/// The members that can be planned with, in the order of their names, and the demand.
+/// The members that serve a workload, in the order of their names, and the demand.
 struct PlanningSnapshot<'a> {
     names: Vec<&'a str>,
     nodes: Vec<NodeCosts>,
@@ -64,86 +64,110 @@ struct BetterPlan {
 }
 
 impl Scheduler {
-    /// The share of their time that the plan's nodes need for the demand; `None` without a plan.
-    pub(super) fn utilisation(&self) -> Option<f64> {
-        let (workload, snapshot) = (self.workload.as_ref()?, self.snapshot()?);
-        Some(workload.utilisation(snapshot.current_s(&self.has_role(&snapshot)?)?))
+    /// The share of their time that a plan's nodes need for the demand; `None` without a plan.
+    pub(super) fn utilisation(&self, number: u64) -> Option<f64> {
+        let (workload, snapshot) = (self.workloads.get(&number)?, self.snapshot(number)?);
+        Some(workload.utilisation(snapshot.current_s(&self.has_role(number, &snapshot)?)?))
     }
 
     /// For each node of the snapshot, whether it has a role in the plan in force.
-    fn has_role(&self, snapshot: &PlanningSnapshot<'_>) -> Option<Vec<bool>> {
-        let active = self.active_plan()?;
+    fn has_role(&self, number: u64, snapshot: &PlanningSnapshot<'_>) -> Option<Vec<bool>> {
+        let active = self.active_plan(number)?;
         Some(snapshot.names.iter().map(|name| active.has_role(name)).collect())
     }
 
-    fn usable(&self) -> impl Iterator<Item = (&String, &Member)> {
-        self.members.iter().filter(|(_, member)| member.quarantined_at.is_none())
+    /// Present costs of a workload's operations on each usable node, as if it served nothing else.
+    pub(super) fn costs_of_all(&self, number: u64) -> Vec<NodeCosts> {
+        costs_among(self.usable().filter_map(|(_, member)| member.estimates.get(&number)))
     }
 
-    /// Present costs of usable nodes, in their order.
-    pub(super) fn costs_now(&self) -> Vec<NodeCosts> {
-        let common = common_ratios(self.usable().map(|(_, member)| &member.estimate));
-        let mut nodes: Vec<NodeCosts> = self.usable().map(|(_, member)| member.estimate.now_among(&common)).collect();
-        if self.active_plan().is_some_and(|active| active.plan.assignment.tile_count > 1) {
+    /// The same with other costs alone.
+    pub(super) fn rebased_costs_of_all(&self, number: u64, costs: &Costs) -> Vec<NodeCosts> {
+        let estimates = self.usable().filter_map(|(_, member)| member.estimates.get(&number).cloned());
+        let rebased: Vec<Estimate> = estimates
+            .map(|mut estimate| {
+                estimate.rebase(costs);
+                estimate
+            })
+            .collect();
+        costs_among(rebased.iter())
+    }
+
+    /// Present costs of the nodes that serve a workload, in their order. A node that serves several takes turns.
+    pub(super) fn costs_now(&self, number: u64) -> Vec<NodeCosts> {
+        let Some(workload) = self.workloads.get(&number) else { return Vec::new() };
+        let mut nodes = costs_among(self.serving(workload).filter_map(|(_, member)| member.estimates.get(&number)));
+        if workload.active_plan.as_ref().is_some_and(|active| active.plan.assignment.tile_count > 1) {
             NodeCosts::level_sampling(&mut nodes);
+        }
+        for ((name, _), node) in self.serving(workload).zip(&mut nodes) {
+            let carried = self.carried(number, name);
+            if carried > 1 {
+                *node = node.times(carried as f64);
+            }
         }
         nodes
     }
 
-    fn snapshot(&self) -> Option<PlanningSnapshot<'_>> {
-        let workload = self.workload.as_ref()?;
-        let names: Vec<_> = self.usable().map(|(name, _)| name.as_str()).collect();
+    fn snapshot(&self, number: u64) -> Option<PlanningSnapshot<'_>> {
+        let workload = self.workloads.get(&number)?;
+        let names: Vec<_> = self.serving(workload).map(|(name, _)| name.as_str()).collect();
         let current = workload.active_plan.as_ref().map(|active| CurrentRoles {
             policy: active.policy(),
             samples: names.iter().map(|name| active.samples(name)).collect(),
             tiles: active.plan.assignment.tile_count as usize,
             relay_fanout: active.plan.assignment.relay_fanout,
         });
-        let (load, mut policy_override) = (workload.load(), workload.policy_override());
-        // A forced K that was possible when it was asked for may be too many when nodes are lost.
-        let most = load.tiled(policy_override.forced_tiles.unwrap_or(1)).most_samplers(names.len());
-        policy_override.forced_samplers = policy_override.forced_samplers.map(|forced| forced.min(most));
-        Some(PlanningSnapshot { names, nodes: self.costs_now(), current, load, policy_override })
+        let load = workload.load();
+        let policy_override = workload.sessions.policy_override().possible(&load, names.len());
+        Some(PlanningSnapshot { names, nodes: self.costs_now(number), current, load, policy_override })
     }
 
     /// Plans at once, for any plan in force; without nodes, sessions wait for the next one that joins.
-    pub(super) fn replan(&mut self, why: &str) -> Vec<Command> {
-        let Some(snapshot) = self.snapshot() else { return Vec::new() };
+    pub(super) fn replan(&mut self, number: u64, why: &str) -> Vec<Command> {
+        let Some(snapshot) = self.snapshot(number) else { return Vec::new() };
         match choose(&snapshot.demand()) {
-            Ok(choice) => self.activate(&choice, why),
+            Ok(choice) => self.activate(number, &choice, why),
             Err(_) => {
-                self.workload.iter_mut().for_each(|workload| workload.active_plan = None);
+                self.workloads.get_mut(&number).into_iter().for_each(|workload| workload.active_plan = None);
                 Vec::new()
             }
         }
     }
 
+    pub(super) fn reevaluate_all(&mut self) -> Vec<Command> {
+        self.workload_numbers().into_iter().flat_map(|number| self.reevaluate(number)).collect()
+    }
+
     /// Plans where there is no plan, where overload asks for another quality, or where a better plan is worth the switch.
-    pub(super) fn reevaluate(&mut self) -> Vec<Command> {
+    pub(super) fn reevaluate(&mut self, number: u64) -> Vec<Command> {
         let now = self.now;
-        let Some(active) = self.active_plan() else { return self.replan("") };
+        let Some(active) = self.active_plan(number) else { return self.replan(number, "") };
         if !active.hysteresis.is_due(now) {
             return Vec::new();
         }
-        if let Some(why) = self.step_of_overload() {
-            self.members.values_mut().for_each(|member| member.estimate.restart());
-            return self.replan(&why);
+        if let Some(why) = self.step_of_overload(number) {
+            let estimates = self.members.values_mut().filter_map(|member| member.estimates.get_mut(&number));
+            estimates.for_each(Estimate::restart);
+            return self.replan(number, &why);
         }
-        let Some(BetterPlan { choice, gain }) = self.better_plan() else { return Vec::new() };
+        let Some(BetterPlan { choice, gain }) = self.better_plan(number) else { return Vec::new() };
         let confirms =
             |active: &mut ActivePlan| active.hysteresis.confirms(now, gain, active.ready.len() >= active.members.len());
-        match self.workload.as_mut().and_then(|workload| workload.active_plan.as_mut()).is_some_and(confirms) {
-            true => self.activate(&choice, "demand, costs or nodes have changed"),
+        let active = self.workloads.get_mut(&number).and_then(|workload| workload.active_plan.as_mut());
+        match active.is_some_and(confirms) {
+            true => self.activate(number, &choice, "demand, costs or nodes have changed"),
             false => Vec::new(),
         }
     }
 
     /// Falls back under overload, and returns where there is room: why, if the quality changes.
-    fn step_of_overload(&mut self) -> Option<String> {
-        let (utilisation, now) = (self.utilisation()?, self.now);
-        let workload = self.workload.as_mut()?;
-        let frame_rate_ratios: Vec<f64> = workload.fallbacks().iter().map(|quality| quality.frame_rate_ratio).collect();
-        let views_per_s = workload.views_per_s();
+    fn step_of_overload(&mut self, number: u64) -> Option<String> {
+        let (utilisation, now) = (self.utilisation(number)?, self.now);
+        let workload = self.workloads.get_mut(&number)?;
+        let fallbacks = workload.sessions.fallbacks();
+        let frame_rate_ratios: Vec<f64> = fallbacks.iter().map(|quality| quality.frame_rate_ratio).collect();
+        let views_per_s = workload.sessions.views_per_s();
         let sample = UtilizationSample { utilisation, views_per_s, frame_rate_ratios: &frame_rate_ratios };
         let before = workload.overload.step;
         if !workload.overload.add(now, sample) {
@@ -155,10 +179,10 @@ impl Scheduler {
     }
 
     /// The next plan towards the best one, and the gain of the best one.
-    fn better_plan(&self) -> Option<BetterPlan> {
-        let snapshot = self.snapshot()?;
+    fn better_plan(&self, number: u64) -> Option<BetterPlan> {
+        let snapshot = self.snapshot(number)?;
         let choice = choose(&snapshot.demand()).ok()?;
-        let has_role = self.has_role(&snapshot)?;
+        let has_role = self.has_role(number, &snapshot)?;
         let mean = NodeCosts::mean(&snapshot.nodes);
         let samplers = choice.division.sampler_count().max(1);
         let sampled_s = snapshot.load.images as f64 * mean.sample_image_s / samplers as f64;
@@ -171,33 +195,46 @@ impl Scheduler {
     }
 
     /// Puts a choice in force. A plan that changes nothing is not made: epochs rise only where roles change.
-    fn activate(&mut self, choice: &Choice, why: &str) -> Vec<Command> {
-        let Some(workload) = &self.workload else { return Vec::new() };
-        let nodes = self.usable().map(|(_, member)| &member.status).zip(self.costs_now());
+    fn activate(&mut self, number: u64, choice: &Choice, why: &str) -> Vec<Command> {
+        let Some(workload) = self.workloads.get(&number) else { return Vec::new() };
+        let nodes = self.serving(workload).map(|(_, member)| &member.status).zip(self.costs_now(number));
         let candidates: Vec<_> = nodes.map(|(node, costs)| Candidate { node, costs }).collect();
-        let members = self.usable().map(|(name, member)| (name.clone(), member.incarnation)).collect();
-        let assignment = assignment(self.plan_epoch + 1, workload.degraded(), choice, &candidates);
-        if workload.active_plan.as_ref().is_some_and(|old| old.members == members && old.assigns(&assignment)) {
+        let members = self.serving(workload).map(|(name, member)| (name.clone(), member.incarnation)).collect();
+        let assignment = assignment(self.plan_epoch + 1, number, workload.degraded(), choice, &candidates);
+        let old = workload.active_plan.as_ref();
+        if old.is_some_and(|old| old.members == members && old.assigns(&assignment)) {
             return Vec::new();
         }
         let slowest = candidates.iter().fold(Costs::default(), |slowest, node| slowest.max(node.costs.costs));
-        let again = if workload.active_plan.is_some() { format!(" Planned again: {why}.") } else { String::new() };
+        let again = if old.is_some() { format!(" Planned again: {why}.") } else { String::new() };
         let mut plan = session_plan(assignment, slowest, choice, format!("{}{again}", choice.reason));
         plan.fallback = NonZeroU32::new(workload.overload.step as u32);
         plan.frame_rate_ratio = workload.frame_rate_ratio();
         plan.method = workload.method();
         let active = ActivePlan::new(plan, members, self.now);
         self.plan_epoch = active.epoch();
-        let command = self.apply(&active, workload.sessions());
-        self.workload.iter_mut().for_each(|workload| workload.active_plan = Some(active.clone()));
+        let command = self.apply(&active, workload, workload.sessions.numbers());
+        self.workloads.get_mut(&number).into_iter().for_each(|workload| workload.active_plan = Some(active.clone()));
         vec![command]
     }
 
-    /// Tells every node of a plan, then the sessions.
-    pub(super) fn apply(&self, active: &ActivePlan, sessions: Vec<u64>) -> Command {
-        let nodes = active.members.keys().filter_map(|name| Some(self.members.get(name)?.status.clone())).collect();
+    /// Tells every node of a plan, and of the one before, then the sessions. Nodes that may be silent are told nothing: the
+    /// sessions would wait for them.
+    pub(super) fn apply(&self, active: &ActivePlan, workload: &WorkloadState, sessions: Vec<u64>) -> Command {
+        let before = workload.active_plan.as_ref().map(|active| &active.members);
+        let had_one = |name: &String| before.is_some_and(|before| before.contains_key(name));
+        let is_told = |name: &String| active.members.contains_key(name) || had_one(name);
+        let nodes = self.usable().filter(|(name, _)| is_told(name) && !workload.excluded.contains_key(*name));
+        let nodes = nodes.map(|(_, member)| member.status.clone()).collect();
         Command::Apply { sessions, plan: Box::new(active.plan.clone()), nodes }
     }
+}
+
+/// The costs that timings of all these together suggest.
+fn costs_among<'a>(estimates: impl Iterator<Item = &'a Estimate>) -> Vec<NodeCosts> {
+    let estimates: Vec<&Estimate> = estimates.collect();
+    let common = common_ratios(estimates.iter().copied());
+    estimates.into_iter().map(|estimate| estimate.now_among(&common)).collect()
 }
 
 fn session_plan(assignment: Assignment, costs: Costs, choice: &Choice, reason: String) -> SessionPlan {

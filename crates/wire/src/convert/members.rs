@@ -1,9 +1,9 @@
 //! Members: joining, being measured and being ready; their reports, and the cluster's status.
 
-use cluster::limits::{MAX_BATCH, MAX_SCENES};
+use cluster::limits::{MAX_BATCH, MAX_SCENES, MAX_WORKLOADS};
 use cluster::{
     AchievedTime, ClusterStatus, JoinCluster, MeasureCosts, Measured, NodeCondition, NodeStatus, Ready, SamplerReport,
-    Welcome, WorkReport, at_most,
+    Welcome, WorkReport, WorkloadStatus, at_most,
 };
 
 use crate::error::{PROTOCOL_VERSION, check_version};
@@ -34,7 +34,14 @@ messages! {
         node_name, is_ready, costs, busy_ratio; views: view_count, dropped_views: dropped_view_count
     };
     GetStatusResponse = ClusterStatus {
-        plan_epoch, nodes, offers, plan, session_count, conditions;
-        views_per_set: views_per_set_count, achieved: achieved_times, utilisation: utilisation_ratio
-    }, first |s| at_most(s.offers.len(), MAX_SCENES, "offers"), then ClusterStatus::validate;
+        plan_epoch, nodes, offers, workloads
+    }, first |s| {
+        at_most(s.offers.len(), MAX_SCENES, "offers")?;
+        at_most(s.workloads.len(), MAX_WORKLOADS, "workloads")
+    }, then ClusterStatus::validate;
+    WorkloadStatus = WorkloadStatus {
+        plan, session_count, viewer_count, conditions;
+        number: workload_number, views_per_set: views_per_set_count, achieved: achieved_times,
+        utilisation: utilisation_ratio, one_more_viewer: one_more_viewer_ratio
+    };
 }

@@ -1,0 +1,133 @@
+//! Admission: what a session may ask for, beside what is promised to others.
+
+use cluster::limits::MAX_CELLS;
+use depth_image::PinholeCamera;
+
+use super::Scheduler;
+use crate::schedule::choose::check;
+use crate::schedule::workload_state::WorkloadState;
+use crate::schedule::{ChoiceError, Demand, NodeCosts, Opening, PolicyOverride, choose};
+
+/// The share of the nodes' time that admitted sessions may take at their last fallback. Costs are measured alone and in even
+/// batches, and are higher among many viewers.
+const MOST_ADMITTED: f64 = 0.9;
+
+/// A workload as it would be, and the one that it is of, if there is one.
+struct Change<'a> {
+    before: Option<(u64, &'a WorkloadState)>,
+    after: WorkloadState,
+    /// Costs of all usable nodes.
+    nodes: Vec<NodeCosts>,
+}
+
+impl Scheduler {
+    /// Whether a session is open and planned.
+    #[must_use]
+    pub fn has_session(&self, session: u64) -> bool {
+        self.workload_of_session(session).is_some()
+    }
+
+    /// Whether a session may ask for this many views from now on. A session may always ask for less than before.
+    ///
+    /// # Errors
+    /// As for one that is opened.
+    pub fn admits(&self, session: u64, views_per_set: usize, frames_per_s: Option<f64>) -> Result<(), ChoiceError> {
+        let Some(number) = self.workload_of_session(session) else { return Ok(()) };
+        let before = &self.workloads[&number];
+        let mut after = before.clone();
+        after.change(self.now, |sessions| sessions.set_demand(session, views_per_set, frames_per_s));
+        if after.sessions.views_per_s() <= before.sessions.views_per_s() {
+            return Ok(());
+        }
+        self.admit(&self.change_of(number, before, after))
+    }
+
+    /// Whether a session may look from these viewpoints from now on.
+    ///
+    /// # Errors
+    /// As for one that is opened, and for one that has sample cameras of its own.
+    pub fn admits_viewpoints(&self, session: u64, viewpoints: &[PinholeCamera]) -> Result<(), ChoiceError> {
+        let Some(number) = self.workload_of_session(session) else { return Ok(()) };
+        let before = &self.workloads[&number];
+        match before.cells_seen_from(self.now, session, viewpoints) {
+            None => Err(ChoiceError::NoCells { session }),
+            Some(cells) if cells > MAX_CELLS && Some(cells) > before.cell_count() => Err(ChoiceError::Cells { cells }),
+            Some(_) => Ok(()),
+        }
+    }
+
+    /// The workload that a session belongs to, if it is open.
+    pub(super) fn workload_for(&self, opening: &Opening) -> Option<u64> {
+        self.workloads.iter().find(|(_, workload)| workload.is_shared_by(opening)).map(|(&number, _)| number)
+    }
+
+    /// Whether a session can be served.
+    pub(super) fn check(&self, opening: &Opening) -> Result<(), ChoiceError> {
+        let Some(number) = self.workload_for(opening) else {
+            if self.workloads.len() >= self.max_workloads {
+                return Err(ChoiceError::Workloads { most: self.max_workloads });
+            }
+            let alone = NodeCosts { costs: opening.costs, ..NodeCosts::default() };
+            let nodes = vec![alone; self.usable().count()];
+            return self.admit(&Change { before: None, after: WorkloadState::new(self.now, opening), nodes });
+        };
+        let before = &self.workloads[&number];
+        let forced = opening.policy_override;
+        if forced != PolicyOverride::default() && !before.sessions.all_force(forced) {
+            return Err(ChoiceError::Override { in_force: before.sessions.policy_override() });
+        }
+        let mut after = before.clone();
+        after.change(self.now, |sessions| sessions.add(opening));
+        // It has to be possible without the others, too: they may leave.
+        let alone = vec![NodeCosts { costs: opening.costs, ..NodeCosts::default() }; self.usable().count()];
+        check(&Demand { load: after.load(), nodes: &alone, policy_override: forced, current: None })?;
+        self.admit(&self.change_of(number, before, after))
+    }
+
+    fn change_of<'a>(&self, number: u64, before: &'a WorkloadState, after: WorkloadState) -> Change<'a> {
+        let nodes = self.rebased_costs_of_all(number, &after.costs);
+        Change { before: Some((number, before)), after, nodes }
+    }
+
+    /// Whether a demand can be met; that of sessions with a rate, beside all others, at their last fallback.
+    fn admit(&self, change: &Change<'_>) -> Result<(), ChoiceError> {
+        let Change { before, after, nodes } = change;
+        let policy_override = after.sessions.policy_override();
+        check(&Demand { load: after.load(), nodes, policy_override, current: None })?;
+        if let Some(cells) = after.cell_count().filter(|&cells| cells > MAX_CELLS) {
+            return Err(ChoiceError::Cells { cells });
+        }
+        let own = before.map_or(0.0, |(number, workload)| promised(workload, &self.costs_of_all(number)));
+        let asked = promised(after, nodes).max(self.without_fallbacks(change));
+        // Batches take what is left, and add nothing to what is promised.
+        if asked <= own {
+            return Ok(());
+        }
+        let others = self.workloads.iter().filter(|(number, _)| before.is_none_or(|(own, _)| own != **number));
+        let needed = others.map(|(&number, workload)| promised(workload, &self.costs_of_all(number))).sum::<f64>() + asked;
+        if needed > MOST_ADMITTED { Err(ChoiceError::Overload { needed }) } else { Ok(()) }
+    }
+
+    /// The share of the nodes' time at the last fallback that is left, where a session does not accept the one in force:
+    /// it took as much when it was left.
+    fn without_fallbacks(&self, Change { before, after, nodes }: &Change<'_>) -> f64 {
+        let Some((_, before)) = before else { return 0.0 };
+        let when_left = before.overload.view_utilisation_when_left(after.overload.step);
+        let own_nodes = before.nodes.len() as f64 / nodes.len().max(1) as f64;
+        when_left.map_or(0.0, |view_utilisation| {
+            view_utilisation * after.sessions.views_per_s() * after.frame_rate_ratio() * own_nodes
+        })
+    }
+}
+
+/// The share of all nodes' time that a workload's sessions with a rate take at their last fallback.
+fn promised(workload: &WorkloadState, nodes: &[NodeCosts]) -> f64 {
+    if workload.sessions.viewers() == 0 {
+        return 0.0;
+    }
+    let load = workload.rated_load();
+    let policy_override = workload.sessions.policy_override().possible(&load, nodes.len());
+    let choice = choose(&Demand { load, nodes, policy_override, current: None });
+    // Nodes that can do none of it do not work for it.
+    choice.map_or(0.0, |choice| workload.utilisation_at_last(choice.time_s()))
+}

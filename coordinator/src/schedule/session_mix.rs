@@ -1,0 +1,219 @@
+//! The sessions of one workload, and what they ask for together.
+
+use cluster::{Costs, Quality};
+use depth_image::PinholeCamera;
+
+use super::{Opening, PolicyOverride};
+
+/// The demand of one session.
+#[derive(Debug, Clone)]
+struct Session {
+    number: u64,
+    views: usize,
+    frames_per_s: Option<f64>,
+    policy_override: PolicyOverride,
+    fallbacks: Vec<Quality>,
+    viewpoints: Vec<PinholeCamera>,
+    method: String,
+    /// As measured for its own views.
+    costs: Costs,
+}
+
+impl Session {
+    fn views_per_s(&self) -> Option<f64> {
+        Some(self.frames_per_s? * self.views as f64)
+    }
+}
+
+/// Sessions in the order in which they were opened.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SessionMix(Vec<Session>);
+
+impl SessionMix {
+    pub(super) fn add(&mut self, opening: &Opening) {
+        self.remove(opening.session);
+        self.0.push(Session {
+            number: opening.session,
+            views: opening.views_per_set,
+            frames_per_s: opening.frames_per_s,
+            policy_override: opening.policy_override,
+            fallbacks: opening.fallbacks.clone(),
+            viewpoints: opening.viewpoints.clone(),
+            method: opening.method.clone(),
+            costs: opening.costs,
+        });
+    }
+
+    pub(super) fn remove(&mut self, number: u64) {
+        self.0.retain(|session| session.number != number);
+    }
+
+    fn of_number(&mut self, number: u64) -> impl Iterator<Item = &mut Session> {
+        self.0.iter_mut().filter(move |session| session.number == number)
+    }
+
+    pub(super) fn set_viewpoints(&mut self, number: u64, viewpoints: &[PinholeCamera]) {
+        self.of_number(number).for_each(|session| session.viewpoints = viewpoints.to_vec());
+    }
+
+    pub(super) fn set_demand(&mut self, number: u64, views: usize, frames_per_s: Option<f64>) {
+        self.of_number(number).for_each(|session| (session.views, session.frames_per_s) = (views, frames_per_s));
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    pub(super) fn numbers(&self) -> Vec<u64> {
+        self.0.iter().map(|session| session.number).collect()
+    }
+
+    pub(super) fn contains(&self, number: u64) -> bool {
+        self.0.iter().any(|session| session.number == number)
+    }
+
+    pub(super) fn viewpoints(&self) -> Vec<PinholeCamera> {
+        self.0.iter().flat_map(|session| session.viewpoints.iter().copied()).collect()
+    }
+
+    fn rated(&self) -> impl Iterator<Item = &Session> {
+        self.0.iter().filter(|session| session.frames_per_s.is_some())
+    }
+
+    /// Sessions with a rate.
+    pub(super) fn viewers(&self) -> usize {
+        self.rated().count()
+    }
+
+    pub(super) fn has_batch(&self) -> bool {
+        self.viewers() < self.0.len()
+    }
+
+    /// V of all sessions.
+    pub(super) fn views(&self) -> usize {
+        self.0.iter().fold(0, |sum, session| sum.saturating_add(session.views))
+    }
+
+    /// Views of sessions without a rate, which ask for all of a set at once.
+    pub(super) fn views_at_once(&self) -> usize {
+        let batches = self.0.iter().filter(|session| session.frames_per_s.is_none());
+        batches.fold(0, |sum, session| sum.saturating_add(session.views))
+    }
+
+    /// Views a second that sessions with a rate ask for, undegraded.
+    pub(super) fn views_per_s(&self) -> f64 {
+        self.rated().filter_map(Session::views_per_s).sum()
+    }
+
+    /// What sessions force: it holds while all of them state the same.
+    pub(super) fn policy_override(&self) -> PolicyOverride {
+        let first = self.0.first().map(|session| session.policy_override).unwrap_or_default();
+        if self.all_force(first) { first } else { PolicyOverride::default() }
+    }
+
+    /// Whether every session states this.
+    pub(super) fn all_force(&self, policy_override: PolicyOverride) -> bool {
+        self.0.iter().all(|session| session.policy_override == policy_override)
+    }
+
+    /// The method by which most sessions have their views reconstructed; of several, the first.
+    pub(super) fn usual_method(&self) -> Option<&str> {
+        let count = |of: &Session| self.0.iter().filter(|session| session.method == of.method).count();
+        self.0.iter().rev().max_by_key(|session| count(session)).map(|session| session.method.as_str())
+    }
+
+    /// The qualities that every session with a rate falls back to, in the same order.
+    pub(super) fn fallbacks(&self) -> &[Quality] {
+        let Some(first) = self.rated().next().map(|session| &session.fallbacks) else { return &[] };
+        let common = |other: &Session| first.iter().zip(&other.fallbacks).take_while(|(own, other)| own == other).count();
+        &first[..self.rated().map(common).min().unwrap_or(0)]
+    }
+
+    /// Costs of the mean view, where each is shown for `set_s`; sampling costs are those of the first session. `None`
+    /// without sessions.
+    pub(super) fn costs(&self, set_s: f64) -> Option<Costs> {
+        let first = self.0.first()?.costs;
+        // A mean of equal costs would differ from them by rounding.
+        if self.0.iter().all(|session| session.costs == first) {
+            return Some(first);
+        }
+        let weight = |session: &Session| session.views_per_s().map_or(session.views as f64, |rate| rate * set_s).max(1.0);
+        let all: f64 = self.0.iter().map(weight).sum();
+        let mean =
+            |of: fn(&Costs) -> f64| self.0.iter().map(|session| weight(session) * of(&session.costs)).sum::<f64>() / all;
+        Some(Costs {
+            direct_view_s: mean(|costs| costs.direct_view_s),
+            reconstruct_view_s: mean(|costs| costs.reconstruct_view_s),
+            encode_view_s: mean(|costs| costs.encode_view_s),
+            ..first
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cluster::PolicyChoice;
+
+    use super::*;
+    use crate::schedule::test_support::{COSTS, opening};
+
+    const RATED: Option<f64> = Some(10.0);
+
+    fn quality(lighting: &str) -> Quality {
+        Quality {
+            lighting: lighting.to_owned(),
+            method: "joint_carve".to_owned(),
+            sample_side_ratio: 1.0,
+            frame_rate_ratio: 1.0,
+        }
+    }
+
+    fn mix(openings: &[Opening]) -> SessionMix {
+        let mut mix = SessionMix::default();
+        openings.iter().for_each(|opening| mix.add(opening));
+        mix
+    }
+
+    #[test]
+    fn a_forced_policy_holds_while_all_sessions_force_it() {
+        let forced = opening(1, PolicyChoice::Direct, 1);
+        let mut sessions = mix(&[forced.clone(), Opening { session: 2, ..forced.clone() }]);
+        assert_eq!(sessions.policy_override(), forced.policy_override);
+        sessions.add(&opening(3, PolicyChoice::Auto, 1));
+        assert_eq!(sessions.policy_override(), PolicyOverride::default());
+        sessions.remove(3);
+        assert_eq!(sessions.policy_override(), forced.policy_override);
+    }
+
+    #[test]
+    fn fallbacks_are_those_that_all_rated_sessions_have_in_common() {
+        let [a, b, c] = ["a", "b", "c"].map(quality);
+        let rated = |session, fallbacks: &[&Quality]| Opening {
+            frames_per_s: RATED,
+            fallbacks: fallbacks.iter().copied().cloned().collect(),
+            ..opening(session, PolicyChoice::Auto, 1)
+        };
+        let batch = opening(9, PolicyChoice::Auto, 1);
+        let mut sessions = mix(&[batch, rated(1, &[&a, &b]), rated(2, &[&a, &b, &c])]);
+        assert_eq!(sessions.fallbacks(), [a.clone(), b.clone()]);
+        sessions.add(&rated(3, &[&a, &c]));
+        assert_eq!(sessions.fallbacks(), [a.clone()]);
+        sessions.add(&rated(4, &[&b]));
+        assert_eq!(sessions.fallbacks(), []);
+        assert_eq!(mix(&[opening(1, PolicyChoice::Auto, 1)]).fallbacks(), [], "batches have none");
+    }
+
+    #[test]
+    fn costs_of_views_are_weighted_by_their_number() {
+        let small = opening(1, PolicyChoice::Auto, 30);
+        let costs = Costs { reconstruct_view_s: 0.049, sample_image_s: 7.0, ..COSTS };
+        let large = Opening { session: 2, views_per_set: 10, costs, ..small.clone() };
+        let both = mix(&[small.clone(), large.clone()]).costs(1.0).unwrap();
+        assert!((both.reconstruct_view_s - 0.019).abs() < 1e-12, "{both:?}");
+        assert_eq!(both.sample_image_s, COSTS.sample_image_s, "of the first");
+        let live = Opening { views_per_set: 3, frames_per_s: RATED, ..small.clone() };
+        assert_eq!(mix(&[live, large]).costs(1.0), Some(both), "30 views a second");
+        assert_eq!(mix(&[small]).costs(1.0), Some(COSTS));
+        assert_eq!(SessionMix::default().costs(1.0), None);
+    }
+}
