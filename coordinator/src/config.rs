@@ -16,11 +16,13 @@ pub struct CoordinatorConfig {
     pub reflection: bool,
     /// Sessions that may be open; more are refused with `RESOURCE_EXHAUSTED`.
     pub max_sessions: usize,
+    /// Workloads that may be open, from 1 to 64; more are refused with `RESOURCE_EXHAUSTED`.
+    pub max_workloads: usize,
 }
 
 impl Default for CoordinatorConfig {
     fn default() -> Self {
-        Self { insecure_bind: false, reflection: false, max_sessions: 1024 }
+        Self { insecure_bind: false, reflection: false, max_sessions: 1024, max_workloads: 8 }
     }
 }
 

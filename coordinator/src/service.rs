@@ -41,6 +41,7 @@ pub async fn serve(
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
     let shared = Arc::new(Shared::new(config, offers, observers));
+    shared.step(Event::Limits { max_workloads: config.max_workloads });
     let mut running = JoinSet::new();
     running.spawn(execute(shared.clone()));
     running.spawn(tick(shared.clone()));

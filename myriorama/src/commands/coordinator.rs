@@ -34,6 +34,11 @@ pub struct CoordinatorArgs {
     /// The most open sessions; more are refused
     #[arg(long, value_name = "N", default_value_t = CoordinatorConfig::default().max_sessions)]
     max_sessions: usize,
+    /// The most open workloads; sessions of further ones are refused. Sessions of one scene, lighting, sampling and
+    /// timeline share a workload
+    #[arg(long, value_name = "N", default_value_t = CoordinatorConfig::default().max_workloads,
+        value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=64))]
+    max_workloads: usize,
     /// Serves without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
@@ -56,6 +61,7 @@ pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
         insecure_bind: args.insecure_bind,
         reflection: args.reflection,
         max_sessions: args.max_sessions,
+        max_workloads: args.max_workloads,
     };
     let log = args.record.as_deref().map(event_log).transpose()?;
     let telemetry = Telemetry::default();
