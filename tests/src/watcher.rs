@@ -133,7 +133,7 @@ async fn ask_once(session: &Session, number: u64) -> Call {
         camera: camera((frame % VIEWS) as f32 * 0.2 - 0.3, UVec2::new(40, 30)),
     };
     let (asked, mut frames, mut error) = (Instant::now(), Vec::new(), None);
-    match session.render_views(wanted.clone().map(view).collect()) {
+    match session.render_views(wanted.clone().map(view)) {
         Err(refused) => error = Some(refused.to_string()),
         Ok(mut coming) => {
             while let Some(next) = coming.next().await {
