@@ -127,7 +127,7 @@ async fn ask_once(session: &Session, number: u64) -> Call {
     let wanted = number * VIEWS..(number + 1) * VIEWS;
     let set_index = (number % u64::from(MOVING.set_count)) as u32;
     let scene_time_s = MOVING.time_s(set_index).expect("one of its sets");
-    let view = |frame: u64| ViewRequest {
+    let view = move |frame: u64| ViewRequest {
         frame,
         set_index,
         camera: camera((frame % VIEWS) as f32 * 0.2 - 0.3, UVec2::new(40, 30)),

@@ -172,7 +172,7 @@ async fn a_new_node_gets_a_role_without_a_lost_frame() {
     let start = Instant::now();
     while session.plan().assignment.plan_epoch == epoch {
         let first = all.len() as u64;
-        let asked = (0..6).map(|i| ViewRequest { frame: first + i, ..views(1, 6)[i as usize] });
+        let asked = (0..6).map(move |i| ViewRequest { frame: first + i, ..views(1, 6)[i as usize] });
         all.extend(session.render_views(asked).unwrap().all().await.unwrap());
         assert!(start.elapsed() < 3 * HEALED, "one node goes on doing both");
     }
