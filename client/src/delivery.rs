@@ -1,5 +1,6 @@
 //! Requests frames from all compositors of a plan at once, and after a fault the missing ones from the next plan's.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cluster::Assignment;
@@ -12,6 +13,7 @@ use crate::error::ClientError;
 use crate::frames::FrameSink;
 use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::request_pump::{Started, start_pumps};
+use crate::unrequested::Unrequested;
 use crate::view_request::ViewRequest;
 
 /// A view that waited longer for its sample set does not show its compositor's speed.
@@ -25,15 +27,14 @@ const FIRST_DELAY: Duration = Duration::from_millis(50);
 const LONGEST_DELAY: Duration = Duration::from_secs(1);
 
 /// Requests all frames, and after a fault the missing ones, under the plan in force by then.
-pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, requests: Vec<ViewRequest>, sink: FrameSink) {
-    let mut retries = Retries::new(requests.len());
+pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, sink: FrameSink) {
+    let mut retries = Retries::new(0);
     loop {
         let active = state.borrow_and_update().active.clone();
-        let missing = sink.missing(&requests);
-        if missing.is_empty() {
+        if sink.window().lock().is_complete() {
             return;
         }
-        let error = match call_all(&state, &active, missing, &sink).await {
+        let error = match call_all(&state, &active, &sink).await {
             // Frames that are still missing will not come.
             Ok(()) => return,
             Err(Failure::OfRequest(error) | Failure::Exhausted(error)) => error,
@@ -42,13 +43,16 @@ pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, requests: 
                 true => continue,
                 false => return,
             },
-            Err(Failure::OfPlan(error)) => match retries.next_delay(Instant::now(), sink.missing(&requests).len()) {
-                None => error,
-                Some(delay) => match wait_for_successor(&mut state, active.plan_epoch(), delay, error).await {
-                    Ok(()) => continue,
-                    Err(error) => error,
-                },
-            },
+            Err(Failure::OfPlan(error)) => {
+                let received = sink.window().lock().received();
+                match retries.next_delay(Instant::now(), received) {
+                    None => error,
+                    Some(delay) => match wait_for_successor(&mut state, active.plan_epoch(), delay, error).await {
+                        Ok(()) => continue,
+                        Err(error) => error,
+                    },
+                }
+            }
         };
         return sink.fail(error).await;
     }
@@ -57,14 +61,15 @@ pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, requests: 
 /// All calls under a plan, until they end, one fails, or a later plan loses one of the compositors.
 async fn call_all(
     state: &watch::Receiver<SessionState>,
-    active: &ActivePlan,
-    missing: Vec<ViewRequest>,
+    active: &Arc<ActivePlan>,
     sink: &FrameSink,
 ) -> Result<(), Failure> {
-    let plan = &active.plan.assignment;
-    let (peers, requests) = (active.trusted(), cell_by_cell(plan, missing));
+    let peers = active.trusted();
     let weights: Vec<u32> = peers.iter().map(|peer| peer.share.view_weight).collect();
-    let pumps = start_pumps(active.request(), requests, &weights, Some(active.plan.view_s()));
+    let plan = active.clone();
+    let arrange = move |views: &mut [ViewRequest]| cell_by_cell(&plan.plan.assignment, views);
+    let views = Unrequested::new(sink.window().clone(), &weights, Box::new(arrange));
+    let pumps = start_pumps(active.request(), views, peers.len(), Some(active.plan.view_s()));
     let mut calls = JoinSet::new();
     for (peer, pump) in peers.iter().zip(pumps) {
         if let Some(pump) = pump {
@@ -73,17 +78,15 @@ async fn call_all(
     }
     tokio::select! {
         ended = all(&mut calls) => ended,
-        lost = wait_for_lost_peer(state.clone(), plan.plan_epoch, &peers) => Err(Failure::OfPlan(lost)),
+        lost = wait_for_lost_peer(state.clone(), active.plan_epoch(), &peers) => Err(Failure::OfPlan(lost)),
     }
 }
 
-/// Groups the views of every set by view cell: a compositor then needs the images of few cells.
-fn cell_by_cell(plan: &Assignment, mut requests: Vec<ViewRequest>) -> Vec<ViewRequest> {
+/// Groups views of a set by view cell: a compositor then needs the images of few cells.
+fn cell_by_cell(plan: &Assignment, views: &mut [ViewRequest]) {
     if plan.workload.cell_count() > 1 {
-        let sets = requests.chunk_by_mut(|a, b| a.set_index == b.set_index);
-        sets.for_each(|views| views.sort_by_cached_key(|view| plan.cell_of(&view.camera)));
+        views.sort_by_cached_key(|view| plan.cell_of(&view.camera));
     }
-    requests
 }
 
 /// Waits until all tasks have ended or one has failed.
@@ -99,17 +102,14 @@ async fn receive_all(peer: Peer, (mut pump, messages): Started, sink: FrameSink)
     let parts = peer.client.render_views(messages).await.map_err(|status| Failure::of_status(&peer, &status))?;
     let mut frames = FrameStream::new(parts);
     let mut decoding = JoinSet::new();
-    while let Some(frame) = frames.next(&peer).await? {
-        if let Some(fault) = sink.fault_of(&frame, pump.plan_epoch()) {
-            return Err(Failure::of_peer(&peer, peer.error(fault)));
-        }
+    while let Some((frame, room)) = frames.next_admitted(&peer, &sink, pump.plan_epoch()).await? {
         pump.received(Instant::now(), frame.header.stage_times.set_wait_s > SET_WAIT_S);
         let Some(decoder) = sink.decoder().await else { break };
         let (peer, sink) = (peer.clone(), sink.clone());
         decoding.spawn(async move {
             let number = frame.frame;
             let (header, view) = decode(frame, &peer).await.map_err(|error| Failure::of_peer(&peer, error))?;
-            sink.pass_on(number, header, view).await;
+            sink.pass_on(number, header, view, room);
             drop(decoder);
             Ok(())
         });
@@ -159,22 +159,22 @@ pub(crate) async fn wait_for_lost_peer(
 /// The retries of one request for frames.
 #[derive(Debug)]
 pub(crate) struct Retries {
-    /// Frames that were missing at the last fault.
-    missing: usize,
+    /// Frames that had been received at the last fault.
+    received: u64,
     /// The first fault since a frame was received.
     failing_since: Option<Instant>,
     backoff: Backoff,
 }
 
 impl Retries {
-    pub(crate) fn new(missing: usize) -> Self {
-        Self { missing, failing_since: None, backoff: Backoff::new(FIRST_DELAY, 2, LONGEST_DELAY) }
+    pub(crate) fn new(received: u64) -> Self {
+        Self { received, failing_since: None, backoff: Backoff::new(FIRST_DELAY, 2, LONGEST_DELAY) }
     }
 
     /// The delay before the next attempt; `None` where no frame has been received for too long.
-    pub(crate) fn next_delay(&mut self, now: Instant, missing: usize) -> Option<Duration> {
-        if missing < self.missing {
-            *self = Self::new(missing);
+    pub(crate) fn next_delay(&mut self, now: Instant, received: u64) -> Option<Duration> {
+        if received > self.received {
+            *self = Self::new(received);
         }
         let (since, delay) = (*self.failing_since.get_or_insert(now), self.backoff.next_delay());
         (now.saturating_duration_since(since) < GIVE_UP_AFTER).then_some(delay)
@@ -187,15 +187,15 @@ mod tests {
 
     #[test]
     fn retries_end_where_no_frame_is_received() {
-        let mut retries = Retries::new(9);
+        let mut retries = Retries::new(0);
         let start = Instant::now();
         let at = |s: u64| start + Duration::from_secs(s);
-        assert_eq!(retries.next_delay(at(1), 9), Some(FIRST_DELAY));
-        assert_eq!(retries.next_delay(at(2), 9), Some(2 * FIRST_DELAY));
-        assert_eq!(retries.next_delay(at(18), 8), Some(FIRST_DELAY), "one frame was received");
-        assert_eq!(retries.next_delay(at(37), 8), Some(2 * FIRST_DELAY));
-        assert_eq!(retries.next_delay(at(39), 8), None);
-        let delays: Vec<_> = (0..9).map(|_| retries.next_delay(start, 8)).collect();
+        assert_eq!(retries.next_delay(at(1), 0), Some(FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(2), 0), Some(2 * FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(18), 1), Some(FIRST_DELAY), "one frame was received");
+        assert_eq!(retries.next_delay(at(37), 1), Some(2 * FIRST_DELAY));
+        assert_eq!(retries.next_delay(at(39), 1), None);
+        let delays: Vec<_> = (0..9).map(|_| retries.next_delay(start, 1)).collect();
         assert_eq!(delays[8], Some(LONGEST_DELAY));
     }
 }

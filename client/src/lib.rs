@@ -1,8 +1,9 @@
 //! Thin client library: request views, receive frames. Links no wgpu.
 //!
 //! A [`Client`] knows the coordinator; a [`Session`] has a plan and talks to the compositors alone. [`Frames`] are those of
-//! one request. `delivery` requests them from all compositors, through a `request_pump` for each: [`WorkStealing`] shares
-//! the views out, and [`FlowControl`] keeps a fast compositor busy. A [`LiveView`] is a camera that moves.
+//! one request, whose `window` is drawn from any number of views. `delivery` requests them from all compositors, through a
+//! `request_pump` for each: [`WorkStealing`] shares the views out, and [`FlowControl`] keeps a fast compositor busy. A
+//! [`LiveView`] is a camera that moves.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod active_plan;
@@ -17,7 +18,9 @@ mod placement;
 mod poses;
 mod request_pump;
 mod session;
+mod unrequested;
 mod view_request;
+mod window;
 mod work_stealing;
 
 pub use error::ClientError;

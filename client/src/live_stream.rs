@@ -12,11 +12,11 @@ use wire::rpc::CALL_TIMEOUT;
 use crate::active_plan::SessionState;
 use crate::delivery::GIVE_UP_AFTER;
 use crate::error::ClientError;
-use crate::frames::check_frame;
 use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::placement::{Tried, new_client_id};
 use crate::poses::{Newest, Poses, SentPose};
 use crate::view_request::{Frame, LiveFrame, LiveTimes, ViewRequest};
+use crate::window::check_frame;
 
 /// The longest silence of a client: its compositor cuts off one that is silent for longer.
 const HEARTBEAT: Duration = Duration::from_secs(20);

@@ -15,6 +15,7 @@ use wire::plan_in_force;
 use wire::rpc::{CompositorClient, Messages};
 
 use crate::error::ClientError;
+use crate::frames::{FrameRoom, FrameSink};
 
 /// The time that a compositor is passed over after a failure, where there are others.
 const OPEN_FOR: Duration = Duration::from_secs(10);
@@ -114,6 +115,30 @@ impl FrameStream {
         while let Some(part) = self.next_part(peer).await? {
             if let Some(frame) = self.assembly.push(part).map_err(corrupt)? {
                 return Ok(Some(frame));
+            }
+        }
+        self.assembly.finish().map_err(corrupt)?;
+        Ok(None)
+    }
+
+    /// The next whole frame that is due, and its room, which it has before its first bytes are kept.
+    pub(crate) async fn next_admitted(
+        &mut self,
+        peer: &Peer,
+        sink: &FrameSink,
+        plan_epoch: u64,
+    ) -> Result<Option<(WholeFrame, FrameRoom)>, Failure> {
+        let corrupt = |error: FrameAssemblyError| Failure::of_peer(peer, peer.error(error));
+        let mut room = None;
+        while let Some(part) = self.next_part(peer).await? {
+            if let Some(header) = &part.header {
+                // Whoever waits for room has none: two compositors would wait for each other.
+                drop(room.take());
+                let admitted = sink.admit(part.frame, header, plan_epoch).await;
+                room = Some(admitted.map_err(|fault| Failure::of_peer(peer, peer.error(fault)))?);
+            }
+            if let Some(frame) = self.assembly.push(part).map_err(corrupt)? {
+                return Ok(room.map(|room| (frame, room)));
             }
         }
         self.assembly.finish().map_err(corrupt)?;

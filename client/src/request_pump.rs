@@ -1,6 +1,5 @@
 //! Requests for the views of a batch, to every compositor: a little at a time, and more as views are received.
 
-use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -11,8 +10,8 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
 use crate::flow_control::FlowControl;
+use crate::unrequested::Unrequested;
 use crate::view_request::ViewRequest;
-use crate::work_stealing::WorkStealing;
 
 /// Room for the messages to one compositor: two of the largest, if all had one view.
 const MESSAGES: usize = 2 * MAX_VIEWS_PER_REQUEST;
@@ -21,8 +20,7 @@ const MESSAGES: usize = 2 * MAX_VIEWS_PER_REQUEST;
 #[derive(Debug)]
 struct Batch {
     template: RenderViews,
-    requests: Vec<ViewRequest>,
-    views: Mutex<WorkStealing>,
+    views: Mutex<Unrequested>,
 }
 
 /// Requests one compositor's views of a batch.
@@ -39,18 +37,16 @@ pub(crate) struct RequestPump {
 /// A pump that has been started, and its messages.
 pub(crate) type Started = (RequestPump, ReceiverStream<RenderViews>);
 
-/// The pumps of all compositors of these weights; `None` for a compositor without a share. A view takes about `view_s`;
-/// `None` where that is not known.
+/// The pumps of `compositors`; `None` for a compositor without a share of the first views. A view takes about `view_s`; `None`
+/// where that is not known.
 pub(crate) fn start_pumps(
     template: RenderViews,
-    requests: Vec<ViewRequest>,
-    weights: &[u32],
+    views: Unrequested,
+    compositors: usize,
     view_s: Option<f64>,
 ) -> Vec<Option<Started>> {
-    let runs = requests.chunk_by(|a, b| a.set_index == b.set_index).map(<[ViewRequest]>::len);
-    let views = Mutex::new(WorkStealing::new(runs, weights));
-    let batch = Arc::new(Batch { template, requests, views });
-    (0..weights.len()).map(|compositor| RequestPump::start(&batch, compositor, view_s)).collect()
+    let batch = Arc::new(Batch { template, views: Mutex::new(views) });
+    (0..compositors).map(|compositor| RequestPump::start(&batch, compositor, view_s)).collect()
 }
 
 impl RequestPump {
@@ -82,8 +78,7 @@ impl RequestPump {
         }
     }
 
-    fn request(&mut self, places: Range<usize>) {
-        let requests = &self.batch.requests[places];
+    fn request(&mut self, requests: Vec<ViewRequest>) {
         let (Some(first), Some(messages)) = (requests.first(), &self.messages) else { return };
         let views = requests.iter().map(|view| RequestedView { frame: view.frame, camera: view.camera }).collect();
         self.flow.sent(requests.len());
@@ -101,6 +96,7 @@ mod tests {
     use glam::{UVec2, Vec3};
 
     use super::*;
+    use crate::window::{LEAST_AHEAD_VIEWS, Window};
 
     fn template() -> RenderViews {
         RenderViews {
@@ -113,6 +109,13 @@ mod tests {
             views: Vec::new(),
             live: None,
         }
+    }
+
+    /// Started pumps for some views of each set, for compositors of these weights.
+    fn start(sets: u32, views: u64, weights: &[u32], view_s: Option<f64>) -> Vec<Option<Started>> {
+        let window = Window::open(requests(sets, views).into_iter(), sets, ViewPlanes::default()).unwrap();
+        let views = Unrequested::new(Arc::new(Mutex::new(window)), weights, Box::new(|_| ()));
+        start_pumps(template(), views, weights.len(), view_s)
     }
 
     fn requests(sets: u32, views: u64) -> Vec<ViewRequest> {
@@ -142,7 +145,7 @@ mod tests {
 
     #[test]
     fn a_fast_compositor_finishes_its_share_and_steals_from_a_slow_one() {
-        let mut parts = start_pumps(template(), requests(1, 100), &[1, 1], VIEW_S);
+        let mut parts = start(1, 100, &[1, 1], VIEW_S);
         let (mut slow, mut fast) = (parts.remove(1).unwrap(), parts.remove(0).unwrap());
         assert_eq!(waiting(&mut fast.1), [(0, 0, 16), (0, 16, 16)]);
         assert_eq!(waiting(&mut slow.1), [(0, 50, 16), (0, 66, 16)]);
@@ -157,7 +160,7 @@ mod tests {
 
     #[test]
     fn a_message_is_of_one_set_and_shrinks_for_a_slow_compositor() {
-        let mut part = start_pumps(template(), requests(3, 40), &[9], VIEW_S).remove(0).unwrap();
+        let mut part = start(3, 40, &[9], VIEW_S).remove(0).unwrap();
         let asked = [waiting(&mut part.1), receive(&mut part, 120, 100)].concat();
         assert_eq!(asked.iter().map(|(_, _, views)| views).sum::<usize>(), 120);
         assert!(asked.is_sorted_by_key(|(set, ..)| *set));
@@ -166,15 +169,29 @@ mod tests {
 
     #[test]
     fn small_sets_are_requested_in_many_messages() {
-        let mut part = start_pumps(template(), requests(100, 1), &[1], VIEW_S).remove(0).unwrap();
+        let mut part = start(100, 1, &[1], VIEW_S).remove(0).unwrap();
         assert_eq!(waiting(&mut part.1).len(), 17, "of one view each: as many as fit into two messages");
     }
 
     #[test]
     fn a_compositor_without_a_share_is_not_called() {
         let called =
-            start_pumps(template(), requests(1, 1), &[1, 1, 1], None).iter().filter(|part| part.is_some()).count();
+            start(1, 1, &[1, 1, 1], None).iter().filter(|part| part.is_some()).count();
         assert_eq!(called, 1);
-        assert!(start_pumps(template(), Vec::new(), &[1, 1], None).iter().all(Option::is_none));
+        assert!(start(0, 0, &[1, 1], None).iter().all(Option::is_none));
+    }
+
+    #[test]
+    fn many_views_are_drawn_as_they_are_received() {
+        let mut part = start(100, 1000, &[1], VIEW_S).remove(0).unwrap();
+        let mut asked = waiting(&mut part.1);
+        for views in 1..=100_000 {
+            let unrequested = part.0.batch.views.lock().shares_and_views();
+            assert!(unrequested.iter().all(|&views| views < 2 * LEAST_AHEAD_VIEWS), "{unrequested:?}");
+            asked.extend(receive(&mut part, 1, views));
+        }
+        assert_eq!(asked.iter().map(|(_, _, views)| views).sum::<usize>(), 100_000);
+        assert!(asked.is_sorted_by_key(|(_, frame, _)| *frame));
+        assert!(part.0.messages.is_none());
     }
 }

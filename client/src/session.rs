@@ -17,9 +17,10 @@ use wire::rpc::{CoordinatorClient, Messages, connect};
 use crate::active_plan::{ActivePlan, SessionState, follow_compositors, follow_coordinator};
 use crate::delivery::deliver;
 use crate::error::ClientError;
-use crate::frames::{Expected, Frames};
+use crate::frames::Frames;
 use crate::live_view::LiveView;
 use crate::view_request::{ViewRequest, ViewSettings};
+use crate::window::Window;
 
 /// Plans that compositors have named and the session has not taken over yet.
 const NAMED_PLANS: usize = 4;
@@ -154,13 +155,21 @@ impl Session {
     /// Requests views by the method of the plan in force. Frames are received in the order they are ready. All
     /// compositors work at the same time, each at first on its own share of every set's views.
     ///
+    /// Requests are drawn as frames are received, a few thousand ahead, so that there may be any number. Their iterator must
+    /// not block. The numbers of frames must rise, and views of one set belong together.
+    ///
     /// # Errors
-    /// For frame numbers given twice, sets beyond the timeline, bad cameras, and a session that has ended.
-    pub fn render_views(&self, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
+    /// For frame numbers that do not rise, sets beyond the timeline and bad cameras among the first few thousand requests,
+    /// and for a session that has ended. Later requests that cannot be met are errors of [`Frames::next`], after the frames
+    /// before them.
+    pub fn render_views<R>(&self, requests: R) -> Result<Frames, ClientError>
+    where
+        R: IntoIterator<Item = ViewRequest, IntoIter: Send + 'static>,
+    {
         let active = self.state.borrow().in_force()?;
-        requests.iter().try_for_each(|request| request.check(&active.plan.assignment))?;
-        let expected = Expected::new(requests.iter().copied(), active.settings.planes)?;
-        Ok(Frames::start(expected, |sink| deliver(self.state.clone(), requests, sink)))
+        let sets = active.plan.assignment.workload.timeline.set_count;
+        let window = Window::open(requests.into_iter(), sets, active.settings.planes)?;
+        Ok(Frames::start(window, |sink| deliver(self.state.clone(), sink)))
     }
 
     /// Frames of a camera that moves, by the method of the plan in force. They are sent on one long stream from one

@@ -22,7 +22,7 @@ pub(crate) struct ViewSettings {
 /// One view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewRequest {
-    /// The client's own number, once a call.
+    /// The client's own number; numbers rise within a call.
     pub frame: u64,
     /// Index into the session's timeline.
     pub set_index: u32,
@@ -34,11 +34,20 @@ impl ViewRequest {
     /// # Errors
     /// For a camera that cannot be used, and for a set beyond the plan's timeline.
     pub(crate) fn check(&self, plan: &Assignment) -> Result<(), ClientError> {
-        let invalid = |field, reason| ClientError::Invalid { field, reason };
-        let camera_error = |error| invalid("camera", format!("frame {}: {error}", self.frame));
-        self.camera.validate().map_err(camera_error)?;
-        let beyond = || invalid("set_index", format!("{} is beyond the timeline", self.set_index));
-        plan.sample_set_id(self.set_index).map(drop).ok_or_else(beyond)
+        self.check_within(plan.workload.timeline.set_count)
+    }
+
+    /// # Errors
+    /// For a camera that cannot be used, and for a set beyond `set_count`.
+    pub(crate) fn check_within(&self, set_count: u32) -> Result<(), ClientError> {
+        let invalid = |field, reason| Err(ClientError::Invalid { field, reason });
+        match self.camera.validate() {
+            Err(error) => invalid("camera", format!("frame {}: {error}", self.frame)),
+            Ok(()) if self.set_index >= set_count => {
+                invalid("set_index", format!("{} is beyond the timeline", self.set_index))
+            }
+            Ok(()) => Ok(()),
+        }
     }
 }
 

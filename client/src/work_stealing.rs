@@ -10,25 +10,49 @@ use std::ops::Range;
 /// Fewer views in a message do not pay: a call to the device costs more than a view.
 pub(crate) const FEW_VIEWS: usize = 8;
 
-/// The views of a batch that have not been requested yet, as places in the caller's list.
+/// The views of a batch that have not been requested yet, as places in the order of the caller's requests. Further sets may
+/// be added at any time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WorkStealing {
     /// A share for every compositor, for each set; sets without views are removed.
     sets: VecDeque<Vec<Range<usize>>>,
+    weights: Vec<u32>,
+    /// Sets so far, and their views.
+    set_count: usize,
+    view_count: usize,
+    /// Views of all shares.
+    left: usize,
 }
 
 impl WorkStealing {
     /// Each of `runs` is a number of consecutive views of one set. Weights that are all zero count as equal.
     #[must_use]
     pub fn new(runs: impl IntoIterator<Item = usize>, weights: &[u32]) -> Self {
-        let weights = if weights.iter().all(|&weight| weight == 0) { &vec![1; weights.len()] } else { weights };
-        let mut first = 0;
-        let shares_of = |(set, count): (usize, usize)| {
-            let shares = shares(first..first + count, weights, rounding(set, count, weights.len()));
-            first += count;
-            shares
-        };
-        Self { sets: runs.into_iter().enumerate().map(shares_of).collect() }
+        let is_weighted = weights.iter().any(|&weight| weight > 0);
+        let weights = if is_weighted { weights.to_vec() } else { vec![1; weights.len()] };
+        let mut views = Self { sets: VecDeque::new(), weights, set_count: 0, view_count: 0, left: 0 };
+        runs.into_iter().for_each(|count| views.push(count));
+        views
+    }
+
+    /// Adds the next views, which are of one set.
+    pub fn push(&mut self, count: usize) {
+        let views = self.view_count..self.view_count + count;
+        let rounding = rounding(self.set_count, count, self.weights.len());
+        self.sets.push_back(shares(views.clone(), &self.weights, rounding));
+        (self.set_count, self.view_count, self.left) = (self.set_count + 1, views.end, self.left + count);
+    }
+
+    /// Views that have not been requested.
+    #[must_use]
+    pub fn left(&self) -> usize {
+        self.left
+    }
+
+    /// The first place that may not have been requested.
+    pub(crate) fn first_left(&self) -> usize {
+        let of_first = self.sets.front().into_iter().flatten().filter(|share| !Range::is_empty(share));
+        of_first.map(|share| share.start).min().unwrap_or(0)
     }
 
     /// The next views of a compositor's own share, at most `most` and of one set. A compositor without a share gets none: it
@@ -39,7 +63,9 @@ impl WorkStealing {
             .iter_mut()
             .filter_map(|shares| shares.get_mut(compositor))
             .find(|share| !Range::is_empty(share))?;
-        Some(cut_front(own, most))
+        let views = cut_front(own, most);
+        self.left -= views.len();
+        Some(views)
     }
 
     /// The next views for a compositor, at most `most`, of the first set that has any: its own, or else stolen ones.
@@ -51,7 +77,9 @@ impl WorkStealing {
         if shares.get(compositor)?.is_empty() {
             shares[compositor] = back_half(shares.iter_mut().max_by_key(|share| share.len())?);
         }
-        Some(cut_front(&mut shares[compositor], most))
+        let views = cut_front(&mut shares[compositor], most);
+        self.left -= views.len();
+        Some(views)
     }
 }
 
@@ -123,6 +151,16 @@ mod tests {
         assert_eq!(views.take(1, 16), Some(60..76), "the first set is all under way");
         assert_eq!(views.take(0, 64), Some(40..60));
         assert_eq!((views.take(1, 64), views.take(1, 64), views.take(0, 1)), (Some(76..80), None, None));
+    }
+
+    #[test]
+    fn sets_that_are_added_later_are_shared_as_those_given_at_once() {
+        let (mut early, mut late) = (WorkStealing::new([30, 7, 20], &[1, 2]), WorkStealing::new([30], &[1, 2]));
+        late.push(7);
+        late.push(20);
+        assert_eq!(early, late);
+        assert_eq!((early.take(0, 10), early.take(1, 3), early.left()), (Some(0..10), Some(10..13), 44));
+        assert_eq!(early.first_left(), 13, "the first compositor's share is used up");
     }
 
     #[test]

@@ -32,7 +32,7 @@ The same on several machines or terminals:
   myriorama view --coordinator http://127.0.0.1:7420 --orbit 24 --out out/orbit
 
 Exit status: 0 done; 1 a check that was asked for fell short; 2 arguments or input that cannot be used; 3 a failure
-at run time. RUST_LOG=info (or debug) says what is going on.";
+at run time; 130 `view` was ended by ctrl-c or SIGTERM. RUST_LOG=info (or debug) says what is going on.";
 
 /// A subcommand of the program.
 #[derive(Debug, Subcommand)]
@@ -67,7 +67,13 @@ impl Command {
             Self::Up(args) => runtime()?.block_on(up::run(args)),
             Self::Coordinator(args) => runtime()?.block_on(coordinator::run(args)),
             Self::Node(args) => runtime()?.block_on(node::run(args)),
-            Self::View(args) => runtime()?.block_on(view::run(args)),
+            Self::View(args) => {
+                let runtime = runtime()?;
+                let outcome = runtime.block_on(view::run(args));
+                // A second signal does not wait for pictures that are being written.
+                runtime.shutdown_background();
+                outcome
+            }
             Self::Status(args) => runtime()?.block_on(status::run(&args)),
             Self::Replay(args) => replay::run(&args),
             Self::Health(args) => runtime()?.block_on(health::run(&args)),

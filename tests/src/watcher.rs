@@ -127,13 +127,13 @@ async fn ask_once(session: &Session, number: u64) -> Call {
     let wanted = number * VIEWS..(number + 1) * VIEWS;
     let set_index = (number % u64::from(MOVING.set_count)) as u32;
     let scene_time_s = MOVING.time_s(set_index).expect("one of its sets");
-    let view = |frame: u64| ViewRequest {
+    let view = move |frame: u64| ViewRequest {
         frame,
         set_index,
         camera: camera((frame % VIEWS) as f32 * 0.2 - 0.3, UVec2::new(40, 30)),
     };
     let (asked, mut frames, mut error) = (Instant::now(), Vec::new(), None);
-    match session.render_views(wanted.clone().map(view).collect()) {
+    match session.render_views(wanted.clone().map(view)) {
         Err(refused) => error = Some(refused.to_string()),
         Ok(mut coming) => {
             while let Some(next) = coming.next().await {

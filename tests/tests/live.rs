@@ -2,11 +2,14 @@
 #![allow(clippy::unwrap_used)]
 
 use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use client::{Frame, Session, ViewRequest};
 use cluster::{PolicyChoice, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, camera, request, views};
+use depth_image::ViewPlanes;
 use glam::UVec2;
 use node::{Deadlines, NodeConfig};
 
@@ -70,6 +73,33 @@ async fn other_compositors_send_the_frames_of_a_killed_one() {
     check(&received, 120);
     assert!(session.plan().assignment.plan_epoch > plan.assignment.plan_epoch);
     assert!(!session.plan().assignment.composites(&format!("n{victim}")));
+}
+
+/// A client holds a window of its requests, also over a fault.
+#[tokio::test(flavor = "multi_thread")]
+async fn requests_are_drawn_as_frames_are_received_also_after_a_fault() {
+    const VIEWS: u32 = 30_000;
+    const WINDOW: usize = 10_000;
+    let mut cluster = Cluster::start(4).await;
+    let planes = ViewPlanes::default();
+    let session = cluster.session(SessionRequest { planes, ..pipeline(MOVING) }).await.unwrap();
+    let victim = session.plan().assignment.compositors.last().unwrap().node_name[1..].parse::<usize>().unwrap();
+    let drawn = Arc::new(AtomicUsize::new(0));
+    let (counted, small) = (drawn.clone(), camera(0.1, UVec2::splat(4)));
+    let requests = (0..VIEWS).map(move |i| {
+        counted.fetch_add(1, Ordering::Relaxed);
+        ViewRequest { frame: i.into(), set_index: i / (VIEWS / 3), camera: small }
+    });
+    let (mut frames, mut received) = (session.render_views(requests).unwrap(), Vec::new());
+    while let Some(frame) = frames.next().await {
+        received.push(frame.unwrap());
+        let lead = drawn.load(Ordering::Relaxed) - received.len();
+        assert!(lead <= WINDOW, "{lead} ahead of {}", received.len());
+        if received.len() == 8000 {
+            cluster.nodes[victim].kill();
+        }
+    }
+    check(&received, VIEWS as usize);
 }
 
 /// Decoded frames wait for a busy caller, though their plan ends meanwhile.
@@ -142,7 +172,7 @@ async fn a_new_node_gets_a_role_without_a_lost_frame() {
     let start = Instant::now();
     while session.plan().assignment.plan_epoch == epoch {
         let first = all.len() as u64;
-        let asked = (0..6).map(|i| ViewRequest { frame: first + i, ..views(1, 6)[i as usize] }).collect();
+        let asked = (0..6).map(move |i| ViewRequest { frame: first + i, ..views(1, 6)[i as usize] });
         all.extend(session.render_views(asked).unwrap().all().await.unwrap());
         assert!(start.elapsed() < 3 * HEALED, "one node goes on doing both");
     }

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use depth_image::{CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera};
 use glam::{DMat3, DQuat, DVec3, UVec2, Vec2};
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
 /// The most bytes of a camera file: a thousand cameras take about 0.5 MB.
 pub const MAX_FILE_BYTES: u64 = 32 << 20;
@@ -68,13 +68,16 @@ pub enum CameraFault {
     /// A pinhole camera has no such model or distortion.
     #[error("{0} is not supported: cameras here are pinholes without distortion")]
     Unsupported(String),
+    /// A record of views was changed by hand.
+    #[error("is not as `myriorama view` writes it")]
+    NotAsWritten,
     /// The camera as a whole is not valid.
     #[error(transparent)]
     Camera(#[from] CameraError),
 }
 
 /// A fault at a place, before the file is named.
-fn fault(place: impl Into<String>, kind: impl Into<CameraFault>) -> CameraFileError {
+pub(crate) fn fault(place: impl Into<String>, kind: impl Into<CameraFault>) -> CameraFileError {
     CameraFileError { file: String::new(), place: place.into(), kind: kind.into() }
 }
 
@@ -224,47 +227,4 @@ impl Frame<'_> {
 fn finite(value: &Value) -> Result<f64, CameraFault> {
     let told = || if value.is_null() { "null, NaN or infinite".to_owned() } else { value.to_string() };
     value.as_f64().filter(|v| v.is_finite()).ok_or_else(|| CameraFault::NotFinite(told()))
-}
-
-/// A camera to write, with further fields.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NamedCamera {
-    /// The path of the camera's picture.
-    pub file_path: String,
-    /// The camera.
-    pub camera: PinholeCamera,
-    /// Further fields of the frame.
-    pub more: Map<String, Value>,
-}
-
-/// Writes cameras in the convention of `transforms.json`; `file` has fields to go beside the frames.
-///
-/// # Errors
-/// The file cannot be written.
-pub fn write(
-    path: &Path,
-    cameras: &[NamedCamera],
-    origin_in_source: DVec3,
-    mut file: Map<String, Value>,
-) -> Result<(), CameraFileError> {
-    file.insert("camera_model".to_owned(), json!("OPENCV"));
-    file.insert("frames".to_owned(), cameras.iter().map(|named| frame_of(named, origin_in_source)).collect());
-    let text = serde_json::to_vec_pretty(&file).map_err(CameraFault::from);
-    let written = text.and_then(|text| Ok(std::fs::write(path, text)?));
-    written.map_err(|kind| CameraFileError { file: path.display().to_string(), ..fault("file", kind) })
-}
-
-fn frame_of(named: &NamedCamera, origin_in_source: DVec3) -> Value {
-    let camera = &named.camera;
-    let axes = DMat3::from_quat(camera.world_from_camera.as_dquat().normalize());
-    let eye = camera.eye_in_world.as_dvec3() + origin_in_source;
-    let row = |i: usize| json!([axes.x_axis[i], axes.y_axis[i], axes.z_axis[i], eye[i]]);
-    let mut frame = named.more.clone();
-    let fields = json!({
-        "file_path": named.file_path, "w": camera.size_px.x, "h": camera.size_px.y,
-        "fl_x": camera.focal_px.x, "fl_y": camera.focal_px.y, "cx": camera.principal_px.x, "cy": camera.principal_px.y,
-        "transform_matrix": [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]],
-    });
-    frame.extend(fields.as_object().cloned().unwrap_or_default());
-    Value::Object(frame)
 }

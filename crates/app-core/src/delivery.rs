@@ -1,9 +1,10 @@
 //! Views asked of a cluster as any client asks, and the time until all have arrived.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use client::{Client, Frame, Session, ViewRequest};
-use cluster::limits::MAX_VIEWPOINTS;
+use cluster::limits::{MAX_VIEWPOINTS, MAX_VIEWS_PER_SET};
 use cluster::{OfferSettings, PolicyChoice, Quality, SessionRequest, Timeline};
 use depth_image::{PinholeCamera, ViewPlanes};
 use reconstruction::ReconstructionMethod;
@@ -34,7 +35,8 @@ pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Resul
         sample_size_px: None,
         volume: None,
         typical_view: *views.first().ok_or_else(|| BadInput("no views are asked for".to_owned()))?,
-        views_per_set: u32::try_from(views.len())?,
+        // Plans need no more views: a client requests a few thousand at a time.
+        views_per_set: views.len().min(MAX_VIEWS_PER_SET as usize) as u32,
         planes: ViewPlanes::default(),
         timeline: Timeline::still(0.0),
         policy: PolicyChoice::Auto,
@@ -84,21 +86,41 @@ pub fn viewpoints(views: &[PinholeCamera]) -> Vec<PinholeCamera> {
     views.iter().step_by(views.len().div_ceil(MAX_VIEWPOINTS).max(1)).copied().collect()
 }
 
-/// Asks for all views of all sets; frames are numbered set by set, and view by view in each. `received` is given each as it
-/// comes, and is waited for. Gives the seconds from the request to the last frame, decoded and checksummed.
+/// Requests of all views of all sets, numbered set by set, and view by view in each. They are made as they are drawn.
+pub fn requests(sets: u32, views: Arc<[PinholeCamera]>) -> impl Iterator<Item = ViewRequest> + Send + 'static {
+    let of_set = move |set_index| {
+        let (views, count) = (views.clone(), views.len());
+        let first = u64::from(set_index) * count as u64;
+        (0..count).map(move |at| ViewRequest { frame: first + at as u64, set_index, camera: views[at] })
+    };
+    (0..sets).flat_map(of_set)
+}
+
+/// Asks for all views of all sets, as [`requests`] numbers them; `received` is given each as it comes, and is waited for.
+/// Gives the seconds from the request to the last frame, decoded and checksummed.
 ///
 /// # Errors
 /// The cluster fails, frames are missing, or `received` fails.
 pub async fn receive(
     session: &Session,
     views: &[PinholeCamera],
+    received: impl AsyncFnMut(Frame) -> anyhow::Result<()>,
+) -> anyhow::Result<f64> {
+    let sets = session.plan().assignment.workload.timeline.set_count;
+    receive_requests(session, requests(sets, views.into()), received).await
+}
+
+/// The same for any requests.
+///
+/// # Errors
+/// As [`receive`].
+pub async fn receive_requests(
+    session: &Session,
+    requests: impl Iterator<Item = ViewRequest> + Send + 'static,
     mut received: impl AsyncFnMut(Frame) -> anyhow::Result<()>,
 ) -> anyhow::Result<f64> {
     let start = Instant::now();
-    let sets = session.plan().assignment.workload.timeline.set_count;
-    let all = (0..sets).flat_map(|set_index| views.iter().map(move |&camera| (set_index, camera)));
-    let requests = (0..).zip(all).map(|(frame, (set_index, camera))| ViewRequest { frame, set_index, camera });
-    let mut incoming = session.render_views(requests.collect())?;
+    let mut incoming = session.render_views(requests)?;
     while let Some(frame) = incoming.next().await {
         received(frame?).await?;
     }
@@ -126,6 +148,17 @@ mod tests {
                 (dim, coarse, 0.7, 0.8)
             ]
         );
+    }
+
+    #[test]
+    fn views_of_a_million_moments_are_numbered_as_they_are_drawn() {
+        let up = glam::Vec3::Y;
+        let camera = |x: f32| PinholeCamera::looking_at(glam::Vec3::new(x, 0.0, 3.0), glam::Vec3::ZERO, up, 1.0, [8, 8].into());
+        let views: Arc<[PinholeCamera]> = [0.0, 1.0, 2.0].map(camera).into();
+        let mut drawn = requests(1_000_000, views.clone()).skip(2_999_998);
+        let last = |set_index, frame, at: usize| Some(ViewRequest { frame, set_index, camera: views[at] });
+        assert_eq!([drawn.next(), drawn.next()], [last(999_999, 2_999_998, 1), last(999_999, 2_999_999, 2)]);
+        assert_eq!(drawn.next(), None);
     }
 
     #[test]

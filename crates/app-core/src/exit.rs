@@ -11,6 +11,8 @@ pub enum Outcome {
     Done,
     /// All was done, but a check fell short: by `--strict`, `--least-psnr` or `--longest-gap`.
     FellShort,
+    /// A signal ended the command, which says how to go on.
+    Interrupted,
 }
 
 impl Outcome {
@@ -20,6 +22,9 @@ impl Outcome {
         if holds { Self::Done } else { Self::FellShort }
     }
 }
+
+/// As shells say of a program that ctrl-c ends: 128 and the number of the signal.
+const INTERRUPTED: u8 = 130;
 
 /// Input that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -36,7 +41,7 @@ fn is_bad_input(error: &(dyn std::error::Error + 'static)) -> bool {
 }
 
 /// Prints the error on standard error, and returns the exit status: 0 done, 1 a check fell short, 2 input that cannot be
-/// used, 3 a failure at run time.
+/// used, 3 a failure at run time, 130 ended by a signal.
 #[must_use]
 pub fn report(result: &anyhow::Result<Outcome>) -> ExitCode {
     if let Err(error) = result {
@@ -45,6 +50,7 @@ pub fn report(result: &anyhow::Result<Outcome>) -> ExitCode {
     match result {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::FellShort) => 1,
+        Ok(Outcome::Interrupted) => INTERRUPTED,
         Err(error) if error.chain().any(is_bad_input) => 2,
         Err(_) => 3,
     }

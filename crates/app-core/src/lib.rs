@@ -2,10 +2,11 @@
 //!
 //! [`setup`] makes a scene on offer out of arguments, and [`scenes`] several. [`cluster`] runs coordinator and nodes in one process.
 //! [`delivery`] opens sessions and receives views, and [`live`] follows a path with a moving camera. [`camera_file`]
-//! reads and writes camera files. [`exit`] defines the exit status.
+//! reads camera files, and [`camera_record`] writes those of views. [`exit`] defines the exit status.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod camera_file;
+pub mod camera_record;
 pub mod cluster;
 pub mod delivery;
 pub mod exit;

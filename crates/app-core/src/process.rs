@@ -32,6 +32,37 @@ pub async fn stop_signal() -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Ctrl-c or SIGTERM, once and again.
+#[derive(Debug, Clone, Default)]
+pub struct StopSignals {
+    /// The first asks the command to end in order.
+    pub first: CancellationToken,
+    /// The second ends the command at once.
+    pub second: CancellationToken,
+}
+
+impl StopSignals {
+    /// Signals of the system from now on.
+    ///
+    /// # Errors
+    /// Signals cannot be received.
+    pub fn listen() -> anyhow::Result<Self> {
+        let [mut interrupt, mut terminate] =
+            [signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?];
+        let signals = Self::default();
+        let heard = signals.clone();
+        tokio::spawn(async move {
+            for token in [heard.first, heard.second] {
+                tokio::select! {
+                    _ = interrupt.recv() => token.cancel(),
+                    _ = terminate.recv() => token.cancel(),
+                }
+            }
+        });
+        Ok(signals)
+    }
+}
+
 /// Cancels `shutdown` at ctrl-c or SIGTERM. Without signals, the caller can still kill the process.
 pub fn cancel_at_signal(shutdown: CancellationToken) {
     tokio::spawn(async move {

@@ -1,7 +1,8 @@
 //! Camera files survive a round trip, and faults are named.
 #![allow(clippy::unwrap_used)]
 
-use app_core::camera_file::{CameraFault, MAX_FILE_BYTES, NamedCamera, Placement, read, write};
+use app_core::camera_file::{CameraFault, MAX_FILE_BYTES, Placement, read};
+use app_core::camera_record::{self, NamedCamera, write};
 use depth_image::PinholeCamera;
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use serde_json::{Map, Value, json};
@@ -31,12 +32,42 @@ fn cameras_survive_a_round_trip_far_from_the_origin() {
     for origin_in_source in [DVec3::ZERO, DVec3::new(2_683_123.25, 408.5, -1_247_321.75)] {
         let named = |i| NamedCamera { file_path: format!("{i}.png"), camera: camera(i), more: Map::new() };
         let cameras: Vec<_> = (0..5).map(named).collect();
-        write(&path, &cameras, origin_in_source, Map::new()).unwrap();
+        write(&path, cameras.clone(), origin_in_source, Map::new()).unwrap();
         let found = read(&path, Placement { origin_in_source, ..PLACEMENT }).unwrap();
         assert_eq!(found.len(), 5);
         for (named, found) in cameras.iter().zip(&found) {
             assert!(close(&named.camera, found), "{named:?} {found:?}");
         }
+    }
+}
+
+#[test]
+fn a_record_is_read_line_by_line_as_it_was_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cameras.json");
+    assert!(camera_record::read(&path, |_| ()).unwrap().is_none(), "there is none");
+    let about = Map::from_iter([("settings".to_owned(), json!({"method": "mesh"}))]);
+    let named = |i| NamedCamera { file_path: format!("{i}.png"), camera: camera(i), more: Map::new() };
+    for count in [0, 1, 3] {
+        write(&path, (0..count).map(named), DVec3::X, about.clone()).unwrap();
+        let mut lines = Vec::new();
+        let found = camera_record::read(&path, |line| lines.push(line.to_owned())).unwrap().unwrap();
+        assert_eq!(found["settings"], about["settings"]);
+        assert_eq!(lines, (0..count).map(|i| named(i).line(DVec3::X)).collect::<Vec<_>>());
+    }
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(serde_json::from_str::<Value>(&text).unwrap()["frames"].as_array().unwrap().len() == 3, "it is JSON");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no part is left");
+}
+
+#[test]
+fn a_record_that_was_changed_is_refused_by_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cameras.json");
+    for (text, line) in [("", 1), ("{}", 1), ("{\n}\n", 1), ("{\"a\":1,\"frames\":[\n{},\n{}", 3), ("{\"a\":,\"frames\":[\n]}\n", 1)] {
+        std::fs::write(&path, text).unwrap();
+        let error = camera_record::read(&path, |_| ()).unwrap_err();
+        assert_eq!(error.to_string(), format!("{}: line {line}: is not as `myriorama view` writes it", path.display()));
     }
 }
 

@@ -7,7 +7,7 @@
 
 use std::time::Instant;
 
-use app_core::delivery::open;
+use app_core::delivery::{open, requests};
 use client::{Frame, Session, ViewRequest};
 use cluster::{Policy, SessionRequest};
 use codec::FrameHeader;
@@ -113,10 +113,8 @@ async fn receive(
     settings: &PointSettings,
     mut arrived: impl FnMut(),
 ) -> anyhow::Result<(Arrivals, Window)> {
-    let all = (0..settings.sets()).flat_map(|set_index| views.iter().map(move |camera| (set_index, *camera)));
-    let view_request = |(frame, (set_index, camera))| ViewRequest { frame, set_index, camera };
     // One request for all views: several streams would take turns.
-    let mut frames = session.render_views((0..).zip(all).map(view_request).collect())?;
+    let mut frames = session.render_views(requests(settings.sets(), views.into()))?;
     let (mut arrivals, mut begun) = (Arrivals::new(settings), None);
     while let Some(frame) = frames.next().await {
         let Frame { request: ViewRequest { set_index: set, .. }, header, .. } = frame?;

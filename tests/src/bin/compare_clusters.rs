@@ -200,8 +200,8 @@ async fn image_hash(session: &Session) -> anyhow::Result<u64> {
 async fn frame_hash(session: &Session, views: &[PinholeCamera]) -> anyhow::Result<u64> {
     let sets = session.plan().assignment.workload.timeline.set_count;
     let all = (0..sets).flat_map(|set_index| views.iter().map(move |camera| (set_index, *camera)));
-    let requests =
-        (0..).zip(all).map(|(frame, (set_index, camera))| ViewRequest { frame, set_index, camera }).collect();
+    let request = |(frame, (set_index, camera))| ViewRequest { frame, set_index, camera };
+    let requests: Vec<ViewRequest> = (0..).zip(all).map(request).collect();
     let mut incoming = session.render_views(requests)?;
     let mut frames = Vec::new();
     while let Some(frame) = incoming.next().await {

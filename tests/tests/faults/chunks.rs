@@ -49,7 +49,7 @@ async fn session(cluster: &Cluster) -> Session {
 /// Shows the views of a set that no node has; all must be right.
 async fn show(session: &Session, set_index: u32) -> Duration {
     let start = Instant::now();
-    let asked = views(set_index + 1, 3).into_iter().filter(|view| view.set_index == set_index).collect();
+    let asked = views(set_index + 1, 3).into_iter().filter(move |view| view.set_index == set_index);
     let frames = session.render_views(asked).unwrap().all().await.unwrap();
     let numbers: BTreeSet<u64> = frames.iter().map(|frame| frame.request.frame).collect();
     assert_eq!((frames.len(), numbers.len()), (3, 3));

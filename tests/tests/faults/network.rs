@@ -123,7 +123,7 @@ async fn low_bandwidth() {
     to_node.set(Way::Slow { bytes_per_s }, Way::Slow { bytes_per_s });
     let view = |frame| client::ViewRequest { frame, set_index: 0, camera: camera(0.1, UVec2::new(2048, 1536)) };
     let start = Instant::now();
-    let frames = network.watcher.session.render_views((0..4).map(view).collect()).unwrap().all().await.unwrap();
+    let frames = network.watcher.session.render_views((0..4).map(view)).unwrap().all().await.unwrap();
     let bytes: u64 = frames.iter().map(|frame| frame.header.total_bytes()).sum();
     println!("thin line: {bytes} bytes took {:.2} s", start.elapsed().as_secs_f64());
     let least_s = bytes as f64 / bytes_per_s;

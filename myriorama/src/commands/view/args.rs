@@ -18,7 +18,9 @@ use render::Lighting;
 /// Asks for views and writes them to --out. Colour is view_0000.png. With --depth, view_0000.depth.png has 16-bit
 /// inverse planar depth: value / 65535 × inverse_depth_max_per_m of the frame in cameras.json, 0 for background. With
 /// --provenance, view_0000.provenance.png has a colour for each sample camera, white for blended and red for filled
-/// pixels. cameras.json has the cameras in the transforms.json convention, in the scene file's coordinates.
+/// pixels. cameras.json has the cameras of all written views in the transforms.json convention, in the scene file's
+/// coordinates. It is written every few seconds. After ctrl-c or SIGTERM, pictures that are being written are finished,
+/// and the exit status is 130; a second ctrl-c ends at once. --resume then requests the remaining views.
 #[derive(Debug, Args)]
 pub struct ViewArgs {
     /// The address of the coordinator
@@ -38,6 +40,9 @@ pub struct ViewArgs {
     /// The folder of the pictures
     #[arg(long, default_value = "out/view", value_name = "DIR")]
     pub(super) out: PathBuf,
+    /// Requests only the views that --out does not have yet, as its cameras.json says. Settings must be the same
+    #[arg(long, conflicts_with = "live")]
+    pub(super) resume: bool,
     /// Writes the depth of every view as well
     #[arg(long)]
     pub(super) depth: bool,
@@ -70,7 +75,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(super) tiles: Option<u32>,
     /// Moments of an animated scene; all views are made of each moment
-    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) frames: u32,
     /// Seconds between moments
     #[arg(long, default_value_t = 1.0 / 30.0, value_name = "S")]
@@ -109,16 +114,16 @@ fn duration(text: &str) -> Result<f64, String> {
 #[group(multiple = false)]
 pub(super) struct Viewpoints {
     /// N views on an ellipse between the sample cameras
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) orbit: Option<u32>,
     /// Columns × rows of views on the rectangle of the sample cameras
     #[arg(long, value_name = "CxR", value_parser = grid)]
     pub(super) grid: Option<[u32; 2]>,
     /// N views spread evenly on the rectangle of the sample cameras
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) views: Option<u32>,
     /// N views on a circle around the scene, at the height of the sample cameras' centre; implies --cells
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) around: Option<u32>,
     /// One view: eye, target and full vertical field of view in degrees, in the scene file's coordinates
     #[arg(long, value_name = "X,Y,Z:X,Y,Z[:FOV]", allow_hyphen_values = true)]

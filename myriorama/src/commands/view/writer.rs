@@ -4,89 +4,78 @@ use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 
 use anyhow::Context as _;
-use app_core::camera_file::NamedCamera;
 use app_core::pictures;
 use client::Frame;
+use depth_image::ViewPlanes;
 use image::{DynamicImage, ImageFormat};
-use serde_json::{Map, json};
 use tokio::task::JoinSet;
 
-/// Most bytes of frames that are written at once, though always one frame.
+use super::file_names::FileNames;
+
+/// Most bytes of frames that are written at once, with their copies, though always one frame.
 const BYTES_AT_ONCE: usize = 128 << 20;
+/// Bytes a pixel that writing takes beside the frame: a copy of its colour, and the compressed picture.
+const COPY_BYTES_PER_PIXEL: usize = 6;
+
+/// A written view, and the scale of its depth picture, as in the record.
+pub(super) type Written = (u64, f32);
 
 /// Writes frames into a folder, a few at once.
+///
+/// A client holds [96 MiB of frames](client::Frames) until they are taken, and a frame that is taken is written at once. All
+/// frames together have 224 MiB at most, or are two larger ones.
 pub(super) struct PictureWriter {
     folder: PathBuf,
     most_at_once: usize,
-    writing: JoinSet<anyhow::Result<(u64, NamedCamera)>>,
-    written: Vec<(u64, NamedCamera)>,
+    writing: JoinSet<anyhow::Result<Written>>,
 }
 
 impl PictureWriter {
-    /// `frame_bytes` are those of the largest frame.
-    pub(super) fn new(folder: &Path, frame_bytes: usize) -> Self {
+    /// `pixels` are those of the largest frame.
+    pub(super) fn new(folder: &Path, pixels: usize, planes: ViewPlanes) -> Self {
         let processors = available_parallelism().map_or(1, usize::from);
+        let frame_bytes = pixels * (planes.bytes_per_pixel() + COPY_BYTES_PER_PIXEL);
         let most_at_once = (BYTES_AT_ONCE / frame_bytes.max(1)).clamp(1, processors);
-        Self { folder: folder.to_owned(), most_at_once, writing: JoinSet::new(), written: Vec::new() }
+        Self { folder: folder.to_owned(), most_at_once, writing: JoinSet::new() }
     }
 
-    /// Begins to write a frame once there is room.
+    /// Begins to write a frame, and waits until there is room for another. Gives a view that was written meanwhile. Once
+    /// this has begun, the frame is written, also where the caller does not wait.
     ///
     /// # Errors
     /// An earlier frame cannot be written.
-    pub(super) async fn write(&mut self, frame: Frame) -> anyhow::Result<()> {
-        if self.writing.len() >= self.most_at_once {
-            self.wait_for_one().await?;
-        }
+    pub(super) async fn write(&mut self, frame: Frame) -> anyhow::Result<Option<Written>> {
         let folder = self.folder.clone();
-        self.writing.spawn_blocking(move || Ok((frame.request.frame, write_frame(&folder, &frame)?)));
-        Ok(())
+        self.writing.spawn_blocking(move || write_frame(&folder, &frame));
+        if self.writing.len() < self.most_at_once { Ok(None) } else { self.next_written().await }
     }
 
-    /// The cameras of all frames, by number, once all are written.
+    /// The next view that is written; `None` when all are.
     ///
     /// # Errors
     /// A frame cannot be written.
-    pub(super) async fn finish(mut self) -> anyhow::Result<Vec<NamedCamera>> {
-        while !self.writing.is_empty() {
-            self.wait_for_one().await?;
-        }
-        self.written.sort_by_key(|(number, _)| *number);
-        Ok(self.written.into_iter().map(|(_, camera)| camera).collect())
-    }
-
-    async fn wait_for_one(&mut self) -> anyhow::Result<()> {
-        if let Some(written) = self.writing.join_next().await {
-            self.written.push(written??);
-        }
-        Ok(())
+    pub(super) async fn next_written(&mut self) -> anyhow::Result<Option<Written>> {
+        self.writing.join_next().await.transpose()?.transpose()
     }
 }
 
-/// The name of a view's picture.
-pub(super) fn file_name(number: u64) -> String {
-    format!("view_{number:04}.png")
-}
-
-/// Writes the planes of a frame, each as a picture, and returns its camera with their names.
-fn write_frame(folder: &Path, frame: &Frame) -> anyhow::Result<NamedCamera> {
-    let stem = format!("view_{:04}", frame.request.frame);
-    let file_path = file_name(frame.request.frame);
-    let color = pictures::rgb(&frame.view).context("a view is not of its size")?;
-    save(&folder.join(&file_path), color.into())?;
-    let mut more = Map::from_iter([("set_index".to_owned(), json!(frame.request.set_index))]);
-    if let Some((image, greatest)) = pictures::inverse_depth_16(&frame.view) {
-        let name = format!("{stem}.depth.png");
-        save(&folder.join(&name), image.into())?;
-        more.insert("depth_file_path".to_owned(), json!(name));
-        more.insert("inverse_depth_max_per_m".to_owned(), json!(greatest));
+/// Writes the planes of a frame, each as a picture.
+fn write_frame(folder: &Path, frame: &Frame) -> anyhow::Result<Written> {
+    let (number, view) = (frame.request.frame, &frame.view);
+    let planes =
+        ViewPlanes { inverse_depth: view.inverse_depth_per_m.is_some(), provenance: view.provenance.is_some() };
+    let names = FileNames::of(number, planes);
+    let color = pictures::rgb(view).context("a view is not of its size")?;
+    save(&folder.join(names.color), color.into())?;
+    let mut depth_scale = 0.0;
+    if let (Some((image, greatest)), Some(name)) = (pictures::inverse_depth_16(view), names.depth) {
+        save(&folder.join(name), image.into())?;
+        depth_scale = greatest;
     }
-    if let Some((image, _)) = pictures::provenance(&frame.view) {
-        let name = format!("{stem}.provenance.png");
-        save(&folder.join(&name), image.into())?;
-        more.insert("provenance_file_path".to_owned(), json!(name));
+    if let (Some((image, _)), Some(name)) = (pictures::provenance(view), names.provenance) {
+        save(&folder.join(name), image.into())?;
     }
-    Ok(NamedCamera { file_path, camera: frame.request.camera, more })
+    Ok((number, depth_scale))
 }
 
 /// A picture is whole under its name, or not there.
@@ -94,6 +83,10 @@ fn save(path: &Path, image: DynamicImage) -> anyhow::Result<()> {
     let part = path.with_extension("part");
     let saved = image.save_with_format(&part, ImageFormat::Png).map_err(anyhow::Error::from);
     let saved = saved.and_then(|()| Ok(std::fs::rename(&part, path)?));
+    if saved.is_err() {
+        // There may be none, and the first error counts.
+        let _ = std::fs::remove_file(&part);
+    }
     saved.with_context(|| format!("cannot write {}", path.display()))
 }
 
@@ -126,27 +119,41 @@ mod tests {
         Frame { request: client::ViewRequest { frame: number, set_index: 0, camera }, view, header }
     }
 
+    const DEPTH: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: false };
+
     #[tokio::test]
-    async fn frames_of_any_order_are_whole_files_and_cameras_by_number() {
+    async fn frames_of_any_order_are_whole_files() {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = PictureWriter::new(folder.path(), 1 << 30);
+        let mut writer = PictureWriter::new(folder.path(), 1 << 30, DEPTH);
         assert_eq!(writer.most_at_once, 1, "a frame is larger than the bound");
         for number in [2, 0, 1] {
-            writer.write(frame(number)).await.unwrap();
-            assert_eq!(writer.writing.len(), 1);
+            assert_eq!(writer.write(frame(number)).await.unwrap(), Some((number, 0.5)));
         }
-        let names: Vec<_> = writer.finish().await.unwrap().into_iter().map(|camera| camera.file_path).collect();
-        assert_eq!(names, ["view_0000.png", "view_0001.png", "view_0002.png"]);
-        assert_eq!(image::open(folder.path().join(&names[2])).unwrap().into_rgb8().into_raw(), [2; 18]);
+        assert_eq!(writer.next_written().await.unwrap(), None);
+        let picture = folder.path().join("view_0002.png");
+        assert_eq!(image::open(picture).unwrap().into_rgb8().into_raw(), [2; 18]);
         let files = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
-        assert!(files.into_iter().all(|name| name.to_string_lossy().ends_with(".png")), "no part is left");
+        let names: Vec<_> = files.map(|name| name.into_string().unwrap()).collect();
+        assert!(names.len() == 6 && names.iter().all(|name| name.ends_with(".png")), "no part is left: {names:?}");
+    }
+
+    #[tokio::test]
+    async fn frames_in_hand_stay_within_the_bound() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut writer = PictureWriter::new(folder.path(), 1, DEPTH);
+        writer.most_at_once = 2;
+        assert_eq!(writer.write(frame(0)).await.unwrap(), None);
+        for number in 1..5 {
+            assert!(writer.write(frame(number)).await.unwrap().is_some());
+            assert_eq!(writer.writing.len(), 1, "there is room for the next frame");
+        }
     }
 
     #[tokio::test]
     async fn a_folder_that_is_gone_is_named() {
-        let mut writer = PictureWriter::new(Path::new("/nowhere/out"), 1);
-        writer.write(frame(7)).await.unwrap();
-        let error = format!("{:#}", writer.finish().await.unwrap_err());
+        let mut writer = PictureWriter::new(Path::new("/nowhere/out"), 1, DEPTH);
+        writer.most_at_once = 1;
+        let error = format!("{:#}", writer.write(frame(7)).await.unwrap_err());
         assert!(error.contains("/nowhere/out/view_0007.png"), "{error}");
     }
 }

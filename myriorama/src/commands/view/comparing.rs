@@ -1,0 +1,34 @@
+//! The comparison of written views with the same views drawn directly.
+
+use anyhow::Context as _;
+use app_core::delivery::{open, receive_requests, requests};
+use app_core::exit::Outcome;
+use client::Frame;
+use cluster::{PolicyChoice, SessionRequest};
+use depth_image::ViewPlanes;
+
+use super::args::ViewArgs;
+use super::file_names::FileNames;
+use super::job::Job;
+use crate::comparison;
+
+/// Asks for the same views drawn directly, and writes how far the written ones are from them. One frame at a time is compared;
+/// others wait at the client. A view takes 32 bytes, and its row of the table.
+pub(super) async fn compare(args: &ViewArgs, job: &Job, views: u64) -> anyhow::Result<Outcome> {
+    let direct = SessionRequest { policy: PolicyChoice::Direct, ..job.request.clone() };
+    let session = open(&job.client, direct).await?;
+    let mut rows = Vec::with_capacity(views as usize);
+    let received = async |frame: Frame| {
+        let number = frame.request.frame;
+        let written = args.out.join(FileNames::of(number, ViewPlanes::default()).color);
+        let row = tokio::task::spawn_blocking(move || comparison::row(&frame.view, &written)).await??;
+        rows.push((number as usize, row));
+        Ok(())
+    };
+    receive_requests(&session, requests(args.frames, job.cameras.clone()), received).await?;
+    let (table, worst_psnr_db) = comparison::table(rows)?;
+    println!("\n{}", table.to_text());
+    let path = args.out.join("comparison.csv");
+    std::fs::write(&path, table.to_csv()?).with_context(|| format!("cannot write {}", path.display()))?;
+    Ok(Outcome::of(args.least_psnr.is_none_or(|least| worst_psnr_db >= least)))
+}

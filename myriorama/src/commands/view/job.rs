@@ -1,0 +1,118 @@
+//! A request for views, as arguments and the coordinator's offer determine it.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use app_core::exit::BadInput;
+use app_core::delivery::{at_rate, open, request, viewpoints};
+use client::{Client, Session};
+use cluster::{OfferStatus, SessionRequest, Timeline};
+use depth_image::PinholeCamera;
+use render::Lighting;
+
+use super::args::ViewArgs;
+use super::file_names::remove_parts;
+use super::record::Record;
+use super::settings;
+
+/// A request for views that has not been made.
+pub(super) struct Job {
+    pub(super) client: Client,
+    offer: OfferStatus,
+    pub(super) cameras: Arc<[PinholeCamera]>,
+    pub(super) request: SessionRequest,
+}
+
+impl Job {
+    /// Places the views as the coordinator's offer says.
+    ///
+    /// # Errors
+    /// Arguments cannot be used, no coordinator answers, or the folder cannot be written.
+    pub(super) async fn place(args: &ViewArgs) -> anyhow::Result<Self> {
+        let client = Client::connect(&args.coordinator).await;
+        let client = client.with_context(|| format!("no coordinator at {}", args.coordinator))?;
+        let status = client.wait_for_nodes(1, Duration::from_secs(30)).await?;
+        let offer = offered(status.offers, args.scene.as_deref())?;
+        let cameras = args.viewpoints.cameras(&offer, args.size)?;
+        std::fs::create_dir_all(&args.out).with_context(|| format!("cannot write to {}", args.out.display()))?;
+        let request = session_request(args, &offer, &cameras)?;
+        Ok(Self { client, offer, cameras: cameras.into(), request })
+    }
+
+    /// Opens the session.
+    ///
+    /// # Errors
+    /// The coordinator's.
+    pub(super) async fn open(&self) -> anyhow::Result<Session> {
+        let session = open(&self.client, self.request.clone()).await?;
+        let plan = session.plan();
+        println!("plan {}: {}", plan.assignment.plan_epoch, plan.reason);
+        Ok(session)
+    }
+
+    /// The record of the pictures, with those that an earlier command has left.
+    ///
+    /// # Errors
+    /// There are too many views, or the earlier command's settings were others.
+    pub(super) fn record(&self, args: &ViewArgs) -> anyhow::Result<Record> {
+        let settings = settings::of(&self.request, &self.offer);
+        let views = (self.cameras.clone(), args.frames);
+        let mut record = Record::new(&args.out, self.offer.origin_in_source, settings, views, args.planes())?;
+        if args.resume {
+            record.resume()?;
+        }
+        remove_parts(&args.out);
+        Ok(record)
+    }
+}
+
+/// The offer of a scene by name or hash; the first where none is named.
+fn offered(offers: Vec<OfferStatus>, scene: Option<&str>) -> anyhow::Result<OfferStatus> {
+    let names: Vec<String> = offers.iter().map(|offer| offer.name.clone()).collect();
+    let is_named =
+        |offer: &OfferStatus| scene.is_none_or(|scene| scene == offer.name || scene == offer.scene.hash.as_str());
+    let missing = || BadInput(format!("--scene {}: on offer are {}", scene.unwrap_or("?"), names.join(", ")));
+    Ok(offers.into_iter().find(is_named).ok_or_else(missing)?)
+}
+
+fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamera]) -> anyhow::Result<SessionRequest> {
+    let views = if args.live { &cameras[..1] } else { cameras };
+    let mut request = request(offer.settings.clone(), views)?;
+    request.scene = Some(offer.name.clone());
+    request.method = args.method.map_or(request.method, |method| method.to_string());
+    request.lighting = args.lighting.map_or(request.lighting, |lighting| lighting.to_string());
+    let request = if args.live { at_rate(request, args.rate) } else { request };
+    Ok(SessionRequest {
+        forced_tile_count: args.tiles,
+        refinement_steps: if args.refine { refinement_steps(&request.lighting) } else { 1 },
+        codec: args.codec.to_string(),
+        policy: args.policy,
+        planes: args.planes(),
+        timeline: timeline(args.frames, args.frame_step, args.refine),
+        viewpoints: if args.cells || args.viewpoints.around.is_some() { viewpoints(cameras) } else { Vec::new() },
+        ..request
+    })
+}
+
+/// A picture that is refined stands still: motion would begin the refinement anew.
+fn timeline(set_count: u32, step_s: f64, refine: bool) -> Timeline {
+    Timeline { start_s: 0.0, step_s: if refine { 0.0 } else { step_s }, set_count }
+}
+
+/// The steps of a lighting; one where a newer coordinator names a lighting that is not known here.
+fn refinement_steps(lighting: &str) -> u32 {
+    lighting.parse().map_or(1, |lighting: Lighting| lighting.refinement_steps())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refined_timeline_stands_still() {
+        assert!(timeline(4, 0.1, false).moves());
+        assert!(!timeline(4, 0.1, true).moves() && timeline(4, 0.1, true).set_count == 4);
+        assert!(!timeline(1, 0.1, false).moves(), "one set");
+    }
+}

@@ -1,0 +1,167 @@
+//! The record of a request: which views are written. It is `cameras.json` on disk, and from it a request is resumed.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use app_core::camera_record::{self, NamedCamera};
+use app_core::delivery::requests;
+use app_core::exit::BadInput;
+use client::ViewRequest;
+use depth_image::{PinholeCamera, ViewPlanes};
+use glam::DVec3;
+use serde_json::{Map, Value, json};
+
+use super::file_names::{FileNames, number_of};
+
+/// Most views of one request: the record takes 9 bytes of memory for each.
+pub(super) const MAX_VIEWS: u64 = 1 << 22;
+/// The name of the record.
+pub(super) const FILE_NAME: &str = "cameras.json";
+const DEPTH: &str = "16-bit: value / 65535 * inverse_depth_max_per_m, per metre; 0 is background";
+/// The time between two writings of the record, and its least multiple of the time that writing takes.
+const PAUSE: Duration = Duration::from_secs(5);
+const PAUSE_RATIO: u32 = 20;
+
+/// The views of a request, and which of them are whole in a folder.
+pub(super) struct Record {
+    folder: PathBuf,
+    origin_in_source: DVec3,
+    /// Everything that the pictures depend on, by name.
+    settings: Map<String, Value>,
+    cameras: Arc<[PinholeCamera]>,
+    set_count: u32,
+    planes: ViewPlanes,
+    /// The scale of each written view's depth picture, per metre; 0 without that picture. `None`: the view is not written.
+    written: Vec<Option<f32>>,
+    count: u64,
+    next_save: Instant,
+}
+
+impl Record {
+    /// A record without written views.
+    ///
+    /// # Errors
+    /// There are too many views.
+    pub(super) fn new(
+        folder: &Path,
+        origin_in_source: DVec3,
+        settings: Map<String, Value>,
+        views: (Arc<[PinholeCamera]>, u32),
+        planes: ViewPlanes,
+    ) -> Result<Self, BadInput> {
+        let (cameras, set_count) = views;
+        let total = cameras.len() as u64 * u64::from(set_count);
+        if total > MAX_VIEWS {
+            let sets = format!("{} views of {set_count} moments", cameras.len());
+            return Err(BadInput(format!("--frames: {sets} are {total} pictures, at most {MAX_VIEWS} are allowed")));
+        }
+        let (folder, written) = (folder.to_owned(), vec![None; total as usize]);
+        let next_save = Instant::now() + PAUSE;
+        Ok(Self { folder, origin_in_source, settings, cameras, set_count, planes, written, count: 0, next_save })
+    }
+
+    /// All views.
+    pub(super) fn total(&self) -> u64 {
+        self.written.len() as u64
+    }
+
+    /// Written views.
+    pub(super) fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Requests of the views that are not written.
+    pub(super) fn missing(&self) -> impl Iterator<Item = ViewRequest> + Send + 'static {
+        let kept: Vec<bool> = self.written.iter().map(Option::is_some).collect();
+        requests(self.set_count, self.cameras.clone()).filter(move |view| !kept[view.frame as usize])
+    }
+
+    /// Counts a view as written.
+    pub(super) fn add(&mut self, number: u64, depth_scale: f32) {
+        if let Some(written) = self.written.get_mut(number as usize)
+            && written.replace(depth_scale).is_none()
+        {
+            self.count += 1;
+        }
+    }
+
+    /// Takes over the views that the record in the folder names, if there is one. A view is taken over if its camera and set
+    /// are those of this request and its files exist.
+    ///
+    /// # Errors
+    /// The record cannot be read, or was written with other settings.
+    pub(super) fn resume(&mut self) -> anyhow::Result<()> {
+        let mut found = Vec::new();
+        let path = self.folder.join(FILE_NAME);
+        let about = camera_record::read(&path, |line| found.extend(self.view_of(line)))?;
+        if let Some(about) = about {
+            self.check_settings(&path, about.get("settings").unwrap_or(&Value::Null))?;
+            found.into_iter().for_each(|(number, depth_scale)| self.add(number, depth_scale));
+        }
+        Ok(())
+    }
+
+    /// The view of a line of the record, with the scale of its depth picture.
+    fn view_of(&self, line: &str) -> Option<(u64, f32)> {
+        let frame: Map<String, Value> = serde_json::from_str(line).ok()?;
+        let number = number_of(frame.get("file_path")?.as_str()?)?;
+        let depth_scale = frame.get("inverse_depth_max_per_m").and_then(Value::as_f64).unwrap_or(0.0) as f32;
+        // Text is compared: it holds every bit of a number.
+        let is_equal = number < self.total() && self.named(number, depth_scale).line(self.origin_in_source) == line;
+        let files = FileNames::of(number, self.planes);
+        (is_equal && files.all().all(|name| self.folder.join(name).is_file())).then_some((number, depth_scale))
+    }
+
+    fn check_settings(&self, path: &Path, found: &Value) -> Result<(), BadInput> {
+        match self.settings.iter().find(|(name, value)| found.get(name) != Some(value)) {
+            None => Ok(()),
+            Some((name, value)) => {
+                let found = found.get(name).unwrap_or(&Value::Null);
+                let reason = format!("{} is of {name} {found}, this request of {value}", path.display());
+                Err(BadInput(format!("--resume: {reason}")))
+            }
+        }
+    }
+
+    /// Writes the record if it is time to.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(super) fn save_if_due(&mut self) -> anyhow::Result<()> {
+        if Instant::now() >= self.next_save { self.save() } else { Ok(()) }
+    }
+
+    /// Writes the record.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(super) fn save(&mut self) -> anyhow::Result<()> {
+        let start = Instant::now();
+        let about = [("depth", json!(DEPTH)), ("settings", Value::Object(self.settings.clone()))];
+        let about = about.map(|(name, value)| (name.to_owned(), value)).into_iter().collect();
+        let written = (0..).zip(&self.written);
+        let cameras = written.filter_map(|(number, scale)| Some(self.named(number, (*scale)?)));
+        camera_record::write(&self.folder.join(FILE_NAME), cameras, self.origin_in_source, about)?;
+        // Long records are written less often, so that the views go on.
+        self.next_save = Instant::now() + PAUSE.max(PAUSE_RATIO * start.elapsed());
+        Ok(())
+    }
+
+    fn named(&self, number: u64, depth_scale: f32) -> NamedCamera {
+        let (views, files) = (self.cameras.len() as u64, FileNames::of(number, self.planes));
+        let mut more = Map::from_iter([("set_index".to_owned(), json!(number / views))]);
+        if let Some(name) = files.depth {
+            more.insert("depth_file_path".to_owned(), json!(name));
+            more.insert("inverse_depth_max_per_m".to_owned(), json!(depth_scale));
+        }
+        if let Some(name) = files.provenance {
+            more.insert("provenance_file_path".to_owned(), json!(name));
+        }
+        NamedCamera { file_path: files.color, camera: self.cameras[(number % views) as usize], more }
+    }
+}
+
+#[cfg(test)]
+#[path = "record_tests.rs"]
+mod tests;
