@@ -175,8 +175,7 @@ mod tests {
 
     #[test]
     fn a_compositor_without_a_share_is_not_called() {
-        let called =
-            start(1, 1, &[1, 1, 1], None).iter().filter(|part| part.is_some()).count();
+        let called = start(1, 1, &[1, 1, 1], None).iter().filter(|part| part.is_some()).count();
         assert_eq!(called, 1);
         assert!(start(0, 0, &[1, 1], None).iter().all(Option::is_none));
     }

@@ -95,10 +95,7 @@ pub fn read(path: &Path, frame: impl FnMut(&str)) -> Result<Option<Map<String, V
     }
 }
 
-fn read_lines(
-    mut file: BufReader<File>,
-    mut frame: impl FnMut(&str),
-) -> Result<Map<String, Value>, CameraFileError> {
+fn read_lines(mut file: BufReader<File>, mut frame: impl FnMut(&str)) -> Result<Map<String, Value>, CameraFileError> {
     let mut number = 0;
     let mut next_line = || {
         let mut line = String::new();

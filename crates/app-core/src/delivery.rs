@@ -153,7 +153,8 @@ mod tests {
     #[test]
     fn views_of_a_million_moments_are_numbered_as_they_are_drawn() {
         let up = glam::Vec3::Y;
-        let camera = |x: f32| PinholeCamera::looking_at(glam::Vec3::new(x, 0.0, 3.0), glam::Vec3::ZERO, up, 1.0, [8, 8].into());
+        let camera =
+            |x: f32| PinholeCamera::looking_at(glam::Vec3::new(x, 0.0, 3.0), glam::Vec3::ZERO, up, 1.0, [8, 8].into());
         let views: Arc<[PinholeCamera]> = [0.0, 1.0, 2.0].map(camera).into();
         let mut drawn = requests(1_000_000, views.clone()).skip(2_999_998);
         let last = |set_index, frame, at: usize| Some(ViewRequest { frame, set_index, camera: views[at] });

@@ -47,8 +47,7 @@ impl StopSignals {
     /// # Errors
     /// Signals cannot be received.
     pub fn listen() -> anyhow::Result<Self> {
-        let [mut interrupt, mut terminate] =
-            [signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?];
+        let [mut interrupt, mut terminate] = [signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?];
         let signals = Self::default();
         let heard = signals.clone();
         tokio::spawn(async move {

@@ -64,7 +64,9 @@ fn a_record_is_read_line_by_line_as_it_was_written() {
 fn a_record_that_was_changed_is_refused_by_line() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cameras.json");
-    for (text, line) in [("", 1), ("{}", 1), ("{\n}\n", 1), ("{\"a\":1,\"frames\":[\n{},\n{}", 3), ("{\"a\":,\"frames\":[\n]}\n", 1)] {
+    for (text, line) in
+        [("", 1), ("{}", 1), ("{\n}\n", 1), ("{\"a\":1,\"frames\":[\n{},\n{}", 3), ("{\"a\":,\"frames\":[\n]}\n", 1)]
+    {
         std::fs::write(&path, text).unwrap();
         let error = camera_record::read(&path, |_| ()).unwrap_err();
         assert_eq!(error.to_string(), format!("{}: line {line}: is not as `myriorama view` writes it", path.display()));
