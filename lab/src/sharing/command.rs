@@ -89,7 +89,7 @@ pub fn run(args: &SharingArgs) -> anyhow::Result<Outcome> {
 }
 
 async fn measure(args: &SharingArgs) -> anyhow::Result<(Measured, String)> {
-    let progress = bar("sharing", GUESTS.len() as u64 + 1);
+    let progress = bar("sharing", GUESTS.len() + 1);
     let mut up = Process::up(&args.cluster())?;
     let coordinator = up.address()?;
     let status = client::Client::connect(&coordinator).await?.status().await?;
