@@ -41,6 +41,8 @@ mod fault_tests;
 mod simulated_cluster;
 #[cfg(test)]
 mod test_support;
+#[cfg(test)]
+mod workloads_tests;
 
 pub use balance::k_fd;
 pub(crate) use cells::first_indices;
