@@ -44,8 +44,16 @@ impl ActivePlan {
         self.plan.assignment.plan_epoch
     }
 
+    /// Whether another plan would change nothing: neither the roles of nodes nor the quality of views.
+    pub(super) fn is_like(&self, other: &SessionPlan) -> bool {
+        // Without a fallback each session has its own method.
+        let quality = |plan: &SessionPlan| (plan.fallback, plan.fallback.map(|_| plan.method.clone()));
+        let rate = |plan: &SessionPlan| plan.frame_rate_ratio.to_bits();
+        quality(&self.plan) == quality(other) && rate(&self.plan) == rate(other) && self.assigns(&other.assignment)
+    }
+
     /// Whether another plan would give every node the same roles.
-    pub(super) fn assigns(&self, other: &Assignment) -> bool {
+    fn assigns(&self, other: &Assignment) -> bool {
         // Weights of views follow every timing, and are no reason for a plan.
         let roles = |plan: &Assignment| {
             let mut plan = Assignment { plan_epoch: 0, ..plan.clone() };

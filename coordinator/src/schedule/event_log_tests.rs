@@ -2,7 +2,7 @@ use cluster::{MeasuredCosts, PolicyChoice, SamplerReport};
 
 use super::*;
 use crate::schedule::event::{Opening, ProbeKind};
-use crate::schedule::test_support::{Random, join, opened, opening, view};
+use crate::schedule::test_support::{Random, join, opened, opening, view, workload};
 
 fn history() -> Vec<(Duration, Event)> {
     let measured =
@@ -71,6 +71,43 @@ fn a_replayed_log_gives_the_same_commands() {
         assert_eq!(step, Step { now, event, commands });
     }
     assert!(commanded > 2, "{commanded}");
+}
+
+/// Three workloads on four nodes, one of which is lost while all work.
+fn history_of_three_workloads() -> Vec<(Duration, Event)> {
+    let open = |session: u64, images: usize| {
+        Event::Opened(Box::new(Opening { workload: workload(images), ..opening(session, PolicyChoice::Auto, 40) }))
+    };
+    let mut events = vec![Event::Limits { max_workloads: 3 }];
+    events.extend((0..4).map(|number| join(&format!("n{number}"), number, 0)));
+    events.extend([open(1, 4), open(2, 3), open(3, 2), open(4, 5), open(5, 3)]);
+    events.extend(vec![Event::Tick; 20]);
+    events.push(Event::Left { incarnation: 1, node_name: "n1".to_owned() });
+    events.push(Event::Closed { session: 1 });
+    events.extend(vec![Event::Tick; 40]);
+    events.into_iter().enumerate().map(|(i, event)| (Duration::from_millis(500 * i as u64), event)).collect()
+}
+
+#[test]
+fn a_replayed_log_of_three_workloads_gives_the_same_commands() {
+    let mut text = Vec::new();
+    let mut recorder = Recorder::new(&mut text).unwrap();
+    let (mut scheduler, mut workloads, mut refused) = (Scheduler::default(), BTreeMap::new(), 0);
+    let mut commanded = Vec::new();
+    for (now, event) in history_of_three_workloads() {
+        recorder.record(now, &event).unwrap();
+        let commands = scheduler.step(now, event);
+        for command in &commands {
+            match command {
+                Command::Apply { plan, .. } => *workloads.entry(plan.assignment.workload_number).or_insert(0) += 1,
+                Command::Refuse { .. } => refused += 1,
+                _ => (),
+            }
+        }
+        commanded.push(commands);
+    }
+    assert!(workloads.len() == 3 && workloads.values().all(|&plans| plans > 0) && refused == 1, "{workloads:?}");
+    assert!(replay(&text[..]).unwrap().into_iter().map(|step| step.commands).eq(commanded));
 }
 
 #[test]

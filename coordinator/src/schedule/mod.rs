@@ -42,6 +42,8 @@ mod simulated_cluster;
 #[cfg(test)]
 mod test_support;
 #[cfg(test)]
+mod workloads_tests;
+#[cfg(test)]
 pub(crate) use test_support::workload as workload_for_tests;
 
 pub use balance::k_fd;

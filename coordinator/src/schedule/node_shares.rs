@@ -240,7 +240,9 @@ impl NodeShares {
             return false;
         }
         let losers = |node: usize| self.carried_awake(node).filter(move |&i| i != receiver);
-        let can_lose = |i: usize, node: usize| own[i] > if self.is_own(i, node) { counts[i] } else { 0 };
+        let can_lose = |i: usize, node: usize| {
+            if self.is_own(i, node) { own[i] > counts[i] } else { self.claims[i].held() > 1 }
+        };
         let is_open = |node: &usize| {
             let is_usable = self.claims[receiver].ties[*node].is_usable && !self.is_own(receiver, *node);
             is_usable && losers(*node).all(|i| can_lose(i, *node))

@@ -186,6 +186,11 @@ impl Scheduler {
         plan.is_some_and(|active| active.members.contains_key(name))
     }
 
+    /// The workload whose plan in force has this epoch.
+    pub(in crate::schedule) fn number_of_plan(&self, plan_epoch: u64) -> Option<u64> {
+        self.workload_of_plan(plan_epoch)
+    }
+
     /// The nodes of each workload.
     pub(in crate::schedule) fn nodes_of_workloads(&self) -> BTreeMap<u64, std::collections::BTreeSet<String>> {
         self.workloads.iter().map(|(&number, workload)| (number, workload.nodes.clone())).collect()

@@ -199,7 +199,7 @@ impl World {
     /// Events of an earlier plan and an earlier process.
     fn stale(&mut self) {
         let (node_name, plan_epoch) = (self.random_name(), self.random_epoch());
-        if self.number_of(plan_epoch.saturating_sub(1)).is_none() {
+        if self.scheduler.number_of_plan(plan_epoch.saturating_sub(1)).is_none() {
             let plan_epoch = plan_epoch.saturating_sub(1);
             self.tell(Event::Unready { plan_epoch, node_name: node_name.clone(), reason: "late".to_owned() });
             self.tell(Event::Ready { plan_epoch, node_name: node_name.clone() });
@@ -229,13 +229,6 @@ impl World {
     fn random_epoch(&mut self) -> u64 {
         let epochs: Vec<u64> = self.last.values().map(|last| last.plan.assignment.plan_epoch).collect();
         if epochs.is_empty() { 0 } else { epochs[self.random.below(epochs.len() as u64) as usize] }
-    }
-
-    /// The workload whose plan in force has this epoch.
-    fn number_of(&self, plan_epoch: u64) -> Option<u64> {
-        let workloads = self.scheduler.status().workloads;
-        let has_epoch = |workload: &&WorkloadStatus| epoch_of(workload) == Some(plan_epoch);
-        workloads.iter().find(has_epoch).map(|workload| workload.number)
     }
 
     fn number_of_session(&self, session: u64) -> Option<u64> {
@@ -296,7 +289,7 @@ impl World {
             }
             Event::DemandChanged { session, .. } | Event::Closed { session } => self.number_of_session(*session),
             Event::Measured { plan_epoch, .. } | Event::Ready { plan_epoch, .. } | Event::Unready { plan_epoch, .. } => {
-                Some(self.number_of(*plan_epoch).unwrap_or(0))
+                Some(self.scheduler.number_of_plan(*plan_epoch).unwrap_or(0))
             }
             _ => None,
         }
@@ -334,7 +327,7 @@ impl World {
                 self.members.remove(node_name);
             }
             Event::Unready { plan_epoch, node_name, .. } => {
-                let number = self.number_of(*plan_epoch);
+                let number = self.scheduler.number_of_plan(*plan_epoch);
                 let is_known = self.scheduler.plans_with(*plan_epoch, node_name) && self.members.contains_key(node_name);
                 if is_known && !self.quarantined.contains(&(None, node_name.clone())) {
                     number.into_iter().for_each(|number| self.allow_replan(number));
@@ -475,18 +468,16 @@ impl World {
     /// Workloads of equal weight have about as many nodes.
     fn check_equal_shares(&self) {
         let (nodes, weights) = (self.scheduler.nodes_of_workloads(), self.scheduler.weights_of_workloads());
-        let is_divided = weights.len() > 1 && weights.len() <= nodes.values().flatten().collect::<BTreeSet<_>>().len();
-        for (a, weight) in weights.iter().filter(|_| is_divided) {
-            for b in weights.iter().filter(|(_, other)| (*other / weight - 1.0).abs() < 0.01).map(|(b, _)| b) {
-                let (most, least) = (nodes[a].len() as f64, nodes[b].len() as f64);
-                assert!(most <= (least + 1.0) * 1.25, "{nodes:?} by {weights:?}");
+        let carriers = |node: &String| weights.keys().filter(|number| nodes[number].contains(node)).count();
+        // A node that serves several counts in part.
+        let count = |number: &u64| nodes[number].iter().map(|node| 1.0 / carriers(node) as f64).sum::<f64>();
+        let all = nodes.values().flatten().collect::<BTreeSet<_>>().len();
+        for (a, weight) in weights.iter().filter(|_| weights.len() <= all) {
+            for (b, _) in weights.iter().filter(|(_, other)| (*other / weight - 1.0).abs() < 0.01) {
+                assert!(count(a) <= (count(b) + 1.0) * 1.25, "{nodes:?} by {weights:?}");
             }
         }
     }
-}
-
-fn epoch_of(workload: &WorkloadStatus) -> Option<u64> {
-    workload.plan.as_ref().map(|plan| plan.assignment.plan_epoch)
 }
 
 fn measured(node_name: String, plan_epoch: u64, costs: MeasuredCosts) -> Event {

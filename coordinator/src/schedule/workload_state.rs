@@ -223,7 +223,7 @@ impl WorkloadState {
     /// How views are reconstructed: under a fallback as it says, else as most sessions ask.
     pub(super) fn method(&self) -> String {
         let usual = || self.sessions.usual_method().unwrap_or_default();
-        self.quality().map_or_else(usual, |quality| &quality.method).to_owned()
+        self.quality().map_or_else(usual, |quality| quality.method.as_str()).to_owned()
     }
 
     /// The workload at the present fallback.

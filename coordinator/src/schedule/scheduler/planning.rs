@@ -202,15 +202,15 @@ impl Scheduler {
         let members = self.serving(workload).map(|(name, member)| (name.clone(), member.incarnation)).collect();
         let assignment = assignment(self.plan_epoch + 1, number, workload.degraded(), choice, &candidates);
         let old = workload.active_plan.as_ref();
-        if old.is_some_and(|old| old.members == members && old.assigns(&assignment)) {
-            return Vec::new();
-        }
         let slowest = candidates.iter().fold(Costs::default(), |slowest, node| slowest.max(node.costs.costs));
         let again = if old.is_some() { format!(" Planned again: {why}.") } else { String::new() };
         let mut plan = session_plan(assignment, slowest, choice, format!("{}{again}", choice.reason));
         plan.fallback = NonZeroU32::new(workload.overload.step as u32);
         plan.frame_rate_ratio = workload.frame_rate_ratio();
         plan.method = workload.method();
+        if old.is_some_and(|old| old.members == members && old.is_like(&plan)) {
+            return Vec::new();
+        }
         let active = ActivePlan::new(plan, members, self.now);
         self.plan_epoch = active.epoch();
         let command = self.apply(&active, workload, workload.sessions.numbers());
