@@ -21,6 +21,7 @@ mod layers;
 mod layout_tests;
 mod lighting;
 mod material;
+mod pieces;
 mod pixel_camera;
 mod pixel_list;
 mod planes;
