@@ -6,6 +6,7 @@
 //! into the text, because indexing cameras dynamically costs several times as much as naming them. A [`ShaderVariant`] holds
 //! the switches of one shader, and a [`PassCache`] its pipelines. Resources are bound to a shader's variables by name.
 
+mod catching;
 mod device;
 mod error;
 mod faults;

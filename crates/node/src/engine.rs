@@ -216,9 +216,8 @@ impl From<EngineError> for Status {
             EngineError::InvalidArgument { .. } => Self::invalid_argument(text),
             EngineError::UnknownScene { .. } => Self::failed_precondition(text),
             EngineError::Device(_) => Self::internal(text),
-            EngineError::OutOfMemory(_) => Self::resource_exhausted(text),
-            // Another node's device can do it.
-            EngineError::Lost(_) => Self::unavailable(text),
+                        // Another node's device can do it.
+            EngineError::OutOfMemory(_) | EngineError::Lost(_) => Self::unavailable(text),
         }
     }
 }

@@ -10,6 +10,7 @@ mod accumulation;
 mod batch;
 mod cluster;
 mod error;
+mod few_cores;
 mod finish;
 mod gpu_scene;
 mod illuminate;

@@ -180,7 +180,7 @@ mod tests {
     use std::thread;
 
     use super::*;
-    use crate::sharing::{WorkClass, WorkKind};
+    use crate::sharing::{fair_order::WorkClass, rates::WorkKind};
 
     fn turn(class: WorkClass, flow: u64) -> Turn {
         Turn { class, flow }

@@ -30,6 +30,8 @@ pub(crate) struct Rates {
 struct Rate {
     /// `None` after the first measurement, in which a device may have compiled a shader.
     unit_s: Option<f64>,
+    /// The kind was measured alone. Until then only its family's sum is sure.
+    is_sure: bool,
     last_used: u64,
 }
 
@@ -50,15 +52,22 @@ impl WorkKind {
 }
 
 impl Rates {
-    /// The seconds of work; `None` where some of its kinds is unknown.
+    /// The most seconds of work; `None` where some of its kinds is unknown.
     pub fn predicted_s(&self, work: &[Work]) -> Option<f64> {
-        work.iter().map(|&(kind, units)| Some(self.unit_s(kind)? * units as f64)).sum()
+        work.iter().map(|&(kind, units)| Some(self.most_unit_s(kind)? * units as f64)).sum()
     }
 
-    /// The seconds of a unit of the family's slowest kind; `None` where none is known.
+    /// The most seconds of a unit of the family's slowest kind; `None` where none is known.
     pub fn slowest_unit_s(&self, family: u64) -> Option<f64> {
-        let of_family = self.known.iter().filter(|(kind, _)| kind.family == family);
-        of_family.filter_map(|(_, rate)| rate.unit_s).reduce(f64::max)
+        let of_family = self.known.keys().filter(|kind| kind.family == family);
+        of_family.filter_map(|&kind| self.most_unit_s(kind)).reduce(f64::max)
+    }
+
+    /// Of kinds that were only measured together, each may have taken all of the time.
+    fn most_unit_s(&self, kind: WorkKind) -> Option<f64> {
+        let own = self.known.get(&kind)?;
+        let together = self.known.iter().filter(|(other, rate)| other.family == kind.family && !rate.is_sure);
+        own.unit_s.map(|unit_s| if own.is_sure { unit_s } else { together.filter_map(|(_, rate)| rate.unit_s).sum() })
     }
 
     /// Learns from work that was measured together.
@@ -66,19 +75,23 @@ impl Rates {
         let mut sums: HashMap<WorkKind, u64> = HashMap::new();
         work.iter().for_each(|(kind, units)| *sums.entry(*kind).or_default() += units);
         let (known, new): (Vec<Work>, Vec<Work>) = sums.into_iter().partition(|(kind, _)| self.unit_s(*kind).is_some());
-        let predicted_s = self.predicted_s(&known).unwrap_or(0.0);
+        let seconds_of = |&(kind, units): &Work| Some(self.unit_s(kind)? * units as f64);
+        let predicted_s: f64 = known.iter().filter_map(seconds_of).sum();
+        let is_sure = known.len() + new.len() == 1;
         let new_units: u64 = new.iter().map(|(_, units)| units).sum();
         let least_s = if known.is_empty() { seconds } else { LEAST_SHARE * seconds };
         let of_new_s = if new_units == 0 { 0.0 } else { (seconds - predicted_s).max(least_s) };
         let of_known = (seconds - of_new_s) / predicted_s.max(f64::MIN_POSITIVE);
         self.clock += 1;
         for (kind, _) in known {
-            let learned_s = self.unit_s(kind).map(|unit_s| unit_s * (1.0 + NEW_SHARE * (of_known - 1.0)));
-            self.known.insert(kind, Rate { unit_s: learned_s, last_used: self.clock });
+            let was_sure = self.known.get(&kind).is_some_and(|rate| rate.is_sure);
+            let share = if is_sure && !was_sure { 1.0 } else { NEW_SHARE };
+            let unit_s = self.unit_s(kind).map(|unit_s| unit_s * (1.0 + share * (of_known - 1.0)));
+            self.known.insert(kind, Rate { unit_s, is_sure: is_sure || was_sure, last_used: self.clock });
         }
         for (kind, _) in new {
             let unit_s = self.known.contains_key(&kind).then(|| of_new_s / new_units.max(1) as f64);
-            self.known.insert(kind, Rate { unit_s, last_used: self.clock });
+            self.known.insert(kind, Rate { unit_s, is_sure: is_sure && unit_s.is_some(), last_used: self.clock });
         }
         self.forget();
     }
@@ -126,6 +139,17 @@ mod tests {
         assert!(near(rates.predicted_s(&[(kind(2), 50)]), 2.0));
         assert!(near(rates.predicted_s(&both), 3.0));
         assert!(near(rates.slowest_unit_s(7), 0.04));
+    }
+
+    #[test]
+    fn kinds_that_were_measured_together_may_each_have_taken_all_the_time_until_one_is_measured_alone() {
+        let mut rates = Rates::default();
+        let both = [(kind(1), 100), (kind(2), 100)];
+        (0..2).for_each(|_| rates.learn(&both, 2.0));
+        assert!(near(rates.predicted_s(&both[..1]), 2.0) && near(rates.slowest_unit_s(7), 0.02));
+        rates.learn(&both[1..], 1.8);
+        assert!(near(rates.predicted_s(&both[1..]), 1.8), "measured alone");
+        assert!(near(rates.predicted_s(&both[..1]), 1.0), "the other's own share");
     }
 
     #[test]
