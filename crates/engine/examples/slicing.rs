@@ -1,4 +1,5 @@
 //! The cost of slices: views whole and cut, in turn, on an otherwise idle device (docs/device.md, "Sharing the device").
+//! Arguments name what is measured: reconstruction methods, or `direct`.
 
 use std::time::Instant;
 
@@ -9,7 +10,7 @@ use gpu::{DevicePreference, Turn};
 use reconstruction::SetDescription;
 use render::{DrawWork, GpuScene, Refinement, SamplePlanes, Visibility};
 
-const RUNS: usize = 7;
+const RUNS: usize = 5;
 const VIEW_PX: UVec2 = UVec2::new(1280, 720);
 const LIGHTING: &str = "soft 4, occlusion 4";
 
@@ -39,28 +40,32 @@ fn main() -> Outcome<()> {
     let set = SetDescription { volume: bounds, background_linear, illumination, highlight: None };
     let set = reconstructor.upload(&images, &set)?;
     let view = [camera(0.0, VIEW_PX)];
-    for method in ["joint_carve", "light_field_search", "mesh", "hybrid_mesh"] {
-        let method = method.parse()?;
-        compare(&engine, &method, || {
-            Ok(reconstructor.reconstruct(&set, &view, method, ViewPlanes::default()).map(drop)?)
-        })?;
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    let is_asked = |name: &str| asked.is_empty() || asked.iter().any(|asked| asked == name);
+    for name in ["joint_carve", "light_field_search", "mesh", "hybrid_mesh"].into_iter().filter(|name| is_asked(name)) {
+        let method = name.parse()?;
+        let make = || reconstructor.reconstruct(&set, &view, method, ViewPlanes::default());
+        compare(&engine, name, || Ok(make().map(drop)?))?;
+    }
+    if !is_asked("direct") {
+        return Ok(());
     }
     let lit = draw(LIGHTING)?;
-    compare(&engine, &"direct", || Ok(renderer.draw_views(lit, &view, ViewPlanes::default()).map(drop)?))
+    compare(&engine, "direct", || Ok(renderer.draw_views(lit, &view, ViewPlanes::default()).map(drop)?))
 }
 
 /// Prints the median times of work that is whole and of work that is cut.
-fn compare(engine: &GpuEngine, what: &dyn std::fmt::Display, work: impl Fn() -> Outcome<()>) -> Outcome<()> {
+fn compare(engine: &GpuEngine, what: &str, work: impl Fn() -> Outcome<()>) -> Outcome<()> {
     let queue = &engine.renderer.gpu().device_queue;
     let mut seconds = [Vec::new(), Vec::new()];
     let mut slices = 0;
     // The first runs of both kinds build pipelines and learn rates.
-    for run in 0..2 * (RUNS + 3) {
+    for run in 0..2 * (RUNS + 2) {
         let is_cut = run % 2 == 1;
         let live = is_cut.then(|| queue.live_stream());
         let (start, before) = (Instant::now(), queue.slices());
         work()?;
-        if run >= 6 {
+        if run >= 4 {
             seconds[usize::from(is_cut)].push(start.elapsed().as_secs_f64());
         }
         slices = queue.slices() - before;

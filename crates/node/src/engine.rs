@@ -216,7 +216,7 @@ impl From<EngineError> for Status {
             EngineError::InvalidArgument { .. } => Self::invalid_argument(text),
             EngineError::UnknownScene { .. } => Self::failed_precondition(text),
             EngineError::Device(_) => Self::internal(text),
-                        // Another node's device can do it.
+            // Another node's device can do it.
             EngineError::OutOfMemory(_) | EngineError::Lost(_) => Self::unavailable(text),
         }
     }
