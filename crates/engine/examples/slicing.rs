@@ -7,7 +7,7 @@ use depth_image::{Camera, PinholeCamera, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Turn};
-use reconstruction::SetDescription;
+use reconstruction::{METHODS, SetDescription};
 use render::{DrawWork, GpuScene, Refinement, SamplePlanes, Visibility};
 
 const RUNS: usize = 5;
@@ -42,10 +42,9 @@ fn main() -> Outcome<()> {
     let view = [camera(0.0, VIEW_PX)];
     let asked: Vec<String> = std::env::args().skip(1).collect();
     let is_asked = |name: &str| asked.is_empty() || asked.iter().any(|asked| asked == name);
-    for name in ["joint_carve", "light_field_search", "mesh", "hybrid_mesh"].into_iter().filter(|name| is_asked(name)) {
-        let method = name.parse()?;
-        let make = || reconstructor.reconstruct(&set, &view, method, ViewPlanes::default());
-        compare(&engine, name, || Ok(make().map(drop)?))?;
+    for row in METHODS.iter().filter(|row| is_asked(row.name)) {
+        let make = || reconstructor.reconstruct(&set, &view, row.method, ViewPlanes::default());
+        compare(&engine, row.name, || Ok(make().map(drop)?))?;
     }
     if !is_asked("direct") {
         return Ok(());

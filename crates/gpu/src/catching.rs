@@ -1,6 +1,6 @@
 //! Work on a device whose faults are caught: they end the work with an error, not the process.
 
-use crate::{device::Gpu, error::GpuError};
+use crate::{device::Gpu, error::GpuError, frame::notice_loss};
 
 impl Gpu {
     /// Does work on the device, all of it on this thread. Where the device runs out of memory, the work fails with
@@ -25,8 +25,7 @@ impl Gpu {
             }
             Some(other) => {
                 caught.for_each(drop);
-                // A loss is told when the device is next asked.
-                let _ = self.device.poll(wgpu::PollType::Poll);
+                notice_loss(self);
                 self.faults.check_lost()?;
                 Err(GpuError::Refused(other.to_string()).into())
             }

@@ -218,6 +218,11 @@ fn wait(gpu: &Gpu, index: wgpu::SubmissionIndex) -> Result<(), GpuError> {
     gpu.faults.check_lost()
 }
 
+/// Asks the device, which then tells of its loss.
+pub(crate) fn notice_loss(gpu: &Gpu) {
+    let _ = gpu.device.poll(wgpu::PollType::Poll);
+}
+
 impl<'g> Slice<'g> {
     /// Sends the pieces of one slice. A live stream may have opened while they waited.
     fn submit(gpu: &Gpu, slot: Slot<'g>, pieces: &mut VecDeque<Piece>) -> Self {
