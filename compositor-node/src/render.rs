@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use codec::{StageTimes, encode_view};
 use depth_image::View;
-use node::{DirectWork, Engine, NodeMetrics, Operation, ViewWork, blocking};
+use node::{DirectWork, Engine, NodeMetrics, Operation, Turn, ViewWork, WorkClass, blocking};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::Status;
 
@@ -23,13 +23,15 @@ struct Rendering {
     engine: Arc<dyn Engine>,
     metrics: NodeMetrics,
     encoders: Arc<Semaphore>,
+    /// Of all views of this compositor, on a device that may be others' too.
+    flow: u64,
 }
 
 /// Runs until it is aborted.
 pub(crate) async fn render_loop(engine: Arc<dyn Engine>, arrivals: Arc<Arrivals>, metrics: NodeMetrics) {
     let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
     let behind = Arc::new(Semaphore::new(BATCHES_BEHIND));
-    let rendering = Rendering { engine, metrics, encoders };
+    let rendering = Rendering { engine, metrics, encoders, flow: Turn::next_flow() };
     loop {
         // Before the batch is chosen: views that arrive while frames wait for encoders are newer.
         let Ok(place) = behind.clone().acquire_owned().await else {
@@ -77,14 +79,16 @@ impl Rendering {
         let (engine, source, key) = (self.engine.clone(), batch[0].source.clone(), batch[0].key.clone());
         let cameras: Vec<_> = batch.iter().map(|waiting| waiting.view.camera).collect();
         let count = cameras.len();
+        let is_live = batch.iter().any(|waiting| waiting.reply.outbox().is_live());
+        let turn = Turn { class: if is_live { WorkClass::Live } else { WorkClass::Batch }, flow: self.flow };
         let (operation, views) = blocking(move || match source {
             Source::Set(set) => {
                 let work = ViewWork { cameras, method: key.method, planes: key.planes };
-                engine.reconstruct(set.set.as_ref(), &work).map(|views| (Operation::ReconstructView, views))
+                engine.reconstruct(set.set.as_ref(), &work, turn).map(|views| (Operation::ReconstructView, views))
             }
             Source::Scene { plan, scene_time_s } => {
                 let work = DirectWork { scene_time_s, ..DirectWork::of(&plan.workload, cameras, key.planes) };
-                engine.draw_direct(&work).map(|views| (Operation::DirectView, views))
+                engine.draw_direct(&work, turn).map(|views| (Operation::DirectView, views))
             }
         })
         .await?;

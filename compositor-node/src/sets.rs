@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use cluster::{Assignment, SetContent};
 use codec::EncodedDepthImage;
-use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, SampleSet, UploadedSet};
-use node::{beyond_timeline, blocking};
+use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, SampleSet, Turn, UploadedSet};
+use node::{WorkClass, beyond_timeline, blocking};
 use parking_lot::Mutex;
 use tokio::sync::OnceCell;
 use tonic::Status;
@@ -143,7 +143,7 @@ impl Sets {
         let (set, times) = self.fetch(&request).await?;
         let fetched_s = start.elapsed().as_secs_f64();
         let (engine, uploading) = (self.engine.clone(), Instant::now());
-        let set = blocking(move || engine.upload(&set)).await?;
+        let set = blocking(move || engine.upload(&set, Turn::of(WorkClass::Batch))).await?;
         self.metrics.done.add(Operation::LoadSet, 1.0, times.decode_s + uploading.elapsed().as_secs_f64());
         self.metrics.done.transferred(times.bytes, times.transfer_s);
         self.metrics.sets_loaded.inc();

@@ -9,11 +9,13 @@ use codec::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
 use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
 use engine::GpuEngine;
 use metrics::{PixelClass, classify, unheld_rate};
-use node::{DirectWork, Engine as _, SampleWork};
+use node::{DirectWork, Engine as _, SampleWork, Turn, WorkClass};
 use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
 use render::Lighting;
 
 use crate::statistics::median;
+
+const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
 
 /// Both planes beside colour.
 pub const ALL_PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: true };
@@ -52,7 +54,7 @@ impl ReferenceViews {
             highlight: args.lighting.highlight(),
         };
         let set = engine.reconstructor.upload(&images, &description)?;
-        let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ALL_PLANES))?;
+        let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ALL_PLANES), TURN)?;
         let class = |(camera, view): (&PinholeCamera, &View)| Ok(classify(camera, inverse_depth(view)?, &images)?);
         let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;
         Ok(Self { engine: engine.clone(), cameras, views, images, set, classes })
@@ -80,7 +82,7 @@ impl ReferenceViews {
     /// # Errors
     /// The device fails.
     pub fn drawn(&self, setup: &Setup, lighting: Lighting) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.draw_direct(&direct_work(setup, lighting, &self.cameras, COLOR_ONLY))?)
+        Ok(self.engine.draw_direct(&direct_work(setup, lighting, &self.cameras, COLOR_ONLY), TURN)?)
     }
 
     /// Reconstructs all views.
@@ -134,7 +136,7 @@ fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result
         temporal_reference_s: None,
         refinement: cluster::Refinement::default(),
     };
-    engine.sample(&work)?.iter().map(encoded_and_decoded).collect()
+    engine.sample(&work, TURN)?.iter().map(encoded_and_decoded).collect()
 }
 
 fn encoded_and_decoded(image: &DepthImage) -> anyhow::Result<DepthImage> {

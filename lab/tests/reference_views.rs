@@ -15,8 +15,10 @@ use glam::UVec2;
 use gpu::DevicePreference;
 use lab::reference_views::{ALL_PLANES, ReferenceViews};
 use lab::scene_args;
-use node::{DirectWork, Engine as _, EngineError, SampleWork, ViewWork};
+use node::{DirectWork, Engine as _, EngineError, SampleWork, Turn, ViewWork, WorkClass};
 use reconstruction::ReconstructionMethod;
+
+const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
 
 const VIEW_SIZE: UVec2 = UVec2::new(64, 48);
 
@@ -67,17 +69,20 @@ fn unknown_names_are_refused_with_their_field() {
     let samples: Vec<_> = setup.samples.iter().copied().map(Camera::Pinhole).collect();
     let sample = |scene_hash: &str, sampling: &str, lighting: &str| {
         engine
-            .sample(&SampleWork {
-                scene_hash: scene_hash.to_owned(),
-                cameras: samples.clone(),
-                wanted: vec![0, 1],
-                sampling: sampling.to_owned(),
-                planes: cluster::SamplePlanes::default(),
-                lighting: lighting.to_owned(),
-                scene_time_s: 0.0,
-                temporal_reference_s: None,
-                refinement: cluster::Refinement::default(),
-            })
+            .sample(
+                &SampleWork {
+                    scene_hash: scene_hash.to_owned(),
+                    cameras: samples.clone(),
+                    wanted: vec![0, 1],
+                    sampling: sampling.to_owned(),
+                    planes: cluster::SamplePlanes::default(),
+                    lighting: lighting.to_owned(),
+                    scene_time_s: 0.0,
+                    temporal_reference_s: None,
+                    refinement: cluster::Refinement::default(),
+                },
+                TURN,
+            )
             .unwrap_err()
     };
     assert_eq!(sample("none", "conventional", "unlit"), EngineError::UnknownScene { hash: "none".to_owned() });
@@ -90,16 +95,19 @@ fn unknown_names_are_refused_with_their_field() {
         illumination: setup.offer.illumination.clone(),
         lighting: args.lighting.to_string(),
     };
-    let uploaded = engine.upload(&set).unwrap();
+    let uploaded = engine.upload(&set, TURN).unwrap();
     let work = |method: &str, near_m: f32| ViewWork {
         cameras: vec![PinholeCamera { near_m, ..reference.cameras[0] }],
         method: method.to_owned(),
         planes: ViewPlanes::default(),
     };
-    let refused = |work: &ViewWork| engine.reconstruct(uploaded.as_ref(), work).unwrap_err();
+    let refused = |work: &ViewWork| engine.reconstruct(uploaded.as_ref(), work, TURN).unwrap_err();
     assert!(is_invalid(&refused(&work("guess", 0.01)), "reconstruction_method"));
     assert!(is_invalid(&refused(&work("joint_carve", -1.0)), "camera"));
-    assert!(is_invalid(&engine.upload(&node::SampleSet { images: Vec::new(), ..set }).err().unwrap(), "sample_images"));
+    assert!(is_invalid(
+        &engine.upload(&node::SampleSet { images: Vec::new(), ..set }, TURN).err().unwrap(),
+        "sample_images"
+    ));
     assert!(is_invalid(&engine.load_scene("x", b"no package").unwrap_err(), "package"));
 }
 
@@ -116,7 +124,7 @@ fn a_package_loads_as_the_scene_does() {
         scene_time_s: 0.0,
         planes: ALL_PLANES,
     };
-    let views = engine.draw_direct(&work).unwrap();
+    let views = engine.draw_direct(&work, TURN).unwrap();
     assert_eq!(views.len(), reference.views.len());
     for (view, expected) in views.iter().zip(&reference.views) {
         // The faster of rays and triangles is chosen by timing for each package; they may differ at edges.

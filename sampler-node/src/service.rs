@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use cluster::{Assignment, FetchImages};
 use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
-use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, SampleWork};
-use node::{beyond_timeline, blocking, until_drained};
+use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, SampleWork, Turn};
+use node::{WorkClass, beyond_timeline, blocking, until_drained};
 use tokio::sync::mpsc;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
@@ -143,7 +143,7 @@ fn sample(
     metrics: &NodeMetrics,
 ) -> Result<EncodedImages, Status> {
     let start = Instant::now();
-    let images = engine.sample(work)?;
+    let images = engine.sample(work, Turn::of(WorkClass::Batch))?;
     let sampled_s = start.elapsed().as_secs_f64();
     if images.len() != indices.len() {
         return Err(Status::internal(format!("{} images were sampled for {} cameras", images.len(), indices.len())));

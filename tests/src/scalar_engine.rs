@@ -15,7 +15,7 @@ use depth_image::{
     srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
-use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
+use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork};
 use parking_lot::Mutex;
 
 /// The floor's colour.
@@ -270,7 +270,7 @@ impl Engine for ScalarEngine {
         known("method", method, "splat").map(|()| SamplePlanes::default())
     }
 
-    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
+    fn sample(&self, request: &SampleWork, _: Turn) -> Result<Vec<DepthImage>, EngineError> {
         self.loaded(&request.scene_hash)?;
         self.images_are_sequential(&request.sampling)?;
         known("lighting", &request.lighting, "unlit")?;
@@ -285,7 +285,7 @@ impl Engine for ScalarEngine {
         Ok(cameras.into_iter().map(image).collect())
     }
 
-    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn upload(&self, set: &SampleSet, _: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
         self.works()?;
         if set.illumination != illumination() {
             return Err(EngineError::InvalidArgument {
@@ -296,7 +296,7 @@ impl Engine for ScalarEngine {
         Ok(Arc::new(Uploaded(set.clone())))
     }
 
-    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, _: Turn) -> Result<Vec<View>, EngineError> {
         self.works()?;
         known("method", &work.method, "splat")?;
         let any: &dyn Any = set;
@@ -307,7 +307,7 @@ impl Engine for ScalarEngine {
         Ok(work.cameras.iter().map(|camera| splat(set, camera, work.planes)).collect())
     }
 
-    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
+    fn draw_direct(&self, work: &DirectWork, _: Turn) -> Result<Vec<View>, EngineError> {
         self.loaded(&work.scene_hash)?;
         known("lighting", &work.lighting, "unlit")?;
         Ok(work.cameras.iter().map(|camera| draw(camera, work.scene_time_s, work.planes)).collect())

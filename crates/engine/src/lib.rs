@@ -8,7 +8,7 @@ use std::sync::{Arc, Weak};
 use cluster::SamplePlanes;
 use depth_image::{DepthImage, View};
 use gpu::{DevicePreference, Gpu, GpuError};
-use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
+use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass};
 use parking_lot::Mutex;
 use reconstruction::{ReconstructionError, ReconstructionMethod, Reconstructor, RequiredPlanes, SetDescription};
 use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, Visibility};
@@ -27,8 +27,6 @@ pub struct GpuEngine {
     /// The pipelines that reconstruct, for measurements without a service in between.
     pub reconstructor: Reconstructor,
     scenes: Mutex<Vec<(String, Arc<GpuScene>)>>,
-    /// Batches run one at a time: the device is no faster with several, and memory holds one.
-    reconstructing: Mutex<()>,
     /// Scenes load one at a time: nodes of one process need the same scene at the same moment.
     loading: Mutex<()>,
 }
@@ -51,7 +49,6 @@ impl GpuEngine {
             renderer,
             gpu,
             scenes: Mutex::default(),
-            reconstructing: Mutex::default(),
             loading: Mutex::default(),
         })
     }
@@ -80,13 +77,18 @@ impl GpuEngine {
         if self.has_scene(hash) {
             return Ok(());
         }
-        let uploaded = Arc::new(GpuScene::upload(&self.gpu, scene).map_err(render_error)?);
+        let uploaded = Arc::new(self.catching(|| GpuScene::upload(&self.gpu, scene).map_err(render_error))?);
         let mut scenes = self.scenes.lock();
         if scenes.len() >= KEPT_SCENES {
             scenes.remove(0);
         }
         scenes.push((hash.to_owned(), uploaded));
         Ok(())
+    }
+
+    /// Does work on the device on this thread, and turns faults of the device into errors.
+    fn catching<T>(&self, work: impl FnOnce() -> Result<T, EngineError>) -> Result<T, EngineError> {
+        self.gpu.catching(|| work().map_err(Caught)).map_err(|Caught(error)| error)
     }
 
     /// A scene on the device.
@@ -99,9 +101,18 @@ impl GpuEngine {
     }
 }
 
-fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {
+fn device_turn(Turn { class, flow }: Turn) -> gpu::Turn {
+    let class = match class {
+        WorkClass::Live => gpu::WorkClass::Live,
+        WorkClass::Batch => gpu::WorkClass::Batch,
+        WorkClass::Background => gpu::WorkClass::Background,
+    };
+    gpu::Turn { class, flow }
+}
+
+fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32, turn: Turn) -> DrawWork<'_> {
     let (visibility, refinement) = (Visibility::Measured, Refinement::default());
-    DrawWork { scene, lighting, scene_time_s, visibility, refinement }
+    DrawWork { scene, lighting, scene_time_s, visibility, refinement, turn: device_turn(turn) }
 }
 
 impl Engine for GpuEngine {
@@ -136,12 +147,16 @@ impl Engine for GpuEngine {
         Ok(SamplePlanes { normals: normal, corner_inverse_depths: corner_inverse_depth })
     }
 
-    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
+    fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
+        Box::new(self.gpu.device_queue.live_stream())
+    }
+
+    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError> {
         let scene = self.scene(&request.scene_hash)?;
         let cluster::Refinement { step, steps } = request.refinement;
         let draw = DrawWork {
             refinement: Refinement { step, steps },
-            ..draw_work(&scene, parsed("lighting", &request.lighting)?, request.scene_time_s)
+            ..draw_work(&scene, parsed("lighting", &request.lighting)?, request.scene_time_s, turn)
         };
         let SamplePlanes { normals: normal, corner_inverse_depths: corners } = request.planes;
         let work = sampling::SampleWork {
@@ -152,10 +167,10 @@ impl Engine for GpuEngine {
             planes: render::SamplePlanes { specular: true, normal, corners, ..Default::default() },
             temporal_reference_s: request.temporal_reference_s,
         };
-        self.sampler.sample(&work).map_err(sampling_error)
+        self.catching(|| self.sampler.sample(&work).map_err(sampling_error))
     }
 
-    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
         let lighting: Lighting = parsed("lighting", &set.lighting)?;
         let description = SetDescription {
             volume: set.volume,
@@ -163,21 +178,22 @@ impl Engine for GpuEngine {
             illumination: &set.illumination,
             highlight: lighting.highlight(),
         };
-        let uploaded = self.reconstructor.upload(&set.images, &description);
-        Ok(Arc::new(Uploaded(uploaded.map_err(reconstruction_error)?)))
+        let upload = || self.reconstructor.upload_in_turn(&set.images, &description, device_turn(turn));
+        Ok(Arc::new(Uploaded(self.catching(|| upload().map_err(reconstruction_error))?)))
     }
 
-    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
         let Uploaded(set) = (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))?;
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
-        let _one = self.reconstructing.lock();
-        self.reconstructor.reconstruct(set, &work.cameras, method, work.planes).map_err(reconstruction_error)
+        let turn = device_turn(turn);
+        let make = || self.reconstructor.reconstruct_in_turn(set, &work.cameras, method, work.planes, turn);
+        self.catching(|| make().map_err(reconstruction_error))
     }
 
-    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
+    fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError> {
         let scene = self.scene(&work.scene_hash)?;
-        let draw = draw_work(&scene, parsed("lighting", &work.lighting)?, work.scene_time_s);
-        self.renderer.draw_views(draw, &work.cameras, work.planes).map_err(render_error)
+        let draw = draw_work(&scene, parsed("lighting", &work.lighting)?, work.scene_time_s, turn);
+        self.catching(|| self.renderer.draw_views(draw, &work.cameras, work.planes).map_err(render_error))
     }
 }
 
@@ -189,11 +205,28 @@ fn invalid(field: &'static str, reason: impl ToString) -> EngineError {
     EngineError::InvalidArgument { field, reason: reason.to_string() }
 }
 
+/// An error of work that is done while faults of the device are caught.
+struct Caught(EngineError);
+
+impl From<GpuError> for Caught {
+    fn from(error: GpuError) -> Self {
+        Self(gpu_error(error))
+    }
+}
+
+fn gpu_error(error: GpuError) -> EngineError {
+    match error {
+        GpuError::Lost(reason) => EngineError::Lost(reason),
+        GpuError::OutOfMemory(reason) => EngineError::OutOfMemory(reason),
+        _ => device(error),
+    }
+}
+
 fn render_error(error: RenderError) -> EngineError {
     match error {
         RenderError::Camera { .. } => invalid("camera", error),
-        RenderError::Gpu(GpuError::Lost(reason)) => EngineError::Lost(reason),
-        _ => device(error),
+        RenderError::Gpu(error) => gpu_error(error),
+        RenderError::Shader(_) => device(error),
     }
 }
 
@@ -202,8 +235,8 @@ fn reconstruction_error(error: ReconstructionError) -> EngineError {
         ReconstructionError::Camera { .. } => invalid("camera", error),
         ReconstructionError::Sample { .. } | ReconstructionError::SampleCount(_) => invalid("sample_images", error),
         ReconstructionError::Volume => invalid("volume", error),
-        ReconstructionError::Gpu(GpuError::Lost(reason)) => EngineError::Lost(reason),
-        _ => device(error),
+        ReconstructionError::Gpu(error) => gpu_error(error),
+        ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
     }
 }
 

@@ -3,6 +3,8 @@
 use std::{fmt, str::FromStr, sync::Arc};
 
 use crate::error::GpuError;
+use crate::faults::Faults;
+use crate::sharing::DeviceQueue;
 
 /// The adapters to choose from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -42,6 +44,9 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// Name, backend and kind.
     pub info: wgpu::AdapterInfo,
+    /// The order of all work on this device.
+    pub device_queue: Arc<DeviceQueue>,
+    pub(crate) faults: Arc<Faults>,
     pub(crate) timestamp_period_ns: Option<f32>,
 }
 
@@ -73,7 +78,12 @@ impl Gpu {
         let timestamp_period_ns = (features.contains(timestamps) && info.device_type != wgpu::DeviceType::Cpu)
             .then(|| queue.get_timestamp_period());
         tracing::info!(device = info.name, backend = %info.backend, "graphics device opened");
-        Ok(Arc::new(Self { device, queue, info, timestamp_period_ns }))
+        let faults = Arc::new(Faults::default());
+        device.set_device_lost_callback({
+            let faults = faults.clone();
+            move |cause, reason| faults.lose(format!("{cause:?}: {reason}"))
+        });
+        Ok(Arc::new(Self { device, queue, info, device_queue: Arc::default(), faults, timestamp_period_ns }))
     }
 
     /// The name of the device in reports.

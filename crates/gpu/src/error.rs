@@ -13,9 +13,15 @@ pub enum GpuError {
     /// A buffer or texture is beyond the device's limits.
     #[error("{what} needs {needed}, the device allows {limit}")]
     Limit { what: String, needed: u64, limit: u64 },
-    /// Work failed after its submission.
+    /// The device failed for all work.
     #[error("device lost or read-back failed: {0}")]
     Lost(String),
+    /// The device has no memory for this work.
+    #[error("out of device memory: {0}")]
+    OutOfMemory(String),
+    /// Work that the device does not accept: a fault of this program.
+    #[error("the device refused work: {0}")]
+    Refused(String),
 }
 
 /// A fault of a shader, or of what is bound to it.

@@ -1,18 +1,30 @@
-//! A frame: passes recorded together, submitted once, read back together.
+//! A frame: passes recorded together, submitted in as few slices as the device's queue wants, read back together.
 
-use std::{ops::Range, sync::mpsc, time::Instant};
+use std::{collections::VecDeque, ops::Range, sync::mpsc, time::Instant};
 
 use wgpu::{BufferUsages, LoadOp, Operations, RenderPassColorAttachment, RenderPassDepthStencilAttachment, StoreOp};
 
+use crate::sharing::{Slot, Turn, Work, WorkKind};
 use crate::{device::Gpu, error::GpuError, pool::PooledBuffer};
 
 /// Work that is being recorded.
 pub struct Frame<'g> {
     gpu: &'g Gpu,
-    /// The commands so far, to which passes add theirs.
+    label: &'static str,
+    turn: Turn,
+    /// The commands of the piece that is being recorded, to which passes add theirs.
     pub encoder: wgpu::CommandEncoder,
+    /// The work of that piece.
+    work: Vec<Work>,
+    ended: VecDeque<Piece>,
     timer: Option<Timer>,
     reads: Vec<PooledBuffer>,
+}
+
+/// Work between two cuts.
+struct Piece {
+    commands: wgpu::CommandBuffer,
+    work: Vec<Work>,
 }
 
 /// A place in the results of a frame.
@@ -25,20 +37,38 @@ struct Timer {
     host: wgpu::Buffer,
 }
 
-/// Work that is under way.
+/// Work whose recording has ended.
+struct Recorded<'g> {
+    gpu: &'g Gpu,
+    pieces: VecDeque<Piece>,
+    timer: Option<Timer>,
+    reads: Vec<PooledBuffer>,
+}
+
+/// Work whose last slice is under way. It holds the device until it is waited for or dropped: a thread that has it asks for
+/// no other turn.
 pub struct Submitted<'g> {
     gpu: &'g Gpu,
-    index: wgpu::SubmissionIndex,
+    slice: Slice<'g>,
+    /// Seconds of the slices before.
+    earlier_s: f64,
     timer: Option<Timer>,
     reads: Vec<PooledBuffer>,
     mapped: mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>,
+}
+
+/// Pieces that were submitted together.
+struct Slice<'g> {
+    slot: Slot<'g>,
+    index: wgpu::SubmissionIndex,
+    work: Vec<Work>,
     started: Instant,
 }
 
 /// Finished work.
 pub struct FrameResult {
-    /// Seconds on the device: by time stamps on a GPU, by wall clock around submit and wait on the
-    /// software device.
+    /// Seconds on the device: by time stamps on a GPU, by wall clock around submit and wait on the software device, and where
+    /// the work was cut. Waiting for turns does not count.
     pub device_s: f64,
     reads: Vec<PooledBuffer>,
 }
@@ -46,26 +76,44 @@ pub struct FrameResult {
 impl<'g> Frame<'g> {
     /// Starts recording.
     #[must_use]
-    pub fn begin(gpu: &'g Gpu, label: &str) -> Self {
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) });
+    pub fn begin(gpu: &'g Gpu, label: &'static str, turn: Turn) -> Self {
+        let mut encoder = encoder(gpu, label);
         let timer = gpu.timestamp_period_ns.map(|_| Timer::new(gpu));
         if let Some(timer) = &timer {
             encoder.write_timestamp(&timer.queries, 0);
         }
-        Self { gpu, encoder, timer, reads: Vec::new() }
+        Self { gpu, label, turn, encoder, work: Vec::new(), ended: VecDeque::new(), timer, reads: Vec::new() }
     }
 
-    /// Begins a pass that draws over cleared targets. Depth is reversed: it is cleared to infinity.
+    /// The place of this work in the device's order.
+    #[must_use]
+    pub fn turn(&self) -> Turn {
+        self.turn
+    }
+
+    /// Says what was recorded since the last cut: so many units of a kind. While a live stream is open, other work may go
+    /// between this and what is recorded next.
+    pub fn cut(&mut self, kind: WorkKind, units: u64) {
+        self.count((kind, units));
+        if self.gpu.device_queue.cuts() {
+            let next = encoder(self.gpu, self.label);
+            let commands = std::mem::replace(&mut self.encoder, next).finish();
+            self.ended.push_back(Piece { commands, work: std::mem::take(&mut self.work) });
+        }
+    }
+
+    /// Begins a pass that draws over cleared targets, or over what was drawn before. Depth is reversed: it is cleared to infinity.
     pub fn begin_drawing(
         &mut self,
         label: &str,
         colors: &[&wgpu::TextureView],
-        clear: wgpu::Color,
+        clear: Option<wgpu::Color>,
         reversed_depth: &wgpu::TextureView,
     ) -> wgpu::RenderPass<'_> {
-        let ops = Operations { load: LoadOp::Clear(clear), store: StoreOp::Store };
+        let ops = Operations { load: clear.map_or(LoadOp::Load, LoadOp::Clear), store: StoreOp::Store };
         let color = |view| Some(RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops });
-        let depth_ops = Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Store });
+        let depth_load = if clear.is_some() { LoadOp::Clear(0.0) } else { LoadOp::Load };
+        let depth_ops = Some(Operations { load: depth_load, store: StoreOp::Store });
         let view = reversed_depth;
         self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(label),
@@ -75,6 +123,11 @@ impl<'g> Frame<'g> {
         })
     }
 
+    /// Says what was recorded, without a cut.
+    pub(crate) fn count(&mut self, work: Work) {
+        self.work.push(work);
+    }
+
     /// Copies `range` (multiples of 4) of `source` to host memory that `host` lends.
     pub fn read_back(&mut self, source: &wgpu::Buffer, range: Range<u64>, host: PooledBuffer) -> Readback {
         self.encoder.copy_buffer_to_buffer(source, range.start, &host, 0, range.end - range.start);
@@ -82,24 +135,103 @@ impl<'g> Frame<'g> {
         Readback(self.reads.len() - 1)
     }
 
-    /// Sends the work to the device.
-    #[must_use]
-    pub fn submit(mut self) -> Submitted<'g> {
-        if let Some(timer) = &self.timer {
-            timer.finish(&mut self.encoder);
+    /// Sends the work to the device, each slice in its turn, and waits for all slices but the last.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn submit(self) -> Result<Submitted<'g>, GpuError> {
+        let (gpu, turn) = (self.gpu, self.turn);
+        let recorded = self.end();
+        let slot = gpu.device_queue.wait(turn, predicted_s(gpu, &recorded.pieces));
+        recorded.submit_in(slot)
+    }
+
+    /// Sends work of one piece to the device, which was waited for before.
+    pub(crate) fn submit_in(self, slot: Slot<'g>) -> Result<Submitted<'g>, GpuError> {
+        self.end().submit_in(slot)
+    }
+
+    fn end(self) -> Recorded<'g> {
+        let Self { gpu, mut encoder, work, ended: mut pieces, timer, reads, .. } = self;
+        if let Some(timer) = &timer {
+            timer.finish(&mut encoder);
         }
+        pieces.push_back(Piece { commands: encoder.finish(), work });
+        Recorded { gpu, pieces, timer, reads }
+    }
+}
+
+impl<'g> Recorded<'g> {
+    fn submit_in(mut self, mut slot: Slot<'g>) -> Result<Submitted<'g>, GpuError> {
+        self.gpu.faults.check_injected()?;
+        let mut earlier_s = 0.0;
+        loop {
+            self.gpu.faults.check_lost()?;
+            let slice = Slice::submit(self.gpu, slot, &mut self.pieces);
+            let Self { gpu, pieces, .. } = &self;
+            if pieces.is_empty() {
+                let Self { gpu, timer, reads, .. } = self;
+                let mapped = map(&reads, timer.as_ref());
+                return Ok(Submitted { gpu, slice, earlier_s, timer, reads, mapped });
+            }
+            let Slice { slot: held, index, work, started } = slice;
+            wait(gpu, index)?;
+            let slice_s = started.elapsed().as_secs_f64();
+            gpu.device_queue.learn(&work, slice_s);
+            earlier_s += slice_s;
+            slot = held.next(predicted_s(gpu, pieces));
+        }
+    }
+}
+
+fn encoder(gpu: &Gpu, label: &str) -> wgpu::CommandEncoder {
+    gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
+}
+
+fn works(pieces: &VecDeque<Piece>) -> impl ExactSizeIterator<Item = &[Work]> {
+    pieces.iter().map(|piece| &*piece.work)
+}
+
+/// The seconds of the next slice.
+fn predicted_s(gpu: &Gpu, pieces: &VecDeque<Piece>) -> f64 {
+    let queue = &gpu.device_queue;
+    queue.predicted_s(works(pieces).take(queue.merged(works(pieces))))
+}
+
+/// Asks for host memory to be filled when the device is done.
+fn map(reads: &[PooledBuffer], timer: Option<&Timer>) -> mpsc::Receiver<Result<(), wgpu::BufferAsyncError>> {
+    let (sender, mapped) = mpsc::channel();
+    for buffer in reads.iter().map(|pooled| &**pooled).chain(timer.map(|timer| &timer.host)) {
+        let sender = sender.clone();
+        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+            // The receiver is gone only when the caller no longer waits.
+            let _ = sender.send(result);
+        });
+    }
+    mapped
+}
+
+fn wait(gpu: &Gpu, index: wgpu::SubmissionIndex) -> Result<(), GpuError> {
+    gpu.faults.check_lost()?;
+    let poll = wgpu::PollType::Wait { submission_index: Some(index), timeout: None };
+    gpu.device.poll(poll).map_err(|error| GpuError::Lost(error.to_string()))?;
+    gpu.faults.check_lost()
+}
+
+/// Asks the device, which then tells of its loss.
+pub(crate) fn notice_loss(gpu: &Gpu) {
+    let _ = gpu.device.poll(wgpu::PollType::Poll);
+}
+
+impl<'g> Slice<'g> {
+    /// Sends the pieces of one slice. A live stream may have opened while they waited.
+    fn submit(gpu: &Gpu, slot: Slot<'g>, pieces: &mut VecDeque<Piece>) -> Self {
+        let count = gpu.device_queue.merged(works(pieces));
+        let (commands, works): (Vec<_>, Vec<_>) =
+            pieces.drain(..count).map(|Piece { commands, work }| (commands, work)).unzip();
         let started = Instant::now();
-        let index = self.gpu.queue.submit([self.encoder.finish()]);
-        let (sender, mapped) = mpsc::channel();
-        let timer_buffer = self.timer.iter().map(|timer| &timer.host);
-        for buffer in self.reads.iter().map(|pooled| &**pooled).chain(timer_buffer) {
-            let sender = sender.clone();
-            buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-                // The receiver is gone only when the caller no longer waits.
-                let _ = sender.send(result);
-            });
-        }
-        Submitted { gpu: self.gpu, index, timer: self.timer, reads: self.reads, mapped, started }
+        let index = gpu.queue.submit(commands);
+        Self { slot, index, work: works.concat(), started }
     }
 }
 
@@ -108,17 +240,30 @@ impl Submitted<'_> {
     ///
     /// # Errors
     /// When the device is lost.
-    pub fn wait(self) -> Result<FrameResult, GpuError> {
-        let poll = wgpu::PollType::Wait { submission_index: Some(self.index), timeout: None };
-        self.gpu.device.poll(poll).map_err(|error| GpuError::Lost(error.to_string()))?;
-        let wall_s = self.started.elapsed().as_secs_f64();
+    pub fn wait(mut self) -> Result<FrameResult, GpuError> {
+        wait(self.gpu, self.slice.index.clone())?;
+        let wall_s = self.slice.started.elapsed().as_secs_f64();
         for _ in 0..self.reads.len() + usize::from(self.timer.is_some()) {
             let mapped = self.mapped.recv().map_err(|error| GpuError::Lost(error.to_string()))?;
             mapped.map_err(|error| GpuError::Lost(error.to_string()))?;
         }
+        // Time stamps of several slices would count the time between them.
+        let timer = self.timer.as_ref().filter(|_| self.earlier_s == 0.0);
         let by_timestamp =
-            self.timer.zip(self.gpu.timestamp_period_ns).and_then(|(timer, period_ns)| timer.seconds(period_ns));
-        Ok(FrameResult { device_s: by_timestamp.unwrap_or(wall_s), reads: self.reads })
+            timer.zip(self.gpu.timestamp_period_ns).and_then(|(timer, period_ns)| timer.seconds(period_ns));
+        let slice_s = by_timestamp.unwrap_or(wall_s);
+        self.gpu.device_queue.learn(&self.slice.work, slice_s);
+        Ok(FrameResult { device_s: self.earlier_s + slice_s, reads: std::mem::take(&mut self.reads) })
+    }
+}
+
+impl Drop for Submitted<'_> {
+    /// Host memory goes back to its pool when the device is done with it.
+    fn drop(&mut self) {
+        if !self.reads.is_empty() {
+            let _ = wait(self.gpu, self.slice.index.clone());
+            self.reads.iter().for_each(|buffer| buffer.unmap());
+        }
     }
 }
 

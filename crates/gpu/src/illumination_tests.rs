@@ -91,10 +91,10 @@ fn answers(kind: Highlight, illumination: &Illumination, words: usize, questions
     let out = pool.lend_storage("answers", bytes);
     let bindings = [("illumination", &uniform), ("questions", &asked), ("answers", &*out)];
     let bound = pass.bind(0, bindings.map(|(name, buffer)| Binding::buffer(name, buffer))).expect("all names");
-    let mut frame = Frame::begin(&gpu, "test");
+    let mut frame = Frame::begin(&gpu, "test", crate::Turn::default());
     pass.dispatch(&mut frame, &[&bound], DispatchSize::Invocations([questions.len() as u32, 1, 1]));
     let read = frame.read_back(&out, 0..bytes, pool.lend_host("answers", bytes));
-    let result = frame.submit().wait().expect("a result");
+    let result = frame.submit().and_then(crate::Submitted::wait).expect("a result");
     result.with(read, |answers: &[Answer]| answers[..questions.len()].to_vec()).expect("answers")
 }
 

@@ -1,18 +1,22 @@
 //! The wgpu device, WGSL templates, frames of passes, read-back and timing.
 //!
-//! A pass records into a [`Frame`] and never submits or reads back; the owner of the frame does, once for many passes. Shaders
+//! A pass records into a [`Frame`] and never submits or reads back; the owner of the frame does, once for many passes. Work
+//! waits for its [`Turn`] in the [`DeviceQueue`], which everything that uses the device shares. Shaders
 //! are [templates](Templates): numbers that are known when a pipeline is built (how many cameras, which planes) are written
 //! into the text, because indexing cameras dynamically costs several times as much as naming them. A [`ShaderVariant`] holds
 //! the switches of one shader, and a [`PassCache`] its pipelines. Resources are bound to a shader's variables by name.
 
+mod catching;
 mod device;
 mod error;
+mod faults;
 mod frame;
 mod illumination;
 #[cfg(test)]
 mod illumination_tests;
 mod pool;
 mod shader;
+mod sharing;
 mod table;
 
 pub use device::{DevicePreference, Gpu};
@@ -25,4 +29,5 @@ pub use shader::{
     ResourceTraits, Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, WgslLiteral, source, sources,
     switches, uniform_elements, uniform_stride,
 };
+pub use sharing::{DeviceQueue, Job, JobLimit, LiveStream, SLICE_S, Turn, WorkClass, WorkKind};
 pub use table::{TABLE_WIDTH, Table, TablePool};

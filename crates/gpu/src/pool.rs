@@ -7,12 +7,24 @@ use std::{collections::VecDeque, ops::Deref};
 use parking_lot::Mutex;
 use wgpu::BufferUsages;
 
-use crate::device::Gpu;
+use crate::{device::Gpu, faults::Faults};
 
 /// Items that nobody has; the one that came back last is at the end.
 struct Free<K, T> {
-    items: Mutex<VecDeque<(K, T)>>,
+    /// With the device's shortages of memory when the first of them came back.
+    items: Mutex<(u64, VecDeque<(K, T)>)>,
     most: usize,
+    faults: Option<Arc<Faults>>,
+}
+
+impl<K, T> Free<K, T> {
+    fn new(most: usize, faults: Option<Arc<Faults>>) -> Self {
+        Self { items: Mutex::new((0, VecDeque::new())), most, faults }
+    }
+
+    fn shortages(&self) -> u64 {
+        self.faults.as_ref().map_or(0, |faults| faults.shortages())
+    }
 }
 
 /// Lends items of a kind; they come back when dropped.
@@ -22,6 +34,8 @@ pub struct Pool<K, T>(Arc<Free<K, T>>);
 pub struct Lent<K, T> {
     lent: Option<(K, T)>,
     home: Weak<Free<K, T>>,
+    /// The device's shortages of memory when it was made or lent.
+    shortages: u64,
 }
 
 /// A buffer's size and usage.
@@ -39,7 +53,13 @@ impl<K, T> Pool<K, T> {
     /// A pool that keeps at most `most_free` items that nobody has; the one that came back first goes first.
     #[must_use]
     pub fn keeping(most_free: usize) -> Self {
-        Self(Arc::new(Free { items: Mutex::default(), most: most_free }))
+        Self(Arc::new(Free::new(most_free, None)))
+    }
+
+    /// The same for resources of a device. What was lent before its memory ran out is not lent again.
+    #[must_use]
+    pub fn of_device(gpu: &Gpu, most_free: usize) -> Self {
+        Self(Arc::new(Free::new(most_free, Some(gpu.faults.clone()))))
     }
 }
 
@@ -47,15 +67,20 @@ impl<K: PartialEq, T> Pool<K, T> {
     /// An item of this kind, made where none is free.
     #[must_use]
     pub fn lend(&self, kind: K, make: impl FnOnce(&K) -> T) -> Lent<K, T> {
+        let shortages = self.0.shortages();
         let kept = {
-            let mut free = self.0.items.lock();
+            let (since, free) = &mut *self.0.items.lock();
+            if std::mem::replace(since, shortages) != shortages {
+                // The device needs the memory, and some may have none.
+                free.clear();
+            }
             free.iter().rposition(|(other, _)| *other == kind).and_then(|at| free.remove(at))
         };
         let lent = kept.unwrap_or_else(|| {
             let made = make(&kind);
             (kind, made)
         });
-        Lent { lent: Some(lent), home: Arc::downgrade(&self.0) }
+        Lent { lent: Some(lent), home: Arc::downgrade(&self.0), shortages }
     }
 }
 
@@ -81,7 +106,10 @@ impl<K, T> Deref for Lent<K, T> {
 impl<K, T> Drop for Lent<K, T> {
     fn drop(&mut self) {
         let (Some(home), Some(lent)) = (self.home.upgrade(), self.lent.take()) else { return };
-        let mut free = home.items.lock();
+        let (since, free) = &mut *home.items.lock();
+        if *since != self.shortages || home.shortages() != self.shortages {
+            return;
+        }
         free.push_back(lent);
         if free.len() > home.most {
             free.pop_front();
@@ -93,7 +121,7 @@ impl BufferPool {
     /// An empty pool.
     #[must_use]
     pub fn new(gpu: &Arc<Gpu>) -> Self {
-        Self { gpu: gpu.clone(), buffers: Pool::keeping(usize::MAX) }
+        Self { gpu: gpu.clone(), buffers: Pool::of_device(gpu, usize::MAX) }
     }
 
     fn lend(&self, label: &str, bytes: u64, usage: BufferUsages) -> PooledBuffer {

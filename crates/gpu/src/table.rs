@@ -8,6 +8,7 @@ use parking_lot::Mutex;
 use wgpu::{TextureFormat, TextureUsages, util::StagingBelt};
 
 use crate::pool::{Lent, Pool};
+use crate::sharing::{Turn, WorkKind};
 use crate::{device::Gpu, error::GpuError, frame::Frame};
 
 /// The n-th texel lies in column `n % TABLE_WIDTH` of row `n / TABLE_WIDTH` (`texel_at` in table.wgsl).
@@ -83,19 +84,25 @@ impl TablePool {
     #[must_use]
     pub fn new(gpu: &Arc<Gpu>, most_free: usize) -> Self {
         let staging = Staging { belt: StagingBelt::new(gpu.device.clone(), 0), chunk_bytes: 0 };
-        Self { gpu: gpu.clone(), textures: Pool::keeping(most_free), staging: Mutex::new(staging) }
+        Self { gpu: gpu.clone(), textures: Pool::of_device(gpu, most_free), staging: Mutex::new(staging) }
     }
 
     /// A table of elements, which take whole texels of `format`.
     ///
     /// # Errors
     /// When the device has no texture of that size, or is lost.
-    pub fn upload<T: NoUninit>(&self, label: &str, format: TextureFormat, elements: &[T]) -> Result<Table, GpuError> {
+    pub fn upload<T: NoUninit>(
+        &self,
+        label: &str,
+        format: TextureFormat,
+        elements: &[T],
+        turn: Turn,
+    ) -> Result<Table, GpuError> {
         let shape = Shape::of(&self.gpu, label, format, elements)?;
         let table = Table(self.textures.lend(shape, |&shape| texture(&self.gpu, label, shape)));
         let bytes = bytemuck::cast_slice(elements);
         if bytes.len() <= MOST_STAGED_BYTES {
-            self.fill(&table, bytes)?;
+            self.fill(&table, bytes, turn)?;
         } else {
             table.write(&self.gpu, bytes);
         }
@@ -103,8 +110,12 @@ impl TablePool {
     }
 
     /// Work that reads the texture's last contents was submitted before.
-    fn fill(&self, table: &Table, bytes: &[u8]) -> Result<(), GpuError> {
+    fn fill(&self, table: &Table, bytes: &[u8], turn: Turn) -> Result<(), GpuError> {
         let (texture, row_bytes) = (table.texture(), table.0.kind().row_bytes());
+        let work = (WorkKind::new(WorkKind::family(&"fill a table"), &row_bytes), bytes.len() as u64);
+        // Before the staging memory: whoever holds that waits for nobody.
+        let queue = &self.gpu.device_queue;
+        let slot = queue.wait(turn, queue.predicted_s([&[work][..]].into_iter()));
         let mut staging = self.staging.lock();
         let chunk = staging.chunk(&self.gpu, row_bytes as u64 * u64::from(texture.height()));
         let lost = |error: wgpu::MapRangeError| GpuError::Lost(error.to_string());
@@ -113,13 +124,14 @@ impl TablePool {
         mapped.slice(bytes.len()..).fill(0);
         drop(mapped);
         let from = wgpu::TexelCopyBufferInfo { buffer: chunk.buffer(), layout: row_by_row(row_bytes, chunk.offset()) };
-        let mut frame = Frame::begin(&self.gpu, "fill a table");
+        let mut frame = Frame::begin(&self.gpu, "fill a table", turn);
         frame.encoder.copy_buffer_to_texture(from, texture.as_image_copy(), texture.size());
+        frame.count(work);
         staging.belt.finish();
-        // Nobody waits for it but the work on views that comes after it.
-        let _ = frame.submit();
+        let filled = frame.submit_in(slot);
         staging.belt.recall();
-        Ok(())
+        // Nobody waits for it but the work on views that comes after it, unless that is to be short.
+        if queue.cuts() { filled?.wait().map(drop) } else { filled.map(drop) }
     }
 }
 
@@ -177,8 +189,9 @@ mod tests {
     fn a_dropped_tables_texture_is_lent_to_the_next_of_its_shape() {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
         let pool = TablePool::new(&gpu, 5);
-        let upload =
-            |texels: usize| pool.upload("words", TextureFormat::Rg32Uint, &vec![[7_u32; 2]; texels]).expect("a table");
+        let upload = |texels: usize| {
+            pool.upload("words", TextureFormat::Rg32Uint, &vec![[7_u32; 2]; texels], Turn::default()).expect("a table")
+        };
         let (first, second) = (upload(5000), upload(5000));
         assert!(first.texture() != second.texture(), "both are in use");
         let left = first.texture().clone();

@@ -2,12 +2,51 @@
 
 use std::any::Any;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use cluster::{Refinement, SamplePlanes, Workload};
 use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, View, ViewPlanes};
 use glam::Vec3;
 use tokio::sync::watch;
 use tonic::Status;
+
+/// The urgency of work on a device, which the nodes of a process share.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum WorkClass {
+    /// Somebody watches.
+    Live,
+    /// Somebody waits.
+    Batch,
+    /// Nobody waits, such as for a measurement.
+    Background,
+}
+
+/// Work's place in the order of its device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Turn {
+    /// A higher class goes first.
+    pub class: WorkClass,
+    /// Flows of a class share the device's time evenly. Numbers come from [`Turn::next_flow`].
+    pub flow: u64,
+}
+
+impl Turn {
+    /// The flow of all work without one of its own.
+    pub const COMMON_FLOW: u64 = 0;
+
+    /// The number of a new flow, which is no other flow's in this process.
+    #[must_use]
+    pub fn next_flow() -> u64 {
+        static LAST: AtomicU64 = AtomicU64::new(Turn::COMMON_FLOW);
+        LAST.fetch_add(1, Ordering::Relaxed) + 1
+    }
+
+    /// Work of a class in the common flow.
+    #[must_use]
+    pub fn of(class: WorkClass) -> Self {
+        Self { class, flow: Self::COMMON_FLOW }
+    }
+}
 
 /// The operations of a node's device. Calls block; services run them on blocking threads. Methods, sampling and lighting are
 /// text, as on the command line, and are parsed here. Calls fail for text that is unknown, a scene that is not loaded, and a
@@ -28,14 +67,19 @@ pub trait Engine: Send + Sync + 'static {
     fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError>;
     /// The planes of sample images that a reconstruction method needs.
     fn sample_planes(&self, method: &str) -> Result<SamplePlanes, EngineError>;
+    /// Counts a live stream as open until the guard is dropped. Meanwhile long work is cut into slices, so that live work
+    /// goes between them.
+    fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
+        Box::new(())
+    }
     /// Samples the wanted images of a set, in their order.
-    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError>;
+    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError>;
     /// Uploads a set for reconstruction. Fails for images that the device cannot take.
-    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError>;
-    /// Reconstructs one view for each camera, in one submission.
-    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError>;
+    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError>;
+    /// Reconstructs one view for each camera.
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError>;
     /// Draws one view for each camera from the scene itself.
-    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError>;
+    fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError>;
 }
 
 /// A sample set on the device; the engine downcasts it to its own type.
@@ -159,6 +203,9 @@ pub enum EngineError {
     /// The device, or its memory, failed in this one operation.
     #[error("device: {0}")]
     Device(String),
+    /// The device has no memory for this operation; a smaller one may succeed.
+    #[error("out of device memory: {0}")]
+    OutOfMemory(String),
     /// The device is lost for all operations.
     #[error("device lost: {0}")]
     Lost(String),
@@ -172,7 +219,7 @@ impl From<EngineError> for Status {
             EngineError::UnknownScene { .. } => Self::failed_precondition(text),
             EngineError::Device(_) => Self::internal(text),
             // Another node's device can do it.
-            EngineError::Lost(_) => Self::unavailable(text),
+            EngineError::OutOfMemory(_) | EngineError::Lost(_) => Self::unavailable(text),
         }
     }
 }
@@ -236,19 +283,23 @@ impl Engine for DeviceLossMonitor {
         self.monitored(self.engine.sample_planes(method))
     }
 
-    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
-        self.monitored(self.engine.sample(request))
+    fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
+        self.engine.live_stream()
     }
 
-    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
-        self.monitored(self.engine.upload(set))
+    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError> {
+        self.monitored(self.engine.sample(request, turn))
     }
 
-    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
-        self.monitored(self.engine.reconstruct(set, work))
+    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        self.monitored(self.engine.upload(set, turn))
     }
 
-    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
-        self.monitored(self.engine.draw_direct(work))
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
+        self.monitored(self.engine.reconstruct(set, work, turn))
+    }
+
+    fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError> {
+        self.monitored(self.engine.draw_direct(work, turn))
     }
 }

@@ -19,7 +19,9 @@ mod work_done;
 pub use blocking::blocking;
 pub use config::{Deadlines, NodeConfig, Quotas};
 pub use connections::Connections;
-pub use engine::{DeviceLossMonitor, DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
+pub use engine::{
+    DeviceLossMonitor, DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass,
+};
 pub use membership::keep_membership;
 pub use plan::{CellPlan, CurrentPlan, Relay, beyond_timeline};
 pub use scenes::Scenes;

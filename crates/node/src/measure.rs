@@ -10,7 +10,7 @@ use codec::{decode_depth_image, encode_depth_image, encode_view};
 use depth_image::{Camera, PinholeCamera, View};
 use tonic::Status;
 
-use crate::engine::{DirectWork, Engine, SampleSet, SampleWork, UploadedSet, ViewWork};
+use crate::engine::{DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass};
 
 /// Runs of one operation after a warm-up, in which shaders are built.
 const RUNS: usize = 3;
@@ -19,13 +19,16 @@ const LONG_RUN_S: f64 = 0.5;
 /// The longest time of views that are drawn in one call, unless one alone takes longer.
 const DIRECT_CALL_S: f64 = 1.0;
 
+/// A session waits for the costs.
+const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
+
 /// Measures g_s, g_v, c, d and e one after the other. Nothing else may run on the device meanwhile.
 pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Measured, Status> {
     let workload = &request.workload;
     let planes = engine.sample_planes(&request.method)?;
     let sample = SampleWork { planes, ..SampleWork::of(workload) };
     let (encoded, sample_s) = timed(|| sampled(engine, &sample))?;
-    let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?)?))?;
+    let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?, TURN)?))?;
     let (made, reconstruct_view_s) = reconstruct_view_s(engine, set.as_ref(), request)?;
     let in_order = engine.images_are_sequential(&workload.sampling)?;
     let sample_image_s = sample_s / encoded.len().max(1) as f64;
@@ -44,7 +47,7 @@ pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Resu
 
 /// Images as they leave a sampler, which encodes one set before it samples the next.
 fn sampled(engine: &dyn Engine, work: &SampleWork) -> Result<Vec<EncodedDepthImage>, Status> {
-    let images = engine.sample(work)?;
+    let images = engine.sample(work, TURN)?;
     images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec)).collect()
 }
 
@@ -92,7 +95,7 @@ fn reconstruct_view_s(
         planes: request.planes,
     };
     let calls: Vec<ViewWork> = views.chunks(batch.max(1)).map(work).collect();
-    let make = || calls.iter().try_fold(Vec::new(), |_, work| Ok(engine.reconstruct(set, work)?));
+    let make = || calls.iter().try_fold(Vec::new(), |_, work| Ok(engine.reconstruct(set, work, TURN)?));
     let (made, seconds) = timed(make)?;
     Ok((made, seconds / views.len() as f64))
 }
@@ -101,7 +104,7 @@ fn reconstruct_view_s(
 /// matter where it is not.
 fn direct_view_s(engine: &dyn Engine, request: &MeasureCosts) -> Result<f64, Status> {
     let work = |views: u32| DirectWork::of(&request.workload, request.views(views), request.planes);
-    let draw = |views: u32| Ok(engine.draw_direct(&work(views)).map(drop)?);
+    let draw = |views: u32| Ok(engine.draw_direct(&work(views), TURN).map(drop)?);
     let ((), alone_s) = timed(|| draw(1))?;
     let views = direct_views(alone_s, request.batch_count);
     if views == 1 {

@@ -98,26 +98,26 @@ impl Engine for Sleeper {
         Ok(SamplePlanes { normals: true, ..SamplePlanes::default() })
     }
 
-    fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
+    fn sample(&self, request: &SampleWork, _: Turn) -> Result<Vec<DepthImage>, EngineError> {
         self.calls.lock().unwrap().refinements.push(request.refinement);
         let parts_s: f64 = request.cameras.iter().map(|camera| self.sample_parts_s(camera)).sum();
         std::thread::sleep(Duration::from_secs_f64(self.sample_s + parts_s));
         Ok(request.cameras.iter().map(image).collect())
     }
 
-    fn upload(&self, set: &SampleSet) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn upload(&self, set: &SampleSet, _: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
         let shiny = set.images.iter().all(|image| image.specular.is_some());
         self.calls.lock().unwrap().uploads.push((set.illumination.clone(), shiny));
         Ok(Arc::new(Nothing))
     }
 
-    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork) -> Result<Vec<View>, EngineError> {
+    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, _: Turn) -> Result<Vec<View>, EngineError> {
         let any: &dyn Any = set;
         assert!(any.is::<Nothing>());
         Ok(views(&work.cameras))
     }
 
-    fn draw_direct(&self, work: &DirectWork) -> Result<Vec<View>, EngineError> {
+    fn draw_direct(&self, work: &DirectWork, _: Turn) -> Result<Vec<View>, EngineError> {
         let mut calls = self.calls.lock().unwrap();
         let build_s = if calls.drawn_views.is_empty() { self.build_s } else { 0.0 };
         calls.drawn_views.push(work.cameras.len());

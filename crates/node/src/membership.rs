@@ -13,7 +13,7 @@ use tonic::Status;
 use wire::rpc::{Backoff, CoordinatorClient, connect};
 
 use crate::blocking::blocking;
-use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, ViewWork};
+use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, ViewWork, WorkClass};
 use crate::plan::CurrentPlan;
 use crate::scenes::Scenes;
 use crate::work_done::WorkDone;
@@ -133,14 +133,15 @@ async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plan: &Current
 
 /// Makes one small picture of each kind that the plan has, its views by `method`.
 fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), EngineError> {
+    let turn = Turn::of(WorkClass::Batch);
     let workload = small(&plan.workload.of_cell(0).unwrap_or_else(|| plan.workload.clone()));
     let Some(Camera::Pinhole(view)) = workload.sample_cameras.first().copied() else { return Ok(()) };
     if plan.policy == Policy::Direct {
-        return engine.draw_direct(&DirectWork::of(&workload, vec![view], ViewPlanes::default())).map(drop);
+        return engine.draw_direct(&DirectWork::of(&workload, vec![view], ViewPlanes::default()), turn).map(drop);
     }
-    let set = engine.upload(&SampleSet::of(&workload, engine.sample(&SampleWork::of(&workload))?))?;
+    let set = engine.upload(&SampleSet::of(&workload, engine.sample(&SampleWork::of(&workload), turn)?), turn)?;
     let work = ViewWork { cameras: vec![view], method, planes: ViewPlanes::default() };
-    engine.reconstruct(set.as_ref(), &work).map(drop)
+    engine.reconstruct(set.as_ref(), &work, turn).map(drop)
 }
 
 fn small(workload: &Workload) -> Workload {

@@ -15,7 +15,8 @@ pub(crate) const DIRECTIONS: [[i32; 2]; 8] = [[1, 0], [-1, 0], [0, 1], [0, -1], 
 shader_variant!(Fill(SetVariant), "fill.wgsl", ONE_VIEW);
 
 pub(crate) fn record(recording: &mut Recording<'_>, unknown: &PixelList) -> Result<(), ReconstructionError> {
-    let pass = recording.device.passes.get(&Fill(recording.set.variant()))?;
+    let variant = Fill(recording.set.variant());
+    let pass = recording.device.passes.get(&variant)?;
     let batch = &recording.batch;
     let mut bindings = recording.view_bindings();
     bindings.extend([
@@ -25,6 +26,6 @@ pub(crate) fn record(recording: &mut Recording<'_>, unknown: &PixelList) -> Resu
     ]);
     bindings.extend(unknown.bindings());
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&pass, &bound, Some(unknown));
+    recording.dispatch_pixels(&variant, &pass, &bound, Some(unknown));
     Ok(())
 }

@@ -28,7 +28,7 @@ fn known_towards(origin: vec2i, towards: vec2i, first: u32) -> Neighbour {
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= lists[work.view.number].count { return; }
     let first = work.view.first_pixel;
-    let index = listed_pixels[first + id.x];
+    let index = listed_pixels[first_listed() + id.x];
     let origin = vec2i(vec2u((index - first) % work.view.size_px.x, (index - first) / work.view.size_px.x));
     var farthest = 3.0e38;
 {% for d in DIRECTIONS %}

@@ -25,9 +25,17 @@ pub(crate) struct InFlight<'g> {
     batch: Batch,
 }
 
+/// A batch that the device is done with.
+pub(crate) struct Finished {
+    result: FrameResult,
+    srgb8: Readback,
+    others: [Option<Readback>; 3],
+    batch: Batch,
+}
+
 impl<'g> InFlight<'g> {
     /// Submits a recording, with read-backs of the planes that are asked for.
-    pub fn submit(recording: Recording<'g>, planes: ViewPlanes) -> Self {
+    pub fn submit(recording: Recording<'g>, planes: ViewPlanes) -> Result<Self, ReconstructionError> {
         let Recording { device, mut frame, batch, .. } = recording;
         let bytes = batch.plane_bytes;
         let mut read =
@@ -36,13 +44,20 @@ impl<'g> InFlight<'g> {
         let inverse_depth = planes.inverse_depth.then_some(&batch.inverse_depth_per_m);
         let provenance = planes.provenance.then_some(&batch.provenance);
         let others = [inverse_depth, provenance, batch.fetches.as_ref()].map(|plane| plane.map(&mut read));
-        Self { submitted: frame.submit(), srgb8, others, batch }
+        Ok(Self { submitted: frame.submit()?, srgb8, others, batch })
     }
 
-    /// Waits, and appends the batch's views. Fetches are added up over views.
-    pub fn finish(self, views: &mut Vec<View>, statistics: &mut Statistics) -> Result<(), ReconstructionError> {
-        let Self { submitted, srgb8, others: [inverse_depth, provenance, fetches], batch } = self;
-        let result = submitted.wait()?;
+    /// Waits until the device is free of it.
+    pub fn wait(self) -> Result<Finished, ReconstructionError> {
+        let Self { submitted, srgb8, others, batch } = self;
+        Ok(Finished { result: submitted.wait()?, srgb8, others, batch })
+    }
+}
+
+impl Finished {
+    /// Appends the batch's views. Fetches are added up over views.
+    pub fn unpack(self, views: &mut Vec<View>, statistics: &mut Statistics) -> Result<(), ReconstructionError> {
+        let Self { result, srgb8, others: [inverse_depth, provenance, fetches], batch } = self;
         statistics.device_s += result.device_s;
         let planes = |readback: Readback| each_view(&result, readback, &batch, <[u32]>::to_vec);
         let rgb = each_view(&result, srgb8, &batch, rgb_bytes)?;

@@ -91,7 +91,7 @@ fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
         first_tile,
         size_px,
         number,
-        padding
+        rows
     });
     assert_eq!(templates_that_agree("ViewCamera", &view_camera), passes);
     let sample_camera = host!(GpuSampleCamera {

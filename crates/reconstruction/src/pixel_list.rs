@@ -9,10 +9,10 @@ use crate::device::Device;
 /// The workgroup size of passes over lists of pixels.
 pub(crate) const LIST_WORKGROUP: u32 = 64;
 
-/// For each view of a batch, pixels that a pass left undecided.
+/// For each piece of a view of a batch, pixels that a pass left undecided.
 pub(crate) struct PixelList {
     pub pixels: PooledBuffer,
-    /// A [`GpuPixelList`] for each view: arguments of indirect dispatches.
+    /// A [`GpuPixelList`] for each piece: arguments of indirect dispatches.
     pub lists: wgpu::Buffer,
 }
 
@@ -25,13 +25,13 @@ pub(crate) struct GpuPixelList {
 }
 
 impl PixelList {
-    /// Empty lists for `views` views of together `plane_bytes`, at four bytes a pixel.
-    pub fn lend(device: &Device, views: usize, plane_bytes: u64) -> Self {
+    /// Empty lists for `pieces` pieces of views of together `plane_bytes`, at four bytes a pixel.
+    pub fn lend(device: &Device, pieces: usize, plane_bytes: u64) -> Self {
         let empty = GpuPixelList { workgroups: [0, 1, 1], count: 0 };
         let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT;
         Self {
             pixels: device.buffers.lend_storage("undecided pixels", plane_bytes),
-            lists: device.gpu.buffer_with("lists of undecided pixels", &vec![empty; views], usage),
+            lists: device.gpu.buffer_with("lists of undecided pixels", &vec![empty; pieces], usage),
         }
     }
 

@@ -3,20 +3,35 @@
 use std::sync::Arc;
 
 use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
-use gpu::{BufferPool, Gpu, PassCache, TablePool};
+use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
 use crate::in_flight::{InFlight, Statistics};
-use crate::quads::{self, MeshStatistics, Quad, QuadDrawing};
+use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
 use crate::recording::{Recording, batches};
 use crate::sample_set::{MAX_TABLES, SampleSet, SetDescription};
 use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
 use crate::{fill, shaders::templates, specular, tile_start};
+
+/// Calls of one class that are under way at once: each holds the memory of two batches.
+const CALLS_OF_A_CLASS: usize = 4;
 
 /// Passes for every method and number of cameras that has been asked for.
 pub struct Reconstructor {
     device: Device,
     tables: TablePool,
     drawing: QuadDrawing,
+    calls: JobLimit,
+}
+
+/// Views to reconstruct.
+#[derive(Clone, Copy)]
+struct Request<'r> {
+    set: &'r SampleSet,
+    method: ReconstructionMethod,
+    /// Of the set, where the method draws it.
+    mesh: Option<&'r Mesh>,
+    turn: Turn,
+    count_fetches: bool,
 }
 
 impl Reconstructor {
@@ -29,6 +44,7 @@ impl Reconstructor {
         Ok(Self {
             tables: TablePool::new(gpu, MAX_TABLES),
             drawing: QuadDrawing::new(gpu, &templates),
+            calls: JobLimit::of(CALLS_OF_A_CLASS),
             device: Device { gpu: gpu.clone(), buffers: BufferPool::new(gpu), passes: PassCache::new(gpu, &templates) },
         })
     }
@@ -38,7 +54,20 @@ impl Reconstructor {
     /// # Errors
     /// Images, cameras or a volume that cannot be used, or the device's limits.
     pub fn upload(&self, images: &[DepthImage], set: &SetDescription<'_>) -> Result<SampleSet, ReconstructionError> {
-        SampleSet::upload(&self.tables, images, set)
+        self.upload_in_turn(images, set, Turn::default())
+    }
+
+    /// As [`Reconstructor::upload`], in its turn.
+    ///
+    /// # Errors
+    /// As [`Reconstructor::upload`].
+    pub fn upload_in_turn(
+        &self,
+        images: &[DepthImage],
+        set: &SetDescription<'_>,
+        turn: Turn,
+    ) -> Result<SampleSet, ReconstructionError> {
+        SampleSet::upload(&self.tables, images, set, turn)
     }
 
     /// One view a camera, in their order.
@@ -52,7 +81,22 @@ impl Reconstructor {
         method: ReconstructionMethod,
         planes: ViewPlanes,
     ) -> Result<Vec<View>, ReconstructionError> {
-        self.reconstruct_measured(set, cameras, method, planes, false).map(|(views, _)| views)
+        self.reconstruct_in_turn(set, cameras, method, planes, Turn::default())
+    }
+
+    /// As [`Reconstructor::reconstruct`], in its turn.
+    ///
+    /// # Errors
+    /// As [`Reconstructor::reconstruct`].
+    pub fn reconstruct_in_turn(
+        &self,
+        set: &SampleSet,
+        cameras: &[PinholeCamera],
+        method: ReconstructionMethod,
+        planes: ViewPlanes,
+        turn: Turn,
+    ) -> Result<Vec<View>, ReconstructionError> {
+        self.reconstruct_counted(set, cameras, method, planes, (turn, false)).map(|(views, _)| views)
     }
 
     /// As [`Reconstructor::reconstruct`], and what it cost; counting fetches slows it down.
@@ -67,21 +111,37 @@ impl Reconstructor {
         planes: ViewPlanes,
         count_fetches: bool,
     ) -> Result<(Vec<View>, Statistics), ReconstructionError> {
+        self.reconstruct_counted(set, cameras, method, planes, (Turn::default(), count_fetches))
+    }
+
+    fn reconstruct_counted(
+        &self,
+        set: &SampleSet,
+        cameras: &[PinholeCamera],
+        method: ReconstructionMethod,
+        planes: ViewPlanes,
+        (turn, count_fetches): (Turn, bool),
+    ) -> Result<(Vec<View>, Statistics), ReconstructionError> {
         for (index, camera) in cameras.iter().enumerate() {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
         }
+        let _call = self.calls.begin(turn.class);
+        // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
+        let mesh = method.mesh(&self.device, set, turn)?;
+        let request = Request { set, method, mesh: mesh.as_deref(), turn, count_fetches };
         let mut views = Vec::with_capacity(cameras.len());
         let mut statistics = Statistics::default();
         let mut in_flight: Option<InFlight<'_>> = None;
         // The device works on one batch while the host takes the one before apart.
         for batch in batches(cameras) {
-            let recording = self.record(set, batch, method, count_fetches)?;
-            if let Some(done) = in_flight.replace(InFlight::submit(recording, planes)) {
-                done.finish(&mut views, &mut statistics)?;
-            }
+            let recording = self.record(request, batch)?;
+            // Whoever holds the device asks for no other turn.
+            let done = in_flight.take().map(InFlight::wait).transpose()?;
+            in_flight = Some(InFlight::submit(recording, planes)?);
+            done.map_or(Ok(()), |done| done.unpack(&mut views, &mut statistics))?;
         }
-        if let Some(done) = in_flight {
-            done.finish(&mut views, &mut statistics)?;
+        if let Some(last) = in_flight {
+            last.wait()?.unpack(&mut views, &mut statistics)?;
         }
         statistics.fetches_per_ray = statistics.fetches_per_ray.map(|sum| sum / cameras.len().max(1) as f64);
         Ok((views, statistics))
@@ -90,16 +150,16 @@ impl Reconstructor {
     /// All passes over a batch.
     fn record<'r>(
         &'r self,
-        set: &'r SampleSet,
+        request: Request<'r>,
         cameras: &[PinholeCamera],
-        method: ReconstructionMethod,
-        count_fetches: bool,
     ) -> Result<Recording<'r>, ReconstructionError> {
-        let mut recording = Recording::begin(&self.device, set, cameras, count_fetches)?;
+        let Request { set, method, mesh, turn, count_fetches } = request;
+        let family = WorkKind::family(&("reconstruct", method, set.cameras.len()));
+        let mut recording = Recording::begin(&self.device, set, cameras, (family, turn), count_fetches)?;
         if method.follows_rays() {
             tile_start::record(&mut recording)?;
         }
-        let unknown = method.record(&self.drawing, &mut recording)?;
+        let unknown = method.record(&self.drawing, mesh, &mut recording)?;
         fill::record(&mut recording, &unknown)?;
         specular::record(&mut recording)?;
         Ok(recording)
@@ -114,7 +174,7 @@ impl Reconstructor {
         set: &SampleSet,
         method: ReconstructionMethod,
     ) -> Result<Option<MeshStatistics>, ReconstructionError> {
-        Ok(method.mesh(&self.device, set)?.map(|mesh| mesh.statistics))
+        Ok(method.mesh(&self.device, set, Turn::default())?.map(|mesh| mesh.statistics))
     }
 
     /// The quads that a method draws, image after image in the order of their samples; none for methods that draw none.
@@ -122,7 +182,7 @@ impl Reconstructor {
     /// # Errors
     /// As [`Reconstructor::mesh_statistics`].
     pub fn read_quads(&self, set: &SampleSet, method: ReconstructionMethod) -> Result<Vec<Quad>, ReconstructionError> {
-        let mesh = method.mesh(&self.device, set)?;
+        let mesh = method.mesh(&self.device, set, Turn::default())?;
         mesh.map_or(Ok(Vec::new()), |mesh| quads::read(&self.device, &mesh, set))
     }
 }

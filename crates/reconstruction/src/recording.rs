@@ -1,16 +1,21 @@
-//! Views of one size that are reconstructed together, on their way into a frame.
+//! Views of one size that are reconstructed together, on their way into a frame: whole, or in pieces of some rows each where
+//! the device is shared with live streams.
+
+use std::ops::Range;
 
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
-use gpu::{Binding, ComputePass, DispatchSize, Frame, PooledBuffer, uniform_elements};
+use gpu::{Binding, ComputePass, DispatchSize, Frame, PooledBuffer, ShaderVariant, Turn, WorkKind, uniform_elements};
 use wgpu::BufferUsages;
 
-use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, SetVariant};
+use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, SetVariant, TILE_PX, rows_of};
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList, sample_set::SampleSet};
 
 /// Bounds the memory of a batch: 12 bytes a pixel on the device, up to as much again on the host.
 const PIXELS_A_BATCH: usize = 1 << 20;
 const MAX_VIEWS_A_BATCH: usize = 256;
+/// The pixels of a slice of views whose cost is unknown.
+const UNKNOWN_SLICE_PX: u64 = 1 << 14;
 
 /// A batch of views, recorded into one frame: what every pass is handed.
 pub(crate) struct Recording<'r> {
@@ -18,6 +23,24 @@ pub(crate) struct Recording<'r> {
     pub set: &'r SampleSet,
     pub frame: Frame<'r>,
     pub batch: Batch,
+    /// The family of the passes, whose costs are learned.
+    family: u64,
+}
+
+/// Some rows of a view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Piece {
+    view: usize,
+    first_row: u32,
+}
+
+/// All views in pieces of equal height, but for each view's last.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Pieces {
+    all: Vec<Piece>,
+    rows: u32,
+    /// Pieces that a slice of a pass holds.
+    a_slice: usize,
 }
 
 /// Views of one size, and what they take on the device.
@@ -26,7 +49,8 @@ pub(crate) struct Batch {
     pub size_px: UVec2,
     /// The bytes of one plane of all views.
     pub plane_bytes: u64,
-    /// A `ViewWork` for each view.
+    pub pieces: Pieces,
+    /// A `ViewWork` for each piece.
     pub works: wgpu::Buffer,
     /// For methods that follow rays.
     pub tile_start_m: Option<PooledBuffer>,
@@ -43,16 +67,20 @@ impl<'r> Recording<'r> {
         device: &'r Device,
         set: &'r SampleSet,
         cameras: &[PinholeCamera],
+        (family, turn): (u64, Turn),
         count_fetches: bool,
     ) -> Result<Self, ReconstructionError> {
         let plane_bytes = 4 * (cameras[0].pixel_count() * cameras.len()) as u64;
         device.gpu.check_storage_bytes("a batch of views (bytes)", plane_bytes)?;
-        let works = uniform_elements((0..).zip(cameras).map(|(number, camera)| view_work(set, camera, number)));
+        let slice_px = device.gpu.device_queue.slice_units(family, UNKNOWN_SLICE_PX);
+        let pieces = Pieces::of(cameras.len(), cameras[0].size_px, slice_px);
+        let works = uniform_elements(view_works(set, cameras, &pieces));
         let plane = |label| device.buffers.lend_storage(label, plane_bytes);
         let batch = Batch {
             cameras: cameras.to_vec(),
             size_px: cameras[0].size_px,
             plane_bytes,
+            pieces,
             works: device.gpu.buffer_with("views", &works, BufferUsages::UNIFORM),
             tile_start_m: None,
             srgb8: plane("srgb8"),
@@ -60,11 +88,11 @@ impl<'r> Recording<'r> {
             provenance: plane("provenance"),
             fetches: count_fetches.then(|| plane("fetches")),
         };
-        let mut frame = Frame::begin(&device.gpu, "reconstruct");
+        let mut frame = Frame::begin(&device.gpu, "reconstruct", turn);
         if let Some(fetches) = &batch.fetches {
             frame.encoder.clear_buffer(fetches, 0, None);
         }
-        Ok(Self { device, set, frame, batch })
+        Ok(Self { device, set, frame, batch, family })
     }
 
     /// The switches of passes that find surfaces.
@@ -84,16 +112,66 @@ impl<'r> Recording<'r> {
         bindings
     }
 
-    /// One dispatch a view, over its listed pixels or over all.
-    pub fn dispatch_pixels(&mut self, pass: &ComputePass, bound: &wgpu::BindGroup, listed: Option<&PixelList>) {
-        let [across, down] = self.batch.size_px.to_array();
-        let all = DispatchSize::Invocations([across, down, 1]);
-        self.dispatch(pass, bound, listed.map_or(all, |listed| DispatchSize::Indirect(&listed.lists)));
+    /// One dispatch a piece, over its listed pixels or over all.
+    pub fn dispatch_pixels(
+        &mut self,
+        variant: &impl ShaderVariant,
+        pass: &ComputePass,
+        bound: &wgpu::BindGroup,
+        listed: Option<&PixelList>,
+    ) {
+        let all = [self.batch.size_px.x, self.batch.pieces.rows];
+        self.dispatch(variant, pass, bound, |first| match listed {
+            Some(listed) => DispatchSize::Indirect(&listed.lists, first),
+            None => DispatchSize::Invocations([all[0], all[1], 1]),
+        });
     }
 
-    /// One dispatch a view.
-    pub fn dispatch(&mut self, pass: &ComputePass, bound: &wgpu::BindGroup, size: DispatchSize<'_>) {
-        pass.dispatch_each(&mut self.frame, &[bound], 0..self.batch.cameras.len() as u32, size);
+    /// One dispatch a tile of a piece.
+    pub fn dispatch_tiles(&mut self, variant: &impl ShaderVariant, pass: &ComputePass, bound: &wgpu::BindGroup) {
+        let [across, down] = [self.batch.size_px.x, self.batch.pieces.rows].map(|side| side.div_ceil(TILE_PX));
+        self.dispatch(variant, pass, bound, |_| DispatchSize::Invocations([across, down, 1]));
+    }
+
+    /// One dispatch a piece, of a size that may depend on the first piece.
+    fn dispatch<'b>(
+        &mut self,
+        variant: &impl ShaderVariant,
+        pass: &ComputePass,
+        bound: &wgpu::BindGroup,
+        size: impl Fn(u32) -> DispatchSize<'b>,
+    ) {
+        let kind = WorkKind::new(self.family, &variant.name());
+        let piece_px = u64::from(self.batch.size_px.x) * u64::from(self.batch.pieces.rows);
+        for slice in self.batch.pieces.slices() {
+            let (count, size) = (slice.len() as u64, size(slice.start));
+            pass.dispatch_each(&mut self.frame, &[bound], slice, size);
+            self.frame.cut(kind, count * piece_px);
+        }
+    }
+}
+
+impl Pieces {
+    /// The pieces of views of one size, for slices of at most so many pixels.
+    fn of(views: usize, size_px: UVec2, slice_px: u64) -> Self {
+        let most_rows = (slice_px / u64::from(size_px.x)).min(size_px.y.into()) as u32;
+        let most_rows = if most_rows == size_px.y { most_rows } else { (most_rows / TILE_PX * TILE_PX).max(TILE_PX) };
+        let count = size_px.y.div_ceil(most_rows);
+        // Pieces of a view are about equal, and begin with whole tiles.
+        let rows = if count == 1 { size_px.y } else { size_px.y.div_ceil(count).next_multiple_of(TILE_PX) };
+        let of_view = |view| (0..size_px.y).step_by(rows as usize).map(move |first_row| Piece { view, first_row });
+        let piece_px = u64::from(rows) * u64::from(size_px.x);
+        Self { all: (0..views).flat_map(of_view).collect(), rows, a_slice: (slice_px / piece_px).max(1) as usize }
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.all.len()
+    }
+
+    fn slices(&self) -> impl Iterator<Item = Range<u32>> + use<> {
+        let (count, a_slice) = (self.all.len(), self.a_slice);
+        (0..count).step_by(a_slice).map(move |first| first as u32..first.saturating_add(a_slice).min(count) as u32)
     }
 }
 
@@ -105,8 +183,21 @@ pub(crate) fn batches(cameras: &[PinholeCamera]) -> impl Iterator<Item = &[Pinho
     })
 }
 
-/// The `ViewWork` of the `number`-th view, its sample cameras sorted by distance.
-fn view_work(set: &SampleSet, camera: &PinholeCamera, number: u32) -> Vec<u8> {
+/// The `ViewWork` of each piece.
+fn view_works(set: &SampleSet, cameras: &[PinholeCamera], pieces: &Pieces) -> Vec<Vec<u8>> {
+    let sorted: Vec<_> = cameras.iter().map(|camera| nearest_first(set, camera)).collect();
+    let work = |(number, &Piece { view, first_row }): (u32, &Piece)| {
+        let end_row = (first_row + pieces.rows).min(cameras[view].size_px.y);
+        let rows = rows_of(first_row..end_row);
+        let view_camera = GpuViewCamera { number, rows, ..GpuViewCamera::of(&cameras[view], view as u32) };
+        let work = GpuViewWork { view: view_camera, volume: set.volume };
+        [bytemuck::bytes_of(&work), bytemuck::cast_slice(&sorted[view])].concat()
+    };
+    (0..).zip(&pieces.all).map(work).collect()
+}
+
+/// The sample cameras in the order of their distance from a view's.
+fn nearest_first(set: &SampleSet, camera: &PinholeCamera) -> Vec<GpuSampleCamera> {
     let mut nearest_first = set.cameras.clone();
     nearest_first.sort_by(|a, b| {
         let distance = |c: &GpuSampleCamera| Vec3::from(c.eye_in_world).distance_squared(camera.eye_in_world);
@@ -114,6 +205,33 @@ fn view_work(set: &SampleSet, camera: &PinholeCamera, number: u32) -> Vec<u8> {
         let uncertain = |c: &GpuSampleCamera| set.uncertain[c.mask.trailing_zeros() as usize];
         uncertain(a).cmp(&uncertain(b)).then(distance(a).total_cmp(&distance(b)))
     });
-    let work = GpuViewWork { view: GpuViewCamera::of(camera, number), volume: set.volume };
-    [bytemuck::bytes_of(&work), bytemuck::cast_slice(&nearest_first)].concat()
+    nearest_first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_cover_every_row_once_and_slices_every_piece() {
+        for (size_px, slice_px) in
+            [([64, 48], 1), ([64, 48], 1024), ([33, 21], 600), ([1280, 720], 100_000), ([8, 8], 64)]
+        {
+            let size_px = UVec2::from(size_px);
+            let pieces = Pieces::of(3, size_px, slice_px);
+            let rows_of = |piece: &Piece| (size_px.y - piece.first_row).min(pieces.rows);
+            let rows: u32 = pieces.all.iter().map(rows_of).sum();
+            assert_eq!(rows, 3 * size_px.y);
+            assert!(pieces.all.iter().all(|piece| piece.first_row % TILE_PX == 0));
+            assert!(pieces.rows <= TILE_PX || u64::from(pieces.rows * size_px.x) <= slice_px.max(1), "{pieces:?}");
+            let covered: Vec<u32> = pieces.slices().flatten().collect();
+            assert_eq!(covered, (0..pieces.count() as u32).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn views_are_whole_and_together_where_nobody_watches() {
+        let pieces = Pieces::of(5, UVec2::new(33, 21), u64::MAX);
+        assert_eq!((pieces.count(), pieces.rows, pieces.slices().collect::<Vec<_>>()), (5, 21, vec![0..5]));
+    }
 }

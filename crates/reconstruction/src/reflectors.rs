@@ -1,7 +1,7 @@
 //! The light that the samples of a set reflect towards a viewer, on the device.
 
 use depth_image::{DepthImage, Highlight, Illumination, SpecularPlanes};
-use gpu::{GpuError, Table, TablePool, illumination_bytes};
+use gpu::{GpuError, Table, TablePool, Turn, illumination_bytes};
 use wgpu::{BufferUsages, TextureFormat};
 
 use crate::error::ReconstructionError;
@@ -26,6 +26,7 @@ impl Reflectors {
         images: &[DepthImage],
         illumination: &Illumination,
         highlight: Option<Highlight>,
+        turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
         check(images, illumination)?;
         let Some(highlight) = highlight.filter(|_| images.iter().any(reflects)) else { return Ok(None) };
@@ -37,7 +38,12 @@ impl Reflectors {
             highlight,
             lights: illumination.lights.len(),
             visibility_words,
-            samples: tables.upload("reflectors", TextureFormat::Rgba32Uint, &sample_words(images, visibility_words))?,
+            samples: tables.upload(
+                "reflectors",
+                TextureFormat::Rgba32Uint,
+                &sample_words(images, visibility_words),
+                turn,
+            )?,
             illumination: gpu.buffer_with("illumination", &bytes, BufferUsages::UNIFORM),
         }))
     }

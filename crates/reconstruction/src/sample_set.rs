@@ -3,7 +3,7 @@
 use bytemuck::Zeroable as _;
 use depth_image::{Aabb, Camera, DepthImage, Highlight, Illumination, PinholeCamera, srgb8_from_linear};
 use glam::{Vec2, Vec3};
-use gpu::{Table, TablePool};
+use gpu::{Table, TablePool, Turn};
 use rayon::prelude::*;
 use wgpu::TextureFormat;
 
@@ -59,10 +59,15 @@ impl SampleSet {
         tables: &TablePool,
         images: &[DepthImage],
         set: &SetDescription<'_>,
+        turn: Turn,
     ) -> Result<Self, ReconstructionError> {
         check(tables, images, &set.volume)?;
         let among_holes = is_among_holes(images);
-        let coded: Vec<CodedImage> = images.par_iter().map(|image| CodedImage::of(image, among_holes)).collect();
+        let coded = |image| CodedImage::of(image, among_holes);
+        // One thread leaves the other cores to live streams.
+        let is_shared = tables.gpu.device_queue.cuts();
+        let coded: Vec<CodedImage> =
+            if is_shared { images.iter().map(coded).collect() } else { images.par_iter().map(coded).collect() };
         let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(Vec::with_capacity);
         let mut colors: Vec<[u32; 4]> = Vec::with_capacity(cell_count(images));
         let mut cameras = Vec::with_capacity(images.len());
@@ -83,11 +88,11 @@ impl SampleSet {
             cameras,
             uncertain,
             volume: gpu_volume(&searched_volume(&set.volume, images), set.background_linear),
-            nodes: tables.upload("depth pyramids", TextureFormat::Rg32Uint, &nodes)?,
-            cell_codes: tables.upload("cells", TextureFormat::Rg32Uint, &codes)?,
-            cell_colors: tables.upload("sample colours", TextureFormat::Rgba32Uint, &colors)?,
-            reflectors: Reflectors::upload(tables, images, set.illumination, set.highlight)?,
-            meshes: SetMeshes::upload(tables, images)?,
+            nodes: tables.upload("depth pyramids", TextureFormat::Rg32Uint, &nodes, turn)?,
+            cell_codes: tables.upload("cells", TextureFormat::Rg32Uint, &codes, turn)?,
+            cell_colors: tables.upload("sample colours", TextureFormat::Rgba32Uint, &colors, turn)?,
+            reflectors: Reflectors::upload(tables, images, set.illumination, set.highlight, turn)?,
+            meshes: SetMeshes::upload(tables, images, turn)?,
         })
     }
 }

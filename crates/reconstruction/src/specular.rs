@@ -50,12 +50,13 @@ impl ShaderVariant for Specular {
 /// Highlights are added after the fill, which would spread them.
 pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
     let Some(reflectors) = &recording.set.reflectors else { return Ok(()) };
-    let pass = recording.device.passes.get(&Specular {
+    let variant = Specular {
         set: recording.set.variant(),
         highlight: reflectors.highlight,
         lights: reflectors.lights,
         visibility_words: reflectors.visibility_words,
-    })?;
+    };
+    let pass = recording.device.passes.get(&variant)?;
     let mut bindings = recording.cell_bindings();
     bindings.extend([
         Binding::buffer("out_srgb8", &recording.batch.srgb8),
@@ -65,6 +66,6 @@ pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), Reconstruction
         Binding::texture("samples", &reflectors.samples),
     ]);
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&pass, &bound, None);
+    recording.dispatch_pixels(&variant, &pass, &bound, None);
     Ok(())
 }

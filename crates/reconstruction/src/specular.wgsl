@@ -70,11 +70,12 @@ fn gathered(sample: u32, width_px: u32, shares: vec4f) -> Gathered {
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= work.view.size_px) { return; }
-    let index = work.view.first_pixel + id.y * work.view.size_px.x + id.x;
+    let pixel = pixel_at(id);
+    if any(pixel >= work.view.size_px) { return; }
+    let index = work.view.first_pixel + pixel.y * work.view.size_px.x + pixel.x;
     let origin = provenance[index];
     if (origin & 0xffu) != PROVENANCE_HIT { return; }
-    let center = vec2f(id.xy) + 0.5;
+    let center = vec2f(pixel) + 0.5;
     let direction = work.view.column_in_world * center.x + work.view.row_in_world * center.y + work.view.corner_in_world;
     let point_in_world = work.view.eye_in_world + direction / inverse_depth[index];
     // Cameras are sorted: of those that contributed, the last to be chosen is the nearest. On the software device one

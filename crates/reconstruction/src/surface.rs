@@ -29,7 +29,7 @@ pub(crate) fn record(
 ) -> Result<PixelList, ReconstructionError> {
     let pass = recording.device.passes.get(variant)?;
     let batch = &recording.batch;
-    let undecided = PixelList::lend(recording.device, batch.cameras.len(), batch.plane_bytes);
+    let undecided = PixelList::lend(recording.device, batch.pieces.count(), batch.plane_bytes);
     let mut bindings = recording.cell_bindings();
     bindings.extend([
         Binding::texture("cell_colors", &recording.set.cell_colors),
@@ -45,6 +45,6 @@ pub(crate) fn record(
     bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
     bindings.extend(own.iter().cloned());
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&pass, &bound, listed);
+    recording.dispatch_pixels(variant, &pass, &bound, listed);
     Ok(undecided)
 }

@@ -17,7 +17,7 @@ var<private> fetches: u32 = 0u;
 // Leaves a pixel to the next pass.
 fn leave_undecided(index: u32) {
     let place = atomicAdd(&undecided[work.view.number].count, 1u);
-    undecided_pixels[work.view.first_pixel + place] = index;
+    undecided_pixels[first_listed() + place] = index;
     if place % LIST_WORKGROUP == 0u { atomicAdd(&undecided[work.view.number].workgroups, 1u); }
 }
 

@@ -1,6 +1,6 @@
 //! How far all rays of a tile run through space that is proven empty, or that no camera sees.
 
-use gpu::{Binding, DispatchSize, shader_variant};
+use gpu::{Binding, shader_variant};
 
 use crate::view_work::{ONE_VIEW, SetVariant, tiles_of};
 use crate::{error::ReconstructionError, recording::Recording};
@@ -16,13 +16,14 @@ pub(crate) const HALF_DIAGONAL: f32 = 0.7072;
 shader_variant!(TileStart(SetVariant), "tile_start.wgsl", ONE_VIEW);
 
 pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
-    let pass = recording.device.passes.get(&TileStart(recording.set.variant()))?;
+    let variant = TileStart(recording.set.variant());
+    let pass = recording.device.passes.get(&variant)?;
     let [across, down] = tiles_of(recording.batch.size_px).to_array();
     let bytes = 4 * u64::from(across * down) * recording.batch.cameras.len() as u64;
     let starts = recording.device.buffers.lend_storage("tile starts", bytes);
     let own = Binding::buffer("tile_start_m", &starts);
     let bound = pass.bind(0, recording.view_bindings().into_iter().chain([own]))?;
-    recording.dispatch(&pass, &bound, DispatchSize::Invocations([across, down, 1]));
+    recording.dispatch_tiles(&variant, &pass, &bound);
     recording.batch.tile_start_m = Some(starts);
     Ok(())
 }

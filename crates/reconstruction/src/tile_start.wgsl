@@ -43,8 +43,9 @@ fn evaluate_camera(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, t_end: f32,
 @compute @workgroup_size(TILE_PX, TILE_PX)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let tiles = (work.view.size_px + TILE_PX - 1u) / TILE_PX;
-    if id.x >= tiles.x || id.y >= tiles.y { return; }
-    let middle = (vec2f(id.xy) + 0.5) * f32(TILE_PX);
+    let tile = vec2u(id.x, id.y + first_row() / TILE_PX);
+    if tile.x >= tiles.x || tile.y * TILE_PX >= end_row() { return; }
+    let middle = (vec2f(tile) + 0.5) * f32(TILE_PX);
     let direction = work.view.column_in_world * middle.x + work.view.row_in_world * middle.y + work.view.corner_in_world;
     // Half a tile's diagonal at depth 1, and a little for rounding.
     let slope = (HALF_DIAGONAL * f32(TILE_PX)) / work.view.focal_px;
@@ -55,7 +56,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let a{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
     let b{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f(direction, 0.0));
 {% endfor %}
-    var t = entry(id.xy);
+    var t = entry(tile);
     var stride = GREATEST_TILE_MOVE;
     for (var i = 0u; i < MAX_TILE_MOVES && t < far && stride > LEAST_TILE_MOVE; i++) {
         let t_end = t * stride;
@@ -70,7 +71,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         t = select(t, t_end, free);
         stride = select(0.5 + 0.5 * stride, min(1.0 + (stride - 1.0) * 1.5, GREATEST_TILE_MOVE), free);
     }
-    tile_start_m[work.view.first_tile + id.y * tiles.x + id.x] = t;
+    tile_start_m[work.view.first_tile + tile.y * tiles.x + tile.x] = t;
 }
 
 // The least parameter at which a corner ray of the tile enters the volume. A corner ray that misses it counts with the

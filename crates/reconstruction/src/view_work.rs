@@ -1,5 +1,7 @@
 //! The uniform of a view in passes over sample cameras: `view_work.wgsl`. A test compares layouts with the WGSL.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
@@ -14,7 +16,7 @@ pub(crate) const TILE_PX: u32 = 8;
 pub(crate) const FAR_AWAY: f32 = 3.0e38;
 /// Positions in an image are kept this far from the border of the last cell.
 pub(crate) const CELL_MARGIN_PX: f32 = 0.01;
-/// Each dispatch sees one view of a batch.
+/// Each dispatch sees one piece of a view of a batch.
 pub(crate) const ONE_VIEW: ResourceTraits = &[("work", ResourceTrait::DynamicOffset)];
 
 /// Switches of shaders that include `view_work.wgsl`.
@@ -72,7 +74,7 @@ pub(crate) struct GpuViewCamera {
     pub first_tile: u32,
     pub size_px: [u32; 2],
     pub number: u32,
-    pub padding: u32,
+    pub rows: u32,
 }
 
 /// `ViewWork` of the shader, up to its cameras.
@@ -98,6 +100,11 @@ pub(crate) fn tiles_of(size_px: UVec2) -> UVec2 {
     size_px.map(|side| side.div_ceil(TILE_PX))
 }
 
+/// A view's rows in one word; a side of a view has less than 16 bits.
+pub(crate) fn rows_of(rows: Range<u32>) -> u32 {
+    rows.start | rows.end << 16
+}
+
 impl GpuViewCamera {
     /// The camera of the `number`-th view of a batch.
     pub fn of(camera: &PinholeCamera, number: u32) -> Self {
@@ -115,7 +122,7 @@ impl GpuViewCamera {
             first_tile: number * tiles_of(camera.size_px).element_product(),
             size_px: camera.size_px.to_array(),
             number,
-            padding: 0,
+            rows: rows_of(0..camera.size_px.y),
         }
     }
 }

@@ -40,12 +40,13 @@ struct ViewCamera {
     corner_in_world: vec3f,
     first_tile: u32,
     size_px: vec2u,
-    // This view's number in the batch.
+    // A piece of a view is some of its rows. This piece's number in the batch, and its rows: the first, a multiple of
+    // TILE_PX, in the low half, and the one after the last in the high half.
     number: u32,
-    padding: u32,
+    rows: u32,
 }
 
-// One dispatch a view: what is the same for a whole dispatch costs nothing a ray. Sample cameras are
+// One dispatch for each piece of a view: what is the same for a whole dispatch costs nothing a ray. Sample cameras are
 // sorted by their distance from the view's eye, so that camera 0 knows most.
 struct ViewWork {
     view: ViewCamera,
@@ -59,6 +60,15 @@ struct ViewWork {
 @group(0) var<uniform> work: ViewWork;
 // Nodes of the pyramids: a range (nearest code low, farthest high), and the nearest code of 2 × 2 nodes.
 @group(0) var nodes: texture_2d<u32>;
+
+fn first_row() -> u32 { return work.view.rows & 0xffffu; }
+fn end_row() -> u32 { return work.view.rows >> 16u; }
+
+// The pixel of an invocation in a pass over all pixels.
+fn pixel_at(id: vec3u) -> vec2u { return vec2u(id.x, id.y + first_row()); }
+
+// Where this piece's list begins among the listed pixels of the batch.
+fn first_listed() -> u32 { return work.view.first_pixel + first_row() * work.view.size_px.x; }
 
 struct Span { near: f32, far: f32 }
 

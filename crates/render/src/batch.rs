@@ -3,9 +3,12 @@
 use std::{ops::Range, sync::Arc};
 
 use depth_image::PinholeCamera;
-use gpu::{BufferPool, Frame, Gpu, PassCache};
+use gpu::{BufferPool, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVariant, WorkKind};
+
+use wgpu::BindGroup;
 
 use crate::accumulation::{Key, Sums};
+use crate::pieces::{Piece, Pieces};
 use crate::pixel_camera::{PixelCamera, uniform};
 use crate::{Rate, known_samples::ImageSequence, planes::Output, rays::Traced, work::DrawWork};
 
@@ -15,6 +18,8 @@ const OCCLUSION_OF_DIAGONAL: f32 = 0.05;
 /// 65,535 turns together, and a GPU may take a long dispatch for a hung one.
 const RAYS_A_DISPATCH: u32 = 32;
 const CAMERAS_A_SUBMISSION: usize = 32;
+/// The rays of a slice of pictures whose cost is unknown; a pixel counts as one more.
+const UNKNOWN_SLICE_RAYS: u64 = 1 << 14;
 
 /// One submission's work, once it is known how surfaces are found.
 pub(crate) struct Batch<'a> {
@@ -28,13 +33,23 @@ pub(crate) struct Batch<'a> {
     pub sequence: Option<ImageSequence<'a>>,
 }
 
+/// Some rays of each pixel.
+pub(crate) struct Part {
+    /// To each lamp, and of occlusion.
+    pub rays: [u32; 2],
+    /// A uniform of the pieces.
+    pub cameras: wgpu::Buffer,
+}
+
 /// A batch whose passes are being recorded.
 pub(crate) struct Recording<'a> {
     pub gpu: &'a Gpu,
     pub passes: &'a PassCache,
     pub pool: &'a BufferPool,
     pub batch: &'a Batch<'a>,
-    /// A uniform of the batch's cameras.
+    /// The pictures, as dispatches make them.
+    pub pieces: Pieces,
+    /// A uniform of the batch's cameras, with an element for each piece.
     pub cameras: wgpu::Buffer,
     pub sums: Sums,
     /// Receives node visits and triangle tests of each pixel, of a single camera.
@@ -59,13 +74,37 @@ impl Batch<'_> {
         Key { scene: scene.identity, lighting, scene_time_s, cameras, by_rays, output, redundancy }
     }
 
-    /// A uniform of the cameras with their places in the batch's planes, for each part of the rays.
-    pub fn parts(&self, gpu: &Gpu, sums: &Sums) -> Vec<wgpu::Buffer> {
-        parts_of(&sums.rays).into_iter().map(|part| self.uniform(gpu, sums, part)).collect()
+    /// The family of the passes over pixels, whose costs are learned.
+    pub fn family(&self) -> u64 {
+        let DrawWork { scene, lighting, .. } = self.work;
+        WorkKind::family(&("draw", scene.identity, format!("{lighting:?}"), self.by_rays, self.output))
+    }
+
+    /// The pixels of a slice of pictures whose cost is unknown.
+    pub fn unknown_slice_px(&self) -> u64 {
+        let DrawWork { scene, lighting, .. } = self.work;
+        let [shadow, occlusion] =
+            [lighting.shadow_rays(), lighting.occlusion_rays()].map(|rays| u64::from(rays.min(RAYS_A_DISPATCH)));
+        UNKNOWN_SLICE_RAYS / (1 + shadow * scene.light_count as u64 + occlusion)
+    }
+
+    /// A uniform of the pieces with their cameras' places in the batch's planes, for each part of the rays.
+    pub fn parts(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums) -> Vec<Part> {
+        let part = |rays: [Range<u32>; 2]| Part {
+            rays: rays.each_ref().map(|rays| rays.len() as u32),
+            cameras: self.uniform(gpu, pieces, sums, rays),
+        };
+        parts_of(&sums.rays).into_iter().map(part).collect()
     }
 
     /// The same for these rays.
-    pub fn uniform(&self, gpu: &Gpu, sums: &Sums, [shadow, occlusion]: [Range<u32>; 2]) -> wgpu::Buffer {
+    pub fn uniform(
+        &self,
+        gpu: &Gpu,
+        pieces: &Pieces,
+        sums: &Sums,
+        [shadow, occlusion]: [Range<u32>; 2],
+    ) -> wgpu::Buffer {
         let DrawWork { scene, lighting, .. } = self.work;
         let radius_m = lighting.occlusion.and_then(|occlusion| occlusion.radius_m);
         let diagonal_m = scene.bounds_in_world.size().length();
@@ -90,7 +129,44 @@ impl Batch<'_> {
             first_sum += placed.pixel_count * sum_planes;
             placed
         };
-        uniform(gpu, "pixel cameras", self.cameras.iter().map(place))
+        let placed: Vec<PixelCamera> = self.cameras.iter().map(place).collect();
+        let of_piece =
+            |&Piece { camera, first_row, end_row }: &Piece| PixelCamera { first_row, end_row, ..placed[camera] };
+        uniform(gpu, "pixel cameras", pieces.all.iter().map(of_piece))
+    }
+}
+
+impl Recording<'_> {
+    /// Records a dispatch of a pass over all pixels of a picture, or over each `step_px`-th in both directions.
+    pub fn dispatch(
+        &mut self,
+        variant: &impl ShaderVariant,
+        pass: &ComputePass,
+        groups: &[&BindGroup],
+        (camera, step_px): (usize, u32),
+    ) {
+        let kind = WorkKind::new(self.batch.family(), &variant.name());
+        self.dispatch_pieces(kind, pass, camera, |_, piece, width_px| {
+            let [columns, rows] = [width_px, piece.end_row - piece.first_row].map(|side| side.div_ceil(step_px));
+            (groups.to_vec(), DispatchSize::Invocations([columns, rows, 1]))
+        });
+    }
+
+    /// Records a dispatch for each piece of a picture: `of_piece` gives its groups and its size, for its place among the
+    /// picture's, and the width.
+    pub fn dispatch_pieces<'b>(
+        &mut self,
+        kind: WorkKind,
+        pass: &ComputePass,
+        camera: usize,
+        of_piece: impl Fn(usize, Piece, u32) -> (Vec<&'b BindGroup>, DispatchSize<'b>),
+    ) {
+        let width_px = self.batch.cameras[camera].size_px.x;
+        for (place, (element, piece)) in self.pieces.of_camera(camera).enumerate() {
+            let (groups, size) = of_piece(place, piece, width_px);
+            pass.dispatch_each(&mut self.frame, &groups, element..element + 1, size);
+            self.frame.cut(kind, u64::from(width_px) * u64::from(piece.end_row - piece.first_row));
+        }
     }
 }
 

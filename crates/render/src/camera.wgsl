@@ -25,9 +25,17 @@ struct PixelCamera {
     tolerance: f32,
     // The first pixel, from where the forward axis meets the image; wraps.
     first_from_axis: vec2u,
+    // This dispatch's rows of the picture: the first, a multiple of 8, and the one after the last.
+    first_row: u32,
+    end_row: u32,
 }
 
 @group(0) var<uniform> camera: PixelCamera;
+
+// The pixel of an invocation over every `step`-th pixel of some rows. Beyond them where it has none.
+fn pixel_at(id: vec3u, step: u32) -> vec2u { return vec2u(id.x, id.y) * step + vec2u(0u, camera.first_row); }
+
+fn is_beyond(pixel: vec2u) -> bool { return pixel.x >= camera.size_px.x || pixel.y >= camera.end_row; }
 
 fn direction_of(pixel: vec2u) -> vec3f {
     let center = vec2f(pixel) + 0.5;

@@ -72,7 +72,7 @@ impl ShaderVariant for Finish {
 
 /// Records one dispatch for each camera; gives the words of all planes.
 pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces]) -> Result<PooledBuffer, RenderError> {
-    let Recording { passes, gpu, pool, batch, cameras, sums, frame, .. } = recording;
+    let Recording { passes, gpu, pool, batch, .. } = recording;
     let bytes = batch.bytes(batch.output.layout().count);
     gpu.check_storage_bytes("the planes of a batch (bytes)", bytes)?;
     let words = pool.lend_storage("planes", bytes.max(4));
@@ -81,10 +81,11 @@ pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces]) -> Re
     let [r, g, b] = batch.work.scene.background_linear.to_array();
     let view_cell_m = batch.sequence.map_or(0.0, |sequence| sequence.known.view_cell_m);
     let finish = gpu.buffer_with("finish", &[r, g, b, view_cell_m], BufferUsages::UNIFORM);
-    let buffers: [&Buffer; 5] = [cameras, &words, &sums.buffer, &finish, &batch.work.scene.illumination];
-    for (element, target) in (0..).zip(surfaces) {
+    for (camera, target) in surfaces.iter().enumerate() {
+        let Recording { batch, cameras, sums, .. } = recording;
+        let buffers: [&Buffer; 5] = [cameras, &words, &sums.buffer, &finish, &batch.work.scene.illumination];
         let own = pass.bind(0, bindings(&variant, buffers, target))?;
-        pass.dispatch_each(frame, &[&own], element..element + 1, target.invocations(1));
+        recording.dispatch(&variant, &pass, &[&own], (camera, 1));
     }
     Ok(words)
 }

@@ -52,15 +52,16 @@ fn visibility_word(word: u32, place: u32) -> u32 {
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= camera.size_px) { return; }
-    let place = place_of(id.xy);
-    let depth = reversed_depth_at(id.xy);
-    let surface = surface_at(id.xy);
+    let pixel = pixel_at(id, 1u);
+    if is_beyond(pixel) { return; }
+    let place = place_of(pixel);
+    let depth = reversed_depth_at(pixel);
+    let surface = surface_at(pixel);
     var met = depth > 0.0;
 {% if redundancy %}
-    let front = front_at(id.xy);
+    let front = front_at(pixel);
 {% if usefulness_test %}
-    for (var hidden = met && front > depth; hidden; hidden = false) { met = is_useful(id.xy, depth, front); }
+    for (var hidden = met && front > depth; hidden; hidden = false) { met = is_useful(pixel, depth, front); }
 {% endif %}
 {% endif %}
     var light = vec3f(1.0);
@@ -70,7 +71,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var linear = albedo_linear(surface.x) * light + linear_from_rgb9e5(surface.y);
 {% if highlight %}
     for (var glossy = met && surface.w != 0u; glossy; glossy = false) {
-        let direction = direction_of(id.xy);
+        let direction = direction_of(pixel);
         let point = camera.eye_in_world + direction * (camera.near_m / depth);
         var visibility: VisibilityWords;
 {% for word in range(visibility_words) %}        visibility[{{ word }}] = visibility_word({{ word }}u, place);
@@ -98,7 +99,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% endfor %}
 {% endif %}
 {% if surface_id %}
-    let ids = select(vec2u(0u), textureLoad(surface_ids, id.xy, 0).xy, met);
+    let ids = select(vec2u(0u), textureLoad(surface_ids, pixel, 0).xy, met);
     put({{ id_plane }}u, place, ids.x);
     put({{ id_plane + 1 }}u, place, ids.y);
 {% endif %}

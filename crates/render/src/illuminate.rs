@@ -1,12 +1,16 @@
 //! Light of lamps and the environment, summed over rays.
 
-use gpu::{Binding, ResourceTraits, ShaderVariant, switches};
+use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
 use crate::rays::Traversal;
 use crate::{
-    Direct, RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, pixel_list::PixelList, sums::SumPlanes,
+    Direct, RenderError,
+    batch::{Part, Recording},
+    pixel_camera::CAMERA_TRAITS,
+    pixel_list::PixelList,
+    sums::SumPlanes,
     surfaces::Surfaces,
 };
 
@@ -82,39 +86,48 @@ impl ShaderVariant for Illuminate {
     }
 }
 
-/// Records one dispatch for each of these cameras and part of the rays, which has a uniform of all cameras. Lit are all
-/// pixels of a list, or else those `step_px` apart.
+/// Records one dispatch for each piece of these cameras and part of the rays. Lit are all pixels of a list for each piece of
+/// the one camera, or else those `step_px` apart.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
-    parts: &[Buffer],
-    (first, surfaces): (u32, &[Surfaces]),
-    (step_px, list): (u32, Option<&PixelList>),
+    parts: &[Part],
+    (first, surfaces): (usize, &[Surfaces]),
+    (step_px, lists): (u32, Option<&[PixelList]>),
 ) -> Result<(), RenderError> {
-    let Recording { passes, batch, sums, frame, .. } = recording;
+    let batch = recording.batch;
     let lighting = batch.work.lighting;
     let traced = batch.traced.as_deref().filter(|_| lighting.is_traced());
-    for (part, cameras) in parts.iter().enumerate() {
-        let pass = passes.get(&Illuminate {
+    for (number, part) in parts.iter().enumerate() {
+        let variant = Illuminate {
             by_rays: batch.by_rays,
             step_px,
-            listed: list.is_some(),
+            listed: lists.is_some(),
             shadow_rays: match lighting.direct {
                 Direct::Unlit | Direct::Phong => ShadowRays::None,
                 Direct::Shadows => ShadowRays::One,
                 Direct::Soft(_) => ShadowRays::Many,
             },
             occluded: lighting.occlusion.is_some(),
-            continued: part > 0 || sums.rays.iter().any(|rays| rays.start > 0),
+            continued: number > 0 || recording.sums.rays.iter().any(|rays| rays.start > 0),
             sums: batch.output.sums,
             traversal: traced.map(Traversal::of),
-        })?;
+        };
+        let pass = recording.passes.get(&variant)?;
         let rays = traced.map(|traced| pass.bind(1, traced.bindings())).transpose()?;
-        for (element, target) in (first..).zip(surfaces) {
-            let buffers = [cameras, &batch.work.scene.illumination, &sums.buffer];
-            let own = pass.bind(0, bindings(buffers, list, target))?;
-            let groups: Vec<_> = std::iter::once(&own).chain(&rays).collect();
-            let size = list.map_or(target.invocations(step_px), PixelList::size);
-            pass.dispatch_each(frame, &groups, element..element + 1, size);
+        let kind = WorkKind::new(batch.family(), &(variant.name(), part.rays));
+        for (camera, target) in (first..).zip(surfaces) {
+            let buffers = [&part.cameras, &batch.work.scene.illumination, &recording.sums.buffer];
+            let bind = |list| pass.bind(0, bindings(buffers, list, target));
+            let own = match lists {
+                Some(lists) => lists.iter().map(|list| bind(Some(list))).collect::<Result<Vec<_>, _>>()?,
+                None => vec![bind(None)?],
+            };
+            recording.dispatch_pieces(kind, &pass, camera, |place, piece, width_px| {
+                let [columns, rows] = [width_px, piece.end_row - piece.first_row].map(|side| side.div_ceil(step_px));
+                let all = DispatchSize::Invocations([columns, rows, 1]);
+                let (own, size) = lists.map_or((&own[0], all), |lists| (&own[place], lists[place].size()));
+                (std::iter::once(own).chain(&rays).collect(), size)
+            });
         }
     }
     Ok(())
@@ -146,7 +159,7 @@ mod tests {
     fn every_variant_is_bound_by_its_names() {
         let stage = TestStage::new();
         let (traced, buffer) = (stage.scene.rays.at(0.0).expect("a tree"), &stage.buffer);
-        let list = PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), &stage.surfaces(false, false));
+        let list = PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), 1);
         for variant in Illuminate::all() {
             let target = stage.surfaces(variant.by_rays, false);
             stage.check(&variant, 0, &bindings([buffer; 3], variant.listed.then_some(&list), &target));

@@ -140,8 +140,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% else %}
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let pixel = id.xy * {{ step_px }}u;
-    if any(pixel >= camera.size_px) { return; }
+    let pixel = pixel_at(id, {{ step_px }}u);
+    if is_beyond(pixel) { return; }
     light_pixel(pixel);
 }
 {% endif %}

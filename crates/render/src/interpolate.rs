@@ -1,6 +1,6 @@
 //! Light between pixels that have it; the pixels where it would be wrong are listed.
 
-use gpu::{Binding, ResourceTraits, ShaderVariant, switches};
+use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, switches};
 use minijinja::{Value, context};
 
 use crate::{
@@ -34,18 +34,26 @@ impl ShaderVariant for Interpolate {
     }
 }
 
-/// Records the pass of one camera: pixels `step_px` apart are filled in from those twice as far apart, or listed.
+/// Records the pass of one camera: pixels `step_px` apart are filled in from those twice as far apart, or listed,
+/// in a list for each piece.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
-    (element, target): (u32, &Surfaces),
+    (camera, target): (usize, &Surfaces),
     step_px: u32,
-    list: &PixelList,
+    lists: &[PixelList],
 ) -> Result<(), RenderError> {
-    let Recording { passes, batch, cameras, sums, frame, .. } = recording;
-    let sum_planes = batch.output.sums.count();
-    let pass = passes.get(&Interpolate { by_rays: batch.by_rays, step_px, sum_planes })?;
-    let own = [Binding::buffer("camera", cameras), Binding::buffer("sums", &sums.buffer)];
-    let bound = pass.bind(0, own.into_iter().chain(target.bindings()).chain(list.bindings()))?;
-    pass.dispatch_each(frame, &[&bound], element..element + 1, target.invocations(step_px));
+    let Recording { passes, batch, cameras, sums, .. } = recording;
+    let variant = Interpolate { by_rays: batch.by_rays, step_px, sum_planes: batch.output.sums.count() };
+    let pass = passes.get(&variant)?;
+    let bound = lists.iter().map(|list| {
+        let own = [Binding::buffer("camera", cameras), Binding::buffer("sums", &sums.buffer)];
+        pass.bind(0, own.into_iter().chain(target.bindings()).chain(list.bindings()))
+    });
+    let bound = bound.collect::<Result<Vec<_>, _>>()?;
+    let kind = WorkKind::new(batch.family(), &variant.name());
+    recording.dispatch_pieces(kind, &pass, camera, |place, piece, width_px| {
+        let [columns, rows] = [width_px, piece.end_row - piece.first_row].map(|side| side.div_ceil(step_px));
+        (vec![&bound[place]], DispatchSize::Invocations([columns, rows, 1]))
+    });
     Ok(())
 }

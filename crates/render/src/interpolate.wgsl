@@ -29,15 +29,16 @@ fn is_same_surface(point: vec3f, normal: vec3f, footprint_m: f32, other: vec2u) 
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let pixel = id.xy * STEP;
-    if any(pixel >= camera.size_px) { return; }
+    let pixel = pixel_at(id, STEP);
+    if is_beyond(pixel) { return; }
+    let at = pixel / STEP;
     let place = place_of(pixel);
     let depth = reversed_depth_at(pixel);
-    if all((id.xy & vec2u(1u)) == vec2u(0u)) || depth <= 0.0 { return; }
+    if all((at & vec2u(1u)) == vec2u(0u)) || depth <= 0.0 { return; }
     let z = camera.near_m / depth;
     let point = camera.eye_in_world + direction_of(pixel) * z;
     let normal = unit_from_oct16(surface_at(pixel).z);
-    let low = (id.xy & vec2u(0xfffffffeu)) * STEP;
+    let low = (at & vec2u(0xfffffffeu)) * STEP;
     let high = min(low + 2u * STEP, camera.size_px - 1u);
     var agree = all(low + 2u * STEP < camera.size_px);
     var least = vec3f(3.0e38);

@@ -23,15 +23,16 @@ impl ShaderVariant for Keep {
     }
 }
 
-/// Records the pass of one image, whose camera is the `element`-th of the batch, into a layer of known samples.
+/// Records the pass of one image, whose camera is the `camera`-th of the batch, into a layer of known samples.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
-    (element, target): (u32, &Surfaces),
+    (camera, target): (usize, &Surfaces),
     held: &wgpu::TextureView,
 ) -> Result<(), RenderError> {
-    let pass = recording.passes.get(&Keep { by_rays: recording.batch.by_rays })?;
+    let variant = Keep { by_rays: recording.batch.by_rays };
+    let pass = recording.passes.get(&variant)?;
     let own = [Binding::buffer("camera", &recording.cameras), Binding::texture("held", held)];
     let bound = pass.bind(0, own.into_iter().chain(target.bindings()))?;
-    pass.dispatch_each(&mut recording.frame, &[&bound], element..element + 1, target.invocations(1));
+    recording.dispatch(&variant, &pass, &[&bound], (camera, 1));
     Ok(())
 }

@@ -9,12 +9,13 @@
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= camera.size_px) { return; }
-    let inverse_depth = reversed_depth_at(id.xy) / camera.near_m;
-    let normal = unit_from_oct16(surface_at(id.xy).z);
-    let footprint_m = stretched_footprint(1.0 / max(inverse_depth, 1e-30), camera.footprint, normal, direction_of(id.xy));
+    let pixel = pixel_at(id, 1u);
+    if is_beyond(pixel) { return; }
+    let inverse_depth = reversed_depth_at(pixel) / camera.near_m;
+    let normal = unit_from_oct16(surface_at(pixel).z);
+    let footprint_m = stretched_footprint(1.0 / max(inverse_depth, 1e-30), camera.footprint, normal, direction_of(pixel));
     let sample = vec4u(
         bitcast<u32>(inverse_depth), bitcast<u32>(footprint_m), pack2x16snorm(normal.xy), bitcast<u32>(normal.z),
     );
-    textureStore(held, id.xy, sample);
+    textureStore(held, pixel, sample);
 }

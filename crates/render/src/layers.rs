@@ -10,6 +10,8 @@ use wgpu::{TextureFormat, TextureUsages, TextureView, TextureViewDescriptor, Tex
 pub(crate) struct Layers {
     all: wgpu::Texture,
     pub size_px: UVec2,
+    /// The device's shortages of memory when it was made.
+    shortages: u64,
     /// Each layer, to be written.
     pub each: Vec<TextureView>,
 }
@@ -22,8 +24,9 @@ impl LayerCache {
     /// Layers that nobody else uses; they hold what is left over. `size` is columns, rows and layers.
     pub fn of(&self, gpu: &Gpu, size: [u32; 3], format: TextureFormat) -> Arc<Layers> {
         let mut kept = self.0.lock();
-        let fits = |Layers { all, .. }: &Layers| {
+        let fits = |Layers { all, shortages, .. }: &Layers| {
             ([all.width(), all.height(), all.depth_or_array_layers()], all.format()) == (size, format)
+                && *shortages == gpu.shortages()
         };
         match kept.as_ref().filter(|layers| fits(layers) && Arc::strong_count(layers) == 1) {
             Some(layers) => layers.clone(),
@@ -44,7 +47,12 @@ impl Layers {
                 ..Default::default()
             })
         };
-        Self { each: (0..size[2]).map(layer).collect(), size_px: UVec2::new(size[0], size[1]), all }
+        Self {
+            each: (0..size[2]).map(layer).collect(),
+            size_px: UVec2::new(size[0], size[1]),
+            shortages: gpu.shortages(),
+            all,
+        }
     }
 
     /// The first `count` layers, to be read while others are written.

@@ -113,7 +113,8 @@ fn a_pixel_camera_has_the_wgsl_layout() {
         occlusion_radius_m,
         tolerance,
         first_from_axis,
-        padding
+        first_row,
+        end_row
     });
     assert_eq!(shader(&parsed(&Keep::all().remove(0)), "PixelCamera"), host);
 }

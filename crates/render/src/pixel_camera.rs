@@ -31,7 +31,9 @@ pub(crate) struct PixelCamera {
     pub tolerance: f32,
     /// The first pixel, from where the forward axis meets the image; wraps.
     pub first_from_axis: [u32; 2],
-    pub padding: [u32; 2],
+    /// The rows of a dispatch.
+    pub first_row: u32,
+    pub end_row: u32,
 }
 
 /// The trait of `camera` in all shaders that include `camera.wgsl`.
@@ -62,6 +64,7 @@ impl PixelCamera {
             first_from_axis: (-camera.principal_px).floor().as_ivec2().as_uvec2().to_array(),
             shadow_rays_in_sum: 1,
             occlusion_rays_in_sum: 1,
+            end_row: camera.size_px.y,
             ..Self::zeroed()
         }
     }

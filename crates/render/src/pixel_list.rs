@@ -3,8 +3,6 @@
 use gpu::{Binding, BufferPool, DispatchSize, Gpu, PooledBuffer};
 use wgpu::BufferUsages;
 
-use crate::surfaces::Surfaces;
-
 /// Invocations of a workgroup that lights listed pixels.
 pub(crate) const LIST_WORKGROUP: u32 = 64;
 
@@ -15,9 +13,9 @@ pub(crate) struct PixelList {
 }
 
 impl PixelList {
-    /// An empty list with room for all pixels.
-    pub fn new(gpu: &Gpu, pool: &BufferPool, target: &Surfaces) -> Self {
-        let bytes = 4 * u64::from(target.size_px().element_product());
+    /// An empty list with room for so many pixels.
+    pub fn new(gpu: &Gpu, pool: &BufferPool, pixels: u32) -> Self {
+        let bytes = 4 * u64::from(pixels);
         Self {
             pixels: pool.lend_storage("pixels to be lit", bytes),
             // Workgroups along x, y and z, and the list's length.
@@ -26,7 +24,7 @@ impl PixelList {
     }
 
     pub fn size(&self) -> DispatchSize<'_> {
-        DispatchSize::Indirect(&self.arguments)
+        DispatchSize::Indirect(&self.arguments, 0)
     }
 
     pub fn bindings(&self) -> [Binding<'_>; 2] {

@@ -7,7 +7,7 @@ use depth_image::{Highlight, PinholeCamera};
 use glam::{Mat4, Vec4};
 use gpu::{
     Binding, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ResourceTrait, ResourceTraits, ShaderVariant,
-    Templates, highlight_name, switches, uniform_stride,
+    Templates, WorkKind, highlight_name, switches, uniform_stride,
 };
 use minijinja::{Value, context};
 
@@ -21,6 +21,8 @@ use crate::{
 
 /// The group of known samples.
 const KNOWN_GROUP: u32 = 3;
+/// The indices of a slice of a scene whose cost is unknown.
+const UNKNOWN_SLICE_INDICES: u64 = 3 << 14;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct RasterVariant {
@@ -159,14 +161,34 @@ impl Raster {
         });
         let groups = groups.transpose()?;
         for (place, (camera, target)) in (0..).zip(cameras.iter().zip(surfaces)) {
+            let view = View { scene, place, camera, groups: groups.as_ref() };
             if predecessors.is_some() {
-                let mut pass = begin_pass(frame, &[], &target.views.front_depth);
-                self.draw(&mut pass, scene, front, (place, camera), groups.as_ref())?;
+                self.draw_in_slices(frame, &view, front, &[], &target.views.front_depth)?;
             }
-            let colors: Vec<_> =
-                std::iter::once(&target.views.surfaces).chain(&target.surface_ids).map(attachment).map(Some).collect();
-            let mut pass = begin_pass(frame, &colors, &target.views.reversed_depth);
-            self.draw(&mut pass, scene, shown, (place, camera), groups.as_ref())?;
+            let colors: Vec<_> = std::iter::once(&target.views.surfaces).chain(&target.surface_ids).collect();
+            self.draw_in_slices(frame, &view, shown, &colors, &target.views.reversed_depth)?;
+        }
+        Ok(())
+    }
+
+    /// Draws a view in passes that each take about a slice: what is drawn stays in the targets.
+    fn draw_in_slices(
+        &self,
+        frame: &mut Frame<'_>,
+        view: &View<'_>,
+        variant: RasterVariant,
+        colors: &[&wgpu::TextureView],
+        reversed_depth: &wgpu::TextureView,
+    ) -> Result<(), RenderError> {
+        let family = WorkKind::family(&("raster", view.scene.identity, view.camera.size_px));
+        let runs = visible_runs(view.scene, &Frustum::of(view.camera));
+        let a_slice = self.gpu.device_queue.slice_units(family, UNKNOWN_SLICE_INDICES);
+        for (number, runs) in slices(runs, a_slice).into_iter().enumerate() {
+            let mut pass = begin_pass(frame, colors, reversed_depth, number == 0);
+            self.draw(&mut pass, view, variant, &runs)?;
+            drop(pass);
+            let indices = runs.iter().map(|run| run.indices.len() as u64).sum();
+            frame.cut(WorkKind::new(family, &variant), indices);
         }
         Ok(())
     }
@@ -174,10 +196,9 @@ impl Raster {
     fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        scene: &GpuScene,
+        &View { scene, place, camera, groups }: &View<'_>,
         variant: RasterVariant,
-        (place, camera): (u32, &PinholeCamera),
-        groups: Option<&Groups>,
+        runs: &[Run],
     ) -> Result<(), RenderError> {
         let Some(groups) = groups else { return Ok(()) };
         // Layers of a set are as large as its largest image.
@@ -190,7 +211,7 @@ impl Raster {
             pass.set_bind_group(KNOWN_GROUP, known, &[]);
         }
         let (mut material, mut texture, mut object) = (None, None, None);
-        for run in visible_runs(scene, &Frustum::of(camera)) {
+        for run in runs {
             let draw = &scene.draws[run.draw];
             if material.replace(draw.material) != Some(draw.material) {
                 let variant = RasterVariant { material: draw.material, ..variant };
@@ -203,7 +224,7 @@ impl Raster {
                 pass.set_bind_group(2, &groups.textures[draw.texture as usize], &[]);
             }
             let first_primitive = run.indices.start / 3;
-            pass.draw_indexed(run.indices, draw.base_vertex, first_primitive..first_primitive + 1);
+            pass.draw_indexed(run.indices.clone(), draw.base_vertex, first_primitive..first_primitive + 1);
         }
         Ok(())
     }
@@ -253,7 +274,17 @@ impl RasterCamera {
     }
 }
 
+/// A camera of a batch, and what is drawn into its targets.
+struct View<'r> {
+    scene: &'r GpuScene,
+    /// Among the cameras that are drawn together.
+    place: u32,
+    camera: &'r PinholeCamera,
+    groups: Option<&'r Groups>,
+}
+
 /// Neighbouring clusters drawn in one call, and the first of them.
+#[derive(Debug, Clone, PartialEq, Eq)]
 struct Run {
     draw: usize,
     indices: Range<u32>,
@@ -271,6 +302,26 @@ fn visible_runs(scene: &GpuScene, frustum: &Frustum) -> Vec<Run> {
         }
     }
     runs
+}
+
+/// Runs in their order, cut where a slice has so many indices; one slice at least.
+fn slices(runs: Vec<Run>, most_indices: u64) -> Vec<Vec<Run>> {
+    let most = (most_indices / 3 * 3).clamp(3, u32::MAX.into()) as u32 / 3 * 3;
+    let (mut slices, mut room) = (vec![Vec::new()], most);
+    for Run { draw, indices } in runs {
+        let mut first = indices.start;
+        while first < indices.end {
+            if room == 0 {
+                slices.push(Vec::new());
+                room = most;
+            }
+            let end = first.saturating_add(room).min(indices.end);
+            room -= end - first;
+            slices.last_mut().into_iter().for_each(|slice| slice.push(Run { draw, indices: first..end }));
+            first = end;
+        }
+    }
+    slices
 }
 
 /// Reversed depth: `near / planar depth`, 1 at the near plane and 0 at infinity.
@@ -297,24 +348,46 @@ const CLEAR: wgpu::Color = {
     wgpu::Color { r: word, g: word, b: word, a: word }
 };
 
-fn attachment(view: &wgpu::TextureView) -> wgpu::RenderPassColorAttachment<'_> {
-    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(CLEAR), store: wgpu::StoreOp::Store };
-    wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops }
-}
-
-/// A pass that clears its targets.
+/// A pass over targets, which the first clears.
 fn begin_pass<'f>(
     frame: &'f mut Frame<'_>,
-    colors: &[Option<wgpu::RenderPassColorAttachment<'_>>],
+    colors: &[&wgpu::TextureView],
     reversed_depth: &wgpu::TextureView,
+    is_first: bool,
 ) -> wgpu::RenderPass<'f> {
-    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store };
+    let ops = wgpu::Operations { load: first_or_kept(is_first, CLEAR), store: wgpu::StoreOp::Store };
+    let color = |&view| Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops });
+    let ops = wgpu::Operations { load: first_or_kept(is_first, 0.0), store: wgpu::StoreOp::Store };
     let depth =
         wgpu::RenderPassDepthStencilAttachment { view: reversed_depth, depth_ops: Some(ops), stencil_ops: None };
     frame.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: Some("raster"),
-        color_attachments: colors,
+        color_attachments: &colors.iter().map(color).collect::<Vec<_>>(),
         depth_stencil_attachment: Some(depth),
         ..Default::default()
     })
+}
+
+fn first_or_kept<V>(is_first: bool, clear: V) -> wgpu::LoadOp<V> {
+    if is_first { wgpu::LoadOp::Clear(clear) } else { wgpu::LoadOp::Load }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slices_hold_all_triangles_in_their_order() {
+        let runs =
+            vec![Run { draw: 0, indices: 0..30 }, Run { draw: 4, indices: 60..63 }, Run { draw: 5, indices: 63..99 }];
+        let primitives = |slices: &[Vec<Run>]| -> Vec<(usize, u32)> {
+            slices.iter().flatten().flat_map(|run| run.indices.clone().map(|index| (run.draw, index))).collect()
+        };
+        assert_eq!(slices(runs.clone(), u64::MAX), [runs.clone()]);
+        let cut = slices(runs.clone(), 13);
+        assert_eq!(primitives(&cut), primitives(&[runs]));
+        let sizes: Vec<usize> = cut.iter().map(|runs| runs.iter().map(|run| run.indices.len()).sum()).collect();
+        assert_eq!(sizes, [12, 12, 12, 12, 12, 9]);
+        assert_eq!(slices(Vec::new(), 3), [Vec::new()], "an empty view is cleared");
+    }
 }

@@ -2,15 +2,18 @@
 
 use std::{slice, sync::Arc};
 
-use gpu::{BufferPool, Frame, FrameResult, Gpu, PassCache, Readback, Templates};
-use parking_lot::Mutex;
+use gpu::{BufferPool, Frame, FrameResult, Gpu, JobLimit, PassCache, Readback, Templates};
 
 use crate::accumulation::{Accumulations, Sums};
 use crate::batch::{Batch, Recording};
 use crate::known_samples::{ImageSequence, Predecessors};
+use crate::pieces::{Piece, Pieces};
 use crate::surfaces::{SurfaceKind, SurfacePool, Surfaces};
 use crate::{Rate, RenderError, finish, illuminate, interpolate, keep, pixel_list::PixelList, raster::Raster};
 use crate::{rays::primary, redundancy_test::Evidence};
+
+/// Batches of one class that are under way at once: each holds memory for its surfaces, light and planes.
+const BATCHES_OF_A_CLASS: usize = 2;
 
 /// The passes of drawing, and the memory that they share.
 pub(crate) struct Stages {
@@ -20,8 +23,7 @@ pub(crate) struct Stages {
     accumulations: Accumulations,
     raster: Raster,
     passes: PassCache,
-    /// One batch at a time: the device makes no more of two, and memory holds one.
-    drawing: Mutex<()>,
+    batches: JobLimit,
 }
 
 impl Stages {
@@ -33,7 +35,7 @@ impl Stages {
             accumulations: Accumulations::default(),
             raster: Raster::new(gpu, templates),
             passes: PassCache::new(gpu, templates),
-            drawing: Mutex::default(),
+            batches: JobLimit::of(BATCHES_OF_A_CLASS),
         }
     }
 
@@ -43,19 +45,22 @@ impl Stages {
         batch: &Batch<'_>,
         visit_counts: Option<&wgpu::Buffer>,
     ) -> Result<(FrameResult, Readback), RenderError> {
-        let _one = self.drawing.lock();
+        let turn = batch.work.turn;
+        let _one = self.batches.begin(turn.class);
         let sums = self.sums(batch)?;
-        let cameras = batch.uniform(&self.gpu, &sums, sums.rays.clone());
         let Self { gpu, passes, pool, .. } = self;
-        let frame = Frame::begin(gpu, "draw");
-        let mut recording = Recording { gpu, passes, pool, batch, cameras, sums, visit_counts, frame };
+        let slice_px = gpu.device_queue.slice_units(batch.family(), batch.unknown_slice_px());
+        let pieces = Pieces::of(batch.cameras, slice_px);
+        let cameras = batch.uniform(gpu, &pieces, &sums, sums.rays.clone());
+        let frame = Frame::begin(gpu, "draw", turn);
+        let mut recording = Recording { gpu, passes, pool, batch, pieces, cameras, sums, visit_counts, frame };
         let surfaces = self.find_surfaces(&mut recording)?;
         let lists = self.light(&mut recording, &surfaces)?;
         let words = finish::record(&mut recording, &surfaces)?;
         let Recording { sums, mut frame, .. } = recording;
         let bytes = batch.bytes(batch.output.layout().count);
         let read = frame.read_back(&words, 0..bytes, pool.lend_host("planes read-back", bytes.max(4)));
-        let result = frame.submit().wait()?;
+        let result = frame.submit()?.wait()?;
         drop((surfaces, lists, words));
         if batch.work.refinement.goes_on() {
             self.accumulations.put(batch.key(), sums);
@@ -97,7 +102,7 @@ impl Stages {
             let predecessors = (earlier > 0).then(|| sequence.known.predecessors(&self.gpu, earlier, camera));
             self.find(recording, (place, slice::from_ref(target)), predecessors.as_ref())?;
             if let Some((held, _)) = sequence.layer(place, Evidence::Samples) {
-                keep::record(recording, (place as u32, target), held)?;
+                keep::record(recording, (place, target), held)?;
             }
         }
         Ok(())
@@ -137,21 +142,28 @@ impl Stages {
         if !batch.work.lighting.is_lit() {
             return Ok(lists);
         }
-        let parts = batch.parts(&self.gpu, &recording.sums);
+        let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
         if batch.work.lighting.rate == Rate::Full {
             illuminate::record(recording, &parts, (0, surfaces), (1, None))?;
             return Ok(lists);
         }
         illuminate::record(recording, &parts, (0, surfaces), (illuminate::GRID_PX, None))?;
         for halvings in 1..=illuminate::GRID_PX.ilog2() {
-            for (element, target) in (0..).zip(surfaces) {
-                let list = PixelList::new(&self.gpu, &self.pool, target);
-                interpolate::record(recording, (element, target), illuminate::GRID_PX >> halvings, &list)?;
-                let own = (element, slice::from_ref(target));
-                illuminate::record(recording, &parts, own, (1, Some(&list)))?;
-                lists.push(list);
+            for (camera, target) in surfaces.iter().enumerate() {
+                let own = self.lists(recording, camera);
+                interpolate::record(recording, (camera, target), illuminate::GRID_PX >> halvings, &own)?;
+                illuminate::record(recording, &parts, (camera, slice::from_ref(target)), (1, Some(&own)))?;
+                lists.extend(own);
             }
         }
         Ok(lists)
+    }
+
+    /// An empty list for each piece of a picture.
+    fn lists(&self, recording: &Recording<'_>, camera: usize) -> Vec<PixelList> {
+        let width_px = recording.batch.cameras[camera].size_px.x;
+        let pixels = |(_, piece): (u32, Piece)| width_px * (piece.end_row - piece.first_row);
+        let pieces = recording.pieces.of_camera(camera);
+        pieces.map(|piece| PixelList::new(&self.gpu, &self.pool, pixels(piece))).collect()
     }
 }

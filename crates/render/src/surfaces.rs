@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::UVec2;
-use gpu::{Binding, DispatchSize, DrawPass, Gpu, Lent, Pool};
+use gpu::{Binding, DrawPass, Gpu, Lent, Pool};
 use wgpu::{TextureFormat, TextureUsages};
 
 /// Words of `packed_surface.wgsl`.
@@ -48,7 +48,7 @@ pub(crate) struct Surfaces {
 
 impl SurfacePool {
     pub fn new(gpu: &Arc<Gpu>) -> Self {
-        Self { gpu: gpu.clone(), surfaces: Pool::keeping(usize::MAX) }
+        Self { gpu: gpu.clone(), surfaces: Pool::of_device(gpu, usize::MAX) }
     }
 
     /// Surface ids are drawn into `own_ids`, which are not lent, where there are any.
@@ -76,21 +76,11 @@ impl SurfacePool {
 }
 
 impl Surfaces {
-    pub fn size_px(&self) -> UVec2 {
-        self.views.kind().size_px
-    }
-
     /// The variables of `surfaces.wgsl`.
     pub fn bindings(&self) -> [Binding<'_>; 2] {
         [
             Binding::texture("surfaces", &self.views.surfaces),
             Binding::texture("reversed_depth", &self.views.reversed_depth),
         ]
-    }
-
-    /// One invocation for each pixel, or for each `step_px`-th in both directions.
-    pub fn invocations(&self, step_px: u32) -> DispatchSize<'static> {
-        let size = self.size_px().map(|side| side.div_ceil(step_px));
-        DispatchSize::Invocations([size.x, size.y, 1])
     }
 }

@@ -1,6 +1,7 @@
 //! Requests to draw, besides the cameras.
 
 use depth_image::Highlight;
+use gpu::Turn;
 
 use crate::{GpuScene, Lighting, Visibility};
 
@@ -16,6 +17,8 @@ pub struct DrawWork<'a> {
     pub visibility: Visibility,
     /// The refinement of a still scene's light.
     pub refinement: Refinement,
+    /// The place in the device's order.
+    pub turn: Turn,
 }
 
 impl DrawWork<'_> {

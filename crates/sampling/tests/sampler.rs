@@ -36,6 +36,7 @@ fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, S
         scene_time_s: 0.0,
         visibility: Visibility::Triangles,
         refinement: Refinement::default(),
+        turn: Default::default(),
     };
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let method = SamplingMethod::Conventional;

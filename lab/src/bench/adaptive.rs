@@ -108,7 +108,14 @@ fn rows(args: &BenchArgs, engine: &GpuEngine, setup: &Setup) -> anyhow::Result<V
 
 fn view(engine: &GpuEngine, scene: &GpuScene, camera: &PinholeCamera, lighting: Lighting) -> anyhow::Result<View> {
     let refinement = Refinement::default();
-    let work = DrawWork { scene, lighting, scene_time_s: 0.0, visibility: Visibility::Measured, refinement };
+    let work = DrawWork {
+        scene,
+        lighting,
+        scene_time_s: 0.0,
+        visibility: Visibility::Measured,
+        refinement,
+        turn: Default::default(),
+    };
     let views = engine.renderer.draw_views(work, &[*camera], ViewPlanes::default())?;
     views.into_iter().next().context("no view")
 }

@@ -93,7 +93,7 @@ fn sample_set_s(
     let cameras: Vec<Camera> = setup.samples.iter().copied().map(Camera::Pinhole).collect();
     let lighting: Lighting = LIGHTING.parse()?;
     let (visibility, refinement) = (Visibility::Measured, Refinement::default());
-    let work = DrawWork { scene, lighting, scene_time_s, visibility, refinement };
+    let work = DrawWork { scene, lighting, scene_time_s, visibility, refinement, turn: Default::default() };
     let draw = |()| {
         engine.renderer.draw_depth_images(work, &cameras, SamplePlanes::default())?;
         Ok(())

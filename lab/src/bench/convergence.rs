@@ -77,7 +77,14 @@ fn draw(
     lighting: Lighting,
 ) -> anyhow::Result<DepthImage> {
     let refinement = Refinement::default();
-    let work = DrawWork { scene, lighting, scene_time_s: 0.0, visibility: Visibility::Rays, refinement };
+    let work = DrawWork {
+        scene,
+        lighting,
+        scene_time_s: 0.0,
+        visibility: Visibility::Rays,
+        refinement,
+        turn: Default::default(),
+    };
     let images = engine.renderer.draw_depth_images(work, &[Camera::Pinhole(*camera)], SamplePlanes::default())?;
     images.into_iter().next().context("no image")
 }

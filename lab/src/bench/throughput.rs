@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::Context as _;
 use cluster::PolicyChoice;
 use depth_image::{PinholeCamera, ViewPlanes};
-use node::{DirectWork, Engine as _};
+use node::{DirectWork, Engine as _, Turn, WorkClass};
 use study::{Bar, Check, Report, Table};
 
 use super::args::BenchArgs;
@@ -76,7 +76,7 @@ fn direct_s_a_view(reference: &ReferenceViews, experiment: &Experiment, runs: us
     };
     let run = || {
         let start = Instant::now();
-        experiment.engine.draw_direct(&work).context("drawing views")?;
+        experiment.engine.draw_direct(&work, Turn::of(WorkClass::Batch)).context("drawing views")?;
         anyhow::Ok(start.elapsed().as_secs_f64() / work.cameras.len() as f64)
     };
     run()?;

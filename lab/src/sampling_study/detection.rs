@@ -40,6 +40,7 @@ pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detecti
             scene_time_s: 0.0,
             visibility: Visibility::Measured,
             refinement: Refinement::default(),
+            turn: Default::default(),
         };
         let mut found = [0.0; 3];
         for (found, test) in found.iter_mut().zip(TESTS) {

@@ -96,6 +96,7 @@ impl Subject {
             scene_time_s: 0.0,
             visibility: Visibility::Measured,
             refinement: Refinement::default(),
+            turn: Default::default(),
         }
     }
 

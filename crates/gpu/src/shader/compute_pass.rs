@@ -19,8 +19,8 @@ pub struct ComputePass {
 pub enum DispatchSize<'b> {
     /// At least this many invocations along x, y and z, in whole workgroups.
     Invocations([u32; 3]),
-    /// The workgroups that the device has written at `16 · n` for the n-th element.
-    Indirect(&'b wgpu::Buffer),
+    /// The workgroups that the device has written at `16 · (first + n)` for the n-th of the elements.
+    Indirect(&'b wgpu::Buffer, u32),
 }
 
 impl ComputePass {
@@ -70,7 +70,9 @@ impl ComputePass {
                     let axis = |axis: usize| invocations[axis].div_ceil(interface.workgroup_size[axis]);
                     pass.dispatch_workgroups(axis(0), axis(1), axis(2));
                 }
-                DispatchSize::Indirect(arguments) => pass.dispatch_workgroups_indirect(arguments, 16 * number),
+                DispatchSize::Indirect(arguments, first) => {
+                    pass.dispatch_workgroups_indirect(arguments, 16 * u64::from(first + number));
+                }
             }
         }
     }

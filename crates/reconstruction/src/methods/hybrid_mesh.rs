@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use gpu::{Binding, shader_variant};
+use gpu::{Binding, Turn, shader_variant};
 
 use crate::quads::{self, Cut, ErrorBound, Mesh, QuadVertices};
 use crate::{device::Device, error::ReconstructionError, sample_set::SampleSet};
@@ -19,11 +19,12 @@ pub(super) fn mesh(
     device: &Device,
     set: &SampleSet,
     merged: Option<ErrorBound>,
+    turn: Turn,
 ) -> Result<Arc<Mesh>, ReconstructionError> {
     let planes = set.meshes.planes.as_ref();
     let planes = planes.map_err(|&(index, plane)| ReconstructionError::MissingPlane { index, plane })?;
     let cut = Cut { vertices: QuadVertices::AtTexelCorners, merged };
-    quads::mesh(device, set, cut, |frame, image| {
+    quads::mesh(device, set, (cut, turn), |frame, image| {
         let [depths, extents] = image.quad_bindings();
         let own = [depths, extents, Binding::texture("planes", &planes.texels)];
         image.dispatch(frame, &CutTexels, image.work(), &own, image.size_px.to_array())?;

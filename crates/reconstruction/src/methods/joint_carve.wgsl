@@ -158,7 +158,7 @@ fn vote_of_cell(corners: Corners, codes: vec4f, gaps: vec4f, footprint: f32, at:
 @compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= lists[work.view.number].count { return; }
-    let index = listed_pixels[work.view.first_pixel + id.x];
+    let index = listed_pixels[first_listed() + id.x];
     let pixel = pixel_of(place_of(index));
     let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
 {% for k in range(cameras) %}

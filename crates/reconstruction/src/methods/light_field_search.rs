@@ -8,7 +8,8 @@ use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Record
 
 /// As in the paper.
 pub(super) const DEFAULT_STEPS: u32 = 100;
-pub(super) const MAX_STEPS: u32 = 65_536;
+/// The time of a view is linear in the steps: with more, one client's view would hold the device.
+pub(super) const MAX_STEPS: u32 = 1024;
 pub(crate) const BISECTIONS: u32 = 8;
 
 shader_variant!(Search(SetVariant), "light_field_search.wgsl", ONE_VIEW);

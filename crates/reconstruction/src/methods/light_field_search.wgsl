@@ -139,8 +139,9 @@ fn color_at(place: Place) -> vec3f {
 
 @compute @workgroup_size(TILE_PX, TILE_PX)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= work.view.size_px) { return; }
-    let pixel = pixel_of(id.xy);
+    let at = pixel_at(id);
+    if any(at >= work.view.size_px) { return; }
+    let pixel = pixel_of(at);
     let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
     if span.near > span.far {
         write_pixel(pixel.index, work.background_srgb8, 0.0, PROVENANCE_EMPTY);

@@ -11,7 +11,7 @@ mod mesh;
 use std::sync::Arc;
 
 use depth_image::{NamedMethod, Setting, named_methods};
-use gpu::{ShaderError, ShaderSource, Templates, shader_sources, wgsl_constants, wgsl_files};
+use gpu::{ShaderError, ShaderSource, Templates, Turn, shader_sources, wgsl_constants, wgsl_files};
 
 use self::hybrid_mesh::GREATEST_SLOPE;
 use self::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL};
@@ -63,7 +63,7 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 4] = [
         name: "light_field_search",
         method: LightFieldSearch { steps: DEFAULT_STEPS },
         setting: Some(Setting {
-            form: "STEPS (1 to 65536)",
+            form: "STEPS (1 to 1024)",
             parse: |text| {
                 let steps = text.parse().ok().filter(|steps| (1..=MAX_STEPS).contains(steps));
                 steps.map(|steps| LightFieldSearch { steps })
@@ -137,23 +137,27 @@ impl ReconstructionMethod {
     pub(crate) fn record(
         self,
         drawing: &QuadDrawing,
+        mesh: Option<&QuadMesh>,
         recording: &mut Recording<'_>,
     ) -> Result<PixelList, ReconstructionError> {
-        let (device, set) = (recording.device, recording.set);
         match self {
             LightFieldSearch { steps } => light_field_search::record(recording, steps),
             JointCarve { stop_level } => joint_carve::record(recording, stop_level),
-            Mesh => quads::record(drawing, recording, &*mesh::mesh(device, set)?),
-            HybridMesh { merged } => quads::record(drawing, recording, &*hybrid_mesh::mesh(device, set, merged)?),
+            Mesh | HybridMesh { .. } => quads::record(drawing, recording, mesh),
         }
     }
 
     /// The set's quads, cut when they are first asked for; `None` for methods that draw none.
-    pub(crate) fn mesh(self, device: &Device, set: &SampleSet) -> Result<Option<Arc<QuadMesh>>, ReconstructionError> {
+    pub(crate) fn mesh(
+        self,
+        device: &Device,
+        set: &SampleSet,
+        turn: Turn,
+    ) -> Result<Option<Arc<QuadMesh>>, ReconstructionError> {
         match self {
             LightFieldSearch { .. } | JointCarve { .. } => Ok(None),
-            Mesh => mesh::mesh(device, set).map(Some),
-            HybridMesh { merged } => hybrid_mesh::mesh(device, set, merged).map(Some),
+            Mesh => mesh::mesh(device, set, turn).map(Some),
+            HybridMesh { merged } => hybrid_mesh::mesh(device, set, merged, turn).map(Some),
         }
     }
 
@@ -185,6 +189,7 @@ mod tests {
             "joint_carve:9",
             "light_field_search:0",
             "light_field_search:-1",
+            "light_field_search:1025",
             "light_field_search:99999999999",
             "mesh:1",
             "hybrid_mesh:",

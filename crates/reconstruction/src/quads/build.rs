@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec2, Vec3};
-use gpu::{Frame, Readback};
+use gpu::{Frame, Readback, Turn};
 
 use super::cut::ImageCut;
 use super::mesh::{Cut, INDICES_A_QUAD, MAX_MESHES, Mesh, MeshStatistics, Quad, QuadVertices};
@@ -15,15 +15,19 @@ use crate::{device::Device, error::ReconstructionError, sample_set::SampleSet};
 pub(crate) fn mesh(
     device: &Device,
     set: &SampleSet,
-    cut: Cut,
+    (cut, turn): (Cut, Turn),
     record: impl Fn(&mut Frame<'_>, &ImageCut<'_>) -> Result<(), ReconstructionError>,
 ) -> Result<Arc<Mesh>, ReconstructionError> {
-    // Held while it is made: concurrent callers want the same.
-    let mut meshes = set.meshes.meshes.lock();
-    if let Some(mesh) = meshes.iter().find(|mesh| mesh.cut == cut) {
-        return Ok(mesh.clone());
+    let kept = |meshes: &[Arc<Mesh>]| meshes.iter().find(|mesh| mesh.cut == cut).cloned();
+    if let Some(mesh) = kept(&set.meshes.meshes.lock()) {
+        return Ok(mesh);
     }
-    let mesh = Arc::new(build(device, set, cut, record)?);
+    // Not under the lock: a live view would wait for the turn of a batch.
+    let mesh = Arc::new(build(device, set, (cut, turn), record)?);
+    let mut meshes = set.meshes.meshes.lock();
+    if let Some(mesh) = kept(&meshes) {
+        return Ok(mesh);
+    }
     if meshes.len() >= MAX_MESHES {
         meshes.remove(0);
     }
@@ -35,10 +39,10 @@ pub(crate) fn mesh(
 fn build(
     device: &Device,
     set: &SampleSet,
-    cut: Cut,
+    (cut, turn): (Cut, Turn),
     record: impl Fn(&mut Frame<'_>, &ImageCut<'_>) -> Result<(), ReconstructionError>,
 ) -> Result<Mesh, ReconstructionError> {
-    let mut frame = Frame::begin(&device.gpu, "cut meshes");
+    let mut frame = Frame::begin(&device.gpu, "cut meshes", turn);
     let (mut images, mut reads) = (Vec::new(), Vec::new());
     for number in 0..set.cameras.len() {
         let image = ImageCut::new(device, set, number, cut)?;
@@ -50,7 +54,7 @@ fn build(
         reads.push([&image.quads.draw, &image.report].map(|buffer| read_back(device, &mut frame, buffer)));
         images.push(image.quads);
     }
-    let done = frame.submit().wait()?;
+    let done = frame.submit()?.wait()?;
     let mut statistics = MeshStatistics { device_s: done.device_s, ..MeshStatistics::default() };
     for [draw, report] in reads {
         let [error_bits, before] = done.with(report, |words: &[u32]| [words[0], words[1]])?;
@@ -69,10 +73,10 @@ pub(crate) fn read(device: &Device, mesh: &Mesh, set: &SampleSet) -> Result<Vec<
 
 fn read_image(device: &Device, mesh: &Mesh, set: &SampleSet, number: usize) -> Result<Vec<Quad>, ReconstructionError> {
     let image = &mesh.images[number];
-    let mut frame = Frame::begin(&device.gpu, "read quads");
+    let mut frame = Frame::begin(&device.gpu, "read quads", Turn::default());
     let buffers = [&image.inverse_depths, &image.indices, &image.draw];
     let [depths, indices, draw] = buffers.map(|buffer| read_back(device, &mut frame, buffer));
-    let done = frame.submit().wait()?;
+    let done = frame.submit()?.wait()?;
     let count = done.with(draw, |words: &[u32]| words[0] as usize)?;
     let indices = done.with(indices, |words: &[u32]| words[..count].to_vec())?;
     let (camera, vertices) = (&set.meshes.cameras[number], mesh.cut.vertices);

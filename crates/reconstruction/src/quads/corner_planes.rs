@@ -1,7 +1,7 @@
 //! The planes that methods need, and on the device those that corners of quads are made from.
 
 use depth_image::{DepthImage, HOLE_INVERSE_DEPTH};
-use gpu::{Table, TablePool};
+use gpu::{Table, TablePool, Turn};
 use wgpu::TextureFormat;
 
 use crate::error::ReconstructionError;
@@ -38,7 +38,7 @@ impl CornerPlanes {
     pub const REQUIRED: RequiredPlanes = RequiredPlanes { normal: true, corner_inverse_depth: true };
 
     /// Uploads images that have all planes.
-    pub fn upload(tables: &TablePool, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
+    pub fn upload(tables: &TablePool, images: &[DepthImage], turn: Turn) -> Result<Self, ReconstructionError> {
         let count = images.iter().map(|image| (image.size_px() + 1).element_product() as usize).sum();
         tables.gpu.check_table("corners", count)?;
         let mut texels: Vec<[u32; 4]> = Vec::with_capacity(count);
@@ -47,7 +47,7 @@ impl CornerPlanes {
             first_corners.push(texels.len() as u32);
             texels.extend(corner_texels(image));
         }
-        Ok(Self { texels: tables.upload("corners", TextureFormat::Rgba32Uint, &texels)?, first_corners })
+        Ok(Self { texels: tables.upload("corners", TextureFormat::Rgba32Uint, &texels, turn)?, first_corners })
     }
 }
 

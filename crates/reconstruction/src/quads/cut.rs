@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::UVec2;
-use gpu::{Binding, DispatchSize, Frame, GpuError, PooledBuffer, ShaderVariant};
+use gpu::{Binding, DispatchSize, Frame, GpuError, PooledBuffer, ShaderVariant, WorkKind};
 use wgpu::BufferUsages;
 
 use super::mesh::{Cut, INDICES_A_QUAD, ImageQuads};
@@ -108,6 +108,8 @@ impl<'s> ImageCut<'s> {
         let work = self.device.gpu.buffer_with("cut", &[work], BufferUsages::UNIFORM);
         let bound = pass.bind(0, own.iter().cloned().chain([Binding::buffer("work", &work)]))?;
         pass.dispatch(frame, &[&bound], DispatchSize::Invocations([x, y, 1]));
+        let kind = WorkKind::new(WorkKind::family(&"cut meshes"), &variant.name());
+        frame.cut(kind, self.size_px.element_product().into());
         Ok(())
     }
 }

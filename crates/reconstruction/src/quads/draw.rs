@@ -5,11 +5,11 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3, Vec4};
-use gpu::{Binding, DrawPass, DrawState, DrawVariant, Gpu, GpuError, Lent, PassCache, Pool, Templates};
+use gpu::{Binding, DrawPass, DrawState, DrawVariant, Gpu, GpuError, Lent, PassCache, Pool, Templates, WorkKind};
 use gpu::{shader_variant, uniform_elements, uniform_stride};
 use wgpu::{BufferUsages, TextureFormat, TextureUsages, TextureView, TextureViewDimension};
 
-use super::mesh::{Mesh, QuadVertices};
+use super::mesh::{ImageQuads, Mesh, QuadVertices};
 use crate::view_work::{GpuViewCamera, ONE_VIEW};
 use crate::{error::ReconstructionError, recording::Recording};
 
@@ -91,7 +91,7 @@ impl Targets {
 
 impl QuadDrawing {
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        Self { passes: PassCache::new(gpu, templates), targets: Pool::keeping(2) }
+        Self { passes: PassCache::new(gpu, templates), targets: Pool::of_device(gpu, 2) }
     }
 
     fn targets(&self, gpu: &Gpu, kind: TargetKind) -> Result<Lent<TargetKind, Targets>, GpuError> {
@@ -118,17 +118,43 @@ pub(super) fn record(
     let works = gpu.buffer_with("quads of views", &quad_works(recording), BufferUsages::UNIFORM);
     let bound = quads.bind(0, [Binding::buffer("work", &works)])?;
     let mut offsets = (0..).step_by(uniform_stride(size_of::<GpuQuadWork>() as u32) as usize);
+    let kind = kind(mesh);
     for (samples, depth) in targets.samples.each.iter().zip(&targets.depth.each) {
-        let mut pass = recording.frame.begin_drawing("quads", &[samples], wgpu::Color::TRANSPARENT, depth);
-        pass.set_pipeline(quads.pipeline());
-        for (image, offset) in mesh.images.iter().zip(&mut offsets) {
-            pass.set_bind_group(0, &bound, &[offset]);
-            pass.set_vertex_buffer(0, image.inverse_depths.slice(..));
-            pass.set_index_buffer(image.indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed_indirect(&image.draw, 0);
+        for (number, images) in slices(gpu, mesh).enumerate() {
+            let clear = (number == 0).then_some(wgpu::Color::TRANSPARENT);
+            let mut pass = recording.frame.begin_drawing("quads", &[samples], clear, depth);
+            pass.set_pipeline(quads.pipeline());
+            for (image, offset) in images.iter().zip(&mut offsets) {
+                pass.set_bind_group(0, &bound, &[offset]);
+                pass.set_vertex_buffer(0, image.inverse_depths.slice(..));
+                pass.set_index_buffer(image.indices.slice(..), wgpu::IndexFormat::Uint32);
+                pass.draw_indexed_indirect(&image.draw, 0);
+            }
+            drop(pass);
+            recording.frame.cut(kind, images.iter().map(vertices).sum());
         }
     }
     Ok(targets)
+}
+
+/// The family of drawing quads, whose units are vertices.
+fn family() -> u64 {
+    WorkKind::family(&"draw quads")
+}
+
+fn kind(mesh: &Mesh) -> WorkKind {
+    WorkKind::new(family(), &format!("{:?}", mesh.cut))
+}
+
+fn vertices(image: &ImageQuads) -> u64 {
+    image.inverse_depths.size() / 4
+}
+
+/// The images that one pass draws. A view is cut between images: what is drawn stays in its targets.
+fn slices<'m>(gpu: &Gpu, mesh: &'m Mesh) -> impl Iterator<Item = &'m [ImageQuads]> + use<'m> {
+    let most = mesh.images.iter().map(vertices).max().unwrap_or(1).max(1);
+    let a_slice = gpu.device_queue.slice_units(family(), most) / most;
+    mesh.images.chunks(a_slice.clamp(1, mesh.images.len().max(1) as u64) as usize)
 }
 
 /// A uniform for each view and image.

@@ -4,7 +4,7 @@ use std::{fmt, sync::Arc};
 
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use glam::Vec3;
-use gpu::TablePool;
+use gpu::{TablePool, Turn};
 use minijinja::{Value, context};
 use parking_lot::Mutex;
 
@@ -125,14 +125,14 @@ pub(crate) struct SetMeshes {
 
 impl SetMeshes {
     /// Planes go to the device where every image has them.
-    pub fn upload(tables: &TablePool, images: &[DepthImage]) -> Result<Self, ReconstructionError> {
+    pub fn upload(tables: &TablePool, images: &[DepthImage], turn: Turn) -> Result<Self, ReconstructionError> {
         let camera = |image: &DepthImage| {
             let Camera::Pinhole(camera) = &image.camera;
             *camera
         };
         let planes = match CornerPlanes::REQUIRED.missing(images) {
             Some(missing) => Err(missing),
-            None => Ok(CornerPlanes::upload(tables, images)?),
+            None => Ok(CornerPlanes::upload(tables, images, turn)?),
         };
         Ok(Self { cameras: images.iter().map(camera).collect(), planes, meshes: Mutex::default() })
     }

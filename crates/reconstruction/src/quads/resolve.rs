@@ -13,8 +13,9 @@ shader_variant!(Resolve(SetVariant), "resolve.wgsl", ONE_VIEW);
 pub(crate) fn record(
     drawing: &QuadDrawing,
     recording: &mut Recording<'_>,
-    mesh: &Mesh,
+    mesh: Option<&Mesh>,
 ) -> Result<PixelList, ReconstructionError> {
+    let mesh = mesh.expect("methods that draw are handed their mesh");
     let drawn = draw::record(drawing, recording, mesh)?;
     let resolve = Resolve(recording.variant());
     surface::record(recording, &resolve, None, &drawn.bindings())

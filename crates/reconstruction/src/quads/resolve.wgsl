@@ -36,11 +36,12 @@ fn mask_of(sample: u32) -> u32 {
 
 @compute @workgroup_size(TILE_PX, TILE_PX)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= work.view.size_px) { return; }
-    let pixel = pixel_of(id.xy);
-    let layer = i32(work.view.number);
-    let depth = textureLoad(drawn_depth, vec2i(id.xy), layer, 0);
-    let sample = textureLoad(drawn_sample, vec2i(id.xy), layer, 0).x;
+    let place = pixel_at(id);
+    if any(place >= work.view.size_px) { return; }
+    let pixel = pixel_of(place);
+    let layer = work.view.first_pixel / (work.view.size_px.x * work.view.size_px.y);
+    let depth = textureLoad(drawn_depth, place, layer, 0);
+    let sample = textureLoad(drawn_sample, place, layer, 0).x;
     let drawn = depth > 0.0;
     let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
     // Reversed depth: near over planar depth.

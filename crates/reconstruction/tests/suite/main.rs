@@ -8,6 +8,7 @@ mod merging;
 mod mesh_limits;
 mod meshes;
 mod non_redundant;
+mod slices;
 mod specular;
 mod stage;
 mod twins;

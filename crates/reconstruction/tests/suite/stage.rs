@@ -232,5 +232,6 @@ fn plainly_lit(scene: &GpuScene) -> DrawWork<'_> {
         scene_time_s: 0.0,
         visibility: Visibility::Triangles,
         refinement: Refinement::default(),
+        turn: Default::default(),
     }
 }

@@ -68,7 +68,7 @@ pub(crate) fn record(
     (first, surfaces): (usize, &[Surfaces]),
     predecessors: Option<&Predecessors>,
 ) -> Result<(), RenderError> {
-    let Recording { passes, batch, cameras, visit_counts, frame, .. } = recording;
+    let Recording { passes, batch, visit_counts, .. } = recording;
     let variant = Primary {
         traversal: Traversal::of(traced),
         shading: batch.work.lighting.highlight(),
@@ -79,10 +79,10 @@ pub(crate) fn record(
     let pass = passes.get(&variant)?;
     let rays = pass.bind(1, traced.bindings())?;
     let known = predecessors.map(|images| pass.bind(KNOWN_GROUP, images.bindings())).transpose()?;
-    for (element, target) in (first as u32..).zip(surfaces) {
-        let own = pass.bind(0, bindings(&variant, cameras, *visit_counts, target))?;
+    for (camera, target) in (first..).zip(surfaces) {
+        let own = pass.bind(0, bindings(&variant, &recording.cameras, recording.visit_counts, target))?;
         let groups: Vec<_> = [&own, &rays].into_iter().chain(&known).collect();
-        pass.dispatch_each(frame, &groups, element..element + 1, target.invocations(1));
+        recording.dispatch(&variant, &pass, &groups, (camera, 1));
     }
     Ok(())
 }

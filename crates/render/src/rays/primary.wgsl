@@ -36,8 +36,9 @@ fn candidate_at(hit: Hit, pixel: vec2u, direction: vec3f) -> Candidate {
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= camera.size_px) { return; }
-    let direction = direction_of(id.xy);
+    let pixel = pixel_at(id, 1u);
+    if is_beyond(pixel) { return; }
+    let direction = direction_of(pixel);
     let ray = ray_from(camera.eye_in_world, direction);
 {% if redundancy_test %}
     var hit = Hit(FARTHEST, NOTHING, Crossing(0.0, 0.0, 0.0, false, false, vec3u(0u)));
@@ -50,11 +51,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         searching = false;
         for (var met = hit.slot != NOTHING; met; met = false) {
             front = max(front, camera.near_m / hit.t);
-            searching = is_redundant(candidate_at(hit, id.xy, direction));
+            searching = is_redundant(candidate_at(hit, pixel, direction));
         }
     }
     hit.slot = select(hit.slot, NOTHING, searching);
-    textureStore(front_depth, id.xy, vec4f(front));
+    textureStore(front_depth, pixel, vec4f(front));
 {% else %}
     let hit = closest(ray, camera.near_m, FARTHEST);
 {% endif %}
@@ -73,12 +74,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         );
         ids = triangle.xy;
     }
-    textureStore(surfaces, id.xy, surface);
-    textureStore(reversed_depth, id.xy, vec4f(select(0.0, camera.near_m / hit.t, met)));
-{% if surface_id %}    textureStore(surface_ids, id.xy, vec4u(ids, 0u, 0u));
+    textureStore(surfaces, pixel, surface);
+    textureStore(reversed_depth, pixel, vec4f(select(0.0, camera.near_m / hit.t, met)));
+{% if surface_id %}    textureStore(surface_ids, pixel, vec4u(ids, 0u, 0u));
 {% endif %}
 {% if count_visits %}
-    let place = place_of(id.xy) * 2u;
+    let place = place_of(pixel) * 2u;
     visit_counts[place] = node_visits;
     visit_counts[place + 1u] = triangle_tests;
 {% endif %}

@@ -12,7 +12,7 @@ use wgpu::TextureFormat;
 
 use super::bvh::{Bvh, MAX_DEPTH};
 use super::flat::{CORNER_FLAGS, FlatScene, FlatTriangle, MAX_VERTICES, OrderedMesh};
-use crate::{material::phong_reflector, texture};
+use crate::{few_cores::on_free_cores, material::phong_reflector, texture};
 
 /// The making of the tree over a scene's triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -131,8 +131,11 @@ impl RayScene {
     fn built(&self, scene_time_s: f32) -> Result<Built, GpuError> {
         GpuError::check_limit("the vertices of all instances", self.flat.vertices.len() as u64, MAX_VERTICES)?;
         let start = Instant::now();
-        let corners = self.corners_in_world(scene_time_s);
-        let bvh = Bvh::build(&corners);
+        let (corners, bvh) = on_free_cores(self.gpu.device_queue.cuts(), || {
+            let corners = self.corners_in_world(scene_time_s);
+            let bvh = Bvh::build(&corners);
+            (corners, bvh)
+        });
         GpuError::check_limit("levels of the tree over the scene", u64::from(bvh.depth), u64::from(MAX_DEPTH))?;
         let took = start.elapsed();
         let fixed = Arc::new(self.fixed(&bvh)?);
@@ -142,8 +145,11 @@ impl RayScene {
 
     fn refitted(&self, mut built: Built, scene_time_s: f32) -> Result<Built, GpuError> {
         let start = Instant::now();
-        let corners = self.corners_in_world(scene_time_s);
-        built.bvh.refit(&corners);
+        let corners = on_free_cores(self.gpu.device_queue.cuts(), || {
+            let corners = self.corners_in_world(scene_time_s);
+            built.bvh.refit(&corners);
+            corners
+        });
         if built.bvh.is_worn() {
             return self.built(scene_time_s);
         }

@@ -3,4 +3,5 @@
 mod closed_forms;
 mod light_failures;
 mod raster;
+mod slices;
 mod stage;

@@ -14,7 +14,14 @@ const SIZE_PX: UVec2 = UVec2::new(64, 48);
 const COLOR: [u8; 3] = [200, 120, 60];
 
 fn work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {
-    DrawWork { scene, lighting, scene_time_s, visibility: Visibility::Triangles, refinement: Refinement::default() }
+    DrawWork {
+        scene,
+        lighting,
+        scene_time_s,
+        visibility: Visibility::Triangles,
+        refinement: Refinement::default(),
+        turn: Default::default(),
+    }
 }
 
 fn sample_at(scene: &Scene, camera: &PinholeCamera, planes: SamplePlanes, scene_time_s: f32) -> DepthImage {

@@ -33,6 +33,7 @@ pub fn work<'a>(scene: &'a GpuScene, lighting: &str) -> DrawWork<'a> {
         scene_time_s: 0.0,
         visibility: Visibility::Triangles,
         refinement: Refinement::default(),
+        turn: Default::default(),
     }
 }
 

@@ -2,4 +2,5 @@
 
 mod failures;
 mod non_redundant;
+mod slices;
 mod stage;

@@ -29,6 +29,7 @@ fn taken(
         scene_time_s: 0.0,
         visibility,
         refinement: Refinement::default(),
+        turn: Default::default(),
     };
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
@@ -224,6 +225,7 @@ fn independent_images_can_be_taken_one_by_one() {
         scene_time_s: 0.0,
         visibility: Visibility::Measured,
         refinement: Refinement::default(),
+        turn: Default::default(),
     };
     let cameras: Vec<Camera> = cameras.into_iter().map(Camera::Pinhole).collect();
     let part = |wanted: &[u32], method| {

@@ -37,6 +37,7 @@ pub fn unlit(scene: &GpuScene) -> DrawWork<'_> {
         scene_time_s: 0.0,
         visibility: Visibility::Measured,
         refinement: Refinement::default(),
+        turn: Default::default(),
     }
 }
 

@@ -38,7 +38,7 @@ pub(super) fn read(gpu: &Gpu, pool: &BufferPool, views: &[&wgpu::TextureView]) -
     let pass = ComputePass::new(gpu, Shader::new(gpu, "memory pass", &wgsl, &[])?);
     let tables = views.iter().map(|view| Table::of(pool, &pass, view)).collect::<anyhow::Result<Vec<_>>>()?;
     let sum = sum(pool, recorded(gpu, &pass, &tables), &tables)?;
-    let device_s = recorded(gpu, &pass, &tables).submit().wait()?.device_s;
+    let device_s = recorded(gpu, &pass, &tables).submit()?.wait()?.device_s;
     let texels: u64 = tables.iter().map(|table| table.count() * u64::from(TEXELS_A_THREAD)).sum();
     Ok(MemoryPass { bytes: texels * BYTES_A_TEXEL, device_s, sum })
 }
@@ -62,7 +62,7 @@ fn count([columns, rows]: [u32; 2]) -> u64 {
 }
 
 fn recorded<'g>(gpu: &'g Gpu, pass: &ComputePass, tables: &[Table]) -> Frame<'g> {
-    let mut frame = Frame::begin(gpu, "memory pass");
+    let mut frame = Frame::begin(gpu, "memory pass", gpu::Turn::default());
     for Table { bound, threads: [columns, rows], .. } in tables {
         pass.dispatch(&mut frame, &[bound], DispatchSize::Invocations([*columns, *rows, 1]));
     }
@@ -75,7 +75,7 @@ fn sum(pool: &BufferPool, mut frame: Frame<'_>, tables: &[Table]) -> anyhow::Res
         (frame.read_back(&table.sums, 0..bytes, pool.lend_host("sums of a table", bytes)), table.count() as usize)
     };
     let reads: Vec<_> = tables.iter().map(read).collect();
-    let result = frame.submit().wait()?;
+    let result = frame.submit()?.wait()?;
     reads.into_iter().try_fold(0u32, |sum, (read, threads)| {
         let of_table = result.with(read, |words: &[u32]| wrapping_sum(&words[..threads]))?;
         Ok(sum.wrapping_add(of_table))

@@ -18,7 +18,14 @@ pub(super) struct Subject<'a> {
 
 impl Subject<'_> {
     pub(super) fn work(&self, lighting: Lighting, visibility: Visibility) -> DrawWork<'_> {
-        DrawWork { scene: self.scene, lighting, scene_time_s: 0.0, visibility, refinement: Refinement::default() }
+        DrawWork {
+            scene: self.scene,
+            lighting,
+            scene_time_s: 0.0,
+            visibility,
+            refinement: Refinement::default(),
+            turn: Default::default(),
+        }
     }
 
     pub(super) fn draw(&self, lighting: Lighting, planes: SamplePlanes) -> anyhow::Result<Vec<DepthImage>> {

@@ -118,11 +118,12 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
 @compute @workgroup_size({{ "TILE_PX, TILE_PX" if march_camera == 0 else "LIST_WORKGROUP" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
 {% if march_camera == 0 %}
-    if any(id.xy >= work.view.size_px) { return; }
-    let pixel = pixel_of(id.xy);
+    let place = pixel_at(id);
+    if any(place >= work.view.size_px) { return; }
+    let pixel = pixel_of(place);
 {% else %}
     if id.x >= lists[work.view.number].count { return; }
-    let pixel = pixel_of(place_of(listed_pixels[work.view.first_pixel + id.x]));
+    let pixel = pixel_of(place_of(listed_pixels[first_listed() + id.x]));
 {% endif %}
     let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
     // Of listed pixels the pass before left how far it got.

@@ -1,0 +1,91 @@
+//! A bound on the jobs that hold a device's memory: so many of each class, in the order of their arrival.
+
+use std::collections::VecDeque;
+
+use parking_lot::{Condvar, Mutex};
+
+use super::fair_order::WorkClass;
+
+/// Bounds the jobs of each class. A job of one class never waits for one of another.
+pub struct JobLimit {
+    most: usize,
+    classes: [Mutex<Jobs>; WorkClass::COUNT],
+    ended: [Condvar; WorkClass::COUNT],
+}
+
+#[derive(Default)]
+struct Jobs {
+    running: usize,
+    waiting: VecDeque<u64>,
+    last_ticket: u64,
+}
+
+/// A job that counts until it is dropped.
+pub struct Job<'l> {
+    limit: &'l JobLimit,
+    class: WorkClass,
+}
+
+impl JobLimit {
+    /// At most so many jobs of each class.
+    #[must_use]
+    pub fn of(most: usize) -> Self {
+        Self { most: most.max(1), classes: Default::default(), ended: Default::default() }
+    }
+
+    /// Waits until there is room for one more.
+    pub fn begin(&self, class: WorkClass) -> Job<'_> {
+        let mut jobs = self.classes[class as usize].lock();
+        jobs.last_ticket += 1;
+        let ticket = jobs.last_ticket;
+        jobs.waiting.push_back(ticket);
+        while jobs.running >= self.most || jobs.waiting.front() != Some(&ticket) {
+            self.ended[class as usize].wait(&mut jobs);
+        }
+        jobs.waiting.pop_front();
+        jobs.running += 1;
+        // The next may have room, too.
+        self.ended[class as usize].notify_all();
+        Job { limit: self, class }
+    }
+}
+
+impl Drop for Job<'_> {
+    fn drop(&mut self) {
+        self.limit.classes[self.class as usize].lock().running -= 1;
+        self.limit.ended[self.class as usize].notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+    use std::thread;
+
+    use super::*;
+
+    #[test]
+    fn jobs_beyond_the_limit_wait_in_order_and_other_classes_do_not() {
+        let limit = JobLimit::of(2);
+        let [first, second] = [(); 2].map(|()| limit.begin(WorkClass::Batch));
+        let (sender, began) = mpsc::channel();
+        thread::scope(|threads| {
+            for number in 0..3 {
+                let (limit, sender) = (&limit, sender.clone());
+                threads.spawn(move || {
+                    let _job = limit.begin(WorkClass::Batch);
+                    sender.send(number).expect("a receiver");
+                });
+                while limit.classes[1].lock().waiting.len() <= number {
+                    thread::yield_now();
+                }
+            }
+            drop(limit.begin(WorkClass::Live));
+            assert!(began.try_recv().is_err());
+            drop(first);
+            let order: Vec<_> = began.iter().take(3).collect();
+            assert_eq!(order, [0, 1, 2]);
+        });
+        drop(second);
+    }
+}

@@ -1,0 +1,13 @@
+//! One device for many: turns, slices and bounds (docs/device.md, "Sharing the device").
+
+mod fair_order;
+mod job_limit;
+mod queue;
+mod rates;
+
+pub use fair_order::{Turn, WorkClass};
+pub use job_limit::{Job, JobLimit};
+pub(crate) use queue::Slot;
+pub use queue::{DeviceQueue, LiveStream, SLICE_S};
+pub(crate) use rates::Work;
+pub use rates::WorkKind;

@@ -1,0 +1,98 @@
+//! A shared device: pictures that are drawn in slices are those that are drawn at once, to the byte.
+
+use std::sync::Arc;
+
+use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use glam::{UVec2, Vec3};
+use gpu::{DevicePreference, Gpu};
+use render::{DrawWork, GpuScene, Refinement, Renderer, SamplePlanes, Visibility};
+use scene::procedural::courtyard;
+
+const PLANES: SamplePlanes = SamplePlanes { normal: true, surface_id: true, specular: true, corners: true };
+/// Rows of a piece are eight, and a draw has one triangle.
+const FEW_UNITS: u64 = 1;
+
+/// A device of its own, whose slices no other test counts.
+struct Shared {
+    gpu: Arc<Gpu>,
+    renderer: Renderer,
+    scene: GpuScene,
+    cameras: Vec<PinholeCamera>,
+}
+
+impl Shared {
+    fn new() -> Self {
+        let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
+        let camera = |x: f32, size: [u32; 2]| {
+            PinholeCamera::looking_at(Vec3::new(x, 2.0, 6.0), Vec3::Y, Vec3::Y, 0.9, UVec2::from(size))
+        };
+        Self {
+            renderer: Renderer::new(&gpu, render::templates(&[]).expect("templates")),
+            scene: GpuScene::upload(&gpu, &courtyard()).expect("a scene"),
+            cameras: vec![camera(0.0, [67, 61]), camera(1.0, [40, 48])],
+            gpu,
+        }
+    }
+
+    fn work(&self, lighting: &str, visibility: Visibility) -> DrawWork<'_> {
+        let lighting = lighting.parse().expect(lighting);
+        let (scene_time_s, refinement) = (0.0, Refinement::default());
+        DrawWork { scene: &self.scene, lighting, scene_time_s, visibility, refinement, turn: Default::default() }
+    }
+
+    /// Pictures, and the slices that they took.
+    fn counted<T>(&self, make: impl Fn() -> T) -> (T, u64) {
+        let before = self.gpu.device_queue.slices();
+        let made = make();
+        (made, self.gpu.device_queue.slices() - before)
+    }
+
+    fn views(&self, work: DrawWork<'_>) -> Vec<View> {
+        let planes = ViewPlanes { inverse_depth: true, provenance: true };
+        self.renderer.draw_views(work, &self.cameras, planes).expect("views")
+    }
+
+    fn images(&self, work: DrawWork<'_>) -> Vec<DepthImage> {
+        let cameras: Vec<Camera> = self.cameras.iter().copied().map(Camera::Pinhole).collect();
+        self.renderer.draw_depth_images(work, &cameras, PLANES).expect("images")
+    }
+
+    fn check<T: PartialEq>(&self, what: &str, make: impl Fn() -> T) {
+        let (whole, few) = self.counted(&make);
+        assert!(few <= 2, "{what}: {few} slices, but nobody watches");
+        let live = self.gpu.device_queue.force_slices(FEW_UNITS);
+        let (cut, many) = self.counted(&make);
+        drop(live);
+        assert!(many > 30, "{what}: {many} slices");
+        assert!(cut == whole, "{what}: bytes differ in slices");
+    }
+}
+
+#[test]
+fn a_picture_in_slices_is_the_whole_picture_with_every_light() {
+    let shared = Shared::new();
+    for visibility in [Visibility::Triangles, Visibility::Rays] {
+        for lighting in
+            ["phong", "shadows", "soft 2, occlusion 2", "soft 40, occlusion 3", "soft 2, occlusion 2, adaptive"]
+        {
+            let work = shared.work(lighting, visibility);
+            shared.check(&format!("views, {lighting}, {visibility}"), || shared.views(work));
+            shared.check(&format!("images, {lighting}, {visibility}"), || shared.images(work));
+        }
+    }
+}
+
+#[test]
+fn light_that_is_refined_in_slices_is_that_which_is_refined_at_once() {
+    let shared = Shared::new();
+    let lit = shared.work("soft 4, occlusion 4", Visibility::Rays);
+    let steps = 3;
+    let refined = || {
+        let images = (0..steps).map(|step| shared.images(DrawWork { refinement: Refinement { step, steps }, ..lit }));
+        images.collect::<Vec<_>>()
+    };
+    let whole = refined();
+    let live = shared.gpu.device_queue.force_slices(FEW_UNITS);
+    assert!(refined() == whole);
+    drop(live);
+}

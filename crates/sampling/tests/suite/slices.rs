@@ -1,0 +1,49 @@
+//! A shared device: sets that are sampled in slices are those that are sampled at once, to the byte.
+
+use std::sync::Arc;
+
+use depth_image::PinholeCamera;
+use glam::{UVec2, Vec3};
+use gpu::{DevicePreference, Gpu};
+use render::{DrawWork, GpuScene, Refinement, SamplePlanes, Visibility};
+use sampling::{SampleWork, Sampler, SamplingMethod};
+use scene::procedural::poles;
+
+use crate::stage::pinholes;
+
+#[test]
+fn a_set_in_slices_is_the_whole_set_with_every_method() {
+    let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
+    let sampler = Sampler::sharing(Arc::new(sampling::renderer(&gpu).expect("a renderer")));
+    let scene = GpuScene::upload(&gpu, &poles(0.1)).expect("a scene");
+    let rig = [-0.4, 0.0, 0.4]
+        .map(|x| PinholeCamera::looking_at(Vec3::new(x, 0.5, 3.0), Vec3::ZERO, Vec3::Y, 0.9, UVec2::new(67, 61)));
+    for visibility in [Visibility::Triangles, Visibility::Rays] {
+        // Tests that trace rays find surfaces by rays.
+        let is_possible = |method: &SamplingMethod| {
+            visibility == Visibility::Rays || method.images_are_sequential() || method.images_are_independent()
+        };
+        for method in SamplingMethod::all().filter(is_possible) {
+            let cameras = pinholes(&method.cameras(rig.to_vec()));
+            let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
+            let draw = DrawWork {
+                scene: &scene,
+                lighting: "soft 2, occlusion 2".parse().expect("a lighting"),
+                scene_time_s: 0.0,
+                visibility,
+                refinement: Refinement::default(),
+                turn: Default::default(),
+            };
+            let planes = SamplePlanes { normal: true, specular: true, corners: true, ..SamplePlanes::default() };
+            let work =
+                SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes, temporal_reference_s: None };
+            let whole = sampler.sample(&work).expect("images");
+            let before = gpu.device_queue.slices();
+            let live = gpu.device_queue.force_slices(1);
+            let cut = sampler.sample(&work).expect("images");
+            drop(live);
+            assert!(gpu.device_queue.slices() - before > 30, "{method}");
+            assert!(cut == whole, "{method}, {visibility}: bytes differ in slices");
+        }
+    }
+}
