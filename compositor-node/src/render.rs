@@ -1,4 +1,4 @@
-//! The device's loop: batch by batch, while the frames of the batch before are encoded and sent.
+//! The device's loops, one for each lane: batch by batch, while the frames of the batch before are encoded and sent.
 
 use std::sync::Arc;
 use std::thread::available_parallelism;
@@ -12,44 +12,47 @@ use tonic::Status;
 
 use crate::batch::{Source, Waiting};
 use crate::outbox::Output;
-use crate::queue::Arrivals;
+use crate::queue::{Arrivals, Lane};
 
 /// Batches that are being encoded while the device makes the next.
 const BATCHES_BEHIND: usize = 2;
 
-/// Makes views, and encodes them.
+/// Makes views, and encodes them. Clones share the encoders.
 #[derive(Clone)]
-struct Rendering {
+pub(crate) struct Rendering {
     engine: Arc<dyn Engine>,
     metrics: NodeMetrics,
     encoders: Arc<Semaphore>,
 }
 
-/// Runs until it is aborted.
-pub(crate) async fn render_loop(engine: Arc<dyn Engine>, arrivals: Arc<Arrivals>, metrics: NodeMetrics) {
-    let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
-    let behind = Arc::new(Semaphore::new(BATCHES_BEHIND));
-    let rendering = Rendering { engine, metrics, encoders };
-    loop {
-        // Before the batch is chosen: views that arrive while frames wait for encoders are newer.
-        let Ok(place) = behind.clone().acquire_owned().await else {
-            return;
-        };
-        let mut batch = arrivals.next_batch().await;
-        batch.retain(|view| {
-            let is_wanted = !view.reply.outbox().gone.is_cancelled();
-            if !is_wanted {
-                rendering.metrics.drop_view("client gone");
+impl Rendering {
+    pub(crate) fn new(engine: Arc<dyn Engine>, metrics: NodeMetrics) -> Self {
+        let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
+        Self { engine, metrics, encoders }
+    }
+
+    /// Makes the views of one lane, until it is aborted.
+    pub(crate) async fn run(self, arrivals: Arc<Arrivals>, lane: Lane) {
+        let behind = Arc::new(Semaphore::new(BATCHES_BEHIND));
+        loop {
+            // Before the batch is chosen: views that arrive while frames wait for encoders are newer.
+            let Ok(place) = behind.clone().acquire_owned().await else {
+                return;
+            };
+            let mut batch = arrivals.next_batch(lane).await;
+            batch.retain(|view| {
+                let is_wanted = !view.reply.outbox().gone.is_cancelled();
+                if !is_wanted {
+                    self.metrics.drop_view("client gone");
+                }
+                is_wanted
+            });
+            if !batch.is_empty() {
+                self.render(batch, place).await;
             }
-            is_wanted
-        });
-        if !batch.is_empty() {
-            rendering.render(batch, place).await;
         }
     }
-}
 
-impl Rendering {
     async fn render(&self, batch: Vec<Waiting>, place: OwnedSemaphorePermit) {
         let (start, metrics) = (Instant::now(), &self.metrics);
         match self.make(&batch).await {

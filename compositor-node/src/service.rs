@@ -14,9 +14,9 @@ use wire::rpc::{Compositor, Messages};
 use crate::batch_stream::BatchStream;
 use crate::live_stream::LiveStream;
 use crate::outbox::{Outbox, Outgoing, Reply};
-use crate::queue::Arrivals;
+use crate::queue::{Arrivals, Lane};
 use crate::quota::NodeQuota;
-use crate::render::render_loop;
+use crate::render::Rendering;
 use crate::sets::Sets;
 use crate::shared::{ClientStream, Shared};
 
@@ -29,7 +29,7 @@ pub struct CompositorService {
 }
 
 impl CompositorService {
-    /// Starts the device's loop, which ends with the service.
+    /// Starts the device's loops, which end with the service.
     #[must_use]
     pub fn new(
         engine: Arc<dyn Engine>,
@@ -40,7 +40,10 @@ impl CompositorService {
     ) -> Self {
         let arrivals = Arc::<Arrivals>::default();
         let mut rendering = JoinSet::new();
-        rendering.spawn(render_loop(engine.clone(), arrivals.clone(), metrics.clone()));
+        let renderer = Rendering::new(engine.clone(), metrics.clone());
+        for lane in [Lane::Live, Lane::Batch] {
+            rendering.spawn(renderer.clone().run(arrivals.clone(), lane));
+        }
         let sets = Arc::new(Sets::new(engine, plan.clone(), config, metrics.clone()));
         let quota = NodeQuota::new(config.quotas);
         let shared = Shared {

@@ -11,6 +11,7 @@ pub mod delivery;
 pub mod exit;
 pub mod live;
 pub mod pictures;
+pub mod memory;
 pub mod process;
 pub mod setup;
 pub mod sizes;

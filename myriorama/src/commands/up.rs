@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 
 use app_core::cluster::Cluster;
 use app_core::exit::Outcome;
+use app_core::memory::MemoryArgs;
 use app_core::process::{listen, stop_signal};
 use app_core::setup::{DeviceArgs, SceneArgs};
 use clap::Args;
@@ -20,6 +21,8 @@ pub struct UpArgs {
     scene: SceneArgs,
     #[command(flatten)]
     device: DeviceArgs,
+    #[command(flatten)]
+    memory: MemoryArgs,
     /// Nodes P that share the device
     #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
     nodes: u16,
@@ -43,8 +46,9 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     let (name, triangles) = (setup.scene.name.clone(), setup.scene.triangle_count());
     // The device and the package hold the scene now; the third copy is dropped.
     drop(setup.scene);
+    let (memory, nodes) = (args.memory.set_memory_bytes(engine.is_software()), usize::from(args.nodes));
     let mut cluster =
-        Cluster::start(listener, setup.offer, engine.clone(), usize::from(args.nodes), args.insecure_bind).await?;
+        Cluster::start_within(memory, listener, setup.offer, engine.clone(), nodes, args.insecure_bind).await?;
     println!("{name}: {triangles} triangles on {}, {} nodes, at {}", engine.device_name(), args.nodes, cluster.address);
     tokio::select! {
         stopped = stop_signal() => stopped?,
