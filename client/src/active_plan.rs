@@ -4,8 +4,6 @@
 use std::sync::Arc;
 
 use cluster::{Assignment, CompositorShare, RenderViews, SessionEvent, SessionPlan, SessionRequest};
-use codec::FrameCodec;
-use depth_image::ViewPlanes;
 use parking_lot::Mutex;
 use tokio::sync::{mpsc, watch};
 use tokio_stream::StreamExt as _;
@@ -13,6 +11,7 @@ use wire::rpc::{Backoff, CoordinatorClient, Messages, connect, connect_later};
 
 use crate::error::ClientError;
 use crate::peer::Peer;
+use crate::view_request::ViewSettings;
 
 /// A plan in force, and its compositors, but for those that cannot be reached.
 #[derive(Debug)]
@@ -20,8 +19,7 @@ pub(crate) struct ActivePlan {
     pub(crate) plan: SessionPlan,
     pub(crate) peers: Vec<Peer>,
     /// As the session asked for.
-    pub(crate) codec: FrameCodec,
-    pub(crate) planes: ViewPlanes,
+    pub(crate) settings: ViewSettings,
     named_plans: mpsc::Sender<Assignment>,
 }
 
@@ -32,7 +30,7 @@ impl ActivePlan {
     /// Where no compositor can be reached.
     pub(crate) async fn connect(
         plan: SessionPlan,
-        (codec, planes): (FrameCodec, ViewPlanes),
+        settings: ViewSettings,
         named_plans: mpsc::Sender<Assignment>,
     ) -> Result<Self, ClientError> {
         let (mut peers, mut failed) = (Vec::new(), None);
@@ -44,7 +42,7 @@ impl ActivePlan {
         }
         match failed.filter(|_| peers.is_empty()) {
             Some(error) => Err(error),
-            None => Ok(Self { plan, peers, codec, planes, named_plans }),
+            None => Ok(Self { plan, peers, settings, named_plans }),
         }
     }
 
@@ -55,14 +53,16 @@ impl ActivePlan {
             connect_later(&share.address).map(|channel| Peer::new(share, channel, self.named_plans.clone()))
         };
         let peers = plan.assignment.compositors.iter().filter_map(|share| peer(share).ok()).collect();
-        Self { plan, peers, codec: self.codec, planes: self.planes, named_plans: self.named_plans.clone() }
+        Self { plan, peers, settings: self.settings.clone(), named_plans: self.named_plans.clone() }
     }
 
     /// The plan that a compositor names as the one in force, if it can be this session's.
     pub(crate) fn succeeded_by(&self, assignment: &Assignment) -> Option<Self> {
         let (old, new) = (&self.plan.assignment, assignment);
         let is_later = new.plan_epoch > old.plan_epoch;
-        let shows_the_same = new.workload.scene == old.workload.scene && new.workload.timeline == old.workload.timeline;
+        let shows_the_same = new.workload_number == old.workload_number
+            && new.workload.scene == old.workload.scene
+            && new.workload.timeline == old.workload.timeline;
         let plan =
             || SessionPlan { assignment: new.clone(), reason: "as a compositor says".to_owned(), ..self.plan.clone() };
         (is_later && shows_the_same).then(|| self.replaced_by(plan()))
@@ -78,14 +78,16 @@ impl ActivePlan {
         self.plan.assignment.plan_epoch
     }
 
-    /// A request without views, of set 0.
+    /// A request without views, of set 0. Under a fallback the plan names the method.
     pub(crate) fn request(&self) -> RenderViews {
+        let ViewSettings { method, codec, planes } = &self.settings;
         RenderViews {
             plan_epoch: self.plan_epoch(),
+            workload_number: self.plan.assignment.workload_number,
             set_index: 0,
-            method: self.plan.assignment.workload.method.clone(),
-            codec: self.codec,
-            planes: self.planes,
+            method: if self.plan.fallback.is_some() { self.plan.method.clone() } else { method.clone() },
+            codec: *codec,
+            planes: *planes,
             views: Vec::new(),
             live: None,
         }

@@ -226,6 +226,8 @@ mod tests {
     fn header(index: u64) -> FrameHeader {
         FrameHeader {
             sample_set_id: SampleSetId { plan_epoch: 1, index },
+            cell: 0,
+            is_neighbour_cell: false,
             camera: request(0).camera,
             size_px: [8, 8].into(),
             codec: FrameCodec::Lz4,

@@ -179,7 +179,7 @@ impl LiveStream {
         let unexpected =
             |reason: &str| Failure::of_peer(peer, ClientError::Unexpected { frame: number, reason: reason.to_owned() });
         let answers = self.poses.answer(number).ok_or_else(|| unexpected("was not requested, or is late"))?;
-        let planes = self.state.borrow().active.planes;
+        let planes = self.state.borrow().active.settings.planes;
         check_frame(&answers.pose.request, planes, &frame.header).map_err(|reason| unexpected(&reason))?;
         let plan_epoch = frame.header.sample_set_id.plan_epoch;
         if plan_epoch < self.plan_epoch {

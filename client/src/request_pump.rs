@@ -104,6 +104,7 @@ mod tests {
 
     fn template() -> RenderViews {
         RenderViews {
+            workload_number: 1,
             plan_epoch: 3,
             set_index: 0,
             method: String::new(),

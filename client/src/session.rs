@@ -19,7 +19,7 @@ use crate::delivery::deliver;
 use crate::error::ClientError;
 use crate::frames::{Expected, Frames};
 use crate::live_view::LiveView;
-use crate::view_request::ViewRequest;
+use crate::view_request::{ViewRequest, ViewSettings};
 
 /// Plans that compositors have named and the session has not taken over yet.
 const NAMED_PLANS: usize = 4;
@@ -81,7 +81,8 @@ impl Client {
         let mut events = coordinator.open_session(request.clone()).await.map_err(ClientError::coordinator)?;
         let (session, plan) = plan_of(&mut events, progress).await?;
         let (named_plans, to_follow) = mpsc::channel(NAMED_PLANS);
-        let active = Arc::new(ActivePlan::connect(plan, (codec, request.planes), named_plans).await?);
+        let settings = ViewSettings { method: request.method.clone(), codec, planes: request.planes };
+        let active = Arc::new(ActivePlan::connect(plan, settings, named_plans).await?);
         let (changes, state) = watch::channel(SessionState { session, active, ended: None });
         let request = Arc::new(Mutex::new(request));
         let mut following = JoinSet::new();
@@ -158,7 +159,7 @@ impl Session {
     pub fn render_views(&self, requests: Vec<ViewRequest>) -> Result<Frames, ClientError> {
         let active = self.state.borrow().in_force()?;
         requests.iter().try_for_each(|request| request.check(&active.plan.assignment))?;
-        let expected = Expected::new(requests.iter().copied(), active.planes)?;
+        let expected = Expected::new(requests.iter().copied(), active.settings.planes)?;
         Ok(Frames::start(expected, |sink| deliver(self.state.clone(), requests, sink)))
     }
 

@@ -3,10 +3,21 @@
 use std::time::Instant;
 
 use cluster::Assignment;
-use codec::FrameHeader;
-use depth_image::{PinholeCamera, View};
+use codec::{FrameCodec, FrameHeader};
+use depth_image::{PinholeCamera, View, ViewPlanes};
 
 use crate::error::ClientError;
+
+/// How a session's views are made and sent.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ViewSettings {
+    /// The reconstruction method.
+    pub(crate) method: String,
+    /// The encoding of frames.
+    pub(crate) codec: FrameCodec,
+    /// Planes beside colour.
+    pub(crate) planes: ViewPlanes,
+}
 
 /// One view.
 #[derive(Debug, Clone, Copy, PartialEq)]

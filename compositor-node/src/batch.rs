@@ -21,6 +21,8 @@ const MAX_BATCH_PIXELS: usize = 64 << 20;
 /// Views with equal keys can be made in one call.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct BatchKey {
+    /// Sets of two workloads may have the same epoch and index.
+    pub(crate) workload_number: u64,
     pub(crate) sample_set_id: SampleSetId,
     /// `None` for views that are drawn from the scene.
     pub(crate) content: Option<SetContent>,
@@ -100,6 +102,7 @@ impl Waiting {
         credit: Credit,
     ) -> Self {
         let key = BatchKey {
+            workload_number: request.workload_number,
             sample_set_id: set.place.id,
             content: set.place.content,
             method: request.method.clone(),

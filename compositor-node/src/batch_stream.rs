@@ -21,6 +21,8 @@ use crate::shared::ClientStream;
 const STREAM_PIXELS: u32 = 128 << 20;
 /// Views of one stream that are waiting or not sent yet.
 const STREAM_VIEWS: u32 = 256;
+/// View cells of one request whose sets are fetched at once: others wait behind them for memory.
+const CELLS_AHEAD: usize = 8;
 
 pub(crate) struct BatchStream<'a> {
     client: &'a ClientStream,
@@ -63,21 +65,25 @@ impl<'a> BatchStream<'a> {
         }
     }
 
-    /// Enqueues the views of every view cell as its images arrive; those of all cells are fetched at once.
+    /// Enqueues the views of every view cell as its images arrive; those of several cells are fetched at once.
     async fn enqueue(&mut self, request: RenderViews) -> Result<(), Status> {
         let (arrived, shared) = (Instant::now(), &self.client.shared);
-        let plan = shared.of_compositor(shared.plan.require(request.plan_epoch)?)?;
+        let plan = shared.of_compositor(shared.plans.require(request.workload_number, request.plan_epoch)?)?;
         let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
         for view in &request.views {
             cells.entry(plan.cell_of(&view.camera)).or_default().push(*view);
         }
         let mut sources = JoinSet::new();
-        for (cell, views) in cells {
+        let mut cells = cells.into_iter();
+        let mut fetch_next = |sources: &mut JoinSet<_>| {
+            let Some((cell, views)) = cells.next() else { return };
             let (shared, plan, set_index) = (shared.clone(), plan.clone(), request.set_index);
             sources.spawn(async move { (views, shared.source(&plan, set_index, cell).await) });
-        }
+        };
+        (0..CELLS_AHEAD).for_each(|_| fetch_next(&mut sources));
         // In the order of their arrival: a set that has arrived is in memory, where others may wait for room.
         while let Some(source) = sources.join_next().await {
+            fetch_next(&mut sources);
             let (views, set) = source.map_err(|error| Status::internal(error.to_string()))?;
             self.enqueue_of_cell(&request, &plan, (views, set?), arrived).await?;
         }

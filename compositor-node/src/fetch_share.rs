@@ -124,7 +124,13 @@ async fn call(connections: &Connections, set: &SetRequest, request: &ShareReques
     let client = SamplerClient::new(connections.to(&request.share.address).await?);
     let image_indices = request.share.image_indices.clone();
     let (plan, set_index) = (&set.plan, set.set_index);
-    let images = FetchImages { plan_epoch: plan.plan_epoch, set_index, cell: plan.cell, image_indices };
+    let images = FetchImages {
+        plan_epoch: plan.plan_epoch,
+        workload_number: plan.workload_number,
+        set_index,
+        cell: plan.cell,
+        image_indices,
+    };
     let answer = tokio::time::timeout(request.answer_within, client.fetch_sample_images(images)).await;
     let chunks = answer.map_err(|_| Status::deadline_exceeded("no images in time"))??;
     let (first_within, chunk_within) = (Some(request.first_within), request.chunk_within);

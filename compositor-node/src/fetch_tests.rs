@@ -87,7 +87,9 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
     let plan = Arc::new(Assignment { plan_epoch: 5, workload, samplers: vec![share], ..assignment() });
     let deadlines = Deadlines { chunk: Duration::from_millis(200), ..Deadlines::default() };
     let request = SetRequest { plan: CellPlan::of(&plan, 0).unwrap(), set_index: 0, relay: None };
-    let fetched = Arc::new(Fetcher::new("n0", deadlines)).fetch(&request).await;
+    let plans = PlansInForce::new("n0");
+    plans.apply((*plan).clone()).unwrap();
+    let fetched = Arc::new(Fetcher::new(plans, deadlines)).fetch(&request).await;
     shutdown.cancel();
     let set = fetched.map(|(set, _)| set);
     set.map_err(|failed| {

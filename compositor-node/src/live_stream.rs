@@ -40,8 +40,12 @@ struct Pose {
 
 impl Pose {
     fn shows_set_of(&self, other: &Self) -> bool {
-        let set = |pose: &Self| (pose.plan.plan_epoch, pose.request.set_index, pose.cell);
+        let set = |pose: &Self| (pose.plan_and_cell(), pose.request.set_index);
         set(self) == set(other)
+    }
+
+    fn plan_and_cell(&self) -> (u64, u32) {
+        (self.plan.plan_epoch, self.cell)
     }
 
     fn has_cells(&self) -> bool {
@@ -74,11 +78,9 @@ pub(crate) struct LiveStream<'a> {
     newest: Option<Pose>,
     loading: Option<Fetch>,
     ready: Option<Ready>,
-    /// The plan that the stream was opened under, or its successor.
-    plan: Option<Arc<Assignment>>,
     last_frame: Option<u64>,
-    /// Whether a set has arrived: the first is waited for.
-    has_set: bool,
+    /// The plan and the cell of the last set that was its pose's own; `None` before the first, which is waited for.
+    own: Option<(u64, u32)>,
     /// The time since which no pose has found its own set.
     without_set: Option<Instant>,
     /// Whether neighbours have been tried since something changed.
@@ -99,9 +101,8 @@ impl<'a> LiveStream<'a> {
             newest: None,
             loading: None,
             ready: None,
-            plan: None,
             last_frame: None,
-            has_set: false,
+            own: None,
             without_set: None,
             has_tried: false,
             course: Course::default(),
@@ -127,7 +128,10 @@ impl<'a> LiveStream<'a> {
                     Some(request) => self.accept(request)?,
                     None => is_open = false,
                 },
-                set = wait_for(self.loading.as_mut().map(|fetch| &mut fetch.work)) => self.loaded(set?),
+                set = wait_for(self.loading.as_mut().map(|fetch| &mut fetch.work)) => match set {
+                    Ok(set) => self.loaded(set),
+                    Err(status) => self.not_loaded(status)?,
+                },
                 credit = wait_for(self.ready.as_mut().map(|ready| &mut ready.credit)) => self.credited(credit?),
                 () = until(patience) => self.show_neighbour(),
             }
@@ -139,7 +143,7 @@ impl<'a> LiveStream<'a> {
     fn accept(&mut self, request: RenderViews) -> Result<(), Status> {
         let live = request.live.ok_or_else(|| Status::invalid_argument("live: the stream's first request was"))?;
         self.client.outbox.acknowledge(live.acknowledged_frame);
-        let plan = self.plan_of(request.plan_epoch)?;
+        let plan = self.plan_of(&request)?;
         let Some(&view) = request.views.first() else {
             return Ok(());
         };
@@ -155,6 +159,8 @@ impl<'a> LiveStream<'a> {
             "requested"
         );
         self.course.add(pose.arrived, &pose.view.camera);
+        let done = &self.client.shared.metrics.done;
+        done.viewer_moved(self.client.stream, pose.request.workload_number, pose.view.camera);
         self.fetch_ahead(&pose);
         self.has_tried = false;
         let older = self.put(pose);
@@ -165,7 +171,7 @@ impl<'a> LiveStream<'a> {
 
     /// Begins to fetch the set of the cell where the viewer will be in a second.
     fn fetch_ahead(&mut self, pose: &Pose) {
-        if !self.has_set || !pose.has_cells() {
+        if self.own.is_none() || !pose.has_cells() {
             return;
         }
         let Some(ahead) = self.course.in_a_second(&pose.view.camera) else { return };
@@ -211,20 +217,10 @@ impl<'a> LiveStream<'a> {
         }
     }
 
-    /// The plan of a request. Nodes take a plan before clients hear of it: until they do, the new plan serves them, where it
-    /// shows the same.
-    fn plan_of(&mut self, plan_epoch: u64) -> Result<Arc<Assignment>, Status> {
+    /// The plan in force for a request. A stream goes on from plan to plan of its workload, whatever its cells and roles.
+    fn plan_of(&self, request: &RenderViews) -> Result<Arc<Assignment>, Status> {
         let shared = &self.client.shared;
-        let follows = |plan: &Arc<Assignment>| {
-            plan.plan_epoch > plan_epoch && self.plan.as_ref().is_some_and(|known| known.workload == plan.workload)
-        };
-        let plan = match shared.plan.in_force().filter(follows) {
-            Some(plan) => plan,
-            None => shared.plan.require(plan_epoch)?,
-        };
-        let plan = shared.of_compositor(plan)?;
-        self.plan = Some(plan.clone());
-        Ok(plan)
+        shared.of_compositor(shared.plans.follow(request.workload_number, request.plan_epoch)?)
     }
 
     fn count_replaced(&self, older: Option<RequestedView>) {
@@ -249,15 +245,30 @@ impl<'a> LiveStream<'a> {
 
     fn loaded(&mut self, set: Loaded) {
         let Some(Fetch { pose, .. }) = self.loading.take() else { return };
-        (self.has_set, self.has_tried) = (true, false);
+        self.has_tried = false;
+        self.own.get_or_insert((set.place.id.plan_epoch, set.place.cell));
         if pose.is_some() || self.newest.is_none() {
             self.without_set = None;
         }
         if let Some(pose) = pose {
+            self.own = Some(pose.plan_and_cell());
             // The pose may have arrived after the fetch began.
             let wait_s = set.wait_s.min(pose.arrived.elapsed().as_secs_f64());
             self.prepare(pose, Loaded { wait_s, ..set });
         }
+    }
+
+    /// A set that failed under a plan that was replaced is fetched under the plan in force. One that no pose waits for is
+    /// fetched again when one does.
+    fn not_loaded(&mut self, status: Status) -> Result<(), Status> {
+        let Some(pose) = self.loading.take().and_then(|fetch| fetch.pose) else { return Ok(()) };
+        let plan = self.plan_of(&pose.request)?;
+        if plan.plan_epoch == pose.plan.plan_epoch {
+            return Err(status);
+        }
+        let cell = plan.cell_of(&pose.view.camera);
+        self.newest.get_or_insert(Pose { plan, cell, ..pose });
+        Ok(())
     }
 
     /// Hands a pose over to the device where there is room. Otherwise it waits for room, in place of the one that waited.
@@ -282,11 +293,17 @@ impl<'a> LiveStream<'a> {
         (view.camera.size_px == waiting.key.size_px).then_some(waiting.credit)
     }
 
-    /// The time at which a pose has waited long enough for its set; `None` where none waits, or no other set can serve.
+    /// The newest pose that waits for a set.
+    fn waiting(&self) -> Option<&Pose> {
+        self.newest.as_ref().or_else(|| self.loading.as_ref()?.pose.as_ref())
+    }
+
+    /// The time at which a pose has waited long enough for another cell; `None` where none waits, or no other set can serve.
+    /// A viewer that stays in its cell waits for the next set there: another cell's would look worse.
     fn patience_ends(&self) -> Option<Instant> {
-        let waits = self.newest.is_some() || self.loading.as_ref().is_some_and(|fetch| fetch.pose.is_some());
-        let since = self.without_set.filter(|_| waits && self.has_set && !self.has_tried)?;
-        Some(since + self.client.shared.deadlines.neighbour)
+        let has_moved = |pose: &&Pose| self.own.is_some_and(|own| own != pose.plan_and_cell());
+        let waits = self.waiting().filter(has_moved).is_some() && !self.has_tried;
+        Some(self.without_set.filter(|_| waits)? + self.client.shared.deadlines.neighbour)
     }
 
     /// Makes the newest pose's view where its own set is loaded while another is being fetched.
@@ -294,7 +311,7 @@ impl<'a> LiveStream<'a> {
         let Some(pose) = self.newest.as_ref().filter(|pose| self.loading.is_some() && pose.has_cells()) else { return };
         let loaded = self.client.shared.loaded(&pose.plan, pose.request.set_index, pose.cell);
         if let Some((pose, set)) = loaded.and_then(|set| Some((self.take_newest()?, set))) {
-            self.without_set = None;
+            (self.without_set, self.own) = (None, Some(pose.plan_and_cell()));
             self.prepare(pose, set);
         }
     }
@@ -302,8 +319,7 @@ impl<'a> LiveStream<'a> {
     /// Makes the newest pose's view from the nearest loaded set of its moment. Its own set is fetched all the same.
     fn show_neighbour(&mut self) {
         self.has_tried = true;
-        let loading = self.loading.as_ref().and_then(|fetch| fetch.pose.as_ref());
-        let Some(pose) = self.newest.as_ref().or(loading) else { return };
+        let Some(pose) = self.waiting() else { return };
         let (plan, set_index, cell) = (pose.plan.clone(), pose.request.set_index, pose.cell);
         let Some(set) = self.client.shared.nearest(&plan, set_index, &pose.view.camera) else { return };
         if self.newest.is_some() {

@@ -32,6 +32,8 @@ impl Bench {
         let data = Bytes::from(vec![7; bytes]);
         let header = FrameHeader {
             sample_set_id: SampleSetId { plan_epoch: 1, index: 0 },
+            cell: 0,
+            is_neighbour_cell: false,
             camera,
             size_px: camera.size_px,
             codec: FrameCodec::Lz4,

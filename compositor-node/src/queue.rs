@@ -181,6 +181,7 @@ mod tests {
     fn view(stream: u64, number: u32, index: u64, side_px: u32) -> Waiting {
         let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(side_px));
         let key = BatchKey {
+            workload_number: 1,
             sample_set_id: SampleSetId { plan_epoch: 1, index },
             content: None,
             method: String::new(),

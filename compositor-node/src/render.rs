@@ -58,7 +58,7 @@ impl Rendering {
         match self.make(&batch).await {
             Ok((operation, views)) => {
                 let batch_s = start.elapsed().as_secs_f64();
-                metrics.done.add(operation, batch.len() as f64, batch_s);
+                metrics.done.add(batch[0].key.workload_number, operation, batch.len() as f64, batch_s);
                 metrics.views.inc_by(batch.len() as u64);
                 for view in &batch {
                     metrics.view_s.observe(batch_s / batch.len() as f64);
@@ -142,7 +142,7 @@ fn stage_times(waiting: &Waiting, start: Instant, batch_s: f64, count: usize) ->
 }
 
 async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes, metrics: &NodeMetrics) {
-    let Waiting { key, view: requested, codec, arrived, reply, credit, .. } = waiting;
+    let Waiting { key, place, view: requested, codec, arrived, reply, credit, .. } = waiting;
     let encoded = blocking(move || {
         let start = Instant::now();
         let encoded = encode_view(&view, codec).map_err(|error| Status::internal(format!("encoding: {error}")))?;
@@ -150,9 +150,9 @@ async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes, me
     });
     let output = encoded.await.map(|(encoded, encode_s)| {
         times.encode_s = encode_s;
-        metrics.done.add(Operation::EncodeView, 1.0, encode_s);
+        metrics.done.add(key.workload_number, Operation::EncodeView, 1.0, encode_s);
         metrics.frame_bytes.inc_by(encoded.data.len() as u64);
-        let header = encoded.header(key.sample_set_id, requested.camera, times);
+        let header = encoded.header((key.sample_set_id, place.cell, place.is_neighbour), requested.camera, times);
         Output { frame: requested.frame, header, data: encoded.data, arrived, credit }
     });
     reply.send(output);

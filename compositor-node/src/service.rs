@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use cluster::RenderViews;
 use codec::FramePart;
-use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Relay, next_within, until_drained};
+use node::{CellPlan, PlansInForce, Engine, NodeConfig, NodeMetrics, Relay, next_within, until_drained};
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
@@ -33,7 +33,7 @@ impl CompositorService {
     #[must_use]
     pub fn new(
         engine: Arc<dyn Engine>,
-        plan: CurrentPlan,
+        plans: PlansInForce,
         config: &NodeConfig,
         metrics: NodeMetrics,
         shutdown: CancellationToken,
@@ -44,10 +44,10 @@ impl CompositorService {
         for lane in [Lane::Live, Lane::Batch] {
             rendering.spawn(renderer.clone().run(arrivals.clone(), lane));
         }
-        let sets = Arc::new(Sets::new(engine, plan.clone(), config, metrics.clone()));
+        let sets = Arc::new(Sets::new(engine, plans.clone(), config, metrics.clone()));
         let quota = NodeQuota::new(config.quotas);
         let shared = Shared {
-            plan,
+            plans,
             sets,
             arrivals,
             quota,
@@ -100,6 +100,7 @@ impl ClientStream {
             self.shared.metrics.drop_view("client gone");
             drop(view);
         }
+        self.shared.metrics.done.viewer_left(stream);
         self.shared.metrics.streams.dec();
     }
 

@@ -7,7 +7,7 @@ use std::time::Instant;
 use cluster::{Assignment, SetContent, Workload};
 use codec::EncodedDepthImage;
 use depth_image::{Camera, PinholeCamera, nearest_set};
-use node::{ByteCache, CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, SampleSet, UploadedSet};
+use node::{ByteCache, CellPlan, PlansInForce, Engine, NodeConfig, NodeMetrics, Operation, Pinned, SampleSet, UploadedSet};
 use node::{beyond_timeline, blocking, most_image_bytes, most_set_bytes, set_bytes};
 use tonic::Status;
 use wire::rpc::Messages;
@@ -57,7 +57,7 @@ pub(crate) struct Sets {
     engine: Arc<dyn Engine>,
     fetcher: Arc<Fetcher>,
     metrics: NodeMetrics,
-    current: CurrentPlan,
+    plans: PlansInForce,
     reports: Reports,
     cached: ByteCache<SetContent, ReadySet>,
     relays: RelayBuffers,
@@ -66,15 +66,15 @@ pub(crate) struct Sets {
 impl Sets {
     pub(crate) fn new(
         engine: Arc<dyn Engine>,
-        current: CurrentPlan,
+        plans: PlansInForce,
         config: &NodeConfig,
         metrics: NodeMetrics,
     ) -> Self {
         Self {
             engine,
-            fetcher: Arc::new(Fetcher::new(&config.node_name, config.deadlines)),
+            fetcher: Arc::new(Fetcher::new(plans.clone(), config.deadlines)),
             metrics,
-            current,
+            plans,
             reports: Reports::new(config),
             // The other half is for packed images.
             cached: ByteCache::new("sample sets", config.set_memory_bytes / 2),
@@ -174,7 +174,7 @@ impl Sets {
 
     /// The most bytes of a cell's set, with its images for others.
     fn most_bytes(&self, plan: &CellPlan) -> usize {
-        let relayed = plan.relays(&self.current.node_name);
+        let relayed = plan.relays(&self.plans.node_name);
         let packed = if relayed { most_image_bytes(&plan.workload, &plan.workload.sample_cameras) } else { 0 };
         most_set_bytes(&plan.workload) + packed
     }
@@ -204,7 +204,7 @@ impl Sets {
         content: SetContent,
     ) -> Result<(ReadySet, usize), Status> {
         let start = Instant::now();
-        let relay = plan.relays(&self.current.node_name).then(|| self.relays.of(content));
+        let relay = plan.relays(&self.plans.node_name).then(|| self.relays.of(content));
         let relay = relay.filter(|relay| !relay.has_failed());
         let request = SetRequest { plan: plan.clone(), set_index, relay: relay.clone() };
         let (set, times) = self.fetch(&request).await?;
@@ -212,8 +212,8 @@ impl Sets {
         let fetched_s = start.elapsed().as_secs_f64();
         let (engine, uploading) = (self.engine.clone(), Instant::now());
         let set = blocking(move || engine.upload(&set)).await?;
-        self.metrics.done.add(Operation::LoadSet, 1.0, times.decode_s + uploading.elapsed().as_secs_f64());
-        self.metrics.done.transferred(times.bytes, times.transfer_s);
+        self.metrics.done.add(plan.workload_number, Operation::LoadSet, 1.0, times.decode_s + uploading.elapsed().as_secs_f64());
+        self.metrics.done.transferred(plan.workload_number, times.bytes, times.transfer_s);
         self.metrics.sets_loaded.inc();
         self.metrics.set_s.observe(start.elapsed().as_secs_f64());
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
@@ -222,17 +222,9 @@ impl Sets {
         Ok((ReadySet { set, since: Instant::now(), content, cell: plan.cell, moment, cameras, relay }, bytes))
     }
 
-    /// Stops when a later plan is in force: a sampler without a place in it may be lost without a word.
     async fn fetch(&self, request: &SetRequest) -> Result<(SampleSet, FetchTimes), Status> {
-        let plan_epoch = request.plan.plan_epoch;
-        let fetched = tokio::select! {
-            fetched = self.fetcher.fetch(request) => fetched,
-            () = self.current.replaced(plan_epoch) => {
-                return Err(Status::failed_precondition(format!("plan_epoch {plan_epoch} was replaced")));
-            }
-        };
-        fetched.map_err(|failed| {
-            self.reports.report(plan_epoch, &failed);
+        self.fetcher.fetch(request).await.map_err(|failed| {
+            self.reports.report(request.plan.plan_epoch, &failed);
             failed.status
         })
     }

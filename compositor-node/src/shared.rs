@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use cluster::{Assignment, Policy};
 use depth_image::PinholeCamera;
-use node::{CellPlan, CurrentPlan, Deadlines, NodeMetrics, beyond_timeline};
+use node::{CellPlan, PlansInForce, Deadlines, NodeMetrics, beyond_timeline};
 use tonic::Status;
 
 use crate::batch::{Loaded, Place, Source, Waiting};
@@ -17,7 +17,7 @@ use crate::sets::Sets;
 
 /// The parts that all streams share.
 pub(crate) struct Shared {
-    pub(crate) plan: CurrentPlan,
+    pub(crate) plans: PlansInForce,
     pub(crate) sets: Arc<Sets>,
     pub(crate) arrivals: Arc<Arrivals>,
     pub(crate) quota: NodeQuota,
@@ -47,10 +47,10 @@ impl ClientStream {
 impl Shared {
     /// The plan, if this node makes views in it.
     pub(crate) fn of_compositor(&self, plan: Arc<Assignment>) -> Result<Arc<Assignment>, Status> {
-        if plan.composites(&self.plan.node_name) {
+        if plan.composites(&self.plans.node_name) {
             return Ok(plan);
         }
-        let (name, plan_epoch) = (&self.plan.node_name, plan.plan_epoch);
+        let (name, plan_epoch) = (&self.plans.node_name, plan.plan_epoch);
         Err(Status::failed_precondition(format!("{name} makes no views in plan_epoch {plan_epoch}")))
     }
 

@@ -1,6 +1,6 @@
 //! A plan for tests.
 
-use cluster::{Assignment, Policy, SceneHash, SceneRef, Timeline, Workload};
+use cluster::{Assignment, Policy, SamplePlanes, SceneHash, SceneRef, Timeline, Workload};
 use depth_image::{Aabb, Illumination};
 use glam::Vec3;
 
@@ -12,8 +12,7 @@ pub(crate) fn workload() -> Workload {
         cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
-        method: "joint_carve".to_owned(),
-        codec: "lz4".to_owned(),
+        planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::ZERO,
         timeline: Timeline::still(0.0),
@@ -26,6 +25,7 @@ pub(crate) fn workload() -> Workload {
 pub(crate) fn assignment() -> Assignment {
     Assignment {
         plan_epoch: 1,
+        workload_number: 1,
         policy: Policy::Pipeline,
         workload: workload(),
         samplers: Vec::new(),

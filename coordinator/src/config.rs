@@ -1,9 +1,11 @@
-//! The coordinator's configuration, and the scene that it offers.
+//! The coordinator's configuration, and the scenes that it offers.
 
 use bytes::Bytes;
+use cluster::limits::MAX_SCENES;
 use cluster::{OfferSettings, OfferStatus, SceneHash, SceneRef};
 use depth_image::{Aabb, Camera, Illumination};
 use glam::{DVec3, Vec3};
+use tonic::Status;
 
 /// The coordinator's configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,9 +24,11 @@ impl Default for CoordinatorConfig {
     }
 }
 
-/// The scene that the cluster shows. Only nodes look into its package.
+/// A scene that the cluster shows. Only nodes look into its package.
 #[derive(Debug, Clone)]
 pub struct SceneOffer {
+    /// The name by which sessions ask for it.
+    pub name: String,
     /// The content hash of the package.
     pub hash: SceneHash,
     /// The package.
@@ -43,11 +47,67 @@ pub struct SceneOffer {
     pub settings: OfferSettings,
 }
 
+/// The scenes that a coordinator offers, at least one; sessions that name none get the first.
+#[derive(Debug, Clone)]
+pub struct SceneOffers(Vec<SceneOffer>);
+
+/// Why scenes cannot be offered together.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum OfferError {
+    #[error("scene: there is none")]
+    None,
+    #[error("scene: {count} are given, at most {MAX_SCENES} can be offered")]
+    TooMany { count: usize },
+    #[error("scene {name} is given twice")]
+    Twice { name: String },
+}
+
+impl SceneOffers {
+    /// # Errors
+    /// Without scenes, with too many, and with two of one name or one content.
+    pub fn new(offers: Vec<SceneOffer>) -> Result<Self, OfferError> {
+        match offers.len() {
+            0 => return Err(OfferError::None),
+            count if count > MAX_SCENES => return Err(OfferError::TooMany { count }),
+            _ => (),
+        }
+        for (place, offer) in offers.iter().enumerate() {
+            if offers[..place].iter().any(|other| other.name == offer.name || other.hash == offer.hash) {
+                return Err(OfferError::Twice { name: offer.name.clone() });
+            }
+        }
+        Ok(Self(offers))
+    }
+
+    /// All offers in their order.
+    pub fn iter(&self) -> impl Iterator<Item = &SceneOffer> {
+        self.0.iter()
+    }
+
+    /// The offer of a name or a hash; the first where none is named.
+    pub(crate) fn find(&self, scene: Option<&str>) -> Result<&SceneOffer, Status> {
+        let is_named =
+            |offer: &&SceneOffer| scene.is_none_or(|scene| scene == offer.name || scene == offer.hash.as_str());
+        self.iter().find(is_named).ok_or_else(|| {
+            let names: Vec<&str> = self.iter().map(|offer| offer.name.as_str()).collect();
+            Status::not_found(format!("scene: {} is not on offer; {} are", scene.unwrap_or_default(), names.join(", ")))
+        })
+    }
+}
+
+impl From<SceneOffer> for SceneOffers {
+    fn from(offer: SceneOffer) -> Self {
+        Self(vec![offer])
+    }
+}
+
 impl SceneOffer {
     /// The offer as clients see it.
     #[must_use]
     pub fn status(&self) -> OfferStatus {
         OfferStatus {
+            name: self.name.clone(),
             scene: self.scene(),
             sample_cameras: self.rig.clone(),
             volume: self.volume,

@@ -1,6 +1,6 @@
 //! Measured costs, kept for sessions that ask for the same.
 
-use cluster::{Costs, MeasureCosts, Timeline};
+use cluster::{MeasureCosts, Measured, Timeline};
 use glam::{Quat, Vec3};
 use parking_lot::Mutex;
 
@@ -9,21 +9,21 @@ const CAPACITY: usize = 16;
 
 /// Costs by device and measurement, the oldest first.
 #[derive(Default)]
-pub(crate) struct CostCache(Mutex<Vec<(String, MeasureCosts, Costs)>>);
+pub(crate) struct CostCache(Mutex<Vec<(String, MeasureCosts, Measured)>>);
 
 impl CostCache {
-    pub(crate) fn get(&self, device: &str, measurement: &MeasureCosts) -> Option<Costs> {
+    pub(crate) fn get(&self, device: &str, measurement: &MeasureCosts) -> Option<Measured> {
         let key = cache_key(measurement);
-        self.0.lock().iter().find(|(of, kept, _)| of == device && *kept == key).map(|(.., costs)| *costs)
+        self.0.lock().iter().find(|(of, kept, _)| of == device && *kept == key).map(|(.., measured)| *measured)
     }
 
     /// Keeps costs; the oldest are evicted.
-    pub(crate) fn insert(&self, device: String, measurement: &MeasureCosts, costs: Costs) {
+    pub(crate) fn insert(&self, device: String, measurement: &MeasureCosts, measured: Measured) {
         let mut kept = self.0.lock();
         if kept.len() >= CAPACITY {
             kept.remove(0);
         }
-        kept.push((device, cache_key(measurement), costs));
+        kept.push((device, cache_key(measurement), measured));
     }
 }
 

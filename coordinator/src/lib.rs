@@ -18,6 +18,6 @@ mod sessions;
 mod shared;
 mod workload;
 
-pub use config::{CoordinatorConfig, SceneOffer};
+pub use config::{CoordinatorConfig, OfferError, SceneOffer, SceneOffers};
 pub use observers::{CoordinatorMetrics, EventLog, Observers};
 pub use service::serve;

@@ -17,7 +17,7 @@ use tonic::service::Routes;
 use tonic::{Status, async_trait};
 use wire::rpc::{Coordinator, Messages, coordinator_server};
 
-use crate::config::{CoordinatorConfig, SceneOffer};
+use crate::config::{CoordinatorConfig, SceneOffer, SceneOffers};
 use crate::executor::execute;
 use crate::grpc_status::refusal;
 use crate::observers::Observers;
@@ -36,11 +36,11 @@ const TICK: Duration = Duration::from_millis(250);
 pub async fn serve(
     listener: TcpListener,
     config: CoordinatorConfig,
-    offer: SceneOffer,
+    offers: SceneOffers,
     observers: Observers,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
-    let shared = Arc::new(Shared::new(config, offer, observers));
+    let shared = Arc::new(Shared::new(config, offers, observers));
     let mut running = JoinSet::new();
     running.spawn(execute(shared.clone()));
     running.spawn(tick(shared.clone()));
@@ -85,7 +85,7 @@ impl Coordinator for CoordinatorService {
     async fn join_cluster(&self, request: JoinCluster) -> Result<Messages<Welcome>, Status> {
         let (shared, node_name) = (self.shared.clone(), request.node.node_name.clone());
         let incarnation = shared.next_number();
-        let welcome = Welcome { scenes: vec![shared.offer.scene()] };
+        let welcome = Welcome { scenes: shared.offers.iter().map(SceneOffer::scene).collect() };
         let _one = self.shared.joining.lock();
         let stream = shared.membership.join(&request.node, incarnation, welcome)?;
         tracing::info!(node = node_name, address = request.node.address, device = request.node.device_name, "joined");
@@ -118,16 +118,13 @@ impl Coordinator for CoordinatorService {
     }
 
     async fn report_work(&self, request: WorkReport) -> Result<(), Status> {
-        let WorkReport { node_name, plan_epoch, costs, busy_s, views, dropped_views } = request;
+        let WorkReport { node_name, plan_epoch, workload_number: _, costs, busy_s, views, dropped_views, viewpoints: _ } = request;
         self.shared.step(Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views });
         Ok(())
     }
 
     async fn fetch_scene(&self, request: FetchScene) -> Result<Messages<ScenePart>, Status> {
-        let offer = &self.shared.offer;
-        if request.hash != offer.hash {
-            return Err(Status::not_found(format!("scene_hash: the scene on offer is {}", offer.hash)));
-        }
+        let offer = self.shared.offers.find(Some(request.hash.as_str()))?;
         let start = usize::try_from(request.offset_bytes).unwrap_or(usize::MAX);
         if start > offer.package.len() {
             return Err(Status::invalid_argument(format!(
@@ -145,7 +142,10 @@ impl Coordinator for CoordinatorService {
     }
 
     async fn get_status(&self, (): ()) -> Result<ClusterStatus, Status> {
-        Ok(ClusterStatus { offer: Some(self.shared.offer.status()), ..self.shared.status() })
+        Ok(ClusterStatus {
+            offers: self.shared.offers.iter().map(SceneOffer::status).collect(),
+            ..self.shared.status()
+        })
     }
 
     async fn report_sampler(&self, report: SamplerReport) -> Result<(), Status> {

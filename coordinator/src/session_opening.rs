@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use cluster::{Costs, MeasureCosts, NodeStatus, SessionEvent, SessionRequest, SessionStage};
+use cluster::{MeasureCosts, Measured, NodeStatus, SessionEvent, SessionRequest, SessionStage, Workload};
 use tonic::{Code, Status};
 use wire::rpc::{Backoff, NodeClient};
 
@@ -47,18 +47,21 @@ async fn measured_opening(
     request: SessionRequest,
     events: &EventSender,
 ) -> Result<Opening, Status> {
-    let workload = workload_of(&request, &shared.offer)?;
+    let workload = workload_of(&request, shared.offers.find(request.scene.as_deref())?)?;
     let measurement = MeasureCosts {
         // Costs are those of one image, and of one view, which is made from the images of one cell.
         workload: workload.of_cell(0).unwrap_or_else(|| workload.clone()),
+        method: request.method.clone(),
+        codec: request.codec.clone(),
         typical_views: vec![request.typical_view],
         batch_count: request.views_per_set.min(MEASURED_BATCH),
         planes: request.planes,
     };
-    let costs = measured_undisturbed(shared, measurement, events).await?;
+    let Measured { costs, planes } = measured_undisturbed(shared, measurement, events).await?;
     Ok(Opening {
         session,
-        workload,
+        workload: Workload { planes, ..workload },
+        method: request.method,
         views_per_set: request.views_per_set as usize,
         frames_per_s: request.frames_per_s,
         policy_override: PolicyOverride {
@@ -78,7 +81,7 @@ async fn measured_undisturbed(
     shared: &Arc<Shared>,
     measurement: MeasureCosts,
     events: &EventSender,
-) -> Result<Costs, Status> {
+) -> Result<Measured, Status> {
     if let Some(known) = known(shared, &measurement) {
         return Ok(known);
     }
@@ -94,10 +97,10 @@ async fn measured_undisturbed(
 }
 
 /// The slowest device's costs, where all devices' are kept.
-fn known(shared: &Shared, measurement: &MeasureCosts) -> Option<Costs> {
+fn known(shared: &Shared, measurement: &MeasureCosts) -> Option<Measured> {
     let devices: BTreeSet<String> = shared.status().nodes.into_iter().map(|node| node.device_name).collect();
-    let kept: Option<Vec<Costs>> = devices.iter().map(|device| shared.costs.get(device, measurement)).collect();
-    kept?.into_iter().reduce(Costs::max)
+    let kept: Option<Vec<Measured>> = devices.iter().map(|device| shared.costs.get(device, measurement)).collect();
+    kept?.into_iter().reduce(slowest)
 }
 
 /// A node may be lost while it measures: others of its kind are asked once it has left.
@@ -105,7 +108,7 @@ async fn measured_on_present_nodes(
     shared: &Shared,
     measurement: &MeasureCosts,
     events: &EventSender,
-) -> Result<Costs, Status> {
+) -> Result<Measured, Status> {
     let mut backoff = Backoff::reconnect();
     for _ in 1..ATTEMPTS {
         match measured(shared, measurement, events).await {
@@ -126,13 +129,13 @@ async fn send_progress(events: &EventSender, stage: SessionStage, detail: String
 }
 
 /// The slowest device's costs: one node of each device measures, one after the other.
-async fn measured(shared: &Shared, measurement: &MeasureCosts, events: &EventSender) -> Result<Costs, Status> {
+async fn measured(shared: &Shared, measurement: &MeasureCosts, events: &EventSender) -> Result<Measured, Status> {
     let nodes = shared.status().nodes;
     let devices: BTreeMap<String, NodeStatus> =
         nodes.into_iter().rev().map(|node| (node.device_name.clone(), node)).collect();
-    let mut slowest: Option<Costs> = None;
+    let mut all = Vec::new();
     for (device, node) in devices {
-        let costs = match shared.costs.get(&device, measurement) {
+        all.push(match shared.costs.get(&device, measurement) {
             Some(known) => known,
             None => {
                 let detail = format!("{} measures its costs on {device}", node.node_name);
@@ -147,8 +150,12 @@ async fn measured(shared: &Shared, measurement: &MeasureCosts, events: &EventSen
                 shared.costs.insert(device, measurement, fresh);
                 fresh
             }
-        };
-        slowest = Some(slowest.map_or(costs, |slowest| slowest.max(costs)));
+        });
     }
-    slowest.ok_or_else(|| Status::failed_precondition("no node has joined the cluster"))
+    all.into_iter().reduce(slowest).ok_or_else(|| Status::failed_precondition("no node has joined the cluster"))
+}
+
+/// Which planes a method needs is the same on every node.
+fn slowest(one: Measured, other: Measured) -> Measured {
+    Measured { costs: one.costs.max(other.costs), ..one }
 }

@@ -9,7 +9,7 @@ use node::Connections;
 use parking_lot::Mutex;
 use tokio::sync::Notify;
 
-use crate::config::{CoordinatorConfig, SceneOffer};
+use crate::config::{CoordinatorConfig, SceneOffers};
 use crate::cost_cache::CostCache;
 use crate::membership::MembershipRegistry;
 use crate::observers::Observers;
@@ -18,7 +18,7 @@ use crate::sessions::SessionRegistry;
 
 pub(crate) struct Shared {
     pub(crate) config: CoordinatorConfig,
-    pub(crate) offer: SceneOffer,
+    pub(crate) offers: SceneOffers,
     pub(crate) connections: Connections,
     /// Costs are measured one session at a time.
     pub(crate) measuring: tokio::sync::Mutex<()>,
@@ -35,10 +35,10 @@ pub(crate) struct Shared {
 }
 
 impl Shared {
-    pub(crate) fn new(config: CoordinatorConfig, offer: SceneOffer, observers: Observers) -> Self {
+    pub(crate) fn new(config: CoordinatorConfig, offers: SceneOffers, observers: Observers) -> Self {
         Self {
             config,
-            offer,
+            offers,
             connections: Connections::default(),
             measuring: tokio::sync::Mutex::default(),
             costs: CostCache::default(),

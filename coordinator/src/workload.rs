@@ -1,7 +1,7 @@
-//! The workload of a session: its own settings, completed with those of the scene on offer.
+//! The workload of a session: its own settings, completed with those of its scene.
 
 use cluster::limits::MAX_CELLS;
-use cluster::{SessionRequest, Workload};
+use cluster::{SamplePlanes, SessionRequest, Workload};
 use depth_image::{Aabb, Camera, PinholeCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
@@ -10,14 +10,11 @@ use crate::config::SceneOffer;
 use crate::grpc_status::refusal;
 use crate::schedule::{ChoiceError, first_indices};
 
-/// Completes a request with the scene's defaults.
+/// Completes a request with the scene's defaults. A node tells which planes its method needs.
 ///
 /// # Errors
-/// For another scene than the one on offer, and invalid cameras.
+/// For invalid cameras.
 pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Result<Workload, Status> {
-    if request.scene.as_ref().is_some_and(|hash| *hash != offer.hash) {
-        return Err(Status::not_found(format!("scene_hash: the scene on offer is {}", offer.hash)));
-    }
     let volume = request.volume.unwrap_or(offer.volume);
     let cells = cells_of(request, offer, &volume)?;
     let cell_first_indices = first_indices(&cells);
@@ -38,8 +35,7 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
         cell_first_indices,
         sampling: request.sampling.clone(),
         lighting: request.lighting.clone(),
-        method: request.method.clone(),
-        codec: request.codec.clone(),
+        planes: SamplePlanes::default(),
         volume,
         background_linear: offer.background_linear,
         timeline: request.timeline,

@@ -8,8 +8,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use cluster::{
-    Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, Quality, SceneHash, SceneRef, TileCosts, Timeline,
-    Workload,
+    Costs, JoinCluster, NodeStatus, PolicyChoice, Quality, SamplePlanes, SceneHash, SceneRef, SessionPlan, TileCosts,
+    Timeline, Workload,
 };
 use coordinator::schedule::{Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
@@ -46,8 +46,7 @@ fn workload(images: usize, timeline: Timeline) -> Workload {
         cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
-        method: "joint_carve".to_owned(),
-        codec: "lz4".to_owned(),
+        planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::ZERO,
         timeline,
@@ -66,6 +65,7 @@ fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) -> Opening 
     Opening {
         session,
         workload: workload(4, Timeline::still(0.0)),
+        method: "joint_carve".to_owned(),
         views_per_set,
         frames_per_s: None,
         policy_override: PolicyOverride { policy, ..PolicyOverride::default() },
@@ -128,7 +128,7 @@ impl Script {
             let at_s = self.now.as_secs_f64();
             match command {
                 Command::Apply { sessions, plan, .. } => {
-                    let plan_text = described(&plan.assignment);
+                    let plan_text = described(&plan);
                     let fallback = plan.fallback.map_or(0, NonZeroU32::get);
                     writeln!(self.text, "{at_s:.1} s, sessions {sessions:?}, fallback {fallback}: {plan_text}")
                         .unwrap();
@@ -190,7 +190,7 @@ fn timings(costs: &Costs, times: f64) -> MeasuredCosts {
 }
 
 /// One line: policy, K, tiles, the relays' fan-out, the workload's size, and each node's roles.
-fn described(plan: &Assignment) -> String {
+fn described(SessionPlan { assignment: plan, method, .. }: &SessionPlan) -> String {
     let mut text = format!(
         "plan {} {} K={} tiles={} relays={} images={} cells={} {} {}",
         plan.plan_epoch,
@@ -200,7 +200,7 @@ fn described(plan: &Assignment) -> String {
         plan.relay_fanout.map_or(0, |fanout| fanout.get()),
         plan.workload.sample_cameras.len(),
         plan.workload.cell_count(),
-        plan.workload.method,
+        method,
         plan.workload.lighting,
     );
     for share in &plan.samplers {

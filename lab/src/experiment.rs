@@ -96,7 +96,7 @@ impl Experiment {
         let runtime = runtime()?;
         let (cluster, client) = runtime.block_on(async {
             let listener = listen(([127, 0, 0, 1], 0).into(), false).await?;
-            let cluster = Cluster::start(listener, setup.offer.clone(), engine.clone(), nodes, false).await?;
+            let cluster = Cluster::start(listener, setup.offer.clone().into(), engine.clone(), nodes, false).await?;
             let client = cluster.client().await?;
             anyhow::Ok((cluster, client))
         })?;

@@ -128,7 +128,7 @@ fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result
         wanted: (0..setup.samples.len() as u32).collect(),
         cameras: setup.samples.iter().copied().map(Camera::Pinhole).collect(),
         sampling: args.sampling.to_string(),
-        method: args.method.to_string(),
+        planes: engine.sample_planes(&args.method.to_string())?,
         lighting: args.lighting.to_string(),
         scene_time_s: 0.0,
         temporal_reference_s: None,

@@ -72,7 +72,7 @@ fn unknown_names_are_refused_with_their_field() {
                 cameras: samples.clone(),
                 wanted: vec![0, 1],
                 sampling: sampling.to_owned(),
-                method: "joint_carve".to_owned(),
+                planes: cluster::SamplePlanes::default(),
                 lighting: lighting.to_owned(),
                 scene_time_s: 0.0,
                 temporal_reference_s: None,
@@ -132,9 +132,9 @@ fn a_cluster_gives_what_one_engine_gives() {
     let alone = reference.reconstruct(args.method, ALL_PLANES).unwrap();
     let mut delivered = runtime().unwrap().block_on(async {
         let listener = listen(([127, 0, 0, 1], 0).into(), false).await.unwrap();
-        let cluster = Cluster::start(listener, setup.offer.clone(), engine, 3, false).await.unwrap();
+        let cluster = Cluster::start(listener, setup.offer.clone().into(), engine, 3, false).await.unwrap();
         let client = cluster.client().await.unwrap();
-        let offer = client.status().await.unwrap().offer.unwrap();
+        let offer = client.status().await.unwrap().offers.remove(0);
         assert_eq!((&offer.sample_cameras, &offer.settings), (&setup.offer.rig, &setup.offer.settings));
         let request = request(offer.settings, &reference.cameras).unwrap();
         let request = SessionRequest { policy: PolicyChoice::Pipeline, planes: ALL_PLANES, ..request };

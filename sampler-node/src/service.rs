@@ -1,12 +1,14 @@
 //! The service that compositors fetch images from.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cluster::{Assignment, FetchImages, SetContent};
 use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
-use node::{ByteCache, CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, Relay, SampleWork};
-use node::{beyond_timeline, blocking, most_image_bytes, until_drained, with_guard};
+use node::{ByteCache, CellPlan, PlansInForce, Engine, NodeConfig, NodeMetrics, Operation, Pinned, Relay, SampleWork};
+use node::{beyond_timeline, blocking, has_set, most_image_bytes, until_drained, with_guard};
+use parking_lot::Mutex;
 use tokio::sync::mpsc;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
@@ -24,15 +26,28 @@ type Key = (SetContent, u32, Vec<u32>);
 /// Packed images with their indices.
 type PackedImages = Vec<(u32, EncodedDepthImage)>;
 
+/// Sets of one workload are sampled in the order of their requests: the one that is needed next comes first. Workloads do
+/// not wait for each other; the device shares itself among them.
+#[derive(Debug, Default)]
+struct Turns(Mutex<HashMap<u64, Arc<tokio::sync::Mutex<()>>>>);
+
+impl Turns {
+    fn of(&self, workload_number: u64) -> Arc<tokio::sync::Mutex<()>> {
+        let mut turns = self.0.lock();
+        // One that is held or waited for has more owners.
+        turns.retain(|_, turn| Arc::strong_count(turn) > 1);
+        turns.entry(workload_number).or_default().clone()
+    }
+}
+
 /// The sampler's role.
 pub struct SamplerService {
     engine: Arc<dyn Engine>,
-    plan: CurrentPlan,
+    plans: PlansInForce,
     cache: ByteCache<Key, PackedImages>,
     /// A receiver that takes no chunk for so long is cut off: it keeps images in memory.
     stall: Duration,
-    /// Sets are sampled in the order of their requests: the one that is needed next comes first.
-    sampling: Arc<tokio::sync::Mutex<()>>,
+    turns: Turns,
     relay: Relay,
     metrics: NodeMetrics,
     shutdown: CancellationToken,
@@ -43,7 +58,7 @@ impl SamplerService {
     #[must_use]
     pub fn new(
         engine: Arc<dyn Engine>,
-        plan: CurrentPlan,
+        plans: PlansInForce,
         config: &NodeConfig,
         relay: Relay,
         metrics: NodeMetrics,
@@ -52,25 +67,28 @@ impl SamplerService {
         // The other half is for sets on the device.
         let cache = ByteCache::new("packed sample images", config.set_memory_bytes / 2);
         let stall = config.deadlines.stall;
-        Self { engine, plan, cache, stall, sampling: Arc::default(), relay, metrics, shutdown }
+        Self { engine, plans, cache, stall, turns: Turns::default(), relay, metrics, shutdown }
     }
 
     /// All of this node's images of a set, made for the first request in one submission.
     async fn images(&self, plan: &Assignment, set_index: u32) -> Result<Pinned<PackedImages>, Status> {
         let content = plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))?;
-        let indices = plan.images_of(&self.plan.node_name, set_index).to_vec();
+        let indices = plan.images_of(&self.plans.node_name, set_index).to_vec();
         let work = sample_work(plan, &indices, set_index)?;
         let (engine, metrics) = (self.engine.clone(), self.metrics.clone());
         let own: Vec<_> = indices.iter().map(|&index| work.cameras[index as usize]).collect();
         let most_bytes = most_image_bytes(&plan.workload, &own);
         let key = (content, plan.tile_count, indices.clone());
         let tiles = f64::from(plan.tile_count);
-        let (sampling, current, plan_epoch) = (self.sampling.clone(), self.plan.clone(), plan.plan_epoch);
+        let number = plan.workload_number;
+        let (turn, plans) = (self.turns.of(number), self.plans.clone());
         let make = move || async move {
-            let _one = sampling.lock().await;
-            // A later plan may be in force by now: its sets must not wait for sets of this one.
-            current.require(plan_epoch)?;
-            let images = blocking(move || sample(engine.as_ref(), &work, (&indices, tiles), &metrics)).await?;
+            let _one = turn.lock().await;
+            // A later plan may be in force by now: its sets must not wait for sets that no plan has any more.
+            if !plans.in_force(number).is_some_and(|plan| has_set(&plan, &content, set_index)) {
+                return Err(Status::failed_precondition(format!("no plan in force has this set {set_index}")));
+            }
+            let images = blocking(move || sample(engine.as_ref(), &work, (&indices, tiles), (number, &metrics))).await?;
             let bytes = images.iter().map(|(_, image)| image.payload.len()).sum();
             Ok((images, bytes))
         };
@@ -95,8 +113,8 @@ impl SamplerService {
 #[async_trait]
 impl Sampler for SamplerService {
     async fn fetch_sample_images(&self, request: FetchImages) -> Result<Messages<Chunk>, Status> {
-        let plan = CellPlan::of(&self.plan.require(request.plan_epoch)?, request.cell)?;
-        let name = &self.plan.node_name;
+        let plan = CellPlan::of(&self.plans.remembered(request.workload_number, request.plan_epoch)?, request.cell)?;
+        let name = &self.plans.node_name;
         let own = plan.images_of(name, request.set_index);
         if let Some(index) = request.image_indices.iter().find(|index| !own.contains(index)) {
             if plan.relays(name) {
@@ -160,7 +178,7 @@ fn sample(
     engine: &dyn Engine,
     work: &SampleWork,
     (indices, tiles): (&[u32], f64),
-    metrics: &NodeMetrics,
+    (workload_number, metrics): (u64, &NodeMetrics),
 ) -> Result<PackedImages, Status> {
     let start = Instant::now();
     let images = engine.sample(work)?;
@@ -177,8 +195,8 @@ fn sample(
     let image_s = start.elapsed().as_secs_f64() / whole_images.max(f64::MIN_POSITIVE);
     images.iter().for_each(|_| metrics.image_s.observe(image_s));
     metrics.images_sampled.inc_by(images.len() as u64);
-    metrics.done.add(Operation::SampleImage, whole_images, start.elapsed().as_secs_f64());
-    metrics.done.encoded(whole_images, encoded.iter().map(|(_, image)| image.payload.len()).sum());
+    metrics.done.add(workload_number, Operation::SampleImage, whole_images, start.elapsed().as_secs_f64());
+    metrics.done.encoded(workload_number, whole_images, encoded.iter().map(|(_, image)| image.payload.len()).sum());
     tracing::debug!(
         images = images.len(),
         scene_time_s = work.scene_time_s,

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use cluster::{
-    Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, SessionPlan, Timeline, Workload,
+    Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, SamplePlanes, SceneHash, SceneRef, SessionPlan, Timeline,
+    Workload,
 };
 use coordinator::schedule::{ChoiceError, Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
@@ -159,6 +160,7 @@ fn open(cluster: &Cluster, demand: &Demand) -> Event {
     Event::Opened(Box::new(Opening {
         session: 1,
         workload: workload(cluster.images, demand.sets),
+        method: "simulated".to_owned(),
         views_per_set: demand.views,
         policy_override: PolicyOverride { policy: demand.policy, forced_samplers: None, forced_tiles: demand.tiles },
         frames_per_s: None,
@@ -190,8 +192,7 @@ fn workload(images: usize, sets: u32) -> Workload {
         cell_first_indices: Vec::new(),
         sampling: String::new(),
         lighting: String::new(),
-        method: String::new(),
-        codec: String::new(),
+        planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::ZERO,
         timeline: Timeline { start_s: 0.0, step_s: 1.0, set_count: sets },

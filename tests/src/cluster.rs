@@ -120,6 +120,7 @@ pub fn rig() -> Vec<Camera> {
 #[must_use]
 pub fn offer() -> SceneOffer {
     SceneOffer {
+        name: "ball".to_owned(),
         hash: SceneHash::of(&package()),
         package: package(),
         rig: rig(),
@@ -262,7 +263,7 @@ async fn coordinate(
     listener: TcpListener,
     shutdown: CancellationToken,
 ) -> Result<(), node::ServeError> {
-    coordinator::serve(listener, config, offer(), Observers::default(), shutdown).await
+    coordinator::serve(listener, config, offer().into(), Observers::default(), shutdown).await
 }
 
 /// A client of a coordinator that starts soon.

@@ -1,6 +1,6 @@
 //! The checker detects every violation.
 
-use cluster::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneRef, Timeline, Workload};
+use cluster::{Costs, JoinCluster, NodeStatus, PolicyChoice, SamplePlanes, SceneRef, Timeline, Workload};
 use coordinator::schedule::{Event, Opening, PolicyOverride, Recorder};
 
 use super::*;
@@ -25,8 +25,7 @@ fn workload() -> Workload {
         cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
-        method: "splat".to_owned(),
-        codec: "lz4".to_owned(),
+        planes: SamplePlanes::default(),
         volume: offer.volume,
         background_linear: offer.background_linear,
         timeline: Timeline::still(0.0),
@@ -59,6 +58,7 @@ fn log(plan_epoch: u64) -> Vec<u8> {
     let opening = Opening {
         session: 9,
         workload: workload(),
+        method: "splat".to_owned(),
         views_per_set: 10,
         frames_per_s: None,
         fallbacks: Vec::new(),

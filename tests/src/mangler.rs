@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cluster::{Assignment, Costs, FetchImages, MeasureCosts, Ready, RenderViews};
+use cluster::{Assignment, FetchImages, MeasureCosts, Measured, Ready, RenderViews};
 use codec::{Chunk, FramePart};
 use node::{ServeError, serve};
 use parking_lot::Mutex;
@@ -111,7 +111,7 @@ impl Sampler for Front {
 
 #[async_trait]
 impl Node for Front {
-    async fn measure_costs(&self, request: MeasureCosts) -> Result<Costs, Status> {
+    async fn measure_costs(&self, request: MeasureCosts) -> Result<Measured, Status> {
         NodeClient::new(connect(&self.node()).await?).measure_costs(request).await
     }
 

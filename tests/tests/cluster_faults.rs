@@ -31,6 +31,7 @@ fn raw_request(session: &Session) -> RenderViews {
     let Camera::Pinhole(camera) = rig()[0];
     RenderViews {
         plan_epoch: session.plan().assignment.plan_epoch,
+        workload_number: session.plan().assignment.workload_number,
         set_index: 0,
         method: "splat".to_owned(),
         codec: FrameCodec::Lz4,
@@ -66,6 +67,7 @@ async fn old_plans_are_refused_by_every_service() {
     let sampler = SamplerClient::new(connect(&share.address).await.unwrap());
     let fetch = FetchImages {
         plan_epoch: old_plan.plan_epoch,
+        workload_number: old_plan.workload_number,
         set_index: 0,
         cell: 0,
         image_indices: share.image_indices.clone(),
@@ -109,6 +111,7 @@ async fn bad_sessions_are_refused_by_field() {
     let sampler = SamplerClient::new(connect(&share.address).await.unwrap());
     let fetch = FetchImages {
         plan_epoch: session.plan().assignment.plan_epoch,
+        workload_number: session.plan().assignment.workload_number,
         set_index: 0,
         cell: 0,
         image_indices: vec![77],
@@ -121,9 +124,10 @@ async fn bad_sessions_are_refused_by_field() {
     let patient = cluster::SessionRequest { refinement_steps: 65, ..request(PolicyChoice::Auto, MOVING) };
     let error = cluster.session(patient).await.unwrap_err().to_string();
     assert!(error.contains("refinement_step_count is 65"), "{error}");
-    let elsewhere =
-        cluster::SessionRequest { scene: Some(SceneHash::of(b"other")), ..request(PolicyChoice::Auto, MOVING) };
-    assert!(cluster.session(elsewhere).await.unwrap_err().to_string().contains("scene_hash"));
+    let elsewhere = cluster::SessionRequest { scene: Some("other".to_owned()), ..request(PolicyChoice::Auto, MOVING) };
+    assert!(
+        cluster.session(elsewhere).await.unwrap_err().to_string().contains("scene: other is not on offer; ball are")
+    );
 }
 
 fn with_camera(good: &RenderViews, change: impl Fn(&mut depth_image::PinholeCamera)) -> RenderViews {

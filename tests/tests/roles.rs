@@ -78,6 +78,7 @@ async fn chained(cluster: &Cluster) -> Assignment {
 async fn ask(address: &str, plan: &Assignment, set_index: u32) -> WholeFrame {
     let request = RenderViews {
         plan_epoch: plan.plan_epoch,
+        workload_number: plan.workload_number,
         set_index,
         method: "splat".to_owned(),
         codec: FrameCodec::Lz4,
@@ -104,7 +105,7 @@ async fn compositors_relay_images_in_a_chain() {
     assert!(cluster.take_counts().iter().all(|&times| times == 1), "sampled once");
     let relayed = |address: String, plan_epoch| async move {
         let sampler = SamplerClient::new(connect(&address).await.unwrap());
-        let fetch = FetchImages { plan_epoch, set_index: 1, cell: 0, image_indices: vec![0, 1, 2] };
+        let fetch = FetchImages { plan_epoch, workload_number: 1, set_index: 1, cell: 0, image_indices: vec![0, 1, 2] };
         sampler.fetch_sample_images(fetch).await.map(|chunks| chunks.collect::<Vec<_>>())
     };
     let chunks = relayed(second.address.clone(), 100).await.unwrap().await;
@@ -139,7 +140,13 @@ async fn a_set_that_was_not_begun_when_its_plan_ended_is_not_sampled() {
     engine.keep_pace(Pace { image: Duration::from_millis(200), ..Pace::default() });
     let fetch = |set_index| {
         let (address, image_indices) = (share.address.clone(), share.image_indices.clone());
-        let fetch = FetchImages { plan_epoch: plan.plan_epoch, set_index, cell: 0, image_indices };
+        let fetch = FetchImages {
+            plan_epoch: plan.plan_epoch,
+            workload_number: plan.workload_number,
+            set_index,
+            cell: 0,
+            image_indices,
+        };
         tokio::spawn(async move {
             let sampler = SamplerClient::new(connect(&address).await.unwrap());
             sampler.fetch_sample_images(fetch).await.map(drop)

@@ -37,6 +37,7 @@ pub(super) fn assignment(plan_epoch: u64, workload: Workload, choice: &Choice, n
     let relays = choice.policy == Policy::Pipeline && nodes.len() > 1;
     Assignment {
         plan_epoch,
+        workload_number: 1,
         policy: choice.policy,
         workload,
         samplers: sampler_shares(&choice.load, &sampling),

@@ -62,6 +62,8 @@ pub struct Opening {
     pub session: u64,
     /// The session's workload.
     pub workload: Workload,
+    /// How its views are reconstructed.
+    pub method: String,
     /// V.
     pub views_per_set: usize,
     /// Pictures a second, of `views_per_set` views each; `None`: as fast as they come.
@@ -105,6 +107,7 @@ impl Event {
 impl Opening {
     fn validate(&self) -> Result<(), InvalidField> {
         self.workload.validate()?;
+        nonempty(&self.method, "method")?;
         check_demand(self.views_per_set, self.frames_per_s)?;
         self.policy_override.validate()?;
         self.fallbacks.iter().try_for_each(Quality::validate)?;

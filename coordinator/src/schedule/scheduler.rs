@@ -145,7 +145,7 @@ impl Scheduler {
         ClusterStatus {
             plan_epoch: self.plan_epoch,
             nodes: self.members.values().map(|member| member.status.clone()).collect(),
-            offer: None,
+            offers: Vec::new(),
             plan: self.active_plan().map(|active| active.plan.clone()),
             session_count: workload.map_or(0, |workload| workload.sessions().len() as u32),
             views_per_set: workload.map_or(0, |workload| workload.views() as u64),

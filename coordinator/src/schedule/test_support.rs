@@ -1,6 +1,8 @@
 //! Shared by tests: random numbers, costs, and events.
 
-use cluster::{Costs, JoinCluster, NodeStatus, PolicyChoice, SceneHash, SceneRef, TileCosts, Timeline, Workload};
+use cluster::{
+    Costs, JoinCluster, NodeStatus, PolicyChoice, SamplePlanes, SceneHash, SceneRef, TileCosts, Timeline, Workload,
+};
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
@@ -77,8 +79,7 @@ pub(super) fn workload(images: usize) -> Workload {
         cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
-        method: "joint_carve".to_owned(),
-        codec: "lz4".to_owned(),
+        planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::ZERO,
         timeline: Timeline::still(0.0),
@@ -97,6 +98,7 @@ pub(super) fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) 
     Opening {
         session,
         workload: workload(4),
+        method: "joint_carve".to_owned(),
         views_per_set,
         frames_per_s: None,
         policy_override: PolicyOverride { policy, ..PolicyOverride::default() },

@@ -18,6 +18,7 @@ struct Session {
     policy_override: PolicyOverride,
     fallbacks: Vec<Quality>,
     viewpoints: Vec<PinholeCamera>,
+    method: String,
 }
 
 /// Sessions of one workload.
@@ -61,6 +62,7 @@ impl WorkloadState {
             policy_override: opening.policy_override,
             fallbacks: opening.fallbacks.clone(),
             viewpoints: opening.viewpoints.clone(),
+            method: opening.method.clone(),
         });
         self.update_cells();
     }
@@ -167,6 +169,12 @@ impl WorkloadState {
         self.quality().map_or(1.0, |quality| quality.frame_rate_ratio)
     }
 
+    /// How views are reconstructed: under a fallback as it says, else as the last session asks.
+    pub(super) fn method(&self) -> String {
+        let asked = self.sessions.last().map(|session| &session.method);
+        self.quality().map(|quality| &quality.method).or(asked).cloned().unwrap_or_default()
+    }
+
     /// The workload at the present fallback.
     pub(super) fn degraded(&self) -> Workload {
         let Some(quality) = self.quality() else { return self.requested.clone() };
@@ -176,7 +184,6 @@ impl WorkloadState {
         };
         Workload {
             lighting: quality.lighting.clone(),
-            method: quality.method.clone(),
             sample_cameras: self.requested.sample_cameras.iter().map(sized).collect(),
             ..self.requested.clone()
         }

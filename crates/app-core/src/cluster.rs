@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use client::Client;
-use coordinator::{CoordinatorConfig, Observers, SceneOffer};
+use coordinator::{CoordinatorConfig, Observers, SceneOffers};
 use node::{Engine, NodeConfig, NodeMetrics, ServeError};
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
@@ -25,20 +25,20 @@ pub struct Cluster {
 }
 
 impl Cluster {
-    /// Starts a coordinator on `listener` and `nodes` nodes, and waits until all have joined. Nodes fetch the scene
-    /// unless the engine has it.
+    /// Starts a coordinator on `listener` and `nodes` nodes, and waits until all have joined. Nodes fetch
+    /// scenes unless the engine has them.
     ///
     /// # Errors
     /// A port is not to be had, or nodes do not join.
     pub async fn start(
         listener: TcpListener,
-        offer: SceneOffer,
+        offers: SceneOffers,
         engine: Arc<dyn Engine>,
         nodes: usize,
         insecure_bind: bool,
     ) -> anyhow::Result<Self> {
         let memory = MemoryArgs { set_memory: None }.set_memory_bytes(engine.is_software());
-        Self::start_within(memory, listener, offer, engine, nodes, insecure_bind).await
+        Self::start_within(memory, listener, offers, engine, nodes, insecure_bind).await
     }
 
     /// As [`Cluster::start`], with `set_memory_bytes` for the sample sets of all nodes together.
@@ -48,7 +48,7 @@ impl Cluster {
     pub async fn start_within(
         set_memory_bytes: usize,
         listener: TcpListener,
-        offer: SceneOffer,
+        offers: SceneOffers,
         engine: Arc<dyn Engine>,
         nodes: usize,
         insecure_bind: bool,
@@ -57,7 +57,7 @@ impl Cluster {
         let mut cluster = Self { address, shutdown: CancellationToken::new(), servers: JoinSet::new() };
         let config = CoordinatorConfig { insecure_bind, ..CoordinatorConfig::default() };
         let (observers, shutdown) = (Observers::default(), cluster.shutdown.clone());
-        cluster.servers.spawn(coordinator::serve(listener, config, offer, observers, shutdown));
+        cluster.servers.spawn(coordinator::serve(listener, config, offers, observers, shutdown));
         for number in 0..nodes {
             let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
             // Enough digits to sort well: members are listed by name.

@@ -1,6 +1,6 @@
 //! Common parts of the program's commands and the lab's.
 //!
-//! [`setup`] makes a scene on offer out of arguments. [`cluster`] runs coordinator and nodes in one process.
+//! [`setup`] makes a scene on offer out of arguments, and [`scenes`] several. [`cluster`] runs coordinator and nodes in one process.
 //! [`delivery`] opens sessions and receives views, and [`live`] follows a path with a moving camera. [`camera_file`]
 //! reads and writes camera files. [`exit`] defines the exit status.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -13,5 +13,6 @@ pub mod live;
 pub mod pictures;
 pub mod memory;
 pub mod process;
+pub mod scenes;
 pub mod setup;
 pub mod sizes;

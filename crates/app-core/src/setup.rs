@@ -104,6 +104,7 @@ impl SceneArgs {
         let samples = self.sampling.cameras(around.clone());
         let package = scene::pack(&scene);
         let offer = SceneOffer {
+            name: self.scene.to_string(),
             hash: SceneHash::of(&package),
             package: package.into(),
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),

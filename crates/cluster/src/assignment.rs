@@ -32,11 +32,13 @@ pub struct CompositorShare {
     pub view_weight: u32,
 }
 
-/// One plan for the whole cluster. Every node gets the same and finds its own roles in it: one, both or none.
+/// The plan of one workload. Every node of it gets the same and finds its own roles in it: one, both or none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assignment {
-    /// Fences: a node refuses a lower one than it has.
+    /// Fences: a node refuses a lower one than it has of this workload. No two plans of a coordinator have the same.
     pub plan_epoch: u64,
+    /// The workload's number at the coordinator, which stays the same from plan to plan.
+    pub workload_number: u64,
     /// How views come about.
     pub policy: Policy,
     /// The images to sample, when and how.

@@ -28,11 +28,11 @@ pub use check::{
     InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints,
 };
 pub use costs::{Costs, MeasuredCosts, ROW_PARTS, TileCosts};
-pub use node::{JoinCluster, MeasureCosts, NodeStatus, Ready, SamplerReport, Welcome, WorkReport};
+pub use node::{JoinCluster, MeasureCosts, Measured, NodeStatus, Ready, SamplerReport, Welcome, WorkReport};
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};
 pub use scene::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, ScenePart, SceneRef};
 pub use session::{ChangeSession, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage};
 pub use status::{AchievedTime, ClusterStatus, NodeCondition, OfferSettings, OfferStatus};
 pub use timeline::{Refinement, Timeline};
 pub use views::{FetchImages, LiveRequest, RenderViews, RequestedView, check_view_count};
-pub use workload::{SetContent, Workload};
+pub use workload::{SamplePlanes, SetContent, Workload};

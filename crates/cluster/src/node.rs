@@ -3,11 +3,11 @@
 use depth_image::{PinholeCamera, ViewPlanes};
 use serde::{Deserialize, Serialize};
 
-use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, within};
-use crate::costs::MeasuredCosts;
+use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, viewpoints, within};
+use crate::costs::{Costs, MeasuredCosts};
 use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use crate::scene::SceneRef;
-use crate::workload::Workload;
+use crate::workload::{SamplePlanes, Workload};
 
 /// A node that wants to be a member.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -52,8 +52,12 @@ pub struct Welcome {
 /// Asks a node what operations cost it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasureCosts {
-    /// The workload to measure, at set 0 of its timeline.
+    /// The workload to measure, at set 0 of its timeline, with the planes that the method needs.
     pub workload: Workload,
+    /// How views are reconstructed.
+    pub method: String,
+    /// How frames are encoded.
+    pub codec: String,
     /// Views that are reconstructed and drawn, in turn: of one size, at least one. A view's cost depends on its place.
     pub typical_views: Vec<PinholeCamera>,
     /// Most views of one call: fewer are drawn directly where they take long.
@@ -74,6 +78,8 @@ impl MeasureCosts {
     pub fn validate(&self) -> Result<(), InvalidField> {
         within(self.batch_count, 1..=MAX_BATCH, "batch_count", "from 1 to 64")?;
         self.workload.validate()?;
+        nonempty(&self.method, "reconstruction_method")?;
+        nonempty(&self.codec, "frame_codec")?;
         if self.workload.sample_cameras.is_empty() {
             return Err(InvalidField::Missing { field: "sample_cameras" });
         }
@@ -84,6 +90,15 @@ impl MeasureCosts {
             None => Ok(()),
         }
     }
+}
+
+/// What a node has measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// Seconds of each operation.
+    pub costs: Costs,
+    /// The planes of sample images that the reconstruction method needs, with which the images were measured.
+    pub planes: SamplePlanes,
 }
 
 /// A node is ready for a plan.
@@ -110,6 +125,8 @@ pub struct WorkReport {
     pub node_name: String,
     /// The plan under which the work was done.
     pub plan_epoch: u64,
+    /// The workload of that plan.
+    pub workload_number: u64,
     /// Mean times of the operations.
     pub costs: MeasuredCosts,
     /// Seconds of all operations together.
@@ -118,6 +135,8 @@ pub struct WorkReport {
     pub views: u64,
     /// Views not made, or not sent.
     pub dropped_views: u64,
+    /// Where the workload's live viewers on this member are; those that are near to each other may be merged.
+    pub viewpoints: Vec<PinholeCamera>,
 }
 
 impl WorkReport {
@@ -126,7 +145,8 @@ impl WorkReport {
     pub fn validate(&self) -> Result<(), InvalidField> {
         nonempty(&self.node_name, "node_name")?;
         self.costs.validate()?;
-        finite_seconds(self.busy_s, "busy_s")
+        finite_seconds(self.busy_s, "busy_s")?;
+        viewpoints(&self.viewpoints)
     }
 }
 

@@ -7,19 +7,18 @@ use glam::UVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::assignment::Assignment;
-use crate::check::{InvalidField, at_most, frame_rate, nonempty, ratio, reason, tile_count, viewpoints, within};
+use crate::check::{InvalidField, at_most, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints, within};
 use crate::check_seconds;
 use crate::costs::Costs;
 use crate::limits::{MAX_FALLBACKS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS, MAX_VIEWS_PER_SET};
 use crate::policy::{Policy, PolicyChoice};
-use crate::scene::SceneHash;
 use crate::timeline::Timeline;
 
 /// The request that opens a session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionRequest {
-    /// `None`: the coordinator's own scene.
-    pub scene: Option<SceneHash>,
+    /// The name or the hash of a scene on offer; `None`: the first.
+    pub scene: Option<String>,
     /// How views are reconstructed.
     pub method: String,
     /// How images are sampled.
@@ -66,6 +65,7 @@ impl SessionRequest {
     pub fn validate(&self) -> Result<(), InvalidField> {
         within(self.views_per_set, 1..=MAX_VIEWS_PER_SET, "views_per_set_count", "from 1 to 65536")?;
         within(self.refinement_steps, 1..=MAX_REFINEMENT_STEPS, "refinement_step_count", "from 1 to 64")?;
+        text(self.scene.as_deref().unwrap_or_default(), "scene")?;
         nonempty(&self.method, "reconstruction_method")?;
         nonempty(&self.sampling, "sampling_method")?;
         nonempty(&self.lighting, "lighting")?;
@@ -165,6 +165,8 @@ pub struct SessionPlan {
     pub scene_load_s: f64,
     /// The number of the session's fallback in force, from 1; `None`: the quality that was asked for.
     pub fallback: Option<NonZeroU32>,
+    /// How views are reconstructed: under a fallback by every session, else by most.
+    pub method: String,
     /// Pictures a second, of those asked for.
     pub frame_rate_ratio: f64,
 }
@@ -202,6 +204,7 @@ impl SessionPlan {
         self.assignment.validate()?;
         self.costs.validate()?;
         reason(&self.reason, "plan.reason")?;
+        nonempty(&self.method, "plan.reconstruction_method")?;
         check_seconds!(self; predicted_pipeline_s, predicted_direct_s, predicted_time_share_s, predicted_k_fd_s);
         check_seconds!(self; predicted_enumerated_s, scene_load_s);
         ratio(self.frame_rate_ratio, "frame_rate_ratio")

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use crate::check::{InvalidField, at_most, finite_seconds, nonempty, text};
 use crate::costs::Costs;
-use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS};
+use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_SCENES};
 use crate::node::NodeStatus;
 use crate::policy::Policy;
 use crate::scene::SceneRef;
@@ -21,8 +21,8 @@ pub struct ClusterStatus {
     pub plan_epoch: u64,
     /// Members by name.
     pub nodes: Vec<NodeStatus>,
-    /// The scene on offer.
-    pub offer: Option<OfferStatus>,
+    /// The scenes on offer; sessions that name none get the first.
+    pub offers: Vec<OfferStatus>,
     /// The plan in force; `None` while no session is open, or no node is a member.
     pub plan: Option<SessionPlan>,
     /// Sessions that share the plan, or wait for one.
@@ -44,7 +44,8 @@ impl ClusterStatus {
         at_most(self.nodes.len(), MAX_NODES, "nodes")?;
         at_most(self.conditions.len(), MAX_NODES, "conditions")?;
         at_most(self.achieved.len(), MAX_POLICIES, "achieved_times")?;
-        self.offer.as_ref().map_or(Ok(()), OfferStatus::validate)?;
+        at_most(self.offers.len(), MAX_SCENES, "offers")?;
+        self.offers.iter().try_for_each(OfferStatus::validate)?;
         self.plan.as_ref().map_or(Ok(()), SessionPlan::validate)?;
         self.conditions.iter().try_for_each(NodeCondition::validate)?;
         self.achieved.iter().try_for_each(|achieved| finite_seconds(achieved.busy_s, "busy_s"))?;
@@ -86,9 +87,11 @@ impl NodeCondition {
     }
 }
 
-/// The scene on offer.
+/// A scene on offer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OfferStatus {
+    /// The name by which sessions ask for it, unique among the offers.
+    pub name: String,
     /// The scene by content.
     pub scene: SceneRef,
     /// Sample cameras for sessions that bring none.
@@ -119,6 +122,7 @@ impl OfferStatus {
         if !self.origin_in_source.is_finite() {
             return Err(InvalidField::out_of_range("origin_in_source", self.origin_in_source, "finite"));
         }
+        nonempty(&self.name, "offers.name")?;
         self.scene.validate()?;
         at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras")?;
         let OfferSettings { method, sampling, lighting } = &self.settings;

@@ -3,7 +3,7 @@
 use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera};
 use glam::{UVec2, Vec3};
 
-use crate::{Assignment, CompositorShare, Policy, SamplerShare, SceneHash, SceneRef, Timeline, Workload};
+use crate::{Assignment, CompositorShare, Policy, SamplePlanes, SamplerShare, SceneHash, SceneRef, Timeline, Workload};
 
 pub(crate) fn camera() -> PinholeCamera {
     PinholeCamera::looking_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(40, 30))
@@ -22,8 +22,7 @@ pub(crate) fn workload() -> Workload {
         cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "phong".to_owned(),
-        method: "joint_carve".to_owned(),
-        codec: "raw".to_owned(),
+        planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::splat(0.2),
         timeline: Timeline { start_s: 1.0, step_s: 0.5, set_count: 3 },
@@ -35,6 +34,7 @@ pub(crate) fn workload() -> Workload {
 pub(crate) fn assignment() -> Assignment {
     Assignment {
         plan_epoch: 4,
+        workload_number: 3,
         policy: Policy::Pipeline,
         workload: workload(),
         samplers: vec![SamplerShare {

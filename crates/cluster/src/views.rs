@@ -11,6 +11,8 @@ use crate::limits::{MAX_LIVE_VIEWS_PER_REQUEST, MAX_SAMPLE_CAMERAS, MAX_TILES, M
 pub struct RenderViews {
     /// The epoch of the session's plan.
     pub plan_epoch: u64,
+    /// The workload of that plan.
+    pub workload_number: u64,
     /// Index into the timeline.
     pub set_index: u32,
     /// How views are reconstructed.
@@ -70,6 +72,8 @@ pub fn check_view_count(count: usize, is_live: bool) -> Result<(), InvalidField>
 pub struct FetchImages {
     /// The epoch of the asker's plan.
     pub plan_epoch: u64,
+    /// The workload of that plan.
+    pub workload_number: u64,
     /// Index into the timeline.
     pub set_index: u32,
     /// Index into the workload's view cells.

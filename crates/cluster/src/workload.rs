@@ -11,8 +11,8 @@ use crate::limits::{MAX_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS};
 use crate::scene::SceneRef;
 use crate::timeline::{Refinement, Timeline};
 
-/// The images to sample, when and how. Methods are text, as on the command line: nodes parse them, so that a new method
-/// changes nothing here.
+/// Everything that samples depend on. Methods are text, as on the command line: nodes parse them, so that a new method
+/// changes nothing here. The reconstruction method, the codec, planes, sizes and rate of views belong to requests.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Workload {
     /// The scene.
@@ -25,10 +25,8 @@ pub struct Workload {
     pub sampling: String,
     /// How samples are lit.
     pub lighting: String,
-    /// How views are reconstructed, unless they ask for another method.
-    pub method: String,
-    /// How frames are encoded, unless views ask for another codec.
-    pub codec: String,
+    /// The planes of images beside colour and inverse depth. Views may be made by every method that needs no others.
+    pub planes: SamplePlanes,
     /// The bounds of reconstruction.
     pub volume: Aabb,
     /// Radiance of rays that leave the scene, linear RGB.
@@ -39,6 +37,23 @@ pub struct Workload {
     pub illumination: Illumination,
     /// Steps in which a still picture is refined: from 1, finished at once, to [`MAX_REFINEMENT_STEPS`].
     pub refinement_steps: u32,
+}
+
+/// Planes of sample images that not every reconstruction method needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+pub struct SamplePlanes {
+    /// Normals of surfaces.
+    pub normals: bool,
+    /// Inverse depth at the corners of texels.
+    pub corner_inverse_depths: bool,
+}
+
+impl SamplePlanes {
+    /// Whether images with these planes have all of `needed`.
+    #[must_use]
+    pub fn contain(self, needed: Self) -> bool {
+        (self.normals || !needed.normals) && (self.corner_inverse_depths || !needed.corner_inverse_depths)
+    }
 }
 
 impl Workload {
@@ -95,8 +110,6 @@ impl Workload {
         }
         nonempty(&self.sampling, "sampling_method")?;
         nonempty(&self.lighting, "lighting")?;
-        nonempty(&self.method, "reconstruction_method")?;
-        nonempty(&self.codec, "frame_codec")?;
         if self.volume.is_empty() {
             return Err(InvalidField::out_of_range("bounds", "empty", "min <= max on every axis"));
         }
@@ -145,8 +158,7 @@ struct Shown<'a> {
     temporal_reference_s: f32,
     sampling: &'a str,
     lighting: &'a str,
-    /// It decides which planes images have.
-    method: &'a str,
+    planes: SamplePlanes,
     volume: Aabb,
     background_linear: Vec3,
     refinement: [u32; 2],
@@ -165,7 +177,7 @@ impl SetContent {
             temporal_reference_s: workload.timeline.temporal_reference_s(set_index).unwrap_or(time_s),
             sampling: &workload.sampling,
             lighting: &workload.lighting,
-            method: &workload.method,
+            planes: workload.planes,
             volume: workload.volume,
             background_linear: workload.background_linear,
             refinement: [refinement.step, refinement.steps],

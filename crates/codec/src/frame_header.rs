@@ -13,6 +13,10 @@ pub const MAX_FRAME_BYTES: u64 = 512 << 20;
 pub struct FrameHeader {
     /// The set that the frame shows: one, never a mixture.
     pub sample_set_id: SampleSetId,
+    /// The view cell whose images the frame is made from.
+    pub cell: u32,
+    /// The view's own cell was not loaded yet: the frame is made from the nearest one that was.
+    pub is_neighbour_cell: bool,
     /// The camera of the view, as requested.
     pub camera: PinholeCamera,
     /// Columns and rows.

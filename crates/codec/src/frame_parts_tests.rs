@@ -7,6 +7,8 @@ use crate::{FrameCodec, SampleSetId, StageTimes};
 fn header(data: &[u8]) -> FrameHeader {
     FrameHeader {
         sample_set_id: SampleSetId { plan_epoch: 1, index: 0 },
+        cell: 0,
+        is_neighbour_cell: false,
         camera: PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8)),
         size_px: UVec2::splat(8),
         codec: FrameCodec::Lz4,

@@ -22,12 +22,20 @@ pub struct EncodedView {
 }
 
 impl EncodedView {
-    /// The header of a frame with this view.
+    /// The header of a frame with this view, made from the images of a set's view cell: its index, and whether it is not
+    /// the view's own.
     #[must_use]
-    pub fn header(&self, sample_set_id: SampleSetId, camera: PinholeCamera, stage_times: StageTimes) -> FrameHeader {
+    pub fn header(
+        &self,
+        (sample_set_id, cell, is_neighbour_cell): (SampleSetId, u32, bool),
+        camera: PinholeCamera,
+        stage_times: StageTimes,
+    ) -> FrameHeader {
         let [color_bytes, inverse_depth_bytes, provenance_bytes] = self.lengths;
         FrameHeader {
             sample_set_id,
+            cell,
+            is_neighbour_cell,
             camera,
             size_px: self.size_px,
             codec: self.codec,
@@ -150,7 +158,7 @@ mod tests {
     fn sent(view: &View) -> WholeFrame {
         let encoded = encode_view(view, FrameCodec::Lz4).unwrap();
         let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, view.size_px);
-        let header = encoded.header(SampleSetId { plan_epoch: 3, index: 2 }, camera, StageTimes::default());
+        let header = encoded.header((SampleSetId { plan_epoch: 3, index: 2 }, 0, false), camera, StageTimes::default());
         WholeFrame { frame: 1, header, data: encoded.data }
     }
 

@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use std::str::FromStr;
 use std::sync::{Arc, Weak};
 
+use cluster::SamplePlanes;
 use depth_image::{DepthImage, View};
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 use parking_lot::Mutex;
 use reconstruction::{ReconstructionError, ReconstructionMethod, Reconstructor, RequiredPlanes, SetDescription};
-use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, SamplePlanes, Visibility};
+use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, Visibility};
 use sampling::{Sampler, SamplingError, SamplingMethod};
 use scene::{Limits, Scene};
 
@@ -129,6 +130,12 @@ impl Engine for GpuEngine {
         Ok(parsed::<SamplingMethod>("sampling_method", sampling)?.images_are_independent())
     }
 
+    fn sample_planes(&self, method: &str) -> Result<SamplePlanes, EngineError> {
+        let method: ReconstructionMethod = parsed("reconstruction_method", method)?;
+        let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
+        Ok(SamplePlanes { normals: normal, corner_inverse_depths: corner_inverse_depth })
+    }
+
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
         let scene = self.scene(&request.scene_hash)?;
         let cluster::Refinement { step, steps } = request.refinement;
@@ -136,14 +143,13 @@ impl Engine for GpuEngine {
             refinement: Refinement { step, steps },
             ..draw_work(&scene, parsed("lighting", &request.lighting)?, request.scene_time_s)
         };
-        let method: ReconstructionMethod = parsed("reconstruction_method", &request.method)?;
-        let RequiredPlanes { normal, corner_inverse_depth: corners } = method.required_planes();
+        let SamplePlanes { normals: normal, corner_inverse_depths: corners } = request.planes;
         let work = sampling::SampleWork {
             draw,
             cameras: &request.cameras,
             wanted: &request.wanted,
             method: parsed("sampling_method", &request.sampling)?,
-            planes: SamplePlanes { specular: true, normal, corners, ..SamplePlanes::default() },
+            planes: render::SamplePlanes { specular: true, normal, corners, ..Default::default() },
             temporal_reference_s: request.temporal_reference_s,
         };
         self.sampler.sample(&work).map_err(sampling_error)

@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use cluster::{Refinement, Workload};
+use cluster::{Refinement, SamplePlanes, Workload};
 use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, View, ViewPlanes};
 use glam::Vec3;
 use tokio::sync::watch;
@@ -26,6 +26,8 @@ pub trait Engine: Send + Sync + 'static {
     fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError>;
     /// Whether an image depends on its own camera alone, so that it is tileable.
     fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError>;
+    /// The planes of sample images that a reconstruction method needs.
+    fn sample_planes(&self, method: &str) -> Result<SamplePlanes, EngineError>;
     /// Samples the wanted images of a set, in their order.
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError>;
     /// Uploads a set for reconstruction. Fails for images that the device cannot take.
@@ -49,8 +51,8 @@ pub struct SampleWork {
     /// Indices of the cameras to sample.
     pub wanted: Vec<u32>,
     pub sampling: String,
-    /// The reconstruction method, which decides which planes images need.
-    pub method: String,
+    /// Planes beside colour and inverse depth.
+    pub planes: SamplePlanes,
     pub lighting: String,
     pub scene_time_s: f32,
     /// Scene time of the temporal reference, for sampling methods with temporal hysteresis.
@@ -68,7 +70,7 @@ impl SampleWork {
             cameras: workload.sample_cameras.clone(),
             wanted: (0..workload.sample_cameras.len() as u32).collect(),
             sampling: workload.sampling.clone(),
-            method: workload.method.clone(),
+            planes: workload.planes,
             lighting: workload.lighting.clone(),
             scene_time_s: workload.timeline.start_s as f32,
             temporal_reference_s: None,
@@ -228,6 +230,10 @@ impl Engine for DeviceLossMonitor {
 
     fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
         self.monitored(self.engine.images_are_sequential(sampling))
+    }
+
+    fn sample_planes(&self, method: &str) -> Result<SamplePlanes, EngineError> {
+        self.monitored(self.engine.sample_planes(method))
     }
 
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {

@@ -1,5 +1,5 @@
-//! The parts that all services share: the device's boundary, configuration, logging, health, measured costs, the plan in
-//! force, scenes by hash, membership and drain.
+//! The parts that all services share: the device's boundary, configuration, logging, health, measured costs, the plans
+//! in force, scenes by hash, membership and drain.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod blocking;
@@ -16,6 +16,7 @@ mod service;
 mod set_bytes;
 mod streams;
 mod telemetry;
+mod viewers;
 mod work_done;
 
 pub use blocking::blocking;
@@ -24,7 +25,7 @@ pub use config::{Deadlines, NodeConfig, Quotas};
 pub use connections::Connections;
 pub use engine::{DeviceLossMonitor, DirectWork, Engine, EngineError, SampleSet, SampleWork, UploadedSet, ViewWork};
 pub use membership::keep_membership;
-pub use plan::{CellPlan, CurrentPlan, Relay, beyond_timeline};
+pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};
 pub use scenes::Scenes;
 pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve, with_reflection};
 pub use service::NodeService;

@@ -4,7 +4,7 @@
 use std::fmt::Display;
 use std::time::Instant;
 
-use cluster::{Costs, MeasureCosts, ROW_PARTS, TileCosts, Workload};
+use cluster::{Costs, MeasureCosts, Measured, ROW_PARTS, TileCosts, Workload};
 use codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet};
 use codec::{decode_depth_image, encode_depth_image, encode_view};
 use depth_image::{Camera, PinholeCamera, View};
@@ -20,24 +20,26 @@ const LONG_RUN_S: f64 = 0.5;
 const DIRECT_CALL_S: f64 = 1.0;
 
 /// Measures g_s, g_v, c, d and e one after the other. Nothing else may run on the device meanwhile.
-pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Costs, Status> {
+pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Measured, Status> {
     let workload = &request.workload;
-    let sample = SampleWork::of(workload);
+    let planes = engine.sample_planes(&request.method)?;
+    let sample = SampleWork { planes, ..SampleWork::of(workload) };
     let (encoded, sample_s) = timed(|| sampled(engine, &sample))?;
     let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?)?))?;
     let (made, reconstruct_view_s) = reconstruct_view_s(engine, set.as_ref(), request)?;
     let in_order = engine.images_are_sequential(&workload.sampling)?;
     let sample_image_s = sample_s / encoded.len().max(1) as f64;
     let is_tileable = engine.images_are_independent(&workload.sampling)?;
-    Ok(Costs {
+    let costs = Costs {
         sample_image_s,
         tiles: if is_tileable { tile_costs(engine, &sample, sample_image_s)? } else { None },
         direct_view_s: direct_view_s(engine, request)?,
         reconstruct_view_s,
         load_set_s,
-        encode_view_s: encode_s(&made, &workload.codec)?,
+        encode_view_s: encode_s(&made, &request.codec)?,
         in_order,
-    })
+    };
+    Ok(Measured { costs, planes })
 }
 
 /// Images as they leave a sampler, which encodes one set before it samples the next.
@@ -86,7 +88,7 @@ fn reconstruct_view_s(
     let views = request.views(request.batch_count.max(request.typical_views.len() as u32));
     let work = |cameras: &[PinholeCamera]| ViewWork {
         cameras: cameras.to_vec(),
-        method: request.workload.method.clone(),
+        method: request.method.clone(),
         planes: request.planes,
     };
     let calls: Vec<ViewWork> = views.chunks(batch.max(1)).map(work).collect();

@@ -4,7 +4,7 @@ use std::any::Any;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use cluster::{Refinement, SceneHash, SceneRef, Timeline};
+use cluster::{Refinement, SamplePlanes, SceneHash, SceneRef, Timeline};
 use depth_image::{Aabb, DepthImage, Illumination, SpecularPlanes, ViewPlanes};
 use glam::{UVec2, Vec3};
 
@@ -94,6 +94,10 @@ impl Engine for Sleeper {
         Ok(false)
     }
 
+    fn sample_planes(&self, _: &str) -> Result<SamplePlanes, EngineError> {
+        Ok(SamplePlanes { normals: true, ..SamplePlanes::default() })
+    }
+
     fn sample(&self, request: &SampleWork) -> Result<Vec<DepthImage>, EngineError> {
         self.calls.lock().unwrap().refinements.push(request.refinement);
         let parts_s: f64 = request.cameras.iter().map(|camera| self.sample_parts_s(camera)).sum();
@@ -130,19 +134,25 @@ pub(crate) fn request(batch_count: u32) -> MeasureCosts {
         cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "traced".to_owned(),
-        method: "joint_carve".to_owned(),
-        codec: "lz4".to_owned(),
+        planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::ZERO,
         timeline: Timeline { start_s: 0.0, step_s: 0.0, set_count: 8 },
         illumination: Illumination { lights: vec![lamp], ..Illumination::default() },
         refinement_steps: 4,
     };
-    MeasureCosts { workload, typical_views: vec![camera()], batch_count, planes: ViewPlanes::default() }
+    MeasureCosts {
+        workload,
+        method: "joint_carve".to_owned(),
+        codec: "lz4".to_owned(),
+        typical_views: vec![camera()],
+        batch_count,
+        planes: ViewPlanes::default(),
+    }
 }
 
 fn measured(engine: Sleeper, batch_count: u32) -> (Costs, Calls) {
-    let costs = measure_costs(&engine, &request(batch_count)).unwrap();
+    let costs = measure_costs(&engine, &request(batch_count)).unwrap().costs;
     (costs, engine.calls.into_inner().unwrap())
 }
 

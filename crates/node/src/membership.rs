@@ -14,7 +14,7 @@ use wire::rpc::{Backoff, CoordinatorClient, connect};
 
 use crate::blocking::blocking;
 use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, ViewWork};
-use crate::plan::CurrentPlan;
+use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
 use crate::work_done::WorkDone;
 
@@ -30,7 +30,7 @@ const WARM_UP_TIMEOUT: Duration = Duration::from_secs(120);
 pub async fn keep_membership(
     node: NodeStatus,
     coordinator: String,
-    plan: CurrentPlan,
+    plans: PlansInForce,
     scenes: Arc<Scenes>,
     done: WorkDone,
     shutdown: CancellationToken,
@@ -38,9 +38,9 @@ pub async fn keep_membership(
     let (mut backoff, mut warmed) = (Backoff::reconnect(), false);
     loop {
         let mut joined = false;
-        let request = JoinCluster { node: node.clone(), plan_epoch: plan.epoch() };
+        let request = JoinCluster { node: node.clone(), plan_epoch: plans.epoch() };
         let ended = tokio::select! {
-            ended = member(request, &coordinator, &scenes, (&plan, &done), (&mut warmed, &mut joined)) => ended,
+            ended = member(request, &coordinator, &scenes, (&plans, &done), (&mut warmed, &mut joined)) => ended,
             () = shutdown.cancelled() => return,
         };
         if joined {
@@ -59,7 +59,7 @@ async fn member(
     request: JoinCluster,
     coordinator: &str,
     scenes: &Arc<Scenes>,
-    (plan, done): (&CurrentPlan, &WorkDone),
+    (plans, done): (&PlansInForce, &WorkDone),
     (warmed, joined): (&mut bool, &mut bool),
 ) -> Status {
     let client = match connect(coordinator).await {
@@ -67,7 +67,7 @@ async fn member(
         Err(status) => return status,
     };
     if !std::mem::replace(warmed, true) {
-        warm_up(&client, scenes, plan).await;
+        warm_up(&client, scenes, plans).await;
     }
     let mut stream = match client.join_cluster(request).await {
         Ok(stream) => stream,
@@ -81,19 +81,20 @@ async fn member(
                 Some(Err(status)) => return status,
                 None => return Status::ok("the coordinator ended it"),
             },
-            _ = reports.tick(), if *joined => report(&client, plan, done).await,
+            _ = reports.tick(), if *joined => report(&client, plans, done).await,
         }
         *joined = true;
     }
 }
 
-/// Reports the work since the last report; a report that fails is not repeated.
-async fn report(client: &CoordinatorClient, plan: &CurrentPlan, done: &WorkDone) {
-    let Some(report) = done.take_report(&plan.node_name, plan.epoch()) else { return };
-    match tokio::time::timeout(REPORT, client.report_work(report)).await {
-        Ok(Ok(())) => (),
-        Ok(Err(status)) => tracing::debug!(reason = status.message(), "the report was refused"),
-        Err(_) => tracing::debug!("the report took too long"),
+/// Reports the work of each workload since the last report; a report that fails is not repeated.
+async fn report(client: &CoordinatorClient, plans: &PlansInForce, done: &WorkDone) {
+    for report in done.take_reports(plans) {
+        match tokio::time::timeout(REPORT, client.report_work(report)).await {
+            Ok(Ok(())) => (),
+            Ok(Err(status)) => tracing::debug!(reason = status.message(), "the report was refused"),
+            Err(_) => return tracing::debug!("the report took too long"),
+        }
     }
 }
 
@@ -109,33 +110,33 @@ fn preload(welcome: Welcome, scenes: Arc<Scenes>) {
 }
 
 /// Does a little of the cluster's present work, so that a plan finds the node warm. No other node waits for it.
-async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) {
+async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plans: &PlansInForce) {
     let start = Instant::now();
-    match tokio::time::timeout(WARM_UP_TIMEOUT, do_a_little(client, scenes, plan)).await {
+    match tokio::time::timeout(WARM_UP_TIMEOUT, do_a_little(client, scenes, plans)).await {
         Ok(Ok(())) => tracing::debug!(seconds = start.elapsed().as_secs_f64(), "warm"),
         Ok(Err(status)) => tracing::warn!(reason = status.message(), "joins cold"),
         Err(_) => tracing::warn!(reason = "it took too long", "joins cold"),
     }
 }
 
-async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) -> Result<(), Status> {
-    let served = client.get_status(()).await?.plan.map(|plan| plan.assignment);
+async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plans: &PlansInForce) -> Result<(), Status> {
+    let served = client.get_status(()).await?.plan.map(|plan| (plan.assignment, plan.method));
     // A node that has had a plan is warm.
-    let Some(served) = served.filter(|_| plan.epoch() == 0) else { return Ok(()) };
+    let Some((served, method)) = served.filter(|_| plans.epoch() == 0) else { return Ok(()) };
     scenes.ensure(&served.workload.scene).await?;
     let engine = scenes.engine.clone();
-    blocking(move || warm(engine.as_ref(), &served)).await
+    blocking(move || warm(engine.as_ref(), &served, method)).await
 }
 
-/// Makes one small picture of each kind that the plan has.
-fn warm(engine: &dyn Engine, plan: &Assignment) -> Result<(), EngineError> {
+/// Makes one small picture of each kind that the plan has, its views by `method`.
+fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), EngineError> {
     let workload = small(&plan.workload.of_cell(0).unwrap_or_else(|| plan.workload.clone()));
     let Some(Camera::Pinhole(view)) = workload.sample_cameras.first().copied() else { return Ok(()) };
     if plan.policy == Policy::Direct {
         return engine.draw_direct(&DirectWork::of(&workload, vec![view], ViewPlanes::default())).map(drop);
     }
     let set = engine.upload(&SampleSet::of(&workload, engine.sample(&SampleWork::of(&workload))?))?;
-    let work = ViewWork { cameras: vec![view], method: workload.method.clone(), planes: ViewPlanes::default() };
+    let work = ViewWork { cameras: vec![view], method, planes: ViewPlanes::default() };
     engine.reconstruct(set.as_ref(), &work).map(drop)
 }
 
@@ -154,6 +155,7 @@ mod tests {
     fn plan(policy: Policy) -> Assignment {
         Assignment {
             plan_epoch: 1,
+            workload_number: 1,
             policy,
             workload: request(1).workload,
             samplers: Vec::new(),
@@ -167,7 +169,7 @@ mod tests {
     fn a_warm_up_makes_one_picture_of_each_kind_in_the_plan() {
         for (policy, sampled, drawn) in [(Policy::Direct, 0, 1), (Policy::Pipeline, 1, 0), (Policy::TimeShare, 1, 0)] {
             let engine = Sleeper::default();
-            warm(&engine, &plan(policy)).unwrap();
+            warm(&engine, &plan(policy), "joint_carve".to_owned()).unwrap();
             let calls = engine.calls.into_inner().unwrap();
             assert_eq!(
                 (calls.refinements.len(), calls.uploads.len(), calls.drawn_views.len()),

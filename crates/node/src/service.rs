@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use cluster::{Assignment, Costs, MeasureCosts, Ready};
+use cluster::{Assignment, MeasureCosts, Measured, Ready};
 use parking_lot::Mutex;
 use tonic::{Status, async_trait};
 use wire::rpc;
@@ -11,7 +11,7 @@ use wire::rpc;
 use crate::blocking::blocking;
 use crate::engine::Engine;
 use crate::measure::measure_costs;
-use crate::plan::CurrentPlan;
+use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
 use crate::telemetry::NodeMetrics;
 
@@ -21,46 +21,46 @@ const MAX_MEASURED: usize = 16;
 /// The node's own service.
 pub struct NodeService {
     engine: Arc<dyn Engine>,
-    plan: CurrentPlan,
+    plans: PlansInForce,
     scenes: Arc<Scenes>,
     metrics: NodeMetrics,
     /// Measured costs, the oldest first: a coordinator that was restarted need not wait for them again.
-    measured: Mutex<VecDeque<(MeasureCosts, Costs)>>,
+    measured: Mutex<VecDeque<(MeasureCosts, Measured)>>,
 }
 
 impl NodeService {
     /// The service of one node.
     #[must_use]
-    pub fn new(engine: Arc<dyn Engine>, plan: CurrentPlan, scenes: Arc<Scenes>, metrics: NodeMetrics) -> Self {
-        Self { engine, plan, scenes, metrics, measured: Mutex::default() }
+    pub fn new(engine: Arc<dyn Engine>, plans: PlansInForce, scenes: Arc<Scenes>, metrics: NodeMetrics) -> Self {
+        Self { engine, plans, scenes, metrics, measured: Mutex::default() }
     }
 }
 
 #[async_trait]
 impl rpc::Node for NodeService {
-    async fn measure_costs(&self, request: MeasureCosts) -> Result<Costs, Status> {
-        let known = self.measured.lock().iter().find(|(known, _)| *known == request).map(|(_, costs)| *costs);
-        if let Some(costs) = known {
-            return Ok(costs);
+    async fn measure_costs(&self, request: MeasureCosts) -> Result<Measured, Status> {
+        let known = self.measured.lock().iter().find(|(known, _)| *known == request).map(|(_, measured)| *measured);
+        if let Some(measured) = known {
+            return Ok(measured);
         }
         self.scenes.ensure(&request.workload.scene).await?;
-        let (engine, measured) = (self.engine.clone(), request.clone());
-        let costs = blocking(move || measure_costs(engine.as_ref(), &measured)).await?;
-        let mut measured = self.measured.lock();
-        measured.push_back((request, costs));
-        while measured.len() > MAX_MEASURED {
-            measured.pop_front();
+        let (engine, measurement) = (self.engine.clone(), request.clone());
+        let measured = blocking(move || measure_costs(engine.as_ref(), &measurement)).await?;
+        let mut cached = self.measured.lock();
+        cached.push_back((request, measured));
+        while cached.len() > MAX_MEASURED {
+            cached.pop_front();
         }
-        Ok(costs)
+        Ok(measured)
     }
 
     async fn apply_assignment(&self, assignment: Assignment) -> Result<Ready, Status> {
-        self.plan.admits(&assignment)?;
-        let plan_epoch = assignment.plan_epoch;
+        self.plans.admits(&assignment)?;
+        let (plan_epoch, workload_number) = (assignment.plan_epoch, assignment.workload_number);
         let scene_load_s = self.scenes.ensure(&assignment.workload.scene).await?;
-        self.plan.apply(assignment)?;
-        self.metrics.plan_epoch.set(i64::try_from(plan_epoch).unwrap_or(i64::MAX));
-        tracing::info!(node = &*self.plan.node_name, plan_epoch, "plan in force");
+        self.plans.apply(assignment)?;
+        self.metrics.plan_epoch.set(i64::try_from(self.plans.epoch()).unwrap_or(i64::MAX));
+        tracing::info!(node = &*self.plans.node_name, workload_number, plan_epoch, "plan in force");
         Ok(Ready { plan_epoch, scene_load_s })
     }
 }

@@ -6,8 +6,8 @@ use cluster::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use cluster::{
     AchievedTime, Assignment, ChangeSession, ClusterStatus, CompositorShare, Costs, InvalidField, JoinCluster,
     LiveRequest, MeasureCosts, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings, OfferStatus, Policy,
-    PolicyChoice, Quality, RenderViews, RequestedView, SamplerReport, SamplerShare, SceneHash, SceneRef, SessionEvent,
-    SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload,
+    PolicyChoice, Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport, SamplerShare, SceneHash, SceneRef,
+    SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload,
 };
 use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
 use depth_image::{Aabb, Camera, Environment, Illumination, Light, MAX_LIGHTS, PinholeCamera, ViewPlanes};
@@ -61,8 +61,7 @@ fn workload() -> Workload {
         cell_first_indices: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "phong".to_owned(),
-        method: "joint_carve".to_owned(),
-        codec: "raw".to_owned(),
+        planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
         background_linear: Vec3::splat(0.2),
         timeline: Timeline { start_s: 1.0, step_s: 0.5, set_count: 3 },
@@ -74,6 +73,7 @@ fn workload() -> Workload {
 fn assignment() -> Assignment {
     Assignment {
         plan_epoch: 4,
+        workload_number: 3,
         policy: Policy::Pipeline,
         workload: workload(),
         samplers: vec![SamplerShare {
@@ -123,6 +123,7 @@ fn request() -> SessionRequest {
 fn views() -> RenderViews {
     RenderViews {
         plan_epoch: 4,
+        workload_number: 3,
         set_index: 1,
         method: "joint_carve".to_owned(),
         codec: FrameCodec::Lz4,
@@ -202,13 +203,23 @@ fn session_plan() -> SessionPlan {
         predicted_enumerated_s: 0.5,
         scene_load_s: 0.0,
         fallback: NonZeroU32::new(1),
+        method: "joint_carve:1".to_owned(),
         frame_rate_ratio: 0.5,
     }
 }
 
 fn work_report() -> WorkReport {
     let costs = MeasuredCosts { sample_image_s: Some(0.1), image_bytes: Some(1e5), ..MeasuredCosts::default() };
-    WorkReport { node_name: "a".to_owned(), plan_epoch: 4, costs, busy_s: 0.9, views: 3, dropped_views: 1 }
+    WorkReport {
+        node_name: "a".to_owned(),
+        plan_epoch: 4,
+        workload_number: 3,
+        costs,
+        busy_s: 0.9,
+        views: 3,
+        dropped_views: 1,
+        viewpoints: vec![camera()],
+    }
 }
 
 #[test]
@@ -221,6 +232,8 @@ fn bad_reports_and_changes_are_refused_by_field() {
     assert!(spoilt(&|m| m.node_name.clear()).contains("node_name is missing"));
     assert!(spoilt(&|m| m.busy_s = f64::NAN).contains("busy_s is NaN"));
     assert!(spoilt(&|m| m.load_set_s = Some(-1.0)).contains("load_set_s is -1"));
+    assert!(spoilt(&|m| m.viewpoints = vec![m.viewpoints[0]; 257]).contains("viewpoints has 257"));
+    assert!(spoilt(&|m| m.viewpoints[0].near_m = f32::NAN).contains("viewpoints: camera near_m"));
     let change = proto::ChangeSessionRequest { session_number: 1, frames_per_s: 1.0, ..Default::default() };
     let many = proto::ChangeSessionRequest { views_per_set_count: 1_000_000_000, ..change.clone() };
     assert!(refusal::<_, ChangeSession>(many).contains("views_per_set_count is 1000000000"));
@@ -289,7 +302,7 @@ fn bad_counts_are_refused_by_field() {
     assert!(spoilt(&|m| m.timeline.as_mut().unwrap().set_count = 0).contains("set_count"));
     assert!(spoilt(&|m| m.timeline.as_mut().unwrap().step_s = f64::NAN).contains("step_s"));
     assert!(spoilt(&|m| m.timeline = None).contains("timeline"));
-    assert!(spoilt(&|m| m.scene_hash = "../scene".to_owned()).contains("scene_hash"));
+    assert!(spoilt(&|m| m.scene = "x".repeat(300)).contains("scene has 300"));
     assert!(spoilt(&|m| m.frames_per_s = f64::NAN).contains("frames_per_s is NaN"));
     assert!(spoilt(&|m| m.frames_per_s = 1e9).contains("frames_per_s is 1000000000"));
     assert!(spoilt(&|m| m.forced_tile_count = 17).contains("tile_count is 17"));
@@ -397,6 +410,8 @@ fn errors_become_statuses() {
 fn header() -> FrameHeader {
     FrameHeader {
         sample_set_id: SampleSetId { plan_epoch: 1, index: 0 },
+        cell: 0,
+        is_neighbour_cell: false,
         camera: camera(),
         size_px: camera().size_px,
         codec: FrameCodec::Lz4,
@@ -451,7 +466,8 @@ fn zeros_and_empty_texts_of_the_wire_become_none() {
     assert_eq!(read::<SessionRequest, _>(message), Ok(asked));
     let settings = OfferSettings { lighting: Some("unlit".to_owned()), ..OfferSettings::default() };
     let Workload { scene, sample_cameras, volume, .. } = workload();
-    let offer = OfferStatus { scene, sample_cameras, volume, origin_in_source: DVec3::X, settings };
+    let name = "scene".to_owned();
+    let offer = OfferStatus { name, scene, sample_cameras, volume, origin_in_source: DVec3::X, settings };
     let message = to_message::<proto::SceneOffer, _>(offer.clone());
     assert_eq!((message.sampling_method.as_str(), message.lighting.as_str()), ("", "unlit"));
     assert_eq!(read::<OfferStatus, _>(message), Ok(offer));
@@ -484,6 +500,8 @@ fn typical_views_of_several_sizes_or_none_are_refused() {
     let view = |size_px: u32| PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(size_px));
     let measure = |typical_views: Vec<PinholeCamera>| MeasureCosts {
         workload: workload(),
+        method: "joint_carve".to_owned(),
+        codec: "lz4".to_owned(),
         typical_views,
         batch_count: 5,
         planes: ViewPlanes::default(),

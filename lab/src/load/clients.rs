@@ -50,7 +50,7 @@ impl Tour {
     /// The coordinator does not answer, or has no scene.
     pub async fn of(coordinator: &str, size_px: UVec2, rate_hz: f64) -> anyhow::Result<Self> {
         let status = Client::connect(coordinator).await?.status().await?;
-        let offer = status.offer.context("the coordinator does not say what it shows")?;
+        let offer = status.offers.into_iter().next().context("the coordinator does not say what it shows")?;
         let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
         let path = ViewCell::between(&samples).context("no sample cameras")?.orbit(PATH_POSES, size_px);
         let request = at_rate(request(offer.settings, &path[..1])?, rate_hz);

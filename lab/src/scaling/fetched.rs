@@ -27,7 +27,13 @@ pub async fn fetch(plan: &Assignment, set_index: u32) -> anyhow::Result<Fetched>
     let image_indices = share.image_indices.clone();
     let images = image_indices.len().max(1) as f64;
     let start = Instant::now();
-    let request = FetchImages { plan_epoch: plan.plan_epoch, set_index, cell: 0, image_indices };
+    let request = FetchImages {
+        plan_epoch: plan.plan_epoch,
+        workload_number: plan.workload_number,
+        set_index,
+        cell: 0,
+        image_indices,
+    };
     let mut chunks = client.fetch_sample_images(request).await?;
     let mut bytes = 0;
     while let Some(chunk) = chunks.next().await {

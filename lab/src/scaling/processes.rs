@@ -103,7 +103,7 @@ impl NodeProcesses {
         });
         let mut all = Vec::new();
         for (node, measuring) in measuring.collect::<Vec<_>>().into_iter().enumerate() {
-            all.push(measuring.await?.with_context(|| format!("node {node} could not measure its costs"))?);
+            all.push(measuring.await?.with_context(|| format!("node {node} could not measure its costs"))?.costs);
         }
         Ok(all)
     }
@@ -113,7 +113,7 @@ impl NodeProcesses {
         let mut all = Vec::new();
         for member in &self.members {
             let client = NodeClient::new(connect(&member.address).await?);
-            all.push(client.measure_costs(request.clone()).await?);
+            all.push(client.measure_costs(request.clone()).await?.costs);
             done();
         }
         Ok(all)

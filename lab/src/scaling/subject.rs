@@ -5,7 +5,7 @@ use std::cell::Cell;
 use anyhow::Context as _;
 use app_core::delivery::request;
 use app_core::setup::{SceneArgs, Setup};
-use cluster::{MeasureCosts, PolicyChoice, SessionRequest, Timeline, Workload};
+use cluster::{MeasureCosts, PolicyChoice, SamplePlanes, SessionRequest, Timeline, Workload};
 use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
 use render::Lighting;
 
@@ -81,14 +81,20 @@ impl Subject {
             cell_first_indices: Vec::new(),
             sampling: self.args.sampling.to_string(),
             lighting: lighting.to_string(),
-            method: self.args.method.to_string(),
-            codec: CODEC.to_owned(),
+            planes: SamplePlanes::default(),
             volume: offer.volume,
             background_linear: offer.background_linear,
             timeline: self.fresh_timeline(1),
             illumination: offer.illumination.clone(),
             refinement_steps: 1,
         };
-        MeasureCosts { workload, typical_views, batch_count, planes: ViewPlanes::default() }
+        MeasureCosts {
+            workload,
+            method: self.args.method.to_string(),
+            codec: CODEC.to_owned(),
+            typical_views,
+            batch_count,
+            planes: ViewPlanes::default(),
+        }
     }
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use app_core::exit::Outcome;
 use app_core::process::{cancel_at_signal, listen, serve_metrics};
-use app_core::setup::{SceneArgs, Setup};
+use app_core::scenes::ScenesArgs;
 use clap::Args;
 use coordinator::schedule::Recorder;
 use coordinator::{CoordinatorConfig, CoordinatorMetrics, EventLog, Observers};
@@ -18,7 +18,7 @@ use tokio_util::sync::CancellationToken;
 #[derive(Debug, Args)]
 pub struct CoordinatorArgs {
     #[command(flatten)]
-    scene: SceneArgs,
+    scenes: ScenesArgs,
     /// The address to listen on
     #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT")]
     listen: SocketAddr,
@@ -44,11 +44,13 @@ pub struct CoordinatorArgs {
 /// # Errors
 /// The scene cannot be used, or the port is taken.
 pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
-    let Setup { scene, offer, .. } = args.scene.load()?;
+    let (scenes, offers) = args.scenes.load()?;
     let listener = listen(args.listen, args.insecure_bind).await?;
-    let (name, triangles, address) = (&scene.name, scene.triangle_count(), listener.local_addr()?);
-    println!("{name}: {triangles} triangles offered at http://{address}");
-    drop(scene);
+    let address = listener.local_addr()?;
+    for (scene, offer) in scenes.iter().zip(offers.iter()) {
+        println!("{}: {} triangles offered at http://{address}", offer.name, scene.triangle_count());
+    }
+    drop(scenes);
     let shutdown = CancellationToken::new();
     let config = CoordinatorConfig {
         insecure_bind: args.insecure_bind,
@@ -60,7 +62,7 @@ pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
     let metrics = CoordinatorMetrics::new(&telemetry);
     serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
     cancel_at_signal(shutdown.clone());
-    coordinator::serve(listener, config, offer, Observers { metrics, log }, shutdown).await?;
+    coordinator::serve(listener, config, offers, Observers { metrics, log }, shutdown).await?;
     Ok(Outcome::Done)
 }
 

@@ -6,7 +6,8 @@ use app_core::cluster::Cluster;
 use app_core::exit::Outcome;
 use app_core::memory::MemoryArgs;
 use app_core::process::{listen, stop_signal};
-use app_core::setup::{DeviceArgs, SceneArgs};
+use app_core::scenes::ScenesArgs;
+use app_core::setup::DeviceArgs;
 use clap::Args;
 use engine::GpuEngine;
 use node::Engine as _;
@@ -18,7 +19,7 @@ use node::Engine as _;
 )]
 pub struct UpArgs {
     #[command(flatten)]
-    scene: SceneArgs,
+    scenes: ScenesArgs,
     #[command(flatten)]
     device: DeviceArgs,
     #[command(flatten)]
@@ -39,17 +40,19 @@ pub struct UpArgs {
 /// # Errors
 /// The scene cannot be used, there is no device, or the port is taken.
 pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
-    let setup = args.scene.load()?;
+    let (scenes, offers) = args.scenes.load()?;
     let listener = listen(args.listen, args.insecure_bind).await?;
     let engine = GpuEngine::shared(args.device.device)?;
-    engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
-    let (name, triangles) = (setup.scene.name.clone(), setup.scene.triangle_count());
-    // The device and the package hold the scene now; the third copy is dropped.
-    drop(setup.scene);
+    for (scene, offer) in scenes.iter().zip(offers.iter()) {
+        engine.put_scene(offer.hash.as_str(), scene)?;
+        println!("{}: {} triangles", offer.name, scene.triangle_count());
+    }
+    // The device and the packages hold the scenes now; the third copy is dropped.
+    drop(scenes);
     let (memory, nodes) = (args.memory.set_memory_bytes(engine.is_software()), usize::from(args.nodes));
     let mut cluster =
-        Cluster::start_within(memory, listener, setup.offer, engine.clone(), nodes, args.insecure_bind).await?;
-    println!("{name}: {triangles} triangles on {}, {} nodes, at {}", engine.device_name(), args.nodes, cluster.address);
+        Cluster::start_within(memory, listener, offers, engine.clone(), nodes, args.insecure_bind).await?;
+    println!("{nodes} nodes on {}, at {}", engine.device_name(), cluster.address);
     tokio::select! {
         stopped = stop_signal() => stopped?,
         failed = cluster.failed() => failed?,

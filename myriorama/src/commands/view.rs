@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use app_core::delivery::{at_rate, open, receive, request, viewpoints};
-use app_core::exit::Outcome;
+use app_core::exit::{BadInput, Outcome};
 use app_core::live::Drive;
 use app_core::{camera_file, live};
 use client::{Client, Frame, Session};
@@ -30,7 +30,7 @@ pub async fn run(args: ViewArgs) -> anyhow::Result<Outcome> {
     let client =
         Client::connect(&args.coordinator).await.with_context(|| format!("no coordinator at {}", args.coordinator))?;
     let status = client.wait_for_nodes(1, Duration::from_secs(30)).await?;
-    let offer = status.offer.context("the coordinator does not say what it shows")?;
+    let offer = offered(status.offers, args.scene.as_deref())?;
     let cameras = args.viewpoints.cameras(&offer, args.size)?;
     std::fs::create_dir_all(&args.out).with_context(|| format!("cannot write to {}", args.out.display()))?;
     let request = session_request(&args, &offer, &cameras)?;
@@ -48,9 +48,19 @@ pub async fn run(args: ViewArgs) -> anyhow::Result<Outcome> {
     compare(&args, &client, request, &cameras).await
 }
 
+/// The offer of a scene by name or hash; the first where none is named.
+fn offered(offers: Vec<OfferStatus>, scene: Option<&str>) -> anyhow::Result<OfferStatus> {
+    let names: Vec<String> = offers.iter().map(|offer| offer.name.clone()).collect();
+    let is_named =
+        |offer: &OfferStatus| scene.is_none_or(|scene| scene == offer.name || scene == offer.scene.hash.as_str());
+    let missing = || BadInput(format!("--scene {}: on offer are {}", scene.unwrap_or("?"), names.join(", ")));
+    Ok(offers.into_iter().find(is_named).ok_or_else(missing)?)
+}
+
 fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamera]) -> anyhow::Result<SessionRequest> {
     let views = if args.live { &cameras[..1] } else { cameras };
     let mut request = request(offer.settings.clone(), views)?;
+    request.scene = Some(offer.name.clone());
     request.method = args.method.map_or(request.method, |method| method.to_string());
     request.lighting = args.lighting.map_or(request.lighting, |lighting| lighting.to_string());
     let request = if args.live { at_rate(request, args.rate) } else { request };

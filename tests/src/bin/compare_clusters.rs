@@ -92,7 +92,13 @@ async fn bytes(url: &str, file: Option<&Path>) -> anyhow::Result<()> {
 
 /// Views on the rectangle of the sample cameras that the coordinator offers.
 async fn views_between_samples(client: &Client, size_px: UVec2, count: usize) -> anyhow::Result<Vec<PinholeCamera>> {
-    let offer = client.wait_for_nodes(1, Duration::from_secs(60)).await?.offer.context("no scene on offer")?;
+    let offer = client
+        .wait_for_nodes(1, Duration::from_secs(60))
+        .await?
+        .offers
+        .into_iter()
+        .next()
+        .context("no scene on offer")?;
     let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
     Ok(ViewCell::between(&samples).context("no sample cameras")?.spread(count, size_px))
 }
@@ -170,6 +176,7 @@ async fn image_hash(session: &Session) -> anyhow::Result<u64> {
             let sampler = SamplerClient::new(connect(&share.address).await?);
             let request = FetchImages {
                 plan_epoch: plan.plan_epoch,
+                workload_number: plan.workload_number,
                 set_index,
                 cell: 0,
                 image_indices: share.image_indices.clone(),
@@ -244,7 +251,14 @@ impl Subject {
         let plan = client.open_session(request(row, typical_views[0]), |_| ()).await?.plan().assignment;
         let node = NodeClient::new(connect(&plan.compositors[0].address).await?);
         let batch_count = TIMED_VIEWS as u32;
-        let work = MeasureCosts { workload: plan.workload, typical_views, batch_count, planes: ViewPlanes::default() };
+        let work = MeasureCosts {
+            workload: plan.workload,
+            method: row.method.to_owned(),
+            codec: row.codec.to_owned(),
+            typical_views,
+            batch_count,
+            planes: ViewPlanes::default(),
+        };
         Ok(Self { node, work })
     }
 
@@ -253,7 +267,7 @@ impl Subject {
         let mut work = self.work.clone();
         work.typical_views.iter_mut().for_each(|view| view.near_m *= 1.0 + 1e-4 * round as f32);
         let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, .. } =
-            self.node.measure_costs(work).await?;
+            self.node.measure_costs(work).await?.costs;
         Ok([sample_image_s, direct_view_s, reconstruct_view_s, load_set_s])
     }
 }

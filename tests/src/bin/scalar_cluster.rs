@@ -81,7 +81,7 @@ async fn coordinate(args: CoordinatorArgs, shutdown: CancellationToken) -> anyho
     let log = args.record.map(event_log).transpose()?;
     let observers = Observers { metrics: CoordinatorMetrics::default(), log };
     let listener = listen(&args.listen).await?;
-    Ok(coordinator::serve(listener, CoordinatorConfig::default(), offer(), observers, shutdown).await?)
+    Ok(coordinator::serve(listener, CoordinatorConfig::default(), offer().into(), observers, shutdown).await?)
 }
 
 fn event_log(path: PathBuf) -> std::io::Result<EventLog> {

@@ -217,6 +217,7 @@ async fn a_client_that_does_not_read_delays_no_other() {
     let view = |frame| RequestedView { frame, camera: camera(0.1, UVec2::new(128, 96)) };
     let request = RenderViews {
         plan_epoch: plan.plan_epoch,
+        workload_number: plan.workload_number,
         set_index: 0,
         method: "splat".to_owned(),
         codec: FrameCodec::Lz4,

@@ -186,7 +186,13 @@ fn probed_image(plan: &Assignment, sampler: &str, number: usize) -> Option<Probe
     let image = images.get(number % images.len()).copied()?;
     let camera = plan.sampled_cameras().get(image as usize).copied()?;
     let (cell, first) = cell_of_image(plan, image)?;
-    let request = FetchImages { plan_epoch: plan.plan_epoch, set_index, cell, image_indices: vec![image - first] };
+    let request = FetchImages {
+        plan_epoch: plan.plan_epoch,
+        workload_number: plan.workload_number,
+        set_index,
+        cell,
+        image_indices: vec![image - first],
+    };
     Some(ProbedImage { request, camera })
 }
 

@@ -185,6 +185,7 @@ impl Scheduler {
         let mut plan = session_plan(assignment, slowest, choice, format!("{}{again}", choice.reason));
         plan.fallback = NonZeroU32::new(workload.overload.step as u32);
         plan.frame_rate_ratio = workload.frame_rate_ratio();
+        plan.method = workload.method();
         let active = ActivePlan::new(plan, members, self.now);
         self.plan_epoch = active.epoch();
         let command = self.apply(&active, workload.sessions());
@@ -214,6 +215,7 @@ fn session_plan(assignment: Assignment, costs: Costs, choice: &Choice, reason: S
         predicted_enumerated_s: predicted.enumerated_s,
         scene_load_s: 0.0,
         fallback: None,
+        method: String::new(),
         frame_rate_ratio: 1.0,
     }
 }

@@ -9,7 +9,7 @@ use crate::error::WireError;
 
 messages! {
     RenderViewsRequest = RenderViews {
-        plan_epoch, set_index, views, live;
+        plan_epoch, workload_number, set_index, views, live;
         method: reconstruction_method, codec: frame_codec, planes: with_inverse_depth | with_provenance
     }, first |r| check_view_count(r.views.len(), r.live.is_some()), then RenderViews::validate;
     RequestedView = RequestedView { camera as "views.camera"; frame: frame_number };
@@ -17,7 +17,7 @@ messages! {
     RenderViewsResponse = FramePart { header, offset_bytes, data; frame: frame_number };
     FrameHeader = FrameHeader {
         camera as "header.camera", color_bytes, inverse_depth_bytes, provenance_bytes,
-        stage_times as "header.stage_times";
+        stage_times as "header.stage_times", is_neighbour_cell; cell: cell_index,
         sample_set_id: plan_epoch | set_index, size_px: width_px | height_px, codec: frame_codec as "header.frame_codec",
         crc32: frame_crc32
     }, then check_header;

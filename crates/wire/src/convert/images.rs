@@ -13,7 +13,7 @@ use crate::proto::chunk::Body;
 const MAX_PLANES: usize = 5 + MAX_VISIBILITY_PLANES;
 
 messages! {
-    FetchSampleImagesRequest = FetchImages { plan_epoch, set_index, image_indices; cell: cell_index },
+    FetchSampleImagesRequest = FetchImages { plan_epoch, workload_number, set_index, image_indices; cell: cell_index },
         then FetchImages::validate;
     Chunk = Chunk {
         image_index, chunk_count, body as "chunk.body";

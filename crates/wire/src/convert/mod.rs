@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 
-use cluster::{InvalidField, MeasuredCosts, NodeStatus, OfferSettings, SceneHash, at_most};
+use cluster::{InvalidField, MeasuredCosts, NodeStatus, OfferSettings, SamplePlanes, SceneHash, at_most};
 use codec::{InverseDepthRange, SampleSetId};
 use depth_image::{PinholeCamera, ViewPlanes};
 use glam::{DVec3, UVec2};
@@ -202,6 +202,7 @@ flat! {
     UVec2 { x: u32, y: u32 }
     DVec3 { x: f64, y: f64, z: f64 }
     ViewPlanes { inverse_depth: bool, provenance: bool }
+    SamplePlanes { normals: bool, corner_inverse_depths: bool }
     InverseDepthRange { least_per_m: f32, greatest_per_m: f32 }
     SampleSetId { plan_epoch: u64, index: u32 }
     SampleSetId { plan_epoch: u64, index: u64 }

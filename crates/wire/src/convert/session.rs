@@ -17,14 +17,14 @@ enums! {
 
 messages! {
     SceneOffer = OfferStatus {
-        scene as "offer.scene", sample_cameras, volume as "offer.volume";
+        name, scene as "offer.scene", sample_cameras, volume as "offer.volume";
         origin_in_source: origin_in_source_x_m | origin_in_source_y_m | origin_in_source_z_m,
         settings: reconstruction_method | sampling_method | lighting
     }, first |o| at_most(o.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras"), then OfferStatus::validate;
     OpenSessionRequest = SessionRequest {
-        lighting, sample_cameras, volume, typical_view, timeline, forced_sampler_count, frames_per_s, fallbacks,
+        scene, lighting, sample_cameras, volume, typical_view, timeline, forced_sampler_count, frames_per_s, fallbacks,
         forced_tile_count, viewpoints;
-        scene: scene_hash, method: reconstruction_method, sampling: sampling_method, codec: frame_codec,
+        method: reconstruction_method, sampling: sampling_method, codec: frame_codec,
         sample_size_px: sample_image_size, views_per_set: views_per_set_count,
         planes: with_inverse_depth | with_provenance, policy: policy_choice, refinement_steps: refinement_step_count
     }, with protocol_version = PROTOCOL_VERSION, first check_request, then SessionRequest::validate;
@@ -35,7 +35,7 @@ messages! {
     SessionPlan = SessionPlan {
         assignment as "plan.assignment", costs as "plan.costs", reason, predicted_pipeline_s, predicted_direct_s,
         predicted_time_share_s, k_fd_sampler_count, predicted_k_fd_s, enumerated_sampler_count, predicted_enumerated_s,
-        scene_load_s, frame_rate_ratio; fallback: fallback_number
+        scene_load_s, frame_rate_ratio; fallback: fallback_number, method: reconstruction_method
     }, then SessionPlan::validate;
 }
 

@@ -20,14 +20,14 @@ messages! {
     Workload = Workload {
         scene as "workload.scene", sample_cameras, cell_first_indices, lighting, volume as "workload.volume",
         timeline as "workload.timeline", illumination as "workload.illumination";
-        sampling: sampling_method, method: reconstruction_method, codec: frame_codec,
+        sampling: sampling_method, planes: with_normals | with_corner_inverse_depths,
         background_linear: background_linear_rgb, refinement_steps: refinement_step_count
     }, first |w| {
         let cells = w.cell_first_indices.len().clamp(1, MAX_CELLS);
         at_most(w.sample_cameras.len(), MAX_SAMPLE_CAMERAS * cells, "sample_cameras")
     }, then Workload::validate;
     Assignment = Assignment {
-        plan_epoch, policy, workload as "assignment.workload", samplers, compositors, tile_count;
+        plan_epoch, workload_number, policy, workload as "assignment.workload", samplers, compositors, tile_count;
         relay_fanout: relay_fanout_count
     }, first |a| {
         a.tile_count = a.tile_count.max(1);
@@ -49,7 +49,6 @@ fn check_node(name: &str, address: &str) -> Result<(), InvalidField> {
 }
 
 wrappers! {
-    MeasureCostsResponse { costs: Costs }
     ApplyAssignmentRequest { assignment: Assignment }
 }
 

@@ -3,7 +3,7 @@
 use std::pin::Pin;
 
 use cluster::{
-    Assignment, ChangeSession, ClusterStatus, Costs, FetchImages, FetchScene, JoinCluster, MeasureCosts, Ready,
+    Assignment, ChangeSession, ClusterStatus, FetchImages, FetchScene, JoinCluster, MeasureCosts, Measured, Ready,
     RenderViews, SamplerReport, ScenePart, SessionEvent, SessionRequest, Welcome, WorkReport,
 };
 use codec::{Chunk, FramePart};
@@ -157,7 +157,7 @@ service! {
     Node: NodeService(NodeServiceServer, NodeServiceClient) as node_server, NodeAdapter, NodeClient;
     calls {
         /// Measures each cost alone and warm.
-        measure_costs(MeasureCostsRequest as MeasureCosts) -> MeasureCostsResponse as Costs;
+        measure_costs(MeasureCostsRequest as MeasureCosts) -> MeasureCostsResponse as Measured;
         /// Takes a plan; answers when ready for it. `FAILED_PRECONDITION` for an epoch below the one it has.
         apply_assignment(ApplyAssignmentRequest as Assignment) -> ApplyAssignmentResponse as Ready;
     }

@@ -24,6 +24,9 @@ pub struct ViewArgs {
     /// The address of the coordinator
     #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR")]
     pub(super) coordinator: String,
+    /// The scene, by its name or hash at the coordinator [default: the first on offer]
+    #[arg(long, value_name = "NAME")]
+    pub(super) scene: Option<String>,
     #[command(flatten)]
     pub(super) viewpoints: Viewpoints,
     /// Samples near the views, in as many view cells as they need, in place of the coordinator's sample cameras

@@ -110,6 +110,8 @@ mod tests {
         let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, size_px);
         let header = FrameHeader {
             sample_set_id: SampleSetId { plan_epoch: 1, index: 0 },
+            cell: 0,
+            is_neighbour_cell: false,
             camera,
             size_px,
             codec: FrameCodec::Lz4,

@@ -1,0 +1,53 @@
+//! The scenes of a coordinator: `--scene` may be repeated, and every other argument is for all of them.
+
+use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches};
+use coordinator::{SceneOffer, SceneOffers};
+use scene::{Scene, SceneSpec};
+
+use crate::exit::BadInput;
+use crate::setup::{SceneArgs, Setup};
+
+/// The arguments of [`SceneArgs`], for one scene or several.
+#[derive(Debug, Clone)]
+pub struct ScenesArgs {
+    /// In the order of the command line; sessions that name no scene get the first.
+    scenes: Vec<SceneSpec>,
+    /// The arguments of the first scene, which are those of every scene but for its name.
+    first: SceneArgs,
+}
+
+impl ScenesArgs {
+    /// Loads all scenes, and places sample cameras in each.
+    ///
+    /// # Errors
+    /// A scene cannot be used, or is given twice.
+    pub fn load(&self) -> anyhow::Result<(Vec<Scene>, SceneOffers)> {
+        let setup = |scene: &SceneSpec| SceneArgs { scene: scene.clone(), ..self.first.clone() }.load();
+        let setups = self.scenes.iter().map(setup).collect::<anyhow::Result<Vec<Setup>>>()?;
+        let (scenes, offers): (_, Vec<SceneOffer>) = setups.into_iter().map(|setup| (setup.scene, setup.offer)).unzip();
+        Ok((scenes, SceneOffers::new(offers).map_err(|error| BadInput(error.to_string()))?))
+    }
+}
+
+impl Args for ScenesArgs {
+    fn augment_args(command: Command) -> Command {
+        SceneArgs::augment_args(command).mut_arg("scene", |scene| scene.action(ArgAction::Append))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for ScenesArgs {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let scenes = matches.get_many("scene").into_iter().flatten().cloned().collect();
+        // One value is taken here: the first.
+        Ok(Self { scenes, first: SceneArgs::from_arg_matches(matches)? })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
