@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use cluster::RenderViews;
 use codec::FramePart;
-use node::{CellPlan, PlansInForce, Engine, NodeConfig, NodeMetrics, Relay, next_within, until_drained};
+use node::{CellPlan, Engine, NodeConfig, NodeMetrics, PlansInForce, Relay, next_within, until_drained};
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};

@@ -7,7 +7,9 @@ use std::time::Instant;
 use cluster::{Assignment, SetContent, Workload};
 use codec::EncodedDepthImage;
 use depth_image::{Camera, PinholeCamera, nearest_set};
-use node::{ByteCache, CellPlan, PlansInForce, Engine, NodeConfig, NodeMetrics, Operation, Pinned, SampleSet, UploadedSet};
+use node::{
+    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet, UploadedSet,
+};
 use node::{beyond_timeline, blocking, most_image_bytes, most_set_bytes, set_bytes};
 use tonic::Status;
 use wire::rpc::Messages;
@@ -64,12 +66,7 @@ pub(crate) struct Sets {
 }
 
 impl Sets {
-    pub(crate) fn new(
-        engine: Arc<dyn Engine>,
-        plans: PlansInForce,
-        config: &NodeConfig,
-        metrics: NodeMetrics,
-    ) -> Self {
+    pub(crate) fn new(engine: Arc<dyn Engine>, plans: PlansInForce, config: &NodeConfig, metrics: NodeMetrics) -> Self {
         Self {
             engine,
             fetcher: Arc::new(Fetcher::new(plans.clone(), config.deadlines)),
@@ -108,11 +105,7 @@ impl Sets {
 
     /// Waits for a complete set; the sets after it are then fetched ahead, so that samplers work on them while this one is
     /// shown.
-    pub(crate) async fn get(
-        self: &Arc<Self>,
-        plan: &CellPlan,
-        set_index: u32,
-    ) -> Result<Pinned<ReadySet>, Status> {
+    pub(crate) async fn get(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<Pinned<ReadySet>, Status> {
         let in_turn = plan.sets_at_once() > 1;
         if in_turn {
             self.fetch_ahead(plan, set_index);
@@ -130,12 +123,7 @@ impl Sets {
     }
 
     /// The loaded set of the same moment whose cameras are nearest to a view.
-    pub(crate) fn nearest(
-        &self,
-        plan: &Assignment,
-        set_index: u32,
-        view: &PinholeCamera,
-    ) -> Option<Pinned<ReadySet>> {
+    pub(crate) fn nearest(&self, plan: &Assignment, set_index: u32, view: &PinholeCamera) -> Option<Pinned<ReadySet>> {
         let moment = moment(plan, set_index)?;
         let mut sets = self.cached.loaded_where(|set| set.moment == moment);
         let nearest = nearest_set(view, sets.iter().map(|set| set.cameras.clone()), &plan.workload.volume)?;
@@ -212,7 +200,12 @@ impl Sets {
         let fetched_s = start.elapsed().as_secs_f64();
         let (engine, uploading) = (self.engine.clone(), Instant::now());
         let set = blocking(move || engine.upload(&set)).await?;
-        self.metrics.done.add(plan.workload_number, Operation::LoadSet, 1.0, times.decode_s + uploading.elapsed().as_secs_f64());
+        self.metrics.done.add(
+            plan.workload_number,
+            Operation::LoadSet,
+            1.0,
+            times.decode_s + uploading.elapsed().as_secs_f64(),
+        );
         self.metrics.done.transferred(plan.workload_number, times.bytes, times.transfer_s);
         self.metrics.sets_loaded.inc();
         self.metrics.set_s.observe(start.elapsed().as_secs_f64());

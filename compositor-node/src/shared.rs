@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use cluster::{Assignment, Policy};
 use depth_image::PinholeCamera;
-use node::{CellPlan, PlansInForce, Deadlines, NodeMetrics, beyond_timeline};
+use node::{CellPlan, Deadlines, NodeMetrics, PlansInForce, beyond_timeline};
 use tonic::Status;
 
 use crate::batch::{Loaded, Place, Source, Waiting};

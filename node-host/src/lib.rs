@@ -5,7 +5,7 @@ use std::sync::Arc;
 use cluster::NodeStatus;
 use compositor_node::CompositorService;
 use node::{
-    PlansInForce, DeviceLossMonitor, Engine, NodeConfig, NodeMetrics, NodeService, Scenes, ServeError, health,
+    DeviceLossMonitor, Engine, NodeConfig, NodeMetrics, NodeService, PlansInForce, Scenes, ServeError, health,
     keep_membership, with_reflection,
 };
 use sampler_node::SamplerService;

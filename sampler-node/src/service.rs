@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use cluster::{Assignment, FetchImages, SetContent};
 use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
-use node::{ByteCache, CellPlan, PlansInForce, Engine, NodeConfig, NodeMetrics, Operation, Pinned, Relay, SampleWork};
+use node::{ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Relay, SampleWork};
 use node::{beyond_timeline, blocking, has_set, most_image_bytes, until_drained, with_guard};
 use parking_lot::Mutex;
 use tokio::sync::mpsc;
@@ -88,7 +88,8 @@ impl SamplerService {
             if !plans.in_force(number).is_some_and(|plan| has_set(&plan, &content, set_index)) {
                 return Err(Status::failed_precondition(format!("no plan in force has this set {set_index}")));
             }
-            let images = blocking(move || sample(engine.as_ref(), &work, (&indices, tiles), (number, &metrics))).await?;
+            let images =
+                blocking(move || sample(engine.as_ref(), &work, (&indices, tiles), (number, &metrics))).await?;
             let bytes = images.iter().map(|(_, image)| image.payload.len()).sum();
             Ok((images, bytes))
         };

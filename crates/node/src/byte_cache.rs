@@ -245,7 +245,13 @@ where
     }
 
     /// Puts a loaded value in place of its room; a failed one leaves.
-    fn end(&self, key: &K, reserved_bytes: usize, loaded: Result<(V, usize), Status>, send: &watch::Sender<Outcome<V>>) {
+    fn end(
+        &self,
+        key: &K,
+        reserved_bytes: usize,
+        loaded: Result<(V, usize), Status>,
+        send: &watch::Sender<Outcome<V>>,
+    ) {
         let mut state = self.0.state.lock();
         state.used_bytes -= reserved_bytes;
         state.entries.remove(key);

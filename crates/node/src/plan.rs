@@ -267,7 +267,7 @@ pub(crate) mod tests {
         Assignment {
             plan_epoch,
             workload_number,
-            policy: Policy::Direct,
+            policy: Policy::Pipeline,
             workload: request(1).workload,
             samplers: Vec::new(),
             compositors: Vec::new(),
@@ -280,8 +280,8 @@ pub(crate) mod tests {
     fn moved(plan: Assignment) -> Assignment {
         let sample_cameras: Vec<Camera> = plan.workload.sample_cameras.iter().rev().copied().collect();
         let workload = Workload { sample_cameras, cell_first_indices: vec![0], ..plan.workload };
-        let share = CompositorShare { node_name: "n".to_owned(), address: String::new(), view_weight: 1 };
-        Assignment { workload, policy: Policy::TimeShare, compositors: vec![share], ..plan }
+        let share = CompositorShare { node_name: "n".to_owned(), address: "http://n".to_owned(), view_weight: 1 };
+        Assignment { workload, policy: Policy::Direct, compositors: vec![share], ..plan }
     }
 
     fn of_another_scene(plan: Assignment) -> Assignment {

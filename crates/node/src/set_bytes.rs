@@ -31,7 +31,8 @@ pub fn set_bytes(images: &[DepthImage]) -> usize {
 }
 
 fn image_bytes(image: &DepthImage) -> usize {
-    let specular = |specular: &SpecularPlanes| specular.reflectance_srgb8_roughness8.len() * (1 + specular.visibility8.len());
+    let specular =
+        |specular: &SpecularPlanes| specular.reflectance_srgb8_roughness8.len() * (1 + specular.visibility8.len());
     let texels = image.inverse_depth_per_m.len();
     let words = texels
         + image.color_rgb9e5.len()

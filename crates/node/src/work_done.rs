@@ -184,7 +184,8 @@ mod tests {
             done.add(number, Operation::ReconstructView, 1.0, seconds);
         }
         let reports = done.take_reports(&plans);
-        let parts = |report: &WorkReport| (report.workload_number, report.plan_epoch, report.busy_s, report.dropped_views);
+        let parts =
+            |report: &WorkReport| (report.workload_number, report.plan_epoch, report.busy_s, report.dropped_views);
         assert_eq!(reports.iter().map(parts).collect::<Vec<_>>(), [(1, 7, 1.0, 1), (2, 8, 2.0, 0)]);
     }
 }

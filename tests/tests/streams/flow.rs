@@ -160,6 +160,30 @@ async fn a_set_that_is_wanted_is_fetched_once_whatever_the_plan() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_workload_whose_sampling_takes_long_delays_no_other() {
+    let cluster = Cluster::start(1).await;
+    let session = cluster.session(pipeline(STILL)).await.unwrap();
+    let plan = session.plan().assignment;
+    let engine = &cluster.engines[0];
+    engine.hold_samples_from(eye(&rig()[0]));
+    let address = compositor_of(&session).0;
+    let mut held = opened(&address, &plan).await;
+    held.say_at(Some((1, camera(0.0, SIZE_PX))), 0).await;
+    eventually("sampling has begun", HEALED, || engine.held_calls() == 1).await;
+    let workload = Workload { sample_cameras: shifted_rig(AWAY_M), ..plan.workload.clone() };
+    // Epochs of different workloads may be equal.
+    let other = Assignment { workload_number: plan.workload_number + 1, workload, ..plan.clone() };
+    apply(&cluster, &other).await;
+    let mut raw = opened(&address, &other).await;
+    for frame in 1..4 {
+        shown(&mut raw, frame, AWAY_M).await;
+    }
+    assert_eq!(engine.held_calls(), 1);
+    engine.release();
+    timeout(HEALED, whole_frame(&mut held.parts)).await.expect("the first workload's view");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_batch_of_large_views_does_not_keep_a_live_view_waiting() {
     let cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
