@@ -3,10 +3,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, RenderViews, RequestedView};
+use cluster::{Assignment, RenderViews, RequestedView, SetContent};
 use codec::{FrameCodec, SampleSetId};
 use depth_image::ViewPlanes;
 use glam::UVec2;
+use node::Pinned;
 
 use crate::outbox::Reply;
 use crate::quota::Credit;
@@ -20,9 +21,11 @@ const MAX_BATCH_PIXELS: usize = 64 << 20;
 /// Views with equal keys can be made in one call.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct BatchKey {
+    /// Sets of two workloads may have the same epoch and index.
+    pub(crate) workload_number: u64,
     pub(crate) sample_set_id: SampleSetId,
-    /// The view cell whose images of the set it is made from.
-    pub(crate) cell: u32,
+    /// `None` for views that are drawn from the scene.
+    pub(crate) content: Option<SetContent>,
     pub(crate) method: String,
     pub(crate) planes: ViewPlanes,
     pub(crate) size_px: UVec2,
@@ -39,7 +42,7 @@ impl BatchKey {
 #[derive(Clone)]
 pub(crate) enum Source {
     /// A complete sample set.
-    Set(ReadySet),
+    Set(Pinned<ReadySet>),
     /// The scene itself.
     Scene { plan: Arc<Assignment>, scene_time_s: f32 },
 }
@@ -54,12 +57,23 @@ impl Source {
     }
 }
 
+/// The name of a view's source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Place {
+    pub(crate) id: SampleSetId,
+    /// The view cell whose set it is.
+    pub(crate) cell: u32,
+    /// Whether the view is in another cell.
+    pub(crate) is_neighbour: bool,
+    /// The set; `None` for the scene itself.
+    pub(crate) content: Option<SetContent>,
+}
+
 /// The source of the views of a set that are in one view cell.
 #[derive(Clone)]
 pub(crate) struct Loaded {
     pub(crate) source: Source,
-    pub(crate) id: SampleSetId,
-    pub(crate) cell: u32,
+    pub(crate) place: Place,
     /// The wait for it.
     pub(crate) wait_s: f64,
 }
@@ -67,6 +81,7 @@ pub(crate) struct Loaded {
 /// A view that waits for the device, with the way back to its client.
 pub(crate) struct Waiting {
     pub(crate) key: BatchKey,
+    pub(crate) place: Place,
     pub(crate) source: Source,
     pub(crate) view: RequestedView,
     pub(crate) codec: FrameCodec,
@@ -87,14 +102,15 @@ impl Waiting {
         credit: Credit,
     ) -> Self {
         let key = BatchKey {
-            sample_set_id: set.id,
-            cell: set.cell,
+            workload_number: request.workload_number,
+            sample_set_id: set.place.id,
+            content: set.place.content,
             method: request.method.clone(),
             planes: request.planes,
             size_px: view.camera.size_px,
         };
         let (source, codec, set_wait_s, queued) = (set.source.clone(), request.codec, set.wait_s, Instant::now());
-        Self { key, source, view, codec, arrived, set_wait_s, queued, reply, credit }
+        Self { key, place: set.place, source, view, codec, arrived, set_wait_s, queued, reply, credit }
     }
 
     /// The wait for room, before it was ready.

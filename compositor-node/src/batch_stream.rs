@@ -4,14 +4,16 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{RenderViews, RequestedView};
+use cluster::{Assignment, RenderViews, RequestedView};
 use node::next_within;
 use tokio::sync::Semaphore;
+use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::Messages;
 
 use crate::batch::{Loaded, MAX_BATCH, Waiting};
 use crate::outbox::Reply;
+use crate::queue::Lane;
 use crate::quota::{Credit, closed};
 use crate::shared::ClientStream;
 
@@ -19,6 +21,8 @@ use crate::shared::ClientStream;
 const STREAM_PIXELS: u32 = 128 << 20;
 /// Views of one stream that are waiting or not sent yet.
 const STREAM_VIEWS: u32 = 256;
+/// View cells of one request whose sets are fetched at once: others wait behind them for memory.
+const CELLS_AHEAD: usize = 8;
 
 pub(crate) struct BatchStream<'a> {
     client: &'a ClientStream,
@@ -61,21 +65,27 @@ impl<'a> BatchStream<'a> {
         }
     }
 
-    /// Enqueues the views of every view cell; the images of all cells are fetched at once.
+    /// Enqueues the views of every view cell as its images arrive; those of several cells are fetched at once.
     async fn enqueue(&mut self, request: RenderViews) -> Result<(), Status> {
         let (arrived, shared) = (Instant::now(), &self.client.shared);
-        let plan = shared.of_compositor(shared.plan.require(request.plan_epoch)?)?;
+        let plan = shared.of_compositor(shared.plans.require(request.workload_number, request.plan_epoch)?)?;
         let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
         for view in &request.views {
             cells.entry(plan.cell_of(&view.camera)).or_default().push(*view);
         }
-        let sources = cells.into_iter().map(|(cell, views)| {
+        let mut sources = JoinSet::new();
+        let mut cells = cells.into_iter();
+        let mut fetch_next = |sources: &mut JoinSet<_>| {
+            let Some((cell, views)) = cells.next() else { return };
             let (shared, plan, set_index) = (shared.clone(), plan.clone(), request.set_index);
-            (views, tokio::spawn(async move { shared.source(&plan, set_index, cell).await }))
-        });
-        for (views, set) in sources.collect::<Vec<_>>() {
-            let set = set.await.map_err(|error| Status::internal(error.to_string()))??;
-            self.enqueue_of_cell(&request, &views, &set, arrived).await?;
+            sources.spawn(async move { (views, shared.source(&plan, set_index, cell).await) });
+        };
+        (0..CELLS_AHEAD).for_each(|_| fetch_next(&mut sources));
+        // In the order of their arrival: a set that has arrived is in memory, where others may wait for room.
+        while let Some(source) = sources.join_next().await {
+            fetch_next(&mut sources);
+            let (views, set) = source.map_err(|error| Status::internal(error.to_string()))?;
+            self.enqueue_of_cell(&request, &plan, (views, set?), arrived).await?;
         }
         Ok(())
     }
@@ -84,25 +94,32 @@ impl<'a> BatchStream<'a> {
     async fn enqueue_of_cell(
         &mut self,
         request: &RenderViews,
-        views: &[RequestedView],
-        set: &Loaded,
+        plan: &Arc<Assignment>,
+        (views, set): (Vec<RequestedView>, Loaded),
         arrived: Instant,
     ) -> Result<(), Status> {
+        let (set_index, cell, mut set) = (request.set_index, set.place.cell, Some(set));
         for views in views.chunks(MAX_BATCH) {
             let mut batch = Vec::with_capacity(views.len());
             for view in views {
-                // A view without credit must not keep back those with credit: these are handed over first.
                 let credit = match self.try_credit(view)? {
                     Some(credit) => credit,
                     None => {
-                        self.client.queue(std::mem::take(&mut batch));
+                        // A view without credit must not keep back those with credit, nor a set in memory.
+                        self.client.queue(Lane::Batch, std::mem::take(&mut batch));
+                        set = None;
                         self.credit(view).await?
                     }
                 };
                 self.admitted = true;
-                batch.push(Waiting::new((request, *view, arrived), set, self.reply.clone(), credit));
+                let loaded = match set.take() {
+                    Some(loaded) => loaded,
+                    None => self.client.shared.source(plan, set_index, cell).await?,
+                };
+                batch.push(Waiting::new((request, *view, arrived), &loaded, self.reply.clone(), credit));
+                set = Some(loaded);
             }
-            self.client.queue(batch);
+            self.client.queue(Lane::Batch, batch);
         }
         Ok(())
     }

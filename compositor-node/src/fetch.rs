@@ -1,12 +1,13 @@
 //! One complete sample set: fetched from all its samplers at once, or from a compositor that relays it.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use cluster::SamplerShare;
+use cluster::{Assignment, SamplerShare, SetContent};
 use depth_image::{Camera, DepthImage};
-use node::{CellPlan, Connections, Deadlines, SampleSet, blocking};
+use node::{CellPlan, Connections, Deadlines, PlansInForce, SampleSet, beyond_timeline, blocking, has_set};
+use parking_lot::Mutex;
 use tokio::task::JoinSet;
 use tonic::Status;
 
@@ -16,14 +17,17 @@ use crate::reports::NotFetched;
 /// The time that a relay may be silent. The samplers are asked then, and have the images or not.
 const RELAY_TIMEOUT: Duration = Duration::from_secs(3);
 
+/// Plans whose relay has failed, as many as there are workloads.
+const MAX_FAILED_RELAYS: usize = 16;
+
 /// Fetches sets for one compositor.
 #[derive(Debug)]
 pub(crate) struct Fetcher {
-    node_name: String,
+    plans: PlansInForce,
     connections: Connections,
     deadlines: Deadlines,
-    /// The plan whose relay has failed this node: samplers are asked from then on.
-    failed_relay_epoch: AtomicU64,
+    /// The last plans whose relay has failed this node: samplers are asked from then on.
+    failed_relay_epochs: Mutex<BTreeSet<u64>>,
 }
 
 /// The images of a set that have been fetched so far.
@@ -33,9 +37,8 @@ struct Gathered {
 }
 
 impl Fetcher {
-    pub(crate) fn new(node_name: &str, deadlines: Deadlines) -> Self {
-        let (node_name, connections) = (node_name.to_owned(), Connections::default());
-        Self { node_name, connections, deadlines, failed_relay_epoch: AtomicU64::new(0) }
+    pub(crate) fn new(plans: PlansInForce, deadlines: Deadlines) -> Self {
+        Self { plans, connections: Connections::default(), deadlines, failed_relay_epochs: Mutex::default() }
     }
 
     /// A set with every image whole and decoded, and the times of its fetch.
@@ -56,7 +59,11 @@ impl Fetcher {
             && let Err(NotFetched { status, .. }) = self.fetch_all(set, vec![request], &mut gathered).await
         {
             tracing::info!(plan_epoch = plan.plan_epoch, reason = status.message(), "samplers in place of a relay");
-            self.failed_relay_epoch.store(plan.plan_epoch, Ordering::Relaxed);
+            let mut failed = self.failed_relay_epochs.lock();
+            failed.insert(plan.plan_epoch);
+            while failed.len() > MAX_FAILED_RELAYS {
+                failed.pop_first();
+            }
         }
         let missing = self.requests_to_samplers(set, &gathered.images);
         self.fetch_all(set, missing, &mut gathered).await?;
@@ -66,8 +73,8 @@ impl Fetcher {
 
     /// All images, from the relay of this compositor; `None` without one, or where it has failed.
     fn request_to_relay(&self, plan: &CellPlan) -> Option<ShareRequest> {
-        let has_failed = self.failed_relay_epoch.load(Ordering::Relaxed) == plan.plan_epoch;
-        let relay = plan.relay_of(&self.node_name).filter(|_| !has_failed)?;
+        let has_failed = self.failed_relay_epochs.lock().contains(&plan.plan_epoch);
+        let relay = plan.relay_of(&self.plans.node_name).filter(|_| !has_failed)?;
         let image_indices = (0..plan.image_count() as u32).collect();
         Some(ShareRequest {
             share: SamplerShare { node_name: relay.node_name.clone(), address: relay.address.clone(), image_indices },
@@ -90,6 +97,16 @@ impl Fetcher {
         requests.filter(|request| !request.share.image_indices.is_empty()).collect()
     }
 
+    /// Resolves when a plan is in force that has no such set, or no place for the node that it is fetched from: that node
+    /// may be lost without a word. A set outlives every other plan.
+    async fn in_vain(&self, set: &SetRequest, content: &SetContent, share: &SamplerShare) {
+        let goes_on = |plan: &Arc<Assignment>| {
+            plan.plan_epoch == set.plan.plan_epoch
+                || (has_place(plan, &share.node_name) && has_set(plan, content, set.set_index))
+        };
+        self.plans.until(set.plan.workload_number, |plan| !plan.is_some_and(goes_on)).await;
+    }
+
     /// Fetches all shares at the same time.
     async fn fetch_all(
         self: &Arc<Self>,
@@ -97,12 +114,17 @@ impl Fetcher {
         requests: Vec<ShareRequest>,
         gathered: &mut Gathered,
     ) -> Result<(), NotFetched> {
+        let content = set.plan.set_content(set.set_index).ok_or_else(|| beyond_timeline(set.set_index))?;
         let mut fetches = JoinSet::new();
         for request in requests {
             let (fetcher, set) = (self.clone(), set.clone());
             fetches.spawn(async move {
-                let fetched = fetch_share(&fetcher.connections, &set, &request).await;
-                fetched.map_err(|status| not_fetched(request.share, &status))
+                tokio::select! {
+                    fetched = fetch_share(&fetcher.connections, &set, &request) => {
+                        fetched.map_err(|status| not_fetched(request.share, &status))
+                    }
+                    () = fetcher.in_vain(&set, &content, &request.share) => Err(given_up(&set.plan).into()),
+                }
             });
         }
         while let Some(share) = fetches.join_next().await {
@@ -112,6 +134,15 @@ impl Fetcher {
         }
         Ok(())
     }
+}
+
+fn given_up(plan: &Assignment) -> Status {
+    let Assignment { plan_epoch, workload_number, .. } = plan;
+    Status::failed_precondition(format!("plan_epoch {plan_epoch} of workload {workload_number} was replaced"))
+}
+
+fn has_place(plan: &Assignment, node_name: &str) -> bool {
+    plan.composites(node_name) || plan.samplers.iter().any(|share| share.node_name == node_name)
 }
 
 /// The images of a set from those that were sampled: the same, or joined from tiles.

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use cluster::{FetchImages, Policy, SceneHash, SceneRef, Timeline, Workload};
+use cluster::{Assignment, FetchImages, Workload};
 use codec::{Chunk, ChunkBody, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
-use depth_image::{Aabb, Environment, Illumination, Light, PinholeCamera, SpecularPlanes};
+use depth_image::{Environment, Illumination, Light, PinholeCamera, SpecularPlanes};
 use glam::{UVec2, Vec3};
 use tokio::net::TcpListener;
 use tokio_stream::StreamExt as _;
@@ -14,6 +14,7 @@ use tonic::{Code, async_trait};
 use wire::rpc::{Messages, Sampler, sampler_server};
 
 use super::*;
+use crate::test_support::{assignment, workload};
 
 type Spoil = fn(&mut Vec<Chunk>);
 
@@ -81,34 +82,14 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
     let shutdown = CancellationToken::new();
     let routes = Routes::new(sampler_server(Script { chunks, stays_open }));
     let _server = tokio::spawn(node::serve(listener, routes, false, shutdown.clone()));
-    let workload = Workload {
-        scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
-        sample_cameras: vec![camera(); 2],
-        cell_first_indices: Vec::new(),
-        sampling: "conventional".to_owned(),
-        lighting: "unlit".to_owned(),
-        method: "joint_carve".to_owned(),
-        codec: "lz4".to_owned(),
-        volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
-        background_linear: Vec3::ZERO,
-        timeline: Timeline::still(0.0),
-        illumination: illumination(),
-        refinement_steps: 1,
-    };
     let share = SamplerShare { node_name: "n7".to_owned(), address, image_indices: vec![0, 1] };
-    let plan = Arc::new(cluster::Assignment {
-        plan_epoch: 5,
-        workload_number: 1,
-        policy: Policy::Pipeline,
-        workload,
-        samplers: vec![share],
-        compositors: Vec::new(),
-        tile_count: 1,
-        relay_fanout: None,
-    });
+    let workload = Workload { sample_cameras: vec![camera(); 2], illumination: illumination(), ..workload() };
+    let plan = Arc::new(Assignment { plan_epoch: 5, workload, samplers: vec![share], ..assignment() });
     let deadlines = Deadlines { chunk: Duration::from_millis(200), ..Deadlines::default() };
     let request = SetRequest { plan: CellPlan::of(&plan, 0).unwrap(), set_index: 0, relay: None };
-    let fetched = Arc::new(Fetcher::new("n0", deadlines)).fetch(&request).await;
+    let plans = PlansInForce::new("n0");
+    plans.apply((*plan).clone()).unwrap();
+    let fetched = Arc::new(Fetcher::new(plans, deadlines)).fetch(&request).await;
     shutdown.cancel();
     let set = fetched.map(|(set, _)| set);
     set.map_err(|failed| {

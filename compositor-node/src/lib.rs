@@ -1,15 +1,17 @@
 //! The compositor's service: one complete sample set, many views.
 //!
 //! Sets: `fetch` gathers the images of a set from its samplers, or from a compositor that relays them. `fetch_share` talks
-//! to one of these nodes, checks and decodes, and `relay_buffer` relays images to other compositors. `sets` keeps the latest
-//! few on the device and fetches the next ahead; `reports` names samplers that fail.
+//! to one of these nodes, checks and decodes, and `relay_buffer` relays images to other compositors. `sets` keeps those on
+//! the device that memory has room for, and fetches the next ahead; `reports` names samplers that fail.
 //!
-//! Views: `service` answers clients. A `batch_stream` makes every view that is requested, a `live_stream` the newest. Views
-//! wait in `queue`; `render` makes and encodes them batch by batch, and `outbox` sends them. `quota` bounds them all.
+//! Views: `service` answers clients. A `batch_stream` makes every view that is requested, a `live_stream` the newest, whose
+//! `course` tells which cell comes next. Views wait in `queue`, live ones and others in lanes of their own; `render` makes
+//! and encodes them batch by batch, and `outbox` sends them. `quota` bounds them all.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod batch;
 mod batch_stream;
+mod course;
 mod fetch;
 mod fetch_share;
 mod live_stream;
@@ -22,5 +24,7 @@ mod reports;
 mod service;
 mod sets;
 mod shared;
+#[cfg(test)]
+mod test_support;
 
 pub use service::CompositorService;

@@ -3,20 +3,24 @@
 //! A pose waits for its set, for its client to take a frame, and for the device. A stream has one pose at most in each of
 //! these places, and a newer one replaces it. A set that is being fetched is never given up for a newer one. Where sets
 //! arrive more slowly than poses, every set is shown, with its newest pose.
+//!
+//! A viewer that moves to another view cell waits only for a moment: until the set of that cell is there, the nearest loaded
+//! set of the same scene time serves.
 
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, RenderViews, RequestedView};
-use node::next_within;
+use cluster::{Assignment, Policy, RenderViews, RequestedView, SetContent};
+use node::{CellPlan, next_within};
 use tokio::sync::Semaphore;
 use tonic::Status;
 use wire::rpc::Messages;
 
-use crate::batch::{Loaded, Waiting};
+use crate::batch::{Loaded, Place, Waiting};
+use crate::course::Course;
 use crate::outbox::Reply;
-use crate::queue::Viewer;
+use crate::queue::{Lane, Viewer};
 use crate::quota::{Credit, closed};
 use crate::shared::ClientStream;
 
@@ -36,15 +40,32 @@ struct Pose {
 
 impl Pose {
     fn shows_set_of(&self, other: &Self) -> bool {
-        let set = |pose: &Self| (pose.plan.plan_epoch, pose.request.set_index, pose.cell);
+        let set = |pose: &Self| (pose.plan_and_cell(), pose.request.set_index);
         set(self) == set(other)
+    }
+
+    fn plan_and_cell(&self) -> (u64, u32) {
+        (self.plan.plan_epoch, self.cell)
+    }
+
+    fn has_cells(&self) -> bool {
+        self.plan.policy != Policy::Direct && self.plan.workload.cell_count() > 1
     }
 }
 
-/// A pose whose set is ready.
+/// A set that is being fetched.
+struct Fetch {
+    /// The newest pose that it is for; `None` once another set has served it.
+    pose: Option<Pose>,
+    work: Pending<Loaded>,
+}
+
+/// A pose whose set is ready. While it waits for room, nothing keeps the set in memory: a client that takes no frames would
+/// keep it there.
 struct Ready {
     pose: Pose,
-    set: Loaded,
+    place: Place,
+    wait_s: f64,
     /// The wait for room.
     credit: Pending<Credit>,
 }
@@ -55,12 +76,18 @@ pub(crate) struct LiveStream<'a> {
     credits: Arc<Semaphore>,
     /// The newest pose, whose set is not being fetched yet.
     newest: Option<Pose>,
-    /// The pose whose set is being fetched.
-    loading: Option<(Pose, Pending<Loaded>)>,
+    loading: Option<Fetch>,
     ready: Option<Ready>,
-    /// The plan that the stream was opened under, or its successor.
-    plan: Option<Arc<Assignment>>,
     last_frame: Option<u64>,
+    /// The plan and the cell of the last set that was its pose's own; `None` before the first, which is waited for.
+    own: Option<(u64, u32)>,
+    /// The time since which no pose has found its own set.
+    without_set: Option<Instant>,
+    /// Whether neighbours have been tried since something changed.
+    has_tried: bool,
+    course: Course,
+    /// The last set that was fetched without being waited for.
+    aside: Option<SetContent>,
     _viewer: Viewer,
 }
 
@@ -74,8 +101,12 @@ impl<'a> LiveStream<'a> {
             newest: None,
             loading: None,
             ready: None,
-            plan: None,
             last_frame: None,
+            own: None,
+            without_set: None,
+            has_tried: false,
+            course: Course::default(),
+            aside: None,
             _viewer: client.shared.arrivals.viewer(),
         }
     }
@@ -90,14 +121,19 @@ impl<'a> LiveStream<'a> {
         self.accept(first)?;
         while is_open || self.newest.is_some() || self.loading.is_some() || self.ready.is_some() {
             self.fetch_next();
+            let patience = self.patience_ends();
             tokio::select! {
                 biased;
                 request = next_within(&mut requests, idle, "poses"), if is_open => match request? {
                     Some(request) => self.accept(request)?,
                     None => is_open = false,
                 },
-                set = wait_for(self.loading.as_mut().map(|(_, work)| work)) => self.loaded(set?),
+                set = wait_for(self.loading.as_mut().map(|fetch| &mut fetch.work)) => match set {
+                    Ok(set) => self.loaded(set),
+                    Err(status) => self.not_loaded(status)?,
+                },
                 credit = wait_for(self.ready.as_mut().map(|ready| &mut ready.credit)) => self.credited(credit?),
+                () = until(patience) => self.show_neighbour(),
             }
         }
         Ok(())
@@ -107,7 +143,7 @@ impl<'a> LiveStream<'a> {
     fn accept(&mut self, request: RenderViews) -> Result<(), Status> {
         let live = request.live.ok_or_else(|| Status::invalid_argument("live: the stream's first request was"))?;
         self.client.outbox.acknowledge(live.acknowledged_frame);
-        let plan = self.plan_of(request.plan_epoch)?;
+        let plan = self.plan_of(&request)?;
         let Some(&view) = request.views.first() else {
             return Ok(());
         };
@@ -122,14 +158,43 @@ impl<'a> LiveStream<'a> {
             set_index = pose.request.set_index,
             "requested"
         );
+        self.course.add(pose.arrived, &pose.view.camera);
+        let done = &self.client.shared.metrics.done;
+        done.viewer_moved(self.client.stream, pose.request.workload_number, pose.view.camera);
+        self.fetch_ahead(&pose);
+        self.has_tried = false;
         let older = self.put(pose);
         self.count_replaced(older.map(|pose| pose.view));
+        self.show_loaded();
         Ok(())
+    }
+
+    /// Begins to fetch the set of the cell where the viewer will be in a second.
+    fn fetch_ahead(&mut self, pose: &Pose) {
+        if self.own.is_none() || !pose.has_cells() {
+            return;
+        }
+        let Some(ahead) = self.course.in_a_second(&pose.view.camera) else { return };
+        let cell = pose.plan.cell_of(&ahead);
+        if cell != pose.cell {
+            self.fetch_aside(&pose.plan, pose.request.set_index, cell);
+        }
+    }
+
+    /// Begins to fetch a set that is not waited for; one at a time, however fast a camera jumps.
+    fn fetch_aside(&mut self, plan: &Arc<Assignment>, set_index: u32, cell: u32) {
+        let sets = &self.client.shared.sets;
+        if self.aside.is_some_and(|aside| sets.is_loading(&aside)) {
+            return;
+        }
+        if let Ok(plan) = CellPlan::of(plan, cell) {
+            self.aside = sets.load_ahead(&plan, set_index);
+        }
     }
 
     /// Puts a pose in place of one of the same set, or else in place of the newest; gives the pose that it replaces.
     fn put(&mut self, pose: Pose) -> Option<Pose> {
-        if self.ready.as_ref().is_some_and(|ready| ready.pose.shows_set_of(&pose)) {
+        if self.ready.as_ref().is_some_and(|ready| !ready.place.is_neighbour && ready.pose.shows_set_of(&pose)) {
             let credit = self.credit(&pose.view);
             let ready = self.ready.as_mut()?;
             if ready.pose.view.camera.size_px != pose.view.camera.size_px {
@@ -137,8 +202,8 @@ impl<'a> LiveStream<'a> {
             }
             return Some(std::mem::replace(&mut ready.pose, pose));
         }
-        match &mut self.loading {
-            Some((loading, _)) if loading.shows_set_of(&pose) => Some(std::mem::replace(loading, pose)),
+        match self.loading.as_mut().and_then(|fetch| fetch.pose.as_mut()) {
+            Some(loading) if loading.shows_set_of(&pose) => Some(std::mem::replace(loading, pose)),
             _ => self.newest.replace(pose),
         }
     }
@@ -152,20 +217,10 @@ impl<'a> LiveStream<'a> {
         }
     }
 
-    /// The plan of a request. Nodes take a plan before clients hear of it: until they do, the new plan serves them, where it
-    /// shows the same.
-    fn plan_of(&mut self, plan_epoch: u64) -> Result<Arc<Assignment>, Status> {
+    /// The plan in force for a request. A stream goes on from plan to plan of its workload, whatever its cells and roles.
+    fn plan_of(&self, request: &RenderViews) -> Result<Arc<Assignment>, Status> {
         let shared = &self.client.shared;
-        let follows = |plan: &Arc<Assignment>| {
-            plan.plan_epoch > plan_epoch && self.plan.as_ref().is_some_and(|known| known.workload == plan.workload)
-        };
-        let plan = match shared.plan.in_force().filter(follows) {
-            Some(plan) => plan,
-            None => shared.plan.require(plan_epoch)?,
-        };
-        let plan = shared.of_compositor(plan)?;
-        self.plan = Some(plan.clone());
-        Ok(plan)
+        shared.of_compositor(shared.plans.follow(request.workload_number, request.plan_epoch)?)
     }
 
     fn count_replaced(&self, older: Option<RequestedView>) {
@@ -184,32 +239,125 @@ impl<'a> LiveStream<'a> {
         let (shared, plan) = (self.client.shared.clone(), pose.plan.clone());
         let (set_index, cell) = (pose.request.set_index, pose.cell);
         let work = Box::pin(async move { shared.source(&plan, set_index, cell).await });
-        self.loading = Some((pose, work));
+        self.without_set.get_or_insert(pose.arrived);
+        self.loading = Some(Fetch { pose: Some(pose), work });
     }
 
     fn loaded(&mut self, set: Loaded) {
-        let Some((pose, _)) = self.loading.take() else { return };
-        // The pose may have arrived after the fetch began.
-        let set = Loaded { wait_s: set.wait_s.min(pose.arrived.elapsed().as_secs_f64()), ..set };
-        let older = self.ready.replace(Ready { credit: self.credit(&pose.view), pose, set });
-        self.count_replaced(older.map(|ready| ready.pose.view));
-        self.replace_waiting();
-    }
-
-    /// Replaces a view of this stream that still waits for the device, and takes its credit.
-    fn replace_waiting(&mut self) {
-        let waiting = self.client.shared.arrivals.withdraw(self.client.stream).pop_front();
-        let Some((waiting, ready)) = waiting.zip(self.ready.as_ref()) else { return };
-        self.count_replaced(Some(waiting.view));
-        if ready.pose.view.camera.size_px == waiting.key.size_px {
-            self.credited(waiting.credit);
+        let Some(Fetch { pose, .. }) = self.loading.take() else { return };
+        self.has_tried = false;
+        self.own.get_or_insert((set.place.id.plan_epoch, set.place.cell));
+        if pose.is_some() || self.newest.is_none() {
+            self.without_set = None;
+        }
+        if let Some(pose) = pose {
+            self.own = Some(pose.plan_and_cell());
+            // The pose may have arrived after the fetch began.
+            let wait_s = set.wait_s.min(pose.arrived.elapsed().as_secs_f64());
+            self.prepare(pose, Loaded { wait_s, ..set });
         }
     }
 
+    /// A set that failed under a plan that was replaced is fetched under the plan in force. One that no pose waits for is
+    /// fetched again when one does.
+    fn not_loaded(&mut self, status: Status) -> Result<(), Status> {
+        let Some(pose) = self.loading.take().and_then(|fetch| fetch.pose) else { return Ok(()) };
+        let plan = self.plan_of(&pose.request)?;
+        if plan.plan_epoch == pose.plan.plan_epoch {
+            return Err(status);
+        }
+        let cell = plan.cell_of(&pose.view.camera);
+        self.newest.get_or_insert(Pose { plan, cell, ..pose });
+        Ok(())
+    }
+
+    /// Hands a pose over to the device where there is room. Otherwise it waits for room, in place of the one that waited.
+    fn prepare(&mut self, pose: Pose, set: Loaded) {
+        let older = self.ready.take();
+        self.count_replaced(older.as_ref().map(|ready| ready.pose.view));
+        if let Some(credit) = self.replaced_credit(&pose.view).or_else(|| self.try_credit(&pose.view)) {
+            return self.queue(pose, &set, credit);
+        }
+        let same_size = |ready: &Ready| ready.pose.view.camera.size_px == pose.view.camera.size_px;
+        let credit = match older.filter(same_size) {
+            Some(older) => older.credit,
+            None => self.credit(&pose.view),
+        };
+        self.ready = Some(Ready { pose, place: set.place, wait_s: set.wait_s, credit });
+    }
+
+    /// The credit of a view of this stream that still waits for the device, and is replaced.
+    fn replaced_credit(&self, view: &RequestedView) -> Option<Credit> {
+        let waiting = self.client.shared.arrivals.withdraw(self.client.stream).pop_front()?;
+        self.count_replaced(Some(waiting.view));
+        (view.camera.size_px == waiting.key.size_px).then_some(waiting.credit)
+    }
+
+    /// The newest pose that waits for a set.
+    fn waiting(&self) -> Option<&Pose> {
+        self.newest.as_ref().or_else(|| self.loading.as_ref()?.pose.as_ref())
+    }
+
+    /// The time at which a pose has waited long enough for another cell; `None` where none waits, or no other set can serve.
+    /// A viewer that stays in its cell waits for the next set there: another cell's would look worse.
+    fn patience_ends(&self) -> Option<Instant> {
+        let has_moved = |pose: &&Pose| self.own.is_some_and(|own| own != pose.plan_and_cell());
+        let waits = self.waiting().filter(has_moved).is_some() && !self.has_tried;
+        Some(self.without_set.filter(|_| waits)? + self.client.shared.deadlines.neighbour)
+    }
+
+    /// Makes the newest pose's view where its own set is loaded while another is being fetched.
+    fn show_loaded(&mut self) {
+        let Some(pose) = self.newest.as_ref().filter(|pose| self.loading.is_some() && pose.has_cells()) else { return };
+        let loaded = self.client.shared.loaded(&pose.plan, pose.request.set_index, pose.cell);
+        if let Some((pose, set)) = loaded.and_then(|set| Some((self.take_newest()?, set))) {
+            (self.without_set, self.own) = (None, Some(pose.plan_and_cell()));
+            self.prepare(pose, set);
+        }
+    }
+
+    /// Makes the newest pose's view from the nearest loaded set of its moment. Its own set is fetched all the same.
+    fn show_neighbour(&mut self) {
+        self.has_tried = true;
+        let Some(pose) = self.waiting() else { return };
+        let (plan, set_index, cell) = (pose.plan.clone(), pose.request.set_index, pose.cell);
+        let Some(set) = self.client.shared.nearest(&plan, set_index, &pose.view.camera) else { return };
+        if self.newest.is_some() {
+            self.fetch_aside(&plan, set_index, cell);
+        }
+        if let Some(pose) = self.take_newest() {
+            let wait_s = pose.arrived.elapsed().as_secs_f64();
+            self.prepare(pose, Loaded { wait_s, ..set });
+        }
+    }
+
+    /// The newest pose that waits for a set; it replaces the other.
+    fn take_newest(&mut self) -> Option<Pose> {
+        let loading = self.loading.as_mut().and_then(|fetch| fetch.pose.take());
+        let Some(newest) = self.newest.take() else { return loading };
+        self.count_replaced(loading.map(|pose| pose.view));
+        Some(newest)
+    }
+
+    /// A pose that waited has room now. One whose set has been evicted meanwhile waits for it again.
     fn credited(&mut self, credit: Credit) {
-        let Some(Ready { pose, set, .. }) = self.ready.take() else { return };
+        let Some(Ready { pose, place, wait_s, .. }) = self.ready.take() else { return };
+        match self.client.shared.source_at(&pose.plan, pose.request.set_index, place) {
+            Some(source) => self.queue(pose, &Loaded { source, place, wait_s }, credit),
+            None => {
+                self.newest.get_or_insert(pose);
+            }
+        }
+    }
+
+    fn queue(&self, pose: Pose, set: &Loaded, credit: Credit) {
         let requested = (&pose.request, pose.view, pose.arrived);
-        self.client.queue(vec![Waiting::new(requested, &set, self.reply.clone(), credit)]);
+        self.client.queue(Lane::Live, vec![Waiting::new(requested, set, self.reply.clone(), credit)]);
+    }
+
+    fn try_credit(&self, view: &RequestedView) -> Option<Credit> {
+        let stream = self.credits.clone().try_acquire_owned().ok()?;
+        Some(Credit { stream, _node: self.client.shared.quota.try_live_view(&view.camera)? })
     }
 
     fn credit(&self, view: &RequestedView) -> Pending<Credit> {
@@ -226,6 +374,14 @@ impl<'a> LiveStream<'a> {
 async fn wait_for<T>(work: Option<&mut Pending<T>>) -> Result<T, Status> {
     match work {
         Some(work) => work.await,
+        None => std::future::pending().await,
+    }
+}
+
+/// Waits for a time; without any, waits for ever.
+async fn until(time: Option<Instant>) {
+    match time {
+        Some(time) => tokio::time::sleep_until(time.into()).await,
         None => std::future::pending().await,
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use parking_lot::Mutex;
 use tokio::sync::Notify;
@@ -14,38 +15,67 @@ const SHARED_VIEWS: usize = 8;
 /// Pixels of these views.
 const SHARED_PIXELS: usize = 1 << 20;
 
+/// The ways to the device. Each has one call to it at a time, so that no view of a live stream waits for a call of a batch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Lane {
+    /// Views of live streams.
+    Live,
+    /// Views of batches.
+    Batch,
+}
+
 /// The views of all streams that wait for the device. Bounded: each view that waits holds a credit.
 #[derive(Default)]
 pub(crate) struct Arrivals {
+    live: WaitingLane,
+    batch: WaitingLane,
+    /// Live streams that are open, whether they wait or not: the next pose may come at any time.
+    viewers: AtomicUsize,
+}
+
+#[derive(Default)]
+struct WaitingLane {
     queue: Mutex<FairQueue>,
     added: Notify,
 }
 
 impl Arrivals {
-    pub(crate) fn push(&self, stream: u64, views: Vec<Waiting>) {
-        self.queue.lock().push(stream, views);
-        self.added.notify_one();
+    fn lane(&self, lane: Lane) -> &WaitingLane {
+        match lane {
+            Lane::Live => &self.live,
+            Lane::Batch => &self.batch,
+        }
+    }
+
+    pub(crate) fn push(&self, lane: Lane, stream: u64, views: Vec<Waiting>) {
+        let lane = self.lane(lane);
+        lane.queue.lock().push(stream, views);
+        lane.added.notify_one();
     }
 
     /// Counts a live stream as open: batches are small until the guard is dropped.
     pub(crate) fn viewer(self: &Arc<Self>) -> Viewer {
-        self.queue.lock().viewers += 1;
+        self.viewers.fetch_add(1, Ordering::Relaxed);
         Viewer(self.clone())
     }
 
     /// Takes back a stream's views, oldest first.
     pub(crate) fn withdraw(&self, stream: u64) -> VecDeque<Waiting> {
-        self.queue.lock().withdraw(stream)
+        let [mut live, mut batch] = [&self.live, &self.batch].map(|lane| lane.queue.lock().withdraw(stream));
+        live.append(&mut batch);
+        live
     }
 
-    /// Waits for the next batch.
-    pub(crate) async fn next_batch(&self) -> Vec<Waiting> {
+    /// Waits for the next batch of a lane.
+    pub(crate) async fn next_batch(&self, lane: Lane) -> Vec<Waiting> {
+        let lane = self.lane(lane);
         loop {
-            let batch = self.queue.lock().take_batch();
+            let has_viewers = self.viewers.load(Ordering::Relaxed) > 0;
+            let batch = lane.queue.lock().take_batch(has_viewers);
             if !batch.is_empty() {
                 return batch;
             }
-            self.added.notified().await;
+            lane.added.notified().await;
         }
     }
 }
@@ -55,7 +85,7 @@ pub(crate) struct Viewer(Arc<Arrivals>);
 
 impl Drop for Viewer {
     fn drop(&mut self) {
-        self.0.queue.lock().viewers -= 1;
+        self.0.viewers.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
@@ -66,8 +96,6 @@ struct FairQueue {
     streams: BTreeMap<u64, VecDeque<Waiting>>,
     /// The last stream that has had its turn.
     last: u64,
-    /// Live streams that are open, whether they wait or not: the next pose may come at any time.
-    viewers: usize,
 }
 
 impl FairQueue {
@@ -83,14 +111,14 @@ impl FairQueue {
 
     /// The next stream's first view and those that can be made with it, one of each stream in turn, round by round. Streams
     /// that had no part in it have the next turn.
-    fn take_batch(&mut self) -> Vec<Waiting> {
+    fn take_batch(&mut self, has_viewers: bool) -> Vec<Waiting> {
         let order = self.order();
         let first = order.first().and_then(|first| self.streams.get(first)?.front());
         let Some(wanted) = first.map(|view| view.key.clone()) else {
             return Vec::new();
         };
         // While live streams are open, a pose may arrive at any time.
-        let most = if self.viewers == 0 { wanted.max_views() } else { shared(&wanted) };
+        let most = if has_viewers { shared(&wanted) } else { wanted.max_views() };
         // The most views of each stream.
         let rounds = if order.len() == 1 { MAX_BATCH } else { shared(&wanted) };
         let first = self.take_round(&order, &wanted, most);
@@ -145,19 +173,17 @@ mod tests {
     use tokio::sync::Semaphore;
 
     use super::*;
-    use crate::batch::Source;
+    use crate::batch::{Place, Source};
     use crate::outbox::{Outbox, Reply};
     use crate::quota::{Credit, NodeQuota};
-    use crate::sets::ReadySet;
-
-    struct Nothing;
-    impl node::UploadedSet for Nothing {}
+    use crate::test_support::assignment;
 
     fn view(stream: u64, number: u32, index: u64, side_px: u32) -> Waiting {
         let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(side_px));
         let key = BatchKey {
+            workload_number: 1,
             sample_set_id: SampleSetId { plan_epoch: 1, index },
-            cell: 0,
+            content: None,
             method: String::new(),
             planes: ViewPlanes::default(),
             size_px: camera.size_px,
@@ -165,9 +191,11 @@ mod tests {
         let permit = Arc::new(Semaphore::new(1)).try_acquire_owned().unwrap();
         let node = NodeQuota::new(Quotas::default()).try_view(&camera).unwrap();
         let now = Instant::now();
+        let place = Place { id: key.sample_set_id, cell: 0, is_neighbour: false, content: None };
         Waiting {
             key,
-            source: Source::Set(ReadySet { set: Arc::new(Nothing), since: now }),
+            place,
+            source: Source::Scene { plan: Arc::new(assignment()), scene_time_s: 0.0 },
             view: RequestedView { frame: number.into(), camera },
             codec: FrameCodec::Lz4,
             arrived: now,
@@ -188,7 +216,7 @@ mod tests {
         queue.push(1, (0..200).map(|i| view(1, i, u64::from(i / 3 % 2), 64)).collect());
         let mut seen = Vec::new();
         loop {
-            let batch = queue.take_batch();
+            let batch = queue.take_batch(false);
             assert!(batch.len() <= MAX_BATCH && batch.iter().all(|view| view.key == batch[0].key));
             assert!(batch.is_sorted_by_key(|view| view.view.frame));
             if batch.is_empty() {
@@ -204,10 +232,10 @@ mod tests {
     fn large_views_make_small_batches() {
         let mut queue = FairQueue::default();
         queue.push(1, views(1, 8, 4096));
-        assert_eq!(queue.take_batch().len(), 4);
+        assert_eq!(queue.take_batch(false).len(), 4);
         let mut queue = FairQueue::default();
         queue.push(1, views(1, 2, 16_384));
-        assert_eq!(queue.take_batch().len(), 1);
+        assert_eq!(queue.take_batch(false).len(), 1);
     }
 
     #[test]
@@ -215,29 +243,26 @@ mod tests {
         let mut queue = FairQueue::default();
         queue.push(1, views(1, 5000, 64));
         (2..10).for_each(|stream| queue.push(stream, vec![view(stream, 0, 0, 64)]));
-        let batch = queue.take_batch();
+        let batch = queue.take_batch(false);
         let of = |stream: u64| batch.iter().filter(|view| view.reply.outbox().stream == stream).count();
         assert_eq!(of(1), SHARED_VIEWS);
         assert!((2..10).all(|stream| of(stream) == 1), "views of one size go together");
-        assert_eq!(queue.take_batch().len(), MAX_BATCH, "alone, it has the device");
-        queue.viewers += 1;
-        assert_eq!(queue.take_batch().len(), SHARED_VIEWS, "a pose may arrive at any time");
-        queue.viewers -= 1;
-        assert_eq!(queue.take_batch().len(), MAX_BATCH);
+        assert_eq!(queue.take_batch(false).len(), MAX_BATCH, "alone, it has the device");
+        assert_eq!(queue.take_batch(true).len(), SHARED_VIEWS, "a pose may arrive at any time");
+        assert_eq!(queue.take_batch(false).len(), MAX_BATCH);
     }
 
     #[test]
     fn many_viewers_take_turns_in_small_batches() {
         let mut queue = FairQueue::default();
         let mut served = [0; 40];
-        queue.viewers = 40;
         for _ in 0..10 {
             // Every viewer has a pose again as soon as its last was taken.
             (0..40).for_each(|stream| {
                 let waiting = queue.withdraw(stream);
                 queue.push(stream, vec![waiting.into_iter().next().unwrap_or_else(|| view(stream, 0, 0, 64))]);
             });
-            let batch = queue.take_batch();
+            let batch = queue.take_batch(true);
             assert_eq!(batch.len(), SHARED_VIEWS);
             batch.iter().for_each(|view| served[view.reply.outbox().stream as usize] += 1);
         }
@@ -249,7 +274,7 @@ mod tests {
         let mut queue = FairQueue::default();
         queue.push(1, views(1, 9, 1024));
         queue.push(2, vec![view(2, 0, 0, 64)]);
-        assert_eq!(queue.take_batch().len(), 1);
+        assert_eq!(queue.take_batch(false).len(), 1);
     }
 
     #[test]
@@ -258,7 +283,7 @@ mod tests {
         queue.push(1, views(1, 100, 64));
         queue.push(2, views(2, 30, 32));
         queue.push(7, views(7, 30, 16));
-        let leaders: Vec<u64> = (0..6).map(|_| queue.take_batch()[0].reply.outbox().stream).collect();
+        let leaders: Vec<u64> = (0..6).map(|_| queue.take_batch(false)[0].reply.outbox().stream).collect();
         assert_eq!(leaders, [1, 2, 7, 1, 2, 7]);
     }
 
@@ -270,8 +295,8 @@ mod tests {
         queue.push(5, Vec::new());
         assert_eq!(queue.withdraw(3).len(), 5);
         assert!(queue.withdraw(3).is_empty());
-        let batch = queue.take_batch();
+        let batch = queue.take_batch(false);
         assert_eq!((batch.len(), batch[0].reply.outbox().stream), (1, 4));
-        assert!(queue.take_batch().is_empty() && queue.streams.is_empty());
+        assert!(queue.take_batch(false).is_empty() && queue.streams.is_empty());
     }
 }

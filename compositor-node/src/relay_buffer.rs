@@ -1,6 +1,11 @@
 //! Encoded images of one set as they arrive, for compositors that this one relays them to.
 
+use std::collections::HashMap;
+use std::sync::{Arc, Weak};
+
+use cluster::SetContent;
 use codec::EncodedDepthImage;
+use parking_lot::Mutex;
 use tokio::sync::watch;
 use tokio_stream::StreamExt as _;
 use tonic::Status;
@@ -15,7 +20,25 @@ struct RelayState {
 
 /// Images are relayed in the order they arrive. Clones share them.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct RelayBuffer(watch::Sender<RelayState>);
+pub(crate) struct RelayBuffer(Arc<watch::Sender<RelayState>>);
+
+/// The buffers of sets that are loaded or being loaded, which hold them.
+#[derive(Debug, Default)]
+pub(crate) struct RelayBuffers(Mutex<HashMap<SetContent, Weak<watch::Sender<RelayState>>>>);
+
+impl RelayBuffers {
+    /// The buffer of a set, the same for all as long as one of them holds it.
+    pub(crate) fn of(&self, content: SetContent) -> RelayBuffer {
+        let mut buffers = self.0.lock();
+        buffers.retain(|_, buffer| buffer.strong_count() > 0);
+        if let Some(buffer) = buffers.get(&content).and_then(Weak::upgrade) {
+            return RelayBuffer(buffer);
+        }
+        let buffer = RelayBuffer::default();
+        buffers.insert(content, Arc::downgrade(&buffer.0));
+        buffer
+    }
+}
 
 impl RelayBuffer {
     /// Adds an image that has arrived; one that was fetched again after a fault counts once.
@@ -39,9 +62,9 @@ impl RelayBuffer {
         matches!(self.0.borrow().ended, Some(Err(_)))
     }
 
-    /// Whether no image has arrived.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.0.borrow().images.is_empty()
+    /// Bytes of the images that have arrived.
+    pub(crate) fn bytes(&self) -> usize {
+        self.0.borrow().images.iter().map(|(_, image)| image.payload.len()).sum()
     }
 
     /// The images that have arrived, then those that arrive.
@@ -92,7 +115,8 @@ mod tests {
         assert_eq!(waiting.await.unwrap(), (0, true));
         let late: Vec<_> = buffer.images().map(|image| image.unwrap().0).collect().await;
         assert_eq!(late, [2, 0]);
-        assert!(!buffer.has_failed() && !buffer.is_empty());
+        assert!(!buffer.has_failed());
+        assert_eq!(buffer.bytes(), 2);
     }
 
     #[tokio::test]

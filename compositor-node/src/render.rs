@@ -1,4 +1,4 @@
-//! The device's loop: batch by batch, while the frames of the batch before are encoded and sent.
+//! The device's loops, one for each lane: batch by batch, while the frames of the batch before are encoded and sent.
 
 use std::sync::Arc;
 use std::thread::available_parallelism;
@@ -12,14 +12,14 @@ use tonic::Status;
 
 use crate::batch::{Source, Waiting};
 use crate::outbox::Output;
-use crate::queue::Arrivals;
+use crate::queue::{Arrivals, Lane};
 
 /// Batches that are being encoded while the device makes the next.
 const BATCHES_BEHIND: usize = 2;
 
-/// Makes views, and encodes them.
+/// Makes views, and encodes them. Clones share the encoders.
 #[derive(Clone)]
-struct Rendering {
+pub(crate) struct Rendering {
     engine: Arc<dyn Engine>,
     metrics: NodeMetrics,
     encoders: Arc<Semaphore>,
@@ -27,37 +27,40 @@ struct Rendering {
     flow: u64,
 }
 
-/// Runs until it is aborted.
-pub(crate) async fn render_loop(engine: Arc<dyn Engine>, arrivals: Arc<Arrivals>, metrics: NodeMetrics) {
-    let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
-    let behind = Arc::new(Semaphore::new(BATCHES_BEHIND));
-    let rendering = Rendering { engine, metrics, encoders, flow: Turn::next_flow() };
-    loop {
-        // Before the batch is chosen: views that arrive while frames wait for encoders are newer.
-        let Ok(place) = behind.clone().acquire_owned().await else {
-            return;
-        };
-        let mut batch = arrivals.next_batch().await;
-        batch.retain(|view| {
-            let is_wanted = !view.reply.outbox().gone.is_cancelled();
-            if !is_wanted {
-                rendering.metrics.drop_view("client gone");
+impl Rendering {
+    pub(crate) fn new(engine: Arc<dyn Engine>, metrics: NodeMetrics) -> Self {
+        let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
+        Self { engine, metrics, encoders, flow: Turn::next_flow() }
+    }
+
+    /// Makes the views of one lane, until it is aborted.
+    pub(crate) async fn run(self, arrivals: Arc<Arrivals>, lane: Lane) {
+        let behind = Arc::new(Semaphore::new(BATCHES_BEHIND));
+        loop {
+            // Before the batch is chosen: views that arrive while frames wait for encoders are newer.
+            let Ok(place) = behind.clone().acquire_owned().await else {
+                return;
+            };
+            let mut batch = arrivals.next_batch(lane).await;
+            batch.retain(|view| {
+                let is_wanted = !view.reply.outbox().gone.is_cancelled();
+                if !is_wanted {
+                    self.metrics.drop_view("client gone");
+                }
+                is_wanted
+            });
+            if !batch.is_empty() {
+                self.render(batch, place).await;
             }
-            is_wanted
-        });
-        if !batch.is_empty() {
-            rendering.render(batch, place).await;
         }
     }
-}
 
-impl Rendering {
     async fn render(&self, batch: Vec<Waiting>, place: OwnedSemaphorePermit) {
         let (start, metrics) = (Instant::now(), &self.metrics);
         match self.make(&batch).await {
             Ok((operation, views)) => {
                 let batch_s = start.elapsed().as_secs_f64();
-                metrics.done.add(operation, batch.len() as f64, batch_s);
+                metrics.done.add(batch[0].key.workload_number, operation, batch.len() as f64, batch_s);
                 metrics.views.inc_by(batch.len() as u64);
                 for view in &batch {
                     metrics.view_s.observe(batch_s / batch.len() as f64);
@@ -143,7 +146,7 @@ fn stage_times(waiting: &Waiting, start: Instant, batch_s: f64, count: usize) ->
 }
 
 async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes, metrics: &NodeMetrics) {
-    let Waiting { key, view: requested, codec, arrived, reply, credit, .. } = waiting;
+    let Waiting { key, place, view: requested, codec, arrived, reply, credit, .. } = waiting;
     let encoded = blocking(move || {
         let start = Instant::now();
         let encoded = encode_view(&view, codec).map_err(|error| Status::internal(format!("encoding: {error}")))?;
@@ -151,9 +154,9 @@ async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes, me
     });
     let output = encoded.await.map(|(encoded, encode_s)| {
         times.encode_s = encode_s;
-        metrics.done.add(Operation::EncodeView, 1.0, encode_s);
+        metrics.done.add(key.workload_number, Operation::EncodeView, 1.0, encode_s);
         metrics.frame_bytes.inc_by(encoded.data.len() as u64);
-        let header = encoded.header((key.sample_set_id, key.cell, false), requested.camera, times);
+        let header = encoded.header((key.sample_set_id, place.cell, place.is_neighbour), requested.camera, times);
         Output { frame: requested.frame, header, data: encoded.data, arrived, credit }
     });
     reply.send(output);

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use cluster::RenderViews;
 use codec::FramePart;
-use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Relay, next_within, until_drained};
+use node::{CellPlan, Engine, NodeConfig, NodeMetrics, PlansInForce, Relay, next_within, until_drained};
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
@@ -14,9 +14,9 @@ use wire::rpc::{Compositor, Messages};
 use crate::batch_stream::BatchStream;
 use crate::live_stream::LiveStream;
 use crate::outbox::{Outbox, Outgoing, Reply};
-use crate::queue::Arrivals;
+use crate::queue::{Arrivals, Lane};
 use crate::quota::NodeQuota;
-use crate::render::render_loop;
+use crate::render::Rendering;
 use crate::sets::Sets;
 use crate::shared::{ClientStream, Shared};
 
@@ -29,22 +29,25 @@ pub struct CompositorService {
 }
 
 impl CompositorService {
-    /// Starts the device's loop, which ends with the service.
+    /// Starts the device's loops, which end with the service.
     #[must_use]
     pub fn new(
         engine: Arc<dyn Engine>,
-        plan: CurrentPlan,
+        plans: PlansInForce,
         config: &NodeConfig,
         metrics: NodeMetrics,
         shutdown: CancellationToken,
     ) -> Self {
         let arrivals = Arc::<Arrivals>::default();
         let mut rendering = JoinSet::new();
-        rendering.spawn(render_loop(engine.clone(), arrivals.clone(), metrics.clone()));
-        let sets = Arc::new(Sets::new(engine, plan.clone(), config, metrics.clone()));
+        let renderer = Rendering::new(engine.clone(), metrics.clone());
+        for lane in [Lane::Live, Lane::Batch] {
+            rendering.spawn(renderer.clone().run(arrivals.clone(), lane));
+        }
+        let sets = Arc::new(Sets::new(engine, plans.clone(), config, metrics.clone()));
         let quota = NodeQuota::new(config.quotas);
         let shared = Shared {
-            plan,
+            plans,
             sets,
             arrivals,
             quota,
@@ -97,6 +100,7 @@ impl ClientStream {
             self.shared.metrics.drop_view("client gone");
             drop(view);
         }
+        self.shared.metrics.done.viewer_left(stream);
         self.shared.metrics.streams.dec();
     }
 

@@ -1,25 +1,28 @@
 //! Sample sets on the device: complete or absent.
 
-use std::collections::VecDeque;
+use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, SetContent};
+use cluster::{Assignment, SetContent, Workload};
 use codec::EncodedDepthImage;
-use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, SampleSet, Turn, UploadedSet};
-use node::{WorkClass, beyond_timeline, blocking};
-use parking_lot::Mutex;
-use tokio::sync::OnceCell;
+use depth_image::{Camera, PinholeCamera, nearest_set};
+use node::{
+    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet, Turn, UploadedSet,
+};
+use node::{WorkClass, beyond_timeline, blocking, most_image_bytes, most_set_bytes, set_bytes};
 use tonic::Status;
 use wire::rpc::Messages;
 
 use crate::fetch::Fetcher;
 use crate::fetch_share::{FetchTimes, SetRequest};
-use crate::relay_buffer::RelayBuffer;
+use crate::relay_buffer::{RelayBuffer, RelayBuffers};
 use crate::reports::Reports;
 
 /// The set that is shown and one that late views still need, besides those that are fetched ahead.
 const SETS_IN_USE: usize = 2;
+
+type BoxFuture<T> = Pin<Box<dyn Future<Output = T> + Send>>;
 
 /// While one set is sent and loaded, samplers should have another to work on.
 const SETS_AHEAD: u32 = 2;
@@ -30,19 +33,25 @@ fn sets_ahead(plan: &Assignment) -> u32 {
     plan.sets_at_once().max(SETS_AHEAD).min(others)
 }
 
-/// A complete set, ready to be reconstructed from.
-#[derive(Clone)]
+/// A complete set on the device, ready to be reconstructed from.
 pub(crate) struct ReadySet {
     pub(crate) set: Arc<dyn UploadedSet>,
     /// The time at which it was ready.
     pub(crate) since: Instant,
+    pub(crate) content: SetContent,
+    /// The view cell that it was loaded for, in the plan of that time.
+    pub(crate) cell: u32,
+    /// What its images show, wherever their cameras are.
+    moment: SetContent,
+    cameras: Vec<PinholeCamera>,
+    /// Its images for other compositors, where they ask this one.
+    relay: Option<RelayBuffer>,
 }
 
-/// A set on the device, and its images for other compositors.
-#[derive(Clone, Default)]
-struct Slot {
-    ready: Arc<OnceCell<ReadySet>>,
-    relay: RelayBuffer,
+/// The content of a set without its cameras: equal for the sets of all view cells at one moment.
+fn moment(plan: &Assignment, set_index: u32) -> Option<SetContent> {
+    let workload = Workload { sample_cameras: Vec::new(), cell_first_indices: Vec::new(), ..plan.workload.clone() };
+    Assignment { workload, samplers: Vec::new(), ..plan.clone() }.set_content(set_index)
 }
 
 /// The sets of one compositor, the latest few cached.
@@ -50,25 +59,23 @@ pub(crate) struct Sets {
     engine: Arc<dyn Engine>,
     fetcher: Arc<Fetcher>,
     metrics: NodeMetrics,
-    current: CurrentPlan,
+    plans: PlansInForce,
     reports: Reports,
-    cached: Mutex<VecDeque<(SetContent, Slot)>>,
+    cached: ByteCache<SetContent, ReadySet>,
+    relays: RelayBuffers,
 }
 
 impl Sets {
-    pub(crate) fn new(
-        engine: Arc<dyn Engine>,
-        current: CurrentPlan,
-        config: &NodeConfig,
-        metrics: NodeMetrics,
-    ) -> Self {
+    pub(crate) fn new(engine: Arc<dyn Engine>, plans: PlansInForce, config: &NodeConfig, metrics: NodeMetrics) -> Self {
         Self {
             engine,
-            fetcher: Arc::new(Fetcher::new(&config.node_name, config.deadlines)),
+            fetcher: Arc::new(Fetcher::new(plans.clone(), config.deadlines)),
             metrics,
-            current,
+            plans,
             reports: Reports::new(config),
-            cached: Mutex::default(),
+            // The other half is for packed images.
+            cached: ByteCache::new("sample sets", config.set_memory_bytes / 2),
+            relays: RelayBuffers::default(),
         }
     }
 
@@ -78,19 +85,27 @@ impl Sets {
         plan: &CellPlan,
         set_index: u32,
     ) -> Result<Messages<(u32, EncodedDepthImage)>, Status> {
-        let (_, slot) = self.slot(plan, set_index)?;
-        if (slot.ready.initialized() && slot.relay.is_empty()) || slot.relay.has_failed() {
+        let content = content_of(plan, set_index)?;
+        let relay = match self.cached.loaded(&content) {
+            Some(set) => set.relay.clone(),
+            None => Some(self.relays.of(content)),
+        };
+        let Some(relay) = relay.filter(|relay| !relay.has_failed()) else {
             return Err(Status::failed_precondition(format!("sample set {set_index} is not relayed")));
-        }
-        let (images, sets, plan) = (slot.relay.images(), self.clone(), plan.clone());
+        };
+        let (images, sets, plan) = (relay.images(), self.clone(), plan.clone());
         // The first request begins the loading, whose end the stream of images tells.
-        tokio::spawn(async move { sets.load(&plan, set_index).await.map(drop) });
+        tokio::spawn(async move {
+            let loaded = sets.load(&plan, set_index).await.map(drop);
+            drop(relay);
+            loaded
+        });
         Ok(images)
     }
 
     /// Waits for a complete set; the sets after it are then fetched ahead, so that samplers work on them while this one is
     /// shown.
-    pub(crate) async fn get(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<ReadySet, Status> {
+    pub(crate) async fn get(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<Pinned<ReadySet>, Status> {
         let in_turn = plan.sets_at_once() > 1;
         if in_turn {
             self.fetch_ahead(plan, set_index);
@@ -102,88 +117,112 @@ impl Sets {
         Ok(set)
     }
 
+    /// A set that is loaded already.
+    pub(crate) fn loaded(&self, content: &SetContent) -> Option<Pinned<ReadySet>> {
+        self.cached.loaded(content)
+    }
+
+    /// The loaded set of the same moment whose cameras are nearest to a view.
+    pub(crate) fn nearest(&self, plan: &Assignment, set_index: u32, view: &PinholeCamera) -> Option<Pinned<ReadySet>> {
+        let moment = moment(plan, set_index)?;
+        let mut sets = self.cached.loaded_where(|set| set.moment == moment);
+        let nearest = nearest_set(view, sets.iter().map(|set| set.cameras.clone()), &plan.workload.volume)?;
+        Some(sets.swap_remove(nearest))
+    }
+
     /// Where samplers take turns, those of later sets need not wait for this one's.
     fn fetch_ahead(self: &Arc<Self>, plan: &CellPlan, set_index: u32) {
         let last = plan.workload.timeline.set_count.saturating_sub(1);
-        for next in set_index.saturating_add(1)..=last.min(set_index.saturating_add(sets_ahead(plan))) {
-            if plan.set_content(next) == plan.set_content(set_index) {
-                continue;
+        let room = self.cached.max_bytes() / self.most_bytes(plan).max(1);
+        // Sets ahead would evict the sets in use.
+        let ahead = sets_ahead(plan).min(u32::try_from(room.saturating_sub(SETS_IN_USE)).unwrap_or(u32::MAX));
+        for next in set_index.saturating_add(1)..=last.min(set_index.saturating_add(ahead)) {
+            if plan.set_content(next) != plan.set_content(set_index) {
+                self.load_ahead(plan, next);
             }
-            let (sets, plan) = (self.clone(), plan.clone());
-            tokio::spawn(async move {
-                if let Err(status) = sets.load(&plan, next).await {
-                    tracing::debug!(set_index = next, reason = status.message(), "not fetched ahead");
-                }
-            });
         }
     }
 
-    /// Loads a set once for all that wait for it; loading goes on when the first of them leaves.
-    async fn load(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<ReadySet, Status> {
-        let (content, slot) = self.slot(plan, set_index)?;
-        if let Some(set) = slot.ready.get() {
-            return Ok(set.clone());
-        }
+    /// Begins to load a set that no view needs yet, where it has room; gives its content.
+    pub(crate) fn load_ahead(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Option<SetContent> {
+        let content = plan.set_content(set_index)?;
+        self.cached.load_ahead(content, self.most_bytes(plan), self.loading(plan, set_index, content));
+        Some(content)
+    }
+
+    /// Whether a set is being loaded.
+    pub(crate) fn is_loading(&self, content: &SetContent) -> bool {
+        self.cached.is_loading(content)
+    }
+
+    async fn load(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<Pinned<ReadySet>, Status> {
+        let content = content_of(plan, set_index)?;
+        self.cached.get(content, self.most_bytes(plan), self.loading(plan, set_index, content)).await
+    }
+
+    /// The most bytes of a cell's set, with its images for others.
+    fn most_bytes(&self, plan: &CellPlan) -> usize {
+        let relayed = plan.relays(&self.plans.node_name);
+        let packed = if relayed { most_image_bytes(&plan.workload, &plan.workload.sample_cameras) } else { 0 };
+        most_set_bytes(&plan.workload) + packed
+    }
+
+    fn loading(
+        self: &Arc<Self>,
+        plan: &CellPlan,
+        set_index: u32,
+        content: SetContent,
+    ) -> impl FnOnce() -> BoxFuture<Result<(ReadySet, usize), Status>> + Send + 'static {
         let (sets, plan) = (self.clone(), plan.clone());
-        let loading = tokio::spawn(async move {
-            let load = || sets.fetch_and_upload(&plan, set_index, &slot.relay);
-            let loaded = slot.ready.get_or_try_init(load).await.cloned();
-            if loaded.is_err() {
-                sets.remove_failed(&content);
-            }
-            loaded
-        });
-        loading.await.map_err(|error| Status::internal(format!("loading a sample set failed: {error}")))?
+        move || {
+            Box::pin(async move {
+                let loaded = sets.fetch_and_upload(&plan, set_index, content).await;
+                if let Err(status) = &loaded {
+                    tracing::debug!(set_index, reason = status.message(), "a sample set was not loaded");
+                }
+                loaded
+            })
+        }
     }
 
-    async fn fetch_and_upload(&self, plan: &CellPlan, set_index: u32, relay: &RelayBuffer) -> Result<ReadySet, Status> {
+    async fn fetch_and_upload(
+        &self,
+        plan: &CellPlan,
+        set_index: u32,
+        content: SetContent,
+    ) -> Result<(ReadySet, usize), Status> {
         let start = Instant::now();
-        let relay = Some(relay).filter(|relay| plan.relays(&self.current.node_name) && !relay.has_failed());
-        let request = SetRequest { plan: plan.clone(), set_index, relay: relay.cloned() };
+        let relay = plan.relays(&self.plans.node_name).then(|| self.relays.of(content));
+        let relay = relay.filter(|relay| !relay.has_failed());
+        let request = SetRequest { plan: plan.clone(), set_index, relay: relay.clone() };
         let (set, times) = self.fetch(&request).await?;
+        let bytes = set_bytes(&set.images) + relay.as_ref().map_or(0, RelayBuffer::bytes);
         let fetched_s = start.elapsed().as_secs_f64();
         let (engine, uploading) = (self.engine.clone(), Instant::now());
         let set = blocking(move || engine.upload(&set, Turn::of(WorkClass::Batch))).await?;
-        self.metrics.done.add(Operation::LoadSet, 1.0, times.decode_s + uploading.elapsed().as_secs_f64());
-        self.metrics.done.transferred(times.bytes, times.transfer_s);
+        self.metrics.done.add(
+            plan.workload_number,
+            Operation::LoadSet,
+            1.0,
+            times.decode_s + uploading.elapsed().as_secs_f64(),
+        );
+        self.metrics.done.transferred(plan.workload_number, times.bytes, times.transfer_s);
         self.metrics.sets_loaded.inc();
         self.metrics.set_s.observe(start.elapsed().as_secs_f64());
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
-        Ok(ReadySet { set, since: Instant::now() })
+        let moment = moment(plan, set_index).ok_or_else(|| beyond_timeline(set_index))?;
+        let cameras = plan.workload.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+        Ok((ReadySet { set, since: Instant::now(), content, cell: plan.cell, moment, cameras, relay }, bytes))
     }
 
-    /// Removes a set that failed: the next request loads it again.
-    fn remove_failed(&self, content: &SetContent) {
-        self.cached.lock().retain(|(other, slot)| other != content || slot.ready.initialized());
-    }
-
-    /// Stops when a later plan is in force: a sampler without a place in it may be lost without a word.
     async fn fetch(&self, request: &SetRequest) -> Result<(SampleSet, FetchTimes), Status> {
-        let plan_epoch = request.plan.plan_epoch;
-        let fetched = tokio::select! {
-            fetched = self.fetcher.fetch(request) => fetched,
-            () = self.current.replaced(plan_epoch) => {
-                return Err(Status::failed_precondition(format!("plan_epoch {plan_epoch} was replaced")));
-            }
-        };
-        fetched.map_err(|failed| {
-            self.reports.report(plan_epoch, &failed);
+        self.fetcher.fetch(request).await.map_err(|failed| {
+            self.reports.report(request.plan.plan_epoch, &failed);
             failed.status
         })
     }
+}
 
-    /// A set's content and its slot, new or cached; evicts the sets that were used longest ago. As many sets of every view
-    /// cell stay cached, since views of all cells take turns.
-    fn slot(&self, plan: &CellPlan, set_index: u32) -> Result<(SetContent, Slot), Status> {
-        let content = plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))?;
-        let max_cached = (SETS_IN_USE + sets_ahead(plan) as usize) * plan.cell_count;
-        let mut cached = self.cached.lock();
-        let at = cached.iter().position(|(other, _)| *other == content);
-        let entry = at.and_then(|at| cached.remove(at)).unwrap_or_else(|| (content, Slot::default()));
-        cached.push_back(entry.clone());
-        while cached.len() > max_cached {
-            cached.pop_front();
-        }
-        Ok(entry)
-    }
+fn content_of(plan: &CellPlan, set_index: u32) -> Result<SetContent, Status> {
+    plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))
 }

@@ -5,18 +5,19 @@ use std::sync::atomic::AtomicU64;
 use std::time::Instant;
 
 use cluster::{Assignment, Policy};
-use node::{CellPlan, CurrentPlan, Deadlines, NodeMetrics, beyond_timeline};
+use depth_image::PinholeCamera;
+use node::{CellPlan, Deadlines, NodeMetrics, PlansInForce, beyond_timeline};
 use tonic::Status;
 
-use crate::batch::{Loaded, Source, Waiting};
+use crate::batch::{Loaded, Place, Source, Waiting};
 use crate::outbox::Outbox;
-use crate::queue::Arrivals;
+use crate::queue::{Arrivals, Lane};
 use crate::quota::NodeQuota;
 use crate::sets::Sets;
 
 /// The parts that all streams share.
 pub(crate) struct Shared {
-    pub(crate) plan: CurrentPlan,
+    pub(crate) plans: PlansInForce,
     pub(crate) sets: Arc<Sets>,
     pub(crate) arrivals: Arc<Arrivals>,
     pub(crate) quota: NodeQuota,
@@ -34,39 +35,67 @@ pub(crate) struct ClientStream {
 }
 
 impl ClientStream {
-    /// Hands views over to the device.
-    pub(crate) fn queue(&self, views: Vec<Waiting>) {
+    /// Hands views over to a lane of the device.
+    pub(crate) fn queue(&self, lane: Lane, views: Vec<Waiting>) {
         for Waiting { key, view, .. } in &views {
             tracing::debug!(stream = self.stream, frame = view.frame, set = %key.sample_set_id, "queued");
         }
-        self.shared.arrivals.push(self.stream, views);
+        self.shared.arrivals.push(lane, self.stream, views);
     }
 }
 
 impl Shared {
     /// The plan, if this node makes views in it.
     pub(crate) fn of_compositor(&self, plan: Arc<Assignment>) -> Result<Arc<Assignment>, Status> {
-        if plan.composites(&self.plan.node_name) {
+        if plan.composites(&self.plans.node_name) {
             return Ok(plan);
         }
-        let (name, plan_epoch) = (&self.plan.node_name, plan.plan_epoch);
+        let (name, plan_epoch) = (&self.plans.node_name, plan.plan_epoch);
         Err(Status::failed_precondition(format!("{name} makes no views in plan_epoch {plan_epoch}")))
     }
 
     /// Waits for the source of a cell's set.
     pub(crate) async fn source(&self, plan: &Arc<Assignment>, set_index: u32, cell: u32) -> Result<Loaded, Status> {
         let start = Instant::now();
-        let beyond = || beyond_timeline(set_index);
-        let id = plan.sample_set_id(set_index).ok_or_else(beyond)?;
-        let source = match plan.policy {
+        let id = plan.sample_set_id(set_index).ok_or_else(|| beyond_timeline(set_index))?;
+        let (source, content) = match plan.policy {
             Policy::Pipeline | Policy::TimeShare => {
-                Source::Set(self.sets.get(&CellPlan::of(plan, cell)?, set_index).await?)
+                let set = self.sets.get(&CellPlan::of(plan, cell)?, set_index).await?;
+                let content = set.content;
+                (Source::Set(set), Some(content))
             }
-            Policy::Direct => {
-                let scene_time_s = plan.workload.timeline.time_s(set_index).ok_or_else(beyond)?;
-                Source::Scene { plan: plan.clone(), scene_time_s }
-            }
+            Policy::Direct => (scene(plan, set_index)?, None),
         };
-        Ok(Loaded { source, id, cell, wait_s: start.elapsed().as_secs_f64() })
+        let place = Place { id, cell, is_neighbour: false, content };
+        Ok(Loaded { source, place, wait_s: start.elapsed().as_secs_f64() })
     }
+
+    /// The source of a place, if it is still there; it is not waited for.
+    pub(crate) fn source_at(&self, plan: &Arc<Assignment>, set_index: u32, place: Place) -> Option<Source> {
+        match place.content {
+            Some(content) => self.sets.loaded(&content).map(Source::Set),
+            None => scene(plan, set_index).ok(),
+        }
+    }
+
+    /// The set of a cell, if it is loaded.
+    pub(crate) fn loaded(&self, plan: &Arc<Assignment>, set_index: u32, cell: u32) -> Option<Loaded> {
+        let id = plan.sample_set_id(set_index)?;
+        let set = self.sets.loaded(&CellPlan::of(plan, cell).ok()?.set_content(set_index)?)?;
+        let place = Place { id, cell, is_neighbour: false, content: Some(set.content) };
+        Some(Loaded { source: Source::Set(set), place, wait_s: 0.0 })
+    }
+
+    /// The nearest loaded set of a view's moment.
+    pub(crate) fn nearest(&self, plan: &Assignment, set_index: u32, view: &PinholeCamera) -> Option<Loaded> {
+        let id = plan.sample_set_id(set_index).filter(|_| plan.policy != Policy::Direct)?;
+        let set = self.sets.nearest(plan, set_index, view)?;
+        let place = Place { id, cell: set.cell, is_neighbour: true, content: Some(set.content) };
+        Some(Loaded { source: Source::Set(set), place, wait_s: 0.0 })
+    }
+}
+
+fn scene(plan: &Arc<Assignment>, set_index: u32) -> Result<Source, Status> {
+    let scene_time_s = plan.workload.timeline.time_s(set_index).ok_or_else(|| beyond_timeline(set_index))?;
+    Ok(Source::Scene { plan: plan.clone(), scene_time_s })
 }

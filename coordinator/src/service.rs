@@ -119,7 +119,16 @@ impl Coordinator for CoordinatorService {
     }
 
     async fn report_work(&self, request: WorkReport) -> Result<(), Status> {
-        let WorkReport { node_name, plan_epoch, workload_number: _, costs, busy_s, views, dropped_views } = request;
+        let WorkReport {
+            node_name,
+            plan_epoch,
+            workload_number: _,
+            costs,
+            busy_s,
+            views,
+            dropped_views,
+            viewpoints: _,
+        } = request;
         self.shared.step(Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views });
         Ok(())
     }

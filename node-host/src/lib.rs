@@ -5,7 +5,7 @@ use std::sync::Arc;
 use cluster::NodeStatus;
 use compositor_node::CompositorService;
 use node::{
-    CurrentPlan, DeviceLossMonitor, Engine, NodeConfig, NodeMetrics, NodeService, Scenes, ServeError, health,
+    DeviceLossMonitor, Engine, NodeConfig, NodeMetrics, NodeService, PlansInForce, Scenes, ServeError, health,
     keep_membership, with_reflection,
 };
 use sampler_node::SamplerService;
@@ -28,7 +28,7 @@ pub async fn serve(
 ) -> Result<(), ServeError> {
     let monitor = DeviceLossMonitor::new(engine);
     let engine: Arc<dyn Engine> = Arc::new(monitor.clone());
-    let plan = CurrentPlan::new(&config.node_name);
+    let plans = PlansInForce::new(&config.node_name);
     let scenes = Arc::new(Scenes::new(engine.clone(), &config));
     let address = listener.local_addr()?;
     let status = NodeStatus {
@@ -37,16 +37,16 @@ pub async fn serve(
         device_name: engine.device_name(),
         is_software: engine.is_software(),
     };
-    let compositor = CompositorService::new(engine.clone(), plan.clone(), &config, metrics.clone(), shutdown.clone());
+    let compositor = CompositorService::new(engine.clone(), plans.clone(), &config, metrics.clone(), shutdown.clone());
     let (relay, done) = (compositor.relay(), metrics.done.clone());
-    let sampler = SamplerService::new(engine.clone(), plan.clone(), &config, relay, metrics.clone(), shutdown.clone());
-    let service = NodeService::new(engine, plan.clone(), scenes.clone(), metrics);
+    let sampler = SamplerService::new(engine.clone(), plans.clone(), &config, relay, metrics.clone(), shutdown.clone());
+    let service = NodeService::new(engine, plans.clone(), scenes.clone(), metrics);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))
         .add_service(compositor_server(compositor));
     let routes = with_reflection(routes, config.reflection)?;
-    let member = keep_membership(status, config.coordinator.clone(), plan, scenes, done, shutdown.clone());
+    let member = keep_membership(status, config.coordinator.clone(), plans, scenes, done, shutdown.clone());
     let membership = tokio::spawn(member);
     let served = tokio::select! {
         served = node::serve(listener, routes, config.insecure_bind, shutdown) => served,

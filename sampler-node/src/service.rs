@@ -1,12 +1,14 @@
 //! The service that compositors fetch images from.
 
+use std::collections::HashMap;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use cluster::{Assignment, FetchImages};
+use cluster::{Assignment, FetchImages, SetContent};
 use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
-use node::{CellPlan, CurrentPlan, Engine, NodeConfig, NodeMetrics, Operation, Relay, SampleWork, Turn};
-use node::{WorkClass, beyond_timeline, blocking, until_drained};
+use node::{ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Relay, SampleWork, Turn};
+use node::{WorkClass, beyond_timeline, blocking, has_set, most_image_bytes, until_drained, with_guard};
+use parking_lot::Mutex;
 use tokio::sync::mpsc;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
@@ -14,18 +16,38 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Messages, Sampler};
 
-use crate::encoded_set_cache::{EncodedImages, EncodedSetCache};
-
-/// Chunks of relayed images that are not sent yet.
+/// Chunks of images that are not sent yet.
 const CHUNKS_AHEAD: usize = 4;
+
+/// The content of a set, the number of tiles of an image, and the indices of images or tiles. Without the plan: a static
+/// scene is not sampled again for another.
+type Key = (SetContent, u32, Vec<u32>);
+
+/// Packed images with their indices.
+type PackedImages = Vec<(u32, EncodedDepthImage)>;
+
+/// Sets of one workload are sampled in the order of their requests: the one that is needed next comes first. Workloads do
+/// not wait for each other; the device shares itself among them.
+#[derive(Debug, Default)]
+struct Turns(Mutex<HashMap<u64, Arc<tokio::sync::Mutex<()>>>>);
+
+impl Turns {
+    fn of(&self, workload_number: u64) -> Arc<tokio::sync::Mutex<()>> {
+        let mut turns = self.0.lock();
+        // One that is held or waited for has more owners.
+        turns.retain(|_, turn| Arc::strong_count(turn) > 1);
+        turns.entry(workload_number).or_default().clone()
+    }
+}
 
 /// The sampler's role.
 pub struct SamplerService {
     engine: Arc<dyn Engine>,
-    plan: CurrentPlan,
-    cache: Arc<EncodedSetCache>,
-    /// Sets are sampled in the order of their requests: the one that is needed next comes first.
-    sampling: Arc<tokio::sync::Mutex<()>>,
+    plans: PlansInForce,
+    cache: ByteCache<Key, PackedImages>,
+    /// A receiver that takes no chunk for so long is cut off: it keeps images in memory.
+    stall: Duration,
+    turns: Turns,
     relay: Relay,
     metrics: NodeMetrics,
     shutdown: CancellationToken,
@@ -36,84 +58,101 @@ impl SamplerService {
     #[must_use]
     pub fn new(
         engine: Arc<dyn Engine>,
-        plan: CurrentPlan,
+        plans: PlansInForce,
         config: &NodeConfig,
         relay: Relay,
         metrics: NodeMetrics,
         shutdown: CancellationToken,
     ) -> Self {
-        let cache = Arc::new(EncodedSetCache::new(config.sample_cache_bytes));
-        Self { engine, plan, cache, sampling: Arc::default(), relay, metrics, shutdown }
+        // The other half is for sets on the device.
+        let cache = ByteCache::new("packed sample images", config.set_memory_bytes / 2);
+        let stall = config.deadlines.stall;
+        Self { engine, plans, cache, stall, turns: Turns::default(), relay, metrics, shutdown }
     }
 
     /// All of this node's images of a set, made for the first request in one submission.
-    async fn images(&self, plan: &Assignment, set_index: u32) -> Result<EncodedImages, Status> {
+    async fn images(&self, plan: &Assignment, set_index: u32) -> Result<Pinned<PackedImages>, Status> {
         let content = plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))?;
-        let indices = plan.images_of(&self.plan.node_name, set_index).to_vec();
+        let indices = plan.images_of(&self.plans.node_name, set_index).to_vec();
         let work = sample_work(plan, &indices, set_index)?;
         let (engine, metrics) = (self.engine.clone(), self.metrics.clone());
+        let own: Vec<_> = indices.iter().map(|&index| work.cameras[index as usize]).collect();
+        let most_bytes = most_image_bytes(&plan.workload, &own);
         let key = (content, plan.tile_count, indices.clone());
         let tiles = f64::from(plan.tile_count);
-        let (sampling, current, plan_epoch) = (self.sampling.clone(), self.plan.clone(), plan.plan_epoch);
+        let number = plan.workload_number;
+        let (turn, plans) = (self.turns.of(number), self.plans.clone());
         let make = move || async move {
-            let _one = sampling.lock().await;
-            // A later plan may be in force by now: its sets must not wait for sets of this one.
-            current.require(plan_epoch)?;
-            blocking(move || sample(engine.as_ref(), &work, (&indices, tiles), &metrics)).await
+            let _one = turn.lock().await;
+            // A later plan may be in force by now: its sets must not wait for sets that no plan has any more.
+            if !plans.in_force(number).is_some_and(|plan| has_set(&plan, &content, set_index)) {
+                return Err(Status::failed_precondition(format!("no plan in force has this set {set_index}")));
+            }
+            let images =
+                blocking(move || sample(engine.as_ref(), &work, (&indices, tiles), (number, &metrics))).await?;
+            let bytes = images.iter().map(|(_, image)| image.payload.len()).sum();
+            Ok((images, bytes))
         };
-        self.cache.get(key, make).await
+        self.cache.get(key, most_bytes, make).await
     }
 
-    /// Images of other samplers, as they arrive.
-    fn relayed(&self, plan: &CellPlan, request: FetchImages) -> Result<Messages<Chunk>, Status> {
+    /// The wanted ones of `images` as chunks.
+    fn send(&self, plan: &CellPlan, request: FetchImages, images: Images) -> Messages<Chunk> {
         let id = SampleSetId { plan_epoch: plan.plan_epoch, index: request.set_index.into() };
-        let images = (self.relay)(plan, request.set_index)?;
         let (send, chunks) = mpsc::channel(CHUNKS_AHEAD);
-        tokio::spawn(relay(images, id, request.image_indices, send));
-        Ok(until_drained(Box::pin(ReceiverStream::new(chunks)), self.shutdown.clone()))
+        let (wanted, stall) = (request.image_indices, self.stall);
+        tokio::spawn(async move {
+            tokio::select! {
+                () = send_chunks(images, id, &wanted, &send, stall) => (),
+                () = send.closed() => (),
+            }
+        });
+        until_drained(Box::pin(ReceiverStream::new(chunks)), self.shutdown.clone())
     }
 }
 
 #[async_trait]
 impl Sampler for SamplerService {
     async fn fetch_sample_images(&self, request: FetchImages) -> Result<Messages<Chunk>, Status> {
-        let plan = CellPlan::of(&self.plan.require(request.plan_epoch)?, request.cell)?;
-        let name = &self.plan.node_name;
+        let plan = CellPlan::of(&self.plans.remembered(request.workload_number, request.plan_epoch)?, request.cell)?;
+        let name = &self.plans.node_name;
         let own = plan.images_of(name, request.set_index);
         if let Some(index) = request.image_indices.iter().find(|index| !own.contains(index)) {
             if plan.relays(name) {
-                return self.relayed(&plan, request);
+                let images = (self.relay)(&plan, request.set_index)?;
+                return Ok(self.send(&plan, request, images));
             }
             return Err(Status::invalid_argument(format!("image_indices: {index} is not sampled by {name}")));
         }
         let images = self.images(&plan, request.set_index).await?;
-        let id = SampleSetId { plan_epoch: plan.plan_epoch, index: request.set_index.into() };
-        let wanted: Vec<_> =
-            images.iter().filter(|(index, _)| request.image_indices.contains(index)).cloned().collect();
-        // The payload is shared: an iterator of chunks holds no copies.
-        let chunks = wanted.into_iter().flat_map(move |(index, image)| split_into_chunks(id, index, image)).map(Ok);
-        Ok(until_drained(Box::pin(tokio_stream::iter(chunks)), self.shutdown.clone()))
+        // Payloads are shared, and stay in the cache until all have been sent.
+        let shared = Box::pin(tokio_stream::iter(images.to_vec()).map(Ok));
+        Ok(self.send(&plan, request, with_guard(shared, images)))
     }
 }
 
-/// Sends the wanted images as chunks, until all are sent, one fails, or the receiver is dropped.
-async fn relay(
-    mut images: Messages<(u32, EncodedDepthImage)>,
+/// Images with their indices, of this node or of others as they arrive.
+type Images = Messages<(u32, EncodedDepthImage)>;
+
+/// Sends the wanted images as chunks, until all are sent, one fails, or the receiver takes none for too long.
+async fn send_chunks(
+    mut images: Images,
     id: SampleSetId,
-    wanted: Vec<u32>,
-    send: mpsc::Sender<Result<Chunk, Status>>,
+    wanted: &[u32],
+    send: &mpsc::Sender<Result<Chunk, Status>>,
+    stall: Duration,
 ) {
     while let Some(image) = images.next().await {
         let chunks = match image {
             Ok((index, _)) if !wanted.contains(&index) => continue,
             Ok((index, image)) => split_into_chunks(id, index, image),
             Err(status) => {
-                let _ = send.send(Err(status)).await;
+                let _ = send.send_timeout(Err(status), stall).await;
                 return;
             }
         };
         for chunk in chunks {
-            if send.send(Ok(chunk)).await.is_err() {
+            if send.send_timeout(Ok(chunk), stall).await.is_err() {
                 return;
             }
         }
@@ -140,8 +179,8 @@ fn sample(
     engine: &dyn Engine,
     work: &SampleWork,
     (indices, tiles): (&[u32], f64),
-    metrics: &NodeMetrics,
-) -> Result<EncodedImages, Status> {
+    (workload_number, metrics): (u64, &NodeMetrics),
+) -> Result<PackedImages, Status> {
     let start = Instant::now();
     let images = engine.sample(work, Turn::of(WorkClass::Batch))?;
     let sampled_s = start.elapsed().as_secs_f64();
@@ -157,8 +196,8 @@ fn sample(
     let image_s = start.elapsed().as_secs_f64() / whole_images.max(f64::MIN_POSITIVE);
     images.iter().for_each(|_| metrics.image_s.observe(image_s));
     metrics.images_sampled.inc_by(images.len() as u64);
-    metrics.done.add(Operation::SampleImage, whole_images, start.elapsed().as_secs_f64());
-    metrics.done.encoded(whole_images, encoded.iter().map(|(_, image)| image.payload.len()).sum());
+    metrics.done.add(workload_number, Operation::SampleImage, whole_images, start.elapsed().as_secs_f64());
+    metrics.done.encoded(workload_number, whole_images, encoded.iter().map(|(_, image)| image.payload.len()).sum());
     tracing::debug!(
         images = images.len(),
         scene_time_s = work.scene_time_s,
@@ -167,5 +206,5 @@ fn sample(
         total_s = start.elapsed().as_secs_f64(),
         "sampled"
     );
-    Ok(Arc::new(encoded))
+    Ok(encoded)
 }

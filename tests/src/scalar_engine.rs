@@ -16,7 +16,7 @@ use depth_image::{
 };
 use glam::{UVec2, Vec2, Vec3};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork};
-use parking_lot::Mutex;
+use parking_lot::{Condvar, Mutex};
 
 /// The floor's colour.
 pub const FLOOR_LINEAR: Vec3 = Vec3::new(0.1, 0.6, 0.2);
@@ -61,6 +61,15 @@ pub struct Pace {
     pub view: Duration,
 }
 
+/// Work that waits until a test releases it.
+#[derive(Debug, Default)]
+struct Holds {
+    eyes: Vec<Vec3>,
+    sizes_px: Vec<UVec2>,
+    /// Calls that wait.
+    calls: usize,
+}
+
 /// A device of plain loops. Clones share their counters.
 #[derive(Debug, Clone, Default)]
 pub struct ScalarEngine {
@@ -69,6 +78,7 @@ pub struct ScalarEngine {
     is_lost: Arc<AtomicBool>,
     pace: Arc<Mutex<Pace>>,
     reconstructed: Arc<AtomicUsize>,
+    holds: Arc<(Mutex<Holds>, Condvar)>,
 }
 
 struct Meets {
@@ -218,6 +228,40 @@ impl ScalarEngine {
         *self.pace.lock()
     }
 
+    /// Sampling of images from `eye` waits.
+    pub fn hold_samples_from(&self, eye: Vec3) {
+        self.holds.0.lock().eyes.push(eye);
+    }
+
+    /// Reconstruction of views of a size waits.
+    pub fn hold_views_of(&self, size_px: UVec2) {
+        self.holds.0.lock().sizes_px.push(size_px);
+    }
+
+    /// The number of calls that wait.
+    #[must_use]
+    pub fn held_calls(&self) -> usize {
+        self.holds.0.lock().calls
+    }
+
+    /// Lets all calls go on.
+    pub fn release(&self) {
+        let (holds, released) = &*self.holds;
+        let mut holds = holds.lock();
+        (holds.eyes, holds.sizes_px) = (Vec::new(), Vec::new());
+        released.notify_all();
+    }
+
+    fn wait_while(&self, is_held: impl Fn(&Holds) -> bool) {
+        let (holds, released) = &*self.holds;
+        let mut holds = holds.lock();
+        while is_held(&holds) {
+            holds.calls += 1;
+            released.wait(&mut holds);
+            holds.calls -= 1;
+        }
+    }
+
     /// Loses the device.
     pub fn lose(&self) {
         self.is_lost.store(true, Ordering::Relaxed);
@@ -280,6 +324,8 @@ impl Engine for ScalarEngine {
             let image = (eye, request.scene_time_s.to_bits(), request.refinement);
             *self.counts.lock().entry(image).or_default() += 1;
         }
+        let is_held = |Camera::Pinhole(camera): &&Camera, holds: &Holds| holds.eyes.contains(&camera.eye_in_world);
+        self.wait_while(|holds| cameras.iter().any(|camera| is_held(camera, holds)));
         let image = |camera| depth_image(camera, request.scene_time_s, request.refinement);
         sleep(self.pace().image * cameras.len() as u32);
         Ok(cameras.into_iter().map(image).collect())
@@ -302,6 +348,7 @@ impl Engine for ScalarEngine {
         let any: &dyn Any = set;
         let Uploaded(set) =
             any.downcast_ref().ok_or_else(|| EngineError::Device("a set of another device".to_owned()))?;
+        self.wait_while(|holds| work.cameras.iter().any(|camera| holds.sizes_px.contains(&camera.size_px)));
         sleep(self.pace().view * work.cameras.len() as u32);
         self.reconstructed.fetch_add(work.cameras.len(), Ordering::Relaxed);
         Ok(work.cameras.iter().map(|camera| splat(set, camera, work.planes)).collect())

@@ -11,6 +11,8 @@ use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
+use crate::memory::MemoryArgs;
+
 /// The longest wait for nodes of one process to join.
 const JOIN: Duration = Duration::from_secs(30);
 
@@ -35,6 +37,22 @@ impl Cluster {
         nodes: usize,
         insecure_bind: bool,
     ) -> anyhow::Result<Self> {
+        let memory = MemoryArgs { set_memory: None }.set_memory_bytes(engine.is_software());
+        Self::start_within(memory, listener, offers, engine, nodes, insecure_bind).await
+    }
+
+    /// As [`Cluster::start`], with `set_memory_bytes` for the sample sets of all nodes together.
+    ///
+    /// # Errors
+    /// As [`Cluster::start`].
+    pub async fn start_within(
+        set_memory_bytes: usize,
+        listener: TcpListener,
+        offers: SceneOffers,
+        engine: Arc<dyn Engine>,
+        nodes: usize,
+        insecure_bind: bool,
+    ) -> anyhow::Result<Self> {
         let address = format!("http://{}", loopback_of(&listener)?);
         let mut cluster = Self { address, shutdown: CancellationToken::new(), servers: JoinSet::new() };
         let config = CoordinatorConfig { insecure_bind, ..CoordinatorConfig::default() };
@@ -43,7 +61,10 @@ impl Cluster {
         for number in 0..nodes {
             let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
             // Enough digits to sort well: members are listed by name.
-            let config = NodeConfig::new(format!("node-{number:03}"), &cluster.address);
+            let config = NodeConfig {
+                set_memory_bytes: set_memory_bytes / nodes.max(1),
+                ..NodeConfig::new(format!("node-{number:03}"), &cluster.address)
+            };
             let (engine, metrics, shutdown) = (engine.clone(), NodeMetrics::default(), cluster.shutdown.clone());
             cluster.servers.spawn(node_host::serve(listener, config, engine, metrics, shutdown));
         }

@@ -11,6 +11,7 @@ pub mod cluster;
 pub mod delivery;
 pub mod exit;
 pub mod live;
+pub mod memory;
 pub mod pictures;
 pub mod process;
 pub mod scenes;

@@ -3,7 +3,7 @@
 use depth_image::{PinholeCamera, ViewPlanes};
 use serde::{Deserialize, Serialize};
 
-use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, within};
+use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, viewpoints, within};
 use crate::costs::{Costs, MeasuredCosts};
 use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use crate::scene::SceneRef;
@@ -137,6 +137,8 @@ pub struct WorkReport {
     pub views: u64,
     /// Views not made, or not sent.
     pub dropped_views: u64,
+    /// Where the workload's live viewers on this member are; those that are near to each other may be merged.
+    pub viewpoints: Vec<PinholeCamera>,
 }
 
 impl WorkReport {
@@ -145,7 +147,8 @@ impl WorkReport {
     pub fn validate(&self) -> Result<(), InvalidField> {
         nonempty(&self.node_name, "node_name")?;
         self.costs.validate()?;
-        finite_seconds(self.busy_s, "busy_s")
+        finite_seconds(self.busy_s, "busy_s")?;
+        viewpoints(&self.viewpoints)
     }
 }
 

@@ -18,8 +18,8 @@ pub struct NodeConfig {
     pub insecure_bind: bool,
     /// Serves reflection: the names of services and messages.
     pub reflection: bool,
-    /// Most bytes of encoded sample images that are cached for later requests.
-    pub sample_cache_bytes: usize,
+    /// Most bytes of sample sets: half for sets on the device and their relayed images, half for packed images.
+    pub set_memory_bytes: usize,
     /// Deadlines of streams.
     pub deadlines: Deadlines,
     /// Bounds on the work in flight.
@@ -37,7 +37,7 @@ impl NodeConfig {
             scene_folder: None,
             insecure_bind: false,
             reflection: false,
-            sample_cache_bytes: 1 << 30,
+            set_memory_bytes: 2 << 30,
             deadlines: Deadlines::default(),
             quotas: Quotas::default(),
         }
@@ -55,6 +55,8 @@ pub struct Deadlines {
     pub chunk: Duration,
     /// A client that takes none of the frames that wait for it.
     pub stall: Duration,
+    /// A live view's set: after it, a neighbouring view cell's set of the same moment serves.
+    pub neighbour: Duration,
 }
 
 impl Default for Deadlines {
@@ -64,6 +66,7 @@ impl Default for Deadlines {
             work: Duration::from_secs(300),
             chunk: Duration::from_secs(10),
             stall: Duration::from_secs(30),
+            neighbour: Duration::from_millis(100),
         }
     }
 }
@@ -76,7 +79,7 @@ pub struct Quotas {
     pub streams: usize,
     /// Views of batches that are waiting or not sent yet.
     pub views: usize,
-    /// Pixels of these views; and as many of live streams' views.
+    /// Pixels of these views and of live streams' views together.
     pub pixels: usize,
 }
 

@@ -1,8 +1,9 @@
-//! The parts that all services share: the device's boundary, configuration, logging, health, measured costs, the plan in
-//! force, scenes by hash, membership and drain.
+//! The parts that all services share: the device's boundary, configuration, logging, health, measured costs, the plans
+//! in force, scenes by hash, membership and drain.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod blocking;
+mod byte_cache;
 mod config;
 mod connections;
 mod engine;
@@ -12,21 +13,25 @@ mod plan;
 mod scenes;
 mod server;
 mod service;
+mod set_bytes;
 mod streams;
 mod telemetry;
+mod viewers;
 mod work_done;
 
 pub use blocking::blocking;
+pub use byte_cache::{ByteCache, Pinned};
 pub use config::{Deadlines, NodeConfig, Quotas};
 pub use connections::Connections;
 pub use engine::{
     DeviceLossMonitor, DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass,
 };
 pub use membership::keep_membership;
-pub use plan::{CellPlan, CurrentPlan, Relay, beyond_timeline};
+pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};
 pub use scenes::Scenes;
 pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve, with_reflection};
 pub use service::NodeService;
+pub use set_bytes::{most_image_bytes, most_set_bytes, set_bytes};
 pub use streams::{next_within, until_drained, with_guard};
 pub use telemetry::{NodeMetrics, Reason, Telemetry, init_logging};
 pub use work_done::{Operation, WorkDone};

@@ -14,7 +14,7 @@ use wire::rpc::{Backoff, CoordinatorClient, connect};
 
 use crate::blocking::blocking;
 use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, ViewWork, WorkClass};
-use crate::plan::CurrentPlan;
+use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
 use crate::work_done::WorkDone;
 
@@ -30,7 +30,7 @@ const WARM_UP_TIMEOUT: Duration = Duration::from_secs(120);
 pub async fn keep_membership(
     node: NodeStatus,
     coordinator: String,
-    plan: CurrentPlan,
+    plans: PlansInForce,
     scenes: Arc<Scenes>,
     done: WorkDone,
     shutdown: CancellationToken,
@@ -38,9 +38,9 @@ pub async fn keep_membership(
     let (mut backoff, mut warmed) = (Backoff::reconnect(), false);
     loop {
         let mut joined = false;
-        let request = JoinCluster { node: node.clone(), plan_epoch: plan.epoch() };
+        let request = JoinCluster { node: node.clone(), plan_epoch: plans.epoch() };
         let ended = tokio::select! {
-            ended = member(request, &coordinator, &scenes, (&plan, &done), (&mut warmed, &mut joined)) => ended,
+            ended = member(request, &coordinator, &scenes, (&plans, &done), (&mut warmed, &mut joined)) => ended,
             () = shutdown.cancelled() => return,
         };
         if joined {
@@ -59,7 +59,7 @@ async fn member(
     request: JoinCluster,
     coordinator: &str,
     scenes: &Arc<Scenes>,
-    (plan, done): (&CurrentPlan, &WorkDone),
+    (plans, done): (&PlansInForce, &WorkDone),
     (warmed, joined): (&mut bool, &mut bool),
 ) -> Status {
     let client = match connect(coordinator).await {
@@ -67,7 +67,7 @@ async fn member(
         Err(status) => return status,
     };
     if !std::mem::replace(warmed, true) {
-        warm_up(&client, scenes, plan).await;
+        warm_up(&client, scenes, plans).await;
     }
     let mut stream = match client.join_cluster(request).await {
         Ok(stream) => stream,
@@ -81,19 +81,20 @@ async fn member(
                 Some(Err(status)) => return status,
                 None => return Status::ok("the coordinator ended it"),
             },
-            _ = reports.tick(), if *joined => report(&client, plan, done).await,
+            _ = reports.tick(), if *joined => report(&client, plans, done).await,
         }
         *joined = true;
     }
 }
 
-/// Reports the work since the last report; a report that fails is not repeated.
-async fn report(client: &CoordinatorClient, plan: &CurrentPlan, done: &WorkDone) {
-    let Some(report) = done.take_report(&plan.node_name, plan.epoch()) else { return };
-    match tokio::time::timeout(REPORT, client.report_work(report)).await {
-        Ok(Ok(())) => (),
-        Ok(Err(status)) => tracing::debug!(reason = status.message(), "the report was refused"),
-        Err(_) => tracing::debug!("the report took too long"),
+/// Reports the work of each workload since the last report; a report that fails is not repeated.
+async fn report(client: &CoordinatorClient, plans: &PlansInForce, done: &WorkDone) {
+    for report in done.take_reports(plans) {
+        match tokio::time::timeout(REPORT, client.report_work(report)).await {
+            Ok(Ok(())) => (),
+            Ok(Err(status)) => tracing::debug!(reason = status.message(), "the report was refused"),
+            Err(_) => return tracing::debug!("the report took too long"),
+        }
     }
 }
 
@@ -109,18 +110,18 @@ fn preload(welcome: Welcome, scenes: Arc<Scenes>) {
 }
 
 /// Does a little of the work of every plan in force, so that the next finds the node warm. No other node waits for it.
-async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) {
+async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plans: &PlansInForce) {
     let start = Instant::now();
-    match tokio::time::timeout(WARM_UP_TIMEOUT, do_a_little(client, scenes, plan)).await {
+    match tokio::time::timeout(WARM_UP_TIMEOUT, do_a_little(client, scenes, plans)).await {
         Ok(Ok(())) => tracing::debug!(seconds = start.elapsed().as_secs_f64(), "warm"),
         Ok(Err(status)) => tracing::warn!(reason = status.message(), "joins cold"),
         Err(_) => tracing::warn!(reason = "it took too long", "joins cold"),
     }
 }
 
-async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plan: &CurrentPlan) -> Result<(), Status> {
+async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plans: &PlansInForce) -> Result<(), Status> {
     // A node that has had a plan is warm.
-    if plan.epoch() > 0 {
+    if plans.epoch() > 0 {
         return Ok(());
     }
     for served in client.get_status(()).await?.workloads.into_iter().filter_map(|workload| workload.plan) {

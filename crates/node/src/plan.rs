@@ -1,100 +1,215 @@
-//! The plan in force on this node, whose epochs only rise, and the plan of one view cell.
+//! The plans in force on this node, one of each workload, and the plan of one view cell.
 
+use std::collections::VecDeque;
 use std::ops::Deref;
 use std::sync::Arc;
 
-use cluster::Assignment;
+use cluster::{Assignment, SetContent, Workload};
 use codec::EncodedDepthImage;
+use parking_lot::Mutex;
 use tokio::sync::watch;
 use tonic::Status;
 use wire::refuse_plan;
 use wire::rpc::Messages;
 
-/// The node's name and the plan in force on it.
+/// The last plans of a workload that are remembered.
+const MAX_PLANS: usize = 8;
+/// Workloads with a plan in force.
+const MAX_WORKLOADS: usize = 16;
+
+/// The node's name and the plans in force on it. Epochs of one workload only rise. Clones share them.
 #[derive(Debug, Clone)]
-pub struct CurrentPlan {
+pub struct PlansInForce {
     /// The name of this node.
     pub node_name: Arc<str>,
-    plan: watch::Sender<Option<Arc<Assignment>>>,
+    plans: Arc<Mutex<Plans>>,
+    /// The number of changes.
+    changes: watch::Sender<u64>,
 }
 
-impl CurrentPlan {
+#[derive(Debug, Default)]
+struct Plans {
+    workloads: Vec<WorkloadPlans>,
+    highest_epoch: u64,
+    /// Uses of all plans so far.
+    uses: u64,
+}
+
+#[derive(Debug)]
+struct WorkloadPlans {
+    number: u64,
+    /// One at least; the last is in force, and the others were before it.
+    plans: VecDeque<Arc<Assignment>>,
+    last_use: u64,
+}
+
+impl WorkloadPlans {
+    fn in_force(&self) -> Option<&Arc<Assignment>> {
+        self.plans.back()
+    }
+
+    fn of_epoch(&self, plan_epoch: u64) -> Option<&Arc<Assignment>> {
+        self.plans.iter().find(|plan| plan.plan_epoch == plan_epoch)
+    }
+}
+
+/// Whether a workload is the same, whatever its cameras, cells, lighting and planes: a fallback may change these. A
+/// coordinator that was restarted may give a number to another workload.
+fn goes_on(before: &Workload, after: &Workload) -> bool {
+    before.scene == after.scene
+        && before.timeline == after.timeline
+        && before.volume == after.volume
+        && before.background_linear == after.background_linear
+        && before.illumination == after.illumination
+        && before.refinement_steps == after.refinement_steps
+}
+
+impl Plans {
+    fn of(&mut self, workload_number: u64) -> Option<&mut WorkloadPlans> {
+        self.uses += 1;
+        let uses = self.uses;
+        let workload = self.workloads.iter_mut().find(|workload| workload.number == workload_number)?;
+        workload.last_use = uses;
+        Some(workload)
+    }
+
+    /// Whether a plan is new; an error where it may not replace the one in force.
+    fn admits(&mut self, assignment: &Assignment) -> Result<bool, Status> {
+        let in_force = self.of(assignment.workload_number).and_then(|workload| workload.in_force().cloned());
+        let Some(in_force) = in_force else { return Ok(true) };
+        let (old, new) = (in_force.plan_epoch, assignment.plan_epoch);
+        match new > old {
+            false if new == old && *in_force == *assignment => Ok(false),
+            false => Err(Status::failed_precondition(format!(
+                "plan_epoch {new} of workload {} does not replace {old}",
+                assignment.workload_number
+            ))),
+            true => Ok(true),
+        }
+    }
+
+    fn put(&mut self, assignment: Assignment) {
+        self.highest_epoch = self.highest_epoch.max(assignment.plan_epoch);
+        let (number, assignment) = (assignment.workload_number, Arc::new(assignment));
+        if let Some(workload) = self.of(number) {
+            if !workload.in_force().is_some_and(|before| goes_on(&before.workload, &assignment.workload)) {
+                workload.plans.clear();
+            }
+            workload.plans.push_back(assignment);
+            while workload.plans.len() > MAX_PLANS {
+                workload.plans.pop_front();
+            }
+            return;
+        }
+        if self.workloads.len() >= MAX_WORKLOADS {
+            let unused = self.workloads.iter().enumerate().min_by_key(|(_, workload)| workload.last_use);
+            unused.map(|(at, _)| at).map(|at| self.workloads.swap_remove(at));
+        }
+        self.workloads.push(WorkloadPlans { number, plans: [assignment].into(), last_use: self.uses });
+    }
+}
+
+impl PlansInForce {
     /// No plan yet.
     #[must_use]
     pub fn new(node_name: &str) -> Self {
-        Self { node_name: node_name.into(), plan: watch::Sender::new(None) }
+        Self { node_name: node_name.into(), plans: Arc::default(), changes: watch::Sender::new(0) }
     }
 
-    /// The highest epoch so far; 0 before the first plan.
+    /// The highest epoch of any workload so far; 0 before the first plan.
     #[must_use]
     pub fn epoch(&self) -> u64 {
-        self.plan.borrow().as_ref().map_or(0, |plan| plan.plan_epoch)
+        self.plans.lock().highest_epoch
     }
 
-    /// The plan in force.
+    /// A workload's plan in force.
     #[must_use]
-    pub fn in_force(&self) -> Option<Arc<Assignment>> {
-        self.plan.borrow().clone()
+    pub fn in_force(&self, workload_number: u64) -> Option<Arc<Assignment>> {
+        self.plans.lock().of(workload_number)?.in_force().cloned()
     }
 
-    /// Whether a plan may replace the one in force.
+    /// Whether a plan may replace its workload's plan in force.
     ///
     /// # Errors
     /// `FAILED_PRECONDITION` for a lower epoch, or for another plan with the same.
     pub fn admits(&self, assignment: &Assignment) -> Result<(), Status> {
-        let current = self.plan.borrow();
-        let Some(current) = current.as_ref() else { return Ok(()) };
-        let (old, new) = (current.plan_epoch, assignment.plan_epoch);
-        if new > old || (new == old && **current == *assignment) {
-            return Ok(());
-        }
-        Err(Status::failed_precondition(format!("plan_epoch {new} does not replace {old}")))
+        self.plans.lock().admits(assignment).map(drop)
     }
 
-    /// Puts a plan in force.
+    /// Puts a plan in force. The workload that was used longest ago leaves where there are too many.
     ///
     /// # Errors
-    /// As [`CurrentPlan::admits`].
+    /// As [`PlansInForce::admits`].
     pub fn apply(&self, assignment: Assignment) -> Result<(), Status> {
-        let mut result = Ok(());
         // Compared under the lock: of two plans that were prepared at the same time the higher one stays.
-        self.plan.send_if_modified(|current| {
-            let higher = current.as_ref().is_none_or(|current| assignment.plan_epoch > current.plan_epoch);
-            let same = current.as_ref().is_some_and(|current| **current == assignment);
-            if higher {
-                *current = Some(Arc::new(assignment));
-            } else if !same {
-                result = Err(Status::failed_precondition(format!("plan_epoch {} is too late", assignment.plan_epoch)));
-            }
-            higher
-        });
-        result
+        let mut plans = self.plans.lock();
+        if plans.admits(&assignment)? {
+            plans.put(assignment);
+            drop(plans);
+            self.changes.send_modify(|changes| *changes += 1);
+        }
+        Ok(())
     }
 
-    /// Resolves when a later plan than `plan_epoch` is in force.
-    pub async fn replaced(&self, plan_epoch: u64) {
-        let later = |plan: &Option<Arc<Assignment>>| plan.as_ref().is_some_and(|plan| plan.plan_epoch > plan_epoch);
-        // This value owns a sender, which therefore outlives the wait.
-        let _ = self.plan.subscribe().wait_for(later).await;
+    /// Resolves when `ends` holds for a workload's plan in force, or for its absence.
+    pub async fn until(&self, workload_number: u64, ends: impl Fn(Option<&Arc<Assignment>>) -> bool) {
+        let mut changes = self.changes.subscribe();
+        while !ends(self.in_force(workload_number).as_ref()) {
+            // This value owns a sender, which therefore outlives the wait.
+            let _ = changes.changed().await;
+        }
     }
 
     /// The plan that a caller names, if it is in force.
     ///
     /// # Errors
     /// `FAILED_PRECONDITION` where it is not the one in force, which the refusal names.
-    pub fn require(&self, plan_epoch: u64) -> Result<Arc<Assignment>, Status> {
-        match self.in_force() {
-            Some(plan) if plan.plan_epoch == plan_epoch => Ok(plan),
-            Some(plan) => Err(refuse_plan(
-                &plan,
-                format!("plan_epoch {plan_epoch} is not in force on {}, {} is", self.node_name, plan.plan_epoch),
-            )),
-            None => Err(Status::failed_precondition(format!(
-                "plan_epoch {plan_epoch} is not in force on {}, none is",
-                self.node_name
-            ))),
+    pub fn require(&self, workload_number: u64, plan_epoch: u64) -> Result<Arc<Assignment>, Status> {
+        self.find(workload_number, plan_epoch, |workload| workload.in_force().filter(|p| p.plan_epoch == plan_epoch))
+    }
+
+    /// The plan in force, for a caller that knows it or one before it: a stream goes on from plan to plan.
+    ///
+    /// # Errors
+    /// As [`PlansInForce::require`], for a plan of which the one in force is no successor.
+    pub fn follow(&self, workload_number: u64, plan_epoch: u64) -> Result<Arc<Assignment>, Status> {
+        self.find(workload_number, plan_epoch, |workload| {
+            workload.of_epoch(plan_epoch).and_then(|_| workload.in_force())
+        })
+    }
+
+    /// The plan that a caller names, in force or before the one in force: a set that is being fetched outlives its plan.
+    ///
+    /// # Errors
+    /// As [`PlansInForce::follow`].
+    pub fn remembered(&self, workload_number: u64, plan_epoch: u64) -> Result<Arc<Assignment>, Status> {
+        self.find(workload_number, plan_epoch, |workload| workload.of_epoch(plan_epoch))
+    }
+
+    fn find(
+        &self,
+        workload_number: u64,
+        plan_epoch: u64,
+        wanted: impl Fn(&WorkloadPlans) -> Option<&Arc<Assignment>>,
+    ) -> Result<Arc<Assignment>, Status> {
+        let mut plans = self.plans.lock();
+        let workload = plans.of(workload_number).map(|workload| &*workload);
+        if let Some(plan) = workload.and_then(wanted) {
+            return Ok(plan.clone());
+        }
+        let refused = format!("plan_epoch {plan_epoch} of workload {workload_number} is not in force");
+        match workload.and_then(WorkloadPlans::in_force) {
+            Some(plan) => Err(refuse_plan(plan, format!("{refused} on {}, {} is", self.node_name, plan.plan_epoch))),
+            None => Err(Status::failed_precondition(format!("{refused} on {}, none is", self.node_name))),
         }
     }
+}
+
+/// Whether a set is made under a plan, in any of its view cells.
+#[must_use]
+pub fn has_set(plan: &Arc<Assignment>, content: &SetContent, set_index: u32) -> bool {
+    let of_cell = |cell: usize| CellPlan::of(plan, cell as u32).ok()?.set_content(set_index);
+    (0..plan.workload.cell_count()).any(|cell| of_cell(cell).as_ref() == Some(content))
 }
 
 /// The plan of one view cell, without the images of other cells. Clones share it.
@@ -140,32 +255,20 @@ pub fn beyond_timeline(set_index: u32) -> Status {
 }
 
 #[cfg(test)]
-mod tests {
-    use cluster::{Policy, SamplePlanes, SceneHash, SceneRef, Timeline, Workload};
-    use depth_image::{Aabb, Illumination};
-    use glam::Vec3;
+pub(crate) mod tests {
+    use cluster::{CompositorShare, Policy};
+    use depth_image::Camera;
+    use tonic::Code;
 
     use super::*;
+    use crate::measure::tests::request;
 
-    fn plan(plan_epoch: u64, lighting: &str) -> Assignment {
-        let workload = Workload {
-            scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
-            sample_cameras: Vec::new(),
-            cell_first_indices: Vec::new(),
-            sampling: "conventional".to_owned(),
-            lighting: lighting.to_owned(),
-            planes: SamplePlanes::default(),
-            volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
-            background_linear: Vec3::ZERO,
-            timeline: Timeline::still(0.0),
-            illumination: Illumination::default(),
-            refinement_steps: 1,
-        };
+    pub(crate) fn plan(workload_number: u64, plan_epoch: u64) -> Assignment {
         Assignment {
             plan_epoch,
-            workload_number: 1,
-            policy: Policy::Direct,
-            workload,
+            workload_number,
+            policy: Policy::Pipeline,
+            workload: request(1).workload,
             samplers: Vec::new(),
             compositors: Vec::new(),
             tile_count: 1,
@@ -173,31 +276,86 @@ mod tests {
         }
     }
 
+    /// The same workload with other cameras, in another role and policy.
+    fn moved(plan: Assignment) -> Assignment {
+        let sample_cameras: Vec<Camera> = plan.workload.sample_cameras.iter().rev().copied().collect();
+        let workload = Workload { sample_cameras, cell_first_indices: vec![0], ..plan.workload };
+        let share = CompositorShare { node_name: "n".to_owned(), address: "http://n".to_owned(), view_weight: 1 };
+        Assignment { workload, policy: Policy::Direct, compositors: vec![share], ..plan }
+    }
+
+    fn of_another_scene(plan: Assignment) -> Assignment {
+        let scene = cluster::SceneRef { hash: cluster::SceneHash::of(b"another"), package_bytes: 7 };
+        Assignment { workload: Workload { scene, ..plan.workload }, ..plan }
+    }
+
     #[tokio::test]
-    async fn a_plan_is_replaced_by_a_later_one() {
-        let current = CurrentPlan::new("n");
-        current.apply(plan(3, "unlit")).unwrap();
-        let waits = std::time::Duration::from_millis(20);
-        assert!(tokio::time::timeout(waits, current.replaced(3)).await.is_err());
-        current.replaced(2).await;
-        let (waiting, later) = (current.clone(), current);
-        let replaced = tokio::spawn(async move { waiting.replaced(3).await });
-        later.apply(plan(4, "unlit")).unwrap();
-        replaced.await.unwrap();
+    async fn a_wait_ends_with_the_plan_that_it_waits_for() {
+        let plans = PlansInForce::new("n");
+        plans.apply(plan(1, 3)).unwrap();
+        let waiting = plans.clone();
+        let is_late = |plan: Option<&Arc<Assignment>>| plan.is_some_and(|plan| plan.plan_epoch > 3);
+        let waits = tokio::spawn(async move { waiting.until(1, is_late).await });
+        for other in [plan(2, 9), plan(1, 3)] {
+            plans.apply(other).unwrap();
+            tokio::task::yield_now().await;
+            assert!(!waits.is_finished());
+        }
+        plans.apply(plan(1, 10)).unwrap();
+        waits.await.unwrap();
     }
 
     #[test]
-    fn a_plan_with_a_lower_epoch_is_refused() {
-        let current = CurrentPlan::new("n");
-        assert!(current.require(0).is_err(), "no plan yet");
-        current.apply(plan(3, "unlit")).unwrap();
-        current.apply(plan(3, "unlit")).unwrap();
-        for refused in [plan(2, "unlit"), plan(3, "phong")] {
-            assert_eq!(current.admits(&refused).unwrap_err().code(), tonic::Code::FailedPrecondition);
-            assert_eq!(current.apply(refused).unwrap_err().code(), tonic::Code::FailedPrecondition);
+    fn a_plan_with_a_lower_epoch_of_its_workload_is_refused() {
+        let plans = PlansInForce::new("n");
+        assert!(plans.require(1, 0).is_err(), "no plan yet");
+        plans.apply(plan(1, 3)).unwrap();
+        plans.apply(plan(1, 3)).unwrap();
+        for refused in [plan(1, 2), moved(plan(1, 3))] {
+            assert_eq!(plans.admits(&refused).unwrap_err().code(), Code::FailedPrecondition);
+            assert_eq!(plans.apply(refused).unwrap_err().code(), Code::FailedPrecondition);
         }
-        current.apply(plan(4, "phong")).unwrap();
-        assert!(current.require(3).is_err() && current.require(5).is_err());
-        assert_eq!((current.require(4).unwrap().plan_epoch, current.epoch()), (4, 4));
+        plans.apply(plan(2, 1)).unwrap();
+        plans.apply(plan(1, 4)).unwrap();
+        assert!(plans.require(1, 3).is_err() && plans.require(1, 5).is_err() && plans.require(2, 4).is_err());
+        assert_eq!((plans.require(1, 4).unwrap().plan_epoch, plans.require(2, 1).unwrap().plan_epoch), (4, 1));
+        assert_eq!(plans.epoch(), 4);
+    }
+
+    #[test]
+    fn a_workload_that_goes_on_remembers_its_last_plans() {
+        let plans = PlansInForce::new("n");
+        plans.apply(plan(1, 3)).unwrap();
+        plans.apply(moved(plan(1, 5))).unwrap();
+        assert_eq!(plans.follow(1, 3).unwrap().plan_epoch, 5);
+        assert_eq!(*plans.remembered(1, 3).unwrap(), plan(1, 3));
+        assert!(plans.follow(1, 4).is_err() && plans.follow(1, 6).is_err() && plans.remembered(1, 4).is_err());
+        let in_force = wire::plan_in_force(&plans.require(1, 3).unwrap_err());
+        assert_eq!(in_force.map(|plan| plan.plan_epoch), Some(5), "the refusal names it");
+        (6..20).for_each(|epoch| plans.apply(plan(1, epoch)).unwrap());
+        assert!(plans.follow(1, 5).is_err() && plans.remembered(1, 11).is_err() && plans.follow(1, 12).is_ok());
+        plans.apply(of_another_scene(plan(1, 20))).unwrap();
+        assert!(plans.follow(1, 19).is_err() && plans.remembered(1, 19).is_err(), "it shows something else");
+    }
+
+    #[test]
+    fn the_workload_that_was_used_longest_ago_leaves() {
+        let plans = PlansInForce::new("n");
+        (1..=16).for_each(|number| plans.apply(plan(number, number)).unwrap());
+        assert!(plans.in_force(1).is_some(), "it was used now");
+        plans.apply(plan(17, 17)).unwrap();
+        assert!(plans.in_force(2).is_none() && plans.in_force(1).is_some() && plans.in_force(17).is_some());
+    }
+
+    #[test]
+    fn a_plan_has_the_sets_of_all_its_cells() {
+        let workload = request(1).workload;
+        let cameras = [workload.sample_cameras.clone(), workload.sample_cameras.clone()].concat();
+        let second = workload.sample_cameras.len() as u32;
+        let both = Workload { sample_cameras: cameras, cell_first_indices: vec![0, second], ..workload.clone() };
+        let both = Arc::new(Assignment { workload: both, ..plan(1, 1) });
+        let content = plan(1, 1).set_content(0).unwrap();
+        assert!(has_set(&both, &content, 0));
+        assert!(!has_set(&Arc::new(of_another_scene(plan(1, 1))), &content, 0));
     }
 }

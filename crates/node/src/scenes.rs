@@ -35,6 +35,10 @@ impl Scenes {
     /// # Errors
     /// Where it cannot be found, does not have its hash, or cannot be loaded.
     pub async fn ensure(&self, scene: &SceneRef) -> Result<f64, Status> {
+        // A plan whose scene is there does not wait for the scene of another.
+        if self.engine.has_scene(scene.hash.as_str()) {
+            return Ok(0.0);
+        }
         let _one = self.loading.lock().await;
         if self.engine.has_scene(scene.hash.as_str()) {
             return Ok(0.0);

@@ -11,7 +11,7 @@ use wire::rpc;
 use crate::blocking::blocking;
 use crate::engine::Engine;
 use crate::measure::measure_costs;
-use crate::plan::CurrentPlan;
+use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
 use crate::telemetry::NodeMetrics;
 
@@ -21,7 +21,7 @@ const MAX_MEASURED: usize = 16;
 /// The node's own service.
 pub struct NodeService {
     engine: Arc<dyn Engine>,
-    plan: CurrentPlan,
+    plans: PlansInForce,
     scenes: Arc<Scenes>,
     metrics: NodeMetrics,
     /// Measured costs, the oldest first: a coordinator that was restarted need not wait for them again.
@@ -31,8 +31,8 @@ pub struct NodeService {
 impl NodeService {
     /// The service of one node.
     #[must_use]
-    pub fn new(engine: Arc<dyn Engine>, plan: CurrentPlan, scenes: Arc<Scenes>, metrics: NodeMetrics) -> Self {
-        Self { engine, plan, scenes, metrics, measured: Mutex::default() }
+    pub fn new(engine: Arc<dyn Engine>, plans: PlansInForce, scenes: Arc<Scenes>, metrics: NodeMetrics) -> Self {
+        Self { engine, plans, scenes, metrics, measured: Mutex::default() }
     }
 }
 
@@ -55,12 +55,12 @@ impl rpc::Node for NodeService {
     }
 
     async fn apply_assignment(&self, assignment: Assignment) -> Result<Ready, Status> {
-        self.plan.admits(&assignment)?;
-        let plan_epoch = assignment.plan_epoch;
+        self.plans.admits(&assignment)?;
+        let (plan_epoch, workload_number) = (assignment.plan_epoch, assignment.workload_number);
         let scene_load_s = self.scenes.ensure(&assignment.workload.scene).await?;
-        self.plan.apply(assignment)?;
-        self.metrics.plan_epoch.set(i64::try_from(plan_epoch).unwrap_or(i64::MAX));
-        tracing::info!(node = &*self.plan.node_name, plan_epoch, "plan in force");
+        self.plans.apply(assignment)?;
+        self.metrics.plan_epoch.set(i64::try_from(self.plans.epoch()).unwrap_or(i64::MAX));
+        tracing::info!(node = &*self.plans.node_name, workload_number, plan_epoch, "plan in force");
         Ok(Ready { plan_epoch, scene_load_s })
     }
 }

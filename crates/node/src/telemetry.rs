@@ -124,7 +124,7 @@ impl NodeMetrics {
             frame_bytes: in_unit(to, "frames", "Encoded frames", Unit::Bytes, counter()),
             dropped: registered(to, "dropped_views", "Views not made or not sent", Family::default()),
             streams: registered(to, "streams", "Clients' streams that are open", gauge()),
-            plan_epoch: registered(to, "plan_epoch", "The plan in force", gauge()),
+            plan_epoch: registered(to, "plan_epoch", "The newest plan in force", gauge()),
             done: WorkDone::default(),
         }
     }

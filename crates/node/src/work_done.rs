@@ -1,9 +1,14 @@
 //! A node's work since its last report, and the time that it took.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use cluster::{MeasuredCosts, WorkReport};
+use depth_image::PinholeCamera;
 use parking_lot::Mutex;
+
+use crate::plan::PlansInForce;
+use crate::viewers::Viewers;
 
 /// An operation that is timed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,11 +25,19 @@ pub enum Operation {
     EncodeView,
 }
 
-/// Counts and seconds. Clones share them.
+/// Counts and seconds of each workload, by its number. Clones share them.
 #[derive(Debug, Clone, Default)]
-pub struct WorkDone(Arc<Mutex<Sums>>);
+pub struct WorkDone(Arc<Mutex<AllWork>>);
 
-/// The work since the last report.
+#[derive(Debug, Default)]
+struct AllWork {
+    workloads: BTreeMap<u64, Sums>,
+    /// Of all workloads: the next report has them.
+    dropped_views: u64,
+    viewers: Viewers,
+}
+
+/// The work of one workload since the last report.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Sums {
     /// Count and seconds of each [`Operation`].
@@ -35,31 +48,35 @@ struct Sums {
     encoded: (f64, f64),
     busy_s: f64,
     views: u64,
-    dropped_views: u64,
 }
 
 impl WorkDone {
-    /// Adds `count` operations that took `seconds` together; the count may be a fraction.
-    pub fn add(&self, operation: Operation, count: f64, seconds: f64) {
-        let sums = &mut *self.0.lock();
-        let sum = &mut sums.operations[operation as usize];
-        *sum = (sum.0 + count, sum.1 + seconds);
-        sums.busy_s += seconds;
-        if matches!(operation, Operation::DirectView | Operation::ReconstructView) {
-            sums.views += count as u64;
-        }
+    /// Adds `count` operations of a workload that took `seconds` together; the count may be a fraction.
+    pub fn add(&self, workload_number: u64, operation: Operation, count: f64, seconds: f64) {
+        self.of(workload_number, |sums| {
+            let sum = &mut sums.operations[operation as usize];
+            *sum = (sum.0 + count, sum.1 + seconds);
+            sums.busy_s += seconds;
+            if matches!(operation, Operation::DirectView | Operation::ReconstructView) {
+                sums.views += count as u64;
+            }
+        });
     }
 
     /// Adds bytes that were received in `seconds`.
-    pub fn transferred(&self, bytes: usize, seconds: f64) {
-        let sum = &mut self.0.lock().transferred;
-        *sum = (sum.0 + bytes as f64, sum.1 + seconds);
+    pub fn transferred(&self, workload_number: u64, bytes: usize, seconds: f64) {
+        self.of(workload_number, |Sums { transferred, .. }| {
+            *transferred = (transferred.0 + bytes as f64, transferred.1 + seconds);
+        });
     }
 
     /// Adds whole images that were encoded to `bytes` together.
-    pub fn encoded(&self, images: f64, bytes: usize) {
-        let sum = &mut self.0.lock().encoded;
-        *sum = (sum.0 + images, sum.1 + bytes as f64);
+    pub fn encoded(&self, workload_number: u64, images: f64, bytes: usize) {
+        self.of(workload_number, |Sums { encoded, .. }| *encoded = (encoded.0 + images, encoded.1 + bytes as f64));
+    }
+
+    fn of(&self, workload_number: u64, add: impl FnOnce(&mut Sums)) {
+        add(self.0.lock().workloads.entry(workload_number).or_default());
     }
 
     /// Counts a view that was not made or not sent.
@@ -67,18 +84,39 @@ impl WorkDone {
         self.0.lock().dropped_views += 1;
     }
 
-    /// Takes the work since the last call; `None` where there is none.
-    pub(crate) fn take_report(&self, node_name: &str, plan_epoch: u64) -> Option<WorkReport> {
-        let sums = std::mem::take(&mut *self.0.lock());
-        (sums != Sums::default()).then(|| WorkReport {
-            node_name: node_name.to_owned(),
-            plan_epoch,
-            workload_number: 0,
-            costs: sums.costs(),
-            busy_s: sums.busy_s,
-            views: sums.views,
-            dropped_views: sums.dropped_views,
-        })
+    /// The newest pose of a live stream, by the stream's number.
+    pub fn viewer_moved(&self, stream: u64, workload_number: u64, camera: PinholeCamera) {
+        self.0.lock().viewers.moved(stream, workload_number, camera);
+    }
+
+    /// A live stream has ended.
+    pub fn viewer_left(&self, stream: u64) {
+        self.0.lock().viewers.left(stream);
+    }
+
+    /// Takes the work and the movements since the last call, of each workload that has a plan in force.
+    pub(crate) fn take_reports(&self, plans: &PlansInForce) -> Vec<WorkReport> {
+        let mut work = self.0.lock();
+        let (mut workloads, mut dropped_views) = (std::mem::take(&mut work.workloads), work.dropped_views);
+        for workload_number in work.viewers.take_changed() {
+            workloads.entry(workload_number).or_default();
+        }
+        let report = |(workload_number, sums): (u64, Sums)| {
+            let plan = plans.in_force(workload_number)?;
+            Some(WorkReport {
+                node_name: plans.node_name.to_string(),
+                plan_epoch: plan.plan_epoch,
+                workload_number,
+                costs: sums.costs(),
+                busy_s: sums.busy_s,
+                views: sums.views,
+                dropped_views: std::mem::take(&mut dropped_views),
+                viewpoints: work.viewers.of(workload_number),
+            })
+        };
+        let reports = workloads.into_iter().filter_map(report).collect();
+        work.dropped_views = dropped_views;
+        reports
     }
 }
 
@@ -109,24 +147,45 @@ fn quotient((count, sum): (f64, f64)) -> Option<f64> {
 mod tests {
     use super::*;
 
+    fn plans(workloads: u64) -> PlansInForce {
+        let plans = PlansInForce::new("n");
+        (1..=workloads).for_each(|number| plans.apply(crate::plan::tests::plan(number, 6 + number)).unwrap());
+        plans
+    }
+
     #[test]
     fn costs_are_the_means_since_the_last_report() {
-        let done = WorkDone::default();
-        assert!(done.take_report("n", 7).is_none());
-        done.add(Operation::ReconstructView, 32.0, 0.32);
-        done.clone().add(Operation::ReconstructView, 8.0, 0.48);
-        done.add(Operation::SampleImage, 0.25, 0.1);
-        done.transferred(1 << 20, 0.5);
-        done.encoded(0.5, 1000);
+        let (done, plans) = (WorkDone::default(), plans(1));
+        assert!(done.take_reports(&plans).is_empty());
+        done.add(1, Operation::ReconstructView, 32.0, 0.32);
+        done.clone().add(1, Operation::ReconstructView, 8.0, 0.48);
+        done.add(1, Operation::SampleImage, 0.25, 0.1);
+        done.transferred(1, 1 << 20, 0.5);
+        done.encoded(1, 0.5, 1000);
         done.dropped();
-        let report = done.take_report("n", 7).unwrap();
+        let [report] = &done.take_reports(&plans)[..] else { panic!("one workload") };
         let costs = report.costs;
+        assert_eq!((report.node_name.as_str(), report.plan_epoch, report.workload_number), ("n", 7, 1));
         assert_eq!(costs.reconstruct_view_s, Some(0.02));
         assert_eq!(costs.sample_image_s, Some(0.4), "a quarter of an image in 0.1 s");
         assert_eq!(costs.transfer_bytes_per_s, Some(2.0 * 1024.0 * 1024.0));
         assert_eq!((costs.image_bytes, costs.direct_view_s, costs.load_set_s), (Some(2000.0), None, None));
         assert_eq!((report.views, report.dropped_views), (40, 1));
         assert!((report.busy_s - 0.9).abs() < 1e-12);
-        assert!(done.take_report("n", 7).is_none());
+        assert!(done.take_reports(&plans).is_empty());
+    }
+
+    #[test]
+    fn the_work_of_each_workload_is_reported_alone() {
+        let (done, plans) = (WorkDone::default(), plans(2));
+        done.dropped();
+        assert!(done.take_reports(&plans).is_empty());
+        for (number, seconds) in [(1, 1.0), (2, 2.0), (3, 3.0)] {
+            done.add(number, Operation::ReconstructView, 1.0, seconds);
+        }
+        let reports = done.take_reports(&plans);
+        let parts =
+            |report: &WorkReport| (report.workload_number, report.plan_epoch, report.busy_s, report.dropped_views);
+        assert_eq!(reports.iter().map(parts).collect::<Vec<_>>(), [(1, 7, 1.0, 1), (2, 8, 2.0, 0)]);
     }
 }

@@ -221,6 +221,7 @@ fn work_report() -> WorkReport {
         busy_s: 0.9,
         views: 3,
         dropped_views: 1,
+        viewpoints: vec![camera()],
     }
 }
 
@@ -234,6 +235,8 @@ fn bad_reports_and_changes_are_refused_by_field() {
     assert!(spoilt(&|m| m.node_name.clear()).contains("node_name is missing"));
     assert!(spoilt(&|m| m.busy_s = f64::NAN).contains("busy_s is NaN"));
     assert!(spoilt(&|m| m.load_set_s = Some(-1.0)).contains("load_set_s is -1"));
+    assert!(spoilt(&|m| m.viewpoints = vec![m.viewpoints[0]; 257]).contains("viewpoints has 257"));
+    assert!(spoilt(&|m| m.viewpoints[0].near_m = f32::NAN).contains("viewpoints: camera near_m"));
     let change = proto::ChangeSessionRequest { session_number: 1, frames_per_s: 1.0, ..Default::default() };
     let many = proto::ChangeSessionRequest { views_per_set_count: 1_000_000_000, ..change.clone() };
     assert!(refusal::<_, ChangeSession>(many).contains("views_per_set_count is 1000000000"));

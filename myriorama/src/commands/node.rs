@@ -4,6 +4,7 @@ use std::net::{SocketAddr, UdpSocket};
 use std::path::PathBuf;
 
 use app_core::exit::Outcome;
+use app_core::memory::MemoryArgs;
 use app_core::process::{cancel_at_signal, listen, serve_metrics};
 use app_core::setup::DeviceArgs;
 use clap::Args;
@@ -31,6 +32,8 @@ pub struct NodeArgs {
     scene_folder: Option<PathBuf>,
     #[command(flatten)]
     device: DeviceArgs,
+    #[command(flatten)]
+    memory: MemoryArgs,
     /// The address for Prometheus, at /metrics [default: no metrics]
     #[arg(long, value_name = "HOST:PORT")]
     metrics: Option<SocketAddr>,
@@ -43,7 +46,7 @@ pub struct NodeArgs {
     /// The most views of batches that are queued or not sent yet
     #[arg(long, value_name = "N", default_value_t = Quotas::default().views)]
     max_views: usize,
-    /// The most pixels of these views, and of live views
+    /// The most pixels of these views and of live views together
     #[arg(long, value_name = "N", default_value_t = Quotas::default().pixels)]
     max_pixels: usize,
     /// Serves without TLS on an address that others can reach
@@ -67,6 +70,7 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
         advertised_address: advertise,
         insecure_bind: args.insecure_bind,
         reflection: args.reflection,
+        set_memory_bytes: args.memory.set_memory_bytes(engine.is_software()),
         quotas: Quotas { streams: args.max_streams, views: args.max_views, pixels: args.max_pixels },
         ..NodeConfig::new(name, args.coordinator)
     };

@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 
 use app_core::cluster::Cluster;
 use app_core::exit::Outcome;
+use app_core::memory::MemoryArgs;
 use app_core::process::{listen, stop_signal};
 use app_core::scenes::ScenesArgs;
 use app_core::setup::DeviceArgs;
@@ -21,6 +22,8 @@ pub struct UpArgs {
     scenes: ScenesArgs,
     #[command(flatten)]
     device: DeviceArgs,
+    #[command(flatten)]
+    memory: MemoryArgs,
     /// Nodes P that share the device
     #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
     nodes: u16,
@@ -46,8 +49,9 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     }
     // The device and the packages hold the scenes now; the third copy is dropped.
     drop(scenes);
-    let nodes = usize::from(args.nodes);
-    let mut cluster = Cluster::start(listener, offers, engine.clone(), nodes, args.insecure_bind).await?;
+    let (memory, nodes) = (args.memory.set_memory_bytes(engine.is_software()), usize::from(args.nodes));
+    let mut cluster =
+        Cluster::start_within(memory, listener, offers, engine.clone(), nodes, args.insecure_bind).await?;
     println!("{nodes} nodes on {}, at {}", engine.device_name(), cluster.address);
     tokio::select! {
         stopped = stop_signal() => stopped?,

@@ -6,7 +6,7 @@ use client::{LiveFrame, LiveView, Session};
 use cluster::{LiveRequest, PolicyChoice, RenderViews, RequestedView, SessionRequest, Timeline};
 use cluster_tests::cluster::{camera, request};
 use codec::{FrameCodec, FramePart};
-use depth_image::ViewPlanes;
+use depth_image::{PinholeCamera, ViewPlanes};
 use glam::UVec2;
 use tokio::sync::mpsc;
 use tokio::time::timeout;
@@ -77,7 +77,11 @@ impl Raw {
     }
 
     pub async fn say(&self, frame: Option<u64>, acknowledged_frame: u64) {
-        let views = frame.map(|frame| RequestedView { frame, camera: camera(frame as f32 * 1e-3, SIZE_PX) });
+        self.say_at(frame.map(|frame| (frame, camera(frame as f32 * 1e-3, SIZE_PX))), acknowledged_frame).await;
+    }
+
+    pub async fn say_at(&self, pose: Option<(u64, PinholeCamera)>, acknowledged_frame: u64) {
+        let views = pose.map(|(frame, camera)| RequestedView { frame, camera });
         let live = self.template.live.map(|live| LiveRequest { acknowledged_frame, ..live });
         let request = RenderViews { views: views.into_iter().collect(), live, ..self.template.clone() };
         let _ = self.send.send(request).await;

@@ -1,6 +1,6 @@
 //! Members: joining, being measured and being ready; their reports, and the cluster's status.
 
-use cluster::limits::{MAX_BATCH, MAX_SCENES, MAX_WORKLOADS};
+use cluster::limits::{MAX_BATCH, MAX_SCENES, MAX_VIEWPOINTS, MAX_WORKLOADS};
 use cluster::{
     AchievedTime, ClusterStatus, JoinCluster, MeasureCosts, Measured, NodeCondition, NodeStatus, Ready, SamplerReport,
     Welcome, WorkReport, WorkloadStatus, at_most,
@@ -22,11 +22,11 @@ messages! {
     MeasureCostsResponse = Measured { costs; planes: with_normals | with_corner_inverse_depths };
     ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then Ready::validate;
     ReportWorkRequest = WorkReport {
-        node_name, plan_epoch, workload_number, busy_s;
+        node_name, plan_epoch, workload_number, busy_s, viewpoints;
         costs: sample_image_s | direct_view_s | reconstruct_view_s | load_set_s | encode_view_s | transfer_bytes_per_s
             | image_bytes,
         views: view_count, dropped_views: dropped_view_count
-    }, then WorkReport::validate;
+    }, first |r| at_most(r.viewpoints.len(), MAX_VIEWPOINTS, "viewpoints"), then WorkReport::validate;
     ReportSamplerRequest = SamplerReport { plan_epoch, reason; compositor: compositor_name, sampler: sampler_name },
         then SamplerReport::validate;
     AchievedTime = AchievedTime { policy, busy_s };

@@ -1,0 +1,328 @@
+//! A cache that is bounded in bytes. A value is loaded once for all that wait for it, and stays while it is in use.
+
+use std::collections::HashMap;
+use std::hash::Hash;
+use std::ops::Deref;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use parking_lot::Mutex;
+use tokio::sync::{Notify, watch};
+use tonic::Status;
+
+/// A cached value in use: it is not evicted before all clones are dropped.
+pub struct Pinned<V>(Arc<Held<V>>);
+
+/// A loaded value.
+struct Held<V> {
+    value: V,
+    bytes: usize,
+    pins: AtomicUsize,
+    freed: Arc<Notify>,
+}
+
+impl<V> Pinned<V> {
+    fn new(held: &Arc<Held<V>>) -> Self {
+        held.pins.fetch_add(1, Ordering::AcqRel);
+        Self(held.clone())
+    }
+}
+
+impl<V> Clone for Pinned<V> {
+    fn clone(&self) -> Self {
+        Self::new(&self.0)
+    }
+}
+
+impl<V> Drop for Pinned<V> {
+    fn drop(&mut self) {
+        if self.0.pins.fetch_sub(1, Ordering::AcqRel) == 1 {
+            self.0.freed.notify_waiters();
+        }
+    }
+}
+
+impl<V> Deref for Pinned<V> {
+    type Target = V;
+
+    fn deref(&self) -> &V {
+        &self.0.value
+    }
+}
+
+/// The end of a load; `None` before it.
+type Outcome<V> = Option<Result<Pinned<V>, Status>>;
+
+enum Entry<V> {
+    Loading(watch::Receiver<Outcome<V>>),
+    Loaded { held: Arc<Held<V>>, last_use: u64 },
+}
+
+struct State<K, V> {
+    entries: HashMap<K, Entry<V>>,
+    /// Bytes of loaded values, and of those that are being loaded.
+    used_bytes: usize,
+    /// Uses of all values so far.
+    uses: u64,
+}
+
+struct Inner<K, V> {
+    /// The values, in refusals.
+    what: &'static str,
+    max_bytes: usize,
+    state: Mutex<State<K, V>>,
+    /// Loads wait for room one after the other: small ones cannot keep a large one waiting.
+    turn: tokio::sync::Mutex<()>,
+    freed: Arc<Notify>,
+}
+
+/// Values by key. The least recently used are evicted for new ones. A value that would exceed the bound while all others
+/// are in use waits. Clones share the values.
+pub struct ByteCache<K, V>(Arc<Inner<K, V>>);
+
+impl<K, V> Clone for ByteCache<K, V> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+impl<K, V> ByteCache<K, V>
+where
+    K: Clone + Eq + Hash + Send + 'static,
+    V: Send + Sync + 'static,
+{
+    /// An empty cache of `max_bytes`; refusals name its values by `what`.
+    #[must_use]
+    pub fn new(what: &'static str, max_bytes: usize) -> Self {
+        let state = Mutex::new(State { entries: HashMap::new(), used_bytes: 0, uses: 0 });
+        Self(Arc::new(Inner { what, max_bytes, state, turn: tokio::sync::Mutex::default(), freed: Arc::default() }))
+    }
+
+    /// The bound.
+    #[must_use]
+    pub fn max_bytes(&self) -> usize {
+        self.0.max_bytes
+    }
+
+    /// Bytes of loaded values, and of those that are being loaded.
+    #[must_use]
+    pub fn used_bytes(&self) -> usize {
+        self.0.state.lock().used_bytes
+    }
+
+    /// A value that is loaded already.
+    #[must_use]
+    pub fn loaded(&self, key: &K) -> Option<Pinned<V>> {
+        self.0.state.lock().loaded(key)
+    }
+
+    /// Whether a value is being loaded, or waits for room.
+    #[must_use]
+    pub fn is_loading(&self, key: &K) -> bool {
+        matches!(self.0.state.lock().entries.get(key), Some(Entry::Loading(_)))
+    }
+
+    /// All loaded values that are `wanted`. This counts as no use of them.
+    #[must_use]
+    pub fn loaded_where(&self, wanted: impl Fn(&V) -> bool) -> Vec<Pinned<V>> {
+        let state = self.0.state.lock();
+        let held = state.entries.values().filter_map(|entry| match entry {
+            Entry::Loaded { held, .. } => Some(held),
+            Entry::Loading(_) => None,
+        });
+        held.filter(|held| wanted(&held.value)).map(Pinned::new).collect()
+    }
+
+    /// A value, loaded for the first that asks for it. A load that has begun goes on when those that wait for it leave, and a
+    /// failed one is forgotten. `load` gives the value and its size, which should be at most `most_bytes`.
+    ///
+    /// # Errors
+    /// The load's own; `RESOURCE_EXHAUSTED` for a value beyond the bound.
+    pub async fn get<F>(
+        &self,
+        key: K,
+        most_bytes: usize,
+        load: impl FnOnce() -> F + Send + 'static,
+    ) -> Result<Pinned<V>, Status>
+    where
+        F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
+    {
+        let mut outcome = {
+            let mut state = self.0.state.lock();
+            if let Some(value) = state.loaded(&key) {
+                return Ok(value);
+            }
+            match state.entries.get(&key) {
+                Some(Entry::Loading(outcome)) => outcome.clone(),
+                _ => {
+                    let (send, outcome) = watch::channel(None);
+                    state.entries.insert(key.clone(), Entry::Loading(outcome.clone()));
+                    tokio::spawn(self.clone().load_with_room(key, most_bytes, load, send));
+                    outcome
+                }
+            }
+        };
+        let ended = outcome.wait_for(Option::is_some).await.map(|outcome| outcome.clone());
+        ended.ok().flatten().unwrap_or_else(|| Err(Status::internal(format!("loading {} was given up", self.0.what))))
+    }
+
+    /// Begins to load a value ahead, where it has room at once.
+    pub fn load_ahead<F>(&self, key: K, most_bytes: usize, load: impl FnOnce() -> F + Send + 'static)
+    where
+        F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
+    {
+        let mut state = self.0.state.lock();
+        if state.entries.contains_key(&key) {
+            return;
+        }
+        let Some(evicted) = state.make_room(most_bytes, self.0.max_bytes) else { return };
+        let (send, outcome) = watch::channel(None);
+        state.entries.insert(key.clone(), Entry::Loading(outcome));
+        drop(state);
+        drop(evicted);
+        tokio::spawn(self.clone().load(key, most_bytes, load, send));
+    }
+
+    /// Loads when there is room, unless all that asked for it have left by then.
+    async fn load_with_room<F>(
+        self,
+        key: K,
+        most_bytes: usize,
+        load: impl FnOnce() -> F + Send + 'static,
+        send: watch::Sender<Outcome<V>>,
+    ) where
+        F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
+    {
+        if let Err(refused) = self.reserve(most_bytes).await {
+            return self.end(&key, 0, Err(refused), &send);
+        }
+        {
+            let mut state = self.0.state.lock();
+            // The entry itself holds one receiver.
+            if send.receiver_count() <= 1 {
+                state.entries.remove(&key);
+                state.used_bytes -= most_bytes;
+                self.0.freed.notify_waiters();
+                return;
+            }
+        }
+        self.load(key, most_bytes, load, send).await;
+    }
+
+    async fn load<F>(
+        self,
+        key: K,
+        reserved_bytes: usize,
+        load: impl FnOnce() -> F + Send + 'static,
+        send: watch::Sender<Outcome<V>>,
+    ) where
+        F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
+    {
+        // A task of its own: a panic in it must give the room back.
+        let loaded = tokio::spawn(async move { load().await }).await;
+        let failed = |error| Err(Status::internal(format!("loading {} failed: {error}", self.0.what)));
+        self.end(&key, reserved_bytes, loaded.unwrap_or_else(failed), &send);
+    }
+
+    /// Waits for room of `bytes`, which then count as used.
+    async fn reserve(&self, bytes: usize) -> Result<(), Status> {
+        let Inner { what, max_bytes, .. } = *self.0;
+        if bytes > max_bytes {
+            let reason = format!("set-memory: {bytes} bytes of {what} exceed the {max_bytes} bytes of this node");
+            return Err(Status::resource_exhausted(reason));
+        }
+        let _turn = self.0.turn.lock().await;
+        loop {
+            let freed = self.0.freed.notified();
+            tokio::pin!(freed);
+            // From here on no notice is missed.
+            freed.as_mut().enable();
+            if self.0.state.lock().make_room(bytes, max_bytes).is_some() {
+                return Ok(());
+            }
+            freed.await;
+        }
+    }
+
+    /// Puts a loaded value in place of its room; a failed one leaves.
+    fn end(
+        &self,
+        key: &K,
+        reserved_bytes: usize,
+        loaded: Result<(V, usize), Status>,
+        send: &watch::Sender<Outcome<V>>,
+    ) {
+        let mut state = self.0.state.lock();
+        state.used_bytes -= reserved_bytes;
+        state.entries.remove(key);
+        let (outcome, evicted) = match loaded {
+            Ok((value, bytes)) => {
+                let evicted = state.make_room(bytes, self.0.max_bytes).unwrap_or_else(|| {
+                    // It exists, larger than it was said to be: it counts, and others wait for it.
+                    state.used_bytes += bytes;
+                    Vec::new()
+                });
+                let held = Arc::new(Held { value, bytes, pins: AtomicUsize::new(0), freed: self.0.freed.clone() });
+                let pinned = Pinned::new(&held);
+                let last_use = state.next_use();
+                state.entries.insert(key.clone(), Entry::Loaded { held, last_use });
+                (Ok(pinned), evicted)
+            }
+            Err(status) => (Err(status), Vec::new()),
+        };
+        drop(state);
+        drop(evicted);
+        send.send_replace(Some(outcome));
+        self.0.freed.notify_waiters();
+    }
+}
+
+impl<K: Clone + Eq + Hash, V> State<K, V> {
+    fn next_use(&mut self) -> u64 {
+        self.uses += 1;
+        self.uses
+    }
+
+    fn loaded(&mut self, key: &K) -> Option<Pinned<V>> {
+        let use_now = self.next_use();
+        match self.entries.get_mut(key) {
+            Some(Entry::Loaded { held, last_use }) => {
+                *last_use = use_now;
+                Some(Pinned::new(held))
+            }
+            _ => None,
+        }
+    }
+
+    /// Takes room for `bytes`, with the values that were evicted for it; `None` where too much is in use.
+    fn make_room(&mut self, bytes: usize, max_bytes: usize) -> Option<Vec<Arc<Held<V>>>> {
+        let unused = self.entries.iter().filter_map(|(key, entry)| match entry {
+            Entry::Loaded { held, last_use } if held.pins.load(Ordering::Acquire) == 0 => {
+                Some((*last_use, key.clone(), held.bytes))
+            }
+            _ => None,
+        });
+        let mut unused: Vec<(u64, K, usize)> = unused.collect();
+        let evictable: usize = unused.iter().map(|(.., bytes)| bytes).sum();
+        if self.used_bytes - evictable + bytes > max_bytes {
+            return None;
+        }
+        unused.sort_unstable_by_key(|(last_use, ..)| *last_use);
+        let mut evicted = Vec::new();
+        for (_, key, freed) in unused {
+            if self.used_bytes + bytes <= max_bytes {
+                break;
+            }
+            self.used_bytes -= freed;
+            if let Some(Entry::Loaded { held, .. }) = self.entries.remove(&key) {
+                evicted.push(held);
+            }
+        }
+        self.used_bytes += bytes;
+        Some(evicted)
+    }
+}
+
+#[cfg(test)]
+#[path = "byte_cache_tests.rs"]
+mod tests;
