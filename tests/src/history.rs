@@ -204,11 +204,16 @@ fn roles(plan: &Assignment) -> Vec<String> {
     wrong
 }
 
+/// Epochs rise from plan to plan of each workload.
 fn rising(commanded: &[Assignment]) -> Vec<String> {
-    // Later sessions receive the same plan again.
-    let again = |pair: &&[Assignment]| pair[0].plan_epoch > pair[1].plan_epoch;
-    let falls = commanded.windows(2).filter(again);
-    falls.map(|pair| format!("plan {} after plan {}", pair[1].plan_epoch, pair[0].plan_epoch)).collect()
+    let (mut wrong, mut last) = (Vec::new(), BTreeMap::new());
+    for Assignment { workload_number, plan_epoch, .. } in commanded {
+        // Later sessions receive the same plan again.
+        if let Some(before) = last.insert(workload_number, plan_epoch).filter(|before| *before > plan_epoch) {
+            wrong.push(format!("plan {plan_epoch} after plan {before} of workload {workload_number}"));
+        }
+    }
+    wrong
 }
 
 #[cfg(test)]

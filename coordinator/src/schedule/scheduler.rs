@@ -90,7 +90,8 @@ impl Scheduler {
 
     /// The number of the workload whose plan in force has this epoch.
     fn workload_of_plan(&self, plan_epoch: u64) -> Option<u64> {
-        let has_epoch = |workload: &WorkloadState| workload.active_plan.as_ref().is_some_and(|a| a.epoch() == plan_epoch);
+        let has_epoch =
+            |workload: &WorkloadState| workload.active_plan.as_ref().is_some_and(|a| a.epoch() == plan_epoch);
         self.workloads.iter().find(|(_, workload)| has_epoch(workload)).map(|(&number, _)| number)
     }
 
@@ -158,10 +159,8 @@ impl Scheduler {
         let plan = self.workloads.get(&number).and_then(|workload| workload.active_plan.as_ref());
         let plan = plan.map(|active| &active.plan.assignment);
         let share = plan.and_then(|plan| plan.samplers.iter().find(|share| share.node_name == name));
-        let sampled = plan.zip(share).map(|(plan, share)| SampledParts {
-            parts: &share.image_indices,
-            tiles: plan.tile_count,
-        });
+        let sampled =
+            plan.zip(share).map(|(plan, share)| SampledParts { parts: &share.image_indices, tiles: plan.tile_count });
         if let Some(estimate) = self.members.get_mut(name).and_then(|member| member.estimates.get_mut(&number)) {
             estimate.add(costs, sampled);
         }

@@ -281,7 +281,9 @@ fn commands_have_a_text_form() {
     let mut cluster = Cluster::of(2);
     let text = cluster.step(opened(1, PIPELINE, 40))[0].to_string();
     assert!(
-        text.starts_with("apply plan 1 of workload 1 to sessions [1]: pipeline, samplers n0[0,1,2,3], compositors n1, "),
+        text.starts_with(
+            "apply plan 1 of workload 1 to sessions [1]: pipeline, samplers n0[0,1,2,3], compositors n1, "
+        ),
         "{text}"
     );
     let refused = Command::Refuse { session: 3, error: ChoiceError::NoNodes };

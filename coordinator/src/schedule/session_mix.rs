@@ -125,7 +125,8 @@ impl SessionMix {
     /// The qualities that every session with a rate falls back to, in the same order.
     pub(super) fn fallbacks(&self) -> &[Quality] {
         let Some(first) = self.rated().next().map(|session| &session.fallbacks) else { return &[] };
-        let common = |other: &Session| first.iter().zip(&other.fallbacks).take_while(|(own, other)| own == other).count();
+        let common =
+            |other: &Session| first.iter().zip(&other.fallbacks).take_while(|(own, other)| own == other).count();
         &first[..self.rated().map(common).min().unwrap_or(0)]
     }
 
@@ -137,10 +138,12 @@ impl SessionMix {
         if self.0.iter().all(|session| session.costs == first) {
             return Some(first);
         }
-        let weight = |session: &Session| session.views_per_s().map_or(session.views as f64, |rate| rate * set_s).max(1.0);
+        let weight =
+            |session: &Session| session.views_per_s().map_or(session.views as f64, |rate| rate * set_s).max(1.0);
         let all: f64 = self.0.iter().map(weight).sum();
-        let mean =
-            |of: fn(&Costs) -> f64| self.0.iter().map(|session| weight(session) * of(&session.costs)).sum::<f64>() / all;
+        let mean = |of: fn(&Costs) -> f64| {
+            self.0.iter().map(|session| weight(session) * of(&session.costs)).sum::<f64>() / all
+        };
         Some(Costs {
             direct_view_s: mean(|costs| costs.direct_view_s),
             reconstruct_view_s: mean(|costs| costs.reconstruct_view_s),

@@ -158,8 +158,7 @@ impl World {
         let views_per_set = self.random.between(1.0, 500.0) as usize;
         let is_live = self.random.below(4) == 0;
         let frames_per_s = is_live.then(|| self.random.between(0.01, 0.3));
-        let opening =
-            Opening { workload: workload(images), frames_per_s, ..opening(session, policy, views_per_set) };
+        let opening = Opening { workload: workload(images), frames_per_s, ..opening(session, policy, views_per_set) };
         self.sessions.insert(session, images);
         self.tell(Event::Opened(Box::new(opening)));
     }
@@ -288,9 +287,9 @@ impl World {
                 Some(self.number_of_session(opening.session).unwrap_or(new))
             }
             Event::DemandChanged { session, .. } | Event::Closed { session } => self.number_of_session(*session),
-            Event::Measured { plan_epoch, .. } | Event::Ready { plan_epoch, .. } | Event::Unready { plan_epoch, .. } => {
-                Some(self.scheduler.number_of_plan(*plan_epoch).unwrap_or(0))
-            }
+            Event::Measured { plan_epoch, .. }
+            | Event::Ready { plan_epoch, .. }
+            | Event::Unready { plan_epoch, .. } => Some(self.scheduler.number_of_plan(*plan_epoch).unwrap_or(0)),
             _ => None,
         }
     }
@@ -301,8 +300,11 @@ impl World {
         // A workload whose sessions have closed has no quarantine any more, and its number does not return.
         self.quarantined.retain(|(number, _)| number.is_none_or(|number| after.contains_key(&number)));
         self.last.retain(|number, _| after.contains_key(number));
-        let moved: BTreeSet<u64> =
-            after.iter().filter(|(number, nodes)| before.get(number) != Some(nodes)).map(|(&number, _)| number).collect();
+        let moved: BTreeSet<u64> = after
+            .iter()
+            .filter(|(number, nodes)| before.get(number) != Some(nodes))
+            .map(|(&number, _)| number)
+            .collect();
         // A node that joins has a role after the dwell.
         if !matches!(event, Event::Joined { .. }) {
             moved.iter().for_each(|number| self.allow_replan(*number));
@@ -328,7 +330,8 @@ impl World {
             }
             Event::Unready { plan_epoch, node_name, .. } => {
                 let number = self.scheduler.number_of_plan(*plan_epoch);
-                let is_known = self.scheduler.plans_with(*plan_epoch, node_name) && self.members.contains_key(node_name);
+                let is_known =
+                    self.scheduler.plans_with(*plan_epoch, node_name) && self.members.contains_key(node_name);
                 if is_known && !self.quarantined.contains(&(None, node_name.clone())) {
                     number.into_iter().for_each(|number| self.allow_replan(number));
                     self.quarantined.insert((number, node_name.clone()));

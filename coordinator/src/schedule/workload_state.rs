@@ -91,7 +91,10 @@ impl WorkloadState {
     /// Whether a session asks for this workload.
     pub(super) fn is_shared_by(&self, opening: &Opening) -> bool {
         match &self.cells {
-            Some(cells) => !opening.viewpoints.is_empty() && cells.are_shareable(&self.requested, &self.with_planes(&opening.workload)),
+            Some(cells) => {
+                !opening.viewpoints.is_empty()
+                    && cells.are_shareable(&self.requested, &self.with_planes(&opening.workload))
+            }
             None => opening.viewpoints.is_empty() && self.requested == self.with_planes(&opening.workload),
         }
     }

@@ -108,7 +108,8 @@ fn headline(status: &ClusterStatus) -> String {
 }
 
 fn workload_row(workload: &WorkloadStatus) -> Vec<Cell> {
-    let WorkloadStatus { number, session_count, viewer_count, views_per_set, utilisation, one_more_viewer, .. } = workload;
+    let WorkloadStatus { number, session_count, viewer_count, views_per_set, utilisation, one_more_viewer, .. } =
+        workload;
     let plan = workload.plan.as_ref().map(|plan| {
         let shown = &plan.assignment.workload;
         let scene: String = shown.scene.hash.as_str().chars().take(SHORT_HASH).collect();

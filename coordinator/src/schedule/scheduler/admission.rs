@@ -104,7 +104,8 @@ impl Scheduler {
             return Ok(());
         }
         let others = self.workloads.iter().filter(|(number, _)| before.is_none_or(|(own, _)| own != **number));
-        let needed = others.map(|(&number, workload)| promised(workload, &self.costs_of_all(number))).sum::<f64>() + asked;
+        let needed =
+            others.map(|(&number, workload)| promised(workload, &self.costs_of_all(number))).sum::<f64>() + asked;
         if needed > MOST_ADMITTED { Err(ChoiceError::Overload { needed }) } else { Ok(()) }
     }
 

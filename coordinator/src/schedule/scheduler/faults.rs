@@ -86,9 +86,9 @@ impl Scheduler {
     fn exclude(&mut self, number: u64, name: &str, reason: &str) -> Vec<Command> {
         let now = self.now;
         let is_usable = self.usable().any(|(usable, _)| usable == name);
-        let Some(workload) = self.workloads.get_mut(&number).filter(|workload| {
-            is_usable && !workload.excluded.contains_key(name)
-        }) else {
+        let Some(workload) =
+            self.workloads.get_mut(&number).filter(|workload| is_usable && !workload.excluded.contains_key(name))
+        else {
             return Vec::new();
         };
         workload.excluded.insert(name.to_owned(), now);
@@ -97,8 +97,7 @@ impl Scheduler {
 
     fn fault(&mut self, name: &str, workload_number: Option<u64>, reason: &str) -> Vec<Command> {
         self.reports.forget(name);
-        let quarantine =
-            Command::Quarantine { node_name: name.to_owned(), workload_number, reason: reason.to_owned() };
+        let quarantine = Command::Quarantine { node_name: name.to_owned(), workload_number, reason: reason.to_owned() };
         let mut commands = vec![quarantine];
         commands.extend(self.nodes_changed(&format!("node {name} {reason}")));
         commands

@@ -15,9 +15,9 @@ impl Scheduler {
         }
         let Some(number) = self.workload_for(opening) else { return self.begin(opening) };
         let mut commands = self.change(number, |sessions| sessions.add(opening));
-        let is_announced = commands.iter().any(
-            |command| matches!(command, Command::Apply { plan, .. } if plan.assignment.workload_number == number),
-        );
+        let is_announced = commands
+            .iter()
+            .any(|command| matches!(command, Command::Apply { plan, .. } if plan.assignment.workload_number == number));
         let workload = self.workloads.get(&number).filter(|_| !is_announced);
         let announced = workload.and_then(|workload| Some((workload, workload.active_plan.as_ref()?)));
         commands.extend(announced.map(|(workload, active)| self.apply(active, workload, vec![session])));

@@ -18,7 +18,11 @@ impl Scheduler {
             plan_epoch: self.plan_epoch,
             nodes: self.members.values().map(|member| member.status.clone()).collect(),
             offers: Vec::new(),
-            workloads: self.workloads.iter().map(|(&number, workload)| self.workload_status(number, workload)).collect(),
+            workloads: self
+                .workloads
+                .iter()
+                .map(|(&number, workload)| self.workload_status(number, workload))
+                .collect(),
         }
     }
 
