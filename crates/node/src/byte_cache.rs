@@ -89,7 +89,7 @@ impl<K, V> Clone for ByteCache<K, V> {
 
 impl<K, V> ByteCache<K, V>
 where
-    K: Clone + Eq + Hash + Send + 'static,
+    K: Clone + Eq + Hash + Send + Sync + 'static,
     V: Send + Sync + 'static,
 {
     /// An empty cache of `max_bytes`; refusals name its values by `what`.
