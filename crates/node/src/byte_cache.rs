@@ -71,7 +71,8 @@ struct Inner<K, V> {
     what: &'static str,
     max_bytes: usize,
     state: Mutex<State<K, V>>,
-    /// Loads wait for room one after the other: small ones cannot keep a large one waiting.
+    /// Loads wait for room one after the other: small ones cannot keep a large one waiting. One of more than half the bound
+    /// has no turn. It may have to wait until hardly anything is in use, and must not keep all others waiting until then.
     turn: tokio::sync::Mutex<()>,
     freed: Arc<Notify>,
 }
@@ -88,7 +89,7 @@ impl<K, V> Clone for ByteCache<K, V> {
 
 impl<K, V> ByteCache<K, V>
 where
-    K: Clone + Eq + Hash + Send + 'static,
+    K: Clone + Eq + Hash + Send + Sync + 'static,
     V: Send + Sync + 'static,
 {
     /// An empty cache of `max_bytes`; refusals name its values by `what`.
@@ -193,20 +194,11 @@ where
     ) where
         F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
     {
-        if let Err(refused) = self.reserve(most_bytes).await {
-            return self.end(&key, 0, Err(refused), &send);
+        match self.reserve(&key, most_bytes, &send).await {
+            Ok(true) => self.load(key, most_bytes, load, send).await,
+            Ok(false) => (),
+            Err(refused) => self.end(&key, 0, Err(refused), &send),
         }
-        {
-            let mut state = self.0.state.lock();
-            // The entry itself holds one receiver.
-            if send.receiver_count() <= 1 {
-                state.entries.remove(&key);
-                state.used_bytes -= most_bytes;
-                self.0.freed.notify_waiters();
-                return;
-            }
-        }
-        self.load(key, most_bytes, load, send).await;
     }
 
     async fn load<F>(
@@ -224,21 +216,29 @@ where
         self.end(&key, reserved_bytes, loaded.unwrap_or_else(failed), &send);
     }
 
-    /// Waits for room of `bytes`, which then count as used.
-    async fn reserve(&self, bytes: usize) -> Result<(), Status> {
+    /// Waits for room of `bytes`, which then count as used. Gives up, and removes the entry, when all that asked have left.
+    async fn reserve(&self, key: &K, bytes: usize, send: &watch::Sender<Outcome<V>>) -> Result<bool, Status> {
         let Inner { what, max_bytes, .. } = *self.0;
         if bytes > max_bytes {
             let reason = format!("set-memory: {bytes} bytes of {what} exceed the {max_bytes} bytes of this node");
             return Err(Status::resource_exhausted(reason));
         }
-        let _turn = self.0.turn.lock().await;
+        let _turn = if bytes <= max_bytes / 2 { Some(self.0.turn.lock().await) } else { None };
         loop {
             let freed = self.0.freed.notified();
             tokio::pin!(freed);
             // From here on no notice is missed.
             freed.as_mut().enable();
-            if self.0.state.lock().make_room(bytes, max_bytes).is_some() {
-                return Ok(());
+            {
+                let mut state = self.0.state.lock();
+                // The entry itself holds one receiver.
+                if send.receiver_count() <= 1 {
+                    state.entries.remove(key);
+                    return Ok(false);
+                }
+                if state.make_room(bytes, max_bytes).is_some() {
+                    return Ok(true);
+                }
             }
             freed.await;
         }
