@@ -89,6 +89,8 @@ pub(crate) struct LiveStream<'a> {
     /// The last set that was fetched without being waited for.
     aside: Option<SetContent>,
     _viewer: Viewer,
+    /// The device cuts long work into slices meanwhile.
+    _on_device: Box<dyn std::any::Any + Send + Sync>,
 }
 
 impl<'a> LiveStream<'a> {
@@ -108,6 +110,7 @@ impl<'a> LiveStream<'a> {
             course: Course::default(),
             aside: None,
             _viewer: client.shared.arrivals.viewer(),
+            _on_device: client.shared.sets.live_stream(),
         }
     }
 
@@ -220,7 +223,7 @@ impl<'a> LiveStream<'a> {
     /// The plan in force for a request. A stream goes on from plan to plan of its workload, whatever its cells and roles.
     fn plan_of(&self, request: &RenderViews) -> Result<Arc<Assignment>, Status> {
         let shared = &self.client.shared;
-        shared.of_compositor(shared.plans.follow(request.workload_number, request.plan_epoch)?)
+        shared.of_compositor(shared.plans.follow(request.workload_number, request.plan_epoch)?, &request.method)
     }
 
     fn count_replaced(&self, older: Option<RequestedView>) {

@@ -75,11 +75,6 @@ impl Outbox {
         self.state.lock().is_live = true;
     }
 
-    /// Whether the stream is live.
-    pub(crate) fn is_live(&self) -> bool {
-        self.state.lock().is_live
-    }
-
     /// Resolves when frames have waited for the client for `deadline`.
     pub(crate) async fn stalled(&self, deadline: Duration) {
         loop {

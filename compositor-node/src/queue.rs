@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use parking_lot::Mutex;
 use tokio::sync::Notify;
@@ -22,6 +22,8 @@ pub(crate) enum Lane {
     Live,
     /// Views of batches.
     Batch,
+    /// Views that a request has drawn from the scene, whatever the plan: one at a time.
+    Direct,
 }
 
 /// The views of all streams that wait for the device. Bounded: each view that waits holds a credit.
@@ -29,8 +31,11 @@ pub(crate) enum Lane {
 pub(crate) struct Arrivals {
     live: WaitingLane,
     batch: WaitingLane,
+    direct: WaitingLane,
     /// Live streams that are open, whether they wait or not: the next pose may come at any time.
     viewers: AtomicUsize,
+    /// Batches of the lanes that follow the plan.
+    served: AtomicU64,
 }
 
 #[derive(Default)]
@@ -44,6 +49,7 @@ impl Arrivals {
         match lane {
             Lane::Live => &self.live,
             Lane::Batch => &self.batch,
+            Lane::Direct => &self.direct,
         }
     }
 
@@ -61,21 +67,31 @@ impl Arrivals {
 
     /// Takes back a stream's views, oldest first.
     pub(crate) fn withdraw(&self, stream: u64) -> VecDeque<Waiting> {
-        let [mut live, mut batch] = [&self.live, &self.batch].map(|lane| lane.queue.lock().withdraw(stream));
-        live.append(&mut batch);
-        live
+        let lanes = [&self.live, &self.batch, &self.direct];
+        lanes.into_iter().flat_map(|lane| lane.queue.lock().withdraw(stream)).collect()
+    }
+
+    /// A count that rises with every batch of the lanes that follow the plan.
+    pub(crate) fn served(&self) -> u64 {
+        self.served.load(Ordering::Relaxed)
     }
 
     /// Waits for the next batch of a lane.
-    pub(crate) async fn next_batch(&self, lane: Lane) -> Vec<Waiting> {
-        let lane = self.lane(lane);
+    pub(crate) async fn next_batch(&self, number: Lane) -> Vec<Waiting> {
+        let waiting = self.lane(number);
         loop {
             let has_viewers = self.viewers.load(Ordering::Relaxed) > 0;
-            let batch = lane.queue.lock().take_batch(has_viewers);
+            let batch = match number {
+                Lane::Direct => waiting.queue.lock().take_one(),
+                Lane::Live | Lane::Batch => waiting.queue.lock().take_batch(has_viewers),
+            };
             if !batch.is_empty() {
+                if number != Lane::Direct {
+                    self.served.fetch_add(1, Ordering::Relaxed);
+                }
                 return batch;
             }
-            lane.added.notified().await;
+            waiting.added.notified().await;
         }
     }
 }
@@ -133,6 +149,16 @@ impl FairQueue {
             batch.extend(next.into_iter().map(|(_, view)| view));
         }
         batch
+    }
+
+    /// The next stream's first view.
+    fn take_one(&mut self) -> Vec<Waiting> {
+        let Some(&stream) = self.order().first() else { return Vec::new() };
+        let Some(wanted) = self.streams.get(&stream).and_then(|views| Some(views.front()?.key.clone())) else {
+            return Vec::new();
+        };
+        self.last = stream;
+        self.take(stream, &wanted).into_iter().collect()
     }
 
     /// All streams, from the one after the last that had its turn.

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 use std::thread::available_parallelism;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use codec::{StageTimes, encode_view};
 use depth_image::View;
-use node::{DirectWork, Engine, NodeMetrics, Operation, Turn, ViewWork, WorkClass, blocking};
+use node::{DirectWork, Engine, NodeMetrics, Operation, Turn, ViewWork, WorkClass, blocking, own_time};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::Status;
 
@@ -25,12 +25,14 @@ pub(crate) struct Rendering {
     encoders: Arc<Semaphore>,
     /// Of all views of this compositor, on a device that may be others' too.
     flow: u64,
+    /// The share of the time for views that are drawn from the scene while others are served.
+    direct_share: f64,
 }
 
 impl Rendering {
-    pub(crate) fn new(engine: Arc<dyn Engine>, metrics: NodeMetrics) -> Self {
+    pub(crate) fn new(engine: Arc<dyn Engine>, metrics: NodeMetrics, direct_share: f64) -> Self {
         let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
-        Self { engine, metrics, encoders, flow: Turn::next_flow() }
+        Self { engine, metrics, encoders, flow: Turn::next_flow(), direct_share }
     }
 
     /// Makes the views of one lane, until it is aborted.
@@ -50,41 +52,47 @@ impl Rendering {
                 is_wanted
             });
             if !batch.is_empty() {
-                self.render(batch, place).await;
+                let served = arrivals.served();
+                let busy_s = self.render(lane, batch, place).await;
+                if lane == Lane::Direct && arrivals.served() > served {
+                    tokio::time::sleep(pause(busy_s, self.direct_share)).await;
+                }
             }
         }
     }
 
-    async fn render(&self, batch: Vec<Waiting>, place: OwnedSemaphorePermit) {
+    /// Gives the seconds that the views had the device.
+    async fn render(&self, lane: Lane, batch: Vec<Waiting>, place: OwnedSemaphorePermit) -> f64 {
         let (start, metrics) = (Instant::now(), &self.metrics);
-        match self.make(&batch).await {
-            Ok((operation, views)) => {
+        match self.make(lane, &batch).await {
+            Ok((operation, views, busy_s)) => {
                 let batch_s = start.elapsed().as_secs_f64();
-                metrics.done.add(batch[0].key.workload_number, operation, batch.len() as f64, batch_s);
+                metrics.done.add(batch[0].key.workload_number, operation, batch.len() as f64, busy_s);
                 metrics.views.inc_by(batch.len() as u64);
                 for view in &batch {
                     metrics.view_s.observe(batch_s / batch.len() as f64);
                     metrics.queue_s.observe(start.saturating_duration_since(view.queued).as_secs_f64());
                 }
                 tokio::spawn(self.clone().encode_all(batch, views, (start, batch_s), place));
+                busy_s
             }
             Err(status) => {
                 for view in batch {
                     metrics.drop_view("device failed");
                     view.reply.send(Err(status.clone()));
                 }
+                0.0
             }
         }
     }
 
-    /// Makes the views of a batch, which has one at least.
-    async fn make(&self, batch: &[Waiting]) -> Result<(Operation, Vec<View>), Status> {
+    /// Makes the views of a batch, which has one at least; with the seconds that they had the device.
+    async fn make(&self, lane: Lane, batch: &[Waiting]) -> Result<(Operation, Vec<View>, f64), Status> {
         let (engine, source, key) = (self.engine.clone(), batch[0].source.clone(), batch[0].key.clone());
         let cameras: Vec<_> = batch.iter().map(|waiting| waiting.view.camera).collect();
         let count = cameras.len();
-        let is_live = batch.iter().any(|waiting| waiting.reply.outbox().is_live());
-        let turn = Turn { class: if is_live { WorkClass::Live } else { WorkClass::Batch }, flow: self.flow };
-        let (operation, views) = blocking(move || match source {
+        let turn = Turn { class: if lane == Lane::Live { WorkClass::Live } else { WorkClass::Batch }, flow: self.flow };
+        let make = move |engine: &dyn Engine| match source {
             Source::Set(set) => {
                 let work = ViewWork { cameras, method: key.method, planes: key.planes };
                 engine.reconstruct(set.set.as_ref(), &work, turn).map(|views| (Operation::ReconstructView, views))
@@ -93,10 +101,11 @@ impl Rendering {
                 let work = DirectWork { scene_time_s, ..DirectWork::of(&plan.workload, cameras, key.planes) };
                 engine.draw_direct(&work, turn).map(|views| (Operation::DirectView, views))
             }
-        })
-        .await?;
+        };
+        let (made, busy_s) = blocking(move || Ok::<_, Status>(own_time(engine.as_ref(), || make(engine.as_ref())))).await?;
+        let (operation, views) = made?;
         if views.len() == count {
-            Ok((operation, views))
+            Ok((operation, views, busy_s))
         } else {
             Err(Status::internal(format!("{} views were made for {count} cameras", views.len())))
         }
@@ -125,6 +134,11 @@ impl Rendering {
         while encodings.join_next().await.is_some() {}
         drop(place);
     }
+}
+
+/// The pause after work of `busy_s` that may take `share` of the time.
+fn pause(busy_s: f64, share: f64) -> Duration {
+    Duration::try_from_secs_f64(busy_s * (share.recip() - 1.0)).unwrap_or_default()
 }
 
 /// The stage times of a view in a batch of `count` views that was begun at `start`.

@@ -40,8 +40,8 @@ impl CompositorService {
     ) -> Self {
         let arrivals = Arc::<Arrivals>::default();
         let mut rendering = JoinSet::new();
-        let renderer = Rendering::new(engine.clone(), metrics.clone());
-        for lane in [Lane::Live, Lane::Batch] {
+        let renderer = Rendering::new(engine.clone(), metrics.clone(), config.direct_share);
+        for lane in [Lane::Live, Lane::Batch, Lane::Direct] {
             rendering.spawn(renderer.clone().run(arrivals.clone(), lane));
         }
         let sets = Arc::new(Sets::new(engine, plans.clone(), config, metrics.clone()));

@@ -10,7 +10,7 @@ use depth_image::{Camera, PinholeCamera, nearest_set};
 use node::{
     ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet, Turn, UploadedSet,
 };
-use node::{WorkClass, beyond_timeline, blocking, most_image_bytes, most_set_bytes, set_bytes};
+use node::{WorkClass, beyond_timeline, blocking, most_image_bytes, most_set_bytes, own_time, set_bytes};
 use tonic::Status;
 use wire::rpc::Messages;
 
@@ -66,6 +66,20 @@ pub(crate) struct Sets {
 }
 
 impl Sets {
+    /// Checks that a plan's samples have the planes that a method needs.
+    pub(crate) fn check_method(&self, plan: &Assignment, method: &str) -> Result<(), Status> {
+        if plan.workload.planes.contain(self.engine.sample_planes(method)?) {
+            return Ok(());
+        }
+        let text = "needs planes that this workload does not sample; a session of this method does";
+        Err(Status::invalid_argument(format!("reconstruction_method: {method} {text}")))
+    }
+
+    /// Counts a live stream as open on the device until the guard is dropped.
+    pub(crate) fn live_stream(&self) -> Box<dyn std::any::Any + Send + Sync> {
+        self.engine.live_stream()
+    }
+
     pub(crate) fn new(engine: Arc<dyn Engine>, plans: PlansInForce, config: &NodeConfig, metrics: NodeMetrics) -> Self {
         Self {
             engine,
@@ -198,14 +212,13 @@ impl Sets {
         let (set, times) = self.fetch(&request).await?;
         let bytes = set_bytes(&set.images) + relay.as_ref().map_or(0, RelayBuffer::bytes);
         let fetched_s = start.elapsed().as_secs_f64();
-        let (engine, uploading) = (self.engine.clone(), Instant::now());
-        let set = blocking(move || engine.upload(&set, Turn::of(WorkClass::Batch))).await?;
-        self.metrics.done.add(
-            plan.workload_number,
-            Operation::LoadSet,
-            1.0,
-            times.decode_s + uploading.elapsed().as_secs_f64(),
-        );
+        let engine = self.engine.clone();
+        let upload = move || {
+            let (set, upload_s) = own_time(engine.as_ref(), || engine.upload(&set, Turn::of(WorkClass::Batch)));
+            set.map(|set| (set, upload_s))
+        };
+        let (set, upload_s) = blocking(upload).await?;
+        self.metrics.done.add(plan.workload_number, Operation::LoadSet, 1.0, times.decode_s + upload_s);
         self.metrics.done.transferred(plan.workload_number, times.bytes, times.transfer_s);
         self.metrics.sets_loaded.inc();
         self.metrics.set_s.observe(start.elapsed().as_secs_f64());

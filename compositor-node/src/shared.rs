@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Instant;
 
-use cluster::{Assignment, Policy};
+use cluster::{Assignment, DIRECT, Policy};
 use depth_image::PinholeCamera;
 use node::{CellPlan, Deadlines, NodeMetrics, PlansInForce, beyond_timeline};
 use tonic::Status;
@@ -35,8 +35,9 @@ pub(crate) struct ClientStream {
 }
 
 impl ClientStream {
-    /// Hands views over to a lane of the device.
+    /// Hands views of one request over to a lane of the device, or to that of views that are drawn whatever the plan.
     pub(crate) fn queue(&self, lane: Lane, views: Vec<Waiting>) {
+        let lane = if views.first().is_some_and(|view| view.key.method == DIRECT) { Lane::Direct } else { lane };
         for Waiting { key, view, .. } in &views {
             tracing::debug!(stream = self.stream, frame = view.frame, set = %key.sample_set_id, "queued");
         }
@@ -45,10 +46,13 @@ impl ClientStream {
 }
 
 impl Shared {
-    /// The plan, if this node makes views in it.
-    pub(crate) fn of_compositor(&self, plan: Arc<Assignment>) -> Result<Arc<Assignment>, Status> {
+    /// The plan for views by a method, if this node makes views in it. Views that are drawn from the scene ignore the plan's
+    /// policy.
+    pub(crate) fn of_compositor(&self, plan: Arc<Assignment>, method: &str) -> Result<Arc<Assignment>, Status> {
         if plan.composites(&self.plans.node_name) {
-            return Ok(plan);
+            self.sets.check_method(&plan, method)?;
+            let is_as_planned = method != DIRECT || plan.policy == Policy::Direct;
+            return Ok(if is_as_planned { plan } else { Arc::new(Assignment { policy: Policy::Direct, ..(*plan).clone() }) });
         }
         let (name, plan_epoch) = (&self.plans.node_name, plan.plan_epoch);
         Err(Status::failed_precondition(format!("{name} makes no views in plan_epoch {plan_epoch}")))

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use cluster::{Assignment, FetchImages, SetContent};
 use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
 use node::{ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Relay, SampleWork, Turn};
-use node::{WorkClass, beyond_timeline, blocking, has_set, most_image_bytes, until_drained, with_guard};
+use node::{WorkClass, beyond_timeline, blocking, has_set, most_image_bytes, own_time, until_drained, with_guard};
 use parking_lot::Mutex;
 use tokio::sync::mpsc;
 use tokio_stream::StreamExt as _;
@@ -181,9 +181,8 @@ fn sample(
     (indices, tiles): (&[u32], f64),
     (workload_number, metrics): (u64, &NodeMetrics),
 ) -> Result<PackedImages, Status> {
-    let start = Instant::now();
-    let images = engine.sample(work, Turn::of(WorkClass::Batch))?;
-    let sampled_s = start.elapsed().as_secs_f64();
+    let (images, sampled_s) = own_time(engine, || engine.sample(work, Turn::of(WorkClass::Batch)));
+    let (images, encoding) = (images?, Instant::now());
     if images.len() != indices.len() {
         return Err(Status::internal(format!("{} images were sampled for {} cameras", images.len(), indices.len())));
     }
@@ -193,17 +192,18 @@ fn sample(
     };
     let encoded = indices.iter().zip(&images).map(encode).collect::<Result<Vec<_>, Status>>()?;
     let whole_images = images.len() as f64 / tiles;
-    let image_s = start.elapsed().as_secs_f64() / whole_images.max(f64::MIN_POSITIVE);
+    let total_s = sampled_s + encoding.elapsed().as_secs_f64();
+    let image_s = total_s / whole_images.max(f64::MIN_POSITIVE);
     images.iter().for_each(|_| metrics.image_s.observe(image_s));
     metrics.images_sampled.inc_by(images.len() as u64);
-    metrics.done.add(workload_number, Operation::SampleImage, whole_images, start.elapsed().as_secs_f64());
+    metrics.done.add(workload_number, Operation::SampleImage, whole_images, total_s);
     metrics.done.encoded(workload_number, whole_images, encoded.iter().map(|(_, image)| image.payload.len()).sum());
     tracing::debug!(
         images = images.len(),
         scene_time_s = work.scene_time_s,
         refinement_step = work.refinement.step,
         sampled_s,
-        total_s = start.elapsed().as_secs_f64(),
+        total_s,
         "sampled"
     );
     Ok(encoded)

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::sleep;
 use std::time::Duration;
 
-use cluster::{Refinement, SamplePlanes};
+use cluster::{DIRECT, Refinement, SamplePlanes};
 use depth_image::{
     BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, Environment, Illumination, Light, PinholeCamera, Provenance,
     ProvenanceKind, Ray, Texel, View, ViewPlanes, linear_from_rgb9e5, linear_from_srgb8, rgb9e5_from_linear,
@@ -311,7 +311,7 @@ impl Engine for ScalarEngine {
     }
 
     fn sample_planes(&self, method: &str) -> Result<SamplePlanes, EngineError> {
-        known("method", method, "splat").map(|()| SamplePlanes::default())
+        if method == DIRECT { Ok(()) } else { known("method", method, "splat") }.map(|()| SamplePlanes::default())
     }
 
     fn sample(&self, request: &SampleWork, _: Turn) -> Result<Vec<DepthImage>, EngineError> {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::str::FromStr;
 use std::sync::{Arc, Weak};
 
-use cluster::SamplePlanes;
+use cluster::{DIRECT, SamplePlanes};
 use depth_image::{DepthImage, View};
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass};
@@ -142,6 +142,9 @@ impl Engine for GpuEngine {
     }
 
     fn sample_planes(&self, method: &str) -> Result<SamplePlanes, EngineError> {
+        if method == DIRECT {
+            return Ok(SamplePlanes::default());
+        }
         let method: ReconstructionMethod = parsed("reconstruction_method", method)?;
         let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
         Ok(SamplePlanes { normals: normal, corner_inverse_depths: corner_inverse_depth })
@@ -149,6 +152,10 @@ impl Engine for GpuEngine {
 
     fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
         Box::new(self.gpu.device_queue.live_stream())
+    }
+
+    fn take_waited_s(&self) -> f64 {
+        gpu::take_waited_s()
     }
 
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError> {

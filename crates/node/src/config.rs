@@ -20,6 +20,8 @@ pub struct NodeConfig {
     pub reflection: bool,
     /// Most bytes of sample sets: half for sets on the device and their relayed images, half for packed images.
     pub set_memory_bytes: usize,
+    /// The share of the time that views drawn from the scene by request may take while others are served: above 0, at most 1.
+    pub direct_share: f64,
     /// Deadlines of streams.
     pub deadlines: Deadlines,
     /// Bounds on the work in flight.
@@ -38,6 +40,7 @@ impl NodeConfig {
             insecure_bind: false,
             reflection: false,
             set_memory_bytes: 2 << 30,
+            direct_share: 0.1,
             deadlines: Deadlines::default(),
             quotas: Quotas::default(),
         }

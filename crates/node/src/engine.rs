@@ -3,6 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
 
 use cluster::{Refinement, SamplePlanes, Workload};
 use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, View, ViewPlanes};
@@ -72,6 +73,10 @@ pub trait Engine: Send + Sync + 'static {
     fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
         Box::new(())
     }
+    /// Seconds for which calls of this thread have waited for their turns since the last call of this function.
+    fn take_waited_s(&self) -> f64 {
+        0.0
+    }
     /// Samples the wanted images of a set, in their order.
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError>;
     /// Uploads a set for reconstruction. Fails for images that the device cannot take.
@@ -80,6 +85,15 @@ pub trait Engine: Send + Sync + 'static {
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError>;
     /// Draws one view for each camera from the scene itself.
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError>;
+}
+
+/// The result of work on this thread, and the seconds that it took, without those for which it waited for others.
+pub fn own_time<T>(engine: &dyn Engine, work: impl FnOnce() -> T) -> (T, f64) {
+    // Earlier waits of this thread are of other work.
+    engine.take_waited_s();
+    let start = Instant::now();
+    let done = work();
+    (done, (start.elapsed().as_secs_f64() - engine.take_waited_s()).max(0.0))
 }
 
 /// A sample set on the device; the engine downcasts it to its own type.
@@ -285,6 +299,10 @@ impl Engine for DeviceLossMonitor {
 
     fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
         self.engine.live_stream()
+    }
+
+    fn take_waited_s(&self) -> f64 {
+        self.engine.take_waited_s()
     }
 
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError> {

@@ -2,15 +2,14 @@
 //! g_v hold all light that samplers compute, and c the light that compositors add.
 
 use std::fmt::Display;
-use std::time::Instant;
 
-use cluster::{Costs, MeasureCosts, Measured, ROW_PARTS, TileCosts, Workload};
+use cluster::{Costs, DIRECT, MeasureCosts, Measured, ROW_PARTS, TileCosts, Workload};
 use codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet};
 use codec::{decode_depth_image, encode_depth_image, encode_view};
 use depth_image::{Camera, PinholeCamera, View};
 use tonic::Status;
 
-use crate::engine::{DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass};
+use crate::engine::{DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, own_time};
 
 /// Runs of one operation after a warm-up, in which shaders are built.
 const RUNS: usize = 3;
@@ -19,55 +18,121 @@ const LONG_RUN_S: f64 = 0.5;
 /// The longest time of views that are drawn in one call, unless one alone takes longer.
 const DIRECT_CALL_S: f64 = 1.0;
 
-/// A session waits for the costs.
-const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
-
-/// Measures g_s, g_v, c, d and e one after the other. Nothing else may run on the device meanwhile.
+/// Measures g_s, g_v, c, d and e one after the other. Time that other work has the device does not count.
 pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Measured, Status> {
-    let workload = &request.workload;
-    let planes = engine.sample_planes(&request.method)?;
-    let sample = SampleWork { planes, ..SampleWork::of(workload) };
-    let (encoded, sample_s) = timed(|| sampled(engine, &sample))?;
-    let (set, load_set_s) = timed(|| Ok(engine.upload(&decoded(workload, &encoded)?, TURN)?))?;
-    let (made, reconstruct_view_s) = reconstruct_view_s(engine, set.as_ref(), request)?;
-    let in_order = engine.images_are_sequential(&workload.sampling)?;
-    let sample_image_s = sample_s / encoded.len().max(1) as f64;
-    let is_tileable = engine.images_are_independent(&workload.sampling)?;
-    let costs = Costs {
-        sample_image_s,
-        tiles: if is_tileable { tile_costs(engine, &sample, sample_image_s)? } else { None },
-        direct_view_s: direct_view_s(engine, request)?,
-        reconstruct_view_s,
-        load_set_s,
-        encode_view_s: encode_s(&made, &request.codec)?,
-        in_order,
-    };
-    Ok(Measured { costs, planes })
+    let class = if request.in_background { WorkClass::Background } else { WorkClass::Batch };
+    Measurement { engine, turn: Turn { class, flow: Turn::next_flow() } }.costs(request)
 }
 
-/// Images as they leave a sampler, which encodes one set before it samples the next.
-fn sampled(engine: &dyn Engine, work: &SampleWork) -> Result<Vec<EncodedDepthImage>, Status> {
-    let images = engine.sample(work, TURN)?;
-    images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec)).collect()
+/// A measurement's device, and its place among other work.
+struct Measurement<'a> {
+    engine: &'a dyn Engine,
+    turn: Turn,
 }
 
-/// The overhead of a tile, measured on a tile of one row, and the shares of rows, measured on quarters of the height. Each
-/// quarter is of another image, since images differ. Images of too few rows are not tileable.
-fn tile_costs(engine: &dyn Engine, whole: &SampleWork, sample_image_s: f64) -> Result<Option<TileCosts>, Status> {
-    let Some(Camera::Pinhole(first)) = whole.cameras.first().copied() else { return Ok(None) };
-    if whole.cameras.iter().any(|Camera::Pinhole(camera)| (camera.size_px.y as usize) < ROW_PARTS) {
-        return Ok(None);
+impl Measurement<'_> {
+    fn costs(&self, request: &MeasureCosts) -> Result<Measured, Status> {
+        let (engine, workload) = (self.engine, &request.workload);
+        let planes = engine.sample_planes(&request.method)?;
+        let sample = SampleWork { planes, ..SampleWork::of(workload) };
+        let (encoded, sample_s) = self.timed(|| self.sampled(&sample))?;
+        let (set, load_set_s) = self.timed(|| Ok(engine.upload(&decoded(workload, &encoded)?, self.turn)?))?;
+        let sample_image_s = sample_s / encoded.len().max(1) as f64;
+        let is_tileable = engine.images_are_independent(&workload.sampling)?;
+        let tiles = if is_tileable { self.tile_costs(&sample, sample_image_s)? } else { None };
+        let (drawn, direct_view_s) = self.direct_view_s(request)?;
+        let (made, reconstruct_view_s) = match request.method.as_str() {
+            DIRECT => (drawn, direct_view_s),
+            _ => self.reconstruct_view_s(set.as_ref(), request)?,
+        };
+        let encode_view_s = self.encode_s(&made, &request.codec)?;
+        let in_order = engine.images_are_sequential(&workload.sampling)?;
+        let costs =
+            Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles };
+        Ok(Measured { costs, planes })
     }
-    let tile_s = |camera: Camera| {
-        let work = SampleWork { cameras: vec![camera], wanted: vec![0], ..whole.clone() };
-        Ok::<f64, Status>(timed(|| sampled(engine, &work))?.1)
-    };
-    let row_s = tile_s(Camera::Pinhole(first).tile(0, first.size_px.y))?;
-    let mut quarters_s = [0.0; ROW_PARTS];
-    for (quarter, camera) in whole.cameras.iter().cycle().take(ROW_PARTS).enumerate() {
-        quarters_s[quarter] = tile_s(camera.tile(quarter as u32, ROW_PARTS as u32))?;
+
+    /// Images as they leave a sampler, which encodes one set before it samples the next.
+    fn sampled(&self, work: &SampleWork) -> Result<Vec<EncodedDepthImage>, Status> {
+        let images = self.engine.sample(work, self.turn)?;
+        images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec)).collect()
     }
-    Ok(split_into_overhead_and_shares(sample_image_s, row_s, quarters_s))
+
+    /// The overhead of a tile, measured on a tile of one row, and the shares of rows, measured on quarters of the height.
+    /// Each quarter is of another image, since images differ. Images of too few rows are not tileable.
+    fn tile_costs(&self, whole: &SampleWork, sample_image_s: f64) -> Result<Option<TileCosts>, Status> {
+        let Some(Camera::Pinhole(first)) = whole.cameras.first().copied() else { return Ok(None) };
+        if whole.cameras.iter().any(|Camera::Pinhole(camera)| (camera.size_px.y as usize) < ROW_PARTS) {
+            return Ok(None);
+        }
+        let tile_s = |camera: Camera| {
+            let work = SampleWork { cameras: vec![camera], wanted: vec![0], ..whole.clone() };
+            Ok::<f64, Status>(self.timed(|| self.sampled(&work))?.1)
+        };
+        let row_s = tile_s(Camera::Pinhole(first).tile(0, first.size_px.y))?;
+        let mut quarters_s = [0.0; ROW_PARTS];
+        for (quarter, camera) in whole.cameras.iter().cycle().take(ROW_PARTS).enumerate() {
+            quarters_s[quarter] = tile_s(camera.tile(quarter as u32, ROW_PARTS as u32))?;
+        }
+        Ok(split_into_overhead_and_shares(sample_image_s, row_s, quarters_s))
+    }
+
+    /// The cost of one view over all typical views, in calls of the batch's size; with some of the views.
+    fn reconstruct_view_s(
+        &self,
+        set: &dyn UploadedSet,
+        request: &MeasureCosts,
+    ) -> Result<(Vec<View>, f64), Status> {
+        let batch = request.batch_count as usize;
+        let views = request.views(request.batch_count.max(request.typical_views.len() as u32));
+        let work = |cameras: &[PinholeCamera]| ViewWork {
+            cameras: cameras.to_vec(),
+            method: request.method.clone(),
+            planes: request.planes,
+        };
+        let calls: Vec<ViewWork> = views.chunks(batch.max(1)).map(work).collect();
+        let make =
+            || calls.iter().try_fold(Vec::new(), |_, work| Ok(self.engine.reconstruct(set, work, self.turn)?));
+        let (made, seconds) = self.timed(make)?;
+        Ok((made, seconds / views.len() as f64))
+    }
+
+    /// Measured on as many views as time allows; with some of the views. Fixed costs are shared as in real batches where a
+    /// view is quick, and hardly matter where it is not.
+    fn direct_view_s(&self, request: &MeasureCosts) -> Result<(Vec<View>, f64), Status> {
+        let work = |views: u32| DirectWork::of(&request.workload, request.views(views), request.planes);
+        let draw = |views: u32| Ok(self.engine.draw_direct(&work(views), self.turn)?);
+        let (drawn, alone_s) = self.timed(|| draw(1))?;
+        let views = direct_views(alone_s, request.batch_count);
+        if views == 1 {
+            return Ok((drawn, alone_s));
+        }
+        let (drawn, direct_s) = self.timed(|| draw(views))?;
+        Ok((drawn, direct_s / f64::from(views)))
+    }
+
+    /// The mean cost over all views of the batch. A single view ends within a time slice, in which a node with a CPU quota
+    /// is as fast as any.
+    fn encode_s(&self, made: &[View], codec_name: &str) -> Result<f64, Status> {
+        let frame_codec: FrameCodec = codec_name.parse().map_err(codec)?;
+        let encode = || made.iter().try_for_each(|view| encode_view(view, frame_codec).map(drop).map_err(codec));
+        let ((), seconds) = self.timed(encode)?;
+        Ok(seconds / made.len().max(1) as f64)
+    }
+
+    /// The result of a warm-up, and the median time of the runs after it: one long run, or [`RUNS`]. The first run after the
+    /// warm-up decides how many, since the warm-up may have built shaders.
+    fn timed<T>(&self, mut run: impl FnMut() -> Result<T, Status>) -> Result<(T, f64), Status> {
+        let result = run()?;
+        let mut seconds = Vec::with_capacity(RUNS);
+        while seconds.len() < runs_after(seconds.first().copied()) {
+            let (done, own_s) = own_time(self.engine, &mut run);
+            done?;
+            seconds.push(own_s);
+        }
+        seconds.sort_by(f64::total_cmp);
+        Ok((result, seconds[seconds.len() / 2]))
+    }
 }
 
 fn split_into_overhead_and_shares(sample_image_s: f64, row_s: f64, quarters_s: [f64; ROW_PARTS]) -> Option<TileCosts> {
@@ -79,39 +144,6 @@ fn split_into_overhead_and_shares(sample_image_s: f64, row_s: f64, quarters_s: [
 
 fn codec(error: impl Display) -> Status {
     Status::internal(format!("codec: {error}"))
-}
-
-/// The cost of one view over all typical views, in calls of the batch's size; with some of the views.
-fn reconstruct_view_s(
-    engine: &dyn Engine,
-    set: &dyn UploadedSet,
-    request: &MeasureCosts,
-) -> Result<(Vec<View>, f64), Status> {
-    let batch = request.batch_count as usize;
-    let views = request.views(request.batch_count.max(request.typical_views.len() as u32));
-    let work = |cameras: &[PinholeCamera]| ViewWork {
-        cameras: cameras.to_vec(),
-        method: request.method.clone(),
-        planes: request.planes,
-    };
-    let calls: Vec<ViewWork> = views.chunks(batch.max(1)).map(work).collect();
-    let make = || calls.iter().try_fold(Vec::new(), |_, work| Ok(engine.reconstruct(set, work, TURN)?));
-    let (made, seconds) = timed(make)?;
-    Ok((made, seconds / views.len() as f64))
-}
-
-/// Measured on as many views as time allows. Fixed costs are shared as in real batches where a view is quick, and hardly
-/// matter where it is not.
-fn direct_view_s(engine: &dyn Engine, request: &MeasureCosts) -> Result<f64, Status> {
-    let work = |views: u32| DirectWork::of(&request.workload, request.views(views), request.planes);
-    let draw = |views: u32| Ok(engine.draw_direct(&work(views), TURN).map(drop)?);
-    let ((), alone_s) = timed(|| draw(1))?;
-    let views = direct_views(alone_s, request.batch_count);
-    if views == 1 {
-        return Ok(alone_s);
-    }
-    let ((), direct_s) = timed(|| draw(views))?;
-    Ok(direct_s / f64::from(views))
 }
 
 /// The number of views to draw in one call, where one alone takes `alone_s`.
@@ -127,29 +159,6 @@ fn decoded(workload: &Workload, encoded: &[EncodedDepthImage]) -> Result<SampleS
     };
     let images = encoded.iter().zip(&workload.sample_cameras).map(decode).collect::<Result<_, _>>()?;
     Ok(SampleSet::of(workload, images))
-}
-
-/// The mean cost over all views of the batch. A single view ends within a time slice, in which a node with a CPU quota is
-/// as fast as any.
-fn encode_s(made: &[View], codec_name: &str) -> Result<f64, Status> {
-    let frame_codec: FrameCodec = codec_name.parse().map_err(codec)?;
-    let ((), seconds) =
-        timed(|| made.iter().try_for_each(|view| encode_view(view, frame_codec).map(drop).map_err(codec)))?;
-    Ok(seconds / made.len().max(1) as f64)
-}
-
-/// The result of a warm-up, and the median time of the runs after it: one long run, or [`RUNS`]. The first run after the
-/// warm-up decides how many, since the warm-up may have built shaders.
-fn timed<T>(mut run: impl FnMut() -> Result<T, Status>) -> Result<(T, f64), Status> {
-    let result = run()?;
-    let mut seconds = Vec::with_capacity(RUNS);
-    while seconds.len() < runs_after(seconds.first().copied()) {
-        let start = Instant::now();
-        run()?;
-        seconds.push(start.elapsed().as_secs_f64());
-    }
-    seconds.sort_by(f64::total_cmp);
-    Ok((result, seconds[seconds.len() / 2]))
 }
 
 /// The number of runs, by the time of the first.

@@ -48,11 +48,6 @@ impl Guest {
         Self { name, views, size_px, difference }
     }
 
-    /// Whether its views are made from the samples of the viewer's workload.
-    pub(super) fn shares_samples(&self) -> bool {
-        matches!(self.difference, Difference::Size | Difference::Codec)
-    }
-
     /// Opens a session, asks for all views, and gives the seconds until the last has come.
     ///
     /// # Errors

@@ -1,10 +1,12 @@
 //! A bound on the jobs that hold a device's memory: so many of each class, in the order of their arrival.
 
 use std::collections::VecDeque;
+use std::time::Instant;
 
 use parking_lot::{Condvar, Mutex};
 
 use super::fair_order::WorkClass;
+use super::queue::count_waited;
 
 /// Bounds the jobs of each class. A job of one class never waits for one of another.
 pub struct JobLimit {
@@ -39,9 +41,11 @@ impl JobLimit {
         jobs.last_ticket += 1;
         let ticket = jobs.last_ticket;
         jobs.waiting.push_back(ticket);
+        let start = Instant::now();
         while jobs.running >= self.most || jobs.waiting.front() != Some(&ticket) {
             self.ended[class as usize].wait(&mut jobs);
         }
+        count_waited(start);
         jobs.waiting.pop_front();
         jobs.running += 1;
         // The next may have room, too.

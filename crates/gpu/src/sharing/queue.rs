@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::cell::Cell;
 use std::time::Instant;
 
 use parking_lot::{Condvar, Mutex, MutexGuard};
@@ -11,6 +12,22 @@ use super::rates::{Rates, Work};
 
 /// The longest slice that is planned while a live stream is open.
 pub const SLICE_S: f64 = 0.050;
+
+thread_local! {
+    /// Seconds for which this thread has waited for its turn.
+    static WAITED_S: Cell<f64> = const { Cell::new(0.0) };
+}
+
+/// Seconds for which this thread has waited for its turns since the last call. What remains of a call's time is its own.
+#[must_use]
+pub fn take_waited_s() -> f64 {
+    WAITED_S.take()
+}
+
+/// Counts time that this thread has waited since `start`.
+pub(super) fn count_waited(start: Instant) {
+    WAITED_S.set(WAITED_S.get() + start.elapsed().as_secs_f64());
+}
 
 /// The queue of one device. One piece of work holds the device at a time.
 #[derive(Default)]
@@ -94,10 +111,12 @@ impl DeviceQueue {
         let ticket = state.last_ticket;
         state.order.enter(ticket, turn, predicted_s);
         self.choose(&mut state);
+        let start = Instant::now();
         while state.going != Some(ticket) {
             self.changed.wait(&mut state);
         }
         state.going = None;
+        count_waited(start);
         self.slices.fetch_add(1, Ordering::AcqRel);
         Slot { queue: self, turn, since: Instant::now() }
     }

@@ -4,7 +4,7 @@ use anyhow::Context as _;
 use app_core::delivery::{open, receive_requests, requests};
 use app_core::exit::Outcome;
 use client::Frame;
-use cluster::{PolicyChoice, SessionRequest};
+use cluster::{DIRECT, PolicyChoice, SessionRequest};
 use depth_image::ViewPlanes;
 
 use super::args::ViewArgs;
@@ -15,7 +15,7 @@ use crate::comparison;
 /// Asks for the same views drawn directly, and writes how far the written ones are from them. One frame at a time is compared;
 /// others wait at the client. A view takes 32 bytes, and its row of the table.
 pub(super) async fn compare(args: &ViewArgs, job: &Job, views: u64) -> anyhow::Result<Outcome> {
-    let direct = SessionRequest { policy: PolicyChoice::Direct, ..job.request.clone() };
+    let direct = SessionRequest { method: DIRECT.to_owned(), policy: PolicyChoice::Auto, ..job.request.clone() };
     let session = open(&job.client, direct).await?;
     let mut rows = Vec::with_capacity(views as usize);
     let received = async |frame: Frame| {
