@@ -133,24 +133,31 @@ impl SessionMix {
     /// Costs of the mean view, where each is shown for `set_s`; sampling costs are those of the first session. `None`
     /// without sessions.
     pub(super) fn costs(&self, set_s: f64) -> Option<Costs> {
-        let first = self.0.first()?.costs;
-        // A mean of equal costs would differ from them by rounding.
-        if self.0.iter().all(|session| session.costs == first) {
-            return Some(first);
-        }
-        let weight =
-            |session: &Session| session.views_per_s().map_or(session.views as f64, |rate| rate * set_s).max(1.0);
-        let all: f64 = self.0.iter().map(weight).sum();
-        let mean = |of: fn(&Costs) -> f64| {
-            self.0.iter().map(|session| weight(session) * of(&session.costs)).sum::<f64>() / all
-        };
-        Some(Costs {
-            direct_view_s: mean(|costs| costs.direct_view_s),
-            reconstruct_view_s: mean(|costs| costs.reconstruct_view_s),
-            encode_view_s: mean(|costs| costs.encode_view_s),
-            ..first
-        })
+        mean_costs(self.0.iter(), set_s)
     }
+
+    /// The same of sessions with a rate alone.
+    pub(super) fn rated_costs(&self, set_s: f64) -> Option<Costs> {
+        mean_costs(self.rated(), set_s)
+    }
+}
+
+fn mean_costs<'a>(sessions: impl Iterator<Item = &'a Session> + Clone, set_s: f64) -> Option<Costs> {
+    let first = sessions.clone().next()?.costs;
+    // A mean of equal costs would differ from them by rounding.
+    if sessions.clone().all(|session| session.costs == first) {
+        return Some(first);
+    }
+    let weight = |session: &Session| session.views_per_s().map_or(session.views as f64, |rate| rate * set_s).max(1.0);
+    let all: f64 = sessions.clone().map(weight).sum();
+    let mean =
+        |of: fn(&Costs) -> f64| sessions.clone().map(|session| weight(session) * of(&session.costs)).sum::<f64>() / all;
+    Some(Costs {
+        direct_view_s: mean(|costs| costs.direct_view_s),
+        reconstruct_view_s: mean(|costs| costs.reconstruct_view_s),
+        encode_view_s: mean(|costs| costs.encode_view_s),
+        ..first
+    })
 }
 
 #[cfg(test)]

@@ -194,9 +194,26 @@ impl WorkloadState {
         time_s / self.set_s() * least_ratio / self.frame_rate_ratio()
     }
 
+    /// A node's costs of the views of sessions with a rate, from those of the mean view: batches may ask for larger ones.
+    pub(super) fn of_viewers(&self, node: &Costs) -> Costs {
+        let Some(rated) = self.sessions.rated_costs(self.set_s()) else { return *node };
+        let of = |node_s: f64, rated_s: f64, mean_s: f64| {
+            let ratio = rated_s / mean_s;
+            if ratio.is_finite() && rated_s != mean_s { node_s * ratio } else { node_s }
+        };
+        let mean = &self.costs;
+        Costs {
+            direct_view_s: of(node.direct_view_s, rated.direct_view_s, mean.direct_view_s),
+            reconstruct_view_s: of(node.reconstruct_view_s, rated.reconstruct_view_s, mean.reconstruct_view_s),
+            encode_view_s: of(node.encode_view_s, rated.encode_view_s, mean.encode_view_s),
+            ..*node
+        }
+    }
+
     /// Nodes that do nothing but serve sessions with a rate, at these mean costs. It does not depend on the policy in force,
     /// which depends on the number of nodes.
     pub(super) fn live_nodes(&self, mean: &Costs) -> f64 {
+        let mean = &self.of_viewers(mean);
         let is_direct = self.sessions.policy_override().policy == PolicyChoice::Direct;
         let direct_s = mean.direct_view_s + mean.encode_view_s;
         let each_s = if is_direct { direct_s } else { direct_s.min(view_s(mean)) };

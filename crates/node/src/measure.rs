@@ -20,6 +20,8 @@ const DIRECT_CALL_S: f64 = 1.0;
 
 /// Measures g_s, g_v, c, d and e one after the other. Time that other work has the device does not count.
 pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Measured, Status> {
+    // Work that arrives meanwhile goes between slices of a measurement that nobody waits for.
+    let _cut = request.in_background.then(|| engine.live_stream());
     let class = if request.in_background { WorkClass::Background } else { WorkClass::Batch };
     Measurement { engine, turn: Turn { class, flow: Turn::next_flow() } }.costs(request)
 }

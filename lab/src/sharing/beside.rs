@@ -11,13 +11,16 @@ use super::viewer::{Viewer, Watched};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Row {
     pub(super) watched: Watched,
-    /// The guest's time beside the viewer.
+    /// The guest's time beside the viewer, at its first visit.
+    pub(super) first_s: f64,
+    /// The same once all is warm.
     pub(super) beside_s: f64,
     /// The guest's time alone, with all that is made once made.
     pub(super) alone_s: f64,
 }
 
-/// Measures one guest: alone until all is warm, beside the viewer, and alone again.
+/// Measures one guest beside the viewer, twice: its first visit has costs measured and samples taken, its second is timed.
+/// Then the guest is timed alone.
 ///
 /// # Errors
 /// A client is refused, or its frames end.
@@ -27,10 +30,14 @@ pub(super) async fn measure(coordinator: &str, guest: &Guest, repeats: usize) ->
     for _ in 0..repeats {
         let viewer = Viewer::start(coordinator, &offers[0], PolicyChoice::Pipeline).await?;
         let since_s = viewer.now_s();
-        let visited = guest.visit(coordinator, &offers).await;
+        let visits = async {
+            let first_s = guest.visit(coordinator, &offers).await?;
+            Ok::<_, anyhow::Error>((first_s, guest.visit(coordinator, &offers).await?))
+        };
+        let visits = visits.await;
         let watched = viewer.stop(since_s).await?;
-        let beside_s = visited?;
-        rows.push(Row { watched, beside_s, alone_s: guest.visit(coordinator, &offers).await? });
+        let (first_s, beside_s) = visits?;
+        rows.push(Row { watched, first_s, beside_s, alone_s: guest.visit(coordinator, &offers).await? });
     }
     Ok(median(&rows))
 }
@@ -53,6 +60,7 @@ pub(super) fn median(rows: &[Row]) -> Row {
             longest_gap_s: of(|row| row.watched.longest_gap_s),
             shown_share: of(|row| row.watched.shown_share),
         },
+        first_s: of(|row| row.first_s),
         beside_s: of(|row| row.beside_s),
         alone_s: of(|row| row.alone_s),
     }

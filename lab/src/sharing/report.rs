@@ -24,11 +24,11 @@ pub(super) struct Measured {
 /// Adds the table and the checks.
 pub(super) fn add(measured: &Measured, report: &mut Report) -> anyhow::Result<()> {
     let columns =
-        [("beside the viewer", ""), ("longest gap", "s"), ("poses shown", "%"), ("beside", "s"), ("alone", "s")];
+        [("beside the viewer", ""), ("longest gap", "s"), ("poses shown", "%"), ("first visit", "s"), ("beside", "s"), ("alone", "s")];
     let mut table = Table::new("A viewer beside other clients", &columns);
     for (name, row) in &measured.rows {
-        let numbers = row.map_or([f64::NAN; 4], |row| {
-            [row.watched.longest_gap_s, row.watched.shown_share * 100.0, row.beside_s, row.alone_s]
+        let numbers = row.map_or([f64::NAN; 5], |row| {
+            [row.watched.longest_gap_s, row.watched.shown_share * 100.0, row.first_s, row.beside_s, row.alone_s]
         });
         table.push([Cell::from(*name)].into_iter().chain(numbers.map(Cell::from)))?;
         report.checks.extend(checks(name, *row));

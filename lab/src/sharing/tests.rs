@@ -35,6 +35,7 @@ fn a_viewer_that_sees_nothing_has_one_long_gap() {
 fn each_figure_has_its_own_median() {
     let row = |s: f64, share: f64| Row {
         watched: Watched { longest_gap_s: s, shown_share: share },
+        first_s: 3.0 * s,
         beside_s: 2.0 * s,
         alone_s: s,
     };

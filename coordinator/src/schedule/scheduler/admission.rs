@@ -128,7 +128,9 @@ fn promised(workload: &WorkloadState, nodes: &[NodeCosts]) -> f64 {
     }
     let load = workload.rated_load();
     let policy_override = workload.sessions.policy_override().possible(&load, nodes.len());
-    let choice = choose(&Demand { load, nodes, policy_override, current: None });
+    let of_viewers = |node: &NodeCosts| NodeCosts { costs: workload.of_viewers(&node.costs), ..*node };
+    let nodes: Vec<NodeCosts> = nodes.iter().map(of_viewers).collect();
+    let choice = choose(&Demand { load, nodes: &nodes, policy_override, current: None });
     // Nodes that can do none of it do not work for it.
     choice.map_or(0.0, |choice| workload.utilisation_at_last(choice.time_s()))
 }
