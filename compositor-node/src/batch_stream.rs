@@ -68,7 +68,8 @@ impl<'a> BatchStream<'a> {
     /// Enqueues the views of every view cell as its images arrive; those of several cells are fetched at once.
     async fn enqueue(&mut self, request: RenderViews) -> Result<(), Status> {
         let (arrived, shared) = (Instant::now(), &self.client.shared);
-        let plan = shared.of_compositor(shared.plans.require(request.workload_number, request.plan_epoch)?, &request.method)?;
+        let plan = shared
+            .of_compositor(shared.plans.require(request.workload_number, request.plan_epoch)?, &request.method)?;
         let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
         for view in &request.views {
             cells.entry(plan.cell_of(&view.camera)).or_default().push(*view);

@@ -102,7 +102,8 @@ impl Rendering {
                 engine.draw_direct(&work, turn).map(|views| (Operation::DirectView, views))
             }
         };
-        let (made, busy_s) = blocking(move || Ok::<_, Status>(own_time(engine.as_ref(), || make(engine.as_ref())))).await?;
+        let (made, busy_s) =
+            blocking(move || Ok::<_, Status>(own_time(engine.as_ref(), || make(engine.as_ref())))).await?;
         let (operation, views) = made?;
         if views.len() == count {
             Ok((operation, views, busy_s))

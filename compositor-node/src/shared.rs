@@ -52,7 +52,11 @@ impl Shared {
         if plan.composites(&self.plans.node_name) {
             self.sets.check_method(&plan, method)?;
             let is_as_planned = method != DIRECT || plan.policy == Policy::Direct;
-            return Ok(if is_as_planned { plan } else { Arc::new(Assignment { policy: Policy::Direct, ..(*plan).clone() }) });
+            return Ok(if is_as_planned {
+                plan
+            } else {
+                Arc::new(Assignment { policy: Policy::Direct, ..(*plan).clone() })
+            });
         }
         let (name, plan_epoch) = (&self.plans.node_name, plan.plan_epoch);
         Err(Status::failed_precondition(format!("{name} makes no views in plan_epoch {plan_epoch}")))

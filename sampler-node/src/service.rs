@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 
 use cluster::{Assignment, FetchImages, SetContent};
 use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
-use node::{ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Relay, SampleWork, Turn};
+use node::{
+    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Relay, SampleWork, Turn,
+};
 use node::{WorkClass, beyond_timeline, blocking, has_set, most_image_bytes, own_time, until_drained, with_guard};
 use parking_lot::Mutex;
 use tokio::sync::mpsc;

@@ -76,7 +76,7 @@ impl SessionMix {
         self.0.iter().flat_map(|session| session.viewpoints.iter().copied()).collect()
     }
 
-    fn rated(&self) -> impl Iterator<Item = &Session> {
+    fn rated(&self) -> impl Iterator<Item = &Session> + Clone {
         self.0.iter().filter(|session| session.frames_per_s.is_some())
     }
 

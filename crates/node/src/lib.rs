@@ -23,7 +23,10 @@ pub use blocking::blocking;
 pub use byte_cache::{ByteCache, Pinned};
 pub use config::{Deadlines, NodeConfig, Quotas};
 pub use connections::Connections;
-pub use engine::{DeviceLossMonitor, DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, own_time};
+pub use engine::{
+    DeviceLossMonitor, DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass,
+    own_time,
+};
 pub use membership::keep_membership;
 pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};
 pub use scenes::Scenes;

@@ -80,11 +80,7 @@ impl Measurement<'_> {
     }
 
     /// The cost of one view over all typical views, in calls of the batch's size; with some of the views.
-    fn reconstruct_view_s(
-        &self,
-        set: &dyn UploadedSet,
-        request: &MeasureCosts,
-    ) -> Result<(Vec<View>, f64), Status> {
+    fn reconstruct_view_s(&self, set: &dyn UploadedSet, request: &MeasureCosts) -> Result<(Vec<View>, f64), Status> {
         let batch = request.batch_count as usize;
         let views = request.views(request.batch_count.max(request.typical_views.len() as u32));
         let work = |cameras: &[PinholeCamera]| ViewWork {
@@ -93,8 +89,7 @@ impl Measurement<'_> {
             planes: request.planes,
         };
         let calls: Vec<ViewWork> = views.chunks(batch.max(1)).map(work).collect();
-        let make =
-            || calls.iter().try_fold(Vec::new(), |_, work| Ok(self.engine.reconstruct(set, work, self.turn)?));
+        let make = || calls.iter().try_fold(Vec::new(), |_, work| Ok(self.engine.reconstruct(set, work, self.turn)?));
         let (made, seconds) = self.timed(make)?;
         Ok((made, seconds / views.len() as f64))
     }

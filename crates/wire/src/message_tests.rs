@@ -319,9 +319,15 @@ fn bad_counts_are_refused_by_field() {
 fn other_versions_are_refused_before_anything_else() {
     for version in [0, PROTOCOL_VERSION + 1] {
         let message = proto::OpenSessionRequest { protocol_version: version, ..proto::OpenSessionRequest::default() };
-        assert!(refusal::<_, SessionRequest>(message).contains(&format!("protocol_version is {version}, must be {PROTOCOL_VERSION}")));
+        assert!(
+            refusal::<_, SessionRequest>(message)
+                .contains(&format!("protocol_version is {version}, must be {PROTOCOL_VERSION}"))
+        );
         let message = proto::JoinClusterRequest { protocol_version: version, ..proto::JoinClusterRequest::default() };
-        assert!(refusal::<_, JoinCluster>(message).contains(&format!("protocol_version is {version}, must be {PROTOCOL_VERSION}")));
+        assert!(
+            refusal::<_, JoinCluster>(message)
+                .contains(&format!("protocol_version is {version}, must be {PROTOCOL_VERSION}"))
+        );
     }
     let error = read::<JoinCluster, _>(proto::JoinClusterRequest::default()).unwrap_err();
     assert_eq!(tonic::Status::from(error).code(), tonic::Code::FailedPrecondition);

@@ -23,8 +23,14 @@ pub(super) struct Measured {
 
 /// Adds the table and the checks.
 pub(super) fn add(measured: &Measured, report: &mut Report) -> anyhow::Result<()> {
-    let columns =
-        [("beside the viewer", ""), ("longest gap", "s"), ("poses shown", "%"), ("first visit", "s"), ("beside", "s"), ("alone", "s")];
+    let columns = [
+        ("beside the viewer", ""),
+        ("longest gap", "s"),
+        ("poses shown", "%"),
+        ("first visit", "s"),
+        ("beside", "s"),
+        ("alone", "s"),
+    ];
     let mut table = Table::new("A viewer beside other clients", &columns);
     for (name, row) in &measured.rows {
         let numbers = row.map_or([f64::NAN; 5], |row| {

@@ -1,8 +1,8 @@
 //! The device's queue: work waits for its turn, and long work is cut into slices while somebody watches.
 
+use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::cell::Cell;
 use std::time::Instant;
 
 use parking_lot::{Condvar, Mutex, MutexGuard};

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use app_core::exit::BadInput;
 use app_core::delivery::{at_rate, open, request, viewpoints};
+use app_core::exit::BadInput;
 use client::{Client, Session};
 use cluster::{OfferStatus, SessionRequest, Timeline};
 use depth_image::PinholeCamera;
