@@ -50,7 +50,7 @@ impl LiveView {
     }
 
     /// The next frame. Its number is above that of the one before; those between were replaced by newer poses. Cancellation
-    /// loses no frame.
+    /// loses no frame. A frame from a neighbouring view cell is followed by another of the same pose.
     ///
     /// # Errors
     /// For an invalid request, no room anywhere, a session that has ended, and a plan without a compositor that answers.
@@ -60,6 +60,11 @@ impl LiveView {
         let frame = self.frames.recv().await.ok_or_else(over)??;
         let number = frame.frame.request.frame;
         self.newest.send_modify(|newest| newest.taken = number);
+        // A viewer that rests would see a neighbouring cell's picture for ever.
+        if frame.frame.header.is_neighbour_cell && number == self.last {
+            let ViewRequest { camera, set_index, .. } = frame.frame.request;
+            self.set_pose(camera, set_index)?;
+        }
         Ok(frame)
     }
 }

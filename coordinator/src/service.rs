@@ -122,13 +122,16 @@ impl Coordinator for CoordinatorService {
         let WorkReport {
             node_name,
             plan_epoch,
-            workload_number: _,
+            workload_number,
             costs,
             busy_s,
             views,
             dropped_views,
-            viewpoints: _,
+            viewpoints,
         } = request;
+        if self.shared.with_scheduler(|scheduler| scheduler.follows_viewers(workload_number)) {
+            self.shared.step(Event::ViewersMoved { workload_number, node_name: node_name.clone(), viewpoints });
+        }
         self.shared.step(Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views });
         Ok(())
     }

@@ -19,6 +19,10 @@ use crate::workload::workload_of;
 const MEASURED_BATCH: u32 = 32;
 /// How long one node may measure.
 const MEASURED_WITHIN: Duration = Duration::from_secs(600);
+/// Predicted costs are measured when nodes have had little to do for so long.
+const IDLE_FOR: Duration = Duration::from_secs(5);
+/// Nodes that are busy for so long are not waited for: other work goes first anyway.
+const BUSY_FOR: Duration = Duration::from_secs(120);
 /// Attempts to measure costs where nodes are lost meanwhile.
 const ATTEMPTS: usize = 11;
 
@@ -112,6 +116,13 @@ fn known(shared: &Shared, of: impl Fn(&str) -> Option<Measured>) -> Option<Measu
 /// Measures what was predicted, one size at a time: the next session of this size finds it.
 async fn measured_in_background(shared: Arc<Shared>, measurement: MeasureCosts) {
     let _one = shared.measuring_in_background.lock().await;
+    let give_up = tokio::time::Instant::now() + BUSY_FOR;
+    loop {
+        tokio::time::sleep(IDLE_FOR).await;
+        if shared.is_idle() || tokio::time::Instant::now() > give_up {
+            break;
+        }
+    }
     let measurement = MeasureCosts { in_background: true, ..measurement };
     let (events, _unread) = tokio::sync::mpsc::channel(1);
     if let Err(status) = measured(&shared, &measurement, &events).await {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use cluster::{ClusterStatus, SessionEvent};
+use cluster::{ClusterStatus, NodeCondition, SessionEvent};
 use node::Connections;
 use parking_lot::Mutex;
 use tokio::sync::Notify;
@@ -15,6 +15,9 @@ use crate::membership::MembershipRegistry;
 use crate::observers::Observers;
 use crate::schedule::{Command, Event, Scheduler};
 use crate::sessions::SessionRegistry;
+
+/// The share of its time that an idle node may work.
+const MOST_IDLE_RATIO: f64 = 0.2;
 
 pub(crate) struct Shared {
     pub(crate) config: CoordinatorConfig,
@@ -76,6 +79,12 @@ impl Shared {
 
     pub(crate) fn status(&self) -> ClusterStatus {
         self.with_scheduler(Scheduler::status)
+    }
+
+    /// Whether the nodes have little to do.
+    pub(crate) fn is_idle(&self) -> bool {
+        let is_busy = |condition: &NodeCondition| condition.busy_ratio > MOST_IDLE_RATIO;
+        !self.status().workloads.iter().any(|workload| workload.conditions.iter().any(is_busy))
     }
 
     /// A session whose client does not read its events is closed.

@@ -76,7 +76,9 @@ fn a_cell_without_viewpoints_is_removed() {
         step(&mut scheduler, Event::ViewpointsChanged { session: 1, viewpoints: vec![view(0.0), view(2.0)] });
     assert!(matches!(&commands[..], [Command::Apply { .. }]));
     assert_eq!((cells(&scheduler), contents(&scheduler)[0]), (vec![1, 1], before[0]));
-    step(&mut scheduler, Event::ViewpointsChanged { session: 1, viewpoints: vec![view(2.0)] });
+    let gone = Event::ViewpointsChanged { session: 1, viewpoints: vec![view(2.0)] };
+    assert_eq!(step(&mut scheduler, gone), [], "within a second of the last change");
+    scheduler.step(Duration::from_secs(2), Event::Tick);
     assert_eq!(cells(&scheduler), [1]);
     assert_ne!(contents(&scheduler), before);
     assert_eq!(
@@ -132,4 +134,29 @@ fn too_many_cells_are_refused_and_given_sample_cameras_are_kept() {
     let commands = step(&mut scheduler, looking_from(2, spread(1)));
     assert!(matches!(&commands[..], [.., Command::Apply { sessions, .. }] if sessions == &[2]), "{commands:?}");
     assert!(scheduler.has_session(1), "beside the other");
+}
+
+#[test]
+fn cells_follow_live_viewers_and_change_once_a_second_at_most() {
+    let mut scheduler = of(4);
+    step(&mut scheduler, looking_from(1, vec![view(0.0)]));
+    let number = plan(&scheduler).workload_number;
+    let seen = |azimuth_rad| Event::ViewersMoved {
+        workload_number: number,
+        node_name: "n1".to_owned(),
+        viewpoints: vec![view(azimuth_rad)],
+    };
+    let (mut plans, mut now) = (Vec::new(), Duration::from_secs(10));
+    for tenth in 0..100 {
+        now += Duration::from_millis(100);
+        let event = if tenth % 3 == 0 { seen(tenth as f32 * 0.06) } else { Event::Tick };
+        let commands = scheduler.step(now, event);
+        plans.extend(commands.iter().filter(|command| matches!(command, Command::Apply { .. })).map(|_| now));
+    }
+    assert!(plans.len() >= 3, "the viewer has gone all around: {plans:?}");
+    assert!(plans.windows(2).all(|pair| pair[1] - pair[0] >= Duration::from_secs(1)), "{plans:?}");
+    assert_eq!(cells(&scheduler).len(), 2, "the session's own cell, and the viewer's");
+    scheduler.step(now, Event::Left { incarnation: 1, node_name: "n1".to_owned() });
+    scheduler.step(now + Duration::from_secs(2), Event::ViewpointsChanged { session: 1, viewpoints: vec![view(0.0)] });
+    assert_eq!(cells(&scheduler).len(), 1, "viewers of a lost node are forgotten");
 }

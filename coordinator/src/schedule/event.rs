@@ -27,6 +27,8 @@ pub enum Event {
     DemandChanged { session: u64, views_per_set: usize, frames_per_s: Option<f64> },
     /// A session looks from these viewpoints, in place of those before.
     ViewpointsChanged { session: u64, viewpoints: Vec<PinholeCamera> },
+    /// A compositor's live viewers are at these viewpoints, in place of those before.
+    ViewersMoved { workload_number: u64, node_name: String, viewpoints: Vec<PinholeCamera> },
     /// A node timed its own work. `busy_s` is the time of all of it.
     Measured { node_name: String, plan_epoch: u64, costs: MeasuredCosts, busy_s: f64, views: u64, dropped_views: u64 },
     /// A node has taken the plan.
@@ -91,6 +93,10 @@ impl Event {
             Self::Opened(opening) => opening.validate(),
             Self::DemandChanged { views_per_set, frames_per_s, .. } => check_demand(*views_per_set, *frames_per_s),
             Self::ViewpointsChanged { viewpoints: changed, .. } => viewpoints(changed),
+            Self::ViewersMoved { node_name, viewpoints: changed, .. } => {
+                nonempty(node_name, "node_name")?;
+                viewpoints(changed)
+            }
             Self::Measured { node_name, costs, busy_s, .. } => {
                 nonempty(node_name, "node_name")?;
                 costs.validate()?;

@@ -6,6 +6,7 @@ mod planning;
 mod sessions;
 mod sharing;
 mod state;
+mod viewers;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -36,6 +37,8 @@ pub struct Scheduler {
     sharing: SharingHysteresis,
     reports: SamplerReports,
     liveness_probed_at: Duration,
+    /// The last plan because viewers had moved.
+    cells_changed_at: Option<Duration>,
 }
 
 impl Default for Scheduler {
@@ -50,6 +53,7 @@ impl Default for Scheduler {
             sharing: SharingHysteresis::default(),
             reports: SamplerReports::default(),
             liveness_probed_at: Duration::ZERO,
+            cells_changed_at: None,
         }
     }
 }
@@ -71,6 +75,9 @@ impl Scheduler {
                 self.demand_changed(session, views_per_set, frames_per_s)
             }
             Event::ViewpointsChanged { session, viewpoints } => self.viewpoints_changed(session, &viewpoints),
+            Event::ViewersMoved { workload_number, node_name, viewpoints } => {
+                self.viewers_moved(workload_number, node_name, viewpoints)
+            }
             Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views } => {
                 self.count_work(&node_name, plan_epoch, busy_s, views, dropped_views);
                 self.measured(&node_name, plan_epoch, &costs)
@@ -170,6 +177,7 @@ impl Scheduler {
     fn tick(&mut self) -> Vec<Command> {
         let mut commands = self.readmit();
         commands.extend(self.share_evenly());
+        commands.extend(self.follow_viewers());
         commands.extend(self.reevaluate_all());
         commands.extend(self.probe_liveness());
         commands

@@ -41,6 +41,10 @@ pub(super) struct WorkloadState {
     active_at: Duration,
     /// A node has taken a plan of it.
     has_been_ready: bool,
+    /// Where live viewers are, as their compositors have said.
+    live_viewpoints: BTreeMap<String, Vec<PinholeCamera>>,
+    /// Viewers have moved since cells were placed.
+    viewers_have_moved: bool,
 }
 
 /// The part of the demand that a plan follows at once.
@@ -66,6 +70,8 @@ impl WorkloadState {
             achieved: Vec::new(),
             active_at: now,
             has_been_ready: false,
+            live_viewpoints: BTreeMap::new(),
+            viewers_have_moved: false,
         };
         workload.change(now, |sessions| sessions.add(opening));
         workload
@@ -105,9 +111,29 @@ impl WorkloadState {
         Workload { planes: if own.contain(other.planes) { own } else { other.planes }, ..other.clone() }
     }
 
-    fn update_cells(&mut self) {
+    /// Where a compositor's live viewers are, in place of where they were.
+    pub(super) fn set_live_viewpoints(&mut self, node: String, viewpoints: Vec<PinholeCamera>) {
+        if viewpoints.is_empty() { self.live_viewpoints.remove(&node) } else { self.live_viewpoints.insert(node, viewpoints) };
+    }
+
+    /// Viewers have moved: cells follow when that is due.
+    pub(super) fn note_movement(&mut self, now: Duration) {
+        self.viewers_have_moved = true;
+        self.note_activity(now);
+    }
+
+    pub(super) fn viewers_have_moved(&self) -> bool {
+        self.viewers_have_moved
+    }
+
+    /// Places cells around the viewpoints of sessions, and of live viewers on nodes that serve it.
+    pub(super) fn update_cells(&mut self) {
+        self.viewers_have_moved = false;
+        self.live_viewpoints.retain(|node, _| self.nodes.contains(node));
         let Some(cells) = &mut self.cells else { return };
-        cells.follow(&self.sessions.viewpoints(), &self.requested.volume);
+        let mut viewpoints = self.sessions.viewpoints();
+        viewpoints.extend(self.live_viewpoints.values().flatten());
+        cells.follow(&viewpoints, &self.requested.volume);
         cells.place_cameras(&mut self.requested);
     }
 

@@ -11,7 +11,7 @@ use scene::SceneSpec;
 use study::Report;
 
 use super::beside::{self, Row, offers};
-use super::guests::GUESTS;
+use super::guests::{GUESTS, Guest};
 use super::report::{self, Measured};
 use super::viewer::path;
 use crate::process::Process;
@@ -94,7 +94,7 @@ async fn measure(args: &SharingArgs) -> anyhow::Result<(Measured, String)> {
     let coordinator = up.address()?;
     let status = client::Client::connect(&coordinator).await?.status().await?;
     let device = status.nodes.first().map_or_else(String::new, |node| node.device_name.clone());
-    let mut rows: Vec<(&'static str, Option<Row>)> = Vec::new();
+    let mut rows: Vec<(&'static Guest, Option<Row>)> = Vec::new();
     for guest in &GUESTS {
         progress.set_message(guest.name);
         // One guest that is refused, or that ends the viewer, hides no other.
@@ -102,7 +102,7 @@ async fn measure(args: &SharingArgs) -> anyhow::Result<(Measured, String)> {
         if let Err(error) = &row {
             tracing::warn!(guest = guest.name, error = format!("{error:#}"), "not measured");
         }
-        rows.push((guest.name, row.ok()));
+        rows.push((guest, row.ok()));
         progress.inc(1);
     }
     progress.set_message("a view of a new size");

@@ -34,7 +34,7 @@ enum Difference {
 const SMALL_PX: UVec2 = UVec2::new(320, 180);
 
 /// All guests, in the order of the report.
-pub(super) const GUESTS: [Guest; 6] = [
+pub(super) static GUESTS: [Guest; 6] = [
     Guest::new("32 views of 1280×720", 32, UVec2::new(1280, 720), Difference::Size),
     Guest::new("another lighting", 32, SMALL_PX, Difference::Lighting),
     Guest::new("another codec", 32, SMALL_PX, Difference::Codec),
@@ -46,6 +46,11 @@ pub(super) const GUESTS: [Guest; 6] = [
 impl Guest {
     const fn new(name: &'static str, views: usize, size_px: UVec2, difference: Difference) -> Self {
         Self { name, views, size_px, difference }
+    }
+
+    /// Whether its views are made from the viewer's samples by the plan's policy.
+    pub(super) fn shares_workload(&self) -> bool {
+        matches!(self.difference, Difference::Size | Difference::Codec)
     }
 
     /// Opens a session, asks for all views, and gives the seconds until the last has come.

@@ -3,6 +3,7 @@
 use study::{Bar, Cell, Check, Report, Table};
 
 use super::beside::Row;
+use super::guests::Guest;
 
 /// The longest time without a new frame.
 const LONGEST_GAP_S: f64 = 1.0;
@@ -15,8 +16,8 @@ const NEW_SIZE_S: f64 = 0.3;
 
 /// All that was measured.
 pub(super) struct Measured {
-    /// Guests by name; `None` where one could not be measured.
-    pub(super) rows: Vec<(&'static str, Option<Row>)>,
+    /// Guests; `None` where one could not be measured.
+    pub(super) rows: Vec<(&'static Guest, Option<Row>)>,
     /// Seconds until the first view of a known size, and of a new one.
     pub(super) new_size_s: [f64; 2],
 }
@@ -32,12 +33,13 @@ pub(super) fn add(measured: &Measured, report: &mut Report) -> anyhow::Result<()
         ("alone", "s"),
     ];
     let mut table = Table::new("A viewer beside other clients", &columns);
-    for (name, row) in &measured.rows {
+    for (guest, row) in &measured.rows {
+        let name = guest.name;
         let numbers = row.map_or([f64::NAN; 5], |row| {
             [row.watched.longest_gap_s, row.watched.shown_share * 100.0, row.first_s, row.beside_s, row.alone_s]
         });
-        table.push([Cell::from(*name)].into_iter().chain(numbers.map(Cell::from)))?;
-        report.checks.extend(checks(name, *row));
+        table.push([Cell::from(name)].into_iter().chain(numbers.map(Cell::from)))?;
+        report.checks.extend(checks(guest, *row));
     }
     report.tables.push(table);
     let [known_s, new_s] = measured.new_size_s;
@@ -54,14 +56,20 @@ pub(super) fn add(measured: &Measured, report: &mut Report) -> anyhow::Result<()
     Ok(())
 }
 
-/// A guest that could not be measured falls short of every bar.
-fn checks(name: &str, row: Option<Row>) -> [Check; 3] {
+/// A guest that could not be measured falls short of every bar. The time of one that shares the viewer's workload has a bar,
+/// for others take nodes of their own.
+fn checks(guest: &Guest, row: Option<Row>) -> Vec<Check> {
+    let name = guest.name;
     let of = |figure: fn(&Row) -> f64, worst: f64| row.as_ref().map_or(worst, figure);
     let [gap, shown, ratio] =
         [": longest gap", ": poses shown", ": beside over alone"].map(|what| format!("{name}{what}"));
-    [
+    let mut checks = vec![
         Check::new(gap, of(|row| row.watched.longest_gap_s, f64::INFINITY), "s", Bar::AtMost(LONGEST_GAP_S)),
         Check::new(shown, of(|row| row.watched.shown_share * 100.0, 0.0), "%", Bar::AtLeast(SHOWN * 100.0)),
-        Check::new(ratio, of(|row| row.beside_s / row.alone_s, f64::INFINITY), "", Bar::AtMost(BESIDE_OVER_ALONE)),
-    ]
+    ];
+    if guest.shares_workload() {
+        let times = of(|row| row.beside_s / row.alone_s, f64::INFINITY);
+        checks.push(Check::new(ratio, times, "", Bar::AtMost(BESIDE_OVER_ALONE)));
+    }
+    checks
 }

@@ -1,7 +1,5 @@
 //! Sessions: opening, closing, and changes of their demand.
 
-use depth_image::PinholeCamera;
-
 use super::Scheduler;
 use crate::schedule::session_mix::SessionMix;
 use crate::schedule::workload_state::{PlanTrigger, WorkloadState};
@@ -37,11 +35,6 @@ impl Scheduler {
     pub(super) fn demand_changed(&mut self, session: u64, views: usize, frames_per_s: Option<f64>) -> Vec<Command> {
         let Some(number) = self.workload_of_session(session) else { return Vec::new() };
         self.change(number, |sessions| sessions.set_demand(session, views, frames_per_s))
-    }
-
-    pub(super) fn viewpoints_changed(&mut self, session: u64, viewpoints: &[PinholeCamera]) -> Vec<Command> {
-        let Some(number) = self.workload_of_session(session) else { return Vec::new() };
-        self.change(number, |sessions| sessions.set_viewpoints(session, viewpoints))
     }
 
     pub(super) fn closed(&mut self, session: u64) -> Vec<Command> {

@@ -1,0 +1,61 @@
+//! View cells follow viewers: where sessions say that they look from, and where compositors see them.
+
+use std::time::Duration;
+
+use depth_image::PinholeCamera;
+
+use super::Scheduler;
+use crate::schedule::Command;
+use crate::schedule::workload_state::WorkloadState;
+
+/// The least time between two plans because viewers have moved, for all sessions together.
+const CELLS_INTERVAL: Duration = Duration::from_secs(1);
+
+impl Scheduler {
+    /// Whether the sample cameras of a workload follow viewpoints.
+    #[must_use]
+    pub fn follows_viewers(&self, workload_number: u64) -> bool {
+        self.workloads.get(&workload_number).is_some_and(|workload| workload.cell_count().is_some())
+    }
+
+    pub(super) fn viewpoints_changed(&mut self, session: u64, viewpoints: &[PinholeCamera]) -> Vec<Command> {
+        let Some(number) = self.workload_of_session(session) else { return Vec::new() };
+        self.moved(number, |workload| workload.sessions.set_viewpoints(session, viewpoints))
+    }
+
+    /// A compositor says where its live viewers are.
+    pub(super) fn viewers_moved(&mut self, number: u64, node: String, viewpoints: Vec<PinholeCamera>) -> Vec<Command> {
+        if !self.follows_viewers(number) || !self.members.contains_key(&node) {
+            return Vec::new();
+        }
+        self.moved(number, |workload| workload.set_live_viewpoints(node, viewpoints))
+    }
+
+    fn moved(&mut self, number: u64, change: impl FnOnce(&mut WorkloadState)) -> Vec<Command> {
+        let now = self.now;
+        let Some(workload) = self.workloads.get_mut(&number) else { return Vec::new() };
+        change(workload);
+        workload.note_movement(now);
+        self.follow_viewers()
+    }
+
+    /// Places cells around the viewpoints of today, where that is due, and plans for those that are new.
+    pub(super) fn follow_viewers(&mut self) -> Vec<Command> {
+        if self.cells_changed_at.is_some_and(|at| self.now.saturating_sub(at) < CELLS_INTERVAL) {
+            return Vec::new();
+        }
+        let moved: Vec<u64> = self.workloads.iter().filter(|(_, w)| w.viewers_have_moved()).map(|(&n, _)| n).collect();
+        let changed = |number: &u64| {
+            let workload = self.workloads.get_mut(number)?;
+            let before = workload.trigger();
+            workload.update_cells();
+            (workload.trigger() != before).then_some(*number)
+        };
+        let changed: Vec<u64> = moved.iter().filter_map(changed).collect();
+        if changed.is_empty() {
+            return Vec::new();
+        }
+        self.cells_changed_at = Some(self.now);
+        changed.into_iter().flat_map(|number| self.replan(number, "sessions look from elsewhere")).collect()
+    }
+}
