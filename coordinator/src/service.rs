@@ -119,16 +119,8 @@ impl Coordinator for CoordinatorService {
     }
 
     async fn report_work(&self, request: WorkReport) -> Result<(), Status> {
-        let WorkReport {
-            node_name,
-            plan_epoch,
-            workload_number,
-            costs,
-            busy_s,
-            views,
-            dropped_views,
-            viewpoints,
-        } = request;
+        let WorkReport { node_name, plan_epoch, workload_number, costs, busy_s, views, dropped_views, viewpoints } =
+            request;
         if self.shared.with_scheduler(|scheduler| scheduler.follows_viewers(workload_number)) {
             self.shared.step(Event::ViewersMoved { workload_number, node_name: node_name.clone(), viewpoints });
         }

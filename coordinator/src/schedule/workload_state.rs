@@ -113,7 +113,11 @@ impl WorkloadState {
 
     /// Where a compositor's live viewers are, in place of where they were.
     pub(super) fn set_live_viewpoints(&mut self, node: String, viewpoints: Vec<PinholeCamera>) {
-        if viewpoints.is_empty() { self.live_viewpoints.remove(&node) } else { self.live_viewpoints.insert(node, viewpoints) };
+        if viewpoints.is_empty() {
+            self.live_viewpoints.remove(&node)
+        } else {
+            self.live_viewpoints.insert(node, viewpoints)
+        };
     }
 
     /// Viewers have moved: cells follow when that is due.

@@ -84,6 +84,14 @@ pub struct Setup {
     pub offer: SceneOffer,
 }
 
+/// The name by which sessions ask for a scene: a built-in scene's own, or a file's without folder and ending.
+fn offer_name(scene: &SceneSpec) -> String {
+    match scene {
+        SceneSpec::File(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        _ => scene.to_string(),
+    }
+}
+
 impl SceneArgs {
     /// Loads the scene and places its sample cameras.
     ///
@@ -104,7 +112,7 @@ impl SceneArgs {
         let samples = self.sampling.cameras(around.clone());
         let package = scene::pack(&scene);
         let offer = SceneOffer {
-            name: self.scene.to_string(),
+            name: offer_name(&self.scene),
             hash: SceneHash::of(&package),
             package: package.into(),
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
