@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use client::{ClientError, Session};
-use cluster::{FetchImages, PolicyChoice, RenderViews, RequestedView, Timeline};
+use cluster::{Assignment, FetchImages, PolicyChoice, RenderViews, RequestedView, Timeline};
 use cluster_tests::cluster::{Cluster, request, rig, views};
 use codec::FrameCodec;
 use depth_image::Camera;
@@ -42,41 +42,40 @@ fn raw_request(session: &Session) -> RenderViews {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn old_plans_are_refused_by_every_service() {
+async fn replaced_plans_are_refused_by_every_service() {
     let cluster = Cluster::start(2).await;
-    let old = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
-    // The workload differs, since sessions of one workload share a plan.
-    let other = cluster::SessionRequest { refinement_steps: 2, ..request(PolicyChoice::Pipeline, MOVING) };
-    let new = cluster.session(other).await.unwrap();
-    let (old_plan, new_plan) = (&old.plan().assignment, &new.plan().assignment);
-    assert!(new_plan.plan_epoch > old_plan.plan_epoch);
-    let compositor = &old_plan.compositors[0].address;
-    assert_eq!(ask(compositor, raw_request(&new)).await.unwrap(), 1);
-    let refused = ask(compositor, raw_request(&old)).await.unwrap_err();
-    assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
-    assert!(refused.message().contains("plan_epoch 1 is not in force"), "{refused}");
+    let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
+    let old = session.plan().assignment;
+    let new = Assignment { plan_epoch: old.plan_epoch + 10, ..old.clone() };
+    let compositor = &old.compositors[0].address;
     let node = NodeClient::new(connect(compositor).await.unwrap());
-    let refused = node.apply_assignment(old_plan.clone()).await.unwrap_err();
-    assert_eq!(refused.code(), Code::FailedPrecondition);
+    let good = raw_request(&session);
+    assert_eq!(ask(compositor, good.clone()).await.unwrap(), 1);
+    node.apply_assignment(new.clone()).await.unwrap();
+    let refused = ask(compositor, good.clone()).await.unwrap_err();
+    assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
+    let replaced = format!("plan_epoch {} of workload {} is not in force", old.plan_epoch, old.workload_number);
+    assert!(refused.message().contains(&replaced), "{refused}");
+    assert_eq!(wire::plan_in_force(&refused), Some(new.clone()), "the refusal names the plan in force");
+    let followed = RenderViews { plan_epoch: new.plan_epoch, ..good };
+    assert_eq!(ask(compositor, followed).await.unwrap(), 1);
+    let refused = node.apply_assignment(old.clone()).await.unwrap_err();
+    assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
     assert_eq!(
-        node.apply_assignment(new_plan.clone()).await.unwrap().plan_epoch,
-        new_plan.plan_epoch,
+        node.apply_assignment(new.clone()).await.unwrap().plan_epoch,
+        new.plan_epoch,
         "the same again is no change"
     );
-    let share = &old_plan.samplers[0];
+    let share = &old.samplers[0];
     let sampler = SamplerClient::new(connect(&share.address).await.unwrap());
-    let fetch = FetchImages {
-        plan_epoch: old_plan.plan_epoch,
-        workload_number: old_plan.workload_number,
+    let unknown = FetchImages {
+        plan_epoch: new.plan_epoch + 10,
+        workload_number: old.workload_number,
         set_index: 0,
         cell: 0,
         image_indices: share.image_indices.clone(),
     };
-    assert_eq!(sampler.fetch_sample_images(fetch).await.err().unwrap().code(), Code::FailedPrecondition);
-    tokio::time::sleep(Duration::from_millis(50)).await;
-    assert!(
-        matches!(old.render_views(views(1, 1)), Err(ClientError::Ended { reason }) if reason.contains("took its place"))
-    );
+    assert_eq!(sampler.fetch_sample_images(unknown).await.err().unwrap().code(), Code::FailedPrecondition);
 }
 
 #[tokio::test(flavor = "multi_thread")]
