@@ -16,7 +16,7 @@ pub enum ClientError {
     /// Nodes did not join in time.
     #[error("{joined} of {wanted} nodes have joined")]
     FewNodes { joined: usize, wanted: usize },
-    /// The plan no longer holds: a node left, or another session took its place.
+    /// The session, or one of its views, is over.
     #[error("the session has ended: {reason}")]
     Ended { reason: String },
     /// A compositor cannot be reached, or refuses.

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use client::{ClientError, Session};
-use cluster::{FetchImages, PolicyChoice, RenderViews, RequestedView, Timeline};
+use cluster::{Assignment, FetchImages, PolicyChoice, RenderViews, RequestedView, Timeline};
 use cluster_tests::cluster::{Cluster, request, rig, views};
 use codec::FrameCodec;
 use depth_image::Camera;
@@ -42,90 +42,40 @@ fn raw_request(session: &Session) -> RenderViews {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn replaced_and_unknown_plans_are_refused_by_every_service() {
+async fn replaced_plans_are_refused_by_every_service() {
     let cluster = Cluster::start(2).await;
     let session = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
-    let old_plan = session.plan().assignment;
-    let new_plan = cluster::Assignment { plan_epoch: old_plan.plan_epoch + 1, ..old_plan.clone() };
-    let (compositor, sampler) = (&old_plan.compositors[0].address, &old_plan.samplers[0]);
+    let old = session.plan().assignment;
+    let new = Assignment { plan_epoch: old.plan_epoch + 10, ..old.clone() };
+    let compositor = &old.compositors[0].address;
     let node = NodeClient::new(connect(compositor).await.unwrap());
-    node.apply_assignment(new_plan.clone()).await.unwrap();
-    let old_request = raw_request(&session);
-    let new_request = RenderViews { plan_epoch: new_plan.plan_epoch, ..old_request.clone() };
-    assert_eq!(ask(compositor, new_request).await.unwrap(), 1);
-    let refused = ask(compositor, old_request).await.unwrap_err();
+    let good = raw_request(&session);
+    assert_eq!(ask(compositor, good.clone()).await.unwrap(), 1);
+    node.apply_assignment(new.clone()).await.unwrap();
+    let refused = ask(compositor, good.clone()).await.unwrap_err();
     assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
-    assert!(refused.message().contains("plan_epoch 1 is not in force"), "{refused}");
-    let refused = node.apply_assignment(old_plan.clone()).await.unwrap_err();
-    assert_eq!(refused.code(), Code::FailedPrecondition);
-    let again = node.apply_assignment(new_plan.clone()).await.unwrap().plan_epoch;
-    assert_eq!(again, new_plan.plan_epoch, "the same again is no change");
-    let sampling = SamplerClient::new(connect(&sampler.address).await.unwrap());
-    let fetch = FetchImages {
-        plan_epoch: new_plan.plan_epoch + 100,
-        workload_number: old_plan.workload_number,
+    let replaced = format!("plan_epoch {} of workload {} is not in force", old.plan_epoch, old.workload_number);
+    assert!(refused.message().contains(&replaced), "{refused}");
+    assert_eq!(wire::plan_in_force(&refused), Some(new.clone()), "the refusal names the plan in force");
+    let followed = RenderViews { plan_epoch: new.plan_epoch, ..good };
+    assert_eq!(ask(compositor, followed).await.unwrap(), 1);
+    let refused = node.apply_assignment(old.clone()).await.unwrap_err();
+    assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
+    assert_eq!(
+        node.apply_assignment(new.clone()).await.unwrap().plan_epoch,
+        new.plan_epoch,
+        "the same again is no change"
+    );
+    let share = &old.samplers[0];
+    let sampler = SamplerClient::new(connect(&share.address).await.unwrap());
+    let unknown = FetchImages {
+        plan_epoch: new.plan_epoch + 10,
+        workload_number: old.workload_number,
         set_index: 0,
         cell: 0,
-        image_indices: sampler.image_indices.clone(),
+        image_indices: share.image_indices.clone(),
     };
-    assert_eq!(sampling.fetch_sample_images(fetch).await.err().unwrap().code(), Code::FailedPrecondition);
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn sessions_of_two_workloads_are_served_side_by_side() {
-    let cluster = Cluster::start(3).await;
-    let first = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
-    // The steps of refinement are part of a workload.
-    let other = cluster::SessionRequest { refinement_steps: 2, ..request(PolicyChoice::Auto, MOVING) };
-    let second = cluster.session(other).await.unwrap();
-    let number = |session: &Session| session.plan().assignment.workload_number;
-    assert_ne!(number(&first), number(&second));
-    for session in [&first, &second, &first] {
-        assert_eq!(frames(session, 8).await, 8);
-    }
-    assert_eq!((first.ended(), second.ended()), (None, None));
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn sessions_that_differ_in_codec_or_method_share_a_workload() {
-    let cluster = Cluster::start(3).await;
-    let first = cluster.session(request(PolicyChoice::Pipeline, MOVING)).await.unwrap();
-    let jpeg = cluster::SessionRequest { codec: "jpeg:85".to_owned(), ..request(PolicyChoice::Pipeline, MOVING) };
-    let direct = cluster::SessionRequest { method: cluster::DIRECT.to_owned(), ..request(PolicyChoice::Auto, MOVING) };
-    for asked in [jpeg, direct] {
-        let other = cluster.session(asked).await.unwrap();
-        let numbers = [&first, &other].map(|session| session.plan().assignment.workload_number);
-        assert_eq!(numbers[0], numbers[1]);
-        assert_eq!(frames(&other, 8).await, 8);
-    }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_workload_beyond_the_limit_is_refused_by_the_limits_name() {
-    let cluster = Cluster::start(2).await;
-    let mut open = Vec::new();
-    for refinement_steps in 1..=8 {
-        let asked = cluster::SessionRequest { refinement_steps, ..request(PolicyChoice::Auto, MOVING) };
-        open.push(cluster.session(asked).await.unwrap());
-    }
-    let ninth = cluster::SessionRequest { refinement_steps: 9, ..request(PolicyChoice::Auto, MOVING) };
-    let refused = cluster.session(ninth).await.unwrap_err();
-    assert!(matches!(&refused, ClientError::Exhausted { .. }), "{refused}");
-    assert!(refused.to_string().contains("--max-workloads"), "{refused}");
-    for session in &open {
-        assert_eq!(frames(session, 2).await, 2);
-    }
-}
-
-/// The number of frames that come of `per_set` views of one set.
-async fn frames(session: &Session, per_set: u32) -> usize {
-    let mut incoming = session.render_views(views(1, per_set)).unwrap();
-    let mut count = 0;
-    while let Some(frame) = incoming.next().await {
-        frame.unwrap();
-        count += 1;
-    }
-    count
+    assert_eq!(sampler.fetch_sample_images(unknown).await.err().unwrap().code(), Code::FailedPrecondition);
 }
 
 #[tokio::test(flavor = "multi_thread")]

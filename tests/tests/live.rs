@@ -223,13 +223,3 @@ async fn sessions_of_one_workload_share_a_plan() {
     cluster.nodes[2].kill();
     check(&sessions[0].render_views(views(3, 4)).unwrap().all().await.unwrap(), 12);
 }
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_session_of_another_workload_ends_the_one_before() {
-    let cluster = Cluster::start(2).await;
-    let old = cluster.session(pipeline(MOVING)).await.unwrap();
-    let new = cluster.session(pipeline(STILL)).await.unwrap();
-    wait_for("the end of the old session", async || old.ended().is_some()).await;
-    assert!(old.render_views(views(1, 1)).is_err());
-    check(&new.render_views(views(1, 6)).unwrap().all().await.unwrap(), 6);
-}

@@ -5,12 +5,15 @@ use std::num::NonZeroU32;
 use std::time::{Duration, Instant};
 
 use client::{ClientError, Frame};
-use cluster::{Assignment, FetchImages, Policy, PolicyChoice, RenderViews, RequestedView, SessionRequest, Timeline};
+use cluster::{
+    Assignment, FetchImages, Policy, PolicyChoice, RenderViews, RequestedView, SessionRequest, Timeline, Workload,
+};
 use cluster_tests::cluster::{Cluster, camera, request, rig, views, whole_frame};
 use cluster_tests::scalar_engine::Pace;
 use codec::{FrameCodec, WholeFrame};
 use glam::UVec2;
 use tokio_stream::StreamExt as _;
+use tonic::{Code, Status};
 use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
@@ -129,9 +132,8 @@ async fn samplers_replace_a_relay_that_is_lost() {
     assert!(start.elapsed() < Duration::from_secs(2), "the next set is not asked of it any more");
 }
 
-/// Another plan arrives while one set is sampled and the next waits.
-#[tokio::test(flavor = "multi_thread")]
-async fn a_set_that_was_not_begun_when_its_plan_ended_is_not_sampled() {
+/// Another plan arrives while one set is sampled and the next waits. Returns how the wait ends, and whether it sampled.
+async fn next_set_under(change: impl Fn(Assignment) -> Assignment) -> (Result<(), Status>, bool) {
     let cluster = Cluster::start(3).await;
     let plan = chained(&cluster).await;
     let share = plan.samplers[0].clone();
@@ -159,12 +161,30 @@ async fn a_set_that_was_not_begun_when_its_plan_ended_is_not_sampled() {
     let waits = fetch(1);
     tokio::time::sleep(Duration::from_millis(100)).await;
     let _ = engine.take_counts();
-    let next = Assignment { plan_epoch: plan.plan_epoch + 1, ..plan.clone() };
+    let next = change(Assignment { plan_epoch: plan.plan_epoch + 1, ..plan.clone() });
     NodeClient::new(connect(&share.address).await.unwrap()).apply_assignment(next).await.unwrap();
     begun.await.unwrap().unwrap();
-    let refused = waits.await.unwrap().unwrap_err();
-    assert!(refused.message().contains("plan_epoch"), "{refused}");
-    assert!(engine.take_counts().is_empty());
+    let waited = waits.await.unwrap();
+    (waited, !engine.take_counts().is_empty())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_set_that_was_not_begun_and_is_in_no_plan_any_more_is_not_sampled() {
+    let (waited, sampled) = next_set_under(|plan| {
+        let timeline = Timeline { start_s: 10.0, ..plan.workload.timeline };
+        Assignment { workload: Workload { timeline, ..plan.workload }, ..plan }
+    })
+    .await;
+    let refused = waited.unwrap_err();
+    assert!(refused.code() == Code::FailedPrecondition && refused.message().contains("set 1"), "{refused}");
+    assert!(!sampled);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_set_that_the_next_plan_has_too_is_sampled() {
+    let (waited, sampled) = next_set_under(|plan| plan).await;
+    waited.unwrap();
+    assert!(sampled);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,0 +1,98 @@
+//! Several workloads are served side by side, and no session ends another.
+#![allow(clippy::unwrap_used)]
+
+use client::{ClientError, Frame, Session};
+use cluster::{DIRECT, Policy, PolicyChoice, Refinement, SessionRequest, Timeline};
+use cluster_tests::cluster::{Cluster, request, views};
+use cluster_tests::picture::fault_of;
+use cluster_tests::scalar_engine::ScalarEngine;
+use codec::FrameCodec;
+use coordinator::CoordinatorConfig;
+
+const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
+
+fn pipeline(timeline: Timeline) -> SessionRequest {
+    request(PolicyChoice::Pipeline, timeline)
+}
+
+/// A workload of its own for each number: the moments differ.
+fn numbered(number: u32) -> SessionRequest {
+    SessionRequest { policy: PolicyChoice::Auto, ..pipeline(Timeline { start_s: 0.1 * f64::from(number), ..MOVING }) }
+}
+
+/// The frames of two views of each set.
+async fn frames_of(session: &Session) -> Vec<Frame> {
+    let frames = session.render_views(views(3, 2)).unwrap().all().await.unwrap();
+    assert_eq!(frames.len(), 6);
+    frames
+}
+
+fn workload_of(session: &Session) -> u64 {
+    session.plan().assignment.workload_number
+}
+
+/// Every frame shows the moment and the refinement of its own session.
+fn shows(frames: &[Frame], timeline: Timeline, refinement: Refinement) {
+    for frame in frames {
+        let scene_time_s = timeline.start_s + timeline.step_s * f64::from(frame.request.set_index);
+        assert_eq!(fault_of(frame, scene_time_s as f32, refinement), None);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sessions_of_two_workloads_are_served_side_by_side() {
+    let cluster = Cluster::start(2).await;
+    let later = Timeline { start_s: 0.5, ..MOVING };
+    let one = cluster.session(pipeline(MOVING)).await.unwrap();
+    let other = cluster.session(pipeline(later)).await.unwrap();
+    assert_ne!(workload_of(&one), workload_of(&other));
+    for _ in 0..2 {
+        let (of_one, of_other) = tokio::join!(frames_of(&one), frames_of(&other));
+        shows(&of_one, MOVING, Refinement::default());
+        shows(&of_other, later, Refinement::default());
+    }
+    assert_eq!((one.ended(), other.ended()), (None, None));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sessions_that_differ_in_codec_or_method_share_a_workload() {
+    let cluster = Cluster::start(2).await;
+    let one = cluster.session(pipeline(MOVING)).await.unwrap();
+    let jpeg = cluster.session(SessionRequest { codec: "jpeg:80".to_owned(), ..pipeline(MOVING) }).await.unwrap();
+    let direct = cluster.session(SessionRequest { method: DIRECT.to_owned(), ..pipeline(MOVING) }).await.unwrap();
+    assert_eq!([workload_of(&jpeg), workload_of(&direct)], [workload_of(&one); 2]);
+    let (of_one, of_jpeg, of_direct) = tokio::join!(frames_of(&one), frames_of(&jpeg), frames_of(&direct));
+    shows(&of_one, MOVING, Refinement::default());
+    assert!(of_jpeg.iter().all(|frame| frame.header.codec == FrameCodec::Jpeg { quality: 80 }));
+    assert_eq!(of_direct.len(), of_one.len());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_pipeline_serves_direct_views() {
+    let cluster = Cluster::start(2).await;
+    let session = cluster.session(SessionRequest { method: DIRECT.to_owned(), ..pipeline(MOVING) }).await.unwrap();
+    assert_eq!(session.plan().assignment.policy, Policy::Pipeline);
+    let reconstructed = || cluster.engines.iter().map(ScalarEngine::take_reconstructed).sum::<usize>();
+    // Those of the measurement.
+    reconstructed();
+    shows(&frames_of(&session).await, MOVING, Refinement::default());
+    assert_eq!(reconstructed(), 0, "each view was drawn from the scene");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_workload_beyond_the_most_is_refused_and_the_others_go_on() {
+    let cluster = Cluster::start(2).await;
+    let most = CoordinatorConfig::default().max_workloads as u32;
+    let mut sessions = Vec::new();
+    for number in 0..most {
+        sessions.push(cluster.session(numbered(number)).await.unwrap());
+    }
+    let refused = cluster.session(numbered(most)).await.unwrap_err();
+    assert!(matches!(&refused, ClientError::Exhausted { reason } if reason.contains("--max-workloads")), "{refused}");
+    let shared = cluster.session(numbered(0)).await.unwrap();
+    assert_eq!(workload_of(&shared), workload_of(&sessions[0]), "an open workload takes more sessions");
+    for (number, session) in (0..).zip(&sessions) {
+        shows(&frames_of(session).await, numbered(number).timeline, Refinement::default());
+        assert_eq!(session.ended(), None);
+    }
+}
