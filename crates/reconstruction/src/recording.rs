@@ -232,6 +232,7 @@ mod tests {
     #[test]
     fn views_are_whole_and_together_where_nobody_watches() {
         let pieces = Pieces::of(5, UVec2::new(33, 21), u64::MAX);
-        assert_eq!((pieces.count(), pieces.rows, pieces.slices().collect::<Vec<_>>()), (5, 21, vec![0..5]));
+        assert_eq!((pieces.count(), pieces.rows), (5, 21));
+        assert!(pieces.slices().eq([0..5]));
     }
 }

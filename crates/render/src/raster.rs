@@ -383,7 +383,8 @@ mod tests {
         let primitives = |slices: &[Vec<Run>]| -> Vec<(usize, u32)> {
             slices.iter().flatten().flat_map(|run| run.indices.clone().map(|index| (run.draw, index))).collect()
         };
-        assert_eq!(slices(runs.clone(), u64::MAX), [runs.clone()]);
+        assert_eq!(slices(runs.clone(), u64::MAX).concat(), runs);
+        assert_eq!(slices(runs.clone(), u64::MAX).len(), 1);
         let cut = slices(runs.clone(), 13);
         assert_eq!(primitives(&cut), primitives(&[runs]));
         let sizes: Vec<usize> = cut.iter().map(|runs| runs.iter().map(|run| run.indices.len()).sum()).collect();
