@@ -207,7 +207,7 @@ mod tests {
         let mut sessions = mix(&[batch, rated(1, &[&a, &b]), rated(2, &[&a, &b, &c])]);
         assert_eq!(sessions.fallbacks(), [a.clone(), b.clone()]);
         sessions.add(&rated(3, &[&a, &c]));
-        assert_eq!(sessions.fallbacks(), [a.clone()]);
+        assert_eq!(sessions.fallbacks(), std::slice::from_ref(&a));
         sessions.add(&rated(4, &[&b]));
         assert_eq!(sessions.fallbacks(), []);
         assert_eq!(mix(&[opening(1, PolicyChoice::Auto, 1)]).fallbacks(), [], "batches have none");

@@ -220,7 +220,7 @@ async fn the_bound_holds_at_each_step_of_any_sequence() {
         let bench = Bench::new(100);
         let (mut waiting, mut pins) = (Vec::new(), Vec::<Pinned<Block>>::new());
         for _ in 0..200 {
-            if next(&mut seed) % 2 == 0 && !pins.is_empty() {
+            if next(&mut seed).is_multiple_of(2) && !pins.is_empty() {
                 pins.swap_remove(next(&mut seed) as usize % pins.len());
             } else if waiting.len() < 10 {
                 let key = next(&mut seed) as u32 % 12;

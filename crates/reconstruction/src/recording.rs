@@ -233,6 +233,7 @@ mod tests {
     fn views_are_whole_and_together_where_nobody_watches() {
         let pieces = Pieces::of(5, UVec2::new(33, 21), u64::MAX);
         assert_eq!((pieces.count(), pieces.rows), (5, 21));
-        assert!(pieces.slices().eq([0..5]));
+        assert_eq!(pieces.slices().collect::<Vec<_>>().len(), 1);
+        assert_eq!(pieces.slices().next(), Some(0..5));
     }
 }
