@@ -69,7 +69,7 @@ mod tests {
     fn work_is_seen() {
         let before = MachineTime::now();
         let mut sum = 0u64;
-        while MachineTime::now().since(&before).client_s < 0.02 {
+        while MachineTime::now().since(&before).client_s < 0.1 {
             sum = std::hint::black_box(sum.wrapping_add(1));
         }
         assert!(MachineTime::now().since(&before).busy_s > 0.0, "{sum}");
