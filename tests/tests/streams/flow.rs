@@ -47,7 +47,7 @@ fn with_two_cells(plan: &Assignment) -> Assignment {
 async fn apply(cluster: &Cluster, plan: &Assignment) {
     for node in &cluster.nodes {
         let node = NodeClient::new(connect(&node.address).await.unwrap());
-        node.apply_assignment(plan.clone()).await.unwrap();
+        node.apply_assignment(plan.clone().into()).await.unwrap();
     }
 }
 
