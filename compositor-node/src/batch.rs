@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, RenderViews, RequestedView, SetContent};
+use cluster::{Assignment, DIRECT, RenderViews, RequestedView, SetContent};
 use codec::{FrameCodec, SampleSetId};
 use depth_image::ViewPlanes;
 use glam::UVec2;
@@ -12,6 +12,7 @@ use node::Pinned;
 use crate::outbox::Reply;
 use crate::quota::Credit;
 use crate::sets::ReadySet;
+use crate::view_times::ViewKind;
 
 /// Views of one call to the device.
 pub(crate) const MAX_BATCH: usize = 64;
@@ -32,6 +33,12 @@ pub(crate) struct BatchKey {
 }
 
 impl BatchKey {
+    /// The kind of these views.
+    pub(crate) fn kind(&self) -> ViewKind {
+        let method = if self.content.is_some() { &self.method } else { DIRECT };
+        ViewKind { workload_number: self.workload_number, method: method.to_owned() }
+    }
+
     /// The most views of one call to the device.
     pub(crate) fn max_views(&self) -> usize {
         (MAX_BATCH_PIXELS / (self.size_px.element_product() as usize).max(1)).clamp(1, MAX_BATCH)

@@ -7,13 +7,11 @@ use std::time::Instant;
 use cluster::{Assignment, RenderViews, RequestedView};
 use node::next_within;
 use tokio::sync::Semaphore;
-use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::Messages;
 
-use crate::batch::{Loaded, MAX_BATCH, Waiting};
+use crate::batch::{MAX_BATCH, Waiting};
 use crate::outbox::Reply;
-use crate::queue::Lane;
 use crate::quota::{Credit, closed};
 use crate::shared::ClientStream;
 
@@ -21,7 +19,7 @@ use crate::shared::ClientStream;
 const STREAM_PIXELS: u32 = 128 << 20;
 /// Views of one stream that are waiting or not sent yet.
 const STREAM_VIEWS: u32 = 256;
-/// View cells of one request whose sets are fetched at once: others wait behind them for memory.
+/// View cells of one request whose sets are fetched at once, where memory has room.
 const CELLS_AHEAD: usize = 8;
 
 pub(crate) struct BatchStream<'a> {
@@ -65,64 +63,67 @@ impl<'a> BatchStream<'a> {
         }
     }
 
-    /// Enqueues the views of every view cell as its images arrive; those of several cells are fetched at once.
+    /// Enqueues the views of one view cell after the other.
     async fn enqueue(&mut self, request: RenderViews) -> Result<(), Status> {
         let (arrived, shared) = (Instant::now(), &self.client.shared);
         let plan = shared
             .of_compositor(shared.plans.require(request.workload_number, request.plan_epoch)?, &request.method)?;
+        shared.check_times(&plan, &request.method, &request.views)?;
         let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
         for view in &request.views {
             cells.entry(plan.cell_of(&view.camera)).or_default().push(*view);
         }
-        let mut sources = JoinSet::new();
-        let mut cells = cells.into_iter();
-        let mut fetch_next = |sources: &mut JoinSet<_>| {
-            let Some((cell, views)) = cells.next() else { return };
-            let (shared, plan, set_index) = (shared.clone(), plan.clone(), request.set_index);
-            sources.spawn(async move { (views, shared.source(&plan, set_index, cell).await) });
-        };
-        (0..CELLS_AHEAD).for_each(|_| fetch_next(&mut sources));
-        // In the order of their arrival: a set that has arrived is in memory, where others may wait for room.
-        while let Some(source) = sources.join_next().await {
-            fetch_next(&mut sources);
-            let (views, set) = source.map_err(|error| Status::internal(error.to_string()))?;
-            self.enqueue_of_cell(&request, &plan, (views, set?), arrived).await?;
+        let cells: Vec<_> = cells.into_iter().collect();
+        for (at, (cell, views)) in cells.iter().enumerate() {
+            // The sets of the next cells are fetched meanwhile, unpinned: one that is not needed yet must not keep out another.
+            let next = cells[at..].iter().take(CELLS_AHEAD).map(|(cell, _)| *cell);
+            shared.begin_to_load(&plan, request.set_index, next);
+            self.enqueue_of_cell(&request, &plan, (*cell, views), arrived).await?;
         }
         Ok(())
     }
 
-    /// Hands over views in pieces of one batch, as credit allows.
+    /// Hands over views in pieces of one batch, as credit allows. Without credit the stream keeps no set in memory, and
+    /// without a set it waits with few credits at most: other streams never wait for one that waits.
     async fn enqueue_of_cell(
         &mut self,
         request: &RenderViews,
         plan: &Arc<Assignment>,
-        (views, set): (Vec<RequestedView>, Loaded),
+        (cell, views): (u32, &[RequestedView]),
         arrived: Instant,
     ) -> Result<(), Status> {
-        let (set_index, cell, mut set) = (request.set_index, set.place.cell, Some(set));
-        for views in views.chunks(MAX_BATCH) {
-            let mut batch = Vec::with_capacity(views.len());
-            for view in views {
-                let credit = match self.try_credit(view)? {
-                    Some(credit) => credit,
-                    None => {
-                        // A view without credit must not keep back those with credit, nor a set in memory.
-                        self.client.queue(Lane::Batch, std::mem::take(&mut batch));
-                        set = None;
-                        self.credit(view).await?
-                    }
-                };
-                self.admitted = true;
-                let loaded = match set.take() {
-                    Some(loaded) => loaded,
-                    None => self.client.shared.source(plan, set_index, cell).await?,
-                };
-                batch.push(Waiting::new((request, *view, arrived), &loaded, self.reply.clone(), credit));
-                set = Some(loaded);
+        let shared = self.client.shared.clone();
+        let (mut left, mut set) = (views, Some(shared.source(plan, request.set_index, cell).await?));
+        while let Some(first) = left.first() {
+            let mut credits = self.try_credits(left)?;
+            if credits.is_empty() {
+                set = None;
+                credits.push(self.credit(first).await?);
+                credits.extend(self.try_credits(&left[1..])?);
             }
-            self.client.queue(Lane::Batch, batch);
+            let loaded = match set.take() {
+                Some(loaded) => loaded,
+                None => shared.source(plan, request.set_index, cell).await?,
+            };
+            let (now, later) = left.split_at(credits.len());
+            let waiting = |(view, credit): (&RequestedView, Credit)| {
+                Waiting::new((request, *view, arrived), &loaded, self.reply.clone(), credit)
+            };
+            self.client.queue(false, now.iter().zip(credits).map(waiting).collect());
+            (left, set) = (later, Some(loaded));
         }
         Ok(())
+    }
+
+    /// The credits of the first views, as many as there is room for and a batch can have.
+    fn try_credits(&mut self, views: &[RequestedView]) -> Result<Vec<Credit>, Status> {
+        let mut credits = Vec::new();
+        for view in views.iter().take(MAX_BATCH) {
+            let Some(credit) = self.try_credit(view)? else { break };
+            self.admitted = true;
+            credits.push(credit);
+        }
+        Ok(credits)
     }
 
     /// `None` where the view must wait; an error where other streams have taken the node's room and this one has had none.
@@ -140,8 +141,12 @@ impl<'a> BatchStream<'a> {
         }
     }
 
+    /// Waits until a part of the stream's room is free. A set that was evicted meanwhile is fetched again for several views.
     async fn credit(&self, view: &RequestedView) -> Result<Credit, Status> {
-        let stream = self.credits.clone().acquire_many_owned(price(view)).await.map_err(closed)?;
+        let part = price(view).max(STREAM_PIXELS / 4);
+        let mut free = self.credits.clone().acquire_many_owned(part).await.map_err(closed)?;
+        let stream = free.split(price(view) as usize).ok_or_else(|| closed(()))?;
+        drop(free);
         Ok(Credit { stream, _node: self.client.shared.quota.view(&view.camera).await? })
     }
 }

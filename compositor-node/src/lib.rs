@@ -5,8 +5,9 @@
 //! the device that memory has room for, and fetches the next ahead; `reports` names samplers that fail.
 //!
 //! Views: `service` answers clients. A `batch_stream` makes every view that is requested, a `live_stream` the newest, whose
-//! `course` tells which cell comes next. Views wait in `queue`, live ones and others in lanes of their own; `render` makes
-//! and encodes them batch by batch, and `outbox` sends them. `quota` bounds them all.
+//! `course` tells which cell comes next. Views wait in `queue`, live ones, long ones and others in lanes of their own; `render`
+//! makes and encodes them batch by batch, and `outbox` sends them. `quota` bounds them all, and `view_times` predicts the
+//! time of each.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod batch;
@@ -26,5 +27,6 @@ mod sets;
 mod shared;
 #[cfg(test)]
 mod test_support;
+mod view_times;
 
 pub use service::CompositorService;

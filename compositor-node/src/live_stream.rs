@@ -20,7 +20,7 @@ use wire::rpc::Messages;
 use crate::batch::{Loaded, Place, Waiting};
 use crate::course::Course;
 use crate::outbox::Reply;
-use crate::queue::{Lane, Viewer};
+use crate::queue::Viewer;
 use crate::quota::{Credit, closed};
 use crate::shared::ClientStream;
 
@@ -151,6 +151,7 @@ impl<'a> LiveStream<'a> {
             return Ok(());
         };
         self.check_number(view.frame)?;
+        self.client.shared.check_times(&plan, &request.method, &request.views)?;
         let cell = plan.cell_of(&view.camera);
         let pose = Pose { request, view, plan, cell, arrived: Instant::now() };
         tracing::debug!(
@@ -355,7 +356,7 @@ impl<'a> LiveStream<'a> {
 
     fn queue(&self, pose: Pose, set: &Loaded, credit: Credit) {
         let requested = (&pose.request, pose.view, pose.arrived);
-        self.client.queue(Lane::Live, vec![Waiting::new(requested, set, self.reply.clone(), credit)]);
+        self.client.queue(true, vec![Waiting::new(requested, set, self.reply.clone(), credit)]);
     }
 
     fn try_credit(&self, view: &RequestedView) -> Option<Credit> {

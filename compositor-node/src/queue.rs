@@ -15,23 +15,34 @@ const SHARED_VIEWS: usize = 8;
 /// Pixels of these views.
 const SHARED_PIXELS: usize = 1 << 20;
 
-/// The ways to the device. Each has one call to it at a time, so that no view of a live stream waits for a call of a batch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The ways to the device. Each has one call to it at a time, so that no view of a live stream waits for a call of a batch,
+/// and none for a long view of another stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Lane {
     /// Views of live streams.
     Live,
+    /// Views of live streams that take long.
+    LongLive,
     /// Views of batches.
     Batch,
+    /// Views of batches that take long.
+    LongBatch,
     /// Views that a request has drawn from the scene, whatever the plan: one at a time.
     Direct,
+}
+
+impl Lane {
+    pub(crate) const ALL: [Self; 5] = [Self::Live, Self::LongLive, Self::Batch, Self::LongBatch, Self::Direct];
+
+    pub(crate) fn is_live(self) -> bool {
+        matches!(self, Self::Live | Self::LongLive)
+    }
 }
 
 /// The views of all streams that wait for the device. Bounded: each view that waits holds a credit.
 #[derive(Default)]
 pub(crate) struct Arrivals {
-    live: WaitingLane,
-    batch: WaitingLane,
-    direct: WaitingLane,
+    lanes: [WaitingLane; Lane::ALL.len()],
     /// Live streams that are open, whether they wait or not: the next pose may come at any time.
     viewers: AtomicUsize,
     /// Batches of the lanes that follow the plan.
@@ -45,16 +56,8 @@ struct WaitingLane {
 }
 
 impl Arrivals {
-    fn lane(&self, lane: Lane) -> &WaitingLane {
-        match lane {
-            Lane::Live => &self.live,
-            Lane::Batch => &self.batch,
-            Lane::Direct => &self.direct,
-        }
-    }
-
     pub(crate) fn push(&self, lane: Lane, stream: u64, views: Vec<Waiting>) {
-        let lane = self.lane(lane);
+        let lane = &self.lanes[lane as usize];
         lane.queue.lock().push(stream, views);
         lane.added.notify_one();
     }
@@ -67,8 +70,7 @@ impl Arrivals {
 
     /// Takes back a stream's views, oldest first.
     pub(crate) fn withdraw(&self, stream: u64) -> VecDeque<Waiting> {
-        let lanes = [&self.live, &self.batch, &self.direct];
-        lanes.into_iter().flat_map(|lane| lane.queue.lock().withdraw(stream)).collect()
+        self.lanes.iter().flat_map(|lane| lane.queue.lock().withdraw(stream)).collect()
     }
 
     /// A count that rises with every batch of the lanes that follow the plan.
@@ -78,12 +80,12 @@ impl Arrivals {
 
     /// Waits for the next batch of a lane.
     pub(crate) async fn next_batch(&self, number: Lane) -> Vec<Waiting> {
-        let waiting = self.lane(number);
+        let waiting = &self.lanes[number as usize];
         loop {
             let has_viewers = self.viewers.load(Ordering::Relaxed) > 0;
             let batch = match number {
                 Lane::Direct => waiting.queue.lock().take_one(),
-                Lane::Live | Lane::Batch => waiting.queue.lock().take_batch(has_viewers),
+                _ => waiting.queue.lock().take_batch(has_viewers),
             };
             if !batch.is_empty() {
                 if number != Lane::Direct {

@@ -13,6 +13,7 @@ use tonic::Status;
 use crate::batch::{Source, Waiting};
 use crate::outbox::Output;
 use crate::queue::{Arrivals, Lane};
+use crate::view_times::ViewTimes;
 
 /// Batches that are being encoded while the device makes the next.
 const BATCHES_BEHIND: usize = 2;
@@ -22,22 +23,24 @@ const BATCHES_BEHIND: usize = 2;
 pub(crate) struct Rendering {
     engine: Arc<dyn Engine>,
     metrics: NodeMetrics,
+    times: Arc<ViewTimes>,
     encoders: Arc<Semaphore>,
-    /// Of all views of this compositor, on a device that may be others' too.
-    flow: u64,
     /// The share of the time for views that are drawn from the scene while others are served.
     direct_share: f64,
 }
 
 impl Rendering {
-    pub(crate) fn new(engine: Arc<dyn Engine>, metrics: NodeMetrics, direct_share: f64) -> Self {
+    pub(crate) fn new(engine: Arc<dyn Engine>, metrics: NodeMetrics, times: Arc<ViewTimes>, direct_share: f64) -> Self {
         let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
-        Self { engine, metrics, encoders, flow: Turn::next_flow(), direct_share }
+        Self { engine, metrics, times, encoders, direct_share }
     }
 
     /// Makes the views of one lane, until it is aborted.
     pub(crate) async fn run(self, arrivals: Arc<Arrivals>, lane: Lane) {
         let behind = Arc::new(Semaphore::new(BATCHES_BEHIND));
+        // Lanes of a class share the device evenly: long views delay others by a slice each.
+        let class = if lane.is_live() { WorkClass::Live } else { WorkClass::Batch };
+        let turn = Turn { class, flow: Turn::next_flow() };
         loop {
             // Before the batch is chosen: views that arrive while frames wait for encoders are newer.
             let Ok(place) = behind.clone().acquire_owned().await else {
@@ -53,7 +56,7 @@ impl Rendering {
             });
             if !batch.is_empty() {
                 let served = arrivals.served();
-                let busy_s = self.render(lane, batch, place).await;
+                let busy_s = self.render(turn, batch, place).await;
                 if lane == Lane::Direct && arrivals.served() > served {
                     tokio::time::sleep(pause(busy_s, self.direct_share)).await;
                 }
@@ -62,11 +65,13 @@ impl Rendering {
     }
 
     /// Gives the seconds that the views had the device.
-    async fn render(&self, lane: Lane, batch: Vec<Waiting>, place: OwnedSemaphorePermit) -> f64 {
+    async fn render(&self, turn: Turn, batch: Vec<Waiting>, place: OwnedSemaphorePermit) -> f64 {
         let (start, metrics) = (Instant::now(), &self.metrics);
-        match self.make(lane, &batch).await {
+        match self.make(turn, &batch).await {
             Ok((operation, views, busy_s)) => {
                 let batch_s = start.elapsed().as_secs_f64();
+                let pixels = batch.iter().map(|view| view.view.camera.pixel_count()).sum();
+                self.times.learn(&batch[0].key.kind(), pixels, busy_s);
                 metrics.done.add(batch[0].key.workload_number, operation, batch.len() as f64, busy_s);
                 metrics.views.inc_by(batch.len() as u64);
                 for view in &batch {
@@ -87,11 +92,10 @@ impl Rendering {
     }
 
     /// Makes the views of a batch, which has one at least; with the seconds that they had the device.
-    async fn make(&self, lane: Lane, batch: &[Waiting]) -> Result<(Operation, Vec<View>, f64), Status> {
+    async fn make(&self, turn: Turn, batch: &[Waiting]) -> Result<(Operation, Vec<View>, f64), Status> {
         let (engine, source, key) = (self.engine.clone(), batch[0].source.clone(), batch[0].key.clone());
         let cameras: Vec<_> = batch.iter().map(|waiting| waiting.view.camera).collect();
         let count = cameras.len();
-        let turn = Turn { class: if lane == Lane::Live { WorkClass::Live } else { WorkClass::Batch }, flow: self.flow };
         let make = move |engine: &dyn Engine| match source {
             Source::Set(set) => {
                 let work = ViewWork { cameras, method: key.method, planes: key.planes };

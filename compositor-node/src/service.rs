@@ -19,6 +19,7 @@ use crate::quota::NodeQuota;
 use crate::render::Rendering;
 use crate::sets::Sets;
 use crate::shared::{ClientStream, Shared};
+use crate::view_times::ViewTimes;
 
 /// The compositor's role.
 pub struct CompositorService {
@@ -40,8 +41,9 @@ impl CompositorService {
     ) -> Self {
         let arrivals = Arc::<Arrivals>::default();
         let mut rendering = JoinSet::new();
-        let renderer = Rendering::new(engine.clone(), metrics.clone(), config.direct_share);
-        for lane in [Lane::Live, Lane::Batch, Lane::Direct] {
+        let times = Arc::new(ViewTimes::new(config.max_view_s));
+        let renderer = Rendering::new(engine.clone(), metrics.clone(), times.clone(), config.direct_share);
+        for lane in Lane::ALL {
             rendering.spawn(renderer.clone().run(arrivals.clone(), lane));
         }
         let sets = Arc::new(Sets::new(engine, plans.clone(), config, metrics.clone()));
@@ -51,6 +53,7 @@ impl CompositorService {
             sets,
             arrivals,
             quota,
+            times,
             deadlines: config.deadlines,
             metrics,
             stream_count: AtomicU64::new(1),

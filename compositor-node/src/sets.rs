@@ -2,7 +2,7 @@
 
 use std::pin::Pin;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use cluster::{Assignment, SetContent, Workload};
 use codec::EncodedDepthImage;
@@ -26,6 +26,8 @@ type BoxFuture<T> = Pin<Box<dyn Future<Output = T> + Send>>;
 
 /// While one set is sent and loaded, samplers should have another to work on.
 const SETS_AHEAD: u32 = 2;
+/// A set that was used within this time is not evicted for that of another cell ahead: a viewer's next pose needs it.
+const RECENTLY: Duration = Duration::from_millis(500);
 
 /// Sets that are fetched before views need them; where samplers take turns, one of each sampler. A timeline may have fewer.
 fn sets_ahead(plan: &Assignment) -> u32 {
@@ -147,21 +149,29 @@ impl Sets {
     /// Where samplers take turns, those of later sets need not wait for this one's.
     fn fetch_ahead(self: &Arc<Self>, plan: &CellPlan, set_index: u32) {
         let last = plan.workload.timeline.set_count.saturating_sub(1);
-        let room = self.cached.max_bytes() / self.most_bytes(plan).max(1);
-        // Sets ahead would evict the sets in use.
-        let ahead = sets_ahead(plan).min(u32::try_from(room.saturating_sub(SETS_IN_USE)).unwrap_or(u32::MAX));
+        let ahead = sets_ahead(plan).min(u32::try_from(self.room_ahead(plan)).unwrap_or(u32::MAX));
         for next in set_index.saturating_add(1)..=last.min(set_index.saturating_add(ahead)) {
             if plan.set_content(next) != plan.set_content(set_index) {
-                self.load_ahead(plan, next);
+                self.begin_to_load(plan, next, Duration::ZERO);
             }
         }
     }
 
-    /// Begins to load a set that no view needs yet, where it has room; gives its content.
+    /// The number of sets ahead for which memory has room: more would evict the sets in use.
+    pub(crate) fn room_ahead(&self, plan: &CellPlan) -> usize {
+        (self.cached.max_bytes() / self.most_bytes(plan).max(1)).saturating_sub(SETS_IN_USE)
+    }
+
+    /// Begins to load the set of a cell that no view needs yet, where it has room; gives its content if it is loaded or
+    /// being loaded.
     pub(crate) fn load_ahead(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Option<SetContent> {
+        self.begin_to_load(plan, set_index, RECENTLY)
+    }
+
+    fn begin_to_load(self: &Arc<Self>, plan: &CellPlan, set_index: u32, recently: Duration) -> Option<SetContent> {
         let content = plan.set_content(set_index)?;
-        self.cached.load_ahead(content, self.most_bytes(plan), self.loading(plan, set_index, content));
-        Some(content)
+        let loading = self.loading(plan, set_index, content);
+        self.cached.load_ahead(content, self.most_bytes(plan), recently, loading).then_some(content)
     }
 
     /// Whether a set is being loaded.

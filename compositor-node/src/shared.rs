@@ -1,19 +1,28 @@
 //! Everything that the streams of one compositor share.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Instant;
 
-use cluster::{Assignment, DIRECT, Policy};
+use cluster::{Assignment, DIRECT, Policy, RequestedView};
 use depth_image::PinholeCamera;
 use node::{CellPlan, Deadlines, NodeMetrics, PlansInForce, beyond_timeline};
 use tonic::Status;
 
-use crate::batch::{Loaded, Place, Source, Waiting};
+use crate::batch::{BatchKey, Loaded, Place, Source, Waiting};
 use crate::outbox::Outbox;
 use crate::queue::{Arrivals, Lane};
 use crate::quota::NodeQuota;
 use crate::sets::Sets;
+use crate::view_times::{ViewKind, ViewTimes};
+
+/// A live view that takes longer has a lane beside that of others.
+const LONG_LIVE_S: f64 = 0.1;
+/// The same for views of batches.
+const LONG_BATCH_S: f64 = 1.0;
+/// Pixels of a view from which on it counts as long where its time is not known yet.
+const LONG_PIXELS: u32 = 1 << 20;
 
 /// The parts that all streams share.
 pub(crate) struct Shared {
@@ -21,6 +30,7 @@ pub(crate) struct Shared {
     pub(crate) sets: Arc<Sets>,
     pub(crate) arrivals: Arc<Arrivals>,
     pub(crate) quota: NodeQuota,
+    pub(crate) times: Arc<ViewTimes>,
     pub(crate) deadlines: Deadlines,
     pub(crate) metrics: NodeMetrics,
     pub(crate) stream_count: AtomicU64,
@@ -35,17 +45,46 @@ pub(crate) struct ClientStream {
 }
 
 impl ClientStream {
-    /// Hands views of one request over to a lane of the device, or to that of views that are drawn whatever the plan.
-    pub(crate) fn queue(&self, lane: Lane, views: Vec<Waiting>) {
-        let lane = if views.first().is_some_and(|view| view.key.method == DIRECT) { Lane::Direct } else { lane };
-        for Waiting { key, view, .. } in &views {
+    /// Hands views over to the lanes of the device.
+    pub(crate) fn queue(&self, is_live: bool, views: Vec<Waiting>) {
+        let mut by_lane = BTreeMap::<Lane, Vec<Waiting>>::new();
+        for waiting in views {
+            let Waiting { key, view, .. } = &waiting;
             tracing::debug!(stream = self.stream, frame = view.frame, set = %key.sample_set_id, "queued");
+            by_lane.entry(self.shared.lane(is_live, key)).or_default().push(waiting);
         }
-        self.shared.arrivals.push(lane, self.stream, views);
+        for (lane, views) in by_lane {
+            self.shared.arrivals.push(lane, self.stream, views);
+        }
     }
 }
 
 impl Shared {
+    fn lane(&self, is_live: bool, key: &BatchKey) -> Lane {
+        let plan = || self.plans.in_force(key.workload_number);
+        if key.method == DIRECT && plan().is_some_and(|plan| plan.policy != Policy::Direct) {
+            return Lane::Direct;
+        }
+        let is_long = |limit_s: f64| match self.times.predicted_s(&key.kind(), key.size_px) {
+            Some(seconds) => seconds > limit_s,
+            None => key.size_px.element_product() > LONG_PIXELS,
+        };
+        match is_live {
+            true if is_long(LONG_LIVE_S) => Lane::LongLive,
+            true => Lane::Live,
+            false if is_long(LONG_BATCH_S) => Lane::LongBatch,
+            false => Lane::Batch,
+        }
+    }
+
+    /// Checks that no view of a request takes too long.
+    pub(crate) fn check_times(&self, plan: &Assignment, method: &str, views: &[RequestedView]) -> Result<(), Status> {
+        let method = if plan.policy == Policy::Direct { DIRECT } else { method };
+        let kind = ViewKind { workload_number: plan.workload_number, method: method.to_owned() };
+        let largest = views.iter().map(|view| view.camera.size_px).max_by_key(|size_px| size_px.element_product());
+        largest.map_or(Ok(()), |size_px| self.times.check(&kind, size_px))
+    }
+
     /// The plan for views by a method, if this node makes views in it. Views that are drawn from the scene ignore the plan's
     /// policy.
     pub(crate) fn of_compositor(&self, plan: Arc<Assignment>, method: &str) -> Result<Arc<Assignment>, Status> {
@@ -76,6 +115,16 @@ impl Shared {
         };
         let place = Place { id, cell, is_neighbour: false, content };
         Ok(Loaded { source, place, wait_s: start.elapsed().as_secs_f64() })
+    }
+
+    /// Begins to fetch the sets of cells, one after the other while memory has room.
+    pub(crate) fn begin_to_load(&self, plan: &Arc<Assignment>, set_index: u32, cells: impl Iterator<Item = u32>) {
+        if plan.policy != Policy::Direct {
+            let plans = cells.map_while(|cell| CellPlan::of(plan, cell).ok());
+            let has_room = |(ahead, plan): &(usize, CellPlan)| *ahead <= self.sets.room_ahead(plan);
+            let plans = plans.enumerate().take_while(has_room);
+            plans.map_while(|(_, plan)| self.sets.load_ahead(&plan, set_index)).for_each(drop);
+        }
     }
 
     /// The source of a place, if it is still there; it is not waited for.

@@ -5,6 +5,7 @@ use std::hash::Hash;
 use std::ops::Deref;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use parking_lot::Mutex;
 use tokio::sync::{Notify, watch};
@@ -55,7 +56,7 @@ type Outcome<V> = Option<Result<Pinned<V>, Status>>;
 
 enum Entry<V> {
     Loading(watch::Receiver<Outcome<V>>),
-    Loaded { held: Arc<Held<V>>, last_use: u64 },
+    Loaded { held: Arc<Held<V>>, last_use: u64, used_at: Instant },
 }
 
 struct State<K, V> {
@@ -167,21 +168,43 @@ where
         ended.ok().flatten().unwrap_or_else(|| Err(Status::internal(format!("loading {} was given up", self.0.what))))
     }
 
-    /// Begins to load a value ahead, where it has room at once.
-    pub fn load_ahead<F>(&self, key: K, most_bytes: usize, load: impl FnOnce() -> F + Send + 'static)
+    /// Begins to load a value ahead, where it has room at once: beside the values that were used within `recently`, and
+    /// while none waits for room. Gives whether the value is loaded or being loaded.
+    pub fn load_ahead<F>(
+        &self,
+        key: K,
+        most_bytes: usize,
+        recently: Duration,
+        load: impl FnOnce() -> F + Send + 'static,
+    ) -> bool
     where
         F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
     {
+        let Ok(_turn) = self.0.turn.try_lock() else { return self.0.state.lock().entries.contains_key(&key) };
         let mut state = self.0.state.lock();
         if state.entries.contains_key(&key) {
-            return;
+            return true;
         }
-        let Some(evicted) = state.make_room(most_bytes, self.0.max_bytes) else { return };
+        let Some(evicted) = state.make_room(most_bytes, self.0.max_bytes, recently) else { return false };
         let (send, outcome) = watch::channel(None);
         state.entries.insert(key.clone(), Entry::Loading(outcome));
         drop(state);
         drop(evicted);
         tokio::spawn(self.clone().load(key, most_bytes, load, send));
+        true
+    }
+
+    /// Evicts all values that are not in use; gives their bytes.
+    pub fn clear_unused(&self) -> usize {
+        let mut state = self.0.state.lock();
+        let before = state.used_bytes;
+        let unused = state.unused(Duration::ZERO);
+        let evicted = state.evict_until(0, &unused);
+        let freed = before - state.used_bytes;
+        drop(state);
+        drop(evicted);
+        self.0.freed.notify_waiters();
+        freed
     }
 
     /// Loads when there is room, unless all that asked for it have left by then.
@@ -236,7 +259,10 @@ where
                     state.entries.remove(key);
                     return Ok(false);
                 }
-                if state.make_room(bytes, max_bytes).is_some() {
+                if let Some(evicted) = state.make_room(bytes, max_bytes, Duration::ZERO) {
+                    // The device may take long to free them.
+                    drop(state);
+                    drop(evicted);
                     return Ok(true);
                 }
             }
@@ -257,7 +283,7 @@ where
         state.entries.remove(key);
         let (outcome, evicted) = match loaded {
             Ok((value, bytes)) => {
-                let evicted = state.make_room(bytes, self.0.max_bytes).unwrap_or_else(|| {
+                let evicted = state.make_room(bytes, self.0.max_bytes, Duration::ZERO).unwrap_or_else(|| {
                     // It exists, larger than it was said to be: it counts, and others wait for it.
                     state.used_bytes += bytes;
                     Vec::new()
@@ -265,7 +291,7 @@ where
                 let held = Arc::new(Held { value, bytes, pins: AtomicUsize::new(0), freed: self.0.freed.clone() });
                 let pinned = Pinned::new(&held);
                 let last_use = state.next_use();
-                state.entries.insert(key.clone(), Entry::Loaded { held, last_use });
+                state.entries.insert(key.clone(), Entry::Loaded { held, last_use, used_at: Instant::now() });
                 (Ok(pinned), evicted)
             }
             Err(status) => (Err(status), Vec::new()),
@@ -286,40 +312,55 @@ impl<K: Clone + Eq + Hash, V> State<K, V> {
     fn loaded(&mut self, key: &K) -> Option<Pinned<V>> {
         let use_now = self.next_use();
         match self.entries.get_mut(key) {
-            Some(Entry::Loaded { held, last_use }) => {
-                *last_use = use_now;
+            Some(Entry::Loaded { held, last_use, used_at }) => {
+                (*last_use, *used_at) = (use_now, Instant::now());
                 Some(Pinned::new(held))
             }
             _ => None,
         }
     }
 
-    /// Takes room for `bytes`, with the values that were evicted for it; `None` where too much is in use.
-    fn make_room(&mut self, bytes: usize, max_bytes: usize) -> Option<Vec<Arc<Held<V>>>> {
+    /// The values that are not in use and were not used within `recently`, the one that was used longest ago first; with
+    /// their bytes.
+    fn unused(&self, recently: Duration) -> Vec<(K, usize)> {
         let unused = self.entries.iter().filter_map(|(key, entry)| match entry {
-            Entry::Loaded { held, last_use } if held.pins.load(Ordering::Acquire) == 0 => {
+            Entry::Loaded { held, last_use, used_at }
+                if held.pins.load(Ordering::Acquire) == 0 && used_at.elapsed() >= recently =>
+            {
                 Some((*last_use, key.clone(), held.bytes))
             }
             _ => None,
         });
-        let mut unused: Vec<(u64, K, usize)> = unused.collect();
-        let evictable: usize = unused.iter().map(|(.., bytes)| bytes).sum();
+        let mut unused: Vec<_> = unused.collect();
+        unused.sort_unstable_by_key(|(last_use, ..)| *last_use);
+        unused.into_iter().map(|(_, key, bytes)| (key, bytes)).collect()
+    }
+
+    /// Takes room for `bytes`, with the values that were evicted for it; `None` where too much is in use.
+    fn make_room(&mut self, bytes: usize, max_bytes: usize, recently: Duration) -> Option<Vec<Arc<Held<V>>>> {
+        let unused = self.unused(recently);
+        let evictable: usize = unused.iter().map(|(_, bytes)| bytes).sum();
         if self.used_bytes - evictable + bytes > max_bytes {
             return None;
         }
-        unused.sort_unstable_by_key(|(last_use, ..)| *last_use);
+        let evicted = self.evict_until(max_bytes.saturating_sub(bytes), &unused);
+        self.used_bytes += bytes;
+        Some(evicted)
+    }
+
+    /// Evicts the first of these values until at most `most_bytes` are used. The caller drops them outside the lock.
+    fn evict_until(&mut self, most_bytes: usize, unused: &[(K, usize)]) -> Vec<Arc<Held<V>>> {
         let mut evicted = Vec::new();
-        for (_, key, freed) in unused {
-            if self.used_bytes + bytes <= max_bytes {
+        for (key, bytes) in unused {
+            if self.used_bytes <= most_bytes {
                 break;
             }
-            self.used_bytes -= freed;
-            if let Some(Entry::Loaded { held, .. }) = self.entries.remove(&key) {
+            self.used_bytes -= bytes;
+            if let Some(Entry::Loaded { held, .. }) = self.entries.remove(key) {
                 evicted.push(held);
             }
         }
-        self.used_bytes += bytes;
-        Some(evicted)
+        evicted
     }
 }
 

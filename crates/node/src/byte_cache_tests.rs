@@ -190,22 +190,66 @@ async fn a_value_counts_by_its_true_size_once_it_is_known() {
 async fn a_value_is_loaded_ahead_only_where_it_has_room_at_once() {
     let bench = Bench::new(20);
     let pinned = bench.get(0, 15).await.unwrap();
-    let ahead = |key: u32| {
+    let ahead = |key: u32, recently: Duration| {
         let existing = bench.existing.clone();
         let load = move || async move {
             existing.fetch_add(10, Ordering::SeqCst);
             Ok((Block { bytes: 10, existing }, 10))
         };
-        bench.cache.load_ahead(key, 10, load);
+        bench.cache.load_ahead(key, 10, recently, load)
     };
-    ahead(1);
+    assert!(!ahead(1, Duration::ZERO));
     settle().await;
     assert!(bench.cache.loaded(&1).is_none());
     drop(pinned);
-    ahead(1);
+    assert!(!ahead(1, Duration::from_secs(3600)), "the other was used just now");
+    settle().await;
+    assert!(bench.cache.loaded(&1).is_none() && bench.cache.loaded(&0).is_some());
+    assert!(ahead(1, Duration::ZERO));
     settle().await;
     assert!(bench.cache.loaded(&1).is_some() && bench.cache.loaded(&0).is_none());
     assert_eq!(bench.cache.loaded_where(|block| block.bytes == 10).len(), 1);
+}
+
+#[tokio::test]
+async fn nothing_is_loaded_ahead_of_those_that_wait_for_room() {
+    let bench = Bench::new(20);
+    let pinned = bench.get(0, 16).await.unwrap();
+    let waiting = bench.wait_for(1, 10);
+    settle().await;
+    let load = || async { Err(Status::internal("it is not begun")) };
+    assert!(!bench.cache.load_ahead(2, 4, Duration::ZERO, load));
+    assert!(bench.cache.load_ahead(0, 16, Duration::ZERO, load), "it is there");
+    drop(pinned);
+    waiting.await.unwrap();
+}
+
+/// A value that looks whether the cache is locked when it is dropped.
+struct Looking(ByteCache<u32, Looking>, Arc<AtomicUsize>);
+
+impl Drop for Looking {
+    fn drop(&mut self) {
+        self.1.fetch_add(1, Ordering::SeqCst);
+        assert!(self.0.0.state.try_lock().is_some(), "the cache is locked");
+    }
+}
+
+#[tokio::test]
+async fn evicted_values_are_dropped_outside_the_lock() {
+    let (cache, dropped) = (ByteCache::new("values", 10), Arc::<AtomicUsize>::default());
+    let get = |key: u32, bytes: usize| {
+        let value = Looking(cache.clone(), dropped.clone());
+        cache.get(key, bytes, move || async move { Ok((value, bytes)) })
+    };
+    get(0, 10).await.unwrap();
+    get(1, 10).await.unwrap();
+    assert_eq!(dropped.load(Ordering::SeqCst), 1);
+    assert_eq!((cache.clear_unused(), cache.used_bytes(), dropped.load(Ordering::SeqCst)), (10, 0, 2));
+    let pinned = get(2, 4).await.unwrap();
+    get(3, 4).await.unwrap();
+    assert_eq!((cache.clear_unused(), cache.used_bytes()), (4, 4), "one is in use");
+    drop(pinned);
+    cache.clear_unused();
 }
 
 fn next(seed: &mut u64) -> u64 {

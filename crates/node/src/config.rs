@@ -22,6 +22,8 @@ pub struct NodeConfig {
     pub set_memory_bytes: usize,
     /// The share of the time that views drawn from the scene by request may take while others are served: above 0, at most 1.
     pub direct_share: f64,
+    /// Seconds that one view may take; one that is predicted to take longer is refused. Above 0.
+    pub max_view_s: f64,
     /// Deadlines of streams.
     pub deadlines: Deadlines,
     /// Bounds on the work in flight.
@@ -41,6 +43,7 @@ impl NodeConfig {
             reflection: false,
             set_memory_bytes: 2 << 30,
             direct_share: 0.1,
+            max_view_s: 120.0,
             deadlines: Deadlines::default(),
             quotas: Quotas::default(),
         }
