@@ -115,7 +115,7 @@ pub struct NodeCondition {
     pub views: u64,
     /// Views not made, or not sent, since it joined.
     pub dropped_views: u64,
-    /// The share of its last report's time that it worked; two operations at a time count twice.
+    /// The share of the last second that it worked, for all workloads; two operations at a time count twice.
     pub busy_ratio: f64,
 }
 
