@@ -3,14 +3,14 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cluster::{Assignment, NodeStatus, Ready, SessionEvent, SessionPlan, SessionStage};
+use cluster::{ApplyPlan, Assignment, NodeStatus, Ready, SessionEvent, SessionPlan, SessionStage};
 use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
 
 use crate::grpc_status::{of_node, refusal, within};
 use crate::probe::probe;
-use crate::schedule::{Command, Event};
+use crate::schedule::{Command, Event, Scheduler};
 use crate::shared::Shared;
 
 /// How long a node may take to load a scene and get ready.
@@ -100,8 +100,11 @@ async fn apply_to(shared: Arc<Shared>, assignment: Assignment, node: NodeStatus)
 
 /// Calls once more where a connection broke: the node may not have received the call.
 async fn call(shared: &Shared, assignment: &Assignment, address: &str) -> Result<Ready, Status> {
-    let apply =
-        async || NodeClient::new(shared.connections.to(address).await?).apply_assignment(assignment.clone()).await;
+    let apply = async || {
+        let node = NodeClient::new(shared.connections.to(address).await?);
+        let open_workloads = shared.with_scheduler(Scheduler::open_workloads);
+        node.apply_assignment(ApplyPlan { assignment: assignment.clone(), open_workloads }).await
+    };
     let start = Instant::now();
     match apply().await {
         Err(status) if is_of_connection(&status) && start.elapsed() < SOON => {

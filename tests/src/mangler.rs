@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cluster::{Assignment, FetchImages, MeasureCosts, Measured, Ready, RenderViews};
+use cluster::{ApplyPlan, FetchImages, MeasureCosts, Measured, Ready, RenderViews};
 use codec::{Chunk, FramePart};
 use node::{ServeError, serve};
 use parking_lot::Mutex;
@@ -115,8 +115,8 @@ impl Node for Front {
         NodeClient::new(connect(&self.node()).await?).measure_costs(request).await
     }
 
-    async fn apply_assignment(&self, assignment: Assignment) -> Result<Ready, Status> {
-        NodeClient::new(connect(&self.node()).await?).apply_assignment(assignment).await
+    async fn apply_assignment(&self, plan: ApplyPlan) -> Result<Ready, Status> {
+        NodeClient::new(connect(&self.node()).await?).apply_assignment(plan).await
     }
 }
 

@@ -51,7 +51,7 @@ async fn replaced_plans_are_refused_by_every_service() {
     let node = NodeClient::new(connect(compositor).await.unwrap());
     let good = raw_request(&session);
     assert_eq!(ask(compositor, good.clone()).await.unwrap(), 1);
-    node.apply_assignment(new.clone()).await.unwrap();
+    node.apply_assignment(new.clone().into()).await.unwrap();
     let refused = ask(compositor, good.clone()).await.unwrap_err();
     assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
     let replaced = format!("plan_epoch {} of workload {} is not in force", old.plan_epoch, old.workload_number);
@@ -59,10 +59,10 @@ async fn replaced_plans_are_refused_by_every_service() {
     assert_eq!(wire::plan_in_force(&refused), Some(new.clone()), "the refusal names the plan in force");
     let followed = RenderViews { plan_epoch: new.plan_epoch, ..good };
     assert_eq!(ask(compositor, followed).await.unwrap(), 1);
-    let refused = node.apply_assignment(old.clone()).await.unwrap_err();
+    let refused = node.apply_assignment(old.clone().into()).await.unwrap_err();
     assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
     assert_eq!(
-        node.apply_assignment(new.clone()).await.unwrap().plan_epoch,
+        node.apply_assignment(new.clone().into()).await.unwrap().plan_epoch,
         new.plan_epoch,
         "the same again is no change"
     );

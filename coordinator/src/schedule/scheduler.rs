@@ -24,6 +24,9 @@ use super::{Command, Event};
 /// Workloads that may be open, unless an event says otherwise.
 const MAX_WORKLOADS: usize = 8;
 
+/// Sessions of a coordinator before open again within this time.
+const RESUMED_WITHIN: Duration = Duration::from_secs(30);
+
 /// Members by name, workloads by number, and the last epoch.
 #[derive(Debug, Clone)]
 pub struct Scheduler {
@@ -39,6 +42,8 @@ pub struct Scheduler {
     liveness_probed_at: Duration,
     /// The last plan because viewers had moved.
     cells_changed_at: Option<Duration>,
+    /// The last time that a node came with a plan of a coordinator before.
+    resumed_at: Option<Duration>,
 }
 
 impl Default for Scheduler {
@@ -54,6 +59,7 @@ impl Default for Scheduler {
             reports: SamplerReports::default(),
             liveness_probed_at: Duration::ZERO,
             cells_changed_at: None,
+            resumed_at: None,
         }
     }
 }
@@ -124,7 +130,9 @@ impl Scheduler {
     /// The later of two processes with one name counts. A node's epoch may be above ours where the coordinator was
     /// restarted: plans go on above it.
     fn joined(&mut self, incarnation: u64, join: JoinCluster) -> Vec<Command> {
-        self.plan_epoch = self.plan_epoch.max(join.plan_epoch);
+        if join.plan_epoch > self.plan_epoch {
+            (self.plan_epoch, self.resumed_at) = (join.plan_epoch, Some(self.now));
+        }
         let name = join.node.node_name.clone();
         let mut member = Member::new(self.now, incarnation, join.node);
         self.workloads.iter().for_each(|(&number, workload)| member.expect(number, &workload.costs));

@@ -130,6 +130,21 @@ fn a_session_of_another_workload_opens_beside_the_others() {
 }
 
 #[test]
+fn workloads_that_have_ended_are_told_apart_from_those_of_a_coordinator_before() {
+    let mut cluster = Cluster::of(2);
+    cluster.open(of(4, 1));
+    cluster.open(of(3, 2));
+    assert_eq!(cluster.scheduler.open_workloads(), [1, 2]);
+    cluster.step(Event::Closed { session: 1 });
+    assert_eq!(cluster.scheduler.open_workloads(), [2]);
+    cluster.step(join("n2", 2, 90));
+    assert!(cluster.scheduler.open_workloads().is_empty(), "the node has seen plans of another coordinator");
+    cluster.now += Duration::from_secs(30);
+    cluster.step(Event::Tick);
+    assert_eq!(cluster.scheduler.open_workloads(), [2]);
+}
+
+#[test]
 fn a_lost_node_concerns_the_workload_that_it_served() {
     let mut cluster = Cluster::of(4);
     cluster.open(of(4, 1));

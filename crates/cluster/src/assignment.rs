@@ -55,6 +55,34 @@ pub struct Assignment {
     pub relay_fanout: Option<NonZeroU32>,
 }
 
+/// A plan on its way to a node, and the workloads that are open when it is sent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ApplyPlan {
+    /// The plan.
+    pub assignment: Assignment,
+    /// Numbers of all open workloads. Empty: a coordinator that has just started does not know them yet.
+    pub open_workloads: Vec<u64>,
+}
+
+impl ApplyPlan {
+    /// Whether a workload has ended. Numbers are above all epochs before them: one above this plan's is of a workload that
+    /// may have begun since.
+    #[must_use]
+    pub fn has_ended(&self, workload_number: u64) -> bool {
+        !self.open_workloads.is_empty()
+            && workload_number <= self.assignment.plan_epoch
+            && workload_number != self.assignment.workload_number
+            && !self.open_workloads.contains(&workload_number)
+    }
+}
+
+impl From<Assignment> for ApplyPlan {
+    /// Of an unknown number of workloads.
+    fn from(assignment: Assignment) -> Self {
+        Self { assignment, open_workloads: Vec::new() }
+    }
+}
+
 impl Assignment {
     /// The cameras of all images that are sampled: of the set's images, or of their tiles.
     #[must_use]

@@ -6,7 +6,7 @@ use depth_image::{Camera, Environment, PinholeCamera};
 use glam::Vec3;
 
 use crate::test_support::{assignment, camera, workload};
-use crate::{Assignment, CompositorShare, Policy, Refinement, SamplerShare, Timeline, Workload};
+use crate::{ApplyPlan, Assignment, CompositorShare, Policy, Refinement, SamplerShare, Timeline, Workload};
 
 fn refusal(plan: &Assignment) -> String {
     plan.validate().expect_err("refused").to_string()
@@ -148,6 +148,17 @@ fn the_plan_of_a_cell_has_the_images_of_that_cell_alone() {
     assert_eq!(plan.of_cell(3), None);
     let one = assignment();
     assert_eq!((one.of_cell(0), one.of_cell(1)), (Some(one.clone()), None));
+}
+
+#[test]
+fn a_plan_tells_which_workloads_have_ended() {
+    let told = ApplyPlan { open_workloads: vec![1, 3], ..ApplyPlan::from(assignment()) };
+    assert_eq!((told.assignment.plan_epoch, told.assignment.workload_number), (4, 3));
+    let ended: Vec<u64> = (1..7).filter(|&number| told.has_ended(number)).collect();
+    assert_eq!(ended, [2, 4], "later ones may have begun since");
+    let own = ApplyPlan { open_workloads: vec![1], ..told };
+    assert!(own.has_ended(2) && !own.has_ended(3), "it has a plan");
+    assert!(!ApplyPlan::from(assignment()).has_ended(2), "nothing is known");
 }
 
 #[test]

@@ -23,7 +23,7 @@ mod assignment_tests;
 #[cfg(test)]
 mod test_support;
 
-pub use assignment::{Assignment, CompositorShare, SamplerShare};
+pub use assignment::{ApplyPlan, Assignment, CompositorShare, SamplerShare};
 pub use check::{
     InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints,
 };

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use cluster::{Assignment, MeasureCosts, Measured, Ready};
+use cluster::{ApplyPlan, MeasureCosts, Measured, Ready};
 use parking_lot::Mutex;
 use tonic::{Status, async_trait};
 use wire::rpc;
@@ -54,7 +54,7 @@ impl rpc::Node for NodeService {
         Ok(measured)
     }
 
-    async fn apply_assignment(&self, assignment: Assignment) -> Result<Ready, Status> {
+    async fn apply_assignment(&self, ApplyPlan { assignment, .. }: ApplyPlan) -> Result<Ready, Status> {
         self.plans.admits(&assignment)?;
         let (plan_epoch, workload_number) = (assignment.plan_epoch, assignment.workload_number);
         let scene_load_s = self.scenes.ensure(&assignment.workload.scene).await?;

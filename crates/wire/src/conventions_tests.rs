@@ -6,9 +6,9 @@ use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 
 /// Endings of the names of numbers; counts and indices are units, too.
-const UNITS: [&str; 18] = [
-    "_m", "_per_m", "_s", "_px", "_bytes", "_count", "_epoch", "_index", "_indices", "_id", "_number", "_version",
-    "_crc32", "_unit", "_rgb", "_hz", "_rad", "_ratio",
+const UNITS: [&str; 19] = [
+    "_m", "_per_m", "_s", "_px", "_bytes", "_count", "_epoch", "_index", "_indices", "_id", "_number", "_numbers",
+    "_version", "_crc32", "_unit", "_rgb", "_hz", "_rad", "_ratio",
 ];
 /// Their fields are components: the unit is in the name of the field that holds one.
 const TUPLES: [&str; 3] = ["Vec2", "Vec3", "Quaternion"];
@@ -53,12 +53,12 @@ fn times_and_lengths_are_not_integers_and_counts_are() {
     for message in messages() {
         for field in &message.field {
             let fractional = matches!(field.r#type(), Type::Float | Type::Double);
-            let whole = ["_count", "_bytes", "_epoch", "_index", "_indices", "_id", "_number", "_crc32"]
+            let whole = ["_count", "_bytes", "_epoch", "_index", "_indices", "_id", "_number", "_numbers", "_crc32"]
                 .iter()
                 .any(|unit| field.name().ends_with(unit));
             assert!(!(fractional && whole), "{}.{}", message.name(), field.name());
             let repeated_number = field.label() == Label::Repeated && needs_unit(field);
-            assert!(!repeated_number || field.name().ends_with("_indices"), "{}.{}", message.name(), field.name());
+            assert!(!repeated_number || ["_indices", "_numbers"].iter().any(|unit| field.name().ends_with(unit)), "{}.{}", message.name(), field.name());
         }
     }
 }

@@ -4,7 +4,7 @@ use std::num::NonZeroU32;
 
 use cluster::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use cluster::{
-    AchievedTime, Assignment, ChangeSession, ClusterStatus, CompositorShare, Costs, InvalidField, JoinCluster,
+    AchievedTime, ApplyPlan, Assignment, ChangeSession, ClusterStatus, CompositorShare, Costs, InvalidField, JoinCluster,
     LiveRequest, MeasureCosts, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings, OfferStatus, Policy,
     PolicyChoice, Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport, SamplerShare, SceneHash, SceneRef,
     SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
@@ -140,6 +140,8 @@ fn messages_survive_the_round_trip() {
     cells.workload.cell_first_indices = vec![0, 1];
     cells.samplers[0].image_indices = vec![3, 1, 2, 0];
     assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(cells.clone())), Ok(cells));
+    let apply = ApplyPlan { assignment: assignment(), open_workloads: vec![3, 1] };
+    assert_eq!(read::<ApplyPlan, _>(to_message::<proto::ApplyAssignmentRequest, _>(apply.clone())), Ok(apply));
     assert_eq!(read::<SessionRequest, _>(to_message::<proto::OpenSessionRequest, _>(request())), Ok(request()));
     assert_eq!(read::<RenderViews, _>(to_message::<proto::RenderViewsRequest, _>(views())), Ok(views()));
     let live =

@@ -53,7 +53,7 @@ fn with_cells(plan: &Assignment, count: u32) -> Assignment {
 async fn apply(cluster: &Cluster, plan: &Assignment) {
     for node in &cluster.nodes {
         let node = NodeClient::new(connect(&node.address).await.unwrap());
-        node.apply_assignment(plan.clone()).await.unwrap();
+        node.apply_assignment(plan.clone().into()).await.unwrap();
     }
 }
 

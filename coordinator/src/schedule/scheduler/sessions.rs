@@ -1,11 +1,19 @@
 //! Sessions: opening, closing, and changes of their demand.
 
-use super::Scheduler;
+use super::{RESUMED_WITHIN, Scheduler};
 use crate::schedule::session_mix::SessionMix;
 use crate::schedule::workload_state::{PlanTrigger, WorkloadState};
 use crate::schedule::{Command, Opening};
 
 impl Scheduler {
+    /// Numbers of all open workloads. None for a while after a restart: streams under plans of the coordinator before go on
+    /// until their sessions are open again.
+    #[must_use]
+    pub fn open_workloads(&self) -> Vec<u64> {
+        let is_resuming = self.resumed_at.is_some_and(|at| self.now.saturating_sub(at) < RESUMED_WITHIN);
+        if is_resuming { Vec::new() } else { self.workload_numbers() }
+    }
+
     pub(super) fn opened(&mut self, opening: &Opening) -> Vec<Command> {
         let session = opening.session;
         if let Err(error) = self.check(opening) {

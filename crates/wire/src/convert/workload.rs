@@ -1,8 +1,8 @@
 //! Scenes, workloads, costs and plans.
 
-use cluster::limits::{MAX_CELLS, MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_TILES};
+use cluster::limits::{MAX_CELLS, MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_TILES, MAX_WORKLOADS};
 use cluster::{
-    Assignment, CompositorShare, Costs, FetchScene, InvalidField, Policy, SamplerShare, ScenePart, SceneRef, TileCosts,
+    ApplyPlan, Assignment, CompositorShare, Costs, FetchScene, InvalidField, Policy, SamplerShare, ScenePart, SceneRef, TileCosts,
     Timeline, Workload, at_most, finite_seconds, nonempty,
 };
 
@@ -34,6 +34,8 @@ messages! {
         at_most(a.samplers.len(), MAX_NODES, "samplers")?;
         at_most(a.compositors.len(), MAX_NODES, "compositors")
     }, then Assignment::validate;
+    ApplyAssignmentRequest = ApplyPlan { assignment; open_workloads: open_workload_numbers },
+        first |r| at_most(r.open_workload_numbers.len(), MAX_WORKLOADS, "open_workload_numbers");
     SamplerShare = SamplerShare { node_name, image_indices; address: node_address },
         first |s| {
             at_most(s.image_indices.len(), MAX_CELLS * MAX_SAMPLE_CAMERAS * MAX_TILES as usize, "image_indices")?;
@@ -46,10 +48,6 @@ messages! {
 fn check_node(name: &str, address: &str) -> Result<(), InvalidField> {
     nonempty(name, "node_name")?;
     nonempty(address, "node_address")
-}
-
-wrappers! {
-    ApplyAssignmentRequest { assignment: Assignment }
 }
 
 nested!(Costs = Costs);

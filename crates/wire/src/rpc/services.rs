@@ -3,7 +3,7 @@
 use std::pin::Pin;
 
 use cluster::{
-    Assignment, ChangeSession, ClusterStatus, FetchImages, FetchScene, JoinCluster, MeasureCosts, Measured, Ready,
+    ApplyPlan, ChangeSession, ClusterStatus, FetchImages, FetchScene, JoinCluster, MeasureCosts, Measured, Ready,
     RenderViews, SamplerReport, ScenePart, SessionEvent, SessionRequest, Welcome, WorkReport,
 };
 use codec::{Chunk, FramePart};
@@ -145,7 +145,7 @@ service! {
     streams {
         /// Membership lasts as long as the stream.
         join_cluster(JoinClusterRequest as JoinCluster) -> JoinClusterStream(JoinClusterResponse as Welcome);
-        /// The session's number, progress, every plan that comes into force, and the end of the session.
+        /// The session's number, progress, and every plan that comes into force.
         open_session(OpenSessionRequest as SessionRequest) -> OpenSessionStream(OpenSessionResponse as SessionEvent);
         /// A scene's package from an offset on.
         fetch_scene(FetchSceneRequest as FetchScene) -> FetchSceneStream(FetchSceneResponse as ScenePart);
@@ -159,7 +159,7 @@ service! {
         /// Measures each cost alone and warm.
         measure_costs(MeasureCostsRequest as MeasureCosts) -> MeasureCostsResponse as Measured;
         /// Takes a plan; answers when ready for it. `FAILED_PRECONDITION` for an epoch below the one it has.
-        apply_assignment(ApplyAssignmentRequest as Assignment) -> ApplyAssignmentResponse as Ready;
+        apply_assignment(ApplyAssignmentRequest as ApplyPlan) -> ApplyAssignmentResponse as Ready;
     }
     streams {}
 }
