@@ -38,15 +38,16 @@ impl Cluster {
         insecure_bind: bool,
     ) -> anyhow::Result<Self> {
         let memory = MemoryArgs { set_memory: None }.set_memory_bytes(engine.is_software());
-        Self::start_within(memory, listener, offers, engine, nodes, insecure_bind).await
+        let configure = |config| NodeConfig { set_memory_bytes: memory / nodes.max(1), ..config };
+        Self::start_with(configure, listener, offers, engine, nodes, insecure_bind).await
     }
 
-    /// As [`Cluster::start`], with `set_memory_bytes` for the sample sets of all nodes together.
+    /// As [`Cluster::start`], with each node's configuration changed by `configure`.
     ///
     /// # Errors
     /// As [`Cluster::start`].
-    pub async fn start_within(
-        set_memory_bytes: usize,
+    pub async fn start_with(
+        configure: impl Fn(NodeConfig) -> NodeConfig,
         listener: TcpListener,
         offers: SceneOffers,
         engine: Arc<dyn Engine>,
@@ -61,10 +62,7 @@ impl Cluster {
         for number in 0..nodes {
             let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
             // Enough digits to sort well: members are listed by name.
-            let config = NodeConfig {
-                set_memory_bytes: set_memory_bytes / nodes.max(1),
-                ..NodeConfig::new(format!("node-{number:03}"), &cluster.address)
-            };
+            let config = configure(NodeConfig::new(format!("node-{number:03}"), &cluster.address));
             let (engine, metrics, shutdown) = (engine.clone(), NodeMetrics::default(), cluster.shutdown.clone());
             cluster.servers.spawn(node_host::serve(listener, config, engine, metrics, shutdown));
         }

@@ -17,3 +17,4 @@ pub mod process;
 pub mod scenes;
 pub mod setup;
 pub mod sizes;
+pub mod view_limits;

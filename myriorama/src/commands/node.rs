@@ -7,6 +7,7 @@ use app_core::exit::Outcome;
 use app_core::memory::MemoryArgs;
 use app_core::process::{cancel_at_signal, listen, serve_metrics};
 use app_core::setup::DeviceArgs;
+use app_core::view_limits::ViewLimitArgs;
 use clap::Args;
 use engine::GpuEngine;
 use node::{Engine as _, NodeConfig, NodeMetrics, Quotas, Telemetry};
@@ -49,16 +50,11 @@ pub struct NodeArgs {
     /// The most pixels of these views and of live views together
     #[arg(long, value_name = "N", default_value_t = Quotas::default().pixels)]
     max_pixels: usize,
-    /// The share of the time that views of the method direct may take while others are served
-    #[arg(long, value_name = "SHARE", default_value_t = 0.1, value_parser = share)]
-    direct_share: f64,
+    #[command(flatten)]
+    limits: ViewLimitArgs,
     /// Serves without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
-}
-
-fn share(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|share| (0.01..=1.0).contains(share)).ok_or_else(|| "expected 0.01 to 1".to_owned())
 }
 
 /// Runs until a signal.
@@ -78,9 +74,8 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
         insecure_bind: args.insecure_bind,
         reflection: args.reflection,
         set_memory_bytes: args.memory.set_memory_bytes(engine.is_software()),
-        direct_share: args.direct_share,
         quotas: Quotas { streams: args.max_streams, views: args.max_views, pixels: args.max_pixels },
-        ..NodeConfig::new(name, args.coordinator)
+        ..args.limits.within(NodeConfig::new(name, args.coordinator))
     };
     let shutdown = CancellationToken::new();
     let telemetry = Telemetry::default();

@@ -8,9 +8,10 @@ use app_core::memory::MemoryArgs;
 use app_core::process::{listen, stop_signal};
 use app_core::scenes::ScenesArgs;
 use app_core::setup::DeviceArgs;
+use app_core::view_limits::ViewLimitArgs;
 use clap::Args;
 use engine::GpuEngine;
-use node::Engine as _;
+use node::{Engine as _, NodeConfig};
 
 /// Serves until ctrl-c or SIGTERM, then drains for at most 10 s.
 #[derive(Debug, Args)]
@@ -24,6 +25,8 @@ pub struct UpArgs {
     device: DeviceArgs,
     #[command(flatten)]
     memory: MemoryArgs,
+    #[command(flatten)]
+    limits: ViewLimitArgs,
     /// Nodes P that share the device
     #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
     nodes: u16,
@@ -49,9 +52,11 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     }
     // The device and the packages hold the scenes now; the third copy is dropped.
     drop(scenes);
-    let (memory, nodes) = (args.memory.set_memory_bytes(engine.is_software()), usize::from(args.nodes));
+    let nodes = usize::from(args.nodes);
+    let set_memory_bytes = args.memory.set_memory_bytes(engine.is_software()) / nodes;
+    let configure = |config: NodeConfig| NodeConfig { set_memory_bytes, ..args.limits.within(config) };
     let mut cluster =
-        Cluster::start_within(memory, listener, offers, engine.clone(), nodes, args.insecure_bind).await?;
+        Cluster::start_with(configure, listener, offers, engine.clone(), nodes, args.insecure_bind).await?;
     println!("{nodes} nodes on {}, at {}", engine.device_name(), cluster.address);
     tokio::select! {
         stopped = stop_signal() => stopped?,

@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 use std::time::Duration;
 
-use cluster::{Assignment, Policy, SamplerShare, SessionRequest, Timeline, Workload};
+use cluster::{Assignment, Policy, RenderViews, RequestedView, SamplerShare, SessionRequest, Timeline, Workload};
 use cluster_tests::cluster::{Cluster, camera, rig, views, whole_frame};
 use cluster_tests::watcher::eventually;
 use codec::{FrameHeader, WholeFrame};
@@ -35,12 +35,18 @@ fn eye(camera: &Camera) -> Vec3 {
 
 /// The next plan: with a second cell to the side, whose images all samplers share.
 fn with_two_cells(plan: &Assignment) -> Assignment {
-    let sample_cameras = [rig(), shifted_rig(AWAY_M)].concat();
+    with_cells(plan, 2)
+}
+
+/// The next plan: with cells side by side, whose images all samplers share.
+fn with_cells(plan: &Assignment, count: u32) -> Assignment {
+    let sample_cameras: Vec<_> = (0..count).flat_map(|cell| shifted_rig(AWAY_M * cell as f32)).collect();
+    let cell_first_indices = (0..count).map(|cell| cell * rig().len() as u32).collect();
     let nodes = plan.samplers.len() as u32;
     let own = |at: u32| (0..sample_cameras.len() as u32).filter(|image| image % nodes == at).collect();
     let shares = plan.samplers.iter().zip(0..);
     let samplers = shares.map(|(share, at)| SamplerShare { image_indices: own(at), ..share.clone() }).collect();
-    let workload = Workload { sample_cameras, cell_first_indices: vec![0, 3], ..plan.workload.clone() };
+    let workload = Workload { sample_cameras, cell_first_indices, ..plan.workload.clone() };
     Assignment { plan_epoch: plan.plan_epoch + 1, workload, samplers, ..plan.clone() }
 }
 
@@ -202,6 +208,62 @@ async fn a_batch_of_large_views_does_not_keep_a_live_view_waiting() {
     engine.release();
     for _ in 0..64 {
         timeout(HEALED, whole_frame(&mut batch)).await.expect("the batch ends");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_long_view_keeps_neither_viewers_nor_batches_of_others_waiting() {
+    let cluster = Cluster::start(1).await;
+    let session = cluster.session(pipeline(STILL)).await.unwrap();
+    let engine = &cluster.engines[0];
+    let (long_live_px, long_batch_side_px) = (UVec2::new(1200, 1000), 1100);
+    engine.hold_views_of(long_live_px);
+    engine.hold_views_of(UVec2::splat(long_batch_side_px));
+    let (address, plan_epoch) = compositor_of(&session);
+    let mut long = Raw::open(&address, plan_epoch).await.unwrap();
+    long.say_at(Some((1, camera(0.0, long_live_px))), 0).await;
+    let client = wire::rpc::CompositorClient::new(connect(&address).await.unwrap());
+    let ask = async |side_px: u32, count: u64| {
+        client.render_views(tokio_stream::once(greedy(&session, side_px, count))).await.unwrap()
+    };
+    let mut long_batch = ask(long_batch_side_px, 1).await;
+    eventually("both are on the device", HEALED, || engine.held_calls() == 2).await;
+    let (mut live, mut batch) = (session.live(), ask(32, 8).await);
+    for i in 0..5 {
+        seen(&mut live, i as f32 * 0.01, 0).await;
+    }
+    for _ in 0..8 {
+        timeout(HEALED, whole_frame(&mut batch)).await.expect("the short batch ends");
+    }
+    assert_eq!(engine.held_calls(), 2, "the long views are still there");
+    engine.release();
+    timeout(HEALED, whole_frame(&mut long.parts)).await.expect("the long view");
+    timeout(HEALED, whole_frame(&mut long_batch)).await.expect("the long view of a batch");
+}
+
+/// Each stream has more views in each cell than it may have in flight.
+#[tokio::test(flavor = "multi_thread")]
+async fn batches_of_more_cells_than_memory_has_room_for_end() {
+    let few = |config: NodeConfig| NodeConfig { set_memory_bytes: 2_500_000, ..config };
+    let cluster = Cluster::start_with(1, few).await;
+    let session = cluster.session(pipeline(STILL)).await.unwrap();
+    let plan = with_cells(&session.plan().assignment, 5);
+    apply(&cluster, &plan).await;
+    let at = |frame: u64| camera(AWAY_M * (frame % 5) as f32, UVec2::splat(8));
+    let views = |count: u64| (0..count).map(|frame| RequestedView { frame, camera: at(frame) }).collect();
+    let request = RenderViews { plan_epoch: plan.plan_epoch, views: views(1500), ..greedy(&session, 8, 0) };
+    let mut ends = Vec::new();
+    for _ in 0..3 {
+        let client = wire::rpc::CompositorClient::new(connect(&compositor_of(&session).0).await.unwrap());
+        let mut parts = client.render_views(tokio_stream::once(request.clone())).await.unwrap();
+        ends.push(tokio::spawn(async move {
+            for _ in 0..1500 {
+                timeout(HEALED, whole_frame(&mut parts)).await.expect("the next frame");
+            }
+        }));
+    }
+    for end in ends {
+        end.await.unwrap();
     }
 }
 

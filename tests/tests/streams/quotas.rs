@@ -3,8 +3,9 @@
 use std::time::{Duration, Instant};
 
 use client::{Client, ClientError};
-use cluster::SessionRequest;
-use cluster_tests::cluster::{Cluster, whole_frame};
+use cluster::{DIRECT, PolicyChoice, RenderViews, SessionRequest};
+use cluster_tests::cluster::{Cluster, request, whole_frame};
+use cluster_tests::scalar_engine::Pace;
 use coordinator::CoordinatorConfig;
 use node::{Deadlines, NodeConfig, Quotas};
 use tokio::sync::mpsc;
@@ -174,5 +175,46 @@ async fn two_hundred_idle_streams_delay_no_frame() {
     // No stream was ended.
     for (_, live) in &mut idle {
         seen(live, 0.3, 0).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_view_that_is_predicted_to_take_too_long_is_refused_by_name() {
+    let hasty = |config: NodeConfig| NodeConfig { max_view_s: 0.1, ..config };
+    let cluster = Cluster::start_with(1, hasty).await;
+    let session = cluster.session(pipeline(STILL)).await.unwrap();
+    let client = CompositorClient::new(connect(&compositor_of(&session).0).await.unwrap());
+    let ask = async |side_px: u32, count: u64| {
+        client.render_views(tokio_stream::once(greedy(&session, side_px, count))).await.unwrap()
+    };
+    cluster.engines[0].keep_pace(Pace { view: Duration::from_millis(20), ..Pace::default() });
+    whole_frame(&mut ask(1024, 1).await).await;
+    let mut live = session.live();
+    for i in 0..8 {
+        seen(&mut live, i as f32 * 0.01, 0).await;
+    }
+    let refused = timeout(HEALED, ask(1024, 1).await.next()).await.unwrap().unwrap().unwrap_err();
+    assert_eq!(refused.code(), Code::ResourceExhausted, "{refused}");
+    assert!(refused.message().starts_with("max-view-s: a view of 1024x1024 by splat"), "{refused}");
+    let mut many = ask(48, 20).await;
+    for _ in 0..20 {
+        timeout(HEALED, whole_frame(&mut many)).await.expect("none of them is long");
+    }
+    seen(&mut live, 0.1, 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn views_that_the_plan_itself_draws_have_no_share_of_their_own() {
+    for (policy, most_views) in [(PolicyChoice::Direct, 8), (PolicyChoice::Pipeline, 1)] {
+        let cluster = Cluster::start(1).await;
+        let session = cluster.session(request(policy, STILL)).await.unwrap();
+        let client = CompositorClient::new(connect(&compositor_of(&session).0).await.unwrap());
+        let eight = RenderViews { method: DIRECT.to_owned(), ..greedy(&session, 16, 8) };
+        let mut frames = client.render_views(tokio_stream::once(eight)).await.unwrap();
+        let mut together = Vec::new();
+        for _ in 0..8 {
+            together.push(whole_frame(&mut frames).await.header.stage_times.batch_count);
+        }
+        assert_eq!(together.iter().max(), Some(&most_views), "{policy:?}: {together:?}");
     }
 }
