@@ -94,14 +94,12 @@ impl WorkloadState {
         }
     }
 
-    /// Whether a session asks for this workload.
-    pub(super) fn is_shared_by(&self, opening: &Opening) -> bool {
+    /// Whether a session asks for this workload; `follows_viewers`: its sample cameras are those of its viewpoints.
+    pub(super) fn is_shared_by(&self, asked: &Workload, follows_viewers: bool) -> bool {
+        let asked = self.with_planes(asked);
         match &self.cells {
-            Some(cells) => {
-                !opening.viewpoints.is_empty()
-                    && cells.are_shareable(&self.requested, &self.with_planes(&opening.workload))
-            }
-            None => opening.viewpoints.is_empty() && self.requested == self.with_planes(&opening.workload),
+            Some(cells) => follows_viewers && cells.are_shareable(&self.requested, &asked),
+            None => !follows_viewers && self.requested == asked,
         }
     }
 

@@ -145,6 +145,40 @@ fn workloads_that_have_ended_are_told_apart_from_those_of_a_coordinator_before()
 }
 
 #[test]
+fn a_node_is_idle_while_no_node_at_its_address_works() {
+    let mut cluster = Cluster::of(2);
+    let neighbour = Event::Joined {
+        incarnation: 2,
+        join: cluster::JoinCluster {
+            node: cluster::NodeStatus {
+                node_name: "n2".to_owned(),
+                address: "http://n1:99".to_owned(),
+                device_name: "cpu".to_owned(),
+                is_software: true,
+            },
+            plan_epoch: 0,
+        },
+    };
+    cluster.step(neighbour);
+    let idle_s = |cluster: &Cluster| ["n0", "n1", "n2"].map(|name| cluster.scheduler.idle_for(name).as_secs());
+    assert_eq!(idle_s(&cluster), [u64::MAX; 3]);
+    cluster.now = Duration::from_secs(10);
+    let busy = |busy_s| Event::Measured {
+        node_name: "n1".to_owned(),
+        plan_epoch: 7,
+        costs: MeasuredCosts::default(),
+        busy_s,
+        views: 1,
+        dropped_views: 0,
+    };
+    cluster.step(busy(0.9));
+    cluster.now = Duration::from_secs(14);
+    cluster.step(busy(0.1));
+    assert_eq!(idle_s(&cluster), [u64::MAX, 4, 4], "a little work makes no node busy");
+    assert_eq!(cluster.scheduler.idle_for("n9"), Duration::ZERO, "it is no member");
+}
+
+#[test]
 fn a_lost_node_concerns_the_workload_that_it_served() {
     let mut cluster = Cluster::of(4);
     cluster.open(of(4, 1));
@@ -171,6 +205,9 @@ fn no_more_workloads_than_the_limit_are_opened() {
     cluster.open(of(3, 2));
     let refused = cluster.open(of(2, 3));
     assert_eq!(refusal(&refused).to_string(), "workloads: 2 are open, the limit of --max-workloads");
+    let admits = |workload| cluster.scheduler.admits_workload(&workload, false);
+    assert_eq!(admits(workload(2)), Err(ChoiceError::Workloads { most: 2 }), "before its costs are measured");
+    assert_eq!(admits(workload(3)), Ok(()));
     assert_eq!(applied(&cluster.open(of(3, 4))).len(), 1, "one that is open has room");
     cluster.step(Event::Closed { session: 1 });
     assert_eq!(applied(&cluster.open(of(2, 5))).last().map(|plan| plan.2.clone()), Some(vec![5]));

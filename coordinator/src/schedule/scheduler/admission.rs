@@ -1,5 +1,6 @@
 //! Admission: what a session may ask for, beside what is promised to others.
 
+use cluster::Workload;
 use cluster::limits::MAX_CELLS;
 use depth_image::PinholeCamera;
 
@@ -56,17 +57,28 @@ impl Scheduler {
         }
     }
 
+    /// Whether a session of this workload may be opened, as far as is known before its costs and planes are.
+    ///
+    /// # Errors
+    /// Where it would be one workload too many.
+    pub fn admits_workload(&self, workload: &Workload, follows_viewers: bool) -> Result<(), ChoiceError> {
+        let is_open = self.workloads.values().any(|open| open.is_shared_by(workload, follows_viewers));
+        if is_open || self.workloads.len() < self.max_workloads {
+            return Ok(());
+        }
+        Err(ChoiceError::Workloads { most: self.max_workloads })
+    }
+
     /// The workload that a session belongs to, if it is open.
     pub(super) fn workload_for(&self, opening: &Opening) -> Option<u64> {
-        self.workloads.iter().find(|(_, workload)| workload.is_shared_by(opening)).map(|(&number, _)| number)
+        let is_shared = |open: &WorkloadState| open.is_shared_by(&opening.workload, !opening.viewpoints.is_empty());
+        self.workloads.iter().find(|(_, workload)| is_shared(workload)).map(|(&number, _)| number)
     }
 
     /// Whether a session can be served.
     pub(super) fn check(&self, opening: &Opening) -> Result<(), ChoiceError> {
         let Some(number) = self.workload_for(opening) else {
-            if self.workloads.len() >= self.max_workloads {
-                return Err(ChoiceError::Workloads { most: self.max_workloads });
-            }
+            self.admits_workload(&opening.workload, !opening.viewpoints.is_empty())?;
             let alone = NodeCosts { costs: opening.costs, ..NodeCosts::default() };
             let nodes = vec![alone; self.usable().count()];
             return self.admit(&Change { before: None, after: WorkloadState::new(self.now, opening), nodes });
