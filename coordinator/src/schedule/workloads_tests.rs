@@ -377,6 +377,26 @@ fn a_session_that_does_not_accept_the_fallback_in_force_is_refused_where_it_is_n
 }
 
 #[test]
+fn viewers_keep_their_quality_beside_batches() {
+    let quality = Quality {
+        lighting: "unlit".to_owned(),
+        method: "joint_carve:1".to_owned(),
+        sample_side_ratio: 1.0,
+        frame_rate_ratio: 0.5,
+    };
+    let mut cluster = Cluster::of(2);
+    cluster.open(Opening { fallbacks: vec![quality], ..rated(of(4, 1), 60.0) });
+    cluster.open(Opening { views_per_set: 5000, ..of(4, 2) });
+    let utilisation = |cluster: &Cluster| cluster.workloads()[0].utilisation.unwrap();
+    assert!((utilisation(&cluster) - 0.3).abs() < 0.01, "60 views of 10 ms a second on 2 nodes");
+    (3..=5).for_each(|number| drop(cluster.open(of(number - 2, number as u64))));
+    cluster.pass(80, &[1, 2, 3, 4, 5]);
+    assert!(cluster.nodes(1).len() == 1 && utilisation(&cluster) < 0.7, "{}", utilisation(&cluster));
+    assert_eq!(cluster.workloads()[0].plan.as_ref().unwrap().fallback, None);
+    assert_eq!(cluster.workloads()[1].utilisation, None, "a batch");
+}
+
+#[test]
 fn status_says_what_one_more_viewer_would_cost() {
     let mut cluster = Cluster::of(4);
     cluster.open(of(4, 1));

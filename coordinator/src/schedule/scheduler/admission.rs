@@ -35,8 +35,7 @@ impl Scheduler {
     pub fn admits(&self, session: u64, views_per_set: usize, frames_per_s: Option<f64>) -> Result<(), ChoiceError> {
         let Some(number) = self.workload_of_session(session) else { return Ok(()) };
         let before = &self.workloads[&number];
-        let mut after = before.clone();
-        after.change(self.now, |sessions| sessions.set_demand(session, views_per_set, frames_per_s));
+        let after = before.changed(self.now, |sessions| sessions.set_demand(session, views_per_set, frames_per_s));
         if after.sessions.views_per_s() <= before.sessions.views_per_s() {
             return Ok(());
         }
@@ -46,15 +45,19 @@ impl Scheduler {
     /// Whether a session may look from these viewpoints from now on.
     ///
     /// # Errors
-    /// As for one that is opened, and for one that has sample cameras of its own.
+    /// As for one that is opened, and for one that has sample cameras of its own. A session may always ask for fewer images
+    /// than before.
     pub fn admits_viewpoints(&self, session: u64, viewpoints: &[PinholeCamera]) -> Result<(), ChoiceError> {
         let Some(number) = self.workload_of_session(session) else { return Ok(()) };
         let before = &self.workloads[&number];
-        match before.cells_seen_from(self.now, session, viewpoints) {
-            None => Err(ChoiceError::NoCells { session }),
-            Some(cells) if cells > MAX_CELLS && Some(cells) > before.cell_count() => Err(ChoiceError::Cells { cells }),
-            Some(_) => Ok(()),
+        if before.cell_count().is_none() {
+            return Err(ChoiceError::NoCells { session });
         }
+        let after = before.changed(self.now, |sessions| sessions.set_viewpoints(session, viewpoints));
+        if after.cell_count() <= before.cell_count() && after.load().images <= before.load().images {
+            return Ok(());
+        }
+        self.admit(&self.change_of(number, before, after))
     }
 
     /// Whether a session of this workload may be opened, as far as is known before its costs and planes are.
@@ -88,8 +91,7 @@ impl Scheduler {
         if forced != PolicyOverride::default() && !before.sessions.all_force(forced) {
             return Err(ChoiceError::Override { in_force: before.sessions.policy_override() });
         }
-        let mut after = before.clone();
-        after.change(self.now, |sessions| sessions.add(opening));
+        let after = before.changed(self.now, |sessions| sessions.add(opening));
         // It has to be possible without the others, too: they may leave.
         let alone = vec![NodeCosts { costs: opening.costs, ..NodeCosts::default() }; self.usable().count()];
         check(&Demand { load: after.load(), nodes: &alone, policy_override: forced, current: None })?;
