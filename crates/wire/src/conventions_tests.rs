@@ -58,7 +58,12 @@ fn times_and_lengths_are_not_integers_and_counts_are() {
                 .any(|unit| field.name().ends_with(unit));
             assert!(!(fractional && whole), "{}.{}", message.name(), field.name());
             let repeated_number = field.label() == Label::Repeated && needs_unit(field);
-            assert!(!repeated_number || ["_indices", "_numbers"].iter().any(|unit| field.name().ends_with(unit)), "{}.{}", message.name(), field.name());
+            assert!(
+                !repeated_number || ["_indices", "_numbers"].iter().any(|unit| field.name().ends_with(unit)),
+                "{}.{}",
+                message.name(),
+                field.name()
+            );
         }
     }
 }

@@ -4,10 +4,10 @@ use std::num::NonZeroU32;
 
 use cluster::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use cluster::{
-    AchievedTime, ApplyPlan, Assignment, ChangeSession, ClusterStatus, CompositorShare, Costs, InvalidField, JoinCluster,
-    LiveRequest, MeasureCosts, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings, OfferStatus, Policy,
-    PolicyChoice, Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport, SamplerShare, SceneHash, SceneRef,
-    SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
+    AchievedTime, ApplyPlan, Assignment, ChangeSession, ClusterStatus, CompositorShare, Costs, InvalidField,
+    JoinCluster, LiveRequest, MeasureCosts, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings, OfferStatus,
+    Policy, PolicyChoice, Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport, SamplerShare, SceneHash,
+    SceneRef, SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
 };
 use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
 use depth_image::{Aabb, Camera, Environment, Illumination, Light, MAX_LIGHTS, PinholeCamera, ViewPlanes};

@@ -147,7 +147,9 @@ async fn a_plan_of_the_same_workload_serves_clients_of_the_plan_before() {
     let part = timeout(HEALED, raw.parts.next()).await.unwrap().unwrap().unwrap();
     assert_eq!((part.frame, part.header.unwrap().sample_set_id.plan_epoch), (2, epoch + 1));
     let workload = cluster::Workload { refinement_steps: 2, ..plan.workload.clone() };
-    node.apply_assignment(cluster::Assignment { plan_epoch: epoch + 2, workload, ..plan.clone() }.into()).await.unwrap();
+    node.apply_assignment(cluster::Assignment { plan_epoch: epoch + 2, workload, ..plan.clone() }.into())
+        .await
+        .unwrap();
     raw.say(Some(3), 2).await;
     assert_eq!(raw.refused().await.code(), Code::FailedPrecondition, "it shows something else");
 }

@@ -2,8 +2,8 @@
 
 use cluster::limits::{MAX_CELLS, MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_TILES, MAX_WORKLOADS};
 use cluster::{
-    ApplyPlan, Assignment, CompositorShare, Costs, FetchScene, InvalidField, Policy, SamplerShare, ScenePart, SceneRef, TileCosts,
-    Timeline, Workload, at_most, finite_seconds, nonempty,
+    ApplyPlan, Assignment, CompositorShare, Costs, FetchScene, InvalidField, Policy, SamplerShare, ScenePart, SceneRef,
+    TileCosts, Timeline, Workload, at_most, finite_seconds, nonempty,
 };
 
 use super::Convert;
