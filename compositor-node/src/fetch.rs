@@ -4,21 +4,19 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
+use cluster::limits::MAX_WORKLOADS;
 use cluster::{Assignment, SamplerShare, SetContent};
 use depth_image::{Camera, DepthImage};
 use node::{CellPlan, Connections, Deadlines, PlansInForce, SampleSet, beyond_timeline, blocking, has_set};
 use parking_lot::Mutex;
 use tokio::task::JoinSet;
-use tonic::Status;
+use tonic::{Code, Status};
 
 use crate::fetch_share::{FetchTimes, FetchedShare, SetRequest, ShareRequest, fetch_share};
 use crate::reports::NotFetched;
 
 /// The time that a relay may be silent. The samplers are asked then, and have the images or not.
 const RELAY_TIMEOUT: Duration = Duration::from_secs(3);
-
-/// Plans whose relay has failed, as many as there are workloads.
-const MAX_FAILED_RELAYS: usize = 16;
 
 /// Fetches sets for one compositor.
 #[derive(Debug)]
@@ -59,16 +57,24 @@ impl Fetcher {
             && let Err(NotFetched { status, .. }) = self.fetch_all(set, vec![request], &mut gathered).await
         {
             tracing::info!(plan_epoch = plan.plan_epoch, reason = status.message(), "samplers in place of a relay");
-            let mut failed = self.failed_relay_epochs.lock();
-            failed.insert(plan.plan_epoch);
-            while failed.len() > MAX_FAILED_RELAYS {
-                failed.pop_first();
-            }
+            self.relay_failed(plan.plan_epoch, &status);
         }
         let missing = self.requests_to_samplers(set, &gathered.images);
         self.fetch_all(set, missing, &mut gathered).await?;
         let incomplete = || Status::data_loss(format!("sample set {} is not complete", set.set_index));
         Ok((gathered.images.into_iter().collect::<Option<_>>().ok_or_else(incomplete)?, gathered.times))
+    }
+
+    /// A relay that refuses one set may relay the next.
+    fn relay_failed(&self, plan_epoch: u64, status: &Status) {
+        if status.code() == Code::FailedPrecondition {
+            return;
+        }
+        let mut failed = self.failed_relay_epochs.lock();
+        failed.insert(plan_epoch);
+        while failed.len() > MAX_WORKLOADS {
+            failed.pop_first();
+        }
     }
 
     /// All images, from the relay of this compositor; `None` without one, or where it has failed.

@@ -310,19 +310,23 @@ impl<'a> LiveStream<'a> {
         Some(self.without_set.filter(|_| waits)? + self.client.shared.deadlines.neighbour)
     }
 
-    /// Makes the newest pose's view where its own set is loaded while another is being fetched.
-    fn show_loaded(&mut self) {
-        let Some(pose) = self.newest.as_ref().filter(|pose| self.loading.is_some() && pose.has_cells()) else { return };
-        let loaded = self.client.shared.loaded(&pose.plan, pose.request.set_index, pose.cell);
-        if let Some((pose, set)) = loaded.and_then(|set| Some((self.take_newest()?, set))) {
-            (self.without_set, self.own) = (None, Some(pose.plan_and_cell()));
-            self.prepare(pose, set);
-        }
+    /// Makes the newest pose's view where its own set is loaded while another is being fetched; gives whether it is.
+    fn show_loaded(&mut self) -> bool {
+        let newest = self.newest.as_ref().filter(|pose| self.loading.is_some() && pose.has_cells());
+        let own = newest.and_then(|pose| self.client.shared.loaded(&pose.plan, pose.request.set_index, pose.cell));
+        let Some((pose, set)) = own.and_then(|set| Some((self.take_newest()?, set))) else { return false };
+        (self.without_set, self.own) = (None, Some(pose.plan_and_cell()));
+        self.prepare(pose, set);
+        true
     }
 
-    /// Makes the newest pose's view from the nearest loaded set of its moment. Its own set is fetched all the same.
+    /// Makes the newest pose's view from its own set if that has been loaded meanwhile, or else from the nearest loaded set
+    /// of its moment. Its own set is fetched all the same.
     fn show_neighbour(&mut self) {
         self.has_tried = true;
+        if self.show_loaded() {
+            return;
+        }
         let Some(pose) = self.waiting() else { return };
         let (plan, set_index, cell) = (pose.plan.clone(), pose.request.set_index, pose.cell);
         let Some(set) = self.client.shared.nearest(&plan, set_index, &pose.view.camera) else { return };

@@ -67,6 +67,11 @@ impl RelayBuffer {
         self.0.borrow().images.iter().map(|(_, image)| image.payload.len()).sum()
     }
 
+    /// Resolves when no stream of its images is left.
+    pub(crate) async fn unwanted(&self) {
+        self.0.closed().await;
+    }
+
     /// The images that have arrived, then those that arrive.
     pub(crate) fn images(&self) -> Messages<(u32, EncodedDepthImage)> {
         let state = self.0.subscribe();

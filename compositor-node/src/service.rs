@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use cluster::RenderViews;
 use codec::FramePart;
-use node::{CellPlan, Engine, NodeConfig, NodeMetrics, PlansInForce, Relay, next_within, until_drained};
+use node::{CellPlan, Engine, NodeConfig, NodeMetrics, PlansInForce, Relay, SetMemory, next_within, until_drained};
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
@@ -61,6 +61,12 @@ impl CompositorService {
         Self { shared: Arc::new(shared), shutdown, _rendering: rendering }
     }
 
+    /// The sets on the device.
+    #[must_use]
+    pub fn memory(&self) -> Arc<dyn SetMemory> {
+        self.shared.sets.memory()
+    }
+
     /// Relays the images that this compositor fetches to other compositors.
     #[must_use]
     pub fn relay(&self) -> Relay {
@@ -75,7 +81,7 @@ impl Compositor for CompositorService {
         let place = self.shared.quota.stream()?;
         let stream = self.shared.stream_count.fetch_add(1, Ordering::Relaxed);
         let outbox = Outbox::new(stream, self.shared.metrics.clone());
-        let client = ClientStream { shared: self.shared.clone(), stream, outbox: outbox.clone() };
+        let client = ClientStream::open(self.shared.clone(), stream, outbox.clone());
         let requests = until_drained(requests, self.shutdown.clone());
         tokio::spawn(async move {
             client.run(requests).await;
@@ -88,7 +94,6 @@ impl Compositor for CompositorService {
 impl ClientStream {
     /// Runs until either side ends the stream; a client that takes no frames is cut off.
     async fn run(self, requests: Messages<RenderViews>) {
-        self.shared.metrics.streams.inc();
         let (stream, stall) = (self.stream, self.shared.deadlines.stall);
         tokio::select! {
             () = self.answer_and_send(requests) => (),
@@ -99,12 +104,6 @@ impl ClientStream {
                 self.outbox.cut(Status::deadline_exceeded(format!("frames: none was taken for {seconds:.1} s")));
             }
         }
-        for view in self.shared.arrivals.withdraw(stream) {
-            self.shared.metrics.drop_view("client gone");
-            drop(view);
-        }
-        self.shared.metrics.done.viewer_left(stream);
-        self.shared.metrics.streams.dec();
     }
 
     /// Frames in flight are sent before the stream ends.

@@ -8,10 +8,11 @@ use cluster::{Assignment, SetContent, Workload};
 use codec::EncodedDepthImage;
 use depth_image::{Camera, PinholeCamera, nearest_set};
 use node::{
-    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet, Turn, UploadedSet,
+    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, OfSet, Operation, Pinned, PlansInForce, SampleSet, SetMemory,
+    Turn, UploadedSet,
 };
 use node::{WorkClass, beyond_timeline, blocking, most_image_bytes, most_set_bytes, own_time, set_bytes};
-use tonic::Status;
+use tonic::{Code, Status};
 use wire::rpc::Messages;
 
 use crate::fetch::Fetcher;
@@ -41,6 +42,8 @@ pub(crate) struct ReadySet {
     /// The time at which it was ready.
     pub(crate) since: Instant,
     pub(crate) content: SetContent,
+    /// The workload that it was loaded for, and its index there.
+    origin: (u64, u32),
     /// The view cell that it was loaded for, in the plan of that time.
     pub(crate) cell: u32,
     /// What its images show, wherever their cameras are.
@@ -48,6 +51,16 @@ pub(crate) struct ReadySet {
     cameras: Vec<PinholeCamera>,
     /// Its images for other compositors, where they ask this one.
     relay: Option<RelayBuffer>,
+}
+
+impl OfSet for ReadySet {
+    fn content(&self) -> &SetContent {
+        &self.content
+    }
+
+    fn origin(&self) -> (u64, u32) {
+        self.origin
+    }
 }
 
 /// The content of a set without its cameras: equal for the sets of all view cells at one moment.
@@ -68,6 +81,11 @@ pub(crate) struct Sets {
 }
 
 impl Sets {
+    /// The sets on the device.
+    pub(crate) fn memory(&self) -> Arc<dyn SetMemory> {
+        Arc::new(self.cached.clone())
+    }
+
     /// Checks that a plan's samples have the planes that a method needs.
     pub(crate) fn check_method(&self, plan: &Assignment, method: &str) -> Result<(), Status> {
         if plan.workload.planes.contain(self.engine.sample_planes(method)?) {
@@ -110,11 +128,17 @@ impl Sets {
             return Err(Status::failed_precondition(format!("sample set {set_index} is not relayed")));
         };
         let (images, sets, plan) = (relay.images(), self.clone(), plan.clone());
-        // The first request begins the loading, whose end the stream of images tells.
+        // The first request begins the loading, whose end the stream of images tells. The set stays while images are sent.
         tokio::spawn(async move {
-            let loaded = sets.load(&plan, set_index).await.map(drop);
-            drop(relay);
-            loaded
+            let is_sent = async {
+                let _in_use = sets.load(&plan, set_index).await?;
+                relay.unwanted().await;
+                Ok::<_, Status>(())
+            };
+            tokio::select! {
+                sent = is_sent => drop(sent),
+                () = relay.unwanted() => (),
+            }
         });
         Ok(images)
     }
@@ -179,9 +203,18 @@ impl Sets {
         self.cached.is_loading(content)
     }
 
+    /// A load that another workload's plan began may end with that plan. This plan, if it is in force, then begins its own.
     async fn load(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<Pinned<ReadySet>, Status> {
         let content = content_of(plan, set_index)?;
-        self.cached.get(content, self.most_bytes(plan), self.loading(plan, set_index, content)).await
+        let load = || self.cached.get(content, self.most_bytes(plan), self.loading(plan, set_index, content));
+        match load().await {
+            Err(status) if status.code() == Code::FailedPrecondition && self.is_in_force(plan) => load().await,
+            loaded => loaded,
+        }
+    }
+
+    fn is_in_force(&self, plan: &CellPlan) -> bool {
+        self.plans.in_force(plan.workload_number).is_some_and(|in_force| in_force.plan_epoch == plan.plan_epoch)
     }
 
     /// The most bytes of a cell's set, with its images for others.
@@ -234,8 +267,9 @@ impl Sets {
         self.metrics.set_s.observe(start.elapsed().as_secs_f64());
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
         let moment = moment(plan, set_index).ok_or_else(|| beyond_timeline(set_index))?;
+        let origin = (plan.workload_number, set_index);
         let cameras = plan.workload.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
-        Ok((ReadySet { set, since: Instant::now(), content, cell: plan.cell, moment, cameras, relay }, bytes))
+        Ok((ReadySet { set, since: Instant::now(), content, origin, cell: plan.cell, moment, cameras, relay }, bytes))
     }
 
     async fn fetch(&self, request: &SetRequest) -> Result<(SampleSet, FetchTimes), Status> {

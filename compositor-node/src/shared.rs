@@ -45,6 +45,11 @@ pub(crate) struct ClientStream {
 }
 
 impl ClientStream {
+    pub(crate) fn open(shared: Arc<Shared>, stream: u64, outbox: Arc<Outbox>) -> Self {
+        shared.metrics.streams.inc();
+        Self { shared, stream, outbox }
+    }
+
     /// Hands views over to the lanes of the device.
     pub(crate) fn queue(&self, is_live: bool, views: Vec<Waiting>) {
         let mut by_lane = BTreeMap::<Lane, Vec<Waiting>>::new();
@@ -56,6 +61,16 @@ impl ClientStream {
         for (lane, views) in by_lane {
             self.shared.arrivals.push(lane, self.stream, views);
         }
+    }
+}
+
+/// However a call ends, nothing of it is left.
+impl Drop for ClientStream {
+    fn drop(&mut self) {
+        let metrics = &self.shared.metrics;
+        self.shared.arrivals.withdraw(self.stream).iter().for_each(|_| metrics.drop_view("client gone"));
+        metrics.done.viewer_left(self.stream);
+        metrics.streams.dec();
     }
 }
 

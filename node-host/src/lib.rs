@@ -40,7 +40,8 @@ pub async fn serve(
     let compositor = CompositorService::new(engine.clone(), plans.clone(), &config, metrics.clone(), shutdown.clone());
     let (relay, done) = (compositor.relay(), metrics.done.clone());
     let sampler = SamplerService::new(engine.clone(), plans.clone(), &config, relay, metrics.clone(), shutdown.clone());
-    let service = NodeService::new(engine, plans.clone(), scenes.clone(), metrics);
+    let memory = vec![compositor.memory(), sampler.memory()];
+    let service = NodeService::new(engine, plans.clone(), scenes.clone(), metrics, memory);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))

@@ -7,9 +7,10 @@ use std::time::{Duration, Instant};
 use cluster::{Assignment, FetchImages, SetContent};
 use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
 use node::{
-    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Relay, SampleWork, Turn,
+    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, OfSet, Operation, Pinned, PlansInForce, Relay, SampleWork,
+    SetMemory, Turn,
 };
-use node::{WorkClass, beyond_timeline, blocking, has_set, most_image_bytes, own_time, until_drained, with_guard};
+use node::{WorkClass, beyond_timeline, blocking, most_image_bytes, own_time, until_drained, with_guard};
 use parking_lot::Mutex;
 use tokio::sync::mpsc;
 use tokio_stream::StreamExt as _;
@@ -27,6 +28,24 @@ type Key = (SetContent, u32, Vec<u32>);
 
 /// Packed images with their indices.
 type PackedImages = Vec<(u32, EncodedDepthImage)>;
+
+/// The packed images of a set.
+struct PackedSet {
+    images: PackedImages,
+    content: SetContent,
+    /// The workload that it was sampled for, and its index there.
+    origin: (u64, u32),
+}
+
+impl OfSet for PackedSet {
+    fn content(&self) -> &SetContent {
+        &self.content
+    }
+
+    fn origin(&self) -> (u64, u32) {
+        self.origin
+    }
+}
 
 /// Sets of one workload are sampled in the order of their requests: the one that is needed next comes first. Workloads do
 /// not wait for each other; the device shares itself among them.
@@ -46,7 +65,7 @@ impl Turns {
 pub struct SamplerService {
     engine: Arc<dyn Engine>,
     plans: PlansInForce,
-    cache: ByteCache<Key, PackedImages>,
+    cache: ByteCache<Key, PackedSet>,
     /// A receiver that takes no chunk for so long is cut off: it keeps images in memory.
     stall: Duration,
     turns: Turns,
@@ -72,8 +91,14 @@ impl SamplerService {
         Self { engine, plans, cache, stall, turns: Turns::default(), relay, metrics, shutdown }
     }
 
+    /// The packed images.
+    #[must_use]
+    pub fn memory(&self) -> Arc<dyn SetMemory> {
+        Arc::new(self.cache.clone())
+    }
+
     /// All of this node's images of a set, made for the first request in one submission.
-    async fn images(&self, plan: &Assignment, set_index: u32) -> Result<Pinned<PackedImages>, Status> {
+    async fn images(&self, plan: &Assignment, set_index: u32) -> Result<Pinned<PackedSet>, Status> {
         let content = plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))?;
         let indices = plan.images_of(&self.plans.node_name, set_index).to_vec();
         let work = sample_work(plan, &indices, set_index)?;
@@ -87,13 +112,13 @@ impl SamplerService {
         let make = move || async move {
             let _one = turn.lock().await;
             // A later plan may be in force by now: its sets must not wait for sets that no plan has any more.
-            if !plans.in_force(number).is_some_and(|plan| has_set(&plan, &content, set_index)) {
+            if !plans.have_set(&content, set_index) {
                 return Err(Status::failed_precondition(format!("no plan in force has this set {set_index}")));
             }
             let images =
                 blocking(move || sample(engine.as_ref(), &work, (&indices, tiles), (number, &metrics))).await?;
             let bytes = images.iter().map(|(_, image)| image.payload.len()).sum();
-            Ok((images, bytes))
+            Ok((PackedSet { images, content, origin: (number, set_index) }, bytes))
         };
         self.cache.get(key, most_bytes, make).await
     }
@@ -128,7 +153,7 @@ impl Sampler for SamplerService {
         }
         let images = self.images(&plan, request.set_index).await?;
         // Payloads are shared, and stay in the cache until all have been sent.
-        let shared = Box::pin(tokio_stream::iter(images.to_vec()).map(Ok));
+        let shared = Box::pin(tokio_stream::iter(images.images.clone()).map(Ok));
         Ok(self.send(&plan, request, with_guard(shared, images)))
     }
 }

@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 use std::ops::Deref;
 use std::sync::Arc;
 
-use cluster::{Assignment, SetContent, Workload};
+use cluster::limits::MAX_WORKLOADS;
+use cluster::{ApplyPlan, Assignment, SetContent, Workload};
 use codec::EncodedDepthImage;
 use parking_lot::Mutex;
 use tokio::sync::watch;
@@ -14,8 +15,6 @@ use wire::rpc::Messages;
 
 /// The last plans of a workload that are remembered.
 const MAX_PLANS: usize = 8;
-/// Workloads with a plan in force.
-const MAX_WORKLOADS: usize = 16;
 
 /// The node's name and the plans in force on it. Epochs of one workload only rise. Clones share them.
 #[derive(Debug, Clone)]
@@ -31,6 +30,8 @@ pub struct PlansInForce {
 struct Plans {
     workloads: Vec<WorkloadPlans>,
     highest_epoch: u64,
+    /// The last plan that told which workloads are open.
+    told: Option<ApplyPlan>,
     /// Uses of all plans so far.
     uses: u64,
 }
@@ -75,17 +76,33 @@ impl Plans {
 
     /// Whether a plan is new; an error where it may not replace the one in force.
     fn admits(&mut self, assignment: &Assignment) -> Result<bool, Status> {
-        let in_force = self.of(assignment.workload_number).and_then(|workload| workload.in_force().cloned());
+        let number = assignment.workload_number;
+        let is_later = |told: &&ApplyPlan| told.assignment.plan_epoch > assignment.plan_epoch;
+        if self.told.as_ref().filter(is_later).is_some_and(|told| told.has_ended(number)) {
+            return Err(Status::failed_precondition(format!("workload {number} has ended")));
+        }
+        let in_force = self.of(number).and_then(|workload| workload.in_force().cloned());
         let Some(in_force) = in_force else { return Ok(true) };
         let (old, new) = (in_force.plan_epoch, assignment.plan_epoch);
         match new > old {
             false if new == old && *in_force == *assignment => Ok(false),
             false => Err(Status::failed_precondition(format!(
-                "plan_epoch {new} of workload {} does not replace {old}",
-                assignment.workload_number
+                "plan_epoch {new} of workload {number} does not replace {old}"
             ))),
             true => Ok(true),
         }
+    }
+
+    /// Forgets the workloads that have ended by the time of this plan; gives their numbers.
+    fn forget(&mut self, plan: ApplyPlan) -> Vec<u64> {
+        let told_epoch = self.told.as_ref().map_or(0, |told| told.assignment.plan_epoch);
+        if plan.open_workloads.is_empty() || plan.assignment.plan_epoch < told_epoch {
+            return Vec::new();
+        }
+        let ended = |workload: &mut WorkloadPlans| plan.has_ended(workload.number);
+        let ended = self.workloads.extract_if(.., ended).map(|workload| workload.number).collect();
+        self.told = Some(plan);
+        ended
     }
 
     fn put(&mut self, assignment: Assignment) {
@@ -136,19 +153,32 @@ impl PlansInForce {
         self.plans.lock().admits(assignment).map(drop)
     }
 
-    /// Puts a plan in force. The workload that was used longest ago leaves where there are too many.
+    /// Puts a plan in force, and forgets the workloads that have ended; gives their numbers. The workload that was used
+    /// longest ago leaves where there are too many.
     ///
     /// # Errors
     /// As [`PlansInForce::admits`].
-    pub fn apply(&self, assignment: Assignment) -> Result<(), Status> {
+    pub fn apply(&self, plan: impl Into<ApplyPlan>) -> Result<Vec<u64>, Status> {
+        let plan = plan.into();
         // Compared under the lock: of two plans that were prepared at the same time the higher one stays.
         let mut plans = self.plans.lock();
-        if plans.admits(&assignment)? {
-            plans.put(assignment);
-            drop(plans);
+        let is_new = plans.admits(&plan.assignment)?;
+        if is_new {
+            plans.put(plan.assignment.clone());
+        }
+        let ended = plans.forget(plan);
+        drop(plans);
+        if is_new || !ended.is_empty() {
             self.changes.send_modify(|changes| *changes += 1);
         }
-        Ok(())
+        Ok(ended)
+    }
+
+    /// Whether a plan in force has a set.
+    #[must_use]
+    pub fn have_set(&self, content: &SetContent, set_index: u32) -> bool {
+        let plans: Vec<_> = self.plans.lock().workloads.iter().filter_map(|of| of.in_force().cloned()).collect();
+        plans.iter().any(|plan| has_set(plan, content, set_index))
     }
 
     /// Resolves when `ends` holds for a workload's plan in force, or for its absence.
@@ -192,14 +222,18 @@ impl PlansInForce {
         plan_epoch: u64,
         wanted: impl Fn(&WorkloadPlans) -> Option<&Arc<Assignment>>,
     ) -> Result<Arc<Assignment>, Status> {
-        let mut plans = self.plans.lock();
-        let workload = plans.of(workload_number).map(|workload| &*workload);
-        if let Some(plan) = workload.and_then(wanted) {
-            return Ok(plan.clone());
-        }
+        // The refusal is encoded after the lock is released: it holds a whole plan.
+        let in_force = {
+            let mut plans = self.plans.lock();
+            let workload = plans.of(workload_number).map(|workload| &*workload);
+            if let Some(plan) = workload.and_then(wanted) {
+                return Ok(plan.clone());
+            }
+            workload.and_then(WorkloadPlans::in_force).cloned()
+        };
         let refused = format!("plan_epoch {plan_epoch} of workload {workload_number} is not in force");
-        match workload.and_then(WorkloadPlans::in_force) {
-            Some(plan) => Err(refuse_plan(plan, format!("{refused} on {}, {} is", self.node_name, plan.plan_epoch))),
+        match in_force {
+            Some(plan) => Err(refuse_plan(&plan, format!("{refused} on {}, {} is", self.node_name, plan.plan_epoch))),
             None => Err(Status::failed_precondition(format!("{refused} on {}, none is", self.node_name))),
         }
     }
@@ -332,7 +366,7 @@ pub(crate) mod tests {
         assert!(plans.follow(1, 4).is_err() && plans.follow(1, 6).is_err() && plans.remembered(1, 4).is_err());
         let in_force = wire::plan_in_force(&plans.require(1, 3).unwrap_err());
         assert_eq!(in_force.map(|plan| plan.plan_epoch), Some(5), "the refusal names it");
-        (6..20).for_each(|epoch| plans.apply(plan(1, epoch)).unwrap());
+        (6..20).for_each(|epoch| drop(plans.apply(plan(1, epoch)).unwrap()));
         assert!(plans.follow(1, 5).is_err() && plans.remembered(1, 11).is_err() && plans.follow(1, 12).is_ok());
         plans.apply(of_another_scene(plan(1, 20))).unwrap();
         assert!(plans.follow(1, 19).is_err() && plans.remembered(1, 19).is_err(), "it shows something else");
@@ -341,10 +375,45 @@ pub(crate) mod tests {
     #[test]
     fn the_workload_that_was_used_longest_ago_leaves() {
         let plans = PlansInForce::new("n");
-        (1..=16).for_each(|number| plans.apply(plan(number, number)).unwrap());
+        let most = MAX_WORKLOADS as u64;
+        (1..=most).for_each(|number| drop(plans.apply(plan(number, number)).unwrap()));
         assert!(plans.in_force(1).is_some(), "it was used now");
-        plans.apply(plan(17, 17)).unwrap();
-        assert!(plans.in_force(2).is_none() && plans.in_force(1).is_some() && plans.in_force(17).is_some());
+        plans.apply(plan(most + 1, most + 1)).unwrap();
+        assert!(plans.in_force(2).is_none() && plans.in_force(1).is_some() && plans.in_force(most + 1).is_some());
+    }
+
+    #[test]
+    fn workloads_that_have_ended_are_forgotten_whatever_comes_late() {
+        let plans = PlansInForce::new("n");
+        [plan(1, 3), plan(2, 4), plan(5, 6)].into_iter().for_each(|plan| drop(plans.apply(plan).unwrap()));
+        let telling =
+            |plan_epoch, open: &[u64]| ApplyPlan { open_workloads: open.to_vec(), ..plan(1, plan_epoch).into() };
+        assert_eq!(plans.apply(telling(7, &[1, 5])).unwrap(), [2]);
+        assert!(plans.in_force(2).is_none() && plans.in_force(5).is_some());
+        assert!(plans.require(2, 4).unwrap_err().message().ends_with("none is"));
+        let late = plans.apply(plan(2, 5)).unwrap_err();
+        assert_eq!((late.code(), late.message()), (Code::FailedPrecondition, "workload 2 has ended"));
+        assert_eq!(plans.apply(telling(9, &[1, 5, 8])).unwrap(), [0; 0]);
+        assert!(plans.apply(telling(8, &[1])).is_err(), "a plan of before is refused");
+        assert!(plans.in_force(5).is_some(), "and its list does not count");
+        plans.apply(plan(8, 8)).unwrap();
+        plans.apply(ApplyPlan { open_workloads: vec![1, 8], ..plan(8, 10).into() }).unwrap();
+        let both = (plans.in_force(5).is_none(), plans.in_force(8).map(|plan| plan.plan_epoch));
+        assert_eq!(both, (true, Some(10)));
+        assert_eq!(plans.apply(plan(1, 11)).unwrap(), [0; 0], "nothing is told");
+        let content = plan(1, 1).set_content(0).unwrap();
+        assert!(plans.have_set(&content, 0));
+    }
+
+    #[tokio::test]
+    async fn a_wait_ends_with_its_workload() {
+        let plans = PlansInForce::new("n");
+        plans.apply(plan(1, 3)).unwrap();
+        let waiting = plans.clone();
+        let waits = tokio::spawn(async move { waiting.until(1, |plan| plan.is_none()).await });
+        tokio::task::yield_now().await;
+        plans.apply(ApplyPlan { open_workloads: vec![2], ..plan(2, 4).into() }).unwrap();
+        waits.await.unwrap();
     }
 
     #[test]

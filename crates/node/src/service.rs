@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use cluster::{ApplyPlan, MeasureCosts, Measured, Ready};
+use cluster::{ApplyPlan, Assignment, MeasureCosts, Measured, Ready};
 use parking_lot::Mutex;
 use tonic::{Status, async_trait};
 use wire::rpc;
@@ -13,6 +13,7 @@ use crate::engine::Engine;
 use crate::measure::measure_costs;
 use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
+use crate::set_memory::SetMemory;
 use crate::telemetry::NodeMetrics;
 
 /// Measured costs that are cached.
@@ -24,15 +25,22 @@ pub struct NodeService {
     plans: PlansInForce,
     scenes: Arc<Scenes>,
     metrics: NodeMetrics,
+    memory: Vec<Arc<dyn SetMemory>>,
     /// Measured costs, the oldest first: a coordinator that was restarted need not wait for them again.
     measured: Mutex<VecDeque<(MeasureCosts, Measured)>>,
 }
 
 impl NodeService {
-    /// The service of one node.
+    /// The service of one node, whose roles keep sets in `memory`.
     #[must_use]
-    pub fn new(engine: Arc<dyn Engine>, plans: PlansInForce, scenes: Arc<Scenes>, metrics: NodeMetrics) -> Self {
-        Self { engine, plans, scenes, metrics, measured: Mutex::default() }
+    pub fn new(
+        engine: Arc<dyn Engine>,
+        plans: PlansInForce,
+        scenes: Arc<Scenes>,
+        metrics: NodeMetrics,
+        memory: Vec<Arc<dyn SetMemory>>,
+    ) -> Self {
+        Self { engine, plans, scenes, metrics, memory, measured: Mutex::default() }
     }
 }
 
@@ -55,11 +63,16 @@ impl rpc::Node for NodeService {
         Ok(measured)
     }
 
-    async fn apply_assignment(&self, ApplyPlan { assignment, .. }: ApplyPlan) -> Result<Ready, Status> {
-        self.plans.admits(&assignment)?;
-        let (plan_epoch, workload_number) = (assignment.plan_epoch, assignment.workload_number);
-        let scene_load_s = self.scenes.ensure(&assignment.workload.scene).await?;
-        self.plans.apply(assignment)?;
+    async fn apply_assignment(&self, plan: ApplyPlan) -> Result<Ready, Status> {
+        let Assignment { plan_epoch, workload_number, workload, .. } = &plan.assignment;
+        let (plan_epoch, workload_number) = (*plan_epoch, *workload_number);
+        self.plans.admits(&plan.assignment)?;
+        let scene_load_s = self.scenes.ensure(&workload.scene).await?;
+        let ended = self.plans.apply(plan)?;
+        if !ended.is_empty() {
+            let freed_bytes: usize = self.memory.iter().map(|memory| memory.free_ended(&self.plans)).sum();
+            tracing::info!(node = &*self.plans.node_name, ?ended, freed_bytes, "workloads have ended");
+        }
         self.metrics.plan_epoch.set(i64::try_from(self.plans.epoch()).unwrap_or(i64::MAX));
         tracing::info!(node = &*self.plans.node_name, workload_number, plan_epoch, "plan in force");
         Ok(Ready { plan_epoch, scene_load_s })

@@ -3,8 +3,10 @@
 use cluster::Workload;
 use depth_image::{Camera, DepthImage, SpecularPlanes};
 
-/// Inverse depth, colour, a normal, a surface, reflectance, a corner's depth and a mark, for one texel.
-const MOST_TEXEL_BYTES: usize = 4 + 4 + 4 + 8 + 4 + 4 + 1;
+/// Inverse depth, colour, a normal, a surface, reflectance and a mark, for one texel.
+const MOST_TEXEL_BYTES: usize = 4 + 4 + 4 + 8 + 4 + 1;
+/// The inverse depth of a texel's corner; an image has a column and a row of them more than of texels.
+const CORNER_BYTES: usize = 4;
 /// The least and the greatest depth of all levels of a pyramid, for one texel: 8 · 4/3.
 const PYRAMID_TEXEL_BYTES: usize = 11;
 
@@ -12,8 +14,11 @@ const PYRAMID_TEXEL_BYTES: usize = 11;
 #[must_use]
 pub fn most_image_bytes(workload: &Workload, cameras: &[Camera]) -> usize {
     let visibility_bytes = 4 * SpecularPlanes::visibility_planes(workload.illumination.lights.len());
-    let texels: usize = cameras.iter().map(|Camera::Pinhole(camera)| camera.pixel_count()).sum();
-    texels * (MOST_TEXEL_BYTES + visibility_bytes)
+    let bytes = |Camera::Pinhole(camera): &Camera| {
+        let corners = (camera.size_px.x as usize + 1) * (camera.size_px.y as usize + 1);
+        camera.pixel_count() * (MOST_TEXEL_BYTES + visibility_bytes) + corners * CORNER_BYTES
+    };
+    cameras.iter().map(bytes).sum()
 }
 
 /// The most bytes of a workload's set on a device.
@@ -76,10 +81,10 @@ mod tests {
             surface_id: Some(vec![depth_image::SurfaceId { instance: 0, primitive: 0 }; 256]),
             specular: Some(specular),
             passed: Some(vec![false; 256]),
-            // A column and a row more are no matter.
-            corner_inverse_depth_per_m: Some(vec![0.0; 256]),
+            corner_inverse_depth_per_m: Some(vec![0.0; 17 * 17]),
             ..plain
         };
+        full.validate().unwrap();
         assert_eq!(set_bytes(&[full.clone(), full]), most_set_bytes(&workload));
     }
 }

@@ -149,7 +149,7 @@ mod tests {
 
     fn plans(workloads: u64) -> PlansInForce {
         let plans = PlansInForce::new("n");
-        (1..=workloads).for_each(|number| plans.apply(crate::plan::tests::plan(number, 6 + number)).unwrap());
+        (1..=workloads).for_each(|number| drop(plans.apply(crate::plan::tests::plan(number, 6 + number)).unwrap()));
         plans
     }
 

@@ -3,7 +3,9 @@
 use std::num::NonZeroU32;
 use std::time::Duration;
 
-use cluster::{Assignment, Policy, RenderViews, RequestedView, SamplerShare, SessionRequest, Timeline, Workload};
+use cluster::{
+    ApplyPlan, Assignment, Policy, RenderViews, RequestedView, SamplerShare, SessionRequest, Timeline, Workload,
+};
 use cluster_tests::cluster::{Cluster, camera, rig, views, whole_frame};
 use cluster_tests::watcher::eventually;
 use codec::{FrameHeader, WholeFrame};
@@ -163,6 +165,61 @@ async fn a_set_that_is_wanted_is_fetched_once_whatever_the_plan() {
     engine.release();
     timeout(HEALED, whole_frame(&mut raw.parts)).await.expect("the set that was fetched under the first plan");
     assert_eq!(cluster.take_counts(), [1; 3], "each image once");
+}
+
+/// The plan of another workload that is open alone: all others have ended.
+fn alone(plan: &Assignment, workload_number: u64, plan_epoch: u64) -> ApplyPlan {
+    let assignment = Assignment { workload_number, plan_epoch, ..plan.clone() };
+    ApplyPlan { assignment, open_workloads: vec![workload_number] }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_set_that_two_workloads_fetch_is_there_for_the_second_when_the_first_has_ended() {
+    let cluster = Cluster::start(1).await;
+    let session = cluster.session(pipeline(STILL)).await.unwrap();
+    let plan = session.plan().assignment;
+    let engine = &cluster.engines[0];
+    engine.hold_samples_from(eye(&rig()[0]));
+    let address = compositor_of(&session).0;
+    let mut first = opened(&address, &plan).await;
+    first.say_at(Some((1, camera(0.0, SIZE_PX))), 0).await;
+    eventually("sampling has begun", HEALED, || engine.held_calls() == 1).await;
+    let next = alone(&plan, plan.plan_epoch + 1, plan.plan_epoch + 1);
+    apply(&cluster, &next.assignment).await;
+    let mut second = opened(&address, &next.assignment).await;
+    second.say_at(Some((1, camera(0.0, SIZE_PX))), 0).await;
+    assert_eq!(second.frame().await, None, "both wait for one fetch");
+    let next = alone(&plan, plan.plan_epoch + 1, plan.plan_epoch + 2);
+    NodeClient::new(connect(&address).await.unwrap()).apply_assignment(next).await.unwrap();
+    let refused = first.refused().await;
+    assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
+    engine.release();
+    timeout(HEALED, whole_frame(&mut second.parts)).await.expect("the set goes on");
+    assert_eq!(cluster.take_counts(), [1; 3], "each image once");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_sets_of_workloads_that_have_ended_are_freed() {
+    let cluster = Cluster::start(1).await;
+    let session = cluster.session(pipeline(STILL)).await.unwrap();
+    let plan = session.plan().assignment;
+    let address = compositor_of(&session).0;
+    let node = NodeClient::new(connect(&address).await.unwrap());
+    let mut number = plan.workload_number;
+    shown(&mut opened(&address, &plan).await, 1, 0.0).await;
+    assert_eq!(cluster.take_counts(), [1; 3]);
+    for (is_open, samples) in [(true, vec![]), (false, vec![1; 3])] {
+        let workload = Workload { sample_cameras: shifted_rig(AWAY_M), ..plan.workload.clone() };
+        let between = Assignment { workload, ..plan.clone() };
+        let mut between = alone(&between, number + 10, number + 10);
+        between.open_workloads.extend(is_open.then_some(number));
+        node.apply_assignment(between).await.unwrap();
+        number += 20;
+        let again = alone(&plan, number, number);
+        node.apply_assignment(again.clone()).await.unwrap();
+        shown(&mut opened(&address, &again.assignment).await, 1, 0.0).await;
+        assert_eq!(cluster.take_counts(), samples, "open: {is_open}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
