@@ -46,11 +46,13 @@ struct Recorded<'g> {
 }
 
 /// Work whose last slice is under way. It holds the device until it is waited for or dropped: a thread that has it asks for
-/// no other turn.
+/// no other turn. While a live stream is open, it has ended: no work of the host lies between the device's end and others'
+/// turns.
 pub struct Submitted<'g> {
     gpu: &'g Gpu,
-    slice: Slice<'g>,
-    /// Seconds of the slices before.
+    /// The slice that is under way.
+    slice: Option<Slice<'g>>,
+    /// Seconds of the slices that have ended.
     earlier_s: f64,
     timer: Option<Timer>,
     reads: Vec<PooledBuffer>,
@@ -168,19 +170,25 @@ impl<'g> Recorded<'g> {
         loop {
             self.gpu.faults.check_lost()?;
             let slice = Slice::submit(self.gpu, slot, &mut self.pieces);
-            let Self { gpu, pieces, .. } = &self;
-            if pieces.is_empty() {
-                let Self { gpu, timer, reads, .. } = self;
-                let mapped = map(&reads, timer.as_ref());
-                return Ok(Submitted { gpu, slice, earlier_s, timer, reads, mapped });
+            if self.pieces.is_empty() {
+                return self.submitted(slice, earlier_s);
             }
-            let Slice { slot: held, index, work, started } = slice;
-            wait(gpu, index)?;
-            let slice_s = started.elapsed().as_secs_f64();
-            gpu.device_queue.learn(&work, slice_s);
+            let (held, slice_s) = slice.ended(self.gpu)?;
             earlier_s += slice_s;
-            slot = held.next(predicted_s(gpu, pieces));
+            slot = held.next(predicted_s(self.gpu, &self.pieces));
         }
+    }
+
+    fn submitted(self, last: Slice<'g>, earlier_s: f64) -> Result<Submitted<'g>, GpuError> {
+        let Self { gpu, timer, reads, .. } = self;
+        let mapped = map(&reads, timer.as_ref());
+        let mut submitted = Submitted { gpu, slice: None, earlier_s, timer, reads, mapped };
+        if gpu.device_queue.cuts() {
+            submitted.earlier_s += last.ended(gpu)?.1;
+        } else {
+            submitted.slice = Some(last);
+        }
+        Ok(submitted)
     }
 }
 
@@ -235,35 +243,56 @@ impl<'g> Slice<'g> {
     }
 }
 
+impl<'g> Slice<'g> {
+    /// Waits for the device and learns from the time that it took.
+    fn ended(self, gpu: &Gpu) -> Result<(Slot<'g>, f64), GpuError> {
+        let Self { slot, index, work, started } = self;
+        wait(gpu, index)?;
+        let slice_s = started.elapsed().as_secs_f64();
+        gpu.device_queue.learn(&work, slice_s);
+        Ok((slot, slice_s))
+    }
+}
+
 impl Submitted<'_> {
     /// Blocks until the device is done with this frame.
     ///
     /// # Errors
     /// When the device is lost.
     pub fn wait(mut self) -> Result<FrameResult, GpuError> {
-        wait(self.gpu, self.slice.index.clone())?;
-        let wall_s = self.slice.started.elapsed().as_secs_f64();
+        let mut device_s = self.earlier_s;
+        // Where the device was done before anybody waited, the time since is the host's.
+        let was_done = self.gpu.device.poll(wgpu::PollType::Poll).is_ok_and(|status| status.is_queue_empty());
+        let slice = self.slice.take();
+        if let Some(slice) = &slice {
+            wait(self.gpu, slice.index.clone())?;
+        }
+        let wall_s = slice.as_ref().map_or(0.0, |slice| slice.started.elapsed().as_secs_f64());
         for _ in 0..self.reads.len() + usize::from(self.timer.is_some()) {
             let mapped = self.mapped.recv().map_err(|error| GpuError::Lost(error.to_string()))?;
             mapped.map_err(|error| GpuError::Lost(error.to_string()))?;
         }
-        // Time stamps of several slices would count the time between them.
-        let timer = self.timer.as_ref().filter(|_| self.earlier_s == 0.0);
-        let by_timestamp =
-            timer.zip(self.gpu.timestamp_period_ns).and_then(|(timer, period_ns)| timer.seconds(period_ns));
-        let slice_s = by_timestamp.unwrap_or(wall_s);
-        self.gpu.device_queue.learn(&self.slice.work, slice_s);
-        Ok(FrameResult { device_s: self.earlier_s + slice_s, reads: std::mem::take(&mut self.reads) })
+        if let Some(slice) = slice {
+            // Time stamps of several slices would count the time between them.
+            let timer = self.timer.as_ref().filter(|_| self.earlier_s == 0.0);
+            let by_timestamp =
+                timer.zip(self.gpu.timestamp_period_ns).and_then(|(timer, period_ns)| timer.seconds(period_ns));
+            if by_timestamp.is_some() || !was_done {
+                self.gpu.device_queue.learn(&slice.work, by_timestamp.unwrap_or(wall_s));
+            }
+            device_s += by_timestamp.unwrap_or(wall_s);
+        }
+        Ok(FrameResult { device_s, reads: std::mem::take(&mut self.reads) })
     }
 }
 
 impl Drop for Submitted<'_> {
     /// Host memory goes back to its pool when the device is done with it.
     fn drop(&mut self) {
-        if !self.reads.is_empty() {
-            let _ = wait(self.gpu, self.slice.index.clone());
-            self.reads.iter().for_each(|buffer| buffer.unmap());
+        if let Some(slice) = self.slice.as_ref().filter(|_| !self.reads.is_empty()) {
+            let _ = wait(self.gpu, slice.index.clone());
         }
+        self.reads.iter().for_each(|buffer| buffer.unmap());
     }
 }
 

@@ -9,17 +9,30 @@ use wgpu::BufferUsages;
 
 use crate::{device::Gpu, faults::Faults};
 
-/// Items that nobody has; the one that came back last is at the end.
+/// The most bytes of free buffers: those of a few batches.
+const MOST_FREE_BYTES: u64 = 256 << 20;
+
+/// Items that nobody has.
 struct Free<K, T> {
-    /// With the device's shortages of memory when the first of them came back.
-    items: Mutex<(u64, VecDeque<(K, T)>)>,
-    most: usize,
+    items: Mutex<FreeItems<K, T>>,
+    /// The most weight of all of them.
+    most: u64,
+    weight: fn(&K) -> u64,
     faults: Option<Arc<Faults>>,
 }
 
+struct FreeItems<K, T> {
+    /// The device's shortages of memory when the first of them came back.
+    shortages: u64,
+    /// The one that came back last is at the end.
+    items: VecDeque<(K, T)>,
+    weight: u64,
+}
+
 impl<K, T> Free<K, T> {
-    fn new(most: usize, faults: Option<Arc<Faults>>) -> Self {
-        Self { items: Mutex::new((0, VecDeque::new())), most, faults }
+    fn new(most: u64, weight: fn(&K) -> u64, faults: Option<Arc<Faults>>) -> Self {
+        let items = FreeItems { shortages: 0, items: VecDeque::new(), weight: 0 };
+        Self { items: Mutex::new(items), most, weight, faults }
     }
 
     fn shortages(&self) -> u64 {
@@ -53,13 +66,14 @@ impl<K, T> Pool<K, T> {
     /// A pool that keeps at most `most_free` items that nobody has; the one that came back first goes first.
     #[must_use]
     pub fn keeping(most_free: usize) -> Self {
-        Self(Arc::new(Free::new(most_free, None)))
+        Self(Arc::new(Free::new(most_free as u64, |_| 1, None)))
     }
 
-    /// The same for resources of a device. What was lent before its memory ran out is not lent again.
+    /// A pool of resources of a device that keeps at most `most_bytes` of them free. What was lent before the device's memory
+    /// ran out is not lent again.
     #[must_use]
-    pub fn of_device(gpu: &Gpu, most_free: usize) -> Self {
-        Self(Arc::new(Free::new(most_free, Some(gpu.faults.clone()))))
+    pub fn of_device(gpu: &Gpu, most_bytes: u64, bytes: fn(&K) -> u64) -> Self {
+        Self(Arc::new(Free::new(most_bytes, bytes, Some(gpu.faults.clone()))))
     }
 }
 
@@ -69,12 +83,13 @@ impl<K: PartialEq, T> Pool<K, T> {
     pub fn lend(&self, kind: K, make: impl FnOnce(&K) -> T) -> Lent<K, T> {
         let shortages = self.0.shortages();
         let kept = {
-            let (since, free) = &mut *self.0.items.lock();
-            if std::mem::replace(since, shortages) != shortages {
+            let mut free = self.0.items.lock();
+            if std::mem::replace(&mut free.shortages, shortages) != shortages {
                 // The device needs the memory, and some may have none.
-                free.clear();
+                (free.items, free.weight) = (VecDeque::new(), 0);
             }
-            free.iter().rposition(|(other, _)| *other == kind).and_then(|at| free.remove(at))
+            let at = free.items.iter().rposition(|(other, _)| *other == kind);
+            at.and_then(|at| free.items.remove(at)).inspect(|_| free.weight -= (self.0.weight)(&kind))
         };
         let lent = kept.unwrap_or_else(|| {
             let made = make(&kind);
@@ -106,13 +121,19 @@ impl<K, T> Deref for Lent<K, T> {
 impl<K, T> Drop for Lent<K, T> {
     fn drop(&mut self) {
         let (Some(home), Some(lent)) = (self.home.upgrade(), self.lent.take()) else { return };
-        let (since, free) = &mut *home.items.lock();
-        if *since != self.shortages || home.shortages() != self.shortages {
+        let mut free = home.items.lock();
+        if free.shortages != self.shortages || home.shortages() != self.shortages {
             return;
         }
-        free.push_back(lent);
-        if free.len() > home.most {
-            free.pop_front();
+        let weight = (home.weight)(&lent.0);
+        if weight > home.most {
+            return;
+        }
+        free.weight += weight;
+        free.items.push_back(lent);
+        while free.weight > home.most {
+            let Some((first, _)) = free.items.pop_front() else { return };
+            free.weight -= (home.weight)(&first);
         }
     }
 }
@@ -121,7 +142,7 @@ impl BufferPool {
     /// An empty pool.
     #[must_use]
     pub fn new(gpu: &Arc<Gpu>) -> Self {
-        Self { gpu: gpu.clone(), buffers: Pool::of_device(gpu, usize::MAX) }
+        Self { gpu: gpu.clone(), buffers: Pool::of_device(gpu, MOST_FREE_BYTES, |&(bytes, _)| bytes) }
     }
 
     fn lend(&self, label: &str, bytes: u64, usage: BufferUsages) -> PooledBuffer {
@@ -162,5 +183,21 @@ mod tests {
         let outlives = lend('f', 12);
         drop(pool);
         assert_eq!(*outlives, 12);
+    }
+
+    #[test]
+    fn free_items_are_bounded_in_weight_and_those_unused_for_longest_go_first() {
+        let pool = Pool(Arc::new(Free::new(10, |weight: &u64| *weight, None)));
+        let kept = || pool.0.items.lock().items.iter().map(|(weight, ())| *weight).collect::<Vec<_>>();
+        let lend = |weight: u64| pool.lend(weight, |_| ());
+        let (five, four, one) = (lend(5), lend(4), lend(1));
+        drop((five, four, one));
+        assert_eq!(kept(), [5, 4, 1]);
+        drop(lend(5));
+        assert_eq!(kept(), [4, 1, 5], "it was used last");
+        drop(lend(3));
+        assert_eq!(kept(), [1, 5, 3]);
+        drop(lend(11));
+        assert_eq!((kept(), pool.0.items.lock().weight), (vec![1, 5, 3], 9), "larger than all that is kept");
     }
 }

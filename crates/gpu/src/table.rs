@@ -18,6 +18,8 @@ pub(crate) const TABLE_WIDTH_LOG2: u32 = 12;
 /// Larger tables are filled through memory that is not kept: there is much of it, and a device may have no buffer of that
 /// size.
 const MOST_STAGED_BYTES: usize = 64 << 20;
+/// The most bytes of free textures: about a sample set's.
+const MOST_FREE_BYTES: u64 = 64 << 20;
 /// The alignment of rows within a chunk.
 const ROW_ALIGNMENT: wgpu::BufferSize = wgpu::BufferSize::new(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as u64).unwrap();
 
@@ -80,11 +82,15 @@ impl Deref for Table {
 }
 
 impl TablePool {
-    /// A pool that keeps at most `most_free` textures for tables to come.
+    /// A pool that keeps textures for tables to come.
     #[must_use]
-    pub fn new(gpu: &Arc<Gpu>, most_free: usize) -> Self {
+    pub fn new(gpu: &Arc<Gpu>) -> Self {
         let staging = Staging { belt: StagingBelt::new(gpu.device.clone(), 0), chunk_bytes: 0 };
-        Self { gpu: gpu.clone(), textures: Pool::of_device(gpu, most_free), staging: Mutex::new(staging) }
+        Self {
+            gpu: gpu.clone(),
+            textures: Pool::of_device(gpu, MOST_FREE_BYTES, Shape::bytes),
+            staging: Mutex::new(staging),
+        }
     }
 
     /// A table of elements, which take whole texels of `format`.
@@ -162,6 +168,10 @@ impl Shape {
         Ok(Self { format, rows: texels.div_ceil(TABLE_WIDTH as usize).max(1) as u32 })
     }
 
+    fn bytes(&self) -> u64 {
+        self.row_bytes() as u64 * u64::from(self.rows)
+    }
+
     fn row_bytes(&self) -> usize {
         TABLE_WIDTH as usize * texel_bytes(self.format)
     }
@@ -188,7 +198,7 @@ mod tests {
     #[test]
     fn a_dropped_tables_texture_is_lent_to_the_next_of_its_shape() {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let pool = TablePool::new(&gpu, 5);
+        let pool = TablePool::new(&gpu);
         let upload = |texels: usize| {
             pool.upload("words", TextureFormat::Rg32Uint, &vec![[7_u32; 2]; texels], Turn::default()).expect("a table")
         };

@@ -8,7 +8,7 @@ use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 use crate::in_flight::{InFlight, Statistics};
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
 use crate::recording::{Recording, batches};
-use crate::sample_set::{MAX_TABLES, SampleSet, SetDescription};
+use crate::sample_set::{SampleSet, SetDescription};
 use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
 use crate::{fill, shaders::templates, specular, tile_start};
 
@@ -42,7 +42,7 @@ impl Reconstructor {
     pub fn new(gpu: &Arc<Gpu>) -> Result<Self, ReconstructionError> {
         let templates = Arc::new(templates()?);
         Ok(Self {
-            tables: TablePool::new(gpu, MAX_TABLES),
+            tables: TablePool::new(gpu),
             drawing: QuadDrawing::new(gpu, &templates),
             calls: JobLimit::of(CALLS_OF_A_CLASS),
             device: Device { gpu: gpu.clone(), buffers: BufferPool::new(gpu), passes: PassCache::new(gpu, &templates) },

@@ -11,9 +11,6 @@ use crate::pyramid::{CodedDepth, Pyramid, cell_row, is_among_holes};
 use crate::view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant};
 use crate::{error::ReconstructionError, quads::SetMeshes, reflectors::Reflectors};
 
-/// Tables of one set.
-pub(crate) const MAX_TABLES: usize = 5;
-
 /// The padding of the volume, in parts of its longest edge. All cameras must still enter a surface on the very face of the
 /// volume, although their samples of a slope are steps.
 pub(crate) const VOLUME_MARGIN: f32 = 0.005;

@@ -14,6 +14,9 @@ pub(crate) const SURFACE_ID_FORMAT: TextureFormat = TextureFormat::Rg32Uint;
 /// All bits of a word: no instance has this number, and no triangle.
 pub(crate) const NOTHING: u32 = u32::MAX;
 
+/// The most bytes of free textures: those of a few batches.
+const MOST_FREE_BYTES: u64 = 128 << 20;
+
 /// The textures that are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct SurfaceKind {
@@ -22,6 +25,13 @@ pub(crate) struct SurfaceKind {
     pub surface_id: bool,
     /// The nearest surface is wanted besides the one that is shown.
     pub front: bool,
+}
+
+impl SurfaceKind {
+    fn bytes(&self) -> u64 {
+        let pixel = 16 + 4 * (1 + u64::from(self.front)) + 8 * u64::from(self.surface_id);
+        pixel * u64::from(self.size_px.x) * u64::from(self.size_px.y)
+    }
 }
 
 /// Texture views of one kind.
@@ -48,7 +58,7 @@ pub(crate) struct Surfaces {
 
 impl SurfacePool {
     pub fn new(gpu: &Arc<Gpu>) -> Self {
-        Self { gpu: gpu.clone(), surfaces: Pool::of_device(gpu, usize::MAX) }
+        Self { gpu: gpu.clone(), surfaces: Pool::of_device(gpu, MOST_FREE_BYTES, SurfaceKind::bytes) }
     }
 
     /// Surface ids are drawn into `own_ids`, which are not lent, where there are any.

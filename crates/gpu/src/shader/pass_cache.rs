@@ -10,6 +10,9 @@ use super::template::Templates;
 use super::variant::{Pass, ShaderVariant, source};
 use crate::{device::Gpu, error::ShaderError};
 
+/// Passes that are kept; the one that was used longest ago goes first.
+const MOST_PASSES: usize = 256;
+
 /// A pass, once it is built.
 type Entry<P> = Arc<Mutex<Option<Arc<P>>>>;
 
@@ -17,14 +20,39 @@ type Entry<P> = Arc<Mutex<Option<Arc<P>>>>;
 pub struct PassCache<P = ComputePass> {
     gpu: Arc<Gpu>,
     templates: Arc<Templates>,
-    passes: Mutex<HashMap<String, Entry<P>>>,
+    passes: Mutex<Passes<P>>,
+}
+
+struct Passes<P> {
+    /// With the clock's value when they were last used.
+    entries: HashMap<String, (Entry<P>, u64)>,
+    /// Counts uses.
+    clock: u64,
+}
+
+impl<P> Passes<P> {
+    fn entry(&mut self, name: String) -> Entry<P> {
+        self.clock += 1;
+        let (entry, last_used) = self.entries.entry(name).or_default();
+        *last_used = self.clock;
+        let entry = entry.clone();
+        if self.entries.len() > MOST_PASSES {
+            let oldest = self.entries.iter().min_by_key(|(_, (_, last_used))| *last_used).map(|(name, _)| name.clone());
+            oldest.and_then(|name| self.entries.remove(&name));
+        }
+        entry
+    }
 }
 
 impl<P> PassCache<P> {
     /// An empty cache.
     #[must_use]
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        Self { gpu: gpu.clone(), templates: templates.clone(), passes: Mutex::default() }
+        Self {
+            gpu: gpu.clone(),
+            templates: templates.clone(),
+            passes: Mutex::new(Passes { entries: HashMap::new(), clock: 0 }),
+        }
     }
 
     /// The pass of a variant, built at the first call.
@@ -35,7 +63,7 @@ impl<P> PassCache<P> {
     where
         P: Pass<V>,
     {
-        let entry = self.passes.lock().entry(variant.name()).or_default().clone();
+        let entry = self.passes.lock().entry(variant.name());
         // Held while the pass is built: only those who want this one wait.
         let mut entry = entry.lock();
         if let Some(pass) = &*entry {
@@ -78,6 +106,18 @@ mod tests {
         fn build(_: &Gpu, _: Shader, _: &Fast) -> Self {
             Self
         }
+    }
+
+    #[test]
+    fn passes_by_the_thousand_leave_those_that_are_in_use() {
+        let mut passes = Passes::<()> { entries: HashMap::new(), clock: 0 };
+        for number in 0..2000 {
+            passes.entry("in use".to_owned());
+            passes.entry(number.to_string());
+        }
+        let mut kept = ["in use", "1999", "1"].map(|name| passes.entries.contains_key(name)).to_vec();
+        kept.push(passes.entries.len() == MOST_PASSES);
+        assert_eq!(kept, [true, true, false, true]);
     }
 
     #[test]

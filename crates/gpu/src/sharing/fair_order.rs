@@ -49,6 +49,8 @@ struct ClassOrder {
     /// By arrival.
     waiting: Vec<Waiting>,
     flows: Vec<Flow>,
+    /// The flow whose work is on the device: it is remembered, for it is yet to be charged.
+    running: Option<u64>,
     /// The start of the work that went last, on the clock of the flows.
     virtual_s: f64,
     /// Device time that the class may take before higher classes.
@@ -132,10 +134,13 @@ impl ClassOrder {
     fn take(&mut self) -> Option<Waiting> {
         let (place, start_s) = self.first()?;
         self.virtual_s = self.virtual_s.max(start_s);
-        Some(self.waiting.remove(place))
+        let gone = self.waiting.remove(place);
+        self.running = Some(gone.flow);
+        Some(gone)
     }
 
     fn charge(&mut self, flow: u64, seconds: f64, by_credit: bool) {
+        self.running = None;
         if let Some(flow) = self.flows.iter_mut().find(|other| other.id == flow) {
             flow.end_s += seconds;
         }
@@ -149,11 +154,11 @@ impl ClassOrder {
 
     /// Forgets flows that are as new ones, then those that are nearest to it.
     fn forget(&mut self) {
-        let Self { waiting, flows, virtual_s, .. } = self;
-        let waits = |flow: &Flow| waiting.iter().any(|work| work.flow == flow.id);
-        flows.retain(|flow| flow.end_s > *virtual_s || waits(flow));
+        let Self { waiting, flows, virtual_s, running, .. } = self;
+        let has_work = |flow: &Flow| *running == Some(flow.id) || waiting.iter().any(|work| work.flow == flow.id);
+        flows.retain(|flow| flow.end_s > *virtual_s || has_work(flow));
         while flows.len() > MOST_FLOWS {
-            let idle = flows.iter().enumerate().filter(|(_, flow)| !waits(flow));
+            let idle = flows.iter().enumerate().filter(|(_, flow)| !has_work(flow));
             let Some((least, _)) = idle.min_by(|(_, a), (_, b)| a.end_s.total_cmp(&b.end_s)) else { return };
             flows.swap_remove(least);
         }
@@ -195,6 +200,27 @@ mod tests {
             assert!((pair[0] - pair[1]).abs() <= 2.0 * longest, "{had_s:?}");
         }
         assert!(had_s[0] > 20.0 * longest, "{had_s:?}");
+    }
+
+    #[test]
+    fn a_slice_is_charged_to_its_flow_whoever_arrives_while_it_runs() {
+        let mut order = FairOrder::default();
+        let (slices_s, mut had_s) = ([1.0, 0.1], [0.0; 2]);
+        (0..2).for_each(|flow| order.enter(flow, turn(Batch, flow), slices_s[flow as usize]));
+        for visitor in 2..1000 {
+            let flow = order.next().expect("work waits");
+            if flow < 2 {
+                order.enter(visitor, turn(Batch, visitor), 0.01);
+            }
+            let slice_s = slices_s.get(flow as usize).copied().unwrap_or(0.01);
+            order.used(slice_s);
+            if flow < 2 {
+                // The next slice of the same work.
+                had_s[flow as usize] += slice_s;
+                order.enter(flow, turn(Batch, flow), slice_s);
+            }
+        }
+        assert!((had_s[0] - had_s[1]).abs() <= 2.0 && had_s[0] > 3.0, "{had_s:?}");
     }
 
     #[test]

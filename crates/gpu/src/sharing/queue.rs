@@ -13,6 +13,9 @@ use super::rates::{Rates, Work};
 /// The longest slice that is planned while a live stream is open.
 pub const SLICE_S: f64 = 0.050;
 
+/// The most that a slice's units differ from those of unknown work.
+const MOST_RESIZING: u64 = 64;
+
 thread_local! {
     /// Seconds for which this thread has waited for its turn.
     static WAITED_S: Cell<f64> = const { Cell::new(0.0) };
@@ -74,16 +77,20 @@ impl DeviceQueue {
         self.live_streams.load(Ordering::Acquire) > 0
     }
 
-    /// The units of one slice of a family's work; all where work is not cut, `unknown` where no rate is known.
+    /// The units of one slice of a family's work; all where work is not cut, `unknown` where a rate is not known. Known
+    /// rates bring no more than [`MOST_RESIZING`] times as many or as few.
     #[must_use]
     pub fn slice_units(&self, family: u64, unknown: u64) -> u64 {
         if !self.cuts() {
             return u64::MAX;
         }
-        match self.forced_units.load(Ordering::Acquire) {
-            0 => self.rates.lock().slowest_unit_s(family).map_or(unknown, |unit_s| (SLICE_S / unit_s) as u64).max(1),
-            forced => forced,
+        let forced = self.forced_units.load(Ordering::Acquire);
+        if forced > 0 {
+            return forced;
         }
+        let known = self.rates.lock().slowest_unit_s(family).map(|unit_s| (SLICE_S / unit_s) as u64);
+        let bounds = [(unknown / MOST_RESIZING).max(1), unknown.saturating_mul(MOST_RESIZING).max(1)];
+        known.unwrap_or(unknown).clamp(bounds[0], bounds[1])
     }
 
     /// The slices that have gone to the device so far.
@@ -256,15 +263,16 @@ mod tests {
     fn pieces_are_merged_up_to_a_slice_while_a_live_stream_is_open() {
         let queue = Arc::new(DeviceQueue::default());
         let (known, unknown) = (WorkKind::new(1, &0), WorkKind::new(1, &1));
-        (0..2).for_each(|_| queue.learn(&[(known, 1000)], SLICE_S));
+        queue.learn(&[(known, 1000)], SLICE_S);
         let pieces = [[(known, 400)], [(known, 400)], [(known, 400)], [(unknown, 1)]];
         let merged = |from: usize| queue.merged(pieces[from..].iter().map(<[_; 1]>::as_slice));
-        assert_eq!((merged(0), queue.slice_units(1, 5)), (4, u64::MAX), "nobody watches");
+        assert_eq!((merged(0), queue.slice_units(1, 50)), (4, u64::MAX), "nobody watches");
         let live = queue.live_stream();
         assert_eq!([merged(0), merged(2), merged(3)], [2, 1, 1]);
-        assert_eq!((queue.slice_units(1, 5), queue.slice_units(2, 5)), (1000, 5));
+        assert_eq!((queue.slice_units(1, 50), queue.slice_units(2, 50)), (1000, 50));
+        assert_eq!([1, 64 * 10_000].map(|unknown| queue.slice_units(1, unknown)), [64, 10_000], "within bounds");
         let forced = queue.force_slices(16);
-        assert_eq!((merged(0), queue.slice_units(1, 5)), (1, 16));
+        assert_eq!((merged(0), queue.slice_units(1, 50)), (1, 16));
         drop((live, forced));
         assert_eq!(merged(0), 4);
     }

@@ -7,6 +7,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 const MOST_KINDS: usize = 1024;
 /// The weight of a new measurement.
 const NEW_SHARE: f64 = 0.3;
+/// The most that one measurement counts over what was known: another process may have had the processor.
+const MOST_RISE: f64 = 4.0;
 /// The least share of a measurement that new kinds are given beside known ones.
 const LEAST_SHARE: f64 = 0.1;
 
@@ -22,20 +24,27 @@ pub(crate) type Work = (WorkKind, u64);
 
 #[derive(Debug, Default)]
 pub(crate) struct Rates {
-    known: HashMap<WorkKind, Rate>,
+    /// With the clock's value when they were last used.
+    kinds: HashMap<WorkKind, (Known, u64)>,
     clock: u64,
 }
 
+/// Of a kind that was never measured without the compiling of a shader, only its existence is known.
+type Known = Option<Rate>;
+
 #[derive(Debug, Clone, Copy)]
 struct Rate {
-    /// `None` after the first measurement, in which a device may have compiled a shader.
-    unit_s: Option<f64>,
-    /// The kind was measured alone. Until then only its family's sum is sure.
+    /// Of measurements together with others, a share.
+    unit_s: f64,
+    /// As if the kind had taken all of the time that was not sure to be another's. The same where the kind was measured alone.
+    most_unit_s: f64,
     is_sure: bool,
-    last_used: u64,
 }
 
 impl WorkKind {
+    /// The first use of a shader, in which the device may compile it. A slice with such work teaches nothing.
+    pub(crate) const FIRST_USE: Self = Self { family: 0, pass: 0 };
+
     /// A pass of a family of passes, which are cut alike.
     #[must_use]
     pub fn new(family: u64, pass: &impl Hash) -> Self {
@@ -54,56 +63,63 @@ impl WorkKind {
 impl Rates {
     /// The most seconds of work; `None` where some of its kinds is unknown.
     pub fn predicted_s(&self, work: &[Work]) -> Option<f64> {
-        work.iter().map(|&(kind, units)| Some(self.most_unit_s(kind)? * units as f64)).sum()
+        work.iter().map(|&(kind, units)| Some(self.rate(kind)?.most_unit_s * units as f64)).sum()
     }
 
-    /// The most seconds of a unit of the family's slowest kind; `None` where none is known.
+    /// The most seconds of a unit of the family's slowest kind; `None` where one of its kinds is unknown.
     pub fn slowest_unit_s(&self, family: u64) -> Option<f64> {
-        let of_family = self.known.keys().filter(|kind| kind.family == family);
-        of_family.filter_map(|&kind| self.most_unit_s(kind)).reduce(f64::max)
-    }
-
-    /// Of kinds that were only measured together, each may have taken all of the time.
-    fn most_unit_s(&self, kind: WorkKind) -> Option<f64> {
-        let own = self.known.get(&kind)?;
-        let together = self.known.iter().filter(|(other, rate)| other.family == kind.family && !rate.is_sure);
-        own.unit_s.map(|unit_s| if own.is_sure { unit_s } else { together.filter_map(|(_, rate)| rate.unit_s).sum() })
+        let of_family = self.kinds.iter().filter(|(kind, _)| kind.family == family);
+        let rates: Option<Vec<f64>> = of_family.map(|(_, (known, _))| Some((*known)?.most_unit_s)).collect();
+        rates?.into_iter().reduce(f64::max)
     }
 
     /// Learns from work that was measured together.
     pub fn learn(&mut self, work: &[Work], seconds: f64) {
         let mut sums: HashMap<WorkKind, u64> = HashMap::new();
         work.iter().for_each(|(kind, units)| *sums.entry(*kind).or_default() += units);
-        let (known, new): (Vec<Work>, Vec<Work>) = sums.into_iter().partition(|(kind, _)| self.unit_s(*kind).is_some());
-        let seconds_of = |&(kind, units): &Work| Some(self.unit_s(kind)? * units as f64);
-        let predicted_s: f64 = known.iter().filter_map(seconds_of).sum();
-        let is_sure = known.len() + new.len() == 1;
-        let new_units: u64 = new.iter().map(|(_, units)| units).sum();
-        let least_s = if known.is_empty() { seconds } else { LEAST_SHARE * seconds };
-        let of_new_s = if new_units == 0 { 0.0 } else { (seconds - predicted_s).max(least_s) };
-        let of_known = (seconds - of_new_s) / predicted_s.max(f64::MIN_POSITIVE);
+        let learned: Vec<(WorkKind, Known)> = match sums.remove(&WorkKind::FIRST_USE) {
+            Some(_) => sums.into_keys().map(|kind| (kind, self.rate(kind))).collect(),
+            None => self.learned(&sums, seconds),
+        };
         self.clock += 1;
-        for (kind, _) in known {
-            let was_sure = self.known.get(&kind).is_some_and(|rate| rate.is_sure);
-            let share = if is_sure && !was_sure { 1.0 } else { NEW_SHARE };
-            let unit_s = self.unit_s(kind).map(|unit_s| unit_s * (1.0 + share * (of_known - 1.0)));
-            self.known.insert(kind, Rate { unit_s, is_sure: is_sure || was_sure, last_used: self.clock });
-        }
-        for (kind, _) in new {
-            let unit_s = self.known.contains_key(&kind).then(|| of_new_s / new_units.max(1) as f64);
-            self.known.insert(kind, Rate { unit_s, is_sure: is_sure && unit_s.is_some(), last_used: self.clock });
-        }
+        self.kinds.extend(learned.into_iter().map(|(kind, known)| (kind, (known, self.clock))));
         self.forget();
     }
 
-    fn unit_s(&self, kind: WorkKind) -> Option<f64> {
-        self.known.get(&kind)?.unit_s
+    /// The rates of kinds after they took so long together.
+    fn learned(&self, sums: &HashMap<WorkKind, u64>, seconds: f64) -> Vec<(WorkKind, Known)> {
+        let is_alone = sums.len() == 1;
+        let rates = || sums.iter().filter_map(|(&kind, &units)| Some((self.rate(kind)?, units as f64)));
+        let predicted_s: f64 = rates().map(|(rate, units)| rate.unit_s * units).sum();
+        let sure_s: f64 = rates().filter(|(rate, _)| rate.is_sure).map(|(rate, units)| rate.unit_s * units).sum();
+        let new_kinds = sums.len() - rates().count();
+        let least_s = if new_kinds == sums.len() { seconds } else { LEAST_SHARE * seconds };
+        let of_new_s = if new_kinds == 0 { 0.0 } else { (seconds - predicted_s).max(least_s) };
+        let of_known = ((seconds - of_new_s) / predicted_s.max(f64::MIN_POSITIVE)).min(MOST_RISE);
+        let not_sure_s = (seconds - sure_s).max(LEAST_SHARE * seconds);
+        let learned = |(&kind, &units): (&WorkKind, &u64)| {
+            let (units, old) = (units.max(1) as f64, self.rate(kind));
+            let was_sure = old.is_some_and(|rate| rate.is_sure);
+            let share = if is_alone && !was_sure { 1.0 } else { NEW_SHARE };
+            let unit_s = match old {
+                Some(_) if share == 1.0 => seconds / units,
+                Some(old) => old.unit_s * (1.0 + share * (of_known - 1.0)),
+                None => of_new_s / new_kinds as f64 / units,
+            };
+            let is_sure = is_alone || was_sure;
+            (kind, Some(Rate { unit_s, most_unit_s: if is_sure { unit_s } else { not_sure_s / units }, is_sure }))
+        };
+        sums.iter().map(learned).collect()
+    }
+
+    fn rate(&self, kind: WorkKind) -> Known {
+        self.kinds.get(&kind)?.0
     }
 
     fn forget(&mut self) {
-        while self.known.len() > MOST_KINDS {
-            let oldest = self.known.iter().min_by_key(|(_, rate)| rate.last_used).map(|(kind, _)| *kind);
-            oldest.and_then(|kind| self.known.remove(&kind));
+        while self.kinds.len() > MOST_KINDS {
+            let oldest = self.kinds.iter().min_by_key(|(_, (_, last_used))| *last_used).map(|(kind, _)| *kind);
+            oldest.and_then(|kind| self.kinds.remove(&kind));
         }
     }
 }
@@ -121,21 +137,24 @@ mod tests {
     }
 
     #[test]
-    fn a_kinds_first_measurement_counts_for_nothing() {
+    fn a_slice_in_which_a_shader_was_compiled_teaches_nothing_but_that_its_kinds_exist() {
         let mut rates = Rates::default();
-        rates.learn(&[(kind(1), 100)], 50.0);
-        assert_eq!((rates.predicted_s(&[(kind(1), 1)]), rates.slowest_unit_s(7)), (None, None));
         rates.learn(&[(kind(1), 100)], 1.0);
+        assert!(near(rates.predicted_s(&[(kind(1), 50)]), 0.5), "one measurement is enough");
+        rates.learn(&[(WorkKind::FIRST_USE, 1), (kind(1), 100), (kind(2), 100)], 50.0);
         assert!(near(rates.predicted_s(&[(kind(1), 50)]), 0.5));
-        assert!(near(rates.slowest_unit_s(7), 0.01) && rates.slowest_unit_s(8).is_none());
+        assert_eq!((rates.predicted_s(&[(kind(2), 1)]), rates.slowest_unit_s(7)), (None, None));
+        assert_eq!(rates.predicted_s(&[(WorkKind::FIRST_USE, 1)]), None);
+        rates.learn(&[(kind(2), 100)], 2.0);
+        assert!(near(rates.slowest_unit_s(7), 0.02) && rates.slowest_unit_s(8).is_none());
     }
 
     #[test]
     fn a_new_kind_beside_a_known_one_has_the_rest_of_the_time() {
         let mut rates = Rates::default();
-        (0..2).for_each(|_| rates.learn(&[(kind(1), 100)], 1.0));
+        rates.learn(&[(kind(1), 100)], 1.0);
         let both = [(kind(1), 100), (kind(2), 50)];
-        (0..2).for_each(|_| rates.learn(&both, 3.0));
+        rates.learn(&both, 3.0);
         assert!(near(rates.predicted_s(&[(kind(2), 50)]), 2.0));
         assert!(near(rates.predicted_s(&both), 3.0));
         assert!(near(rates.slowest_unit_s(7), 0.04));
@@ -144,18 +163,30 @@ mod tests {
     #[test]
     fn kinds_that_were_measured_together_may_each_have_taken_all_the_time_until_one_is_measured_alone() {
         let mut rates = Rates::default();
-        let both = [(kind(1), 100), (kind(2), 100)];
-        (0..2).for_each(|_| rates.learn(&both, 2.0));
+        // Units of other families are others.
+        let other = WorkKind::new(8, &1);
+        let both = [(kind(1), 100), (other, 1)];
+        rates.learn(&both, 2.0);
         assert!(near(rates.predicted_s(&both[..1]), 2.0) && near(rates.slowest_unit_s(7), 0.02));
+        assert!(near(rates.predicted_s(&both[1..]), 2.0));
         rates.learn(&both[1..], 1.8);
         assert!(near(rates.predicted_s(&both[1..]), 1.8), "measured alone");
-        assert!(near(rates.predicted_s(&both[..1]), 1.0), "the other's own share");
+        rates.learn(&both, 2.0);
+        assert!(rates.predicted_s(&both[..1]).is_some_and(|s| s < 0.3), "the rest of the time");
+    }
+
+    #[test]
+    fn one_slow_measurement_of_many_changes_a_rate_by_less_than_two() {
+        let mut rates = Rates::default();
+        (0..2).for_each(|_| rates.learn(&[(kind(1), 100)], 1.0));
+        rates.learn(&[(kind(1), 100)], 1000.0);
+        assert!(rates.predicted_s(&[(kind(1), 100)]).is_some_and(|s| s > 1.0 && s < 2.0));
     }
 
     #[test]
     fn a_rate_that_changes_is_followed() {
         let mut rates = Rates::default();
-        (0..2).for_each(|_| rates.learn(&[(kind(1), 100)], 1.0));
+        rates.learn(&[(kind(1), 100)], 1.0);
         (0..40).for_each(|_| rates.learn(&[(kind(1), 50), (kind(1), 50)], 4.0));
         let learned_s = rates.predicted_s(&[(kind(1), 100)]).expect("known");
         assert!((learned_s - 4.0).abs() < 1e-3, "{learned_s}");
@@ -165,9 +196,9 @@ mod tests {
     fn kinds_by_the_thousand_leave_no_more_than_the_bound_and_the_newest_stay() {
         let mut rates = Rates::default();
         for pass in 0..2000 {
-            (0..2).for_each(|_| rates.learn(&[(kind(pass), 1)], 1.0));
+            rates.learn(&[(kind(pass), 1)], 1.0);
         }
-        assert_eq!(rates.known.len(), MOST_KINDS);
+        assert_eq!(rates.kinds.len(), MOST_KINDS);
         assert!(rates.predicted_s(&[(kind(1999), 1)]).is_some() && rates.predicted_s(&[(kind(0), 1)]).is_none());
     }
 }

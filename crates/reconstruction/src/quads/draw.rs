@@ -14,6 +14,8 @@ use crate::view_work::{GpuViewCamera, ONE_VIEW};
 use crate::{error::ReconstructionError, recording::Recording};
 
 const SAMPLE_FORMAT: TextureFormat = TextureFormat::R32Uint;
+/// The most bytes of free targets: those of a few batches.
+const MOST_FREE_BYTES: u64 = 64 << 20;
 const INVERSE_DEPTH: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32];
 
 /// `QuadWork` of the shader.
@@ -46,7 +48,12 @@ impl DrawVariant for DrawQuads {
 /// The size of views, and how many there are.
 type TargetKind = (UVec2, u32);
 
-/// Drawing passes, and the targets of the last batches of two sizes: most are alike.
+/// Depth and samples.
+fn target_bytes(&(size_px, count): &TargetKind) -> u64 {
+    8 * u64::from(size_px.x) * u64::from(size_px.y) * u64::from(count)
+}
+
+/// Drawing passes, and the targets of the last batches: most are alike.
 pub(crate) struct QuadDrawing {
     passes: PassCache<DrawPass>,
     targets: Pool<TargetKind, Targets>,
@@ -91,7 +98,7 @@ impl Targets {
 
 impl QuadDrawing {
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        Self { passes: PassCache::new(gpu, templates), targets: Pool::of_device(gpu, 2) }
+        Self { passes: PassCache::new(gpu, templates), targets: Pool::of_device(gpu, MOST_FREE_BYTES, target_bytes) }
     }
 
     fn targets(&self, gpu: &Gpu, kind: TargetKind) -> Result<Lent<TargetKind, Targets>, GpuError> {
