@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Starts the cluster of deploy/compose.yaml, waits until all services are healthy, and requests 24 views, which must
-# agree with direct rendering. With --test it also kills nodes while a client is served, and then stops the cluster.
+# Starts the cluster of deploy/compose.yaml, waits until all services are healthy, and requests 24 views of each scene,
+# which must agree with direct rendering. With --test it also kills nodes while both scenes are watched, and then stops
+# the cluster.
 #
 # The program is expected at target/release/myriorama, or at $MYRIORAMA.
 set -euo pipefail
@@ -9,6 +10,7 @@ cd "$(dirname "$0")/.."
 program="${MYRIORAMA:-target/release/myriorama}"
 coordinator=http://127.0.0.1:7420
 services=(coordinator node-1 node-2 node-3 node-4)
+scenes=("${MYRIORAMA_SCENE:-courtyard}" "${MYRIORAMA_OTHER_SCENE:-poles}")
 
 compose() {
     if docker compose version >/dev/null 2>&1; then
@@ -52,21 +54,48 @@ wait_until_healthy() {
 }
 
 views() {
-    "$program" view --coordinator "$coordinator" --views 24 --policy pipeline --compare --least-psnr 24 \
-        --out out/cluster
+    local at
+    for at in 0 1; do
+        "$program" view --coordinator "$coordinator" --scene "${scenes[at]}" --views 24 --policy pipeline --compare \
+            --least-psnr 24 --out "out/cluster/scene-$at"
+    done
 }
 
-# A client moves for 20 s; a node is killed after 5 s and started again after 12 s.
+# A viewer of scene $1 for 20 s, which may see no new picture for $2 seconds; its output is in $3.
+watch_scene() {
+    "$program" view --coordinator "$coordinator" --scene "$1" --orbit 120 --size 160x120 --policy pipeline --live \
+        --rate 10 --seconds 20 --longest-gap "$2" --out "$3"
+}
+
+status() {
+    "$program" status --coordinator "$coordinator"
+}
+
+# The nodes of the first or second open workload, one a line.
+nodes_of() {
+    status | awk -v wanted="$1" '/^Workload / { number += 1 } number == wanted && /^node-/ { print $1 }' | sort
+}
+
+# Both scenes are watched, scene $1 first; a node that serves it alone is killed after 8 s and started again after 15 s.
+# The viewer of the other scene notices less of it.
 kill_while_served() {
-    local victim="$1" live
-    "$program" view --coordinator "$coordinator" --orbit 120 --policy pipeline --live --rate 10 --seconds 20 \
-        --longest-gap 5 --out "out/cluster/$victim" &
-    live=$!
+    local scene="$1" other="$2" own_viewer other_viewer victim
+    watch_scene "$scene" 5 "out/cluster/killed" &
+    own_viewer=$!
+    sleep 3
+    watch_scene "$other" 2 "out/cluster/beside" &
+    other_viewer=$!
     sleep 5
+    status
+    victim="$(comm -23 <(nodes_of 1) <(nodes_of 2) | tail -n 1)"
+    : "${victim:?no node serves $scene alone}"
     compose kill -s KILL "$victim"
-    sleep 7
+    sleep 2
+    status
+    sleep 5
     compose up --detach --no-recreate "$victim"
-    wait "$live"
+    wait "$own_viewer"
+    wait "$other_viewer"
     wait_until_healthy "$victim"
 }
 
@@ -77,10 +106,10 @@ fi
 compose up --detach
 wait_until_healthy "${services[@]}"
 views
-"$program" status --coordinator "$coordinator"
+status
 if [ "${1:-}" = --test ]; then
-    kill_while_served node-4
-    kill_while_served node-1
+    kill_while_served "${scenes[0]}" "${scenes[1]}"
+    kill_while_served "${scenes[1]}" "${scenes[0]}"
     views
 else
     echo "The cluster runs: myriorama view --coordinator $coordinator …; docker-compose --project-name myriorama --file deploy/compose.yaml down ends it."

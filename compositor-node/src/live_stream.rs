@@ -266,6 +266,7 @@ impl<'a> LiveStream<'a> {
     /// fetched again when one does.
     fn not_loaded(&mut self, status: Status) -> Result<(), Status> {
         let Some(pose) = self.loading.take().and_then(|fetch| fetch.pose) else { return Ok(()) };
+        self.client.shared.metrics.wanted_fetches_ended.inc();
         let plan = self.plan_of(&pose.request)?;
         if plan.plan_epoch == pose.plan.plan_epoch {
             return Err(status);

@@ -34,9 +34,12 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
     let cameras = folder.path().join("cameras.json");
     std::fs::write(&cameras, b"{\"frames\": [{}]}").unwrap();
     let (broken, cameras) = (broken.to_str().unwrap(), cameras.to_str().unwrap());
-    let cases: [(&[&str], &str); 7] = [
+    let folder = folder.path().to_str().unwrap();
+    let cases: [(&[&str], &str); 9] = [
         (&["up", "--scene", broken], "broken.glb"),
         (&["coordinator", "--scene", broken], "broken.glb"),
+        (&["coordinator", "--scene", "quad", "--scene", "quad"], "scene quad is given twice"),
+        (&["view", "--cameras", cameras, "--out", folder], "would be written over it"),
         (&["up", "--scene", "quad", "--samples", cameras], "cameras.json: frame 0, w"),
         (&["up", "--scene", "quad", "--listen", "0.0.0.0:0"], "--insecure-bind"),
         (&["up", "--scene", "quad", "--method", "guess"], "guess"),

@@ -31,6 +31,14 @@ fn every_metric_of_the_dashboard_is_exported() {
     assert!(unknown.is_empty(), "{unknown:?} are not among {exported:?}");
 }
 
+/// A word with the default of its variable: `${NAME:-default}`.
+fn default_of(word: &str) -> String {
+    match word.split_once("${").and_then(|(before, rest)| Some((before, rest.split_once(":-")?.1))) {
+        Some((before, default)) => format!("{before}{}", default.trim_end_matches('}')),
+        None => word.to_owned(),
+    }
+}
+
 /// The `- --flag=value` lists of a service, as the shell would pass them.
 fn commands_in(compose: &str) -> Vec<Vec<String>> {
     let mut commands: Vec<Vec<String>> = Vec::new();
@@ -40,7 +48,7 @@ fn commands_in(compose: &str) -> Vec<Vec<String>> {
             commands.push(vec!["myriorama".to_owned()]);
             inside = true;
         } else if let Some(word) = line.strip_prefix("- ").filter(|_| inside) {
-            commands.last_mut().unwrap().push(word.replace("${MYRIORAMA_SCENE:-courtyard}", "courtyard"));
+            commands.last_mut().unwrap().push(default_of(word));
         } else {
             inside = false;
         }

@@ -54,6 +54,10 @@ fn said(output: &Output, status: i32) -> String {
     text
 }
 
+fn files_of(folder: &Path) -> impl Iterator<Item = String> {
+    fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap())
+}
+
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = fs::read_dir(folder).unwrap().map(Result::unwrap);
     entries.map(|entry| (entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap())).collect()
@@ -71,6 +75,32 @@ fn cut(record: &Path, views: usize) {
     let text = fs::read_to_string(record).unwrap();
     let kept: Vec<&str> = text.lines().take(1 + views).collect();
     fs::write(record, format!("{}\n]}}\n", kept.join("\n").trim_end_matches(','))).unwrap();
+}
+
+/// A picture that cannot be written for now keeps `view` from its end.
+#[test]
+fn a_second_signal_ends_a_command_that_writes() {
+    let up = Up::start();
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut view = up.view(folder, &["--views", "4000"]).spawn().unwrap();
+    while !folder.join("view_0000.png").exists() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let pipe = folder.join("view_3999.part");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let pictures = || files_of(folder).filter(|name| name.ends_with(".png")).count();
+    while pictures() < 3999 {
+        assert!(view.try_wait().unwrap().is_none(), "{} pictures", pictures());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    kill_process(Pid::from_child(&view), Signal::INT).unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(view.try_wait().unwrap().is_none(), "it waits for the last picture");
+    kill_process(Pid::from_child(&view), Signal::INT).unwrap();
+    said(&view.wait_with_output().unwrap(), 130);
+    assert_eq!(pictures(), 3999);
+    assert!(!pipe.exists(), "no part is left");
 }
 
 #[test]

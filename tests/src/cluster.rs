@@ -7,7 +7,7 @@ use bytes::Bytes;
 use client::{Client, ClientError, Session, ViewRequest};
 use cluster::{OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline};
 use codec::{FrameAssembly, FramePart, WholeFrame};
-use coordinator::{CoordinatorConfig, Observers, SceneOffer};
+use coordinator::{CoordinatorConfig, Observers, SceneOffer, SceneOffers};
 use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
 use glam::{DVec3, UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
@@ -98,6 +98,8 @@ pub struct Cluster {
     pub nodes: Vec<Server>,
     /// The counters of all nodes together.
     pub engines: Vec<ScalarEngine>,
+    /// The metrics of each node.
+    pub metrics: Vec<NodeMetrics>,
     /// A connected client.
     pub client: Client,
 }
@@ -130,6 +132,20 @@ pub fn offer() -> SceneOffer {
         origin_in_source: DVec3::ZERO,
         settings: OfferSettings::default(),
     }
+}
+
+/// The name of the second scene of [`two_offers`].
+pub const OTHER_SCENE: &str = "another ball";
+
+/// The offers of a coordinator with two scenes that look alike.
+///
+/// # Panics
+/// They cannot be offered together.
+#[must_use]
+pub fn two_offers() -> SceneOffers {
+    let package: Bytes = [&package()[..], b"another"].concat().into();
+    let other = SceneOffer { name: OTHER_SCENE.to_owned(), hash: SceneHash::of(&package), package, ..offer() };
+    SceneOffers::new(vec![offer(), other]).expect("two scenes")
 }
 
 /// A camera in front of the ball.
@@ -194,7 +210,7 @@ impl Cluster {
     ) -> Self {
         let coordinator = Server::start(move |listener, shutdown| coordinate(config, listener, shutdown));
         let client = connected(&coordinator.address).await;
-        let mut cluster = Self { coordinator, nodes: Vec::new(), engines: Vec::new(), client };
+        let mut cluster = Self { coordinator, nodes: Vec::new(), engines: Vec::new(), metrics: Vec::new(), client };
         for _ in 0..nodes {
             cluster.add_node(&change);
         }
@@ -206,9 +222,11 @@ impl Cluster {
     pub fn add_node(&mut self, change: impl Fn(NodeConfig) -> NodeConfig) {
         let engine = ScalarEngine::default();
         let config = change(NodeConfig::new(format!("n{}", self.nodes.len()), &self.coordinator.address));
+        let metrics = NodeMetrics::default();
         self.engines.push(engine.clone());
+        self.metrics.push(metrics.clone());
         self.nodes.push(Server::start(|listener, shutdown| {
-            node_host::serve(listener, config, std::sync::Arc::new(engine), NodeMetrics::default(), shutdown)
+            node_host::serve(listener, config, std::sync::Arc::new(engine), metrics, shutdown)
         }));
     }
 

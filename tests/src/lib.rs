@@ -2,7 +2,7 @@
 //!
 //! The tests share a small scalar device, and clusters in one process ([`cluster`]) and in many ([`processes`]). They
 //! share networks that fail ([`proxy`]) and samplers that send corrupt data ([`mangler`]). A client records its frames
-//! ([`watcher`]), which are checked against the invariants ([`history`]).
+//! ([`watcher`]), which are checked against the invariants ([`history`]). Viewers walk around ([`walkers`]).
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod cluster;
@@ -15,4 +15,5 @@ pub mod proxy;
 pub mod random;
 pub mod raw;
 pub mod scalar_engine;
+pub mod walkers;
 pub mod watcher;

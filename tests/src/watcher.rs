@@ -49,7 +49,15 @@ impl Watcher {
     /// # Panics
     /// No session opens, or its first frames do not arrive.
     pub async fn start(client: &Client) -> Self {
-        let session = Arc::new(client.open_session(watched_request(), |_| ()).await.expect("a session"));
+        Self::start_with(client, watched_request()).await
+    }
+
+    /// As [`Watcher::start`], with a request of the timeline [`MOVING`].
+    ///
+    /// # Panics
+    /// As [`Watcher::start`].
+    pub async fn start_with(client: &Client, request: SessionRequest) -> Self {
+        let session = Arc::new(client.open_session(request, |_| ()).await.expect("a session"));
         let history = Arc::<Mutex<History>>::default();
         let asking = tokio::spawn(ask(session.clone(), history.clone()));
         let watcher = Self { session, history, asking };

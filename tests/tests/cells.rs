@@ -2,10 +2,12 @@
 #![allow(clippy::unwrap_used)]
 
 use std::f32::consts::{PI, TAU};
+use std::time::Duration;
 
 use client::{Frame, ViewRequest};
 use cluster::{PolicyChoice, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, request};
+use cluster_tests::walkers::walk;
 use depth_image::{PinholeCamera, ProvenanceKind};
 use glam::{UVec2, Vec3};
 
@@ -100,10 +102,7 @@ async fn cells_follow_a_viewer_that_walks_around() {
             let depth_image::Camera::Pinhole(camera) = camera;
             (camera.eye_in_world - view(azimuth).eye_in_world).length() < 1e-3
         };
-        cluster_tests::watcher::eventually("a cell here", std::time::Duration::from_secs(5), || {
-            cells().iter().any(near)
-        })
-        .await;
+        cluster_tests::watcher::eventually("a cell here", Duration::from_secs(5), || cells().iter().any(near)).await;
         let number = live.set_pose(view(azimuth), 0).unwrap();
         let shown = loop {
             let frame = live.next().await.unwrap().frame;
@@ -117,4 +116,16 @@ async fn cells_follow_a_viewer_that_walks_around() {
     let own_cameras = cluster.session(request(PolicyChoice::Pipeline, STILL)).await.unwrap();
     let error = own_cameras.set_viewpoints(vec![view(0.0)]).await.unwrap_err().to_string();
     assert!(error.contains("was opened with sample cameras"), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn walkers_who_change_cells_all_the_time_see_frames_all_the_time() {
+    const SECONDS: u64 = 8;
+    let walked = walk(&Cluster::start(4).await, 16, Duration::from_secs(SECONDS)).await;
+    println!("{walked:?}");
+    assert!(walked.sets_loaded >= 16 * SECONDS / 4, "they have entered new cells: {walked:?}");
+    assert!(walked.plans > 0 && walked.plans as f64 <= walked.seconds + 1.0, "{walked:?}");
+    assert_eq!(walked.wanted_fetches_ended, 0);
+    // A pause that one would notice is longer than those of a busy machine.
+    assert!(walked.longest_gap_s < 2.0, "{walked:?}");
 }

@@ -7,6 +7,6 @@ mod clients;
 pub mod command;
 mod memory;
 mod phases;
-mod processes;
+pub mod processes;
 mod report;
 mod statistics;

@@ -67,6 +67,11 @@ impl Processes {
         all.map(|process| (process.name().to_owned(), of(process))).collect()
     }
 
+    /// Kills a node as `kill -9` does.
+    pub fn kill(&mut self, node_name: &str) {
+        self.nodes.retain(|node| node.process.name() != node_name);
+    }
+
     /// Views that all nodes dropped, by reason.
     ///
     /// # Errors

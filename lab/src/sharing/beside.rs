@@ -1,15 +1,15 @@
 //! One guest beside the viewer, and alone.
 
-use app_core::exit::BadInput;
-use client::Client;
 use cluster::{OfferStatus, PolicyChoice};
 
 use super::guests::Guest;
+use super::up::{Up, policies};
 use super::viewer::{Viewer, Watched};
+use crate::statistics::median;
 
-/// One guest's row, with medians of its repeats.
+/// The figures of one repeat.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Row {
+pub(super) struct Visit {
     pub(super) watched: Watched,
     /// The guest's time beside the viewer, at its first visit.
     pub(super) first_s: f64,
@@ -19,49 +19,54 @@ pub(super) struct Row {
     pub(super) alone_s: f64,
 }
 
+/// One guest's row.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Row {
+    /// The policies in force beside the guest.
+    pub(super) policies: String,
+    /// At least one repeat.
+    pub(super) visits: Vec<Visit>,
+}
+
 /// Measures one guest beside the viewer, twice: its first visit has costs measured and samples taken, its second is timed.
 /// Then the guest is timed alone.
 ///
 /// # Errors
 /// A client is refused, or its frames end.
-pub(super) async fn measure(coordinator: &str, guest: &Guest, repeats: usize) -> anyhow::Result<Row> {
-    let offers = offers(coordinator).await?;
-    let mut rows = Vec::with_capacity(repeats);
+pub(super) async fn measure(up: &Up, guest: &Guest, repeats: usize) -> anyhow::Result<Row> {
+    let offers = up.two_offers()?;
+    let (mut in_force, mut visits) = (String::new(), Vec::with_capacity(repeats));
     for _ in 0..repeats {
-        let viewer = Viewer::start(coordinator, &offers[0], PolicyChoice::Pipeline).await?;
+        let viewer = Viewer::start(&up.coordinator, offers[0], PolicyChoice::Pipeline).await?;
         let since_s = viewer.now_s();
-        let visits = async {
-            let first_s = guest.visit(coordinator, &offers).await?;
-            Ok::<_, anyhow::Error>((first_s, guest.visit(coordinator, &offers).await?))
-        };
-        let visits = visits.await;
+        let times = two_visits(&up.coordinator, guest, offers).await;
         let watched = viewer.stop(since_s).await?;
-        let (first_s, beside_s) = visits?;
-        rows.push(Row { watched, first_s, beside_s, alone_s: guest.visit(coordinator, &offers).await? });
+        let (first_s, beside_s, policies) = times?;
+        in_force = policies;
+        visits.push(Visit { watched, first_s, beside_s, alone_s: guest.visit(&up.coordinator, offers).await? });
     }
-    Ok(median(&rows))
+    Ok(Row { policies: in_force, visits })
 }
 
-/// The scenes on offer.
-pub(super) async fn offers(coordinator: &str) -> anyhow::Result<Vec<OfferStatus>> {
-    let offers = Client::connect(coordinator).await?.status().await?.offers;
-    if offers.len() < 2 { Err(BadInput("two scenes are needed".to_owned()).into()) } else { Ok(offers) }
+async fn two_visits(coordinator: &str, guest: &Guest, offers: [&OfferStatus; 2]) -> anyhow::Result<(f64, f64, String)> {
+    let first_s = guest.visit(coordinator, offers).await?;
+    let policies = policies(coordinator).await?;
+    Ok((first_s, guest.visit(coordinator, offers).await?, policies))
 }
 
-/// The median of each figure, at least one row.
-pub(super) fn median(rows: &[Row]) -> Row {
-    let of = |figure: fn(&Row) -> f64| {
-        let mut sorted: Vec<f64> = rows.iter().map(figure).collect();
-        sorted.sort_by(f64::total_cmp);
-        sorted[sorted.len() / 2]
-    };
-    Row {
-        watched: Watched {
-            longest_gap_s: of(|row| row.watched.longest_gap_s),
-            shown_share: of(|row| row.watched.shown_share),
-        },
-        first_s: of(|row| row.first_s),
-        beside_s: of(|row| row.beside_s),
-        alone_s: of(|row| row.alone_s),
+impl Row {
+    /// The median of a figure of all repeats.
+    pub(super) fn median(&self, figure: impl Fn(&Visit) -> f64) -> f64 {
+        median(self.visits.iter().map(figure).collect())
+    }
+
+    /// The longest gap of all repeats.
+    pub(super) fn worst_gap_s(&self) -> f64 {
+        self.visits.iter().map(|visit| visit.watched.longest_gap_s).fold(0.0, f64::max)
+    }
+
+    /// The least share of poses shown of all repeats.
+    pub(super) fn worst_shown_share(&self) -> f64 {
+        self.visits.iter().map(|visit| visit.watched.shown_share).fold(1.0, f64::min)
     }
 }

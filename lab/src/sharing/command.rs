@@ -4,21 +4,20 @@ use std::path::PathBuf;
 
 use app_core::exit::Outcome;
 use app_core::process::runtime;
-use clap::Args;
+use clap::{Args, ValueEnum as _};
 use gpu::DevicePreference;
 use render::Lighting;
 use scene::SceneSpec;
 use study::Report;
 
-use super::beside::{self, Row, offers};
-use super::guests::{GUESTS, Guest};
-use super::report::{self, Measured};
-use super::viewer::path;
-use crate::process::Process;
+use super::section::{Part, Section};
+use super::up::Up;
+use super::{beside, costs, guests, killed_compositor, many_views, new_size, report, walkers};
 use crate::progress::bar;
 
 /// Measures a live viewer of 320×180 at 10 poses a second beside batches of other clients: other sizes, lightings,
-/// codecs, scenes, moments, and views drawn directly. Each batch is measured alone, too.
+/// codecs, scenes, moments, and views drawn directly. Each batch is measured alone, too. Further rows are what the sharing
+/// of a cluster must not change: costs, the other scene when a node is killed, a client's memory, plans of walkers.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama bench sharing --strict")]
 pub struct SharingArgs {
@@ -37,6 +36,9 @@ pub struct SharingArgs {
     /// Nodes P that share the device
     #[arg(long, default_value_t = 4, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=64))]
     nodes: u16,
+    /// Measures only this part of the report; may be repeated
+    #[arg(long, value_name = "PART")]
+    only: Vec<Part>,
     /// One repeat in place of three
     #[arg(long)]
     quick: bool,
@@ -53,77 +55,86 @@ impl SharingArgs {
         if self.quick { 1 } else { 3 }
     }
 
+    fn parts(&self) -> &[Part] {
+        if self.only.is_empty() { Part::value_variants() } else { &self.only }
+    }
+
     /// Arguments of `myriorama up`.
-    fn cluster(&self) -> Vec<String> {
-        let [scene, other, lighting] =
-            [self.scene.to_string(), self.other_scene.to_string(), self.lighting.to_string()];
-        let (device, nodes) = (self.device.to_string(), self.nodes.to_string());
-        let words =
-            ["--scene", &scene, "--scene", &other, "--lighting", &lighting, "--device", &device, "--nodes", &nodes];
-        words.map(str::to_owned).to_vec()
+    fn cluster(&self, scenes: &[&SceneSpec]) -> Vec<String> {
+        let scenes = scenes.iter().flat_map(|scene| ["--scene".to_owned(), scene.to_string()]);
+        let [lighting, device, nodes] = [self.lighting.to_string(), self.device.to_string(), self.nodes.to_string()];
+        let rest = ["--lighting", &lighting, "--device", &device, "--nodes", &nodes].map(str::to_owned);
+        scenes.chain(rest).collect()
     }
 }
 
-/// Measures all guests and writes the report.
+/// Measures the parts and writes the report.
 ///
 /// # Errors
-/// The cluster does not start, or a client fails.
+/// The report cannot be written.
 pub fn run(args: &SharingArgs) -> anyhow::Result<Outcome> {
-    let (measured, device) = runtime()?.block_on(measure(args))?;
-    let mut report = Report::new("Myriorama bench sharing", device);
+    let sections = runtime()?.block_on(measure(args));
+    let device = sections.iter().map(|section| section.device.as_str()).find(|device| !device.is_empty());
+    let mut report = Report::new("Myriorama bench sharing", device.unwrap_or_default());
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
     for (name, value) in [
         ("scene", args.scene.to_string()),
         ("other scene", args.other_scene.to_string()),
         ("lighting", args.lighting.to_string()),
-        ("policy", "pipeline, forced by every session".to_owned()),
     ] {
         report.parameter(name, value);
     }
     report.parameter("nodes P", u32::from(args.nodes));
     report.parameter("repeats", args.repeats());
-    report::add(&measured, &mut report)?;
+    for section in sections {
+        report.tables.extend(section.tables);
+        report.checks.extend(section.checks);
+    }
     report.tables.iter().for_each(|table| println!("{}", table.to_markdown()));
     let ok = report.finish(&args.out)?;
     Ok(Outcome::of(ok || !args.strict))
 }
 
-async fn measure(args: &SharingArgs) -> anyhow::Result<(Measured, String)> {
-    let progress = bar("sharing", GUESTS.len() + 1);
-    let mut up = Process::up(&args.cluster())?;
-    let coordinator = up.address()?;
-    let status = client::Client::connect(&coordinator).await?.status().await?;
-    let device = status.nodes.first().map_or_else(String::new, |node| node.device_name.clone());
-    let mut rows: Vec<(&'static Guest, Option<Row>)> = Vec::new();
-    for guest in &GUESTS {
-        progress.set_message(guest.name);
+/// Measures one part after the other. A part that fails hides no other.
+async fn measure(args: &SharingArgs) -> Vec<Section> {
+    let progress = bar("sharing", args.parts().len());
+    let mut sections = Vec::new();
+    for part in args.parts() {
+        progress.set_message(part.to_string());
+        let section = measure_part(args, *part).await.unwrap_or_else(|error| {
+            tracing::warn!(%part, error = format!("{error:#}"), "not measured");
+            Section::failed(*part)
+        });
+        sections.push(section);
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    sections
+}
+
+async fn measure_part(args: &SharingArgs, part: Part) -> anyhow::Result<Section> {
+    let both = || args.cluster(&[&args.scene, &args.other_scene]);
+    match part {
+        Part::Guests => guests(&both(), args.repeats()).await,
+        Part::NewSize => new_size::measure(&both(), args.repeats()).await,
+        Part::Costs => costs::measure(&both(), args.repeats()).await,
+        Part::KilledCompositor => killed_compositor::measure(args.device).await,
+        Part::ManyViews => many_views::measure(&args.cluster(&[&args.other_scene]), &args.out).await,
+        Part::Walkers => walkers::measure().await,
+    }
+}
+
+/// All guests, one after the other, beside a viewer of one cluster.
+async fn guests(cluster: &[String], repeats: usize) -> anyhow::Result<Section> {
+    let up = Up::start(cluster).await?;
+    let mut rows = Vec::new();
+    for guest in &guests::GUESTS {
         // One guest that is refused, or that ends the viewer, hides no other.
-        let row = beside::measure(&coordinator, guest, args.repeats()).await;
+        let row = beside::measure(&up, guest, repeats).await;
         if let Err(error) = &row {
             tracing::warn!(guest = guest.name, error = format!("{error:#}"), "not measured");
         }
         rows.push((guest, row.ok()));
-        progress.inc(1);
     }
-    progress.set_message("a view of a new size");
-    let new_size = new_size(&coordinator).await?;
-    progress.finish_and_clear();
-    Ok((Measured { rows, new_size_s: new_size }, device))
-}
-
-/// Seconds until the first view of a known size, and of a new one, on a warm workload.
-async fn new_size(coordinator: &str) -> anyhow::Result<[f64; 2]> {
-    use app_core::delivery::{open, receive, request};
-    use glam::UVec2;
-    let offer = offers(coordinator).await?.remove(0);
-    let client = client::Client::connect(coordinator).await?;
-    let first_s = async |size_px: UVec2| -> anyhow::Result<f64> {
-        let views = path(&offer, 1, size_px)?;
-        let start = std::time::Instant::now();
-        let session = open(&client, request(offer.settings.clone(), &views)?).await?;
-        receive(&session, &views, async |_| Ok(())).await?;
-        Ok(start.elapsed().as_secs_f64())
-    };
-    first_s(UVec2::new(320, 180)).await?;
-    Ok([first_s(UVec2::new(320, 180)).await?, first_s(UVec2::new(352, 198)).await?])
+    report::section(&rows, up.device)
 }

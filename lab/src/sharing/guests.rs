@@ -31,7 +31,7 @@ enum Difference {
     Direct,
 }
 
-const SMALL_PX: UVec2 = UVec2::new(320, 180);
+pub(super) const SMALL_PX: UVec2 = UVec2::new(320, 180);
 
 /// All guests, in the order of the report.
 pub(super) static GUESTS: [Guest; 6] = [
@@ -57,13 +57,12 @@ impl Guest {
     ///
     /// # Errors
     /// The coordinator refuses, or frames are missing.
-    pub(super) async fn visit(&self, coordinator: &str, offers: &[OfferStatus]) -> anyhow::Result<f64> {
+    pub(super) async fn visit(&self, coordinator: &str, offers: [&OfferStatus; 2]) -> anyhow::Result<f64> {
         let start = Instant::now();
-        let other = usize::from(self.difference == Difference::Scene).min(offers.len() - 1);
-        let views = path(&offers[other], self.views, self.size_px)?;
+        let offer = offers[usize::from(self.difference == Difference::Scene)];
+        let views = path(offer, self.views, self.size_px)?;
         let client = Client::connect(coordinator).await?;
-        let session =
-            open(&client, self.request(&offers[other], request(offers[other].settings.clone(), &views)?)).await?;
+        let session = open(&client, self.request(offer, request(offer.settings.clone(), &views)?)).await?;
         receive(&session, &views, async |_| Ok(())).await?;
         Ok(start.elapsed().as_secs_f64())
     }

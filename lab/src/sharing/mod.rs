@@ -1,11 +1,21 @@
-//! `bench sharing`: a viewer beside other clients of one cluster.
+//! `bench sharing`: a viewer beside other clients of one cluster, and what sharing must not change.
+//!
+//! Each part is a [`section`] of the report, measured on processes of its own: `beside` has the guests, the other modules
+//! are named after their parts.
 
 pub mod command;
 
 mod beside;
+mod costs;
 mod guests;
+mod killed_compositor;
+mod many_views;
+mod new_size;
 mod report;
+mod section;
+mod up;
 mod viewer;
+mod walkers;
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 use app_core::live::{Record, Shown};
 
-use super::beside::{Row, median};
+use super::beside::{Row, Visit};
 use super::viewer::Watched;
 
 fn record(shown_s: impl IntoIterator<Item = f64>, seconds: f64) -> Record {
@@ -32,13 +32,23 @@ fn a_viewer_that_sees_nothing_has_one_long_gap() {
 }
 
 #[test]
-fn each_figure_has_its_own_median() {
-    let row = |s: f64, share: f64| Row {
+fn each_figure_has_its_own_median_and_the_worst_is_shown_beside_it() {
+    let visit = |s: f64, share: f64| Visit {
         watched: Watched { longest_gap_s: s, shown_share: share },
         first_s: 3.0 * s,
         beside_s: 2.0 * s,
         alone_s: s,
     };
-    let middle = median(&[row(3.0, 0.1), row(1.0, 0.9), row(2.0, 0.5)]);
-    assert_eq!((middle.watched.longest_gap_s, middle.watched.shown_share, middle.beside_s), (2.0, 0.5, 4.0));
+    let row = Row { policies: String::new(), visits: vec![visit(3.0, 0.1), visit(1.0, 0.9), visit(2.0, 0.5)] };
+    let medians = [row.median(|visit| visit.watched.longest_gap_s), row.median(|visit| visit.watched.shown_share)];
+    assert_eq!((medians, row.median(|visit| visit.beside_s)), ([2.0, 0.5], 4.0));
+    assert_eq!((row.worst_gap_s(), row.worst_shown_share()), (3.0, 0.1));
+}
+
+#[test]
+fn a_guest_that_could_not_be_measured_falls_short_of_every_bar() {
+    let rows: Vec<_> = super::guests::GUESTS.iter().map(|guest| (guest, None)).collect();
+    let section = super::report::section(&rows, String::new()).unwrap();
+    assert!(section.checks.len() > 12);
+    assert!(section.checks.iter().all(|check| check.outcome() == study::Outcome::FallsShort));
 }

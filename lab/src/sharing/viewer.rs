@@ -1,12 +1,13 @@
 //! The live viewer whose frames are counted.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use app_core::delivery::{at_rate, open, request};
 use app_core::live::{Drive, Record, drive};
-use client::Client;
-use cluster::{OfferStatus, PolicyChoice, SessionRequest};
+use client::{Client, Session};
+use cluster::{Assignment, OfferStatus, PolicyChoice, SessionRequest};
 use depth_image::{Camera, PinholeCamera, ViewCell};
 use glam::UVec2;
 use tokio::task::JoinHandle;
@@ -36,18 +37,17 @@ pub(super) struct Watched {
 impl Watched {
     /// What a record shows from `since_s` on; a record that ended by an error shows nothing.
     pub(super) fn of(record: &Record, since_s: f64) -> Self {
-        let times: Vec<f64> = record.shown.iter().map(|shown| shown.shown_s).filter(|&s| s >= since_s).collect();
-        let ends = [since_s].into_iter().chain(times.iter().copied()).chain([record.seconds]);
-        let ends: Vec<f64> = ends.collect();
-        let gaps = ends.windows(2).map(|pair| pair[1] - pair[0]);
+        let shown = record.shown.iter().filter(|shown| shown.shown_s >= since_s).count();
         let poses = (record.seconds - since_s) * RATE_HZ;
-        Self { longest_gap_s: gaps.fold(0.0, f64::max), shown_share: (times.len() as f64 / poses.max(1.0)).min(1.0) }
+        let (longest_gap_s, _) = record.longest_gap_s(since_s);
+        Self { longest_gap_s, shown_share: (shown as f64 / poses.max(1.0)).min(1.0) }
     }
 }
 
 /// A viewer that follows its path until it is told to stop.
 pub(super) struct Viewer {
     start: Instant,
+    session: Arc<Session>,
     driving: JoinHandle<anyhow::Result<Record>>,
     stop: tokio::sync::oneshot::Sender<()>,
 }
@@ -76,15 +76,21 @@ impl Viewer {
         drop(live);
         let (stop, stopped) = tokio::sync::oneshot::channel::<()>();
         let settings = Drive { path, rate_hz: RATE_HZ, lasting: LONGEST, set_step_s: 1.0, set_count: 1 };
-        let start = Instant::now();
-        let driving = tokio::spawn(async move { Ok(drive(&session, &settings, stopped).await?) });
+        let (session, start) = (Arc::new(session), Instant::now());
+        let driven = session.clone();
+        let driving = tokio::spawn(async move { Ok(drive(&driven, &settings, stopped).await?) });
         tokio::time::sleep(SETTLE).await;
-        Ok(Self { start, driving, stop })
+        Ok(Self { start, session, driving, stop })
     }
 
     /// Seconds since the first pose.
     pub(super) fn now_s(&self) -> f64 {
         self.start.elapsed().as_secs_f64()
+    }
+
+    /// The plan in force.
+    pub(super) fn plan(&self) -> Assignment {
+        self.session.plan().assignment
     }
 
     /// Stops after a short while, and gives what was seen since `since_s`.

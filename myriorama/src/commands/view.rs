@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use app_core::delivery::receive_requests;
-use app_core::exit::Outcome;
+use app_core::exit::{BadInput, Outcome, exit_interrupted};
 use app_core::live;
 use app_core::live::Drive;
 use app_core::process::StopSignals;
@@ -34,17 +34,32 @@ use writer::PictureWriter;
 /// # Errors
 /// Input that cannot be used, a cluster that cannot be reached, or a folder that cannot be written.
 pub async fn run(args: ViewArgs) -> anyhow::Result<Outcome> {
+    check_cameras(&args)?;
     if args.live {
         let job = Job::place(&args).await?;
         let session = job.open().await?;
         return follow(&args, &session, job.cameras.to_vec()).await;
     }
     let signals = StopSignals::listen()?;
-    tokio::select! {
-        outcome = pictures(&args, &signals) => outcome,
-        () = signals.second.cancelled() => {
-            remove_parts(&args.out);
-            Ok(Outcome::Interrupted)
+    let (second, folder) = (signals.second.clone(), args.out.clone());
+    // A task of its own: long records are written without a pause in which this one could hear of the signal.
+    tokio::spawn(async move {
+        second.cancelled().await;
+        remove_parts(&folder);
+        exit_interrupted();
+    });
+    pictures(&args, &signals).await
+}
+
+/// The record is written beside the pictures: the caller's file of cameras must not be there under its name.
+fn check_cameras(args: &ViewArgs) -> Result<(), BadInput> {
+    let record = args.out.join(record::FILE_NAME).canonicalize().ok();
+    let given = args.viewpoints.cameras.as_ref().filter(|_| !args.live);
+    match given.filter(|given| record.is_some() && given.canonicalize().ok() == record) {
+        None => Ok(()),
+        Some(given) => {
+            let reason = "the record of the views would be written over it; give --out another folder";
+            Err(BadInput(format!("--cameras {}: {reason}", given.display())))
         }
     }
 }
@@ -139,6 +154,6 @@ async fn follow(args: &ViewArgs, session: &Session, path: Vec<PinholeCamera>) ->
     if let Some(error) = record.error {
         return Err(error.into());
     }
-    let gap_s = record.longest_gap_s().map_or(f64::INFINITY, |(gap_s, _)| gap_s);
+    let (gap_s, _) = record.longest_gap_s(0.0);
     Ok(Outcome::of(args.longest_gap.is_none_or(|longest| gap_s <= longest)))
 }

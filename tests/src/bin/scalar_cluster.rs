@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::{Args, Parser};
-use cluster_tests::cluster::offer;
+use cluster_tests::cluster::two_offers;
 use cluster_tests::scalar_engine::ScalarEngine;
 use coordinator::schedule::Recorder;
 use coordinator::{CoordinatorConfig, CoordinatorMetrics, EventLog, Observers};
@@ -81,7 +81,7 @@ async fn coordinate(args: CoordinatorArgs, shutdown: CancellationToken) -> anyho
     let log = args.record.map(event_log).transpose()?;
     let observers = Observers { metrics: CoordinatorMetrics::default(), log };
     let listener = listen(&args.listen).await?;
-    Ok(coordinator::serve(listener, CoordinatorConfig::default(), offer().into(), observers, shutdown).await?)
+    Ok(coordinator::serve(listener, CoordinatorConfig::default(), two_offers(), observers, shutdown).await?)
 }
 
 fn event_log(path: PathBuf) -> std::io::Result<EventLog> {

@@ -26,21 +26,22 @@ const OPEN: &str = "/myriorama.v1.CoordinatorService/OpenSession";
 const FETCH: &str = "/myriorama.v1.SamplerService/FetchSampleImages";
 const VIEWS: &str = "/myriorama.v1.CompositorService/RenderViews";
 
-struct Beside {
-    cluster: Processes,
-    watcher: Watcher,
+/// A cluster with a concurrent client.
+pub struct Beside {
+    pub cluster: Processes,
+    pub watcher: Watcher,
     since: Instant,
 }
 
 impl Beside {
-    async fn start(nodes: usize) -> Self {
+    pub async fn start(nodes: usize) -> Self {
         let cluster = Processes::start(PROGRAM, nodes).await;
         let watcher = Watcher::start(&cluster.client).await;
         Self { cluster, watcher, since: Instant::now() }
     }
 
     /// The concurrent client saw no fault.
-    async fn finish(self, what: &str) {
+    pub async fn finish(self, what: &str) {
         let wait = self.watcher.healed(self.since, CLOSED, |_| true).await;
         assert!(wait < 2 * AT_ONCE, "{what}: no frames for {wait:?}");
         finish(what, wait, &self.cluster, &self.watcher);
@@ -57,10 +58,16 @@ async fn other_versions_and_malformed_messages_are_refused() {
     let beside = Beside::start(2).await;
     let (coordinator, node) = (&beside.cluster.coordinator.address, &beside.cluster.nodes[0].address);
     let join = [raw::text_field(1, "old"), raw::text_field(2, "http://127.0.0.1:1")].concat();
-    for (version, says) in [(None, "protocol_version is 0"), (Some(77), "protocol_version is 77")] {
+    let versions =
+        [(None, "protocol_version is 0"), (Some(1), "protocol_version is 1"), (Some(77), "protocol_version is 77")];
+    for (version, says) in versions {
         let number = version.map_or_else(Vec::new, |version| raw::number_field(15, version));
         let refused = refusal(raw::call(coordinator, JOIN, [join.clone(), number].concat().into())).await;
         assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
+        assert!(refused.message().contains(says), "{refused}");
+        let number = version.map_or_else(Vec::new, |version| raw::number_field(31, version));
+        let refused = refusal(raw::call(coordinator, OPEN, number.into())).await;
+        assert_eq!(refused.code(), Code::FailedPrecondition, "a client: {refused}");
         assert!(refused.message().contains(says), "{refused}");
     }
     let mut random = Random::new(5);

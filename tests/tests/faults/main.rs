@@ -5,8 +5,10 @@
 
 mod bad_input;
 mod chunks;
+mod many_sessions;
 mod network;
 mod processes;
+mod two_scenes;
 
 use std::time::Duration;
 

@@ -88,11 +88,16 @@ pub struct Record {
 }
 
 impl Record {
-    /// The longest time without a new frame, and its start.
+    /// The longest time without a new frame from `since_s` on, and its start. The wait for the first frame counts, and the
+    /// time after the last.
     #[must_use]
-    pub fn longest_gap_s(&self) -> Option<(f64, f64)> {
-        let gaps = self.shown.windows(2).map(|pair| (pair[1].shown_s - pair[0].shown_s, pair[0].shown_s));
-        gaps.max_by(|a, b| a.0.total_cmp(&b.0))
+    pub fn longest_gap_s(&self, since_s: f64) -> (f64, f64) {
+        let shown = self.shown.iter().map(|shown| shown.shown_s).filter(|&shown_s| shown_s > since_s);
+        let ends = shown.chain([self.seconds.max(since_s)]);
+        let mut last_s = since_s;
+        let gap = |end_s: f64| (end_s - std::mem::replace(&mut last_s, end_s), end_s);
+        let longest = ends.map(gap).fold((0.0, since_s), |a, b| if b.0 > a.0 { b } else { a });
+        (longest.0, longest.1 - longest.0)
     }
 
     /// A table of every frame.
@@ -117,9 +122,7 @@ impl Record {
     #[must_use]
     pub fn summary(&self) -> String {
         let Self { shown, posed, seconds, error } = self;
-        let gap = self.longest_gap_s().map_or_else(String::new, |(gap_s, since_s)| {
-            format!("; longest without a new one {:.0} ms, from {since_s:.2} s on", gap_s * 1e3)
-        });
+        let (gap_s, since_s) = self.longest_gap_s(0.0);
         let rate_hz = shown.len() as f64 / seconds.max(1e-9);
         let plans = shown.iter().map(|shown| shown.plan_epoch).collect::<std::collections::BTreeSet<_>>().len();
         let replaced = posed.saturating_sub(shown.len() as u64);
@@ -128,8 +131,9 @@ impl Record {
         let error = error.as_ref().map_or_else(String::new, |error| format!("; then none: {error}"));
         format!(
             "{} frames shown of {posed} poses in {seconds:.1} s, {rate_hz:.1} a second, of {plans} plans{degraded}; \
-             {replaced} poses were replaced by newer ones{gap}{error}",
-            shown.len()
+             {replaced} poses were replaced by newer ones; longest without a new one {:.0} ms, from {since_s:.2} s on{error}",
+            shown.len(),
+            gap_s * 1e3
         )
     }
 }
@@ -195,7 +199,7 @@ mod tests {
             seconds: 2.0,
             error: None,
         };
-        let (gap_s, since_s) = record.longest_gap_s().unwrap();
+        let (gap_s, since_s) = record.longest_gap_s(0.0);
         assert!((gap_s - 1.5).abs() < 1e-9 && (since_s - 0.2).abs() < 1e-9);
         let one = record.shown[0];
         assert!((one.stages_s.iter().sum::<f64>() - one.age_s()).abs() < 1e-9);
@@ -204,7 +208,20 @@ mod tests {
         let summary = record.summary();
         assert!(summary.contains("longest without a new one 1500 ms") && summary.contains("2 poses were"), "{summary}");
         assert_eq!(record.frames().unwrap().rows.len(), 4);
-        assert!(latencies("none", [].iter()).is_ok() && Record::default().longest_gap_s().is_none());
+        assert!(latencies("none", [].iter()).is_ok());
+    }
+
+    #[test]
+    fn a_viewer_without_frames_at_the_start_or_the_end_has_a_gap_there() {
+        let record = |shown_s: &[f64], seconds: f64| {
+            let shown = (1..).zip(shown_s).map(|(frame, &shown_s)| shown(frame, shown_s)).collect();
+            Record { shown, posed: 9, seconds, error: None }
+        };
+        assert_eq!(record(&[3.0, 3.5], 4.0).longest_gap_s(0.0), (3.0, 0.0), "before the first frame");
+        assert_eq!(record(&[0.5, 1.0], 4.0).longest_gap_s(0.0), (3.0, 1.0), "after the last");
+        assert_eq!(record(&[], 4.0).longest_gap_s(0.0), (4.0, 0.0), "there is none");
+        assert_eq!(record(&[0.5, 1.0, 3.5], 4.0).longest_gap_s(3.0), (0.5, 3.0), "earlier gaps do not count");
+        assert_eq!(Record::default().longest_gap_s(0.0), (0.0, 0.0));
     }
 
     #[test]

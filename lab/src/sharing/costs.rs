@@ -1,0 +1,110 @@
+//! The costs by which the coordinator admits and plans, measured beside load and without.
+
+use std::convert::Infallible;
+use std::ops::Range;
+
+use anyhow::Context as _;
+use app_core::delivery::{open, receive, request};
+use client::Client;
+use cluster::{Costs, PolicyChoice, SessionRequest, Timeline};
+use depth_image::PinholeCamera;
+use study::{Bar, Cell, Check, Table};
+
+use super::guests::{GUESTS, SMALL_PX};
+use super::section::Section;
+use super::up::{Up, policies};
+use super::viewer::{Viewer, path};
+use crate::statistics::median;
+
+/// The most that one is of the other.
+const RATIO: f64 = 1.3;
+/// Batches after which costs have settled: nodes time their own work.
+const BATCHES: usize = 4;
+/// Views of a batch.
+const VIEWS: usize = 32;
+/// The step between the near planes of two sessions: costs of a near plane that is known are not measured again.
+const NEAR_STEP: f32 = 1e-3;
+
+/// c and g_v of one session, and the policies in force.
+struct Taken {
+    costs: Costs,
+    policies: String,
+}
+
+/// Measures the costs of sessions that differ in nothing that matters to them: first without load, then beside a viewer and
+/// a batch that never ends.
+///
+/// # Errors
+/// The cluster does not start, or a session is refused.
+pub(super) async fn measure(cluster: &[String], repeats: usize) -> anyhow::Result<Section> {
+    let up = Up::start(cluster).await?;
+    let idle = all_taken(&up, 0..repeats).await?;
+    let viewer = Viewer::start(&up.coordinator, up.offer()?, PolicyChoice::Pipeline).await?;
+    let beside = tokio::select! {
+        beside = all_taken(&up, repeats..2 * repeats) => beside?,
+        Err(error) = batches(&up) => return Err(error),
+    };
+    viewer.stop(0.0).await?;
+    section(&idle, &beside, up.device.clone())
+}
+
+/// Asks for one batch after the other.
+async fn batches(up: &Up) -> anyhow::Result<Infallible> {
+    loop {
+        GUESTS[0].visit(&up.coordinator, up.two_offers()?).await?;
+    }
+}
+
+async fn all_taken(up: &Up, numbers: Range<usize>) -> anyhow::Result<Vec<Taken>> {
+    let mut all = Vec::with_capacity(numbers.len());
+    for number in numbers {
+        all.push(taken(up, number).await?);
+    }
+    Ok(all)
+}
+
+/// The costs of a workload of its own, once they have settled.
+async fn taken(up: &Up, number: usize) -> anyhow::Result<Taken> {
+    let offer = up.offer()?;
+    let client = Client::connect(&up.coordinator).await?;
+    let near = |view: PinholeCamera| PinholeCamera { near_m: view.near_m * (1.0 + NEAR_STEP * number as f32), ..view };
+    let views: Vec<PinholeCamera> = path(offer, VIEWS, SMALL_PX)?.into_iter().map(near).collect();
+    let request = SessionRequest {
+        policy: PolicyChoice::Pipeline,
+        timeline: Timeline::still(1e-3 * (number + 1) as f64),
+        ..request(offer.settings.clone(), &views)?
+    };
+    let session = open(&client, request).await?;
+    for _ in 0..BATCHES {
+        receive(&session, &views, async |_| Ok(())).await?;
+    }
+    let own = session.plan().assignment.workload_number;
+    let workloads = client.status().await?.workloads;
+    let workload = workloads.into_iter().find(|workload| workload.number == own).context("the workload has ended")?;
+    let of = |figure: fn(&Costs) -> f64| median(workload.conditions.iter().map(|node| figure(&node.costs)).collect());
+    let costs = Costs {
+        reconstruct_view_s: of(|costs| costs.reconstruct_view_s),
+        direct_view_s: of(|costs| costs.direct_view_s),
+        ..Costs::default()
+    };
+    Ok(Taken { costs, policies: policies(&up.coordinator).await? })
+}
+
+fn section(idle: &[Taken], beside: &[Taken], device: String) -> anyhow::Result<Section> {
+    let columns = [("cost", ""), ("policy", ""), ("idle", "ms"), ("beside load", "ms"), ("beside over idle", "")];
+    let mut table = Table::new("Costs beside load", &columns);
+    let mut checks = Vec::new();
+    let policies = beside.first().map_or_else(String::new, |taken| taken.policies.clone());
+    let figures: [(&str, fn(&Costs) -> f64); 2] =
+        [("c", |costs| costs.reconstruct_view_s), ("g_v", |costs| costs.direct_view_s)];
+    for (name, figure) in figures {
+        let [idle_s, beside_s] =
+            [idle, beside].map(|taken| median(taken.iter().map(|taken| figure(&taken.costs)).collect()));
+        let ratio = beside_s / idle_s;
+        let numbers = [idle_s * 1e3, beside_s * 1e3, ratio].map(Cell::from);
+        table.push([Cell::from(name), policies.clone().into()].into_iter().chain(numbers))?;
+        let name = format!("{name} taken beside load and idle, the greater over the smaller");
+        checks.push(Check::new(name, ratio.max(ratio.recip()), "", Bar::AtMost(RATIO)));
+    }
+    Ok(Section { device, tables: vec![table], checks })
+}
