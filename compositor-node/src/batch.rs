@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, DIRECT, RenderViews, RequestedView, SetContent};
+use cluster::{Assignment, DIRECT, RenderViews, RequestedView, SceneRef, SetContent};
 use codec::{FrameCodec, SampleSetId};
 use depth_image::ViewPlanes;
 use glam::UVec2;
@@ -55,6 +55,14 @@ pub(crate) enum Source {
 }
 
 impl Source {
+    /// The scene that views are drawn from.
+    pub(crate) fn scene(&self) -> Option<&SceneRef> {
+        match self {
+            Self::Set(_) => None,
+            Self::Scene { plan, .. } => Some(&plan.workload.scene),
+        }
+    }
+
     /// The age of the set at `now`; 0 where views are drawn from the scene.
     pub(crate) fn age_s(&self, now: Instant) -> f64 {
         match self {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use codec::{StageTimes, encode_view};
 use depth_image::View;
-use node::{DirectWork, Engine, NodeMetrics, Operation, Turn, ViewWork, WorkClass, blocking, own_time};
+use node::{DirectWork, Engine, NodeMetrics, Operation, Scenes, Turn, ViewWork, WorkClass, blocking, own_time};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::Status;
 
@@ -21,7 +21,7 @@ const BATCHES_BEHIND: usize = 2;
 /// Makes views, and encodes them. Clones share the encoders.
 #[derive(Clone)]
 pub(crate) struct Rendering {
-    engine: Arc<dyn Engine>,
+    scenes: Arc<Scenes>,
     metrics: NodeMetrics,
     times: Arc<ViewTimes>,
     encoders: Arc<Semaphore>,
@@ -30,9 +30,9 @@ pub(crate) struct Rendering {
 }
 
 impl Rendering {
-    pub(crate) fn new(engine: Arc<dyn Engine>, metrics: NodeMetrics, times: Arc<ViewTimes>, direct_share: f64) -> Self {
+    pub(crate) fn new(scenes: Arc<Scenes>, metrics: NodeMetrics, times: Arc<ViewTimes>, direct_share: f64) -> Self {
         let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
-        Self { engine, metrics, times, encoders, direct_share }
+        Self { scenes, metrics, times, encoders, direct_share }
     }
 
     /// Makes the views of one lane, until it is aborted.
@@ -93,22 +93,26 @@ impl Rendering {
 
     /// Makes the views of a batch, which has one at least; with the seconds that they had the device.
     async fn make(&self, turn: Turn, batch: &[Waiting]) -> Result<(Operation, Vec<View>, f64), Status> {
-        let (engine, source, key) = (self.engine.clone(), batch[0].source.clone(), batch[0].key.clone());
+        let (source, key) = (batch[0].source.clone(), batch[0].key.clone());
         let cameras: Vec<_> = batch.iter().map(|waiting| waiting.view.camera).collect();
         let count = cameras.len();
-        let make = move |engine: &dyn Engine| match source {
+        let scene = source.scene().cloned();
+        let make = move |engine: &dyn Engine| match &source {
             Source::Set(set) => {
-                let work = ViewWork { cameras, method: key.method, planes: key.planes };
+                let work = ViewWork { cameras: cameras.clone(), method: key.method.clone(), planes: key.planes };
                 engine.reconstruct(set.set.as_ref(), &work, turn).map(|views| (Operation::ReconstructView, views))
             }
             Source::Scene { plan, scene_time_s } => {
-                let work = DirectWork { scene_time_s, ..DirectWork::of(&plan.workload, cameras, key.planes) };
+                let work = DirectWork::of(&plan.workload, cameras.clone(), key.planes);
+                let work = DirectWork { scene_time_s: *scene_time_s, ..work };
                 engine.draw_direct(&work, turn).map(|views| (Operation::DirectView, views))
             }
         };
-        let (made, busy_s) =
-            blocking(move || Ok::<_, Status>(own_time(engine.as_ref(), || make(engine.as_ref())))).await?;
-        let (operation, views) = made?;
+        let timed = move |engine: &dyn Engine| {
+            let (made, busy_s) = own_time(engine, || make(engine));
+            made.map(|made| (made, busy_s))
+        };
+        let ((operation, views), busy_s) = self.scenes.on_device(scene.as_ref(), timed).await?;
         if views.len() == count {
             Ok((operation, views, busy_s))
         } else {

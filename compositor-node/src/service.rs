@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use cluster::RenderViews;
 use codec::FramePart;
-use node::{CellPlan, Engine, NodeConfig, NodeMetrics, PlansInForce, Relay, SetMemory, next_within, until_drained};
+use node::{CellPlan, NodeConfig, NodeMetrics, PlansInForce, Relay, Scenes, SetMemory, next_within, until_drained};
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
@@ -33,7 +33,7 @@ impl CompositorService {
     /// Starts the device's loops, which end with the service.
     #[must_use]
     pub fn new(
-        engine: Arc<dyn Engine>,
+        scenes: Arc<Scenes>,
         plans: PlansInForce,
         config: &NodeConfig,
         metrics: NodeMetrics,
@@ -42,11 +42,11 @@ impl CompositorService {
         let arrivals = Arc::<Arrivals>::default();
         let mut rendering = JoinSet::new();
         let times = Arc::new(ViewTimes::new(config.max_view_s));
-        let renderer = Rendering::new(engine.clone(), metrics.clone(), times.clone(), config.direct_share);
+        let renderer = Rendering::new(scenes.clone(), metrics.clone(), times.clone(), config.direct_share);
         for lane in Lane::ALL {
             rendering.spawn(renderer.clone().run(arrivals.clone(), lane));
         }
-        let sets = Arc::new(Sets::new(engine, plans.clone(), config, metrics.clone()));
+        let sets = Arc::new(Sets::new(scenes.engine(), plans.clone(), config, metrics.clone()));
         let quota = NodeQuota::new(config.quotas);
         let shared = Shared {
             plans,

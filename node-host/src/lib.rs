@@ -1,11 +1,12 @@
 //! One node process: it can sample and composite, and takes its roles from the plan.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use cluster::NodeStatus;
 use compositor_node::CompositorService;
 use node::{
-    DeviceLossMonitor, Engine, NodeConfig, NodeMetrics, NodeService, PlansInForce, Scenes, ServeError, health,
+    DeviceMonitor, Engine, NodeConfig, NodeMetrics, NodeService, PlansInForce, Scenes, ServeError, health,
     keep_membership, with_reflection,
 };
 use sampler_node::SamplerService;
@@ -15,7 +16,8 @@ use tonic::service::Routes;
 use wire::rpc::{compositor_server, node_server, sampler_server};
 
 /// Serves both roles on one port and stays a member of the coordinator's cluster until `shutdown`. Then it ends its streams
-/// and returns when connections have ended, after 10 s at most. A node whose device is lost leaves at once.
+/// and returns when connections have ended, after 10 s at most. A node whose device is lost leaves at once; one whose device
+/// runs out of memory again and again leaves for a while.
 ///
 /// # Errors
 /// Where the address is not allowed, the transport fails or the device is lost.
@@ -26,29 +28,34 @@ pub async fn serve(
     metrics: NodeMetrics,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
-    let monitor = DeviceLossMonitor::new(engine);
+    let monitor = DeviceMonitor::new(engine);
     let engine: Arc<dyn Engine> = Arc::new(monitor.clone());
     let plans = PlansInForce::new(&config.node_name);
     let scenes = Arc::new(Scenes::new(engine.clone(), &config));
-    let address = listener.local_addr()?;
+    let (address, left) = (listener.local_addr()?, plans.clone());
     let status = NodeStatus {
         node_name: config.node_name.clone(),
         address: config.advertised_address.clone().unwrap_or_else(|| format!("http://{address}")),
         device_name: engine.device_name(),
         is_software: engine.is_software(),
     };
-    let compositor = CompositorService::new(engine.clone(), plans.clone(), &config, metrics.clone(), shutdown.clone());
+    let compositor = CompositorService::new(scenes.clone(), plans.clone(), &config, metrics.clone(), shutdown.clone());
     let (relay, done) = (compositor.relay(), metrics.done.clone());
-    let sampler = SamplerService::new(engine.clone(), plans.clone(), &config, relay, metrics.clone(), shutdown.clone());
+    let sampler = SamplerService::new(scenes.clone(), plans.clone(), &config, relay, metrics.clone(), shutdown.clone());
     let memory = vec![compositor.memory(), sampler.memory()];
-    let service = NodeService::new(engine, plans.clone(), scenes.clone(), metrics, memory);
+    monitor.set_memory(memory.clone());
+    let service = NodeService::new(plans.clone(), scenes.clone(), metrics, memory);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))
         .add_service(compositor_server(compositor));
     let routes = with_reflection(routes, config.reflection)?;
-    let member = keep_membership(status, config.coordinator.clone(), plans, scenes, done, shutdown.clone());
-    let membership = tokio::spawn(member);
+    let (coordinator, away, ends) = (config.coordinator.clone(), config.deadlines.away, shutdown.clone());
+    let member = move || {
+        let (node, coordinator, plans) = (status.clone(), coordinator.clone(), plans.clone());
+        keep_membership(node, coordinator, plans, scenes.clone(), done.clone(), ends.clone())
+    };
+    let membership = tokio::spawn(stay_while_memory_lasts(member, monitor.clone(), left, away));
     let served = tokio::select! {
         served = node::serve(listener, routes, config.insecure_bind, shutdown) => served,
         reason = monitor.lost() => Err(ServeError::DeviceLost { reason }),
@@ -56,4 +63,27 @@ pub async fn serve(
     // Where serving has ended by itself, `shutdown` is not cancelled.
     membership.abort();
     served
+}
+
+/// A member leaves when its device has no memory left, and begins again with nothing in it.
+async fn stay_while_memory_lasts<F: Future<Output = ()>>(
+    member: impl Fn() -> F,
+    monitor: DeviceMonitor,
+    plans: PlansInForce,
+    away: Duration,
+) {
+    loop {
+        tokio::select! {
+            () = member() => return,
+            () = monitor.exhausted() => (),
+        }
+        tracing::error!(
+            node = &*plans.node_name,
+            away_s = away.as_secs_f64(),
+            "out of device memory: leaves for a while"
+        );
+        plans.forget_all();
+        tokio::time::sleep(away).await;
+        monitor.free();
+    }
 }

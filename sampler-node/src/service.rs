@@ -6,9 +6,10 @@ use std::time::{Duration, Instant};
 
 use cluster::{Assignment, FetchImages, SetContent};
 use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
+use depth_image::DepthImage;
 use node::{
-    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, OfSet, Operation, Pinned, PlansInForce, Relay, SampleWork,
-    SetMemory, Turn,
+    ByteCache, CellPlan, Engine, EngineError, NodeConfig, NodeMetrics, OfSet, Operation, Pinned, PlansInForce, Relay,
+    SampleWork, Scenes, SetMemory, Turn,
 };
 use node::{WorkClass, beyond_timeline, blocking, most_image_bytes, own_time, until_drained, with_guard};
 use parking_lot::Mutex;
@@ -63,7 +64,7 @@ impl Turns {
 
 /// The sampler's role.
 pub struct SamplerService {
-    engine: Arc<dyn Engine>,
+    scenes: Arc<Scenes>,
     plans: PlansInForce,
     cache: ByteCache<Key, PackedSet>,
     /// A receiver that takes no chunk for so long is cut off: it keeps images in memory.
@@ -78,7 +79,7 @@ impl SamplerService {
     /// The service of a node, which relays the images of `relay`.
     #[must_use]
     pub fn new(
-        engine: Arc<dyn Engine>,
+        scenes: Arc<Scenes>,
         plans: PlansInForce,
         config: &NodeConfig,
         relay: Relay,
@@ -88,7 +89,7 @@ impl SamplerService {
         // The other half is for sets on the device.
         let cache = ByteCache::new("packed sample images", config.set_memory_bytes / 2);
         let stall = config.deadlines.stall;
-        Self { engine, plans, cache, stall, turns: Turns::default(), relay, metrics, shutdown }
+        Self { scenes, plans, cache, stall, turns: Turns::default(), relay, metrics, shutdown }
     }
 
     /// The packed images.
@@ -102,7 +103,7 @@ impl SamplerService {
         let content = plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))?;
         let indices = plan.images_of(&self.plans.node_name, set_index).to_vec();
         let work = sample_work(plan, &indices, set_index)?;
-        let (engine, metrics) = (self.engine.clone(), self.metrics.clone());
+        let (scenes, scene, metrics) = (self.scenes.clone(), plan.workload.scene.clone(), self.metrics.clone());
         let own: Vec<_> = indices.iter().map(|&index| work.cameras[index as usize]).collect();
         let most_bytes = most_image_bytes(&plan.workload, &own);
         let key = (content, plan.tile_count, indices.clone());
@@ -115,8 +116,8 @@ impl SamplerService {
             if !plans.have_set(&content, set_index) {
                 return Err(Status::failed_precondition(format!("no plan in force has this set {set_index}")));
             }
-            let images =
-                blocking(move || sample(engine.as_ref(), &work, (&indices, tiles), (number, &metrics))).await?;
+            let sampled = scenes.on_device(Some(&scene), move |engine| sample(engine, &work)).await?;
+            let images = blocking(move || pack(sampled, (&indices, tiles), (number, &metrics))).await?;
             let bytes = images.iter().map(|(_, image)| image.payload.len()).sum();
             Ok((PackedSet { images, content, origin: (number, set_index) }, bytes))
         };
@@ -202,14 +203,20 @@ fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Sam
     })
 }
 
-fn sample(
-    engine: &dyn Engine,
-    work: &SampleWork,
+/// Images with the seconds that they took.
+fn sample(engine: &dyn Engine, work: &SampleWork) -> Result<(Vec<DepthImage>, f64), EngineError> {
+    let (images, sampled_s) = own_time(engine, || engine.sample(work, Turn::of(WorkClass::Batch)));
+    let (scene_time_s, refinement_step) = (work.scene_time_s, work.refinement.step);
+    tracing::debug!(images = work.wanted.len(), scene_time_s, refinement_step, sampled_s, "sampled");
+    Ok((images?, sampled_s))
+}
+
+fn pack(
+    (images, sampled_s): (Vec<DepthImage>, f64),
     (indices, tiles): (&[u32], f64),
     (workload_number, metrics): (u64, &NodeMetrics),
 ) -> Result<PackedImages, Status> {
-    let (images, sampled_s) = own_time(engine, || engine.sample(work, Turn::of(WorkClass::Batch)));
-    let (images, encoding) = (images?, Instant::now());
+    let encoding = Instant::now();
     if images.len() != indices.len() {
         return Err(Status::internal(format!("{} images were sampled for {} cameras", images.len(), indices.len())));
     }
@@ -225,13 +232,5 @@ fn sample(
     metrics.images_sampled.inc_by(images.len() as u64);
     metrics.done.add(workload_number, Operation::SampleImage, whole_images, total_s);
     metrics.done.encoded(workload_number, whole_images, encoded.iter().map(|(_, image)| image.payload.len()).sum());
-    tracing::debug!(
-        images = images.len(),
-        scene_time_s = work.scene_time_s,
-        refinement_step = work.refinement.step,
-        sampled_s,
-        total_s,
-        "sampled"
-    );
     Ok(encoded)
 }

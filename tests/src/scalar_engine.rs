@@ -76,6 +76,10 @@ pub struct ScalarEngine {
     counts: Arc<Mutex<SampleCounts>>,
     scenes: Arc<Mutex<HashSet<String>>>,
     is_lost: Arc<AtomicBool>,
+    /// Calls from now on that run out of memory.
+    shortages: Arc<AtomicUsize>,
+    /// Views of one call that memory has no room for; 0 for any number.
+    too_many_views: Arc<AtomicUsize>,
     pace: Arc<Mutex<Pace>>,
     reconstructed: Arc<AtomicUsize>,
     holds: Arc<(Mutex<Holds>, Condvar)>,
@@ -267,9 +271,35 @@ impl ScalarEngine {
         self.is_lost.store(true, Ordering::Relaxed);
     }
 
+    /// The next calls run out of memory.
+    pub fn run_short(&self, calls: usize) {
+        self.shortages.store(calls, Ordering::Relaxed);
+    }
+
+    /// From now on memory has no room for so many views of one call.
+    pub fn run_short_for(&self, views: usize) {
+        self.too_many_views.store(views, Ordering::Relaxed);
+    }
+
+    /// Scenes leave the device.
+    pub fn evict_scenes(&self) {
+        self.scenes.lock().clear();
+    }
+
     fn works(&self) -> Result<(), EngineError> {
+        self.has_room_for(0)?;
         let is_lost = self.is_lost.load(Ordering::Relaxed);
         if is_lost { Err(EngineError::Lost("as a test wanted".to_owned())) } else { Ok(()) }
+    }
+
+    fn has_room_for(&self, views: usize) -> Result<(), EngineError> {
+        let most = self.too_many_views.load(Ordering::Relaxed);
+        let next = |calls: usize| calls.checked_sub(1);
+        let is_short = self.shortages.fetch_update(Ordering::Relaxed, Ordering::Relaxed, next).is_ok();
+        if is_short || (most > 0 && views >= most) {
+            return Err(EngineError::OutOfMemory("as a test wanted".to_owned()));
+        }
+        Ok(())
     }
 
     fn loaded(&self, hash: &str) -> Result<(), EngineError> {
@@ -344,6 +374,7 @@ impl Engine for ScalarEngine {
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, _: Turn) -> Result<Vec<View>, EngineError> {
         self.works()?;
+        self.has_room_for(work.cameras.len())?;
         known("method", &work.method, "splat")?;
         let any: &dyn Any = set;
         let Uploaded(set) =

@@ -63,6 +63,8 @@ pub struct Deadlines {
     pub stall: Duration,
     /// A live view's set: after it, a neighbouring view cell's set of the same moment serves.
     pub neighbour: Duration,
+    /// A node whose device has no memory left, until it joins again.
+    pub away: Duration,
 }
 
 impl Default for Deadlines {
@@ -73,6 +75,7 @@ impl Default for Deadlines {
             chunk: Duration::from_secs(10),
             stall: Duration::from_secs(30),
             neighbour: Duration::from_millis(100),
+            away: Duration::from_secs(5),
         }
     }
 }

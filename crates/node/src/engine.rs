@@ -1,4 +1,4 @@
-//! The boundary to the device, and the notice of its loss.
+//! The boundary to the device.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -8,7 +8,6 @@ use std::time::Instant;
 use cluster::{Refinement, SamplePlanes, Workload};
 use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, View, ViewPlanes};
 use glam::Vec3;
-use tokio::sync::watch;
 use tonic::Status;
 
 /// The urgency of work on a device, which the nodes of a process share.
@@ -235,89 +234,5 @@ impl From<EngineError> for Status {
             // Another node's device can do it.
             EngineError::OutOfMemory(_) | EngineError::Lost(_) => Self::unavailable(text),
         }
-    }
-}
-
-/// An engine that notices when the device of the engine inside is lost.
-#[derive(Clone)]
-pub struct DeviceLossMonitor {
-    engine: Arc<dyn Engine>,
-    lost: watch::Sender<Option<String>>,
-}
-
-impl DeviceLossMonitor {
-    /// Monitors an engine.
-    #[must_use]
-    pub fn new(engine: Arc<dyn Engine>) -> Self {
-        Self { engine, lost: watch::Sender::new(None) }
-    }
-
-    /// Resolves when the device is lost, with the reason.
-    pub async fn lost(&self) -> String {
-        let mut lost = self.lost.subscribe();
-        // This value owns a sender, which therefore outlives the wait.
-        let reason = lost.wait_for(Option::is_some).await.ok().and_then(|reason| reason.clone());
-        reason.unwrap_or_default()
-    }
-
-    fn monitored<T>(&self, done: Result<T, EngineError>) -> Result<T, EngineError> {
-        if let Err(EngineError::Lost(reason)) = &done {
-            self.lost.send_replace(Some(reason.clone()));
-        }
-        done
-    }
-}
-
-impl Engine for DeviceLossMonitor {
-    fn device_name(&self) -> String {
-        self.engine.device_name()
-    }
-
-    fn is_software(&self) -> bool {
-        self.engine.is_software()
-    }
-
-    fn load_scene(&self, hash: &str, package: &[u8]) -> Result<(), EngineError> {
-        self.monitored(self.engine.load_scene(hash, package))
-    }
-
-    fn has_scene(&self, hash: &str) -> bool {
-        self.engine.has_scene(hash)
-    }
-
-    fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError> {
-        self.monitored(self.engine.images_are_independent(sampling))
-    }
-
-    fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
-        self.monitored(self.engine.images_are_sequential(sampling))
-    }
-
-    fn sample_planes(&self, method: &str) -> Result<SamplePlanes, EngineError> {
-        self.monitored(self.engine.sample_planes(method))
-    }
-
-    fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
-        self.engine.live_stream()
-    }
-
-    fn take_waited_s(&self) -> f64 {
-        self.engine.take_waited_s()
-    }
-
-    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError> {
-        self.monitored(self.engine.sample(request, turn))
-    }
-
-    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
-        self.monitored(self.engine.upload(set, turn))
-    }
-
-    fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
-        self.monitored(self.engine.reconstruct(set, work, turn))
-    }
-
-    fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError> {
-        self.monitored(self.engine.draw_direct(work, turn))
     }
 }

@@ -6,6 +6,7 @@ mod blocking;
 mod byte_cache;
 mod config;
 mod connections;
+mod device_monitor;
 mod engine;
 mod measure;
 mod membership;
@@ -24,9 +25,9 @@ pub use blocking::blocking;
 pub use byte_cache::{ByteCache, Pinned};
 pub use config::{Deadlines, NodeConfig, Quotas};
 pub use connections::Connections;
+pub use device_monitor::DeviceMonitor;
 pub use engine::{
-    DeviceLossMonitor, DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass,
-    own_time,
+    DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, own_time,
 };
 pub use membership::keep_membership;
 pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};

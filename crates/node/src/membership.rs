@@ -126,7 +126,7 @@ async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plans: &PlansI
     }
     for served in client.get_status(()).await?.workloads.into_iter().filter_map(|workload| workload.plan) {
         scenes.ensure(&served.assignment.workload.scene).await?;
-        let engine = scenes.engine.clone();
+        let engine = scenes.engine();
         blocking(move || warm(engine.as_ref(), &served.assignment, served.method)).await?;
     }
     Ok(())

@@ -174,6 +174,12 @@ impl PlansInForce {
         Ok(ended)
     }
 
+    /// Forgets all plans; their epochs are refused as before.
+    pub fn forget_all(&self) {
+        self.plans.lock().workloads.clear();
+        self.changes.send_modify(|changes| *changes += 1);
+    }
+
     /// Whether a plan in force has a set.
     #[must_use]
     pub fn have_set(&self, content: &SetContent, set_index: u32) -> bool {

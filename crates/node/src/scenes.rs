@@ -12,12 +12,12 @@ use wire::rpc::{CoordinatorClient, connect};
 
 use crate::blocking::blocking;
 use crate::config::NodeConfig;
-use crate::engine::Engine;
+use crate::engine::{Engine, EngineError};
 use crate::streams::next_within;
 
 /// Loads scenes onto the device.
 pub struct Scenes {
-    pub(crate) engine: Arc<dyn Engine>,
+    engine: Arc<dyn Engine>,
     config: NodeConfig,
     /// One load at a time: two plans may want the same scene.
     loading: Mutex<()>,
@@ -53,6 +53,35 @@ impl Scenes {
         let seconds = start.elapsed().as_secs_f64();
         tracing::info!(scene = %scene.hash, seconds, "scene loaded");
         Ok(seconds)
+    }
+
+    /// The device.
+    #[must_use]
+    pub fn engine(&self) -> Arc<dyn Engine> {
+        self.engine.clone()
+    }
+
+    /// Does work on the device, on a blocking thread. Where a scene that it needs has left the device since the plan was
+    /// applied, the scene is loaded and the work done again.
+    ///
+    /// # Errors
+    /// The work's own, and those of [`Scenes::ensure`].
+    pub async fn on_device<T: Send + 'static>(
+        &self,
+        scene: Option<&SceneRef>,
+        work: impl Fn(&dyn Engine) -> Result<T, EngineError> + Clone + Send + 'static,
+    ) -> Result<T, Status> {
+        let attempt = || {
+            let (engine, work) = (self.engine(), work.clone());
+            blocking(move || Ok::<_, Status>(work(engine.as_ref())))
+        };
+        match (attempt().await?, scene) {
+            (Err(EngineError::UnknownScene { .. }), Some(scene)) => {
+                self.ensure(scene).await?;
+                Ok(attempt().await??)
+            }
+            (done, _) => Ok(done?),
+        }
     }
 
     async fn read_folder(&self, hash: &SceneHash) -> Result<Option<Vec<u8>>, Status> {

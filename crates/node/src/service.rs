@@ -9,7 +9,6 @@ use tonic::{Status, async_trait};
 use wire::rpc;
 
 use crate::blocking::blocking;
-use crate::engine::Engine;
 use crate::measure::measure_costs;
 use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
@@ -21,7 +20,6 @@ const MAX_MEASURED: usize = 16;
 
 /// The node's own service.
 pub struct NodeService {
-    engine: Arc<dyn Engine>,
     plans: PlansInForce,
     scenes: Arc<Scenes>,
     metrics: NodeMetrics,
@@ -34,13 +32,12 @@ impl NodeService {
     /// The service of one node, whose roles keep sets in `memory`.
     #[must_use]
     pub fn new(
-        engine: Arc<dyn Engine>,
         plans: PlansInForce,
         scenes: Arc<Scenes>,
         metrics: NodeMetrics,
         memory: Vec<Arc<dyn SetMemory>>,
     ) -> Self {
-        Self { engine, plans, scenes, metrics, memory, measured: Mutex::default() }
+        Self { plans, scenes, metrics, memory, measured: Mutex::default() }
     }
 }
 
@@ -53,7 +50,7 @@ impl rpc::Node for NodeService {
             return Ok(measured);
         }
         self.scenes.ensure(&request.workload.scene).await?;
-        let (engine, measurement) = (self.engine.clone(), request.clone());
+        let (engine, measurement) = (self.scenes.engine(), request.clone());
         let measured = blocking(move || measure_costs(engine.as_ref(), &measurement)).await?;
         let mut cached = self.measured.lock();
         cached.push_back((request, measured));

@@ -4,6 +4,7 @@
 mod flow;
 mod quotas;
 mod raw;
+mod shortage;
 
 use std::time::{Duration, Instant};
 
