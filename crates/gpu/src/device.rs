@@ -2,6 +2,8 @@
 
 use std::{fmt, str::FromStr, sync::Arc};
 
+use parking_lot::Mutex;
+
 use crate::error::GpuError;
 use crate::faults::Faults;
 use crate::sharing::DeviceQueue;
@@ -48,6 +50,8 @@ pub struct Gpu {
     pub device_queue: Arc<DeviceQueue>,
     pub(crate) faults: Arc<Faults>,
     pub(crate) timestamp_period_ns: Option<f32>,
+    /// A second device of the same driver, where shaders are compiled while others use this one (`shader/warming.rs`).
+    pub(crate) second: Mutex<Option<Arc<Self>>>,
 }
 
 impl Gpu {
@@ -83,7 +87,8 @@ impl Gpu {
             let faults = faults.clone();
             move |cause, reason| faults.lose(format!("{cause:?}: {reason}"))
         });
-        Ok(Arc::new(Self { device, queue, info, device_queue: Arc::default(), faults, timestamp_period_ns }))
+        let (device_queue, second) = Default::default();
+        Ok(Arc::new(Self { device, queue, info, device_queue, faults, timestamp_period_ns, second }))
     }
 
     /// The name of the device in reports.
@@ -133,6 +138,20 @@ impl Gpu {
             format,
             usage,
             view_formats: &[],
+        })
+    }
+
+    /// The sampler of all textures of materials: smooth at every distance, repeated beyond the borders.
+    #[must_use]
+    pub fn texture_sampler(&self) -> wgpu::Sampler {
+        self.device.create_sampler(&wgpu::SamplerDescriptor {
+            address_mode_u: wgpu::AddressMode::Repeat,
+            address_mode_v: wgpu::AddressMode::Repeat,
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            mipmap_filter: wgpu::MipmapFilterMode::Linear,
+            anisotropy_clamp: 4,
+            ..Default::default()
         })
     }
 

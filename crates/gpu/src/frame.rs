@@ -125,6 +125,16 @@ impl<'g> Frame<'g> {
         })
     }
 
+    /// The device.
+    pub(crate) fn gpu(&self) -> &'g Gpu {
+        self.gpu
+    }
+
+    /// Says that a shader is used for the first time since the last cut.
+    pub(crate) fn count_first_use(&mut self) {
+        self.count((WorkKind::FIRST_USE, 1));
+    }
+
     /// Says what was recorded, without a cut.
     pub(crate) fn count(&mut self, work: Work) {
         self.work.push(work);

@@ -25,7 +25,7 @@ pub use frame::{Frame, FrameResult, Readback, Submitted};
 pub use illumination::{highlight_name, illumination_bytes, light_slots};
 pub use pool::{BufferPool, Lent, Pool, PooledBuffer};
 pub use shader::{
-    Binding, ComputePass, DispatchSize, DrawPass, DrawState, DrawVariant, Pass, PassCache, ResourceTrait,
+    Binding, BoundGroup, ComputePass, DispatchSize, DrawPass, DrawState, DrawVariant, Pass, PassCache, ResourceTrait,
     ResourceTraits, Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, WgslLiteral, source, sources,
     switches, uniform_elements, uniform_stride,
 };

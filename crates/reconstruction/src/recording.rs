@@ -5,7 +5,10 @@ use std::ops::Range;
 
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
-use gpu::{Binding, ComputePass, DispatchSize, Frame, PooledBuffer, ShaderVariant, Turn, WorkKind, uniform_elements};
+use gpu::{
+    Binding, BoundGroup, ComputePass, DispatchSize, Frame, PooledBuffer, ShaderVariant, Turn, WorkKind,
+    uniform_elements,
+};
 use wgpu::BufferUsages;
 
 use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, SetVariant, TILE_PX, rows_of};
@@ -117,7 +120,7 @@ impl<'r> Recording<'r> {
         &mut self,
         variant: &impl ShaderVariant,
         pass: &ComputePass,
-        bound: &wgpu::BindGroup,
+        bound: &BoundGroup,
         listed: Option<&PixelList>,
     ) {
         let all = [self.batch.size_px.x, self.batch.pieces.rows];
@@ -128,7 +131,7 @@ impl<'r> Recording<'r> {
     }
 
     /// One dispatch a tile of a piece.
-    pub fn dispatch_tiles(&mut self, variant: &impl ShaderVariant, pass: &ComputePass, bound: &wgpu::BindGroup) {
+    pub fn dispatch_tiles(&mut self, variant: &impl ShaderVariant, pass: &ComputePass, bound: &BoundGroup) {
         let [across, down] = [self.batch.size_px.x, self.batch.pieces.rows].map(|side| side.div_ceil(TILE_PX));
         self.dispatch(variant, pass, bound, |_| DispatchSize::Invocations([across, down, 1]));
     }
@@ -138,7 +141,7 @@ impl<'r> Recording<'r> {
         &mut self,
         variant: &impl ShaderVariant,
         pass: &ComputePass,
-        bound: &wgpu::BindGroup,
+        bound: &BoundGroup,
         size: impl Fn(u32) -> DispatchSize<'b>,
     ) {
         let kind = WorkKind::new(self.family, &variant.name());

@@ -3,9 +3,7 @@
 use std::{ops::Range, sync::Arc};
 
 use depth_image::PinholeCamera;
-use gpu::{BufferPool, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVariant, WorkKind};
-
-use wgpu::BindGroup;
+use gpu::{BoundGroup, BufferPool, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVariant, WorkKind};
 
 use crate::accumulation::{Key, Sums};
 use crate::pieces::{Piece, Pieces};
@@ -142,7 +140,7 @@ impl Recording<'_> {
         &mut self,
         variant: &impl ShaderVariant,
         pass: &ComputePass,
-        groups: &[&BindGroup],
+        groups: &[&BoundGroup],
         (camera, step_px): (usize, u32),
     ) {
         let kind = WorkKind::new(self.batch.family(), &variant.name());
@@ -159,7 +157,7 @@ impl Recording<'_> {
         kind: WorkKind,
         pass: &ComputePass,
         camera: usize,
-        of_piece: impl Fn(usize, Piece, u32) -> (Vec<&'b BindGroup>, DispatchSize<'b>),
+        of_piece: impl Fn(usize, Piece, u32) -> (Vec<&'b BoundGroup>, DispatchSize<'b>),
     ) {
         let width_px = self.batch.cameras[camera].size_px.x;
         for (place, (element, piece)) in self.pieces.of_camera(camera).enumerate() {

@@ -66,6 +66,13 @@ pub(crate) struct Draw {
     pub bounds_in_world: Aabb,
 }
 
+impl Draw {
+    /// Whether another draw has the same pipeline and textures.
+    pub fn is_like(&self, other: &Self) -> bool {
+        (self.material, self.texture) == (other.material, other.texture)
+    }
+}
+
 static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(0);
 
 /// A scene uploaded to one device.
@@ -128,6 +135,11 @@ impl GpuScene {
     #[must_use]
     pub fn has_highlights(&self, highlight: Highlight) -> bool {
         self.highlights[usize::from(highlight == Highlight::Ggx)]
+    }
+
+    /// Instances counted each.
+    pub(crate) fn triangle_count(&self) -> usize {
+        self.draws.iter().map(|draw| draw.indices.len() / 3).sum()
     }
 
     /// The tree that rays go through at a scene time: made now if there is none.

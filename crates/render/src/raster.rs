@@ -6,8 +6,8 @@ use bytemuck::{Pod, Zeroable};
 use depth_image::{Highlight, PinholeCamera};
 use glam::{Mat4, Vec4};
 use gpu::{
-    Binding, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ResourceTrait, ResourceTraits, ShaderVariant,
-    Templates, WorkKind, highlight_name, switches, uniform_stride,
+    Binding, BoundGroup, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ResourceTrait, ResourceTraits,
+    ShaderVariant, Templates, WorkKind, highlight_name, switches, uniform_stride,
 };
 use minijinja::{Value, context};
 
@@ -48,10 +48,10 @@ pub(crate) struct RasterCamera {
 
 /// The resources of all draws of a submission.
 struct Groups {
-    scene: wgpu::BindGroup,
-    object: wgpu::BindGroup,
-    textures: Vec<wgpu::BindGroup>,
-    known: Option<wgpu::BindGroup>,
+    scene: BoundGroup,
+    object: BoundGroup,
+    textures: Vec<BoundGroup>,
+    known: Option<BoundGroup>,
 }
 
 pub(crate) struct Raster {
@@ -122,16 +122,7 @@ impl DrawVariant for RasterVariant {
 
 impl Raster {
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-            address_mode_u: wgpu::AddressMode::Repeat,
-            address_mode_v: wgpu::AddressMode::Repeat,
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            mipmap_filter: wgpu::MipmapFilterMode::Linear,
-            anisotropy_clamp: 4,
-            ..Default::default()
-        });
-        Self { gpu: gpu.clone(), sampler, passes: PassCache::new(gpu, templates) }
+        Self { gpu: gpu.clone(), sampler: gpu.texture_sampler(), passes: PassCache::new(gpu, templates) }
     }
 
     /// Records one pass for each camera from the `first` on. With predecessors, whose samples are not drawn again, there is one
@@ -184,11 +175,31 @@ impl Raster {
         let runs = visible_runs(view.scene, &Frustum::of(view.camera));
         let a_slice = self.gpu.device_queue.slice_units(family, UNKNOWN_SLICE_INDICES);
         for (number, runs) in slices(runs, a_slice).into_iter().enumerate() {
+            self.announce(frame, view, variant, &runs)?;
             let mut pass = begin_pass(frame, colors, reversed_depth, number == 0);
             self.draw(&mut pass, view, variant, &runs)?;
             drop(pass);
             let indices = runs.iter().map(|run| run.indices.len() as u64).sum();
             frame.cut(WorkKind::new(family, &variant), indices);
+        }
+        Ok(())
+    }
+
+    /// Tells the frame of the pipelines that the next pass draws with.
+    fn announce(
+        &self,
+        frame: &mut Frame<'_>,
+        &View { scene, groups, .. }: &View<'_>,
+        variant: RasterVariant,
+        runs: &[Run],
+    ) -> Result<(), RenderError> {
+        let Some(groups) = groups else { return Ok(()) };
+        let known = groups.known.as_ref().filter(|_| variant.redundancy.is_some());
+        for run in runs.chunk_by(|a, b| scene.draws[a.draw].is_like(&scene.draws[b.draw])) {
+            let draw = &scene.draws[run[0].draw];
+            let textures = &groups.textures[draw.texture as usize];
+            let bound: Vec<_> = [&groups.scene, &groups.object, textures].into_iter().chain(known).collect();
+            self.passes.get(&RasterVariant { material: draw.material, ..variant })?.announce(frame, &bound);
         }
         Ok(())
     }
@@ -206,9 +217,9 @@ impl Raster {
         pass.set_viewport(0.0, 0.0, size.x, size.y, 0.0, 1.0);
         pass.set_vertex_buffer(0, scene.vertices.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.set_bind_group(0, &groups.scene, &[place * CAMERA_STRIDE]);
+        pass.set_bind_group(0, &*groups.scene, &[place * CAMERA_STRIDE]);
         if let Some(known) = groups.known.as_ref().filter(|_| variant.redundancy.is_some()) {
-            pass.set_bind_group(KNOWN_GROUP, known, &[]);
+            pass.set_bind_group(KNOWN_GROUP, &**known, &[]);
         }
         let (mut material, mut texture, mut object) = (None, None, None);
         for run in runs {
@@ -218,10 +229,10 @@ impl Raster {
                 pass.set_pipeline(self.passes.get(&variant)?.pipeline());
             }
             if object.replace(draw.object) != Some(draw.object) {
-                pass.set_bind_group(1, &groups.object, &[draw.object * OBJECT_STRIDE]);
+                pass.set_bind_group(1, &*groups.object, &[draw.object * OBJECT_STRIDE]);
             }
             if texture.replace(draw.texture) != Some(draw.texture) {
-                pass.set_bind_group(2, &groups.textures[draw.texture as usize], &[]);
+                pass.set_bind_group(2, &*groups.textures[draw.texture as usize], &[]);
             }
             let first_primitive = run.indices.start / 3;
             pass.draw_indexed(run.indices.clone(), draw.base_vertex, first_primitive..first_primitive + 1);

@@ -1,16 +1,16 @@
 //! Views and depth images of scenes, in as few submissions as memory allows.
 
-use std::{collections::HashMap, slice, sync::Arc};
+use std::{collections::VecDeque, slice, sync::Arc};
 
 use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
 use glam::UVec2;
-use gpu::{Frame, Gpu, GpuError, Templates, Turn};
+use gpu::{Frame, Gpu, GpuError, Templates, Turn, WorkClass};
 use parking_lot::Mutex;
 
 use crate::batch::{Batch, batches};
 use crate::known_samples::{ImageSequence, KnownSamples, TemporalReference};
 use crate::planes::{self, Output};
-use crate::visibility::{Choice, Visibility};
+use crate::visibility::{Choice, Costs, Visibility};
 use crate::work::{DrawWork, SamplePlanes};
 use crate::{
     GpuScene, Lighting, RenderError, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages,
@@ -20,13 +20,16 @@ use crate::{
 /// Pixels in one submission: bounds the memory for surfaces, light and read-back.
 const PIXELS_A_SUBMISSION: usize = 1 << 20;
 
+/// Scenes whose costs are remembered.
+const MOST_SCENES: usize = 64;
+
 /// Draws on one device.
 pub struct Renderer {
     gpu: Arc<Gpu>,
     stages: Stages,
     layer_cache: LayerCache,
-    /// By scene and size of pictures.
-    choices: Mutex<HashMap<(u64, UVec2), Choice>>,
+    /// By scene; the one that was measured first is at the front.
+    costs: Mutex<VecDeque<(u64, Costs)>>,
 }
 
 impl Renderer {
@@ -34,7 +37,7 @@ impl Renderer {
     #[must_use]
     pub fn new(gpu: &Arc<Gpu>, templates: Templates) -> Self {
         let stages = Stages::new(gpu, &Arc::new(templates));
-        Self { gpu: gpu.clone(), stages, layer_cache: LayerCache::default(), choices: Mutex::default() }
+        Self { gpu: gpu.clone(), stages, layer_cache: LayerCache::default(), costs: Mutex::default() }
     }
 
     /// The device.
@@ -171,26 +174,71 @@ impl Renderer {
         Ok(pictures)
     }
 
-    /// The faster way of finding surfaces for pictures of `camera`'s size: measured the first time.
+    /// The costs of both ways of finding surfaces for pictures of `camera`'s size: measured with the scene's first pictures,
+    /// predicted for others.
     ///
     /// # Errors
     /// The device's.
     pub fn choice(&self, scene: &GpuScene, camera: &PinholeCamera, scene_time_s: f32) -> Result<Choice, RenderError> {
-        self.choice_in_turn(scene, camera, scene_time_s, Turn::default())
+        Ok(self.costs_in_turn(scene, camera, scene_time_s, Turn::default())?.at(camera.pixel_count()))
+    }
+
+    /// Whether surfaces are found by rays. A live stream does not wait for the measurement: where there is none, it traces rays
+    /// if the scene has more triangles than the picture pixels.
+    fn is_by_rays(
+        &self,
+        scene: &GpuScene,
+        camera: &PinholeCamera,
+        scene_time_s: f32,
+        turn: Turn,
+    ) -> Result<bool, RenderError> {
+        if turn.class == WorkClass::Live && self.known_costs(scene).is_none() {
+            return Ok(scene.triangle_count() > camera.pixel_count());
+        }
+        Ok(self.costs_in_turn(scene, camera, scene_time_s, turn)?.at(camera.pixel_count()).rays_are_faster())
+    }
+
+    fn known_costs(&self, scene: &GpuScene) -> Option<Costs> {
+        self.costs.lock().iter().find(|(identity, _)| *identity == scene.identity).map(|(_, costs)| *costs)
     }
 
     /// Not under a lock: work of one class would wait for the turn of another.
-    fn choice_in_turn(
+    fn costs_in_turn(
+        &self,
+        scene: &GpuScene,
+        camera: &PinholeCamera,
+        scene_time_s: f32,
+        turn: Turn,
+    ) -> Result<Costs, RenderError> {
+        if let Some(costs) = self.known_costs(scene) {
+            return Ok(costs);
+        }
+        let small = halved(camera);
+        let measured = |camera: &PinholeCamera| {
+            let choice = self.measure(scene, camera, scene_time_s, turn)?;
+            tracing::info!(size_px = %camera.size_px, %choice, "surfaces are found by");
+            Ok::<_, RenderError>((camera.pixel_count(), choice))
+        };
+        let measured = Costs::through([measured(&small)?, measured(camera)?]);
+        let mut costs = self.costs.lock();
+        // Of several that were measured at once the first counts.
+        if let Some((_, first)) = costs.iter().find(|(identity, _)| *identity == scene.identity) {
+            return Ok(*first);
+        }
+        if costs.len() >= MOST_SCENES {
+            costs.pop_front();
+        }
+        costs.push_back((scene.identity, measured));
+        Ok(measured)
+    }
+
+    fn measure(
         &self,
         scene: &GpuScene,
         camera: &PinholeCamera,
         scene_time_s: f32,
         turn: Turn,
     ) -> Result<Choice, RenderError> {
-        let key = (scene.identity, camera.size_px);
-        if let Some(choice) = self.choices.lock().get(&key) {
-            return Ok(*choice);
-        }
         let seconds = |visibility| {
             let (lighting, refinement) = (Lighting::UNLIT, Default::default());
             let work = DrawWork { scene, lighting, scene_time_s, visibility, refinement, turn };
@@ -204,10 +252,7 @@ impl Renderer {
             run()?;
             (0..3).map(|_| run()).try_fold(f64::INFINITY, |least, s: Result<f64, RenderError>| s.map(|s| least.min(s)))
         };
-        let choice = Choice { triangles_s: seconds(Visibility::Triangles)?, rays_s: seconds(Visibility::Rays)? };
-        tracing::info!(size_px = %camera.size_px, %choice, "surfaces are found by");
-        // Of several that were measured at once the first counts.
-        Ok(*self.choices.lock().entry(key).or_insert(choice))
+        Ok(Choice { triangles_s: seconds(Visibility::Triangles)?, rays_s: seconds(Visibility::Rays)? })
     }
 
     /// Visits of nodes, then tests of triangles, of each pixel's primary ray; slower than drawing.
@@ -252,9 +297,7 @@ impl Renderer {
             Visibility::Measured if sequence.is_some_and(|sequence| sequence.known.test.traces_rays()) => true,
             // Each moment of a moving scene would need a tree that nothing else needs.
             Visibility::Measured if work.scene.animated && !work.lighting.is_traced() => false,
-            Visibility::Measured => {
-                self.choice_in_turn(work.scene, &cameras[0], work.scene_time_s, work.turn)?.rays_are_faster()
-            }
+            Visibility::Measured => self.is_by_rays(work.scene, &cameras[0], work.scene_time_s, work.turn)?,
         };
         let needs_tree = by_rays || work.lighting.is_traced();
         let traced = needs_tree.then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
@@ -267,6 +310,13 @@ impl Renderer {
         let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) as usize;
         PIXELS_A_SUBMISSION.min(bytes / (4 * output.layout().count.max(output.sums.count())))
     }
+}
+
+/// The same view with a quarter of the pixels.
+fn halved(camera: &PinholeCamera) -> PinholeCamera {
+    let size_px = (camera.size_px / 2).max(UVec2::ONE);
+    let scale = size_px.as_vec2() / camera.size_px.as_vec2();
+    PinholeCamera { size_px, focal_px: camera.focal_px * scale, principal_px: camera.principal_px * scale, ..*camera }
 }
 
 fn pinholes(cameras: &[Camera]) -> Vec<PinholeCamera> {

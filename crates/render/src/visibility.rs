@@ -1,5 +1,5 @@
 //! Ways of finding surfaces: by drawing triangles, or by one ray a pixel. The faster way depends on the scene, the
-//! size of its pictures and the device, so it is measured.
+//! size of its pictures and the device. It is measured once for a scene, at two sizes, and predicted for others.
 
 use std::{fmt, str::FromStr};
 
@@ -37,6 +37,45 @@ impl Choice {
     }
 }
 
+/// The costs of both ways as lines over a view's pixels, measured at two sizes: they predict every other.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Costs {
+    triangles: Line,
+    rays: Line,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    fixed_s: f64,
+    pixel_s: f64,
+}
+
+impl Costs {
+    /// Lines through the measured costs of views of so many pixels, the smaller first.
+    pub fn through(measured: [(usize, Choice); 2]) -> Self {
+        let line =
+            |seconds: fn(&Choice) -> f64| Line::through(measured.map(|(pixels, choice)| (pixels, seconds(&choice))));
+        Self { triangles: line(|choice| choice.triangles_s), rays: line(|choice| choice.rays_s) }
+    }
+
+    /// The costs of a view of so many pixels.
+    pub fn at(&self, pixels: usize) -> Choice {
+        Choice { triangles_s: self.triangles.at(pixels), rays_s: self.rays.at(pixels) }
+    }
+}
+
+impl Line {
+    /// More pixels never cost less, and no pixels no less than nothing.
+    fn through([(least_px, least_s), (px, s)]: [(usize, f64); 2]) -> Self {
+        let pixel_s = ((s - least_s) / px.saturating_sub(least_px).max(1) as f64).clamp(0.0, s / px.max(1) as f64);
+        Self { fixed_s: s - pixel_s * px as f64, pixel_s }
+    }
+
+    fn at(&self, pixels: usize) -> f64 {
+        self.fixed_s + self.pixel_s * pixels as f64
+    }
+}
+
 impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let chosen = if self.rays_are_faster() { Visibility::Rays } else { Visibility::Triangles };
@@ -60,5 +99,30 @@ impl fmt::Display for Visibility {
             Self::Triangles => "triangles",
             Self::Rays => "rays",
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn costs_of_other_sizes_lie_on_the_lines_through_two_measured_ones() {
+        let choice = |triangles_s, rays_s| Choice { triangles_s, rays_s };
+        let costs = Costs::through([(1000, choice(4.0, 1.0)), (4000, choice(4.3, 4.0))]);
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        let (same, large) = (costs.at(4000), costs.at(10_000));
+        assert!(near(same.triangles_s, 4.3) && near(same.rays_s, 4.0) && same.rays_are_faster());
+        assert!(near(large.triangles_s, 4.9) && near(large.rays_s, 10.0) && !large.rays_are_faster());
+    }
+
+    #[test]
+    fn noisy_measurements_predict_neither_negative_nor_falling_costs() {
+        let choice = |s| Choice { triangles_s: s, rays_s: s };
+        for measured in [[3.0, 2.0], [0.1, 8.0], [0.0, 0.0]] {
+            let costs = Costs::through([(1000, choice(measured[0])), (4000, choice(measured[1]))]);
+            assert!(costs.at(1).rays_s >= 0.0 && costs.at(100_000).rays_s >= costs.at(4000).rays_s, "{measured:?}");
+        }
+        assert!(Costs::through([(1, choice(1.0)), (1, choice(1.0))]).at(1).rays_s.is_finite());
     }
 }

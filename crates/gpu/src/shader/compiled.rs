@@ -2,8 +2,9 @@
 
 use std::num::NonZeroU64;
 
-use wgpu::{BindGroup, BindGroupLayout, BindingResource};
+use wgpu::{BindGroupLayout, BindingResource};
 
+use super::bound_group::{BoundGroup, Form};
 use super::interface::{Binding, Resource, ResourceTraits, ShaderInterface};
 use crate::{device::Gpu, error::ShaderError};
 
@@ -17,6 +18,8 @@ pub struct Shader {
     pub(super) layout: wgpu::PipelineLayout,
     groups: Vec<BindGroupLayout>,
     device: wgpu::Device,
+    wgsl: String,
+    traits: ResourceTraits,
 }
 
 impl Shader {
@@ -39,7 +42,12 @@ impl Shader {
         });
         let source = wgpu::ShaderSource::Wgsl(wgsl.into());
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source });
-        Ok(Self { interface, module, layout, groups, device })
+        Ok(Self { interface, module, layout, groups, device, wgsl: wgsl.to_owned(), traits })
+    }
+
+    /// The same shader on another device.
+    pub(super) fn on(&self, gpu: &Gpu) -> Result<Self, ShaderError> {
+        Self::new(gpu, &self.interface.shader, &self.wgsl, self.traits)
     }
 
     /// Binds resources to all variables of a group.
@@ -50,20 +58,30 @@ impl Shader {
         &self,
         group: u32,
         bindings: impl IntoIterator<Item = Binding<'r>>,
-    ) -> Result<BindGroup, ShaderError> {
+    ) -> Result<BoundGroup, ShaderError> {
         let bindings: Vec<Binding<'r>> = bindings.into_iter().collect();
         let resources = self.interface.matched(group, bindings.iter().map(|binding| binding.name))?;
-        let entries: Vec<_> = resources.into_iter().zip(bindings).map(|(at, bound)| entry(at, bound)).collect();
-        Ok(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        let bound = bindings.into_iter().map(|binding| binding.resource);
+        let mut in_order: Vec<_> = resources.into_iter().zip(bound).collect();
+        in_order.sort_by_key(|(resource, _)| resource.layout.binding);
+        Ok(self.bind_in_order(group, in_order))
+    }
+
+    /// Binds to all variables of a group, which are in the order of its layout.
+    pub(super) fn bind_in_order(&self, group: u32, bound: Vec<(&Resource, BindingResource<'_>)>) -> BoundGroup {
+        let forms = bound.iter().map(|(_, resource)| Form::of(resource)).collect();
+        let entries: Vec<_> = bound.into_iter().map(|(at, resource)| entry(at, resource)).collect();
+        let descriptor = wgpu::BindGroupDescriptor {
             label: Some(&self.interface.shader),
             layout: &self.groups[group as usize],
             entries: &entries,
-        }))
+        };
+        BoundGroup::new(self.device.create_bind_group(&descriptor), forms)
     }
 }
 
-fn entry<'r>(at: &Resource, bound: Binding<'r>) -> wgpu::BindGroupEntry<'r> {
-    let resource = match (bound.resource, at.element_bytes) {
+fn entry<'r>(at: &Resource, bound: BindingResource<'r>) -> wgpu::BindGroupEntry<'r> {
+    let resource = match (bound, at.element_bytes) {
         (BindingResource::Buffer(buffer), Some(bytes)) => {
             BindingResource::Buffer(wgpu::BufferBinding { size: NonZeroU64::new(bytes.into()), ..buffer })
         }

@@ -2,16 +2,17 @@
 
 use std::ops::{Deref, Range};
 
-use wgpu::BindGroup;
-
+use super::bound_group::BoundGroup;
 use super::compiled::Shader;
 use super::variant::{Pass, ShaderVariant};
-use crate::{device::Gpu, frame::Frame};
+use super::warming::{FirstUses, warm};
+use crate::{device::Gpu, error::GpuError, frame::Frame, sharing::Turn};
 
 /// A compute pipeline with its layout. The shader's entry point is `main`.
 pub struct ComputePass {
     shader: Shader,
     pipeline: wgpu::ComputePipeline,
+    first_uses: FirstUses,
 }
 
 /// The size of a dispatch.
@@ -38,11 +39,11 @@ impl ComputePass {
             },
             cache: None,
         });
-        Self { shader, pipeline }
+        Self { shader, pipeline, first_uses: FirstUses::default() }
     }
 
     /// Records one dispatch, which sees the first element of buffers at dynamic offsets. `groups` are all groups, from 0.
-    pub fn dispatch(&self, frame: &mut Frame<'_>, groups: &[&BindGroup], size: DispatchSize<'_>) {
+    pub fn dispatch(&self, frame: &mut Frame<'_>, groups: &[&BoundGroup], size: DispatchSize<'_>) {
         self.dispatch_each(frame, groups, 0..1, size);
     }
 
@@ -50,10 +51,14 @@ impl ComputePass {
     pub fn dispatch_each(
         &self,
         frame: &mut Frame<'_>,
-        groups: &[&BindGroup],
+        groups: &[&BoundGroup],
         elements: Range<u32>,
         size: DispatchSize<'_>,
     ) {
+        if self.first_uses.is_first(groups) {
+            warm(frame.gpu(), &self.shader, groups, use_without_work);
+            frame.count_first_use();
+        }
         let interface = &self.shader.interface;
         let label = Some(interface.shader.as_str());
         let mut pass = frame.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes: None });
@@ -62,7 +67,7 @@ impl ComputePass {
             for (group, bound) in groups.iter().enumerate() {
                 let offsets: Vec<u32> = interface.strides(group).map(|stride| element * stride).collect();
                 if number == 0 || !offsets.is_empty() {
-                    pass.set_bind_group(group as u32, *bound, &offsets);
+                    pass.set_bind_group(group as u32, &***bound, &offsets);
                 }
             }
             match size {
@@ -76,6 +81,14 @@ impl ComputePass {
             }
         }
     }
+}
+
+/// Uses a shader on a device, which compiles it.
+fn use_without_work(gpu: &Gpu, shader: Shader, groups: &[BoundGroup]) -> Result<(), GpuError> {
+    let mut frame = Frame::begin(gpu, "compile", Turn::default());
+    let groups: Vec<&BoundGroup> = groups.iter().collect();
+    ComputePass::new(gpu, shader).dispatch(&mut frame, &groups, DispatchSize::Invocations([0; 3]));
+    frame.submit()?.wait().map(drop)
 }
 
 impl Deref for ComputePass {

@@ -2,19 +2,24 @@
 
 use std::ops::Deref;
 
-use wgpu::{RenderPipeline, ShaderStages, TextureFormat};
+use wgpu::{BufferUsages, RenderPipeline, ShaderStages, TextureFormat, TextureUsages};
 
+use super::bound_group::BoundGroup;
 use super::compiled::Shader;
 use super::variant::{Pass, ShaderVariant};
-use crate::device::Gpu;
+use super::warming::{FirstUses, warm};
+use crate::{device::Gpu, error::GpuError, frame::Frame, sharing::Turn};
 
 /// A render pipeline with its layout. The shader's entry points are `vertex` and, unless it draws depth alone, `fragment`.
 pub struct DrawPass {
     shader: Shader,
     pipeline: RenderPipeline,
+    state: DrawState,
+    first_uses: FirstUses,
 }
 
 /// The fixed functions of a drawing variant.
+#[derive(Clone)]
 pub struct DrawState {
     /// The attributes of vertices.
     pub vertices: wgpu::VertexBufferLayout<'static>,
@@ -34,6 +39,73 @@ impl DrawPass {
     /// The format of depth targets.
     pub const DEPTH_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 
+    fn new(gpu: &Gpu, shader: Shader, state: DrawState) -> Self {
+        let targets: Vec<_> = state.color_formats.iter().map(|&format| Some(format.into())).collect();
+        let fragment = shader.interface.stages.contains(ShaderStages::FRAGMENT).then(|| wgpu::FragmentState {
+            module: &shader.module,
+            entry_point: Some("fragment"),
+            compilation_options: Default::default(),
+            targets: &targets,
+        });
+        let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(&shader.interface.shader),
+            layout: Some(&shader.layout),
+            vertex: wgpu::VertexState {
+                module: &shader.module,
+                entry_point: Some("vertex"),
+                compilation_options: Default::default(),
+                buffers: &[Some(state.vertices.clone())],
+            },
+            primitive: wgpu::PrimitiveState { cull_mode: state.cull_mode, ..Default::default() },
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: Self::DEPTH_FORMAT,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::Greater),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment,
+            multiview_mask: None,
+            cache: None,
+        });
+        Self { shader, pipeline, state, first_uses: FirstUses::default() }
+    }
+
+    /// Says that a pass of the frame will draw with this pipeline and these groups: all, from 0. It has to be said before the
+    /// pass begins.
+    pub fn announce(&self, frame: &mut Frame<'_>, groups: &[&BoundGroup]) {
+        if self.first_uses.is_first(groups) {
+            warm(frame.gpu(), &self.shader, groups, |gpu, shader, groups| {
+                Self::new(gpu, shader, self.state.clone()).draw_nothing(gpu, groups)
+            });
+            frame.count_first_use();
+        }
+    }
+
+    /// Draws one triangle of no extent, for which the device compiles the shader.
+    fn draw_nothing(&self, gpu: &Gpu, groups: &[BoundGroup]) -> Result<(), GpuError> {
+        let target = |format| {
+            let texture = gpu.texture("nothing", [4, 4, 1], format, TextureUsages::RENDER_ATTACHMENT);
+            texture.create_view(&Default::default())
+        };
+        let colors: Vec<_> = self.state.color_formats.iter().map(|&format| target(format)).collect();
+        let corners = gpu.buffer("nothing", 1024, BufferUsages::VERTEX | BufferUsages::INDEX);
+        let mut frame = Frame::begin(gpu, "compile", Turn::default());
+        let (colors, depth): (Vec<_>, _) = (colors.iter().collect(), target(Self::DEPTH_FORMAT));
+        let mut pass = frame.begin_drawing("compile", &colors, Some(wgpu::Color::TRANSPARENT), &depth);
+        pass.set_pipeline(&self.pipeline);
+        pass.set_vertex_buffer(0, corners.slice(..));
+        pass.set_index_buffer(corners.slice(..), wgpu::IndexFormat::Uint32);
+        for (number, bound) in groups.iter().enumerate() {
+            let offsets: Vec<u32> = self.shader.interface.strides(number).map(|_| 0).collect();
+            pass.set_bind_group(number as u32, &**bound, &offsets);
+        }
+        pass.draw_indexed(0..3, 0, 0..1);
+        drop(pass);
+        frame.submit()?.wait().map(drop)
+    }
+
     /// The pipeline, to be set in a render pass.
     #[must_use]
     pub fn pipeline(&self) -> &RenderPipeline {
@@ -50,36 +122,6 @@ impl Deref for DrawPass {
 
 impl<V: DrawVariant> Pass<V> for DrawPass {
     fn build(gpu: &Gpu, shader: Shader, variant: &V) -> Self {
-        let DrawState { vertices, cull_mode, color_formats } = variant.state();
-        let targets: Vec<_> = color_formats.into_iter().map(|format| Some(format.into())).collect();
-        let fragment = shader.interface.stages.contains(ShaderStages::FRAGMENT).then(|| wgpu::FragmentState {
-            module: &shader.module,
-            entry_point: Some("fragment"),
-            compilation_options: Default::default(),
-            targets: &targets,
-        });
-        let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(&shader.interface.shader),
-            layout: Some(&shader.layout),
-            vertex: wgpu::VertexState {
-                module: &shader.module,
-                entry_point: Some("vertex"),
-                compilation_options: Default::default(),
-                buffers: &[Some(vertices)],
-            },
-            primitive: wgpu::PrimitiveState { cull_mode, ..Default::default() },
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: Self::DEPTH_FORMAT,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::Greater),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
-            multisample: Default::default(),
-            fragment,
-            multiview_mask: None,
-            cache: None,
-        });
-        Self { shader, pipeline }
+        Self::new(gpu, shader, variant.state())
     }
 }

@@ -1,5 +1,6 @@
 //! Shaders: WGSL written out of templates, what it declares, and passes that are bound to it by name.
 
+mod bound_group;
 mod compiled;
 mod compute_pass;
 mod draw_pass;
@@ -7,7 +8,9 @@ mod interface;
 mod pass_cache;
 mod template;
 mod variant;
+mod warming;
 
+pub use bound_group::BoundGroup;
 pub use compiled::Shader;
 pub use compute_pass::{ComputePass, DispatchSize};
 pub use draw_pass::{DrawPass, DrawState, DrawVariant};

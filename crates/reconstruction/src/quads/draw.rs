@@ -129,10 +129,11 @@ pub(super) fn record(
     for (samples, depth) in targets.samples.each.iter().zip(&targets.depth.each) {
         for (number, images) in slices(gpu, mesh).enumerate() {
             let clear = (number == 0).then_some(wgpu::Color::TRANSPARENT);
+            quads.announce(&mut recording.frame, &[&bound]);
             let mut pass = recording.frame.begin_drawing("quads", &[samples], clear, depth);
             pass.set_pipeline(quads.pipeline());
             for (image, offset) in images.iter().zip(&mut offsets) {
-                pass.set_bind_group(0, &bound, &[offset]);
+                pass.set_bind_group(0, &*bound, &[offset]);
                 pass.set_vertex_buffer(0, image.inverse_depths.slice(..));
                 pass.set_index_buffer(image.indices.slice(..), wgpu::IndexFormat::Uint32);
                 pass.draw_indexed_indirect(&image.draw, 0);
