@@ -67,7 +67,13 @@ impl Command {
             Self::Up(args) => runtime()?.block_on(up::run(args)),
             Self::Coordinator(args) => runtime()?.block_on(coordinator::run(args)),
             Self::Node(args) => runtime()?.block_on(node::run(args)),
-            Self::View(args) => runtime()?.block_on(view::run(args)),
+            Self::View(args) => {
+                let runtime = runtime()?;
+                let outcome = runtime.block_on(view::run(args));
+                // A second signal does not wait for pictures that are being written.
+                runtime.shutdown_background();
+                outcome
+            }
             Self::Status(args) => runtime()?.block_on(status::run(&args)),
             Self::Replay(args) => replay::run(&args),
             Self::Health(args) => runtime()?.block_on(health::run(&args)),

@@ -77,30 +77,56 @@ fn cut(record: &Path, views: usize) {
     fs::write(record, format!("{}\n]}}\n", kept.join("\n").trim_end_matches(','))).unwrap();
 }
 
-/// A picture that cannot be written for now keeps `view` from its end.
-#[test]
-fn a_second_signal_ends_a_command_that_writes() {
-    let up = Up::start();
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    let mut view = up.view(folder, &["--views", "4000"]).spawn().unwrap();
+/// Waits until there is a picture.
+fn wait_for_first_picture(folder: &Path) {
     while !folder.join("view_0000.png").exists() {
         std::thread::sleep(Duration::from_millis(2));
     }
-    let pipe = folder.join("view_3999.part");
-    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+}
+
+/// A pipe that nobody reads: what is written to this file waits.
+fn block(file: &Path) {
+    assert!(Command::new("mkfifo").arg(file).status().unwrap().success());
+}
+
+/// Sends a signal, which does not end the command, and another, which does.
+fn interrupt_twice(mut view: Child) {
+    kill_process(Pid::from_child(&view), Signal::INT).unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(view.try_wait().unwrap().is_none(), "it waits for a file");
+    kill_process(Pid::from_child(&view), Signal::INT).unwrap();
+    said(&view.wait_with_output().unwrap(), 130);
+}
+
+#[test]
+fn a_second_signal_ends_a_command_that_writes_a_picture() {
+    let (up, folder) = (Up::start(), tempfile::tempdir().unwrap());
+    let folder = folder.path();
+    let mut view = up.view(folder, &["--views", "4000"]).spawn().unwrap();
+    wait_for_first_picture(folder);
+    let part = folder.join("view_3999.part");
+    block(&part);
     let pictures = || files_of(folder).filter(|name| name.ends_with(".png")).count();
     while pictures() < 3999 {
         assert!(view.try_wait().unwrap().is_none(), "{} pictures", pictures());
         std::thread::sleep(Duration::from_millis(20));
     }
-    kill_process(Pid::from_child(&view), Signal::INT).unwrap();
-    std::thread::sleep(Duration::from_millis(300));
-    assert!(view.try_wait().unwrap().is_none(), "it waits for the last picture");
-    kill_process(Pid::from_child(&view), Signal::INT).unwrap();
-    said(&view.wait_with_output().unwrap(), 130);
-    assert_eq!(pictures(), 3999);
-    assert!(!pipe.exists(), "no part is left");
+    interrupt_twice(view);
+    assert_eq!((pictures(), part.exists()), (3999, false));
+}
+
+#[test]
+fn a_second_signal_ends_a_command_that_writes_its_record() {
+    let (up, folder) = (Up::start(), tempfile::tempdir().unwrap());
+    let folder = folder.path();
+    let view = up.view(folder, &["--views", "4000"]).spawn().unwrap();
+    wait_for_first_picture(folder);
+    let before = fs::read(folder.join("cameras.json")).unwrap();
+    let part = folder.join("cameras.part");
+    block(&part);
+    interrupt_twice(view);
+    assert_eq!(fs::read(folder.join("cameras.json")).unwrap(), before);
+    assert!(!part.exists());
 }
 
 #[test]
@@ -128,9 +154,7 @@ fn a_resumed_request_leaves_the_files_of_one_that_was_not_interrupted() {
 
     up.viewed(whole, MANY, 0);
     let view = up.view(interrupted, MANY).spawn().unwrap();
-    while !interrupted.join("view_0000.png").exists() {
-        std::thread::sleep(Duration::from_millis(2));
-    }
+    wait_for_first_picture(interrupted);
     kill_process(Pid::from_child(&view), Signal::INT).unwrap();
     let text = said(&view.wait_with_output().unwrap(), 130);
     let left = files(interrupted);

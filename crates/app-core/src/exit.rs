@@ -26,11 +26,6 @@ impl Outcome {
 /// As shells say of a program that ctrl-c ends: 128 and the number of the signal.
 const INTERRUPTED: u8 = 130;
 
-/// Ends the process at once, as a second ctrl-c does.
-pub fn exit_interrupted() -> ! {
-    std::process::exit(INTERRUPTED.into())
-}
-
 /// Input that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]

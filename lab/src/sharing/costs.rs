@@ -95,11 +95,9 @@ fn section(idle: &[Taken], beside: &[Taken], device: String) -> anyhow::Result<S
     let mut table = Table::new("Costs beside load", &columns);
     let mut checks = Vec::new();
     let policies = beside.first().map_or_else(String::new, |taken| taken.policies.clone());
-    let figures: [(&str, fn(&Costs) -> f64); 2] =
-        [("c", |costs| costs.reconstruct_view_s), ("g_v", |costs| costs.direct_view_s)];
-    for (name, figure) in figures {
-        let [idle_s, beside_s] =
-            [idle, beside].map(|taken| median(taken.iter().map(|taken| figure(&taken.costs)).collect()));
+    for (at, name) in ["c", "g_v"].into_iter().enumerate() {
+        let figure = |taken: &Taken| [taken.costs.reconstruct_view_s, taken.costs.direct_view_s][at];
+        let [idle_s, beside_s] = [idle, beside].map(|taken| median(taken.iter().map(figure).collect()));
         let ratio = beside_s / idle_s;
         let numbers = [idle_s * 1e3, beside_s * 1e3, ratio].map(Cell::from);
         table.push([Cell::from(name), policies.clone().into()].into_iter().chain(numbers))?;

@@ -13,13 +13,14 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use app_core::delivery::receive_requests;
-use app_core::exit::{BadInput, Outcome, exit_interrupted};
+use app_core::exit::{BadInput, Outcome};
 use app_core::live;
 use app_core::live::Drive;
 use app_core::process::StopSignals;
 use client::Session;
 use depth_image::PinholeCamera;
 use indicatif::ProgressBar;
+use tokio::runtime::Handle;
 
 pub use args::ViewArgs;
 use comparing::compare;
@@ -42,13 +43,15 @@ pub async fn run(args: ViewArgs) -> anyhow::Result<Outcome> {
     }
     let signals = StopSignals::listen()?;
     let (second, folder) = (signals.second.clone(), args.out.clone());
-    // A task of its own: long records are written without a pause in which this one could hear of the signal.
-    tokio::spawn(async move {
-        second.cancelled().await;
-        remove_parts(&folder);
-        exit_interrupted();
-    });
-    pictures(&args, &signals).await
+    // A thread of its own: a long record is written without a pause in which the second signal could be heard.
+    let work = tokio::task::spawn_blocking(move || Handle::current().block_on(pictures(&args, &signals)));
+    tokio::select! {
+        outcome = work => outcome?,
+        () = second.cancelled() => {
+            remove_parts(&folder);
+            Ok(Outcome::Interrupted)
+        }
+    }
 }
 
 /// The record is written beside the pictures: the caller's file of cameras must not be there under its name.
