@@ -10,6 +10,12 @@ use super::smoothing::{Smoothed, geometric_mean, is_valid};
 const RECENT: u32 = 30;
 /// A first timing of this many times the expected one includes the building of shaders, and is ignored.
 const COLD: f64 = 2.0;
+/// Work that takes so many times as long as expected, or this share of it, is other work, and says nothing of the node.
+const ALIKE: f64 = 16.0;
+
+fn is_alike(ratio: f64) -> bool {
+    (1.0 / ALIKE..=ALIKE).contains(&ratio)
+}
 
 /// One operation: as measured alone, and as timed since.
 #[derive(Debug, Clone, Default)]
@@ -29,7 +35,7 @@ impl Operation {
     /// Another cost alone, of which it takes as many times as long as of the one before.
     fn rebase(&mut self, alone_s: f64) {
         let times = alone_s / self.alone_s;
-        if times.is_finite() && times > 0.0 {
+        if is_alike(times) {
             self.timed.scale(times);
             self.alone_s = alone_s;
         } else {
@@ -37,7 +43,7 @@ impl Operation {
         }
     }
 
-    /// Gives how many times longer than alone the timing is, where it is valid.
+    /// Gives how many times longer than alone the timing is, where it is valid and of the expected work.
     fn add(&mut self, timing_s: Option<f64>, slowness: f64) -> Option<f64> {
         let was_cold = !self.is_warm && timing_s.is_some_and(|timing_s| timing_s > COLD * self.alone_s * slowness);
         self.is_warm |= timing_s.is_some();
@@ -45,7 +51,7 @@ impl Operation {
         let timing_s = timing_s.filter(|timing_s| !was_cold && is_valid(*timing_s));
         self.reports_without = if timing_s.is_some() { 0 } else { self.reports_without.saturating_add(1) };
         self.timed.add(timing_s);
-        timing_s.map(|timing_s| timing_s / self.alone_s).filter(|ratio| ratio.is_finite() && *ratio > 0.0)
+        timing_s.map(|timing_s| timing_s / self.alone_s).filter(|ratio| is_alike(*ratio))
     }
 
     fn is_timed(&self) -> bool {
@@ -64,7 +70,7 @@ impl Operation {
     /// How many times longer than alone it takes, where that is known.
     fn ratio(&self) -> Option<f64> {
         let ratio = self.timed_s() / self.alone_s;
-        Some(ratio).filter(|ratio| self.is_timed() && ratio.is_finite() && *ratio > 0.0)
+        Some(ratio).filter(|ratio| self.is_timed() && is_alike(*ratio))
     }
 }
 
@@ -307,6 +313,17 @@ mod tests {
         let before = estimate.now();
         estimate.rebase(&Costs { sample_image_s: 3.0, reconstruct_view_s: 0.4, ..alone });
         assert_eq!(estimate.now(), before);
+    }
+
+    #[test]
+    fn timings_beside_views_of_another_kind_are_forgotten() {
+        let alone = Costs { reconstruct_view_s: 0.01, ..Costs::default() };
+        let mut estimate = Estimate::starting_at(&alone);
+        let usual = MeasuredCosts { reconstruct_view_s: Some(0.01), ..MeasuredCosts::default() };
+        estimate.rebase(&Costs { reconstruct_view_s: 1e-5, ..alone });
+        (0..40).for_each(|_| estimate.add(&usual, None));
+        estimate.rebase(&alone);
+        assert_eq!(estimate.now().costs.reconstruct_view_s, 0.01, "no node is a thousand times slower");
     }
 
     #[test]

@@ -1,20 +1,24 @@
 //! The scheduler in a simulated cluster: nodes die, come back, and answer late or never; clients of one to five workloads
 //! come and go, all from a seed. Invariants are checked after every step; a seed that fails is named.
 
+mod faults;
+mod invariants;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use cluster::{Assignment, Costs, MeasuredCosts, NodeStatus, PolicyChoice, SessionPlan, WorkloadStatus};
+use cluster::{Costs, NodeStatus, PolicyChoice, SessionPlan};
 
 use super::balance::k_fd;
 use super::command::Command;
-use super::event::{Event, Opening, ProbeKind};
+use super::event::{Event, Opening};
 use super::load::Load;
 use super::node_costs::NodeCosts;
 use super::prediction::pipeline_s;
 use super::scheduler::Scheduler;
 use super::search::{first, order};
 use super::test_support::{COSTS, Random, join, opened, opening, workload};
+use faults::{measured, timings};
 
 const SEEDS: u64 = 500;
 /// Steps with faults, before the calm.
@@ -78,156 +82,6 @@ impl World {
             highest_epoch: 0,
             plans: 0,
         }
-    }
-
-    fn random_name(&mut self) -> String {
-        format!("n{:02}", self.random.below(MOST_NODES))
-    }
-
-    fn random_policy(&mut self) -> PolicyChoice {
-        match self.random.below(12) {
-            0 => PolicyChoice::Auto,
-            1 => PolicyChoice::Direct,
-            2 => PolicyChoice::TimeShare,
-            _ => PolicyChoice::Pipeline,
-        }
-    }
-
-    fn later(&mut self, most_ms: u64, event: Event) {
-        let delay = Duration::from_millis(self.random.below(most_ms));
-        self.coming.push((self.now + delay, event));
-    }
-
-    /// A fault, or another event.
-    fn fault(&mut self) {
-        match self.random.below(22) {
-            0..4 => self.start(),
-            4..6 => self.kill(),
-            6 => self.zombie(),
-            7..10 => self.open(),
-            10..12 => self.close(),
-            12..14 => self.swing(),
-            14 => self.cannot(),
-            15 => self.stale(),
-            16..18 => self.slow_down(),
-            18 => self.silent(),
-            19 => self.work(),
-            _ => self.tell(Event::Tick),
-        }
-    }
-
-    fn start(&mut self) {
-        let name = self.random_name();
-        if !self.alive.contains_key(&name) {
-            self.join(name);
-        }
-    }
-
-    fn join(&mut self, name: String) {
-        let incarnation = self.next_incarnation;
-        self.next_incarnation += 1;
-        let speed = if self.random.below(4) == 0 { self.random.between(1.5, 8.0) } else { 1.0 };
-        self.alive.insert(name.clone(), (incarnation, speed));
-        // A node may have seen plans of an earlier coordinator.
-        let seen = if self.random.below(20) == 0 { self.random.below(1000) } else { 0 };
-        self.tell(join(&name, incarnation, seen));
-    }
-
-    /// The coordinator learns of it, sometimes late.
-    fn kill(&mut self) {
-        let name = self.random_name();
-        if let Some((incarnation, _)) = self.alive.remove(&name) {
-            self.later(3000, Event::Left { incarnation, node_name: name });
-        }
-    }
-
-    /// A second process of one name joins; the end of the first is noticed after that.
-    fn zombie(&mut self) {
-        let name = self.random_name();
-        if let Some((incarnation, _)) = self.alive.remove(&name) {
-            self.join(name.clone());
-            self.later(5000, Event::Left { incarnation, node_name: name });
-        }
-    }
-
-    fn open(&mut self) {
-        let session = self.next_session;
-        self.next_session += 1;
-        let images = IMAGES[self.random.below(self.kinds) as usize];
-        let policy = self.random_policy();
-        let views_per_set = self.random.between(1.0, 500.0) as usize;
-        let is_live = self.random.below(4) == 0;
-        let frames_per_s = is_live.then(|| self.random.between(0.01, 0.3));
-        let opening = Opening { workload: workload(images), frames_per_s, ..opening(session, policy, views_per_set) };
-        self.sessions.insert(session, images);
-        self.tell(Event::Opened(Box::new(opening)));
-    }
-
-    fn random_session(&mut self) -> Option<u64> {
-        let count = self.sessions.len() as u64;
-        if count == 0 { None } else { self.sessions.keys().nth(self.random.below(count) as usize).copied() }
-    }
-
-    fn close(&mut self) {
-        if let Some(session) = self.random_session() {
-            self.tell(Event::Closed { session });
-        }
-    }
-
-    fn swing(&mut self) {
-        if let Some(session) = self.random_session() {
-            let views_per_set = [1, 500, 30][self.random.below(3) as usize];
-            self.tell(Event::DemandChanged { session, views_per_set, frames_per_s: None });
-        }
-    }
-
-    fn cannot(&mut self) {
-        let (name, plan_epoch) = (self.random_name(), self.random_epoch());
-        self.tell(Event::Unready { plan_epoch, node_name: name, reason: "no disk".to_owned() });
-    }
-
-    /// A member does not answer.
-    fn silent(&mut self) {
-        let (node_name, plan_epoch) = (self.random_name(), self.random_epoch());
-        if let Some(&incarnation) = self.members.get(&node_name) {
-            let (kind, failure) = (ProbeKind::Liveness, Some("silent".to_owned()));
-            self.tell(Event::Probed { plan_epoch, node_name, incarnation, kind, failure });
-        }
-    }
-
-    /// Events of an earlier plan and an earlier process.
-    fn stale(&mut self) {
-        let (node_name, plan_epoch) = (self.random_name(), self.random_epoch());
-        if self.scheduler.number_of_plan(plan_epoch.saturating_sub(1)).is_none() {
-            let plan_epoch = plan_epoch.saturating_sub(1);
-            self.tell(Event::Unready { plan_epoch, node_name: node_name.clone(), reason: "late".to_owned() });
-            self.tell(Event::Ready { plan_epoch, node_name: node_name.clone() });
-        }
-        self.tell(Event::Left { incarnation: 0, node_name });
-    }
-
-    fn slow_down(&mut self) {
-        let name = self.random_name();
-        if let Some(&(_, speed)) = self.alive.get(&name) {
-            let noise = self.random.between(0.8, 1.25);
-            let epoch = self.random_epoch();
-            self.tell(measured(name, epoch, timings(speed * noise)));
-        }
-    }
-
-    /// Nodes do something for every workload, which is therefore not idle.
-    fn work(&mut self) {
-        for workload in self.scheduler.status().workloads {
-            let Some(plan) = workload.plan else { continue };
-            let name = plan.assignment.compositors[0].node_name.clone();
-            self.tell(measured(name, plan.assignment.plan_epoch, MeasuredCosts::default()));
-        }
-    }
-
-    /// The epoch of some workload's plan.
-    fn random_epoch(&mut self) -> u64 {
-        let epochs: Vec<u64> = self.last.values().map(|last| last.plan.assignment.plan_epoch).collect();
-        if epochs.is_empty() { 0 } else { epochs[self.random.below(epochs.len() as u64) as usize] }
     }
 
     fn number_of_session(&self, session: u64) -> Option<u64> {
@@ -381,18 +235,6 @@ impl World {
         self.activated(plan);
     }
 
-    /// Without losses, and without sessions that come or go, plans dwell, and pipelines change two roles at most.
-    fn check_calm_change(&self, last: &LastPlan, plan: &SessionPlan) {
-        if last.may_replan {
-            return;
-        }
-        let lasted = self.now - last.at;
-        assert!(lasted >= DWELL, "{lasted:?} after the last plan: {}", plan.reason);
-        let last = &last.plan.assignment;
-        let is_pipeline = [last.policy, plan.assignment.policy] == [cluster::Policy::Pipeline; 2];
-        assert!(!is_pipeline || changes(last, &plan.assignment) <= 2, "{}", plan.reason);
-    }
-
     fn activated(&mut self, plan: SessionPlan) {
         let (epoch, number) = (plan.assignment.plan_epoch, plan.assignment.workload_number);
         assert!(epoch > self.seen, "above what nodes have seen");
@@ -405,44 +247,6 @@ impl World {
         self.last.insert(number, LastPlan { plan, at: self.now, may_replan: false });
         self.highest_epoch = epoch;
         self.plans += 1;
-    }
-
-    fn may_use(&self, number: u64, name: &str) -> bool {
-        [None, Some(number)].iter().all(|scope| !self.quarantined.contains(&(*scope, name.to_owned())))
-    }
-
-    /// Every node of a plan is a member, and each image is sampled once.
-    fn check_plan(&self, plan: &Assignment, nodes: &[NodeStatus]) {
-        let names = plan.samplers.iter().map(|s| (&s.node_name, &s.address));
-        for (name, address) in names.chain(plan.compositors.iter().map(|c| (&c.node_name, &c.address))) {
-            let incarnation = self.members.get(name).expect("a member");
-            assert_eq!(*address, format!("http://{name}:{incarnation}"));
-            assert!(nodes.iter().any(|node| node.address == *address), "{name}");
-            assert!(self.may_use(plan.workload_number, name), "{name}");
-        }
-        assert!(!plan.compositors.is_empty());
-        let mut images: Vec<u32> = plan.samplers.iter().flat_map(|s| s.image_indices.clone()).collect();
-        images.sort_unstable();
-        let all = 0..plan.image_count() as u32;
-        assert_eq!(images, if plan.policy == cluster::Policy::Direct { vec![] } else { all.collect::<Vec<_>>() });
-    }
-
-    /// A workload has a plan while it has sessions and there is a node for it; every node that can serve one does.
-    fn check_always(&self) {
-        let (workloads, nodes) = (self.scheduler.status().workloads, self.scheduler.nodes_of_workloads());
-        let kinds: BTreeSet<usize> = self.sessions.values().copied().collect();
-        assert_eq!(workloads.len(), kinds.len(), "{:?}", self.sessions);
-        for WorkloadStatus { number, plan, .. } in &workloads {
-            let usable = self.members.keys().any(|name| self.may_use(*number, name));
-            assert_eq!(plan.is_some(), usable, "{number} of {:?} {:?}", self.members, self.quarantined);
-            assert_eq!(nodes[number].is_empty(), !usable, "every workload has a node");
-            assert!(nodes[number].iter().all(|name| self.may_use(*number, name)));
-            let assignment = plan.as_ref().map(|plan| &plan.assignment);
-            assert!(assignment.is_none_or(|plan| roles(plan).keys().all(|name| nodes[number].contains(*name))));
-        }
-        let serves = |name: &String| nodes.values().any(|nodes| nodes.contains(name));
-        let could = |name: &String| workloads.iter().any(|workload| self.may_use(workload.number, name));
-        assert!(self.members.keys().all(|name| serves(name) == could(name)), "{nodes:?}");
     }
 
     /// No more faults: late events arrive, nodes work or are idle, and plans come to rest.
@@ -467,46 +271,6 @@ impl World {
             self.tell(Event::Tick);
         }
     }
-
-    /// Workloads of equal weight have about as many nodes.
-    fn check_equal_shares(&self) {
-        let (nodes, weights) = (self.scheduler.nodes_of_workloads(), self.scheduler.weights_of_workloads());
-        let carriers = |node: &String| weights.keys().filter(|number| nodes[number].contains(node)).count();
-        // A node that serves several counts in part.
-        let count = |number: &u64| nodes[number].iter().map(|node| 1.0 / carriers(node) as f64).sum::<f64>();
-        let all = nodes.values().flatten().collect::<BTreeSet<_>>().len();
-        for (a, weight) in weights.iter().filter(|_| weights.len() <= all) {
-            for (b, _) in weights.iter().filter(|(_, other)| (*other / weight - 1.0).abs() < 0.01) {
-                assert!(count(a) <= (count(b) + 1.0) * 1.25, "{nodes:?} by {weights:?}");
-            }
-        }
-    }
-}
-
-fn measured(node_name: String, plan_epoch: u64, costs: MeasuredCosts) -> Event {
-    Event::Measured { node_name, plan_epoch, costs, busy_s: 0.1, views: 3, dropped_views: 0 }
-}
-
-fn timings(times: f64) -> MeasuredCosts {
-    MeasuredCosts {
-        sample_image_s: Some(COSTS.sample_image_s * times),
-        reconstruct_view_s: Some(COSTS.reconstruct_view_s * times),
-        ..MeasuredCosts::default()
-    }
-}
-
-/// Whether each node samples, and whether it composites.
-fn roles(plan: &Assignment) -> BTreeMap<&str, (bool, bool)> {
-    let mut roles: BTreeMap<&str, (bool, bool)> = BTreeMap::new();
-    plan.samplers.iter().for_each(|share| roles.entry(&share.node_name).or_default().0 = true);
-    plan.compositors.iter().for_each(|share| roles.entry(&share.node_name).or_default().1 = true);
-    roles
-}
-
-/// Nodes that had a role and have another.
-fn changes(from: &Assignment, to: &Assignment) -> usize {
-    let (from, to) = (roles(from), roles(to));
-    from.iter().filter(|(name, role)| to.get(*name).is_some_and(|new| new != *role)).count()
 }
 
 /// Runs the seeds and names the ones that fail.

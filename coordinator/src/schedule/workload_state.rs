@@ -230,11 +230,14 @@ impl WorkloadState {
     }
 
     /// A node's costs of the views of sessions with a rate, from those of the mean view: batches may ask for larger ones.
+    /// How many of these the node makes is not known, so that a cost lies between the timed one and the one alone.
     pub(super) fn of_viewers(&self, node: &Costs) -> Costs {
         let Some(rated) = self.sessions.rated_costs(self.set_s()) else { return *node };
         let of = |node_s: f64, rated_s: f64, mean_s: f64| {
             let ratio = rated_s / mean_s;
-            if ratio.is_finite() && rated_s != mean_s { node_s * ratio } else { node_s }
+            let is_mixed = ratio.is_finite() && rated_s != mean_s;
+            let scaled = || (node_s * ratio).clamp(node_s.min(rated_s), node_s.max(rated_s));
+            if is_mixed { scaled() } else { node_s }
         };
         let mean = &self.costs;
         Costs {

@@ -407,6 +407,40 @@ fn viewers_keep_their_quality_beside_batches() {
 }
 
 #[test]
+fn a_batch_that_states_tiny_or_huge_views_and_asks_for_none_costs_viewers_nothing() {
+    for reconstruct_view_s in [1e-6, 90.0] {
+        let quality = Quality {
+            lighting: "unlit".to_owned(),
+            method: "joint_carve:1".to_owned(),
+            sample_side_ratio: 1.0,
+            frame_rate_ratio: 0.5,
+        };
+        let mut cluster = Cluster::of(2);
+        let of = |session| Opening { policy_override: forced(PIPELINE, None), ..of(4, session) };
+        cluster.open(Opening { fallbacks: vec![quality], ..rated(of(1), 60.0) });
+        let mut other = Opening { views_per_set: 65_536, ..of(2) };
+        (other.costs.reconstruct_view_s, other.costs.direct_view_s) = (reconstruct_view_s, 11.0 * reconstruct_view_s);
+        cluster.open(other);
+        let usual = MeasuredCosts { reconstruct_view_s: Some(0.009), ..MeasuredCosts::default() };
+        for _ in 0..40 {
+            for name in ["n0", "n1"] {
+                let (plan_epoch, node_name) = (cluster.plan_of(1).plan_epoch, name.to_owned());
+                let (costs, busy_s, views) = (usual, 0.3, 30);
+                cluster.step(Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views: 0 });
+            }
+            cluster.pass(1, &[]);
+        }
+        let utilisation = cluster.workloads()[0].utilisation.unwrap();
+        assert!((0.2..0.7).contains(&utilisation), "{utilisation}");
+        assert_eq!(cluster.workloads()[0].plan.as_ref().unwrap().fallback, None);
+        assert_eq!(cluster.scheduler.admits(1, 1, Some(90.0)), Ok(()));
+        cluster.step(Event::Closed { session: 2 });
+        let seconds = cluster.workloads()[0].conditions[0].costs.reconstruct_view_s;
+        assert!((seconds / 0.009 - 1.0).abs() < 0.2, "{seconds}");
+    }
+}
+
+#[test]
 fn status_says_what_one_more_viewer_would_cost() {
     let mut cluster = Cluster::of(4);
     cluster.open(of(4, 1));
