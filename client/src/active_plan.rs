@@ -100,19 +100,6 @@ pub(crate) struct SessionState {
     /// Its number at the coordinator.
     pub(crate) session: u64,
     pub(crate) active: Arc<ActivePlan>,
-    /// Why the session has ended, if it has.
-    pub(crate) ended: Option<String>,
-}
-
-impl SessionState {
-    /// # Errors
-    /// Where the session has ended.
-    pub(crate) fn in_force(&self) -> Result<Arc<ActivePlan>, ClientError> {
-        match self.ended.clone() {
-            Some(reason) => Err(ClientError::Ended { reason }),
-            None => Ok(self.active.clone()),
-        }
-    }
 }
 
 /// Takes over plans that compositors name, until it is aborted.
@@ -130,7 +117,7 @@ pub(crate) async fn follow_compositors(
     }
 }
 
-/// Takes over what the coordinator says, until the session ends. Frames go on while the coordinator is away; the session
+/// Takes over what the coordinator says, until it is aborted. Frames go on while the coordinator is away; the session
 /// is then opened once more.
 pub(crate) async fn follow_coordinator(
     coordinator: CoordinatorClient,
@@ -144,9 +131,7 @@ pub(crate) async fn follow_coordinator(
     loop {
         while let Some(Ok(event)) = events.next().await {
             backoff.reset();
-            if take_over(event, &state, &mut is_new_session) {
-                return;
-            }
+            take_over(event, &state, &mut is_new_session);
         }
         events = reopen(&coordinator, &request, &mut backoff).await;
         is_new_session = true;
@@ -168,18 +153,12 @@ async fn reopen(
     }
 }
 
-/// Whether the event ends the session.
-fn take_over(event: SessionEvent, state: &watch::Sender<SessionState>, is_new_session: &mut bool) -> bool {
+fn take_over(event: SessionEvent, state: &watch::Sender<SessionState>, is_new_session: &mut bool) {
     match event {
         SessionEvent::Opened { session } => state.send_modify(|state| state.session = session),
         SessionEvent::Progress { .. } => (),
         SessionEvent::Plan(plan) => put_in_force(*plan, state, std::mem::take(is_new_session)),
-        SessionEvent::Ended { reason } => {
-            state.send_modify(|state| state.ended = Some(reason));
-            return true;
-        }
     }
-    false
 }
 
 /// Puts a plan in force, unless it is older than the one in force. The coordinator sends a plan when its nodes have taken

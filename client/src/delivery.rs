@@ -127,15 +127,11 @@ pub(crate) async fn wait_for_successor(
     delay: Duration,
     error: ClientError,
 ) -> Result<(), ClientError> {
-    let is_later = |state: &SessionState| state.ended.is_some() || state.active.plan_epoch() > plan_epoch;
+    let is_later = |state: &SessionState| state.active.plan_epoch() > plan_epoch;
     match tokio::time::timeout(delay, state.wait_for(is_later)).await {
-        Ok(Ok(state)) => match &state.ended {
-            Some(reason) => Err(ClientError::Ended { reason: format!("{reason} ({error})") }),
-            None => Ok(()),
-        },
         // The session was dropped.
         Ok(Err(_)) => Err(error),
-        Err(_) => Ok(()),
+        Ok(Ok(_)) | Err(_) => Ok(()),
     }
 }
 

@@ -83,7 +83,7 @@ impl LiveStream {
     async fn follow(&mut self) -> Result<(), ClientError> {
         let mut tried = Tried::none(0);
         loop {
-            let active = self.state.borrow_and_update().in_force()?;
+            let active = self.state.borrow_and_update().active.clone();
             let plan_epoch = active.plan_epoch();
             if tried.plan_epoch != plan_epoch {
                 tried = Tried::none(plan_epoch);
@@ -157,7 +157,7 @@ impl LiveStream {
         let state = self.state.borrow();
         let place = |peer: &Peer| (peer.share.node_name.clone(), peer.share.address.clone());
         let wanted = Tried::none(0).next(self.client_id, &state.active).map(place);
-        state.ended.is_none() && wanted == Some(place(peer))
+        wanted == Some(place(peer))
     }
 
     /// A request for the newest pose, if it was not sent, which acknowledges the frames that were taken.

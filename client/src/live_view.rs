@@ -39,10 +39,10 @@ impl LiveView {
     /// if that is not being made yet.
     ///
     /// # Errors
-    /// For a set beyond the timeline, a bad camera, and a session that has ended.
+    /// For a set beyond the timeline, and a bad camera.
     pub fn set_pose(&mut self, camera: PinholeCamera, set_index: u32) -> Result<u64, ClientError> {
         let request = ViewRequest { frame: self.last + 1, set_index, camera };
-        request.check(&self.state.borrow().in_force()?.plan.assignment)?;
+        request.check(&self.state.borrow().active.plan.assignment)?;
         self.last = request.frame;
         let pose = Pose { request, posed: Instant::now() };
         self.newest.send_modify(|newest| newest.pose = Some(pose));

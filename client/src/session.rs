@@ -84,7 +84,7 @@ impl Client {
         let (named_plans, to_follow) = mpsc::channel(NAMED_PLANS);
         let settings = ViewSettings { method: request.method.clone(), codec, planes: request.planes };
         let active = Arc::new(ActivePlan::connect(plan, settings, named_plans).await?);
-        let (changes, state) = watch::channel(SessionState { session, active, ended: None });
+        let (changes, state) = watch::channel(SessionState { session, active });
         let request = Arc::new(Mutex::new(request));
         let mut following = JoinSet::new();
         following.spawn(follow_compositors(to_follow, changes.clone()));
@@ -107,7 +107,7 @@ impl Session {
     /// Asks for another number of views a set, or another frame rate, from now on; plans follow.
     ///
     /// # Errors
-    /// The coordinator's; a session that has ended.
+    /// The coordinator's.
     pub async fn change(&self, views_per_set: u32, frames_per_s: Option<f64>) -> Result<(), ClientError> {
         self.change_request(|request| (request.views_per_set, request.frames_per_s) = (views_per_set, frames_per_s))
             .await
@@ -117,7 +117,7 @@ impl Session {
     /// viewpoints.
     ///
     /// # Errors
-    /// The coordinator's; a session that has ended.
+    /// The coordinator's.
     pub async fn set_viewpoints(&self, viewpoints: Vec<PinholeCamera>) -> Result<(), ClientError> {
         self.change_request(|request| request.viewpoints.clone_from(&viewpoints)).await
     }
@@ -146,12 +146,6 @@ impl Session {
         self.state.borrow().active.plan.clone()
     }
 
-    /// Why the session has ended, if it has.
-    #[must_use]
-    pub fn ended(&self) -> Option<String> {
-        self.state.borrow().ended.clone()
-    }
-
     /// Requests views by the method of the plan in force. Frames are received in the order they are ready. All
     /// compositors work at the same time, each at first on its own share of every set's views.
     ///
@@ -166,7 +160,7 @@ impl Session {
     where
         R: IntoIterator<Item = ViewRequest, IntoIter: Send + 'static>,
     {
-        let active = self.state.borrow().in_force()?;
+        let active = self.state.borrow().active.clone();
         let sets = active.plan.assignment.workload.timeline.set_count;
         let window = Window::open(requests.into_iter(), sets, active.settings.planes)?;
         Ok(Frames::start(window, |sink| deliver(self.state.clone(), sink)))
@@ -192,7 +186,6 @@ async fn plan_of(
             SessionEvent::Opened { session } => number = session,
             SessionEvent::Progress { .. } => (),
             SessionEvent::Plan(plan) => return Ok((number, *plan)),
-            SessionEvent::Ended { reason } => return Err(ClientError::Ended { reason }),
         }
     }
     Err(ClientError::Coordinator { reason: "the session's stream ended before its plan".to_owned() })

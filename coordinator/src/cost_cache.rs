@@ -6,44 +6,68 @@ use parking_lot::Mutex;
 
 /// The number of measurements that are kept.
 const CAPACITY: usize = 64;
+/// Costs are predicted for views of at most this many times the pixels of a measured view, or of this share of them.
+const FARTHEST: f64 = 16.0;
 
 /// Costs by device and measurement, the oldest first.
 #[derive(Default)]
-pub(crate) struct CostCache(Mutex<Vec<(String, MeasureCosts, Measured)>>);
+pub(crate) struct CostCache(Mutex<Vec<Entry>>);
+
+struct Entry {
+    device: String,
+    key: MeasureCosts,
+    known: Known,
+}
+
+/// Costs of a device.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Known {
+    pub(crate) measured: Measured,
+    /// They were measured on an idle node: neither predicted, nor measured beside other work.
+    pub(crate) is_settled: bool,
+}
 
 impl CostCache {
-    pub(crate) fn get(&self, device: &str, measurement: &MeasureCosts) -> Option<Measured> {
-        let key = cache_key(measurement);
-        self.0.lock().iter().find(|(of, kept, _)| of == device && *kept == key).map(|(.., measured)| *measured)
+    /// Costs as measured, else as predicted.
+    pub(crate) fn find(&self, device: &str, measurement: &MeasureCosts) -> Option<Known> {
+        let predicted = || Some(Known { measured: self.predict(device, measurement)?, is_settled: false });
+        self.get(device, measurement).or_else(predicted)
     }
 
-    /// Costs from measurements that differ in the view's size alone; `None` without any.
-    pub(crate) fn predict(&self, device: &str, measurement: &MeasureCosts) -> Option<Measured> {
-        let (key, pixels) = (cache_key(measurement), pixels_of(measurement));
-        let kept = self.0.lock();
-        let alike = kept.iter().filter(|(of, kept, _)| of == device && sizeless(kept) == sizeless(&key));
-        let mut sizes: Vec<(f64, Measured)> = alike.map(|(_, kept, measured)| (pixels_of(kept), *measured)).collect();
+    fn get(&self, device: &str, measurement: &MeasureCosts) -> Option<Known> {
+        let key = cache_key(measurement);
+        self.0.lock().iter().find(|entry| entry.device == device && entry.key == key).map(|entry| entry.known)
+    }
+
+    /// Costs from measurements that differ in the view's size alone; `None` without any of a size near it.
+    fn predict(&self, device: &str, measurement: &MeasureCosts) -> Option<Measured> {
+        let (key, pixels) = (sizeless(&cache_key(measurement)), pixels_of(measurement));
+        let entries = self.0.lock();
+        let alike = entries.iter().filter(|entry| entry.device == device && sizeless(&entry.key) == key);
+        let mut sizes: Vec<(f64, Measured)> =
+            alike.map(|entry| (pixels_of(&entry.key), entry.known.measured)).collect();
+        let distance = |of_px: f64| (of_px / pixels).max(pixels / of_px);
         // The nearest first.
-        sizes.sort_by(|(a, _), (b, _)| (a / pixels).ln().abs().total_cmp(&(b / pixels).ln().abs()));
-        let nearest = sizes.first()?;
+        sizes.sort_by(|(a, _), (b, _)| distance(*a).total_cmp(&distance(*b)));
+        let nearest = sizes.first().filter(|(of_px, _)| distance(*of_px) <= FARTHEST)?;
         let other = sizes.iter().find(|(other, _)| *other != nearest.0);
         Some(at_size(*nearest, other.copied(), pixels))
     }
 
     /// Keeps costs in place of earlier ones; the oldest are evicted.
-    pub(crate) fn insert(&self, device: String, measurement: &MeasureCosts, measured: Measured) {
-        let (mut kept, key) = (self.0.lock(), cache_key(measurement));
-        kept.retain(|(of, other, _)| *of != device || *other != key);
-        if kept.len() >= CAPACITY {
-            kept.remove(0);
+    pub(crate) fn insert(&self, device: &str, measurement: &MeasureCosts, known: Known) {
+        let (mut entries, key) = (self.0.lock(), cache_key(measurement));
+        entries.retain(|entry| entry.device != device || entry.key != key);
+        if entries.len() >= CAPACITY {
+            entries.remove(0);
         }
-        kept.push((device, key, measured));
+        entries.push(Entry { device: device.to_owned(), key, known });
     }
 }
 
 /// Costs are those of finished pictures. They depend neither on the scene's time nor, as far as sessions are concerned, on
 /// the place of a view.
-fn cache_key(measurement: &MeasureCosts) -> MeasureCosts {
+pub(crate) fn cache_key(measurement: &MeasureCosts) -> MeasureCosts {
     let mut key = measurement.clone();
     key.workload.timeline = Timeline::still(0.0);
     key.workload.refinement_steps = 1;
@@ -90,14 +114,14 @@ fn at_size((near_px, near): (f64, Measured), other: Option<(f64, Measured)>, pix
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use cluster::SamplePlanes;
     use depth_image::{PinholeCamera, ViewPlanes};
 
     use super::*;
     use crate::schedule::workload_for_tests as workload;
 
-    fn measurement(size_px: UVec2) -> MeasureCosts {
+    pub(crate) fn measurement(size_px: UVec2) -> MeasureCosts {
         MeasureCosts {
             workload: workload(2),
             method: "joint_carve".to_owned(),
@@ -109,9 +133,9 @@ mod tests {
         }
     }
 
-    fn measured(reconstruct_view_s: f64) -> Measured {
+    fn measured(reconstruct_view_s: f64) -> Known {
         let costs = Costs { sample_image_s: 3.0, reconstruct_view_s, encode_view_s: 0.001, ..Costs::default() };
-        Measured { costs, planes: SamplePlanes::default() }
+        Known { measured: Measured { costs, planes: SamplePlanes::default() }, is_settled: true }
     }
 
     fn predicted_s(cache: &CostCache, size_px: UVec2) -> Option<f64> {
@@ -122,23 +146,47 @@ mod tests {
     fn one_size_predicts_in_proportion_and_two_find_the_part_that_every_view_has() {
         let cache = CostCache::default();
         assert_eq!(predicted_s(&cache, UVec2::new(100, 100)), None);
-        cache.insert("d".to_owned(), &measurement(UVec2::new(100, 100)), measured(0.03));
+        cache.insert("d", &measurement(UVec2::new(100, 100)), measured(0.03));
         assert!((predicted_s(&cache, UVec2::new(200, 100)).unwrap() - 0.06).abs() < 1e-12);
         assert!((predicted_s(&cache, UVec2::new(50, 100)).unwrap() - 0.015).abs() < 1e-12);
         // 0.01 s a view, and 2 µs a pixel.
-        cache.insert("d".to_owned(), &measurement(UVec2::new(300, 100)), measured(0.07));
+        cache.insert("d", &measurement(UVec2::new(300, 100)), measured(0.07));
         assert!((predicted_s(&cache, UVec2::new(200, 100)).unwrap() - 0.05).abs() < 1e-12);
         assert!((predicted_s(&cache, UVec2::new(50, 100)).unwrap() - 0.02).abs() < 1e-12);
-        assert_eq!(cache.predict("d", &measurement(UVec2::ONE)).unwrap().costs.sample_image_s, 3.0);
-        assert_eq!(cache.predict("other", &measurement(UVec2::ONE)), None);
+        assert_eq!(cache.predict("d", &measurement(UVec2::splat(50))).unwrap().costs.sample_image_s, 3.0);
+        assert_eq!(cache.predict("other", &measurement(UVec2::splat(50))), None);
+    }
+
+    #[test]
+    fn sizes_far_from_those_measured_are_not_predicted() {
+        let cache = CostCache::default();
+        cache.insert("d", &measurement(UVec2::ONE), measured(0.005));
+        cache.insert("d", &measurement(UVec2::splat(16_384)), measured(900.0));
+        for side in [5, 320, 1280, 4000] {
+            assert_eq!(predicted_s(&cache, UVec2::splat(side)), None, "{side}");
+        }
+        cache.insert("d", &measurement(UVec2::splat(400)), measured(0.05));
+        let at = |side| predicted_s(&cache, UVec2::splat(side)).unwrap();
+        assert!(at(100) > 0.001 && at(400) > 0.04 && at(1600) < 1.0, "{} {} {}", at(100), at(400), at(1600));
+        assert_eq!((predicted_s(&cache, UVec2::splat(99)), predicted_s(&cache, UVec2::splat(1601))), (None, None));
+    }
+
+    #[test]
+    fn costs_are_settled_once_they_were_measured_on_an_idle_node() {
+        let (cache, size) = (CostCache::default(), measurement(UVec2::splat(8)));
+        cache.insert("d", &size, Known { is_settled: false, ..measured(0.09) });
+        assert_eq!(cache.find("d", &size), Some(Known { is_settled: false, ..measured(0.09) }));
+        assert!(!cache.find("d", &measurement(UVec2::splat(9))).unwrap().is_settled, "predicted");
+        cache.insert("d", &size, measured(0.03));
+        assert_eq!(cache.find("d", &size), Some(measured(0.03)));
     }
 
     #[test]
     fn a_larger_size_that_was_timed_faster_predicts_no_negative_cost() {
         let cache = CostCache::default();
-        cache.insert("d".to_owned(), &measurement(UVec2::new(100, 100)), measured(0.03));
-        cache.insert("d".to_owned(), &measurement(UVec2::new(200, 100)), measured(0.01));
-        for side in [1, 10, 100, 1000, 4000] {
+        cache.insert("d", &measurement(UVec2::new(100, 100)), measured(0.03));
+        cache.insert("d", &measurement(UVec2::new(200, 100)), measured(0.01));
+        for side in [30, 50, 100, 200, 400] {
             let seconds = predicted_s(&cache, UVec2::splat(side)).unwrap();
             assert!((0.01..=0.03).contains(&seconds), "{side}: {seconds}");
         }
@@ -147,7 +195,7 @@ mod tests {
     #[test]
     fn another_method_or_workload_is_not_predicted() {
         let cache = CostCache::default();
-        cache.insert("d".to_owned(), &measurement(UVec2::splat(8)), measured(0.03));
+        cache.insert("d", &measurement(UVec2::splat(8)), measured(0.03));
         let wanted = measurement(UVec2::splat(9));
         assert!(cache.predict("d", &wanted).is_some());
         let method = MeasureCosts { method: "mesh".to_owned(), ..wanted.clone() };

@@ -42,6 +42,10 @@ pub(crate) async fn execute(shared: Arc<Shared>) {
 
 async fn apply(shared: Arc<Shared>, sessions: Vec<u64>, mut plan: SessionPlan, nodes: Vec<NodeStatus>) {
     let plan_epoch = plan.assignment.plan_epoch;
+    // The last of them has ended the workload, or later ones have this plan applied.
+    if !sessions.iter().any(|&session| shared.sessions.contains(session)) {
+        return;
+    }
     tracing::info!(plan_epoch, reason = plan.reason, "planned");
     for &session in &sessions {
         let detail = format!("{} nodes take plan {plan_epoch}", nodes.len());

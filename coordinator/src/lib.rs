@@ -8,6 +8,8 @@ mod config;
 mod cost_cache;
 mod executor;
 mod grpc_status;
+mod measuring;
+mod measuring_queue;
 mod membership;
 mod observers;
 mod probe;

@@ -20,6 +20,7 @@ use wire::rpc::{Coordinator, Messages, coordinator_server};
 use crate::config::{CoordinatorConfig, SceneOffer, SceneOffers};
 use crate::executor::execute;
 use crate::grpc_status::refusal;
+use crate::measuring::measure_when_idle;
 use crate::observers::Observers;
 use crate::schedule::{Event, Scheduler};
 use crate::session_opening::open;
@@ -45,6 +46,7 @@ pub async fn serve(
     let mut running = JoinSet::new();
     running.spawn(execute(shared.clone()));
     running.spawn(tick(shared.clone()));
+    running.spawn(measure_when_idle(shared.clone()));
     let service = CoordinatorService { shared, shutdown: shutdown.clone() };
     let routes = Routes::new(health(&["coordinator"]).await).add_service(coordinator_server(service));
     node::serve(listener, with_reflection(routes, config.reflection)?, config.insecure_bind, shutdown).await

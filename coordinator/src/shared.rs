@@ -1,32 +1,31 @@
 //! State that all calls share.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use cluster::{ClusterStatus, NodeCondition, SessionEvent};
+use cluster::{ClusterStatus, SessionEvent};
 use node::Connections;
 use parking_lot::Mutex;
 use tokio::sync::Notify;
 
 use crate::config::{CoordinatorConfig, SceneOffers};
 use crate::cost_cache::CostCache;
+use crate::measuring_queue::MeasuringQueue;
 use crate::membership::MembershipRegistry;
 use crate::observers::Observers;
 use crate::schedule::{Command, Event, Scheduler};
 use crate::sessions::SessionRegistry;
-
-/// The share of its time that an idle node may work.
-const MOST_IDLE_RATIO: f64 = 0.2;
 
 pub(crate) struct Shared {
     pub(crate) config: CoordinatorConfig,
     pub(crate) offers: SceneOffers,
     pub(crate) connections: Connections,
     /// Costs are measured one session at a time.
-    pub(crate) measuring: tokio::sync::Mutex<()>,
-    /// Predicted costs are measured one size at a time.
-    pub(crate) measuring_in_background: tokio::sync::Mutex<()>,
+    pub(crate) measuring: Arc<tokio::sync::Mutex<()>>,
+    /// Measurements that wait for idle nodes.
+    pub(crate) to_measure: Mutex<MeasuringQueue>,
     pub(crate) costs: CostCache,
     pub(crate) commands: CommandQueue,
     pub(crate) membership: MembershipRegistry,
@@ -45,8 +44,8 @@ impl Shared {
             config,
             offers,
             connections: Connections::default(),
-            measuring: tokio::sync::Mutex::default(),
-            measuring_in_background: tokio::sync::Mutex::default(),
+            measuring: Arc::default(),
+            to_measure: Mutex::default(),
             costs: CostCache::default(),
             commands: CommandQueue::default(),
             membership: MembershipRegistry::default(),
@@ -79,12 +78,6 @@ impl Shared {
 
     pub(crate) fn status(&self) -> ClusterStatus {
         self.with_scheduler(Scheduler::status)
-    }
-
-    /// Whether the nodes have little to do.
-    pub(crate) fn is_idle(&self) -> bool {
-        let is_busy = |condition: &NodeCondition| condition.busy_ratio > MOST_IDLE_RATIO;
-        !self.status().workloads.iter().any(|workload| workload.conditions.iter().any(is_busy))
     }
 
     /// A session whose client does not read its events is closed.

@@ -1,6 +1,8 @@
 //! Several workloads are served side by side, and no session ends another.
 #![allow(clippy::unwrap_used)]
 
+use std::time::Duration;
+
 use client::{ClientError, Frame, Session};
 use cluster::{DIRECT, Policy, PolicyChoice, Refinement, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, request, views};
@@ -8,6 +10,7 @@ use cluster_tests::picture::fault_of;
 use cluster_tests::scalar_engine::ScalarEngine;
 use codec::FrameCodec;
 use coordinator::CoordinatorConfig;
+use glam::UVec2;
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 
@@ -19,6 +22,10 @@ fn pipeline(timeline: Timeline) -> SessionRequest {
 fn numbered(number: u32) -> SessionRequest {
     SessionRequest { policy: PolicyChoice::Auto, ..pipeline(Timeline { start_s: 0.1 * f64::from(number), ..MOVING }) }
 }
+
+/// A client that does not wait for its session.
+const HASTE: Duration = Duration::from_millis(5);
+const DEADLINE: Duration = Duration::from_secs(60);
 
 /// The frames of two views of each set.
 async fn frames_of(session: &Session) -> Vec<Frame> {
@@ -51,7 +58,6 @@ async fn sessions_of_two_workloads_are_served_side_by_side() {
         shows(&of_one, MOVING, Refinement::default());
         shows(&of_other, later, Refinement::default());
     }
-    assert_eq!((one.ended(), other.ended()), (None, None));
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -89,10 +95,42 @@ async fn a_workload_beyond_the_most_is_refused_and_the_others_go_on() {
     }
     let refused = cluster.session(numbered(most)).await.unwrap_err();
     assert!(matches!(&refused, ClientError::Exhausted { reason } if reason.contains("--max-workloads")), "{refused}");
+    let unmeasured = SessionRequest { sample_size_px: Some(UVec2::splat(9)), ..numbered(most) };
+    let refused = cluster.client.open_session(unmeasured, |_| ()).await.unwrap_err();
+    assert!(matches!(&refused, ClientError::Exhausted { .. }), "{refused}");
+    assert_eq!(cluster.take_counts(), [0; 0], "before costs were measured");
     let shared = cluster.session(numbered(0)).await.unwrap();
     assert_eq!(workload_of(&shared), workload_of(&sessions[0]), "an open workload takes more sessions");
     for (number, session) in (0..).zip(&sessions) {
         shows(&frames_of(session).await, numbered(number).timeline, Refinement::default());
-        assert_eq!(session.ended(), None);
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sessions_that_are_opened_and_dropped_in_numbers_disturb_nobody() {
+    let cluster = Cluster::start(2).await;
+    let session = cluster.session(numbered(0)).await.unwrap();
+    let (mut begun, mut dropped) = (tokio::task::JoinSet::new(), 0);
+    for number in 0..10_000 {
+        let (client, size_px) = (cluster.client.clone(), UVec2::splat(8 + number % 20));
+        let request = SessionRequest { sample_size_px: Some(size_px), ..numbered(number % 50) };
+        begun.spawn(async move { tokio::time::timeout(HASTE, client.open_session(request, |_| ())).await.map(drop) });
+        while begun.len() > 100 {
+            dropped += begun.join_next().await.map_or(0, |_| 1);
+        }
+    }
+    let (frames, ()) = tokio::join!(frames_of(&session), async {
+        while begun.join_next().await.is_some() {
+            dropped += 1;
+        }
+    });
+    assert_eq!(dropped, 10_000);
+    shows(&frames, numbered(0).timeline, Refinement::default());
+    let start = std::time::Instant::now();
+    while cluster.client.status().await.unwrap().session_count() > 1 {
+        assert!(start.elapsed() < DEADLINE, "dropped sessions are still open");
+        tokio::time::sleep(HASTE).await;
+    }
+    assert_eq!(cluster.client.status().await.unwrap().workloads.len(), 1);
+    shows(&frames_of(&session).await, numbered(0).timeline, Refinement::default());
 }

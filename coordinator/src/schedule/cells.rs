@@ -25,10 +25,17 @@ impl Cells {
         self.groups.len()
     }
 
-    /// Adapts the cells to all viewpoints of all sessions.
-    pub(super) fn follow(&mut self, viewpoints: &[PinholeCamera], scene: &Aabb) {
-        self.groups.retain(|group| viewpoints.iter().any(|view| group.serves(view, scene)));
-        ViewGroup::add(&mut self.groups, viewpoints, scene);
+    /// Adapts the cells to the viewpoints that sessions have declared, and to those of live viewers as far as there is room.
+    pub(super) fn follow(&mut self, declared: &[PinholeCamera], live: &[PinholeCamera], scene: &Aabb) {
+        let serves = |group: &ViewGroup, views: &[PinholeCamera]| views.iter().any(|view| group.serves(view, scene));
+        self.groups.retain(|group| serves(group, declared) || serves(group, live));
+        ViewGroup::add(&mut self.groups, declared, scene);
+        ViewGroup::add(&mut self.groups, live, scene);
+        for i in (0..self.groups.len()).rev() {
+            if self.groups.len() > MAX_CELLS && !serves(&self.groups[i], declared) {
+                self.groups.remove(i);
+            }
+        }
     }
 
     /// Gives the workload the cameras of these cells, up to the limit of a plan. Views of further cells are made from

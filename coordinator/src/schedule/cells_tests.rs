@@ -26,6 +26,27 @@ fn step(scheduler: &mut Scheduler, event: Event) -> Vec<Command> {
     scheduler.step(Duration::from_secs(1), event)
 }
 
+fn step_at(scheduler: &mut Scheduler, now_s: u64, event: Event) -> Vec<Command> {
+    let mut commands = scheduler.step(Duration::from_secs(now_s), event);
+    commands.retain(|command| !matches!(command, Command::Probe(_)));
+    commands
+}
+
+/// Seven views on each circle; each circle is twice as far away as the one before. Each is a cell of its own.
+fn spread(circles: std::ops::Range<usize>) -> Vec<PinholeCamera> {
+    let at = |circle: usize, azimuth: usize| {
+        let mut view = view(0.5 * azimuth as f32);
+        view.eye_in_world *= 2f32.powi(circle as i32);
+        view
+    };
+    circles.flat_map(|circle| (0..7).map(move |azimuth| at(circle, azimuth))).collect()
+}
+
+fn seen(scheduler: &Scheduler, node: &str, viewpoints: Vec<PinholeCamera>) -> Event {
+    let workload_number = plan(scheduler).workload_number;
+    Event::ViewersMoved { workload_number, node_name: node.to_owned(), viewpoints }
+}
+
 fn plan(scheduler: &Scheduler) -> Assignment {
     scheduler.status().workloads[0].plan.clone().expect("a plan").assignment
 }
@@ -61,9 +82,9 @@ fn sessions_near_each_other_share_cells_and_distant_ones_do_not() {
     let workload = plan(&scheduler).workload;
     assert_eq!([0.02, 3.0].map(|azimuth| workload.cell_of(&view(azimuth))), [0, 1]);
 
-    step(&mut scheduler, Event::Closed { session: 1 });
+    step_at(&mut scheduler, 2, Event::Closed { session: 1 });
     assert_eq!(contents(&scheduler)[0], alone[0], "session 2 still looks from there");
-    step(&mut scheduler, Event::Closed { session: 2 });
+    step_at(&mut scheduler, 2, Event::Closed { session: 2 });
     assert_eq!(cells(&scheduler), [1], "no session does");
 }
 
@@ -110,13 +131,7 @@ fn every_image_of_every_cell_has_one_sampler() {
 
 #[test]
 fn too_many_cells_are_refused_and_given_sample_cameras_are_kept() {
-    // Seven views on each circle; each circle is twice as far away as the one before.
-    let at = |circle: usize, azimuth: usize| {
-        let mut view = view(0.5 * azimuth as f32);
-        view.eye_in_world *= 2f32.powi(circle as i32);
-        view
-    };
-    let spread = |circles: usize| (0..7 * circles).map(|i| at(i / 7, i % 7)).collect::<Vec<_>>();
+    let spread = |circles: usize| spread(0..circles);
     let mut scheduler = of(3);
     let refused = step(&mut scheduler, looking_from(1, spread(12)));
     assert!(matches!(&refused[..], [Command::Refuse { error: ChoiceError::Cells { cells: 84 }, .. }]), "{refused:?}");
@@ -159,4 +174,62 @@ fn cells_follow_live_viewers_and_change_once_a_second_at_most() {
     scheduler.step(now, Event::Left { incarnation: 1, node_name: "n1".to_owned() });
     scheduler.step(now + Duration::from_secs(2), Event::ViewpointsChanged { session: 1, viewpoints: vec![view(0.0)] });
     assert_eq!(cells(&scheduler).len(), 1, "viewers of a lost node are forgotten");
+}
+
+#[test]
+fn sessions_that_come_and_go_change_cells_once_a_second_at_most() {
+    let mut scheduler = of(4);
+    step(&mut scheduler, looking_from(1, vec![view(0.0)]));
+    let (mut plans, mut now) = (Vec::new(), Duration::from_secs(2));
+    for i in 0..100 {
+        now += Duration::from_millis(50);
+        let session = 2 + i / 2;
+        let event = match i % 2 {
+            0 => looking_from(session, vec![view(1.0 + 0.5 * (session % 7) as f32)]),
+            _ => Event::Closed { session },
+        };
+        let mut commands = scheduler.step(now, event);
+        commands.extend(scheduler.step(now, Event::Tick));
+        let is_change = |command: &Command| matches!(command, Command::Apply { plan, .. } if plan.assignment.plan_epoch > plans.len() as u64 + 1);
+        let changes = commands.iter().filter(|command| is_change(command)).count();
+        assert!(changes <= 1, "{commands:?}");
+        plans.extend((changes > 0).then_some(now));
+    }
+    assert!(plans.len() >= 3, "{plans:?}");
+    assert!(plans.windows(2).all(|pair| pair[1] - pair[0] >= Duration::from_secs(1)), "{plans:?}");
+}
+
+#[test]
+fn cells_of_live_viewers_leave_room_for_declared_viewpoints() {
+    let mut scheduler = of(4);
+    step(&mut scheduler, looking_from(1, spread(0..2)));
+    let live = seen(&scheduler, "n1", spread(3..13));
+    step_at(&mut scheduler, 3, live);
+    assert_eq!(cells(&scheduler).len(), MAX_CELLS);
+    assert_eq!(scheduler.admits_viewpoints(1, &spread(0..3)), Ok(()), "live viewers promise nothing");
+    step_at(&mut scheduler, 5, looking_from(2, spread(13..17)));
+    assert_eq!(cells(&scheduler).len(), MAX_CELLS);
+    let workload = plan(&scheduler).workload;
+    let own: std::collections::BTreeSet<u32> =
+        spread(0..2).iter().chain(&spread(13..17)).map(|view| workload.cell_of(view)).collect();
+    assert_eq!(own.len(), 42, "each declared viewpoint has its cell");
+}
+
+#[test]
+fn viewpoints_that_take_more_than_is_left_beside_promises_are_refused() {
+    let timeline = cluster::Timeline { start_s: 0.0, step_s: 1.0, set_count: 1000 };
+    let of_cells = |session, frames_per_s| {
+        let mut opening =
+            Opening { viewpoints: vec![view(0.0)], frames_per_s, ..opening(session, PolicyChoice::Pipeline, 1) };
+        opening.workload.timeline = timeline;
+        opening
+    };
+    let mut scheduler = of(4);
+    step(&mut scheduler, Event::Opened(Box::new(of_cells(1, Some(20.0)))));
+    assert_eq!(scheduler.admits_viewpoints(1, &spread(0..1)), Ok(()));
+    let refused = scheduler.admits_viewpoints(1, &spread(0..9));
+    assert!(matches!(refused, Err(ChoiceError::Overload { needed }) if needed > 1.0), "{refused:?}");
+    let mut scheduler = of(4);
+    step(&mut scheduler, Event::Opened(Box::new(of_cells(1, None))));
+    assert_eq!(scheduler.admits_viewpoints(1, &spread(0..9)), Ok(()), "a batch takes what is left");
 }

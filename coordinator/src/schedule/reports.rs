@@ -3,7 +3,8 @@
 //! A report alone proves nothing. It counts against the sampler when a second compositor reports the same sampler, or when
 //! the coordinator's own probe of that sampler fails. A report whose probe passes counts against the compositor: after
 //! [`REFUTED_LIMIT`] refuted reports within [`WINDOW`] the compositor is the one that is cut off. Reports of a sampler that
-//! turns out to be at fault are dropped, so that they never count against those that made them.
+//! turns out to be at fault are dropped, so that they never count against those that made them. Reports of different
+//! workloads have nothing to do with each other: what a session asks for may be the fault.
 
 use std::time::Duration;
 
@@ -21,6 +22,7 @@ pub(super) struct SamplerReports(Vec<Filed>);
 #[derive(Debug, Clone)]
 struct Filed {
     at: Duration,
+    workload: u64,
     compositor: String,
     sampler: String,
     reason: String,
@@ -30,36 +32,39 @@ struct Filed {
 
 impl SamplerReports {
     /// Files a report; whether another compositor agrees, so that the sampler is at fault. Else it has to be probed.
-    pub(super) fn file(&mut self, now: Duration, report: SamplerReport) -> bool {
+    pub(super) fn file(&mut self, now: Duration, workload: u64, report: SamplerReport) -> bool {
         self.0.retain(|filed| now.saturating_sub(filed.at) < WINDOW);
         let SamplerReport { compositor, sampler, reason, .. } = report;
-        let agrees = self.0.iter().any(|filed| filed.sampler == sampler && filed.compositor != compositor);
+        let of_sampler = |filed: &Filed| filed.workload == workload && filed.sampler == sampler;
+        let agrees = self.0.iter().any(|filed| of_sampler(filed) && filed.compositor != compositor);
         // One probe answers all reports before it.
-        self.0.retain(|filed| filed.is_refuted || (&filed.sampler, &filed.compositor) != (&sampler, &compositor));
-        self.0.push(Filed { at: now, compositor, sampler, reason, is_refuted: false });
+        self.0.retain(|filed| filed.is_refuted || !of_sampler(filed) || filed.compositor != compositor);
+        self.0.push(Filed { at: now, workload, compositor, sampler, reason, is_refuted: false });
         agrees
     }
 
     /// A probe of the sampler has passed. Gives the compositors that are now at fault, and the reasons of their reports.
-    pub(super) fn refute(&mut self, sampler: &str) -> Vec<(String, String)> {
+    pub(super) fn refute(&mut self, workload: u64, sampler: &str) -> Vec<(String, String)> {
         let mut at_fault = Vec::new();
-        for filed in self.0.iter_mut().filter(|filed| filed.sampler == sampler && !filed.is_refuted) {
+        let mut own: Vec<&mut Filed> = self.0.iter_mut().filter(|filed| filed.workload == workload).collect();
+        for filed in own.iter_mut().filter(|filed| filed.sampler == sampler && !filed.is_refuted) {
             filed.is_refuted = true;
             at_fault.push((filed.compositor.clone(), filed.reason.clone()));
         }
-        let refuted = |of: &str| self.0.iter().filter(|filed| filed.is_refuted && filed.compositor == of).count();
+        let refuted = |of: &str| own.iter().filter(|filed| filed.is_refuted && filed.compositor == of).count();
         at_fault.retain(|(compositor, _)| refuted(compositor) >= REFUTED_LIMIT);
         at_fault
     }
 
     /// Reports on file of a sampler: the number of the image that is probed next.
-    pub(super) fn count_of(&self, sampler: &str) -> usize {
-        self.0.iter().filter(|filed| filed.sampler == sampler).count()
+    pub(super) fn count_of(&self, workload: u64, sampler: &str) -> usize {
+        self.0.iter().filter(|filed| filed.workload == workload && filed.sampler == sampler).count()
     }
 
-    /// A node is quarantined: neither reports of it nor by it count any more.
-    pub(super) fn forget(&mut self, node_name: &str) {
-        self.0.retain(|filed| filed.sampler != node_name && filed.compositor != node_name);
+    /// A node is quarantined, from one workload or from all: neither reports of it nor by it count any more.
+    pub(super) fn forget(&mut self, workload: Option<u64>, node_name: &str) {
+        let concerns = |filed: &Filed| filed.sampler == node_name || filed.compositor == node_name;
+        self.0.retain(|filed| workload.is_some_and(|number| number != filed.workload) || !concerns(filed));
     }
 }
 
@@ -81,39 +86,51 @@ mod tests {
     #[test]
     fn a_second_compositor_convicts_the_sampler_and_a_repeated_report_does_not() {
         let mut reports = SamplerReports::default();
-        assert!(!reports.file(START, report("c", "a")));
-        assert!(!reports.file(START, report("c", "a")), "the same compositor again");
-        assert!(!reports.file(START, report("d", "b")), "another sampler");
-        assert!(reports.file(START, report("d", "a")));
-        assert!(!SamplerReports::default().file(START, report("d", "a")));
+        assert!(!reports.file(START, 1, report("c", "a")));
+        assert!(!reports.file(START, 1, report("c", "a")), "the same compositor again");
+        assert!(!reports.file(START, 1, report("d", "b")), "another sampler");
+        assert!(reports.file(START, 1, report("d", "a")));
+        assert!(!SamplerReports::default().file(START, 1, report("d", "a")));
     }
 
     #[test]
     fn reports_a_minute_apart_do_not_agree() {
         let mut reports = SamplerReports::default();
-        reports.file(START, report("c", "a"));
-        assert!(!reports.file(START + WINDOW, report("d", "a")));
+        reports.file(START, 1, report("c", "a"));
+        assert!(!reports.file(START + WINDOW, 1, report("d", "a")));
     }
 
     #[test]
     fn two_refuted_reports_convict_the_compositor() {
         let mut reports = SamplerReports::default();
-        reports.file(START, report("c", "a"));
-        reports.file(START, report("c", "a"));
-        assert_eq!(reports.refute("a"), [], "one probe answers both");
-        assert_eq!(reports.refute("a"), [], "a report is refuted once");
-        reports.file(START, report("c", "b"));
-        assert_eq!(reports.refute("b"), [("c".to_owned(), "no images".to_owned())]);
+        reports.file(START, 1, report("c", "a"));
+        reports.file(START, 1, report("c", "a"));
+        assert_eq!(reports.refute(1, "a"), [], "one probe answers both");
+        assert_eq!(reports.refute(1, "a"), [], "a report is refuted once");
+        reports.file(START, 1, report("c", "b"));
+        assert_eq!(reports.refute(1, "b"), [("c".to_owned(), "no images".to_owned())]);
     }
 
     #[test]
     fn reports_of_a_sampler_at_fault_do_not_count_against_its_compositors() {
         let mut reports = SamplerReports::default();
-        reports.file(START, report("c", "a"));
-        reports.refute("a");
-        reports.forget("a");
-        reports.file(START, report("c", "b"));
-        assert_eq!(reports.refute("b"), []);
-        assert_eq!((reports.count_of("a"), reports.count_of("b")), (0, 1));
+        reports.file(START, 1, report("c", "a"));
+        reports.refute(1, "a");
+        reports.forget(None, "a");
+        reports.file(START, 1, report("c", "b"));
+        assert_eq!(reports.refute(1, "b"), []);
+        assert_eq!((reports.count_of(1, "a"), reports.count_of(1, "b")), (0, 1));
+    }
+
+    #[test]
+    fn reports_of_two_workloads_do_not_agree() {
+        let mut reports = SamplerReports::default();
+        assert!(!reports.file(START, 1, report("c", "a")) && !reports.file(START, 2, report("d", "a")));
+        assert_eq!(reports.refute(1, "a"), []);
+        assert_eq!((reports.count_of(1, "a"), reports.count_of(2, "a")), (1, 1));
+        reports.file(START, 2, report("c", "b"));
+        assert_eq!(reports.refute(2, "b"), [], "it is the first of that workload");
+        reports.forget(Some(2), "a");
+        assert_eq!((reports.count_of(1, "a"), reports.count_of(2, "a")), (1, 0));
     }
 }

@@ -6,32 +6,11 @@ use depth_image::Camera;
 use super::*;
 use crate::schedule::demand::{ChoiceError, PolicyOverride};
 use crate::schedule::event::Opening;
-use crate::schedule::test_support::{COSTS, TILEABLE, join, opened, opening, workload};
+use crate::schedule::test_support::{COSTS, Cluster, TILEABLE, join, opened, opening, workload};
 
 const PIPELINE: PolicyChoice = PolicyChoice::Pipeline;
 
-/// A scheduler and its clock.
-struct Cluster {
-    scheduler: Scheduler,
-    now: Duration,
-}
-
 impl Cluster {
-    fn of(nodes: u64) -> Self {
-        let mut cluster = Self { scheduler: Scheduler::default(), now: Duration::ZERO };
-        for i in 0..nodes {
-            assert_eq!(cluster.step(join(&format!("n{i}"), i, 0)), []);
-        }
-        cluster
-    }
-
-    /// Probes are tested elsewhere.
-    fn step(&mut self, event: Event) -> Vec<Command> {
-        let mut commands = self.scheduler.step(self.now, event);
-        commands.retain(|command| !matches!(command, Command::Probe(_)));
-        commands
-    }
-
     fn left(&mut self, incarnation: u64, name: &str) -> Vec<Command> {
         self.step(Event::Left { incarnation, node_name: name.to_owned() })
     }
@@ -54,7 +33,7 @@ impl Cluster {
 
     /// The only workload.
     fn workload(&self) -> WorkloadStatus {
-        let [workload] = &self.scheduler.status().workloads[..] else { panic!("{:?}", self.scheduler) };
+        let [workload] = &self.workloads()[..] else { panic!("{:?}", self.scheduler) };
         workload.clone()
     }
 

@@ -1,14 +1,47 @@
 //! Shared by tests: random numbers, costs, and events.
 
+use std::time::Duration;
+
 use cluster::{
     Costs, JoinCluster, NodeStatus, PolicyChoice, SamplePlanes, SceneHash, SceneRef, TileCosts, Timeline, Workload,
+    WorkloadStatus,
 };
 use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
+use super::command::Command;
 use super::demand::PolicyOverride;
 use super::event::{Event, Opening};
 use super::node_costs::NodeCosts;
+use super::scheduler::Scheduler;
+
+/// A scheduler and its clock.
+pub(super) struct Cluster {
+    pub(super) scheduler: Scheduler,
+    pub(super) now: Duration,
+}
+
+impl Cluster {
+    /// Of nodes n0, n1, …, whose incarnations are their numbers.
+    pub(super) fn of(nodes: u64) -> Self {
+        let mut cluster = Self { scheduler: Scheduler::default(), now: Duration::ZERO };
+        for i in 0..nodes {
+            assert_eq!(cluster.step(join(&format!("n{i}"), i, 0)), []);
+        }
+        cluster
+    }
+
+    /// The commands but for probes, which are tested elsewhere.
+    pub(super) fn step(&mut self, event: Event) -> Vec<Command> {
+        let mut commands = self.scheduler.step(self.now, event);
+        commands.retain(|command| !matches!(command, Command::Probe(_)));
+        commands
+    }
+
+    pub(super) fn workloads(&self) -> Vec<WorkloadStatus> {
+        self.scheduler.status().workloads
+    }
+}
 
 /// Numbers from a seed (SplitMix64).
 pub(super) struct Random(pub(super) u64);

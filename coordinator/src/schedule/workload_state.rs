@@ -43,7 +43,7 @@ pub(super) struct WorkloadState {
     has_been_ready: bool,
     /// Where live viewers are, as their compositors have said.
     live_viewpoints: BTreeMap<String, Vec<PinholeCamera>>,
-    /// Viewers have moved since cells were placed.
+    /// Viewers have moved, come or gone since cells were placed.
     viewers_have_moved: bool,
 }
 
@@ -74,16 +74,24 @@ impl WorkloadState {
             viewers_have_moved: false,
         };
         workload.change(now, |sessions| sessions.add(opening));
+        workload.update_cells();
         workload
     }
 
-    /// Changes the sessions, and all that follows from them.
+    /// As it would be with other sessions.
+    pub(super) fn changed(&self, now: Duration, change: impl FnOnce(&mut SessionMix)) -> Self {
+        let mut changed = self.clone();
+        changed.change(now, change);
+        changed.update_cells();
+        changed
+    }
+
+    /// Changes the sessions, and all that follows from them but the cells, which follow when that is due.
     pub(super) fn change(&mut self, now: Duration, change: impl FnOnce(&mut SessionMix)) {
         change(&mut self.sessions);
         self.costs = self.sessions.costs(self.set_s()).unwrap_or(self.costs);
         self.overload.limit(now, self.sessions.fallbacks().len());
-        self.update_cells();
-        self.note_activity(now);
+        self.note_movement(now);
     }
 
     pub(super) fn trigger(&self) -> PlanTrigger {
@@ -94,14 +102,12 @@ impl WorkloadState {
         }
     }
 
-    /// Whether a session asks for this workload.
-    pub(super) fn is_shared_by(&self, opening: &Opening) -> bool {
+    /// Whether a session asks for this workload; `follows_viewers`: its sample cameras are those of its viewpoints.
+    pub(super) fn is_shared_by(&self, asked: &Workload, follows_viewers: bool) -> bool {
+        let asked = self.with_planes(asked);
         match &self.cells {
-            Some(cells) => {
-                !opening.viewpoints.is_empty()
-                    && cells.are_shareable(&self.requested, &self.with_planes(&opening.workload))
-            }
-            None => opening.viewpoints.is_empty() && self.requested == self.with_planes(&opening.workload),
+            Some(cells) => follows_viewers && cells.are_shareable(&self.requested, &asked),
+            None => !follows_viewers && self.requested == asked,
         }
     }
 
@@ -120,7 +126,7 @@ impl WorkloadState {
         };
     }
 
-    /// Viewers have moved: cells follow when that is due.
+    /// Viewers have moved, come or gone: cells follow when that is due.
     pub(super) fn note_movement(&mut self, now: Duration) {
         self.viewers_have_moved = true;
         self.note_activity(now);
@@ -135,9 +141,8 @@ impl WorkloadState {
         self.viewers_have_moved = false;
         self.live_viewpoints.retain(|node, _| self.nodes.contains(node));
         let Some(cells) = &mut self.cells else { return };
-        let mut viewpoints = self.sessions.viewpoints();
-        viewpoints.extend(self.live_viewpoints.values().flatten());
-        cells.follow(&viewpoints, &self.requested.volume);
+        let live: Vec<PinholeCamera> = self.live_viewpoints.values().flatten().copied().collect();
+        cells.follow(&self.sessions.viewpoints(), &live, &self.requested.volume);
         cells.place_cameras(&mut self.requested);
     }
 
@@ -212,9 +217,9 @@ impl WorkloadState {
         }
     }
 
-    /// The share of the nodes' time that a plan of `time_s` a set takes; 0 where a session states no rate.
+    /// The share of the nodes' time that sessions with a rate take, where a set of their views takes `time_s`.
     pub(super) fn utilisation(&self, time_s: f64) -> f64 {
-        if self.sessions.has_batch() { 0.0 } else { time_s / self.set_s() }
+        if self.sessions.viewers() == 0 { 0.0 } else { time_s / self.set_s() }
     }
 
     /// The share of the nodes' time that sessions with a rate take at their last fallback, where a set of their views
@@ -288,12 +293,5 @@ impl WorkloadState {
             sample_cameras: self.requested.sample_cameras.iter().map(sized).collect(),
             ..self.requested.clone()
         }
-    }
-
-    /// Whether its samples may be seen from these viewpoints; `None` where sample cameras follow none.
-    pub(super) fn cells_seen_from(&self, now: Duration, session: u64, viewpoints: &[PinholeCamera]) -> Option<usize> {
-        let mut changed = self.clone();
-        changed.change(now, |sessions| sessions.set_viewpoints(session, viewpoints));
-        changed.cell_count()
     }
 }

@@ -3,45 +3,22 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use cluster::{Assignment, MeasuredCosts, PolicyChoice, Quality, SamplePlanes, WorkloadStatus};
+use cluster::{Assignment, MeasuredCosts, PolicyChoice, Quality, SamplePlanes, SamplerReport};
 
 use super::command::Command;
 use super::demand::{ChoiceError, PolicyOverride};
-use super::event::{Event, Opening};
-use super::scheduler::Scheduler;
-use super::test_support::{join, opening, workload};
+use super::event::{Event, Opening, ProbeKind};
+use super::test_support::{Cluster, join, opening, workload};
 
 const AUTO: PolicyChoice = PolicyChoice::Auto;
 const PIPELINE: PolicyChoice = PolicyChoice::Pipeline;
 
-/// A scheduler and its clock.
-struct Cluster {
-    scheduler: Scheduler,
-    now: Duration,
-}
-
 impl Cluster {
-    fn of(nodes: u64) -> Self {
-        let mut cluster = Self { scheduler: Scheduler::default(), now: Duration::ZERO };
-        (0..nodes).for_each(|i| drop(cluster.step(join(&format!("n{i}"), i, 0))));
-        cluster
-    }
-
-    fn step(&mut self, event: Event) -> Vec<Command> {
-        let mut commands = self.scheduler.step(self.now, event);
-        commands.retain(|command| !matches!(command, Command::Probe(_)));
-        commands
-    }
-
     fn open(&mut self, opening: Opening) -> Vec<Command> {
         self.step(Event::Opened(Box::new(opening)))
     }
 
-    fn workloads(&self) -> Vec<WorkloadStatus> {
-        self.scheduler.status().workloads
-    }
-
-    fn plan(&self, number: u64) -> Assignment {
+    fn plan_of(&self, number: u64) -> Assignment {
         let workloads = self.workloads();
         let workload = workloads.iter().find(|workload| workload.number == number).expect("a workload");
         workload.plan.clone().expect("a plan").assignment
@@ -145,6 +122,40 @@ fn workloads_that_have_ended_are_told_apart_from_those_of_a_coordinator_before()
 }
 
 #[test]
+fn a_node_is_idle_while_no_node_at_its_address_works() {
+    let mut cluster = Cluster::of(2);
+    let neighbour = Event::Joined {
+        incarnation: 2,
+        join: cluster::JoinCluster {
+            node: cluster::NodeStatus {
+                node_name: "n2".to_owned(),
+                address: "http://n1:99".to_owned(),
+                device_name: "cpu".to_owned(),
+                is_software: true,
+            },
+            plan_epoch: 0,
+        },
+    };
+    cluster.step(neighbour);
+    let idle_s = |cluster: &Cluster| ["n0", "n1", "n2"].map(|name| cluster.scheduler.idle_for(name).as_secs());
+    assert_eq!(idle_s(&cluster), [u64::MAX; 3]);
+    cluster.now = Duration::from_secs(10);
+    let busy = |busy_s| Event::Measured {
+        node_name: "n1".to_owned(),
+        plan_epoch: 7,
+        costs: MeasuredCosts::default(),
+        busy_s,
+        views: 1,
+        dropped_views: 0,
+    };
+    cluster.step(busy(0.9));
+    cluster.now = Duration::from_secs(14);
+    cluster.step(busy(0.1));
+    assert_eq!(idle_s(&cluster), [u64::MAX, 4, 4], "a little work makes no node busy");
+    assert_eq!(cluster.scheduler.idle_for("n9"), Duration::ZERO, "it is no member");
+}
+
+#[test]
 fn a_lost_node_concerns_the_workload_that_it_served() {
     let mut cluster = Cluster::of(4);
     cluster.open(of(4, 1));
@@ -171,6 +182,9 @@ fn no_more_workloads_than_the_limit_are_opened() {
     cluster.open(of(3, 2));
     let refused = cluster.open(of(2, 3));
     assert_eq!(refusal(&refused).to_string(), "workloads: 2 are open, the limit of --max-workloads");
+    let admits = |workload| cluster.scheduler.admits_workload(&workload, false);
+    assert_eq!(admits(workload(2)), Err(ChoiceError::Workloads { most: 2 }), "before its costs are measured");
+    assert_eq!(admits(workload(3)), Ok(()));
     assert_eq!(applied(&cluster.open(of(3, 4))).len(), 1, "one that is open has room");
     cluster.step(Event::Closed { session: 1 });
     assert_eq!(applied(&cluster.open(of(2, 5))).last().map(|plan| plan.2.clone()), Some(vec![5]));
@@ -197,7 +211,7 @@ fn what_a_session_forces_binds_its_own_workload_while_all_its_sessions_force_it(
     let mut cluster = Cluster::of(4);
     let k = |session, k| Opening { policy_override: forced(PIPELINE, Some(k)), ..of(4, session) };
     cluster.open(k(1, 2));
-    assert_eq!(cluster.plan(1).samplers.len(), 2);
+    assert_eq!(cluster.plan_of(1).samplers.len(), 2);
     let refused = cluster.open(k(2, 1));
     let text = refusal(&refused).to_string();
     assert!(text.ends_with("the workload has other sessions, with policy pipeline, K = 2"), "{text}");
@@ -207,7 +221,7 @@ fn what_a_session_forces_binds_its_own_workload_while_all_its_sessions_force_it(
     let refused = cluster.open(k(5, 2));
     assert!(refusal(&refused).to_string().ends_with("with policy auto"), "{refused:?}");
     cluster.step(Event::Closed { session: 4 });
-    assert_eq!(cluster.plan(1).samplers.len(), 2, "it is in force again");
+    assert_eq!(cluster.plan_of(1).samplers.len(), 2, "it is in force again");
     let other = Opening { policy_override: forced(PolicyChoice::Direct, None), ..of(3, 6) };
     assert!(!applied(&cluster.open(other)).is_empty(), "another workload is free to choose");
 }
@@ -236,6 +250,37 @@ fn a_node_that_cannot_take_a_plan_serves_the_other_workloads() {
 }
 
 #[test]
+fn a_sampler_of_faulty_images_serves_the_other_workloads_and_a_dead_node_none() {
+    let mut cluster = Cluster::of(4);
+    cluster.open(Opening { policy_override: forced(PIPELINE, Some(1)), ..of(4, 1) });
+    cluster.open(of(3, 2));
+    let plan = cluster.plan_of(1);
+    let (sampler, compositor) = (plan.samplers[0].node_name.clone(), plan.compositors[0].node_name.clone());
+    let plan_epoch = plan.plan_epoch;
+    let report = SamplerReport { plan_epoch, compositor, sampler: sampler.clone(), reason: "no images".to_owned() };
+    cluster.step(Event::Reported(report));
+    let incarnation = sampler[1..].parse().unwrap();
+    let probed = |plan_epoch, kind| Event::Probed {
+        plan_epoch,
+        node_name: sampler.clone(),
+        incarnation,
+        kind,
+        failure: Some("corrupt".to_owned()),
+    };
+    let commands = cluster.step(probed(plan_epoch, ProbeKind::Image));
+    let scope = |command: &Command| match command {
+        Command::Quarantine { workload_number, .. } => *workload_number,
+        other => panic!("{other}"),
+    };
+    assert_eq!(scope(&commands[0]), Some(1));
+    assert!(!cluster.nodes(1).contains(&sampler) && cluster.nodes(2).contains(&sampler), "{:?}", cluster.nodes(1));
+    assert!(!cluster.plan_of(1).composites(&sampler));
+    let commands = cluster.step(probed(cluster.plan_of(2).plan_epoch, ProbeKind::Liveness));
+    assert_eq!(scope(&commands[0]), None);
+    assert!(!cluster.nodes(2).contains(&sampler));
+}
+
+#[test]
 fn an_idle_workload_gives_nodes_back_and_gets_one_when_it_works_again() {
     let mut cluster = Cluster::of(4);
     cluster.open(of(4, 1));
@@ -256,7 +301,9 @@ fn workloads_that_outnumber_nodes_share_them() {
     (1..=5).for_each(|number| drop(cluster.open(of(number, number as u64))));
     let busy = [1, 2, 3, 4, 5].map(|i: usize| cluster.workloads()[i - 1].number);
     cluster.pass(80, &busy);
-    assert!(busy.iter().all(|&number| cluster.nodes(number).len() == 1 && cluster.plan(number).compositors.len() == 1));
+    assert!(
+        busy.iter().all(|&number| cluster.nodes(number).len() == 1 && cluster.plan_of(number).compositors.len() == 1)
+    );
     let on = |name: &str| busy.iter().filter(|&&number| cluster.nodes(number).contains(name)).count();
     assert_eq!(on("n0").abs_diff(on("n1")), 1);
     let costs = cluster.workloads()[4].plan.as_ref().unwrap().costs;
@@ -320,7 +367,7 @@ fn a_session_that_does_not_accept_the_fallback_in_force_is_refused_where_it_is_n
     let slow = MeasuredCosts { reconstruct_view_s: Some(0.0115), ..MeasuredCosts::default() };
     for _ in 0..40 {
         for name in ["n0", "n1"] {
-            let plan_epoch = cluster.plan(1).plan_epoch;
+            let plan_epoch = cluster.plan_of(1).plan_epoch;
             cluster.step(Event::Measured {
                 node_name: name.to_owned(),
                 plan_epoch,
@@ -337,6 +384,26 @@ fn a_session_that_does_not_accept_the_fallback_in_force_is_refused_where_it_is_n
     assert!(matches!(refusal(&refused), ChoiceError::Overload { .. }), "{refused:?}");
     assert!(!applied(&cluster.open(Opening { fallbacks, ..rated(of(4, 3), 0.1) })).is_empty());
     assert!(!applied(&cluster.open(of(4, 4))).is_empty(), "batches do not count");
+}
+
+#[test]
+fn viewers_keep_their_quality_beside_batches() {
+    let quality = Quality {
+        lighting: "unlit".to_owned(),
+        method: "joint_carve:1".to_owned(),
+        sample_side_ratio: 1.0,
+        frame_rate_ratio: 0.5,
+    };
+    let mut cluster = Cluster::of(2);
+    cluster.open(Opening { fallbacks: vec![quality], ..rated(of(4, 1), 60.0) });
+    cluster.open(Opening { views_per_set: 5000, ..of(4, 2) });
+    let utilisation = |cluster: &Cluster| cluster.workloads()[0].utilisation.unwrap();
+    assert!((utilisation(&cluster) - 0.3).abs() < 0.01, "60 views of 10 ms a second on 2 nodes");
+    (3..=5).for_each(|number| drop(cluster.open(of(number - 2, number as u64))));
+    cluster.pass(80, &[1, 2, 3, 4, 5]);
+    assert!(cluster.nodes(1).len() == 1 && utilisation(&cluster) < 0.7, "{}", utilisation(&cluster));
+    assert_eq!(cluster.workloads()[0].plan.as_ref().unwrap().fallback, None);
+    assert_eq!(cluster.workloads()[1].utilisation, None, "a batch");
 }
 
 #[test]

@@ -228,9 +228,4 @@ pub enum SessionEvent {
     },
     /// A plan is in force.
     Plan(Box<SessionPlan>),
-    /// The session has ended.
-    Ended {
-        /// Why.
-        reason: String,
-    },
 }

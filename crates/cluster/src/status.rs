@@ -74,7 +74,7 @@ pub struct WorkloadStatus {
     pub conditions: Vec<NodeCondition>,
     /// One entry for each policy that has been in force for it.
     pub achieved: Vec<AchievedTime>,
-    /// The share of its nodes' time that its sessions' frame rates take; `None` where a session states no rate.
+    /// The share of its nodes' time that its sessions' frame rates take; `None` without such sessions.
     pub utilisation: Option<f64>,
     /// The share of all nodes' time that one more viewer would take: one like the mean of its viewers, or one of 10 views a
     /// second.
@@ -115,7 +115,7 @@ pub struct NodeCondition {
     pub views: u64,
     /// Views not made, or not sent, since it joined.
     pub dropped_views: u64,
-    /// The share of its last report's time that it worked; two operations at a time count twice.
+    /// The share of the last second that it worked, for all workloads; two operations at a time count twice.
     pub busy_ratio: f64,
 }
 

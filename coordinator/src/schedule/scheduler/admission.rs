@@ -1,5 +1,6 @@
 //! Admission: what a session may ask for, beside what is promised to others.
 
+use cluster::Workload;
 use cluster::limits::MAX_CELLS;
 use depth_image::PinholeCamera;
 
@@ -34,8 +35,7 @@ impl Scheduler {
     pub fn admits(&self, session: u64, views_per_set: usize, frames_per_s: Option<f64>) -> Result<(), ChoiceError> {
         let Some(number) = self.workload_of_session(session) else { return Ok(()) };
         let before = &self.workloads[&number];
-        let mut after = before.clone();
-        after.change(self.now, |sessions| sessions.set_demand(session, views_per_set, frames_per_s));
+        let after = before.changed(self.now, |sessions| sessions.set_demand(session, views_per_set, frames_per_s));
         if after.sessions.views_per_s() <= before.sessions.views_per_s() {
             return Ok(());
         }
@@ -45,28 +45,43 @@ impl Scheduler {
     /// Whether a session may look from these viewpoints from now on.
     ///
     /// # Errors
-    /// As for one that is opened, and for one that has sample cameras of its own.
+    /// As for one that is opened, and for one that has sample cameras of its own. A session may always ask for fewer images
+    /// than before.
     pub fn admits_viewpoints(&self, session: u64, viewpoints: &[PinholeCamera]) -> Result<(), ChoiceError> {
         let Some(number) = self.workload_of_session(session) else { return Ok(()) };
         let before = &self.workloads[&number];
-        match before.cells_seen_from(self.now, session, viewpoints) {
-            None => Err(ChoiceError::NoCells { session }),
-            Some(cells) if cells > MAX_CELLS && Some(cells) > before.cell_count() => Err(ChoiceError::Cells { cells }),
-            Some(_) => Ok(()),
+        if before.cell_count().is_none() {
+            return Err(ChoiceError::NoCells { session });
         }
+        let after = before.changed(self.now, |sessions| sessions.set_viewpoints(session, viewpoints));
+        if after.cell_count() <= before.cell_count() && after.load().images <= before.load().images {
+            return Ok(());
+        }
+        self.admit(&self.change_of(number, before, after))
+    }
+
+    /// Whether a session of this workload may be opened, as far as is known before its costs and planes are.
+    ///
+    /// # Errors
+    /// Where it would be one workload too many.
+    pub fn admits_workload(&self, workload: &Workload, follows_viewers: bool) -> Result<(), ChoiceError> {
+        let is_open = self.workloads.values().any(|open| open.is_shared_by(workload, follows_viewers));
+        if is_open || self.workloads.len() < self.max_workloads {
+            return Ok(());
+        }
+        Err(ChoiceError::Workloads { most: self.max_workloads })
     }
 
     /// The workload that a session belongs to, if it is open.
     pub(super) fn workload_for(&self, opening: &Opening) -> Option<u64> {
-        self.workloads.iter().find(|(_, workload)| workload.is_shared_by(opening)).map(|(&number, _)| number)
+        let is_shared = |open: &WorkloadState| open.is_shared_by(&opening.workload, !opening.viewpoints.is_empty());
+        self.workloads.iter().find(|(_, workload)| is_shared(workload)).map(|(&number, _)| number)
     }
 
     /// Whether a session can be served.
     pub(super) fn check(&self, opening: &Opening) -> Result<(), ChoiceError> {
         let Some(number) = self.workload_for(opening) else {
-            if self.workloads.len() >= self.max_workloads {
-                return Err(ChoiceError::Workloads { most: self.max_workloads });
-            }
+            self.admits_workload(&opening.workload, !opening.viewpoints.is_empty())?;
             let alone = NodeCosts { costs: opening.costs, ..NodeCosts::default() };
             let nodes = vec![alone; self.usable().count()];
             return self.admit(&Change { before: None, after: WorkloadState::new(self.now, opening), nodes });
@@ -76,8 +91,7 @@ impl Scheduler {
         if forced != PolicyOverride::default() && !before.sessions.all_force(forced) {
             return Err(ChoiceError::Override { in_force: before.sessions.policy_override() });
         }
-        let mut after = before.clone();
-        after.change(self.now, |sessions| sessions.add(opening));
+        let after = before.changed(self.now, |sessions| sessions.add(opening));
         // It has to be possible without the others, too: they may leave.
         let alone = vec![NodeCosts { costs: opening.costs, ..NodeCosts::default() }; self.usable().count()];
         check(&Demand { load: after.load(), nodes: &alone, policy_override: forced, current: None })?;

@@ -82,7 +82,8 @@ impl Scheduler {
         self.fault(name, None, reason)
     }
 
-    /// The same for the plans of one workload: what a session asks for takes a node from no other.
+    /// The same for the plans of one workload: what a session asks for takes a node from no other. A node that is dead for all
+    /// workloads answers no liveness probe.
     fn exclude(&mut self, number: u64, name: &str, reason: &str) -> Vec<Command> {
         let now = self.now;
         let is_usable = self.usable().any(|(usable, _)| usable == name);
@@ -96,7 +97,7 @@ impl Scheduler {
     }
 
     fn fault(&mut self, name: &str, workload_number: Option<u64>, reason: &str) -> Vec<Command> {
-        self.reports.forget(name);
+        self.reports.forget(workload_number, name);
         let quarantine = Command::Quarantine { node_name: name.to_owned(), workload_number, reason: reason.to_owned() };
         let mut commands = vec![quarantine];
         commands.extend(self.nodes_changed(&format!("node {name} {reason}")));
@@ -139,18 +140,20 @@ impl Scheduler {
             return Vec::new();
         }
         let SamplerReport { plan_epoch, compositor, sampler, reason } = report.clone();
-        if self.reports.file(self.now, report) {
-            return self.quarantine(&sampler, &format!("sends no images to {compositor} and others: {reason}"));
+        let Some(number) = self.workload_of_plan(plan_epoch) else { return Vec::new() };
+        if self.reports.file(self.now, number, report) {
+            return self.exclude(number, &sampler, &format!("sends no images to {compositor} and others: {reason}"));
         }
         self.probe_image(plan_epoch, &sampler).into_iter().collect()
     }
 
     /// One probe of a sampler at a time. Each report on file has another image fetched.
     fn probe_image(&mut self, plan_epoch: u64, sampler: &str) -> Option<Command> {
-        let number = self.reports.count_of(sampler).saturating_sub(1);
+        let workload_number = self.workload_of_plan(plan_epoch)?;
+        let number = self.reports.count_of(workload_number, sampler).saturating_sub(1);
         let member = self.members.get(sampler)?;
         let (incarnation, address) = (member.incarnation, member.status.address.clone());
-        let estimate = member.estimates.get(&self.workload_of_plan(plan_epoch)?)?;
+        let estimate = member.estimates.get(&workload_number)?;
         let sample_image_s = estimate.now().costs.sample_image_s;
         let active = self.active_plan_for(plan_epoch, sampler)?;
         let plan = &active.plan.assignment;
@@ -192,11 +195,12 @@ impl Scheduler {
         if !probed.is_some_and(|active| active.probed_samplers.remove(sampler)) {
             return Vec::new();
         }
+        let Some(number) = self.workload_of_plan(plan_epoch) else { return Vec::new() };
         if let Some(reason) = failure {
-            return self.quarantine(sampler, &format!("sends no images: {reason}"));
+            return self.exclude(number, sampler, &format!("sends no images: {reason}"));
         }
-        let at_fault = self.reports.refute(sampler).into_iter().map(|(compositor, reason)| {
-            self.quarantine(&compositor, &format!("reports samplers whose images can be had: {reason}"))
+        let at_fault = self.reports.refute(number, sampler).into_iter().map(|(compositor, reason)| {
+            self.exclude(number, &compositor, &format!("reports samplers whose images can be had: {reason}"))
         });
         at_fault.flatten().collect()
     }

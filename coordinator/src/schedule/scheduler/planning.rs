@@ -64,9 +64,13 @@ struct BetterPlan {
 }
 
 impl Scheduler {
-    /// The share of their time that a plan's nodes need for the demand; `None` without a plan.
+    /// The share of their time that a plan's nodes need for sessions with a rate; `None` without a plan. Batches take what
+    /// is left, those of other workloads as well.
     pub(super) fn utilisation(&self, number: u64) -> Option<f64> {
-        let (workload, snapshot) = (self.workloads.get(&number)?, self.snapshot(number)?);
+        let (workload, mut snapshot) = (self.workloads.get(&number)?, self.snapshot(number)?);
+        snapshot.load = workload.rated_load();
+        snapshot.nodes = self.costs_beside(number, |other| other.sessions.viewers() > 0);
+        snapshot.nodes.iter_mut().for_each(|node| node.costs = workload.of_viewers(&node.costs));
         Some(workload.utilisation(snapshot.current_s(&self.has_role(number, &snapshot)?)?))
     }
 
@@ -95,13 +99,18 @@ impl Scheduler {
 
     /// Present costs of the nodes that serve a workload, in their order. A node that serves several takes turns.
     pub(super) fn costs_now(&self, number: u64) -> Vec<NodeCosts> {
+        self.costs_beside(number, |_| true)
+    }
+
+    /// The same, beside some of the other workloads.
+    fn costs_beside(&self, number: u64, counts: impl Fn(&WorkloadState) -> bool) -> Vec<NodeCosts> {
         let Some(workload) = self.workloads.get(&number) else { return Vec::new() };
         let mut nodes = costs_among(self.serving(workload).filter_map(|(_, member)| member.estimates.get(&number)));
         if workload.active_plan.as_ref().is_some_and(|active| active.plan.assignment.tile_count > 1) {
             NodeCosts::level_sampling(&mut nodes);
         }
         for ((name, _), node) in self.serving(workload).zip(&mut nodes) {
-            let carried = self.carried(number, name);
+            let carried = self.carried(number, name, &counts);
             if carried > 1 {
                 *node = node.times(carried as f64);
             }

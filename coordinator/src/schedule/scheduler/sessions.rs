@@ -61,11 +61,17 @@ impl Scheduler {
     /// Replans at once where sessions force something else, other images are sampled or another quality is left; else where
     /// it is worth it.
     fn change(&mut self, number: u64, change: impl FnOnce(&mut SessionMix)) -> Vec<Command> {
-        let now = self.now;
+        let (now, may_change_cells) = (self.now, self.may_change_cells());
         let Some(workload) = self.workloads.get_mut(&number) else { return Vec::new() };
         let before = workload.trigger();
         workload.change(now, change);
+        if may_change_cells {
+            workload.update_cells();
+        }
         let (after, costs) = (workload.trigger(), workload.costs);
+        if before.sample_cameras != after.sample_cameras {
+            self.cells_changed_at = Some(now);
+        }
         let estimates = self.members.values_mut().filter_map(|member| member.estimates.get_mut(&number));
         estimates.for_each(|estimate| estimate.rebase(&costs));
         match why(&before, &after) {

@@ -19,10 +19,10 @@ impl Scheduler {
         self.usable().filter(|(name, _)| workload.nodes.contains(*name))
     }
 
-    /// How many workloads a node serves that are not idle, beside this one and with it.
-    pub(super) fn carried(&self, number: u64, name: &str) -> usize {
-        let others = self.workloads.iter().filter(|(other, _)| **other != number);
-        1 + others.filter(|(_, workload)| workload.nodes.contains(name) && !workload.is_idle(self.now)).count()
+    /// How many workloads a node serves: this one, and others that count and are not idle.
+    pub(super) fn carried(&self, number: u64, name: &str, counts: impl Fn(&WorkloadState) -> bool) -> usize {
+        let others = self.workloads.iter().filter(|(other, _)| **other != number).map(|(_, other)| other);
+        1 + others.filter(|other| other.nodes.contains(name) && !other.is_idle(self.now) && counts(other)).count()
     }
 
     /// The division in force, without nodes that are gone.

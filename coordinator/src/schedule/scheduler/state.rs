@@ -1,5 +1,7 @@
 //! The state of the cluster, for those that ask.
 
+use std::time::Duration;
+
 use cluster::{ClusterStatus, NodeCondition, WorkloadStatus};
 
 use super::Scheduler;
@@ -24,6 +26,15 @@ impl Scheduler {
                 .map(|(&number, workload)| self.workload_status(number, workload))
                 .collect(),
         }
+    }
+
+    /// How long a node, and all others at its address, have had little to do; no time for a node that is not a member.
+    #[must_use]
+    pub fn idle_for(&self, node_name: &str) -> Duration {
+        let Some(node) = self.members.get(node_name) else { return Duration::ZERO };
+        let neighbours = self.members.values().filter(|member| member.machine() == node.machine());
+        let busy_at = neighbours.filter_map(|member| member.activity.busy_at).max();
+        busy_at.map_or(Duration::MAX, |busy_at| self.now.saturating_sub(busy_at))
     }
 
     fn workload_status(&self, number: u64, workload: &WorkloadState) -> WorkloadStatus {
@@ -57,7 +68,7 @@ impl Scheduler {
             costs: member.estimates.get(&number).map(|estimate| estimate.now().costs).unwrap_or_default(),
             views: member.activity.views,
             dropped_views: member.activity.dropped_views,
-            busy_ratio: member.activity.busy_ratio,
+            busy_ratio: member.activity.busy_ratio(self.now),
         };
         self.serving(workload).map(condition).collect()
     }

@@ -39,9 +39,14 @@ impl Scheduler {
         self.follow_viewers()
     }
 
+    /// Whether cells may change: not so soon after they did.
+    pub(super) fn may_change_cells(&self) -> bool {
+        self.cells_changed_at.is_none_or(|at| self.now.saturating_sub(at) >= CELLS_INTERVAL)
+    }
+
     /// Places cells around the viewpoints of today, where that is due, and plans for those that are new.
     pub(super) fn follow_viewers(&mut self) -> Vec<Command> {
-        if self.cells_changed_at.is_some_and(|at| self.now.saturating_sub(at) < CELLS_INTERVAL) {
+        if !self.may_change_cells() {
             return Vec::new();
         }
         let moved: Vec<u64> = self.workloads.iter().filter(|(_, w)| w.viewers_have_moved()).map(|(&n, _)| n).collect();

@@ -56,10 +56,6 @@ impl Convert<proto::OpenSessionResponse> for SessionEvent {
                 Self::Progress { stage: Convert::read(p.stage, "stage")?, detail: p.detail }
             }
             Event::Plan(plan) => Self::Plan(Box::new(Convert::read(plan, "plan")?)),
-            Event::Ended(ended) => {
-                reason(&ended.reason, "ended.reason")?;
-                Self::Ended { reason: ended.reason }
-            }
             Event::Opened(opened) => Self::Opened { session: opened.session_number },
         })
     }
@@ -70,7 +66,6 @@ impl Convert<proto::OpenSessionResponse> for SessionEvent {
                 Event::Progress(proto::SessionProgress { stage: stage.write(), detail })
             }
             Self::Plan(plan) => Event::Plan(plan.write()),
-            Self::Ended { reason } => Event::Ended(proto::SessionEnded { reason }),
             Self::Opened { session } => Event::Opened(proto::SessionOpened { session_number: session }),
         };
         proto::OpenSessionResponse { event: Some(event) }

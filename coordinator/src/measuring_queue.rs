@@ -1,0 +1,112 @@
+//! Measurements that nobody waits for: of costs that were predicted, or measured beside other work.
+
+use std::collections::VecDeque;
+
+use cluster::MeasureCosts;
+
+use crate::cost_cache::cache_key;
+
+/// Measurements that may wait; the oldest leave.
+const CAPACITY: usize = 32;
+/// A measurement that was disturbed so often waits for the next session that wants it.
+const MOST_DISTURBED: u32 = 3;
+
+/// A measurement on any node of a device.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Wanted {
+    pub(crate) device: String,
+    pub(crate) measurement: MeasureCosts,
+    /// How often it has been measured beside other work.
+    disturbed: u32,
+}
+
+/// Measurements in the order in which they were first wanted.
+#[derive(Debug, Default)]
+pub(crate) struct MeasuringQueue(VecDeque<Wanted>);
+
+impl MeasuringQueue {
+    /// Adds a measurement, unless it waits already.
+    pub(crate) fn add(&mut self, device: &str, measurement: &MeasureCosts) {
+        let measurement = MeasureCosts { in_background: true, ..measurement.clone() };
+        self.push(Wanted { device: device.to_owned(), measurement, disturbed: 0 });
+    }
+
+    /// Adds a measurement that was taken, and made beside other work.
+    pub(crate) fn add_again(&mut self, wanted: Wanted) {
+        let disturbed = wanted.disturbed + 1;
+        if disturbed < MOST_DISTURBED {
+            self.push(Wanted { disturbed, ..wanted });
+        }
+    }
+
+    fn push(&mut self, wanted: Wanted) {
+        let key = cache_key(&wanted.measurement);
+        let is_same = |other: &Wanted| other.device == wanted.device && cache_key(&other.measurement) == key;
+        if self.0.iter().any(is_same) {
+            return;
+        }
+        if self.0.len() >= CAPACITY {
+            self.0.pop_front();
+        }
+        self.0.push_back(wanted);
+    }
+
+    /// The devices of all measurements.
+    pub(crate) fn devices(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().map(|wanted| wanted.device.as_str())
+    }
+
+    /// Takes the first measurement on a device of which a node is idle.
+    pub(crate) fn take(&mut self, is_idle: impl Fn(&str) -> bool) -> Option<Wanted> {
+        let first = self.0.iter().position(|wanted| is_idle(&wanted.device))?;
+        self.0.remove(first)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::UVec2;
+
+    use super::*;
+    use crate::cost_cache::tests::measurement;
+
+    fn taken(queue: &mut MeasuringQueue, idle: &str) -> Option<(String, UVec2)> {
+        let wanted = queue.take(|device| device == idle)?;
+        Some((wanted.device, wanted.measurement.typical_views[0].size_px))
+    }
+
+    #[test]
+    fn measurements_wait_until_their_device_is_idle() {
+        let mut queue = MeasuringQueue::default();
+        let [small, large] = [8, 9].map(UVec2::splat);
+        queue.add("a", &measurement(small));
+        queue.add("b", &measurement(small));
+        queue.add("a", &measurement(large));
+        queue.add("a", &measurement(small));
+        assert_eq!(queue.take(|_| false), None);
+        assert_eq!(taken(&mut queue, "a"), Some(("a".to_owned(), small)));
+        assert_eq!(taken(&mut queue, "a"), Some(("a".to_owned(), large)), "none waits twice");
+        assert_eq!(taken(&mut queue, "a"), None);
+        assert_eq!(taken(&mut queue, "b"), Some(("b".to_owned(), small)));
+    }
+
+    #[test]
+    fn a_measurement_that_is_always_disturbed_is_given_up() {
+        let mut queue = MeasuringQueue::default();
+        queue.add("a", &measurement(UVec2::splat(8)));
+        let mut measured = 0;
+        while let Some(wanted) = queue.take(|_| true) {
+            measured += 1;
+            queue.add_again(wanted);
+        }
+        assert_eq!(measured, MOST_DISTURBED);
+    }
+
+    #[test]
+    fn the_oldest_measurements_leave_a_full_queue() {
+        let mut queue = MeasuringQueue::default();
+        (1..=10_000).for_each(|side| queue.add("a", &measurement(UVec2::splat(side))));
+        let sides: Vec<u32> = std::iter::from_fn(|| taken(&mut queue, "a")).map(|(_, size_px)| size_px.x).collect();
+        assert_eq!(sides, (9_969..=10_000).collect::<Vec<_>>());
+    }
+}
