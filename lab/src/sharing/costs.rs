@@ -1,7 +1,6 @@
 //! The costs by which the coordinator admits and plans, measured beside load and without.
 
 use std::convert::Infallible;
-use std::ops::Range;
 
 use anyhow::Context as _;
 use app_core::delivery::{open, receive, request};
@@ -31,21 +30,31 @@ struct Taken {
     policies: String,
 }
 
-/// Measures the costs of sessions that differ in nothing that matters to them: first without load, then beside a viewer and
-/// a batch that never ends.
+/// Measures the costs of sessions that differ in nothing that matters to them: in turn without load, and beside a viewer and
+/// batches without end.
 ///
 /// # Errors
 /// The cluster does not start, or a session is refused.
 pub(super) async fn measure(cluster: &[String], repeats: usize) -> anyhow::Result<Section> {
     let up = Up::start(cluster).await?;
-    let idle = all_taken(&up, 0..repeats).await?;
+    // All that is made once is made by the first.
+    taken(&up, 0).await?;
+    let mut pairs = Vec::with_capacity(repeats);
+    for repeat in 0..repeats {
+        let idle = taken(&up, 2 * repeat + 1).await?;
+        pairs.push([idle, beside(&up, 2 * repeat + 2).await?]);
+    }
+    section(&pairs, up.device.clone())
+}
+
+async fn beside(up: &Up, number: usize) -> anyhow::Result<Taken> {
     let viewer = Viewer::start(&up.coordinator, up.offer()?, PolicyChoice::Pipeline).await?;
-    let beside = tokio::select! {
-        beside = all_taken(&up, repeats..2 * repeats) => beside?,
-        Err(error) = batches(&up) => return Err(error),
+    let taken = tokio::select! {
+        taken = taken(up, number) => taken,
+        Err(error) = batches(up) => Err(error),
     };
     viewer.stop(0.0).await?;
-    section(&idle, &beside, up.device.clone())
+    taken
 }
 
 /// Asks for one batch after the other.
@@ -53,14 +62,6 @@ async fn batches(up: &Up) -> anyhow::Result<Infallible> {
     loop {
         GUESTS[0].visit(&up.coordinator, up.two_offers()?).await?;
     }
-}
-
-async fn all_taken(up: &Up, numbers: Range<usize>) -> anyhow::Result<Vec<Taken>> {
-    let mut all = Vec::with_capacity(numbers.len());
-    for number in numbers {
-        all.push(taken(up, number).await?);
-    }
-    Ok(all)
 }
 
 /// The costs of a workload of its own, once they have settled.
@@ -90,16 +91,18 @@ async fn taken(up: &Up, number: usize) -> anyhow::Result<Taken> {
     Ok(Taken { costs, policies: policies(&up.coordinator).await? })
 }
 
-fn section(idle: &[Taken], beside: &[Taken], device: String) -> anyhow::Result<Section> {
+/// Each pair is of a session without load and one beside it.
+fn section(pairs: &[[Taken; 2]], device: String) -> anyhow::Result<Section> {
     let columns = [("cost", ""), ("policy", ""), ("idle", "ms"), ("beside load", "ms"), ("beside over idle", "")];
     let mut table = Table::new("Costs beside load", &columns);
     let mut checks = Vec::new();
-    let policies = beside.first().map_or_else(String::new, |taken| taken.policies.clone());
+    let policies = pairs.first().map_or_else(String::new, |[_, beside]| beside.policies.clone());
     for (at, name) in ["c", "g_v"].into_iter().enumerate() {
-        let figure = |taken: &Taken| [taken.costs.reconstruct_view_s, taken.costs.direct_view_s][at];
-        let [idle_s, beside_s] = [idle, beside].map(|taken| median(taken.iter().map(figure).collect()));
-        let ratio = beside_s / idle_s;
-        let numbers = [idle_s * 1e3, beside_s * 1e3, ratio].map(Cell::from);
+        let of = |taken: &Taken| [taken.costs.reconstruct_view_s, taken.costs.direct_view_s][at];
+        let middle =
+            |figure: fn([f64; 2]) -> f64| median(pairs.iter().map(|pair| figure(pair.each_ref().map(of))).collect());
+        let ratio = middle(|[idle_s, beside_s]| beside_s / idle_s);
+        let numbers = [middle(|pair| pair[0] * 1e3), middle(|pair| pair[1] * 1e3), ratio].map(Cell::from);
         table.push([Cell::from(name), policies.clone().into()].into_iter().chain(numbers))?;
         let name = format!("{name} taken beside load and idle, the greater over the smaller");
         checks.push(Check::new(name, ratio.max(ratio.recip()), "", Bar::AtMost(RATIO)));
