@@ -23,7 +23,7 @@ pub(super) struct MemoryPass {
 
 /// A table, and where its threads leave their sums.
 struct Table {
-    bound: wgpu::BindGroup,
+    bound: gpu::BoundGroup,
     sums: PooledBuffer,
     threads: [u32; 2],
 }
