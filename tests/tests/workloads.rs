@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use client::{ClientError, Frame, Session};
-use cluster::{DIRECT, Policy, PolicyChoice, Refinement, SessionRequest, Timeline};
+use cluster::{DIRECT, Policy, PolicyChoice, Refinement, SessionEvent, SessionRequest, SessionStage, Timeline};
 use cluster_tests::cluster::{Cluster, request, views};
 use cluster_tests::picture::fault_of;
 use cluster_tests::scalar_engine::ScalarEngine;
@@ -133,4 +133,26 @@ async fn sessions_that_are_opened_and_dropped_in_numbers_disturb_nobody() {
     }
     assert_eq!(cluster.client.status().await.unwrap().workloads.len(), 1);
     shows(&frames_of(&session).await, numbered(0).timeline, Refinement::default());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_predicted_view_size_opens_at_once_and_is_measured_on_an_idle_node() {
+    let cluster = Cluster::start(2).await;
+    let reconstructed = || cluster.engines.iter().map(ScalarEngine::take_reconstructed).sum::<usize>();
+    let _known = cluster.session(numbered(0)).await.unwrap();
+    assert!(reconstructed() > 0, "it was measured");
+    let mut larger = numbered(0);
+    larger.typical_view = larger.typical_view.resized(larger.typical_view.size_px * 2);
+    let mut stages = Vec::new();
+    let note = |event: &SessionEvent| match event {
+        SessionEvent::Progress { stage, .. } => stages.push(*stage),
+        SessionEvent::Opened { .. } | SessionEvent::Plan(_) => (),
+    };
+    let _predicted = cluster.client.open_session(larger, note).await.unwrap();
+    assert!(!stages.is_empty() && !stages.contains(&SessionStage::Measuring), "{stages:?}");
+    let start = std::time::Instant::now();
+    while reconstructed() == 0 {
+        assert!(start.elapsed() < DEADLINE, "the predicted size is not measured");
+        tokio::time::sleep(HASTE).await;
+    }
 }
