@@ -9,11 +9,11 @@ const GPU_BYTES: usize = 2 << 30;
 /// Where the system does not tell how much memory is available.
 const UNKNOWN_AVAILABLE_BYTES: usize = 8 << 30;
 
-/// The memory for sample sets.
+/// The memory for sample sets, and as much again for scenes on the device.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct MemoryArgs {
     /// The most memory for sample sets, in bytes or with K, M, G or T: half for sets on the device, half for packed
-    /// images. [default: a quarter of the available memory; 2G on a GPU]
+    /// images. Scenes on the device have as much again. [default: a quarter of the available memory; 2G on a GPU]
     #[arg(long, value_name = "SIZE", value_parser = bytes_of)]
     pub set_memory: Option<usize>,
 }

@@ -14,9 +14,12 @@ use reconstruction::{ReconstructionError, ReconstructionMethod, Reconstructor, R
 use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, Visibility};
 use sampling::{Sampler, SamplingError, SamplingMethod};
 use scene::{Limits, Scene};
+use scene_cache::SceneCache;
 
-/// The most scenes on the device; the one that was loaded first is evicted first.
-const KEPT_SCENES: usize = 8;
+mod scene_cache;
+
+/// The bound of scenes' memory where none is given.
+const SCENE_BYTES: u64 = 2 << 30;
 
 /// One device, its pipelines, and the scenes on it.
 pub struct GpuEngine {
@@ -26,7 +29,7 @@ pub struct GpuEngine {
     sampler: Sampler,
     /// The pipelines that reconstruct, for measurements without a service in between.
     pub reconstructor: Reconstructor,
-    scenes: Mutex<Vec<(String, Arc<GpuScene>)>>,
+    scenes: SceneCache,
     /// Scenes load one at a time: nodes of one process need the same scene at the same moment.
     loading: Mutex<()>,
 }
@@ -48,7 +51,7 @@ impl GpuEngine {
             reconstructor: Reconstructor::new(&gpu).map_err(reconstruction_error)?,
             renderer,
             gpu,
-            scenes: Mutex::default(),
+            scenes: SceneCache::new(SCENE_BYTES, GpuScene::bytes),
             loading: Mutex::default(),
         })
     }
@@ -68,6 +71,11 @@ impl GpuEngine {
         Ok(engine)
     }
 
+    /// Bounds the memory of scenes to come, in bytes. One in use stays, and one beyond the bound is there alone.
+    pub fn bound_scenes(&self, bytes: usize) {
+        self.scenes.set_max_bytes(bytes as u64);
+    }
+
     /// Uploads a scene under the hash of its package, unless it is there.
     ///
     /// # Errors
@@ -77,12 +85,7 @@ impl GpuEngine {
         if self.has_scene(hash) {
             return Ok(());
         }
-        let uploaded = Arc::new(self.catching(|| GpuScene::upload(&self.gpu, scene).map_err(render_error))?);
-        let mut scenes = self.scenes.lock();
-        if scenes.len() >= KEPT_SCENES {
-            scenes.remove(0);
-        }
-        scenes.push((hash.to_owned(), uploaded));
+        self.scenes.put(hash, self.catching(|| GpuScene::upload(&self.gpu, scene).map_err(render_error))?);
         Ok(())
     }
 
@@ -96,8 +99,7 @@ impl GpuEngine {
     /// # Errors
     /// The scene was never loaded.
     pub fn scene(&self, hash: &str) -> Result<Arc<GpuScene>, EngineError> {
-        let found = self.scenes.lock().iter().find(|(kept, _)| kept == hash).map(|(_, scene)| scene.clone());
-        found.ok_or_else(|| EngineError::UnknownScene { hash: hash.to_owned() })
+        self.scenes.get(hash).ok_or_else(|| EngineError::UnknownScene { hash: hash.to_owned() })
     }
 }
 
@@ -130,7 +132,7 @@ impl Engine for GpuEngine {
     }
 
     fn has_scene(&self, hash: &str) -> bool {
-        self.scenes.lock().iter().any(|(kept, _)| kept == hash)
+        self.scenes.has(hash)
     }
 
     fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {

@@ -38,6 +38,15 @@ impl fmt::Display for DevicePreference {
     }
 }
 
+/// The shaders that were compiled on a second device, so that other work on this one does not wait (`shader/warming.rs`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CompiledOutside {
+    /// Shaders with a form of their resources.
+    pub compiled: u64,
+    /// Those that this device had to compile after all.
+    pub failed: u64,
+}
+
 /// An open device. One is shared by everything in a process.
 pub struct Gpu {
     /// Makes resources.
@@ -50,8 +59,7 @@ pub struct Gpu {
     pub device_queue: Arc<DeviceQueue>,
     pub(crate) faults: Arc<Faults>,
     pub(crate) timestamp_period_ns: Option<f32>,
-    /// A second device of the same driver, where shaders are compiled while others use this one (`shader/warming.rs`).
-    pub(crate) second: Mutex<Option<Arc<Self>>>,
+    pub(crate) compiled_outside: Mutex<CompiledOutside>,
 }
 
 impl Gpu {
@@ -87,14 +95,20 @@ impl Gpu {
             let faults = faults.clone();
             move |cause, reason| faults.lose(format!("{cause:?}: {reason}"))
         });
-        let (device_queue, second) = Default::default();
-        Ok(Arc::new(Self { device, queue, info, device_queue, faults, timestamp_period_ns, second }))
+        let (device_queue, compiled_outside) = Default::default();
+        Ok(Arc::new(Self { device, queue, info, device_queue, faults, timestamp_period_ns, compiled_outside }))
     }
 
     /// The name of the device in reports.
     #[must_use]
     pub fn name(&self) -> String {
         format!("{} ({}, {})", self.info.name, self.info.backend, self.info.driver_info)
+    }
+
+    /// The shaders that were compiled outside this device's queue so far.
+    #[must_use]
+    pub fn compiled_outside(&self) -> CompiledOutside {
+        *self.compiled_outside.lock()
     }
 
     /// Whether shaders run on the processor.

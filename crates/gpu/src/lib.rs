@@ -19,7 +19,7 @@ mod shader;
 mod sharing;
 mod table;
 
-pub use device::{DevicePreference, Gpu};
+pub use device::{CompiledOutside, DevicePreference, Gpu};
 pub use error::{GpuError, ShaderError};
 pub use frame::{Frame, FrameResult, Readback, Submitted};
 pub use illumination::{highlight_name, illumination_bytes, light_slots};
@@ -30,4 +30,4 @@ pub use shader::{
     switches, uniform_elements, uniform_stride,
 };
 pub use sharing::{DeviceQueue, Job, JobLimit, LiveStream, SLICE_S, Turn, WorkClass, WorkKind, take_waited_s};
-pub use table::{TABLE_WIDTH, Table, TablePool};
+pub use table::{TABLE_WIDTH, Table, TablePool, texture_bytes};

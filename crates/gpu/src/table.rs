@@ -177,6 +177,18 @@ impl Shape {
     }
 }
 
+/// The bytes of a texture's texels, on all levels and layers.
+#[must_use]
+pub fn texture_bytes(texture: &wgpu::Texture) -> u64 {
+    let size = texture.size();
+    let texel = texture.format().block_copy_size(None).unwrap_or(4);
+    let level = |level| {
+        let extent = size.mip_level_size(level, texture.dimension());
+        u64::from(extent.width) * u64::from(extent.height) * u64::from(extent.depth_or_array_layers)
+    };
+    u64::from(texel) * (0..texture.mip_level_count()).map(level).sum::<u64>()
+}
+
 fn texel_bytes(format: TextureFormat) -> usize {
     format.block_copy_size(None).expect("a format of one aspect") as usize
 }

@@ -1,5 +1,6 @@
 //! A scene on the device.
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -129,6 +130,16 @@ impl GpuScene {
             bounds_in_world: scene.bounds(),
             draws: geometry.draws,
         })
+    }
+
+    /// The bytes of its buffers, textures and tables, with those of rays where they are there.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let buffers = [&self.vertices, &self.indices, &self.objects, &self.surroundings, &self.illumination];
+        // Several materials may share a texture.
+        let textures: HashSet<&wgpu::Texture> = self.textures.iter().flatten().map(|view| view.texture()).collect();
+        let of_textures: u64 = textures.into_iter().map(gpu::texture_bytes).sum();
+        buffers.map(wgpu::Buffer::size).iter().sum::<u64>() + of_textures + self.rays.bytes()
     }
 
     /// Whether some surface has highlights.

@@ -65,6 +65,8 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
     let listener = listen(args.listen, args.insecure_bind).await?;
     let address = listener.local_addr()?;
     let engine = GpuEngine::shared(args.device.device)?;
+    let memory = args.memory.set_memory_bytes(engine.is_software());
+    engine.bound_scenes(memory);
     let name = args.name.unwrap_or_else(|| name_of(address));
     let advertise = args.advertise.or_else(|| own_address(&args.coordinator, address));
     println!("{name} on {}, at http://{address}", engine.device_name());
@@ -73,7 +75,7 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
         advertised_address: advertise,
         insecure_bind: args.insecure_bind,
         reflection: args.reflection,
-        set_memory_bytes: args.memory.set_memory_bytes(engine.is_software()),
+        set_memory_bytes: memory,
         quotas: Quotas { streams: args.max_streams, views: args.max_views, pixels: args.max_pixels },
         ..args.limits.within(NodeConfig::new(name, args.coordinator))
     };

@@ -46,15 +46,15 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     let (scenes, offers) = args.scenes.load()?;
     let listener = listen(args.listen, args.insecure_bind).await?;
     let engine = GpuEngine::shared(args.device.device)?;
+    let (memory, nodes) = (args.memory.set_memory_bytes(engine.is_software()), usize::from(args.nodes));
+    engine.bound_scenes(memory);
     for (scene, offer) in scenes.iter().zip(offers.iter()) {
         engine.put_scene(offer.hash.as_str(), scene)?;
         println!("{}: {} triangles", offer.name, scene.triangle_count());
     }
     // The device and the packages hold the scenes now; the third copy is dropped.
     drop(scenes);
-    let nodes = usize::from(args.nodes);
-    let set_memory_bytes = args.memory.set_memory_bytes(engine.is_software()) / nodes;
-    let configure = |config: NodeConfig| NodeConfig { set_memory_bytes, ..args.limits.within(config) };
+    let configure = |config: NodeConfig| NodeConfig { set_memory_bytes: memory / nodes, ..args.limits.within(config) };
     let mut cluster =
         Cluster::start_with(configure, listener, offers, engine.clone(), nodes, args.insecure_bind).await?;
     println!("{nodes} nodes on {}, at {}", engine.device_name(), cluster.address);

@@ -6,7 +6,7 @@ use std::thread;
 
 use depth_image::{PinholeCamera, View};
 use glam::{UVec2, Vec3};
-use gpu::{DevicePreference, Gpu, Turn, WorkClass};
+use gpu::{CompiledOutside, DevicePreference, Gpu, Turn, WorkClass};
 use reconstruction::{ReconstructionMethod, Reconstructor, SampleSet};
 use scene::procedural::uv_sphere;
 
@@ -102,4 +102,17 @@ fn a_live_view_goes_between_the_slices_of_a_batch() {
         }
     });
     assert!(batch_ended.load(Ordering::Acquire));
+}
+
+#[test]
+fn shaders_are_compiled_outside_the_queue_beside_a_live_stream() {
+    let shared = Shared::new();
+    let set = shared.upload(&Stage::with_corners(uv_sphere(1.0, 24), &corners().samples(2)));
+    let _live = shared.gpu.device_queue.live_stream();
+    for method in METHODS {
+        shared.views(&set, &cameras(UVec2::new(67, 61)), method);
+        assert_eq!(shared.gpu.compiled_outside().failed, 0, "{method}");
+    }
+    let CompiledOutside { compiled, .. } = shared.gpu.compiled_outside();
+    assert!(compiled > METHODS.len() as u64, "{compiled}");
 }

@@ -106,6 +106,12 @@ impl RayScene {
         Ok(self.moved_to(scene_time_s, &mut state)?.traced.clone())
     }
 
+    /// The bytes of all tables on the device: none before rays are traced, nor while a tree is being made.
+    pub fn bytes(&self) -> u64 {
+        let state = self.state.try_lock();
+        state.and_then(|state| state.as_ref().map(|built| built.traced.bytes())).unwrap_or(0)
+    }
+
     /// Forgets the tree: the next is a new one.
     pub fn forget(&self) {
         *self.state.lock() = None;
@@ -235,6 +241,12 @@ impl RayScene {
 }
 
 impl Traced {
+    fn bytes(&self) -> u64 {
+        let Fixed { vertices, triangles, materials, texels } = &*self.fixed;
+        let tables = [&self.nodes, &self.corners, vertices, triangles, materials, texels];
+        tables.map(|table| gpu::texture_bytes(table.texture())).iter().sum()
+    }
+
     /// The variables of `traverse.wgsl`.
     pub fn bindings(&self) -> [Binding<'_>; 6] {
         let Fixed { vertices, triangles, materials, texels } = &*self.fixed;

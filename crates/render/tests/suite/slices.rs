@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
-use gpu::{DevicePreference, Gpu};
+use gpu::{CompiledOutside, DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Refinement, Renderer, SamplePlanes, Visibility};
 use scene::procedural::courtyard;
 
@@ -95,4 +95,21 @@ fn light_that_is_refined_in_slices_is_that_which_is_refined_at_once() {
     let live = shared.gpu.device_queue.force_slices(FEW_UNITS);
     assert!(refined() == whole);
     drop(live);
+}
+
+#[test]
+fn shaders_are_compiled_outside_the_queue_beside_a_live_stream() {
+    let shared = Shared::new();
+    let _live = shared.gpu.device_queue.live_stream();
+    let lightings = [
+        ("soft 2, occlusion 2", Visibility::Rays),
+        ("shadows, adaptive", Visibility::Triangles),
+        ("unlit", Visibility::Triangles),
+    ];
+    for (lighting, visibility) in lightings {
+        let before = shared.gpu.compiled_outside();
+        shared.images(shared.work(lighting, visibility));
+        let CompiledOutside { compiled, failed } = shared.gpu.compiled_outside();
+        assert!(compiled > before.compiled && failed == 0, "{lighting}: {compiled} compiled, {failed} failed");
+    }
 }

@@ -2,7 +2,8 @@
 //! speed of rays whose loads miss the cache.
 
 use gpu::{
-    Binding, BufferPool, ComputePass, DispatchSize, Frame, Gpu, PooledBuffer, Shader, Templates, wgsl_constants,
+    Binding, BoundGroup, BufferPool, ComputePass, DispatchSize, Frame, Gpu, PooledBuffer, Shader, Templates,
+    wgsl_constants,
 };
 use minijinja::context;
 
@@ -23,7 +24,7 @@ pub(super) struct MemoryPass {
 
 /// A table, and where its threads leave their sums.
 struct Table {
-    bound: gpu::BoundGroup,
+    bound: BoundGroup,
     sums: PooledBuffer,
     threads: [u32; 2],
 }
