@@ -63,6 +63,8 @@ struct State<K, V> {
     entries: HashMap<K, Entry<V>>,
     /// Bytes of loaded values, and of those that are being loaded.
     used_bytes: usize,
+    /// Loads that wait for room.
+    waiting: usize,
     /// Uses of all values so far.
     uses: u64,
 }
@@ -96,7 +98,7 @@ where
     /// An empty cache of `max_bytes`; refusals name its values by `what`.
     #[must_use]
     pub fn new(what: &'static str, max_bytes: usize) -> Self {
-        let state = Mutex::new(State { entries: HashMap::new(), used_bytes: 0, uses: 0 });
+        let state = Mutex::new(State { entries: HashMap::new(), used_bytes: 0, waiting: 0, uses: 0 });
         Self(Arc::new(Inner { what, max_bytes, state, turn: tokio::sync::Mutex::default(), freed: Arc::default() }))
     }
 
@@ -180,10 +182,12 @@ where
     where
         F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
     {
-        let Ok(_turn) = self.0.turn.try_lock() else { return self.0.state.lock().entries.contains_key(&key) };
         let mut state = self.0.state.lock();
         if state.entries.contains_key(&key) {
             return true;
+        }
+        if state.waiting > 0 {
+            return false;
         }
         let Some(evicted) = state.make_room(most_bytes, self.0.max_bytes, recently) else { return false };
         let (send, outcome) = watch::channel(None);
@@ -220,7 +224,10 @@ where
     ) where
         F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
     {
-        match self.reserve(&key, most_bytes, &send).await {
+        self.0.state.lock().waiting += 1;
+        let reserved = self.reserve(&key, most_bytes, &send).await;
+        self.0.state.lock().waiting -= 1;
+        match reserved {
             Ok(true) => self.load(key, most_bytes, load, send).await,
             Ok(false) => (),
             Err(refused) => self.end(&key, 0, Err(refused), &send),

@@ -213,15 +213,17 @@ async fn a_value_is_loaded_ahead_only_where_it_has_room_at_once() {
 
 #[tokio::test]
 async fn nothing_is_loaded_ahead_of_those_that_wait_for_room() {
-    let bench = Bench::new(20);
-    let pinned = bench.get(0, 16).await.unwrap();
-    let waiting = bench.wait_for(1, 10);
-    settle().await;
-    let load = || async { Err(Status::internal("it is not begun")) };
-    assert!(!bench.cache.load_ahead(2, 4, Duration::ZERO, load));
-    assert!(bench.cache.load_ahead(0, 16, Duration::ZERO, load), "it is there");
-    drop(pinned);
-    waiting.await.unwrap();
+    for waiting_bytes in [10, 20] {
+        let bench = Bench::new(20);
+        let pinned = bench.get(0, 16).await.unwrap();
+        let waiting = bench.wait_for(1, waiting_bytes);
+        settle().await;
+        let load = || async { Err(Status::internal("it is not begun")) };
+        assert!(!bench.cache.load_ahead(2, 4, Duration::ZERO, load), "{waiting_bytes} bytes wait");
+        assert!(bench.cache.load_ahead(0, 16, Duration::ZERO, load), "it is there");
+        drop(pinned);
+        waiting.await.unwrap();
+    }
 }
 
 /// A value that looks whether the cache is locked when it is dropped.
