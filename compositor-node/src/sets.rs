@@ -8,8 +8,8 @@ use cluster::{Assignment, SetContent, Workload};
 use codec::EncodedDepthImage;
 use depth_image::{Camera, PinholeCamera, nearest_set};
 use node::{
-    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, OfSet, Operation, Pinned, PlansInForce, SampleSet, SetMemory,
-    Turn, UploadedSet,
+    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet, SetMemory, Turn,
+    UploadedSet,
 };
 use node::{WorkClass, beyond_timeline, blocking, most_image_bytes, most_set_bytes, own_time, set_bytes};
 use tonic::{Code, Status};
@@ -42,8 +42,6 @@ pub(crate) struct ReadySet {
     /// The time at which it was ready.
     pub(crate) since: Instant,
     pub(crate) content: SetContent,
-    /// The workload that it was loaded for, and its index there.
-    origin: (u64, u32),
     /// The view cell that it was loaded for, in the plan of that time.
     pub(crate) cell: u32,
     /// What its images show, wherever their cameras are.
@@ -51,16 +49,6 @@ pub(crate) struct ReadySet {
     cameras: Vec<PinholeCamera>,
     /// Its images for other compositors, where they ask this one.
     relay: Option<RelayBuffer>,
-}
-
-impl OfSet for ReadySet {
-    fn content(&self) -> &SetContent {
-        &self.content
-    }
-
-    fn origin(&self) -> (u64, u32) {
-        self.origin
-    }
 }
 
 /// The content of a set without its cameras: equal for the sets of all view cells at one moment.
@@ -267,9 +255,8 @@ impl Sets {
         self.metrics.set_s.observe(start.elapsed().as_secs_f64());
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
         let moment = moment(plan, set_index).ok_or_else(|| beyond_timeline(set_index))?;
-        let origin = (plan.workload_number, set_index);
         let cameras = plan.workload.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
-        Ok((ReadySet { set, since: Instant::now(), content, origin, cell: plan.cell, moment, cameras, relay }, bytes))
+        Ok((ReadySet { set, since: Instant::now(), content, cell: plan.cell, moment, cameras, relay }, bytes))
     }
 
     async fn fetch(&self, request: &SetRequest) -> Result<(SampleSet, FetchTimes), Status> {

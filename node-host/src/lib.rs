@@ -42,9 +42,8 @@ pub async fn serve(
     let compositor = CompositorService::new(scenes.clone(), plans.clone(), &config, metrics.clone(), shutdown.clone());
     let (relay, done) = (compositor.relay(), metrics.done.clone());
     let sampler = SamplerService::new(scenes.clone(), plans.clone(), &config, relay, metrics.clone(), shutdown.clone());
-    let memory = vec![compositor.memory(), sampler.memory()];
-    monitor.set_memory(memory.clone());
-    let service = NodeService::new(plans.clone(), scenes.clone(), metrics, memory);
+    monitor.set_memory(vec![compositor.memory(), sampler.memory()]);
+    let service = NodeService::new(plans.clone(), scenes.clone(), metrics);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))

@@ -8,7 +8,7 @@ use cluster::{Assignment, FetchImages, SetContent};
 use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
 use depth_image::DepthImage;
 use node::{
-    ByteCache, CellPlan, Engine, EngineError, NodeConfig, NodeMetrics, OfSet, Operation, Pinned, PlansInForce, Relay,
+    ByteCache, CellPlan, Engine, EngineError, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Relay,
     SampleWork, Scenes, SetMemory, Turn,
 };
 use node::{WorkClass, beyond_timeline, blocking, most_image_bytes, own_time, until_drained, with_guard};
@@ -30,24 +30,6 @@ type Key = (SetContent, u32, Vec<u32>);
 /// Packed images with their indices.
 type PackedImages = Vec<(u32, EncodedDepthImage)>;
 
-/// The packed images of a set.
-struct PackedSet {
-    images: PackedImages,
-    content: SetContent,
-    /// The workload that it was sampled for, and its index there.
-    origin: (u64, u32),
-}
-
-impl OfSet for PackedSet {
-    fn content(&self) -> &SetContent {
-        &self.content
-    }
-
-    fn origin(&self) -> (u64, u32) {
-        self.origin
-    }
-}
-
 /// Sets of one workload are sampled in the order of their requests: the one that is needed next comes first. Workloads do
 /// not wait for each other; the device shares itself among them.
 #[derive(Debug, Default)]
@@ -66,7 +48,7 @@ impl Turns {
 pub struct SamplerService {
     scenes: Arc<Scenes>,
     plans: PlansInForce,
-    cache: ByteCache<Key, PackedSet>,
+    cache: ByteCache<Key, PackedImages>,
     /// A receiver that takes no chunk for so long is cut off: it keeps images in memory.
     stall: Duration,
     turns: Turns,
@@ -99,7 +81,7 @@ impl SamplerService {
     }
 
     /// All of this node's images of a set, made for the first request in one submission.
-    async fn images(&self, plan: &Assignment, set_index: u32) -> Result<Pinned<PackedSet>, Status> {
+    async fn images(&self, plan: &Assignment, set_index: u32) -> Result<Pinned<PackedImages>, Status> {
         let content = plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))?;
         let indices = plan.images_of(&self.plans.node_name, set_index).to_vec();
         let work = sample_work(plan, &indices, set_index)?;
@@ -119,7 +101,7 @@ impl SamplerService {
             let sampled = scenes.on_device(Some(&scene), move |engine| sample(engine, &work)).await?;
             let images = blocking(move || pack(sampled, (&indices, tiles), (number, &metrics))).await?;
             let bytes = images.iter().map(|(_, image)| image.payload.len()).sum();
-            Ok((PackedSet { images, content, origin: (number, set_index) }, bytes))
+            Ok((images, bytes))
         };
         self.cache.get(key, most_bytes, make).await
     }
@@ -154,7 +136,7 @@ impl Sampler for SamplerService {
         }
         let images = self.images(&plan, request.set_index).await?;
         // Payloads are shared, and stay in the cache until all have been sent.
-        let shared = Box::pin(tokio_stream::iter(images.images.clone()).map(Ok));
+        let shared = Box::pin(tokio_stream::iter((*images).clone()).map(Ok));
         Ok(self.send(&plan, request, with_guard(shared, images)))
     }
 }

@@ -198,14 +198,11 @@ where
         true
     }
 
-    /// Evicts the values that are not in use and not `needed`; gives their bytes.
-    pub fn evict_unused(&self, needed: impl Fn(&V) -> bool) -> usize {
+    /// Evicts the values that are not in use; gives their bytes.
+    pub fn evict_unused(&self) -> usize {
         let mut state = self.0.state.lock();
         let before = state.used_bytes;
-        let mut unused = state.unused(Duration::ZERO);
-        unused.retain(
-            |(key, _)| !matches!(state.entries.get(key), Some(Entry::Loaded { held, .. }) if needed(&held.value)),
-        );
+        let unused = state.unused(Duration::ZERO);
         let evicted = state.evict_until(0, &unused);
         let freed = before - state.used_bytes;
         drop(state);

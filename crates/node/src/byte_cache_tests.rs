@@ -246,13 +246,12 @@ async fn evicted_values_are_dropped_outside_the_lock() {
     get(0, 10).await.unwrap();
     get(1, 10).await.unwrap();
     assert_eq!(dropped.load(Ordering::SeqCst), 1);
-    assert_eq!((cache.evict_unused(|_| true), cache.used_bytes()), (0, 10), "it is needed");
-    assert_eq!((cache.evict_unused(|_| false), cache.used_bytes(), dropped.load(Ordering::SeqCst)), (10, 0, 2));
+    assert_eq!((cache.evict_unused(), cache.used_bytes(), dropped.load(Ordering::SeqCst)), (10, 0, 2));
     let pinned = get(2, 4).await.unwrap();
     get(3, 4).await.unwrap();
-    assert_eq!((cache.evict_unused(|_| false), cache.used_bytes()), (4, 4), "one is in use");
+    assert_eq!((cache.evict_unused(), cache.used_bytes()), (4, 4), "one is in use");
     drop(pinned);
-    cache.evict_unused(|_| false);
+    cache.evict_unused();
 }
 
 fn next(seed: &mut u64) -> u64 {

@@ -12,7 +12,6 @@ use crate::blocking::blocking;
 use crate::measure::measure_costs;
 use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
-use crate::set_memory::SetMemory;
 use crate::telemetry::NodeMetrics;
 
 /// Measured costs that are cached.
@@ -23,21 +22,15 @@ pub struct NodeService {
     plans: PlansInForce,
     scenes: Arc<Scenes>,
     metrics: NodeMetrics,
-    memory: Vec<Arc<dyn SetMemory>>,
     /// Measured costs, the oldest first: a coordinator that was restarted need not wait for them again.
     measured: Mutex<VecDeque<(MeasureCosts, Measured)>>,
 }
 
 impl NodeService {
-    /// The service of one node, whose roles keep sets in `memory`.
+    /// The service of one node.
     #[must_use]
-    pub fn new(
-        plans: PlansInForce,
-        scenes: Arc<Scenes>,
-        metrics: NodeMetrics,
-        memory: Vec<Arc<dyn SetMemory>>,
-    ) -> Self {
-        Self { plans, scenes, metrics, memory, measured: Mutex::default() }
+    pub fn new(plans: PlansInForce, scenes: Arc<Scenes>, metrics: NodeMetrics) -> Self {
+        Self { plans, scenes, metrics, measured: Mutex::default() }
     }
 }
 
@@ -67,8 +60,7 @@ impl rpc::Node for NodeService {
         let scene_load_s = self.scenes.ensure(&workload.scene).await?;
         let ended = self.plans.apply(plan)?;
         if !ended.is_empty() {
-            let freed_bytes: usize = self.memory.iter().map(|memory| memory.free_ended(&self.plans)).sum();
-            tracing::info!(node = &*self.plans.node_name, ?ended, freed_bytes, "workloads have ended");
+            tracing::info!(node = &*self.plans.node_name, ?ended, "workloads have ended");
         }
         self.metrics.plan_epoch.set(i64::try_from(self.plans.epoch()).unwrap_or(i64::MAX));
         tracing::info!(node = &*self.plans.node_name, workload_number, plan_epoch, "plan in force");

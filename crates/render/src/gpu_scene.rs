@@ -1,6 +1,5 @@
 //! A scene on the device.
 
-use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -137,7 +136,9 @@ impl GpuScene {
     pub fn bytes(&self) -> u64 {
         let buffers = [&self.vertices, &self.indices, &self.objects, &self.surroundings, &self.illumination];
         // Several materials may share a texture.
-        let textures: HashSet<&wgpu::Texture> = self.textures.iter().flatten().map(|view| view.texture()).collect();
+        let mut textures: Vec<&wgpu::Texture> = self.textures.iter().flatten().map(|view| view.texture()).collect();
+        textures.sort_unstable();
+        textures.dedup();
         let of_textures: u64 = textures.into_iter().map(gpu::texture_bytes).sum();
         buffers.map(wgpu::Buffer::size).iter().sum::<u64>() + of_textures + self.rays.bytes()
     }

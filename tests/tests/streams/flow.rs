@@ -199,7 +199,7 @@ async fn a_set_that_two_workloads_fetch_is_there_for_the_second_when_the_first_h
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_sets_of_workloads_that_have_ended_are_freed() {
+async fn a_workload_that_has_ended_and_is_opened_again_is_not_sampled_again() {
     let cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let plan = session.plan().assignment;
@@ -208,7 +208,7 @@ async fn the_sets_of_workloads_that_have_ended_are_freed() {
     let mut number = plan.workload_number;
     shown(&mut opened(&address, &plan).await, 1, 0.0).await;
     assert_eq!(cluster.take_counts(), [1; 3]);
-    for (is_open, samples) in [(true, vec![]), (false, vec![1; 3])] {
+    for is_open in [true, false] {
         let workload = Workload { sample_cameras: shifted_rig(AWAY_M), ..plan.workload.clone() };
         let between = Assignment { workload, ..plan.clone() };
         let mut between = alone(&between, number + 10, number + 10);
@@ -218,7 +218,7 @@ async fn the_sets_of_workloads_that_have_ended_are_freed() {
         let again = alone(&plan, number, number);
         node.apply_assignment(again.clone()).await.unwrap();
         shown(&mut opened(&address, &again.assignment).await, 1, 0.0).await;
-        assert_eq!(cluster.take_counts(), samples, "open: {is_open}");
+        assert!(cluster.take_counts().is_empty(), "open: {is_open}");
     }
 }
 
