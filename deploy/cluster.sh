@@ -101,7 +101,7 @@ kill_while_served() {
 
 build
 if [ "${1:-}" = --test ]; then
-    trap 'compose down --timeout 15' EXIT
+    trap 'compose down --timeout 15 --volumes' EXIT
 fi
 compose up --detach
 wait_until_healthy "${services[@]}"
