@@ -276,7 +276,7 @@ impl ScalarEngine {
         self.shortages.store(calls, Ordering::Relaxed);
     }
 
-    /// From now on memory has no room for so many views of one call.
+    /// From now on a call for this number of views or more runs out of memory.
     pub fn run_short_for(&self, views: usize) {
         self.too_many_views.store(views, Ordering::Relaxed);
     }

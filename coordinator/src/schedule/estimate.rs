@@ -10,7 +10,8 @@ use super::smoothing::{Smoothed, geometric_mean, is_valid};
 const RECENT: u32 = 30;
 /// A first timing of this many times the expected one includes the building of shaders, and is ignored.
 const COLD: f64 = 2.0;
-/// Work that takes so many times as long as expected, or this share of it, is other work, and says nothing of the node.
+/// The largest ratio, either way, of a timing to its expected value. A timing beyond it belongs to work of another kind and
+/// does not describe the node.
 const ALIKE: f64 = 16.0;
 
 fn is_alike(ratio: f64) -> bool {

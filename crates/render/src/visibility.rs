@@ -51,14 +51,14 @@ struct Line {
 }
 
 impl Costs {
-    /// Lines through the measured costs of views of so many pixels, the smaller first.
+    /// Straight lines through measured costs over the number of pixels, the view with fewer pixels first.
     pub fn through(measured: [(usize, Choice); 2]) -> Self {
         let line =
             |seconds: fn(&Choice) -> f64| Line::through(measured.map(|(pixels, choice)| (pixels, seconds(&choice))));
         Self { triangles: line(|choice| choice.triangles_s), rays: line(|choice| choice.rays_s) }
     }
 
-    /// The costs of a view of so many pixels.
+    /// The predicted costs of a view with this number of pixels.
     pub fn at(&self, pixels: usize) -> Choice {
         Choice { triangles_s: self.triangles.at(pixels), rays_s: self.rays.at(pixels) }
     }
