@@ -84,7 +84,7 @@ impl<'a> BatchStream<'a> {
     }
 
     /// Hands over views in pieces of one batch, as credit allows. Without credit the stream keeps no set in memory, and
-    /// without a set it waits with few credits at most: other streams never wait for one that waits.
+    /// without a set it waits with one credit at most: other streams never wait for one that waits.
     async fn enqueue_of_cell(
         &mut self,
         request: &RenderViews,
@@ -99,11 +99,14 @@ impl<'a> BatchStream<'a> {
             if credits.is_empty() {
                 set = None;
                 credits.push(self.credit(first).await?);
-                credits.extend(self.try_credits(&left[1..])?);
             }
             let loaded = match set.take() {
                 Some(loaded) => loaded,
-                None => shared.source(plan, request.set_index, cell).await?,
+                None => {
+                    let loaded = shared.source(plan, request.set_index, cell).await?;
+                    credits.extend(self.try_credits(&left[1..])?);
+                    loaded
+                }
             };
             let (now, later) = left.split_at(credits.len());
             let waiting = |(view, credit): (&RequestedView, Credit)| {

@@ -208,8 +208,9 @@ impl Sets {
     /// The most bytes of a cell's set, with its images for others.
     fn most_bytes(&self, plan: &CellPlan) -> usize {
         let relayed = plan.relays(&self.plans.node_name);
-        let packed = if relayed { most_image_bytes(&plan.workload, &plan.workload.sample_cameras) } else { 0 };
-        most_set_bytes(&plan.workload) + packed
+        let (illumination, cameras) = (&plan.workload.illumination, &*plan.workload.sample_cameras);
+        let packed = if relayed { most_image_bytes(illumination, cameras) } else { 0 };
+        most_set_bytes(illumination, cameras) + packed
     }
 
     fn loading(

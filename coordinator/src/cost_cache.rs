@@ -54,10 +54,14 @@ impl CostCache {
         Some(at_size(*nearest, other.copied(), pixels))
     }
 
-    /// Keeps costs in place of earlier ones; the oldest are evicted.
+    /// Keeps costs in place of earlier ones. Settled costs are replaced by settled ones alone. The oldest are evicted.
     pub(crate) fn insert(&self, device: &str, measurement: &MeasureCosts, known: Known) {
         let (mut entries, key) = (self.0.lock(), cache_key(measurement));
-        entries.retain(|entry| entry.device != device || entry.key != key);
+        let is_same = |entry: &Entry| entry.device == device && entry.key == key;
+        if !known.is_settled && entries.iter().any(|entry| is_same(entry) && entry.known.is_settled) {
+            return;
+        }
+        entries.retain(|entry| !is_same(entry));
         if entries.len() >= CAPACITY {
             entries.remove(0);
         }
@@ -178,7 +182,8 @@ pub(crate) mod tests {
         assert_eq!(cache.find("d", &size), Some(Known { is_settled: false, ..measured(0.09) }));
         assert!(!cache.find("d", &measurement(UVec2::splat(9))).unwrap().is_settled, "predicted");
         cache.insert("d", &size, measured(0.03));
-        assert_eq!(cache.find("d", &size), Some(measured(0.03)));
+        cache.insert("d", &size, Known { is_settled: false, ..measured(0.2) });
+        assert_eq!(cache.find("d", &size), Some(measured(0.03)), "measured once more, beside other work");
     }
 
     #[test]

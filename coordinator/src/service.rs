@@ -110,14 +110,7 @@ impl Coordinator for CoordinatorService {
         if !self.shared.sessions.contains(request.session) {
             return Err(Status::not_found(format!("session_number: no session {} is open", request.session)));
         }
-        self.shared.with_scheduler(|scheduler| check_change(scheduler, &request))?;
-        let ChangeSession { session, views_per_set, frames_per_s, viewpoints } = request;
-        let views_per_set = views_per_set as usize;
-        self.shared.step(Event::DemandChanged { session, views_per_set, frames_per_s });
-        if let Some(viewpoints) = viewpoints {
-            self.shared.step(Event::ViewpointsChanged { session, viewpoints });
-        }
-        Ok(())
+        self.shared.step_with(|scheduler| admitted_changes(scheduler, request))
     }
 
     async fn report_work(&self, request: WorkReport) -> Result<(), Status> {
@@ -164,16 +157,19 @@ impl Coordinator for CoordinatorService {
     }
 }
 
-/// Whether the schedule would admit a change.
-fn check_change(scheduler: &Scheduler, change: &ChangeSession) -> Result<(), Status> {
+/// The events of a change that the schedule admits.
+fn admitted_changes(
+    scheduler: &Scheduler,
+    change: ChangeSession,
+) -> Result<impl Iterator<Item = Event> + use<>, Status> {
     let ChangeSession { session, views_per_set, frames_per_s, viewpoints } = change;
-    if !scheduler.has_session(*session) {
+    let views_per_set = views_per_set as usize;
+    if !scheduler.has_session(session) {
         return Err(Status::unavailable(format!("session_number: session {session} is still being opened")));
     }
-    let admitted = scheduler.admits(*session, *views_per_set as usize, *frames_per_s);
+    let admitted = scheduler.admits(session, views_per_set, frames_per_s, viewpoints.as_deref());
     admitted.map_err(|error| refusal(&error))?;
-    if let Some(viewpoints) = viewpoints {
-        scheduler.admits_viewpoints(*session, viewpoints).map_err(|error| refusal(&error))?;
-    }
-    Ok(())
+    let demand = Event::DemandChanged { session, views_per_set, frames_per_s };
+    let viewpoints = viewpoints.map(|viewpoints| Event::ViewpointsChanged { session, viewpoints });
+    Ok([demand].into_iter().chain(viewpoints))
 }

@@ -59,7 +59,20 @@ impl Shared {
 
     /// Tells the schedule; its commands are executed in its order.
     pub(crate) fn step(&self, event: Event) {
-        let (scheduler, observers) = &mut *self.schedule.lock();
+        self.step_locked(&mut self.schedule.lock(), event);
+    }
+
+    /// Tells the schedule the events that follow from its state. No other event comes in between.
+    pub(crate) fn step_with<E, I: IntoIterator<Item = Event>>(
+        &self,
+        events: impl FnOnce(&Scheduler) -> Result<I, E>,
+    ) -> Result<(), E> {
+        let mut schedule = self.schedule.lock();
+        events(&schedule.0)?.into_iter().for_each(|event| self.step_locked(&mut schedule, event));
+        Ok(())
+    }
+
+    fn step_locked(&self, (scheduler, observers): &mut (Scheduler, Observers), event: Event) {
         let now = self.started.elapsed();
         observers.record(now, &event);
         let is_tick = matches!(event, Event::Tick);

@@ -10,10 +10,11 @@ use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use client::{Client, Frame, Session};
 use cluster::{PolicyChoice, SessionPlan, SessionRequest, Timeline};
-use depth_image::{PinholeCamera, ViewCell};
+use depth_image::{Camera, PinholeCamera, ViewCell};
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
+use node::{NodeConfig, most_image_bytes, most_set_bytes};
 use reconstruction::ReconstructionMethod;
 use render::{Choice, Lighting};
 use tokio::runtime::Runtime;
@@ -67,6 +68,16 @@ pub async fn receive_all(
     Ok(Delivered { plan: session.plan(), seconds, frames })
 }
 
+/// Sample sets that a node has room for: one in use and one to come. Every run has sets of its own, and none needs them again.
+const SETS_IN_MEMORY: usize = 2;
+
+/// Half of a node's memory is for sets on the device, with the images that are relayed.
+fn set_memory_bytes(setup: &Setup) -> usize {
+    let illumination = &setup.scene.illumination;
+    let cameras: Vec<_> = setup.samples.iter().copied().map(Camera::Pinhole).collect();
+    2 * SETS_IN_MEMORY * (most_set_bytes(illumination, &cameras) + most_image_bytes(illumination, &cameras))
+}
+
 /// A cluster that runs until it is stopped.
 pub struct Experiment {
     pub engine: Arc<GpuEngine>,
@@ -96,7 +107,9 @@ impl Experiment {
         let runtime = runtime()?;
         let (cluster, client) = runtime.block_on(async {
             let listener = listen(([127, 0, 0, 1], 0).into(), false).await?;
-            let cluster = Cluster::start(listener, setup.offer.clone().into(), engine.clone(), nodes, false).await?;
+            let configure = |config| NodeConfig { set_memory_bytes: set_memory_bytes(&setup), ..config };
+            let open = engine.clone().opener();
+            let cluster = Cluster::start(configure, listener, setup.offer.clone().into(), open, nodes, false).await?;
             let client = cluster.client().await?;
             anyhow::Ok((cluster, client))
         })?;

@@ -140,7 +140,8 @@ fn a_cluster_gives_what_one_engine_gives() {
     let alone = reference.reconstruct(args.method, ALL_PLANES).unwrap();
     let mut delivered = runtime().unwrap().block_on(async {
         let listener = listen(([127, 0, 0, 1], 0).into(), false).await.unwrap();
-        let cluster = Cluster::start(listener, setup.offer.clone().into(), engine, 3, false).await.unwrap();
+        let cluster =
+            Cluster::start(|it| it, listener, setup.offer.clone().into(), engine.opener(), 3, false).await.unwrap();
         let client = cluster.client().await.unwrap();
         let offer = client.status().await.unwrap().offers.remove(0);
         assert_eq!((&offer.sample_cameras, &offer.settings), (&setup.offer.rig, &setup.offer.settings));

@@ -1,37 +1,101 @@
 //! One node process: it can sample and composite, and takes its roles from the plan.
 
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
 use cluster::NodeStatus;
 use compositor_node::CompositorService;
 use node::{
-    DeviceMonitor, Engine, NodeConfig, NodeMetrics, NodeService, PlansInForce, Scenes, ServeError, health,
-    keep_membership, with_reflection,
+    DeviceMonitor, Engine, EngineError, NodeConfig, NodeMetrics, NodeService, OpenEngine, PlansInForce, Scenes,
+    ServeError, health, keep_membership, with_reflection,
 };
 use sampler_node::SamplerService;
 use tokio::net::TcpListener;
+use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 use wire::rpc::{compositor_server, node_server, sampler_server};
 
+/// Attempts to open a device, or to listen again, until the node ends.
+const MAX_ATTEMPTS: usize = 3;
+
 /// Serves both roles on one port and stays a member of the coordinator's cluster until `shutdown`. Then it ends its streams
-/// and returns when connections have ended, after 10 s at most. A node whose device is lost leaves at once; one whose device
-/// runs out of memory again and again leaves for a while.
+/// and returns when connections have ended, after 10 s at most. A node whose device is lost ends its streams and leaves, and
+/// comes back with a new device and nothing in it, after a while at least where that device is lost too. One whose device runs
+/// out of memory again and again leaves for a while.
 ///
 /// # Errors
-/// Where the address is not allowed, the transport fails or the device is lost.
+/// Where the address is not allowed, the transport fails or no device can be opened.
 pub async fn serve(
     listener: TcpListener,
     config: NodeConfig,
-    engine: Arc<dyn Engine>,
+    open: OpenEngine,
     metrics: NodeMetrics,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
+    let (address, away) = (listener.local_addr()?, config.deadlines.away);
+    let mut listening = Some(listener);
+    loop {
+        let ready = async {
+            let engine = attempted("device", away, || engine_of(open.clone())).await?;
+            let listener = match listening.take() {
+                Some(listener) => listener,
+                // Meanwhile another connection may have the port.
+                None => attempted("address", away, || async { Ok(TcpListener::bind(address).await?) }).await?,
+            };
+            Ok::<_, ServeError>((engine, listener))
+        };
+        let (engine, listener) = tokio::select! {
+            biased;
+            () = shutdown.cancelled() => break,
+            ready = ready => ready?,
+        };
+        let since = Instant::now();
+        let Some(reason) = serve_on(engine, listener, &config, metrics.clone(), shutdown.child_token()).await? else {
+            break;
+        };
+        tracing::error!(node = config.node_name, reason, "device lost: leaves, and opens it again");
+        tokio::select! {
+            () = tokio::time::sleep_until(since + away) => (),
+            () = shutdown.cancelled() => (),
+        }
+    }
+    Ok(())
+}
+
+/// The result of a few attempts.
+async fn attempted<T, F>(what: &str, pause: Duration, attempt: impl Fn() -> F) -> Result<T, ServeError>
+where
+    F: Future<Output = Result<T, ServeError>>,
+{
+    for number in 1..MAX_ATTEMPTS {
+        match attempt().await {
+            Ok(done) => return Ok(done),
+            Err(error) => tracing::warn!(%error, number, "no {what}"),
+        }
+        tokio::time::sleep(pause).await;
+    }
+    attempt().await
+}
+
+async fn engine_of(open: OpenEngine) -> Result<Arc<dyn Engine>, ServeError> {
+    let opened = tokio::task::spawn_blocking(move || open()).await;
+    Ok(opened.unwrap_or_else(|panicked| Err(EngineError::Device(panicked.to_string())))?)
+}
+
+/// Serves until `shutdown`, or until the device is lost, with the reason.
+async fn serve_on(
+    engine: Arc<dyn Engine>,
+    listener: TcpListener,
+    config: &NodeConfig,
+    metrics: NodeMetrics,
+    shutdown: CancellationToken,
+) -> Result<Option<String>, ServeError> {
     let monitor = DeviceMonitor::new(engine);
     let engine: Arc<dyn Engine> = Arc::new(monitor.clone());
     let plans = PlansInForce::new(&config.node_name);
-    let scenes = Arc::new(Scenes::new(engine.clone(), &config));
+    let scenes = Arc::new(Scenes::new(engine.clone(), config));
     let (address, left) = (listener.local_addr()?, plans.clone());
     let status = NodeStatus {
         node_name: config.node_name.clone(),
@@ -39,9 +103,9 @@ pub async fn serve(
         device_name: engine.device_name(),
         is_software: engine.is_software(),
     };
-    let compositor = CompositorService::new(scenes.clone(), plans.clone(), &config, metrics.clone(), shutdown.clone());
+    let compositor = CompositorService::new(scenes.clone(), plans.clone(), config, metrics.clone(), shutdown.clone());
     let (relay, done) = (compositor.relay(), metrics.done.clone());
-    let sampler = SamplerService::new(scenes.clone(), plans.clone(), &config, relay, metrics.clone(), shutdown.clone());
+    let sampler = SamplerService::new(scenes.clone(), plans.clone(), config, relay, metrics.clone(), shutdown.clone());
     monitor.set_memory(vec![compositor.memory(), sampler.memory()]);
     let service = NodeService::new(plans.clone(), scenes.clone(), metrics);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
@@ -55,16 +119,20 @@ pub async fn serve(
         keep_membership(node, coordinator, plans, scenes.clone(), done.clone(), ends.clone())
     };
     let membership = tokio::spawn(stay_while_memory_lasts(member, monitor.clone(), left, away));
+    let mut serving = pin!(node::serve(listener, routes, config.insecure_bind, shutdown.clone()));
     let served = tokio::select! {
-        served = node::serve(listener, routes, config.insecure_bind, shutdown) => served,
-        reason = monitor.lost() => Err(ServeError::DeviceLost { reason }),
+        served = &mut serving => served.map(|()| None),
+        reason = monitor.lost() => {
+            shutdown.cancel();
+            serving.await.map(|()| Some(reason))
+        }
     };
     // Where serving has ended by itself, `shutdown` is not cancelled.
     membership.abort();
     served
 }
 
-/// A member leaves when its device has no memory left, and begins again with nothing in it.
+/// A member leaves when its device has no memory left, and begins again without plans and sets.
 async fn stay_while_memory_lasts<F: Future<Output = ()>>(
     member: impl Fn() -> F,
     monitor: DeviceMonitor,
@@ -83,6 +151,6 @@ async fn stay_while_memory_lasts<F: Future<Output = ()>>(
         );
         plans.forget_all();
         tokio::time::sleep(away).await;
-        monitor.free();
+        monitor.begin_anew();
     }
 }

@@ -87,7 +87,7 @@ impl SamplerService {
         let work = sample_work(plan, &indices, set_index)?;
         let (scenes, scene, metrics) = (self.scenes.clone(), plan.workload.scene.clone(), self.metrics.clone());
         let own: Vec<_> = indices.iter().map(|&index| work.cameras[index as usize]).collect();
-        let most_bytes = most_image_bytes(&plan.workload, &own);
+        let most_bytes = most_image_bytes(&plan.workload.illumination, &own);
         let key = (content, plan.tile_count, indices.clone());
         let tiles = f64::from(plan.tile_count);
         let number = plan.workload_number;

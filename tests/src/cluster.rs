@@ -226,7 +226,8 @@ impl Cluster {
         self.engines.push(engine.clone());
         self.metrics.push(metrics.clone());
         self.nodes.push(Server::start(|listener, shutdown| {
-            node_host::serve(listener, config, std::sync::Arc::new(engine), metrics, shutdown)
+            let open = std::sync::Arc::new(move || Ok(std::sync::Arc::new(engine.opened()) as _));
+            node_host::serve(listener, config, open, metrics, shutdown)
         }));
     }
 

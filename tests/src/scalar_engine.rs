@@ -266,6 +266,14 @@ impl ScalarEngine {
         }
     }
 
+    /// A new device in place of one that is lost.
+    #[must_use]
+    pub fn opened(&self) -> Self {
+        self.evict_scenes();
+        self.is_lost.store(false, Ordering::Relaxed);
+        self.clone()
+    }
+
     /// Loses the device.
     pub fn lose(&self) {
         self.is_lost.store(true, Ordering::Relaxed);

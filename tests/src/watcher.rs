@@ -18,8 +18,8 @@ const VIEWS: u64 = 4;
 /// Pause between two calls, which leaves time for other work.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// A repeated timeline of distinct sets. They are more than a compositor keeps, so that samplers are needed all the
-/// time.
+/// A repeated timeline of distinct sets. They are more than a node of `scalar_cluster` keeps, so that samplers are needed
+/// all the time.
 pub const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 0.05, set_count: 40 };
 
 /// The request of the recorded session.

@@ -1,15 +1,19 @@
 //! Faulty requests are refused by name, and the cluster survives them.
 #![allow(clippy::unwrap_used)]
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use client::{ClientError, Session};
 use cluster::{Assignment, FetchImages, PolicyChoice, RenderViews, RequestedView, Timeline};
 use cluster_tests::cluster::{Cluster, request, rig, views};
+use cluster_tests::scalar_engine::ScalarEngine;
 use codec::FrameCodec;
 use depth_image::Camera;
-use node::{Deadlines, NodeConfig};
+use node::{Deadlines, EngineError, NodeConfig, NodeMetrics, OpenEngine, ServeError};
 use tokio_stream::StreamExt as _;
+use tokio_util::sync::CancellationToken;
 use tonic::Code;
 use wire::rpc::{CompositorClient, NodeClient, SamplerClient, connect};
 
@@ -167,19 +171,30 @@ async fn an_idle_stream_ends_at_its_deadline() {
     assert_eq!(parts.next().await.unwrap().unwrap_err().code(), Code::DeadlineExceeded);
 }
 
+async fn served_at(address: &str, open: OpenEngine) -> Result<(), ServeError> {
+    let listener = tokio::net::TcpListener::bind(address).await.unwrap();
+    let deadlines = Deadlines { away: Duration::from_millis(1), ..Deadlines::default() };
+    let config = NodeConfig { deadlines, ..NodeConfig::new("n", "http://127.0.0.1:1") };
+    node_host::serve(listener, config, open, NodeMetrics::default(), CancellationToken::new()).await
+}
+
 #[tokio::test]
 async fn another_address_than_loopback_needs_a_flag() {
-    let listener = tokio::net::TcpListener::bind("0.0.0.0:0").await.unwrap();
-    let engine = std::sync::Arc::new(cluster_tests::scalar_engine::ScalarEngine::default());
-    let refused = node_host::serve(
-        listener,
-        NodeConfig::new("n", "http://127.0.0.1:1"),
-        engine,
-        node::NodeMetrics::default(),
-        tokio_util::sync::CancellationToken::new(),
-    )
-    .await;
-    assert!(matches!(refused, Err(node::ServeError::NotLoopback { .. })));
+    let refused = served_at("0.0.0.0:0", Arc::new(|| Ok(Arc::new(ScalarEngine::default())))).await;
+    assert!(matches!(refused, Err(ServeError::NotLoopback { .. })));
+}
+
+#[tokio::test]
+async fn a_node_without_a_device_ends_after_three_attempts() {
+    let attempts = Arc::new(AtomicUsize::new(0));
+    let counted = attempts.clone();
+    let none = move || {
+        counted.fetch_add(1, Ordering::Relaxed);
+        Err(EngineError::Device("none".to_owned()))
+    };
+    let ended = served_at("127.0.0.1:0", Arc::new(none)).await;
+    assert!(matches!(ended, Err(ServeError::Device(_))), "{ended:?}");
+    assert_eq!(attempts.load(Ordering::Relaxed), 3);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -137,15 +137,15 @@ fn too_many_cells_are_refused_and_given_sample_cameras_are_kept() {
     assert!(matches!(&refused[..], [Command::Refuse { error: ChoiceError::Cells { cells: 84 }, .. }]), "{refused:?}");
     step(&mut scheduler, looking_from(1, spread(4)));
     assert_eq!(cells(&scheduler).len(), 28);
-    assert_eq!(scheduler.admits_viewpoints(1, &spread(12)), Err(ChoiceError::Cells { cells: 84 }));
-    assert_eq!(scheduler.admits_viewpoints(1, &spread(2)), Ok(()));
+    assert_eq!(scheduler.admits(1, 40, None, Some(&spread(12))), Err(ChoiceError::Cells { cells: 84 }));
+    assert_eq!(scheduler.admits(1, 40, None, Some(&spread(2))), Ok(()));
     // A log may have the event all the same: the nearest cell serves.
     step(&mut scheduler, Event::ViewpointsChanged { session: 1, viewpoints: spread(12) });
     assert_eq!(cells(&scheduler).len(), MAX_CELLS);
 
     let mut scheduler = of(3);
     step(&mut scheduler, Event::Opened(Box::new(opening(1, PolicyChoice::Pipeline, 40))));
-    assert_eq!(scheduler.admits_viewpoints(1, &spread(1)), Err(ChoiceError::NoCells { session: 1 }));
+    assert_eq!(scheduler.admits(1, 40, None, Some(&spread(1))), Err(ChoiceError::NoCells { session: 1 }));
     let commands = step(&mut scheduler, looking_from(2, spread(1)));
     assert!(matches!(&commands[..], [.., Command::Apply { sessions, .. }] if sessions == &[2]), "{commands:?}");
     assert!(scheduler.has_session(1), "beside the other");
@@ -206,7 +206,7 @@ fn cells_of_live_viewers_leave_room_for_declared_viewpoints() {
     let live = seen(&scheduler, "n1", spread(3..13));
     step_at(&mut scheduler, 3, live);
     assert_eq!(cells(&scheduler).len(), MAX_CELLS);
-    assert_eq!(scheduler.admits_viewpoints(1, &spread(0..3)), Ok(()), "live viewers promise nothing");
+    assert_eq!(scheduler.admits(1, 40, None, Some(&spread(0..3))), Ok(()), "live viewers promise nothing");
     step_at(&mut scheduler, 5, looking_from(2, spread(13..17)));
     assert_eq!(cells(&scheduler).len(), MAX_CELLS);
     let workload = plan(&scheduler).workload;
@@ -226,10 +226,13 @@ fn viewpoints_that_take_more_than_is_left_beside_promises_are_refused() {
     };
     let mut scheduler = of(4);
     step(&mut scheduler, Event::Opened(Box::new(of_cells(1, Some(20.0)))));
-    assert_eq!(scheduler.admits_viewpoints(1, &spread(0..1)), Ok(()));
-    let refused = scheduler.admits_viewpoints(1, &spread(0..9));
+    assert_eq!(scheduler.admits(1, 1, Some(20.0), Some(&spread(0..1))), Ok(()));
+    let refused = scheduler.admits(1, 1, Some(20.0), Some(&spread(0..9)));
     assert!(matches!(refused, Err(ChoiceError::Overload { needed }) if needed > 1.0), "{refused:?}");
     let mut scheduler = of(4);
     step(&mut scheduler, Event::Opened(Box::new(of_cells(1, None))));
-    assert_eq!(scheduler.admits_viewpoints(1, &spread(0..9)), Ok(()), "a batch takes what is left");
+    assert_eq!(scheduler.admits(1, 1, None, Some(&spread(0..9))), Ok(()), "a batch takes what is left");
+    let both = scheduler.admits(1, 1, Some(20.0), Some(&spread(0..9)));
+    assert!(matches!(both, Err(ChoiceError::Overload { .. })), "rate and viewpoints together: {both:?}");
+    assert_eq!(scheduler.admits(1, 1, Some(20.0), Some(&spread(0..1))), Ok(()));
 }

@@ -70,9 +70,9 @@ impl Activity {
     pub(super) fn add(&mut self, now: Duration, busy_s: f64, views: u64, dropped_views: u64) {
         let since = now.saturating_sub(self.reported_at);
         if since >= TOGETHER {
-            // A node that was silent for longer began to work in the last interval.
-            let interval = if since < SILENT { since } else { REPORT_INTERVAL };
-            (self.reported_at, self.interval_s, self.busy_s) = (now, interval.as_secs_f64(), 0.0);
+            // A node that was silent for longer began its work no earlier than an interval ago, or than the work took.
+            let longest_s = if since < SILENT { f64::INFINITY } else { REPORT_INTERVAL.as_secs_f64().max(busy_s) };
+            (self.reported_at, self.interval_s, self.busy_s) = (now, since.as_secs_f64().min(longest_s), 0.0);
         }
         self.busy_s += busy_s;
         self.views = self.views.saturating_add(views);
@@ -126,6 +126,13 @@ mod tests {
         let activity = after([(0.001, 0.4)]);
         assert!((busy_ratio(&activity, 0.1) - 0.4).abs() < 1e-9, "{activity:?}");
         assert!((busy_ratio(&after([(1.0, 0.9), (60.0, 0.4)]), 60.1) - 0.4).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_operation_longer_than_the_silence_counts_whole_and_none_counts_more_than_its_time() {
+        assert!((busy_ratio(&after([(1.0, 0.9), (31.0, 30.0)]), 31.1) - 1.0).abs() < 1e-9);
+        assert!((busy_ratio(&after([(1.0, 0.9), (61.0, 30.0)]), 61.1) - 1.0).abs() < 1e-9);
+        assert!(busy_ratio(&after([(60.0, f64::MAX)]), 60.1).is_finite());
     }
 
     #[test]

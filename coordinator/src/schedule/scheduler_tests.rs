@@ -301,11 +301,11 @@ fn sessions_beyond_the_nodes_time_are_refused() {
     assert!(matches!(admitted[..], [Command::Apply { .. }]), "220 are too many, 176 are not: {admitted:?}");
     let scheduler = &cluster.scheduler;
     assert!(
-        matches!(scheduler.admits(3, 1, Some(140.0)), Err(ChoiceError::Overload { .. })),
+        matches!(scheduler.admits(3, 1, Some(140.0), None), Err(ChoiceError::Overload { .. })),
         "nor may one ask for it later"
     );
     assert_eq!(
-        [scheduler.admits(3, 1, Some(60.0)), scheduler.admits(1, 1, Some(1.0))],
+        [scheduler.admits(3, 1, Some(60.0), None), scheduler.admits(1, 1, Some(1.0), None)],
         [Ok(()), Ok(())],
         "less, always"
     );

@@ -200,7 +200,7 @@ fn promises_to_one_workload_count_for_all() {
         "{refused:?}"
     );
     assert!(!applied(&cluster.open(rated(of(3, 3), 100.0))).is_empty());
-    assert!(matches!(cluster.scheduler.admits(3, 1, Some(180.0)), Err(ChoiceError::Overload { .. })));
+    assert!(matches!(cluster.scheduler.admits(3, 1, Some(180.0), None), Err(ChoiceError::Overload { .. })));
     assert!(!applied(&cluster.open(of(2, 4))).is_empty(), "a batch takes what is left");
     let refused = cluster.open(rated(of(2, 5), 100.0));
     assert!(matches!(refusal(&refused), ChoiceError::Overload { .. }), "beside a batch, too");
@@ -433,7 +433,7 @@ fn a_batch_that_states_tiny_or_huge_views_and_asks_for_none_costs_viewers_nothin
         let utilisation = cluster.workloads()[0].utilisation.unwrap();
         assert!((0.2..0.7).contains(&utilisation), "{utilisation}");
         assert_eq!(cluster.workloads()[0].plan.as_ref().unwrap().fallback, None);
-        assert_eq!(cluster.scheduler.admits(1, 1, Some(90.0)), Ok(()));
+        assert_eq!(cluster.scheduler.admits(1, 1, Some(90.0), None), Ok(()));
         cluster.step(Event::Closed { session: 2 });
         let seconds = cluster.workloads()[0].conditions[0].costs.reconstruct_view_s;
         assert!((seconds / 0.009 - 1.0).abs() < 0.2, "{seconds}");

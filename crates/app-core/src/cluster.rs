@@ -1,17 +1,14 @@
 //! A whole cluster in one process: coordinator and nodes over loopback gRPC, one device among them.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::Context as _;
 use client::Client;
 use coordinator::{CoordinatorConfig, Observers, SceneOffers};
-use node::{Engine, NodeConfig, NodeMetrics, ServeError};
+use node::{NodeConfig, NodeMetrics, OpenEngine, ServeError};
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
-
-use crate::memory::MemoryArgs;
 
 /// The longest wait for nodes of one process to join.
 const JOIN: Duration = Duration::from_secs(30);
@@ -25,32 +22,16 @@ pub struct Cluster {
 }
 
 impl Cluster {
-    /// Starts a coordinator on `listener` and `nodes` nodes, and waits until all have joined. Nodes fetch
-    /// scenes unless the engine has them.
+    /// Starts a coordinator on `listener` and `nodes` nodes, each with its configuration changed by `configure`, and waits
+    /// until all have joined. Nodes fetch scenes unless the engine that `open` gives has them.
     ///
     /// # Errors
     /// A port is not to be had, or nodes do not join.
     pub async fn start(
-        listener: TcpListener,
-        offers: SceneOffers,
-        engine: Arc<dyn Engine>,
-        nodes: usize,
-        insecure_bind: bool,
-    ) -> anyhow::Result<Self> {
-        let memory = MemoryArgs { set_memory: None }.set_memory_bytes(engine.is_software());
-        let configure = |config| NodeConfig { set_memory_bytes: memory / nodes.max(1), ..config };
-        Self::start_with(configure, listener, offers, engine, nodes, insecure_bind).await
-    }
-
-    /// As [`Cluster::start`], with each node's configuration changed by `configure`.
-    ///
-    /// # Errors
-    /// As [`Cluster::start`].
-    pub async fn start_with(
         configure: impl Fn(NodeConfig) -> NodeConfig,
         listener: TcpListener,
         offers: SceneOffers,
-        engine: Arc<dyn Engine>,
+        open: OpenEngine,
         nodes: usize,
         insecure_bind: bool,
     ) -> anyhow::Result<Self> {
@@ -63,8 +44,8 @@ impl Cluster {
             let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
             // Enough digits to sort well: members are listed by name.
             let config = configure(NodeConfig::new(format!("node-{number:03}"), &cluster.address));
-            let (engine, metrics, shutdown) = (engine.clone(), NodeMetrics::default(), cluster.shutdown.clone());
-            cluster.servers.spawn(node_host::serve(listener, config, engine, metrics, shutdown));
+            let (open, metrics, shutdown) = (open.clone(), NodeMetrics::default(), cluster.shutdown.clone());
+            cluster.servers.spawn(node_host::serve(listener, config, open, metrics, shutdown));
         }
         cluster.client().await?.wait_for_nodes(nodes, JOIN).await?;
         Ok(cluster)

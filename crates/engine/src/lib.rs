@@ -8,7 +8,9 @@ use std::sync::{Arc, Weak};
 use cluster::{DIRECT, SamplePlanes};
 use depth_image::{DepthImage, View};
 use gpu::{DevicePreference, Gpu, GpuError};
-use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass};
+use node::{
+    DirectWork, Engine, EngineError, OpenEngine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass,
+};
 use parking_lot::Mutex;
 use reconstruction::{ReconstructionError, ReconstructionMethod, Reconstructor, RequiredPlanes, SetDescription};
 use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, Visibility};
@@ -24,6 +26,7 @@ const SCENE_BYTES: u64 = 2 << 30;
 /// One device, its pipelines, and the scenes on it.
 pub struct GpuEngine {
     gpu: Arc<Gpu>,
+    preference: DevicePreference,
     /// The pipelines that draw, for measurements without a service in between.
     pub renderer: Arc<Renderer>,
     sampler: Sampler,
@@ -51,6 +54,7 @@ impl GpuEngine {
             reconstructor: Reconstructor::new(&gpu).map_err(reconstruction_error)?,
             renderer,
             gpu,
+            preference,
             scenes: SceneCache::new(SCENE_BYTES, GpuScene::bytes),
             loading: Mutex::default(),
         })
@@ -69,6 +73,25 @@ impl GpuEngine {
         let engine = Arc::new(Self::open(preference)?);
         open.insert(preference.to_string(), Arc::downgrade(&engine));
         Ok(engine)
+    }
+
+    /// Gives nodes this engine; one with a new device and the same bound of scenes once this device is lost. It holds no
+    /// engine that a node has: a lost one closes with the last node that leaves it.
+    #[must_use]
+    pub fn opener(self: Arc<Self>) -> OpenEngine {
+        let (preference, scene_bytes, first) = (self.preference, self.scenes.max_bytes(), Arc::downgrade(&self));
+        let open = Mutex::new((Some(self), first));
+        Arc::new(move || {
+            let (unused, open) = &mut *open.lock();
+            let last = unused.take().or_else(|| open.upgrade()).filter(|engine| !engine.gpu.is_lost());
+            let engine = match last {
+                Some(engine) => engine,
+                None => Arc::new(Self::open(preference)?),
+            };
+            engine.scenes.set_max_bytes(scene_bytes);
+            *open = Arc::downgrade(&engine);
+            Ok(engine)
+        })
     }
 
     /// Bounds the memory of scenes to come, in bytes. One in use stays, and one beyond the bound is there alone.

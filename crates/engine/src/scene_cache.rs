@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use parking_lot::Mutex;
 use render::GpuScene;
 
-/// Scenes by hash. The least recently used are evicted for new ones, but none that is in use: the bound is exceeded instead,
-/// as it is by one large scene alone.
+/// Scenes by hash. The least recently used are evicted when others come or grow, but none that is in use: the bound is
+/// exceeded instead, as it is by one large scene alone.
 ///
 /// This is no `node::ByteCache`: an engine is called without a runtime, a load must not wait for room while its node's plan
 /// waits for the scene, and a scene grows after it was loaded, by the tree that rays need.
@@ -15,12 +15,18 @@ pub(crate) struct SceneCache<S = GpuScene> {
     max_bytes: AtomicU64,
     bytes: fn(&S) -> u64,
     /// The one that was used last is at the end.
-    scenes: Mutex<Vec<(String, Arc<S>)>>,
+    scenes: Mutex<Scenes<S>>,
 }
+
+type Scenes<S> = Vec<(String, Arc<S>)>;
 
 impl<S> SceneCache<S> {
     pub fn new(max_bytes: u64, bytes: fn(&S) -> u64) -> Self {
         Self { max_bytes: max_bytes.into(), bytes, scenes: Mutex::default() }
+    }
+
+    pub fn max_bytes(&self) -> u64 {
+        self.max_bytes.load(Ordering::Acquire)
     }
 
     /// Changes the bound, for scenes to come.
@@ -40,6 +46,10 @@ impl<S> SceneCache<S> {
         let found = scenes.remove(at);
         let scene = found.1.clone();
         scenes.push(found);
+        // Scenes grow after they were put, by the tree that rays need.
+        let evicted = self.evict(&mut scenes);
+        drop(scenes);
+        drop(evicted);
         Some(scene)
     }
 
@@ -47,14 +57,22 @@ impl<S> SceneCache<S> {
     pub fn put(&self, hash: &str, scene: S) {
         let mut scenes = self.scenes.lock();
         scenes.push((hash.to_owned(), Arc::new(scene)));
-        let mut bytes: u64 = scenes.iter().map(|(_, scene)| (self.bytes)(scene)).sum();
-        let max_bytes = self.max_bytes.load(Ordering::Acquire);
-        while bytes > max_bytes {
-            let newest = scenes.len() - 1;
-            let idle = scenes[..newest].iter().position(|(_, scene)| Arc::strong_count(scene) == 1);
-            let Some(idle) = idle else { return };
-            bytes -= (self.bytes)(&scenes.remove(idle).1);
-        }
+        let evicted = self.evict(&mut scenes);
+        drop(scenes);
+        drop(evicted);
+    }
+
+    /// Takes out the least recently used that are idle, until the others are within the bound. The last one stays.
+    fn evict(&self, scenes: &mut Scenes<S>) -> Scenes<S> {
+        let bytes = |(_, scene): &(String, Arc<S>)| (self.bytes)(scene);
+        let mut beyond = scenes.iter().map(bytes).sum::<u64>().saturating_sub(self.max_bytes());
+        let last = scenes.len().saturating_sub(1);
+        let is_evicted = |entry: &mut (String, Arc<S>)| {
+            let leaves = beyond > 0 && Arc::strong_count(&entry.1) == 1;
+            beyond = if leaves { beyond.saturating_sub(bytes(entry)) } else { beyond };
+            leaves
+        };
+        scenes.extract_if(..last, is_evicted).collect()
     }
 }
 
@@ -89,6 +107,14 @@ mod tests {
         drop(in_use);
         cache.put("d", 1);
         assert_eq!(kept(&cache), ["c", "d"]);
+    }
+
+    #[test]
+    fn scenes_that_grow_beyond_the_bound_drive_others_out() {
+        let cache = SceneCache::new(10, |bytes: &AtomicU64| bytes.load(Ordering::Relaxed));
+        ["a", "b"].iter().for_each(|hash| cache.put(hash, AtomicU64::new(4)));
+        cache.get("b").expect("kept").store(7, Ordering::Relaxed);
+        assert!(cache.has("b") && !cache.has("a"));
     }
 
     #[test]

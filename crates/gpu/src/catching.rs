@@ -36,6 +36,13 @@ impl Gpu {
         }
     }
 
+    /// Whether the device is lost for all work.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        notice_loss(self);
+        self.faults.check_lost().is_err()
+    }
+
     /// Times that the device's memory ran out. What was made before may be without memory.
     #[must_use]
     pub fn shortages(&self) -> u64 {
@@ -102,5 +109,6 @@ mod tests {
             let failed = gpu.catching(|| copied(&gpu, &pool));
             assert!(matches!(failed, Err(GpuError::Lost(_))), "{failed:?}");
         }
+        assert!(gpu.is_lost() && !open().is_lost());
     }
 }

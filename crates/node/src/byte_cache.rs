@@ -183,7 +183,12 @@ where
         F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
     {
         let mut state = self.0.state.lock();
-        if state.entries.contains_key(&key) {
+        let use_now = state.next_use();
+        if let Some(entry) = state.entries.get_mut(&key) {
+            // It is about to be used: what is loaded ahead after it must not evict it.
+            if let Entry::Loaded { last_use, used_at, .. } = entry {
+                (*last_use, *used_at) = (use_now, Instant::now());
+            }
             return true;
         }
         if state.waiting > 0 {

@@ -63,7 +63,7 @@ pub struct Deadlines {
     pub stall: Duration,
     /// A live view's set: after it, a neighbouring view cell's set of the same moment serves.
     pub neighbour: Duration,
-    /// A node whose device has no memory left, until it joins again.
+    /// A node whose device has no memory left, until it joins again; and the least time between two openings of a device.
     pub away: Duration,
 }
 

@@ -38,7 +38,7 @@ impl DeviceMonitor {
     }
 
     /// Frees the sets that are not in use; gives their bytes.
-    pub fn free(&self) -> usize {
+    fn free(&self) -> usize {
         let memory = self.memory.lock().clone();
         memory.iter().map(|memory| memory.free()).sum()
     }
@@ -51,11 +51,16 @@ impl DeviceMonitor {
         reason.unwrap_or_default()
     }
 
-    /// Resolves when several calls in a row have run out of memory, whatever was freed; they are counted anew then.
+    /// Frees the sets that are not in use, and counts calls that run out of memory anew.
+    pub fn begin_anew(&self) {
+        self.free();
+        self.shortages.send_replace(0);
+    }
+
+    /// Resolves when several calls in a row have run out of memory, whatever was freed.
     pub async fn exhausted(&self) {
         let mut shortages = self.shortages.subscribe();
         let _ = shortages.wait_for(|count| *count >= MAX_SHORTAGES).await;
-        self.shortages.send_replace(0);
     }
 
     fn monitored<T>(&self, done: Result<T, EngineError>) -> Result<T, EngineError> {

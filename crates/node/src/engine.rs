@@ -86,6 +86,9 @@ pub trait Engine: Send + Sync + 'static {
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError>;
 }
 
+/// Opens the engine of a device, for a node's start and again after the device was lost. It blocks.
+pub type OpenEngine = Arc<dyn Fn() -> Result<Arc<dyn Engine>, EngineError> + Send + Sync>;
+
 /// The result of work on this thread, and the seconds that it took, without those for which it waited for others.
 pub fn own_time<T>(engine: &dyn Engine, work: impl FnOnce() -> T) -> (T, f64) {
     // Earlier waits of this thread are of other work.

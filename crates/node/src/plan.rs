@@ -174,7 +174,7 @@ impl PlansInForce {
         Ok(ended)
     }
 
-    /// Forgets all plans; their epochs are refused as before.
+    /// Forgets all plans.
     pub fn forget_all(&self) {
         self.plans.lock().workloads.clear();
         self.changes.send_modify(|changes| *changes += 1);

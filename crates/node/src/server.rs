@@ -16,6 +16,8 @@ use tonic_health::ServingStatus;
 use tonic_health::pb::health_server::{Health, HealthServer};
 use wire::rpc::{KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT, reflection_server};
 
+use crate::engine::EngineError;
+
 /// The time that connections may take to end after their streams have ended.
 pub const DRAIN: Duration = Duration::from_secs(10);
 /// Most streams, and calls that are being answered, of one connection.
@@ -41,9 +43,9 @@ pub enum ServeError {
     Listen(#[from] io::Error),
     #[error("reflection: {0}")]
     Reflection(String),
-    /// The process can make nothing any more; a supervisor may start it again.
-    #[error("device lost: {reason}")]
-    DeviceLost { reason: String },
+    /// The process can make nothing (any more); a supervisor may start it again.
+    #[error("no device could be opened: {0}")]
+    Device(#[from] EngineError),
     #[error("serving: {0}")]
     Transport(#[from] tonic::transport::Error),
 }

@@ -45,7 +45,9 @@ impl rpc::Node for NodeService {
         self.scenes.ensure(&request.workload.scene).await?;
         let (engine, measurement) = (self.scenes.engine(), request.clone());
         let measured = blocking(move || measure_costs(engine.as_ref(), &measurement)).await?;
+        let request = MeasureCosts { in_background: false, ..request };
         let mut cached = self.measured.lock();
+        cached.retain(|(known, _)| *known != request);
         cached.push_back((request, measured));
         while cached.len() > MAX_MEASURED {
             cached.pop_front();

@@ -1,7 +1,6 @@
 //! The sizes of sample sets in memory, before they are allocated and afterwards.
 
-use cluster::Workload;
-use depth_image::{Camera, DepthImage, SpecularPlanes};
+use depth_image::{Camera, DepthImage, Illumination, SpecularPlanes};
 
 /// Inverse depth, colour, a normal, a surface, reflectance and a mark, for one texel.
 const MOST_TEXEL_BYTES: usize = 4 + 4 + 4 + 8 + 4 + 1;
@@ -10,10 +9,10 @@ const CORNER_BYTES: usize = 4;
 /// The least and the greatest depth of all levels of a pyramid, for one texel: 8 · 4/3.
 const PYRAMID_TEXEL_BYTES: usize = 11;
 
-/// The most bytes of a workload's sample images, unpacked, if an image has every plane.
+/// The most bytes of sample images, unpacked, if an image has every plane.
 #[must_use]
-pub fn most_image_bytes(workload: &Workload, cameras: &[Camera]) -> usize {
-    let visibility_bytes = 4 * SpecularPlanes::visibility_planes(workload.illumination.lights.len());
+pub fn most_image_bytes(illumination: &Illumination, cameras: &[Camera]) -> usize {
+    let visibility_bytes = 4 * SpecularPlanes::visibility_planes(illumination.lights.len());
     let bytes = |Camera::Pinhole(camera): &Camera| {
         let corners = (camera.size_px.x as usize + 1) * (camera.size_px.y as usize + 1);
         camera.pixel_count() * (MOST_TEXEL_BYTES + visibility_bytes) + corners * CORNER_BYTES
@@ -21,12 +20,11 @@ pub fn most_image_bytes(workload: &Workload, cameras: &[Camera]) -> usize {
     cameras.iter().map(bytes).sum()
 }
 
-/// The most bytes of a workload's set on a device.
+/// The most bytes of a set on a device.
 #[must_use]
-pub fn most_set_bytes(workload: &Workload) -> usize {
-    let cameras = &workload.sample_cameras;
+pub fn most_set_bytes(illumination: &Illumination, cameras: &[Camera]) -> usize {
     let texels: usize = cameras.iter().map(|Camera::Pinhole(camera)| camera.pixel_count()).sum();
-    most_image_bytes(workload, cameras) + texels * PYRAMID_TEXEL_BYTES
+    most_image_bytes(illumination, cameras) + texels * PYRAMID_TEXEL_BYTES
 }
 
 /// Bytes of images on a device, by the planes that they have.
@@ -59,8 +57,8 @@ mod tests {
     #[test]
     fn a_set_is_never_larger_than_its_cameras_told() {
         let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(16));
-        let workload = Workload { sample_cameras: vec![Camera::Pinhole(camera); 2], ..request(1).workload };
-        let lights = workload.illumination.lights.len();
+        let illumination = request(1).workload.illumination;
+        let lights = illumination.lights.len();
         let plain = DepthImage {
             camera: Camera::Pinhole(camera),
             inverse_depth_per_m: vec![0.5; 256],
@@ -85,6 +83,6 @@ mod tests {
             ..plain
         };
         full.validate().unwrap();
-        assert_eq!(set_bytes(&[full.clone(), full]), most_set_bytes(&workload));
+        assert_eq!(set_bytes(&[full.clone(), full]), most_set_bytes(&illumination, &[Camera::Pinhole(camera); 2]));
     }
 }

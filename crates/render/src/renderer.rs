@@ -20,6 +20,9 @@ use crate::{
 /// Pixels in one submission: bounds the memory for surfaces, light and read-back.
 const PIXELS_A_SUBMISSION: usize = 1 << 20;
 
+/// Pixels of the smallest picture that is timed. Smaller ones say little about larger ones.
+const LEAST_TIMED_PX: usize = 256 * 256;
+
 /// Scenes whose costs are remembered.
 const MOST_SCENES: usize = 64;
 
@@ -213,13 +216,14 @@ impl Renderer {
         if let Some(costs) = self.known_costs(scene) {
             return Ok(costs);
         }
-        let small = halved(camera);
+        let large = at_least(camera, LEAST_TIMED_PX);
+        let small = large.resized((large.size_px / 2).max(UVec2::ONE));
         let measured = |camera: &PinholeCamera| {
             let choice = self.measure(scene, camera, scene_time_s, turn)?;
             tracing::info!(size_px = %camera.size_px, %choice, "surfaces are found by");
             Ok::<_, RenderError>((camera.pixel_count(), choice))
         };
-        let measured = Costs::through([measured(&small)?, measured(camera)?]);
+        let measured = Costs::through([measured(&small)?, measured(&large)?]);
         let mut costs = self.costs.lock();
         // Of several that were measured at once the first counts.
         if let Some((_, first)) = costs.iter().find(|(identity, _)| *identity == scene.identity) {
@@ -312,11 +316,10 @@ impl Renderer {
     }
 }
 
-/// The same view with a quarter of the pixels.
-fn halved(camera: &PinholeCamera) -> PinholeCamera {
-    let size_px = (camera.size_px / 2).max(UVec2::ONE);
-    let scale = size_px.as_vec2() / camera.size_px.as_vec2();
-    PinholeCamera { size_px, focal_px: camera.focal_px * scale, principal_px: camera.principal_px * scale, ..*camera }
+/// The camera with the same field of view and no fewer than `pixels` pixels.
+fn at_least(camera: &PinholeCamera, pixels: usize) -> PinholeCamera {
+    let scale = (pixels as f32 / camera.pixel_count() as f32).sqrt();
+    if scale > 1.0 { camera.resized((camera.size_px.as_vec2() * scale).ceil().as_uvec2()) } else { *camera }
 }
 
 fn pinholes(cameras: &[Camera]) -> Vec<PinholeCamera> {

@@ -84,7 +84,7 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
     let metrics = NodeMetrics::new(&telemetry);
     serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
     cancel_at_signal(shutdown.clone());
-    node_host::serve(listener, config, engine, metrics, shutdown).await?;
+    node_host::serve(listener, config, engine.opener(), metrics, shutdown).await?;
     Ok(Outcome::Done)
 }
 

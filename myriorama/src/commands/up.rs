@@ -55,9 +55,9 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     // The device and the packages hold the scenes now; the third copy is dropped.
     drop(scenes);
     let configure = |config: NodeConfig| NodeConfig { set_memory_bytes: memory / nodes, ..args.limits.within(config) };
-    let mut cluster =
-        Cluster::start_with(configure, listener, offers, engine.clone(), nodes, args.insecure_bind).await?;
-    println!("{nodes} nodes on {}, at {}", engine.device_name(), cluster.address);
+    let device_name = engine.device_name();
+    let mut cluster = Cluster::start(configure, listener, offers, engine.opener(), nodes, args.insecure_bind).await?;
+    println!("{nodes} nodes on {device_name}, at {}", cluster.address);
     tokio::select! {
         stopped = stop_signal() => stopped?,
         failed = cluster.failed() => failed?,

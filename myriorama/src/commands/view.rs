@@ -158,5 +158,6 @@ async fn follow(args: &ViewArgs, session: &Session, path: Vec<PinholeCamera>) ->
         return Err(error.into());
     }
     let (gap_s, _) = record.longest_gap_s(0.0);
-    Ok(Outcome::of(args.longest_gap.is_none_or(|longest| gap_s <= longest)))
+    let is_fluent = |longest: f64| gap_s <= longest && !record.shown.is_empty();
+    Ok(Outcome::of(args.longest_gap.is_none_or(is_fluent)))
 }

@@ -17,6 +17,9 @@ use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 
+/// Less than a watcher's sets take.
+const SET_MEMORY_BYTES: usize = 8 << 20;
+
 #[derive(Parser)]
 enum Role {
     Coordinator(CoordinatorArgs),
@@ -97,6 +100,11 @@ async fn host(args: NodeArgs, shutdown: CancellationToken) -> anyhow::Result<()>
         lose.recv().await;
         device.lose();
     });
-    let config = NodeConfig { advertised_address: args.advertise, ..NodeConfig::new(args.name, args.coordinator) };
-    Ok(node_host::serve(listener, config, Arc::new(engine), NodeMetrics::default(), shutdown).await?)
+    let config = NodeConfig {
+        advertised_address: args.advertise,
+        set_memory_bytes: SET_MEMORY_BYTES,
+        ..NodeConfig::new(args.name, args.coordinator)
+    };
+    let open = Arc::new(move || Ok(Arc::new(engine.opened()) as _));
+    Ok(node_host::serve(listener, config, open, NodeMetrics::default(), shutdown).await?)
 }

@@ -28,36 +28,36 @@ impl Scheduler {
         self.workload_of_session(session).is_some()
     }
 
-    /// Whether a session may ask for this many views from now on. A session may always ask for less than before.
+    /// Whether a session may ask for this many views from now on, and look from these viewpoints where they are given. A
+    /// session may always ask for less than before.
     ///
     /// # Errors
-    /// As for one that is opened.
-    pub fn admits(&self, session: u64, views_per_set: usize, frames_per_s: Option<f64>) -> Result<(), ChoiceError> {
+    /// As for one that is opened; with viewpoints, also for one that has sample cameras of its own.
+    pub fn admits(
+        &self,
+        session: u64,
+        views_per_set: usize,
+        frames_per_s: Option<f64>,
+        viewpoints: Option<&[PinholeCamera]>,
+    ) -> Result<(), ChoiceError> {
         let Some(number) = self.workload_of_session(session) else { return Ok(()) };
         let before = &self.workloads[&number];
-        let after = before.changed(self.now, |sessions| sessions.set_demand(session, views_per_set, frames_per_s));
-        if after.sessions.views_per_s() <= before.sessions.views_per_s() {
-            return Ok(());
-        }
-        self.admit(&self.change_of(number, before, after))
-    }
-
-    /// Whether a session may look from these viewpoints from now on.
-    ///
-    /// # Errors
-    /// As for one that is opened, and for one that has sample cameras of its own. A session may always ask for fewer images
-    /// than before.
-    pub fn admits_viewpoints(&self, session: u64, viewpoints: &[PinholeCamera]) -> Result<(), ChoiceError> {
-        let Some(number) = self.workload_of_session(session) else { return Ok(()) };
-        let before = &self.workloads[&number];
-        if before.cell_count().is_none() {
+        if viewpoints.is_some() && before.cell_count().is_none() {
             return Err(ChoiceError::NoCells { session });
         }
-        let after = before.changed(self.now, |sessions| sessions.set_viewpoints(session, viewpoints));
-        if after.cell_count() <= before.cell_count() && after.load().images <= before.load().images {
-            return Ok(());
+        // Together: rate and cells multiply.
+        let after = before.changed(self.now, |sessions| {
+            sessions.set_demand(session, views_per_set, frames_per_s);
+            if let Some(viewpoints) = viewpoints {
+                sessions.set_viewpoints(session, viewpoints);
+            }
+        });
+        let asks_for_more_views = after.sessions.views_per_s() > before.sessions.views_per_s();
+        let needs_more_images = after.cell_count() > before.cell_count() || after.load().images > before.load().images;
+        if asks_for_more_views || (viewpoints.is_some() && needs_more_images) {
+            self.admit(&self.change_of(number, before, after))?;
         }
-        self.admit(&self.change_of(number, before, after))
+        Ok(())
     }
 
     /// Whether a session of this workload may be opened, as far as is known before its costs and planes are.

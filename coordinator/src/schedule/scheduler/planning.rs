@@ -69,8 +69,8 @@ impl Scheduler {
     pub(super) fn utilisation(&self, number: u64) -> Option<f64> {
         let (workload, mut snapshot) = (self.workloads.get(&number)?, self.snapshot(number)?);
         snapshot.load = workload.rated_load();
-        snapshot.nodes = self.costs_beside(number, |other| other.sessions.viewers() > 0);
-        snapshot.nodes.iter_mut().for_each(|node| node.costs = workload.of_viewers(&node.costs));
+        let of_viewers = |costs: &Costs| workload.of_viewers(costs);
+        snapshot.nodes = self.costs_beside(number, |other| other.sessions.viewers() > 0, of_viewers);
         Some(workload.utilisation(snapshot.current_s(&self.has_role(number, &snapshot)?)?))
     }
 
@@ -99,17 +99,24 @@ impl Scheduler {
 
     /// Present costs of the nodes that serve a workload, in their order. A node that serves several takes turns.
     pub(super) fn costs_now(&self, number: u64) -> Vec<NodeCosts> {
-        self.costs_beside(number, |_| true)
+        self.costs_beside(number, |_| true, |costs| *costs)
     }
 
-    /// The same, beside some of the other workloads.
-    fn costs_beside(&self, number: u64, counts: impl Fn(&WorkloadState) -> bool) -> Vec<NodeCosts> {
+    /// Present costs as `of_views` changes them, of nodes that take turns with those of the other workloads that `counts`
+    /// chooses.
+    fn costs_beside(
+        &self,
+        number: u64,
+        counts: impl Fn(&WorkloadState) -> bool,
+        of_views: impl Fn(&Costs) -> Costs,
+    ) -> Vec<NodeCosts> {
         let Some(workload) = self.workloads.get(&number) else { return Vec::new() };
         let mut nodes = costs_among(self.serving(workload).filter_map(|(_, member)| member.estimates.get(&number)));
         if workload.active_plan.as_ref().is_some_and(|active| active.plan.assignment.tile_count > 1) {
             NodeCosts::level_sampling(&mut nodes);
         }
         for ((name, _), node) in self.serving(workload).zip(&mut nodes) {
+            node.costs = of_views(&node.costs);
             let carried = self.carried(number, name, &counts);
             if carried > 1 {
                 *node = node.times(carried as f64);

@@ -83,7 +83,7 @@ pub struct Record {
     pub posed: u64,
     /// The error that ended the frames.
     pub error: Option<ClientError>,
-    /// Seconds from the first pose to the last frame.
+    /// Seconds from the first pose to the end of the wait for frames.
     pub seconds: f64,
 }
 
