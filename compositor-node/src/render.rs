@@ -71,7 +71,7 @@ impl Rendering {
             Ok((operation, views, busy_s)) => {
                 let batch_s = start.elapsed().as_secs_f64();
                 let pixels = batch.iter().map(|view| view.view.camera.pixel_count()).sum();
-                self.times.learn(&batch[0].key.kind(), pixels, busy_s);
+                self.times.learn(Instant::now(), &batch[0].key.kind(), pixels, busy_s);
                 metrics.done.add(batch[0].key.workload_number, operation, batch.len() as f64, busy_s);
                 metrics.views.inc_by(batch.len() as u64);
                 for view in &batch {

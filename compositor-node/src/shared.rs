@@ -97,7 +97,7 @@ impl Shared {
         let method = if plan.policy == Policy::Direct { DIRECT } else { method };
         let kind = ViewKind { workload_number: plan.workload_number, method: method.to_owned() };
         let largest = views.iter().map(|view| view.camera.size_px).max_by_key(|size_px| size_px.element_product());
-        largest.map_or(Ok(()), |size_px| self.times.check(&kind, size_px))
+        largest.map_or(Ok(()), |size_px| self.times.check(Instant::now(), &kind, size_px))
     }
 
     /// The plan for views by a method, if this node makes views in it. Views that are drawn from the scene ignore the plan's

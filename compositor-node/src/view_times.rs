@@ -1,6 +1,7 @@
 //! The times of views on this node, learnt from calls: what one more view of any size would take.
 
 use std::collections::VecDeque;
+use std::time::{Duration, Instant};
 
 use glam::UVec2;
 use parking_lot::Mutex;
@@ -12,6 +13,8 @@ const REMEMBERED: usize = 4;
 const LEAST_CALLS: usize = 2;
 /// A smaller call takes as long as this many pixels at least.
 const LEAST_PIXELS: usize = 1 << 16;
+/// A kind that was not made for so long is tried again, though its views took too long.
+const TRIED_AGAIN_AFTER: Duration = Duration::from_secs(60);
 /// Kinds that are remembered.
 const MAX_KINDS: usize = 256;
 
@@ -23,8 +26,13 @@ pub(crate) struct ViewKind {
     pub(crate) method: String,
 }
 
-/// A kind, and the seconds a pixel of its last calls.
-type Times = (ViewKind, VecDeque<f64>);
+/// What is known of a kind.
+struct Times {
+    kind: ViewKind,
+    /// The seconds a pixel of its last calls.
+    pixel_s: VecDeque<f64>,
+    learned_at: Instant,
+}
 
 /// The times of this node's views.
 pub(crate) struct ViewTimes {
@@ -40,16 +48,15 @@ impl ViewTimes {
     }
 
     /// Learns from a call of `pixels` that took `seconds`.
-    pub(crate) fn learn(&self, kind: &ViewKind, pixels: usize, seconds: f64) {
+    pub(crate) fn learn(&self, now: Instant, kind: &ViewKind, pixels: usize, seconds: f64) {
         let mut kinds = self.kinds.lock();
-        let place = kinds.iter().position(|(known, _)| known == kind);
-        let (_, mut times) =
-            place.and_then(|place| kinds.remove(place)).unwrap_or_else(|| (kind.clone(), VecDeque::new()));
-        times.push_back(seconds / pixels.max(LEAST_PIXELS) as f64);
-        if times.len() > REMEMBERED {
-            times.pop_front();
+        let known = kinds.iter().position(|times| times.kind == *kind).and_then(|place| kinds.remove(place));
+        let mut pixel_s = known.map(|times| times.pixel_s).unwrap_or_default();
+        pixel_s.push_back(seconds / pixels.max(LEAST_PIXELS) as f64);
+        if pixel_s.len() > REMEMBERED {
+            pixel_s.pop_front();
         }
-        kinds.push_back((kind.clone(), times));
+        kinds.push_back(Times { kind: kind.clone(), pixel_s, learned_at: now });
         if kinds.len() > MAX_KINDS {
             kinds.pop_front();
         }
@@ -57,22 +64,30 @@ impl ViewTimes {
 
     /// The seconds of one view; `None` for a kind that is not known yet.
     pub(crate) fn predicted_s(&self, kind: &ViewKind, size_px: UVec2) -> Option<f64> {
-        let kinds = self.kinds.lock();
-        let (_, times) = kinds.iter().find(|(known, times)| known == kind && times.len() >= LEAST_CALLS)?;
-        let pixel_s = times.iter().copied().fold(f64::INFINITY, f64::min);
-        Some(pixel_s * f64::from(size_px.x) * f64::from(size_px.y))
+        Some(self.known(kind, size_px)?.0)
     }
 
     /// Checks that a view does not take too long. A view of a kind that is not known yet is admitted.
-    pub(crate) fn check(&self, kind: &ViewKind, size_px: UVec2) -> Result<(), Status> {
+    pub(crate) fn check(&self, now: Instant, kind: &ViewKind, size_px: UVec2) -> Result<(), Status> {
         let most_s = self.max_view_s;
-        match self.predicted_s(kind, size_px).filter(|seconds| *seconds > most_s) {
+        let is_refused = |(seconds, learned_at): &(f64, Instant)| {
+            *seconds > most_s && now.saturating_duration_since(*learned_at) < TRIED_AGAIN_AFTER
+        };
+        match self.known(kind, size_px).filter(is_refused) {
             None => Ok(()),
-            Some(seconds) => Err(Status::resource_exhausted(format!(
+            Some((seconds, _)) => Err(Status::resource_exhausted(format!(
                 "max-view-s: a view of {}x{} by {} is predicted to take {seconds:.1} s here, and {most_s} s are allowed",
                 size_px.x, size_px.y, kind.method
             ))),
         }
+    }
+
+    /// The seconds of one view, and when its kind was learned from.
+    fn known(&self, kind: &ViewKind, size_px: UVec2) -> Option<(f64, Instant)> {
+        let kinds = self.kinds.lock();
+        let times = kinds.iter().find(|times| times.kind == *kind && times.pixel_s.len() >= LEAST_CALLS)?;
+        let pixel_s = times.pixel_s.iter().copied().fold(f64::INFINITY, f64::min);
+        Some((pixel_s * f64::from(size_px.x) * f64::from(size_px.y), times.learned_at))
     }
 }
 
@@ -88,14 +103,14 @@ mod tests {
 
     #[test]
     fn times_grow_with_pixels_and_the_quickest_of_the_last_calls_counts() {
-        let times = ViewTimes::new(120.0);
+        let (now, times) = (Instant::now(), ViewTimes::new(120.0));
         let (slow, size_px) = (kind(1, "joint_carve"), UVec2::new(1024, 1024));
-        times.learn(&slow, 1 << 16, 60.0);
+        times.learn(now, &slow, 1 << 16, 60.0);
         assert_eq!(times.predicted_s(&slow, size_px), None, "the first call builds shaders");
-        times.learn(&slow, 1 << 16, 1.0);
-        times.learn(&slow, 1 << 18, 8.0);
+        times.learn(now, &slow, 1 << 16, 1.0);
+        times.learn(now, &slow, 1 << 18, 8.0);
         assert_eq!(times.predicted_s(&slow, size_px), Some(16.0));
-        (0..REMEMBERED).for_each(|_| times.learn(&slow, 1 << 20, 32.0));
+        (0..REMEMBERED).for_each(|_| times.learn(now, &slow, 1 << 20, 32.0));
         assert_eq!(times.predicted_s(&slow, size_px), Some(32.0), "it has become slower");
         for other in [kind(2, "joint_carve"), kind(1, "mesh")] {
             assert_eq!(times.predicted_s(&other, size_px), None);
@@ -104,29 +119,33 @@ mod tests {
 
     #[test]
     fn the_overhead_of_small_calls_predicts_no_long_views() {
-        let times = ViewTimes::new(120.0);
-        (0..2).for_each(|_| times.learn(&kind(1, "mesh"), 16 * 16, 0.005));
-        assert!(times.check(&kind(1, "mesh"), UVec2::new(7680, 4320)).is_ok());
+        let (now, times) = (Instant::now(), ViewTimes::new(120.0));
+        (0..2).for_each(|_| times.learn(now, &kind(1, "mesh"), 16 * 16, 0.005));
+        assert!(times.check(now, &kind(1, "mesh"), UVec2::new(7680, 4320)).is_ok());
     }
 
     #[test]
     fn a_view_that_takes_too_long_is_refused_by_name() {
-        let times = ViewTimes::new(120.0);
+        let (now, times) = (Instant::now(), ViewTimes::new(120.0));
         let (known, size_px) = (kind(1, "direct"), UVec2::new(3840, 2160));
-        (0..2).for_each(|_| times.learn(&known, 1 << 16, 1.0));
-        assert!(times.check(&kind(2, "direct"), size_px).is_ok(), "not known");
-        assert!(times.check(&known, UVec2::new(1920, 1080)).is_ok());
-        let refused = times.check(&known, size_px).unwrap_err();
+        (0..2).for_each(|_| times.learn(now, &known, 1 << 16, 1.0));
+        assert!(times.check(now, &kind(2, "direct"), size_px).is_ok(), "not known");
+        assert!(times.check(now, &known, UVec2::new(1920, 1080)).is_ok());
+        let refused = times.check(now, &known, size_px).unwrap_err();
         assert_eq!(refused.code(), Code::ResourceExhausted);
         let text = "max-view-s: a view of 3840x2160 by direct is predicted to take 126.6 s here, and 120 s are allowed";
         assert_eq!(refused.message(), text);
+        let later = now + TRIED_AGAIN_AFTER;
+        assert!(times.check(later, &known, size_px).is_ok(), "tried again");
+        times.learn(later, &known, 1 << 16, 1.0);
+        assert!(times.check(later, &known, size_px).is_err(), "and refused once more");
     }
 
     #[test]
     fn the_kinds_that_were_made_long_ago_are_forgotten() {
-        let times = ViewTimes::new(120.0);
+        let (now, times) = (Instant::now(), ViewTimes::new(120.0));
         for _ in 0..2 {
-            (0..2 * MAX_KINDS as u64).for_each(|number| times.learn(&kind(number, "mesh"), 1, 1.0));
+            (0..2 * MAX_KINDS as u64).for_each(|number| times.learn(now, &kind(number, "mesh"), 1, 1.0));
         }
         assert_eq!(times.kinds.lock().len(), MAX_KINDS);
     }

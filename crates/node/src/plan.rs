@@ -30,6 +30,8 @@ pub struct PlansInForce {
 struct Plans {
     workloads: Vec<WorkloadPlans>,
     highest_epoch: u64,
+    /// Plans of this epoch and of lower ones were forgotten together, and do not come back.
+    forgotten_epoch: u64,
     /// The last plan that told which workloads are open.
     told: Option<ApplyPlan>,
     /// Uses of all plans so far.
@@ -76,8 +78,11 @@ impl Plans {
 
     /// Whether a plan is new; an error where it may not replace the one in force.
     fn admits(&mut self, assignment: &Assignment) -> Result<bool, Status> {
-        let number = assignment.workload_number;
-        let is_later = |told: &&ApplyPlan| told.assignment.plan_epoch > assignment.plan_epoch;
+        let (number, plan_epoch) = (assignment.workload_number, assignment.plan_epoch);
+        if plan_epoch <= self.forgotten_epoch {
+            return Err(Status::failed_precondition(format!("plan_epoch {plan_epoch} was forgotten")));
+        }
+        let is_later = |told: &&ApplyPlan| told.assignment.plan_epoch > plan_epoch;
         if self.told.as_ref().filter(is_later).is_some_and(|told| told.has_ended(number)) {
             return Err(Status::failed_precondition(format!("workload {number} has ended")));
         }
@@ -174,9 +179,12 @@ impl PlansInForce {
         Ok(ended)
     }
 
-    /// Forgets all plans.
+    /// Forgets all plans. One that is still being applied is refused.
     pub fn forget_all(&self) {
-        self.plans.lock().workloads.clear();
+        let mut plans = self.plans.lock();
+        plans.workloads.clear();
+        plans.forgotten_epoch = plans.highest_epoch;
+        drop(plans);
         self.changes.send_modify(|changes| *changes += 1);
     }
 
@@ -360,6 +368,18 @@ pub(crate) mod tests {
         assert!(plans.require(1, 3).is_err() && plans.require(1, 5).is_err() && plans.require(2, 4).is_err());
         assert_eq!((plans.require(1, 4).unwrap().plan_epoch, plans.require(2, 1).unwrap().plan_epoch), (4, 1));
         assert_eq!(plans.epoch(), 4);
+    }
+
+    #[test]
+    fn plans_that_were_forgotten_together_do_not_come_back() {
+        let plans = PlansInForce::new("n");
+        plans.apply(plan(1, 3)).unwrap();
+        plans.forget_all();
+        assert!(plans.in_force(1).is_none());
+        for late in [plan(1, 3), plan(2, 2)] {
+            assert_eq!(plans.apply(late).unwrap_err().code(), Code::FailedPrecondition);
+        }
+        plans.apply(plan(1, 4)).unwrap();
     }
 
     #[test]

@@ -32,6 +32,12 @@ impl NodeService {
     pub fn new(plans: PlansInForce, scenes: Arc<Scenes>, metrics: NodeMetrics) -> Self {
         Self { plans, scenes, metrics, measured: Mutex::default() }
     }
+
+    async fn measure_now(&self, request: &MeasureCosts) -> Result<Measured, Status> {
+        self.scenes.ensure(&request.workload.scene).await?;
+        let (engine, request) = (self.scenes.engine(), request.clone());
+        blocking(move || measure_costs(engine.as_ref(), &request)).await
+    }
 }
 
 #[async_trait]
@@ -42,9 +48,12 @@ impl rpc::Node for NodeService {
         if let Some(measured) = known.filter(|_| !request.in_background) {
             return Ok(measured);
         }
-        self.scenes.ensure(&request.workload.scene).await?;
-        let (engine, measurement) = (self.scenes.engine(), request.clone());
-        let measured = blocking(move || measure_costs(engine.as_ref(), &measurement)).await?;
+        let scene = &request.workload.scene;
+        let measured = match self.measure_now(&request).await {
+            // The scenes of others may have driven it out meanwhile.
+            Err(_) if !self.scenes.engine().has_scene(scene.hash.as_str()) => self.measure_now(&request).await?,
+            done => done?,
+        };
         let request = MeasureCosts { in_background: false, ..request };
         let mut cached = self.measured.lock();
         cached.retain(|(known, _)| *known != request);

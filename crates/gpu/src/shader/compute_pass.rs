@@ -55,8 +55,7 @@ impl ComputePass {
         elements: Range<u32>,
         size: DispatchSize<'_>,
     ) {
-        if self.first_uses.is_first(groups) {
-            warm(frame.gpu(), &self.shader, groups, use_without_work);
+        if self.first_uses.make_ready(groups, || warm(frame.gpu(), &self.shader, groups, use_without_work)) {
             frame.count_first_use();
         }
         let interface = &self.shader.interface;

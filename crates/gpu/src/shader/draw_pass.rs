@@ -75,10 +75,10 @@ impl DrawPass {
     /// Says that a pass of the frame will draw with this pipeline and these groups: all, from 0. It has to be said before the
     /// pass begins.
     pub fn announce(&self, frame: &mut Frame<'_>, groups: &[&BoundGroup]) {
-        if self.first_uses.is_first(groups) {
-            warm(frame.gpu(), &self.shader, groups, |gpu, shader, groups| {
-                Self::new(gpu, shader, self.state.clone()).draw_nothing(gpu, groups)
-            });
+        let draw_nothing = |gpu: &Gpu, shader, groups: &[BoundGroup]| {
+            Self::new(gpu, shader, self.state.clone()).draw_nothing(gpu, groups)
+        };
+        if self.first_uses.make_ready(groups, || warm(frame.gpu(), &self.shader, groups, draw_nothing)) {
             frame.count_first_use();
         }
     }

@@ -2,8 +2,9 @@
 //! its work. While a live stream is open, a second device of the same driver therefore uses the shader first: without work,
 //! and with resources of the same form. The driver keeps what it compiled on disk, where the device of the queue finds it.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::{Arc, Once};
 
 use parking_lot::Mutex;
 use wgpu::{BindingResource, BindingType, BufferUsages, TextureFormat, TextureUsages, TextureView};
@@ -21,9 +22,9 @@ const BUFFER_BYTES: u64 = 64 << 10;
 /// Sides of textures: a power of two, or not.
 const SIDES_PX: [u32; 2] = [3, 4];
 
-/// The forms with which a pass was used.
+/// The forms with which a pass was used; others of a form wait while it is made ready.
 #[derive(Debug, Default)]
-pub(super) struct FirstUses(Mutex<HashSet<u64>>);
+pub(super) struct FirstUses(Mutex<HashMap<u64, Arc<Once>>>);
 
 /// A resource without contents.
 enum Empty {
@@ -82,15 +83,20 @@ impl Empty {
 }
 
 impl FirstUses {
-    /// Whether a pass was not used with resources of these forms before.
-    pub fn is_first(&self, groups: &[&BoundGroup]) -> bool {
+    /// Has `make_ready` done once for resources of these forms. Whether this is the first use, or was when it began to wait.
+    pub fn make_ready(&self, groups: &[&BoundGroup], make_ready: impl FnOnce()) -> bool {
         let mut hasher = DefaultHasher::new();
         groups.iter().for_each(|bound| bound.forms.hash(&mut hasher));
         let mut uses = self.0.lock();
         if uses.len() >= MOST_FORMS {
             uses.clear();
         }
-        uses.insert(hasher.finish())
+        let first_use = uses.entry(hasher.finish()).or_default().clone();
+        drop(uses);
+        let is_first = !first_use.is_completed();
+        // Where an earlier thread panicked, the pass goes on without.
+        first_use.call_once_force(|_| make_ready());
+        is_first
     }
 }
 
