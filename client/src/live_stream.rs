@@ -15,7 +15,7 @@ use crate::error::ClientError;
 use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::placement::{Tried, new_client_id};
 use crate::poses::{Newest, Poses, SentPose};
-use crate::view_request::{Frame, LiveFrame, LiveTimes, ViewRequest};
+use crate::view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, ViewRequest};
 use crate::window::check_frame;
 
 /// The longest silence of a client: its compositor cuts off one that is silent for longer.
@@ -24,6 +24,7 @@ const HEARTBEAT: Duration = Duration::from_secs(20);
 const RETRY: Duration = Duration::from_millis(200);
 
 /// A frame before it is decoded.
+#[derive(Debug)]
 pub(crate) struct Encoded {
     frame: WholeFrame,
     /// The pose that it answers.
@@ -169,6 +170,7 @@ impl LiveStream {
         if let Some(pose) = pose.filter(|pose| self.poses.wants(pose)) {
             let ViewRequest { frame, set_index, camera } = pose.request;
             (request.set_index, request.views) = (set_index, vec![RequestedView { frame, camera }]);
+            request.codec = pose.codec.unwrap_or(request.codec);
             self.poses.sent(pose);
         }
         request
@@ -181,6 +183,9 @@ impl LiveStream {
         let answers = self.poses.answer(number).ok_or_else(|| unexpected("was not requested, or is late"))?;
         let planes = self.state.borrow().active.settings.planes;
         check_frame(&answers.pose.request, planes, &frame.header).map_err(|reason| unexpected(&reason))?;
+        if answers.pose.codec.is_some_and(|codec| codec != frame.header.codec) {
+            return Err(unexpected("has another codec than requested"));
+        }
         let plan_epoch = frame.header.sample_set_id.plan_epoch;
         if plan_epoch < self.plan_epoch {
             return Err(unexpected("is of an older plan than the frame before"));
@@ -227,6 +232,14 @@ pub(crate) async fn decode_all(
 }
 
 impl Encoded {
+    /// The frame as it came.
+    pub(crate) fn into_frame(self) -> EncodedFrame {
+        let Self { frame, answers: SentPose { pose, sent }, received, peer } = self;
+        let WholeFrame { header, data, .. } = frame;
+        let node_name = peer.share.node_name;
+        EncodedFrame { request: pose.request, header, data, node_name, posed: pose.posed, sent, received }
+    }
+
     async fn decode(self) -> Result<LiveFrame, ClientError> {
         let Self { frame, answers: SentPose { pose, sent }, received, peer } = self;
         let (header, view) = decode(frame, &peer).await?;

@@ -3,6 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
+use codec::FrameCodec;
+
 use crate::view_request::ViewRequest;
 
 /// Frames that may be on their way, or received and not taken.
@@ -14,6 +16,8 @@ const MAX_SENT: usize = 64;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pose {
     pub(crate) request: ViewRequest,
+    /// `None`: the session's.
+    pub(crate) codec: Option<FrameCodec>,
     pub(crate) posed: Instant,
 }
 
@@ -85,7 +89,7 @@ mod tests {
     fn pose(frame: u64) -> Pose {
         let (eye, up) = ([0.0, 0.0, 1.0].into(), [0.0, 1.0, 0.0].into());
         let camera = PinholeCamera::looking_at(eye, [0.0; 3].into(), up, 1.0, [8, 8].into());
-        Pose { request: ViewRequest { frame, set_index: 0, camera }, posed: Instant::now() }
+        Pose { request: ViewRequest { frame, set_index: 0, camera }, codec: None, posed: Instant::now() }
     }
 
     #[test]

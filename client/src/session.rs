@@ -18,7 +18,7 @@ use crate::active_plan::{ActivePlan, SessionState, follow_compositors, follow_co
 use crate::delivery::deliver;
 use crate::error::ClientError;
 use crate::frames::Frames;
-use crate::live_view::LiveView;
+use crate::live_view::{EncodedLiveView, LiveView};
 use crate::view_request::{ViewRequest, ViewSettings};
 use crate::window::Window;
 
@@ -171,6 +171,12 @@ impl Session {
     #[must_use]
     pub fn live(&self) -> LiveView {
         LiveView::start(self.state.clone())
+    }
+
+    /// The same, of which frames are not decoded.
+    #[must_use]
+    pub fn live_encoded(&self) -> EncodedLiveView {
+        EncodedLiveView::start(self.state.clone())
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use bytes::Bytes;
 use cluster::Assignment;
 use codec::{FrameCodec, FrameHeader};
 use depth_image::{PinholeCamera, View, ViewPlanes};
@@ -69,6 +70,25 @@ pub struct LiveFrame {
     pub frame: Frame,
     /// Times on this machine. Those elsewhere are in the frame's header.
     pub times: LiveTimes,
+}
+
+/// A frame of a camera that moves, as it came. Its checksum has been verified.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EncodedFrame {
+    /// The request that it answers; its number rises.
+    pub request: ViewRequest,
+    /// Its sample set, encoding and stage times.
+    pub header: FrameHeader,
+    /// All planes, colour first, as the header says.
+    pub data: Bytes,
+    /// The compositor that made it.
+    pub node_name: String,
+    /// The pose was given, by the clock of this machine.
+    pub posed: Instant,
+    /// The pose was sent, by the clock of this machine.
+    pub sent: Instant,
+    /// The frame was received, by the clock of this machine.
+    pub received: Instant,
 }
 
 /// Times on this machine.

@@ -4,7 +4,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cluster::{Assignment, SetContent, Workload};
+use cluster::{Assignment, SetContent, Timeline, Workload};
 use codec::EncodedDepthImage;
 use depth_image::{Camera, PinholeCamera, nearest_set};
 use node::{
@@ -27,6 +27,9 @@ type BoxFuture<T> = Pin<Box<dyn Future<Output = T> + Send>>;
 
 /// While one set is sent and loaded, samplers should have another to work on.
 const SETS_AHEAD: u32 = 2;
+/// Sets of earlier moments that stay beside these: a client may ask again for what it has just seen. The next sets are made in
+/// the memory of older ones, for new memory costs a software device half as much as loading a set.
+const EARLIER_SETS: usize = 4;
 /// A set that was used within this time is not evicted for that of another cell ahead: a viewer's next pose needs it.
 const RECENTLY: Duration = Duration::from_millis(500);
 
@@ -46,6 +49,8 @@ pub(crate) struct ReadySet {
     pub(crate) cell: u32,
     /// What its images show, wherever their cameras are.
     moment: SetContent,
+    /// What its images show, whenever it is.
+    subject: SetContent,
     cameras: Vec<PinholeCamera>,
     /// Its images for other compositors, where they ask this one.
     relay: Option<RelayBuffer>,
@@ -57,7 +62,13 @@ fn moment(plan: &Assignment, set_index: u32) -> Option<SetContent> {
     Assignment { workload, samplers: Vec::new(), ..plan.clone() }.set_content(set_index)
 }
 
-/// The sets of one compositor, the latest few cached.
+/// The content of a cell's sets without their time: equal for all moments.
+fn subject(plan: &Assignment) -> Option<SetContent> {
+    let workload = Workload { timeline: Timeline::still(0.0), refinement_steps: 1, ..plan.workload.clone() };
+    Assignment { workload, samplers: Vec::new(), ..plan.clone() }.set_content(0)
+}
+
+/// The sets of one compositor: the latest few moments of each cell, as long as memory has room.
 pub(crate) struct Sets {
     engine: Arc<dyn Engine>,
     fetcher: Arc<Fetcher>,
@@ -242,6 +253,9 @@ impl Sets {
         let relay = relay.filter(|relay| !relay.has_failed());
         let request = SetRequest { plan: plan.clone(), set_index, relay: relay.clone() };
         let (set, times) = self.fetch(&request).await?;
+        let subject = subject(plan).ok_or_else(|| beyond_timeline(set_index))?;
+        let latest = SETS_IN_USE + sets_ahead(plan) as usize + EARLIER_SETS;
+        self.cached.keep_latest(latest - 1, |set| set.subject == subject);
         let bytes = set_bytes(&set.images) + relay.as_ref().map_or(0, RelayBuffer::bytes);
         let fetched_s = start.elapsed().as_secs_f64();
         let engine = self.engine.clone();
@@ -257,7 +271,7 @@ impl Sets {
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
         let moment = moment(plan, set_index).ok_or_else(|| beyond_timeline(set_index))?;
         let cameras = plan.workload.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
-        Ok((ReadySet { set, since: Instant::now(), content, cell: plan.cell, moment, cameras, relay }, bytes))
+        Ok((ReadySet { set, since: Instant::now(), content, cell: plan.cell, moment, subject, cameras, relay }, bytes))
     }
 
     async fn fetch(&self, request: &SetRequest) -> Result<(SampleSet, FetchTimes), Status> {

@@ -33,6 +33,9 @@ pub enum FrameError {
     /// The JPEG library refuses.
     #[error("JPEG: {0}")]
     Jpeg(String),
+    /// The PNG library refuses.
+    #[error("PNG: {0}")]
+    Png(String),
     /// Size over the limits, or data that does not decode.
     #[error(transparent)]
     Decode(#[from] DecodeError),

@@ -13,14 +13,16 @@ use glam::UVec2;
 
 use crate::error::check_limit;
 use crate::lz4::expand_lz4;
-use crate::{DecodeLimits, FrameError, jpeg};
+use crate::{DecodeLimits, FrameError, jpeg, png};
 
-/// The packing of frames: `lz4`, `jpeg` or `jpeg:QUALITY` in settings.
+/// The packing of frames: `lz4`, `png`, `jpeg` or `jpeg:QUALITY` in settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum FrameCodec {
     /// Without loss: differences along the row, LZ4.
     #[default]
     Lz4,
+    /// Without loss, for programs that read pictures: PNG without colour chunks.
+    Png,
     /// Baseline JPEG.
     Jpeg {
         /// 1 to 100.
@@ -32,7 +34,7 @@ const DEFAULT_JPEG_QUALITY: u8 = 90;
 
 /// Why a text names no codec.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("frame codec {0:?}, must be lz4, jpeg or jpeg:QUALITY with a quality of 1 to 100")]
+#[error("frame codec {0:?}, must be lz4, png, jpeg or jpeg:QUALITY with a quality of 1 to 100")]
 pub struct ParseFrameCodecError(String);
 
 impl FromStr for FrameCodec {
@@ -41,6 +43,7 @@ impl FromStr for FrameCodec {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let quality = match text.split_once(':') {
             None if text == "lz4" => return Ok(Self::Lz4),
+            None if text == "png" => return Ok(Self::Png),
             None if text == "jpeg" => Some(DEFAULT_JPEG_QUALITY),
             Some(("jpeg", quality)) => quality.parse().ok().filter(|quality| (1..=100).contains(quality)),
             _ => None,
@@ -53,6 +56,7 @@ impl fmt::Display for FrameCodec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Lz4 => f.write_str("lz4"),
+            Self::Png => f.write_str("png"),
             Self::Jpeg { quality } => write!(f, "jpeg:{quality}"),
         }
     }
@@ -61,7 +65,7 @@ impl fmt::Display for FrameCodec {
 /// Packs a frame of three bytes a pixel, rows top-down.
 ///
 /// # Errors
-/// A slice that is not of the frame's size; a size or quality that JPEG cannot have.
+/// A slice that is not of the frame's size; a size or quality that the codec cannot have.
 pub fn encode_frame(codec: FrameCodec, size_px: UVec2, rgb: &[u8]) -> Result<Bytes, FrameError> {
     let UVec2 { x: width, y: height } = size_px;
     let (pixels, rest) = rgb.as_chunks::<3>();
@@ -70,6 +74,7 @@ pub fn encode_frame(codec: FrameCodec, size_px: UVec2, rgb: &[u8]) -> Result<Byt
     }
     Ok(match codec {
         FrameCodec::Lz4 => lz4_flex::block::compress(&filter(pixels)).into(),
+        FrameCodec::Png => png::encode(width, height, rgb)?.into(),
         FrameCodec::Jpeg { quality } => jpeg::encode(width, height, rgb, quality)?.into(),
     })
 }
@@ -92,7 +97,8 @@ pub fn decode_frame(
             unfilter(&mut rgb);
             Ok(rgb)
         }
-        FrameCodec::Jpeg { .. } => jpeg::decode(size_px.x, size_px.y, data),
+        FrameCodec::Png => png::decode(size_px, data),
+        FrameCodec::Jpeg { .. } => jpeg::decode(size_px, data),
     }
 }
 
@@ -137,13 +143,29 @@ mod tests {
     }
 
     #[test]
-    fn lz4_frames_survive_to_the_bit() {
+    fn frames_without_loss_survive_to_the_bit() {
         for (width, height) in [(1, 1), (3, 2), (200, 150)] {
             let rgb = picture(width, height);
             let size_px = UVec2::new(width as u32, height as u32);
-            let data = encode_frame(FrameCodec::Lz4, size_px, &rgb).expect("right size");
-            assert_eq!(decode_frame(FrameCodec::Lz4, size_px, &data, &limits()).as_ref(), Ok(&rgb));
+            for codec in [FrameCodec::Lz4, FrameCodec::Png] {
+                let data = encode_frame(codec, size_px, &rgb).expect("right size");
+                assert_eq!(decode_frame(codec, size_px, &data, &limits()).as_ref(), Ok(&rgb));
+            }
         }
+    }
+
+    #[test]
+    fn png_frames_have_no_colour_chunks() {
+        let data = encode_frame(FrameCodec::Png, UVec2::new(20, 10), &picture(20, 10)).expect("right size");
+        let mut chunks = Vec::new();
+        let mut rest = &data[8..];
+        while let [a, b, c, d, name @ ..] = rest {
+            let length = u32::from_be_bytes([*a, *b, *c, *d]) as usize;
+            chunks.push(String::from_utf8_lossy(&name[..4]).into_owned());
+            rest = &name[4 + length + 4..];
+        }
+        chunks.dedup();
+        assert_eq!(chunks, ["IHDR", "IDAT", "IEND"]);
     }
 
     #[test]
@@ -169,7 +191,7 @@ mod tests {
     fn damaged_frames_never_panic() {
         let (rgb, size_px) = (picture(40, 30), UVec2::new(40, 30));
         let mut random = Random::new(16);
-        for codec in [FrameCodec::Lz4, FrameCodec::Jpeg { quality: 80 }] {
+        for codec in [FrameCodec::Lz4, FrameCodec::Png, FrameCodec::Jpeg { quality: 80 }] {
             let good = encode_frame(codec, size_px, &rgb).expect("right size");
             for case in 0..4000 {
                 let mut data = good.to_vec();
@@ -195,11 +217,11 @@ mod tests {
 
     #[test]
     fn names_of_codecs_survive() {
-        for name in ["lz4", "jpeg:1", "jpeg:90", "jpeg:100"] {
+        for name in ["lz4", "png", "jpeg:1", "jpeg:90", "jpeg:100"] {
             assert_eq!(name.parse::<FrameCodec>().expect(name).to_string(), name);
         }
         assert_eq!("jpeg".parse(), Ok(FrameCodec::Jpeg { quality: 90 }));
-        for name in ["", "png", "lz4:3", "jpeg:0", "jpeg:101", "jpeg:", "JPEG"] {
+        for name in ["", "PNG", "png:9", "lz4:3", "jpeg:0", "jpeg:101", "jpeg:", "JPEG"] {
             assert!(name.parse::<FrameCodec>().is_err(), "{name}");
         }
     }

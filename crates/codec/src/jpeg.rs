@@ -2,10 +2,12 @@
 
 use std::io::Cursor;
 
-use image::{ColorType, ImageDecoder, Limits, codecs::jpeg::JpegDecoder};
+use glam::UVec2;
+use image::codecs::jpeg::JpegDecoder;
 use jpeg_encoder::Encoder;
 
 use crate::FrameError;
+use crate::picture::decode_rgb;
 
 /// Packs three bytes a pixel.
 pub(crate) fn encode(width: u32, height: u32, rgb: &[u8], quality: u8) -> Result<Vec<u8>, FrameError> {
@@ -21,16 +23,7 @@ pub(crate) fn encode(width: u32, height: u32, rgb: &[u8], quality: u8) -> Result
 }
 
 /// Unpacks a picture that must be of the given size, which the caller has checked against its limits.
-pub(crate) fn decode(width: u32, height: u32, data: &[u8]) -> Result<Vec<u8>, FrameError> {
-    let jpeg_error = |error: image::ImageError| FrameError::Jpeg(error.to_string());
-    let mut decoder = JpegDecoder::new(Cursor::new(data)).map_err(jpeg_error)?;
-    if decoder.dimensions() != (width, height) || decoder.color_type() != ColorType::Rgb8 {
-        return Err(FrameError::Jpeg(format!("not an RGB picture of {width}×{height}")));
-    }
-    let mut limits = Limits::default();
-    (limits.max_image_width, limits.max_image_height) = (Some(width), Some(height));
-    decoder.set_limits(limits).map_err(jpeg_error)?;
-    let mut rgb = vec![0; width as usize * height as usize * 3];
-    decoder.read_image(&mut rgb).map_err(jpeg_error)?;
-    Ok(rgb)
+pub(crate) fn decode(size_px: UVec2, data: &[u8]) -> Result<Vec<u8>, FrameError> {
+    let decoded = JpegDecoder::new(Cursor::new(data)).and_then(|decoder| decode_rgb(decoder, size_px));
+    decoded.map_err(|error| FrameError::Jpeg(error.to_string()))
 }

@@ -19,6 +19,8 @@ mod image_codec;
 mod image_header;
 mod jpeg;
 mod lz4;
+mod picture;
+mod png;
 mod quantise;
 mod reassembler;
 mod runs;

@@ -137,6 +137,27 @@ where
         held.filter(|held| wanted(&held.value)).map(Pinned::new).collect()
     }
 
+    /// Evicts the least recently used of the values that are `alike` and not in use, until `most` that are alike are left.
+    pub fn keep_latest(&self, most: usize, alike: impl Fn(&V) -> bool) {
+        let mut state = self.0.state.lock();
+        let mut all: Vec<(u64, K)> = Vec::new();
+        for (key, entry) in &state.entries {
+            if let Entry::Loaded { held, last_use, .. } = entry
+                && alike(&held.value)
+            {
+                all.push((*last_use, key.clone()));
+            }
+        }
+        all.sort_unstable_by_key(|(last_use, _)| *last_use);
+        let beyond: Vec<K> = all.drain(..all.len().saturating_sub(most)).map(|(_, key)| key).collect();
+        let mut evicted = state.unused(Duration::ZERO);
+        evicted.retain(|(key, _)| beyond.contains(key));
+        let evicted = state.evict_until(0, &evicted);
+        drop(state);
+        drop(evicted);
+        self.0.freed.notify_waiters();
+    }
+
     /// A value, loaded for the first that asks for it. A load that has begun goes on when those that wait for it leave, and a
     /// failed one is forgotten. `load` gives the value and its size, which should be at most `most_bytes`.
     ///

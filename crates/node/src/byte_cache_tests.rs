@@ -294,3 +294,20 @@ async fn the_bound_holds_at_each_step_of_any_sequence() {
         bench.assert_bounded();
     }
 }
+
+#[tokio::test]
+async fn the_latest_of_values_that_are_alike_stay_and_so_do_those_in_use() {
+    let bench = Bench::new(100);
+    let in_use = bench.get(1, 5).await.unwrap();
+    for key in [2, 3, 4] {
+        bench.get(key, 5).await.unwrap();
+    }
+    bench.get(9, 7).await.unwrap();
+    bench.cache.keep_latest(2, |block| block.bytes == 5);
+    let kept = [1, 2, 3, 4, 9].map(|key| bench.cache.loaded(&key).is_some());
+    assert_eq!(kept, [true, false, true, true, true]);
+    drop(in_use);
+    bench.cache.keep_latest(2, |block| block.bytes == 5);
+    assert_eq!(bench.existing.load(Ordering::SeqCst), 17);
+    bench.assert_bounded();
+}

@@ -91,7 +91,7 @@ impl FirstUses {
         if uses.len() >= MOST_FORMS {
             uses.clear();
         }
-        let first_use = uses.entry(hasher.finish()).or_default().clone();
+        let first_use = uses.entry(hasher.finish()).or_insert_with(|| Arc::new(Once::new())).clone();
         drop(uses);
         let is_first = !first_use.is_completed();
         // Where an earlier thread panicked, the pass goes on without.

@@ -31,7 +31,7 @@ messages! {
 impl Convert<String> for FrameCodec {
     fn read(text: String, field: &'static str) -> Result<Self, WireError> {
         let short: String = text.chars().take(32).collect();
-        Ok(text.parse().map_err(|_| InvalidField::out_of_range(field, short, "lz4, jpeg or jpeg:QUALITY"))?)
+        Ok(text.parse().map_err(|_| InvalidField::out_of_range(field, short, "lz4, png, jpeg or jpeg:QUALITY"))?)
     }
 
     fn write(self) -> String {

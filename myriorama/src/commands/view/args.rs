@@ -65,7 +65,7 @@ pub struct ViewArgs {
     /// With --frames: starts with one ray a light and pixel, and doubles them from frame to frame
     #[arg(long)]
     pub(super) refine: bool,
-    /// The codec of frames: lz4 (lossless) or jpeg:QUALITY
+    /// The codec of frames: lz4 or png (lossless), or jpeg:QUALITY
     #[arg(long, default_value = "lz4", value_name = "NAME")]
     pub(super) codec: FrameCodec,
     /// The policy: pipeline, direct, time-share, or auto (the fastest by prediction)
