@@ -41,6 +41,8 @@ pub(crate) struct LiveStream {
     poses: Poses,
     /// The plan of the last frame: epochs rise.
     plan_epoch: u64,
+    /// The time at which the last call was answered.
+    opened_at: Option<Instant>,
     /// The first of the failures since the last frame.
     failing_since: Option<Instant>,
 }
@@ -71,7 +73,8 @@ impl LiveStream {
         frames: mpsc::Sender<Result<Encoded, ClientError>>,
     ) -> impl Future<Output = ()> {
         let (client_id, poses) = (new_client_id(), Poses::default());
-        let mut stream = Self { state, newest, client_id, frames, poses, plan_epoch: 0, failing_since: None };
+        let mut stream =
+            Self { state, newest, client_id, frames, poses, plan_epoch: 0, opened_at: None, failing_since: None };
         async move {
             if let Err(error) = stream.follow().await {
                 // A failure to send means that the viewer has left.
@@ -93,7 +96,7 @@ impl LiveStream {
                 tried = self.wait_for_others(tried).await?;
                 continue;
             };
-            let start = Instant::now();
+            self.opened_at = None;
             match self.stream_from(peer).await {
                 Ok(Left::ByViewer) => return Ok(()),
                 Ok(Left::ForPlan) => (),
@@ -101,7 +104,8 @@ impl LiveStream {
                 Err(Failure::OfPlan(error) | Failure::Exhausted(error)) => {
                     tracing::debug!(client = self.client_id, node = peer.share.node_name, %error, "a live stream ends");
                     // A stream that lasted ends a series of failures, even if no frame was requested on it.
-                    self.failing_since = self.failing_since.filter(|_| start.elapsed() < CALL_TIMEOUT);
+                    let has_lasted = self.opened_at.is_some_and(|opened| opened.elapsed() >= CALL_TIMEOUT);
+                    self.failing_since = self.failing_since.filter(|_| !has_lasted);
                     tried.add(peer, error);
                 }
             }
@@ -124,6 +128,7 @@ impl LiveStream {
     /// Streams from one compositor, until the call fails or another compositor is to be asked.
     async fn stream_from(&mut self, peer: &Peer) -> Result<Left, Failure> {
         let mut call = Call::open(peer.clone()).await?;
+        self.opened_at = Some(Instant::now());
         self.poses.begin_stream();
         loop {
             tokio::select! {

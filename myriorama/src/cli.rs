@@ -4,7 +4,7 @@ use app_core::exit::Outcome;
 use app_core::process::runtime;
 use clap::{Parser, Subcommand};
 
-use crate::commands::{coordinator, health, node, replay, status, up, view};
+use crate::commands::{coordinator, gateway, health, node, replay, status, up, view};
 
 /// Many views of one scene from a few depth images.
 ///
@@ -43,6 +43,8 @@ pub enum Command {
     Coordinator(coordinator::CoordinatorArgs),
     /// Joins a coordinator, to sample and composite by its plan
     Node(node::NodeArgs),
+    /// Serves the viewer to browsers
+    Gateway(gateway::GatewayArgs),
     /// Asks a cluster for views and writes them as pictures
     View(view::ViewArgs),
     /// Shows the nodes of a cluster, their roles, and the reason of the plan
@@ -67,6 +69,7 @@ impl Command {
             Self::Up(args) => runtime()?.block_on(up::run(args)),
             Self::Coordinator(args) => runtime()?.block_on(coordinator::run(args)),
             Self::Node(args) => runtime()?.block_on(node::run(args)),
+            Self::Gateway(args) => runtime()?.block_on(gateway::run(args)),
             Self::View(args) => {
                 let runtime = runtime()?;
                 let outcome = runtime.block_on(view::run(args));

@@ -30,6 +30,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("node-host", &["sampler-node", "compositor-node", "node", "wire", "cluster"]),
     ("coordinator", &["node", "wire", "cluster", "codec", "depth-image"]),
     ("client", &["wire", "cluster", "codec", "depth-image"]),
+    ("gateway", &["client", "wire", "cluster", "codec", "depth-image"]),
     ("simulation", &["client", "coordinator", "cluster", "depth-image"]),
     ("table", &[]),
     ("study", &["metrics", "table"]),
@@ -83,6 +84,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "coordinator",
             "depth-image",
             "engine",
+            "gateway",
             "lab",
             "metrics",
             "node",
@@ -93,7 +95,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "wire",
         ],
     ),
-    ("cluster-tests", &["client", "cluster", "codec", "coordinator", "depth-image", "node", "node-host", "wire"]),
+    (
+        "cluster-tests",
+        &["client", "cluster", "codec", "coordinator", "depth-image", "gateway", "node", "node-host", "wire"],
+    ),
 ];
 
 /// Crates that work on pictures in different ways, and never use one another, not even in tests.

@@ -1,0 +1,83 @@
+//! The page's files, as they are in `page/`.
+
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+
+/// The program's version, which the page names, too.
+pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
+const VERSION_PLACE: &str = "{version}";
+/// Only files of this server are loaded and connected to.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
+    connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+macro_rules! files {
+    ($($name:literal, $media_type:literal;)*) => {
+        &[$(($name, $media_type, include_str!(concat!("../page/", $name)))),*]
+    };
+}
+
+const FILES: &[(&str, &str, &str)] = files! {
+    "index.html", "text/html; charset=utf-8";
+    "style.css", "text/css; charset=utf-8";
+    "main.js", "text/javascript; charset=utf-8";
+    "camera.js", "text/javascript; charset=utf-8";
+    "input.js", "text/javascript; charset=utf-8";
+    "link.js", "text/javascript; charset=utf-8";
+    "screen.js", "text/javascript; charset=utf-8";
+    "statistics.js", "text/javascript; charset=utf-8";
+};
+
+/// The answer to a request for a file; without a body where the browser has it already.
+pub(crate) fn answer(name: &str, headers: &HeaderMap) -> Response {
+    let Some((_, media_type, text)) = FILES.iter().find(|(known, ..)| *known == name) else {
+        return (StatusCode::NOT_FOUND, "no such page\n").into_response();
+    };
+    let text = text.replace(VERSION_PLACE, VERSION);
+    let etag = format!("\"{}\"", &blake3::hash(text.as_bytes()).to_hex()[..32]);
+    let has_it = headers.get(header::IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == etag.as_bytes());
+    let mut response = if has_it { StatusCode::NOT_MODIFIED.into_response() } else { text.into_response() };
+    let fields = [
+        (header::CONTENT_TYPE, media_type.parse()),
+        (header::ETAG, etag.parse()),
+        (header::CACHE_CONTROL, "no-cache".parse()),
+        (header::CONTENT_SECURITY_POLICY, POLICY.parse()),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff".parse()),
+        (header::REFERRER_POLICY, "no-referrer".parse()),
+    ];
+    for (name, value) in fields {
+        response.headers_mut().insert(name, value.unwrap_or(HeaderValue::from_static("")));
+    }
+    response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_sent_once() {
+        let first = answer("index.html", &HeaderMap::new());
+        assert_eq!(first.status(), StatusCode::OK);
+        let mut headers = HeaderMap::new();
+        headers.insert(header::IF_NONE_MATCH, first.headers()[header::ETAG].clone());
+        assert_eq!(answer("index.html", &headers).status(), StatusCode::NOT_MODIFIED);
+        assert_eq!(answer("main.js", &headers).status(), StatusCode::OK);
+        assert_eq!(answer("../Cargo.toml", &headers).status(), StatusCode::NOT_FOUND);
+    }
+
+    #[test]
+    fn the_page_is_small() {
+        let bytes: usize = FILES.iter().map(|(.., text)| text.len()).sum();
+        assert!(bytes <= 120_000, "{bytes}");
+        assert!(FILES.iter().all(|(name, _, text)| text.lines().count() < 400 || panic!("{name}")));
+    }
+
+    #[test]
+    fn the_page_names_its_version_and_no_address() {
+        let all: String = FILES.iter().map(|(.., text)| *text).collect();
+        assert!(all.contains(VERSION_PLACE));
+        for absolute in ["http://", "https://", "href=\"/", "src=\"/"] {
+            assert!(!all.contains(absolute), "{absolute}");
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Settings of a gateway.
+
+use std::sync::Arc;
+
+use cluster::{OfferStatus, SessionRequest};
+use depth_image::PinholeCamera;
+use glam::UVec2;
+
+/// The request of the session that all visitors of a scene share, for views like this one. The page names no method, and the
+/// gateway knows none.
+pub type RequestOf = Arc<dyn Fn(&OfferStatus, PinholeCamera) -> SessionRequest + Send + Sync>;
+
+/// Settings of a gateway.
+#[derive(Clone)]
+pub struct GatewayConfig {
+    /// The coordinator's address, as `http://host:port`.
+    pub coordinator: String,
+    /// The request of a scene's session.
+    pub request_of: RequestOf,
+    /// Visitors at a time; further ones wait. Each has two streams of the 64 that a connection to a compositor may have.
+    pub max_visitors: usize,
+    /// Columns and rows of the largest still.
+    pub max_still_px: UVec2,
+    /// Names of this server, beside `localhost` and addresses.
+    pub hosts: Vec<String>,
+    /// Origins of other pages that may use this server, as `https://host`.
+    pub origins: Vec<String>,
+}
+
+impl GatewayConfig {
+    /// The gateway of a coordinator, for 24 visitors and stills of up to 1920×1080.
+    #[must_use]
+    pub fn new(coordinator: &str, request_of: RequestOf) -> Self {
+        Self {
+            coordinator: coordinator.to_owned(),
+            request_of,
+            max_visitors: 24,
+            max_still_px: UVec2::new(1920, 1080),
+            hosts: Vec::new(),
+            origins: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! State that all requests share.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use tokio::sync::Semaphore;
+use tokio_util::sync::CancellationToken;
+
+use crate::config::GatewayConfig;
+use crate::scenes::Scenes;
+use crate::stills::Stills;
+
+/// Pages that wait for a place.
+const MAX_WAITING: usize = 64;
+
+/// State that all requests share.
+pub(crate) struct Gateway {
+    pub(crate) config: GatewayConfig,
+    pub(crate) scenes: Scenes,
+    /// Places of visitors.
+    pub(crate) visitors: Semaphore,
+    pub(crate) shutdown: CancellationToken,
+    /// Places of all pages, those that wait included.
+    pub(crate) pages: Arc<Semaphore>,
+    pub(crate) stills: Stills,
+    last_visitor: AtomicU64,
+}
+
+impl Gateway {
+    pub(crate) fn new(config: GatewayConfig, shutdown: CancellationToken) -> Self {
+        Self {
+            scenes: Scenes::new(config.clone()),
+            visitors: Semaphore::new(config.max_visitors),
+            pages: Arc::new(Semaphore::new(config.max_visitors + MAX_WAITING)),
+            stills: Stills::default(),
+            last_visitor: AtomicU64::default(),
+            config,
+            shutdown,
+        }
+    }
+
+    pub(crate) fn next_visitor(&self) -> u64 {
+        self.last_visitor.fetch_add(1, Ordering::Relaxed)
+    }
+}

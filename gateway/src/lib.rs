@@ -1,0 +1,24 @@
+//! The way of browsers into a cluster: a page, a WebSocket for each visitor, and views over plain HTTP.
+//!
+//! `server` answers connections and `http` their requests. A `visitor` has two live streams, one of pictures in
+//! motion and one of stills; `rate` chooses the size of the pictures in motion. `scenes` keeps one session for all visitors of
+//! a scene. Messages are in `protocol`, and on a page of the documentation: `docs/viewer-protocol.md`.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod assets;
+mod camera;
+mod config;
+mod gateway;
+mod http;
+mod origin;
+mod picture_stream;
+mod protocol;
+mod rate;
+mod scenes;
+mod server;
+mod stills;
+mod visitor;
+mod visits;
+
+pub use config::{GatewayConfig, RequestOf};
+pub use server::{Connections, accept, serve};

@@ -1,0 +1,139 @@
+//! One of a visitor's two streams: poses that were asked for, pictures that were sent and not shown yet.
+
+use std::collections::VecDeque;
+use std::time::Instant;
+
+use bytes::Bytes;
+use client::{ClientError, EncodedFrame, EncodedLiveView, Session};
+use codec::FrameCodec;
+use depth_image::PinholeCamera;
+
+use crate::protocol::{self, PictureHeader, PictureTimes, Pose};
+
+/// Poses that are remembered: a client replaces those that were not sent.
+const MAX_ASKED: usize = 512;
+
+/// A pose that was asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Asked {
+    pub(crate) pose: Pose,
+    /// The live stream's own number.
+    frame: u64,
+    arrived: Instant,
+    /// Poses that it replaced.
+    replaced: u64,
+}
+
+/// A picture that was sent and not shown yet.
+#[derive(Debug, Clone, Copy)]
+struct Sent {
+    number: u64,
+    frame: u64,
+    /// `None` for a picture whose age says nothing of the link: one that was discarded, or repeats a pose.
+    height_px: Option<u32>,
+}
+
+pub(crate) struct PictureStream {
+    view: EncodedLiveView,
+    /// The number of the last picture.
+    last: u64,
+    asked: VecDeque<Asked>,
+    sent: VecDeque<Sent>,
+}
+
+impl PictureStream {
+    pub(crate) fn new(session: &Session) -> Self {
+        Self { view: session.live_encoded(), last: 0, asked: VecDeque::new(), sent: VecDeque::new() }
+    }
+
+    /// Asks for a picture of a pose.
+    pub(crate) fn ask(&mut self, pose: Pose, camera: PinholeCamera, codec: FrameCodec) -> Result<(), ClientError> {
+        let frame = self.view.set_pose(camera, 0, codec)?;
+        if self.asked.len() >= MAX_ASKED {
+            self.asked.pop_front();
+        }
+        self.asked.push_back(Asked { pose, frame, arrived: Instant::now(), replaced: 0 });
+        Ok(())
+    }
+
+    /// The next picture, and the pose that it answers. Cancellation loses none.
+    pub(crate) async fn next(&mut self) -> Result<(EncodedFrame, Option<Asked>), ClientError> {
+        let frame = self.view.next().await?;
+        let at = self.asked.iter().position(|asked| asked.frame == frame.request.frame);
+        let asked = at.and_then(|at| {
+            let asked = self.asked.drain(..=at).next_back()?;
+            Some(Asked { replaced: at as u64, ..asked })
+        });
+        Ok((frame, asked))
+    }
+
+    /// A picture is not sent. Its credit is given back, after those of pictures that were sent before it.
+    pub(crate) fn discard(&mut self, frame: &EncodedFrame) {
+        match self.sent.back().copied() {
+            Some(last) => self.sent.push_back(Sent { frame: frame.request.frame, height_px: None, ..last }),
+            None => self.view.confirm(frame.request.frame),
+        }
+    }
+
+    /// The height of a picture that was sent and not shown yet.
+    pub(crate) fn height_of(&self, number: u64) -> Option<u32> {
+        self.sent.iter().find(|sent| sent.number == number)?.height_px
+    }
+
+    /// All pictures up to this number have been shown, or never will be.
+    pub(crate) fn shown(&mut self, number: u64) {
+        while let Some(sent) = self.sent.front().copied().filter(|sent| sent.number <= number) {
+            self.view.confirm(sent.frame);
+            self.sent.pop_front();
+        }
+    }
+
+    /// The message of a picture, which is sent now.
+    pub(crate) fn message(&mut self, frame: &EncodedFrame, asked: &Asked) -> Bytes {
+        let (number, size_px) = (asked.pose.number, frame.header.size_px);
+        let height_px = (number > self.last).then_some(size_px.y);
+        self.last = number;
+        self.sent.push_back(Sent { number, frame: frame.request.frame, height_px });
+        let header = &frame.header;
+        let media_type = match header.codec {
+            FrameCodec::Png => "image/png",
+            FrameCodec::Jpeg { .. } => "image/jpeg",
+            FrameCodec::Lz4 => "application/octet-stream",
+        };
+        let picture = PictureHeader {
+            number,
+            still: asked.pose.still,
+            media_type,
+            size_px: size_px.to_array(),
+            camera: asked.pose.camera,
+            set: header.sample_set_id.to_string(),
+            cell: header.cell,
+            neighbour: header.is_neighbour_cell,
+            compositor: frame.node_name.clone(),
+            replaced: asked.replaced,
+            times_ms: times(frame, asked.arrived, Instant::now()),
+        };
+        protocol::picture(&picture, &frame.data[..header.color_bytes as usize])
+    }
+}
+
+/// The parts of a picture's time between its pose's arrival and its departure, which add up.
+fn times(frame: &EncodedFrame, arrived: Instant, leaves: Instant) -> PictureTimes {
+    let ms = |seconds: f64| seconds * 1000.0;
+    let between = |from: Instant, to: Instant| ms(to.saturating_duration_since(from).as_secs_f64());
+    let at = &frame.header.stage_times;
+    let (to_send, forward) = (between(arrived, frame.sent), between(frame.received, leaves));
+    let gateway = between(arrived, leaves);
+    PictureTimes {
+        gateway,
+        to_send,
+        cluster_network: gateway - to_send - forward - ms(at.compositor_s),
+        set: ms(at.set_wait_s),
+        credit: ms(at.credit_wait_s),
+        queue: ms(at.queue_s),
+        reconstruct: ms(at.batch_s),
+        encode: ms(at.encode_s),
+        send: ms(at.send_wait_s),
+        forward,
+    }
+}

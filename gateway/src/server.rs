@@ -1,0 +1,85 @@
+//! Connections of HTTP/1, each within limits.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::mpsc;
+use tokio::task::JoinSet;
+use tokio_util::sync::CancellationToken;
+
+use crate::config::GatewayConfig;
+use crate::gateway::Gateway;
+use crate::http::router;
+
+/// The time that a request's headers may take, and the idle time of a connection between requests.
+const HEADERS_WITHIN: Duration = Duration::from_secs(10);
+/// Open connections: further ones wait in the system's queue.
+const MAX_CONNECTIONS: usize = 1024;
+/// Connections that wait for the gateway.
+const WAITING: usize = 16;
+/// The delay after a failure to accept: where the system has no more files, others must close theirs first.
+const AFTER_ERROR: Duration = Duration::from_millis(100);
+/// The time that connections may take to end.
+const DRAIN: Duration = Duration::from_secs(5);
+
+/// Connections of browsers, from a port of their own or from one that they share with gRPC.
+pub type Connections = mpsc::Receiver<TcpStream>;
+
+/// Accepts the connections of a port, until nobody takes them.
+#[must_use]
+pub fn accept(listener: TcpListener) -> Connections {
+    let (send, connections) = mpsc::channel(WAITING);
+    tokio::spawn(async move {
+        loop {
+            let accepted = tokio::select! {
+                accepted = listener.accept() => accepted,
+                () = send.closed() => return,
+            };
+            match accepted {
+                Ok((stream, _)) => drop(send.send(stream).await),
+                Err(error) => {
+                    tracing::warn!(%error, "no connection can be accepted");
+                    tokio::time::sleep(AFTER_ERROR).await;
+                }
+            }
+        }
+    });
+    connections
+}
+
+/// Serves browsers until `shutdown`.
+pub async fn serve(mut connections: Connections, config: GatewayConfig, shutdown: CancellationToken) {
+    let gateway = Arc::new(Gateway::new(config, shutdown.clone()));
+    let (router, mut open) = (router(gateway.clone()), JoinSet::new());
+    open.spawn(async move { gateway.scenes.prepare().await });
+    loop {
+        while open.try_join_next().is_some() {}
+        let stream = tokio::select! {
+            () = shutdown.cancelled() => break,
+            Some(_) = open.join_next(), if open.len() >= MAX_CONNECTIONS => continue,
+            stream = connections.recv(), if open.len() < MAX_CONNECTIONS => match stream {
+                Some(stream) => stream,
+                None => break,
+            },
+        };
+        let _ = stream.set_nodelay(true);
+        let (service, shutdown) = (TowerToHyperService::new(router.clone()), shutdown.clone());
+        open.spawn(async move {
+            let mut http = hyper::server::conn::http1::Builder::new();
+            http.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN);
+            let connection = http.serve_connection(TokioIo::new(stream), service).with_upgrades();
+            tokio::pin!(connection);
+            tokio::select! {
+                _ = &mut connection => return,
+                () = shutdown.cancelled() => connection.as_mut().graceful_shutdown(),
+            }
+            // A fault of one connection is that client's own.
+            let _ = tokio::time::timeout(DRAIN, connection).await;
+        });
+    }
+    let ended = async { while open.join_next().await.is_some() {} };
+    let _ = tokio::time::timeout(DRAIN, ended).await;
+}
