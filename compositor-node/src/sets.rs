@@ -28,7 +28,7 @@ type BoxFuture<T> = Pin<Box<dyn Future<Output = T> + Send>>;
 /// While one set is sent and loaded, samplers should have another to work on.
 const SETS_AHEAD: u32 = 2;
 /// Sets of earlier moments that stay beside these: a client may ask again for what it has just seen. The next sets are made in
-/// the memory of older ones, for new memory costs a software device half as much as loading a set.
+/// the memory of older ones: the system clears new memory page by page, in the time of a software device.
 const EARLIER_SETS: usize = 4;
 /// A set that was used within this time is not evicted for that of another cell ahead: a viewer's next pose needs it.
 const RECENTLY: Duration = Duration::from_millis(500);

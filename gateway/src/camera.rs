@@ -5,8 +5,6 @@ use depth_image::{Camera, PinholeCamera, ViewCell};
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// The distance to the near plane, as a share of the scene's diagonal.
-const NEAR_OF_DIAGONAL: f32 = 1e-3;
 /// The field of view of a page that chooses none, in degrees.
 const FOV_Y_DEG: f64 = 45.0;
 /// The greatest coordinate of a camera, in the scene file's unit.
@@ -48,8 +46,7 @@ pub(crate) struct ViewSpace {
 
 impl ViewSpace {
     pub(crate) fn of(offer: &OfferStatus) -> Self {
-        let near_m = (offer.volume.size().length() * NEAR_OF_DIAGONAL).max(1e-6);
-        Self { origin_in_source: offer.origin_in_source, near_m }
+        Self { origin_in_source: offer.origin_in_source, near_m: offer.volume.near_m() }
     }
 
     /// The camera of a view of this size.

@@ -152,7 +152,7 @@ async fn found(page: &mut Page, gateway: &Gateway, name: Option<&str>) -> Result
             Err(error @ crate::scenes::SceneError::Unknown { .. }) => return Err(End::Refused(error.to_string())),
             Err(error) => page.wait("connecting", &error.to_string())?,
         }
-        page.pause(AFTER_FAILURE).await?;
+        page.pause(|_, _| Ok(())).await?;
     }
 }
 
@@ -219,15 +219,16 @@ impl Page {
         }
     }
 
-    /// Lets time pass; poses of that time are lost.
-    async fn pause(&mut self, time: Duration) -> Result<(), End> {
-        let end = tokio::time::sleep(time);
+    /// Lets a moment pass before another attempt; `hear` takes the messages of that time.
+    async fn pause(&mut self, mut hear: impl FnMut(&Self, FromPage) -> Result<(), End>) -> Result<(), End> {
+        let end = tokio::time::sleep(AFTER_FAILURE);
         tokio::pin!(end);
         loop {
-            tokio::select! {
+            let message = tokio::select! {
                 () = &mut end => return Ok(()),
-                message = self.next() => drop(message?),
-            }
+                message = self.next() => message?,
+            };
+            hear(self, message)?;
         }
     }
 
@@ -288,19 +289,7 @@ impl Visitor {
             if !matches!(error, ClientError::Exhausted { .. } | ClientError::Invalid { .. }) {
                 self.scene.has_failed(session);
             }
-            self.pause(page).await?;
-        }
-    }
-
-    /// Lets a moment pass before another attempt.
-    async fn pause(&mut self, page: &mut Page) -> Result<(), End> {
-        let end = tokio::time::sleep(AFTER_FAILURE);
-        tokio::pin!(end);
-        loop {
-            tokio::select! {
-                () = &mut end => return Ok(()),
-                message = page.next() => self.hear(page, message?)?,
-            }
+            page.pause(|page, message| self.hear(page, message)).await?;
         }
     }
 

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use parking_lot::Mutex;
 
-/// A visitor who has not moved for so long asks for nothing.
+/// Visitors are active for this time after their last move.
 const ACTIVE_FOR: Duration = Duration::from_secs(10);
 
 /// The last moves of a scene's visitors.

@@ -253,6 +253,19 @@ impl Cluster {
         Ok(session)
     }
 
+    /// Closes a session, and waits until the coordinator has heard of it: the next may then force another policy.
+    ///
+    /// # Panics
+    /// The coordinator does not answer.
+    pub async fn close(&self, session: Session) {
+        let open = async || self.client.status().await.expect("a status").session_count();
+        let before = open().await;
+        drop(session);
+        while open().await >= before {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    }
+
     /// The number of times that each image was sampled since the last call, over all nodes.
     pub fn take_counts(&self) -> Vec<usize> {
         let mut all = std::collections::HashMap::new();

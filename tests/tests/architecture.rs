@@ -285,9 +285,11 @@ fn only_wire_names_messages() {
 #[test]
 fn thin_clients_link_no_graphics() {
     let uses = resolved();
-    let client = closure("client", &uses);
-    assert!(client.contains("wire") && client.contains("tonic"), "the graph was read");
-    assert_eq!(device_crates(&client), Vec::<&str>::new());
+    for name in ["client", "gateway"] {
+        let thin = closure(name, &uses);
+        assert!(thin.contains("wire") && thin.contains("tonic"), "the graph was read");
+        assert_eq!(device_crates(&thin), Vec::<&str>::new(), "{name}");
+    }
     assert!(device_crates(&closure("reconstruction", &uses)).contains(&"wgpu"), "the check sees wgpu where it is");
 }
 

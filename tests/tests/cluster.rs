@@ -3,7 +3,7 @@
 
 use std::collections::HashSet;
 
-use client::Frame;
+use client::{Frame, ViewRequest};
 use cluster::{Policy, PolicyChoice, Refinement, SceneHash, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, package, request, views};
 use cluster_tests::picture::fault_of;
@@ -76,6 +76,7 @@ async fn every_number_of_samplers_gives_the_same_pictures() {
         let mut frames = session.render_views(views(3, 4)).unwrap().all().await.unwrap();
         frames.sort_by_key(|frame| frame.request.frame);
         pictures.push(frames.into_iter().map(|frame| frame.view).collect::<Vec<_>>());
+        cluster.close(session).await;
     }
     assert!(pictures[0] == pictures[1] && pictures[1] == pictures[2]);
     let forced = SessionRequest { forced_sampler_count: Some(4), ..request(PolicyChoice::Pipeline, MOVING) };
@@ -102,6 +103,7 @@ async fn sets_of_sequential_images_stay_on_one_node() {
         frames.sort_by_key(|frame| frame.request.frame);
         assert!(cluster.take_counts().iter().all(|&times| times == 1), "no image twice in a session");
         pictures.push(frames.into_iter().map(|frame| frame.view).collect::<Vec<_>>());
+        cluster.close(session).await;
     }
     assert!(pictures[0] == pictures[1] && pictures[1] == pictures[2]);
     let still = SessionRequest {
@@ -195,4 +197,22 @@ async fn scenes_are_fetched_by_hash_and_stored_in_the_folder() {
     session.render_views(views(1, 1)).unwrap().all().await.unwrap();
     let kept = folder.path().join(format!("{}.scene", SceneHash::of(&package())));
     assert_eq!(std::fs::read(kept).unwrap(), package());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_latest_eight_moments_stay_on_the_device_and_older_ones_are_loaded_again() {
+    let cluster = Cluster::start(1).await;
+    let timeline = Timeline { set_count: 20, ..MOVING };
+    let session = cluster.session(request(PolicyChoice::Pipeline, timeline)).await.unwrap();
+    let loaded_by = async |requests: Vec<ViewRequest>| {
+        let before = cluster.metrics[0].sets_loaded.get();
+        session.render_views(requests).unwrap().all().await.unwrap();
+        cluster.metrics[0].sets_loaded.get() - before
+    };
+    let of_set = |set_index| views(20, 1).into_iter().filter(|view| view.set_index == set_index).collect();
+    assert_eq!(loaded_by(views(20, 1)).await, 20);
+    assert_eq!(loaded_by(of_set(19)).await, 0, "the last of the eight");
+    assert_eq!(loaded_by(of_set(13)).await, 0, "one of the eight, and so are those that are fetched ahead of it");
+    assert!(loaded_by(of_set(3)).await >= 1);
+    assert!(cluster.take_counts().iter().all(|times| *times == 1), "samplers kept the images");
 }

@@ -23,8 +23,6 @@ const SAMPLE_SIZE_PX: UVec2 = UVec2::new(400, 300);
 const TWO_PLANE_HEIGHT: f32 = 3.0;
 /// Half the angle between neighbouring cameras in front of a model.
 const MODEL_SPREAD_RAD: f32 = 0.12;
-/// The distance to the near plane of a camera from a file, as a share of the scene's diagonal.
-pub const NEAR_OF_DIAGONAL: f32 = 1e-3;
 
 /// The device.
 #[derive(Debug, Clone, Copy, Args)]
@@ -145,7 +143,7 @@ impl SceneArgs {
         let Some(path) = &self.samples else {
             return self.rig_cameras(scene, size_px.unwrap_or(SAMPLE_SIZE_PX));
         };
-        let near_m = (scene.bounds().size().length() * NEAR_OF_DIAGONAL).max(1e-6);
+        let near_m = scene.bounds().near_m();
         let cameras = camera_file::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?;
         Ok(cameras.into_iter().map(|camera| size_px.map_or(camera, |size_px| camera.resized(size_px))).collect())
     }

@@ -34,6 +34,12 @@ impl Aabb {
         Self { min: self.min - margin_m, max: self.max + margin_m }
     }
 
+    /// The distance to the near plane of cameras that name none: a thousandth of the diagonal, metres.
+    #[must_use]
+    pub fn near_m(&self) -> f32 {
+        (self.size().length() * 1e-3).max(1e-6)
+    }
+
     /// Returns whether the box holds no point.
     #[must_use]
     pub fn is_empty(&self) -> bool {

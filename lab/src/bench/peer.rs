@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use app_core::camera_file::{self, Placement};
-use app_core::setup::{NEAR_OF_DIAGONAL, SceneArgs, Setup};
+use app_core::setup::{SceneArgs, Setup};
 use depth_image::PinholeCamera;
 use engine::GpuEngine;
 use render::Lighting;
@@ -52,7 +52,7 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
 }
 
 fn views(args: &BenchArgs, setup: &Setup, folder: &std::path::Path) -> anyhow::Result<Vec<PinholeCamera>> {
-    let near_m = setup.offer.volume.size().length() * NEAR_OF_DIAGONAL;
+    let near_m = setup.offer.volume.near_m();
     let placement = Placement { origin_in_source: setup.scene.origin_in_source, near_m };
     let all = camera_file::read(&folder.join("views.json"), placement)?;
     let step = if args.quick { 8 } else { 1 };

@@ -5,7 +5,6 @@ use std::time::Instant;
 use anyhow::Context as _;
 use app_core::camera_file::{self, Placement};
 use app_core::exit::Outcome;
-use app_core::setup::NEAR_OF_DIAGONAL;
 use depth_image::PinholeCamera;
 use node::Engine as _;
 use scene::Limits;
@@ -58,7 +57,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
 fn given_views(args: &DemoArgs) -> anyhow::Result<Vec<PinholeCamera>> {
     let Some(path) = &args.cameras else { return Ok(Vec::new()) };
     let scene = args.scene.scene.load(&Limits::default()).context("the scene cannot be used")?;
-    let near_m = scene.bounds().size().length() * NEAR_OF_DIAGONAL;
+    let near_m = scene.bounds().near_m();
     Ok(camera_file::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?)
 }
 

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use app_core::camera_file::{self, Placement};
 use app_core::exit::BadInput;
-use app_core::setup::NEAR_OF_DIAGONAL;
 use app_core::sizes::{SizePx, grid};
 use clap::Args;
 use cluster::{OfferStatus, PolicyChoice};
@@ -139,7 +138,7 @@ impl Viewpoints {
     /// # Errors
     /// A file or a camera cannot be used, or the coordinator has no sample cameras.
     pub(super) fn cameras(&self, offer: &OfferStatus, size: SizePx) -> anyhow::Result<Vec<PinholeCamera>> {
-        let near_m = (offer.volume.size().length() * NEAR_OF_DIAGONAL).max(1e-6);
+        let near_m = offer.volume.near_m();
         let placement = Placement { origin_in_source: offer.origin_in_source, near_m };
         if let Some(path) = &self.cameras {
             return Ok(camera_file::read(path, placement)?);
