@@ -26,7 +26,7 @@ pub use chart::{
 pub use check::{Bar, Check, Outcome};
 pub use check_text::checks_text;
 pub use error::ReportError;
-pub use picture::{Legend, Picture, PictureRow, comparison_row, contact_sheet, error_map};
+pub use picture::{Legend, Picture, PictureRow, comparison_row, contact_sheet};
 pub use report::{Report, SCHEMA_VERSION};
 pub use slug::slug;
 pub use table::{Cell, Column, Table, TableError};

@@ -38,7 +38,10 @@ impl Server {
     }
 
     /// As [`Server::start`], at a port that another server may have used.
-    fn start_at<F>(address: &str, serve: impl FnOnce(TcpListener, CancellationToken) -> F + Send + 'static) -> Self
+    pub(crate) fn start_at<F>(
+        address: &str,
+        serve: impl FnOnce(TcpListener, CancellationToken) -> F + Send + 'static,
+    ) -> Self
     where
         F: Future<Output = Result<(), node::ServeError>> + Send + 'static,
     {
@@ -131,6 +134,8 @@ pub fn offer() -> SceneOffer {
         illumination: illumination(),
         origin_in_source: DVec3::ZERO,
         settings: OfferSettings::default(),
+        // Six moments of a viewer.
+        period_s: Some(0.5),
     }
 }
 

@@ -23,6 +23,15 @@ pub const FLOOR_LINEAR: Vec3 = Vec3::new(0.1, 0.6, 0.2);
 /// The colour of rays that leave the scene.
 pub const SKY_LINEAR: Vec3 = Vec3::new(0.0, 0.0, 0.25);
 
+/// The ball's radius.
+pub const BALL_RADIUS_M: f32 = 0.5;
+
+/// The middle of the ball, which rolls to the right.
+#[must_use]
+pub fn ball_center(scene_time_s: f32) -> Vec3 {
+    Vec3::new(scene_time_s * 0.4 - 0.4, 0.6, 0.0)
+}
+
 /// A lamp above the ball, and a sky; the scalar device checks that they arrive and shades with neither.
 #[must_use]
 pub fn illumination() -> Illumination {
@@ -91,9 +100,8 @@ struct Meets {
 }
 
 fn ball(ray: &Ray, scene_time_s: f32, refinement: Refinement) -> Option<Meets> {
-    let center = Vec3::new(scene_time_s * 0.4 - 0.4, 0.6, 0.0);
-    let (to_eye, d) = (ray.origin_in_world - center, ray.direction_in_world);
-    let (a, b, c) = (d.dot(d), to_eye.dot(d), to_eye.dot(to_eye) - 0.25);
+    let (to_eye, d) = (ray.origin_in_world - ball_center(scene_time_s), ray.direction_in_world);
+    let (a, b, c) = (d.dot(d), to_eye.dot(d), to_eye.dot(to_eye) - BALL_RADIUS_M * BALL_RADIUS_M);
     let t = (-b - (b * b - a * c).sqrt()) / a;
     (t > 0.0).then_some(Meets { planar_depth_m: t, color_linear: ball_linear(scene_time_s, refinement) })
 }

@@ -5,7 +5,8 @@ use std::io::{BufRead as _, BufReader, BufWriter, ErrorKind, Read as _, Write as
 use std::path::Path;
 
 use depth_image::PinholeCamera;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
+use pictures::camera_frame;
 use serde_json::{Map, Value, json};
 
 use crate::camera_file::{CameraFault, CameraFileError, fault};
@@ -31,18 +32,9 @@ impl NamedCamera {
     /// The line of the camera in a record, in the space of the scene file.
     #[must_use]
     pub fn line(&self, origin_in_source: DVec3) -> String {
-        let camera = &self.camera;
-        let axes = DMat3::from_quat(camera.world_from_camera.as_dquat().normalize());
-        let eye = camera.eye_in_world.as_dvec3() + origin_in_source;
-        let row = |i: usize| json!([axes.x_axis[i], axes.y_axis[i], axes.z_axis[i], eye[i]]);
         let mut frame = self.more.clone();
-        let (size_px, focal_px, principal_px) = (camera.size_px, camera.focal_px, camera.principal_px);
-        let fields = json!({
-            "file_path": self.file_path, "w": size_px.x, "h": size_px.y,
-            "fl_x": focal_px.x, "fl_y": focal_px.y, "cx": principal_px.x, "cy": principal_px.y,
-            "transform_matrix": [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]],
-        });
-        frame.extend(fields.as_object().cloned().unwrap_or_default());
+        frame.insert("file_path".to_owned(), json!(self.file_path));
+        frame.extend(camera_frame(&self.camera, origin_in_source));
         Value::Object(frame).to_string()
     }
 }

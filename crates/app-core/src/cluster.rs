@@ -5,10 +5,12 @@ use std::time::Duration;
 use anyhow::Context as _;
 use client::Client;
 use coordinator::{CoordinatorConfig, Observers, SceneOffers};
-use node::{NodeConfig, NodeMetrics, OpenEngine, ServeError};
+use node::{NodeConfig, NodeMetrics, OpenEngine, Port, ServeError};
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
+
+use crate::process::loopback_of;
 
 /// The longest wait for nodes of one process to join.
 const JOIN: Duration = Duration::from_secs(30);
@@ -22,24 +24,25 @@ pub struct Cluster {
 }
 
 impl Cluster {
-    /// Starts a coordinator on `listener` and `nodes` nodes, each with its configuration changed by `configure`, and waits
+    /// Starts a coordinator on `port` and `nodes` nodes, each with its configuration changed by `configure`, and waits
     /// until all have joined. Nodes fetch scenes unless the engine that `open` gives has them.
     ///
     /// # Errors
     /// A port is not to be had, or nodes do not join.
     pub async fn start(
         configure: impl Fn(NodeConfig) -> NodeConfig,
-        listener: TcpListener,
+        port: impl Into<Port>,
         offers: SceneOffers,
         open: OpenEngine,
         nodes: usize,
         insecure_bind: bool,
     ) -> anyhow::Result<Self> {
-        let address = format!("http://{}", loopback_of(&listener)?);
+        let port = port.into();
+        let address = format!("http://{}", loopback_of(&port.listener)?);
         let mut cluster = Self { address, shutdown: CancellationToken::new(), servers: JoinSet::new() };
         let config = CoordinatorConfig { insecure_bind, ..CoordinatorConfig::default() };
         let (observers, shutdown) = (Observers::default(), cluster.shutdown.clone());
-        cluster.servers.spawn(coordinator::serve(listener, config, offers, observers, shutdown));
+        cluster.servers.spawn(coordinator::serve(port, config, offers, observers, shutdown));
         for number in 0..nodes {
             let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
             // Enough digits to sort well: members are listed by name.
@@ -79,17 +82,4 @@ impl Cluster {
         }
         Ok(())
     }
-}
-
-/// The address at which this process reaches a listener, which may be bound to all addresses.
-fn loopback_of(listener: &TcpListener) -> anyhow::Result<std::net::SocketAddr> {
-    let mut address = listener.local_addr()?;
-    if address.ip().is_unspecified() {
-        address.set_ip(if address.is_ipv4() {
-            std::net::Ipv4Addr::LOCALHOST.into()
-        } else {
-            std::net::Ipv6Addr::LOCALHOST.into()
-        });
-    }
-    Ok(address)
 }

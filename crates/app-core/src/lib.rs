@@ -12,7 +12,6 @@ pub mod delivery;
 pub mod exit;
 pub mod live;
 pub mod memory;
-pub mod pictures;
 pub mod process;
 pub mod scenes;
 pub mod setup;

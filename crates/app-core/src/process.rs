@@ -1,6 +1,6 @@
 //! Basics of every command: a runtime, a signal, ports.
 
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use anyhow::Context as _;
 use node::Telemetry;
@@ -81,6 +81,18 @@ pub async fn listen(address: SocketAddr, insecure_bind: bool) -> anyhow::Result<
         return Err(BadInput(reason).into());
     }
     TcpListener::bind(address).await.with_context(|| format!("cannot listen on {address}"))
+}
+
+/// The address at which this process reaches a listener, which may be bound to all addresses.
+///
+/// # Errors
+/// The listener has no address.
+pub fn loopback_of(listener: &TcpListener) -> anyhow::Result<SocketAddr> {
+    let mut address = listener.local_addr()?;
+    if address.ip().is_unspecified() {
+        address.set_ip(if address.is_ipv4() { Ipv4Addr::LOCALHOST.into() } else { Ipv6Addr::LOCALHOST.into() });
+    }
+    Ok(address)
 }
 
 /// Serves the process's metrics until `shutdown`, where an address is given.

@@ -123,6 +123,7 @@ impl SceneArgs {
                 sampling: Some(self.sampling.to_string()),
                 lighting: Some(self.lighting.to_string()),
             },
+            period_s: scene.wind.map(|wind| f64::from(wind.frequency_hz).recip()).filter(|period| period.is_finite()),
         };
         Ok(Setup { scene, around, samples, offer })
     }

@@ -1,17 +1,14 @@
 //! Pictures of a report: rows of labelled images, contact sheets, false colours.
 
 mod contact_sheet;
-mod error_map;
 
 use image::RgbImage;
 use metrics::ScoreMap;
+use pictures::error_map;
 use serde::{Deserialize, Serialize};
 
 pub use contact_sheet::contact_sheet;
-pub use error_map::error_map;
-
-/// Names of colours.
-pub type Legend = Vec<(String, [u8; 3])>;
+pub use pictures::Legend;
 
 /// One image, written as `pictures/{slug(name)}.png`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

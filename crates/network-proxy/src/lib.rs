@@ -1,5 +1,9 @@
 //! A network that fails: a TCP proxy between two processes, switched while they communicate.
 
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod random;
+
 use std::io;
 use std::net::SocketAddr;
 use std::pin::pin;
@@ -12,7 +16,7 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::{JoinHandle, JoinSet};
 use tokio::time::{Instant, sleep_until};
 
-use crate::random::Random;
+pub use random::Random;
 
 /// Greatest size of a piece.
 const PIECE_BYTES: usize = 8 << 10;
@@ -41,6 +45,13 @@ pub enum Way {
     Slow {
         /// Rate of the direction.
         bytes_per_s: f64,
+    },
+    /// Bytes arrive later and at a limited rate: a link over a long way.
+    Link {
+        /// Rate of the direction.
+        bytes_per_s: f64,
+        /// Time of each byte on its way.
+        delay: Duration,
     },
     /// One in `one_in` pieces has a byte changed.
     Spoilt {
@@ -232,7 +243,7 @@ async fn take(
         let mut bytes = piece[..count].to_vec();
         let way = way(&network.borrow());
         last = last.max(Instant::now()) + spent(way, &mut bytes, &mut random);
-        let due = last.max(Instant::now() + waited(way, &mut random));
+        let due = last + waited(way, &mut random);
         // An empty piece is the end.
         if send.send((due, bytes)).await.is_err() || count == 0 {
             return Ok(());
@@ -243,7 +254,9 @@ async fn take(
 /// The serial time of a piece; changes a byte where the direction corrupts.
 fn spent(way: Way, bytes: &mut [u8], random: &mut Random) -> Duration {
     match way {
-        Way::Slow { bytes_per_s } => Duration::from_secs_f64(bytes.len() as f64 / bytes_per_s),
+        Way::Slow { bytes_per_s } | Way::Link { bytes_per_s, .. } => {
+            Duration::from_secs_f64(bytes.len() as f64 / bytes_per_s)
+        }
         Way::Spoilt { one_in } if !bytes.is_empty() && random.below(one_in) == 0 => {
             let at = random.below(bytes.len() as u64) as usize;
             bytes[at] ^= 1 << random.below(8);
@@ -255,7 +268,11 @@ fn spent(way: Way, bytes: &mut [u8], random: &mut Random) -> Duration {
 
 /// The additional time of a piece that overlaps with others.
 fn waited(way: Way, random: &mut Random) -> Duration {
-    let Way::Late { delay, jitter, one_in } = way else { return Duration::ZERO };
+    let (delay, jitter, one_in) = match way {
+        Way::Late { delay, jitter, one_in } => (delay, jitter, one_in),
+        Way::Link { delay, .. } => return delay,
+        _ => return Duration::ZERO,
+    };
     let again = if one_in > 0 && random.below(one_in) == 0 { RETRANSMISSION } else { Duration::ZERO };
     delay + random.up_to(jitter) + again
 }

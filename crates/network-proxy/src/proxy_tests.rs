@@ -44,6 +44,8 @@ async fn bytes_are_delayed_throttled_and_corrupted_as_ordered() {
     assert!(echoed(&mut stream, 100).await.unwrap().1 >= delay);
     proxy.set(Way::Slow { bytes_per_s: 50_000.0 }, Way::Pass);
     assert!(echoed(&mut stream, 10_000).await.unwrap().1 >= Duration::from_millis(190));
+    proxy.set(Way::Link { bytes_per_s: 50_000.0, delay }, Way::Pass);
+    assert!(echoed(&mut stream, 10_000).await.unwrap().1 >= Duration::from_millis(190) + delay);
     proxy.set(Way::Pass, Way::Spoilt { one_in: 1 });
     let (spoilt, _) = echoed(&mut stream, 100).await.unwrap();
     assert!((1..=8).contains(&spoilt.iter().filter(|&&byte| byte != 7).count()));

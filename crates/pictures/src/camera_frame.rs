@@ -1,0 +1,21 @@
+//! Cameras in the convention of `transforms.json`.
+
+use depth_image::PinholeCamera;
+use glam::{DMat3, DVec3};
+use serde_json::{Map, Value, json};
+
+/// The fields of a camera's frame in a `transforms.json`: sides, focal lengths and principal point in pixels, and the
+/// camera-to-world matrix of OpenGL's convention, in the space of the scene's file.
+#[must_use]
+pub fn camera_frame(camera: &PinholeCamera, origin_in_source: DVec3) -> Map<String, Value> {
+    let axes = DMat3::from_quat(camera.world_from_camera.as_dquat().normalize());
+    let eye = camera.eye_in_world.as_dvec3() + origin_in_source;
+    let row = |i: usize| json!([axes.x_axis[i], axes.y_axis[i], axes.z_axis[i], eye[i]]);
+    let (size_px, focal_px, principal_px) = (camera.size_px, camera.focal_px, camera.principal_px);
+    let fields = json!({
+        "w": size_px.x, "h": size_px.y,
+        "fl_x": focal_px.x, "fl_y": focal_px.y, "cx": principal_px.x, "cy": principal_px.y,
+        "transform_matrix": [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]],
+    });
+    fields.as_object().cloned().unwrap_or_default()
+}
