@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cluster::Assignment;
+use cluster::{Assignment, RenderViews};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 use wire::rpc::Backoff;
@@ -69,7 +69,8 @@ async fn call_all(
     let plan = active.clone();
     let arrange = move |views: &mut [ViewRequest]| cell_by_cell(&plan.plan.assignment, views);
     let views = Unrequested::new(sink.window().clone(), &weights, Box::new(arrange));
-    let pumps = start_pumps(active.request(), views, peers.len(), Some(active.plan.view_s()));
+    let request = RenderViews { planes: sink.window().lock().planes(), ..active.request() };
+    let pumps = start_pumps(request, views, peers.len(), Some(active.plan.view_s()));
     let mut calls = JoinSet::new();
     for (peer, pump) in peers.iter().zip(pumps) {
         if let Some(pump) = pump {

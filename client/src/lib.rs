@@ -27,6 +27,7 @@ pub use error::ClientError;
 pub use flow_control::FlowControl;
 pub use frames::Frames;
 pub use live_view::{EncodedLiveView, LiveView};
+pub use placement::ClientId;
 pub use session::{Client, Session};
 pub use view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, ViewRequest};
 pub use work_stealing::WorkStealing;

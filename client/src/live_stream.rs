@@ -13,7 +13,7 @@ use crate::active_plan::SessionState;
 use crate::delivery::GIVE_UP_AFTER;
 use crate::error::ClientError;
 use crate::peer::{Failure, FrameStream, Peer, decode};
-use crate::placement::{Tried, new_client_id};
+use crate::placement::{ClientId, Tried};
 use crate::poses::{Newest, Poses, SentPose};
 use crate::view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, ViewRequest};
 use crate::window::check_frame;
@@ -68,11 +68,12 @@ struct Call {
 impl LiveStream {
     /// Streams until the session ends or the viewer leaves.
     pub(crate) fn run(
+        ClientId(client_id): ClientId,
         state: watch::Receiver<SessionState>,
         newest: watch::Receiver<Newest>,
         frames: mpsc::Sender<Result<Encoded, ClientError>>,
     ) -> impl Future<Output = ()> {
-        let (client_id, poses) = (new_client_id(), Poses::default());
+        let poses = Poses::default();
         let mut stream =
             Self { state, newest, client_id, frames, poses, plan_epoch: 0, opened_at: None, failing_since: None };
         async move {

@@ -10,6 +10,7 @@ use tokio::task::JoinSet;
 use crate::active_plan::SessionState;
 use crate::error::ClientError;
 use crate::live_stream::{Encoded, LiveStream, decode_all};
+use crate::placement::ClientId;
 use crate::poses::{CREDITS, Newest, Pose};
 use crate::view_request::{EncodedFrame, LiveFrame, ViewRequest};
 
@@ -74,7 +75,7 @@ impl LiveView {
         let mut tasks = JoinSet::new();
         tasks.spawn(decode_all(to_decode, decoded));
         let posing = Posing::start(state.clone(), |newest| {
-            tasks.spawn(LiveStream::run(state, newest, encoded));
+            tasks.spawn(LiveStream::run(ClientId::new(), state, newest, encoded));
         });
         Self { posing, frames, _tasks: tasks }
     }
@@ -107,11 +108,11 @@ impl LiveView {
 }
 
 impl EncodedLiveView {
-    pub(crate) fn start(state: watch::Receiver<SessionState>) -> Self {
+    pub(crate) fn start(client: ClientId, state: watch::Receiver<SessionState>) -> Self {
         let (encoded, frames) = mpsc::channel(CREDITS);
         let mut tasks = JoinSet::new();
         let posing = Posing::start(state.clone(), |newest| {
-            tasks.spawn(LiveStream::run(state, newest, encoded));
+            tasks.spawn(LiveStream::run(client, state, newest, encoded));
         });
         Self { posing, frames, _tasks: tasks }
     }

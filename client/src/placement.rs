@@ -13,9 +13,17 @@ use crate::peer::Peer;
 /// one, so that clients of one process go to all compositors evenly.
 static NEXT: LazyLock<AtomicU64> = LazyLock::new(|| AtomicU64::new(RandomState::new().build_hasher().finish()));
 
-/// An id that names a client in logs and chooses its compositor.
-pub(crate) fn new_client_id() -> u64 {
-    NEXT.fetch_add(1, Ordering::Relaxed)
+/// A client of live streams. The id names it in logs and chooses its compositor: streams of one client share view cells there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ClientId(pub(crate) u64);
+
+impl ClientId {
+    /// The id of a new client.
+    #[must_use]
+    #[expect(clippy::new_without_default, reason = "every id is another")]
+    pub fn new() -> Self {
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
 }
 
 /// The order in which a client tries compositors of these weights.
@@ -82,10 +90,10 @@ mod tests {
     #[test]
     fn clients_of_a_process_spread_evenly_over_equal_compositors() {
         let mut clients = [0; 3];
-        let first = new_client_id();
+        let ClientId(first) = ClientId::new();
         (0..12).for_each(|i| clients[order(first + i, &[7; 3]).next().unwrap()] += 1);
         assert_eq!(clients, [4; 3]);
-        assert_ne!(new_client_id(), new_client_id());
+        assert_ne!(ClientId::new(), ClientId::new());
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use cluster::{ChangeSession, ClusterStatus, SessionEvent, SessionPlan, SessionRequest};
 use codec::FrameCodec;
-use depth_image::PinholeCamera;
+use depth_image::{PinholeCamera, ViewPlanes};
 use parking_lot::Mutex;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
@@ -19,6 +19,7 @@ use crate::delivery::deliver;
 use crate::error::ClientError;
 use crate::frames::Frames;
 use crate::live_view::{EncodedLiveView, LiveView};
+use crate::placement::ClientId;
 use crate::view_request::{ViewRequest, ViewSettings};
 use crate::window::Window;
 
@@ -146,6 +147,17 @@ impl Session {
         self.state.borrow().active.plan.clone()
     }
 
+    /// Waits for a plan of another number.
+    pub async fn another_plan(&self, plan_epoch: u64) -> SessionPlan {
+        let mut state = self.state.clone();
+        let other = state.wait_for(|state| state.active.plan_epoch() != plan_epoch).await;
+        match other.map(|state| state.active.plan.clone()) {
+            Ok(plan) => plan,
+            // The session has ended: no plan follows.
+            Err(_) => std::future::pending().await,
+        }
+    }
+
     /// Requests views by the method of the plan in force. Frames are received in the order they are ready. All
     /// compositors work at the same time, each at first on its own share of every set's views.
     ///
@@ -160,9 +172,20 @@ impl Session {
     where
         R: IntoIterator<Item = ViewRequest, IntoIter: Send + 'static>,
     {
-        let active = self.state.borrow().active.clone();
-        let sets = active.plan.assignment.workload.timeline.set_count;
-        let window = Window::open(requests.into_iter(), sets, active.settings.planes)?;
+        let planes = self.state.borrow().active.settings.planes;
+        self.render_views_with(planes, requests)
+    }
+
+    /// As [`Session::render_views`], with these planes in place of the session's.
+    ///
+    /// # Errors
+    /// As [`Session::render_views`].
+    pub fn render_views_with<R>(&self, planes: ViewPlanes, requests: R) -> Result<Frames, ClientError>
+    where
+        R: IntoIterator<Item = ViewRequest, IntoIter: Send + 'static>,
+    {
+        let sets = self.state.borrow().active.plan.assignment.workload.timeline.set_count;
+        let window = Window::open(requests.into_iter(), sets, planes)?;
         Ok(Frames::start(window, |sink| deliver(self.state.clone(), sink)))
     }
 
@@ -173,10 +196,10 @@ impl Session {
         LiveView::start(self.state.clone())
     }
 
-    /// The same, of which frames are not decoded.
+    /// The same, of which frames are not decoded, for one of a client's streams.
     #[must_use]
-    pub fn live_encoded(&self) -> EncodedLiveView {
-        EncodedLiveView::start(self.state.clone())
+    pub fn live_encoded(&self, client: ClientId) -> EncodedLiveView {
+        EncodedLiveView::start(client, self.state.clone())
     }
 }
 

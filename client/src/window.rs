@@ -107,6 +107,11 @@ impl Window {
         }
     }
 
+    /// The planes that all views have beside colour.
+    pub(crate) fn planes(&self) -> ViewPlanes {
+        self.planes
+    }
+
     /// The decoded bytes of a frame that is due.
     pub(crate) fn decoded_bytes(&self, frame: u64) -> usize {
         self.due.get(&frame).map_or(0, |request| request.camera.pixel_count() * self.planes.bytes_per_pixel())

@@ -47,6 +47,8 @@ pub struct SceneOffer {
     pub origin_in_source: DVec3,
     /// Defaults of sessions.
     pub settings: OfferSettings,
+    /// Seconds after which a scene that moves is as at its start; `None` for one that never moves.
+    pub period_s: Option<f64>,
 }
 
 /// The scenes that a coordinator offers, at least one; sessions that name none get the first.
@@ -115,6 +117,7 @@ impl SceneOffer {
             volume: self.volume,
             origin_in_source: self.origin_in_source,
             settings: self.settings.clone(),
+            period_s: self.period_s,
         }
     }
 

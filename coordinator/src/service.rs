@@ -8,8 +8,7 @@ use cluster::{
     Welcome, WorkReport,
 };
 use codec::MAX_CHUNK_BYTES;
-use node::{ServeError, health, until_drained, with_guard, with_reflection};
-use tokio::net::TcpListener;
+use node::{Port, ServeError, health, until_drained, with_guard, with_reflection};
 use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
@@ -35,7 +34,7 @@ const TICK: Duration = Duration::from_millis(250);
 /// # Errors
 /// Where the address is not allowed or the transport fails.
 pub async fn serve(
-    listener: TcpListener,
+    port: impl Into<Port>,
     config: CoordinatorConfig,
     offers: SceneOffers,
     observers: Observers,
@@ -49,7 +48,7 @@ pub async fn serve(
     running.spawn(measure_when_idle(shared.clone()));
     let service = CoordinatorService { shared, shutdown: shutdown.clone() };
     let routes = Routes::new(health(&["coordinator"]).await).add_service(coordinator_server(service));
-    node::serve(listener, with_reflection(routes, config.reflection)?, config.insecure_bind, shutdown).await
+    node::serve(port, with_reflection(routes, config.reflection)?, config.insecure_bind, shutdown).await
 }
 
 async fn tick(shared: Arc<Shared>) {

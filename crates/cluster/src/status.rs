@@ -142,6 +142,8 @@ pub struct OfferStatus {
     pub origin_in_source: DVec3,
     /// Settings for sessions that choose none.
     pub settings: OfferSettings,
+    /// Seconds after which a scene that moves is as at its start; `None` for one that never moves.
+    pub period_s: Option<f64>,
 }
 
 /// Settings named as on the command line; `None` where the client may choose.
@@ -162,6 +164,7 @@ impl OfferStatus {
         if !self.origin_in_source.is_finite() {
             return Err(InvalidField::out_of_range("origin_in_source", self.origin_in_source, "finite"));
         }
+        finite_seconds(self.period_s, "offer.period_s")?;
         nonempty(&self.name, "offers.name")?;
         self.scene.validate()?;
         at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras")?;

@@ -11,6 +11,7 @@ mod engine;
 mod measure;
 mod membership;
 mod plan;
+mod port;
 mod scenes;
 mod server;
 mod service;
@@ -32,6 +33,7 @@ pub use engine::{
 };
 pub use membership::keep_membership;
 pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};
+pub use port::Port;
 pub use scenes::Scenes;
 pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve, with_reflection};
 pub use service::NodeService;

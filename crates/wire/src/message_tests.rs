@@ -478,7 +478,8 @@ fn zeros_and_empty_texts_of_the_wire_become_none() {
     let settings = OfferSettings { lighting: Some("unlit".to_owned()), ..OfferSettings::default() };
     let Workload { scene, sample_cameras, volume, .. } = workload();
     let name = "scene".to_owned();
-    let offer = OfferStatus { name, scene, sample_cameras, volume, origin_in_source: DVec3::X, settings };
+    let (origin_in_source, period_s) = (DVec3::X, Some(2.5));
+    let offer = OfferStatus { name, scene, sample_cameras, volume, origin_in_source, settings, period_s };
     let message = to_message::<proto::SceneOffer, _>(offer.clone());
     assert_eq!((message.sampling_method.as_str(), message.lighting.as_str()), ("", "unlit"));
     assert_eq!(read::<OfferStatus, _>(message), Ok(offer));

@@ -17,7 +17,7 @@ enums! {
 
 messages! {
     SceneOffer = OfferStatus {
-        name, scene as "offer.scene", sample_cameras, volume as "offer.volume";
+        name, scene as "offer.scene", sample_cameras, volume as "offer.volume", period_s;
         origin_in_source: origin_in_source_x_m | origin_in_source_y_m | origin_in_source_z_m,
         settings: reconstruction_method | sampling_method | lighting
     }, first |o| at_most(o.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras"), then OfferStatus::validate;
