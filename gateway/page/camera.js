@@ -14,6 +14,7 @@ const FASTER = 4;
 export const add = (a, b) => a.map((v, i) => v + b[i]);
 export const scale = (a, s) => a.map((v) => v * s);
 export const length = (a) => Math.hypot(...a);
+export const dot = (a, b) => a.reduce((sum, v, i) => sum + v * b[i], 0);
 const clamp = (v, low, high) => Math.min(high, Math.max(low, v));
 
 /** The unit vector from the target to the eye. */
@@ -21,12 +22,16 @@ export function backward({ yaw, pitch }) {
   return [Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch), Math.cos(yaw) * Math.cos(pitch)];
 }
 
+/** The unit vectors of a camera: rightwards, upwards, and from the target to the eye. */
+export function axesOf(state) {
+  return [right(state), up(state), backward(state)];
+}
+
 function right({ yaw }) {
   return [Math.cos(yaw), 0, -Math.sin(yaw)];
 }
 
-function up(state) {
-  const { yaw, pitch } = state;
+function up({ yaw, pitch }) {
   return [-Math.sin(yaw) * Math.sin(pitch), Math.cos(pitch), -Math.cos(yaw) * Math.sin(pitch)];
 }
 
@@ -79,11 +84,34 @@ export function withMode(state, isFlying) {
   return { ...state, isFlying };
 }
 
-/** Shows all of a scene with these corners. */
-export function fit(state, [low, high]) {
+/** Shows all of a scene with these corners, in a window with this ratio of width to height. */
+export function fit(state, [low, high], aspect) {
   const size = length(add(high, scale(low, -1)));
-  const distance = (0.5 * size) / Math.tan((state.fovY * Math.PI) / 360);
+  const slope = Math.tan((state.fovY * Math.PI) / 360) * Math.min(1, aspect);
+  // The sphere around the scene touches the nearer sides of the view.
+  const distance = (0.5 * size) / Math.sin(Math.atan(slope));
   return { ...state, target: scale(add(low, high), 0.5), distance, size };
+}
+
+/** Makes a point the pivot. Around it, the view moves sideways only; a flying camera stays and turns to it. */
+export function pivotAt(state, point) {
+  const [eye, back] = [eyeOf(state), backward(state)];
+  const fromPoint = add(eye, scale(point, -1));
+  const distance = state.isFlying ? length(fromPoint) : dot(fromPoint, back);
+  if (distance < NEAREST * state.size) return state;
+  if (!state.isFlying) return { ...state, target: point, distance };
+  return fromCamera({ eye, target: point, fov_y_deg: state.fovY }, state.size, true);
+}
+
+/** The state at a share of the way between two. */
+export function between(from, to, share) {
+  const mix = (a, b) => a + (b - a) * share;
+  const turns = Math.round((to.yaw - from.yaw) / (2 * Math.PI));
+  const yaw = mix(from.yaw, to.yaw - turns * 2 * Math.PI);
+  const mixed = { ...to, yaw, pitch: mix(from.pitch, to.pitch), distance: mix(from.distance, to.distance) };
+  const last = eyeOf(to);
+  const eye = eyeOf(from).map((v, i) => mix(v, last[i]));
+  return { ...mixed, target: add(eye, scale(backward(mixed), -mixed.distance)) };
 }
 
 /** One key press, or the same state for other keys. */
@@ -123,7 +151,7 @@ export function isSame(a, b) {
 
 /** The camera as a transforms.json with one frame, for a picture of this size. */
 export function toTransforms(state, width, height) {
-  const [x, y, z, eye] = [right(state), up(state), backward(state), eyeOf(state)];
+  const [[x, y, z], eye] = [axesOf(state), eyeOf(state)];
   const focal = (0.5 * height) / Math.tan((state.fovY * Math.PI) / 360);
   const row = (i) => [x[i], y[i], z[i], eye[i]];
   const frame = {

@@ -5,20 +5,23 @@ import { dolly, fly, pan, press, turn } from "./camera.js";
 const FLY_KEYS = { w: [0, 0, 1], s: [0, 0, -1], a: [-1, 0, 0], d: [1, 0, 0], q: [0, -1, 0], e: [0, 1, 0] };
 const WHEEL_PER_PIXEL = 0.0015;
 const WHEEL_LINE_PX = 16;
+/** A pointer that moves less has clicked. */
+const DRAG_PX = 4;
 
 export class Input {
-  /** `change(update, eventTime)` is called with a function from state to state; `command(key)` with other keys. */
-  constructor(canvas, { change, command, isFlying }) {
-    this.canvas = canvas;
-    this.change = change;
-    this.command = command;
-    this.isFlying = isFlying;
+  /**
+   * `change(update, eventTime)` is called with a function from state to state; `command(key)` with other keys, and returns
+   * whether it knows them; `click` and `doubleClick` with a place as shares of the canvas's width and height.
+   */
+  constructor(canvas, { change, command, click, doubleClick, isFlying }) {
+    Object.assign(this, { canvas, change, command, click, isFlying });
     this.pointers = new Map();
     this.held = new Set();
     const on = (name, listener, options) => canvas.addEventListener(name, listener.bind(this), options);
     on("pointerdown", this.down);
     on("pointermove", this.move);
     for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) on(name, this.up);
+    on("dblclick", (event) => doubleClick(this.place(event)));
     on("wheel", this.wheel, { passive: false });
     on("contextmenu", (event) => event.preventDefault());
     on("keydown", this.keydown);
@@ -30,15 +33,26 @@ export class Input {
     this.canvas.focus();
     this.canvas.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, [event.clientX, event.clientY]);
+    if (this.pointers.size > 1 || event.button !== 0) this.pressed = null;
+    else this.pressed = [event.clientX, event.clientY];
   }
 
   up(event) {
+    if (event.type === "pointerup" && this.pressed) this.click(this.place(event));
+    this.pressed = null;
     this.pointers.delete(event.pointerId);
+  }
+
+  place(event) {
+    return [event.offsetX / this.canvas.clientWidth, event.offsetY / this.canvas.clientHeight];
   }
 
   move(event) {
     const before = this.pointers.get(event.pointerId);
     if (!before) return;
+    // A hand that trembles does not drag.
+    if (this.pressed && Math.hypot(event.clientX - this.pressed[0], event.clientY - this.pressed[1]) < DRAG_PX) return;
+    this.pressed = null;
     const after = [event.clientX, event.clientY];
     const [dx, dy] = [after[0] - before[0], after[1] - before[1]];
     const height = this.canvas.clientHeight;
@@ -81,8 +95,8 @@ export class Input {
     } else if (key.startsWith("Arrow") || ["+", "=", "-"].includes(key)) {
       event.preventDefault();
       this.change((state) => press(state, key), event.timeStamp);
-    } else {
-      this.command(key);
+    } else if (!event.repeat && this.command(key)) {
+      event.preventDefault();
     }
   }
 

@@ -1,5 +1,7 @@
 // The connection to the gateway: messages of the protocol myriorama.v1, reconnected with growing delays.
 
+import { refusal } from "./api.js";
+
 const FIRST_DELAY_MS = 250;
 const LONGEST_DELAY_MS = 4000;
 
@@ -51,10 +53,16 @@ export class Link {
     this.listeners.message(message);
   }
 
-  lost() {
+  async lost() {
+    const { socket, isWelcome } = this;
     this.isWelcome = false;
     if (this.isRefused) return;
     this.listeners.closed();
+    // A browser does not tell a page why its connection fails.
+    const reason = isWelcome ? null : await refusal(LONGEST_DELAY_MS);
+    // Another scene may have been chosen meanwhile.
+    if (socket !== this.socket) return;
+    if (reason) return this.listeners.message({ type: "refused", reason });
     this.timer = setTimeout(() => this.connect(), delayBefore(this.attempt));
     this.attempt += 1;
   }

@@ -20,10 +20,53 @@ export function quantile(values, share) {
   return sorted.length ? sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))] : NaN;
 }
 
+function ms(value) {
+  return Number.isFinite(value) ? `${value.toFixed(1)} ms` : "–";
+}
+
+function ratesOf(recent, last) {
+  const seconds = WINDOW_MS / 1000;
+  const sum = recent.reduce((bytes, picture) => bytes + picture.bytes, 0);
+  return [
+    ["pictures a second", (recent.length / seconds).toFixed(1)],
+    ["kB a second", (sum / seconds / 1000).toFixed(0)],
+    ["size", last.header.size_px.join("×")],
+    ["quality", last.header.jpeg_quality ? `JPEG, ${last.header.jpeg_quality} of 100` : "lossless"],
+    ["round trip, least", ms(last.header.rtt_ms ?? NaN)],
+  ];
+}
+
+function agesOf(recent) {
+  const moving = recent.filter((picture) => !picture.header.still);
+  const ages = moving.map((picture) => picture.age);
+  const median = (name) => quantile(moving.map((picture) => picture.parts[name]), 0.5);
+  return [
+    ["age in motion, 95 %", ms(quantile(ages, 0.95))],
+    ["age in motion, median", ms(quantile(ages, 0.5))],
+    ...PARTS.map((name) => [name.replace("_", " "), ms(median(name)), "part"]),
+  ];
+}
+
+/** Where the last picture comes from. */
+function originOf(header, lightSteps) {
+  return [
+    ["light step", `${header.light_step} of ${lightSteps}`],
+    ["sample set", header.set],
+    ["view cell", `${header.cell}, ${header.neighbour ? "a neighbour's" : "the view's own"}`],
+    ["compositor", header.compositor],
+  ];
+}
+
+function planRows(plan) {
+  return plan ? [["plan", `${plan.epoch}: ${plan.policy}`], ["reason", plan.reason, "text"]] : [["plan", "–"]];
+}
+
 export class Statistics {
   constructor() {
     this.pictures = [];
     this.replaced = 0;
+    /** Pictures that came and were not shown, by reason. */
+    this.drops = { late: 0, undecoded: 0 };
   }
 
   /** A picture on the screen. */
@@ -35,34 +78,34 @@ export class Statistics {
     return age;
   }
 
-  /** Rows of name and value. */
-  rows(now, plan) {
+  /** A picture that is not shown, for a reason. */
+  dropped(reason, picture) {
+    this.replaced += picture.header.replaced;
+    this.drops[reason] += 1;
+    return picture.paintedAt - picture.posedAt;
+  }
+
+  /** Rows of name and value; a third entry says that a row is a "part" of the one above, or a "text". */
+  rows(now, plan, lightSteps) {
     const recent = this.pictures.filter((picture) => now - picture.paintedAt < WINDOW_MS && !picture.isRepeat);
     const last = this.pictures[this.pictures.length - 1];
     if (!last) return [["pictures", "none yet"]];
-    const moving = recent.filter((picture) => !picture.header.still);
-    const ages = moving.map((picture) => picture.age);
-    const ms = (value) => (Number.isFinite(value) ? `${value.toFixed(1)} ms` : "–");
-    const sum = recent.reduce((bytes, picture) => bytes + picture.bytes, 0);
-    const seconds = WINDOW_MS / 1000;
-    const parts = PARTS.map((name) => [`  ${name.replace("_", " ")}`, ms(quantile(moving.map((p) => p.parts[name]), 0.5))]);
+    const origin = originOf(last.header, lightSteps);
+    return [...ratesOf(recent, last), ...agesOf(recent), ...origin, ...this.dropRows(), ...planRows(plan)];
+  }
+
+  dropRows() {
     return [
-      ["pictures a second", (recent.length / seconds).toFixed(1)],
-      ["kB a second", (sum / seconds / 1000).toFixed(0)],
-      ["size", `${last.header.size_px.join("×")} ${last.header.media_type.slice(6)}`],
-      ["age in motion, median", ms(quantile(ages, 0.5))],
-      ["age in motion, 95 %", ms(quantile(ages, 0.95))],
-      ...parts,
-      ["sample set, cell", `${last.header.set}, ${last.header.cell}${last.header.neighbour ? " (neighbour)" : ""}`],
-      ["compositor", last.header.compositor],
-      ["plan", plan ? `${plan.epoch}: ${plan.policy}` : "–"],
-      ["poses replaced", this.replaced],
+      ["dropped", this.replaced + this.drops.late + this.drops.undecoded],
+      ["poses replaced", this.replaced, "part"],
+      ["pictures late", this.drops.late, "part"],
+      ["pictures not decoded", this.drops.undecoded, "part"],
     ];
   }
 
   csv() {
-    const names = ["number", "still", "width_px", "height_px", "bytes", "age_ms", ...PARTS.map((part) => `${part}_ms`)];
-    const row = (p) => [p.header.number, p.header.still, ...p.header.size_px, p.bytes, p.age.toFixed(3),
+    const names = ["number", "still", "width_px", "height_px", "jpeg_quality", "bytes", "rtt_ms", "age_ms", ...PARTS.map((part) => `${part}_ms`)];
+    const row = (p) => [p.header.number, p.header.still, ...p.header.size_px, p.header.jpeg_quality ?? "", p.bytes, p.header.rtt_ms?.toFixed(3) ?? "", p.age.toFixed(3),
       ...PARTS.map((part) => p.parts[part].toFixed(3))];
     return [names, ...this.pictures.map(row)].map((fields) => fields.join(",")).join("\n") + "\n";
   }

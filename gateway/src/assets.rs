@@ -18,13 +18,30 @@ macro_rules! files {
 
 const FILES: &[(&str, &str, &str)] = files! {
     "index.html", "text/html; charset=utf-8";
+    "status.html", "text/html; charset=utf-8";
     "style.css", "text/css; charset=utf-8";
-    "main.js", "text/javascript; charset=utf-8";
+    "api.js", "text/javascript; charset=utf-8";
     "camera.js", "text/javascript; charset=utf-8";
+    "chart.js", "text/javascript; charset=utf-8";
+    "compare.js", "text/javascript; charset=utf-8";
+    "dom.js", "text/javascript; charset=utf-8";
+    "frusta.js", "text/javascript; charset=utf-8";
     "input.js", "text/javascript; charset=utf-8";
     "link.js", "text/javascript; charset=utf-8";
+    "main.js", "text/javascript; charset=utf-8";
+    "marks.js", "text/javascript; charset=utf-8";
+    "measure.js", "text/javascript; charset=utf-8";
+    "notices.js", "text/javascript; charset=utf-8";
+    "overlays.js", "text/javascript; charset=utf-8";
+    "panels.js", "text/javascript; charset=utf-8";
+    "pictures.js", "text/javascript; charset=utf-8";
+    "pivot.js", "text/javascript; charset=utf-8";
+    "playback.js", "text/javascript; charset=utf-8";
+    "poses.js", "text/javascript; charset=utf-8";
+    "projection.js", "text/javascript; charset=utf-8";
     "screen.js", "text/javascript; charset=utf-8";
     "statistics.js", "text/javascript; charset=utf-8";
+    "status.js", "text/javascript; charset=utf-8";
 };
 
 /// The answer to a request for a file; without a body where the browser has it already.

@@ -23,6 +23,8 @@ pub(crate) struct Gateway {
     /// Places of all pages, those that wait included.
     pub(crate) pages: Arc<Semaphore>,
     pub(crate) stills: Stills,
+    /// The place of a view that is compared.
+    pub(crate) comparison: Semaphore,
     last_visitor: AtomicU64,
 }
 
@@ -33,6 +35,7 @@ impl Gateway {
             visitors: Semaphore::new(config.max_visitors),
             pages: Arc::new(Semaphore::new(config.max_visitors + MAX_WAITING)),
             stills: Stills::default(),
+            comparison: Semaphore::new(1),
             last_visitor: AtomicU64::default(),
             config,
             shutdown,

@@ -7,18 +7,28 @@
 
 mod assets;
 mod camera;
+mod compare;
 mod config;
 mod gateway;
 mod http;
+mod kept_session;
 mod origin;
+mod page;
 mod picture_stream;
 mod protocol;
 mod rate;
+mod responses;
 mod scenes;
 mod server;
+mod status;
 mod stills;
+mod tls;
+mod token;
+mod views;
 mod visitor;
 mod visits;
 
 pub use config::{GatewayConfig, RequestOf};
 pub use server::{Connections, accept, serve};
+pub use tls::{TlsError, tls_config};
+pub use token::Token;

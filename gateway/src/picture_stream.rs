@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Instant;
 
 use bytes::Bytes;
-use client::{ClientError, EncodedFrame, EncodedLiveView, Session};
+use client::{ClientError, ClientId, EncodedFrame, EncodedLiveView, Session};
 use codec::FrameCodec;
 use depth_image::PinholeCamera;
 
@@ -33,6 +33,17 @@ struct Sent {
     height_px: Option<u32>,
 }
 
+/// What the page is told of a picture, beside its frame's own header.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct About {
+    /// From 1.
+    pub(crate) light_step: u32,
+    /// Whether its view cell is made for its place.
+    pub(crate) is_own_cell: bool,
+    /// The least round trip to the page so far.
+    pub(crate) rtt_s: Option<f64>,
+}
+
 pub(crate) struct PictureStream {
     view: EncodedLiveView,
     /// The number of the last picture.
@@ -42,13 +53,20 @@ pub(crate) struct PictureStream {
 }
 
 impl PictureStream {
-    pub(crate) fn new(session: &Session) -> Self {
-        Self { view: session.live_encoded(), last: 0, asked: VecDeque::new(), sent: VecDeque::new() }
+    /// A stream of this client.
+    pub(crate) fn new(session: &Session, client: ClientId) -> Self {
+        Self { view: session.live_encoded(client), last: 0, asked: VecDeque::new(), sent: VecDeque::new() }
     }
 
-    /// Asks for a picture of a pose.
-    pub(crate) fn ask(&mut self, pose: Pose, camera: PinholeCamera, codec: FrameCodec) -> Result<(), ClientError> {
-        let frame = self.view.set_pose(camera, 0, codec)?;
+    /// Asks for a picture of a pose from a sample set.
+    pub(crate) fn ask(
+        &mut self,
+        pose: Pose,
+        camera: PinholeCamera,
+        set_index: u32,
+        codec: FrameCodec,
+    ) -> Result<(), ClientError> {
+        let frame = self.view.set_pose(camera, set_index, codec)?;
         if self.asked.len() >= MAX_ASKED {
             self.asked.pop_front();
         }
@@ -89,26 +107,29 @@ impl PictureStream {
     }
 
     /// The message of a picture, which is sent now.
-    pub(crate) fn message(&mut self, frame: &EncodedFrame, asked: &Asked) -> Bytes {
+    pub(crate) fn message(&mut self, frame: &EncodedFrame, asked: &Asked, about: About) -> Bytes {
         let (number, size_px) = (asked.pose.number, frame.header.size_px);
         let height_px = (number > self.last).then_some(size_px.y);
         self.last = number;
         self.sent.push_back(Sent { number, frame: frame.request.frame, height_px });
         let header = &frame.header;
-        let media_type = match header.codec {
-            FrameCodec::Png => "image/png",
-            FrameCodec::Jpeg { .. } => "image/jpeg",
-            FrameCodec::Lz4 => "application/octet-stream",
+        let (media_type, jpeg_quality) = match header.codec {
+            FrameCodec::Png => ("image/png", None),
+            FrameCodec::Jpeg { quality } => ("image/jpeg", Some(quality)),
+            FrameCodec::Lz4 => ("application/octet-stream", None),
         };
         let picture = PictureHeader {
             number,
             still: asked.pose.still,
             media_type,
+            jpeg_quality,
+            rtt_ms: about.rtt_s.map(|rtt_s| rtt_s * 1000.0),
             size_px: size_px.to_array(),
             camera: asked.pose.camera,
             set: header.sample_set_id.to_string(),
             cell: header.cell,
-            neighbour: header.is_neighbour_cell,
+            light_step: about.light_step,
+            neighbour: !about.is_own_cell,
             compositor: frame.node_name.clone(),
             replaced: asked.replaced,
             times_ms: times(frame, asked.arrived, Instant::now()),
@@ -124,10 +145,12 @@ fn times(frame: &EncodedFrame, arrived: Instant, leaves: Instant) -> PictureTime
     let at = &frame.header.stage_times;
     let (to_send, forward) = (between(arrived, frame.sent), between(frame.received, leaves));
     let gateway = between(arrived, leaves);
+    let stages_s = at.set_wait_s + at.credit_wait_s + at.queue_s + at.batch_s + at.encode_s + at.send_wait_s;
     PictureTimes {
         gateway,
         to_send,
-        cluster_network: gateway - to_send - forward - ms(at.compositor_s),
+        // What no stage of the compositor accounts for.
+        cluster_network: gateway - to_send - forward - ms(stages_s),
         set: ms(at.set_wait_s),
         credit: ms(at.credit_wait_s),
         queue: ms(at.queue_s),

@@ -38,6 +38,9 @@ pub(crate) struct Pose {
     pub(crate) camera: PageCamera,
     /// Columns and rows of the canvas, in device pixels.
     pub(crate) canvas_px: [u32; 2],
+    /// The moment of a scene that moves; the first where none is named.
+    #[serde(default)]
+    pub(crate) moment: u32,
     /// Whether the camera rests: the picture is then lossless and of the canvas's size.
     pub(crate) still: bool,
 }
@@ -58,6 +61,12 @@ pub(crate) enum ToPage {
         home: PageCamera,
         /// The least and the greatest corner of its bounds, in the file's coordinates.
         bounds: [[f64; 3]; 2],
+        /// Steps in which the light of a still is refined.
+        light_steps: u32,
+        /// Moments of a scene that moves; 1 for one that never moves.
+        moments: u32,
+        /// The time between two moments.
+        moment_step_s: f64,
     },
     /// Why there are no pictures at the moment.
     Waiting {
@@ -91,14 +100,20 @@ pub(crate) struct PictureHeader {
     pub(crate) still: bool,
     /// `image/jpeg` or `image/png`.
     pub(crate) media_type: &'static str,
+    /// That of a JPEG, from 1 to 100.
+    pub(crate) jpeg_quality: Option<u8>,
     /// Columns and rows.
     pub(crate) size_px: [u32; 2],
+    /// The least round trip to the page so far, once it is known.
+    pub(crate) rtt_ms: Option<f64>,
     /// The camera that it shows.
     pub(crate) camera: PageCamera,
     /// The sample set, as `plan_epoch.set_index`.
     pub(crate) set: String,
     /// The view cell.
     pub(crate) cell: u32,
+    /// The step of its light, from 1 to the welcome's `light_steps`.
+    pub(crate) light_step: u32,
     /// Whether the cell is a neighbour of the view's own, which is not loaded yet.
     pub(crate) neighbour: bool,
     /// The compositor that made it.
@@ -159,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_pose_is_read() {
-        let pose = Pose { number: 7, camera: CAMERA, canvas_px: [640, 360], still: true };
+        let pose = Pose { number: 7, camera: CAMERA, canvas_px: [640, 360], moment: 0, still: true };
         assert_eq!(serde_json::from_str::<FromPage>(POSE).unwrap(), FromPage::Pose(pose));
         assert_eq!(serde_json::from_str::<FromPage>(r#"{"type":"open"}"#).unwrap(), FromPage::Open { scene: None });
     }
@@ -183,10 +198,13 @@ mod tests {
             number: 3,
             still: false,
             media_type: "image/jpeg",
+            jpeg_quality: Some(70),
             size_px: [32, 18],
+            rtt_ms: None,
             camera: CAMERA,
             set: "4.0".to_owned(),
             cell: 1,
+            light_step: 1,
             neighbour: false,
             compositor: "n0".to_owned(),
             replaced: 2,

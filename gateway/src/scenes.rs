@@ -1,28 +1,31 @@
-//! One session for all visitors of a scene. It is opened before anybody comes where the scene is the first on offer, and at
-//! its first visitor otherwise, and opened again when it fails.
+//! The scenes on offer that were visited, each with the sessions that its visitors share.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use client::{Client, ClientError, Session};
-use cluster::{OfferStatus, SessionEvent, SessionStage};
+use client::{Client, ClientError};
+use cluster::{DIRECT, OfferStatus, PolicyChoice, SessionRequest, Timeline};
 use glam::UVec2;
 use parking_lot::Mutex;
-use tokio::sync::{mpsc, watch};
-use tokio::task::JoinSet;
 
-use crate::camera::{PageCamera, ViewSpace};
-use crate::config::{GatewayConfig, RequestOf};
-use crate::visits::Visits;
+use crate::camera::{BadView, PageCamera, ViewSpace};
+use crate::config::GatewayConfig;
+use crate::kept_session::{FIRST_DELAY, FirstOpened, KeptSession, LONGEST_DELAY, Lingers};
 
 /// The size of pictures in motion that costs are measured on.
 const TYPICAL_PX: UVec2 = UVec2::new(640, 360);
-/// The delays between attempts to reach the coordinator.
-const FIRST_DELAY: Duration = Duration::from_millis(250);
-const LONGEST_DELAY: Duration = Duration::from_secs(4);
-/// The interval at which the session's demand follows the visitors.
-const FOLLOW: Duration = Duration::from_secs(1);
+
+/// Moments of a scene that moves.
+const MOMENTS_PER_S: f64 = 12.0;
+const MAX_MOMENTS: f64 = 120.0;
+
+/// A visitor who comes back soon finds the samples that were there.
+const VISITORS: Lingers = Lingers(Duration::from_secs(60));
+/// Nodes that draw single views are needed elsewhere.
+const SINGLE_VIEWS: Lingers = Lingers(Duration::from_secs(3));
+/// Views a second that are drawn directly: a low rate takes few nodes from visitors.
+const DIRECT_PER_S: f64 = 0.1;
 
 /// All scenes that were visited.
 pub(crate) struct Scenes {
@@ -34,7 +37,7 @@ pub(crate) struct Scenes {
 struct Known {
     /// The names on offer, in their order.
     names: Vec<String>,
-    scenes: BTreeMap<String, Arc<SceneSession>>,
+    scenes: BTreeMap<String, Arc<SceneSessions>>,
 }
 
 /// Why a scene cannot be visited.
@@ -51,32 +54,22 @@ pub(crate) enum SceneError {
     /// The coordinator does not answer.
     #[error("the coordinator does not answer: {0}")]
     Away(#[from] ClientError),
+    /// The scene on offer has no camera in front of it.
+    #[error("the scene cannot be viewed: {0}")]
+    Invalid(#[from] BadView),
 }
 
-/// What a scene's session is doing.
-#[derive(Debug, Clone)]
-pub(crate) enum SessionState {
-    /// It is being opened.
-    Waiting {
-        /// As in [`crate::protocol::ToPage::Waiting`].
-        stage: &'static str,
-        /// A sentence.
-        detail: String,
-    },
-    /// It is open.
-    Open(Arc<Session>),
-}
-
-/// A scene, and its session.
-pub(crate) struct SceneSession {
+/// A scene, and its sessions.
+pub(crate) struct SceneSessions {
     pub(crate) offer: OfferStatus,
     pub(crate) space: ViewSpace,
     pub(crate) home: PageCamera,
-    pub(crate) visits: Arc<Visits>,
-    state: watch::Receiver<SessionState>,
-    failures: mpsc::Sender<Arc<Session>>,
-    /// Ends with the scene.
-    _keeper: JoinSet<()>,
+    /// Views for visitors.
+    pub(crate) shown: KeptSession,
+    /// Views of a scene that moves, for visitors who see it move. At rest, many views share a sample set.
+    pub(crate) moving: Option<KeptSession>,
+    /// The same views drawn directly, for comparison.
+    pub(crate) direct: KeptSession,
 }
 
 impl Scenes {
@@ -95,10 +88,14 @@ impl Scenes {
     }
 
     /// A scene by its name; the first on offer where there is none.
-    pub(crate) async fn visit(&self, name: Option<&str>) -> Result<Arc<SceneSession>, SceneError> {
+    pub(crate) async fn visit(&self, name: Option<&str>) -> Result<Arc<SceneSessions>, SceneError> {
         if let Some(scene) = self.find(name) {
             return Ok(scene);
         }
+        self.add(name, FirstOpened::AtVisit).await
+    }
+
+    async fn add(&self, name: Option<&str>, first: FirstOpened) -> Result<Arc<SceneSessions>, SceneError> {
         let offers = self.client().await?.status().await?.offers;
         let names: Vec<String> = offers.iter().map(|offer| offer.name.clone()).collect();
         let offered = names.join(", ");
@@ -106,12 +103,15 @@ impl Scenes {
         let is_wanted = |offer: &OfferStatus| name.is_none_or(|name| name == offer.name);
         let unknown = || SceneError::Unknown { name: name.unwrap_or("(the first)").to_owned(), offered };
         let offer = offers.into_iter().find(is_wanted).ok_or_else(unknown)?;
-        let mut known = self.known.lock();
-        let open = || Arc::new(SceneSession::open(offer.clone(), &self.config));
-        Ok(known.scenes.entry(offer.name.clone()).or_insert_with(open).clone())
+        if let Some(scene) = self.known.lock().scenes.get(&offer.name) {
+            return Ok(scene.clone());
+        }
+        let name = offer.name.clone();
+        let scene = Arc::new(SceneSessions::start(offer, &self.config, first)?);
+        Ok(self.known.lock().scenes.entry(name).or_insert(scene).clone())
     }
 
-    fn find(&self, name: Option<&str>) -> Option<Arc<SceneSession>> {
+    fn find(&self, name: Option<&str>) -> Option<Arc<SceneSessions>> {
         let known = self.known.lock();
         let name = name.or(known.names.first().map(String::as_str))?;
         known.scenes.get(name).cloned()
@@ -120,7 +120,7 @@ impl Scenes {
     /// Opens the first scene's session as soon as the coordinator answers.
     pub(crate) async fn prepare(&self) {
         let mut delay = FIRST_DELAY;
-        while let Err(error) = self.visit(None).await {
+        while let Err(error) = self.add(None, FirstOpened::AtOnce).await {
             tracing::debug!(%error, "no scene yet");
             tokio::time::sleep(delay).await;
             delay = (delay * 2).min(LONGEST_DELAY);
@@ -128,122 +128,53 @@ impl Scenes {
     }
 }
 
-impl SceneSession {
-    fn open(offer: OfferStatus, config: &GatewayConfig) -> Self {
-        let waiting = SessionState::Waiting { stage: "connecting", detail: "the gateway connects".to_owned() };
-        let (changes, state) = watch::channel(waiting);
-        let (failures, failed) = mpsc::channel(16);
-        let (space, visits) = (ViewSpace::of(&offer), Arc::new(Visits::default()));
+impl SceneSessions {
+    fn start(offer: OfferStatus, config: &GatewayConfig, first: FirstOpened) -> Result<Self, BadView> {
+        let space = ViewSpace::of(&offer);
         let home = space.home(&offer);
-        let mut keeper = JoinSet::new();
-        keeper.spawn(
-            Keeper {
-                coordinator: config.coordinator.clone(),
-                request_of: config.request_of.clone(),
-                offer: offer.clone(),
-                visits: visits.clone(),
-                changes,
-                failed,
-            }
-            .run(),
-        );
-        Self { offer, space, home, visits, state, failures, _keeper: keeper }
+        let shown = (config.request_of)(&offer, space.camera(&home, TYPICAL_PX)?);
+        let moving = offer.period_s.map(|period_s| moving(shown.clone(), period_s));
+        let direct = drawn_directly(shown.clone(), moving.as_ref().map(|request| request.timeline));
+        let start = |request, first, lingers| KeptSession::start(&config.coordinator, request, first, lingers);
+        Ok(Self {
+            shown: start(shown, first, VISITORS),
+            moving: moving.map(|request| start(request, FirstOpened::AtVisit, VISITORS)),
+            direct: start(direct, FirstOpened::AtVisit, SINGLE_VIEWS),
+            offer,
+            space,
+            home,
+        })
     }
 
-    /// The session's states, the present one first.
-    pub(crate) fn states(&self) -> watch::Receiver<SessionState> {
-        let mut states = self.state.clone();
-        states.mark_changed();
-        states
+    /// The timeline of a scene that moves, or of one moment.
+    pub(crate) fn timeline(&self) -> Timeline {
+        self.moving.as_ref().map_or(Timeline::still(0.0), |moving| moving.timeline)
     }
 
-    /// Has a session opened again that delivers nothing any more.
-    pub(crate) fn has_failed(&self, session: Arc<Session>) {
-        // Where there is no room, others have told of it.
-        let _ = self.failures.try_send(session);
+    /// The session that shows a moment of the scene: the first is that of the scene at rest.
+    pub(crate) fn session_of(&self, moment: u32) -> &KeptSession {
+        self.moving.as_ref().filter(|_| moment > 0).unwrap_or(&self.shown)
     }
 }
 
-/// Keeps a scene's session open.
-struct Keeper {
-    coordinator: String,
-    request_of: RequestOf,
-    offer: OfferStatus,
-    visits: Arc<Visits>,
-    changes: watch::Sender<SessionState>,
-    failed: mpsc::Receiver<Arc<Session>>,
+/// The same views of a scene that moves, over its period. Its light is finished at once.
+fn moving(request: SessionRequest, period_s: f64) -> SessionRequest {
+    let moments = (period_s * MOMENTS_PER_S).round().clamp(2.0, MAX_MOMENTS);
+    let timeline = Timeline { start_s: 0.0, step_s: period_s / moments, set_count: moments as u32 };
+    SessionRequest { timeline, refinement_steps: 1, ..request }
 }
 
-impl Keeper {
-    async fn run(mut self) {
-        let mut delay = FIRST_DELAY;
-        loop {
-            match self.opened().await {
-                Ok((session, rate)) => {
-                    let opened_at = Instant::now();
-                    let session = Arc::new(session);
-                    self.changes.send_replace(SessionState::Open(session.clone()));
-                    self.follow(&session, rate).await;
-                    self.wait("reconnecting", "the session is opened again");
-                    if opened_at.elapsed() > LONGEST_DELAY {
-                        delay = FIRST_DELAY;
-                    }
-                }
-                Err(error) => {
-                    tracing::warn!(scene = self.offer.name, %error, "no session");
-                    self.wait("connecting", &error.to_string());
-                }
-            }
-            tokio::time::sleep(delay).await;
-            delay = (delay * 2).min(LONGEST_DELAY);
-        }
-    }
-
-    fn wait(&self, stage: &'static str, detail: &str) {
-        self.changes.send_replace(SessionState::Waiting { stage, detail: detail.to_owned() });
-    }
-
-    /// Opens a session; gives its rate, too.
-    async fn opened(&self) -> Result<(Session, Option<f64>), ClientError> {
-        let client = Client::connect(&self.coordinator).await?;
-        let space = ViewSpace::of(&self.offer);
-        let invalid =
-            |error: crate::camera::BadView| ClientError::Invalid { field: "camera", reason: error.to_string() };
-        let typical = space.camera(&space.home(&self.offer), TYPICAL_PX).map_err(invalid)?;
-        let request = (self.request_of)(&self.offer, typical);
-        let rate = request.frames_per_s;
-        Ok((client.open_session(request, |event| self.tell(event)).await?, rate))
-    }
-
-    fn tell(&self, event: &SessionEvent) {
-        if let SessionEvent::Progress { stage, detail } = event {
-            let stage = match stage {
-                SessionStage::Measuring => "measuring",
-                SessionStage::Planning => "planning",
-                SessionStage::Preparing => "preparing",
-            };
-            self.wait(stage, detail);
-        }
-    }
-
-    /// Has the session's demand follow the visitors, until the session fails.
-    async fn follow(&mut self, session: &Arc<Session>, rate: Option<f64>) {
-        let (mut ticks, mut told) = (tokio::time::interval(FOLLOW), 1);
-        loop {
-            tokio::select! {
-                failed = self.failed.recv() => if failed.is_none_or(|failed| Arc::ptr_eq(&failed, session)) {
-                    return;
-                },
-                _ = ticks.tick() => {
-                    let active = self.visits.active(Instant::now()).max(1) as u32;
-                    if active != told {
-                        match session.change(active, rate).await {
-                            Ok(()) => told = active,
-                            Err(error) => tracing::debug!(active, %error, "the demand is not changed"),
-                        }
-                    }
-                }
-            }
-        }
+/// Single views of the same scene and light, drawn directly. Without viewpoints they share the visitors' workload, and force
+/// what visitors force: something else would change their plan.
+fn drawn_directly(request: SessionRequest, timeline: Option<Timeline>) -> SessionRequest {
+    SessionRequest {
+        method: DIRECT.to_owned(),
+        policy: if request.viewpoints.is_empty() { request.policy } else { PolicyChoice::Auto },
+        frames_per_s: Some(DIRECT_PER_S),
+        fallbacks: Vec::new(),
+        viewpoints: Vec::new(),
+        timeline: timeline.unwrap_or(Timeline::still(0.0)),
+        refinement_steps: 1,
+        ..request
     }
 }

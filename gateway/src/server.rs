@@ -3,11 +3,15 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::Router;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
+use tokio_io_timeout::TimeoutStream;
+use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 
 use crate::config::GatewayConfig;
@@ -16,6 +20,8 @@ use crate::http::router;
 
 /// The time that a request's headers may take, and the idle time of a connection between requests.
 const HEADERS_WITHIN: Duration = Duration::from_secs(10);
+/// The time that a connection may take none of what is written to it.
+const WRITES_WITHIN: Duration = Duration::from_secs(20);
 /// Open connections: further ones wait in the system's queue.
 const MAX_CONNECTIONS: usize = 1024;
 /// Connections that wait for the gateway.
@@ -52,6 +58,7 @@ pub fn accept(listener: TcpListener) -> Connections {
 
 /// Serves browsers until `shutdown`.
 pub async fn serve(mut connections: Connections, config: GatewayConfig, shutdown: CancellationToken) {
+    let tls = config.tls.clone().map(TlsAcceptor::from);
     let gateway = Arc::new(Gateway::new(config, shutdown.clone()));
     let (router, mut open) = (router(gateway.clone()), JoinSet::new());
     open.spawn(async move { gateway.scenes.prepare().await });
@@ -66,20 +73,37 @@ pub async fn serve(mut connections: Connections, config: GatewayConfig, shutdown
             },
         };
         let _ = stream.set_nodelay(true);
-        let (service, shutdown) = (TowerToHyperService::new(router.clone()), shutdown.clone());
-        open.spawn(async move {
-            let mut http = hyper::server::conn::http1::Builder::new();
-            http.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN);
-            let connection = http.serve_connection(TokioIo::new(stream), service).with_upgrades();
-            tokio::pin!(connection);
-            tokio::select! {
-                _ = &mut connection => return,
-                () = shutdown.cancelled() => connection.as_mut().graceful_shutdown(),
-            }
-            // A fault of one connection is that client's own.
-            let _ = tokio::time::timeout(DRAIN, connection).await;
-        });
+        let mut stream = Box::pin(TimeoutStream::new(stream));
+        stream.as_mut().set_write_timeout_pinned(Some(WRITES_WITHIN));
+        let (router, shutdown) = (router.clone(), shutdown.clone());
+        match tls.clone() {
+            None => drop(open.spawn(answer(stream, router, shutdown))),
+            Some(tls) => drop(open.spawn(async move {
+                // A fault of one connection is that client's own.
+                if let Ok(Ok(stream)) = tokio::time::timeout(HEADERS_WITHIN, tls.accept(stream)).await {
+                    answer(stream, router, shutdown).await;
+                }
+            })),
+        }
     }
     let ended = async { while open.join_next().await.is_some() {} };
     let _ = tokio::time::timeout(DRAIN, ended).await;
+}
+
+/// Answers the requests of a connection.
+async fn answer(
+    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    router: Router,
+    shutdown: CancellationToken,
+) {
+    let mut http = hyper::server::conn::http1::Builder::new();
+    http.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN);
+    let connection = http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router)).with_upgrades();
+    tokio::pin!(connection);
+    tokio::select! {
+        _ = &mut connection => return,
+        () = shutdown.cancelled() => connection.as_mut().graceful_shutdown(),
+    }
+    // A fault of one connection is that client's own.
+    let _ = tokio::time::timeout(DRAIN, connection).await;
 }

@@ -1,8 +1,10 @@
 //! Views over plain HTTP: four at a time, and some that wait.
 
-use client::{Session, ViewRequest};
-use depth_image::{PinholeCamera, View};
-use tokio::sync::Semaphore;
+use std::sync::Arc;
+
+use client::{Frame, Session, ViewRequest};
+use depth_image::{PinholeCamera, ViewPlanes};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 /// Views that are made at a time.
 const MADE: usize = 4;
@@ -12,7 +14,7 @@ const WAITING: usize = 64;
 /// The places of views over HTTP.
 pub(crate) struct Stills {
     made: Semaphore,
-    all: Semaphore,
+    all: Arc<Semaphore>,
 }
 
 /// Why a view is not made.
@@ -28,18 +30,30 @@ pub(crate) enum StillError {
 
 impl Default for Stills {
     fn default() -> Self {
-        Self { made: Semaphore::new(MADE), all: Semaphore::new(MADE + WAITING) }
+        Self { made: Semaphore::new(MADE), all: Arc::new(Semaphore::new(MADE + WAITING)) }
     }
 }
 
 impl Stills {
-    /// One view of a session.
-    pub(crate) async fn view(&self, session: &Session, camera: PinholeCamera) -> Result<View, StillError> {
-        let _waits = self.all.try_acquire().map_err(|_| StillError::Full)?;
+    /// A place, which a view keeps until it has been read.
+    pub(crate) fn place(&self) -> Result<OwnedSemaphorePermit, StillError> {
+        self.all.clone().try_acquire_owned().map_err(|_| StillError::Full)
+    }
+
+    /// One view of a session: of a moment of a scene that moves, else in its finished light.
+    pub(crate) async fn frame(
+        &self,
+        session: &Session,
+        camera: PinholeCamera,
+        planes: ViewPlanes,
+        moment: u32,
+    ) -> Result<Frame, StillError> {
         let _made = self.made.acquire().await.map_err(|_| StillError::Full)?;
-        let request = ViewRequest { frame: 1, set_index: 0, camera };
-        let frames = session.render_views([request])?.all().await?;
+        let timeline = session.plan().assignment.workload.timeline;
+        let set_index = if timeline.moves() { moment } else { timeline.set_count - 1 };
+        let request = ViewRequest { frame: 1, set_index, camera };
+        let frames = session.render_views_with(planes, [request])?.all().await?;
         let over = || client::ClientError::Ended { reason: "no frame was received".to_owned() };
-        Ok(frames.into_iter().next().map(|frame| frame.view).ok_or_else(over)?)
+        Ok(frames.into_iter().next().ok_or_else(over)?)
     }
 }

@@ -5,104 +5,31 @@
 //! is always of the newest pose.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
-use axum::body::Bytes;
-use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
-use client::{ClientError, EncodedFrame, Session};
+use axum::extract::ws::{Message, WebSocket};
+use client::{ClientError, ClientId, EncodedFrame, Session};
+use cluster::{Policy, SessionPlan};
 use codec::FrameCodec;
-use futures_util::stream::{SplitSink, SplitStream};
-use futures_util::{SinkExt as _, StreamExt as _};
+use depth_image::Camera;
 use glam::UVec2;
-use tokio::sync::mpsc;
-use tokio::task::JoinSet;
+use tokio::sync::watch;
 
 use crate::camera::still_size;
 use crate::gateway::Gateway;
-use crate::picture_stream::{Asked, PictureStream};
-use crate::protocol::{self, FromPage, Pose, ToPage};
+use crate::kept_session::{KeptSession, SessionState};
+use crate::page::{End, Page, with_page};
+use crate::picture_stream::{About, Asked, PictureStream};
+use crate::protocol::{FromPage, Pose, ToPage};
 use crate::rate::{Rate, Shown};
-use crate::scenes::{SceneSession, SessionState};
+use crate::scenes::{SceneError, SceneSessions};
+use crate::views;
 
-/// The first message is due by then.
-const OPENED_WITHIN: Duration = Duration::from_secs(10);
-/// The time that the last messages may take.
-const FAREWELL: Duration = Duration::from_secs(5);
-/// The interval of pings, which measure the round trip and show that a page is there.
-const PING: Duration = Duration::from_secs(2);
-/// A page that answers no ping for so long has gone.
-const SILENCE: Duration = Duration::from_secs(20);
-/// Messages of a page that are read in a second; further ones wait, as after a stall of the link.
-const MAX_MESSAGES_S: u32 = 240;
-/// Messages on their way to the page. Pictures among them are bounded by their credits.
-const OUTGOING: usize = 32;
-/// The delay before a view that has failed is begun anew.
-const AFTER_FAILURE: Duration = Duration::from_millis(250);
 /// The longest age that says something of the link: a page may have been hidden.
 const MAX_AGE_MS: f64 = 10_000.0;
 
-/// Why a visit ends.
-pub(crate) enum End {
-    /// The page has gone.
-    Gone,
-    /// The page breaks the protocol.
-    Refused(String),
-}
-
-/// A connected page.
-pub(crate) struct Page {
-    incoming: SplitStream<WebSocket>,
-    outgoing: mpsc::Sender<Message>,
-    /// The second that messages are counted in, and their number.
-    counted: (Instant, u32),
-    heard: Instant,
-    started: Instant,
-    /// The least round trip so far.
-    rtt_s: Option<f64>,
-    pings: tokio::time::Interval,
-}
-
 /// Serves a page until it leaves.
 pub(crate) async fn visit(socket: WebSocket, gateway: Arc<Gateway>) {
-    let (sink, incoming) = socket.split();
-    let (outgoing, to_send) = mpsc::channel(OUTGOING);
-    let now = Instant::now();
-    let mut page = Page {
-        incoming,
-        outgoing,
-        counted: (now, 0),
-        heard: now,
-        started: now,
-        rtt_s: None,
-        pings: tokio::time::interval(PING),
-    };
-    let mut writer = JoinSet::new();
-    writer.spawn(write(sink, to_send));
-    let end = tokio::select! {
-        Err(end) = serve(&mut page, &gateway) => end,
-        _ = writer.join_next() => End::Gone,
-        () = gateway.shutdown.cancelled() => End::Gone,
-    };
-    if let End::Refused(reason) = end {
-        tracing::info!(reason, "a page is refused");
-        let _ = page.tell(&ToPage::Refused { reason: reason.clone() });
-        let reason = reason.chars().take(100).collect::<String>();
-        let close = CloseFrame { code: close_code::POLICY, reason: reason.into() };
-        let _ = page.outgoing.try_send(Message::Close(Some(close)));
-    } else {
-        let _ = page.outgoing.try_send(Message::Close(None));
-    }
-    drop(page);
-    // What is on its way is sent, for as long as a page takes to read it.
-    let _ = tokio::time::timeout(FAREWELL, writer.join_next()).await;
-}
-
-async fn write(mut sink: SplitSink<WebSocket, Message>, mut messages: mpsc::Receiver<Message>) {
-    while let Some(message) = messages.recv().await {
-        if sink.send(message).await.is_err() {
-            return;
-        }
-    }
+    with_page(socket, &gateway, async |page| serve(page, &gateway).await).await;
 }
 
 async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
@@ -114,10 +41,16 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
         scenes: gateway.scenes.names(),
         scene: scene.offer.name.clone(),
         home: scene.home,
+        light_steps: scene.shown.light_steps,
+        moments: scene.timeline().set_count,
+        moment_step_s: scene.timeline().step_s,
         bounds: [scene.offer.volume.min, scene.offer.volume.max].map(|corner| scene.space.in_source(corner)),
     })?;
     let mut visitor = Visitor {
         number: gateway.next_visitor(),
+        is_moving: false,
+        light_step: 0,
+        finished_with: None,
         scene,
         max_still_px: gateway.config.max_still_px,
         newest: None,
@@ -145,110 +78,26 @@ async fn admitted<'a>(page: &mut Page, gateway: &'a Gateway) -> Result<tokio::sy
 }
 
 /// The scene that a page asks for, once the coordinator answers.
-async fn found(page: &mut Page, gateway: &Gateway, name: Option<&str>) -> Result<Arc<SceneSession>, End> {
+async fn found(page: &mut Page, gateway: &Gateway, name: Option<&str>) -> Result<Arc<SceneSessions>, End> {
     loop {
         match gateway.scenes.visit(name).await {
             Ok(scene) => return Ok(scene),
-            Err(error @ crate::scenes::SceneError::Unknown { .. }) => return Err(End::Refused(error.to_string())),
+            Err(error @ SceneError::Unknown { .. }) => return Err(End::Refused(error.to_string())),
             Err(error) => page.wait("connecting", &error.to_string())?,
         }
         page.pause(|_, _| Ok(())).await?;
     }
 }
 
-impl Page {
-    /// The next message of the protocol, within its limits. Cancellation loses none.
-    async fn next(&mut self) -> Result<FromPage, End> {
-        loop {
-            let (second, count) = self.counted;
-            if count >= MAX_MESSAGES_S {
-                tokio::time::sleep_until((second + Duration::from_secs(1)).into()).await;
-            }
-            let message = tokio::select! {
-                message = self.incoming.next() => message.and_then(Result::ok).ok_or(End::Gone)?,
-                _ = self.pings.tick() => {
-                    if self.heard.elapsed() > SILENCE {
-                        return Err(End::Gone);
-                    }
-                    self.ping()?;
-                    continue;
-                }
-            };
-            self.heard = Instant::now();
-            self.count();
-            match message {
-                Message::Text(text) => {
-                    return serde_json::from_str(&text).map_err(|error| End::Refused(format!("message: {error}")));
-                }
-                Message::Binary(_) => return Err(End::Refused("message: binary, must be JSON text".to_owned())),
-                Message::Pong(sent) => self.learn_round_trip(&sent),
-                Message::Ping(_) => (),
-                Message::Close(_) => return Err(End::Gone),
-            }
-        }
-    }
-
-    fn count(&mut self) {
-        let (second, count) = &mut self.counted;
-        if self.heard.duration_since(*second) >= Duration::from_secs(1) {
-            (*second, *count) = (self.heard, 0);
-        }
-        *count += 1;
-    }
-
-    fn learn_round_trip(&mut self, sent: &[u8]) {
-        let Ok(sent) = sent.try_into().map(f64::from_le_bytes) else { return };
-        let rtt_s = self.heard.duration_since(self.started).as_secs_f64() - sent;
-        // A page may answer what was never asked.
-        if (0.0..SILENCE.as_secs_f64()).contains(&rtt_s) {
-            self.rtt_s = Some(self.rtt_s.map_or(rtt_s, |least| least.min(rtt_s)));
-        }
-    }
-
-    fn ping(&self) -> Result<(), End> {
-        let now_s = self.started.elapsed().as_secs_f64();
-        self.send(Message::Ping(Bytes::copy_from_slice(&now_s.to_le_bytes())))
-    }
-
-    async fn opened(&mut self) -> Result<Option<String>, End> {
-        match tokio::time::timeout(OPENED_WITHIN, self.next()).await {
-            Ok(Ok(FromPage::Open { scene })) => Ok(scene),
-            Ok(Ok(_)) => Err(End::Refused("type: the first message must be open".to_owned())),
-            Ok(Err(end)) => Err(end),
-            Err(_) => Err(End::Refused("no message was received".to_owned())),
-        }
-    }
-
-    /// Lets a moment pass before another attempt; `hear` takes the messages of that time.
-    async fn pause(&mut self, mut hear: impl FnMut(&Self, FromPage) -> Result<(), End>) -> Result<(), End> {
-        let end = tokio::time::sleep(AFTER_FAILURE);
-        tokio::pin!(end);
-        loop {
-            let message = tokio::select! {
-                () = &mut end => return Ok(()),
-                message = self.next() => message?,
-            };
-            hear(self, message)?;
-        }
-    }
-
-    fn tell(&self, message: &ToPage) -> Result<(), End> {
-        self.send(Message::Text(protocol::text(message).into()))
-    }
-
-    fn wait(&self, stage: &'static str, detail: &str) -> Result<(), End> {
-        self.tell(&ToPage::Waiting { stage, detail: detail.to_owned() })
-    }
-
-    /// A page that reads nothing has no room after a while.
-    fn send(&self, message: Message) -> Result<(), End> {
-        self.outgoing.try_send(message).map_err(|_| End::Gone)
-    }
-}
-
 struct Visitor {
     number: u64,
-    scene: Arc<SceneSession>,
+    scene: Arc<SceneSessions>,
+    /// Whether the scene moves for the visitor.
+    is_moving: bool,
+    /// The latest step of light that a still has shown: from 0.
+    light_step: u32,
+    /// The sample cameras of the finished still; `None` where there is none, or its plan is over.
+    finished_with: Option<Vec<Camera>>,
     max_still_px: UVec2,
     newest: Option<Pose>,
     /// The number of the last picture.
@@ -260,43 +109,78 @@ struct Visitor {
 
 impl Drop for Visitor {
     fn drop(&mut self) {
-        self.scene.visits.left(self.number);
+        self.kept(&self.scene).visits.left(self.number);
     }
 }
 
 impl Visitor {
     /// Serves from one session after the other.
     async fn follow(&mut self, page: &mut Page) -> Result<(), End> {
-        let mut states = self.scene.states();
+        let scene = self.scene.clone();
         loop {
-            let state = states.borrow_and_update().clone();
-            let session = match state {
-                SessionState::Open(session) => session,
-                SessionState::Waiting { stage, detail } => {
-                    page.wait(stage, &detail)?;
-                    loop {
-                        tokio::select! {
-                            changed = states.changed() => break changed.map_err(|_| End::Gone)?,
-                            message = page.next() => self.hear(page, message?)?,
-                        }
+            let kept = self.kept(&scene);
+            let _visit = kept.visits.begin();
+            let mut states = kept.states();
+            while self.is_at(kept) {
+                let state = states.borrow_and_update().clone();
+                let session = match state {
+                    SessionState::Open(session) => session,
+                    SessionState::Waiting { stage, detail } => {
+                        page.wait(stage, &detail)?;
+                        self.wait_for_change(page, kept, &mut states).await?;
+                        continue;
                     }
-                    continue;
+                };
+                let Some(error) = self.serve_from(page, kept, &session).await? else { break };
+                page.wait("reconnecting", &error.to_string())?;
+                // A picture that has no room, or takes too long, is no fault of the session.
+                if !matches!(error, ClientError::Exhausted { .. } | ClientError::Invalid { .. }) {
+                    kept.has_failed(session);
                 }
-            };
-            let error = self.serve_from(page, &session).await?;
-            page.wait("reconnecting", &error.to_string())?;
-            // A picture that has no room, or takes too long, is no fault of the session.
-            if !matches!(error, ClientError::Exhausted { .. } | ClientError::Invalid { .. }) {
-                self.scene.has_failed(session);
+                page.pause(|page, message| self.hear(page, message)).await?;
             }
-            page.pause(|page, message| self.hear(page, message)).await?;
+            kept.visits.left(self.number);
         }
     }
 
-    /// Serves from a session, until it fails.
-    async fn serve_from(&mut self, page: &mut Page, session: &Session) -> Result<ClientError, End> {
-        self.tell_plan(page, session)?;
-        let (mut motion, mut still) = (PictureStream::new(session), PictureStream::new(session));
+    /// The session of the visitor's moment.
+    fn kept<'a>(&self, scene: &'a SceneSessions) -> &'a KeptSession {
+        scene.session_of(u32::from(self.is_moving))
+    }
+
+    /// Whether a session is that of the visitor's moment.
+    fn is_at(&self, kept: &KeptSession) -> bool {
+        std::ptr::eq(self.kept(&self.scene), kept)
+    }
+
+    /// Takes poses until a session is open, or is another one.
+    async fn wait_for_change(
+        &mut self,
+        page: &mut Page,
+        kept: &KeptSession,
+        states: &mut watch::Receiver<SessionState>,
+    ) -> Result<(), End> {
+        loop {
+            tokio::select! {
+                changed = states.changed() => return changed.map_err(|_| End::Gone),
+                message = page.next() => self.hear(page, message?)?,
+            }
+            if !self.is_at(kept) {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Serves from a session until it fails; `None` when the visitor needs another one.
+    async fn serve_from(
+        &mut self,
+        page: &mut Page,
+        kept: &KeptSession,
+        session: &Session,
+    ) -> Result<Option<ClientError>, End> {
+        self.tell_plan(page, &session.plan())?;
+        let client = ClientId::new();
+        let (mut motion, mut still) = (PictureStream::new(session, client), PictureStream::new(session, client));
         if let Some(pose) = self.newest {
             self.ask(pose, &mut motion, &mut still)?;
         }
@@ -310,18 +194,25 @@ impl Visitor {
                     }
                     message => {
                         self.hear(page, message)?;
+                        if !self.is_at(kept) {
+                            return Ok(None);
+                        }
                         if let Some(pose) = self.newest {
                             self.ask(pose, &mut motion, &mut still)?;
                         }
                     }
                 },
+                plan = session.another_plan(self.plan_epoch) => {
+                    self.tell_plan(page, &plan)?;
+                    self.renew_still(&plan, &mut motion, &mut still)?;
+                }
                 frame = motion.next() => match frame {
                     Ok((frame, asked)) => self.forward(page, session, &mut motion, frame, asked)?,
-                    Err(error) => return Ok(error),
+                    Err(error) => return Ok(Some(error)),
                 },
                 frame = still.next() => match frame {
                     Ok((frame, asked)) => self.forward(page, session, &mut still, frame, asked)?,
-                    Err(error) => return Ok(error),
+                    Err(error) => return Ok(Some(error)),
                 },
             }
         }
@@ -337,12 +228,18 @@ impl Visitor {
                 if pose.number <= last {
                     return Err(End::Refused(format!("number: {} comes after {last}", pose.number)));
                 }
+                let moments = self.scene.timeline().set_count;
+                if pose.moment >= moments {
+                    return Err(End::Refused(format!("moment: {} must be below {moments}", pose.moment)));
+                }
                 let canvas_px = UVec2::from_array(pose.canvas_px);
                 let checked = self.scene.space.camera(&pose.camera, canvas_px);
                 checked.map_err(|error| End::Refused(error.to_string()))?;
                 self.rate.fit(canvas_px);
                 self.newest = Some(pose);
-                self.scene.visits.moved(self.number, page.heard);
+                // A scene that moves passes its first moment, too.
+                self.is_moving = pose.moment > 0 || self.is_moving && !pose.still;
+                self.kept(&self.scene).visits.moved(self.number, page.heard);
                 Ok(())
             }
         }
@@ -359,7 +256,8 @@ impl Visitor {
         };
         let camera = self.scene.space.camera(&pose.camera, canvas_px).map(|camera| camera.resized(size_px));
         let camera = camera.map_err(|error| End::Refused(error.to_string()))?;
-        stream.ask(pose, camera, codec).map_err(|error| End::Refused(error.to_string()))
+        let set_index = if self.is_moving { pose.moment } else { self.light_step };
+        stream.ask(pose, camera, set_index, codec).map_err(|error| End::Refused(error.to_string()))
     }
 
     /// Passes a picture on, unless a later one was sent, or it is a still of an earlier pose.
@@ -380,23 +278,64 @@ impl Visitor {
             stream.discard(&frame);
             return Ok(());
         };
-        if self.plan_epoch != frame.header.sample_set_id.plan_epoch {
-            self.tell_plan(page, session)?;
-        }
         self.sent = asked.pose.number;
-        page.send(Message::Binary(stream.message(&frame, &asked)))?;
-        // A visitor that rests would see a neighbouring cell's picture for ever.
-        if frame.header.is_neighbour_cell && asked.pose.number == newest {
-            let again = stream.ask(asked.pose, frame.request.camera, frame.header.codec);
-            again.map_err(|error| End::Refused(error.to_string()))?;
+        let (shown, last) = (self.light_step_of(session, &frame), self.scene.shown.light_steps - 1);
+        let is_own_cell = !frame.header.is_neighbour_cell;
+        let is_near = !asked.pose.still || is_near(session, &frame);
+        let about = About { light_step: shown + 1, is_own_cell: is_own_cell && is_near, rtt_s: page.rtt_s };
+        page.send(Message::Binary(stream.message(&frame, &asked, about)))?;
+        if asked.pose.still && is_own_cell && !self.is_moving {
+            self.light_step = self.light_step.max(shown);
         }
-        Ok(())
+        if asked.pose.number != newest {
+            return Ok(());
+        }
+        let is_finished = is_own_cell && (shown == last || !asked.pose.still);
+        self.finished_with = cameras_of(session, &frame).filter(|_| is_finished);
+        if is_finished && (self.finished_with.is_some() || !asked.pose.still) {
+            return Ok(());
+        }
+        // A visitor that rests would see a neighbouring cell's picture, an earlier plan's or unfinished light for ever.
+        let next_set = match (self.is_moving, is_own_cell) {
+            (true, _) => frame.request.set_index,
+            (false, true) => (shown + 1).min(last),
+            (false, false) => self.light_step,
+        };
+        let again = stream.ask(asked.pose, frame.request.camera, next_set, frame.header.codec);
+        again.map_err(|error| End::Refused(error.to_string()))
     }
 
-    fn tell_plan(&mut self, page: &Page, session: &Session) -> Result<(), End> {
-        let plan = session.plan();
+    /// A new plan may have a view cell that is nearer to a visitor who rests: the still is then asked for again.
+    fn renew_still(
+        &mut self,
+        plan: &SessionPlan,
+        motion: &mut PictureStream,
+        still: &mut PictureStream,
+    ) -> Result<(), End> {
+        let Some(pose) = self.newest.filter(|pose| pose.still && pose.number == self.sent) else { return Ok(()) };
+        let camera = self.scene.space.camera(&pose.camera, UVec2::from_array(pose.canvas_px));
+        let camera = camera.map_err(|error| End::Refused(error.to_string()))?;
+        let workload = &plan.assignment.workload;
+        let cameras = workload.cameras_of_cell(workload.cell_of(&camera) as usize);
+        if cameras.map(|cameras| workload.sample_cameras[cameras].to_vec()) == self.finished_with {
+            return Ok(());
+        }
+        self.ask(pose, motion, still)
+    }
+
+    /// The step of a picture's light, from 0. Views that are drawn directly show the last, and so do scenes that move.
+    fn light_step_of(&self, session: &Session, frame: &EncodedFrame) -> u32 {
+        let last = self.scene.shown.light_steps - 1;
+        match session.plan().assignment.policy {
+            _ if self.is_moving => last,
+            Policy::Direct => last,
+            Policy::Pipeline | Policy::TimeShare => frame.request.set_index.min(last),
+        }
+    }
+
+    fn tell_plan(&mut self, page: &Page, plan: &SessionPlan) -> Result<(), End> {
         self.plan_epoch = plan.assignment.plan_epoch;
-        let (policy, reason) = (plan.assignment.policy.to_string(), plan.reason);
+        let (policy, reason) = (plan.assignment.policy.to_string(), plan.reason.clone());
         page.tell(&ToPage::Plan { epoch: self.plan_epoch, policy, reason })
     }
 
@@ -408,4 +347,18 @@ impl Visitor {
             self.rate.step(now_s, Shown { age_s: age_ms / 1000.0, rtt_s, height_px });
         }
     }
+}
+
+/// Whether the plan in force has a view cell near a frame's camera. Where it has none, the next plan will.
+fn is_near(session: &Session, frame: &EncodedFrame) -> bool {
+    let assignment = session.plan().assignment;
+    assignment.policy == Policy::Direct || views::is_near(&assignment.workload, &frame.request.camera)
+}
+
+/// The sample cameras of a frame, under the plan in force.
+fn cameras_of(session: &Session, frame: &EncodedFrame) -> Option<Vec<Camera>> {
+    let assignment = session.plan().assignment;
+    let is_current = assignment.plan_epoch == frame.header.sample_set_id.plan_epoch;
+    let cameras = assignment.workload.cameras_of_cell(frame.header.cell as usize).filter(|_| is_current)?;
+    Some(assignment.workload.sample_cameras[cameras].to_vec())
 }

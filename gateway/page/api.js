@@ -1,0 +1,37 @@
+// Requests of HTTP to the gateway. A refusal is an error whose message is the gateway's sentence.
+
+/** The query of a view: { scene, camera, size, moment }; a null moment is left out. */
+export function queryOf({ scene, camera, size, moment }, more = {}) {
+  const query = new URLSearchParams({
+    scene, eye: camera.eye.join(","), target: camera.target.join(","), fov: camera.fov_y_deg, size: size.join("x"), ...more,
+  });
+  if (moment !== null) query.set("moment", moment);
+  return query;
+}
+
+/** An answer with success. */
+export async function request(name, query, signal) {
+  const answer = await fetch(`api/v1/${name}?${query}`, { signal, cache: "no-store" }).catch((error) => {
+    throw signal?.aborted ? error : new Error("The gateway does not answer.");
+  });
+  if (answer.ok) return answer;
+  const sentence = (await answer.text()).trim();
+  throw new Error(sentence || `The gateway answers ${answer.status}.`);
+}
+
+export async function requestJson(name, query, signal) {
+  return (await request(name, query, signal)).json();
+}
+
+/** The gateway's reason not to let this page in; null where it lets it in, or does not answer in time. */
+export async function refusal(withinMs) {
+  const options = { cache: "no-store", signal: AbortSignal.timeout(withinMs) };
+  const answer = await fetch("api/v1/status.json", options).catch(() => null);
+  return [401, 403].includes(answer?.status) ? (await answer.text()).trim() : null;
+}
+
+/** A size within limits, of the same shape. */
+export function within(size, limits) {
+  const share = Math.min(1, ...size.map((side, axis) => limits[axis] / side));
+  return size.map((side) => Math.max(1, Math.round(side * share)));
+}

@@ -1,0 +1,106 @@
+// The view as it was reconstructed beside the view drawn directly, with the measures of their difference.
+
+import { $, element, on, press, say } from "./dom.js";
+import { queryOf, requestJson, within } from "./api.js";
+
+const LARGEST_PX = [640, 360];
+const PICTURES = { "compare-view": "view", "compare-direct": "direct", "compare-flip": "flip_map" };
+
+export class Compare {
+  /** `restView()` gives the view that rests on the screen, or null; `pause()` stops the time. */
+  constructor(restView, pause) {
+    Object.assign(this, { restView, pause });
+    on("compare", () => this.toggle());
+    on("compare-close", () => this.close());
+    on("flip", () => this.showsFlip($("compare-flip").hidden));
+    $("split").addEventListener("input", () => this.split());
+  }
+
+  get isOpen() {
+    return !$("comparison").hidden;
+  }
+
+  toggle() {
+    if (this.isOpen) this.close();
+    else this.open();
+  }
+
+  open() {
+    this.pause();
+    this.isDone = false;
+    $("comparison").hidden = false;
+    $("compare").setAttribute("aria-expanded", "true");
+    $("compared").hidden = true;
+    this.tell("Both pictures are made once the camera rests…");
+    $("comparison").focus();
+    this.rested();
+  }
+
+  /** Any motion of the camera closes it, too. */
+  close() {
+    if (!this.isOpen) return;
+    this.asked?.abort();
+    this.asked = null;
+    const hadFocus = $("comparison").contains(document.activeElement);
+    $("comparison").hidden = true;
+    $("compare").setAttribute("aria-expanded", "false");
+    say("The comparison is closed.");
+    if (hadFocus) $("picture").focus();
+  }
+
+  tell(text) {
+    $("compare-state").textContent = text;
+    $("compare-state").hidden = !text;
+    if (text) say(text);
+  }
+
+  async rested() {
+    const view = this.restView();
+    if (!this.isOpen || this.isDone || !view) return;
+    this.isDone = true;
+    const { signal } = (this.asked = new AbortController());
+    this.tell("Both pictures are being made…");
+    try {
+      const result = await requestJson("compare.json", queryOf({ ...view, size: within(view.size, LARGEST_PX) }), signal);
+      if (!signal.aborted) this.show(result);
+    } catch (error) {
+      if (!signal.aborted) this.tell(error.message);
+    }
+  }
+
+  show(result) {
+    for (const [id, name] of Object.entries(PICTURES)) {
+      $(id).src = result[name];
+      [$(id).width, $(id).height] = result.size_px;
+    }
+    const number = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits) : "–");
+    const psnr = result.psnr_db === null ? "equal" : `${number(result.psnr_db, 1)} dB`;
+    const ms = (value) => `${number(value, 0)} ms`;
+    const rows = [
+      ["PSNR", psnr], ["SSIM", number(result.ssim, 4)], ["FLIP", number(result.flip, 4)],
+      ["Reconstructed in", ms(result.view_ms)], ["Drawn directly in", ms(result.direct_ms)],
+    ];
+    $("measures").replaceChildren(...rows.map(([name, value]) => element("div", element("dt", name), element("dd", value))));
+    this.showsFlip(false);
+    this.split();
+    $("compared").hidden = false;
+    this.tell("");
+    say(`Compared: PSNR ${psnr}, FLIP ${number(result.flip, 4)}.`);
+    if ($("comparison").contains(document.activeElement)) $("split").focus();
+  }
+
+  showsFlip(isShown) {
+    $("compare-flip").hidden = !isShown;
+    $("divider").hidden = isShown;
+    $("split").disabled = isShown;
+    press($("flip"), isShown);
+  }
+
+  /** Left of the slider the view is shown, right of it the picture drawn directly. */
+  split() {
+    const percent = Number($("split").value);
+    $("compare-view").style.clipPath = `inset(0 ${100 - percent}% 0 0)`;
+    $("divider").style.left = `${percent}%`;
+    $("split").setAttribute("aria-valuetext", `${percent} % reconstructed, ${100 - percent} % drawn directly`);
+  }
+}

@@ -1,0 +1,46 @@
+// What the page says about its picture: the badge, and why there is none.
+
+import { $, say } from "./dom.js";
+
+const BANNER_AFTER_MS = 400;
+const LATE_MS = 5000;
+
+export class Notices {
+  /** A pose has left: pictures that stay away are late. */
+  asked(still) {
+    if (!still) this.badge("moving");
+    this.timer ??= setTimeout(() => this.waits("waiting", "pictures are late"), LATE_MS);
+  }
+
+  /** A picture is on the screen; `isNewest` says whether no pose has followed. */
+  shows(header, { isNewest, isSharp, lightSteps }) {
+    clearTimeout(this.timer);
+    this.timer = null;
+    $("banner").hidden = true;
+    $("picture").classList.remove("stale");
+    if (!isNewest || !header.still) return this.badge(isNewest ? "still" : "moving");
+    const light = header.light_step;
+    if (light === lightSteps) this.badge(isSharp && !header.neighbour ? "exact" : "still");
+    else this.badge("still", `still (light ${light} of ${lightSteps})`);
+  }
+
+  badge(state, text = state) {
+    const badge = $("badge");
+    if (badge.textContent === text) return;
+    badge.dataset.state = state;
+    badge.textContent = text;
+    if (state === "exact") say("The picture is sharp.");
+  }
+
+  /** Says why there are no pictures; the last one stays, greyed. */
+  waits(stage, detail) {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => {
+      const text = `${stage[0].toUpperCase()}${stage.slice(1)}: ${detail}.`;
+      if ($("banner").textContent !== text) $("banner").textContent = text;
+      $("banner").hidden = false;
+      $("picture").classList.add("stale");
+      this.badge("waiting");
+    }, stage === "waiting" ? 0 : BANNER_AFTER_MS);
+  }
+}

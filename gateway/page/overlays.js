@@ -1,0 +1,104 @@
+// Provenance and depth of a view that rests, above its picture, with their legend.
+
+import { $, element, on, press, say } from "./dom.js";
+import { queryOf, request } from "./api.js";
+
+const NAMES = { provenance: "Provenance", depth: "Depth" };
+
+/** The entries of a legend's header: [text, colour]; none where the header is missing or broken. */
+export function legendOf(header) {
+  try {
+    const entries = JSON.parse(header ?? "[]");
+    return entries.filter(([text, color]) => typeof text === "string" && /^#[0-9a-f]{6}$/i.test(color));
+  } catch {
+    return [];
+  }
+}
+
+export class Overlays {
+  /** `restView()` gives the view that rests on the screen, or null. */
+  constructor(restView) {
+    this.restView = restView;
+    /** The kind that is on; null for none. */
+    this.kind = null;
+    for (const kind of Object.keys(NAMES)) on(kind, () => this.toggle(kind));
+    on("legend-close", () => this.toggle(this.kind));
+    $("opacity").addEventListener("input", () => this.fade());
+    this.fade();
+  }
+
+  toggle(kind) {
+    this.kind = kind === this.kind ? null : kind;
+    for (const name of Object.keys(NAMES)) press($(name), name === this.kind);
+    this.hide();
+    $("legend").hidden = !this.kind;
+    $("entries").replaceChildren();
+    if (!this.kind) return say(`${NAMES[kind] ?? "The overlay"} is hidden.`);
+    $("legend-name").textContent = NAMES[this.kind];
+    this.tell("Shown when the camera rests.");
+    this.rested();
+  }
+
+  fade() {
+    $("overlay").style.opacity = $("opacity").value / 100;
+  }
+
+  tell(text) {
+    $("legend-state").textContent = text;
+    $("legend-state").hidden = !text;
+  }
+
+  /** The camera moves: what was shown is of another view. */
+  moved() {
+    if (!this.kind) return;
+    this.hide();
+    this.tell("Shown when the camera rests.");
+  }
+
+  hide() {
+    this.asked?.abort();
+    $("overlay").hidden = true;
+  }
+
+  async rested() {
+    const view = this.restView();
+    if (!this.kind || !view) return;
+    this.asked?.abort();
+    const { signal } = (this.asked = new AbortController());
+    this.tell("Asked…");
+    try {
+      await this.load(view, this.kind, signal);
+    } catch (error) {
+      if (signal.aborted) return;
+      $("overlay").hidden = true;
+      this.tell(error.message);
+      say(error.message);
+    }
+  }
+
+  async load(view, kind, signal) {
+    const answer = await request("view.png", queryOf(view, { show: kind }), signal);
+    const legend = legendOf(answer.headers.get("Myriorama-Legend"));
+    const url = URL.createObjectURL(await answer.blob());
+    const image = new Image();
+    image.src = url;
+    await image.decode().finally(() => URL.revokeObjectURL(url));
+    if (signal.aborted) return;
+    this.show(image, legend);
+    say(`${NAMES[kind]} is shown.`);
+  }
+
+  show(image, legend) {
+    const overlay = $("overlay");
+    Object.assign(overlay, { width: image.naturalWidth, height: image.naturalHeight });
+    overlay.getContext("2d").drawImage(image, 0, 0);
+    overlay.hidden = false;
+    this.tell("");
+    $("entries").replaceChildren(...legend.map(([text, color]) => {
+      const swatch = element("span");
+      swatch.className = "swatch";
+      swatch.style.background = color;
+      return element("li", swatch, text);
+    }));
+  }
+}

@@ -1,0 +1,61 @@
+//! A view beside the same view drawn directly, with the errors between them.
+
+use std::sync::Arc;
+
+use axum::extract::{Query, State};
+use axum::http::StatusCode;
+use axum::response::Response;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use client::Frame;
+use codec::{FrameCodec, encode_frame};
+use depth_image::{View, ViewPlanes};
+use glam::UVec2;
+use metrics::{PSNR_CAP_DB, Rgb8Image, flip_map, psnr_db, ssim_map};
+use serde_json::{Value, json};
+
+use crate::gateway::Gateway;
+use crate::responses::{Refusal, held, opened};
+use crate::views::{ViewQuery, Visited};
+
+/// The largest view that is compared: it takes a thread a fraction of a second.
+const MAX_PX: UVec2 = UVec2::new(640, 360);
+
+/// `compare.json`: one at a time.
+pub(crate) async fn compare(
+    State(gateway): State<Arc<Gateway>>,
+    Query(query): Query<ViewQuery>,
+) -> Result<Response, Refusal> {
+    let busy = |_| Refusal(StatusCode::TOO_MANY_REQUESTS, "another view is being compared: try again later".to_owned());
+    let _place = gateway.comparison.try_acquire().map_err(busy)?;
+    let visited = Visited::of(&gateway, &query, MAX_PX).await?;
+    let (camera, moment, planes) = (visited.camera, visited.moment, ViewPlanes::default());
+    let (shown, direct) = (visited.scene.session_of(moment), &visited.scene.direct);
+    let _visits = (shown.visits.begin(), direct.visits.begin());
+    let (shown, direct) = (opened(shown).await?, opened(direct).await?);
+    let view = gateway.stills.frame(&shown, camera, planes, moment).await?;
+    let direct = gateway.stills.frame(&direct, camera, planes, moment).await?;
+    let compared = tokio::task::spawn_blocking(move || compared(&view, &direct));
+    let compared = compared.await.map_err(Refusal::internal)?;
+    let compared = compared.ok_or_else(|| Refusal::internal("the views cannot be compared"))?;
+    Ok(held("application/json", format!("{compared:#}\n").into(), visited.place))
+}
+
+fn compared(frame: &Frame, direct: &Frame) -> Option<Value> {
+    let (test, reference) = (Rgb8Image::of_view(&frame.view).ok()?, Rgb8Image::of_view(&direct.view).ok()?);
+    let (flip, ssim) = (flip_map(&reference, &test).ok()?, ssim_map(&reference, &test).ok()?);
+    let psnr = psnr_db(&reference, &test, None).ok()??.min(PSNR_CAP_DB);
+    let flip_image = View { srgb8: pictures::error_map(&flip).into_raw(), ..frame.view.clone() };
+    let ms = |frame: &Frame| frame.header.stage_times.batch_s * 1000.0;
+    Some(json!({
+        "size_px": frame.view.size_px.to_array(),
+        "psnr_db": psnr, "ssim": ssim.mean(None).ok()?, "flip": flip.mean(None).ok()?,
+        "view_ms": ms(frame), "direct_ms": ms(direct),
+        "view": data_url(&frame.view)?, "direct": data_url(&direct.view)?, "flip_map": data_url(&flip_image)?,
+    }))
+}
+
+fn data_url(view: &View) -> Option<String> {
+    let png = encode_frame(FrameCodec::Png, view.size_px, &view.srgb8).ok()?;
+    Some(format!("data:image/png;base64,{}", STANDARD.encode(png)))
+}

@@ -1,0 +1,222 @@
+//! A session that is open while somebody needs it, and opened again when it fails.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use client::{Client, ClientError, Session};
+use cluster::{SessionEvent, SessionRequest, SessionStage, Timeline};
+use tokio::sync::{mpsc, watch};
+use tokio::task::JoinSet;
+
+use crate::visits::Visits;
+
+/// The delays between attempts to reach the coordinator.
+pub(crate) const FIRST_DELAY: Duration = Duration::from_millis(250);
+pub(crate) const LONGEST_DELAY: Duration = Duration::from_secs(4);
+/// The lowest rate that a session is opened with, in pictures a second.
+const LEAST_RATE: f64 = 0.05;
+/// The interval at which the session's demand follows the visitors.
+const FOLLOW: Duration = Duration::from_secs(1);
+
+/// The state of a kept session.
+#[derive(Debug, Clone)]
+pub(crate) enum SessionState {
+    /// It is being opened.
+    Waiting {
+        /// As in [`crate::protocol::ToPage::Waiting`].
+        stage: &'static str,
+        /// A sentence.
+        detail: String,
+    },
+    /// It is open.
+    Open(Arc<Session>),
+}
+
+/// A session that all visitors of a scene share.
+pub(crate) struct KeptSession {
+    pub(crate) visits: Arc<Visits>,
+    /// Steps in which the light of its pictures is refined.
+    pub(crate) light_steps: u32,
+    /// The moments of its sample sets.
+    pub(crate) timeline: Timeline,
+    state: watch::Receiver<SessionState>,
+    failures: mpsc::Sender<Arc<Session>>,
+    /// Ends with the session.
+    _keeper: JoinSet<()>,
+}
+
+/// The occasion on which a session is opened for the first time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FirstOpened {
+    /// At once: its costs are then known before anybody comes.
+    AtOnce,
+    /// At its first visit.
+    AtVisit,
+}
+
+/// The time for which a session stays open after its last visit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Lingers(pub(crate) Duration);
+
+impl KeptSession {
+    pub(crate) fn start(
+        coordinator: &str,
+        request: SessionRequest,
+        first: FirstOpened,
+        Lingers(lingers): Lingers,
+    ) -> Self {
+        let waiting = SessionState::Waiting { stage: "connecting", detail: "the gateway connects".to_owned() };
+        let (changes, state) = watch::channel(waiting);
+        let (failures, failed) = mpsc::channel(16);
+        let (light_steps, timeline) = (request.refinement_steps.max(1), request.timeline);
+        let visits = Arc::new(Visits::default());
+        let coordinator = coordinator.to_owned();
+        let keeper = Keeper { coordinator, request, lingers, visits: visits.clone(), changes, failed };
+        let mut tasks = JoinSet::new();
+        tasks.spawn(keeper.run(first));
+        Self { visits, light_steps, timeline, state, failures, _keeper: tasks }
+    }
+
+    /// The session's states, the present one first.
+    pub(crate) fn states(&self) -> watch::Receiver<SessionState> {
+        let mut states = self.state.clone();
+        states.mark_changed();
+        states
+    }
+
+    /// The session, once it is open.
+    pub(crate) async fn open(&self) -> Option<Arc<Session>> {
+        let mut states = self.states();
+        loop {
+            if let SessionState::Open(session) = &*states.borrow_and_update() {
+                return Some(session.clone());
+            }
+            states.changed().await.ok()?;
+        }
+    }
+
+    /// Has a session opened again that delivers nothing any more.
+    pub(crate) fn has_failed(&self, session: Arc<Session>) {
+        // Where there is no room, others have told of it.
+        let _ = self.failures.try_send(session);
+    }
+}
+
+/// Opens and closes the session.
+struct Keeper {
+    coordinator: String,
+    request: SessionRequest,
+    lingers: Duration,
+    visits: Arc<Visits>,
+    changes: watch::Sender<SessionState>,
+    failed: mpsc::Receiver<Arc<Session>>,
+}
+
+/// Why a session is closed.
+enum Closed {
+    Failed,
+    Left,
+}
+
+impl Keeper {
+    async fn run(mut self, first: FirstOpened) {
+        let (mut delay, mut is_wanted) = (FIRST_DELAY, first == FirstOpened::AtOnce);
+        loop {
+            if !is_wanted {
+                self.visits.somebody().await;
+                delay = FIRST_DELAY;
+            }
+            is_wanted = true;
+            match self.opened().await {
+                Ok(session) => {
+                    let opened_at = Instant::now();
+                    let session = Arc::new(session);
+                    self.changes.send_replace(SessionState::Open(session.clone()));
+                    if let Closed::Left = self.follow(&session).await {
+                        self.wait("preparing", "the scene's session is opened");
+                        is_wanted = false;
+                        continue;
+                    }
+                    self.wait("reconnecting", "the session is opened again");
+                    if opened_at.elapsed() > LONGEST_DELAY {
+                        delay = FIRST_DELAY;
+                    }
+                }
+                // A slow device has no room for the usual rate: visitors get fewer pictures.
+                Err(ClientError::Exhausted { .. }) if self.halve_rate() => continue,
+                Err(error) => self.tell_failure(&error),
+            }
+            tokio::time::sleep(delay).await;
+            delay = (delay * 2).min(LONGEST_DELAY);
+        }
+    }
+
+    /// Asks for half the rate from now on; false where there is none, or it is low already.
+    fn halve_rate(&mut self) -> bool {
+        let half = self.request.frames_per_s.map(|rate| rate / 2.0).filter(|&half| half >= LEAST_RATE);
+        if half.is_some() {
+            self.request.frames_per_s = half;
+        }
+        half.is_some()
+    }
+
+    fn wait(&self, stage: &'static str, detail: &str) {
+        self.changes.send_replace(SessionState::Waiting { stage, detail: detail.to_owned() });
+    }
+
+    /// Warns of a failure once, however often it is met.
+    fn tell_failure(&self, error: &ClientError) {
+        let detail = error.to_string();
+        let is_known =
+            matches!(&*self.changes.borrow(), SessionState::Waiting { detail: known, .. } if *known == detail);
+        if !is_known {
+            tracing::warn!(scene = self.request.scene, %error, "no session");
+        }
+        self.wait("connecting", &detail);
+    }
+
+    async fn opened(&self) -> Result<Session, ClientError> {
+        let client = Client::connect(&self.coordinator).await?;
+        client.open_session(self.request.clone(), |event| self.tell(event)).await
+    }
+
+    fn tell(&self, event: &SessionEvent) {
+        if let SessionEvent::Progress { stage, detail } = event {
+            let stage = match stage {
+                SessionStage::Measuring => "measuring",
+                SessionStage::Planning => "planning",
+                SessionStage::Preparing => "preparing",
+            };
+            self.wait(stage, detail);
+        }
+    }
+
+    /// Has the session's demand follow the visitors, until it fails or they have left.
+    async fn follow(&mut self, session: &Arc<Session>) -> Closed {
+        let (mut ticks, mut told) = (tokio::time::interval(FOLLOW), 1);
+        loop {
+            tokio::select! {
+                failed = self.failed.recv() => if failed.is_none_or(|failed| Arc::ptr_eq(&failed, session)) {
+                    return Closed::Failed;
+                },
+                _ = ticks.tick() => {
+                    if self.visits.is_left(Instant::now(), self.lingers) {
+                        return Closed::Left;
+                    }
+                    self.ask_for(self.visits.active(Instant::now()).max(1) as u32, &mut told, session).await;
+                }
+            }
+        }
+    }
+
+    async fn ask_for(&self, active: u32, told: &mut u32, session: &Session) {
+        // A session without a rate follows nobody.
+        if active == *told || self.request.frames_per_s.is_none() {
+            return;
+        }
+        match session.change(active, self.request.frames_per_s).await {
+            Ok(()) => *told = active,
+            Err(error) => tracing::debug!(active, %error, "the demand is not changed"),
+        }
+    }
+}

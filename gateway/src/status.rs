@@ -1,0 +1,112 @@
+//! The cluster as JSON: sample cameras, nodes, workloads and their plans.
+
+use std::sync::Arc;
+
+use axum::extract::{Query, State};
+use axum::response::Response;
+use cluster::{AchievedTime, ClusterStatus, Costs, NodeStatus, Policy, SessionPlan, WorkloadStatus};
+use depth_image::Camera;
+use pictures::camera_frame;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::assets;
+use crate::gateway::Gateway;
+use crate::responses::{Refusal, as_json, opened};
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SceneQuery {
+    scene: Option<String>,
+}
+
+/// `cameras.json`: the sample cameras of a scene's plan, as a `transforms.json` has them, each with its view cell.
+pub(crate) async fn cameras(
+    State(gateway): State<Arc<Gateway>>,
+    Query(query): Query<SceneQuery>,
+) -> Result<Response, Refusal> {
+    let scene = gateway.scenes.visit(query.scene.as_deref()).await?;
+    let _visit = scene.shown.visits.begin();
+    let workload = opened(&scene.shown).await?.plan().assignment.workload;
+    let cells = (0..workload.cell_count()).filter_map(|cell| Some((cell, workload.cameras_of_cell(cell)?)));
+    let frames: Vec<Value> = cells
+        .flat_map(|(cell, cameras)| workload.sample_cameras[cameras].iter().map(move |camera| (cell, camera)))
+        .map(|(cell, Camera::Pinhole(camera))| {
+            let mut frame = camera_frame(camera, scene.offer.origin_in_source);
+            frame.insert("cell".to_owned(), json!(cell));
+            Value::Object(frame)
+        })
+        .collect();
+    Ok(as_json(&json!({ "camera_model": "PINHOLE", "frames": frames })))
+}
+
+/// `status.json`.
+pub(crate) async fn status(State(gateway): State<Arc<Gateway>>) -> Result<Response, Refusal> {
+    let status = gateway.scenes.client().await?.status().await?;
+    let visitors = gateway.config.max_visitors - gateway.visitors.available_permits();
+    Ok(as_json(&described(&status, visitors)))
+}
+
+fn described(status: &ClusterStatus, visitors: usize) -> Value {
+    let nodes: Vec<Value> = status.nodes.iter().map(|node| described_node(status, node)).collect();
+    let scenes: Vec<&str> = status.offers.iter().map(|offer| offer.name.as_str()).collect();
+    let workloads: Vec<Value> = status.workloads.iter().map(described_workload).collect();
+    json!({
+        "version": assets::VERSION, "visitors": visitors, "plan_epoch": status.plan_epoch,
+        "nodes": nodes, "scenes": scenes, "workloads": workloads,
+    })
+}
+
+/// A node, with its roles in all plans and its busiest second.
+fn described_node(status: &ClusterStatus, node: &NodeStatus) -> Value {
+    let name = node.node_name.as_str();
+    let assignments = || status.workloads.iter().filter_map(|workload| Some(&workload.plan.as_ref()?.assignment));
+    let samples = assignments().any(|plan| plan.samplers.iter().any(|share| share.node_name == name));
+    let composites = assignments().any(|plan| plan.composites(name));
+    let roles: Vec<&str> = [(samples, "sampler"), (composites, "compositor")]
+        .into_iter()
+        .filter_map(|(is, role)| is.then_some(role))
+        .collect();
+    let conditions = status.workloads.iter().flat_map(|workload| &workload.conditions);
+    let busy = conditions.filter(|condition| condition.node_name == name).map(|condition| condition.busy_ratio);
+    json!({ "name": name, "device": node.device_name, "roles": roles, "busy": busy.reduce(f64::max) })
+}
+
+fn described_workload(workload: &WorkloadStatus) -> Value {
+    json!({
+        "number": workload.number, "sessions": workload.session_count, "viewers": workload.viewer_count,
+        "views_per_set": workload.views_per_set, "utilisation": workload.utilisation,
+        "plan": workload.plan.as_ref().map(|plan| described_plan(plan, &workload.achieved)),
+    })
+}
+
+fn described_plan(plan: &SessionPlan, achieved: &[AchievedTime]) -> Value {
+    let assignment = &plan.assignment;
+    let samplers: Vec<&str> = assignment.samplers.iter().map(|share| share.node_name.as_str()).collect();
+    let compositors: Vec<&str> = assignment.compositors.iter().map(|share| share.node_name.as_str()).collect();
+    let predicted = [
+        (Policy::Pipeline, plan.predicted_pipeline_s),
+        (Policy::Direct, plan.predicted_direct_s),
+        (Policy::TimeShare, plan.predicted_time_share_s),
+    ];
+    let policies: Vec<Value> = predicted
+        .into_iter()
+        .map(|(policy, predicted_s)| {
+            let achieved_s = achieved.iter().find(|time| time.policy == policy).map(|time| time.busy_s);
+            json!({ "policy": policy.to_string(), "predicted_s": predicted_s, "achieved_s": achieved_s })
+        })
+        .collect();
+    json!({
+        "epoch": assignment.plan_epoch, "policy": assignment.policy.to_string(), "reason": plan.reason,
+        "samplers": samplers, "compositors": compositors, "cells": assignment.workload.cell_count(),
+        "costs": described_costs(&plan.costs), "policies": policies,
+    })
+}
+
+fn described_costs(costs: &Costs) -> Value {
+    json!({
+        "sample_image_s": costs.sample_image_s, "direct_view_s": costs.direct_view_s,
+        "reconstruct_view_s": costs.reconstruct_view_s, "load_set_s": costs.load_set_s,
+        "encode_view_s": costs.encode_view_s,
+    })
+}

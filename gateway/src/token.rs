@@ -1,0 +1,140 @@
+//! The token of a gateway that others can reach. Its link sets a cookie; programs send it as a bearer token.
+
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::response::{IntoResponse as _, Response};
+
+const COOKIE: &str = "myriorama_token";
+const QUERY: &str = "token=";
+const BYTES: usize = 16;
+
+/// A secret, compared in constant time. It is in no log.
+#[derive(Clone)]
+pub struct Token(String);
+
+/// The answer to a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Admission {
+    /// The request needs no token, or brings it.
+    Granted,
+    /// The request opens the link.
+    Link,
+    /// The token is missing.
+    Refused,
+}
+
+impl Token {
+    /// A random token.
+    ///
+    /// # Errors
+    /// The system has no random numbers.
+    pub fn random() -> std::io::Result<Self> {
+        let mut bytes = [0; BYTES];
+        getrandom::fill(&mut bytes).map_err(std::io::Error::other)?;
+        Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
+    }
+
+    /// The query of a link that carries the token.
+    #[must_use]
+    pub fn query(&self) -> String {
+        format!("?{QUERY}{}", self.0)
+    }
+
+    /// The page itself is no secret: only what is below `/api/` is. A cookie that is set by a link in another page is not sent
+    /// with the redirect that follows.
+    pub(crate) fn admit(&self, uri: &Uri, headers: &HeaderMap) -> Admission {
+        let link = uri.query().and_then(|query| query.split('&').find_map(|part| part.strip_prefix(QUERY)));
+        if link.is_some_and(|given| self.is(given)) {
+            return Admission::Link;
+        }
+        let bearer = headers.get(header::AUTHORIZATION).and_then(|value| value.to_str().ok()?.strip_prefix("Bearer "));
+        let is_open = !uri.path().starts_with("/api/");
+        if is_open || bearer.is_some_and(|given| self.is(given)) || cookies(headers).any(|given| self.is(given)) {
+            Admission::Granted
+        } else {
+            Admission::Refused
+        }
+    }
+
+    /// The answer to the link: a cookie, and the same address without the token. It is relative, so that the page may be under
+    /// any path.
+    pub(crate) fn redirect(&self, uri: &Uri, is_secure: bool) -> Response {
+        let secure = if is_secure { "; Secure" } else { "" };
+        let cookie = format!("{COOKIE}={}; HttpOnly; SameSite=Strict{secure}", self.0);
+        let fields = [
+            (header::SET_COOKIE, HeaderValue::from_str(&cookie).unwrap_or(HeaderValue::from_static(""))),
+            (header::LOCATION, HeaderValue::from_str(&without_token(uri)).unwrap_or(HeaderValue::from_static("./"))),
+            (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
+            (header::REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
+        ];
+        (StatusCode::SEE_OTHER, fields).into_response()
+    }
+
+    fn is(&self, given: &str) -> bool {
+        // Hashes compare in constant time.
+        blake3::hash(given.as_bytes()) == blake3::hash(self.0.as_bytes())
+    }
+}
+
+/// The last part of an address, without the token.
+fn without_token(uri: &Uri) -> String {
+    let name = uri.path().rsplit('/').next().unwrap_or_default();
+    let rest: Vec<&str> = uri
+        .query()
+        .unwrap_or_default()
+        .split('&')
+        .filter(|part| !part.is_empty() && !part.starts_with(QUERY))
+        .collect();
+    let query = if rest.is_empty() { String::new() } else { format!("?{}", rest.join("&")) };
+    format!("./{name}{query}")
+}
+
+fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
+    let all = headers.get_all(header::COOKIE).into_iter().filter_map(|value| value.to_str().ok());
+    let pairs = all.flat_map(|value| value.split(';')).filter_map(|pair| pair.trim().split_once('='));
+    pairs.filter_map(|(name, value)| (name == COOKIE).then_some(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn admitted(path: &str, name: header::HeaderName, value: &str) -> Admission {
+        let token = Token("secret".to_owned());
+        let mut headers = HeaderMap::new();
+        headers.insert(name, value.parse().unwrap());
+        token.admit(&path.parse().unwrap(), &headers)
+    }
+
+    #[test]
+    fn a_cookie_or_a_bearer_token_opens_the_api() {
+        let path = "/api/v1/view.png?size=8x8";
+        assert_eq!(admitted(path, header::COOKIE, "a=b; myriorama_token=secret"), Admission::Granted);
+        assert_eq!(admitted(path, header::AUTHORIZATION, "Bearer secret"), Admission::Granted);
+        assert_eq!(admitted(path, header::AUTHORIZATION, "Basic secret"), Admission::Refused);
+        assert_eq!(admitted(path, header::COOKIE, "myriorama_token=secre"), Admission::Refused);
+        assert_eq!(admitted(path, header::COOKIE, "token=secret"), Admission::Refused);
+    }
+
+    #[test]
+    fn the_page_is_open_and_its_link_sets_the_cookie() {
+        assert_eq!(admitted("/main.js", header::ACCEPT, "*/*"), Admission::Granted);
+        assert_eq!(admitted("/?token=secret", header::ACCEPT, "*/*"), Admission::Link);
+        assert_eq!(admitted("/api/v1/socket?token=wrong", header::ACCEPT, "*/*"), Admission::Refused);
+        for (link, location) in [
+            ("/?token=secret", "./"),
+            ("/status?token=secret", "./status"),
+            ("/a/b?x=1&token=secret&y=2", "./b?x=1&y=2"),
+        ] {
+            let answer = Token("secret".to_owned()).redirect(&link.parse().unwrap(), true);
+            assert_eq!(answer.headers()[header::LOCATION], location);
+        }
+        let answer = Token("secret".to_owned()).redirect(&Uri::from_static("/"), true);
+        let cookie = answer.headers()[header::SET_COOKIE].to_str().unwrap();
+        assert!(cookie.starts_with("myriorama_token=secret; HttpOnly; SameSite=Strict; Secure"), "{cookie}");
+    }
+
+    #[test]
+    fn tokens_differ() {
+        assert_ne!(Token::random().unwrap().query(), Token::random().unwrap().query());
+    }
+}

@@ -1,0 +1,281 @@
+//! Single views over HTTP: pictures of their colour, depth or provenance, depth as numbers, and the surface at a pixel.
+
+use std::sync::Arc;
+
+use axum::extract::{Path, Query, State};
+use axum::http::{HeaderName, HeaderValue, StatusCode};
+use axum::response::Response;
+use client::Frame;
+use cluster::Workload;
+use codec::{FrameCodec, encode_frame};
+use depth_image::{Camera, PinholeCamera, PixelDepth, ProvenanceKind, View, ViewGroup, ViewPlanes};
+use glam::{UVec2, Vec2};
+use pictures::Legend;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use tokio::sync::OwnedSemaphorePermit;
+
+use crate::camera::PageCamera;
+use crate::gateway::Gateway;
+use crate::responses::{Refusal, as_json, held, opened};
+use crate::scenes::SceneSessions;
+use crate::visits::Visit;
+
+/// The size of a view that names none.
+const SIZE_PX: UVec2 = UVec2::new(640, 360);
+/// The JPEG quality of views.
+const QUALITY: u8 = 90;
+/// Names of the colours of a picture, as JSON.
+const LEGEND: HeaderName = HeaderName::from_static("myriorama-legend");
+
+/// One view, and what is wanted of it.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ViewQuery {
+    scene: Option<String>,
+    eye: Option<String>,
+    target: Option<String>,
+    fov: Option<f64>,
+    size: Option<String>,
+    #[serde(default)]
+    show: Plane,
+    at: Option<String>,
+    #[serde(default)]
+    moment: u32,
+}
+
+/// The plane of a view that a picture shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Plane {
+    #[default]
+    Color,
+    Depth,
+    Provenance,
+}
+
+impl ViewQuery {
+    fn camera(&self, scene: &SceneSessions, max_px: UVec2) -> Result<PinholeCamera, Refusal> {
+        let point = |field: &str, text: &Option<String>, home: [f64; 3]| match text {
+            None => Ok(home),
+            Some(text) => numbers(text).ok_or_else(|| Refusal::bad(format!("{field}: {text:?}, must be X,Y,Z"))),
+        };
+        let page = PageCamera {
+            eye: point("eye", &self.eye, scene.home.eye)?,
+            target: point("target", &self.target, scene.home.target)?,
+            fov_y_deg: self.fov.unwrap_or(scene.home.fov_y_deg),
+        };
+        let size_px = match &self.size {
+            None => SIZE_PX.min(max_px),
+            Some(text) => size(text).ok_or_else(|| Refusal::bad(format!("size: {text:?}, must be WIDTHxHEIGHT")))?,
+        };
+        if size_px.cmpgt(max_px).any() {
+            return Err(Refusal::bad(format!("size: {size_px} is above {max_px}")));
+        }
+        scene.space.camera(&page, size_px).map_err(Refusal::bad)
+    }
+
+    /// The pixel that is asked for; the middle where none is named.
+    fn pixel(&self, size_px: UVec2) -> Result<UVec2, Refusal> {
+        let Some(text) = &self.at else { return Ok(size_px / 2) };
+        let at = numbers(text).map(UVec2::from_array).filter(|at| at.cmplt(size_px).all());
+        at.ok_or_else(|| Refusal::bad(format!("at: {text:?}, must be COLUMN,ROW within the view")))
+    }
+}
+
+fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
+    let numbers: Option<Vec<T>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    numbers?.try_into().ok()
+}
+
+fn size(text: &str) -> Option<UVec2> {
+    let (width, height) = text.split_once('x')?;
+    Some(UVec2::new(width.parse().ok()?, height.parse().ok()?))
+}
+
+/// A scene that a request visits.
+pub(crate) struct Visited {
+    pub(crate) scene: Arc<SceneSessions>,
+    pub(crate) camera: PinholeCamera,
+    pub(crate) moment: u32,
+    /// The place of the answer.
+    pub(crate) place: OwnedSemaphorePermit,
+    _visit: Visit,
+}
+
+impl Visited {
+    /// The scene and the camera of a query, whose view is within `max_px`.
+    pub(crate) async fn of(gateway: &Gateway, query: &ViewQuery, max_px: UVec2) -> Result<Self, Refusal> {
+        let place = gateway.stills.place()?;
+        let scene = gateway.scenes.visit(query.scene.as_deref()).await?;
+        let (moment, moments) = (query.moment, scene.timeline().set_count);
+        if moment >= moments {
+            return Err(Refusal::bad(format!("moment: {moment}, must be below {moments}")));
+        }
+        let visit = scene.session_of(moment).visits.begin();
+        let camera = query.camera(&scene, max_px)?;
+        Ok(Self { scene, camera, moment, place, _visit: visit })
+    }
+
+    /// The view, drawn directly where no view cell is near: cells follow visitors, not single requests.
+    async fn frame(&self, gateway: &Gateway, planes: ViewPlanes) -> Result<Frame, Refusal> {
+        let session = opened(self.scene.session_of(self.moment)).await?;
+        if is_near(&session.plan().assignment.workload, &self.camera) {
+            return Ok(gateway.stills.frame(&session, self.camera, planes, self.moment).await?);
+        }
+        let _visit = self.scene.direct.visits.begin();
+        let session = opened(&self.scene.direct).await?;
+        Ok(gateway.stills.frame(&session, self.camera, planes, self.moment).await?)
+    }
+}
+
+impl Visited {
+    /// The number of the first sample camera of a frame's view cell.
+    async fn first_camera(&self, frame: &Frame) -> Result<usize, Refusal> {
+        let session = opened(self.scene.session_of(self.moment)).await?;
+        let cameras = session.plan().assignment.workload.cameras_of_cell(frame.header.cell as usize);
+        Ok(cameras.map_or(0, |cameras| cameras.start))
+    }
+}
+
+/// Whether the view cells of a workload serve a view, or would with a small step.
+pub(crate) fn is_near(workload: &Workload, view: &PinholeCamera) -> bool {
+    let samples: Vec<_> = workload.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+    let mut groups = Vec::new();
+    ViewGroup::add(&mut groups, &samples, &workload.volume);
+    let before = groups.len();
+    ViewGroup::add(&mut groups, &[*view], &workload.volume);
+    groups.len() == before
+}
+
+/// `view.png` and `view.jpg`.
+pub(crate) async fn picture(
+    State(gateway): State<Arc<Gateway>>,
+    Path(name): Path<String>,
+    Query(query): Query<ViewQuery>,
+) -> Result<Response, Refusal> {
+    let (codec, media_type) = match name.as_str() {
+        "view.png" => (FrameCodec::Png, "image/png"),
+        "view.jpg" => (FrameCodec::Jpeg { quality: QUALITY }, "image/jpeg"),
+        _ => return Err(Refusal(StatusCode::NOT_FOUND, "the pictures are view.png and view.jpg".to_owned())),
+    };
+    let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
+    let planes = match query.show {
+        Plane::Color => ViewPlanes::default(),
+        Plane::Depth => ViewPlanes { inverse_depth: true, provenance: false },
+        Plane::Provenance => ViewPlanes { inverse_depth: false, provenance: true },
+    };
+    let frame = visited.frame(&gateway, planes).await?;
+    let first_camera = visited.first_camera(&frame).await?;
+    let Visited { camera, place, .. } = visited;
+    let encode = move || {
+        let (rgb, legend) = colored(frame.view, query.show, first_camera)?;
+        encode_frame(codec, camera.size_px, &rgb).ok().map(|encoded| (encoded, legend))
+    };
+    let encoded = tokio::task::spawn_blocking(encode).await.map_err(Refusal::internal)?;
+    let (encoded, legend) = encoded.ok_or_else(|| Refusal::internal("the view lacks a plane"))?;
+    let mut response = held(media_type, encoded, place);
+    if let Some(legend) = header_of(&legend) {
+        response.headers_mut().insert(LEGEND, legend);
+    }
+    Ok(response)
+}
+
+/// Three bytes a pixel, and the names of colours.
+fn colored(view: View, plane: Plane, first_camera: usize) -> Option<(Vec<u8>, Legend)> {
+    let (image, legend) = match plane {
+        Plane::Color => return Some((view.srgb8, Legend::new())),
+        Plane::Depth => pictures::depth(&view)?,
+        Plane::Provenance => pictures::provenance(&view, first_camera)?,
+    };
+    Some((image.into_raw(), legend))
+}
+
+fn header_of(legend: &Legend) -> Option<HeaderValue> {
+    let names = legend.iter().map(|(name, [r, g, b])| json!([name, format!("#{r:02x}{g:02x}{b:02x}")]));
+    let names: Value = names.collect();
+    names.to_string().parse().ok().filter(|_| !legend.is_empty())
+}
+
+/// `depth.npy`: planar depth in 32-bit floats, infinite where there is no surface.
+pub(crate) async fn depth(
+    State(gateway): State<Arc<Gateway>>,
+    Query(query): Query<ViewQuery>,
+) -> Result<Response, Refusal> {
+    let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
+    let planes = ViewPlanes { inverse_depth: true, provenance: false };
+    let Frame { view, .. } = visited.frame(&gateway, planes).await?;
+    let inverse = view.inverse_depth_per_m.ok_or_else(|| Refusal::internal("the view lacks depth"))?;
+    // One over zero is infinite, as it should be.
+    let file = npy(view.size_px, inverse.into_iter().map(f32::recip));
+    Ok(held("application/octet-stream", file.into(), visited.place))
+}
+
+/// A file of NumPy's format, version 1.0: the header is padded to 64 bytes.
+fn npy(size_px: UVec2, numbers: impl Iterator<Item = f32>) -> Vec<u8> {
+    let fields = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}", size_px.y, size_px.x);
+    let prefix = b"\x93NUMPY\x01\x00";
+    let length = (prefix.len() + 2 + fields.len() + 1).next_multiple_of(64) - prefix.len() - 2;
+    let mut file = prefix.to_vec();
+    file.extend_from_slice(&(length as u16).to_le_bytes());
+    file.extend_from_slice(format!("{fields:<width$}\n", width = length - 1).as_bytes());
+    file.extend(numbers.flat_map(f32::to_le_bytes));
+    file
+}
+
+/// `point.json`: the surface at a pixel.
+pub(crate) async fn point(
+    State(gateway): State<Arc<Gateway>>,
+    Query(query): Query<ViewQuery>,
+) -> Result<Response, Refusal> {
+    let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
+    let at = query.pixel(visited.camera.size_px)?;
+    let planes = ViewPlanes { inverse_depth: true, provenance: true };
+    let frame = visited.frame(&gateway, planes).await?;
+    let first_camera = visited.first_camera(&frame).await?;
+    let found = surface(&visited, &frame.view, at, first_camera);
+    Ok(as_json(&found.ok_or_else(|| Refusal::internal("the view lacks a plane"))?))
+}
+
+fn surface(visited: &Visited, view: &View, at: UVec2, first_camera: usize) -> Option<Value> {
+    let index = (at.y * view.size_px.x + at.x) as usize;
+    let (inverse, provenance) =
+        (*view.inverse_depth_per_m.as_ref()?.get(index)?, *view.provenance.as_ref()?.get(index)?);
+    let has_surface = inverse > 0.0 && provenance.kind() != ProvenanceKind::Empty;
+    let pixel = at.as_vec2() + Vec2::splat(0.5);
+    let in_world = visited.camera.unproject(PixelDepth { pixel, planar_depth_m: 1.0 / inverse });
+    let mask = provenance.camera_mask();
+    let cameras: Vec<usize> = (0..24).filter(|bit| mask >> bit & 1 == 1).map(|bit| first_camera + bit).collect();
+    let source = match provenance.kind() {
+        ProvenanceKind::Empty => "nothing",
+        ProvenanceKind::Hit if cameras.is_empty() => "direct",
+        ProvenanceKind::Hit => "cameras",
+        ProvenanceKind::Filled => "filled",
+    };
+    Some(json!({
+        "at": at.to_array(), "source": source, "cameras": cameras,
+        "point": has_surface.then(|| visited.scene.space.in_source(in_world)),
+        "depth": has_surface.then_some(1.0 / inverse),
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_depth_file_has_an_aligned_header_and_one_float_a_pixel() {
+        let file = npy(UVec2::new(3, 2), [0.0, 0.5, 1.0, 2.0, 4.0, 8.0].map(f32::recip).into_iter());
+        let header_bytes = 10 + usize::from(u16::from_le_bytes([file[8], file[9]]));
+        assert_eq!((header_bytes % 64, file.len() - header_bytes, file[header_bytes - 1]), (0, 24, b'\n'));
+        assert!(String::from_utf8_lossy(&file[..header_bytes]).contains("'shape': (2, 3)"));
+        assert_eq!(file[header_bytes..header_bytes + 4], f32::INFINITY.to_le_bytes());
+    }
+
+    #[test]
+    fn lists_of_numbers_have_their_length() {
+        assert_eq!(numbers::<f64, 3>("1, -2,3e1"), Some([1.0, -2.0, 30.0]));
+        assert_eq!((numbers::<f64, 3>("1,2"), numbers::<u32, 2>("1,-2")), (None, None));
+        assert_eq!((size("640x360"), size("640"), size("-1x2")), (Some(UVec2::new(640, 360)), None, None));
+    }
+}
