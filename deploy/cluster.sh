@@ -99,6 +99,20 @@ kill_while_served() {
     wait_until_healthy "$victim"
 }
 
+# The link of the viewer, as this machine reaches it.
+viewer_link() {
+    local token
+    token="$(compose logs --no-color gateway | grep -o 'token=[0-9a-f]*' | tail -n 1)"
+    echo "http://127.0.0.1:7421/?${token:?the gateway has printed no link}"
+}
+
+# A browser opens the link, drags and rests.
+visit() {
+    scripts/ensure-browser.sh
+    MYRIORAMA_VIEWER="$(viewer_link)" "${CARGO:-cargo}" test --quiet --release --locked --package browser-tests \
+        --test cluster -- --ignored --nocapture
+}
+
 build
 if [ "${1:-}" = --test ]; then
     trap 'compose down --timeout 15 --volumes' EXIT
@@ -111,6 +125,9 @@ if [ "${1:-}" = --test ]; then
     kill_while_served "${scenes[0]}" "${scenes[1]}"
     kill_while_served "${scenes[1]}" "${scenes[0]}"
     views
+    # The last, as a gateway's visitors have a workload of their own for a while.
+    visit
 else
+    echo "The viewer: $(viewer_link)"
     echo "The cluster runs: myriorama view --coordinator $coordinator …; docker-compose --project-name myriorama --file deploy/compose.yaml down ends it."
 fi

@@ -8,3 +8,4 @@ pub mod cli;
 pub mod commands;
 pub mod comparison;
 pub mod terminal_picture;
+pub mod viewer;

@@ -59,7 +59,7 @@ fn commands_in(compose: &str) -> Vec<Vec<String>> {
 #[test]
 fn every_command_of_the_compose_file_is_valid() {
     let commands = commands_in(&deployed("compose.yaml"));
-    assert_eq!(commands.len(), 2, "{commands:?}");
+    assert_eq!(commands.len(), 3, "{commands:?}");
     for command in commands {
         if let Err(error) = myriorama::cli::Cli::try_parse_from(&command) {
             panic!("{command:?}: {error}");

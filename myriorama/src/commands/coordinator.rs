@@ -6,13 +6,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use app_core::exit::Outcome;
-use app_core::process::{cancel_at_signal, listen, serve_metrics};
+use app_core::process::{cancel_at_signal, listen, loopback_of, serve_metrics};
 use app_core::scenes::ScenesArgs;
 use clap::Args;
 use coordinator::schedule::Recorder;
 use coordinator::{CoordinatorConfig, CoordinatorMetrics, EventLog, Observers};
 use node::Telemetry;
 use tokio_util::sync::CancellationToken;
+
+use crate::viewer::ViewerArgs;
 
 /// Serves a scene and plans the work of the nodes that join. A coordinator draws nothing and needs no device.
 #[derive(Debug, Args)]
@@ -42,6 +44,8 @@ pub struct CoordinatorArgs {
     /// Serves without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
+    #[command(flatten)]
+    viewer: ViewerArgs,
 }
 
 /// Runs until a signal.
@@ -68,7 +72,13 @@ pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
     let metrics = CoordinatorMetrics::new(&telemetry);
     serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
     cancel_at_signal(shutdown.clone());
-    coordinator::serve(listener, config, offers, Observers { metrics, log }, shutdown).await?;
+    let own_address = format!("http://{}", loopback_of(&listener)?);
+    let (port, browsers) = args.viewer.share(listener);
+    let viewer = args.viewer.serve(browsers, &own_address, shutdown.child_token());
+    coordinator::serve(port, config, offers, Observers { metrics, log }, shutdown).await?;
+    if let Some(viewer) = viewer {
+        viewer.end().await;
+    }
     Ok(Outcome::Done)
 }
 

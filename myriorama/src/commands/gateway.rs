@@ -1,21 +1,18 @@
 //! `myriorama gateway`: thin clients in browsers.
 
-use std::net::SocketAddr;
-use std::sync::Arc;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
+use std::path::PathBuf;
 
-use app_core::delivery::{at_rate, request};
-use app_core::exit::Outcome;
+use app_core::exit::{BadInput, Outcome};
 use app_core::process::{cancel_at_signal, listen};
 use app_core::sizes::SizePx;
 use clap::Args;
-use cluster::{OfferStatus, PolicyChoice, SessionRequest};
-use depth_image::PinholeCamera;
-use gateway::{GatewayConfig, RequestOf};
+use cluster::PolicyChoice;
+use gateway::{GatewayConfig, Token, tls_config};
 use glam::UVec2;
 use tokio_util::sync::CancellationToken;
 
-/// Pictures a second of a visitor who moves.
-const PICTURES_PER_S: f64 = 20.0;
+use crate::viewer::request_of;
 
 /// Serves the viewer to browsers. Pictures go on while the coordinator is away. There may be any number of gateways.
 #[derive(Debug, Args)]
@@ -28,7 +25,7 @@ pub struct GatewayArgs {
     #[arg(long, default_value = "127.0.0.1:7421", value_name = "HOST:PORT")]
     listen: SocketAddr,
     /// The most visitors at a time; further ones wait
-    #[arg(long, default_value_t = 24, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=24))]
+    #[arg(long, default_value_t = 64, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=64))]
     max_visitors: u16,
     /// The largest still picture
     #[arg(long, default_value_t = SizePx(UVec2::new(1920, 1080)), value_name = "WxH")]
@@ -42,6 +39,12 @@ pub struct GatewayArgs {
     /// Another page that may use this server, as https://host; may be repeated
     #[arg(long = "allow-origin", value_name = "ORIGIN")]
     origins: Vec<String>,
+    /// The certificate chain of TLS, as PEM
+    #[arg(long, value_name = "FILE", requires = "tls_key")]
+    tls_cert: Option<PathBuf>,
+    /// The private key of the certificate, as PEM
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    tls_key: Option<PathBuf>,
     /// Serves without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
@@ -52,13 +55,26 @@ pub struct GatewayArgs {
 /// # Errors
 /// The port is taken, or the address is not allowed.
 pub async fn run(args: GatewayArgs) -> anyhow::Result<Outcome> {
-    let listener = listen(args.listen, args.insecure_bind).await?;
-    println!("Open http://{}/", listener.local_addr()?);
+    let tls = match args.tls_cert.as_deref().zip(args.tls_key.as_deref()) {
+        Some((certificates, key)) => {
+            Some(tls_config(certificates, key).map_err(|error| BadInput(format!("--tls-cert, --tls-key: {error}")))?)
+        }
+        None => None,
+    };
+    let listener = listen(args.listen, args.insecure_bind || tls.is_some()).await?;
+    let address = listener.local_addr()?;
+    // Whoever can reach the port needs the link.
+    let token = if address.ip().is_loopback() { None } else { Some(Token::random()?) };
+    let scheme = if tls.is_some() { "https" } else { "http" };
+    let authority = reachable(address, args.hosts.first());
+    println!("Open {scheme}://{authority}/{}", token.as_ref().map_or_else(String::new, Token::query));
     let config = GatewayConfig {
         max_visitors: usize::from(args.max_visitors),
         max_still_px: args.max_still.0,
         hosts: args.hosts,
         origins: args.origins,
+        tls,
+        token,
         ..GatewayConfig::new(&args.coordinator, request_of(args.policy))
     };
     let shutdown = CancellationToken::new();
@@ -67,11 +83,20 @@ pub async fn run(args: GatewayArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The session of a scene's visitors: with the scene's own settings, a rate, fallbacks, and view cells that follow them.
-fn request_of(policy: PolicyChoice) -> RequestOf {
-    Arc::new(move |offer: &OfferStatus, typical: PinholeCamera| {
-        let request = request(offer.settings.clone(), &[typical]).expect("one view");
-        let request = at_rate(request, PICTURES_PER_S);
-        SessionRequest { scene: Some(offer.name.clone()), policy, viewpoints: vec![typical], ..request }
-    })
+/// The host and port by which others reach an address: its first name, or the machine's own address where it is bound to all.
+fn reachable(address: SocketAddr, name: Option<&String>) -> String {
+    match name {
+        Some(name) => format!("{name}:{}", address.port()),
+        None if address.ip().is_unspecified() => outbound(address).unwrap_or(address).to_string(),
+        None => address.to_string(),
+    }
+}
+
+/// The address from which this machine would reach others. Nothing is sent.
+fn outbound(address: SocketAddr) -> Option<SocketAddr> {
+    let socket = UdpSocket::bind((address.ip(), 0)).ok()?;
+    let elsewhere: IpAddr =
+        if address.is_ipv4() { Ipv4Addr::new(192, 0, 2, 1).into() } else { "2001:db8::1".parse().ok()? };
+    socket.connect((elsewhere, 9)).ok()?;
+    Some(SocketAddr::new(socket.local_addr().ok()?.ip(), address.port()))
 }

@@ -12,6 +12,9 @@ use app_core::view_limits::ViewLimitArgs;
 use clap::Args;
 use engine::GpuEngine;
 use node::{Engine as _, NodeConfig};
+use tokio_util::sync::CancellationToken;
+
+use crate::viewer::ViewerArgs;
 
 /// Serves until ctrl-c or SIGTERM, then drains for at most 10 s.
 #[derive(Debug, Args)]
@@ -36,6 +39,8 @@ pub struct UpArgs {
     /// Serves without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
+    #[command(flatten)]
+    viewer: ViewerArgs,
 }
 
 /// Runs until a signal.
@@ -56,13 +61,18 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     drop(scenes);
     let configure = |config: NodeConfig| NodeConfig { set_memory_bytes: memory / nodes, ..args.limits.within(config) };
     let device_name = engine.device_name();
-    let mut cluster = Cluster::start(configure, listener, offers, engine.opener(), nodes, args.insecure_bind).await?;
+    let (port, browsers) = args.viewer.share(listener);
+    let mut cluster = Cluster::start(configure, port, offers, engine.opener(), nodes, args.insecure_bind).await?;
     println!("{nodes} nodes on {device_name}, at {}", cluster.address);
+    let viewer = args.viewer.serve(browsers, &cluster.address, CancellationToken::new());
     tokio::select! {
         stopped = stop_signal() => stopped?,
         failed = cluster.failed() => failed?,
     }
     println!("draining");
+    if let Some(viewer) = viewer {
+        viewer.end().await;
+    }
     cluster.drain().await?;
     Ok(Outcome::Done)
 }

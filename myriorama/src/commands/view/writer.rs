@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 
 use anyhow::Context as _;
-use app_core::pictures;
 use client::Frame;
 use depth_image::ViewPlanes;
 use image::{DynamicImage, ImageFormat};
@@ -72,7 +71,7 @@ fn write_frame(folder: &Path, frame: &Frame) -> anyhow::Result<Written> {
         save(&folder.join(name), image.into())?;
         depth_scale = greatest;
     }
-    if let (Some((image, _)), Some(name)) = (pictures::provenance(view), names.provenance) {
+    if let (Some((image, _)), Some(name)) = (pictures::provenance(view, 0), names.provenance) {
         save(&folder.join(name), image.into())?;
     }
     Ok((number, depth_scale))

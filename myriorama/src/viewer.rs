@@ -1,0 +1,91 @@
+//! The viewer on the coordinator's own port, and the sessions that visitors of any gateway share.
+
+use std::io::Write as _;
+use std::sync::Arc;
+
+use app_core::delivery::{at_rate, request};
+use clap::Args;
+use cluster::{OfferStatus, PolicyChoice, SessionRequest, Timeline};
+use depth_image::PinholeCamera;
+use gateway::{Connections, GatewayConfig, RequestOf};
+use node::Port;
+use render::Lighting;
+use tokio::net::TcpListener;
+use tokio::sync::mpsc;
+use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
+
+/// Pictures a second of a visitor who moves.
+const PICTURES_PER_S: f64 = 20.0;
+/// Connections of browsers that wait to be served.
+const WAITING: usize = 16;
+
+/// The viewer on the port of a coordinator.
+#[derive(Debug, Clone, Args)]
+pub struct ViewerArgs {
+    /// Serves no viewer on the port: only gRPC
+    #[arg(long)]
+    no_viewer: bool,
+    /// A name of this server in links, beside localhost and addresses; may be repeated
+    #[arg(long = "host", value_name = "NAME")]
+    hosts: Vec<String>,
+}
+
+/// A viewer that runs.
+pub struct Viewer {
+    shutdown: CancellationToken,
+    served: JoinHandle<()>,
+}
+
+impl ViewerArgs {
+    /// The port of a coordinator, and the browsers that come to it where there is a viewer.
+    pub fn share(&self, listener: TcpListener) -> (Port, Option<Connections>) {
+        if self.no_viewer {
+            return (listener.into(), None);
+        }
+        let (send, browsers) = mpsc::channel(WAITING);
+        (Port { listener, browsers: Some(send) }, Some(browsers))
+    }
+
+    /// Serves these browsers from the coordinator at this address until `shutdown`, and prints the link.
+    pub fn serve(
+        &self,
+        browsers: Option<Connections>,
+        coordinator: &str,
+        shutdown: CancellationToken,
+    ) -> Option<Viewer> {
+        let request_of = request_of(PolicyChoice::Auto);
+        let config = GatewayConfig { hosts: self.hosts.clone(), ..GatewayConfig::new(coordinator, request_of) };
+        let served = tokio::spawn(gateway::serve(browsers?, config, shutdown.clone()));
+        // Whoever started this may read no more than the address.
+        let _ = writeln!(std::io::stdout(), "Open {coordinator}/");
+        Some(Viewer { shutdown, served })
+    }
+}
+
+impl Viewer {
+    /// Ends the visits, before the cluster that makes their pictures.
+    pub async fn end(self) {
+        self.shutdown.cancel();
+        // A viewer that has failed has ended, too.
+        let _ = self.served.await;
+    }
+}
+
+/// The session of a scene's visitors: with the scene's own settings, a rate, fallbacks, light in steps, and view cells that
+/// follow them.
+pub fn request_of(policy: PolicyChoice) -> RequestOf {
+    Arc::new(move |offer: &OfferStatus, typical: PinholeCamera| {
+        let request = request(offer.settings.clone(), &[typical]).expect("one view");
+        let request = at_rate(request, PICTURES_PER_S);
+        let steps = request.lighting.parse().map_or(1, |lighting: Lighting| lighting.refinement_steps());
+        SessionRequest {
+            scene: Some(offer.name.clone()),
+            policy,
+            viewpoints: vec![typical],
+            refinement_steps: steps,
+            timeline: Timeline { set_count: steps, ..Timeline::still(0.0) },
+            ..request
+        }
+    })
+}
