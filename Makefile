@@ -1,8 +1,8 @@
 # The release profile builds everything: the software device and the scalar references need it, and no second
 # profile is then compiled.
 #
-# Requirements are Rust (its version is in Cargo.toml), a linker (`cc`) and a Vulkan device. The targets install
-# the last two where they are missing and no question is needed; see scripts/.
+# Requirements are Rust (its version is in Cargo.toml), a linker (`cc`) and a Vulkan device; tests need a browser, too. The
+# targets install all but Rust where they are missing and no question is needed; see scripts/.
 
 CARGO ?= cargo
 ARGS ?=
@@ -13,7 +13,7 @@ export NODEVICE_SELECT = 1
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo cluster cluster-test test fmt-check lint unit bench doc audit vulkan toolchain lint-toolchain clean bench-scaling
+.PHONY: help build demo cluster cluster-test test fmt-check lint unit bench doc audit vulkan browser toolchain lint-toolchain clean bench-scaling
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -56,11 +56,14 @@ fmt-check: lint-toolchain
 lint: lint-toolchain
 	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 
-unit: toolchain vulkan
+unit: toolchain vulkan browser
 	$(CARGO) test --release --locked --workspace
 
 vulkan:
 	@scripts/ensure-vulkan.sh
+
+browser:
+	@scripts/ensure-browser.sh
 
 toolchain:
 	@scripts/ensure-toolchain.sh

@@ -21,6 +21,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("sampling", &["render", "gpu", "scene", "depth-image"]),
     ("reconstruction", &["gpu", "depth-image"]),
     ("metrics", &["depth-image"]),
+    ("pictures", &["metrics", "depth-image"]),
     ("codec", &["depth-image"]),
     ("cluster", &["codec", "depth-image"]),
     ("wire", &["cluster", "codec", "depth-image"]),
@@ -30,10 +31,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("node-host", &["sampler-node", "compositor-node", "node", "wire", "cluster"]),
     ("coordinator", &["node", "wire", "cluster", "codec", "depth-image"]),
     ("client", &["wire", "cluster", "codec", "depth-image"]),
-    ("gateway", &["client", "wire", "cluster", "codec", "depth-image"]),
+    ("gateway", &["client", "wire", "cluster", "codec", "metrics", "pictures", "depth-image"]),
+    ("browser", &[]),
+    ("network-proxy", &[]),
     ("simulation", &["client", "coordinator", "cluster", "depth-image"]),
     ("table", &[]),
-    ("study", &["metrics", "table"]),
+    ("study", &["metrics", "pictures", "table"]),
     ("engine", &["node", "reconstruction", "sampling", "render", "gpu", "scene", "cluster", "depth-image"]),
     (
         "app-core",
@@ -45,6 +48,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "gpu",
             "node",
             "node-host",
+            "pictures",
             "reconstruction",
             "render",
             "sampling",
@@ -56,6 +60,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "lab",
         &[
             "app-core",
+            "browser",
             "client",
             "cluster",
             "codec",
@@ -64,7 +69,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "engine",
             "gpu",
             "metrics",
+            "network-proxy",
             "node",
+            "pictures",
             "reconstruction",
             "render",
             "sampling",
@@ -89,6 +96,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "metrics",
             "node",
             "node-host",
+            "pictures",
             "reconstruction",
             "render",
             "table",
@@ -97,8 +105,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     (
         "cluster-tests",
-        &["client", "cluster", "codec", "coordinator", "depth-image", "gateway", "node", "node-host", "wire"],
+        &[
+            "client",
+            "cluster",
+            "codec",
+            "coordinator",
+            "depth-image",
+            "gateway",
+            "network-proxy",
+            "node",
+            "node-host",
+            "wire",
+        ],
     ),
+    ("browser-tests", &["browser", "cluster", "cluster-tests", "network-proxy"]),
 ];
 
 /// Crates that work on pictures in different ways, and never use one another, not even in tests.
@@ -111,7 +131,7 @@ const MESSAGES: [&str; 5] = ["prost", "prost-types", "prost-build", "tonic-prost
 const DEVICE: [&str; 5] = ["wgpu", "wgpu-core", "wgpu-hal", "naga", "ash"];
 
 /// Crates that a program without its lab must not link: measurements, and the charts of their reports.
-const LAB: [&str; 4] = ["lab", "plotters", "simulation", "study"];
+const LAB: [&str; 6] = ["browser", "lab", "plotters", "simulation", "study", "thirtyfour"];
 
 /// Text of code that a decision may not depend on.
 const IMPURE: [&str; 8] =

@@ -1,64 +1,37 @@
 //! Visitors of a gateway, over its real port: pictures are those of the Rust client, and nobody can break it.
 #![allow(clippy::unwrap_used)]
 
-use std::sync::Arc;
 use std::time::Duration;
 
-use client::ViewRequest;
-use cluster::{PolicyChoice, SessionRequest, Timeline};
-use cluster_tests::cluster::{Cluster, request};
+use cluster_tests::gateway_bench::{GatewayBench, PageCamera};
 use codec::{DecodeLimits, FrameCodec, decode_frame};
-use depth_image::{PinholeCamera, ViewPlanes};
 use futures_util::{SinkExt as _, StreamExt as _};
 use gateway::GatewayConfig;
-use glam::{UVec2, Vec3};
+use glam::UVec2;
+use network_proxy::Proxy;
 use serde_json::{Value, json};
-use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
-use tokio::net::{TcpListener, TcpStream};
+use tokio::net::TcpStream;
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest as _;
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
-use tokio_util::sync::CancellationToken;
 
 const SOON: Duration = Duration::from_secs(10);
+/// A page that answers nothing has gone after this time.
+const SILENCE: Duration = Duration::from_secs(20);
 const SIZE: [u32; 2] = [64, 48];
 const EYE: [f64; 3] = [0.1, 1.2, 3.0];
 const TARGET: [f64; 3] = [0.0, 0.5, 0.0];
 const FOV_Y_DEG: f64 = 51.0;
 
-struct Bench {
-    cluster: Cluster,
-    address: String,
-    shutdown: CancellationToken,
-}
-
-impl Drop for Bench {
-    fn drop(&mut self) {
-        self.shutdown.cancel();
-    }
-}
-
-fn session_request() -> SessionRequest {
-    let request = request(PolicyChoice::Pipeline, Timeline::still(0.0));
-    SessionRequest { planes: ViewPlanes::default(), views_per_set: 1, frames_per_s: Some(20.0), ..request }
-}
+struct Bench(GatewayBench);
 
 impl Bench {
     async fn start(change: impl FnOnce(GatewayConfig) -> GatewayConfig) -> Self {
-        let cluster = Cluster::start(3).await;
-        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
-        let address = listener.local_addr().unwrap().to_string();
-        let config = GatewayConfig::new(&cluster.coordinator.address, Arc::new(|_, _| session_request()));
-        let shutdown = CancellationToken::new();
-        tokio::spawn(gateway::serve(gateway::accept(listener), change(config), shutdown.clone()));
-        Self { cluster, address, shutdown }
+        Self(GatewayBench::start(change).await)
     }
 
     async fn visitor(&self) -> Visitor {
-        let mut request = format!("ws://{}/api/v1/socket", self.address).into_client_request().unwrap();
-        request.headers_mut().insert("Sec-WebSocket-Protocol", "myriorama.v1".parse().unwrap());
-        let (socket, _) = connect_async(request).await.unwrap();
-        Visitor { socket, number: 0 }
+        visitor_at(self.0.authority()).await
     }
 
     /// A visitor who has been let in, to a scene with a plan.
@@ -72,31 +45,21 @@ impl Bench {
 
     /// The answer to a request: its status line and headers, and its body.
     async fn get(&self, path: &str, headers: &str) -> (String, Vec<u8>) {
-        let mut stream = TcpStream::connect(&self.address).await.unwrap();
-        stream
-            .write_all(format!("GET {path} HTTP/1.1\r\n{headers}Connection: close\r\n\r\n").as_bytes())
-            .await
-            .unwrap();
-        let mut answer = Vec::new();
-        stream.read_to_end(&mut answer).await.unwrap();
-        let end = answer.windows(4).position(|window| window == b"\r\n\r\n").unwrap();
-        (String::from_utf8_lossy(&answer[..end]).into_owned(), answer[end + 4..].to_vec())
+        self.0.get(path, headers).await
     }
 
     /// The picture of a camera as the Rust client receives it.
     async fn reference(&self, eye: [f64; 3]) -> Vec<u8> {
-        let session = self.cluster.client.open_session(session_request(), |_| ()).await.unwrap();
-        let view = ViewRequest { frame: 1, set_index: 0, camera: camera(eye) };
-        session.render_views([view]).unwrap().all().await.unwrap().remove(0).view.srgb8
+        self.0.reference(&PageCamera { eye, target: TARGET, fov_y_deg: FOV_Y_DEG }, SIZE).await
     }
 }
 
-/// The camera of a page that shows the scene of the tests, whose diagonal is six times the root of three.
-fn camera(eye: [f64; 3]) -> PinholeCamera {
-    let [eye, target] = [eye, TARGET].map(|point| Vec3::from_array(point.map(|v| v as f32)));
-    let fov_y_rad = FOV_Y_DEG.to_radians() as f32;
-    let near_m = Vec3::splat(6.0).length() * 1e-3;
-    PinholeCamera { near_m, ..PinholeCamera::looking_at(eye, target, Vec3::Y, fov_y_rad, UVec2::from_array(SIZE)) }
+/// A visitor of the gateway at `host:port`.
+async fn visitor_at(authority: &str) -> Visitor {
+    let mut request = format!("ws://{authority}/api/v1/socket").into_client_request().unwrap();
+    request.headers_mut().insert("Sec-WebSocket-Protocol", "myriorama.v1".parse().unwrap());
+    let (socket, _) = connect_async(request).await.unwrap();
+    Visitor { socket, number: 0 }
 }
 
 struct Visitor {
@@ -277,6 +240,27 @@ async fn two_visitors_see_their_own_pictures_in_one_session() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_scene_that_moves_shows_the_moment_of_each_pose() {
+    let bench = Bench::start(|config| config).await;
+    let mut visitor = bench.visitor().await;
+    visitor.tell(&json!({ "type": "open" })).await;
+    let welcome = visitor.heard().await;
+    assert_eq!((&welcome["moments"], welcome["moment_step_s"].as_f64()), (&json!(6), Some(0.5 / 6.0)));
+    let camera = json!({ "eye": EYE, "target": TARGET, "fov_y_deg": FOV_Y_DEG });
+    for (number, moment, still) in [(1, 3, false), (2, 5, true), (3, 0, false), (4, 0, true)] {
+        let mut pose = json!({ "type": "pose", "number": number, "camera": camera, "canvas_px": SIZE });
+        pose.as_object_mut()
+            .unwrap()
+            .extend([("moment".to_owned(), json!(moment)), ("still".to_owned(), json!(still))]);
+        visitor.tell(&pose).await;
+        let picture = visitor.picture().await;
+        visitor.shown(&picture).await;
+        let set = picture.header["set"].as_str().unwrap().to_owned();
+        assert_eq!((picture.number(), set.ends_with(&format!(".{moment}"))), (number, true), "{set}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_page_that_breaks_the_protocol_is_refused_by_name_and_hurts_nobody() {
     let bench = Bench::start(|config| config).await;
     let mut watcher = bench.welcomed().await;
@@ -286,12 +270,13 @@ async fn a_page_that_breaks_the_protocol_is_refused_by_name_and_hurts_nobody() {
         pose.as_object_mut().unwrap().extend(changes.as_object().unwrap().clone());
         Message::text(pose.to_string())
     };
-    let bad: [(Message, &str); 8] = [
+    let bad: [(Message, &str); 9] = [
         (pose(json!({ "method": "mesh" })), "unknown field"),
         (pose(json!({ "number": 0 })), "number: 0 comes after 0"),
         (pose(json!({ "canvas_px": [0, 5] })), "size"),
         (pose(json!({ "camera": { "eye": [1e300, 0, 0], "target": TARGET, "fov_y_deg": 45 } })), "eye"),
         (pose(json!({ "camera": { "eye": EYE, "target": TARGET, "fov_y_deg": 0 } })), "fov_y_deg"),
+        (pose(json!({ "moment": 6 })), "moment: 6 must be below 6"),
         (Message::binary(vec![0; 8]), "binary"),
         (Message::text(r#"{"type":"open"}"#), "open comes once"),
         (Message::text("{"), "message"),
@@ -324,6 +309,37 @@ async fn a_page_that_sends_600_poses_at_once_gets_the_last() {
         number = picture.number();
     }
     assert_eq!(number, last);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_page_that_floods_is_refused_and_hurts_nobody() {
+    let bench = Bench::start(|config| config).await;
+    let (mut flood, mut watcher) = (bench.welcomed().await, bench.welcomed().await);
+    let message = Message::text(r#"{"type":"shown","number":0,"age_ms":1}"#);
+    // Those of five seconds at once: the connection may end before the last.
+    for _ in 0..1200 {
+        let _ = flood.socket.feed(message.clone()).await;
+    }
+    let _ = flood.socket.flush().await;
+    let refusal = flood.refusal().await;
+    assert!(refusal.contains("more than 240 a second"), "{refusal}");
+    watcher.pose(EYE, true).await;
+    assert_eq!(watcher.picture().await.number(), 1);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_page_that_vanishes_without_a_word_leaves_its_place() {
+    let bench = Bench::start(|config| GatewayConfig { max_visitors: 1, ..config }).await;
+    let proxy = Proxy::to(&format!("http://{}", bench.0.authority()), 1);
+    let mut vanished = visitor_at(proxy.address.trim_start_matches("http://")).await;
+    vanished.tell(&json!({ "type": "open" })).await;
+    assert_eq!(vanished.heard().await["type"], "welcome");
+    proxy.partition();
+    let mut next = bench.visitor().await;
+    next.tell(&json!({ "type": "open" })).await;
+    assert_eq!(next.heard().await["stage"], "full");
+    let let_in = tokio::time::timeout(SILENCE + SOON, next.next_text()).await.expect("a place in time");
+    assert_eq!(let_in["type"], "welcome");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -366,7 +382,7 @@ async fn pictures_go_on_while_the_coordinator_is_away() {
     let _ = visitor.pose(EYE, false).await;
     let picture = visitor.picture().await;
     visitor.shown(&picture).await;
-    bench.cluster.kill_coordinator();
+    bench.0.cluster.kill_coordinator();
     let number = visitor.pose([0.3, 1.2, 3.0], false).await;
     assert_eq!(visitor.picture().await.number(), number);
 }

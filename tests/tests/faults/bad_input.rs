@@ -9,11 +9,11 @@ use bytes::Bytes;
 use cluster::{SamplerReport, SessionRequest, Timeline};
 use cluster_tests::cluster::connected;
 use cluster_tests::processes::Processes;
-use cluster_tests::random::Random;
 use cluster_tests::raw;
 use cluster_tests::watcher::{Watcher, watched_request as request};
 use depth_image::{Camera, PinholeCamera};
 use glam::{UVec2, Vec3};
+use network_proxy::Random;
 use tonic::{Code, Status};
 use wire::rpc::{CoordinatorClient, connect};
 

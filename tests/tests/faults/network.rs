@@ -6,11 +6,11 @@ use client::Session;
 use cluster::{RenderViews, RequestedView};
 use cluster_tests::cluster::{camera, connected};
 use cluster_tests::processes::{Processes, number_of};
-use cluster_tests::proxy::{Proxy, Way};
 use cluster_tests::watcher::Watcher;
 use codec::FrameCodec;
 use depth_image::ViewPlanes;
 use glam::UVec2;
+use network_proxy::{Proxy, Way};
 use tokio_stream::StreamExt as _;
 use wire::rpc::{CompositorClient, connect};
 

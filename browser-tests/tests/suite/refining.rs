@@ -1,0 +1,39 @@
+//! Stills whose light is refined in steps.
+
+use browser_tests::visit::{Expected, Visit};
+use cluster::{Refinement, SessionRequest, Timeline};
+use cluster_tests::scalar_engine::{ball_linear, srgb8};
+use serde_json::json;
+
+use crate::scene::{gateway_of, slow_request};
+
+const STEPS: u32 = 3;
+/// Keeps each text of the badge, with the step of the picture below it.
+const WATCH_BADGE: &str = "addEventListener('DOMContentLoaded', () => {
+    window.badges = [];
+    const badge = document.getElementById('badge');
+    const note = () => badges.push([badge.textContent, myriorama.statistics.pictures.at(-1)?.header.light_step ?? 0]);
+    new MutationObserver(note).observe(badge, { childList: true });
+})";
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_still_is_exact_only_in_its_last_step_of_light() {
+    let timeline = Timeline { start_s: 0.0, step_s: 0.0, set_count: STEPS };
+    let (_bench, url) = gateway_of(SessionRequest { refinement_steps: STEPS, timeline, ..slow_request() }).await;
+    let visit = Visit::to("about:blank").await;
+    visit.browser.devtools("Page.addScriptToEvaluateOnNewDocument", json!({ "source": WATCH_BADGE })).await.unwrap();
+    visit.browser.open(&url).await.unwrap();
+    visit.until("document.getElementById('badge').textContent === 'exact'").await;
+    let pictures = visit.pictures().await;
+    let mut steps: Vec<u32> = pictures.iter().filter(|p| p.header.still).map(|p| p.header.light_step).collect();
+    steps.dedup();
+    assert_eq!(steps, [1, 2, 3]);
+    let mut badges: Vec<(String, u32)> = visit.browser.value("badges").await.unwrap();
+    // Without a number, it is the last picture in motion, which rests.
+    badges.retain(|(text, _)| !["moving", "waiting", "still"].contains(&text.as_str()));
+    let expected = [("still (light 1 of 3)", 1), ("still (light 2 of 3)", 2), ("exact", 3)];
+    assert_eq!(badges, expected.map(|(text, step)| (text.to_owned(), step)));
+    let last = ball_linear(0.0, Refinement { step: STEPS - 1, steps: STEPS });
+    assert!(visit.canvas().await.srgb8.as_chunks::<3>().0.contains(&srgb8(last)), "the ball in its last light");
+    visit.end(Expected::NoError).await;
+}
