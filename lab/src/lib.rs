@@ -21,9 +21,11 @@ pub mod reference_views;
 pub mod sampling_study;
 mod scaling;
 mod scene_args;
+mod section;
 mod sharing;
 pub mod statistics;
 mod sweep;
+mod viewer;
 
 pub use command::LabCommand;
 pub use evaluation::Evaluation;

@@ -18,6 +18,18 @@ pub fn memory_mib(process: &str) -> Option<f64> {
     Some(status_bytes(process, "VmRSS:")? / f64::from(1 << 20))
 }
 
+/// Seconds that a process has had of processors; `None` where the system does not tell.
+#[must_use]
+pub fn processor_s(process: u32) -> Option<f64> {
+    /// Linux counts in hundredths, whatever its own clock.
+    const TICKS_PER_S: f64 = 100.0;
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // The name, in brackets, may have spaces.
+    let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+    let ticks = |at: usize| fields.get(at)?.parse::<f64>().ok();
+    Some((ticks(11)? + ticks(12)?) / TICKS_PER_S)
+}
+
 fn status_bytes(process: &str, field: &str) -> Option<f64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix(field))?;

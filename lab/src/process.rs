@@ -23,9 +23,7 @@ pub struct Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // A process that has ended already cannot be killed.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.kill();
     }
 }
 
@@ -42,14 +40,31 @@ impl Process {
 
     /// Starts a coordinator on a free port, with further arguments.
     pub fn coordinator(arguments: &[String]) -> anyhow::Result<Self> {
-        let fixed = ["coordinator", "--listen", "127.0.0.1:0"].map(str::to_owned);
+        let fixed = ["coordinator", "--no-viewer", "--listen", "127.0.0.1:0"].map(str::to_owned);
         Self::start("coordinator", &[&fixed, arguments].concat())
     }
 
     /// Starts a whole cluster in one process on a free port, with further arguments.
     pub fn up(arguments: &[String]) -> anyhow::Result<Self> {
-        let fixed = ["up", "--listen", "127.0.0.1:0"].map(str::to_owned);
+        let fixed = ["up", "--no-viewer", "--listen", "127.0.0.1:0"].map(str::to_owned);
         Self::start("up", &[&fixed, arguments].concat())
+    }
+
+    /// Starts a whole cluster in one process on a free port, with its viewer. It prints its address, then the viewer's.
+    pub fn up_with_viewer(arguments: &[&str]) -> anyhow::Result<Self> {
+        Self::start("up", &owned(&[&["up", "--listen", "127.0.0.1:0"], arguments].concat()))
+    }
+
+    /// Starts a gateway. It prints the address of its page.
+    pub fn gateway(arguments: &[&str]) -> anyhow::Result<Self> {
+        Self::start("gateway", &owned(&[&["gateway"], arguments].concat()))
+    }
+
+    /// Kills the process as `kill -9` does.
+    pub fn kill(&mut self) {
+        // A process that has ended already cannot be killed.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 
     /// Starts a node on a free port. It prints its address, then that of its metrics.
@@ -87,6 +102,10 @@ impl Process {
     }
 }
 
+fn owned(arguments: &[&str]) -> Vec<String> {
+    arguments.iter().map(|&word| word.to_owned()).collect()
+}
+
 /// The name of a node, with enough digits to sort well.
 #[must_use]
 pub fn node_name(number: usize) -> String {
@@ -105,16 +124,17 @@ fn lines_of(output: ChildStdout) -> mpsc::Receiver<String> {
     lines
 }
 
-/// The Prometheus page of a process at `http://HOST:PORT/metrics`.
+/// The text at an address `http://HOST:PORT/PATH`.
 ///
 /// # Errors
 /// Nobody answers.
-pub async fn metrics_page(url: &str) -> anyhow::Result<String> {
-    let authority = url.trim_start_matches("http://").split('/').next().unwrap_or_default();
-    let mut socket = TcpStream::connect(authority).await.with_context(|| format!("no metrics at {url}"))?;
-    let request = format!("GET /metrics HTTP/1.1\r\nhost: {authority}\r\nconnection: close\r\n\r\n");
+pub async fn http_page(url: &str) -> anyhow::Result<String> {
+    let (authority, path) = url.trim_start_matches("http://").split_once('/').unwrap_or_default();
+    let mut socket = TcpStream::connect(authority).await.with_context(|| format!("nobody answers at {url}"))?;
+    let request = format!("GET /{path} HTTP/1.1\r\nhost: {authority}\r\nconnection: close\r\n\r\n");
     socket.write_all(request.as_bytes()).await?;
-    let mut page = String::new();
-    socket.read_to_string(&mut page).await?;
-    Ok(page)
+    let mut answer = String::new();
+    socket.read_to_string(&mut answer).await?;
+    let (_, page) = answer.split_once("\r\n\r\n").context("an answer without an end of its headers")?;
+    Ok(page.to_owned())
 }

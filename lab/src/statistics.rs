@@ -6,3 +6,11 @@ pub fn median(mut numbers: Vec<f64>) -> f64 {
     numbers.sort_by(f64::total_cmp);
     numbers.get(numbers.len() / 2).copied().unwrap_or(f64::NAN)
 }
+
+/// The number that this share of all is at or below; NaN without any.
+#[must_use]
+pub fn quantile(mut numbers: Vec<f64>, share: f64) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    let last = numbers.len().saturating_sub(1);
+    numbers.get(((last as f64 * share).ceil() as usize).min(last)).copied().unwrap_or(f64::NAN)
+}

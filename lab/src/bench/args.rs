@@ -8,6 +8,7 @@ use clap::{Args, Subcommand};
 use crate::load::command::LoadArgs;
 use crate::scaling::command::ScalingArgs;
 use crate::sharing::command::SharingArgs;
+use crate::viewer::command::ViewerBenchArgs;
 
 /// Holds measured values against bars and writes a report. A check without its input is not run and does not fall
 /// short.
@@ -52,6 +53,8 @@ pub(super) enum Part {
     Scaling(ScalingArgs),
     /// Measure a live viewer beside the batches of other clients
     Sharing(SharingArgs),
+    /// Measure the viewer in a browser
+    Viewer(ViewerBenchArgs),
 }
 
 impl BenchArgs {

@@ -9,7 +9,7 @@ use super::{adaptive, animation, codec, convergence, fronts, light, peer, rays, 
 use crate::experiment::Experiment;
 use crate::memory::peak_memory_mb;
 use crate::reference_views::ReferenceViews;
-use crate::{load, scaling, sharing};
+use crate::{load, scaling, sharing, viewer};
 
 /// Measures everything and writes the report.
 ///
@@ -20,6 +20,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
         Some(Part::Load(args)) => return load::command::run(args),
         Some(Part::Scaling(args)) => return scaling::command::run(args),
         Some(Part::Sharing(args)) => return sharing::command::run(args),
+        Some(Part::Viewer(args)) => return viewer::command::run(args),
         None => (),
     }
     let experiment = Experiment::start(args.scene.clone(), Vec::new(), args.device.device, usize::from(args.nodes))?;

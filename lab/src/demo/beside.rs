@@ -1,7 +1,6 @@
 //! The sampling asked for, with conventional sampling beside it.
 
 use anyhow::Context as _;
-use app_core::pictures;
 use app_core::setup::{SceneArgs, Setup};
 use metrics::{Rgb8Image, flip_map};
 use sampling::SamplingMethod;
@@ -64,7 +63,7 @@ fn show(
         let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(view)?)?;
         let images = pictures::rgb(direct).zip(pictures::rgb(view)).context("a view is not of its size")?;
         let title = format!("{sampling}, view {index}");
-        report.pictures.push(comparison_row(&title, images.0, images.1, &flip, pictures::provenance(view)));
+        report.pictures.push(comparison_row(&title, images.0, images.1, &flip, pictures::provenance(view, 0)));
     }
     Ok(())
 }

@@ -1,7 +1,6 @@
 //! Pictures of the views.
 
 use anyhow::Context as _;
-use app_core::pictures;
 use client::Frame;
 use depth_image::View;
 use image::imageops;
@@ -41,7 +40,7 @@ pub fn comparisons(reference: &ReferenceViews, views: &[View], report: &mut Repo
             images.0,
             images.1,
             &flip,
-            pictures::provenance(view),
+            pictures::provenance(view, 0),
         ));
     }
     Ok(())

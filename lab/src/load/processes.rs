@@ -9,7 +9,7 @@ use gpu::DevicePreference;
 
 use crate::cpu_share::{CpuGroup, Hierarchy};
 use crate::memory::memory_mib;
-use crate::process::{Process, metrics_page};
+use crate::process::{Process, http_page};
 
 /// The longest wait for nodes to join.
 const JOIN: Duration = Duration::from_secs(60);
@@ -79,7 +79,7 @@ impl Processes {
     pub async fn dropped(&self) -> anyhow::Result<BTreeMap<String, u64>> {
         let mut dropped = BTreeMap::new();
         for node in &self.nodes {
-            for (reason, count) in dropped_in(&metrics_page(&node.metrics).await?) {
+            for (reason, count) in dropped_in(&http_page(&node.metrics).await?) {
                 *dropped.entry(reason).or_insert(0) += count;
             }
         }

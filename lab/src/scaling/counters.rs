@@ -2,7 +2,7 @@
 
 use anyhow::Context as _;
 
-use crate::process::metrics_page;
+use crate::process::http_page;
 
 /// Counters of nodes, summed since they started.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -61,7 +61,7 @@ impl Counters {
 /// # Errors
 /// Nobody answers, or the page lacks a counter.
 pub async fn read(url: &str) -> anyhow::Result<Counters> {
-    let page = metrics_page(url).await?;
+    let page = http_page(url).await?;
     Counters::of_page(&page)
 }
 

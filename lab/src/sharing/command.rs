@@ -4,16 +4,15 @@ use std::path::PathBuf;
 
 use app_core::exit::Outcome;
 use app_core::process::runtime;
-use clap::{Args, ValueEnum as _};
+use clap::Args;
 use gpu::DevicePreference;
 use render::Lighting;
 use scene::SceneSpec;
-use study::Report;
 
-use super::section::{Part, Section};
+use super::part::Part;
 use super::up::Up;
 use super::{beside, costs, guests, killed_compositor, many_views, new_size, report, walkers};
-use crate::progress::bar;
+use crate::section::{self, Section, finish, measure_parts};
 
 /// Measures a live viewer of 320×180 at 10 poses a second beside batches of other clients: other sizes, lightings,
 /// codecs, scenes, moments, and views drawn directly. Each batch is measured alone, too. Further rows are what the sharing
@@ -55,10 +54,6 @@ impl SharingArgs {
         if self.quick { 1 } else { 3 }
     }
 
-    fn parts(&self) -> &[Part] {
-        if self.only.is_empty() { Part::value_variants() } else { &self.only }
-    }
-
     /// Arguments of `myriorama up`.
     fn cluster(&self, scenes: &[&SceneSpec]) -> Vec<String> {
         let scenes = scenes.iter().flat_map(|scene| ["--scene".to_owned(), scene.to_string()]);
@@ -73,10 +68,8 @@ impl SharingArgs {
 /// # Errors
 /// The report cannot be written.
 pub fn run(args: &SharingArgs) -> anyhow::Result<Outcome> {
-    let sections = runtime()?.block_on(measure(args));
-    let device = sections.iter().map(|section| section.device.as_str()).find(|device| !device.is_empty());
-    let mut report = Report::new("Myriorama bench sharing", device.unwrap_or_default());
-    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    let sections = runtime()?.block_on(measure_parts(&args.only, async |part| measure_part(args, *part).await));
+    let mut report = section::report("Myriorama bench sharing", &sections);
     for (name, value) in [
         ("scene", args.scene.to_string()),
         ("other scene", args.other_scene.to_string()),
@@ -86,30 +79,7 @@ pub fn run(args: &SharingArgs) -> anyhow::Result<Outcome> {
     }
     report.parameter("nodes P", u32::from(args.nodes));
     report.parameter("repeats", args.repeats());
-    for section in sections {
-        report.tables.extend(section.tables);
-        report.checks.extend(section.checks);
-    }
-    report.tables.iter().for_each(|table| println!("{}", table.to_markdown()));
-    let ok = report.finish(&args.out)?;
-    Ok(Outcome::of(ok || !args.strict))
-}
-
-/// Measures one part after the other. A part that fails hides no other.
-async fn measure(args: &SharingArgs) -> Vec<Section> {
-    let progress = bar("sharing", args.parts().len());
-    let mut sections = Vec::new();
-    for part in args.parts() {
-        progress.set_message(part.to_string());
-        let section = measure_part(args, *part).await.unwrap_or_else(|error| {
-            tracing::warn!(%part, error = format!("{error:#}"), "not measured");
-            Section::failed(*part)
-        });
-        sections.push(section);
-        progress.inc(1);
-    }
-    progress.finish_and_clear();
-    sections
+    finish(report, sections, &args.out, args.strict)
 }
 
 async fn measure_part(args: &SharingArgs, part: Part) -> anyhow::Result<Section> {

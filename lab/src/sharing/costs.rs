@@ -10,9 +10,9 @@ use depth_image::PinholeCamera;
 use study::{Bar, Cell, Check, Table};
 
 use super::guests::{GUESTS, SMALL_PX};
-use super::section::Section;
 use super::up::{Up, policies};
 use super::viewer::{Viewer, path};
+use crate::section::Section;
 use crate::statistics::median;
 
 /// The most that one is of the other.

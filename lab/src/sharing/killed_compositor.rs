@@ -8,10 +8,10 @@ use cluster::PolicyChoice;
 use gpu::DevicePreference;
 use study::{Bar, Cell, Check, Table};
 
-use super::section::Section;
 use super::up::policies;
 use super::viewer::{Viewer, Watched};
 use crate::load::processes::{Processes, Setting};
+use crate::section::Section;
 
 /// The longest time without a new frame of the other scene.
 const LONGEST_GAP_S: f64 = 0.5;

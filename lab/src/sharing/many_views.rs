@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use study::{Bar, Cell, Check, Table};
 
-use super::section::Section;
 use super::up::{Up, policies};
 use crate::memory::peak_memory_mb_of;
+use crate::section::Section;
 
 /// The most memory of the client.
 const MEMORY_MB: f64 = 500.0;

@@ -1,6 +1,6 @@
 //! `bench sharing`: a viewer beside other clients of one cluster, and what sharing must not change.
 //!
-//! Each part is a [`section`] of the report, measured on processes of its own: `beside` has the guests, the other modules
+//! Each part is a [`crate::section`] of the report, measured on processes of its own: `beside` has the guests, the other modules
 //! are named after their parts.
 
 pub mod command;
@@ -11,8 +11,9 @@ mod guests;
 mod killed_compositor;
 mod many_views;
 mod new_size;
+mod part;
 mod report;
-mod section;
+
 mod up;
 mod viewer;
 mod walkers;

@@ -9,9 +9,9 @@ use glam::UVec2;
 use study::{Bar, Cell, Check, Table};
 
 use super::guests::SMALL_PX;
-use super::section::Section;
 use super::up::{Up, policies};
 use super::viewer::path;
+use crate::section::Section;
 use crate::statistics::median;
 
 /// The most that the first view of a new size waits longer than that of a known one.

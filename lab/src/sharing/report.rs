@@ -4,7 +4,7 @@ use study::{Bar, Cell, Check, Table};
 
 use super::beside::Row;
 use super::guests::Guest;
-use super::section::Section;
+use crate::section::Section;
 
 /// The longest time without a new frame.
 const LONGEST_GAP_S: f64 = 1.0;

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use anyhow::Context as _;
 use study::{Bar, Cell, Check, Table};
 
-use super::section::Section;
+use crate::section::Section;
 
 /// The program, in the folder of this one.
 const PROGRAM: &str = "walkers";

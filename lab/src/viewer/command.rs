@@ -1,0 +1,73 @@
+//! `myriorama bench viewer`: the viewer in a real browser.
+
+use std::path::PathBuf;
+
+use app_core::exit::Outcome;
+use app_core::process::runtime;
+use clap::Args;
+use gpu::DevicePreference;
+use scene::SceneSpec;
+
+use super::part::Part;
+use super::stand::Ground;
+use super::{dragging, faults, first_picture, memory, rest, slow_link, walk};
+use crate::section::{Section, finish, measure_parts, report};
+
+/// Measures the viewer's page in Chromium, before a gateway, a coordinator and two nodes on the same machine: pictures of
+/// drags, stills, first pictures, a slow link, faults, a walk around the scene, and memory. Needs chromium and
+/// chromium-driver.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: myriorama bench viewer --quick --only dragging --only rest")]
+pub struct ViewerBenchArgs {
+    /// The scene
+    #[arg(long, value_name = "SPEC", default_value = "courtyard")]
+    scene: SceneSpec,
+    /// any (a GPU if there is one) or software
+    #[arg(long, default_value_t, value_name = "NAME", env = "MYRIORAMA_DEVICE")]
+    device: DevicePreference,
+    /// Measures only this part of the report; may be repeated
+    #[arg(long, value_name = "PART")]
+    only: Vec<Part>,
+    /// One repeat in place of five, and one minute of memory in place of ten
+    #[arg(long)]
+    quick: bool,
+    /// Where the report goes
+    #[arg(long, default_value = "out/bench-viewer", value_name = "DIR")]
+    out: PathBuf,
+    /// Exit status 1 when a check falls short
+    #[arg(long)]
+    strict: bool,
+}
+
+impl ViewerBenchArgs {
+    fn ground(&self) -> Ground {
+        let (repeats, memory_s) = if self.quick { (1, 60.0) } else { (5, 600.0) };
+        Ground { scene: self.scene.to_string(), device: self.device, repeats, memory_s }
+    }
+}
+
+/// Measures the parts and writes the report.
+///
+/// # Errors
+/// The report cannot be written.
+pub fn run(args: &ViewerBenchArgs) -> anyhow::Result<Outcome> {
+    let ground = args.ground();
+    let measure = measure_parts(&args.only, async |part| measure_part(&ground, *part).await);
+    let sections = runtime()?.block_on(measure);
+    let mut report = report("Myriorama bench viewer", &sections);
+    report.parameter("scene", ground.scene.clone());
+    report.parameter("repeats", ground.repeats);
+    finish(report, sections, &args.out, args.strict)
+}
+
+async fn measure_part(ground: &Ground, part: Part) -> anyhow::Result<Section> {
+    match part {
+        Part::Dragging => dragging::measure(ground).await,
+        Part::Rest => rest::measure(ground).await,
+        Part::FirstPicture => first_picture::measure(ground).await,
+        Part::SlowLink => slow_link::measure(ground).await,
+        Part::Faults => faults::measure(ground).await,
+        Part::Walk => walk::measure(ground).await,
+        Part::Memory => memory::measure(ground).await,
+    }
+}
