@@ -1,7 +1,7 @@
 """Walks around a scene and writes the pictures: a client of docs/viewer-protocol.md.
 
     pip install websockets
-    python walk.py ws://127.0.0.1:7421/api/v1/socket 12
+    python walk.py ws://127.0.0.1:7420/api/v1/socket 12
 """
 
 import asyncio
@@ -10,6 +10,9 @@ import math
 import sys
 
 import websockets
+
+# View cells follow a visitor who rests: a nearer one brings a better picture.
+FOLLOW_S = 4
 
 
 def around(home, share):
@@ -32,22 +35,30 @@ async def picture(socket):
     raise SystemExit("the gateway has closed the connection")
 
 
+async def still(socket, number, light_steps):
+    """The last still of a pose: of the view's own cell, in finished light, and not renewed for some seconds."""
+    header, file = {"number": 0}, b""
+    while True:
+        finished = header["number"] == number and not header["neighbour"] and header["light_step"] == light_steps
+        try:
+            header, file = await asyncio.wait_for(picture(socket), FOLLOW_S if finished else None)
+        except asyncio.TimeoutError:
+            return header, file
+        await socket.send(json.dumps({"type": "shown", "number": header["number"], "age_ms": 0}))
+
+
 async def walk(address, count):
     async with websockets.connect(address, subprotocols=["myriorama.v1"], max_size=None) as socket:
         await socket.send(json.dumps({"type": "open", "scene": None}))
-        message = json.loads(await socket.recv())
-        while message["type"] != "welcome":
-            print(message.get("detail") or message.get("reason"))
-            message = json.loads(await socket.recv())
+        welcome = json.loads(await socket.recv())
+        while welcome["type"] != "welcome":
+            print(welcome.get("detail") or welcome.get("reason"))
+            welcome = json.loads(await socket.recv())
         for number in range(1, count + 1):
-            camera = around(message["home"], (number - 1) / count)
+            camera = around(welcome["home"], (number - 1) / count)
             pose = {"type": "pose", "number": number, "camera": camera, "canvas_px": [640, 360], "still": True}
             await socket.send(json.dumps(pose))
-            header = {"number": 0, "neighbour": True}
-            # A picture from a neighbouring view cell is followed by the view cell's own.
-            while header["number"] < number or header["neighbour"]:
-                header, file = await picture(socket)
-                await socket.send(json.dumps({"type": "shown", "number": header["number"], "age_ms": 0}))
+            header, file = await still(socket, number, welcome["light_steps"])
             name = f"walk_{number:03}.png"
             with open(name, "wb") as out:
                 out.write(file)
