@@ -122,7 +122,7 @@ export class Measure {
   rows(result, i) {
     const term = element("dt", `Point ${i + 1}`);
     term.dataset.point = i + 1;
-    const details = [`depth ${figure(result.depth ?? 0)}`, sourceOf(result)].join("; ");
+    const details = [`depth ${figure(result.planar_depth ?? 0)}`, sourceOf(result)].join("; ");
     return [term, element("dd", result.point.map(figure).join(", "), element("small", details))];
   }
 

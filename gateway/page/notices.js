@@ -9,13 +9,17 @@ export class Notices {
   /** A pose has left: pictures that stay away are late. */
   asked(still) {
     if (!still) this.badge("moving");
-    this.timer ??= setTimeout(() => this.waits("waiting", "pictures are late"), LATE_MS);
+    this.expect();
+  }
+
+  expect() {
+    this.late ??= setTimeout(() => $("banner").hidden && this.tell("waiting", "pictures are late"), LATE_MS);
   }
 
   /** A picture is on the screen; `isNewest` says whether no pose has followed. */
   shows(header, { isNewest, isSharp, lightSteps }) {
-    clearTimeout(this.timer);
-    this.timer = null;
+    this.stop();
+    if (!isNewest) this.expect();
     $("banner").hidden = true;
     $("picture").classList.remove("stale");
     if (!isNewest || !header.still) return this.badge(isNewest ? "still" : "moving");
@@ -32,15 +36,24 @@ export class Notices {
     if (state === "exact") say("The picture is sharp.");
   }
 
-  /** Says why there are no pictures; the last one stays, greyed. */
+  /** Says why there are no pictures, unless there soon are; the last one stays, greyed. */
   waits(stage, detail) {
-    clearTimeout(this.timer);
-    this.timer = setTimeout(() => {
-      const text = `${stage[0].toUpperCase()}${stage.slice(1)}: ${detail}.`;
-      if ($("banner").textContent !== text) $("banner").textContent = text;
-      $("banner").hidden = false;
-      $("picture").classList.add("stale");
-      this.badge("waiting");
-    }, stage === "waiting" ? 0 : BANNER_AFTER_MS);
+    this.reason = [stage, detail];
+    this.banner ??= setTimeout(() => this.tell(...this.reason), $("banner").hidden ? BANNER_AFTER_MS : 0);
+  }
+
+  tell(stage, detail) {
+    this.stop();
+    const text = `${stage[0].toUpperCase()}${stage.slice(1)}: ${detail}.`;
+    if ($("banner").textContent !== text) $("banner").textContent = text;
+    $("banner").hidden = false;
+    $("picture").classList.add("stale");
+    this.badge("waiting");
+  }
+
+  stop() {
+    clearTimeout(this.late);
+    clearTimeout(this.banner);
+    this.late = this.banner = null;
   }
 }

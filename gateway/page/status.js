@@ -81,7 +81,7 @@ function show(status) {
 }
 
 function nodeTable(nodes) {
-  const rows = nodes.map((node) => [node.name ?? UNKNOWN, node.device ?? UNKNOWN, list(node.roles), percent(node.busy)]);
+  const rows = nodes.map((node) => [node.name ?? UNKNOWN, node.device ?? UNKNOWN, list(node.roles), percent(node.busy_ratio)]);
   return table(nodes.length ? "" : "No node has joined.", ["Node", "Device", "Roles", "Busy"], rows);
 }
 

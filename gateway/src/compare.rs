@@ -15,7 +15,8 @@ use metrics::{PSNR_CAP_DB, Rgb8Image, flip_map, psnr_db, ssim_map};
 use serde_json::{Value, json};
 
 use crate::gateway::Gateway;
-use crate::responses::{Refusal, held, opened};
+use crate::responses::{Refusal, held};
+use crate::single_views::SingleView;
 use crate::views::{ViewQuery, Visited};
 
 /// The largest view that is compared: it takes a thread a fraction of a second.
@@ -26,19 +27,20 @@ pub(crate) async fn compare(
     State(gateway): State<Arc<Gateway>>,
     Query(query): Query<ViewQuery>,
 ) -> Result<Response, Refusal> {
+    let visited = Visited::of(&gateway, &query, MAX_PX).await?;
+    let (shown, direct) = (visited.shown(), &visited.scene.direct);
+    let _visit = direct.visits.begin();
+    // Those that wait for a session hold up no other comparison.
+    tokio::try_join!(shown.opened(), direct.opened())?;
     let busy = |_| Refusal(StatusCode::TOO_MANY_REQUESTS, "another view is being compared: try again later".to_owned());
     let _place = gateway.comparison.try_acquire().map_err(busy)?;
-    let visited = Visited::of(&gateway, &query, MAX_PX).await?;
-    let (camera, moment, planes) = (visited.camera, visited.moment, ViewPlanes::default());
-    let (shown, direct) = (visited.scene.session_of(moment), &visited.scene.direct);
-    let _visits = (shown.visits.begin(), direct.visits.begin());
-    let (shown, direct) = (opened(shown).await?, opened(direct).await?);
-    let view = gateway.stills.frame(&shown, camera, planes, moment).await?;
-    let direct = gateway.stills.frame(&direct, camera, planes, moment).await?;
+    let draw = |kept| gateway.single_views.draw(kept, visited.camera, ViewPlanes::default(), visited.moment);
+    let SingleView { frame: view, place, .. } = draw(shown).await?;
+    let SingleView { frame: direct, .. } = draw(direct).await?;
     let compared = tokio::task::spawn_blocking(move || compared(&view, &direct));
     let compared = compared.await.map_err(Refusal::internal)?;
     let compared = compared.ok_or_else(|| Refusal::internal("the views cannot be compared"))?;
-    Ok(held("application/json", format!("{compared:#}\n").into(), visited.place))
+    Ok(held("application/json", format!("{compared:#}\n").into(), place))
 }
 
 fn compared(frame: &Frame, direct: &Frame) -> Option<Value> {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use client::{Client, ClientError, Session};
 use cluster::{SessionEvent, SessionRequest, SessionStage, Timeline};
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::task::JoinSet;
 
 use crate::visits::Visits;
@@ -17,6 +17,11 @@ pub(crate) const LONGEST_DELAY: Duration = Duration::from_secs(4);
 const LEAST_RATE: f64 = 0.05;
 /// The interval at which the session's demand follows the visitors.
 const FOLLOW: Duration = Duration::from_secs(1);
+
+/// The longest wait of a single view for its session.
+const OPEN_WITHIN: Duration = Duration::from_secs(60);
+/// Single views that are made at a time: slow ones hold up no other session's.
+const SINGLE_VIEWS: usize = 4;
 
 /// The state of a kept session.
 #[derive(Debug, Clone)]
@@ -32,6 +37,14 @@ pub(crate) enum SessionState {
     Open(Arc<Session>),
 }
 
+/// A session did not open in time.
+#[derive(Debug, thiserror::Error)]
+#[error("the scene's session is not open yet: {stage}: {detail}")]
+pub(crate) struct NotOpen {
+    stage: &'static str,
+    detail: String,
+}
+
 /// A session that all visitors of a scene share.
 pub(crate) struct KeptSession {
     pub(crate) visits: Arc<Visits>,
@@ -39,6 +52,8 @@ pub(crate) struct KeptSession {
     pub(crate) light_steps: u32,
     /// The moments of its sample sets.
     pub(crate) timeline: Timeline,
+    /// Places of single views that are made.
+    pub(crate) single_views: Semaphore,
     state: watch::Receiver<SessionState>,
     failures: mpsc::Sender<Arc<Session>>,
     /// Ends with the session.
@@ -71,10 +86,12 @@ impl KeptSession {
         let (light_steps, timeline) = (request.refinement_steps.max(1), request.timeline);
         let visits = Arc::new(Visits::default());
         let coordinator = coordinator.to_owned();
-        let keeper = Keeper { coordinator, request, lingers, visits: visits.clone(), changes, failed };
+        let usual_rate = request.frames_per_s;
+        let keeper = Keeper { coordinator, request, usual_rate, lingers, visits: visits.clone(), changes, failed };
         let mut tasks = JoinSet::new();
         tasks.spawn(keeper.run(first));
-        Self { visits, light_steps, timeline, state, failures, _keeper: tasks }
+        let single_views = Semaphore::new(SINGLE_VIEWS);
+        Self { visits, light_steps, timeline, single_views, state, failures, _keeper: tasks }
     }
 
     /// The session's states, the present one first.
@@ -85,20 +102,27 @@ impl KeptSession {
     }
 
     /// The session, once it is open.
-    pub(crate) async fn open(&self) -> Option<Arc<Session>> {
-        let mut states = self.states();
-        loop {
-            if let SessionState::Open(session) = &*states.borrow_and_update() {
-                return Some(session.clone());
-            }
-            states.changed().await.ok()?;
+    pub(crate) async fn opened(&self) -> Result<Arc<Session>, NotOpen> {
+        let mut state = self.state.clone();
+        let opened = state.wait_for(|state| matches!(state, SessionState::Open(_)));
+        let _ = tokio::time::timeout(OPEN_WITHIN, opened).await;
+        match &*self.state.borrow() {
+            SessionState::Open(session) => Ok(session.clone()),
+            SessionState::Waiting { stage, detail } => Err(NotOpen { stage, detail: detail.clone() }),
         }
     }
 
+    pub(crate) fn is_open(&self) -> bool {
+        matches!(&*self.state.borrow(), SessionState::Open(_))
+    }
+
     /// Has a session opened again that delivers nothing any more.
-    pub(crate) fn has_failed(&self, session: Arc<Session>) {
-        // Where there is no room, others have told of it.
-        let _ = self.failures.try_send(session);
+    pub(crate) fn has_failed(&self, session: Arc<Session>, error: &ClientError) {
+        // A picture that has no room, or takes too long, is no fault of the session.
+        if !matches!(error, ClientError::Exhausted { .. } | ClientError::Invalid { .. }) {
+            // Where there is no room, others have told of it.
+            let _ = self.failures.try_send(session);
+        }
     }
 }
 
@@ -106,6 +130,7 @@ impl KeptSession {
 struct Keeper {
     coordinator: String,
     request: SessionRequest,
+    usual_rate: Option<f64>,
     lingers: Duration,
     visits: Arc<Visits>,
     changes: watch::Sender<SessionState>,
@@ -135,6 +160,7 @@ impl Keeper {
                     if let Closed::Left = self.follow(&session).await {
                         self.wait("preparing", "the scene's session is opened");
                         is_wanted = false;
+                        self.request.frames_per_s = self.usual_rate;
                         continue;
                     }
                     self.wait("reconnecting", "the session is opened again");

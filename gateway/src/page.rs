@@ -21,13 +21,14 @@ const PING: Duration = Duration::from_secs(2);
 /// A page that answers no ping for so long has gone.
 const SILENCE: Duration = Duration::from_secs(20);
 /// Messages of a page a second, in the long run.
-const MAX_MESSAGES_S: f64 = 240.0;
+const MAX_MESSAGES_PER_S: f64 = 240.0;
 /// Messages that a page may send at once: those of some seconds, as after a stall of the link.
-const MAX_BURST: f64 = 4.0 * MAX_MESSAGES_S;
+const MAX_BURST: f64 = 4.0 * MAX_MESSAGES_PER_S;
 /// Messages on their way to the page. Pictures among them are bounded by their credits.
 const OUTGOING: usize = 32;
 /// The delay before a view that has failed is begun anew.
 const AFTER_FAILURE: Duration = Duration::from_millis(250);
+
 /// Why a visit ends.
 pub(crate) enum End {
     /// The page has gone.
@@ -125,10 +126,10 @@ impl Page {
     }
 
     fn count(&mut self, now: Instant) -> Result<(), End> {
-        let earned = MAX_MESSAGES_S * now.duration_since(self.heard).as_secs_f64();
+        let earned = MAX_MESSAGES_PER_S * now.duration_since(self.heard).as_secs_f64();
         self.allowance = (self.allowance + earned).min(MAX_BURST) - 1.0;
         self.heard = now;
-        let too_many = || End::Refused(format!("messages: more than {MAX_MESSAGES_S} a second"));
+        let too_many = || End::Refused(format!("messages: more than {MAX_MESSAGES_PER_S} a second"));
         if self.allowance < 0.0 { Err(too_many()) } else { Ok(()) }
     }
 
@@ -157,12 +158,20 @@ impl Page {
     }
 
     /// Lets a moment pass before another attempt; `hear` takes the messages of that time.
-    pub(crate) async fn pause(&mut self, mut hear: impl FnMut(&Self, FromPage) -> Result<(), End>) -> Result<(), End> {
-        let end = tokio::time::sleep(AFTER_FAILURE);
-        tokio::pin!(end);
+    pub(crate) async fn pause(&mut self, hear: impl FnMut(&Self, FromPage) -> Result<(), End>) -> Result<(), End> {
+        self.hearing(tokio::time::sleep(AFTER_FAILURE), hear).await
+    }
+
+    /// Awaits something else; `hear` takes the messages of that time.
+    pub(crate) async fn hearing<T>(
+        &mut self,
+        other: impl Future<Output = T>,
+        mut hear: impl FnMut(&Self, FromPage) -> Result<(), End>,
+    ) -> Result<T, End> {
+        tokio::pin!(other);
         loop {
             let message = tokio::select! {
-                () = &mut end => return Ok(()),
+                output = &mut other => return Ok(output),
                 message = self.next() => message?,
             };
             hear(self, message)?;

@@ -1,26 +1,18 @@
 //! Answers to requests of HTTP that several of them share: refusals, and JSON.
 
-use std::io;
-use std::sync::Arc;
-use std::time::{Duration, Instant};
-
 use axum::body::{Body, Bytes};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use client::Session;
 use futures_util::stream;
 use serde_json::Value;
+use std::convert::Infallible;
 use tokio::sync::OwnedSemaphorePermit;
 
-use crate::kept_session::KeptSession;
+use crate::kept_session::NotOpen;
 use crate::scenes::SceneError;
-use crate::stills::StillError;
+use crate::single_views::SingleViewError;
 
-/// The time that a client may take to read a body.
-const BODY_WITHIN: Duration = Duration::from_secs(60);
 const CHUNK_BYTES: usize = 64 << 10;
-/// The longest wait for a session.
-const SESSION_WITHIN: Duration = Duration::from_secs(60);
 
 /// The refusal of a request: a status and a sentence.
 #[derive(Debug)]
@@ -59,30 +51,30 @@ impl From<client::ClientError> for Refusal {
     }
 }
 
-impl From<StillError> for Refusal {
-    fn from(error: StillError) -> Self {
+impl From<NotOpen> for Refusal {
+    fn from(error: NotOpen) -> Self {
+        Self(StatusCode::SERVICE_UNAVAILABLE, error.to_string())
+    }
+}
+
+impl From<SingleViewError> for Refusal {
+    fn from(error: SingleViewError) -> Self {
         match error {
-            StillError::Full => Self(StatusCode::TOO_MANY_REQUESTS, error.to_string()),
-            StillError::Client(error @ client::ClientError::Invalid { .. }) => Self::bad(error),
-            StillError::Client(error) => error.into(),
+            SingleViewError::Full => Self(StatusCode::TOO_MANY_REQUESTS, error.to_string()),
+            SingleViewError::PlanOver => Self(StatusCode::SERVICE_UNAVAILABLE, error.to_string()),
+            SingleViewError::NotOpen(error) => error.into(),
+            SingleViewError::Client(error @ client::ClientError::Invalid { .. }) => Self::bad(error),
+            SingleViewError::Client(error) => error.into(),
         }
     }
 }
 
-/// A session, once it is open.
-pub(crate) async fn opened(kept: &KeptSession) -> Result<Arc<Session>, Refusal> {
-    let late = || Refusal(StatusCode::SERVICE_UNAVAILABLE, "the scene's session is not open yet".to_owned());
-    tokio::time::timeout(SESSION_WITHIN, kept.open()).await.ok().flatten().ok_or_else(late)
-}
-
-/// A body that keeps its place until it has been read: unread ones take memory. It is cut after a minute.
+/// A body that keeps its place until it has been read: unread ones take memory.
 pub(crate) fn held(media_type: &'static str, bytes: Bytes, place: OwnedSemaphorePermit) -> Response {
-    let (length, end) = (bytes.len(), Instant::now() + BODY_WITHIN);
-    let chunks = stream::unfold((bytes, place), move |(mut rest, place)| async move {
+    let length = bytes.len();
+    let chunks = stream::unfold((bytes, place), async |(mut rest, place)| {
         let chunk = rest.split_to(rest.len().min(CHUNK_BYTES));
-        let in_time = if Instant::now() < end { Ok(chunk) } else { Err(io::Error::from(io::ErrorKind::TimedOut)) };
-        let is_over = matches!(&in_time, Ok(chunk) if chunk.is_empty());
-        (!is_over).then_some((in_time, (rest, place)))
+        (!chunk.is_empty()).then_some((Ok::<_, Infallible>(chunk), (rest, place)))
     });
     let fields = [
         (header::CONTENT_TYPE, HeaderValue::from_static(media_type)),

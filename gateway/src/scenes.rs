@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use client::{Client, ClientError};
-use cluster::{DIRECT, OfferStatus, PolicyChoice, SessionRequest, Timeline};
+use cluster::{ClusterStatus, DIRECT, OfferStatus, PolicyChoice, SessionRequest, Timeline};
 use glam::UVec2;
 use parking_lot::Mutex;
 
@@ -27,10 +27,15 @@ const SINGLE_VIEWS: Lingers = Lingers(Duration::from_secs(3));
 /// Views a second that are drawn directly: a low rate takes few nodes from visitors.
 const DIRECT_PER_S: f64 = 0.1;
 
+/// A status is told for this time.
+const STATUS_FOR: Duration = Duration::from_millis(500);
+
 /// All scenes that were visited.
 pub(crate) struct Scenes {
     config: GatewayConfig,
     known: Mutex<Known>,
+    /// Whoever asks for it within a moment is told the same.
+    status: tokio::sync::Mutex<Option<(Instant, Arc<ClusterStatus>)>>,
 }
 
 #[derive(Default)]
@@ -74,12 +79,18 @@ pub(crate) struct SceneSessions {
 
 impl Scenes {
     pub(crate) fn new(config: GatewayConfig) -> Self {
-        Self { config, known: Mutex::default() }
+        Self { config, known: Mutex::default(), status: tokio::sync::Mutex::default() }
     }
 
-    /// A client of the coordinator.
-    pub(crate) async fn client(&self) -> Result<Client, ClientError> {
-        Client::connect(&self.config.coordinator).await
+    /// The cluster's status. Requests that wait for it share one.
+    pub(crate) async fn status(&self) -> Result<Arc<ClusterStatus>, ClientError> {
+        let mut last = self.status.lock().await;
+        if let Some((_, status)) = last.as_ref().filter(|(at, _)| at.elapsed() < STATUS_FOR) {
+            return Ok(status.clone());
+        }
+        let status = Arc::new(Client::connect(&self.config.coordinator).await?.status().await?);
+        *last = Some((Instant::now(), status.clone()));
+        Ok(status)
     }
 
     /// The names of the scenes on offer, as last heard of.
@@ -89,26 +100,28 @@ impl Scenes {
 
     /// A scene by its name; the first on offer where there is none.
     pub(crate) async fn visit(&self, name: Option<&str>) -> Result<Arc<SceneSessions>, SceneError> {
-        if let Some(scene) = self.find(name) {
+        // A scene whose session is not open may be on offer no more.
+        if let Some(scene) = self.find(name).filter(|scene| scene.shown.is_open()) {
             return Ok(scene);
         }
         self.add(name, FirstOpened::AtVisit).await
     }
 
     async fn add(&self, name: Option<&str>, first: FirstOpened) -> Result<Arc<SceneSessions>, SceneError> {
-        let offers = self.client().await?.status().await?.offers;
+        let offers = &self.status().await?.offers;
         let names: Vec<String> = offers.iter().map(|offer| offer.name.clone()).collect();
         let offered = names.join(", ");
         self.known.lock().names = names;
         let is_wanted = |offer: &OfferStatus| name.is_none_or(|name| name == offer.name);
         let unknown = || SceneError::Unknown { name: name.unwrap_or("(the first)").to_owned(), offered };
-        let offer = offers.into_iter().find(is_wanted).ok_or_else(unknown)?;
-        if let Some(scene) = self.known.lock().scenes.get(&offer.name) {
+        let offer = offers.iter().find(|offer| is_wanted(offer)).ok_or_else(unknown)?;
+        let mut known = self.known.lock();
+        if let Some(scene) = known.scenes.get(&offer.name).filter(|scene| scene.offer == *offer) {
             return Ok(scene.clone());
         }
-        let name = offer.name.clone();
-        let scene = Arc::new(SceneSessions::start(offer, &self.config, first)?);
-        Ok(self.known.lock().scenes.entry(name).or_insert(scene).clone())
+        let scene = Arc::new(SceneSessions::start(offer.clone(), &self.config, first)?);
+        known.scenes.insert(offer.name.clone(), scene.clone());
+        Ok(scene)
     }
 
     fn find(&self, name: Option<&str>) -> Option<Arc<SceneSessions>> {

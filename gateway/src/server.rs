@@ -4,12 +4,17 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
+use axum::extract::{Request, State};
+use axum::http::StatusCode;
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::Response;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
+use tokio::time::Instant;
 use tokio_io_timeout::TimeoutStream;
 use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
@@ -20,6 +25,8 @@ use crate::http::router;
 
 /// The time that a request's headers may take, and the idle time of a connection between requests.
 const HEADERS_WITHIN: Duration = Duration::from_secs(10);
+/// The time that a client may take to read an answer, after which its connection is cut.
+const READ_WITHIN: Duration = Duration::from_secs(60);
 /// The time that a connection may take none of what is written to it.
 const WRITES_WITHIN: Duration = Duration::from_secs(20);
 /// Open connections: further ones wait in the system's queue.
@@ -61,7 +68,10 @@ pub async fn serve(mut connections: Connections, config: GatewayConfig, shutdown
     let tls = config.tls.clone().map(TlsAcceptor::from);
     let gateway = Arc::new(Gateway::new(config, shutdown.clone()));
     let (router, mut open) = (router(gateway.clone()), JoinSet::new());
-    open.spawn(async move { gateway.scenes.prepare().await });
+    let until = shutdown.clone();
+    open.spawn(async move {
+        until.run_until_cancelled(gateway.scenes.prepare()).await;
+    });
     loop {
         while open.try_join_next().is_some() {}
         let stream = tokio::select! {
@@ -96,14 +106,79 @@ async fn answer(
     router: Router,
     shutdown: CancellationToken,
 ) {
+    let due = watch::Sender::default();
+    let mut overdue = due.subscribe();
+    let router = router.layer(from_fn_with_state(due, noted));
     let mut http = hyper::server::conn::http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN);
     let connection = http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router)).with_upgrades();
     tokio::pin!(connection);
     tokio::select! {
         _ = &mut connection => return,
+        () = is_overdue(&mut overdue) => return,
         () = shutdown.cancelled() => connection.as_mut().graceful_shutdown(),
     }
     // A fault of one connection is that client's own.
     let _ = tokio::time::timeout(DRAIN, connection).await;
+}
+
+/// Notes by when an answer is due to be read.
+async fn noted(State(due): State<watch::Sender<Option<Instant>>>, request: Request, next: Next) -> Response {
+    due.send_replace(None);
+    let response = next.run(request).await;
+    // A WebSocket stays open.
+    if response.status() != StatusCode::SWITCHING_PROTOCOLS {
+        due.send_replace(Some(Instant::now() + READ_WITHIN));
+    }
+    response
+}
+
+/// Waits until an answer should have been read.
+async fn is_overdue(due: &mut watch::Receiver<Option<Instant>>) {
+    loop {
+        let at = *due.borrow_and_update();
+        match at {
+            None if due.changed().await.is_ok() => (),
+            // The connection has ended.
+            None => std::future::pending().await,
+            Some(at) if tokio::time::timeout_at(at, due.changed()).await.is_err() => return,
+            Some(_) => (),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::routing::get;
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+
+    use super::*;
+
+    /// Reads an answer of 1 MiB, so many bytes a second; returns the bytes and the seconds until its end.
+    async fn read_slowly(bytes_a_second: usize) -> (usize, u64) {
+        let router = Router::new().route("/", get(async || vec![0_u8; 1 << 20]));
+        let (mut client, server) = tokio::io::duplex(1 << 16);
+        let serving = tokio::spawn(answer(server, router, CancellationToken::new()));
+        client.write_all(b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").await.unwrap();
+        let (start, mut chunk, mut total) = (Instant::now(), vec![0; bytes_a_second], 0);
+        loop {
+            match client.read(&mut chunk).await.unwrap_or(0) {
+                0 => break,
+                read => total += read,
+            }
+            tokio::time::sleep(Duration::from_secs(1)).await;
+        }
+        let seconds = start.elapsed().as_secs();
+        serving.await.unwrap();
+        (total, seconds)
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn an_answer_that_is_read_byte_by_byte_is_cut() {
+        let (bytes, seconds) = read_slowly(16).await;
+        // What was written before is read to its end.
+        assert!(bytes < 1 << 17 && seconds >= 60, "{bytes} bytes in {seconds} s");
+        let (bytes, seconds) = read_slowly(1 << 16).await;
+        assert!(bytes > 1 << 20 && seconds < 60, "{bytes} bytes in {seconds} s");
+    }
 }

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use crate::assets;
 use crate::gateway::Gateway;
-use crate::responses::{Refusal, as_json, opened};
+use crate::responses::{Refusal, as_json};
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -27,7 +27,7 @@ pub(crate) async fn cameras(
 ) -> Result<Response, Refusal> {
     let scene = gateway.scenes.visit(query.scene.as_deref()).await?;
     let _visit = scene.shown.visits.begin();
-    let workload = opened(&scene.shown).await?.plan().assignment.workload;
+    let workload = scene.shown.opened().await?.plan().assignment.workload;
     let cells = (0..workload.cell_count()).filter_map(|cell| Some((cell, workload.cameras_of_cell(cell)?)));
     let frames: Vec<Value> = cells
         .flat_map(|(cell, cameras)| workload.sample_cameras[cameras].iter().map(move |camera| (cell, camera)))
@@ -42,7 +42,7 @@ pub(crate) async fn cameras(
 
 /// `status.json`.
 pub(crate) async fn status(State(gateway): State<Arc<Gateway>>) -> Result<Response, Refusal> {
-    let status = gateway.scenes.client().await?.status().await?;
+    let status = gateway.scenes.status().await?;
     let visitors = gateway.config.max_visitors - gateway.visitors.available_permits();
     Ok(as_json(&described(&status, visitors)))
 }
@@ -69,7 +69,7 @@ fn described_node(status: &ClusterStatus, node: &NodeStatus) -> Value {
         .collect();
     let conditions = status.workloads.iter().flat_map(|workload| &workload.conditions);
     let busy = conditions.filter(|condition| condition.node_name == name).map(|condition| condition.busy_ratio);
-    json!({ "name": name, "device": node.device_name, "roles": roles, "busy": busy.reduce(f64::max) })
+    json!({ "name": name, "device": node.device_name, "roles": roles, "busy_ratio": busy.reduce(f64::max) })
 }
 
 fn described_workload(workload: &WorkloadStatus) -> Value {

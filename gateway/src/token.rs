@@ -3,7 +3,8 @@
 use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse as _, Response};
 
-const COOKIE: &str = "myriorama_token";
+/// The first part of the cookie's name.
+const COOKIE: &str = "myriorama_";
 const QUERY: &str = "token=";
 const BYTES: usize = 16;
 
@@ -48,7 +49,7 @@ impl Token {
         }
         let bearer = headers.get(header::AUTHORIZATION).and_then(|value| value.to_str().ok()?.strip_prefix("Bearer "));
         let is_open = !uri.path().starts_with("/api/");
-        if is_open || bearer.is_some_and(|given| self.is(given)) || cookies(headers).any(|given| self.is(given)) {
+        if is_open || bearer.is_some_and(|given| self.is(given)) || self.cookies(headers).any(|given| self.is(given)) {
             Admission::Granted
         } else {
             Admission::Refused
@@ -59,7 +60,7 @@ impl Token {
     /// any path.
     pub(crate) fn redirect(&self, uri: &Uri, is_secure: bool) -> Response {
         let secure = if is_secure { "; Secure" } else { "" };
-        let cookie = format!("{COOKIE}={}; HttpOnly; SameSite=Strict{secure}", self.0);
+        let cookie = format!("{}={}; HttpOnly; SameSite=Strict{secure}", self.cookie(), self.0);
         let fields = [
             (header::SET_COOKIE, HeaderValue::from_str(&cookie).unwrap_or(HeaderValue::from_static(""))),
             (header::LOCATION, HeaderValue::from_str(&without_token(uri)).unwrap_or(HeaderValue::from_static("./"))),
@@ -72,6 +73,18 @@ impl Token {
     fn is(&self, given: &str) -> bool {
         // Hashes compare in constant time.
         blake3::hash(given.as_bytes()) == blake3::hash(self.0.as_bytes())
+    }
+
+    /// Gateways on different ports of a host share its cookies: each has a name of its own.
+    fn cookie(&self) -> String {
+        format!("{COOKIE}{}", &blake3::hash(self.0.as_bytes()).to_hex()[..8])
+    }
+
+    fn cookies<'h>(&self, headers: &'h HeaderMap) -> impl Iterator<Item = &'h str> + use<'h> {
+        let own = self.cookie();
+        let all = headers.get_all(header::COOKIE).into_iter().filter_map(|value| value.to_str().ok());
+        let pairs = all.flat_map(|value| value.split(';')).filter_map(|pair| pair.trim().split_once('='));
+        pairs.filter_map(move |(name, value)| (name == own).then_some(value))
     }
 }
 
@@ -88,12 +101,6 @@ fn without_token(uri: &Uri) -> String {
     format!("./{name}{query}")
 }
 
-fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
-    let all = headers.get_all(header::COOKIE).into_iter().filter_map(|value| value.to_str().ok());
-    let pairs = all.flat_map(|value| value.split(';')).filter_map(|pair| pair.trim().split_once('='));
-    pairs.filter_map(|(name, value)| (name == COOKIE).then_some(value))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,11 +115,14 @@ mod tests {
     #[test]
     fn a_cookie_or_a_bearer_token_opens_the_api() {
         let path = "/api/v1/view.png?size=8x8";
-        assert_eq!(admitted(path, header::COOKIE, "a=b; myriorama_token=secret"), Admission::Granted);
+        let name = Token("secret".to_owned()).cookie();
+        assert_eq!(admitted(path, header::COOKIE, &format!("a=b; {name}=secret")), Admission::Granted);
         assert_eq!(admitted(path, header::AUTHORIZATION, "Bearer secret"), Admission::Granted);
         assert_eq!(admitted(path, header::AUTHORIZATION, "Basic secret"), Admission::Refused);
-        assert_eq!(admitted(path, header::COOKIE, "myriorama_token=secre"), Admission::Refused);
-        assert_eq!(admitted(path, header::COOKIE, "token=secret"), Admission::Refused);
+        assert_eq!(admitted(path, header::COOKIE, &format!("{name}=secre")), Admission::Refused);
+        let other = Token("other".to_owned()).cookie();
+        assert_eq!(admitted(path, header::COOKIE, &format!("{other}=secret")), Admission::Refused);
+        assert_eq!(admitted(path, header::COOKIE, &format!("{other}=other; {name}=secret")), Admission::Granted);
     }
 
     #[test]
@@ -130,7 +140,8 @@ mod tests {
         }
         let answer = Token("secret".to_owned()).redirect(&Uri::from_static("/"), true);
         let cookie = answer.headers()[header::SET_COOKIE].to_str().unwrap();
-        assert!(cookie.starts_with("myriorama_token=secret; HttpOnly; SameSite=Strict; Secure"), "{cookie}");
+        let name = Token("secret".to_owned()).cookie();
+        assert!(cookie.starts_with(&format!("{name}=secret; HttpOnly; SameSite=Strict; Secure")), "{cookie}");
     }
 
     #[test]

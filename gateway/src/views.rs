@@ -6,19 +6,19 @@ use axum::extract::{Path, Query, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::response::Response;
 use client::Frame;
-use cluster::Workload;
 use codec::{FrameCodec, encode_frame};
-use depth_image::{Camera, PinholeCamera, PixelDepth, ProvenanceKind, View, ViewGroup, ViewPlanes};
+use depth_image::{PinholeCamera, PixelDepth, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec2};
 use pictures::Legend;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use tokio::sync::OwnedSemaphorePermit;
 
 use crate::camera::PageCamera;
 use crate::gateway::Gateway;
-use crate::responses::{Refusal, as_json, held, opened};
+use crate::kept_session::KeptSession;
+use crate::responses::{Refusal, as_json, held};
 use crate::scenes::SceneSessions;
+use crate::single_views::SingleView;
 use crate::visits::Visit;
 
 /// The size of a view that names none.
@@ -98,15 +98,12 @@ pub(crate) struct Visited {
     pub(crate) scene: Arc<SceneSessions>,
     pub(crate) camera: PinholeCamera,
     pub(crate) moment: u32,
-    /// The place of the answer.
-    pub(crate) place: OwnedSemaphorePermit,
     _visit: Visit,
 }
 
 impl Visited {
     /// The scene and the camera of a query, whose view is within `max_px`.
     pub(crate) async fn of(gateway: &Gateway, query: &ViewQuery, max_px: UVec2) -> Result<Self, Refusal> {
-        let place = gateway.stills.place()?;
         let scene = gateway.scenes.visit(query.scene.as_deref()).await?;
         let (moment, moments) = (query.moment, scene.timeline().set_count);
         if moment >= moments {
@@ -114,38 +111,22 @@ impl Visited {
         }
         let visit = scene.session_of(moment).visits.begin();
         let camera = query.camera(&scene, max_px)?;
-        Ok(Self { scene, camera, moment, place, _visit: visit })
+        Ok(Self { scene, camera, moment, _visit: visit })
+    }
+
+    /// The session that shows the scene.
+    pub(crate) fn shown(&self) -> &KeptSession {
+        self.scene.session_of(self.moment)
     }
 
     /// The view, drawn directly where no view cell is near: cells follow visitors, not single requests.
-    async fn frame(&self, gateway: &Gateway, planes: ViewPlanes) -> Result<Frame, Refusal> {
-        let session = opened(self.scene.session_of(self.moment)).await?;
-        if is_near(&session.plan().assignment.workload, &self.camera) {
-            return Ok(gateway.stills.frame(&session, self.camera, planes, self.moment).await?);
-        }
-        let _visit = self.scene.direct.visits.begin();
-        let session = opened(&self.scene.direct).await?;
-        Ok(gateway.stills.frame(&session, self.camera, planes, self.moment).await?)
+    async fn draw(&self, gateway: &Gateway, planes: ViewPlanes) -> Result<SingleView, Refusal> {
+        let (shown, direct) = (self.shown(), &self.scene.direct);
+        let is_near = shown.opened().await?.plan().assignment.workload.has_cell_near(&self.camera);
+        let _visit = (!is_near).then(|| direct.visits.begin());
+        let kept = if is_near { shown } else { direct };
+        Ok(gateway.single_views.draw(kept, self.camera, planes, self.moment).await?)
     }
-}
-
-impl Visited {
-    /// The number of the first sample camera of a frame's view cell.
-    async fn first_camera(&self, frame: &Frame) -> Result<usize, Refusal> {
-        let session = opened(self.scene.session_of(self.moment)).await?;
-        let cameras = session.plan().assignment.workload.cameras_of_cell(frame.header.cell as usize);
-        Ok(cameras.map_or(0, |cameras| cameras.start))
-    }
-}
-
-/// Whether the view cells of a workload serve a view, or would with a small step.
-pub(crate) fn is_near(workload: &Workload, view: &PinholeCamera) -> bool {
-    let samples: Vec<_> = workload.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
-    let mut groups = Vec::new();
-    ViewGroup::add(&mut groups, &samples, &workload.volume);
-    let before = groups.len();
-    ViewGroup::add(&mut groups, &[*view], &workload.volume);
-    groups.len() == before
 }
 
 /// `view.png` and `view.jpg`.
@@ -165,12 +146,13 @@ pub(crate) async fn picture(
         Plane::Depth => ViewPlanes { inverse_depth: true, provenance: false },
         Plane::Provenance => ViewPlanes { inverse_depth: false, provenance: true },
     };
-    let frame = visited.frame(&gateway, planes).await?;
-    let first_camera = visited.first_camera(&frame).await?;
-    let Visited { camera, place, .. } = visited;
+    let drawn = visited.draw(&gateway, planes).await?;
+    let first_camera = if query.show == Plane::Provenance { drawn.first_camera()? } else { 0 };
+    let SingleView { frame: Frame { view, .. }, place, .. } = drawn;
     let encode = move || {
-        let (rgb, legend) = colored(frame.view, query.show, first_camera)?;
-        encode_frame(codec, camera.size_px, &rgb).ok().map(|encoded| (encoded, legend))
+        let size_px = view.size_px;
+        let (rgb, legend) = colored(view, query.show, first_camera)?;
+        encode_frame(codec, size_px, &rgb).ok().map(|encoded| (encoded, legend))
     };
     let encoded = tokio::task::spawn_blocking(encode).await.map_err(Refusal::internal)?;
     let (encoded, legend) = encoded.ok_or_else(|| Refusal::internal("the view lacks a plane"))?;
@@ -204,11 +186,11 @@ pub(crate) async fn depth(
 ) -> Result<Response, Refusal> {
     let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
     let planes = ViewPlanes { inverse_depth: true, provenance: false };
-    let Frame { view, .. } = visited.frame(&gateway, planes).await?;
+    let SingleView { frame: Frame { view, .. }, place, .. } = visited.draw(&gateway, planes).await?;
     let inverse = view.inverse_depth_per_m.ok_or_else(|| Refusal::internal("the view lacks depth"))?;
     // One over zero is infinite, as it should be.
     let file = npy(view.size_px, inverse.into_iter().map(f32::recip));
-    Ok(held("application/octet-stream", file.into(), visited.place))
+    Ok(held("application/octet-stream", file.into(), place))
 }
 
 /// A file of NumPy's format, version 1.0: the header is padded to 64 bytes.
@@ -231,9 +213,8 @@ pub(crate) async fn point(
     let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
     let at = query.pixel(visited.camera.size_px)?;
     let planes = ViewPlanes { inverse_depth: true, provenance: true };
-    let frame = visited.frame(&gateway, planes).await?;
-    let first_camera = visited.first_camera(&frame).await?;
-    let found = surface(&visited, &frame.view, at, first_camera);
+    let drawn = visited.draw(&gateway, planes).await?;
+    let found = surface(&visited, &drawn.frame.view, at, drawn.first_camera()?);
     Ok(as_json(&found.ok_or_else(|| Refusal::internal("the view lacks a plane"))?))
 }
 
@@ -255,7 +236,7 @@ fn surface(visited: &Visited, view: &View, at: UVec2, first_camera: usize) -> Op
     Some(json!({
         "at": at.to_array(), "source": source, "cameras": cameras,
         "point": has_surface.then(|| visited.scene.space.in_source(in_world)),
-        "depth": has_surface.then_some(1.0 / inverse),
+        "planar_depth": has_surface.then_some(1.0 / inverse),
     }))
 }
 

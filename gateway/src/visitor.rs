@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use axum::extract::ws::{Message, WebSocket};
 use client::{ClientError, ClientId, EncodedFrame, Session};
-use cluster::{Policy, SessionPlan};
+use cluster::{Assignment, Policy, SessionPlan};
 use codec::FrameCodec;
 use depth_image::Camera;
 use glam::UVec2;
@@ -22,7 +22,6 @@ use crate::picture_stream::{About, Asked, PictureStream};
 use crate::protocol::{FromPage, Pose, ToPage};
 use crate::rate::{Rate, Shown};
 use crate::scenes::{SceneError, SceneSessions};
-use crate::views;
 
 /// The longest age that says something of the link: a page may have been hidden.
 const MAX_AGE_MS: f64 = 10_000.0;
@@ -67,20 +66,13 @@ async fn admitted<'a>(page: &mut Page, gateway: &'a Gateway) -> Result<tokio::sy
         return Ok(place);
     }
     page.wait("full", "all places are taken: this page is let in when there is room")?;
-    let place = gateway.visitors.acquire();
-    tokio::pin!(place);
-    loop {
-        tokio::select! {
-            place = &mut place => return place.map_err(|_| End::Gone),
-            message = page.next() => drop(message?),
-        }
-    }
+    page.hearing(gateway.visitors.acquire(), |_, _| Ok(())).await?.map_err(|_| End::Gone)
 }
 
 /// The scene that a page asks for, once the coordinator answers.
 async fn found(page: &mut Page, gateway: &Gateway, name: Option<&str>) -> Result<Arc<SceneSessions>, End> {
     loop {
-        match gateway.scenes.visit(name).await {
+        match page.hearing(gateway.scenes.visit(name), |_, _| Ok(())).await? {
             Ok(scene) => return Ok(scene),
             Err(error @ SceneError::Unknown { .. }) => return Err(End::Refused(error.to_string())),
             Err(error) => page.wait("connecting", &error.to_string())?,
@@ -131,12 +123,9 @@ impl Visitor {
                         continue;
                     }
                 };
-                let Some(error) = self.serve_from(page, kept, &session).await? else { break };
+                let Some(error) = self.serve_from(page, kept, &session, &mut states).await? else { continue };
                 page.wait("reconnecting", &error.to_string())?;
-                // A picture that has no room, or takes too long, is no fault of the session.
-                if !matches!(error, ClientError::Exhausted { .. } | ClientError::Invalid { .. }) {
-                    kept.has_failed(session);
-                }
+                kept.has_failed(session, &error);
                 page.pause(|page, message| self.hear(page, message)).await?;
             }
             kept.visits.left(self.number);
@@ -171,12 +160,13 @@ impl Visitor {
         }
     }
 
-    /// Serves from a session until it fails; `None` when the visitor needs another one.
+    /// Serves from a session until it fails; `None` when the visitor needs another one, or there is another.
     async fn serve_from(
         &mut self,
         page: &mut Page,
         kept: &KeptSession,
         session: &Session,
+        states: &mut watch::Receiver<SessionState>,
     ) -> Result<Option<ClientError>, End> {
         self.tell_plan(page, &session.plan())?;
         let client = ClientId::new();
@@ -202,6 +192,7 @@ impl Visitor {
                         }
                     }
                 },
+                changed = states.changed() => return changed.map(|()| None).map_err(|_| End::Gone),
                 plan = session.another_plan(self.plan_epoch) => {
                     self.tell_plan(page, &plan)?;
                     self.renew_still(&plan, &mut motion, &mut still)?;
@@ -279,19 +270,21 @@ impl Visitor {
             return Ok(());
         };
         self.sent = asked.pose.number;
-        let (shown, last) = (self.light_step_of(session, &frame), self.scene.shown.light_steps - 1);
+        let plan = session.plan().assignment;
+        let (shown, last) = (self.light_step_of(&plan, &frame), self.scene.shown.light_steps - 1);
         let is_own_cell = !frame.header.is_neighbour_cell;
-        let is_near = !asked.pose.still || is_near(session, &frame);
+        let is_near = !asked.pose.still || is_near(&plan, &frame);
         let about = About { light_step: shown + 1, is_own_cell: is_own_cell && is_near, rtt_s: page.rtt_s };
         page.send(Message::Binary(stream.message(&frame, &asked, about)))?;
-        if asked.pose.still && is_own_cell && !self.is_moving {
-            self.light_step = self.light_step.max(shown);
+        if asked.pose.still && plan.policy != Policy::Direct && !self.is_moving {
+            // Another cell's light begins anew.
+            self.light_step = if is_own_cell { self.light_step.max(shown) } else { 0 };
         }
         if asked.pose.number != newest {
             return Ok(());
         }
         let is_finished = is_own_cell && (shown == last || !asked.pose.still);
-        self.finished_with = cameras_of(session, &frame).filter(|_| is_finished);
+        self.finished_with = cameras_of(&plan, &frame).filter(|_| is_finished);
         if is_finished && (self.finished_with.is_some() || !asked.pose.still) {
             return Ok(());
         }
@@ -320,13 +313,16 @@ impl Visitor {
         if cameras.map(|cameras| workload.sample_cameras[cameras].to_vec()) == self.finished_with {
             return Ok(());
         }
+        if self.finished_with.is_some() {
+            self.light_step = 0;
+        }
         self.ask(pose, motion, still)
     }
 
     /// The step of a picture's light, from 0. Views that are drawn directly show the last, and so do scenes that move.
-    fn light_step_of(&self, session: &Session, frame: &EncodedFrame) -> u32 {
+    fn light_step_of(&self, plan: &Assignment, frame: &EncodedFrame) -> u32 {
         let last = self.scene.shown.light_steps - 1;
-        match session.plan().assignment.policy {
+        match plan.policy {
             _ if self.is_moving => last,
             Policy::Direct => last,
             Policy::Pipeline | Policy::TimeShare => frame.request.set_index.min(last),
@@ -349,16 +345,14 @@ impl Visitor {
     }
 }
 
-/// Whether the plan in force has a view cell near a frame's camera. Where it has none, the next plan will.
-fn is_near(session: &Session, frame: &EncodedFrame) -> bool {
-    let assignment = session.plan().assignment;
-    assignment.policy == Policy::Direct || views::is_near(&assignment.workload, &frame.request.camera)
+/// Whether a plan has a view cell near a frame's camera. Where it has none, the next plan will.
+fn is_near(plan: &Assignment, frame: &EncodedFrame) -> bool {
+    plan.policy == Policy::Direct || plan.workload.has_cell_near(&frame.request.camera)
 }
 
-/// The sample cameras of a frame, under the plan in force.
-fn cameras_of(session: &Session, frame: &EncodedFrame) -> Option<Vec<Camera>> {
-    let assignment = session.plan().assignment;
-    let is_current = assignment.plan_epoch == frame.header.sample_set_id.plan_epoch;
-    let cameras = assignment.workload.cameras_of_cell(frame.header.cell as usize).filter(|_| is_current)?;
-    Some(assignment.workload.sample_cameras[cameras].to_vec())
+/// The sample cameras of a frame, if it was made under this plan.
+fn cameras_of(plan: &Assignment, frame: &EncodedFrame) -> Option<Vec<Camera>> {
+    let is_current = plan.plan_epoch == frame.header.sample_set_id.plan_epoch;
+    let cameras = plan.workload.cameras_of_cell(frame.header.cell as usize).filter(|_| is_current)?;
+    Some(plan.workload.sample_cameras[cameras].to_vec())
 }

@@ -9,6 +9,7 @@ use tokio::sync::watch;
 
 /// Visitors are active for this time after their last move.
 const ACTIVE_FOR: Duration = Duration::from_secs(10);
+
 /// The visitors of a scene.
 #[derive(Debug, Default)]
 pub(crate) struct Visits {

@@ -232,6 +232,8 @@ async fn two_visitors_see_their_own_pictures_in_one_session() {
     one.pose(EYE, true).await;
     other.pose([0.3, 1.0, 2.5], true).await;
     let (of_one, of_other) = (one.picture().await, other.picture().await);
+    // A status is told again for half a second.
+    tokio::time::sleep(Duration::from_millis(600)).await;
     let (_, body) = bench.get("/api/v1/status.json", "Host: 127.0.0.1\r\n").await;
     let status: Value = serde_json::from_slice(&body).unwrap();
     assert_eq!((&status["visitors"], &status["workloads"][0]["sessions"]), (&json!(2), &json!(1)));

@@ -1,6 +1,6 @@
 //! A browser for tests and measurements: Debian's `chromium`, driven through its `chromedriver`.
 //!
-//! A [`Browser`] is one driver, one browser and one profile of its own, all gone when it is dropped ([`process`]). It opens
+//! A [`Browser`] is one driver, one browser and one profile of its own, all gone when it is dropped. It opens
 //! pages, runs scripts in them and keeps their console. [`input`] sends real events of mouse, fingers and keys: a page cannot
 //! tell them from a person's. [`inspect`] reads what a person or an aid would: pictures, the accessibility tree, memory.
 //!
@@ -14,7 +14,7 @@ mod error;
 pub mod input;
 pub mod inspect;
 mod options;
-pub mod process;
+mod process;
 mod profile;
 
 pub use browser::Browser;

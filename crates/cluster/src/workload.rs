@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use depth_image::{Aabb, Camera, Illumination, MAX_LIGHTS, PinholeCamera, nearest_set};
+use depth_image::{Aabb, Camera, Illumination, MAX_LIGHTS, PinholeCamera, ViewGroup, nearest_set};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -93,11 +93,24 @@ impl Workload {
         if self.cell_count() == 1 {
             return 0;
         }
-        let cameras = |cell: usize| {
-            let range = self.cameras_of_cell(cell).unwrap_or_default();
-            self.sample_cameras[range].iter().map(|Camera::Pinhole(camera)| *camera).collect()
-        };
-        nearest_set(view, (0..self.cell_count()).map(cameras), &self.volume).unwrap_or(0) as u32
+        let cells = (0..self.cell_count()).map(|cell| self.pinholes_of_cell(cell));
+        nearest_set(view, cells, &self.volume).unwrap_or(0) as u32
+    }
+
+    /// Whether the view cell nearest to a view serves it, or would with a small step.
+    #[must_use]
+    pub fn has_cell_near(&self, view: &PinholeCamera) -> bool {
+        let cameras = self.pinholes_of_cell(self.cell_of(view) as usize);
+        let mut groups = Vec::new();
+        ViewGroup::add(&mut groups, &cameras, &self.volume);
+        let before = groups.len();
+        ViewGroup::add(&mut groups, &[*view], &self.volume);
+        groups.len() == before
+    }
+
+    fn pinholes_of_cell(&self, cell: usize) -> Vec<PinholeCamera> {
+        let range = self.cameras_of_cell(cell).unwrap_or_default();
+        self.sample_cameras[range].iter().map(|Camera::Pinhole(camera)| *camera).collect()
     }
 
     /// # Errors

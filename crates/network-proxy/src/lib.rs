@@ -257,7 +257,7 @@ fn spent(way: Way, bytes: &mut [u8], random: &mut Random) -> Duration {
         Way::Slow { bytes_per_s } | Way::Link { bytes_per_s, .. } => {
             Duration::from_secs_f64(bytes.len() as f64 / bytes_per_s)
         }
-        Way::Spoilt { one_in } if !bytes.is_empty() && random.below(one_in) == 0 => {
+        Way::Spoilt { one_in } if one_in > 0 && !bytes.is_empty() && random.below(one_in) == 0 => {
             let at = random.below(bytes.len() as u64) as usize;
             bytes[at] ^= 1 << random.below(8);
             Duration::ZERO

@@ -1,0 +1,97 @@
+//! Single views over HTTP: some of each session are made at a time, and others wait.
+
+use std::sync::Arc;
+
+use client::{ClientError, Frame, Session, ViewRequest};
+use cluster::SessionPlan;
+use depth_image::{PinholeCamera, ViewPlanes};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use crate::kept_session::{KeptSession, NotOpen};
+
+/// Views that are made, wait, or are read.
+const PLACES: usize = 68;
+
+/// The places of views over HTTP.
+pub(crate) struct SingleViews(Arc<Semaphore>);
+
+/// A view, and the plan that it was made under.
+pub(crate) struct SingleView {
+    pub(crate) frame: Frame,
+    /// `None` where the plan has changed twice meanwhile.
+    plan: Option<SessionPlan>,
+    /// Kept until the answer has been read.
+    pub(crate) place: OwnedSemaphorePermit,
+}
+
+/// Why a view is not made.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum SingleViewError {
+    /// Too many wait.
+    #[error("{PLACES} views are under way already: try again later")]
+    Full,
+    /// The scene's session is not open.
+    #[error(transparent)]
+    NotOpen(#[from] NotOpen),
+    /// The cluster's reason.
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    /// The cameras of the view are those of a plan that is over.
+    #[error("the plan has changed: try again")]
+    PlanOver,
+}
+
+impl Default for SingleViews {
+    fn default() -> Self {
+        Self(Arc::new(Semaphore::new(PLACES)))
+    }
+}
+
+impl SingleViews {
+    /// One view: of a moment of a scene that moves, else in its finished light.
+    pub(crate) async fn draw(
+        &self,
+        kept: &KeptSession,
+        camera: PinholeCamera,
+        planes: ViewPlanes,
+        moment: u32,
+    ) -> Result<SingleView, SingleViewError> {
+        // A session that does not open takes no place from others.
+        let session = kept.opened().await?;
+        let place = self.0.clone().try_acquire_owned().map_err(|_| SingleViewError::Full)?;
+        let _made = kept.single_views.acquire().await.map_err(|_| SingleViewError::Full)?;
+        match made(&session, camera, planes, moment).await {
+            Ok((frame, plan)) => Ok(SingleView { frame, plan, place }),
+            Err(error) => {
+                kept.has_failed(session, &error);
+                Err(error.into())
+            }
+        }
+    }
+}
+
+async fn made(
+    session: &Session,
+    camera: PinholeCamera,
+    planes: ViewPlanes,
+    moment: u32,
+) -> Result<(Frame, Option<SessionPlan>), ClientError> {
+    let plan = session.plan();
+    let timeline = plan.assignment.workload.timeline;
+    let set_index = if timeline.moves() { moment } else { timeline.set_count - 1 };
+    let request = ViewRequest { frame: 1, set_index, camera };
+    let frames = session.render_views_with(planes, [request])?.all().await?;
+    let none = || ClientError::Ended { reason: "no frame was received".to_owned() };
+    let frame = frames.into_iter().next().ok_or_else(none)?;
+    let plan_epoch = frame.header.sample_set_id.plan_epoch;
+    let plan = [plan, session.plan()].into_iter().find(|plan| plan.assignment.plan_epoch == plan_epoch);
+    Ok((frame, plan))
+}
+
+impl SingleView {
+    /// The number of the first sample camera of its view cell.
+    pub(crate) fn first_camera(&self) -> Result<usize, SingleViewError> {
+        let workload = &self.plan.as_ref().ok_or(SingleViewError::PlanOver)?.assignment.workload;
+        Ok(workload.cameras_of_cell(self.frame.header.cell as usize).map_or(0, |cameras| cameras.start))
+    }
+}
