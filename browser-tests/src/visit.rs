@@ -130,6 +130,15 @@ impl Visit {
         Self::at(place, url, &options).await
     }
 
+    /// As [`Visit::in_view`], while no other page is open: for measured times.
+    ///
+    /// # Panics
+    /// As [`Visit::in_view`].
+    pub async fn alone(url: &str, view: View) -> Self {
+        let places = PLACES.acquire_many(2).await.expect("never closed");
+        Self::at(places, url, &BrowserOptions { view, ..BrowserOptions::default() }).await
+    }
+
     /// Opens two pages, each in a browser of its own.
     ///
     /// # Panics

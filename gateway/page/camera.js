@@ -117,7 +117,8 @@ export function between(from, to, share) {
 /** One key press, or the same state for other keys. */
 export function press(state, key) {
   const steps = { ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0], ArrowUp: [0, STEP], ArrowDown: [0, -STEP] };
-  if (steps[key]) return turn(state, ...steps[key]);
+  // A flying camera looks where the arrow points.
+  if (steps[key]) return turn(state, ...scale(steps[key], state.isFlying ? -1 : 1));
   if (key === "+" || key === "=") return dolly(state, ZOOM_STEP);
   if (key === "-") return dolly(state, 1 / ZOOM_STEP);
   return state;

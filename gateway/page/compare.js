@@ -74,7 +74,7 @@ export class Compare {
       [$(id).width, $(id).height] = result.size_px;
     }
     const number = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits) : "–");
-    const psnr = result.psnr_db === null ? "equal" : `${number(result.psnr_db, 1)} dB`;
+    const psnr = `${number(result.psnr_db, 1)} dB`;
     const ms = (value) => `${number(value, 0)} ms`;
     const rows = [
       ["PSNR", psnr], ["SSIM", number(result.ssim, 4)], ["FLIP", number(result.flip, 4)],

@@ -24,6 +24,15 @@ export function say(text) {
   $("spoken").textContent = text;
 }
 
+/** Writes an address into the address bar. */
+export function writeAddress(url) {
+  try {
+    history.replaceState(null, "", url);
+  } catch {
+    // Browsers limit how often it may change.
+  }
+}
+
 let toastTimer = null;
 
 /** Says something and shows it for a moment. */

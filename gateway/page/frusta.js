@@ -22,8 +22,9 @@ export function frustumOf(frame, depth) {
 }
 
 export class Frusta {
-  constructor(marks, scene, sceneSize, ownCell) {
-    Object.assign(this, { marks, scene, sceneSize, ownCell });
+  /** `plan()` gives the scene and the moment whose cameras are drawn. */
+  constructor(marks, plan, sceneSize, ownCell) {
+    Object.assign(this, { marks, plan, sceneSize, ownCell });
     this.frames = [];
     this.isOn = false;
     marks.add((pen) => this.isOn && this.draw(pen));
@@ -34,8 +35,14 @@ export class Frusta {
     this.isOn = !this.isOn;
     press($("cameras"), this.isOn);
     if (this.isOn) this.load();
-    else say("Cameras are hidden.");
+    else this.hide();
     this.marks.redraw();
+  }
+
+  hide() {
+    clearTimeout(this.timer);
+    this.asked?.abort();
+    say("Cameras are hidden.");
   }
 
   /** A plan is in force, perhaps with other cameras. */
@@ -49,7 +56,7 @@ export class Frusta {
     this.asked?.abort();
     const { signal } = (this.asked = new AbortController());
     try {
-      const { frames } = await requestJson("cameras.json", new URLSearchParams({ scene: this.scene() }), signal);
+      const { frames } = await requestJson("cameras.json", new URLSearchParams(this.plan()), signal);
       this.frames = frames;
       say(`${frames.length} sample cameras are shown.`);
       this.marks.redraw();

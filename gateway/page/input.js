@@ -25,7 +25,10 @@ export class Input {
     on("wheel", this.wheel, { passive: false });
     on("contextmenu", (event) => event.preventDefault());
     on("keydown", this.keydown);
-    on("keyup", (event) => this.held.delete(event.key.toLowerCase()));
+    on("keyup", (event) => {
+      this.isFast = event.shiftKey;
+      this.held.delete(event.key.toLowerCase());
+    });
     on("blur", () => this.held.clear());
   }
 
@@ -86,11 +89,11 @@ export class Input {
   }
 
   keydown(event) {
+    this.isFast = event.shiftKey;
     if (event.ctrlKey || event.metaKey || event.altKey || event.key === "Tab") return;
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     if (this.isFlying() && FLY_KEYS[key]) {
       event.preventDefault();
-      this.isFast = event.shiftKey;
       if (!this.held.has(key)) this.startFlying(key, event.timeStamp);
     } else if (key.startsWith("Arrow") || ["+", "=", "-"].includes(key)) {
       event.preventDefault();
@@ -106,6 +109,7 @@ export class Input {
     this.isStepping = true;
     let last = eventTime;
     const step = (now) => {
+      if (!this.isFlying()) this.held.clear();
       this.isStepping = this.held.size > 0;
       if (!this.isStepping) return;
       const along = [...this.held].reduce((sum, k) => sum.map((v, i) => v + FLY_KEYS[k][i]), [0, 0, 0]);

@@ -4,12 +4,14 @@ import { refusal } from "./api.js";
 
 const FIRST_DELAY_MS = 250;
 const LONGEST_DELAY_MS = 4000;
+/** The gateway says every other second that it is there. */
+const SILENCE_MS = 20000;
 
-/** Splits a picture's message into its header and its bytes. */
-export function parsePicture(buffer) {
+/** Splits a binary message into its header, which a further part of a picture lacks, and its bytes. */
+export function parsePart(buffer) {
   const headerBytes = new DataView(buffer).getUint32(0, true);
-  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, headerBytes)));
-  return { header, data: new Uint8Array(buffer, 4 + headerBytes), bytes: buffer.byteLength };
+  const header = headerBytes ? JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, headerBytes))) : null;
+  return { header, data: new Uint8Array(buffer, 4 + headerBytes) };
 }
 
 /** The delay before the n-th attempt to connect again, with jitter, in milliseconds. */
@@ -28,6 +30,7 @@ export class Link {
   }
 
   connect() {
+    this.hear();
     const socket = new WebSocket(this.url, "myriorama.v1");
     socket.binaryType = "arraybuffer";
     this.socket = socket;
@@ -39,11 +42,18 @@ export class Link {
     socket.onclose = () => socket === this.socket && this.lost();
   }
 
+  /** A connection without a word has gone, even if the browser knows nothing of it. */
+  hear() {
+    clearTimeout(this.silence);
+    this.silence = setTimeout(() => {
+      this.listeners.closed();
+      this.open(this.scene);
+    }, SILENCE_MS);
+  }
+
   receive(data) {
-    if (typeof data !== "string") {
-      this.listeners.picture(parsePicture(data));
-      return;
-    }
+    this.hear();
+    if (typeof data !== "string") return this.receivePart(parsePart(data), data.byteLength);
     const message = JSON.parse(data);
     if (message.type === "welcome") {
       this.attempt = 0;
@@ -53,7 +63,19 @@ export class Link {
     this.listeners.message(message);
   }
 
+  /** A picture is complete with its last part; a header begins another one. */
+  receivePart({ header, data }, bytes) {
+    if (header) this.picture = { header, data: [], bytes: 0, left: header.bytes };
+    const picture = this.picture;
+    picture.data.push(data);
+    picture.bytes += bytes;
+    picture.left -= data.byteLength;
+    if (picture.left > 0) this.send({ type: "received" });
+    else this.listeners.picture(picture);
+  }
+
   async lost() {
+    clearTimeout(this.silence);
     const { socket, isWelcome } = this;
     this.isWelcome = false;
     if (this.isRefused) return;
@@ -67,7 +89,7 @@ export class Link {
     this.attempt += 1;
   }
 
-  /** Shows another scene. */
+  /** Connects again, to this scene. */
   open(scene) {
     this.scene = scene;
     clearTimeout(this.timer);

@@ -3,7 +3,7 @@
 import { within } from "./api.js";
 import * as camera from "./camera.js";
 import { Compare } from "./compare.js";
-import { $, copied, download, on, press, say } from "./dom.js";
+import { $, copied, download, on, press, say, toast, writeAddress } from "./dom.js";
 import { Frusta } from "./frusta.js";
 import { Input } from "./input.js";
 import { Link } from "./link.js";
@@ -19,8 +19,6 @@ import { Poses } from "./poses.js";
 import { Screen } from "./screen.js";
 import { Statistics } from "./statistics.js";
 
-/** The gateway's default for the largest still. */
-const LARGEST_PX = [1920, 1080];
 const COMMANDS = {
   r: "reset", f: "fit", v: "mode", s: "show-statistics", h: "show-keys", p: "provenance", d: "depth", o: "cameras", m: "measure",
   c: "compare", " ": "play",
@@ -31,8 +29,8 @@ let welcome = null;
 let plan = null;
 /** The picture on the screen: { header, moment }. */
 let shown = null;
-/** The number of the last pose that came to rest on the screen. */
-let settled = 0;
+/** The last picture that came to rest on the screen: its pose, plan and view cell. */
+let settled = null;
 
 const notices = new Notices();
 const statistics = new Statistics();
@@ -42,6 +40,7 @@ const link = new Link(socketUrl(), {
   picture: (picture) => pictures.received(picture),
   closed: () => notices.waits("reconnecting", "the connection is lost"),
 });
+link.scene = new URLSearchParams(location.search).get("scene");
 const poses = new Poses(link, screen, {
   moved,
   asked: (still) => notices.asked(still),
@@ -56,13 +55,13 @@ const overlays = new Overlays(restView);
 const compare = new Compare(restView, () => playback.pause());
 const measure = new Measure(marks, view);
 const pivot = new Pivot(poses, view);
-const frusta = new Frusta(marks, () => welcome.scene, () => poses.state.size, () => shown?.header.cell);
+const frusta = new Frusta(marks, () => ({ scene: welcome.scene, moment: poses.moment ?? 0 }), () => poses.state.size, () => shown?.header.cell);
 const panels = new Panels(() => statistics.rows(performance.now(), plan, welcome?.light_steps ?? 1), () => statistics.csv());
 const isFlying = () => poses.state?.isFlying ?? false;
 new Input($("picture"), { change: steer, command, click, doubleClick: (place) => measure.isOn || pivot.at(place), isFlying });
 // For tests and for the curious.
 window.myriorama = {
-  statistics, screen, link, camera, poses, overlays, measure, compare, frusta, playback, panels, view,
+  statistics, screen, link, camera, measure, view,
   state: () => poses.state, number: () => poses.number, shown: () => pictures.shownNumber,
 };
 $("picture").focus();
@@ -70,7 +69,6 @@ $("picture").focus();
 function socketUrl() {
   const url = new URL("api/v1/socket", document.baseURI);
   url.protocol = url.protocol.replace("http", "ws");
-  url.hash = "";
   return url.href;
 }
 
@@ -82,26 +80,47 @@ function heard(message) {
 }
 
 function begin(message) {
-  if (message.version !== version && sessionStorage.getItem("reloaded") !== message.version) {
-    sessionStorage.setItem("reloaded", message.version);
-    location.reload();
-    return;
+  if (message.version !== version) {
+    if (mayReload(message.version)) return location.reload();
+    toast(`This page is of version ${version}, its server of ${message.version}.`);
   }
   const isNew = welcome?.scene !== message.scene;
   welcome = message;
   document.title = `${message.scene} – Myriorama`;
   $("scene").replaceChildren(...message.scenes.map((name) => new Option(name, name, false, name === message.scene)));
   $("scene").hidden = message.scenes.length < 2;
+  nameScene(message);
   if (isNew) enter(message);
   playback.begin(message, isNew);
   // Numbers begin again with each connection.
-  settled = 0;
+  settled = null;
   pictures.restart();
   poses.restart();
 }
 
+/** Whether the page may load itself again for a server of another version: once. */
+function mayReload(server) {
+  try {
+    if (sessionStorage.getItem("reloaded") === server) return false;
+    sessionStorage.setItem("reloaded", server);
+    return true;
+  } catch {
+    // Without storage, the page would load itself for ever.
+    return false;
+  }
+}
+
+/** A link to one of several scenes names it. */
+function nameScene({ scene, scenes }) {
+  const url = new URL(location.href);
+  if (scenes.length < 2 || url.searchParams.get("scene") === scene) return;
+  url.searchParams.set("scene", scene);
+  writeAddress(url);
+}
+
 /** Another scene: nothing that was shown belongs to it. */
 function enter({ home, bounds }) {
+  pivot.cancel();
   const linked = poses.state ? null : camera.fromFragment(location.hash);
   poses.state = camera.fromCamera(linked ?? home, sizeOf(bounds), isFlying());
   [shown, plan] = [null, null];
@@ -136,10 +155,10 @@ function resized() {
   poses.again();
 }
 
-function showsPicture(header, moment) {
+function showsPicture(header, moment, receivedAt) {
   shown = { header, moment };
   const isSharp = header.size_px.every((side, axis) => side === screen.size[axis]);
-  notices.shows(header, { isNewest: header.number === poses.number, isSharp, lightSteps: welcome?.light_steps ?? 1 });
+  notices.shows(header, { isNewest: header.number === poses.number, isSharp, lightSteps: welcome.light_steps, receivedAt });
   marks.redraw();
   settle();
 }
@@ -151,8 +170,12 @@ function isAtRest() {
 }
 
 function settle() {
-  if (!isAtRest() || settled === poses.number) return;
-  settled = poses.number;
+  if (!isAtRest()) return;
+  // A pose may have stills of several plans and view cells.
+  const { number, set, cell, neighbour } = shown.header;
+  const picture = [number, set.split(".")[0], cell, neighbour].join(" ");
+  if (settled === picture) return;
+  settled = picture;
   overlays.rested();
   compare.rested();
 }
@@ -161,7 +184,7 @@ function settle() {
 function view() {
   if (!shown) return null;
   const { header, moment } = shown;
-  const size = header.still ? header.size_px : within(screen.size, LARGEST_PX);
+  const size = header.still ? header.size_px : within(screen.size, welcome.max_still_px);
   return { scene: welcome.scene, camera: header.camera, size, moment };
 }
 
@@ -199,7 +222,7 @@ on("copy-camera", (button) => poses.state && copied(button, JSON.stringify(camer
 on("save", async () => shown && download(await screen.png(), `${welcome.scene}.png`));
 $("scene").addEventListener("change", (event) => link.open(event.target.value));
 $("lossless").addEventListener("change", () => poses.again());
-document.addEventListener("visibilitychange", () => !document.hidden && poses.again());
+document.addEventListener("visibilitychange", () => !document.hidden && !(poses.number && isAtRest()) && poses.again());
 addEventListener("keydown", (event) => event.key === "Escape" && escape());
 addEventListener("hashchange", () => {
   const linked = camera.fromFragment(location.hash);

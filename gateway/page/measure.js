@@ -74,7 +74,7 @@ export class Measure {
     if (!view) return;
     this.asked?.abort();
     const { signal } = (this.asked = new AbortController());
-    this.tell("Asked…");
+    this.tell("Loading…");
     try {
       this.taken(await pointAt(view, place, signal));
     } catch (error) {

@@ -6,18 +6,25 @@ const BANNER_AFTER_MS = 400;
 const LATE_MS = 5000;
 
 export class Notices {
+  waitsSince = 0;
+
   /** A pose has left: pictures that stay away are late. */
   asked(still) {
-    if (!still) this.badge("moving");
+    if (!still && $("banner").hidden) this.badge("moving");
     this.expect();
   }
 
   expect() {
-    this.late ??= setTimeout(() => $("banner").hidden && this.tell("waiting", "pictures are late"), LATE_MS);
+    this.late ??= setTimeout(() => {
+      this.late = null;
+      if ($("banner").hidden && !this.banner) this.tell("waiting", "pictures are late");
+    }, LATE_MS);
   }
 
   /** A picture is on the screen; `isNewest` says whether no pose has followed. */
-  shows(header, { isNewest, isSharp, lightSteps }) {
+  shows(header, { isNewest, isSharp, lightSteps, receivedAt }) {
+    // It was on its way before the reason that there are none.
+    if (receivedAt < this.waitsSince) return;
     this.stop();
     if (!isNewest) this.expect();
     $("banner").hidden = true;
@@ -39,6 +46,7 @@ export class Notices {
   /** Says why there are no pictures, unless there soon are; the last one stays, greyed. */
   waits(stage, detail) {
     this.reason = [stage, detail];
+    this.waitsSince = performance.now();
     this.banner ??= setTimeout(() => this.tell(...this.reason), $("banner").hidden ? BANNER_AFTER_MS : 0);
   }
 

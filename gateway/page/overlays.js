@@ -33,7 +33,7 @@ export class Overlays {
     this.hide();
     $("legend").hidden = !this.kind;
     $("entries").replaceChildren();
-    if (!this.kind) return say(`${NAMES[kind] ?? "The overlay"} is hidden.`);
+    if (!this.kind) return say(`${NAMES[kind]} is hidden.`);
     $("legend-name").textContent = NAMES[this.kind];
     this.tell("Shown when the camera rests.");
     this.rested();
@@ -65,7 +65,7 @@ export class Overlays {
     if (!this.kind || !view) return;
     this.asked?.abort();
     const { signal } = (this.asked = new AbortController());
-    this.tell("Asked…");
+    this.tell("Loading…");
     try {
       await this.load(view, this.kind, signal);
     } catch (error) {

@@ -12,13 +12,10 @@ function toggle(button) {
   return isOpen;
 }
 
-/** A panel with a button of its own to close it, which gives the focus back. */
+/** A panel with a button of its own to close it. */
 function panel(name, opened = () => {}) {
   on(`show-${name}`, (button) => opened(toggle(button)));
-  on(`${name}-close`, () => {
-    $(`show-${name}`).click();
-    $("picture").focus();
-  });
+  on(`${name}-close`, () => $(`show-${name}`).click());
 }
 
 /** A row of the statistics; a text takes the whole width. */
@@ -36,6 +33,11 @@ function keepFocus(event) {
   if (button && event.detail > 0 && !isTaken) $("picture").focus();
 }
 
+/** A button that has vanished gives the focus back. */
+function giveBackFocus(event) {
+  if (event.target.closest(".close, #measure-clear")) $("picture").focus();
+}
+
 export class Panels {
   /** `rows()` gives the statistics' rows: [name, value, kind]. */
   constructor(rows, csv) {
@@ -44,6 +46,7 @@ export class Panels {
     panel("keys");
     on("more", (button) => button.setAttribute("aria-expanded", String(button.getAttribute("aria-expanded") === "false")));
     on("export", () => download(new Blob([csv()], { type: "text/csv" }), "pictures.csv"));
+    document.querySelector(".docks").addEventListener("click", giveBackFocus);
     document.querySelector("footer").addEventListener("click", keepFocus);
   }
 

@@ -3,7 +3,7 @@
 import { Screen } from "./screen.js";
 
 export class Pictures {
-  /** `shows(header, moment)` is called after each picture on the screen. */
+  /** `shows(header, moment, receivedAt)` is called after each picture on the screen. */
   constructor(link, screen, poses, statistics, shows) {
     Object.assign(this, { link, screen, poses, statistics, shows });
     this.lastDecoded = Promise.resolve();
@@ -35,17 +35,19 @@ export class Pictures {
     if (drop) bitmap?.close();
     else this.screen.show(bitmap, header);
     const pose = this.poses.answered(header.number);
-    const { posedAt, sentAt } = pose ?? { posedAt: times.receivedAt, sentAt: times.receivedAt };
+    // The gateway asks for a repeat by itself.
+    const askedAt = times.receivedAt - header.times_ms.gateway;
+    const { posedAt, sentAt } = pose ?? { posedAt: askedAt, sentAt: askedAt };
     const shown = { header, bytes, isRepeat: !pose, posedAt, sentAt, ...times, paintedAt: performance.now() };
     const age = drop ? this.statistics.dropped(drop, shown) : this.statistics.add(shown);
     // A picture that is dropped gives back its credit, too.
     this.link.send({ type: "shown", number: header.number, age_ms: Math.max(0, age) });
-    if (!drop) this.showed(header, pose);
+    if (!drop) this.showed(header, pose, times.receivedAt);
   }
 
-  showed(header, pose) {
+  showed(header, pose, receivedAt) {
     this.shownNumber = header.number;
     if (pose) this.moment = pose.moment;
-    this.shows(header, this.moment);
+    this.shows(header, this.moment, receivedAt);
   }
 }

@@ -1,6 +1,6 @@
 // The time of an animated scene: play, pause and a slider. While it plays, each animation frame asks for the moment of the clock.
 
-import { $, on, press, say } from "./dom.js";
+import { $, on, say } from "./dom.js";
 
 export class Playback {
   constructor(poses) {
@@ -67,7 +67,6 @@ export class Playback {
 
   label(text, spoken) {
     $("play").firstChild.textContent = text;
-    press($("play"), this.isPlaying);
     say(spoken);
   }
 

@@ -1,6 +1,7 @@
 // Poses: the newest counts, and one that rests is asked for without loss.
 
 import * as camera from "./camera.js";
+import { writeAddress } from "./dom.js";
 
 const REST_MS = 150;
 const POSE_MS = 8;
@@ -39,7 +40,8 @@ export class Poses {
     const isSame = camera.isSame(next, this.state);
     if (isSame && next.isFlying === this.state.isFlying) return;
     this.state = next;
-    if (!isSame) this.hooks.moved();
+    if (isSame) return;
+    this.hooks.moved();
     this.pose(eventTime);
   }
 
@@ -103,7 +105,7 @@ export class Poses {
   rest() {
     if (!this.state) return;
     if (this.poseTimer) this.ask(false);
-    history.replaceState(null, "", camera.toFragment(this.state));
+    writeAddress(camera.toFragment(this.state));
     if (this.hooks.isPlaying()) return;
     if (this.hooks.isLossless()) this.ask(true);
     this.isResting = true;

@@ -5,7 +5,7 @@ export class Screen {
     this.canvas = canvas;
     this.context = canvas.getContext("2d", { alpha: false });
     this.size = [0, 0];
-    new ResizeObserver((entries) => {
+    const observer = new ResizeObserver((entries) => {
       const entry = entries[entries.length - 1];
       const exact = entry.devicePixelContentBoxSize?.[0];
       const ratio = window.devicePixelRatio;
@@ -15,12 +15,18 @@ export class Screen {
       if (size[0] === this.size[0] && size[1] === this.size[1]) return;
       this.size = size;
       onResize();
-    }).observe(canvas);
+    });
+    try {
+      // The device's pixels change with the monitor, too.
+      observer.observe(canvas, { box: "device-pixel-content-box" });
+    } catch {
+      observer.observe(canvas);
+    }
   }
 
   /** Decodes a picture without a change of its colours. */
   static decode({ header, data }) {
-    const blob = new Blob([data], { type: header.media_type });
+    const blob = new Blob(data, { type: header.media_type });
     return createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
   }
 

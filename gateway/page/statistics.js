@@ -27,8 +27,9 @@ function ms(value) {
 function ratesOf(recent, last) {
   const seconds = WINDOW_MS / 1000;
   const sum = recent.reduce((bytes, picture) => bytes + picture.bytes, 0);
+  const poses = recent.filter((picture) => !picture.isRepeat);
   return [
-    ["pictures a second", (recent.length / seconds).toFixed(1)],
+    ["pictures a second", (poses.length / seconds).toFixed(1)],
     ["kB a second", (sum / seconds / 1000).toFixed(0)],
     ["size", last.header.size_px.join("×")],
     ["quality", last.header.jpeg_quality ? `JPEG, ${last.header.jpeg_quality} of 100` : "lossless"],
@@ -37,7 +38,7 @@ function ratesOf(recent, last) {
 }
 
 function agesOf(recent) {
-  const moving = recent.filter((picture) => !picture.header.still);
+  const moving = recent.filter((picture) => !picture.header.still && !picture.isRepeat);
   const ages = moving.map((picture) => picture.age);
   const median = (name) => quantile(moving.map((picture) => picture.parts[name]), 0.5);
   return [
@@ -87,7 +88,7 @@ export class Statistics {
 
   /** Rows of name and value; a third entry says that a row is a "part" of the one above, or a "text". */
   rows(now, plan, lightSteps) {
-    const recent = this.pictures.filter((picture) => now - picture.paintedAt < WINDOW_MS && !picture.isRepeat);
+    const recent = this.pictures.filter((picture) => now - picture.paintedAt < WINDOW_MS);
     const last = this.pictures[this.pictures.length - 1];
     if (!last) return [["pictures", "none yet"]];
     const origin = originOf(last.header, lightSteps);
@@ -104,8 +105,8 @@ export class Statistics {
   }
 
   csv() {
-    const names = ["number", "still", "width_px", "height_px", "jpeg_quality", "bytes", "rtt_ms", "age_ms", ...PARTS.map((part) => `${part}_ms`)];
-    const row = (p) => [p.header.number, p.header.still, ...p.header.size_px, p.header.jpeg_quality ?? "", p.bytes, p.header.rtt_ms?.toFixed(3) ?? "", p.age.toFixed(3),
+    const names = ["number", "still", "repeat", "width_px", "height_px", "jpeg_quality", "bytes", "rtt_ms", "age_ms", ...PARTS.map((part) => `${part}_ms`)];
+    const row = (p) => [p.header.number, p.header.still, p.isRepeat, ...p.header.size_px, p.header.jpeg_quality ?? "", p.bytes, p.header.rtt_ms?.toFixed(3) ?? "", p.age.toFixed(3),
       ...PARTS.map((part) => p.parts[part].toFixed(3))];
     return [names, ...this.pictures.map(row)].map((fields) => fields.join(",")).join("\n") + "\n";
   }

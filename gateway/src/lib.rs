@@ -14,6 +14,7 @@ mod http;
 mod kept_session;
 mod origin;
 mod page;
+mod parts;
 mod picture_stream;
 mod protocol;
 mod rate;

@@ -10,6 +10,7 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 
 use crate::gateway::Gateway;
+use crate::parts::Parts;
 use crate::protocol::{self, FromPage, ToPage};
 
 /// The first message is due by then.
@@ -24,8 +25,8 @@ const SILENCE: Duration = Duration::from_secs(20);
 const MAX_MESSAGES_PER_S: f64 = 240.0;
 /// Messages that a page may send at once: those of some seconds, as after a stall of the link.
 const MAX_BURST: f64 = 4.0 * MAX_MESSAGES_PER_S;
-/// Messages on their way to the page. Pictures among them are bounded by their credits.
-const OUTGOING: usize = 32;
+/// Messages on their way to the page. Pictures among them are bounded by their credits, and parts of stills by the link.
+const OUTGOING: usize = 96;
 /// The delay before a view that has failed is begun anew.
 const AFTER_FAILURE: Duration = Duration::from_millis(250);
 
@@ -48,6 +49,7 @@ pub(crate) struct Page {
     pub(crate) started: Instant,
     /// The least round trip so far.
     pub(crate) rtt_s: Option<f64>,
+    stills: Parts,
     pings: tokio::time::Interval,
 }
 
@@ -67,6 +69,7 @@ pub(crate) async fn with_page(
         heard: now,
         started: now,
         rtt_s: None,
+        stills: Parts::default(),
         pings: tokio::time::interval(PING),
     };
     let mut writer = JoinSet::new();
@@ -109,13 +112,18 @@ impl Page {
                         return Err(End::Gone);
                     }
                     self.ping()?;
+                    self.tell(&ToPage::Alive)?;
                     continue;
                 }
             };
             self.count(Instant::now())?;
             match message {
                 Message::Text(text) => {
-                    return serde_json::from_str(&text).map_err(|error| End::Refused(format!("message: {error}")));
+                    let message = serde_json::from_str(&text);
+                    match message.map_err(|error| End::Refused(format!("message: {error}")))? {
+                        FromPage::Received {} => self.go_on()?,
+                        message => return Ok(message),
+                    }
                 }
                 Message::Binary(_) => return Err(End::Refused("message: binary, must be JSON text".to_owned())),
                 Message::Pong(sent) => self.learn_round_trip(&sent),
@@ -123,6 +131,37 @@ impl Page {
                 Message::Close(_) => return Err(End::Gone),
             }
         }
+    }
+
+    /// Sends further parts of a still.
+    fn go_on(&mut self) -> Result<(), End> {
+        // Until the round trip is known, the link is taken for a fast one.
+        if !self.stills.received(self.heard, self.rtt_s.unwrap_or(0.0)) {
+            return Err(End::Refused("type: received, but no part is on its way".to_owned()));
+        }
+        // Answers to parts are as many as the parts.
+        self.allowance += 1.0;
+        while let Some(part) = self.stills.next(self.heard) {
+            self.send(Message::Binary(protocol::continued(&part)))?;
+        }
+        Ok(())
+    }
+
+    /// Sends a picture in motion, which ends a still that is on its way.
+    pub(crate) fn send_moving(&mut self, message: Bytes) -> Result<(), End> {
+        self.stills.end();
+        self.send(Message::Binary(message))
+    }
+
+    /// Sends a still in parts, until a pose ends it.
+    pub(crate) fn send_still(&mut self, message: Bytes) -> Result<(), End> {
+        let first = self.stills.begin(message, Instant::now());
+        self.send(Message::Binary(first))
+    }
+
+    /// A still that is on its way is of an earlier pose.
+    pub(crate) fn end_still(&mut self) {
+        self.stills.end();
     }
 
     fn count(&mut self, now: Instant) -> Result<(), End> {
@@ -158,7 +197,7 @@ impl Page {
     }
 
     /// Lets a moment pass before another attempt; `hear` takes the messages of that time.
-    pub(crate) async fn pause(&mut self, hear: impl FnMut(&Self, FromPage) -> Result<(), End>) -> Result<(), End> {
+    pub(crate) async fn pause(&mut self, hear: impl FnMut(&mut Self, FromPage) -> Result<(), End>) -> Result<(), End> {
         self.hearing(tokio::time::sleep(AFTER_FAILURE), hear).await
     }
 
@@ -166,7 +205,7 @@ impl Page {
     pub(crate) async fn hearing<T>(
         &mut self,
         other: impl Future<Output = T>,
-        mut hear: impl FnMut(&Self, FromPage) -> Result<(), End>,
+        mut hear: impl FnMut(&mut Self, FromPage) -> Result<(), End>,
     ) -> Result<T, End> {
         tokio::pin!(other);
         loop {
@@ -189,7 +228,7 @@ impl Page {
     }
 
     /// A page that reads nothing has no room after a while.
-    pub(crate) fn send(&self, message: Message) -> Result<(), End> {
+    fn send(&self, message: Message) -> Result<(), End> {
         self.outgoing.try_send(message).map_err(|_| End::Gone)
     }
 }

@@ -125,6 +125,7 @@ impl PictureStream {
             jpeg_quality,
             rtt_ms: about.rtt_s.map(|rtt_s| rtt_s * 1000.0),
             size_px: size_px.to_array(),
+            bytes: header.color_bytes as usize,
             camera: asked.pose.camera,
             set: header.sample_set_id.to_string(),
             cell: header.cell,

@@ -1,4 +1,4 @@
-//! Messages between a page and the gateway: JSON text, and pictures as one binary message each. `docs/viewer-protocol.md` has
+//! Messages between a page and the gateway: JSON text, and pictures as binary messages. `docs/viewer-protocol.md` has
 //! them for clients in other languages.
 
 use bytes::{BufMut as _, Bytes, BytesMut};
@@ -26,6 +26,8 @@ pub(crate) enum FromPage {
         /// From the input event to the screen.
         age_ms: f64,
     },
+    /// A part of a picture has arrived, and others follow.
+    Received {},
 }
 
 /// A pose of the visitor's camera.
@@ -67,7 +69,11 @@ pub(crate) enum ToPage {
         moments: u32,
         /// The time between two moments.
         moment_step_s: f64,
+        /// Columns and rows of the largest still.
+        max_still_px: [u32; 2],
     },
+    /// The connection is alive, from time to time.
+    Alive,
     /// Why there are no pictures at the moment.
     Waiting {
         /// `full`, `connecting`, `measuring`, `planning`, `preparing` or `reconnecting`.
@@ -104,6 +110,8 @@ pub(crate) struct PictureHeader {
     pub(crate) jpeg_quality: Option<u8>,
     /// Columns and rows.
     pub(crate) size_px: [u32; 2],
+    /// The length of its file.
+    pub(crate) bytes: usize,
     /// The least round trip to the page so far, once it is known.
     pub(crate) rtt_ms: Option<f64>,
     /// The camera that it shows.
@@ -164,6 +172,11 @@ pub(crate) fn picture(header: &PictureHeader, data: &[u8]) -> Bytes {
     message.freeze()
 }
 
+/// A further part of a picture: no header, and its bytes.
+pub(crate) fn continued(part: &[u8]) -> Bytes {
+    [&0_u32.to_le_bytes(), part].concat().into()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -200,6 +213,7 @@ mod tests {
             media_type: "image/jpeg",
             jpeg_quality: Some(70),
             size_px: [32, 18],
+            bytes: 4,
             rtt_ms: None,
             camera: CAMERA,
             set: "4.0".to_owned(),

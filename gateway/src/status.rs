@@ -16,18 +16,21 @@ use crate::responses::{Refusal, as_json};
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct SceneQuery {
+pub(crate) struct CamerasQuery {
     scene: Option<String>,
+    #[serde(default)]
+    moment: u32,
 }
 
 /// `cameras.json`: the sample cameras of a scene's plan, as a `transforms.json` has them, each with its view cell.
 pub(crate) async fn cameras(
     State(gateway): State<Arc<Gateway>>,
-    Query(query): Query<SceneQuery>,
+    Query(query): Query<CamerasQuery>,
 ) -> Result<Response, Refusal> {
     let scene = gateway.scenes.visit(query.scene.as_deref()).await?;
-    let _visit = scene.shown.visits.begin();
-    let workload = scene.shown.opened().await?.plan().assignment.workload;
+    let shown = scene.session_of(query.moment);
+    let _visit = shown.visits.begin();
+    let workload = shown.opened().await?.plan().assignment.workload;
     let cells = (0..workload.cell_count()).filter_map(|cell| Some((cell, workload.cameras_of_cell(cell)?)));
     let frames: Vec<Value> = cells
         .flat_map(|(cell, cameras)| workload.sample_cameras[cameras].iter().map(move |camera| (cell, camera)))

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use axum::extract::ws::{Message, WebSocket};
+use axum::extract::ws::WebSocket;
 use client::{ClientError, ClientId, EncodedFrame, Session};
 use cluster::{Assignment, Policy, SessionPlan};
 use codec::FrameCodec;
@@ -43,6 +43,7 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
         light_steps: scene.shown.light_steps,
         moments: scene.timeline().set_count,
         moment_step_s: scene.timeline().step_s,
+        max_still_px: gateway.config.max_still_px.to_array(),
         bounds: [scene.offer.volume.min, scene.offer.volume.max].map(|corner| scene.space.in_source(corner)),
     })?;
     let mut visitor = Visitor {
@@ -210,10 +211,10 @@ impl Visitor {
     }
 
     /// Takes a pose.
-    fn hear(&mut self, page: &Page, message: FromPage) -> Result<(), End> {
+    fn hear(&mut self, page: &mut Page, message: FromPage) -> Result<(), End> {
         match message {
             FromPage::Open { .. } => Err(End::Refused("type: open comes once".to_owned())),
-            FromPage::Shown { .. } => Ok(()),
+            FromPage::Shown { .. } | FromPage::Received {} => Ok(()),
             FromPage::Pose(pose) => {
                 let last = self.newest.map_or(0, |newest| newest.number);
                 if pose.number <= last {
@@ -228,6 +229,7 @@ impl Visitor {
                 checked.map_err(|error| End::Refused(error.to_string()))?;
                 self.rate.fit(canvas_px);
                 self.newest = Some(pose);
+                page.end_still();
                 // A scene that moves passes its first moment, too.
                 self.is_moving = pose.moment > 0 || self.is_moving && !pose.still;
                 self.kept(&self.scene).visits.moved(self.number, page.heard);
@@ -254,7 +256,7 @@ impl Visitor {
     /// Passes a picture on, unless a later one was sent, or it is a still of an earlier pose.
     fn forward(
         &mut self,
-        page: &Page,
+        page: &mut Page,
         session: &Session,
         stream: &mut PictureStream,
         frame: EncodedFrame,
@@ -275,7 +277,12 @@ impl Visitor {
         let is_own_cell = !frame.header.is_neighbour_cell;
         let is_near = !asked.pose.still || is_near(&plan, &frame);
         let about = About { light_step: shown + 1, is_own_cell: is_own_cell && is_near, rtt_s: page.rtt_s };
-        page.send(Message::Binary(stream.message(&frame, &asked, about)))?;
+        let message = stream.message(&frame, &asked, about);
+        if asked.pose.still {
+            page.send_still(message)?
+        } else {
+            page.send_moving(message)?
+        }
         if asked.pose.still && plan.policy != Policy::Direct && !self.is_moving {
             // Another cell's light begins anew.
             self.light_step = if is_own_cell { self.light_step.max(shown) } else { 0 };

@@ -116,6 +116,7 @@ impl Visitor {
     async fn next_text(&mut self) -> Value {
         loop {
             match self.next().await.expect("no end") {
+                Message::Text(text) if text.contains("alive") => (),
                 Message::Text(text) => return serde_json::from_str(&text).unwrap(),
                 Message::Close(reason) => panic!("closed: {reason:?}"),
                 _ => (),
@@ -128,11 +129,19 @@ impl Visitor {
     }
 
     async fn next_picture(&mut self) -> Picture {
+        let mut picture = Picture { header: Value::Null, data: Vec::new() };
         loop {
             if let Message::Binary(message) = self.next().await.expect("no end") {
                 let (length, rest) = message.split_at(4);
                 let (header, data) = rest.split_at(u32::from_le_bytes(length.try_into().unwrap()) as usize);
-                return Picture { header: serde_json::from_slice(header).unwrap(), data: data.to_vec() };
+                if !header.is_empty() {
+                    picture = Picture { header: serde_json::from_slice(header).unwrap(), data: Vec::new() };
+                }
+                picture.data.extend(data);
+                if picture.data.len() as u64 == picture.header["bytes"].as_u64().unwrap() {
+                    return picture;
+                }
+                self.tell(&json!({ "type": "received" })).await;
             }
         }
     }

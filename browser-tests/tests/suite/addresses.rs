@@ -48,5 +48,7 @@ async fn a_page_works_under_a_path_of_another_server() {
     let still = visit.settled().await;
     let canvas = visit.canvas().await;
     assert!(canvas.srgb8 == bench.reference(&still.header.camera.into(), canvas.size_px).await);
+    visit.press('d').await;
+    visit.until("!document.getElementById('overlay').hidden").await;
     visit.end(Expected::NoError).await;
 }

@@ -72,7 +72,7 @@ async fn every_control_has_a_name_for_screen_readers() {
     let nameless: Vec<_> = controls.iter().filter(|node| node.name.trim().is_empty()).collect();
     assert!(nameless.is_empty(), "{nameless:#?}");
     assert_eq!(controls.len(), visit.browser.value::<Vec<String>>(CONTROLS).await.unwrap().len(), "{controls:#?}");
-    let pictures: Vec<_> = controls.iter().filter(|node| ["image", "img"].contains(&&*node.role)).collect();
+    let pictures: Vec<_> = controls.iter().filter(|node| node.role == "application").collect();
     assert_eq!(pictures.len(), 1, "the canvas: {controls:#?}");
     let buttons: BTreeSet<_> = controls.iter().filter(|node| node.role == "button").map(|node| &node.name).collect();
     let all = controls.iter().filter(|node| node.role == "button").count();

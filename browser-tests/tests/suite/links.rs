@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use browser::View;
 use browser::input::Drag;
 use browser_tests::visit::{Expected, Picture, SOON, Visit};
 use network_proxy::{Proxy, Way};
@@ -35,7 +36,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 fn last_height_px(pictures: &[Picture]) -> u32 {
-    pictures.last().unwrap().header.size_px[1]
+    pictures.last().map_or(0, |picture| picture.header.size_px[1])
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -44,7 +45,7 @@ async fn a_slow_link_has_small_pictures_and_a_freed_one_larger_ones() {
     let proxy = Proxy::to(&bench.gateway.address, 1);
     let slow = Way::Link { bytes_per_s: BYTES_PER_S, delay: DELAY };
     proxy.set(slow, slow);
-    let visit = Visit::to(&proxy.address).await;
+    let visit = Visit::alone(&proxy.address, View::default()).await;
     visit.settled().await;
     drag_for(&visit, Duration::from_secs(4)).await;
     let pictures = drag_for(&visit, Duration::from_secs(6)).await;
@@ -59,6 +60,39 @@ async fn a_slow_link_has_small_pictures_and_a_freed_one_larger_ones() {
     while last_height_px(&drag_for(&visit, Duration::from_secs(1)).await) <= small_px {
         assert!(start.elapsed() < SOON, "pictures stay at {small_px} rows");
     }
+    visit.settled().await;
+    visit.end(Expected::NoError).await;
+}
+
+/// 200 kbit/s.
+const SLOW_BYTES_PER_S: f64 = 25e3;
+/// The bytes of a still that takes the slow link for seconds, and its part that is there when a drag begins.
+const STILL_BYTES: u64 = 100_000;
+const BEGUN_BYTES: u64 = 30_000;
+/// Two parts of the still, the picture, and the round trip; as much again for a busy machine.
+const FIRST_MOVE: Duration = Duration::from_secs(3);
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_still_on_a_slow_link_ends_for_a_drag() {
+    let (bench, _) = gateway().await;
+    let proxy = Proxy::to(&bench.gateway.address, 1);
+    let visit = Visit::alone(&proxy.address, View { size_px: [1600, 1000], ..View::default() }).await;
+    visit.settled().await;
+    let slow = Way::Link { bytes_per_s: SLOW_BYTES_PER_S, delay: DELAY };
+    proxy.set(slow, slow);
+    visit.browser.drag(&Drag::along(to_and_fro([200.0, 200.0], 10))).await.unwrap();
+    let begun = format!(
+        "(({{ header, left }}) => header.still && left > 0 && header.bytes - left > {BEGUN_BYTES})(myriorama.link.picture)"
+    );
+    visit.until(&begun).await;
+    let bytes: u64 = visit.browser.value("myriorama.link.picture.header.bytes").await.unwrap();
+    assert!(bytes > STILL_BYTES, "a still of {bytes} bytes");
+    let (start, before) = (Instant::now(), visit.picture_count().await);
+    visit.browser.drag(&Drag::along(to_and_fro([200.0, 200.0], 10))).await.unwrap();
+    visit.until(&format!("myriorama.statistics.pictures.length > {before}")).await;
+    assert!(start.elapsed() < FIRST_MOVE, "{:?}", start.elapsed());
+    assert!(!visit.pictures().await[before].header.still, "the still went on");
+    proxy.heal();
     visit.settled().await;
     visit.end(Expected::NoError).await;
 }

@@ -94,5 +94,6 @@ async fn enter_measures_the_middle_the_sky_has_no_point_and_escape_leaves() {
     let before = visit.state().await;
     visit.click_picture(MIDDLE, 1).await;
     assert_eq!(visit.state().await, before, "a click is no more than a click");
+    assert_eq!(visit.browser.value::<usize>("myriorama.measure.results.length").await.unwrap(), 0);
     visit.end(Expected::NoError).await;
 }

@@ -88,6 +88,7 @@ async fn a_held_key_flies_along_the_view_for_as_long_as_it_is_held() {
     let before = visit.state().await;
     browser.key_down('w').await.unwrap();
     tokio::time::sleep(Duration::from_millis(300)).await;
+    visit.until(&format!("myriorama.state().target[2] !== {}", before.target[2])).await;
     browser.key_up('w').await.unwrap();
     let after = visit.settled().await;
     let (state, [down, up]) = (visit.state().await, browser.value::<[f64; 2]>("window.times").await.unwrap());
@@ -118,6 +119,11 @@ async fn arrows_turn_and_signs_come_closer() {
         expected = expected.closer(factor);
         assert_same(visit.state().await, expected);
     }
+    visit.browser.press('v').await.unwrap();
+    visit.browser.press(Key::Right).await.unwrap();
+    let turned = State { is_flying: true, ..expected }.turned(-0.1, 0.0);
+    assert_same(visit.state().await, turned);
+    assert!(turned.forward().cross(expected.forward()).y > 0.0, "it looks to the right");
     visit.end(Expected::NoError).await;
 }
 

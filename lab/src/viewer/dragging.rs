@@ -26,7 +26,7 @@ const LARGE: [u32; 2] = [640, 360];
 struct Drags {
     per_s: f64,
     age_ms: [f64; 2],
-    /// The greatest difference between an age and the sum of its parts.
+    /// The greatest difference between an age and the sum of its parts, or the greatest time below 0 of a part.
     parts_off_ms: f64,
     bytes: f64,
     detour_ms: f64,
@@ -116,8 +116,11 @@ async fn drags(ground: &Ground, stand: &Stand, size_px: [u32; 2]) -> anyhow::Res
     for _ in 0..ground.repeats {
         page.wait_for_exact(STILL).await?;
         tokio::time::sleep(REST).await;
-        moves.extend(page.drag(FIRST_MOVE_S).await?.first().map(|picture| picture.age_ms));
+        let before = page.picture_count().await?;
+        page.drag(FIRST_MOVE_S).await?;
         page.wait_for_exact(STILL).await?;
+        let first = page.moving_since(before).await?.into_iter().next();
+        moves.push(first.map_or(f64::INFINITY, |picture| picture.age_ms));
         all.push(one_drag(stand, &page).await?);
     }
     let of = |figure: fn(&Drags) -> f64| median(all.iter().map(figure).collect());
@@ -143,7 +146,9 @@ async fn one_drag(stand: &Stand, page: &Page) -> anyhow::Result<Drags> {
     Ok(Drags {
         per_s: found.len() as f64 / (DRAG_S - FOUND_MS / 1000.0),
         age_ms: [0.5, 0.95].map(|share| quantile(of(|picture| picture.age_ms), share)),
-        parts_off_ms: of(|picture| (picture.age_ms - picture.parts_ms).abs()).into_iter().fold(0.0, f64::max),
+        parts_off_ms: of(|picture| (picture.age_ms - picture.parts_ms).abs().max(-picture.least_part_ms))
+            .into_iter()
+            .fold(0.0, f64::max),
         bytes: median(of(|picture| picture.bytes)),
         detour_ms: median(of(|picture| picture.detour_ms)),
         gateway_ms: used_s * 1000.0 / pictures.len() as f64,

@@ -12,9 +12,9 @@ use serde::Deserialize;
 const MOVE: Duration = Duration::from_millis(8);
 /// The page's pictures from an index on.
 const PICTURES: &str = "return window.myriorama.statistics.pictures.slice(arguments[0]).map((p) => ({
-    still: p.header.still, size_px: p.header.size_px, bytes: p.bytes, age_ms: p.age,
+    still: p.header.still, is_repeat: p.isRepeat, size_px: p.header.size_px, bytes: p.bytes, age_ms: p.age,
     painted_ms: p.paintedAt, parts_ms: Object.values(p.parts).reduce((sum, part) => sum + part, 0),
-    detour_ms: p.parts.network + p.parts.forward,
+    least_part_ms: Math.min(...Object.values(p.parts)), detour_ms: p.parts.network + p.parts.forward,
 }))";
 /// Notes the time of the last move of the mouse, and the bytes of the longest pose.
 const WATCH: &str = "window.lastMove = 0;
@@ -33,6 +33,8 @@ const IS_EXACT: &str = "window.myriorama && document.getElementById('badge').dat
 #[derive(Debug, Clone, Deserialize)]
 pub(super) struct Picture {
     pub(super) still: bool,
+    /// Whether its pose was shown before.
+    pub(super) is_repeat: bool,
     pub(super) size_px: [u32; 2],
     pub(super) bytes: f64,
     /// From the input event to the screen.
@@ -40,6 +42,7 @@ pub(super) struct Picture {
     pub(super) painted_ms: f64,
     /// The sum of its age's parts.
     pub(super) parts_ms: f64,
+    pub(super) least_part_ms: f64,
     /// Between page and gateway, and in the gateway after its arrival: a client of gRPC has neither.
     pub(super) detour_ms: f64,
 }
@@ -84,12 +87,19 @@ impl Page {
         Ok(self.browser.run(PICTURES, vec![index.into()]).await?)
     }
 
+    /// The poses' first pictures in motion from an index on.
+    pub(super) async fn moving_since(&self, index: usize) -> anyhow::Result<Vec<Picture>> {
+        let pictures = self.pictures_since(index).await?;
+        Ok(pictures.into_iter().filter(|picture| !picture.still && !picture.is_repeat).collect())
+    }
+
     /// The page's clock, in milliseconds.
     pub(super) async fn now_ms(&self) -> anyhow::Result<f64> {
         Ok(self.browser.value("performance.now()").await?)
     }
 
-    /// Drags for some seconds along an eight around the middle of the upper half, and gives the pictures in motion.
+    /// Drags for some seconds along an eight around the middle of the upper half, and gives the poses' first pictures in motion
+    /// that have come meanwhile.
     pub(super) async fn drag(&self, seconds: f64) -> anyhow::Result<Vec<Picture>> {
         let before = self.picture_count().await?;
         let (start, steps) = (std::time::Instant::now(), (seconds / MOVE.as_secs_f64()).ceil() as usize);
@@ -100,8 +110,7 @@ impl Page {
             self.browser.drag(&Drag { interval: MOVE, ..Drag::along(path) }).await?;
             at += 25;
         }
-        let pictures = self.pictures_since(before).await?;
-        Ok(pictures.into_iter().filter(|picture| !picture.still).collect())
+        self.moving_since(before).await
     }
 
     fn place(&self, step: usize) -> Place {
@@ -126,11 +135,13 @@ mod tests {
     fn a_gap_lasts_to_the_end_where_no_picture_follows() {
         let at = |painted_ms: f64| Picture {
             still: false,
+            is_repeat: false,
             size_px: [1, 1],
             bytes: 0.0,
             age_ms: 0.0,
             painted_ms,
             parts_ms: 0.0,
+            least_part_ms: 0.0,
             detour_ms: 0.0,
         };
         let pictures = [100.0, 400.0, 450.0].map(at);
