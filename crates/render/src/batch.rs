@@ -12,8 +12,8 @@ use crate::{Rate, known_samples::ImageSequence, planes::Output, rays::Traced, wo
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.
 const OCCLUSION_OF_DIAGONAL: f32 = 0.05;
-/// Rays of each kind that one dispatch traces for a pixel: the software device ends all loops of an invocation after
-/// 65,535 turns together, and a GPU may take a long dispatch for a hung one.
+/// Rays to all lamps, and rays of occlusion, that one dispatch traces for a pixel: the software device ends all loops of an
+/// invocation after 65,535 turns together, and a GPU may take a long dispatch for a hung one.
 const RAYS_A_DISPATCH: u32 = 32;
 const CAMERAS_A_SUBMISSION: usize = 32;
 /// The rays of a slice of pictures whose cost is unknown; a pixel counts as one more.
@@ -33,8 +33,8 @@ pub(crate) struct Batch<'a> {
 
 /// Some rays of each pixel.
 pub(crate) struct Part {
-    /// To each lamp, and of occlusion.
-    pub rays: [u32; 2],
+    /// The numbers of the rays to each lamp, of these lamps, and of the rays of occlusion.
+    pub counts: [u32; 3],
     /// A uniform of the pieces.
     pub cameras: wgpu::Buffer,
 }
@@ -81,28 +81,29 @@ impl Batch<'_> {
     /// The pixels of a slice of pictures whose cost is unknown.
     pub fn unknown_slice_px(&self) -> u64 {
         let DrawWork { scene, lighting, .. } = self.work;
-        let [shadow, occlusion] =
-            [lighting.shadow_rays(), lighting.occlusion_rays()].map(|rays| u64::from(rays.min(RAYS_A_DISPATCH)));
-        UNKNOWN_SLICE_RAYS / (1 + shadow * scene.light_count as u64 + occlusion)
+        let [shadow, occlusion] = [lighting.shadow_rays() * scene.light_count as u32, lighting.occlusion_rays()]
+            .map(|rays| u64::from(rays.min(RAYS_A_DISPATCH)));
+        UNKNOWN_SLICE_RAYS / (1 + shadow + occlusion)
     }
 
     /// A uniform of the pieces with their cameras' places in the batch's planes, for each part of the rays.
     pub fn parts(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums) -> Vec<Part> {
-        let part = |rays: [Range<u32>; 2]| Part {
-            rays: rays.each_ref().map(|rays| rays.len() as u32),
+        let part = |rays: Rays| Part {
+            counts: [&rays.shadow, &rays.lamps, &rays.occlusion].map(|range| range.len() as u32),
             cameras: self.uniform(gpu, pieces, sums, rays),
         };
-        parts_of(&sums.rays).into_iter().map(part).collect()
+        parts_of(&sums.rays, self.work.scene.light_count as u32).into_iter().map(part).collect()
     }
 
-    /// The same for these rays.
-    pub fn uniform(
-        &self,
-        gpu: &Gpu,
-        pieces: &Pieces,
-        sums: &Sums,
-        [shadow, occlusion]: [Range<u32>; 2],
-    ) -> wgpu::Buffer {
+    /// A uniform for all rays.
+    pub fn uniform_of_all(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums) -> wgpu::Buffer {
+        let ([shadow, occlusion], lamps) = (sums.rays.clone(), 0..self.work.scene.light_count as u32);
+        self.uniform(gpu, pieces, sums, Rays { shadow, lamps, occlusion })
+    }
+
+    /// A uniform for these rays.
+    fn uniform(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums, rays: Rays) -> wgpu::Buffer {
+        let Rays { shadow, lamps, occlusion } = rays;
         let DrawWork { scene, lighting, .. } = self.work;
         let radius_m = lighting.occlusion.and_then(|occlusion| occlusion.radius_m);
         let diagonal_m = scene.bounds_in_world.size().length();
@@ -114,6 +115,8 @@ impl Batch<'_> {
                 first_sum,
                 first_shadow_ray: shadow.start,
                 shadow_rays: shadow.end - shadow.start,
+                first_light: lamps.start,
+                end_light: lamps.end,
                 first_occlusion_ray: occlusion.start,
                 occlusion_rays: occlusion.end - occlusion.start,
                 // Without rays, all light is known at once.
@@ -184,14 +187,33 @@ pub(crate) fn batches(cameras: &[PinholeCamera], most_pixels: usize) -> impl Ite
     })
 }
 
-/// Ranges of rays, cut into parts of [`RAYS_A_DISPATCH`].
-fn parts_of(ranges: &[Range<u32>; 2]) -> Vec<[Range<u32>; 2]> {
-    let most = ranges.iter().map(|range| range.len().div_ceil(RAYS_A_DISPATCH as usize)).max().unwrap_or(0).max(1);
-    let part = |range: &Range<u32>, number: u32| {
-        let at = |number: u32| (range.start + number * RAYS_A_DISPATCH).min(range.end);
-        at(number)..at(number + 1)
-    };
-    (0..most as u32).map(|number| ranges.each_ref().map(|range| part(range, number))).collect()
+/// Numbers of rays to each of some lamps, and of occlusion.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Rays {
+    shadow: Range<u32>,
+    lamps: Range<u32>,
+    occlusion: Range<u32>,
+}
+
+/// Rays to all lamps and of occlusion, cut into parts of at most [`RAYS_A_DISPATCH`] of each kind.
+fn parts_of([shadow, occlusion]: &[Range<u32>; 2], lamp_count: u32) -> Vec<Rays> {
+    let lamps_a_part = if shadow.is_empty() { lamp_count } else { lamp_count.min(RAYS_A_DISPATCH) }.max(1);
+    let lamps = ranges(&(0..lamp_count), lamps_a_part);
+    let to_lamps = ranges(shadow, RAYS_A_DISPATCH / lamps_a_part.min(RAYS_A_DISPATCH));
+    let to_lamps = to_lamps.iter().flat_map(|shadow| lamps.iter().map(|lamps| (shadow.clone(), lamps.clone())));
+    let mut to_lamps: Vec<(Range<u32>, Range<u32>)> = to_lamps.collect();
+    let mut around = ranges(occlusion, RAYS_A_DISPATCH);
+    let count = to_lamps.len().max(around.len());
+    to_lamps.resize(count, (shadow.end..shadow.end, 0..0));
+    around.resize(count, occlusion.end..occlusion.end);
+    let part = |((shadow, lamps), occlusion)| Rays { shadow, lamps, occlusion };
+    to_lamps.into_iter().zip(around).map(part).collect()
+}
+
+/// A range in pieces of at most this length; one piece where it is empty.
+fn ranges(range: &Range<u32>, most: u32) -> Vec<Range<u32>> {
+    let starts = range.clone().step_by(most as usize).chain(range.is_empty().then_some(range.start));
+    starts.map(|start| start..(start + most).min(range.end)).collect()
 }
 
 #[cfg(test)]
@@ -200,7 +222,19 @@ mod tests {
 
     #[test]
     fn rays_are_traced_in_parts_that_cover_all_of_them() {
-        assert_eq!(parts_of(&[0..0, 0..0]), [[0..0, 0..0]]);
-        assert_eq!(parts_of(&[3..70, 0..16]), [[3..35, 0..16], [35..67, 16..16], [67..70, 16..16]]);
+        let rays = |shadow, lamps, occlusion| Rays { shadow, lamps, occlusion };
+        assert_eq!(parts_of(&[0..0, 0..0], 200), [rays(0..0, 0..200, 0..0)]);
+        assert_eq!(parts_of(&[0..0, 0..40], 2), [rays(0..0, 0..2, 0..32), rays(0..0, 0..0, 32..40)]);
+        let one_lamp = [rays(3..35, 0..1, 0..16), rays(35..67, 0..1, 16..16), rays(67..70, 0..1, 16..16)];
+        assert_eq!(parts_of(&[3..70, 0..16], 1), one_lamp);
+        for lamp_count in [1, 3, 31, 32, 33, 200, 255] {
+            let mut seen = vec![0; 64 * lamp_count as usize];
+            for part in parts_of(&[0..64, 0..64], lamp_count) {
+                assert!(part.shadow.len() * part.lamps.len() <= RAYS_A_DISPATCH as usize, "{part:?}");
+                let each = part.lamps.flat_map(|lamp| part.shadow.clone().map(move |ray| lamp * 64 + ray));
+                each.for_each(|ray| seen[ray as usize] += 1);
+            }
+            assert!(seen.iter().all(|&times| times == 1), "{lamp_count} lamps");
+        }
     }
 }

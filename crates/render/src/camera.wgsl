@@ -28,6 +28,9 @@ struct PixelCamera {
     // This dispatch's rows of the picture: the first, a multiple of 8, and the one after the last.
     first_row: u32,
     end_row: u32,
+    // This dispatch's lamps.
+    first_light: u32,
+    end_light: u32,
 }
 
 @group(0) var<uniform> camera: PixelCamera;

@@ -114,7 +114,7 @@ pub(crate) fn record(
         };
         let pass = recording.passes.get(&variant)?;
         let rays = traced.map(|traced| pass.bind(1, traced.bindings())).transpose()?;
-        let kind = WorkKind::new(batch.family(), &(variant.name(), part.rays));
+        let kind = WorkKind::new(batch.family(), &(variant.name(), part.counts));
         for (camera, target) in (first..).zip(surfaces) {
             let buffers = [&part.cameras, &batch.work.scene.illumination, &recording.sums.buffer];
             let bind = |list| pass.bind(0, bindings(buffers, list, target));

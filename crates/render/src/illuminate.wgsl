@@ -94,8 +94,10 @@ fn from_environment(spot: Spot) -> Arrival {
 {% endif %}
 }
 
+fn index_of(plane: u32, place: u32) -> u32 { return camera.first_sum + plane * camera.pixel_count + place; }
+
 fn add(plane: u32, place: u32, value: f32) {
-    let index = camera.first_sum + plane * camera.pixel_count + place;
+    let index = index_of(plane, place);
 {% if continued %}
     sums[index] += value;
 {% else %}
@@ -117,10 +119,13 @@ fn light_pixel(pixel: vec2u) {
     for (var found = depth > 0.0; found; found = false) {
         let spot = spot_of(pixel, depth, surface_at(pixel));
         environment = from_environment(spot);
-        for (var number = 0u; number < illumination.light_count; number++) {
+{% if visibility and not continued %}
+        for (var number = 0u; number < illumination.light_count; number++) { add(OPEN_TO_LAMPS + number, place, 0.0); }
+{% endif %}
+        for (var number = camera.first_light; number < camera.end_light; number++) {
             let lamp = from_lamp(number, spot);
             lamps_linear += lamp.linear;
-{% if visibility %}            add(OPEN_TO_LAMPS + number, place, lamp.open);
+{% if visibility %}            sums[index_of(OPEN_TO_LAMPS + number, place)] += lamp.open;
 {% endif %}
         }
     }

@@ -114,7 +114,10 @@ fn a_pixel_camera_has_the_wgsl_layout() {
         tolerance,
         first_from_axis,
         first_row,
-        end_row
+        end_row,
+        first_light,
+        end_light,
+        padding
     });
     assert_eq!(shader(&parsed(&Keep::all().remove(0)), "PixelCamera"), host);
 }

@@ -34,6 +34,10 @@ pub(crate) struct PixelCamera {
     /// The rows of a dispatch.
     pub first_row: u32,
     pub end_row: u32,
+    /// The lamps of a dispatch.
+    pub first_light: u32,
+    pub end_light: u32,
+    pub padding: [u32; 2],
 }
 
 /// The trait of `camera` in all shaders that include `camera.wgsl`.

@@ -51,7 +51,7 @@ impl Stages {
         let Self { gpu, passes, pool, .. } = self;
         let slice_px = gpu.device_queue.slice_units(batch.family(), batch.unknown_slice_px());
         let pieces = Pieces::of(batch.cameras, slice_px);
-        let cameras = batch.uniform(gpu, &pieces, &sums, sums.rays.clone());
+        let cameras = batch.uniform_of_all(gpu, &pieces, &sums);
         let frame = Frame::begin(gpu, "draw", turn);
         let mut recording = Recording { gpu, passes, pool, batch, pieces, cameras, sums, visit_counts, frame };
         let surfaces = self.find_surfaces(&mut recording)?;

@@ -164,6 +164,30 @@ fn a_penumbra_is_as_wide_as_the_sun() {
 }
 
 #[test]
+fn many_lamps_light_as_one_of_their_sum() {
+    let mut scene = tree_terrain(30_000, 1);
+    let bounds = scene.bounds();
+    let diagonal_m = bounds.size().length();
+    let lit_by = |count: usize, scene: &mut Scene| {
+        let lamp = Light::Point {
+            position_in_world: bounds.center() + Vec3::new(0.3, 0.8, 0.2) * diagonal_m,
+            intensity_linear: Vec3::splat(diagonal_m * diagonal_m / count as f32),
+            radius_m: 0.02 * diagonal_m,
+        };
+        scene.illumination = lamps(vec![lamp; count]);
+        view(work(&upload(scene), "soft 64"), &before(scene))
+    };
+    let (many, one) = (lit_by(200, &mut scene), lit_by(1, &mut scene));
+    let surfaces = one.inverse_depth_per_m.as_ref().expect("depth").iter().map(|&d| d > 0.0);
+    let squares = one.srgb8.chunks_exact(3).zip(many.srgb8.chunks_exact(3)).zip(surfaces).filter(|(_, shown)| *shown);
+    let square = |((a, b), _): ((&[u8], &[u8]), bool)| {
+        mean(a.iter().zip(b).map(|(a, b)| (f32::from(*a) - f32::from(*b)).powi(2)))
+    };
+    let psnr_db = 10.0 * (255.0f32 * 255.0 / mean(squares.map(square))).log10();
+    assert!(psnr_db >= 40.0, "{psnr_db} dB over the surfaces");
+}
+
+#[test]
 fn a_rectangle_lights_by_its_form_factor() {
     let lamp = Light::Rectangle {
         center_in_world: Vec3::Y,
