@@ -33,10 +33,12 @@ fn evaluate_camera(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, t_end: f32,
     let log2_sides = camera.log2_sides;
     let wanted = u32(max(ceil(log2(max(extent.x, extent.y) + 1e-3)), 1.0));
     let level = min(wanted, top_level(log2_sides));
+    // The coarsest nodes of a strip are shorter than it.
+    let is_covered = wanted <= level;
     let node = camera.first_node + node_index(log2_sides, level, vec2u(first) >> vec2u(level));
     let nearest = nearest_code(textureLoad(nodes, texel_at(node), 0).y);
     let farthest_codes = camera.code_scale / max(depths_m + radii_m, vec2f(1e-20)) + camera.code_offset;
-    let empty = all(closest_m > vec2f(0.0)) && min(farthest_codes.x, farthest_codes.y) > nearest;
+    let empty = is_covered && all(closest_m > vec2f(0.0)) && min(farthest_codes.x, farthest_codes.y) > nearest;
     return select(select(0u, select(UNOPPOSED, PROVEN | UNOPPOSED, whole), empty), UNOPPOSED, unseen);
 }
 

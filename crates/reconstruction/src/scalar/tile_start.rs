@@ -69,9 +69,11 @@ fn evaluate_camera(camera: &SampleCamera, middle: &ViewRay, way: [f32; 2], slope
     let extent = high.max(Vec2::ZERO).min(camera.cells) - first;
     let wanted = (extent.max_element() + 1e-3).log2().ceil().max(1.0) as u32;
     let level = wanted.min(camera.top_level());
+    // The coarsest nodes of a strip are shorter than it.
+    let is_covered = wanted <= level;
     let nearest = camera.wide_nearest(level, first.as_uvec2() >> level);
     let farthest_code = farthest_m.map(|m| camera.code(m.max(1e-20).recip())).into_iter().fold(f32::INFINITY, f32::min);
-    let empty = in_front && farthest_code > nearest;
+    let empty = is_covered && in_front && farthest_code > nearest;
     let whole = low.cmpge(Vec2::ZERO).all() && high.cmple(camera.cells).all();
     Evaluation { proven: empty && whole, unopposed: empty }
 }

@@ -83,6 +83,35 @@ fn tiles_start_before_every_surface() {
     }
 }
 
+/// A tile of a coarse view is wider in a strip of samples than the coarsest nodes of their pyramid: all of it counts.
+#[test]
+fn tiles_start_before_every_surface_of_a_strip() {
+    for near_x_m in [-2.0, -1.0, 0.5, 1.5] {
+        let mut scene = quad(Vec3::NEG_Z * 10.0, 8.0, Vec3::Z, [180, 90, 40]);
+        let near = quad(Vec3::new(near_x_m, 0.0, -4.0), 0.2, Vec3::Z, [40, 90, 180]);
+        scene.instances.push(scene::Instance { mesh: 1, ..near.instances[0] });
+        scene.meshes.extend(near.meshes);
+        let camera = |x: f32, size_px| looking(Vec3::X * x, Vec3::new(x, 0.0, -1.0), 5.0, size_px);
+        let stage = Stage::new(scene, &[camera(-0.1, UVec2::new(1024, 64)), camera(0.1, UVec2::new(1024, 64))]);
+        let view = camera(0.0, UVec2::new(64, 4));
+        let starts = scalar::tile_starts_m(&stage.images, &stage.volume, &view);
+        let drawn = stage.drawn_directly(&view);
+        let truth = depths(&drawn);
+        let nearest_m = |tile: usize| {
+            let pixels = (0..4).flat_map(|row| (0..8).map(move |column| row * 64 + tile * 8 + column));
+            pixels.map(|pixel| truth[pixel].recip()).fold(f32::INFINITY, f32::min)
+        };
+        assert!((0..8).any(|tile| nearest_m(tile) < 4.1), "the near quad is seen");
+        for (tile, &start_m) in starts.iter().enumerate() {
+            assert!(start_m <= nearest_m(tile) * 1.002, "near at {near_x_m} m, tile {tile}: {start_m} m");
+        }
+        for method in [CARVE, SEARCH] {
+            let agreement = Agreement::of(&stage.view(&view, method), &stage.twin(&view, method));
+            assert!(agreement.close >= 0.95, "near at {near_x_m} m, {method}: {agreement:?}");
+        }
+    }
+}
+
 #[test]
 fn starting_at_the_volume_finds_the_same_surfaces() {
     for (name, scene, corners) in corpus_without_thin_things() {
