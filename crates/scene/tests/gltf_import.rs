@@ -6,7 +6,9 @@ mod samples;
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
 
 use glam::Vec3;
-use samples::{GltfCube, Sample, cube_buffer, load, refusal, signed_volume, world_triangles};
+use samples::{
+    CUBE_CORNERS, GltfCube, Sample, cube_buffer, cube_triangles, load, refusal, signed_volume, world_triangles,
+};
 use scene::{Light, LightSpec, Limits, Scene, SceneErrorKind, load_file};
 
 fn cube(change: impl FnOnce(&mut GltfCube)) -> GltfCube {
@@ -399,8 +401,7 @@ fn factors_out_of_range_are_clamped_and_infinite_ones_refused() {
 #[test]
 fn triangles_without_area_are_kept_with_unit_normals() {
     // Corner 0 thrice, an edge there and back, and the cube's own after them.
-    let flat: Vec<u16> =
-        [0, 0, 0, 1, 2, 1].into_iter().chain(samples::cube_triangles().into_iter().map(|i| i as u16)).collect();
+    let flat: Vec<u16> = [0, 0, 0, 1, 2, 1].into_iter().chain(cube_triangles().into_iter().map(|i| i as u16)).collect();
     let with = |attributes: &str| {
         cube(|c| {
             c.primitive = format!(r#"{{"attributes":{{"POSITION":0{attributes}}},"indices":1}}"#);
@@ -549,5 +550,58 @@ fn files_outside_the_folder_are_refused() {
         let error = load("out.gltf", json.as_bytes()).unwrap_err();
         assert!(matches!(error.kind, SceneErrorKind::Forbidden { .. }), "{uri}: {error}");
         assert_eq!(error.element, "buffer 0");
+    }
+}
+
+#[test]
+fn quantized_positions_and_coordinates_are_those_of_their_floats() {
+    // Positions from -1 to 1 in 16 bits, padded to four each; a node scales them back.
+    let code = |c: &f32| (c * 2.0 * 32767.0) as i16;
+    let positions = CUBE_CORNERS.iter().flat_map(|corner| [code(&corner[0]), code(&corner[1]), code(&corner[2]), 0]);
+    let mut binary: Vec<u8> = positions.flat_map(i16::to_le_bytes).collect();
+    binary.extend(cube_triangles().iter().flat_map(|index| (*index as u16).to_le_bytes()));
+    let quantized = cube(|c| {
+        c.more = r#""extensionsRequired":["KHR_mesh_quantization"],"#.into();
+        c.nodes = r#"{"mesh":0,"scale":[0.5,0.5,0.5]}"#.into();
+        c.accessors = concat!(
+            r#"{"bufferView":0,"componentType":5122,"normalized":true,"count":8,"type":"VEC3"},"#,
+            r#"{"bufferView":1,"componentType":5123,"count":36,"type":"SCALAR"}"#
+        )
+        .into();
+        c.views = r#"{"buffer":0,"byteLength":64,"byteStride":8},{"buffer":0,"byteOffset":64,"byteLength":72}"#.into();
+        c.buffers = r#"{"byteLength":136}"#.into();
+        c.binary = binary;
+    });
+    let scene = load("quantized.glb", &quantized.glb()).unwrap();
+    assert_eq!((scene.bounds().min, scene.bounds().max), (Vec3::splat(-0.5), Vec3::splat(0.5)));
+    assert!((signed_volume(&scene) - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_webp_texture_is_read_with_and_without_another_format() {
+    let texels = [[10, 200, 255, 255], [20, 100, 0, 255]];
+    let image = image::RgbaImage::from_raw(2, 1, texels.concat()).unwrap();
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut bytes, image::ImageFormat::WebP).unwrap();
+    let hex: String = bytes.get_ref().iter().map(|b| format!("%{b:02x}")).collect();
+    let other = png_of(&[[1, 2, 3, 255]]);
+    let textured = |source: &str, webp: &str| {
+        let of_webp = format!(r#"{source}"extensions":{{"EXT_texture_webp":{{"source":{webp}}}}}"#);
+        let textured = cube(|c| {
+            c.primitive = r#"{"attributes":{"POSITION":0},"indices":1,"material":0}"#.into();
+            c.more = format!(
+                r#""extensionsRequired":["EXT_texture_webp"],"textures":[{{{of_webp}}}],
+                "images":[{{"uri":"{other}"}},{{"uri":"data:image/webp,{hex}"}}],
+                "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],"#
+            );
+        });
+        textured.glb()
+    };
+    for source in ["", r#""source":0,"#] {
+        let scene = load("webp.glb", &textured(source, "1")).unwrap();
+        assert_eq!((scene.textures.len(), &scene.textures[0].srgba8), (1, &texels.concat()), "{source:?}");
+    }
+    for webp in ["2", "4294967296", "-1", "\"one\"", "null"] {
+        assert!(refusal("webp.glb", &textured("", webp)).contains("material 0"), "{webp}");
     }
 }

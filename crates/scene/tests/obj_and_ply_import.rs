@@ -161,7 +161,8 @@ fn bad_ply_files_are_refused_by_element() {
     assert!(bad("property float x", "property float w").contains("x, y, z"));
     assert!(bad("element vertex 8", "element node 8").contains("no element vertex"));
     assert!(bad("ascii", "utf8").contains("header"));
-    assert!(bad("element face 6", "element face 0").contains("no triangles"));
+    assert!(bad("element face 6", "element face 0").contains("point clouds"));
+    assert!(bad("element face 6", "element edge 6").contains("point clouds"));
     assert!(bad("comment cube", "element nothing 18446744073709551615").contains("no properties"));
     assert!(refusal("not.ply", b"not a ply").contains("header"));
 }

@@ -7,7 +7,7 @@ use depth_image::linear_from_srgb8;
 use glam::Vec3;
 use gltf::json::image::Image;
 use gltf::json::material::{AlphaMode, Material as JsonMaterial};
-use gltf::json::texture::Info;
+use gltf::json::texture::{Info, Texture as JsonTexture};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
@@ -96,7 +96,7 @@ impl Pictures {
     fn place(&mut self, root: &Root, info: &Info, is_srgb: bool, element: &str) -> Result<usize, Fault> {
         let missing =
             || Fault::malformed(element, format!("texture {} or its image does not exist", info.index.value()));
-        let image = root.get(info.index).ok_or_else(missing)?.source;
+        let image = image_of(root.get(info.index).ok_or_else(missing)?);
         root.get(image).ok_or_else(missing)?;
         let next = self.uses.len();
         let place = *self.place_of.entry((image.value(), is_srgb)).or_insert(next);
@@ -105,6 +105,13 @@ impl Pictures {
         }
         Ok(place)
     }
+}
+
+/// The image of a texture: that of `EXT_texture_webp`, where the file has it in another format, too.
+fn image_of(texture: &JsonTexture) -> Index<Image> {
+    let webp = texture.extensions.as_ref().and_then(|extensions| extensions.others.get("EXT_texture_webp"));
+    let source = webp.and_then(|webp| u32::try_from(webp.get("source")?.as_u64()?).ok());
+    source.map_or(texture.source, Index::new)
 }
 
 /// Places in [`Pictures`] of a material's textures.

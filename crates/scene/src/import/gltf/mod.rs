@@ -10,11 +10,11 @@
 //! base colour's, since a vertex has one pair.
 //!
 //! It also reads alpha masks (blending becomes a mask at 0.5), the mean of an emissive texture, `KHR_materials_unlit`,
-//! `KHR_materials_emissive_strength`, `KHR_lights_punctual` and perspective cameras. Missing normals are flat, as the
+//! `KHR_materials_emissive_strength`, `KHR_lights_punctual`, `KHR_mesh_quantization` and perspective cameras. Missing normals are flat, as the
 //! specification requires.
 //!
 //! It skips points and lines, normal and occlusion maps, skins (shown in bind pose), morph targets and animations. It
-//! also skips sampler wrap modes (all textures repeat) and textures in formats other than PNG and JPEG.
+//! also skips sampler wrap modes (all textures repeat). Textures are PNG, JPEG, or WebP by `EXT_texture_webp`.
 //!
 //! Factors of materials are clamped to their range. A factor that is not finite is refused, as is an invalid light.
 //!
@@ -40,8 +40,14 @@ use crate::error::{Fault, at_most};
 use document::Document;
 
 /// Extensions that a file may require.
-const SUPPORTED_EXTENSIONS: [&str; 4] =
-    ["KHR_materials_unlit", "KHR_materials_emissive_strength", "KHR_texture_transform", "KHR_lights_punctual"];
+const SUPPORTED_EXTENSIONS: [&str; 6] = [
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
 
 const GLB_MAGIC: &[u8] = b"glTF";
 const GLB_HEADER_BYTES: u32 = 12;

@@ -26,7 +26,8 @@ pub(super) fn check(header: &PlyHeader, file_bytes: u64, limits: &Limits) -> Res
         header.get_element("vertex").ok_or_else(|| Fault::malformed("header", "there is no element vertex"))?;
     at_most("header, element vertex", vertex.count as u64, limits.vertices)?;
     let has_position = ["x", "y", "z"].iter().all(|name| vertex.has_property(name));
-    let face = header.get_element("face").ok_or_else(|| Fault::malformed("header", "there is no element face"))?;
+    let faces = header.get_element("face").filter(|face| face.count > 0);
+    let face = faces.ok_or_else(|| Fault::unsupported("file", "point clouds: it has no faces, so no surface"))?;
     let has_corners = face.has_property("vertex_indices") || face.has_property("vertex_index");
     if !has_position || !has_corners {
         return Err(Fault::malformed("header", "vertex needs x, y, z, and face needs vertex_indices"));
