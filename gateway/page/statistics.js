@@ -105,9 +105,14 @@ export class Statistics {
   }
 
   csv() {
-    const names = ["number", "still", "repeat", "width_px", "height_px", "jpeg_quality", "bytes", "rtt_ms", "age_ms", ...PARTS.map((part) => `${part}_ms`)];
-    const row = (p) => [p.header.number, p.header.still, p.isRepeat, ...p.header.size_px, p.header.jpeg_quality ?? "", p.bytes, p.header.rtt_ms?.toFixed(3) ?? "", p.age.toFixed(3),
-      ...PARTS.map((part) => p.parts[part].toFixed(3))];
+    const names = [
+      "number", "still", "repeat", "width_px", "height_px", "jpeg_quality", "bytes", "rtt_ms", "age_ms",
+      ...PARTS.map((part) => `${part}_ms`),
+    ];
+    const row = ({ header, isRepeat, bytes, age, parts }) => [
+      header.number, header.still, isRepeat, ...header.size_px, header.jpeg_quality ?? "", bytes,
+      header.rtt_ms?.toFixed(3) ?? "", age.toFixed(3), ...PARTS.map((part) => parts[part].toFixed(3)),
+    ];
     return [names, ...this.pictures.map(row)].map((fields) => fields.join(",")).join("\n") + "\n";
   }
 }

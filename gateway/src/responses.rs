@@ -1,11 +1,12 @@
 //! Answers to requests of HTTP that several of them share: refusals, and JSON.
 
+use std::convert::Infallible;
+
 use axum::body::{Body, Bytes};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream;
 use serde_json::Value;
-use std::convert::Infallible;
 use tokio::sync::OwnedSemaphorePermit;
 
 use crate::kept_session::NotOpen;

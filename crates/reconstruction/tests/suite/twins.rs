@@ -4,6 +4,7 @@ use depth_image::{ProvenanceKind, View};
 use glam::{UVec2, Vec3};
 use reconstruction::{ReconstructionMethod, scalar};
 use scene::procedural::quad;
+use scene::{Instance, Scene};
 
 use crate::stage::{Agreement, CARVE, Corners, SEARCH, Stage, VIEW_PX, corpus, depths, kinds, looking};
 
@@ -57,7 +58,7 @@ fn a_shift_by_a_pixel_is_seen() {
     }
 }
 
-fn corpus_without_thin_things() -> impl Iterator<Item = (&'static str, scene::Scene, Corners)> {
+fn corpus_without_thin_things() -> impl Iterator<Item = (&'static str, Scene, Corners)> {
     corpus().into_iter().filter(|(name, ..)| ["uv-sphere", "courtyard", "quad"].contains(name))
 }
 
@@ -83,14 +84,20 @@ fn tiles_start_before_every_surface() {
     }
 }
 
+/// A wall, and a square of this half edge before it.
+fn wall_behind(near_x_m: f32, half_edge_m: f32) -> Scene {
+    let mut scene = quad(Vec3::NEG_Z * 10.0, 8.0, Vec3::Z, [180, 90, 40]);
+    let near = quad(Vec3::new(near_x_m, 0.0, -4.0), half_edge_m, Vec3::Z, [40, 90, 180]);
+    scene.instances.push(Instance { mesh: 1, ..near.instances[0] });
+    scene.meshes.extend(near.meshes);
+    scene
+}
+
 /// A tile of a coarse view is wider in a strip of samples than the coarsest nodes of their pyramid: all of it counts.
 #[test]
 fn tiles_start_before_every_surface_of_a_strip() {
     for near_x_m in [-2.0, -1.0, 0.5, 1.5] {
-        let mut scene = quad(Vec3::NEG_Z * 10.0, 8.0, Vec3::Z, [180, 90, 40]);
-        let near = quad(Vec3::new(near_x_m, 0.0, -4.0), 0.2, Vec3::Z, [40, 90, 180]);
-        scene.instances.push(scene::Instance { mesh: 1, ..near.instances[0] });
-        scene.meshes.extend(near.meshes);
+        let scene = wall_behind(near_x_m, 0.2);
         let camera = |x: f32, size_px| looking(Vec3::X * x, Vec3::new(x, 0.0, -1.0), 5.0, size_px);
         let stage = Stage::new(scene, &[camera(-0.1, UVec2::new(1024, 64)), camera(0.1, UVec2::new(1024, 64))]);
         let view = camera(0.0, UVec2::new(64, 4));
@@ -134,10 +141,7 @@ fn starting_at_the_volume_finds_the_same_surfaces() {
 fn the_coarsest_levels_of_wide_images_are_whole() {
     let mut bad = Vec::new();
     for near_x_m in [-1.0, 1.0] {
-        let mut scene = quad(Vec3::NEG_Z * 10.0, 8.0, Vec3::Z, [180, 90, 40]);
-        let near = quad(Vec3::new(near_x_m, 0.0, -4.0), 0.5, Vec3::Z, [40, 90, 180]);
-        scene.instances.push(scene::Instance { mesh: 1, ..near.instances[0] });
-        scene.meshes.extend(near.meshes);
+        let scene = wall_behind(near_x_m, 0.5);
         let camera = |x: f32, size_px| looking(Vec3::X * x, Vec3::new(x, 0.0, -1.0), 45.0, size_px);
         let stage = Stage::new(scene, &[camera(-0.1, UVec2::new(96, 60)), camera(0.1, UVec2::new(96, 60))]);
         for stop_level in [0, 6, 8] {
