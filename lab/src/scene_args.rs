@@ -4,13 +4,14 @@ use app_core::setup::SceneArgs;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::SamplingMethod;
-use scene::SceneSpec;
+use scene::{MissingTextures, SceneSpec};
 
 /// A scene with all other arguments by default.
 #[must_use]
 pub fn scene_args(scene: SceneSpec) -> SceneArgs {
     SceneArgs {
         scene,
+        missing_textures: MissingTextures::default(),
         lighting: Lighting::default(),
         lights: Vec::new(),
         environment: None,

@@ -12,7 +12,7 @@ use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::{Rig, SamplingMethod};
-use scene::{EnvironmentSpec, LightSpec, Limits, Scene, SceneSpec};
+use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec};
 
 use crate::camera_file::{self, Placement};
 use crate::sizes::SizePx;
@@ -39,6 +39,9 @@ pub struct SceneArgs {
     /// -wind), bird-nest, urban, tree, grass, grass:DENSITY, blocks, courtyard, uv-sphere, and more
     #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
     pub scene: SceneSpec,
+    /// What is done about textures that a scene's file names and that are not there: refuse the scene, or show grey
+    #[arg(long, default_value_t, value_name = "refuse|grey")]
+    pub missing_textures: MissingTextures,
     /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, or soft N (N rays
     /// a light). Ambient occlusion: occlusion N [RADIUSm]. Rate: adaptive [TOLERANCE] traces rays only where light
     /// changes
@@ -129,7 +132,7 @@ impl SceneArgs {
     }
 
     fn load_scene(&self) -> anyhow::Result<Scene> {
-        let scene = self.scene.load(&Limits::default()).context("the scene cannot be used")?;
+        let scene = self.scene.load(&Limits::default(), self.missing_textures).context("the scene cannot be used")?;
         let lights = (!self.lights.is_empty()).then(|| self.lights.iter().map(|spec| spec.0).collect());
         let lit = scene.lit_by(lights, self.environment.map(|spec| spec.0));
         lit.validate(&Limits::default()).context("the scene cannot be used")?;

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use scene::{EnvironmentSpec, LightSpec, Limits, SceneSpec, pack, unpack};
+use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, SceneSpec, pack, unpack};
 
 fn main() {
     for name in std::env::args().skip(1) {
@@ -17,7 +17,7 @@ fn main() {
 fn inspect(spec: &SceneSpec) {
     let limits = Limits::default();
     let start = Instant::now();
-    let scene = match spec.load(&limits) {
+    let scene = match spec.load(&limits, MissingTextures::Grey) {
         Ok(scene) => scene,
         Err(error) => return println!("{spec}: refused after {:?}: {error}", start.elapsed()),
     };

@@ -33,6 +33,9 @@ pub enum SceneErrorKind {
     #[error("refers to {reference:?}, which {reason}")]
     #[allow(missing_docs, reason = "self-naming fields")]
     Forbidden { reference: String, reason: &'static str },
+    /// The file refers to others that are not there.
+    #[error("missing: {}", .0.join(", "))]
+    MissingFiles(Vec<String>),
     /// A number exceeds [`crate::Limits`].
     #[error("{actual} is over the limit of {limit}")]
     #[allow(missing_docs, reason = "self-naming fields")]

@@ -23,7 +23,7 @@ mod validate;
 
 pub use depth_image::{Environment, Illumination, Light, LightError};
 pub use error::{SceneError, SceneErrorKind};
-pub use import::load_file;
+pub use import::{MissingTextures, MissingTexturesError, load_file};
 pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorKind};
 pub use limits::Limits;
 pub use model::*;

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use crate::error::at_most;
 use crate::procedural::{self, GrassDensity, grass, tree_terrain};
-use crate::{Limits, Scene, SceneError, load_file};
+use crate::{Limits, MissingTextures, Scene, SceneError, load_file};
 
 /// Names of the built-in scenes. A `tree-terrain-…` may have the suffix `-wind`, and `grass` a `:` with a
 /// [density](GrassDensity). A file of such a name is reached as `./name`.
@@ -75,9 +75,9 @@ impl SceneSpec {
     ///
     /// # Errors
     /// The errors of [`load_file`], and a meadow over the limits.
-    pub fn load(&self, limits: &Limits) -> Result<Scene, SceneError> {
+    pub fn load(&self, limits: &Limits, missing: MissingTextures) -> Result<Scene, SceneError> {
         let scene = match self {
-            Self::File(path) => return Ok(load_file(path, limits)?.with_default_lights()),
+            Self::File(path) => return Ok(load_file(path, limits, missing)?.with_default_lights()),
             Self::TreeTerrain { triangles, wind: false } => tree_terrain(*triangles, TREE_SEED),
             Self::TreeTerrain { triangles, wind: true } => tree_terrain(*triangles, TREE_SEED).with_wind(),
             Self::Grass { density } => {
@@ -208,7 +208,7 @@ mod tests {
     fn a_meadow_over_the_limits_is_refused_before_it_is_made() {
         let limits = Limits { triangles: 55_000, ..Limits::default() };
         for (text, limits) in [("grass:1000", &Limits::default()), ("grass", &limits)] {
-            let error = parsed(text).load(limits).unwrap_err();
+            let error = parsed(text).load(limits, MissingTextures::Refuse).unwrap_err();
             assert!(matches!(error.kind, crate::SceneErrorKind::TooLarge { .. }), "{error}");
         }
     }
@@ -217,7 +217,7 @@ mod tests {
     fn built_in_scenes_load_lit_and_valid() {
         let limits = Limits::default();
         for name in BUILT_IN_NAMES.iter().filter(|n| !n.starts_with("tree-terrain") || n.ends_with("30k")) {
-            let scene = parsed(name).load(&limits).unwrap();
+            let scene = parsed(name).load(&limits, MissingTextures::Refuse).unwrap();
             scene.validate(&limits).unwrap();
             assert_eq!(scene.name, *name);
             assert!(!scene.bounds().is_empty());

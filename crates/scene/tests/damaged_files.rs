@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use samples::{GltfCube, cube_obj, cube_ply_ascii, cube_ply_binary};
 use scene::procedural::{checker_sphere, unit_cube};
-use scene::{Limits, load_file, pack, unpack};
+use scene::{Limits, MissingTextures, load_file, pack, unpack};
 
 /// Tight limits keep a changed size from making the test slow.
 fn limits() -> Limits {
@@ -121,7 +121,7 @@ fn rewrite(path: &Path, bytes: &[u8]) {
 
 fn load(path: &Path) -> bool {
     let limits = limits();
-    load_file(path, &limits).map(|scene| scene.validate(&limits).unwrap()).is_ok()
+    load_file(path, &limits, MissingTextures::Refuse).map(|scene| scene.validate(&limits).unwrap()).is_ok()
 }
 
 #[test]
@@ -231,7 +231,7 @@ fn rich_gltf() -> GltfCube {
 fn the_undamaged_sample_loads() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("a.glb"), rich_gltf().glb()).unwrap();
-    let scene = load_file(&dir.path().join("a.glb"), &limits()).unwrap();
+    let scene = load_file(&dir.path().join("a.glb"), &limits(), MissingTextures::Refuse).unwrap();
     assert_eq!(
         (scene.triangle_count(), scene.illumination.lights.len(), scene.cameras.len(), scene.textures.len()),
         (24, 2, 1, 2)

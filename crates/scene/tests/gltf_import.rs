@@ -9,7 +9,7 @@ use glam::Vec3;
 use samples::{
     CUBE_CORNERS, GltfCube, Sample, cube_buffer, cube_triangles, load, refusal, signed_volume, world_triangles,
 };
-use scene::{Light, LightSpec, Limits, Scene, SceneErrorKind, load_file};
+use scene::{Light, LightSpec, Limits, MissingTextures, Scene, SceneErrorKind, load_file};
 
 fn cube(change: impl FnOnce(&mut GltfCube)) -> GltfCube {
     let mut cube = GltfCube::default();
@@ -307,7 +307,8 @@ fn invalid_lights_are_refused_by_file_light_and_field() {
 fn more_lights_than_the_limit_are_refused() {
     let sample = Sample::new("lit.glb", &sun_and_lamp(r#""type":"directional""#, r#""type":"point""#).glb());
     assert_eq!(sample.load().unwrap().illumination.lights.len(), 2);
-    let error = load_file(&sample.path, &Limits { lights: 1, ..Limits::default() }).unwrap_err();
+    let error =
+        load_file(&sample.path, &Limits { lights: 1, ..Limits::default() }, MissingTextures::Refuse).unwrap_err();
     assert!(matches!(error.kind, SceneErrorKind::TooLarge { actual: 2, limit: 1 }), "{error}");
 }
 
@@ -531,7 +532,7 @@ fn limits_hold_over_instances_and_objects() {
         Limits { vertices: 1, triangles: 1, ..Limits::default() },
     ];
     for limits in tight {
-        let error = load_file(&sample.path, &limits).unwrap_err();
+        let error = load_file(&sample.path, &limits, MissingTextures::Refuse).unwrap_err();
         assert!(matches!(error.kind, SceneErrorKind::TooLarge { .. }), "{error}");
     }
 }
@@ -604,4 +605,31 @@ fn a_webp_texture_is_read_with_and_without_another_format() {
     for webp in ["2", "4294967296", "-1", "\"one\"", "null"] {
         assert!(refusal("webp.glb", &textured("", webp)).contains("material 0"), "{webp}");
     }
+}
+
+#[test]
+fn all_missing_textures_are_named_and_grey_goes_on() {
+    let pbr = r#""baseColorTexture":{"index":0},"metallicRoughnessTexture":{"index":1}"#;
+    let bytes = cube(|c| {
+        c.primitive = r#"{"attributes":{"POSITION":0},"indices":1,"material":0}"#.into();
+        c.more = format!(
+            r#""textures":[{{"source":0}},{{"source":1}}],"images":[{{"uri":"a%20b.png"}},{{"uri":"c.jpg"}}],
+            "materials":[{{"pbrMetallicRoughness":{{{pbr},"roughnessFactor":0.7}}}}],"#
+        );
+    })
+    .glb();
+    let sample = Sample::new("lost.glb", &bytes);
+    let error = sample.load().unwrap_err();
+    assert_eq!(error.to_string().split_once("lost.glb: ").unwrap().1, "textures: missing: a%20b.png, c.jpg");
+    let scene = load_file(&sample.path, &Limits::default(), MissingTextures::Grey).unwrap();
+    let texels: Vec<&[u8]> = scene.textures.iter().map(|texture| texture.srgba8.as_slice()).collect();
+    assert_eq!(texels, [[188, 188, 188, 255], [255; 4]], "data leave the factors alone");
+    let outside = cube(|c| {
+        c.more = r#""images":[{"uri":"../c.jpg"}],"textures":[{"source":0}],
+            "materials":[{"emissiveTexture":{"index":0}}],"#
+            .into();
+    });
+    let sample = Sample::new("out.glb", &outside.glb());
+    let error = load_file(&sample.path, &Limits::default(), MissingTextures::Grey).unwrap_err();
+    assert!(matches!(error.kind, SceneErrorKind::Forbidden { .. }), "{error}");
 }

@@ -5,7 +5,7 @@ mod samples;
 
 use glam::{DVec3, Vec3};
 use samples::{Sample, cube_obj, cube_ply_ascii, cube_ply_binary, load, ply_header, refusal, signed_volume};
-use scene::{Limits, Scene, SceneErrorKind, SceneSpec, load_file};
+use scene::{Limits, MissingTextures, Scene, SceneErrorKind, SceneSpec, load_file};
 
 fn assert_is_cube(scene: &Scene) {
     assert_eq!(scene.triangle_count(), 12);
@@ -42,10 +42,13 @@ fn mtl_materials_and_their_textures_are_found() {
     let library = "newmtl red\nKd 1 0 0\nKs 0.5 0.5 0.5\nNs 62\nd 1\nmap_Kd -s 1 1 1 no.png\nillum 2\n";
     let sample =
         Sample::new("cube.obj", format!("mtllib my lib.mtl\n{text}").as_bytes()).with("my lib.mtl", library.as_bytes());
-    let scene = sample.load().unwrap();
+    let missing = sample.load().unwrap_err();
+    assert!(matches!(&missing.kind, SceneErrorKind::MissingFiles(files) if files == &["no.png"]), "{missing}");
+    let scene = load_file(&sample.path, &Limits::default(), MissingTextures::Grey).unwrap();
     let red = scene.materials.iter().find(|m| m.name == "red").unwrap();
     assert_eq!((red.base_color_linear, red.phong_specular, red.phong_exponent), ([1.0, 0.0, 0.0, 1.0], 0.5, 62.0));
-    assert!(red.base_color_texture.is_none() && (red.roughness - 0.42).abs() < 0.01);
+    assert_eq!((red.base_color_texture, &scene.textures[0].srgba8), (Some(0), &vec![188, 188, 188, 255]));
+    assert!((red.roughness - 0.42).abs() < 0.01);
     assert_eq!((scene.materials.len(), scene.meshes[0].parts.len(), scene.triangle_count()), (3, 3, 12));
     assert!(load("lost.obj", format!("mtllib lost.mtl\n{text}").as_bytes()).is_ok(), "a missing library is no error");
 }
@@ -188,7 +191,7 @@ fn limits_hold_for_obj_and_ply() {
             Limits { vertices: 7, ..Limits::default() },
             Limits { file_bytes: 99, ..Limits::default() },
         ] {
-            let error = load_file(&sample.path, &limits).unwrap_err();
+            let error = load_file(&sample.path, &limits, MissingTextures::Refuse).unwrap_err();
             assert!(matches!(error.kind, SceneErrorKind::TooLarge { .. }), "{name}: {error}");
         }
     }
@@ -229,7 +232,7 @@ fn unlit_sources_get_the_default_lights_by_spec() {
     let sample = Sample::new("cube.obj", cube_obj().as_bytes());
     let spec: SceneSpec = sample.path.to_str().unwrap().parse().unwrap();
     assert!(!sample.load().unwrap().has_light());
-    let lit = spec.load(&Limits::default()).unwrap();
+    let lit = spec.load(&Limits::default(), MissingTextures::Refuse).unwrap();
     assert_eq!(lit.illumination.lights.len(), 1);
     assert_eq!(lit.clone().with_default_lights(), lit, "lights that are there are kept");
 }
@@ -238,9 +241,9 @@ fn unlit_sources_get_the_default_lights_by_spec() {
 fn unknown_kinds_and_missing_files_are_refused() {
     assert!(refusal("a.blend", b"BLENDER").contains("blend"));
     assert!(refusal("noextension", b"").contains("not supported"));
-    let missing = load_file("/nowhere/at/all.obj".as_ref(), &Limits::default()).unwrap_err();
+    let missing = load_file("/nowhere/at/all.obj".as_ref(), &Limits::default(), MissingTextures::Refuse).unwrap_err();
     assert!(matches!(missing.kind, SceneErrorKind::Io(_)));
     let folder = Sample::new("x.txt", b"");
     std::fs::create_dir(folder.dir.path().join("dir.obj")).unwrap();
-    assert!(load_file(&folder.dir.path().join("dir.obj"), &Limits::default()).is_err());
+    assert!(load_file(&folder.dir.path().join("dir.obj"), &Limits::default(), MissingTextures::Refuse).is_err());
 }

@@ -4,14 +4,14 @@
 #![allow(clippy::unwrap_used)]
 
 use glam::Vec3;
-use scene::{Limits, Mesh, Scene, SceneSpec};
+use scene::{Limits, Mesh, MissingTextures, Scene, SceneSpec};
 
 /// Triangles in the paper's table 1, and the larger of the two sides on the ground in metres.
 const SCENES: [(&str, f64, f32); 4] =
     [("bird-nest", 67_000.0, 450.0), ("grass", 56_000.0, 5.0), ("urban", 50_000.0, 400.0), ("tree", 113_000.0, 14.0)];
 
 fn load(name: &str) -> Scene {
-    name.parse::<SceneSpec>().unwrap().load(&Limits::default()).unwrap()
+    name.parse::<SceneSpec>().unwrap().load(&Limits::default(), MissingTextures::Refuse).unwrap()
 }
 
 fn triangles(mesh: &Mesh) -> impl Iterator<Item = [Vec3; 3]> + '_ {

@@ -56,7 +56,8 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
 
 fn given_views(args: &DemoArgs) -> anyhow::Result<Vec<PinholeCamera>> {
     let Some(path) = &args.cameras else { return Ok(Vec::new()) };
-    let scene = args.scene.scene.load(&Limits::default()).context("the scene cannot be used")?;
+    let scene =
+        args.scene.scene.load(&Limits::default(), args.scene.missing_textures).context("the scene cannot be used")?;
     let near_m = scene.bounds().near_m();
     Ok(camera_file::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?)
 }

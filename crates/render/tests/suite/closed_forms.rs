@@ -479,7 +479,7 @@ fn a_refitted_tree_finds_the_surfaces_of_a_new_one() {
     let scene: Scene = "tree-terrain-30k-wind"
         .parse::<scene::SceneSpec>()
         .expect("a name")
-        .load(&scene::Limits::default())
+        .load(&scene::Limits::default(), scene::MissingTextures::Refuse)
         .expect("a scene");
     let camera = before(&scene);
     let (moved, fresh) = (upload(&scene), upload(&scene));

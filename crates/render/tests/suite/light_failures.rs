@@ -82,7 +82,7 @@ fn canopy_far_away(at: DVec3) -> Scene {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("canopy.obj");
     std::fs::write(&file, text).expect("a file");
-    let mut scene = scene::load_file(&file, &Limits::default()).expect("a scene");
+    let mut scene = scene::load_file(&file, &Limits::default(), scene::MissingTextures::Refuse).expect("a scene");
     scene.illumination = lamps(vec![sun(Vec3::new(1.0, 1.0, 0.3))]);
     scene
 }

@@ -7,21 +7,27 @@ use std::path::{Component, Path, PathBuf};
 
 use percent_encoding::percent_decode_str;
 
-use crate::Limits;
+use super::missing_textures::MissingTextures;
 use crate::error::{Fault, at_most};
+use crate::{Limits, SceneErrorKind};
 
 /// A scene's folder. No file outside it is read, and the bytes of all files together are limited.
 pub(crate) struct Folder {
     canonical_root: PathBuf,
     bytes_left: Cell<u64>,
+    pub(crate) missing_textures: MissingTextures,
 }
 
 impl Folder {
     /// Opens the folder of the scene file `path`; returns it with that file's bytes.
-    pub(crate) fn opened_with(path: &Path, limits: &Limits) -> Result<(Self, Vec<u8>), Fault> {
+    pub(crate) fn opened_with(
+        path: &Path,
+        limits: &Limits,
+        missing_textures: MissingTextures,
+    ) -> Result<(Self, Vec<u8>), Fault> {
         let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let canonical_root = parent.canonicalize().map_err(|e| Fault::io("folder", e))?;
-        let folder = Self { canonical_root, bytes_left: Cell::new(limits.file_bytes) };
+        let folder = Self { canonical_root, bytes_left: Cell::new(limits.file_bytes), missing_textures };
         let bytes = folder.read_path("file", path)?;
         Ok((folder, bytes))
     }
@@ -62,6 +68,12 @@ impl Folder {
     }
 }
 
+/// `None` for a file that does not exist.
+pub(crate) fn existing(read: Result<Vec<u8>, Fault>) -> Result<Option<Vec<u8>>, Fault> {
+    let is_missing = |kind: &_| matches!(kind, SceneErrorKind::Io(e) if e.kind() == std::io::ErrorKind::NotFound);
+    read.map(Some).or_else(|fault| if is_missing(&fault.kind) { Ok(None) } else { Err(fault) })
+}
+
 fn reason_to_refuse(relative: &str) -> Option<&'static str> {
     let path = Path::new(relative);
     if relative.contains('\0') {
@@ -80,7 +92,10 @@ fn reason_to_refuse(relative: &str) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SceneErrorKind;
+
+    fn opened(path: &Path, limits: &Limits) -> Result<(Folder, Vec<u8>), Fault> {
+        Folder::opened_with(path, limits, MissingTextures::Refuse)
+    }
 
     fn folder_with_file() -> (tempfile::TempDir, Folder) {
         let dir = tempfile::tempdir().unwrap();
@@ -88,7 +103,7 @@ mod tests {
         std::fs::write(dir.path().join("secret.bin"), b"secret").unwrap();
         std::fs::write(dir.path().join("scene/a.gltf"), b"{}").unwrap();
         std::fs::write(dir.path().join("scene/a b.bin"), b"inside").unwrap();
-        let (folder, bytes) = Folder::opened_with(&dir.path().join("scene/a.gltf"), &Limits::default()).unwrap();
+        let (folder, bytes) = opened(&dir.path().join("scene/a.gltf"), &Limits::default()).unwrap();
         assert_eq!(bytes, b"{}");
         (dir, folder)
     }
@@ -143,7 +158,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("a.gltf"), [0; 60]).unwrap();
         let limits = Limits { file_bytes: 100, ..Limits::default() };
-        let (folder, _) = Folder::opened_with(&dir.path().join("a.gltf"), &limits).unwrap();
+        let (folder, _) = opened(&dir.path().join("a.gltf"), &limits).unwrap();
         let fault = folder.read_name("buffer 0", "a.gltf").unwrap_err().in_file("a.gltf");
         assert!(matches!(fault.kind, SceneErrorKind::TooLarge { actual: 60, limit: 40 }), "{fault}");
     }

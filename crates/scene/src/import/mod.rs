@@ -4,6 +4,7 @@
 mod clamped;
 mod folder;
 mod gltf;
+mod missing_textures;
 mod normals;
 mod obj;
 mod picture;
@@ -15,6 +16,7 @@ use std::path::Path;
 use crate::error::Fault;
 use crate::{Limits, Scene, SceneError};
 use folder::Folder;
+pub use missing_textures::{MissingTextures, MissingTexturesError};
 use source_scene::SourceScene;
 
 /// Reads a scene from a `.gltf`, `.glb`, `.obj` or `.ply` file. Files that it refers to are read only
@@ -28,12 +30,12 @@ use source_scene::SourceScene;
 ///
 /// # Errors
 /// The file, the element at fault, and the reason.
-pub fn load_file(path: &Path, limits: &Limits) -> Result<Scene, SceneError> {
-    let scene = read_source(path, limits).and_then(|source| source.finish(limits));
+pub fn load_file(path: &Path, limits: &Limits, missing: MissingTextures) -> Result<Scene, SceneError> {
+    let scene = read_source(path, limits, missing).and_then(|source| source.finish(limits));
     scene.map_err(|fault| fault.in_path(path))
 }
 
-fn read_source(path: &Path, limits: &Limits) -> Result<SourceScene, Fault> {
+fn read_source(path: &Path, limits: &Limits, missing: MissingTextures) -> Result<SourceScene, Fault> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let unknown =
         || Fault::unsupported("file name", format!("extension {extension:?}; known are gltf, glb, obj and ply"));
@@ -43,7 +45,7 @@ fn read_source(path: &Path, limits: &Limits) -> Result<SourceScene, Fault> {
         "ply" => ply::read,
         _ => return Err(unknown()),
     };
-    let (folder, bytes) = Folder::opened_with(path, limits)?;
+    let (folder, bytes) = Folder::opened_with(path, limits, missing)?;
     let mut source = read(&bytes, &folder, limits)?;
     source.name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     Ok(source)

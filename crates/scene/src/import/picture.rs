@@ -5,22 +5,39 @@ use std::io::Cursor;
 use image::ImageReader;
 use rayon::prelude::*;
 
+use super::missing_textures::MissingTextures;
 use crate::error::{Fault, at_most};
-use crate::{Limits, Texture};
+use crate::{Limits, SceneErrorKind, Texture};
+
+/// A missing colour, half as bright as white; and missing data, which leave a material's factors alone.
+const GREY_SRGB8: u8 = 188;
+const NO_CHANGE: u8 = 255;
 
 /// An image file's bytes and its name in messages.
 pub(crate) struct EncodedPicture {
     pub element: String,
-    pub bytes: Vec<u8>,
+    /// The file's name, as the scene has it.
+    pub file: String,
+    /// `None` where the file is missing.
+    pub bytes: Option<Vec<u8>>,
     /// See [`Texture::is_srgb`].
     pub is_srgb: bool,
 }
 
 /// Decodes all images in parallel, after their headers show that they fit the limits together.
-pub(crate) fn decode_all(pictures: &[EncodedPicture], limits: &Limits) -> Result<Vec<Texture>, Fault> {
+pub(crate) fn decode_all(
+    pictures: &[EncodedPicture],
+    limits: &Limits,
+    missing: MissingTextures,
+) -> Result<Vec<Texture>, Fault> {
+    let files: Vec<String> = pictures.iter().filter(|p| p.bytes.is_none()).map(|p| p.file.clone()).collect();
+    if !files.is_empty() && missing == MissingTextures::Refuse {
+        return Err(Fault::new("textures", SceneErrorKind::MissingFiles(files)));
+    }
     let mut decoded_bytes = 0u64;
     for picture in pictures {
-        let (width_px, height_px) = size_px(picture)?;
+        let Some(bytes) = &picture.bytes else { continue };
+        let (width_px, height_px) = size_px(&picture.element, bytes)?;
         at_most(
             format!("{}, side in pixels", picture.element),
             width_px.max(height_px).into(),
@@ -32,17 +49,23 @@ pub(crate) fn decode_all(pictures: &[EncodedPicture], limits: &Limits) -> Result
     pictures.par_iter().map(|picture| decode(picture, limits)).collect()
 }
 
-fn reader(picture: &EncodedPicture) -> Result<ImageReader<Cursor<&[u8]>>, Fault> {
-    let reader = ImageReader::new(Cursor::new(picture.bytes.as_slice())).with_guessed_format();
-    reader.map_err(|e| Fault::io(&picture.element, e))
+fn reader<'b>(element: &str, bytes: &'b [u8]) -> Result<ImageReader<Cursor<&'b [u8]>>, Fault> {
+    ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| Fault::io(element, e))
 }
 
-fn size_px(picture: &EncodedPicture) -> Result<(u32, u32), Fault> {
-    reader(picture)?.into_dimensions().map_err(|e| Fault::malformed(&picture.element, e.to_string()))
+fn size_px(element: &str, bytes: &[u8]) -> Result<(u32, u32), Fault> {
+    reader(element, bytes)?.into_dimensions().map_err(|e| Fault::malformed(element, e.to_string()))
+}
+
+/// The texture in place of a missing one.
+fn stand_in(is_srgb: bool) -> Texture {
+    let [r, g, b] = [if is_srgb { GREY_SRGB8 } else { NO_CHANGE }; 3];
+    Texture { width_px: 1, height_px: 1, is_srgb, srgba8: vec![r, g, b, 255] }
 }
 
 fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
-    let mut reader = reader(picture)?;
+    let Some(bytes) = &picture.bytes else { return Ok(stand_in(picture.is_srgb)) };
+    let mut reader = reader(&picture.element, bytes)?;
     let mut image_limits = image::Limits::default();
     image_limits.max_image_width = Some(limits.texture_side_px);
     image_limits.max_image_height = Some(limits.texture_side_px);
@@ -57,19 +80,22 @@ fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SceneErrorKind;
     use image::RgbaImage;
+
+    fn decoded(pictures: &[EncodedPicture], limits: &Limits) -> Result<Vec<Texture>, Fault> {
+        decode_all(pictures, limits, MissingTextures::Refuse)
+    }
 
     fn png(width: u32, height: u32) -> EncodedPicture {
         let mut bytes = Vec::new();
         let pixels = RgbaImage::from_fn(width, height, |x, y| image::Rgba([x as u8, y as u8, 7, 255]));
         pixels.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png).unwrap();
-        EncodedPicture { element: "image 0".into(), bytes, is_srgb: true }
+        EncodedPicture { element: "image 0".into(), file: "a.png".into(), bytes: Some(bytes), is_srgb: true }
     }
 
     #[test]
     fn decodes_rows_top_down() {
-        let textures = decode_all(&[png(3, 2)], &Limits::default()).unwrap();
+        let textures = decoded(&[png(3, 2)], &Limits::default()).unwrap();
         assert_eq!((textures[0].width_px, textures[0].height_px), (3, 2));
         assert_eq!(textures[0].srgba8[3 * 4..3 * 4 + 4], [0, 1, 7, 255]);
     }
@@ -77,9 +103,9 @@ mod tests {
     #[test]
     fn a_header_that_claims_65535_squared_is_refused_before_decoding() {
         let mut picture = png(1, 1);
-        picture.bytes[16..24].copy_from_slice(&[0, 0, 255, 255, 0, 0, 255, 255]);
+        picture.bytes.as_mut().unwrap()[16..24].copy_from_slice(&[0, 0, 255, 255, 0, 0, 255, 255]);
         // The header's checksum is wrong as well. Either reason is right; an allocation is not.
-        assert!(decode_all(&[picture], &Limits::default()).is_err());
+        assert!(decoded(&[picture], &Limits::default()).is_err());
     }
 
     #[test]
@@ -87,7 +113,7 @@ mod tests {
         let sides = Limits { texture_side_px: 2, ..Limits::default() };
         let total = Limits { texture_bytes: 40, ..Limits::default() };
         for limits in [sides, total] {
-            let fault = decode_all(&[png(3, 2), png(3, 2)], &limits).unwrap_err().in_file("a");
+            let fault = decoded(&[png(3, 2), png(3, 2)], &limits).unwrap_err().in_file("a");
             assert!(matches!(fault.kind, SceneErrorKind::TooLarge { .. }), "{fault}");
         }
     }

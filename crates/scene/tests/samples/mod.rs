@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use scene::{Limits, Scene, SceneError, load_file};
+use scene::{Limits, MissingTextures, Scene, SceneError, load_file};
 use tempfile::TempDir;
 
 /// Corners of the cube from -0.5 to 0.5, and its faces as quads that face out.
@@ -44,7 +44,7 @@ impl Sample {
     }
 
     pub fn load(&self) -> Result<Scene, SceneError> {
-        load_file(&self.path, &Limits::default())
+        load_file(&self.path, &Limits::default(), MissingTextures::Refuse)
     }
 }
 

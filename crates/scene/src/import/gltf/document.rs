@@ -17,7 +17,7 @@ use crate::error::{Fault, at_most};
 pub(super) struct Document<'a> {
     pub root: &'a Root,
     pub limits: &'a Limits,
-    folder: &'a Folder,
+    pub folder: &'a Folder,
     buffers: Vec<Cow<'a, [u8]>>,
     /// A budget of elements to read. Primitives may share an accessor, so that a small file could otherwise expand
     /// without bound.

@@ -12,6 +12,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
 use super::super::clamped::{all_clamped, clamped};
+use super::super::folder::existing;
 use super::super::picture::{EncodedPicture, decode_all};
 use super::super::source_scene::SourceScene;
 use super::document::Document;
@@ -29,7 +30,8 @@ pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<(), F
         root.materials.iter().enumerate().map(|(i, m)| Uses::of(root, m, &mut pictures, &format!("material {i}")));
     let uses: Vec<_> = uses.collect::<Result<_, _>>()?;
     let encoded = pictures.uses.iter().map(|&(image, is_srgb)| encoded_picture(document, image, is_srgb));
-    let textures = decode_all(&encoded.collect::<Result<Vec<_>, _>>()?, document.limits)?;
+    let encoded = encoded.collect::<Result<Vec<_>, _>>()?;
+    let textures = decode_all(&encoded, document.limits, document.folder.missing_textures)?;
     let means = Means::of(&textures);
     for (number, (material, uses)) in root.materials.iter().zip(&uses).enumerate() {
         scene.materials.push(converted(material, uses, &means, number)?);
@@ -138,11 +140,11 @@ fn encoded_picture(document: &Document, index: Index<Image>, is_srgb: bool) -> R
     let element = format!("image {}", index.value());
     let image = document.root.get(index).ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
     let bytes = match (&image.uri, image.buffer_view) {
-        (Some(uri), _) => document.read_uri(&element, uri)?,
-        (None, Some(view)) => document.view(view, &element)?.1.to_vec(),
+        (Some(uri), _) => existing(document.read_uri(&element, uri))?,
+        (None, Some(view)) => Some(document.view(view, &element)?.1.to_vec()),
         (None, None) => return Err(Fault::malformed(element, "it has neither a uri nor a buffer view")),
     };
-    Ok(EncodedPicture { element, bytes, is_srgb })
+    Ok(EncodedPicture { file: image.uri.clone().unwrap_or_default(), element, bytes, is_srgb })
 }
 
 fn converted(material: &JsonMaterial, uses: &Uses, means: &Means, number: usize) -> Result<Material, Fault> {

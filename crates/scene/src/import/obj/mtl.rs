@@ -5,15 +5,15 @@ use std::collections::HashMap;
 use glam::Vec3;
 
 use super::super::clamped::{all_clamped, clamped};
-use super::super::folder::Folder;
+use super::super::folder::{Folder, existing};
 use super::super::picture::{EncodedPicture, decode_all};
 use super::super::source_scene::SourceScene;
 use super::text::{Line, floats, lines};
 use crate::error::{Fault, at_most};
-use crate::{Limits, Material, SceneErrorKind};
+use crate::{Limits, Material};
 
-/// Fills the scene's materials and textures, and numbers them for `names`. Missing libraries and textures are skipped;
-/// those outside the folder are refused.
+/// Fills the scene's materials and textures, and numbers them for `names`. Missing libraries are skipped;
+/// files outside the folder are refused.
 pub(super) fn read_materials(
     libraries: &[String],
     names: &[String],
@@ -38,14 +38,14 @@ pub(super) fn read_materials(
             // A material without a highlight; many programs write an exponent all the same.
             material.roughness = 1.0;
         }
-        material.base_color_texture = picture.map(|file| textures.number_of(&file, folder)).transpose()?.flatten();
+        material.base_color_texture = picture.map(|file| textures.number_of(&file, folder)).transpose()?;
         numbers.push(scene.materials.len() as u32);
         scene.materials.push(material);
     }
     if scene.materials.is_empty() {
         scene.materials.push(Material::default());
     }
-    scene.textures = decode_all(&textures.encoded, limits)?;
+    scene.textures = decode_all(&textures.encoded, limits, folder.missing_textures)?;
     Ok(numbers)
 }
 
@@ -124,27 +124,20 @@ fn file_name(rest: &str) -> &str {
 
 #[derive(Default)]
 struct Textures {
-    number_of_file: HashMap<String, Option<u32>>,
+    number_of_file: HashMap<String, u32>,
     encoded: Vec<EncodedPicture>,
 }
 
 impl Textures {
-    fn number_of(&mut self, file: &str, folder: &Folder) -> Result<Option<u32>, Fault> {
+    fn number_of(&mut self, file: &str, folder: &Folder) -> Result<u32, Fault> {
         if let Some(&number) = self.number_of_file.get(file) {
             return Ok(number);
         }
         let element = format!("map_Kd {file}");
-        let number = existing(folder.read_name(&element, file))?.map(|bytes| {
-            self.encoded.push(EncodedPicture { element, bytes, is_srgb: true });
-            self.encoded.len() as u32 - 1
-        });
+        let bytes = existing(folder.read_name(&element, file))?;
+        let number = self.encoded.len() as u32;
+        self.encoded.push(EncodedPicture { element, file: file.to_owned(), bytes, is_srgb: true });
         self.number_of_file.insert(file.to_owned(), number);
         Ok(number)
     }
-}
-
-/// `None` for a file that does not exist.
-fn existing(read: Result<Vec<u8>, Fault>) -> Result<Option<Vec<u8>>, Fault> {
-    let is_missing = |kind: &_| matches!(kind, SceneErrorKind::Io(e) if e.kind() == std::io::ErrorKind::NotFound);
-    read.map(Some).or_else(|fault| if is_missing(&fault.kind) { Ok(None) } else { Err(fault) })
 }
