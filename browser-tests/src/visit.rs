@@ -32,7 +32,7 @@ const IS_SETTLED: &str = "(() => {
         && last.size_px.every((side, axis) => side === page.screen.size[axis]);
 })()";
 
-/// What is on a page that does not settle.
+/// The state of a page that does not settle, for the message of a failed test.
 const SEEN: &str = "[myriorama.number(), myriorama.shown(), document.getElementById('banner').textContent,
     JSON.stringify(myriorama.state()), JSON.stringify(myriorama.statistics.pictures.at(-1)?.header)]";
 

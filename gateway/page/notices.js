@@ -1,4 +1,4 @@
-// What the page says about its picture: the badge, and why there is none.
+// The badge of the picture, and the banner that says why there is none.
 
 import { $, say } from "./dom.js";
 

@@ -77,7 +77,8 @@ mod tests {
 
     use super::*;
 
-    /// The seconds until the page has a still of so many bytes, and the most bytes that wait for the link meanwhile.
+    /// Sends a still of this size over a link. Returns the seconds until the page has it, and the greatest number of bytes
+    /// that waited for the link.
     fn sent_over(bytes: usize, bytes_per_s: f64, rtt_s: f64) -> (f64, usize) {
         let (mut parts, start) = (Parts::default(), Instant::now());
         let at = |s: f64| start + Duration::from_secs_f64(s);

@@ -154,7 +154,7 @@ mod tests {
 
     use super::*;
 
-    /// Reads an answer of 1 MiB, so many bytes a second; returns the bytes and the seconds until its end.
+    /// Reads an answer of 1 MiB at this rate. Returns the bytes that came and the seconds until the connection ended.
     async fn read_slowly(bytes_a_second: usize) -> (usize, u64) {
         let router = Router::new().route("/", get(async || vec![0_u8; 1 << 20]));
         let (mut client, server) = tokio::io::duplex(1 << 16);

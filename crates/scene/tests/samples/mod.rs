@@ -133,6 +133,13 @@ impl Default for GltfCube {
     }
 }
 
+/// A glTF cube with a change.
+pub fn cube(change: impl FnOnce(&mut GltfCube)) -> GltfCube {
+    let mut cube = GltfCube::default();
+    change(&mut cube);
+    cube
+}
+
 impl GltfCube {
     pub fn json(&self) -> String {
         let Self { nodes, roots, primitive, accessors, views, buffers, more, .. } = self;
