@@ -63,7 +63,10 @@ impl SingleViews {
         match made(&session, camera, planes, moment).await {
             Ok((frame, plan)) => Ok(SingleView { frame, plan, place }),
             Err(error) => {
-                kept.has_failed(session, &error);
+                // Pages judge a session that they watch: one request ends it for nobody.
+                if !kept.visits.has_pages() {
+                    kept.has_failed(session, &error);
+                }
                 Err(error.into())
             }
         }

@@ -64,6 +64,11 @@ impl Visits {
         self.moves.lock().remove(&visitor);
     }
 
+    /// Whether a page is there, which moves and sees pictures.
+    pub(crate) fn has_pages(&self) -> bool {
+        !self.moves.lock().is_empty()
+    }
+
     /// Visitors who have moved lately.
     pub(crate) fn active(&self, now: Instant) -> usize {
         self.moves.lock().values().filter(|moved| now.saturating_duration_since(**moved) < ACTIVE_FOR).count()
@@ -82,7 +87,9 @@ mod tests {
         assert_eq!(visits.active(start + ACTIVE_FOR / 2), 2);
         assert_eq!(visits.active(start + ACTIVE_FOR), 1);
         visits.left(2);
-        assert_eq!(visits.active(start + ACTIVE_FOR), 0);
+        assert_eq!((visits.active(start + ACTIVE_FOR), visits.has_pages()), (0, true));
+        visits.left(1);
+        assert!(!visits.has_pages());
     }
 
     #[tokio::test]
