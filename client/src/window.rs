@@ -141,9 +141,13 @@ pub(crate) fn check_frame(request: &ViewRequest, planes: ViewPlanes, header: &Fr
     if header.sample_set_id.index != u64::from(request.set_index) {
         return Err(format!("shows sample set {} in place of {}", header.sample_set_id, request.set_index));
     }
-    let has = ViewPlanes { inverse_depth: header.inverse_depth_bytes > 0, provenance: header.provenance_bytes > 0 };
+    let has = ViewPlanes {
+        inverse_depth: header.inverse_depth_bytes > 0,
+        provenance: header.provenance_bytes > 0,
+        antialias: header.antialias,
+    };
     if header.size_px != request.camera.size_px || has != planes {
-        return Err("has another size or other planes than requested".to_owned());
+        return Err("has another size, other planes or other samples a pixel than requested".to_owned());
     }
     if header.camera != request.camera {
         return Err("shows another pose than requested".to_owned());

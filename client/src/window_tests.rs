@@ -2,7 +2,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use codec::{FrameCodec, SampleSetId, StageTimes};
-use depth_image::PinholeCamera;
+use depth_image::{Antialias, PinholeCamera};
 
 use super::*;
 
@@ -18,6 +18,7 @@ fn header(index: u64) -> FrameHeader {
         is_neighbour_cell: false,
         camera: request(0).camera,
         size_px: [8, 8].into(),
+        antialias: Antialias::NONE,
         codec: FrameCodec::Lz4,
         color_bytes: 1,
         inverse_depth_bytes: 0,

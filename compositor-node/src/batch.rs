@@ -16,7 +16,7 @@ use crate::view_times::ViewKind;
 
 /// Views of one call to the device.
 pub(crate) const MAX_BATCH: usize = 64;
-/// Pixels of one call: 64 views of full HD would hold half a gigabyte.
+/// Pixels of one call, times their samples: 64 views of full HD would hold half a gigabyte.
 const MAX_BATCH_PIXELS: usize = 64 << 20;
 
 /// Views with equal keys can be made in one call.
@@ -36,12 +36,14 @@ impl BatchKey {
     /// The kind of these views.
     pub(crate) fn kind(&self) -> ViewKind {
         let method = if self.content.is_some() { &self.method } else { DIRECT };
-        ViewKind { workload_number: self.workload_number, method: method.to_owned() }
+        let antialias = self.planes.antialias;
+        ViewKind { workload_number: self.workload_number, method: method.to_owned(), antialias }
     }
 
     /// The most views of one call to the device.
     pub(crate) fn max_views(&self) -> usize {
-        (MAX_BATCH_PIXELS / (self.size_px.element_product() as usize).max(1)).clamp(1, MAX_BATCH)
+        let samples = self.size_px.element_product() as usize * self.planes.antialias.samples() as usize;
+        (MAX_BATCH_PIXELS / samples.max(1)).clamp(1, MAX_BATCH)
     }
 }
 

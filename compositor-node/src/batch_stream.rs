@@ -68,7 +68,7 @@ impl<'a> BatchStream<'a> {
         let (arrived, shared) = (Instant::now(), &self.client.shared);
         let plan = shared
             .of_compositor(shared.plans.require(request.workload_number, request.plan_epoch)?, &request.method)?;
-        shared.check_times(&plan, &request.method, &request.views)?;
+        shared.check_times(&plan, &request)?;
         let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
         for view in &request.views {
             cells.entry(plan.cell_of(&view.camera)).or_default().push(*view);

@@ -151,7 +151,7 @@ impl<'a> LiveStream<'a> {
             return Ok(());
         };
         self.check_number(view.frame)?;
-        self.client.shared.check_times(&plan, &request.method, &request.views)?;
+        self.client.shared.check_times(&plan, &request)?;
         let cell = plan.cell_of(&view.camera);
         let pose = Pose { request, view, plan, cell, arrived: Instant::now() };
         tracing::debug!(

@@ -1,6 +1,6 @@
 use codec::MAX_CHUNK_BYTES;
 use codec::{FrameCodec, SampleSetId, StageTimes};
-use depth_image::PinholeCamera;
+use depth_image::{Antialias, PinholeCamera};
 use glam::{UVec2, Vec3};
 use node::Quotas;
 use tokio::sync::Semaphore;
@@ -36,6 +36,7 @@ impl Bench {
             is_neighbour_cell: false,
             camera,
             size_px: camera.size_px,
+            antialias: Antialias::NONE,
             codec: FrameCodec::Lz4,
             color_bytes: bytes as u64,
             inverse_depth_bytes: 0,

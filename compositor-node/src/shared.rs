@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Instant;
 
-use cluster::{Assignment, DIRECT, Policy, RequestedView};
+use cluster::{Assignment, DIRECT, Policy, RenderViews};
 use depth_image::PinholeCamera;
 use node::{CellPlan, Deadlines, NodeMetrics, PlansInForce, beyond_timeline};
 use tonic::Status;
@@ -82,7 +82,7 @@ impl Shared {
         }
         let is_long = |limit_s: f64| match self.times.predicted_s(&key.kind(), key.size_px) {
             Some(seconds) => seconds > limit_s,
-            None => key.size_px.element_product() > LONG_PIXELS,
+            None => key.size_px.element_product().saturating_mul(key.planes.antialias.samples()) > LONG_PIXELS,
         };
         match is_live {
             true if is_long(LONG_LIVE_S) => Lane::LongLive,
@@ -93,10 +93,12 @@ impl Shared {
     }
 
     /// Checks that no view of a request takes too long.
-    pub(crate) fn check_times(&self, plan: &Assignment, method: &str, views: &[RequestedView]) -> Result<(), Status> {
-        let method = if plan.policy == Policy::Direct { DIRECT } else { method };
-        let kind = ViewKind { workload_number: plan.workload_number, method: method.to_owned() };
-        let largest = views.iter().map(|view| view.camera.size_px).max_by_key(|size_px| size_px.element_product());
+    pub(crate) fn check_times(&self, plan: &Assignment, request: &RenderViews) -> Result<(), Status> {
+        let method = if plan.policy == Policy::Direct { DIRECT } else { &request.method };
+        let antialias = request.planes.antialias;
+        let kind = ViewKind { workload_number: plan.workload_number, method: method.to_owned(), antialias };
+        let largest =
+            request.views.iter().map(|view| view.camera.size_px).max_by_key(|size_px| size_px.element_product());
         largest.map_or(Ok(()), |size_px| self.times.check(Instant::now(), &kind, size_px))
     }
 

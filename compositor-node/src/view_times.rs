@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
+use depth_image::Antialias;
 use glam::UVec2;
 use parking_lot::Mutex;
 use tonic::Status;
@@ -24,6 +25,7 @@ pub(crate) struct ViewKind {
     pub(crate) workload_number: u64,
     /// The reconstruction method, or [`cluster::DIRECT`] for views that are drawn from the scene.
     pub(crate) method: String,
+    pub(crate) antialias: Antialias,
 }
 
 /// What is known of a kind.
@@ -98,7 +100,7 @@ mod tests {
     use super::*;
 
     fn kind(workload_number: u64, method: &str) -> ViewKind {
-        ViewKind { workload_number, method: method.to_owned() }
+        ViewKind { workload_number, method: method.to_owned(), antialias: Antialias::NONE }
     }
 
     #[test]

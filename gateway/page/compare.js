@@ -74,10 +74,12 @@ export class Compare {
       [$(id).width, $(id).height] = result.size_px;
     }
     const number = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits) : "–");
-    const psnr = `${number(result.psnr_db, 1)} dB`;
+    const psnr = (db) => `${number(db, 1)} dB`;
     const ms = (value) => `${number(value, 0)} ms`;
     const rows = [
-      ["PSNR", psnr], ["SSIM", number(result.ssim, 4)], ["FLIP", number(result.flip, 4)],
+      ["Foreground PSNR", psnr(result.foreground_psnr_db)], ["Foreground SSIM", number(result.foreground_ssim, 4)],
+      ["Foreground FLIP", number(result.foreground_flip, 4)],
+      ["PSNR", psnr(result.psnr_db)], ["SSIM", number(result.ssim, 4)], ["FLIP", number(result.flip, 4)],
       ["Reconstructed in", ms(result.view_ms)], ["Drawn directly in", ms(result.direct_ms)],
     ];
     $("measures").replaceChildren(...rows.map(([name, value]) => element("div", element("dt", name), element("dd", value))));
@@ -85,7 +87,7 @@ export class Compare {
     this.split();
     $("compared").hidden = false;
     this.tell("");
-    say(`Compared: PSNR ${psnr}, FLIP ${number(result.flip, 4)}.`);
+    say(`Compared: foreground PSNR ${psnr(result.foreground_psnr_db)}, FLIP ${number(result.foreground_flip, 4)}.`);
     if ($("comparison").contains(document.activeElement)) $("split").focus();
   }
 

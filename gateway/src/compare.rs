@@ -11,7 +11,7 @@ use client::Frame;
 use codec::{FrameCodec, encode_frame};
 use depth_image::{View, ViewPlanes};
 use glam::UVec2;
-use metrics::{PSNR_CAP_DB, Rgb8Image, flip_map, psnr_db, ssim_map};
+use metrics::{PictureErrors, Rgb8Image, flip_map};
 use serde_json::{Value, json};
 
 use crate::gateway::Gateway;
@@ -34,9 +34,9 @@ pub(crate) async fn compare(
     tokio::try_join!(shown.opened(), direct.opened())?;
     let busy = |_| Refusal(StatusCode::TOO_MANY_REQUESTS, "another view is being compared: try again later".to_owned());
     let _place = gateway.comparison.try_acquire().map_err(busy)?;
-    let draw = |kept| gateway.single_views.draw(kept, visited.camera, ViewPlanes::default(), visited.moment);
-    let SingleView { frame: view, place, .. } = draw(shown).await?;
-    let SingleView { frame: direct, .. } = draw(direct).await?;
+    let draw = |kept, planes| gateway.single_views.draw(kept, visited.camera, planes, visited.moment);
+    let SingleView { frame: view, place, .. } = draw(shown, ViewPlanes::COLOR).await?;
+    let SingleView { frame: direct, .. } = draw(direct, ViewPlanes::WITH_DEPTH).await?;
     let compared = tokio::task::spawn_blocking(move || compared(&view, &direct));
     let compared = compared.await.map_err(Refusal::internal)?;
     let compared = compared.ok_or_else(|| Refusal::internal("the views cannot be compared"))?;
@@ -45,13 +45,15 @@ pub(crate) async fn compare(
 
 fn compared(frame: &Frame, direct: &Frame) -> Option<Value> {
     let (test, reference) = (Rgb8Image::of_view(&frame.view).ok()?, Rgb8Image::of_view(&direct.view).ok()?);
-    let (flip, ssim) = (flip_map(&reference, &test).ok()?, ssim_map(&reference, &test).ok()?);
-    let psnr = psnr_db(&reference, &test, None).ok()??.min(PSNR_CAP_DB);
+    let [foreground, whole] = PictureErrors::of(&direct.view, &test).ok()?;
+    let flip = flip_map(&reference, &test).ok()?;
     let flip_image = View { srgb8: pictures::error_map(&flip).into_raw(), ..frame.view.clone() };
     let ms = |frame: &Frame| frame.header.stage_times.batch_s * 1000.0;
     Some(json!({
         "size_px": frame.view.size_px.to_array(),
-        "psnr_db": psnr, "ssim": ssim.mean(None).ok()?, "flip": flip.mean(None).ok()?,
+        "foreground_psnr_db": foreground.psnr_db, "foreground_ssim": foreground.ssim,
+        "foreground_flip": foreground.flip,
+        "psnr_db": whole.psnr_db, "ssim": whole.ssim, "flip": whole.flip,
         "view_ms": ms(frame), "direct_ms": ms(direct),
         "view": data_url(&frame.view)?, "direct": data_url(&direct.view)?, "flip_map": data_url(&flip_image)?,
     }))

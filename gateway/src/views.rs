@@ -143,8 +143,8 @@ pub(crate) async fn picture(
     let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
     let planes = match query.show {
         Plane::Color => ViewPlanes::default(),
-        Plane::Depth => ViewPlanes { inverse_depth: true, provenance: false },
-        Plane::Provenance => ViewPlanes { inverse_depth: false, provenance: true },
+        Plane::Depth => ViewPlanes::WITH_DEPTH,
+        Plane::Provenance => ViewPlanes::WITH_PROVENANCE,
     };
     let drawn = visited.draw(&gateway, planes).await?;
     let first_camera = if query.show == Plane::Provenance { drawn.first_camera()? } else { 0 };
@@ -185,7 +185,7 @@ pub(crate) async fn depth(
     Query(query): Query<ViewQuery>,
 ) -> Result<Response, Refusal> {
     let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
-    let planes = ViewPlanes { inverse_depth: true, provenance: false };
+    let planes = ViewPlanes::WITH_DEPTH;
     let SingleView { frame: Frame { view, .. }, place, .. } = visited.draw(&gateway, planes).await?;
     let inverse = view.inverse_depth_per_m.ok_or_else(|| Refusal::internal("the view lacks depth"))?;
     // One over zero is infinite, as it should be.
@@ -212,7 +212,7 @@ pub(crate) async fn point(
 ) -> Result<Response, Refusal> {
     let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
     let at = query.pixel(visited.camera.size_px)?;
-    let planes = ViewPlanes { inverse_depth: true, provenance: true };
+    let planes = ViewPlanes::ALL;
     let drawn = visited.draw(&gateway, planes).await?;
     let found = surface(&visited, &drawn.frame.view, at, drawn.first_camera()?);
     Ok(as_json(&found.ok_or_else(|| Refusal::internal("the view lacks a plane"))?))

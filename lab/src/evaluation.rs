@@ -2,7 +2,7 @@
 
 use anyhow::Context as _;
 use depth_image::{ProvenanceKind, View};
-use metrics::{PixelClass, Rgb8Image, ScoreMap, class_mask, depth_errors, flip_map, psnr_db, ssim_map};
+use metrics::{PictureErrors, PixelClass, Rgb8Image, class_mask, depth_errors, flip_map};
 use rayon::prelude::*;
 use reconstruction::ReconstructionMethod;
 
@@ -20,6 +20,10 @@ pub struct Evaluation {
     pub method: ReconstructionMethod,
     /// One view in a batch, to host pixels.
     pub ms_a_view: f64,
+    /// Over the pixels that show a surface; mean over views.
+    pub foreground_psnr_db: f64,
+    /// As `foreground_psnr_db`.
+    pub foreground_flip: f64,
     /// Mean over views.
     pub psnr_db: f64,
     /// The worst view.
@@ -71,6 +75,8 @@ impl ReferenceViews {
 /// Errors of one view, to be added up.
 #[derive(Debug, Clone, Copy, Default)]
 struct Errors {
+    foreground_psnr_db: f64,
+    foreground_flip: f64,
     psnr_db: f64,
     ssim: f64,
     flip: f64,
@@ -89,10 +95,13 @@ impl Errors {
         let (expected, actual) = (Rgb8Image::of_view(reference)?, Rgb8Image::of_view(view)?);
         let flip = flip_map(&expected, &actual)?;
         let depth = depth_errors(&known_depth(reference)?, &known_depth(view)?, None)?;
+        let [foreground, whole] = PictureErrors::of(reference, &actual)?;
         let errors = Self {
-            psnr_db: psnr_db(&expected, &actual, None)?.unwrap_or(f64::NAN).min(metrics::PSNR_CAP_DB),
-            ssim: mean(&ssim_map(&expected, &actual)?)?,
-            flip: mean(&flip)?,
+            foreground_psnr_db: foreground.psnr_db,
+            foreground_flip: foreground.flip,
+            psnr_db: whole.psnr_db,
+            ssim: whole.ssim,
+            flip: whole.flip,
             flip_covered: flip.mean(Some(&class_mask(classes, PixelClass::Covered)))?,
             pixels: depth.pixels,
             hits: depth.hit_px,
@@ -126,6 +135,8 @@ fn evaluation(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, 
     Evaluation {
         method,
         ms_a_view,
+        foreground_psnr_db: mean(|e| e.foreground_psnr_db),
+        foreground_flip: mean(|e| e.foreground_flip),
         psnr_db: mean(|e| e.psnr_db),
         psnr_min_db: errors.iter().map(|e| e.psnr_db).fold(f64::INFINITY, f64::min),
         ssim: mean(|e| e.ssim),
@@ -146,7 +157,8 @@ fn evaluation(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, 
 /// Views differ in size.
 pub fn mean_flip(references: &[View], tests: &[View]) -> anyhow::Result<f64> {
     let flip = |(reference, test): (&View, &View)| {
-        mean(&flip_map(&Rgb8Image::of_view(reference)?, &Rgb8Image::of_view(test)?)?)
+        let map = flip_map(&Rgb8Image::of_view(reference)?, &Rgb8Image::of_view(test)?)?;
+        anyhow::Ok(map.mean(None)?.unwrap_or(f64::NAN))
     };
     let flips = references.iter().zip(tests).map(flip).collect::<anyhow::Result<Vec<_>>>()?;
     Ok(flips.iter().sum::<f64>() / flips.len() as f64)
@@ -161,8 +173,4 @@ fn known_depth(view: &View) -> anyhow::Result<Vec<f32>> {
         }
     }
     Ok(plane)
-}
-
-fn mean(map: &ScoreMap) -> anyhow::Result<f64> {
-    Ok(map.mean(None)?.unwrap_or(f64::NAN))
 }

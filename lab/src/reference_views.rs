@@ -18,8 +18,8 @@ use crate::statistics::median;
 const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
 
 /// Both planes beside colour.
-pub const ALL_PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: true };
-const COLOR_ONLY: ViewPlanes = ViewPlanes { inverse_depth: false, provenance: false };
+pub const ALL_PLANES: ViewPlanes = ViewPlanes::ALL;
+const COLOR_ONLY: ViewPlanes = ViewPlanes::COLOR;
 
 /// A scene's sample set as compositors have it, and views drawn from the scene.
 pub struct ReferenceViews {
@@ -82,7 +82,21 @@ impl ReferenceViews {
     /// # Errors
     /// The device fails.
     pub fn drawn(&self, setup: &Setup, lighting: Lighting) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.draw_direct(&direct_work(setup, lighting, &self.cameras, COLOR_ONLY), TURN)?)
+        self.drawn_from(setup, lighting, &self.cameras, COLOR_ONLY)
+    }
+
+    /// Views of other cameras drawn from the scene.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub(crate) fn drawn_from(
+        &self,
+        setup: &Setup,
+        lighting: Lighting,
+        cameras: &[PinholeCamera],
+        planes: ViewPlanes,
+    ) -> anyhow::Result<Vec<View>> {
+        Ok(self.engine.draw_direct(&direct_work(setup, lighting, cameras, planes), TURN)?)
     }
 
     /// Reconstructs all views.
@@ -90,7 +104,20 @@ impl ReferenceViews {
     /// # Errors
     /// The device fails.
     pub fn reconstruct(&self, method: ReconstructionMethod, planes: ViewPlanes) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.reconstructor.reconstruct(&self.set, &self.cameras, method, planes)?)
+        self.reconstruct_at(&self.cameras, method, planes)
+    }
+
+    /// Reconstructs the views of other cameras.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub(crate) fn reconstruct_at(
+        &self,
+        cameras: &[PinholeCamera],
+        method: ReconstructionMethod,
+        planes: ViewPlanes,
+    ) -> anyhow::Result<Vec<View>> {
+        Ok(self.engine.reconstructor.reconstruct(&self.set, cameras, method, planes)?)
     }
 
     /// Reconstructs all views and counts the fetches of a ray; NaN where they cannot be counted.

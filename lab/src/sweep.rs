@@ -37,6 +37,8 @@ pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
     let columns = [
         ("method", ""),
         ("time a view", "ms"),
+        ("foreground PSNR", "dB"),
+        ("foreground FLIP", ""),
         ("PSNR", "dB"),
         ("PSNR of the worst view", "dB"),
         ("SSIM", ""),
@@ -52,9 +54,8 @@ pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
     for row in rows {
         let shares = [row.wrong_hits, row.unknown, row.disoccluded_wrong, row.disoccluded_unmarked, row.disoccluded]
             .map(|share| share * 100.0);
-        let numbers =
-            [&[row.ms_a_view, row.psnr_db, row.psnr_min_db, row.ssim, row.flip][..], &shares, &[row.fetches_a_ray]]
-                .concat();
+        let pictures = [row.foreground_psnr_db, row.foreground_flip, row.psnr_db, row.psnr_min_db, row.ssim, row.flip];
+        let numbers = [&[row.ms_a_view], &pictures[..], &shares, &[row.fetches_a_ray]].concat();
         table.push([Cell::from(row.method.to_string())].into_iter().chain(numbers.into_iter().map(Cell::from)))?;
     }
     Ok(table)
@@ -71,8 +72,8 @@ pub fn charts(name: &str, rows: &[Evaluation]) -> Vec<XyChart> {
             .with_front(Better::Low, better)
     };
     vec![
-        chart("FLIP", "", Better::Low, |row| row.flip),
-        chart("PSNR", "dB", Better::High, |row| row.psnr_db),
+        chart("Foreground FLIP", "", Better::Low, |row| row.foreground_flip),
+        chart("Foreground PSNR", "dB", Better::High, |row| row.foreground_psnr_db),
         chart("Wrong hits", "%", Better::Low, |row| row.wrong_hits * 100.0),
     ]
 }

@@ -5,41 +5,51 @@ use std::path::Path;
 use anyhow::Context as _;
 use depth_image::View;
 use image::ImageReader;
-use metrics::{Rgb8Image, ScoreMap, flip_map, psnr_db, ssim_map};
+use metrics::{PictureErrors, Rgb8Image};
 use table::{Cell, Table};
 
-/// A table with a row a view, by number, the mean and the worst of each column; and the worst PSNR.
+/// Errors over the foreground, then over the whole picture.
+pub type Row = [f64; 6];
+
+const COLUMNS: [(&str, &str); 7] = [
+    ("view", ""),
+    ("foreground PSNR", "dB"),
+    ("foreground SSIM", ""),
+    ("foreground FLIP", ""),
+    ("PSNR", "dB"),
+    ("SSIM", ""),
+    ("FLIP", ""),
+];
+
+/// A table with a row a view, by number, the mean and the worst of each column; and the worst PSNR of a whole picture.
 ///
 /// # Errors
 /// The table refuses a value.
-pub fn table(mut rows: Vec<(usize, [f64; 3])>) -> anyhow::Result<(Table, f64)> {
-    let columns = [("view", ""), ("PSNR", "dB"), ("SSIM", ""), ("FLIP", "")];
-    let mut table = Table::new("Against views drawn directly", &columns);
+pub fn table(mut rows: Vec<(usize, Row)>) -> anyhow::Result<(Table, f64)> {
+    let mut table = Table::new("Against views drawn directly", &COLUMNS);
     rows.sort_by_key(|(number, _)| *number);
     let of = |column: usize| rows.iter().map(move |(_, row)| row[column]);
-    let means = [0, 1, 2].map(|column| of(column).sum::<f64>() / rows.len() as f64);
-    let [psnr_db, ssim] = [0, 1].map(|column| of(column).fold(f64::INFINITY, f64::min));
-    let worst = [psnr_db, ssim, of(2).fold(f64::NEG_INFINITY, f64::max)];
+    let means = [0, 1, 2, 3, 4, 5].map(|column| of(column).sum::<f64>() / rows.len() as f64);
+    let least = |column| of(column).fold(f64::INFINITY, f64::min);
+    let most = |column| of(column).fold(f64::NEG_INFINITY, f64::max);
+    let worst = [least(0), least(1), most(2), least(3), least(4), most(5)];
     let views = rows.iter().map(|(number, row)| (Cell::from(*number), *row));
     for (name, numbers) in views.chain([("mean".into(), means), ("worst".into(), worst)]) {
         table.push([name].into_iter().chain(numbers.map(Cell::from)))?;
     }
-    Ok((table, psnr_db))
+    Ok((table, worst[3]))
 }
 
-/// PSNR, SSIM and FLIP of a written picture.
+/// PSNR, SSIM and FLIP of a written picture, against a view with depth.
 ///
 /// # Errors
 /// The picture cannot be read, or has another size.
-pub fn row(truth: &View, written: &Path) -> anyhow::Result<[f64; 3]> {
+pub fn row(truth: &View, written: &Path) -> anyhow::Result<Row> {
     let read = || anyhow::Ok(ImageReader::open(written)?.decode()?.into_rgb8());
     let picture = read().with_context(|| format!("cannot read {}", written.display()))?;
-    let (reference, test) =
-        (Rgb8Image::of_view(truth)?, Rgb8Image::new(picture.width(), picture.height(), picture.as_raw().as_slice())?);
-    let psnr_db = psnr_db(&reference, &test, None)?.unwrap_or(f64::NAN).min(metrics::PSNR_CAP_DB);
-    Ok([psnr_db, mean(&ssim_map(&reference, &test)?)?, mean(&flip_map(&reference, &test)?)?])
-}
-
-fn mean(map: &ScoreMap) -> anyhow::Result<f64> {
-    Ok(map.mean(None)?.unwrap_or(f64::NAN))
+    let test = Rgb8Image::new(picture.width(), picture.height(), picture.as_raw().as_slice())?;
+    let [foreground, whole] = PictureErrors::of(truth, &test)?;
+    let three = |PictureErrors { psnr_db, ssim, flip }| [psnr_db, ssim, flip];
+    let [[a, b, c], [d, e, f]] = [three(foreground), three(whole)];
+    Ok([a, b, c, d, e, f])
 }

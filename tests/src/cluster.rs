@@ -173,7 +173,7 @@ pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
         volume: None,
         typical_view: camera(0.1, UVec2::new(48, 36)),
         views_per_set: 12,
-        planes: ViewPlanes { inverse_depth: true, provenance: true },
+        planes: ViewPlanes::ALL,
         timeline,
         policy,
         forced_sampler_count: None,

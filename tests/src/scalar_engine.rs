@@ -10,9 +10,9 @@ use std::time::Duration;
 
 use cluster::{DIRECT, Refinement, SamplePlanes};
 use depth_image::{
-    BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, Environment, Illumination, Light, PinholeCamera, Provenance,
-    ProvenanceKind, Ray, Texel, View, ViewPlanes, linear_from_rgb9e5, linear_from_srgb8, rgb9e5_from_linear,
-    srgb8_from_linear,
+    Antialias, BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, Environment, Illumination, Light, PinholeCamera,
+    Provenance, ProvenanceKind, Ray, Texel, View, ViewPlanes, linear_from_rgb9e5, linear_from_srgb8,
+    rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork};
@@ -207,6 +207,20 @@ fn draw(camera: &PinholeCamera, scene_time_s: f32, planes: ViewPlanes) -> View {
     canvas.view(planes)
 }
 
+/// A view whose colour is the mean, in linear light, over the positions within its pixels.
+fn averaged(camera: &PinholeCamera, planes: ViewPlanes, view_of: impl Fn(&PinholeCamera) -> View) -> View {
+    if planes.antialias == Antialias::NONE {
+        return view_of(camera);
+    }
+    let views: Vec<View> =
+        planes.antialias.offsets_px().map(|offset_px| view_of(&camera.with_offset(offset_px))).collect();
+    let mean = |byte: usize| {
+        let sum: f32 = views.iter().map(|view| linear_from_srgb8(view.srgb8[byte])).sum();
+        srgb8_from_linear(sum / views.len() as f32)
+    };
+    View { srgb8: (0..3 * camera.pixel_count()).map(mean).collect(), ..view_of(camera) }
+}
+
 struct Uploaded(SampleSet);
 impl UploadedSet for Uploaded {}
 
@@ -398,13 +412,17 @@ impl Engine for ScalarEngine {
         self.wait_while(|holds| work.cameras.iter().any(|camera| holds.sizes_px.contains(&camera.size_px)));
         sleep(self.pace().view * work.cameras.len() as u32);
         self.reconstructed.fetch_add(work.cameras.len(), Ordering::Relaxed);
-        Ok(work.cameras.iter().map(|camera| splat(set, camera, work.planes)).collect())
+        Ok(work.cameras.iter().map(|camera| averaged(camera, work.planes, |c| splat(set, c, work.planes))).collect())
     }
 
     fn draw_direct(&self, work: &DirectWork, _: Turn) -> Result<Vec<View>, EngineError> {
         self.loaded(&work.scene_hash)?;
         known("lighting", &work.lighting, "unlit")?;
-        Ok(work.cameras.iter().map(|camera| draw(camera, work.scene_time_s, work.planes)).collect())
+        Ok(work
+            .cameras
+            .iter()
+            .map(|camera| averaged(camera, work.planes, |c| draw(c, work.scene_time_s, work.planes)))
+            .collect())
     }
 }
 

@@ -7,7 +7,7 @@ use client::{Frame, ViewRequest};
 use cluster::{Policy, PolicyChoice, Refinement, SceneHash, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, package, request, views};
 use cluster_tests::picture::fault_of;
-use depth_image::ProvenanceKind;
+use depth_image::{Antialias, ProvenanceKind, View, ViewPlanes};
 use node::NodeConfig;
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
@@ -82,6 +82,29 @@ async fn every_number_of_samplers_gives_the_same_pictures() {
     let forced = SessionRequest { forced_sampler_count: Some(4), ..request(PolicyChoice::Pipeline, MOVING) };
     let error = cluster.session(forced).await.unwrap_err().to_string();
     assert!(error.contains("forced_sampler_count is 4, at most 3"), "{error}");
+}
+
+/// Samples a pixel belong to a request, not to the workload: the same sample images serve both.
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_say_their_samples_a_pixel() {
+    let cluster = Cluster::start(3).await;
+    let (four, mut shown) = (Antialias::of(4).unwrap(), Vec::new());
+    for antialias in [Antialias::NONE, four] {
+        let still = request(PolicyChoice::Pipeline, Timeline::still(0.0));
+        let asked = SessionRequest { planes: ViewPlanes { antialias, ..still.planes }, ..still };
+        let session = cluster.session(asked).await.unwrap();
+        let mut frames = session.render_views(views(1, 6)).unwrap().all().await.unwrap();
+        frames.sort_by_key(|frame| frame.request.frame);
+        assert!(frames.iter().all(|frame| frame.header.antialias == antialias));
+        shown.push(frames.into_iter().map(|frame| frame.view).collect::<Vec<_>>());
+    }
+    assert_eq!(cluster.take_counts(), [1; 3], "nothing is sampled again");
+    for (plain, smooth) in shown[0].iter().zip(&shown[1]) {
+        let colors = |view: &View| view.srgb8.chunks(3).map(<[u8]>::to_vec).collect::<HashSet<_>>().len();
+        assert!(colors(smooth) > colors(plain) + 3, "silhouettes are between two colours");
+        assert_eq!(plain.inverse_depth_per_m, smooth.inverse_depth_per_m);
+        assert_eq!(plain.provenance, smooth.provenance);
+    }
 }
 
 /// Nodes take whole sets in turn: each image is sampled once for any K, and pictures are equal.

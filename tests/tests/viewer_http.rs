@@ -69,7 +69,7 @@ fn numbers(file: &[u8]) -> Vec<f32> {
 }
 
 async fn reference_depth(bench: &GatewayBench) -> Vec<f32> {
-    let planes = ViewPlanes { inverse_depth: true, provenance: false };
+    let planes = ViewPlanes::WITH_DEPTH;
     let view = bench.reference_view(&CAMERA, SIZE, planes).await;
     view.inverse_depth_per_m.unwrap().into_iter().map(f32::recip).collect()
 }

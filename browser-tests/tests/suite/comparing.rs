@@ -31,6 +31,8 @@ const SOURCES: &str = "['view', 'direct', 'flip'].map((name) => document.getElem
 #[derive(Debug, Deserialize)]
 struct Comparison {
     size_px: [u32; 2],
+    foreground_psnr_db: f64,
+    foreground_flip: f64,
     psnr_db: f64,
     ssim: f64,
     flip: f64,
@@ -80,6 +82,10 @@ async fn the_figures_are_those_of_the_two_pictures() {
     }
     let shown: BTreeMap<String, String> = visit.browser.value(FIGURES).await.unwrap();
     assert_eq!(shown["PSNR"], format!("{psnr_db:.1} dB"));
+    // The sky of both pictures is the same.
+    assert!(answer.foreground_psnr_db < psnr_db && answer.foreground_flip > flip);
+    assert_eq!(shown["Foreground PSNR"], format!("{:.1} dB", answer.foreground_psnr_db));
+    assert_eq!(shown["Foreground FLIP"], format!("{:.4}", answer.foreground_flip));
     assert_eq!((&shown["SSIM"], &shown["FLIP"]), (&format!("{ssim:.4}"), &format!("{flip:.4}")));
     visit.end(Expected::NoError).await;
 }

@@ -1,6 +1,6 @@
 //! The headers of frames.
 
-use depth_image::PinholeCamera;
+use depth_image::{Antialias, PinholeCamera};
 use glam::UVec2;
 
 use crate::{FrameCodec, SampleSetId};
@@ -21,6 +21,8 @@ pub struct FrameHeader {
     pub camera: PinholeCamera,
     /// Columns and rows.
     pub size_px: UVec2,
+    /// Samples a pixel of its colour, around the centres of the camera's pixels.
+    pub antialias: Antialias,
     /// The encoding of its colour.
     pub codec: FrameCodec,
     /// Bytes of the encoded colour.

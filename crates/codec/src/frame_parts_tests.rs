@@ -1,4 +1,4 @@
-use depth_image::PinholeCamera;
+use depth_image::{Antialias, PinholeCamera};
 use glam::{UVec2, Vec3};
 
 use super::*;
@@ -11,6 +11,7 @@ fn header(data: &[u8]) -> FrameHeader {
         is_neighbour_cell: false,
         camera: PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8)),
         size_px: UVec2::splat(8),
+        antialias: Antialias::NONE,
         codec: FrameCodec::Lz4,
         color_bytes: data.len() as u64,
         inverse_depth_bytes: 0,

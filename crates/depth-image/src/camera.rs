@@ -142,6 +142,12 @@ impl PinholeCamera {
         Self { size_px, focal_px: self.focal_px * scale, principal_px: self.principal_px * scale, ..*self }
     }
 
+    /// The camera whose pixels' centres are those points of this one's pixels, in pixels from their centres.
+    #[must_use]
+    pub fn with_offset(&self, offset_px: Vec2) -> Self {
+        Self { principal_px: self.principal_px - offset_px, ..*self }
+    }
+
     /// Number of pixels.
     #[must_use]
     pub fn pixel_count(&self) -> usize {

@@ -6,6 +6,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod antialias;
 mod bounds;
 mod camera;
 mod encoding;
@@ -20,6 +21,7 @@ mod view;
 mod view_cell;
 mod view_group;
 
+pub use antialias::{Antialias, AntialiasError};
 pub use bounds::Aabb;
 pub use camera::{Camera, CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera, PixelDepth, Ray};
 pub use encoding::{linear_from_srgb8, oct16_from_unit, srgb8_from_linear};

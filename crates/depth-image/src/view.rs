@@ -2,6 +2,8 @@
 
 use glam::UVec2;
 
+use crate::Antialias;
+
 /// The origin of a pixel's colour, packed in 32 bits. The low byte is the kind; above it is one bit for each sample
 /// camera that contributed.
 #[repr(transparent)]
@@ -59,9 +61,11 @@ pub struct View {
     pub provenance: Option<Vec<Provenance>>,
 }
 
-/// The requested planes of a view beside its colour.
+/// The requested planes of a view: how its colour is sampled, and what comes with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub struct ViewPlanes {
+    /// Of [`View::srgb8`].
+    pub antialias: Antialias,
     /// [`View::inverse_depth_per_m`].
     pub inverse_depth: bool,
     /// [`View::provenance`].
@@ -69,6 +73,15 @@ pub struct ViewPlanes {
 }
 
 impl ViewPlanes {
+    /// Colour alone, of one sample a pixel.
+    pub const COLOR: Self = Self { antialias: Antialias::NONE, inverse_depth: false, provenance: false };
+    /// Colour and depth.
+    pub const WITH_DEPTH: Self = Self { inverse_depth: true, ..Self::COLOR };
+    /// Colour and provenance.
+    pub const WITH_PROVENANCE: Self = Self { provenance: true, ..Self::COLOR };
+    /// Colour, depth and provenance.
+    pub const ALL: Self = Self { inverse_depth: true, ..Self::WITH_PROVENANCE };
+
     /// Bytes of a decoded view for each pixel, with its colour.
     #[must_use]
     pub fn bytes_per_pixel(self) -> usize {

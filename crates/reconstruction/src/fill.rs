@@ -20,7 +20,7 @@ pub(crate) fn record(recording: &mut Recording<'_>, unknown: &PixelList) -> Resu
     let batch = &recording.batch;
     let mut bindings = recording.view_bindings();
     bindings.extend([
-        Binding::buffer("srgb8", &batch.srgb8),
+        Binding::buffer("color", &batch.color),
         Binding::buffer("inverse_depth", &batch.inverse_depth_per_m),
         Binding::buffer("provenance", &batch.provenance),
     ]);

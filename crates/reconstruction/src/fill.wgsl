@@ -4,7 +4,8 @@
 {% include "pixel_list.wgsl" %}
 {% include "view_work.wgsl" %}
 
-@group(0) var<storage, read_write> srgb8: array<u32>;
+// Linear, as RGB9E5.
+@group(0) var<storage, read_write> color: array<u32>;
 @group(0) var<storage, read_write> inverse_depth: array<f32>;
 @group(0) var<storage, read> provenance: array<u32>;
 
@@ -17,8 +18,7 @@ fn known_towards(origin: vec2i, towards: vec2i, first: u32) -> Neighbour {
         if any(at < vec2i(0)) || any(at >= vec2i(work.view.size_px)) { break; }
         let index = first + u32(at.y) * work.view.size_px.x + u32(at.x);
         if (provenance[index] & 0xffu) != PROVENANCE_FILLED {
-            let color = linear_from_srgb(unpack4x8unorm(srgb8[index]).rgb);
-            return Neighbour(inverse_depth[index], color, 1.0 / (f32(i) * length(vec2f(towards))));
+            return Neighbour(inverse_depth[index], linear_from_rgb9e5(color[index]), 1.0 / (f32(i) * length(vec2f(towards))));
         }
     }
     return Neighbour(0.0, vec3f(0.0), 0.0);
@@ -45,6 +45,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     depths += n{{ loop.index0 }}.inverse_depth * w{{ loop.index0 }};
     weights += w{{ loop.index0 }};
 {% endfor %}
-    srgb8[index] = pack4x8unorm(vec4f(srgb_from_linear(sum / weights), 1.0));
+    color[index] = rgb9e5_from_linear(sum / weights);
     inverse_depth[index] = depths / weights;
 }

@@ -18,7 +18,7 @@ pub struct Statistics {
 /// A submitted batch.
 pub(crate) struct InFlight<'g> {
     submitted: Submitted<'g>,
-    srgb8: Readback,
+    colors: Readback,
     /// Inverse depths, provenance and fetches.
     others: [Option<Readback>; 3],
     /// Lent until the device is done with it.
@@ -28,7 +28,7 @@ pub(crate) struct InFlight<'g> {
 /// A batch that the device is done with.
 pub(crate) struct Finished {
     result: FrameResult,
-    srgb8: Readback,
+    colors: Readback,
     others: [Option<Readback>; 3],
     batch: Batch,
 }
@@ -40,27 +40,27 @@ impl<'g> InFlight<'g> {
         let bytes = batch.plane_bytes;
         let mut read =
             |plane: &PooledBuffer| frame.read_back(plane, 0..bytes, device.buffers.lend_host("view read-back", bytes));
-        let srgb8 = read(&batch.srgb8);
+        let colors = read(&batch.color);
         let inverse_depth = planes.inverse_depth.then_some(&batch.inverse_depth_per_m);
         let provenance = planes.provenance.then_some(&batch.provenance);
         let others = [inverse_depth, provenance, batch.fetches.as_ref()].map(|plane| plane.map(&mut read));
-        Ok(Self { submitted: frame.submit()?, srgb8, others, batch })
+        Ok(Self { submitted: frame.submit()?, colors, others, batch })
     }
 
     /// Waits until the device is free of it.
     pub fn wait(self) -> Result<Finished, ReconstructionError> {
-        let Self { submitted, srgb8, others, batch } = self;
-        Ok(Finished { result: submitted.wait()?, srgb8, others, batch })
+        let Self { submitted, colors, others, batch } = self;
+        Ok(Finished { result: submitted.wait()?, colors, others, batch })
     }
 }
 
 impl Finished {
     /// Appends the batch's views. Fetches are added up over views.
     pub fn unpack(self, views: &mut Vec<View>, statistics: &mut Statistics) -> Result<(), ReconstructionError> {
-        let Self { result, srgb8, others: [inverse_depth, provenance, fetches], batch } = self;
+        let Self { result, colors, others: [inverse_depth, provenance, fetches], batch } = self;
         statistics.device_s += result.device_s;
         let planes = |readback: Readback| each_view(&result, readback, &batch, <[u32]>::to_vec);
-        let rgb = each_view(&result, srgb8, &batch, rgb_bytes)?;
+        let rgb = each_view(&result, colors, &batch, rgb_bytes)?;
         let mut depths = inverse_depth.map(planes).transpose()?.unwrap_or_default().into_iter();
         let mut provenances = provenance.map(planes).transpose()?.unwrap_or_default().into_iter();
         if let Some(readback) = fetches {

@@ -1,17 +1,16 @@
 //! Pixels that one pass leaves to the next: `pixel_list.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
-use gpu::{Binding, PooledBuffer};
+use gpu::{Binding, Gpu};
 use wgpu::BufferUsages;
-
-use crate::device::Device;
 
 /// The workgroup size of passes over lists of pixels.
 pub(crate) const LIST_WORKGROUP: u32 = 64;
 
 /// For each piece of a view of a batch, pixels that a pass left undecided.
 pub(crate) struct PixelList {
-    pub pixels: PooledBuffer,
+    /// Memory of the batch, which several lists use in turn.
+    pub pixels: wgpu::Buffer,
     /// A [`GpuPixelList`] for each piece: arguments of indirect dispatches.
     pub lists: wgpu::Buffer,
 }
@@ -25,14 +24,11 @@ pub(crate) struct GpuPixelList {
 }
 
 impl PixelList {
-    /// Empty lists for `pieces` pieces of views of together `plane_bytes`, at four bytes a pixel.
-    pub fn lend(device: &Device, pieces: usize, plane_bytes: u64) -> Self {
+    /// Empty lists for `pieces` pieces of views, with four bytes for each of their pixels.
+    pub fn empty(gpu: &Gpu, pixels: wgpu::Buffer, pieces: usize) -> Self {
         let empty = GpuPixelList { workgroups: [0, 1, 1], count: 0 };
         let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT;
-        Self {
-            pixels: device.buffers.lend_storage("undecided pixels", plane_bytes),
-            lists: device.gpu.buffer_with("lists of undecided pixels", &vec![empty; pieces], usage),
-        }
+        Self { pixels, lists: gpu.buffer_with("lists of undecided pixels", &vec![empty; pieces], usage) }
     }
 
     /// As the next pass reads it.

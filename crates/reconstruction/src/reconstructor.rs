@@ -1,10 +1,13 @@
-//! Views from sample sets, in batches: tile starts, the method, the fill and highlights, in one submission each.
+//! Views from sample sets, in batches, in one submission each: tile starts, then the method, the fill and highlights for
+//! each position within the pixels, and their mean.
 
 use std::sync::Arc;
 
-use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{Antialias, DepthImage, PinholeCamera, View, ViewPlanes};
+use glam::Vec2;
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
+use crate::antialias::{self, Sums};
 use crate::in_flight::{InFlight, Statistics};
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
 use crate::recording::{Recording, batches};
@@ -30,6 +33,7 @@ struct Request<'r> {
     method: ReconstructionMethod,
     /// Of the set, where the method draws it.
     mesh: Option<&'r Mesh>,
+    planes: ViewPlanes,
     turn: Turn,
     count_fetches: bool,
 }
@@ -128,7 +132,7 @@ impl Reconstructor {
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
-        let request = Request { set, method, mesh: mesh.as_deref(), turn, count_fetches };
+        let request = Request { set, method, mesh: mesh.as_deref(), planes, turn, count_fetches };
         let mut views = Vec::with_capacity(cameras.len());
         let mut statistics = Statistics::default();
         let mut in_flight: Option<InFlight<'_>> = None;
@@ -153,16 +157,38 @@ impl Reconstructor {
         request: Request<'r>,
         cameras: &[PinholeCamera],
     ) -> Result<Recording<'r>, ReconstructionError> {
-        let Request { set, method, mesh, turn, count_fetches } = request;
+        let Request { set, method, planes, turn, count_fetches, .. } = request;
         let family = WorkKind::family(&("reconstruct", method, set.cameras.len()));
-        let mut recording = Recording::begin(&self.device, set, cameras, (family, turn), count_fetches)?;
+        let output = (planes.antialias, count_fetches);
+        let mut recording = Recording::begin(&self.device, set, cameras, output, (family, turn))?;
+        // What a tile's start proves holds for every position within its pixels.
         if method.follows_rays() {
             tile_start::record(&mut recording)?;
         }
-        let unknown = method.record(&self.drawing, mesh, &mut recording)?;
-        fill::record(&mut recording, &unknown)?;
-        specular::record(&mut recording)?;
+        if planes.antialias == Antialias::NONE {
+            self.record_position(request, &mut recording)?;
+            antialias::record(&mut recording, Sums::None)?;
+            return Ok(recording);
+        }
+        for (number, offset_px) in planes.antialias.offsets_px().enumerate() {
+            recording.go_to(offset_px);
+            self.record_position(request, &mut recording)?;
+            antialias::record(&mut recording, if number == 0 { Sums::Begun } else { Sums::Continued })?;
+        }
+        // Depth and provenance have no mean: they are the centre's.
+        if planes.inverse_depth || planes.provenance {
+            recording.go_to(Vec2::ZERO);
+            self.record_position(request, &mut recording)?;
+        }
+        antialias::record(&mut recording, Sums::Read)?;
         Ok(recording)
+    }
+
+    /// The passes over one position within the pixels.
+    fn record_position(&self, request: Request<'_>, recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
+        let unknown = request.method.record(&self.drawing, request.mesh, recording)?;
+        fill::record(recording, &unknown)?;
+        specular::record(recording)
     }
 
     /// Statistics of the quads that a method draws; `None` for methods that draw none.

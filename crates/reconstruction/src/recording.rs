@@ -3,18 +3,19 @@
 
 use std::ops::Range;
 
-use depth_image::PinholeCamera;
-use glam::{UVec2, Vec3};
+use depth_image::{Antialias, PinholeCamera};
+use glam::{UVec2, Vec2, Vec3};
 use gpu::{
     Binding, BoundGroup, ComputePass, DispatchSize, Frame, PooledBuffer, ShaderVariant, Turn, WorkKind,
     uniform_elements,
 };
 use wgpu::BufferUsages;
 
-use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, SetVariant, TILE_PX, rows_of};
-use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList, sample_set::SampleSet};
+use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume, SetVariant, TILE_PX, rows_of};
+use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
+use crate::{quads::QuadTargets, sample_set::SampleSet};
 
-/// Bounds the memory of a batch: 12 bytes a pixel on the device, up to as much again on the host.
+/// Bounds the memory of a batch: 12 bytes a pixel on the device, 24 with several positions a pixel, up to 12 on the host.
 const PIXELS_A_BATCH: usize = 1 << 20;
 const MAX_VIEWS_A_BATCH: usize = 256;
 /// The pixels of a slice of views whose cost is unknown.
@@ -48,8 +49,12 @@ pub(crate) struct Pieces {
 
 /// Views of one size, and what they take on the device.
 pub(crate) struct Batch {
+    /// Of the pixels' centres.
+    centers: Vec<PinholeCamera>,
+    /// Of the position within the pixels that is being recorded.
     pub cameras: Vec<PinholeCamera>,
     pub size_px: UVec2,
+    antialias: Antialias,
     /// The bytes of one plane of all views.
     pub plane_bytes: u64,
     pub pieces: Pieces,
@@ -57,9 +62,17 @@ pub(crate) struct Batch {
     pub works: wgpu::Buffer,
     /// For methods that follow rays.
     pub tile_start_m: Option<PooledBuffer>,
-    pub srgb8: PooledBuffer,
+    /// RGB9E5 of one position; sRGB once the views are finished.
+    pub color: PooledBuffer,
+    /// Linear light of several positions, 12 bytes a pixel.
+    pub sums: Option<PooledBuffer>,
     pub inverse_depth_per_m: PooledBuffer,
     pub provenance: PooledBuffer,
+    /// The memory of lists of pixels: a pass reads one list and writes the next.
+    undecided_pixels: [PooledBuffer; 2],
+    lists_made: usize,
+    /// For methods that draw; all positions are drawn into the same.
+    pub targets: Option<QuadTargets>,
     /// Fetches of each pixel, where they are counted.
     pub fetches: Option<PooledBuffer>,
 }
@@ -70,25 +83,32 @@ impl<'r> Recording<'r> {
         device: &'r Device,
         set: &'r SampleSet,
         cameras: &[PinholeCamera],
+        (antialias, count_fetches): (Antialias, bool),
         (family, turn): (u64, Turn),
-        count_fetches: bool,
     ) -> Result<Self, ReconstructionError> {
         let plane_bytes = 4 * (cameras[0].pixel_count() * cameras.len()) as u64;
-        device.gpu.check_storage_bytes("a batch of views (bytes)", plane_bytes)?;
+        let sum_bytes = (antialias > Antialias::NONE).then_some(3 * plane_bytes);
+        device.gpu.check_storage_bytes("a batch of views (bytes)", sum_bytes.unwrap_or(plane_bytes))?;
         let slice_px = device.gpu.device_queue.slice_units(family, UNKNOWN_SLICE_PX);
         let pieces = Pieces::of(cameras.len(), cameras[0].size_px, slice_px);
-        let works = uniform_elements(view_works(set, cameras, &pieces));
+        let works = works(device, set, cameras, &pieces, antialias);
         let plane = |label| device.buffers.lend_storage(label, plane_bytes);
         let batch = Batch {
+            centers: cameras.to_vec(),
             cameras: cameras.to_vec(),
             size_px: cameras[0].size_px,
+            antialias,
             plane_bytes,
             pieces,
-            works: device.gpu.buffer_with("views", &works, BufferUsages::UNIFORM),
+            works,
             tile_start_m: None,
-            srgb8: plane("srgb8"),
+            color: plane("color"),
+            sums: sum_bytes.map(|bytes| device.buffers.lend_storage("sums of positions", bytes)),
             inverse_depth_per_m: plane("inverse depth"),
             provenance: plane("provenance"),
+            undecided_pixels: ["undecided pixels", "pixels still undecided"].map(plane),
+            lists_made: 0,
+            targets: None,
             fetches: count_fetches.then(|| plane("fetches")),
         };
         let mut frame = Frame::begin(&device.gpu, "reconstruct", turn);
@@ -96,6 +116,22 @@ impl<'r> Recording<'r> {
             frame.encoder.clear_buffer(fetches, 0, None);
         }
         Ok(Self { device, set, frame, batch, family })
+    }
+
+    /// Records what follows for another position within the pixels.
+    pub fn go_to(&mut self, offset_px: Vec2) {
+        let Batch { centers, pieces, antialias, .. } = &self.batch;
+        let cameras: Vec<_> = centers.iter().map(|camera| camera.with_offset(offset_px)).collect();
+        self.batch.works = works(self.device, self.set, &cameras, pieces, *antialias);
+        self.batch.cameras = cameras;
+    }
+
+    /// A list for the pixels that a pass leaves undecided; it is good until the list after the next is begun.
+    pub fn empty_list(&mut self) -> PixelList {
+        let Batch { undecided_pixels, lists_made, pieces, .. } = &mut self.batch;
+        let pixels = &undecided_pixels[*lists_made % undecided_pixels.len()];
+        *lists_made += 1;
+        PixelList::empty(&self.device.gpu, (**pixels).clone(), pieces.count())
     }
 
     /// The switches of passes that find surfaces.
@@ -186,14 +222,26 @@ pub(crate) fn batches(cameras: &[PinholeCamera]) -> impl Iterator<Item = &[Pinho
     })
 }
 
+fn works(
+    device: &Device,
+    set: &SampleSet,
+    cameras: &[PinholeCamera],
+    pieces: &Pieces,
+    antialias: Antialias,
+) -> wgpu::Buffer {
+    let elements = uniform_elements(view_works(set, cameras, pieces, antialias));
+    device.gpu.buffer_with("views", &elements, BufferUsages::UNIFORM)
+}
+
 /// The `ViewWork` of each piece.
-fn view_works(set: &SampleSet, cameras: &[PinholeCamera], pieces: &Pieces) -> Vec<Vec<u8>> {
+fn view_works(set: &SampleSet, cameras: &[PinholeCamera], pieces: &Pieces, antialias: Antialias) -> Vec<Vec<u8>> {
+    let volume = GpuVolume { position_share: (antialias.samples() as f32).recip(), ..set.volume };
     let sorted: Vec<_> = cameras.iter().map(|camera| nearest_first(set, camera)).collect();
     let work = |(number, &Piece { view, first_row }): (u32, &Piece)| {
         let end_row = (first_row + pieces.rows).min(cameras[view].size_px.y);
         let rows = rows_of(first_row..end_row);
         let view_camera = GpuViewCamera { number, rows, ..GpuViewCamera::of(&cameras[view], view as u32) };
-        let work = GpuViewWork { view: view_camera, volume: set.volume };
+        let work = GpuViewWork { view: view_camera, volume };
         [bytemuck::bytes_of(&work), bytemuck::cast_slice(&sorted[view])].concat()
     };
     (0..).zip(&pieces.all).map(work).collect()

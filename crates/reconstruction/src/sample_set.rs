@@ -1,7 +1,7 @@
 //! A sample set on the device.
 
 use bytemuck::Zeroable as _;
-use depth_image::{Aabb, Camera, DepthImage, Highlight, Illumination, PinholeCamera, srgb8_from_linear};
+use depth_image::{Aabb, Camera, DepthImage, Highlight, Illumination, PinholeCamera};
 use glam::{Vec2, Vec3};
 use gpu::{Table, TablePool, Turn};
 use rayon::prelude::*;
@@ -178,11 +178,10 @@ pub(crate) fn searched_volume(volume: &Aabb, images: &[DepthImage]) -> Aabb {
 }
 
 fn gpu_volume(searched: &Aabb, background_linear: Vec3) -> GpuVolume {
-    let [r, g, b] = background_linear.to_array().map(srgb8_from_linear);
     GpuVolume {
         min_in_world: searched.min.to_array(),
-        background_srgb8: u32::from_le_bytes([r, g, b, 255]),
         max_in_world: searched.max.to_array(),
-        padding: 0,
+        background_linear: background_linear.to_array(),
+        ..GpuVolume::zeroed()
     }
 }

@@ -59,7 +59,7 @@ pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), Reconstruction
     let pass = recording.device.passes.get(&variant)?;
     let mut bindings = recording.cell_bindings();
     bindings.extend([
-        Binding::buffer("out_srgb8", &recording.batch.srgb8),
+        Binding::buffer("out_color", &recording.batch.color),
         Binding::buffer("inverse_depth", &recording.batch.inverse_depth_per_m),
         Binding::buffer("provenance", &recording.batch.provenance),
         Binding::buffer("illumination", &reflectors.illumination),

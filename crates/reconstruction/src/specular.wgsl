@@ -10,7 +10,8 @@
 {% include "view_work.wgsl" %}
 {% include "cell.wgsl" %}
 
-@group(0) var<storage, read_write> out_srgb8: array<u32>;
+// Linear, as RGB9E5.
+@group(0) var<storage, read_write> out_color: array<u32>;
 @group(0) var<storage, read> inverse_depth: array<f32>;
 @group(0) var<storage, read> provenance: array<u32>;
 @group(0) var<uniform> illumination: Illumination;
@@ -101,6 +102,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if around.reflecting <= 0.0 { return; }
     let towards_eye = unit_or_zero(-direction);
     let added = highlight(point_in_world, around.normal, towards_eye, around.reflector, around.visibility);
-    let color = linear_from_srgb(unpack4x8unorm(out_srgb8[index]).rgb) + added * around.reflecting;
-    out_srgb8[index] = pack4x8unorm(vec4f(srgb_from_linear(color), 1.0));
+    out_color[index] = rgb9e5_from_linear(linear_from_rgb9e5(out_color[index]) + added * around.reflecting);
 }

@@ -28,12 +28,12 @@ pub(crate) fn record(
     own: &[Binding<'_>],
 ) -> Result<PixelList, ReconstructionError> {
     let pass = recording.device.passes.get(variant)?;
+    let undecided = recording.empty_list();
     let batch = &recording.batch;
-    let undecided = PixelList::lend(recording.device, batch.pieces.count(), batch.plane_bytes);
     let mut bindings = recording.cell_bindings();
     bindings.extend([
         Binding::texture("cell_colors", &recording.set.cell_colors),
-        Binding::buffer("out_srgb8", &batch.srgb8),
+        Binding::buffer("out_color", &batch.color),
         Binding::buffer("out_inverse_depth", &batch.inverse_depth_per_m),
         Binding::buffer("out_provenance", &batch.provenance),
         Binding::buffer("undecided_pixels", &undecided.pixels),
@@ -42,6 +42,7 @@ pub(crate) fn record(
     bindings.extend(batch.fetches.as_ref().map(|fetches| Binding::buffer("out_fetches", fetches)));
     let starts = batch.tile_start_m.as_ref().filter(|_| listed.is_none());
     bindings.extend(starts.map(|starts| Binding::buffer("tile_start_m", starts)));
+    bindings.extend(batch.targets.iter().flat_map(|drawn| drawn.bindings()));
     bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
     bindings.extend(own.iter().cloned());
     let bound = pass.bind(0, bindings)?;

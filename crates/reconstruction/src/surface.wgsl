@@ -2,7 +2,8 @@
 
 // RGB9E5 of each cell's corners, in their order.
 @group(0) var cell_colors: texture_2d<u32>;
-@group(0) var<storage, read_write> out_srgb8: array<u32>;
+// Linear, as RGB9E5; the colour of the background is added later.
+@group(0) var<storage, read_write> out_color: array<u32>;
 @group(0) var<storage, read_write> out_inverse_depth: array<f32>;
 @group(0) var<storage, read_write> out_provenance: array<u32>;
 // Pixels that the next pass takes up, as it reads them with pixel_list.wgsl.
@@ -44,8 +45,8 @@ fn place_of(index: u32) -> vec2u {
     return vec2u(place % work.view.size_px.x, place / work.view.size_px.x);
 }
 
-fn write_pixel(index: u32, color_srgb8: u32, inverse_depth_per_m: f32, provenance: u32) {
-    out_srgb8[index] = color_srgb8;
+fn write_pixel(index: u32, color_rgb9e5: u32, inverse_depth_per_m: f32, provenance: u32) {
+    out_color[index] = color_rgb9e5;
     out_inverse_depth[index] = inverse_depth_per_m;
     out_provenance[index] = provenance;
 {% if count_fetches %}    out_fetches[index] += fetches;
@@ -56,7 +57,7 @@ fn write_pixel(index: u32, color_srgb8: u32, inverse_depth_per_m: f32, provenanc
 fn write_found(index: u32, found: bool, t: f32, color_linear: vec3f, camera_mask: u32, empty: bool) {
     let missed = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, empty);
     let provenance = select(missed, PROVENANCE_HIT | (camera_mask << 8u), found);
-    let color = select(work.background_srgb8, srgb8_from_linear(color_linear), found);
+    let color = select(0u, rgb9e5_from_linear(color_linear), found);
     write_pixel(index, color, select(0.0, 1.0 / t, found), provenance);
     if provenance == PROVENANCE_FILLED { leave_undecided(index); }
 }
@@ -178,8 +179,4 @@ fn pick_vote(a: CameraVote, b: CameraVote, second: bool) -> CameraVote {
         select(a.weight, b.weight, second), select(a.cell, b.cell, second), select(a.shares, b.shares, second),
         select(a.same, b.same, second), 0.0,
     );
-}
-
-fn srgb8_from_linear(linear: vec3f) -> u32 {
-    return pack4x8unorm(vec4f(srgb_from_linear(linear), 1.0));
 }

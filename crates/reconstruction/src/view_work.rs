@@ -90,9 +90,11 @@ pub(crate) struct GpuViewWork {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct GpuVolume {
     pub min_in_world: [f32; 3],
-    pub background_srgb8: u32,
+    pub position_share: f32,
     pub max_in_world: [f32; 3],
     pub padding: u32,
+    pub background_linear: [f32; 3],
+    pub padding_2: u32,
 }
 
 /// Columns and rows of tiles.

@@ -51,9 +51,12 @@ struct ViewCamera {
 struct ViewWork {
     view: ViewCamera,
     volume_min_in_world: vec3f,
-    background_srgb8: u32,
+    // One over the number of positions that a pixel is the mean of.
+    position_share: f32,
     volume_max_in_world: vec3f,
     padding: u32,
+    background_linear: vec3f,
+    padding_2: u32,
     cameras: array<SampleCamera, {{ cameras }}>,
 }
 

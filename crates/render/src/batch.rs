@@ -2,8 +2,9 @@
 
 use std::{ops::Range, sync::Arc};
 
-use depth_image::PinholeCamera;
-use gpu::{BoundGroup, BufferPool, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVariant, WorkKind};
+use depth_image::{Antialias, PinholeCamera};
+use glam::Vec2;
+use gpu::{BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVariant, WorkKind};
 
 use crate::accumulation::{Key, Sums};
 use crate::pieces::{Piece, Pieces};
@@ -29,6 +30,8 @@ pub(crate) struct Batch<'a> {
     pub traced: Option<Arc<Traced>>,
     pub output: Output,
     pub sequence: Option<ImageSequence<'a>>,
+    /// The number of the position within the pixels.
+    pub position: u32,
 }
 
 /// Some rays of each pixel.
@@ -43,7 +46,6 @@ pub(crate) struct Part {
 pub(crate) struct Recording<'a> {
     pub gpu: &'a Gpu,
     pub passes: &'a PassCache,
-    pub pool: &'a BufferPool,
     pub batch: &'a Batch<'a>,
     /// The pictures, as dispatches make them.
     pub pieces: Pieces,
@@ -55,7 +57,29 @@ pub(crate) struct Recording<'a> {
     pub frame: Frame<'a>,
 }
 
+/// The number of a position, and the cameras whose pixels' centres are there.
+pub(crate) type Position = (u32, Vec<PinholeCamera>);
+
 impl Batch<'_> {
+    /// All positions within the pixels. The centre comes last where it gives depth alone.
+    pub fn positions(&self) -> Vec<Position> {
+        let Output { antialias, depth, .. } = self.output;
+        let center = (depth && antialias > Antialias::NONE).then_some(Vec2::ZERO);
+        let shifted = |offset_px: Vec2| self.cameras.iter().map(|camera| camera.with_offset(offset_px)).collect();
+        (0..).zip(antialias.offsets_px().chain(center).map(shifted)).collect()
+    }
+
+    /// The batch at one position.
+    pub fn at<'b>(&'b self, (position, cameras): &'b Position) -> Batch<'b> {
+        let Self { work, by_rays, ref traced, output, sequence, .. } = *self;
+        Batch { work, cameras, by_rays, traced: traced.clone(), output, sequence, position: *position }
+    }
+
+    /// Whether colour is wanted of this position.
+    pub fn has_color(&self) -> bool {
+        self.position < self.output.antialias.samples()
+    }
+
     /// The bytes of planes of all pixels.
     pub fn bytes(&self, planes: usize) -> u64 {
         let pixels: usize = self.cameras.iter().map(PinholeCamera::pixel_count).sum();
@@ -124,7 +148,7 @@ impl Batch<'_> {
                 occlusion_rays_in_sum: sums.rays[1].end.max(1),
                 occlusion_radius_m: radius_m.unwrap_or(diagonal_m * OCCLUSION_OF_DIAGONAL),
                 tolerance: if let Rate::Adaptive { tolerance } = lighting.rate { tolerance } else { 0.0 },
-                ..PixelCamera::of(camera)
+                ..PixelCamera::of(camera, self.position)
             };
             first_word += placed.pixel_count * planes;
             first_sum += placed.pixel_count * sum_planes;

@@ -2,8 +2,8 @@
 
 use std::collections::HashSet;
 
-use depth_image::Highlight;
-use gpu::{Binding, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, switches};
+use depth_image::{Antialias, Highlight};
+use gpu::{Binding, BufferPool, Gpu, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, switches};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
@@ -22,7 +22,9 @@ pub(crate) struct Finish {
 
 impl Finish {
     fn of(batch: &Batch<'_>) -> Self {
-        Self { by_rays: batch.by_rays, lit: batch.work.lighting.is_lit(), output: batch.output }
+        // One shader, whether depth is wanted or not.
+        let output = Output { depth: false, ..batch.output };
+        Self { by_rays: batch.by_rays, lit: batch.work.lighting.is_lit(), output }
     }
 
     /// The variants with each usefulness test.
@@ -50,14 +52,15 @@ impl ShaderVariant for Finish {
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
-        let Output { sums, samples, highlight, passed: redundancy, usefulness_test, .. } = self.output;
-        let PlaneLayout { normal, reflector, surface_id, passed, .. } = self.output.layout();
+        let Output { sums, samples, antialias, highlight, passed: redundancy, usefulness_test, .. } = self.output;
+        let PlaneLayout { normal, reflector, surface_id, passed, count } = self.output.layout();
         context! {
             by_rays => self.by_rays,
             lit => self.lit,
             highlight => highlight.map(highlight_name),
             surface_id => surface_id.is_some(),
             normal_plane => normal, reflector_plane => reflector, id_plane => surface_id, passed_plane => passed,
+            averaged => antialias > Antialias::NONE, plane_count => count,
             samples, redundancy, usefulness_test,
             ..sums.context()
         }
@@ -65,34 +68,60 @@ impl ShaderVariant for Finish {
 
     fn all() -> Vec<Self> {
         let highlights = [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)].into_iter();
-        let views = highlights.flat_map(|highlight| Self::of_output(Output { highlight, ..Output::default() }));
+        let colors = highlights.flat_map(|highlight| {
+            [Antialias::NONE, Antialias::MOST].map(|antialias| Output { highlight, antialias, ..Output::default() })
+        });
+        let views = colors.flat_map(Self::of_output);
         views.chain(Self::of_images(false, None)).chain(Self::of_images(true, None)).collect()
     }
 }
 
-/// Records one dispatch for each camera; gives the words of all planes.
-pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces]) -> Result<PooledBuffer, RenderError> {
-    let Recording { passes, gpu, pool, batch, .. } = recording;
-    let bytes = batch.bytes(batch.output.layout().count);
-    gpu.check_storage_bytes("the planes of a batch (bytes)", bytes)?;
-    let words = pool.lend_storage("planes", bytes.max(4));
+/// The words of a batch's planes, and linear light of several positions.
+pub(crate) struct Planes {
+    pub words: PooledBuffer,
+    position_sums: Option<PooledBuffer>,
+}
+
+impl Planes {
+    /// Fails for planes beyond the device's limits.
+    pub fn lend(gpu: &Gpu, pool: &BufferPool, batch: &Batch<'_>) -> Result<Self, RenderError> {
+        let bytes = batch.bytes(batch.output.layout().count);
+        gpu.check_storage_bytes("the planes of a batch (bytes)", bytes)?;
+        let is_averaged = batch.output.antialias > Antialias::NONE;
+        let sums = is_averaged.then(|| pool.lend_storage("sums of positions", batch.bytes(3).max(4)));
+        Ok(Self { words: pool.lend_storage("planes", bytes.max(4)), position_sums: sums })
+    }
+}
+
+/// Records one dispatch for each camera.
+pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces], planes: &Planes) -> Result<(), RenderError> {
+    let Recording { passes, gpu, batch, .. } = recording;
     let variant = Finish::of(batch);
     let pass = passes.get(&variant)?;
-    let [r, g, b] = batch.work.scene.background_linear.to_array();
     let view_cell_m = batch.sequence.map_or(0.0, |sequence| sequence.known.view_cell_m);
-    let finish = gpu.buffer_with("finish", &[r, g, b, view_cell_m], BufferUsages::UNIFORM);
+    let [r, g, b] = batch.work.scene.background_linear.to_array().map(f32::to_bits);
+    let positions = [batch.position, batch.output.antialias.samples(), 0, 0];
+    let finish = [[r, g, b, view_cell_m.to_bits()], positions].concat();
+    let finish = gpu.buffer_with("finish", &finish, BufferUsages::UNIFORM);
     for (camera, target) in surfaces.iter().enumerate() {
         let Recording { batch, cameras, sums, .. } = recording;
-        let buffers: [&Buffer; 5] = [cameras, &words, &sums.buffer, &finish, &batch.work.scene.illumination];
+        let buffers: [&Buffer; 6] = [
+            cameras,
+            &planes.words,
+            &sums.buffer,
+            &finish,
+            &batch.work.scene.illumination,
+            planes.position_sums.as_deref().unwrap_or(&planes.words),
+        ];
         let own = pass.bind(0, bindings(&variant, buffers, target))?;
         recording.dispatch(&variant, &pass, &[&own], (camera, 1));
     }
-    Ok(words)
+    Ok(())
 }
 
 fn bindings<'r>(
     variant: &Finish,
-    [camera, words, sums, finish, illumination]: [&'r Buffer; 5],
+    [camera, words, sums, finish, illumination, position_sums]: [&'r Buffer; 6],
     target: &'r Surfaces,
 ) -> Vec<Binding<'r>> {
     let mut bindings = vec![
@@ -103,6 +132,8 @@ fn bindings<'r>(
     ];
     bindings.extend(target.bindings());
     bindings.extend(variant.output.highlight.map(|_| Binding::buffer("illumination", illumination)));
+    let is_averaged = variant.output.antialias > Antialias::NONE;
+    bindings.extend(is_averaged.then(|| Binding::buffer("position_sums", position_sums)));
     let ids = target.surface_ids.as_ref().filter(|_| variant.output.surface_id);
     bindings.extend(ids.map(|ids| Binding::texture("surface_ids", ids)));
     bindings.extend(variant.output.passed.then(|| Binding::texture("front_depth", &target.views.front_depth)));
@@ -119,7 +150,7 @@ mod tests {
         let stage = TestStage::new();
         for variant in Finish::all() {
             let target = stage.surfaces(variant.by_rays, variant.output.surface_id);
-            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 5], &target));
+            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 6], &target));
         }
     }
 }

@@ -13,6 +13,10 @@
 @group(0) var<storage, read_write> words: array<u32>;
 @group(0) var<storage, read> sums: array<f32>;
 @group(0) var<uniform> finish: Finish;
+{% if averaged %}
+// Red, green and blue of each pixel: linear light, over the positions so far.
+@group(0) var<storage, read_write> position_sums: array<f32>;
+{% endif %}
 {% if highlight %}
 @group(0) var<uniform> illumination: Illumination;
 {% endif %}
@@ -25,7 +29,8 @@
 {% endif %}
 {% include "sums.wgsl" %}
 
-struct Finish { background_linear: vec3f, view_cell_m: f32 }
+// The position within the pixels, of so many. One beyond them is the centre: it gives depth, and no colour.
+struct Finish { background_linear: vec3f, view_cell_m: f32, position: u32, position_count: u32 }
 {% if redundancy %}
 
 fn front_at(texel: vec2u) -> f32 { return textureLoad(front_depth, texel, 0){{ ".x" if by_rays else "" }}; }
@@ -47,6 +52,20 @@ fn visibility_word(word: u32, place: u32) -> u32 {
         shares[i] = sum_at(OPEN_TO_ENVIRONMENT + plane, place) / f32(rays);
     }
     return pack4x8unorm(shares);
+}
+{% endif %}
+
+{% if averaged %}
+
+// Adds the colour of one position, and gives the mean of all so far.
+fn mean_with(color: vec3f, place: u32) -> vec3f {
+    let first = 3u * (camera.first_word / {{ plane_count }}u + place);
+    var sum = select(color, vec3f(0.0), finish.position == finish.position_count);
+    if finish.position > 0u { sum += vec3f(position_sums[first], position_sums[first + 1u], position_sums[first + 2u]); }
+    position_sums[first] = sum.r;
+    position_sums[first + 1u] = sum.g;
+    position_sums[first + 2u] = sum.b;
+    return sum / f32(min(finish.position + 1u, finish.position_count));
 }
 {% endif %}
 
@@ -83,7 +102,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% if samples %}
     put(0u, place, rgb9e5_from_linear(color));
 {% else %}
-    put(0u, place, pack4x8unorm(vec4f(srgb_from_linear(color), 1.0)));
+    put(0u, place, pack4x8unorm(vec4f(srgb_from_linear({{ "mean_with(color, place)" if averaged else "color" }}), 1.0)));
 {% endif %}
 {% if redundancy %}
     // A hole lies behind redundant surfaces where nothing else is met: nothing is known of it.

@@ -45,8 +45,9 @@ pub(crate) const CAMERA_TRAITS: ResourceTraits = &[("camera", ResourceTrait::Dyn
 
 impl PixelCamera {
     /// Rays' seeds are the camera's place, and the pixel's from the forward axis: noise does not swim while nothing moves,
-    /// images that are blended do not share it, and a tile of an image has the image's.
-    pub fn of(camera: &PinholeCamera) -> Self {
+    /// images that are blended do not share it, and a tile of an image has the image's. Positions within a pixel do not share it
+    /// either.
+    pub fn of(camera: &PinholeCamera, position: u32) -> Self {
         let column = camera.world_from_camera * Vec3::X / camera.focal_px.x;
         let row = camera.world_from_camera * Vec3::NEG_Y / camera.focal_px.y;
         let corner = camera.forward_in_world() - column * camera.principal_px.x - row * camera.principal_px.y;
@@ -54,7 +55,7 @@ impl PixelCamera {
             .eye_in_world
             .to_array()
             .iter()
-            .fold(0u32, |seed, c| (seed ^ c.to_bits()).wrapping_mul(0x9e37_79b1).rotate_left(13));
+            .fold(position, |seed, c| (seed ^ c.to_bits()).wrapping_mul(0x9e37_79b1).rotate_left(13));
         Self {
             eye_in_world: camera.eye_in_world.to_array(),
             near_m: camera.near_m,

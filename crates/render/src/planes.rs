@@ -2,8 +2,8 @@
 //! and depth images.
 
 use depth_image::{
-    Camera, DepthImage, Highlight, PinholeCamera, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View,
-    ViewPlanes,
+    Antialias, Camera, DepthImage, Highlight, PinholeCamera, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId,
+    View, ViewPlanes,
 };
 
 use crate::sums::SumPlanes;
@@ -14,6 +14,10 @@ pub(crate) struct Output {
     pub sums: SumPlanes,
     /// Samples of depth images, or else colours of views.
     pub samples: bool,
+    /// Positions within a pixel whose mean is a view's colour.
+    pub antialias: Antialias,
+    /// Whether depth is wanted, which is the centre's.
+    pub depth: bool,
     /// Highlights of a view, for its own eye.
     pub highlight: Option<Highlight>,
     pub normal: bool,

@@ -60,9 +60,9 @@ impl Renderer {
         planes: ViewPlanes,
     ) -> Result<Vec<View>, RenderError> {
         self.check(cameras)?;
-        self.draw(work, cameras, views_output(work), None, |words, output, cameras| {
-            planes::views(words, output, cameras, planes)
-        })
+        let (antialias, depth) = (planes.antialias, planes.inverse_depth || planes.provenance);
+        let output = Output { antialias, depth, ..views_output(work) };
+        self.draw(work, cameras, output, None, |words, output, cameras| planes::views(words, output, cameras, planes))
     }
 
     /// Depth images, in as few submissions as memory allows.
@@ -305,7 +305,7 @@ impl Renderer {
         };
         let needs_tree = by_rays || work.lighting.is_traced();
         let traced = needs_tree.then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
-        Ok(Batch { work, cameras, by_rays, traced, output, sequence })
+        Ok(Batch { work, cameras, by_rays, traced, output, sequence, position: 0 })
     }
 
     /// The pixels for which no buffer of a batch is larger than the device binds.

@@ -6,6 +6,7 @@ use gpu::{BufferPool, Frame, FrameResult, Gpu, JobLimit, PassCache, Readback, Te
 
 use crate::accumulation::{Accumulations, Sums};
 use crate::batch::{Batch, Recording};
+use crate::finish::Planes;
 use crate::known_samples::{ImageSequence, Predecessors};
 use crate::pieces::{Piece, Pieces};
 use crate::surfaces::{SurfaceKind, SurfacePool, Surfaces};
@@ -52,16 +53,23 @@ impl Stages {
         let slice_px = gpu.device_queue.slice_units(batch.family(), batch.unknown_slice_px());
         let pieces = Pieces::of(batch.cameras, slice_px);
         let cameras = batch.uniform_of_all(gpu, &pieces, &sums);
+        let shifted = batch.positions();
+        let positions: Vec<Batch<'_>> = shifted.iter().map(|position| batch.at(position)).collect();
         let frame = Frame::begin(gpu, "draw", turn);
-        let mut recording = Recording { gpu, passes, pool, batch, pieces, cameras, sums, visit_counts, frame };
-        let surfaces = self.find_surfaces(&mut recording)?;
-        let lists = self.light(&mut recording, &surfaces)?;
-        let words = finish::record(&mut recording, &surfaces)?;
+        let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, visit_counts, frame };
+        let surfaces: Vec<Surfaces> = (0..batch.cameras.len()).map(|place| self.lend(batch, place)).collect();
+        let planes = Planes::lend(gpu, pool, batch)?;
+        let mut lists = Vec::new();
+        for position in &positions {
+            recording.cameras = position.uniform_of_all(gpu, &recording.pieces, &recording.sums);
+            recording.batch = position;
+            lists.extend(self.record_position(&mut recording, &surfaces, &planes)?);
+        }
         let Recording { sums, mut frame, .. } = recording;
         let bytes = batch.bytes(batch.output.layout().count);
-        let read = frame.read_back(&words, 0..bytes, pool.lend_host("planes read-back", bytes.max(4)));
+        let read = frame.read_back(&planes.words, 0..bytes, pool.lend_host("planes read-back", bytes.max(4)));
         let result = frame.submit()?.wait()?;
-        drop((surfaces, lists, words));
+        drop((surfaces, lists, planes));
         if batch.work.refinement.goes_on() {
             self.accumulations.put(batch.key(), sums);
         }
@@ -79,15 +87,20 @@ impl Stages {
         Ok(kept.unwrap_or_else(|| Sums { buffer: buffer(), rays: wanted.map(|rays| 0..rays) }))
     }
 
-    /// Records which surface each pixel shows.
-    fn find_surfaces(&self, recording: &mut Recording<'_>) -> Result<Vec<Surfaces>, RenderError> {
-        let batch = recording.batch;
-        let surfaces: Vec<Surfaces> = (0..batch.cameras.len()).map(|place| self.lend(batch, place)).collect();
-        match batch.sequence {
-            Some(sequence) => self.find_in_sequence(recording, sequence, &surfaces)?,
-            None => self.find(recording, (0, &surfaces), None)?,
+    /// Records one position within the pixels: which surface each shows, its light, and its planes.
+    fn record_position(
+        &self,
+        recording: &mut Recording<'_>,
+        surfaces: &[Surfaces],
+        planes: &Planes,
+    ) -> Result<Vec<PixelList>, RenderError> {
+        match recording.batch.sequence {
+            Some(sequence) => self.find_in_sequence(recording, sequence, surfaces)?,
+            None => self.find(recording, (0, surfaces), None)?,
         }
-        Ok(surfaces)
+        let lists = if recording.batch.has_color() { self.light(recording, surfaces)? } else { Vec::new() };
+        finish::record(recording, surfaces, planes)?;
+        Ok(lists)
     }
 
     /// Image after image: each consults those before it.

@@ -10,7 +10,7 @@ use cluster::{
     SceneRef, SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
 };
 use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
-use depth_image::{Aabb, Camera, Environment, Illumination, Light, MAX_LIGHTS, PinholeCamera, ViewPlanes};
+use depth_image::{Aabb, Antialias, Camera, Environment, Illumination, Light, MAX_LIGHTS, PinholeCamera, ViewPlanes};
 use glam::{DVec3, UVec2, Vec3};
 
 use crate::convert::Convert;
@@ -103,7 +103,7 @@ fn request() -> SessionRequest {
         volume: None,
         typical_view: camera(),
         views_per_set: 12,
-        planes: ViewPlanes { inverse_depth: true, provenance: false },
+        planes: ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::WITH_DEPTH },
         timeline: Timeline::still(0.0),
         policy: PolicyChoice::Auto,
         forced_sampler_count: None,
@@ -295,6 +295,7 @@ fn bad_counts_are_refused_by_field() {
     assert!(spoilt_views(|m| m.views.clear()).contains("views is missing"));
     assert!(spoilt_views(|m| m.views = vec![proto::RequestedView::default(); 1_000_000]).contains("views has 1000000"));
     assert!(spoilt_views(|m| m.frame_codec = "x".repeat(300)).contains("frame_codec"));
+    assert!(spoilt_views(|m| m.antialias_sample_count = 3).contains("antialias_sample_count is 3"));
     assert!(spoilt_views(|m| m.reconstruction_method.clear()).contains("reconstruction_method"));
     let spoilt = |spoil: &dyn Fn(&mut proto::OpenSessionRequest)| {
         let mut message = to_message::<proto::OpenSessionRequest, _>(request());
@@ -314,6 +315,7 @@ fn bad_counts_are_refused_by_field() {
     assert!(spoilt(&|m| m.fallbacks = vec![m.fallbacks[0].clone(); 17]).contains("fallbacks has 17"));
     assert!(spoilt(&|m| m.fallbacks[0].sample_side_ratio = 1.5).contains("fallbacks.sample_side_ratio is 1.5"));
     assert!(spoilt(&|m| m.fallbacks[0].frame_rate_ratio = 0.0).contains("fallbacks.frame_rate_ratio is 0"));
+    assert!(spoilt(&|m| m.antialias_sample_count = 32).contains("antialias_sample_count is 32"));
     assert!(spoilt(&|m| m.refinement_step_count = 65).contains("refinement_step_count is 65"));
 }
 
@@ -425,6 +427,7 @@ fn header() -> FrameHeader {
         is_neighbour_cell: false,
         camera: camera(),
         size_px: camera().size_px,
+        antialias: Antialias::MOST,
         codec: FrameCodec::Lz4,
         color_bytes: 4,
         inverse_depth_bytes: 0,

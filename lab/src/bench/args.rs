@@ -33,6 +33,9 @@ pub struct BenchArgs {
     /// Nodes P that share the device
     #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub(super) nodes: u16,
+    /// Measures samples a pixel alone: time, error and cost of 1 to 16, on built-in scenes and on two of --models
+    #[arg(long)]
+    pub(super) antialias: bool,
     /// Where the report goes
     #[arg(long, default_value = "out/bench", value_name = "DIR")]
     pub(super) out: PathBuf,

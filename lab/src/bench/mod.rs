@@ -2,6 +2,7 @@
 
 mod adaptive;
 mod animation;
+mod antialias;
 mod args;
 mod codec;
 mod convergence;

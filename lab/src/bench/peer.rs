@@ -1,5 +1,6 @@
 //! Views against an independent synthesiser's: MPEG's RVS 4.0 on the same samples and cameras.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use app_core::camera_file::{self, Placement};
@@ -37,11 +38,7 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
             .extend(COMPARISONS.map(|(name, unit, bar, _)| Check::not_run(name, unit, bar, "--peer is not given")));
         return Ok(());
     };
-    let scene = SceneArgs {
-        lighting: Lighting::UNLIT,
-        samples: Some(folder.join("samples.json")),
-        ..scene_args(SceneSpec::File(folder.join("bench.ply")))
-    };
+    let scene = scene(folder);
     let setup = scene.load()?;
     let views = views(args, &setup, folder)?;
     let reference = ReferenceViews::draw(engine, &setup, &scene, views)?;
@@ -51,7 +48,16 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
     Ok(())
 }
 
-fn views(args: &BenchArgs, setup: &Setup, folder: &std::path::Path) -> anyhow::Result<Vec<PinholeCamera>> {
+/// The scene of a folder, unlit as the peer shows it.
+pub(super) fn scene(folder: &Path) -> SceneArgs {
+    SceneArgs {
+        lighting: Lighting::UNLIT,
+        samples: Some(folder.join("samples.json")),
+        ..scene_args(SceneSpec::File(folder.join("bench.ply")))
+    }
+}
+
+pub(super) fn views(args: &BenchArgs, setup: &Setup, folder: &Path) -> anyhow::Result<Vec<PinholeCamera>> {
     let near_m = setup.offer.volume.near_m();
     let placement = Placement { origin_in_source: setup.scene.origin_in_source, near_m };
     let all = camera_file::read(&folder.join("views.json"), placement)?;

@@ -1,11 +1,12 @@
 //! The order of the bench.
 
 use app_core::exit::Outcome;
+use engine::GpuEngine;
 use node::Engine as _;
 use study::{Bar, Check, Report};
 
 use super::args::{BenchArgs, Part};
-use super::{adaptive, animation, codec, convergence, fronts, light, peer, rays, sampling, throughput};
+use super::{adaptive, animation, antialias, codec, convergence, fronts, light, peer, rays, sampling, throughput};
 use crate::experiment::Experiment;
 use crate::memory::peak_memory_mb;
 use crate::reference_views::ReferenceViews;
@@ -21,10 +22,11 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
         Some(Part::Scaling(args)) => return scaling::command::run(args),
         Some(Part::Sharing(args)) => return sharing::command::run(args),
         Some(Part::Viewer(args)) => return viewer::command::run(args),
+        None if args.antialias => return antialias_alone(args),
         None => (),
     }
     let experiment = Experiment::start(args.scene.clone(), Vec::new(), args.device.device, usize::from(args.nodes))?;
-    let mut report = new_report(args, &experiment);
+    let mut report = new_report(args, &experiment.engine.device_name());
     println!("{} on {}", args.scene.scene, experiment.engine.device_name());
     throughput::delivered(args, &experiment, &mut report)?;
     let views = experiment.views(args.compared_views())?;
@@ -54,14 +56,26 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
         Bar::AtMost(1500.0),
         "the device has memory of its own",
     ));
+    print_and_write(args, &report)
+}
+
+/// Samples a pixel alone.
+fn antialias_alone(args: &BenchArgs) -> anyhow::Result<Outcome> {
+    let engine = GpuEngine::shared(args.device.device)?;
+    let mut report = new_report(args, &engine.device_name());
+    antialias::measure(args, &engine, &mut report)?;
+    print_and_write(args, &report)
+}
+
+fn print_and_write(args: &BenchArgs, report: &Report) -> anyhow::Result<Outcome> {
     report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
     println!();
     let ok = report.finish(&args.out)?;
     Ok(Outcome::of(ok || !args.strict))
 }
 
-fn new_report(args: &BenchArgs, experiment: &Experiment) -> Report {
-    let mut report = Report::new("Myriorama bench", experiment.engine.device_name());
+fn new_report(args: &BenchArgs, device: &str) -> Report {
+    let mut report = Report::new("Myriorama bench", device);
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
     report.parameter("scene", args.scene.scene.to_string());
     report.parameter("method", args.scene.method.to_string());

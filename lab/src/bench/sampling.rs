@@ -127,7 +127,7 @@ fn upload(subject: &Subject, engine: &GpuEngine, images: &[DepthImage]) -> anyho
 }
 
 fn view(engine: &GpuEngine, set: &SampleSet, camera: &PinholeCamera, method: &str) -> anyhow::Result<View> {
-    let planes = ViewPlanes { inverse_depth: false, provenance: true };
+    let planes = ViewPlanes::WITH_PROVENANCE;
     let views = engine.reconstructor.reconstruct(set, std::slice::from_ref(camera), method.parse()?, planes)?;
     views.into_iter().next().ok_or_else(|| anyhow::anyhow!("no view came"))
 }

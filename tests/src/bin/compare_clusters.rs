@@ -150,7 +150,7 @@ fn request(row: Row, typical_view: PinholeCamera) -> SessionRequest {
         volume: None,
         typical_view,
         views_per_set: VIEWS as u32,
-        planes: ViewPlanes { inverse_depth: true, provenance: true },
+        planes: ViewPlanes::ALL,
         timeline: Timeline { start_s: 0.25, step_s: 0.5, set_count: 2 },
         policy: row.policy,
         forced_sampler_count: None,

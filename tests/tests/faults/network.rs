@@ -221,7 +221,7 @@ async fn a_client_that_does_not_read_delays_no_other() {
         set_index: 0,
         method: "splat".to_owned(),
         codec: FrameCodec::Lz4,
-        planes: ViewPlanes { inverse_depth: true, provenance: true },
+        planes: ViewPlanes::ALL,
         views: (0..4096).map(view).collect(),
         live: None,
     };

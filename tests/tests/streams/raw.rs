@@ -123,7 +123,7 @@ pub fn greedy(session: &Session, side_px: u32, count: u64) -> RenderViews {
         set_index: 0,
         method: "splat".to_owned(),
         codec: FrameCodec::Lz4,
-        planes: ViewPlanes { inverse_depth: true, provenance: true },
+        planes: ViewPlanes::ALL,
         views: (0..count).map(view).collect(),
         live: None,
     }

@@ -144,7 +144,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let pixel = pixel_of(at);
     let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
     if span.near > span.far {
-        write_pixel(pixel.index, work.background_srgb8, 0.0, PROVENANCE_EMPTY);
+        write_pixel(pixel.index, 0u, 0.0, PROVENANCE_EMPTY);
         return;
     }
     let rays = image_rays(pixel.direction);

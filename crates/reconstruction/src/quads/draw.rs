@@ -53,6 +53,9 @@ fn target_bytes(&(size_px, count): &TargetKind) -> u64 {
     8 * u64::from(size_px.x) * u64::from(size_px.y) * u64::from(count)
 }
 
+/// Targets of a batch of views.
+pub(crate) type QuadTargets = Lent<TargetKind, Targets>;
+
 /// Drawing passes, and the targets of the last batches: most are alike.
 pub(crate) struct QuadDrawing {
     passes: PassCache<DrawPass>,
@@ -101,7 +104,7 @@ impl QuadDrawing {
         Self { passes: PassCache::new(gpu, templates), targets: Pool::of_device(gpu, MOST_FREE_BYTES, target_bytes) }
     }
 
-    fn targets(&self, gpu: &Gpu, kind: TargetKind) -> Result<Lent<TargetKind, Targets>, GpuError> {
+    fn targets(&self, gpu: &Gpu, kind: TargetKind) -> Result<QuadTargets, GpuError> {
         let (limits, (size_px, views)) = (gpu.device.limits(), kind);
         let (side_px, layers) = (limits.max_texture_dimension_2d, limits.max_texture_array_layers);
         GpuError::check_limit("a drawn view's side (px)", size_px.max_element().into(), side_px.into())?;
@@ -113,15 +116,16 @@ impl QuadDrawing {
     }
 }
 
-/// Draws all images' quads into every view.
+/// Draws all images' quads into every view, in the targets of the batch.
 pub(super) fn record(
     drawing: &QuadDrawing,
     recording: &mut Recording<'_>,
     mesh: &Mesh,
-) -> Result<Lent<TargetKind, Targets>, ReconstructionError> {
+) -> Result<(), ReconstructionError> {
     let gpu = &recording.device.gpu;
     let quads = drawing.passes.get(&DrawQuads(mesh.cut.vertices))?;
-    let targets = drawing.targets(gpu, (recording.batch.size_px, recording.batch.cameras.len() as u32))?;
+    let views = (recording.batch.size_px, recording.batch.cameras.len() as u32);
+    let targets = recording.batch.targets.take().map_or_else(|| drawing.targets(gpu, views), Ok)?;
     let works = gpu.buffer_with("quads of views", &quad_works(recording), BufferUsages::UNIFORM);
     let bound = quads.bind(0, [Binding::buffer("work", &works)])?;
     let mut offsets = (0..).step_by(uniform_stride(size_of::<GpuQuadWork>() as u32) as usize);
@@ -142,7 +146,8 @@ pub(super) fn record(
             recording.frame.cut(kind, images.iter().map(vertices).sum());
         }
     }
-    Ok(targets)
+    recording.batch.targets = Some(targets);
+    Ok(())
 }
 
 /// The family of drawing quads, whose units are vertices.

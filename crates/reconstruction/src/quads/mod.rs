@@ -18,7 +18,7 @@ pub use corner_planes::RequiredPlanes;
 pub(crate) use cut::GpuCutWork;
 #[cfg(test)]
 pub(crate) use draw::GpuQuadWork;
-pub(crate) use draw::QuadDrawing;
+pub(crate) use draw::{QuadDrawing, QuadTargets};
 #[cfg(feature = "scalar")]
 pub(crate) use merge::GREATEST_EXTENT;
 pub(crate) use merge::record as merge;

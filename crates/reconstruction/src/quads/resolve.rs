@@ -16,7 +16,7 @@ pub(crate) fn record(
     mesh: Option<&Mesh>,
 ) -> Result<PixelList, ReconstructionError> {
     let mesh = mesh.expect("methods that draw are handed their mesh");
-    let drawn = draw::record(drawing, recording, mesh)?;
+    draw::record(drawing, recording, mesh)?;
     let resolve = Resolve(recording.variant());
-    surface::record(recording, &resolve, None, &drawn.bindings())
+    surface::record(recording, &resolve, None, &[])
 }

@@ -1,6 +1,6 @@
 //! Twin of `quads/draw.wgsl` and `quads/resolve.wgsl`: triangles met by rays, then coloured by all cameras.
 
-use depth_image::{DepthImage, PinholeCamera, ProvenanceKind, linear_from_rgb9e5, srgb8_from_linear};
+use depth_image::{DepthImage, PinholeCamera, ProvenanceKind, linear_from_rgb9e5};
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{
@@ -26,7 +26,6 @@ pub(super) fn drawn(
     cameras: &[SampleCamera],
     view: &PinholeCamera,
     rays: &ViewRays,
-    background_linear: Vec3,
 ) -> Vec<Pixel> {
     let mut nearest = vec![None; view.pixel_count()];
     for quad in quads {
@@ -35,10 +34,9 @@ pub(super) fn drawn(
             draw(&mut nearest, view, rays, triangle, (quad.image, sample));
         }
     }
-    let background_srgb8 = background_linear.to_array().map(srgb8_from_linear);
     let resolve = |(place, drawn): (UVec2, Option<Drawn>)| match drawn {
         Some(drawn) => resolved(drawn, images, cameras, &rays.ray(place)),
-        None => Pixel::without_surface(kind_of_nothing(cameras, &rays.ray(place)), background_srgb8),
+        None => Pixel::without_surface(kind_of_nothing(cameras, &rays.ray(place))),
     };
     rays.places().zip(nearest).map(resolve).collect()
 }

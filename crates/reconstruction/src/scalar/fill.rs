@@ -1,6 +1,6 @@
 //! Twin of `fill.wgsl`: what no camera knows gets the colour of the farther side of its gap.
 
-use depth_image::{ProvenanceKind, linear_from_srgb8, srgb8_from_linear};
+use depth_image::ProvenanceKind;
 use glam::{IVec2, UVec2, Vec3};
 
 use super::pixel::Pixel;
@@ -32,9 +32,9 @@ fn fill_pixel(pixel: &mut Pixel, neighbours: &[Neighbour]) {
     let weights: f32 = far_side().map(|n| n.weight).sum();
     // Nothing is known within reach: the background stays.
     if weights > 0.0 {
-        let color: Vec3 = far_side().map(|n| Vec3::from(n.pixel.srgb8.map(linear_from_srgb8)) * n.weight).sum();
+        let color: Vec3 = far_side().map(|n| n.pixel.color_linear * n.weight).sum();
         let depth: f32 = far_side().map(|n| n.pixel.inverse_depth_per_m * n.weight).sum();
-        pixel.srgb8 = (color / weights).to_array().map(srgb8_from_linear);
+        pixel.color_linear = color / weights;
         pixel.inverse_depth_per_m = depth / weights;
     }
 }

@@ -51,17 +51,11 @@ struct InNode {
 }
 
 /// Marches in the nearest cameras, one after another; what they leave is carved by all together.
-pub(super) fn joint_carve(
-    cameras: &[SampleCamera],
-    ray: &ViewRay,
-    start: f32,
-    stop_level: u32,
-    background_srgb8: [u8; 3],
-) -> Pixel {
+pub(super) fn joint_carve(cameras: &[SampleCamera], ray: &ViewRay, start: f32, stop_level: u32) -> Pixel {
     let mut t = ray.near.max(start);
     for marched in cameras.iter().take(MARCHES) {
         if t >= ray.far {
-            return Pixel::without_surface(ProvenanceKind::Empty, background_srgb8);
+            return Pixel::without_surface(ProvenanceKind::Empty);
         }
         let found = march(marched, ray, t);
         t = found.t;
@@ -70,10 +64,10 @@ pub(super) fn joint_carve(
             return Pixel::hit(blend.color_linear, t, blend.camera_mask);
         }
     }
-    carve(cameras, ray, t, stop_level, background_srgb8)
+    carve(cameras, ray, t, stop_level)
 }
 
-fn carve(cameras: &[SampleCamera], ray: &ViewRay, begin: f32, stop_level: u32, background_srgb8: [u8; 3]) -> Pixel {
+fn carve(cameras: &[SampleCamera], ray: &ViewRay, begin: f32, stop_level: u32) -> Pixel {
     let start_level = START_LEVEL.max(stop_level);
     let (mut t, mut level, mut hit, mut known) = (begin, start_level, false, true);
     let among_holes = cameras.iter().any(|camera| camera.among_holes);
@@ -113,7 +107,7 @@ fn carve(cameras: &[SampleCamera], ray: &ViewRay, begin: f32, stop_level: u32, b
         return Pixel::hit(blend.color_linear, t, blend.camera_mask);
     }
     let empty = !hit && known && t >= ray.far;
-    Pixel::without_surface(if empty { ProvenanceKind::Empty } else { ProvenanceKind::Filled }, background_srgb8)
+    Pixel::without_surface(if empty { ProvenanceKind::Empty } else { ProvenanceKind::Filled })
 }
 
 /// How far the way is free for any camera, and the least penetration. A crossing farther on than the

@@ -16,15 +16,9 @@ struct Evaluation {
     seen: bool,
 }
 
-pub(super) fn light_field_search(
-    cameras: &[SampleCamera],
-    ray: &ViewRay,
-    start: f32,
-    steps: u32,
-    background_srgb8: [u8; 3],
-) -> Pixel {
+pub(super) fn light_field_search(cameras: &[SampleCamera], ray: &ViewRay, start: f32, steps: u32) -> Pixel {
     if ray.near > ray.far {
-        return Pixel::without_surface(ProvenanceKind::Empty, background_srgb8);
+        return Pixel::without_surface(ProvenanceKind::Empty);
     }
     let stride = (ray.far - ray.near) / steps as f32;
     // The last step that is proven free need not be taken.
@@ -52,7 +46,7 @@ pub(super) fn light_field_search(
     let found = if entered { most_conservative(cameras, ray, high) } else { None };
     match found {
         Some(camera) => Pixel::hit(color(camera, ray, high), high, camera.mask),
-        None => Pixel::without_surface(missed, background_srgb8),
+        None => Pixel::without_surface(missed),
     }
 }
 

@@ -17,7 +17,7 @@ mod surface;
 mod tile_start;
 mod view_ray;
 
-use depth_image::{Aabb, DepthImage, PinholeCamera, View, srgb8_from_linear};
+use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, View, srgb8_from_linear};
 use glam::Vec3;
 
 use self::{pixel::Pixel, sample_camera::SampleCamera, view_ray::ViewRays};
@@ -31,15 +31,55 @@ pub fn reconstruct(
     camera: &PinholeCamera,
     method: ReconstructionMethod,
 ) -> View {
+    view(&pixels(images, set, camera, method), set, camera)
+}
+
+/// As [`reconstruct`], with the mean colour of several positions a pixel.
+#[must_use]
+pub fn reconstruct_antialiased(
+    images: &[DepthImage],
+    set: &SetDescription<'_>,
+    camera: &PinholeCamera,
+    method: ReconstructionMethod,
+    antialias: Antialias,
+) -> View {
+    let mut sums = vec![Vec3::ZERO; camera.pixel_count()];
+    for offset_px in antialias.offsets_px() {
+        let shifted = pixels(images, set, &camera.with_offset(offset_px), method);
+        sums.iter_mut().zip(&shifted).for_each(|(sum, pixel)| *sum += shown_linear(pixel, set));
+    }
+    let mean = |sum: &Vec3| *sum / antialias.samples() as f32;
+    let srgb8 = sums.iter().flat_map(|sum| mean(sum).to_array().map(srgb8_from_linear)).collect();
+    View { srgb8, ..reconstruct(images, set, camera, method) }
+}
+
+fn pixels(
+    images: &[DepthImage],
+    set: &SetDescription<'_>,
+    camera: &PinholeCamera,
+    method: ReconstructionMethod,
+) -> Vec<Pixel> {
     let cameras = nearest_first(images, camera);
     let rays = ViewRays::of(camera, &set.volume, images);
-    if let Some(quads) = quads(images, method) {
-        let pixels = draw::drawn(&quads, images, &cameras, camera, &rays, set.background_linear);
-        return finished(pixels, images, set, &cameras, &rays);
+    let found = match quads(images, method) {
+        Some(quads) => draw::drawn(&quads, images, &cameras, camera, &rays),
+        None => pixels_from(&cameras, &rays, &tile_start::tile_starts(&cameras, &rays), method),
+    };
+    finished(found, images, set, &cameras, &rays)
+}
+
+/// What a pixel shows: its surface, or the background.
+fn shown_linear(pixel: &Pixel, set: &SetDescription<'_>) -> Vec3 {
+    if pixel.inverse_depth_per_m > 0.0 { pixel.color_linear } else { set.background_linear }
+}
+
+fn view(pixels: &[Pixel], set: &SetDescription<'_>, camera: &PinholeCamera) -> View {
+    View {
+        size_px: camera.size_px,
+        srgb8: pixels.iter().flat_map(|p| shown_linear(p, set).to_array().map(srgb8_from_linear)).collect(),
+        inverse_depth_per_m: Some(pixels.iter().map(|p| p.inverse_depth_per_m).collect()),
+        provenance: Some(pixels.iter().map(|p| p.provenance).collect()),
     }
-    let starts = tile_start::tile_starts(&cameras, &rays);
-    let pixels = pixels_from(&cameras, &rays, &starts, set.background_linear, method);
-    finished(pixels, images, set, &cameras, &rays)
 }
 
 /// As [`reconstruct`], but each ray is followed from where it enters the volume. Tile starts must not change the view,
@@ -54,8 +94,8 @@ pub fn reconstruct_from_entry(
     let cameras = nearest_first(images, camera);
     let rays = ViewRays::of(camera, &set.volume, images);
     let starts = vec![0.0; rays.tiles().element_product() as usize];
-    let pixels = pixels_from(&cameras, &rays, &starts, set.background_linear, method);
-    finished(pixels, images, set, &cameras, &rays)
+    let found = pixels_from(&cameras, &rays, &starts, method);
+    view(&finished(found, images, set, &cameras, &rays), set, camera)
 }
 
 /// For each tile of 8 × 8 pixels, row by row, the planar depth in metres up to which its rays need not be
@@ -91,24 +131,17 @@ fn nearest_first(images: &[DepthImage], camera: &PinholeCamera) -> Vec<SampleCam
 }
 
 /// The pixels that the method finds, row by row.
-fn pixels_from(
-    cameras: &[SampleCamera],
-    rays: &ViewRays,
-    starts: &[f32],
-    background_linear: Vec3,
-    method: ReconstructionMethod,
-) -> Vec<Pixel> {
-    let background_srgb8 = background_linear.to_array().map(srgb8_from_linear);
+fn pixels_from(cameras: &[SampleCamera], rays: &ViewRays, starts: &[f32], method: ReconstructionMethod) -> Vec<Pixel> {
     rays.places()
         .map(|place| {
             let ray = rays.ray(place);
             let start = starts[rays.tile_index(place)];
             match method {
                 ReconstructionMethod::LightFieldSearch { steps } => {
-                    light_field_search::light_field_search(cameras, &ray, start, steps, background_srgb8)
+                    light_field_search::light_field_search(cameras, &ray, start, steps)
                 }
                 ReconstructionMethod::JointCarve { stop_level } => {
-                    joint_carve::joint_carve(cameras, &ray, start, stop_level, background_srgb8)
+                    joint_carve::joint_carve(cameras, &ray, start, stop_level)
                 }
                 ReconstructionMethod::Mesh | ReconstructionMethod::HybridMesh { .. } => {
                     unreachable!("meshes are drawn, not searched")
@@ -125,13 +158,8 @@ fn finished(
     set: &SetDescription<'_>,
     cameras: &[SampleCamera],
     rays: &ViewRays,
-) -> View {
+) -> Vec<Pixel> {
     fill::fill(&mut pixels, rays.size_px());
     specular::add_highlights(&mut pixels, images, set, cameras, rays);
-    View {
-        size_px: rays.size_px(),
-        srgb8: pixels.iter().flat_map(|p| p.srgb8).collect(),
-        inverse_depth_per_m: Some(pixels.iter().map(|p| p.inverse_depth_per_m).collect()),
-        provenance: Some(pixels.iter().map(|p| p.provenance).collect()),
-    }
+    pixels
 }

@@ -1,9 +1,6 @@
 //! Twin of `specular.wgsl`: the light that depends on the viewer, on pixels that show a surface.
 
-use depth_image::{
-    DepthImage, Highlight, ProvenanceKind, Reflector, highlight_linear, linear_from_srgb8, srgb8_from_linear,
-    unit_from_oct16,
-};
+use depth_image::{DepthImage, Highlight, ProvenanceKind, Reflector, highlight_linear, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{
@@ -34,9 +31,7 @@ pub(super) fn add_highlights(
 ) {
     let Some(highlight) = set.highlight else { return };
     for (pixel, place) in pixels.iter_mut().zip(rays.places()) {
-        let added = added_linear(pixel, images, (set, highlight), cameras, &rays.ray(place));
-        let color = Vec3::from(pixel.srgb8.map(linear_from_srgb8)) + added;
-        pixel.srgb8 = color.to_array().map(srgb8_from_linear);
+        pixel.color_linear += added_linear(pixel, images, (set, highlight), cameras, &rays.ray(place));
     }
 }
 

@@ -16,7 +16,7 @@ pub const SAMPLE_PX: UVec2 = UVec2::new(96, 72);
 pub const VIEW_PX: UVec2 = UVec2::new(64, 48);
 pub const CARVE: ReconstructionMethod = ReconstructionMethod::JointCarve { stop_level: 0 };
 pub const SEARCH: ReconstructionMethod = ReconstructionMethod::LightFieldSearch { steps: 64 };
-pub const ALL_PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: true };
+pub const ALL_PLANES: ViewPlanes = ViewPlanes::ALL;
 
 /// The redundancy test of sampling `non_redundant:pixel`.
 const APART: (&str, &str) = ("apart.wgsl", include_str!("../../../sampling/src/methods/non_redundant/pixel.wgsl"));

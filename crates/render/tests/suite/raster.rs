@@ -35,7 +35,7 @@ fn sample(scene: &Scene, camera: &PinholeCamera) -> DepthImage {
 }
 
 fn unlit_view(scene: &Scene, camera: &PinholeCamera) -> View {
-    let planes = ViewPlanes { inverse_depth: true, provenance: true };
+    let planes = ViewPlanes::ALL;
     device().1.draw_views(work(&upload(scene), Lighting::UNLIT, 0.0), &[*camera], planes).expect("a view").remove(0)
 }
 
@@ -128,7 +128,7 @@ fn unlit_colors_and_the_background_are_exact() {
     scene.background_linear = Vec3::new(0.2, 0.4, 0.6);
     let background = scene.background_linear.to_array().map(depth_image::srgb8_from_linear);
     for lighting in [Lighting::UNLIT, Lighting::default()] {
-        let planes = ViewPlanes { inverse_depth: true, provenance: true };
+        let planes = ViewPlanes::ALL;
         let on_device = upload(&scene);
         let view =
             device().1.draw_views(work(&on_device, lighting, 0.0), &[ahead()], planes).expect("a view").remove(0);

@@ -48,7 +48,7 @@ impl Shared {
     }
 
     fn views(&self, work: DrawWork<'_>) -> Vec<View> {
-        let planes = ViewPlanes { inverse_depth: true, provenance: true };
+        let planes = ViewPlanes::ALL;
         self.renderer.draw_views(work, &self.cameras, planes).expect("views")
     }
 

@@ -17,7 +17,7 @@ messages! {
     NodeStatus = NodeStatus { node_name, device_name; address: node_address, is_software: is_software_device };
     MeasureCostsRequest = MeasureCosts {
         workload, typical_views, batch_count; method: reconstruction_method, codec: frame_codec, in_background: is_background,
-        planes: with_inverse_depth | with_provenance
+        planes: antialias_sample_count | with_inverse_depth | with_provenance
     }, first |r| at_most(r.typical_views.len(), MAX_BATCH as usize, "typical_views"), then MeasureCosts::validate;
     MeasureCostsResponse = Measured { costs; planes: with_normals | with_corner_inverse_depths };
     ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then Ready::validate;

@@ -4,7 +4,7 @@ use std::num::NonZeroU32;
 
 use cluster::{InvalidField, MeasuredCosts, NodeStatus, OfferSettings, SamplePlanes, SceneHash, at_most};
 use codec::{InverseDepthRange, SampleSetId};
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::{Antialias, PinholeCamera, ViewPlanes};
 use glam::{DVec3, UVec2};
 use prost::bytes::Bytes;
 
@@ -201,7 +201,7 @@ macro_rules! flat {
 flat! {
     UVec2 { x: u32, y: u32 }
     DVec3 { x: f64, y: f64, z: f64 }
-    ViewPlanes { inverse_depth: bool, provenance: bool }
+    ViewPlanes { antialias: u32, inverse_depth: bool, provenance: bool }
     SamplePlanes { normals: bool, corner_inverse_depths: bool }
     InverseDepthRange { least_per_m: f32, greatest_per_m: f32 }
     SampleSetId { plan_epoch: u64, index: u32 }
@@ -231,6 +231,18 @@ impl<P, D: Convert<P>> Convert<Option<P>> for Option<D> {
 
     fn write(self) -> Option<P> {
         self.map(D::write)
+    }
+}
+
+/// Samples a pixel; none said is one.
+impl Convert<u32> for Antialias {
+    fn read(count: u32, _: &'static str) -> Result<Self, WireError> {
+        let refused = || InvalidField::out_of_range("antialias_sample_count", count, "1, 2, 4, 8 or 16");
+        Ok(Self::of(count.max(1)).ok_or_else(refused)?)
+    }
+
+    fn write(self) -> u32 {
+        self.samples()
     }
 }
 

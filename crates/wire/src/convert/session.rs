@@ -26,7 +26,7 @@ messages! {
         forced_tile_count, viewpoints;
         method: reconstruction_method, sampling: sampling_method, codec: frame_codec,
         sample_size_px: sample_image_size, views_per_set: views_per_set_count,
-        planes: with_inverse_depth | with_provenance, policy: policy_choice, refinement_steps: refinement_step_count
+        planes: antialias_sample_count | with_inverse_depth | with_provenance, policy: policy_choice, refinement_steps: refinement_step_count
     }, with protocol_version = PROTOCOL_VERSION, first check_request, then SessionRequest::validate;
     Quality = Quality { lighting, sample_side_ratio, frame_rate_ratio; method: reconstruction_method };
     ChangeSessionRequest = ChangeSession {

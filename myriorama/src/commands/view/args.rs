@@ -9,7 +9,7 @@ use app_core::sizes::{SizePx, grid};
 use clap::Args;
 use cluster::{OfferStatus, PolicyChoice};
 use codec::FrameCodec;
-use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
+use depth_image::{Antialias, Camera, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{DVec3, Vec3};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -42,6 +42,9 @@ pub struct ViewArgs {
     /// Requests only the views that --out does not have yet, as its cameras.json says. Settings must be the same
     #[arg(long, conflicts_with = "live")]
     pub(super) resume: bool,
+    /// Samples a pixel, whose mean in linear light is its colour: 1, 2, 4, 8 or 16. Depth and provenance are the centre's
+    #[arg(long, default_value = "4", value_name = "N")]
+    pub(super) antialias: Antialias,
     /// Writes the depth of every view as well
     #[arg(long)]
     pub(super) depth: bool,
@@ -54,8 +57,8 @@ pub struct ViewArgs {
     /// How surfaces are lit, as in "soft 16, occlusion 16" (see `myriorama up --help`) [default: the coordinator's]
     #[arg(long, value_name = "TERMS")]
     pub(super) lighting: Option<Lighting>,
-    /// Draws every view directly as well, and prints the PSNR, SSIM and FLIP of the views against it; also in
-    /// comparison.csv
+    /// Draws every view directly as well, and prints the PSNR, SSIM and FLIP of the views against it, over the
+    /// pixels that show a surface and over the whole picture; also in comparison.csv
     #[arg(long)]
     pub(super) compare: bool,
     /// With --compare: exit status 1 if the PSNR of a view is below
@@ -96,7 +99,7 @@ pub struct ViewArgs {
 
 impl ViewArgs {
     pub(super) fn planes(&self) -> ViewPlanes {
-        ViewPlanes { inverse_depth: self.depth, provenance: self.provenance }
+        ViewPlanes { antialias: self.antialias, inverse_depth: self.depth, provenance: self.provenance }
     }
 }
 

@@ -15,7 +15,10 @@ use crate::comparison;
 /// Asks for the same views drawn directly, and writes how far the written ones are from them. One frame at a time is compared;
 /// others wait at the client. A view takes 32 bytes, and its row of the table.
 pub(super) async fn compare(args: &ViewArgs, job: &Job, views: u64) -> anyhow::Result<Outcome> {
-    let direct = SessionRequest { method: DIRECT.to_owned(), policy: PolicyChoice::Auto, ..job.request.clone() };
+    // Depth tells where a surface is.
+    let planes = ViewPlanes { inverse_depth: true, ..job.request.planes };
+    let direct =
+        SessionRequest { method: DIRECT.to_owned(), policy: PolicyChoice::Auto, planes, ..job.request.clone() };
     let session = open(&job.client, direct).await?;
     let mut rows = Vec::with_capacity(views as usize);
     let received = async |frame: Frame| {

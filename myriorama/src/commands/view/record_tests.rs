@@ -2,7 +2,7 @@ use glam::{UVec2, Vec3};
 
 use super::*;
 
-const PLANES: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: false };
+const PLANES: ViewPlanes = ViewPlanes::WITH_DEPTH;
 
 fn camera(x_m: f32) -> PinholeCamera {
     PinholeCamera::looking_at(Vec3::new(x_m, 0.1, 3.0), Vec3::ZERO, Vec3::Y, 0.7, UVec2::new(8, 6))

@@ -16,6 +16,7 @@ pub(super) fn of(request: &SessionRequest, offer: &OfferStatus) -> Map<String, V
         ("method", request.method.clone()),
         ("policy", request.policy.to_string()),
         ("codec", request.codec.clone()),
+        ("antialias", planes.antialias.to_string()),
         ("depth", planes.inverse_depth.to_string()),
         ("provenance", planes.provenance.to_string()),
         ("size", format!("{}x{}", typical_view.size_px.x, typical_view.size_px.y)),

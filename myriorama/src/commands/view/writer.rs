@@ -61,8 +61,11 @@ impl PictureWriter {
 /// Writes the planes of a frame, each as a picture.
 fn write_frame(folder: &Path, frame: &Frame) -> anyhow::Result<Written> {
     let (number, view) = (frame.request.frame, &frame.view);
-    let planes =
-        ViewPlanes { inverse_depth: view.inverse_depth_per_m.is_some(), provenance: view.provenance.is_some() };
+    let planes = ViewPlanes {
+        inverse_depth: view.inverse_depth_per_m.is_some(),
+        provenance: view.provenance.is_some(),
+        ..ViewPlanes::default()
+    };
     let names = FileNames::of(number, planes);
     let color = pictures::rgb(view).context("a view is not of its size")?;
     save(&folder.join(names.color), color.into())?;
@@ -92,7 +95,7 @@ fn save(path: &Path, image: DynamicImage) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use codec::{FrameCodec, FrameHeader, SampleSetId, StageTimes};
-    use depth_image::{PinholeCamera, View};
+    use depth_image::{Antialias, PinholeCamera, View};
     use glam::{UVec2, Vec3};
 
     use super::*;
@@ -106,6 +109,7 @@ mod tests {
             is_neighbour_cell: false,
             camera,
             size_px,
+            antialias: Antialias::NONE,
             codec: FrameCodec::Lz4,
             color_bytes: 18,
             inverse_depth_bytes: 0,
@@ -118,7 +122,7 @@ mod tests {
         Frame { request: client::ViewRequest { frame: number, set_index: 0, camera }, view, header }
     }
 
-    const DEPTH: ViewPlanes = ViewPlanes { inverse_depth: true, provenance: false };
+    const DEPTH: ViewPlanes = ViewPlanes::WITH_DEPTH;
 
     #[tokio::test]
     async fn frames_of_any_order_are_whole_files() {

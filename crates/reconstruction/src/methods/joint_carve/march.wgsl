@@ -136,7 +136,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     // Proven empty up to where the volume ends. A pixel that is left undecided keeps how far it got where
     // its inverse depth will be.
     let empty = begin >= span.far;
-    let color = select(work.background_srgb8, srgb8_from_linear(blend.color_linear), hit && !empty);
+    let color = select(0u, rgb9e5_from_linear(blend.color_linear), hit && !empty);
     let provenance = select(PROVENANCE_HIT | (blend.camera_mask << 8u), PROVENANCE_EMPTY, empty);
     let depth = select(select(found.t, 1.0 / found.t, hit), 0.0, empty);
     write_pixel(pixel.index, color, depth, provenance);

@@ -1,0 +1,64 @@
+//! The colour that a pixel shows: the mean over its positions in linear light, as sRGB.
+
+use gpu::{Binding, ResourceTraits, ShaderVariant};
+use minijinja::{Value, context};
+
+use crate::view_work::{ONE_VIEW, SetVariant};
+use crate::{error::ReconstructionError, recording::Recording};
+
+/// What `antialias.wgsl` does with the sums over positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sums {
+    /// There is one position, and none are needed.
+    None,
+    /// The first position begins them.
+    Begun,
+    /// Another position is added.
+    Continued,
+    /// All positions are there.
+    Read,
+}
+
+/// The switches of `antialias.wgsl`.
+#[derive(Debug)]
+pub(crate) struct Shown {
+    set: SetVariant,
+    sums: Sums,
+}
+
+impl ShaderVariant for Shown {
+    const TEMPLATE: &'static str = "antialias.wgsl";
+    const TRAITS: ResourceTraits = ONE_VIEW;
+
+    fn context(&self) -> Value {
+        let sums = match self.sums {
+            Sums::None => "none",
+            Sums::Begun => "begun",
+            Sums::Continued => "continued",
+            Sums::Read => "read",
+        };
+        context! { sums, ..self.set.context() }
+    }
+
+    fn all() -> Vec<Self> {
+        let sums = [Sums::None, Sums::Begun, Sums::Continued, Sums::Read];
+        let sets = SetVariant::all().into_iter().filter(|set| !set.count_fetches && !set.holes);
+        sets.flat_map(|set| sums.map(|sums| Self { set, sums })).collect()
+    }
+}
+
+/// Adds a finished position to the sums, or writes the colours that the view shows.
+pub(crate) fn record(recording: &mut Recording<'_>, sums: Sums) -> Result<(), ReconstructionError> {
+    // Neither holes nor fetches matter here.
+    let set = SetVariant { holes: false, ..recording.set.variant() };
+    let variant = Shown { set, sums };
+    let pass = recording.device.passes.get(&variant)?;
+    let batch = &recording.batch;
+    let mut bindings = recording.view_bindings();
+    bindings.push(Binding::buffer("color", &batch.color));
+    bindings.push(Binding::buffer("inverse_depth", &batch.inverse_depth_per_m));
+    bindings.extend(batch.sums.as_ref().filter(|_| sums != Sums::None).map(|sums| Binding::buffer("sums", sums)));
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_pixels(&variant, &pass, &bound, None);
+    Ok(())
+}

@@ -1,0 +1,279 @@
+//! Samples a pixel: the time and the error of views with 1 to 16, against direct views with 64.
+
+use std::sync::Arc;
+
+use anyhow::Context as _;
+use app_core::setup::{SceneArgs, Setup};
+use depth_image::{Antialias, PinholeCamera, View, ViewCell, ViewPlanes, linear_from_srgb8, srgb8_from_linear};
+use engine::GpuEngine;
+use glam::{UVec2, Vec2};
+use metrics::{PictureErrors, Rgb8Image};
+use reconstruction::ReconstructionMethod;
+use scene::SceneSpec;
+use study::{Axis, Bar, Better, Check, Point, Report, Series, Table, XyChart};
+
+use super::args::BenchArgs;
+use super::fronts::models_of;
+use super::peer;
+use super::timing::in_turn;
+use crate::experiment::VIEW_SIZE_PX;
+use crate::progress::bar;
+use crate::reference_views::ReferenceViews;
+use crate::scene_args::scene_args;
+
+/// Scenes of the study beside models.
+const SCENES: [&str; 3] = ["tree-terrain-500k", "urban", "grass"];
+/// What FLIP with four samples a pixel may be at most, over that with one, for each of the scenes.
+const FLIP_BARS: [f64; 3] = [0.82, 0.70, 0.85];
+/// Sizes at which c is compared.
+const TIMED_SIZES_PX: [UVec2; 2] = [VIEW_SIZE_PX, UVec2::new(640, 360)];
+/// Views of a batch that is timed.
+const TIMED_VIEWS: usize = 16;
+/// Parts of a pixel's side at which the truth's patterns of 16 are placed, from its centre.
+const TRUTH_OFFSETS_PX: [Vec2; 4] =
+    [Vec2::new(-1.0, -3.0), Vec2::new(3.0, -1.0), Vec2::new(1.0, 3.0), Vec2::new(-3.0, 1.0)];
+const TRUTH_STEP_PX: f32 = 1.0 / 128.0;
+
+/// How views are made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Maker {
+    Reconstructed(ReconstructionMethod),
+    Direct,
+}
+
+/// Error and time of one number of samples.
+struct Row {
+    maker: Maker,
+    antialias: Antialias,
+    ms_a_view: f64,
+    foreground_psnr_db: f64,
+    psnr_db: f64,
+    foreground_flip: f64,
+    flip: f64,
+}
+
+const COLUMNS: [(&str, &str); 8] = [
+    ("scene", ""),
+    ("views by", ""),
+    ("samples a pixel", ""),
+    ("time a view", "ms"),
+    ("foreground PSNR", "dB"),
+    ("PSNR", "dB"),
+    ("foreground FLIP", ""),
+    ("FLIP", ""),
+];
+
+/// A scene with views of it.
+struct Subject {
+    setup: Setup,
+    args: SceneArgs,
+    reference: ReferenceViews,
+    /// Of 64 samples a pixel.
+    truth: Vec<View>,
+}
+
+/// Adds a table, charts and checks.
+pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
+    let mut table = Table::new("Samples a pixel, against direct views with 64", &COLUMNS);
+    let models = match &args.models {
+        Some(folder) => models_of(folder, 2)?,
+        None => Vec::new(),
+    };
+    let named = SCENES.into_iter().map(|name| Ok((name.to_owned(), name.parse()?)));
+    let named = named.collect::<anyhow::Result<Vec<(String, SceneSpec)>>>()?;
+    let models = models.into_iter().map(|path| (path.display().to_string(), SceneSpec::File(path)));
+    for (number, (name, spec)) in named.into_iter().chain(models).enumerate() {
+        let subject = Subject::new(args, engine, scene_args(spec))?;
+        let rows = subject.rows(args)?;
+        push(&mut table, &name, &rows)?;
+        report.charts.extend(charts(&name, &rows).map(Into::into));
+        report.checks.extend(subject.checks(&name, FLIP_BARS.get(number), &rows)?);
+        if number == 0 {
+            report.checks.extend(subject.costs(args, &name)?);
+        }
+    }
+    if let Some(folder) = &args.peer {
+        let subject = Subject::of_views(engine, peer::scene(folder), |setup| peer::views(args, setup, folder))?;
+        report.checks.extend(subject.costs(args, "peer scene")?);
+    }
+    report.tables.push(table);
+    Ok(())
+}
+
+impl Subject {
+    fn new(args: &BenchArgs, engine: &Arc<GpuEngine>, scene: SceneArgs) -> anyhow::Result<Self> {
+        Self::of_views(engine, scene, |setup| {
+            let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
+            Ok(cell.spread(args.compared_views() / 2, VIEW_SIZE_PX * 2))
+        })
+    }
+
+    fn of_views(
+        engine: &Arc<GpuEngine>,
+        scene: SceneArgs,
+        views: impl FnOnce(&Setup) -> anyhow::Result<Vec<PinholeCamera>>,
+    ) -> anyhow::Result<Self> {
+        let setup = scene.load()?;
+        let reference = ReferenceViews::draw(engine, &setup, &scene, views(&setup)?)?;
+        let mut subject = Self { setup, args: scene, reference, truth: Vec::new() };
+        subject.truth = subject.drawn_with_64()?;
+        Ok(subject)
+    }
+
+    /// Means in linear light of four patterns of 16 that interleave.
+    fn drawn_with_64(&self) -> anyhow::Result<Vec<View>> {
+        let planes = ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::ALL };
+        let drawn = |offset: &Vec2| {
+            let shifted: Vec<_> =
+                self.reference.cameras.iter().map(|camera| camera.with_offset(*offset * TRUTH_STEP_PX)).collect();
+            self.reference.drawn_from(&self.setup, self.args.lighting, &shifted, planes)
+        };
+        let sets = TRUTH_OFFSETS_PX.iter().map(drawn).collect::<anyhow::Result<Vec<_>>>()?;
+        Ok(mean_of(&sets))
+    }
+
+    fn views(&self, maker: Maker, planes: ViewPlanes) -> anyhow::Result<Vec<View>> {
+        match maker {
+            Maker::Reconstructed(method) => self.reference.reconstruct(method, planes),
+            Maker::Direct => {
+                self.reference.drawn_from(&self.setup, self.args.lighting, &self.reference.cameras, planes)
+            }
+        }
+    }
+
+    fn rows(&self, args: &BenchArgs) -> anyhow::Result<Vec<Row>> {
+        let hybrid = Maker::Reconstructed("hybrid_mesh".parse()?);
+        let makers = [Maker::Reconstructed(args.scene.method), hybrid, Maker::Direct];
+        let counts = [1, 2, 4, 8, 16].into_iter().filter_map(Antialias::of);
+        let works: Vec<(Maker, Antialias)> =
+            makers.into_iter().flat_map(|maker| counts.clone().map(move |antialias| (maker, antialias))).collect();
+        let progress = bar("samples a pixel", works.len() * (args.runs() + 2));
+        let seconds = in_turn(&works, args.runs(), |(maker, antialias)| {
+            self.views(maker, ViewPlanes { antialias, ..ViewPlanes::COLOR })?;
+            progress.inc(1);
+            Ok(())
+        })?;
+        let rows = works.into_iter().zip(seconds).map(|((maker, antialias), seconds)| {
+            progress.inc(1);
+            let views = self.views(maker, ViewPlanes { antialias, ..ViewPlanes::ALL })?;
+            Row::of(maker, antialias, seconds * 1e3 / views.len() as f64, &self.truth, &views)
+        });
+        let rows = rows.collect();
+        progress.finish_and_clear();
+        rows
+    }
+
+    /// The mean of four whole reconstructions, each of one position.
+    fn four_whole(&self, method: ReconstructionMethod) -> anyhow::Result<Vec<View>> {
+        let four = Antialias::of(4).context("four samples are offered")?;
+        let whole = |offset_px| {
+            let cameras: Vec<_> = self.reference.cameras.iter().map(|camera| camera.with_offset(offset_px)).collect();
+            self.reference.reconstruct_at(&cameras, method, ViewPlanes::ALL)
+        };
+        Ok(mean_of(&four.offsets_px().map(whole).collect::<anyhow::Result<Vec<_>>>()?))
+    }
+
+    fn checks(&self, name: &str, flip_bar: Option<&f64>, rows: &[Row]) -> anyhow::Result<Vec<Check>> {
+        let Maker::Reconstructed(method) = rows[0].maker else { anyhow::bail!("the first rows are reconstructed") };
+        let of = |samples: u32| {
+            let found = rows.iter().find(|row| row.maker == rows[0].maker && row.antialias.samples() == samples);
+            found.context("a number of samples is missing")
+        };
+        let (one, four) = (of(1)?, of(4)?);
+        let whole = Row::of(four.maker, four.antialias, f64::NAN, &self.truth, &self.four_whole(method)?)?;
+        let flip = flip_bar.map(|&bar| {
+            Check::new(format!("{name}: FLIP, 4 samples over 1"), four.flip / one.flip, "×", Bar::AtMost(bar))
+        });
+        let gain_db = four.foreground_psnr_db - one.foreground_psnr_db;
+        let least_db = if flip_bar.is_some() { 3.5 } else { 0.0 };
+        let away = (four.flip / whole.flip - 1.0).abs() * 100.0;
+        Ok(flip
+            .into_iter()
+            .chain([
+                Check::new(format!("{name}: foreground PSNR, 4 samples over 1"), gain_db, "dB", Bar::AtLeast(least_db)),
+                Check::new(format!("{name}: FLIP, 4 samples from 4 whole views"), away, "%", Bar::AtMost(3.0)),
+            ])
+            .collect())
+    }
+
+    /// c with four samples a pixel over c with one.
+    fn costs(&self, args: &BenchArgs, name: &str) -> anyhow::Result<Vec<Check>> {
+        let four = Antialias::of(4).context("four samples are offered")?;
+        let check = |size_px: UVec2| {
+            let cameras: Vec<_> = self.reference.cameras.iter().map(|camera| camera.resized(size_px)).collect();
+            let cameras = cameras.iter().copied().cycle().take(TIMED_VIEWS).collect::<Vec<_>>();
+            let seconds = in_turn(&[Antialias::NONE, four], args.runs().max(5), |antialias| {
+                let planes = ViewPlanes { antialias, ..ViewPlanes::COLOR };
+                self.reference.reconstruct_at(&cameras, args.scene.method, planes).map(drop)
+            })?;
+            let name = format!("{name}, {}x{}: c, 4 samples over 1 (aim 2.5)", size_px.x, size_px.y);
+            anyhow::Ok(Check::new(name, seconds[1] / seconds[0], "×", Bar::AtMost(3.0)))
+        };
+        TIMED_SIZES_PX.into_iter().map(check).collect()
+    }
+}
+
+impl Row {
+    fn of(maker: Maker, antialias: Antialias, ms_a_view: f64, truth: &[View], views: &[View]) -> anyhow::Result<Self> {
+        let mut sums = [0.0; 4];
+        for (truth, view) in truth.iter().zip(views) {
+            let [foreground, whole] = PictureErrors::of(truth, &Rgb8Image::of_view(view)?)?;
+            let errors = [foreground.psnr_db, whole.psnr_db, foreground.flip, whole.flip];
+            sums.iter_mut().zip(errors).for_each(|(sum, error)| *sum += error);
+        }
+        let [foreground_psnr_db, psnr_db, foreground_flip, flip] = sums.map(|sum| sum / views.len() as f64);
+        Ok(Self { maker, antialias, ms_a_view, foreground_psnr_db, psnr_db, foreground_flip, flip })
+    }
+}
+
+impl std::fmt::Display for Maker {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Reconstructed(method) => method.fmt(f),
+            Self::Direct => f.write_str(cluster::DIRECT),
+        }
+    }
+}
+
+/// Of each view, the mean colour of all sets in linear light, with the other planes of the first.
+fn mean_of(sets: &[Vec<View>]) -> Vec<View> {
+    let mean = |number: usize, byte: usize| {
+        let sum: f32 = sets.iter().map(|set| linear_from_srgb8(set[number].srgb8[byte])).sum();
+        srgb8_from_linear(sum / sets.len() as f32)
+    };
+    let view = |(number, first): (usize, &View)| {
+        let srgb8 = (0..first.srgb8.len()).map(|byte| mean(number, byte)).collect();
+        View { srgb8, ..first.clone() }
+    };
+    sets.first().into_iter().flatten().enumerate().map(view).collect()
+}
+
+fn push(table: &mut Table, scene: &str, rows: &[Row]) -> anyhow::Result<()> {
+    for row in rows {
+        let numbers = [row.ms_a_view, row.foreground_psnr_db, row.psnr_db, row.foreground_flip, row.flip];
+        let names = [scene.into(), row.maker.to_string().into(), row.antialias.samples().into()];
+        table.push(names.into_iter().chain(numbers.map(Into::into)))?;
+    }
+    Ok(())
+}
+
+fn charts(scene: &str, rows: &[Row]) -> [XyChart; 2] {
+    let chart = |what: &str, unit: &str, better: Better, value: fn(&Row) -> f64| {
+        let axes = (Axis::log("time a view", "ms"), Axis::linear(what, unit));
+        let chart = XyChart::new(format!("Samples a pixel: {what}, {scene}"), axes.0, axes.1);
+        let mut makers: Vec<Maker> = rows.iter().map(|row| row.maker).collect();
+        makers.dedup();
+        let series = makers.into_iter().map(|maker| {
+            let own = rows.iter().filter(|row| row.maker == maker);
+            let point = |row: &Row| Point::labelled(row.ms_a_view, value(row), row.antialias.to_string());
+            Series::line(maker.to_string(), own.map(point))
+        });
+        let mut chart = series.fold(chart, XyChart::with).with_front(Better::Low, better);
+        chart.note = "Labels are samples a pixel. Errors are against direct views with 64.".to_owned();
+        chart
+    };
+    [
+        chart("foreground PSNR", "dB", Better::High, |row| row.foreground_psnr_db),
+        chart("foreground FLIP", "", Better::Low, |row| row.foreground_flip),
+    ]
+}
