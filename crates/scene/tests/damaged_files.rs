@@ -6,6 +6,7 @@ mod samples;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use samples::compressed::{compressed_cube, diagonals, plain_streams, positions};
 use samples::{GltfCube, cube_obj, cube_ply_ascii, cube_ply_binary};
 use scene::procedural::{checker_sphere, unit_cube};
 use scene::{Limits, MissingTextures, load_file, pack, unpack};
@@ -147,6 +148,23 @@ fn glb_with_other_numbers_in_its_json() {
 }
 
 #[test]
+fn compressed_glb() {
+    load_damaged("a.glb", &compressed_gltf().glb(), 2000);
+    // Damage that meets the streams alone, behind the JSON.
+    let (cube, dir) = (compressed_gltf(), tempfile::tempdir().unwrap());
+    let path = dir.path().join("a.glb");
+    let (mut loaded, mut slowest) = (0, Duration::ZERO);
+    damaged(&cube.binary, 3000, |binary| {
+        rewrite(&path, &samples::glb(&cube.json(), binary));
+        let start = Instant::now();
+        loaded += u32::from(load(&path));
+        slowest = slowest.max(start.elapsed());
+    });
+    println!("{loaded} loaded, slowest {slowest:?}");
+    assert!(loaded > 100 && slowest < Duration::from_secs(1), "{loaded} {slowest:?}");
+}
+
+#[test]
 fn gltf() {
     let mut cube = rich_gltf();
     let hex: String = cube.binary.iter().map(|b| format!("%{b:02x}")).collect();
@@ -224,6 +242,15 @@ fn rich_gltf() -> GltfCube {
         "images":[{"uri":"data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC"}],
         "materials":[{"emissiveTexture":{"index":0},"pbrMetallicRoughness":{"baseColorTexture":{"index":0},
         "metallicRoughnessTexture":{"index":0}}}],"#.into();
+    cube
+}
+
+/// A cube whose positions, triangles and normals are compressed, with two filters.
+fn compressed_gltf() -> GltfCube {
+    let streams = [positions(0, "EXPONENTIAL"), plain_streams().remove(1), diagonals(4)];
+    let mut cube = compressed_cube("EXT_meshopt_compression", &streams);
+    cube.primitive = r#"{"attributes":{"POSITION":0,"NORMAL":2},"indices":1}"#.into();
+    cube.accessors += r#",{"bufferView":2,"componentType":5120,"normalized":true,"count":8,"type":"VEC3"}"#;
     cube
 }
 

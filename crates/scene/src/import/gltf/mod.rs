@@ -24,6 +24,7 @@
 //! the sum is within two stops of white, lights stay unchanged. Otherwise one factor makes the sum white, which keeps
 //! the lights' ratios. Emissive surfaces are not exposed: in files they are relative to white already.
 
+mod compressed;
 mod document;
 mod lights;
 mod materials;
@@ -40,13 +41,22 @@ use crate::error::{Fault, at_most};
 use document::Document;
 
 /// Extensions that a file may require.
-const SUPPORTED_EXTENSIONS: [&str; 6] = [
+const SUPPORTED_EXTENSIONS: [&str; 8] = [
+    compressed::NAMES[0],
+    compressed::NAMES[1],
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
+];
+
+/// Extensions that a file may be freed of, each with the command line that does it.
+const CONVERSIONS: [(&str, &str); 2] = [
+    // Writing drops the compression unless it is asked for.
+    ("KHR_draco_mesh_compression", "npx @gltf-transform/cli copy IN OUT"),
+    ("KHR_texture_basisu", "npx @gltf-transform/cli ktxdecompress IN OUT"),
 ];
 
 const GLB_MAGIC: &[u8] = b"glTF";
@@ -96,7 +106,10 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
 
 fn refuse_unknown_requirements(root: &Root) -> Result<(), Fault> {
     let unknown = root.extensions_required.iter().find(|name| !SUPPORTED_EXTENSIONS.contains(&name.as_str()));
-    unknown.map_or(Ok(()), |name| Err(Fault::unsupported("extensionsRequired", name.as_str())))
+    let Some(name) = unknown else { return Ok(()) };
+    let conversion = CONVERSIONS.iter().find(|(extension, _)| extension == name);
+    let advice = conversion.map_or_else(String::new, |(_, command)| format!("; convert the file with `{command}`"));
+    Err(Fault::unsupported("extensionsRequired", format!("{name}{advice}")))
 }
 
 fn check_counts(root: &Root, limits: &Limits) -> Result<(), Fault> {
