@@ -155,12 +155,12 @@ impl Gpu {
         })
     }
 
-    /// The sampler of all textures of materials: smooth at every distance, repeated beyond the borders.
+    /// A sampler of textures of materials: smooth at every distance; the modes beyond the borders are along u and v.
     #[must_use]
-    pub fn texture_sampler(&self) -> wgpu::Sampler {
+    pub fn texture_sampler(&self, [address_mode_u, address_mode_v]: [wgpu::AddressMode; 2]) -> wgpu::Sampler {
         self.device.create_sampler(&wgpu::SamplerDescriptor {
-            address_mode_u: wgpu::AddressMode::Repeat,
-            address_mode_v: wgpu::AddressMode::Repeat,
+            address_mode_u,
+            address_mode_v,
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
             mipmap_filter: wgpu::MipmapFilterMode::Linear,

@@ -218,11 +218,11 @@ fn packages() {
     }
 }
 
-/// A cube with lights, cameras, colours, normals, a sparse accessor, materials and a texture.
+/// A cube with lights, cameras, colours, normals, a sparse accessor, and a material with a texture in every place.
 fn rich_gltf() -> GltfCube {
     let mut cube = GltfCube::default();
     cube.primitive =
-        r#"{"attributes":{"POSITION":0,"NORMAL":0,"COLOR_0":2,"TEXCOORD_0":3},"indices":1,"material":0}"#.into();
+        r#"{"attributes":{"POSITION":0,"NORMAL":0,"COLOR_0":2,"TEXCOORD_0":3,"TEXCOORD_1":3},"indices":1,"material":0}"#.into();
     cube.accessors = cube.accessors.replacen(
         r#""count":8"#,
         r#""sparse":{"count":1,"indices":{"bufferView":2,"componentType":5121},"values":{"bufferView":0}},"count":8"#,
@@ -238,10 +238,14 @@ fn rich_gltf() -> GltfCube {
         .into();
     cube.more = r#""extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":3},
         {"type":"spot","intensity":900,"color":[1,0.5,0.25],"spot":{"innerConeAngle":0.25,"outerConeAngle":0.5}}]}},
-        "cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1}}],"textures":[{"source":0}],
+        "cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1}}],"textures":[{"source":0,"sampler":0}],
         "images":[{"uri":"data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC"}],
-        "materials":[{"emissiveTexture":{"index":0},"pbrMetallicRoughness":{"baseColorTexture":{"index":0},
-        "metallicRoughnessTexture":{"index":0}}}],"#.into();
+        "samplers":[{"wrapS":33071,"wrapT":33648}],"materials":[{"emissiveTexture":{"index":0},"alphaMode":"BLEND",
+        "pbrMetallicRoughness":{"baseColorTexture":{"index":0},"metallicRoughnessTexture":{"index":0}},
+        "normalTexture":{"index":0,"texCoord":1,"scale":2},"occlusionTexture":{"index":0,"strength":0.5,
+        "extensions":{"KHR_texture_transform":{"texCoord":1,"scale":[2,3]}}},"extensions":{"KHR_materials_ior":{"ior":1.4},
+        "KHR_materials_specular":{"specularFactor":0.5,"specularTexture":{"index":0},"specularColorFactor":[1,2,3]}}}],"#
+        .into();
     cube
 }
 
@@ -261,6 +265,6 @@ fn the_undamaged_sample_loads() {
     let scene = load_file(&dir.path().join("a.glb"), &limits(), MissingTextures::Refuse).unwrap();
     assert_eq!(
         (scene.triangle_count(), scene.illumination.lights.len(), scene.cameras.len(), scene.textures.len()),
-        (24, 2, 1, 2)
+        (24, 2, 1, 3)
     );
 }

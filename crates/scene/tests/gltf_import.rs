@@ -109,7 +109,7 @@ fn materials_keep_the_factors_of_the_model() {
     assert_eq!((m.metallic, m.roughness, m.alpha_cutoff), (0.5, 0.75, 0.25));
     assert!(m.double_sided && m.unlit);
     assert_eq!(m.emissive_linear, Vec3::Y);
-    assert_eq!(scene.materials[1].alpha_cutoff, 0.5);
+    assert!(scene.materials[1].alpha_hashed && !m.alpha_hashed);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod closed_forms;
 mod light_failures;
+mod materials;
 mod raster;
 mod slices;
 mod stage;

@@ -34,8 +34,9 @@ impl<'a> Document<'a> {
         folder: &'a Folder,
         limits: &'a Limits,
     ) -> Result<Self, Fault> {
-        // Positions, normals, coordinates, colours: four elements a vertex; three indices a triangle.
-        let elements = limits.vertices.saturating_mul(4).saturating_add(limits.triangles.saturating_mul(3));
+        // Positions, normals, tangents, two pairs of coordinates, colours: six elements a vertex; three indices a
+        // triangle.
+        let elements = limits.vertices.saturating_mul(6).saturating_add(limits.triangles.saturating_mul(3));
         let elements_left = Cell::new(elements);
         let mut document = Self { root, limits, folder, buffers: Vec::new(), decoded_views: Vec::new(), elements_left };
         for (number, buffer) in root.buffers.iter().enumerate() {

@@ -4,17 +4,7 @@
 //! used. The crate's own validation and readers are not called: both index without checking
 //! (`primitive_validate_hook`, `accessor::Iter`), which a malformed file turns into a panic.
 //!
-//! The importer reads node transforms, meshes (one per glTF mesh, shared by its nodes), triangles, strips and fans.
-//! Materials have base colour with texture and `KHR_texture_transform` (baked into the coordinates), `COLOR_0`, and
-//! metallic and roughness with their texture. That texture counts by its mean where its coordinates differ from the
-//! base colour's, since a vertex has one pair.
-//!
-//! It also reads alpha masks (blending becomes a mask at 0.5), the mean of an emissive texture, `KHR_materials_unlit`,
-//! `KHR_materials_emissive_strength`, `KHR_lights_punctual`, `KHR_mesh_quantization` and perspective cameras. Missing normals are flat, as the
-//! specification requires.
-//!
-//! It skips points and lines, normal and occlusion maps, skins (shown in bind pose), morph targets and animations. It
-//! also skips sampler wrap modes (all textures repeat). Textures are PNG, JPEG, or WebP by `EXT_texture_webp`.
+//! `docs/formats.md` lists what is read, what is not, and what happens then.
 //!
 //! Factors of materials are clamped to their range. A factor that is not finite is refused, as is an invalid light.
 //!
@@ -30,6 +20,7 @@ mod lights;
 mod materials;
 mod nodes;
 mod primitives;
+mod texture_coordinates;
 
 use gltf::binary::Glb;
 use gltf::json::Root;
@@ -39,14 +30,17 @@ use super::source_scene::{SourceMesh, SourceScene};
 use crate::Limits;
 use crate::error::{Fault, at_most};
 use document::Document;
+use texture_coordinates::Coordinates;
 
 /// Extensions that a file may require.
-const SUPPORTED_EXTENSIONS: [&str; 8] = [
+const SUPPORTED_EXTENSIONS: [&str; 10] = [
     compressed::NAMES[0],
     compressed::NAMES[1],
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
@@ -125,9 +119,9 @@ fn read_meshes(document: &Document, scene: &mut SourceScene) -> Result<(), Fault
         let mut merged = SourceMesh::default();
         for (part, primitive) in mesh.primitives.iter().enumerate() {
             let element = format!("mesh {number}, primitive {part}");
-            let uv = materials::uv_source(document.root, primitive.material);
+            let coordinates = Coordinates::of_material(document.root, primitive.material)?;
             let material = materials::material_number(document.root, primitive.material, &element)?;
-            if let Some(geometry) = primitives::read(document, primitive, &uv, &element)? {
+            if let Some(geometry) = primitives::read(document, primitive, &coordinates, &element)? {
                 merged.append_part(geometry, material);
             }
         }
