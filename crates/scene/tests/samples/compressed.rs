@@ -44,7 +44,7 @@ pub fn positions(version: u8, filter: &'static str) -> Stream {
 
 /// Unit vectors from the middle of the cube to its corners.
 pub fn diagonals(stride: usize) -> Stream {
-    let unit = |corner: &[f32; 3]| glam::Vec3::from(*corner).normalize().extend(0.0).to_array();
+    let unit = |corner: &[f32; 3]| glam::Vec3::from(*corner).normalize_or(glam::Vec3::X).extend(0.0).to_array();
     let floats: Vec<f32> = CUBE_CORNERS.iter().flat_map(unit).collect();
     let bits = if stride == 4 { 8 } else { 16 };
     let decoded = encode_filter_oct(8, stride, bits, &floats, &mut Workspace::default()).unwrap();
