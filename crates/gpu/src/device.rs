@@ -155,16 +155,18 @@ impl Gpu {
         })
     }
 
-    /// The sampler of all textures of materials: smooth at every distance, repeated beyond the borders.
+    /// A sampler of textures of materials: smooth at every distance; the modes beyond the borders are along u and v.
     #[must_use]
-    pub fn texture_sampler(&self) -> wgpu::Sampler {
+    pub fn texture_sampler(&self, [address_mode_u, address_mode_v]: [wgpu::AddressMode; 2]) -> wgpu::Sampler {
+        // The anisotropic filter of Mesa's software device does not mirror.
+        let is_mirrored = [address_mode_u, address_mode_v].contains(&wgpu::AddressMode::MirrorRepeat);
         self.device.create_sampler(&wgpu::SamplerDescriptor {
-            address_mode_u: wgpu::AddressMode::Repeat,
-            address_mode_v: wgpu::AddressMode::Repeat,
+            address_mode_u,
+            address_mode_v,
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
             mipmap_filter: wgpu::MipmapFilterMode::Linear,
-            anisotropy_clamp: 4,
+            anisotropy_clamp: if is_mirrored { 1 } else { 4 },
             ..Default::default()
         })
     }

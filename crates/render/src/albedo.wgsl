@@ -1,6 +1,8 @@
 // Diffuse reflectance in ten bits a channel, sRGB-encoded, so that eight-bit colours come back as they were; and
 // whether light is no matter.
 const SHOWN_AS_IT_IS: u32 = 0x40000000u;
+// The surface's second word is the share of the environment's light that arrives, not emission.
+const OCCLUDED: u32 = 0x80000000u;
 
 fn packed_albedo(linear: vec3f, unlit: bool) -> u32 {
     let codes = vec3u(srgb_from_linear(linear) * 1023.0 + 0.5);

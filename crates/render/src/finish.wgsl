@@ -43,13 +43,13 @@ fn put(plane: u32, place: u32, word: u32) { words[camera.first_word + plane * ca
 {% if visibility %}
 
 // Bytes of visibility: the environment's, then the lamps'.
-fn visibility_word(word: u32, place: u32) -> u32 {
+fn visibility_word(word: u32, place: u32, open: f32) -> u32 {
     var shares = vec4f(0.0);
     for (var i = 0u; i < 4u; i++) {
         let plane = word * 4u + i;
         if plane >= {{ light_count + 1 }}u { break; }
         let rays = select(camera.shadow_rays_in_sum, camera.occlusion_rays_in_sum, plane == 0u);
-        shares[i] = sum_at(OPEN_TO_ENVIRONMENT + plane, place) / f32(rays);
+        shares[i] = sum_at(OPEN_TO_ENVIRONMENT + plane, place) * select(1.0, open, plane == 0u) / f32(rays);
     }
     return pack4x8unorm(shares);
 }
@@ -83,17 +83,19 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var hidden = met && front > depth; hidden; hidden = false) { met = is_useful(pixel, depth, front); }
 {% endif %}
 {% endif %}
+    let occluded = met && (surface.x & OCCLUDED) != 0u;
+    let open = select(1.0, bitcast<f32>(surface.y), occluded);
     var light = vec3f(1.0);
 {% if lit %}
-    light = select(light_at(place), light, (surface.x & SHOWN_AS_IT_IS) != 0u);
+    light = select(light_at(place, open), light, (surface.x & SHOWN_AS_IT_IS) != 0u);
 {% endif %}
-    var linear = albedo_linear(surface.x) * light + linear_from_rgb9e5(surface.y);
+    var linear = albedo_linear(surface.x) * light + select(linear_from_rgb9e5(surface.y), vec3f(0.0), occluded);
 {% if highlight %}
     for (var glossy = met && surface.w != 0u; glossy; glossy = false) {
         let direction = direction_of(pixel);
         let point = camera.eye_in_world + direction * (camera.near_m / depth);
         var visibility: VisibilityWords;
-{% for word in range(visibility_words) %}        visibility[{{ word }}] = visibility_word({{ word }}u, place);
+{% for word in range(visibility_words) %}        visibility[{{ word }}] = visibility_word({{ word }}u, place, open);
 {% endfor %}
         linear += highlight(point, unit_from_oct16(surface.z), -normalize(direction), surface.w, visibility);
     }
@@ -114,7 +116,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% if normal_plane %}    put({{ normal_plane }}u, place, surface.z);
 {% endif %}
 {% if reflector_plane %}    put({{ reflector_plane }}u, place, select(0u, surface.w, met));
-{% for word in range(visibility_words) %}    put({{ reflector_plane + 1 + word }}u, place, visibility_word({{ word }}u, place));
+{% for word in range(visibility_words) %}    put({{ reflector_plane + 1 + word }}u, place, visibility_word({{ word }}u, place, open));
 {% endfor %}
 {% endif %}
 {% if surface_id %}

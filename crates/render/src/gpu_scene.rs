@@ -9,11 +9,12 @@ use depth_image::{Aabb, Highlight, MAX_LIGHTS};
 use glam::{Affine3A, Mat3, Vec3};
 use gpu::{Gpu, GpuError, switches};
 use indexmap::IndexSet;
-use scene::{Material, Scene, Wind};
+use scene::{Material, Scene, TextureUse, VertexDetail, Wind};
 use wgpu::BufferUsages;
 
-use crate::rays::{AccelerationReport, OrderedMesh, RayScene};
-use crate::{RenderError, cluster, material::phong_reflector, pixel_camera::uniform, texture};
+use crate::material::{normal_scale, phong_reflector};
+use crate::rays::{AccelerationReport, OrderedMesh, RayScene, flat::world_metres};
+use crate::{RenderError, cluster, pixel_camera::uniform, texture};
 
 /// A mesh part where an instance places it: `Object` in the shader, the same for a whole draw. It lies at a dynamic offset: a
 /// load from a uniform costs nothing a vertex or fragment.
@@ -29,6 +30,12 @@ pub(crate) struct GpuObject {
     pub roughness: f32,
     pub phong_reflector: u32,
     pub instance: u32,
+    pub dielectric_linear: [f32; 3],
+    pub normal_scale: f32,
+    pub occlusion_strength: f32,
+    pub second_uv: u32,
+    pub alpha_hashed: u32,
+    pub scale: f32,
 }
 
 /// The part of the scene that is the same for every vertex and fragment.
@@ -52,13 +59,15 @@ pub(crate) struct MaterialTraits {
     pub coat_textured: bool,
     pub unlit: bool,
     pub specular: bool,
+    /// See [`Material::is_mapped`]; all textures are then read.
+    pub mapped: bool,
 }
 
 /// A cluster of one instance, ready to draw.
 pub(crate) struct Draw {
     pub indices: Range<u32>,
     pub base_vertex: i32,
-    /// Into the pairs of textures.
+    /// Into the textures of materials.
     pub texture: u32,
     pub material: MaterialTraits,
     /// Into the objects.
@@ -79,11 +88,14 @@ static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(0);
 pub struct GpuScene {
     pub(crate) draws: Vec<Draw>,
     pub(crate) vertices: wgpu::Buffer,
+    /// One [`scene::VertexDetail`] for each vertex; a single one where no material is mapped.
+    pub(crate) details: wgpu::Buffer,
     pub(crate) indices: wgpu::Buffer,
     pub(crate) objects: wgpu::Buffer,
     pub(crate) surroundings: wgpu::Buffer,
-    /// Base colour, and metallic and roughness; white where a material has none.
-    pub(crate) textures: Vec<[wgpu::TextureView; 2]>,
+    /// The textures of materials in the order of [`Material::textures`], white where there is none, each with its
+    /// sampler.
+    pub(crate) textures: Vec<[(wgpu::TextureView, wgpu::Sampler); 5]>,
     pub(crate) background_linear: Vec3,
     pub(crate) illumination: wgpu::Buffer,
     pub(crate) light_count: usize,
@@ -106,16 +118,21 @@ impl GpuScene {
         check_sizes(gpu, scene)?;
         let ordered = OrderedMesh::all(scene);
         let geometry = Geometry::gather(scene, &ordered);
+        let samplers = texture::samplers(gpu);
         let white = texture::upload(gpu, &texture::white());
         let uploaded: Vec<_> = scene.textures.iter().map(|t| texture::upload(gpu, t)).collect();
-        let view = |t: &Option<u32>| t.map_or(&white, |t| &uploaded[t as usize]).clone();
+        let sampled = |t: &Option<TextureUse>| {
+            let view = t.map_or(&white, |t| &uploaded[t.texture as usize]);
+            (view.clone(), samplers[&t.map_or_else(Default::default, |t| t.wrap)].clone())
+        };
         let illumination = gpu::illumination_bytes(&scene.illumination);
         Ok(Self {
             vertices: gpu.buffer_with("vertices", &geometry.vertices, BufferUsages::VERTEX),
+            details: gpu.buffer_with("vertex details", &geometry.details, BufferUsages::VERTEX),
             indices: gpu.buffer_with("indices", &geometry.indices, BufferUsages::INDEX),
             objects: uniform(gpu, "objects", geometry.objects.into_iter()),
             surroundings: gpu.buffer_with("surroundings", &[surroundings(scene)], BufferUsages::UNIFORM),
-            textures: geometry.textures.iter().map(|pair| pair.each_ref().map(view)).collect(),
+            textures: geometry.textures.iter().map(|textures| textures.each_ref().map(sampled)).collect(),
             background_linear: scene.background_linear,
             illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
             light_count: scene.illumination.lights.len(),
@@ -134,9 +151,11 @@ impl GpuScene {
     /// The bytes of its buffers, textures and tables, with those of rays where they are there.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        let buffers = [&self.vertices, &self.indices, &self.objects, &self.surroundings, &self.illumination];
+        let buffers =
+            [&self.vertices, &self.details, &self.indices, &self.objects, &self.surroundings, &self.illumination];
         // Several materials may share a texture.
-        let mut textures: Vec<&wgpu::Texture> = self.textures.iter().flatten().map(|view| view.texture()).collect();
+        let mut textures: Vec<&wgpu::Texture> =
+            self.textures.iter().flatten().map(|(view, _)| view.texture()).collect();
         textures.sort_unstable();
         textures.dedup();
         let of_textures: u64 = textures.into_iter().map(gpu::texture_bytes).sum();
@@ -190,15 +209,17 @@ fn check_sizes(gpu: &Gpu, scene: &Scene) -> Result<(), GpuError> {
 #[derive(Default)]
 struct Geometry {
     vertices: Vec<scene::Vertex>,
+    details: Vec<VertexDetail>,
     indices: Vec<u32>,
     objects: Vec<GpuObject>,
     draws: Vec<Draw>,
-    textures: IndexSet<[Option<u32>; 2]>,
+    textures: IndexSet<[Option<TextureUse>; 5]>,
 }
 
 impl Geometry {
     fn gather(scene: &Scene, ordered: &[OrderedMesh<'_>]) -> Self {
         let mut geometry = Self::default();
+        let is_mapped = scene.materials.iter().any(Material::is_mapped);
         for (mesh_number, OrderedMesh { mesh, indices, clusters, .. }) in ordered.iter().enumerate() {
             let placements = scene.instances.iter().enumerate().filter(|(_, i)| i.mesh as usize == mesh_number);
             for (number, instance) in placements {
@@ -207,6 +228,10 @@ impl Geometry {
                 }
             }
             geometry.vertices.extend(&mesh.vertices);
+            if is_mapped {
+                geometry.details.extend(&mesh.details);
+                geometry.details.resize(geometry.vertices.len(), VertexDetail::default());
+            }
             geometry.indices.extend(indices);
         }
         // Few changes of pipeline and texture; the sort is stable, so clusters stay along their curve.
@@ -220,8 +245,7 @@ impl Geometry {
         let reach_m = scene.wind.map_or(0.0, |wind: Wind| wind.amplitude_m.abs());
         let (indices, base_vertex) = (self.indices.len() as u32, self.vertices.len() as i32);
         let object = self.objects.len() as u32;
-        let pair = [material.base_color_texture, material.metallic_roughness_texture];
-        let (texture, _) = self.textures.insert_full(pair);
+        let (texture, _) = self.textures.insert_full(material.textures());
         self.objects.push(gpu_object(world_from_mesh, material, instance));
         self.draws.extend(clusters.iter().map(|cluster| {
             let corners = cluster.bounds_in_mesh.corners().map(|corner| world_from_mesh.transform_point3(corner));
@@ -239,26 +263,30 @@ impl Geometry {
 }
 
 impl MaterialTraits {
-    /// Every combination.
+    /// Every combination that occurs.
     pub fn all() -> impl Iterator<Item = Self> {
-        switches().map(|[double_sided, alpha_tested, textured, coat_textured, unlit, specular]| Self {
+        let each = |[double_sided, alpha_tested, textured, coat_textured, unlit, specular, mapped]: [bool; 7]| Self {
             double_sided,
             alpha_tested,
             textured,
             coat_textured,
             unlit,
             specular,
-        })
+            mapped,
+        };
+        switches().map(each).filter(|material| !material.mapped || material.textured && material.coat_textured)
     }
 
     fn of(material: &Material) -> Self {
+        let mapped = material.is_mapped();
         Self {
             double_sided: material.double_sided,
-            alpha_tested: material.alpha_cutoff > 0.0,
-            textured: material.base_color_texture.is_some(),
-            coat_textured: material.metallic_roughness_texture.is_some(),
+            alpha_tested: material.is_alpha_tested(),
+            textured: mapped || material.base_color_texture.is_some(),
+            coat_textured: mapped || material.metallic_roughness_texture.is_some(),
             unlit: material.unlit,
             specular: material.is_specular(),
+            mapped,
         }
     }
 }
@@ -270,6 +298,7 @@ fn rows(matrix: Mat3, translation: Vec3) -> [[f32; 4]; 3] {
 fn gpu_object(world_from_mesh: &Affine3A, material: &Material, instance: u32) -> GpuObject {
     let linear = Mat3::from(world_from_mesh.matrix3);
     let normals = linear.inverse().transpose();
+    let second_uv = material.textures().into_iter().map(|texture| texture.is_some_and(|t| t.second_uv));
     GpuObject {
         world_from_mesh: rows(linear, world_from_mesh.translation.into()),
         normal_from_mesh: rows(normals, Vec3::ZERO),
@@ -280,6 +309,12 @@ fn gpu_object(world_from_mesh: &Affine3A, material: &Material, instance: u32) ->
         roughness: material.roughness,
         phong_reflector: phong_reflector(material),
         instance,
+        dielectric_linear: material.dielectric_reflectance_linear.to_array(),
+        normal_scale: normal_scale(material),
+        occlusion_strength: material.occlusion_strength,
+        second_uv: second_uv.rev().fold(0, |bits, second| bits << 1 | u32::from(second)),
+        alpha_hashed: material.alpha_hashed.into(),
+        scale: world_metres(world_from_mesh),
     }
 }
 

@@ -118,6 +118,8 @@ fn light_pixel(pixel: vec2u) {
     var environment = Arrival(vec3f(0.0), 0.0);
     for (var found = depth > 0.0; found; found = false) {
         let spot = spot_of(pixel, depth, surface_at(pixel));
+{% if traced and alpha_tested and mapped %}        ray_side_m = camera.near_m / depth * camera.footprint;
+{% endif %}
         environment = from_environment(spot);
 {% if visibility and not continued %}
         for (var number = 0u; number < illumination.light_count; number++) { add(OPEN_TO_LAMPS + number, place, 0.0); }

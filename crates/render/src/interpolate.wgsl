@@ -47,7 +47,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let corner{{ corner }} = vec2u({{ "high.x" if corner % 2 == 1 else "low.x" }}, {{ "high.y" if corner // 2 == 1 else "low.y" }});
     agree = agree && is_same_surface(point, normal, z * camera.footprint, corner{{ corner }});
     let place{{ corner }} = place_of(corner{{ corner }});
-    let light{{ corner }} = light_at(place{{ corner }});
+    let light{{ corner }} = light_at(place{{ corner }}, 1.0);
     least = min(least, light{{ corner }});
     greatest = max(greatest, light{{ corner }});
 {% endfor %}

@@ -66,7 +66,13 @@ fn structs_of_draws_have_the_wgsl_layout() {
         metallic,
         roughness,
         phong_reflector,
-        instance
+        instance,
+        dielectric_linear,
+        normal_scale,
+        occlusion_strength,
+        second_uv,
+        alpha_hashed,
+        scale
     });
     let surroundings = host!(GpuSurroundings { wind_direction, wind_amplitude_m, wind_waves_per_m, wind_frequency_hz });
     for (name, host) in [("RasterCamera", camera), ("Object", object), ("Surroundings", surroundings)] {

@@ -12,3 +12,8 @@ pub(crate) fn phong_reflector(material: &Material) -> u32 {
     let roughness = Reflector::roughness_of_exponent(material.phong_exponent);
     Reflector { reflectance_linear: Vec3::splat(material.phong_specular), roughness }.pack()
 }
+
+/// The scale of a material's normal map, 0 where it has none: shaders then read a texel of white.
+pub(crate) fn normal_scale(material: &Material) -> f32 {
+    material.normal_texture.map_or(0.0, |_| material.normal_scale)
+}

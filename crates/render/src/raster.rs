@@ -21,6 +21,14 @@ use crate::{
 
 /// The group of known samples.
 const KNOWN_GROUP: u32 = 3;
+/// The variables of the textures in the order of [`scene::Material::textures`], and of their samplers.
+const TEXTURES: [(&str, &str); 5] = [
+    ("base_color_texture", "base_color_sampler"),
+    ("metallic_roughness_texture", "metallic_roughness_sampler"),
+    ("normal_texture", "normal_sampler"),
+    ("emissive_texture", "emissive_sampler"),
+    ("occlusion_texture", "occlusion_sampler"),
+];
 /// The indices of a slice of a scene whose cost is unknown.
 const UNKNOWN_SLICE_INDICES: u64 = 3 << 14;
 
@@ -56,7 +64,6 @@ struct Groups {
 
 pub(crate) struct Raster {
     gpu: Arc<Gpu>,
-    sampler: wgpu::Sampler,
     passes: PassCache<DrawPass>,
 }
 
@@ -75,18 +82,22 @@ impl ShaderVariant for RasterVariant {
     const TRAITS: ResourceTraits = &[
         ("camera", ResourceTrait::DynamicOffset),
         ("object", ResourceTrait::DynamicOffset),
-        ("base_color_texture", ResourceTrait::Filterable),
-        ("metallic_roughness_texture", ResourceTrait::Filterable),
+        (TEXTURES[0].0, ResourceTrait::Filterable),
+        (TEXTURES[1].0, ResourceTrait::Filterable),
+        (TEXTURES[2].0, ResourceTrait::Filterable),
+        (TEXTURES[3].0, ResourceTrait::Filterable),
+        (TEXTURES[4].0, ResourceTrait::Filterable),
     ];
 
     fn context(&self) -> Value {
-        let MaterialTraits { double_sided, alpha_tested, textured, coat_textured, unlit, specular } = self.material;
+        let MaterialTraits { double_sided, alpha_tested, textured, coat_textured, unlit, specular, mapped } =
+            self.material;
         context! {
             shading => self.shading.map_or("unlit", highlight_name),
             surface_id => self.surface_id,
             depth_only => self.depth_only,
             wind => self.wind,
-            double_sided, alpha_tested, textured, unlit, specular,
+            double_sided, alpha_tested, textured, unlit, specular, mapped,
             coat_textured => coat_textured && self.shading == Some(Highlight::Ggx),
             ..RedundancyVariant::context(self.redundancy, KNOWN_GROUP)
         }
@@ -116,13 +127,14 @@ impl DrawVariant for RasterVariant {
         color_formats.extend((!self.depth_only).then_some(SURFACE_FORMAT));
         color_formats.extend((!self.depth_only && self.surface_id).then_some(SURFACE_ID_FORMAT));
         let cull_mode = (!self.material.double_sided).then_some(wgpu::Face::Back);
-        DrawState { vertices: vertex_layout(), cull_mode, color_formats }
+        let vertices = [vertex_layout()].into_iter().chain(self.material.mapped.then(detail_layout)).collect();
+        DrawState { vertices, cull_mode, color_formats }
     }
 }
 
 impl Raster {
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        Self { gpu: gpu.clone(), sampler: gpu.texture_sampler(), passes: PassCache::new(gpu, templates) }
+        Self { gpu: gpu.clone(), passes: PassCache::new(gpu, templates) }
     }
 
     /// Records one pass for each camera from the `first` on. With predecessors, whose samples are not drawn again, there is one
@@ -216,6 +228,7 @@ impl Raster {
         let size = camera.size_px.as_vec2();
         pass.set_viewport(0.0, 0.0, size.x, size.y, 0.0, 1.0);
         pass.set_vertex_buffer(0, scene.vertices.slice(..));
+        pass.set_vertex_buffer(1, scene.details.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.set_bind_group(0, &*groups.scene, &[place * CAMERA_STRIDE]);
         if let Some(known) = groups.known.as_ref().filter(|_| variant.redundancy.is_some()) {
@@ -251,13 +264,12 @@ impl Raster {
         let scene = work.scene;
         let cameras = cameras.iter().map(|camera| RasterCamera::of(camera, work.scene_time_s));
         let cameras = uniform(&self.gpu, "raster cameras", cameras);
-        let textures = |[base_color, metallic_roughness]: &[wgpu::TextureView; 2]| {
-            let views = [
-                Binding::texture("base_color_texture", base_color),
-                Binding::texture("metallic_roughness_texture", metallic_roughness),
-                Binding::sampler("material_sampler", &self.sampler),
-            ];
-            pass.bind(2, views)
+        let textures = |textures: &[(wgpu::TextureView, wgpu::Sampler); 5]| {
+            let bindings =
+                TEXTURES.iter().zip(textures).flat_map(|(&(texture_name, sampler_name), (view, sampler))| {
+                    [Binding::texture(texture_name, view), Binding::sampler(sampler_name, sampler)]
+                });
+            pass.bind(2, bindings)
         };
         let own = [Binding::buffer("camera", &cameras), Binding::buffer("surroundings", &scene.surroundings)];
         Ok(Groups {
@@ -348,6 +360,16 @@ fn vertex_layout() -> wgpu::VertexBufferLayout<'static> {
         wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2, 3 => Unorm8x4, 4 => Float32];
     wgpu::VertexBufferLayout {
         array_stride: size_of::<scene::Vertex>() as u64,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &ATTRIBUTES,
+    }
+}
+
+/// The attributes of `scene::VertexDetail`.
+fn detail_layout() -> wgpu::VertexBufferLayout<'static> {
+    const ATTRIBUTES: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![5 => Float32x2, 6 => Float32x4];
+    wgpu::VertexBufferLayout {
+        array_stride: size_of::<scene::VertexDetail>() as u64,
         step_mode: wgpu::VertexStepMode::Vertex,
         attributes: &ATTRIBUTES,
     }

@@ -2,6 +2,9 @@
 {% endif %}
 // Draws triangles: which surface each pixel shows. Light comes later.
 {% include "packed_surface.wgsl" %}
+{% if mapped and alpha_tested %}
+{% include "hashed_alpha.wgsl" %}
+{% endif %}
 
 struct Object {
     world_from_mesh: array<vec4f, 3>,
@@ -13,6 +16,15 @@ struct Object {
     roughness: f32,
     phong_reflector: u32,
     instance: u32,
+    dielectric_linear: vec3f,
+    normal_scale: f32,
+    occlusion_strength: f32,
+    // A bit for each texture that lies on the second coordinates: base colour, metallic and roughness, normals, emission,
+    // occlusion.
+    second_uv: u32,
+    alpha_hashed: u32,
+    // Metres of the world a metre of the mesh.
+    scale: f32,
 }
 struct Surroundings {
     wind_direction: vec3f,
@@ -33,8 +45,15 @@ struct RasterCamera {
 @group(0) var<uniform> surroundings: Surroundings;
 @group(1) var<uniform> object: Object;
 @group(2) var base_color_texture: texture_2d<f32>;
+@group(2) var base_color_sampler: sampler;
 @group(2) var metallic_roughness_texture: texture_2d<f32>;
-@group(2) var material_sampler: sampler;
+@group(2) var metallic_roughness_sampler: sampler;
+@group(2) var normal_texture: texture_2d<f32>;
+@group(2) var normal_sampler: sampler;
+@group(2) var emissive_texture: texture_2d<f32>;
+@group(2) var emissive_sampler: sampler;
+@group(2) var occlusion_texture: texture_2d<f32>;
+@group(2) var occlusion_sampler: sampler;
 
 struct Varyings {
     // The same for all pipelines: depths of one pass are compared with those of another.
@@ -44,6 +63,11 @@ struct Varyings {
     @location(2) color_linear: vec4f,
     @location(3) @interpolate(flat) first_primitive: u32,
 {% if redundancy_test %}    @location(4) position_in_world: vec3f,
+{% endif %}
+{% if mapped %}    @location(5) second_uv: vec2f,
+    @location(6) tangent_in_world: vec4f,
+    // In the mesh's space, in metres of the world.
+    @location(7) place_m: vec3f,
 {% endif %}
 }
 
@@ -60,6 +84,9 @@ fn vertex(
     @location(2) uv: vec2f,
     @location(3) color_srgb: vec4f,
     @location(4) sway: f32,
+{% if mapped %}    @location(5) second_uv: vec2f,
+    @location(6) tangent: vec4f,
+{% endif %}
 ) -> Varyings {
     var position_in_world = rows_times(object.world_from_mesh, vec4f(position, 1.0));
 {% if wind %}
@@ -75,8 +102,34 @@ fn vertex(
     out.first_primitive = first_primitive;
 {% if redundancy_test %}    out.position_in_world = position_in_world;
 {% endif %}
+{% if mapped %}
+    // Corners have unit vectors, as those of rays do.
+    out.normal_in_world = normalize(out.normal_in_world);
+    out.second_uv = second_uv;
+    out.tangent_in_world = vec4f(normalize(rows_times(object.world_from_mesh, vec4f(tangent.xyz, 0.0))), tangent.w);
+    out.place_m = position * object.scale;
+{% endif %}
     return out;
 }
+
+// The coordinates of a texture, by its bit in `second_uv`.
+fn uv_of(in: Varyings, number: u32) -> vec2f {
+{% if mapped %}
+    return select(in.uv, in.second_uv, (object.second_uv & (1u << number)) != 0u);
+{% else %}
+    return in.uv;
+{% endif %}
+}
+{% if alpha_tested %}
+
+fn is_there(in: Varyings, alpha: f32) -> bool {
+    var cutoff = object.alpha_cutoff;
+{% if mapped %}
+    cutoff = select(cutoff, hashed_cutoff(in.place_m, camera.near_m / in.clip.z * camera.footprint), object.alpha_hashed != 0u);
+{% endif %}
+    return alpha >= cutoff;
+}
+{% endif %}
 
 {% if redundancy_test %}
 {% include "known_samples.wgsl" %}
@@ -97,9 +150,9 @@ fn candidate_at(in: Varyings, normal: vec3f, primitive: u32) -> Candidate {
 fn fragment(in: Varyings) {
     var alpha = object.base_color_linear.a * in.color_linear.a;
 {% if textured %}
-    alpha *= textureSample(base_color_texture, material_sampler, in.uv).a;
+    alpha *= textureSample(base_color_texture, base_color_sampler, uv_of(in, 0u)).a;
 {% endif %}
-    if alpha < object.alpha_cutoff { discard; }
+    if !is_there(in, alpha) { discard; }
 }
 {% endif %}
 {% else %}
@@ -113,23 +166,36 @@ struct Planes {
 fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface_id or redundancy_test %}, @builtin(primitive_index) primitive: u32{% endif %}) -> Planes {
     var base = object.base_color_linear * in.color_linear;
 {% if textured %}
-    base *= textureSample(base_color_texture, material_sampler, in.uv);
+    base *= textureSample(base_color_texture, base_color_sampler, uv_of(in, 0u));
 {% endif %}
 {% if alpha_tested %}
-    if base.a < object.alpha_cutoff { discard; }
+    if !is_there(in, base.a) { discard; }
 {% endif %}
-    var coat = Coat(object.metallic, object.roughness, object.phong_reflector, {{ "true" if unlit else "false" }}, {{ "true" if specular else "false" }});
+    var coat = Coat(
+        object.metallic, object.roughness, object.dielectric_linear, object.phong_reflector,
+        {{ "true" if unlit else "false" }}, {{ "true" if specular else "false" }}, 1.0,
+    );
 {% if coat_textured %}
-    let metallic_roughness = textureSample(metallic_roughness_texture, material_sampler, in.uv);
+    let metallic_roughness = textureSample(metallic_roughness_texture, metallic_roughness_sampler, uv_of(in, 1u));
     coat.metallic *= metallic_roughness.b;
     coat.roughness *= metallic_roughness.g;
 {% endif %}
-    let normal = normalize(in.normal_in_world){% if double_sided %} * select(-1.0, 1.0, front_facing){% endif %};
+    var emissive_linear = object.emissive_linear;
+    var shown_normal = normalize(in.normal_in_world);
+{% if mapped %}
+    emissive_linear *= textureSample(emissive_texture, emissive_sampler, uv_of(in, 3u)).rgb;
+    let occlusion = textureSample(occlusion_texture, occlusion_sampler, uv_of(in, 4u)).r;
+    coat.open = 1.0 + object.occlusion_strength * (occlusion - 1.0);
+    let map = textureSample(normal_texture, normal_sampler, uv_of(in, 2u)).xyz;
+    shown_normal = mapped_normal(map, object.normal_scale, in.normal_in_world, in.tangent_in_world);
+{% endif %}
+    let facing = {% if double_sided %}select(-1.0, 1.0, front_facing){% else %}1.0{% endif %};
+    let normal = normalize(in.normal_in_world) * facing;
 {% if redundancy_test %}
     if is_redundant(candidate_at(in, normal, primitive)) { discard; }
 {% endif %}
     var out: Planes;
-    out.surface = packed_surface(base.rgb, object.emissive_linear, normal, coat);
+    out.surface = packed_surface(base.rgb, emissive_linear, shown_normal * facing, coat);
 {% if surface_id %}    out.surface_id = vec2u(object.instance, in.first_primitive + primitive);
 {% endif %}
     return out;

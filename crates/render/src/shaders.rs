@@ -3,18 +3,23 @@
 use gpu::{ShaderError, ShaderSource, Templates, source, wgsl_constants, wgsl_files};
 
 use crate::known_samples::{LEAST_FACING, REFERENCE_FOOTPRINTS};
-use crate::rays::flat::{ALPHA_TESTED, DOUBLE_SIDED, SPECULAR, UNLIT, VERTEX};
+use crate::rays::flat::{ALPHA_HASHED, ALPHA_TESTED, DOUBLE_SIDED, SPECULAR, UNLIT, VERTEX};
 use crate::rays::primary::{MOST_LAYERS, Primary};
+use crate::rays::ray_scene::MATERIAL_TEXELS;
 use crate::rays::traversal::{BOX_SLACK, EDGE_ROUNDINGS};
 use crate::{
     finish::Finish, illuminate::Illuminate, interpolate::Interpolate, keep::Keep, pixel_list::LIST_WORKGROUP,
     raster::RasterVariant, redundancy_test::RedundancyTest, sums::COLOR_SUMS, surfaces::NOTHING,
 };
 
+/// Numbers of a texture's wrap modes.
+const MIRROR: u32 = scene::Wrap::Mirror as u32;
+const CLAMP: u32 = scene::Wrap::Clamp as u32;
+
 /// The shader templates of this crate.
 pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
     "raster.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "sequence.wgsl", "sums.wgsl",
-    "illuminate.wgsl", "interpolate.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl",
+    "illuminate.wgsl", "interpolate.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
     "rays/traverse.wgsl", "rays/material.wgsl", "rays/primary.wgsl"
 };
 
@@ -24,7 +29,7 @@ pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
 /// When a text is not a template.
 pub fn templates(tests: &[(&'static str, &'static str)]) -> Result<Templates, ShaderError> {
     Ok(Templates::new(&[SHADERS, tests].concat())?.declaring(wgsl_constants! {
-        ALPHA_TESTED, BOX_SLACK, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MOST_LAYERS,
+        ALPHA_HASHED, ALPHA_TESTED, BOX_SLACK, CLAMP, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MATERIAL_TEXELS, MIRROR, MOST_LAYERS,
         NOTHING, REFERENCE_FOOTPRINTS, SPECULAR, UNLIT, VERTEX
     }))
 }

@@ -1,13 +1,27 @@
 //! Textures with mip chains averaged in linear light.
 
+use std::collections::HashMap;
+
 use depth_image::{linear_from_srgb8, srgb8_from_linear};
 use gpu::Gpu;
-use scene::Texture;
+use scene::{Texture, Wrap};
 use wgpu::util::{DeviceExt as _, TextureDataOrder};
 
 /// One texel of white, for materials without a texture.
 pub(crate) fn white() -> Texture {
     Texture { width_px: 1, height_px: 1, is_srgb: true, srgba8: vec![255; 4] }
+}
+
+/// The samplers of all wrap modes.
+pub(crate) fn samplers(gpu: &Gpu) -> HashMap<[Wrap; 2], wgpu::Sampler> {
+    let mode = |wrap| match wrap {
+        Wrap::Repeat => wgpu::AddressMode::Repeat,
+        Wrap::Mirror => wgpu::AddressMode::MirrorRepeat,
+        Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
+    };
+    let all = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
+    let pairs = all.into_iter().flat_map(|u| all.map(|v| [u, v]));
+    pairs.map(|wrap| (wrap, gpu.texture_sampler(wrap.map(mode)))).collect()
 }
 
 /// Uploads a texture and all of its mip levels.

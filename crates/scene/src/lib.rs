@@ -19,6 +19,7 @@ mod model;
 mod package;
 pub mod procedural;
 mod spec;
+mod texture_use;
 mod validate;
 
 pub use depth_image::{Environment, Illumination, Light, LightError};
@@ -29,4 +30,5 @@ pub use limits::Limits;
 pub use model::*;
 pub use package::{pack, unpack};
 pub use spec::{BUILT_IN_NAMES, SceneSpec, SceneSpecError};
+pub use texture_use::{TextureUse, Wrap};
 pub use validate::MAX_COORDINATE_M;

@@ -4,6 +4,8 @@ use depth_image::{Aabb, Illumination};
 use glam::{Affine3A, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::TextureUse;
+
 /// A renderable scene. All indices of a scene from this crate are valid.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
@@ -68,6 +70,8 @@ impl Scene {
 pub struct Mesh {
     /// Corner data.
     pub vertices: Vec<Vertex>,
+    /// Further corner data: empty, or one for each of `vertices`.
+    pub details: Vec<VertexDetail>,
     /// Three indices into `vertices` a triangle, counter-clockwise seen from the front.
     pub indices: Vec<u32>,
     /// Runs of `indices`; together they cover it in order.
@@ -109,6 +113,23 @@ pub struct Vertex {
     pub sway: f32,
 }
 
+/// The data of a corner that only some materials need. `#[repr(C)]`, 24 bytes: uploaded as it is.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct VertexDetail {
+    /// A second pair of texture coordinates.
+    pub uv: [f32; 2],
+    /// Unit tangent in the mesh's space, along u of the normal map, and the sign s of the bitangent
+    /// `s · normal × tangent`, which points against v.
+    pub tangent: [f32; 4],
+}
+
+impl Default for VertexDetail {
+    fn default() -> Self {
+        Self { uv: [0.0; 2], tangent: [1.0, 0.0, 0.0, 1.0] }
+    }
+}
+
 /// A mesh placed in the world.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Instance {
@@ -125,22 +146,36 @@ pub struct Material {
     pub name: String,
     /// Factor of texture and vertex colour, linear RGB and alpha.
     pub base_color_linear: [f32; 4],
-    /// Index into [`Scene::textures`]; sRGB.
-    pub base_color_texture: Option<u32>,
+    /// Colours.
+    pub base_color_texture: Option<TextureUse>,
     /// 0 for a dielectric, 1 for a metal; multiplied by the texture's value.
     pub metallic: f32,
     /// Perceptual roughness, 0 to 1; multiplied by the texture's value.
     pub roughness: f32,
-    /// Index into [`Scene::textures`]; green is roughness and blue is metallic, linear: `is_srgb` is false.
-    pub metallic_roughness_texture: Option<u32>,
-    /// Emitted radiance, linear RGB.
+    /// Green is roughness and blue is metallic, linear: `is_srgb` is false.
+    pub metallic_roughness_texture: Option<TextureUse>,
+    /// Reflectance of the surface at normal incidence where it is a dielectric, linear RGB, 0 to 1.
+    pub dielectric_reflectance_linear: Vec3,
+    /// Normals in the tangent space of [`VertexDetail`], linear; each channel's 0…1 stands for -1…1.
+    pub normal_texture: Option<TextureUse>,
+    /// Factor of the normal map's x and y.
+    pub normal_scale: f32,
+    /// Red is the share of the environment's light that arrives, linear. A surface that emits light is not occluded.
+    pub occlusion_texture: Option<TextureUse>,
+    /// Share of the occlusion that counts, 0 to 1.
+    pub occlusion_strength: f32,
+    /// Emitted radiance, linear RGB; multiplied by the texture's value.
     pub emissive_linear: Vec3,
+    /// Colours.
+    pub emissive_texture: Option<TextureUse>,
     /// Blinn-Phong specular strength and exponent for `phong` lighting; a texture counts by its mean.
     pub phong_specular: f32,
     /// See `phong_specular`.
     pub phong_exponent: f32,
     /// Fragments with less alpha are discarded; 0 for opaque surfaces.
     pub alpha_cutoff: f32,
+    /// The cutoff is a hash of the place instead, so that the share of the surface that remains is its alpha.
+    pub alpha_hashed: bool,
     /// The back is visible too; its normal then faces the viewer.
     pub double_sided: bool,
     /// The colour is independent of light (`KHR_materials_unlit`).
@@ -156,38 +191,87 @@ impl Default for Material {
             metallic: 0.0,
             roughness: 1.0,
             metallic_roughness_texture: None,
+            dielectric_reflectance_linear: Vec3::splat(DIELECTRIC_REFLECTANCE),
+            normal_texture: None,
+            normal_scale: 1.0,
+            occlusion_texture: None,
+            occlusion_strength: 1.0,
             emissive_linear: Vec3::ZERO,
+            emissive_texture: None,
             phong_specular: 0.0,
             phong_exponent: 32.0,
             alpha_cutoff: 0.0,
+            alpha_hashed: false,
             double_sided: false,
             unlit: false,
         }
     }
 }
 
+/// Reflectance at normal incidence of a dielectric with a refractive index of 1.5, as in glTF 2.0.
+pub const DIELECTRIC_REFLECTANCE: f32 = 0.04;
+
 /// See [`Material::is_specular`].
 const LEAST_MATT_ROUGHNESS: f32 = 0.95;
 
 impl Material {
     /// Blinn-Phong strength and exponent of a highlight about as bright and wide as that of a metallic-roughness
-    /// surface.
+    /// surface with this reflectance at normal incidence of its dielectric part.
     #[must_use]
-    pub fn phong_from_metallic_roughness(metallic: f32, roughness: f32) -> (f32, f32) {
+    pub fn phong_from_metallic_roughness(metallic: f32, roughness: f32, dielectric_reflectance: f32) -> (f32, f32) {
         // Blinn-Phong and GGX agree near the peak for exponent = 2 / alpha^2 - 2 (Karis 2013).
         let alpha = (roughness * roughness).max(0.03);
-        let strength = (0.08 + 0.6 * metallic) * (1.0 - roughness);
+        let strength = (2.0 * dielectric_reflectance + 0.6 * metallic) * (1.0 - roughness);
         (strength, (2.0 / (alpha * alpha) - 2.0).clamp(1.0, 1024.0))
     }
 
     /// Returns whether the material has a visible highlight under GGX. Samples keep view-dependent light apart, at a
-    /// cost that a scene should pay only where it needs it. A dielectric (reflectance 0.04 head on) of roughness 0.95
-    /// or more reflects about a hundredth of a white surface's light, and counts as matt. A roughness texture always
-    /// counts as visible, because it may vary.
+    /// cost that a scene should pay only where it needs it. A dielectric of roughness 0.95 or more reflects about a
+    /// hundredth of a white surface's light, and counts as matt. A roughness texture always counts as visible, because
+    /// it may vary.
     #[must_use]
     pub fn is_specular(&self) -> bool {
+        let reflects = self.metallic > 0.0 || self.dielectric_reflectance_linear.max_element() > 0.0;
         let is_smooth_or_metal = self.metallic > 0.0 || self.roughness < LEAST_MATT_ROUGHNESS;
-        !self.unlit && (is_smooth_or_metal || self.metallic_roughness_texture.is_some())
+        !self.unlit && reflects && (is_smooth_or_metal || self.metallic_roughness_texture.is_some())
+    }
+
+    /// Its textures: base colour, metallic and roughness, normals, emission, occlusion.
+    #[must_use]
+    pub fn textures(&self) -> [Option<TextureUse>; 5] {
+        [
+            self.base_color_texture,
+            self.metallic_roughness_texture,
+            self.normal_texture,
+            self.emissive_texture,
+            self.occlusion_texture,
+        ]
+    }
+
+    /// The same, to be changed.
+    pub fn textures_mut(&mut self) -> [&mut Option<TextureUse>; 5] {
+        [
+            &mut self.base_color_texture,
+            &mut self.metallic_roughness_texture,
+            &mut self.normal_texture,
+            &mut self.emissive_texture,
+            &mut self.occlusion_texture,
+        ]
+    }
+
+    /// Returns whether alpha decides where the surface is.
+    #[must_use]
+    pub fn is_alpha_tested(&self) -> bool {
+        self.alpha_hashed || self.alpha_cutoff > 0.0
+    }
+
+    /// Returns whether more than base colour, metallic and roughness at the first texture coordinates is needed:
+    /// further textures, [`VertexDetail`], or hashed alpha.
+    #[must_use]
+    pub fn is_mapped(&self) -> bool {
+        let [_, _, further @ ..] = self.textures();
+        let has_second_uv = self.textures().iter().flatten().any(|texture| texture.second_uv);
+        self.alpha_hashed || has_second_uv || further.iter().any(Option::is_some)
     }
 
     /// The perceptual roughness that corresponds to a Blinn-Phong exponent.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! magic "MYRSCENE" | version u32 | header length u32 | header (postcard)
-//! then for each mesh: vertices (40 bytes each), indices (4 bytes each); for each texture: texels
+//! then for each mesh: vertices (40 bytes each), details (24 bytes each), indices (4 bytes each); for each texture: texels
 //! ```
 //!
 //! Arrays have their layout in memory, so that packing and unpacking are copies. The header has their lengths, which
@@ -20,7 +20,7 @@ use crate::{Instance, Limits, Material, Mesh, MeshPart, Scene, SceneError, Sourc
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");
 
 const MAGIC: &[u8; 8] = b"MYRSCENE";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// A scene without its large arrays.
 #[derive(Serialize, Deserialize)]
@@ -40,6 +40,7 @@ struct Header {
 #[derive(Serialize, Deserialize)]
 struct MeshHeader {
     vertex_count: u32,
+    detail_count: u32,
     index_count: u32,
     parts: Vec<MeshPart>,
 }
@@ -63,6 +64,7 @@ pub fn pack(scene: &Scene) -> Vec<u8> {
     bytes.extend_from_slice(&header);
     for mesh in &scene.meshes {
         bytes.extend_from_slice(bytemuck::cast_slice(&mesh.vertices));
+        bytes.extend_from_slice(bytemuck::cast_slice(&mesh.details));
         bytes.extend_from_slice(bytemuck::cast_slice(&mesh.indices));
     }
     scene.textures.iter().for_each(|texture| bytes.extend_from_slice(&texture.srgba8));
@@ -98,6 +100,7 @@ fn scene_from_bytes(bytes: &[u8], limits: &Limits) -> Result<Scene, Fault> {
 fn header_of(scene: &Scene) -> Header {
     let mesh = |m: &Mesh| MeshHeader {
         vertex_count: m.vertices.len() as u32,
+        detail_count: m.details.len() as u32,
         index_count: m.indices.len() as u32,
         parts: m.parts.clone(),
     };
@@ -117,7 +120,9 @@ fn header_of(scene: &Scene) -> Header {
 }
 
 fn array_bytes(scene: &Scene) -> usize {
-    let mesh = |m: &Mesh| size_of_val(m.vertices.as_slice()) + size_of_val(m.indices.as_slice());
+    let mesh = |m: &Mesh| {
+        size_of_val(m.vertices.as_slice()) + size_of_val(m.details.as_slice()) + size_of_val(m.indices.as_slice())
+    };
     scene.meshes.iter().map(mesh).sum::<usize>() + scene.textures.iter().map(|t| t.srgba8.len()).sum::<usize>()
 }
 
@@ -135,8 +140,9 @@ fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Re
         let element = format!("mesh {number}");
         at_most(format!("{element}, vertices"), mesh.vertex_count.into(), limits.vertices)?;
         let vertices = reader.pods(&element, mesh.vertex_count.into())?;
+        let details = reader.pods(&element, mesh.detail_count.into())?;
         let indices = reader.pods(&element, mesh.index_count.into())?;
-        meshes.push(Mesh { vertices, indices, parts: mesh.parts });
+        meshes.push(Mesh { vertices, details, indices, parts: mesh.parts });
     }
     let mut textures = Vec::new();
     for (number, TextureHeader { width_px, height_px, is_srgb }) in header.textures.into_iter().enumerate() {

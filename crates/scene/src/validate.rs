@@ -5,7 +5,8 @@ use glam::{Affine3A, Vec3};
 
 use crate::error::{Fault, at_most};
 use crate::{
-    Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SceneError, SourceCamera, Texture, Vertex, Wind,
+    Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SceneError, SourceCamera, Texture, TextureUse, Vertex,
+    VertexDetail, Wind,
 };
 
 /// Coordinates beyond this are refused: products of four edge lengths must stay finite in `f32`.
@@ -84,6 +85,14 @@ fn check_mesh(mesh: &Mesh, material_count: usize) -> Result<(), String> {
     ensure(bad_vertex.is_none(), || {
         format!("vertex {} is not finite, out of range or without a unit normal", bad_vertex.unwrap_or(0))
     })?;
+    let details = mesh.details.len();
+    ensure(details == 0 || details == mesh.vertices.len(), || {
+        format!("{details} vertex details for {} vertices", mesh.vertices.len())
+    })?;
+    let bad_detail = mesh.details.iter().position(|d| !is_detail_valid(d));
+    ensure(bad_detail.is_none(), || {
+        format!("the detail of vertex {} is not finite or without a unit tangent", bad_detail.unwrap_or(0))
+    })?;
     let bad_index = mesh.indices.iter().find(|&&i| i as usize >= mesh.vertices.len());
     ensure(bad_index.is_none(), || {
         format!("index {} is beyond its {} vertices", bad_index.unwrap_or(&0), mesh.vertices.len())
@@ -113,6 +122,12 @@ fn is_vertex_valid(vertex: &Vertex) -> bool {
         && (0.0..=1.0).contains(&vertex.sway)
 }
 
+fn is_detail_valid(detail: &VertexDetail) -> bool {
+    let [x, y, z, sign] = detail.tangent;
+    let is_unit = (Vec3::new(x, y, z).length_squared() - 1.0).abs() < 1e-2;
+    is_unit && sign.abs() == 1.0 && detail.uv.iter().all(|c| c.is_finite())
+}
+
 fn check_transform(world_from_mesh: &Affine3A) -> Result<(), String> {
     ensure(world_from_mesh.is_finite(), || "its transform is not finite".into())?;
     let columns = [world_from_mesh.matrix3.x_axis, world_from_mesh.matrix3.y_axis, world_from_mesh.matrix3.z_axis];
@@ -126,22 +141,29 @@ fn check_transform(world_from_mesh: &Affine3A) -> Result<(), String> {
 }
 
 fn check_material(material: &Material, textures: &[Texture]) -> Result<(), String> {
-    check_texture_use("base colour", material.base_color_texture, textures)?;
-    check_texture_use("metallic-roughness", material.metallic_roughness_texture, textures)?;
-    let data = material.metallic_roughness_texture.and_then(|t| textures.get(t as usize));
-    ensure(data.is_none_or(|t| !t.is_srgb), || "its metallic-roughness texture holds colours".into())?;
+    let names = ["base colour", "metallic-roughness", "normal", "emissive", "occlusion"];
+    for (name, texture) in names.into_iter().zip(material.textures()) {
+        let holds_colors = matches!(name, "base colour" | "emissive");
+        texture.map_or(Ok(()), |texture| check_texture_use(name, holds_colors, texture, textures))?;
+    }
     let unit = |v: f32| (0.0..=1.0).contains(&v);
     ensure(material.base_color_linear.iter().all(|c| c.is_finite() && *c >= 0.0), || "bad base colour".into())?;
     ensure(is_radiance(material.emissive_linear), || "bad emissive colour".into())?;
     ensure(unit(material.metallic), || "metallic is not from 0 to 1".into())?;
     ensure(unit(material.roughness), || "roughness is not from 0 to 1".into())?;
+    ensure(unit(material.occlusion_strength), || "occlusion strength is not from 0 to 1".into())?;
+    ensure(material.normal_scale.is_finite(), || "normal scale is not finite".into())?;
+    let reflectance = material.dielectric_reflectance_linear;
+    ensure(reflectance.to_array().into_iter().all(unit), || "bad dielectric reflectance".into())?;
     let phong = [material.phong_specular, material.phong_exponent, material.alpha_cutoff];
     ensure(phong.iter().all(|v| v.is_finite() && *v >= 0.0), || "bad Phong terms or alpha cutoff".into())
 }
 
-fn check_texture_use(what: &str, texture: Option<u32>, textures: &[Texture]) -> Result<(), String> {
-    let is_there = texture.is_none_or(|t| (t as usize) < textures.len());
-    ensure(is_there, || format!("its {what} texture {} does not exist", texture.unwrap_or(0)))
+fn check_texture_use(name: &str, holds_colors: bool, used: TextureUse, textures: &[Texture]) -> Result<(), String> {
+    let number = used.texture;
+    let texture = textures.get(number as usize);
+    let texture = texture.ok_or_else(|| format!("its {name} texture {number} does not exist"))?;
+    ensure(holds_colors || !texture.is_srgb, || format!("its {name} texture holds colours"))
 }
 
 fn check_texture(texture: &Texture, limits: &Limits) -> Result<(), String> {

@@ -6,6 +6,7 @@ mod samples;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use samples::compressed::{compressed_cube, diagonals, plain_streams, positions};
 use samples::{GltfCube, cube_obj, cube_ply_ascii, cube_ply_binary};
 use scene::procedural::{checker_sphere, unit_cube};
 use scene::{Limits, MissingTextures, load_file, pack, unpack};
@@ -147,6 +148,23 @@ fn glb_with_other_numbers_in_its_json() {
 }
 
 #[test]
+fn compressed_glb() {
+    load_damaged("a.glb", &compressed_gltf().glb(), 2000);
+    // Damage that meets the streams alone, behind the JSON.
+    let (cube, dir) = (compressed_gltf(), tempfile::tempdir().unwrap());
+    let path = dir.path().join("a.glb");
+    let (mut loaded, mut slowest) = (0, Duration::ZERO);
+    damaged(&cube.binary, 3000, |binary| {
+        rewrite(&path, &samples::glb(&cube.json(), binary));
+        let start = Instant::now();
+        loaded += u32::from(load(&path));
+        slowest = slowest.max(start.elapsed());
+    });
+    println!("{loaded} loaded, slowest {slowest:?}");
+    assert!(loaded > 100 && slowest < Duration::from_secs(1), "{loaded} {slowest:?}");
+}
+
+#[test]
 fn gltf() {
     let mut cube = rich_gltf();
     let hex: String = cube.binary.iter().map(|b| format!("%{b:02x}")).collect();
@@ -200,11 +218,11 @@ fn packages() {
     }
 }
 
-/// A cube with lights, cameras, colours, normals, a sparse accessor, materials and a texture.
+/// A cube with lights, cameras, colours, normals, a sparse accessor, and a material with a texture in every place.
 fn rich_gltf() -> GltfCube {
     let mut cube = GltfCube::default();
     cube.primitive =
-        r#"{"attributes":{"POSITION":0,"NORMAL":0,"COLOR_0":2,"TEXCOORD_0":3},"indices":1,"material":0}"#.into();
+        r#"{"attributes":{"POSITION":0,"NORMAL":0,"COLOR_0":2,"TEXCOORD_0":3,"TEXCOORD_1":3},"indices":1,"material":0}"#.into();
     cube.accessors = cube.accessors.replacen(
         r#""count":8"#,
         r#""sparse":{"count":1,"indices":{"bufferView":2,"componentType":5121},"values":{"bufferView":0}},"count":8"#,
@@ -220,10 +238,23 @@ fn rich_gltf() -> GltfCube {
         .into();
     cube.more = r#""extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":3},
         {"type":"spot","intensity":900,"color":[1,0.5,0.25],"spot":{"innerConeAngle":0.25,"outerConeAngle":0.5}}]}},
-        "cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1}}],"textures":[{"source":0}],
+        "cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1}}],"textures":[{"source":0,"sampler":0}],
         "images":[{"uri":"data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC"}],
-        "materials":[{"emissiveTexture":{"index":0},"pbrMetallicRoughness":{"baseColorTexture":{"index":0},
-        "metallicRoughnessTexture":{"index":0}}}],"#.into();
+        "samplers":[{"wrapS":33071,"wrapT":33648}],"materials":[{"emissiveTexture":{"index":0},"alphaMode":"BLEND",
+        "pbrMetallicRoughness":{"baseColorTexture":{"index":0},"metallicRoughnessTexture":{"index":0}},
+        "normalTexture":{"index":0,"texCoord":1,"scale":2},"occlusionTexture":{"index":0,"strength":0.5,
+        "extensions":{"KHR_texture_transform":{"texCoord":1,"scale":[2,3]}}},"extensions":{"KHR_materials_ior":{"ior":1.4},
+        "KHR_materials_specular":{"specularFactor":0.5,"specularTexture":{"index":0},"specularColorFactor":[1,2,3]}}}],"#
+        .into();
+    cube
+}
+
+/// A cube whose positions, triangles and normals are compressed, with two filters.
+fn compressed_gltf() -> GltfCube {
+    let streams = [positions(0, "EXPONENTIAL"), plain_streams().remove(1), diagonals(4)];
+    let mut cube = compressed_cube("EXT_meshopt_compression", &streams);
+    cube.primitive = r#"{"attributes":{"POSITION":0,"NORMAL":2},"indices":1}"#.into();
+    cube.accessors += r#",{"bufferView":2,"componentType":5120,"normalized":true,"count":8,"type":"VEC3"}"#;
     cube
 }
 
@@ -234,6 +265,6 @@ fn the_undamaged_sample_loads() {
     let scene = load_file(&dir.path().join("a.glb"), &limits(), MissingTextures::Refuse).unwrap();
     assert_eq!(
         (scene.triangle_count(), scene.illumination.lights.len(), scene.cameras.len(), scene.textures.len()),
-        (24, 2, 1, 2)
+        (24, 2, 1, 3)
     );
 }

@@ -109,7 +109,7 @@ fn materials_keep_the_factors_of_the_model() {
     assert_eq!((m.metallic, m.roughness, m.alpha_cutoff), (0.5, 0.75, 0.25));
     assert!(m.double_sided && m.unlit);
     assert_eq!(m.emissive_linear, Vec3::Y);
-    assert_eq!(scene.materials[1].alpha_cutoff, 0.5);
+    assert!(scene.materials[1].alpha_hashed && !m.alpha_hashed);
 }
 
 #[test]
@@ -409,8 +409,17 @@ fn dangling_references_are_refused_by_name() {
 
 #[test]
 fn unknown_required_extensions_are_refused_by_name() {
-    let message = refused(|c| c.more = r#""extensionsRequired":["KHR_draco_mesh_compression"],"#.into());
-    assert!(message.contains("KHR_draco_mesh_compression") && message.contains("not supported"), "{message}");
+    let required = |name: &str| refused(|c| c.more = format!(r#""extensionsRequired":["{name}"],"#));
+    let message = required("KHR_animation_pointer");
+    assert!(message.ends_with("extensionsRequired: not supported: KHR_animation_pointer"), "{message}");
+    // A converter's command line follows where there is one.
+    for (name, command) in [
+        ("KHR_draco_mesh_compression", "npx @gltf-transform/cli copy IN OUT"),
+        ("KHR_texture_basisu", "npx @gltf-transform/cli ktxdecompress IN OUT"),
+    ] {
+        let message = required(name);
+        assert!(message.contains("not supported") && message.contains(name) && message.contains(command), "{message}");
+    }
     assert!(refusal("old.gltf", br#"{"asset":{"version":"1.0"}}"#).contains("version"));
 }
 

@@ -4,7 +4,7 @@
 mod samples;
 
 use samples::{Sample, cube, load, refusal};
-use scene::{Limits, MissingTextures, SceneErrorKind, load_file};
+use scene::{Limits, MissingTextures, SceneErrorKind, TextureUse, load_file};
 
 /// An image of `texels`, as a data URI.
 fn png_of(texels: &[[u8; 4]]) -> String {
@@ -35,11 +35,11 @@ fn metallic_and_roughness_keep_their_texture() {
     let scene = load("mr.glb", &textured_cube(pbr)).unwrap();
     let m = &scene.materials[0];
     assert_eq!((m.metallic, m.roughness, m.base_color_texture), (0.5, 0.8, None));
-    let texture = &scene.textures[m.metallic_roughness_texture.unwrap() as usize];
+    let texture = &scene.textures[m.metallic_roughness_texture.unwrap().texture as usize];
     assert_eq!((texture.is_srgb, texture.width_px, scene.textures.len()), (false, 2, 1));
     assert_eq!(texture.srgba8[..3], [10, 200, 255], "as it is in the file");
     // Blinn-Phong has the mean: metallic 0.5 · 0.5 and roughness 0.8 · 150/255.
-    let (specular, exponent) = scene::Material::phong_from_metallic_roughness(0.25, 0.8 * 150.0 / 255.0);
+    let (specular, exponent) = scene::Material::phong_from_metallic_roughness(0.25, 0.8 * 150.0 / 255.0, 0.04);
     assert!((m.phong_specular - specular).abs() < 1e-5 && (m.phong_exponent / exponent - 1.0).abs() < 1e-4);
 }
 
@@ -47,25 +47,10 @@ fn metallic_and_roughness_keep_their_texture() {
 fn an_image_of_colours_and_data_is_two_textures() {
     let both = r#""baseColorTexture":{"index":0},"metallicRoughnessTexture":{"index":0}"#;
     let scene = load("both.glb", &textured_cube(both)).unwrap();
-    let of = |texture: Option<u32>| &scene.textures[texture.unwrap() as usize];
+    let of = |used: Option<TextureUse>| &scene.textures[used.unwrap().texture as usize];
     let m = &scene.materials[0];
     assert!(of(m.base_color_texture).is_srgb && !of(m.metallic_roughness_texture).is_srgb);
     assert_eq!((scene.textures.len(), &scene.textures[0].srgba8), (2, &scene.textures[1].srgba8));
-}
-
-#[test]
-fn a_texture_with_coordinates_of_its_own_is_reduced_to_its_mean() {
-    let transform = r#""extensions":{"KHR_texture_transform":{"scale":[2,2]}}"#;
-    let pbr = format!(r#""baseColorTexture":{{"index":1}},"metallicRoughnessTexture":{{"index":0,{transform}}}"#);
-    let scene = load("own.glb", &textured_cube(&pbr)).unwrap();
-    let m = &scene.materials[0];
-    assert_eq!((m.metallic_roughness_texture, scene.textures.len()), (None, 1));
-    assert!((m.metallic - 0.5).abs() < 1e-5 && (m.roughness - 150.0 / 255.0).abs() < 1e-5);
-    // Alone, its coordinates are the vertex's.
-    let alone = format!(r#""metallicRoughnessTexture":{{"index":0,{transform}}}"#);
-    let scene = load("alone.glb", &textured_cube(&alone)).unwrap();
-    assert!(scene.materials[0].metallic_roughness_texture.is_some());
-    assert_eq!(scene.meshes[0].vertices[0].uv, [-1.0, -1.0]);
 }
 
 #[test]
@@ -100,20 +85,22 @@ fn a_webp_texture_is_read_with_and_without_another_format() {
 #[test]
 fn all_missing_textures_are_named_and_grey_goes_on() {
     let pbr = r#""baseColorTexture":{"index":0},"metallicRoughnessTexture":{"index":1}"#;
+    let normal = r#""normalTexture":{"index":2}"#;
     let bytes = cube(|c| {
         c.primitive = r#"{"attributes":{"POSITION":0},"indices":1,"material":0}"#.into();
         c.more = format!(
-            r#""textures":[{{"source":0}},{{"source":1}}],"images":[{{"uri":"a%20b.png"}},{{"uri":"c.jpg"}}],
-            "materials":[{{"pbrMetallicRoughness":{{{pbr},"roughnessFactor":0.7}}}}],"#
+            r#""textures":[{{"source":0}},{{"source":1}},{{"source":2}}],
+            "images":[{{"uri":"a%20b.png"}},{{"uri":"c.jpg"}},{{"uri":"d.png"}}],
+            "materials":[{{{normal},"pbrMetallicRoughness":{{{pbr},"roughnessFactor":0.7}}}}],"#
         );
     })
     .glb();
     let sample = Sample::new("lost.glb", &bytes);
     let error = sample.load().unwrap_err();
-    assert_eq!(error.to_string().split_once("lost.glb: ").unwrap().1, "textures: missing: a%20b.png, c.jpg");
+    assert_eq!(error.to_string().split_once("lost.glb: ").unwrap().1, "textures: missing: a%20b.png, c.jpg, d.png");
     let scene = load_file(&sample.path, &Limits::default(), MissingTextures::Grey).unwrap();
     let texels: Vec<&[u8]> = scene.textures.iter().map(|texture| texture.srgba8.as_slice()).collect();
-    assert_eq!(texels, [[188, 188, 188, 255], [255; 4]], "data leave the factors alone");
+    assert_eq!(texels, [[188, 188, 188, 255], [255; 4], [128, 128, 255, 255]], "data leave factors and normals alone");
     let outside = cube(|c| {
         c.more = r#""images":[{"uri":"../c.jpg"}],"textures":[{"source":0}],
             "materials":[{"emissiveTexture":{"index":0}}],"#

@@ -196,7 +196,7 @@ fn only_a_material_with_a_highlight_is_specular() {
     let shiny = [
         Material { roughness: 0.9, ..matt.clone() },
         Material { metallic: 0.1, ..matt.clone() },
-        Material { metallic_roughness_texture: Some(0), ..matt.clone() },
+        Material { metallic_roughness_texture: Some(0.into()), ..matt.clone() },
     ];
     for material in shiny {
         assert!(material.is_specular(), "{material:?}");

@@ -47,7 +47,7 @@ fn mtl_materials_and_their_textures_are_found() {
     let scene = load_file(&sample.path, &Limits::default(), MissingTextures::Grey).unwrap();
     let red = scene.materials.iter().find(|m| m.name == "red").unwrap();
     assert_eq!((red.base_color_linear, red.phong_specular, red.phong_exponent), ([1.0, 0.0, 0.0, 1.0], 0.5, 62.0));
-    assert_eq!((red.base_color_texture, &scene.textures[0].srgba8), (Some(0), &vec![188, 188, 188, 255]));
+    assert_eq!((red.base_color_texture, &scene.textures[0].srgba8), (Some(0.into()), &vec![188, 188, 188, 255]));
     assert!((red.roughness - 0.42).abs() < 0.01);
     assert_eq!((scene.materials.len(), scene.meshes[0].parts.len(), scene.triangle_count()), (3, 3, 12));
     assert!(load("lost.obj", format!("mtllib lost.mtl\n{text}").as_bytes()).is_ok(), "a missing library is no error");
@@ -55,7 +55,8 @@ fn mtl_materials_and_their_textures_are_found() {
 
 #[test]
 fn mtl_numbers_out_of_range_are_clamped() {
-    let library = b"newmtl a\nKd -1 0.5 2\nKs -0.1 0 0\nNs -3\nd 1.5\nnewmtl b\nKs 0.4\nNs 200\nnewmtl c\nNs 200\n";
+    let library =
+        b"newmtl a\nKd -1 0.5 2\nKs -0.1 0 0\nNs -3\nd 1.5\nnewmtl b\nKs 0.4\nNs 200\nnewmtl c\nNs 200\nd 0.4\n";
     let faces = cube_obj().replace("f 5 6", "usemtl b\nf 5 6").replace("f 1 2", "usemtl c\nf 1 2");
     let scene = Sample::new("a.obj", format!("mtllib a.mtl\nusemtl a\n{faces}").as_bytes())
         .with("a.mtl", library)
@@ -63,6 +64,7 @@ fn mtl_numbers_out_of_range_are_clamped() {
         .unwrap();
     let of = |name: &str| scene.materials.iter().find(|m| m.name == name).unwrap();
     assert_eq!((of("a").base_color_linear, of("a").phong_specular), ([0.0, 0.5, 2.0, 1.0], 0.0));
+    assert!(of("c").alpha_hashed && of("c").base_color_linear[3] == 0.4 && !of("a").alpha_hashed, "opacity");
     assert!(of("b").is_specular(), "a highlight of exponent 200");
     assert!(!of("a").is_specular() && !of("c").is_specular(), "no highlight without a specular colour");
 }

@@ -6,7 +6,10 @@ mod samples;
 use glam::Vec3;
 use samples::signed_volume;
 use scene::procedural::{checker_sphere, courtyard, poles, quad, tree_terrain, unit_cube, uv_sphere};
-use scene::{Illumination, Light, LightSpec, Limits, Scene, SceneErrorKind, Texture, pack, unpack};
+use scene::{
+    Illumination, Light, LightSpec, Limits, Scene, SceneErrorKind, Texture, TextureUse, VertexDetail, Wrap, pack,
+    unpack,
+};
 
 #[test]
 fn packing_is_deterministic_and_loses_nothing() {
@@ -20,7 +23,7 @@ fn packing_is_deterministic_and_loses_nothing() {
 
 #[test]
 fn an_invalid_scene_is_not_unpacked() {
-    let broken: [fn(&mut Scene); 16] = [
+    let broken: [fn(&mut Scene); 22] = [
         |s| s.meshes[0].indices[0] = 99,
         |s| s.meshes[0].vertices[3].position[1] = f32::NAN,
         |s| s.meshes[0].vertices[3].normal = [0.0; 3],
@@ -30,8 +33,14 @@ fn an_invalid_scene_is_not_unpacked() {
         |s| s.instances[0].mesh = 1,
         |s| s.instances[0].world_from_mesh.matrix3.x_axis.x = -1.0,
         |s| s.instances[0].world_from_mesh.matrix3.x_axis.x = 0.0,
-        |s| s.materials[0].base_color_texture = Some(0),
-        |s| s.materials[0].metallic_roughness_texture = Some(0),
+        |s| s.materials[0].base_color_texture = Some(0.into()),
+        |s| s.materials[0].metallic_roughness_texture = Some(0.into()),
+        |s| s.materials[0].normal_texture = Some(0.into()),
+        |s| s.materials[0].normal_scale = f32::NAN,
+        |s| s.materials[0].occlusion_strength = 1.5,
+        |s| s.materials[0].dielectric_reflectance_linear.y = 1.5,
+        |s| s.meshes[0].details = vec![VertexDetail::default(); 3],
+        |s| s.meshes[0].details = vec![VertexDetail { uv: [0.0; 2], tangent: [0.0; 4] }; s.meshes[0].vertices.len()],
         |s| s.materials[0].metallic = 2.0,
         |s| s.materials[0].roughness = f32::NAN,
         |s| s.illumination.environment.zenith_linear.x = -1.0,
@@ -88,9 +97,13 @@ fn lights_of_all_kinds_and_both_kinds_of_texture_travel() {
     let lights = lights.map(|text| text.parse::<LightSpec>().unwrap().0).to_vec();
     let mut scene = checker_sphere().lit_by(Some(lights), None);
     scene.textures.push(Texture { is_srgb: false, ..scene.textures[0].clone() });
-    scene.materials[0].metallic_roughness_texture = Some(1);
+    scene.materials[0].metallic_roughness_texture = Some(1.into());
+    scene.materials[0].occlusion_texture =
+        Some(TextureUse { texture: 1, second_uv: true, wrap: [Wrap::Mirror, Wrap::Clamp] });
+    let count = scene.meshes[0].vertices.len();
+    scene.meshes[0].details = vec![VertexDetail { uv: [0.5, 2.0], tangent: [0.0, 1.0, 0.0, -1.0] }; count];
     assert_eq!(unpack(&pack(&scene), &Limits::default()).unwrap(), scene);
-    scene.materials[0].metallic_roughness_texture = Some(0);
+    scene.materials[0].metallic_roughness_texture = Some(0.into());
     let error = unpack(&pack(&scene), &Limits::default()).unwrap_err();
     assert!(error.to_string().contains("holds colours"), "{error}");
 }

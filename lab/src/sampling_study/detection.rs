@@ -102,7 +102,7 @@ fn wall(leg_px: f32) -> Scene {
         (0..columns - 1).flat_map(|y| (0..columns - 1).map(move |x| (x, y))).flat_map(square).collect();
     let mut scene = procedural::quad(Vec3::ZERO, 1.0, Vec3::Z, [200; 3]);
     let parts = vec![MeshPart { first_index: 0, index_count: indices.len() as u32, material: 0 }];
-    scene.meshes = vec![Mesh { vertices, indices, parts }];
+    scene.meshes = vec![Mesh { vertices, indices, parts, ..Mesh::default() }];
     scene
 }
 

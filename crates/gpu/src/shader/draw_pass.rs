@@ -21,8 +21,8 @@ pub struct DrawPass {
 /// The fixed functions of a drawing variant.
 #[derive(Clone)]
 pub struct DrawState {
-    /// The attributes of vertices.
-    pub vertices: wgpu::VertexBufferLayout<'static>,
+    /// The attributes of vertices, one layout for each vertex buffer.
+    pub vertices: Vec<wgpu::VertexBufferLayout<'static>>,
     /// The side of triangles that is not drawn.
     pub cull_mode: Option<wgpu::Face>,
     /// The colour targets, besides depth.
@@ -47,6 +47,7 @@ impl DrawPass {
             compilation_options: Default::default(),
             targets: &targets,
         });
+        let buffers: Vec<_> = state.vertices.iter().cloned().map(Some).collect();
         let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(&shader.interface.shader),
             layout: Some(&shader.layout),
@@ -54,7 +55,7 @@ impl DrawPass {
                 module: &shader.module,
                 entry_point: Some("vertex"),
                 compilation_options: Default::default(),
-                buffers: &[Some(state.vertices.clone())],
+                buffers: &buffers,
             },
             primitive: wgpu::PrimitiveState { cull_mode: state.cull_mode, ..Default::default() },
             depth_stencil: Some(wgpu::DepthStencilState {
@@ -95,7 +96,7 @@ impl DrawPass {
         let (colors, depth): (Vec<_>, _) = (colors.iter().collect(), target(Self::DEPTH_FORMAT));
         let mut pass = frame.begin_drawing("compile", &colors, Some(wgpu::Color::TRANSPARENT), &depth);
         pass.set_pipeline(&self.pipeline);
-        pass.set_vertex_buffer(0, corners.slice(..));
+        (0..self.state.vertices.len() as u32).for_each(|slot| pass.set_vertex_buffer(slot, corners.slice(..)));
         pass.set_index_buffer(corners.slice(..), wgpu::IndexFormat::Uint32);
         for (number, bound) in groups.iter().enumerate() {
             let offsets: Vec<u32> = self.shader.interface.strides(number).map(|_| 0).collect();

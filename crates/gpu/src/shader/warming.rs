@@ -65,7 +65,9 @@ impl Empty {
             (Form::Texture { format, is_power_of_two, has_mips }, ty) => {
                 Self::Texture(texture(gpu, format, is_power_of_two, has_mips, ty))
             }
-            (Form::OfLayout, BindingType::Sampler(_)) => Self::Sampler(gpu.texture_sampler()),
+            (Form::OfLayout, BindingType::Sampler(_)) => {
+                Self::Sampler(gpu.texture_sampler([wgpu::AddressMode::Repeat; 2]))
+            }
             (Form::OfLayout, BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, .. }) => {
                 Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM))
             }
@@ -190,7 +192,8 @@ mod tests {
         let words = texture(gpu, [width_px, 8, 1], TextureFormat::Rg32Uint, D2);
         let layers = texture(gpu, [8, 8, 3], TextureFormat::Rgba32Uint, D2Array);
         let colors = texture(gpu, [8, 8, 1], TextureFormat::Rgba8UnormSrgb, D2);
-        let (drawn, sampler) = (texture(gpu, [8, 8, 1], TextureFormat::R32Float, D2), gpu.texture_sampler());
+        let (drawn, sampler) =
+            (texture(gpu, [8, 8, 1], TextureFormat::R32Float, D2), gpu.texture_sampler([wgpu::AddressMode::Repeat; 2]));
         let own = [
             Binding::texture("words", &words),
             Binding::buffer("camera", &uniform),

@@ -1,9 +1,9 @@
 //! A scene's triangles in the world, instances written out: what rays are traced against.
 
 use depth_image::oct16_from_unit;
-use glam::{Mat3, Vec3};
+use glam::{Affine3A, Mat3, Vec3};
 use rayon::prelude::*;
-use scene::{Material, Mesh, Scene, Wind};
+use scene::{Material, Mesh, Scene, Vertex, VertexDetail, Wind};
 
 use crate::cluster::{self, Cluster};
 
@@ -15,6 +15,8 @@ pub const DOUBLE_SIDED: u32 = 1 << 30;
 pub const UNLIT: u32 = 1 << 29;
 /// Flag of a triangle that has highlights.
 pub const SPECULAR: u32 = 1 << 28;
+/// Flag of a triangle whose alpha is compared with a hash of the place.
+pub const ALPHA_HASHED: u32 = 1 << 27;
 /// The flags that a ray needs before it has met a triangle.
 pub const CORNER_FLAGS: u32 = ALPHA_TESTED | DOUBLE_SIDED;
 /// The bits of a vertex' number, which shares a word with the flags.
@@ -34,6 +36,39 @@ pub struct FlatVertex {
     pub color_srgba8: [u8; 4],
 }
 
+/// One corner's further data, which only mapped materials need ([`Material::is_mapped`]): two texels on the device.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct FlatDetail {
+    /// As in [`scene::VertexDetail`].
+    pub uv: [f32; 2],
+    /// Unit tangent in the world, whose lowest bit is the sign of the bitangent.
+    pub tangent_oct16: u32,
+    padding: u32,
+    /// In the mesh's space, in metres of the world.
+    pub place_m: [f32; 3],
+    more_padding: u32,
+}
+
+impl FlatDetail {
+    fn of(vertex: &Vertex, detail: VertexDetail, placed: &Affine3A) -> Self {
+        let [x, y, z, sign] = detail.tangent;
+        let tangent = placed.transform_vector3(Vec3::new(x, y, z)).normalize_or(Vec3::X);
+        Self {
+            uv: detail.uv,
+            tangent_oct16: oct16_from_unit(tangent) & !1 | u32::from(sign < 0.0),
+            padding: 0,
+            place_m: (Vec3::from(vertex.position) * world_metres(placed)).to_array(),
+            more_padding: 0,
+        }
+    }
+}
+
+/// Metres of the world that a metre of the mesh becomes, the mean over the axes.
+pub fn world_metres(world_from_mesh: &Affine3A) -> f32 {
+    world_from_mesh.matrix3.determinant().abs().cbrt()
+}
+
 /// One triangle besides its corners: one texel on the device.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -44,7 +79,7 @@ pub struct FlatTriangle {
     pub primitive: u32,
     /// Into [`Scene::materials`].
     pub material: u32,
-    /// [`ALPHA_TESTED`], [`DOUBLE_SIDED`], [`UNLIT`] and [`SPECULAR`].
+    /// [`ALPHA_TESTED`], [`DOUBLE_SIDED`], [`UNLIT`], [`SPECULAR`] and [`ALPHA_HASHED`].
     pub flags: u32,
 }
 
@@ -56,16 +91,25 @@ pub struct FlatScene {
     /// Positions depend on scene time where there is any.
     pub wind: Option<Wind>,
     pub vertices: Vec<FlatVertex>,
+    /// One for each vertex, or none.
+    pub details: Vec<FlatDetail>,
     pub corners: Vec<[u32; 3]>,
     pub triangles: Vec<FlatTriangle>,
 }
 
 impl FlatScene {
-    /// Writes out the instances.
-    pub fn of(scene: &Scene, ordered: &[OrderedMesh<'_>]) -> Self {
+    /// Writes out the instances, with the details of vertices if they are asked for.
+    pub fn of(scene: &Scene, ordered: &[OrderedMesh<'_>], detailed: bool) -> Self {
         let mut flat = Self { wind: scene.wind, ..Self::default() };
         for (number, instance) in (0..).zip(&scene.instances) {
-            flat.add(scene, number, &ordered[instance.mesh as usize]);
+            let mesh = &ordered[instance.mesh as usize];
+            flat.add(scene, number, mesh);
+            if detailed {
+                let details = mesh.mesh.details.iter().copied().chain(std::iter::repeat(VertexDetail::default()));
+                let placed = &instance.world_from_mesh;
+                let detail = |(vertex, detail): (&Vertex, _)| FlatDetail::of(vertex, detail, placed);
+                flat.details.extend(mesh.mesh.vertices.iter().zip(details).map(detail));
+            }
         }
         flat
     }
@@ -100,7 +144,8 @@ impl FlatScene {
 
 fn flags_of(material: &Material) -> u32 {
     let flag = |is: bool, bit: u32| if is { bit } else { 0 };
-    flag(material.alpha_cutoff > 0.0, ALPHA_TESTED)
+    flag(material.is_alpha_tested(), ALPHA_TESTED)
+        | flag(material.alpha_hashed, ALPHA_HASHED)
         | flag(material.double_sided, DOUBLE_SIDED)
         | flag(material.unlit, UNLIT)
         | flag(material.is_specular(), SPECULAR)

@@ -65,12 +65,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var found = met; found; found = false) {
         let triangle = textureLoad(flat_triangles, texel_at(hit.slot), 0);
         let at = attributes_at(hit.crossing);
-        let footprint = uv_footprint(hit.crossing, hit.slot, hit.t * camera.footprint);
+        let footprints = uv_footprints(hit.crossing, hit.slot, hit.t * camera.footprint);
         let facing = select(-1.0, 1.0, hit.crossing.front);
-        let normal = normalize(at.normal + vec3f(0.0, 1e-20, 0.0)) * facing;
-        let emissive = bitcast<vec3f>(material_texel(triangle.z, 1u).xyz);
         surface = packed_surface(
-            base_color(triangle.z, at, footprint).rgb, emissive, normal, coat(triangle.z, triangle.w, at, footprint),
+            base_color(triangle.z, at, footprints).rgb, emission(triangle.z, at, footprints),
+            normal_at(triangle.z, at, footprints) * facing, coat(triangle.z, triangle.w, at, footprints),
         );
         ids = triangle.xy;
     }

@@ -7,12 +7,14 @@ use glam::{Vec3, Vec4};
 use gpu::{Binding, Gpu, GpuError, Table};
 use parking_lot::Mutex;
 use rayon::prelude::*;
-use scene::{Material, Scene};
+use scene::{Material, Scene, TextureUse};
 use wgpu::TextureFormat;
 
 use super::bvh::{Bvh, MAX_DEPTH};
 use super::flat::{CORNER_FLAGS, FlatScene, FlatTriangle, MAX_VERTICES, OrderedMesh};
-use crate::{few_cores::on_free_cores, material::phong_reflector, texture};
+use super::material_switches::MaterialSwitches;
+use crate::material::{normal_scale, phong_reflector};
+use crate::{few_cores::on_free_cores, texture};
 
 /// The making of the tree over a scene's triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -45,7 +47,7 @@ pub struct RayScene {
 struct Tables {
     materials: Vec<[u32; 4]>,
     texels: Vec<[u8; 4]>,
-    alpha_tested: bool,
+    switches: MaterialSwitches,
 }
 
 struct Built {
@@ -61,7 +63,7 @@ pub struct Traced {
     pub(crate) nodes: Table,
     pub(crate) corners: Table,
     fixed: Arc<Fixed>,
-    pub(crate) alpha_tested: bool,
+    pub(crate) switches: MaterialSwitches,
     /// The making of the tree.
     pub report: AccelerationReport,
 }
@@ -69,6 +71,7 @@ pub struct Traced {
 /// Tables that stay while triangles move; a new tree changes the order of triangles.
 struct Fixed {
     vertices: Table,
+    details: Table,
     triangles: Table,
     materials: Table,
     texels: Table,
@@ -81,6 +84,7 @@ pub(crate) struct HostTables<'t> {
     pub corners: Vec<[[u32; 4]; 3]>,
     pub triangles: Vec<FlatTriangle>,
     pub vertices: &'t [super::flat::FlatVertex],
+    pub details: &'t [super::flat::FlatDetail],
     pub materials: &'t [[u32; 4]],
     pub texels: &'t [[u8; 4]],
 }
@@ -88,10 +92,11 @@ pub(crate) struct HostTables<'t> {
 impl RayScene {
     /// Keeps what trees are made of; nothing is built or uploaded before it is needed.
     pub(crate) fn of(gpu: &Arc<Gpu>, scene: &Scene, ordered: &[OrderedMesh<'_>]) -> Self {
+        let tables = Tables::of(scene);
         Self {
             gpu: gpu.clone(),
-            flat: FlatScene::of(scene, ordered),
-            tables: Tables::of(scene),
+            flat: FlatScene::of(scene, ordered, tables.switches.mapped),
+            tables,
             state: Mutex::default(),
         }
     }
@@ -169,6 +174,12 @@ impl RayScene {
         let words = TextureFormat::Rgba32Uint;
         Ok(Fixed {
             vertices: Table::new(&self.gpu, "vertex attributes", words, &self.flat.vertices)?,
+            details: Table::new(
+                &self.gpu,
+                "vertex details",
+                words,
+                bytemuck::cast_slice::<_, [u32; 4]>(&self.flat.details),
+            )?,
             triangles: Table::new(&self.gpu, "triangle attributes", words, &self.triangles_of_leaves(bvh))?,
             materials: Table::new(&self.gpu, "materials", words, &self.tables.materials)?,
             texels: Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?,
@@ -197,8 +208,8 @@ impl RayScene {
             depth: bvh.depth,
         };
         tracing::debug!(?report, "rays are ready");
-        let alpha_tested = self.tables.alpha_tested;
-        Ok(Arc::new(Traced { nodes, corners, fixed, alpha_tested, report }))
+        let switches = self.tables.switches;
+        Ok(Arc::new(Traced { nodes, corners, fixed, switches, report }))
     }
 
     /// Three texels a triangle in the order of the tree's leaves: a corner's position, and its number with the
@@ -230,6 +241,7 @@ impl RayScene {
             corners: self.corner_texels(bvh, &self.corners_in_world(scene_time_s)),
             triangles: self.triangles_of_leaves(bvh),
             vertices: &self.flat.vertices,
+            details: &self.flat.details,
             materials: &self.tables.materials,
             texels: &self.tables.texels,
         }))
@@ -242,18 +254,19 @@ impl RayScene {
 
 impl Traced {
     fn bytes(&self) -> u64 {
-        let Fixed { vertices, triangles, materials, texels } = &*self.fixed;
-        let tables = [&self.nodes, &self.corners, vertices, triangles, materials, texels];
+        let Fixed { vertices, details, triangles, materials, texels } = &*self.fixed;
+        let tables = [&self.nodes, &self.corners, vertices, details, triangles, materials, texels];
         tables.map(|table| gpu::texture_bytes(table.texture())).iter().sum()
     }
 
     /// The variables of `traverse.wgsl`.
-    pub fn bindings(&self) -> [Binding<'_>; 6] {
-        let Fixed { vertices, triangles, materials, texels } = &*self.fixed;
+    pub fn bindings(&self) -> [Binding<'_>; 7] {
+        let Fixed { vertices, details, triangles, materials, texels } = &*self.fixed;
         [
             Binding::texture("bvh_nodes", &self.nodes),
             Binding::texture("triangle_corners", &self.corners),
             Binding::texture("flat_vertices", vertices),
+            Binding::texture("flat_details", details),
             Binding::texture("flat_triangles", triangles),
             Binding::texture("materials", materials),
             Binding::texture("texels", texels),
@@ -270,22 +283,34 @@ impl Tables {
             [first, texture.width_px | texture.height_px << 16]
         };
         let places: Vec<[u32; 2]> = scene.textures.iter().map(&mut place).collect();
-        let place_of = |texture: Option<u32>| texture.map_or([0, 0], |t| places[t as usize]);
+        let place_of = |texture: Option<TextureUse>| texture.map_or([0, 0], |t| places[t.texture as usize]);
         let materials = scene.materials.iter().flat_map(|material| material_texels(material, place_of)).collect();
-        let alpha_tested = scene.materials.iter().any(|m| m.alpha_cutoff > 0.0);
-        Self { materials, texels, alpha_tested }
+        Self { materials, texels, switches: MaterialSwitches::of(scene) }
     }
 }
 
-/// Four texels: base colour; emission and alpha cutoff; metallic, roughness and reflector; places of textures.
-fn material_texels(material: &Material, place_of: impl Fn(Option<u32>) -> [u32; 2]) -> [[u32; 4]; 4] {
-    let emission = Vec4::from((material.emissive_linear, material.alpha_cutoff));
-    let [base_first, base_size] = place_of(material.base_color_texture);
-    let [coat_first, coat_size] = place_of(material.metallic_roughness_texture);
+/// Texels of a material, which rays/material.wgsl lists.
+pub(crate) const MATERIAL_TEXELS: u32 = 7;
+
+fn material_texels(material: &Material, place_of: impl Fn(Option<TextureUse>) -> [u32; 2]) -> [[u32; 4]; 7] {
+    let bits = |v: Vec4| v.to_array().map(f32::to_bits);
+    let [[base, base_size], [coat, coat_size], [normal, normal_size], [emissive, emissive_size], [open, open_size]] =
+        material.textures().map(place_of);
+    let uses = material.textures().map(|texture| texture.map_or(0, use_bits));
+    let uses = uses.into_iter().rev().fold(0, |all, bits| all << 5 | bits);
+    let strength = material.occlusion_strength.to_bits();
     [
         material.base_color_linear.map(f32::to_bits),
-        emission.to_array().map(f32::to_bits),
-        [material.metallic.to_bits(), material.roughness.to_bits(), phong_reflector(material), 0],
-        [base_first, base_size, coat_first, coat_size],
+        bits(Vec4::from((material.emissive_linear, material.alpha_cutoff))),
+        [material.metallic.to_bits(), material.roughness.to_bits(), phong_reflector(material), uses],
+        bits(Vec4::from((material.dielectric_reflectance_linear, normal_scale(material)))),
+        [base, base_size, coat, coat_size],
+        [normal, normal_size, emissive, emissive_size],
+        [open, open_size, strength, 0],
     ]
+}
+
+/// The five bits of a texture's use that `use_of` of rays/material.wgsl returns.
+fn use_bits(texture: TextureUse) -> u32 {
+    u32::from(texture.second_uv) | (texture.wrap[0] as u32) << 1 | (texture.wrap[1] as u32) << 3
 }

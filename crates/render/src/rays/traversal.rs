@@ -2,7 +2,7 @@
 
 use minijinja::{Value, context};
 
-use super::ray_scene::Traced;
+use super::{material_switches::MaterialSwitches, ray_scene::Traced};
 
 /// Boxes are left a little later than they are: what rounding takes off must not open a gap.
 pub(crate) const BOX_SLACK: f32 = 1.000_001;
@@ -14,19 +14,23 @@ pub(crate) const EDGE_ROUNDINGS: f32 = 4e-7;
 pub(crate) struct Traversal {
     /// Room for unvisited nodes.
     stack: u32,
-    /// Triangles may have holes where their texture is transparent.
-    alpha_tested: bool,
+    materials: MaterialSwitches,
 }
 
 impl Traversal {
-    pub const ALL: [Self; 2] = [Self { stack: 16, alpha_tested: false }, Self { stack: 16, alpha_tested: true }];
+    pub const ALL: [Self; 3] = [Self::with(false, false), Self::with(true, false), Self::with(true, true)];
+
+    const fn with(alpha_tested: bool, mapped: bool) -> Self {
+        Self { stack: 16, materials: MaterialSwitches { alpha_tested, mapped } }
+    }
 
     /// Room on the stack comes in steps, so that pipelines are shared.
     pub fn of(traced: &Traced) -> Self {
-        Self { stack: traced.report.depth.next_multiple_of(8).max(1), alpha_tested: traced.alpha_tested }
+        Self { stack: traced.report.depth.next_multiple_of(8).max(1), materials: traced.switches }
     }
 
     pub fn context(self) -> Value {
-        context! { stack => self.stack, alpha_tested => self.alpha_tested }
+        let MaterialSwitches { alpha_tested, mapped } = self.materials;
+        context! { stack => self.stack, alpha_tested, mapped }
     }
 }

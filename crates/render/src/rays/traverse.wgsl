@@ -7,6 +7,7 @@
 // Three texels a triangle: a corner's position and number each.
 @group(1) var triangle_corners: texture_2d<u32>;
 @group(1) var flat_vertices: texture_2d<u32>;
+@group(1) var flat_details: texture_2d<u32>;
 @group(1) var flat_triangles: texture_2d<u32>;
 @group(1) var materials: texture_2d<u32>;
 @group(1) var texels: texture_2d<u32>;
@@ -126,11 +127,21 @@ const ROOT: Todo = Todo(0u, 0x80000000u);
 {% include "rays/material.wgsl" %}
 {% endif %}
 {% if alpha_tested %}
+{% if mapped and not primary %}
+
+// A pixel's side on the surface from which rays are sent.
+var<private> ray_side_m: f32 = 1.0;
+{% endif %}
 
 fn is_there(slot: u32, crossing: Crossing) -> bool {
     let triangle = textureLoad(flat_triangles, texel_at(slot), 0);
-    let cutoff = bitcast<f32>(material_texel(triangle.z, 1u).w);
-    return base_color(triangle.z, attributes_at(crossing), 0.0).a >= cutoff;
+    let at = attributes_at(crossing);
+    var cutoff = bitcast<f32>(material_texel(triangle.z, 1u).w);
+{% if mapped %}
+    let side_m = {% if primary %}crossing.t * camera.footprint{% else %}ray_side_m{% endif %};
+    cutoff = select(cutoff, hashed_cutoff(at.place_m, side_m), (triangle.w & ALPHA_HASHED) != 0u);
+{% endif %}
+    return base_color(triangle.z, at, vec2f(0.0)).a >= cutoff;
 }
 {% endif %}
 

@@ -5,9 +5,11 @@
 use depth_image::{PinholeCamera, Ray, SurfaceId, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 use obvhs::cwbvh::node::CwBvhNode;
+use scene::Wrap;
 
-use crate::rays::flat::{ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatTriangle, FlatVertex};
-use crate::rays::ray_scene::HostTables;
+use super::hashed_alpha::hashed_cutoff;
+use crate::rays::flat::{ALPHA_HASHED, ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatDetail, FlatTriangle, FlatVertex};
+use crate::rays::ray_scene::{HostTables, MATERIAL_TEXELS};
 use crate::rays::traversal::{BOX_SLACK, EDGE_ROUNDINGS};
 use crate::{GpuScene, RenderError, pixel_camera::PixelCamera};
 
@@ -19,8 +21,11 @@ pub struct Scene {
     corners: Vec<[[u32; 4]; 3]>,
     triangles: Vec<FlatTriangle>,
     vertices: Vec<FlatVertex>,
+    details: Vec<FlatDetail>,
     materials: Vec<[u32; 4]>,
     texels: Vec<[u8; 4]>,
+    /// The side of a pixel on a surface where a ray's parameter is 1: the size of cells of hashed alpha.
+    pub footprint: f32,
 }
 
 /// A ray's crossing of a triangle.
@@ -114,8 +119,10 @@ impl Scene {
             corners: tables.corners,
             triangles: tables.triangles,
             vertices: tables.vertices.to_vec(),
+            details: tables.details.to_vec(),
             materials: tables.materials.to_vec(),
             texels: tables.texels.to_vec(),
+            footprint: 0.0,
         };
         Ok(scene.rays.host_tables(scene_time_s, tables)?)
     }
@@ -253,35 +260,77 @@ impl Scene {
         if !self.has(hit.slot, ALPHA_TESTED) {
             return true;
         }
-        let material = self.triangles[hit.slot as usize].material as usize * 4;
-        let cutoff = f32::from_bits(self.materials[material + 1][3]);
+        let FlatTriangle { material, flags, .. } = self.triangles[hit.slot as usize];
+        let material = (material * MATERIAL_TEXELS) as usize;
+        let cutoff = if flags & ALPHA_HASHED != 0 {
+            let places = self.numbers_of(hit).map(|number| Vec3::from(self.details[number].place_m));
+            let place_m = (0..3).map(|i| places[i] * hit.shares()[i]).sum();
+            hashed_cutoff(place_m, hit.t * self.footprint)
+        } else {
+            f32::from_bits(self.materials[material + 1][3])
+        };
         self.alpha(material, hit) >= cutoff
     }
 
+    /// Numbers of a triangle's vertices.
+    fn numbers_of(&self, hit: &Hit) -> [usize; 3] {
+        self.corners[hit.slot as usize].map(|corner| (corner[3] & !CORNER_FLAGS) as usize)
+    }
+
     fn alpha(&self, material: usize, hit: &Hit) -> f32 {
-        let [second, third] = hit.barycentric;
-        let shares = [1.0 - second - third, second, third];
-        let vertices = self.corners[hit.slot as usize].map(|c| self.vertices[(c[3] & !CORNER_FLAGS) as usize]);
-        let uv: Vec2 = (0..3).map(|i| Vec2::from(vertices[i].uv) * shares[i]).sum();
-        let vertex_alpha: f32 = (0..3).map(|i| f32::from(vertices[i].color_srgba8[3]) / 255.0 * shares[i]).sum();
-        let [first, packed_size, ..] = self.materials[material + 3];
-        f32::from_bits(self.materials[material][3]) * vertex_alpha * self.texture_alpha(first, packed_size, uv)
+        let (numbers, shares) = (self.numbers_of(hit), hit.shares());
+        let used = self.materials[material + 2][3] & 31;
+        let uv_of = |number: usize| {
+            let second = used & 1 != 0;
+            Vec2::from(if second { self.details[number].uv } else { self.vertices[number].uv })
+        };
+        let uv: Vec2 = (0..3).map(|i| uv_of(numbers[i]) * shares[i]).sum();
+        let color = |i: usize| f32::from(self.vertices[numbers[i]].color_srgba8[3]) / 255.0;
+        let vertex_alpha: f32 = (0..3).map(|i| color(i) * shares[i]).sum();
+        let [first, packed_size, ..] = self.materials[material + 4];
+        let wraps = [used >> 1 & 3, used >> 3 & 3];
+        f32::from_bits(self.materials[material][3]) * vertex_alpha * self.texture_alpha(first, packed_size, uv, wraps)
     }
 
     /// Bilinear, of the finest level; 1 where there is no texture.
-    fn texture_alpha(&self, first: u32, packed_size: u32, uv: Vec2) -> f32 {
+    fn texture_alpha(&self, first: u32, packed_size: u32, uv: Vec2, wraps: [u32; 2]) -> f32 {
         if packed_size == 0 {
             return 1.0;
         }
         let size = UVec2::new(packed_size & 0xffff, packed_size >> 16);
-        let at = (uv - uv.floor()) * size.as_vec2() - 0.5;
+        let wrapped = Vec2::new(wrapped(uv.x, wraps[0]), wrapped(uv.y, wraps[1]));
+        let at = wrapped * size.as_vec2() - 0.5;
         let (low, share) = (at.floor(), at - at.floor());
+        let place = |at: i32, size: u32, wrap: u32| match wrap == Wrap::Repeat as u32 {
+            true => at.rem_euclid(size as i32) as u32,
+            false => at.clamp(0, size as i32 - 1) as u32,
+        };
         let texel = |x: i32, y: i32| {
-            let place = (low.as_ivec2() + glam::IVec2::new(x, y)).rem_euclid(size.as_ivec2()).as_uvec2();
-            f32::from(self.texels[(first + place.y * size.x + place.x) as usize][3]) / 255.0
+            let [x, y] = [place(low.x as i32 + x, size.x, wraps[0]), place(low.y as i32 + y, size.y, wraps[1])];
+            f32::from(self.texels[(first + y * size.x + x) as usize][3]) / 255.0
         };
         let mix = |a: f32, b: f32, share: f32| a * (1.0 - share) + b * share;
         mix(mix(texel(0, 0), texel(1, 0), share.x), mix(texel(0, 1), texel(1, 1), share.x), share.y)
+    }
+}
+
+impl Hit {
+    /// Barycentric coordinates of all corners.
+    fn shares(&self) -> [f32; 3] {
+        let [second, third] = self.barycentric;
+        [1.0 - second - third, second, third]
+    }
+}
+
+/// A place in a texture, from 0 to 1.
+fn wrapped(at: f32, wrap: u32) -> f32 {
+    let fract = |v: f32| v - v.floor();
+    if wrap == Wrap::Mirror as u32 {
+        1.0 - (1.0 - 2.0 * fract(at * 0.5)).abs()
+    } else if wrap == Wrap::Clamp as u32 {
+        at.clamp(0.0, 1.0)
+    } else {
+        fract(at)
     }
 }
 

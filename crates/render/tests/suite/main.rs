@@ -3,6 +3,7 @@
 mod antialias;
 mod closed_forms;
 mod light_failures;
+mod materials;
 mod raster;
 mod slices;
 mod stage;

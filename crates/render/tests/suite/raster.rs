@@ -158,7 +158,7 @@ fn background_texels_are_marked_and_samples_keep_their_color() {
 /// The wall with a texture all over it.
 fn textured(texture: Texture, alpha_cutoff: f32) -> Scene {
     let mut scene = quad(Vec3::NEG_Z * 4.0, 1.0, Vec3::Z, [255; 3]);
-    scene.materials[0] = Material { base_color_texture: Some(0), alpha_cutoff, ..scene.materials[0].clone() };
+    scene.materials[0] = Material { base_color_texture: Some(0.into()), alpha_cutoff, ..scene.materials[0].clone() };
     scene.textures = vec![texture];
     scene
 }

@@ -10,6 +10,7 @@ mod obj;
 mod picture;
 mod ply;
 mod source_scene;
+mod tangents;
 
 use std::path::Path;
 

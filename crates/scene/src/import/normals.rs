@@ -74,9 +74,8 @@ fn copy_with_normal(mesh: &mut SourceMesh, next_copy: &mut Vec<Option<u32>>, ver
             None => break,
         }
     }
-    let copy = mesh.vertices.len() as u32;
-    mesh.vertices.push(crate::Vertex { normal, ..mesh.vertices[vertex as usize] });
-    mesh.positions_in_mesh.push(mesh.positions_in_mesh[vertex as usize]);
+    let copy = mesh.copy_of(vertex);
+    mesh.vertices[copy as usize].normal = normal;
     next_copy[at] = Some(copy);
     next_copy.push(None);
     copy
@@ -178,6 +177,7 @@ mod tests {
         SourceMesh {
             positions_in_mesh: points.iter().map(|&p| p.into()).collect(),
             vertices: vec![plain_vertex(); points.len()],
+            details: Vec::new(),
             indices: indices.to_vec(),
             parts: Vec::new(),
         }

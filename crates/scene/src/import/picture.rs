@@ -9,9 +9,32 @@ use super::missing_textures::MissingTextures;
 use crate::error::{Fault, at_most};
 use crate::{Limits, SceneErrorKind, Texture};
 
-/// A missing colour, half as bright as white; and missing data, which leave a material's factors alone.
-const GREY_SRGB8: u8 = 188;
-const NO_CHANGE: u8 = 255;
+/// The meaning of a picture's channels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Content {
+    /// sRGB-encoded.
+    Colors,
+    /// Factors.
+    Data,
+    /// Directions, with 0…1 for -1…1.
+    Normals,
+}
+
+impl Content {
+    /// The texel in place of a missing picture: half as bright as white, or what leaves a material's factors and
+    /// normals alone.
+    fn stand_in(self) -> [u8; 4] {
+        match self {
+            Self::Colors => [188, 188, 188, 255],
+            Self::Data => [255; 4],
+            Self::Normals => [128, 128, 255, 255],
+        }
+    }
+
+    fn is_srgb(self) -> bool {
+        self == Self::Colors
+    }
+}
 
 /// An image file's bytes and its name in messages.
 pub(crate) struct EncodedPicture {
@@ -20,8 +43,7 @@ pub(crate) struct EncodedPicture {
     pub file: String,
     /// `None` where the file is missing.
     pub bytes: Option<Vec<u8>>,
-    /// See [`Texture::is_srgb`].
-    pub is_srgb: bool,
+    pub content: Content,
 }
 
 /// Decodes all images in parallel, after their headers show that they fit the limits together.
@@ -58,13 +80,12 @@ fn size_px(element: &str, bytes: &[u8]) -> Result<(u32, u32), Fault> {
 }
 
 /// The texture in place of a missing one.
-fn stand_in(is_srgb: bool) -> Texture {
-    let [r, g, b] = [if is_srgb { GREY_SRGB8 } else { NO_CHANGE }; 3];
-    Texture { width_px: 1, height_px: 1, is_srgb, srgba8: vec![r, g, b, 255] }
+fn stand_in(content: Content) -> Texture {
+    Texture { width_px: 1, height_px: 1, is_srgb: content.is_srgb(), srgba8: content.stand_in().to_vec() }
 }
 
 fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
-    let Some(bytes) = &picture.bytes else { return Ok(stand_in(picture.is_srgb)) };
+    let Some(bytes) = &picture.bytes else { return Ok(stand_in(picture.content)) };
     let mut reader = reader(&picture.element, bytes)?;
     let mut image_limits = image::Limits::default();
     image_limits.max_image_width = Some(limits.texture_side_px);
@@ -74,7 +95,7 @@ fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
     reader.limits(image_limits);
     let pixels = reader.decode().map_err(|e| Fault::malformed(&picture.element, e.to_string()))?.into_rgba8();
     let (width_px, height_px) = pixels.dimensions();
-    Ok(Texture { width_px, height_px, is_srgb: picture.is_srgb, srgba8: pixels.into_raw() })
+    Ok(Texture { width_px, height_px, is_srgb: picture.content.is_srgb(), srgba8: pixels.into_raw() })
 }
 
 #[cfg(test)]
@@ -90,7 +111,7 @@ mod tests {
         let mut bytes = Vec::new();
         let pixels = RgbaImage::from_fn(width, height, |x, y| image::Rgba([x as u8, y as u8, 7, 255]));
         pixels.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png).unwrap();
-        EncodedPicture { element: "image 0".into(), file: "a.png".into(), bytes: Some(bytes), is_srgb: true }
+        EncodedPicture { element: "image 0".into(), file: "a.png".into(), bytes: Some(bytes), content: Content::Colors }
     }
 
     #[test]

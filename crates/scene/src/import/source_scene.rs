@@ -6,7 +6,9 @@ use glam::{Affine3A, BVec3, DAffine3, DVec3};
 
 use crate::error::{Fault, at_most};
 use crate::light_rig::{color, color_mut, position_mut};
-use crate::{Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Vertex};
+use crate::{
+    Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Vertex, VertexDetail,
+};
 
 /// Distance from the origin beyond which `f32` loses a millimetre.
 const FAR_M: f64 = 1e4;
@@ -30,6 +32,8 @@ pub(crate) struct SourceScene {
 pub(crate) struct SourceMesh {
     pub positions_in_mesh: Vec<DVec3>,
     pub vertices: Vec<Vertex>,
+    /// Empty, or one for each of `vertices`.
+    pub details: Vec<VertexDetail>,
     pub indices: Vec<u32>,
     pub parts: Vec<MeshPart>,
 }
@@ -158,16 +162,37 @@ impl SourceMesh {
         let first_vertex = self.vertices.len() as u32;
         let first_index = self.indices.len() as u32;
         let index_count = other.indices.len() as u32;
+        let vertex_count = self.vertices.len() + other.vertices.len();
+        if !self.details.is_empty() || !other.details.is_empty() {
+            self.details.resize(self.vertices.len(), VertexDetail::default());
+            self.details.extend(other.details);
+            self.details.resize(vertex_count, VertexDetail::default());
+        }
         self.positions_in_mesh.extend(other.positions_in_mesh);
         self.vertices.extend(other.vertices);
         self.indices.extend(other.indices.into_iter().map(|i| i + first_vertex));
         self.parts.push(MeshPart { first_index, index_count, material });
     }
 
+    /// Appends a copy of a vertex and returns its number.
+    pub(crate) fn copy_of(&mut self, vertex: u32) -> u32 {
+        let copy = self.vertices.len() as u32;
+        let vertex = vertex as usize;
+        self.vertices.push(self.vertices[vertex]);
+        self.positions_in_mesh.push(self.positions_in_mesh[vertex]);
+        self.details.extend(self.details.get(vertex).copied());
+        copy
+    }
+
     fn mirrored_in_x(&self) -> Self {
         let mut mesh = self.clone();
         mesh.positions_in_mesh.iter_mut().for_each(|p| p.x = -p.x);
         mesh.vertices.iter_mut().for_each(|v| v.normal[0] = -v.normal[0]);
+        for detail in &mut mesh.details {
+            // The cross product of mirrored vectors is the mirrored cross product turned round.
+            detail.tangent[0] = -detail.tangent[0];
+            detail.tangent[3] = -detail.tangent[3];
+        }
         mesh.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
         mesh
     }
@@ -176,7 +201,7 @@ impl SourceMesh {
         for (vertex, position) in self.vertices.iter_mut().zip(&self.positions_in_mesh) {
             vertex.position = position.as_vec3().to_array();
         }
-        Mesh { vertices: self.vertices, indices: self.indices, parts: self.parts }
+        Mesh { vertices: self.vertices, details: self.details, indices: self.indices, parts: self.parts }
     }
 }
 

@@ -193,7 +193,7 @@ impl MeshBuilder {
     }
 
     pub(super) fn into_mesh(self) -> Mesh {
-        Mesh { vertices: self.vertices, indices: self.indices, parts: self.parts }
+        Mesh { vertices: self.vertices, indices: self.indices, parts: self.parts, ..Mesh::default() }
     }
 
     /// A scene of this mesh alone, in one material, lit.

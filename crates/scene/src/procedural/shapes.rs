@@ -52,7 +52,7 @@ pub fn uv_sphere(radius_m: f32, segments: u32) -> Scene {
 /// A sphere of radius 1 with a texture of 16 × 8 black and white checks.
 #[must_use]
 pub fn checker_sphere() -> Scene {
-    let material = Material { base_color_texture: Some(0), ..Material::default() };
+    let material = Material { base_color_texture: Some(0.into()), ..Material::default() };
     let scene = sphere(1.0, 96).into_scene("checker-sphere", material);
     Scene { textures: vec![checks(256, 128, 16)], ..scene }
 }

@@ -10,6 +10,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
 use super::super::folder::Folder;
+use super::compressed;
 use crate::Limits;
 use crate::error::{Fault, at_most};
 
@@ -19,6 +20,8 @@ pub(super) struct Document<'a> {
     pub limits: &'a Limits,
     pub folder: &'a Folder,
     buffers: Vec<Cow<'a, [u8]>>,
+    /// The bytes of each buffer view that is compressed in the file.
+    decoded_views: Vec<Option<Vec<u8>>>,
     /// A budget of elements to read. Primitives may share an accessor, so that a small file could otherwise expand
     /// without bound.
     elements_left: Cell<u64>,
@@ -31,11 +34,17 @@ impl<'a> Document<'a> {
         folder: &'a Folder,
         limits: &'a Limits,
     ) -> Result<Self, Fault> {
-        // Positions, normals, coordinates, colours: four elements a vertex; three indices a triangle.
-        let elements = limits.vertices.saturating_mul(4).saturating_add(limits.triangles.saturating_mul(3));
-        let mut document = Self { root, limits, folder, buffers: Vec::new(), elements_left: Cell::new(elements) };
+        // Positions, normals, tangents, two pairs of coordinates, colours: six elements a vertex; three indices a
+        // triangle.
+        let elements = limits.vertices.saturating_mul(6).saturating_add(limits.triangles.saturating_mul(3));
+        let elements_left = Cell::new(elements);
+        let mut document = Self { root, limits, folder, buffers: Vec::new(), decoded_views: Vec::new(), elements_left };
         for (number, buffer) in root.buffers.iter().enumerate() {
             let element = format!("buffer {number}");
+            if compressed::is_fallback(buffer) {
+                document.buffers.push(Cow::default());
+                continue;
+            }
             let bytes: Cow<[u8]> = match (&buffer.uri, binary_chunk) {
                 (Some(uri), _) => document.read_uri(&element, uri)?.into(),
                 (None, Some(chunk)) if number == 0 => chunk.into(),
@@ -47,6 +56,9 @@ impl<'a> Document<'a> {
             }
             document.buffers.push(bytes);
         }
+        let of_buffer =
+            |buffer, offset, length| slice_of(document.buffers.get(usize::try_from(buffer).ok()?)?, offset, length);
+        document.decoded_views = compressed::decode_all(root, limits.file_bytes, of_buffer)?;
         Ok(document)
     }
 
@@ -64,6 +76,9 @@ impl<'a> Document<'a> {
     pub(super) fn view(&self, index: Index<View>, element: &str) -> Result<(&View, &[u8]), Fault> {
         let wrong = |reason: String| Fault::malformed(format!("{element}, buffer view {}", index.value()), reason);
         let view = self.root.get(index).ok_or_else(|| wrong("it does not exist".into()))?;
+        if let Some(Some(decoded)) = self.decoded_views.get(index.value()) {
+            return Ok((view, decoded));
+        }
         let buffer = view.buffer.value();
         let bytes = self.buffers.get(buffer).ok_or_else(|| wrong(format!("buffer {buffer} does not exist")))?;
         let range = slice_of(bytes, view.byte_offset.map_or(0, |o| o.0), view.byte_length.0);

@@ -4,17 +4,7 @@
 //! used. The crate's own validation and readers are not called: both index without checking
 //! (`primitive_validate_hook`, `accessor::Iter`), which a malformed file turns into a panic.
 //!
-//! The importer reads node transforms, meshes (one per glTF mesh, shared by its nodes), triangles, strips and fans.
-//! Materials have base colour with texture and `KHR_texture_transform` (baked into the coordinates), `COLOR_0`, and
-//! metallic and roughness with their texture. That texture counts by its mean where its coordinates differ from the
-//! base colour's, since a vertex has one pair.
-//!
-//! It also reads alpha masks (blending becomes a mask at 0.5), the mean of an emissive texture, `KHR_materials_unlit`,
-//! `KHR_materials_emissive_strength`, `KHR_lights_punctual`, `KHR_mesh_quantization` and perspective cameras. Missing normals are flat, as the
-//! specification requires.
-//!
-//! It skips points and lines, normal and occlusion maps, skins (shown in bind pose), morph targets and animations. It
-//! also skips sampler wrap modes (all textures repeat). Textures are PNG, JPEG, or WebP by `EXT_texture_webp`.
+//! `docs/formats.md` lists what is read, what is not, and what happens then.
 //!
 //! Factors of materials are clamped to their range. A factor that is not finite is refused, as is an invalid light.
 //!
@@ -24,11 +14,13 @@
 //! the sum is within two stops of white, lights stay unchanged. Otherwise one factor makes the sum white, which keeps
 //! the lights' ratios. Emissive surfaces are not exposed: in files they are relative to white already.
 
+mod compressed;
 mod document;
 mod lights;
 mod materials;
 mod nodes;
 mod primitives;
+mod texture_coordinates;
 
 use gltf::binary::Glb;
 use gltf::json::Root;
@@ -38,15 +30,27 @@ use super::source_scene::{SourceMesh, SourceScene};
 use crate::Limits;
 use crate::error::{Fault, at_most};
 use document::Document;
+use texture_coordinates::Coordinates;
 
 /// Extensions that a file may require.
-const SUPPORTED_EXTENSIONS: [&str; 6] = [
+const SUPPORTED_EXTENSIONS: [&str; 10] = [
+    compressed::NAMES[0],
+    compressed::NAMES[1],
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
+];
+
+/// Extensions that a file may be freed of, each with the command line that does it.
+const CONVERSIONS: [(&str, &str); 2] = [
+    // Writing drops the compression unless it is asked for.
+    ("KHR_draco_mesh_compression", "npx @gltf-transform/cli copy IN OUT"),
+    ("KHR_texture_basisu", "npx @gltf-transform/cli ktxdecompress IN OUT"),
 ];
 
 const GLB_MAGIC: &[u8] = b"glTF";
@@ -96,7 +100,10 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
 
 fn refuse_unknown_requirements(root: &Root) -> Result<(), Fault> {
     let unknown = root.extensions_required.iter().find(|name| !SUPPORTED_EXTENSIONS.contains(&name.as_str()));
-    unknown.map_or(Ok(()), |name| Err(Fault::unsupported("extensionsRequired", name.as_str())))
+    let Some(name) = unknown else { return Ok(()) };
+    let conversion = CONVERSIONS.iter().find(|(extension, _)| extension == name);
+    let advice = conversion.map_or_else(String::new, |(_, command)| format!("; convert the file with `{command}`"));
+    Err(Fault::unsupported("extensionsRequired", format!("{name}{advice}")))
 }
 
 fn check_counts(root: &Root, limits: &Limits) -> Result<(), Fault> {
@@ -112,9 +119,9 @@ fn read_meshes(document: &Document, scene: &mut SourceScene) -> Result<(), Fault
         let mut merged = SourceMesh::default();
         for (part, primitive) in mesh.primitives.iter().enumerate() {
             let element = format!("mesh {number}, primitive {part}");
-            let uv = materials::uv_source(document.root, primitive.material);
+            let coordinates = Coordinates::of_material(document.root, primitive.material)?;
             let material = materials::material_number(document.root, primitive.material, &element)?;
-            if let Some(geometry) = primitives::read(document, primitive, &uv, &element)? {
+            if let Some(geometry) = primitives::read(document, primitive, &coordinates, &element)? {
                 merged.append_part(geometry, material);
             }
         }

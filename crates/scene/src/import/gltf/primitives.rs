@@ -9,15 +9,17 @@ use gltf::json::validation::Checked;
 
 use super::super::normals;
 use super::super::source_scene::{SourceMesh, plain_vertex};
+use super::super::tangents;
 use super::document::Document;
-use super::materials::UvSource;
+use super::texture_coordinates::{Coordinates, UvSource};
 use crate::error::Fault;
+use crate::{Vertex, VertexDetail};
 
 /// `None` for points and lines.
 pub(super) fn read(
     document: &Document,
     primitive: &Primitive,
-    uv: &UvSource,
+    coordinates: &Coordinates,
     element: &str,
 ) -> Result<Option<SourceMesh>, Fault> {
     let Checked::Valid(mode) = primitive.mode else {
@@ -26,34 +28,88 @@ pub(super) fn read(
     if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
         return Ok(None);
     }
-    let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
-    let position = attribute(Semantic::Positions).ok_or_else(|| Fault::malformed(element, "it has no POSITION"))?;
+    let attributes = Attributes { document, primitive, element };
+    let position = attributes.index(Semantic::Positions);
+    let position = position.ok_or_else(|| Fault::malformed(element, "it has no POSITION"))?;
     let positions = document.floats::<3>(position, element)?;
     let indices = triangles(document, primitive.indices, mode, positions.len(), element)?;
-    let mut vertices = vec![plain_vertex(); positions.len()];
-    if let Some(index) = attribute(Semantic::TexCoords(uv.set)) {
-        let uvs = same_count(document.floats::<2>(index, element)?, positions.len(), "TEXCOORD", element)?;
-        vertices.iter_mut().zip(uvs).for_each(|(v, at)| v.uv = uv.apply(at));
-    }
-    if let Some(index) = attribute(Semantic::Colors(0)) {
-        let colors = same_count(linear_colors(document, index, element)?, positions.len(), "COLOR_0", element)?;
-        vertices.iter_mut().zip(colors).for_each(|(v, linear)| v.color_srgba8 = srgba8_from_linear(linear));
-    }
-    let normals = attribute(Semantic::Normals);
-    if let Some(index) = normals {
-        let normals = same_count(document.floats::<3>(index, element)?, positions.len(), "NORMAL", element)?;
-        if normals.iter().any(|n| !Vec3::from(*n).is_finite()) {
-            return Err(Fault::malformed(element, "a normal is not finite"));
-        }
-        vertices.iter_mut().zip(normals).for_each(|(v, normal)| v.normal = normal);
-    }
-    let positions_in_mesh = positions.iter().map(|p| Vec3::from(*p).as_dvec3()).collect();
-    let mut mesh = SourceMesh { vertices, positions_in_mesh, indices, parts: Vec::new() };
+    let (vertices, has_normals) = attributes.vertices(positions.len(), &coordinates.first)?;
+    let details = attributes.details(positions.len(), coordinates)?;
+    let positions_in_mesh: Vec<_> = positions.iter().map(|p| Vec3::from(*p).as_dvec3()).collect();
+    let mut mesh = SourceMesh { vertices, details, positions_in_mesh, indices, parts: Vec::new() };
     drop_unused(&mut mesh);
     if mesh.positions_in_mesh.iter().all(|p| p.is_finite()) {
-        normals::complete(&mut mesh, normals.is_some(), normals::FLAT);
+        normals::complete(&mut mesh, has_normals, normals::FLAT);
+        // Tangents without normals do not count (glTF 2.0, 3.7.2.1).
+        let has_tangents = has_normals && attributes.index(Semantic::Tangents).is_some();
+        if let Some(second_uv) = coordinates.tangents_along_second.filter(|_| !has_tangents) {
+            let wrong = |error| Fault::malformed(element, format!("its tangents cannot be computed: {error}"));
+            tangents::generate(&mut mesh, second_uv).map_err(wrong)?;
+        }
     }
     Ok(Some(mesh))
+}
+
+/// The attributes of a primitive.
+struct Attributes<'a> {
+    document: &'a Document<'a>,
+    primitive: &'a Primitive,
+    element: &'a str,
+}
+
+impl Attributes<'_> {
+    fn index(&self, semantic: Semantic) -> Option<Index<Accessor>> {
+        self.primitive.attributes.get(&Checked::Valid(semantic)).copied()
+    }
+
+    /// `count` elements of an attribute; `None` where the primitive lacks it.
+    fn floats<const N: usize>(&self, semantic: Semantic, count: usize) -> Result<Option<Vec<[f32; N]>>, Fault> {
+        let name = semantic.to_string();
+        let read = |index| same_count(self.document.floats::<N>(index, self.element)?, count, &name, self.element);
+        self.index(semantic).map(read).transpose()
+    }
+
+    /// The vertices, and whether they have normals.
+    fn vertices(&self, count: usize, uv: &UvSource) -> Result<(Vec<Vertex>, bool), Fault> {
+        let mut vertices = vec![plain_vertex(); count];
+        for (v, at) in vertices.iter_mut().zip(self.floats(Semantic::TexCoords(uv.set), count)?.unwrap_or_default()) {
+            v.uv = uv.apply(at);
+        }
+        if let Some(index) = self.index(Semantic::Colors(0)) {
+            let colors = linear_colors(self.document, index, self.element)?;
+            let colors = same_count(colors, count, "COLOR_0", self.element)?;
+            vertices.iter_mut().zip(colors).for_each(|(v, linear)| v.color_srgba8 = srgba8_from_linear(linear));
+        }
+        let Some(normals) = self.floats::<3>(Semantic::Normals, count)? else { return Ok((vertices, false)) };
+        if normals.iter().any(|n| !Vec3::from(*n).is_finite()) {
+            return Err(Fault::malformed(self.element, "a normal is not finite"));
+        }
+        vertices.iter_mut().zip(normals).for_each(|(v, normal)| v.normal = normal);
+        Ok((vertices, true))
+    }
+
+    /// Second coordinates and tangents, where the material needs them.
+    fn details(&self, count: usize, coordinates: &Coordinates) -> Result<Vec<VertexDetail>, Fault> {
+        if coordinates.second.is_none() && coordinates.tangents_along_second.is_none() {
+            return Ok(Vec::new());
+        }
+        let mut details = vec![VertexDetail::default(); count];
+        if let Some(uv) = &coordinates.second {
+            let uvs = self.floats(Semantic::TexCoords(uv.set), count)?.unwrap_or_default();
+            details.iter_mut().zip(uvs).for_each(|(detail, at)| detail.uv = uv.apply(at));
+        }
+        if coordinates.tangents_along_second.is_some() {
+            let tangents = self.floats::<4>(Semantic::Tangents, count)?.unwrap_or_default();
+            details.iter_mut().zip(tangents).for_each(|(detail, tangent)| detail.tangent = unit_tangent(tangent));
+        }
+        Ok(details)
+    }
+}
+
+/// Some unit vector where the tangent has no length or is not finite.
+fn unit_tangent([x, y, z, sign]: [f32; 4]) -> [f32; 4] {
+    let unit = Vec3::new(x, y, z).normalize_or(Vec3::X);
+    unit.extend(if sign < 0.0 { -1.0 } else { 1.0 }).to_array()
 }
 
 /// Keeps the vertices that the triangles use: primitives may share one large set.
@@ -65,6 +121,8 @@ fn drop_unused(mesh: &mut SourceMesh) {
     used.zip(0..).for_each(|(number, kept)| *number = kept);
     let mut at = new_number.iter();
     mesh.vertices.retain(|_| at.next() != Some(&UNUSED));
+    let mut at = new_number.iter();
+    mesh.details.retain(|_| at.next() != Some(&UNUSED));
     let mut at = new_number.iter();
     mesh.positions_in_mesh.retain(|_| at.next() != Some(&UNUSED));
     mesh.indices.iter_mut().for_each(|i| *i = new_number[*i as usize]);

@@ -6,11 +6,11 @@ use glam::Vec3;
 
 use super::super::clamped::{all_clamped, clamped};
 use super::super::folder::{Folder, existing};
-use super::super::picture::{EncodedPicture, decode_all};
+use super::super::picture::{Content, EncodedPicture, decode_all};
 use super::super::source_scene::SourceScene;
 use super::text::{Line, floats, lines};
 use crate::error::{Fault, at_most};
-use crate::{Limits, Material};
+use crate::{Limits, Material, TextureUse};
 
 /// Fills the scene's materials and textures, and numbers them for `names`. Missing libraries are skipped;
 /// files outside the folder are refused.
@@ -38,7 +38,8 @@ pub(super) fn read_materials(
             // A material without a highlight; many programs write an exponent all the same.
             material.roughness = 1.0;
         }
-        material.base_color_texture = picture.map(|file| textures.number_of(&file, folder)).transpose()?;
+        material.base_color_texture =
+            picture.map(|file| textures.number_of(&file, folder)).transpose()?.map(TextureUse::from);
         numbers.push(scene.materials.len() as u32);
         scene.materials.push(material);
     }
@@ -93,10 +94,10 @@ impl Entry {
 }
 
 impl Material {
-    /// Opacity acts as glTF's blending: surfaces are opaque, and those below one half are discarded.
+    /// Opacity acts as glTF's blending: its share of the surface remains.
     fn set_opacity(&mut self, opacity: f32) {
         self.base_color_linear[3] = opacity.clamp(0.0, 1.0);
-        self.alpha_cutoff = if opacity < 1.0 { 0.5 } else { 0.0 };
+        self.alpha_hashed = opacity < 1.0;
     }
 }
 
@@ -136,7 +137,7 @@ impl Textures {
         let element = format!("map_Kd {file}");
         let bytes = existing(folder.read_name(&element, file))?;
         let number = self.encoded.len() as u32;
-        self.encoded.push(EncodedPicture { element, file: file.to_owned(), bytes, is_srgb: true });
+        self.encoded.push(EncodedPicture { element, file: file.to_owned(), bytes, content: Content::Colors });
         self.number_of_file.insert(file.to_owned(), number);
         Ok(number)
     }

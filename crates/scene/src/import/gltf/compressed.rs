@@ -1,0 +1,173 @@
+//! `EXT_meshopt_compression`, and its successor `KHR_meshopt_compression`: buffer views whose bytes are compressed.
+//!
+//! `meshoptimizer-rs` decodes. It is a port of the reference without unsafe code, and checks every read of a stream.
+
+use std::fmt;
+
+use gltf::json::buffer::{Buffer, View};
+use gltf::json::{Root, Value, deserialize};
+use meshoptimizer_rs::codec::{
+    decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat, decode_index_buffer,
+    decode_index_sequence, decode_vertex_buffer,
+};
+use meshoptimizer_rs::{Error, Limits, Workspace};
+use serde::Deserialize;
+
+use crate::error::{Fault, at_most};
+
+/// The names of the extension. Their JSON is the same.
+pub(super) const NAMES: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+
+/// Returns whether `buffer` only stands for decoded bytes. It may have no data, and is never read.
+pub(super) fn is_fallback(buffer: &Buffer) -> bool {
+    let others = buffer.extensions.as_ref().map(|extensions| &extensions.others);
+    let extension = NAMES.iter().find_map(|name| others?.get(*name));
+    extension.and_then(|value| value.get("fallback")?.as_bool()).unwrap_or(false)
+}
+
+/// The decoded bytes of each buffer view that is compressed. `source` returns a range of a buffer: its number, an offset
+/// and a length. All decoded bytes together count against `limit_bytes`, before memory is allocated.
+pub(super) fn decode_all<'a>(
+    root: &Root,
+    limit_bytes: u64,
+    source: impl Fn(u64, u64, u64) -> Option<&'a [u8]>,
+) -> Result<Vec<Option<Vec<u8>>>, Fault> {
+    let mut decoded_bytes = 0u64;
+    let decode = |(number, view): (usize, &View)| {
+        let Some((name, value)) = extension_of(view) else { return Ok(None) };
+        let element = Element { number, name };
+        let compressed = Compressed::of(value, view, &element)?;
+        decoded_bytes = decoded_bytes.saturating_add(compressed.decoded_bytes());
+        at_most(format_args!("{element}: decoded views in bytes"), decoded_bytes, limit_bytes)?;
+        let Compressed { buffer, byte_offset, byte_length, .. } = compressed;
+        let outside = || element.wrong(format!("its {byte_length} bytes leave buffer {buffer}"));
+        let bytes = source(buffer, byte_offset, byte_length).ok_or_else(outside)?;
+        compressed.decode(bytes, limit_bytes).map(Some).map_err(|error| element.wrong(reason(error)))
+    };
+    root.buffer_views.iter().enumerate().map(decode).collect()
+}
+
+/// A buffer view in messages.
+struct Element {
+    number: usize,
+    name: &'static str,
+}
+
+impl Element {
+    fn wrong(&self, reason: impl Into<String>) -> Fault {
+        Fault::malformed(self, reason)
+    }
+}
+
+impl fmt::Display for Element {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "buffer view {}, {}", self.number, self.name)
+    }
+}
+
+fn extension_of(view: &View) -> Option<(&'static str, &Value)> {
+    let others = &view.extensions.as_ref()?.others;
+    NAMES.into_iter().find_map(|name| Some((name, others.get(name)?)))
+}
+
+/// The extension's JSON.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Compressed {
+    buffer: u64,
+    #[serde(default)]
+    byte_offset: u64,
+    byte_length: u64,
+    byte_stride: u64,
+    count: u64,
+    mode: Mode,
+    #[serde(default)]
+    filter: Filter,
+}
+
+#[derive(Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+enum Mode {
+    Attributes,
+    Triangles,
+    Indices,
+}
+
+#[derive(Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+enum Filter {
+    #[default]
+    None,
+    Octahedral,
+    Quaternion,
+    Exponential,
+    Color,
+}
+
+impl Compressed {
+    /// Checks the count, the stride and the filter, also against the view that is replaced.
+    fn of(value: &Value, view: &View, element: &Element) -> Result<Self, Fault> {
+        let compressed: Self =
+            deserialize::from_value(value.clone()).map_err(|error| element.wrong(error.to_string()))?;
+        let Self { byte_stride, count, mode, filter, .. } = compressed;
+        let is_stride_valid = match mode {
+            Mode::Attributes => byte_stride.is_multiple_of(4) && (4..=256).contains(&byte_stride),
+            Mode::Triangles | Mode::Indices => matches!(byte_stride, 2 | 4),
+        };
+        let is_filter_valid = match filter {
+            Filter::None => true,
+            Filter::Octahedral | Filter::Color => mode == Mode::Attributes && matches!(byte_stride, 4 | 8),
+            Filter::Quaternion => mode == Mode::Attributes && byte_stride == 8,
+            Filter::Exponential => mode == Mode::Attributes,
+        };
+        let parent_stride = view.byte_stride.map(|stride| stride.0 as u64);
+        let problem = if count == 0 {
+            "count is 0".to_owned()
+        } else if !is_stride_valid {
+            format!("byteStride {byte_stride} does not suit its mode")
+        } else if !is_filter_valid {
+            format!("its filter does not suit its mode or byteStride {byte_stride}")
+        } else if mode == Mode::Triangles && !count.is_multiple_of(3) {
+            format!("count {count} is not of whole triangles")
+        } else if count.checked_mul(byte_stride) != Some(view.byte_length.0) {
+            format!("{count} elements of {byte_stride} bytes where the view has {} bytes", view.byte_length.0)
+        } else if parent_stride.is_some_and(|stride| stride != byte_stride) {
+            format!("byteStride {byte_stride} is not the view's")
+        } else {
+            return Ok(compressed);
+        };
+        Err(element.wrong(problem))
+    }
+
+    fn decoded_bytes(&self) -> u64 {
+        self.count * self.byte_stride
+    }
+
+    fn decode(&self, bytes: &[u8], limit_bytes: u64) -> Result<Vec<u8>, Error> {
+        let size = |size: u64| usize::try_from(size).map_err(|_| Error::SizeOverflow);
+        let (count, stride) = (size(self.count)?, size(self.byte_stride)?);
+        let max_bytes = usize::try_from(limit_bytes).unwrap_or(usize::MAX);
+        let workspace = &mut Workspace::new(Limits { max_bytes, ..Limits::default() });
+        let mut decoded = match self.mode {
+            Mode::Attributes => decode_vertex_buffer(count, stride, bytes, workspace),
+            Mode::Triangles => decode_index_buffer(count, stride, bytes, workspace),
+            Mode::Indices => decode_index_sequence(count, stride, bytes, workspace),
+        }?;
+        match self.filter {
+            Filter::None => Ok(()),
+            Filter::Octahedral => decode_filter_oct(&mut decoded, count, stride, workspace),
+            Filter::Quaternion => decode_filter_quat(&mut decoded, count, stride, workspace),
+            Filter::Exponential => decode_filter_exp(&mut decoded, count, stride, workspace),
+            Filter::Color => decode_filter_color(&mut decoded, count, stride, workspace),
+        }?;
+        Ok(decoded)
+    }
+}
+
+fn reason(error: Error) -> String {
+    match error {
+        Error::InvalidStream => "its stream is cut off, damaged, or of another count or byteStride".to_owned(),
+        Error::NumericalFailure => "its filter has no value for some element".to_owned(),
+        other => other.to_string(),
+    }
+}
