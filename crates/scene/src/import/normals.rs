@@ -77,6 +77,9 @@ fn copy_with_normal(mesh: &mut SourceMesh, next_copy: &mut Vec<Option<u32>>, ver
     let copy = mesh.vertices.len() as u32;
     mesh.vertices.push(crate::Vertex { normal, ..mesh.vertices[vertex as usize] });
     mesh.positions_in_mesh.push(mesh.positions_in_mesh[vertex as usize]);
+    if let Some(&influence) = mesh.influences.get(vertex as usize) {
+        mesh.influences.push(influence);
+    }
     next_copy[at] = Some(copy);
     next_copy.push(None);
     copy
@@ -180,6 +183,7 @@ mod tests {
             vertices: vec![plain_vertex(); points.len()],
             indices: indices.to_vec(),
             parts: Vec::new(),
+            influences: Vec::new(),
         }
     }
 

@@ -1,6 +1,8 @@
 //! Small files of every format for tests.
 #![allow(dead_code, clippy::unwrap_used)]
 
+pub mod skinned;
+
 use std::path::PathBuf;
 
 use scene::{Limits, MissingTextures, Scene, SceneError, load_file};

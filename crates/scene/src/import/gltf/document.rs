@@ -31,8 +31,10 @@ impl<'a> Document<'a> {
         folder: &'a Folder,
         limits: &'a Limits,
     ) -> Result<Self, Fault> {
-        // Positions, normals, coordinates, colours: four elements a vertex; three indices a triangle.
-        let elements = limits.vertices.saturating_mul(4).saturating_add(limits.triangles.saturating_mul(3));
+        // Positions, normals, coordinates, colours, joints, weights: six elements a vertex, and four of further joints;
+        // three indices a triangle.
+        let of_triangles = limits.triangles.saturating_mul(3);
+        let elements = limits.vertices.saturating_mul(10).saturating_add(of_triangles).saturating_add(limits.keys);
         let mut document = Self { root, limits, folder, buffers: Vec::new(), elements_left: Cell::new(elements) };
         for (number, buffer) in root.buffers.iter().enumerate() {
             let element = format!("buffer {number}");
@@ -108,6 +110,11 @@ impl<'a> Document<'a> {
     /// Components of an accessor: 3 or 4 for colours.
     pub(super) fn component_count(&self, index: Index<Accessor>, element: &str) -> Result<usize, Fault> {
         Ok(self.layout(index, element)?.components)
+    }
+
+    /// Elements of an accessor, before they are read.
+    pub(super) fn element_count(&self, index: Index<Accessor>, element: &str) -> Result<u64, Fault> {
+        Ok(self.layout(index, element)?.count)
     }
 
     /// An accessor's elements as vertex numbers.

@@ -13,7 +13,10 @@
 //! `KHR_materials_emissive_strength`, `KHR_lights_punctual`, `KHR_mesh_quantization` and perspective cameras. Missing normals are flat, as the
 //! specification requires.
 //!
-//! It skips points and lines, normal and occlusion maps, skins (shown in bind pose), morph targets and animations. It
+//! Nodes that an animation moves and skins become the scene's animation, whose first clip plays. Lamps and cameras stay at
+//! rest, and so do morph targets, with a warning.
+//!
+//! It skips points and lines, and normal and occlusion maps. It
 //! also skips sampler wrap modes (all textures repeat). Textures are PNG, JPEG, or WebP by `EXT_texture_webp`.
 //!
 //! Factors of materials are clamped to their range. A factor that is not finite is refused, as is an invalid light.
@@ -24,11 +27,14 @@
 //! the sum is within two stops of white, lights stay unchanged. Otherwise one factor makes the sum white, which keeps
 //! the lights' ratios. Emissive surfaces are not exposed: in files they are relative to white already.
 
+mod animation;
+mod channels;
 mod document;
 mod lights;
 mod materials;
 mod nodes;
 mod primitives;
+mod skins;
 
 use gltf::binary::Glb;
 use gltf::json::Root;
@@ -60,7 +66,8 @@ pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<Sou
     let mut scene = SourceScene::default();
     materials::read(&document, &mut scene)?;
     read_meshes(&document, &mut scene)?;
-    nodes::read(&root, limits, &mut scene)?;
+    let tree = nodes::read(&root, limits, &mut scene)?;
+    animation::read(&document, &tree, &mut scene)?;
     lights::expose(&mut scene);
     Ok(scene)
 }
@@ -114,6 +121,9 @@ fn read_meshes(document: &Document, scene: &mut SourceScene) -> Result<(), Fault
             let element = format!("mesh {number}, primitive {part}");
             let uv = materials::uv_source(document.root, primitive.material);
             let material = materials::material_number(document.root, primitive.material, &element)?;
+            if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
+                tracing::warn!("{element}: its morph targets are shown at rest");
+            }
             if let Some(geometry) = primitives::read(document, primitive, &uv, &element)? {
                 merged.append_part(geometry, material);
             }

@@ -11,6 +11,7 @@ use super::super::normals;
 use super::super::source_scene::{SourceMesh, plain_vertex};
 use super::document::Document;
 use super::materials::UvSource;
+use super::skins;
 use crate::error::Fault;
 
 /// `None` for points and lines.
@@ -48,7 +49,8 @@ pub(super) fn read(
         vertices.iter_mut().zip(normals).for_each(|(v, normal)| v.normal = normal);
     }
     let positions_in_mesh = positions.iter().map(|p| Vec3::from(*p).as_dvec3()).collect();
-    let mut mesh = SourceMesh { vertices, positions_in_mesh, indices, parts: Vec::new() };
+    let influences = skins::influences(document, primitive, &indices, positions.len(), element)?;
+    let mut mesh = SourceMesh { vertices, positions_in_mesh, indices, parts: Vec::new(), influences };
     drop_unused(&mut mesh);
     if mesh.positions_in_mesh.iter().all(|p| p.is_finite()) {
         normals::complete(&mut mesh, normals.is_some(), normals::FLAT);
@@ -67,6 +69,8 @@ fn drop_unused(mesh: &mut SourceMesh) {
     mesh.vertices.retain(|_| at.next() != Some(&UNUSED));
     let mut at = new_number.iter();
     mesh.positions_in_mesh.retain(|_| at.next() != Some(&UNUSED));
+    let mut at = new_number.iter();
+    mesh.influences.retain(|_| at.next() != Some(&UNUSED));
     mesh.indices.iter_mut().for_each(|i| *i = new_number[*i as usize]);
 }
 
@@ -84,7 +88,7 @@ fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {
     [r, g, b, (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
 }
 
-fn same_count<T>(items: Vec<T>, needs: usize, what: &str, element: &str) -> Result<Vec<T>, Fault> {
+pub(super) fn same_count<T>(items: Vec<T>, needs: usize, what: &str, element: &str) -> Result<Vec<T>, Fault> {
     let has = items.len();
     let wrong = || Fault::malformed(element, format!("{what} has {has} elements, POSITION {needs}"));
     (has == needs).then_some(items).ok_or_else(wrong)
