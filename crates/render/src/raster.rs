@@ -141,7 +141,7 @@ impl Raster {
             shading: batch.work.lighting.highlight(),
             surface_id: surfaces.iter().any(|target| target.surface_ids.is_some()),
             depth_only: false,
-            wind: scene.animated,
+            wind: scene.wind,
             redundancy: predecessors.map(|images| images.variant),
         };
         let front = RasterVariant { depth_only: true, redundancy: None, ..shown };
@@ -151,8 +151,10 @@ impl Raster {
             self.groups(&pass, &batch.work, cameras, predecessors)
         });
         let groups = groups.transpose()?;
+        let posed = scene.motion.as_ref().map(|motion| motion.at(batch.work.scene_time_s));
+        let posed = posed.as_ref().map(|posed| posed.buffer(&self.gpu));
         for (place, (camera, target)) in (0..).zip(cameras.iter().zip(surfaces)) {
-            let view = View { scene, place, camera, groups: groups.as_ref() };
+            let view = View { scene, posed, place, camera, groups: groups.as_ref() };
             if predecessors.is_some() {
                 self.draw_in_slices(frame, &view, front, &[], &target.views.front_depth)?;
             }
@@ -207,7 +209,7 @@ impl Raster {
     fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        &View { scene, place, camera, groups }: &View<'_>,
+        &View { scene, posed, place, camera, groups }: &View<'_>,
         variant: RasterVariant,
         runs: &[Run],
     ) -> Result<(), RenderError> {
@@ -215,15 +217,18 @@ impl Raster {
         // Layers of a set are as large as its largest image.
         let size = camera.size_px.as_vec2();
         pass.set_viewport(0.0, 0.0, size.x, size.y, 0.0, 1.0);
-        pass.set_vertex_buffer(0, scene.vertices.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.set_bind_group(0, &*groups.scene, &[place * CAMERA_STRIDE]);
         if let Some(known) = groups.known.as_ref().filter(|_| variant.redundancy.is_some()) {
             pass.set_bind_group(KNOWN_GROUP, &**known, &[]);
         }
-        let (mut material, mut texture, mut object) = (None, None, None);
+        let (mut material, mut texture, mut object, mut vertices) = (None, None, None, None);
         for run in runs {
             let draw = &scene.draws[run.draw];
+            let buffer = posed.filter(|_| draw.posed).unwrap_or(&scene.vertices);
+            if vertices.replace(buffer) != Some(buffer) {
+                pass.set_vertex_buffer(0, buffer.slice(..));
+            }
             if material.replace(draw.material) != Some(draw.material) {
                 let variant = RasterVariant { material: draw.material, ..variant };
                 pass.set_pipeline(self.passes.get(&variant)?.pipeline());
@@ -288,6 +293,8 @@ impl RasterCamera {
 /// A camera of a batch, and what is drawn into its targets.
 struct View<'r> {
     scene: &'r GpuScene,
+    /// The vertices of instances that move.
+    posed: Option<&'r wgpu::Buffer>,
     /// Among the cameras that are drawn together.
     place: u32,
     camera: &'r PinholeCamera,

@@ -12,7 +12,7 @@ use wgpu::TextureFormat;
 
 use super::bvh::{Bvh, MAX_DEPTH};
 use super::flat::{CORNER_FLAGS, FlatScene, FlatTriangle, MAX_VERTICES, OrderedMesh};
-use crate::{few_cores::on_free_cores, material::phong_reflector, texture};
+use crate::{few_cores::on_free_cores, material::phong_reflector, motion::Motion, texture};
 
 /// The making of the tree over a scene's triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -60,6 +60,7 @@ struct Built {
 pub struct Traced {
     pub(crate) nodes: Table,
     pub(crate) corners: Table,
+    vertices: Arc<Table>,
     fixed: Arc<Fixed>,
     pub(crate) alpha_tested: bool,
     /// The making of the tree.
@@ -68,7 +69,6 @@ pub struct Traced {
 
 /// Tables that stay while triangles move; a new tree changes the order of triangles.
 struct Fixed {
-    vertices: Table,
     triangles: Table,
     materials: Table,
     texels: Table,
@@ -87,10 +87,10 @@ pub(crate) struct HostTables<'t> {
 
 impl RayScene {
     /// Keeps what trees are made of; nothing is built or uploaded before it is needed.
-    pub(crate) fn of(gpu: &Arc<Gpu>, scene: &Scene, ordered: &[OrderedMesh<'_>]) -> Self {
+    pub(crate) fn of(gpu: &Arc<Gpu>, scene: &Scene, ordered: &[OrderedMesh<'_>], motion: Option<Arc<Motion>>) -> Self {
         Self {
             gpu: gpu.clone(),
-            flat: FlatScene::of(scene, ordered),
+            flat: FlatScene::of(scene, ordered, motion),
             tables: Tables::of(scene),
             state: Mutex::default(),
         }
@@ -119,7 +119,7 @@ impl RayScene {
 
     fn moved_to<'s>(&self, scene_time_s: f32, state: &'s mut Option<Built>) -> Result<&'s Built, GpuError> {
         let next = match state.take() {
-            Some(built) if self.flat.wind.is_none() || built.scene_time_s == scene_time_s => built,
+            Some(built) if !self.flat.moves() || built.scene_time_s == scene_time_s => built,
             // Whichever took less time when it was last done.
             Some(built) if built.last_refit.is_none_or(|refit| refit < built.last_build) => {
                 self.refitted(built, scene_time_s)?
@@ -145,7 +145,8 @@ impl RayScene {
         GpuError::check_limit("levels of the tree over the scene", u64::from(bvh.depth), u64::from(MAX_DEPTH))?;
         let took = start.elapsed();
         let fixed = Arc::new(self.fixed(&bvh)?);
-        let traced = self.traced(&bvh, &corners, fixed, took, false)?;
+        let vertices = self.vertices(scene_time_s)?;
+        let traced = self.traced(&bvh, &corners, (vertices, fixed), took, false)?;
         Ok(Built { bvh, scene_time_s, traced, last_refit: None, last_build: took })
     }
 
@@ -160,15 +161,22 @@ impl RayScene {
             return self.built(scene_time_s);
         }
         let took = start.elapsed();
-        let traced = self.traced(&built.bvh, &corners, built.traced.fixed.clone(), took, true)?;
+        let Traced { vertices, fixed, .. } = &*built.traced;
+        let vertices = if self.flat.turns() { self.vertices(scene_time_s)? } else { vertices.clone() };
+        let traced = self.traced(&built.bvh, &corners, (vertices, fixed.clone()), took, true)?;
         Ok(Built { scene_time_s, traced, last_refit: Some(took), ..built })
     }
 
-    /// Attributes and textures; triangles in the order of the tree's leaves.
+    /// Attributes of vertices at a scene time.
+    fn vertices(&self, scene_time_s: f32) -> Result<Arc<Table>, GpuError> {
+        let vertices = self.flat.vertices_at(scene_time_s);
+        Ok(Arc::new(Table::new(&self.gpu, "vertex attributes", TextureFormat::Rgba32Uint, &vertices)?))
+    }
+
+    /// Attributes of triangles and textures; triangles in the order of the tree's leaves.
     fn fixed(&self, bvh: &Bvh) -> Result<Fixed, GpuError> {
         let words = TextureFormat::Rgba32Uint;
         Ok(Fixed {
-            vertices: Table::new(&self.gpu, "vertex attributes", words, &self.flat.vertices)?,
             triangles: Table::new(&self.gpu, "triangle attributes", words, &self.triangles_of_leaves(bvh))?,
             materials: Table::new(&self.gpu, "materials", words, &self.tables.materials)?,
             texels: Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?,
@@ -179,7 +187,7 @@ impl RayScene {
         &self,
         bvh: &Bvh,
         corners_in_world: &[[Vec3; 3]],
-        fixed: Arc<Fixed>,
+        (vertices, fixed): (Arc<Table>, Arc<Fixed>),
         took: Duration,
         refitted: bool,
     ) -> Result<Arc<Traced>, GpuError> {
@@ -198,7 +206,7 @@ impl RayScene {
         };
         tracing::debug!(?report, "rays are ready");
         let alpha_tested = self.tables.alpha_tested;
-        Ok(Arc::new(Traced { nodes, corners, fixed, alpha_tested, report }))
+        Ok(Arc::new(Traced { nodes, corners, vertices, fixed, alpha_tested, report }))
     }
 
     /// Three texels a triangle in the order of the tree's leaves: a corner's position, and its number with the
@@ -229,7 +237,7 @@ impl RayScene {
             nodes: &bvh.tree.nodes,
             corners: self.corner_texels(bvh, &self.corners_in_world(scene_time_s)),
             triangles: self.triangles_of_leaves(bvh),
-            vertices: &self.flat.vertices,
+            vertices: &self.flat.vertices_at(scene_time_s),
             materials: &self.tables.materials,
             texels: &self.tables.texels,
         }))
@@ -242,18 +250,18 @@ impl RayScene {
 
 impl Traced {
     fn bytes(&self) -> u64 {
-        let Fixed { vertices, triangles, materials, texels } = &*self.fixed;
-        let tables = [&self.nodes, &self.corners, vertices, triangles, materials, texels];
+        let Fixed { triangles, materials, texels } = &*self.fixed;
+        let tables = [&self.nodes, &self.corners, &*self.vertices, triangles, materials, texels];
         tables.map(|table| gpu::texture_bytes(table.texture())).iter().sum()
     }
 
     /// The variables of `traverse.wgsl`.
     pub fn bindings(&self) -> [Binding<'_>; 6] {
-        let Fixed { vertices, triangles, materials, texels } = &*self.fixed;
+        let Fixed { triangles, materials, texels } = &*self.fixed;
         [
             Binding::texture("bvh_nodes", &self.nodes),
             Binding::texture("triangle_corners", &self.corners),
-            Binding::texture("flat_vertices", vertices),
+            Binding::texture("flat_vertices", &self.vertices),
             Binding::texture("flat_triangles", triangles),
             Binding::texture("materials", materials),
             Binding::texture("texels", texels),
