@@ -109,6 +109,19 @@ fn nodes_move_their_meshes_and_all_below_by_lines_steps_and_splines() {
 }
 
 #[test]
+fn what_a_clip_grows_may_have_no_size_at_rest() {
+    let mut tube = Tube::new(1, 1, 3);
+    tube.nodes = r#"{"mesh":0,"scale":[0,0,0],"translation":[3,0,0]}"#.into();
+    (tube.roots, tube.skins) = ("0".into(), r#"{"joints":[0]}"#.into());
+    assert!(refusal("still.glb", &tube.glb()).contains("node 0: its transform is singular"));
+    tube.animate("grow", &[(0, "scale", "LINEAR", &[0., 1.], &[0., 0., 0., 2., 2., 2.])]);
+    let scene = load("grows.glb", &tube.glb()).unwrap();
+    let reach_m = |t: f32| posed(&scene, t).iter().map(|v| v.position[0] - 3.0).fold(0.0, f32::max);
+    assert_eq!([reach_m(0.0), reach_m(0.5)], [0.0, 1.0]);
+    assert!(posed(&scene, 0.0).iter().all(|v| (Vec3::from(v.normal).length() - 1.0).abs() < 1e-3));
+}
+
+#[test]
 fn a_skin_without_clips_is_shown_as_its_joints_stand() {
     let mut tube = Tube::new(2, 2, 4);
     // The mesh's own node counts for nothing; the second joint is turned.

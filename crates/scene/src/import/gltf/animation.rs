@@ -46,9 +46,18 @@ fn moving_instances(
                 (joints, mesh.influences.clone())
             }
             None if moves[place as usize] => {
+                // A clip may grow what has no size at rest: only the place at rest is left.
+                let at_rest = &mut scene.instances[instance].source_from_mesh;
+                if !is_invertible(at_rest) {
+                    *at_rest = DAffine3::from_translation(at_rest.translation);
+                }
                 (vec![Joint { node: place, joint_from_mesh: DAffine3::IDENTITY }], Vec::new())
             }
-            None => continue,
+            None if is_invertible(&node.source_from_node) => continue,
+            None => {
+                let element = format!("node {}", node.number);
+                return Err(Fault::malformed(element, "its transform is singular or not finite"));
+            }
         };
         moving.push(MovingInstance { instance: instance as u32, joints, influences });
     }

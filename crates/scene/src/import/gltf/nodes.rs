@@ -47,7 +47,7 @@ pub(super) struct PlacedNode {
     pub number: usize,
     /// In the tree.
     pub parent: Option<usize>,
-    /// The placement of its mesh, if it has triangles.
+    /// The placement of its mesh, if it has triangles. Whether it has to be invertible depends on clips and skins.
     pub instance: Option<usize>,
     pub source_from_node: DAffine3,
 }
@@ -80,10 +80,6 @@ fn add_contents(root: &Root, node: &Node, place: &Place, scene: &mut SourceScene
     if let Some(mesh) = node.mesh.map(|mesh| mesh.value()) {
         let missing = || Fault::malformed(&place.element, format!("mesh {mesh} does not exist"));
         if !scene.meshes.get(mesh).ok_or_else(missing)?.indices.is_empty() {
-            // A skinned mesh is placed by its joints alone.
-            if node.skin.is_none() {
-                place.require_invertible()?;
-            }
             scene.instances.push(SourceInstance { mesh, source_from_mesh: place.source_from_node });
         }
     }
