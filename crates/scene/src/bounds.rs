@@ -15,6 +15,8 @@ const MOMENTS_BETWEEN_KEYS: usize = 4;
 const FEW_KEYS_MOMENTS: usize = 256;
 /// Most steps of sampling, over nodes, channels and corners of boxes: large skeletons have fewer moments.
 const MOST_STEPS: usize = 8_000_000;
+/// Most corners of boxes at once, unless one moment has more.
+const MOST_CORNERS: usize = 1 << 20;
 /// The fewest moments of any clip.
 const FEWEST_MOMENTS: usize = 16;
 
@@ -74,10 +76,10 @@ impl Scene {
             };
             carried.iter().map(|boxes| boxes.iter().flat_map(of_box).collect()).collect()
         };
-        // A few moments at a time: all corners of all moments would fill memory.
+        // Corners of all moments at once would fill memory.
         let mut boxes = vec![Aabb::EMPTY; carried.len()];
         let mut before: Option<(f32, Vec<Vec<DVec3>>)> = None;
-        for some in moments.chunks(32) {
+        for some in moments.chunks((MOST_CORNERS / corners.max(1)).clamp(1, 32)) {
             for (&time_s, corners) in some.iter().zip(some.par_iter().map(corners_at).collect::<Vec<_>>()) {
                 // Nothing moves between neighbouring numbers: a step there is a jump.
                 let from = before.as_ref().filter(|(then_s, _)| then_s.next_up() < time_s).map(|(_, corners)| corners);

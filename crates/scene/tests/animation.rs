@@ -6,7 +6,7 @@ mod samples;
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use glam::Vec3;
-use samples::skinned::Tube;
+use samples::skinned::{ChannelOf, Tube};
 use samples::{GltfCube, cube, load, refusal, signed_volume};
 use scene::procedural::{snake, unit_cube};
 use scene::{Limits, MissingTextures, NodeTransform, Scene, Vertex, load_file, pack, unpack};
@@ -192,9 +192,11 @@ fn a_packed_animation_loses_nothing() {
     }
 }
 
+type Break = fn(&mut scene::Animation);
+
 #[test]
 fn an_invalid_animation_is_not_unpacked() {
-    let broken: [(&str, fn(&mut scene::Animation)); 15] = [
+    let broken: [(&str, Break); 15] = [
         ("parent", |a| a.nodes[1].parent = Some(1)),
         ("node 0", |a| a.nodes[0].rest = NodeTransform::Fixed(glam::DAffine3::from_scale(glam::DVec3::NAN))),
         ("moving instance 0", |a| a.moving[0].instance = 9),
@@ -240,45 +242,43 @@ fn weights_are_made_to_sum_to_1_and_the_strongest_four_count() {
     }
 }
 
+/// A change to a file.
+type Damage = fn(&mut Tube);
+
+/// The vertices of [`Tube::bending`].
+const VERTICES: usize = 9 * 6;
+
+/// Gives all vertices the same weights.
+fn weights(tube: &mut Tube, of_each: [f32; 4]) {
+    let accessor = tube.floats(&of_each.repeat(VERTICES), "VEC4");
+    tube.set_attribute("WEIGHTS_0", accessor);
+}
+
 #[test]
 fn damaged_skins_are_refused_by_their_field() {
-    let count = 9 * 6;
-    let weights = |tube: &mut Tube, of_each: [f32; 4]| {
-        let accessor = tube.floats(&of_each.repeat(count), "VEC4");
-        tube.set_attribute("WEIGHTS_0", accessor);
-    };
-    let cases: [(&str, Box<dyn Fn(&mut Tube)>); 13] = [
-        ("vertex 0: the sum of its weights is 0,", Box::new(|t| weights(t, [0.0; 4]))),
-        ("the sum of its weights is 0.8", Box::new(|t| weights(t, [0.5, 0.3, 0.0, 0.0]))),
-        ("the sum of its weights is 2", Box::new(|t| weights(t, [1.0; 4].map(|w| w * 0.5)))),
-        ("the weight NaN", Box::new(|t| weights(t, [f32::NAN, 0.0, 0.0, 1.0]))),
-        ("the weight -1", Box::new(|t| weights(t, [2.0, -1.0, 0.0, 0.0]))),
-        (
-            "joint 2 is beyond the skin's 2",
-            Box::new(|t| {
-                let joints = t.shorts(&[2, 0, 0, 0].repeat(count));
-                t.set_attribute("JOINTS_0", joints);
-            }),
-        ),
-        (
-            "JOINTS has 53 elements",
-            Box::new(|t| {
-                let joints = t.shorts(&[0; 4 * 53]);
-                t.set_attribute("JOINTS_0", joints);
-            }),
-        ),
-        ("skin 0: its mesh has no JOINTS_0", Box::new(|t| t.attributes = t.attributes.replace("JOINTS_0", "_J"))),
-        ("skin 0, inverseBindMatrices, matrix 1: it is not finite", Box::new(|t| bind(t, f32::NAN))),
-        ("matrix 1: it is not finite, not affine, or not invertible", Box::new(|t| bind(t, 0.0))),
-        (
-            "1 matrices for 2 joints",
-            Box::new(|t| {
-                let one = t.floats(&glam::Mat4::IDENTITY.to_cols_array(), "MAT4");
-                t.skins = format!(r#"{{"inverseBindMatrices":{one},"joints":[1,2]}}"#);
-            }),
-        ),
-        ("skin 0: it has no joints", Box::new(|t| t.skins = r#"{"joints":[]}"#.into())),
-        ("node 0: skin 1 does not exist", Box::new(|t| t.nodes = t.nodes.replacen(r#""skin":0"#, r#""skin":1"#, 1))),
+    let cases: [(&str, Damage); 13] = [
+        ("vertex 0: the sum of its weights is 0,", |t| weights(t, [0.0; 4])),
+        ("the sum of its weights is 0.8", |t| weights(t, [0.5, 0.3, 0.0, 0.0])),
+        ("the sum of its weights is 2", |t| weights(t, [1.0; 4].map(|w| w * 0.5))),
+        ("the weight NaN", |t| weights(t, [f32::NAN, 0.0, 0.0, 1.0])),
+        ("the weight -1", |t| weights(t, [2.0, -1.0, 0.0, 0.0])),
+        ("joint 2 is beyond the skin's 2", |t| {
+            let joints = t.shorts(&[2, 0, 0, 0].repeat(VERTICES));
+            t.set_attribute("JOINTS_0", joints);
+        }),
+        ("JOINTS has 53 elements", |t| {
+            let joints = t.shorts(&[0; 4 * 53]);
+            t.set_attribute("JOINTS_0", joints);
+        }),
+        ("skin 0: its mesh has no JOINTS_0", |t| t.attributes = t.attributes.replace("JOINTS_0", "_J")),
+        ("skin 0, inverseBindMatrices, matrix 1: it is not finite", |t| bind(t, f32::NAN)),
+        ("matrix 1: it is not finite, not affine, or not invertible", |t| bind(t, 0.0)),
+        ("1 matrices for 2 joints", |t| {
+            let one = t.floats(&glam::Mat4::IDENTITY.to_cols_array(), "MAT4");
+            t.skins = format!(r#"{{"inverseBindMatrices":{one},"joints":[1,2]}}"#);
+        }),
+        ("skin 0: it has no joints", |t| t.skins = r#"{"joints":[]}"#.into()),
+        ("node 0: skin 1 does not exist", |t| t.nodes = t.nodes.replacen(r#""skin":0"#, r#""skin":1"#, 1)),
     ];
     for (expected, damage) in cases {
         let message = refused(damage);
@@ -307,8 +307,7 @@ fn cyclic_skeletons_are_refused() {
 #[test]
 fn damaged_animations_are_refused_by_their_field() {
     const TURN: [f32; 8] = [0., 0., 0., 1., 0., 0., 1., 0.];
-    type Channels<'a> = &'a [(u32, &'a str, &'a str, &'a [f32], &'a [f32])];
-    let cases: [(&str, Channels); 12] = [
+    let cases: [(&str, &[ChannelOf]); 12] = [
         (
             "animation 0, channel 0, input: time 1 is negative or not finite",
             &[(2, "rotation", "LINEAR", &[0., f32::NAN], &TURN)],

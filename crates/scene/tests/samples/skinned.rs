@@ -23,6 +23,9 @@ const U16: u32 = 5123;
 const U32: u32 = 5125;
 const F32: u32 = 5126;
 
+/// Node, path, interpolation, times and values.
+pub type ChannelOf<'a> = (u32, &'a str, &'a str, &'a [f32], &'a [f32]);
+
 impl Tube {
     /// `joints` in a chain from x = 0 on, a metre apart; `rings` of `sides` corners around each metre and at the end.
     /// Node 0 holds the mesh, and nodes 1… are the joints. There are no animations yet.
@@ -86,8 +89,8 @@ impl Tube {
         tube
     }
 
-    /// Adds a clip: node, path, interpolation, times and values of each channel.
-    pub fn animate(&mut self, name: &str, channels: &[(u32, &str, &str, &[f32], &[f32])]) {
+    /// Adds a clip.
+    pub fn animate(&mut self, name: &str, channels: &[ChannelOf<'_>]) {
         let (mut targets, mut samplers) = (Vec::new(), Vec::new());
         for (number, (node, path, curve, times_s, values)) in channels.iter().enumerate() {
             let input = self.floats(times_s, "SCALAR");

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::{Quat, Vec4};
 use gltf::json::animation::{
-    Animation as JsonAnimation, Channel as JsonChannel, Interpolation as Curve, Property as Path,
+    Animation as JsonAnimation, Channel as JsonChannel, Interpolation as Curve, Property as Path, Sampler,
 };
 use gltf::json::validation::Checked;
 
@@ -89,9 +89,20 @@ fn channel(
     *keys_left -= keys;
     let times_s: Vec<f32> = document.floats::<1>(sampler.input, &input)?.into_iter().flatten().collect();
     check_times(&times_s).map_err(|why| Fault::malformed(input, why))?;
+    let values = values(document, sampler, property, (interpolation, times_s.len()), element)?;
+    Ok(Channel { node: node.value() as u32, property, interpolation, times_s, values })
+}
+
+fn values(
+    document: &Document,
+    sampler: &Sampler,
+    property: Property,
+    (interpolation, keys): (Interpolation, usize),
+    element: &str,
+) -> Result<Vec<Vec4>, Fault> {
     let output = format!("{element}, output");
     let wrong = |why: String| Fault::malformed(&output, why);
-    let expected = times_s.len() as u64 * interpolation.values_a_key() as u64;
+    let expected = keys as u64 * interpolation.values_a_key() as u64;
     let has = document.element_count(sampler.output, &output)?;
     if has != expected {
         return Err(wrong(format!("{has} values where its keys need {expected}")));
@@ -109,7 +120,7 @@ fn channel(
     if property == Property::Rotation {
         make_unit(&mut values, interpolation).map_err(wrong)?;
     }
-    Ok(Channel { node: node.value() as u32, property, interpolation, times_s, values })
+    Ok(values)
 }
 
 /// Makes rotations unit: integers are rounded, and exporters are careless. Slopes stay.

@@ -216,6 +216,13 @@ fn slice_of(bytes: &[u8], offset: u64, length: u64) -> Option<&[u8]> {
     bytes.get(start..end)
 }
 
+/// The elements of an attribute, as many as there are positions.
+pub(super) fn same_count<T>(items: Vec<T>, needs: usize, what: &str, element: &str) -> Result<Vec<T>, Fault> {
+    let has = items.len();
+    let wrong = || Fault::malformed(element, format!("{what} has {has} elements, POSITION {needs}"));
+    (has == needs).then_some(items).ok_or_else(wrong)
+}
+
 /// Reads one component, little-endian; `bytes` has the component's length.
 fn unsigned(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte))

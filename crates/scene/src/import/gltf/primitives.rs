@@ -9,7 +9,7 @@ use gltf::json::validation::Checked;
 
 use super::super::normals;
 use super::super::source_scene::{SourceMesh, plain_vertex};
-use super::document::Document;
+use super::document::{Document, same_count};
 use super::materials::UvSource;
 use super::skins;
 use crate::error::Fault;
@@ -86,12 +86,6 @@ fn linear_colors(document: &Document, index: Index<Accessor>, element: &str) -> 
 fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {
     let [r, g, b] = [r, g, b].map(srgb8_from_linear);
     [r, g, b, (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
-}
-
-pub(super) fn same_count<T>(items: Vec<T>, needs: usize, what: &str, element: &str) -> Result<Vec<T>, Fault> {
-    let has = items.len();
-    let wrong = || Fault::malformed(element, format!("{what} has {has} elements, POSITION {needs}"));
-    (has == needs).then_some(items).ok_or_else(wrong)
 }
 
 fn triangles(

@@ -5,9 +5,8 @@ use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, skin::Skin};
 
-use super::document::Document;
+use super::document::{Document, same_count};
 use super::nodes::affine_from;
-use super::primitives::same_count;
 use crate::animation::{Influence, is_invertible};
 use crate::error::{Fault, at_most};
 
