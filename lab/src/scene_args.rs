@@ -12,6 +12,7 @@ pub fn scene_args(scene: SceneSpec) -> SceneArgs {
     SceneArgs {
         scene,
         missing_textures: MissingTextures::default(),
+        clip: None,
         lighting: Lighting::default(),
         lights: Vec::new(),
         environment: None,

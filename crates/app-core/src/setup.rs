@@ -36,12 +36,15 @@ pub struct DeviceArgs {
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
     /// A scene by name or a file (.gltf, .glb, .obj, .ply). Names: tree-terrain-30k, -125k, -500k, -2m (each also with
-    /// -wind), bird-nest, urban, tree, grass, grass:DENSITY, blocks, courtyard, uv-sphere, and more
+    /// -wind), snake (animated), bird-nest, urban, tree, grass, grass:DENSITY, blocks, courtyard, uv-sphere, and more
     #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
     pub scene: SceneSpec,
     /// What is done about textures that a scene's file names and that are not there: refuse the scene, or show grey
     #[arg(long, default_value_t, value_name = "refuse|grey")]
     pub missing_textures: MissingTextures,
+    /// The clip of an animated scene that plays, by its name [default: the first]
+    #[arg(long, value_name = "NAME")]
+    pub clip: Option<String>,
     /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, or soft N (N rays
     /// a light). Ambient occlusion: occlusion N [RADIUSm]. Rate: adaptive [TOLERANCE] traces rays only where light
     /// changes
@@ -126,13 +129,17 @@ impl SceneArgs {
                 sampling: Some(self.sampling.to_string()),
                 lighting: Some(self.lighting.to_string()),
             },
-            period_s: scene.wind.map(|wind| f64::from(wind.frequency_hz).recip()).filter(|period| period.is_finite()),
+            period_s: scene.period_s().map(f64::from),
         };
         Ok(Setup { scene, around, samples, offer })
     }
 
     fn load_scene(&self) -> anyhow::Result<Scene> {
-        let scene = self.scene.load(&Limits::default(), self.missing_textures).context("the scene cannot be used")?;
+        let mut scene =
+            self.scene.load(&Limits::default(), self.missing_textures).context("the scene cannot be used")?;
+        if let Some(name) = &self.clip {
+            scene.play(name).with_context(|| format!("{}: --clip", self.scene))?;
+        }
         let lights = (!self.lights.is_empty()).then(|| self.lights.iter().map(|spec| spec.0).collect());
         let lit = scene.lit_by(lights, self.environment.map(|spec| spec.0));
         lit.validate(&Limits::default()).context("the scene cannot be used")?;

@@ -22,6 +22,13 @@ impl Aabb {
         points.into_iter().fold(Self::EMPTY, Self::grown_to)
     }
 
+    /// The smallest box around `boxes`; empty ones count for nothing.
+    #[must_use]
+    pub fn of_boxes(boxes: &[Self]) -> Self {
+        let boxes = boxes.iter().filter(|b| !b.is_empty());
+        boxes.fold(Self::EMPTY, |all, b| all.grown_to(b.min).grown_to(b.max))
+    }
+
     /// The smallest box around this box and `point`.
     #[must_use]
     pub fn grown_to(self, point: Vec3) -> Self {

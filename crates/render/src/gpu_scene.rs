@@ -13,6 +13,7 @@ use scene::{Material, Scene, TextureUse, VertexDetail, Wind};
 use wgpu::BufferUsages;
 
 use crate::material::{normal_scale, phong_reflector};
+use crate::motion::Motion;
 use crate::rays::{AccelerationReport, OrderedMesh, RayScene, flat::world_metres};
 use crate::{RenderError, cluster, pixel_camera::uniform, texture};
 
@@ -67,6 +68,8 @@ pub(crate) struct MaterialTraits {
 pub(crate) struct Draw {
     pub indices: Range<u32>,
     pub base_vertex: i32,
+    /// Its vertices are those of a pose, in the world.
+    pub posed: bool,
     /// Into the textures of materials.
     pub texture: u32,
     pub material: MaterialTraits,
@@ -105,6 +108,10 @@ pub struct GpuScene {
     pub identity: u64,
     /// Whether pictures depend on scene time.
     pub(crate) animated: bool,
+    /// Whether vertices sway.
+    pub(crate) wind: bool,
+    /// Instances that follow nodes.
+    pub(crate) motion: Option<Arc<Motion>>,
     /// Around all geometry at all times.
     pub(crate) bounds_in_world: Aabb,
 }
@@ -117,7 +124,9 @@ impl GpuScene {
     pub fn upload(gpu: &Arc<Gpu>, scene: &Scene) -> Result<Self, RenderError> {
         check_sizes(gpu, scene)?;
         let ordered = OrderedMesh::all(scene);
-        let geometry = Geometry::gather(scene, &ordered);
+        let motion = Motion::of(gpu, scene);
+        let boxes = scene.bounds_of_instances();
+        let geometry = Geometry::gather(scene, &ordered, motion.as_deref(), &boxes);
         let samplers = texture::samplers(gpu);
         let white = texture::upload(gpu, &texture::white());
         let uploaded: Vec<_> = scene.textures.iter().map(|t| texture::upload(gpu, t)).collect();
@@ -136,14 +145,16 @@ impl GpuScene {
             background_linear: scene.background_linear,
             illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
             light_count: scene.illumination.lights.len(),
-            rays: RayScene::of(gpu, scene, &ordered),
+            rays: RayScene::of(gpu, scene, &ordered, motion.clone()),
             highlights: [
                 scene.materials.iter().any(|m| m.phong_specular > 0.0 && !m.unlit),
                 scene.materials.iter().any(Material::is_specular),
             ],
             identity: NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed),
-            animated: scene.wind.is_some(),
-            bounds_in_world: scene.bounds(),
+            animated: scene.wind.is_some() || scene.is_animated(),
+            wind: scene.wind.is_some(),
+            motion,
+            bounds_in_world: Aabb::of_boxes(&boxes),
             draws: geometry.draws,
         })
     }
@@ -158,8 +169,9 @@ impl GpuScene {
             self.textures.iter().flatten().map(|(view, _)| view.texture()).collect();
         textures.sort_unstable();
         textures.dedup();
+        let posed = self.motion.as_ref().map_or(0, |motion| motion.bytes());
         let of_textures: u64 = textures.into_iter().map(gpu::texture_bytes).sum();
-        buffers.map(wgpu::Buffer::size).iter().sum::<u64>() + of_textures + self.rays.bytes()
+        buffers.map(wgpu::Buffer::size).iter().sum::<u64>() + of_textures + self.rays.bytes() + posed
     }
 
     /// Whether some surface has highlights.
@@ -198,6 +210,7 @@ impl GpuScene {
 
 fn check_sizes(gpu: &Gpu, scene: &Scene) -> Result<(), GpuError> {
     let vertices: usize = scene.meshes.iter().map(|mesh| mesh.vertices.len()).sum();
+    let vertices = vertices.max(Motion::vertex_count(scene));
     let bytes = (vertices * size_of::<scene::Vertex>()) as u64;
     GpuError::check_limit("the scene's vertices (bytes)", bytes, gpu.device.limits().max_buffer_size)?;
     GpuError::check_limit("the scene's lights", scene.illumination.lights.len() as u64, MAX_LIGHTS as u64)?;
@@ -216,15 +229,24 @@ struct Geometry {
     textures: IndexSet<[Option<TextureUse>; 5]>,
 }
 
+/// An instance that moves: the first of its posed vertices, and where it is over all moments.
+#[derive(Clone, Copy)]
+struct Moving {
+    base_vertex: i32,
+    bounds_in_world: Aabb,
+}
+
 impl Geometry {
-    fn gather(scene: &Scene, ordered: &[OrderedMesh<'_>]) -> Self {
+    fn gather(scene: &Scene, ordered: &[OrderedMesh<'_>], motion: Option<&Motion>, boxes: &[Aabb]) -> Self {
         let mut geometry = Self::default();
         let is_mapped = scene.materials.iter().any(Material::is_mapped);
         for (mesh_number, OrderedMesh { mesh, indices, clusters, .. }) in ordered.iter().enumerate() {
             let placements = scene.instances.iter().enumerate().filter(|(_, i)| i.mesh as usize == mesh_number);
             for (number, instance) in placements {
+                let first_posed = motion.and_then(|motion| motion.place(number as u32)).map(|place| place.start as i32);
+                let moving = first_posed.map(|base_vertex| Moving { base_vertex, bounds_in_world: boxes[number] });
                 for of_one_material in clusters.chunk_by(|a, b| a.material == b.material) {
-                    geometry.add(scene, of_one_material, number as u32, &instance.world_from_mesh);
+                    geometry.add(scene, of_one_material, number as u32, &instance.world_from_mesh, moving);
                 }
             }
             geometry.vertices.extend(&mesh.vertices);
@@ -240,23 +262,33 @@ impl Geometry {
     }
 
     /// Adds neighbouring clusters of one material where an instance places them.
-    fn add(&mut self, scene: &Scene, clusters: &[cluster::Cluster], instance: u32, world_from_mesh: &Affine3A) {
+    fn add(
+        &mut self,
+        scene: &Scene,
+        clusters: &[cluster::Cluster],
+        instance: u32,
+        world_from_mesh: &Affine3A,
+        moving: Option<Moving>,
+    ) {
         let material = &scene.materials[clusters[0].material as usize];
         let reach_m = scene.wind.map_or(0.0, |wind: Wind| wind.amplitude_m.abs());
         let (indices, base_vertex) = (self.indices.len() as u32, self.vertices.len() as i32);
         let object = self.objects.len() as u32;
         let (texture, _) = self.textures.insert_full(material.textures());
-        self.objects.push(gpu_object(world_from_mesh, material, instance));
+        // A pose's vertices are in the world already.
+        let world_from_vertices = if moving.is_some() { &Affine3A::IDENTITY } else { world_from_mesh };
+        self.objects.push(gpu_object(world_from_vertices, material, instance));
         self.draws.extend(clusters.iter().map(|cluster| {
             let corners = cluster.bounds_in_mesh.corners().map(|corner| world_from_mesh.transform_point3(corner));
             let first_index = indices + cluster.first_triangle * 3;
             Draw {
                 indices: first_index..first_index + cluster.triangle_count * 3,
-                base_vertex,
+                base_vertex: moving.map_or(base_vertex, |moving| moving.base_vertex),
+                posed: moving.is_some(),
                 texture: texture as u32,
                 material: MaterialTraits::of(material),
                 object,
-                bounds_in_world: Aabb::around(corners).padded(reach_m),
+                bounds_in_world: moving.map_or(Aabb::around(corners).padded(reach_m), |moving| moving.bounds_in_world),
             }
         }));
     }

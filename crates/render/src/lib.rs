@@ -22,6 +22,7 @@ mod layers;
 mod layout_tests;
 mod lighting;
 mod material;
+mod motion;
 mod pieces;
 mod pixel_camera;
 mod pixel_list;

@@ -153,7 +153,7 @@ impl Raster {
             shading: batch.work.lighting.highlight(),
             surface_id: surfaces.iter().any(|target| target.surface_ids.is_some()),
             depth_only: false,
-            wind: scene.animated,
+            wind: scene.wind,
             redundancy: predecessors.map(|images| images.variant),
         };
         let front = RasterVariant { depth_only: true, redundancy: None, ..shown };
@@ -163,8 +163,10 @@ impl Raster {
             self.groups(&pass, &batch.work, cameras, predecessors)
         });
         let groups = groups.transpose()?;
+        let posed = scene.motion.as_ref().map(|motion| motion.at(batch.work.scene_time_s));
+        let posed = posed.as_ref().map(|posed| posed.buffers(&self.gpu));
         for (place, (camera, target)) in (0..).zip(cameras.iter().zip(surfaces)) {
-            let view = View { scene, place, camera, groups: groups.as_ref() };
+            let view = View { scene, posed, place, camera, groups: groups.as_ref() };
             if predecessors.is_some() {
                 self.draw_in_slices(frame, &view, front, &[], &target.views.front_depth)?;
             }
@@ -219,7 +221,7 @@ impl Raster {
     fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        &View { scene, place, camera, groups }: &View<'_>,
+        &View { scene, posed, place, camera, groups }: &View<'_>,
         variant: RasterVariant,
         runs: &[Run],
     ) -> Result<(), RenderError> {
@@ -227,16 +229,18 @@ impl Raster {
         // Layers of a set are as large as its largest image.
         let size = camera.size_px.as_vec2();
         pass.set_viewport(0.0, 0.0, size.x, size.y, 0.0, 1.0);
-        pass.set_vertex_buffer(0, scene.vertices.slice(..));
-        pass.set_vertex_buffer(1, scene.details.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.set_bind_group(0, &*groups.scene, &[place * CAMERA_STRIDE]);
         if let Some(known) = groups.known.as_ref().filter(|_| variant.redundancy.is_some()) {
             pass.set_bind_group(KNOWN_GROUP, &**known, &[]);
         }
-        let (mut material, mut texture, mut object) = (None, None, None);
+        let (mut material, mut texture, mut object, mut vertices) = (None, None, None, None);
         for run in runs {
             let draw = &scene.draws[run.draw];
+            let buffers = posed.filter(|_| draw.posed).unwrap_or([&scene.vertices, &scene.details]);
+            if vertices.replace(buffers) != Some(buffers) {
+                (0..).zip(buffers).for_each(|(slot, buffer)| pass.set_vertex_buffer(slot, buffer.slice(..)));
+            }
             if material.replace(draw.material) != Some(draw.material) {
                 let variant = RasterVariant { material: draw.material, ..variant };
                 pass.set_pipeline(self.passes.get(&variant)?.pipeline());
@@ -300,6 +304,8 @@ impl RasterCamera {
 /// A camera of a batch, and what is drawn into its targets.
 struct View<'r> {
     scene: &'r GpuScene,
+    /// The vertices of instances that move, and their details.
+    posed: Option<[&'r wgpu::Buffer; 2]>,
     /// Among the cameras that are drawn together.
     place: u32,
     camera: &'r PinholeCamera,

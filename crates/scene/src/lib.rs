@@ -1,4 +1,4 @@
-//! Scenes: triangles, materials, lights and wind; import of glTF, OBJ and PLY; procedural scenes;
+//! Scenes: triangles, materials, lights, wind and animation; import of glTF, OBJ and PLY; procedural scenes;
 //! packages for the transfer between nodes.
 //!
 //! World space is right-handed, in metres, +Y up (glTF). Positions are `f32` around
@@ -10,6 +10,9 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod animation;
+mod bounds;
+mod contents;
 mod error;
 mod import;
 mod light_rig;
@@ -17,18 +20,23 @@ mod light_spec;
 mod limits;
 mod model;
 mod package;
+mod pose;
 pub mod procedural;
 mod spec;
 mod texture_use;
 mod validate;
+mod validate_animation;
 
+pub use animation::{
+    Animation, Channel, Clip, Influence, Interpolation, Joint, MovingInstance, Node, NodeTransform, Property,
+    TransformParts, UnknownClip,
+};
 pub use depth_image::{Environment, Illumination, Light, LightError};
 pub use error::{SceneError, SceneErrorKind};
 pub use import::{MissingTextures, MissingTexturesError, load_file};
 pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorKind};
-pub use limits::Limits;
+pub use limits::{Limits, MAX_COORDINATE_M};
 pub use model::*;
 pub use package::{pack, unpack};
 pub use spec::{BUILT_IN_NAMES, SceneSpec, SceneSpecError};
 pub use texture_use::{TextureUse, Wrap};
-pub use validate::MAX_COORDINATE_M;

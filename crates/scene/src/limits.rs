@@ -1,5 +1,8 @@
 //! Limits on the size of a scene.
 
+/// Coordinates beyond this are refused: products of four edge lengths must stay finite in `f32`.
+pub const MAX_COORDINATE_M: f32 = 1e9;
+
 /// Bounds that are checked before memory is allocated. The defaults admit a scene of several gigabytes; a service for
 /// untrusted scenes needs lower bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,7 +17,7 @@ pub struct Limits {
     pub texture_side_px: u32,
     /// Bytes of all decoded textures together.
     pub texture_bytes: u64,
-    /// Nodes of a glTF scene.
+    /// Nodes of a glTF scene; joints of all its skinned meshes.
     pub nodes: u64,
     /// Nodes between a glTF scene and a mesh.
     pub node_depth: u32,
@@ -24,6 +27,8 @@ pub struct Limits {
     pub json_objects: u64,
     /// Materials and cameras, each.
     pub attributes: u64,
+    /// Keys of all channels of all clips.
+    pub keys: u64,
     /// Light sources. Each has a byte of visibility in every sample.
     pub lights: u64,
 }
@@ -41,6 +46,7 @@ impl Default for Limits {
             instances: 200_000,
             json_objects: 2_000_000,
             attributes: 65_536,
+            keys: 16_000_000,
             lights: 255,
         }
     }

@@ -1,10 +1,11 @@
 //! The scene as plain data, equal on every node.
 
-use depth_image::{Aabb, Illumination};
+use depth_image::Illumination;
 use glam::{Affine3A, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::TextureUse;
+use crate::animation::{Animation, UnknownClip};
 
 /// A renderable scene. All indices of a scene from this crate are valid.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -25,31 +26,15 @@ pub struct Scene {
     pub background_linear: Vec3,
     /// Cameras that the source file listed.
     pub cameras: Vec<SourceCamera>,
-    /// Motion as a function of scene time; `None` for a static scene.
+    /// Sway as a function of scene time; `None` without wind.
     pub wind: Option<Wind>,
+    /// Motion by nodes, joints and clips; `None` for a scene without it.
+    pub animation: Option<Animation>,
     /// The point of the source file's space that became the world's origin.
     pub origin_in_source: DVec3,
 }
 
 impl Scene {
-    /// The box around all surfaces at every scene time, including the wind's sway. Empty for a scene without vertices.
-    #[must_use]
-    pub fn bounds(&self) -> Aabb {
-        let boxes = self.instances.iter().filter_map(|instance| {
-            let mesh = self.meshes.get(instance.mesh as usize)?;
-            Some(self.mesh_bounds_in_world(mesh, instance.world_from_mesh))
-        });
-        boxes.filter(|b| !b.is_empty()).fold(Aabb::EMPTY, |all, b| all.grown_to(b.min).grown_to(b.max))
-    }
-
-    fn mesh_bounds_in_world(&self, mesh: &Mesh, world_from_mesh: Affine3A) -> Aabb {
-        let points = mesh.vertices.iter().map(|v| world_from_mesh.transform_point3(Vec3::from(v.position)));
-        let at_rest = Aabb::around(points);
-        let sway = mesh.vertices.iter().fold(0.0f32, |most, v| most.max(v.sway));
-        let reach = self.wind.map_or(Vec3::ZERO, |w| (w.direction_in_world * w.amplitude_m * sway).abs());
-        Aabb { min: at_rest.min - reach, max: at_rest.max + reach }
-    }
-
     /// Triangles as drawn: a mesh's count once for each of its instances.
     #[must_use]
     pub fn triangle_count(&self) -> u64 {
@@ -57,11 +42,36 @@ impl Scene {
         self.instances.iter().map(|i| of(i.mesh)).sum()
     }
 
+    /// Plays the first clip of a name.
+    ///
+    /// # Errors
+    /// When no clip has the name: lists all.
+    pub fn play(&mut self, name: &str) -> Result<(), UnknownClip> {
+        let clips = self.animation.as_ref().map_or(&[][..], |animation| &animation.clips);
+        let names = || clips.iter().map(|clip| clip.name.clone()).collect();
+        let number = clips.iter().position(|clip| clip.name == name);
+        let number = number.ok_or_else(|| UnknownClip { name: name.to_owned(), clips: names() })?;
+        self.animation.iter_mut().for_each(|animation| animation.playing = Some(number as u32));
+        Ok(())
+    }
+
     /// Returns whether the picture depends on scene time.
     #[must_use]
     pub fn is_animated(&self) -> bool {
-        self.wind.is_some_and(|w| w.amplitude_m > 0.0)
-            && self.meshes.iter().any(|m| m.vertices.iter().any(|v| v.sway > 0.0))
+        self.period_s().is_some()
+    }
+
+    /// The time after which the motion repeats, seconds: that of the clip that plays, or else of the wind. `None` where
+    /// nothing moves.
+    #[must_use]
+    pub fn period_s(&self) -> Option<f32> {
+        let sways = |wind: &Wind| {
+            let has_effect = wind.amplitude_m > 0.0 && wind.frequency_hz != 0.0;
+            has_effect && self.meshes.iter().any(|m| m.vertices.iter().any(|v| v.sway > 0.0))
+        };
+        let of_clip = self.animation.as_ref().and_then(Animation::period_s);
+        of_clip
+            .or_else(|| self.wind.filter(sways).map(|wind| wind.frequency_hz.abs().recip()).filter(|s| s.is_finite()))
     }
 }
 

@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Fault, at_most};
-use crate::{Instance, Limits, Material, Mesh, MeshPart, Scene, SceneError, SourceCamera, Texture, Wind};
+use crate::{Animation, Instance, Limits, Material, Mesh, MeshPart, Scene, SceneError, SourceCamera, Texture, Wind};
 
 #[cfg(target_endian = "big")]
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");
@@ -34,6 +34,7 @@ struct Header {
     background_linear: Vec3,
     cameras: Vec<SourceCamera>,
     wind: Option<Wind>,
+    animation: Option<Animation>,
     origin_in_source: DVec3,
 }
 
@@ -115,6 +116,7 @@ fn header_of(scene: &Scene) -> Header {
         background_linear: scene.background_linear,
         cameras: scene.cameras.clone(),
         wind: scene.wind,
+        animation: scene.animation.clone(),
         origin_in_source: scene.origin_in_source,
     }
 }
@@ -160,6 +162,7 @@ fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Re
         background_linear: header.background_linear,
         cameras: header.cameras,
         wind: header.wind,
+        animation: header.animation,
         origin_in_source: header.origin_in_source,
     })
 }

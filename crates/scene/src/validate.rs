@@ -4,13 +4,11 @@ use depth_image::LightError;
 use glam::{Affine3A, Vec3};
 
 use crate::error::{Fault, at_most};
+use crate::limits::MAX_COORDINATE_M;
 use crate::{
     Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SceneError, SourceCamera, Texture, TextureUse, Vertex,
     VertexDetail, Wind,
 };
-
-/// Coordinates beyond this are refused: products of four edge lengths must stay finite in `f32`.
-pub const MAX_COORDINATE_M: f32 = 1e9;
 
 /// Smallest determinant relative to the cube of the largest column that counts as invertible.
 const MIN_RELATIVE_DETERMINANT: f32 = 1e-12;
@@ -34,6 +32,7 @@ impl Scene {
         each("camera", &self.cameras, check_camera)?;
         require(is_radiance(self.background_linear), "background", "negative or not finite")?;
         self.wind.as_ref().map_or(Ok(()), check_wind)?;
+        self.check_animation(limits)?;
         require(self.origin_in_source.is_finite(), "origin", "not finite")
     }
 
@@ -67,16 +66,16 @@ impl Scene {
     }
 }
 
-fn each<T>(kind: &str, items: &[T], check: impl Fn(&T) -> Result<(), String>) -> Result<(), Fault> {
+pub(crate) fn each<T>(kind: &str, items: &[T], check: impl Fn(&T) -> Result<(), String>) -> Result<(), Fault> {
     let mut numbered = items.iter().enumerate();
     numbered.try_for_each(|(i, item)| check(item).map_err(|why| Fault::malformed(format!("{kind} {i}"), why)))
 }
 
-fn require(holds: bool, element: &str, reason: &str) -> Result<(), Fault> {
+pub(crate) fn require(holds: bool, element: &str, reason: &str) -> Result<(), Fault> {
     if holds { Ok(()) } else { Err(Fault::malformed(element, reason)) }
 }
 
-fn ensure(holds: bool, reason: impl FnOnce() -> String) -> Result<(), String> {
+pub(crate) fn ensure(holds: bool, reason: impl FnOnce() -> String) -> Result<(), String> {
     if holds { Ok(()) } else { Err(reason()) }
 }
 

@@ -7,6 +7,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use samples::compressed::{compressed_cube, diagonals, plain_streams, positions};
+use samples::skinned::Tube;
 use samples::{GltfCube, cube_obj, cube_ply_ascii, cube_ply_binary};
 use scene::procedural::{checker_sphere, unit_cube};
 use scene::{Limits, MissingTextures, load_file, pack, unpack};
@@ -132,18 +133,24 @@ fn glb() {
 
 #[test]
 fn glb_with_other_numbers_in_its_json() {
-    let (dir, cube, mut random) = (tempfile::tempdir().unwrap(), rich_gltf(), Random(11));
+    let cube = rich_gltf();
+    load_with_other_numbers(&cube.json(), &cube.binary, 600);
+}
+
+/// Of 6000 files with other numbers, at least so many must load, and at least so many must not.
+fn load_with_other_numbers(json: &str, binary: &[u8], least: u32) {
+    let (dir, mut random) = (tempfile::tempdir().unwrap(), Random(11));
     let path = dir.path().join("a.glb");
     let (mut loaded, mut slowest) = (0, Duration::ZERO);
     for _ in 0..6000 {
-        let json = with_other_numbers(cube.json().as_bytes(), &mut random);
-        rewrite(&path, &samples::glb(std::str::from_utf8(&json).unwrap(), &cube.binary));
+        let json = with_other_numbers(json.as_bytes(), &mut random);
+        rewrite(&path, &samples::glb(std::str::from_utf8(&json).unwrap(), binary));
         let start = Instant::now();
         loaded += u32::from(load(&path));
         slowest = slowest.max(start.elapsed());
     }
     println!("{loaded} of 6000 loaded, slowest {slowest:?}");
-    assert!((600..5400).contains(&loaded), "{loaded}: both outcomes must be common, or this tests little");
+    assert!((least..6000 - least).contains(&loaded), "{loaded}: both outcomes must be common, or this tests little");
     assert!(slowest < Duration::from_secs(1), "{slowest:?}");
 }
 
@@ -162,6 +169,17 @@ fn compressed_glb() {
     });
     println!("{loaded} loaded, slowest {slowest:?}");
     assert!(loaded > 100 && slowest < Duration::from_secs(1), "{loaded} {slowest:?}");
+}
+
+#[test]
+fn skinned_glb() {
+    load_damaged("a.glb", &skinned().glb(), 4000);
+}
+
+#[test]
+fn skinned_glb_with_other_numbers_in_its_json() {
+    let tube = skinned();
+    load_with_other_numbers(&tube.json(), &tube.binary, 200);
 }
 
 #[test]
@@ -209,13 +227,26 @@ fn ply_binary() {
 fn packages() {
     let mut textured = checker_sphere();
     textured.textures[0] = scene::Texture { width_px: 2, height_px: 2, is_srgb: true, srgba8: vec![9; 16] };
-    for scene in [unit_cube().with_wind(), textured] {
+    let animated = samples::load("a.glb", &skinned().glb()).unwrap();
+    for scene in [unit_cube().with_wind(), textured, animated] {
         damaged(&pack(&scene), 4000, |bytes| {
             if let Ok(scene) = unpack(bytes, &limits()) {
                 scene.validate(&limits()).unwrap();
             }
         });
     }
+}
+
+/// A tube with two clips of all interpolations.
+fn skinned() -> Tube {
+    let mut tube = Tube::bending();
+    let grow = [0., 0., 0., 1., 1., 1., 0., 0., 0., 0., 0., 0., 2., 2., 2., 0., 0., 0.];
+    let slide = [0., 0., 0., 1., 0., 0.];
+    tube.animate(
+        "grow",
+        &[(2, "scale", "CUBICSPLINE", &[0., 2.], &grow), (1, "translation", "STEP", &[0., 1.], &slide)],
+    );
+    tube
 }
 
 /// A cube with lights, cameras, colours, normals, a sparse accessor, and a material with a texture in every place.

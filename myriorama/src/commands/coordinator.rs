@@ -57,7 +57,7 @@ pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
     let listener = listen(args.listen, args.insecure_bind).await?;
     let address = listener.local_addr()?;
     for (scene, offer) in scenes.iter().zip(offers.iter()) {
-        println!("{}: {} triangles offered at http://{address}", offer.name, scene.triangle_count());
+        println!("{}: {}, offered at http://{address}", offer.name, scene.contents());
     }
     drop(scenes);
     let shutdown = CancellationToken::new();

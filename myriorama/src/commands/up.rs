@@ -55,7 +55,7 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     engine.bound_scenes(memory);
     for (scene, offer) in scenes.iter().zip(offers.iter()) {
         engine.put_scene(offer.hash.as_str(), scene)?;
-        println!("{}: {} triangles", offer.name, scene.triangle_count());
+        println!("{}: {}", offer.name, scene.contents());
     }
     // The device and the packages hold the scenes now; the third copy is dropped.
     drop(scenes);

@@ -1,11 +1,17 @@
 //! A scene's triangles in the world, instances written out: what rays are traced against.
 
+use std::borrow::Cow;
+use std::iter::repeat;
+use std::ops::Range;
+use std::sync::Arc;
+
 use depth_image::oct16_from_unit;
 use glam::{Affine3A, Mat3, Vec3};
 use rayon::prelude::*;
 use scene::{Material, Mesh, Scene, Vertex, VertexDetail, Wind};
 
 use crate::cluster::{self, Cluster};
+use crate::motion::Motion;
 
 /// Flag of a triangle whose texture decides where it is.
 pub const ALPHA_TESTED: u32 = 1 << 31;
@@ -84,12 +90,15 @@ pub struct FlatTriangle {
 }
 
 /// All triangles of all instances.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct FlatScene {
     rest_in_world: Vec<Vec3>,
     sway: Vec<f32>,
-    /// Positions depend on scene time where there is any.
-    pub wind: Option<Wind>,
+    wind: Option<Wind>,
+    motion: Option<Arc<Motion>>,
+    /// Of each instance that moves, the first vertex here, and its vertices in a pose.
+    moving: Vec<(usize, Range<usize>)>,
+    /// At rest.
     pub vertices: Vec<FlatVertex>,
     /// One for each vertex, or none.
     pub details: Vec<FlatDetail>,
@@ -99,13 +108,13 @@ pub struct FlatScene {
 
 impl FlatScene {
     /// Writes out the instances, with the details of vertices if they are asked for.
-    pub fn of(scene: &Scene, ordered: &[OrderedMesh<'_>], detailed: bool) -> Self {
-        let mut flat = Self { wind: scene.wind, ..Self::default() };
+    pub fn of(scene: &Scene, ordered: &[OrderedMesh<'_>], motion: Option<Arc<Motion>>, detailed: bool) -> Self {
+        let mut flat = Self { wind: scene.wind, motion, ..Self::default() };
         for (number, instance) in (0..).zip(&scene.instances) {
             let mesh = &ordered[instance.mesh as usize];
             flat.add(scene, number, mesh);
             if detailed {
-                let details = mesh.mesh.details.iter().copied().chain(std::iter::repeat(VertexDetail::default()));
+                let details = mesh.mesh.details.iter().copied().chain(repeat(VertexDetail::default()));
                 let placed = &instance.world_from_mesh;
                 let detail = |(vertex, detail): (&Vertex, _)| FlatDetail::of(vertex, detail, placed);
                 flat.details.extend(mesh.mesh.vertices.iter().zip(details).map(detail));
@@ -118,6 +127,9 @@ impl FlatScene {
         let placed = &scene.instances[number as usize].world_from_mesh;
         let normals = Mat3::from(placed.matrix3).inverse().transpose();
         let first_vertex = self.rest_in_world.len() as u32;
+        if let Some(posed) = self.motion.as_ref().and_then(|motion| motion.place(number)) {
+            self.moving.push((first_vertex as usize, posed));
+        }
         let vertices = &mesh.mesh.vertices;
         self.rest_in_world.extend(vertices.iter().map(|v| placed.transform_point3(v.position.into())));
         self.sway.extend(vertices.iter().map(|v| v.sway));
@@ -136,9 +148,54 @@ impl FlatScene {
 
     /// The positions of all vertices at a scene time.
     pub fn positions_in_world(&self, scene_time_s: f32) -> Vec<Vec3> {
-        let Some(wind) = self.wind else { return self.rest_in_world.clone() };
-        let moved = |(&rest, &sway): (&Vec3, &f32)| rest + wind.displacement_in_world(rest, sway, scene_time_s);
-        self.rest_in_world.par_iter().zip(&self.sway).map(moved).collect()
+        let mut positions = self.rest_in_world.clone();
+        self.for_posed(scene_time_s, |vertex, posed, _| positions[vertex] = posed.position.into());
+        if let Some(wind) = self.wind {
+            let sway = |(at, &sway): (&mut Vec3, &f32)| *at += wind.displacement_in_world(*at, sway, scene_time_s);
+            positions.par_iter_mut().zip(&self.sway).for_each(sway);
+        }
+        positions
+    }
+
+    /// The attributes of all vertices at a scene time: normals turn with joints.
+    pub fn vertices_at(&self, scene_time_s: f32) -> Cow<'_, [FlatVertex]> {
+        let mut vertices = Cow::Borrowed(&self.vertices[..]);
+        self.for_posed(scene_time_s, |vertex, posed, _| {
+            vertices.to_mut()[vertex].normal_oct16 = oct16_from_unit(posed.normal.into());
+        });
+        vertices
+    }
+
+    /// The details of all vertices at a scene time: tangents turn with joints.
+    pub fn details_at(&self, scene_time_s: f32) -> Cow<'_, [FlatDetail]> {
+        let mut details = Cow::Borrowed(&self.details[..]);
+        self.for_posed(scene_time_s, |vertex, posed, detail| {
+            if let Some(own) = details.to_mut().get_mut(vertex) {
+                *own = FlatDetail::of(posed, detail, &Affine3A::IDENTITY);
+            }
+        });
+        details
+    }
+
+    /// Whether anything depends on scene time.
+    pub fn moves(&self) -> bool {
+        self.wind.is_some() || self.turns()
+    }
+
+    /// Whether attributes depend on scene time, besides positions.
+    pub fn turns(&self) -> bool {
+        self.motion.as_ref().is_some_and(|motion| motion.moves())
+    }
+
+    /// Calls `set` with the number, the pose and the posed details of every vertex that has a pose.
+    fn for_posed(&self, scene_time_s: f32, mut set: impl FnMut(usize, &Vertex, VertexDetail)) {
+        let Some(motion) = &self.motion else { return };
+        let posed = motion.at(scene_time_s);
+        for (first, place) in &self.moving {
+            let details = posed.details.iter().skip(place.start).copied().chain(repeat(VertexDetail::default()));
+            let posed = posed.vertices[place.clone()].iter().zip(details);
+            (*first..).zip(posed).for_each(|(vertex, (posed, detail))| set(vertex, posed, detail));
+        }
     }
 }
 

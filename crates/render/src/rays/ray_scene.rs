@@ -14,7 +14,7 @@ use super::bvh::{Bvh, MAX_DEPTH};
 use super::flat::{CORNER_FLAGS, FlatScene, FlatTriangle, MAX_VERTICES, OrderedMesh};
 use super::material_switches::MaterialSwitches;
 use crate::material::{normal_scale, phong_reflector};
-use crate::{few_cores::on_free_cores, texture};
+use crate::{few_cores::on_free_cores, motion::Motion, texture};
 
 /// The making of the tree over a scene's triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -62,16 +62,21 @@ struct Built {
 pub struct Traced {
     pub(crate) nodes: Table,
     pub(crate) corners: Table,
+    attributes: Arc<Attributes>,
     fixed: Arc<Fixed>,
     pub(crate) switches: MaterialSwitches,
     /// The making of the tree.
     pub report: AccelerationReport,
 }
 
-/// Tables that stay while triangles move; a new tree changes the order of triangles.
-struct Fixed {
+/// Tables of vertices, which change where normals turn.
+struct Attributes {
     vertices: Table,
     details: Table,
+}
+
+/// Tables that stay while triangles move; a new tree changes the order of triangles.
+struct Fixed {
     triangles: Table,
     materials: Table,
     texels: Table,
@@ -91,11 +96,11 @@ pub(crate) struct HostTables<'t> {
 
 impl RayScene {
     /// Keeps what trees are made of; nothing is built or uploaded before it is needed.
-    pub(crate) fn of(gpu: &Arc<Gpu>, scene: &Scene, ordered: &[OrderedMesh<'_>]) -> Self {
+    pub(crate) fn of(gpu: &Arc<Gpu>, scene: &Scene, ordered: &[OrderedMesh<'_>], motion: Option<Arc<Motion>>) -> Self {
         let tables = Tables::of(scene);
         Self {
             gpu: gpu.clone(),
-            flat: FlatScene::of(scene, ordered, tables.switches.mapped),
+            flat: FlatScene::of(scene, ordered, motion, tables.switches.mapped),
             tables,
             state: Mutex::default(),
         }
@@ -124,7 +129,7 @@ impl RayScene {
 
     fn moved_to<'s>(&self, scene_time_s: f32, state: &'s mut Option<Built>) -> Result<&'s Built, GpuError> {
         let next = match state.take() {
-            Some(built) if self.flat.wind.is_none() || built.scene_time_s == scene_time_s => built,
+            Some(built) if !self.flat.moves() || built.scene_time_s == scene_time_s => built,
             // Whichever took less time when it was last done.
             Some(built) if built.last_refit.is_none_or(|refit| refit < built.last_build) => {
                 self.refitted(built, scene_time_s)?
@@ -150,7 +155,8 @@ impl RayScene {
         GpuError::check_limit("levels of the tree over the scene", u64::from(bvh.depth), u64::from(MAX_DEPTH))?;
         let took = start.elapsed();
         let fixed = Arc::new(self.fixed(&bvh)?);
-        let traced = self.traced(&bvh, &corners, fixed, took, false)?;
+        let attributes = self.attributes(scene_time_s)?;
+        let traced = self.traced(&bvh, &corners, (attributes, fixed), took, false)?;
         Ok(Built { bvh, scene_time_s, traced, last_refit: None, last_build: took })
     }
 
@@ -165,21 +171,26 @@ impl RayScene {
             return self.built(scene_time_s);
         }
         let took = start.elapsed();
-        let traced = self.traced(&built.bvh, &corners, built.traced.fixed.clone(), took, true)?;
+        let Traced { attributes, fixed, .. } = &*built.traced;
+        let attributes = if self.flat.turns() { self.attributes(scene_time_s)? } else { attributes.clone() };
+        let traced = self.traced(&built.bvh, &corners, (attributes, fixed.clone()), took, true)?;
         Ok(Built { scene_time_s, traced, last_refit: Some(took), ..built })
     }
 
-    /// Attributes and textures; triangles in the order of the tree's leaves.
+    /// Attributes of vertices at a scene time.
+    fn attributes(&self, scene_time_s: f32) -> Result<Arc<Attributes>, GpuError> {
+        let (vertices, details) = (self.flat.vertices_at(scene_time_s), self.flat.details_at(scene_time_s));
+        let (words, details) = (TextureFormat::Rgba32Uint, bytemuck::cast_slice::<_, [u32; 4]>(&details));
+        Ok(Arc::new(Attributes {
+            vertices: Table::new(&self.gpu, "vertex attributes", words, &vertices)?,
+            details: Table::new(&self.gpu, "vertex details", words, details)?,
+        }))
+    }
+
+    /// Attributes of triangles and textures; triangles in the order of the tree's leaves.
     fn fixed(&self, bvh: &Bvh) -> Result<Fixed, GpuError> {
         let words = TextureFormat::Rgba32Uint;
         Ok(Fixed {
-            vertices: Table::new(&self.gpu, "vertex attributes", words, &self.flat.vertices)?,
-            details: Table::new(
-                &self.gpu,
-                "vertex details",
-                words,
-                bytemuck::cast_slice::<_, [u32; 4]>(&self.flat.details),
-            )?,
             triangles: Table::new(&self.gpu, "triangle attributes", words, &self.triangles_of_leaves(bvh))?,
             materials: Table::new(&self.gpu, "materials", words, &self.tables.materials)?,
             texels: Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?,
@@ -190,7 +201,7 @@ impl RayScene {
         &self,
         bvh: &Bvh,
         corners_in_world: &[[Vec3; 3]],
-        fixed: Arc<Fixed>,
+        (attributes, fixed): (Arc<Attributes>, Arc<Fixed>),
         took: Duration,
         refitted: bool,
     ) -> Result<Arc<Traced>, GpuError> {
@@ -209,7 +220,7 @@ impl RayScene {
         };
         tracing::debug!(?report, "rays are ready");
         let switches = self.tables.switches;
-        Ok(Arc::new(Traced { nodes, corners, fixed, switches, report }))
+        Ok(Arc::new(Traced { nodes, corners, attributes, fixed, switches, report }))
     }
 
     /// Three texels a triangle in the order of the tree's leaves: a corner's position, and its number with the
@@ -240,8 +251,8 @@ impl RayScene {
             nodes: &bvh.tree.nodes,
             corners: self.corner_texels(bvh, &self.corners_in_world(scene_time_s)),
             triangles: self.triangles_of_leaves(bvh),
-            vertices: &self.flat.vertices,
-            details: &self.flat.details,
+            vertices: &self.flat.vertices_at(scene_time_s),
+            details: &self.flat.details_at(scene_time_s),
             materials: &self.tables.materials,
             texels: &self.tables.texels,
         }))
@@ -254,14 +265,16 @@ impl RayScene {
 
 impl Traced {
     fn bytes(&self) -> u64 {
-        let Fixed { vertices, details, triangles, materials, texels } = &*self.fixed;
+        let Fixed { triangles, materials, texels } = &*self.fixed;
+        let Attributes { vertices, details } = &*self.attributes;
         let tables = [&self.nodes, &self.corners, vertices, details, triangles, materials, texels];
         tables.map(|table| gpu::texture_bytes(table.texture())).iter().sum()
     }
 
     /// The variables of `traverse.wgsl`.
     pub fn bindings(&self) -> [Binding<'_>; 7] {
-        let Fixed { vertices, details, triangles, materials, texels } = &*self.fixed;
+        let Fixed { triangles, materials, texels } = &*self.fixed;
+        let Attributes { vertices, details } = &*self.attributes;
         [
             Binding::texture("bvh_nodes", &self.nodes),
             Binding::texture("triangle_corners", &self.corners),

@@ -1,5 +1,6 @@
 //! Drawing, rays and light on the software device: closed forms, the scalar reference, and where they fail.
 
+mod animation;
 mod antialias;
 mod closed_forms;
 mod light_failures;

@@ -180,6 +180,7 @@ mod tests {
             details: Vec::new(),
             indices: indices.to_vec(),
             parts: Vec::new(),
+            influences: Vec::new(),
         }
     }
 

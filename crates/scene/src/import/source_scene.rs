@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use glam::{Affine3A, BVec3, DAffine3, DVec3};
 
+use crate::animation::{Animation, Influence, MovingInstance};
 use crate::error::{Fault, at_most};
 use crate::light_rig::{color, color_mut, position_mut};
 use crate::{
@@ -25,6 +26,8 @@ pub(crate) struct SourceScene {
     pub textures: Vec<Texture>,
     pub lights: Vec<SourceLight>,
     pub cameras: Vec<PlacedCamera>,
+    /// Its nodes are in the source's coordinates.
+    pub animation: Option<Animation>,
 }
 
 /// A mesh whose positions are in `positions_in_mesh`; `vertices[i].position` is unset.
@@ -36,6 +39,8 @@ pub(crate) struct SourceMesh {
     pub details: Vec<VertexDetail>,
     pub indices: Vec<u32>,
     pub parts: Vec<MeshPart>,
+    /// The joints of each vertex; empty for a mesh without.
+    pub influences: Vec<Influence>,
 }
 
 /// A placement of a mesh; its transform is invertible.
@@ -78,6 +83,9 @@ impl SourceScene {
             world_from_camera: moved(&source_from_camera),
             fov_y_rad,
         };
+        if let Some(animation) = &mut self.animation {
+            animation.world_from_source = DAffine3::from_translation(-origin_in_source);
+        }
         let scene = Scene {
             name: self.name,
             meshes: self.meshes.into_iter().map(SourceMesh::into_f32).collect(),
@@ -86,6 +94,7 @@ impl SourceScene {
             textures: self.textures,
             illumination: Illumination { lights, ..Illumination::default() },
             cameras: self.cameras.into_iter().map(camera).collect(),
+            animation: self.animation,
             origin_in_source,
             ..Scene::default()
         };
@@ -114,6 +123,9 @@ impl SourceScene {
             let offset = recentring_offset(Box3::around(mesh.positions_in_mesh.iter().copied()));
             if offset != DVec3::ZERO {
                 mesh.positions_in_mesh.iter_mut().for_each(|p| *p -= offset);
+                let moving = moving_instances(&mut self.animation);
+                let of_mesh = moving.filter(|moving| self.instances[moving.instance as usize].mesh == number);
+                of_mesh.for_each(|moving| moving.follow_mesh(&DAffine3::from_translation(offset)));
                 let of_mesh = self.instances.iter_mut().filter(|i| i.mesh == number);
                 of_mesh.for_each(|i| i.source_from_mesh *= DAffine3::from_translation(offset));
             }
@@ -144,16 +156,24 @@ impl SourceScene {
     fn unmirror(&mut self) {
         let mirror_x = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
         let mut mirrored_of = HashMap::new();
-        for instance in &mut self.instances {
+        let mut is_mirrored = vec![false; self.instances.len()];
+        for (instance, is_mirrored) in self.instances.iter_mut().zip(&mut is_mirrored) {
             if instance.source_from_mesh.matrix3.determinant() < 0.0 {
                 instance.mesh = *mirrored_of.entry(instance.mesh).or_insert_with(|| {
                     self.meshes.push(self.meshes[instance.mesh].mirrored_in_x());
                     self.meshes.len() - 1
                 });
                 instance.source_from_mesh *= mirror_x;
+                *is_mirrored = true;
             }
         }
+        let moving = moving_instances(&mut self.animation).filter(|moving| is_mirrored[moving.instance as usize]);
+        moving.for_each(|moving| moving.follow_mesh(&mirror_x));
     }
+}
+
+fn moving_instances(animation: &mut Option<Animation>) -> impl Iterator<Item = &mut MovingInstance> {
+    animation.iter_mut().flat_map(|animation| &mut animation.moving)
 }
 
 impl SourceMesh {
@@ -168,6 +188,11 @@ impl SourceMesh {
             self.details.extend(other.details);
             self.details.resize(vertex_count, VertexDetail::default());
         }
+        if !(self.influences.is_empty() && other.influences.is_empty()) {
+            self.influences.resize(self.vertices.len(), Influence::NONE);
+            self.influences.extend(other.influences);
+            self.influences.resize(vertex_count, Influence::NONE);
+        }
         self.positions_in_mesh.extend(other.positions_in_mesh);
         self.vertices.extend(other.vertices);
         self.indices.extend(other.indices.into_iter().map(|i| i + first_vertex));
@@ -181,6 +206,7 @@ impl SourceMesh {
         self.vertices.push(self.vertices[vertex]);
         self.positions_in_mesh.push(self.positions_in_mesh[vertex]);
         self.details.extend(self.details.get(vertex).copied());
+        self.influences.extend(self.influences.get(vertex).copied());
         copy
     }
 
@@ -232,11 +258,6 @@ fn moved(source_from_x: &DAffine3, origin_in_source: DVec3) -> Affine3A {
     let [x, y, z] = [0, 1, 2].map(|i| source_from_x.matrix3.col(i).as_vec3());
     let translation = (source_from_x.translation - origin_in_source).as_vec3();
     Affine3A::from_cols(x.into(), y.into(), z.into(), translation.into())
-}
-
-pub(crate) fn is_invertible(transform: &DAffine3) -> bool {
-    let largest = (0..3).fold(0f64, |most, i| most.max(transform.matrix3.col(i).length()));
-    transform.is_finite() && (transform.matrix3 * largest.recip()).determinant().abs() > 1e-12
 }
 
 /// Offset that moves `bounds` to the origin, in whole metres unless the bounds are too small.

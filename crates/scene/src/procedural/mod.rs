@@ -10,6 +10,7 @@ mod grass;
 mod lone_tree;
 mod random;
 mod shapes;
+mod snake;
 mod terrain;
 mod tree;
 mod tree_terrain;
@@ -20,6 +21,7 @@ pub use blocks::{BlocksViewpoints, blocks, blocks_viewpoints};
 pub use grass::{GrassDensity, grass};
 pub use lone_tree::lone_tree;
 pub use shapes::{checker_sphere, courtyard, poles, quad, unit_cube, uv_sphere};
+pub use snake::snake;
 pub use tree_terrain::tree_terrain;
 pub use urban::urban;
 
@@ -39,6 +41,7 @@ pub(crate) fn by_name(name: &str) -> Scene {
         "bird-nest" => bird_nest(),
         "urban" => urban(),
         "tree" => lone_tree(),
+        "snake" => snake(),
         _ => unit_cube(),
     }
 }

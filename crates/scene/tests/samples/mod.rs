@@ -2,6 +2,7 @@
 #![allow(dead_code, clippy::unwrap_used)]
 
 pub mod compressed;
+pub mod skinned;
 
 use std::path::PathBuf;
 

@@ -34,9 +34,10 @@ impl<'a> Document<'a> {
         folder: &'a Folder,
         limits: &'a Limits,
     ) -> Result<Self, Fault> {
-        // Positions, normals, tangents, two pairs of coordinates, colours: six elements a vertex; three indices a
-        // triangle.
-        let elements = limits.vertices.saturating_mul(6).saturating_add(limits.triangles.saturating_mul(3));
+        // Positions, normals, tangents, two pairs of coordinates, colours, joints, weights: eight elements a vertex, and four of
+        // further joints; three indices a triangle.
+        let of_triangles = limits.triangles.saturating_mul(3);
+        let elements = limits.vertices.saturating_mul(12).saturating_add(of_triangles).saturating_add(limits.keys);
         let elements_left = Cell::new(elements);
         let mut document = Self { root, limits, folder, buffers: Vec::new(), decoded_views: Vec::new(), elements_left };
         for (number, buffer) in root.buffers.iter().enumerate() {
@@ -123,6 +124,11 @@ impl<'a> Document<'a> {
     /// Components of an accessor: 3 or 4 for colours.
     pub(super) fn component_count(&self, index: Index<Accessor>, element: &str) -> Result<usize, Fault> {
         Ok(self.layout(index, element)?.components)
+    }
+
+    /// Elements of an accessor, before they are read.
+    pub(super) fn element_count(&self, index: Index<Accessor>, element: &str) -> Result<u64, Fault> {
+        Ok(self.layout(index, element)?.count)
     }
 
     /// An accessor's elements as vertex numbers.
@@ -222,6 +228,13 @@ fn slice_of(bytes: &[u8], offset: u64, length: u64) -> Option<&[u8]> {
     let start = usize::try_from(offset).ok()?;
     let end = usize::try_from(offset.checked_add(length)?).ok()?;
     bytes.get(start..end)
+}
+
+/// The elements of an attribute, as many as there are positions.
+pub(super) fn same_count<T>(items: Vec<T>, needs: usize, what: &str, element: &str) -> Result<Vec<T>, Fault> {
+    let has = items.len();
+    let wrong = || Fault::malformed(element, format!("{what} has {has} elements, POSITION {needs}"));
+    (has == needs).then_some(items).ok_or_else(wrong)
 }
 
 /// Reads one component, little-endian; `bytes` has the component's length.

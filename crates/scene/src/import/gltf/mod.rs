@@ -4,7 +4,8 @@
 //! used. The crate's own validation and readers are not called: both index without checking
 //! (`primitive_validate_hook`, `accessor::Iter`), which a malformed file turns into a panic.
 //!
-//! `docs/formats.md` lists what is read, what is not, and what happens then.
+//! `docs/formats.md` lists what is read, what is not, and what happens then. Nodes that an animation moves and skins become the
+//! scene's animation, whose first clip plays. Lamps and cameras stay at rest, and so do morph targets, with a warning.
 //!
 //! Factors of materials are clamped to their range. A factor that is not finite is refused, as is an invalid light.
 //!
@@ -14,12 +15,15 @@
 //! the sum is within two stops of white, lights stay unchanged. Otherwise one factor makes the sum white, which keeps
 //! the lights' ratios. Emissive surfaces are not exposed: in files they are relative to white already.
 
+mod animation;
+mod channels;
 mod compressed;
 mod document;
 mod lights;
 mod materials;
 mod nodes;
 mod primitives;
+mod skins;
 mod texture_coordinates;
 
 use gltf::binary::Glb;
@@ -64,7 +68,8 @@ pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<Sou
     let mut scene = SourceScene::default();
     materials::read(&document, &mut scene)?;
     read_meshes(&document, &mut scene)?;
-    nodes::read(&root, limits, &mut scene)?;
+    let tree = nodes::read(&root, limits, &mut scene)?;
+    animation::read(&document, &tree, &mut scene)?;
     lights::expose(&mut scene);
     Ok(scene)
 }
@@ -121,6 +126,9 @@ fn read_meshes(document: &Document, scene: &mut SourceScene) -> Result<(), Fault
             let element = format!("mesh {number}, primitive {part}");
             let coordinates = Coordinates::of_material(document.root, primitive.material)?;
             let material = materials::material_number(document.root, primitive.material, &element)?;
+            if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
+                tracing::warn!("{element}: its morph targets are shown at rest");
+            }
             if let Some(geometry) = primitives::read(document, primitive, &coordinates, &element)? {
                 merged.append_part(geometry, material);
             }

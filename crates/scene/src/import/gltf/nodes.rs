@@ -2,20 +2,22 @@
 
 use std::collections::HashSet;
 
-use glam::{DAffine3, DMat4, DQuat, DVec3, Mat4, Quat, Vec3};
+use glam::{DAffine3, DMat4, DVec3, Mat4, Quat, Vec3};
 use gltf::json::{Index, Node, Root, Scene as JsonScene};
 
-use super::super::source_scene::{PlacedCamera, SourceInstance, SourceScene, is_invertible};
+use super::super::source_scene::{PlacedCamera, SourceInstance, SourceScene};
 use super::lights;
 use crate::Limits;
+use crate::animation::{TransformParts, is_invertible};
 use crate::error::{Fault, at_most};
 
 /// Walks the default scene, else the first, else all nodes without a parent. A node reached twice is in a cycle or has
 /// two parents; glTF allows neither.
-pub(super) fn read(root: &Root, limits: &Limits, scene: &mut SourceScene) -> Result<(), Fault> {
+pub(super) fn read(root: &Root, limits: &Limits, scene: &mut SourceScene) -> Result<NodeTree, Fault> {
     let mut is_visited = vec![false; root.nodes.len()];
-    let mut pending: Vec<_> = roots(root)?.into_iter().map(|node| (node, DAffine3::IDENTITY, 0u32)).collect();
-    while let Some((index, source_from_parent, depth)) = pending.pop() {
+    let mut tree = NodeTree::default();
+    let mut pending: Vec<_> = roots(root)?.into_iter().map(|node| (node, None, DAffine3::IDENTITY, 0u32)).collect();
+    while let Some((index, parent, source_from_parent, depth)) = pending.pop() {
         let element = format!("node {}", index.value());
         let node = root.get(index).ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
         at_most(format!("{element}, depth"), u64::from(depth), limits.node_depth.into())?;
@@ -23,11 +25,31 @@ pub(super) fn read(root: &Root, limits: &Limits, scene: &mut SourceScene) -> Res
             return Err(Fault::malformed(element, "it is reached twice: a cycle, or two parents"));
         }
         let source_from_node = source_from_parent * parent_from_node(node, &element)?;
+        let instance = scene.instances.len();
         add_contents(root, node, &Place { element, source_from_node }, scene)?;
+        let instance = (scene.instances.len() > instance).then_some(instance);
         let children = node.children.iter().flatten();
-        pending.extend(children.map(|&child| (child, source_from_node, depth + 1)));
+        pending.extend(children.map(|&child| (child, Some(tree.nodes.len()), source_from_node, depth + 1)));
+        tree.nodes.push(PlacedNode { number: index.value(), parent, instance, source_from_node });
     }
-    Ok(())
+    Ok(tree)
+}
+
+/// The nodes of the scene; parents come before their children.
+#[derive(Default)]
+pub(super) struct NodeTree {
+    pub nodes: Vec<PlacedNode>,
+}
+
+/// A node of the scene at rest.
+pub(super) struct PlacedNode {
+    /// In the file.
+    pub number: usize,
+    /// In the tree.
+    pub parent: Option<usize>,
+    /// The placement of its mesh, if it has triangles. Whether it has to be invertible depends on clips and skins.
+    pub instance: Option<usize>,
+    pub source_from_node: DAffine3,
 }
 
 fn roots(root: &Root) -> Result<Vec<Index<Node>>, Fault> {
@@ -58,7 +80,6 @@ fn add_contents(root: &Root, node: &Node, place: &Place, scene: &mut SourceScene
     if let Some(mesh) = node.mesh.map(|mesh| mesh.value()) {
         let missing = || Fault::malformed(&place.element, format!("mesh {mesh} does not exist"));
         if !scene.meshes.get(mesh).ok_or_else(missing)?.indices.is_empty() {
-            place.require_invertible()?;
             scene.instances.push(SourceInstance { mesh, source_from_mesh: place.source_from_node });
         }
     }
@@ -71,7 +92,7 @@ fn add_contents(root: &Root, node: &Node, place: &Place, scene: &mut SourceScene
     Ok(())
 }
 
-fn parent_from_node(node: &Node, element: &str) -> Result<DAffine3, Fault> {
+pub(super) fn parent_from_node(node: &Node, element: &str) -> Result<DAffine3, Fault> {
     let transform = match node.matrix {
         Some(matrix) => affine_from(Mat4::from_cols_array(&matrix).as_dmat4()),
         None => from_parts(node),
@@ -80,18 +101,24 @@ fn parent_from_node(node: &Node, element: &str) -> Result<DAffine3, Fault> {
     transform.ok_or_else(|| Fault::malformed(element, "its transform is not finite, not affine, or has no rotation"))
 }
 
-fn affine_from(matrix: DMat4) -> Option<DAffine3> {
+pub(super) fn affine_from(matrix: DMat4) -> Option<DAffine3> {
     let is_affine = (matrix.row(3) - glam::DVec4::W).abs().max_element() < 1e-6;
     is_affine.then(|| DAffine3::from_mat4(matrix))
 }
 
 fn from_parts(node: &Node) -> Option<DAffine3> {
-    let scale = node.scale.map_or(DVec3::ONE, |s| Vec3::from(s).as_dvec3());
-    let translation = node.translation.map_or(DVec3::ZERO, |t| Vec3::from(t).as_dvec3());
-    let rotation = node.rotation.map_or(DQuat::IDENTITY, |r| Quat::from_array(r.0).as_dquat());
-    let length = rotation.length();
-    let is_usable = length > 1e-6 && length.is_finite();
-    is_usable.then(|| DAffine3::from_scale_rotation_translation(scale, rotation / length, translation))
+    let parts = parts_of(node);
+    let length = parts.rotation.as_dquat().length();
+    (length > 1e-6 && length.is_finite()).then(|| parts.parent_from_node())
+}
+
+/// The parts of a node's transform as in the file; a rotation may have any length.
+pub(super) fn parts_of(node: &Node) -> TransformParts {
+    TransformParts {
+        translation: node.translation.map_or(Vec3::ZERO, Vec3::from),
+        rotation: node.rotation.map_or(Quat::IDENTITY, |r| Quat::from_array(r.0)),
+        scale: node.scale.map_or(Vec3::ONE, Vec3::from),
+    }
 }
 
 /// `None` for an orthographic camera. The pose is rigid: a node's scale does not affect a view.

@@ -10,7 +10,8 @@ use gltf::json::validation::Checked;
 use super::super::normals;
 use super::super::source_scene::{SourceMesh, plain_vertex};
 use super::super::tangents;
-use super::document::Document;
+use super::document::{Document, same_count};
+use super::skins;
 use super::texture_coordinates::{Coordinates, UvSource};
 use crate::error::Fault;
 use crate::{Vertex, VertexDetail};
@@ -36,7 +37,8 @@ pub(super) fn read(
     let (vertices, has_normals) = attributes.vertices(positions.len(), &coordinates.first)?;
     let details = attributes.details(positions.len(), coordinates)?;
     let positions_in_mesh: Vec<_> = positions.iter().map(|p| Vec3::from(*p).as_dvec3()).collect();
-    let mut mesh = SourceMesh { vertices, details, positions_in_mesh, indices, parts: Vec::new() };
+    let influences = skins::influences(document, primitive, &indices, positions.len(), element)?;
+    let mut mesh = SourceMesh { vertices, details, positions_in_mesh, indices, parts: Vec::new(), influences };
     drop_unused(&mut mesh);
     if mesh.positions_in_mesh.iter().all(|p| p.is_finite()) {
         normals::complete(&mut mesh, has_normals, normals::FLAT);
@@ -125,6 +127,8 @@ fn drop_unused(mesh: &mut SourceMesh) {
     mesh.details.retain(|_| at.next() != Some(&UNUSED));
     let mut at = new_number.iter();
     mesh.positions_in_mesh.retain(|_| at.next() != Some(&UNUSED));
+    let mut at = new_number.iter();
+    mesh.influences.retain(|_| at.next() != Some(&UNUSED));
     mesh.indices.iter_mut().for_each(|i| *i = new_number[*i as usize]);
 }
 
@@ -140,12 +144,6 @@ fn linear_colors(document: &Document, index: Index<Accessor>, element: &str) -> 
 fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {
     let [r, g, b] = [r, g, b].map(srgb8_from_linear);
     [r, g, b, (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
-}
-
-fn same_count<T>(items: Vec<T>, needs: usize, what: &str, element: &str) -> Result<Vec<T>, Fault> {
-    let has = items.len();
-    let wrong = || Fault::malformed(element, format!("{what} has {has} elements, POSITION {needs}"));
-    (has == needs).then_some(items).ok_or_else(wrong)
 }
 
 fn triangles(

@@ -1,0 +1,189 @@
+//! The moving part of a scene: instances below nodes that clips move, and skinned meshes.
+
+use glam::DAffine3;
+use gltf::json::{Index, Node as JsonNode, skin::Skin};
+
+use super::super::source_scene::{SourceMesh, SourceScene};
+use super::document::Document;
+use super::nodes::{NodeTree, PlacedNode, parent_from_node, parts_of};
+use super::{channels, skins};
+use crate::animation::{
+    Animation, Clip, Influence, Joint, MovingInstance, Node, NodeTransform, TransformParts, is_invertible,
+};
+use crate::error::{Fault, at_most};
+
+/// Reads clips and skins. A scene in which no mesh follows them has no animation.
+pub(super) fn read(document: &Document, tree: &NodeTree, scene: &mut SourceScene) -> Result<(), Fault> {
+    let clips = channels::read(document)?;
+    let moving = moving_instances(document, tree, &clips, scene)?;
+    if moving.is_empty() {
+        return Ok(());
+    }
+    let mut animation = Animation { clips, moving, ..Animation::default() };
+    animation.playing = (!animation.clips.is_empty()).then_some(0);
+    keep_needed_nodes(document, tree, &mut animation)?;
+    scene.animation = Some(animation);
+    Ok(())
+}
+
+/// All instances that move or are skinned. `Joint::node` is the node's place in the tree.
+fn moving_instances(
+    document: &Document,
+    tree: &NodeTree,
+    clips: &[Clip],
+    scene: &mut SourceScene,
+) -> Result<Vec<MovingInstance>, Fault> {
+    let moves = moving_nodes(document, tree, clips);
+    let mut skins = Skins::of(document, tree);
+    let mut moving = Vec::new();
+    for (place, node) in (0u32..).zip(&tree.nodes) {
+        let Some(instance) = node.instance else { continue };
+        let (joints, influences) = match document.root.nodes[node.number].skin {
+            Some(skin) => {
+                let mesh = &scene.meshes[scene.instances[instance].mesh];
+                let joints = skins.joints(skin, mesh, &format!("node {}", node.number))?;
+                scene.instances[instance].source_from_mesh = at_rest(tree, &joints, &format!("skin {}", skin.value()))?;
+                (joints, mesh.influences.clone())
+            }
+            None if moves[place as usize] => {
+                // A clip may grow what has no size at rest: only the place at rest is left.
+                let at_rest = &mut scene.instances[instance].source_from_mesh;
+                if !is_invertible(at_rest) {
+                    *at_rest = DAffine3::from_translation(at_rest.translation);
+                }
+                (vec![Joint { node: place, joint_from_mesh: DAffine3::IDENTITY }], Vec::new())
+            }
+            None if is_invertible(&node.source_from_node) => continue,
+            None => {
+                let element = format!("node {}", node.number);
+                return Err(Fault::malformed(element, "its transform is singular or not finite"));
+            }
+        };
+        moving.push(MovingInstance { instance: instance as u32, joints, influences });
+    }
+    Ok(moving)
+}
+
+/// Reads skins. What all skinned meshes take is counted, for a small file may place one mesh often.
+struct Skins<'d> {
+    document: &'d Document<'d>,
+    /// Of each node of the file.
+    place_in_tree: Vec<Option<u32>>,
+    joints_left: u64,
+    influences_left: u64,
+}
+
+impl<'d> Skins<'d> {
+    fn of(document: &'d Document<'d>, tree: &NodeTree) -> Self {
+        let mut place_in_tree = vec![None; document.root.nodes.len()];
+        tree.nodes.iter().zip(0..).for_each(|(node, place)| place_in_tree[node.number] = Some(place));
+        let (joints_left, influences_left) = (document.limits.nodes, document.limits.vertices);
+        Self { document, place_in_tree, joints_left, influences_left }
+    }
+
+    /// The joints of a skin, which the mesh of a node fits.
+    fn joints(&mut self, index: Index<Skin>, mesh: &SourceMesh, node: &str) -> Result<Vec<Joint>, Fault> {
+        let skin = skins::skin(self.document, index, node)?;
+        let (joints, vertices) = (skin.joints.len() as u64, mesh.vertices.len() as u64);
+        at_most(format_args!("{node}, joints of all skinned meshes"), joints, self.joints_left)?;
+        at_most(format_args!("{node}, vertices of all skinned meshes"), vertices, self.influences_left)?;
+        (self.joints_left, self.influences_left) = (self.joints_left - joints, self.influences_left - vertices);
+        let element = format!("skin {}", index.value());
+        let matrices = skins::bind_matrices(self.document, skin, &element)?;
+        check_influences(&mesh.influences, mesh.vertices.len(), skin.joints.len(), &element)?;
+        let joint = |(number, (joint, joint_from_mesh)): (usize, (&Index<JsonNode>, DAffine3))| {
+            let place = self.place_in_tree.get(joint.value()).copied().flatten();
+            let outside = || {
+                let why = format!("node {} is not in the scene, or in a cycle", joint.value());
+                Fault::malformed(format_args!("{element}, joint {number}"), why)
+            };
+            Ok(Joint { node: place.ok_or_else(outside)?, joint_from_mesh })
+        };
+        skin.joints.iter().zip(matrices).enumerate().map(joint).collect()
+    }
+}
+
+/// Whether each node of the tree is moved by some clip, itself or with its parents.
+fn moving_nodes(document: &Document, tree: &NodeTree, clips: &[Clip]) -> Vec<bool> {
+    let is_target = targets(document, clips);
+    let mut moves: Vec<bool> = Vec::with_capacity(tree.nodes.len());
+    for node in &tree.nodes {
+        moves.push(is_target[node.number] || node.parent.is_some_and(|parent| moves[parent]));
+    }
+    moves
+}
+
+/// Whether each node of the file is the target of a channel. A channel's node exists.
+fn targets(document: &Document, clips: &[Clip]) -> Vec<bool> {
+    let mut is_target = vec![false; document.root.nodes.len()];
+    clips.iter().flat_map(|clip| &clip.channels).for_each(|channel| is_target[channel.node as usize] = true);
+    is_target
+}
+
+/// The placement at rest by the first joint whose scale is not 0: most skins are bound at rest, where all joints agree.
+fn at_rest(tree: &NodeTree, joints: &[Joint], element: &str) -> Result<DAffine3, Fault> {
+    let placed = |joint: &Joint| tree.nodes[joint.node as usize].source_from_node * joint.joint_from_mesh;
+    let usable = joints.iter().map(placed).find(is_invertible);
+    usable.ok_or_else(|| Fault::malformed(element, "the transforms of all its joints are singular or not finite"))
+}
+
+fn check_influences(influences: &[Influence], vertices: usize, joints: usize, skin: &str) -> Result<(), Fault> {
+    let wrong = |vertex: usize, why: String| Err(Fault::malformed(format_args!("{skin}, vertex {vertex}"), why));
+    if influences.len() != vertices {
+        return Err(Fault::malformed(skin, "its mesh has no JOINTS_0 and WEIGHTS_0"));
+    }
+    for (vertex, influence) in influences.iter().enumerate() {
+        if influence.shares().next().is_none() {
+            return wrong(vertex, "it has no JOINTS_0 and WEIGHTS_0".into());
+        }
+        if let Some((joint, _)) = influence.shares().find(|(joint, _)| *joint >= joints) {
+            return wrong(vertex, format!("joint {joint} is beyond the skin's {joints}"));
+        }
+    }
+    Ok(())
+}
+
+/// Copies the nodes that joints follow, with all above them, and renumbers joints and channels. Channels of other nodes
+/// are dropped.
+fn keep_needed_nodes(document: &Document, tree: &NodeTree, animation: &mut Animation) -> Result<(), Fault> {
+    let mut is_needed = vec![false; tree.nodes.len()];
+    let joints = animation.moving.iter().flat_map(|moving| &moving.joints);
+    joints.for_each(|joint| is_needed[joint.node as usize] = true);
+    // Parents come before their children: from the last node on, all that need a parent are known.
+    for place in (0..tree.nodes.len()).rev() {
+        if let Some(parent) = tree.nodes[place].parent.filter(|_| is_needed[place]) {
+            is_needed[parent] = true;
+        }
+    }
+    let is_target = targets(document, &animation.clips);
+    let mut new_number = vec![u32::MAX; tree.nodes.len()];
+    let mut number_of_file = vec![None; document.root.nodes.len()];
+    for (place, PlacedNode { number, parent, .. }) in
+        tree.nodes.iter().enumerate().filter(|(place, _)| is_needed[*place])
+    {
+        let rest = rest_of(&document.root.nodes[*number], is_target[*number], &format!("node {number}"))?;
+        new_number[place] = animation.nodes.len() as u32;
+        number_of_file[*number] = Some(new_number[place]);
+        animation.nodes.push(Node { parent: parent.map(|parent| new_number[parent]), rest });
+    }
+    let joints = animation.moving.iter_mut().flat_map(|moving| &mut moving.joints);
+    joints.for_each(|joint| joint.node = new_number[joint.node as usize]);
+    for clip in &mut animation.clips {
+        clip.channels.retain_mut(|channel| {
+            let number = number_of_file[channel.node as usize];
+            number.inspect(|&number| channel.node = number).is_some()
+        });
+    }
+    Ok(())
+}
+
+/// A node's transform at rest: in parts where a channel moves it.
+fn rest_of(node: &JsonNode, is_target: bool, element: &str) -> Result<NodeTransform, Fault> {
+    let parent_from_node = parent_from_node(node, element)?;
+    if !is_target {
+        return Ok(NodeTransform::Fixed(parent_from_node));
+    }
+    let parts = if node.matrix.is_some() { TransformParts::of(&parent_from_node) } else { parts_of(node) };
+    // Its length has been checked.
+    Ok(NodeTransform::Parts(TransformParts { rotation: parts.rotation.normalize(), ..parts }))
+}

@@ -1,0 +1,137 @@
+//! Clips: what moves which node, and when.
+
+use std::collections::HashMap;
+
+use glam::{Quat, Vec4};
+use gltf::json::animation::{
+    Animation as JsonAnimation, Channel as JsonChannel, Interpolation as Curve, Property as Path, Sampler,
+};
+use gltf::json::validation::Checked;
+
+use super::document::Document;
+use crate::animation::{Channel, Clip, Interpolation, Property};
+use crate::error::{Fault, at_most};
+use crate::validate_animation::check_times;
+
+/// All clips of a file. `Channel::node` is the file's number of the node.
+pub(super) fn read(document: &Document) -> Result<Vec<Clip>, Fault> {
+    at_most("animations", document.root.animations.len() as u64, document.limits.attributes)?;
+    let mut keys_left = document.limits.keys;
+    let animations = document.root.animations.iter().enumerate();
+    animations.map(|(number, animation)| clip(document, number, animation, &mut keys_left)).collect()
+}
+
+fn clip(document: &Document, number: usize, animation: &JsonAnimation, keys_left: &mut u64) -> Result<Clip, Fault> {
+    let name = animation.name.clone().unwrap_or_else(|| format!("animation {number}"));
+    // A node's property has one channel.
+    let mut channels = HashMap::new();
+    let mut morphs = 0;
+    for (place, json) in animation.channels.iter().enumerate() {
+        let element = format!("animation {number}, channel {place}");
+        match property(json, &element)? {
+            Some(property) => {
+                let channel = channel(document, animation, json, property, &element, keys_left)?;
+                if channels.insert((channel.node, channel.property), (place, channel)).is_some() {
+                    return Err(Fault::malformed(element, "an earlier channel moves the same property"));
+                }
+            }
+            None => morphs += 1,
+        }
+    }
+    if morphs > 0 {
+        tracing::warn!("animation {number}: {morphs} channels move morph targets, which are shown at rest");
+    }
+    let mut channels: Vec<_> = channels.into_values().collect();
+    channels.sort_unstable_by_key(|(place, _)| *place);
+    Ok(Clip { name, channels: channels.into_iter().map(|(_, channel)| channel).collect() })
+}
+
+/// `None` for the weights of morph targets.
+fn property(json: &JsonChannel, element: &str) -> Result<Option<Property>, Fault> {
+    match json.target.path {
+        Checked::Valid(Path::Translation) => Ok(Some(Property::Translation)),
+        Checked::Valid(Path::Rotation) => Ok(Some(Property::Rotation)),
+        Checked::Valid(Path::Scale) => Ok(Some(Property::Scale)),
+        Checked::Valid(Path::MorphTargetWeights) => Ok(None),
+        Checked::Invalid => Err(Fault::malformed(
+            format_args!("{element}, target.path"),
+            "neither translation, rotation, scale nor weights",
+        )),
+    }
+}
+
+fn channel(
+    document: &Document,
+    animation: &JsonAnimation,
+    json: &JsonChannel,
+    property: Property,
+    element: &str,
+    keys_left: &mut u64,
+) -> Result<Channel, Fault> {
+    let node = json.target.node;
+    if document.root.get(node).is_none() {
+        return Err(Fault::malformed(element, format!("node {} does not exist", node.value())));
+    }
+    let number = json.sampler.value();
+    let sampler = animation.samplers.get(number);
+    let sampler = sampler.ok_or_else(|| Fault::malformed(element, format!("sampler {number} does not exist")))?;
+    let Checked::Valid(curve) = sampler.interpolation else {
+        return Err(Fault::malformed(format_args!("{element}, interpolation"), "unknown"));
+    };
+    let interpolation = match curve {
+        Curve::Step => Interpolation::Step,
+        Curve::Linear => Interpolation::Linear,
+        Curve::CubicSpline => Interpolation::CubicSpline,
+    };
+    let input = format!("{element}, input");
+    let keys = document.element_count(sampler.input, &input)?;
+    at_most(format_args!("{input}, keys"), keys, *keys_left)?;
+    *keys_left -= keys;
+    let times_s: Vec<f32> = document.floats::<1>(sampler.input, &input)?.into_iter().flatten().collect();
+    check_times(&times_s).map_err(|why| Fault::malformed(input, why))?;
+    let values = values(document, sampler, property, (interpolation, times_s.len()), element)?;
+    Ok(Channel { node: node.value() as u32, property, interpolation, times_s, values })
+}
+
+fn values(
+    document: &Document,
+    sampler: &Sampler,
+    property: Property,
+    (interpolation, keys): (Interpolation, usize),
+    element: &str,
+) -> Result<Vec<Vec4>, Fault> {
+    let output = format!("{element}, output");
+    let wrong = |why: String| Fault::malformed(&output, why);
+    let expected = keys as u64 * interpolation.values_a_key() as u64;
+    let has = document.element_count(sampler.output, &output)?;
+    if has != expected {
+        return Err(wrong(format!("{has} values where its keys need {expected}")));
+    }
+    let mut values: Vec<Vec4> = match property {
+        Property::Rotation => document.floats::<4>(sampler.output, &output)?.into_iter().map(Vec4::from).collect(),
+        _ => {
+            let values = document.floats::<3>(sampler.output, &output)?;
+            values.into_iter().map(|[x, y, z]| Vec4::new(x, y, z, 0.0)).collect()
+        }
+    };
+    if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
+        return Err(wrong(format!("value {bad} is not finite")));
+    }
+    if property == Property::Rotation {
+        make_unit(&mut values, interpolation).map_err(wrong)?;
+    }
+    Ok(values)
+}
+
+/// Makes rotations unit: integers are rounded, and exporters are careless. Slopes stay.
+fn make_unit(values: &mut [Vec4], interpolation: Interpolation) -> Result<(), String> {
+    let stride = interpolation.values_a_key();
+    for (number, value) in values.iter_mut().enumerate().skip(stride / 2).step_by(stride) {
+        let length = value.length();
+        if !(length > 1e-6 && length.is_finite()) {
+            return Err(format!("value {number} is no rotation"));
+        }
+        *value = Quat::from_vec4(*value / length).into();
+    }
+    Ok(())
+}

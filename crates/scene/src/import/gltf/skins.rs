@@ -1,0 +1,103 @@
+//! Skins: joints of vertices, and where meshes are bound to them.
+
+use glam::{DAffine3, Mat4};
+use gltf::json::mesh::{Primitive, Semantic};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, skin::Skin};
+
+use super::document::{Document, same_count};
+use super::nodes::affine_from;
+use crate::animation::{Influence, is_invertible};
+use crate::error::{Fault, at_most};
+
+/// Weights whose sum is further from 1 are refused; others are divided by it. Files whose least weights were cut off are
+/// common.
+const MOST_MISSING: f32 = 0.1;
+/// Four joints each; files with more sets are not known.
+const MOST_SETS: u32 = 4;
+
+/// Joints and weights of each vertex; empty for a primitive without. Of more than four joints the strongest four count.
+/// Vertices that no triangle uses are not checked.
+pub(super) fn influences(
+    document: &Document,
+    primitive: &Primitive,
+    indices: &[u32],
+    vertices: usize,
+    element: &str,
+) -> Result<Vec<Influence>, Fault> {
+    let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
+    let mut shares: Vec<Vec<(f32, f32)>> = Vec::new();
+    for set in 0..MOST_SETS {
+        let (Some(joints), Some(weights)) = (attribute(Semantic::Joints(set)), attribute(Semantic::Weights(set)))
+        else {
+            break;
+        };
+        let joints = same_count(document.floats::<4>(joints, element)?, vertices, "JOINTS", element)?;
+        let weights = same_count(document.floats::<4>(weights, element)?, vertices, "WEIGHTS", element)?;
+        shares.resize(vertices, Vec::new());
+        for (shares, (joints, weights)) in shares.iter_mut().zip(joints.into_iter().zip(weights)) {
+            shares.extend(joints.into_iter().zip(weights));
+        }
+    }
+    if shares.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut influences = vec![Influence::NONE; vertices];
+    for &vertex in indices {
+        let vertex = vertex as usize;
+        if influences[vertex] == Influence::NONE {
+            let wrong = |why| Fault::malformed(format_args!("{element}, vertex {vertex}"), why);
+            influences[vertex] = influence(&mut shares[vertex]).map_err(wrong)?;
+        }
+    }
+    Ok(influences)
+}
+
+fn influence(shares: &mut [(f32, f32)]) -> Result<Influence, String> {
+    if let Some((_, weight)) = shares.iter().find(|(_, weight)| !(weight.is_finite() && *weight >= 0.0)) {
+        return Err(format!("the weight {weight} is negative or not finite"));
+    }
+    let sum: f32 = shares.iter().map(|(_, weight)| weight).sum();
+    if (sum - 1.0).abs() > MOST_MISSING {
+        return Err(format!("the sum of its weights is {sum}, not 1"));
+    }
+    // The sort is stable: equal weights stay in the file's order.
+    shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let strongest = || shares.iter().take(4);
+    let kept: f32 = strongest().map(|(_, weight)| weight).sum();
+    let mut influence = Influence::NONE;
+    for (place, &(joint, weight)) in strongest().enumerate().filter(|(_, (_, weight))| *weight > 0.0) {
+        let is_number = joint.fract() == 0.0 && (0.0..=f32::from(u16::MAX)).contains(&joint);
+        influence.joints[place] =
+            if is_number { Ok(joint as u16) } else { Err(format!("joint {joint} is no number")) }?;
+        influence.weights[place] = weight / kept;
+    }
+    Ok(influence)
+}
+
+/// The inverse bind matrices of a skin, one for each of its joints.
+pub(super) fn bind_matrices(document: &Document, skin: &Skin, element: &str) -> Result<Vec<DAffine3>, Fault> {
+    at_most(format_args!("{element}, joints"), skin.joints.len() as u64, u64::from(u16::MAX))?;
+    if skin.joints.is_empty() {
+        return Err(Fault::malformed(element, "it has no joints"));
+    }
+    let Some(index) = skin.inverse_bind_matrices else { return Ok(vec![DAffine3::IDENTITY; skin.joints.len()]) };
+    let element = format!("{element}, inverseBindMatrices");
+    let matrices = document.floats::<16>(index, &element)?;
+    if matrices.len() < skin.joints.len() {
+        let why = format!("{} matrices for {} joints", matrices.len(), skin.joints.len());
+        return Err(Fault::malformed(element, why));
+    }
+    let bind = |(number, matrix): (usize, &[f32; 16])| {
+        let transform = affine_from(Mat4::from_cols_array(matrix).as_dmat4()).filter(is_invertible);
+        let why = "it is not finite, not affine, or not invertible";
+        transform.ok_or_else(|| Fault::malformed(format_args!("{element}, matrix {number}"), why))
+    };
+    matrices.iter().take(skin.joints.len()).enumerate().map(bind).collect()
+}
+
+/// A skin by its number.
+pub(super) fn skin<'d>(document: &Document<'d>, index: Index<Skin>, element: &str) -> Result<&'d Skin, Fault> {
+    let missing = || Fault::malformed(element, format!("skin {} does not exist", index.value()));
+    document.root.get(index).ok_or_else(missing)
+}

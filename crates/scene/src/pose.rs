@@ -1,0 +1,115 @@
+//! Vertices at a moment: linear blend skinning (glTF 2.0, 3.7.3).
+
+use glam::{Affine3A, DAffine3, Mat3A, Vec3, Vec3A};
+use rayon::prelude::*;
+
+use crate::animation::{Animation, Influence, MovingInstance};
+use crate::limits::MAX_COORDINATE_M;
+use crate::model::{Mesh, Scene, Vertex, VertexDetail};
+
+impl Scene {
+    /// The scene as it is at a moment, without motion by nodes: each moving instance has a mesh of its own, in the world.
+    /// The reference for what moves.
+    #[must_use]
+    pub fn frozen_at(&self, scene_time_s: f32) -> Self {
+        let mut frozen = self.clone();
+        let Some(animation) = frozen.animation.take() else { return frozen };
+        let world_from_nodes = animation.world_from_nodes(scene_time_s);
+        for moving in &animation.moving {
+            let Some(instance) = frozen.instances.get_mut(moving.instance as usize) else { continue };
+            let Some(mesh) = self.meshes.get(instance.mesh as usize) else { continue };
+            let vertices = animation.posed(moving, &mesh.vertices, &world_from_nodes);
+            let details = animation.posed_details(moving, &mesh.details, &world_from_nodes);
+            (instance.mesh, instance.world_from_mesh) = (frozen.meshes.len() as u32, Affine3A::IDENTITY);
+            frozen.meshes.push(Mesh { vertices, details, ..mesh.clone() });
+        }
+        frozen
+    }
+}
+
+impl Animation {
+    /// The vertices of an instance in the world, by [`Animation::world_from_nodes`] and its mesh's vertices at rest.
+    /// Every coordinate is finite and at most [`MAX_COORDINATE_M`].
+    #[must_use]
+    pub fn posed(&self, moving: &MovingInstance, rest: &[Vertex], world_from_nodes: &[DAffine3]) -> Vec<Vertex> {
+        let world_from_mesh = by_joints(moving, world_from_nodes);
+        let Some(first) = world_from_mesh.first() else { return rest.to_vec() };
+        if moving.influences.is_empty() {
+            let normals = normals_from(first.matrix3);
+            return rest.par_iter().map(|vertex| placed(first, normals, vertex)).collect();
+        }
+        let posed = |(vertex, influence): (&Vertex, &Influence)| {
+            let blended = blended(&world_from_mesh, influence);
+            placed(&blended, normals_from(blended.matrix3), vertex)
+        };
+        rest.par_iter().zip(&moving.influences).map(posed).collect()
+    }
+}
+
+impl Animation {
+    /// As [`Animation::posed`], the details of vertices: tangents turn.
+    #[must_use]
+    pub fn posed_details(
+        &self,
+        moving: &MovingInstance,
+        rest: &[VertexDetail],
+        world_from_nodes: &[DAffine3],
+    ) -> Vec<VertexDetail> {
+        let world_from_mesh = by_joints(moving, world_from_nodes);
+        let Some(first) = world_from_mesh.first() else { return rest.to_vec() };
+        if moving.influences.is_empty() {
+            return rest.par_iter().map(|detail| turned(first, detail)).collect();
+        }
+        let posed =
+            |(detail, influence): (&VertexDetail, &Influence)| turned(&blended(&world_from_mesh, influence), detail);
+        rest.par_iter().zip(&moving.influences).map(posed).collect()
+    }
+}
+
+fn turned(world_from_mesh: &Affine3A, detail: &VertexDetail) -> VertexDetail {
+    let [x, y, z, sign] = detail.tangent;
+    let tangent = world_from_mesh.transform_vector3(Vec3::new(x, y, z)).try_normalize().unwrap_or(Vec3::X);
+    VertexDetail { tangent: tangent.extend(sign).to_array(), ..*detail }
+}
+
+/// The mesh's placement in the world by each joint.
+fn by_joints(moving: &MovingInstance, world_from_nodes: &[DAffine3]) -> Vec<Affine3A> {
+    let node = |node: u32| world_from_nodes.get(node as usize).unwrap_or(&DAffine3::IDENTITY);
+    moving.joints.iter().map(|joint| as_f32(&(*node(joint.node) * joint.joint_from_mesh))).collect()
+}
+
+fn blended(world_from_mesh: &[Affine3A], influence: &Influence) -> Affine3A {
+    let nothing = Affine3A { matrix3: Mat3A::ZERO, translation: Vec3A::ZERO };
+    influence.shares().fold(nothing, |sum, (joint, weight)| {
+        let placed = world_from_mesh.get(joint).unwrap_or(&Affine3A::IDENTITY);
+        Affine3A {
+            matrix3: sum.matrix3 + placed.matrix3 * weight,
+            translation: sum.translation + placed.translation * weight,
+        }
+    })
+}
+
+fn placed(world_from_mesh: &Affine3A, normals: Mat3A, vertex: &Vertex) -> Vertex {
+    let point = world_from_mesh.transform_point3a(Vec3A::from(vertex.position)).to_array();
+    let normal = (normals * Vec3A::from(vertex.normal)).try_normalize().map_or(Vec3::Y, Vec3::from);
+    Vertex { position: point.map(|c| bounded(c.into())), normal: normal.to_array(), ..*vertex }
+}
+
+/// The inverse transpose up to a positive factor, by cofactors: a flattened mesh has normals too.
+fn normals_from(linear: Mat3A) -> Mat3A {
+    let columns = [linear.x_axis, linear.y_axis, linear.z_axis];
+    let largest = columns.iter().fold(f32::MIN_POSITIVE, |most, column| most.max(column.abs().max_element()));
+    let [x, y, z] = columns.map(|column| column / largest);
+    let side = if x.cross(y).dot(z) < 0.0 { -1.0 } else { 1.0 };
+    Mat3A::from_cols(y.cross(z) * side, z.cross(x) * side, x.cross(y) * side)
+}
+
+fn as_f32(world_from_mesh: &DAffine3) -> Affine3A {
+    Affine3A::from_cols_array(&world_from_mesh.to_cols_array().map(bounded))
+}
+
+/// A number of a pose that vertices can be computed with: between keys, a spline swings as far as it likes.
+fn bounded(value: f64) -> f32 {
+    let most = f64::from(MAX_COORDINATE_M);
+    if value.is_nan() { 0.0 } else { value.clamp(-most, most) as f32 }
+}
