@@ -4,7 +4,7 @@ use app_core::setup::SceneArgs;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::SamplingMethod;
-use scene::{MissingTextures, SceneSpec};
+use scene::{MissingTextures, SceneSpec, UpAxis};
 
 /// A scene with all other arguments by default.
 #[must_use]
@@ -12,6 +12,7 @@ pub fn scene_args(scene: SceneSpec) -> SceneArgs {
     SceneArgs {
         scene,
         missing_textures: MissingTextures::default(),
+        up: UpAxis::default(),
         lighting: Lighting::default(),
         lights: Vec::new(),
         environment: None,

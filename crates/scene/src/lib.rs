@@ -19,6 +19,7 @@ mod model;
 mod package;
 pub mod procedural;
 mod spec;
+mod up_axis;
 mod validate;
 
 pub use depth_image::{Environment, Illumination, Light, LightError};
@@ -29,4 +30,5 @@ pub use limits::Limits;
 pub use model::*;
 pub use package::{pack, unpack};
 pub use spec::{BUILT_IN_NAMES, SceneSpec, SceneSpecError};
+pub use up_axis::{UpAxis, UpAxisError};
 pub use validate::MAX_COORDINATE_M;

@@ -48,6 +48,14 @@ impl Scene {
         Aabb { min: at_rest.min - reach, max: at_rest.max + reach }
     }
 
+    /// Every vertex of every instance, at rest.
+    pub fn vertices_in_world(&self) -> impl Iterator<Item = Vec3> + Clone {
+        let placed = |instance: &Instance| Some((self.meshes.get(instance.mesh as usize)?, instance.world_from_mesh));
+        self.instances.iter().filter_map(placed).flat_map(|(mesh, world_from_mesh)| {
+            mesh.vertices.iter().map(move |v| world_from_mesh.transform_point3(Vec3::from(v.position)))
+        })
+    }
+
     /// Triangles as drawn: a mesh's count once for each of its instances.
     #[must_use]
     pub fn triangle_count(&self) -> u64 {
