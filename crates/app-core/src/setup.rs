@@ -122,7 +122,7 @@ impl SceneArgs {
             package: package.into(),
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             volume: scene.bounds(),
-            background_linear: scene.background_linear,
+            background: scene.background,
             illumination: scene.illumination.clone(),
             origin_in_source: scene.origin_in_source,
             settings: OfferSettings {

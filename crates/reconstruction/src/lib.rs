@@ -4,6 +4,7 @@
 //! [`Reconstructor::reconstruct`] draws views from it, many in one submission: tile starts, the method, the fill and
 //! highlights. Each method is one enum variant, one `.rs` and `.wgsl` pair in `methods`, and has a scalar twin.
 
+mod background_pixels;
 mod device;
 mod error;
 mod fill;

@@ -78,12 +78,12 @@ pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces]) -> Re
     let words = pool.lend_storage("planes", bytes.max(4));
     let variant = Finish::of(batch);
     let pass = passes.get(&variant)?;
-    let [r, g, b] = batch.work.scene.background_linear.to_array();
     let view_cell_m = batch.sequence.map_or(0.0, |sequence| sequence.known.view_cell_m);
-    let finish = gpu.buffer_with("finish", &[r, g, b, view_cell_m], BufferUsages::UNIFORM);
+    let finish = gpu.buffer_with("finish", &[view_cell_m], BufferUsages::UNIFORM);
     for (camera, target) in surfaces.iter().enumerate() {
         let Recording { batch, cameras, sums, .. } = recording;
-        let buffers: [&Buffer; 5] = [cameras, &words, &sums.buffer, &finish, &batch.work.scene.illumination];
+        let scene = batch.work.scene;
+        let buffers: [&Buffer; 6] = [cameras, &words, &sums.buffer, &finish, &scene.background, &scene.illumination];
         let own = pass.bind(0, bindings(&variant, buffers, target))?;
         recording.dispatch(&variant, &pass, &[&own], (camera, 1));
     }
@@ -92,7 +92,7 @@ pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces]) -> Re
 
 fn bindings<'r>(
     variant: &Finish,
-    [camera, words, sums, finish, illumination]: [&'r Buffer; 5],
+    [camera, words, sums, finish, background, illumination]: [&'r Buffer; 6],
     target: &'r Surfaces,
 ) -> Vec<Binding<'r>> {
     let mut bindings = vec![
@@ -100,6 +100,7 @@ fn bindings<'r>(
         Binding::buffer("words", words),
         Binding::buffer("sums", sums),
         Binding::buffer("finish", finish),
+        Binding::buffer("background", background),
     ];
     bindings.extend(target.bindings());
     bindings.extend(variant.output.highlight.map(|_| Binding::buffer("illumination", illumination)));
@@ -119,7 +120,7 @@ mod tests {
         let stage = TestStage::new();
         for variant in Finish::all() {
             let target = stage.surfaces(variant.by_rays, variant.output.surface_id);
-            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 5], &target));
+            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 6], &target));
         }
     }
 }

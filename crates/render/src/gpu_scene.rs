@@ -84,7 +84,7 @@ pub struct GpuScene {
     pub(crate) surroundings: wgpu::Buffer,
     /// Base colour, and metallic and roughness; white where a material has none.
     pub(crate) textures: Vec<[wgpu::TextureView; 2]>,
-    pub(crate) background_linear: Vec3,
+    pub(crate) background: wgpu::Buffer,
     pub(crate) illumination: wgpu::Buffer,
     pub(crate) light_count: usize,
     pub(crate) rays: RayScene,
@@ -116,7 +116,7 @@ impl GpuScene {
             objects: uniform(gpu, "objects", geometry.objects.into_iter()),
             surroundings: gpu.buffer_with("surroundings", &[surroundings(scene)], BufferUsages::UNIFORM),
             textures: geometry.textures.iter().map(|pair| pair.each_ref().map(view)).collect(),
-            background_linear: scene.background_linear,
+            background: gpu.buffer_with("background", &gpu::background_bytes(&scene.background), BufferUsages::UNIFORM),
             illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
             light_count: scene.illumination.lights.len(),
             rays: RayScene::of(gpu, scene, &ordered),

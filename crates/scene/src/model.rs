@@ -1,6 +1,6 @@
 //! The scene as plain data, equal on every node.
 
-use depth_image::{Aabb, Illumination};
+use depth_image::{Aabb, Environment, Illumination};
 use glam::{Affine3A, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -19,8 +19,8 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Lamps and environment. A scene without light is black and valid.
     pub illumination: Illumination,
-    /// Colour of pixels without a surface, linear RGB.
-    pub background_linear: Vec3,
+    /// Radiance of rays that meet no surface, by their direction.
+    pub background: Environment,
     /// Cameras that the source file listed.
     pub cameras: Vec<SourceCamera>,
     /// Motion as a function of scene time; `None` for a static scene.

@@ -9,8 +9,8 @@
 //! are checked against the remaining bytes before memory is allocated.
 
 use bytemuck::Pod;
-use depth_image::Illumination;
-use glam::{DVec3, Vec3};
+use depth_image::{Environment, Illumination};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Fault, at_most};
@@ -20,7 +20,7 @@ use crate::{Instance, Limits, Material, Mesh, MeshPart, Scene, SceneError, Sourc
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");
 
 const MAGIC: &[u8; 8] = b"MYRSCENE";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// A scene without its large arrays.
 #[derive(Serialize, Deserialize)]
@@ -31,7 +31,7 @@ struct Header {
     materials: Vec<Material>,
     textures: Vec<TextureHeader>,
     illumination: Illumination,
-    background_linear: Vec3,
+    background: Environment,
     cameras: Vec<SourceCamera>,
     wind: Option<Wind>,
     origin_in_source: DVec3,
@@ -109,7 +109,7 @@ fn header_of(scene: &Scene) -> Header {
         materials: scene.materials.clone(),
         textures: scene.textures.iter().map(texture).collect(),
         illumination: scene.illumination.clone(),
-        background_linear: scene.background_linear,
+        background: scene.background,
         cameras: scene.cameras.clone(),
         wind: scene.wind,
         origin_in_source: scene.origin_in_source,
@@ -151,7 +151,7 @@ fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Re
         materials: header.materials,
         textures,
         illumination: header.illumination,
-        background_linear: header.background_linear,
+        background: header.background,
         cameras: header.cameras,
         wind: header.wind,
         origin_in_source: header.origin_in_source,

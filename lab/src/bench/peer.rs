@@ -7,7 +7,7 @@ use app_core::setup::{SceneArgs, Setup};
 use depth_image::PinholeCamera;
 use engine::GpuEngine;
 use render::Lighting;
-use scene::SceneSpec;
+use scene::{Environment, SceneSpec};
 use study::{Bar, Check, Report};
 
 use super::args::BenchArgs;
@@ -42,7 +42,8 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
         samples: Some(folder.join("samples.json")),
         ..scene_args(SceneSpec::File(folder.join("bench.ply")))
     };
-    let setup = scene.load()?;
+    // The pictures of RVS are on black.
+    let setup = scene.load_changed(|scene| scene.background = Environment::default())?;
     let views = views(args, &setup, folder)?;
     let reference = ReferenceViews::draw(engine, &setup, &scene, views)?;
     let row = reference.evaluate(args.scene.method, args.runs())?;

@@ -17,7 +17,7 @@ mod surface;
 mod tile_start;
 mod view_ray;
 
-use depth_image::{Aabb, DepthImage, PinholeCamera, View, srgb8_from_linear};
+use depth_image::{Aabb, DepthImage, Environment, PinholeCamera, ProvenanceKind, View, srgb8_from_linear};
 use glam::Vec3;
 
 use self::{pixel::Pixel, sample_camera::SampleCamera, view_ray::ViewRays};
@@ -34,11 +34,11 @@ pub fn reconstruct(
     let cameras = nearest_first(images, camera);
     let rays = ViewRays::of(camera, &set.volume, images);
     if let Some(quads) = quads(images, method) {
-        let pixels = draw::drawn(&quads, images, &cameras, camera, &rays, set.background_linear);
+        let pixels = draw::drawn(&quads, images, &cameras, camera, &rays, set.background.zenith_linear);
         return finished(pixels, images, set, &cameras, &rays);
     }
     let starts = tile_start::tile_starts(&cameras, &rays);
-    let pixels = pixels_from(&cameras, &rays, &starts, set.background_linear, method);
+    let pixels = pixels_from(&cameras, &rays, &starts, set.background.zenith_linear, method);
     finished(pixels, images, set, &cameras, &rays)
 }
 
@@ -54,7 +54,7 @@ pub fn reconstruct_from_entry(
     let cameras = nearest_first(images, camera);
     let rays = ViewRays::of(camera, &set.volume, images);
     let starts = vec![0.0; rays.tiles().element_product() as usize];
-    let pixels = pixels_from(&cameras, &rays, &starts, set.background_linear, method);
+    let pixels = pixels_from(&cameras, &rays, &starts, set.background.zenith_linear, method);
     finished(pixels, images, set, &cameras, &rays)
 }
 
@@ -118,7 +118,17 @@ fn pixels_from(
         .collect()
 }
 
-/// Fills unknown pixels, then adds highlights, which the fill would spread.
+/// Twin of `background_pixels.wgsl`.
+fn paint_background(pixels: &mut [Pixel], background: &Environment, rays: &ViewRays) {
+    let without_surface =
+        pixels.iter_mut().zip(rays.places()).filter(|(pixel, _)| pixel.provenance.kind() != ProvenanceKind::Hit);
+    for (pixel, place) in without_surface.filter(|_| !background.is_uniform()) {
+        let radiance = background.radiance_linear(rays.ray(place).direction.normalize_or_zero());
+        pixel.srgb8 = radiance.to_array().map(srgb8_from_linear);
+    }
+}
+
+/// Paints the background, fills unknown pixels, then adds highlights, which the fill would spread.
 fn finished(
     mut pixels: Vec<Pixel>,
     images: &[DepthImage],
@@ -126,6 +136,7 @@ fn finished(
     cameras: &[SampleCamera],
     rays: &ViewRays,
 ) -> View {
+    paint_background(&mut pixels, &set.background, rays);
     fill::fill(&mut pixels, rays.size_px());
     specular::add_highlights(&mut pixels, images, set, cameras, rays);
     View {
