@@ -32,8 +32,8 @@ const FRAMED_SHARE: f32 = 0.9;
 const CORNER_SHARE: f32 = 0.98;
 /// The greatest width of a frame over its height: that of views by default. Wider views show more on both sides.
 const FRAME_ASPECT: f32 = 4.0 / 3.0;
-/// The direction from a model to the eye: a three-quarter view, 25° from the front and 28° above.
-const THREE_QUARTER: Vec3 = Vec3::new(0.3731, 0.4695, 0.8002);
+/// The direction from a model to the eye: a three-quarter view, 25° from the front and 30° above.
+const THREE_QUARTER: Vec3 = Vec3::new(0.3660, 0.5, 0.7849);
 /// The least distance from an eye to a model's nearest point, in radii of the model.
 const LEAST_GAP_RADII: f32 = 0.5;
 
