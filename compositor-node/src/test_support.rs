@@ -1,7 +1,7 @@
 //! A plan for tests.
 
 use cluster::{Assignment, Policy, SamplePlanes, SceneHash, SceneRef, Timeline, Workload};
-use depth_image::{Aabb, Illumination};
+use depth_image::{Aabb, Environment, Illumination};
 use glam::Vec3;
 
 /// A still scene without cameras.
@@ -14,7 +14,7 @@ pub(crate) fn workload() -> Workload {
         lighting: "unlit".to_owned(),
         planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
-        background_linear: Vec3::ZERO,
+        background: Environment::default(),
         timeline: Timeline::still(0.0),
         illumination: Illumination::default(),
         refinement_steps: 1,

@@ -3,8 +3,8 @@
 use bytes::Bytes;
 use cluster::limits::MAX_SCENES;
 use cluster::{OfferSettings, OfferStatus, SceneHash, SceneRef};
-use depth_image::{Aabb, Camera, Illumination};
-use glam::{DVec3, Vec3};
+use depth_image::{Aabb, Camera, Environment, Illumination};
+use glam::DVec3;
 use tonic::Status;
 
 /// The coordinator's configuration.
@@ -39,8 +39,8 @@ pub struct SceneOffer {
     pub rig: Vec<Camera>,
     /// The volume that is reconstructed, unless a session brings its own.
     pub volume: Aabb,
-    /// The colour of rays that leave the scene.
-    pub background_linear: Vec3,
+    /// Radiance of rays that leave the scene, by their direction.
+    pub background: Environment,
     /// Lamps and environment: compositors add the highlights, which depend on the viewer.
     pub illumination: Illumination,
     /// The point of the source file's space that is the world's origin.

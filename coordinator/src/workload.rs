@@ -37,7 +37,7 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
         lighting: request.lighting.clone(),
         planes: SamplePlanes::default(),
         volume,
-        background_linear: offer.background_linear,
+        background: offer.background,
         timeline: request.timeline,
         illumination: offer.illumination.clone(),
         refinement_steps: request.refinement_steps,

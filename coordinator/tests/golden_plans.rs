@@ -12,7 +12,7 @@ use cluster::{
     Timeline, Workload,
 };
 use coordinator::schedule::{Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
-use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
+use depth_image::{Aabb, Camera, Environment, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
 /// Images that are not tileable.
@@ -48,7 +48,7 @@ fn workload(images: usize, timeline: Timeline) -> Workload {
         lighting: "unlit".to_owned(),
         planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
-        background_linear: Vec3::ZERO,
+        background: Environment::default(),
         timeline,
         illumination: Illumination::default(),
         refinement_steps: 1,

@@ -49,7 +49,7 @@ impl ReferenceViews {
         let images = sample(engine, setup, args)?;
         let description = SetDescription {
             volume: setup.offer.volume,
-            background_linear: setup.offer.background_linear,
+            background: setup.offer.background,
             illumination: &setup.offer.illumination,
             highlight: args.lighting.highlight(),
         };

@@ -4,7 +4,7 @@ use app_core::setup::SceneArgs;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::SamplingMethod;
-use scene::{MissingTextures, SceneSpec};
+use scene::{MissingTextures, SceneSpec, UpAxis};
 
 /// A scene with all other arguments by default.
 #[must_use]
@@ -13,6 +13,7 @@ pub fn scene_args(scene: SceneSpec) -> SceneArgs {
         scene,
         missing_textures: MissingTextures::default(),
         clip: None,
+        up: UpAxis::default(),
         lighting: Lighting::default(),
         lights: Vec::new(),
         environment: None,

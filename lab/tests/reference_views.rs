@@ -9,7 +9,7 @@ use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SizePx;
 use cluster::{PolicyChoice, SessionRequest};
-use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
+use depth_image::{Camera, Environment, PinholeCamera, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
@@ -91,7 +91,7 @@ fn unknown_names_are_refused_with_their_field() {
     let set = node::SampleSet {
         images: reference.images.clone(),
         volume: setup.offer.volume,
-        background_linear: glam::Vec3::ZERO,
+        background: Environment::default(),
         illumination: setup.offer.illumination.clone(),
         lighting: args.lighting.to_string(),
     };

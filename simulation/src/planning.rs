@@ -7,7 +7,7 @@ use cluster::{
     Workload,
 };
 use coordinator::schedule::{ChoiceError, Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
-use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
+use depth_image::{Aabb, Camera, Environment, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
 use crate::cluster::{Cluster, Machine};
@@ -193,7 +193,7 @@ fn workload(images: usize, sets: u32) -> Workload {
         lighting: String::new(),
         planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
-        background_linear: Vec3::ZERO,
+        background: Environment::default(),
         timeline: Timeline { start_s: 0.0, step_s: 1.0, set_count: sets },
         illumination: Illumination::default(),
         refinement_steps: 1,

@@ -8,7 +8,7 @@ use client::{Client, ClientError, Session, ViewRequest};
 use cluster::{OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline};
 use codec::{FrameAssembly, FramePart, WholeFrame};
 use coordinator::{CoordinatorConfig, Observers, SceneOffer, SceneOffers};
-use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
+use depth_image::{Aabb, Camera, Environment, PinholeCamera, ViewPlanes};
 use glam::{DVec3, UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
 use tokio::net::TcpListener;
@@ -130,7 +130,7 @@ pub fn offer() -> SceneOffer {
         package: package(),
         rig: rig(),
         volume: Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) },
-        background_linear: SKY_LINEAR,
+        background: Environment::uniform(SKY_LINEAR),
         illumination: illumination(),
         origin_in_source: DVec3::ZERO,
         settings: OfferSettings::default(),

@@ -27,7 +27,7 @@ fn workload() -> Workload {
         lighting: "unlit".to_owned(),
         planes: SamplePlanes::default(),
         volume: offer.volume,
-        background_linear: offer.background_linear,
+        background: offer.background,
         timeline: Timeline::still(0.0),
         illumination: illumination(),
         refinement_steps: 1,

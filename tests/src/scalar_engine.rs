@@ -151,11 +151,12 @@ struct Canvas {
 }
 
 impl Canvas {
-    fn new(size_px: UVec2, background_linear: Vec3) -> Self {
-        let texels = size_px.element_product() as usize;
+    fn new(camera: &PinholeCamera, background: &Environment) -> Self {
+        let (size_px, texels) = (camera.size_px, camera.pixel_count());
+        let towards = |pixel| camera.ray(pixel).direction_in_world.normalize_or_zero();
         Self {
             inverse_depth_per_m: vec![0.0; texels],
-            srgb8: vec![srgb8(background_linear); texels],
+            srgb8: pixels(size_px).map(|pixel| srgb8(background.radiance_linear(towards(pixel)))).collect(),
             provenance: vec![Provenance::EMPTY; texels],
             size_px,
         }
@@ -181,7 +182,7 @@ impl Canvas {
 }
 
 fn splat(set: &SampleSet, camera: &PinholeCamera, planes: ViewPlanes) -> View {
-    let mut canvas = Canvas::new(camera.size_px, set.background_linear);
+    let mut canvas = Canvas::new(camera, &set.background);
     for (index, image) in set.images.iter().enumerate() {
         let size_px = image.size_px();
         for (x, y) in (0..size_px.y).flat_map(|y| (0..size_px.x).map(move |x| (x, y))) {
@@ -198,7 +199,7 @@ fn splat(set: &SampleSet, camera: &PinholeCamera, planes: ViewPlanes) -> View {
 }
 
 fn draw(camera: &PinholeCamera, scene_time_s: f32, planes: ViewPlanes) -> View {
-    let mut canvas = Canvas::new(camera.size_px, SKY_LINEAR);
+    let mut canvas = Canvas::new(camera, &Environment::uniform(SKY_LINEAR));
     for pixel in pixels(camera.size_px) {
         if let Some(met) = first_met(&camera.ray(pixel), scene_time_s, Refinement::default()) {
             canvas.put(pixel, met.planar_depth_m, met.color_linear, 0);

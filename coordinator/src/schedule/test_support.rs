@@ -6,7 +6,7 @@ use cluster::{
     Costs, JoinCluster, NodeStatus, PolicyChoice, SamplePlanes, SceneHash, SceneRef, TileCosts, Timeline, Workload,
     WorkloadStatus,
 };
-use depth_image::{Aabb, Camera, Illumination, PinholeCamera};
+use depth_image::{Aabb, Camera, Environment, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
 use super::command::Command;
@@ -114,7 +114,7 @@ pub(crate) fn workload(images: usize) -> Workload {
         lighting: "unlit".to_owned(),
         planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
-        background_linear: Vec3::ZERO,
+        background: Environment::default(),
         timeline: Timeline::still(0.0),
         illumination: Illumination::default(),
         refinement_steps: 1,

@@ -1,6 +1,6 @@
 //! Arguments that several commands share, and the scene on offer that they make.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
@@ -12,7 +12,7 @@ use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::{Rig, SamplingMethod};
-use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec};
+use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec, UpAxis};
 
 use crate::camera_file::{self, Placement};
 use crate::sizes::SizePx;
@@ -45,6 +45,10 @@ pub struct SceneArgs {
     /// The clip of an animated scene that plays, by its name [default: the first]
     #[arg(long, value_name = "NAME")]
     pub clip: Option<String>,
+    /// The axis of an .obj or .ply file that points upwards. With another than y, all coordinates are those of the turned
+    /// file
+    #[arg(long, default_value_t, value_name = "x|y|z")]
+    pub up: UpAxis,
     /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, or soft N (N rays
     /// a light). Ambient occlusion: occlusion N [RADIUSm]. Rate: adaptive [TOLERANCE] traces rays only where light
     /// changes
@@ -121,7 +125,7 @@ impl SceneArgs {
             package: package.into(),
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             volume: scene.bounds(),
-            background_linear: scene.background_linear,
+            background: scene.background,
             illumination: scene.illumination.clone(),
             origin_in_source: scene.origin_in_source,
             settings: OfferSettings {
@@ -135,11 +139,16 @@ impl SceneArgs {
     }
 
     fn load_scene(&self) -> anyhow::Result<Scene> {
+        match &self.scene {
+            SceneSpec::File(file) => self.up.check(file).context("--up")?,
+            built_in => self.up.check(Path::new(&built_in.to_string())).context("--up")?,
+        }
         let mut scene =
             self.scene.load(&Limits::default(), self.missing_textures).context("the scene cannot be used")?;
         if let Some(name) = &self.clip {
             scene.play(name).with_context(|| format!("{}: --clip", self.scene))?;
         }
+        let scene = scene.turned_upright(self.up);
         let lights = (!self.lights.is_empty()).then(|| self.lights.iter().map(|spec| spec.0).collect());
         let lit = scene.lit_by(lights, self.environment.map(|spec| spec.0));
         lit.validate(&Limits::default()).context("the scene cannot be used")?;
@@ -163,6 +172,7 @@ impl SceneArgs {
         let bounds = scene.bounds();
         let rig = match self.scene {
             SceneSpec::TreeTerrain { .. } => Rig::two_plane(&bounds, TWO_PLANE_HEIGHT),
+            SceneSpec::File(_) => Rig::framing(scene.vertices_in_world(), MODEL_SPREAD_RAD, size_px),
             _ => Rig::in_front_of(&bounds, MODEL_SPREAD_RAD),
         };
         Ok(rig.with_context(|| format!("{}: no sample cameras", self.scene))?.samples(size_px))

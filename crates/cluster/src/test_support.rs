@@ -24,7 +24,7 @@ pub(crate) fn workload() -> Workload {
         lighting: "phong".to_owned(),
         planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
-        background_linear: Vec3::splat(0.2),
+        background: Environment::uniform(Vec3::splat(0.2)),
         timeline: Timeline { start_s: 1.0, step_s: 0.5, set_count: 3 },
         illumination: illumination(),
         refinement_steps: 1,

@@ -2,8 +2,7 @@
 
 use std::ops::Range;
 
-use depth_image::{Aabb, Camera, Illumination, MAX_LIGHTS, PinholeCamera, ViewGroup, nearest_set};
-use glam::Vec3;
+use depth_image::{Aabb, Camera, Environment, Illumination, MAX_LIGHTS, PinholeCamera, ViewGroup, nearest_set};
 use serde::{Deserialize, Serialize};
 
 use crate::check::{InvalidField, at_most, nonempty, within};
@@ -29,8 +28,8 @@ pub struct Workload {
     pub planes: SamplePlanes,
     /// The bounds of reconstruction.
     pub volume: Aabb,
-    /// Radiance of rays that leave the scene, linear RGB.
-    pub background_linear: Vec3,
+    /// Radiance of rays that leave the scene, by their direction.
+    pub background: Environment,
     /// Scene times.
     pub timeline: Timeline,
     /// The scene's lamps and environment: compositors add what depends on the viewer.
@@ -127,6 +126,8 @@ impl Workload {
             return Err(InvalidField::out_of_range("bounds", "empty", "min <= max on every axis"));
         }
         self.timeline.validate()?;
+        let refused = |source| InvalidField::Light { field: "background", source };
+        self.background.validate().map_err(refused)?;
         validate_illumination(&self.illumination)?;
         within(self.refinement_steps, 1..=MAX_REFINEMENT_STEPS, "refinement_step_count", "from 1 to 64")
     }
@@ -173,7 +174,7 @@ struct Shown<'a> {
     lighting: &'a str,
     planes: SamplePlanes,
     volume: Aabb,
-    background_linear: Vec3,
+    background: Environment,
     refinement: [u32; 2],
     illumination: &'a Illumination,
     sample_cameras: &'a [Camera],
@@ -192,7 +193,7 @@ impl SetContent {
             lighting: &workload.lighting,
             planes: workload.planes,
             volume: workload.volume,
-            background_linear: workload.background_linear,
+            background: workload.background,
             refinement: [refinement.step, refinement.steps],
             illumination: &workload.illumination,
             sample_cameras: &workload.sample_cameras,

@@ -90,6 +90,12 @@ impl Environment {
         Self { zenith_linear: radiance_linear, nadir_linear: radiance_linear }
     }
 
+    /// Whether all directions have the same radiance.
+    #[must_use]
+    pub fn is_uniform(&self) -> bool {
+        self.zenith_linear == self.nadir_linear
+    }
+
     /// Checks that both colours are finite and not negative.
     ///
     /// # Errors

@@ -206,7 +206,7 @@ impl Engine for GpuEngine {
         let lighting: Lighting = parsed("lighting", &set.lighting)?;
         let description = SetDescription {
             volume: set.volume,
-            background_linear: set.background_linear,
+            background: set.background,
             illumination: &set.illumination,
             highlight: lighting.highlight(),
         };

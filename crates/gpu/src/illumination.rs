@@ -1,7 +1,7 @@
 //! Light sources as `light.wgsl` reads them.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Highlight, Illumination, Light};
+use depth_image::{Environment, Highlight, Illumination, Light};
 use glam::Vec3;
 
 /// `Light` of `light.wgsl`, which says what its numbers are.
@@ -32,6 +32,13 @@ pub(crate) struct GpuIllumination {
 const PARALLEL: u32 = 0;
 const ROUND: u32 = 1;
 const RECTANGLE: u32 = 2;
+
+/// `Background` of `background.wgsl`: what rays that leave the scene show.
+#[must_use]
+pub fn background_bytes(background: &Environment) -> [f32; 8] {
+    let ([r, g, b], nadir) = (background.zenith_linear.to_array(), background.nadir_linear.to_array());
+    [r, g, b, 0.0, nadir[0], nadir[1], nadir[2], 0.0]
+}
 
 /// A light without colour or place, the same in all directions.
 const NOTHING: GpuLight = GpuLight {

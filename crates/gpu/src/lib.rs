@@ -22,7 +22,7 @@ mod table;
 pub use device::{CompiledOutside, DevicePreference, Gpu};
 pub use error::{GpuError, ShaderError};
 pub use frame::{Frame, FrameResult, Readback, Submitted};
-pub use illumination::{highlight_name, illumination_bytes, light_slots};
+pub use illumination::{background_bytes, highlight_name, illumination_bytes, light_slots};
 pub use pool::{BufferPool, Lent, Pool, PooledBuffer};
 pub use shader::{
     Binding, BoundGroup, ComputePass, DispatchSize, DrawPass, DrawState, DrawVariant, Pass, PassCache, ResourceTrait,

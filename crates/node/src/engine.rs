@@ -6,8 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use cluster::{Refinement, SamplePlanes, Workload};
-use depth_image::{Aabb, Camera, DepthImage, Illumination, PinholeCamera, View, ViewPlanes};
-use glam::Vec3;
+use depth_image::{Aabb, Camera, DepthImage, Environment, Illumination, PinholeCamera, View, ViewPlanes};
 use tonic::Status;
 
 /// The urgency of work on a device, which the nodes of a process share.
@@ -146,8 +145,8 @@ pub struct SampleSet {
     pub images: Vec<DepthImage>,
     /// The bounds of reconstruction.
     pub volume: Aabb,
-    /// Radiance of rays that leave the scene, linear RGB.
-    pub background_linear: Vec3,
+    /// Radiance of rays that leave the scene, by their direction.
+    pub background: Environment,
     /// The scene's lamps and environment, for highlights; in the order of the images' visibility.
     pub illumination: Illumination,
     /// The lighting that the images were sampled with; highlights follow its formula.
@@ -161,7 +160,7 @@ impl SampleSet {
         Self {
             images,
             volume: workload.volume,
-            background_linear: workload.background_linear,
+            background: workload.background,
             illumination: workload.illumination.clone(),
             lighting: workload.lighting.clone(),
         }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use cluster::{Refinement, SamplePlanes, SceneHash, SceneRef, Timeline};
-use depth_image::{Aabb, DepthImage, Illumination, SpecularPlanes, ViewPlanes};
+use depth_image::{Aabb, DepthImage, Environment, Illumination, SpecularPlanes, ViewPlanes};
 use glam::{UVec2, Vec3};
 
 use super::*;
@@ -136,7 +136,7 @@ pub(crate) fn request(batch_count: u32) -> MeasureCosts {
         lighting: "traced".to_owned(),
         planes: SamplePlanes::default(),
         volume: Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE },
-        background_linear: Vec3::ZERO,
+        background: Environment::default(),
         timeline: Timeline { start_s: 0.0, step_s: 0.0, set_count: 8 },
         illumination: Illumination { lights: vec![lamp], ..Illumination::default() },
         refinement_steps: 4,

@@ -62,7 +62,7 @@ fn goes_on(before: &Workload, after: &Workload) -> bool {
     before.scene == after.scene
         && before.timeline == after.timeline
         && before.volume == after.volume
-        && before.background_linear == after.background_linear
+        && before.background == after.background
         && before.illumination == after.illumination
         && before.refinement_steps == after.refinement_steps
 }

@@ -55,6 +55,7 @@ pub(crate) fn record(recording: &mut Recording<'_>, sums: Sums) -> Result<(), Re
     let pass = recording.device.passes.get(&variant)?;
     let batch = &recording.batch;
     let mut bindings = recording.view_bindings();
+    bindings.push(Binding::buffer("background", &recording.set.background));
     bindings.push(Binding::buffer("color", &batch.color));
     bindings.push(Binding::buffer("inverse_depth", &batch.inverse_depth_per_m));
     bindings.extend(batch.sums.as_ref().filter(|_| sums != Sums::None).map(|sums| Binding::buffer("sums", sums)));

@@ -1,5 +1,6 @@
 // The colour that a pixel shows: the mean over its positions in linear light, as sRGB.
 {% include "color.wgsl" %}
+{% include "background.wgsl" %}
 {% include "view_work.wgsl" %}
 
 // Linear, as RGB9E5, of one position; sRGB once the view is finished.
@@ -11,8 +12,10 @@
 {% endif %}
 
 // Nothing nearer than infinity is the background, whether proven or assumed.
-fn shown_linear(index: u32) -> vec3f {
-    return select(work.background_linear, linear_from_rgb9e5(color[index]), inverse_depth[index] > 0.0);
+fn shown_linear(index: u32, place: vec2u) -> vec3f {
+    let center = vec2f(place) + 0.5;
+    let direction = work.view.column_in_world * center.x + work.view.row_in_world * center.y + work.view.corner_in_world;
+    return select(background_linear(direction), linear_from_rgb9e5(color[index]), inverse_depth[index] > 0.0);
 }
 
 @compute @workgroup_size(TILE_PX, TILE_PX)
@@ -21,12 +24,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(place >= work.view.size_px) { return; }
     let index = work.view.first_pixel + place.y * work.view.size_px.x + place.x;
 {% if sums == "none" %}
-    color[index] = pack4x8unorm(vec4f(srgb_from_linear(shown_linear(index)), 1.0));
+    color[index] = pack4x8unorm(vec4f(srgb_from_linear(shown_linear(index, place)), 1.0));
 {% elif sums == "read" %}
     let mean = vec3f(sums[3u * index], sums[3u * index + 1u], sums[3u * index + 2u]) * work.position_share;
     color[index] = pack4x8unorm(vec4f(srgb_from_linear(mean), 1.0));
 {% else %}
-    let shown = shown_linear(index);
+    let shown = shown_linear(index, place);
 {% for channel in ["r", "g", "b"] %}
     sums[3u * index + {{ loop.index0 }}u] {{ "=" if sums == "begun" else "+=" }} shown.{{ channel }};
 {% endfor %}

@@ -122,14 +122,7 @@ fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
 /// The shader has the volume's fields in place of the struct; the cameras follow.
 fn view_work(cameras: usize) -> Layout {
     let GpuViewWork { view: _, volume: _ } = GpuViewWork::zeroed();
-    let GpuVolume {
-        min_in_world: _,
-        position_share: _,
-        max_in_world: _,
-        padding: _,
-        background_linear: _,
-        padding_2: _,
-    } = GpuVolume::zeroed();
+    let GpuVolume { min_in_world: _, position_share: _, max_in_world: _, padding: _ } = GpuVolume::zeroed();
     let volume = offset_of!(GpuViewWork, volume);
     let fields = [
         ("view", offset_of!(GpuViewWork, view)),
@@ -137,8 +130,6 @@ fn view_work(cameras: usize) -> Layout {
         ("position_share", volume + offset_of!(GpuVolume, position_share)),
         ("volume_max_in_world", volume + offset_of!(GpuVolume, max_in_world)),
         ("padding", volume + offset_of!(GpuVolume, padding)),
-        ("background_linear", volume + offset_of!(GpuVolume, background_linear)),
-        ("padding_2", volume + offset_of!(GpuVolume, padding_2)),
         ("cameras", size_of::<GpuViewWork>()),
     ];
     Layout::new(fields, size_of::<GpuViewWork>() + cameras * size_of::<GpuSampleCamera>())

@@ -1,8 +1,8 @@
 //! A sample set on the device.
 
 use bytemuck::Zeroable as _;
-use depth_image::{Aabb, Camera, DepthImage, Highlight, Illumination, PinholeCamera};
-use glam::{Vec2, Vec3};
+use depth_image::{Aabb, Camera, DepthImage, Environment, Highlight, Illumination, PinholeCamera};
+use glam::Vec2;
 use gpu::{Table, TablePool, Turn};
 use rayon::prelude::*;
 use wgpu::TextureFormat;
@@ -20,8 +20,8 @@ pub(crate) const VOLUME_MARGIN: f32 = 0.005;
 pub struct SetDescription<'a> {
     /// Holds all geometry of the scene.
     pub volume: Aabb,
-    /// The colour of pixels that show nothing.
-    pub background_linear: Vec3,
+    /// Radiance of rays that leave the scene, by their direction.
+    pub background: Environment,
     /// The scene's lights; they are seen in highlights only, since the samples' colours hold the rest.
     pub illumination: &'a Illumination,
     /// How surfaces reflect towards the viewer; `None` leaves highlights away, even where images have planes for them.
@@ -34,6 +34,8 @@ pub struct SampleSet {
     /// Images of which some texels prove nothing, by their bits in provenance.
     pub(crate) uncertain: Vec<bool>,
     pub(crate) volume: GpuVolume,
+    /// As `background.wgsl` reads it.
+    pub(crate) background: wgpu::Buffer,
     /// Two words for each node of the pyramids.
     pub(crate) nodes: Table,
     /// See [`CodedDepth::cell_words`].
@@ -84,7 +86,8 @@ impl SampleSet {
         Ok(Self {
             cameras,
             uncertain,
-            volume: gpu_volume(&searched_volume(&set.volume, images), set.background_linear),
+            volume: gpu_volume(&searched_volume(&set.volume, images)),
+            background: background_buffer(tables, &set.background),
             nodes: tables.upload("depth pyramids", TextureFormat::Rg32Uint, &nodes, turn)?,
             cell_codes: tables.upload("cells", TextureFormat::Rg32Uint, &codes, turn)?,
             cell_colors: tables.upload("sample colours", TextureFormat::Rgba32Uint, &colors, turn)?,
@@ -177,11 +180,10 @@ pub(crate) fn searched_volume(volume: &Aabb, images: &[DepthImage]) -> Aabb {
     volume.padded(volume.size().max_element() * VOLUME_MARGIN + depth_error_m)
 }
 
-fn gpu_volume(searched: &Aabb, background_linear: Vec3) -> GpuVolume {
-    GpuVolume {
-        min_in_world: searched.min.to_array(),
-        max_in_world: searched.max.to_array(),
-        background_linear: background_linear.to_array(),
-        ..GpuVolume::zeroed()
-    }
+fn background_buffer(tables: &TablePool, background: &Environment) -> wgpu::Buffer {
+    tables.gpu.buffer_with("background", &gpu::background_bytes(background), wgpu::BufferUsages::UNIFORM)
+}
+
+fn gpu_volume(searched: &Aabb) -> GpuVolume {
+    GpuVolume { min_in_world: searched.min.to_array(), max_in_world: searched.max.to_array(), ..GpuVolume::zeroed() }
 }

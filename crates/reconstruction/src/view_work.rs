@@ -93,8 +93,6 @@ pub(crate) struct GpuVolume {
     pub position_share: f32,
     pub max_in_world: [f32; 3],
     pub padding: u32,
-    pub background_linear: [f32; 3],
-    pub padding_2: u32,
 }
 
 /// Columns and rows of tiles.

@@ -55,8 +55,6 @@ struct ViewWork {
     position_share: f32,
     volume_max_in_world: vec3f,
     padding: u32,
-    background_linear: vec3f,
-    padding_2: u32,
     cameras: array<SampleCamera, {{ cameras }}>,
 }
 

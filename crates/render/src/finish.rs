@@ -99,18 +99,18 @@ pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces], plane
     let variant = Finish::of(batch);
     let pass = passes.get(&variant)?;
     let view_cell_m = batch.sequence.map_or(0.0, |sequence| sequence.known.view_cell_m);
-    let [r, g, b] = batch.work.scene.background_linear.to_array().map(f32::to_bits);
-    let positions = [batch.position, batch.output.antialias.samples(), 0, 0];
-    let finish = [[r, g, b, view_cell_m.to_bits()], positions].concat();
+    let finish = [view_cell_m.to_bits(), batch.position, batch.output.antialias.samples(), 0];
     let finish = gpu.buffer_with("finish", &finish, BufferUsages::UNIFORM);
     for (camera, target) in surfaces.iter().enumerate() {
         let Recording { batch, cameras, sums, .. } = recording;
-        let buffers: [&Buffer; 6] = [
+        let scene = batch.work.scene;
+        let buffers: [&Buffer; 7] = [
             cameras,
             &planes.words,
             &sums.buffer,
             &finish,
-            &batch.work.scene.illumination,
+            &scene.background,
+            &scene.illumination,
             planes.position_sums.as_deref().unwrap_or(&planes.words),
         ];
         let own = pass.bind(0, bindings(&variant, buffers, target))?;
@@ -121,7 +121,7 @@ pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces], plane
 
 fn bindings<'r>(
     variant: &Finish,
-    [camera, words, sums, finish, illumination, position_sums]: [&'r Buffer; 6],
+    [camera, words, sums, finish, background, illumination, position_sums]: [&'r Buffer; 7],
     target: &'r Surfaces,
 ) -> Vec<Binding<'r>> {
     let mut bindings = vec![
@@ -129,6 +129,7 @@ fn bindings<'r>(
         Binding::buffer("words", words),
         Binding::buffer("sums", sums),
         Binding::buffer("finish", finish),
+        Binding::buffer("background", background),
     ];
     bindings.extend(target.bindings());
     bindings.extend(variant.output.highlight.map(|_| Binding::buffer("illumination", illumination)));
@@ -150,7 +151,7 @@ mod tests {
         let stage = TestStage::new();
         for variant in Finish::all() {
             let target = stage.surfaces(variant.by_rays, variant.output.surface_id);
-            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 6], &target));
+            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 7], &target));
         }
     }
 }

@@ -1,6 +1,7 @@
 // Surface and light to finished planes: a view's colour and depth, or those of a depth image.
 {% include "camera.wgsl" %}
 {% include "color.wgsl" %}
+{% include "background.wgsl" %}
 {% include "normal.wgsl" %}
 {% include "albedo.wgsl" %}
 {% include "surfaces.wgsl" %}
@@ -30,7 +31,7 @@
 {% include "sums.wgsl" %}
 
 // The position within the pixels, of so many. One beyond them is the centre: it gives depth, and no colour.
-struct Finish { background_linear: vec3f, view_cell_m: f32, position: u32, position_count: u32 }
+struct Finish { view_cell_m: f32, position: u32, position_count: u32, padding: u32 }
 {% if redundancy %}
 
 fn front_at(texel: vec2u) -> f32 { return textureLoad(front_depth, texel, 0){{ ".x" if by_rays else "" }}; }
@@ -100,7 +101,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         linear += highlight(point, unit_from_oct16(surface.z), -normalize(direction), surface.w, visibility);
     }
 {% endif %}
-    let color = select(finish.background_linear, linear, met);
+    let color = select(background_linear(direction_of(pixel)), linear, met);
 {% if samples %}
     put(0u, place, rgb9e5_from_linear(color));
 {% else %}

@@ -99,7 +99,7 @@ pub struct GpuScene {
     /// The textures of materials in the order of [`Material::textures`], white where there is none, each with its
     /// sampler.
     pub(crate) textures: Vec<[(wgpu::TextureView, wgpu::Sampler); 5]>,
-    pub(crate) background_linear: Vec3,
+    pub(crate) background: wgpu::Buffer,
     pub(crate) illumination: wgpu::Buffer,
     pub(crate) light_count: usize,
     pub(crate) rays: RayScene,
@@ -142,7 +142,7 @@ impl GpuScene {
             objects: uniform(gpu, "objects", geometry.objects.into_iter()),
             surroundings: gpu.buffer_with("surroundings", &[surroundings(scene)], BufferUsages::UNIFORM),
             textures: geometry.textures.iter().map(|textures| textures.each_ref().map(sampled)).collect(),
-            background_linear: scene.background_linear,
+            background: gpu.buffer_with("background", &gpu::background_bytes(&scene.background), BufferUsages::UNIFORM),
             illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
             light_count: scene.illumination.lights.len(),
             rays: RayScene::of(gpu, scene, &ordered, motion.clone()),

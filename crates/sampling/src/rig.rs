@@ -26,6 +26,16 @@ pub struct RigError;
 
 /// 45 degrees, as in the paper.
 const FOV_Y_RAD: f32 = std::f32::consts::FRAC_PI_4;
+/// The greatest share of a frame's height and width that a model reaches, seen from the middle of its rig.
+const FRAMED_SHARE: f32 = 0.9;
+/// The same, seen from a corner.
+const CORNER_SHARE: f32 = 0.98;
+/// The greatest width of a frame over its height: that of views by default. Wider views show more on both sides.
+const FRAME_ASPECT: f32 = 4.0 / 3.0;
+/// The direction from a model to the eye: a three-quarter view, 25° from the front and 30° above.
+const THREE_QUARTER: Vec3 = Vec3::new(0.3660, 0.5, 0.7849);
+/// The least distance from an eye to a model's nearest point, in radii of the model.
+const LEAST_GAP_RADII: f32 = 0.5;
 
 impl Rig {
     /// The rig of the paper: cameras above the corners of a block between two horizontal planes, looking at the
@@ -69,6 +79,48 @@ impl Rig {
         })
     }
 
+    /// A three-quarter view of a model, a little above its middle. The model reaches 90 % of the frame's height or width,
+    /// and no camera of the rig cuts it off. Neighbouring cameras see its middle 2 · `spread_rad` apart. `points_in_world` are the model's vertices,
+    /// or other points whose hull has them all; `size_px` is the size of the sample images.
+    ///
+    /// # Errors
+    /// When the volume of the points is empty.
+    pub fn framing(
+        points_in_world: impl Iterator<Item = Vec3> + Clone,
+        spread_rad: f32,
+        size_px: UVec2,
+    ) -> Result<Self, RigError> {
+        let volume = Aabb::around(points_in_world.clone());
+        check(&volume)?;
+        let aspect = (size_px.x as f32 / size_px.y.max(1) as f32).min(FRAME_ASPECT);
+        let slopes = Vec2::new(aspect, 1.0) * (FOV_Y_RAD * 0.5).tan();
+        let radius_m = volume.size().length() * 0.5;
+        let backwards = THREE_QUARTER.normalize_or(Vec3::Z);
+        let right = Vec3::Y.cross(backwards).normalize_or(Vec3::X);
+        let up = backwards.cross(right);
+        let offsets = |middle: Vec3| points_in_world.clone().map(move |point| point - middle);
+        let seen = Extent::of(offsets(volume.center()), [right, up, backwards], slopes * FRAMED_SHARE);
+        let target = volume.center() + right * seen.off_center.x + up * seen.off_center.y;
+        let spread = spread_rad.tan();
+        let places = [(0.0, 0.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+        let distance_m = places.into_iter().fold(0.0f32, |most, (x, y)| {
+            let towards_eye = backwards + (right * x + up * y) * spread;
+            let (axis, length) = (towards_eye.normalize_or(Vec3::Z), towards_eye.length());
+            let side = up.cross(axis).normalize_or(Vec3::X);
+            let share = if x == 0.0 { FRAMED_SHARE } else { CORNER_SHARE };
+            let seen = Extent::of(offsets(target), [side, axis.cross(side), axis], slopes * share);
+            most.max(seen.distance_m.max(seen.nearest_m + LEAST_GAP_RADII * radius_m) / length)
+        });
+        let half = distance_m * spread;
+        Ok(Self {
+            center_in_world: target + backwards * distance_m,
+            half_edges_in_world: [right * half, up * half],
+            target_in_world: target,
+            fov_y_rad: FOV_Y_RAD,
+            near_m: LEAST_GAP_RADII * radius_m * 0.25,
+        })
+    }
+
     /// The camera at a place of the rectangle, -1 to 1 each way.
     #[must_use]
     pub fn camera_at(&self, place: Vec2, size_px: UVec2) -> PinholeCamera {
@@ -85,6 +137,33 @@ impl Rig {
     pub fn samples(&self, size_px: UVec2) -> Vec<PinholeCamera> {
         let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
         corners.map(|(x, y)| self.camera_at(Vec2::new(x, y), size_px)).to_vec()
+    }
+}
+
+/// What a camera that looks at the origin of some points must do to see all of them.
+struct Extent {
+    /// The least distance of the eye from the origin.
+    distance_m: f32,
+    /// The point to look at, to the right and above the origin, so that the points are in the middle of the picture.
+    off_center: Vec2,
+    /// The greatest offset of a point towards the eye.
+    nearest_m: f32,
+}
+
+impl Extent {
+    /// `axes` lead right, up and towards the eye; `slopes` are the frame's half sides at unit distance. A point at
+    /// (x, y, z) on the axes is inside from a distance of |x| / slope + z, and of |y| / slope + z.
+    fn of(offsets: impl Iterator<Item = Vec3>, [right, up, backwards]: [Vec3; 3], slopes: Vec2) -> Self {
+        let (mut high, mut low, mut nearest_m) = (Vec2::MIN, Vec2::MIN, f32::MIN);
+        for offset in offsets {
+            let across = Vec2::new(right.dot(offset), up.dot(offset)) / slopes;
+            let towards_eye_m = backwards.dot(offset);
+            high = high.max(across + towards_eye_m);
+            low = low.max(towards_eye_m - across);
+            nearest_m = nearest_m.max(towards_eye_m);
+        }
+        let off_center = (high - low) * 0.5 * slopes;
+        Self { distance_m: high.max(low).max_element(), off_center, nearest_m }
     }
 }
 

@@ -24,6 +24,7 @@ mod pose;
 pub mod procedural;
 mod spec;
 mod texture_use;
+mod up_axis;
 mod validate;
 mod validate_animation;
 
@@ -40,3 +41,4 @@ pub use model::*;
 pub use package::{pack, unpack};
 pub use spec::{BUILT_IN_NAMES, SceneSpec, SceneSpecError};
 pub use texture_use::{TextureUse, Wrap};
+pub use up_axis::{UpAxis, UpAxisError};

@@ -12,7 +12,20 @@ pub(crate) const SOFT_SUN_RAD: f32 = 2.0f32.to_radians();
 const DEFAULT_ENVIRONMENT: Environment =
     Environment { zenith_linear: Vec3::new(0.216, 0.232, 0.260), nadir_linear: Vec3::new(0.12, 0.10, 0.08) };
 
+/// A quiet grey from above to below, which no colour of a model is mistaken for.
+const DEFAULT_BACKGROUND: Environment =
+    Environment { zenith_linear: Vec3::new(0.56, 0.60, 0.66), nadir_linear: Vec3::new(0.06, 0.065, 0.075) };
+
 impl Scene {
+    /// Adds a quiet gradient behind a scene without a background.
+    #[must_use]
+    pub fn with_default_background(mut self) -> Self {
+        if self.background == Environment::default() {
+            self.background = DEFAULT_BACKGROUND;
+        }
+        self
+    }
+
     /// Returns whether a lamp or the environment lights the scene. Otherwise only emissive and unlit surfaces are
     /// visible.
     #[must_use]

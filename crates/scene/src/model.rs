@@ -1,6 +1,6 @@
 //! The scene as plain data, equal on every node.
 
-use depth_image::Illumination;
+use depth_image::{Environment, Illumination};
 use glam::{Affine3A, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -22,8 +22,8 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Lamps and environment. A scene without light is black and valid.
     pub illumination: Illumination,
-    /// Colour of pixels without a surface, linear RGB.
-    pub background_linear: Vec3,
+    /// Radiance of rays that meet no surface, by their direction.
+    pub background: Environment,
     /// Cameras that the source file listed.
     pub cameras: Vec<SourceCamera>,
     /// Sway as a function of scene time; `None` without wind.
@@ -35,6 +35,14 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Every vertex of every instance, at rest.
+    pub fn vertices_in_world(&self) -> impl Iterator<Item = Vec3> + Clone {
+        let placed = |instance: &Instance| Some((self.meshes.get(instance.mesh as usize)?, instance.world_from_mesh));
+        self.instances.iter().filter_map(placed).flat_map(|(mesh, world_from_mesh)| {
+            mesh.vertices.iter().map(move |v| world_from_mesh.transform_point3(Vec3::from(v.position)))
+        })
+    }
+
     /// Triangles as drawn: a mesh's count once for each of its instances.
     #[must_use]
     pub fn triangle_count(&self) -> u64 {

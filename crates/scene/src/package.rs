@@ -9,8 +9,8 @@
 //! are checked against the remaining bytes before memory is allocated.
 
 use bytemuck::Pod;
-use depth_image::Illumination;
-use glam::{DVec3, Vec3};
+use depth_image::{Environment, Illumination};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Fault, at_most};
@@ -31,7 +31,7 @@ struct Header {
     materials: Vec<Material>,
     textures: Vec<TextureHeader>,
     illumination: Illumination,
-    background_linear: Vec3,
+    background: Environment,
     cameras: Vec<SourceCamera>,
     wind: Option<Wind>,
     animation: Option<Animation>,
@@ -113,7 +113,7 @@ fn header_of(scene: &Scene) -> Header {
         materials: scene.materials.clone(),
         textures: scene.textures.iter().map(texture).collect(),
         illumination: scene.illumination.clone(),
-        background_linear: scene.background_linear,
+        background: scene.background,
         cameras: scene.cameras.clone(),
         wind: scene.wind,
         animation: scene.animation.clone(),
@@ -159,7 +159,7 @@ fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Re
         materials: header.materials,
         textures,
         illumination: header.illumination,
-        background_linear: header.background_linear,
+        background: header.background,
         cameras: header.cameras,
         wind: header.wind,
         animation: header.animation,

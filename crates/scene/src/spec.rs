@@ -72,13 +72,15 @@ pub enum SceneSpecError {
 }
 
 impl SceneSpec {
-    /// Makes or reads the scene, and adds default lights to a scene without light.
+    /// Makes or reads the scene. A file without light gets default lights, and a background.
     ///
     /// # Errors
     /// The errors of [`load_file`], and a meadow over the limits.
     pub fn load(&self, limits: &Limits, missing: MissingTextures) -> Result<Scene, SceneError> {
         let scene = match self {
-            Self::File(path) => return Ok(load_file(path, limits, missing)?.with_default_lights()),
+            Self::File(path) => {
+                return Ok(load_file(path, limits, missing)?.with_default_lights().with_default_background());
+            }
             Self::TreeTerrain { triangles, wind: false } => tree_terrain(*triangles, TREE_SEED),
             Self::TreeTerrain { triangles, wind: true } => tree_terrain(*triangles, TREE_SEED).with_wind(),
             Self::Grass { density } => {

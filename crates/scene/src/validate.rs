@@ -30,7 +30,7 @@ impl Scene {
         each("texture", &self.textures, |texture| check_texture(texture, limits))?;
         self.check_illumination()?;
         each("camera", &self.cameras, check_camera)?;
-        require(is_radiance(self.background_linear), "background", "negative or not finite")?;
+        self.background.validate().map_err(|e| Fault::light("background", &e))?;
         self.wind.as_ref().map_or(Ok(()), check_wind)?;
         self.check_animation(limits)?;
         require(self.origin_in_source.is_finite(), "origin", "not finite")

@@ -190,6 +190,18 @@ fn the_default_lights_are_soft_and_under_a_sky() {
 }
 
 #[test]
+fn a_scene_without_a_background_gets_a_quiet_gradient() {
+    let background = Scene::default().with_default_background().background;
+    let (above, below) = (background.zenith_linear, background.nadir_linear);
+    assert!(below.cmplt(above).all() && below.min_element() > 0.0 && above.max_element() < 1.0, "{background:?}");
+    for color in [above, below] {
+        assert!(color.max_element() < 1.3 * color.min_element(), "{color} is no grey");
+    }
+    let red = Scene { background: Environment::uniform(Vec3::X), ..Scene::default() };
+    assert_eq!(red.clone().with_default_background(), red, "a background that is there is kept");
+}
+
+#[test]
 fn only_a_material_with_a_highlight_is_specular() {
     let matt = Material::default();
     assert!(!matt.is_specular() && !Material { roughness: 0.95, ..matt.clone() }.is_specular());

@@ -95,7 +95,9 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
         }
     }
     if let Some(folder) = &args.peer {
-        let subject = Subject::of_views(engine, peer::scene(folder), |setup| peer::views(args, setup, folder))?;
+        let (scene, setup) = peer::scene(folder)?;
+        let views = peer::views(args, &setup, folder)?;
+        let subject = Subject::of_views(engine, scene, setup, views)?;
         report.checks.extend(subject.costs(args, "peer scene")?);
     }
     report.tables.push(table);
@@ -104,21 +106,21 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
 
 impl Subject {
     fn new(args: &BenchArgs, engine: &Arc<GpuEngine>, scene: SceneArgs) -> anyhow::Result<Self> {
-        Self::of_views(engine, scene, |setup| {
-            let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
-            Ok(cell.spread(args.compared_views() / 2, VIEW_SIZE_PX * 2))
-        })
+        let setup = scene.load()?;
+        let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
+        let views = cell.spread(args.compared_views() / 2, VIEW_SIZE_PX * 2);
+        Self::of_views(engine, scene, setup, views)
     }
 
     fn of_views(
         engine: &Arc<GpuEngine>,
         scene: SceneArgs,
-        views: impl FnOnce(&Setup) -> anyhow::Result<Vec<PinholeCamera>>,
+        setup: Setup,
+        views: Vec<PinholeCamera>,
     ) -> anyhow::Result<Self> {
         // The planes of the hybrid mesh are enough for all methods.
         let scene = SceneArgs { method: HYBRID.parse()?, ..scene };
-        let setup = scene.load()?;
-        let reference = ReferenceViews::draw(engine, &setup, &scene, views(&setup)?)?;
+        let reference = ReferenceViews::draw(engine, &setup, &scene, views)?;
         let mut subject = Self { setup, args: scene, reference, truth: Vec::new() };
         subject.truth = subject.drawn_with_64()?;
         Ok(subject)

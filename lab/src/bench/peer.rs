@@ -8,7 +8,7 @@ use app_core::setup::{SceneArgs, Setup};
 use depth_image::PinholeCamera;
 use engine::GpuEngine;
 use render::Lighting;
-use scene::SceneSpec;
+use scene::{Environment, SceneSpec};
 use study::{Bar, Check, Report};
 
 use super::args::BenchArgs;
@@ -38,8 +38,7 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
             .extend(COMPARISONS.map(|(name, unit, bar, _)| Check::not_run(name, unit, bar, "--peer is not given")));
         return Ok(());
     };
-    let scene = scene(folder);
-    let setup = scene.load()?;
+    let (scene, setup) = scene(folder)?;
     let views = views(args, &setup, folder)?;
     let reference = ReferenceViews::draw(engine, &setup, &scene, views)?;
     let row = reference.evaluate(args.scene.method, args.runs())?;
@@ -48,13 +47,15 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
     Ok(())
 }
 
-/// The scene of a folder, unlit as the peer shows it.
-pub(super) fn scene(folder: &Path) -> SceneArgs {
-    SceneArgs {
+/// The scene of a folder, unlit and on black as the peer shows it.
+pub(super) fn scene(folder: &Path) -> anyhow::Result<(SceneArgs, Setup)> {
+    let args = SceneArgs {
         lighting: Lighting::UNLIT,
         samples: Some(folder.join("samples.json")),
         ..scene_args(SceneSpec::File(folder.join("bench.ply")))
-    }
+    };
+    let setup = args.load_changed(|scene| scene.background = Environment::default())?;
+    Ok((args, setup))
 }
 
 pub(super) fn views(args: &BenchArgs, setup: &Setup, folder: &Path) -> anyhow::Result<Vec<PinholeCamera>> {

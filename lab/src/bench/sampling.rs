@@ -119,7 +119,7 @@ fn upload(subject: &Subject, engine: &GpuEngine, images: &[DepthImage]) -> anyho
     let offer = &subject.setup.offer;
     let description = SetDescription {
         volume: offer.volume,
-        background_linear: offer.background_linear,
+        background: offer.background,
         illumination: &offer.illumination,
         highlight: None,
     };

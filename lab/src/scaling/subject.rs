@@ -83,7 +83,7 @@ impl Subject {
             lighting: lighting.to_string(),
             planes: SamplePlanes::default(),
             volume: offer.volume,
-            background_linear: offer.background_linear,
+            background: offer.background,
             timeline: self.fresh_timeline(1),
             illumination: offer.illumination.clone(),
             refinement_steps: 1,

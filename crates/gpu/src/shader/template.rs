@@ -62,6 +62,7 @@ impl Templates {
     /// When a text is not a template.
     pub fn new(own: &[(&'static str, &'static str)]) -> Result<Self, ShaderError> {
         let shared = [
+            ("background.wgsl", include_str!("../wgsl/background.wgsl")),
             ("color.wgsl", include_str!("../wgsl/color.wgsl")),
             ("normal.wgsl", include_str!("../wgsl/normal.wgsl")),
             ("light.wgsl", include_str!("../wgsl/light.wgsl")),

@@ -18,7 +18,7 @@ mod tile_start;
 mod view_ray;
 
 use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, View, srgb8_from_linear};
-use glam::Vec3;
+use glam::{UVec2, Vec3};
 
 use self::{pixel::Pixel, sample_camera::SampleCamera, view_ray::ViewRays};
 use crate::{methods::ReconstructionMethod, pyramid::is_among_holes, quads::Quad, sample_set::SetDescription};
@@ -45,8 +45,9 @@ pub fn reconstruct_antialiased(
 ) -> View {
     let mut sums = vec![Vec3::ZERO; camera.pixel_count()];
     for offset_px in antialias.offsets_px() {
-        let shifted = pixels(images, set, &camera.with_offset(offset_px), method);
-        sums.iter_mut().zip(&shifted).for_each(|(sum, pixel)| *sum += shown_linear(pixel, set));
+        let shifted = camera.with_offset(offset_px);
+        let shown = shown_linear(&pixels(images, set, &shifted, method), set, &shifted);
+        sums.iter_mut().zip(shown).for_each(|(sum, shown)| *sum += shown);
     }
     let mean = |sum: &Vec3| *sum / antialias.samples() as f32;
     let srgb8 = sums.iter().flat_map(|sum| mean(sum).to_array().map(srgb8_from_linear)).collect();
@@ -68,15 +69,26 @@ fn pixels(
     finished(found, images, set, &cameras, &rays)
 }
 
-/// What a pixel shows: its surface, or the background.
-fn shown_linear(pixel: &Pixel, set: &SetDescription<'_>) -> Vec3 {
-    if pixel.inverse_depth_per_m > 0.0 { pixel.color_linear } else { set.background_linear }
+/// What each pixel shows: its surface, or the background in its direction.
+fn shown_linear(pixels: &[Pixel], set: &SetDescription<'_>, camera: &PinholeCamera) -> Vec<Vec3> {
+    let place = |index: usize| UVec2::new(index as u32 % camera.size_px.x, index as u32 / camera.size_px.x);
+    let background = |index| {
+        set.background.radiance_linear(camera.ray(place(index).as_vec2() + 0.5).direction_in_world.normalize_or_zero())
+    };
+    let shown = |(index, pixel): (usize, &Pixel)| match pixel.inverse_depth_per_m > 0.0 {
+        true => pixel.color_linear,
+        false => background(index),
+    };
+    pixels.iter().enumerate().map(shown).collect()
 }
 
 fn view(pixels: &[Pixel], set: &SetDescription<'_>, camera: &PinholeCamera) -> View {
     View {
         size_px: camera.size_px,
-        srgb8: pixels.iter().flat_map(|p| shown_linear(p, set).to_array().map(srgb8_from_linear)).collect(),
+        srgb8: shown_linear(pixels, set, camera)
+            .iter()
+            .flat_map(|shown| shown.to_array().map(srgb8_from_linear))
+            .collect(),
         inverse_depth_per_m: Some(pixels.iter().map(|p| p.inverse_depth_per_m).collect()),
         provenance: Some(pixels.iter().map(|p| p.provenance).collect()),
     }

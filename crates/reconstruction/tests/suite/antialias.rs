@@ -78,7 +78,7 @@ fn views_with_several_positions_are_their_twins() {
 #[test]
 fn a_silhouette_is_between_the_surface_and_the_background() {
     let (_, mut scene, corners) = corpus().swap_remove(3);
-    scene.background_linear = Vec3::ONE;
+    scene.background = Environment::uniform(Vec3::ONE);
     let stage = Stage::new(scene, &corners.samples(4));
     let planes = ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::COLOR };
     let view = drawn(&stage.upload(), corners.view(), CARVE, planes);
@@ -96,8 +96,12 @@ fn light_beyond_white_counts_in_the_mean() {
     }
     let dark = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
     let none: Option<Highlight> = None;
-    let description =
-        SetDescription { volume: stage.volume, background_linear: Vec3::ZERO, illumination: &dark, highlight: none };
+    let description = SetDescription {
+        volume: stage.volume,
+        background: Environment::uniform(Vec3::ZERO),
+        illumination: &dark,
+        highlight: none,
+    };
     let set = reconstructor().upload(&stage.images, &description).expect("a set");
     let planes = ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::COLOR };
     let view = drawn(&set, corners.view(), CARVE, planes);

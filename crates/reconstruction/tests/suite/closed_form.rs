@@ -1,7 +1,7 @@
 //! Closed forms: views that are known without any oracle.
 
-use depth_image::{DepthImage, ProvenanceKind, View};
-use glam::{UVec2, Vec3};
+use depth_image::{DepthImage, Environment, ProvenanceKind, View, srgb8_from_linear};
+use glam::{UVec2, Vec2, Vec3};
 use reconstruction::{CodedDepth, ReconstructionMethod};
 use scene::procedural::{quad, uv_sphere};
 
@@ -138,4 +138,35 @@ fn a_search_in_small_steps_finds_the_wall_too() {
         |(kind, inverse): &(&ProvenanceKind, &f32)| **kind == ProvenanceKind::Hit && (*inverse - 0.25).abs() < 1e-3;
     let found = kinds.iter().zip(depths(&view)).filter(near);
     assert!(found.count() > 500);
+}
+
+/// A wall before a gradient: pixels without a surface show it in their own direction, drawn and reconstructed alike.
+#[test]
+fn a_background_by_direction_is_the_same_drawn_and_reconstructed() {
+    let background = Environment { zenith_linear: Vec3::new(0.9, 0.7, 0.5), nadir_linear: Vec3::new(0.0, 0.1, 0.3) };
+    let eyes = [Vec3::new(-0.3, 0.2, 0.0), Vec3::new(0.3, -0.2, 0.0)];
+    let scene = scene::Scene { background, ..wall(4.0) };
+    let stage = Stage::with_corners(scene, &eyes.map(|eye| looking_ahead(eye, SAMPLE_PX)));
+    let camera = looking(Vec3::ZERO, Vec3::new(0.1, 0.2, -1.0), 60.0, VIEW_PX);
+    let drawn = stage.drawn_directly(&camera);
+    let expected = |index: usize| {
+        let (x, y) = (index as u32 % VIEW_PX.x, index as u32 / VIEW_PX.x);
+        let ray = camera.ray(Vec2::new(x as f32, y as f32) + 0.5);
+        background.radiance_linear(ray.direction_in_world.normalize_or_zero()).to_array().map(srgb8_from_linear)
+    };
+    let is_empty = |view: &View, index: usize| kinds(view)[index] == ProvenanceKind::Empty;
+    for method in [CARVE, SEARCH, ReconstructionMethod::Mesh, ReconstructionMethod::HybridMesh { merged: None }] {
+        for (name, view) in [("device", stage.view(&camera, method)), ("twin", stage.twin(&camera, method))] {
+            let both: Vec<usize> =
+                (0..drawn.srgb8.len() / 3).filter(|&i| is_empty(&drawn, i) && is_empty(&view, i)).collect();
+            assert!(both.len() > 500, "{method}, {name}: {} pixels", both.len());
+            for &index in &both {
+                let differ = (0..3).map(|c| view.srgb8[3 * index + c].abs_diff(expected(index)[c])).max();
+                assert!(differ <= Some(1), "{method}, {name}, pixel {index}: {differ:?}");
+                assert!(colors_differ_by(&drawn, &view, index) <= 1, "{method}, {name}, pixel {index}");
+            }
+            let colors: std::collections::BTreeSet<u8> = both.iter().map(|&index| view.srgb8[3 * index]).collect();
+            assert!(colors.len() > 20, "{method}, {name}: no gradient, {colors:?}");
+        }
+    }
 }

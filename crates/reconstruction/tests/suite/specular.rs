@@ -102,7 +102,7 @@ impl Room {
 
     fn description(&self, highlight: Option<Highlight>) -> SetDescription<'_> {
         let volume = Aabb { min: Vec3::new(-4.0, -4.0, 0.0), max: Vec3::new(4.0, 4.0, 1.2) };
-        SetDescription { volume, background_linear: Vec3::ZERO, illumination: &self.illumination, highlight }
+        SetDescription { volume, background: Environment::default(), illumination: &self.illumination, highlight }
     }
 
     /// The colour of a view's pixel, as an eye sees it.

@@ -45,8 +45,8 @@ pub fn reconstructor() -> &'static Reconstructor {
 static DARK: Illumination = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
 
 /// A set in which nothing depends on the viewer.
-pub fn matt(volume: Aabb, background_linear: Vec3) -> SetDescription<'static> {
-    SetDescription { volume, background_linear, illumination: &DARK, highlight: None }
+pub fn matt(volume: Aabb, background: Environment) -> SetDescription<'static> {
+    SetDescription { volume, background, illumination: &DARK, highlight: None }
 }
 
 /// A scene and depth images of it.
@@ -90,7 +90,7 @@ impl Stage {
     }
 
     pub fn description(&self) -> SetDescription<'static> {
-        matt(self.volume, self.scene.background_linear)
+        matt(self.volume, self.scene.background)
     }
 
     pub fn views(&self, cameras: &[PinholeCamera], method: ReconstructionMethod) -> Vec<View> {

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use depth_image::{Camera, CameraError, DepthImage, PinholeCamera, View, ViewPlanes, linear_from_rgb9e5};
+use depth_image::{Camera, CameraError, DepthImage, Environment, PinholeCamera, View, ViewPlanes, linear_from_rgb9e5};
 use glam::{Affine3A, UVec2, Vec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, SamplePlanes, Visibility, scalar};
 use scene::procedural::{courtyard, poles, quad, unit_cube, uv_sphere};
@@ -125,8 +125,9 @@ fn a_wall_four_metres_ahead_reads_a_quarter() {
 #[test]
 fn unlit_colors_and_the_background_are_exact() {
     let mut scene = wall();
-    scene.background_linear = Vec3::new(0.2, 0.4, 0.6);
-    let background = scene.background_linear.to_array().map(depth_image::srgb8_from_linear);
+    let background_linear = Vec3::new(0.2, 0.4, 0.6);
+    scene.background = Environment::uniform(background_linear);
+    let background = background_linear.to_array().map(depth_image::srgb8_from_linear);
     for lighting in [Lighting::UNLIT, Lighting::default()] {
         let planes = ViewPlanes::ALL;
         let on_device = upload(&scene);

@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 
 use super::geometry::{MeshBuilder, matt, vertex};
 use super::random::{Noise, Rng, lerp, mix};
-use crate::{Material, Scene, Vertex};
+use crate::{Environment, Material, Scene, Vertex};
 
 /// Number of triangles at density 1, that of the model in the paper's table 1.
 const TRIANGLES: f64 = 56_000.0;
@@ -92,7 +92,7 @@ pub fn grass(density: GrassDensity) -> Scene {
     builder.finish_part(1);
     let blades = Material { double_sided: true, ..matt("blades") };
     let scene = builder.into_scene_of("grass", vec![matt("ground"), blades]);
-    Scene { background_linear: Vec3::new(0.46, 0.60, 0.80), ..scene }
+    Scene { background: Environment::uniform(Vec3::new(0.46, 0.60, 0.80)), ..scene }
 }
 
 /// Places spread evenly over the unit square for any number of them: the R2 sequence (Roberts 2018).

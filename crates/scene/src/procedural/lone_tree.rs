@@ -7,7 +7,7 @@ use glam::{Affine3A, Vec2, Vec3};
 use super::geometry::{MeshBuilder, matt, vertex};
 use super::random::{Noise, mix};
 use super::tree::{TreePlan, tree_mesh};
-use crate::{Instance, Material, Mesh, Scene};
+use crate::{Environment, Instance, Material, Mesh, Scene};
 
 /// Number of triangles of the model in the paper's table 1.
 const TRIANGLES: u32 = 113_000;
@@ -34,7 +34,7 @@ pub fn lone_tree() -> Scene {
         meshes: vec![ground, tree_mesh(&plan, SEED)],
         instances: vec![instance(0, 1.0), instance(1, SCALE)],
         materials: vec![matt("ground"), matt("bark"), Material { double_sided: true, ..matt("leaves") }],
-        background_linear: Vec3::new(0.46, 0.60, 0.80),
+        background: Environment::uniform(Vec3::new(0.46, 0.60, 0.80)),
         ..Scene::default()
     }
     .with_default_lights()

@@ -2,6 +2,7 @@
 
 use std::f32::consts::{PI, TAU};
 
+use depth_image::Environment;
 use glam::{Affine3A, DAffine3, Quat, Vec3};
 
 use super::geometry::{MeshBuilder, matt, vertex};
@@ -52,7 +53,7 @@ pub fn snake() -> Scene {
         meshes: vec![body, ground()],
         instances: instances.collect(),
         materials: vec![matt("skin"), matt("sand")],
-        background_linear: Vec3::new(0.46, 0.60, 0.80),
+        background: Environment::uniform(Vec3::new(0.46, 0.60, 0.80)),
         animation: Some(animation),
         ..Scene::default()
     }

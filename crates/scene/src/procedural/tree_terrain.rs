@@ -40,7 +40,7 @@ pub fn tree_terrain(triangles: u32, seed: u64) -> Scene {
         meshes,
         materials: materials(),
         illumination: Illumination { lights: lights(), environment: ENVIRONMENT },
-        background_linear: Vec3::new(0.40, 0.56, 0.80),
+        background: Environment::uniform(Vec3::new(0.40, 0.56, 0.80)),
         ..Scene::default()
     }
 }

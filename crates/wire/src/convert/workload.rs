@@ -19,9 +19,9 @@ messages! {
     Timeline = Timeline { start_s, step_s, set_count };
     Workload = Workload {
         scene as "workload.scene", sample_cameras, cell_first_indices, lighting, volume as "workload.volume",
-        timeline as "workload.timeline", illumination as "workload.illumination";
+        timeline as "workload.timeline", illumination as "workload.illumination", background as "workload.background";
         sampling: sampling_method, planes: with_normals | with_corner_inverse_depths,
-        background_linear: background_linear_rgb, refinement_steps: refinement_step_count
+        refinement_steps: refinement_step_count
     }, first |w| {
         let cells = w.cell_first_indices.len().clamp(1, MAX_CELLS);
         at_most(w.sample_cameras.len(), MAX_SAMPLE_CAMERAS * cells, "sample_cameras")

@@ -10,7 +10,7 @@ mod shell;
 use glam::Vec3;
 
 use super::geometry::{MeshBuilder, matt};
-use crate::Scene;
+use crate::{Environment, Scene};
 
 /// Number of triangles of the model in the paper's table 1.
 const TRIANGLES: u32 = 67_000;
@@ -26,5 +26,5 @@ pub fn bird_nest() -> Scene {
     lattice::add(&mut builder, TRIANGLES);
     builder.finish_part(2);
     let scene = builder.into_scene_of("bird-nest", vec![matt("ground"), matt("bowl"), matt("steel")]);
-    Scene { background_linear: Vec3::new(0.50, 0.60, 0.74), ..scene }
+    Scene { background: Environment::uniform(Vec3::new(0.50, 0.60, 0.74)), ..scene }
 }

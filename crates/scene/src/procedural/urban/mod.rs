@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 
 use super::geometry::{MeshBuilder, matt};
 use super::random::Rng;
-use crate::Scene;
+use crate::{Environment, Scene};
 use street::{BLOCK_M, HALF_WIDTH_M, SEED, blocks};
 
 /// Number of triangles of the model in the paper's table 1.
@@ -27,7 +27,7 @@ pub fn urban() -> Scene {
     street::add_furniture(&mut builder, TRIANGLES);
     builder.finish_part(2);
     let scene = builder.into_scene_of("urban", vec![matt("street"), matt("houses"), matt("furniture")]);
-    Scene { background_linear: Vec3::new(0.52, 0.62, 0.76), ..scene }
+    Scene { background: Environment::uniform(Vec3::new(0.52, 0.62, 0.76)), ..scene }
 }
 
 /// Quarters of blocks that are parks: (block, quarter).
