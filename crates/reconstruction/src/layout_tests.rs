@@ -72,6 +72,7 @@ fn shader(module: &Module, name: &str) -> Layout {
 #[test]
 fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
     let passes = BTreeSet::from([
+        "background.wgsl",
         "fill.wgsl",
         "joint_carve.wgsl",
         "light_field_search.wgsl",

@@ -1,9 +1,10 @@
 //! Reconstruction methods: depth images to views.
 //!
 //! [`Reconstructor::upload`] puts one complete sample set on the device with a min-max pyramid a camera.
-//! [`Reconstructor::reconstruct`] draws views from it, many in one submission: tile starts, the method, the fill and
-//! highlights. Each method is one enum variant, one `.rs` and `.wgsl` pair in `methods`, and has a scalar twin.
+//! [`Reconstructor::reconstruct`] draws views from it, many in one submission: tile starts, the method, the fill, the
+//! background and highlights. Each method is one enum variant, one `.rs` and `.wgsl` pair in `methods`, and has a scalar twin.
 
+mod background;
 mod device;
 mod error;
 mod fill;

@@ -9,8 +9,8 @@ use crate::in_flight::{InFlight, Statistics};
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
 use crate::recording::{Recording, batches};
 use crate::sample_set::{SampleSet, SetDescription};
+use crate::{background, fill, shaders::templates, specular, tile_start};
 use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
-use crate::{fill, shaders::templates, specular, tile_start};
 
 /// Calls of one class that are under way at once: each holds the memory of two batches.
 const CALLS_OF_A_CLASS: usize = 4;
@@ -161,6 +161,7 @@ impl Reconstructor {
         }
         let unknown = method.record(&self.drawing, mesh, &mut recording)?;
         fill::record(&mut recording, &unknown)?;
+        background::record(&mut recording)?;
         specular::record(&mut recording)?;
         Ok(recording)
     }

@@ -4,6 +4,7 @@ use depth_image::ProvenanceKind;
 use gpu::{ShaderError, ShaderSource, Templates, wgsl_constants, wgsl_files};
 use minijinja::Value;
 
+use crate::background::Background;
 use crate::fill::{DIRECTIONS, Fill, REACH_PX, SAME_SIDE};
 use crate::pyramid::{BACKGROUND_CODE, FLAT_FOOTPRINTS, HOLE_CODE, SLOPE_SHARE};
 use crate::surface::{
@@ -14,8 +15,9 @@ use crate::view_work::{CELL_MARGIN_PX, FAR_AWAY, TILE_PX};
 use crate::{methods, pixel_list::LIST_WORKGROUP, quads, specular::Specular};
 
 /// Passes over whole views, and templates that several shaders include.
-const SHADERS: [(&str, &str); 7] = wgsl_files! {
-    "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "pixel_list.wgsl"
+const SHADERS: [(&str, &str); 8] = wgsl_files! {
+    "tile_start.wgsl", "fill.wgsl", "background.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl",
+    "pixel_list.wgsl"
 };
 
 const PROVENANCE_EMPTY: u32 = ProvenanceKind::Empty as u32;
@@ -46,7 +48,7 @@ pub fn templates() -> Result<Templates, ShaderError> {
 
 /// The texts of all variants of all passes.
 pub fn shader_sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    gpu::shader_sources!(templates, TileStart, Fill, Specular)
+    gpu::shader_sources!(templates, TileStart, Fill, Background, Specular)
         .chain(quads::sources(templates))
         .chain(methods::sources(templates))
 }

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use depth_image::Highlight;
-use gpu::{Binding, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, switches};
+use gpu::{Binding, GpuEnvironment, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, switches};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
@@ -17,12 +17,15 @@ use crate::{
 pub(crate) struct Finish {
     by_rays: bool,
     lit: bool,
+    /// The environment is a map, which is the background, too.
+    environment_map: bool,
     output: Output,
 }
 
 impl Finish {
     fn of(batch: &Batch<'_>) -> Self {
-        Self { by_rays: batch.by_rays, lit: batch.work.lighting.is_lit(), output: batch.output }
+        let (lit, environment_map) = (batch.work.lighting.is_lit(), batch.work.scene.environment.is_some());
+        Self { by_rays: batch.by_rays, lit, environment_map, output: batch.output }
     }
 
     /// The variants with each usefulness test.
@@ -39,8 +42,10 @@ impl Finish {
     }
 
     fn of_output(output: Output) -> impl Iterator<Item = Self> {
-        let each =
-            move |sums| switches().map(move |[by_rays, lit]| Self { by_rays, lit, output: Output { sums, ..output } });
+        let each = move |sums| {
+            let output = Output { sums, ..output };
+            switches().map(move |[by_rays, lit, environment_map]| Self { by_rays, lit, environment_map, output })
+        };
         SumPlanes::all().flat_map(each)
     }
 }
@@ -55,6 +60,7 @@ impl ShaderVariant for Finish {
         context! {
             by_rays => self.by_rays,
             lit => self.lit,
+            environment_map => self.environment_map,
             highlight => highlight.map(highlight_name),
             surface_id => surface_id.is_some(),
             normal_plane => normal, reflector_plane => reflector, id_plane => surface_id, passed_plane => passed,
@@ -84,7 +90,7 @@ pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces]) -> Re
     for (camera, target) in surfaces.iter().enumerate() {
         let Recording { batch, cameras, sums, .. } = recording;
         let buffers: [&Buffer; 5] = [cameras, &words, &sums.buffer, &finish, &batch.work.scene.illumination];
-        let own = pass.bind(0, bindings(&variant, buffers, target))?;
+        let own = pass.bind(0, bindings(&variant, buffers, target, batch.work.scene.environment.as_deref()))?;
         recording.dispatch(&variant, &pass, &[&own], (camera, 1));
     }
     Ok(words)
@@ -94,6 +100,7 @@ fn bindings<'r>(
     variant: &Finish,
     [camera, words, sums, finish, illumination]: [&'r Buffer; 5],
     target: &'r Surfaces,
+    map: Option<&'r GpuEnvironment>,
 ) -> Vec<Binding<'r>> {
     let mut bindings = vec![
         Binding::buffer("camera", camera),
@@ -105,6 +112,7 @@ fn bindings<'r>(
     bindings.extend(variant.output.highlight.map(|_| Binding::buffer("illumination", illumination)));
     let ids = target.surface_ids.as_ref().filter(|_| variant.output.surface_id);
     bindings.extend(ids.map(|ids| Binding::texture("surface_ids", ids)));
+    bindings.extend(map.into_iter().flat_map(GpuEnvironment::bindings));
     bindings.extend(variant.output.passed.then(|| Binding::texture("front_depth", &target.views.front_depth)));
     bindings
 }
@@ -119,7 +127,8 @@ mod tests {
         let stage = TestStage::new();
         for variant in Finish::all() {
             let target = stage.surfaces(variant.by_rays, variant.output.surface_id);
-            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 5], &target));
+            let map = variant.environment_map.then_some(&stage.environment);
+            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 5], &target, map));
         }
     }
 }

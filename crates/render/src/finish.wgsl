@@ -4,9 +4,14 @@
 {% include "normal.wgsl" %}
 {% include "albedo.wgsl" %}
 {% include "surfaces.wgsl" %}
+{% if environment_map %}
+{% include "table.wgsl" %}
+{% endif %}
 {% if highlight %}
 {% include "light.wgsl" %}
 {% include "highlight.wgsl" %}
+{% elif environment_map %}
+{% include "environment.wgsl" %}
 {% endif %}
 
 // The finished planes of each camera, one after the other.
@@ -33,6 +38,15 @@ fn front_at(texel: vec2u) -> f32 { return textureLoad(front_depth, texel, 0){{ "
 {% if usefulness_test %}
 {% include usefulness_test %}
 {% endif %}
+
+// Radiance where a ray meets no surface; the direction's length does not matter.
+fn background_linear(direction: vec3f) -> vec3f {
+{% if environment_map %}
+    return environment_radiance(normalize(direction));
+{% else %}
+    return finish.background_linear;
+{% endif %}
+}
 
 fn put(plane: u32, place: u32, word: u32) { words[camera.first_word + plane * camera.pixel_count + place] = word; }
 {% if visibility %}
@@ -79,7 +93,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         linear += highlight(point, unit_from_oct16(surface.z), -normalize(direction), surface.w, visibility);
     }
 {% endif %}
-    let color = select(finish.background_linear, linear, met);
+    for (var open = !met; open; open = false) { linear = background_linear(direction_of(pixel)); }
+    let color = linear;
 {% if samples %}
     put(0u, place, rgb9e5_from_linear(color));
 {% else %}

@@ -21,9 +21,9 @@ pub mod procedural;
 mod spec;
 mod validate;
 
-pub use depth_image::{Environment, Illumination, Light, LightError};
+pub use depth_image::{Environment, EnvironmentMap, Illumination, Light, LightError};
 pub use error::{SceneError, SceneErrorKind};
-pub use import::{MissingTextures, MissingTexturesError, load_file};
+pub use import::{MissingTextures, MissingTexturesError, load_environment, load_file};
 pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorKind};
 pub use limits::Limits;
 pub use model::*;

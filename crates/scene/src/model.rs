@@ -1,6 +1,6 @@
 //! The scene as plain data, equal on every node.
 
-use depth_image::{Aabb, Illumination};
+use depth_image::{Aabb, EnvironmentMap, Illumination};
 use glam::{Affine3A, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +19,8 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Lamps and environment. A scene without light is black and valid.
     pub illumination: Illumination,
+    /// The map of an [environment](Illumination::environment) that is mapped.
+    pub environment_map: Option<EnvironmentMap>,
     /// Colour of pixels without a surface, linear RGB.
     pub background_linear: Vec3,
     /// Cameras that the source file listed.

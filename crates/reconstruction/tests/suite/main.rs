@@ -1,5 +1,6 @@
 //! The methods on the software device: against their scalar twins, closed forms and their own limits.
 
+mod background;
 mod batches;
 mod closed_form;
 mod failures;

@@ -2,6 +2,7 @@
 //! common steps: re-centring, mirrored placements, limits, validation.
 
 mod clamped;
+mod environment;
 mod folder;
 mod gltf;
 mod missing_textures;
@@ -15,6 +16,7 @@ use std::path::Path;
 
 use crate::error::Fault;
 use crate::{Limits, Scene, SceneError};
+pub use environment::load_environment;
 use folder::Folder;
 pub use missing_textures::{MissingTextures, MissingTexturesError};
 use source_scene::SourceScene;

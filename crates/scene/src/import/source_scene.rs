@@ -81,6 +81,7 @@ impl SourceScene {
             materials: self.materials,
             textures: self.textures,
             illumination: Illumination { lights, ..Illumination::default() },
+            environment_map: None,
             cameras: self.cameras.into_iter().map(camera).collect(),
             origin_in_source,
             ..Scene::default()
