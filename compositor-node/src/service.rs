@@ -46,7 +46,7 @@ impl CompositorService {
         for lane in Lane::ALL {
             rendering.spawn(renderer.clone().run(arrivals.clone(), lane));
         }
-        let sets = Arc::new(Sets::new(scenes.engine(), plans.clone(), config, metrics.clone()));
+        let sets = Arc::new(Sets::new(scenes.clone(), plans.clone(), config, metrics.clone()));
         let quota = NodeQuota::new(config.quotas);
         let shared = Shared {
             plans,

@@ -8,10 +8,10 @@ use cluster::{Assignment, SetContent, Timeline, Workload};
 use codec::EncodedDepthImage;
 use depth_image::{Camera, PinholeCamera, nearest_set};
 use node::{
-    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet, SetMemory, Turn,
-    UploadedSet,
+    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet, Scenes,
+    SetMemory, Turn, UploadedSet,
 };
-use node::{WorkClass, beyond_timeline, blocking, most_image_bytes, most_set_bytes, own_time, set_bytes};
+use node::{WorkClass, beyond_timeline, most_image_bytes, most_set_bytes, own_time, set_bytes};
 use tonic::{Code, Status};
 use wire::rpc::Messages;
 
@@ -70,7 +70,7 @@ fn subject(plan: &Assignment) -> Option<SetContent> {
 
 /// The sets of one compositor: the latest few moments of each cell, as long as memory has room.
 pub(crate) struct Sets {
-    engine: Arc<dyn Engine>,
+    scenes: Arc<Scenes>,
     fetcher: Arc<Fetcher>,
     metrics: NodeMetrics,
     plans: PlansInForce,
@@ -87,7 +87,7 @@ impl Sets {
 
     /// Checks that a plan's samples have the planes that a method needs.
     pub(crate) fn check_method(&self, plan: &Assignment, method: &str) -> Result<(), Status> {
-        if plan.workload.planes.contain(self.engine.sample_planes(method)?) {
+        if plan.workload.planes.contain(self.scenes.engine().sample_planes(method)?) {
             return Ok(());
         }
         let text = "needs planes that this workload does not sample; a session of this method does";
@@ -96,12 +96,12 @@ impl Sets {
 
     /// Counts a live stream as open on the device until the guard is dropped.
     pub(crate) fn live_stream(&self) -> Box<dyn std::any::Any + Send + Sync> {
-        self.engine.live_stream()
+        self.scenes.engine().live_stream()
     }
 
-    pub(crate) fn new(engine: Arc<dyn Engine>, plans: PlansInForce, config: &NodeConfig, metrics: NodeMetrics) -> Self {
+    pub(crate) fn new(scenes: Arc<Scenes>, plans: PlansInForce, config: &NodeConfig, metrics: NodeMetrics) -> Self {
         Self {
-            engine,
+            scenes,
             fetcher: Arc::new(Fetcher::new(plans.clone(), config.deadlines)),
             metrics,
             plans,
@@ -258,12 +258,13 @@ impl Sets {
         self.cached.keep_latest(latest - 1, |set| set.subject == subject);
         let bytes = set_bytes(&set.images) + relay.as_ref().map_or(0, RelayBuffer::bytes);
         let fetched_s = start.elapsed().as_secs_f64();
-        let engine = self.engine.clone();
-        let upload = move || {
-            let (set, upload_s) = own_time(engine.as_ref(), || engine.upload(&set, Turn::of(WorkClass::Batch)));
+        let set = Arc::new(set);
+        let upload = move |engine: &dyn Engine| {
+            let (set, upload_s) = own_time(engine, || engine.upload(&set, Turn::of(WorkClass::Batch)));
             set.map(|set| (set, upload_s))
         };
-        let (set, upload_s) = blocking(upload).await?;
+        // Only a scene with an environment map has a part in this.
+        let (set, upload_s) = self.scenes.on_device(Some(&plan.workload.scene), upload).await?;
         self.metrics.done.add(plan.workload_number, Operation::LoadSet, 1.0, times.decode_s + upload_s);
         self.metrics.done.transferred(plan.workload_number, times.bytes, times.transfer_s);
         self.metrics.sets_loaded.inc();

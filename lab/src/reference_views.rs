@@ -47,11 +47,13 @@ impl ReferenceViews {
     ) -> anyhow::Result<Self> {
         engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
         let images = sample(engine, setup, args)?;
+        let environment = engine.scene(setup.offer.hash.as_str())?.environment.clone();
         let description = SetDescription {
             volume: setup.offer.volume,
             background: setup.offer.background,
             illumination: &setup.offer.illumination,
             highlight: args.lighting.highlight(),
+            environment: environment.as_ref(),
         };
         let set = engine.reconstructor.upload(&images, &description)?;
         let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ALL_PLANES), TURN)?;

@@ -89,6 +89,7 @@ fn unknown_names_are_refused_with_their_field() {
     assert!(is_invalid(&sample(&hash, "random", "unlit"), "sampling_method"));
     assert!(is_invalid(&sample(&hash, "conventional", "candles"), "lighting"));
     let set = node::SampleSet {
+        scene_hash: hash.clone(),
         images: reference.images.clone(),
         volume: setup.offer.volume,
         background: Environment::default(),

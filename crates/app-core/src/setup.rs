@@ -60,8 +60,9 @@ pub struct SceneArgs {
     /// [radiance=V]". V is a grey, R,G,B or #rrggbb
     #[arg(long = "light", value_name = "LAMP")]
     pub lights: Vec<LightSpec>,
-    /// Light from all directions in place of the scene's: V, or ZENITH/NADIR
-    #[arg(long, value_name = "V[/V]")]
+    /// Light from all directions in place of the scene's: V, or ZENITH/NADIR, or an equirectangular map, FILE.hdr, which is
+    /// the background, too. Its bright parts cast shadows with the rays of "soft N" or else of "occlusion N"
+    #[arg(long, value_name = "V[/V]|FILE.hdr")]
     pub environment: Option<EnvironmentSpec>,
     /// The reconstruction method
     #[arg(long, visible_alias = "reconstruction", default_value_t, value_name = "NAME",
@@ -150,7 +151,14 @@ impl SceneArgs {
         }
         let scene = scene.turned_upright(self.up);
         let lights = (!self.lights.is_empty()).then(|| self.lights.iter().map(|spec| spec.0).collect());
-        let lit = scene.lit_by(lights, self.environment.map(|spec| spec.0));
+        let lit = match &self.environment {
+            None => scene.lit_by(lights, None),
+            Some(EnvironmentSpec::Colors(environment)) => scene.lit_by(lights, Some(*environment)),
+            Some(EnvironmentSpec::File(path)) => {
+                let map = scene::load_environment(path).context("the environment cannot be used")?;
+                scene.lit_by(lights, None).surrounded_by(map)
+            }
+        };
         lit.validate(&Limits::default()).context("the scene cannot be used")?;
         if self.lighting.is_lit() && !lit.has_light() {
             tracing::warn!("nothing lights the scene: all that gives off no light itself will be black");

@@ -10,6 +10,8 @@ mod antialias;
 mod bounds;
 mod camera;
 mod encoding;
+mod environment_light;
+mod environment_map;
 mod highlight;
 mod image;
 mod light;
@@ -24,15 +26,16 @@ mod view_group;
 pub use antialias::{Antialias, AntialiasError};
 pub use bounds::Aabb;
 pub use camera::{Camera, CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera, PixelDepth, Ray};
-pub use encoding::{linear_from_srgb8, oct16_from_unit, srgb8_from_linear};
+pub use encoding::{linear_from_rgb9e5, linear_from_srgb8, oct16_from_unit, rgb9e5_from_linear, srgb8_from_linear};
+pub use environment_light::{BrightTexel, EnvironmentLight, LOBE_ROUGHNESS, LOBE_SIZE_PX, Lobe};
+pub use environment_map::{EnvironmentMap, EnvironmentMapError, MAX_ENVIRONMENT_SIZE_PX};
 pub use highlight::{Highlight, Reflector};
 pub use image::{BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId};
 pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
 pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_named};
 #[cfg(any(test, feature = "scalar"))]
 pub use scalar::{
-    Incident, Texel, disc_from_square, highlight_linear, linear_from_rgb9e5, rgb9e5_from_linear, tangents_of,
-    unit_from_oct16,
+    Incident, Texel, disc_from_square, environment_highlight_linear, highlight_linear, tangents_of, unit_from_oct16,
 };
 pub use tiles::TileError;
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};

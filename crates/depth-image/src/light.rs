@@ -65,13 +65,16 @@ pub enum Light {
     },
 }
 
-/// Light from far away all around: a gradient from straight down to straight up.
+/// Light from far away all around: a gradient from straight down to straight up, or a map.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Environment {
     /// Radiance from +Y.
     pub zenith_linear: Vec3,
     /// Radiance from −Y.
     pub nadir_linear: Vec3,
+    /// The scene's [`EnvironmentMap`](crate::EnvironmentMap) takes the place of the gradient, which is black, and of the
+    /// background.
+    pub is_mapped: bool,
 }
 
 /// An unusable light.
@@ -87,22 +90,29 @@ impl Environment {
     /// The same radiance from all directions.
     #[must_use]
     pub const fn uniform(radiance_linear: Vec3) -> Self {
-        Self { zenith_linear: radiance_linear, nadir_linear: radiance_linear }
+        Self::gradient(radiance_linear, radiance_linear)
     }
 
-    /// Whether all directions have the same radiance.
+    /// The radiance from +Y, from −Y, and evenly between.
     #[must_use]
-    pub fn is_uniform(&self) -> bool {
-        self.zenith_linear == self.nadir_linear
+    pub const fn gradient(zenith_linear: Vec3, nadir_linear: Vec3) -> Self {
+        Self { zenith_linear, nadir_linear, is_mapped: false }
     }
 
-    /// Checks that both colours are finite and not negative.
+    /// The radiance of the scene's map.
+    #[must_use]
+    pub const fn mapped() -> Self {
+        Self { zenith_linear: Vec3::ZERO, nadir_linear: Vec3::ZERO, is_mapped: true }
+    }
+
+    /// Checks that both colours are finite and not negative, and black beside a map.
     ///
     /// # Errors
     /// The first colour that is not.
     pub fn validate(&self) -> Result<(), LightError> {
         radiance("zenith", self.zenith_linear)?;
-        radiance("nadir", self.nadir_linear)
+        radiance("nadir", self.nadir_linear)?;
+        check(!self.is_mapped || *self == Self::mapped(), "zenith", "a gradient beside a map")
     }
 }
 

@@ -204,11 +204,16 @@ impl Engine for GpuEngine {
 
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
         let lighting: Lighting = parsed("lighting", &set.lighting)?;
+        let environment = match set.illumination.environment.is_mapped {
+            true => self.scene(&set.scene_hash)?.environment.clone(),
+            false => None,
+        };
         let description = SetDescription {
             volume: set.volume,
             background: set.background,
             illumination: &set.illumination,
             highlight: lighting.highlight(),
+            environment: environment.as_ref(),
         };
         let upload = || self.reconstructor.upload_in_turn(&set.images, &description, device_turn(turn));
         Ok(Arc::new(Uploaded(self.catching(|| upload().map_err(reconstruction_error))?)))

@@ -8,14 +8,16 @@ use std::{
 
 use bytemuck::Zeroable as _;
 use depth_image::{
-    Environment, Highlight, Illumination, Light, Reflector, disc_from_square, highlight_linear, tangents_of,
+    Environment, EnvironmentLight, EnvironmentMap, Highlight, Illumination, Light, Lobe, Reflector, disc_from_square,
+    environment_highlight_linear, highlight_linear, tangents_of,
 };
-use glam::{Vec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 use minijinja::context;
 use wgpu::BufferUsages;
 
 use crate::{
-    Binding, BufferPool, ComputePass, DevicePreference, DispatchSize, Frame, Gpu, Shader, Templates, highlight_name,
+    Binding, BufferPool, ComputePass, DevicePreference, DispatchSize, Frame, Gpu, GpuEnvironment, Shader, Templates,
+    highlight_name,
     illumination::{GpuIllumination, GpuLight},
     illumination_bytes, light_slots,
 };
@@ -37,6 +39,7 @@ struct Question {
 
 const SHADER: &str = "
 {% include 'color.wgsl' %}
+{% include 'table.wgsl' %}
 {% include 'light.wgsl' %}
 {% include 'highlight.wgsl' %}
 struct Question {
@@ -55,7 +58,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% for word in range(visibility_words) %}    words[{{ word }}] = q.visibility[{{ word }}];
 {% endfor %}
     let tangents = tangents_of(q.normal);
-    let first = id.x * 8u;
+    let first = id.x * 16u;
     answers[first] = vec4f(incident.towards, incident.distance_m);
     answers[first + 1u] = vec4f(incident.irradiance_linear, 0.0);
     answers[first + 2u] = vec4f(environment_radiance(q.normal), 0.0);
@@ -64,13 +67,21 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     answers[first + 5u] = vec4f(tangents.bitangent, 0.0);
     answers[first + 6u] = vec4f(disc_from_square(q.place), 0.0, 0.0);
     answers[first + 7u] = vec4f(highlight(q.point_in_world, q.normal, q.towards_eye, q.reflector, words), 0.0);
+{% if environment_map %}
+    answers[first + 8u] = vec4f(environment_base(q.normal), 0.0);
+    answers[first + 9u] = vec4f(environment_base_diffuse(q.normal), 0.0);
+    let bright = incident_from_bright(q.place);
+    answers[first + 10u] = vec4f(bright.towards, bright.irradiance_linear.x);
+{% endif %}
 }
 ";
 
-type Answer = [[f32; 4]; 8];
+/// A power of two, as the sizes of pooled buffers.
+type Answer = [[f32; 4]; 16];
 
-fn text(kind: Highlight, lights: usize, visibility_words: usize) -> String {
-    let form = context! { highlight => highlight_name(kind), light_slots => light_slots(lights), visibility_words };
+fn text(kind: Highlight, lights: usize, visibility_words: usize, environment_map: bool) -> String {
+    let (highlight, light_slots) = (highlight_name(kind), light_slots(lights));
+    let form = context! { highlight, light_slots, visibility_words, environment_map };
     let templates = Templates::new(&[("test.wgsl", SHADER)]).expect("templates");
     templates.render("test.wgsl", form).expect("a text")
 }
@@ -81,8 +92,20 @@ fn gpu() -> Arc<Gpu> {
 }
 
 fn answers(kind: Highlight, illumination: &Illumination, words: usize, questions: &[Question]) -> Vec<Answer> {
+    answers_under(None, kind, illumination, words, questions)
+}
+
+fn answers_under(
+    map: Option<&EnvironmentMap>,
+    kind: Highlight,
+    illumination: &Illumination,
+    words: usize,
+    questions: &[Question],
+) -> Vec<Answer> {
     let gpu = gpu();
-    let shader = Shader::new(&gpu, "test", &text(kind, illumination.lights.len(), words), &[]).expect("a shader");
+    let text = text(kind, illumination.lights.len(), words, map.is_some());
+    let shader = Shader::new(&gpu, "test", &text, &[]).expect("a shader");
+    let environment = map.map(|map| GpuEnvironment::upload(&gpu, map).expect("a map"));
     let pass = ComputePass::new(&gpu, shader);
     let uniform = gpu.buffer_with("illumination", &illumination_bytes(illumination), BufferUsages::UNIFORM);
     let asked = gpu.buffer_with("questions", questions, BufferUsages::STORAGE);
@@ -90,7 +113,9 @@ fn answers(kind: Highlight, illumination: &Illumination, words: usize, questions
     let bytes = size_of_val(questions) as u64 / size_of::<Question>() as u64 * size_of::<Answer>() as u64;
     let out = pool.lend_storage("answers", bytes);
     let bindings = [("illumination", &uniform), ("questions", &asked), ("answers", &*out)];
-    let bound = pass.bind(0, bindings.map(|(name, buffer)| Binding::buffer(name, buffer))).expect("all names");
+    let mut bindings = bindings.map(|(name, buffer)| Binding::buffer(name, buffer)).to_vec();
+    bindings.extend(environment.iter().flat_map(GpuEnvironment::bindings));
+    let bound = pass.bind(0, bindings).expect("all names");
     let mut frame = Frame::begin(&gpu, "test", crate::Turn::default());
     pass.dispatch(&mut frame, &[&bound], DispatchSize::Invocations([questions.len() as u32, 1, 1]));
     let read = frame.read_back(&out, 0..bytes, pool.lend_host("answers", bytes));
@@ -124,7 +149,7 @@ fn illumination() -> Illumination {
             radiance_linear: Vec3::new(1.0, 2.0, 3.0),
         },
     ];
-    let environment = Environment { zenith_linear: Vec3::new(0.3, 0.5, 0.9), nadir_linear: Vec3::splat(0.1) };
+    let environment = Environment::gradient(Vec3::new(0.3, 0.5, 0.9), Vec3::splat(0.1));
     Illumination { lights, environment }
 }
 
@@ -176,6 +201,49 @@ fn incident_light_equals_the_scalar_twins() {
         assert!(close(answer[4], tangent, 1e-4) && close(answer[5], bitangent, 1e-4), "{q:?} {answer:?}");
         assert!(close(answer[6], disc_from_square(place).extend(0.0), 1e-4), "{q:?} {answer:?}");
     }
+}
+
+/// Noise of every brightness, and suns.
+fn noisy_map() -> EnvironmentMap {
+    let size_px = UVec2::new(200, 90);
+    let random = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
+    let texel = |i: u32| {
+        let color = Vec3::new(random(3 * i), random(3 * i + 1), random(3 * i + 2));
+        if i % 997 == 5 { color * 900.0 } else { color }
+    };
+    let radiances: Vec<Vec3> = (0..size_px.element_product()).map(texel).collect();
+    EnvironmentMap::new(size_px, &radiances).expect("a map")
+}
+
+#[test]
+fn an_environment_maps_light_equals_the_scalar_twins() {
+    let (map, questions) = (noisy_map(), questions());
+    let (light, lit) =
+        (EnvironmentLight::of(&map), Illumination { environment: Environment::mapped(), ..illumination() });
+    assert!(light.bright_texels.len() > 10);
+    let found = answers_under(Some(&map), Highlight::Ggx, &lit, 2, &questions);
+    // Rounding takes a direction or a point across the edge of a texel now and then.
+    let mut other = [0; 5];
+    for (q, answer) in questions.iter().zip(&found) {
+        let [normal, eye] = [q.normal, q.towards_eye].map(Vec3::from);
+        let reflector = Reflector::unpack(q.reflector).expect("a reflector");
+        let visible = |place| share(2, q.visibility, place);
+        let lamps = highlight_linear(Highlight::Ggx, &lit, &visible, q.point_in_world.into(), normal, eye, &reflector);
+        let mirrored = environment_highlight_linear((&light, &map), normal, eye, &reflector) * visible(0);
+        let bright = light.bright_incident(&map, q.place.into()).expect("bright texels");
+        let checks = [
+            close(answer[2], map.radiance_linear(normal), 5e-3),
+            close(answer[3], light.lobe_linear(Lobe::Diffuse, normal), 1e-3)
+                && close(answer[9], light.lobe_linear(Lobe::DiffuseBase, normal), 1e-3),
+            close(answer[7], lamps + mirrored, 1e-2),
+            close(answer[8], light.base_linear(&map, normal), 1e-5),
+            close(answer[10], bright.towards_light_in_world, 1e-3)
+                && (answer[10][3] / bright.irradiance_linear.x - 1.0).abs() < 1e-4,
+        ];
+        other.iter_mut().zip(checks).for_each(|(other, is_close)| *other += usize::from(!is_close));
+    }
+    assert!(other.iter().all(|&other| other <= questions.len() / 200), "{other:?} of {}", questions.len());
+    assert!(found.iter().any(|answer| answer[7][0] > 0.1), "highlights");
 }
 
 #[test]
@@ -284,7 +352,7 @@ macro_rules! host {
 #[test]
 fn host_structs_have_the_wgsl_layout() {
     for (lights, slots) in [(0, 1), (3, 3)] {
-        let text = text(Highlight::Ggx, lights, 1);
+        let text = text(Highlight::Ggx, lights, 1, false);
         let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
         let light: Layout = host!(GpuLight {
             middle_in_world,

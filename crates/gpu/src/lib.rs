@@ -8,6 +8,7 @@
 
 mod catching;
 mod device;
+mod environment;
 mod error;
 mod faults;
 mod frame;
@@ -20,6 +21,7 @@ mod sharing;
 mod table;
 
 pub use device::{CompiledOutside, DevicePreference, Gpu};
+pub use environment::GpuEnvironment;
 pub use error::{GpuError, ShaderError};
 pub use frame::{Frame, FrameResult, Readback, Submitted};
 pub use illumination::{background_bytes, highlight_name, illumination_bytes, light_slots};

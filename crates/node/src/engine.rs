@@ -141,6 +141,8 @@ impl SampleWork {
 /// The images of one set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleSet {
+    /// The scene, whose environment map views show and highlights mirror; it must be loaded where there is one.
+    pub scene_hash: String,
     /// One image for each sample camera, in their order.
     pub images: Vec<DepthImage>,
     /// The bounds of reconstruction.
@@ -158,6 +160,7 @@ impl SampleSet {
     #[must_use]
     pub fn of(workload: &Workload, images: Vec<DepthImage>) -> Self {
         Self {
+            scene_hash: workload.scene.hash.to_string(),
             images,
             volume: workload.volume,
             background: workload.background,

@@ -24,6 +24,7 @@ pub(crate) enum Sums {
 pub(crate) struct Shown {
     set: SetVariant,
     sums: Sums,
+    environment_map: bool,
 }
 
 impl ShaderVariant for Shown {
@@ -37,13 +38,17 @@ impl ShaderVariant for Shown {
             Sums::Continued => "continued",
             Sums::Read => "read",
         };
-        context! { sums, ..self.set.context() }
+        context! { sums, environment_map => self.environment_map, ..self.set.context() }
     }
 
     fn all() -> Vec<Self> {
         let sums = [Sums::None, Sums::Begun, Sums::Continued, Sums::Read];
         let sets = SetVariant::all().into_iter().filter(|set| !set.count_fetches && !set.holes);
-        sets.flat_map(|set| sums.map(|sums| Self { set, sums })).collect()
+        let each = |set| {
+            sums.into_iter()
+                .flat_map(move |sums| [false, true].map(|environment_map| Self { set, sums, environment_map }))
+        };
+        sets.flat_map(each).collect()
     }
 }
 
@@ -51,11 +56,15 @@ impl ShaderVariant for Shown {
 pub(crate) fn record(recording: &mut Recording<'_>, sums: Sums) -> Result<(), ReconstructionError> {
     // Neither holes nor fetches matter here.
     let set = SetVariant { holes: false, ..recording.set.variant() };
-    let variant = Shown { set, sums };
+    let map = recording.set.environment.as_deref();
+    let variant = Shown { set, sums, environment_map: map.is_some() };
     let pass = recording.device.passes.get(&variant)?;
     let batch = &recording.batch;
     let mut bindings = recording.view_bindings();
-    bindings.push(Binding::buffer("background", &recording.set.background));
+    match map {
+        Some(map) => bindings.extend(map.bindings()),
+        None => bindings.push(Binding::buffer("background", &recording.set.background)),
+    }
     bindings.push(Binding::buffer("color", &batch.color));
     bindings.push(Binding::buffer("inverse_depth", &batch.inverse_depth_per_m));
     bindings.extend(batch.sums.as_ref().filter(|_| sums != Sums::None).map(|sums| Binding::buffer("sums", sums)));

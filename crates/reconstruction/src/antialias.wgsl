@@ -1,7 +1,10 @@
 // The colour that a pixel shows: the mean over its positions in linear light, as sRGB.
 {% include "color.wgsl" %}
-{% include "background.wgsl" %}
 {% include "view_work.wgsl" %}
+{% if environment_map %}
+{% include "environment.wgsl" %}
+{% endif %}
+{% include "background.wgsl" %}
 
 // Linear, as RGB9E5, of one position; sRGB once the view is finished.
 @group(0) var<storage, read_write> color: array<u32>;
@@ -13,9 +16,15 @@
 
 // Nothing nearer than infinity is the background, whether proven or assumed.
 fn shown_linear(index: u32, place: vec2u) -> vec3f {
-    let center = vec2f(place) + 0.5;
-    let direction = work.view.column_in_world * center.x + work.view.row_in_world * center.y + work.view.corner_in_world;
-    return select(background_linear(direction), linear_from_rgb9e5(color[index]), inverse_depth[index] > 0.0);
+    var linear = linear_from_rgb9e5(color[index]);
+    // A loop, not a branch: the software device skips only loops that no lane needs.
+    for (var open = inverse_depth[index] <= 0.0; open; open = false) {
+        let center = vec2f(place) + 0.5;
+        linear = background_linear(
+            work.view.column_in_world * center.x + work.view.row_in_world * center.y + work.view.corner_in_world,
+        );
+    }
+    return linear;
 }
 
 @compute @workgroup_size(TILE_PX, TILE_PX)

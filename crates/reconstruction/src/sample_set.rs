@@ -1,9 +1,11 @@
 //! A sample set on the device.
 
+use std::sync::Arc;
+
 use bytemuck::Zeroable as _;
 use depth_image::{Aabb, Camera, DepthImage, Environment, Highlight, Illumination, PinholeCamera};
 use glam::Vec2;
-use gpu::{Table, TablePool, Turn};
+use gpu::{GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
 use wgpu::TextureFormat;
 
@@ -16,7 +18,7 @@ use crate::{error::ReconstructionError, quads::SetMeshes, reflectors::Reflectors
 pub(crate) const VOLUME_MARGIN: f32 = 0.005;
 
 /// The properties that all images of a sample set share.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct SetDescription<'a> {
     /// Holds all geometry of the scene.
     pub volume: Aabb,
@@ -26,6 +28,8 @@ pub struct SetDescription<'a> {
     pub illumination: &'a Illumination,
     /// How surfaces reflect towards the viewer; `None` leaves highlights away, even where images have planes for them.
     pub highlight: Option<Highlight>,
+    /// A map in the place of the background and of the lights' environment. The twin does not know it.
+    pub environment: Option<&'a Arc<GpuEnvironment>>,
 }
 
 /// One complete sample set: what views are reconstructed from.
@@ -43,6 +47,7 @@ pub struct SampleSet {
     /// RGB9E5 of each cell's corners.
     pub(crate) cell_colors: Table,
     pub(crate) reflectors: Option<Reflectors>,
+    pub(crate) environment: Option<Arc<GpuEnvironment>>,
     pub(crate) meshes: SetMeshes,
 }
 
@@ -92,6 +97,7 @@ impl SampleSet {
             cell_codes: tables.upload("cells", TextureFormat::Rg32Uint, &codes, turn)?,
             cell_colors: tables.upload("sample colours", TextureFormat::Rgba32Uint, &colors, turn)?,
             reflectors: Reflectors::upload(tables, images, set.illumination, set.highlight, turn)?,
+            environment: set.environment.cloned(),
             meshes: SetMeshes::upload(tables, images, turn)?,
         })
     }

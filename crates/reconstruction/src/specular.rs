@@ -1,7 +1,9 @@
 //! Adds the light that depends on the viewer to pixels that show a surface.
 
+use std::sync::Arc;
+
 use depth_image::Highlight;
-use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, light_slots};
+use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots};
 use minijinja::{Value, context};
 
 use crate::view_work::{ONE_VIEW, SetVariant};
@@ -13,6 +15,8 @@ pub(crate) struct Specular {
     set: SetVariant,
     highlight: Highlight,
     lights: usize,
+    /// The environment is a map.
+    environment_map: bool,
     /// The words that say which lights a sample sees; 0 where all samples see all.
     visibility_words: usize,
 }
@@ -25,6 +29,7 @@ impl ShaderVariant for Specular {
         context! {
             highlight => highlight_name(self.highlight),
             light_slots => light_slots(self.lights),
+            environment_map => self.environment_map,
             visibility_words => self.visibility_words,
             sample_texels => sample_texels(self.visibility_words),
             ..self.set.context()
@@ -33,13 +38,14 @@ impl ShaderVariant for Specular {
 
     fn all() -> Vec<Self> {
         let lights = [(0, 0), (0, 1), (3, 0), (3, 1), (9, 3), (255, 64)];
-        let kinds = [Highlight::BlinnPhong, Highlight::Ggx].into_iter();
-        let lit = kinds.flat_map(|highlight| lights.map(|(lights, words)| (highlight, lights, words)));
-        lit.flat_map(|(highlight, lights, visibility_words)| {
+        let kinds = [(Highlight::BlinnPhong, false), (Highlight::Ggx, false), (Highlight::Ggx, true)].into_iter();
+        let lit = kinds.flat_map(|kind| lights.map(|(lights, words)| (kind, lights, words)));
+        lit.flat_map(|((highlight, environment_map), lights, visibility_words)| {
             SetVariant::all().into_iter().filter(|set| !set.count_fetches).map(move |set| Self {
                 set,
                 highlight,
                 lights,
+                environment_map,
                 visibility_words,
             })
         })
@@ -50,10 +56,14 @@ impl ShaderVariant for Specular {
 /// Highlights are added after the fill, which would spread them.
 pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
     let Some(reflectors) = &recording.set.reflectors else { return Ok(()) };
+    let mirrors = |_: &&Arc<GpuEnvironment>| reflectors.highlight == Highlight::Ggx;
+    let environment = recording.set.environment.as_ref().filter(mirrors);
     let variant = Specular {
         set: recording.set.variant(),
         highlight: reflectors.highlight,
         lights: reflectors.lights,
+        // Blinn-Phong surfaces mirror lamps only.
+        environment_map: environment.is_some(),
         visibility_words: reflectors.visibility_words,
     };
     let pass = recording.device.passes.get(&variant)?;
@@ -65,6 +75,7 @@ pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), Reconstruction
         Binding::buffer("illumination", &reflectors.illumination),
         Binding::texture("samples", &reflectors.samples),
     ]);
+    bindings.extend(environment.into_iter().flat_map(|map| map.bindings()));
     let bound = pass.bind(0, bindings)?;
     recording.dispatch_pixels(&variant, &pass, &bound, None);
     Ok(())

@@ -105,7 +105,7 @@ impl Batch<'_> {
     /// The pixels of a slice of pictures whose cost is unknown.
     pub fn unknown_slice_px(&self) -> u64 {
         let DrawWork { scene, lighting, .. } = self.work;
-        let [shadow, occlusion] = [lighting.shadow_rays() * scene.light_count as u32, lighting.occlusion_rays()]
+        let [shadow, occlusion] = [lighting.shadow_rays() * scene.traced_lamps(lighting), lighting.occlusion_rays()]
             .map(|rays| u64::from(rays.min(RAYS_A_DISPATCH)));
         UNKNOWN_SLICE_RAYS / (1 + shadow + occlusion)
     }
@@ -116,12 +116,14 @@ impl Batch<'_> {
             counts: [&rays.shadow, &rays.lamps, &rays.occlusion].map(|range| range.len() as u32),
             cameras: self.uniform(gpu, pieces, sums, rays),
         };
-        parts_of(&sums.rays, self.work.scene.light_count as u32).into_iter().map(part).collect()
+        let lamps = self.work.scene.traced_lamps(self.work.lighting);
+        parts_of(&sums.rays, lamps).into_iter().map(part).collect()
     }
 
     /// A uniform for all rays.
     pub fn uniform_of_all(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums) -> wgpu::Buffer {
-        let ([shadow, occlusion], lamps) = (sums.rays.clone(), 0..self.work.scene.light_count as u32);
+        let lamps = 0..self.work.scene.traced_lamps(self.work.lighting);
+        let [shadow, occlusion] = sums.rays.clone();
         self.uniform(gpu, pieces, sums, Rays { shadow, lamps, occlusion })
     }
 

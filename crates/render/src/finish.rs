@@ -3,7 +3,9 @@
 use std::collections::HashSet;
 
 use depth_image::{Antialias, Highlight};
-use gpu::{Binding, BufferPool, Gpu, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, switches};
+use gpu::{
+    Binding, BufferPool, Gpu, GpuEnvironment, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, switches,
+};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
@@ -17,6 +19,8 @@ use crate::{
 pub(crate) struct Finish {
     by_rays: bool,
     lit: bool,
+    /// The environment is a map, which is the background, too.
+    environment_map: bool,
     output: Output,
 }
 
@@ -24,7 +28,8 @@ impl Finish {
     fn of(batch: &Batch<'_>) -> Self {
         // One shader, whether depth is wanted or not.
         let output = Output { depth: false, ..batch.output };
-        Self { by_rays: batch.by_rays, lit: batch.work.lighting.is_lit(), output }
+        let (lit, environment_map) = (batch.work.lighting.is_lit(), batch.work.scene.environment.is_some());
+        Self { by_rays: batch.by_rays, lit, environment_map, output }
     }
 
     /// The variants with each usefulness test.
@@ -41,8 +46,10 @@ impl Finish {
     }
 
     fn of_output(output: Output) -> impl Iterator<Item = Self> {
-        let each =
-            move |sums| switches().map(move |[by_rays, lit]| Self { by_rays, lit, output: Output { sums, ..output } });
+        let each = move |sums| {
+            let output = Output { sums, ..output };
+            switches().map(move |[by_rays, lit, environment_map]| Self { by_rays, lit, environment_map, output })
+        };
         SumPlanes::all().flat_map(each)
     }
 }
@@ -57,6 +64,7 @@ impl ShaderVariant for Finish {
         context! {
             by_rays => self.by_rays,
             lit => self.lit,
+            environment_map => self.environment_map,
             highlight => highlight.map(highlight_name),
             surface_id => surface_id.is_some(),
             normal_plane => normal, reflector_plane => reflector, id_plane => surface_id, passed_plane => passed,
@@ -113,7 +121,7 @@ pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces], plane
             &scene.illumination,
             planes.position_sums.as_deref().unwrap_or(&planes.words),
         ];
-        let own = pass.bind(0, bindings(&variant, buffers, target))?;
+        let own = pass.bind(0, bindings(&variant, buffers, target, scene.environment.as_deref()))?;
         recording.dispatch(&variant, &pass, &[&own], (camera, 1));
     }
     Ok(())
@@ -123,14 +131,18 @@ fn bindings<'r>(
     variant: &Finish,
     [camera, words, sums, finish, background, illumination, position_sums]: [&'r Buffer; 7],
     target: &'r Surfaces,
+    map: Option<&'r GpuEnvironment>,
 ) -> Vec<Binding<'r>> {
     let mut bindings = vec![
         Binding::buffer("camera", camera),
         Binding::buffer("words", words),
         Binding::buffer("sums", sums),
         Binding::buffer("finish", finish),
-        Binding::buffer("background", background),
     ];
+    match map {
+        Some(map) => bindings.extend(map.bindings()),
+        None => bindings.push(Binding::buffer("background", background)),
+    }
     bindings.extend(target.bindings());
     bindings.extend(variant.output.highlight.map(|_| Binding::buffer("illumination", illumination)));
     let is_averaged = variant.output.antialias > Antialias::NONE;
@@ -151,7 +163,8 @@ mod tests {
         let stage = TestStage::new();
         for variant in Finish::all() {
             let target = stage.surfaces(variant.by_rays, variant.output.surface_id);
-            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 7], &target));
+            let map = variant.environment_map.then_some(&stage.environment);
+            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 7], &target, map));
         }
     }
 }

@@ -5,9 +5,14 @@
 {% include "normal.wgsl" %}
 {% include "albedo.wgsl" %}
 {% include "surfaces.wgsl" %}
+{% if environment_map %}
+{% include "table.wgsl" %}
+{% endif %}
 {% if highlight %}
 {% include "light.wgsl" %}
 {% include "highlight.wgsl" %}
+{% elif environment_map %}
+{% include "environment.wgsl" %}
 {% endif %}
 
 // The finished planes of each camera, one after the other.
@@ -101,7 +106,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         linear += highlight(point, unit_from_oct16(surface.z), -normalize(direction), surface.w, visibility);
     }
 {% endif %}
-    let color = select(background_linear(direction_of(pixel)), linear, met);
+    for (var open = !met; open; open = false) { linear = background_linear(direction_of(pixel)); }
+    let color = linear;
 {% if samples %}
     put(0u, place, rgb9e5_from_linear(color));
 {% else %}

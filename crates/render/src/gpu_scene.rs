@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Aabb, Highlight, MAX_LIGHTS};
 use glam::{Affine3A, Mat3, Vec3};
-use gpu::{Gpu, GpuError, switches};
+use gpu::{Gpu, GpuEnvironment, GpuError, switches};
 use indexmap::IndexSet;
 use scene::{Material, Scene, TextureUse, VertexDetail, Wind};
 use wgpu::BufferUsages;
@@ -15,7 +15,7 @@ use wgpu::BufferUsages;
 use crate::material::{normal_scale, phong_reflector};
 use crate::motion::Motion;
 use crate::rays::{AccelerationReport, OrderedMesh, RayScene, flat::world_metres};
-use crate::{RenderError, cluster, pixel_camera::uniform, texture};
+use crate::{Lighting, RenderError, cluster, pixel_camera::uniform, texture};
 
 /// A mesh part where an instance places it: `Object` in the shader, the same for a whole draw. It lies at a dynamic offset: a
 /// load from a uniform costs nothing a vertex or fragment.
@@ -102,6 +102,8 @@ pub struct GpuScene {
     pub(crate) background: wgpu::Buffer,
     pub(crate) illumination: wgpu::Buffer,
     pub(crate) light_count: usize,
+    /// Light and background, where a map gives them.
+    pub environment: Option<Arc<GpuEnvironment>>,
     pub(crate) rays: RayScene,
     highlights: [bool; 2],
     /// A number that no other scene of this process has.
@@ -135,6 +137,7 @@ impl GpuScene {
             (view.clone(), samplers[&t.map_or_else(Default::default, |t| t.wrap)].clone())
         };
         let illumination = gpu::illumination_bytes(&scene.illumination);
+        let environment = scene.environment_map.as_ref().map(|map| GpuEnvironment::upload(gpu, map)).transpose()?;
         Ok(Self {
             vertices: gpu.buffer_with("vertices", &geometry.vertices, BufferUsages::VERTEX),
             details: gpu.buffer_with("vertex details", &geometry.details, BufferUsages::VERTEX),
@@ -145,6 +148,7 @@ impl GpuScene {
             background: gpu.buffer_with("background", &gpu::background_bytes(&scene.background), BufferUsages::UNIFORM),
             illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
             light_count: scene.illumination.lights.len(),
+            environment: environment.map(Arc::new),
             rays: RayScene::of(gpu, scene, &ordered, motion.clone()),
             highlights: [
                 scene.materials.iter().any(|m| m.phong_specular > 0.0 && !m.unlit),
@@ -171,7 +175,14 @@ impl GpuScene {
         textures.dedup();
         let posed = self.motion.as_ref().map_or(0, |motion| motion.bytes());
         let of_textures: u64 = textures.into_iter().map(gpu::texture_bytes).sum();
-        buffers.map(wgpu::Buffer::size).iter().sum::<u64>() + of_textures + self.rays.bytes() + posed
+        let environment = self.environment.as_deref().map_or(0, GpuEnvironment::bytes);
+        buffers.map(wgpu::Buffer::size).iter().sum::<u64>() + of_textures + environment + self.rays.bytes() + posed
+    }
+
+    /// Lamps that take rays: those of the scene, and the bright texels of its environment map, which only rays find.
+    pub(crate) fn traced_lamps(&self, lighting: Lighting) -> u32 {
+        let has_bright = self.environment.as_deref().is_some_and(|map| map.has_bright_texels);
+        self.light_count as u32 + u32::from(has_bright && lighting.shadow_rays() > 0)
     }
 
     /// Whether some surface has highlights.

@@ -1,6 +1,6 @@
 //! Light of lamps and the environment, summed over rays.
 
-use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, switches};
+use gpu::{Binding, DispatchSize, GpuEnvironment, ResourceTraits, ShaderVariant, WorkKind, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
@@ -39,8 +39,25 @@ pub(crate) struct Illuminate {
     /// Light is added to sums of earlier rays.
     continued: bool,
     sums: SumPlanes,
+    /// The environment is a map.
+    environment_map: bool,
     /// Present where rays are traced.
     traversal: Option<Traversal>,
+}
+
+impl Illuminate {
+    /// The variant without any of the switches.
+    const UNLIT: Self = Self {
+        by_rays: false,
+        step_px: 1,
+        listed: false,
+        shadow_rays: ShadowRays::None,
+        occluded: false,
+        continued: false,
+        sums: SumPlanes { light_count: 0, visibility: false },
+        environment_map: false,
+        traversal: None,
+    };
 }
 
 impl ShaderVariant for Illuminate {
@@ -59,6 +76,7 @@ impl ShaderVariant for Illuminate {
             },
             occluded => self.occluded,
             continued => self.continued,
+            environment_map => self.environment_map,
             traced => self.traversal.is_some(),
             primary => false,
             count_visits => false,
@@ -68,14 +86,16 @@ impl ShaderVariant for Illuminate {
 
     fn all() -> Vec<Self> {
         let mut variants = Vec::new();
-        for [by_rays, occluded, continued] in switches() {
+        for [by_rays, occluded, continued, environment_map] in switches() {
             for (step_px, listed) in [(1, false), (GRID_PX, false), (1, true)] {
                 for shadow_rays in [ShadowRays::None, ShadowRays::One, ShadowRays::Many] {
                     let is_traced = occluded || shadow_rays != ShadowRays::None;
                     let each = |sums| {
                         Traversal::ALL.map(|traversal| {
                             let traversal = is_traced.then_some(traversal);
-                            Self { by_rays, step_px, listed, shadow_rays, occluded, continued, sums, traversal }
+                            let lit =
+                                Self { by_rays, step_px, listed, shadow_rays, occluded, continued, ..Self::UNLIT };
+                            Self { sums, environment_map, traversal, ..lit }
                         })
                     };
                     variants.extend(SumPlanes::all().flat_map(each));
@@ -110,6 +130,7 @@ pub(crate) fn record(
             occluded: lighting.occlusion.is_some(),
             continued: number > 0 || recording.sums.rays.iter().any(|rays| rays.start > 0),
             sums: batch.output.sums,
+            environment_map: batch.work.scene.environment.is_some(),
             traversal: traced.map(Traversal::of),
         };
         let pass = recording.passes.get(&variant)?;
@@ -117,7 +138,8 @@ pub(crate) fn record(
         let kind = WorkKind::new(batch.family(), &(variant.name(), part.counts));
         for (camera, target) in (first..).zip(surfaces) {
             let buffers = [&part.cameras, &batch.work.scene.illumination, &recording.sums.buffer];
-            let bind = |list| pass.bind(0, bindings(buffers, list, target));
+            let map = batch.work.scene.environment.as_deref();
+            let bind = |list| pass.bind(0, bindings(buffers, list, target, map));
             let own = match lists {
                 Some(lists) => lists.iter().map(|list| bind(Some(list))).collect::<Result<Vec<_>, _>>()?,
                 None => vec![bind(None)?],
@@ -137,6 +159,7 @@ fn bindings<'r>(
     [camera, illumination, sums]: [&'r Buffer; 3],
     list: Option<&'r PixelList>,
     target: &'r Surfaces,
+    map: Option<&'r GpuEnvironment>,
 ) -> Vec<Binding<'r>> {
     let mut bindings = vec![
         Binding::buffer("camera", camera),
@@ -145,6 +168,7 @@ fn bindings<'r>(
     ];
     bindings.extend(target.bindings());
     bindings.extend(list.into_iter().flat_map(PixelList::bindings));
+    bindings.extend(map.into_iter().flat_map(GpuEnvironment::bindings));
     bindings
 }
 
@@ -162,7 +186,8 @@ mod tests {
         let list = PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), 1);
         for variant in Illuminate::all() {
             let target = stage.surfaces(variant.by_rays, false);
-            stage.check(&variant, 0, &bindings([buffer; 3], variant.listed.then_some(&list), &target));
+            let map = variant.environment_map.then_some(&stage.environment);
+            stage.check(&variant, 0, &bindings([buffer; 3], variant.listed.then_some(&list), &target, map));
             if variant.traversal.is_some() {
                 stage.check(&variant, 1, &traced.bindings());
             }

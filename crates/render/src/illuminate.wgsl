@@ -4,6 +4,9 @@
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
 {% include "light.wgsl" %}
+{% if environment_map and not traced %}
+{% include "table.wgsl" %}
+{% endif %}
 {% include "sequence.wgsl" %}
 {% include "surfaces.wgsl" %}
 {% if traced %}
@@ -42,33 +45,55 @@ fn spot_of(pixel: vec2u, depth: f32, surface: vec4u) -> Spot {
 
 struct Arrival { linear: vec3f, open: f32 }
 
+{% if environment_map %}
+// The number after those of the lamps: bright texels of the environment map are traced like a lamp.
+fn is_bright(number: u32) -> bool { return number == illumination.light_count; }
+{% endif %}
+
+// The light of one point of a lamp, were nothing in between.
+fn incident_of(number: u32, spot: Spot, place: vec2f) -> Incident {
+{% if environment_map %}
+    if is_bright(number) { return incident_from_bright(place); }
+{% endif %}
+    return incident_from(illumination.lights[number], spot.point, place);
+}
+{% if traced %}
+
+// What arrives of it.
+fn arrival_of(incident: Incident, spot: Spot) -> Arrival {
+    let cosine = dot(spot.normal, incident.towards);
+    var open = 0.0;
+    // A loop, not a branch: the software device skips only loops that no lane needs.
+    for (var lit = cosine > 0.0 && any(incident.irradiance_linear > vec3f(0.0)); lit; lit = false) {
+        let blocked = is_blocked(ray_from(spot.origin, incident.towards), incident.distance_m - spot.bias_m);
+        open = select(1.0, 0.0, blocked);
+    }
+    return Arrival(incident.irradiance_linear * (max(cosine, 0.0) * open), open);
+}
+{% endif %}
+
 // The light of one lamp: the sum over its rays.
 fn from_lamp(number: u32, spot: Spot) -> Arrival {
-    let lamp = illumination.lights[number];
 {% if shadow_rays == "none" and continued %}
     // Known at once, and in the sums already.
     return Arrival(vec3f(0.0), 0.0);
 {% elif shadow_rays == "none" %}
-    let incident = incident_from(lamp, spot.point, vec2f(0.5));
+    let incident = incident_of(number, spot, vec2f(0.5));
     return Arrival(incident.irradiance_linear * max(dot(spot.normal, incident.towards), 0.0), 1.0);
 {% else %}
     var arrival = Arrival(vec3f(0.0), 0.0);
     for (var i = 0u; i < camera.shadow_rays; i++) {
-{% if shadow_rays == "one" %}
+{% if shadow_rays == "one" and environment_map %}
+        // Bright texels have no middle.
+        let place = select(vec2f(0.5), point_of(camera.first_shadow_ray + i, hashed(spot.seed + number)), is_bright(number));
+{% elif shadow_rays == "one" %}
         let place = vec2f(0.5);
 {% else %}
         let place = point_of(camera.first_shadow_ray + i, hashed(spot.seed + number));
 {% endif %}
-        let incident = incident_from(lamp, spot.point, place);
-        let cosine = dot(spot.normal, incident.towards);
-        var open = 0.0;
-        // A loop, not a branch: the software device skips only loops that no lane needs.
-        for (var lit = cosine > 0.0 && any(incident.irradiance_linear > vec3f(0.0)); lit; lit = false) {
-            let blocked = is_blocked(ray_from(spot.origin, incident.towards), incident.distance_m - spot.bias_m);
-            open = select(1.0, 0.0, blocked);
-        }
-        arrival.linear += incident.irradiance_linear * (max(cosine, 0.0) * open);
-        arrival.open += open;
+        let ray = arrival_of(incident_of(number, spot, place), spot);
+        arrival.linear += ray.linear;
+        arrival.open += ray.open;
     }
     return arrival;
 {% endif %}
@@ -83,12 +108,21 @@ fn from_environment(spot: Spot) -> Arrival {
         let up = sqrt(max(1.0 - dot(disc, disc), 0.0));
         let towards = around.tangent * disc.x + around.bitangent * disc.y + spot.normal * up;
         let open = select(1.0, 0.0, is_blocked(ray_from(spot.origin, towards), camera.occlusion_radius_m));
-        arrival.linear += environment_radiance(towards) * open;
+        arrival.linear += {{ "environment_base" if environment_map else "environment_radiance" }}(towards) * open;
         arrival.open += open;
     }
+{% if environment_map and shadow_rays == "none" %}
+    // Lamps have no rays: bright texels take as many as there are of occlusion.
+    for (var i = 0u; i < camera.occlusion_rays && has_bright_texels(); i++) {
+        let place = point_of(camera.first_occlusion_ray + i, hashed(spot.seed + illumination.light_count));
+        arrival.linear += arrival_of(incident_from_bright(place), spot).linear;
+    }
+{% endif %}
     return arrival;
 {% elif continued %}
     return Arrival(vec3f(0.0), 0.0);
+{% elif environment_map and shadow_rays != "none" %}
+    return Arrival(environment_base_diffuse(spot.normal), 1.0);
 {% else %}
     return Arrival(environment_diffuse(spot.normal), 1.0);
 {% endif %}
@@ -127,6 +161,8 @@ fn light_pixel(pixel: vec2u) {
         for (var number = camera.first_light; number < camera.end_light; number++) {
             let lamp = from_lamp(number, spot);
             lamps_linear += lamp.linear;
+{% if visibility and environment_map %}            if is_bright(number) { continue; }
+{% endif %}
 {% if visibility %}            sums[index_of(OPEN_TO_LAMPS + number, place)] += lamp.open;
 {% endif %}
         }

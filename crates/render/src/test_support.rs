@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
-use glam::UVec2;
-use gpu::{Binding, DevicePreference, Gpu, ShaderInterface, ShaderSource, ShaderVariant, Templates, source};
+use depth_image::EnvironmentMap;
+use glam::{UVec2, Vec3};
+use gpu::{
+    Binding, DevicePreference, Gpu, GpuEnvironment, ShaderInterface, ShaderSource, ShaderVariant, Templates, source,
+};
 use wgpu::BufferUsages;
 
 use crate::redundancy_test::{Evidence, RedundancyTest};
@@ -24,6 +27,7 @@ pub(crate) struct TestStage {
     pub gpu: Arc<Gpu>,
     pub buffer: wgpu::Buffer,
     pub scene: GpuScene,
+    pub environment: GpuEnvironment,
     surfaces: SurfacePool,
     templates: Templates,
 }
@@ -31,9 +35,11 @@ pub(crate) struct TestStage {
 impl TestStage {
     pub fn new() -> Self {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
+        let map = EnvironmentMap::new(UVec2::ONE, &[Vec3::ONE]).expect("a texel");
         Self {
             buffer: gpu.buffer_with("any", &[0_u32; 64], BufferUsages::STORAGE | BufferUsages::UNIFORM),
             scene: GpuScene::upload(&gpu, &scene::procedural::unit_cube()).expect("a scene"),
+            environment: GpuEnvironment::upload(&gpu, &map).expect("a map"),
             surfaces: SurfacePool::new(&gpu),
             templates: test_templates(),
             gpu,

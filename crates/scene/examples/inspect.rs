@@ -33,7 +33,7 @@ fn inspect(spec: &SceneSpec) {
     println!(
         "  {} lights, environment {}, {} cameras",
         lights.len(),
-        EnvironmentSpec(environment),
+        EnvironmentSpec::Colors(environment),
         scene.cameras.len()
     );
     lights.iter().for_each(|&light| println!("  {}", LightSpec(light)));

@@ -32,9 +32,9 @@ pub use animation::{
     Animation, Channel, Clip, Influence, Interpolation, Joint, MovingInstance, Node, NodeTransform, Property,
     TransformParts, UnknownClip,
 };
-pub use depth_image::{Environment, Illumination, Light, LightError};
+pub use depth_image::{Environment, EnvironmentMap, Illumination, Light, LightError};
 pub use error::{SceneError, SceneErrorKind};
-pub use import::{MissingTextures, MissingTexturesError, load_file};
+pub use import::{MissingTextures, MissingTexturesError, load_environment, load_file};
 pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorKind};
 pub use limits::{Limits, MAX_COORDINATE_M};
 pub use model::*;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::{Environment, Illumination, Light, Scene};
+use crate::{Environment, EnvironmentMap, Illumination, Light, Scene};
 
 /// Angular radius of default suns: 2°, so that soft shadows are visible. The real sun's 0.27° blurs a shadow's edge by
 /// a hundredth of the distance to its caster, a pixel or two in a view of a whole scene.
@@ -10,11 +10,11 @@ pub(crate) const SOFT_SUN_RAD: f32 = 2.0f32.to_radians();
 
 /// A pale sky over warm, darker ground: `(0.20, 0.21, 0.23)` on upward surfaces.
 const DEFAULT_ENVIRONMENT: Environment =
-    Environment { zenith_linear: Vec3::new(0.216, 0.232, 0.260), nadir_linear: Vec3::new(0.12, 0.10, 0.08) };
+    Environment::gradient(Vec3::new(0.216, 0.232, 0.260), Vec3::new(0.12, 0.10, 0.08));
 
 /// A quiet grey from above to below, which no colour of a model is mistaken for.
 const DEFAULT_BACKGROUND: Environment =
-    Environment { zenith_linear: Vec3::new(0.56, 0.60, 0.66), nadir_linear: Vec3::new(0.06, 0.065, 0.075) };
+    Environment::gradient(Vec3::new(0.56, 0.60, 0.66), Vec3::new(0.06, 0.065, 0.075));
 
 impl Scene {
     /// Adds a quiet gradient behind a scene without a background.
@@ -61,8 +61,17 @@ impl Scene {
             }
             self.illumination.lights = lights;
         }
-        self.illumination.environment = environment.unwrap_or(self.illumination.environment);
+        if let Some(environment) = environment {
+            (self.illumination.environment, self.environment_map) = (environment, None);
+        }
         self
+    }
+
+    /// Replaces the scene's environment and background by a map.
+    #[must_use]
+    pub fn surrounded_by(self, map: EnvironmentMap) -> Self {
+        let illumination = Illumination { environment: Environment::mapped(), ..self.illumination };
+        Self { illumination, environment_map: Some(map), ..self }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Lights and environments as text, for the command line.
 
 use std::fmt;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use depth_image::{Environment, Light, LightError, linear_from_srgb8};
@@ -25,10 +26,15 @@ use glam::{DVec3, Vec3};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightSpec(pub Light);
 
-/// An environment as text: one colour as in [`LightSpec`], or two, `ZENITH/NADIR`. The display form parses to the same
-/// environment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EnvironmentSpec(pub Environment);
+/// An environment as text: one colour as in [`LightSpec`], or two, `ZENITH/NADIR`, or the name of a `.hdr` file. The
+/// display form parses to the same environment.
+#[derive(Debug, Clone, PartialEq)]
+pub enum EnvironmentSpec {
+    /// A gradient.
+    Colors(Environment),
+    /// A file for [`load_environment`](crate::load_environment).
+    File(PathBuf),
+}
 
 /// A text that is no light or environment. Display reads `field: reason`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -131,13 +137,15 @@ impl FromStr for EnvironmentSpec {
 
     fn from_str(text: &str) -> Result<Self, LightSpecError> {
         let text = text.trim();
+        let path = Path::new(text);
+        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr")) {
+            return Ok(Self::File(path.to_owned()));
+        }
         let environment = match text.split_once('/') {
-            Some((zenith, nadir)) => {
-                Environment { zenith_linear: color_from("zenith", zenith)?, nadir_linear: color_from("nadir", nadir)? }
-            }
+            Some((zenith, nadir)) => Environment::gradient(color_from("zenith", zenith)?, color_from("nadir", nadir)?),
             None => Environment::uniform(color_from("environment", text)?),
         };
-        Ok(Self(environment))
+        Ok(Self::Colors(environment))
     }
 }
 
@@ -273,7 +281,10 @@ impl fmt::Display for LightSpec {
 
 impl fmt::Display for EnvironmentSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Environment { zenith_linear, nadir_linear } = self.0;
+        let Environment { zenith_linear, nadir_linear, .. } = match self {
+            Self::Colors(environment) => *environment,
+            Self::File(path) => return path.display().fmt(f),
+        };
         f.write_str(&color_text(zenith_linear))?;
         if zenith_linear == nadir_linear { Ok(()) } else { write!(f, "/{}", color_text(nadir_linear)) }
     }

@@ -1,6 +1,6 @@
 //! The scene as plain data, equal on every node.
 
-use depth_image::{Environment, Illumination};
+use depth_image::{Environment, EnvironmentMap, Illumination};
 use glam::{Affine3A, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,9 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Lamps and environment. A scene without light is black and valid.
     pub illumination: Illumination,
-    /// Radiance of rays that meet no surface, by their direction.
+    /// The map of an [environment](Illumination::environment) that is mapped.
+    pub environment_map: Option<EnvironmentMap>,
+    /// Radiance of rays that meet no surface, by their direction, where there is no map.
     pub background: Environment,
     /// Cameras that the source file listed.
     pub cameras: Vec<SourceCamera>,

@@ -2,15 +2,16 @@
 //!
 //! ```text
 //! magic "MYRSCENE" | version u32 | header length u32 | header (postcard)
-//! then for each mesh: vertices (40 bytes each), details (24 bytes each), indices (4 bytes each); for each texture: texels
+//! then for each mesh: vertices (40 bytes each), details (24 bytes each), indices (4 bytes each); for each texture: texels;
+//! the texels of the environment map (4 bytes each)
 //! ```
 //!
 //! Arrays have their layout in memory, so that packing and unpacking are copies. The header has their lengths, which
 //! are checked against the remaining bytes before memory is allocated.
 
 use bytemuck::Pod;
-use depth_image::{Environment, Illumination};
-use glam::DVec3;
+use depth_image::{Environment, EnvironmentMap, Illumination, MAX_ENVIRONMENT_SIZE_PX};
+use glam::{DVec3, UVec2};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Fault, at_most};
@@ -31,6 +32,7 @@ struct Header {
     materials: Vec<Material>,
     textures: Vec<TextureHeader>,
     illumination: Illumination,
+    environment_size_px: Option<UVec2>,
     background: Environment,
     cameras: Vec<SourceCamera>,
     wind: Option<Wind>,
@@ -69,6 +71,7 @@ pub fn pack(scene: &Scene) -> Vec<u8> {
         bytes.extend_from_slice(bytemuck::cast_slice(&mesh.indices));
     }
     scene.textures.iter().for_each(|texture| bytes.extend_from_slice(&texture.srgba8));
+    scene.environment_map.iter().for_each(|map| bytes.extend_from_slice(bytemuck::cast_slice(map.texels_rgb9e5())));
     bytes
 }
 
@@ -113,6 +116,7 @@ fn header_of(scene: &Scene) -> Header {
         materials: scene.materials.clone(),
         textures: scene.textures.iter().map(texture).collect(),
         illumination: scene.illumination.clone(),
+        environment_size_px: scene.environment_map.as_ref().map(EnvironmentMap::size_px),
         background: scene.background,
         cameras: scene.cameras.clone(),
         wind: scene.wind,
@@ -125,7 +129,9 @@ fn array_bytes(scene: &Scene) -> usize {
     let mesh = |m: &Mesh| {
         size_of_val(m.vertices.as_slice()) + size_of_val(m.details.as_slice()) + size_of_val(m.indices.as_slice())
     };
-    scene.meshes.iter().map(mesh).sum::<usize>() + scene.textures.iter().map(|t| t.srgba8.len()).sum::<usize>()
+    let environment = scene.environment_map.as_ref().map_or(0, |map| size_of_val(map.texels_rgb9e5()));
+    let textures = scene.textures.iter().map(|t| t.srgba8.len()).sum::<usize>();
+    scene.meshes.iter().map(mesh).sum::<usize>() + textures + environment
 }
 
 fn read_header(bytes: &[u8]) -> Result<Header, Fault> {
@@ -152,6 +158,7 @@ fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Re
         let srgba8 = reader.take(format!("texture {number}"), bytes)?.to_vec();
         textures.push(Texture { width_px, height_px, is_srgb, srgba8 });
     }
+    let environment_map = header.environment_size_px.map(|size_px| read_environment(size_px, reader)).transpose()?;
     Ok(Scene {
         name: header.name,
         meshes,
@@ -159,12 +166,19 @@ fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Re
         materials: header.materials,
         textures,
         illumination: header.illumination,
+        environment_map,
         background: header.background,
         cameras: header.cameras,
         wind: header.wind,
         animation: header.animation,
         origin_in_source: header.origin_in_source,
     })
+}
+
+fn read_environment(size_px: UVec2, reader: &mut Reader) -> Result<EnvironmentMap, Fault> {
+    let size_px = size_px.min(MAX_ENVIRONMENT_SIZE_PX + 1);
+    let texels = reader.pods("environment map", size_px.element_product().into())?;
+    EnvironmentMap::from_texels(size_px, texels).map_err(|e| Fault::malformed("environment map", e.to_string()))
 }
 
 struct Reader<'a> {

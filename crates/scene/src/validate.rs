@@ -57,7 +57,12 @@ impl Scene {
         for (number, light) in self.illumination.lights.iter().enumerate() {
             check_light(light).map_err(|e| Fault::light(format_args!("light {number}"), &e))?;
         }
-        self.illumination.environment.validate().map_err(|e| Fault::light("environment", &e))
+        let environment = &self.illumination.environment;
+        environment.validate().map_err(|e| Fault::light("environment", &e))?;
+        let is_there = environment.is_mapped == self.environment_map.is_some();
+        require(is_there, "environment map", "it is missing, or there beside a gradient")?;
+        let checked = self.environment_map.as_ref().map_or(Ok(()), |map| map.validate());
+        checked.map_err(|e| Fault::malformed("environment map", e.to_string()))
     }
 
     fn check_instance(&self, instance: &Instance) -> Result<(), String> {

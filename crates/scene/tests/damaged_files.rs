@@ -299,3 +299,62 @@ fn the_undamaged_sample_loads() {
         (24, 2, 1, 3)
     );
 }
+
+/// An `.hdr` file: rows of eight and more texels are run-length encoded.
+fn hdr() -> Vec<u8> {
+    let texels: Vec<image::Rgb<f32>> = (0..32 * 16).map(|i| image::Rgb([i as f32, 0.5, (i / 32) as f32])).collect();
+    let mut bytes = Vec::new();
+    image::codecs::hdr::HdrEncoder::new(&mut bytes).encode(&texels, 32, 16).unwrap();
+    bytes
+}
+
+#[test]
+fn environment_maps() {
+    let (dir, bytes) = (tempfile::tempdir().unwrap(), hdr());
+    let path = dir.path().join("a.hdr");
+    let (mut loaded, mut refused) = (0, 0);
+    damaged(&bytes, 3000, |bytes| {
+        rewrite(&path, bytes);
+        match scene::load_environment(&path) {
+            Ok(map) => loaded += usize::from(map.validate().is_ok()),
+            Err(error) => refused += usize::from(error.to_string().contains("a.hdr")),
+        }
+    });
+    println!("{loaded} loaded, {refused} refused");
+    assert!(loaded > 100 && refused > 100, "{loaded} loaded, {refused} refused");
+    rewrite(&path, &bytes[..bytes.len() - 1]);
+    scene::load_environment(&path).expect_err("a file without its last byte");
+}
+
+#[test]
+fn an_environment_map_is_refused_by_field() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.hdr");
+    let file =
+        |header: &str, size: &str| format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n{header}\n{size}\n").into_bytes();
+    let with_texel = |header: &str, texel: [u8; 4]| [&file(header, "-Y 1 +X 1")[..], &texel].concat();
+    let white = [128, 128, 128, 129];
+    for (bytes, field) in [
+        (file("", "-Y 0 +X 0"), "size: 0×0"),
+        (file("", "-Y 0 +X 8"), "size: 8×0"),
+        (file("", "-Y 100000 +X 200000"), "size: "),
+        (file("", "-Y 4294967295 +X 4294967295"), "header"),
+        (file("", "-Y 2 +X 1"), "texels: "),
+        (with_texel("EXPOSURE=nan\n", white), "EXPOSURE"),
+        (with_texel("EXPOSURE=0\n", white), "EXPOSURE"),
+        (with_texel("EXPOSURE=-1\n", white), "EXPOSURE"),
+        (with_texel("EXPOSURE=1e-30\n", [255, 255, 255, 255]), "radiance: "),
+        (b"P6 1 1 255 abc".to_vec(), "header"),
+        (Vec::new(), "header"),
+    ] {
+        rewrite(&path, &bytes);
+        let refused = scene::load_environment(&path).expect_err(field).to_string();
+        assert!(refused.contains("a.hdr") && refused.contains(field), "{field}: {refused}");
+    }
+    rewrite(&path, &with_texel("EXPOSURE=2\n", white));
+    let map = scene::load_environment(&path).unwrap();
+    assert_eq!(map.texel_linear(0, 0), glam::Vec3::splat(0.5), "pixels are divided by the exposure");
+    rewrite(&path, &with_texel("", [255, 255, 255, 255]));
+    assert_eq!(scene::load_environment(&path).unwrap().texel_linear(0, 0), glam::Vec3::splat(65_408.0), "clamped");
+    assert!(scene::load_environment(&dir.path().join("none.hdr")).unwrap_err().to_string().contains("none.hdr"));
+}

@@ -56,11 +56,19 @@ fn every_kind_of_light_is_parsed_with_and_without_defaults() {
 
 #[test]
 fn an_environment_is_one_colour_or_two() {
-    let read = |text: &str| text.parse::<EnvironmentSpec>().unwrap().0;
+    let read = |text: &str| match text.parse::<EnvironmentSpec>().unwrap() {
+        EnvironmentSpec::Colors(environment) => environment,
+        EnvironmentSpec::File(path) => panic!("{path:?}"),
+    };
     assert_eq!(read("0.25"), Environment::uniform(Vec3::splat(0.25)));
     assert_eq!(read(" #000000 "), Environment::default());
-    let gradient = Environment { zenith_linear: Vec3::new(0.1, 0.2, 0.3), nadir_linear: Vec3::ONE };
+    let gradient = Environment::gradient(Vec3::new(0.1, 0.2, 0.3), Vec3::ONE);
     assert_eq!(read("0.1,0.2,0.3/#ffffff"), gradient);
+    let file: EnvironmentSpec = "skies/noon.HDR".parse().unwrap();
+    assert_eq!(
+        (file.to_string(), &file),
+        ("skies/noon.HDR".to_owned(), &EnvironmentSpec::File("skies/noon.HDR".into()))
+    );
 }
 
 #[test]
@@ -83,7 +91,7 @@ fn a_displayed_light_parses_to_the_same_light() {
         assert_eq!(LightSpec(*light).to_string().parse::<LightSpec>().unwrap().0, *light);
     }
     for environment in [tree.environment, Environment::uniform(Vec3::splat(0.1)), Environment::default()] {
-        let spec = EnvironmentSpec(environment);
+        let spec = EnvironmentSpec::Colors(environment);
         assert_eq!(spec.to_string().parse::<EnvironmentSpec>().unwrap(), spec, "{spec}");
     }
 }

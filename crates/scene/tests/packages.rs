@@ -3,12 +3,12 @@
 
 mod samples;
 
-use glam::Vec3;
+use glam::{UVec2, Vec3};
 use samples::signed_volume;
 use scene::procedural::{checker_sphere, courtyard, poles, quad, tree_terrain, unit_cube, uv_sphere};
 use scene::{
-    Illumination, Light, LightSpec, Limits, Scene, SceneErrorKind, Texture, TextureUse, VertexDetail, Wrap, pack,
-    unpack,
+    Environment, EnvironmentMap, Illumination, Light, LightSpec, Limits, Scene, SceneErrorKind, Texture, TextureUse,
+    VertexDetail, Wrap, pack, unpack,
 };
 
 #[test]
@@ -19,11 +19,16 @@ fn packing_is_deterministic_and_loses_nothing() {
         assert_eq!(unpack(&package, &Limits::default()).unwrap(), make());
     }
     assert!(pack(&tree_terrain(10_000, 1)) != pack(&tree_terrain(10_000, 2)));
+    let map = EnvironmentMap::from_texels(UVec2::new(4, 2), (0..8).collect()).unwrap();
+    let mapped = unit_cube().surrounded_by(map);
+    assert_eq!(unpack(&pack(&mapped), &Limits::default()).unwrap(), mapped);
+    let package = pack(&mapped);
+    assert!(unpack(&package[..package.len() - 1], &Limits::default()).is_err(), "a texel is cut");
 }
 
 #[test]
 fn an_invalid_scene_is_not_unpacked() {
-    let broken: [fn(&mut Scene); 22] = [
+    let broken: [fn(&mut Scene); 24] = [
         |s| s.meshes[0].indices[0] = 99,
         |s| s.meshes[0].vertices[3].position[1] = f32::NAN,
         |s| s.meshes[0].vertices[3].normal = [0.0; 3],
@@ -46,6 +51,8 @@ fn an_invalid_scene_is_not_unpacked() {
         |s| s.illumination.environment.zenith_linear.x = -1.0,
         |s| s.illumination.lights = vec![s.illumination.lights[0]; 256],
         |s| s.materials.clear(),
+        |s| s.illumination.environment = Environment::mapped(),
+        |s| s.environment_map = EnvironmentMap::from_texels(UVec2::ONE, vec![0]).ok(),
     ];
     for (number, break_it) in broken.iter().enumerate() {
         let mut scene = unit_cube();

@@ -51,7 +51,7 @@ fn illumination() -> Illumination {
             radiance_linear: Vec3::ONE,
         },
     ];
-    Illumination { lights, environment: Environment { zenith_linear: Vec3::ONE, nadir_linear: Vec3::splat(0.1) } }
+    Illumination { lights, environment: Environment::gradient(Vec3::ONE, Vec3::splat(0.1)) }
 }
 
 fn workload() -> Workload {
@@ -370,6 +370,8 @@ fn bad_lights_are_refused_by_field() {
         })
     };
     assert!(zenith(f32::NAN).contains("zenith_linear_rgb"));
+    let mapped = spoilt(|i| i.environment.as_mut().unwrap().is_mapped = true);
+    assert!(mapped.contains("illumination.environment: zenith: a gradient beside a map"), "{mapped}");
     assert!(zenith(-1.0).contains("illumination.environment: zenith: negative"));
     let directional = |spoil: fn(&mut proto::DirectionalLight)| {
         spoilt_light(0, |kind| match kind {

@@ -122,6 +122,7 @@ fn upload(subject: &Subject, engine: &GpuEngine, images: &[DepthImage]) -> anyho
         background: offer.background,
         illumination: &offer.illumination,
         highlight: None,
+        environment: None,
     };
     Ok(engine.reconstructor.upload(images, &description)?)
 }

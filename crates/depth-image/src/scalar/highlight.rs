@@ -8,7 +8,10 @@ use std::f32::consts::PI;
 use glam::{Vec3, Vec4};
 
 use super::Incident;
-use crate::{Environment, Highlight, Illumination, Light, Reflector, highlight::EXPONENTS, linear_from_srgb8};
+use crate::{
+    EnvironmentLight, EnvironmentMap, Highlight, Illumination, Light, Reflector, highlight::EXPONENTS,
+    linear_from_srgb8,
+};
 
 /// A point that reflects towards an eye.
 #[derive(Debug, Clone, Copy)]
@@ -64,8 +67,25 @@ pub fn highlight_linear(
         (1..).zip(&illumination.lights).map(|(place, light)| mirror.lamp(kind, light) * visibility(place)).sum();
     match kind {
         Highlight::BlinnPhong => lamps,
-        Highlight::Ggx => lamps + mirror.environment(&illumination.environment) * visibility(0),
+        Highlight::Ggx => {
+            let environment = &illumination.environment;
+            let gradient = |mirrored: Vec3, roughness| environment.radiance_linear(mirrored * contrast(roughness));
+            lamps + mirror.environment(gradient) * visibility(0)
+        }
     }
+}
+
+/// The highlight of an unoccluded environment map under GGX. The two directions are unit vectors.
+#[must_use]
+pub fn environment_highlight_linear(
+    (light, map): (&EnvironmentLight, &EnvironmentMap),
+    normal_in_world: Vec3,
+    towards_eye_in_world: Vec3,
+    reflector: &Reflector,
+) -> Vec3 {
+    let point_in_world = Vec3::ZERO;
+    let mirror = Mirror { point_in_world, normal_in_world, towards_eye_in_world, reflector: *reflector };
+    mirror.environment(|mirrored, roughness| light.mirrored_linear(map, mirrored, roughness))
 }
 
 impl Mirror {
@@ -98,15 +118,16 @@ impl Mirror {
     }
 
     /// The highlight of the unoccluded environment: split sum, with Karis' fit for the surface's part
-    /// ("Physically Based Shading on Mobile", 2014).
-    fn environment(&self, environment: &Environment) -> Vec3 {
+    /// ("Physically Based Shading on Mobile", 2014). `mirrored_linear` is the mean radiance over a lobe, by its middle and
+    /// the surface's roughness.
+    fn environment(&self, mirrored_linear: impl FnOnce(Vec3, f32) -> Vec3) -> Vec3 {
         let n_v = self.normal_in_world.dot(self.towards_eye_in_world).clamp(0.0, 1.0);
         let roughness = self.reflector.roughness.max(LEAST_ROUGHNESS);
         let r = Vec4::new(-1.0, -0.0275, -0.572, 0.022) * roughness + Vec4::new(1.0, 0.0425, 1.04, -0.04);
         let grazing = (r.x * r.x).min((-9.28 * n_v).exp2()) * r.x + r.y;
         let brdf = self.reflector.reflectance_linear * (r.z - 1.04 * grazing) + (r.w + 1.04 * grazing);
         let mirrored = -self.towards_eye_in_world.reflect(self.normal_in_world);
-        environment.radiance_linear(mirrored * contrast(roughness)) * brdf
+        mirrored_linear(mirrored, roughness) * brdf
     }
 }
 
@@ -151,6 +172,7 @@ fn schlick(reflectance_linear: Vec3, cosine: f32) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Environment;
 
     const POLISHED_TO_ROUGH: [f32; 6] = [0.1, 0.2, 0.35, 0.5, 0.75, 1.0];
     const TILTS_RAD: [f32; 5] = [0.0, 0.4, 0.8, 1.2, 1.5];

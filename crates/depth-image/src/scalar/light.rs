@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn the_gradient_under_a_cosine_lobe_equals_its_closed_form() {
-        let environment = Environment { zenith_linear: Vec3::ONE, nadir_linear: Vec3::ZERO };
+        let environment = Environment::gradient(Vec3::ONE, Vec3::ZERO);
         let normal = Vec3::new(0.6, 0.64, 0.48);
         let [tangent, bitangent] = tangents_of(normal);
         let count = 20_000;

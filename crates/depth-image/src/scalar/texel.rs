@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-use super::linear_from_rgb9e5;
-use crate::{BACKGROUND_INVERSE_DEPTH, DepthImage};
+use crate::{BACKGROUND_INVERSE_DEPTH, DepthImage, linear_from_rgb9e5};
 
 /// The content of one texel.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,6 +6,7 @@
 
 use std::{collections::HashMap, fmt::Debug};
 
+use depth_image::{LOBE_ROUGHNESS, LOBE_SIZE_PX};
 use minijinja::{Environment, UndefinedBehavior, Value};
 
 use crate::{error::ShaderError, table::TABLE_WIDTH_LOG2};
@@ -66,12 +67,15 @@ impl Templates {
             ("color.wgsl", include_str!("../wgsl/color.wgsl")),
             ("normal.wgsl", include_str!("../wgsl/normal.wgsl")),
             ("light.wgsl", include_str!("../wgsl/light.wgsl")),
+            ("environment.wgsl", include_str!("../wgsl/environment.wgsl")),
             ("highlight.wgsl", include_str!("../wgsl/highlight.wgsl")),
             ("table.wgsl", include_str!("../wgsl/table.wgsl")),
         ];
         let mut environment = Environment::new();
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
         environment.add_global("table_width_log2", TABLE_WIDTH_LOG2);
+        environment.add_global("lobe_size_px", LOBE_SIZE_PX.to_array().to_vec());
+        environment.add_global("lobe_roughness", LOBE_ROUGHNESS.to_vec());
         for &(name, text) in shared.iter().chain(own) {
             environment
                 .add_template(name, text)

@@ -68,10 +68,7 @@ fn highlight_from_environment(mirror: Mirror) -> vec3f {
     let r = roughness * vec4f(-1.0, -0.0275, -0.572, 0.022) + vec4f(1.0, 0.0425, 1.04, -0.04);
     let grazing = min(r.x * r.x, exp2(-9.28 * n_v)) * r.x + r.y;
     let brdf = mirror.reflector.reflectance_linear * (r.z - 1.04 * grazing) + (r.w + 1.04 * grazing);
-    // A rough surface's lobe sees less of the gradient.
-    let alpha = roughness * roughness;
-    let contrast = 1.0 - alpha * (0.5 - alpha * (1.0 / 6.0));
-    return environment_radiance(reflect(-mirror.towards_eye, mirror.normal) * contrast) * brdf;
+    return environment_mirrored(reflect(-mirror.towards_eye, mirror.normal), roughness) * brdf;
 }
 {% else %}
 // The exponent whose lobe is as wide as a roughness' (Walter et al. 2007).

@@ -110,6 +110,15 @@ fn apparent_radius(light: Light, incident: Incident) -> f32 {
     return radius_m / select(incident.distance_m, 1.0, light.kind == LIGHT_PARALLEL);
 }
 
+{% if environment_map %}
+{% include "environment.wgsl" %}
+
+// One point of the bright texels of the environment map, as a lamp.
+fn incident_from_bright(place: vec2f) -> Incident {
+    let bright = bright_from(place);
+    return Incident(bright.towards, PARALLEL_M, bright.irradiance_linear);
+}
+{% else %}
 // The radiance that arrives from far away in a direction: a gradient from straight down to straight up.
 fn environment_radiance(direction: vec3f) -> vec3f {
     return mix(illumination.nadir_linear, illumination.zenith_linear, 0.5 + 0.5 * direction.y);
@@ -119,3 +128,11 @@ fn environment_radiance(direction: vec3f) -> vec3f {
 fn environment_diffuse(normal: vec3f) -> vec3f {
     return mix(illumination.nadir_linear, illumination.zenith_linear, 0.5 + normal.y * (1.0 / 3.0));
 }
+
+// The gradient as a surface mirrors it: a rough one's lobe sees less of it.
+fn environment_mirrored(mirrored: vec3f, roughness: f32) -> vec3f {
+    let alpha = roughness * roughness;
+    let contrast = 1.0 - alpha * (0.5 - alpha * (1.0 / 6.0));
+    return environment_radiance(mirrored * contrast);
+}
+{% endif %}

@@ -101,6 +101,7 @@ fn light_beyond_white_counts_in_the_mean() {
         background: Environment::uniform(Vec3::ZERO),
         illumination: &dark,
         highlight: none,
+        environment: None,
     };
     let set = reconstructor().upload(&stage.images, &description).expect("a set");
     let planes = ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::COLOR };

@@ -143,7 +143,7 @@ fn a_search_in_small_steps_finds_the_wall_too() {
 /// A wall before a gradient: pixels without a surface show it in their own direction, drawn and reconstructed alike.
 #[test]
 fn a_background_by_direction_is_the_same_drawn_and_reconstructed() {
-    let background = Environment { zenith_linear: Vec3::new(0.9, 0.7, 0.5), nadir_linear: Vec3::new(0.0, 0.1, 0.3) };
+    let background = Environment::gradient(Vec3::new(0.9, 0.7, 0.5), Vec3::new(0.0, 0.1, 0.3));
     let eyes = [Vec3::new(-0.3, 0.2, 0.0), Vec3::new(0.3, -0.2, 0.0)];
     let scene = scene::Scene { background, ..wall(4.0) };
     let stage = Stage::with_corners(scene, &eyes.map(|eye| looking_ahead(eye, SAMPLE_PX)));

@@ -1,6 +1,7 @@
 //! The methods on the software device: against their scalar twins, closed forms and their own limits.
 
 mod antialias;
+mod background;
 mod batches;
 mod closed_form;
 mod failures;

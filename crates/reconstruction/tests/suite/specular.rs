@@ -1,14 +1,19 @@
 //! Light that depends on the viewer: against its closed form at the true point, and against the scalar twin.
 
+use std::sync::Arc;
+
 use depth_image::{
-    Aabb, Camera, DepthImage, Environment, Highlight, Illumination, Light, PinholeCamera, ProvenanceKind, Ray,
-    Reflector, SpecularPlanes, View, highlight_linear, oct16_from_unit, rgb9e5_from_linear, srgb8_from_linear,
+    Aabb, Camera, DepthImage, Environment, EnvironmentMap, Highlight, Illumination, Light, PinholeCamera,
+    ProvenanceKind, Ray, Reflector, SpecularPlanes, View, highlight_linear, oct16_from_unit, rgb9e5_from_linear,
+    srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
+use gpu::GpuEnvironment;
 use reconstruction::{ReconstructionError, SetDescription, scalar};
 
 use crate::stage::{
-    ALL_PLANES, Agreement, CARVE, Corners, SEARCH, VIEW_PX, assert_sane, colors_differ_by, count, kinds, reconstructor,
+    ALL_PLANES, Agreement, CARVE, Corners, SEARCH, VIEW_PX, assert_sane, colors_differ_by, count, gpu, kinds,
+    reconstructor,
 };
 
 const KINDS: [Highlight; 2] = [Highlight::BlinnPhong, Highlight::Ggx];
@@ -44,7 +49,7 @@ fn lamp(position_in_world: Vec3) -> Light {
 fn lamps(count: usize) -> Illumination {
     let places = [(0.4, 0.5), (-0.6, 0.3), (0.0, -0.7), (0.8, 0.0), (-0.3, -0.3)];
     let lights = places.iter().take(count).map(|&(x, y)| lamp(Vec3::new(x, y, 1.5))).collect();
-    let environment = Environment { zenith_linear: Vec3::splat(0.2), nadir_linear: Vec3::splat(0.05) };
+    let environment = Environment::gradient(Vec3::splat(0.2), Vec3::splat(0.05));
     Illumination { lights, environment }
 }
 
@@ -102,7 +107,13 @@ impl Room {
 
     fn description(&self, highlight: Option<Highlight>) -> SetDescription<'_> {
         let volume = Aabb { min: Vec3::new(-4.0, -4.0, 0.0), max: Vec3::new(4.0, 4.0, 1.2) };
-        SetDescription { volume, background: Environment::default(), illumination: &self.illumination, highlight }
+        SetDescription {
+            volume,
+            background: Environment::default(),
+            illumination: &self.illumination,
+            highlight,
+            environment: None,
+        }
     }
 
     /// The colour of a view's pixel, as an eye sees it.
@@ -300,5 +311,25 @@ fn planes_that_do_not_fit_are_refused() {
     short[2].specular.as_mut().expect("planes").reflectance_srgb8_roughness8.pop();
     for images in [no_normals, too_few, short] {
         assert!(refused(&images));
+    }
+}
+
+#[test]
+fn a_uniform_map_is_mirrored_as_the_constant_environment() {
+    let grey = Vec3::splat(0.5);
+    let map = EnvironmentMap::new(UVec2::new(8, 4), &[grey; 32]).expect("a map");
+    let on_device = Arc::new(GpuEnvironment::upload(gpu(), &map).expect("a map"));
+    let lit_by = |environment| Room { illumination: Illumination { environment, ..lamps(1) }, ..with_ball() };
+    let (constant, mapped, dark) =
+        (lit_by(Environment::uniform(grey)), lit_by(Environment::mapped()), lit_by(Environment::default()));
+    let images = constant.images();
+    for kind in KINDS {
+        let seen = |room: &Room, environment| {
+            let set = SetDescription { environment, ..room.description(Some(kind)) };
+            view(&images, &set, &corners().view()).srgb8
+        };
+        let (constant, mapped, dark) = (seen(&constant, None), seen(&mapped, Some(&on_device)), seen(&dark, None));
+        assert!(constant.iter().zip(&mapped).all(|(a, b)| a.abs_diff(*b) <= 1), "{kind:?}");
+        assert_eq!(constant != dark, kind == Highlight::Ggx, "{kind:?}: only microfacets mirror the environment");
     }
 }

@@ -38,6 +38,10 @@ fn device() -> &'static Device {
     })
 }
 
+pub fn gpu() -> &'static Arc<Gpu> {
+    &device().gpu
+}
+
 pub fn reconstructor() -> &'static Reconstructor {
     &device().reconstructor
 }
@@ -46,7 +50,7 @@ static DARK: Illumination = Illumination { lights: Vec::new(), environment: Envi
 
 /// A set in which nothing depends on the viewer.
 pub fn matt(volume: Aabb, background: Environment) -> SetDescription<'static> {
-    SetDescription { volume, background, illumination: &DARK, highlight: None }
+    SetDescription { volume, background, illumination: &DARK, highlight: None, environment: None }
 }
 
 /// A scene and depth images of it.

@@ -238,7 +238,7 @@ fn light_without_rays_equals_the_scalar_reference() {
             radius_m: 0.0,
         },
     ];
-    let environment = Environment { zenith_linear: Vec3::splat(0.3), nadir_linear: Vec3::splat(0.1) };
+    let environment = Environment::gradient(Vec3::splat(0.3), Vec3::splat(0.1));
     let scene = floor_under(&[], Illumination { lights: lights.clone(), environment });
     for (point, reflected) in floor_light(&image(work(&upload(&scene), "phong"), &down_from(2.0))) {
         let lamp = |light: &Light| {

@@ -3,6 +3,7 @@
 mod animation;
 mod antialias;
 mod closed_forms;
+mod environment_map;
 mod light_failures;
 mod materials;
 mod raster;

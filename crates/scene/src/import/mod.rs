@@ -2,6 +2,7 @@
 //! common steps: re-centring, mirrored placements, limits, validation.
 
 mod clamped;
+mod environment;
 mod folder;
 mod gltf;
 mod missing_textures;
@@ -16,6 +17,7 @@ use std::path::Path;
 
 use crate::error::Fault;
 use crate::{Limits, Scene, SceneError};
+pub use environment::load_environment;
 use folder::Folder;
 pub use missing_textures::{MissingTextures, MissingTexturesError};
 use source_scene::SourceScene;

@@ -93,6 +93,7 @@ impl SourceScene {
             materials: self.materials,
             textures: self.textures,
             illumination: Illumination { lights, ..Illumination::default() },
+            environment_map: None,
             cameras: self.cameras.into_iter().map(camera).collect(),
             animation: self.animation,
             origin_in_source,

@@ -16,8 +16,7 @@ const CEILING_M: f32 = 0.98;
 const TREE_HEIGHT_M: f32 = 0.8;
 
 /// A blue sky over a meadow that reflects some of it: `(0.20, 0.23, 0.27)` on level ground.
-const ENVIRONMENT: Environment =
-    Environment { zenith_linear: Vec3::new(0.220, 0.258, 0.312), nadir_linear: Vec3::new(0.10, 0.09, 0.06) };
+const ENVIRONMENT: Environment = Environment::gradient(Vec3::new(0.220, 0.258, 0.312), Vec3::new(0.10, 0.09, 0.06));
 
 /// A tree on a hilly meadow of 2 m × 2 m, within x, z in [-1, 1] and y in [0, 1]. Half of the triangles are ground and
 /// half are tree. The count is met within 3 % from some 10,000 triangles up. The scene is static: see

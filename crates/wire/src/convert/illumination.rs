@@ -12,7 +12,7 @@ messages! {
     Illumination = Illumination { lights, environment as "illumination.environment" },
         first |i| at_most(i.lights.len(), MAX_LIGHTS, "illumination.lights");
     Environment = Environment {
-        ; zenith_linear: zenith_linear_rgb as "environment.zenith_linear_rgb",
+        is_mapped; zenith_linear: zenith_linear_rgb as "environment.zenith_linear_rgb",
         nadir_linear: nadir_linear_rgb as "environment.nadir_linear_rgb"
     }, then |environment| environment.validate().map_err(refused("illumination.environment"));
 }

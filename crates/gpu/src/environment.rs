@@ -1,0 +1,57 @@
+//! An environment map on the device: `environment.wgsl` reads it.
+
+use std::sync::Arc;
+
+use bytemuck::cast_slice;
+use depth_image::{EnvironmentLight, EnvironmentMap};
+use wgpu::TextureFormat;
+
+use crate::{Binding, Gpu, GpuError, Table, texture_bytes};
+
+/// The map, its means over lobes, and its bright texels.
+pub struct GpuEnvironment {
+    texels: Table,
+    lobes: Table,
+    bright_texels: Table,
+    /// Bright texels are traced like a lamp.
+    pub has_bright_texels: bool,
+}
+
+impl GpuEnvironment {
+    /// Puts a map on the device.
+    ///
+    /// # Errors
+    /// When a table would exceed the device's limits: names it.
+    pub fn upload(gpu: &Arc<Gpu>, map: &EnvironmentMap) -> Result<Self, GpuError> {
+        let light = EnvironmentLight::of(map);
+        let size_px = map.size_px();
+        let count = light.bright_texels.len() as u32;
+        let floats = [light.bright_irradiance, light.base_limit].map(f32::to_bits);
+        let header = [count, floats[0], floats[1], size_px.x | size_px.y << 16];
+        let listed = light.bright_texels.iter().map(|&texel| bytemuck::cast(texel));
+        let words: Vec<[u32; 4]> = std::iter::once(header).chain(listed).collect();
+        let table = |label, format, bytes: &[u8]| Table::new(gpu, label, format, bytes);
+        Ok(Self {
+            texels: table("environment texels", TextureFormat::R32Uint, cast_slice(map.texels_rgb9e5()))?,
+            lobes: table("environment lobes", TextureFormat::Rgba32Float, cast_slice(&light.lobes))?,
+            bright_texels: table("bright texels", TextureFormat::Rgba32Uint, cast_slice(&words))?,
+            has_bright_texels: count > 0,
+        })
+    }
+
+    /// The resources of `environment.wgsl`.
+    #[must_use]
+    pub fn bindings(&self) -> [Binding<'_>; 3] {
+        [
+            Binding::texture("environment_texels", &self.texels),
+            Binding::texture("environment_lobes", &self.lobes),
+            Binding::texture("bright_texels", &self.bright_texels),
+        ]
+    }
+
+    /// The bytes of its tables.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        [&self.texels, &self.lobes, &self.bright_texels].map(|table| texture_bytes(table.texture())).iter().sum()
+    }
+}
