@@ -180,6 +180,10 @@ impl SceneArgs {
         let bounds = scene.bounds();
         let rig = match self.scene {
             SceneSpec::TreeTerrain { .. } => Rig::two_plane(&bounds, TWO_PLANE_HEIGHT),
+            // As it stands first.
+            SceneSpec::File(_) if scene.animation.is_some() => {
+                Rig::framing(scene.frozen_at(0.0).vertices_in_world(), MODEL_SPREAD_RAD, size_px)
+            }
             SceneSpec::File(_) => Rig::framing(scene.vertices_in_world(), MODEL_SPREAD_RAD, size_px),
             _ => Rig::in_front_of(&bounds, MODEL_SPREAD_RAD),
         };

@@ -128,6 +128,9 @@ impl Workload {
         self.timeline.validate()?;
         let refused = |source| InvalidField::Light { field: "background", source };
         self.background.validate().map_err(refused)?;
+        if self.background.is_mapped {
+            return Err(InvalidField::out_of_range("background", "a map", "a gradient"));
+        }
         validate_illumination(&self.illumination)?;
         within(self.refinement_steps, 1..=MAX_REFINEMENT_STEPS, "refinement_step_count", "from 1 to 64")
     }

@@ -205,7 +205,10 @@ impl Engine for GpuEngine {
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
         let lighting: Lighting = parsed("lighting", &set.lighting)?;
         let environment = match set.illumination.environment.is_mapped {
-            true => self.scene(&set.scene_hash)?.environment.clone(),
+            true => {
+                let map = self.scene(&set.scene_hash)?.environment.clone();
+                Some(map.ok_or_else(|| invalid("illumination", "the scene has no environment map"))?)
+            }
             false => None,
         };
         let description = SetDescription {

@@ -15,7 +15,7 @@ use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume, S
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
 use crate::{quads::QuadTargets, sample_set::SampleSet};
 
-/// Bounds the memory of a batch: 12 bytes a pixel on the device, 24 with several positions a pixel, up to 12 on the host.
+/// Bounds the memory of a batch: 20 bytes a pixel on the device, 32 with several positions a pixel, up to 12 on the host.
 const PIXELS_A_BATCH: usize = 1 << 20;
 const MAX_VIEWS_A_BATCH: usize = 256;
 /// The pixels of a slice of views whose cost is unknown.
@@ -88,7 +88,8 @@ impl<'r> Recording<'r> {
     ) -> Result<Self, ReconstructionError> {
         let plane_bytes = 4 * (cameras[0].pixel_count() * cameras.len()) as u64;
         let sum_bytes = (antialias > Antialias::NONE).then_some(3 * plane_bytes);
-        device.gpu.check_storage_bytes("a batch of views (bytes)", sum_bytes.unwrap_or(plane_bytes))?;
+        device.gpu.check_storage_bytes("a batch of views (bytes)", plane_bytes)?;
+        device.gpu.check_storage_bytes("the sums of several samples a pixel (bytes)", sum_bytes.unwrap_or(0))?;
         let slice_px = device.gpu.device_queue.slice_units(family, UNKNOWN_SLICE_PX);
         let pieces = Pieces::of(cameras.len(), cameras[0].size_px, slice_px);
         let works = works(device, set, cameras, &pieces, antialias);

@@ -105,9 +105,18 @@ impl Batch<'_> {
     /// The pixels of a slice of pictures whose cost is unknown.
     pub fn unknown_slice_px(&self) -> u64 {
         let DrawWork { scene, lighting, .. } = self.work;
-        let [shadow, occlusion] = [lighting.shadow_rays() * scene.traced_lamps(lighting), lighting.occlusion_rays()]
-            .map(|rays| u64::from(rays.min(RAYS_A_DISPATCH)));
+        let (to_lamps, around) =
+            (lighting.shadow_rays() * scene.traced_lamps(lighting), lighting.occlusion_rays() * self.rays_around());
+        let [shadow, occlusion] = [to_lamps, around].map(|rays| u64::from(rays.min(RAYS_A_DISPATCH)));
         UNKNOWN_SLICE_RAYS / (1 + shadow + occlusion)
+    }
+
+    /// Rays that are traced for each ray of occlusion: where lamps have no rays, bright texels of an environment map take as
+    /// many.
+    fn rays_around(&self) -> u32 {
+        let DrawWork { scene, lighting, .. } = self.work;
+        let has_bright = scene.environment.as_deref().is_some_and(|map| map.has_bright_texels);
+        if has_bright && lighting.shadow_rays() == 0 { 2 } else { 1 }
     }
 
     /// A uniform of the pieces with their cameras' places in the batch's planes, for each part of the rays.
@@ -117,7 +126,7 @@ impl Batch<'_> {
             cameras: self.uniform(gpu, pieces, sums, rays),
         };
         let lamps = self.work.scene.traced_lamps(self.work.lighting);
-        parts_of(&sums.rays, lamps).into_iter().map(part).collect()
+        parts_of(&sums.rays, lamps, self.rays_around()).into_iter().map(part).collect()
     }
 
     /// A uniform for all rays.
@@ -221,14 +230,15 @@ struct Rays {
     occlusion: Range<u32>,
 }
 
-/// Rays to all lamps and of occlusion, cut into parts of at most [`RAYS_A_DISPATCH`] of each kind.
-fn parts_of([shadow, occlusion]: &[Range<u32>; 2], lamp_count: u32) -> Vec<Rays> {
+/// Rays to all lamps and of occlusion, cut into parts of at most [`RAYS_A_DISPATCH`] of each kind; of occlusion, so many are
+/// traced for each.
+fn parts_of([shadow, occlusion]: &[Range<u32>; 2], lamp_count: u32, rays_around: u32) -> Vec<Rays> {
     let lamps_a_part = if shadow.is_empty() { lamp_count } else { lamp_count.min(RAYS_A_DISPATCH) }.max(1);
     let lamps = ranges(&(0..lamp_count), lamps_a_part);
     let to_lamps = ranges(shadow, RAYS_A_DISPATCH / lamps_a_part.min(RAYS_A_DISPATCH));
     let to_lamps = to_lamps.iter().flat_map(|shadow| lamps.iter().map(|lamps| (shadow.clone(), lamps.clone())));
     let mut to_lamps: Vec<(Range<u32>, Range<u32>)> = to_lamps.collect();
-    let mut around = ranges(occlusion, RAYS_A_DISPATCH);
+    let mut around = ranges(occlusion, RAYS_A_DISPATCH / rays_around);
     let count = to_lamps.len().max(around.len());
     to_lamps.resize(count, (shadow.end..shadow.end, 0..0));
     around.resize(count, occlusion.end..occlusion.end);
@@ -249,13 +259,14 @@ mod tests {
     #[test]
     fn rays_are_traced_in_parts_that_cover_all_of_them() {
         let rays = |shadow, lamps, occlusion| Rays { shadow, lamps, occlusion };
-        assert_eq!(parts_of(&[0..0, 0..0], 200), [rays(0..0, 0..200, 0..0)]);
-        assert_eq!(parts_of(&[0..0, 0..40], 2), [rays(0..0, 0..2, 0..32), rays(0..0, 0..0, 32..40)]);
+        assert_eq!(parts_of(&[0..0, 0..0], 200, 1), [rays(0..0, 0..200, 0..0)]);
+        assert_eq!(parts_of(&[0..0, 0..40], 2, 1), [rays(0..0, 0..2, 0..32), rays(0..0, 0..0, 32..40)]);
+        assert_eq!(parts_of(&[0..0, 0..20], 0, 2), [rays(0..0, 0..0, 0..16), rays(0..0, 0..0, 16..20)]);
         let one_lamp = [rays(3..35, 0..1, 0..16), rays(35..67, 0..1, 16..16), rays(67..70, 0..1, 16..16)];
-        assert_eq!(parts_of(&[3..70, 0..16], 1), one_lamp);
+        assert_eq!(parts_of(&[3..70, 0..16], 1, 1), one_lamp);
         for lamp_count in [1, 3, 31, 32, 33, 200, 255] {
             let mut seen = vec![0; 64 * lamp_count as usize];
-            for part in parts_of(&[0..64, 0..64], lamp_count) {
+            for part in parts_of(&[0..64, 0..64], lamp_count, 1) {
                 assert!(part.shadow.len() * part.lamps.len() <= RAYS_A_DISPATCH as usize, "{part:?}");
                 let each = part.lamps.flat_map(|lamp| part.shadow.clone().map(move |ray| lamp * 64 + ray));
                 each.for_each(|ray| seen[ray as usize] += 1);

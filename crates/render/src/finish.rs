@@ -26,8 +26,10 @@ pub(crate) struct Finish {
 
 impl Finish {
     fn of(batch: &Batch<'_>) -> Self {
-        // One shader, whether depth is wanted or not.
-        let output = Output { depth: false, ..batch.output };
+        // One shader, whether depth is wanted or not, and for any number of positions.
+        let is_averaged = batch.output.antialias > Antialias::NONE;
+        let antialias = if is_averaged { Antialias::MOST } else { Antialias::NONE };
+        let output = Output { depth: false, antialias, ..batch.output };
         let (lit, environment_map) = (batch.work.lighting.is_lit(), batch.work.scene.environment.is_some());
         Self { by_rays: batch.by_rays, lit, environment_map, output }
     }
@@ -96,7 +98,9 @@ impl Planes {
         let bytes = batch.bytes(batch.output.layout().count);
         gpu.check_storage_bytes("the planes of a batch (bytes)", bytes)?;
         let is_averaged = batch.output.antialias > Antialias::NONE;
-        let sums = is_averaged.then(|| pool.lend_storage("sums of positions", batch.bytes(3).max(4)));
+        let sum_bytes = if is_averaged { batch.bytes(3) } else { 0 };
+        gpu.check_storage_bytes("the sums of several samples a pixel (bytes)", sum_bytes)?;
+        let sums = is_averaged.then(|| pool.lend_storage("sums of positions", sum_bytes.max(4)));
         Ok(Self { words: pool.lend_storage("planes", bytes.max(4)), position_sums: sums })
     }
 }

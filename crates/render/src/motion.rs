@@ -77,15 +77,14 @@ impl Motion {
 
     /// The pose of a moment.
     pub fn at(&self, scene_time_s: f32) -> Arc<Posed> {
-        let mut last = self.last.lock();
-        match &*last {
-            Some((time_s, posed)) if !self.moves() || *time_s == scene_time_s => posed.clone(),
-            _ => {
-                let posed = Arc::new(on_free_cores(self.gpu.device_queue.cuts(), || self.posed(scene_time_s)));
-                *last = Some((scene_time_s, posed.clone()));
-                posed
-            }
+        let is_good = |(time_s, _): &&(f32, Arc<Posed>)| !self.moves() || *time_s == scene_time_s;
+        if let Some((_, posed)) = self.last.lock().as_ref().filter(is_good) {
+            return posed.clone();
         }
+        // Not under the lock: the pool's threads may ask for a pose, too.
+        let posed = Arc::new(on_free_cores(self.gpu.device_queue.cuts(), || self.posed(scene_time_s)));
+        *self.last.lock() = Some((scene_time_s, posed.clone()));
+        posed
     }
 
     fn posed(&self, scene_time_s: f32) -> Posed {

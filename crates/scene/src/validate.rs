@@ -31,6 +31,7 @@ impl Scene {
         self.check_illumination()?;
         each("camera", &self.cameras, check_camera)?;
         self.background.validate().map_err(|e| Fault::light("background", &e))?;
+        require(!self.background.is_mapped, "background", "it is a map, which only the environment may be")?;
         self.wind.as_ref().map_or(Ok(()), check_wind)?;
         self.check_animation(limits)?;
         require(self.origin_in_source.is_finite(), "origin", "not finite")

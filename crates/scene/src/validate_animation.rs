@@ -32,6 +32,9 @@ impl Scene {
         let instances: HashSet<u32> = animation.moving.iter().map(|moving| moving.instance).collect();
         require(instances.len() == animation.moving.len(), "animation, moving", "an instance moves twice")?;
         each("moving instance", &animation.moving, |moving| self.check_moving(moving, animation.nodes.len()))?;
+        let mesh = |moving: &MovingInstance| self.meshes.get(self.instances[moving.instance as usize].mesh as usize);
+        let moved = animation.moving.iter().filter_map(mesh).map(|mesh| mesh.vertices.len() as u64).sum();
+        at_most("animation, vertices of all moving instances", moved, limits.vertices)?;
         self.check_reach(animation)
     }
 

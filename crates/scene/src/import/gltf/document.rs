@@ -166,7 +166,8 @@ impl<'a> Document<'a> {
             // An accessor without a view holds zeros. No byte of the file backs its count, so the file's size bounds it
             // instead.
             None => {
-                let backed = self.buffers.iter().map(|b| b.len() as u64).sum();
+                let decoded = self.decoded_views.iter().flatten().map(Vec::len);
+                let backed = self.buffers.iter().map(|b| b.len()).chain(decoded).map(|bytes| bytes as u64).sum();
                 at_most(format!("{}, elements without data", layout.name), layout.count, backed)?;
                 vec![zero; layout.count as usize]
             }

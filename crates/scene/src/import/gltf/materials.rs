@@ -17,7 +17,7 @@ use super::super::picture::{Content, EncodedPicture, decode_all};
 use super::super::source_scene::SourceScene;
 use super::document::Document;
 use super::texture_coordinates::{Coordinates, maps_of};
-use crate::error::Fault;
+use crate::error::{Fault, at_most};
 use crate::{DIELECTRIC_REFLECTANCE, Material, Texture, TextureUse, Wrap};
 
 /// Fills the scene's materials, one more than the file's (its default), and its textures.
@@ -26,7 +26,9 @@ pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<(), F
     let mut pictures = Pictures::default();
     let of_material = |(i, m): (usize, &JsonMaterial)| Uses::of(root, m, &mut pictures, &format!("material {i}"));
     let uses: Vec<_> = root.materials.iter().enumerate().map(of_material).collect::<Result<_, _>>()?;
-    let encoded = pictures.uses.iter().map(|&(image, content)| encoded_picture(document, image, content));
+    let mut bytes_left = document.limits.file_bytes;
+    let encoded =
+        pictures.uses.iter().map(|&(image, content)| encoded_picture(document, image, content, &mut bytes_left));
     let encoded = encoded.collect::<Result<Vec<_>, _>>()?;
     let textures = decode_all(&encoded, document.limits, document.folder.missing_textures)?;
     let means = Means::of(&textures);
@@ -155,12 +157,23 @@ fn wrap_of(root: &Root, texture: Index<JsonTexture>, element: &str) -> Result<[W
     Ok([wrap(sampler.wrap_s)?, wrap(sampler.wrap_t)?])
 }
 
-fn encoded_picture(document: &Document, index: Index<Image>, content: Content) -> Result<EncodedPicture, Fault> {
+/// Many images may share a buffer view: `bytes_left` bounds their copies together.
+fn encoded_picture(
+    document: &Document,
+    index: Index<Image>,
+    content: Content,
+    bytes_left: &mut u64,
+) -> Result<EncodedPicture, Fault> {
     let element = format!("image {}", index.value());
     let image = document.root.get(index).ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
     let bytes = match (&image.uri, image.buffer_view) {
         (Some(uri), _) => existing(document.read_uri(&element, uri))?,
-        (None, Some(view)) => Some(document.view(view, &element)?.1.to_vec()),
+        (None, Some(view)) => {
+            let bytes = document.view(view, &element)?.1;
+            at_most(format_args!("{element}, bytes of images"), bytes.len() as u64, *bytes_left)?;
+            *bytes_left -= bytes.len() as u64;
+            Some(bytes.to_vec())
+        }
         (None, None) => return Err(Fault::malformed(element, "it has neither a uri nor a buffer view")),
     };
     Ok(EncodedPicture { file: image.uri.clone().unwrap_or_default(), element, bytes, content })

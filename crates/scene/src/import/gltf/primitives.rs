@@ -13,7 +13,7 @@ use super::super::tangents;
 use super::document::{Document, same_count};
 use super::skins;
 use super::texture_coordinates::{Coordinates, UvSource};
-use crate::error::Fault;
+use crate::error::{Fault, at_most};
 use crate::{Vertex, VertexDetail};
 
 /// `None` for points and lines.
@@ -32,6 +32,8 @@ pub(super) fn read(
     let attributes = Attributes { document, primitive, element };
     let position = attributes.index(Semantic::Positions);
     let position = position.ok_or_else(|| Fault::malformed(element, "it has no POSITION"))?;
+    let count = document.element_count(position, element)?;
+    at_most(format_args!("{element}, vertices"), count, document.limits.vertices)?;
     let positions = document.floats::<3>(position, element)?;
     let indices = triangles(document, primitive.indices, mode, positions.len(), element)?;
     let (vertices, has_normals) = attributes.vertices(positions.len(), &coordinates.first)?;

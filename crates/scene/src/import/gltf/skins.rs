@@ -83,6 +83,7 @@ pub(super) fn bind_matrices(document: &Document, skin: &Skin, element: &str) -> 
     }
     let Some(index) = skin.inverse_bind_matrices else { return Ok(vec![DAffine3::IDENTITY; skin.joints.len()]) };
     let element = format!("{element}, inverseBindMatrices");
+    at_most(format_args!("{element}, matrices"), document.element_count(index, &element)?, u64::from(u16::MAX))?;
     let matrices = document.floats::<16>(index, &element)?;
     if matrices.len() < skin.joints.len() {
         let why = format!("{} matrices for {} joints", matrices.len(), skin.joints.len());
