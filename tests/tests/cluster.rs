@@ -98,7 +98,7 @@ async fn frames_say_their_samples_a_pixel() {
         assert!(frames.iter().all(|frame| frame.header.antialias == antialias));
         shown.push(frames.into_iter().map(|frame| frame.view).collect::<Vec<_>>());
     }
-    assert_eq!(cluster.take_counts(), [1; 3], "nothing is sampled again");
+    assert!(cluster.take_counts().is_empty(), "what was sampled for the measurement serves both");
     for (plain, smooth) in shown[0].iter().zip(&shown[1]) {
         let colors = |view: &View| view.srgb8.chunks(3).map(<[u8]>::to_vec).collect::<HashSet<_>>().len();
         assert!(colors(smooth) > colors(plain) + 3, "silhouettes are between two colours");

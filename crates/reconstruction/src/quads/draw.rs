@@ -4,16 +4,16 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
-use glam::{UVec2, Vec3, Vec4};
-use gpu::{Binding, DrawPass, DrawState, DrawVariant, Gpu, GpuError, Lent, PassCache, Pool, Templates, WorkKind};
+use glam::{Vec3, Vec4};
+use gpu::{Binding, DrawPass, DrawState, DrawVariant, Gpu, GpuError, PassCache, Pool, Templates, WorkKind};
 use gpu::{shader_variant, uniform_elements, uniform_stride};
-use wgpu::{BufferUsages, TextureFormat, TextureUsages, TextureView, TextureViewDimension};
+use wgpu::BufferUsages;
 
 use super::mesh::{ImageQuads, Mesh, QuadVertices};
+use super::targets::{QuadTargets, SAMPLE_FORMAT, TargetKind, Targets, target_bytes};
 use crate::view_work::{GpuViewCamera, ONE_VIEW};
 use crate::{error::ReconstructionError, recording::Recording};
 
-const SAMPLE_FORMAT: TextureFormat = TextureFormat::R32Uint;
 /// The most bytes of free targets: those of a few batches.
 const MOST_FREE_BYTES: u64 = 64 << 20;
 const INVERSE_DEPTH: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32];
@@ -45,58 +45,10 @@ impl DrawVariant for DrawQuads {
     }
 }
 
-/// The size of views, and how many there are.
-type TargetKind = (UVec2, u32);
-
-/// Depth and samples.
-fn target_bytes(&(size_px, count): &TargetKind) -> u64 {
-    8 * u64::from(size_px.x) * u64::from(size_px.y) * u64::from(count)
-}
-
-/// Targets of a batch of views.
-pub(crate) type QuadTargets = Lent<TargetKind, Targets>;
-
 /// Drawing passes, and the targets of the last batches: most are alike.
 pub(crate) struct QuadDrawing {
     passes: PassCache<DrawPass>,
     targets: Pool<TargetKind, Targets>,
-}
-
-/// The textures that views are drawn into, a layer each.
-pub(crate) struct Targets {
-    depth: Layers,
-    samples: Layers,
-}
-
-struct Layers {
-    all: TextureView,
-    each: Vec<TextureView>,
-}
-
-impl Layers {
-    fn new(gpu: &Gpu, label: &str, format: TextureFormat, (size_px, count): TargetKind) -> Self {
-        let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
-        let texture = gpu.texture(label, size_px.extend(count).to_array(), format, usage);
-        let view = |dimension, base_array_layer, count| {
-            texture.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(dimension),
-                base_array_layer,
-                array_layer_count: Some(count),
-                ..Default::default()
-            })
-        };
-        Self {
-            all: view(TextureViewDimension::D2Array, 0, count),
-            each: (0..count).map(|layer| view(TextureViewDimension::D2, layer, 1)).collect(),
-        }
-    }
-}
-
-impl Targets {
-    /// As `resolve.wgsl` reads them.
-    pub fn bindings(&self) -> [Binding<'_>; 2] {
-        [Binding::texture("drawn_depth", &self.depth.all), Binding::texture("drawn_sample", &self.samples.all)]
-    }
 }
 
 impl QuadDrawing {
@@ -109,10 +61,7 @@ impl QuadDrawing {
         let (side_px, layers) = (limits.max_texture_dimension_2d, limits.max_texture_array_layers);
         GpuError::check_limit("a drawn view's side (px)", size_px.max_element().into(), side_px.into())?;
         GpuError::check_limit("views drawn together", views.into(), layers.into())?;
-        Ok(self.targets.lend(kind, |&kind| Targets {
-            depth: Layers::new(gpu, "drawn depth", DrawPass::DEPTH_FORMAT, kind),
-            samples: Layers::new(gpu, "drawn samples", SAMPLE_FORMAT, kind),
-        }))
+        Ok(self.targets.lend(kind, |&kind| Targets::new(gpu, kind)))
     }
 }
 

@@ -10,6 +10,7 @@ mod merge;
 mod mesh;
 mod resolve;
 mod scan;
+mod targets;
 
 pub(crate) use build::{mesh, read};
 pub(crate) use corner_planes::CornerPlanes;
@@ -18,13 +19,14 @@ pub use corner_planes::RequiredPlanes;
 pub(crate) use cut::GpuCutWork;
 #[cfg(test)]
 pub(crate) use draw::GpuQuadWork;
-pub(crate) use draw::{QuadDrawing, QuadTargets};
+pub(crate) use draw::QuadDrawing;
 #[cfg(feature = "scalar")]
 pub(crate) use merge::GREATEST_EXTENT;
 pub(crate) use merge::record as merge;
 pub(crate) use mesh::{Cut, Mesh, QuadVertices, SetMeshes};
 pub use mesh::{ErrorBound, MeshStatistics, Quad};
 pub(crate) use resolve::record;
+pub(crate) use targets::QuadTargets;
 
 use gpu::{ShaderError, ShaderSource, Templates, shader_sources, wgsl_constants, wgsl_files};
 
