@@ -1,12 +1,12 @@
 //! Reconstructed views against reference views, pixel by pixel.
 
 use anyhow::Context as _;
-use depth_image::{ProvenanceKind, View};
+use depth_image::{ProvenanceKind, View, ViewPlanes};
 use metrics::{PictureErrors, PixelClass, Rgb8Image, class_mask, depth_errors, flip_map};
 use rayon::prelude::*;
 use reconstruction::ReconstructionMethod;
 
-use crate::reference_views::{ALL_PLANES, ReferenceViews};
+use crate::reference_views::ReferenceViews;
 
 /// A channel off by more than this, out of 255, is a wrong colour.
 const WRONG_COLOR: u8 = 16;
@@ -62,7 +62,7 @@ impl ReferenceViews {
         runs: usize,
     ) -> anyhow::Result<Evaluation> {
         let ms_a_view = self.ms_a_view(method, views, runs)?;
-        let (views, fetches_a_ray) = self.reconstruct_counted(method, ALL_PLANES)?;
+        let (views, fetches_a_ray) = self.reconstruct_counted(method, ViewPlanes::ALL)?;
         let pairs: Vec<_> = self.views.iter().zip(&views).zip(self.classes()).collect();
         let errors = pairs
             .into_par_iter()

@@ -17,10 +17,6 @@ use crate::statistics::median;
 
 const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
 
-/// Both planes beside colour.
-pub const ALL_PLANES: ViewPlanes = ViewPlanes::ALL;
-const COLOR_ONLY: ViewPlanes = ViewPlanes::COLOR;
-
 /// A scene's sample set as compositors have it, and views drawn from the scene.
 pub struct ReferenceViews {
     engine: Arc<GpuEngine>,
@@ -56,7 +52,7 @@ impl ReferenceViews {
             environment: environment.as_ref(),
         };
         let set = engine.reconstructor.upload(&images, &description)?;
-        let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ALL_PLANES), TURN)?;
+        let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ViewPlanes::ALL), TURN)?;
         let class = |(camera, view): (&PinholeCamera, &View)| Ok(classify(camera, inverse_depth(view)?, &images)?);
         let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;
         Ok(Self { engine: engine.clone(), cameras, views, images, set, classes })
@@ -84,7 +80,7 @@ impl ReferenceViews {
     /// # Errors
     /// The device fails.
     pub fn drawn(&self, setup: &Setup, lighting: Lighting) -> anyhow::Result<Vec<View>> {
-        self.drawn_from(setup, lighting, &self.cameras, COLOR_ONLY)
+        self.drawn_from(setup, lighting, &self.cameras, ViewPlanes::COLOR)
     }
 
     /// Views of other cameras drawn from the scene.
@@ -143,7 +139,7 @@ impl ReferenceViews {
         let cameras = self.cameras.repeat(times);
         let run = || {
             let start = Instant::now();
-            self.engine.reconstructor.reconstruct(&self.set, &cameras, method, COLOR_ONLY)?;
+            self.engine.reconstructor.reconstruct(&self.set, &cameras, method, ViewPlanes::COLOR)?;
             anyhow::Ok(start.elapsed().as_secs_f64())
         };
         run()?;

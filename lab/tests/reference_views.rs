@@ -13,7 +13,7 @@ use depth_image::{Camera, Environment, PinholeCamera, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
-use lab::reference_views::{ALL_PLANES, ReferenceViews};
+use lab::reference_views::ReferenceViews;
 use lab::scene_args;
 use node::{DirectWork, Engine as _, EngineError, SampleWork, Turn, ViewWork, WorkClass};
 use reconstruction::ReconstructionMethod;
@@ -123,7 +123,7 @@ fn a_package_loads_as_the_scene_does() {
         cameras: reference.cameras.clone(),
         lighting: "phong".to_owned(),
         scene_time_s: 0.0,
-        planes: ALL_PLANES,
+        planes: ViewPlanes::ALL,
     };
     let views = engine.draw_direct(&work, TURN).unwrap();
     assert_eq!(views.len(), reference.views.len());
@@ -138,7 +138,7 @@ fn a_package_loads_as_the_scene_does() {
 #[test]
 fn a_cluster_gives_what_one_engine_gives() {
     let (engine, args, setup, reference) = reference("uv-sphere", 16);
-    let alone = reference.reconstruct(args.method, ALL_PLANES).unwrap();
+    let alone = reference.reconstruct(args.method, ViewPlanes::ALL).unwrap();
     let mut delivered = runtime().unwrap().block_on(async {
         let listener = listen(([127, 0, 0, 1], 0).into(), false).await.unwrap();
         let cluster =
@@ -147,7 +147,7 @@ fn a_cluster_gives_what_one_engine_gives() {
         let offer = client.status().await.unwrap().offers.remove(0);
         assert_eq!((&offer.sample_cameras, &offer.settings), (&setup.offer.rig, &setup.offer.settings));
         let request = request(offer.settings, &reference.cameras).unwrap();
-        let request = SessionRequest { policy: PolicyChoice::Pipeline, planes: ALL_PLANES, ..request };
+        let request = SessionRequest { policy: PolicyChoice::Pipeline, planes: ViewPlanes::ALL, ..request };
         let session = open(&client, request).await.unwrap();
         let plan = session.plan();
         assert!(plan.sampler_count() >= 1 && plan.assignment.compositors.len() + plan.sampler_count() == 3);

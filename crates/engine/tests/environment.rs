@@ -14,7 +14,6 @@ use scene::{Material, Scene, pack};
 
 const LIGHTING: &str = "soft 4";
 const HASH: &str = "a ball under a map";
-const PLANES: ViewPlanes = ViewPlanes::WITH_DEPTH;
 
 /// A metal ball in a map of broad stripes.
 fn scene() -> Scene {
@@ -58,7 +57,8 @@ fn from_samples(engine: &GpuEngine, scene: &Scene) -> View {
     let without_scene = GpuEngine::open(DevicePreference::Software).expect("an engine").upload(&set, turn).err();
     assert_eq!(without_scene, Some(EngineError::UnknownScene { hash: HASH.to_owned() }));
     let set = engine.upload(&set, turn).expect("a set");
-    let work = ViewWork { cameras: vec![camera(0.05)], method: "joint_carve".to_owned(), planes: PLANES };
+    let work =
+        ViewWork { cameras: vec![camera(0.05)], method: "joint_carve".to_owned(), planes: ViewPlanes::WITH_DEPTH };
     engine.reconstruct(set.as_ref(), &work, turn).expect("a view").remove(0)
 }
 
@@ -73,7 +73,7 @@ fn a_view_from_samples_shows_and_mirrors_the_map_of_the_package() {
         cameras: vec![camera(0.05)],
         lighting: LIGHTING.to_owned(),
         scene_time_s: 0.0,
-        planes: PLANES,
+        planes: ViewPlanes::WITH_DEPTH,
     };
     let direct = engine.draw_direct(&direct, Turn::of(WorkClass::Batch)).expect("a view").remove(0);
     let depths = view

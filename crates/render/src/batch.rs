@@ -230,8 +230,8 @@ struct Rays {
     occlusion: Range<u32>,
 }
 
-/// Rays to all lamps and of occlusion, cut into parts of at most [`RAYS_A_DISPATCH`] of each kind; of occlusion, so many are
-/// traced for each.
+/// Rays to all lamps and of occlusion, cut into parts. A part traces at most [`RAYS_A_DISPATCH`] rays to lamps and as many
+/// of occlusion. Each ray of occlusion counts as `rays_around` traced ones.
 fn parts_of([shadow, occlusion]: &[Range<u32>; 2], lamp_count: u32, rays_around: u32) -> Vec<Rays> {
     let lamps_a_part = if shadow.is_empty() { lamp_count } else { lamp_count.min(RAYS_A_DISPATCH) }.max(1);
     let lamps = ranges(&(0..lamp_count), lamps_a_part);

@@ -137,7 +137,7 @@ fn glb_with_other_numbers_in_its_json() {
     load_with_other_numbers(&cube.json(), &cube.binary, 600);
 }
 
-/// Of 6000 files with other numbers, at least so many must load, and at least so many must not.
+/// Loads 6000 copies of a file with other numbers in its JSON. At least `least` must load, and at least `least` must be refused.
 fn load_with_other_numbers(json: &str, binary: &[u8], least: u32) {
     let (dir, mut random) = (tempfile::tempdir().unwrap(), Random(11));
     let path = dir.path().join("a.glb");

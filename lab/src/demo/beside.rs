@@ -2,13 +2,14 @@
 
 use anyhow::Context as _;
 use app_core::setup::{SceneArgs, Setup};
+use depth_image::ViewPlanes;
 use metrics::{Rgb8Image, flip_map};
 use sampling::SamplingMethod;
 use study::{Cell, Report, Table, comparison_row};
 
 use super::args::COMPARED_VIEWS;
 use crate::experiment::Experiment;
-use crate::reference_views::{ALL_PLANES, ReferenceViews};
+use crate::reference_views::ReferenceViews;
 
 /// The rows of pictures of each sampling.
 const SIDE_BY_SIDE: usize = 2;
@@ -58,7 +59,7 @@ fn show(
     args: &SceneArgs,
     report: &mut Report,
 ) -> anyhow::Result<()> {
-    let views = reference.reconstruct(args.method, ALL_PLANES)?;
+    let views = reference.reconstruct(args.method, ViewPlanes::ALL)?;
     for (index, (direct, view)) in reference.views.iter().zip(&views).take(SIDE_BY_SIDE).enumerate() {
         let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(view)?)?;
         let images = pictures::rgb(direct).zip(pictures::rgb(view)).context("a view is not of its size")?;

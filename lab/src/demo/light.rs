@@ -2,13 +2,14 @@
 
 use app_core::setup::SceneArgs;
 use client::Frame;
+use depth_image::ViewPlanes;
 use study::{Check, Report};
 
 use super::args::{COMPARED_VIEWS, DemoArgs};
 use super::pictures;
 use crate::experiment::Experiment;
 use crate::lighting_study::{self, Extent};
-use crate::reference_views::{ALL_PLANES, ReferenceViews};
+use crate::reference_views::ReferenceViews;
 
 /// Adds tables and charts, all views in the finest light, and six of them beside reference views.
 pub fn show(args: &DemoArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<Vec<Check>> {
@@ -20,7 +21,7 @@ pub fn show(args: &DemoArgs, experiment: &Experiment, report: &mut Report) -> an
         let lit = SceneArgs { lighting: finest.lighting, ..experiment.args.clone() };
         let reference =
             ReferenceViews::draw(&experiment.engine, &experiment.setup, &lit, experiment.views(COMPARED_VIEWS)?)?;
-        let views = reference.reconstruct(args.scene.method, ALL_PLANES)?;
+        let views = reference.reconstruct(args.scene.method, ViewPlanes::ALL)?;
         pictures::contact_sheet(&frames, &finest.lighting, report);
         pictures::comparisons(&reference, &views, report)?;
     }

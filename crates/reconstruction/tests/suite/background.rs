@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use depth_image::{EnvironmentMap, ProvenanceKind, srgb8_from_linear};
+use depth_image::{EnvironmentMap, ProvenanceKind, ViewPlanes, srgb8_from_linear};
 use glam::{UVec2, Vec2, Vec3};
 use gpu::GpuEnvironment;
 use reconstruction::{ReconstructionMethod, SetDescription};
 use scene::procedural::uv_sphere;
 
-use crate::stage::{ALL_PLANES, CARVE, Corners, SEARCH, Stage, VIEW_PX, count, depths, gpu, reconstructor};
+use crate::stage::{CARVE, Corners, SEARCH, Stage, VIEW_PX, count, depths, gpu, reconstructor};
 
 /// Colours that differ everywhere.
 fn colorful() -> EnvironmentMap {
@@ -29,7 +29,7 @@ fn a_view_shows_the_map_in_each_direction_without_a_surface() {
     let methods = [CARVE, SEARCH, ReconstructionMethod::Mesh, ReconstructionMethod::HybridMesh { merged: None }];
     for method in methods {
         let views = [around.view(), around.camera(-0.7, 0.6, VIEW_PX)];
-        let found = reconstructor().reconstruct(&set, &views, method, ALL_PLANES).expect("views");
+        let found = reconstructor().reconstruct(&set, &views, method, ViewPlanes::ALL).expect("views");
         for (camera, view) in views.iter().zip(found) {
             let without = stage.view(camera, method);
             let pixels = (0..VIEW_PX.y).flat_map(|y| (0..VIEW_PX.x).map(move |x| Vec2::new(x as f32, y as f32) + 0.5));

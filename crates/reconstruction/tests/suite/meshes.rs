@@ -1,13 +1,15 @@
 //! Quads cut from sample images: their twins, closed forms, and what merging gives up.
 
-use depth_image::{BACKGROUND_INVERSE_DEPTH, Camera, HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, View};
+use depth_image::{
+    BACKGROUND_INVERSE_DEPTH, Camera, HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, View, ViewPlanes,
+};
 use glam::{UVec2, Vec3};
 use reconstruction::{ErrorBound, Quad, ReconstructionMethod, scalar};
 use scene::procedural::{quad, tree_terrain, uv_sphere};
 
 use crate::stage::{
-    ALL_PLANES, Agreement, CARVE, Corners, SAMPLE_PX, Stage, VIEW_PX, assert_sane, corpus, count, depths, kinds,
-    looking, psnr_db, reconstructor,
+    Agreement, CARVE, Corners, SAMPLE_PX, Stage, VIEW_PX, assert_sane, corpus, count, depths, kinds, looking, psnr_db,
+    reconstructor,
 };
 
 pub const MESH: ReconstructionMethod = ReconstructionMethod::Mesh;
@@ -261,12 +263,13 @@ fn merging_keeps_its_bound() {
         let set = stage.upload();
         let truth = stage.drawn_directly(&corners.view());
         let mut last = usize::MAX as u64;
-        let view = reconstructor().reconstruct(&set, &[corners.view()], HYBRID, ALL_PLANES).expect("a view");
+        let view = reconstructor().reconstruct(&set, &[corners.view()], HYBRID, ViewPlanes::ALL).expect("a view");
         let (inside, lost_before) = inside_and_lost(&truth, &view[0]);
         println!("{name:<18} not merged: {lost_before} of {inside} pixels lost");
         for px in [0.1, 0.5, 2.0] {
             let found = reconstructor().mesh_statistics(&set, merged(px)).expect("statistics").expect("a mesh");
-            let view = reconstructor().reconstruct(&set, &[corners.view()], merged(px), ALL_PLANES).expect("a view");
+            let view =
+                reconstructor().reconstruct(&set, &[corners.view()], merged(px), ViewPlanes::ALL).expect("a view");
             let (inside, lost) = inside_and_lost(&truth, &view[0]);
             println!(
                 "{name:<18} {px} px: {:>6} of {:>6} quads, off by {:.3} px; {lost} of {inside} pixels lost",
@@ -306,7 +309,7 @@ fn hybrids_cover_more_than_meshes() {
         let cameras = [corners.view(); 16];
         let everywhere = vec![true; kinds(&truth).len()];
         let shown = |method| {
-            let reconstruct = || reconstructor().reconstruct_measured(&set, &cameras, method, ALL_PLANES, false);
+            let reconstruct = || reconstructor().reconstruct_measured(&set, &cameras, method, ViewPlanes::ALL, false);
             reconstruct().expect("pipelines and quads");
             let (views, statistics) = reconstruct().expect("views");
             let both = kinds(&truth).into_iter().zip(kinds(&views[0])).filter(|(t, _)| *t == ProvenanceKind::Hit);
@@ -387,7 +390,7 @@ fn prints_the_cost_of_a_view() {
     let truth = stage.drawn_directly(&cameras[0]);
     for method in [MESH, HYBRID, merged(0.1), merged(0.5), merged(2.0), CARVE] {
         let cut = reconstructor().mesh_statistics(&set, method).expect("statistics").unwrap_or_default();
-        let reconstruct = || reconstructor().reconstruct_measured(&set, &cameras, method, ALL_PLANES, false);
+        let reconstruct = || reconstructor().reconstruct_measured(&set, &cameras, method, ViewPlanes::ALL, false);
         reconstruct().expect("pipelines");
         let (views, statistics) = reconstruct().expect("views");
         let ms = statistics.device_s * 1e3 / VIEWS as f64;

@@ -4,13 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use depth_image::{PinholeCamera, View};
+use depth_image::{PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use gpu::{CompiledOutside, DevicePreference, Gpu, Turn, WorkClass};
 use reconstruction::{ReconstructionMethod, Reconstructor, SampleSet};
 use scene::procedural::uv_sphere;
 
-use crate::stage::{ALL_PLANES, CARVE, Corners, Stage};
+use crate::stage::{CARVE, Corners, Stage};
 
 const METHODS: [&str; 6] =
     ["joint_carve", "joint_carve:2", "light_field_search:64", "mesh", "hybrid_mesh", "hybrid_mesh:0.5"];
@@ -37,7 +37,7 @@ impl Shared {
     fn views(&self, set: &SampleSet, cameras: &[PinholeCamera], method: &str) -> (Vec<View>, u64) {
         let before = self.gpu.device_queue.slices();
         let method: ReconstructionMethod = method.parse().expect(method);
-        let views = self.reconstructor.reconstruct(set, cameras, method, ALL_PLANES).expect("views");
+        let views = self.reconstructor.reconstruct(set, cameras, method, ViewPlanes::ALL).expect("views");
         (views, self.gpu.device_queue.slices() - before)
     }
 }
@@ -81,7 +81,8 @@ fn a_live_view_goes_between_the_slices_of_a_batch() {
     let set = shared.upload(&Stage::new(uv_sphere(1.0, 24), &corners().samples(2)));
     let (many, one) = (cameras(UVec2::new(320, 240)), cameras(UVec2::new(64, 48)));
     let live = Turn { class: WorkClass::Live, flow: 1 };
-    let view = || shared.reconstructor.reconstruct_in_turn(&set, &one[..1], CARVE, ALL_PLANES, live).expect("a view");
+    let view =
+        || shared.reconstructor.reconstruct_in_turn(&set, &one[..1], CARVE, ViewPlanes::ALL, live).expect("a view");
     let alone = view();
     let _live = shared.gpu.device_queue.force_slices(FEW_PX);
     let batch_ended = AtomicBool::new(false);
@@ -89,7 +90,7 @@ fn a_live_view_goes_between_the_slices_of_a_batch() {
         let before = shared.gpu.device_queue.slices();
         threads.spawn(|| {
             let batch = Turn { class: WorkClass::Batch, flow: 2 };
-            let views = shared.reconstructor.reconstruct_in_turn(&set, &many, CARVE, ALL_PLANES, batch);
+            let views = shared.reconstructor.reconstruct_in_turn(&set, &many, CARVE, ViewPlanes::ALL, batch);
             batch_ended.store(true, Ordering::Release);
             assert_eq!(views.expect("views").len(), many.len());
         });

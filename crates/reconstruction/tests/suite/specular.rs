@@ -4,16 +4,15 @@ use std::sync::Arc;
 
 use depth_image::{
     Aabb, Camera, DepthImage, Environment, EnvironmentMap, Highlight, Illumination, Light, PinholeCamera,
-    ProvenanceKind, Ray, Reflector, SpecularPlanes, View, highlight_linear, oct16_from_unit, rgb9e5_from_linear,
-    srgb8_from_linear,
+    ProvenanceKind, Ray, Reflector, SpecularPlanes, View, ViewPlanes, highlight_linear, oct16_from_unit,
+    rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
 use gpu::GpuEnvironment;
 use reconstruction::{ReconstructionError, SetDescription, scalar};
 
 use crate::stage::{
-    ALL_PLANES, Agreement, CARVE, Corners, SEARCH, VIEW_PX, assert_sane, colors_differ_by, count, gpu, kinds,
-    reconstructor,
+    Agreement, CARVE, Corners, SEARCH, VIEW_PX, assert_sane, colors_differ_by, count, gpu, kinds, reconstructor,
 };
 
 const KINDS: [Highlight; 2] = [Highlight::BlinnPhong, Highlight::Ggx];
@@ -133,7 +132,7 @@ fn pixels(size_px: UVec2) -> impl Iterator<Item = Vec2> {
 
 fn view(images: &[DepthImage], set: &SetDescription<'_>, camera: &PinholeCamera) -> View {
     let set = reconstructor().upload(images, set).expect("a sample set");
-    reconstructor().reconstruct(&set, &[*camera], CARVE, ALL_PLANES).expect("a view").remove(0)
+    reconstructor().reconstruct(&set, &[*camera], CARVE, ViewPlanes::ALL).expect("a view").remove(0)
 }
 
 /// Share of the pixels within two codes of what `eye` would see there.
@@ -222,7 +221,8 @@ fn highlights_are_the_twins() {
         for (kind, method) in [(KINDS[0], CARVE), (KINDS[1], CARVE), (KINDS[1], SEARCH)] {
             let set = room.description(Some(kind));
             let uploaded = reconstructor().upload(&images, &set).expect("a sample set");
-            let seen = reconstructor().reconstruct(&uploaded, &[camera], method, ALL_PLANES).expect("a view").remove(0);
+            let seen =
+                reconstructor().reconstruct(&uploaded, &[camera], method, ViewPlanes::ALL).expect("a view").remove(0);
             let twin = scalar::reconstruct(&images, &set, &camera, method);
             let agreement = Agreement::of(&seen, &twin);
             let matt = scalar::reconstruct(&images, &room.description(None), &camera, method);

@@ -16,7 +16,6 @@ pub const SAMPLE_PX: UVec2 = UVec2::new(96, 72);
 pub const VIEW_PX: UVec2 = UVec2::new(64, 48);
 pub const CARVE: ReconstructionMethod = ReconstructionMethod::JointCarve { stop_level: 0 };
 pub const SEARCH: ReconstructionMethod = ReconstructionMethod::LightFieldSearch { steps: 64 };
-pub const ALL_PLANES: ViewPlanes = ViewPlanes::ALL;
 
 /// The redundancy test of sampling `non_redundant:pixel`.
 const APART: (&str, &str) = ("apart.wgsl", include_str!("../../../sampling/src/methods/non_redundant/pixel.wgsl"));
@@ -98,7 +97,7 @@ impl Stage {
     }
 
     pub fn views(&self, cameras: &[PinholeCamera], method: ReconstructionMethod) -> Vec<View> {
-        reconstructor().reconstruct(&self.upload(), cameras, method, ALL_PLANES).expect("views")
+        reconstructor().reconstruct(&self.upload(), cameras, method, ViewPlanes::ALL).expect("views")
     }
 
     pub fn view(&self, camera: &PinholeCamera, method: ReconstructionMethod) -> View {
@@ -113,7 +112,7 @@ impl Stage {
     pub fn drawn_directly(&self, camera: &PinholeCamera) -> View {
         let scene = GpuScene::upload(&device().gpu, &self.scene).expect("a scene");
         let work = plainly_lit(&scene);
-        device().renderer.draw_views(work, &[*camera], ALL_PLANES).expect("a view").remove(0)
+        device().renderer.draw_views(work, &[*camera], ViewPlanes::ALL).expect("a view").remove(0)
     }
 }
 

@@ -1,11 +1,11 @@
 //! Every pass is built and bound to its resources in every variant that changes what it binds.
 
-use depth_image::{HOLE_INVERSE_DEPTH, ProvenanceKind};
+use depth_image::{HOLE_INVERSE_DEPTH, ProvenanceKind, ViewPlanes};
 use glam::{UVec2, Vec3};
 use reconstruction::METHODS;
 use scene::procedural::uv_sphere;
 
-use crate::stage::{ALL_PLANES, Corners, Stage, count, reconstructor};
+use crate::stage::{Corners, Stage, count, reconstructor};
 
 #[test]
 fn every_method_binds_all_names_of_its_shaders() {
@@ -21,7 +21,7 @@ fn every_method_binds_all_names_of_its_shaders() {
             let Some(method) = method else { continue };
             for count_fetches in [false, true] {
                 let (views, statistics) = reconstructor()
-                    .reconstruct_measured(&set, &[camera], method, ALL_PLANES, count_fetches)
+                    .reconstruct_measured(&set, &[camera], method, ViewPlanes::ALL, count_fetches)
                     .unwrap_or_else(|error| panic!("{method}, {cameras} cameras, holes {holes}: {error}"));
                 assert!(count(&views[0], ProvenanceKind::Hit) > 10, "{method}, {cameras} cameras, holes {holes}");
                 assert_eq!(statistics.fetches_per_ray.is_some_and(|fetches| fetches > 1.0), count_fetches, "{method}");

@@ -12,10 +12,8 @@ use scene::{Instance, Scene};
 
 use crate::stage::{SIZE_PX, device, down_from, floor_light, floor_under, image, lamps, mean, upload, work};
 
-const DEPTH: ViewPlanes = ViewPlanes::WITH_DEPTH;
-
 fn view(work: DrawWork<'_>, camera: &PinholeCamera) -> View {
-    device().1.draw_views(work, &[*camera], DEPTH).expect("a view").remove(0)
+    device().1.draw_views(work, &[*camera], ViewPlanes::WITH_DEPTH).expect("a view").remove(0)
 }
 
 /// From above a scene's front.

@@ -2,8 +2,6 @@ use glam::{UVec2, Vec3};
 
 use super::*;
 
-const PLANES: ViewPlanes = ViewPlanes::WITH_DEPTH;
-
 fn camera(x_m: f32) -> PinholeCamera {
     PinholeCamera::looking_at(Vec3::new(x_m, 0.1, 3.0), Vec3::ZERO, Vec3::Y, 0.7, UVec2::new(8, 6))
 }
@@ -12,11 +10,11 @@ fn camera(x_m: f32) -> PinholeCamera {
 fn record(folder: &Path, method: &str, cameras: [f32; 2]) -> Record {
     let settings = Map::from_iter([("codec".to_owned(), json!("lz4")), ("method".to_owned(), json!(method))]);
     let views = (cameras.map(camera).into(), 3);
-    Record::new(folder, DVec3::new(0.1, 1e6, 0.0), settings, views, PLANES).unwrap()
+    Record::new(folder, DVec3::new(0.1, 1e6, 0.0), settings, views, ViewPlanes::WITH_DEPTH).unwrap()
 }
 
 fn write(record: &mut Record, number: u64) {
-    for name in FileNames::of(number, PLANES).all() {
+    for name in FileNames::of(number, ViewPlanes::WITH_DEPTH).all() {
         std::fs::write(record.folder.join(name), "a picture").unwrap();
     }
     record.add(number, 0.1 + number as f32);
@@ -85,6 +83,6 @@ fn the_record_is_written_now_and_then() {
 #[test]
 fn more_views_than_a_record_has_room_for_are_refused() {
     let views = ([0.3, 0.4].map(camera).into(), 1 << 22);
-    let refused = Record::new(Path::new("out"), DVec3::ZERO, Map::new(), views, PLANES).err().unwrap();
+    let refused = Record::new(Path::new("out"), DVec3::ZERO, Map::new(), views, ViewPlanes::WITH_DEPTH).err().unwrap();
     assert!(refused.to_string().contains("8388608 pictures"), "{refused}");
 }

@@ -122,12 +122,10 @@ mod tests {
         Frame { request: client::ViewRequest { frame: number, set_index: 0, camera }, view, header }
     }
 
-    const DEPTH: ViewPlanes = ViewPlanes::WITH_DEPTH;
-
     #[tokio::test]
     async fn frames_of_any_order_are_whole_files() {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = PictureWriter::new(folder.path(), 1 << 30, DEPTH);
+        let mut writer = PictureWriter::new(folder.path(), 1 << 30, ViewPlanes::WITH_DEPTH);
         assert_eq!(writer.most_at_once, 1, "a frame is larger than the bound");
         for number in [2, 0, 1] {
             assert_eq!(writer.write(frame(number)).await.unwrap(), Some((number, 0.5)));
@@ -143,7 +141,7 @@ mod tests {
     #[tokio::test]
     async fn frames_in_hand_stay_within_the_bound() {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = PictureWriter::new(folder.path(), 1, DEPTH);
+        let mut writer = PictureWriter::new(folder.path(), 1, ViewPlanes::WITH_DEPTH);
         writer.most_at_once = 2;
         assert_eq!(writer.write(frame(0)).await.unwrap(), None);
         for number in 1..5 {
@@ -154,7 +152,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_folder_that_is_gone_is_named() {
-        let mut writer = PictureWriter::new(Path::new("/nowhere/out"), 1, DEPTH);
+        let mut writer = PictureWriter::new(Path::new("/nowhere/out"), 1, ViewPlanes::WITH_DEPTH);
         writer.most_at_once = 1;
         let error = format!("{:#}", writer.write(frame(7)).await.unwrap_err());
         assert!(error.contains("/nowhere/out/view_0007.png"), "{error}");
