@@ -6,6 +6,7 @@ use client::{Client, ClientError};
 use cluster::{DIRECT, PolicyChoice, RenderViews, SessionRequest};
 use cluster_tests::cluster::{Cluster, request, whole_frame};
 use cluster_tests::scalar_engine::Pace;
+use codec::FrameAssembly;
 use coordinator::CoordinatorConfig;
 use node::{Deadlines, NodeConfig, Quotas};
 use tokio::sync::mpsc;
@@ -85,11 +86,21 @@ async fn an_admitted_stream_waits_for_room() {
     let (takes_all, all_taken) = mpsc::channel(1);
     takes_all.send(greedy(&session, 1024, 64)).await.unwrap();
     let full = narrow(&address).await.render_views(ReceiverStream::new(all_taken)).await.unwrap();
-    tokio::time::sleep(Duration::from_millis(300)).await;
+    // The connection takes some frames before it is full; until then, there is room now and then.
+    let mut assembly = FrameAssembly::default();
     asks.send(greedy(&session, 1024, 1)).await.unwrap();
-    timeout(Duration::from_millis(300), let_in.next()).await.expect_err("there is no room");
+    for parts in 1.. {
+        let Ok(part) = timeout(Duration::from_millis(300), let_in.next()).await else { break };
+        assert!(parts < 10_000, "there is always room");
+        if assembly.push(part.unwrap().unwrap()).unwrap().is_some() {
+            asks.send(greedy(&session, 1024, 1)).await.unwrap();
+        }
+    }
     drop((takes_all, full));
-    timeout(HEALED, whole_frame(&mut let_in)).await.expect("there is");
+    let frame = async {
+        while assembly.push(let_in.next().await.unwrap().unwrap()).unwrap().is_none() {}
+    };
+    timeout(HEALED, frame).await.expect("there is room");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -107,9 +118,14 @@ async fn a_request_beyond_a_quota_of_a_node_is_refused_by_name() {
     };
     // This client takes no frames, and holds the node's pixels.
     let _first = ask(64).await.unwrap();
-    tokio::time::sleep(Duration::from_millis(300)).await;
-    let mut second = ask(1).await.unwrap();
-    let refused = timeout(HEALED, second.next()).await.unwrap().unwrap().unwrap_err();
+    let start = Instant::now();
+    let (second, refused) = loop {
+        let mut second = ask(1).await.unwrap();
+        match timeout(HEALED, second.next()).await.unwrap().unwrap() {
+            Ok(_) => assert!(start.elapsed() < HEALED, "nothing is held"),
+            Err(refused) => break (second, refused),
+        }
+    };
     assert_eq!(refused.code(), Code::ResourceExhausted);
     assert!(refused.message().contains("quota pixels: 4194304"), "{refused}");
     seen(&mut live, 0.1, 0).await;
