@@ -4,7 +4,7 @@ use gpu::{Binding, ResourceTraits, ShaderVariant};
 use minijinja::{Value, context};
 
 use crate::view_work::{ONE_VIEW, SetVariant};
-use crate::{error::ReconstructionError, recording::Recording};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
 /// What `antialias.wgsl` does with the sums over positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +24,8 @@ pub(crate) enum Sums {
 pub(crate) struct Shown {
     set: SetVariant,
     sums: Sums,
+    /// Only listed pixels are added.
+    listed: bool,
     environment_map: bool,
 }
 
@@ -38,37 +40,41 @@ impl ShaderVariant for Shown {
             Sums::Continued => "continued",
             Sums::Read => "read",
         };
-        context! { sums, environment_map => self.environment_map, ..self.set.context() }
+        context! { sums, listed => self.listed, environment_map => self.environment_map, ..self.set.context() }
     }
 
     fn all() -> Vec<Self> {
-        let sums = [Sums::None, Sums::Begun, Sums::Continued, Sums::Read];
+        let whole = [Sums::None, Sums::Begun, Sums::Continued, Sums::Read].map(|sums| (sums, false));
+        let sums = whole.into_iter().chain([(Sums::Continued, true)]);
         let sets = SetVariant::all().into_iter().filter(|set| !set.count_fetches && !set.holes);
         let each = |set| {
-            sums.into_iter()
-                .flat_map(move |sums| [false, true].map(|environment_map| Self { set, sums, environment_map }))
+            sums.clone().flat_map(move |(sums, listed)| {
+                [false, true].map(|environment_map| Self { set, sums, listed, environment_map })
+            })
         };
         sets.flat_map(each).collect()
     }
 }
 
-/// Adds a finished position to the sums, or writes the colours that the view shows.
-pub(crate) fn record(recording: &mut Recording<'_>, sums: Sums) -> Result<(), ReconstructionError> {
+/// Adds a finished position to the sums, of listed pixels or of all, or writes the colours that the view shows.
+pub(crate) fn record(
+    recording: &mut Recording<'_>,
+    sums: Sums,
+    listed: Option<&PixelList>,
+) -> Result<(), ReconstructionError> {
     // Neither holes nor fetches matter here.
     let set = SetVariant { holes: false, ..recording.set.variant() };
-    let map = recording.set.environment.as_deref();
-    let variant = Shown { set, sums, environment_map: map.is_some() };
+    let environment_map = recording.set.environment.is_some();
+    let variant = Shown { set, sums, listed: listed.is_some(), environment_map };
     let pass = recording.device.passes.get(&variant)?;
     let batch = &recording.batch;
     let mut bindings = recording.view_bindings();
-    match map {
-        Some(map) => bindings.extend(map.bindings()),
-        None => bindings.push(Binding::buffer("background", &recording.set.background)),
-    }
+    bindings.extend(recording.set.background_bindings());
     bindings.push(Binding::buffer("color", &batch.color));
     bindings.push(Binding::buffer("inverse_depth", &batch.inverse_depth_per_m));
     bindings.extend(batch.sums.as_ref().filter(|_| sums != Sums::None).map(|sums| Binding::buffer("sums", sums)));
+    bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&variant, &pass, &bound, None);
+    recording.dispatch_pixels(&variant, &pass, &bound, listed);
     Ok(())
 }

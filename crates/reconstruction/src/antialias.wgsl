@@ -27,16 +27,26 @@ fn shown_linear(index: u32, place: vec2u) -> vec3f {
     return linear;
 }
 
-@compute @workgroup_size(TILE_PX, TILE_PX)
+{% if listed %}
+{% include "pixel_list.wgsl" %}
+{% endif %}
+
+@compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
+{% if listed %}
+    if id.x >= lists[work.view.number].count { return; }
+    let index = listed_pixels[first_listed() + id.x];
+    let place = place_of(index);
+{% else %}
     let place = pixel_at(id);
     if any(place >= work.view.size_px) { return; }
     let index = work.view.first_pixel + place.y * work.view.size_px.x + place.x;
+{% endif %}
 {% if sums == "none" %}
-    color[index] = pack4x8unorm(vec4f(srgb_from_linear(shown_linear(index, place)), 1.0));
+    color[index] = pack4x8unorm(vec4f(srgb_from_linear(shown_from_mean(shown_linear(index, place), work.tone)), 1.0));
 {% elif sums == "read" %}
     let mean = vec3f(sums[3u * index], sums[3u * index + 1u], sums[3u * index + 2u]) * work.position_share;
-    color[index] = pack4x8unorm(vec4f(srgb_from_linear(mean), 1.0));
+    color[index] = pack4x8unorm(vec4f(srgb_from_linear(shown_from_mean(mean, work.tone)), 1.0));
 {% else %}
     let shown = shown_linear(index, place);
 {% for channel in ["r", "g", "b"] %}

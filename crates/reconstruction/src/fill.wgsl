@@ -29,7 +29,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= lists[work.view.number].count { return; }
     let first = work.view.first_pixel;
     let index = listed_pixels[first_listed() + id.x];
-    let origin = vec2i(vec2u((index - first) % work.view.size_px.x, (index - first) / work.view.size_px.x));
+    let origin = vec2i(place_of(index));
     var farthest = 3.0e38;
 {% for d in DIRECTIONS %}
     let n{{ loop.index0 }} = known_towards(origin, vec2i({{ d[0] }}, {{ d[1] }}), first);

@@ -5,6 +5,7 @@ use gpu::{FrameResult, PooledBuffer, Readback, Submitted};
 
 use crate::error::ReconstructionError;
 use crate::recording::{Batch, Recording};
+use crate::surface::SPLIT_SHIFT;
 
 /// Device time and fetches of a reconstruction.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -72,7 +73,7 @@ impl Finished {
             size_px: batch.size_px,
             srgb8,
             inverse_depth_per_m: depths.next().map(bytemuck::cast_vec),
-            provenance: provenances.next().map(|words| words.into_iter().map(Provenance).collect()),
+            provenance: provenances.next().map(|words| words.into_iter().map(provenance_of).collect()),
         }));
         Ok(())
     }
@@ -93,4 +94,9 @@ fn rgb_bytes(rgba: &[u32]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(rgba.len() * 3);
     rgba.iter().for_each(|word| bytes.extend_from_slice(&word.to_le_bytes()[..3]));
     bytes
+}
+
+/// Without what stays on the device.
+fn provenance_of(word: u32) -> Provenance {
+    Provenance(word & ((1 << SPLIT_SHIFT) - 1))
 }

@@ -3,7 +3,7 @@
 use std::{collections::BTreeSet, mem::offset_of, sync::OnceLock};
 
 use bytemuck::Zeroable as _;
-use gpu::ShaderSource;
+use gpu::{GpuTone, ShaderSource};
 use naga::{Module, TypeInner};
 
 use crate::{
@@ -77,6 +77,7 @@ fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
         "joint_carve.wgsl",
         "light_field_search.wgsl",
         "joint_carve/march.wgsl",
+        "joint_carve/smooth.wgsl",
         "resolve.wgsl",
         "specular.wgsl",
         "tile_start.wgsl",
@@ -111,6 +112,8 @@ fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
         padding
     });
     assert_eq!(templates_that_agree("SampleCamera", &sample_camera), passes);
+    let tone = host!(GpuTone { exposure_factor, curve, padding });
+    assert_eq!(templates_that_agree("Tone", &tone), passes);
     for (source, module) in modules_with("ViewWork") {
         let found = shader(module, "ViewWork");
         let cameras = (found.bytes - size_of::<GpuViewWork>()) / size_of::<GpuSampleCamera>();
@@ -121,7 +124,7 @@ fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
 
 /// The shader has the volume's fields in place of the struct; the cameras follow.
 fn view_work(cameras: usize) -> Layout {
-    let GpuViewWork { view: _, volume: _ } = GpuViewWork::zeroed();
+    let GpuViewWork { view: _, volume: _, tone: _ } = GpuViewWork::zeroed();
     let GpuVolume { min_in_world: _, position_share: _, max_in_world: _, padding: _ } = GpuVolume::zeroed();
     let volume = offset_of!(GpuViewWork, volume);
     let fields = [
@@ -130,6 +133,7 @@ fn view_work(cameras: usize) -> Layout {
         ("position_share", volume + offset_of!(GpuVolume, position_share)),
         ("volume_max_in_world", volume + offset_of!(GpuVolume, max_in_world)),
         ("padding", volume + offset_of!(GpuVolume, padding)),
+        ("tone", offset_of!(GpuViewWork, tone)),
         ("cameras", size_of::<GpuViewWork>()),
     ];
     Layout::new(fields, size_of::<GpuViewWork>() + cameras * size_of::<GpuSampleCamera>())
@@ -143,9 +147,10 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
     let count = offset_of!(GpuPixelList, count);
     let fields = [("workgroups", first), ("y", first + 4), ("z", first + 8), ("count", count)];
     let list = Layout::new(fields, size_of::<GpuPixelList>());
-    let written = ["joint_carve.wgsl", "light_field_search.wgsl", "joint_carve/march.wgsl", "resolve.wgsl"];
-    assert_eq!(templates_that_agree("UndecidedList", &list), BTreeSet::from(written));
-    let read = ["fill.wgsl", "joint_carve.wgsl", "joint_carve/march.wgsl"];
+    let searches = ["joint_carve.wgsl", "light_field_search.wgsl", "resolve.wgsl"];
+    let written = [&searches[..], &["joint_carve/march.wgsl", "joint_carve/smooth.wgsl"]].concat();
+    assert_eq!(templates_that_agree("UndecidedList", &list), BTreeSet::from_iter(written));
+    let read = ["antialias.wgsl", "fill.wgsl", "joint_carve.wgsl", "joint_carve/march.wgsl", "specular.wgsl"];
     assert_eq!(templates_that_agree("PixelList", &list), BTreeSet::from(read));
 }
 

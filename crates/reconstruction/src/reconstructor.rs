@@ -9,6 +9,7 @@ use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
 use crate::in_flight::{InFlight, Statistics};
+use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
 use crate::recording::{Recording, batches};
 use crate::sample_set::{SampleSet, SetDescription};
@@ -159,36 +160,54 @@ impl Reconstructor {
     ) -> Result<Recording<'r>, ReconstructionError> {
         let Request { set, method, planes, turn, count_fetches, .. } = request;
         let family = WorkKind::family(&("reconstruct", method, set.cameras.len()));
-        let output = (planes.antialias, count_fetches);
+        let output = (planes, count_fetches);
         let mut recording = Recording::begin(&self.device, set, cameras, output, (family, turn))?;
         // What a tile's start proves holds for every position within its pixels.
         if method.follows_rays() {
             tile_start::record(&mut recording)?;
         }
         if planes.antialias == Antialias::NONE {
-            self.record_position(request, &mut recording)?;
-            antialias::record(&mut recording, Sums::None)?;
+            self.record_position(request, &mut recording, None)?;
+            antialias::record(&mut recording, Sums::None, None)?;
             return Ok(recording);
         }
-        for (number, offset_px) in planes.antialias.offsets_px().enumerate() {
-            recording.go_to(offset_px);
-            self.record_position(request, &mut recording)?;
-            antialias::record(&mut recording, if number == 0 { Sums::Begun } else { Sums::Continued })?;
-        }
+        self.record_sums(request, &mut recording)?;
         // Depth and provenance have no mean: they are the centre's.
         if planes.inverse_depth || planes.provenance {
             recording.go_to(Vec2::ZERO);
-            self.record_position(request, &mut recording)?;
+            self.record_position(request, &mut recording, None)?;
         }
-        antialias::record(&mut recording, Sums::Read)?;
+        antialias::record(&mut recording, Sums::Read, None)?;
         Ok(recording)
     }
 
-    /// The passes over one position within the pixels.
-    fn record_position(&self, request: Request<'_>, recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
-        let unknown = request.method.record(&self.drawing, request.mesh, recording)?;
+    /// The passes over all positions within the pixels. After the first, only the pixels that it leaves are found.
+    fn record_sums(&self, request: Request<'_>, recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
+        let mut offsets_px = request.planes.antialias.offsets_px();
+        recording.go_to(offsets_px.next().unwrap_or_default());
+        self.record_position(request, recording, None)?;
+        let rough = request.method.share_positions(recording)?;
+        if rough.is_none() {
+            antialias::record(recording, Sums::Begun, None)?;
+        }
+        for offset_px in offsets_px {
+            recording.go_to(offset_px);
+            self.record_position(request, recording, rough.as_ref())?;
+            antialias::record(recording, Sums::Continued, rough.as_ref())?;
+        }
+        Ok(())
+    }
+
+    /// The passes over one position within the pixels, of listed pixels or of all.
+    fn record_position(
+        &self,
+        request: Request<'_>,
+        recording: &mut Recording<'_>,
+        listed: Option<&PixelList>,
+    ) -> Result<(), ReconstructionError> {
+        let unknown = request.method.record(&self.drawing, request.mesh, recording, listed)?;
         fill::record(recording, &unknown)?;
-        specular::record(recording)
+        specular::record(recording, listed)
     }
 
     /// Statistics of the quads that a method draws; `None` for methods that draw none.

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use depth_image::{Antialias, PinholeCamera};
+use depth_image::{Antialias, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec2, Vec3};
 use gpu::{
     Binding, BoundGroup, ComputePass, DispatchSize, Frame, PooledBuffer, ShaderVariant, Turn, WorkKind,
@@ -54,7 +54,8 @@ pub(crate) struct Batch {
     /// Of the position within the pixels that is being recorded.
     pub cameras: Vec<PinholeCamera>,
     pub size_px: UVec2,
-    antialias: Antialias,
+    /// How the views' colours are sampled and shown.
+    pub planes: ViewPlanes,
     /// The bytes of one plane of all views.
     pub plane_bytes: u64,
     pub pieces: Pieces,
@@ -71,6 +72,8 @@ pub(crate) struct Batch {
     /// The memory of lists of pixels: a pass reads one list and writes the next.
     undecided_pixels: [PooledBuffer; 2],
     lists_made: usize,
+    /// The memory of the list of pixels that all further positions take up.
+    rough_pixels: Option<PooledBuffer>,
     /// For methods that draw; all positions are drawn into the same.
     pub targets: Option<QuadTargets>,
     /// Fetches of each pixel, where they are counted.
@@ -83,22 +86,22 @@ impl<'r> Recording<'r> {
         device: &'r Device,
         set: &'r SampleSet,
         cameras: &[PinholeCamera],
-        (antialias, count_fetches): (Antialias, bool),
+        (planes, count_fetches): (ViewPlanes, bool),
         (family, turn): (u64, Turn),
     ) -> Result<Self, ReconstructionError> {
         let plane_bytes = 4 * (cameras[0].pixel_count() * cameras.len()) as u64;
-        let sum_bytes = (antialias > Antialias::NONE).then_some(3 * plane_bytes);
+        let sum_bytes = (planes.antialias > Antialias::NONE).then_some(3 * plane_bytes);
         device.gpu.check_storage_bytes("a batch of views (bytes)", plane_bytes)?;
         device.gpu.check_storage_bytes("the sums of several samples a pixel (bytes)", sum_bytes.unwrap_or(0))?;
         let slice_px = device.gpu.device_queue.slice_units(family, UNKNOWN_SLICE_PX);
         let pieces = Pieces::of(cameras.len(), cameras[0].size_px, slice_px);
-        let works = works(device, set, cameras, &pieces, antialias);
+        let works = works(device, set, cameras, &pieces, planes);
         let plane = |label| device.buffers.lend_storage(label, plane_bytes);
         let batch = Batch {
             centers: cameras.to_vec(),
             cameras: cameras.to_vec(),
             size_px: cameras[0].size_px,
-            antialias,
+            planes,
             plane_bytes,
             pieces,
             works,
@@ -109,6 +112,7 @@ impl<'r> Recording<'r> {
             provenance: plane("provenance"),
             undecided_pixels: ["undecided pixels", "pixels still undecided"].map(plane),
             lists_made: 0,
+            rough_pixels: (planes.antialias > Antialias::NONE).then(|| plane("pixels of further positions")),
             targets: None,
             fetches: count_fetches.then(|| plane("fetches")),
         };
@@ -121,9 +125,9 @@ impl<'r> Recording<'r> {
 
     /// Records what follows for another position within the pixels.
     pub fn go_to(&mut self, offset_px: Vec2) {
-        let Batch { centers, pieces, antialias, .. } = &self.batch;
+        let Batch { centers, pieces, planes, .. } = &self.batch;
         let cameras: Vec<_> = centers.iter().map(|camera| camera.with_offset(offset_px)).collect();
-        self.batch.works = works(self.device, self.set, &cameras, pieces, *antialias);
+        self.batch.works = works(self.device, self.set, &cameras, pieces, *planes);
         self.batch.cameras = cameras;
     }
 
@@ -133,6 +137,15 @@ impl<'r> Recording<'r> {
         let pixels = &undecided_pixels[*lists_made % undecided_pixels.len()];
         *lists_made += 1;
         PixelList::empty(&self.device.gpu, (**pixels).clone(), pieces.count())
+    }
+
+    /// A list for the pixels that all further positions take up; it is good until the batch ends.
+    ///
+    /// # Panics
+    /// Where a pixel has one position.
+    pub fn rough_list(&self) -> PixelList {
+        let pixels = self.batch.rough_pixels.as_ref().expect("lent where a pixel has several positions");
+        PixelList::empty(&self.device.gpu, (**pixels).clone(), self.batch.pieces.count())
     }
 
     /// The switches of passes that find surfaces.
@@ -228,21 +241,22 @@ fn works(
     set: &SampleSet,
     cameras: &[PinholeCamera],
     pieces: &Pieces,
-    antialias: Antialias,
+    planes: ViewPlanes,
 ) -> wgpu::Buffer {
-    let elements = uniform_elements(view_works(set, cameras, pieces, antialias));
+    let elements = uniform_elements(view_works(set, cameras, pieces, planes));
     device.gpu.buffer_with("views", &elements, BufferUsages::UNIFORM)
 }
 
 /// The `ViewWork` of each piece.
-fn view_works(set: &SampleSet, cameras: &[PinholeCamera], pieces: &Pieces, antialias: Antialias) -> Vec<Vec<u8>> {
-    let volume = GpuVolume { position_share: (antialias.samples() as f32).recip(), ..set.volume };
+fn view_works(set: &SampleSet, cameras: &[PinholeCamera], pieces: &Pieces, planes: ViewPlanes) -> Vec<Vec<u8>> {
+    let volume = GpuVolume { position_share: (planes.antialias.samples() as f32).recip(), ..set.volume };
+    let tone = planes.tone.into();
     let sorted: Vec<_> = cameras.iter().map(|camera| nearest_first(set, camera)).collect();
     let work = |(number, &Piece { view, first_row }): (u32, &Piece)| {
         let end_row = (first_row + pieces.rows).min(cameras[view].size_px.y);
         let rows = rows_of(first_row..end_row);
         let view_camera = GpuViewCamera { number, rows, ..GpuViewCamera::of(&cameras[view], view as u32) };
-        let work = GpuViewWork { view: view_camera, volume };
+        let work = GpuViewWork { view: view_camera, volume, tone };
         [bytemuck::bytes_of(&work), bytemuck::cast_slice(&sorted[view])].concat()
     };
     (0..).zip(&pieces.all).map(work).collect()

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytemuck::Zeroable as _;
 use depth_image::{Aabb, Camera, DepthImage, Environment, Highlight, Illumination, PinholeCamera};
 use glam::Vec2;
-use gpu::{GpuEnvironment, Table, TablePool, Turn};
+use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
 use wgpu::TextureFormat;
 
@@ -55,6 +55,14 @@ impl SampleSet {
     /// The switches of all shaders that read the set, without fetches.
     pub(crate) fn variant(&self) -> SetVariant {
         SetVariant { cameras: self.cameras.len(), holes: self.uncertain.contains(&true), count_fetches: false }
+    }
+
+    /// The resources of `background.wgsl`.
+    pub(crate) fn background_bindings(&self) -> Vec<Binding<'_>> {
+        match &self.environment {
+            Some(map) => map.bindings().into_iter().collect(),
+            None => vec![Binding::buffer("background", &self.background)],
+        }
     }
 
     /// Builds pyramids and uploads everything. Fails for too many images, planes or cameras that do not fit, or a set

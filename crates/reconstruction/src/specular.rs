@@ -7,7 +7,7 @@ use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name
 use minijinja::{Value, context};
 
 use crate::view_work::{ONE_VIEW, SetVariant};
-use crate::{error::ReconstructionError, recording::Recording, reflectors::sample_texels};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, reflectors::sample_texels};
 
 /// The switches of `specular.wgsl`.
 #[derive(Debug)]
@@ -17,6 +17,8 @@ pub(crate) struct Specular {
     lights: usize,
     /// The environment is a map.
     environment_map: bool,
+    /// Only listed pixels are lit.
+    listed: bool,
     /// The words that say which lights a sample sees; 0 where all samples see all.
     visibility_words: usize,
 }
@@ -31,6 +33,7 @@ impl ShaderVariant for Specular {
             light_slots => light_slots(self.lights),
             environment_map => self.environment_map,
             visibility_words => self.visibility_words,
+            listed => self.listed,
             sample_texels => sample_texels(self.visibility_words),
             ..self.set.context()
         }
@@ -41,12 +44,8 @@ impl ShaderVariant for Specular {
         let kinds = [(Highlight::BlinnPhong, false), (Highlight::Ggx, false), (Highlight::Ggx, true)].into_iter();
         let lit = kinds.flat_map(|kind| lights.map(|(lights, words)| (kind, lights, words)));
         lit.flat_map(|((highlight, environment_map), lights, visibility_words)| {
-            SetVariant::all().into_iter().filter(|set| !set.count_fetches).map(move |set| Self {
-                set,
-                highlight,
-                lights,
-                environment_map,
-                visibility_words,
+            SetVariant::all().into_iter().filter(|set| !set.count_fetches).flat_map(move |set| {
+                [false, true].map(|listed| Self { set, highlight, lights, environment_map, listed, visibility_words })
             })
         })
         .collect()
@@ -54,7 +53,7 @@ impl ShaderVariant for Specular {
 }
 
 /// Highlights are added after the fill, which would spread them.
-pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
+pub(crate) fn record(recording: &mut Recording<'_>, listed: Option<&PixelList>) -> Result<(), ReconstructionError> {
     let Some(reflectors) = &recording.set.reflectors else { return Ok(()) };
     let mirrors = |_: &&Arc<GpuEnvironment>| reflectors.highlight == Highlight::Ggx;
     let environment = recording.set.environment.as_ref().filter(mirrors);
@@ -64,6 +63,7 @@ pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), Reconstruction
         lights: reflectors.lights,
         // Blinn-Phong surfaces mirror lamps only.
         environment_map: environment.is_some(),
+        listed: listed.is_some(),
         visibility_words: reflectors.visibility_words,
     };
     let pass = recording.device.passes.get(&variant)?;
@@ -76,7 +76,8 @@ pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), Reconstruction
         Binding::texture("samples", &reflectors.samples),
     ]);
     bindings.extend(environment.into_iter().flat_map(|map| map.bindings()));
+    bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&variant, &pass, &bound, None);
+    recording.dispatch_pixels(&variant, &pass, &bound, listed);
     Ok(())
 }

@@ -69,11 +69,21 @@ fn gathered(sample: u32, width_px: u32, shares: vec4f) -> Gathered {
     return Gathered(unit_or_zero(normal), pack4x8unorm(reflector * inverse), visibility, reflecting / all);
 }
 
-@compute @workgroup_size(8, 8)
+{% if listed %}
+{% include "pixel_list.wgsl" %}
+{% endif %}
+
+@compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
+{% if listed %}
+    if id.x >= lists[work.view.number].count { return; }
+    let index = listed_pixels[first_listed() + id.x];
+    let pixel = place_of(index);
+{% else %}
     let pixel = pixel_at(id);
     if any(pixel >= work.view.size_px) { return; }
     let index = work.view.first_pixel + pixel.y * work.view.size_px.x + pixel.x;
+{% endif %}
     let origin = provenance[index];
     if (origin & 0xffu) != PROVENANCE_HIT { return; }
     let center = vec2f(pixel) + 0.5;

@@ -19,16 +19,54 @@ pub(crate) const BORDER_PX: f32 = 8.0;
 /// Depth is known to half a code; a ray that reached a plane's very depth is still before it.
 pub(crate) const HALF_CODE: f32 = 0.5;
 
-/// Records a pass that finds surfaces, with its own resources: over listed pixels, or over all from where their tiles
-/// start. Gives the pixels that it leaves undecided.
+/// A sample whose texels all lie on one surface has more than this share of them there.
+pub(crate) const WHOLE: f32 = 0.999;
+/// Where provenance says how two cameras share a colour.
+pub(crate) const SPLIT_SHIFT: u32 = 24;
+
+/// The pixels that a pass finds surfaces for, and where their rays begin.
+#[derive(Clone, Copy)]
+pub(crate) enum Rays<'l> {
+    /// All, from where their tiles start.
+    All,
+    /// Some, from where their tiles start.
+    Listed(&'l PixelList),
+    /// What the pass before left, from where it got.
+    Left(&'l PixelList),
+}
+
+impl<'l> Rays<'l> {
+    pub fn list(self) -> Option<&'l PixelList> {
+        match self {
+            Self::All => None,
+            Self::Listed(list) | Self::Left(list) => Some(list),
+        }
+    }
+}
+
+/// Records a pass that finds surfaces, with its own resources. Gives the pixels that it leaves undecided.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     variant: &impl ShaderVariant,
-    listed: Option<&PixelList>,
+    rays: Rays<'_>,
     own: &[Binding<'_>],
 ) -> Result<PixelList, ReconstructionError> {
     let pass = recording.device.passes.get(variant)?;
     let undecided = recording.empty_list();
+    let batch = &recording.batch;
+    let mut bindings = bindings(recording, &undecided);
+    let starts = batch.tile_start_m.as_ref().filter(|_| !matches!(rays, Rays::Left(_)));
+    bindings.extend(starts.map(|starts| Binding::buffer("tile_start_m", starts)));
+    bindings.extend(batch.targets.iter().flat_map(|drawn| drawn.bindings()));
+    bindings.extend(rays.list().map(PixelList::bindings).into_iter().flatten());
+    bindings.extend(own.iter().cloned());
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_pixels(variant, &pass, &bound, rays.list());
+    Ok(undecided)
+}
+
+/// The resources of `surface.wgsl`.
+pub(crate) fn bindings<'b>(recording: &'b Recording<'_>, undecided: &'b PixelList) -> Vec<Binding<'b>> {
     let batch = &recording.batch;
     let mut bindings = recording.cell_bindings();
     bindings.extend([
@@ -40,12 +78,5 @@ pub(crate) fn record(
         Binding::buffer("undecided", &undecided.lists),
     ]);
     bindings.extend(batch.fetches.as_ref().map(|fetches| Binding::buffer("out_fetches", fetches)));
-    let starts = batch.tile_start_m.as_ref().filter(|_| listed.is_none());
-    bindings.extend(starts.map(|starts| Binding::buffer("tile_start_m", starts)));
-    bindings.extend(batch.targets.iter().flat_map(|drawn| drawn.bindings()));
-    bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
-    bindings.extend(own.iter().cloned());
-    let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(variant, &pass, &bound, listed);
-    Ok(undecided)
+    bindings
 }

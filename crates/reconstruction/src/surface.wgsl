@@ -39,12 +39,6 @@ fn pixel_of(id: vec2u) -> Pixel {
     return Pixel(index, tile, direction);
 }
 
-// Where a pixel of this view lies.
-fn place_of(index: u32) -> vec2u {
-    let place = index - work.view.first_pixel;
-    return vec2u(place % work.view.size_px.x, place / work.view.size_px.x);
-}
-
 fn write_pixel(index: u32, color_rgb9e5: u32, inverse_depth_per_m: f32, provenance: u32) {
     out_color[index] = color_rgb9e5;
     out_inverse_depth[index] = inverse_depth_per_m;
@@ -54,9 +48,9 @@ fn write_pixel(index: u32, color_rgb9e5: u32, inverse_depth_per_m: f32, provenan
 }
 
 // Writes the surface that was found at t, or what is where none was; `empty`: nothing is there.
-fn write_found(index: u32, found: bool, t: f32, color_linear: vec3f, camera_mask: u32, empty: bool) {
+fn write_found(index: u32, found: bool, t: f32, color_linear: vec3f, origin: u32, empty: bool) {
     let missed = select(PROVENANCE_FILLED, PROVENANCE_EMPTY, empty);
-    let provenance = select(missed, PROVENANCE_HIT | (camera_mask << 8u), found);
+    let provenance = select(missed, PROVENANCE_HIT | origin, found);
     let color = select(0u, rgb9e5_from_linear(color_linear), found);
     write_pixel(index, color, select(0.0, 1.0 / t, found), provenance);
     if provenance == PROVENANCE_FILLED { leave_undecided(index); }
@@ -128,7 +122,8 @@ fn vote_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f) -
 
 // `occupied`: the cameras together hold that there is a surface. A silhouette lies somewhere within
 // a texel; the mean of what all cameras show around a point tells better where than any one does.
-struct Blend { color_linear: vec3f, camera_mask: u32, occupied: bool }
+// `origin`: a hit's provenance but for its kind; 0 where no camera shows the point.
+struct Blend { color_linear: vec3f, origin: u32, occupied: bool }
 
 fn color_of(vote: CameraVote) -> vec3f {
     let colors = colors_of(vote.cell).corners;
@@ -171,7 +166,20 @@ fn blend_two_best(point_in_world: vec3f, direction: vec3f) -> Blend {
     let weights = max(vec2f(first.weight, second.weight) - third_weight, vec2f(0.0)) + vec2f(1e-9, 0.0);
     let color = (color_of(first) * weights.x + color_of(second) * weights.y) / (weights.x + weights.y);
     let mask = select(0u, first_mask, first.weight > 0.0) | select(0u, second_mask, second.weight > third_weight);
-    return Blend(color, mask, same >= beyond && mask != 0u && !carved);
+    return Blend(color, origin_of(mask, split_of(first, first_mask, second, mask, weights)), same >= beyond && mask != 0u && !carved);
+}
+
+fn origin_of(mask: u32, split: u32) -> u32 { return (mask << 8u) | (split << SPLIT_SHIFT); }
+
+// How the cameras of `mask` share a colour: 1 + 254 times the share of the one with the lowest bit; 0 where a texel around the
+// point lies on another surface.
+fn split_of(first: CameraVote, first_mask: u32, second: CameraVote, mask: u32, weights: vec2f) -> u32 {
+    let own = vec2f(dot(first.shares, vec4f(1.0)), dot(second.shares, vec4f(1.0)));
+    let is_whole = own.x > WHOLE && (own.y > WHOLE || mask == first_mask);
+    let share = weights.x / (weights.x + weights.y);
+    let is_lowest = (mask & (first_mask - 1u)) == 0u;
+    let split = 1u + u32(254.0 * select(1.0 - share, share, is_lowest) + 0.5);
+    return select(0u, split, is_whole);
 }
 
 fn pick_vote(a: CameraVote, b: CameraVote, second: bool) -> CameraVote {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
-use gpu::{ResourceTrait, ResourceTraits, switches};
+use gpu::{GpuTone, ResourceTrait, ResourceTraits, switches};
 use minijinja::{Value, context};
 
 /// Shaders name each camera; more would make them too long.
@@ -83,6 +83,7 @@ pub(crate) struct GpuViewCamera {
 pub(crate) struct GpuViewWork {
     pub view: GpuViewCamera,
     pub volume: GpuVolume,
+    pub tone: GpuTone,
 }
 
 /// The volume in `ViewWork`.

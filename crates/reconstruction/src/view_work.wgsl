@@ -1,9 +1,11 @@
 // The uniform of a view in passes over sample cameras: its camera, the volume, and the sample cameras.
 {% include "table.wgsl" %}
+{% include "tone.wgsl" %}
 //
 // Depth is kept as 15-bit codes, linear in inverse depth: code = 2 + (1/z - least) / step. So it is linear in screen
 // space along a projected ray. 1 is background, farther than any sample; 0 is a hole, which certifies nothing and blocks
-// nothing. The lowest byte of a pixel's provenance is its kind; a bit for each contributing camera follows.
+// nothing. The lowest byte of a pixel's provenance is its kind; a bit for each contributing camera follows. The
+// highest byte says how two cameras share a colour (`split_of`) and stays on the device.
 
 struct SampleCamera {
     // Rows that take (point_in_world, 1) to (column · w, row · w, w), w the planar depth in metres.
@@ -55,6 +57,8 @@ struct ViewWork {
     position_share: f32,
     volume_max_in_world: vec3f,
     padding: u32,
+    // From a pixel's mean to what it shows.
+    tone: Tone,
     cameras: array<SampleCamera, {{ cameras }}>,
 }
 
@@ -67,6 +71,12 @@ fn end_row() -> u32 { return work.view.rows >> 16u; }
 
 // The pixel of an invocation in a pass over all pixels.
 fn pixel_at(id: vec3u) -> vec2u { return vec2u(id.x, id.y + first_row()); }
+
+// Where a pixel of this view lies.
+fn place_of(index: u32) -> vec2u {
+    let place = index - work.view.first_pixel;
+    return vec2u(place % work.view.size_px.x, place / work.view.size_px.x);
+}
 
 // Where this piece's list begins among the listed pixels of the batch.
 fn first_listed() -> u32 { return work.view.first_pixel + first_row() * work.view.size_px.x; }

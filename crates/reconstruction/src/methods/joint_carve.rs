@@ -1,13 +1,15 @@
 //! Min-max pyramids of all cameras, traversed together; the cameras' colours are blended.
 
 pub(crate) mod march;
+pub(crate) mod smooth;
 
 use gpu::{ResourceTraits, ShaderVariant};
 use minijinja::{Value, context};
 
 use self::march::{MARCHES, March};
+use crate::surface::{self, Rays};
 use crate::view_work::{ONE_VIEW, SetVariant};
-use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, surface};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
 pub(super) const MAX_STOP_LEVEL: u32 = 8;
 /// Moves of a ray. A ray that is not done by then wanders behind all that cameras see, and stays unknown. A surface that
@@ -44,11 +46,18 @@ impl ShaderVariant for Carve {
 
 /// Marches in the nearest cameras, one after another; what they leave is carved by all together. Gives the pixels that
 /// stay unknown.
-pub(super) fn record(recording: &mut Recording<'_>, stop_level: u32) -> Result<PixelList, ReconstructionError> {
+pub(super) fn record(
+    recording: &mut Recording<'_>,
+    stop_level: u32,
+    listed: Option<&PixelList>,
+) -> Result<PixelList, ReconstructionError> {
     let set = recording.variant();
-    let mut undecided = None;
+    let mut undecided: Option<PixelList> = None;
     for camera in 0..MARCHES.min(recording.set.cameras.len()) {
-        undecided = Some(surface::record(recording, &March { set, camera }, undecided.as_ref(), &[])?);
+        let rays = undecided.as_ref().map(Rays::Left).or(listed.map(Rays::Listed)).unwrap_or(Rays::All);
+        let march = March { set, camera, listed: rays.list().is_some() };
+        undecided = Some(surface::record(recording, &march, rays, &[])?);
     }
-    surface::record(recording, &Carve { set, stop_level }, undecided.as_ref(), &[])
+    let left = undecided.as_ref().map_or(Rays::All, Rays::Left);
+    surface::record(recording, &Carve { set, stop_level }, left, &[])
 }

@@ -206,5 +206,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     // As all cameras together show the point found. Empty where the whole way is proven free.
     let blend = blend_two_best(work.view.eye_in_world + pixel.direction * t, pixel.direction);
     let empty = !hit && known && t >= span.far;
-    write_found(index, hit && blend.camera_mask != 0u, t, blend.color_linear, blend.camera_mask, empty);
+    write_found(index, hit && blend.origin != 0u, t, blend.color_linear, blend.origin, empty);
 }

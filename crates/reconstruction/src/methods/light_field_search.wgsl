@@ -151,5 +151,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let found = search(rays, span, tile_start_m[pixel.tile]);
     let place = most_conservative(rays, found.t);
     let hit = found.entered && place.mask != 0u;
-    write_found(pixel.index, hit, found.t, color_at(place), place.mask, found.never_unseen);
+    write_found(pixel.index, hit, found.t, color_at(place), origin_of(place.mask, 0u), found.never_unseen);
 }

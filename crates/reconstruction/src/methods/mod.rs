@@ -15,6 +15,7 @@ use gpu::{ShaderError, ShaderSource, Templates, Turn, shader_sources, wgsl_const
 
 use self::hybrid_mesh::GREATEST_SLOPE;
 use self::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL};
+use self::joint_carve::smooth::{FAINT_HIGHLIGHT, OPEN_SHARE, SMOOTH_FOOTPRINTS, Smooth};
 use self::joint_carve::{BLIND_MOVE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_AMONG_HOLES, MAX_STOP_LEVEL};
 use self::light_field_search::{BISECTIONS, DEFAULT_STEPS, MAX_STEPS};
 use crate::quads::{self, CornerPlanes, ErrorBound, Mesh as QuadMesh, QuadDrawing, RequiredPlanes};
@@ -87,22 +88,22 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 4] = [
 ];
 
 /// The templates of all methods.
-pub(crate) const SHADERS: [(&str, &str); 5] = wgsl_files! {
-    "joint_carve.wgsl", "joint_carve/march.wgsl", "light_field_search.wgsl", "mesh.wgsl", "hybrid_mesh.wgsl"
+pub(crate) const SHADERS: [(&str, &str); 6] = wgsl_files! {
+    "joint_carve.wgsl", "joint_carve/march.wgsl", "joint_carve/smooth.wgsl", "light_field_search.wgsl", "mesh.wgsl", "hybrid_mesh.wgsl"
 };
 
 /// The numbers that methods share with their shaders.
-pub(crate) fn constants() -> [(&'static str, String); 11] {
+pub(crate) fn constants() -> [(&'static str, String); 14] {
     wgsl_constants! {
-        BISECTIONS, BLIND_MOVE, EYE_SHARE, GREATEST_SLOPE, LEAST_MOVE, MAX_COARSE_MOVES, MAX_FINE_MOVES, MAX_MOVES,
-        MAX_MOVES_AMONG_HOLES, NUDGE_PX, START_LEVEL
+        BISECTIONS, BLIND_MOVE, EYE_SHARE, FAINT_HIGHLIGHT, GREATEST_SLOPE, LEAST_MOVE, MAX_COARSE_MOVES, MAX_FINE_MOVES, MAX_MOVES,
+        MAX_MOVES_AMONG_HOLES, NUDGE_PX, OPEN_SHARE, SMOOTH_FOOTPRINTS, START_LEVEL
     }
 }
 
 /// The texts of all variants of all methods' passes.
 pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
     let searches =
-        shader_sources!(templates, joint_carve::march::March, joint_carve::Carve, light_field_search::Search);
+        shader_sources!(templates, joint_carve::march::March, Smooth, joint_carve::Carve, light_field_search::Search);
     searches.chain(shader_sources!(templates, mesh::CutBetweenSamples, hybrid_mesh::CutTexels))
 }
 
@@ -133,17 +134,31 @@ impl ReconstructionMethod {
         matches!(self, LightFieldSearch { .. } | JointCarve { .. })
     }
 
-    /// Records the method's passes; gives the pixels that stay unknown.
+    /// Records the method's passes, for listed pixels or for all; gives the pixels that stay unknown. Lists come from
+    /// [`Self::share_positions`].
     pub(crate) fn record(
         self,
         drawing: &QuadDrawing,
         mesh: Option<&QuadMesh>,
         recording: &mut Recording<'_>,
+        listed: Option<&PixelList>,
     ) -> Result<PixelList, ReconstructionError> {
         match self {
             LightFieldSearch { steps } => light_field_search::record(recording, steps),
-            JointCarve { stop_level } => joint_carve::record(recording, stop_level),
+            JointCarve { stop_level } => joint_carve::record(recording, stop_level, listed),
             Mesh | HybridMesh { .. } => quads::record(drawing, recording, mesh),
+        }
+    }
+
+    /// Begins the sums over positions from the first one, and gives the pixels that further positions are to find; `None`
+    /// for methods that find all pixels at each position.
+    pub(crate) fn share_positions(
+        self,
+        recording: &mut Recording<'_>,
+    ) -> Result<Option<PixelList>, ReconstructionError> {
+        match self {
+            JointCarve { .. } => joint_carve::smooth::record(recording).map(Some),
+            LightFieldSearch { .. } | Mesh | HybridMesh { .. } => Ok(None),
         }
     }
 

@@ -51,12 +51,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% if count_fetches %}    fetches += 1u;
 {% endif %}
     let own = linear_from_rgb9e5(textureLoad(cell_colors, texel_at(sample), 0).x);
-    let known = blend.camera_mask != 0u;
-    let mask = select(mask_of(sample), blend.camera_mask, known);
+    let known = blend.origin != 0u;
+    let origin = select(origin_of(mask_of(sample), 0u), blend.origin, known);
     // Some camera sees the background where the ray leaves the volume.
     var empty = span.near > span.far;
 {% for k in range(cameras) %}
     empty = empty || shows_background(work.cameras[{{ k }}], point_in_world);
 {% endfor %}
-    write_found(pixel.index, drawn, t, select(own, blend.color_linear, known), mask, empty);
+    write_found(pixel.index, drawn, t, select(own, blend.color_linear, known), origin, empty);
 }

@@ -61,7 +61,7 @@ pub(super) fn joint_carve(cameras: &[SampleCamera], ray: &ViewRay, start: f32, s
         t = found.t;
         let blend = blend_two_best(cameras, ray, t);
         if found.crossed && blend.occupied {
-            return Pixel::hit(blend.color_linear, t, blend.camera_mask);
+            return blend.pixel_at(t);
         }
     }
     carve(cameras, ray, t, stop_level)
@@ -104,7 +104,7 @@ fn carve(cameras: &[SampleCamera], ray: &ViewRay, begin: f32, stop_level: u32) -
     }
     let blend = blend_two_best(cameras, ray, t);
     if hit && blend.camera_mask != 0 {
-        return Pixel::hit(blend.color_linear, t, blend.camera_mask);
+        return blend.pixel_at(t);
     }
     let empty = !hit && known && t >= ray.far;
     Pixel::without_surface(if empty { ProvenanceKind::Empty } else { ProvenanceKind::Filled })

@@ -12,15 +12,16 @@ mod march;
 mod mesh;
 mod pixel;
 mod sample_camera;
+mod smooth;
 mod specular;
 mod surface;
 mod tile_start;
 mod view_ray;
 
-use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, View, srgb8_from_linear};
+use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 
-use self::{pixel::Pixel, sample_camera::SampleCamera, view_ray::ViewRays};
+use self::{pixel::Pixel, sample_camera::SampleCamera, smooth::First, view_ray::ViewRays};
 use crate::{methods::ReconstructionMethod, pyramid::is_among_holes, quads::Quad, sample_set::SetDescription};
 
 /// One view with depth and provenance.
@@ -43,15 +44,67 @@ pub fn reconstruct_antialiased(
     method: ReconstructionMethod,
     antialias: Antialias,
 ) -> View {
-    let mut sums = vec![Vec3::ZERO; camera.pixel_count()];
-    for offset_px in antialias.offsets_px() {
-        let shifted = camera.with_offset(offset_px);
-        let shown = shown_linear(&pixels(images, set, &shifted, method), set, &shifted);
-        sums.iter_mut().zip(shown).for_each(|(sum, shown)| *sum += shown);
-    }
+    reconstruct_shown(images, set, camera, method, ViewPlanes { antialias, ..ViewPlanes::COLOR })
+}
+
+/// As [`reconstruct`], with the colour that the planes describe.
+#[must_use]
+pub fn reconstruct_shown(
+    images: &[DepthImage],
+    set: &SetDescription<'_>,
+    camera: &PinholeCamera,
+    method: ReconstructionMethod,
+    ViewPlanes { antialias, tone, .. }: ViewPlanes,
+) -> View {
+    let sums = sums(images, set, camera, method, antialias);
     let mean = |sum: &Vec3| *sum / antialias.samples() as f32;
-    let srgb8 = sums.iter().flat_map(|sum| mean(sum).to_array().map(srgb8_from_linear)).collect();
+    let srgb8 = sums.iter().flat_map(|sum| tone.srgb8(mean(sum))).collect();
     View { srgb8, ..reconstruct(images, set, camera, method) }
+}
+
+/// Of each pixel, the linear light of all positions.
+fn sums(
+    images: &[DepthImage],
+    set: &SetDescription<'_>,
+    center: &PinholeCamera,
+    method: ReconstructionMethod,
+    antialias: Antialias,
+) -> Vec<Vec3> {
+    let mut cameras = antialias.offsets_px().map(|offset_px| center.with_offset(offset_px));
+    let camera = cameras.next().unwrap_or(*center);
+    let found = pixels(images, set, &camera, method);
+    let mut sums = shown_linear(&found, set, &camera);
+    let (samples, rays) = (nearest_first(images, &camera), ViewRays::of(&camera, &set.volume, images));
+    let starts = tile_start::tile_starts(&samples, &rays);
+    let first = First { pixels: &found, cameras: &samples, rays: &rays, starts: &starts, set, antialias };
+    let shares = matches!(method, ReconstructionMethod::JointCarve { .. });
+    let further = |index| if shares { first.further(index, sums[index]) } else { None };
+    let further: Vec<Option<Vec3>> = (0..found.len()).map(further).collect();
+    sums.iter_mut().zip(&further).for_each(|(sum, further)| *sum += further.unwrap_or_default());
+    for camera in cameras {
+        let shown = shown_linear(&rough(images, set, &camera, method, (&found, &further)), set, &camera);
+        let own = sums.iter_mut().zip(shown).zip(&further).filter(|(_, further)| further.is_none());
+        own.for_each(|((sum, shown), _)| *sum += shown);
+    }
+    sums
+}
+
+/// The pixels of a further position: only those that do not follow from the first are found.
+fn rough(
+    images: &[DepthImage],
+    set: &SetDescription<'_>,
+    camera: &PinholeCamera,
+    method: ReconstructionMethod,
+    (first, further): (&[Pixel], &[Option<Vec3>]),
+) -> Vec<Pixel> {
+    if further.iter().all(Option::is_none) {
+        return pixels(images, set, camera, method);
+    }
+    let (samples, rays) = (nearest_first(images, camera), ViewRays::of(camera, &set.volume, images));
+    let mut found = pixels_from(&samples, &rays, &tile_start::tile_starts(&samples, &rays), method);
+    let kept = found.iter_mut().zip(first).zip(further).filter(|(_, further)| further.is_some());
+    kept.for_each(|((found, first), _)| *found = *first);
+    finished(found, images, set, &samples, &rays)
 }
 
 fn pixels(
@@ -85,10 +138,7 @@ fn shown_linear(pixels: &[Pixel], set: &SetDescription<'_>, camera: &PinholeCame
 fn view(pixels: &[Pixel], set: &SetDescription<'_>, camera: &PinholeCamera) -> View {
     View {
         size_px: camera.size_px,
-        srgb8: shown_linear(pixels, set, camera)
-            .iter()
-            .flat_map(|shown| shown.to_array().map(srgb8_from_linear))
-            .collect(),
+        srgb8: shown_linear(pixels, set, camera).iter().flat_map(|&shown| ToneMapping::NONE.srgb8(shown)).collect(),
         inverse_depth_per_m: Some(pixels.iter().map(|p| p.inverse_depth_per_m).collect()),
         provenance: Some(pixels.iter().map(|p| p.provenance).collect()),
     }

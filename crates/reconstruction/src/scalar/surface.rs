@@ -2,9 +2,9 @@
 
 use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
-use super::{sample_camera::SampleCamera, view_ray::ViewRay};
+use super::{pixel::Pixel, sample_camera::SampleCamera, view_ray::ViewRay};
 use crate::{
-    surface::{ANGLE_FLOOR, BORDER_PX, CARVING_SHARE, HIDDEN_WEIGHT, LEAST_SHARE, THICKNESS_FOOTPRINTS},
+    surface::{ANGLE_FLOOR, BORDER_PX, CARVING_SHARE, HIDDEN_WEIGHT, LEAST_SHARE, THICKNESS_FOOTPRINTS, WHOLE},
     view_work::CELL_MARGIN_PX,
 };
 
@@ -26,6 +26,14 @@ pub(super) struct Blend {
     pub color_linear: Vec3,
     pub camera_mask: u32,
     pub occupied: bool,
+    /// The share of the camera with the lowest bit; `None` where a texel around the point lies on another surface.
+    pub lowest_share: Option<f32>,
+}
+
+impl Blend {
+    pub fn pixel_at(self, t: f32) -> Pixel {
+        Pixel { lowest_share: self.lowest_share, ..Pixel::hit(self.color_linear, t, self.camera_mask) }
+    }
 }
 
 /// One camera's vote on a point.
@@ -35,6 +43,8 @@ struct CameraVote {
     weight: f32,
     color_linear: Vec3,
     mask: u32,
+    /// What the texels whose colours count amount to.
+    own: f32,
     /// Share of the texels around that lie on the point's own surface, or show what is beyond it.
     same: f32,
     beyond: f32,
@@ -60,7 +70,21 @@ pub(super) fn blend_two_best(cameras: &[SampleCamera], ray: &ViewRay, t: f32) ->
     }
     let [same, beyond]: [f32; 2] = [votes.iter().map(|s| s.same).sum(), votes.iter().map(|s| s.beyond).sum()];
     let carved = votes.iter().any(|s| s.beyond > CARVING_SHARE);
-    Blend { color_linear: color / weights, camera_mask, occupied: same >= beyond && camera_mask != 0 && !carved }
+    Blend {
+        color_linear: color / weights,
+        camera_mask,
+        occupied: same >= beyond && camera_mask != 0 && !carved,
+        lowest_share: lowest_share(&best_first, camera_mask, weight_of(&first) / weights),
+    }
+}
+
+/// To one of 254 parts, as provenance says it.
+fn lowest_share(best_first: &[CameraVote], camera_mask: u32, share: f32) -> Option<f32> {
+    let first = &best_first[0];
+    let is_single = camera_mask == first.mask;
+    let is_whole = first.own > WHOLE && (is_single || best_first.get(1).is_some_and(|second| second.own > WHOLE));
+    let share = if camera_mask.trailing_zeros() == first.mask.trailing_zeros() { share } else { 1.0 - share };
+    is_whole.then_some((share * 254.0).round() / 254.0)
 }
 
 fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> CameraVote {
@@ -68,7 +92,14 @@ fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> Ca
     let inverse_w = p.z.recip();
     let uv = p.xy() * inverse_w - 0.5;
     if !(p.z > 0.0 && uv.cmpge(Vec2::ZERO).all() && uv.cmplt(camera.cells).all()) {
-        return CameraVote { weight: 0.0, color_linear: Vec3::ZERO, mask: camera.mask, same: 0.0, beyond: 0.0 };
+        return CameraVote {
+            weight: 0.0,
+            color_linear: Vec3::ZERO,
+            mask: camera.mask,
+            own: 0.0,
+            same: 0.0,
+            beyond: 0.0,
+        };
     }
     let clamped = uv.min(camera.cells - CELL_MARGIN_PX);
     let (cell, at) = (clamped.as_uvec2(), clamped - clamped.floor());
@@ -96,7 +127,7 @@ fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> Ca
     let fade = if camera.among_holes { faded(proven) + HIDDEN_WEIGHT * faded(same) } else { 1.0 };
     let of: f32 = if camera.among_holes { own.max(1e-6) } else { same.max(LEAST_SHARE) };
     let weight = if same > LEAST_SHARE { weight(camera, uv, point_in_world, view_direction) * fade } else { 0.0 };
-    CameraVote { weight, color_linear: color / of, mask: camera.mask, same, beyond }
+    CameraVote { weight, color_linear: color / of, mask: camera.mask, own, same, beyond }
 }
 
 /// By the angle between the two lines of sight, the footprint and the distance to the border.

@@ -45,9 +45,10 @@ fn a_pixel_is_the_mean_of_its_positions_in_linear_light() {
             let smooth = drawn(&set, camera, method, planes);
             let means = mean_of_whole(&set, &camera, method);
             let off = smooth.srgb8.iter().zip(&means).map(|(&byte, mean)| (linear_from_srgb8(byte) - mean).abs());
-            // Whole reconstructions have tile starts of their own, with which a ray may end a rounding apart.
+            // Whole reconstructions have tile starts of their own, with which a ray may end a rounding apart. Where the first
+            // position found a smooth surface, the others continue it.
             let apart = off.filter(|&off| off > 0.006).count();
-            assert!(apart * 200 <= means.len(), "{name}, {method}: {apart} of {} bytes", means.len());
+            assert!(apart * 100 <= means.len(), "{name}, {method}: {apart} of {} bytes", means.len());
             let plain = drawn(&set, camera, method, ViewPlanes::ALL);
             assert_eq!(smooth.inverse_depth_per_m, plain.inverse_depth_per_m, "{name}, {method}");
             assert_eq!(smooth.provenance, plain.provenance, "{name}, {method}");

@@ -13,5 +13,6 @@ mod non_redundant;
 mod slices;
 mod specular;
 mod stage;
+mod tone;
 mod twins;
 mod variants;

@@ -22,8 +22,10 @@ pub(crate) const EYE_SHARE: f32 = 0.01;
 #[derive(Debug)]
 pub(crate) struct March {
     pub set: SetVariant,
-    /// The camera among a view's, nearest first. Marches after the first are over lists of pixels.
+    /// The camera among a view's, nearest first.
     pub camera: usize,
+    /// Only listed pixels are marched.
+    pub listed: bool,
 }
 
 impl ShaderVariant for March {
@@ -31,11 +33,14 @@ impl ShaderVariant for March {
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
-        context! { march_camera => self.camera, ..self.set.context() }
+        context! { march_camera => self.camera, listed => self.listed, ..self.set.context() }
     }
 
     fn all() -> Vec<Self> {
-        let marches = |set: SetVariant| (0..set.cameras.min(MARCHES)).map(move |camera| Self { set, camera });
+        let marches = |set: SetVariant| {
+            let later = (1..set.cameras.min(MARCHES)).map(move |camera| Self { set, camera, listed: true });
+            later.chain([false, true].map(|listed| Self { set, camera: 0, listed }))
+        };
         SetVariant::all().into_iter().flat_map(marches).collect()
     }
 }

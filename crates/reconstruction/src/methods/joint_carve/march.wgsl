@@ -111,22 +111,23 @@ fn march(a: vec3f, b: vec3f, near: f32, far: f32) -> March {
 
 {% if march_camera == 0 %}
 @group(0) var<storage, read> tile_start_m: array<f32>;
-{% else %}
+{% endif %}
+{% if listed %}
 {% include "pixel_list.wgsl" %}
 {% endif %}
 
-@compute @workgroup_size({{ "TILE_PX, TILE_PX" if march_camera == 0 else "LIST_WORKGROUP" }})
+@compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
-{% if march_camera == 0 %}
+{% if listed %}
+    if id.x >= lists[work.view.number].count { return; }
+    let pixel = pixel_of(place_of(listed_pixels[first_listed() + id.x]));
+{% else %}
     let place = pixel_at(id);
     if any(place >= work.view.size_px) { return; }
     let pixel = pixel_of(place);
-{% else %}
-    if id.x >= lists[work.view.number].count { return; }
-    let pixel = pixel_of(place_of(listed_pixels[first_listed() + id.x]));
 {% endif %}
     let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
-    // Of listed pixels the pass before left how far it got.
+    // The marches after the first go on where the one before ended.
     let begin = {{ "max(span.near, tile_start_m[pixel.tile])" if march_camera == 0 else "out_inverse_depth[pixel.index]" }};
     let a = homogeneous(work.cameras[CAMERA].homogeneous_pixel_from_world, vec4f(work.view.eye_in_world, 1.0));
     let b = homogeneous(work.cameras[CAMERA].homogeneous_pixel_from_world, vec4f(pixel.direction, 0.0));
@@ -137,7 +138,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     // its inverse depth will be.
     let empty = begin >= span.far;
     let color = select(0u, rgb9e5_from_linear(blend.color_linear), hit && !empty);
-    let provenance = select(PROVENANCE_HIT | (blend.camera_mask << 8u), PROVENANCE_EMPTY, empty);
+    let provenance = select(PROVENANCE_HIT | blend.origin, PROVENANCE_EMPTY, empty);
     let depth = select(select(found.t, 1.0 / found.t, hit), 0.0, empty);
     write_pixel(pixel.index, color, depth, provenance);
     if !hit && !empty { leave_undecided(pixel.index); }

@@ -1,0 +1,80 @@
+//! The light of all positions within pixels that show one smooth surface or only background, from the first position.
+
+use depth_image::Antialias;
+use glam::Vec2;
+use gpu::{Binding, ResourceTraits, ShaderVariant};
+use minijinja::{Value, context};
+
+use crate::view_work::{ONE_VIEW, SetVariant};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, surface};
+
+/// A surface is smooth where its depth lies this close to the middle of its neighbours' on both sides, in the pixel's
+/// footprints.
+pub(crate) const SMOOTH_FOOTPRINTS: f32 = 0.5;
+/// A tile's start over the depth of a smooth surface in it, at least.
+pub(crate) const OPEN_SHARE: f32 = 0.5;
+/// Linear light. A highlight up to here may be the same at all positions.
+pub(crate) const FAINT_HIGHLIGHT: f32 = 0.02;
+
+/// The switches of `smooth.wgsl`.
+#[derive(Debug)]
+pub(crate) struct Smooth {
+    set: SetVariant,
+    antialias: Antialias,
+    /// Samples have a light that depends on the viewer.
+    highlights: bool,
+    environment_map: bool,
+}
+
+impl ShaderVariant for Smooth {
+    const TEMPLATE: &'static str = "joint_carve/smooth.wgsl";
+    const TRAITS: ResourceTraits = ONE_VIEW;
+
+    fn context(&self) -> Value {
+        let offsets: Vec<[f32; 2]> = from_first_px(self.antialias).map(|offset| offset.to_array()).collect();
+        let Self { highlights, environment_map, .. } = *self;
+        context! { offsets, highlights, environment_map, ..self.set.context() }
+    }
+
+    fn all() -> Vec<Self> {
+        let counts = [2, 4, 8, 16].into_iter().filter_map(Antialias::of);
+        let each = |antialias| {
+            SetVariant::all().into_iter().flat_map(move |set| {
+                gpu::switches().map(move |[highlights, environment_map]| Self {
+                    set,
+                    antialias,
+                    highlights,
+                    environment_map,
+                })
+            })
+        };
+        counts.flat_map(each).collect()
+    }
+}
+
+/// Where the further positions are, from the first.
+pub(crate) fn from_first_px(antialias: Antialias) -> impl Iterator<Item = Vec2> {
+    let first = antialias.offsets_px().next().unwrap_or_default();
+    antialias.offsets_px().skip(1).map(move |offset| offset - first)
+}
+
+/// Begins the sums over positions; gives the pixels whose further positions are to be found.
+pub(crate) fn record(recording: &mut Recording<'_>) -> Result<PixelList, ReconstructionError> {
+    let set = recording.set;
+    let variant = Smooth {
+        set: recording.variant(),
+        antialias: recording.batch.planes.antialias,
+        highlights: set.reflectors.is_some(),
+        environment_map: set.environment.is_some(),
+    };
+    let pass = recording.device.passes.get(&variant)?;
+    let rough = recording.rough_list();
+    let mut bindings = surface::bindings(recording, &rough);
+    bindings.extend(set.background_bindings());
+    bindings.extend(recording.batch.sums.as_ref().map(|sums| Binding::buffer("sums", sums)));
+    let starts = recording.batch.tile_start_m.as_ref();
+    bindings.extend(starts.map(|starts| Binding::buffer("tile_start_m", starts)));
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_pixels(&variant, &pass, &bound, None);
+    Ok(rough)
+}
