@@ -1,6 +1,6 @@
 use codec::MAX_CHUNK_BYTES;
 use codec::{FrameCodec, SampleSetId, StageTimes};
-use depth_image::{Antialias, PinholeCamera};
+use depth_image::{Antialias, PinholeCamera, ToneMapping};
 use glam::{UVec2, Vec3};
 use node::Quotas;
 use tokio::sync::Semaphore;
@@ -37,6 +37,7 @@ impl Bench {
             camera,
             size_px: camera.size_px,
             antialias: Antialias::NONE,
+            tone: ToneMapping::NONE,
             codec: FrameCodec::Lz4,
             color_bytes: bytes as u64,
             inverse_depth_bytes: 0,

@@ -195,7 +195,7 @@ mod tests {
 
     use cluster::RequestedView;
     use codec::{FrameCodec, SampleSetId};
-    use depth_image::{PinholeCamera, ViewPlanes};
+    use depth_image::{ExposureEv, PinholeCamera, ToneCurve, ViewPlanes};
     use glam::{UVec2, Vec3};
     use node::{NodeMetrics, Quotas};
     use tokio::sync::Semaphore;
@@ -254,6 +254,19 @@ mod tests {
         }
         seen.sort_unstable();
         assert_eq!(seen, (0..200).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn views_of_two_tones_are_not_in_one_batch() {
+        let mut mapped = views(1, 6, 64);
+        for waiting in mapped.iter_mut().skip(3) {
+            waiting.key.planes.tone.curve = ToneCurve::KhronosNeutral;
+        }
+        mapped[5].key.planes.tone.exposure = ExposureEv::new(1.0).unwrap();
+        let mut queue = FairQueue::default();
+        queue.push(1, mapped);
+        let sizes: Vec<usize> = (0..4).map(|_| queue.take_batch(false).len()).collect();
+        assert_eq!(sizes, [3, 2, 1, 0]);
     }
 
     #[test]

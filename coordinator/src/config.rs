@@ -37,6 +37,8 @@ pub struct SceneOffer {
     pub package: Bytes,
     /// Sample cameras for sessions that bring none.
     pub rig: Vec<Camera>,
+    /// The rig's images get the size that suits the views of a session that names none.
+    pub fits_views: bool,
     /// The volume that is reconstructed, unless a session brings its own.
     pub volume: Aabb,
     /// Radiance of rays that leave the scene, by their direction.

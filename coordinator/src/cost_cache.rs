@@ -120,7 +120,7 @@ fn at_size((near_px, near): (f64, Measured), other: Option<(f64, Measured)>, pix
 #[cfg(test)]
 pub(crate) mod tests {
     use cluster::SamplePlanes;
-    use depth_image::{PinholeCamera, ViewPlanes};
+    use depth_image::{ExposureEv, PinholeCamera, ViewPlanes};
 
     use super::*;
     use crate::schedule::workload_for_tests as workload;
@@ -139,7 +139,10 @@ pub(crate) mod tests {
 
     fn measured(reconstruct_view_s: f64) -> Known {
         let costs = Costs { sample_image_s: 3.0, reconstruct_view_s, encode_view_s: 0.001, ..Costs::default() };
-        Known { measured: Measured { costs, planes: SamplePlanes::default() }, is_settled: true }
+        Known {
+            measured: Measured { costs, planes: SamplePlanes::default(), auto_exposure: ExposureEv::ZERO },
+            is_settled: true,
+        }
     }
 
     fn predicted_s(cache: &CostCache, size_px: UVec2) -> Option<f64> {

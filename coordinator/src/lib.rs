@@ -23,3 +23,4 @@ mod workload;
 pub use config::{CoordinatorConfig, OfferError, SceneOffer, SceneOffers};
 pub use observers::{CoordinatorMetrics, EventLog, Observers};
 pub use service::serve;
+pub use workload::fitting_size_px;

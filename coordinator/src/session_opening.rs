@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use cluster::{MeasureCosts, Measured, SessionRequest, SessionStage, Workload};
+use depth_image::{ToneMapping, ViewPlanes};
 use tonic::Status;
 
 use crate::grpc_status::refusal;
@@ -49,7 +50,8 @@ async fn measured_opening(
         codec: request.codec.clone(),
         typical_views: vec![request.typical_view],
         batch_count: request.views_per_set.min(MEASURED_BATCH),
-        planes: request.planes,
+        // Every tone costs the same.
+        planes: ViewPlanes { tone: ToneMapping::NONE, ..request.planes },
         in_background: false,
     };
     let admits = || {
@@ -57,7 +59,7 @@ async fn measured_opening(
         let admitted = shared.with_scheduler(|scheduler| scheduler.admits_workload(&workload, follows_viewers));
         admitted.map_err(|error| refusal(&error))
     };
-    let Measured { costs, planes } = costs_of(shared, measurement, events, admits).await?;
+    let Measured { costs, planes, auto_exposure } = costs_of(shared, measurement, events, admits).await?;
     Ok(Opening {
         session,
         workload: Workload { planes, ..workload },
@@ -71,6 +73,7 @@ async fn measured_opening(
         },
         fallbacks: request.fallbacks,
         costs,
+        auto_exposure,
         viewpoints: request.viewpoints,
     })
 }

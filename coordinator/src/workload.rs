@@ -10,6 +10,13 @@ use crate::config::SceneOffer;
 use crate::grpc_status::refusal;
 use crate::schedule::{ChoiceError, first_indices};
 
+/// Texels of a sample image a pixel of a view, each way: what brings most for its cost (docs/benchmarks.md).
+const SAMPLE_DENSITY: f32 = 2.0;
+/// The most texels of a set of images whose size follows the views: a software device samples them in about a second.
+const MAX_FITTING_TEXELS: usize = 1 << 20;
+/// Steps of √2 by which images are smaller than the offered ones at most.
+const LEAST_STEPS: f32 = -2.0;
+
 /// Completes a request with the scene's defaults. A node tells which planes its method needs.
 ///
 /// # Errors
@@ -24,7 +31,8 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
         (true, false) => request.sample_cameras.clone(),
         (true, true) => offer.rig.clone(),
     };
-    let sized = |camera: &Camera| request.sample_size_px.map_or(Ok(*camera), |size_px| resized(camera, size_px));
+    let size_px = session_size_px(request, offer);
+    let sized = |camera: &Camera| size_px.map_or(Ok(*camera), |size_px| resized(camera, size_px));
     let sample_cameras = cameras.iter().map(sized).collect::<Result<Vec<_>, _>>()?;
     if sample_cameras.is_empty() {
         return Err(Status::invalid_argument("sample_cameras is missing, and the scene came without a rig"));
@@ -47,7 +55,7 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
 /// The sample cameras of each view cell of the session's viewpoints, as if it were alone, in the size of the offered ones.
 fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Result<Vec<Vec<Camera>>, Status> {
     let offered = offer.rig.first().map(|Camera::Pinhole(camera)| camera.size_px);
-    let size_px = request.sample_size_px.or(offered).unwrap_or(request.typical_view.size_px);
+    let size_px = session_size_px(request, offer).or(offered).unwrap_or(request.typical_view.size_px);
     let mut groups = Vec::new();
     ViewGroup::add(&mut groups, &request.viewpoints, volume);
     if groups.len() > MAX_CELLS {
@@ -61,10 +69,57 @@ fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Resu
     groups.iter().map(cameras).collect()
 }
 
+/// The size of a session's images; `None` where the offer's is fixed, or the session brings its own cameras.
+fn session_size_px(request: &SessionRequest, offer: &SceneOffer) -> Option<UVec2> {
+    let is_fitted = offer.fits_views && request.sample_cameras.is_empty();
+    request.sample_size_px.or_else(|| fitting_size_px(&offer.rig, &request.typical_view).filter(|_| is_fitted))
+}
+
+/// The size of offered images that makes them about [`SAMPLE_DENSITY`] times as dense as a view. Sizes are whole steps of √2
+/// apart, so that sessions of similar views share their samples. `None` without images or with a degenerate view.
+#[must_use]
+pub fn fitting_size_px(rig: &[Camera], view: &PinholeCamera) -> Option<UVec2> {
+    let Camera::Pinhole(offered) = rig.first()?;
+    let wanted = SAMPLE_DENSITY * view.focal_px.min_element() / offered.focal_px.min_element();
+    let most = (MAX_FITTING_TEXELS as f32 / (offered.pixel_count() * rig.len()) as f32).log2().floor();
+    let steps = (2.0 * wanted.log2()).round().max(LEAST_STEPS).min(most);
+    let size_px = (offered.size_px.as_vec2() * (0.5 * steps).exp2()).round();
+    steps.is_finite().then(|| size_px.as_uvec2().max(UVec2::ONE))
+}
+
 /// The same field of view in another size.
 fn resized(camera: &Camera, size_px: UVec2) -> Result<Camera, Status> {
     let Camera::Pinhole(camera) = camera;
     let camera = camera.resized(size_px);
     camera.validate().map_err(|error| Status::invalid_argument(format!("sample_image_size: {error}")))?;
     Ok(Camera::Pinhole(camera))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(width: u32, height: u32) -> PinholeCamera {
+        let size_px = UVec2::new(width, height);
+        PinholeCamera::looking_at(glam::Vec3::Z, glam::Vec3::ZERO, glam::Vec3::Y, 0.8, size_px)
+    }
+
+    #[test]
+    fn images_follow_the_density_of_views_in_steps_up_to_a_bound() {
+        let rig = vec![Camera::Pinhole(camera(400, 300)); 4];
+        let size = |width, height| fitting_size_px(&rig, &camera(width, height)).map(|size| (size.x, size.y));
+        assert_eq!(size(200, 150), Some((400, 300)));
+        assert_eq!(size(210, 160), Some((400, 300)), "similar views share their samples");
+        assert_eq!(size(120, 90), Some((283, 212)));
+        assert_eq!(size(16, 12), Some((200, 150)), "the least");
+        for (width, height) in [(400, 300), (1280, 720), (8192, 8192)] {
+            assert_eq!(size(width, height), Some((566, 424)), "the most");
+        }
+        let texels = |cameras: usize| {
+            let rig = vec![Camera::Pinhole(camera(400, 300)); cameras];
+            fitting_size_px(&rig, &camera(4000, 3000)).map(|size| size.element_product() as usize * cameras)
+        };
+        assert!((1..=40).all(|cameras| texels(cameras).is_some_and(|texels| texels < MAX_FITTING_TEXELS + 4096)));
+        assert_eq!(fitting_size_px(&[], &camera(4, 3)), None);
+    }
 }

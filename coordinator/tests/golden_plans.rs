@@ -12,7 +12,7 @@ use cluster::{
     Timeline, Workload,
 };
 use coordinator::schedule::{Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
-use depth_image::{Aabb, Camera, Environment, Illumination, PinholeCamera};
+use depth_image::{Aabb, Camera, Environment, ExposureEv, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
 /// Images that are not tileable.
@@ -72,6 +72,7 @@ fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) -> Opening 
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
         costs: WHOLE,
+        auto_exposure: ExposureEv::ZERO,
     }
 }
 

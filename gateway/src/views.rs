@@ -122,7 +122,9 @@ impl Visited {
     /// The view, drawn directly where no view cell is near: cells follow visitors, not single requests.
     async fn draw(&self, gateway: &Gateway, planes: ViewPlanes) -> Result<SingleView, Refusal> {
         let (shown, direct) = (self.shown(), &self.scene.direct);
-        let is_near = shown.opened().await?.plan().assignment.workload.has_cell_near(&self.camera);
+        let session = shown.opened().await?;
+        let is_near = session.plan().assignment.workload.has_cell_near(&self.camera);
+        let planes = ViewPlanes { tone: session.tone(), ..planes };
         let _visit = (!is_near).then(|| direct.visits.begin());
         let kept = if is_near { shown } else { direct };
         Ok(gateway.single_views.draw(kept, self.camera, planes, self.moment).await?)

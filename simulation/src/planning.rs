@@ -7,7 +7,7 @@ use cluster::{
     Workload,
 };
 use coordinator::schedule::{ChoiceError, Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
-use depth_image::{Aabb, Camera, Environment, Illumination, PinholeCamera};
+use depth_image::{Aabb, Camera, Environment, ExposureEv, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
 use crate::cluster::{Cluster, Machine};
@@ -166,6 +166,7 @@ fn open(cluster: &Cluster, demand: &Demand) -> Event {
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
         costs: slowest,
+        auto_exposure: ExposureEv::ZERO,
     }))
 }
 

@@ -5,7 +5,7 @@ use cluster::{
     Costs, InvalidField, JoinCluster, MeasuredCosts, Quality, SamplerReport, Workload, finite_seconds, frame_rate,
     nonempty, viewpoints,
 };
-use depth_image::PinholeCamera;
+use depth_image::{ExposureEv, PinholeCamera};
 use serde::{Deserialize, Serialize};
 
 use super::PolicyOverride;
@@ -78,6 +78,9 @@ pub struct Opening {
     pub fallbacks: Vec<Quality>,
     /// Measured costs, of the session's own views: every node's until it reports its own.
     pub costs: Costs,
+    /// The exposure of the workload's default view: its first session's counts.
+    #[serde(default)]
+    pub auto_exposure: ExposureEv,
     /// The workload's sample cameras are the cells of these viewpoints, as if the session were alone. Empty: it brings
     /// sample cameras of its own.
     pub viewpoints: Vec<PinholeCamera>,

@@ -6,7 +6,7 @@ use cluster::{
     Costs, JoinCluster, NodeStatus, PolicyChoice, SamplePlanes, SceneHash, SceneRef, TileCosts, Timeline, Workload,
     WorkloadStatus,
 };
-use depth_image::{Aabb, Camera, Environment, Illumination, PinholeCamera};
+use depth_image::{Aabb, Camera, Environment, ExposureEv, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
 use super::command::Command;
@@ -138,6 +138,7 @@ pub(super) fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) 
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
         costs: COSTS,
+        auto_exposure: ExposureEv::ZERO,
     }
 }
 

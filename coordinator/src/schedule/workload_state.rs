@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use cluster::{AchievedTime, Costs, Policy, PolicyChoice, Quality, Workload};
-use depth_image::{Camera, PinholeCamera};
+use depth_image::{Camera, ExposureEv, PinholeCamera};
 use glam::UVec2;
 
 use super::active_plan::ActivePlan;
@@ -26,6 +26,8 @@ pub(super) struct WorkloadState {
     cells: Option<Cells>,
     /// Of the mean view of its sessions, as measured when they were opened.
     pub(super) costs: Costs,
+    /// As measured when it was opened: views of all cells, moments and plans have one exposure.
+    pub(super) auto_exposure: ExposureEv,
     pub(super) sessions: SessionMix,
     /// The present fallback.
     pub(super) overload: Overload,
@@ -62,6 +64,7 @@ impl WorkloadState {
             requested: opening.workload.clone(),
             cells: (!opening.viewpoints.is_empty()).then(|| Cells::of(&opening.workload)),
             costs: opening.costs,
+            auto_exposure: opening.auto_exposure,
             sessions: SessionMix::default(),
             overload: Overload::default(),
             nodes: BTreeSet::new(),

@@ -1,6 +1,6 @@
 //! Members: joining, measuring, being ready for plans, and reports on their own work and on each other.
 
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::{ExposureEv, PinholeCamera, ViewPlanes};
 use serde::{Deserialize, Serialize};
 
 use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, viewpoints, within};
@@ -101,6 +101,8 @@ pub struct Measured {
     pub costs: Costs,
     /// The planes of sample images that the reconstruction method needs, with which the images were measured.
     pub planes: SamplePlanes,
+    /// The exposure at which the view in the middle of the workload's first view cell is bright, and little of it white.
+    pub auto_exposure: ExposureEv,
 }
 
 /// A node is ready for a plan.

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 
-use depth_image::{Aabb, Camera, PinholeCamera, ViewPlanes};
+use depth_image::{Aabb, Camera, ExposureEv, PinholeCamera, ViewPlanes};
 use glam::UVec2;
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +39,8 @@ pub struct SessionRequest {
     pub views_per_set: u32,
     /// Planes that views will have.
     pub planes: ViewPlanes,
+    /// The exposure of views is the plan's, in place of that of `planes`.
+    pub auto_exposure: bool,
     /// Scene times.
     pub timeline: Timeline,
     /// The policy, or that the schedule decides.
@@ -169,6 +171,9 @@ pub struct SessionPlan {
     pub method: String,
     /// Pictures a second, of those asked for.
     pub frame_rate_ratio: f64,
+    /// The exposure of sessions that leave it to the plan: measured when the workload was opened, and the same in all of its
+    /// plans.
+    pub auto_exposure: ExposureEv,
 }
 
 impl SessionPlan {

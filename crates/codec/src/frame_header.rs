@@ -1,6 +1,6 @@
 //! The headers of frames.
 
-use depth_image::{Antialias, PinholeCamera};
+use depth_image::{Antialias, PinholeCamera, ToneMapping};
 use glam::UVec2;
 
 use crate::{FrameCodec, SampleSetId};
@@ -23,6 +23,8 @@ pub struct FrameHeader {
     pub size_px: UVec2,
     /// Samples a pixel of its colour, around the centres of the camera's pixels.
     pub antialias: Antialias,
+    /// From the mean of these samples to its colour.
+    pub tone: ToneMapping,
     /// The encoding of its colour.
     pub codec: FrameCodec,
     /// Bytes of the encoded colour.

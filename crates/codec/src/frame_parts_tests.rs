@@ -1,4 +1,4 @@
-use depth_image::{Antialias, PinholeCamera};
+use depth_image::{Antialias, PinholeCamera, ToneMapping};
 use glam::{UVec2, Vec3};
 
 use super::*;
@@ -12,6 +12,7 @@ fn header(data: &[u8]) -> FrameHeader {
         camera: PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8)),
         size_px: UVec2::splat(8),
         antialias: Antialias::NONE,
+        tone: ToneMapping::NONE,
         codec: FrameCodec::Lz4,
         color_bytes: data.len() as u64,
         inverse_depth_bytes: 0,

@@ -1,7 +1,7 @@
 //! Views to bytes and back: colour by the frame codec, other planes without loss.
 
 use bytes::Bytes;
-use depth_image::{Antialias, HOLE_INVERSE_DEPTH, PinholeCamera, Provenance, View};
+use depth_image::{HOLE_INVERSE_DEPTH, PinholeCamera, Provenance, View, ViewPlanes};
 use glam::UVec2;
 
 use crate::frame_codec::{decode_frame, encode_frame};
@@ -28,7 +28,7 @@ impl EncodedView {
     pub fn header(
         &self,
         (sample_set_id, cell, is_neighbour_cell): (SampleSetId, u32, bool),
-        (camera, antialias): (PinholeCamera, Antialias),
+        (camera, planes): (PinholeCamera, ViewPlanes),
         stage_times: StageTimes,
     ) -> FrameHeader {
         let [color_bytes, inverse_depth_bytes, provenance_bytes] = self.lengths;
@@ -38,7 +38,8 @@ impl EncodedView {
             is_neighbour_cell,
             camera,
             size_px: self.size_px,
-            antialias,
+            antialias: planes.antialias,
+            tone: planes.tone,
             codec: self.codec,
             color_bytes,
             inverse_depth_bytes,
@@ -161,7 +162,7 @@ mod tests {
         let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, view.size_px);
         let header = encoded.header(
             (SampleSetId { plan_epoch: 3, index: 2 }, 0, false),
-            (camera, Antialias::NONE),
+            (camera, ViewPlanes::ALL),
             StageTimes::default(),
         );
         WholeFrame { frame: 1, header, data: encoded.data }

@@ -19,6 +19,7 @@ mod method_table;
 #[cfg(any(test, feature = "scalar"))]
 mod scalar;
 mod tiles;
+mod tone;
 mod view;
 mod view_cell;
 mod view_group;
@@ -38,6 +39,7 @@ pub use scalar::{
     Incident, Texel, disc_from_square, environment_highlight_linear, highlight_linear, tangents_of, unit_from_oct16,
 };
 pub use tiles::TileError;
+pub use tone::{Exposure, ExposureEv, ToneCurve, ToneError, ToneMapping};
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};
 pub use view_cell::ViewCell;
 pub use view_group::{ViewGroup, nearest_set};

@@ -2,7 +2,7 @@
 
 use glam::UVec2;
 
-use crate::Antialias;
+use crate::{Antialias, ToneMapping};
 
 /// The origin of a pixel's colour, packed in 32 bits. The low byte is the kind; above it is one bit for each sample
 /// camera that contributed.
@@ -66,6 +66,8 @@ pub struct View {
 pub struct ViewPlanes {
     /// Of [`View::srgb8`].
     pub antialias: Antialias,
+    /// From the mean of its samples to [`View::srgb8`].
+    pub tone: ToneMapping,
     /// [`View::inverse_depth_per_m`].
     pub inverse_depth: bool,
     /// [`View::provenance`].
@@ -73,8 +75,9 @@ pub struct ViewPlanes {
 }
 
 impl ViewPlanes {
-    /// Colour alone, of one sample a pixel.
-    pub const COLOR: Self = Self { antialias: Antialias::NONE, inverse_depth: false, provenance: false };
+    /// Colour alone, of one sample a pixel, as it is.
+    pub const COLOR: Self =
+        Self { antialias: Antialias::NONE, tone: ToneMapping::NONE, inverse_depth: false, provenance: false };
     /// Colour and depth.
     pub const WITH_DEPTH: Self = Self { inverse_depth: true, ..Self::COLOR };
     /// Colour and provenance.

@@ -19,6 +19,7 @@ mod pool;
 mod shader;
 mod sharing;
 mod table;
+mod tone;
 
 pub use device::{CompiledOutside, DevicePreference, Gpu};
 pub use environment::GpuEnvironment;
@@ -33,3 +34,4 @@ pub use shader::{
 };
 pub use sharing::{DeviceQueue, Job, JobLimit, LiveStream, SLICE_S, Turn, WorkClass, WorkKind, take_waited_s};
 pub use table::{TABLE_WIDTH, Table, TablePool, texture_bytes};
+pub use tone::GpuTone;

@@ -2,6 +2,7 @@
 //! in force, scenes by hash, membership and drain.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod auto_exposure;
 mod blocking;
 mod byte_cache;
 mod config;

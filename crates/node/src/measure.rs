@@ -9,6 +9,7 @@ use codec::{decode_depth_image, encode_depth_image, encode_view};
 use depth_image::{Camera, PinholeCamera, View};
 use tonic::Status;
 
+use crate::auto_exposure::auto_exposure;
 use crate::engine::{DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, own_time};
 
 /// Runs of one operation after a warm-up, in which shaders are built.
@@ -51,7 +52,7 @@ impl Measurement<'_> {
         let in_order = engine.images_are_sequential(&workload.sampling)?;
         let costs =
             Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles };
-        Ok(Measured { costs, planes })
+        Ok(Measured { costs, planes, auto_exposure: auto_exposure(engine, workload, self.turn)? })
     }
 
     /// Images as they leave a sampler, which encodes one set before it samples the next.

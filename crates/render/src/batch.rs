@@ -2,7 +2,7 @@
 
 use std::{ops::Range, sync::Arc};
 
-use depth_image::{Antialias, PinholeCamera};
+use depth_image::{Antialias, PinholeCamera, ToneMapping};
 use glam::Vec2;
 use gpu::{BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVariant, WorkKind};
 
@@ -29,6 +29,9 @@ pub(crate) struct Batch<'a> {
     /// The tree, where rays are traced.
     pub traced: Option<Arc<Traced>>,
     pub output: Output,
+    /// From a pixel's mean to the colour of a view. Light of equal pictures is the same in every tone, so that it is no part
+    /// of the output.
+    pub tone: ToneMapping,
     pub sequence: Option<ImageSequence<'a>>,
     /// The number of the position within the pixels.
     pub position: u32,
@@ -71,8 +74,8 @@ impl Batch<'_> {
 
     /// The batch at one position.
     pub fn at<'b>(&'b self, (position, cameras): &'b Position) -> Batch<'b> {
-        let Self { work, by_rays, ref traced, output, sequence, .. } = *self;
-        Batch { work, cameras, by_rays, traced: traced.clone(), output, sequence, position: *position }
+        let Self { work, by_rays, ref traced, output, tone, sequence, .. } = *self;
+        Batch { work, cameras, by_rays, traced: traced.clone(), output, tone, sequence, position: *position }
     }
 
     /// Whether colour is wanted of this position.

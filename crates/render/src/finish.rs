@@ -2,9 +2,11 @@
 
 use std::collections::HashSet;
 
+use bytemuck::{Pod, Zeroable};
 use depth_image::{Antialias, Highlight};
 use gpu::{
-    Binding, BufferPool, Gpu, GpuEnvironment, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, switches,
+    Binding, BufferPool, Gpu, GpuEnvironment, GpuTone, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name,
+    switches,
 };
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
@@ -14,6 +16,17 @@ use crate::planes::{Output, PlaneLayout};
 use crate::{
     RenderError, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest, sums::SumPlanes, surfaces::Surfaces,
 };
+
+/// `Finish` of the shader.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuFinish {
+    pub view_cell_m: f32,
+    pub position: u32,
+    pub position_count: u32,
+    pub padding: u32,
+    pub tone: GpuTone,
+}
 
 #[derive(Debug)]
 pub(crate) struct Finish {
@@ -110,9 +123,14 @@ pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces], plane
     let Recording { passes, gpu, batch, .. } = recording;
     let variant = Finish::of(batch);
     let pass = passes.get(&variant)?;
-    let view_cell_m = batch.sequence.map_or(0.0, |sequence| sequence.known.view_cell_m);
-    let finish = [view_cell_m.to_bits(), batch.position, batch.output.antialias.samples(), 0];
-    let finish = gpu.buffer_with("finish", &finish, BufferUsages::UNIFORM);
+    let finish = GpuFinish {
+        view_cell_m: batch.sequence.map_or(0.0, |sequence| sequence.known.view_cell_m),
+        position: batch.position,
+        position_count: batch.output.antialias.samples(),
+        padding: 0,
+        tone: batch.tone.into(),
+    };
+    let finish = gpu.buffer_with("finish", &[finish], BufferUsages::UNIFORM);
     for (camera, target) in surfaces.iter().enumerate() {
         let Recording { batch, cameras, sums, .. } = recording;
         let scene = batch.work.scene;

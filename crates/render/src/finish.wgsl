@@ -1,6 +1,7 @@
 // Surface and light to finished planes: a view's colour and depth, or those of a depth image.
 {% include "camera.wgsl" %}
 {% include "color.wgsl" %}
+{% include "tone.wgsl" %}
 {% include "background.wgsl" %}
 {% include "normal.wgsl" %}
 {% include "albedo.wgsl" %}
@@ -36,7 +37,7 @@
 {% include "sums.wgsl" %}
 
 // The position within the pixels, of so many. One beyond them is the centre: it gives depth, and no colour.
-struct Finish { view_cell_m: f32, position: u32, position_count: u32, padding: u32 }
+struct Finish { view_cell_m: f32, position: u32, position_count: u32, tone: Tone }
 {% if redundancy %}
 
 fn front_at(texel: vec2u) -> f32 { return textureLoad(front_depth, texel, 0){{ ".x" if by_rays else "" }}; }
@@ -111,7 +112,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% if samples %}
     put(0u, place, rgb9e5_from_linear(color));
 {% else %}
-    put(0u, place, pack4x8unorm(vec4f(srgb_from_linear({{ "mean_with(color, place)" if averaged else "color" }}), 1.0)));
+    let shown = shown_from_mean({{ "mean_with(color, place)" if averaged else "color" }}, finish.tone);
+    put(0u, place, pack4x8unorm(vec4f(srgb_from_linear(shown), 1.0)));
 {% endif %}
 {% if redundancy %}
     // A hole lies behind redundant surfaces where nothing else is met: nothing is known of it.

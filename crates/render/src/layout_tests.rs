@@ -3,10 +3,11 @@
 use std::mem::offset_of;
 
 use bytemuck::Zeroable as _;
-use gpu::ShaderVariant as _;
+use gpu::{GpuTone, ShaderVariant as _};
 use naga::front::wgsl::{Frontend, Options};
 use naga::{TypeInner, valid::Capabilities};
 
+use crate::finish::{Finish, GpuFinish};
 use crate::gpu_scene::{GpuObject, GpuSurroundings};
 use crate::keep::Keep;
 use crate::known_samples::KnownCamera;
@@ -126,6 +127,20 @@ fn a_pixel_camera_has_the_wgsl_layout() {
         padding
     });
     assert_eq!(shader(&parsed(&Keep::all().remove(0)), "PixelCamera"), host);
+}
+
+#[test]
+fn the_finish_and_its_tone_have_the_wgsl_layout() {
+    let finish = host!(GpuFinish { view_cell_m, position, position_count, padding, tone });
+    let GpuTone { exposure_factor: _, curve: _, padding: _ } = GpuTone::zeroed();
+    let offsets = [offset_of!(GpuTone, exposure_factor), offset_of!(GpuTone, curve), offset_of!(GpuTone, padding)];
+    for variant in Finish::all() {
+        let module = parsed(&variant);
+        assert_eq!(shader(&module, "Finish"), finish);
+        let tone = shader(&module, "Tone");
+        assert_eq!(tone.bytes, size_of::<GpuTone>());
+        assert_eq!(tone.fields.iter().map(|(_, offset)| *offset).collect::<Vec<_>>(), offsets);
+    }
 }
 
 #[test]

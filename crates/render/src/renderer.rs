@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, slice, sync::Arc};
 
-use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{Camera, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
 use glam::UVec2;
 use gpu::{Frame, Gpu, GpuError, Templates, Turn, WorkClass};
 use parking_lot::Mutex;
@@ -62,7 +62,8 @@ impl Renderer {
         self.check(cameras)?;
         let (antialias, depth) = (planes.antialias, planes.inverse_depth || planes.provenance);
         let output = Output { antialias, depth, ..views_output(work) };
-        self.draw(work, cameras, output, None, |words, output, cameras| planes::views(words, output, cameras, planes))
+        let read = |words: &[u32], output, cameras: &[PinholeCamera]| planes::views(words, output, cameras, planes);
+        self.draw(work, cameras, (output, planes.tone), None, read)
     }
 
     /// Depth images, in as few submissions as memory allows.
@@ -145,12 +146,13 @@ impl Renderer {
         [sequence, of_corners]: [Option<ImageSequence<'_>>; 2],
     ) -> Result<Vec<DepthImage>, RenderError> {
         let output = images_output(work, planes, test);
-        let mut images = self.draw(work, cameras, output, sequence, planes::depth_images)?;
+        let untoned = |output: Output| (output, ToneMapping::NONE);
+        let mut images = self.draw(work, cameras, untoned(output), sequence, planes::depth_images)?;
         if planes.corners {
             let (work, cameras) = (work.unlit(), corner_cameras(cameras));
             self.check(&cameras)?;
             let output = images_output(work, SamplePlanes::default(), test);
-            let corners = self.draw(work, &cameras, output, of_corners, planes::depth_images)?;
+            let corners = self.draw(work, &cameras, untoned(output), of_corners, planes::depth_images)?;
             for (image, corners) in images.iter_mut().zip(corners) {
                 image.corner_inverse_depth_per_m = Some(corners.inverse_depth_per_m);
             }
@@ -163,14 +165,14 @@ impl Renderer {
         &self,
         work: DrawWork<'_>,
         cameras: &[PinholeCamera],
-        output: Output,
+        (output, tone): (Output, ToneMapping),
         sequence: Option<ImageSequence<'_>>,
         read: impl Fn(&[u32], Output, &[PinholeCamera]) -> Vec<T>,
     ) -> Result<Vec<T>, RenderError> {
         let mut pictures = Vec::with_capacity(cameras.len());
         for cameras in batches(cameras, self.most_pixels(output)) {
             let sequence = sequence.map(|sequence| ImageSequence { first: pictures.len(), ..sequence });
-            let batch = self.batch(work, cameras, output, sequence)?;
+            let batch = Batch { tone, ..self.batch(work, cameras, output, sequence)? };
             let (result, words) = self.stages.draw(&batch, None)?;
             result.with(words, |words: &[u32]| pictures.extend(read(words, output, cameras)))?;
         }
@@ -305,7 +307,7 @@ impl Renderer {
         };
         let needs_tree = by_rays || work.lighting.is_traced();
         let traced = needs_tree.then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
-        Ok(Batch { work, cameras, by_rays, traced, output, sequence, position: 0 })
+        Ok(Batch { work, cameras, by_rays, traced, output, tone: ToneMapping::NONE, sequence, position: 0 })
     }
 
     /// The pixels for which no buffer of a batch is larger than the device binds.

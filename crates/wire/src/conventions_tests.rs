@@ -6,9 +6,9 @@ use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 
 /// Endings of the names of numbers; counts and indices are units, too.
-const UNITS: [&str; 19] = [
+const UNITS: [&str; 20] = [
     "_m", "_per_m", "_s", "_px", "_bytes", "_count", "_epoch", "_index", "_indices", "_id", "_number", "_numbers",
-    "_version", "_crc32", "_unit", "_rgb", "_hz", "_rad", "_ratio",
+    "_version", "_crc32", "_unit", "_rgb", "_hz", "_rad", "_ratio", "_ev",
 ];
 /// Their fields are components: the unit is in the name of the field that holds one.
 const TUPLES: [&str; 3] = ["Vec2", "Vec3", "Quaternion"];
@@ -97,5 +97,5 @@ fn enums_are_prefixed_and_begin_unspecified() {
         assert!(kind.value.iter().all(|value| value.name().starts_with(prefix)));
         enums += 1;
     }
-    assert_eq!(enums, 5);
+    assert_eq!(enums, 6);
 }

@@ -5,12 +5,16 @@ use std::num::NonZeroU32;
 use cluster::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use cluster::{
     AchievedTime, ApplyPlan, Assignment, ChangeSession, ClusterStatus, CompositorShare, Costs, InvalidField,
-    JoinCluster, LiveRequest, MeasureCosts, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings, OfferStatus,
-    Policy, PolicyChoice, Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport, SamplerShare, SceneHash,
-    SceneRef, SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
+    JoinCluster, LiveRequest, MeasureCosts, Measured, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings,
+    OfferStatus, Policy, PolicyChoice, Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport, SamplerShare,
+    SceneHash, SceneRef, SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload,
+    WorkloadStatus,
 };
 use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
-use depth_image::{Aabb, Antialias, Camera, Environment, Illumination, Light, MAX_LIGHTS, PinholeCamera, ViewPlanes};
+use depth_image::{
+    Aabb, Antialias, Camera, Environment, ExposureEv, Illumination, Light, MAX_LIGHTS, PinholeCamera, ToneCurve,
+    ToneMapping, ViewPlanes,
+};
 use glam::{DVec3, UVec2, Vec3};
 
 use crate::convert::Convert;
@@ -91,6 +95,10 @@ fn assignment() -> Assignment {
     }
 }
 
+fn tone() -> ToneMapping {
+    ToneMapping { exposure: ExposureEv::new(-2.5).unwrap(), curve: ToneCurve::KhronosNeutral }
+}
+
 fn request() -> SessionRequest {
     SessionRequest {
         scene: None,
@@ -103,7 +111,8 @@ fn request() -> SessionRequest {
         volume: None,
         typical_view: camera(),
         views_per_set: 12,
-        planes: ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::WITH_DEPTH },
+        planes: ViewPlanes { antialias: Antialias::MOST, tone: tone(), ..ViewPlanes::WITH_DEPTH },
+        auto_exposure: true,
         timeline: Timeline::still(0.0),
         policy: PolicyChoice::Auto,
         forced_sampler_count: None,
@@ -127,7 +136,7 @@ fn views() -> RenderViews {
         set_index: 1,
         method: "joint_carve".to_owned(),
         codec: FrameCodec::Lz4,
-        planes: ViewPlanes::default(),
+        planes: ViewPlanes { tone: tone(), ..ViewPlanes::default() },
         views: vec![RequestedView { frame: 9, camera: camera() }],
         live: None,
     }
@@ -210,6 +219,7 @@ fn session_plan() -> SessionPlan {
         fallback: NonZeroU32::new(1),
         method: "joint_carve:1".to_owned(),
         frame_rate_ratio: 0.5,
+        auto_exposure: ExposureEv::new(1.25).unwrap(),
     }
 }
 
@@ -297,6 +307,9 @@ fn bad_counts_are_refused_by_field() {
     assert!(spoilt_views(|m| m.frame_codec = "x".repeat(300)).contains("frame_codec"));
     assert!(spoilt_views(|m| m.antialias_sample_count = 3).contains("antialias_sample_count is 3"));
     assert!(spoilt_views(|m| m.reconstruction_method.clear()).contains("reconstruction_method"));
+    assert!(spoilt_views(|m| m.exposure_ev = f32::NAN).contains("exposure_ev is NaN"));
+    assert!(spoilt_views(|m| m.exposure_ev = 99.0).contains("exposure_ev is 99"));
+    assert!(spoilt_views(|m| m.tone_curve = 7).contains("tone_curve"));
     let spoilt = |spoil: &dyn Fn(&mut proto::OpenSessionRequest)| {
         let mut message = to_message::<proto::OpenSessionRequest, _>(request());
         spoil(&mut message);
@@ -315,6 +328,7 @@ fn bad_counts_are_refused_by_field() {
     assert!(spoilt(&|m| m.fallbacks = vec![m.fallbacks[0].clone(); 17]).contains("fallbacks has 17"));
     assert!(spoilt(&|m| m.fallbacks[0].sample_side_ratio = 1.5).contains("fallbacks.sample_side_ratio is 1.5"));
     assert!(spoilt(&|m| m.fallbacks[0].frame_rate_ratio = 0.0).contains("fallbacks.frame_rate_ratio is 0"));
+    assert!(spoilt(&|m| m.exposure_ev = f32::NEG_INFINITY).contains("exposure_ev is -inf"));
     assert!(spoilt(&|m| m.antialias_sample_count = 32).contains("antialias_sample_count is 32"));
     assert!(spoilt(&|m| m.refinement_step_count = 65).contains("refinement_step_count is 65"));
 }
@@ -430,6 +444,7 @@ fn header() -> FrameHeader {
         camera: camera(),
         size_px: camera().size_px,
         antialias: Antialias::MOST,
+        tone: tone(),
         codec: FrameCodec::Lz4,
         color_bytes: 4,
         inverse_depth_bytes: 0,
@@ -532,4 +547,26 @@ fn typical_views_of_several_sizes_or_none_are_refused() {
     for views in [vec![], vec![view(8), view(9)], vec![view(8); MAX_BATCH as usize + 1]] {
         assert!(sent(measure(views)).unwrap_err().to_string().contains("typical_views"));
     }
+}
+
+#[test]
+fn a_measured_exposure_survives_within_its_limits() {
+    let auto_exposure = ExposureEv::new(-3.25).unwrap();
+    let measured = Measured { costs: session_plan().costs, planes: SamplePlanes::default(), auto_exposure };
+    let message = to_message::<proto::MeasureCostsResponse, _>(measured);
+    assert_eq!(read::<Measured, _>(message), Ok(measured));
+    let spoilt = proto::MeasureCostsResponse { auto_exposure_ev: f32::NAN, ..message };
+    assert!(refusal::<_, Measured>(spoilt).contains("auto_exposure_ev is NaN"));
+    let plan = to_message::<proto::SessionPlan, _>(session_plan());
+    let spoilt = proto::SessionPlan { auto_exposure_ev: 17.0, ..plan };
+    assert!(refusal::<_, SessionPlan>(spoilt).contains("auto_exposure_ev is 17"));
+}
+
+#[test]
+fn a_peer_that_names_no_tone_gets_light_as_it_is() {
+    let planes = ViewPlanes { tone: ToneMapping::NONE, ..request().planes };
+    let message = to_message::<proto::OpenSessionRequest, _>(request());
+    let silent = proto::OpenSessionRequest { exposure_ev: 0.0, tone_curve: 0, with_auto_exposure: false, ..message };
+    let expected = SessionRequest { planes, auto_exposure: false, ..request() };
+    assert_eq!(read::<SessionRequest, _>(silent), Ok(expected));
 }

@@ -3,6 +3,7 @@
 use std::num::NonZeroU32;
 
 use cluster::{Assignment, Costs, Policy, SessionPlan};
+use depth_image::ExposureEv;
 
 use super::Scheduler;
 use crate::schedule::active_plan::ActivePlan;
@@ -224,6 +225,7 @@ impl Scheduler {
         plan.fallback = NonZeroU32::new(workload.overload.step as u32);
         plan.frame_rate_ratio = workload.frame_rate_ratio();
         plan.method = workload.method();
+        plan.auto_exposure = workload.auto_exposure;
         if old.is_some_and(|old| old.members == members && old.is_like(&plan)) {
             return Vec::new();
         }
@@ -270,5 +272,6 @@ fn session_plan(assignment: Assignment, costs: Costs, choice: &Choice, reason: S
         fallback: None,
         method: String::new(),
         frame_rate_ratio: 1.0,
+        auto_exposure: ExposureEv::ZERO,
     }
 }

@@ -70,6 +70,7 @@ impl Templates {
             ("environment.wgsl", include_str!("../wgsl/environment.wgsl")),
             ("highlight.wgsl", include_str!("../wgsl/highlight.wgsl")),
             ("table.wgsl", include_str!("../wgsl/table.wgsl")),
+            ("tone.wgsl", include_str!("../wgsl/tone.wgsl")),
         ];
         let mut environment = Environment::new();
         environment.set_undefined_behavior(UndefinedBehavior::Strict);

@@ -9,3 +9,4 @@ mod materials;
 mod raster;
 mod slices;
 mod stage;
+mod tone;

@@ -10,7 +10,8 @@ use crate::error::WireError;
 messages! {
     RenderViewsRequest = RenderViews {
         plan_epoch, workload_number, set_index, views, live;
-        method: reconstruction_method, codec: frame_codec, planes: antialias_sample_count | with_inverse_depth | with_provenance
+        method: reconstruction_method, codec: frame_codec,
+        planes: antialias_sample_count | exposure_ev | tone_curve | with_inverse_depth | with_provenance
     }, first |r| check_view_count(r.views.len(), r.live.is_some()), then RenderViews::validate;
     RequestedView = RequestedView { camera as "views.camera"; frame: frame_number };
     LiveRequest = LiveRequest { client_id; acknowledged_frame: acknowledged_frame_number };
@@ -19,7 +20,7 @@ messages! {
         camera as "header.camera", color_bytes, inverse_depth_bytes, provenance_bytes,
         stage_times as "header.stage_times", is_neighbour_cell; cell: cell_index,
         sample_set_id: plan_epoch | set_index, size_px: width_px | height_px, codec: frame_codec as "header.frame_codec",
-        crc32: frame_crc32, antialias: antialias_sample_count
+        crc32: frame_crc32, antialias: antialias_sample_count, tone: exposure_ev | tone_curve
     }, then check_header;
     StageTimes = StageTimes {
         set_wait_s, credit_wait_s, queue_s, batch_s, reconstruct_s, encode_s, send_wait_s, compositor_s, set_age_s,

@@ -17,9 +17,11 @@ messages! {
     NodeStatus = NodeStatus { node_name, device_name; address: node_address, is_software: is_software_device };
     MeasureCostsRequest = MeasureCosts {
         workload, typical_views, batch_count; method: reconstruction_method, codec: frame_codec, in_background: is_background,
-        planes: antialias_sample_count | with_inverse_depth | with_provenance
+        planes: antialias_sample_count | exposure_ev | tone_curve | with_inverse_depth | with_provenance
     }, first |r| at_most(r.typical_views.len(), MAX_BATCH as usize, "typical_views"), then MeasureCosts::validate;
-    MeasureCostsResponse = Measured { costs; planes: with_normals | with_corner_inverse_depths };
+    MeasureCostsResponse = Measured {
+        costs; planes: with_normals | with_corner_inverse_depths, auto_exposure: auto_exposure_ev
+    };
     ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then Ready::validate;
     ReportWorkRequest = WorkReport {
         node_name, plan_epoch, workload_number, busy_s, viewpoints;

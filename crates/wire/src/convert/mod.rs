@@ -4,7 +4,7 @@ use std::num::NonZeroU32;
 
 use cluster::{InvalidField, MeasuredCosts, NodeStatus, OfferSettings, SamplePlanes, SceneHash, at_most};
 use codec::{InverseDepthRange, SampleSetId};
-use depth_image::{Antialias, PinholeCamera, ViewPlanes};
+use depth_image::{Antialias, ExposureEv, PinholeCamera, ToneCurve, ToneMapping, ViewPlanes};
 use glam::{DVec3, UVec2};
 use prost::bytes::Bytes;
 
@@ -201,7 +201,6 @@ macro_rules! flat {
 flat! {
     UVec2 { x: u32, y: u32 }
     DVec3 { x: f64, y: f64, z: f64 }
-    ViewPlanes { antialias: u32, inverse_depth: bool, provenance: bool }
     SamplePlanes { normals: bool, corner_inverse_depths: bool }
     InverseDepthRange { least_per_m: f32, greatest_per_m: f32 }
     SampleSetId { plan_epoch: u64, index: u32 }
@@ -231,6 +230,61 @@ impl<P, D: Convert<P>> Convert<Option<P>> for Option<D> {
 
     fn write(self) -> Option<P> {
         self.map(D::write)
+    }
+}
+
+/// How colour is sampled and shown, then the planes beside it.
+impl Convert<(u32, f32, i32, bool, bool)> for ViewPlanes {
+    fn read(
+        (count, exposure_ev, curve, inverse_depth, provenance): (u32, f32, i32, bool, bool),
+        field: &'static str,
+    ) -> Result<Self, WireError> {
+        let antialias = Convert::read(count, field)?;
+        Ok(Self { antialias, tone: Convert::read((exposure_ev, curve), field)?, inverse_depth, provenance })
+    }
+
+    fn write(self) -> (u32, f32, i32, bool, bool) {
+        let Self { antialias, tone, inverse_depth, provenance } = self;
+        let (exposure_ev, curve) = tone.write();
+        (antialias.write(), exposure_ev, curve, inverse_depth, provenance)
+    }
+}
+
+impl Convert<(f32, i32)> for ToneMapping {
+    fn read((exposure_ev, curve): (f32, i32), _: &'static str) -> Result<Self, WireError> {
+        Ok(Self { exposure: Convert::read(exposure_ev, "exposure_ev")?, curve: Convert::read(curve, "tone_curve")? })
+    }
+
+    fn write(self) -> (f32, i32) {
+        (self.exposure.write(), self.curve.write())
+    }
+}
+
+impl Convert<f32> for ExposureEv {
+    fn read(ev: f32, field: &'static str) -> Result<Self, WireError> {
+        Ok(Self::new(ev).map_err(|_| InvalidField::out_of_range(field, ev, "from -16 to 16"))?)
+    }
+
+    fn write(self) -> f32 {
+        self.ev()
+    }
+}
+
+/// A curve; none said is none.
+impl Convert<i32> for ToneCurve {
+    fn read(value: i32, field: &'static str) -> Result<Self, WireError> {
+        match proto::ToneCurve::try_from(value) {
+            Ok(proto::ToneCurve::Unspecified | proto::ToneCurve::None) => Ok(Self::None),
+            Ok(proto::ToneCurve::KhronosNeutral) => Ok(Self::KhronosNeutral),
+            Err(_) => Err(WireError::UnknownEnum { field, value }),
+        }
+    }
+
+    fn write(self) -> i32 {
+        match self {
+            Self::None => proto::ToneCurve::None.into(),
+            Self::KhronosNeutral => proto::ToneCurve::KhronosNeutral.into(),
+        }
     }
 }
 

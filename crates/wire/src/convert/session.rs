@@ -26,7 +26,8 @@ messages! {
         forced_tile_count, viewpoints;
         method: reconstruction_method, sampling: sampling_method, codec: frame_codec,
         sample_size_px: sample_image_size, views_per_set: views_per_set_count,
-        planes: antialias_sample_count | with_inverse_depth | with_provenance, policy: policy_choice, refinement_steps: refinement_step_count
+        planes: antialias_sample_count | exposure_ev | tone_curve | with_inverse_depth | with_provenance,
+        auto_exposure: with_auto_exposure, policy: policy_choice, refinement_steps: refinement_step_count
     }, with protocol_version = PROTOCOL_VERSION, first check_request, then SessionRequest::validate;
     Quality = Quality { lighting, sample_side_ratio, frame_rate_ratio; method: reconstruction_method };
     ChangeSessionRequest = ChangeSession {
@@ -35,7 +36,7 @@ messages! {
     SessionPlan = SessionPlan {
         assignment as "plan.assignment", costs as "plan.costs", reason, predicted_pipeline_s, predicted_direct_s,
         predicted_time_share_s, k_fd_sampler_count, predicted_k_fd_s, enumerated_sampler_count, predicted_enumerated_s,
-        scene_load_s, frame_rate_ratio; fallback: fallback_number, method: reconstruction_method
+        scene_load_s, frame_rate_ratio; fallback: fallback_number, method: reconstruction_method, auto_exposure: auto_exposure_ev
     }, then SessionPlan::validate;
 }
 

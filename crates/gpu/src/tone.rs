@@ -1,0 +1,24 @@
+//! Exposure and tone curve as `tone.wgsl` reads them.
+
+use bytemuck::{Pod, Zeroable};
+use depth_image::{ToneCurve, ToneMapping};
+
+/// `Tone` of `tone.wgsl`, a part of the uniforms of passes that encode colours.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct GpuTone {
+    pub exposure_factor: f32,
+    pub curve: u32,
+    pub padding: [u32; 2],
+}
+
+impl From<ToneMapping> for GpuTone {
+    fn from(ToneMapping { exposure, curve }: ToneMapping) -> Self {
+        let curve = match curve {
+            ToneCurve::None => 0,
+            ToneCurve::KhronosNeutral => 1,
+        };
+        Self { exposure_factor: exposure.factor(), curve, padding: [0; 2] }
+    }
+}
