@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::str::FromStr;
 use std::sync::{Arc, Weak};
 
+use bands::{BAND_PIXELS, views_in_bands};
 use cluster::{DIRECT, SamplePlanes};
 use depth_image::{DepthImage, View};
 use gpu::{DevicePreference, Gpu, GpuError};
@@ -18,6 +19,7 @@ use sampling::{Sampler, SamplingError, SamplingMethod};
 use scene::{Limits, Scene};
 use scene_cache::SceneCache;
 
+mod bands;
 mod scene_cache;
 
 /// The bound of scenes' memory where none is given.
@@ -226,14 +228,19 @@ impl Engine for GpuEngine {
         let Uploaded(set) = (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))?;
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
         let turn = device_turn(turn);
-        let make = || self.reconstructor.reconstruct_in_turn(set, &work.cameras, method, work.planes, turn);
-        self.catching(|| make().map_err(reconstruction_error))
+        views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
+            let make = || self.reconstructor.reconstruct_in_turn(set, cameras, method, work.planes, turn);
+            self.catching(|| make().map_err(reconstruction_error))
+        })
     }
 
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError> {
         let scene = self.scene(&work.scene_hash)?;
-        let draw = draw_work(&scene, parsed("lighting", &work.lighting)?, work.scene_time_s, turn);
-        self.catching(|| self.renderer.draw_views(draw, &work.cameras, work.planes).map_err(render_error))
+        let lighting = parsed("lighting", &work.lighting)?;
+        views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
+            let draw = draw_work(&scene, lighting, work.scene_time_s, turn);
+            self.catching(|| self.renderer.draw_views(draw, cameras, work.planes).map_err(render_error))
+        })
     }
 }
 
