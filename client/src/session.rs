@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use cluster::{ChangeSession, ClusterStatus, SessionEvent, SessionPlan, SessionRequest};
 use codec::FrameCodec;
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::{PinholeCamera, ToneMapping, ViewPlanes};
 use parking_lot::Mutex;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
@@ -83,7 +83,11 @@ impl Client {
         let mut events = coordinator.open_session(request.clone()).await.map_err(ClientError::coordinator)?;
         let (session, plan) = plan_of(&mut events, progress).await?;
         let (named_plans, to_follow) = mpsc::channel(NAMED_PLANS);
-        let settings = ViewSettings { method: request.method.clone(), codec, planes: request.planes };
+        let mut planes = request.planes;
+        if request.auto_exposure {
+            planes.tone.exposure = plan.auto_exposure;
+        }
+        let settings = ViewSettings { method: request.method.clone(), codec, planes };
         let active = Arc::new(ActivePlan::connect(plan, settings, named_plans).await?);
         let (changes, state) = watch::channel(SessionState { session, active });
         let request = Arc::new(Mutex::new(request));
@@ -139,6 +143,13 @@ impl Session {
             request.views_per_set = request.views_per_set.max(1);
         }
         answer.map_err(ClientError::coordinator)
+    }
+
+    /// How its views are shown, with the plan's exposure where the request leaves it to the plan. It stays the same as plans
+    /// change.
+    #[must_use]
+    pub fn tone(&self) -> ToneMapping {
+        self.state.borrow().active.settings.planes.tone
     }
 
     /// The plan in force, its costs and its reason. It changes as nodes come and go.

@@ -145,9 +145,10 @@ pub(crate) fn check_frame(request: &ViewRequest, planes: ViewPlanes, header: &Fr
         inverse_depth: header.inverse_depth_bytes > 0,
         provenance: header.provenance_bytes > 0,
         antialias: header.antialias,
+        tone: header.tone,
     };
     if header.size_px != request.camera.size_px || has != planes {
-        return Err("has another size, other planes or other samples a pixel than requested".to_owned());
+        return Err("has another size, other planes, other samples a pixel or another tone than requested".to_owned());
     }
     if header.camera != request.camera {
         return Err("shows another pose than requested".to_owned());

@@ -2,7 +2,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use codec::{FrameCodec, SampleSetId, StageTimes};
-use depth_image::{Antialias, PinholeCamera};
+use depth_image::{Antialias, PinholeCamera, ToneMapping};
 
 use super::*;
 
@@ -19,6 +19,7 @@ fn header(index: u64) -> FrameHeader {
         camera: request(0).camera,
         size_px: [8, 8].into(),
         antialias: Antialias::NONE,
+        tone: ToneMapping::NONE,
         codec: FrameCodec::Lz4,
         color_bytes: 1,
         inverse_depth_bytes: 0,

@@ -24,6 +24,10 @@ pub struct Evaluation {
     pub foreground_psnr_db: f64,
     /// As `foreground_psnr_db`.
     pub foreground_flip: f64,
+    /// As `foreground_psnr_db`.
+    pub foreground_ssim: f64,
+    /// As `foreground_psnr_db`, of the worst view.
+    pub foreground_psnr_min_db: f64,
     /// Mean over views.
     pub psnr_db: f64,
     /// The worst view.
@@ -77,6 +81,7 @@ impl ReferenceViews {
 struct Errors {
     foreground_psnr_db: f64,
     foreground_flip: f64,
+    foreground_ssim: f64,
     psnr_db: f64,
     ssim: f64,
     flip: f64,
@@ -99,6 +104,7 @@ impl Errors {
         let errors = Self {
             foreground_psnr_db: foreground.psnr_db,
             foreground_flip: foreground.flip,
+            foreground_ssim: foreground.ssim,
             psnr_db: whole.psnr_db,
             ssim: whole.ssim,
             flip: whole.flip,
@@ -137,6 +143,8 @@ fn evaluation(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, 
         ms_a_view,
         foreground_psnr_db: mean(|e| e.foreground_psnr_db),
         foreground_flip: mean(|e| e.foreground_flip),
+        foreground_ssim: mean(|e| e.foreground_ssim),
+        foreground_psnr_min_db: errors.iter().map(|e| e.foreground_psnr_db).fold(f64::INFINITY, f64::min),
         psnr_db: mean(|e| e.psnr_db),
         psnr_min_db: errors.iter().map(|e| e.psnr_db).fold(f64::INFINITY, f64::min),
         ssim: mean(|e| e.ssim),
@@ -151,17 +159,20 @@ fn evaluation(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, 
     }
 }
 
-/// The mean FLIP over views.
+/// The mean errors over views: over the foreground, then over whole pictures.
 ///
 /// # Errors
-/// Views differ in size.
-pub fn mean_flip(references: &[View], tests: &[View]) -> anyhow::Result<f64> {
-    let flip = |(reference, test): (&View, &View)| {
-        let map = flip_map(&Rgb8Image::of_view(reference)?, &Rgb8Image::of_view(test)?)?;
-        anyhow::Ok(map.mean(None)?.unwrap_or(f64::NAN))
+/// Views differ in size, or a reference has no depth.
+pub fn mean_errors(references: &[View], tests: &[View]) -> anyhow::Result<[PictureErrors; 2]> {
+    let errors = |(reference, test): (&View, &View)| PictureErrors::of(reference, &Rgb8Image::of_view(test)?);
+    let errors = references.iter().zip(tests).map(errors).collect::<Result<Vec<_>, _>>()?;
+    let mean = |part: usize| {
+        let mean = |value: fn(&PictureErrors) -> f64| {
+            errors.iter().map(|e| value(&e[part])).sum::<f64>() / errors.len() as f64
+        };
+        PictureErrors { psnr_db: mean(|e| e.psnr_db), ssim: mean(|e| e.ssim), flip: mean(|e| e.flip) }
     };
-    let flips = references.iter().zip(tests).map(flip).collect::<anyhow::Result<Vec<_>>>()?;
-    Ok(flips.iter().sum::<f64>() / flips.len() as f64)
+    Ok([mean(0), mean(1)])
 }
 
 /// The depth of a view, unknown where it was filled in.
@@ -173,4 +184,28 @@ fn known_depth(view: &View) -> anyhow::Result<Vec<f32>> {
         }
     }
     Ok(plane)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::UVec2;
+
+    use super::*;
+
+    /// A surface in the upper half, and in it a grey.
+    fn view(grey: u8) -> View {
+        View {
+            size_px: UVec2::splat(16),
+            srgb8: (0..768).map(|byte| if byte < 384 { grey } else { 200 }).collect(),
+            inverse_depth_per_m: Some((0..256).map(|pixel| if pixel < 128 { 1.0 } else { 0.0 }).collect()),
+            provenance: None,
+        }
+    }
+
+    #[test]
+    fn mean_errors_of_the_foreground_are_free_of_empty_space() {
+        let [foreground, whole] = mean_errors(&[view(100), view(100)], &[view(100), view(120)]).unwrap();
+        assert!(foreground.flip > 1.5 * whole.flip && whole.flip > 0.0, "{foreground:?} {whole:?}");
+        assert!(foreground.psnr_db < whole.psnr_db && foreground.ssim < whole.ssim, "{foreground:?} {whole:?}");
+    }
 }

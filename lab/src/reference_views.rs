@@ -75,12 +75,12 @@ impl ReferenceViews {
         Ok(rates.iter().sum::<f64>() / rates.len() as f64)
     }
 
-    /// The same views drawn from the scene in another light.
+    /// The same views drawn from the scene in another light, with depth.
     ///
     /// # Errors
     /// The device fails.
     pub fn drawn(&self, setup: &Setup, lighting: Lighting) -> anyhow::Result<Vec<View>> {
-        self.drawn_from(setup, lighting, &self.cameras, ViewPlanes::COLOR)
+        self.drawn_from(setup, lighting, &self.cameras, ViewPlanes::WITH_DEPTH)
     }
 
     /// Views of other cameras drawn from the scene.

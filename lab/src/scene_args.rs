@@ -1,6 +1,7 @@
 //! Arguments of a scene, without a command line.
 
 use app_core::setup::SceneArgs;
+use app_core::sizes::SampleSize;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::SamplingMethod;
@@ -19,7 +20,7 @@ pub fn scene_args(scene: SceneSpec) -> SceneArgs {
         environment: None,
         method: ReconstructionMethod::default(),
         sampling: SamplingMethod::default(),
-        sample_size: None,
+        sample_size: SampleSize::default(),
         samples: None,
     }
 }

@@ -38,6 +38,8 @@ pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
         ("method", ""),
         ("time a view", "ms"),
         ("foreground PSNR", "dB"),
+        ("foreground PSNR of the worst view", "dB"),
+        ("foreground SSIM", ""),
         ("foreground FLIP", ""),
         ("PSNR", "dB"),
         ("PSNR of the worst view", "dB"),
@@ -54,8 +56,9 @@ pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
     for row in rows {
         let shares = [row.wrong_hits, row.unknown, row.disoccluded_wrong, row.disoccluded_unmarked, row.disoccluded]
             .map(|share| share * 100.0);
-        let pictures = [row.foreground_psnr_db, row.foreground_flip, row.psnr_db, row.psnr_min_db, row.ssim, row.flip];
-        let numbers = [&[row.ms_a_view], &pictures[..], &shares, &[row.fetches_a_ray]].concat();
+        let foreground = [row.foreground_psnr_db, row.foreground_psnr_min_db, row.foreground_ssim, row.foreground_flip];
+        let whole = [row.psnr_db, row.psnr_min_db, row.ssim, row.flip];
+        let numbers = [&[row.ms_a_view], &foreground[..], &whole, &shares, &[row.fetches_a_ray]].concat();
         table.push([Cell::from(row.method.to_string())].into_iter().chain(numbers.into_iter().map(Cell::from)))?;
     }
     Ok(table)

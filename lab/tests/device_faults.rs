@@ -7,7 +7,7 @@ use app_core::cluster::Cluster;
 use app_core::delivery::{open, receive, request};
 use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
-use app_core::sizes::SizePx;
+use app_core::sizes::SampleSize;
 use client::Session;
 use cluster::{PolicyChoice, SessionRequest};
 use depth_image::{PinholeCamera, View, ViewCell};
@@ -27,8 +27,10 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let args =
-            SceneArgs { sample_size: Some(SizePx(UVec2::new(160, 120))), ..scene_args("courtyard".parse().unwrap()) };
+        let args = SceneArgs {
+            sample_size: SampleSize::Fixed(UVec2::new(160, 120)),
+            ..scene_args("courtyard".parse().unwrap())
+        };
         let setup = args.load().unwrap();
         let views = ViewCell::between(&setup.samples).unwrap().spread(VIEWS, UVec2::new(96, 72));
         Self { setup, views }

@@ -7,7 +7,7 @@ use app_core::cluster::Cluster;
 use app_core::delivery::{open, receive, request};
 use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
-use app_core::sizes::SizePx;
+use app_core::sizes::SampleSize;
 use cluster::{PolicyChoice, SessionRequest};
 use depth_image::{Camera, Environment, PinholeCamera, ViewCell, ViewPlanes};
 use engine::GpuEngine;
@@ -23,7 +23,7 @@ const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
 const VIEW_SIZE: UVec2 = UVec2::new(64, 48);
 
 fn args(scene: &str) -> SceneArgs {
-    SceneArgs { sample_size: Some(SizePx(UVec2::new(160, 120))), ..scene_args(scene.parse().unwrap()) }
+    SceneArgs { sample_size: SampleSize::Fixed(UVec2::new(160, 120)), ..scene_args(scene.parse().unwrap()) }
 }
 
 fn views(setup: &Setup, count: usize) -> Vec<PinholeCamera> {

@@ -8,4 +8,5 @@ pub mod cli;
 pub mod commands;
 pub mod comparison;
 pub mod terminal_picture;
+pub mod tone;
 pub mod viewer;

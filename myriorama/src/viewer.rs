@@ -15,6 +15,8 @@ use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
+use crate::tone::ToneArgs;
+
 /// Pictures a second of a visitor who moves.
 const PICTURES_PER_S: f64 = 20.0;
 /// Connections of browsers that wait to be served.
@@ -29,6 +31,8 @@ pub struct ViewerArgs {
     /// A name of this server in links, beside localhost and addresses; may be repeated
     #[arg(long = "host", value_name = "NAME")]
     hosts: Vec<String>,
+    #[command(flatten)]
+    tone: ToneArgs,
 }
 
 /// A viewer that runs.
@@ -54,7 +58,7 @@ impl ViewerArgs {
         coordinator: &str,
         shutdown: CancellationToken,
     ) -> Option<Viewer> {
-        let request_of = request_of(PolicyChoice::Auto);
+        let request_of = request_of(PolicyChoice::Auto, self.tone);
         let config = GatewayConfig { hosts: self.hosts.clone(), ..GatewayConfig::new(coordinator, request_of) };
         let served = tokio::spawn(gateway::serve(browsers?, config, shutdown.clone()));
         // Whoever started this may read no more than the address.
@@ -74,10 +78,10 @@ impl Viewer {
 
 /// The session of a scene's visitors: with the scene's own settings, a rate, fallbacks, light in steps, and view cells that
 /// follow them.
-pub fn request_of(policy: PolicyChoice) -> RequestOf {
+pub fn request_of(policy: PolicyChoice, tone: ToneArgs) -> RequestOf {
     Arc::new(move |offer: &OfferStatus, typical: PinholeCamera| {
         let request = request(offer.settings.clone(), &[typical]).expect("one view");
-        let request = at_rate(request, PICTURES_PER_S);
+        let request = tone.for_people(at_rate(request, PICTURES_PER_S));
         let steps = request.lighting.parse().map_or(1, |lighting: Lighting| lighting.refinement_steps());
         SessionRequest {
             scene: Some(offer.name.clone()),

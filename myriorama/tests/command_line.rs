@@ -35,7 +35,7 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
     std::fs::write(&cameras, b"{\"frames\": [{}]}").unwrap();
     let (broken, cameras) = (broken.to_str().unwrap(), cameras.to_str().unwrap());
     let folder = folder.path().to_str().unwrap();
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 13] = [
         (&["up", "--scene", broken], "broken.glb"),
         (&["coordinator", "--scene", broken], "broken.glb"),
         (&["coordinator", "--scene", "quad", "--scene", "quad"], "scene quad is given twice"),
@@ -44,6 +44,10 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
         (&["up", "--scene", "quad", "--listen", "0.0.0.0:0"], "--insecure-bind"),
         (&["up", "--scene", "quad", "--method", "guess"], "guess"),
         (&["view", "--size", "0x0"], "0x0"),
+        (&["view", "--exposure", "nan"], "exposure must be auto, or from -16 to 16 EV"),
+        (&["view", "--exposure", "99"], "exposure must be auto, or from -16 to 16 EV"),
+        (&["view", "--tone-map", "foo"], "tone map must be none or khronos-neutral"),
+        (&["up", "--scene", "quad", "--exposure", "-17"], "--exposure"),
         (&["view", "--orbit", "3", "--grid", "2x2"], "--grid"),
     ];
     for (arguments, named) in cases {

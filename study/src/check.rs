@@ -70,6 +70,9 @@ pub struct Check {
     value: Option<f64>,
     unit: String,
     bar: Bar,
+    /// The same figure over the pixels that show a surface, where the value is a whole picture's. No bar is stated for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    foreground: Option<f64>,
     /// The outcome; `null` where not run.
     holds: Option<bool>,
     /// The reason why the check was not run.
@@ -87,6 +90,7 @@ impl Check {
             value: Some(value).filter(|value| value.is_finite()),
             unit: unit.into(),
             bar,
+            foreground: None,
             holds: Some(bar.holds(value)),
             reason: None,
         }
@@ -95,7 +99,15 @@ impl Check {
     /// A check that was not run.
     #[must_use]
     pub fn not_run(name: impl Into<String>, unit: impl Into<String>, bar: Bar, reason: impl Into<String>) -> Self {
-        Self { name: name.into(), value: None, unit: unit.into(), bar, holds: None, reason: Some(reason.into()) }
+        Self {
+            name: name.into(),
+            value: None,
+            unit: unit.into(),
+            bar,
+            foreground: None,
+            holds: None,
+            reason: Some(reason.into()),
+        }
     }
 
     /// Compares a value with the bar; without a value, the check was not run for `reason`.
@@ -111,6 +123,12 @@ impl Check {
             Some(value) => Self::new(name, value, unit, bar),
             None => Self::not_run(name, unit, bar, reason),
         }
+    }
+
+    /// Names the same figure over the foreground beside the whole picture's, which is compared with the bar.
+    #[must_use]
+    pub fn with_foreground(self, value: f64) -> Self {
+        Self { foreground: Some(value).filter(|value| value.is_finite()), ..self }
     }
 
     /// The name of the check.
@@ -155,10 +173,16 @@ impl Check {
 
     /// The value with its unit, or a dash.
     pub(crate) fn value_text(&self) -> String {
-        match self.value {
+        let value = match self.value {
             Some(value) => with_unit(&format_number(value), &self.unit),
             None if self.holds.is_some() => "not finite".into(),
             None => "–".into(),
+        };
+        match self.foreground {
+            Some(foreground) => {
+                format!("foreground {}, whole {value}", with_unit(&format_number(foreground), &self.unit))
+            }
+            None => value,
         }
     }
 
@@ -185,6 +209,15 @@ mod tests {
         assert_eq!(Check::new("x", 1.9, "", Bar::AtLeast(2.0)).outcome(), Outcome::FallsShort);
         assert_eq!(Check::new("x", 2.1, "", Bar::AtMost(2.0)).outcome(), Outcome::FallsShort);
         assert_eq!(Check::new("x", f64::INFINITY, "dB", Bar::AtLeast(40.0)).outcome(), Outcome::Holds);
+    }
+
+    #[test]
+    fn the_foregrounds_figure_comes_first_and_decides_nothing() {
+        let check = Check::new("FLIP", 0.04, "", Bar::AtMost(0.05)).with_foreground(0.09);
+        assert_eq!(check.outcome(), Outcome::Holds);
+        assert_eq!(check.value_text(), "foreground 0.09, whole 0.04");
+        assert_eq!(serde_json::to_value(&check).unwrap()["foreground"], 0.09);
+        assert_eq!(check.with_foreground(f64::NAN).value_text(), "0.04");
     }
 
     #[test]

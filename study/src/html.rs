@@ -18,6 +18,7 @@ pub(crate) fn page(report: &Report, charts: Vec<String>) -> Result<String, Repor
     Ok(environment.get_template("index.html")?.render(context! {
         title => report.title.as_str(),
         summary => report.summary.as_str(),
+        cover => report.cover.as_ref().map(picture),
         device => report.device.as_str(),
         versions => named(report.versions.iter().map(|(name, version)| (name, version.clone()))),
         parameters => named(report.parameters.iter().map(|(name, value)| (name, value.display()))),
@@ -66,16 +67,16 @@ fn table(table: &Table) -> Value {
 }
 
 fn pictures(row: &PictureRow) -> Value {
-    let picture = |picture: &Picture| {
-        let legend =
-            picture.legend.iter().map(|(name, [r, g, b])| context! { name, color => format!("rgb({r},{g},{b})") });
-        context! {
-            file => picture_path(&picture.name),
-            caption => picture.caption.as_str(),
-            width => picture.image.width(),
-            height => picture.image.height(),
-            legend => legend.collect::<Vec<_>>(),
-        }
-    };
     context! { title => row.title.as_str(), pictures => row.pictures.iter().map(picture).collect::<Vec<_>>() }
+}
+
+fn picture(picture: &Picture) -> Value {
+    let legend = picture.legend.iter().map(|(name, [r, g, b])| context! { name, color => format!("rgb({r},{g},{b})") });
+    context! {
+        file => picture_path(&picture.name),
+        caption => picture.caption.as_str(),
+        width => picture.image.width(),
+        height => picture.image.height(),
+        legend => legend.collect::<Vec<_>>(),
+    }
 }

@@ -7,7 +7,7 @@ use table::{Cell, Table};
 
 use crate::chart::Chart;
 use crate::check::{Check, Outcome};
-use crate::picture::PictureRow;
+use crate::picture::{Picture, PictureRow};
 
 /// The version of `report.json`; raised when a field changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -22,6 +22,9 @@ pub struct Report {
     /// One or two sentences with the result; may be empty.
     #[serde(default)]
     pub summary: String,
+    /// The picture that the page shows first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cover: Option<Picture>,
     /// The device of the measurements.
     pub device: String,
     /// Versions of programs and libraries, in order.
@@ -49,6 +52,7 @@ impl Report {
             schema: SCHEMA_VERSION,
             title: title.into(),
             summary: String::new(),
+            cover: None,
             device: device.into(),
             versions: IndexMap::new(),
             parameters: IndexMap::new(),
@@ -67,6 +71,11 @@ impl Report {
     /// Adds a parameter.
     pub fn parameter(&mut self, name: impl Into<String>, value: impl Into<Cell>) {
         self.parameters.insert(name.into(), value.into());
+    }
+
+    /// The cover and all other pictures.
+    pub(crate) fn all_pictures(&self) -> impl Iterator<Item = &Picture> {
+        self.cover.iter().chain(self.pictures.iter().flat_map(|row| &row.pictures))
     }
 
     /// True where no check falls short, as `--strict` demands. A check that was not run does not fall short.

@@ -56,10 +56,9 @@ fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
 
 fn validate(report: &Report) -> Result<(), ReportError> {
     report.tables.iter().try_for_each(Table::validate)?;
-    let pictures = report.pictures.iter().flat_map(|row| &row.pictures);
     expect_distinct("tables", report.tables.iter().map(|table| table.name.as_str()))?;
     expect_distinct("charts", report.charts.iter().map(Chart::name))?;
-    expect_distinct("pictures", pictures.map(|picture| picture.name.as_str()))
+    expect_distinct("pictures", report.all_pictures().map(|picture| picture.name.as_str()))
 }
 
 fn expect_distinct<'a>(kind: &'static str, names: impl Iterator<Item = &'a str>) -> Result<(), ReportError> {
@@ -71,7 +70,7 @@ fn expect_distinct<'a>(kind: &'static str, names: impl Iterator<Item = &'a str>)
 }
 
 fn make_folders(report: &Report, folder: &Path) -> Result<(), ReportError> {
-    let parts = [("charts", report.charts.is_empty()), ("pictures", report.pictures.is_empty())];
+    let parts = [("charts", report.charts.is_empty()), ("pictures", report.all_pictures().next().is_none())];
     let used = parts.iter().filter(|(_, empty)| !empty).map(|(part, _)| folder.join(part));
     for path in std::iter::once(folder.to_path_buf()).chain(used) {
         fs::create_dir_all(&path).map_err(|source| ReportError::Io { path, source })?;
@@ -80,7 +79,7 @@ fn make_folders(report: &Report, folder: &Path) -> Result<(), ReportError> {
 }
 
 fn write_pictures(report: &Report, folder: &Path) -> Result<(), ReportError> {
-    for picture in report.pictures.iter().flat_map(|row| &row.pictures) {
+    for picture in report.all_pictures() {
         picture.image.save_with_format(folder.join(picture_path(&picture.name)), image::ImageFormat::Png)?;
     }
     Ok(())

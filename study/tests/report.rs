@@ -42,6 +42,7 @@ fn full_report() -> Report {
         Check::not_run("speed-up", "×", Bar::AtLeast(10.0), "no GPU"),
     ];
     report.charts = vec![lines().into(), bars().into()];
+    report.cover = Some(Picture::new("first", "the cover", RgbImage::new(5, 2)));
     let picture = Picture::new("one", HOSTILE, RgbImage::new(4, 3));
     report.pictures = vec![PictureRow { title: "views".into(), pictures: vec![picture] }];
     report
@@ -63,7 +64,8 @@ fn report_json_reads_back_as_it_was() {
     let folder = written_folder(&report);
     let back: Report = serde_json::from_str(&read(folder.path(), "report.json")).unwrap();
     let mut without_pixels = report;
-    without_pixels.pictures[0].pictures[0].image = RgbImage::default();
+    let pictures = without_pixels.cover.iter_mut().chain(&mut without_pixels.pictures[0].pictures);
+    pictures.for_each(|picture| picture.image = RgbImage::default());
     assert_eq!(back, without_pixels);
     assert_eq!(back.parameters.keys().collect::<Vec<_>>(), ["views", "scene"]);
 }
@@ -95,9 +97,18 @@ fn strict_fails_only_what_falls_short() {
 }
 
 #[test]
+fn the_cover_is_the_first_picture_of_the_page() {
+    let page = read(written_folder(&full_report()).path(), "index.html");
+    let cover = page.find("pictures&#x2f;first.png").expect("a cover");
+    assert!(cover < page.find("<h2>").expect("a heading"), "{page}");
+}
+
+#[test]
 fn every_part_has_its_file() {
     let folder = written_folder(&full_report());
-    for file in ["costs.csv", "charts/cost-over-views.svg", "charts/stages.svg", "pictures/one.png", "index.html"] {
+    for file in
+        ["costs.csv", "charts/cost-over-views.svg", "charts/stages.svg", "pictures/one.png", "pictures/first.png"]
+    {
         assert!(folder.path().join(file).is_file(), "{file}");
     }
     assert_eq!(image::open(folder.path().join("pictures/one.png")).unwrap().width(), 4);

@@ -2,6 +2,7 @@
 
 use cluster::{Costs, JoinCluster, NodeStatus, PolicyChoice, SamplePlanes, SceneRef, Timeline, Workload};
 use coordinator::schedule::{Event, Opening, PolicyOverride, Recorder};
+use depth_image::ExposureEv;
 
 use super::*;
 use crate::cluster::{offer, rig};
@@ -65,6 +66,7 @@ fn log(plan_epoch: u64) -> Vec<u8> {
         viewpoints: Vec::new(),
         policy_override: PolicyOverride { policy: PolicyChoice::Pipeline, ..PolicyOverride::default() },
         costs,
+        auto_exposure: ExposureEv::ZERO,
     };
     let left = Event::Left { incarnation: plan_epoch + 1, node_name: "b".to_owned() };
     let events = [joined("a", plan_epoch), joined("b", plan_epoch), Event::Opened(Box::new(opening)), left];

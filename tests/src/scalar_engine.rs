@@ -11,7 +11,7 @@ use std::time::Duration;
 use cluster::{DIRECT, Refinement, SamplePlanes};
 use depth_image::{
     Antialias, BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, Environment, Illumination, Light, PinholeCamera,
-    Provenance, ProvenanceKind, Ray, Texel, View, ViewPlanes, linear_from_rgb9e5, linear_from_srgb8,
+    Provenance, ProvenanceKind, Ray, Texel, ToneMapping, View, ViewPlanes, linear_from_rgb9e5, linear_from_srgb8,
     rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
@@ -208,18 +208,19 @@ fn draw(camera: &PinholeCamera, scene_time_s: f32, planes: ViewPlanes) -> View {
     canvas.view(planes)
 }
 
-/// A view whose colour is the mean, in linear light, over the positions within its pixels.
+/// A view whose colour is the mean, in linear light, over the positions within its pixels, as its tone shows it.
 fn averaged(camera: &PinholeCamera, planes: ViewPlanes, view_of: impl Fn(&PinholeCamera) -> View) -> View {
-    if planes.antialias == Antialias::NONE {
+    if planes.antialias == Antialias::NONE && planes.tone == ToneMapping::NONE {
         return view_of(camera);
     }
     let views: Vec<View> =
         planes.antialias.offsets_px().map(|offset_px| view_of(&camera.with_offset(offset_px))).collect();
     let mean = |byte: usize| {
         let sum: f32 = views.iter().map(|view| linear_from_srgb8(view.srgb8[byte])).sum();
-        srgb8_from_linear(sum / views.len() as f32)
+        sum / views.len() as f32
     };
-    View { srgb8: (0..3 * camera.pixel_count()).map(mean).collect(), ..view_of(camera) }
+    let shown = |pixel: usize| planes.tone.srgb8(Vec3::from([0, 1, 2].map(|channel| mean(3 * pixel + channel))));
+    View { srgb8: (0..camera.pixel_count()).flat_map(shown).collect(), ..view_of(camera) }
 }
 
 struct Uploaded(SampleSet);

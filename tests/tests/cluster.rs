@@ -7,7 +7,7 @@ use client::{Frame, ViewRequest};
 use cluster::{Policy, PolicyChoice, Refinement, SceneHash, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, package, request, views};
 use cluster_tests::picture::fault_of;
-use depth_image::{Antialias, ProvenanceKind, View, ViewPlanes};
+use depth_image::{Antialias, ProvenanceKind, ToneCurve, ToneMapping, View, ViewPlanes};
 use node::NodeConfig;
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
@@ -105,6 +105,37 @@ async fn frames_say_their_samples_a_pixel() {
         assert_eq!(plain.inverse_depth_per_m, smooth.inverse_depth_per_m);
         assert_eq!(plain.provenance, smooth.provenance);
     }
+}
+
+/// Exposure and curve belong to a request, too. A session that leaves the exposure to the plan gets the plan's, whatever its
+/// policy.
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_say_their_tone_and_the_plan_its_exposure() {
+    let cluster = Cluster::start(3).await;
+    let still = request(PolicyChoice::Pipeline, Timeline::still(0.0));
+    let plain = cluster.session(still.clone()).await.unwrap();
+    let measured = plain.plan().auto_exposure;
+    assert!(measured.ev().abs() <= 8.0 && measured.ev() != 0.0, "{measured}");
+    assert_eq!(plain.tone(), ToneMapping::NONE);
+    let mut planes = still.planes;
+    planes.tone.curve = ToneCurve::KhronosNeutral;
+    let shown = async |policy| {
+        let asked = SessionRequest { planes, auto_exposure: true, policy, ..still.clone() };
+        let session = cluster.session(asked).await.unwrap();
+        let expected = ToneMapping { exposure: measured, curve: ToneCurve::KhronosNeutral };
+        assert_eq!((session.plan().auto_exposure, session.tone()), (measured, expected));
+        let frames = session.render_views(views(1, 6)).unwrap().all().await.unwrap();
+        assert!(frames.iter().all(|frame| frame.header.tone == expected));
+        session
+    };
+    let session = shown(PolicyChoice::Pipeline).await;
+    let frames = plain.render_views(views(1, 6)).unwrap().all().await.unwrap();
+    assert!(frames.iter().all(|frame| frame.header.tone == ToneMapping::NONE));
+    assert!(cluster.take_counts().iter().all(|&times| times == 1), "samples serve all tones");
+    // The sessions of a workload have one policy.
+    cluster.close(session).await;
+    cluster.close(plain).await;
+    cluster.close(shown(PolicyChoice::Direct).await).await;
 }
 
 /// Nodes take whole sets in turn: each image is sampled once for any K, and pictures are equal.

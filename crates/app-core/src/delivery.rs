@@ -38,6 +38,7 @@ pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Resul
         // Plans need no more views: a client requests a few thousand at a time.
         views_per_set: views.len().min(MAX_VIEWS_PER_SET as usize) as u32,
         planes: ViewPlanes::default(),
+        auto_exposure: false,
         timeline: Timeline::still(0.0),
         policy: PolicyChoice::Auto,
         forced_sampler_count: None,

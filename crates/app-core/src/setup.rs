@@ -15,7 +15,7 @@ use sampling::{Rig, SamplingMethod};
 use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec, UpAxis};
 
 use crate::camera_file::{self, Placement};
-use crate::sizes::SizePx;
+use crate::sizes::SampleSize;
 
 /// The size of the sample images, as in the paper.
 const SAMPLE_SIZE_PX: UVec2 = UVec2::new(400, 300);
@@ -72,9 +72,10 @@ pub struct SceneArgs {
     #[arg(long, default_value_t, value_name = "NAME",
         help = format!("Which samples are taken. {}", SamplingMethod::help()))]
     pub sampling: SamplingMethod,
-    /// Size of the sample images [default: 400x300, or as in --samples]
-    #[arg(long, value_name = "WxH")]
-    pub sample_size: Option<SizePx>,
+    /// Size of the sample images, or auto: as in --samples, or from a quarter to twice the pixels of 400x300, so that they
+    /// are about twice as dense as each session's views
+    #[arg(long, default_value_t, value_name = "WxH|auto")]
+    pub sample_size: SampleSize,
     /// Sample cameras from a transforms.json, in the scene file's coordinates [default: four, placed from the scene's
     /// bounds]
     #[arg(long, value_name = "FILE")]
@@ -125,6 +126,7 @@ impl SceneArgs {
             hash: SceneHash::of(&package),
             package: package.into(),
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
+            fits_views: self.sample_size == SampleSize::Auto && self.samples.is_none(),
             volume: scene.bounds(),
             background: scene.background,
             illumination: scene.illumination.clone(),
@@ -167,7 +169,7 @@ impl SceneArgs {
     }
 
     fn sample_cameras(&self, scene: &Scene) -> anyhow::Result<Vec<PinholeCamera>> {
-        let size_px = self.sample_size.map(|size| size.0);
+        let size_px = self.sample_size.fixed_px();
         let Some(path) = &self.samples else {
             return self.rig_cameras(scene, size_px.unwrap_or(SAMPLE_SIZE_PX));
         };

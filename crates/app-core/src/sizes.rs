@@ -28,6 +28,43 @@ fn pair(text: &str, most: u32) -> Result<[u32; 2], SizeError> {
         .ok_or_else(|| SizeError { text: text.to_owned(), most })
 }
 
+/// The size of sample images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SampleSize {
+    /// As the views of a session need it.
+    #[default]
+    Auto,
+    /// Columns and rows.
+    Fixed(UVec2),
+}
+
+impl SampleSize {
+    /// Columns and rows; `None` where they follow the views.
+    #[must_use]
+    pub fn fixed_px(self) -> Option<UVec2> {
+        match self {
+            Self::Auto => None,
+            Self::Fixed(size_px) => Some(size_px),
+        }
+    }
+}
+
+impl FromStr for SampleSize {
+    type Err = SizeError;
+    fn from_str(text: &str) -> Result<Self, SizeError> {
+        if text == "auto" { Ok(Self::Auto) } else { text.parse().map(|size: SizePx| Self::Fixed(size.0)) }
+    }
+}
+
+impl fmt::Display for SampleSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Fixed(size_px) => write!(f, "{}x{}", size_px.x, size_px.y),
+        }
+    }
+}
+
 impl FromStr for SizePx {
     type Err = SizeError;
     fn from_str(text: &str) -> Result<Self, SizeError> {

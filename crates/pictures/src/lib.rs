@@ -1,4 +1,5 @@
-//! Views as pictures: colour, depth, provenance and errors in false colours; and cameras as a `transforms.json` names them.
+//! Views as pictures: colour, depth, provenance and errors in false colours; lines of text in them; and cameras as a
+//! `transforms.json` names them.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod camera_frame;
@@ -6,6 +7,7 @@ mod depth;
 mod error_map;
 mod legend;
 mod provenance;
+mod text;
 
 use depth_image::View;
 use image::RgbImage;
@@ -15,6 +17,7 @@ pub use depth::{Grey16, depth, inverse_depth_16};
 pub use error_map::error_map;
 pub use legend::Legend;
 pub use provenance::provenance;
+pub use text::TextStyle;
 
 /// The colour of a view; `None` where its plane is not of its size.
 #[must_use]

@@ -6,14 +6,14 @@ use anyhow::Context as _;
 use app_core::setup::{SceneArgs, Setup};
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use engine::GpuEngine;
-use metrics::{Rgb8Image, psnr_db};
+use metrics::PictureErrors;
 use render::{DrawWork, GpuScene, Lighting, Rate, Refinement, Visibility};
 use scene::SceneSpec;
 use study::{Axis, Bar, Check, Point, Report, Series, Table, XyChart};
 
 use super::args::BenchArgs;
 use super::timing::in_turn;
-use crate::evaluation::mean_flip;
+use crate::evaluation::mean_errors;
 use crate::lighting_study::FINE;
 use crate::progress::bar;
 use crate::scene_args::scene_args;
@@ -31,16 +31,20 @@ const ALLOWED: f64 = 1.1;
 struct Row {
     rate: Rate,
     seconds: f64,
-    flip_to_full: f64,
-    psnr_to_full_db: f64,
-    flip_to_converged: f64,
+    /// Over the foreground, then over the whole picture.
+    to_full: [PictureErrors; 2],
+    to_converged: [PictureErrors; 2],
 }
 
-const COLUMNS: [(&str, &str); 8] = [
+const COLUMNS: [(&str, &str); 12] = [
     ("scene", ""),
     ("rate", ""),
     ("time a view", "ms"),
     ("over full rate", "×"),
+    ("foreground FLIP to full rate", ""),
+    ("foreground PSNR to full rate", "dB"),
+    ("foreground FLIP to converged", ""),
+    ("its share of full rate's", "×"),
     ("FLIP to full rate", ""),
     ("PSNR to full rate", "dB"),
     ("FLIP to converged", ""),
@@ -116,21 +120,14 @@ fn view(engine: &GpuEngine, scene: &GpuScene, camera: &PinholeCamera, lighting: 
         refinement,
         turn: Default::default(),
     };
-    let views = engine.renderer.draw_views(work, &[*camera], ViewPlanes::default())?;
+    let views = engine.renderer.draw_views(work, &[*camera], ViewPlanes::WITH_DEPTH)?;
     views.into_iter().next().context("no view")
 }
 
 impl Row {
     fn of(rate: Rate, seconds: f64, view: &View, full: &View, converged: &View) -> anyhow::Result<Self> {
-        let flip = |reference: &View| mean_flip(std::slice::from_ref(reference), std::slice::from_ref(view));
-        let psnr_db = psnr_db(&Rgb8Image::of_view(full)?, &Rgb8Image::of_view(view)?, None)?.unwrap_or(f64::NAN);
-        Ok(Self {
-            rate,
-            seconds,
-            flip_to_full: flip(full)?,
-            psnr_to_full_db: psnr_db,
-            flip_to_converged: flip(converged)?,
-        })
+        let errors = |reference: &View| mean_errors(std::slice::from_ref(reference), std::slice::from_ref(view));
+        Ok(Self { rate, seconds, to_full: errors(full)?, to_converged: errors(converged)? })
     }
 
     fn name(&self) -> String {
@@ -144,23 +141,21 @@ impl Row {
 fn push(table: &mut Table, scene: &str, rows: &[Row]) -> anyhow::Result<()> {
     let Some(full) = rows.first() else { return Ok(()) };
     for row in rows {
-        let numbers = [
-            row.seconds * 1e3,
-            row.seconds / full.seconds,
-            row.flip_to_full,
-            row.psnr_to_full_db,
-            row.flip_to_converged,
-            row.flip_to_converged / full.flip_to_converged,
-        ];
+        let times = [row.seconds * 1e3, row.seconds / full.seconds];
+        let errors = |part: usize| {
+            let (to_full, to_converged) = (row.to_full[part], row.to_converged[part].flip);
+            [to_full.flip, to_full.psnr_db, to_converged, to_converged / full.to_converged[part].flip]
+        };
+        let numbers = times.into_iter().chain(errors(0)).chain(errors(1));
         table.push([scene.into(), row.name().into()].into_iter().chain(numbers.map(Into::into)))?;
     }
     Ok(())
 }
 
 fn chart(scene: &str, rows: &[Row]) -> XyChart {
-    let point = |row: &Row| Point::labelled(row.seconds * 1e3, row.flip_to_converged, row.name());
+    let point = |row: &Row| Point::labelled(row.seconds * 1e3, row.to_converged[0].flip, row.name());
     let (full, adaptive): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|row| row.rate == Rate::Full);
-    let (x, y) = (Axis::linear("time a view", "ms"), Axis::linear("FLIP to converged", ""));
+    let (x, y) = (Axis::linear("time a view", "ms"), Axis::linear("foreground FLIP to converged", ""));
     let mut chart = XyChart::new(format!("Adaptive rate, {scene}"), x, y)
         .with(Series::points("full rate", full.into_iter().map(point)))
         .with(Series::line("adaptive", adaptive.into_iter().map(point)));
@@ -172,7 +167,7 @@ fn checks(scene: &str, rows: &[Row]) -> anyhow::Result<[Check; 2]> {
     let default = default_rate()?;
     let find = |rate: Rate| rows.iter().find(|row| row.rate == rate).context("a rate is missing");
     let (full, adaptive) = (find(Rate::Full)?, find(default)?);
-    let error = adaptive.flip_to_converged / full.flip_to_converged;
+    let [foreground, error] = [0, 1].map(|part| adaptive.to_converged[part].flip / full.to_converged[part].flip);
     let time = adaptive.seconds / full.seconds;
     Ok([
         Check::new(
@@ -180,7 +175,8 @@ fn checks(scene: &str, rows: &[Row]) -> anyhow::Result<[Check; 2]> {
             error,
             "×",
             Bar::AtMost(ALLOWED),
-        ),
+        )
+        .with_foreground(foreground),
         Check::new(format!("{scene}: time, adaptive over full rate"), time, "×", Bar::AtMost(1.0)),
     ])
 }

@@ -24,7 +24,8 @@ pub struct BenchArgs {
     pub(super) scene: SceneArgs,
     #[command(flatten)]
     pub(super) device: DeviceArgs,
-    /// A folder of models (.gltf, .glb, .obj, .ply); methods are compared on the largest of them
+    /// A folder of models (.gltf, .glb, .obj, .ply), with its subfolders. All are loaded, and methods are compared on the
+    /// largest
     #[arg(long, value_name = "DIR")]
     pub(super) models: Option<PathBuf>,
     /// A folder with bench.ply, samples.json and views.json; the views are compared with another synthesiser's
@@ -36,6 +37,9 @@ pub struct BenchArgs {
     /// Measures samples a pixel alone: time, error and cost of 1 to 16, on built-in scenes and on two of --models
     #[arg(long)]
     pub(super) antialias: bool,
+    /// Loads the files of --models alone: contents, time to load, and the share of the first picture that each covers
+    #[arg(long, requires = "models")]
+    pub(super) loading: bool,
     /// Where the report goes
     #[arg(long, default_value = "out/bench", value_name = "DIR")]
     pub(super) out: PathBuf,

@@ -56,10 +56,11 @@ fn checks(name: &str, rows: &[Evaluation], default: ReconstructionMethod) -> Vec
     };
     let [hits, colors, beaten] = check_names(name);
     let disoccluded = exact(|row| row.disoccluded_wrong) / least(&searches, |row| row.disoccluded_wrong);
-    let better = rows
-        .iter()
-        .find(|row| row.method == default)
-        .map(|own| rows.iter().filter(|row| row.ms_a_view < own.ms_a_view && row.flip < own.flip).count() as f64);
+    let own = rows.iter().find(|row| row.method == default);
+    let better = |flip: fn(&Evaluation) -> f64| {
+        own.map(|own| rows.iter().filter(|row| row.ms_a_view < own.ms_a_view && flip(row) < flip(own)).count() as f64)
+    };
+    let foreground = better(|row| row.foreground_flip).unwrap_or(f64::NAN);
     vec![
         Check::new(hits, exact(|row| row.wrong_hits) / least(&searches, |row| row.wrong_hits), "×", Bar::AtMost(1.0)),
         Check::maybe(
@@ -69,7 +70,8 @@ fn checks(name: &str, rows: &[Evaluation], default: ReconstructionMethod) -> Vec
             Bar::AtMost(1.0),
             "no view has disocclusions",
         ),
-        Check::maybe(beaten, better, "", Bar::Equal(0.0), "the default is not among the settings"),
+        Check::maybe(beaten, better(|row| row.flip), "", Bar::Equal(0.0), "the default is not among the settings")
+            .with_foreground(foreground),
     ]
 }
 

@@ -10,7 +10,7 @@ use render::Lighting;
 use study::{Bar, Check, Report, Table};
 
 use super::args::BenchArgs;
-use crate::evaluation::mean_flip;
+use crate::evaluation::mean_errors;
 use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS, VIEW_SIZE_PX};
 use crate::lighting_study::{self, Extent, FINE};
 use crate::progress::bar;
@@ -48,7 +48,7 @@ fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyh
     Ok(())
 }
 
-/// The FLIP of views against converged light: from shared samples, and drawn with as many rays.
+/// The errors of views against converged light: from shared samples, and drawn with as many rays.
 pub fn reference(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let views = experiment.views(if args.quick { 1 } else { CONVERGED_VIEWS })?;
     let progress = bar("converged light", 3);
@@ -62,19 +62,25 @@ pub fn reference(args: &BenchArgs, experiment: &Experiment, report: &mut Report)
     let converged = fine.drawn(&experiment.setup, CONVERGED.parse()?)?;
     progress.finish_and_clear();
     let reconstructed = |reference: &ReferenceViews| reference.reconstruct(args.scene.method, Default::default());
-    let shared = mean_flip(&converged, &reconstructed(&fine)?)?;
-    let drawn = mean_flip(&converged, &fine.views)?;
-    let geometry = mean_flip(&unlit.views, &reconstructed(&unlit)?)?;
-    let mut table = Table::new("Light beside converged light", &[("views", ""), ("FLIP", "")]);
-    table.push([format!("pipeline, {FINE}").into(), shared.into()])?;
-    table.push([format!("direct, {FINE}").into(), drawn.into()])?;
-    table.push(["pipeline beside direct, unlit".into(), geometry.into()])?;
+    let shared = mean_errors(&converged, &reconstructed(&fine)?)?;
+    let drawn = mean_errors(&converged, &fine.views)?;
+    let geometry = mean_errors(&unlit.views, &reconstructed(&unlit)?)?;
+    let mut table = Table::new("Light beside converged light", &[("views", ""), ("foreground FLIP", ""), ("FLIP", "")]);
+    let rows = [
+        (format!("pipeline, {FINE}"), shared),
+        (format!("direct, {FINE}"), drawn),
+        ("pipeline beside direct, unlit".to_owned(), geometry),
+    ];
+    for (name, [foreground, whole]) in rows {
+        table.push([name.into(), foreground.flip.into(), whole.flip.into()])?;
+    }
     report.tables.push(table);
     let [plain, lit] = ms_in_turn(args, [&unlit, &fine])?;
     let name = format!("c with {FINE} over c unlit");
     report.checks.push(Check::new(name, lit / plain, "×", Bar::AtMost(1.25)));
     let name = "FLIP to converged light: the pipeline's over direct's plus the unlit pipeline's";
-    report.checks.push(Check::new(name, shared / (drawn + geometry), "×", Bar::AtMost(1.0)));
+    let [foreground, whole] = [0, 1].map(|part| shared[part].flip / (drawn[part].flip + geometry[part].flip));
+    report.checks.push(Check::new(name, whole, "×", Bar::AtMost(1.0)).with_foreground(foreground));
     Ok(())
 }
 

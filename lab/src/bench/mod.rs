@@ -8,6 +8,7 @@ mod codec;
 mod convergence;
 mod fronts;
 mod light;
+mod loaded;
 mod peer;
 mod rays;
 mod run;

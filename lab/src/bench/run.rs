@@ -1,12 +1,16 @@
 //! The order of the bench.
 
+use std::sync::Arc;
+
 use app_core::exit::Outcome;
 use engine::GpuEngine;
 use node::Engine as _;
 use study::{Bar, Check, Report};
 
 use super::args::{BenchArgs, Part};
-use super::{adaptive, animation, antialias, codec, convergence, fronts, light, peer, rays, sampling, throughput};
+use super::{
+    adaptive, animation, antialias, codec, convergence, fronts, light, loaded, peer, rays, sampling, throughput,
+};
 use crate::experiment::Experiment;
 use crate::memory::peak_memory_mb;
 use crate::reference_views::ReferenceViews;
@@ -22,7 +26,8 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
         Some(Part::Scaling(args)) => return scaling::command::run(args),
         Some(Part::Sharing(args)) => return sharing::command::run(args),
         Some(Part::Viewer(args)) => return viewer::command::run(args),
-        None if args.antialias => return antialias_alone(args),
+        None if args.antialias => return alone(args, antialias::measure),
+        None if args.loading => return alone(args, loaded::measure),
         None => (),
     }
     let experiment = Experiment::start(args.scene.clone(), Vec::new(), args.device.device, usize::from(args.nodes))?;
@@ -46,6 +51,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     light::glossy(args, &engine, &mut report)?;
     sampling::measure(args, &engine, &mut report)?;
     fronts::gaps(args, &engine, &mut report)?;
+    loaded::measure(args, &engine, &mut report)?;
     fronts::models(args, &engine, &mut report)?;
     peer::measure(args, &engine, &mut report)?;
     let memory = peak_memory_mb().filter(|_| engine.is_software());
@@ -59,11 +65,14 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     print_and_write(args, &report)
 }
 
-/// Samples a pixel alone.
-fn antialias_alone(args: &BenchArgs) -> anyhow::Result<Outcome> {
+/// A part that measures on a device, without a cluster.
+type DevicePart = fn(&BenchArgs, &Arc<GpuEngine>, &mut Report) -> anyhow::Result<()>;
+
+/// One part alone.
+fn alone(args: &BenchArgs, measure: DevicePart) -> anyhow::Result<Outcome> {
     let engine = GpuEngine::shared(args.device.device)?;
     let mut report = new_report(args, &engine.device_name());
-    antialias::measure(args, &engine, &mut report)?;
+    measure(args, &engine, &mut report)?;
     print_and_write(args, &report)
 }
 

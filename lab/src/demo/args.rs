@@ -10,7 +10,7 @@ use clap::Args;
 /// of every lighting. Takes three minutes at most on two slow cores, and less than one with --quick.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  myriorama demo\n  myriorama demo --scene helmet.gltf --out out/helmet\n  myriorama demo --scene tree-terrain-30k --quick"
+    after_help = "Examples:\n  myriorama demo\n  myriorama demo --showcase\n  myriorama demo --scene helmet.gltf --out out/helmet\n  myriorama demo --scene tree-terrain-30k --quick"
 )]
 pub struct DemoArgs {
     #[command(flatten)]
@@ -27,6 +27,9 @@ pub struct DemoArgs {
     /// Where the report goes
     #[arg(long, default_value = "out/demo", value_name = "DIR")]
     pub(super) out: PathBuf,
+    /// Makes only the first page, first-page.png in --out, and measures nothing else
+    #[arg(long)]
+    pub(super) showcase: bool,
     /// Runs a smaller form
     #[arg(long)]
     pub(super) quick: bool,

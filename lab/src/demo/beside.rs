@@ -25,6 +25,8 @@ pub fn conventional(experiment: &Experiment, report: &mut Report) -> anyhow::Res
         ("reconstruction", ""),
         ("samples", ""),
         ("time a view", "ms"),
+        ("foreground PSNR", "dB"),
+        ("foreground FLIP", ""),
         ("PSNR", "dB"),
         ("FLIP", ""),
         ("FLIP of covered pixels", ""),
@@ -36,7 +38,8 @@ pub fn conventional(experiment: &Experiment, report: &mut Report) -> anyhow::Res
         let row = reference.evaluate(args.method, 1)?;
         let depths = reference.images.iter().flat_map(|image| &image.inverse_depth_per_m);
         let samples = depths.filter(|&&depth| depth > 0.0).count();
-        let numbers = [row.ms_a_view, row.psnr_db, row.flip, row.flip_covered, 100.0 * row.unknown];
+        let whole = [row.psnr_db, row.flip, row.flip_covered, 100.0 * row.unknown];
+        let numbers = [row.ms_a_view, row.foreground_psnr_db, row.foreground_flip].into_iter().chain(whole);
         let head = [sampling.to_string().into(), args.method.to_string().into(), samples.into()];
         table.push(head.into_iter().chain(numbers.map(Cell::from)))?;
         show(&reference, sampling, args, report)?;

@@ -4,9 +4,12 @@ mod args;
 mod beside;
 mod charts;
 mod light;
+mod page;
 mod pictures;
 mod run;
+mod showcase;
 mod timing;
+mod viewpoint;
 
 pub use args::DemoArgs;
 pub use run::run;

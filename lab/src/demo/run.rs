@@ -6,13 +6,15 @@ use anyhow::Context as _;
 use app_core::camera_file::{self, Placement};
 use app_core::exit::Outcome;
 use depth_image::PinholeCamera;
+use engine::GpuEngine;
 use node::Engine as _;
 use scene::Limits;
 use study::{Bar, Check, Report};
 
 use super::args::{COMPARED_VIEWS, DemoArgs};
-use super::{beside, charts, light, timing};
+use super::{beside, charts, light, showcase, timing};
 use crate::experiment::Experiment;
+use crate::lighting_study;
 use crate::memory::peak_memory_mb;
 use crate::progress::bar;
 use crate::reference_views::ReferenceViews;
@@ -26,6 +28,9 @@ const TIME_LIMIT_S: f64 = 180.0;
 /// # Errors
 /// Input that cannot be used, or a failure of the device or the cluster.
 pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
+    if args.showcase {
+        return showcase_alone(args);
+    }
     let start = Instant::now();
     let given = given_views(args)?;
     let experiment = Experiment::start(args.scene.clone(), given, args.device.device, usize::from(args.nodes))?;
@@ -35,23 +40,34 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
         experiment.setup.scene.triangle_count(),
         experiment.engine.device_name()
     );
-    let times = timing::measure(&experiment, args.quick)?;
+    let cover = showcase::write(&experiment.engine, &experiment.setup, &args.scene, &args.out)?;
     let mut report = new_report(args, &experiment);
+    report.cover = Some(cover);
+    // What sharing gains where light is expensive comes first; plain light is beside it.
+    let light = light::show(args, &experiment, &mut report)?;
+    let times = timing::measure(&experiment, args.quick)?;
     timing::tables(&times, &mut report)?;
     report.charts.extend([charts::total_time(&times).into(), charts::stages(&times).into()]);
     compare(args, &experiment, &mut report)?;
     beside::conventional(&experiment, &mut report)?;
-    let light = light::show(args, &experiment, &mut report)?;
     let choice = experiment.visibility()?;
     report.parameter("direct finds surfaces by", choice.to_string());
-    report.summary = timing::summary(&times);
+    report.summary = format!("{} In plain light: {}", lighting_study::summary(&light), timing::summary(&times));
     report.checks = checks(&times, start, args);
-    report.checks.extend(light);
+    report.checks.extend(lighting_study::checks(&light));
     experiment.stop()?;
     report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
     println!("\n{}", report.summary);
     let ok = report.finish(&args.out)?;
     Ok(Outcome::of(ok || !args.strict))
+}
+
+/// The first page alone, without a cluster.
+fn showcase_alone(args: &DemoArgs) -> anyhow::Result<Outcome> {
+    let setup = args.scene.load()?;
+    let engine = GpuEngine::shared(args.device.device)?;
+    showcase::write(&engine, &setup, &args.scene, &args.out)?;
+    Ok(Outcome::Done)
 }
 
 fn given_views(args: &DemoArgs) -> anyhow::Result<Vec<PinholeCamera>> {

@@ -73,7 +73,8 @@ fn started(coordinator: &str, views: usize, folder: &Path) -> anyhow::Result<Chi
     let mut command = Command::new(std::env::current_exe().context("this program's file is not known")?);
     command.args(["view", "--coordinator", coordinator, "--views", &views.to_string(), "--size", "1920x1080"]);
     command
-        .args(["--antialias", "1", "--depth", "--provenance", "--policy", "pipeline", "--out"])
+        .args(["--antialias", "1", "--exposure", "0", "--tone-map", "none"])
+        .args(["--depth", "--provenance", "--policy", "pipeline", "--out"])
         .arg(folder)
         .stdout(Stdio::null());
     command.spawn().context("cannot start view")

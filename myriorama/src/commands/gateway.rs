@@ -12,6 +12,7 @@ use gateway::{GatewayConfig, Token, tls_config};
 use glam::UVec2;
 use tokio_util::sync::CancellationToken;
 
+use crate::tone::ToneArgs;
 use crate::viewer::request_of;
 
 /// Serves the viewer to browsers. Pictures go on while the coordinator is away. There may be any number of gateways.
@@ -33,6 +34,8 @@ pub struct GatewayArgs {
     /// The policy of the visitors' sessions: pipeline, direct, time-share, or auto (the fastest by prediction)
     #[arg(long, default_value_t, value_name = "NAME")]
     policy: PolicyChoice,
+    #[command(flatten)]
+    tone: ToneArgs,
     /// A name of this server in links, beside localhost and addresses; may be repeated
     #[arg(long = "host", value_name = "NAME")]
     hosts: Vec<String>,
@@ -75,7 +78,7 @@ pub async fn run(args: GatewayArgs) -> anyhow::Result<Outcome> {
         origins: args.origins,
         tls,
         token,
-        ..GatewayConfig::new(&args.coordinator, request_of(args.policy))
+        ..GatewayConfig::new(&args.coordinator, request_of(args.policy, args.tone))
     };
     let shutdown = CancellationToken::new();
     cancel_at_signal(shutdown.clone());

@@ -69,8 +69,9 @@ fn check_cameras(args: &ViewArgs) -> Result<(), BadInput> {
 
 /// Writes the views that are missing, and compares all of them if that is wanted.
 async fn pictures(args: &ViewArgs, signals: &StopSignals) -> anyhow::Result<Outcome> {
-    let Some(job) = until(&signals.first, Job::place(args)).await? else { return Ok(Outcome::Interrupted) };
+    let Some(mut job) = until(&signals.first, Job::place(args)).await? else { return Ok(Outcome::Interrupted) };
     let mut record = job.record(args)?;
+    job.expose(&record);
     if record.count() < record.total() {
         let ended = write_missing(args, &job, &mut record, signals).await;
         if matches!(ended, Ok(Ended::Stopped)) || ended.is_err() && record.count() > 0 {
@@ -86,6 +87,7 @@ async fn pictures(args: &ViewArgs, signals: &StopSignals) -> anyhow::Result<Outc
     if !args.compare {
         return Ok(Outcome::Done);
     }
+    job.expose(&record);
     match until(&signals.first, compare(args, &job, record.total())).await? {
         Some(outcome) => Ok(outcome),
         None => {
@@ -103,6 +105,7 @@ async fn write_missing(
     signals: &StopSignals,
 ) -> anyhow::Result<Ended> {
     let Some(session) = until(&signals.first, job.open()).await? else { return Ok(Ended::Stopped) };
+    record.set_tone(session.tone());
     // A record of other pictures does not outlive them.
     record.save()?;
     let progress = ProgressBar::new(record.total());

@@ -151,6 +151,7 @@ fn request(row: Row, typical_view: PinholeCamera) -> SessionRequest {
         typical_view,
         views_per_set: VIEWS as u32,
         planes: ViewPlanes::ALL,
+        auto_exposure: false,
         timeline: Timeline { start_s: 0.25, step_s: 0.5, set_count: 2 },
         policy: row.policy,
         forced_sampler_count: None,

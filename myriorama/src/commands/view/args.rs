@@ -14,6 +14,8 @@ use glam::{DVec3, Vec3};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 
+use crate::tone::ToneArgs;
+
 /// Asks for views and writes them to --out. Colour is view_0000.png. With --depth, view_0000.depth.png has 16-bit
 /// inverse planar depth: value / 65535 × inverse_depth_max_per_m of the frame in cameras.json, 0 for background. With
 /// --provenance, view_0000.provenance.png has a colour for each sample camera, white for blended and red for filled
@@ -45,6 +47,8 @@ pub struct ViewArgs {
     /// Samples a pixel, whose mean in linear light is its colour: 1, 2, 4, 8 or 16. Depth and provenance are the centre's
     #[arg(long, default_value = "4", value_name = "N")]
     pub(super) antialias: Antialias,
+    #[command(flatten)]
+    pub(super) tone: ToneArgs,
     /// Writes the depth of every view as well
     #[arg(long)]
     pub(super) depth: bool,
@@ -98,8 +102,10 @@ pub struct ViewArgs {
 }
 
 impl ViewArgs {
+    /// The planes of the views, without their tone, which may be the plan's.
     pub(super) fn planes(&self) -> ViewPlanes {
-        ViewPlanes { antialias: self.antialias, inverse_depth: self.depth, provenance: self.provenance }
+        let (inverse_depth, provenance) = (self.depth, self.provenance);
+        ViewPlanes { antialias: self.antialias, inverse_depth, provenance, ..ViewPlanes::COLOR }
     }
 }
 

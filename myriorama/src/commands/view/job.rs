@@ -51,6 +51,14 @@ impl Job {
         Ok(session)
     }
 
+    /// Shows all views at one exposure, once it is known: those of later sessions, too.
+    pub(super) fn expose(&mut self, record: &Record) {
+        if let Some(exposure) = record.exposure() {
+            self.request.auto_exposure = false;
+            self.request.planes.tone.exposure = exposure;
+        }
+    }
+
     /// The record of the pictures, with those that an earlier command has left.
     ///
     /// # Errors
@@ -58,7 +66,7 @@ impl Job {
     pub(super) fn record(&self, args: &ViewArgs) -> anyhow::Result<Record> {
         let settings = settings::of(&self.request, &self.offer);
         let views = (self.cameras.clone(), args.frames);
-        let mut record = Record::new(&args.out, self.offer.origin_in_source, settings, views, args.planes())?;
+        let mut record = Record::new(&args.out, self.offer.origin_in_source, settings, views, self.request.planes)?;
         if args.resume {
             record.resume()?;
         }
@@ -83,7 +91,7 @@ fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamer
     request.method = args.method.map_or(request.method, |method| method.to_string());
     request.lighting = args.lighting.map_or(request.lighting, |lighting| lighting.to_string());
     let request = if args.live { at_rate(request, args.rate) } else { request };
-    Ok(SessionRequest {
+    let request = SessionRequest {
         forced_tile_count: args.tiles,
         refinement_steps: if args.refine { refinement_steps(&request.lighting) } else { 1 },
         codec: args.codec.to_string(),
@@ -92,7 +100,9 @@ fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamer
         timeline: timeline(args.frames, args.frame_step, args.refine),
         viewpoints: if args.cells || args.viewpoints.around.is_some() { viewpoints(cameras) } else { Vec::new() },
         ..request
-    })
+    };
+    // Metrics are of light as it is, unless the arguments say otherwise.
+    Ok(if args.compare { args.tone.for_metrics(request) } else { args.tone.for_people(request) })
 }
 
 /// A picture that is refined stands still: motion would begin the refinement anew.

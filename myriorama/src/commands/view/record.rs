@@ -8,7 +8,7 @@ use app_core::camera_record::{self, NamedCamera};
 use app_core::delivery::requests;
 use app_core::exit::BadInput;
 use client::ViewRequest;
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::{ExposureEv, PinholeCamera, ToneMapping, ViewPlanes};
 use glam::DVec3;
 use serde_json::{Map, Value, json};
 
@@ -18,6 +18,9 @@ use super::file_names::{FileNames, number_of};
 pub(super) const MAX_VIEWS: u64 = 1 << 22;
 /// The name of the record.
 pub(super) const FILE_NAME: &str = "cameras.json";
+/// The field that says how the pictures are shown, and its exposure.
+const TONE: &str = "tone_mapping";
+const EXPOSURE_EV: &str = "exposure_ev";
 const DEPTH: &str = "16-bit: value / 65535 * inverse_depth_max_per_m, per metre; 0 is background";
 /// The time between two writings of the record, and its least multiple of the time that writing takes.
 const PAUSE: Duration = Duration::from_secs(5);
@@ -32,6 +35,8 @@ pub(super) struct Record {
     cameras: Arc<[PinholeCamera]>,
     set_count: u32,
     planes: ViewPlanes,
+    /// `None`: it is the plan's, and not known yet.
+    exposure: Option<ExposureEv>,
     /// The scale of each written view's depth picture, per metre; 0 without that picture. `None`: the view is not written.
     written: Vec<Option<f32>>,
     count: u64,
@@ -58,7 +63,19 @@ impl Record {
         }
         let (folder, written) = (folder.to_owned(), vec![None; total as usize]);
         let next_save = Instant::now() + PAUSE;
-        Ok(Self { folder, origin_in_source, settings, cameras, set_count, planes, written, count: 0, next_save })
+        let exposure = None;
+        Ok(Self {
+            folder,
+            origin_in_source,
+            settings,
+            cameras,
+            set_count,
+            planes,
+            exposure,
+            written,
+            count: 0,
+            next_save,
+        })
     }
 
     /// All views.
@@ -69,6 +86,17 @@ impl Record {
     /// Written views.
     pub(super) fn count(&self) -> u64 {
         self.count
+    }
+
+    /// The exposure of all views, once it is known.
+    pub(super) fn exposure(&self) -> Option<ExposureEv> {
+        self.exposure
+    }
+
+    /// Notes how the views are shown.
+    pub(super) fn set_tone(&mut self, tone: ToneMapping) {
+        self.exposure = Some(tone.exposure);
+        self.planes.tone = tone;
     }
 
     /// Requests of the views that are not written.
@@ -97,6 +125,7 @@ impl Record {
         let about = camera_record::read(&path, |line| found.extend(self.view_of(line)))?;
         if let Some(about) = about {
             self.check_settings(&path, about.get("settings").unwrap_or(&Value::Null))?;
+            self.exposure = about.get(TONE).and_then(exposure_of);
             found.into_iter().for_each(|(number, depth_scale)| self.add(number, depth_scale));
         }
         Ok(())
@@ -138,8 +167,13 @@ impl Record {
     /// The file cannot be written.
     pub(super) fn save(&mut self) -> anyhow::Result<()> {
         let start = Instant::now();
-        let about = [("depth", json!(DEPTH)), ("settings", Value::Object(self.settings.clone()))];
-        let about = about.map(|(name, value)| (name.to_owned(), value)).into_iter().collect();
+        let mut about = Map::new();
+        about.insert("depth".to_owned(), json!(DEPTH));
+        about.insert("settings".to_owned(), Value::Object(self.settings.clone()));
+        if let Some(exposure) = self.exposure {
+            let curve = self.planes.tone.curve.to_string();
+            about.insert(TONE.to_owned(), json!({ "curve": curve, EXPOSURE_EV: exposure.ev() }));
+        }
         let written = (0..).zip(&self.written);
         let cameras = written.filter_map(|(number, scale)| Some(self.named(number, (*scale)?)));
         camera_record::write(&self.folder.join(FILE_NAME), cameras, self.origin_in_source, about)?;
@@ -160,6 +194,11 @@ impl Record {
         }
         NamedCamera { file_path: files.color, camera: self.cameras[(number % views) as usize], more }
     }
+}
+
+/// The exposure that a record names; `None` for one that is out of its limits.
+fn exposure_of(tone: &Value) -> Option<ExposureEv> {
+    ExposureEv::new(tone.get(EXPOSURE_EV)?.as_f64()? as f32).ok()
 }
 
 #[cfg(test)]

@@ -95,7 +95,7 @@ fn save(path: &Path, image: DynamicImage) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use codec::{FrameCodec, FrameHeader, SampleSetId, StageTimes};
-    use depth_image::{Antialias, PinholeCamera, View};
+    use depth_image::{Antialias, PinholeCamera, ToneMapping, View};
     use glam::{UVec2, Vec3};
 
     use super::*;
@@ -110,6 +110,7 @@ mod tests {
             camera,
             size_px,
             antialias: Antialias::NONE,
+            tone: ToneMapping::NONE,
             codec: FrameCodec::Lz4,
             color_bytes: 18,
             inverse_depth_bytes: 0,

@@ -1,0 +1,182 @@
+//! Loaded files: the contents of each, the time to load it, and how much of the first picture it covers.
+
+use std::iter::repeat_n;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::Context as _;
+use app_core::setup::Setup;
+use depth_image::{View, ViewCell, ViewPlanes};
+use engine::GpuEngine;
+use glam::{UVec2, Vec2};
+use render::{DrawWork, Lighting, Refinement, Visibility};
+use scene::SceneSpec;
+use study::{Bar, Cell, Check, Report, Table};
+
+use super::args::BenchArgs;
+use super::fronts::models_of;
+use crate::progress::bar;
+use crate::scene_args::scene_args;
+
+/// The size of the pictures whose covered share counts.
+const PICTURE_PX: UVec2 = UVec2::new(480, 360);
+/// The least mean share of pictures that models cover.
+const LEAST_SHARE: f64 = 0.35;
+const REFUSED: &str = "model files: refused";
+const SHARE: &str = "model files: mean share of the first picture that shows a surface";
+
+const COLUMNS: [(&str, &str); 9] = [
+    ("file", ""),
+    ("format", ""),
+    ("triangles", ""),
+    ("textures", ""),
+    ("clips", ""),
+    ("lamps", ""),
+    ("time to load", "s"),
+    ("covers of the first picture", "%"),
+    ("refused", ""),
+];
+
+/// A model as it was loaded.
+#[derive(Debug, Clone, PartialEq)]
+struct Loaded {
+    triangles: u64,
+    textures: usize,
+    clips: usize,
+    /// With those that a file without light gets.
+    lamps: usize,
+    seconds: f64,
+    /// Pixels that show a surface, of 1.
+    share: f64,
+}
+
+/// Loads all models of the folder, if one is given; adds a table and checks.
+pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
+    let Some(folder) = &args.models else {
+        let not_run = |name, bar| Check::not_run(name, "", bar, "--models is not given");
+        report.checks.extend([not_run(REFUSED, Bar::Equal(0.0)), not_run(SHARE, Bar::AtLeast(LEAST_SHARE))]);
+        return Ok(());
+    };
+    let mut paths = models_of(folder, usize::MAX)?;
+    paths.sort();
+    let progress = bar("model files", paths.len());
+    let mut models = Vec::with_capacity(paths.len());
+    for path in paths {
+        progress.set_message(name_of(folder, &path));
+        let model = load(engine, path.clone()).map_err(|error| format!("{error:#}"));
+        models.push((name_of(folder, &path), model));
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    report.tables.push(table(&models)?);
+    report.checks.extend(checks(&models));
+    Ok(())
+}
+
+/// The path of a model inside the folder.
+fn name_of(folder: &Path, path: &Path) -> String {
+    path.strip_prefix(folder).unwrap_or(path).display().to_string()
+}
+
+fn load(engine: &Arc<GpuEngine>, path: PathBuf) -> anyhow::Result<Loaded> {
+    let start = Instant::now();
+    let setup = scene_args(SceneSpec::File(path)).load()?;
+    let seconds = start.elapsed().as_secs_f64();
+    Ok(Loaded {
+        triangles: setup.scene.triangle_count(),
+        textures: setup.scene.textures.len(),
+        clips: setup.scene.animation.as_ref().map_or(0, |animation| animation.clips.len()),
+        lamps: setup.scene.illumination.lights.len(),
+        seconds,
+        share: share(&first_picture(engine, &setup)?),
+    })
+}
+
+/// The picture from the middle of the sample cameras, where a viewer begins.
+fn first_picture(engine: &Arc<GpuEngine>, setup: &Setup) -> anyhow::Result<View> {
+    engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
+    let scene = engine.scene(setup.offer.hash.as_str())?;
+    let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
+    let work = DrawWork {
+        scene: &scene,
+        lighting: Lighting::UNLIT,
+        scene_time_s: 0.0,
+        visibility: Visibility::Measured,
+        refinement: Refinement::default(),
+        turn: Default::default(),
+    };
+    let camera = cell.camera_at(Vec2::ZERO, PICTURE_PX);
+    engine.renderer.draw_views(work, &[camera], ViewPlanes::WITH_DEPTH)?.pop().context("no view")
+}
+
+/// The share of pixels that show a surface; NaN without any pixel.
+fn share(view: &View) -> f64 {
+    let depths = view.inverse_depth_per_m.as_deref().unwrap_or_default();
+    depths.iter().filter(|&&inverse| inverse > 0.0).count() as f64 / depths.len() as f64
+}
+
+fn table(models: &[(String, Result<Loaded, String>)]) -> anyhow::Result<Table> {
+    let mut table = Table::new("Model files", &COLUMNS);
+    for (name, model) in models {
+        let format =
+            Path::new(name).extension().map_or_else(String::new, |ending| ending.to_string_lossy().to_lowercase());
+        let cells: Vec<Cell> = match model {
+            Ok(model) => vec![
+                (model.triangles as usize).into(),
+                model.textures.into(),
+                model.clips.into(),
+                model.lamps.into(),
+                model.seconds.into(),
+                (100.0 * model.share).into(),
+                "".into(),
+            ],
+            Err(error) => repeat_n(Cell::Missing, COLUMNS.len() - 3).chain([error.as_str().into()]).collect(),
+        };
+        table.push([name.as_str().into(), format.into()].into_iter().chain(cells))?;
+    }
+    Ok(table)
+}
+
+fn checks(models: &[(String, Result<Loaded, String>)]) -> [Check; 2] {
+    let shares: Vec<f64> = models.iter().filter_map(|(_, model)| Some(model.as_ref().ok()?.share)).collect();
+    let refused = models.len() - shares.len();
+    let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+    [Check::new(REFUSED, refused as f64, "", Bar::Equal(0.0)), Check::new(SHARE, mean, "", Bar::AtLeast(LEAST_SHARE))]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gpu::DevicePreference;
+
+    fn loaded(share: f64) -> (String, Result<Loaded, String>) {
+        let model = Loaded { triangles: 1, textures: 2, clips: 3, lamps: 4, seconds: 0.5, share };
+        ("folder/a.GLB".to_owned(), Ok(model))
+    }
+
+    #[test]
+    fn a_refused_file_has_a_row_with_its_error_and_fails_its_check() {
+        let models = [loaded(0.5), loaded(0.3), ("b.ply".to_owned(), Err("no faces".to_owned()))];
+        let table = table(&models).unwrap();
+        let text = |row: usize, column: usize| table.rows[row][column].display();
+        assert_eq!([text(0, 0), text(0, 1), text(0, 2), text(0, 7)], ["folder/a.GLB", "glb", "1", "50"]);
+        assert_eq!([text(2, 1), text(2, 8)], ["ply", "no faces"]);
+        let [refused, share] = checks(&models);
+        assert_eq!((refused.outcome(), refused.value()), (study::Outcome::FallsShort, Some(1.0)));
+        assert_eq!((share.outcome(), share.value()), (study::Outcome::Holds, Some(0.4)));
+        assert_eq!(checks(&models[1..2])[1].outcome(), study::Outcome::FallsShort);
+    }
+
+    #[test]
+    fn a_file_is_loaded_and_covers_some_of_its_first_picture() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("square.obj");
+        std::fs::write(&path, "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n").unwrap();
+        let engine = GpuEngine::shared(DevicePreference::Any).unwrap();
+        let model = load(&engine, path).unwrap();
+        assert_eq!((model.triangles, model.textures, model.clips), (2, 0, 0));
+        assert!(model.lamps > 0 && model.share > 0.2 && model.share < 0.95, "{model:?}");
+        assert!(load(&engine, folder.path().join("none.obj")).is_err());
+    }
+}
