@@ -97,9 +97,7 @@ async fn an_admitted_stream_waits_for_room() {
         }
     }
     drop((takes_all, full));
-    let frame = async {
-        while assembly.push(let_in.next().await.unwrap().unwrap()).unwrap().is_none() {}
-    };
+    let frame = async { while assembly.push(let_in.next().await.unwrap().unwrap()).unwrap().is_none() {} };
     timeout(HEALED, frame).await.expect("there is room");
 }
 
