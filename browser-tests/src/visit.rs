@@ -24,7 +24,7 @@ const IS_SETTLED: &str = "(() => {
     const page = window.myriorama;
     const state = page?.state();
     const last = page?.statistics.pictures.at(-1)?.header;
-    if (!state || !last?.still || last.number !== page.number() || page.shown() !== last.number) return false;
+    if (!state || !last?.still || last.samples !== 16 || last.number !== page.number() || page.shown() !== last.number) return false;
     const camera = page.camera.toCamera(state);
     const numbers = (c) => [...c.eye, ...c.target, c.fov_y_deg];
     const [shown, wanted] = [numbers(last.camera), numbers(camera)];
@@ -80,6 +80,8 @@ pub struct Header {
     pub camera: Camera,
     /// The step of its light, from 1.
     pub light_step: u32,
+    /// Samples a pixel.
+    pub samples: u32,
     /// The node that made it.
     pub compositor: String,
 }

@@ -29,5 +29,5 @@ pub use frames::Frames;
 pub use live_view::{EncodedLiveView, LiveView};
 pub use placement::ClientId;
 pub use session::{Client, Session};
-pub use view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, ViewRequest};
+pub use view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, PictureQuality, ViewRequest};
 pub use work_stealing::WorkStealing;

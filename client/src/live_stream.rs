@@ -15,7 +15,7 @@ use crate::error::ClientError;
 use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::placement::{ClientId, Tried};
 use crate::poses::{Newest, Poses, SentPose};
-use crate::view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, ViewRequest};
+use crate::view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, PictureQuality, ViewRequest};
 use crate::window::check_frame;
 
 /// The longest silence of a client: its compositor cuts off one that is silent for longer.
@@ -176,7 +176,9 @@ impl LiveStream {
         if let Some(pose) = pose.filter(|pose| self.poses.wants(pose)) {
             let ViewRequest { frame, set_index, camera } = pose.request;
             (request.set_index, request.views) = (set_index, vec![RequestedView { frame, camera }]);
-            request.codec = pose.codec.unwrap_or(request.codec);
+            if let Some(PictureQuality { codec, antialias }) = pose.quality {
+                (request.codec, request.planes.antialias) = (codec, antialias);
+            }
             self.poses.sent(pose);
         }
         request
@@ -187,9 +189,11 @@ impl LiveStream {
         let unexpected =
             |reason: &str| Failure::of_peer(peer, ClientError::Unexpected { frame: number, reason: reason.to_owned() });
         let answers = self.poses.answer(number).ok_or_else(|| unexpected("was not requested, or is late"))?;
-        let planes = self.state.borrow().active.settings.planes;
+        let mut planes = self.state.borrow().active.settings.planes;
+        let quality = answers.pose.quality;
+        planes.antialias = quality.map_or(planes.antialias, |quality| quality.antialias);
         check_frame(&answers.pose.request, planes, &frame.header).map_err(|reason| unexpected(&reason))?;
-        if answers.pose.codec.is_some_and(|codec| codec != frame.header.codec) {
+        if quality.is_some_and(|quality| quality.codec != frame.header.codec) {
             return Err(unexpected("has another codec than requested"));
         }
         let plan_epoch = frame.header.sample_set_id.plan_epoch;

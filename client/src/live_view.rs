@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use codec::FrameCodec;
 use depth_image::PinholeCamera;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
@@ -12,7 +11,7 @@ use crate::error::ClientError;
 use crate::live_stream::{Encoded, LiveStream, decode_all};
 use crate::placement::ClientId;
 use crate::poses::{CREDITS, Newest, Pose};
-use crate::view_request::{EncodedFrame, LiveFrame, ViewRequest};
+use crate::view_request::{EncodedFrame, LiveFrame, PictureQuality, ViewRequest};
 
 /// Frames of a camera that moves. A newer pose replaces one that is not being made yet. Two frames at most are on their way
 /// or not taken by [`LiveView::next`]. A live view outlives compositors and plans, and ends with its session.
@@ -24,7 +23,7 @@ pub struct LiveView {
     _tasks: JoinSet<()>,
 }
 
-/// Frames of a camera that moves, as they came: for a caller that passes them on. Each pose has a codec of its own. Two frames
+/// Frames of a camera that moves, as they came: for a caller that passes them on. Each pose has a quality of its own. Two frames
 /// at most are on their way or not confirmed by [`EncodedLiveView::confirm`]; otherwise it is as a [`LiveView`].
 #[derive(Debug)]
 pub struct EncodedLiveView {
@@ -49,11 +48,16 @@ impl Posing {
         Self { newest, state, last: 0 }
     }
 
-    fn set(&mut self, camera: PinholeCamera, set_index: u32, codec: Option<FrameCodec>) -> Result<u64, ClientError> {
+    fn set(
+        &mut self,
+        camera: PinholeCamera,
+        set_index: u32,
+        quality: Option<PictureQuality>,
+    ) -> Result<u64, ClientError> {
         let request = ViewRequest { frame: self.last + 1, set_index, camera };
         request.check(&self.state.borrow().active.plan.assignment)?;
         self.last = request.frame;
-        let pose = Pose { request, codec, posed: Instant::now() };
+        let pose = Pose { request, quality, posed: Instant::now() };
         self.newest.send_modify(|newest| newest.pose = Some(pose));
         Ok(request.frame)
     }
@@ -117,12 +121,17 @@ impl EncodedLiveView {
         Self { posing, frames, _tasks: tasks }
     }
 
-    /// As [`LiveView::set_pose`], in this codec.
+    /// As [`LiveView::set_pose`], in this quality.
     ///
     /// # Errors
     /// As [`LiveView::set_pose`].
-    pub fn set_pose(&mut self, camera: PinholeCamera, set_index: u32, codec: FrameCodec) -> Result<u64, ClientError> {
-        self.posing.set(camera, set_index, Some(codec))
+    pub fn set_pose(
+        &mut self,
+        camera: PinholeCamera,
+        set_index: u32,
+        quality: PictureQuality,
+    ) -> Result<u64, ClientError> {
+        self.posing.set(camera, set_index, Some(quality))
     }
 
     /// The next frame, as [`LiveView::next`]. None follows a frame from a neighbouring view cell: the caller may set its pose

@@ -3,9 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use codec::FrameCodec;
-
-use crate::view_request::ViewRequest;
+use crate::view_request::{PictureQuality, ViewRequest};
 
 /// Frames that may be on their way, or received and not taken.
 pub(crate) const CREDITS: usize = 2;
@@ -17,7 +15,7 @@ const MAX_SENT: usize = 64;
 pub(crate) struct Pose {
     pub(crate) request: ViewRequest,
     /// `None`: the session's.
-    pub(crate) codec: Option<FrameCodec>,
+    pub(crate) quality: Option<PictureQuality>,
     pub(crate) posed: Instant,
 }
 
@@ -89,7 +87,7 @@ mod tests {
     fn pose(frame: u64) -> Pose {
         let (eye, up) = ([0.0, 0.0, 1.0].into(), [0.0, 1.0, 0.0].into());
         let camera = PinholeCamera::looking_at(eye, [0.0; 3].into(), up, 1.0, [8, 8].into());
-        Pose { request: ViewRequest { frame, set_index: 0, camera }, codec: None, posed: Instant::now() }
+        Pose { request: ViewRequest { frame, set_index: 0, camera }, quality: None, posed: Instant::now() }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::time::Instant;
 use bytes::Bytes;
 use cluster::Assignment;
 use codec::{FrameCodec, FrameHeader};
-use depth_image::{PinholeCamera, View, ViewPlanes};
+use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
 
 use crate::error::ClientError;
 
@@ -18,6 +18,15 @@ pub(crate) struct ViewSettings {
     pub(crate) codec: FrameCodec,
     /// Planes beside colour.
     pub(crate) planes: ViewPlanes,
+}
+
+/// How one picture is made and sent, in place of the session's way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PictureQuality {
+    /// The encoding.
+    pub codec: FrameCodec,
+    /// Samples a pixel.
+    pub antialias: Antialias,
 }
 
 /// One view.

@@ -158,7 +158,7 @@ function resized() {
 function showsPicture(header, moment, receivedAt) {
   shown = { header, moment };
   const isSharp = header.size_px.every((side, axis) => side === screen.size[axis]);
-  notices.shows(header, { isNewest: header.number === poses.number, isSharp, lightSteps: welcome.light_steps, receivedAt });
+  notices.shows(header, { isNewest: header.number === poses.number, isSharp, lightSteps: welcome.light_steps, stillSamples: welcome.still_samples, receivedAt });
   marks.redraw();
   settle();
 }

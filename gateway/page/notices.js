@@ -22,7 +22,7 @@ export class Notices {
   }
 
   /** A picture is on the screen; `isNewest` says whether no pose has followed. */
-  shows(header, { isNewest, isSharp, lightSteps, receivedAt }) {
+  shows(header, { isNewest, isSharp, lightSteps, stillSamples, receivedAt }) {
     // It was on its way before the reason that there are none.
     if (receivedAt < this.waitsSince) return;
     this.stop();
@@ -31,8 +31,9 @@ export class Notices {
     $("picture").classList.remove("stale");
     if (!isNewest || !header.still) return this.badge(isNewest ? "still" : "moving");
     const light = header.light_step;
-    if (light === lightSteps) this.badge(isSharp && !header.neighbour ? "exact" : "still");
-    else this.badge("still", `still (light ${light} of ${lightSteps})`);
+    if (light < lightSteps) this.badge("still", `still (light ${light} of ${lightSteps})`);
+    else if (header.samples < stillSamples) this.badge("still", `still (${header.samples} of ${stillSamples} samples)`);
+    else this.badge(isSharp && !header.neighbour ? "exact" : "still");
   }
 
   badge(state, text = state) {

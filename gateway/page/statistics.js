@@ -52,6 +52,7 @@ function agesOf(recent) {
 function originOf(header, lightSteps) {
   return [
     ["light step", `${header.light_step} of ${lightSteps}`],
+    ["samples a pixel", `${header.samples}`],
     ["sample set", header.set],
     ["view cell", `${header.cell}, ${header.neighbour ? "a neighbour's" : "the view's own"}`],
     ["compositor", header.compositor],

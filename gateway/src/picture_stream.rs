@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Instant;
 
 use bytes::Bytes;
-use client::{ClientError, ClientId, EncodedFrame, EncodedLiveView, Session};
+use client::{ClientError, ClientId, EncodedFrame, EncodedLiveView, PictureQuality, Session};
 use codec::FrameCodec;
 use depth_image::PinholeCamera;
 
@@ -64,9 +64,9 @@ impl PictureStream {
         pose: Pose,
         camera: PinholeCamera,
         set_index: u32,
-        codec: FrameCodec,
+        quality: PictureQuality,
     ) -> Result<(), ClientError> {
-        let frame = self.view.set_pose(camera, set_index, codec)?;
+        let frame = self.view.set_pose(camera, set_index, quality)?;
         if self.asked.len() >= MAX_ASKED {
             self.asked.pop_front();
         }
@@ -130,6 +130,7 @@ impl PictureStream {
             set: header.sample_set_id.to_string(),
             cell: header.cell,
             light_step: about.light_step,
+            samples: header.antialias.samples(),
             neighbour: !about.is_own_cell,
             compositor: frame.node_name.clone(),
             replaced: asked.replaced,

@@ -65,6 +65,8 @@ pub(crate) enum ToPage {
         bounds: [[f64; 3]; 2],
         /// Steps in which the light of a still is refined.
         light_steps: u32,
+        /// Samples a pixel of a finished still.
+        still_samples: u32,
         /// Moments of a scene that moves; 1 for one that never moves.
         moments: u32,
         /// The time between two moments.
@@ -122,6 +124,8 @@ pub(crate) struct PictureHeader {
     pub(crate) cell: u32,
     /// The step of its light, from 1 to the welcome's `light_steps`.
     pub(crate) light_step: u32,
+    /// Samples a pixel, from 1 to the welcome's `still_samples`.
+    pub(crate) samples: u32,
     /// Whether the cell is a neighbour of the view's own, which is not loaded yet.
     pub(crate) neighbour: bool,
     /// The compositor that made it.
@@ -219,6 +223,7 @@ mod tests {
             set: "4.0".to_owned(),
             cell: 1,
             light_step: 1,
+            samples: 1,
             neighbour: false,
             compositor: "n0".to_owned(),
             replaced: 2,

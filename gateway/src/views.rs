@@ -7,7 +7,7 @@ use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::response::Response;
 use client::Frame;
 use codec::{FrameCodec, encode_frame};
-use depth_image::{PinholeCamera, PixelDepth, ProvenanceKind, View, ViewPlanes};
+use depth_image::{Antialias, PinholeCamera, PixelDepth, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec2};
 use pictures::Legend;
 use serde::Deserialize;
@@ -144,7 +144,8 @@ pub(crate) async fn picture(
     };
     let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
     let planes = match query.show {
-        Plane::Color => ViewPlanes::default(),
+        // As finished stills are.
+        Plane::Color => ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::default() },
         Plane::Depth => ViewPlanes::WITH_DEPTH,
         Plane::Provenance => ViewPlanes::WITH_PROVENANCE,
     };

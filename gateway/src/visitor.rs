@@ -7,10 +7,10 @@
 use std::sync::Arc;
 
 use axum::extract::ws::WebSocket;
-use client::{ClientError, ClientId, EncodedFrame, Session};
+use client::{ClientError, ClientId, EncodedFrame, PictureQuality, Session};
 use cluster::{Assignment, Policy, SessionPlan};
 use codec::FrameCodec;
-use depth_image::Camera;
+use depth_image::{Antialias, Camera};
 use glam::UVec2;
 use tokio::sync::watch;
 
@@ -41,6 +41,7 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
         scene: scene.offer.name.clone(),
         home: scene.home,
         light_steps: scene.shown.light_steps,
+        still_samples: Antialias::MOST.samples(),
         moments: scene.timeline().set_count,
         moment_step_s: scene.timeline().step_s,
         max_still_px: gateway.config.max_still_px.to_array(),
@@ -51,6 +52,7 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
         is_moving: false,
         light_step: 0,
         finished_with: None,
+        most_samples: Antialias::MOST,
         scene,
         max_still_px: gateway.config.max_still_px,
         newest: None,
@@ -91,6 +93,8 @@ struct Visitor {
     light_step: u32,
     /// The sample cameras of the finished still; `None` where there is none, or its plan is over.
     finished_with: Option<Vec<Camera>>,
+    /// Samples a pixel of a finished still: fewer where the cluster has refused more.
+    most_samples: Antialias,
     max_still_px: UVec2,
     newest: Option<Pose>,
     /// The number of the last picture.
@@ -204,6 +208,13 @@ impl Visitor {
                 },
                 frame = still.next() => match frame {
                     Ok((frame, asked)) => self.forward(page, session, &mut still, frame, asked)?,
+                    Err(ClientError::Exhausted { .. }) if self.most_samples > Antialias::NONE => {
+                        self.most_samples = fewer(self.most_samples);
+                        still = PictureStream::new(session, client);
+                        if let Some(pose) = self.newest {
+                            self.ask(pose, &mut motion, &mut still)?;
+                        }
+                    }
                     Err(error) => return Ok(Some(error)),
                 },
             }
@@ -247,10 +258,12 @@ impl Visitor {
         } else {
             (motion, chosen.size_px(canvas_px), FrameCodec::Jpeg { quality: chosen.quality() })
         };
+        // The first still comes soon: more samples follow once its light is finished.
+        let quality = PictureQuality { codec, antialias: Antialias::NONE };
         let camera = self.scene.space.camera(&pose.camera, canvas_px).map(|camera| camera.resized(size_px));
         let camera = camera.map_err(|error| End::Refused(error.to_string()))?;
         let set_index = if self.is_moving { pose.moment } else { self.light_step };
-        stream.ask(pose, camera, set_index, codec).map_err(|error| End::Refused(error.to_string()))
+        stream.ask(pose, camera, set_index, quality).map_err(|error| End::Refused(error.to_string()))
     }
 
     /// Passes a picture on, unless a later one was sent, or it is a still of an earlier pose.
@@ -290,18 +303,26 @@ impl Visitor {
         if asked.pose.number != newest {
             return Ok(());
         }
-        let is_finished = is_own_cell && (shown == last || !asked.pose.still);
+        let samples = frame.header.antialias;
+        let is_finished = is_own_cell && (shown == last && samples >= self.most_samples || !asked.pose.still);
         self.finished_with = cameras_of(&plan, &frame).filter(|_| is_finished);
         if is_finished && (self.finished_with.is_some() || !asked.pose.still) {
             return Ok(());
         }
-        // A visitor that rests would see a neighbouring cell's picture, an earlier plan's or unfinished light for ever.
+        // A visitor that rests would see a neighbouring cell's picture, an earlier plan's, unfinished light or few samples a
+        // pixel for ever.
         let next_set = match (self.is_moving, is_own_cell) {
             (true, _) => frame.request.set_index,
             (false, true) => (shown + 1).min(last),
             (false, false) => self.light_step,
         };
-        let again = stream.ask(asked.pose, frame.request.camera, next_set, frame.header.codec);
+        let antialias = if is_own_cell && shown == last && asked.pose.still {
+            more(samples).min(self.most_samples)
+        } else {
+            Antialias::NONE
+        };
+        let quality = PictureQuality { codec: frame.header.codec, antialias };
+        let again = stream.ask(asked.pose, frame.request.camera, next_set, quality);
         again.map_err(|error| End::Refused(error.to_string()))
     }
 
@@ -350,6 +371,16 @@ impl Visitor {
             self.rate.step(now_s, Shown { age_s: age_ms / 1000.0, rtt_s, height_px });
         }
     }
+}
+
+/// The samples a pixel of the still after one with so many. Each step costs more than all before it, and positions of one
+/// view share their work, which views of one position each would not.
+fn more(samples: Antialias) -> Antialias {
+    Antialias::of(4 * samples.samples()).unwrap_or(Antialias::MOST)
+}
+
+fn fewer(samples: Antialias) -> Antialias {
+    Antialias::of(samples.samples() / 4).unwrap_or(Antialias::NONE)
 }
 
 /// Whether a plan has a view cell near a frame's camera. Where it has none, the next plan will.

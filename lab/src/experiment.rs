@@ -44,32 +44,27 @@ pub struct Delivered {
     pub plan: SessionPlan,
     /// Seconds from the request to the last frame, decoded and checksummed.
     pub seconds: f64,
-    /// Frames by number: set by set, and view by view in each.
-    pub frames: Vec<Frame>,
 }
 
-/// Receives all views of all sets; `arrived` is called for each.
+/// Receives all views of all sets, in the order in which they come; `arrived` is called for each.
 ///
 /// # Errors
 /// As [`receive`].
 pub async fn receive_all(
     session: &Session,
     views: &[PinholeCamera],
-    mut arrived: impl FnMut(&Frame),
+    mut arrived: impl FnMut(Frame),
 ) -> anyhow::Result<Delivered> {
-    let mut frames = Vec::new();
     let received = async |frame| {
-        arrived(&frame);
-        frames.push(frame);
+        arrived(frame);
         Ok(())
     };
     let seconds = receive(session, views, received).await?;
-    frames.sort_by_key(|frame| frame.request.frame);
-    Ok(Delivered { plan: session.plan(), seconds, frames })
+    Ok(Delivered { plan: session.plan(), seconds })
 }
 
 /// Sample sets that a node has room for: one in use and one to come. Every run has sets of its own, and none needs them again.
-const SETS_IN_MEMORY: usize = 2;
+const SETS_IN_MEMORY: usize = 1;
 
 /// Half of a node's memory is for sets on the device, with the images that are relayed.
 fn set_memory_bytes(setup: &Setup) -> usize {
@@ -135,7 +130,7 @@ impl Experiment {
     }
 
     /// Delivers views of a new sample set. The time excludes the coordinator's measurements.
-    pub fn deliver(&self, settings: DeliverySettings, arrived: impl FnMut(&Frame)) -> anyhow::Result<Delivered> {
+    pub fn deliver(&self, settings: DeliverySettings, arrived: impl FnMut(Frame)) -> anyhow::Result<Delivered> {
         let run = self.runs.replace(self.runs.get() + 1);
         let views = self.views(settings.views)?;
         let request = SessionRequest {

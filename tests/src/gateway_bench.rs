@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use client::ViewRequest;
 use cluster::{PolicyChoice, SessionRequest, Timeline};
-use depth_image::{PinholeCamera, View, ViewPlanes};
+use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
 use gateway::GatewayConfig;
 use glam::{DVec3, UVec2, Vec3};
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
@@ -82,12 +82,13 @@ impl GatewayBench {
         self.gateway = serve(self.authority(), self.config.clone());
     }
 
-    /// The picture of a camera as the Rust client receives it: sRGB bytes, row by row.
+    /// The finished still of a camera as the Rust client receives it: sRGB bytes, row by row.
     ///
     /// # Panics
     /// The cluster does not serve.
     pub async fn reference(&self, camera: &PageCamera, size_px: [u32; 2]) -> Vec<u8> {
-        self.reference_view(camera, size_px, ViewPlanes::default()).await.srgb8
+        let planes = ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::default() };
+        self.reference_view(camera, size_px, planes).await.srgb8
     }
 
     /// As [`GatewayBench::reference`], with further planes.

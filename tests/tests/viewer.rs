@@ -155,6 +155,18 @@ impl Visitor {
         pictures
     }
 
+    /// The stills that follow the first one of a pose, up to the one with all samples a pixel.
+    async fn finished(&mut self, first: &Picture) -> Vec<Picture> {
+        self.shown(first).await;
+        let mut stills = Vec::new();
+        while stills.last().is_none_or(|still: &Picture| still.header["samples"] != 16) {
+            let still = self.picture().await;
+            self.shown(&still).await;
+            stills.push(still);
+        }
+        stills
+    }
+
     /// The reason of a refusal, after which the connection ends.
     async fn refusal(&mut self) -> String {
         tokio::time::timeout(SOON, self.refused()).await.expect("a refusal in time")
@@ -185,6 +197,9 @@ async fn a_still_is_the_picture_of_the_rust_client_to_the_bit() {
         (number, &json!(true), &json!("image/png"))
     );
     assert_eq!(still.header["size_px"], json!(SIZE));
+    let samples = visitor.finished(&still).await;
+    assert_eq!(samples.iter().map(|still| still.header["samples"].as_u64().unwrap()).collect::<Vec<_>>(), [4, 16]);
+    let still = &samples[1];
     let rgb = still.rgb(FrameCodec::Png);
     assert!(rgb == bench.reference(EYE).await);
     assert!(rgb != bench.reference([0.2, 1.2, 3.0]).await, "a shifted camera shows another picture");
@@ -241,13 +256,14 @@ async fn two_visitors_see_their_own_pictures_in_one_session() {
     one.pose(EYE, true).await;
     other.pose([0.3, 1.0, 2.5], true).await;
     let (of_one, of_other) = (one.picture().await, other.picture().await);
+    let (of_one, of_other) = (one.finished(&of_one).await, other.finished(&of_other).await);
     // A status is told again for half a second.
     tokio::time::sleep(Duration::from_millis(600)).await;
     let (_, body) = bench.get("/api/v1/status.json", "Host: 127.0.0.1\r\n").await;
     let status: Value = serde_json::from_slice(&body).unwrap();
     assert_eq!((&status["visitors"], &status["workloads"][0]["sessions"]), (&json!(2), &json!(1)));
-    assert!(of_one.rgb(FrameCodec::Png) == bench.reference(EYE).await);
-    assert!(of_other.rgb(FrameCodec::Png) == bench.reference([0.3, 1.0, 2.5]).await);
+    assert!(of_one[1].rgb(FrameCodec::Png) == bench.reference(EYE).await);
+    assert!(of_other[1].rgb(FrameCodec::Png) == bench.reference([0.3, 1.0, 2.5]).await);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -265,7 +281,11 @@ async fn a_scene_that_moves_shows_the_moment_of_each_pose() {
             .extend([("moment".to_owned(), json!(moment)), ("still".to_owned(), json!(still))]);
         visitor.tell(&pose).await;
         let picture = visitor.picture().await;
-        visitor.shown(&picture).await;
+        if still {
+            visitor.finished(&picture).await;
+        } else {
+            visitor.shown(&picture).await;
+        }
         let set = picture.header["set"].as_str().unwrap().to_owned();
         assert_eq!((picture.number(), set.ends_with(&format!(".{moment}"))), (number, true), "{set}");
     }

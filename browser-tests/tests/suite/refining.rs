@@ -1,4 +1,4 @@
-//! Stills whose light is refined in steps.
+//! Stills whose light is refined in steps, and then their samples a pixel.
 
 use browser_tests::visit::{Expected, Visit};
 use cluster::{Refinement, SessionRequest, Timeline};
@@ -17,7 +17,7 @@ const WATCH_BADGE: &str = "addEventListener('DOMContentLoaded', () => {
 })";
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_still_is_exact_only_in_its_last_step_of_light() {
+async fn a_still_is_exact_only_in_its_last_light_with_all_samples() {
     let timeline = Timeline { start_s: 0.0, step_s: 0.0, set_count: STEPS };
     let (_bench, url) = gateway_of(SessionRequest { refinement_steps: STEPS, timeline, ..slow_request() }).await;
     let visit = Visit::to("about:blank").await;
@@ -31,7 +31,13 @@ async fn a_still_is_exact_only_in_its_last_step_of_light() {
     let mut badges: Vec<(String, u32)> = visit.browser.value("badges").await.unwrap();
     // Without a number, it is the last picture in motion, which rests.
     badges.retain(|(text, _)| !["moving", "waiting", "still"].contains(&text.as_str()));
-    let expected = [("still (light 1 of 3)", 1), ("still (light 2 of 3)", 2), ("exact", 3)];
+    let expected = [
+        ("still (light 1 of 3)", 1),
+        ("still (light 2 of 3)", 2),
+        ("still (1 of 16 samples)", 3),
+        ("still (4 of 16 samples)", 3),
+        ("exact", 3),
+    ];
     assert_eq!(badges, expected.map(|(text, step)| (text.to_owned(), step)));
     let last = ball_linear(0.0, Refinement { step: STEPS - 1, steps: STEPS });
     assert!(visit.canvas().await.srgb8.as_chunks::<3>().0.contains(&srgb8(last)), "the ball in its last light");

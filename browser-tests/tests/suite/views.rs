@@ -5,7 +5,7 @@ use browser::inspect::Pixels;
 use browser_tests::visit::{Expected, Picture, Visit};
 use cluster::Refinement;
 use cluster_tests::gateway_bench::PageCamera;
-use cluster_tests::scalar_engine::{BALL_RADIUS_M, ball_center, ball_linear, srgb8};
+use cluster_tests::scalar_engine::{BALL_RADIUS_M, FLOOR_LINEAR, SKY_LINEAR, ball_center, ball_linear, srgb8};
 use glam::{UVec2, Vec2, Vec3};
 
 use crate::scene::{SAMPLE_PX, gateway};
@@ -17,11 +17,13 @@ fn extents(places: impl Iterator<Item = Vec2>) -> Extents {
     places.fold([Vec2::INFINITY, Vec2::NEG_INFINITY], |[low, high], at| [low.min(at), high.max(at)])
 }
 
-/// Where the ball is on the screen.
+/// Where the ball is on the screen: pixels whose colour is nearest to its own.
 fn seen(canvas: &Pixels) -> Extents {
-    let color = srgb8(ball_linear(0.0, Refinement::default()));
+    let [ball, others @ ..] = [ball_linear(0.0, Refinement::default()), FLOOR_LINEAR, SKY_LINEAR].map(srgb8);
+    let distance = |pixel: &[u8], color: [u8; 3]| pixel.iter().zip(color).map(|(a, b)| a.abs_diff(b)).max();
+    let is_ball = |pixel: &[u8]| others.iter().all(|&other| distance(pixel, ball) < distance(pixel, other));
     let width = canvas.size_px[0] as usize;
-    let pixels = canvas.srgb8.chunks_exact(3).enumerate().filter(|(_, pixel)| *pixel == color);
+    let pixels = canvas.srgb8.chunks_exact(3).enumerate().filter(|(_, pixel)| is_ball(pixel));
     extents(pixels.map(|(at, _)| Vec2::new((at % width) as f32 + 0.5, (at / width) as f32 + 0.5)))
 }
 

@@ -10,7 +10,7 @@ use wgpu::BufferUsages;
 use crate::{device::Gpu, faults::Faults};
 
 /// The most bytes of free buffers: those of a few batches.
-const MOST_FREE_BYTES: u64 = 256 << 20;
+const MOST_FREE_BYTES: u64 = 128 << 20;
 
 /// Items that nobody has.
 struct Free<K, T> {

@@ -28,6 +28,12 @@ const HYBRID: &str = "hybrid_mesh";
 const SCENES: [&str; 3] = ["tree-terrain-500k", "urban", "grass"];
 /// What FLIP with four samples a pixel may be at most, over that with one, for each of the scenes.
 const FLIP_BARS: [f64; 3] = [0.82, 0.70, 0.85];
+/// The number of models on which defaults are compared with those before, the largest files.
+const DEFAULTS_MODELS: usize = 4;
+/// The size of sample images before they followed the views.
+const FIXED_SAMPLES_PX: UVec2 = UVec2::new(400, 300);
+/// The least gain in foreground PSNR of the defaults over those before: the mean of models, and of each.
+const LEAST_GAINS_DB: [f64; 2] = [4.0, 2.5];
 /// Sizes at which c is compared.
 const TIMED_SIZES_PX: [UVec2; 2] = [VIEW_SIZE_PX, UVec2::new(640, 360)];
 /// Views of a batch that is timed.
@@ -102,6 +108,50 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
         report.checks.extend(subject.costs(args, "peer scene")?);
     }
     report.tables.push(table);
+    defaults(args, engine, report)
+}
+
+/// Compares the defaults, four samples a pixel from sample images that follow the views, with those before: one, from
+/// 400×300.
+fn defaults(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
+    let [mean_name, least_name] =
+        ["mean", "least"].map(|of| format!("models: foreground PSNR over the defaults before, {of}"));
+    let Some(folder) = &args.models else {
+        let names = [mean_name, least_name].into_iter().zip(LEAST_GAINS_DB);
+        let not_run = |(name, bar)| Check::not_run(name, "dB", Bar::AtLeast(bar), "--models is not given");
+        report.checks.extend(names.map(not_run));
+        return Ok(());
+    };
+    let columns = [
+        ("model", ""),
+        ("foreground PSNR before", "dB"),
+        ("foreground PSNR", "dB"),
+        ("foreground FLIP before", ""),
+        ("foreground FLIP", ""),
+    ];
+    let mut table = Table::new("Defaults, and those before, against direct views with 64 samples a pixel", &columns);
+    let paths = models_of(folder, DEFAULTS_MODELS)?;
+    let progress = bar("defaults on models", paths.len());
+    let mut gains_db = Vec::with_capacity(paths.len());
+    for path in paths {
+        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        let subject = Subject::new(args, engine, scene_args(SceneSpec::File(path)))?;
+        let four = Antialias::of(4).context("four samples are offered")?;
+        let row =
+            |subject: &Subject, antialias| subject.row(Maker::Reconstructed(args.scene.method), antialias, f64::NAN);
+        let (now, before) =
+            (row(&subject, four)?, row(&subject.resampled(engine, FIXED_SAMPLES_PX)?, Antialias::NONE)?);
+        let cells = [before.foreground_psnr_db, now.foreground_psnr_db, before.foreground_flip, now.foreground_flip];
+        table.push([name.into()].into_iter().chain(cells.map(Into::into)))?;
+        gains_db.push(now.foreground_psnr_db - before.foreground_psnr_db);
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    let mean = gains_db.iter().sum::<f64>() / gains_db.len() as f64;
+    let least = gains_db.into_iter().fold(f64::INFINITY, f64::min);
+    report.tables.push(table);
+    let checks = [(mean_name, mean), (least_name, least)].into_iter().zip(LEAST_GAINS_DB);
+    report.checks.extend(checks.map(|((name, gain), bar)| Check::new(name, gain, "dB", Bar::AtLeast(bar))));
     Ok(())
 }
 
@@ -128,6 +178,15 @@ impl Subject {
         let mut subject = Self { setup, args: scene, reference, truth: Vec::new() };
         subject.truth = subject.drawn_with_64()?;
         Ok(subject)
+    }
+
+    /// The same views from sample images of another size.
+    fn resampled(&self, engine: &Arc<GpuEngine>, size_px: UVec2) -> anyhow::Result<Self> {
+        let Setup { scene, around, samples, offer } = &self.setup;
+        let samples = samples.iter().map(|camera| camera.resized(size_px)).collect();
+        let setup = Setup { scene: scene.clone(), around: around.clone(), samples, offer: offer.clone() };
+        let reference = ReferenceViews::draw(engine, &setup, &self.args, self.reference.cameras.clone())?;
+        Ok(Self { setup, args: self.args.clone(), reference, truth: self.truth.clone() })
     }
 
     /// Means in linear light of four patterns of 16 that interleave.
@@ -165,12 +224,17 @@ impl Subject {
         })?;
         let rows = works.into_iter().zip(seconds).map(|((maker, antialias), seconds)| {
             progress.inc(1);
-            let views = self.views(maker, ViewPlanes { antialias, ..ViewPlanes::ALL })?;
-            Row::of(maker, antialias, seconds * 1e3 / views.len() as f64, &self.truth, &views)
+            self.row(maker, antialias, seconds)
         });
         let rows = rows.collect();
         progress.finish_and_clear();
         rows
+    }
+
+    /// The errors of all views, which took so many seconds.
+    fn row(&self, maker: Maker, antialias: Antialias, seconds: f64) -> anyhow::Result<Row> {
+        let views = self.views(maker, ViewPlanes { antialias, ..ViewPlanes::ALL })?;
+        Row::of(maker, antialias, seconds * 1e3 / views.len() as f64, &self.truth, &views)
     }
 
     /// The mean of four whole reconstructions, each of one position.

@@ -26,11 +26,11 @@ pub fn delivered(args: &BenchArgs, experiment: &Experiment, report: &mut Report)
     let (mut pipeline, mut direct) = (Vec::new(), Vec::new());
     let mut reason = String::new();
     for _ in 0..args.runs() {
-        let run = experiment.deliver(experiment.delivery(PolicyChoice::Pipeline, PAPER_VIEWS), |_| ())?;
+        let run = experiment.deliver(experiment.delivery(PolicyChoice::Pipeline, PAPER_VIEWS), drop)?;
         reason = run.plan.reason;
         pipeline.push(PAPER_VIEWS as f64 / run.seconds);
         progress.inc(1);
-        let run = experiment.deliver(experiment.delivery(PolicyChoice::Direct, DIRECT_VIEWS), |_| ())?;
+        let run = experiment.deliver(experiment.delivery(PolicyChoice::Direct, DIRECT_VIEWS), drop)?;
         direct.push(DIRECT_VIEWS as f64 / run.seconds);
         progress.inc(1);
     }

@@ -14,7 +14,8 @@ use crate::reference_views::ReferenceViews;
 /// Adds tables and charts, all views in the finest light, and six of them beside reference views.
 pub fn show(args: &DemoArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<Vec<Row>> {
     let mut frames: Vec<Frame> = Vec::new();
-    let rows = lighting_study::measure(experiment, Extent::demo(args.quick), |delivered| frames = delivered.frames)?;
+    let rows = lighting_study::measure(experiment, Extent::demo(args.quick), |frame| frames.push(frame))?;
+    frames.sort_by_key(|frame| frame.request.frame);
     let lamps = experiment.setup.scene.illumination.lights.len();
     lighting_study::report(&rows, lamps, report)?;
     if let Some(finest) = rows.last() {

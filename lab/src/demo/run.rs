@@ -9,7 +9,7 @@ use depth_image::PinholeCamera;
 use engine::GpuEngine;
 use node::Engine as _;
 use scene::Limits;
-use study::{Bar, Check, Report};
+use study::{Bar, Check, Picture, Report};
 
 use super::args::{COMPARED_VIEWS, DemoArgs};
 use super::{beside, charts, light, showcase, timing};
@@ -28,10 +28,11 @@ const TIME_LIMIT_S: f64 = 180.0;
 /// # Errors
 /// Input that cannot be used, or a failure of the device or the cluster.
 pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
-    if args.showcase {
-        return showcase_alone(args);
-    }
     let start = Instant::now();
+    let cover = first_page(args)?;
+    if args.showcase {
+        return Ok(Outcome::Done);
+    }
     let given = given_views(args)?;
     let experiment = Experiment::start(args.scene.clone(), given, args.device.device, usize::from(args.nodes))?;
     println!(
@@ -40,7 +41,6 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
         experiment.setup.scene.triangle_count(),
         experiment.engine.device_name()
     );
-    let cover = showcase::write(&experiment.engine, &experiment.setup, &args.scene, &args.out)?;
     let mut report = new_report(args, &experiment);
     report.cover = Some(cover);
     // What sharing gains where light is expensive comes first; plain light is beside it.
@@ -62,12 +62,11 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::of(ok || !args.strict))
 }
 
-/// The first page alone, without a cluster.
-fn showcase_alone(args: &DemoArgs) -> anyhow::Result<Outcome> {
+/// The first page, on a device of its own: its views are far larger than the others, and so are their buffers.
+fn first_page(args: &DemoArgs) -> anyhow::Result<Picture> {
     let setup = args.scene.load()?;
     let engine = GpuEngine::shared(args.device.device)?;
-    showcase::write(&engine, &setup, &args.scene, &args.out)?;
-    Ok(Outcome::Done)
+    showcase::write(&engine, setup, &args.scene, &args.out)
 }
 
 fn given_views(args: &DemoArgs) -> anyhow::Result<Vec<PinholeCamera>> {

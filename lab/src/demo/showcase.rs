@@ -54,7 +54,7 @@ fn time(seconds: f64) -> String {
 ///
 /// # Errors
 /// The device fails, or the folder cannot be written.
-pub fn write(engine: &Arc<GpuEngine>, setup: &Setup, args: &SceneArgs, folder: &Path) -> anyhow::Result<Picture> {
+pub fn write(engine: &Arc<GpuEngine>, setup: Setup, args: &SceneArgs, folder: &Path) -> anyhow::Result<Picture> {
     let picture = first_page(engine, setup, args)?;
     let path = folder.join("first-page.png");
     let writing = || -> anyhow::Result<()> {
@@ -68,20 +68,15 @@ pub fn write(engine: &Arc<GpuEngine>, setup: &Setup, args: &SceneArgs, folder: &
     Ok(picture)
 }
 
-fn first_page(engine: &Arc<GpuEngine>, setup: &Setup, args: &SceneArgs) -> anyhow::Result<Picture> {
+fn first_page(engine: &Arc<GpuEngine>, setup: Setup, args: &SceneArgs) -> anyhow::Result<Picture> {
     let asked = args.lighting != Lighting::default();
     let lighting = if asked { args.lighting } else { LIGHTING.parse()? };
     let args = SceneArgs { lighting, ..args.clone() };
-    let viewpoint = Viewpoint::of(&args.scene, setup)?;
+    let viewpoint = Viewpoint::of(&args.scene, &setup)?;
     let camera = viewpoint.camera(VIEW_PX.into());
     let denser_px = (camera.size_px.as_vec2() * DENSITY).as_uvec2();
     let around = viewpoint.samples(args.sample_size.fixed_px().unwrap_or(denser_px));
-    let setup = Setup {
-        scene: setup.scene.clone(),
-        samples: args.sampling.cameras(around.clone()),
-        around,
-        offer: setup.offer.clone(),
-    };
+    let setup = Setup { samples: args.sampling.cameras(around.clone()), around, ..setup };
     let start = Instant::now();
     let reference = ReferenceViews::draw(engine, &setup, &args, vec![camera.resized(WARM_UP_PX)])?;
     let samples_s = start.elapsed().as_secs_f64();

@@ -64,13 +64,12 @@ pub fn measure(experiment: &Experiment, quick: bool) -> anyhow::Result<Times> {
     for method in compared(experiment.args.method) {
         let mut runs = Vec::new();
         for &count in &counts {
-            let delivered = deliver(experiment, PolicyChoice::Pipeline, method, count)?;
-            runs.push(run_of(count, &delivered));
+            runs.push(deliver(experiment, PolicyChoice::Pipeline, method, count)?);
         }
         times.pipelines.push((method.to_string(), runs));
     }
     for count in DIRECT_VIEWS {
-        times.direct.push(run_of(count, &deliver(experiment, PolicyChoice::Direct, experiment.args.method, count)?));
+        times.direct.push(deliver(experiment, PolicyChoice::Direct, experiment.args.method, count)?);
     }
     let assignment = times.direct.first().map(|run| &run.plan.assignment);
     times.nodes = assignment.map_or(0, |assignment| assignment.compositors.len());
@@ -81,19 +80,19 @@ fn deliver(
     experiment: &Experiment,
     policy: PolicyChoice,
     method: ReconstructionMethod,
-    count: usize,
-) -> anyhow::Result<Delivered> {
+    views: usize,
+) -> anyhow::Result<Run> {
     let name = if policy == PolicyChoice::Direct { "direct".to_owned() } else { method.to_string() };
-    let progress = bar(format!("{count} views by {name}"), count);
-    let delivered =
-        experiment.deliver(DeliverySettings { method, ..experiment.delivery(policy, count) }, |_| progress.inc(1));
+    let progress = bar(format!("{views} views by {name}"), views);
+    let mut set_wait_s = 0.0_f64;
+    let settings = DeliverySettings { method, ..experiment.delivery(policy, views) };
+    let delivered = experiment.deliver(settings, |frame| {
+        set_wait_s = set_wait_s.max(frame.header.stage_times.set_wait_s);
+        progress.inc(1);
+    });
     progress.finish_and_clear();
-    delivered
-}
-
-fn run_of(views: usize, delivered: &Delivered) -> Run {
-    let set_wait_s = delivered.frames.iter().map(|frame| frame.header.stage_times.set_wait_s).fold(0.0, f64::max);
-    Run { views, seconds: delivered.seconds, set_wait_s, plan: delivered.plan.clone() }
+    let Delivered { plan, seconds } = delivered?;
+    Ok(Run { views, seconds, set_wait_s, plan })
 }
 
 impl Times {

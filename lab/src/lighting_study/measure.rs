@@ -1,9 +1,10 @@
 //! Measurements of lightings: parts alone, and views delivered.
 
+use client::Frame;
 use cluster::{Costs, PolicyChoice};
 use render::Lighting;
 
-use crate::experiment::{Delivered, DeliverySettings, Experiment, PAPER_VIEWS};
+use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
 use crate::progress::bar;
 
 /// The finest lighting of the demo, which the checks are about.
@@ -51,13 +52,19 @@ impl Extent {
     }
 }
 
-/// Measures every lighting, and passes every delivery to `keep`.
-pub fn measure(experiment: &Experiment, extent: Extent, mut keep: impl FnMut(Delivered)) -> anyhow::Result<Vec<Row>> {
+/// Measures every lighting, and passes the frames of the last one to `finest`, in the order in which they come.
+pub fn measure(experiment: &Experiment, extent: Extent, mut finest: impl FnMut(Frame)) -> anyhow::Result<Vec<Row>> {
     let progress = bar("light", extent.qualities);
     let mut rows = Vec::with_capacity(extent.qualities);
     for name in &QUALITIES[..extent.qualities] {
         let views = if *name == FINE { extent.views } else { &extent.views[..1] };
-        rows.push(row(experiment, name.parse()?, views, &mut keep)?);
+        let is_last = rows.len() + 1 == extent.qualities;
+        let arrived = |frame| {
+            if is_last {
+                finest(frame)
+            }
+        };
+        rows.push(row(experiment, name.parse()?, views, arrived)?);
         progress.inc(1);
     }
     progress.finish_and_clear();
@@ -68,20 +75,19 @@ fn row(
     experiment: &Experiment,
     lighting: Lighting,
     views: &[usize],
-    keep: &mut impl FnMut(Delivered),
+    mut arrived: impl FnMut(Frame),
 ) -> anyhow::Result<Row> {
     let settings = |policy, count| DeliverySettings { lighting, ..experiment.delivery(policy, count) };
     let mut pipelines = Vec::with_capacity(views.len());
     let mut plan = None;
     for &count in views {
-        let delivered = experiment.deliver(settings(PolicyChoice::Pipeline, count), |_| ())?;
+        let delivered = experiment.deliver(settings(PolicyChoice::Pipeline, count), &mut arrived)?;
         pipelines.push((count, delivered.seconds));
-        plan = Some(delivered.plan.clone());
-        keep(delivered);
+        plan = Some(delivered.plan);
     }
     let plan = plan.ok_or_else(|| anyhow::anyhow!("no views are asked for"))?;
     let direct_views = ((DIRECT_S / plan.costs.direct_view_s) as usize).clamp(4, 48);
-    let direct = experiment.deliver(settings(PolicyChoice::Direct, direct_views), |_| ())?;
+    let direct = experiment.deliver(settings(PolicyChoice::Direct, direct_views), drop)?;
     Ok(Row {
         lighting,
         costs: plan.costs,
