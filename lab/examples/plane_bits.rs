@@ -19,7 +19,7 @@ use sampling::{Redundancy, SamplingMethod};
 use study::{Cell, Table};
 
 const SIZE_PX: UVec2 = UVec2::splat(1024);
-const METHODS: [SamplingMethod; 2] = [SamplingMethod::Conventional, SamplingMethod::NonRedundant(Redundancy::Pixel)];
+const METHODS: [SamplingMethod; 2] = [SamplingMethod::CONVENTIONAL, SamplingMethod::NonRedundant(Redundancy::Pixel)];
 const PLANES: [PlaneKind; 3] = [PlaneKind::InverseDepth, PlaneKind::ColorRgb9e5, PlaneKind::Passed1];
 const RUNS: usize = 15;
 

@@ -149,7 +149,7 @@ impl ReferenceViews {
 }
 
 /// The sample set as compositors decode it.
-fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result<Vec<DepthImage>> {
+pub(crate) fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result<Vec<DepthImage>> {
     let work = SampleWork {
         scene_hash: setup.offer.hash.to_string(),
         wanted: (0..setup.samples.len() as u32).collect(),

@@ -64,12 +64,13 @@ pub(crate) struct Recording<'a> {
 pub(crate) type Position = (u32, Vec<PinholeCamera>);
 
 impl Batch<'_> {
-    /// All positions within the pixels. The centre comes last where it gives depth alone.
+    /// All positions within the pixels. The centre of a depth image comes first; that of a view last, for depth alone.
     pub fn positions(&self) -> Vec<Position> {
-        let Output { antialias, depth, .. } = self.output;
-        let center = (depth && antialias > Antialias::NONE).then_some(Vec2::ZERO);
+        let Output { antialias, depth, samples, .. } = self.output;
+        let center = |is: bool| (is && antialias > Antialias::NONE).then_some(Vec2::ZERO);
         let shifted = |offset_px: Vec2| self.cameras.iter().map(|camera| camera.with_offset(offset_px)).collect();
-        (0..).zip(antialias.offsets_px().chain(center).map(shifted)).collect()
+        let all = center(samples).into_iter().chain(antialias.offsets_px()).chain(center(depth && !samples));
+        (0..).zip(all.map(shifted)).collect()
     }
 
     /// The batch at one position.
@@ -80,7 +81,7 @@ impl Batch<'_> {
 
     /// Whether colour is wanted of this position.
     pub fn has_color(&self) -> bool {
-        self.position < self.output.antialias.samples()
+        self.output.samples || self.position < self.output.antialias.samples()
     }
 
     /// The bytes of planes of all pixels.

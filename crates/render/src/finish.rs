@@ -17,6 +17,9 @@ use crate::{
     RenderError, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest, sums::SumPlanes, surfaces::Surfaces,
 };
 
+/// Inverse depths within a texel differ by this share at most where they are of one surface.
+pub const SAME_SURFACE: f32 = 0.005;
+
 /// `Finish` of the shader.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -50,13 +53,14 @@ impl Finish {
     /// The variants with each usefulness test.
     pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
         let useful: HashSet<_> = tests.iter().filter_map(|test| test.usefulness).collect();
-        useful.into_iter().flat_map(|test| Self::of_images(true, Some(test)))
+        useful
+            .into_iter()
+            .flat_map(|test| Self::of_images(Output { passed: true, usefulness_test: Some(test), ..Output::default() }))
     }
 
-    fn of_images(passed: bool, usefulness_test: Option<&'static str>) -> impl Iterator<Item = Self> {
+    fn of_images(output: Output) -> impl Iterator<Item = Self> {
         switches().flat_map(move |[normal, reflector, surface_id]| {
-            let planes = Output { samples: true, normal, reflector, surface_id, passed, ..Output::default() };
-            Self::of_output(Output { usefulness_test, ..planes })
+            Self::of_output(Output { samples: true, normal, reflector, surface_id, ..output })
         })
     }
 
@@ -95,7 +99,9 @@ impl ShaderVariant for Finish {
             [Antialias::NONE, Antialias::MOST].map(|antialias| Output { highlight, antialias, ..Output::default() })
         });
         let views = colors.flat_map(Self::of_output);
-        views.chain(Self::of_images(false, None)).chain(Self::of_images(true, None)).collect()
+        let plain = Output::default();
+        let images = [plain, Output { antialias: Antialias::MOST, ..plain }, Output { passed: true, ..plain }];
+        views.chain(images.into_iter().flat_map(Self::of_images)).collect()
     }
 }
 
@@ -111,7 +117,7 @@ impl Planes {
         let bytes = batch.bytes(batch.output.layout().count);
         gpu.check_storage_bytes("the planes of a batch (bytes)", bytes)?;
         let is_averaged = batch.output.antialias > Antialias::NONE;
-        let sum_bytes = if is_averaged { batch.bytes(3) } else { 0 };
+        let sum_bytes = if is_averaged { batch.bytes(3 + usize::from(batch.output.samples)) } else { 0 };
         gpu.check_storage_bytes("the sums of several samples a pixel (bytes)", sum_bytes)?;
         let sums = is_averaged.then(|| pool.lend_storage("sums of positions", sum_bytes.max(4)));
         Ok(Self { words: pool.lend_storage("planes", bytes.max(4)), position_sums: sums })

@@ -21,7 +21,7 @@
 @group(0) var<storage, read> sums: array<f32>;
 @group(0) var<uniform> finish: Finish;
 {% if averaged %}
-// Red, green and blue of each pixel: linear light, over the positions so far.
+// Red, green and blue of each pixel: linear light, over the positions so far; of a texel, with the number that counts.
 @group(0) var<storage, read_write> position_sums: array<f32>;
 {% endif %}
 {% if highlight %}
@@ -62,7 +62,22 @@ fn visibility_word(word: u32, place: u32, open: f32) -> u32 {
 }
 {% endif %}
 
-{% if averaged %}
+{% if averaged and samples %}
+
+// Adds the colour of one position, if it shows the surface of the centre, the first position; gives the mean so far.
+fn mean_with(color: vec3f, inverse_depth_per_m: f32, place: u32) -> vec3f {
+    let first = 4u * (camera.first_word / {{ plane_count }}u + place);
+    var sum = vec4f(color, 1.0);
+    if finish.position > 0u {
+        let center_per_m = bitcast<f32>(words[camera.first_word + camera.pixel_count + place]);
+        let is_same = abs(inverse_depth_per_m - center_per_m) <= SAME_SURFACE * center_per_m;
+        sum = select(vec4f(0.0), sum, is_same);
+        for (var i = 0u; i < 4u; i++) { sum[i] += position_sums[first + i]; }
+    }
+    for (var i = 0u; i < 4u; i++) { position_sums[first + i] = sum[i]; }
+    return sum.rgb / sum.a;
+}
+{% elif averaged %}
 
 // Adds the colour of one position, and gives the mean of all so far.
 fn mean_with(color: vec3f, place: u32) -> vec3f {
@@ -109,7 +124,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% endif %}
     for (var open = !met; open; open = false) { linear = background_linear(direction_of(pixel)); }
     let color = linear;
-{% if samples %}
+{% if samples and averaged %}
+    put(0u, place, rgb9e5_from_linear(mean_with(color, depth / camera.near_m, place)));
+    // All other planes are the centre's.
+    if finish.position > 0u { return; }
+{% elif samples %}
     put(0u, place, rgb9e5_from_linear(color));
 {% else %}
     let shown = shown_from_mean({{ "mean_with(color, place)" if averaged else "color" }}, finish.tone);

@@ -14,7 +14,7 @@ pub(crate) struct Output {
     pub sums: SumPlanes,
     /// Samples of depth images, or else colours of views.
     pub samples: bool,
-    /// Positions within a pixel whose mean is a view's colour.
+    /// Positions within a pixel whose mean is a view's colour. Those of depth images lie around the centre, which counts, too.
     pub antialias: Antialias,
     /// Whether depth is wanted, which is the centre's.
     pub depth: bool,

@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, slice, sync::Arc};
 
-use depth_image::{Camera, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
+use depth_image::{Antialias, Camera, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
 use glam::UVec2;
 use gpu::{Frame, Gpu, GpuError, Templates, Turn, WorkClass};
 use parking_lot::Mutex;
@@ -339,8 +339,10 @@ fn views_output(work: DrawWork<'_>) -> Output {
 
 fn images_output(work: DrawWork<'_>, planes: SamplePlanes, test: Option<RedundancyTest>) -> Output {
     let reflector = planes.specular && work.highlight().is_some();
+    let antialias = if work.refinement.steps > 1 { Antialias::NONE } else { planes.antialias };
     Output {
         samples: true,
+        antialias,
         normal: planes.normal || reflector,
         reflector,
         surface_id: planes.surface_id,

@@ -8,8 +8,15 @@ use crate::rays::primary::{MOST_LAYERS, Primary};
 use crate::rays::ray_scene::MATERIAL_TEXELS;
 use crate::rays::traversal::{BOX_SLACK, EDGE_ROUNDINGS};
 use crate::{
-    finish::Finish, illuminate::Illuminate, interpolate::Interpolate, keep::Keep, pixel_list::LIST_WORKGROUP,
-    raster::RasterVariant, redundancy_test::RedundancyTest, sums::COLOR_SUMS, surfaces::NOTHING,
+    finish::{Finish, SAME_SURFACE},
+    illuminate::Illuminate,
+    interpolate::Interpolate,
+    keep::Keep,
+    pixel_list::LIST_WORKGROUP,
+    raster::RasterVariant,
+    redundancy_test::RedundancyTest,
+    sums::COLOR_SUMS,
+    surfaces::NOTHING,
 };
 
 /// Numbers of a texture's wrap modes.
@@ -30,7 +37,7 @@ pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
 pub fn templates(tests: &[(&'static str, &'static str)]) -> Result<Templates, ShaderError> {
     Ok(Templates::new(&[SHADERS, tests].concat())?.declaring(wgsl_constants! {
         ALPHA_HASHED, ALPHA_TESTED, BOX_SLACK, CLAMP, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MATERIAL_TEXELS, MIRROR, MOST_LAYERS,
-        NOTHING, REFERENCE_FOOTPRINTS, SPECULAR, UNLIT, VERTEX
+        NOTHING, REFERENCE_FOOTPRINTS, SAME_SURFACE, SPECULAR, UNLIT, VERTEX
     }))
 }
 

@@ -1,6 +1,6 @@
 //! Requests to draw, besides the cameras.
 
-use depth_image::Highlight;
+use depth_image::{Antialias, Highlight};
 use gpu::Turn;
 
 use crate::{GpuScene, Lighting, Visibility};
@@ -61,9 +61,12 @@ impl Refinement {
     }
 }
 
-/// Optional planes of depth images.
+/// The samples of a texel's colour, and the optional planes of depth images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct SamplePlanes {
+    /// With more than one, a texel's colour is the mean of its centre and of as many positions around it, as far as these
+    /// show the centre's surface. Light that is refined is the centre's.
+    pub antialias: Antialias,
     /// [`DepthImage::normal_oct16`](depth_image::DepthImage::normal_oct16).
     pub normal: bool,
     /// [`DepthImage::surface_id`](depth_image::DepthImage::surface_id).

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use depth_image::{Camera, DepthImage};
 use gpu::Gpu;
-use render::{RenderError, Renderer};
+use render::{RenderError, Renderer, SamplePlanes};
 
 use crate::{error::SamplingError, methods::templates, temporal_hysteresis::TemporalHysteresis, work::SampleWork};
 
@@ -30,7 +30,8 @@ impl Sampler {
         work.method.check(work.cameras)?;
         let Some(test) = work.method.redundancy_test() else {
             let cameras: Vec<Camera> = work.wanted.iter().map(|&index| work.cameras[index as usize]).collect();
-            return Ok(self.renderer.draw_depth_images(work.draw, &cameras, work.planes)?);
+            let planes = SamplePlanes { antialias: work.method.antialias(), ..work.planes };
+            return Ok(self.renderer.draw_depth_images(work.draw, &cameras, planes)?);
         };
         let reference = self.hysteresis.reference(&self.renderer, work, test)?;
         let SampleWork { draw, cameras, wanted, planes, .. } = *work;

@@ -39,7 +39,7 @@ fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, S
         turn: Default::default(),
     };
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-    let method = SamplingMethod::Conventional;
+    let method = SamplingMethod::CONVENTIONAL;
     device().sampler.sample(&SampleWork { draw, cameras, wanted: &wanted, method, planes, temporal_reference_s: None })
 }
 

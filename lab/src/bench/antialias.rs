@@ -10,6 +10,7 @@ use engine::GpuEngine;
 use glam::{UVec2, Vec2};
 use metrics::{PictureErrors, Rgb8Image};
 use reconstruction::ReconstructionMethod;
+use sampling::SamplingMethod;
 use scene::SceneSpec;
 use study::{Axis, Bar, Better, Check, Point, Report, Series, Table, XyChart};
 
@@ -19,7 +20,7 @@ use super::peer;
 use super::timing::in_turn;
 use crate::experiment::VIEW_SIZE_PX;
 use crate::progress::bar;
-use crate::reference_views::ReferenceViews;
+use crate::reference_views::{ReferenceViews, sample};
 use crate::scene_args::scene_args;
 
 /// A method that draws, beside the one that is asked for.
@@ -72,6 +73,16 @@ const COLUMNS: [(&str, &str); 8] = [
     ("FLIP", ""),
 ];
 
+const FILTERED: [(&str, &str); 7] = [
+    ("scene", ""),
+    ("positions around a centre", ""),
+    ("time a sample image", "ms"),
+    ("foreground PSNR", "dB"),
+    ("PSNR", "dB"),
+    ("foreground FLIP", ""),
+    ("FLIP", ""),
+];
+
 /// A scene with views of it.
 struct Subject {
     setup: Setup,
@@ -84,6 +95,7 @@ struct Subject {
 /// Adds a table, charts and checks.
 pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let mut table = Table::new("Samples a pixel, against direct views with 64", &COLUMNS);
+    let mut filtered = Table::new("Colours of samples: means of texels' centres and positions around them", &FILTERED);
     let models = match &args.models {
         Some(folder) => models_of(folder, 2)?,
         None => Vec::new(),
@@ -97,6 +109,7 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
         push(&mut table, &name, &rows)?;
         report.charts.extend(charts(&name, &rows).map(Into::into));
         report.checks.extend(subject.checks(&name, FLIP_BARS.get(number), &rows)?);
+        report.checks.push(subject.push_filtered((args, engine), &name, &mut filtered)?);
         if number == 0 {
             report.checks.extend(subject.costs(args, &name)?);
         }
@@ -107,7 +120,7 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
         let subject = Subject::of_views(engine, scene, setup, views)?;
         report.checks.extend(subject.costs(args, "peer scene")?);
     }
-    report.tables.push(table);
+    report.tables.extend([table, filtered]);
     defaults(args, engine, report)
 }
 
@@ -208,6 +221,45 @@ impl Subject {
                 self.reference.drawn_from(&self.setup, self.args.lighting, &self.reference.cameras, planes)
             }
         }
+    }
+
+    /// The same views from sample images whose colours are means of so many positions around a texel's centre.
+    fn filtered(&self, engine: &Arc<GpuEngine>, antialias: Antialias) -> anyhow::Result<Self> {
+        let args = SceneArgs { sampling: SamplingMethod::Conventional(antialias), ..self.args.clone() };
+        let Setup { scene, around, samples, offer } = &self.setup;
+        let setup =
+            Setup { scene: scene.clone(), around: around.clone(), samples: samples.clone(), offer: offer.clone() };
+        let reference = ReferenceViews::draw(engine, &setup, &args, self.reference.cameras.clone())?;
+        Ok(Self { setup, args, reference, truth: self.truth.clone() })
+    }
+
+    /// Adds what means over texels bring to views of four samples a pixel; with a check of four positions over none.
+    fn push_filtered(
+        &self,
+        (args, engine): (&BenchArgs, &Arc<GpuEngine>),
+        name: &str,
+        table: &mut Table,
+    ) -> anyhow::Result<Check> {
+        let four = Antialias::of(4).context("four samples are offered")?;
+        let subjects = [Antialias::NONE, four, Antialias::MOST].map(|antialias| self.filtered(engine, antialias));
+        let subjects = subjects.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
+        let numbers: Vec<usize> = (0..subjects.len()).collect();
+        let seconds = in_turn(&numbers, args.runs(), |number| {
+            sample(engine, &subjects[number].setup, &subjects[number].args).map(drop)
+        })?;
+        let mut rows = Vec::with_capacity(subjects.len());
+        for (subject, seconds) in subjects.iter().zip(seconds) {
+            let row = subject.row(Maker::Reconstructed(args.scene.method), four, f64::NAN)?;
+            let ms = seconds * 1e3 / subject.setup.samples.len() as f64;
+            let numbers = [ms, row.foreground_psnr_db, row.psnr_db, row.foreground_flip, row.flip];
+            let positions = subject.args.sampling.antialias().samples();
+            let names = [name.into(), (if positions > 1 { positions } else { 0 }).into()];
+            table.push(names.into_iter().chain(numbers.map(Into::into)))?;
+            rows.push(row);
+        }
+        let name = format!("{name}: FLIP, colours of 4 positions around texels' centres over none");
+        let check = Check::new(name, rows[1].flip / rows[0].flip, "×", Bar::AtMost(0.97));
+        Ok(check.with_foreground(rows[1].foreground_flip / rows[0].foreground_flip))
     }
 
     fn rows(&self, args: &BenchArgs) -> anyhow::Result<Vec<Row>> {

@@ -112,7 +112,7 @@ fn merge(
 
 fn conventional(subject: &Subject, size_px: UVec2) -> anyhow::Result<Vec<DepthImage>> {
     let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
-    subject.sample(SamplingMethod::Conventional, size_px, planes)
+    subject.sample(SamplingMethod::CONVENTIONAL, size_px, planes)
 }
 
 fn upload(subject: &Subject, engine: &GpuEngine, images: &[DepthImage]) -> anyhow::Result<SampleSet> {

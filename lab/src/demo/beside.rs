@@ -17,7 +17,7 @@ const SIDE_BY_SIDE: usize = 2;
 /// Adds a table and pictures; nothing where sampling is conventional.
 pub fn conventional(experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let args = &experiment.args;
-    if args.sampling == SamplingMethod::Conventional {
+    if args.sampling == SamplingMethod::CONVENTIONAL {
         return Ok(());
     }
     let columns = [
@@ -33,7 +33,7 @@ pub fn conventional(experiment: &Experiment, report: &mut Report) -> anyhow::Res
         ("unknown", "%"),
     ];
     let mut table = Table::new("Conventional sampling beside it", &columns);
-    for sampling in [args.sampling, SamplingMethod::Conventional] {
+    for sampling in [args.sampling, SamplingMethod::CONVENTIONAL] {
         let reference = taken(experiment, sampling)?;
         let row = reference.evaluate(args.method, 1)?;
         let depths = reference.images.iter().flat_map(|image| &image.inverse_depth_per_m);

@@ -48,7 +48,7 @@ pub(super) fn checks(row: &SceneRow) -> Vec<Check> {
         _ => Check::new(title, useful, "×", Bar::AtLeast(1.0)),
     });
     for method in [PIXEL, TOLERANCE] {
-        let [ours, whole, peeled] = [method, SamplingMethod::Conventional, PEELING].map(|m| row.availability(m));
+        let [ours, whole, peeled] = [method, SamplingMethod::CONVENTIONAL, PEELING].map(|m| row.availability(m));
         let points = |of: fn(&Availability) -> f64| of(&ours) - of(&whole).max(of(&peeled));
         let title =
             |what: &str| format!("{name}: available {what}, {method} over the better of conventional and peeling");
@@ -63,7 +63,7 @@ pub(super) fn checks(row: &SceneRow) -> Vec<Check> {
 pub(super) fn missing_ratio(rows: &[SceneRow]) -> Check {
     let ratio = |row: &SceneRow| {
         let missing = |method| 100.0 - row.availability(method).mean();
-        missing(PIXEL).min(missing(TOLERANCE)) / missing(SamplingMethod::Conventional)
+        missing(PIXEL).min(missing(TOLERANCE)) / missing(SamplingMethod::CONVENTIONAL)
     };
     let mean = rows.iter().map(ratio).sum::<f64>() / rows.len() as f64;
     Check::new("not available, non_redundant over conventional, mean of the scenes", mean, "×", Bar::AtMost(0.75))

@@ -6,7 +6,7 @@ use sampling::{Redundancy, SamplingMethod};
 pub const IMAGES: usize = 3;
 /// The methods that are compared, conventional sampling first.
 pub const METHODS: [SamplingMethod; 6] = [
-    SamplingMethod::Conventional,
+    SamplingMethod::CONVENTIONAL,
     SamplingMethod::NonRedundant(Redundancy::Pixel),
     SamplingMethod::NonRedundant(Redundancy::Visibility),
     SamplingMethod::NonRedundant(Redundancy::Tolerance),

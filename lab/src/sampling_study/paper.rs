@@ -50,12 +50,12 @@ pub(super) fn paper(scene: &str, method: SamplingMethod, image: usize) -> [Cell;
     };
     let pair = |pair: Option<&[f64; 2]>| pair.map_or([f64::NAN; 2], |pair| *pair);
     let [disoccluded, useful] = match method {
-        SamplingMethod::Conventional => [0.0, f64::NAN],
+        SamplingMethod::Conventional(_) => [0.0, f64::NAN],
         SamplingMethod::DepthPeeling { .. } => pair(peeled.get(image)),
         _ => pair(image.checked_sub(1).and_then(|i| apart.get(i))),
     };
     let redundant = match (method, image) {
-        (SamplingMethod::Conventional, 1..) => redundant.get(image - 1).copied().unwrap_or(f64::NAN),
+        (SamplingMethod::Conventional(_), 1..) => redundant.get(image - 1).copied().unwrap_or(f64::NAN),
         _ => 0.0,
     };
     [redundant, disoccluded, useful].map(Cell::from)

@@ -58,7 +58,7 @@ fn of_method(
 ) -> anyhow::Result<Reconstructed> {
     let setup = Setup {
         scene: subject.setup.scene.clone(),
-        around: subject.cameras(SamplingMethod::Conventional, size_px),
+        around: subject.cameras(SamplingMethod::CONVENTIONAL, size_px),
         samples: subject.cameras(sampling, size_px),
         offer: subject.setup.offer.clone(),
     };
@@ -154,7 +154,7 @@ fn checks(scenes: &[(String, Vec<Reconstructed>)]) -> Vec<Check> {
     let apart = |all: &[Reconstructed], of: fn(&Reconstructed) -> f64| {
         let non_redundant = all[..METHODS.len()]
             .iter()
-            .filter(|r| !matches!(r.sampling, SamplingMethod::Conventional | SamplingMethod::DepthPeeling { .. }));
+            .filter(|r| !matches!(r.sampling, SamplingMethod::Conventional(_) | SamplingMethod::DepthPeeling { .. }));
         non_redundant.map(of).fold(f64::INFINITY, f64::min)
     };
     let mut checks = Vec::new();

@@ -47,7 +47,7 @@ pub fn scene_report(subject: &Subject, extent: Extent, report: &mut Report) -> a
     })?;
     progress.finish_and_clear();
     let rays = render::scalar::rays::Scene::of(&subject.scene, 0.0)?;
-    let viewpoints = subject.cameras(SamplingMethod::Conventional, size_px);
+    let viewpoints = subject.cameras(SamplingMethod::CONVENTIONAL, size_px);
     let seen = METHODS
         .iter()
         .zip(&sets)

@@ -42,7 +42,7 @@ pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<V
     let mut rows = Vec::with_capacity(sides.len());
     for &side_px in sides {
         let size_px = UVec2::splat(side_px);
-        let viewpoints = subject.cameras(SamplingMethod::Conventional, size_px);
+        let viewpoints = subject.cameras(SamplingMethod::CONVENTIONAL, size_px);
         let methods = [METHODS[0], METHODS[1], SamplingMethod::NonRedundant(Redundancy::Visibility)];
         let take = |method| subject.sample(method, size_px, WITH_IDS);
         let [whole, apart, by_rays] = [take(methods[0])?, take(methods[1])?, take(methods[2])?];

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use app_core::setup::{SceneArgs, Setup};
-use depth_image::{Camera, DepthImage, PinholeCamera};
+use depth_image::{Antialias, Camera, DepthImage, PinholeCamera};
 use engine::GpuEngine;
 use glam::{UVec2, Vec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
@@ -143,4 +143,4 @@ impl Subject {
 
 /// The planes that all metrics by pixel need.
 pub(super) const WITH_IDS: SamplePlanes =
-    SamplePlanes { normal: false, surface_id: true, specular: false, corners: false };
+    SamplePlanes { antialias: Antialias::NONE, normal: false, surface_id: true, specular: false, corners: false };

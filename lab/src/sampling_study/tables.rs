@@ -89,7 +89,7 @@ fn availabilities(rows: &[SceneRow]) -> anyhow::Result<Table> {
         let paper = PAPER_AVAILABLE.iter().find(|(name, _)| *name == row.name).map(|(_, figures)| figures);
         for (method, available) in METHODS.iter().zip(&row.available) {
             let kind = match method {
-                SamplingMethod::Conventional => 0,
+                SamplingMethod::Conventional(_) => 0,
                 SamplingMethod::DepthPeeling { .. } => 2,
                 _ => 1,
             };

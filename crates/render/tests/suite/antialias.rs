@@ -1,8 +1,11 @@
-//! Direct views of several samples a pixel: the mean of views of one, in linear light.
+//! Direct views of several samples a pixel, and depth images of several samples a texel: means in linear light.
 
-use depth_image::{Antialias, Illumination, Light, PinholeCamera, View, ViewPlanes, linear_from_srgb8};
+use depth_image::{
+    Antialias, Camera, DepthImage, Illumination, Light, PinholeCamera, View, ViewPlanes, linear_from_rgb9e5,
+    linear_from_srgb8,
+};
 use glam::{UVec2, Vec3};
-use render::{DrawWork, GpuScene, Visibility};
+use render::{DrawWork, GpuScene, SamplePlanes, Visibility};
 use scene::procedural::poles;
 
 use crate::stage::{device, down_from, floor_under, upload, work};
@@ -38,6 +41,42 @@ fn a_pixel_is_the_mean_of_its_positions_in_linear_light() {
         assert_ne!(smooth.srgb8, plain.srgb8, "{how:?}: nothing changes");
         let colors = drawn(&scene, camera, ViewPlanes { antialias, ..ViewPlanes::COLOR }, how);
         assert_eq!(colors.srgb8, smooth.srgb8, "{how:?}: depth changes the colour");
+    }
+}
+
+fn sampled(scene: &GpuScene, camera: PinholeCamera, antialias: Antialias, visibility: Visibility) -> DepthImage {
+    let work = DrawWork { visibility, ..work(scene, "phong") };
+    let planes = SamplePlanes { antialias, normal: true, surface_id: true, ..SamplePlanes::default() };
+    device().1.draw_depth_images(work, &[Camera::Pinhole(camera)], planes).expect("an image").remove(0)
+}
+
+/// The oracle averages images of one sample a texel by their depths.
+#[test]
+fn a_texel_is_the_mean_of_its_surface() {
+    let size_px = UVec2::new(64, 48);
+    let camera = PinholeCamera::looking_at(Vec3::new(0.3, 0.4, 4.0), Vec3::NEG_Z, Vec3::Y, 0.8, size_px);
+    let scene = upload(&poles(0.08));
+    let antialias = Antialias::of(4).expect("offered");
+    for visibility in [Visibility::Triangles, Visibility::Rays] {
+        let at = |camera| sampled(&scene, camera, Antialias::NONE, visibility);
+        let (filtered, center) = (sampled(&scene, camera, antialias, visibility), at(camera));
+        let around: Vec<DepthImage> =
+            antialias.offsets_px().map(|offset_px| at(camera.with_offset(offset_px))).collect();
+        let (mut mixed, mut apart) = (0, 0);
+        for texel in 0..center.color_rgb9e5.len() {
+            let depth = center.inverse_depth_per_m[texel];
+            let is_same = |image: &&DepthImage| (image.inverse_depth_per_m[texel] - depth).abs() <= 0.005 * depth;
+            let same = [&center].into_iter().chain(around.iter().filter(is_same));
+            let colors: Vec<Vec3> = same.map(|image| linear_from_rgb9e5(image.color_rgb9e5[texel])).collect();
+            let mean = colors.iter().sum::<Vec3>() / colors.len() as f32;
+            let shown = linear_from_rgb9e5(filtered.color_rgb9e5[texel]);
+            assert!(shown.abs_diff_eq(mean, 0.004), "{visibility:?}, texel {texel}: {shown}, not {mean}");
+            mixed += u32::from(shown.distance(linear_from_rgb9e5(center.color_rgb9e5[texel])) > 0.004);
+            apart += u32::from(colors.len() < 5);
+        }
+        assert!(mixed > 50 && apart > 50, "{visibility:?}: {mixed} means, {apart} texels with other surfaces");
+        let other_planes = DepthImage { color_rgb9e5: center.color_rgb9e5.clone(), ..filtered };
+        assert!(other_planes == center, "{visibility:?}: other planes are the centre's");
     }
 }
 

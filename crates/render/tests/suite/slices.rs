@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{Antialias, Camera, DepthImage, PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use gpu::{CompiledOutside, DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Refinement, Renderer, SamplePlanes, Visibility};
 use scene::procedural::courtyard;
 
-const PLANES: SamplePlanes = SamplePlanes { normal: true, surface_id: true, specular: true, corners: true };
+const PLANES: SamplePlanes =
+    SamplePlanes { antialias: Antialias::NONE, normal: true, surface_id: true, specular: true, corners: true };
 /// Rows of a piece are eight, and a draw has one triangle.
 const FEW_UNITS: u64 = 1;
 

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use depth_image::{Camera, DepthImage, Environment, Illumination, Light, PinholeCamera, linear_from_rgb9e5};
+use depth_image::{Antialias, Camera, DepthImage, Environment, Illumination, Light, PinholeCamera, linear_from_rgb9e5};
 use glam::{Affine3A, UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Refinement, Renderer, SamplePlanes, Visibility};
@@ -10,7 +10,8 @@ use scene::procedural::quad;
 use scene::{Instance, Scene};
 
 pub const SIZE_PX: UVec2 = UVec2::new(96, 72);
-const ALL: SamplePlanes = SamplePlanes { normal: true, surface_id: true, specular: true, corners: false };
+const ALL: SamplePlanes =
+    SamplePlanes { antialias: Antialias::NONE, normal: true, surface_id: true, specular: true, corners: false };
 
 /// The software device of this program; a test without one fails.
 pub fn device() -> &'static (Arc<Gpu>, Renderer) {

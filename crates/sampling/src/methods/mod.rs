@@ -7,7 +7,7 @@ pub(crate) mod depth_peeling;
 pub(crate) mod non_redundant;
 pub(crate) mod useful;
 
-use depth_image::{Camera, NamedMethod, PinholeCamera, Setting, named_methods};
+use depth_image::{Antialias, Camera, NamedMethod, PinholeCamera, Setting, named_methods};
 use gpu::{ShaderError, Templates};
 use render::RedundancyTest;
 
@@ -17,8 +17,9 @@ pub use non_redundant::Redundancy;
 /// The choice of samples of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum SamplingMethod {
-    /// Every visible surface, whether another image holds it too or not (Lages §4.1).
-    Conventional,
+    /// Every visible surface, whether another image holds it too or not (Lages §4.1). The setting is the number of positions
+    /// around a texel's centre whose colours count, too.
+    Conventional(Antialias),
     /// Only samples that no image before holds; behind others rays go on (Xie §3).
     NonRedundant(Redundancy),
     /// The same, less the samples that no viewpoint between the sample cameras can see past their blockers.
@@ -34,7 +35,15 @@ use SamplingMethod::{Conventional, DepthPeeling, NonRedundant, Useful};
 
 /// All methods by name; the first is the default.
 pub const METHODS: [NamedMethod<SamplingMethod>; 4] = [
-    NamedMethod { name: "conventional", method: Conventional, setting: None, help: "takes every visible surface" },
+    NamedMethod {
+        name: "conventional",
+        method: SamplingMethod::CONVENTIONAL,
+        setting: Some(Setting {
+            form: "POSITIONS (2, 4, 8 or 16)",
+            parse: |text| text.parse().ok().filter(|&antialias| antialias > Antialias::NONE).map(Conventional),
+        }),
+        help: "takes every visible surface; a texel's colour can be the mean over as many positions around its centre",
+    },
     NamedMethod {
         name: "non_redundant",
         method: NonRedundant(Redundancy::Pixel),
@@ -74,12 +83,15 @@ pub fn templates() -> Result<Templates, ShaderError> {
 named_methods!(SamplingMethod, UnknownSampling, "sampling method");
 
 impl SamplingMethod {
+    /// Every visible surface, with the colour of a texel's centre.
+    pub const CONVENTIONAL: Self = Conventional(Antialias::NONE);
+
     /// All methods, each with all of its redundancy tests.
     pub fn all() -> impl Iterator<Item = Self> {
         METHODS.into_iter().flat_map(|row| match row.method {
             NonRedundant(_) => Redundancy::ALL.map(NonRedundant).to_vec(),
             Useful(_) => Redundancy::ALL.map(Useful).to_vec(),
-            method @ (Conventional | DepthPeeling { .. }) => vec![method],
+            method @ (Conventional(_) | DepthPeeling { .. }) => vec![method],
         })
     }
 
@@ -88,7 +100,7 @@ impl SamplingMethod {
     pub fn cameras(self, rig: Vec<PinholeCamera>) -> Vec<PinholeCamera> {
         match self {
             DepthPeeling { layers } => depth_peeling::cameras(&rig, layers as usize),
-            Conventional | NonRedundant(_) | Useful(_) => rig,
+            Conventional(_) | NonRedundant(_) | Useful(_) => rig,
         }
     }
 
@@ -99,7 +111,16 @@ impl SamplingMethod {
     pub fn check(self, cameras: &[Camera]) -> Result<(), SamplingError> {
         match self {
             DepthPeeling { .. } => depth_peeling::check(cameras),
-            Conventional | NonRedundant(_) | Useful(_) => Ok(()),
+            Conventional(_) | NonRedundant(_) | Useful(_) => Ok(()),
+        }
+    }
+
+    /// The positions around a texel's centre whose colours count.
+    #[must_use]
+    pub fn antialias(self) -> Antialias {
+        match self {
+            Conventional(antialias) => antialias,
+            NonRedundant(_) | Useful(_) | DepthPeeling { .. } => Antialias::NONE,
         }
     }
 
@@ -107,7 +128,7 @@ impl SamplingMethod {
     #[must_use]
     pub fn redundancy_test(self) -> Option<RedundancyTest> {
         match self {
-            Conventional => None,
+            Conventional(_) => None,
             NonRedundant(redundancy) => Some(redundancy.test()),
             Useful(redundancy) => Some(useful::test(redundancy)),
             DepthPeeling { .. } => Some(depth_peeling::TEST),
@@ -130,7 +151,7 @@ impl SamplingMethod {
     #[must_use]
     pub fn has_hysteresis(self) -> bool {
         match self {
-            Conventional | DepthPeeling { .. } => false,
+            Conventional(_) | DepthPeeling { .. } => false,
             NonRedundant(redundancy) | Useful(redundancy) => redundancy == Redundancy::Tolerance,
         }
     }
@@ -138,7 +159,7 @@ impl SamplingMethod {
     /// The setting as users spell it.
     fn setting(self) -> Option<String> {
         match self {
-            Conventional => None,
+            Conventional(antialias) => (antialias > Antialias::NONE).then(|| antialias.to_string()),
             NonRedundant(redundancy) | Useful(redundancy) => Some(redundancy.to_string()),
             DepthPeeling { layers } => Some(layers.to_string()),
         }
@@ -156,9 +177,18 @@ mod tests {
         }
         assert_eq!(SamplingMethod::all().count(), 8);
         assert_eq!("non-redundant".parse(), Ok(NonRedundant(Redundancy::Pixel)));
-        for name in
-            ["", "non_redundant:", "non_redundant:id", "depth_peeling:0", "depth_peeling:17", "depth_peeling:-1"]
-        {
+        let filtered = Conventional(Antialias::of(4).expect("offered"));
+        assert_eq!(("conventional:4".parse(), filtered.to_string().as_str()), (Ok(filtered), "conventional:4"));
+        for name in [
+            "",
+            "conventional:1",
+            "conventional:3",
+            "non_redundant:",
+            "non_redundant:id",
+            "depth_peeling:0",
+            "depth_peeling:17",
+            "depth_peeling:-1",
+        ] {
             assert!(name.parse::<SamplingMethod>().is_err(), "{name}");
         }
     }

@@ -45,7 +45,7 @@ fn a_grazing_floor_counts_as_sampled_by_pixel_but_not_by_tolerance() {
         let first = PinholeCamera::looking_at(eye, Vec3::ZERO, Vec3::new(0.0, 0.3, -1.0), 0.6, SIZE_PX);
         let left_out = [PIXEL, VISIBILITY, TOLERANCE].map(|method| {
             let images = sample(&scene, &[first, above], method);
-            1.0 - share(samples(&images[1]), samples(&sample(&scene, &[above], SamplingMethod::Conventional)[0]))
+            1.0 - share(samples(&images[1]), samples(&sample(&scene, &[above], SamplingMethod::CONVENTIONAL)[0]))
         });
         println!("{degrees:5}: {left_out:.3?}");
         assert!(left_out[1] > 0.95, "all of it is seen");
@@ -217,7 +217,7 @@ fn more_tolerance_keeps_fewer_samples_and_loses_more_surface() {
         let eye = bounds.center() + Vec3::new(x, 0.5, 0.9) * reach;
         PinholeCamera::looking_at(eye, bounds.center(), Vec3::Y, 0.7, SIZE_PX)
     };
-    let view = scalar::sample(&rays, &[camera(0.05)], SamplingMethod::Conventional).remove(0);
+    let view = scalar::sample(&rays, &[camera(0.05)], SamplingMethod::CONVENTIONAL).remove(0);
     println!("allowed: share of the second image kept, of a view not held");
     let curve = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0].map(|allowed| {
         let settings = scalar::Settings { allowed, ..scalar::Settings::default() };

@@ -1,6 +1,6 @@
 //! Images that omit what others hold: against the scalar reference, and what must hold of them.
 
-use depth_image::{Camera, DepthImage, PinholeCamera};
+use depth_image::{Antialias, Camera, DepthImage, PinholeCamera};
 use glam::{UVec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use sampling::{Redundancy, Rig, SampleWork, SamplingError, SamplingMethod, scalar};
@@ -10,7 +10,8 @@ use scene::{Instance, Scene};
 use crate::stage::{device, upload};
 
 const SIZE_PX: UVec2 = UVec2::new(80, 60);
-const ALL: SamplePlanes = SamplePlanes { normal: true, surface_id: true, specular: false, corners: true };
+const ALL: SamplePlanes =
+    SamplePlanes { antialias: Antialias::NONE, normal: true, surface_id: true, specular: false, corners: true };
 const APART: [SamplingMethod; 3] = [
     SamplingMethod::NonRedundant(Redundancy::Pixel),
     SamplingMethod::NonRedundant(Redundancy::Visibility),
@@ -104,7 +105,7 @@ fn every_conventional_sample_is_held_by_some_image() {
     let scene = courtyard();
     let on_device = upload(&scene);
     let cameras = two_plane(&scene);
-    let conventional = sample(&on_device, &cameras, SamplingMethod::Conventional);
+    let conventional = sample(&on_device, &cameras, SamplingMethod::CONVENTIONAL);
     let apart = sample(&on_device, &cameras, SamplingMethod::NonRedundant(Redundancy::Pixel));
     for (number, (whole, part)) in conventional.iter().zip(&apart).enumerate() {
         let ids = whole.surface_id.as_ref().expect("ids");
@@ -147,7 +148,7 @@ fn only_images_without_redundance_find_block_c() {
         let cameras = method.cameras(fig_3());
         shows_block_c(&sample(&on_device, &cameras, method), &scene)
     };
-    assert_eq!(found(SamplingMethod::Conventional), 0);
+    assert_eq!(found(SamplingMethod::CONVENTIONAL), 0);
     for method in APART {
         let texels = found(method);
         println!("{method}: {texels} texels show block C");
