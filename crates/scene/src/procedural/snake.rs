@@ -122,11 +122,15 @@ fn influence(x_m: f32) -> Influence {
 }
 
 fn slither() -> Clip {
+    let bend_rad =
+        |joint: u32, time_s: f32| BEND_RAD * (TAU * (time_s / SLITHER_S - WAVES * joint as f32 / JOINTS as f32)).sin();
+    // The tail turns against the mean direction of all bones, so that the snake stays on its ground.
+    let mean_rad = |time_s: f32| {
+        let after = |joint: u32| (JOINTS - joint) as f32 / JOINTS as f32;
+        (1..JOINTS).map(|joint| bend_rad(joint, time_s) * after(joint)).sum::<f32>()
+    };
     let turn_at = |joint: u32, time_s: f32| {
-        let phase = time_s / SLITHER_S - WAVES * joint as f32 / JOINTS as f32;
-        // The tail swings about the middle of the body.
-        let bend = if joint == 0 { -BEND_RAD } else { BEND_RAD };
-        Quat::from_rotation_y(bend * (TAU * phase).sin())
+        Quat::from_rotation_y(if joint == 0 { -mean_rad(time_s) } else { bend_rad(joint, time_s) })
     };
     let keys = (SLITHER_S / KEY_S) as u32;
     let times_s: Vec<f32> = (0..=keys).map(|key| key as f32 * KEY_S).collect();
