@@ -158,7 +158,7 @@ impl FrameStream {
 
 /// Decodes a frame of `peer` on a blocking thread.
 pub(crate) async fn decode(frame: WholeFrame, peer: &Peer) -> Result<(FrameHeader, View), ClientError> {
-    let decoding = move || decode_view(&frame, &DecodeLimits::default()).map(|view| (frame.header, view));
+    let decoding = move || decode_view(&frame, &DecodeLimits::VIEWS).map(|view| (frame.header, view));
     match tokio::task::spawn_blocking(decoding).await {
         Ok(decoded) => decoded.map_err(|error| peer.error(error)),
         Err(error) => Err(peer.error(error)),

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cluster::{Assignment, RenderViews, RequestedView};
-use node::next_within;
+use depth_image::ViewPlanes;
+use node::{next_within, view_bytes};
 use tokio::sync::Semaphore;
 use tonic::{Code, Status};
 use wire::rpc::Messages;
@@ -68,7 +69,7 @@ impl<'a> BatchStream<'a> {
         let (arrived, shared) = (Instant::now(), &self.client.shared);
         let plan = shared
             .of_compositor(shared.plans.require(request.workload_number, request.plan_epoch)?, &request.method)?;
-        shared.check_times(&plan, &request)?;
+        shared.check_views(&plan, &request)?;
         let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
         for view in &request.views {
             cells.entry(plan.cell_of(&view.camera)).or_default().push(*view);
@@ -95,16 +96,16 @@ impl<'a> BatchStream<'a> {
         let shared = self.client.shared.clone();
         let (mut left, mut set) = (views, Some(shared.source(plan, request.set_index, cell).await?));
         while let Some(first) = left.first() {
-            let mut credits = self.try_credits(left)?;
+            let mut credits = self.try_credits(request.planes, left)?;
             if credits.is_empty() {
                 set = None;
-                credits.push(self.credit(first).await?);
+                credits.push(self.credit(request.planes, first).await?);
             }
             let loaded = match set.take() {
                 Some(loaded) => loaded,
                 None => {
                     let loaded = shared.source(plan, request.set_index, cell).await?;
-                    credits.extend(self.try_credits(&left[1..])?);
+                    credits.extend(self.try_credits(request.planes, &left[1..])?);
                     loaded
                 }
             };
@@ -119,10 +120,10 @@ impl<'a> BatchStream<'a> {
     }
 
     /// The credits of the first views, as many as there is room for and a batch can have.
-    fn try_credits(&mut self, views: &[RequestedView]) -> Result<Vec<Credit>, Status> {
+    fn try_credits(&mut self, planes: ViewPlanes, views: &[RequestedView]) -> Result<Vec<Credit>, Status> {
         let mut credits = Vec::new();
         for view in views.iter().take(MAX_BATCH) {
-            let Some(credit) = self.try_credit(view)? else { break };
+            let Some(credit) = self.try_credit(planes, view)? else { break };
             self.admitted = true;
             credits.push(credit);
         }
@@ -130,11 +131,11 @@ impl<'a> BatchStream<'a> {
     }
 
     /// `None` where the view must wait; an error where other streams have taken the node's room and this one has had none.
-    fn try_credit(&self, view: &RequestedView) -> Result<Option<Credit>, Status> {
+    fn try_credit(&self, planes: ViewPlanes, view: &RequestedView) -> Result<Option<Credit>, Status> {
         let Ok(stream) = self.credits.clone().try_acquire_many_owned(price(view)) else {
             return Ok(None);
         };
-        match self.client.shared.quota.try_view(&view.camera) {
+        match self.client.shared.quota.try_view(view_bytes(&view.camera, planes)) {
             Ok(node) => Ok(Some(Credit { stream, _node: node })),
             Err(refused) if !self.admitted => {
                 self.client.shared.metrics.drop_view("node full");
@@ -145,12 +146,13 @@ impl<'a> BatchStream<'a> {
     }
 
     /// Waits until a part of the stream's room is free. A set that was evicted meanwhile is fetched again for several views.
-    async fn credit(&self, view: &RequestedView) -> Result<Credit, Status> {
+    async fn credit(&self, planes: ViewPlanes, view: &RequestedView) -> Result<Credit, Status> {
         let part = price(view).max(STREAM_PIXELS / 4);
         let mut free = self.credits.clone().acquire_many_owned(part).await.map_err(closed)?;
         let stream = free.split(price(view) as usize).ok_or_else(|| closed(()))?;
         drop(free);
-        Ok(Credit { stream, _node: self.client.shared.quota.view(&view.camera).await? })
+        let bytes = view_bytes(&view.camera, planes);
+        Ok(Credit { stream, _node: self.client.shared.quota.view(bytes).await? })
     }
 }
 

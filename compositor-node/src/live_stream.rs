@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cluster::{Assignment, Policy, RenderViews, RequestedView, SetContent};
-use node::{CellPlan, next_within};
+use node::{CellPlan, next_within, view_bytes};
 use tokio::sync::Semaphore;
 use tonic::Status;
 use wire::rpc::Messages;
@@ -46,6 +46,10 @@ impl Pose {
 
     fn plan_and_cell(&self) -> (u64, u32) {
         (self.plan.plan_epoch, self.cell)
+    }
+
+    fn bytes(&self) -> usize {
+        view_bytes(&self.view.camera, self.request.planes)
     }
 
     fn has_cells(&self) -> bool {
@@ -151,7 +155,7 @@ impl<'a> LiveStream<'a> {
             return Ok(());
         };
         self.check_number(view.frame)?;
-        self.client.shared.check_times(&plan, &request)?;
+        self.client.shared.check_views(&plan, &request)?;
         let cell = plan.cell_of(&view.camera);
         let pose = Pose { request, view, plan, cell, arrived: Instant::now() };
         tracing::debug!(
@@ -199,9 +203,9 @@ impl<'a> LiveStream<'a> {
     /// Puts a pose in place of one of the same set, or else in place of the newest; gives the pose that it replaces.
     fn put(&mut self, pose: Pose) -> Option<Pose> {
         if self.ready.as_ref().is_some_and(|ready| !ready.place.is_neighbour && ready.pose.shows_set_of(&pose)) {
-            let credit = self.credit(&pose.view);
+            let credit = self.credit(&pose);
             let ready = self.ready.as_mut()?;
-            if ready.pose.view.camera.size_px != pose.view.camera.size_px {
+            if ready.pose.bytes() != pose.bytes() {
                 ready.credit = credit;
             }
             return Some(std::mem::replace(&mut ready.pose, pose));
@@ -280,22 +284,22 @@ impl<'a> LiveStream<'a> {
     fn prepare(&mut self, pose: Pose, set: Loaded) {
         let older = self.ready.take();
         self.count_replaced(older.as_ref().map(|ready| ready.pose.view));
-        if let Some(credit) = self.replaced_credit(&pose.view).or_else(|| self.try_credit(&pose.view)) {
+        if let Some(credit) = self.replaced_credit(&pose).or_else(|| self.try_credit(&pose)) {
             return self.queue(pose, &set, credit);
         }
-        let same_size = |ready: &Ready| ready.pose.view.camera.size_px == pose.view.camera.size_px;
+        let same_size = |ready: &Ready| ready.pose.bytes() == pose.bytes();
         let credit = match older.filter(same_size) {
             Some(older) => older.credit,
-            None => self.credit(&pose.view),
+            None => self.credit(&pose),
         };
         self.ready = Some(Ready { pose, place: set.place, wait_s: set.wait_s, credit });
     }
 
     /// The credit of a view of this stream that still waits for the device, and is replaced.
-    fn replaced_credit(&self, view: &RequestedView) -> Option<Credit> {
+    fn replaced_credit(&self, pose: &Pose) -> Option<Credit> {
         let waiting = self.client.shared.arrivals.withdraw(self.client.stream).pop_front()?;
         self.count_replaced(Some(waiting.view));
-        (view.camera.size_px == waiting.key.size_px).then_some(waiting.credit)
+        (view_bytes(&waiting.view.camera, waiting.key.planes) == pose.bytes()).then_some(waiting.credit)
     }
 
     /// The newest pose that waits for a set.
@@ -364,17 +368,17 @@ impl<'a> LiveStream<'a> {
         self.client.queue(true, vec![Waiting::new(requested, set, self.reply.clone(), credit)]);
     }
 
-    fn try_credit(&self, view: &RequestedView) -> Option<Credit> {
+    fn try_credit(&self, pose: &Pose) -> Option<Credit> {
         let stream = self.credits.clone().try_acquire_owned().ok()?;
-        Some(Credit { stream, _node: self.client.shared.quota.try_live_view(&view.camera)? })
+        Some(Credit { stream, _node: self.client.shared.quota.try_live_view(pose.bytes())? })
     }
 
-    fn credit(&self, view: &RequestedView) -> Pending<Credit> {
+    fn credit(&self, pose: &Pose) -> Pending<Credit> {
         let (credits, shared) = (self.credits.clone(), self.client.shared.clone());
-        let camera = view.camera;
+        let bytes = pose.bytes();
         Box::pin(async move {
             let stream = credits.acquire_owned().await.map_err(closed)?;
-            Ok(Credit { stream, _node: shared.quota.live_view(&camera).await? })
+            Ok(Credit { stream, _node: shared.quota.live_view(bytes).await? })
         })
     }
 }

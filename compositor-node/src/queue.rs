@@ -217,7 +217,7 @@ mod tests {
             size_px: camera.size_px,
         };
         let permit = Arc::new(Semaphore::new(1)).try_acquire_owned().unwrap();
-        let node = NodeQuota::new(Quotas::default()).try_view(&camera).unwrap();
+        let node = NodeQuota::new(Quotas::default()).try_view(1).unwrap();
         let now = Instant::now();
         let place = Place { id: key.sample_set_id, cell: 0, is_neighbour: false, content: None };
         Waiting {

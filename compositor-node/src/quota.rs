@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use depth_image::PinholeCamera;
+use depth_image::{PinholeCamera, ViewPlanes};
 use node::Quotas;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::Status;
@@ -19,19 +19,19 @@ pub(crate) struct Credit {
 /// Dropped when the frame has been sent.
 #[derive(Debug)]
 pub(crate) struct NodeCredit {
-    _pixels: OwnedSemaphorePermit,
+    _bytes: OwnedSemaphorePermit,
     /// `None` for live streams: these are bounded by their number, as each has two views in flight at most.
     _view: Option<OwnedSemaphorePermit>,
 }
 
-/// A part of the node's pixels.
+/// A part of the node's memory for views, in units of 1,024 bytes: a permit of many counts to 2³².
 struct Pool {
-    pixels: usize,
+    units: usize,
     free: Arc<Semaphore>,
 }
 
-/// The room that a node has. Pixels of all views are in one bound: a part is for live views alone, a small part for batches
-/// alone, and the rest for both. Neither can starve the other.
+/// The room that a node has. The memory of all views has one bound: a part is for live views alone, a small part for
+/// batches alone, and the rest for both. Neither can starve the other.
 pub(crate) struct NodeQuota {
     limits: Quotas,
     streams: Arc<Semaphore>,
@@ -41,39 +41,48 @@ pub(crate) struct NodeQuota {
     batches: Pool,
 }
 
-/// The share of pixels for live views alone, and for batches alone.
+/// The share of memory for live views alone, and for batches alone.
 const LIVE_SHARE: f64 = 1.0 / 4.0;
 const BATCH_SHARE: f64 = 1.0 / 16.0;
 
+/// Bytes of a unit.
+const UNIT: usize = 1 << 10;
+
 impl Pool {
-    fn new(pixels: usize) -> Self {
-        Self { pixels, free: room(pixels) }
+    fn new(units: usize) -> Self {
+        Self { units, free: room(units) }
     }
 
-    /// The pixels that a view takes of it; `None` where the view is larger than the pool.
-    fn price(&self, camera: &PinholeCamera) -> Option<u32> {
-        let pixels = camera.pixel_count();
-        u32::try_from(pixels).ok().filter(|_| pixels <= self.pixels)
+    /// The units that a view takes of it; `None` where the view is larger than the pool.
+    fn price(&self, bytes: usize) -> Option<u32> {
+        let units = bytes.div_ceil(UNIT);
+        u32::try_from(units).ok().filter(|_| units <= self.units)
     }
 
-    /// The pixels that a view takes of the largest pool, at most all: one view larger than the bound still passes, alone.
-    fn price_at_most(&self, camera: &PinholeCamera) -> u32 {
-        u32::try_from(camera.pixel_count().min(self.pixels.max(1))).unwrap_or(u32::MAX)
+    /// The units that a view takes of the largest pool, at most all: one view larger than the pool still passes, alone.
+    fn price_at_most(&self, bytes: usize) -> u32 {
+        u32::try_from(bytes.div_ceil(UNIT).min(self.units.max(1))).unwrap_or(u32::MAX)
     }
 }
 
 impl NodeQuota {
     pub(crate) fn new(limits: Quotas) -> Self {
-        let part = |share: f64| (limits.pixels as f64 * share) as usize;
+        let units = limits.view_bytes / UNIT;
+        let part = |share: f64| (units as f64 * share) as usize;
         let (live, batches) = (part(LIVE_SHARE), part(BATCH_SHARE));
         Self {
             limits,
             streams: room(limits.streams),
             views: room(limits.views),
-            common: Pool::new(limits.pixels - live - batches),
+            common: Pool::new(units - live - batches),
             live: Pool::new(live),
             batches: Pool::new(batches),
         }
+    }
+
+    /// Checks that a view can ever have room.
+    pub(crate) fn check_view(&self, camera: &PinholeCamera, planes: ViewPlanes) -> Result<(), Status> {
+        self.limits.check_view(camera, planes)
     }
 
     /// Room for one more stream.
@@ -83,48 +92,48 @@ impl NodeQuota {
     }
 
     /// Room for a view of a batch; an error while all room is taken.
-    pub(crate) fn try_view(&self, camera: &PinholeCamera) -> Result<NodeCredit, Status> {
+    pub(crate) fn try_view(&self, bytes: usize) -> Result<NodeCredit, Status> {
         let few = |_| self.exceeded("views", self.limits.views, "views are in flight");
         let view = self.views.clone().try_acquire_owned().map_err(few)?;
-        let small = || self.exceeded("pixels", self.limits.pixels, "pixels of views are in flight");
-        Ok(NodeCredit { _pixels: self.try_pixels(&self.batches, camera).ok_or_else(small)?, _view: Some(view) })
+        let small = || self.exceeded("view-memory", self.limits.view_bytes, "bytes of views are in flight");
+        Ok(NodeCredit { _bytes: self.try_bytes(&self.batches, bytes).ok_or_else(small)?, _view: Some(view) })
     }
 
     /// Waits for room for a view of a batch.
-    pub(crate) async fn view(&self, camera: &PinholeCamera) -> Result<NodeCredit, Status> {
+    pub(crate) async fn view(&self, bytes: usize) -> Result<NodeCredit, Status> {
         let view = self.views.clone().acquire_owned().await.map_err(closed)?;
-        Ok(NodeCredit { _pixels: self.pixels(&self.batches, camera).await?, _view: Some(view) })
+        Ok(NodeCredit { _bytes: self.bytes(&self.batches, bytes).await?, _view: Some(view) })
     }
 
     /// Room for a view of a live stream, if it need not wait.
-    pub(crate) fn try_live_view(&self, camera: &PinholeCamera) -> Option<NodeCredit> {
-        Some(NodeCredit { _pixels: self.try_pixels(&self.live, camera)?, _view: None })
+    pub(crate) fn try_live_view(&self, bytes: usize) -> Option<NodeCredit> {
+        Some(NodeCredit { _bytes: self.try_bytes(&self.live, bytes)?, _view: None })
     }
 
     /// Waits for room for a view of a live stream.
-    pub(crate) async fn live_view(&self, camera: &PinholeCamera) -> Result<NodeCredit, Status> {
-        Ok(NodeCredit { _pixels: self.pixels(&self.live, camera).await?, _view: None })
+    pub(crate) async fn live_view(&self, bytes: usize) -> Result<NodeCredit, Status> {
+        Ok(NodeCredit { _bytes: self.bytes(&self.live, bytes).await?, _view: None })
     }
 
-    fn try_pixels(&self, own: &Pool, camera: &PinholeCamera) -> Option<OwnedSemaphorePermit> {
-        let of_own = own.price(camera).and_then(|price| own.free.clone().try_acquire_many_owned(price).ok());
-        let price = self.common.price_at_most(camera);
+    fn try_bytes(&self, own: &Pool, bytes: usize) -> Option<OwnedSemaphorePermit> {
+        let of_own = own.price(bytes).and_then(|price| own.free.clone().try_acquire_many_owned(price).ok());
+        let price = self.common.price_at_most(bytes);
         of_own.or_else(|| self.common.free.clone().try_acquire_many_owned(price).ok())
     }
 
-    /// Waits for pixels of `own` or of all, whichever are free first.
-    async fn pixels(&self, own: &Pool, camera: &PinholeCamera) -> Result<OwnedSemaphorePermit, Status> {
+    /// Waits for bytes of `own` or of all, whichever are free first.
+    async fn bytes(&self, own: &Pool, bytes: usize) -> Result<OwnedSemaphorePermit, Status> {
         let of_own = async {
-            match own.price(camera) {
+            match own.price(bytes) {
                 Some(price) => own.free.clone().acquire_many_owned(price).await,
                 None => std::future::pending().await,
             }
         };
-        let of_all = self.common.free.clone().acquire_many_owned(self.common.price_at_most(camera));
+        let of_all = self.common.free.clone().acquire_many_owned(self.common.price_at_most(bytes));
         tokio::select! {
             biased;
-            pixels = of_own => pixels.map_err(closed),
-            pixels = of_all => pixels.map_err(closed),
+            permit = of_own => permit.map_err(closed),
+            permit = of_all => permit.map_err(closed),
         }
     }
 
@@ -148,13 +157,18 @@ mod tests {
 
     use super::*;
 
-    fn camera(side_px: u32) -> PinholeCamera {
-        PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(side_px))
+    /// 40 units for live views, 10 for batches, 110 for both.
+    fn quota() -> NodeQuota {
+        NodeQuota::new(Quotas { streams: 1, views: 2, view_bytes: 160 * UNIT })
     }
 
-    /// 40 pixels for live views, 10 for batches, 110 for both.
-    fn quota() -> NodeQuota {
-        NodeQuota::new(Quotas { streams: 1, views: 2, pixels: 160 })
+    #[test]
+    fn a_view_beyond_all_memory_is_refused_with_its_size() {
+        let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::new(160, 170));
+        assert!(quota().check_view(&camera, ViewPlanes::COLOR).is_ok());
+        let refused = quota().check_view(&camera, ViewPlanes::WITH_DEPTH).unwrap_err();
+        assert_eq!(refused.code(), Code::InvalidArgument);
+        assert!(refused.message().contains("a view of 160×170 takes 380800 bytes"), "{refused}");
     }
 
     #[test]
@@ -168,37 +182,35 @@ mod tests {
         );
         drop(stream);
         assert!(quota.stream().is_ok());
-        let first = quota.try_view(&camera(10)).unwrap();
-        assert!(quota.try_view(&camera(4)).unwrap_err().message().starts_with("quota pixels: 160 "));
-        let second = quota.try_view(&camera(3)).unwrap();
-        assert!(quota.try_view(&camera(1)).unwrap_err().message().starts_with("quota views: 2 "));
+        let first = quota.try_view(100 * UNIT).unwrap();
+        assert!(quota.try_view(16 * UNIT).unwrap_err().message().starts_with("quota view-memory: 163840 "));
+        let second = quota.try_view(9 * UNIT).unwrap();
+        assert!(quota.try_view(UNIT).unwrap_err().message().starts_with("quota views: 2 "));
         drop((first, second));
-        assert!(quota.try_view(&camera(1000)).is_ok(), "larger than all, alone");
+        assert!(quota.try_view(1000 * UNIT).is_ok(), "larger than all, alone");
     }
 
     #[tokio::test]
     async fn batches_leave_room_for_live_views() {
         let quota = quota();
-        let batch = quota.try_view(&camera(10)).unwrap();
-        let live = quota.live_view(&camera(6)).await.unwrap();
-        let next = camera(5);
-        let mut waits = Box::pin(quota.live_view(&next));
-        assert!(at_once(&mut waits).await.is_none(), "36 of 40 pixels are taken, and 100 of 110");
+        let batch = quota.try_view(100 * UNIT).unwrap();
+        let live = quota.live_view(36 * UNIT).await.unwrap();
+        let mut waits = Box::pin(quota.live_view(25 * UNIT));
+        assert!(at_once(&mut waits).await.is_none(), "36 of 40 units are taken, and 100 of 110");
         drop(batch);
-        assert!(waits.await.is_ok(), "pixels of both count for either");
+        assert!(waits.await.is_ok(), "memory of both counts for either");
         drop(live);
     }
 
     #[tokio::test]
     async fn live_views_leave_room_for_batches() {
         let quota = quota();
-        let _live = [quota.live_view(&camera(6)).await.unwrap(), quota.live_view(&camera(10)).await.unwrap()];
-        assert!(at_once(&mut Box::pin(quota.live_view(&camera(4)))).await.is_none());
-        let small = quota.try_view(&camera(3)).unwrap();
-        assert!(quota.try_view(&camera(4)).is_err());
-        let next = camera(3);
-        let mut waits = Box::pin(quota.view(&next));
-        assert!(at_once(&mut waits).await.is_some(), "pixels of both count for either");
+        let _live = [quota.live_view(36 * UNIT).await.unwrap(), quota.live_view(100 * UNIT).await.unwrap()];
+        assert!(at_once(&mut Box::pin(quota.live_view(16 * UNIT))).await.is_none());
+        let small = quota.try_view(9 * UNIT).unwrap();
+        assert!(quota.try_view(16 * UNIT).is_err());
+        let mut waits = Box::pin(quota.view(9 * UNIT));
+        assert!(at_once(&mut waits).await.is_some(), "memory of both counts for either");
         drop(small);
     }
 

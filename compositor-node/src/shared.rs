@@ -92,14 +92,16 @@ impl Shared {
         }
     }
 
-    /// Checks that no view of a request takes too long.
-    pub(crate) fn check_times(&self, plan: &Assignment, request: &RenderViews) -> Result<(), Status> {
+    /// Checks that no view of a request takes too long or too much memory.
+    pub(crate) fn check_views(&self, plan: &Assignment, request: &RenderViews) -> Result<(), Status> {
         let method = if plan.policy == Policy::Direct { DIRECT } else { &request.method };
         let antialias = request.planes.antialias;
         let kind = ViewKind { workload_number: plan.workload_number, method: method.to_owned(), antialias };
-        let largest =
-            request.views.iter().map(|view| view.camera.size_px).max_by_key(|size_px| size_px.element_product());
-        largest.map_or(Ok(()), |size_px| self.times.check(Instant::now(), &kind, size_px))
+        let Some(largest) = request.views.iter().map(|view| view.camera).max_by_key(PinholeCamera::pixel_count) else {
+            return Ok(());
+        };
+        self.quota.check_view(&largest, request.planes)?;
+        self.times.check(Instant::now(), &kind, largest.size_px)
     }
 
     /// The plan for views by a method, if this node makes views in it. Views that are drawn from the scene ignore the plan's

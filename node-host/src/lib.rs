@@ -107,7 +107,7 @@ async fn serve_on(
     let (relay, done) = (compositor.relay(), metrics.done.clone());
     let sampler = SamplerService::new(scenes.clone(), plans.clone(), config, relay, metrics.clone(), shutdown.clone());
     monitor.set_memory(vec![compositor.memory(), sampler.memory()]);
-    let service = NodeService::new(plans.clone(), scenes.clone(), metrics);
+    let service = NodeService::new(plans.clone(), scenes.clone(), config.quotas, metrics);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))

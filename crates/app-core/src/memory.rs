@@ -16,6 +16,9 @@ pub struct MemoryArgs {
     /// images. Scenes on the device have as much again. [default: a quarter of the available memory; 2G on a GPU]
     #[arg(long, value_name = "SIZE", value_parser = bytes_of)]
     pub set_memory: Option<usize>,
+    /// The most memory of a node for views that are queued or not sent yet, with their frames; a larger view is refused
+    #[arg(long, value_name = "SIZE", value_parser = bytes_of, default_value = "2G")]
+    pub view_memory: usize,
 }
 
 impl MemoryArgs {
@@ -76,8 +79,8 @@ mod tests {
         assert_eq!(available_of("MemTotal: 9 kB\nMemAvailable:   23620420 kB\n"), Some(23_620_420 << 10));
         assert_eq!(available_of("MemTotal: 9 kB\n"), None);
         assert!(available_bytes() > 0);
-        let given = MemoryArgs { set_memory: Some(7) };
-        assert_eq!((given.set_memory_bytes(true), given.set_memory_bytes(false)), (7, 7));
-        assert_eq!(MemoryArgs { set_memory: None }.set_memory_bytes(false), 2 << 30);
+        let of = |set_memory| MemoryArgs { set_memory, view_memory: 1 };
+        assert_eq!((of(Some(7)).set_memory_bytes(true), of(Some(7)).set_memory_bytes(false)), (7, 7));
+        assert_eq!(of(None).set_memory_bytes(false), 2 << 30);
     }
 }

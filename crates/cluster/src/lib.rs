@@ -34,5 +34,5 @@ pub use scene::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, SceneP
 pub use session::{ChangeSession, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage};
 pub use status::{AchievedTime, ClusterStatus, NodeCondition, OfferSettings, OfferStatus, WorkloadStatus};
 pub use timeline::{Refinement, Timeline};
-pub use views::{DIRECT, FetchImages, LiveRequest, RenderViews, RequestedView, check_view_count};
+pub use views::{DIRECT, FetchImages, LiveRequest, RenderViews, RequestedView, check_view_count, check_view_size};
 pub use workload::{SamplePlanes, SetContent, Workload};

@@ -7,6 +7,7 @@ use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text
 use crate::costs::{Costs, MeasuredCosts};
 use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use crate::scene::SceneRef;
+use crate::views::check_view_size;
 use crate::workload::{SamplePlanes, Workload};
 
 /// A node that wants to be a member.
@@ -87,6 +88,7 @@ impl MeasureCosts {
         }
         at_most(self.typical_views.len(), MAX_BATCH as usize, "typical_views")?;
         let first = self.typical_views.first().ok_or(InvalidField::Missing { field: "typical_views" })?;
+        check_view_size(first.size_px, "typical_views.size_px")?;
         match self.typical_views.iter().find(|view| view.size_px != first.size_px) {
             Some(other) => Err(InvalidField::out_of_range("typical_views", other.size_px, "all of one size")),
             None => Ok(()),

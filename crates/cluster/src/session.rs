@@ -13,6 +13,7 @@ use crate::costs::Costs;
 use crate::limits::{MAX_FALLBACKS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS, MAX_VIEWS_PER_SET};
 use crate::policy::{Policy, PolicyChoice};
 use crate::timeline::Timeline;
+use crate::views::check_view_size;
 
 /// The request that opens a session.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,6 +74,7 @@ impl SessionRequest {
         nonempty(&self.lighting, "lighting")?;
         nonempty(&self.codec, "frame_codec")?;
         at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras")?;
+        check_view_size(self.typical_view.size_px, "typical_view.size_px")?;
         self.timeline.validate()?;
         frame_rate(self.frames_per_s)?;
         at_most(self.fallbacks.len(), MAX_FALLBACKS, "fallbacks")?;

@@ -1,7 +1,8 @@
 //! Views that a client asks a compositor for, and the images that a compositor asks a sampler or a relay for.
 
-use codec::FrameCodec;
+use codec::{DecodeLimits, FrameCodec};
 use depth_image::{PinholeCamera, ViewPlanes};
+use glam::UVec2;
 
 use crate::check::{InvalidField, at_most, nonempty};
 use crate::limits::{MAX_LIVE_VIEWS_PER_REQUEST, MAX_SAMPLE_CAMERAS, MAX_TILES, MAX_VIEWS_PER_REQUEST};
@@ -53,6 +54,7 @@ impl RenderViews {
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
         check_view_count(self.views.len(), self.live.is_some())?;
+        self.views.iter().try_for_each(|view| check_view_size(view.camera.size_px, "views.camera.size_px"))?;
         nonempty(&self.method, "reconstruction_method")
     }
 }
@@ -68,6 +70,18 @@ pub fn check_view_count(count: usize, is_live: bool) -> Result<(), InvalidField>
         (false, 0) => Err(InvalidField::Missing { field: "views" }),
         (false, _) => at_most(count, MAX_VIEWS_PER_REQUEST, "views"),
     }
+}
+
+/// Checks the size of a view, or of a frame with it.
+///
+/// # Errors
+/// More pixels than [`DecodeLimits::VIEWS`] has.
+pub fn check_view_size(size_px: UVec2, field: &'static str) -> Result<(), InvalidField> {
+    if size_px.as_u64vec2().element_product() <= DecodeLimits::VIEWS.max_texels as u64 {
+        return Ok(());
+    }
+    let size = format!("{}×{}", size_px.x, size_px.y);
+    Err(InvalidField::out_of_range(field, size, "67108864 pixels at most, as of 8192×8192"))
 }
 
 /// Asks for encoded images of one set.
@@ -98,6 +112,15 @@ impl FetchImages {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn views_have_67_million_pixels_at_most() {
+        for (size_px, is_right) in [([8192, 8192], true), ([16384, 4096], true), ([8192, 8200], false)] {
+            assert_eq!(check_view_size(size_px.into(), "size_px").is_ok(), is_right, "{size_px:?}");
+        }
+        let error = check_view_size(UVec2::splat(u32::MAX), "views.camera.size_px").unwrap_err().to_string();
+        assert!(error.starts_with("views.camera.size_px is 4294967295×4294967295, must be 67108864"), "{error}");
+    }
 
     #[test]
     fn only_live_streams_may_request_no_view() {

@@ -74,6 +74,14 @@ impl Default for DecodeLimits {
 }
 
 impl DecodeLimits {
+    /// Those of views: 67 million pixels, as of 8192×8192.
+    pub const VIEWS: Self = Self {
+        max_side_px: MAX_IMAGE_SIDE_PX,
+        max_texels: 1 << 26,
+        max_payload_bytes: 1 << 30,
+        max_image_bytes: 1 << 30,
+    };
+
     /// Texels of an image that is within the limits.
     ///
     /// # Errors

@@ -5,8 +5,8 @@ use glam::UVec2;
 
 use crate::{FrameCodec, SampleSetId};
 
-/// Bytes of one encoded frame, all planes.
-pub const MAX_FRAME_BYTES: u64 = 512 << 20;
+/// Bytes of one encoded frame, all planes: those of 8192×8192 take 740 million where nothing can be packed.
+pub const MAX_FRAME_BYTES: u64 = 1 << 30;
 
 /// The header of a frame, whose planes' bytes follow one another.
 #[derive(Debug, Clone, PartialEq)]

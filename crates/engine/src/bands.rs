@@ -42,7 +42,8 @@ fn joined<E>(
     most_pixels: usize,
     views_of: &mut impl FnMut(&[PinholeCamera]) -> Result<Vec<View>, E>,
 ) -> Result<View, E> {
-    let mut whole = View { size_px: camera.size_px, srgb8: Vec::new(), inverse_depth_per_m: None, provenance: None };
+    let srgb8 = Vec::with_capacity(3 * camera.pixel_count());
+    let mut whole = View { size_px: camera.size_px, srgb8, inverse_depth_per_m: None, provenance: None };
     for band in bands(camera, most_pixels) {
         for view in views_of(&[band.camera])? {
             append(&mut whole, view, &band.rows);
@@ -52,14 +53,18 @@ fn joined<E>(
 }
 
 fn append(whole: &mut View, band: View, rows: &Range<u32>) {
+    let all = whole.size_px.element_product() as usize;
     let row = band.size_px.x as usize;
     let pixels = rows.start as usize * row..rows.end as usize * row;
     whole.srgb8.extend_from_slice(&band.srgb8[3 * pixels.start..3 * pixels.end]);
     if let Some(plane) = band.inverse_depth_per_m {
-        whole.inverse_depth_per_m.get_or_insert_default().extend_from_slice(&plane[pixels.clone()]);
+        whole
+            .inverse_depth_per_m
+            .get_or_insert_with(|| Vec::with_capacity(all))
+            .extend_from_slice(&plane[pixels.clone()]);
     }
     if let Some(plane) = band.provenance {
-        whole.provenance.get_or_insert_default().extend_from_slice(&plane[pixels]);
+        whole.provenance.get_or_insert_with(|| Vec::with_capacity(all)).extend_from_slice(&plane[pixels]);
     }
 }
 

@@ -3,6 +3,9 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use depth_image::{PinholeCamera, ViewPlanes};
+use tonic::Status;
+
 /// A node's configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodeConfig {
@@ -88,12 +91,33 @@ pub struct Quotas {
     pub streams: usize,
     /// Views of batches that are waiting or not sent yet.
     pub views: usize,
-    /// Pixels of these views and of live streams' views together.
-    pub pixels: usize,
+    /// Bytes of these views and of live streams' views together, each with its frame.
+    pub view_bytes: usize,
+}
+
+/// The most bytes of a view, before it is encoded, and of its frame.
+#[must_use]
+pub fn view_bytes(camera: &PinholeCamera, planes: ViewPlanes) -> usize {
+    2 * camera.pixel_count() * planes.bytes_per_pixel()
+}
+
+impl Quotas {
+    /// # Errors
+    /// `INVALID_ARGUMENT` for a view that takes more than all views together may.
+    pub fn check_view(&self, camera: &PinholeCamera, planes: ViewPlanes) -> Result<(), Status> {
+        let (bytes, limit) = (view_bytes(camera, planes), self.view_bytes);
+        if bytes <= limit {
+            return Ok(());
+        }
+        let [width, height] = camera.size_px.to_array();
+        Err(Status::invalid_argument(format!(
+            "size_px: a view of {width}×{height} takes {bytes} bytes with its frame, and view-memory of this node is {limit}"
+        )))
+    }
 }
 
 impl Default for Quotas {
     fn default() -> Self {
-        Self { streams: 1024, views: 4096, pixels: 256 << 20 }
+        Self { streams: 1024, views: 4096, view_bytes: 2 << 30 }
     }
 }

@@ -25,7 +25,7 @@ mod work_done;
 
 pub use blocking::blocking;
 pub use byte_cache::{ByteCache, Pinned};
-pub use config::{Deadlines, NodeConfig, Quotas};
+pub use config::{Deadlines, NodeConfig, Quotas, view_bytes};
 pub use connections::Connections;
 pub use device_monitor::DeviceMonitor;
 pub use engine::{

@@ -7,6 +7,7 @@ use cluster::{Costs, DIRECT, MeasureCosts, Measured, ROW_PARTS, TileCosts, Workl
 use codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet};
 use codec::{decode_depth_image, encode_depth_image, encode_view};
 use depth_image::{Camera, PinholeCamera, View};
+use glam::UVec2;
 use tonic::Status;
 
 use crate::auto_exposure::auto_exposure;
@@ -16,6 +17,8 @@ use crate::engine::{DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet
 const RUNS: usize = 3;
 /// A run that takes longer is not repeated: with expensive lighting it takes seconds, and varies little.
 const LONG_RUN_S: f64 = 0.5;
+/// Larger views are measured in this size: their time is in proportion to their pixels.
+const MOST_PIXELS: usize = 1 << 20;
 /// The longest time of views that are drawn in one call, unless one alone takes longer.
 const DIRECT_CALL_S: f64 = 1.0;
 
@@ -24,7 +27,30 @@ pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Resu
     // Work that arrives meanwhile goes between slices of a measurement that nobody waits for.
     let _cut = request.in_background.then(|| engine.live_stream());
     let class = if request.in_background { WorkClass::Background } else { WorkClass::Batch };
-    Measurement { engine, turn: Turn { class, flow: Turn::next_flow() } }.costs(request)
+    let (measured_request, of_pixels) = of_most_pixels(request);
+    let measurement = Measurement { engine, turn: Turn { class, flow: Turn::next_flow() } };
+    let Measured { costs, planes, auto_exposure } = measurement.costs(&measured_request)?;
+    let costs = Costs {
+        direct_view_s: costs.direct_view_s * of_pixels,
+        reconstruct_view_s: costs.reconstruct_view_s * of_pixels,
+        encode_view_s: costs.encode_view_s * of_pixels,
+        ..costs
+    };
+    Ok(Measured { costs, planes, auto_exposure })
+}
+
+/// The request with views of [`MOST_PIXELS`] at most, and the pixels of a requested view for each of theirs.
+fn of_most_pixels(request: &MeasureCosts) -> (MeasureCosts, f64) {
+    let pixels = |request: &MeasureCosts| request.typical_views.first().map_or(1, PinholeCamera::pixel_count);
+    let mut measured = request.clone();
+    if pixels(request) > MOST_PIXELS {
+        let scale = (MOST_PIXELS as f32 / pixels(request) as f32).sqrt();
+        for view in &mut measured.typical_views {
+            *view = view.resized((view.size_px.as_vec2() * scale).as_uvec2().max(UVec2::ONE));
+        }
+    }
+    let of_pixels = pixels(request) as f64 / pixels(&measured) as f64;
+    (measured, of_pixels)
 }
 
 /// A measurement's device, and its place among other work.

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use cluster::{Refinement, SamplePlanes, SceneHash, SceneRef, Timeline};
 use depth_image::{Aabb, DepthImage, Environment, Illumination, SpecularPlanes, ViewPlanes};
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 
 use super::*;
 use crate::engine::EngineError;
@@ -54,7 +54,7 @@ fn image(camera: &Camera) -> DepthImage {
 fn views(cameras: &[PinholeCamera]) -> Vec<View> {
     let view = |camera: &PinholeCamera| View {
         size_px: camera.size_px,
-        srgb8: vec![0; 48],
+        srgb8: vec![0; 3 * camera.pixel_count()],
         inverse_depth_per_m: None,
         provenance: None,
     };
@@ -174,6 +174,19 @@ fn slow_operations_run_once_after_a_warm_up() {
     assert_eq!((calls.refinements.len(), calls.drawn_views), (2, vec![1, 1, 1]));
     assert!((0.51..2.0).contains(&costs.direct_view_s), "{costs:?}");
     assert!((0.255..1.0).contains(&costs.sample_image_s), "two images a run: {costs:?}");
+}
+
+#[test]
+fn large_views_are_measured_in_a_smaller_size() {
+    let large = camera().resized(UVec2::new(8192, 4096));
+    let (smaller, of_pixels) = of_most_pixels(&MeasureCosts { typical_views: vec![large; 2], ..request(1) });
+    let [first, second] = smaller.typical_views[..] else { panic!() };
+    assert_eq!((first, first.size_px), (second, UVec2::new(1448, 724)));
+    assert!((of_pixels - 32.0).abs() < 0.02, "{of_pixels}");
+    let engine = Sleeper { direct_view_s: 0.01, ..Sleeper::default() };
+    let costs = measure_costs(&engine, &MeasureCosts { typical_views: vec![large], ..request(1) }).unwrap().costs;
+    assert!((0.32..1.0).contains(&costs.direct_view_s), "{costs:?}");
+    assert_eq!(of_most_pixels(&request(1)).1, 1.0);
 }
 
 #[test]

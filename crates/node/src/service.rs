@@ -9,6 +9,7 @@ use tonic::{Status, async_trait};
 use wire::rpc;
 
 use crate::blocking::blocking;
+use crate::config::Quotas;
 use crate::measure::measure_costs;
 use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
@@ -21,6 +22,7 @@ const MAX_MEASURED: usize = 16;
 pub struct NodeService {
     plans: PlansInForce,
     scenes: Arc<Scenes>,
+    quotas: Quotas,
     metrics: NodeMetrics,
     /// Measured costs, the oldest first: a coordinator that was restarted need not wait for them again.
     measured: Mutex<VecDeque<(MeasureCosts, Measured)>>,
@@ -29,8 +31,8 @@ pub struct NodeService {
 impl NodeService {
     /// The service of one node.
     #[must_use]
-    pub fn new(plans: PlansInForce, scenes: Arc<Scenes>, metrics: NodeMetrics) -> Self {
-        Self { plans, scenes, metrics, measured: Mutex::default() }
+    pub fn new(plans: PlansInForce, scenes: Arc<Scenes>, quotas: Quotas, metrics: NodeMetrics) -> Self {
+        Self { plans, scenes, quotas, metrics, measured: Mutex::default() }
     }
 
     async fn measure_now(&self, request: &MeasureCosts) -> Result<Measured, Status> {
@@ -43,6 +45,7 @@ impl NodeService {
 #[async_trait]
 impl rpc::Node for NodeService {
     async fn measure_costs(&self, request: MeasureCosts) -> Result<Measured, Status> {
+        request.typical_views.iter().try_for_each(|view| self.quotas.check_view(view, request.planes))?;
         let known = self.measured.lock().iter().find(|(known, _)| *known == request).map(|(_, measured)| *measured);
         // What is measured in the background was measured before, beside other work.
         if let Some(measured) = known.filter(|_| !request.in_background) {

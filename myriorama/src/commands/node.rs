@@ -47,9 +47,6 @@ pub struct NodeArgs {
     /// The most views of batches that are queued or not sent yet
     #[arg(long, value_name = "N", default_value_t = Quotas::default().views)]
     max_views: usize,
-    /// The most pixels of these views and of live views together
-    #[arg(long, value_name = "N", default_value_t = Quotas::default().pixels)]
-    max_pixels: usize,
     #[command(flatten)]
     limits: ViewLimitArgs,
     /// Serves without TLS on an address that others can reach
@@ -76,7 +73,7 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
         insecure_bind: args.insecure_bind,
         reflection: args.reflection,
         set_memory_bytes: memory,
-        quotas: Quotas { streams: args.max_streams, views: args.max_views, pixels: args.max_pixels },
+        quotas: Quotas { streams: args.max_streams, views: args.max_views, view_bytes: args.memory.view_memory },
         ..args.limits.within(NodeConfig::new(name, args.coordinator))
     };
     let shutdown = CancellationToken::new();

@@ -11,7 +11,7 @@ use app_core::setup::DeviceArgs;
 use app_core::view_limits::ViewLimitArgs;
 use clap::Args;
 use engine::GpuEngine;
-use node::{Engine as _, NodeConfig};
+use node::{Engine as _, NodeConfig, Quotas};
 use tokio_util::sync::CancellationToken;
 
 use crate::viewer::ViewerArgs;
@@ -59,7 +59,12 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     }
     // The device and the packages hold the scenes now; the third copy is dropped.
     drop(scenes);
-    let configure = |config: NodeConfig| NodeConfig { set_memory_bytes: memory / nodes, ..args.limits.within(config) };
+    let view_bytes = args.memory.view_memory;
+    let configure = |config: NodeConfig| NodeConfig {
+        set_memory_bytes: memory / nodes,
+        quotas: Quotas { view_bytes, ..config.quotas },
+        ..args.limits.within(config)
+    };
     let device_name = engine.device_name();
     let (port, browsers) = args.viewer.share(listener);
     let mut cluster = Cluster::start(configure, port, offers, engine.opener(), nodes, args.insecure_bind).await?;

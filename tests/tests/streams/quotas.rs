@@ -74,7 +74,7 @@ async fn a_client_with_thousands_of_views_does_not_starve_others() {
 /// A client requests the rest of a batch when it has some of it: by then others may have used the quota.
 #[tokio::test(flavor = "multi_thread")]
 async fn an_admitted_stream_waits_for_room() {
-    let small = |config: NodeConfig| NodeConfig { quotas: Quotas { pixels: 4 << 20, ..config.quotas }, ..config };
+    let small = |config: NodeConfig| NodeConfig { quotas: Quotas { view_bytes: 24 << 20, ..config.quotas }, ..config };
     let cluster = Cluster::start_with(1, small).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let (address, _) = compositor_of(&session);
@@ -103,8 +103,10 @@ async fn an_admitted_stream_waits_for_room() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_request_beyond_a_quota_of_a_node_is_refused_by_name() {
-    let small =
-        |config: NodeConfig| NodeConfig { quotas: Quotas { streams: 3, pixels: 4 << 20, ..config.quotas }, ..config };
+    let small = |config: NodeConfig| NodeConfig {
+        quotas: Quotas { streams: 3, view_bytes: 24 << 20, ..config.quotas },
+        ..config
+    };
     let cluster = Cluster::start_with(1, small).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let (address, _) = compositor_of(&session);
@@ -114,7 +116,7 @@ async fn a_request_beyond_a_quota_of_a_node_is_refused_by_name() {
         let request = greedy(&session, 1024, count);
         narrow(&address).await.render_views(tokio_stream::once(request).chain(tokio_stream::pending())).await
     };
-    // This client takes no frames, and holds the node's pixels.
+    // This client takes no frames, and holds the node's memory.
     let _first = ask(64).await.unwrap();
     let start = Instant::now();
     let (second, refused) = loop {
@@ -125,7 +127,7 @@ async fn a_request_beyond_a_quota_of_a_node_is_refused_by_name() {
         }
     };
     assert_eq!(refused.code(), Code::ResourceExhausted);
-    assert!(refused.message().contains("quota pixels: 4194304"), "{refused}");
+    assert!(refused.message().contains("quota view-memory: 25165824"), "{refused}");
     seen(&mut live, 0.1, 0).await;
     drop(second);
     tokio::time::sleep(Duration::from_millis(100)).await;

@@ -1,8 +1,9 @@
 //! Requests for views, and frames in parts.
 
-use cluster::{InvalidField, LiveRequest, RenderViews, RequestedView, check_seconds, check_view_count};
-use codec::{DecodeLimits, FrameCodec, FrameHeader, FramePart, MAX_FRAME_BYTES, StageTimes};
-use glam::UVec2;
+use cluster::{
+    InvalidField, LiveRequest, RenderViews, RequestedView, check_seconds, check_view_count, check_view_size,
+};
+use codec::{FrameCodec, FrameHeader, FramePart, MAX_FRAME_BYTES, StageTimes};
 
 use super::Convert;
 use crate::error::WireError;
@@ -41,9 +42,7 @@ impl Convert<String> for FrameCodec {
 }
 
 fn check_header(header: &FrameHeader) -> Result<(), InvalidField> {
-    let UVec2 { x, y } = header.size_px;
-    let texels = DecodeLimits::default().texels(x, y);
-    texels.map_err(|error| InvalidField::out_of_range("header.size_px", error, "within the limits"))?;
+    check_view_size(header.size_px, "header.size_px")?;
     if header.camera.size_px != header.size_px {
         return Err(InvalidField::out_of_range("header.camera.size_px", header.camera.size_px, "the frame's"));
     }
