@@ -46,7 +46,8 @@ async fn a_slow_link_has_small_pictures_and_a_freed_one_larger_ones() {
     let slow = Way::Link { bytes_per_s: BYTES_PER_S, delay: DELAY };
     proxy.set(slow, slow);
     let visit = Visit::alone(&proxy.address, View::default()).await;
-    visit.settled().await;
+    // All samples of a still take this link for a quarter of a minute.
+    visit.until("window.myriorama?.statistics.pictures.length > 0").await;
     drag_for(&visit, Duration::from_secs(4)).await;
     let pictures = drag_for(&visit, Duration::from_secs(6)).await;
     let age_ms = median(pictures.iter().map(|picture| picture.age));

@@ -68,7 +68,10 @@ impl Gpu {
     /// # Errors
     /// No device exists, or it cannot be opened.
     pub fn open(preference: DevicePreference) -> Result<Arc<Self>, GpuError> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+        // Sizes of indirect dispatches come from our own lists of pixels. To check each would take a dispatch of its own.
+        descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
+        let instance = wgpu::Instance::new(descriptor);
         let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
             force_fallback_adapter: preference == DevicePreference::Software,

@@ -9,7 +9,7 @@ use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
 use wgpu::TextureFormat;
 
-use crate::pyramid::{CodedDepth, Pyramid, cell_row, is_among_holes};
+use crate::pyramid::{CodedDepth, Pyramid, is_among_holes};
 use crate::view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant};
 use crate::{error::ReconstructionError, quads::SetMeshes, reflectors::Reflectors};
 
@@ -44,7 +44,7 @@ pub struct SampleSet {
     pub(crate) nodes: Table,
     /// See [`CodedDepth::cell_words`].
     pub(crate) cell_codes: Table,
-    /// RGB9E5 of each cell's corners.
+    /// RGB9E5 of each texel and of the one below it.
     pub(crate) cell_colors: Table,
     pub(crate) reflectors: Option<Reflectors>,
     pub(crate) environment: Option<Arc<GpuEnvironment>>,
@@ -81,7 +81,7 @@ impl SampleSet {
         let coded: Vec<CodedImage> =
             if is_shared { images.iter().map(coded).collect() } else { images.par_iter().map(coded).collect() };
         let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(Vec::with_capacity);
-        let mut colors: Vec<[u32; 4]> = Vec::with_capacity(cell_count(images));
+        let mut colors: Vec<[u32; 2]> = Vec::with_capacity(cell_count(images));
         let mut cameras = Vec::with_capacity(images.len());
         let uncertain = coded.iter().map(|coded| coded.uncertain).collect();
         for (image, coded) in images.iter().zip(coded) {
@@ -93,8 +93,7 @@ impl SampleSet {
             });
             nodes.extend(coded.nodes);
             codes.extend(coded.cells);
-            let [columns, rows] = image.size_px().to_array().map(|side| side as usize);
-            (0..rows).for_each(|y| colors.extend(cell_row(&image.color_rgb9e5, columns, y)));
+            colors.extend(with_below(&image.color_rgb9e5, image.size_px().x as usize));
         }
         Ok(Self {
             cameras,
@@ -103,7 +102,7 @@ impl SampleSet {
             background: background_buffer(tables, &set.background),
             nodes: tables.upload("depth pyramids", TextureFormat::Rg32Uint, &nodes, turn)?,
             cell_codes: tables.upload("cells", TextureFormat::Rg32Uint, &codes, turn)?,
-            cell_colors: tables.upload("sample colours", TextureFormat::Rgba32Uint, &colors, turn)?,
+            cell_colors: tables.upload("sample colours", TextureFormat::Rg32Uint, &colors, turn)?,
             reflectors: Reflectors::upload(tables, images, set.illumination, set.highlight, turn)?,
             environment: set.environment.cloned(),
             meshes: SetMeshes::upload(tables, images, turn)?,
@@ -165,6 +164,12 @@ fn check(tables: &TablePool, images: &[DepthImage], volume: &Aabb) -> Result<(),
     tables.gpu.check_table("depth pyramids", node_count(images))?;
     tables.gpu.check_table("cells", cell_count(images))?;
     Ok(())
+}
+
+/// Each texel's colour and that of the texel below it. The last row is below itself.
+fn with_below(colors: &[u32], columns: usize) -> impl Iterator<Item = [u32; 2]> {
+    let last = &colors[colors.len() - columns..];
+    colors.iter().zip(colors[columns..].iter().chain(last)).map(|(&own, &below)| [own, below])
 }
 
 fn node_count(images: &[DepthImage]) -> usize {

@@ -1,6 +1,6 @@
 // The vote of all cameras on a point: the surfaces that their samples describe around it.
 
-// RGB9E5 of each cell's corners, in their order.
+// RGB9E5 of each texel and of the one below it: half the bytes of all four corners of each cell.
 @group(0) var cell_colors: texture_2d<u32>;
 // Linear, as RGB9E5; the colour of the background is added later.
 @group(0) var<storage, read_write> out_color: array<u32>;
@@ -60,11 +60,12 @@ fn write_found(index: u32, found: bool, t: f32, color_linear: vec3f, origin: u32
 struct Colors { corners: array<vec3f, 4> }
 
 fn colors_of(cell_index: u32) -> Colors {
-{% if count_fetches %}    fetches += 1u;
+{% if count_fetches %}    fetches += 2u;
 {% endif %}
-    let words = textureLoad(cell_colors, texel_at(cell_index), 0);
+    let left = textureLoad(cell_colors, texel_at(cell_index), 0).xy;
+    let right = textureLoad(cell_colors, texel_at(cell_index + 1u), 0).xy;
     return Colors(array(
-        linear_from_rgb9e5(words.x), linear_from_rgb9e5(words.y), linear_from_rgb9e5(words.z), linear_from_rgb9e5(words.w),
+        linear_from_rgb9e5(left.x), linear_from_rgb9e5(right.x), linear_from_rgb9e5(left.y), linear_from_rgb9e5(right.y),
     ));
 }
 

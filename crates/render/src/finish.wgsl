@@ -123,15 +123,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
 {% endif %}
     for (var open = !met; open; open = false) { linear = background_linear(direction_of(pixel)); }
-    let color = linear;
 {% if samples and averaged %}
-    put(0u, place, rgb9e5_from_linear(mean_with(color, depth / camera.near_m, place)));
+    put(0u, place, rgb9e5_from_linear(mean_with(linear, depth / camera.near_m, place)));
     // All other planes are the centre's.
     if finish.position > 0u { return; }
 {% elif samples %}
-    put(0u, place, rgb9e5_from_linear(color));
+    put(0u, place, rgb9e5_from_linear(linear));
 {% else %}
-    let shown = shown_from_mean({{ "mean_with(color, place)" if averaged else "color" }}, finish.tone);
+    let shown = shown_from_mean({{ "mean_with(linear, place)" if averaged else "linear" }}, finish.tone);
     put(0u, place, pack4x8unorm(vec4f(srgb_from_linear(shown), 1.0)));
 {% endif %}
 {% if redundancy %}
