@@ -22,6 +22,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("reconstruction", &["gpu", "depth-image"]),
     ("metrics", &["depth-image"]),
     ("pictures", &["metrics", "depth-image"]),
+    ("planner", &["depth-image"]),
     ("codec", &["depth-image"]),
     ("cluster", &["codec", "depth-image"]),
     ("wire", &["cluster", "codec", "depth-image"]),
