@@ -88,14 +88,19 @@ impl Evidence<'_> {
 
     /// The views on which a certificate is decided: as few as probably suffice.
     pub(crate) fn views_to_certify(&self, error_rate: f64) -> usize {
-        let options = self.certificate_sizes(error_rate);
-        let enough = options.iter().find(|&&views| self.chance(views, error_rate) >= ENOUGH_CHANCE);
-        enough.or(options.last()).copied().unwrap_or(0)
+        let mut options = self.certificate_sizes(error_rate).into_iter();
+        let enough = options.find(|&views| self.chance(views, error_rate) >= ENOUGH_CHANCE);
+        enough.unwrap_or_else(|| self.most_views(error_rate))
+    }
+
+    /// The most views on which a certificate is decided.
+    pub(crate) fn most_views(&self, error_rate: f64) -> usize {
+        self.certificate_sizes(error_rate).last().copied().unwrap_or(0)
     }
 
     /// The probable chance of a certificate, with as many views as there may be.
     pub(crate) fn chance_to_certify(&self, error_rate: f64) -> f64 {
-        self.certificate_sizes(error_rate).last().map_or(0.0, |&views| self.chance(views, error_rate))
+        self.chance(self.most_views(error_rate), error_rate)
     }
 
     fn certificate_sizes(&self, error_rate: f64) -> Vec<usize> {

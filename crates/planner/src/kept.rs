@@ -60,7 +60,7 @@ pub struct KeptRow {
     /// Budgets that the row was certified to keep.
     #[serde(deserialize_with = "bounded::<_, _, MAX_CERTIFICATES>")]
     pub certificates: Vec<Certificate>,
-    /// Budgets at which certificates failed: they are not tried again, nor are stricter ones.
+    /// Budgets at which certification ended without the row: it is not tried again at them, nor at stricter ones.
     #[serde(deserialize_with = "bounded::<_, _, MAX_CERTIFICATES>")]
     pub rejected: Vec<Budget>,
     /// Costs by device and program.

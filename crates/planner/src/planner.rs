@@ -24,7 +24,7 @@ use crate::invalid::{InvalidField, name, seconds, within};
 use crate::kept::KeptKey;
 use crate::ladder::{Ladder, Row};
 use crate::metric::Metric;
-use crate::outcome::{Outcome, PruningCheck, RowSummary};
+use crate::outcome::{Outcome, RowSummary};
 
 /// Views and repetitions with which finalists are timed.
 const TIMED_VIEWS: usize = 32;
@@ -73,7 +73,6 @@ pub struct Planner<P> {
     probe_number: u64,
     fresh_views_drawn: u64,
     finalists_were_timed: bool,
-    pruning: PruningCheck,
     spent_s: f64,
     allowance_s: f64,
     outcome: Option<Outcome>,
@@ -107,7 +106,6 @@ impl<P: Pricing> Planner<P> {
             probe_number: 0,
             fresh_views_drawn: 0,
             finalists_were_timed: false,
-            pruning: PruningCheck::default(),
             spent_s: 0.0,
             allowance_s: request.allowance_s,
             outcome: None,

@@ -4,9 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::random::unit;
 
-/// 1/g, 1/g² and 1/g³ for g⁴ = g + 1: the additive recurrence of lowest discrepancy in three dimensions (Roberts 2018, "The
-/// unreasonable effectiveness of quasirandom sequences").
-const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3];
+/// Bases of the Halton sequence (Halton 1960), whose places are even on each axis and together.
+const BASES: [u64; 3] = [2, 3, 5];
 
 /// A view on which a row is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,8 +23,19 @@ impl ProbeView {
     #[must_use]
     pub fn place(self, seed: u64) -> [f64; 3] {
         match self {
-            Self::Screening(number) => STEPS.map(|step| (0.5 + step * (f64::from(number) + 1.0)).fract()),
+            Self::Screening(number) => BASES.map(|base| radical_inverse(u64::from(number) + 1, base)),
             Self::Fresh(number) => [0, 1, 2].map(|axis| unit(seed, number.wrapping_mul(3).wrapping_add(axis))),
         }
     }
+}
+
+/// The digits of a number in a base, mirrored at the point.
+fn radical_inverse(mut number: u64, base: u64) -> f64 {
+    let (mut inverse, mut digit) = (0.0, 1.0);
+    while number > 0 {
+        digit /= base as f64;
+        inverse += digit * (number % base) as f64;
+        number /= base;
+    }
+    inverse
 }

@@ -128,9 +128,10 @@ impl<P: Pricing> Planner<P> {
     /// Chooses the number of views from what screening says, before a fresh view is measured.
     fn begin_row(&mut self) {
         let error_rate = round_error_rate(self.round.number);
+        let is_last = self.round.number + 1 == MAX_ROUNDS;
         let needed = self.round.row().zip(self.term()).map(|(row, term)| {
             let evidence = self.evidence(row, term);
-            evidence.views_to_certify(error_rate)
+            if is_last { evidence.most_views(error_rate) } else { evidence.views_to_certify(error_rate) }
         });
         self.round.errors.clear();
         self.round.needed_views = needed.unwrap_or(0);

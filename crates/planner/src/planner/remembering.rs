@@ -41,6 +41,15 @@ impl<P: Pricing> Planner<P> {
         }
     }
 
+    /// Whether certification came to its end without this row, which it would have preferred: its failure, or that of a safer
+    /// one, ended the sequence.
+    fn ended_without(&self, row: usize) -> bool {
+        let status = self.rows[row].status;
+        let chosen = self.outcome.as_ref().filter(|_| self.round.is_over() && self.term().is_some());
+        let is_better = chosen.is_some_and(|chosen| self.prices[row].node_s < chosen.price.node_s);
+        status == RowStatus::Rejected || (status == RowStatus::Passed && is_better)
+    }
+
     fn row_from(&self, kept: KeptRow) -> RowState {
         let term = self.term();
         let is_certified = term.is_some_and(|term| kept.certificates.iter().any(|own| own.serves(&term)));
@@ -78,7 +87,7 @@ impl<P: Pricing> Planner<P> {
             is_settled: state.is_settled,
             costs,
         });
-        let rejected = (state.status == RowStatus::Rejected).then_some(self.request.budget);
+        let rejected = self.ended_without(row).then_some(self.request.budget);
         let rejected = rejected.filter(|budget| !state.rejected.contains(budget));
         let kept = KeptRow::new(self.row(row).clone(), state.screening().to_vec());
         KeptRow {

@@ -91,7 +91,11 @@ impl Subject {
         }
     }
 
-    pub fn least_foreground(&self) -> f64 { self.least_foreground }
+    /// The same, where direct drawing takes so long.
+    pub fn with_direct(self, direct_s: f64) -> Self {
+        Self { direct_s, ..self }
+    }
+
     pub fn price(&self, row: usize) -> Price {
         self.row(&self.ladder.rows()[row], &self.costs[row])
     }
