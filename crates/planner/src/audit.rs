@@ -20,6 +20,8 @@ const TUNED_AT_VIEWS: f64 = 100.0;
 const ERROR_RATE: f64 = 0.05;
 /// The share of views that may be over a budget of 95 of 100 views.
 const MOST_OVER: f64 = 0.05;
+/// Bets on such views are so many times lower: they are rare, and one of them would pay for too much.
+const RARE_OVER: f64 = 3.0;
 
 /// The audited views of one promise.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +54,7 @@ impl Audit {
     pub fn new(term: ErrorTerm, foreground_ratio: f64) -> Self {
         let (limit, weight) = match term.statistic() {
             Statistic::Mean => (term.most_ratio(), foreground_ratio.clamp(BETS[2], 1.0)),
-            Statistic::P95 => (MOST_OVER, 1.0),
+            Statistic::P95 => (MOST_OVER, RARE_OVER),
         };
         Self {
             term,
@@ -104,7 +106,8 @@ impl Audit {
         let n = self.views as f64;
         let deviation = (self.squares / (n - 1.0)).sqrt();
         let spread = n * tuned_variance();
-        let half_width = deviation * (2.0 * (spread + 1.0) / (n * spread) * ((spread + 1.0).sqrt() / ERROR_RATE).ln()).sqrt();
+        let half_width =
+            deviation * (2.0 * (spread + 1.0) / (n * spread) * ((spread + 1.0).sqrt() / ERROR_RATE).ln()).sqrt();
         Some(Interval { low: self.mean - half_width, mean: self.mean, high: self.mean + half_width })
     }
 

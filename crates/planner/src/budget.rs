@@ -72,6 +72,7 @@ impl Budget {
         match term.split_whitespace().collect::<Vec<_>>()[..] {
             ["time", limit] if self.most_view_ms.is_none() => self.most_view_ms = Some(milliseconds(limit, term)?),
             ["time", _] => return Err(repeated("time")),
+            ["time", ..] => return Err(BudgetError::Malformed { term: shown(term) }),
             _ => {
                 let error = ErrorTerm::parse(term)?;
                 if self.error.replace(error).is_some() {

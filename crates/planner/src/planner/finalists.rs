@@ -35,7 +35,8 @@ impl<P: Pricing> Planner<P> {
     fn finalists(&self) -> Vec<usize> {
         let eligible = self.eligible(TOLERANCES);
         let Some(&best) = eligible.first() else { return eligible };
-        let is_close = |&row: &usize| self.term().is_none() || self.prices[row].node_s <= CLOSE * self.prices[best].node_s;
+        let is_close =
+            |&row: &usize| self.term().is_none() || self.prices[row].node_s <= CLOSE * self.prices[best].node_s;
         let mut finalists: Vec<usize> = eligible.iter().copied().filter(is_close).take(MOST_FINALISTS).collect();
         // Where all are at the edge of the time, one that is clearly within it must be among them.
         let safe = eligible.into_iter().find(|&row| self.is_clearly_in_time(row));

@@ -52,7 +52,9 @@ impl<P: Pricing> Planner<P> {
 
     fn direct_keeps(&self, of: &str) -> String {
         let nearest = match (self.term(), self.nearest_to_error()) {
-            (Some(term), Some(row)) => format!(" The row with the least error, {}, has {}.", self.row(row), shown(term, self.error_ratio(row))),
+            (Some(term), Some(row)) => {
+                format!(" The row with the least error, {}, has {}.", self.row(row), shown(term, self.error_ratio(row)))
+            }
             _ => String::new(),
         };
         format!(

@@ -1,6 +1,6 @@
 //! Budgets as texts, and the definition of y.
 
-use planner::{Budget, BudgetError, Metric, Statistic, ViewErrors};
+use planner::{Budget, BudgetError, Metric, Statistic, UnknownMetric, ViewErrors};
 
 fn parse(text: &str) -> Result<Budget, BudgetError> {
     text.parse()
@@ -75,6 +75,14 @@ fn wrong_budgets_are_refused_by_their_term() {
         let error = parse(text).expect_err(text).to_string();
         assert!(error.starts_with(expected), "{text:?}: {error}");
     }
+}
+
+#[test]
+fn an_unknown_metric_is_an_error_of_its_own() {
+    let unknown: UnknownMetric = "ssim".parse::<Metric>().unwrap_err();
+    let expected = BudgetError::UnknownMetric { term: "ssim 1".to_owned(), source: unknown };
+    assert_eq!(parse("ssim 1"), Err(expected));
+    assert!(Metric::help().starts_with("flip: FLIP over the foreground"), "{}", Metric::help());
 }
 
 #[test]

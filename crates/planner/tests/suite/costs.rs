@@ -99,7 +99,11 @@ fn degenerate_measurements_give_finite_predictions() {
         vec![timed(f64::NAN, f64::NAN), timed(f64::INFINITY, -1.0)],
         vec![timed(1e-3, 3e4); 50],
         vec![timed(1e300, 1e300), timed(1e-300, 1e-300)],
-        vec![TimedRow { row: Row { sampling: "unknown".to_owned(), ..row.clone() }, view_pixels: 1.0, costs: costs(1.0) }],
+        vec![TimedRow {
+            row: Row { sampling: "unknown".to_owned(), ..row.clone() },
+            view_pixels: 1.0,
+            costs: costs(1.0),
+        }],
     ] {
         let model = CostModel::fit(ladder.rows(), &set);
         ladder.rows().iter().for_each(|row| assert_finite(&model, row, VIEW_PIXELS));
@@ -114,7 +118,8 @@ fn rows_of_measured_methods_are_less_uncertain() {
     let rows = ladder.rows();
     let mut random = Random(1);
     let first = random.below(rows.len());
-    let timed = TimedRow { row: rows[first].clone(), view_pixels: VIEW_PIXELS, costs: known(&rows[first], VIEW_PIXELS) };
+    let timed =
+        TimedRow { row: rows[first].clone(), view_pixels: VIEW_PIXELS, costs: known(&rows[first], VIEW_PIXELS) };
     let model = CostModel::fit(rows, &[timed]);
     let own = model.uncertainty(&rows[first], VIEW_PIXELS);
     let others = rows.iter().filter(|row| row.method != rows[first].method);

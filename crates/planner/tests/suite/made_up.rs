@@ -1,8 +1,8 @@
 //! A made-up subject: a ladder whose errors and costs are known exactly, and the caller of a planner.
 
 use planner::{
-    Command, Event, Kept, KeptKey, Ladder, Outcome, PlanRequest, Planner, Price, Pricing, ProbeView, Probed, Purpose, Row,
-    RowCosts, Timed, ViewErrors,
+    Command, Event, Kept, KeptKey, Ladder, Outcome, PlanRequest, Planner, Price, Pricing, ProbeView, Probed, Purpose,
+    Row, RowCosts, Timed, ViewErrors,
 };
 
 use crate::random::Random;
@@ -12,8 +12,14 @@ pub const VIEW_PIXELS: f64 = 30_000.0;
 const VIEWS_PER_SET: f64 = 290.0;
 
 const SAMPLINGS: [&str; 3] = ["plain", "thrifty", "peeled"];
-const METHODS: [(&str, &str, u32); 6] =
-    [("search:8", "search", 8), ("search:32", "search", 32), ("carve:2", "carve", 2), ("carve:4", "carve", 4), ("mesh", "mesh", 1), ("boxes", "boxes", 1)];
+const METHODS: [(&str, &str, u32); 6] = [
+    ("search:8", "search", 8),
+    ("search:32", "search", 32),
+    ("carve:2", "carve", 2),
+    ("carve:4", "carve", 4),
+    ("mesh", "mesh", 1),
+    ("boxes", "boxes", 1),
+];
 
 /// 3 sampling methods × S of {1, 2, 4, 8} × 3 sides × 6 reconstructions.
 pub fn ladder() -> Ladder {
@@ -225,7 +231,16 @@ pub fn answer(subject: &Subject, command: &Command) -> Option<Event> {
     }
 }
 
-/// Carries a plan out to its end.
+/// The nodes' time that an answer names, in s.
+pub fn busy_s(event: &Event) -> f64 {
+    match event {
+        Event::Probed(probed) => probed.busy_s,
+        Event::Timed(timed) => timed.busy_s,
+        _ => 0.0,
+    }
+}
+
+/// Executes a plan to its end.
 pub fn run(planner: &mut Planner<Subject>, subject: &Subject, kept: Kept) -> Run {
     let mut run = Run::default();
     let mut next = Some(Event::Remembered(kept));

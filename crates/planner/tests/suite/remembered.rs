@@ -104,10 +104,13 @@ fn errors_hold_on_another_device_and_costs_do_not() {
     }
 }
 
+/// A text of a key.
+type Text = fn(&mut KeptKey) -> &mut String;
+
 #[test]
 fn measurements_of_another_key_are_refused_by_field() {
     let subject = subject(1);
-    let fields: [(&str, fn(&mut KeptKey) -> &mut String); 5] = [
+    let fields: [(&str, Text); 5] = [
         ("scene", |key| &mut key.scene),
         ("cell", |key| &mut key.cell),
         ("lighting", |key| &mut key.lighting),
