@@ -5,7 +5,8 @@
 //! is kept, alarms are at least 1,000 views apart in the mean. The interval is the asymptotic confidence sequence of
 //! Waudby-Smith, Arbour, Sinha, Kennedy and Ramdas (2024), with a confidence of 95 %.
 
-use crate::budget::{ErrorTerm, Statistic};
+use crate::bounds::ERROR_RATE;
+use crate::budget::{ErrorTerm, MOST_OVER, Statistic};
 use crate::view_errors::ViewErrors;
 
 /// Bets on a broken promise, as shares of the greatest that cannot lose everything.
@@ -16,10 +17,6 @@ const ALARM: f64 = 1_000.0;
 const LEAST_VIEWS: u64 = 16;
 /// Views at which the interval is narrowest for what is known.
 const TUNED_AT_VIEWS: f64 = 100.0;
-/// The probability that the interval is ever wrong.
-const ERROR_RATE: f64 = 0.05;
-/// The share of views that may be over a budget of 95 of 100 views.
-const MOST_OVER: f64 = 0.05;
 /// Bets on such views are so many times lower: they are rare, and one of them would pay for too much.
 const RARE_OVER: f64 = 3.0;
 

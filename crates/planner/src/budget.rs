@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::metric::{Metric, UnknownMetric};
 
+/// The share of views that may be over a limit on 95 of 100 views.
+pub(crate) const MOST_OVER: f64 = 0.05;
 /// The most bytes of a term that an error repeats.
 const SHOWN_BYTES: usize = 40;
 /// The greatest limit on PSNR, in dB: 8-bit pictures that differ less are equal.

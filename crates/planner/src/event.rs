@@ -33,7 +33,7 @@ pub enum Event {
     Probed(Probed),
     /// The answer to [`Time`](crate::Command::Time).
     Timed(Timed),
-    /// A measurement failed.
+    /// A measurement failed, and is not tried again: its row is not chosen.
     Failed {
         /// The measurement.
         id: ProbeId,

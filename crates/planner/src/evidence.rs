@@ -2,12 +2,10 @@
 
 use crate::binomial::{at_most_over, is_over, most_over, views_needed};
 use crate::bounds::Moments;
-use crate::budget::{ErrorTerm, Statistic};
+use crate::budget::{ErrorTerm, MOST_OVER, Statistic};
 use crate::student::upper_quantile;
 use crate::view_errors::ViewErrors;
 
-/// The share of views that may be over a budget of 95 of 100 views.
-const MOST_OVER: f64 = 0.05;
 /// Numbers of views on which a mean is certified.
 const MEAN_VIEWS: [usize; 3] = [32, 48, 64];
 /// The most views that may be over in the certificate of a percentile.

@@ -51,13 +51,14 @@ impl<P: Pricing> Planner<P> {
         Ok(())
     }
 
-    /// A row that cannot be measured is not chosen.
+    /// A row that cannot be measured is not chosen. Finalists that cannot be timed again keep the costs that they have.
     pub(super) fn failed(&mut self, id: ProbeId, busy_s: f64) -> Result<(), InvalidField> {
         let rows = match self.pending_work(id)? {
             Work::Screen { row, .. } | Work::Certify { row, .. } => vec![*row],
-            Work::Time { rows } => rows.clone(),
+            Work::Time { rows } => rows.iter().copied().filter(|&row| self.rows[row].costs.is_none()).collect(),
         };
         self.finish(busy_s);
+        self.finalists_were_timed |= self.stage == Stage::Timing;
         for row in rows {
             self.rows[row].status = RowStatus::Failed;
         }

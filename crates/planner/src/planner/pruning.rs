@@ -4,6 +4,7 @@
 
 use super::Planner;
 use crate::costs::Pricing;
+use crate::kept::MAX_SCREENING_VIEWS;
 use crate::outcome::{PruningCheck, RowStatus};
 use crate::random::unit;
 
@@ -11,10 +12,12 @@ use crate::random::unit;
 const TESTED_SHARE: f64 = 0.1;
 
 impl<P: Pricing> Planner<P> {
+    /// Rows that earlier plans measured in full are judged by that.
     pub(super) fn prune_below(&mut self, failed: usize) {
         for row in 0..self.rows.len() {
-            let is_open = self.rows[row].status == RowStatus::Open && !self.rows[row].is_spared;
-            if !is_open || !self.row(row).is_dominated_by(self.row(failed)) {
+            let state = &self.rows[row];
+            let is_known = state.is_spared || state.screening_views == MAX_SCREENING_VIEWS;
+            if state.status != RowStatus::Open || is_known || !self.row(row).is_dominated_by(self.row(failed)) {
                 continue;
             }
             if unit(self.request.seed, row as u64) < TESTED_SHARE {

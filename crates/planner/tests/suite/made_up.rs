@@ -52,6 +52,8 @@ pub struct Subject {
     /// The coefficient of variation of FLIP between views.
     pub variation: f64,
     least_foreground: f64,
+    /// The share of views that show next to nothing.
+    pub empty_share: f64,
     /// The deviation of the logarithm of a cost from timing to timing.
     noise: f64,
     pub direct_s: f64,
@@ -74,7 +76,7 @@ impl Subject {
         let costs = costs(&ladder, &mut random);
         let direct_s = random.between(0.006, 0.06);
         let least_foreground = random.between(0.05, 0.8);
-        Self { ladder, seed, flip, costs, variation, least_foreground, noise: 0.03, direct_s }
+        Self { ladder, seed, flip, costs, variation, least_foreground, empty_share: 0.0, noise: 0.03, direct_s }
     }
 
     /// The errors of a row on a view: half of the variance is common to all rows.
@@ -86,7 +88,8 @@ impl Subject {
         let mut common = Random(self.seed ^ number.wrapping_mul(0x2545_f491_4f6c_dd1d));
         let mut own = Random(common.next() ^ (row as u64) << 32);
         let share = self.variation / 2.0_f64.sqrt();
-        let foreground_ratio = common.between(self.least_foreground, 1.0);
+        let is_empty = common.unit() < self.empty_share;
+        let foreground_ratio = if is_empty { 0.005 } else { common.between(self.least_foreground, 1.0) };
         let flip = (self.flip[row] * common.gamma(share) * own.gamma(share)).min(1.0);
         ViewErrors {
             foreground_ratio,

@@ -280,6 +280,51 @@ fn a_row_that_fails_while_it_is_certified_is_skipped() {
 /// A value of a view's errors.
 type Value = fn(&mut ViewErrors) -> &mut f64;
 
+/// A node that is lost while finalists are timed: what was certified stays.
+#[test]
+fn finalists_that_cannot_be_timed_keep_their_costs() {
+    let mut failed = 0;
+    for seed in 0..40 {
+        let subject = Subject::new(seed).with_direct(1.0);
+        let mut planner = planner(&subject, request(&budget(&subject), seed));
+        let mut next = Some(Event::Remembered(Kept::empty(key())));
+        while let Some(event) = next.take() {
+            next = planner.step(event).iter().find_map(|command| match command {
+                Command::Time { id, .. } => {
+                    failed += 1;
+                    Some(Event::Failed { id: *id, reason: "lost".to_owned(), busy_s: 0.0 })
+                }
+                command => answer(&subject, command),
+            });
+        }
+        assert!(matches!(planner.outcome().choice, Choice::Row(_)), "seed {seed}");
+    }
+    assert!(failed >= 1);
+}
+
+/// The fresh views of a run that were measured for its first certificate.
+fn fresh_views(run: &Run) -> usize {
+    let probes = run.probed(Purpose::Certification);
+    probes.iter().take_while(|(row, _)| *row == probes[0].0).map(|(_, views)| views.len()).sum()
+}
+
+#[test]
+fn percentiles_draw_further_views_in_place_of_those_that_show_nothing() {
+    let mut subject = Subject::new(5).with_direct(1.0);
+    subject.variation = 0.2;
+    let budget = budget(&subject).replace("flip ", "flip p95 ");
+    let whole = plan(&subject, &budget, 5);
+    subject.empty_share = 0.4;
+    let run = plan(&subject, &budget, 5);
+    let views = run.outcome().certificate.expect("a certificate").views;
+    assert!(views >= 59 && fresh_views(&run) > views && fresh_views(&run) > fresh_views(&whole), "{views}");
+
+    subject.empty_share = 1.0;
+    let run = plan(&subject, &budget, 5);
+    assert_eq!(run.outcome().choice, Choice::Direct);
+    assert!(run.probed(Purpose::Certification).is_empty() || fresh_views(&run) <= 2 * 256);
+}
+
 /// Every change to an answer that makes it foreign or impossible, with the field that refuses it.
 fn damaged(event: &Event) -> Vec<(Event, &'static str)> {
     let Event::Probed(good) = event else { panic!("a probe") };
