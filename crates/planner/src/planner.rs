@@ -117,7 +117,7 @@ impl<P: Pricing> Planner<P> {
         Ok(planner)
     }
 
-    /// The commands that follow from an event. An event that cannot be is refused and changes nothing.
+    /// The commands that follow from an event. An impossible event is refused and changes nothing.
     pub fn step(&mut self, event: Event) -> Vec<Command> {
         match self.apply(event) {
             Ok(()) => self.advance(),

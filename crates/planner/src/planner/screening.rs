@@ -20,7 +20,7 @@ const MODEL_ROWS: usize = 8;
 const CLEARLY_OVER: f64 = 1.1;
 /// The chance of a certificate from which more expensive rows are not measured, by round. After the last there is only
 /// direct drawing; and the best of many by a sample is not as good as it seems.
-const ASSURED: [f64; MAX_ROUNDS as usize] = [0.95, 0.999];
+const ASSURED: [f64; MAX_ROUNDS as usize] = [0.95, 0.9999];
 
 impl<P: Pricing> Planner<P> {
     pub(super) fn next_screening(&self) -> Option<Work> {

@@ -17,7 +17,7 @@ const METHODS: [(&str, &str, u32); 6] = [
     ("search:32", "search", 32),
     ("carve:2", "carve", 2),
     ("carve:4", "carve", 4),
-    ("mesh", "mesh", 1),
+    ("quads", "quads", 1),
     ("boxes", "boxes", 1),
 ];
 
