@@ -2,7 +2,7 @@
 //!
 //! Each cost is a product: a constant of the sampling method, one of the reconstruction method, and powers of S, of the
 //! sample images' side and of a view's pixels. Its logarithm is linear, and is fitted by least squares. A weak prior says
-//! what the methods' loops say, so that eight rows suffice and no input is degenerate.
+//! what the methods' loops say, so that few rows suffice and no input is degenerate.
 
 use std::collections::BTreeSet;
 
@@ -15,9 +15,9 @@ const LEAST_COST_S: f64 = 1e-9;
 /// Logarithms of predicted costs in s stay within this.
 const MOST_LOG: f64 = 20.0;
 /// The weight of the prior on the common constant, on the three exponents, and on the methods' constants: the variance of a
-/// measured logarithm, 0.1², over that of each of them. Exponents are within 0.2 of the prior's, constants within a factor
-/// of 1.6; eight rows outweigh both.
-const WEIGHTS: [f64; 3] = [1e-6, 0.25, 0.04];
+/// measured logarithm, 0.1², over that of each of them. Exponents are within 0.5 of the prior's, constants within a factor
+/// of 2.7.
+const WEIGHTS: [f64; 3] = [1e-6, 0.04, 0.01];
 /// The prior's exponents of S, side and pixels, of g_s, d and c.
 const EXPONENTS: [[f64; 3]; 3] = [[0.0, 2.0, 1.0], [1.0, 2.0, 1.0], [0.5, 0.3, 1.0]];
 /// Columns before those of methods: the constant, and the exponents.
