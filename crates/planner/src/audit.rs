@@ -1,0 +1,140 @@
+//! The audit of a promise: whether it is broken, and the interval of the error.
+//!
+//! Both may be read after every view, for ever, without being wrong more often. The alarm is a mixture of e-detectors
+//! (Shin, Ramdas, Rinaldo 2024, "E-detectors: a nonparametric framework for sequential change detection"): while the promise
+//! is kept, alarms are at least 1,000 views apart in the mean. The interval is the asymptotic confidence sequence of
+//! Waudby-Smith, Arbour, Sinha, Kennedy and Ramdas (2024), with a confidence of 95 %.
+
+use crate::bounds::ERROR_RATE;
+use crate::budget::{ErrorTerm, MOST_OVER, Statistic};
+use crate::view_errors::ViewErrors;
+
+/// Bets on a broken promise, as shares of the greatest that cannot lose everything.
+const BETS: [f64; 3] = [0.1, 0.25, 0.5];
+/// Evidence of an alarm.
+const ALARM: f64 = 1_000.0;
+/// Views that have to be there for an interval.
+const LEAST_VIEWS: u64 = 16;
+/// Views at which the interval is narrowest for what is known.
+const TUNED_AT_VIEWS: f64 = 100.0;
+/// Bets on such views are so many times lower: they are rare, and one of them would pay for too much.
+const RARE_OVER: f64 = 3.0;
+
+/// The audited views of one promise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Audit {
+    term: ErrorTerm,
+    /// The bets' evidence.
+    evidence: [f64; BETS.len()],
+    /// The greatest bet: λ = 1 / budget where the whole picture is foreground.
+    bet_scale: f64,
+    views: u64,
+    skipped: u64,
+    mean: f64,
+    squares: f64,
+    weight_sum: f64,
+}
+
+/// A mean and what it may be, with a confidence of 95 % at all times together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct Interval {
+    pub low: f64,
+    pub mean: f64,
+    pub high: f64,
+}
+
+impl Audit {
+    /// An audit without views. `foreground_ratio` is the mean share of foreground in the views of the certificate, above 0
+    /// and at most 1: small models move y less, and bets on them are higher.
+    #[must_use]
+    pub fn new(term: ErrorTerm, foreground_ratio: f64) -> Self {
+        let (limit, weight) = match term.statistic() {
+            Statistic::Mean => (term.most_ratio(), foreground_ratio.clamp(BETS[2], 1.0)),
+            Statistic::P95 => (MOST_OVER, RARE_OVER),
+        };
+        Self {
+            term,
+            evidence: [1.0; BETS.len()],
+            bet_scale: 1.0 / (limit * weight),
+            views: 0,
+            skipped: 0,
+            mean: 0.0,
+            squares: 0.0,
+            weight_sum: 0.0,
+        }
+    }
+
+    /// Counts a view. Invalid errors and views without a surface, where each view is judged by itself, are skipped.
+    pub fn observe(&mut self, errors: &ViewErrors) {
+        if errors.validate().is_err() || !errors.counts_for(&self.term) {
+            self.skipped += 1;
+            return;
+        }
+        let y = self.excess(errors);
+        for (evidence, bet) in self.evidence.iter_mut().zip(BETS) {
+            *evidence = (evidence.max(1.0) * (1.0 + bet * self.bet_scale * y)).min(f64::MAX);
+        }
+        self.views += 1;
+        self.weight_sum += self.weight(errors);
+        let step = y - self.mean;
+        self.mean += step / self.views as f64;
+        self.squares += step * (y - self.mean);
+    }
+
+    /// Whether the promise is broken.
+    #[must_use]
+    pub fn is_alarmed(&self) -> bool {
+        self.evidence.iter().map(|evidence| evidence / BETS.len() as f64).sum::<f64>() >= ALARM
+    }
+
+    /// Views that counted, and views that were skipped.
+    #[must_use]
+    pub fn views(&self) -> [u64; 2] {
+        [self.views, self.skipped]
+    }
+
+    /// The interval of y. `None` below 16 views.
+    #[must_use]
+    pub fn excess_interval(&self) -> Option<Interval> {
+        if self.views < LEAST_VIEWS {
+            return None;
+        }
+        let n = self.views as f64;
+        let deviation = (self.squares / (n - 1.0)).sqrt();
+        let spread = n * tuned_variance();
+        let half_width =
+            deviation * (2.0 * (spread + 1.0) / (n * spread) * ((spread + 1.0).sqrt() / ERROR_RATE).ln()).sqrt();
+        Some(Interval { low: self.mean - half_width, mean: self.mean, high: self.mean + half_width })
+    }
+
+    /// The interval of the error, as a ratio: the mean over the foreground of all views, or the share of views over the
+    /// limit. `None` below 16 views, and where no view shows a surface.
+    #[must_use]
+    pub fn error_interval(&self) -> Option<Interval> {
+        let Interval { low, mean, high } = self.excess_interval()?;
+        let weight = self.weight_sum / self.views as f64;
+        let limit = if self.term.statistic() == Statistic::P95 { MOST_OVER } else { self.term.most_ratio() };
+        let error = |y: f64| (limit + y / weight).clamp(0.0, 1.0);
+        (weight > 0.0).then(|| Interval { low: error(low), mean: error(mean), high: error(high) })
+    }
+
+    /// y of a view: at most 0 in the mean while the promise is kept.
+    fn excess(&self, errors: &ViewErrors) -> f64 {
+        let (metric, limit) = (self.term.metric(), self.term.most_ratio());
+        match self.term.statistic() {
+            Statistic::Mean => errors.excess(metric, limit),
+            Statistic::P95 => f64::from(u8::from(errors.error_ratio(metric) > limit)) - MOST_OVER,
+        }
+    }
+
+    fn weight(&self, errors: &ViewErrors) -> f64 {
+        if self.term.statistic() == Statistic::P95 { 1.0 } else { errors.weight(self.term.metric()) }
+    }
+}
+
+/// ρ² of the confidence sequence: Waudby-Smith et al., appendix B.2.
+fn tuned_variance() -> f64 {
+    let twice_log = -2.0 * ERROR_RATE.ln();
+    (twice_log + (twice_log + 1.0).ln()) / TUNED_AT_VIEWS
+}

@@ -1,0 +1,43 @@
+//! Exact bounds for shares of views.
+
+/// The most views of one percentile that are asked for.
+const MAX_VIEWS: usize = 4096;
+
+/// The probability that of `count` views at most `over` are over, where a share of `share` is.
+#[must_use]
+pub fn at_most_over(count: usize, over: usize, share: f64) -> f64 {
+    if over >= count || share <= 0.0 {
+        return 1.0;
+    }
+    if share >= 1.0 {
+        return 0.0;
+    }
+    let mut log_term = count as f64 * (-share).ln_1p();
+    let odds = share.ln() - (-share).ln_1p();
+    let mut sum = log_term.exp();
+    for k in 0..over {
+        log_term += ((count - k) as f64 / (k + 1) as f64).ln() + odds;
+        sum += log_term.exp();
+    }
+    sum.min(1.0)
+}
+
+/// The most of `count` views that may be over for a share of at most `share` to be over, wrong with a probability of at
+/// most `error_rate`. `None`: there are too few views.
+#[must_use]
+pub fn most_over(count: usize, share: f64, error_rate: f64) -> Option<usize> {
+    (0..count).take_while(|&over| at_most_over(count, over, share) <= error_rate).last()
+}
+
+/// The views that are needed where `over` of them are over; `None` above 4096.
+#[must_use]
+pub fn views_needed(over: usize, share: f64, error_rate: f64) -> Option<usize> {
+    (over + 1..=MAX_VIEWS).find(|&count| at_most_over(count, over, share) <= error_rate)
+}
+
+/// Whether more than a share of `share` is over, where `over` of `count` views are; wrong with a probability of at most
+/// `error_rate`.
+#[must_use]
+pub fn is_over(count: usize, over: usize, share: f64, error_rate: f64) -> bool {
+    over > 0 && 1.0 - at_most_over(count, over - 1, share) <= error_rate
+}

@@ -1,0 +1,45 @@
+//! Costs of a row, which nodes measure, and their price, which the caller knows.
+
+use serde::{Deserialize, Serialize};
+
+use crate::invalid::{InvalidField, seconds};
+use crate::ladder::Row;
+
+/// Costs of a row on one device, in s.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RowCosts {
+    /// g_s: one sample image, its lighting included.
+    pub sample_image_s: f64,
+    /// d: one sample set on a compositor.
+    pub load_set_s: f64,
+    /// c: one reconstructed view.
+    pub reconstruct_view_s: f64,
+}
+
+impl RowCosts {
+    /// # Errors
+    /// For a cost that is not finite or is negative, by its field.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        seconds(self.sample_image_s, "sample_image_s")?;
+        seconds(self.load_set_s, "load_set_s")?;
+        seconds(self.reconstruct_view_s, "reconstruct_view_s")
+    }
+}
+
+/// What serving costs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Price {
+    /// The nodes' time for a view, sampling and loading included, in s. The least is chosen.
+    pub node_s: f64,
+    /// The time of a view on the slowest node, reconstructing and encoding it, in s. A budget may limit it.
+    pub view_s: f64,
+}
+
+/// The prices of representations. The cluster's come from its schedule, a study's from a cluster of one node. Equal
+/// arguments give equal prices; prices that are not finite exclude a row.
+pub trait Pricing {
+    /// The price of a row with these costs.
+    fn row(&self, row: &Row, costs: &RowCosts) -> Price;
+    /// The price of drawing every view directly.
+    fn direct(&self) -> Price;
+}

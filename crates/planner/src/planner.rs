@@ -1,0 +1,262 @@
+//! The plan as a state machine: events in, commands out.
+
+mod certification;
+mod conclusion;
+mod finalists;
+mod measurements;
+mod pruning;
+mod reason;
+mod remembering;
+mod row_state;
+mod screening;
+mod stage;
+
+use row_state::RowState;
+use stage::{Round, Stage, Work};
+
+use crate::budget::{Budget, ErrorTerm};
+use crate::command::{Command, Purpose};
+use crate::cost_model::CostModel;
+use crate::costs::{Price, Pricing};
+use crate::event::{Event, ProbeId};
+use crate::evidence::Evidence;
+use crate::invalid::{InvalidField, name, seconds, within};
+use crate::kept::KeptKey;
+use crate::ladder::{Ladder, Row};
+use crate::metric::Metric;
+use crate::outcome::{Outcome, RowSummary};
+
+/// Views and repetitions with which finalists are timed.
+const TIMED_VIEWS: usize = 32;
+const TIMED_REPEATS: usize = 2;
+/// Predicted times may be wrong by so much, and measured ones.
+const TOLERANCES: [f64; 2] = [1.15, 1.02];
+/// A measured time below this share of its limit is within it.
+const CLEARLY_IN_TIME: f64 = 0.95;
+
+/// A plan to make.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanRequest {
+    /// The number of the plan, which its measurements repeat.
+    pub plan: u64,
+    /// The budget to keep.
+    pub budget: Budget,
+    /// What errors depend on.
+    pub key: KeptKey,
+    /// The device that measures costs.
+    pub device: String,
+    /// The version of the program that measures.
+    pub program_version: String,
+    /// The pixels of a view.
+    pub view_pixels: f64,
+    /// The nodes' time that measuring may take in all, in s.
+    pub allowance_s: f64,
+    /// Rows of a round of certificates, 1 to 8: fewer where light is expensive.
+    pub most_certified: usize,
+    /// The seed of fresh views and of tests of pruning.
+    pub seed: u64,
+}
+
+/// A plan: it chooses the cheapest row of a ladder, or direct drawing, that keeps a budget.
+#[derive(Debug, Clone)]
+pub struct Planner<P> {
+    request: PlanRequest,
+    ladder: Ladder,
+    pricing: P,
+    rows: Vec<RowState>,
+    /// The prices of rows, from measured costs or predicted ones.
+    prices: Vec<Price>,
+    model: CostModel,
+    stage: Stage,
+    round: Round,
+    pending: Option<(ProbeId, Work)>,
+    probe_number: u64,
+    fresh_views_drawn: u64,
+    finalists_were_timed: bool,
+    spent_s: f64,
+    allowance_s: f64,
+    outcome: Option<Outcome>,
+}
+
+impl PlanRequest {
+    fn validate(&self) -> Result<(), InvalidField> {
+        name(&self.device, "device")?;
+        name(&self.program_version, "program_version")?;
+        within(self.view_pixels, 1.0..=1e9, "view_pixels", "from 1 to 10^9")?;
+        within(self.most_certified, 1..=8, "most_certified", "from 1 to 8")?;
+        seconds(self.allowance_s, "allowance_s")
+    }
+}
+
+impl<P: Pricing> Planner<P> {
+    /// A plan that waits for [`Event::Remembered`].
+    ///
+    /// # Errors
+    /// For a value that its field does not allow.
+    pub fn new(request: PlanRequest, ladder: Ladder, pricing: P) -> Result<Self, InvalidField> {
+        request.validate()?;
+        let model = CostModel::fit(ladder.rows(), &[]);
+        let mut planner = Self {
+            rows: ladder.rows().iter().map(|_| RowState::default()).collect(),
+            prices: Vec::new(),
+            model,
+            stage: Stage::Waiting,
+            round: Round::default(),
+            pending: None,
+            probe_number: 0,
+            fresh_views_drawn: 0,
+            finalists_were_timed: false,
+            spent_s: 0.0,
+            allowance_s: request.allowance_s,
+            outcome: None,
+            request,
+            ladder,
+            pricing,
+        };
+        planner.predict();
+        Ok(planner)
+    }
+
+    /// The commands that follow from an event. An impossible event is refused and changes nothing.
+    pub fn step(&mut self, event: Event) -> Vec<Command> {
+        match self.apply(event) {
+            Ok(()) => self.advance(),
+            Err(error) => vec![Command::Refuse(error)],
+        }
+    }
+
+    /// The result, or the state of a plan that is being made.
+    #[must_use]
+    pub fn outcome(&self) -> Outcome {
+        self.outcome.clone().unwrap_or_else(|| self.outcome_so_far())
+    }
+
+    /// The rows of the ladder, in order.
+    #[must_use]
+    pub fn summaries(&self) -> Vec<RowSummary> {
+        (0..self.rows.len()).map(|row| self.summary(row)).collect()
+    }
+
+    /// The nodes' time that measuring has taken, in s.
+    #[must_use]
+    pub fn spent_s(&self) -> f64 {
+        self.spent_s
+    }
+
+    fn apply(&mut self, event: Event) -> Result<(), InvalidField> {
+        event.validate()?;
+        match event {
+            Event::Remembered(kept) => self.remember(kept),
+            Event::Probed(probed) => self.probed(&probed),
+            Event::Timed(timed) => self.timed(&timed),
+            Event::Failed { id, busy_s, .. } => self.failed(id, busy_s),
+            Event::Allowed { allowance_s } => {
+                self.allowance_s = allowance_s;
+                Ok(())
+            }
+        }
+    }
+
+    fn advance(&mut self) -> Vec<Command> {
+        let is_spent = self.spent_s >= self.allowance_s;
+        if self.stage.is_idle() || (self.pending.is_some() && !is_spent) {
+            return Vec::new();
+        }
+        loop {
+            match self.next_work() {
+                Some(_) if is_spent => return self.conclude(true),
+                Some(work) => return vec![self.issue(work)],
+                None if self.stage == Stage::Timing => return self.conclude(false),
+                None => self.next_stage(),
+            }
+        }
+    }
+
+    fn next_work(&self) -> Option<Work> {
+        match self.stage {
+            Stage::Waiting | Stage::Concluded => None,
+            Stage::Screening => self.next_screening(),
+            Stage::Certifying => self.next_certification(),
+            Stage::Timing => self.next_timing(),
+        }
+    }
+
+    /// Time alone needs no certificate: nothing is promised about errors.
+    fn next_stage(&mut self) {
+        let needs_certificates = self.stage == Stage::Screening && self.term().is_some();
+        let is_further_round = self.stage == Stage::Certifying && self.reconsider();
+        self.stage = match (needs_certificates, is_further_round) {
+            (true, _) => Stage::Certifying,
+            (_, true) => Stage::Screening,
+            _ => Stage::Timing,
+        };
+        if needs_certificates {
+            self.begin_round();
+        }
+    }
+
+    fn issue(&mut self, work: Work) -> Command {
+        self.probe_number += 1;
+        let id = ProbeId { plan: self.request.plan, number: self.probe_number };
+        self.pending = Some((id, work.clone()));
+        match work {
+            Work::Screen { row, views } => Command::Probe { id, row, views, purpose: Purpose::Screening },
+            Work::Certify { row, views } => Command::Probe { id, row, views, purpose: Purpose::Certification },
+            Work::Time { rows } => Command::Time { id, rows, view_count: TIMED_VIEWS, repeats: TIMED_REPEATS },
+        }
+    }
+
+    fn term(&self) -> Option<ErrorTerm> {
+        self.request.budget.error()
+    }
+
+    fn row(&self, row: usize) -> &Row {
+        &self.ladder.rows()[row]
+    }
+
+    fn evidence(&self, row: usize, term: ErrorTerm) -> Evidence<'_> {
+        Evidence { term, errors: &self.rows[row].errors }
+    }
+
+    /// Whether a row may be within the budget's time; `tolerances` are those of predicted and of measured costs.
+    fn is_in_time(&self, row: usize, tolerances: [f64; 2]) -> bool {
+        let tolerance = tolerances[usize::from(self.rows[row].costs.is_some())];
+        self.request.budget.most_view_s().is_none_or(|limit| self.prices[row].view_s <= limit * tolerance)
+    }
+
+    /// Whether measured costs say that a row is within the budget's time.
+    fn is_clearly_in_time(&self, row: usize) -> bool {
+        self.is_in_time(row, [0.0, CLEARLY_IN_TIME])
+    }
+
+    /// The cost of drawing directly; `None` where that takes longer than the budget allows.
+    fn direct_in_time(&self) -> Option<Price> {
+        let direct = self.pricing.direct();
+        let is_in_time = self.request.budget.most_view_s().is_none_or(|limit| direct.view_s <= limit);
+        is_in_time.then_some(direct)
+    }
+
+    fn summary(&self, row: usize) -> RowSummary {
+        let state = &self.rows[row];
+        RowSummary {
+            status: state.status,
+            screening_views: state.screening_views,
+            error_ratio: (!state.errors.is_empty()).then(|| self.error_ratio(row)),
+            price: self.prices[row],
+            is_measured: state.costs.is_some(),
+        }
+    }
+
+    /// The error that the budget limits; FLIP for a budget of time.
+    fn error_ratio(&self, row: usize) -> f64 {
+        match self.term() {
+            Some(term) => self.evidence(row, term).estimate(),
+            None => {
+                let errors = &self.rows[row].errors;
+                let sum = |limit: f64| errors.iter().map(|errors| errors.excess(Metric::Flip, limit)).sum::<f64>();
+                // The sum of the weights is that of y at 0 less that of y at 1.
+                sum(0.0) / (sum(0.0) - sum(1.0)).max(f64::MIN_POSITIVE)
+            }
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! The choice.
+
+use super::stage::Stage;
+use super::{Planner, TOLERANCES};
+use crate::command::Command;
+use crate::costs::{Price, Pricing};
+use crate::kept::Certificate;
+use crate::outcome::{Choice, Outcome, PromiseState, RowStatus};
+
+/// The most that a measured time may be over its limit.
+const EXACT: [f64; 2] = [1.0, 1.0];
+
+impl<P: Pricing> Planner<P> {
+    pub(super) fn conclude(&mut self, is_spent: bool) -> Vec<Command> {
+        (self.stage, self.pending) = (Stage::Concluded, None);
+        let (choice, state) = self.choice();
+        let outcome = self.outcome_of(choice, state, is_spent);
+        self.outcome = Some(outcome.clone());
+        vec![Command::Keep(Box::new(self.kept())), Command::Conclude(Box::new(outcome))]
+    }
+
+    pub(super) fn outcome_so_far(&self) -> Outcome {
+        self.outcome_of(self.choice().0, PromiseState::Measuring, false)
+    }
+
+    pub(super) fn price_of(&self, choice: Choice) -> Price {
+        match choice {
+            Choice::Row(row) => self.prices[row],
+            Choice::Direct => self.pricing.direct(),
+        }
+    }
+
+    /// The certificate that a row has for the budget.
+    pub(super) fn certificate_of(&self, choice: Choice) -> Option<&Certificate> {
+        let (Choice::Row(row), Some(term)) = (choice, self.term()) else { return None };
+        self.rows[row].certificates.iter().rev().find(|certificate| certificate.serves(&term))
+    }
+
+    fn outcome_of(&self, choice: Choice, state: PromiseState, is_spent: bool) -> Outcome {
+        Outcome {
+            state,
+            choice,
+            price: self.price_of(choice),
+            certificate: self.certificate_of(choice).cloned(),
+            pruning: self.pruning_check(),
+            reason: self.reason(choice, state, is_spent),
+        }
+    }
+
+    fn choice(&self) -> (Choice, PromiseState) {
+        let direct = self.direct_in_time();
+        let best = self.eligible(EXACT).first().copied();
+        match (self.term(), best, direct) {
+            (Some(_), Some(row), Some(direct)) if direct.node_s <= self.prices[row].node_s => {
+                (Choice::Direct, PromiseState::Kept)
+            }
+            (None, _, Some(_)) | (_, None, Some(_)) => (Choice::Direct, PromiseState::Kept),
+            (_, Some(row), _) => (Choice::Row(row), PromiseState::Kept),
+            (Some(_), None, None) => (Choice::Direct, PromiseState::Unreachable),
+            (None, None, None) => self.nearest_to_time(),
+        }
+    }
+
+    /// Where no row passed in time: the most accurate that seems to be in time, as after a spent allowance; else the fastest.
+    fn nearest_to_time(&self) -> (Choice, PromiseState) {
+        let is_usable = |&row: &usize| {
+            let is_failed = self.rows[row].status == RowStatus::Failed;
+            !is_failed && self.rows[row].costs.is_some() && !self.rows[row].errors.is_empty()
+        };
+        let usable = || (0..self.rows.len()).filter(is_usable);
+        let in_time = usable().filter(|&row| self.is_in_time(row, EXACT));
+        if let Some(row) = in_time.min_by(|&a, &b| self.error_ratio(a).total_cmp(&self.error_ratio(b))) {
+            return (Choice::Row(row), PromiseState::Kept);
+        }
+        let fastest = usable().min_by(|&a, &b| self.prices[a].view_s.total_cmp(&self.prices[b].view_s));
+        let fastest = fastest.filter(|&row| self.prices[row].view_s < self.pricing.direct().view_s);
+        (fastest.map_or(Choice::Direct, Choice::Row), PromiseState::Unreachable)
+    }
+
+    /// The row that comes nearest to the limit on errors, of those that may be in time.
+    pub(super) fn nearest_to_error(&self) -> Option<usize> {
+        let is_known = |&row: &usize| !self.rows[row].errors.is_empty() && self.is_in_time(row, TOLERANCES);
+        let known = (0..self.rows.len()).filter(is_known);
+        known.min_by(|&a, &b| self.error_ratio(a).total_cmp(&self.error_ratio(b)))
+    }
+}

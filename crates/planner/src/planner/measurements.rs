@@ -1,0 +1,114 @@
+//! Answers to measurements: they must be what was asked for.
+
+use super::Planner;
+use super::stage::{Stage, Work};
+use crate::cost_model::{CostModel, TimedRow};
+use crate::costs::{Price, Pricing, RowCosts};
+use crate::event::{ProbeId, Probed, Timed};
+use crate::invalid::InvalidField;
+use crate::outcome::RowStatus;
+use crate::view::ProbeView;
+
+impl<P: Pricing> Planner<P> {
+    pub(super) fn probed(&mut self, probed: &Probed) -> Result<(), InvalidField> {
+        let is_same = |views: &[ProbeView]| views.iter().eq(probed.views.iter().map(|(view, _)| view));
+        let (row, is_screening) = match self.pending_work(probed.id)? {
+            Work::Screen { row, views } if is_same(views) => (*row, true),
+            Work::Certify { row, views } if is_same(views) => (*row, false),
+            Work::Time { .. } => return Err(other("id", "that of a timing", "that of a probe")),
+            _ => return Err(other("views", "others", "those that were asked for")),
+        };
+        if row != probed.row {
+            return Err(other("row", probed.row, "the row that was asked for"));
+        }
+        self.finish(probed.busy_s);
+        self.learn_costs(row, &probed.costs, probed.views.len());
+        let errors = probed.views.iter().map(|(_, errors)| *errors);
+        if is_screening {
+            self.rows[row].errors.extend(errors);
+            self.rows[row].screening_views = self.rows[row].errors.len();
+            self.assess(row);
+        } else {
+            self.round.errors.extend(errors);
+            self.judge();
+        }
+        Ok(())
+    }
+
+    pub(super) fn timed(&mut self, timed: &Timed) -> Result<(), InvalidField> {
+        let Work::Time { rows } = self.pending_work(timed.id)? else {
+            return Err(other("id", "that of a probe", "that of a timing"));
+        };
+        if !rows.iter().eq(timed.rows.iter().map(|(row, _)| row)) {
+            return Err(other("rows", "others", "those that were asked for"));
+        }
+        self.finish(timed.busy_s);
+        for (row, costs) in &timed.rows {
+            (self.rows[*row].costs, self.rows[*row].is_settled) = (Some(*costs), true);
+        }
+        self.finalists_were_timed |= self.stage == Stage::Timing;
+        self.predict();
+        Ok(())
+    }
+
+    /// A row that cannot be measured is not chosen. Finalists that cannot be timed again keep the costs that they have.
+    pub(super) fn failed(&mut self, id: ProbeId, busy_s: f64) -> Result<(), InvalidField> {
+        let rows = match self.pending_work(id)? {
+            Work::Screen { row, .. } | Work::Certify { row, .. } => vec![*row],
+            Work::Time { rows } => rows.iter().copied().filter(|&row| self.rows[row].costs.is_none()).collect(),
+        };
+        self.finish(busy_s);
+        self.finalists_were_timed |= self.stage == Stage::Timing;
+        for row in rows {
+            self.rows[row].status = RowStatus::Failed;
+        }
+        self.skip_failed_row();
+        Ok(())
+    }
+
+    /// Predicts the prices of all rows from those that were measured.
+    pub(super) fn predict(&mut self) {
+        let timed = |row: usize| Some(self.timed_row(row, self.rows[row].costs?));
+        let timed: Vec<TimedRow> = (0..self.rows.len()).filter_map(timed).collect();
+        self.model = CostModel::fit(self.ladder.rows(), &timed);
+        self.prices = (0..self.rows.len()).map(|row| self.price(row)).collect();
+    }
+
+    fn pending_work(&self, id: ProbeId) -> Result<&Work, InvalidField> {
+        let pending = self.pending.as_ref().filter(|(pending, _)| *pending == id);
+        let shown = || format!("{} of plan {}", id.number, id.plan);
+        pending.map(|(_, work)| work).ok_or_else(|| other("id", shown(), "that of the pending measurement"))
+    }
+
+    fn finish(&mut self, busy_s: f64) {
+        self.pending = None;
+        self.spent_s += busy_s;
+    }
+
+    /// Further timings of a row change its own price alone: the model is for the others.
+    fn learn_costs(&mut self, row: usize, costs: &RowCosts, views: usize) {
+        let is_first = self.rows[row].costs.is_none();
+        self.rows[row].add_costs(costs, views);
+        if is_first {
+            self.predict();
+        } else {
+            self.prices[row] = self.price(row);
+        }
+    }
+
+    fn price(&self, row: usize) -> Price {
+        let costs = self.rows[row].costs.unwrap_or_else(|| self.model.predict(self.row(row), self.request.view_pixels));
+        let price = self.pricing.row(self.row(row), &costs);
+        // What has no price is never the cheapest.
+        let finite = |seconds: f64| if seconds.is_finite() { seconds } else { f64::INFINITY };
+        Price { node_s: finite(price.node_s), view_s: finite(price.view_s) }
+    }
+
+    fn timed_row(&self, row: usize, costs: RowCosts) -> TimedRow {
+        TimedRow { row: self.row(row).clone(), view_pixels: self.request.view_pixels, costs }
+    }
+}
+
+fn other(field: &'static str, value: impl ToString, allowed: &'static str) -> InvalidField {
+    InvalidField::new(field, value, allowed)
+}

@@ -1,0 +1,100 @@
+//! Measurements of earlier plans, and for later ones.
+
+use super::Planner;
+use super::row_state::RowState;
+use super::stage::Stage;
+use crate::budget::Budget;
+use crate::costs::Pricing;
+use crate::invalid::InvalidField;
+use crate::kept::{Kept, KeptCosts, KeptRow, newest};
+use crate::outcome::RowStatus;
+
+impl<P: Pricing> Planner<P> {
+    pub(super) fn remember(&mut self, kept: Kept) -> Result<(), InvalidField> {
+        if self.stage != Stage::Waiting {
+            return Err(InvalidField::new("remembered", "a second one", "the first event"));
+        }
+        if let Some(field) = kept.key.difference(&self.request.key) {
+            return Err(InvalidField::new(field, "another", "that of the request"));
+        }
+        self.fresh_views_drawn = kept.fresh_views_drawn;
+        for kept in kept.rows {
+            let place = self.ladder.rows().iter().position(|row| *row == kept.row);
+            if let Some(place) = place {
+                self.rows[place] = self.row_from(kept);
+            }
+        }
+        self.predict();
+        (0..self.rows.len()).for_each(|row| self.assess(row));
+        self.stage = Stage::Screening;
+        Ok(())
+    }
+
+    /// Everything that is known, for later plans.
+    pub(super) fn kept(&self) -> Kept {
+        let is_known = |state: &RowState| !state.errors.is_empty() || state.costs.is_some();
+        let known = (0..self.rows.len()).filter(|&row| is_known(&self.rows[row]));
+        Kept {
+            key: self.request.key.clone(),
+            fresh_views_drawn: self.fresh_views_drawn,
+            rows: known.map(|row| self.kept_row(row)).collect(),
+        }
+    }
+
+    /// Whether certification came to its end without this row, which it would have preferred: its failure, or that of a safer
+    /// one, ended the sequence.
+    fn ended_without(&self, row: usize) -> bool {
+        let status = self.rows[row].status;
+        let chosen = self.outcome.as_ref().filter(|_| self.round.is_over() && self.term().is_some());
+        let is_better = chosen.is_some_and(|chosen| self.prices[row].node_s < chosen.price.node_s);
+        status == RowStatus::Rejected || (status == RowStatus::Passed && is_better)
+    }
+
+    fn row_from(&self, kept: KeptRow) -> RowState {
+        let term = self.term();
+        let is_certified = term.is_some_and(|term| kept.certificates.iter().any(|own| own.serves(&term)));
+        // What failed at a budget fails at a stricter one.
+        let fails = |budget: &Budget| term.zip(budget.error()).is_some_and(|(term, failed)| term.implies(&failed));
+        let status = match (is_certified, kept.rejected.iter().any(fails)) {
+            (true, _) => RowStatus::Certified,
+            (false, true) => RowStatus::Rejected,
+            (false, false) => RowStatus::Open,
+        };
+        let is_own = |costs: &KeptCosts| {
+            costs.device == self.request.device && costs.program_version == self.request.program_version
+        };
+        let (own, foreign_costs): (Vec<_>, Vec<_>) = kept.costs.into_iter().partition(is_own);
+        let own = own.last();
+        RowState {
+            status,
+            screening_views: kept.screening.len(),
+            timed_views: kept.screening.len(),
+            errors: kept.screening,
+            costs: own.map(|own| own.costs),
+            is_settled: own.is_some_and(|own| own.is_settled),
+            certificates: kept.certificates,
+            rejected: kept.rejected,
+            foreign_costs,
+            ..RowState::default()
+        }
+    }
+
+    fn kept_row(&self, row: usize) -> KeptRow {
+        let state = &self.rows[row];
+        let own = state.costs.map(|costs| KeptCosts {
+            device: self.request.device.clone(),
+            program_version: self.request.program_version.clone(),
+            is_settled: state.is_settled,
+            costs,
+        });
+        let rejected = self.ended_without(row).then_some(self.request.budget);
+        let rejected = rejected.filter(|budget| !state.rejected.contains(budget));
+        let kept = KeptRow::new(self.row(row).clone(), state.screening().to_vec());
+        KeptRow {
+            certificates: newest(&state.certificates),
+            rejected: newest(&state.rejected.iter().copied().chain(rejected).collect::<Vec<_>>()),
+            costs: newest(&state.foreign_costs.iter().cloned().chain(own).collect::<Vec<_>>()),
+            ..kept
+        }
+    }
+}

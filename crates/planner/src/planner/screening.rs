@@ -1,0 +1,126 @@
+//! Which rows seem to keep the budget, on common views.
+//!
+//! A limit on errors is searched from the cheapest row upwards, up to the first that will probably be certified. A limit on
+//! time is searched from the most expensive row downwards: a row that is worse than the best one so far is dropped.
+
+use super::stage::Work;
+use super::{Planner, TOLERANCES};
+use crate::bounds::{ERROR_RATE, MAX_ROUNDS, Moments, round_error_rate};
+use crate::costs::Pricing;
+use crate::kept::MAX_SCREENING_VIEWS;
+use crate::metric::Metric;
+use crate::outcome::RowStatus;
+use crate::view::ProbeView;
+
+/// Numbers of views after which a row may be dropped.
+const LEVELS: [usize; 4] = [4, 8, 16, MAX_SCREENING_VIEWS];
+/// Measured rows from which costs of others are predicted: as many as a ladder of three sampling methods and six
+/// reconstructions has unknowns, which are 3 + 6 − 1 constants and two exponents.
+const MODEL_ROWS: usize = 10;
+/// A row fails clearly where it is over so many times the budget: then worse ones of its kind are not measured.
+const CLEARLY_OVER: f64 = 1.1;
+/// The chance of a certificate from which more expensive rows are not measured, by round. After the last there is only
+/// direct drawing; and the best of many by a sample is not as good as it seems.
+const ASSURED: [f64; MAX_ROUNDS as usize] = [0.95, 0.9999];
+
+impl<P: Pricing> Planner<P> {
+    pub(super) fn next_screening(&self) -> Option<Work> {
+        // Nothing is more accurate than direct drawing.
+        if self.term().is_none() && self.direct_in_time().is_some() {
+            return None;
+        }
+        self.next_for_model().or_else(|| self.next_candidate().map(|row| self.screen(row)))
+    }
+
+    /// Decides on a row as far as its views allow.
+    pub(super) fn assess(&mut self, row: usize) {
+        let views = self.rows[row].screening_views;
+        if self.rows[row].status != RowStatus::Open || !LEVELS.contains(&views) {
+            return;
+        }
+        if self.is_over(row, 1.0) {
+            self.rows[row].status = RowStatus::Over;
+            if self.is_over(row, CLEARLY_OVER) {
+                self.prune_below(row);
+            }
+        } else if views == MAX_SCREENING_VIEWS {
+            self.rows[row].status = RowStatus::Passed;
+        }
+    }
+
+    /// The price of the cheapest row that is certified, or will probably be.
+    pub(super) fn cheapest_assured_s(&self) -> f64 {
+        let assured = (0..self.rows.len()).filter(|&row| self.is_assured(row));
+        assured.map(|row| self.prices[row].node_s).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether the row is worse than the budget, or than the best row so far, by a factor.
+    fn is_over(&self, row: usize, scale: f64) -> bool {
+        match self.term() {
+            Some(term) => self.evidence(row, term).is_over(scale, ERROR_RATE),
+            None => self.leader().is_some_and(|leader| self.is_worse(row, leader, scale)),
+        }
+    }
+
+    /// Compares FLIP on common views.
+    fn is_worse(&self, row: usize, leader: usize, scale: f64) -> bool {
+        let pairs = self.rows[row].screening().iter().zip(self.rows[leader].screening());
+        let differences = pairs.map(|(a, b)| a.excess(Metric::Flip, 0.0) - scale * b.excess(Metric::Flip, 0.0));
+        Moments::of(differences).lower_bound(ERROR_RATE).is_some_and(|bound| bound > 0.0)
+    }
+
+    /// The most accurate row that is clearly in time.
+    fn leader(&self) -> Option<usize> {
+        let passed = (0..self.rows.len())
+            .filter(|&row| self.rows[row].status == RowStatus::Passed && self.is_clearly_in_time(row));
+        passed.min_by(|&a, &b| self.error_ratio(a).total_cmp(&self.error_ratio(b)))
+    }
+
+    fn is_assured(&self, row: usize) -> bool {
+        let Some(term) = self.term().filter(|_| self.is_clearly_in_time(row)) else { return false };
+        match self.rows[row].status {
+            RowStatus::Certified => true,
+            RowStatus::Passed => {
+                let error_rate = round_error_rate(self.round.number);
+                self.evidence(row, term).chance_to_certify(error_rate) >= ASSURED[self.round.number as usize]
+            }
+            _ => false,
+        }
+    }
+
+    /// The row of which least is known, until costs can be predicted. A row whose errors are known is only timed.
+    fn next_for_model(&self) -> Option<Work> {
+        let known = self.rows.iter().filter(|row| row.costs.is_some()).count();
+        if known >= MODEL_ROWS {
+            return None;
+        }
+        let is_useful = |&row: &usize| {
+            let state = &self.rows[row];
+            let may_be_chosen = [RowStatus::Open, RowStatus::Passed, RowStatus::Certified].contains(&state.status);
+            state.costs.is_none() && may_be_chosen
+        };
+        let uncertainty = |row: usize| self.model.uncertainty(self.row(row), self.request.view_pixels);
+        let rows = (0..self.rows.len()).filter(is_useful).map(|row| (row, uncertainty(row)));
+        let (row, _) = rows.min_by(|a, b| b.1.total_cmp(&a.1))?;
+        Some(if self.rows[row].errors.is_empty() { self.screen(row) } else { Work::Time { rows: vec![row] } })
+    }
+
+    /// The next row in the order of the search.
+    fn next_candidate(&self) -> Option<usize> {
+        let is_open = |&row: &usize| self.rows[row].status == RowStatus::Open && self.is_in_time(row, TOLERANCES);
+        let open = (0..self.rows.len()).filter(is_open);
+        let by_price = |a: &usize, b: &usize| self.prices[*a].node_s.total_cmp(&self.prices[*b].node_s);
+        if self.term().is_none() {
+            return open.max_by(by_price);
+        }
+        let direct_s = self.direct_in_time().map_or(f64::INFINITY, |direct| direct.node_s);
+        let enough_s = self.cheapest_assured_s().min(direct_s);
+        open.min_by(by_price).filter(|&row| self.prices[row].node_s < enough_s)
+    }
+
+    fn screen(&self, row: usize) -> Work {
+        let known = self.rows[row].screening_views;
+        let next = LEVELS.into_iter().find(|&level| level > known).unwrap_or(known);
+        Work::Screen { row, views: (known as u32..next as u32).map(ProbeView::Screening).collect() }
+    }
+}

@@ -1,0 +1,15 @@
+//! The planner through its public interface: against a made-up ladder, on streams of made-up errors, and with damaged input.
+
+#![allow(clippy::unwrap_used)]
+
+mod audits;
+mod bounds;
+mod budgets;
+mod costs;
+mod damaged;
+mod ladders;
+mod made_up;
+mod random;
+mod remembered;
+mod rules;
+mod searches;
