@@ -231,7 +231,8 @@ mod tests {
     #[test]
     fn a_violation_of_every_shape_is_seen() {
         let flat_end = FallsThenFlat { least_fall: 3.0, tolerance: 0.1 };
-        let bad: [(Shape, [f64; 5], fn(&Violation) -> bool); 14] = [
+        type Case = (Shape, [f64; 5], fn(&Violation) -> bool);
+        let bad: [Case; 14] = [
             (flat_end, RISING, |v| matches!(v, Violation::Turns { .. })),
             (flat_end, [5.0, 4.0, 3.0, 2.0, 1.0], |v| matches!(v, Violation::NotFlat { .. })),
             (flat_end, FLAT, |v| matches!(v, Violation::ChangesTooLittle { .. })),

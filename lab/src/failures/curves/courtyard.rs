@@ -23,8 +23,8 @@ pub const CURVE: Curve = Curve {
     y: ["share of the picture", ""],
     series: &[
         Series::new("the yard", &[Shape::rises(0.04, 0.005)]),
-        Series::new("hit, joint_carve", &[Shape::Bounded { least: 0.0, most: 0.02 }]),
-        Series::new("hit, light_field_search:64", &[Shape::rises(0.01, 0.01)]),
+        Series::new("not marked, joint_carve", &[Shape::Bounded { least: 0.0, most: 0.02 }]),
+        Series::new("not marked, light_field_search:64", &[Shape::rises(0.01, 0.01)]),
     ],
     why: "The carve marks what it does not know. The search meets the shadow volume that all cameras share, and calls its colour a hit.",
     measure,
@@ -40,9 +40,9 @@ fn measure(stand: &Stand, heights_deg: &[f64]) -> anyhow::Result<Rows> {
         let turn = Vec2::from_angle(0.6) * cos * DISTANCE_M;
         let camera = looking(Vec3::new(turn.x, sin * DISTANCE_M, turn.y), Vec3::ZERO, 35.0, stand.view_px);
         let yard = yard(&camera, &stage.truth(&[camera])?[0]);
-        let hits = |method| Ok::<_, anyhow::Error>(share_of_hits(&yard, &stage.views(&[camera], method)?[0]));
+        let unmarked = |method| Ok::<_, anyhow::Error>(share_unmarked(&yard, &stage.views(&[camera], method)?[0]));
         let seen = yard.iter().filter(|is| **is).count() as f64 / yard.len() as f64;
-        Ok([seen, hits(CARVE)?, hits(search(64))?])
+        Ok([seen, unmarked(CARVE)?, unmarked(search(64))?])
     })
 }
 
@@ -57,8 +57,8 @@ fn yard(camera: &PinholeCamera, truth: &View) -> Vec<bool> {
     depths(truth).iter().enumerate().map(is_inside).collect()
 }
 
-/// Of all pixels, those of the yard that a view calls hits: no camera saw it, so that they are wrong.
-fn share_of_hits(yard: &[bool], view: &View) -> f64 {
-    let hits = yard.iter().zip(is_kind(view, ProvenanceKind::Hit)).filter(|(yard, hit)| **yard && *hit);
-    hits.count() as f64 / yard.len() as f64
+/// Of all pixels, those of the yard that are not marked as filled, although no camera saw them.
+fn share_unmarked(yard: &[bool], view: &View) -> f64 {
+    let unmarked = yard.iter().zip(is_kind(view, ProvenanceKind::Filled)).filter(|(yard, filled)| **yard && !*filled);
+    unmarked.count() as f64 / yard.len() as f64
 }

@@ -29,7 +29,11 @@ pub const CURVES: [Curve; 4] = [
         series: &[
             Series::new("light_field_search:8", &[Shape::rises(0.2, 0.12)]),
             Series::new("light_field_search:64", &[Shape::rises(0.1, 0.12)]),
-            Series::new("joint_carve", &[Shape::rises(0.1, 0.12)]),
+            Series::new("joint_carve", &[Shape::rises(0.1, 0.12), Shape::EqualAt { x: 3.0, y: 0.95, tolerance: 0.05 }]),
+            Series::new(
+                "joint_carve less light_field_search:8",
+                &[Shape::Bounded { least: 0.0, most: 1.0 }, Shape::EqualAt { x: 0.6, y: 0.5, tolerance: 0.3 }],
+            ),
         ],
         why: "A step longer than a pole is thick enters it by chance; the carve steps from texel to texel.",
         measure: by_radius,
@@ -68,7 +72,10 @@ pub const CURVES: [Curve; 4] = [
 ];
 
 fn by_radius(stand: &Stand, radii_px: &[f64]) -> anyhow::Result<Rows> {
-    rows(radii_px, |radius_px| found_poles(stand, radius_px, [search(8), search(64), CARVE]))
+    rows(radii_px, |radius_px| {
+        let [few, many, carve] = found_poles(stand, radius_px, [search(8), search(64), CARVE])?;
+        Ok([few, many, carve, carve - few])
+    })
 }
 
 fn by_steps(stand: &Stand, steps: &[f64]) -> anyhow::Result<Rows> {

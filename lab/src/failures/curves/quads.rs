@@ -1,8 +1,6 @@
 //! Quads of samples: grazing normals, isolated samples, holes, and room behind a surface.
 
-use depth_image::{
-    BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, oct16_from_unit,
-};
+use depth_image::{BACKGROUND_INVERSE_DEPTH, DepthImage, HOLE_INVERSE_DEPTH, ProvenanceKind, oct16_from_unit};
 use glam::{UVec2, Vec3};
 use scene::procedural::{quad, tree_terrain};
 
@@ -80,11 +78,18 @@ fn by_normal(stand: &Stand, angles_deg: &[f64]) -> anyhow::Result<Rows> {
         let quads = stand.reconstructor().read_quads(&stage.set()?, HYBRID)?;
         let stretch = |point: &Vec3| {
             let depth_m = (*point - camera.eye_in_world).dot(camera.forward_in_world());
-            100.0 * f64::from((depth_m / WALL_M).max(WALL_M / depth_m) - 1.0)
+            // A corner behind the eye has no stretch.
+            let ratio = if depth_m > 0.0 { (depth_m / WALL_M).max(WALL_M / depth_m) } else { f32::NAN };
+            100.0 * f64::from(ratio - 1.0)
         };
         let greatest = |corners: &mut dyn Iterator<Item = &Vec3>| {
             // `f64::max` would hide what is no number.
-            corners.map(stretch).fold(0.0, |most, stretch| if stretch <= most { most } else { stretch })
+            corners.map(stretch).fold(
+                0.0,
+                |most: f64, stretch| {
+                    if most.is_nan() || stretch <= most { most } else { stretch }
+                },
+            )
         };
         let middle = &quads[36 * 72 + 36];
         let anywhere = greatest(&mut quads.iter().flat_map(|quad| &quad.corners_in_world));
@@ -112,8 +117,7 @@ fn by_distance(stand: &Stand, distances: &[f64]) -> anyhow::Result<Rows> {
 /// out.
 fn isolated(image: &DepthImage, distance: usize) -> DepthImage {
     let mut image = image.clone();
-    let Camera::Pinhole(PinholeCamera { size_px, .. }) = image.camera;
-    let (width, height) = (size_px.x as usize, size_px.y as usize);
+    let [width, height] = image.size_px().to_array().map(|side| side as usize);
     for (index, depth) in image.inverse_depth_per_m.iter_mut().enumerate() {
         let (x, y) = (index % width, index / width);
         let is_inside = x > 0 && y > 0 && x + 1 < width && y + 1 < height;

@@ -71,7 +71,7 @@ pub const CURVES: [Curve; 6] = [
         x: X::linear("jitter", "texels", &[0.0, 0.05, 0.1, 0.25, 0.5]),
         y: ["texels that change between kept and omitted", ""],
         series: &[
-            Series::new("pixel", &[Shape::rises(0.01, 0.01), STILL, Shape::Bounded { least: 0.0, most: 0.12 }]),
+            Series::new("pixel", &[Shape::rises(0.01, 0.01), STILL, Shape::Bounded { least: 0.0, most: 0.1 }]),
             Series::new("visibility", &[STILL, Shape::Bounded { least: 0.0, most: 0.05 }]),
             Series::new("tolerance", &[STILL, Shape::Bounded { least: 0.0, most: 0.1 }]),
         ],

@@ -32,7 +32,7 @@ pub const CURVES: [Curve; 4] = [
         x: X::linear("bits", "", &[4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 16.0, 24.0, 32.0])
             .with_small(&[4.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0, 32.0]),
         y: ["mean depth error", "%"],
-        series: &[Series::new("joint_carve", &[Shape::FallsThenFlat { least_fall: 0.05, tolerance: 0.01 }])],
+        series: &[Series::new("joint_carve", &[Shape::FallsThenFlat { least_fall: 0.05, tolerance: 0.005 }])],
         why: "Below 10 bits a code is coarser than a texel's change of depth; 16 bits lose nothing.",
         measure: by_bits,
     },
