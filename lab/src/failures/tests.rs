@@ -53,6 +53,14 @@ fn unrefused(curve: &Curve, measured: &Measured) -> Vec<String> {
 }
 
 #[test]
+fn the_page_names_every_curve() {
+    let page = include_str!("../../../docs/failures.md");
+    let missing: Vec<&str> =
+        curves::all().map(|curve| curve.name).filter(|name| !page.contains(&format!("**{name}**"))).collect();
+    assert!(missing.is_empty() && !page.contains("**No such curve**"), "{missing:?}");
+}
+
+#[test]
 fn the_list_has_enough_curves_of_strict_shape_and_each_has_a_name_of_its_own() {
     let names: std::collections::BTreeSet<&str> = curves::all().map(|curve| curve.name).collect();
     let strict = curves::all().filter(|curve| curve.is_strict()).count();

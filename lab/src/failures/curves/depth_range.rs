@@ -36,14 +36,11 @@ pub const CURVES: [Curve; 2] = [
         subject: "a card at 1 m before a wall, two images",
         x: RATIOS,
         y: ["pixels with a surface", ""],
-        series: &[
-            Series::new("joint_carve", &[Shape::falls(0.3, 0.02)]),
-            Series::new(
-                "joint_carve, with room behind the wall",
-                &[Shape::EqualAt { x: 1e3, y: 1.0, tolerance: 0.05 }],
-            ),
-        ],
-        why: "From 10,000 on, one code at the far wall is a third of its distance: the cameras no longer agree on a surface there.",
+        series: &[Series::new(
+            "joint_carve",
+            &[Shape::falls(0.3, 0.02), Shape::EqualAt { x: 1e2, y: 1.0, tolerance: 0.05 }],
+        )],
+        why: "Where half a code at the far wall is longer than a surface is thick, two footprints, the ray passes the wall: from 131,000 over the focal length in texels on.",
         measure: far_wall,
     },
 ];
@@ -78,10 +75,6 @@ fn far_wall(stand: &Stand, ratios: &[f64]) -> anyhow::Result<Rows> {
         let camera = |x: f32, size_px| looking(Vec3::X * x, Vec3::new(x, 0.0, -1.0), 60.0, size_px);
         let stage = Stage::new(stand, &scene, &[-0.1, 0.1].map(|x| camera(x, stand.sample_px)))?;
         let view = [camera(0.02, stand.view_px)];
-        let found = |volume| {
-            let views = stage.views_of(&stage.images, volume, &view, CARVE)?;
-            Ok::<_, anyhow::Error>(share_of_kind(&views, ProvenanceKind::Hit))
-        };
-        Ok([found(stage.volume)?, found(stage.volume.padded(far_m))?])
+        Ok([share_of_kind(&stage.views(&view, CARVE)?, ProvenanceKind::Hit)])
     })
 }

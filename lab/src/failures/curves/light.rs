@@ -23,7 +23,7 @@ pub const CURVES: [Curve; 6] = [
         subject: "a courtyard under a wide lamp, sampled and reconstructed",
         x: X::log("rays a pixel and lamp", "", &[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0]),
         y: ["FLIP of the foreground", ""],
-        series: &[Series::new("soft N, joint_carve", &[Shape::FallsThenFlat { least_fall: 0.01, tolerance: 0.01 }])],
+        series: &[Series::new("soft N, joint_carve", &[Shape::FallsThenFlat { least_fall: 0.01, tolerance: 0.003 }])],
         why: "Noise of samples falls with rays, until the reconstruction's own error is all that stays.",
         measure: by_rays,
     },
@@ -70,7 +70,7 @@ pub const CURVES: [Curve; 6] = [
         x: X::linear("height", "m", &[0.0, 1e-6, 1e-3, 0.01, 0.1, 1.0]),
         y: ["mean light of the floor", ""],
         series: &[Series::new("soft 16", &[Shape::rises(0.01, 0.0), Shape::Bounded { least: 0.0, most: 1.0 }])],
-        why: "A lamp in the plane of a surface lights it by its upper half alone, and never by a number that is none.",
+        why: "A lamp in the plane of a surface lights it by its upper half alone, and never by NaN.",
         measure: by_height,
     },
     Curve {

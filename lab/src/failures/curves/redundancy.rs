@@ -62,7 +62,7 @@ pub const CURVES: [Curve; 6] = [
         x: TOLERANCES,
         y: ["share of a view's surfaces that no image holds", ""],
         series: &[Series::new("tolerance", &[Shape::rises(0.002, 2e-3)])],
-        why: "Beyond the default, samples are omitted that no other image holds.",
+        why: "From the default on, walls that the other image met at a slant count as fine enough, and samples are omitted that no image holds.",
         measure: lost_by_tolerance,
     },
     Curve {

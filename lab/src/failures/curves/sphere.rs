@@ -41,7 +41,7 @@ pub const CURVES: [Curve; 4] = [
         subject: FOUR_IMAGES,
         x: X::log("bound", "px", &[0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0]),
         y: ["quads left", ""],
-        series: &[Series::new("hybrid_mesh", &[Shape::falls(0.3, 0.0), Shape::Bounded { least: 0.0, most: 1.0 }])],
+        series: &[Series::new("hybrid_mesh", &[Shape::falls(0.2, 0.0), Shape::Bounded { least: 0.0, most: 1.0 }])],
         why: "A looser bound merges larger blocks.",
         measure: quads_left,
     },

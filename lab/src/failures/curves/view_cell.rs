@@ -73,7 +73,7 @@ pub const CURVES: [Curve; 6] = [
             .with_small(&[0.25, 0.5, 1.0, 2.0, 4.0]),
         y: FLIP,
         series: &[
-            Series::new("joint_carve", &[Shape::falls(0.05, 0.02)]),
+            Series::new("joint_carve", &[Shape::falls(0.03, 0.015)]),
             Series::new("light_field_search:64", &[Shape::falls(0.05, 0.01)]),
         ],
         why: "A texel larger than a view's pixel blurs surfaces and frays silhouettes.",
