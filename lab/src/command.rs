@@ -26,6 +26,12 @@ pub enum StudyCommand {
     /// Measures how well methods sample four kinds of scene: Tables 1 and 2, Fig. 6 and 7 of Xie et al., and more
     Sampling(SamplingArgs),
     /// Draws how methods fail, as curves, and checks their shapes
+    ///
+    /// A curve is a figure over what makes a method fail, such as the error against the number of steps, with the shape
+    /// that it must have: "falls, then is flat". The report has a chart of each curve, and a table of shapes with the
+    /// reasons. A curve that has lost its shape names the first value that is off. docs/failures.md lists all curves.
+    ///
+    /// Errors of pictures are those of the foreground: of the pixels that show a surface.
     Failures(FailuresArgs),
 }
 

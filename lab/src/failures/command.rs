@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use app_core::exit::Outcome;
+use app_core::exit::{BadInput, Outcome};
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use engine::GpuEngine;
@@ -14,17 +14,12 @@ use super::report::{Result as CurveResult, add_to};
 use super::stand::Stand;
 use crate::progress::bar;
 
-/// Draws the curves of docs/failures.md: how each method fails, over what makes it fail. A curve is a list of measured
-/// values and the shape that they must have, such as "falls, then is flat" for the error against the number of steps. A
-/// curve that has lost its shape names the first value that is off. `cargo test -p lab failures` measures the same
-/// curves at a small size.
-///
-/// Errors of pictures are those of the foreground: of the pixels that show a surface.
+/// Measures the curves of docs/failures.md; `cargo test -p lab failures` measures the same at a small size.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  myriorama study failures                       all curves; the report is in out/study/failures/index.html
-  myriorama study failures --quick --strict      small pictures, as in the tests; exit status 1 if a shape is lost
-  myriorama study failures --curve steps         only the curves whose names contain \"steps\"")]
+  myriorama study failures                    all curves
+  myriorama study failures --quick --strict   in small pictures; exit status 1 if a shape is lost
+  myriorama study failures --curve steps      only the curves whose names contain \"steps\"")]
 pub struct FailuresArgs {
     #[command(flatten)]
     device: DeviceArgs,
@@ -55,7 +50,9 @@ impl FailuresArgs {
 /// No curve has such a name, or the folder cannot be written. A curve that cannot be measured is one that does not hold.
 pub fn run(args: &FailuresArgs) -> anyhow::Result<Outcome> {
     let wanted: Vec<_> = curves::all().filter(|curve| args.wants(curve.name)).collect();
-    anyhow::ensure!(!wanted.is_empty(), "no curve's name contains {}", args.curves.join(" or "));
+    if wanted.is_empty() {
+        return Err(BadInput(format!("no curve's name contains {:?}", args.curves)).into());
+    }
     let engine = GpuEngine::shared(args.device.device)?;
     let stand = Stand::new(&engine, args.quick);
     let mut report = Report::new("Myriorama study: failures", engine.device_name());
