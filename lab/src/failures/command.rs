@@ -32,7 +32,7 @@ pub struct FailuresArgs {
     /// Only curves whose names contain this text, in any case
     #[arg(long = "curve", value_name = "TEXT")]
     curves: Vec<String>,
-    /// Exit status 1 when a curve has not its shape
+    /// Exit status 1 when a curve has lost its shape
     #[arg(long)]
     strict: bool,
 }
