@@ -5,6 +5,7 @@ use clap::Subcommand;
 
 use crate::bench::{self, BenchArgs};
 use crate::demo::{self, DemoArgs};
+use crate::failures::command::{self as failures, FailuresArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
 
 /// A subcommand that measures.
@@ -14,16 +15,24 @@ pub enum LabCommand {
     Demo(DemoArgs),
     /// Measures speed and accuracy against bars and writes a report
     Bench(BenchArgs),
-    /// Repeats the experiments of a paper, its figures beside ours, and writes a report
+    /// Repeats the experiments of a paper, or draws how methods fail, and writes a report
     #[command(subcommand)]
     Study(StudyCommand),
 }
 
-/// A study of one paper.
+/// A study.
 #[derive(Debug, Subcommand)]
 pub enum StudyCommand {
     /// Measures how well methods sample four kinds of scene: Tables 1 and 2, Fig. 6 and 7 of Xie et al., and more
     Sampling(SamplingArgs),
+    /// Draws how methods fail, as curves, and checks their shapes
+    ///
+    /// A curve is a figure over what makes a method fail, such as the error against the number of steps, with the shape
+    /// that it must have: "falls, then is flat". The report has a chart of each curve, and a table of shapes with the
+    /// reasons. A curve that has lost its shape names the first value that is off. docs/failures.md lists all curves.
+    ///
+    /// Errors of pictures are those of the foreground: of the pixels that show a surface.
+    Failures(FailuresArgs),
 }
 
 impl LabCommand {
@@ -36,6 +45,7 @@ impl LabCommand {
             Self::Demo(args) => demo::run(args),
             Self::Bench(args) => bench::run(args),
             Self::Study(StudyCommand::Sampling(args)) => sampling::run(args),
+            Self::Study(StudyCommand::Failures(args)) => failures::run(args),
         }
     }
 }

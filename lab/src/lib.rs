@@ -1,8 +1,8 @@
 //! Measurements of the program: speed, accuracy and scaling, each as a report.
 //!
 //! [`demo`] is the paper's experiment on this machine. [`bench`] compares measured values with bars. [`load`] and
-//! [`scaling`] start clusters of processes. [`sampling_study`] repeats the experiments of a paper on sampling. A thin
-//! build of the program has none of this.
+//! [`scaling`] start clusters of processes. [`sampling_study`] repeats the experiments of a paper on sampling.
+//! `failures` holds the shapes of curves of errors. A thin build of the program has none of this.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod balance;
@@ -12,6 +12,7 @@ mod cpu_share;
 mod demo;
 mod evaluation;
 mod experiment;
+mod failures;
 mod lighting_study;
 mod load;
 mod memory;

@@ -26,41 +26,50 @@ pub type Detection = Vec<(f32, [f64; 3])>;
 
 /// Measures all lengths.
 pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detection> {
-    let sampler = Sampler::sharing(engine.renderer.clone());
     let legs = if quick { &LEGS_PX[2..] } else { &LEGS_PX[..] };
     let progress = bar("detection against triangle size", legs.len());
     let mut rows = Vec::with_capacity(legs.len());
     for &leg_px in legs {
-        let name = format!("wall cut to {leg_px} px");
-        engine.put_scene(&name, &wall(leg_px))?;
-        let on_device = engine.scene(&name)?;
-        let draw = DrawWork {
-            scene: &on_device,
-            lighting: Lighting::UNLIT,
-            scene_time_s: 0.0,
-            visibility: Visibility::Measured,
-            refinement: Refinement::default(),
-            turn: Default::default(),
-        };
-        let mut found = [0.0; 3];
-        for (found, test) in found.iter_mut().zip(TESTS) {
-            let method = SamplingMethod::NonRedundant(test);
-            let planes = SamplePlanes::default();
-            let images = sampler.sample(&SampleWork {
-                draw,
-                cameras: &cameras(),
-                wanted: &[0, 1],
-                method,
-                planes,
-                temporal_reference_s: None,
-            })?;
-            *found = left_out(&images[1]);
-        }
-        rows.push((leg_px, found));
+        rows.push((leg_px, found_redundant(engine, leg_px)?));
         progress.inc(1);
     }
     progress.finish_and_clear();
     Ok(rows)
+}
+
+/// The shares of redundant samples that the tests by pixel, visibility and tolerance find on a wall of triangles with
+/// legs of this length.
+///
+/// # Errors
+/// The device's.
+pub fn found_redundant(engine: &Arc<GpuEngine>, leg_px: f32) -> anyhow::Result<[f64; 3]> {
+    let sampler = Sampler::sharing(engine.renderer.clone());
+    let name = format!("wall cut to {leg_px} px");
+    engine.put_scene(&name, &wall(leg_px))?;
+    let on_device = engine.scene(&name)?;
+    let draw = DrawWork {
+        scene: &on_device,
+        lighting: Lighting::UNLIT,
+        scene_time_s: 0.0,
+        visibility: Visibility::Measured,
+        refinement: Refinement::default(),
+        turn: Default::default(),
+    };
+    let mut found = [0.0; 3];
+    for (found, test) in found.iter_mut().zip(TESTS) {
+        let method = SamplingMethod::NonRedundant(test);
+        let planes = SamplePlanes::default();
+        let images = sampler.sample(&SampleWork {
+            draw,
+            cameras: &cameras(),
+            wanted: &[0, 1],
+            method,
+            planes,
+            temporal_reference_s: None,
+        })?;
+        *found = left_out(&images[1]);
+    }
+    Ok(found)
 }
 
 fn cameras() -> [Camera; 2] {

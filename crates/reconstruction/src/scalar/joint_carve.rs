@@ -15,7 +15,7 @@ use crate::{
         BLIND_MOVE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_AMONG_HOLES,
         march::{MARCHES, NUDGE_PX, START_LEVEL},
     },
-    surface::{HALF_CODE, THICKNESS_FOOTPRINTS},
+    surface::HALF_CODE,
     view_work::FAR_AWAY,
 };
 
@@ -71,6 +71,7 @@ fn carve(cameras: &[SampleCamera], ray: &ViewRay, begin: f32, stop_level: u32) -
     let start_level = START_LEVEL.max(stop_level);
     let (mut t, mut level, mut hit, mut known) = (begin, start_level, false, true);
     let among_holes = cameras.iter().any(|camera| camera.among_holes);
+    let thickness_footprints = cameras.iter().map(|camera| camera.thickness_footprints).fold(0.0, f32::max);
     for _ in 0..if among_holes { MAX_MOVES_AMONG_HOLES } else { MAX_MOVES } {
         if t >= ray.far {
             break;
@@ -80,7 +81,7 @@ fn carve(cameras: &[SampleCamera], ray: &ViewRay, begin: f32, stop_level: u32) -
         let free = evaluations.iter().any(|v| v.free_until == v.exit && v.free_until > t);
         let (free_until, penetration) = joined(&evaluations, t);
         let descend = !free && level > stop_level && evaluations.iter().any(|v| v.undecided);
-        let candidate = !free && !descend && penetration < THICKNESS_FOOTPRINTS;
+        let candidate = !free && !descend && penetration < thickness_footprints;
         // First go to the very place, then let the cameras vote there.
         let arrived = free_until <= t || stop_level > 0;
         hit = candidate && arrived && evaluations.iter().map(|v| v.vote).sum::<f32>() >= 0.0;
@@ -198,7 +199,7 @@ fn evaluate_node(
     // Free up to the depth of the nearest thing in the node.
     let surface_t = (camera.inverse_depth_per_m(nearest).recip() - a.z) * safe_reciprocal(b.z);
     let free_until = if code > nearest && nearest > 1.0 { surface_t.max(t).min(exit) } else { t };
-    let slack = THICKNESS_FOOTPRINTS * (code.max(exit_code) - camera.code_offset()) / camera.focal_px;
+    let slack = camera.thickness_footprints * (code.max(exit_code) - camera.code_offset()) / camera.focal_px;
     let behind = code.max(exit_code) + slack < farthest;
     let penetration = if behind { FAR_AWAY } else { penetration_inside };
     Evaluation { free_until, exit, penetration, undecided: !behind, vote: 1.0 }
@@ -228,7 +229,7 @@ fn evaluate_cell(camera: &SampleCamera, within: &InNode, corners: Corners) -> Ev
         return Evaluation { free_until: crossing, exit, penetration, ..nothing };
     }
     let footprint = (code - camera.code_offset()) / camera.focal_px;
-    let reach = THICKNESS_FOOTPRINTS * footprint;
+    let reach = camera.thickness_footprints * footprint;
     let vote = |(i, share): (usize, f32)| match gaps[i] {
         gap if gap > reach && corners.certain => -share,
         gap if gap.abs() < reach && corners.codes[i] > 1.5 => share,

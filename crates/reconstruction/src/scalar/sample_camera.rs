@@ -6,6 +6,7 @@ use glam::{UVec2, Vec2, Vec3, Vec4};
 use crate::{
     pyramid::{BACKGROUND_CODE, CodedDepth, Pyramid},
     sample_set::stretch,
+    surface::THICKNESS_FOOTPRINTS,
     view_work::FAR_AWAY,
 };
 
@@ -22,6 +23,8 @@ pub(super) struct SampleCamera {
     pub mask: u32,
     /// Some texels of some image of the set prove nothing of what lies before them.
     pub among_holes: bool,
+    /// Points within this number of footprints of a sample are on its surface.
+    pub thickness_footprints: f32,
     depth: CodedDepth,
     pyramid: Pyramid,
     wide_words: Vec<u32>,
@@ -58,6 +61,7 @@ impl SampleCamera {
             stretch: stretch(camera),
             mask,
             among_holes,
+            thickness_footprints: THICKNESS_FOOTPRINTS,
             wide_words: pyramid.wide_words(),
             pyramid,
             depth,

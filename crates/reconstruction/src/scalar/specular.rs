@@ -9,7 +9,7 @@ use super::{
     surface::{bilinear, bilinear_shares},
     view_ray::{ViewRay, ViewRays},
 };
-use crate::{sample_set::SetDescription, surface::THICKNESS_FOOTPRINTS, view_work::CELL_MARGIN_PX};
+use crate::{sample_set::SetDescription, view_work::CELL_MARGIN_PX};
 
 /// The mean of the samples around a point.
 struct Gathered {
@@ -82,7 +82,7 @@ fn shares_on_surface(camera: &SampleCamera, point_in_world: Vec3) -> (UVec2, [f3
     let (cell, at) = (uv.as_uvec2(), uv - uv.floor());
     let corners = camera.corners(cell);
     let surfaces = if corners.connected { [bilinear(corners.codes, at); 4] } else { corners.codes };
-    let reach = THICKNESS_FOOTPRINTS * camera.code_above(inverse_w) / camera.focal_px;
+    let reach = camera.thickness_footprints * camera.code_above(inverse_w) / camera.focal_px;
     let mut shares = bilinear_shares(at);
     for i in 0..4 {
         let on_surface = (camera.code(inverse_w) - surfaces[i]).abs() < reach && corners.codes[i] > 1.5;

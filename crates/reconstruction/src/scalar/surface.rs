@@ -4,7 +4,7 @@ use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{pixel::Pixel, sample_camera::SampleCamera, view_ray::ViewRay};
 use crate::{
-    surface::{ANGLE_FLOOR, BORDER_PX, CARVING_SHARE, HIDDEN_WEIGHT, LEAST_SHARE, THICKNESS_FOOTPRINTS, WHOLE},
+    surface::{ANGLE_FLOOR, BORDER_PX, CARVING_SHARE, HIDDEN_WEIGHT, LEAST_SHARE, WHOLE},
     view_work::CELL_MARGIN_PX,
 };
 
@@ -104,7 +104,7 @@ fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> Ca
     let clamped = uv.min(camera.cells - CELL_MARGIN_PX);
     let (cell, at) = (clamped.as_uvec2(), clamped - clamped.floor());
     let corners = camera.corners(cell);
-    let reach = THICKNESS_FOOTPRINTS * camera.code_above(inverse_w) / camera.focal_px;
+    let reach = camera.thickness_footprints * camera.code_above(inverse_w) / camera.focal_px;
     // In a connected cell the surface itself counts, else each sample for itself.
     let surfaces = if corners.connected { [bilinear(corners.codes, at); 4] } else { corners.codes };
     let (mut same, mut beyond, mut color) = (0.0, 0.0, Vec3::ZERO);

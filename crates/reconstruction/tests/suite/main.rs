@@ -4,7 +4,6 @@ mod antialias;
 mod background;
 mod batches;
 mod closed_form;
-mod failures;
 mod holes_and_limits;
 mod merging;
 mod mesh_limits;

@@ -447,31 +447,6 @@ fn a_lamp_inside_a_closed_mesh_lights_its_inside_alone() {
     assert!(view(work(&on_device, "soft 4"), &inside).srgb8.iter().all(|&code| code > 200), "all of it is lit inside");
 }
 
-/// Light stays behind a wall of any thickness; a contact shadow begins where the gap exceeds the rays' bias.
-#[test]
-fn thin_walls_hold_and_contact_shadows_begin_at_the_bias() {
-    let sun =
-        Light::Directional { towards_light_in_world: Vec3::Y, irradiance_linear: Vec3::ONE, angular_radius_rad: 0.0 };
-    let camera = PinholeCamera::looking_at(Vec3::new(0.0, 1.2, 1.2), Vec3::ZERO, Vec3::Y, 0.9, SIZE_PX);
-    let footprint_m = 1.7 / camera.focal_px.y;
-    let mut first_shadow_m = f32::INFINITY;
-    println!("gap (footprints): share of the floor in shadow under the sheet");
-    for power in -12..=0 {
-        let gap_m = footprint_m * 2f32.powi(power);
-        // Seen through, a sheet of no thickness: its own triangles are below the eye's side.
-        let scene = floor_under(&[(Vec3::new(0.0, gap_m, 0.0), 0.3, Vec3::NEG_Y)], lamps(vec![sun]));
-        let light = floor_light(&image(work(&upload(&scene), "shadows"), &camera));
-        let under: Vec<f32> = light.iter().filter(|(p, _)| p.x.abs().max(p.z.abs()) < 0.2).map(|(_, l)| *l).collect();
-        let dark = under.iter().filter(|l| **l == 0.0).count() as f32 / under.len().max(1) as f32;
-        println!("{:9.5}: {dark:.3}", 2f32.powi(power));
-        if dark > 0.99 {
-            first_shadow_m = first_shadow_m.min(gap_m);
-        }
-    }
-    let begins = first_shadow_m / footprint_m;
-    assert!(begins <= 1.0 / 16.0, "contact shadows begin at {begins} footprints");
-}
-
 #[test]
 fn a_refitted_tree_finds_the_surfaces_of_a_new_one() {
     let scene: Scene = "tree-terrain-30k-wind"

@@ -1,11 +1,10 @@
-//! Where light goes wrong, as curves: what they look like is in docs/methods/light.md.
+//! Light far from the origin of a file's coordinates. Where light goes wrong is a list of curves: docs/failures.md.
 
 use depth_image::{DepthImage, Light, PinholeCamera, linear_from_rgb9e5};
 use glam::{DVec3, Vec3};
-use scene::procedural::{courtyard, uv_sphere};
 use scene::{Limits, Scene};
 
-use crate::stage::{SIZE_PX, floor_light, floor_under, image, lamps, lit_points, mean, upload, work};
+use crate::stage::{SIZE_PX, image, lamps, mean, upload, work};
 
 fn sun(towards: Vec3) -> Light {
     Light::Directional {
@@ -22,54 +21,6 @@ fn root_mean_square_difference(a: &DepthImage, b: &DepthImage) -> f32 {
         difference * difference
     });
     mean(squares).sqrt()
-}
-
-/// A ceiling lamp of one brightness in all, a quarter to four times as wide as the scene (Xie's Table 4): the wider
-/// it is the more its rays differ, up to the noise of rays that see all or nothing; more rays help at every width.
-#[test]
-fn wide_lamps_need_more_rays_but_never_fail() {
-    let mut scene = courtyard();
-    let bounds = scene.bounds();
-    let diagonal_m = bounds.size().length();
-    let eye = bounds.center() + Vec3::new(0.4, 1.0, 1.1) * diagonal_m * 0.8;
-    let camera = PinholeCamera::looking_at(eye, bounds.center(), Vec3::Y, 0.8, SIZE_PX);
-    println!("width (diagonals): error of 4, 16 and 64 rays beside 1024");
-    for width in [0.25, 0.5, 1.0, 2.0, 4.0] {
-        let half_m = 0.5 * width * diagonal_m;
-        scene.illumination = lamps(vec![Light::Rectangle {
-            center_in_world: bounds.center() + Vec3::Y * diagonal_m,
-            half_edges_in_world: [Vec3::X * half_m, Vec3::Z * half_m],
-            radiance_linear: Vec3::splat(1.0 / (width * width)),
-        }]);
-        let on_device = upload(&scene);
-        let lit = |rays: u32| image(work(&on_device, &format!("soft {rays}")), &camera);
-        let converged = lit(1024);
-        let errors = [4, 16, 64].map(|rays| root_mean_square_difference(&lit(rays), &converged));
-        println!("{width:5.2}: {errors:.5?}");
-        assert!(errors.iter().all(|e| e.is_finite() && *e < 0.2), "{width}: {errors:?}");
-        assert!(errors[0] > 1.5 * errors[1] && errors[1] > 1.5 * errors[2], "{width}: {errors:?}");
-    }
-}
-
-/// Smooth normals over flat facets: where light grazes, a facet that faces away shadows what the normals call lit.
-#[test]
-fn coarse_spheres_shadow_themselves_at_the_terminator() {
-    let camera = PinholeCamera::looking_at(Vec3::Z * 4.0, Vec3::ZERO, Vec3::Y, 0.7, SIZE_PX);
-    let mut before = 1.0;
-    println!("segments: share of what faces the light that lies in the sphere's own shadow");
-    for segments in [8, 16, 32, 64, 128] {
-        let mut scene = uv_sphere(1.0, segments);
-        scene.illumination = lamps(vec![sun(Vec3::new(1.0, 0.37, 0.21))]);
-        let on_device = upload(&scene);
-        let shares = |lighting| lit_points(&image(work(&on_device, lighting), &camera));
-        let (plain, shadowed) = (shares("phong"), shares("shadows"));
-        let facing: Vec<_> = plain.iter().zip(&shadowed).filter(|((_, lit), _)| *lit > 0.0).collect();
-        let dark = facing.iter().filter(|(_, (_, lit))| *lit == 0.0).count() as f32 / facing.len() as f32;
-        println!("{segments:4}: {dark:.4}");
-        assert!(dark < before && (segments > 8 || dark > 0.03), "{segments}: {dark} after {before}");
-        before = dark;
-    }
-    assert!(before < 0.02, "a fine sphere is nearly free of it: {before}");
 }
 
 /// A canopy over a floor as an OBJ file with its corner at `at`, lit by a slanting sun.
@@ -108,25 +59,5 @@ fn distant_surfaces_are_lit_like_near_ones() {
             println!("at {far:e} m: inverse depth {off:e} a metre, light {light:e}");
             assert!(off < 1e-5 && light < 1e-3, "{far:e}: {off} {light}");
         }
-    }
-}
-
-/// A lamp sinks to the level of the floor that it lights.
-#[test]
-fn a_lamp_in_the_plane_of_a_surface_gives_it_none() {
-    let camera = PinholeCamera::looking_at(Vec3::new(0.0, 2.5, 0.1), Vec3::ZERO, Vec3::NEG_Z, 0.9, SIZE_PX);
-    println!("height (m): mean light of the floor");
-    let mut before = f32::INFINITY;
-    for height_m in [1.0, 0.1, 0.01, 1e-3, 1e-6, 0.0] {
-        let lamp = Light::Point {
-            position_in_world: Vec3::new(2.0, height_m, 0.0),
-            intensity_linear: Vec3::ONE,
-            radius_m: 0.05,
-        };
-        let scene = floor_under(&[], lamps(vec![lamp]));
-        let light = mean(floor_light(&image(work(&upload(&scene), "soft 16"), &camera)).into_iter().map(|(_, l)| l));
-        println!("{height_m:8}: {light:e}");
-        assert!(light.is_finite() && light >= 0.0 && light <= before, "{height_m}: {light} after {before}");
-        before = light;
     }
 }

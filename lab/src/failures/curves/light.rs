@@ -1,0 +1,212 @@
+//! Light by rays: their number, wide lamps, contact, the terminator, lamps that graze, and the adaptive rate.
+
+use depth_image::{DepthImage, Environment, Illumination, Light, PinholeCamera, linear_from_rgb9e5};
+use glam::{Affine3A, Vec3};
+use render::{GpuScene, Lighting, SamplePlanes};
+use scene::procedural::{courtyard, quad, uv_sphere};
+use scene::{Instance, Scene};
+
+use crate::failures::curve::{Curve, Rows, Series, X, rows};
+use crate::failures::measures::{foreground, light_error, mean, share};
+use crate::failures::shape::Shape;
+use crate::failures::stage::{CARVE, Cell, Stage, looking};
+use crate::failures::stand::Stand;
+
+const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
+/// Rays of the truth.
+const TRUE_RAYS: u32 = 512;
+const SMALL_RATIO: &[Shape] = &[Shape::Bounded { least: 0.0, most: 0.67 }];
+
+pub const CURVES: [Curve; 6] = [
+    Curve {
+        name: "Picture error against rays of light",
+        subject: "a courtyard under a wide lamp, sampled and reconstructed",
+        x: X::log("rays a pixel and lamp", "", &[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0]),
+        y: ["FLIP of the foreground", ""],
+        series: &[Series::new("soft N, joint_carve", &[Shape::FallsThenFlat { least_fall: 0.01, tolerance: 0.003 }])],
+        why: "Noise of samples falls with rays, until the reconstruction's own error is all that stays.",
+        measure: by_rays,
+    },
+    Curve {
+        name: "Noise against the width of a lamp",
+        subject: "a courtyard under a ceiling lamp of one brightness",
+        x: X::log("width", "diagonals", &[0.25, 0.5, 1.0, 2.0, 4.0]),
+        y: ["RMSE of linear light", ""],
+        series: &[
+            Series::new("soft 4", &[Shape::rises(2e-4, 1e-4), Shape::Bounded { least: 0.0, most: 0.2 }]),
+            Series::new("soft 16 over soft 4", SMALL_RATIO),
+            Series::new("soft 64 over soft 16", SMALL_RATIO),
+        ],
+        why: "The wider a lamp is, the more its rays differ; more rays help at every width.",
+        measure: by_width,
+    },
+    Curve {
+        name: "Contact shadow against the gap",
+        subject: "a sheet over a floor under a sun",
+        x: X::log("gap", "footprints", &[2.5e-4, 1e-3, 3.90625e-3, 0.015625, 0.0625, 0.25, 1.0]),
+        y: ["floor under the sheet in shadow", ""],
+        series: &[Series::new(
+            "shadows",
+            &[Shape::rises(0.5, 0.02), Shape::EqualAt { x: 0.0625, y: 1.0, tolerance: 0.01 }],
+        )],
+        why: "Rays begin a little above the surface, so that it does not shadow itself: below this bias nothing is met.",
+        measure: by_gap,
+    },
+    Curve {
+        name: "Terminator against the mesh",
+        subject: "a sphere with smooth normals under a slanting sun",
+        x: X::log("segments", "", &[8.0, 16.0, 32.0, 64.0, 128.0]),
+        y: ["lit side in its own shadow", ""],
+        series: &[Series::new(
+            "shadows",
+            &[Shape::falls(0.03, 0.0), Shape::EqualAt { x: 128.0, y: 0.0, tolerance: 0.02 }],
+        )],
+        why: "Normals are smooth, facets are flat: where light grazes, a facet that faces away shadows what the normals call lit.",
+        measure: by_segments,
+    },
+    Curve {
+        name: "Light of a lamp that sinks into the floor",
+        subject: "a floor and a small lamp beside it",
+        x: X::linear("height", "m", &[0.0, 1e-6, 1e-3, 0.01, 0.1, 1.0]),
+        y: ["mean light of the floor", ""],
+        series: &[Series::new("soft 16", &[Shape::rises(0.01, 0.0), Shape::Bounded { least: 0.0, most: 1.0 }])],
+        why: "A lamp in the plane of a surface lights it by its upper half alone, and never by NaN.",
+        measure: by_height,
+    },
+    Curve {
+        name: "Error against the adaptive tolerance",
+        subject: "a courtyard under a wide lamp",
+        x: X::log("tolerance", "", &[0.01, 0.04, 0.16, 0.64]),
+        y: ["RMSE of linear light", ""],
+        series: &[Series::new("soft 16, adaptive", &[Shape::rises(1e-4, 1e-4)])],
+        why: "A looser tolerance takes more pixels from their neighbours, and misses finer shadows.",
+        measure: by_tolerance,
+    },
+];
+
+fn soft(rays: u32) -> anyhow::Result<Lighting> {
+    Ok(format!("soft {rays}").parse()?)
+}
+
+fn lamp(light: Light) -> Illumination {
+    Illumination { lights: vec![light], environment: Environment::default() }
+}
+
+/// A courtyard under a square lamp, as wide as said, of one brightness in all.
+fn yard_under_a_lamp(width_diagonals: f32) -> Scene {
+    let mut scene = courtyard();
+    let bounds = scene.bounds();
+    let diagonal_m = bounds.size().length();
+    let half_m = 0.5 * width_diagonals * diagonal_m;
+    scene.illumination = lamp(Light::Rectangle {
+        center_in_world: bounds.center() + Vec3::Y * diagonal_m,
+        half_edges_in_world: [Vec3::X * half_m, Vec3::Z * half_m],
+        radiance_linear: Vec3::splat(width_diagonals.powi(-2)),
+    });
+    scene
+}
+
+fn sun(towards: Vec3) -> Illumination {
+    lamp(Light::Directional {
+        towards_light_in_world: towards.normalize_or(Vec3::Y),
+        irradiance_linear: Vec3::ONE,
+        angular_radius_rad: 0.0,
+    })
+}
+
+/// A white floor of two metres at the origin.
+fn floor(illumination: Illumination) -> Scene {
+    let mut scene = quad(Vec3::ZERO, 1.0, Vec3::Y, [255; 3]);
+    scene.materials[0].unlit = false;
+    Scene { illumination, ..scene }
+}
+
+fn image(stand: &Stand, scene: &GpuScene, lighting: Lighting, camera: &PinholeCamera) -> anyhow::Result<DepthImage> {
+    Ok(stand.images(scene, lighting, &[*camera], SamplePlanes::default())?.remove(0))
+}
+
+/// Linear green light at each sample, with its place.
+fn lit_points(image: &DepthImage) -> Vec<(Vec3, f32)> {
+    let size_px = image.size_px();
+    let places = (0..size_px.y).flat_map(|y| (0..size_px.x).map(move |x| (x, y)));
+    let lit = |(x, y): (u32, u32)| {
+        let color = linear_from_rgb9e5(image.color_rgb9e5[(y * size_px.x + x) as usize]);
+        Some((image.sample_in_world(x, y)?, color.y))
+    };
+    places.filter_map(lit).collect()
+}
+
+fn by_rays(stand: &Stand, rays: &[f64]) -> anyhow::Result<Rows> {
+    let (scene, samples, cameras) =
+        (yard_under_a_lamp(2.0), YARD.samples(4, stand.sample_px), YARD.views(stand.view_px));
+    let truths = Stage::new(stand, &scene, &[])?.relit(soft(TRUE_RAYS)?, &[])?.truth(&cameras)?;
+    rows(rays, |rays| {
+        let stage = Stage::new(stand, &scene, &[])?.relit(soft(rays as u32)?, &samples)?;
+        Ok([foreground(&truths, &stage.views(&cameras, CARVE)?)?.flip])
+    })
+}
+
+fn by_width(stand: &Stand, widths: &[f64]) -> anyhow::Result<Rows> {
+    let bounds = courtyard().bounds();
+    let eye = bounds.center() + Vec3::new(0.4, 1.0, 1.1) * bounds.size().length() * 0.8;
+    let camera = looking(eye, bounds.center(), 45.0, stand.view_px);
+    rows(widths, |width| {
+        let scene = stand.upload(&yard_under_a_lamp(width as f32))?;
+        let converged = image(stand, &scene, soft(1024)?, &camera)?;
+        let error =
+            |rays| Ok::<_, anyhow::Error>(light_error(&image(stand, &scene, soft(rays)?, &camera)?, &converged));
+        let [few, more, most] = [error(4)?, error(16)?, error(64)?];
+        Ok([few, more / few, most / more])
+    })
+}
+
+fn by_gap(stand: &Stand, gaps: &[f64]) -> anyhow::Result<Rows> {
+    let camera = looking(Vec3::new(0.0, 1.2, 1.2), Vec3::ZERO, 52.0, stand.view_px);
+    // At the distance of the sheet's middle.
+    let footprint_m = 1.7 / camera.focal_px.y;
+    rows(gaps, |gap| {
+        let mut scene = floor(sun(Vec3::Y));
+        // The sheet faces down: the eye sees through it.
+        let sheet = quad(Vec3::Y * gap as f32 * footprint_m, 0.3, Vec3::NEG_Y, [255; 3]);
+        scene.meshes.extend(sheet.meshes);
+        scene.instances.push(Instance { mesh: 1, world_from_mesh: Affine3A::IDENTITY });
+        let lit = lit_points(&image(stand, &stand.upload(&scene)?, "shadows".parse()?, &camera)?);
+        let under = lit.iter().filter(|(p, _)| p.y.abs() < 1e-6 && p.x.abs().max(p.z.abs()) < 0.2);
+        Ok([share(under.map(|(_, light)| *light == 0.0))])
+    })
+}
+
+fn by_segments(stand: &Stand, segments: &[f64]) -> anyhow::Result<Rows> {
+    let camera = looking(Vec3::Z * 4.0, Vec3::ZERO, 40.0, stand.view_px);
+    rows(segments, |segments| {
+        let scene = Scene { illumination: sun(Vec3::new(1.0, 0.37, 0.21)), ..uv_sphere(1.0, segments as u32) };
+        let scene = stand.upload(&scene)?;
+        let lit = |lighting: &str| anyhow::Ok(lit_points(&image(stand, &scene, lighting.parse()?, &camera)?));
+        let (plain, shadowed) = (lit("phong")?, lit("shadows")?);
+        let facing = plain.iter().zip(&shadowed).filter(|((_, plain), _)| *plain > 0.0);
+        Ok([share(facing.map(|(_, (_, shadowed))| *shadowed == 0.0))])
+    })
+}
+
+fn by_height(stand: &Stand, heights_m: &[f64]) -> anyhow::Result<Rows> {
+    let camera = looking(Vec3::new(0.0, 2.5, 0.1), Vec3::ZERO, 52.0, stand.view_px);
+    rows(heights_m, |height_m| {
+        let light = Light::Point {
+            position_in_world: Vec3::new(2.0, height_m as f32, 0.0),
+            intensity_linear: Vec3::ONE,
+            radius_m: 0.05,
+        };
+        let image = image(stand, &stand.upload(&floor(lamp(light)))?, soft(16)?, &camera)?;
+        Ok([mean(lit_points(&image).into_iter().map(|(_, light)| f64::from(light))).unwrap_or(f64::NAN)])
+    })
+}
+
+fn by_tolerance(stand: &Stand, tolerances: &[f64]) -> anyhow::Result<Rows> {
+    let scene = stand.upload(&yard_under_a_lamp(2.0))?;
+    let camera = YARD.camera([0.0, 0.0], stand.sample_px);
+    let full = image(stand, &scene, soft(16)?, &camera)?;
+    rows(tolerances, |tolerance| {
+        let adaptive = image(stand, &scene, format!("soft 16, adaptive {tolerance}").parse()?, &camera)?;
+        Ok([light_error(&adaptive, &full)])
+    })
+}

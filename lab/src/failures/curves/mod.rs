@@ -1,0 +1,39 @@
+//! All curves: tests measure them at a small size, the study at its full size.
+
+mod courtyard;
+mod depth_range;
+mod frames;
+mod k_fd;
+mod layers;
+mod light;
+mod odd_eyes;
+mod poles;
+mod quads;
+mod redundancy;
+mod sphere;
+mod thickness;
+mod view_cell;
+
+use super::curve::Curve;
+
+/// Families of curves that share their scene or their parts.
+pub const CURVES: [&[Curve]; 13] = [
+    &poles::CURVES,
+    &sphere::CURVES,
+    &[thickness::CURVE],
+    &odd_eyes::CURVES,
+    &view_cell::CURVES,
+    &[courtyard::CURVE],
+    &depth_range::CURVES,
+    &light::CURVES,
+    &frames::CURVES,
+    &quads::CURVES,
+    &redundancy::CURVES,
+    &layers::CURVES,
+    &k_fd::CURVES,
+];
+
+/// All curves, in the order of the report.
+pub fn all() -> impl Iterator<Item = &'static Curve> {
+    CURVES.iter().copied().flatten()
+}

@@ -1,0 +1,12 @@
+//! Where methods fail, as data: curves with the shapes that they must have, in one list for tests and for the study.
+
+pub mod command;
+mod curve;
+mod curves;
+mod measures;
+mod report;
+mod shape;
+mod stage;
+mod stand;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,143 @@
+//! A scene with sample images, views of it, and the places of cameras.
+
+use depth_image::{Aabb, DepthImage, Environment, Illumination, PinholeCamera, View, ViewPlanes};
+use glam::{UVec2, Vec3};
+use reconstruction::{ErrorBound, ReconstructionMethod, SampleSet, SetDescription};
+use render::{GpuScene, Lighting, SamplePlanes};
+use scene::Scene;
+
+use super::stand::Stand;
+
+/// The default method.
+pub const CARVE: ReconstructionMethod = ReconstructionMethod::JointCarve { stop_level: 0 };
+/// Quads between samples.
+pub const MESH: ReconstructionMethod = ReconstructionMethod::Mesh;
+/// A quad for each sample.
+pub const HYBRID: ReconstructionMethod = ReconstructionMethod::HybridMesh { merged: None };
+
+/// The search in this number of steps.
+pub fn search(steps: u32) -> ReconstructionMethod {
+    ReconstructionMethod::LightFieldSearch { steps }
+}
+
+/// Quads that are merged within a bound.
+pub fn merged(px: f64) -> ReconstructionMethod {
+    ReconstructionMethod::HybridMesh { merged: ErrorBound::from_px(px) }
+}
+
+static DARK: Illumination = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
+
+/// A scene, depth images of it, and the volume in which views look for surfaces.
+pub struct Stage<'s> {
+    stand: &'s Stand,
+    pub scene: GpuScene,
+    lighting: Lighting,
+    background: Environment,
+    pub images: Vec<DepthImage>,
+    pub volume: Aabb,
+}
+
+impl<'s> Stage<'s> {
+    /// The scene in plain light, seen by cameras.
+    pub fn new(stand: &'s Stand, scene: &Scene, cameras: &[PinholeCamera]) -> anyhow::Result<Self> {
+        Self::with_planes(stand, scene, cameras, SamplePlanes::default())
+    }
+
+    /// As [`Stage::new`], with normals and texel corners for all methods.
+    pub fn with_corners(stand: &'s Stand, scene: &Scene, cameras: &[PinholeCamera]) -> anyhow::Result<Self> {
+        let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
+        Self::with_planes(stand, scene, cameras, planes)
+    }
+
+    fn with_planes(
+        stand: &'s Stand,
+        scene: &Scene,
+        cameras: &[PinholeCamera],
+        planes: SamplePlanes,
+    ) -> anyhow::Result<Self> {
+        let (lighting, volume, background) = (Lighting::default(), scene.bounds(), scene.background);
+        let scene = stand.upload(scene)?;
+        let images = stand.images(&scene, lighting, cameras, planes)?;
+        Ok(Self { stand, scene, lighting, background, images, volume })
+    }
+
+    /// The same with images in another light, which its true views have too.
+    pub fn relit(self, lighting: Lighting, cameras: &[PinholeCamera]) -> anyhow::Result<Self> {
+        let images = self.stand.images(&self.scene, lighting, cameras, SamplePlanes::default())?;
+        Ok(Self { images, lighting, ..self })
+    }
+
+    pub fn description(&self) -> SetDescription<'static> {
+        let (volume, background) = (self.volume, self.background);
+        SetDescription { volume, background, illumination: &DARK, highlight: None, environment: None }
+    }
+
+    pub fn set(&self) -> anyhow::Result<SampleSet> {
+        Ok(self.stand.reconstructor().upload(&self.images, &self.description())?)
+    }
+
+    /// Views by a method, with depth and provenance.
+    pub fn views(&self, cameras: &[PinholeCamera], method: ReconstructionMethod) -> anyhow::Result<Vec<View>> {
+        self.views_of(&self.images, self.volume, cameras, method)
+    }
+
+    /// Views of other images in another volume.
+    pub fn views_of(
+        &self,
+        images: &[DepthImage],
+        volume: Aabb,
+        cameras: &[PinholeCamera],
+        method: ReconstructionMethod,
+    ) -> anyhow::Result<Vec<View>> {
+        let description = SetDescription { volume, ..self.description() };
+        let set = self.stand.reconstructor().upload(images, &description)?;
+        Ok(self.stand.reconstructor().reconstruct(&set, cameras, method, ViewPlanes::ALL)?)
+    }
+
+    /// Views from the triangles.
+    pub fn truth(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<View>> {
+        self.stand.views(&self.scene, self.lighting, cameras, ViewPlanes::ALL)
+    }
+}
+
+/// A camera with its upper edge up, or towards −Z where it looks down or up.
+pub fn looking(eye: Vec3, target: Vec3, fov_y_deg: f32, size_px: UVec2) -> PinholeCamera {
+    let up = if (target - eye).normalize_or_zero().y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };
+    PinholeCamera::looking_at(eye, target, up, fov_y_deg.to_radians(), size_px)
+}
+
+/// A square view cell around `eye`; its cameras are aimed at one target.
+#[derive(Debug, Clone, Copy)]
+pub struct Cell {
+    pub eye: Vec3,
+    pub target: Vec3,
+    pub half_m: f32,
+}
+
+/// A fixed nested order of sample cameras, in halves of the cell: corners, centre, edge middles.
+const PLACES: [[f32; 2]; 9] =
+    [[-1.0, -1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [0.0, 0.0], [0.0, -1.0], [0.0, 1.0], [-1.0, 0.0], [1.0, 0.0]];
+/// Views within the cell.
+const VIEWS: [[f32; 2]; 3] = [[0.23, -0.31], [-0.58, 0.44], [0.71, 0.52]];
+const FOV_DEG: f32 = 45.0;
+
+impl Cell {
+    /// The camera at a place, in halves of the cell.
+    pub fn camera(&self, [x, y]: [f32; 2], size_px: UVec2) -> PinholeCamera {
+        let forward = (self.target - self.eye).normalize_or_zero();
+        let reference = if forward.y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };
+        let right = forward.cross(reference).normalize_or_zero();
+        let eye = self.eye + (right * x + right.cross(forward) * y) * self.half_m;
+        looking(eye, self.target, FOV_DEG, size_px)
+    }
+
+    pub fn samples(&self, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
+        // One camera stands in the middle.
+        let skipped = if count == 1 { 4 } else { 0 };
+        PLACES.iter().skip(skipped).take(count).map(|&place| self.camera(place, size_px)).collect()
+    }
+
+    pub fn views(&self, size_px: UVec2) -> Vec<PinholeCamera> {
+        VIEWS.iter().map(|&place| self.camera(place, size_px)).collect()
+    }
+}
