@@ -156,8 +156,13 @@ impl Gpu {
     /// # Errors
     /// Names the table, its texels and the limit.
     pub fn check_table(&self, label: &str, texels: usize) -> Result<(), GpuError> {
-        let limit = u64::from(self.device.limits().max_texture_dimension_2d) * u64::from(TABLE_WIDTH);
-        GpuError::check_limit(&format!("{label} (texels)"), texels as u64, limit)
+        GpuError::check_limit(&format!("{label} (texels)"), texels as u64, self.most_table_texels())
+    }
+
+    /// The texels of the largest table.
+    #[must_use]
+    pub fn most_table_texels(&self) -> u64 {
+        u64::from(self.device.limits().max_texture_dimension_2d) * u64::from(TABLE_WIDTH)
     }
 }
 

@@ -131,7 +131,9 @@ impl GpuScene {
         let geometry = Geometry::gather(scene, &ordered, motion.as_deref(), &boxes);
         let samplers = texture::samplers(gpu);
         let white = texture::upload(gpu, &texture::white());
-        let uploaded: Vec<_> = scene.textures.iter().map(|t| texture::upload(gpu, t)).collect();
+        // Drawing and rays show the same textures; those of rays are one table.
+        let textures = texture::within(&scene.textures, gpu.most_table_texels());
+        let uploaded: Vec<_> = textures.iter().map(|t| texture::upload(gpu, t)).collect();
         let sampled = |t: &Option<TextureUse>| {
             let view = t.map_or(&white, |t| &uploaded[t.texture as usize]);
             (view.clone(), samplers[&t.map_or_else(Default::default, |t| t.wrap)].clone())
@@ -149,7 +151,7 @@ impl GpuScene {
             illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
             light_count: scene.illumination.lights.len(),
             environment: environment.map(Arc::new),
-            rays: RayScene::of(gpu, scene, &ordered, motion.clone()),
+            rays: RayScene::of(gpu, scene, &textures, &ordered, motion.clone()),
             highlights: [
                 scene.materials.iter().any(|m| m.phong_specular > 0.0 && !m.unlit),
                 scene.materials.iter().any(Material::is_specular),

@@ -1,5 +1,6 @@
 //! Textures with mip chains averaged in linear light.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use depth_image::{linear_from_srgb8, srgb8_from_linear};
@@ -42,6 +43,44 @@ pub(crate) fn upload(gpu: &Gpu, texture: &Texture) -> wgpu::TextureView {
     texture.create_view(&Default::default())
 }
 
+/// A scene's textures, whose mip chains take at most `most_texels` together. Where they take more, the largest lose their
+/// finest level first, with a warning that names each and the size that is left.
+pub(crate) fn within(textures: &[Texture], most_texels: u64) -> Vec<Cow<'_, Texture>> {
+    let levels = finest_levels(textures, most_texels);
+    let at_level = |(number, (texture, &level)): (usize, (_, &u32))| match level {
+        0 => Cow::Borrowed(texture),
+        _ => {
+            let [width, height] = size_at(texture, level);
+            tracing::warn!(
+                "texture {number} is shown at {width}×{height}: the device's table holds {most_texels} texels"
+            );
+            mips(texture).nth(level as usize).map_or(Cow::Borrowed(texture), Cow::Owned)
+        }
+    };
+    textures.iter().zip(&levels).enumerate().map(at_level).collect()
+}
+
+/// The finest level of each texture's mip chain that there is room for.
+fn finest_levels(textures: &[Texture], most_texels: u64) -> Vec<u32> {
+    let mut levels = vec![0; textures.len()];
+    let area = |texture: &Texture, level: u32| size_at(texture, level).map(u64::from).iter().product::<u64>();
+    let chain =
+        |texture: &Texture| (0..32).map(|level| area(texture, level)).take_while(|&texels| texels > 1).sum::<u64>() + 1;
+    let mut texels: u64 = textures.iter().map(chain).sum();
+    while texels > most_texels {
+        let largest = (0..textures.len()).rev().max_by_key(|&number| area(&textures[number], levels[number]));
+        let Some(largest) = largest.filter(|&number| area(&textures[number], levels[number]) > 1) else { break };
+        texels -= area(&textures[largest], levels[largest]);
+        levels[largest] += 1;
+    }
+    levels
+}
+
+/// The sides of a level of a mip chain in texels, 1 at least.
+fn size_at(texture: &Texture, level: u32) -> [u32; 2] {
+    [texture.width_px, texture.height_px].map(|side| (side >> level).max(1))
+}
+
 /// The texture and its halves, down to one texel.
 pub(crate) fn mips(texture: &Texture) -> impl Iterator<Item = Texture> {
     let next = |level: &Texture| (level.width_px.max(level.height_px) > 1).then(|| halved(level));
@@ -77,5 +116,26 @@ mod tests {
         let mut texture = Texture { width_px: 2, height_px: 1, is_srgb: true, srgba8: vec![255; 8] };
         texture.srgba8[..3].fill(0);
         assert_eq!(halved(&texture).srgba8, [188, 188, 188, 255]);
+    }
+
+    #[test]
+    fn the_largest_textures_lose_levels_where_all_are_too_many() {
+        let texture = |width_px, height_px| {
+            let srgba8 = vec![9; 4 * (width_px * height_px) as usize];
+            Texture { width_px, height_px, is_srgb: false, srgba8 }
+        };
+        let textures = [texture(8, 8), texture(16, 4), texture(2, 2)];
+        // 64 + 16 + 4 + 1, 64 + 16 + 4 + 2 + 1 and 4 + 1 texels.
+        let taken = |most_texels| -> Vec<[u32; 2]> {
+            let within = within(&textures, most_texels);
+            assert!(within.iter().all(|t| t.srgba8.len() == 4 * (t.width_px * t.height_px) as usize));
+            within.iter().map(|t| [t.width_px, t.height_px]).collect()
+        };
+        assert_eq!(taken(177), [[8, 8], [16, 4], [2, 2]]);
+        assert_eq!(taken(176), [[4, 4], [16, 4], [2, 2]]);
+        assert_eq!(taken(112), [[4, 4], [8, 2], [2, 2]]);
+        assert_eq!(taken(0), [[1, 1], [1, 1], [1, 1]]);
+        let all: usize = within(&textures, 177).iter().flat_map(|t| mips(t)).map(|level| level.srgba8.len() / 4).sum();
+        assert_eq!(all, 177);
     }
 }

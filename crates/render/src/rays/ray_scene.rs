@@ -1,5 +1,6 @@
 //! A scene's triangles on the device, as rays need them: made when rays are first traced, moved when scene time is.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -7,7 +8,7 @@ use glam::{Vec3, Vec4};
 use gpu::{Binding, Gpu, GpuError, Table};
 use parking_lot::Mutex;
 use rayon::prelude::*;
-use scene::{Material, Scene, TextureUse};
+use scene::{Material, Scene, Texture, TextureUse};
 use wgpu::TextureFormat;
 
 use super::bvh::{Bvh, MAX_DEPTH};
@@ -95,9 +96,16 @@ pub(crate) struct HostTables<'t> {
 }
 
 impl RayScene {
-    /// Keeps what trees are made of; nothing is built or uploaded before it is needed.
-    pub(crate) fn of(gpu: &Arc<Gpu>, scene: &Scene, ordered: &[OrderedMesh<'_>], motion: Option<Arc<Motion>>) -> Self {
-        let tables = Tables::of(scene);
+    /// Keeps what trees are made of, with the scene's textures at the levels that fit one table; nothing is built or uploaded
+    /// before it is needed.
+    pub(crate) fn of(
+        gpu: &Arc<Gpu>,
+        scene: &Scene,
+        textures: &[Cow<'_, Texture>],
+        ordered: &[OrderedMesh<'_>],
+        motion: Option<Arc<Motion>>,
+    ) -> Self {
+        let tables = Tables::of(scene, textures);
         Self {
             gpu: gpu.clone(),
             flat: FlatScene::of(scene, ordered, motion, tables.switches.mapped),
@@ -288,14 +296,14 @@ impl Traced {
 }
 
 impl Tables {
-    fn of(scene: &Scene) -> Self {
+    fn of(scene: &Scene, textures: &[Cow<'_, Texture>]) -> Self {
         let mut texels: Vec<[u8; 4]> = Vec::new();
-        let mut place = |texture: &scene::Texture| {
+        let mut place = |texture: &Texture| {
             let first = texels.len() as u32;
             texture::mips(texture).for_each(|level| texels.extend(level.srgba8.as_chunks::<4>().0));
             [first, texture.width_px | texture.height_px << 16]
         };
-        let places: Vec<[u32; 2]> = scene.textures.iter().map(&mut place).collect();
+        let places: Vec<[u32; 2]> = textures.iter().map(|texture| place(texture)).collect();
         let place_of = |texture: Option<TextureUse>| texture.map_or([0, 0], |t| places[t.texture as usize]);
         let materials = scene.materials.iter().flat_map(|material| material_texels(material, place_of)).collect();
         Self { materials, texels, switches: MaterialSwitches::of(scene) }
