@@ -20,7 +20,7 @@ pub fn at_most_over(count: usize, over: usize, share: f64) -> f64 {
         log_term += ((count - k) as f64 / (k + 1) as f64).ln() + odds;
         sum += log_term.exp();
     }
-    // Not `min`, which would make 1 of NaN.
+    // `min` would make 1 of NaN.
     if sum > 1.0 { 1.0 } else { sum }
 }
 

@@ -190,19 +190,43 @@ fn errors_hold_on_another_device_and_costs_do_not() {
         PlanRequest { device: "another".to_owned(), ..request(&budget, 1) },
         PlanRequest { program_version: "2".to_owned(), ..request(&budget, 1) },
     ] {
-        let (device, program_version) = (request.device.clone(), request.program_version.clone());
         let again = plan_again(&subject, request, &first.kept());
         let times = |run: &Run| run.commands.iter().filter(|c| matches!(c, Command::Time { .. })).count();
         assert!(times(&again) >= 1, "costs are timed again");
-        let kept = again.kept();
-        let own = kept.rows.iter().filter_map(|row| row.costs.last()).filter(|costs| *costs.device == device);
-        let settled = own.filter(|costs| costs.program_version == program_version && costs.is_settled).count();
-        assert!(settled <= 4, "rows timed for the prediction of costs are not settled: {settled}");
         let views = |run: &Run| run.probed(Purpose::Screening).iter().map(|(_, views)| views.len()).sum::<usize>();
         assert!(views(&again) * 4 < views(&first), "{} of {}", views(&again), views(&first));
         let devices = again.kept().rows.iter().map(|row| row.costs.len()).max();
         assert_eq!(devices, Some(2), "costs of both are kept");
     }
+}
+
+/// On another device, rows are timed one by one for the prediction of costs, then finalists in turn.
+#[test]
+fn only_costs_of_finalists_are_settled() {
+    let (mut single, mut settled) = (0, 0);
+    for seed in 0..20 {
+        let subject = subject(seed);
+        let budget = format!("flip {:.5}", limit(&subject));
+        let first = plan(&subject, &budget, seed);
+        let elsewhere = PlanRequest { device: "another".to_owned(), ..request(&budget, seed) };
+        let again = plan_again(&subject, elsewhere, &first.kept());
+        let timed = again.commands.iter().filter_map(|command| match command {
+            Command::Time { rows, .. } => Some(rows.clone()),
+            _ => None,
+        });
+        let (finalists, others): (Vec<_>, Vec<_>) = timed.partition(|rows| rows.len() > 1);
+        let finalists: Vec<usize> = finalists.concat();
+        let kept = again.kept();
+        let is_settled = |row: usize| {
+            let kept = kept.rows.iter().find(|kept| kept.row == subject.ladder.rows()[row]).expect("a timed row");
+            kept.costs.last().expect("costs").is_settled
+        };
+        assert!(finalists.iter().all(|&row| is_settled(row)), "seed {seed}");
+        let others: Vec<usize> = others.concat().into_iter().filter(|row| !finalists.contains(row)).collect();
+        assert!(!others.into_iter().inspect(|_| single += 1).any(is_settled), "seed {seed}");
+        settled += finalists.len();
+    }
+    assert!(single >= 20 && settled >= 2, "{single} {settled}");
 }
 
 /// A text of a key.
